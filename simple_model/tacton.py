@@ -20,7 +20,7 @@ from simple_model.rhythm import Rhythm, Signal
 from simple_model.trajectory import Floats, Trajectory
 
 CARRIER = 40e3  # Hz
-LONGEST = 10.0  # s
+LONGEST = 30.0  # s
 MOST_FOCI = 8  # what devices make at a time
 SHARINGS = ("simultaneous", "time_multiplexed")
 SAME = 1e-9  # of a drawing period, within which phases are the same
@@ -40,7 +40,7 @@ class Tacton:
     am_frequency, second_am_frequency : float, Hz, 0 = off
     superposition : (w1, w2), weights >= 0 of the two AM sinusoids, sum 1
     envelope_frequency : float, Hz, 0 = constant
-    duration : float, s, above 0 and at most 10
+    duration : float, s, above 0 and at most 30
     trajectory : Trajectory
     foci : (n,) phases, 0..1 of the drawing period, by which one to eight foci run ahead on the
         same path; for paths of their own see `simple_model.joined`
@@ -84,9 +84,10 @@ class Tacton:
                     "0 switches it off"
                 )
         if not (isfinite(self.duration) and 0 < self.duration <= LONGEST):
+            cure = "shorten it" if self.duration > LONGEST else "give one above 0"
             raise ValueError(
                 f"duration = {self.duration} s is outside 0 < duration <= {LONGEST:g} s, "
-                "the longest Tacton; shorten it"
+                f"the longest Tacton; {cure}"
             )
         if not (drawn := self.trajectory.drawing_frequency) <= CARRIER / 2:
             raise ValueError(

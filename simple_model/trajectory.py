@@ -23,7 +23,7 @@ SHAPES = ("point", "line", "circle", "triangle", "square")  # defined by a size 
 BY_POINTS = ("polyline", "recorded")
 SWEEPS = ("there_and_back", "one_way", "sinusoidal")
 LARGEST = 0.060  # m, the size of a palm
-FURTHEST = 0.100  # m of a point's coordinates, which devices steer to
+FURTHEST = 0.300  # m of a point's coordinates, which devices steer to
 MOST_POINTS = 1_000_000
 STRAIGHT = 1e-5  # m between a path that is a function and the points that stand for it
 NEARBY = 1e-6  # of a period, over which a tangent is taken; and of its part between two points
@@ -78,9 +78,10 @@ class Trajectory:
         choose("shape", self.shape, (*SHAPES, *BY_POINTS))
         choose("sweep", self.sweep, SWEEPS)
         if not (isfinite(self.size) and 0 <= self.size <= LARGEST):
+            cure = "make the path smaller" if self.size > LARGEST else "give a size of 0 or above"
             raise ValueError(
                 f"size = {1e3 * self.size:g} mm is outside 0..{1e3 * LARGEST:g} mm, "
-                "the size of a palm; make the path smaller"
+                f"the size of a palm; {cure}"
             )
         if not (isfinite(self.speed) and self.speed >= 0):
             raise ValueError(f"speed = {self.speed} m/s must be a finite number, 0 or above")

@@ -186,7 +186,8 @@ class Scene:
             axis = int(np.argmax(reach))
             raise ValueError(
                 f"the focus path reaches {1e3 * (reach + half)[axis]:g} mm along {'xy'[axis]}, off "
-                f"the body, which ends at {1e3 * half[axis]:g} mm; shrink it or widen the body"
+                f"the body, which ends at {1e3 * half[axis]:g} mm; shrink it (of a file: skinwave "
+                "convert --resize) or widen the body"
             )
 
     @property

@@ -298,7 +298,7 @@ WRONG = [
     (lambda: Tacton(sharing="in turn"), "use one of simultaneous, time_multiplexed"),
     (lambda: Tacton(trajectory=wandering(), rhythm=PULSES), "levels of its own; put"),
     (lambda: Trajectory(shape="polyline", points=((0, 0),)), "two points or more"),
-    (lambda: Trajectory(shape="polyline", points=((0, 0), (0.2, 0))), "within 100 mm"),
+    (lambda: Trajectory(shape="polyline", points=((0, 0), (0.4, 0))), "within 300 mm"),
     (lambda: Trajectory(shape="polyline", points=((0, 0), (0, 1, 2))), "pairs"),
     (lambda: Trajectory(shape="circle", points=((0, 0), (0, 1))), "has no points"),
     (lambda: Trajectory(shape="polyline", size=0.01, points=((0, 0), (0, 0.01))), "no size"),
@@ -306,7 +306,7 @@ WRONG = [
     (lambda: replace(wandering(), levels=(1.0,)), "as many of each"),
     (lambda: replace(wandering(), speed=1.0), "timing"),
     (lambda: Trajectory(shape="recorded", points=((0, 0),) * 2, times=(1, 2)), "begin with 0"),
-    (lambda: Trajectory(centre=(float("nan"), 0.0)), "within 100 mm"),
+    (lambda: Trajectory(centre=(float("nan"), 0.0)), "within 300 mm"),
 ]
 
 

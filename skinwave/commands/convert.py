@@ -1,9 +1,11 @@
 """A pattern from one kind of file to another: scene, AdapTics, CSV, WAV, pyautd3."""
 
 import argparse
+from math import isfinite
 from pathlib import Path
 
 from skinwave.commands.common import add_reporting, metre, summarise
+from skinwave.plain_text import number_in
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -16,6 +18,11 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--hold", action="store_true", help="a focal point stays until the next")
     parser.add_argument("--role", default="modulation", help="what a WAV is: modulation, envelope")
     parser.add_argument("--scale", default="full", help="of a WAV's samples: full, peak or rms")
+    parser.add_argument(
+        "--parameter", action="append", default=[], metavar="NAME=VALUE",
+        help="of an AdapTics file, instead of its default; may be repeated",
+    )  # fmt: skip
+    parser.add_argument("--resize", type=float, default=1.0, metavar="FACTOR", help="of the path")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
     parser.add_argument("--quiet", action="store_true", help="no summary")
     add_reporting(parser)
@@ -33,6 +40,8 @@ def run(options: argparse.Namespace) -> int:
         hold=options.hold,
         role=options.role,
         scale=options.scale,
+        parameters=dict(map(_parameter, options.parameter)),
+        resize=options.resize,
     )
     base = read(options.scene) if options.scene else None
     inputs = [options.source, *([options.scene] if options.scene else [])]
@@ -43,3 +52,12 @@ def run(options: argparse.Namespace) -> int:
     said = "".join(f"\n  {note}" for note in notes)
     summarise(options, summary, f"wrote {options.target}{said}")
     return 0
+
+
+def _parameter(text: str) -> tuple[str, float]:
+    """Name and value of NAME=VALUE."""
+    name, _, value = text.rpartition("=")
+    number = number_in(value)
+    if not name or number is None or not isfinite(number):
+        raise ValueError(f"--parameter {text} is not NAME=VALUE, such as proximity=0.5")
+    return name.strip(), number

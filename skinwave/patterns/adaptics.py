@@ -11,7 +11,6 @@ at one place becomes a circle, or a line that is swept as a cosine; anything els
 at the engine's 20 kHz.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 from math import cos, pi, radians, sin
 from typing import Any
@@ -20,86 +19,157 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import Tacton, Trajectory
-from simple_model.tacton import LONGEST
-from skinwave.patterns.adaptics_file import Animation, Brush, Track, parse
-from skinwave.patterns.focal_points import recorded
+from simple_model.tacton import COMMENSURATE, LONGEST, RETURNED
+from simple_model.trajectory import LARGEST
+from skinwave.patterns.adaptics_file import Brush, Track, parse
 from skinwave.patterns.pattern import Options, Pattern, one_height
 
 ENGINE_RATE = 20_000.0  # Hz
 UNBOUNDED = 1.0  # s that stand for a pattern that nothing ends
-NONE = Brush(name="circle", numbers=(0.0,), am_frequency=0.0, drawing_frequency=100.0)
+STRAIGHT = 1e-5, 1e-3  # m and of full drive, within which straight lines stand for samples
 
 
 def read(content: bytes, options: Options) -> Pattern:
     """The pattern in an .adaptics file.
 
+    A pattern that jumps back for ever is its loop: what comes before is left out.
+
     Raises
     ------
     ValueError
-        If it is none, or has what depends on who plays it.
+        If it is none, or lasts too long.
     """
-    animation = parse(content)
+    animation = parse(content, options.parameters)
     notes = list(animation.notes)
-    duration = animation.duration
+    runs = np.array(animation.runs[animation.loop or 0 :])
+    before = float(np.diff(animation.runs[: animation.loop or 0]).sum())  # s until the loop
+    duration = float(np.diff(runs).sum())
     if duration == 0:
-        duration = UNBOUNDED
+        runs, duration = runs[-1:] + [[0.0, UNBOUNDED]], UNBOUNDED
         notes.append(f"the pattern has no end: {UNBOUNDED:g} s of it")
-    if duration > LONGEST:
-        raise ValueError(f"the pattern lasts {duration:g} s, longer than {LONGEST:g} s; cut it")
-    places = np.array(animation.places.values or ((0.0, 0.0, 200.0),))
-    height = one_height(places[:, 2] / 1e3, options, notes)
+    if not 2 / ENGINE_RATE <= duration <= LONGEST:
+        raise ValueError(
+            f"the pattern lasts {duration:g} s, outside {2 / ENGINE_RATE:g}..{LONGEST:g} s; "
+            "move its keyframes or its jump"
+        )
+    if animation.loop is not None:
+        jumps = ", ".join(f"{1e3 * end:g}" for _, end in runs)
+        notes.append(
+            f"it jumps back at {jumps} ms for ever, a loop of {1e3 * duration:g} ms"
+            + (f"; the first {1e3 * before:g} ms are left out" if before else "")
+        )
+    t, p = _playhead(runs, 1)
+    before_p, part = _between(animation.brushes, p)
+    visited = np.union1d(before_p, before_p[part > 0] + 1)
+    brushes = list(dict.fromkeys(animation.brushes.values[k] for k in visited))
+    if animation.loop is not None and (count := _loops(brushes, duration, notes)) > 1:
+        t, p = _playhead(runs, count)
+    place = _at(animation.places, np.array(animation.places.values), p)
+    level = (
+        animation.factor
+        * _at(animation.intensities, np.array(animation.intensities.values)[:, None], p)[:, 0]
+    )
+    if not level.any():
+        notes.append("its intensity is 0 throughout; other values of its parameters may differ")
+    height = one_height(place[:, 2] / 1e3, options, notes)
     if "height" not in height and options.height is None:
         height = {"height": 0.0}  # on the array itself, which is refused with the limits
-    steady = _steady(animation)
-    if steady is None:
-        tacton = _played(animation, duration, notes)
-        pressure: dict[str, Any] = {"drive": "pressure_squared"}
-    else:
-        brush, place, intensity = steady
-        tacton = _drawn(brush, place, notes)
-        tacton = replace(tacton, amplitude=_within(intensity, notes), duration=duration)
-        pressure = {"drive": "pressure_squared"}
-        if brush.am_frequency:
+    pressure: dict[str, Any] = {"drive": "pressure_squared", **height}
+    steady = np.ptp(place[:, :2], axis=0).max() == np.ptp(level) == 0 and len(brushes) == 1
+    if steady and _is_simple(brushes[0]):
+        tacton = _drawn(brushes[0], place[0], notes)
+        tacton = replace(tacton, amplitude=_within(level[:1], notes)[0], duration=duration)
+        if brushes[0].am_frequency:
             pressure["depth_of_modulation"] = 1.0
             notes.append("AM begins at its mean, a quarter of its period behind the engine's")
-    return Pattern(
-        tacton=tacton, pressure=pressure | height, name=animation.name, notes=tuple(notes)
+    else:
+        offset, am_turns = _brush_at(animation.brushes, p, before + t)
+        level = _within(level * (1 + np.cos(2 * pi * am_turns)) / 2, notes)
+        if any(b.name == "lissajous" and b.numbers[5] for b in brushes):
+            notes.append("rotation of a lissajous is taken in radians, as the engine does")
+        notes.append(
+            f"played at {ENGINE_RATE:g} Hz, as the engine does; straight lines between points that "
+            f"are within {1e3 * STRAIGHT[0]:g} mm of it"
+        )
+        tacton = _recorded(t, (place[:, :2] + offset) / 1e3, level)
+    return Pattern(tacton=tacton, pressure=pressure, name=animation.name, notes=tuple(notes))
+
+
+def _loops(brushes: list[Brush], period: float, notes: list[str]) -> int:
+    """How many loops of a period in s bring the phases of brushes and AM back."""
+    turns = period * np.array(
+        [f for b in brushes for f in (b.am_frequency, b.drawing_frequency * any(b.numbers[:2]))]
     )
+    many = np.outer(np.arange(1, int(LONGEST / period) + 1), turns)
+    jump = np.abs(many - np.round(many)).max(axis=1)
+    count = int(np.argmax(jump <= RETURNED) if (jump <= RETURNED).any() else np.argmin(jump))
+    if jump[count] > COMMENSURATE:
+        notes.append(
+            f"where the recording begins again (loops: {count + 1}), the brush jumps by "
+            f"{100 * jump[count]:.2g} % of its turn"
+        )
+    return count + 1
 
 
-def _steady(animation: Animation) -> tuple[Brush, Sequence[float], float] | None:
-    """Brush, place and intensity of a pattern in which they stay the same."""
-    for track in (animation.places, animation.brushes, animation.intensities):
-        if len(set(track.values)) > 1 or (track.times and track.times[0] > 0):
-            return None
-    brush = animation.brushes.values[0] if animation.brushes.values else NONE
-    if brush.name == "lissajous":
-        return None
-    place = animation.places.values[0] if animation.places.values else (0.0, 0.0)
-    intensity = animation.intensities.values[0] if animation.intensities.values else 1.0
-    return brush, place, intensity * animation.factor
+def _playhead(runs: Floats, count: int) -> tuple[Floats, Floats]:
+    """Times (t,) in s at the engine's rate, both ends included, and where the tracks are then (t,)
+    in s, if runs (k, 2) are played so many times.
+    """
+    ends = np.cumsum(np.diff(runs))
+    t = np.linspace(0.0, count * ends[-1], round(count * ends[-1] * ENGINE_RATE) + 1)
+    again = np.mod(t, ends[-1])
+    again[-1] = ends[-1]  # the end itself, not the start of the next loop
+    run = np.minimum(np.searchsorted(ends, again, side="right"), len(ends) - 1)
+    return t, np.asarray(runs[run, 1] - (ends[run] - again))
 
 
-def _within(intensity: float, notes: list[str]) -> float:
-    if not 0 <= intensity <= 1:
-        notes.append(f"intensity {intensity:g} is cut to 0..1, what a device gives")
-    return min(max(intensity, 0.0), 1.0)
+def _recorded(t: Floats, places: Floats, levels: Floats) -> Tacton:
+    """A Tacton of a focus at places (t, 2) in metre with levels (t,), its end included, of which
+    it has the points (k,) that it takes.
+    """
+    values = np.column_stack([places, levels]) / [STRAIGHT[0], STRAIGHT[0], STRAIGHT[1]]
+    kept = np.arange(len(t))
+    while True:
+        fewer = np.append(kept[:-1:2], kept[-1])
+        off = [np.abs(x - np.interp(t, t[fewer], x[fewer])) for x in values.T]
+        worst = np.maximum.reduceat(np.max(off, axis=0), fewer[:-1])
+        needed = np.setdiff1d(kept, fewer)
+        needed = needed[worst[np.searchsorted(fewer, needed) - 1] > 1]
+        found = np.union1d(fewer, needed)
+        if len(found) == len(kept):
+            break
+        kept = found
+    path = Trajectory(
+        shape="recorded",
+        points=tuple(map(tuple, np.round(places[kept], 9).tolist())),
+        times=tuple(np.round(t[kept], 9).tolist()),
+        levels=tuple(np.round(levels[kept], 6).tolist()),
+    )
+    return Tacton(duration=min(path.times[-1], LONGEST), trajectory=path)
 
 
-def _drawn(brush: Brush, place: Sequence[float], notes: list[str]) -> Tacton:
-    """The Tacton of a circle or line brush at a place in millimetre."""
-    x, y, size = place[0] / 1e3, place[1] / 1e3, brush.numbers[0] / 1e3
-    f_d = brush.drawing_frequency
-    if f_d < 0:
-        raise ValueError(f"stm_freq = {f_d:g} Hz must be 0 or above")
+def _within(level: Floats, notes: list[str]) -> Floats:
+    if level.min() < 0 or level.max() > 1:
+        notes.append(
+            f"intensity from {level.min():.3g} to {level.max():.3g} is cut to 0..1, what a device "
+            "gives"
+        )
+    return np.clip(level, 0.0, 1.0)
+
+
+def _is_simple(brush: Brush) -> bool:
+    """Whether a Tacton of a point, a circle or a line is what a brush draws at one place."""
+    size, f_d = 2e-3 * brush.numbers[0], brush.drawing_frequency
+    return brush.name != "lissajous" and 0 <= size <= LARGEST and f_d >= 0
+
+
+def _drawn(brush: Brush, place: Floats, notes: list[str]) -> Tacton:
+    """The Tacton of a simple brush at a place in millimetre."""
+    (x, y), size, f_d = place[:2] / 1e3, brush.numbers[0] / 1e3, brush.drawing_frequency
     if size == 0:
         path = Trajectory(centre=(x, y))
     elif brush.name == "circle":
-        path = Trajectory(
-            shape="circle", size=2 * abs(size), speed=2 * pi * abs(size) * f_d, centre=(x, y)
-        )
-        if size < 0:
-            raise ValueError(f"radius = {brush.numbers[0]:g} mm must be 0 or above")
+        path = Trajectory(shape="circle", size=2 * size, speed=2 * pi * size * f_d, centre=(x, y))
     else:
         turn = radians(brush.numbers[1])
         dx, dy = size * cos(turn), size * sin(turn)
@@ -107,36 +177,14 @@ def _drawn(brush: Brush, place: Sequence[float], notes: list[str]) -> Tacton:
             shape="polyline",
             sweep="sinusoidal",
             points=((x + dx, y + dy), (x - dx, y - dy)),
-            speed=4 * abs(size) * f_d,
+            speed=4 * size * f_d,
         )
         notes.append("the line is swept as a cosine, over twice what the file calls its length")
     return Tacton(am_frequency=brush.am_frequency, trajectory=path)
 
 
-def _played(animation: Animation, duration: float, notes: list[str]) -> Tacton:
-    """Samples that the engine would send to a device."""
-    t = np.arange(max(2, round(duration * ENGINE_RATE))) / ENGINE_RATE
-    brush, drawing = _brush_at(animation.brushes, t)
-    place = _at(animation.places, np.array(animation.places.values or [(0.0, 0.0, 0.0)]), t)
-    intensity = np.array(animation.intensities.values or [1.0])
-    level = animation.factor * _at(animation.intensities, intensity[:, None], t)[:, 0]
-    level = level * (1 + np.cos(2 * pi * drawing[:, 0] * t)) / 2
-    if level.min() < 0 or level.max() > 1:
-        notes.append(
-            f"intensity from {level.min():.3g} to {level.max():.3g} is cut to 0..1, what a device "
-            "gives"
-        )
-    if any(b.name == "lissajous" and b.numbers[5] for b in animation.brushes.values):
-        notes.append("rotation of a lissajous is taken in radians, as the engine does")
-    notes.append(f"recorded at {ENGINE_RATE:g} Hz, as the engine plays it")
-    places = (place[:, :2] + brush) / 1e3
-    return recorded(t, places[None], np.clip(level, 0, 1)[None])
-
-
 def _at(track: Track, values: Floats, t: Floats) -> Floats:
     """Values (t, k) of a track that sets values (n, k)."""
-    if len(values) < 2:
-        return np.repeat(values, len(t), axis=0)
     before, part = _between(track, t)
     after = np.minimum(before + 1, len(values) - 1)
     return np.asarray(values[before] + part[:, None] * (values[after] - values[before]))
@@ -152,34 +200,31 @@ def _between(track: Track, t: Floats) -> tuple[np.ndarray, Floats]:
     return before, np.where(np.array(track.steps)[before] | (after == before), 0.0, part)
 
 
-def _brush_at(track: Track, t: Floats) -> tuple[Floats, Floats]:
-    """Offsets (t, 2) in millimetre that the brush draws, and its frequencies (t, 2): AM, drawing.
+def _brush_at(track: Track, p: Floats, t: Floats) -> tuple[Floats, Floats]:
+    """Offsets (t, 2) in millimetre that brushes draw, and turns (t,) of their AM, at times (t,) in
+    s of the track and of the clock.
 
-    Brushes of one kind turn into each other; of two kinds the earlier one stays.
+    Brushes of one kind turn into each other; of two kinds the earlier one stays, and so does what
+    a lissajous draws but for its rotation.
     """
-    brushes = list(track.values) or [NONE]
-    if len(brushes) == 1:
-        before, part = np.zeros(len(t), int), np.zeros(len(t))
-    else:
-        before, part = _between(track, t)
-    offset, frequencies = np.zeros((len(t), 2)), np.zeros((len(t), 2))
-    for k, brush in enumerate(brushes):
-        mine = before == k
-        start = np.array([brush.am_frequency, brush.drawing_frequency, *brush.numbers])
-        end = start
-        if k + 1 < len(brushes) and (after := brushes[k + 1]).name == brush.name:
-            end = np.array([after.am_frequency, after.drawing_frequency, *after.numbers])
-        now = start[:, None] + part[mine] * (end - start)[:, None]
-        frequencies[mine] = now[:2].T
-        offset[mine] = _offset(brush.name, now[1], now[2:], t[mine])
-    if track.times and track.times[0] > 0:  # no brush yet
-        offset[t < track.times[0]], frequencies[t < track.times[0]] = 0.0, 0.0
-    return offset, frequencies
+    before, part = _between(track, p)
+    offset, turns = np.zeros((len(t), 2)), np.zeros(len(t))
+    for k in np.unique(before):
+        mine, brush = before == k, track.values[k]
+        start = np.array([brush.am_frequency, *brush.numbers])
+        end = start.copy()
+        if k + 1 < len(track.values) and (after := track.values[k + 1]).name == brush.name:
+            turned = slice(-1, None) if brush.name == "lissajous" else slice(None)
+            end[0], end[1:][turned] = after.am_frequency, after.numbers[turned]
+        am, *numbers = start[:, None] + part[mine] * (end - start)[:, None]
+        turns[mine] = am * t[mine]
+        offset[mine] = _offset(brush.name, brush.drawing_frequency * t[mine], numbers)
+    return offset, turns
 
 
-def _offset(name: str, f_d: Floats, numbers: Floats, t: Floats) -> Floats:
-    """Offsets (t, 2) in millimetre that a brush draws."""
-    u = 2 * pi * np.mod(f_d * t, 1.0)
+def _offset(name: str, turns: Floats, numbers: list[Floats]) -> Floats:
+    """Offsets (t, 2) in millimetre that a brush draws after so many turns (t,)."""
+    u = 2 * pi * np.mod(turns, 1.0)
     if name == "circle":
         return numbers[0][:, None] * np.stack([np.cos(u), np.sin(u)], axis=-1)
     if name == "line":

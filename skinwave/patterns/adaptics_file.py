@@ -8,24 +8,23 @@ import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import cos, radians, sin
+from operator import add, ge, gt, le, lt, mul, sub, truediv
 from typing import Any
 
+from simple_model.choices import choose
 from skinwave.numbers import is_finite_number
 
 FORMAT = "MidAirHapticsAnimationFileFormat"
 REVISIONS = ("0.0.10-alpha.1", "0.1.0-alpha.2", "0.1.0-alpha.3")
 DRAWN = 100.0  # Hz of a brush that does not say
+KEYFRAMES = ("standard", "pause", "stop")
 BRUSHES = {
     "circle": ("radius",),
     "line": ("length", "rotation"),
     "lissajous": ("x_scale", "y_scale", "a", "b", "d", "rotation"),
 }
-SUMS = {
-    "add": lambda a, b: a + b,
-    "subtract": lambda a, b: a - b,
-    "multiply": lambda a, b: a * b,
-    "divide": lambda a, b: a / b,
-}
+SUMS = {"add": add, "subtract": sub, "multiply": mul, "divide": truediv}
+OPERATORS = {"lt": lt, "lt_eq": le, "gt": gt, "gt_eq": ge}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,10 +39,13 @@ class Brush:
     drawing_frequency: float
 
 
+NONE = Brush(name="circle", numbers=(0.0,), am_frequency=0.0, drawing_frequency=0.0)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Track:
-    """One quantity that keyframes set: `times` in s, `values`, and whether each stays until the
-    next (`steps`) or goes there linearly.
+    """One quantity that keyframes set: `times` in s, the first at most 0, `values`, and whether
+    each stays until the next (`steps`) or goes there linearly.
     """
 
     times: tuple[float, ...]
@@ -53,26 +55,38 @@ class Track:
 
 @dataclass(frozen=True, kw_only=True)
 class Animation:
-    """A file: its `name`; tracks of `places` (x, y, z) in millimetre above the array, `brushes` and
-    `intensities`; `duration` in s, 0 if nothing ends it; the `factor` of all intensities; `notes`.
+    """A file at some values of its parameters.
+
+    Parameters
+    ----------
+    places, brushes, intensities : Track, of (x, y, z) in millimetre above the array, of brushes,
+        and of numbers that the `factor` multiplies
+    runs : ((start, end), ...) in s, parts of the tracks in the order in which they are played
+    loop : index of the run that follows the last one for ever, or None if the pattern ends
+    notes : sentences on values and jumps
     """
 
     name: str
     places: Track
     brushes: Track
     intensities: Track
-    duration: float
     factor: float
+    runs: tuple[tuple[float, float], ...]
+    loop: int | None
     notes: tuple[str, ...]
 
 
-def parse(content: bytes) -> Animation:
+def parse(content: bytes, parameters: Mapping[str, float]) -> Animation:
     """The animation in a file.
+
+    Parameters
+    ----------
+    parameters : values of the file's user parameters, instead of their defaults
 
     Raises
     ------
     ValueError
-        If it is none, or has what depends on who plays it: jumps and random intensity.
+        If it is none, has random intensity, or has no such parameter.
     """
     try:
         table = json.loads(content.decode("utf-8-sig"))
@@ -84,7 +98,7 @@ def parse(content: bytes) -> Animation:
         raise ValueError(
             f"revision {str(revision)[:40]!r} is unknown; save it as one of {', '.join(REVISIONS)}"
         )
-    numbers = _Numbers(_get(table, "user_parameter_definitions", dict, {}))
+    numbers = _Numbers(_get(table, "user_parameter_definitions", dict, {}), parameters)
     try:
         return _animation(table, numbers)
     except RecursionError:
@@ -92,11 +106,11 @@ def parse(content: bytes) -> Animation:
 
 
 class _Numbers:
-    """Numbers of a file, its user parameters at their defaults, which are noted when used."""
+    """Numbers of a file at the values of its user parameters, with a note for each one used."""
 
-    def __init__(self, definitions: Mapping[str, Any]) -> None:
-        self._definitions = definitions
-        self.used: dict[str, float] = {}
+    def __init__(self, definitions: Mapping[str, Any], given: Mapping[str, float]) -> None:
+        self._definitions, self._given = definitions, given
+        self.notes: dict[str, str] = {}
 
     def __call__(self, value: Any, what: str) -> float:
         if not isinstance(value, dict) or "value" not in value:
@@ -110,15 +124,40 @@ class _Numbers:
             return _finite(self._formula(value["value"], what), what)
         raise ValueError(f"{what} has the type {str(kind)[:40]!r}; use f64, param or formula")
 
+    def holds(self, condition: Mapping[str, Any]) -> bool:
+        """Whether the condition of a jump is met; never by a parameter without a value."""
+        operator, name = condition.get("operator"), condition.get("parameter")
+        word = operator.get("name") if isinstance(operator, dict) else operator
+        meets = OPERATORS[choose("operator of a jump", str(word)[:40], OPERATORS)]
+        limit = _finite(condition.get("value"), "value of a jump's condition")
+        if not isinstance(name, str) or name not in {**self._definitions, **self._given}:
+            return False
+        return bool(meets(self._parameter(name), limit))
+
+    def check_used(self) -> None:
+        """Refuse values of parameters that the file does not have."""
+        known = list({**self._definitions, **self.notes})
+        if self._given and not known:
+            raise ValueError("the file has no parameters; leave out --parameter")
+        for name in self._given:
+            choose("parameter", name, known)
+
     def _parameter(self, name: Any) -> float:
-        definition = self._definitions.get(name) if isinstance(name, str) else None
-        if not isinstance(definition, dict):
+        definition = self._definitions.get(name, {}) if isinstance(name, str) else {}
+        if not definition and name not in self._given:
             raise ValueError(f"parameter {str(name)[:40]!r} is not defined; define its default")
-        value = _finite(definition.get("default"), f"default of parameter '{name[:40]}'")
+        what = f"parameter '{name[:40]}'"
+        whole = value = _finite(
+            self._given.get(name, _object(definition, what).get("default")), f"default of {what}"
+        )
         for key, bound in (("min", max), ("max", min)):
             if definition.get(key) is not None:
-                value = bound(value, _finite(definition[key], f"{key} of parameter '{name[:40]}'"))
-        self.used[name] = value
+                value = bound(value, _finite(definition[key], f"{key} of {what}"))
+        source = ", the nearest that the file allows" if value != whole else ""
+        self.notes[name] = (
+            f"{what} = {value:g}{source}" if name in self._given
+            else f"{what} at its default, {value:g}"
+        )  # fmt: skip
         return value
 
     def _formula(self, formula: Any, what: str) -> float:
@@ -155,59 +194,89 @@ def _animation(table: Mapping[str, Any], number: _Numbers) -> Animation:
         raise ValueError(f"a keyframe is at {1e3 * frames[0][0]:g} ms, before the start; move it")
     places: list[tuple[float, Any, bool]] = []  # time, value, whether it is a step
     brushes, intensities = places.copy(), places.copy()
-    duration = frames[-1][0]
+    jumps: list[tuple[float, float]] = []  # when, and where to
+    kinds: dict[float, str] = {}  # of the last keyframe at a time
     for time, _, frame in frames:
-        kind = frame.get("type")
-        if kind not in ("standard", "pause", "stop"):
-            raise ValueError(
-                f"a keyframe has the type {str(kind)[:40]!r}; use standard, pause, stop"
-            )
-        _refuse_jumps(frame, time)
+        kind = choose("type of a keyframe", str(frame.get("type"))[:40], KEYFRAMES)
+        kinds[time] = kind
         if kind == "standard":
             at, step = _with_transition(frame, "coords")
             places.append((time, tuple(_finite(at.get(a), f"coords {a}") for a in "xyz"), step))
         elif places:
             places.append((time, *places[-1][1:]))
         if kind == "stop":
-            duration = time
-            break
+            for track in (brushes, intensities):
+                track += [(time, *each[1:]) for each in track[-1:]]
+            continue
         if frame.get("brush") is not None:
             inner, step = _with_transition(frame, "brush")
             brushes.append((time, _brush(inner, number), step))
         if frame.get("intensity") is not None:
             inner, step = _with_transition(frame, "intensity")
             intensities.append((time, _intensity(inner, number), step))
+        jumps += [(time, to / speed) for to in _jumps(frame, number)[:1]]
+    runs, loop = _runs(kinds, jumps)
     moved = _get(transform, "geometric_transforms", dict, {})
-    placed = _transformed([place for _, place, _ in places], moved, number)
-    notes = [f"parameter '{name}' at its default, {value:g}" for name, value in number.used.items()]
+    path = _track(places, (0.0, 0.0, 0.0))
+    placed = _transformed(path.values, moved, number)
+    factor = number(transform.get("intensity_factor", 1.0), "intensity_factor")
+    number.check_used()
+    notes = list(number.notes.values())
     if speed != 1:
         notes.append(f"played at {speed:g} times the speed, brushes drawn at their own")
     return Animation(
         name=str(table.get("name", ""))[:80],
-        places=replace(_track(places), values=placed),
-        brushes=_track(brushes),
-        intensities=_track(intensities),
-        duration=duration,
-        factor=number(transform.get("intensity_factor", 1.0), "intensity_factor"),
+        places=replace(path, values=placed),
+        brushes=_track(brushes, NONE),
+        intensities=_track(intensities, 0.0),
+        factor=factor,
+        runs=runs,
+        loop=loop,
         notes=tuple(notes),
     )
 
 
-def _track(entries: list[tuple[float, Any, bool]]) -> Track:
-    times, values, steps = zip(*entries, strict=True) if entries else ((), (), ())
+def _track(entries: list[tuple[float, Any, bool]], none: Any) -> Track:
+    """A track; until its first keyframe it has the value `none`, as the engine plays it."""
+    if not entries or entries[0][0] > 0:
+        entries = [(0.0, none, True), *entries]
+    times, values, steps = zip(*entries, strict=True)
     return Track(times=times, values=values, steps=steps)
 
 
-def _refuse_jumps(frame: Mapping[str, Any], time: float) -> None:
-    for jump in _get(frame, "cjumps", list, []) or []:
-        condition = _get(_object(jump, "a conditional jump"), "condition", dict, {})
-        operator = condition.get("operator")
-        word = operator.get("name") if isinstance(operator, dict) else operator
-        raise ValueError(
-            f"the keyframe at {1e3 * time:g} ms has a conditional jump (cjumps: parameter "
-            f"{str(condition.get('parameter'))[:40]!r} {str(word)[:10]} "
-            f"{str(condition.get('value'))[:20]}), which depends on who plays it; take it out"
-        )
+def _jumps(frame: Mapping[str, Any], number: _Numbers) -> list[float]:
+    """Times in s, at speed 1, that a keyframe's jumps go to whose conditions are met."""
+    jumps = [_object(j, "a conditional jump") for j in _get(frame, "cjumps", list, []) or []]
+    return [
+        _finite(jump.get("jump_to"), "jump_to of a jump") / 1e3
+        for jump in jumps
+        if number.holds(_get(jump, "condition", dict, {}))
+    ]
+
+
+def _runs(
+    kinds: dict[float, str], jumps: list[tuple[float, float]]
+) -> tuple[tuple[tuple[float, float], ...], int | None]:
+    """Runs and loop of an `Animation` by the kind of keyframe at a time, and jumps: when, whereto.
+
+    A jump or a stop is met when the time passes its keyframe, a jump first; where playback begins
+    neither is. After a jump to where a stop is in force the pattern ends.
+    """
+    runs: list[tuple[float, float]] = []
+    entered: dict[float, int] = {}
+    stops = [time for time, kind in kinds.items() if kind == "stop"]
+    at = 0.0
+    while at not in entered:
+        entered[at] = len(runs)
+        if runs and max((time for time in kinds if time <= at), default=None) in stops:
+            return tuple(runs), None
+        stop = min((time for time in stops if time > at), default=max(at, *kinds))
+        end, to = next(((t, to) for t, to in jumps if at < t <= stop), (stop, None))
+        runs.append((at, end))
+        if to is None:
+            return tuple(runs), None
+        at = to
+    return tuple(runs), entered[at]
 
 
 def _with_transition(frame: Mapping[str, Any], key: str) -> tuple[Mapping[str, Any], bool]:

@@ -1,12 +1,13 @@
 """From one pattern file to another, by what their names end with."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from meshes import reading
 from skinwave import scene_file
 from skinwave.patterns import adaptics, adaptics_out, autd3, focal_points, waveform
-from skinwave.patterns.pattern import Options, Pattern, onto
-from skinwave.scene import Scene, check_load
+from skinwave.patterns.pattern import Options, Pattern, onto, resized, wide_enough
+from skinwave.scene import Body, Scene, check_load
 
 READERS = (".toml", ".adaptics", ".csv", ".wav")
 WRITERS = (".toml", ".adaptics", ".csv", ".wav", ".py")
@@ -20,23 +21,26 @@ def convert(
 
     Parameters
     ----------
-    base : Scene, which the pattern is put on: its body, probes, drive; a slab of palm by default
+    base : Scene, which the pattern is put on: its body, probes, drive; a slab of palm by default.
+        Only a scene has a body: from one pattern file to another its size does not matter.
 
     Raises
     ------
     ValueError
         If a file is of no known kind or malformed, or the pattern cannot be expressed.
     """
-    _known(target, WRITERS)
+    suffix = _known(target, WRITERS)
+    if suffix != ".toml":
+        base = replace(base or scene_file.loads(""), body=Body(kind="none"))
     scene, notes = read_pattern(source, options, base)
-    content, more = write_pattern(scene, target.suffix.lower(), options)
+    content, more = write_pattern(scene, suffix, options)
     return content, (*notes, *more)
 
 
 def read_pattern(
     path: Path, options: Options, base: Scene | None = None
 ) -> tuple[Scene, tuple[str, ...]]:
-    """The scene of a pattern file, and notes.
+    """The scene of a pattern file on a base, by default a slab that the path lies on, and notes.
 
     Raises
     ------
@@ -45,14 +49,22 @@ def read_pattern(
     """
     suffix = _known(path, READERS)
     if suffix == ".toml":
-        return scene_file.read(path), ()
-    base = base or scene_file.loads("")
+        return _of_scene(scene_file.read(path), options), ()
+    given = base or scene_file.loads("")
     content = reading.content(path, LARGEST[suffix])
     try:
-        pattern = _read(suffix, content, options, base)
-        return onto(base, pattern, path.stem), pattern.notes
+        pattern = _read(suffix, content, options, given)
+        tacton = resized(pattern.tacton, options.resize)
+        notes = list(pattern.notes)
+        given = base or wide_enough(given, tacton, notes)
+        return onto(given, replace(pattern, tacton=tacton), path.stem), tuple(notes)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
+
+
+def _of_scene(scene: Scene, options: Options) -> Scene:
+    tacton = resized(scene.tacton, options.resize)
+    return replace(scene, pressure=replace(scene.pressure, tacton=tacton))
 
 
 def write_pattern(scene: Scene, suffix: str, options: Options) -> tuple[bytes, tuple[str, ...]]:

@@ -1,4 +1,5 @@
-"""Focal points as CSV: tidy, `t_s,point,x_m,y_m,z_m,intensity`, or bare `x,y[,z]` at a rate.
+"""Focal points as CSV: tidy, `t_s,point,x_m,y_m,z_m,intensity`, or bare `x,y[,z[,intensity]]` at a
+rate. Other programs' words for a column are known (`time`, `X (mm)`); without a unit it is s or m.
 
 Intensity is the sound pressure of a point over that at full drive, 0..1; the radiation pressure is
 its square. Several points are foci on paths of their own: their paths one after the other are a
@@ -7,6 +8,7 @@ path, on which each focus runs one part ahead of the one before.
 
 import csv
 import io
+import re
 from collections.abc import Iterator
 from math import isfinite
 
@@ -22,6 +24,11 @@ from skinwave.scene import Scene
 
 COLUMNS = ("t_s", "point", "x_m", "y_m", "z_m", "intensity")
 NEEDED = ("t_s", "x_m", "y_m")
+WORDS = {
+    "t_s": "t|time|timestamp", "point": "point|focus|id|index", "x_m": "x", "y_m": "y", "z_m": "z",
+    "intensity": "intensity|amplitude|strength",
+}  # fmt: skip
+UNITS = {"t_s": {"s": 1.0, "ms": 1e-3, "us": 1e-6}, "lengths": {"m": 1.0, "cm": 1e-2, "mm": 1e-3}}
 DEVICE_RATE = 40_000.0  # Hz
 MOST_ROWS = 1_000_000
 
@@ -152,43 +159,48 @@ def _cells(text: str) -> Iterator[tuple[int, list[str]]]:
 
 
 def _tidy(rows: list[tuple[int, list[str]]]) -> np.ndarray:
-    header = rows[0][1]
-    for name in header:
-        if name not in COLUMNS:
-            hint = meant(name, COLUMNS) or f"; columns are {','.join(COLUMNS)}"
-            raise ValueError(f"column '{name[:40]}' is unknown{hint}")
-    if len(set(header)) < len(header):
-        raise ValueError(f"a column is there twice in {','.join(header)[:80]}; leave one out")
-    if missing := [name for name in NEEDED if name not in header]:
-        raise ValueError(f"column {missing[0]} is missing; columns are {','.join(COLUMNS)}")
     if len(rows) < 2:
         raise ValueError("a header without focal points; give a line each")
-    table = _table(len(rows) - 1)
-    for k, (line, cells) in enumerate(rows[1:]):
-        for name, value in zip(header, _numbers(line, cells, len(header)), strict=True):
-            table[name][k] = value
-    return table
+    columns = [_column(word) for word in rows[0][1]]
+    names = [name for name, _ in columns]
+    if len(set(names)) < len(names):
+        raise ValueError(f"a column is there twice in {','.join(names)[:80]}; leave one out")
+    if missing := [name for name in NEEDED if name not in names]:
+        raise ValueError(f"column {missing[0]} is missing; columns are {','.join(COLUMNS)}")
+    return _table(rows[1:], columns)
+
+
+def _column(word: str) -> tuple[str, float]:
+    """Name of a column by a word of a header, and its unit in s or m."""
+    plain = re.sub(r"[\s_()\[\]]+", " ", word).strip().lower()
+    for name, words in WORDS.items():
+        units = UNITS.get(name, UNITS["lengths"] if name.endswith("_m") else {})
+        if found := re.fullmatch(rf"({words})(?: ({'|'.join(units)}))?", plain):
+            return name, units.get(found[2], 1.0)
+    hint = meant(word, COLUMNS) or f"; columns are {','.join(COLUMNS)}"
+    raise ValueError(f"column '{word[:40]}' is unknown{hint}")
 
 
 def _bare(rows: list[tuple[int, list[str]]], rate: float | None) -> np.ndarray:
-    if rate is None:
-        raise ValueError("the file has no times; say how many samples a second with --rate HZ")
+    width = len(rows[0][1])
+    if rate is None or not 2 <= width <= 4:
+        raise ValueError(
+            f"the file has no header; begin it with {','.join(COLUMNS)} or those that it has, or "
+            "give x,y[,z[,intensity]] alone, and how many samples a second with --rate HZ"
+        )
     if not (isfinite(rate) and rate > 0):
         raise ValueError(f"rate = {rate} Hz must be a finite number above 0")
-    width = len(rows[0][1])
-    if width not in (2, 3):
-        raise ValueError(f"line {rows[0][0]} has {width} columns; a file without header has x,y,z")
-    table = _table(len(rows))
+    table = _table(rows, [(name, 1.0) for name in ("x_m", "y_m", "z_m", "intensity")[:width]])
     table["t_s"] = np.arange(len(rows)) / rate
-    for k, (line, cells) in enumerate(rows):
-        for name, value in zip(("x_m", "y_m", "z_m"), _numbers(line, cells, width), strict=False):
-            table[name][k] = value
     return table
 
 
-def _table(count: int) -> np.ndarray:
-    table = np.zeros(count, [(name, float) for name in COLUMNS])
+def _table(rows: list[tuple[int, list[str]]], columns: list[tuple[str, float]]) -> np.ndarray:
+    table = np.zeros(len(rows), [(name, float) for name in COLUMNS])
     table["intensity"] = 1.0
+    values = np.array([_numbers(line, cells, len(columns)) for line, cells in rows])
+    for (name, unit), column in zip(columns, values.T, strict=True):
+        table[name] = unit * column
     return table
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,8 @@ from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Tacton
 from simple_model.tacton import tones
 from skinwave.scene import Scene
+
+MARGIN = 0.010  # m between a path and the edge of a body that is made for it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +40,8 @@ class Options:
     role : "modulation" or "envelope", what a WAV is
     scale : "full", "peak" or "rms", how a WAV's samples are scaled: as they are, full scale 1; the
         highest to 1; or the root mean square to that of a full sine, 0.707
+    parameters : values of an AdapTics file's parameters, instead of their defaults
+    resize : float, factor of all positions of the path, about the origin
     """
 
     rate: float | None = None
@@ -44,6 +49,8 @@ class Options:
     hold: bool = False
     role: str = "modulation"
     scale: str = "full"
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    resize: float = 1.0
 
 
 def onto(base: Scene, pattern: Pattern, name: str) -> Scene:
@@ -51,6 +58,31 @@ def onto(base: Scene, pattern: Pattern, name: str) -> Scene:
     pressure = replace(base.pressure, tacton=pattern.tacton, **pattern.pressure)
     named = (pattern.name or name).encode("utf-8", "replace").decode()  # half a letter is none
     return replace(base, name=named, pressure=pressure)
+
+
+def resized(tacton: Tacton, factor: float) -> Tacton:
+    """The Tacton with all positions times a factor, drawn at the same frequency."""
+    if not (isfinite(factor) and factor > 0):
+        raise ValueError(f"resize = {factor:g} must be a finite number above 0")
+    path = tacton.trajectory
+    moved = {name: factor * getattr(path, name) for name in ("size", "speed")}
+    x, y = path.centre
+    points = tuple((factor * x, factor * y) for x, y in path.points)
+    centre = (factor * x, factor * y)
+    return replace(tacton, trajectory=replace(path, **moved, centre=centre, points=points))
+
+
+def wide_enough(base: Scene, tacton: Tacton, notes: list[str]) -> Scene:
+    """The base scene on a body that the path of a Tacton lies on, with a note if it is wider."""
+    reach = 2 * (np.abs(tacton.trajectory.outline).max(axis=0) + MARGIN)
+    width, height = np.maximum(reach, [base.body.width, base.body.height]).tolist()
+    if (width, height) == (base.body.width, base.body.height):
+        return base
+    notes.append(
+        f"the default slab is {1e3 * width:g} mm x {1e3 * height:g} mm, for the path to lie on it; "
+        "--scene gives another body, --resize another path"
+    )
+    return replace(base, body=replace(base.body, width=width, height=height))
 
 
 def aliased(tacton: Tacton, rate: float) -> list[str]:
