@@ -141,9 +141,9 @@ BINARIES = {
         "a.wav", lambda d: wav(np.zeros(1, np.int16), d), ["--unit", "m/s"], "has 1 samples"
     ),
     "empty mat": ("a.mat", lambda d: b"", [], "the file is empty"),
-    "no mat": ("a.mat", lambda d: b"text " * 99, [], "no MATLAB file that can be read"),
+    "no mat": ("a.mat", lambda d: b"text " * 99, [], "the file is damaged or no MATLAB file"),
     "half an hdf5": (
-        "a.mat", lambda d: truncated(files.matlab_73, d, ".mat"), [], "no MATLAB file that can be"
+        "a.mat", lambda d: truncated(files.matlab_73, d, ".mat"), [], "the file is damaged"
     ),
     "mat of text": ("a.mat", lambda d: mat(d, note="text"), [], "no array is of motion"),
     "published table": ("impulseResponses.mat", lambda d: b"x", [], "only MATLAB reads"),
@@ -158,7 +158,7 @@ BINARIES = {
                                two=A_MAP + 1), [], "the places may be one or two; give --places"
     ),
     "no phase": ("a.uff", lambda d: universal(d, func_type=9), [], "type 9, which has no phase"),
-    "along x": ("a.uff", lambda d: universal(d, rsp_dir=1), [], "their directions are 1"),
+    "along x": ("a.uff", lambda d: universal(d, rsp_dir=1), [], "their directions are x; give --direction"),
     "wrong name": ("model-5-location-01.f32", lambda d: b"", [], "not that of a SkinSource file"),
     "wrong size": ("model-1-location-01.f32", lambda d: b"x" * 9, [], "has 9 bytes where"),
     "wrong checksum": ("model-1-location-01.f32", lambda d: b"x" * 451008, [], "download it anew"),

@@ -23,10 +23,15 @@ def read(path: Path, given: Given) -> Recording:
     ValueError
         If it is none, or its arrays do not make a measurement.
     """
+    with reading.opened(path):
+        pass
     try:
         found = reading.arrays(path)
-    except ValueError as error:
-        raise ValueError(str(error).replace("make the result anew", "save it anew")) from None
+    except ValueError:
+        raise ValueError(
+            "the file cannot be read: it is damaged, too large, holds objects, or is no .npz; save "
+            "arrays of numbers by numpy.savez"
+        ) from None
     if str(found.get("format", "")) == FORMAT:
         return _own(found)
     if quantity := _of_response(found):

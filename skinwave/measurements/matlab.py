@@ -41,6 +41,8 @@ def _arrays(path: Path) -> dict[str, np.ndarray]:
         except subprocess_call.Refused as error:
             raise ValueError(str(error)) from None
         except MeshError as error:
-            raise ValueError(f"no MATLAB file that can be read ({error}); save it anew") from None
+            raise ValueError(
+                "the file is damaged or no MATLAB file; save it anew with -v7"
+            ) from error
         with np.load(target, allow_pickle=False) as kept:
             return {str(name): kept[f"array{k}"] for k, name in enumerate(kept["names"])}

@@ -35,37 +35,48 @@ def main() -> int:
     except ImportError:
         print(MISSING, file=sys.stderr)
         return REFUSED
-    except Exception as error:  # whatever is made of spoilt bytes
-        said = " ".join(str(error).split())[:80] or type(error).__name__
-        print(f"no MATLAB file that can be read ({said}); save it anew", file=sys.stderr)
+    except TooLarge as error:
+        print(error, file=sys.stderr)
+        return REFUSED
+    except Exception:  # whatever is made of spoilt bytes
+        print("the file is damaged or no MATLAB file; save it anew with -v7", file=sys.stderr)
         return REFUSED
     arrays: dict[str, Any] = {f"array{k}": array for k, array in enumerate(found.values())}
     np.savez(target, names=np.array(list(found), np.str_), **arrays)
     return 0
 
 
+class TooLarge(Exception):
+    """The arrays of a file exceed the limit."""
+
+
+def check(size: float) -> None:
+    """Refuse arrays of more bytes than the limit."""
+    if size > LARGEST:
+        raise TooLarge(
+            f"the file holds {size / 1e6:,.0f} MB, and the limit is {LARGEST / 1e6:,.0f} MB; save "
+            "fewer variables"
+        )
+
+
 def mat(path: Path) -> dict[str, np.ndarray]:
     """Arrays by name of a file of version 4 to 7."""
     from scipy.io import loadmat, whosmat
 
-    told = sum(8 * int(np.prod(shape, dtype=object)) for _, shape, _ in whosmat(path))
-    if told > LARGEST:
-        raise ValueError(f"it holds {told / 1e6:,.0f} MB, and the limit is {LARGEST / 1e6:,.0f}")
+    check(sum(8 * int(np.prod(shape, dtype=object)) for _, shape, _ in whosmat(path)))
     arrays: dict[str, np.ndarray] = {}
     for name, value in loadmat(path).items():
         if not name.startswith("__"):
-            take(arrays, name, value, 0)
+            take(arrays, name, of_scipy(value), 0)
     return arrays
 
 
-def take(arrays: dict[str, np.ndarray], name: str, value: Any, depth: int) -> None:
-    """Add an array, or those of a structure as "structure.field"."""
+def of_scipy(value: Any) -> Any:
+    """An array, a list of the elements of a cell, or a list of structures as dictionaries."""
     array = np.asarray(value)
-    if array.dtype.names and array.size == 1 and depth < DEEPEST:
-        for field in array.dtype.names:
-            take(arrays, f"{name}.{field}", array.ravel()[0][field], depth + 1)
-    elif array.dtype.kind in "fiucU":
-        arrays[name] = array
+    if array.dtype.names:
+        return [{field: of_scipy(one[field]) for field in array.dtype.names} for one in array.flat]
+    return [of_scipy(one) for one in array.flat] if array.dtype.kind == "O" else array
 
 
 def hdf5(path: Path) -> dict[str, np.ndarray]:
@@ -73,22 +84,61 @@ def hdf5(path: Path) -> dict[str, np.ndarray]:
     import h5py
 
     arrays: dict[str, np.ndarray] = {}
-    left = LARGEST
+    total = 0
 
-    def visit(name: str, node: Any) -> None:
-        nonlocal left
-        if not isinstance(node, h5py.Dataset) or name.startswith("#"):
-            return
-        left -= int(node.nbytes)
-        if left < 0:
-            raise ValueError(f"it holds more than {LARGEST / 1e6:,.0f} MB")
-        array = as_in_matlab(node)
-        if array.dtype.kind in "fiucU":
-            arrays[name.replace("/", ".")] = array
+    def read(node: Any) -> Any:
+        nonlocal total
+        if isinstance(node, h5py.Group):
+            return {name: read(one) for name, one in node.items()}
+        total += int(node.nbytes)
+        check(total)
+        if node.dtype == h5py.ref_dtype:
+            return [read(file[one]) for one in node[()].T.flat]
+        return as_in_matlab(node)
 
     with h5py.File(path, "r") as file:
-        file.visititems(visit)
+        for name, node in file.items():
+            if not name.startswith("#"):
+                take(arrays, name, read(node), 0)
     return arrays
+
+
+def take(arrays: dict[str, np.ndarray], name: str, value: Any, depth: int) -> None:
+    """Add an array, those of a structure as "structure.field", and those of the elements of a cell
+    or an array of structures as one array whose first axis is that of the elements.
+    """
+    if isinstance(value, list) and len(value) == 1:
+        value = value[0]
+    if isinstance(value, list) and value and all(isinstance(one, dict) for one in value):
+        value = {field: [one.get(field) for one in value] for field in value[0]}
+    if isinstance(value, dict) and depth < DEEPEST:
+        for field, one in value.items():
+            take(arrays, f"{name}.{field}", one, depth + 1)
+    elif isinstance(value, list):
+        value = stacked(value)
+    if isinstance(value, np.ndarray) and value.dtype.kind in "fiucU":
+        arrays[name] = value
+
+
+def stacked(parts: list[Any]) -> np.ndarray | None:
+    """Arrays along a new first axis, vectors of other lengths with nan at their end; the one text
+    or number if all are the same; None if they do not fit together.
+    """
+    inner = [stacked(one) if isinstance(one, list) else one for one in parts]
+    found = [one for one in inner if isinstance(one, np.ndarray) and one.dtype.kind in "fiucU"]
+    are_words = [one.dtype.kind == "U" for one in found]
+    if not found or len(found) < len(inner) or (any(are_words) and not all(are_words)):
+        return None
+    if are_words[0] or all(one.size == 1 for one in found):
+        alike = all(np.array_equal(one, found[0]) for one in found)
+        return found[0] if alike else np.array([one.ravel()[0] for one in found if one.size])
+    if all(one.size == max(one.shape, default=0) for one in found):
+        length = max(one.size for one in found)
+        if any(one.size < length for one in found):
+            found = [np.pad(one.ravel() * 1.0, (0, length - one.size), constant_values=np.nan)
+                     for one in found]  # fmt: skip
+        return np.stack([one.ravel() for one in found])
+    return np.stack(found) if len({one.shape for one in found}) == 1 else None
 
 
 def as_in_matlab(node: Any) -> np.ndarray:

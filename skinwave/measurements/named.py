@@ -13,6 +13,7 @@ from simple_model.trajectory import Floats
 from skinwave.measurements import units
 from skinwave.measurements.headers import NAMES
 from skinwave.measurements.recording import Given, Recording, nowhere
+from skinwave.measurements.references import aligned
 
 TIMES = ("t", "time", "times", "t_s", "time_s")
 FREQUENCIES = ("f", "freq", "frequency", "frequencies", "frequency_hz", "f_hz")
@@ -69,6 +70,11 @@ def recording(arrays: Mapping[str, Any], given: Given) -> Recording:
     places = _places(short) if given.places is None else given.places
     ordered, said = in_order(values, len(axis), len(places), name)
     drive = vector(short, DRIVES)
+    each = next((short[key] for key in DRIVES if np.shape(short.get(key, 0)) == values.shape), None)
+    if each is not None and not len(frequencies):
+        every = in_order(np.asarray(each), len(axis), len(places), name)[0]
+        ordered, drive, more = aligned(_real(ordered, name), _real(every, name))
+        times, said = times[: ordered.shape[1]], [*said, more]
     return Recording(
         values=ordered if len(frequencies) else _real(ordered, name),
         times=times, frequencies=frequencies, rate=rate(short),
@@ -103,15 +109,16 @@ def in_order(
     if kept.ndim > 3 or kept.ndim == 0:
         raise ValueError(f"'{name[:40]}' has the shape {values.shape}; give samples and places")
     sizes = list(kept.shape)
+    free = [k for k, size in enumerate(sizes) if size != places or sizes.count(places) > 1]
     along = [k for k, size in enumerate(sizes) if size == samples] if samples else [
-        int(np.argmax(sizes))]  # fmt: skip
+        max(free or range(kept.ndim), key=lambda k: sizes[k])]  # fmt: skip
     if not along:
         raise ValueError(
             f"'{name[:40]}' has the shape {kept.shape}, and there are {samples} times or "
             "frequencies; give an array with as many"
         )
     said = [] if samples or kept.ndim == 1 else [
-        f"the longest axis of '{name[:40]}', of {max(sizes)}, is taken as time"]  # fmt: skip
+        f"the axis of {sizes[along[0]]} of '{name[:40]}' is taken as time"]  # fmt: skip
     time = 1 if kept.ndim == 3 and 1 in along else along[0]
     rest = [k for k in range(kept.ndim) if k != time]
     across = [k for k in rest if sizes[k] == places] if places else []
@@ -145,12 +152,27 @@ def _list(names: Any) -> str:
 
 
 def vector(arrays: Mapping[str, Any], names: tuple[str, ...]) -> np.ndarray:
-    """The first array of one axis by these names; empty if there is none."""
+    """The first array of one axis by these names, or of copies of one; empty if there is none.
+
+    Raises
+    ------
+    ValueError
+        If places have times of their own.
+    """
     for name in names:
         if name in arrays and np.asarray(arrays[name]).dtype.kind in "fiuc":
             array = np.asarray(arrays[name])
             if array.size > 1 and array.size == max(array.shape):
                 return array.ravel()
+            if names is TIMES and array.ndim == 2:
+                rows = array if np.diff(array, axis=1).min(initial=1.0) > 0 else array.T
+                first = rows[np.argmax(np.isfinite(rows).sum(axis=1))]
+                if not (np.isnan(rows) | np.isclose(rows, first, rtol=1e-9, atol=0)).all():
+                    raise ValueError(
+                        f"the times '{name}' differ from place to place; save signals of the same "
+                        "times, or a reference of each"
+                    )
+                return first
     return np.empty(0)
 
 

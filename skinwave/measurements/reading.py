@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from simple_model.trajectory import Floats
-from skinwave.measurements import arrays, matlab, skinsource, sound, text, universal
+from skinwave.measurements import arrays, labview, matlab, skinsource, sound, text, universal
 from skinwave.measurements.measurement import Measurement
 from skinwave.measurements.recording import Given, Recording, completed
 from skinwave.measurements.units import length
@@ -27,6 +27,8 @@ class Reader:
 
 READERS = (
     Reader(words="text in columns", suffixes=(".csv", ".tsv", ".txt", ".asc"), read=text.read),
+    Reader(words="LabVIEW's measurement", suffixes=(".lvm",), read=labview.read_lvm),
+    Reader(words="TDMS", suffixes=(".tdms",), read=labview.read_tdms),
     Reader(words="numpy", suffixes=(".npz",), read=arrays.read),
     Reader(words="sound", suffixes=(".wav",), read=sound.read),
     Reader(words="MATLAB", suffixes=(".mat",), read=matlab.read),
@@ -90,6 +92,11 @@ def read(
     except ValueError as error:
         said = " ".join(str(error).split())
         raise ValueError(said if said.startswith(str(path)) else f"{path}: {said}") from None
+    except (ArithmeticError, AttributeError, LookupError, TypeError) as error:
+        raise ValueError(
+            f"{path}: the content does not fit the format, {reader.words}; export it anew, or as "
+            "text in columns"
+        ) from error
 
 
 def read_alone(path: str | Path) -> Measurement:

@@ -8,7 +8,10 @@ import numpy as np
 from scipy.io import wavfile
 
 from meshes import reading
-from skinwave.measurements.recording import Given, Recording, nowhere
+from skinwave.measurements.headers import Column
+from skinwave.measurements.layouts import recording
+from skinwave.measurements.recording import Given, Recording
+from skinwave.measurements.table import Table
 
 LARGEST = 500_000_000  # bytes
 
@@ -26,16 +29,14 @@ def read(path: Path, given: Given) -> Recording:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", wavfile.WavFileWarning)  # of chunks beside the samples
             rate, data = wavfile.read(io.BytesIO(content))
-    except Exception as error:  # whatever is made of spoilt bytes
-        said = " ".join(str(error).split())[:80]
-        raise ValueError(f"not a WAV file that can be read ({said}); export it anew") from None
+    except Exception:  # whatever is made of spoilt bytes
+        raise ValueError("the file is damaged or not a WAV file; export it anew as PCM") from None
     if len(data) < 2:
         raise ValueError(f"the WAV has {len(data)} samples; give two or more")
     values = _of_full_scale(data.reshape(len(data), -1))
-    return Recording(
-        values=values[None],
-        rate=float(rate),
-        places=nowhere(values.shape[1]),
+    columns = tuple(Column(text=f"channel {k + 1}", role="") for k in range(values.shape[1]))
+    return recording(
+        Table(columns=columns, numbers=values, notes=(("rate", repr(float(rate))),)), given
     )
 
 

@@ -26,6 +26,7 @@ from skinwave.measurements.units import plain
 from skinwave.plain_text import number_in
 
 LARGEST = 256_000_000  # bytes
+FIRST_LINE = "LabVIEW Measurement"  # of .lvm files, whatever they are called
 SHOWN = 100  # rows at the end that show what separates cells
 NO_VALUE = (
     "", "-", "--", "---", "na", "n/a", "#n/a", "null", "none", "nan", "1.#qnan", "-1.#ind",
@@ -47,7 +48,12 @@ def read(path: Path, given: Given) -> Recording:
     ValueError
         If it is no table of numbers, or its columns do not make a measurement.
     """
-    return recording(table(decoded(path)), given)
+    text = decoded(path)
+    if text.startswith(FIRST_LINE):
+        from skinwave.measurements.labview import lvm_table  # which reads text
+
+        return recording(lvm_table(text), given)
+    return recording(table(text), given)
 
 
 def places(path: Path) -> Floats:

@@ -36,7 +36,7 @@ _WORDS = {
         "us": "usec microsecond microseconds mikrosekunden", "ns": "nsec nanosecond nanoseconds",
         "Hz": "hz hertz", "kHz": "khz kilohertz", "deg": "deg degree degrees grad degdeg",
         "rad": "rad radian radians", "um": "micron microns micrometer micrometre",
-        "V": "v volt volts", "g": "gn",
+        "V": "v volt volts", "N": "newton newtons", "g": "gn",
     }.items()
     for word in words.split()
 }  # fmt: skip

@@ -15,6 +15,7 @@ from meshes import reading
 from simple_model.trajectory import Floats
 from skinwave.measurements import units
 from skinwave.measurements.recording import Given, Recording, nowhere
+from skinwave.measurements.references import ONE_AFTER_ANOTHER, aligned
 
 LARGEST = 1_000_000_000  # bytes
 MISSING = 'files of Universal File Format 58 need pyuff; pip install "skinwave[measure]"'
@@ -25,39 +26,45 @@ TIME, FREQUENCY = 17, 18
 IN_TIME, IN_FREQUENCY = (1,), (4, 12)
 GENERAL = 0
 TAG = re.compile(rb"    -1(?=[\r\n]|\Z| {74})")  # line before and after each set
-NORMAL = 3  # along z, out of the body, the way a vibrometer above it looks
+AXES = {"x": 1, "y": 2, "z": 3}  # z is out of the body, the way a vibrometer above it looks
 
 
 def read(path: Path, given: Given) -> Recording:
     """The recording in a file of Universal File Format.
 
+    Sets of a reference for each place bring the places into step; a single one is the drive.
+
     Raises
     ------
     ValueError
-        If it is none, has no set 58 of normal motion, or its sets do not fit together.
+        If it is none, has no set 58 of motion along the direction, or its sets do not fit together.
     """
     found = _sets(path)
     functions = [one for one in found if one.get("type") == FUNCTION]
     if not functions:
         kinds = ", ".join(sorted({str(one.get("type")) for one in found})) or "none"
         raise ValueError(f"the file has no set 58, but {kinds}; export functions of time")
-    motion = [one for one in functions if _is_motion(one)]
-    if not motion:
-        raise ValueError(_no_motion(functions))
-    _alike(motion)
-    motion, sign = _along_z(motion)
-    groups = _by_node(motion)
-    values = np.array([[one["data"] for one in group] for group in groups.values()])
+    motion, others = _motion(functions, given)
     first = motion[0]
+    _alike(motion)
+    motion, sign = _turned(motion)
+    groups = _by_node(motion)
     in_time = _is_in_time(first)
+    values = np.moveaxis(
+        np.array([[one["data"] for one in group] for group in groups.values()]), 0, 2
+    )
+    if not in_time and not np.iscomplexobj(values):
+        raise ValueError("its spectra have no phase; export complex spectra or time responses")
     axis = units.in_si(np.asarray(first["x"], float), _per_axis(first, in_time))
-    drive = _drive(functions, first)
-    kind, unit, said = _unit(first, _per_metre(found))
+    kind, unit, said = _unit(first, _per_metre(found), given)
+    values, drive, more = _in_step(values, others, groups, in_time)
+    if len(groups) == 1 and len(motion) > 1:
+        more.append(f"{len(motion)} sets of one node are taken as repetitions")
     return Recording(
-        values=np.moveaxis(values, 0, 2), times=axis if in_time else np.empty(0),
+        values=values, times=axis[: values.shape[1]] if in_time else np.empty(0),
         frequencies=np.empty(0) if in_time else axis, quantity=kind, unit=unit,
         places=_places(found, list(groups)), sign=sign,
-        drive=drive, name=_text(first, "id1"), remarks=tuple(said),
+        drive=drive, name=_text(first, "id1"), remarks=(*said, *more),
     )  # fmt: skip
 
 
@@ -76,9 +83,10 @@ def _sets(path: Path) -> list[dict[str, Any]]:
             kept = {FUNCTION, *NODES, LENGTH_UNIT}
             which = [k for k, kind in enumerate(file.get_set_types()) if int(kind) in kept]
             found = [file.read_sets(k) for k in which]
-    except Exception as error:  # pyuff raises plain ones
-        said = " ".join(str(error).split())[:80]
-        raise ValueError(f"no Universal File that can be read ({said}); export it anew") from None
+    except Exception:  # pyuff raises plain ones
+        raise ValueError(
+            "the file is damaged or no Universal File; export it anew, as text if it is binary"
+        ) from None
     if not found:
         raise ValueError("the file has no set 58 between lines of -1; export it anew")
     return [_cut(one) if one.get("type") == FUNCTION else one for one in found]
@@ -94,30 +102,54 @@ def _cut(one: dict[str, Any]) -> dict[str, Any]:
     return one | {"data": data[:count], "x": np.asarray(one["x"])[:count]}
 
 
-def _is_motion(one: dict[str, Any]) -> bool:
-    """Whether a set is of normal or of undirected motion, with phase."""
-    has_phase = one.get("func_type") in (GENERAL, *IN_TIME, *IN_FREQUENCY)
-    return _is_of_motion(one) and has_phase and abs(int(one.get("rsp_dir", 0))) in (0, NORMAL)
-
-
-def _is_of_motion(one: dict[str, Any]) -> bool:
-    """Whether a set is of displacement, velocity or acceleration by its type or its unit."""
-    said = _text(one, "ordinate_axis_units_lab").removesuffix("/N")
-    return one.get("ordinate_spec_data_type", 0) in KINDS or units.quantity_of(said) != ""
-
-
-def _no_motion(functions: list[dict[str, Any]]) -> str:
-    first = functions[0]
-    if first.get("func_type") not in (GENERAL, *IN_TIME, *IN_FREQUENCY):
-        return (
-            f"its functions are of type {first.get('func_type')}, which has no phase; export time "
-            "responses (1), frequency responses (4) or spectra (12)"
+def _motion(
+    functions: list[dict[str, Any]], given: Given
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Sets of motion with phase along the direction, and those of anything else."""
+    with_phase = [one for one in functions
+                  if one.get("func_type") in (GENERAL, *IN_TIME, *IN_FREQUENCY)]  # fmt: skip
+    if not with_phase:
+        raise ValueError(
+            f"its functions are of type {functions[0].get('func_type')}, which has no phase; "
+            "export time responses (1), frequency responses (4) or spectra (12)"
         )
-    directions = sorted({int(one.get("rsp_dir", 0)) for one in functions})
-    return (
-        f"none of its {len(functions)} functions is of displacement, velocity or acceleration "
-        f"along z; their directions are {', '.join(map(str, directions))[:60]}"
+    others = [one for one in with_phase if _is_reference(one)]
+    sure = [one for one in with_phase if not _is_reference(one)]
+    of = {_quantity(one) for one in sure} - {""}
+    if not of and (given.unit or given.quantity):
+        motion = sure
+    else:
+        wanted = given.quantity if given.quantity in of else ""
+        motion = [one for one in sure if _quantity(one) in ({wanted} if wanted else of)]
+        others += [one for one in sure if not _quantity(one)]
+    along = AXES[given.direction or "z"]
+    at = [one for one in motion if abs(int(one.get("rsp_dir", 0))) in (0, along)]
+    if at:
+        return at, others
+    if not motion:
+        kinds = sorted({_text(one, "ordinate_axis_units_lab") for one in with_phase} - {""})
+        raise ValueError(
+            f"none of its {len(functions)} functions is of displacement, velocity or acceleration"
+            f"{', but in ' + ', '.join(kinds)[:60] if kinds else ''}; give --unit, such as "
+            '"20 mm/s", if they are motion'
+        )
+    names = {number: name for name, number in AXES.items()}
+    directions = {abs(int(one.get("rsp_dir", 0))) for one in motion}
+    known = sorted(names.get(k, f"rotation {k}") for k in directions)
+    raise ValueError(
+        f"none of its {len(motion)} functions of motion is along {given.direction or 'z'}; their "
+        f"directions are {', '.join(known)[:60]}; give --direction"
     )
+
+
+def _is_reference(one: dict[str, Any]) -> bool:
+    return any(_text(one, key).lower().startswith("ref") for key in ("id1", "id2"))
+
+
+def _quantity(one: dict[str, Any]) -> str:
+    """Quantity of motion of a set by its type or its unit; "" if it is of none."""
+    unit = units.per_reference(_text(one, "ordinate_axis_units_lab"))[0]
+    return KINDS.get(int(one.get("ordinate_spec_data_type", 0)), "") or units.quantity_of(unit)
 
 
 def _is_in_time(one: dict[str, Any]) -> bool:
@@ -138,7 +170,10 @@ def _alike(motion: list[dict[str, Any]]) -> None:
     """Refuse sets that differ in what they are of, or in their times or frequencies."""
     first = motion[0]
     for one in motion[1:]:
-        if len(one["data"]) != len(first["data"]) or not np.allclose(one["x"], first["x"]):
+        step = 1e-3 * abs(first["x"][1] - first["x"][0])
+        if len(one["data"]) != len(first["data"]) or not np.allclose(
+            one["x"], first["x"], rtol=1e-6, atol=step
+        ):
             raise ValueError(
                 f"sets 58 have {len(first['data'])} and {len(one['data'])} times or frequencies, "
                 "or other ones; export them with the same"
@@ -147,7 +182,7 @@ def _alike(motion: list[dict[str, Any]]) -> None:
             if one.get(key) != first.get(key):
                 raise ValueError(
                     f"sets 58 differ in {key}: {str(first.get(key))[:20]}, "
-                    f"{str(one.get(key))[:20]}; export one quantity"
+                    f"{str(one.get(key))[:20]}; export one quantity, or choose it by --quantity"
                 )
 
 
@@ -156,7 +191,8 @@ def _by_node(motion: list[dict[str, Any]]) -> dict[int, list[dict[str, Any]]]:
     groups: dict[int, list[dict[str, Any]]] = {}
     for one in motion:
         groups.setdefault(int(one.get("rsp_node", 0)), []).append(one)
-    if len(groups) == 1 and len({_text(one, "rsp_ent_name") for one in motion}) > 1:
+    names = {(_text(one, "rsp_ent_name"), _text(one, "id1")) for one in motion}
+    if len(groups) == 1 and len(names) == len(motion):
         groups = {k: [one] for k, one in enumerate(motion)}
     counts = {len(group) for group in groups.values()}
     if len(counts) > 1:
@@ -166,47 +202,65 @@ def _by_node(motion: list[dict[str, Any]]) -> dict[int, list[dict[str, Any]]]:
     return groups
 
 
-def _along_z(motion: list[dict[str, Any]]) -> tuple[list[dict[str, Any]], int]:
-    """Sets with those along -z turned, and the sign of z, -1, or 0 if they have no direction."""
-    signs = [int(np.sign(int(one.get("rsp_dir", 0)))) for one in motion]
-    if 0 in signs and any(signs):
+def _turned(motion: list[dict[str, Any]]) -> tuple[list[dict[str, Any]], int]:
+    """Sets with those along a negative axis turned, and the sign of z, -1; 0 of other axes."""
+    of = [int(one.get("rsp_dir", 0)) for one in motion]
+    if 0 in of and any(of):
         raise ValueError("some sets 58 have a direction and others none; export one kind")
-    if 0 in signs:
+    if 0 in of:
         return motion, 0
-    turned = zip(motion, signs, strict=True)
-    return [one | {"data": sign * one["data"]} for one, sign in turned], -1
+    turned = zip(motion, np.sign(of), strict=True)
+    return [one | {"data": sign * one["data"]} for one, sign in turned], -(abs(of[0]) == AXES["z"])
 
 
-def _unit(one: dict[str, Any], per: float) -> tuple[str, str, list[str]]:
+def _unit(one: dict[str, Any], per: float, given: Given) -> tuple[str, str, list[str]]:
     """Quantity and unit of the ordinate, of the file's unit of length if it has none, and what was
     assumed.
     """
-    said = _text(one, "ordinate_axis_units_lab").removesuffix("/N")
-    kind = KINDS.get(int(one.get("ordinate_spec_data_type", 0)), "") or units.quantity_of(said)
+    said, per_reference = units.per_reference(_text(one, "ordinate_axis_units_lab"))
+    kind = _quantity(one)
     remarks = []
-    if one.get("func_type") == IN_FREQUENCY[0]:
+    if one.get("func_type") == IN_FREQUENCY[0] or per_reference:
         remarks.append("frequency responses: values are per unit of the reference")
-    if not said:
+    if not said and kind and not given.unit:
         said = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s2"}[kind]
         said = f"{1 / per!r} {said}"
         remarks.append(f"the unit is not in the file, {said} is assumed; --unit replaces it")
     return kind, said, remarks
 
 
+def _in_step(
+    values: np.ndarray, others: list[dict[str, Any]], groups: dict[int, list[dict[str, Any]]],
+    in_time: bool,
+) -> tuple[np.ndarray, np.ndarray, list[str]]:  # fmt: skip
+    """Values (r, n, p) in step by a reference of each, the drive, and sentences."""
+    first = next(iter(groups.values()))[0]
+    fitting = [one for one in others if len(one["data"]) == values.shape[1]
+               and one.get("func_type") == first.get("func_type")]  # fmt: skip
+    if len(fitting) == 1:
+        return values, np.asarray(fitting[0]["data"]), []
+    count = values.shape[0] * values.shape[2]
+    if len(fitting) == count:
+        at: dict[int, list[np.ndarray]] = {}
+        for one in fitting:
+            at.setdefault(int(one.get("rsp_node", 0)), []).append(one["data"])
+        if set(at) != set(groups) or {len(one) for one in at.values()} != {len(values)}:
+            every = iter([one["data"] for one in fitting])  # in the order of the file
+            at = {node: [next(every) for _ in group] for node, group in groups.items()}
+        each = np.moveaxis(np.array([at[node] for node in groups]), 0, 2)
+        if in_time:
+            moved, drive, said = aligned(values, each.real)
+            return moved, drive, [said]
+        turn = np.exp(1j * (np.angle(each[:1, :, :1]) - np.angle(each)))
+        return values * turn, each[0, :, 0], ["phases of places are relative to their references"]
+    is_alone = values.shape[2] == 1 or (not in_time and first.get("func_type") == IN_FREQUENCY[0])
+    return values, np.empty(0), [] if is_alone else [ONE_AFTER_ANOTHER]
+
+
 def _per_metre(found: list[dict[str, Any]]) -> float:
     """Number of units of length of the file in a metre."""
     told = [float(one.get("length", 1.0)) for one in found if one.get("type") == LENGTH_UNIT]
     return told[0] if told and 0 < told[0] < np.inf else 1.0
-
-
-def _drive(functions: list[dict[str, Any]], first: dict[str, Any]) -> np.ndarray:
-    """The only function that is not of motion along any axis and has as many values."""
-    found = [
-        one["data"] for one in functions
-        if not _is_of_motion(one) and len(one["data"]) == len(first["data"])
-        and one.get("func_type") == first.get("func_type")
-    ]  # fmt: skip
-    return np.asarray(found[0]) if len(found) == 1 else np.empty(0)
 
 
 def _places(found: list[dict[str, Any]], nodes: list[int]) -> Floats:

@@ -10,15 +10,14 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from scipy.signal import correlate
 
 from simple_model.trajectory import Floats
 from skinwave.measurements import named
 from skinwave.measurements.recording import Given, Recording, nowhere
+from skinwave.measurements.references import aligned
 
 SOURCE = "https://zenodo.org/records/7686560"
 LARGEST_HAND = 3.0  # of the spread of places: beyond it these are in mm, not in m
-LEAST_LEFT = 0.5  # of the samples, after what is not common to all places is cut off
 
 
 def fits(arrays: Mapping[str, Any]) -> bool:
@@ -35,12 +34,16 @@ def recording(arrays: Mapping[str, Any], given: Given) -> Recording:
     ValueError
         If y holds no real numbers, or several arrays may be the places and none are given.
     """
-    y = np.asarray(arrays["y"])
+    y, r = np.asarray(arrays["y"]), np.asarray(arrays["r"])
     if y.dtype.kind not in "fiu" or not y.size:
         raise ValueError(f"y holds no real numbers; download the file anew from {SOURCE}")
     values = np.transpose(y, (2, 1, 0)).astype(np.float64)
-    reference = _references(np.asarray(arrays["r"]), y.shape)
-    values, drive, said = _aligned(values, reference)
+    drive, said = np.empty(0), "places are as the file has them, not aligned in time"
+    if r.dtype.kind in "fiu" and r.shape in (y.shape, y.shape[:2]):
+        each = r if r.ndim == 3 else np.repeat(r[..., None], 2, axis=2)
+        values, drive, said = aligned(values, np.transpose(each, (2, 1, 0)).astype(np.float64))
+    elif r.dtype.kind in "fiu" and r.size == y.shape[1]:
+        drive = r.ravel().astype(np.float64)
     times = named.vector(arrays, named.TIMES)
     rate = named.rate(arrays)
     if np.isnan(rate) and len(times) > 1:
@@ -50,48 +53,6 @@ def recording(arrays: Mapping[str, Any], given: Given) -> Recording:
         values=values, rate=rate, quantity="velocity", unit="m/s", places=places, drive=drive,
         remarks=("velocity along the laser, taken as normal to the skin", said),
     )  # fmt: skip
-
-
-def _references(r: np.ndarray, shape: tuple[int, ...]) -> Floats:
-    """Reference signals (2, M, N), (M,) if there is one for all, or none."""
-    if r.dtype.kind not in "fiu":
-        return np.empty(0)
-    if r.shape == shape:
-        return np.transpose(r, (2, 1, 0)).astype(np.float64)
-    if r.shape == shape[:2]:
-        return np.repeat(r.T[None], 2, axis=0).astype(np.float64)
-    return r.ravel().astype(np.float64) if r.size == shape[1] else np.empty(0)
-
-
-def _aligned(values: Floats, reference: Floats) -> tuple[Floats, Floats, str]:
-    """Values (r, t, p) from where the reference of each begins, that reference, and a sentence."""
-    if reference.ndim < 3:
-        return values, reference, "places are as the file has them, not aligned in time"
-    lags = delays(reference)
-    least, most = int(lags.min()), int(lags.max())
-    left = values.shape[1] - (most - least)
-    if left < LEAST_LEFT * values.shape[1]:
-        said = f"places are not aligned: their references lie up to {most - least} samples apart"
-        return values, np.empty(0), said
-    begin = lags - least
-    cut = begin[:, None, :] + np.arange(left)[None, :, None]
-    moved = np.take_along_axis(values, cut, axis=1)
-    drive = np.take_along_axis(reference, cut, axis=1)[0, :, 0]
-    said = f"places aligned by the reference, by up to {most - least} samples, to half a sample"
-    return moved, drive, said
-
-
-def delays(reference: Floats) -> np.ndarray:
-    """Delay (r, p) in samples of each reference (r, t, p) behind the first, where their
-    cross-correlation is largest.
-    """
-    centred = reference - reference.mean(axis=1, keepdims=True)
-    n = centred.shape[1]
-    found = np.zeros((centred.shape[0], centred.shape[2]), int)
-    for r, p in np.ndindex(*found.shape):
-        match = correlate(centred[r, :, p], centred[0, :, 0], method="fft")
-        found[r, p] = int(np.argmax(match)) - (n - 1)
-    return found
 
 
 def _places(arrays: Mapping[str, Any], count: int) -> Floats:
