@@ -147,7 +147,7 @@ BINARIES = {
     ),
     "mat of text": ("a.mat", lambda d: mat(d, note="text"), [], "no array is of motion"),
     "published table": ("impulseResponses.mat", lambda d: b"x", [], "only MATLAB reads"),
-    "no sets": ("a.uff", lambda d: b"text", [], "no set 58 between lines of -1"),
+    "no sets": ("a.uff", lambda d: b"text", [], "no set 58 of functions; export"),
     "half a set": (
         "a.uff", lambda d: universal(d).replace(b"         4        48", b"         4        99"),
         [], "and its header tells of 99" ,
@@ -158,7 +158,9 @@ BINARIES = {
                                two=A_MAP + 1), [], "the places may be one or two; give --places"
     ),
     "no phase": ("a.uff", lambda d: universal(d, func_type=9), [], "type 9, which has no phase"),
-    "along x": ("a.uff", lambda d: universal(d, rsp_dir=1), [], "their directions are x; give --direction"),
+    "along x": (
+        "a.uff", lambda d: universal(d, rsp_dir=1), [], "their directions are x; give --direction"
+    ),
     "wrong name": ("model-5-location-01.f32", lambda d: b"", [], "not that of a SkinSource file"),
     "wrong size": ("model-1-location-01.f32", lambda d: b"x" * 9, [], "has 9 bytes where"),
     "wrong checksum": ("model-1-location-01.f32", lambda d: b"x" * 451008, [], "download it anew"),

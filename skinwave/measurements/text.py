@@ -359,6 +359,5 @@ def _no_rows(lines: list[str], last: list[int]) -> str:
     if len(last) > 1:
         cells = re.split(r"[\t;, ]+", lines[last[-1]].strip())
         wrong = next((cell for cell in cells if number_in(cell) is None), cells[0])
-        if len(wrong) < len(lines[last[-1]].strip()):
-            return f"line {last[-1] + 1} has '{wrong[:40]}', which is no number; mend it"
+        return f"line {last[-1] + 1} has '{wrong[:40]}', which is no number; mend it"
     return "the file has a header and no numbers; export it anew"

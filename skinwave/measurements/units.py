@@ -58,6 +58,7 @@ def per_reference(unit: str) -> tuple[str, bool]:
     """Unit of motion without that of a reference below it, as "m/s" of "(m/s)/N", and whether it
     has one.
     """
+    unit = re.sub(r"\(1/(\w+)\)\*(\(.*\))", r"\2/\1", unit)
     above, _, below = unit.strip("[] ").rpartition("/")
     has = plain(below) in ("N", "V", "Pa") and bool(quantity_of(above))
     return (above.strip("() "), True) if has else (unit, False)

@@ -21,6 +21,10 @@ LARGEST = 1_000_000_000  # bytes
 MISSING = 'files of Universal File Format 58 need pyuff; pip install "skinwave[measure]"'
 FUNCTION, NODES, LENGTH_UNIT = 58, (15, 2411), 164
 KINDS = {8: "displacement", 11: "velocity", 12: "acceleration"}
+HELD = {
+    15: "nodes", 2411: "nodes", 2412: "elements", 18: "coordinate systems", 82: "lines",
+    151: "header", 164: "units", 55: "shapes", 2414: "shapes", 2420: "coordinate systems",
+}  # fmt: skip
 TIME, FREQUENCY = 17, 18
 # Types of functions: of time, complex ones of frequency, and those without a phase.
 IN_TIME, IN_FREQUENCY = (1,), (4, 12)
@@ -41,18 +45,13 @@ def read(path: Path, given: Given) -> Recording:
     """
     found = _sets(path)
     functions = [one for one in found if one.get("type") == FUNCTION]
-    if not functions:
-        kinds = ", ".join(sorted({str(one.get("type")) for one in found})) or "none"
-        raise ValueError(f"the file has no set 58, but {kinds}; export functions of time")
     motion, others = _motion(functions, given)
     first = motion[0]
     _alike(motion)
     motion, sign = _turned(motion)
     groups = _by_node(motion)
     in_time = _is_in_time(first)
-    values = np.moveaxis(
-        np.array([[one["data"] for one in group] for group in groups.values()]), 0, 2
-    )
+    values = np.moveaxis(np.array([[one["data"] for one in group] for _, group in groups]), 0, 2)
     if not in_time and not np.iscomplexobj(values):
         raise ValueError("its spectra have no phase; export complex spectra or time responses")
     axis = units.in_si(np.asarray(first["x"], float), _per_axis(first, in_time))
@@ -63,7 +62,7 @@ def read(path: Path, given: Given) -> Recording:
     return Recording(
         values=values, times=axis[: values.shape[1]] if in_time else np.empty(0),
         frequencies=np.empty(0) if in_time else axis, quantity=kind, unit=unit,
-        places=_places(found, list(groups)), sign=sign,
+        places=_places(found, [node for node, _ in groups]), sign=sign,
         drive=drive, name=_text(first, "id1"), remarks=(*said, *more),
     )  # fmt: skip
 
@@ -80,15 +79,19 @@ def _sets(path: Path) -> list[dict[str, Any]]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             file = pyuff.UFF(str(path))
+            kinds = [int(kind) for kind in file.get_set_types()]
             kept = {FUNCTION, *NODES, LENGTH_UNIT}
-            which = [k for k, kind in enumerate(file.get_set_types()) if int(kind) in kept]
-            found = [file.read_sets(k) for k in which]
+            found = [file.read_sets(k) for k, kind in enumerate(kinds) if kind in kept]
     except Exception:  # pyuff raises plain ones
         raise ValueError(
             "the file is damaged or no Universal File; export it anew, as text if it is binary"
         ) from None
-    if not found:
-        raise ValueError("the file has no set 58 between lines of -1; export it anew")
+    if FUNCTION not in kinds:
+        held = ", ".join(f"{k} ({HELD.get(k, 'unknown')})" for k in sorted(set(kinds)))
+        raise ValueError(
+            f"the file has no set 58 of functions{f', but {held}' if held else ''}; export "
+            "functions of time or frequency"
+        )
     return [_cut(one) if one.get("type") == FUNCTION else one for one in found]
 
 
@@ -143,7 +146,7 @@ def _motion(
 
 
 def _is_reference(one: dict[str, Any]) -> bool:
-    return any(_text(one, key).lower().startswith("ref") for key in ("id1", "id2"))
+    return any(re.match(r"ref(erence)?\d*\b", _text(one, key), re.I) for key in ("id1", "id2"))
 
 
 def _quantity(one: dict[str, Any]) -> str:
@@ -186,20 +189,22 @@ def _alike(motion: list[dict[str, Any]]) -> None:
                 )
 
 
-def _by_node(motion: list[dict[str, Any]]) -> dict[int, list[dict[str, Any]]]:
-    """Sets by the number of their node; each has the same number of them."""
+def _by_node(motion: list[dict[str, Any]]) -> list[tuple[int, list[dict[str, Any]]]]:
+    """Nodes and their sets, as many of each: of several, repetitions. Sets of other names, at one
+    node or of another number at each, are places of their own.
+    """
     groups: dict[int, list[dict[str, Any]]] = {}
     for one in motion:
         groups.setdefault(int(one.get("rsp_node", 0)), []).append(one)
     names = {(_text(one, "rsp_ent_name"), _text(one, "id1")) for one in motion}
-    if len(groups) == 1 and len(names) == len(motion):
-        groups = {k: [one] for k, one in enumerate(motion)}
     counts = {len(group) for group in groups.values()}
+    if (len(groups) == 1 or len(counts) > 1) and len(names) == len(motion):
+        return [(int(one.get("rsp_node", 0)), [one]) for one in motion]
     if len(counts) > 1:
         raise ValueError(
             f"nodes have {min(counts)} to {max(counts)} sets 58; export as many of each"
         )
-    return groups
+    return list(groups.items())
 
 
 def _turned(motion: list[dict[str, Any]]) -> tuple[list[dict[str, Any]], int]:
@@ -230,11 +235,11 @@ def _unit(one: dict[str, Any], per: float, given: Given) -> tuple[str, str, list
 
 
 def _in_step(
-    values: np.ndarray, others: list[dict[str, Any]], groups: dict[int, list[dict[str, Any]]],
-    in_time: bool,
+    values: np.ndarray, others: list[dict[str, Any]],
+    groups: list[tuple[int, list[dict[str, Any]]]], in_time: bool,
 ) -> tuple[np.ndarray, np.ndarray, list[str]]:  # fmt: skip
     """Values (r, n, p) in step by a reference of each, the drive, and sentences."""
-    first = next(iter(groups.values()))[0]
+    first, nodes = groups[0][1][0], [node for node, _ in groups]
     fitting = [one for one in others if len(one["data"]) == values.shape[1]
                and one.get("func_type") == first.get("func_type")]  # fmt: skip
     if len(fitting) == 1:
@@ -244,10 +249,11 @@ def _in_step(
         at: dict[int, list[np.ndarray]] = {}
         for one in fitting:
             at.setdefault(int(one.get("rsp_node", 0)), []).append(one["data"])
-        if set(at) != set(groups) or {len(one) for one in at.values()} != {len(values)}:
-            every = iter([one["data"] for one in fitting])  # in the order of the file
-            at = {node: [next(every) for _ in group] for node, group in groups.items()}
-        each = np.moveaxis(np.array([at[node] for node in groups]), 0, 2)
+        if sorted(at) == sorted(nodes) and {len(one) for one in at.values()} == {len(values)}:
+            each = np.array([at[node] for node in nodes])
+        else:  # in the order of the file
+            each = np.array([one["data"] for one in fitting]).reshape(len(nodes), len(values), -1)
+        each = np.moveaxis(each, 0, 2)
         if in_time:
             moved, drive, said = aligned(values, each.real)
             return moved, drive, [said]
