@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from meshes import reading
+from skinwave.measurements.decoding import decoded
 from skinwave.measurements.headers import column
 from skinwave.measurements.layouts import recording
 from skinwave.measurements.recording import Given, Recording
 from skinwave.measurements.table import Table
-from skinwave.measurements.text import decoded
 from skinwave.measurements.units import plain
 
 LARGEST = 1_000_000_000  # bytes

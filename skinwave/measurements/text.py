@@ -5,7 +5,6 @@ table begins at the first line with numbers in these columns. The line above has
 units below a line of names. Everything above, and cells beside the numbers, are notes.
 """
 
-import codecs
 import io
 import re
 from collections.abc import Iterator
@@ -16,16 +15,16 @@ from pathlib import Path
 
 import numpy as np
 
-from meshes import reading
 from simple_model.trajectory import Floats
+from skinwave.measurements.decoding import decoded
 from skinwave.measurements.headers import TIME, UNITS, Column, X, Y, column
+from skinwave.measurements.labview import lvm_table
 from skinwave.measurements.layouts import EXAMPLE, in_metre, recording
 from skinwave.measurements.recording import Given, Recording
 from skinwave.measurements.table import Table
 from skinwave.measurements.units import plain
 from skinwave.plain_text import number_in
 
-LARGEST = 256_000_000  # bytes
 FIRST_LINE = "LabVIEW Measurement"  # of .lvm files, whatever they are called
 SHOWN = 100  # rows at the end that show what separates cells
 NO_VALUE = (
@@ -50,8 +49,6 @@ def read(path: Path, given: Given) -> Recording:
     """
     text = decoded(path)
     if text.startswith(FIRST_LINE):
-        from skinwave.measurements.labview import lvm_table  # which reads text
-
         return recording(lvm_table(text), given)
     return recording(table(text), given)
 
@@ -72,31 +69,6 @@ def places(path: Path) -> Floats:
     if not all(len(of) == 1 for of in where):
         raise ValueError(f"{path}: a file of places needs the columns x [mm], y [mm]; add these")
     return in_metre(columns, found.numbers, (where[0][0], where[1][0]))
-
-
-def decoded(path: Path) -> str:
-    """Text of a file in UTF-8, UTF-16, or else Windows' Latin-1, whose letters matter little here.
-
-    Raises
-    ------
-    ValueError
-        If it is no text.
-    """
-    content = reading.content(path, LARGEST)
-    encoding = "utf-8-sig"
-    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        encoding = "utf-16"
-    elif b"\0" in content[:2000] and not len(content) % 2:
-        encoding = "utf-16-le" if content[1:2] == b"\0" else "utf-16-be"
-    for name in (encoding, *["cp1252", "latin-1"] * (encoding == "utf-8-sig")):
-        try:
-            text = content.decode(name)
-        except UnicodeDecodeError:
-            continue
-        if not reading.CONTROL.search(text.encode()):
-            return text
-        break
-    raise ValueError("the file is no text; export it as text in UTF-8, or name it by its format")
 
 
 def table(text: str) -> Table:
