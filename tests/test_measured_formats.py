@@ -187,6 +187,23 @@ def test_cells_of_places(tmp_path):
     assert_wave(read(tmp_path / "a.mat", unit="mm/s"))
 
 
+@pytest.mark.parametrize("suffix", ["mat", "npz"])
+def test_times_within_a_matrix_and_beside_it(tmp_path, suffix):
+    path = tmp_path / f"a.{suffix}"
+
+    def save(**arrays):
+        savemat(path, arrays) if suffix == "mat" else np.savez(path, **arrays)
+
+    save(data=np.column_stack([T, TONE]))
+    with pytest.raises(ValueError, match="column 1 of 'data' rises evenly as times do"):
+        read(path, unit="mm/s")
+    assert_tone(read(path, unit="mm/s", rate=RATE))
+    save(t_ms=1e3 * T, v=TONE)
+    assert_tone(read(path, unit="mm/s"))
+    save(fs=RATE, t0=T[0], v=TONE)
+    assert_tone(read(path, unit="mm/s"))
+
+
 def test_more_places_than_samples(tmp_path):
     places = np.random.default_rng(0).uniform(-0.1, 0.1, (300, 2))
     motion = np.sin(2 * np.pi * 140 * np.arange(200) / RATE)[:, None] * np.ones(300)

@@ -93,6 +93,20 @@ TABLES = {
     "another unit given": (
         "t [s],v [m/s]\n" + rows(T, TONE), MM_S, 1
     ),
+    "title in cells": ("My measurement,,\n\nt [s],v [mm/s],w [mm/s]\n" + TWO, {}, 2),
+    "separator for a spreadsheet": ("sep=;\nZeit [s];v [mm/s]\n" + GERMAN, {}, 1),
+    "decimal commas in quotes": ('"t [s]","v [mm/s]"\n' + "".join(
+        '"{}","{}"\n'.format(*row.split(";")) for row in GERMAN.splitlines()), {}, 1),
+    "full-width brackets": ("時間\uff08s\uff09,速度\uff08mm/s\uff09\n" + rows(T, TONE), {}, 1),
+    "index of a data frame": (",t [s],v [mm/s]\n" + "".join(
+        f"{k},{row}\n" for k, row in enumerate(rows(T, TONE).splitlines())), {}, 1),
+    "samples from the trigger": (
+        "".join(f"{k - 200},{a:.6f}\n" for k, a in enumerate(TONE)), MM_S | {"rate": RATE}, 1
+    ),
+    "uneven times, rate given": (
+        rows(T + 3e-5 * np.sin(np.arange(COUNT) ** 2.0), TONE, digits="%.9g"),
+        MM_S | {"rate": RATE}, 1,
+    ),
     "quantity chosen": (
         "t [s],u [um],v [mm/s]\n" + rows(T, OTHER, TONE), {"quantity": "velocity"}, 1
     ),
@@ -116,6 +130,10 @@ CLOCKED = {
     "date and time of day": "Datum;Uhrzeit;v [mm/s]\n" + "".join(
         f"05.01.2026;{c};{a:.7g}\n".replace(".", ",").replace("05,01,", "05.01.")
         for c, a in zip(clock(T, "10:00:%09.6f"), TONE, strict=True)),
+    "clock of milliseconds, rate given": "time,v [mm/s]\n" + "".join(
+        f"{c[:23]},{a:.7g}\n" for c, a in zip(clock(T), TONE, strict=True)),
+    "seconds of an epoch": "t [s],v [mm/s]\n" + "".join(
+        f"{1767607200 + x:.6f},{a:.7g}\n" for x, a in zip(T, TONE, strict=True)),
     "rate in the notes": "Operator: me\nSample Rate (kHz): 10\nUnit: mm/s\n\nCH1\n" + rows(TONE),
 }  # fmt: skip
 
@@ -123,7 +141,8 @@ CLOCKED = {
 @pytest.mark.parametrize("name", CLOCKED)
 def test_table_of_clocks_and_of_no_times(tmp_path, name):
     (tmp_path / "a.csv").write_text(CLOCKED[name])
-    assert_tone(read(tmp_path / "a.csv"), first=0.0)
+    given = {"rate": RATE} if name.endswith("rate given") else {}
+    assert_tone(read(tmp_path / "a.csv", **given), first=0.0)
 
 
 @pytest.mark.parametrize("shift", [0.0, 12.5, 150.0])
@@ -152,11 +171,20 @@ def test_short_gaps_are_interpolated_at_their_times(tmp_path, value, rate):
     assert any("8 samples are missing and interpolated" in said for said in found.remarks)
 
 
-@pytest.mark.parametrize(("last", "value"), [(580, None), (580, "NaN"), (700, None), (700, "NaN")])
-def test_long_gaps_are_refused(tmp_path, last, value):
+@pytest.mark.parametrize("rate", [None, RATE])
+@pytest.mark.parametrize("last", [580, 700])
+@pytest.mark.parametrize("value", [None, "NaN"])
+def test_long_gaps_are_refused(tmp_path, last, value, rate):
     (tmp_path / "a.csv").write_text(gapped(500, last, value))
     with pytest.raises(ValueError, match="missing|lie between"):
-        read(tmp_path / "a.csv")
+        read(tmp_path / "a.csv", rate=rate)
+
+
+def test_a_motion_that_rises_evenly_beside_times_stays(tmp_path):
+    (tmp_path / "a.csv").write_text("t [s],CH1,CH2\n" + rows(T, TONE, 3 * T))
+    found = read(tmp_path / "a.csv", unit="mm/s")
+    assert 1e3 * found.values[0, :, 1] == pytest.approx(3 * T, abs=1e-6)
+    assert any("rises evenly and is taken as motion" in said for said in found.remarks)
 
 
 def test_polytec_spectrum_of_magnitude_and_phase(tmp_path):

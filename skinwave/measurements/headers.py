@@ -6,6 +6,7 @@ programs and languages follow from their units, or from a few words.
 """
 
 import re
+import unicodedata
 from dataclasses import dataclass
 
 from simple_model.quantities import QUANTITIES
@@ -57,6 +58,7 @@ PARTS = {
 ROLE = {name: role for role, names in NAMES.items() for name in names} | {
     name: name for name, record in QUANTITIES.items() if record.of_body
 }
+_PART = "|".join(PARTS)
 _COLUMN = re.compile(
     r"(?P<name>[^()\[\]#]*?)\s*"
     r"(?:\((?P<place>[^()]*,[^()]*)\))?\s*(?:\#(?P<rep>\d{1,9}))?\s*"
@@ -105,7 +107,7 @@ def column(text: str, unit: str = "") -> Column:
     ValueError
         If its place is no pair of numbers.
     """
-    said = " ".join(text.split())
+    said = " ".join(unicodedata.normalize("NFKC", text).split())
     apart = re.fullmatch(r"(.+?)(?:\s+/\s*|\s*/\s+|,\s+|\s+in\s+)(\S+)", said)
     if apart and plain(apart[2]) in UNITS:
         said = f"{apart[1]} [{apart[2]}]"
@@ -118,9 +120,8 @@ def column(text: str, unit: str = "") -> Column:
     unit = unit or found["unit"] or found["round"] or ""
     if words not in ROLE and not unit:
         words, unit = _suffixed(found["name"].strip())
-    first, _, rest = words.replace(".", " ").partition(" ")
-    part = PARTS.get(first, PARTS.get(words.rpartition("_")[2], ""))
-    name = rest if PARTS.get(first) else words
+    parted = re.fullmatch(rf"(?:({_PART})(?:[ _.]+|$))?(.*?)(?:[ _.]+({_PART}))?", words)
+    name, part = (parted[2], PARTS.get(parted[1] or parted[3] or "", "")) if parted else (words, "")
     return Column(
         text=said,
         role=ROLE.get(name, "") if found["place"] else _role(name, unit),
@@ -134,6 +135,8 @@ def column(text: str, unit: str = "") -> Column:
 def _role(name: str, unit: str) -> str:
     """Role of a name without a place. The unit decides where it says another one."""
     role, of = ROLE.get(name, ""), plain(unit)
+    if ROLE.get(re.sub(r"[ _]?\d+$", "", name)) == TIME:
+        role = TIME
     if of in TIMES or of in FREQUENCIES:
         return TIME if of in TIMES else FREQUENCY
     if role in (TIME, FREQUENCY, INDEX) and of in UNITS - {"", "Sequence"}:

@@ -11,9 +11,10 @@ import numpy as np
 
 from simple_model.trajectory import Floats
 from skinwave.measurements import units
-from skinwave.measurements.headers import NAMES
+from skinwave.measurements.headers import NAMES, TIME, column
 from skinwave.measurements.recording import Given, Recording, nowhere
 from skinwave.measurements.references import aligned
+from skinwave.measurements.table import rises
 
 TIMES = ("t", "time", "times", "t_s", "time_s")
 FREQUENCIES = ("f", "freq", "frequency", "frequencies", "frequency_hz", "f_hz")
@@ -26,6 +27,7 @@ RATES = (
     "sampling_frequency",
     "rate_hz",
 )
+STARTS = ("t0", "t_start", "tstart", "start_time", "x0")
 INTERVALS = ("dt", "sampling_interval")
 PLACES = ("places", "points", "probes", "xy", "xyz", "positions", "coordinates", "locations")
 MILLIMETRES = tuple(f"{name}_mm" for name in PLACES)
@@ -35,7 +37,7 @@ WORDS = ("quantity", "unit", "name")
 MOTION = {name: kind for kind in units.MOTION for name in NAMES[kind]} | dict.fromkeys(
     ("values", "y", "data", "signal", "signals"), ""
 )
-KNOWN = (*TIMES, *FREQUENCIES, *RATES, *INTERVALS, *PLACES, *MILLIMETRES, *DRIVES, *WORDS)
+KNOWN = (*TIMES, *FREQUENCIES, *RATES, *INTERVALS, *STARTS, *PLACES, *MILLIMETRES, *DRIVES, *WORDS)
 
 
 def recording(arrays: Mapping[str, Any], given: Given) -> Recording:
@@ -56,7 +58,7 @@ def recording(arrays: Mapping[str, Any], given: Given) -> Recording:
         If no array, or more than one, can be the motion, or the shapes do not fit.
     """
     short = {name.rpartition(".")[2].lower(): array for name, array in arrays.items()}
-    times, frequencies = vector(short, TIMES), vector(short, FREQUENCIES)
+    times, frequencies = _times(short), vector(short, FREQUENCIES)
     name = given.variable or _motion(arrays)
     if name not in arrays:
         raise ValueError(f"no array is named '{name[:40]}'; give --variable as {_list(arrays)}")
@@ -69,6 +71,13 @@ def recording(arrays: Mapping[str, Any], given: Given) -> Recording:
     axis = times if len(times) else frequencies
     places = _places(short) if given.places is None else given.places
     ordered, said = in_order(values, len(axis), len(places), name)
+    first = [float(short[key].ravel()[0]) for key in STARTS if np.size(short.get(key, ())) == 1
+             and np.asarray(short[key]).dtype.kind in "fiu"]  # fmt: skip
+    if first and not len(axis) and not np.isnan(rate(short)):
+        times = axis = first[0] + np.arange(ordered.shape[1]) / rate(short)
+    if not len(axis):
+        times, ordered, found = _times_within(ordered, name, given)
+        said += found
     drive = vector(short, DRIVES)
     each = next((short[key] for key in DRIVES if np.shape(short.get(key, 0)) == values.shape), None)
     if each is not None and not len(frequencies):
@@ -174,6 +183,33 @@ def vector(arrays: Mapping[str, Any], names: tuple[str, ...]) -> np.ndarray:
                     )
                 return first
     return np.empty(0)
+
+
+def _times(arrays: Mapping[str, Any]) -> np.ndarray:
+    """Times in s, of an array "t" or "time", or one whose name ends in its unit: "t_ms"."""
+    found = vector(arrays, TIMES).real
+    for name in () if len(found) else arrays:
+        one = column(name)
+        if one.role == TIME and one.unit and len(array := vector(arrays, (name,))):
+            found = units.in_si(array, units.scale(one.unit, units.TIMES, "time"))
+    return found
+
+
+def _times_within(
+    values: np.ndarray, name: str, given: Given
+) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """Times of a column of a matrix that rises evenly, the other columns, and a sentence."""
+    count = values.shape[2]
+    rising = [p for p in range(count) if np.isrealobj(values) and rises(values[0, :, p])]
+    if not rising or count < 2:
+        return np.empty(0), values, []
+    if given.rate is None:
+        raise ValueError(
+            f"column {rising[0] + 1} of '{name[:40]}' rises evenly as times do; give --rate in Hz, "
+            "or save the times as an array 't' in s"
+        )
+    said = f"column {rising[0] + 1} of '{name[:40]}' rises evenly and is taken as time"
+    return values[0, :, rising[0]].astype(float), np.delete(values, rising[0], axis=2), [said]
 
 
 def rate(arrays: Mapping[str, Any]) -> float:

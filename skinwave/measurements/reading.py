@@ -26,7 +26,9 @@ class Reader:
 
 
 READERS = (
-    Reader(words="text in columns", suffixes=(".csv", ".tsv", ".txt", ".asc"), read=text.read),
+    Reader(
+        words="text in columns", suffixes=(".csv", ".tsv", ".txt", ".asc", ".dat"), read=text.read
+    ),
     Reader(words="LabVIEW's measurement", suffixes=(".lvm",), read=labview.read_lvm),
     Reader(words="TDMS", suffixes=(".tdms",), read=labview.read_tdms),
     Reader(words="numpy", suffixes=(".npz",), read=arrays.read),

@@ -178,6 +178,8 @@ def _sign(found: Recording, given: Given) -> tuple[int, list[str]]:
 def _sampled(found: Recording, given: Given) -> tuple[Floats, Recording, list[str]]:
     """Even times, the recording at each of them, and sentences on what was filled or replaced."""
     if len(found.frequencies):
+        if found.frequencies.min() < 0:
+            raise ValueError("frequencies fall below 0 Hz; export the one-sided spectrum")
         return np.empty(0), found, []
     times, index, said = _times(found, given)
     together = found.values
@@ -209,7 +211,10 @@ def _times(found: Recording, given: Given) -> tuple[Floats, np.ndarray, list[str
         times, index = sampling.even(found.times)
     except ValueError:
         span = float(found.times[-1] - found.times[0])
-        if not span > 0:
+        steps = np.diff(found.times)
+        if not (
+            span > 0 and steps.max() <= max(3 * steps.mean(), 1.5 * np.median(steps[steps > 0]))
+        ):
             raise
         times, index = found.times[0] + span * np.linspace(0, 1, count), np.arange(count)
     step = float(times[-1] - times[0]) / (len(times) - 1)

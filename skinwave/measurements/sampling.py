@@ -5,6 +5,7 @@ import numpy as np
 from simple_model.trajectory import Floats
 from skinwave.measurements.measurement import UNEVEN
 
+CLOCK = 1e8  # s: later times are counted from an epoch, and become those from the first
 DIGITS = 7  # of times as programs round them
 COARSEST = 0.25  # of a sampling interval: what rounding may leave
 LARGEST_GAPS = 0.1  # of the samples
@@ -23,6 +24,9 @@ def even(times: Floats) -> tuple[Floats, np.ndarray]:
     ValueError
         If times fall or repeat, or are not even.
     """
+    largest = float(np.abs(times).max(initial=0.0))
+    if largest > CLOCK:
+        times = times - times[0]
     steps = np.diff(times)
     index = np.arange(len(times))
     if not np.isfinite(times).all():
@@ -40,7 +44,7 @@ def even(times: Floats) -> tuple[Floats, np.ndarray]:
     index = np.concatenate([[0], np.cumsum(np.rint(steps / step).astype(int))])
     step, start = np.polyfit(index, times, 1)
     away = float(np.abs(times - start - step * index).max())
-    rounding = 0.51 * 10.0 ** (np.floor(np.log10(np.abs(times).max())) + 1 - DIGITS)
+    rounding = 0.51 * 10.0 ** (np.floor(np.log10(largest)) + 1 - DIGITS)
     if np.diff(index).min() < 1 or away > max(UNEVEN * step, min(rounding, COARSEST * step)):
         raise ValueError(
             f"times of a measurement must rise in equal steps, and theirs are {steps.min():g} to "

@@ -95,12 +95,15 @@ def with_roles(table: Table, given: Given) -> tuple[Table, tuple[str, ...]]:
     chosen = _chosen(columns, given.columns)
     open_ = [k for k, one in enumerate(columns)
              if one.is_motion and not one.is_of_motion and k not in chosen]  # fmt: skip
+    has_axis = any(one.role in (TIME, FREQUENCY) for one in columns)
     rising = [k for k in open_ if rises(numbers[:, k])] if len(columns) > 1 else []
     for k in rising:
-        columns[k] = replace(columns[k], role=INDEX if _counts(numbers[:, k]) else TIME)
+        counts = _counts(numbers[:, k]) and numbers[0, k] in (0, 1)
+        if counts or not has_axis:
+            columns[k] = replace(columns[k], role=INDEX if counts else TIME)
         said.append(
             f"column {k + 1} rises evenly and is taken as "
-            + ("a count of samples" if columns[k].role == INDEX else "time")
+            + ("a count of samples" if counts else "motion" if has_axis else "time")
         )
     columns = _one_time(columns, numbers)
     if chosen:

@@ -34,7 +34,8 @@ NO_VALUE = (
 BEYOND = ("∞", "+∞", "1.#inf", "overload", "over")  # the range of an instrument
 MARK = "#%;/!"  # before lines about the measurement
 _CLOCK = re.compile(
-    r"(?:(\d{1,4})([-/.])(\d{1,2})\2(\d{1,4}))?[T ]*(?:(\d{1,2}):(\d\d):(\d\d(?:[.,]\d+)?)Z?)?"
+    r"(?:(\d{1,4})([-/.])(\d{1,2})\2(\d{1,4}))?[T ]*"
+    r"(?:(\d{1,2}):(\d\d):(\d\d(?:[.,]\d+)?)(?:Z|[+-]\d\d:?\d\d)?)?"
 )
 _LEADING_ZERO = re.compile(r",0\d+(?=,|$)")
 
@@ -108,8 +109,10 @@ def _separations(rows: list[str]) -> Iterator[tuple[str, bool]]:
         if delimiter != " " and not any(delimiter in line for line in rows):
             continue
         bare = [line for line in rows if line.lstrip()[0] not in "#%"]
-        comma = delimiter != "," and any(_with_point(cell) != cell for line in bare if "," in line
-                                         for cell in _cells(line, delimiter))  # fmt: skip
+        comma = any(
+            _with_point(cell) != cell
+            for line in bare if "," in line for cell in _cells(line, delimiter)
+        )  # fmt: skip
         if len(_columns(rows, delimiter, comma)[0]):
             yield delimiter, comma
 
