@@ -4,9 +4,9 @@ import warnings
 from typing import Any
 
 from meshes.facets import seen_from_above, tag_boundary
+from meshes.files.contents import read, read_surface
 from meshes.files.import_body import body_from_file
-from meshes.files.mesh_files import read, write
-from meshes.files.surface_files import read_surface
+from meshes.files.mesh_files import write
 from meshes.shapes.fingertip import Fingertip
 from meshes.shapes.palm import Palm
 from meshes.shapes.structured import (

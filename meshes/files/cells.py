@@ -1,4 +1,4 @@
-"""Cell arrays of mesh files: regions, facet sets, the order of an element's nodes.
+"""Cell arrays of mesh files: tetrahedra, regions, facet sets, the order of an element's nodes.
 
 `raw` is a mesh as meshio reads it, `kind` one of its cell types.
 """
@@ -10,10 +10,178 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from meshes.tetmesh import EDGES, FACES, Floats, Ints, MeshError, TetMesh
+from meshes.surface.repair import first_of_same
+from meshes.tetmesh import (
+    EDGES,
+    FACES,
+    Floats,
+    Ints,
+    MeshError,
+    TetMesh,
+    corner_volumes,
+    facet_keys,
+)
 
 FACETS, REGION, NAMED = "facets:", "region ", "region:"
+# Cell arrays that number regions: of this package, of others, and of meshio's readers.
+NUMBERED = ("region", "material", "medit:ref", "tetgen:ref", "nastran:ref", "cell_tags")
 OFF_MIDDLE = 0.25  # of an edge: how far a mid-side node may lie from its middle
+
+# Faces of the solid elements that are split into tetrahedra, by their corners.
+SPLIT = {
+    "hexahedron": [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6],
+                   [3, 0, 4, 7]],
+    "voxel": [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [1, 3, 7, 5], [3, 2, 6, 7], [2, 0, 4, 6]],
+    "wedge": [[0, 2, 1], [3, 4, 5], [0, 1, 4, 3], [1, 2, 5, 4], [2, 0, 3, 5]],
+    "pyramid": [[0, 3, 2, 1], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]],
+}  # fmt: skip
+SOLID = ("tetra", "tetra10", *SPLIT)
+PLANE = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}  # corners
+SMALLER = ("vertex", "line", "line3")
+FLAT = 1e-9  # of the volume of its cell: a tetrahedron of a collapsed one
+
+
+def contents(path: Path, raw: Any) -> dict[str, Any]:
+    """The arrays of `Contents`, by name.
+
+    Parameters
+    ----------
+    path : file that messages name
+    raw : mesh as meshio has it, whose `info` has `notes` and `names` of regions
+
+    Returns
+    -------
+    dict of arrays, for `numpy.savez`
+
+    Raises
+    ------
+    MeshError
+        If it holds neither solid elements nor triangles, some of a kind that is not read, or nodes
+        that it does not have.
+    """
+    held: dict[str, int] = {}
+    for block in raw.cells:
+        if not len(block.data):
+            continue
+        held[block.type] = held.get(block.type, 0) + len(block.data)
+        if np.min(block.data) < 0 or np.max(block.data) >= len(raw.points):
+            raise MeshError(f"{path} has cells of points that it does not have; save it again")
+    solid = [kind for kind in SOLID if kind in held]
+    unknown = [kind for kind in held if kind not in (*SOLID, *PLANE, *SMALLER)]
+    if unknown or ("tetra10" in solid and len(solid) > 1):
+        listed = ", ".join(f"{held[kind]:,} of type {kind}" for kind in unknown or solid)
+        raise MeshError(
+            f"{path} has cells that are not read here ({listed}); save it with tetrahedra of 4 "
+            "nodes, or all of them with 10"
+        )
+    if not solid and not any(kind in PLANE for kind in held):
+        raise MeshError(f"{path} holds no triangles and no solid elements; give that of a body")
+    notes = [f"left out {held[kind]:,} cells of type {kind}" for kind in SMALLER if kind in held]
+    notes = [*raw.info["notes"], *notes]
+    points = np.zeros((len(raw.points), 3))
+    points[:, : raw.points.shape[1]] = raw.points
+    arrays = {
+        "points": points, "tets": np.zeros((0, 4), int), "region": np.zeros(0, int),
+        "triangles": np.zeros((0, 3), int), "numbers": np.zeros(0, int),
+        "names": np.zeros(0, str), "sets": np.zeros(0, str),
+    }  # fmt: skip
+    if solid:
+        arrays |= _tetrahedra(path, raw, points, solid, notes)
+    else:
+        fans = [fan(joined(raw.cells, kind), PLANE[kind])[0] for kind in PLANE if kind in held]
+        arrays["triangles"] = np.vstack(fans)
+    return arrays | {"notes": np.array(notes, str)}
+
+
+def _tetrahedra(
+    path: Path, raw: Any, points: Floats, solid: list[str], notes: list[str]
+) -> dict[str, Any]:
+    """Tetrahedra, each once, with nodes that are used, each once; their regions and facet sets."""
+    used = np.unique(np.concatenate([joined(raw.cells, kind).ravel() for kind in solid]))
+    same = np.arange(len(points))
+    same[used] = used[first_of_same(points[used])]
+    if merged := len(used) - len(np.unique(same[used])):
+        notes.append(f"merged {merged:,} nodes that coincide with others, as where bodies touch")
+    names = {abs(number): name for number, name in raw.info["names"].items()}
+    parts: list[tuple[Ints, Ints]] = []
+    for kind in solid:
+        nodes, (own, titles) = same[joined(raw.cells, kind)], regions(raw, kind)
+        names |= titles
+        if kind == "tetra10":
+            nodes = nodes[:, node_order(path, points, nodes)]
+        if kind in SPLIT:
+            count = len(nodes)
+            nodes, cell = _split(path, points, nodes, kind)
+            notes.append(f"split {count:,} cells of type {kind} into {len(nodes):,} tetrahedra")
+            own = own[cell]
+        parts.append((nodes, own))
+    tets, region = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    whole = (np.diff(np.sort(tets[:, :4], axis=1), axis=1) > 0).all(axis=1)
+    if not whole.all():
+        notes.append(f"left out {(~whole).sum():,} tetrahedra with a node that they have twice")
+    tets, region = tets[whole], region[whole]
+    _, once = np.unique(np.sort(tets[:, :4], axis=1), axis=0, return_index=True)
+    if len(once) < len(tets):
+        notes.append(f"left out {len(tets) - len(once):,} tetrahedra that are listed twice")
+        tets, region = tets[np.sort(once)], region[np.sort(once)]
+    used, numbers = np.unique(tets, return_inverse=True)
+    new = np.full(len(points), -1)
+    new[used] = np.arange(len(used))
+    tets = numbers.reshape(tets.shape)
+    if inside_out := int((corner_volumes(points[used], tets) < 0).sum()):
+        notes.append(f"turned round {inside_out:,} of {len(tets):,} tetrahedra")
+    sets = facet_sets(raw, new[same], tets, notes)
+    names = {number: name for number, name in names.items() if number in region}
+    return {
+        "points": points[used], "tets": tets, "region": region,
+        "numbers": np.array(list(names), int), "names": np.array(list(names.values()), str),
+        "sets": np.array(list(sets), str),
+        **{f"facets{k}": facets for k, facets in enumerate(sets.values())},
+    }  # fmt: skip
+
+
+def fan(nodes: Ints, corners: int) -> tuple[Ints, Ints]:
+    """Triangles (k, 3) of plane cells with 3 or 4 corners, from the lowest of a cell's node
+    numbers, and the cell (k,) of each.
+    """
+    if corners == 3:
+        return nodes[:, :3], np.arange(len(nodes))
+    turn = (nodes[:, :4].argmin(axis=1)[:, None] + np.arange(4)) % 4
+    a, b, c, d = np.take_along_axis(nodes[:, :4], turn, axis=1).T
+    both = np.stack([np.column_stack([a, b, c]), np.column_stack([a, c, d])], axis=1)
+    return both.reshape(-1, 3), np.repeat(np.arange(len(nodes)), 2)
+
+
+def _split(path: Path, points: Floats, nodes: Ints, kind: str) -> tuple[Ints, Ints]:
+    """Tetrahedra (m, 4) of solid cells, and the cell (m,) of each.
+
+    They join the lowest of a cell's node numbers with the triangles of the faces that do not have
+    it, each of which is split from its own lowest. So neighbours split a common face alike:
+    Dompierre et al, How to subdivide pyramids, prisms and hexahedra into tetrahedra, 8th
+    International Meshing Roundtable (1999).
+
+    Raises
+    ------
+    MeshError
+        If a cell is so warped that some of its tetrahedra are inside out.
+    """
+    least, tets, cells = nodes.min(axis=1), [], []
+    for face in SPLIT[kind]:
+        triangles, cell = fan(nodes[:, face], len(face))
+        away = (nodes[cell][:, face] != least[cell, None]).all(axis=1)
+        tets.append(np.column_stack([least[cell], triangles])[away])
+        cells.append(cell[away])
+    found, cell = np.vstack(tets), np.concatenate(cells)
+    volumes = corner_volumes(points, found)
+    size = np.bincount(cell, np.abs(volumes), len(nodes))
+    warped = np.abs(np.bincount(cell, volumes, len(nodes))) < (1 - FLAT) * size
+    if warped.any():
+        raise MeshError(
+            f"{path} has {warped.sum():,} cells of type {kind} that are too warped to be split "
+            "into tetrahedra; save it as tetrahedra"
+        )
+    solid = np.abs(volumes) > FLAT * size[cell]
+    return found[solid], cell[solid]
 
 
 def joined(cells: Any, kind: str) -> Ints:
@@ -47,9 +215,9 @@ def regions(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
     """Region (e,) of each element: an array called so, physical groups, or element sets; and the
     names of those that have one.
     """
-    for name in ("region", "material", "medit:ref"):
+    for name in NUMBERED:
         if name in raw.cell_data:
-            region = values(raw, name, kind)
+            region = np.abs(values(raw, name, kind))  # MED's are negative
             flags = [title for title in raw.cell_data if title.startswith(NAMED)]
             marked = {title: region[values(raw, title, kind) == 1] for title in flags}
             return region, {
@@ -90,43 +258,55 @@ def element_sets(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
     return np.concatenate(regions), dict(enumerate(filled, start=1))
 
 
-def facet_sets(raw: Any, kind: str) -> dict[str, Ints]:
-    """Facet sets by name, of arrays `facets:<name>` or physical groups."""
-    names = {n: n.removeprefix(FACETS) for n in raw.cell_data if n.startswith(FACETS)}
+def facet_sets(raw: Any, new: Ints, tets: Ints, notes: list[str]) -> dict[str, Ints]:
+    """Facets (k, 3) or (k, 6) of sets by name, of arrays `facets:<name>` or physical groups, seen
+    from outside. Plane cells that are no faces of tetrahedra are left out.
+
+    Parameters
+    ----------
+    raw : mesh as meshio reads it
+    new : (n,) number of each of its nodes among those of the tetrahedra, or -1
+    tets : (m, 4) or (m, 10)
+    notes : gets a sentence if some are left out
+    """
+    titles = {name.removeprefix(FACETS): name for name in raw.cell_data if name.startswith(FACETS)}
     groups = {title: tag for title, (tag, d) in raw.field_data.items() if d == 2}
-    width = 3 if kind == "triangle" else 6
-    if kind not in [block.type for block in raw.cells]:
-        return {name: np.zeros((0, width), np.int64) for name in (*names.values(), *groups)}
-    facets = joined(raw.cells, kind)
-    sets = {title: facets[values(raw, name, kind) == 1] for name, title in names.items()}
-    if "gmsh:physical" in raw.cell_data:
-        tags = values(raw, "gmsh:physical", kind)
-        groups |= {f"group {tag}": tag for tag in set(tags.tolist()) - {0, *groups.values()}}
-        sets |= {title: facets[tags == tag] for title, tag in groups.items()}
-    return sets
-
-
-def outward(tets: Ints, sets: dict[str, Ints]) -> dict[str, Ints]:
-    """Facets seen from outside: one that a tetrahedron has the other way round is exchanged."""
-    if not any(len(nodes) for nodes in sets.values()):
-        return sets
     width = 3 if tets.shape[1] == 4 else 6
+    sets: dict[str, list[Ints]] = {title: [] for title in (*titles, *groups)}
+    lost = 0
+    for kind in [kind for kind in PLANE if any(block.type == kind for block in raw.cells)]:
+        facets, is_face, cell = _faces_of(new[joined(raw.cells, kind)], PLANE[kind], tets, width)
+        lost += int((~is_face).sum())
+        marked = {title: values(raw, name, kind) == 1 for title, name in titles.items()}
+        if "gmsh:physical" in raw.cell_data:
+            tags = values(raw, "gmsh:physical", kind)
+            other = set(tags.tolist()) - {0, *groups.values()}
+            every = groups | {f"group {tag}": tag for tag in other}
+            marked |= {title: tags == tag for title, tag in every.items()}
+        for title, own in marked.items():
+            sets.setdefault(title, []).append(facets[own[cell] & is_face])
+    if lost:
+        notes.append(f"left out {lost:,} triangles that are no faces of its tetrahedra")
+    none = np.zeros((0, width), np.int64)
+    return {title: np.vstack([none, *found]) for title, found in sets.items()}
+
+
+def _faces_of(nodes: Ints, corners: int, tets: Ints, width: int) -> tuple[Ints, np.ndarray, Ints]:
+    """Plane cells as faces (k, width) of tetrahedra, whether they are some, and the cell of each.
+
+    One that a tetrahedron of the boundary has the other way round is exchanged.
+    """
+    triangles, cell = fan(nodes, corners)
+    n = int(tets.max()) + 1
     faces = tets[:, FACES[:, :width]].reshape(-1, width)
-    _, place, count = np.unique(
-        np.sort(faces[:, :3], axis=1), axis=0, return_index=True, return_counts=True
-    )
-    outer = faces[place[count == 1]]
-    known = {tuple(sorted(facet[:3])): facet for facet in outer.tolist()}
-
-    def seen(facet: list[int]) -> list[int]:
-        own = known.get(tuple(sorted(facet[:3])), facet)
-        turns = (own[:3], own[1:3] + own[:1], own[2:3] + own[:2])
-        return facet if facet[:3] in turns else own
-
-    return {
-        name: np.array([seen(f) for f in nodes.tolist()], np.int64).reshape(-1, width)
-        for name, nodes in sets.items()
-    }
+    keys, place, count = np.unique(facet_keys(faces, n), return_index=True, return_counts=True)
+    own = np.where((triangles >= 0).all(axis=1), facet_keys(triangles, n), -1)
+    at = np.searchsorted(keys, own).clip(max=len(keys) - 1)
+    face, is_face = faces[place[at]], keys[at] == own
+    given = nodes[cell][:, :width] if corners == 3 and nodes.shape[1] == width else face
+    turns = [np.roll(face[:, :3], turn, axis=1) == given[:, :3] for turn in range(3)]
+    alike = np.any([turn.all(axis=1) for turn in turns], axis=0)
+    return np.where((alike | (count[at] > 1))[:, None], given, face), is_face, cell
 
 
 def node_order(path: Path, points: Floats, tets: Ints) -> list[int]:

@@ -9,20 +9,22 @@ from pathlib import Path
 import numpy as np
 
 from meshes.facets import geometry, seen_from_above, tag_boundary
-from meshes.files import mesh_files, surface_files
+from meshes.files.contents import UNITS, Contents, mesh_of, read_contents, scale_of
 from meshes.reading import PathLike
 from meshes.shapes.structured import Grading
-from meshes.surface.alignment import aligned, clipped, cut_to, on_planes
+from meshes.surface.alignment import aligned, clipped, cut_to, off_origin, on_planes, turned, turns
 from meshes.surface.repair import check, repaired
-from meshes.surface.triangulation import Surface, volume
+from meshes.surface.triangulation import Surface, compact, volume
 from meshes.surface.winding import check_inside
-from meshes.tetmesh import MeshError, TetMesh, boundary_facets, corner_volumes
+from meshes.tetmesh import MeshError, TetMesh, boundary_facets
 from meshes.volume.inner import REST
-from meshes.volume.quality import dihedral_angles, edge_lengths
+from meshes.volume.quality import dihedral_angles, edge_lengths, element_volumes
+from meshes.volume.repair import one_body
 from meshes.volume.tetrahedralise import EPSILON, check_size, graded, tetrahedralise
 
 FINE_RADIUS, GROWTH, COARSEST = 30e-3, 1.25, 2.0  # m about the palm's middle; elements; of h
-SMALLEST, LARGEST = 5e-3, 2.0  # m: diagonal of what can be a hand, or part of one
+SMALLEST, LARGEST = 5e-3, 1.0  # m: diagonal of what can be a hand, or part of one
+TYPICAL = 0.1  # m
 
 Say = Callable[[str], None]
 Progress = Callable[[str, float], None]
@@ -40,26 +42,30 @@ def body_from_file(
     up: str = "+z",
     inner: Sequence[PathLike] = (),
     clip: Sequence[float] | None = None,
+    keep_largest: bool = False,
+    cap: bool = False,
     timeout: float = 600.0,
     say: Say = _unsaid,
     progress: Progress = _unsaid,
 ) -> TetMesh:
     """Tetrahedra of the body in a file, placed under the device, with its boundary named.
 
-    A surface (`.stl .ply .obj .glb .vtp`) is repaired where that takes no guess, turned so that
-    `up` is +z, moved so that the middle of its palm is the origin and its top there is z = 0,
-    cut to `clip` and filled with tetrahedra of h that grow beyond 30 mm from the middle. A mesh
-    (`.vtu .msh .inp .vtk .mesh`) is taken as it is.
+    A surface is repaired where that takes no guess, turned so that `up` is +z, moved so that the
+    middle of its palm is the origin and its top there is z = 0, cut to `clip` and filled with
+    tetrahedra of h that grow beyond 30 mm from the middle. A mesh is checked like a surface and
+    turned; it is moved only if the origin is not on top of it.
 
     Parameters
     ----------
-    path : file of a surface or mesh
+    path : file of a surface or mesh, of one of `FORMATS`
     h : float, metre, edge length aimed at in the middle of the palm.
     unit : of the coordinates in the file: m, cm, mm, um or in.
     up : axis of the file that points to the device: +x, -x, ... -z.
     inner : files of closed surfaces inside that of a surface file, in its frame and unit, such as
         those of bones, each of which becomes a region by the name of its file
     clip : least and greatest x, least and greatest y, metre from the middle of the palm.
+    keep_largest : keep only the largest of several separate pieces.
+    cap : close holes of a surface whose edges lie in a plane, such as an open wrist.
     timeout : float, second, of the mesher.
     say : gets a sentence on each thing that was found or done.
     progress : gets the phase, and 0.
@@ -73,20 +79,25 @@ def body_from_file(
     Raises
     ------
     MeshError
-        If the file cannot be read, what is wrong with its surface cannot be repaired, or the mesher
-        takes longer.
+        If the file cannot be read, is of a size that no hand has, what is wrong with it cannot be
+        repaired, or the mesher takes longer.
     """
     progress(f"reading {Path(path).name}", 0.0)
-    if Path(path).suffix.lower() in mesh_files.VOLUME_FORMATS:
-        if clip is not None or up != "+z" or inner:
+    scale, found = scale_of(unit), read_contents(path)
+    for note in found.notes:
+        say(note)
+    _check_plausible(path, found, unit)
+    if len(found.tets):
+        if clip is not None or inner:
             raise MeshError(
-                f"{path} is a mesh already; only surfaces can be clipped, turned, and filled "
-                "around inner ones"
+                f"{path} is a mesh already; only surfaces can be clipped, and filled around inner "
+                "ones: save its surface, as .stl"
             )
-        mesh = mesh_files.read(path, unit=unit)
-        say(f"read {len(mesh.tets):,} tetrahedra of {(4, 10)[mesh.order - 1]} nodes")
-        return _described(_with_sides(mesh), say)
-    surface = sound_surface(path, unit=unit, up=up, say=say)
+        say(f"read {len(found.tets):,} tetrahedra of {found.tets.shape[1]} nodes")
+        mesh = mesh_of(replace(found, points=found.points @ turns(up).T), scale)
+        mesh = one_body(mesh, keep_largest=keep_largest, say=say)
+        return _described(_with_sides(_on_top(mesh, say)), say)
+    surface = _sound(found, scale, up=up, keep_largest=keep_largest, cap=cap, say=say)
     bones = _inner_surfaces(inner, surface, unit=unit, up=up, say=say)
     surface, shift = aligned(surface)
     bones = {name: replace(bone, points=bone.points + shift) for name, bone in bones.items()}
@@ -121,7 +132,12 @@ def _inner_surfaces(
     found: dict[str, Surface] = {}
     for path in paths:
         try:
-            found[Path(path).stem] = sound_surface(path, unit=unit, up=up, say=say)
+            inside, scale = read_contents(path), scale_of(unit)
+            if len(inside.tets):
+                raise MeshError(f"{path} is a mesh; give a closed surface")
+            found[Path(path).stem] = _sound(
+                inside, scale, up=up, keep_largest=False, cap=False, say=say
+            )
         except MeshError as error:
             raise MeshError(f"{path}: {str(error).removeprefix(f'{path} ')}") from None
     if found:
@@ -129,37 +145,44 @@ def _inner_surfaces(
     return found
 
 
-def sound_surface(path: PathLike, *, unit: str = "m", up: str = "+z", say: Say) -> Surface:
-    """Surface in a file, repaired and checked.
+def _check_plausible(path: PathLike, found: Contents, unit: str) -> None:
+    """Check that a body is as large as a hand, or part of one, in the unit of its file."""
+    used = found.points[np.unique(found.tets if len(found.tets) else found.triangles)]
+    size = float(np.linalg.norm(np.ptp(used, axis=0)))
+    if SMALLEST < size * scale_of(unit) < LARGEST:
+        return
+    likely = min(UNITS, key=lambda name: abs(np.log(max(size, 1e-300) * UNITS[name] / TYPICAL)))
+    raise MeshError(
+        f"{path} is {1e3 * size * scale_of(unit):.3g} mm from corner to corner with its unit taken "
+        f"as {unit}, and must be from {1e3 * SMALLEST:g} to {1e3 * LARGEST:g} mm; give its unit, "
+        f'which may be {likely} (--unit {likely}; in a scene, unit = "{likely}" of [body])'
+    )
 
-    Parameters
-    ----------
-    path, unit, up, say : as for `body_from_file`
 
-    Returns
-    -------
-    Surface, metre
-
-    Raises
-    ------
-    MeshError
-        If it cannot be read or repaired, or is of a size that no hand has.
-    """
-    raw = surface_files.read_surface(path, unit=unit, up=up)
-    if not SMALLEST < raw.diagonal < LARGEST:
-        raise MeshError(
-            f"{path} is {1e3 * raw.diagonal:.3g} mm from corner to corner with its unit taken as "
-            f"{unit}, and must be from {1e3 * SMALLEST:g} to {1e3 * LARGEST:g} mm; pass another "
-            "unit"
-        )
-    say(f"read {len(raw.triangles):,} triangles and {len(raw.points):,} points")
-    surface, said = repaired(raw.points, raw.triangles)
+def _sound(
+    found: Contents, scale: float, *, up: str, keep_largest: bool, cap: bool, say: Say
+) -> Surface:
+    """Surface in a file, metre, repaired and checked."""
+    say(f"read {len(found.triangles):,} triangles and {len(found.points):,} points")
+    points = turned(Surface(points=found.points * scale, triangles=found.triangles), up).points
+    surface, said = repaired(points, found.triangles, keep_largest=keep_largest, cap=cap)
     for sentence in said:
         say(sentence)
     check(surface)
     size = " x ".join(f"{1e3 * side:.0f}" for side in np.ptp(surface.points, axis=0))
     say(f"closed surface of {size} mm, {1e6 * volume(surface):.1f} cm3")
     return surface
+
+
+def _on_top(mesh: TetMesh, say: Say) -> TetMesh:
+    """The mesh, moved like a surface if the origin is not on top of it."""
+    boundary = compact(mesh.points, boundary_facets(mesh.tets)[:, :3])
+    shift = off_origin(boundary)
+    if not shift.any():
+        return mesh
+    say("moved by ({:.1f}, {:.1f}, {:.1f}) mm, its top to the origin".format(*1e3 * shift))
+    unmoved = None if mesh.unmoved is None else mesh.unmoved + shift
+    return replace(mesh, points=mesh.points + shift, unmoved=unmoved)
 
 
 def _with_sides(mesh: TetMesh, planes: Sequence[float] = (), tolerance: float = 0.0) -> TetMesh:
@@ -174,9 +197,10 @@ def _with_sides(mesh: TetMesh, planes: Sequence[float] = (), tolerance: float = 
 
 
 def _described(mesh: TetMesh, say: Say) -> TetMesh:
-    volumes = corner_volumes(mesh.points, mesh.tets)
-    for number, name in sorted(mesh.region_names.items()):
-        own = mesh.region == number
+    volumes = element_volumes(mesh.points, mesh.tets)
+    numbers = np.unique(mesh.region).tolist()
+    for number in numbers if len(numbers) > 1 or mesh.region_names else []:
+        name, own = mesh.region_names.get(number, number), mesh.region == number
         say(f"region {name}: {own.sum():,} tetrahedra, {1e6 * volumes[own].sum():.3g} cm3")
     say(
         f"{len(mesh.tets):,} tetrahedra, {1e6 * volumes.sum():.1f} cm3, edges of "

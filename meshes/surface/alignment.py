@@ -18,14 +18,26 @@ TURNS = {
     "+x": [[0, 0, -1], [0, 1, 0], [1, 0, 0]],
     "-x": [[0, 0, 1], [0, 1, 0], [-1, 0, 0]],
 }
+INSIDE, LEVEL = 3e-3, 1e-4  # m: where the origin may lie inside an outline, and off the top
 OUTLINE_CELLS = 200  # along the longer side of the raster in which the outline is drawn
+
+
+def turns(up: str) -> Floats:
+    """The turn (3, 3) that takes an axis (+x, -x, ... -z) to +z.
+
+    Raises
+    ------
+    MeshError
+        If there is no such axis.
+    """
+    if up not in TURNS:
+        raise MeshError(f"up = '{up}' is no axis; use one of {', '.join(TURNS)}")
+    return np.array(TURNS[up], np.float64)
 
 
 def turned(surface: Surface, up: str) -> Surface:
     """The surface with its axis `up` (+x, -x, ... -z) turned to +z."""
-    if up not in TURNS:
-        raise MeshError(f"up = '{up}' is no axis; use one of {', '.join(TURNS)}")
-    return Surface(points=surface.points @ np.array(TURNS[up]).T, triangles=surface.triangles)
+    return Surface(points=surface.points @ turns(up).T, triangles=surface.triangles)
 
 
 def aligned(surface: Surface) -> tuple[Surface, Floats]:
@@ -34,13 +46,44 @@ def aligned(surface: Surface) -> tuple[Surface, Floats]:
     The middle is that of the widest circle within the outline seen from above: in a hand, the
     palm. The highest point of the surface there comes to z = 0.
     """
-    x, y = widest_place(surface)
+    x, y, _ = widest_place(surface)
     shift = -np.array([x, y, height_at(surface, x, y)])
     return Surface(points=surface.points + shift, triangles=surface.triangles), shift
 
 
-def widest_place(surface: Surface) -> tuple[float, float]:
-    """The middle of the widest circle within the outline seen from above, metre."""
+def off_origin(surface: Surface) -> Floats:
+    """By how much (3,), metre, a surface has to move for its top to be at the origin.
+
+    It stays where it is if the origin is on its top, at least 3 mm inside its outline, or half the
+    radius of the widest circle within it. Otherwise it moves as `aligned` does.
+    """
+    x, y, radius = widest_place(surface)
+    low, cell, depth = _outline(surface)
+    i, j = np.floor(-low / cell + 1).astype(int)
+    known = 0 <= i < depth.shape[0] and 0 <= j < depth.shape[1]
+    if known and depth[i, j] * cell >= min(INSIDE, radius / 2):
+        x = y = 0.0
+    height = height_at(surface, x, y)
+    shift = -np.array([x, y, height if abs(height) > LEVEL else 0.0])
+    return shift + 0.0
+
+
+def widest_place(surface: Surface) -> tuple[float, float, float]:
+    """The middle (x, y) of the widest circle within the outline seen from above, and its radius,
+    metre.
+    """
+    low, cell, depth = _outline(surface)
+    # Of many equal circles, as in a long bar, the one in the middle.
+    best = np.argwhere(depth >= depth.max() - 0.5)
+    best = best[np.argmin(((best - best.mean(axis=0)) ** 2).sum(axis=1))]
+    x, y = low + (best - 0.5) * cell
+    return float(x), float(y), float(depth.max() * cell)
+
+
+def _outline(surface: Surface) -> tuple[Floats, float, Floats]:
+    """A raster over the outline seen from above: its corner (2,) and cell in metre, and how many
+    cells (i, j) each is inside the outline.
+    """
     from scipy.ndimage import distance_transform_edt
 
     flat = surface.points[:, :2]
@@ -55,12 +98,7 @@ def widest_place(surface: Surface) -> tuple[float, float]:
         shares = np.column_stack([i, j, n - i - j])[i + j <= n] / n
         drawn = np.einsum("qa,eai->eqi", shares, corners[count == n]).reshape(-1, 2)
         inside[tuple(((drawn - low) / cell + 1).astype(int).T)] = True
-    distance = distance_transform_edt(inside)
-    # Of many equal circles, as in a long bar, the one in the middle.
-    best = np.argwhere(distance >= distance.max() - 0.5)
-    best = best[np.argmin(((best - best.mean(axis=0)) ** 2).sum(axis=1))]
-    x, y = low + (best - 0.5) * cell
-    return float(x), float(y)
+    return low, float(cell), np.asarray(distance_transform_edt(inside))
 
 
 def height_at(surface: Surface, x: float, y: float) -> float:

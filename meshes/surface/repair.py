@@ -12,6 +12,7 @@ from meshes.surface.self_intersection import self_intersections
 from meshes.surface.triangulation import Surface, centred_corners, compact, n_pieces, pieces, volume
 from meshes.tetmesh import Floats, Ints, MeshError
 
+MOST_OFF_PLANE = 0.1  # of its width: how far the edge of a hole that is capped may leave a plane
 SAME_POINT = 1e-6  # of the diagonal: points nearer than this are one
 
 
@@ -23,6 +24,24 @@ def check(surface: Surface) -> None:
     MeshError
         If it is not: how many edges, points or triangles are wrong, and where.
     """
+    check_manifold(surface)
+    if (n := n_pieces(surface)) > 1:
+        raise MeshError(
+            f"the surface is {n} separate pieces; keep the largest of them with --keep largest, "
+            "or save one that lies inside another, as a bone does, as a file for --inner"
+        )
+    if not (enclosed := volume(surface)) > 1e-9 * surface.diagonal**3:
+        raise MeshError(
+            f"the surface encloses {enclosed:.3g} m3; give a closed one whose triangles are seen "
+            "anticlockwise from outside"
+        )
+    check_crossings(surface)
+
+
+def check_manifold(surface: Surface) -> None:
+    """Check that two triangles meet at each edge and look the same way, and that those around each
+    point are one fan; raises what `check` does.
+    """
     pairs = _paired_edges(surface)
     against = pairs[_starts(surface)[pairs[:, 0]] == _starts(surface)[pairs[:, 1]]]
     if len(against):
@@ -31,16 +50,10 @@ def check(surface: Surface) -> None:
             f"{_at(surface, against[0, 0])}; orient them, as `repaired` does"
         )
     _check_fans(surface, pairs)
-    if (n := n_pieces(surface)) > 1:
-        raise MeshError(
-            f"the surface is {n} separate pieces; keep one of them, or join them in the program "
-            "that it comes from"
-        )
-    if not (enclosed := volume(surface)) > 1e-9 * surface.diagonal**3:
-        raise MeshError(
-            f"the surface encloses {enclosed:.3g} m3; give a closed one whose triangles are seen "
-            "anticlockwise from outside"
-        )
+
+
+def check_crossings(surface: Surface) -> None:
+    """Check that no triangles cross or overlap; raises what `check` does."""
     crossing = self_intersections(surface)
     if len(crossing):
         raise MeshError(
@@ -50,20 +63,30 @@ def check(surface: Surface) -> None:
         )
 
 
-def repaired(points: ArrayLike, triangles: ArrayLike) -> tuple[Surface, list[str]]:
+def repaired(
+    points: ArrayLike, triangles: ArrayLike, *, keep_largest: bool = False, cap: bool = False
+) -> tuple[Surface, list[str]]:
     """A surface without seams, doubles and wrong orientation, and sentences on what was done.
 
-    Only what needs no guess is repaired: points that coincide become one, triangles without area
-    for want of three corners and second copies of triangles go, neighbours are made to look the
-    same way and outwards.
+    Points that coincide become one, triangles without area for want of three corners and second
+    copies of triangles go, neighbours are made to look the same way and outwards. Other repairs
+    are made on request only.
+
+    Parameters
+    ----------
+    points : (n, 3) float, metre
+    triangles : (k, 3) int
+    keep_largest : keep only the piece with the largest area.
+    cap : close holes whose edges lie in a plane, such as an open wrist.
 
     Raises
     ------
     MeshError
-        If it is open, has edges of more than two triangles, or has only one side.
+        If it is open, has edges of more than two triangles, or has only one side; or a hole to be
+        capped is not in a plane.
     """
     raw, said = Surface(points=points, triangles=triangles), []  # type: ignore[arg-type]
-    number = _same_points(raw)
+    number = first_of_same(raw.points)
     kept = number[raw.triangles]
     if (merged := len(number) - len(np.unique(number))) > 0:
         said.append(f"merged {merged:,} points that coincide with others, as along seams")
@@ -78,6 +101,11 @@ def repaired(points: ArrayLike, triangles: ArrayLike) -> tuple[Surface, list[str
     surface = compact(raw.points, kept[np.sort(first)])
     if (unused := len(number) - merged - len(surface.points)) > 0:
         said.append(f"dropped {unused:,} points that no triangle uses")
+    if keep_largest and (n := n_pieces(surface)) > 1:
+        surface, share = _largest(surface)
+        said.append(f"kept the largest of {n} pieces, {100 * share:.1f} % of the area")
+    if cap:
+        surface = _capped(surface, said)
     turned = _turned(surface)
     if turned.any():
         said.append(f"turned round {turned.sum():,} of {len(turned):,} triangles to look outwards")
@@ -85,6 +113,63 @@ def repaired(points: ArrayLike, triangles: ArrayLike) -> tuple[Surface, list[str
         along = np.take_along_axis(surface.triangles, order, axis=1)
         surface = Surface(points=surface.points, triangles=along)
     return surface, said
+
+
+def _largest(surface: Surface) -> tuple[Surface, float]:
+    """The piece with the largest area, and its share of all."""
+    piece = pieces(surface)
+    a, b, c = centred_corners(surface)
+    areas = np.bincount(piece, np.linalg.norm(np.cross(b - a, c - a), axis=1))
+    largest = int(areas.argmax())
+    kept = compact(surface.points, surface.triangles[piece == largest])
+    return kept, float(areas[largest] / areas.sum())
+
+
+def _capped(surface: Surface, said: list[str]) -> Surface:
+    """The surface with its holes closed, each by triangles between the points of its edge."""
+    import pyvista
+    from scipy import sparse
+
+    sides = np.sort(surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges, count = np.unique(sides, axis=0, return_counts=True)
+    ends = edges[count == 1]
+    if not len(ends):
+        said.append("found no hole to close")
+        return surface
+    n = len(surface.points)
+    graph = sparse.coo_array((np.ones(len(ends), bool), tuple(ends.T)), shape=(n, n))
+    label = sparse.csgraph.connected_components(graph, directed=False)[1]
+    for hole in np.unique(label[ends]):
+        rim = surface.points[np.flatnonzero(label == hole)]
+        rim = rim - rim.mean(axis=0)
+        widths = np.ptp(rim @ np.linalg.svd(rim, full_matrices=False)[2].T, axis=0)
+        if widths[2] > MOST_OFF_PLANE * widths[0]:
+            place = _place(surface.points[label == hole][0])
+            raise MeshError(
+                f"a hole of {1e3 * widths[0]:.0f} mm near {place} is {1e3 * widths[2]:.1f} mm out "
+                "of a plane and cannot be capped; close it in the program that it comes from"
+            )
+        said.append(
+            f"closed a hole of {len(rim)} edges, {1e3 * widths[0]:.0f} mm wide and "
+            f"{1e3 * widths[2]:.1f} mm out of a plane"
+        )
+    faces = np.insert(surface.triangles, 0, 3, axis=1).ravel()
+    closed = pyvista.PolyData(np.array(surface.points), faces=faces).fill_holes(np.inf)
+    new = np.asarray(closed.faces).reshape(-1, 4)[:, 1:]
+    return Surface(points=np.asarray(closed.points, np.float64), triangles=new)
+
+
+def first_of_same(points: Floats) -> Ints:
+    """The number (n,) of the first point that each of points (n, 3) coincides with."""
+    from scipy import sparse
+    from scipy.spatial import cKDTree
+
+    n, diagonal = len(points), float(np.linalg.norm(np.ptp(points, axis=0)))
+    near = cKDTree(points).query_pairs(SAME_POINT * diagonal, output_type="ndarray")
+    graph = sparse.coo_array((np.ones(len(near), bool), tuple(near.T)), shape=(n, n))
+    label = sparse.csgraph.connected_components(graph, directed=False)[1]
+    _, first = np.unique(label, return_index=True)
+    return np.asarray(first[label])
 
 
 def _starts(surface: Surface) -> Ints:
@@ -100,7 +185,8 @@ def _paired_edges(surface: Surface) -> Ints:
     if (open_edges := first[count == 1]).size:
         raise MeshError(
             f"the surface is open along {len(open_edges):,} of its {len(first):,} edges, first "
-            f"near {_at(surface, open_edges[0])}; close its holes in the program that it comes from"
+            f"near {_at(surface, open_edges[0])}; close those in a plane, such as a wrist, with "
+            "--cap, and others in the program that it comes from"
         )
     if (crowded := first[count > 2]).size:
         raise MeshError(
@@ -152,19 +238,6 @@ def _check_fans(surface: Surface, pairs: Ints) -> None:
             f"parts of the surface touch at {len(pinched):,} single points, first at "
             f"{_place(surface.points[pinched[0]])}; separate them there"
         )
-
-
-def _same_points(surface: Surface) -> Ints:
-    """The number (n,) of the first point that each coincides with."""
-    from scipy import sparse
-    from scipy.spatial import cKDTree
-
-    n, points = len(surface.points), surface.points
-    near = cKDTree(points).query_pairs(SAME_POINT * surface.diagonal, output_type="ndarray")
-    graph = sparse.coo_array((np.ones(len(near), bool), tuple(near.T)), shape=(n, n))
-    label = sparse.csgraph.connected_components(graph, directed=False)[1]
-    _, first = np.unique(label, return_index=True)
-    return first[label]
 
 
 def _at(surface: Surface, side: int) -> str:

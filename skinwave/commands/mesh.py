@@ -9,8 +9,8 @@ from skinwave.commands.common import add_reporting, add_size, progress_of, summa
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
     parser.add_argument(
-        "file", type=Path, metavar="FILE", help="surface (stl, ply, obj, glb, vtp) or mesh (vtu, "
-        "msh, inp, vtk, mesh)",
+        "file", type=Path, metavar="FILE", help="surface (stl, ply, obj, off, glb, vtp) or mesh "
+        "(vtu, msh, inp, vtk, vtkhdf, xdmf, med, bdf, mesh)",
     )  # fmt: skip
     parser.add_argument("--unit", default="m", help="of the file: m (default), cm, mm, um or in")
     parser.add_argument("--up", default="+z", help="axis that points to the device (default +z)")
@@ -23,6 +23,13 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--clip", type=float, nargs=4, metavar=("XMIN", "XMAX", "YMIN", "YMAX"),
         help="keep this patch, mm from the middle of the palm",
     )  # fmt: skip
+    parser.add_argument(
+        "--keep", choices=["all", "largest"], default="all",
+        help="largest: drop all but the largest of several separate pieces",
+    )  # fmt: skip
+    parser.add_argument(
+        "--cap", action="store_true", help="close holes in a plane, such as an open wrist"
+    )
     add_size(parser, default=4.0, help="element size, mm (4)")
     parser.add_argument("--timeout", type=float, default=600.0, metavar="S", help="of the mesher")
     parser.add_argument("-o", "--out", type=Path, metavar="FILE.vtu", help="file to write")
@@ -54,7 +61,8 @@ def run(options: argparse.Namespace) -> int:
         mesh = body_from_file(
             options.file, options.h / 1e3,
             unit=options.unit, up=options.up, inner=options.inner, timeout=options.timeout,
-            say=said.append, progress=progress,
+            keep_largest=options.keep == "largest", cap=options.cap, say=said.append,
+            progress=progress,
             clip=None if options.clip is None else [side / 1e3 for side in options.clip],
         )  # fmt: skip
         progress("writing", 0.9)

@@ -1,0 +1,266 @@
+"""Abaqus input files: the nodes, elements and sections of parts, where their instances place them.
+
+Keywords as in the Abaqus Keywords Reference Guide. meshio's reader knows neither parts nor
+instances, and keeps only the last of several blocks of nodes.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from meshes.reading import exported_text
+from meshes.tetmesh import Floats, MeshError
+
+SOLIDS = {
+    4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10", 15: "wedge15",
+    20: "hexahedron20", 27: "hexahedron27",
+}  # fmt: skip
+FACES = {3: "triangle", 4: "quad"}
+# Keywords that make, copy or move nodes and elements.
+GENERATING = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM")
+MOST_INCLUDED = 20  # levels of files that include others
+LARGEST = 500_000_000  # bytes
+
+Rows = list[list[str]]
+
+
+@dataclass
+class _Part:
+    """Nodes and elements by their numbers, sets of elements, and those sets that lines of *ELEMENT
+    and sections name.
+    """
+
+    name: str
+    nodes: dict[int, list[float]] = field(default_factory=dict)
+    elements: dict[int, tuple[str, list[int]]] = field(default_factory=dict)
+    sets: dict[str, set[int]] = field(default_factory=dict)
+    blocks: list[str] = field(default_factory=list)
+    sections: list[str] = field(default_factory=list)
+
+
+def read_abaqus(path: Path) -> Any:
+    """All instances of the parts in a file, or what it holds outside of parts.
+
+    Parameters
+    ----------
+    path : of the `.inp` file
+
+    Returns
+    -------
+    meshio.Mesh; its `info` has `notes`, and `names` of regions: the element sets of sections, else
+    those of lines of *ELEMENT, other sets, or parts
+
+    Raises
+    ------
+    MeshError
+        If a line cannot be read, or a keyword generates nodes or elements.
+    """
+    loose = current = _Part("")
+    parts: dict[str, _Part] = {}
+    instances: list[tuple[_Part, Rows]] = []
+    for keyword, options, rows in _blocks(path):
+        if keyword in GENERATING or (keyword == "NODE" and options.get("SYSTEM", "R") != "R"):
+            raise MeshError(
+                f"{path} has *{keyword}, which places or makes nodes or elements by a rule; save "
+                "it with all of them written out, from Abaqus/CAE or as .vtu"
+            )
+        if keyword == "PART":
+            current = parts[options.get("NAME", "").upper()] = _Part(options.get("NAME", ""))
+        elif keyword == "INSTANCE":
+            own = parts.get(options.get("PART", "").upper())
+            if own is None:
+                raise MeshError(
+                    f"{path} has an instance of the part '{options.get('PART', '')}', which it "
+                    "does not hold; save it with its parts"
+                )
+            instances.append((own, rows))
+        elif keyword in ("END PART", "END INSTANCE"):
+            current = loose
+        else:
+            try:
+                _add(current, keyword, options, rows)
+            except (ValueError, IndexError):
+                raise MeshError(
+                    f"{path} cannot be read: a line below *{keyword} is not of whole numbers and "
+                    "coordinates; save it again from the program that it comes from"
+                ) from None
+    placed = [(loose, []), *instances] if instances else [(p, []) for p in (loose, *parts.values())]
+    return _joined(path, [(part, rows) for part, rows in placed if part.elements])
+
+
+def _lines(path: Path, level: int = 0) -> Iterator[str]:
+    """Lines that are neither empty nor comments, with those of included files in their places."""
+    try:
+        content = exported_text(path, LARGEST).splitlines()
+    except ValueError as error:
+        raise MeshError(str(error)) from None
+    head = ""
+    for raw in content:
+        line = raw.strip()
+        if line.startswith("**") or not line:
+            continue
+        if not (line.startswith("*") or head):
+            yield line
+            continue
+        head += line  # keywords go on in the next line after a comma
+        if head.endswith(","):
+            continue
+        keyword, options = _keyword(head)
+        if keyword != "INCLUDE":
+            yield head
+        head = ""
+        if keyword in ("INCLUDE", "NODE", "ELEMENT", "ELSET") and "INPUT" in options:
+            other = path.parent / options["INPUT"]
+            if level == MOST_INCLUDED or not other.is_file():
+                raise MeshError(
+                    f"{path} includes '{options['INPUT']}', which cannot be found; put that file "
+                    "beside it"
+                )
+            yield from _lines(other, level + 1)
+
+
+def _keyword(line: str) -> tuple[str, dict[str, str]]:
+    """Keyword and options of a line."""
+    name, *words = [word.strip() for word in line[1:].split(",")]
+    pairs = [word.partition("=")[::2] for word in words]
+    options = {key.strip().upper(): value.strip().strip('"') for key, value in pairs}
+    return " ".join(name.upper().split()), options
+
+
+def _blocks(path: Path) -> Iterator[tuple[str, dict[str, str], Rows]]:
+    """Each keyword with its options and the lines of data below it."""
+    keyword, options = _keyword("*")
+    rows: Rows = []
+    for line in _lines(path):
+        if line.startswith("*"):
+            yield keyword, options, rows
+            (keyword, options), rows = _keyword(line), []
+        else:
+            rows.append([word.strip() for word in line.split(",")])  # the last is "" after a comma
+    yield keyword, options, rows
+
+
+def _add(part: _Part, keyword: str, options: dict[str, str], rows: Rows) -> None:
+    if keyword == "NODE":
+        for row in rows:
+            place = [float(word or 0) for word in row[1:4]]
+            part.nodes[int(row[0])] = (place + [0.0, 0.0])[:3]
+    elif keyword == "ELEMENT":
+        numbers: list[int] = []
+        part.blocks.append(options.get("ELSET", "").upper())
+        members = part.sets.setdefault(part.blocks[-1], set())
+        most = _solid_nodes(options.get("TYPE", "").upper())
+        for row in rows:
+            numbers += [int(word) for word in row if word]
+            if row[-1] or len(numbers) == most + 1:
+                part.elements[numbers[0]] = (options.get("TYPE", "").upper(), numbers[1:])
+                members.add(numbers[0])
+                numbers = []
+    elif keyword == "ELSET":
+        members = part.sets.setdefault(options.get("ELSET", "").upper(), set())
+        for row in rows:
+            words = [word for word in row if word]
+            if "GENERATE" in options:
+                first, last, *step = map(int, words)
+                members.update(range(first, last + 1, *step))
+            else:
+                for word in words:
+                    members |= {int(word)} if word.isdigit() else part.sets.get(word.upper(), set())
+    elif keyword == "SOLID SECTION":
+        part.sections.append(options.get("ELSET", "").upper())
+
+
+def _joined(path: Path, placed: list[tuple[_Part, Rows]]) -> Any:
+    """All parts where they are placed, as one mesh."""
+    import meshio
+
+    points: list[Floats] = [np.zeros((0, 3))]
+    cells: dict[str, list[list[int]]] = {}
+    regions: dict[str, list[int]] = {}
+    names: dict[str, int] = {}
+    left_out: dict[str, int] = {}
+    first = 0
+    for part, rows in placed:
+        number = {node: first + i for i, node in enumerate(part.nodes)}
+        first += len(number)
+        points.append(_moved(path, np.array(list(part.nodes.values())).reshape(-1, 3), rows))
+        region = _regions(part, names)
+        for element, (kind, nodes) in part.elements.items():
+            name = _kind(kind, len(nodes))
+            if name is None:
+                left_out[kind] = left_out.get(kind, 0) + 1
+                continue
+            try:
+                cells.setdefault(name, []).append([number[node] for node in nodes])
+            except KeyError as error:
+                raise MeshError(
+                    f"{path} has no node {error} of its element {element}; save it again from the "
+                    "program that it comes from"
+                ) from None
+            regions.setdefault(name, []).append(region.get(element, 0))
+    notes = [f"left out {count:,} elements of type {kind}" for kind, count in left_out.items()]
+    if len(placed) > 1:
+        notes.append(f"read {len(placed)} parts or instances of parts")
+    return meshio.Mesh(
+        np.vstack(points),
+        [(name, np.array(nodes)) for name, nodes in cells.items()],
+        cell_data={"region": [np.array(regions[name]) for name in cells]},
+        info={"names": {number: name for name, number in names.items() if name}, "notes": notes},
+    )
+
+
+def _kind(kind: str, nodes: int) -> str | None:
+    """The name of an element's shape by its type and the number of its nodes; None if unknown."""
+    if expected := _solid_nodes(kind):
+        return SOLIDS.get(nodes, kind) if nodes == expected else kind
+    return FACES.get(nodes) if re.match(r"(?:S|STRI|M3D|R3D|SFM3D)[34]", kind) else None
+
+
+def _solid_nodes(kind: str) -> int:
+    """How many nodes a solid element of a type has; 0 of other types."""
+    found = re.match(r"(?:C|DC|AC|DCC|Q)3D(\d+)", kind)
+    return int(found[1]) if found else 0
+
+
+def _regions(part: _Part, names: dict[str, int]) -> dict[int, int]:
+    """The number of the region of each element, from 1; `names` has those of all parts.
+
+    Regions are the sets of sections, of lines of *ELEMENT, of *ELSET, or else the part.
+    """
+    for titles in (part.sections, part.blocks, list(part.sets)):
+        sets = {title: part.sets[title] for title in titles if title and part.sets.get(title)}
+        if sets:
+            break
+    else:
+        sets = {part.name: set(part.elements)}
+    return {
+        element: names.setdefault(title, len(names) + 1)
+        for title, members in sets.items()
+        for element in members
+    }
+
+
+def _moved(path: Path, points: Floats, rows: Rows) -> Floats:
+    """Points after the translation and the rotation of an instance: a vector, then two points of
+    an axis and an angle in degrees.
+    """
+    from scipy.spatial.transform import Rotation
+
+    try:
+        values = [[float(word) for word in row if word] for row in rows]
+        if values:
+            points = points + np.array(values[0])
+        if len(values) > 1:
+            a, b, angle = np.array(values[1][:3]), np.array(values[1][3:6]), values[1][6]
+            axis = (b - a) / np.linalg.norm(b - a)
+            points = a + Rotation.from_rotvec(np.radians(angle) * axis).apply(points - a)
+    except (ValueError, IndexError):
+        raise MeshError(
+            f"{path} has an instance whose lines are no translation and rotation; save it again "
+            "from the program that it comes from"
+        ) from None
+    return np.asarray(points)

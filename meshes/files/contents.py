@@ -1,0 +1,161 @@
+"""What a mesh or surface file holds: the one door for all formats.
+
+`read_contents` reads a file in a process of its own, because readers crash on damaged files, print,
+and take whatever time and memory a file asks for. VTK reads its own formats and those of surfaces,
+meshio those of mesh generators.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from meshes import subprocess_call
+from meshes.surface.alignment import turned
+from meshes.surface.triangulation import Surface
+from meshes.tetmesh import Floats, Ints, MeshError, TetMesh
+
+BY_VTK = (
+    ".vtu", ".pvtu", ".vtk", ".vtm", ".vtkhdf", ".xdmf", ".xmf", ".exo", ".e", ".vtp", ".stl",
+    ".ply", ".obj", ".glb", ".gltf",
+)  # fmt: skip
+BY_MESHIO = {
+    ".msh": "gmsh", ".mesh": "medit", ".bdf": "nastran", ".nas": "nastran", ".fem": "nastran",
+    ".med": "med", ".ele": "tetgen", ".node": "tetgen", ".off": "off",
+}  # fmt: skip
+FORMATS = (*BY_VTK, *BY_MESHIO, ".inp")
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 25.4e-3}
+CHILD = Path(__file__).with_name("reader_child.py")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Contents:
+    """Tetrahedra in a file, or triangles if it has no solid elements.
+
+    Parameters
+    ----------
+    points : (n, 3) float, in the unit of the file
+    tets : (m, 4) or (m, 10) int, m = 0 for a surface
+    triangles : (k, 3) int of a surface; none of a mesh, whose facets are in its sets
+    region : (m,) int, and `names` of those that have one
+    facets : name -> (j, 3) or (j, 6) int
+    notes : a sentence on each thing that was left out, merged or split
+    """
+
+    points: Floats
+    tets: Ints
+    triangles: Ints
+    region: Ints
+    names: dict[int, str]
+    facets: dict[str, Ints]
+    notes: list[str]
+
+
+def read_contents(path: str | os.PathLike[str]) -> Contents:
+    """Everything in a file that a body can be made of, by its suffix.
+
+    Raises
+    ------
+    MeshError
+        If the file does not exist, is of an unknown kind or damaged, or holds neither triangles nor
+        solid elements, or solid elements that cannot be split into tetrahedra.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in FORMATS:
+        raise MeshError(f"{path} is of no kind that is read here; give one of {', '.join(FORMATS)}")
+    if not path.is_file():
+        raise MeshError(f"{path} is no file that is there; check its name")
+    with tempfile.TemporaryDirectory(prefix="skinwave-") as folder:
+        target = Path(folder, "contents.npz")
+        try:
+            subprocess_call.read(CHILD, path, target, folder=folder)
+        except subprocess_call.Refused as error:
+            raise MeshError(str(error).replace(str(path.resolve()), str(path))) from None
+        except MeshError as error:
+            raise MeshError(
+                f"{path} cannot be read: {error}; save it again from the program that it comes from"
+            ) from None
+        with np.load(target) as found:
+            return Contents(
+                points=found["points"], tets=found["tets"], triangles=found["triangles"],
+                region=found["region"],
+                names=dict(zip(found["numbers"].tolist(), found["names"].tolist(), strict=True)),
+                facets={str(name): found[f"facets{k}"] for k, name in enumerate(found["sets"])},
+                notes=found["notes"].tolist(),
+            )  # fmt: skip
+
+
+def scale_of(unit: str) -> float:
+    """Size in metre of a unit, by its name.
+
+    Raises
+    ------
+    MeshError
+        If it is unknown.
+    """
+    if unit not in UNITS:
+        raise MeshError(f"unit '{unit}' is unknown; use one of {', '.join(UNITS)}")
+    return UNITS[unit]
+
+
+def read(path: str | os.PathLike[str], *, unit: str = "m") -> TetMesh:
+    """The tetrahedra of a mesh file, with regions and facet sets.
+
+    Regions are the cell array `region` or `material`, medit's references, physical groups, the
+    element sets of Abaqus's sections, or blocks. Groups and sets have names, and so has a region
+    whose elements have 1 in a cell array `region:<name>`. Hexahedra, prisms and pyramids are split
+    into tetrahedra, coinciding nodes are merged, and elements that are listed twice are taken once;
+    `body_from_file` says so.
+
+    Parameters
+    ----------
+    unit : of the coordinates in the file: m, cm, mm, um or in.
+
+    Raises
+    ------
+    MeshError
+        If the file cannot be read, holds no solid elements, or numbers nodes in an unknown order.
+    """
+    scale, found = scale_of(unit), read_contents(path)
+    if not len(found.tets):
+        raise MeshError(
+            f"{path} is a surface without solid elements; read it as such, with "
+            "`meshes.read_surface`, or fill it: skinwave mesh"
+        )
+    return mesh_of(found, scale)
+
+
+def mesh_of(found: Contents, scale: float) -> TetMesh:
+    """The mesh in a file, metre, with `scale` the size of its unit."""
+    return TetMesh(
+        points=found.points * scale if scale != 1 else found.points, tets=found.tets,
+        region=found.region, region_names=found.names, facets=found.facets,
+    )  # fmt: skip
+
+
+def read_surface(path: str | os.PathLike[str], *, unit: str = "m", up: str = "+z") -> Surface:
+    """Triangles of a surface file, as they are in it.
+
+    Parameters
+    ----------
+    path : the file
+    unit : of the coordinates in the file: m, cm, mm, um or in.
+    up : which axis of the file points away from the palm, towards the device: +x, -x, ... -z.
+
+    Returns
+    -------
+    Surface, metre, turned so that `up` is +z
+
+    Raises
+    ------
+    MeshError
+        If the file cannot be read or holds solid elements, or unit or axis are unknown.
+    """
+    scale, found = scale_of(unit), read_contents(path)
+    if len(found.tets):
+        raise MeshError(f"{path} is a mesh already; give a surface, such as .stl, .ply or .obj")
+    return turned(Surface(points=found.points * scale, triangles=found.triangles), up)

@@ -1,0 +1,197 @@
+"""Run by `read_contents` in a process of its own: reads FILE and writes its contents.
+
+    python reader_child.py FILE OUTPUT.npz
+
+What is wrong with the file is the last line of standard error.
+"""
+
+import contextlib
+import io
+import json
+import struct
+import sys
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from meshes import subprocess_call
+from meshes.files.abaqus import read_abaqus
+from meshes.files.cells import contents
+from meshes.files.contents import BY_MESHIO
+from meshes.tetmesh import MeshError
+
+VTK_CELLS = {
+    1: "vertex", 3: "line", 5: "triangle", 9: "quad", 10: "tetra", 11: "voxel", 12: "hexahedron",
+    13: "wedge", 14: "pyramid", 21: "line3", 22: "triangle6", 23: "quad8", 24: "tetra10",
+    25: "hexahedron20", 26: "wedge15", 27: "pyramid13",
+}  # fmt: skip
+SOLID = 3  # dimension
+AGAIN = "save it again from the program that it comes from"
+
+
+def main() -> int:
+    """Write the contents of FILE to OUTPUT."""
+    path, target = map(Path, sys.argv[1:])
+    try:
+        with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings(record=True) as met:
+            warnings.simplefilter("always")
+            found = contents(path, _read(path))
+        if any("error while reading" in str(one.message) for one in met):
+            raise MeshError(f"{path} is damaged or cut short; {AGAIN}")
+    except MeshError as error:
+        print(error, file=sys.stderr)
+        return subprocess_call.REFUSED
+    except (Exception, SystemExit) as error:
+        why = "is damaged, or holds what its reader does not know"
+        if isinstance(error, MemoryError):
+            why = "asks for more memory than a mesh of its size needs"
+        cure = "save it as version 2.2 (gmsh -format msh22)" if path.suffix == ".msh" else AGAIN
+        print(f"{path} cannot be read: it {why}; {cure}", file=sys.stderr)
+        return subprocess_call.REFUSED
+    np.savez(target, **found)
+    return 0
+
+
+def _read(path: Path) -> Any:
+    """A file's cells as meshio has them; `info` has `notes`, and `names` of regions."""
+    suffix = path.suffix.lower()
+    if suffix == ".inp":
+        return read_abaqus(path)
+    if suffix in BY_MESHIO:
+        import meshio
+
+        _check_unread(path, BY_MESHIO[suffix])
+        with contextlib.redirect_stderr(io.StringIO()):
+            raw = meshio.read(path, file_format=BY_MESHIO[suffix])
+        families = getattr(raw, "cell_tags", {})  # of MED
+        raw.info = {"notes": [], "names": {int(n): ", ".join(of) for n, of in families.items()}}
+        return raw
+    if suffix in (".glb", ".gltf"):
+        _check_gltf(path)
+    return _read_vtk(path)
+
+
+def _read_vtk(path: Path) -> Any:
+    """The cells of all parts of what VTK reads; several parts with solid cells are regions."""
+    import meshio
+    import pyvista
+
+    parts = [(name, _grid(part)) for name, part in _leaves(_data(path), "") if part.n_cells]
+    solid = list(dict.fromkeys(name for name, grid in parts if _kinds(grid, SOLID)))
+    points, first = [np.zeros((0, 3))], 0
+    blocks: list[tuple[str, np.ndarray, dict[str, np.ndarray]]] = []
+    notes = [f"read {len(parts)} parts"] * (len(parts) > 1)
+    for part, grid in parts:
+        for kind in _kinds(grid):
+            own = grid.celltypes == kind
+            if kind not in VTK_CELLS:
+                name = pyvista.CellType(kind).name.lower().replace("_", " ")
+                if pyvista.CellType(kind).dimension == SOLID:
+                    raise MeshError(
+                        f"{path} has {own.sum():,} cells of type {name}, which are not split into "
+                        "tetrahedra here; save it as tetrahedra"
+                    )
+                notes.append(f"left out {own.sum():,} cells of type {name}")
+                continue
+            arrays = {name: np.asarray(grid.cell_data[name])[own] for name in grid.cell_data}
+            if len(solid) > 1 and part in solid:
+                arrays.setdefault("region", np.full(own.sum(), solid.index(part) + 1))
+            blocks.append((VTK_CELLS[kind], np.asarray(grid.cells_dict[kind]) + first, arrays))
+        points.append(np.asarray(grid.points, np.float64))
+        first += grid.n_points
+    tags = {name for _, _, arrays in blocks for name, of in arrays.items() if of.ndim == 1}
+    names = dict(enumerate(solid, start=1)) if len(solid) > 1 else {}
+    return meshio.Mesh(
+        np.vstack(points),
+        [(kind, nodes) for kind, nodes, _ in blocks],
+        cell_data={
+            tag: [arrays.get(tag, np.zeros(len(nodes), int)) for _, nodes, arrays in blocks]
+            for tag in tags
+        },
+        info={"notes": notes, "names": names},
+    )
+
+
+def _data(path: Path) -> Any:
+    """What VTK reads from a file."""
+    import pyvista
+
+    if path.suffix.lower() not in (".xdmf", ".xmf"):
+        return pyvista.read(path)
+    from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
+
+    reader = vtkXdmfReader()  # pyvista's wants steps of time
+    reader.SetFileName(str(path))
+    reader.Update()
+    return pyvista.wrap(reader.GetOutputDataObject(0))
+
+
+def _leaves(data: Any, name: str) -> Iterator[tuple[str, Any]]:
+    """The data sets of what VTK read, which may be nested, with their names."""
+    import pyvista
+
+    if isinstance(data, pyvista.PartitionedDataSet):  # parts of one grid
+        for number in range(data.n_partitions):
+            yield from _leaves(data[number], name)
+        return
+    if isinstance(data, pyvista.MultiBlock):
+        for number in range(data.n_blocks):
+            yield from _leaves(data[number], data.get_block_name(number) or f"part {number + 1}")
+    elif data is not None:
+        yield name, data
+
+
+def _grid(part: Any) -> Any:
+    """A data set as an unstructured grid, with polygons and strips as triangles."""
+    import pyvista
+
+    flat = part.triangulate() if isinstance(part, pyvista.PolyData) else part
+    return flat.cast_to_unstructured_grid()
+
+
+def _kinds(grid: Any, dimension: int | None = None) -> list[int]:
+    """VTK's numbers of the types of cells of a grid, all or those of a dimension."""
+    import pyvista
+
+    kinds = [int(kind) for kind in np.unique(grid.celltypes)]
+    return [k for k in kinds if dimension in (None, pyvista.CellType(k).dimension)]
+
+
+def _check_unread(path: Path, kind: str) -> None:
+    """Refuse what meshio's readers pass over: coordinate systems of Nastran, partitions of gmsh."""
+    content = path.read_bytes()
+    if kind == "gmsh" and b"$PartitionedEntities" in content:
+        raise MeshError(f"{path} is partitioned; save it without partitions, or as version 2.2")
+    if kind != "nastran":
+        return
+    for line in content.decode(errors="replace").splitlines():
+        name, width = line[:8].partition(",")[0].strip().upper(), 16 if "*" in line[:8] else 8
+        if name.rstrip("*") == "GRID":
+            words = line.split(",")
+            system = words[2] if len(words) > 2 else line[8 + width : 8 + 2 * width]
+            if system.strip() not in ("", "0"):
+                raise MeshError(
+                    f"{path} gives nodes in coordinate system {system.strip()}; save it with all "
+                    "nodes in the basic one"
+                )
+
+
+def _check_gltf(path: Path) -> None:
+    """Refuse compressed geometry, which VTK leaves out."""
+    content = path.read_bytes()
+    if content[:4] == b"glTF":  # the first chunk of a binary file is its JSON
+        content = content[20 : 20 + struct.unpack_from("<I", content, 12)[0]]
+    needed = json.loads(content).get("extensionsRequired", [])
+    packed = [name for name in needed if "draco" in name or "meshopt" in name]
+    if packed:
+        raise MeshError(
+            f"{path} is compressed ({', '.join(packed)}), which is not read here; export it "
+            "without compression"
+        )
+
+
+if __name__ == "__main__":
+    sys.exit(main())
