@@ -254,7 +254,7 @@ def degenerate():
 
 SPHERE = sphere()
 REFUSED = {
-    "open at one side": (open_sphere, "open along .* edges, first near .* mm; close its holes"),
+    "open at one side": (open_sphere, "open along .* edges, first near .* mm; close those"),
     "an open patch": (
         lambda: Surface(points=SPHERE.points, triangles=SPHERE.triangles[:40]), "open along"),
     "one triangle": (

@@ -268,6 +268,10 @@ def facet_sets(raw: Any, new: Ints, tets: Ints, notes: list[str]) -> dict[str, I
     new : (n,) number of each of its nodes among those of the tetrahedra, or -1
     tets : (m, 4) or (m, 10)
     notes : gets a sentence if some are left out
+
+    Returns
+    -------
+    dict of arrays
     """
     titles = {name.removeprefix(FACETS): name for name in raw.cell_data if name.startswith(FACETS)}
     groups = {title: tag for title, (tag, d) in raw.field_data.items() if d == 2}

@@ -66,7 +66,7 @@ def check_crossings(surface: Surface) -> None:
 def repaired(
     points: ArrayLike, triangles: ArrayLike, *, keep_largest: bool = False, cap: bool = False
 ) -> tuple[Surface, list[str]]:
-    """A surface without seams, doubles and wrong orientation, and sentences on what was done.
+    """Repair seams, doubles and wrong orientation of a surface.
 
     Points that coincide become one, triangles without area for want of three corners and second
     copies of triangles go, neighbours are made to look the same way and outwards. Other repairs
@@ -78,6 +78,10 @@ def repaired(
     triangles : (k, 3) int
     keep_largest : keep only the piece with the largest area.
     cap : close holes whose edges lie in a plane, such as an open wrist.
+
+    Returns
+    -------
+    Surface, and sentences on what was done
 
     Raises
     ------

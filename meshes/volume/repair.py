@@ -23,7 +23,7 @@ from meshes.tetmesh import (
 def one_body(
     mesh: TetMesh, *, keep_largest: bool = False, say: Callable[[str], None] = print
 ) -> TetMesh:
-    """The mesh, if its tetrahedra are one body that no two of them fill twice.
+    """Check that tetrahedra are one body, and that no two of them fill the same space.
 
     Parameters
     ----------
