@@ -34,9 +34,14 @@ def choose(what: str, value: str, known: Iterable[str]) -> str:
 
 
 def meant(value: object, known: Iterable[str]) -> str:
-    """Suggestion of the nearest word, to end a sentence; empty if none is near."""
+    """Suggestion of the nearest word, to end a sentence; empty if none is near.
+
+    A key without its unit is nearest to the first key that it begins.
+    """
     words, said = {word.lower(): word for word in known}, str(value)[:LONGEST].lower()
-    near = difflib.get_close_matches(said, words, 1, NEAR)
+    near = [word for word in words if word.startswith(f"{said}_")] or difflib.get_close_matches(
+        said, words, 1, NEAR
+    )
     if not near and len(said) >= SHORTEST:
         near = [word for word in words if said in word]
     return f"; did you mean '{words[near[0]]}'?" if near else ""

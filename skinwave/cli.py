@@ -6,7 +6,8 @@ Only argparse is imported before a command is known, so that help is immediate.
 import argparse
 import sys
 from collections.abc import Sequence
-from typing import NoReturn
+from functools import partial
+from typing import Any, NoReturn
 
 import skinwave
 from skinwave import extensions
@@ -42,6 +43,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         say(f"skinwave: {error}", sys.stderr)
         return 2
     options = parser().parse_args(_joined(typed))
+    if options.command_name is None:
+        parser().error(f"no command is given; use one of {', '.join(COMMANDS)}")
     options.typed = typed
     leave_out_working_settings()
     try:
@@ -76,10 +79,45 @@ def _joined(arguments: Sequence[str]) -> list[str]:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Argument parser, of the commands too, whose errors a terminal shows and does not obey."""
+    """Argument parser, of the commands too, whose errors are a sentence with the nearest word."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self.register("type", float, _number)
+        self.register("type", int, partial(_number, kind=int))
 
     def error(self, message: str) -> NoReturn:
-        super().error(printable(message, keep=""))
+        shown = printable(message, keep="")
+        self.exit(2, f"skinwave: {shown}; see {self.prog} --help\n")
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            from simple_model.choices import meant
+
+            known = [word for action in self._actions for word in action.option_strings]
+            what = "option" if unknown[0].startswith("-") else "argument"
+            name = unknown[0].partition("=")[0]
+            self.error(f"unknown {what} {name}{meant(name, known).rstrip('?')}")
+        return found, unknown
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            from simple_model.choices import choose
+
+            try:
+                choose("value", value, action.choices)
+            except ValueError as error:
+                raise argparse.ArgumentError(action, str(error).rstrip("?")) from None
+
+
+def _number(text: str, kind: type = float) -> Any:
+    """The number of an option."""
+    try:
+        return kind(text)
+    except ValueError:
+        words = "a whole number" if kind is int else "a number, such as 0.5"
+        raise argparse.ArgumentTypeError(f"'{text}' must be {words}") from None
 
 
 def parser() -> argparse.ArgumentParser:
@@ -91,11 +129,11 @@ def parser() -> argparse.ArgumentParser:
         "used longest ago leave first; empty for none.",
     )
     parser.add_argument("--version", action="store_true", help="print the version and exit")
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    commands = parser.add_subparsers(dest="command_name", metavar="COMMAND")
     for name, module in COMMANDS.items():
         command = commands.add_parser(name, help=(module.__doc__ or "").rstrip("."))
         module.options(command)
         if name not in UNCACHED:
             command.add_argument("--no-cache", action="store_true", help=NO_CACHE)
-        command.set_defaults(command=module.run, command_name=name)
+        command.set_defaults(command=module.run)
     return parser

@@ -72,6 +72,8 @@ def _by_shear(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) ->
             f"{where} has {keys['young']} without {keys['poisson']}, which makes it a shear "
             f"modulus; give {keys['poisson']}"
         )
+    if not values["young"] > 0:
+        raise ValueError(f"{where} has {keys['young']} = {values['young']:g}; give one above 0")
     shear = values["young"] / (2 * (1 + max(values["poisson"], LEAST_POISSON)))
     given = rest.get("shear_modulus", shear)
     if "shear_modulus" in rest and not abs(given - shear) <= SAME_MODULUS * abs(shear):

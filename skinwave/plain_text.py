@@ -47,6 +47,23 @@ def _escape(letter: str) -> str:
     return f"\\u{n:04x}" if n < 0x10000 else f"\\U{n:08x}"
 
 
+def as_utf_8(content: bytes) -> str:
+    """The text of a file's content, without a byte order mark.
+
+    Raises
+    ------
+    ValueError
+        If it is no text in UTF-8.
+    """
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise ValueError("no text in UTF-8; save it as UTF-8") from None
+    if "\0" in text:
+        raise ValueError("no text, or one in UTF-16; save it as UTF-8")
+    return text
+
+
 def number_in(text: str) -> float | None:
     """The number that a text is, as Python reads it, if it is one."""
     try:

@@ -19,11 +19,13 @@ from skinwave.bodies.parts import check_material
 from skinwave.distributions import Distribution, parent_of, with_spreads, without_spreads
 from skinwave.load import Load
 from skinwave.material_file import with_tables
+from skinwave.plain_text import as_utf_8
 from skinwave.scene import BODIES, KINDS, Body, Placement, Scene, kind_of, solid_of
 from skinwave.scene_keys import DERIVED, PATH, SECTIONS, as_table, as_text, checked, renamed
 
 LARGEST = 16_000_000  # bytes of a file: some seconds of a path recorded at 40 kHz
 PROSE = 1_000_000  # bytes of it that are no numbers
+PATHS = "write a Windows path in single quotes, 'C:\\hand.stl', or with /, \"C:/hand.stl\""
 NUMBERS = b"0123456789.,[]+-eE_ \t\r\n"
 DEEP = re.compile(  # keys of many parts, which take squares of their number
     r"""(?<![\w"'-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){16}"""
@@ -63,7 +65,7 @@ def content(path: str | Path) -> str:
             raise ValueError(
                 f"more than {PROSE / 1e6:g} MB of it are no numbers, which no scene has; cut it"
             )
-        return found.decode("utf-8-sig")
+        return as_utf_8(found)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
 
@@ -87,10 +89,42 @@ def parsed(text: str, folder: Path | None = None) -> dict[str, Any]:
     try:
         table = tomllib.loads(text)
     except ValueError as error:
-        raise ValueError(f"not valid TOML: {error}") from None
+        raise ValueError(_not_toml(text, str(error))) from None
     except RecursionError:
         raise ValueError("not valid TOML: brackets within brackets beyond all depth") from None
+    _check_texts({key: value for key, value in table.items() if key != "name"})
     return renamed(with_tables(table, folder) if folder else table)
+
+
+def _not_toml(text: str, error: str) -> str:
+    """What is wrong with a text that the parser refuses, with the line and the cure."""
+    lines = text.splitlines() or [""]
+    place = re.search(r"at line (\d+)", error)
+    k = min(int(place[1]), len(lines)) if place else len(lines)
+    if "Illegal character '\\n'" in error and k > 1:  # found where the next line begins
+        k -= not lines[k - 1].count('"') % 2
+    line = lines[k - 1].strip()
+    if "\\" in line:
+        cure = PATHS
+    elif "twice" in error or "Cannot" in error:
+        cure = "its section or key is there already; leave out one"
+    elif line.count('"') % 2 or line.count("'") % 2:
+        cure = "close the quotes"
+    else:
+        cure = (
+            "write key = value, a text in quotes, a number as 0.5 without its unit, true or false"
+        )
+    return f"not valid TOML: line {k} is {line[:60]}; {cure}"
+
+
+def _check_texts(table: Mapping[str, Any]) -> None:
+    """Refuse texts with control characters, which a path in double quotes gets from a backslash."""
+    for key, value in table.items():
+        for each in value if isinstance(value, list) else [value]:
+            if isinstance(each, dict):
+                _check_texts(each)
+            elif isinstance(each, str) and not each.isprintable():
+                raise ValueError(f"{key} = {each[:60]!r} has a control character; {PATHS}")
 
 
 def from_table(table: dict[str, Any]) -> Scene:

@@ -507,7 +507,9 @@ def checked(where: str, table: dict[str, Any], keys: Mapping[str, Any]) -> dict[
     values = {}
     for key, value in table.items():
         if key not in keys:
-            hint = meant(key, keys) or f"; it may have {', '.join(keys)}"
+            others = [f"[{name}]" for name, known in SECTIONS.items() if key in known]
+            hint = f"; it belongs to {' or '.join(others)}" if others else meant(key, keys)
+            hint = hint or f"; it may have {', '.join(keys)}"
             raise ValueError(f"{where} has the unknown key {_shown(key)}{hint}")
         field = keys[key]
         if isinstance(field, SceneKey):

@@ -290,6 +290,8 @@ def check_options(solver: str, **lengths: float | None) -> None:
         If there is one.
     """
     choose("solver", solver, ("auto", *fem.available()))
+    words = {"h": ("element size", 1e3, "mm"), "dt": ("time step", 1.0, "s")}
     for name, value in lengths.items():
         if value is not None and not (np.isfinite(value) and value > 0):
-            raise ValueError(f"{name} = {value} must be a finite number above 0")
+            what, per_unit, unit = words[name]
+            raise ValueError(f"{what} {per_unit * value:g} {unit} must be a finite number above 0")

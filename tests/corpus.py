@@ -259,7 +259,7 @@ def command_lines() -> list[list[str]]:
 
 
 def wrong_usage() -> list[list[str]]:
-    """Arguments that argparse refuses with its usage."""
+    """Arguments that no command takes."""
     run = ["run", "good.toml"]
     found: list[list[str]] = [[], ["fly"], ["run"], ["plan"], ["tradeoff"], ["run", "a", "b"]]
     found += [["--version-of-what"], ["run", "--quick", "good.toml"], ["verify", "good.toml"]]

@@ -77,7 +77,10 @@ def test_wrong_usage_ends_with_two(folder, capsys, arguments):
     with pytest.raises(SystemExit) as stop:
         main(arguments)
     assert stop.value.code == 2
-    assert "usage: skinwave" in capsys.readouterr().err
+    printed = capsys.readouterr().err
+    assert printed.startswith("skinwave: ")
+    assert printed.endswith("--help\n")
+    assert printed.count("\n") == 1
     assert corpus.contents(folder) == before
 
 

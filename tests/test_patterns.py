@@ -598,7 +598,7 @@ def malformed():
         ),
         "far.adaptics": (with_(keyframes=[keyframe(0, (310.0, 0.0))]), "within 300 mm"),
         "empty.csv": (b"", "no focal points"),
-        "binary.csv": (b"\xff\xfe\x00\x01", "not a text file"),
+        "binary.csv": (b"\xff\xfe\x00\x01", "no text in UTF-8"),
         "header.csv": (header.encode(), "without focal points"),
         "column.csv": (b"t_s,xx_m,y_m\n0,0,0\n", "did you mean 'x_m'"),
         "twice.csv": (b"t_s,x_m,x_m,y_m\n0,0,0,0\n", "twice"),

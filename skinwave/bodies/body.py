@@ -97,7 +97,9 @@ class Body:
         for name in ("width", "height", "depth"):
             length, may_be_infinite = getattr(self, name), name == "depth" and kind.is_layer
             if not (length > 0 and (isfinite(length) or (may_be_infinite and length == inf))):
-                raise ValueError(f"body {name} = {1e3 * length} mm must be finite and above 0")
+                raise ValueError(
+                    f"body {name} ({KEYS[name]}) = {1e3 * length:g} must be finite and above 0"
+                )
             if isfinite(length) and length > LARGEST:
                 raise ValueError(
                     f"body {name} = {length:g} m is more than {LARGEST:g} m, the limit of a body; "

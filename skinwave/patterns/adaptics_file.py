@@ -13,6 +13,7 @@ from typing import Any
 
 from simple_model.choices import choose
 from skinwave.numbers import is_finite_number
+from skinwave.plain_text import as_utf_8
 
 FORMAT = "MidAirHapticsAnimationFileFormat"
 REVISIONS = ("0.0.10-alpha.1", "0.1.0-alpha.2", "0.1.0-alpha.3")
@@ -88,10 +89,15 @@ def parse(content: bytes, parameters: Mapping[str, float]) -> Animation:
     ValueError
         If it is none, has random intensity, or has no such parameter.
     """
+    text = as_utf_8(content)
     try:
-        table = json.loads(content.decode("utf-8-sig"))
-    except (ValueError, RecursionError) as error:
-        raise ValueError(f"not valid JSON: {' '.join(str(error).split())[:80]}") from None
+        table = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise ValueError(
+            f"not valid JSON at line {error.lineno}, column {error.colno}; save it with AdapTics"
+        ) from None
+    except (ValueError, RecursionError):  # numbers of too many digits, brackets beyond all depth
+        raise ValueError("not valid JSON that can be read; save it with AdapTics") from None
     if not isinstance(table, dict) or table.get("$DATA_FORMAT") != FORMAT:
         raise ValueError(f"not an .adaptics file: $DATA_FORMAT is not '{FORMAT}'")
     if (revision := table.get("$REVISION")) not in REVISIONS:

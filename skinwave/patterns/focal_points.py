@@ -19,7 +19,7 @@ from simple_model import Tacton, Trajectory, evenly
 from simple_model.choices import meant
 from simple_model.tacton import LONGEST, MOST_FOCI
 from skinwave.patterns.pattern import Options, Pattern, aliased, loudness, one_height
-from skinwave.plain_text import csv_table, number_in
+from skinwave.plain_text import as_utf_8, csv_table, number_in
 from skinwave.scene import Scene
 
 COLUMNS = ("t_s", "point", "x_m", "y_m", "z_m", "intensity")
@@ -136,22 +136,21 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
 
 def _rows(content: bytes) -> list[tuple[int, list[str]]]:
     """Line numbers and fields of the lines that are neither empty nor comments."""
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise ValueError("not a text file; a CSV is UTF-8") from None
-    found = list(_cells(text))
+    found = list(_cells(as_utf_8(content)))
     if not found:
         raise ValueError("no focal points; give a line each")
     return found
 
 
 def _cells(text: str) -> Iterator[tuple[int, list[str]]]:
-    reader = csv.reader(io.StringIO(text))
+    first = next((line for line in text.splitlines() if line.strip() and line[0] != "#"), "")
+    delimiter = max(",;\t", key=first.count)
+    reader = csv.reader(io.StringIO(text), delimiter=delimiter)
     try:
         for row in reader:
             if row and not row[0].startswith("#") and any(cell.strip() for cell in row):
-                yield reader.line_num, [cell.strip() for cell in row]
+                cells = [cell.strip() for cell in row]
+                yield reader.line_num, [c.replace(",", ".") for c in cells]  # decimal commas
             if reader.line_num > MOST_ROWS:
                 raise ValueError(f"more than {MOST_ROWS:,} lines; cut the pattern")
     except csv.Error as error:

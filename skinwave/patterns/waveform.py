@@ -126,9 +126,8 @@ def _decoded(content: bytes) -> tuple[int, Floats]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", wavfile.WavFileWarning)  # of chunks beside the samples
             rate, data = wavfile.read(io.BytesIO(content))
-    except Exception as error:
-        said = " ".join(str(error).split())[:80]
-        raise ValueError(f"not a WAV file that can be read ({said})") from None
+    except Exception:
+        raise ValueError("not a WAV file that can be read; save it as 16-bit PCM") from None
     if data.ndim != 1:
         raise ValueError(f"the WAV has {data.shape[1]} channels; mix it down to one")
     if rate <= 0 or len(data) < 2:
