@@ -36,10 +36,12 @@ def choose(what: str, value: str, known: Iterable[str]) -> str:
 def meant(value: object, known: Iterable[str]) -> str:
     """Suggestion of the nearest word, to end a sentence; empty if none is near.
 
-    A key without its unit is nearest to the first key that it begins.
+    What is the beginning of a word, such as a key without its unit, is nearest to that which adds
+    fewest parts.
     """
     words, said = {word.lower(): word for word in known}, str(value)[:LONGEST].lower()
-    near = [word for word in words if word.startswith(f"{said}_")] or difflib.get_close_matches(
+    begun = [word for word in words if word.startswith(f"{said}_")]
+    near = sorted(begun, key=lambda word: word.count("_")) or difflib.get_close_matches(
         said, words, 1, NEAR
     )
     if not near and len(said) >= SHORTEST:

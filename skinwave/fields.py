@@ -83,7 +83,7 @@ class Field:
 
     def animate(self, frames: int = 40, *, ax: Axes | None = None) -> FuncAnimation:
         """The same as a film of so many of its times, evenly spaced; `.save("film.gif")` writes it,
-        `.to_jshtml()` shows it in a notebook.
+        or `.save("film.mp4")` with the extra [film]; `.to_jshtml()` shows it in a notebook.
         """
         return field_plot.animation(self, frames, ax)
 

@@ -7,6 +7,7 @@ import sys
 import tomllib
 from dataclasses import replace
 from importlib import import_module
+from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -25,7 +26,7 @@ from skinwave import citations, window
 from skinwave.cli import main
 from skinwave.fields import Field
 from skinwave.models import BUILT_IN, named
-from skinwave.pictures import scene_plot
+from skinwave.pictures import films, scene_plot
 from skinwave.pictures.styles import style
 from skinwave.planning.budget import error_budget
 from skinwave.planning.extent import PlanRow
@@ -280,11 +281,24 @@ def test_a_map_is_of_the_upper_surface_into_the_body(field, tmp_path):
     assert -low == high == pytest.approx(1e6 * np.abs(field.displacement[:, top, 2]).max())
     assert ax.get_title() == "t = 2.00 ms"
     film = field.animate(2)
-    film.save(tmp_path / "wave.gif", writer="pillow", dpi=20)
+    film.save(tmp_path / "wave.gif", dpi=20)
     from PIL import Image
 
     with Image.open(tmp_path / "wave.gif") as kept:
         assert kept.n_frames == 2
+
+
+@pytest.mark.skipif(not all(map(find_spec, films.ENCODER)), reason="the extra [film] is missing")
+def test_a_film_is_saved_as_mp4_with_its_extra_and_named_without(field, tmp_path, monkeypatch):
+    import imageio_ffmpeg
+
+    film = field.animate(3)
+    film.save(tmp_path / "wave.mp4", dpi=20)
+    frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "wave.mp4"))
+    assert (frames, seconds) == (3, pytest.approx(0.15, abs=0.01))
+    monkeypatch.setattr(films, "find_spec", lambda name: None)
+    with pytest.raises(ValueError, match=r"install the extra \[film\], or name it .gif"):
+        film.save(tmp_path / "wave.mp4")
 
 
 def test_a_scene_is_drawn_before_anything_is_solved(scene):

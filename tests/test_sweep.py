@@ -492,6 +492,15 @@ def test_plots_are_drawn_with_units(scene):
         check_plots(kind)
 
 
+def test_a_plot_of_factors_groups_by_them_and_not_by_the_material_they_make(scene, capsys):
+    kernel = ["--model", "point-kernel"]
+    swept("--vary", "body.material.modulus_scale=0.5,1,2", "tacton.size_mm=8,9", *kernel)
+    capsys.readouterr()
+    assert main(["plot", "short-sweep", "--column", "kernel_peak_pa", "--json"]) == 0
+    name = Path(json.loads(capsys.readouterr().out)["figures"][0]).stem
+    assert name == "kernel_peak_pa-over-body_material_modulus_scale-and-tacton_size_mm"
+
+
 def test_rows_keep_the_order_of_the_design(scene):
     kernel = ["--model", "point-kernel"]
     vary = ["--vary", "tacton.speed_m_per_s=8,4,70,6", "tacton.size_mm=9,8", *kernel]

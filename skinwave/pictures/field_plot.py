@@ -11,6 +11,7 @@ from simple_model.quantities import DISPLACEMENT
 from skinwave.exports import collection
 from skinwave.files import folder_name
 from skinwave.outputs import output_file
+from skinwave.pictures.films import encoder
 
 if TYPE_CHECKING:
     from matplotlib.animation import FuncAnimation
@@ -62,7 +63,18 @@ def draw(field: "Field", k: int, ax: "Axes | None") -> "Axes":
 
 def animation(field: "Field", frames: int, ax: "Axes | None") -> "FuncAnimation":
     """A film of some frames."""
+    from matplotlib import rc_context
     from matplotlib.animation import FuncAnimation
+
+    class Film(FuncAnimation):
+        """An animation that is saved as GIF or, by the encoder of the extra [film], as MP4."""
+
+        def save(self, filename: Any, writer: Any = None, *rest: Any, **options: Any) -> None:
+            suffix = Path(filename).suffix
+            if writer is None and suffix == ".gif":
+                writer = "pillow"
+            with rc_context(encoder() if suffix == ".mp4" else {}):
+                super().save(filename, writer, *rest, **options)
 
     ax = new_axes(ax)
     image, pushed = _map(field, ax)
@@ -72,7 +84,7 @@ def animation(field: "Field", frames: int, ax: "Axes | None") -> "FuncAnimation"
         return image, ax.set_title(_stamp(field, k), fontsize="medium")
 
     shown, figure = _spread(len(field.times), frames), cast("Figure", ax.figure)
-    return FuncAnimation(figure, show, shown.tolist(), interval=INTERVAL)
+    return Film(figure, show, shown.tolist(), interval=INTERVAL)
 
 
 def save(field: "Field", path: Path, frames: int | None, *, overwrite: bool) -> Path:

@@ -38,10 +38,14 @@ NAMES = {
 
 
 def varied(rows: Sequence[Row]) -> list[str]:
-    """Keys of scenes that differ between rows, those with most values first."""
+    """Keys of scenes that differ between rows, those with most values first; of a table and a key
+    in it, the key.
+    """
     keys = [key for key in dict.fromkeys(k for row in rows for k in row) if "." in key]
     counts = {key: len({row.get(key) for row in rows}) for key in keys}
-    return sorted((k for k in keys if counts[k] > 1), key=lambda k: -counts[k])
+    found = [k for k in keys if counts[k] > 1]
+    own = [k for k in found if not any(other.startswith(f"{k}.") for other in found)]
+    return sorted(own, key=lambda k: -counts[k])
 
 
 def finished(rows: Sequence[Row]) -> list[Row]:
