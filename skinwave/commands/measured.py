@@ -16,7 +16,7 @@ SIGNS = {"in": 1, "out": -1}
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
     parser.add_argument(
-        "file", type=Path, metavar="FILE", help=".csv .tsv .npz .wav .mat .uff .f32"
+        "file", type=Path, metavar="FILE", help=".csv .txt .lvm .tdms .npz .wav .mat .uff .f32"
     )
     add_reading(parser)
     parser.add_argument(
