@@ -20,7 +20,7 @@ TEXTS = {
     "header alone": (HEAD, "a header and no numbers"),
     "no header": (ROWS, "write a header such as t [s], v(0,0) [mm/s], v(5,0) [mm/s], or"),
     "a word": (HEAD + ROWS + "0.003, x, 8\n", "line 5 has 'x', which is no number"),
-    "thousands": ("t [s]; v(0,0) [nm/s]\n0,001; 594\n0,002; 1.357\n", "'1.357' with a dot, and"),
+    "thousands": ("t [s]; v(0,0) [nm/s]\n0,001; 594\n0,002; 1.357\n", "'1.357', which has a dot"),
     "a short row": (HEAD + ROWS + "0.003, 7\n", "line 5 has 2 cells and the rows above 3"),
     "not a number": (HEAD + ROWS + "0.003, nan, 1\n", "of 4 samples only 3 lie between"),
     "uneven times": (HEAD + ROWS + "0.007, 1, 1\n", "equal steps"),

@@ -180,6 +180,18 @@ def test_long_gaps_are_refused(tmp_path, last, value, rate):
         read(tmp_path / "a.csv", rate=rate)
 
 
+@pytest.mark.parametrize("value", ["", "NaN"])
+@pytest.mark.parametrize("places", [1, 2])
+def test_gaps_without_times_keep_their_samples(tmp_path, value, places):
+    """Of a line for each sample, an empty one is a sample that is missing."""
+    lines = rows(*(TONE, OTHER)[:places]).splitlines()
+    lines[500:504] = [",".join([value] * places)] * 4
+    (tmp_path / "a.csv").write_text(
+        "\n".join(["v [mm/s],w [mm/s]"[: 8 * places + 1].strip(","), *lines])
+    )
+    assert_tone(read(tmp_path / "a.csv", rate=RATE), places, first=0.0)
+
+
 def test_a_motion_that_rises_evenly_beside_times_stays(tmp_path):
     (tmp_path / "a.csv").write_text("t [s],CH1,CH2\n" + rows(T, TONE, 3 * T))
     found = read(tmp_path / "a.csv", unit="mm/s")

@@ -79,7 +79,7 @@ def with_roles(table: Table, given: Given) -> tuple[Table, tuple[str, ...]]:
     ValueError
         If columns have different times, or a chosen column does not exist.
     """
-    numbers, said = table.numbers, []
+    numbers, said = _rows(table), []
     columns = [replace(one, unit=per_reference(one.unit)[0]) for one in table.columns]
     if any(per_reference(one.unit)[1] for one in table.columns):
         said.append("values are per unit of the reference")
@@ -119,6 +119,16 @@ def with_roles(table: Table, given: Given) -> tuple[Table, tuple[str, ...]]:
     return replace(table, columns=tuple(columns[k] for k in kept), numbers=numbers[:, kept]), tuple(
         said
     )
+
+
+def _rows(table: Table) -> Floats:
+    """Numbers without empty rows, if times tell which rows are missing."""
+    numbers = table.numbers
+    full = ~np.isnan(numbers).all(axis=1)
+    told = any(one.role in (TIME, FREQUENCY) for one in table.columns) or any(
+        rises(column) for column in numbers[full].T
+    )
+    return numbers[full] if told else numbers
 
 
 def _counts(numbers: Floats) -> bool:

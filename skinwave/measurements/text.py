@@ -17,7 +17,7 @@ import numpy as np
 
 from simple_model.trajectory import Floats
 from skinwave.measurements.decoding import decoded
-from skinwave.measurements.headers import TIME, UNITS, Column, X, Y, column
+from skinwave.measurements.headers import TIME, UNITS, X, Y, column
 from skinwave.measurements.labview import lvm_table
 from skinwave.measurements.layouts import EXAMPLE, in_metre, recording
 from skinwave.measurements.recording import Given, Recording
@@ -80,27 +80,35 @@ def table(text: str) -> Table:
     ValueError
         If there is none, or a line in it is no row of numbers; with the number of the line.
     """
-    lines = text.splitlines()
-    last = [k for k in range(max(0, len(lines) - 4 * SHOWN), len(lines)) if lines[k].strip()]
+    lines = text.rstrip().splitlines()
+    last = [line for line in lines[-4 * SHOWN :] if line.strip()][-SHOWN:]
     if not any(line.strip() and line.lstrip()[0] not in "#%" for line in lines):
         raise ValueError(f"the file has no table; give a header such as {EXAMPLE}, and numbers")
-    wrong = ""
-    for delimiter, comma in _separations([lines[k] for k in last[-SHOWN:]]):
-        kept, width = _columns([lines[k] for k in last[-SHOWN:]], delimiter, comma)
+    wrong = "the file has a header and no numbers; export it anew"
+    if len(last) > 1:
+        cells = re.split(r"[\t;, ]+", last[-1].strip())
+        word = next((cell for cell in cells if number_in(cell) is None), cells[0])
+        wrong = f"line {len(lines)} has '{word[:40]}', which is no number; mend it"
+    misfits = []
+    for delimiter, comma in _separations(last):
+        kept, width = _columns(last, delimiter, comma)
         first = next((k for k, line in enumerate(lines)
                       if _is_row(_cells(line, delimiter, comma), kept, width)), -1)  # fmt: skip
         if first < 0:
             continue
-        columns, names, notes, problem = _header(lines[:first], delimiter, kept, width)
-        if not problem:
-            numbers = _numbers(lines, first, delimiter, comma, kept, width, names, notes)
-            clocks = [_clock(_cells(lines[first], delimiter, comma)[k]) is not None for k in kept]
-            numbers[:, clocks] -= numbers[:1, clocks]
-            columns = tuple(replace(one, role=TIME, unit="s") if clock else one
-                            for one, clock in zip(columns, clocks, strict=True))  # fmt: skip
-            return Table(columns=columns, numbers=numbers, notes=tuple(notes))
-        wrong = wrong or problem
-    raise ValueError(wrong or _no_rows(lines, last))
+        try:
+            names, units, notes = _header(lines[:first], delimiter, kept, width)
+        except ValueError as error:
+            misfits.append(str(error))
+            continue
+        numbers = _numbers(lines, first, delimiter, comma, kept, names, notes)
+        columns = [column(names[k], units[k]) for k in kept]
+        for k, cell in enumerate(_cells(lines[first], delimiter, comma)[c] for c in kept):
+            if _clock(cell) is not None:
+                numbers[:, k] -= numbers[0, k]
+                columns[k] = replace(columns[k], role=TIME, unit="s")
+        return Table(columns=tuple(columns), numbers=numbers, notes=tuple(notes))
+    raise ValueError([*misfits, wrong][0])
 
 
 def _separations(rows: list[str]) -> Iterator[tuple[str, bool]]:
@@ -206,8 +214,14 @@ def _clock(cell: str) -> float | None:
 
 def _header(
     above: list[str], delimiter: str, kept: list[int], width: int
-) -> tuple[tuple[Column, ...], list[str], list[tuple[str, str]], str]:
-    """Columns, all names, and notes of the lines above a table, and what is wrong with them."""
+) -> tuple[list[str], list[str], list[tuple[str, str]]]:
+    """Names and units of columns, and notes, of the lines above a table.
+
+    Raises
+    ------
+    ValueError
+        If the line of names does not fit the columns.
+    """
     at = [k for k, line in enumerate(above) if line.strip()]
     notes = [_note(above[k]) for k in at]
     rows = [_heading(above[k], delimiter) for k in at]
@@ -215,26 +229,21 @@ def _header(
     if found and _are_units([found[0][k] for k in kept if k < len(found[0])]):
         found = [rows.pop() if rows and len(rows[-1]) > kept[-1] else [], *found]
     elif found and any(number_in(cell) is not None for cell in found[0]):
-        cell = next((cell for cell in found[0] if number_in(cell) is None), "")
         if rows and len(rows[-1]) == len(found[0]) and not any(map(number_in, rows[-1])):
-            return (
-                (),
-                [],
-                notes,
-                f"line {at[-1] + 1} has '{cell[:40]}', which is no number; mend it",
-            )
+            cell = next((cell for cell in found[0] if number_in(cell) is None), "")
+            raise ValueError(f"line {at[-1] + 1} has '{cell[:40]}', which is no number; mend it")
         found = found if column(found[0][0]).role else []
-    names, units = ([*cells, *[""] * width] for cells in [*found, [], []][:2])
-    notes += [(names[k].lower(), units[k]) for k in range(min(len(names), len(units)))
-              if k not in kept and names[k] and units[k]]  # fmt: skip
     count = len(found[0]) if found else width
-    if found and found[0] and (count <= kept[-1] or (count > width and len(found) == 1)):
+    if count and (count <= kept[-1] or (count > width and len(found) == 1)):
         word = {"\t": "tabs", " ": "white space"}.get(delimiter, f"'{delimiter}'")
-        return (), [], notes, (
+        raise ValueError(
             f"line {at[-1] + 2} has {width} cells between {word} and the header {count}; give a "
             "name for each column, and columns with decimal commas between semicolons"
-        )  # fmt: skip
-    return tuple(column(names[k], units[k]) for k in kept), names, notes, ""
+        )
+    names, units = ([*cells, *[""] * width] for cells in [*found, [], []][:2])
+    notes += [(name.lower(), unit) for k, (name, unit) in enumerate(zip(names, units, strict=False))
+              if k not in kept and name and unit]  # fmt: skip
+    return names[: max(width, count)], units, notes
 
 
 def _is_title(cells: list[str], count: int) -> bool:
@@ -272,67 +281,60 @@ def _note(line: str) -> tuple[str, str]:
 
 
 def _numbers(
-    lines: list[str], first: int, delimiter: str, comma: bool, kept: list[int], width: int,
-    names: list[str], notes: list[tuple[str, str]],
+    lines: list[str], first: int, delimiter: str, comma: bool, kept: list[int], names: list[str],
+    notes: list[tuple[str, str]],
 ) -> Floats:  # fmt: skip
     """Numbers (n, c) of the lines from the first on; notes from cells beside them are added."""
-    rows = lines[first:]
+    rows, width = lines[first:], len(names)
     if delimiter == "," and any(_LEADING_ZERO.search(line) for line in rows[:SHOWN]):
         raise ValueError(
             f"line {first + 1} seems to have decimal commas between commas; export columns between "
             "semicolons or tabs"
         )
     plain_rows = "\n".join(rows)
-    values = []
-    if len(kept) == width and not (comma and "." in plain_rows):
+    if len(kept) == width > 1 and not (comma and "." in plain_rows):
         with suppress(ValueError):
             found = np.loadtxt(
                 io.StringIO(plain_rows.replace(",", ".") if comma else plain_rows), ndmin=2,
                 comments=None, delimiter=None if delimiter == " " else delimiter,
             )  # fmt: skip
             if found.shape[1] == width and not np.isinf(found).any():
-                return found[~np.isnan(found).all(axis=1)]
-    for k, line in enumerate(rows, first + 1):
-        if not line.strip():
-            continue
-        if comma and "." in line and ":" not in line:
-            cell = next(cell for cell in _cells(line, delimiter) if "." in cell)
-            raise ValueError(
-                f"line {k} has '{cell[:40]}' with a dot, and the file has decimal commas; leave "
-                "out separators of thousands"
-            )
-        cells = _cells(line, delimiter, comma)
-        if len(cells) > width or len(cells) <= kept[-1]:
-            raise ValueError(
-                f"line {k} has {len(cells)} cells and the rows above {width}; complete or delete it"
-            )
-        row = [_value(cells[c]) for c in kept]
-        for c, number in zip(kept, row, strict=True):
-            if number is None:
-                raise ValueError(f"line {k} has '{cells[c][:40]}', which is no number; mend it")
-            if np.isinf(number):
-                raise ValueError(
-                    f"line {k} has '{cells[c][:40]}', beyond the range of the instrument; measure "
-                    "with a larger range"
-                )
-        aside = {c: cell for c, cell in enumerate(cells) if cell and c not in kept}
-        for c, cell in aside.items():
-            if names[c] and _is_number(cell):
-                raise ValueError(
-                    f"line {k} has '{cell[:40]}' in the column '{names[c][:40]}', which ends "
-                    "early; export columns of one length, or without it"
-                )
-        if aside and not any(names[c] for c in aside):
-            notes.append((next(iter(aside.values())).lower(), " ".join([*aside.values()][1:])))
-        values.append(row)
-    numbers = np.array(values, np.float64)
-    return numbers[~np.isnan(numbers).all(axis=1)]
+                return found
+    return np.array([
+        _row(line, k, delimiter, comma, kept, names, notes)
+        for k, line in enumerate(rows, first + 1) if line.strip() or width == 1
+    ])  # fmt: skip
 
 
-def _no_rows(lines: list[str], last: list[int]) -> str:
-    """Sentence on a text without rows of numbers."""
-    if len(last) > 1:
-        cells = re.split(r"[\t;, ]+", lines[last[-1]].strip())
-        wrong = next((cell for cell in cells if number_in(cell) is None), cells[0])
-        return f"line {last[-1] + 1} has '{wrong[:40]}', which is no number; mend it"
-    return "the file has a header and no numbers; export it anew"
+def _row(
+    line: str, number: int, delimiter: str, comma: bool, kept: list[int], names: list[str],
+    notes: list[tuple[str, str]],
+) -> list[float]:  # fmt: skip
+    """Numbers of a line; its other cells are notes."""
+    cells = _cells(line, delimiter, comma) or [""]
+    wrong = next((cell for cell in cells if comma and "." in cell and "," in cell), "")
+    if comma and not wrong and "." in line and ":" not in line:
+        wrong = next((cell for cell in _cells(line, delimiter) if "." in cell), "")
+    cure = "has a dot, and the file has decimal commas; leave out separators of thousands"
+    if not wrong and not kept[-1] < len(cells) <= len(names):
+        raise ValueError(
+            f"line {number} has {len(cells)} cells and the rows above {len(names)}; complete or "
+            "delete it"
+        )
+    values = [_value(cells[k]) for k in kept] if not wrong else []
+    for k, value in zip(kept, values, strict=False):
+        if value is None or np.isinf(value):
+            wrong, cure = cells[k], "is no number; mend it" if value is None else (
+                "is beyond the range of the instrument; measure with a larger range")  # fmt: skip
+    aside = {k: cell for k, cell in enumerate(cells) if cell and k not in kept}
+    for k, cell in aside.items():
+        if names[k] and _is_number(cell):
+            wrong, cure = (
+                cell,
+                f"is in the column '{names[k][:40]}', which ends early; leave it out",
+            )
+    if wrong:
+        raise ValueError(f"line {number} has '{wrong[:40]}', which {cure}")
+    if aside and not any(names[k] for k in aside):
+        notes.append((next(iter(aside.values())).lower(), " ".join([*aside.values()][1:])))
+    return [float("nan") if value is None else value for value in values]
