@@ -107,6 +107,8 @@ TABLES = {
         rows(T + 3e-5 * np.sin(np.arange(COUNT) ** 2.0), TONE, digits="%.9g"),
         MM_S | {"rate": RATE}, 1,
     ),
+    "direction chosen": ("Time (s),Velocity x (mm/s),Velocity z (mm/s)\n" + rows(T, OTHER, TONE),
+                         {"direction": "z"}, 1),
     "quantity chosen": (
         "t [s],u [um],v [mm/s]\n" + rows(T, OTHER, TONE), {"quantity": "velocity"}, 1
     ),
@@ -235,6 +237,11 @@ REFUSED = {
         "t [s],v [mm/s]\n" + rows(T, TONE, comma=True), {}, "cells between"),
     "time without a unit": (TWO, MM_S, "no unit; write 't \\[s\\]', or give --rate"),
     "a count without a rate": ("Sample,v [mm/s]\n" + rows(np.arange(1200.0), TONE), {}, "--rate"),
+    "directions": ("t [s],X (mm/s),Y (mm/s)\n" + TWO, {}, "by --direction"),
+    "time in metres": ("time [m],v [mm/s]\n" + rows(T, TONE), {}, "'m' is no unit of time"),
+    "time and frequency": ("t [s],f [Hz],v [mm/s]\n" + TWO, {}, "of time and of frequency"),
+    "volts and temperatures": ("t [s],A [V],Temp [degC]\n" + TWO, MM_S, "differ in unit: V, degC"),
+    "an option of other formats": ("t [s],v [mm/s]\n" + TWO, {"variable": "v"}, "leave it out"),
     "voltages": ("t [s],CH1 [mV]\n" + rows(T, TONE), {}, "are in mV, and .* stands for 20 mm/s"),
     "magnitude alone": ("f [Hz],v [mm/s]\n" + rows(T + 1, TONE), {}, "or magnitude and phase"),
     "a channel that ends": (

@@ -38,7 +38,7 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--columns", default="", metavar="NAMES",
                         help='columns of motion, "CH1,CH3" or numbers from 1')  # fmt: skip
     parser.add_argument("--direction", choices=("x", "y", "z"),
-                        help="of the motion in a Universal File (default: z)")  # fmt: skip
+                        help="of the motion in a file of several")  # fmt: skip
 
 
 def measured_in(file: Path, options: argparse.Namespace) -> "Measurement":

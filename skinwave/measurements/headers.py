@@ -139,7 +139,9 @@ def _role(name: str, unit: str) -> str:
         role = TIME
     if of in TIMES or of in FREQUENCIES:
         return TIME if of in TIMES else FREQUENCY
-    if role in (TIME, FREQUENCY, INDEX) and of in UNITS - {"", "Sequence"}:
+    if role in (FREQUENCY, INDEX) and of in UNITS - {"", "Sequence"}:
+        return ""
+    if role in (X, Y, Z) and quantity_of(unit) and of not in LENGTHS:
         return ""
     return "" if len(name) == 1 and role in MOTION and quantity_of(unit) not in ("", role) else role
 

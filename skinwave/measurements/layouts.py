@@ -48,6 +48,8 @@ def _wide(table: Table, given: Given) -> Recording:
     """
     columns, numbers = table.columns, table.numbers
     at = max(table.of(headers.TIME), table.of(headers.FREQUENCY))
+    if min(table.of(headers.TIME), table.of(headers.FREQUENCY)) >= 0:
+        raise ValueError("columns are of time and of frequency; export one of them")
     times, frequencies = axis_of(table, at, given.rate is not None)
     rate, start = noted_axis(table)
     if at < 0 and given.rate is None and np.isnan(rate):

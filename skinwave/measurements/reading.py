@@ -18,11 +18,14 @@ from skinwave.measurements.units import length
 
 @dataclass(frozen=True, kw_only=True)
 class Reader:
-    """A format of files: its `words`, the `suffixes` of its names, and what reads it."""
+    """A format of files: its `words`, the `suffixes` of its names, what reads it, and which options
+    choose in it.
+    """
 
     words: str
     suffixes: tuple[str, ...]
     read: Callable[[Path, Given], Recording]
+    choose: tuple[str, ...] = ("columns", "direction")
 
 
 READERS = (
@@ -31,14 +34,16 @@ READERS = (
     ),
     Reader(words="LabVIEW's measurement", suffixes=(".lvm",), read=labview.read_lvm),
     Reader(words="TDMS", suffixes=(".tdms",), read=labview.read_tdms),
-    Reader(words="numpy", suffixes=(".npz",), read=arrays.read),
+    Reader(words="numpy", suffixes=(".npz",), read=arrays.read, choose=("variable",)),
     Reader(words="sound", suffixes=(".wav",), read=sound.read),
-    Reader(words="MATLAB", suffixes=(".mat",), read=matlab.read),
+    Reader(words="MATLAB", suffixes=(".mat",), read=matlab.read, choose=("variable",)),
     Reader(
         words="Universal File Format 58", suffixes=(".uff", ".unv", ".uf", ".58"),
-        read=universal.read,
+        read=universal.read, choose=("direction",),
     ),
-    Reader(words="SkinSource impulse responses", suffixes=(".f32",), read=skinsource.read),
+    Reader(
+        words="SkinSource impulse responses", suffixes=(".f32",), read=skinsource.read, choose=()
+    ),
 )  # fmt: skip
 
 
@@ -89,6 +94,11 @@ def read(
         quantity=quantity, unit=unit, places=known, sign=sign, rate=rate, variable=variable,
         columns=tuple(columns), direction=direction,
     )  # fmt: skip
+    for option in ("variable", "columns", "direction"):
+        if getattr(given, option) and option not in reader.choose:
+            raise ValueError(
+                f"{path}: --{option} chooses nothing in a file of {reader.words}; leave it out"
+            )
     try:
         return completed(reader.read(path, given), given, path)
     except ValueError as error:

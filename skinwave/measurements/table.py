@@ -28,6 +28,7 @@ _INTERVAL = re.compile(r"(sampl\w*|time)[ _-]*(interval|increment|period)|increm
 _START = re.compile(r"start|x0|trigger offset|first time")
 _BAND = re.compile(r"(band[ _-]*|cent(er|re)[ _-]*)?(frequency|frequenz|fréquence)")
 _AXIS_UNIT = re.compile(r"(horizontal|x|time)[ _-]*units?")
+_AXIS = re.compile(r"(?:^|[ _])([xyz])\s*(?:[\[(]|$)")
 _UNIT = re.compile(r"(vertical|y)?[ _-]*(units?|einheit)")
 
 
@@ -92,7 +93,7 @@ def with_roles(table: Table, given: Given) -> tuple[Table, tuple[str, ...]]:
     for k, one in enumerate(columns):
         if one.role == INDEX and not _counts(numbers[:, k]) and not has_places:
             columns[k] = replace(one, role="")
-    chosen = _chosen(columns, given.columns)
+    chosen = _chosen(columns, given.columns) or _along(columns, given.direction, has_places)
     open_ = [k for k, one in enumerate(columns)
              if one.is_motion and not one.is_of_motion and k not in chosen]  # fmt: skip
     has_axis = any(one.role in (TIME, FREQUENCY) for one in columns)
@@ -188,6 +189,21 @@ def _chosen(columns: list[Column], wanted: tuple[str, ...]) -> list[int]:
     return found
 
 
+def _along(columns: list[Column], direction: str, has_places: bool) -> list[int]:
+    """Numbers of the columns along the one direction that is given, if headings have several."""
+    found = [_AXIS.search(one.text.lower()) for one in columns]
+    axes = {k: one[1] for k, one in enumerate(found)
+            if one and quantity_of(columns[k].unit) and not has_places}  # fmt: skip
+    if len(set(axes.values())) < 2:
+        return []
+    if direction not in axes.values():
+        raise ValueError(
+            f"columns are of the directions {', '.join(sorted(set(axes.values())))}; choose that "
+            "normal to the body by --direction"
+        )
+    return [k for k, axis in axes.items() if axis == direction]
+
+
 def _motion(columns: list[Column], given: Given) -> tuple[list[int], list[str]]:
     """Numbers of the columns to keep: beside columns in units of motion, one in another unit is the
     drive and others are left out. Of several quantities the one that is wanted stays.
@@ -264,7 +280,8 @@ def agreed(columns: list[Column], given: Given) -> tuple[str, str]:
     found = []
     for what, replaced in (("role", given.quantity), ("unit", given.unit)):
         said = {getattr(one, what) for one in columns} - {""}
-        if len(said) > 1 and not replaced:
+        mixed = what == "unit" and not all(map(quantity_of, said))
+        if len(said) > 1 and (mixed or not replaced):
             raise ValueError(
                 f"columns differ in {'quantity' if what == 'role' else what}: "
                 f"{', '.join(sorted(said))[:80]}; choose some by --columns"
