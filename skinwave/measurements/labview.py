@@ -36,15 +36,13 @@ def lvm_table(text: str) -> Table:
 
     try:
         found = lvm_read.read_str(text.replace("\r\n", "\n"))
-        segments = [found[k] for k in range(found["Segments"])]
-        tables = [_of_segment(one, found.get("X_Columns", "One")) for one in segments]
-    except (ArithmeticError, LookupError, SyntaxError, TypeError, ValueError) as error:
-        if isinstance(error, _Refused):
-            raise
+    except Exception:  # whatever is made of spoilt text
         raise ValueError(
             "the file is damaged or no LabVIEW measurement file; export it anew, or as text in "
             "columns"
         ) from None
+    tables = [_of_segment(found[k], found.get("X_Columns", "One"))
+              for k in range(found["Segments"])]  # fmt: skip
     first = tables[0]
     if len(tables) == 1:
         return first
@@ -59,10 +57,6 @@ def lvm_table(text: str) -> Table:
     return Table(columns=first.columns, numbers=np.concatenate([one.numbers for one in tables]))
 
 
-class _Refused(ValueError):
-    """A sentence of ours."""
-
-
 def _of_segment(one: dict[str, Any], x_columns: str) -> Table:
     """Times, of the file or of its start and step, and the channels of a segment."""
     names, numbers = list(one["Channel names"]), np.asarray(one["data"], float)
@@ -71,7 +65,7 @@ def _of_segment(one: dict[str, Any], x_columns: str) -> Table:
     if x_columns == "Multi":
         pairs = range(0, len(names) - 1, 2)
         if any(not np.array_equal(numbers[:, k], numbers[:, 0]) for k in pairs):
-            raise _Refused("channels have times of their own; export them with one X column")
+            raise ValueError("channels have times of their own; export them with one X column")
         kept = [0, *(k + 1 for k in pairs)]
         names, numbers = [names[k] for k in kept], numbers[:, kept]
     axis = (one.get("X_Dimension") or ["Time"])[0].strip() or "Time"
@@ -83,7 +77,7 @@ def _of_segment(one: dict[str, Any], x_columns: str) -> Table:
         step, start = (np.asarray(one[key], float) for key in ("Delta_X", "X0"))
         for said, values in (("steps", step), ("starts", start)):
             if not np.allclose(values[np.isfinite(values)], values[0], rtol=1e-9, atol=0):
-                raise _Refused(f"channels have {said} in time of their own; export one of them")
+                raise ValueError(f"channels have {said} in time of their own; export one of them")
         notes = (("delta_x", repr(float(step[0]))), ("x0", repr(float(start[0]))))
         heads: list[str] = []
     else:

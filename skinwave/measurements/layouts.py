@@ -78,22 +78,15 @@ def _series(
     if not complex_:
         if parts := [columns[k].text for k in motion if columns[k].part]:
             raise ValueError(f"the column '{parts[0]}' is of a spectrum; give the column 'f [Hz]'")
-        quantity, unit = agreed([columns[k] for k in motion], given)
-        return [(columns[k], numbers[:, k]) for k in motion], quantity, unit
-    found = []
-    for k, other in _pairs(columns, motion):
-        found.append((columns[k], complex_of(columns, numbers, k, other)))
-    quantity, unit = agreed([one for one, _ in found], given)
-    return found, quantity, unit
-
-
-def _pairs(columns: tuple[Column, ...], motion: list[int]) -> list[tuple[int, int]]:
-    """Columns of real part and imaginary, or magnitude and phase, next to each other."""
+        found = [(columns[k], numbers[:, k]) for k in motion]
+        return found, *agreed([one for one, _ in found], given)
     if len(motion) % 2:
         raise ValueError(
             "a spectrum needs two columns a place: 're v(0,0)', 'im v(0,0)', or magnitude and phase"
         )
-    return list(zip(motion[::2], motion[1::2], strict=True))
+    pairs = zip(motion[::2], motion[1::2], strict=True)
+    found = [(columns[k], complex_of(columns, numbers, k, other)) for k, other in pairs]
+    return found, *agreed([one for one, _ in found], given)
 
 
 def _by_repetition(series: list[tuple[Column, np.ndarray]]) -> tuple[np.ndarray, Floats]:

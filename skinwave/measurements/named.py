@@ -19,14 +19,8 @@ from skinwave.measurements.table import rises
 TIMES = ("t", "time", "times", "t_s", "time_s")
 FREQUENCIES = ("f", "freq", "frequency", "frequencies", "frequency_hz", "f_hz")
 RATES = (
-    "fs",
-    "rate",
-    "sampling_rate",
-    "sample_rate",
-    "samplerate",
-    "sampling_frequency",
-    "rate_hz",
-)
+    "fs", "rate", "sampling_rate", "sample_rate", "samplerate", "sampling_frequency", "rate_hz",
+)  # fmt: skip
 STARTS = ("t0", "t_start", "tstart", "start_time", "x0")
 INTERVALS = ("dt", "sampling_interval")
 PLACES = ("places", "points", "probes", "xy", "xyz", "positions", "coordinates", "locations")

@@ -142,14 +142,13 @@ def _measured(found: Recording) -> tuple[Recording, list[str]]:
 def _quantity(found: Recording, given: Given) -> tuple[str, str]:
     """Quantity and unit."""
     unit = given.unit or found.unit
-    quantity = (
-        given.quantity or units.quantity_of(given.unit) or found.quantity or units.quantity_of(unit)
-    )
+    of_unit = units.quantity_of(unit)
+    quantity = given.quantity or (of_unit if given.unit else "") or found.quantity or of_unit
     if not unit:
         missing = "the unit" if quantity else "what was measured, and its unit"
         option = f"--unit {_usual(quantity)}" if quantity else EXAMPLE
         raise ValueError(f"{missing} is not in the file; give {option}")
-    if not given.unit and not units.quantity_of(unit) and not quantity and "dB" not in unit:
+    if not given.unit and not quantity and "dB" not in unit:
         raise ValueError(
             f"the values are in {unit[:40]}, and how much motion that is is not in the file; give "
             f'--unit "20 mm/s" if 1 {unit[:40]} stands for 20 mm/s'
@@ -218,10 +217,10 @@ def _times(found: Recording, given: Given) -> tuple[Floats, np.ndarray, list[str
             raise
         times, index = found.times[0] + span * np.linspace(0, 1, count), np.arange(count)
     step = float(times[-1] - times[0]) / (len(times) - 1)
-    said = []
+    start, said = float(times[0]), []
     if not np.isclose(step * rate, 1, rtol=UNEVEN):
+        start /= step * rate
         said.append(f"the file's steps of {step:g} are replaced by 1/{rate:g} s")
-    start = times[0] if np.isclose(step * rate, 1, rtol=UNEVEN) else times[0] / (step * rate)
     return start + np.arange(len(times)) / rate, index, said
 
 

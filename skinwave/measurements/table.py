@@ -117,9 +117,8 @@ def with_roles(table: Table, given: Given) -> tuple[Table, tuple[str, ...]]:
     unit = table.note(_UNIT)
     columns = [replace(one, unit=unit) if quantity_of(unit) and one.is_motion and not one.unit
                else one for one in columns]  # fmt: skip
-    return replace(table, columns=tuple(columns[k] for k in kept), numbers=numbers[:, kept]), tuple(
-        said
-    )
+    found = replace(table, columns=tuple(columns[k] for k in kept), numbers=numbers[:, kept])
+    return found, tuple(said)
 
 
 def _rows(table: Table) -> Floats:
@@ -160,8 +159,7 @@ def _one_time(columns: list[Column], numbers: Floats) -> list[Column]:
         return columns
     constant = [k for k in found if len(numbers) > 1 and not np.ptp(numbers[:, k])]
     kept = [k for k in found if k not in constant] or found[:1]
-    with_unit = [k for k in kept if columns[k].unit]
-    kept = with_unit or kept
+    kept = [k for k in kept if columns[k].unit] or kept
     for k in kept[1:]:
         if not np.array_equal(numbers[:, k], numbers[:, kept[0]]):
             raise ValueError(
