@@ -2,6 +2,7 @@
 
 import io
 import json
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from scipy.io import wavfile
 from simple_model import MovingPressure, Rhythm, Signal, Tacton, Trajectory, lines, point_kernel
 from skinwave import Body, Scene, dumps, loads, read, simulate
 from skinwave.cli import main
+from skinwave.effort import SkinwaveWarning
 from skinwave.patterns import Options, read_pattern, write_pattern
 from skinwave.patterns.adaptics_file import FORMAT, REVISIONS
 from skinwave.patterns.autd3 import steps
@@ -509,6 +511,18 @@ def test_the_script_states_its_frequency_and_holds_its_foci(sharing):
     assert max(eval_list(script, "MODULATION")) == 255
 
 
+@pytest.mark.parametrize("foci", [(0.0,), (0.0, 0.25, 0.5)])
+@pytest.mark.parametrize("sharing", ["simultaneous", "time_multiplexed"])
+def test_a_focus_that_rests_has_the_two_points_that_the_device_needs(foci, sharing):
+    still = Tacton(trajectory=replace(CIRCLE, speed=0.0), foci=foci, sharing=sharing)
+    places = np.array(eval_list(write_pattern(flat(still), ".py", Options())[0], "PLACES"))
+    assert places.shape[0] * places.shape[1] >= 2
+    expected = 1e3 * CIRCLE.at_phase(list(foci))
+    for turn, pattern in enumerate(places):
+        mine = expected[turn % len(foci)][None] if len(pattern) == 1 else expected
+        np.testing.assert_allclose(pattern, mine, atol=1e-3)
+
+
 def eval_list(script, name):
     text = script.decode().split(f"{name} = ", 1)[1].split("\n\n")[0]
     text = text.split("\nMODULATION")[0]
@@ -712,3 +726,29 @@ def test_a_rate_that_does_not_reach_the_modulation_is_noted(suffix, options, ali
         assert strongest == pytest.approx(alias, abs=2)
     if alias:
         assert f"played at {alias} Hz" in said[0]
+
+
+def test_a_recorded_path_that_repeats_has_a_steady_state(tmp_path):
+    """Four points held for 10 ms each, twice: the lines are of the last of ten rounds from rest,
+    and what is stated is how far the motion from rest is from them.
+    """
+    points = [(0.01, 0), (0, 0.01), (-0.01, 0), (0, -0.01)] * 2
+    rows = [f"{0.01 * k:.2f},0,{x},{y},0.2,1" for k, (x, y) in enumerate(points)]
+    text = "\n".join(["t_s,point,x_m,y_m,z_m,intensity", *rows])
+    scene, _ = imported(tmp_path, text, ".csv", hold=True)
+    assert scene.tacton.trajectory.drawing_frequency == pytest.approx(12.5)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SkinwaveWarning)
+        rest, steady = (simulate(scene, m) for m in ("flat-body", "flat-body-harmonic"))
+        tacton = replace(scene.tacton, duration=0.8)
+        later = simulate(
+            replace(scene, pressure=replace(scene.pressure, tacton=tacton)), "flat-body"
+        )
+        mesh = simulate(scene, "fem-harmonic", 0.5, h=0.012)
+    assert np.abs(steady.values - later.values[-800:]).max() < 1e-3 * np.abs(later.values).max()
+    off = [np.sqrt((x**2).sum(axis=0)) for x in (steady.values - rest.values, rest.values)]
+    assert steady.expected_error == pytest.approx((off[0] / off[1]).max(), rel=0.01)
+    assert "flat-body is enough" in steady.effort.warnings[0]
+    assert rest.expected_error < 0.05
+    away = np.linalg.norm(mesh.values - steady.values) / np.linalg.norm(steady.values)
+    assert away < mesh.expected_error

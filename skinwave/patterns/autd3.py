@@ -50,7 +50,7 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
 
 def steps(frequency: float, multiple: int = 1) -> tuple[int, int]:
     """How many points to a period, a multiple, and ticks to a point come nearest to a drawing
-    frequency in Hz; one of each for a focus that rests.
+    frequency in Hz; two points, the least that a FociSTM takes, for a focus that rests.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def steps(frequency: float, multiple: int = 1) -> tuple[int, int]:
         If no list is long enough.
     """
     if frequency == 0:
-        return multiple, 1
+        return 2 * multiple, 1
     ticks = TICK / frequency
     most = MOST_PATTERNS // multiple * multiple
     division = max(1, ceil(ticks / most - 1e-9))
@@ -71,7 +71,7 @@ def steps(frequency: float, multiple: int = 1) -> tuple[int, int]:
 def _places(pressure: MovingPressure, count: int, *, turns: bool) -> Floats:
     """Positions (patterns, foci, 2) in mm along one period."""
     path, ahead = pressure.tacton.trajectory, np.array(pressure.tacton.foci)
-    phase = np.arange(count)[:, None] / count + ahead
+    phase = np.arange(count)[:, None] / count * (not path.is_static) + ahead
     if turns:
         phase = phase[np.arange(count), np.arange(count) % len(ahead)][:, None]
     return 1e3 * path.at_phase(np.mod(phase, 1.0))
