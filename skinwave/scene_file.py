@@ -25,6 +25,7 @@ from skinwave.scene_keys import DERIVED, PATH, SECTIONS, as_table, as_text, chec
 
 LARGEST = 16_000_000  # bytes of a file: some seconds of a path recorded at 40 kHz
 PROSE = 1_000_000  # bytes of it that are no numbers
+PAIRS = re.compile(r"\[\s+(-?\d[\d.e+-]*),\s+(-?\d[\d.e+-]*),\s+\]")  # on lines of their own
 PATHS = "write a Windows path in single quotes, 'C:\\hand.stl', or with /, \"C:/hand.stl\""
 NUMBERS = b"0123456789.,[]+-eE_ \t\r\n"
 DEEP = re.compile(  # keys of many parts, which take squares of their number
@@ -186,7 +187,7 @@ def _of_shear(complete: dict[str, Any], key: str, given: Distribution) -> tuple[
 
 def dumps(scene: Scene) -> str:
     """The complete scene as TOML; `loads` gives it back."""
-    return tomli_w.dumps(to_table(scene))
+    return PAIRS.sub(r"[\1, \2]", tomli_w.dumps(to_table(scene)))
 
 
 def to_table(scene: Scene) -> dict[str, Any]:

@@ -22,11 +22,9 @@ from simple_model import Tacton, Trajectory
 from simple_model.tacton import COMMENSURATE, LONGEST, RETURNED
 from simple_model.trajectory import LARGEST
 from skinwave.patterns.adaptics_file import Brush, Track, parse
-from skinwave.patterns.pattern import Options, Pattern, one_height
+from skinwave.patterns.pattern import ENGINE_RATE, STRAIGHT, Options, Pattern, one_height, thinned
 
-ENGINE_RATE = 20_000.0  # Hz
 UNBOUNDED = 1.0  # s that stand for a pattern that nothing ends
-STRAIGHT = 1e-5, 1e-3  # m and of full drive, within which straight lines stand for samples
 
 
 def read(content: bytes, options: Options) -> Pattern:
@@ -64,11 +62,8 @@ def read(content: bytes, options: Options) -> Pattern:
     brushes = list(dict.fromkeys(animation.brushes.values[k] for k in visited))
     if animation.loop is not None and (count := _loops(brushes, duration, notes)) > 1:
         t, p = _playhead(runs, count)
-    place = _at(animation.places, np.array(animation.places.values), p)
-    level = (
-        animation.factor
-        * _at(animation.intensities, np.array(animation.intensities.values)[:, None], p)[:, 0]
-    )
+    place = _at(animation.places, p)
+    level = animation.factor * _at(animation.intensities, p)[:, 0]
     if not level.any():
         notes.append("its intensity is 0 throughout; other values of its parameters may differ")
     height = one_height(place[:, 2] / 1e3, options, notes)
@@ -124,21 +119,8 @@ def _playhead(runs: Floats, count: int) -> tuple[Floats, Floats]:
 
 
 def _recorded(t: Floats, places: Floats, levels: Floats) -> Tacton:
-    """A Tacton of a focus at places (t, 2) in metre with levels (t,), its end included, of which
-    it has the points (k,) that it takes.
-    """
-    values = np.column_stack([places, levels]) / [STRAIGHT[0], STRAIGHT[0], STRAIGHT[1]]
-    kept = np.arange(len(t))
-    while True:
-        fewer = np.append(kept[:-1:2], kept[-1])
-        off = [np.abs(x - np.interp(t, t[fewer], x[fewer])) for x in values.T]
-        worst = np.maximum.reduceat(np.max(off, axis=0), fewer[:-1])
-        needed = np.setdiff1d(kept, fewer)
-        needed = needed[worst[np.searchsorted(fewer, needed) - 1] > 1]
-        found = np.union1d(fewer, needed)
-        if len(found) == len(kept):
-            break
-        kept = found
+    """A Tacton of a focus at places (t, 2) in metre with levels (t,), its end included."""
+    kept = thinned(t, places, levels)
     path = Trajectory(
         shape="recorded",
         points=tuple(map(tuple, np.round(places[kept], 9).tolist())),
@@ -183,8 +165,9 @@ def _drawn(brush: Brush, place: Floats, notes: list[str]) -> Tacton:
     return Tacton(am_frequency=brush.am_frequency, trajectory=path)
 
 
-def _at(track: Track, values: Floats, t: Floats) -> Floats:
-    """Values (t, k) of a track that sets values (n, k)."""
+def _at(track: Track, t: Floats) -> Floats:
+    """Values (t, k) of a track of numbers or of k each."""
+    values = np.array(track.values).reshape(len(track.values), -1)
     before, part = _between(track, t)
     after = np.minimum(before + 1, len(values) - 1)
     return np.asarray(values[before] + part[:, None] * (values[after] - values[before]))

@@ -92,12 +92,9 @@ def parse(content: bytes, parameters: Mapping[str, float]) -> Animation:
     text = as_utf_8(content)
     try:
         table = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise ValueError(
-            f"not valid JSON at line {error.lineno}, column {error.colno}; save it with AdapTics"
-        ) from None
-    except (ValueError, RecursionError):  # numbers of too many digits, brackets beyond all depth
-        raise ValueError("not valid JSON that can be read; save it with AdapTics") from None
+    except (ValueError, RecursionError) as error:  # of brackets beyond all depth, too
+        at = f" at line {error.lineno}" if isinstance(error, json.JSONDecodeError) else ""
+        raise ValueError(f"not valid JSON{at}; save it with AdapTics") from None
     if not isinstance(table, dict) or table.get("$DATA_FORMAT") != FORMAT:
         raise ValueError(f"not an .adaptics file: $DATA_FORMAT is not '{FORMAT}'")
     if (revision := table.get("$REVISION")) not in REVISIONS:
@@ -289,15 +286,13 @@ def _with_transition(frame: Mapping[str, Any], key: str) -> tuple[Mapping[str, A
     """Setting of a keyframe, and whether it stays until the next one sets it anew."""
     outer = _get(frame, key, dict)
     transition = _get(outer, "transition", dict, {"name": "linear"}).get("name")
-    if transition not in ("linear", "step"):
-        raise ValueError(f"{key} has the transition {str(transition)[:40]!r}; use linear or step")
-    return _get(outer, key, dict), transition == "step"
+    step = choose(f"transition of {key}", str(transition)[:40], ("linear", "step")) == "step"
+    return _get(outer, key, dict), step
 
 
 def _brush(brush: Mapping[str, Any], number: _Numbers) -> Brush:
-    name, params = brush.get("name"), _get(brush, "params", dict)
-    if not isinstance(name, str) or name not in BRUSHES:
-        raise ValueError(f"brush {str(name)[:40]!r} is unknown; use one of {', '.join(BRUSHES)}")
+    name = choose("brush", str(brush.get("name"))[:40], BRUSHES)
+    params = _get(brush, "params", dict)
     return Brush(
         name=name,
         numbers=tuple(number(params.get(key), f"{key} of a {name}") for key in BRUSHES[name]),
@@ -307,11 +302,9 @@ def _brush(brush: Mapping[str, Any], number: _Numbers) -> Brush:
 
 
 def _intensity(intensity: Mapping[str, Any], number: _Numbers) -> float:
-    name = intensity.get("name")
-    if name == "random":
-        raise ValueError("intensity 'random' is another one each time; make it constant")
-    if name != "constant":
-        raise ValueError(f"intensity {str(name)[:40]!r} is unknown; make it constant")
+    if (name := intensity.get("name")) != "constant":
+        why = "another one each time" if name == "random" else "unknown"
+        raise ValueError(f"intensity {str(name)[:40]!r} is {why}; make it constant")
     return number(_get(intensity, "params", dict).get("value"), "value of an intensity")
 
 

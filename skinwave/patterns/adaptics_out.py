@@ -6,16 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from meshes.tetmesh import Floats
-from simple_model import Tacton, Trajectory
-from simple_model.trajectory import BY_POINTS
+from simple_model import Tacton
 from skinwave.patterns.adaptics_file import FORMAT, REVISIONS
-from skinwave.patterns.pattern import Options, loudness
+from skinwave.patterns.pattern import ENGINE_RATE, STRAIGHT, Options, loudness, thinned
 from skinwave.scene import Scene
 
 MOST_KEYFRAMES = 20_000
-TINY = 1e-9  # of a period
-CORNERS = {"triangle": 3, "square": 4}
+ASIDE = 1e-9  # of a period: just before and just after a corner, so that jumps stay jumps
 
 
 def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
@@ -45,13 +42,25 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
     brush, place = _brush(tacton)
     if brush is None:
         brush = _circle(0.0, tacton, 0.0)
-        times, phases = _corners(path, end, tacton.foci[0])
+        f_d, ahead = path.drawing_frequency, tacton.foci[0]
+        corners = np.add.outer(np.arange(int(end * f_d) + 3) - 1, path.parts[0]).ravel() - ahead
+        sides = np.concatenate([corners - ASIDE, corners + ASIDE]) / f_d
+        times = np.union1d(np.linspace(0.0, end, round(end * ENGINE_RATE) + 1), sides)
+        times = times[(times >= 0) & (times <= end)]
+        phases = np.mod(f_d * times + ahead, 1.0)
         places, levels = path.at_phase(phases), np.sqrt(scene.pressure.weight(phases))
-        notes.append(f"{len(times)} keyframes, the path once along")
+        kept = thinned(times, places, levels)
+        if len(kept) > MOST_KEYFRAMES:
+            raise ValueError(
+                f"the path takes {len(kept):,} keyframes in {end:g} s, the limit is "
+                f"{MOST_KEYFRAMES:,}; shorten the Tacton, or write .csv"
+            )
+        times, places, levels = times[kept], places[kept], levels[kept]
+        notes.append(f"{len(times)} keyframes, within {1e3 * STRAIGHT[0]:g} mm of the path")
     else:
         times, places, levels = np.array([0.0, end]), np.array([place, place]), np.ones(2)
     keyframes = [
-        _keyframe(t, xy, amplitude * level, brush, step=path.hold)
+        _keyframe(t, xy, amplitude * level, brush)
         for t, xy, level in zip(times, places, levels, strict=True)
     ]
     keyframes.append({"type": "stop", "time": 1e3 * end})
@@ -98,46 +107,8 @@ def _brush(tacton: Tacton) -> tuple[dict[str, Any] | None, tuple[float, float]]:
     return _named("line", numbers, tacton, path.drawing_frequency), (float(x), float(y))
 
 
-def _corners(path: Trajectory, end: float, ahead: float) -> tuple[Floats, Floats]:
-    """Times (k,) in s and phases (k,) between which the path is straight, from start to end."""
-    if path.shape == "circle" or path.sweep == "sinusoidal":
-        raise ValueError("no brush draws this path, and it is not straight either; write .csv")
-    f_d = path.drawing_frequency
-    if path.shape == "recorded":
-        clock = np.array(path.times) * f_d
-    elif path.shape in BY_POINTS:
-        steps = np.linalg.norm(np.diff(path.outline, axis=0), axis=1)
-        arc = np.concatenate([[0.0], np.cumsum(steps)]) / path.length
-        clock = arc if arc[-1] > 0.75 else np.union1d(arc, 1 - arc)
-    else:
-        clock = np.arange(CORNERS.get(path.shape, 2) + 1) / CORNERS.get(path.shape, 2)
-        clock = clock if path.sweep == "there_and_back" or path.shape in CORNERS else clock[::2]
-    periods = int(np.ceil(end * f_d + ahead - TINY))
-    if periods * len(clock) > MOST_KEYFRAMES:
-        raise ValueError(
-            f"the path has {periods * len(clock):,} corners in {end:g} s, the limit is "
-            f"{MOST_KEYFRAMES:,} keyframes; shorten it, or write .csv"
-        )
-    # Each corner twice, just before and just after it, so that jumps stay jumps.
-    around = np.unique(np.round(np.arange(periods)[:, None] + clock, 12)) - ahead
-    sides = np.stack([around - TINY, around + TINY], axis=1).ravel()
-    inside = sides[(sides > TINY) & (sides < end * f_d - TINY)]
-    at = np.concatenate([[0.0], inside, [end * f_d - TINY]])
-    phase = np.mod(at + ahead, 1.0)
-    kept = _needed(np.column_stack([path.at_phase(phase), path.level_at_phase(phase)]))
-    return at[kept] / f_d, phase[kept]
-
-
-def _needed(values: Floats) -> np.ndarray:
-    """Sides of a corner to keep, both or, where they agree, one."""
-    same = np.abs(np.diff(values, axis=0)).max(axis=1) < 1e-8
-    return np.concatenate([[True], ~same])
-
-
-def _keyframe(
-    t: float, place: Any, level: float, brush: dict[str, Any], *, step: bool
-) -> dict[str, Any]:
-    transition: dict[str, Any] = {"name": "step" if step else "linear", "params": {}}
+def _keyframe(t: float, place: Any, level: float, brush: dict[str, Any]) -> dict[str, Any]:
+    transition: dict[str, Any] = {"name": "linear", "params": {}}
     x, y = (1e3 * float(each) for each in place)
     return {
         "type": "standard",

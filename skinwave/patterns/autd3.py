@@ -106,16 +106,8 @@ def _script(
 import time
 
 import numpy as np
-from pyautd3 import (
-    AUTD3,
-    ControlPoint,
-    ControlPoints,
-    Controller,
-    FociSTM,
-    Null,
-    SamplingConfig,
-    Silencer,
-)
+from pyautd3 import AUTD3, ControlPoint, ControlPoints, Controller, FociSTM, Null
+from pyautd3 import SamplingConfig, Silencer
 from pyautd3.link.nop import Nop
 from pyautd3.modulation import Custom
 

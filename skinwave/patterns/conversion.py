@@ -6,7 +6,7 @@ from pathlib import Path
 from meshes import reading
 from skinwave import scene_file
 from skinwave.patterns import adaptics, adaptics_out, autd3, focal_points, waveform
-from skinwave.patterns.pattern import Options, Pattern, onto, resized, wide_enough
+from skinwave.patterns.pattern import Options, onto, resized, wide_enough
 from skinwave.scene import Body, Scene, check_load
 
 READERS = (".toml", ".adaptics", ".csv", ".wav")
@@ -49,22 +49,22 @@ def read_pattern(
     """
     suffix = _known(path, READERS)
     if suffix == ".toml":
-        return _of_scene(scene_file.read(path), options), ()
+        scene = scene_file.read(path)
+        tacton = resized(scene.tacton, options.resize)
+        return replace(scene, pressure=replace(scene.pressure, tacton=tacton)), ()
     given = base or scene_file.loads("")
     content = reading.content(path, LARGEST[suffix])
     try:
-        pattern = _read(suffix, content, options, given)
+        pattern = (
+            waveform.read(content, options, given) if suffix == ".wav"
+            else {".adaptics": adaptics, ".csv": focal_points}[suffix].read(content, options)
+        )  # fmt: skip
         tacton = resized(pattern.tacton, options.resize)
         notes = list(pattern.notes)
         given = base or wide_enough(given, tacton, notes)
         return onto(given, replace(pattern, tacton=tacton), path.stem), tuple(notes)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
-
-
-def _of_scene(scene: Scene, options: Options) -> Scene:
-    tacton = resized(scene.tacton, options.resize)
-    return replace(scene, pressure=replace(scene.pressure, tacton=tacton))
 
 
 def write_pattern(scene: Scene, suffix: str, options: Options) -> tuple[bytes, tuple[str, ...]]:
@@ -80,12 +80,6 @@ def write_pattern(scene: Scene, suffix: str, options: Options) -> tuple[bytes, t
     check_load(scene, "a pattern of a device")
     modules = {".adaptics": adaptics_out, ".csv": focal_points, ".wav": waveform, ".py": autd3}
     return modules[suffix].write(scene, options)
-
-
-def _read(suffix: str, content: bytes, options: Options, base: Scene) -> Pattern:
-    if suffix == ".wav":
-        return waveform.read(content, options, base)
-    return (adaptics.read if suffix == ".adaptics" else focal_points.read)(content, options)
 
 
 def _known(path: Path, suffixes: tuple[str, ...]) -> str:

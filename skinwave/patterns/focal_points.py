@@ -6,10 +6,7 @@ its square. Several points are foci on paths of their own: their paths one after
 path, on which each focus runs one part ahead of the one before.
 """
 
-import csv
-import io
 import re
-from collections.abc import Iterator
 from math import isfinite
 
 import numpy as np
@@ -136,25 +133,15 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
 
 def _rows(content: bytes) -> list[tuple[int, list[str]]]:
     """Line numbers and fields of the lines that are neither empty nor comments."""
-    found = list(_cells(as_utf_8(content)))
-    if not found:
+    lines = as_utf_8(content).splitlines()
+    if len(lines) > MOST_ROWS:
+        raise ValueError(f"more than {MOST_ROWS:,} lines; cut the pattern")
+    kept = [(k, x) for k, x in enumerate(lines, 1) if x.strip(" ,;\t") and not x.startswith("#")]
+    if not kept:
         raise ValueError("no focal points; give a line each")
-    return found
-
-
-def _cells(text: str) -> Iterator[tuple[int, list[str]]]:
-    first = next((line for line in text.splitlines() if line.strip() and line[0] != "#"), "")
-    delimiter = max(",;\t", key=first.count)
-    reader = csv.reader(io.StringIO(text), delimiter=delimiter)
-    try:
-        for row in reader:
-            if row and not row[0].startswith("#") and any(cell.strip() for cell in row):
-                cells = [cell.strip() for cell in row]
-                yield reader.line_num, [c.replace(",", ".") for c in cells]  # decimal commas
-            if reader.line_num > MOST_ROWS:
-                raise ValueError(f"more than {MOST_ROWS:,} lines; cut the pattern")
-    except csv.Error as error:
-        raise ValueError(f"line {reader.line_num} is no CSV: {error}") from None
+    delimiter = max(",;\t", key=kept[0][1].count)
+    fields = ((k, line.replace('"', "").split(delimiter)) for k, line in kept)
+    return [(k, [x.strip().replace(",", ".") for x in row]) for k, row in fields]
 
 
 def _tidy(rows: list[tuple[int, list[str]]]) -> np.ndarray:

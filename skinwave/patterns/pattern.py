@@ -13,6 +13,8 @@ from simple_model import MovingPressure, Tacton
 from simple_model.tacton import tones
 from skinwave.scene import Scene
 
+ENGINE_RATE = 20_000.0  # Hz, of samples in AdapTics
+STRAIGHT = 2e-5, 1e-3  # m and of full drive, within which straight lines stand for samples
 MARGIN = 0.010  # m between a path and the edge of a body that is made for it
 
 
@@ -116,6 +118,22 @@ def one_height(z: Floats, options: Options, notes: list[str]) -> dict[str, float
         notes.append("the file says nothing of the height above the array: that of the scene")
         return {}
     return {"height": float(z[0])}
+
+
+def thinned(t: Floats, places: Floats, levels: Floats) -> np.ndarray:
+    """Indices (k,) of the samples that straight lines join within `STRAIGHT` of all places (t, 2)
+    in metre and levels (t,) at times (t,).
+    """
+    values = np.column_stack([places / STRAIGHT[0], levels / STRAIGHT[1]])
+    kept, before = np.arange(len(t)), 0
+    while len(kept) != before:
+        before = len(kept)
+        fewer = np.append(kept[:-1:2], kept[-1])
+        off = [np.abs(x - np.interp(t, t[fewer], x[fewer])) for x in values.T]
+        worst = np.maximum.reduceat(np.max(off, axis=0), fewer[:-1])
+        left = np.setdiff1d(kept, fewer)
+        kept = np.union1d(fewer, left[worst[np.searchsorted(fewer, left) - 1] > 1])
+    return kept
 
 
 def loudness(pressure: MovingPressure, t: ArrayLike) -> Floats:
