@@ -65,6 +65,9 @@ TABLES = {
     "rigol": (
         "X,CH1,CH2,Start,Increment\nSequence,Volt,Volt,-2.0e-02,1.0e-04\n" + COUNTED, MM_S, 2
     ),
+    "rigol, start and step behind names": (
+        "CH1V,CH2V,t0 =-2.0e-02, tInc = 1.0e-04,\n" + rows(TONE, OTHER, tail=",,"), MM_S, 2
+    ),
     "scopy": (
         SCOPY + "".join(f"{k},{row}\n" for k, row in enumerate(TWO.splitlines())), MM_S, 2
     ),
@@ -127,6 +130,11 @@ def test_table_of_an_instrument(tmp_path, name):
 CLOCKED = {
     "clock": "timestamp,v [mm/s]\n" + "".join(
         f"{c},{a:.7g}\n" for c, a in zip(clock(T), TONE, strict=True)),
+    "clock before noon": "time,v [mm/s]\n" + "".join(
+        f"{c} AM,{a:.7g}\n" for c, a in zip(clock(T, "10:00:%09.6f"), TONE, strict=True)),
+    "date and time in a cell": "Zeit;v [mm/s]\n" + "".join(
+        f"05.01.2026 {c};{a:.7g}\n".replace(".", ",").replace("05,01,", "05.01.")
+        for c, a in zip(clock(T, "10:00:%09.6f"), TONE, strict=True)),
     "iso clock": "time,v [mm/s]\n" + "".join(
         f"{c.replace(' ', 'T')}Z,{a:.7g}\n" for c, a in zip(clock(T), TONE, strict=True)),
     "date and time of day": "Datum;Uhrzeit;v [mm/s]\n" + "".join(
@@ -237,6 +245,12 @@ REFUSED = {
         "t [s],v [mm/s]\n" + rows(T, TONE, comma=True), {}, "cells between"),
     "time without a unit": (TWO, MM_S, "no unit; write 't \\[s\\]', or give --rate"),
     "a count without a rate": ("Sample,v [mm/s]\n" + rows(np.arange(1200.0), TONE), {}, "--rate"),
+    "times as text": (
+        "time,v [mm/s]\n" + "".join(f"00:{a:.6f},1\n" for a in T + 0.02), {"rate": RATE},
+        "holds text such as '00:0.000000'"),
+    "units within cells": (
+        "t,v\n" + "".join(f"{a:.6f} s,{b:.5f} mm/s\n" for a, b in zip(T, TONE, strict=True)),
+        MM_S | {"rate": RATE}, "no number|holds text|no numbers"),
     "directions": ("t [s],X (mm/s),Y (mm/s)\n" + TWO, {}, "by --direction"),
     "time in metres": ("time [m],v [mm/s]\n" + rows(T, TONE), {}, "'m' is no unit of time"),
     "time and frequency": ("t [s],f [Hz],v [mm/s]\n" + TWO, {}, "of time and of frequency"),

@@ -82,7 +82,8 @@ def _series(
         return found, *agreed([one for one, _ in found], given)
     if len(motion) % 2:
         raise ValueError(
-            "a spectrum needs two columns a place: 're v(0,0)', 'im v(0,0)', or magnitude and phase"
+            "a spectrum needs two columns a place: 're v(0,0)', 'im v(0,0)', or magnitude and "
+            "phase; choose them by --columns"
         )
     pairs = zip(motion[::2], motion[1::2], strict=True)
     found = [(columns[k], complex_of(columns, numbers, k, other)) for k, other in pairs]

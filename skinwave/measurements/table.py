@@ -24,8 +24,10 @@ DIRECTIONS = {"into the body": 1, "out of the body": -1}
 STRAIGHT = 1e-2  # of its range: how far a column of rounded times may be from rising evenly
 FEWEST = 4  # rows that show whether a column rises
 _RATE = re.compile(r"sampl\w*[ _-]*(rate|freq\w*)|abtast(rate|frequenz)|fs|rate")
-_INTERVAL = re.compile(r"(sampl\w*|time)[ _-]*(interval|increment|period)|increment|delta_x|dt")
-_START = re.compile(r"start|x0|trigger offset|first time")
+_INTERVAL = re.compile(
+    r"(sampl\w*|time)[ _-]*(interval|increment|period)|increment|delta_x|dt|tinc"
+)
+_START = re.compile(r"start|x0|t0|trigger offset|first time")
 _BAND = re.compile(r"(band[ _-]*|cent(er|re)[ _-]*)?(frequency|frequenz|fréquence)")
 _AXIS_UNIT = re.compile(r"(horizontal|x|time)[ _-]*units?")
 _AXIS = re.compile(r"(?:^|[ _])([xyz])\s*(?:[\[(]|$)")
@@ -303,7 +305,7 @@ def complex_of(columns: tuple[Column, ...], numbers: Floats, first: int, second:
         return a + 1j * b
     if same and one.part in ("", "abs") and other.part == "phase":
         if (unit := plain(other.unit)) not in ("deg", "rad"):
-            raise ValueError(f"'{other.text}' has the unit '{other.unit}'; give [deg] or [rad]")
+            raise ValueError(f"the phase '{other.text}' needs a unit; give [deg] or [rad]")
         return np.asarray(a * np.exp(1j * (np.deg2rad(b) if unit == "deg" else b)))
     raise ValueError(
         f"'{one.text}' and '{other.text}' are no complex amplitude; name them 're v(0,0) [mm/s]', "

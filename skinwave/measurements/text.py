@@ -22,7 +22,7 @@ from skinwave.measurements.labview import lvm_table
 from skinwave.measurements.layouts import EXAMPLE, in_metre, recording
 from skinwave.measurements.recording import Given, Recording
 from skinwave.measurements.table import Table
-from skinwave.measurements.units import plain
+from skinwave.measurements.units import plain, quantity_of
 from skinwave.plain_text import number_in
 
 FIRST_LINE = "LabVIEW Measurement"  # of .lvm files, whatever they are called
@@ -35,7 +35,7 @@ BEYOND = ("∞", "+∞", "1.#inf", "overload", "over")  # the range of an instru
 MARK = "#%;/!"  # before lines about the measurement
 _CLOCK = re.compile(
     r"(?:(\d{1,4})([-/.])(\d{1,2})\2(\d{1,4}))?[T ]*"
-    r"(?:(\d{1,2}):(\d\d):(\d\d(?:[.,]\d+)?)(?:Z|[+-]\d\d:?\d\d)?)?"
+    r"(?:(\d{1,2}):(\d\d):(\d\d(?:[.,]\d+)?)\s*([AP]M)?(?:Z|[+-]\d\d:?\d\d)?)?"
 )
 _LEADING_ZERO = re.compile(r",0\d+(?=,|$)")
 
@@ -101,6 +101,7 @@ def table(text: str) -> Table:
         except ValueError as error:
             misfits.append(str(error))
             continue
+        _check_text(names, units, kept, _cells(lines[first], delimiter, comma), notes)
         numbers = _numbers(lines, first, delimiter, comma, kept, names, notes)
         columns = [column(names[k], units[k]) for k in kept]
         for k, cell in enumerate(_cells(lines[first], delimiter, comma)[c] for c in kept):
@@ -134,7 +135,8 @@ def _columns(rows: list[str], delimiter: str, comma: bool) -> tuple[list[int], i
     alike = alike[len(alike) // 2 :]  # without the header of a short table
     full = [k for k in range(width) if any(cells[k] for cells in alike)]
     kept = [k for k in full if 2 * sum(_is_value(c[k]) for c in alike) >= len(alike)]
-    return (kept if any(_is_number(c[k]) for c in alike for k in kept) else []), width
+    is_table = any(_is_number(c[k]) for c in alike for k in kept)
+    return kept if is_table and (delimiter != " " or kept == full) else [], width
 
 
 def _is_row(cells: list[str], kept: list[int], width: int) -> bool:
@@ -208,7 +210,8 @@ def _clock(cell: str) -> float | None:
         except ValueError:
             return None
     if found[5]:
-        seconds += 3600 * int(found[5]) + 60 * int(found[6]) + float(found[7].replace(",", "."))
+        hour = int(found[5]) % 12 + 12 * (found[8] == "PM") if found[8] else int(found[5])
+        seconds += 3600 * hour + 60 * int(found[6]) + float(found[7].replace(",", "."))
     return seconds
 
 
@@ -225,6 +228,9 @@ def _header(
     at = [k for k, line in enumerate(above) if line.strip()]
     notes = [_note(above[k]) for k in at]
     rows = [_heading(above[k], delimiter) for k in at]
+    if rows:  # Rigol's "t0 = -0.01, tInc = 1e-4" behind names
+        notes += [_note(cell) for cell in rows[-1] if "=" in cell]
+        rows[-1] = [cell for cell in rows[-1] if "=" not in cell]
     found = [rows.pop()] if rows and not _is_title(rows[-1], len(kept)) else []
     if found and _are_units([found[0][k] for k in kept if k < len(found[0])]):
         found = [rows.pop() if rows and len(rows[-1]) > kept[-1] else [], *found]
@@ -244,6 +250,22 @@ def _header(
     notes += [(name.lower(), unit) for k, (name, unit) in enumerate(zip(names, units, strict=False))
               if k not in kept and name and unit]  # fmt: skip
     return names[: max(width, count)], units, notes
+
+
+def _check_text(
+    names: list[str], units: list[str], kept: list[int], cells: list[str],
+    notes: list[tuple[str, str]],
+) -> None:  # fmt: skip
+    """Note the columns of text that are left out; refuse those whose heading is that of numbers."""
+    for k, cell in enumerate(cells[: len(names)]):
+        if k in kept or not (names[k] and cell) or _is_number(cell):
+            continue
+        if (one := column(names[k], units[k])).role or quantity_of(one.unit):
+            raise ValueError(
+                f"the column '{names[k][:40]}' holds text such as '{cell[:40]}'; export it as "
+                "numbers, times in s or as hours:minutes:seconds"
+            )
+        notes.append(("remark", f"the column '{names[k][:40]}' holds text and is left out"))
 
 
 def _is_title(cells: list[str], count: int) -> bool:
@@ -312,7 +334,8 @@ def _row(
 ) -> list[float]:  # fmt: skip
     """Numbers of a line; its other cells are notes."""
     cells = _cells(line, delimiter, comma) or [""]
-    wrong = next((cell for cell in cells if comma and "." in cell and "," in cell), "")
+    wrong = next((cell for cell in cells if comma and "." in cell and "," in cell
+                  and _clock(cell) is None), "")  # fmt: skip
     if comma and not wrong and "." in line and ":" not in line:
         wrong = next((cell for cell in _cells(line, delimiter) if "." in cell), "")
     cure = "has a dot, and the file has decimal commas; leave out separators of thousands"
