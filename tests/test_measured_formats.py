@@ -117,10 +117,13 @@ def test_quantity_and_direction_are_chosen_in_a_file_of_several(tmp_path, binary
     assert_wave(read(path, direction="x", quantity="velocity"))
 
 
-def test_channels_of_one_node_are_places(tmp_path):
+def test_channels_of_no_node_are_places_and_sets_of_one_node_repetitions(tmp_path):
     sets = [{"rsp_node": 0, "data": WAVE[:, p], "id1": f"channel {p}"} for p in range(4)]
     found = read(uff(tmp_path / "a.uff", sets))
     assert found.values.shape == (1, COUNT, 4)
+    found = read(uff(tmp_path / "b.uff", [one | {"rsp_node": 7} for one in sets]))
+    assert found.values.shape == (4, COUNT, 1)
+    assert any("taken as repetitions" in said for said in found.remarks)
 
 
 def matlab_5(path, scan, **more):

@@ -190,13 +190,15 @@ def _alike(motion: list[dict[str, Any]]) -> None:
 
 
 def _by_node(motion: list[dict[str, Any]]) -> list[tuple[int, list[dict[str, Any]]]]:
-    """Nodes and their sets, as many of each: of several, repetitions. Sets of other names, at one
+    """Nodes and their sets, as many of each: of several, repetitions. Sets of other names, at no
     node or of another number at each, are places of their own.
     """
     groups: dict[int, list[dict[str, Any]]] = {}
     for one in motion:
         groups.setdefault(int(one.get("rsp_node", 0)), []).append(one)
+    named = {_text(one, "rsp_ent_name") for one in motion}
     names = {(_text(one, "rsp_ent_name"), _text(one, "id1")) for one in motion}
+    names = named if len(groups) == 1 and 0 not in groups else names
     counts = {len(group) for group in groups.values()}
     if (len(groups) == 1 or len(counts) > 1) and len(names) == len(motion):
         return [(int(one.get("rsp_node", 0)), [one]) for one in motion]
