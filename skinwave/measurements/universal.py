@@ -196,9 +196,8 @@ def _by_node(motion: list[dict[str, Any]]) -> list[tuple[int, list[dict[str, Any
     groups: dict[int, list[dict[str, Any]]] = {}
     for one in motion:
         groups.setdefault(int(one.get("rsp_node", 0)), []).append(one)
-    named = {_text(one, "rsp_ent_name") for one in motion}
-    names = {(_text(one, "rsp_ent_name"), _text(one, "id1")) for one in motion}
-    names = named if len(groups) == 1 and 0 not in groups else names
+    keys = ("rsp_ent_name",) if len(groups) == 1 and 0 not in groups else ("rsp_ent_name", "id1")
+    names = {tuple(_text(one, key) for key in keys) for one in motion}
     counts = {len(group) for group in groups.values()}
     if (len(groups) == 1 or len(counts) > 1) and len(names) == len(motion):
         return [(int(one.get("rsp_node", 0)), [one]) for one in motion]
