@@ -50,6 +50,13 @@ __all__ = [
 ]
 
 
+LIMITS = {  # beyond which results overflow or are round-off
+    "density": (1e-3, 1e6, "kg/m3"),
+    "shear_modulus": (1e-3, 1e13, "Pa"),
+    "viscosity": (0.0, 1e6, "Pa s"),
+}
+
+
 @dataclass(frozen=True, kw_only=True)
 class Material:
     """An isotropic solid; give `shear_modulus`, or build it with `from_young`, `of_law` or
@@ -96,6 +103,12 @@ class Material:
             value = getattr(self, name)
             if not (isfinite(value) and value >= 0):
                 raise ValueError(f"{name} = {value} must be a finite number, 0 or above")
+        for name, (low, high, unit) in LIMITS.items():
+            if not low <= (value := getattr(self, name)) <= high:
+                raise ValueError(
+                    f"{name} = {value:g} {unit} is outside {low:g}..{high:g} {unit}, far from any "
+                    "solid; check its unit"
+                )
         if self.loss_factor > LARGEST_LOSS_FACTOR:
             raise ValueError(
                 f"loss_factor = {self.loss_factor:g} is above {LARGEST_LOSS_FACTOR:g}, which is "
