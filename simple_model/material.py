@@ -51,10 +51,10 @@ __all__ = [
 
 
 LIMITS = {  # beyond which results overflow or are round-off
-    "density": (1e-3, 1e6, "kg/m3"),
+    "density": (1e-9, 1e6, "kg/m3"),
     "shear_modulus": (1e-3, 1e13, "Pa"),
-    "viscosity": (0.0, 1e6, "Pa s"),
 }
+SLOWEST = 1e3  # s, of viscosity over shear modulus: above it is a liquid
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,6 +109,11 @@ class Material:
                     f"{name} = {value:g} {unit} is outside {low:g}..{high:g} {unit}, far from any "
                     "solid; check its unit"
                 )
+        if self.viscosity > SLOWEST * self.shear_modulus:
+            raise ValueError(
+                f"viscosity = {self.viscosity:g} Pa s is above {SLOWEST:g} s times the shear "
+                f"modulus, {self.shear_modulus:g} Pa, more liquid than solid; check its unit"
+            )
         if self.loss_factor > LARGEST_LOSS_FACTOR:
             raise ValueError(
                 f"loss_factor = {self.loss_factor:g} is above {LARGEST_LOSS_FACTOR:g}, which is "

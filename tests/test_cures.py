@@ -126,9 +126,13 @@ def test_the_nearest_option_command_or_value_is_suggested(capsys, arguments, nea
 @pytest.mark.parametrize(
     ("key", "value", "limits"),
     [
-        ("density_kg_m3", "1e-200", "density = 1e-200 kg/m3 is outside 0.001..1e+06 kg/m3"),
+        ("density_kg_m3", "1e-200", "density = 1e-200 kg/m3 is outside 1e-09..1e+06 kg/m3"),
         ("shear_modulus_pa", "1e300", "shear_modulus = 1e+300 Pa is outside 0.001..1e+13 Pa"),
-        ("viscosity_pa_s", "1e200", "viscosity = 1e+200 Pa s is outside 0..1e+06 Pa s"),
+        (
+            "viscosity_pa_s",
+            "1e200",
+            "viscosity = 1e+200 Pa s is above 1000 s times the shear modulus",
+        ),
     ],
 )
 def test_a_material_that_no_solid_is_names_its_limits(key, value, limits):
