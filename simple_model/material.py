@@ -50,13 +50,6 @@ __all__ = [
 ]
 
 
-LIMITS = {  # beyond which results overflow or are round-off
-    "density": (1e-9, 1e6, "kg/m3"),
-    "shear_modulus": (1e-3, 1e13, "Pa"),
-}
-SLOWEST = 1e3  # s, of viscosity over shear modulus: above it is a liquid
-
-
 @dataclass(frozen=True, kw_only=True)
 class Material:
     """An isotropic solid; give `shear_modulus`, or build it with `from_young`, `of_law` or
@@ -103,17 +96,6 @@ class Material:
             value = getattr(self, name)
             if not (isfinite(value) and value >= 0):
                 raise ValueError(f"{name} = {value} must be a finite number, 0 or above")
-        for name, (low, high, unit) in LIMITS.items():
-            if not low <= (value := getattr(self, name)) <= high:
-                raise ValueError(
-                    f"{name} = {value:g} {unit} is outside {low:g}..{high:g} {unit}, far from any "
-                    "solid; check its unit"
-                )
-        if self.viscosity > SLOWEST * self.shear_modulus:
-            raise ValueError(
-                f"viscosity = {self.viscosity:g} Pa s is above {SLOWEST:g} s times the shear "
-                f"modulus, {self.shear_modulus:g} Pa, more liquid than solid; check its unit"
-            )
         if self.loss_factor > LARGEST_LOSS_FACTOR:
             raise ValueError(
                 f"loss_factor = {self.loss_factor:g} is above {LARGEST_LOSS_FACTOR:g}, which is "

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,8 @@ PLAIN = ("density", "shear_modulus", "poisson")  # and losses, which may be left
 LOSSES = ("viscosity", "loss_factor", "prony")
 ALONG = ("young_x", "young_y", "poisson_xy")  # of an orthotropic sheet, and shear_xy
 TABULATED = ("density", "poisson", "table")
+LIMITS = {"density": (1e-9, 1e6), "shear_modulus": (1e-3, 1e13)}  # kg/m3, Pa
+LONGEST = 1e3  # s, of viscosity over shear modulus
 SAME_MODULUS = 1e-3  # relative: moduli that are given as Young's and as shear agree as far as this
 LEAST_POISSON = -0.999  # below which no solid is; Poisson's ratio is checked with the others
 
@@ -37,6 +40,7 @@ def material_of(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) 
         If a value is missing, not of this kind of material, or out of range.
     """
     values = _by_shear(values, where, keys)
+    _check_limits(values, where, keys)
     kind, needed, optional = _kind(values)
     if missing := [keys[name] for name in needed if name not in values]:
         raise ValueError(f"{where} lacks {' and '.join(missing)}; give it, or name a preset")
@@ -54,6 +58,17 @@ def material_of(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) 
         return Material(**values)
     solid = {name: rest.pop(name) for name in ("density", "poisson")}
     return of_law(**solid, law=MODULUS_LAWS[values["law"]](**rest))
+
+
+def _check_limits(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) -> None:
+    """Refuse numbers that no solid has in these units, and whose results overflow."""
+    slowest = LONGEST * values.get("shear_modulus", inf)
+    for name, (low, high) in {**LIMITS, "viscosity": (-inf, slowest)}.items():
+        if isfinite(value := values.get(name, low)) and not low <= value <= high:
+            raise ValueError(
+                f"{where} has {keys[name]} = {value:g}, outside {max(low, 0):g} to {high:g}, far "
+                "from any solid; check its unit"
+            )
 
 
 def _by_shear(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) -> Mapping[str, Any]:

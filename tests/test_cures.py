@@ -1,6 +1,7 @@
 """What messages advise works: the input as they say is accepted."""
 
 import os
+import re
 import sys
 from pathlib import Path
 
@@ -126,17 +127,13 @@ def test_the_nearest_option_command_or_value_is_suggested(capsys, arguments, nea
 @pytest.mark.parametrize(
     ("key", "value", "limits"),
     [
-        ("density_kg_m3", "1e-200", "density = 1e-200 kg/m3 is outside 1e-09..1e+06 kg/m3"),
-        ("shear_modulus_pa", "1e300", "shear_modulus = 1e+300 Pa is outside 0.001..1e+13 Pa"),
-        (
-            "viscosity_pa_s",
-            "1e200",
-            "viscosity = 1e+200 Pa s is above 1000 s times the shear modulus",
-        ),
+        ("density_kg_m3", "1e-200", "1e-09 to 1e+06"),
+        ("shear_modulus_pa", "1e300", "0.001 to 1e+13"),
+        ("viscosity_pa_s", "1e200", "0 to 1e+07"),
     ],
 )
 def test_a_material_that_no_solid_is_names_its_limits(key, value, limits):
     given = {"density_kg_m3": "1000", "shear_modulus_pa": "1e4", "poisson": "0.49", key: value}
     text = "".join(f"{name} = {number}\n" for name, number in given.items())
-    with pytest.raises(ValueError, match=limits.replace("+", r"\+") + ".*; check its unit"):
+    with pytest.raises(ValueError, match=rf"{key} = .*{re.escape(limits)}, .*; check its unit"):
         loads(f"[body.material]\n{text}")
