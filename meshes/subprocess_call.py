@@ -25,6 +25,10 @@ class Refused(MeshError):
     """Refusal of a file by a script that ended with `REFUSED`, with its message."""
 
 
+class Crashed(MeshError):
+    """End of a script with an error that it does not expect."""
+
+
 def read(script: Path, path: Path, *arguments: object, folder: str | os.PathLike[str]) -> None:
     """Run a script that reads a file, with time and memory by the file's size.
 
@@ -105,5 +109,5 @@ def run(
         raise Refused(ended.stderr.strip().splitlines()[-1])
     if ended.returncode != 0:
         said = ended.stderr.strip().splitlines()[-1:] or ["it said nothing"]
-        raise MeshError(f"it ended with code {ended.returncode}, {said[0][:200]}")
+        raise Crashed(f"it ended with code {ended.returncode}, {said[0][:200]}")
     return ended.stdout

@@ -51,28 +51,29 @@ TEKTRONIX = (
     "Model,TBS1102B\n\nHorizontal Units,S,\nSample Interval,0.0001,\n\nLabel,,\nTIME,CH1,CH2\n"
 )
 BESIDE = ["Record Length,1.2e+03,,", "Sample Interval,1e-04,,", "Horizontal Units,s,,"]
+BOTH = MM_S | {"places": [(0.0, 0.0), (0.005, 0.0)]}
 # Content of a file, options, and number of places.
 TABLES = {
-    "keysight": ("x-axis,1,2\nsecond,Volt,Volt\n" + TWO, MM_S, 2),
-    "keysight, rate given": ("x-axis,1,2\nsecond,Volt,Volt\n" + TWO, MM_S | {"rate": RATE}, 2),
-    "tektronix": (TEKTRONIX + TWO, MM_S, 2),
-    "tektronix, rate given": ("TIME,CH1,CH2\n" + TWO, MM_S | {"rate": RATE}, 2),
+    "keysight": ("x-axis,1,2\nsecond,Volt,Volt\n" + TWO, BOTH, 2),
+    "keysight, rate given": ("x-axis,1,2\nsecond,Volt,Volt\n" + TWO, BOTH | {"rate": RATE}, 2),
+    "tektronix": (TEKTRONIX + TWO, BOTH, 2),
+    "tektronix, rate given": ("TIME,CH1,CH2\n" + TWO, BOTH | {"rate": RATE}, 2),
     "tektronix, notes beside": (
         "".join((BESIDE[k] if k < 3 else ",,,") + row + ",\n"
                 for k, row in enumerate(rows(T, TONE).splitlines())), MM_S, 1,
     ),
     "siglent": (SIGLENT + rows(T, TONE), MM_S, 1),
     "rigol": (
-        "X,CH1,CH2,Start,Increment\nSequence,Volt,Volt,-2.0e-02,1.0e-04\n" + COUNTED, MM_S, 2
+        "X,CH1,CH2,Start,Increment\nSequence,Volt,Volt,-2.0e-02,1.0e-04\n" + COUNTED, BOTH, 2
     ),
     "rigol, start and step behind names": (
-        "CH1V,CH2V,t0 =-2.0e-02, tInc = 1.0e-04,\n" + rows(TONE, OTHER, tail=",,"), MM_S, 2
+        "CH1V,CH2V,t0 =-2.0e-02, tInc = 1.0e-04,\n" + rows(TONE, OTHER, tail=",,"), BOTH, 2
     ),
     "scopy": (
-        SCOPY + "".join(f"{k},{row}\n" for k, row in enumerate(TWO.splitlines())), MM_S, 2
+        SCOPY + "".join(f"{k},{row}\n" for k, row in enumerate(TWO.splitlines())), BOTH, 2
     ),
     "picoscope": (
-        "Time,Channel A,Channel B\n(ms),(mV),(mV)\n\n" + rows(1e3 * T, TONE, OTHER), MM_S, 2
+        "Time,Channel A,Channel B\n(ms),(mV),(mV)\n\n" + rows(1e3 * T, TONE, OTHER), BOTH, 2
     ),
     "german": ("Quelle:\tHandfläche.svd\n\n Zeit\tGeschwindigkeit\n[ s ]\t[ mm/s ]\n"
                + rows(T, TONE, sep="\t", comma=True), {}, 1),
@@ -124,6 +125,18 @@ def test_table_of_an_instrument(tmp_path, name):
     path = tmp_path / "a.csv"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     assert_tone(read(path, **given), places)
+
+
+@pytest.mark.parametrize(
+    ("heads", "first"),
+    [("time,CH1,CH2\ns,V,V", "CH1"), ("Time (s),1 (V),2 (V)", "1"), ("t [s],Kanal A,Kanal B", "2")],
+)
+def test_channels_are_not_taken_as_places_of_motion(tmp_path, heads, first):
+    path = tmp_path / "a.csv"
+    path.write_text(f"{heads}\n{TWO}")
+    with pytest.raises(ValueError, match="are channels, and one may be the drive; choose"):
+        read(path, **MM_S)
+    assert_tone(read(path, **MM_S, columns=[first]), 1)
 
 
 # Tables without times before the first sample.
@@ -203,7 +216,7 @@ def test_gaps_without_times_keep_their_samples(tmp_path, value, places):
 
 
 def test_a_motion_that_rises_evenly_beside_times_stays(tmp_path):
-    (tmp_path / "a.csv").write_text("t [s],CH1,CH2\n" + rows(T, TONE, 3 * T))
+    (tmp_path / "a.csv").write_text("t [s],a,b\n" + rows(T, TONE, 3 * T))
     found = read(tmp_path / "a.csv", unit="mm/s")
     assert 1e3 * found.values[0, :, 1] == pytest.approx(3 * T, abs=1e-6)
     assert any("rises evenly and is taken as motion" in said for said in found.remarks)

@@ -223,8 +223,8 @@ def test_element_sets_of_abaqus_are_regions(tmp_path):
     [
         ("a.vtu", b"", "holds no triangles and no solid"),
         ("a.vtu", b"<VTKFile>", "holds no triangles and no solid"),
-        ("a.msh", b"nothing", r"cannot be read: it is dam.* version 2.2 \(gmsh -format msh22\)"),
-        ("a.msh", b"$MeshFormat\n9.9 0 8\n$EndMeshFormat\n", "cannot be read: .*msh22"),
+        ("a.msh", b"nothing", "cut short or no mesh of gmsh"),
+        ("a.msh", b"$MeshFormat\n9.9 0 8\n$EndMeshFormat\n", "cut short or no mesh of gmsh"),
         ("a.inp", b"*NODE\n1, a, b\n", "cannot be read"),
         ("a.inp", b"", "holds no triangles and no solid"),
         ("a.vtk", b"# vtk DataFile Version 3.0\n", "damaged|holds no triangles"),

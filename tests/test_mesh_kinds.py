@@ -254,6 +254,30 @@ def test_parts_that_are_numbered_alike_are_two_bodies_or_one_where_they_touch(tm
     assert sorted(mesh.region_names.values()) == ["BONE", "SKIN"]
 
 
+def test_instances_may_have_nodes_and_elements_of_their_own(tmp_path, capsys):
+    instances = "".join(
+        f"*Instance, name=P-{side}, part=P\n{nodes_and_elements(*half(side))}*End Instance\n"
+        for side in (-1, 1)
+    )
+    (tmp_path / "a.inp").write_text(abaqus([("P", "")], instances))
+    mesh, said = made(tmp_path, capsys, tmp_path / "a.inp")
+    assert volume(mesh) == pytest.approx(19.2, rel=1e-9)
+    assert said_of(said, "merged 15 nodes")
+
+
+def test_generated_sets_that_have_each_element_once_are_regions(tmp_path, capsys):
+    upper = SLAB.points[SLAB.tets].mean(axis=1)[:, 2] > -0.006
+    order = np.concatenate([np.flatnonzero(upper), np.flatnonzero(~upper)])
+    text = nodes_and_elements(SLAB.points, SLAB.tets[order], ", elset=ALL")
+    text += f"*Elset, elset=skin, generate\n1, {upper.sum()}, 1\n"
+    text += f"*Elset, elset=muscle, generate\n{upper.sum() + 1}, {len(order)}\n"
+    (tmp_path / "a.inp").write_text(text)
+    mesh, said = made(tmp_path, capsys, tmp_path / "a.inp")
+    names = {mesh.region_names[r]: (mesh.region == r).sum() for r in np.unique(mesh.region)}
+    assert names == {"SKIN": upper.sum(), "MUSCLE": (~upper).sum()}
+    assert said_of(said, "element sets that are not taken as regions: ALL")
+
+
 def test_sets_continued_lines_and_included_nodes(tmp_path):
     slab = meshes.block((0.04, 0.04, 0.012), 0.012, order=2)
     upper = slab.points[slab.tets[:, :4]].mean(axis=1)[:, 2] > -0.006
@@ -304,6 +328,45 @@ def test_tetrahedra_that_are_listed_twice_are_taken_once(tmp_path, capsys):
     mesh, said = made(tmp_path, capsys, tmp_path / "a.vtu")
     assert volume(mesh) == pytest.approx(19.2, rel=1e-9)
     assert said_of(said, "left out 5 tetrahedra that are listed twice")
+
+
+def test_the_smaller_of_two_groups_is_the_region(tmp_path, capsys):
+    import meshio
+
+    upper = SLAB.points[SLAB.tets].mean(axis=1)[:, 2] > -0.006
+    tets = np.vstack([SLAB.tets, SLAB.tets])
+    groups = np.concatenate([np.full(len(SLAB.tets), 1), np.where(upper, 2, 3)])
+    raw = meshio.Mesh(
+        SLAB.points, [("tetra", tets)],
+        cell_data={"gmsh:physical": [groups], "gmsh:geometrical": [groups]},
+        field_data={"all": np.array([1, 3]), "skin": np.array([2, 3]), "fat": np.array([3, 3])},
+    )  # fmt: skip
+    meshio.write(tmp_path / "a.msh", raw, file_format="gmsh22")
+    mesh, said = made(tmp_path, capsys, tmp_path / "a.msh")
+    assert set(mesh.region_names.values()) == {"skin", "fat"}
+    assert said_of(said, "the smaller of their groups is taken as their region")
+
+
+def test_voxels_are_split_as_hexahedra(tmp_path):
+    points, bricks = boxes(4, 4, 2, (0.040, 0.040, 0.012))
+    grid_of(points, {11: bricks[:, [0, 1, 3, 2, 4, 5, 7, 6]]}).save(tmp_path / "a.vtu")
+    assert volume(meshes.read(tmp_path / "a.vtu")) == pytest.approx(19.2, rel=1e-9)
+
+
+def test_damaged_files_are_refused_by_what_is_wrong(tmp_path):
+    points = np.array(SLAB.points)
+    points[3] = np.nan
+    grid_of(points, {TETRAHEDRON: SLAB.tets}).save(tmp_path / "a.vtk")
+    with pytest.raises(MeshError, match="1 nodes whose coordinates are no numbers"):
+        meshes.read(tmp_path / "a.vtk")
+    meshes.write(tmp_path / "b.msh", SLAB)
+    content = (tmp_path / "b.msh").read_bytes()
+    (tmp_path / "b.msh").write_bytes(content[: len(content) * 3 // 4])
+    with pytest.raises(MeshError, match="cut short or no mesh of gmsh"):
+        meshes.read(tmp_path / "b.msh")
+    (tmp_path / "c.stl").write_text("solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0")
+    with pytest.raises(MeshError, match="is damaged or cut short"):
+        meshes.read_surface(tmp_path / "c.stl")
 
 
 def test_inverted_tetrahedra_are_turned_and_overlapping_ones_refused(tmp_path, capsys):

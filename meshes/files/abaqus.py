@@ -6,6 +6,7 @@ instances, and keeps only the last of several blocks of nodes.
 
 import re
 from collections.abc import Iterator
+from copy import deepcopy
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -51,8 +52,7 @@ def read_abaqus(path: Path) -> Any:
 
     Returns
     -------
-    meshio.Mesh; its `info` has `notes`, and `names` of regions: the element sets of sections, else
-    those of lines of *ELEMENT, other sets, or parts
+    meshio.Mesh; its `info` has `notes`, and `names` of regions: element sets, or parts
 
     Raises
     ------
@@ -77,7 +77,8 @@ def read_abaqus(path: Path) -> Any:
                     f"{path} has an instance of the part '{options.get('PART', '')}', which it "
                     "does not hold; save it with its parts"
                 )
-            instances.append((own, rows))
+            current = deepcopy(own)  # which may have nodes and elements of its own
+            instances.append((current, rows))
         elif keyword in ("END PART", "END INSTANCE"):
             current = loose
         else:
@@ -183,12 +184,13 @@ def _joined(path: Path, placed: list[tuple[_Part, Rows]]) -> Any:
     regions: dict[str, list[int]] = {}
     names: dict[str, int] = {}
     left_out: dict[str, int] = {}
+    notes: list[str] = []
     first = 0
     for part, rows in placed:
         number = {node: first + i for i, node in enumerate(part.nodes)}
         first += len(number)
         points.append(_moved(path, np.array(list(part.nodes.values())).reshape(-1, 3), rows))
-        region = _regions(part, names)
+        region = _regions(part, names, notes)
         for element, (kind, nodes) in part.elements.items():
             name = _kind(kind, len(nodes))
             if name is None:
@@ -202,7 +204,8 @@ def _joined(path: Path, placed: list[tuple[_Part, Rows]]) -> Any:
                     "program that it comes from"
                 ) from None
             regions.setdefault(name, []).append(region.get(element, 0))
-    notes = [f"left out {count:,} elements of type {kind}" for kind, count in left_out.items()]
+    notes = list(dict.fromkeys(notes))  # of several instances of a part
+    notes += [f"left out {count:,} elements of type {kind}" for kind, count in left_out.items()]
     if len(placed) > 1:
         notes.append(f"read {len(placed)} parts or instances of parts")
     return meshio.Mesh(
@@ -226,22 +229,31 @@ def _solid_nodes(kind: str) -> int:
     return int(found[1]) if found else 0
 
 
-def _regions(part: _Part, names: dict[str, int]) -> dict[int, int]:
+def _regions(part: _Part, names: dict[str, int], notes: list[str]) -> dict[int, int]:
     """The number of the region of each element, from 1; `names` has those of all parts.
 
-    Regions are the sets of sections, of lines of *ELEMENT, of *ELSET, or else the part.
+    Regions are the sets of sections; else sets of *ELSET, or of lines of *ELEMENT, that have each
+    element once; else those of lines of *ELEMENT, or the part.
     """
-    for titles in (part.sections, part.blocks, list(part.sets)):
-        sets = {title: part.sets[title] for title in titles if title and part.sets.get(title)}
-        if sets:
-            break
-    else:
-        sets = {part.name: set(part.elements)}
+    known = {title: of for title, of in part.sets.items() if title and of}
+    apart = [title for title in known if title not in part.blocks]
+    families = [[t for t in titles if t in known] for titles in (part.sections, apart, part.blocks)]
+    chosen = families[0] or next((f for f in families[1:] if _is_partition(part, known, f)), [])
+    chosen = list(dict.fromkeys(chosen or families[2]))
+    if others := [title for title in known if title not in chosen]:
+        notes.append(f"element sets that are not taken as regions: {', '.join(others)}")
+    regions = {title: known[title] for title in chosen} or {part.name: set(part.elements)}
     return {
         element: names.setdefault(title, len(names) + 1)
-        for title, members in sets.items()
+        for title, members in regions.items()
         for element in members
     }
+
+
+def _is_partition(part: _Part, sets: dict[str, set[int]], titles: list[str]) -> bool:
+    """Whether sets of elements have each element of a part once."""
+    members = [element for title in titles for element in sets[title]]
+    return len(members) == len(part.elements) and set(members) == set(part.elements)
 
 
 def _moved(path: Path, points: Floats, rows: Rows) -> Floats:

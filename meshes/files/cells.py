@@ -31,7 +31,6 @@ OFF_MIDDLE = 0.25  # of an edge: how far a mid-side node may lie from its middle
 SPLIT = {
     "hexahedron": [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6],
                    [3, 0, 4, 7]],
-    "voxel": [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [1, 3, 7, 5], [3, 2, 6, 7], [2, 0, 4, 6]],
     "wedge": [[0, 2, 1], [3, 4, 5], [0, 1, 4, 3], [1, 2, 5, 4], [2, 0, 3, 5]],
     "pyramid": [[0, 3, 2, 1], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]],
 }  # fmt: skip
@@ -98,6 +97,8 @@ def _tetrahedra(
 ) -> dict[str, Any]:
     """Tetrahedra, each once, with nodes that are used, each once; their regions and facet sets."""
     used = np.unique(np.concatenate([joined(raw.cells, kind).ravel() for kind in solid]))
+    if bad := int((~np.isfinite(points[used])).any(axis=1).sum()):
+        raise MeshError(f"{path} has {bad:,} nodes whose coordinates are no numbers; mend them")
     same = np.arange(len(points))
     same[used] = used[first_of_same(points[used])]
     if merged := len(used) - len(np.unique(same[used])):
@@ -120,10 +121,14 @@ def _tetrahedra(
     if not whole.all():
         notes.append(f"left out {(~whole).sum():,} tetrahedra with a node that they have twice")
     tets, region = tets[whole], region[whole]
-    _, once = np.unique(np.sort(tets[:, :4], axis=1), axis=0, return_index=True)
+    once = _once(tets, region)
     if len(once) < len(tets):
-        notes.append(f"left out {len(tets) - len(once):,} tetrahedra that are listed twice")
-        tets, region = tets[np.sort(once)], region[np.sort(once)]
+        several = len(np.unique(region)) > 1
+        notes.append(
+            f"left out {len(tets) - len(once):,} tetrahedra that are listed twice"
+            + ("; the smaller of their groups is taken as their region" if several else "")
+        )
+        tets, region = tets[once], region[once]
     used, numbers = np.unique(tets, return_inverse=True)
     new = np.full(len(points), -1)
     new[used] = np.arange(len(used))
@@ -138,6 +143,14 @@ def _tetrahedra(
         "sets": np.array(list(sets), str),
         **{f"facets{k}": facets for k, facets in enumerate(sets.values())},
     }  # fmt: skip
+
+
+def _once(tets: Ints, region: Ints) -> Ints:
+    """Numbers, ascending, of tetrahedra without their copies in larger regions."""
+    _, which, count = np.unique(region, return_inverse=True, return_counts=True)
+    order = np.argsort(count[which], kind="stable")
+    _, first = np.unique(np.sort(tets[order, :4], axis=1), axis=0, return_index=True)
+    return np.sort(order[first])
 
 
 def fan(nodes: Ints, corners: int) -> tuple[Ints, Ints]:
@@ -251,7 +264,8 @@ def element_sets(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
         str(name): [np.asarray(of[i], np.int64) for i in blocks]
         for name, of in raw.cell_sets.items()
     }
-    filled = {name: of for name, of in members.items() if sum(map(len, of))}
+    filled = {name: of for name, of in members.items()
+              if sum(map(len, of)) and not name.startswith("gmsh:")}  # fmt: skip
     for number, of in enumerate(filled.values(), start=1):
         for region, which in zip(regions, of, strict=True):
             region[which] = number

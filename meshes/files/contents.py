@@ -75,10 +75,12 @@ def read_contents(path: str | os.PathLike[str]) -> Contents:
             subprocess_call.read(CHILD, path, target, folder=folder)
         except subprocess_call.Refused as error:
             raise MeshError(str(error).replace(str(path.resolve()), str(path))) from None
-        except MeshError as error:
+        except subprocess_call.Crashed:
             raise MeshError(
-                f"{path} cannot be read: {error}; save it again from the program that it comes from"
+                f"{path} is damaged or cut short; save it again from the program that it comes from"
             ) from None
+        except MeshError as error:
+            raise MeshError(f"{path} cannot be read: {error}") from None
         with np.load(target) as found:
             return Contents(
                 points=found["points"], tets=found["tets"], triangles=found["triangles"],

@@ -24,11 +24,12 @@ from meshes.files.contents import BY_MESHIO
 from meshes.tetmesh import MeshError
 
 VTK_CELLS = {
-    1: "vertex", 3: "line", 5: "triangle", 9: "quad", 10: "tetra", 11: "voxel", 12: "hexahedron",
-    13: "wedge", 14: "pyramid", 21: "line3", 22: "triangle6", 23: "quad8", 24: "tetra10",
-    25: "hexahedron20", 26: "wedge15", 27: "pyramid13",
+    1: "vertex", 3: "line", 5: "triangle", 9: "quad", 10: "tetra", 11: "hexahedron",
+    12: "hexahedron", 13: "wedge", 14: "pyramid", 21: "line3", 22: "triangle6", 23: "quad8",
+    24: "tetra10", 25: "hexahedron20", 26: "wedge15", 27: "pyramid13",
 }  # fmt: skip
 SOLID = 3  # dimension
+VOXEL, BRICK = 11, [0, 1, 3, 2, 4, 5, 7, 6]  # its corners in the order of a hexahedron's
 AGAIN = "save it again from the program that it comes from"
 
 
@@ -38,9 +39,10 @@ def main() -> int:
     try:
         with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings(record=True) as met:
             warnings.simplefilter("always")
-            found = contents(path, _read(path))
-        if any("error while reading" in str(one.message) for one in met):
-            raise MeshError(f"{path} is damaged or cut short; {AGAIN}")
+            raw = _read(path)
+            if any("error while reading" in str(one.message) for one in met):
+                raise MeshError(f"{path} is damaged or cut short; {AGAIN}")
+            found = contents(path, raw)
     except MeshError as error:
         print(error, file=sys.stderr)
         return subprocess_call.REFUSED
@@ -99,7 +101,8 @@ def _read_vtk(path: Path) -> Any:
             arrays = {name: np.asarray(grid.cell_data[name])[own] for name in grid.cell_data}
             if len(solid) > 1 and part in solid:
                 arrays.setdefault("region", np.full(own.sum(), solid.index(part) + 1))
-            blocks.append((VTK_CELLS[kind], np.asarray(grid.cells_dict[kind]) + first, arrays))
+            nodes = np.asarray(grid.cells_dict[kind]) + first
+            blocks.append((VTK_CELLS[kind], nodes[:, BRICK] if kind == VOXEL else nodes, arrays))
         points.append(np.asarray(grid.points, np.float64))
         first += grid.n_points
     tags = {name for _, _, arrays in blocks for name, of in arrays.items() if of.ndim == 1}
@@ -163,6 +166,8 @@ def _kinds(grid: Any, dimension: int | None = None) -> list[int]:
 def _check_unread(path: Path, kind: str) -> None:
     """Refuse what meshio's readers pass over: coordinate systems of Nastran, partitions of gmsh."""
     content = path.read_bytes()
+    if kind == "gmsh" and b"$EndElements" not in content:
+        raise MeshError(f"{path} is cut short or no mesh of gmsh: it has no $EndElements; {AGAIN}")
     if kind == "gmsh" and b"$PartitionedEntities" in content:
         raise MeshError(f"{path} is partitioned; save it without partitions, or as version 2.2")
     if kind != "nastran":
