@@ -529,6 +529,23 @@ def test_a_mesh_is_taken_as_it_is(tmp_path, monkeypatch, capsys):
     assert main(["mesh", "slab.msh", "--quiet", "--overwrite"]) == 0
 
 
+def test_options_of_the_command_reach_the_reader(tmp_path, capsys):
+    x, y, z = layered(1).points.T
+    points = 1e3 * np.column_stack([x + 0.02, z, -y])  # in mm, y up
+    loose = np.vstack([np.zeros(3), np.eye(3)]) + [60, 0, 0]
+    tets = np.vstack([layered(1).tets, len(points) + np.arange(4)[None]])
+    turned = TetMesh(points=np.vstack([points, loose]), tets=tets)
+    meshes.write(tmp_path / "a.vtu", turned)
+    command = ["mesh", str(tmp_path / "a.vtu"), "-o", str(tmp_path / "b.vtu"), "--json"]
+    assert main([*command, "--unit", "mm", "--up", "+y", "--keep", "largest", "--cap"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert any("kept the largest of 2 bodies" in said for said in summary["said"])
+    mesh = meshes.read(tmp_path / "b.vtu")
+    np.testing.assert_allclose(np.ptp(mesh.points, axis=0), [0.02, 0.03, 0.01], rtol=1e-9)
+    assert main([*command[:-1], "--overwrite", "--quiet"]) == 2
+    assert "which may be mm (--unit mm" in capsys.readouterr().err
+
+
 def test_what_is_prepared_is_kept_for_the_facets_that_a_file_names(tmp_path):
     block = meshes.block((0.02, 0.02, 0.01), 0.005)
     body = Body(kind="mesh", file=str(tmp_path / "body.vtu"), sides="clamped")

@@ -9,7 +9,6 @@ import pytest
 import meshes
 from meshes import MeshError
 from meshes.volume.quality import element_volumes
-from skinwave.cli import main
 
 SLAB = meshes.block((0.040, 0.040, 0.012), 0.010, order=1)
 TETRAHEDRON, HEXAHEDRON, WEDGE, PYRAMID = 10, 12, 13, 14  # in VTK
@@ -44,20 +43,18 @@ def boxes(nx, ny, nz, size):
     return points, np.stack(a, axis=-1).reshape(-1, 8)
 
 
-def made(tmp_path, capsys, file, *options):
-    """The mesh that the command makes of a file, and what it says."""
-    out = tmp_path / "made.vtu"
-    assert main(["mesh", str(file), *options, "-o", str(out), "--overwrite", "--json"]) == 0
-    return meshes.read(out), json.loads(capsys.readouterr().out)["said"]
+def made(file, h=0.008, **options):
+    """The body of a file, and what is said of it."""
+    said = []
+    return meshes.body_from_file(file, h, say=said.append, **options), said
 
 
-def refused(tmp_path, capsys, file, *options):
-    """The sentence with which the command refuses a file."""
-    assert main(["mesh", str(file), *options, "-o", str(tmp_path / "made.vtu"), "--quiet"]) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    assert not (tmp_path / "made.vtu").exists()
-    return said
+def refused(file, **options):
+    """The sentence with which a file is refused."""
+    with pytest.raises(MeshError) as error:
+        meshes.body_from_file(file, 0.008, **options)
+    assert "\n" not in str(error.value)
+    return str(error.value)
 
 
 def volume(mesh):
@@ -111,21 +108,21 @@ def pieces_vtu(path):
     )
 
 
-def test_pieces_of_a_file_are_one_body_where_they_touch(tmp_path, capsys):
+def test_pieces_of_a_file_are_one_body_where_they_touch(tmp_path):
     pieces_vtu(tmp_path / "a.vtu")
-    mesh, said = made(tmp_path, capsys, tmp_path / "a.vtu")
+    mesh, said = made(tmp_path / "a.vtu")
     assert volume(mesh) == pytest.approx(19.2, rel=1e-6)
     assert len(mesh.points) == len(SLAB.points)
     assert said_of(said, "merged 15 nodes that coincide")
 
 
-def test_blocks_are_regions_by_their_names(tmp_path, capsys):
+def test_blocks_are_regions_by_their_names(tmp_path):
     import pyvista
 
     grids = {name: grid_of(points, {TETRAHEDRON: tets})
              for name, (points, tets) in (("skin", half(-1)), ("fat", half(1)))}  # fmt: skip
     pyvista.MultiBlock(grids).save(tmp_path / "a.vtm")
-    mesh, _ = made(tmp_path, capsys, tmp_path / "a.vtm")
+    mesh, _ = made(tmp_path / "a.vtm")
     volumes = meshes.corner_volumes(mesh.points, mesh.tets)
     for number, name in mesh.region_names.items():
         assert 1e6 * volumes[mesh.region == number].sum() == pytest.approx(9.6), name
@@ -149,11 +146,11 @@ def mixed():
     return np.vstack([points, points[rest].mean(axis=1)]), cells
 
 
-def test_hexahedra_wedges_and_pyramids_are_split_conformingly(tmp_path, capsys):
+def test_hexahedra_wedges_and_pyramids_are_split_conformingly(tmp_path):
     points, cells = mixed()
     grid = grid_of(points, cells)
     grid.save(tmp_path / "a.vtu")
-    mesh, said = made(tmp_path, capsys, tmp_path / "a.vtu")
+    mesh, said = made(tmp_path / "a.vtu")
     by_vtk = 1e6 * grid.compute_cell_sizes()["Volume"].sum()
     assert volume(mesh) == pytest.approx(by_vtk, rel=1e-9)
     for kind in ("hexahedron", "wedge", "pyramid"):
@@ -185,7 +182,7 @@ def test_facets_of_hexahedra_stay_in_their_sets(tmp_path):
     assert (normals[:, 2] > 0).all()
 
 
-def test_cells_that_are_not_split_are_named(tmp_path, capsys):
+def test_cells_that_are_not_split_are_named(tmp_path):
     import meshio
 
     points, bricks = boxes(1, 1, 1, (0.02, 0.02, 0.01))
@@ -195,7 +192,7 @@ def test_cells_that_are_not_split_are_named(tmp_path, capsys):
     every = np.vstack([points, [(points[a] + points[b]) / 2 for a, b in middles]])
     nodes = np.append(bricks[0], 8 + np.arange(12))[None]
     meshio.write(tmp_path / "a.vtu", meshio.Mesh(every, [("hexahedron20", nodes)]))
-    assert "1 of type hexahedron20" in refused(tmp_path, capsys, tmp_path / "a.vtu")
+    assert "1 of type hexahedron20" in refused(tmp_path / "a.vtu")
 
 
 # Abaqus
@@ -217,20 +214,19 @@ def nodes_and_elements(points, tets, more="", first=1):
     return "*Node\n" + "\n".join(rows) + f"\n*Element, type=C3D4{more}\n" + "\n".join(cells) + "\n"
 
 
-def test_instances_are_placed_by_translation_and_rotation(tmp_path, capsys):
+def test_instances_are_placed_by_translation_and_rotation(tmp_path):
     part = [("BAR", nodes_and_elements(*half(-1)))]
     instances = (
         "*Instance, name=A-1, part=BAR\n*End Instance\n*Instance, name=A-2, part=BAR\n"
         "0., 0., 0.\n0., 0., 0., 0., 0., 1., 180.\n*End Instance\n"
     )
     (tmp_path / "a.inp").write_text(abaqus(part, instances))
-    mesh, said = made(tmp_path, capsys, tmp_path / "a.inp")
+    mesh, said = made(tmp_path / "a.inp")
     assert volume(mesh) == pytest.approx(19.2, rel=1e-9)
     assert said_of(said, "read 2 parts or instances")
     away = instances.replace("0., 0., 0.\n", "0., 0.05, 0.\n")
     (tmp_path / "a.inp").write_text(abaqus(part, away))
-    (tmp_path / "made.vtu").unlink()
-    assert "2 separate bodies (9.6, 9.6 cm3)" in refused(tmp_path, capsys, tmp_path / "a.inp")
+    assert "2 separate bodies (9.6, 9.6 cm3)" in refused(tmp_path / "a.inp")
     # A translation comes before the rotation, here about an axis away from the origin.
     moved = "0.1, 0., 0.\n0.1, 0., 0., 0.1, 0., 1., 90."
     (tmp_path / "a.inp").write_text(
@@ -243,36 +239,36 @@ def test_instances_are_placed_by_translation_and_rotation(tmp_path, capsys):
     np.testing.assert_allclose(read.points[:, 0].mean(), 0.1, atol=1e-12)
 
 
-def test_parts_that_are_numbered_alike_are_two_bodies_or_one_where_they_touch(tmp_path, capsys):
+def test_parts_that_are_numbered_alike_are_two_bodies_or_one_where_they_touch(tmp_path):
     parts = [(name, nodes_and_elements(*half(side))) for name, side in (("SKIN", -1), ("BONE", 1))]
     instances = "".join(
         f"*Instance, name={name}-1, part={name}\n*End Instance\n" for name, _ in parts
     )
     (tmp_path / "a.inp").write_text(abaqus(parts, instances))
-    mesh, _ = made(tmp_path, capsys, tmp_path / "a.inp")
+    mesh, _ = made(tmp_path / "a.inp")
     assert volume(mesh) == pytest.approx(19.2, rel=1e-9)
     assert sorted(mesh.region_names.values()) == ["BONE", "SKIN"]
 
 
-def test_instances_may_have_nodes_and_elements_of_their_own(tmp_path, capsys):
+def test_instances_may_have_nodes_and_elements_of_their_own(tmp_path):
     instances = "".join(
         f"*Instance, name=P-{side}, part=P\n{nodes_and_elements(*half(side))}*End Instance\n"
         for side in (-1, 1)
     )
     (tmp_path / "a.inp").write_text(abaqus([("P", "")], instances))
-    mesh, said = made(tmp_path, capsys, tmp_path / "a.inp")
+    mesh, said = made(tmp_path / "a.inp")
     assert volume(mesh) == pytest.approx(19.2, rel=1e-9)
     assert said_of(said, "merged 15 nodes")
 
 
-def test_generated_sets_that_have_each_element_once_are_regions(tmp_path, capsys):
+def test_generated_sets_that_have_each_element_once_are_regions(tmp_path):
     upper = SLAB.points[SLAB.tets].mean(axis=1)[:, 2] > -0.006
     order = np.concatenate([np.flatnonzero(upper), np.flatnonzero(~upper)])
     text = nodes_and_elements(SLAB.points, SLAB.tets[order], ", elset=ALL")
     text += f"*Elset, elset=skin, generate\n1, {upper.sum()}, 1\n"
     text += f"*Elset, elset=muscle, generate\n{upper.sum() + 1}, {len(order)}\n"
     (tmp_path / "a.inp").write_text(text)
-    mesh, said = made(tmp_path, capsys, tmp_path / "a.inp")
+    mesh, said = made(tmp_path / "a.inp")
     names = {mesh.region_names[r]: (mesh.region == r).sum() for r in np.unique(mesh.region)}
     assert names == {"SKIN": upper.sum(), "MUSCLE": (~upper).sum()}
     assert said_of(said, "element sets that are not taken as regions: ALL")
@@ -322,15 +318,15 @@ def test_what_abaqus_makes_by_a_rule_is_refused(tmp_path, text, said):
 # One sound body
 
 
-def test_tetrahedra_that_are_listed_twice_are_taken_once(tmp_path, capsys):
+def test_tetrahedra_that_are_listed_twice_are_taken_once(tmp_path):
     tets = np.vstack([SLAB.tets, SLAB.tets[10:15][:, [1, 2, 0, 3]]])
     grid_of(SLAB.points, {TETRAHEDRON: tets}).save(tmp_path / "a.vtu")
-    mesh, said = made(tmp_path, capsys, tmp_path / "a.vtu")
+    mesh, said = made(tmp_path / "a.vtu")
     assert volume(mesh) == pytest.approx(19.2, rel=1e-9)
     assert said_of(said, "left out 5 tetrahedra that are listed twice")
 
 
-def test_the_smaller_of_two_groups_is_the_region(tmp_path, capsys):
+def test_the_smaller_of_two_groups_is_the_region(tmp_path):
     import meshio
 
     upper = SLAB.points[SLAB.tets].mean(axis=1)[:, 2] > -0.006
@@ -342,7 +338,7 @@ def test_the_smaller_of_two_groups_is_the_region(tmp_path, capsys):
         field_data={"all": np.array([1, 3]), "skin": np.array([2, 3]), "fat": np.array([3, 3])},
     )  # fmt: skip
     meshio.write(tmp_path / "a.msh", raw, file_format="gmsh22")
-    mesh, said = made(tmp_path, capsys, tmp_path / "a.msh")
+    mesh, said = made(tmp_path / "a.msh")
     assert set(mesh.region_names.values()) == {"skin", "fat"}
     assert said_of(said, "the smaller of their groups is taken as their region")
 
@@ -369,54 +365,53 @@ def test_damaged_files_are_refused_by_what_is_wrong(tmp_path):
         meshes.read_surface(tmp_path / "c.stl")
 
 
-def test_inverted_tetrahedra_are_turned_and_overlapping_ones_refused(tmp_path, capsys):
+def test_inverted_tetrahedra_are_turned_and_overlapping_ones_refused(tmp_path):
     tets = np.array(SLAB.tets)
     tets[:20] = tets[:20][:, [0, 2, 1, 3]]
     grid_of(SLAB.points, {TETRAHEDRON: tets}).save(tmp_path / "a.vtu")
-    mesh, said = made(tmp_path, capsys, tmp_path / "a.vtu")
+    mesh, said = made(tmp_path / "a.vtu")
     assert said_of(said, "turned round 20 of 192")
     assert volume(mesh) == pytest.approx(19.2, rel=1e-9)
     points = np.array(SLAB.points)
     inner = np.flatnonzero(np.abs(points - [0, 0, -0.006]).max(axis=1) < 1e-9)
     points[inner] += [0.013, 0.002, 0.001]
     grid_of(points, {TETRAHEDRON: SLAB.tets}).save(tmp_path / "b.vtu")
-    (tmp_path / "made.vtu").unlink()
-    assert "tetrahedra of the mesh overlap at" in refused(tmp_path, capsys, tmp_path / "b.vtu")
+    assert "tetrahedra of the mesh overlap at" in refused(tmp_path / "b.vtu")
 
 
-def test_the_largest_of_several_bodies_is_kept_on_request(tmp_path, capsys):
+def test_the_largest_of_several_bodies_is_kept_on_request(tmp_path):
     loose = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]) * 1e-3 + [0.03, 0, 0]
     points = np.vstack([SLAB.points, loose])
     tets = np.vstack([SLAB.tets, len(SLAB.points) + np.arange(4)[None]])
     grid_of(points, {TETRAHEDRON: tets}).save(tmp_path / "a.vtu")
-    said = refused(tmp_path, capsys, tmp_path / "a.vtu")
+    said = refused(tmp_path / "a.vtu")
     assert "2 separate bodies (19.2, 0.000167 cm3)" in said
     assert "--keep largest" in said
-    mesh, said = made(tmp_path, capsys, tmp_path / "a.vtu", "--keep", "largest")
+    mesh, said = made(tmp_path / "a.vtu", keep_largest=True)
     assert len(mesh.tets) == len(SLAB.tets)
     assert said_of(said, "kept the largest of 2 bodies, 100.0 % of the volume")
 
 
-def test_units_that_no_hand_has_are_asked_for(tmp_path, capsys):
+def test_units_that_no_hand_has_are_asked_for(tmp_path):
     meshes.write(tmp_path / "a.msh", replace(SLAB, points=1e3 * SLAB.points))
-    said = refused(tmp_path, capsys, tmp_path / "a.msh")
+    said = refused(tmp_path / "a.msh")
     assert "which may be mm (--unit mm" in said
-    mesh, _ = made(tmp_path, capsys, tmp_path / "a.msh", "--unit", "mm")
+    mesh, _ = made(tmp_path / "a.msh", unit="mm")
     np.testing.assert_allclose(mesh.points, SLAB.points, atol=1e-15)
 
 
-def test_a_mesh_is_turned_and_brought_below_the_device(tmp_path, capsys):
+def test_a_mesh_is_turned_and_brought_below_the_device(tmp_path):
     x, y, z = SLAB.points.T
     corner = np.column_stack([x + 0.02, z + 0.012, 0.02 - y])  # y up, a corner at the origin
     meshes.write(tmp_path / "a.msh", replace(SLAB, points=corner, facets={}))
-    mesh, said = made(tmp_path, capsys, tmp_path / "a.msh", "--up", "+y")
+    mesh, said = made(tmp_path / "a.msh", up="+y")
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     np.testing.assert_allclose(low, [-0.02, -0.02, -0.012], atol=1e-3)
     np.testing.assert_allclose(high, [0.02, 0.02, 0.0], atol=1e-3)
     assert high[2] == pytest.approx(0.0, abs=1e-12)
     assert said_of(said, "its top to the origin")
     meshes.write(tmp_path / "b.vtu", mesh)
-    again, said = made(tmp_path, capsys, tmp_path / "b.vtu")
+    again, said = made(tmp_path / "b.vtu")
     np.testing.assert_array_equal(again.points, mesh.points)  # where it is on its top already
     assert not said_of(said, "moved by")
 
@@ -443,27 +438,26 @@ def open_wrist(path, rim=0.0):
     pyvista.PolyData(points, faces=np.insert(every, 0, 3, axis=1).ravel()).save(path)
 
 
-def test_an_open_wrist_is_capped_on_request(tmp_path, capsys):
+def test_an_open_wrist_is_capped_on_request(tmp_path):
     open_wrist(tmp_path / "a.stl")
-    said = refused(tmp_path, capsys, tmp_path / "a.stl")
+    said = refused(tmp_path / "a.stl")
     assert "open along 24 of its" in said
     assert "--cap" in said
-    mesh, said = made(tmp_path, capsys, tmp_path / "a.stl", "--cap", "--h", "8")
+    mesh, said = made(tmp_path / "a.stl", cap=True)
     area = 24 / 2 * np.sin(2 * np.pi / 24) * 0.02 * 0.008
     assert volume(mesh) == pytest.approx(1e6 * 0.04 * area, rel=0.02)
     assert said_of(said, "closed a hole of 24 edges, 40 mm wide and 0.0 mm out of a plane")
-    (tmp_path / "made.vtu").unlink()
     open_wrist(tmp_path / "b.stl", rim=0.005)
-    said = refused(tmp_path, capsys, tmp_path / "b.stl", "--cap")
+    said = refused(tmp_path / "b.stl", cap=True)
     assert "10.0 mm out of a plane and cannot be capped" in said
 
 
-def test_a_bone_in_the_file_of_its_skin_is_named_with_both_cures(tmp_path, capsys):
+def test_a_bone_in_the_file_of_its_skin_is_named_with_both_cures(tmp_path):
     import pyvista
 
     skin, bone = pyvista.Sphere(radius=0.02), pyvista.Sphere(radius=0.005)
     (skin + bone).save(tmp_path / "a.stl")
-    said = refused(tmp_path, capsys, tmp_path / "a.stl")
+    said = refused(tmp_path / "a.stl")
     assert "2 separate pieces" in said
     assert "--inner" in said
     surface = meshes.read_surface(tmp_path / "a.stl")
@@ -472,10 +466,10 @@ def test_a_bone_in_the_file_of_its_skin_is_named_with_both_cures(tmp_path, capsy
     assert notes[-1] == "kept the largest of 2 pieces, 94.1 % of the area"
 
 
-def test_compressed_gltf_is_named(tmp_path, capsys):
+def test_compressed_gltf_is_named(tmp_path):
     head = {"asset": {"version": "2.0"}, "extensionsRequired": ["KHR_draco_mesh_compression"]}
     (tmp_path / "a.gltf").write_text(json.dumps(head))
-    assert "KHR_draco_mesh_compression" in refused(tmp_path, capsys, tmp_path / "a.gltf")
+    assert "KHR_draco_mesh_compression" in refused(tmp_path / "a.gltf")
 
 
 def test_volumes_of_curved_elements_are_those_of_their_edges():
