@@ -291,3 +291,43 @@ def test_no_words_of_a_library_are_in_a_refusal(tmp_path, suffix, content):
         read(tmp_path / f"a.{suffix}", unit="mm/s", rate=1e3)
     for word in ("codec", "unpack", "zero-size", "buffer", "expected", "byte"):
         assert word not in str(error.value)
+
+
+def test_frequency_responses_of_several_references_are_refused(tmp_path):
+    f = np.arange(5.0, 1000, 5)
+    sets = [
+        {"func_type": 4, "rsp_node": node, "ref_node": shaker, "ref_dir": 3, "x": f,
+         "data": np.ones(len(f)) * (1 + 1j), "abscissa_spec_data_type": 18}
+        for node in (1, 2) for shaker in (101, 102)
+    ]  # fmt: skip
+    with pytest.raises(ValueError, match="2 references, the nodes 101, 102; export those of one"):
+        read(uff(tmp_path / "a.uff", sets))
+    found = read(uff(tmp_path / "a.uff", sets[::2]))
+    assert found.values.shape == (1, len(f), 2)
+
+
+def test_functions_of_other_directions_are_named(tmp_path):
+    sets = [{"rsp_node": node, "rsp_dir": way, "data": WAVE[:, node - 1]}
+            for node in (1, 2, 3, 4) for way in (1, 3)]  # fmt: skip
+    found = read(uff(tmp_path / "a.uff", sets))
+    assert_wave(found)
+    assert any("4 functions of other directions are left out" in said for said in found.remarks)
+
+
+def test_objects_of_matlab_are_refused_by_name(tmp_path):
+    with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
+        file["scan"] = np.array([[3707764736, 2, 1, 1, 1, 1]], np.uint32)
+        file["scan"].attrs["MATLAB_class"] = np.bytes_("table")
+        file["scan"].attrs["MATLAB_object_decode"] = np.int32(3)
+        file["fs"] = [[RATE]]
+    with pytest.raises(ValueError, match="'scan' is a table of MATLAB"):
+        read(tmp_path / "a.mat", **MM_S)
+
+
+def test_a_rate_that_holds_no_vibration_and_a_place_without_a_signal_are_said(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("t [s],v(0,0) [mm/s],v(5,0) [mm/s]\n" + rows(T, TONE, 0 * T + 0.003))
+    assert any("place 2 has the same value throughout" in said for said in read(path).remarks)
+    path.write_text("t [s],v(0,0) [mm/s]\n" + rows(T * RATE, TONE))
+    with pytest.raises(ValueError, match="samples at 1 Hz hold no vibration .* give --rate"):
+        read(path)

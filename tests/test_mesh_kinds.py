@@ -8,6 +8,7 @@ import pytest
 
 import meshes
 from meshes import MeshError
+from meshes.surface.alignment import widest_place
 from meshes.volume.quality import element_volumes
 
 SLAB = meshes.block((0.040, 0.040, 0.012), 0.010, order=1)
@@ -481,3 +482,12 @@ def test_volumes_of_curved_elements_are_those_of_their_edges():
     assert curved == pytest.approx(4 / 3 * np.pi, rel=3e-3)
     straight = meshes.corner_volumes(points, ball.tets).sum()
     assert abs(curved / straight - 1) > 0.02
+
+
+@pytest.mark.parametrize("sides", [(0.048, 0.032, 0.01), (0.04, 0.04, 0.012), (0.03, 0.02, 0.01)])
+def test_bodies_are_centred_whatever_the_rounding_at_their_sides(sides):
+    block = meshes.block(sides, 0.008, order=1)
+    surface, _ = meshes.repaired(block.points, meshes.boundary_facets(block.tets))
+    x, y, radius = widest_place(surface)
+    assert [x, y] == pytest.approx([0, 0], abs=0.01 * sides[0])
+    assert radius == pytest.approx(min(sides[:2]) / 2, rel=0.02)

@@ -97,7 +97,7 @@ def _outline(surface: Surface) -> tuple[Floats, float, Floats]:
         i, j = np.indices((n + 1, n + 1)).reshape(2, -1)
         shares = np.column_stack([i, j, n - i - j])[i + j <= n] / n
         drawn = np.einsum("qa,eai->eqi", shares, corners[count == n]).reshape(-1, 2)
-        inside[tuple(((drawn - low) / cell + 1).astype(int).T)] = True
+        inside[tuple(np.maximum((drawn - low) / cell + 1, 1).astype(int).T)] = True
     return low, float(cell), np.asarray(distance_transform_edt(inside))
 
 

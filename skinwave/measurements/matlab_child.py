@@ -35,7 +35,7 @@ def main() -> int:
     except ImportError:
         print(MISSING, file=sys.stderr)
         return REFUSED
-    except TooLarge as error:
+    except Unreadable as error:
         print(error, file=sys.stderr)
         return REFUSED
     except Exception:  # whatever is made of spoilt bytes
@@ -46,14 +46,14 @@ def main() -> int:
     return 0
 
 
-class TooLarge(Exception):
-    """The arrays of a file exceed the limit."""
+class Unreadable(Exception):
+    """The arrays of a file are too large, or of a kind that only MATLAB reads."""
 
 
 def check(size: float) -> None:
     """Refuse arrays of more bytes than the limit."""
     if size > LARGEST:
-        raise TooLarge(
+        raise Unreadable(
             f"the file holds {size / 1e6:,.0f} MB, and the limit is {LARGEST / 1e6:,.0f} MB; save "
             "fewer variables"
         )
@@ -144,6 +144,12 @@ def stacked(parts: list[Any]) -> np.ndarray | None:
 def as_in_matlab(node: Any) -> np.ndarray:
     """Array of a dataset as MATLAB shows it: transposed, text as text, complex as such."""
     array = np.asarray(node[()])
+    if "MATLAB_object_decode" in node.attrs:  # its numbers stand for others
+        kind = bytes(node.attrs.get("MATLAB_class", b"object")).decode(errors="replace")
+        raise Unreadable(
+            f"'{node.name.strip('/')}' is a {kind} of MATLAB, whose values cannot be read; save "
+            "them as arrays, such as by table2array"
+        )
     if node.attrs.get("MATLAB_class", b"") == b"char":
         return np.array(["".join(map(chr, array.ravel()))])
     if array.dtype.names == ("real", "imag"):

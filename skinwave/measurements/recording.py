@@ -12,6 +12,7 @@ from skinwave.measurements import sampling, units
 from skinwave.measurements.measurement import UNEVEN, Measurement
 
 LARGEST = 1e100  # of any value in SI: squares of larger ones may overflow
+SLOWEST = 40.0  # Hz of samples: half of it is below all vibrations that are felt
 EXAMPLE = "--quantity velocity --unit mm/s"
 
 
@@ -97,6 +98,8 @@ def completed(found: Recording, given: Given, path: Path) -> Measurement:
     places, placed = _places(found, given)
     found, missing = _measured(replace(found, places=places))
     axis, found, filled = _sampled(found, given)
+    if len(axis) > 1 and (rate := 1 / (axis[1] - axis[0])) < SLOWEST:
+        raise ValueError(f"samples at {rate:.3g} Hz hold no vibration that is felt; give --rate")
     values = sign * units.in_si(found.values, units.per_unit(unit, quantity))
     if values.size and not np.abs(values).max() < LARGEST:
         raise ValueError(
@@ -111,8 +114,22 @@ def completed(found: Recording, given: Given, path: Path) -> Measurement:
         drive=found.drive,
         name=found.name or path.stem,
         source=path.name,
-        remarks=tuple(dict.fromkeys((*found.remarks, *missing, *filled, *placed, *said))),
+        remarks=tuple(
+            dict.fromkeys((*found.remarks, *missing, *filled, *placed, *_constant(values), *said))
+        ),
     )
+
+
+def _constant(values: np.ndarray) -> list[str]:
+    """Sentence on places (r, n, p) at which nothing varies."""
+    still = np.flatnonzero((values == values[:, :1]).all(axis=(0, 1)))
+    if not len(still) or values.shape[1] < 2:
+        return []
+    listed = ", ".join(str(k + 1) for k in still[:8])
+    return [
+        f"place {listed} has the same value throughout, as without a signal; choose others by "
+        "--columns"
+    ]
 
 
 def _measured(found: Recording) -> tuple[Recording, list[str]]:

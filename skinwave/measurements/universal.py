@@ -57,6 +57,9 @@ def read(path: Path, given: Given) -> Recording:
     axis = units.in_si(np.asarray(first["x"], float), _per_axis(first, in_time))
     kind, unit, said = _unit(first, _per_metre(found), given)
     values, drive, more = _in_step(values, others, groups, in_time)
+    if left_out := sum(abs(int(one.get("rsp_dir", 0))) not in (0, abs(int(first["rsp_dir"])))
+                       for one in functions if _quantity(one)):  # fmt: skip
+        more.append(f"{left_out} functions of other directions are left out")
     if len(groups) == 1 and len(motion) > 1:
         more.append(f"{len(motion)} sets of one node are taken as repetitions")
     return Recording(
@@ -127,6 +130,12 @@ def _motion(
         others += [one for one in sure if not _quantity(one)]
     along = AXES[given.direction or "z"]
     at = [one for one in motion if abs(int(one.get("rsp_dir", 0))) in (0, along)]
+    nodes = {int(one.get("ref_node", 0)) for one in at}
+    if len(nodes) > 1 and all(one.get("func_type") == IN_FREQUENCY[0] for one in at):
+        raise ValueError(
+            f"its frequency responses have {len(nodes)} references, the nodes "
+            f"{', '.join(map(str, sorted(nodes)))}; export those of one"
+        )
     if at:
         return at, others
     if not motion:

@@ -63,6 +63,8 @@ def read(content: bytes, options: Options) -> Pattern:
         )
     if not tidy:
         notes.append(f"samples at {options.rate:g} Hz")
+    elif options.rate is not None:
+        notes.append("the times of the file stay; --rate is that of a file to be written")
     way = "stays at a sample until the next" if options.hold else "goes straight between samples"
     notes.append(f"the focus {way}")
     height = one_height(table["z_m"].ravel(), options, notes)
