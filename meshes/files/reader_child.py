@@ -46,6 +46,12 @@ def main() -> int:
     except MeshError as error:
         print(error, file=sys.stderr)
         return subprocess_call.REFUSED
+    except ImportError as error:  # MED files are read by h5py
+        print(
+            f"{path} is read with {error.name}, which is not installed; pip install "
+            '"skinwave[measure]", or save it as .vtu', file=sys.stderr,
+        )  # fmt: skip
+        return subprocess_call.REFUSED
     except (Exception, SystemExit) as error:
         why = "is damaged, or holds what its reader does not know"
         if isinstance(error, MemoryError):
