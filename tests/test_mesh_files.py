@@ -221,8 +221,8 @@ def test_element_sets_of_abaqus_are_regions(tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        ("a.vtu", b"", "holds no triangles and no solid"),
-        ("a.vtu", b"<VTKFile>", "holds no triangles and no solid"),
+        ("a.vtu", b"", "is damaged or cut short; save it again"),
+        ("a.vtu", b"<VTKFile>", "is damaged or cut short"),
         ("a.msh", b"nothing", "cut short or no mesh of gmsh"),
         ("a.msh", b"$MeshFormat\n9.9 0 8\n$EndMeshFormat\n", "cut short or no mesh of gmsh"),
         ("a.inp", b"*NODE\n1, a, b\n", "cannot be read"),
@@ -418,7 +418,7 @@ def test_up_is_a_turn_that_takes_the_axis_to_z(up):
     ("name", "content", "said"),
     [
         ("a.stl", b"", "damaged|holds no triangles"),
-        ("a.ply", b"ply\nformat ascii 1.0\nend_header\n", "holds no triangles|cannot be read"),
+        ("a.ply", b"ply\nformat ascii 1.0\nend_header\n", "damaged|holds no triangles"),
         ("a.obj", b"v 0 0 0\n", "holds no triangles and no solid"),
         ("a.glb", b"glTF....", "damaged|holds no triangles"),
         ("a.vtp", b"<VTKFile>", "damaged|holds no triangles"),
