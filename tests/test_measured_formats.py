@@ -329,5 +329,4 @@ def test_a_rate_that_holds_no_vibration_and_a_place_without_a_signal_are_said(tm
     path.write_text("t [s],v(0,0) [mm/s],v(5,0) [mm/s]\n" + rows(T, TONE, 0 * T + 0.003))
     assert any("place 2 has the same value throughout" in said for said in read(path).remarks)
     path.write_text("t [s],v(0,0) [mm/s]\n" + rows(T * RATE, TONE))
-    with pytest.raises(ValueError, match="samples at 1 Hz hold no vibration .* give --rate"):
-        read(path)
+    assert any("samples at 1 Hz show no vibration" in said for said in read(path).remarks)

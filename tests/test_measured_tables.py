@@ -128,15 +128,22 @@ def test_table_of_an_instrument(tmp_path, name):
 
 
 @pytest.mark.parametrize(
-    ("heads", "first"),
-    [("time,CH1,CH2\ns,V,V", "CH1"), ("Time (s),1 (V),2 (V)", "1"), ("t [s],Kanal A,Kanal B", "2")],
+    ("heads", "first"), [("time,CH1,CH2\ns,V,V", "CH1"), ("Time (s),1 (V),2 (V)", "1")]
 )
-def test_channels_are_not_taken_as_places_of_motion(tmp_path, heads, first):
+def test_channels_in_volts_are_not_taken_as_places_of_motion(tmp_path, heads, first):
     path = tmp_path / "a.csv"
     path.write_text(f"{heads}\n{TWO}")
-    with pytest.raises(ValueError, match="are channels, and one may be the drive; choose"):
+    with pytest.raises(ValueError, match="are channels in V, and one may be the drive; choose"):
         read(path, **MM_S)
     assert_tone(read(path, **MM_S, columns=[first]), 1)
+
+
+def test_columns_without_a_unit_are_named_if_they_are_taken_as_places(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text(f"TIME,CH1,CH2\n{TWO}")
+    found = read(path, **MM_S, rate=RATE)
+    assert_tone(found, 2)
+    assert any("columns CH1, CH2 are taken as places; if one" in said for said in found.remarks)
 
 
 # Tables without times before the first sample.

@@ -99,7 +99,10 @@ def completed(found: Recording, given: Given, path: Path) -> Measurement:
     found, missing = _measured(replace(found, places=places))
     axis, found, filled = _sampled(found, given)
     if len(axis) > 1 and (rate := 1 / (axis[1] - axis[0])) < SLOWEST:
-        raise ValueError(f"samples at {rate:.3g} Hz hold no vibration that is felt; give --rate")
+        filled.append(
+            f"samples at {rate:.3g} Hz show no vibration that is felt; check the times, or give "
+            "--rate"
+        )
     values = sign * units.in_si(found.values, units.per_unit(unit, quantity))
     if values.size and not np.abs(values).max() < LARGEST:
         raise ValueError(

@@ -31,7 +31,6 @@ _START = re.compile(r"start|x0|t0|trigger offset|first time")
 _BAND = re.compile(r"(band[ _-]*|cent(er|re)[ _-]*)?(frequency|frequenz|fréquence)")
 _AXIS_UNIT = re.compile(r"(horizontal|x|time)[ _-]*units?")
 _AXIS = re.compile(r"(?:^|[ _])([xyz])\s*(?:[\[(]|$)")
-_CHANNEL = re.compile(r"(ch|channel|kanal|canal|voie)[ _-]*\w{1,2}\b")
 _UNIT = re.compile(r"(vertical|y)?[ _-]*(units?|einheit)")
 
 
@@ -213,16 +212,20 @@ def _motion(columns: list[Column], given: Given) -> tuple[list[int], list[str]]:
     of = [kind or one.role for kind, one in zip(of, columns, strict=True)]
     motion = [k for k, one in enumerate(columns) if one.is_motion]
     sure = [k for k in motion if quantity_of(columns[k].unit)]
-    channels = [k for k in motion if _is_channel(columns[k])]
-    if len(channels) == len(motion) > 1 and given.places is None:
-        names = [columns[k].text or str(k + 1) for k in channels]
-        raise ValueError(
-            f"columns {', '.join(names)} are channels, and one may be the drive; choose those of "
-            f"motion, such as --columns {names[0]}, or give the --places of all"
-        )
+    apart = [
+        k for k in motion if np.isnan(columns[k].place[0]) and not quantity_of(columns[k].unit)
+    ]
+    names = ", ".join(columns[k].text or str(k + 1) for k in apart)
+    said = []
+    if len(apart) == len(motion) > 1 and given.places is None:
+        if all(plain(columns[k].unit) in OF_DRIVES for k in apart):
+            raise ValueError(
+                f"columns {names} are channels in {columns[apart[0]].unit}, and one may be the "
+                "drive; choose those of motion by --columns, or give the --places of all"
+            )
+        said.append(f"columns {names} are taken as places; if one is the drive, give --columns")
     other = [k for k in motion if sure and k not in sure and columns[k].unit
              and columns[k].part != "phase"]  # fmt: skip
-    said = []
     drives = [k for k in other if plain(columns[k].unit) in OF_DRIVES]
     if len(drives) == 1 and not any(one.role == DRIVE for one in columns):
         k = drives[0]
@@ -235,12 +238,6 @@ def _motion(columns: list[Column], given: Given) -> tuple[list[int], list[str]]:
     if len(kinds) > 1 and given.quantity in kinds:
         other += [k for k in sure if of[k] != given.quantity]
     return [k for k in range(len(columns)) if k not in other], said
-
-
-def _is_channel(one: Column) -> bool:
-    """Whether a column is a channel of an instrument, in volts or by its name, without a place."""
-    named = _CHANNEL.match(one.text.lower()) and not quantity_of(one.unit)
-    return bool(np.isnan(one.place[0]) and (named or plain(one.unit) in OF_DRIVES))
 
 
 def axis_of(table: Table, k: int, has_rate: bool) -> tuple[Floats, Floats]:
