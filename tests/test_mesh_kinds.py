@@ -491,3 +491,11 @@ def test_bodies_are_centred_whatever_the_rounding_at_their_sides(sides):
     x, y, radius = widest_place(surface)
     assert [x, y] == pytest.approx([0, 0], abs=0.01 * sides[0])
     assert radius == pytest.approx(min(sides[:2]) / 2, rel=0.02)
+
+
+def test_negative_regions_are_refused_and_not_taken_as_positive(tmp_path):
+    grid = grid_of(SLAB.points, {TETRAHEDRON: SLAB.tets})
+    grid.cell_data["material"] = np.where(np.arange(len(SLAB.tets)) < 96, 1, -1)
+    grid.save(tmp_path / "a.vtu")
+    with pytest.raises(MeshError, match="0 or above"):
+        meshes.read(tmp_path / "a.vtu")

@@ -230,7 +230,8 @@ def regions(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
     """
     for name in NUMBERED:
         if name in raw.cell_data:
-            region = np.abs(values(raw, name, kind))  # MED's are negative
+            region = values(raw, name, kind)
+            region = -region if name == "cell_tags" else region  # MED's are negative
             flags = [title for title in raw.cell_data if title.startswith(NAMED)]
             marked = {title: region[values(raw, title, kind) == 1] for title in flags}
             return region, {
