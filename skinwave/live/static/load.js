@@ -1,0 +1,315 @@
+// The moving load of a Tacton: its path, its modulation, and its spectral lines.
+// The same formulas as simple_model: trajectory, tacton, drive, pressure, load_spectrum.
+
+const TAU = 2 * Math.PI;
+const FEWEST_KNOTS = 132; // positions along a closed path: all harmonics below 66 f_d
+const KNOTS_PER_WIDTH = 8; // of the focal spot
+const JUMP_RATE = 25000; // positions a second of a path that jumps
+const PHASES = 8; // of each sinusoid; more than twice the degree of a drive law
+const ROOT3 = Math.sqrt(3);
+const CORNERS = {
+  line: [[-0.5, 0], [0.5, 0]],
+  triangle: [[0, 1 / ROOT3], [-0.5, -0.5 / ROOT3], [0.5, -0.5 / ROOT3]],
+  square: [[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]],
+};
+
+// Force on a disc of 10 mm radius by height in mm, relative to 200 mm (simple_model.focus).
+const HEIGHTS = [20, 40, 60, 80, 100, 120, 150, 180, 200, 220, 250, 300, 350, 400, 500, 600];
+const FORCES = [0.2395, 0.4048, 0.5717, 0.6989, 0.785, 0.8502, 0.9319, 0.986, 1, 0.9963, 0.9634,
+  0.8655, 0.7505, 0.6411, 0.4644, 0.3414];
+
+export const DRIVES = {
+  pressure_squared: (amplitude, m, depth) => (amplitude * (1 + depth * m) / (1 + depth)) ** 2,
+  force_corrected: (amplitude, m, depth) => amplitude * (1 + depth * m) / (1 + depth),
+  linear: (amplitude, m) => amplitude * m,
+};
+
+const interpolate = (x, xs, ys) => {
+  if (x <= xs[0]) return ys[0];
+  for (let k = 1; k < xs.length; k++) {
+    if (x <= xs[k]) return ys[k - 1] + (ys[k] - ys[k - 1]) * (x - xs[k - 1]) / (xs[k] - xs[k - 1]);
+  }
+  return ys[xs.length - 1];
+};
+
+/** Derivatives of a monotone cubic through (xs, ys): Fritsch and Carlson, as scipy's Pchip. */
+function slopes(xs, ys) {
+  const h = xs.slice(1).map((x, k) => x - xs[k]);
+  const d = h.map((step, k) => (ys[k + 1] - ys[k]) / step);
+  const inner = (k) => {
+    if (d[k - 1] * d[k] <= 0) return 0;
+    const w1 = 2 * h[k] + h[k - 1], w2 = h[k] + 2 * h[k - 1];
+    return (w1 + w2) / (w1 / d[k - 1] + w2 / d[k]);
+  };
+  const end = (h0, h1, d0, d1) => {
+    const slope = ((2 * h0 + h1) * d0 - h0 * d1) / (h0 + h1);
+    if (slope * d0 <= 0) return 0;
+    return d0 * d1 <= 0 && Math.abs(slope) > 3 * Math.abs(d0) ? 3 * d0 : slope;
+  };
+  const n = xs.length;
+  return xs.map((_, k) => {
+    if (k === 0) return end(h[0], h[1], d[0], d[1]);
+    return k === n - 1 ? end(h[n - 2], h[n - 3], d[n - 2], d[n - 3]) : inner(k);
+  });
+}
+const FORCE_SLOPES = slopes(HEIGHTS, FORCES);
+
+/** Intensity at a height in metre relative to 200 mm. */
+export function relativeIntensity(height) {
+  const x = Math.min(Math.max(1e3 * height, HEIGHTS[0]), HEIGHTS[HEIGHTS.length - 1]);
+  let k = 0;
+  while (k < HEIGHTS.length - 2 && x > HEIGHTS[k + 1]) k++;
+  const h = HEIGHTS[k + 1] - HEIGHTS[k], t = (x - HEIGHTS[k]) / h;
+  return FORCES[k] * (1 + 2 * t) * (1 - t) ** 2 + FORCE_SLOPES[k] * h * t * (1 - t) ** 2
+    + FORCES[k + 1] * t * t * (3 - 2 * t) + FORCE_SLOPES[k + 1] * h * t * t * (t - 1);
+}
+
+/** Distance in metre from the focus to the first zero of its main lobe, at a height in metre. */
+export function lobeWidth(height) {
+  const above = height - 0.2;
+  return 11.6e-3 + 46.5e-3 * above + 25e-3 * above ** 2;
+}
+
+/** Standard deviation in metre of the Gaussian focal spot at a height in metre. */
+export const spotWidth = (height) => 4.35e-3 * lobeWidth(height) / lobeWidth(0.2);
+
+/** Relative pressure of a round focal spot at a squared distance in m2 from the focus. */
+export function spot(squared, height, profile) {
+  if (profile === "gaussian") return Math.exp(-squared / (2 * spotWidth(height) ** 2));
+  const angle = Math.PI * Math.sqrt(Math.max(squared, 1e-24)) / lobeWidth(height);
+  return (Math.sin(angle) / angle) ** 2;
+}
+
+const isClosed = (points) => points.length > 2
+  && points[0][0] === points[points.length - 1][0] && points[0][1] === points[points.length - 1][1];
+
+/** Corners of a path in metre, and whether a period is one run along them. */
+function outline(path) {
+  if (path.shape === "polyline") {
+    return { corners: path.points, runsOn: path.sweep === "one_way" || isClosed(path.points) };
+  }
+  const unit = CORNERS[path.shape].map(([x, y]) => [path.size * x, path.size * y]);
+  const open = path.shape === "line";
+  return { corners: open ? unit : [...unit, unit[0]], runsOn: !open || path.sweep === "one_way" };
+}
+
+function arc(corners) {
+  const along = [0];
+  for (let k = 1; k < corners.length; k++) {
+    along.push(along[k - 1] + Math.hypot(corners[k][0] - corners[k - 1][0],
+      corners[k][1] - corners[k - 1][1]));
+  }
+  return along;
+}
+
+/** Length in metre of one period of a path. */
+export function pathLength(path) {
+  if (path.shape === "point") return 0;
+  if (path.shape === "circle") return Math.PI * path.size;
+  const { corners, runsOn } = outline(path);
+  const along = arc(corners);
+  return along[along.length - 1] * (runsOn ? 1 : 2);
+}
+
+/** Periods of a path per second, Hz; 0 if the focus does not move. */
+export function drawingFrequency(path) {
+  const length = pathLength(path);
+  return length > 0 ? path.speed / length : 0;
+}
+
+/** Position [x, y] in metre as a function of the fraction 0..1 of the period. */
+export function positionOf(path) {
+  const [cx, cy] = path.centre || [0, 0];
+  if (path.shape === "point" || pathLength(path) === 0) {
+    const [x, y] = path.shape === "polyline" ? path.points[0] : [0, 0];
+    return () => [x + cx, y + cy];
+  }
+  if (path.shape === "circle") {
+    return (p) => [path.size / 2 * Math.cos(TAU * p) + cx, path.size / 2 * Math.sin(TAU * p) + cy];
+  }
+  const { corners, runsOn } = outline(path);
+  const along = arc(corners), whole = along[along.length - 1];
+  const xs = corners.map((c) => c[0]), ys = corners.map((c) => c[1]);
+  return (p) => {
+    let way = p;
+    if (!runsOn) way = path.sweep === "sinusoidal" ? (1 - Math.cos(TAU * p)) / 2 : 1 - Math.abs(1 - 2 * p);
+    return [interpolate(way * whole, along, xs) + cx, interpolate(way * whole, along, ys) + cy];
+  };
+}
+
+/** Whether the focus jumps at the end of each period. */
+export function jumps(path) {
+  if (!["line", "polyline"].includes(path.shape) || drawingFrequency(path) === 0) return false;
+  return path.sweep === "one_way" && !(path.shape === "polyline" && isClosed(path.points));
+}
+
+/** Positions {x, y} in metre in the middles of equal cells of one period. */
+export function pathSamples(load) {
+  const { path } = load, fd = drawingFrequency(path);
+  let count = 1;
+  if (fd > 0) {
+    const enough = KNOTS_PER_WIDTH * pathLength(path) / spotWidth(load.height);
+    count = 12 * Math.ceil(Math.max(enough, FEWEST_KNOTS) / 12);
+    if (jumps(path)) count = Math.ceil(Math.max(enough, FEWEST_KNOTS, JUMP_RATE / fd));
+  }
+  const at = positionOf(path), x = new Float64Array(count), y = new Float64Array(count);
+  for (let q = 0; q < count; q++) [x[q], y[q]] = at((q + 0.5) / count);
+  return { x, y };
+}
+
+const tones = (load) => [load.am, load.am2, load.envelope];
+
+/** Modulation by the phases of the two AM sinusoids and the envelope. */
+function modulationAt(load, phases) {
+  const [m1, m2, e] = tones(load).map((f, k) => (f > 0 ? Math.sin(phases[k]) : 1));
+  return (load.w1 * m1 + (1 - load.w1) * m2) * e;
+}
+
+/** Pressure in Pa at each focus at a time in s, without rhythm. */
+export function gainAt(load, t) {
+  const full = load.peak * relativeIntensity(load.height) / load.foci.length;
+  return full * DRIVES[load.drive](load.amplitude, modulationAt(load, tones(load).map((f) => TAU * f * t)),
+    load.depth);
+}
+
+/** Lines [{f, re, im}] in Hz of either sign and Pa of the pressure at each focus. */
+export function gainLines(load) {
+  const fs = tones(load), counts = fs.map((f) => (f > 0 ? PHASES : 1));
+  const full = load.peak * relativeIntensity(load.height) / load.foci.length;
+  const values = [], total = counts[0] * counts[1] * counts[2];
+  const split = (k) => [Math.floor(k / (counts[1] * counts[2])), Math.floor(k / counts[2]) % counts[1],
+    k % counts[2]];
+  for (let k = 0; k < total; k++) {
+    const phases = split(k).map((j, axis) => TAU * j / counts[axis]);
+    values.push(full * DRIVES[load.drive](load.amplitude, modulationAt(load, phases), load.depth));
+  }
+  const found = [];
+  for (let k = 0; k < total; k++) {
+    const orders = split(k).map((n, axis) => (n >= counts[axis] / 2 && n > 0 ? n - counts[axis] : n));
+    let re = 0, im = 0;
+    for (let j = 0; j < total; j++) {
+      const at = split(j);
+      let turn = 0;
+      for (let axis = 0; axis < 3; axis++) turn += orders[axis] * at[axis] / counts[axis];
+      re += values[j] * Math.cos(TAU * turn);
+      im -= values[j] * Math.sin(TAU * turn);
+    }
+    const f = orders[0] * fs[0] + orders[1] * fs[1] + orders[2] * fs[2];
+    found.push({ f, re: re / total, im: im / total });
+  }
+  const largest = Math.max(...found.map((c) => Math.hypot(c.re, c.im)));
+  return found.filter((c) => Math.hypot(c.re, c.im) > 1e-12 * largest);
+}
+
+/** Array factor [re, im] of all foci on harmonic n of the path. */
+function arrayFactor(load, n) {
+  let re = 0, im = 0;
+  for (const ahead of load.foci) {
+    re += Math.cos(TAU * n * ahead);
+    im += Math.sin(TAU * n * ahead);
+  }
+  return [re, im];
+}
+
+/**
+ * Spectral lines of the load, strongest parts only: frequencies f (l,) in Hz, ascending, and by line
+ * the complex pressure in Pa of a focus at each of the path's samples, so that the pressure at a
+ * place is the real part of sum_q w_q S(x - X_q) exp(2 pi i f t).
+ */
+export function loadLines(load, { threshold = 1e-6, highest = 1e4, samples = pathSamples(load) } = {}) {
+  const count = samples.x.length, fd = drawingFrequency(load.path), gain = gainLines(load);
+  const strengths = harmonicStrengths(load, samples);
+  const byFrequency = new Map();
+  let strongest = 0;
+  const parts = [];
+  const most = Math.floor((count - 1) / 2);
+  for (let n = -most; n <= most; n++) {
+    const [ar, ai] = arrayFactor(load, n), share = strengths[(n + count) % count];
+    for (const c of gain) {
+      const f = Math.round((c.f + n * fd) * 1e9) / 1e9;
+      if (f < 0 || f > highest) continue;
+      const twice = f > 0 ? 2 : 1;
+      const re = twice * (c.re * ar - c.im * ai), im = twice * (c.re * ai + c.im * ar);
+      const strength = Math.hypot(re, im) * share;
+      strongest = Math.max(strongest, strength);
+      parts.push({ f: Math.abs(f), n, re, im, strength });
+    }
+  }
+  for (const part of parts) {
+    if (part.strength <= threshold * strongest) continue;
+    const line = byFrequency.get(part.f) || { f: part.f, parts: [] };
+    line.parts.push(part);
+    byFrequency.set(part.f, line);
+  }
+  const lines = [...byFrequency.values()].sort((a, b) => a.f - b.f);
+  const w = lines.map(({ parts: own }) => {
+    const re = new Float64Array(count), im = new Float64Array(count);
+    for (const { n, re: cr, im: ci } of own) {
+      for (let q = 0; q < count; q++) {
+        const turn = -TAU * n * ((q + 0.5) / count % 1), c = Math.cos(turn) / count, s = Math.sin(turn) / count;
+        re[q] += cr * c - ci * s;
+        im[q] += cr * s + ci * c;
+      }
+    }
+    if (jumps(load.path)) for (const each of [re, im]) spreadJump(each);
+    return { re, im };
+  });
+  return { f: lines.map((line) => line.f), w, samples };
+}
+
+/**
+ * Give the cells on both sides of the jump, the last and the first, the moments of a jump between
+ * them (simple_model.path_cells).
+ */
+function spreadJump(weights) {
+  const last = weights.length - 1, share = (weights[last] - weights[0]) / 24;
+  weights[0] += share;
+  weights[last] -= share;
+}
+
+/** Largest amplitude, at about nine points of the path, of each harmonic of the focal spot. */
+function harmonicStrengths(load, { x, y }) {
+  const count = x.length, step = Math.max(1, Math.floor(count / 8));
+  const strongest = new Float64Array(count);
+  for (let p = 0, seen = 0; p < count && seen < 9; p += step, seen++) {
+    const values = new Float64Array(count);
+    for (let q = 0; q < count; q++) {
+      values[q] = spot((x[p] - x[q]) ** 2 + (y[p] - y[q]) ** 2, load.height, load.profile);
+    }
+    const found = realFourier(values);
+    for (let n = 0; n < count; n++) strongest[n] = Math.max(strongest[n], Math.hypot(found.re[n], found.im[n]) / count);
+  }
+  return strongest;
+}
+
+/** Discrete Fourier transform of real values, of any length; tables of sines are kept. */
+function realFourier(values) {
+  const count = values.length, { cos, sin } = turnsOf(count);
+  const re = new Float64Array(count), im = new Float64Array(count);
+  for (let n = 0; n <= count / 2; n++) {
+    let a = 0, b = 0;
+    for (let q = 0, turn = 0; q < count; q++) {
+      a += values[q] * cos[turn];
+      b -= values[q] * sin[turn];
+      turn += n;
+      if (turn >= count) turn -= count;
+    }
+    re[n] = a; im[n] = b;
+    if (n > 0) { re[count - n] = a; im[count - n] = -b; }
+  }
+  return { re, im };
+}
+
+const kept = new Map();
+function turnsOf(count) {
+  if (!kept.has(count)) {
+    if (kept.size > 8) kept.clear();
+    const cos = new Float64Array(count), sin = new Float64Array(count);
+    for (let q = 0; q < count; q++) {
+      cos[q] = Math.cos(TAU * q / count);
+      sin[q] = Math.sin(TAU * q / count);
+    }
+    kept.set(count, { cos, sin });
+  }
+  return kept.get(count);
+}
