@@ -1,0 +1,1 @@
+"""A page that computes in the browser what bodies that were made here answer."""
