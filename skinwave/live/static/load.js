@@ -165,6 +165,19 @@ function modulationAt(load, phases) {
   return (load.w1 * m1 + (1 - load.w1) * m2) * e;
 }
 
+/** Level 0..1 of the rhythm at a time in s; 1 without a rhythm. */
+export function rhythmLevel(load, t) {
+  if (!load.pulses || !load.pulses.length) return 1;
+  const period = load.pulses.reduce((sum, [on, gap]) => sum + on + gap, 0);
+  let into = (t / period + 1e-12) % 1 * period;
+  for (const [on, gap] of load.pulses) {
+    if (into < on) return load.ramp > 0 ? Math.min(1, into / load.ramp, (on - into) / load.ramp) : 1;
+    if (into < on + gap) return 0;
+    into -= on + gap;
+  }
+  return 0;
+}
+
 /** Pressure in Pa at each focus at a time in s, without rhythm. */
 export function gainAt(load, t) {
   const full = load.peak * relativeIntensity(load.height) / load.foci.length;
@@ -212,49 +225,66 @@ function arrayFactor(load, n) {
 }
 
 /**
- * Spectral lines of the load, strongest parts only: frequencies f (l,) in Hz, ascending, and by line
- * the complex pressure in Pa of a focus at each of the path's samples, so that the pressure at a
- * place is the real part of sum_q w_q S(x - X_q) exp(2 pi i f t).
+ * Weights {re, im} of the path's samples in harmonic n of the path, with all foci: the pressure at a
+ * place is sum_n exp(2 pi i n f_d t) sum_q w_q S(x - X_q) times the pressure of one focus.
  */
-export function loadLines(load, { threshold = 1e-6, highest = 1e4, samples = pathSamples(load) } = {}) {
+export function pathHarmonic(load, n, count) {
+  const [ar, ai] = arrayFactor(load, n), { cos, sin } = turnsOf(2 * count);
+  const re = new Float64Array(count), im = new Float64Array(count);
+  const whole = 2 * count, first = ((n % whole) + whole) % whole, step = (2 * first) % whole;
+  for (let q = 0, turn = first; q < count; q++) {
+    const c = cos[turn] / count, s = -sin[turn] / count;
+    re[q] = c * ar - s * ai;
+    im[q] = c * ai + s * ar;
+    turn += step;
+    if (turn >= whole) turn -= whole;
+  }
+  if (jumps(load.path)) for (const each of [re, im]) spreadJump(each);
+  return { re, im };
+}
+
+/**
+ * Spectral lines of the load without its mean, its strongest ones: frequencies f (l,) in Hz,
+ * ascending, and by line the complex pressure in Pa of a focus at each of the path's samples, so that
+ * the pressure at a place is the real part of sum_q w_q S(x - X_q) exp(2 pi i f t). The parts of a line
+ * are harmonics n of the path times lines {re, im} of the gain.
+ */
+export function loadLines(load, { threshold = 3e-4, lowest = 1e-6, highest = 1000, most = 60,
+  samples = pathSamples(load) } = {}) {
   const count = samples.x.length, fd = drawingFrequency(load.path), gain = gainLines(load);
-  const strengths = harmonicStrengths(load, samples);
-  const byFrequency = new Map();
-  let strongest = 0;
-  const parts = [];
-  const most = Math.floor((count - 1) / 2);
-  for (let n = -most; n <= most; n++) {
-    const [ar, ai] = arrayFactor(load, n), share = strengths[(n + count) % count];
+  const shares = harmonicStrengths(load, samples), byFrequency = new Map();
+  const last = Math.floor((count - 1) / 2);
+  for (let n = -last; n <= last; n++) {
+    const factor = Math.hypot(...arrayFactor(load, n)) * shares[(n + count) % count];
+    if (factor < 1e-12) continue;
     for (const c of gain) {
       const f = Math.round((c.f + n * fd) * 1e9) / 1e9;
-      if (f < 0 || f > highest) continue;
-      const twice = f > 0 ? 2 : 1;
-      const re = twice * (c.re * ar - c.im * ai), im = twice * (c.re * ai + c.im * ar);
-      const strength = Math.hypot(re, im) * share;
-      strongest = Math.max(strongest, strength);
-      parts.push({ f: Math.abs(f), n, re, im, strength });
+      if (f < lowest || f > highest) continue;
+      const line = byFrequency.get(f) || { f, parts: [], strength: 0 };
+      const strength = (f > 0 ? 2 : 1) * Math.hypot(c.re, c.im) * factor;
+      line.parts.push({ n, ...c, strength });
+      line.strength += strength;
+      byFrequency.set(f, line);
     }
   }
-  for (const part of parts) {
-    if (part.strength <= threshold * strongest) continue;
-    const line = byFrequency.get(part.f) || { f: part.f, parts: [] };
-    line.parts.push(part);
-    byFrequency.set(part.f, line);
-  }
-  const lines = [...byFrequency.values()].sort((a, b) => a.f - b.f);
-  const w = lines.map(({ parts: own }) => {
-    const re = new Float64Array(count), im = new Float64Array(count);
-    for (const { n, re: cr, im: ci } of own) {
+  const all = [...byFrequency.values()].sort((a, b) => b.strength - a.strength).slice(0, most);
+  const lines = all.filter((line) => line.strength > threshold * all[0].strength)
+    .sort((a, b) => a.f - b.f);
+  const harmonics = new Map();
+  const w = lines.map(({ f, strength, parts }) => {
+    const re = new Float64Array(count), im = new Float64Array(count), twice = f > 0 ? 2 : 1;
+    for (const part of parts) {
+      if (part.strength < 1e-6 * strength) continue;
+      if (!harmonics.has(part.n)) harmonics.set(part.n, pathHarmonic(load, part.n, count));
+      const h = harmonics.get(part.n), cr = twice * part.re, ci = twice * part.im;
       for (let q = 0; q < count; q++) {
-        const turn = -TAU * n * ((q + 0.5) / count % 1), c = Math.cos(turn) / count, s = Math.sin(turn) / count;
-        re[q] += cr * c - ci * s;
-        im[q] += cr * s + ci * c;
+        re[q] += cr * h.re[q] - ci * h.im[q];
+        im[q] += cr * h.im[q] + ci * h.re[q];
       }
     }
-    if (jumps(load.path)) for (const each of [re, im]) spreadJump(each);
     return { re, im };
   });
-  return { f: lines.map((line) => line.f), w, samples };
+  return { f: Float64Array.from(lines, (line) => line.f), w, samples, parts: lines.map((line) => line.parts) };
 }
 
 /**

@@ -2,7 +2,9 @@
 //   g(r, f) = 1 / (2 pi) int S(k) G(k, f) J0(k r) k dk
 // along a path of complex k, as skinwave.live.radial packs it.
 
-import { spotWidth } from "./load.js";
+import { powerOfTwo, transform } from "./fourier.js";
+import { drawingFrequency, gainAt, gainLines, loadLines, pathHarmonic, pathSamples, rhythmLevel,
+  spotWidth } from "./load.js";
 
 /** Bessel function J0 of a complex argument with a positive real part: [re, im], to about 1e-7. */
 export function besselJ0(a, b) {
@@ -43,64 +45,10 @@ function asymptoticJ0(a, b) {
   return [vr * wr - vi * wi, vr * wi + vi * wr];
 }
 
-/**
- * A radial pack made ready: frequencies (f,) in Hz, distances (r,) in metre, and the table g (f, r)
- * in m/Pa for the focal spot of a height.
- */
-export class RadialBody {
-  constructor(pack) {
-    Object.assign(this, pack); // frequencies, k {re, im}, weights {re, im}, G {re, im} (f, k)
-    this.distances = Float64Array.from({ length: pack.n_distances },
-      (_, j) => j * pack.furthest / (pack.n_distances - 1));
-    const n = this.k.re.length, m = this.distances.length;
-    this.bessel = { re: new Float64Array(n * m), im: new Float64Array(n * m) };
-    for (let i = 0; i < n; i++) {
-      for (let j = 0; j < m; j++) {
-        const r = this.distances[j];
-        const [re, im] = r ? besselJ0(this.k.re[i] * r, this.k.im[i] * r) : [1, 0];
-        this.bessel.re[i * m + j] = re;
-        this.bessel.im[i * m + j] = im;
-      }
-    }
-    this.height = null;
-  }
-
-  /** Table g (f, r) for a height in metre, as {re, im}. */
-  table(height) {
-    if (this.height === height) return this.g;
-    const width = spotWidth(height), n = this.k.re.length, m = this.distances.length;
-    const nf = this.frequencies.length;
-    // kernel (k, r): J0 times k S(k) and the weights of the integration
-    const kr = new Float64Array(n * m), ki = new Float64Array(n * m);
-    for (let i = 0; i < n; i++) {
-      const a = this.k.re[i], b = this.k.im[i];
-      const damp = width * width * Math.exp(-(a * a - b * b) * width * width / 2);
-      const turn = -a * b * width * width;
-      const [sr, si] = [damp * Math.cos(turn), damp * Math.sin(turn)];
-      const [pr, pi] = [sr * a - si * b, sr * b + si * a];
-      const [wr, wi] = [pr * this.weights.re[i] - pi * this.weights.im[i],
-        pr * this.weights.im[i] + pi * this.weights.re[i]];
-      for (let j = i * m; j < (i + 1) * m; j++) {
-        kr[j] = wr * this.bessel.re[j] - wi * this.bessel.im[j];
-        ki[j] = wr * this.bessel.im[j] + wi * this.bessel.re[j];
-      }
-    }
-    const re = new Float64Array(nf * m), im = new Float64Array(nf * m);
-    for (let f = 0; f < nf; f++) {
-      for (let i = 0; i < n; i++) {
-        const a = this.G.re[f * n + i], b = this.G.im[f * n + i];
-        const to = f * m, from = i * m;
-        for (let j = 0; j < m; j++) {
-          re[to + j] += a * kr[from + j] - b * ki[from + j];
-          im[to + j] += a * ki[from + j] + b * kr[from + j];
-        }
-      }
-    }
-    this.height = height;
-    this.g = { re, im };
-    return this.g;
-  }
-}
+const TAIL = 0.4; // s that motion may last after the load
+const HIGHEST = 1200; // Hz up to which a body's motion from rest is computed
+const FINER = 8; // places of a map's table in each interval of the distances
+const NEGLIGIBLE = 1e-4; // of the largest harmonic of a path
 
 /** Fractional index of a value among ascending ones, for cubics between them. */
 const indexIn = (values, x) => {
@@ -120,39 +68,286 @@ function lagrange(values, x) {
     (product, other, j) => (j === k ? product : product * (x - other) / (own - other)), 1)) };
 }
 
-/** g (r,) in m/Pa at a frequency in Hz, as {re, im}. */
-export function alongDistance(body, height, frequency) {
-  const g = body.table(height), m = body.distances.length;
-  const re = new Float64Array(m), im = new Float64Array(m);
-  const { first, shares } = lagrange(body.frequencies, frequency);
-  shares.forEach((share, k) => {
-    const from = (first + k) * m;
-    for (let j = 0; j < m; j++) {
-      re[j] += share * g.re[from + j];
-      im[j] += share * g.im[from + j];
+/** Four weights of a cubic through 0, 1, 2, 3 at x. */
+const cubic = (x) => [-(x - 1) * (x - 2) * (x - 3) / 6, x * (x - 2) * (x - 3) / 2,
+  -x * (x - 1) * (x - 3) / 2, x * (x - 1) * (x - 2) / 6];
+
+/** A laterally infinite body of a pack: frequencies (f,) in Hz, k (k,) and G (f, k) {re, im}. */
+export class RadialBody {
+  constructor(pack) {
+    Object.assign(this, pack);
+    this.distances = Float64Array.from({ length: pack.n_distances },
+      (_, j) => j * pack.furthest / (pack.n_distances - 1));
+    const n = this.k.re.length, m = this.distances.length;
+    this.bessel = { re: new Float64Array(n * m), im: new Float64Array(n * m) };
+    for (let i = 0; i < n; i++) {
+      for (let j = 0; j < m; j++) {
+        const r = this.distances[j];
+        const [re, im] = r ? besselJ0(this.k.re[i] * r, this.k.im[i] * r) : [1, 0];
+        this.bessel.re[i * m + j] = re;
+        this.bessel.im[i * m + j] = im;
+      }
     }
-  });
-  return { re, im };
+    this.shares = new Map(); // of a height
+    this.known = new Map(); // g (r,) of a height and a frequency
+  }
+
+  respond(load) {
+    return new RadialMotion(this, load);
+  }
+
+  /** Shares (k,) of the path of integration: S(k) k times the weights, for a height in metre. */
+  spotShares(height) {
+    if (!this.shares.has(height)) {
+      if (this.shares.size > 8) this.shares.clear();
+      const variance = spotWidth(height) ** 2, n = this.k.re.length;
+      const re = new Float64Array(n), im = new Float64Array(n);
+      let used = n;
+      for (let i = 0; i < n; i++) {
+        const a = this.k.re[i], b = this.k.im[i];
+        const damp = variance * Math.exp(-(a * a - b * b) * variance / 2), turn = -a * b * variance;
+        const sr = damp * Math.cos(turn), si = damp * Math.sin(turn);
+        const pr = sr * a - si * b, pi = sr * b + si * a;
+        const wr = this.weights.re[i], wi = this.weights.im[i];
+        re[i] = pr * wr - pi * wi;
+        im[i] = pr * wi + pi * wr;
+        if (a * a * variance > 6.5 ** 2) { used = i; break; } // the spot has nothing beyond
+      }
+      this.shares.set(height, { re, im, used });
+    }
+    return this.shares.get(height);
+  }
+
+  /** Products (k,) of the compliance at a frequency in Hz and the shares of a height. */
+  products(height, frequency) {
+    const { re: sr, im: si, used } = this.spotShares(height), n = this.k.re.length;
+    const re = new Float64Array(used), im = new Float64Array(used);
+    const { first, shares } = lagrange(this.frequencies, frequency);
+    for (let i = 0; i < used; i++) {
+      let a = 0, b = 0;
+      for (let k = 0, from = first * n + i; k < 4; k++, from += n) {
+        a += shares[k] * this.G.re[from];
+        b += shares[k] * this.G.im[from];
+      }
+      re[i] = a * sr[i] - b * si[i];
+      im[i] = a * si[i] + b * sr[i];
+    }
+    return { re, im, used };
+  }
+
+  /** Motion g (r,) in m/Pa about a focal spot, at the distances, as {re, im}. */
+  alongDistance(height, frequency) {
+    const key = `${height} ${frequency}`;
+    if (!this.known.has(key)) {
+      if (this.known.size > 400) this.known.clear();
+      const { re: pr, im: pi, used } = this.products(height, frequency), m = this.distances.length;
+      const re = new Float64Array(m), im = new Float64Array(m), { re: br, im: bi } = this.bessel;
+      for (let i = 0; i < used; i++) {
+        const a = pr[i], b = pi[i];
+        for (let j = 0, from = i * m; j < m; j++, from++) {
+          re[j] += a * br[from] - b * bi[from];
+          im[j] += a * bi[from] + b * br[from];
+        }
+      }
+      this.known.set(key, { re, im });
+    }
+    return this.known.get(key);
+  }
+
+  /** Bessel functions J0(k r) (used, r) at distances (r,) in metre, by cubics, as {re, im}. */
+  besselAt(distances, used) {
+    const m = this.distances.length, step = this.distances[1], count = distances.length;
+    const re = new Float64Array(used * count), im = new Float64Array(used * count);
+    for (let q = 0; q < count; q++) {
+      const x = distances[q] / step, first = Math.min(Math.max(Math.floor(x) - 1, 0), m - 4);
+      const [s0, s1, s2, s3] = cubic(x - first);
+      for (let i = 0, from = first, to = q; i < used; i++, from += m, to += count) {
+        const { re: br, im: bi } = this.bessel;
+        re[to] = s0 * br[from] + s1 * br[from + 1] + s2 * br[from + 2] + s3 * br[from + 3];
+        im[to] = s0 * bi[from] + s1 * bi[from + 1] + s2 * bi[from + 2] + s3 * bi[from + 3];
+      }
+    }
+    return { re, im };
+  }
 }
 
-/** Complex motion {re, im} in metre of places for one line, by weights of a path's samples. */
-export function lineMotion(body, g, w, samples, places) {
-  const re = new Float64Array(places.x.length), im = new Float64Array(places.x.length);
-  const step = body.distances[1], last = body.distances.length - 4;
-  for (let p = 0; p < places.x.length; p++) {
-    let a = 0, b = 0;
-    for (let q = 0; q < samples.x.length; q++) {
-      const r = Math.hypot(places.x[p] - samples.x[q], places.y[p] - samples.y[q]) / step;
-      const first = Math.min(Math.max(Math.floor(r) - 1, 0), last), x = r - first;
-      const s0 = -(x - 1) * (x - 2) * (x - 3) / 6, s1 = x * (x - 2) * (x - 3) / 2;
-      const s2 = -x * (x - 1) * (x - 3) / 2, s3 = x * (x - 1) * (x - 2) / 6;
-      const gr = s0 * g.re[first] + s1 * g.re[first + 1] + s2 * g.re[first + 2] + s3 * g.re[first + 3];
-      const gi = s0 * g.im[first] + s1 * g.im[first + 1] + s2 * g.im[first + 2] + s3 * g.im[first + 3];
-      a += gr * w.re[q] - gi * w.im[q];
-      b += gr * w.im[q] + gi * w.re[q];
-    }
-    re[p] = a;
-    im[p] = b;
+/** Motion of a laterally infinite body under a load. */
+class RadialMotion {
+  constructor(body, load) {
+    this.body = body;
+    this.load = load;
+    this.lines = loadLines(load);
+    this.f = this.lines.f;
   }
-  return { re, im };
+
+  /** Complex amplitudes (l,) in metre at a place in metre. */
+  at(x, y) {
+    const harmonics = new Map(this.harmonicsAt(x, y)), { parts } = this.lines;
+    const re = new Float64Array(this.f.length), im = new Float64Array(this.f.length);
+    this.f.forEach((f, l) => {
+      const { first, shares: s } = lagrange(this.body.frequencies, f);
+      for (const part of parts[l]) {
+        const h = harmonics.get(part.n);
+        if (!h) continue;
+        let a = 0, b = 0;
+        for (let k = 0; k < 4; k++) {
+          a += s[k] * h.re[first + k];
+          b += s[k] * h.im[first + k];
+        }
+        re[l] += 2 * (a * part.re - b * part.im);
+        im[l] += 2 * (a * part.im + b * part.re);
+      }
+    });
+    return { re, im };
+  }
+
+  /** Complex amplitudes (l, y, x) in metre on a grid. */
+  onGrid(xs, ys) {
+    const x = new Float64Array(xs.length * ys.length), y = new Float64Array(x.length);
+    for (let k = 0; k < x.length; k++) {
+      x[k] = xs[k % xs.length];
+      y[k] = ys[Math.floor(k / xs.length)];
+    }
+    return this.places(x, y);
+  }
+
+  /** Complex amplitudes (l, p) in metre at places (p,), by the nearest entry of a fine table. */
+  places(x, y) {
+    const { body, load, lines: { w, samples } } = this, count = samples.x.length, n = x.length;
+    const m = body.distances.length, step = body.distances[1] / FINER, fine = FINER * (m - 1) + 1;
+    const index = new Uint16Array(n * count);
+    for (let p = 0, k = 0; p < n; p++) {
+      for (let q = 0; q < count; q++, k++) {
+        index[k] = Math.min(Math.hypot(x[p] - samples.x[q], y[p] - samples.y[q]) / step + 0.5, fine - 1);
+      }
+    }
+    const re = new Float32Array(this.f.length * n), im = new Float32Array(this.f.length * n);
+    const tr = new Float32Array(fine), ti = new Float32Array(fine);
+    this.f.forEach((f, l) => {
+      const g = body.alongDistance(load.height, f), { re: wr, im: wi } = w[l];
+      for (let j = 0; j < fine; j++) {
+        const first = Math.min(Math.max(Math.floor(j / FINER) - 1, 0), m - 4);
+        const [s0, s1, s2, s3] = cubic(j / FINER - first);
+        tr[j] = s0 * g.re[first] + s1 * g.re[first + 1] + s2 * g.re[first + 2] + s3 * g.re[first + 3];
+        ti[j] = s0 * g.im[first] + s1 * g.im[first + 1] + s2 * g.im[first + 2] + s3 * g.im[first + 3];
+      }
+      for (let p = 0, k = 0, to = l * n; p < n; p++, to++) {
+        let a = 0, b = 0;
+        for (let q = 0; q < count; q++, k++) {
+          const gr = tr[index[k]], gi = ti[index[k]];
+          a += gr * wr[q] - gi * wi[q];
+          b += gr * wi[q] + gi * wr[q];
+        }
+        re[to] = a;
+        im[to] = b;
+      }
+    });
+    return { re, im };
+  }
+
+  /** Upward motion (l, n) in metre of the points of the body's shape: its sides are at rest. */
+  surface() {
+    const { side, points } = this.body.shape, n = points.length / 3, count = side * side;
+    const x = Float64Array.from({ length: count }, (_, k) => points[3 * k] / 1e3);
+    const y = Float64Array.from({ length: count }, (_, k) => points[3 * k + 1] / 1e3);
+    const found = this.places(x, y), re = new Float32Array(this.f.length * n), im = re.slice();
+    for (let l = 0; l < this.f.length; l++) {
+      for (let k = 0; k < count; k++) {
+        re[l * n + k] = -found.re[l * count + k];
+        im[l * n + k] = -found.im[l * count + k];
+      }
+    }
+    return { re, im };
+  }
+
+  /**
+   * Motion (t,) in metre of a place from rest, at equally spaced times (t,) in s from 0.
+   *
+   * u(w) = sum_n h_n(w) Q(w - n w_d), where Q is the transform of the pressure of a focus and h_n
+   * the harmonic n of the path; the load ends with the times, and motion after it is padded for.
+   */
+  waveform(x, y, times) {
+    const { body, load } = this, n = times.length, dt = times[1] - times[0];
+    const coarser = Math.max(1, Math.floor(2e-4 / dt)), step = coarser * dt;
+    const given = Math.ceil(n / coarser), size = powerOfTwo(given + Math.round(TAIL / step));
+    const bins = Math.min(size / 2, Math.floor(HIGHEST * size * step) + 1);
+    const gain = Float64Array.from({ length: given }, (_, k) => gainAt(load, k * step)
+      * rhythmLevel(load, k * step) * (k ? 1 : 0.5));
+    const harmonics = this.harmonicsAt(x, y);
+    const shares = Array.from({ length: bins }, (_, k) => lagrange(body.frequencies, k / (size * step)));
+    const ur = new Float64Array(size * coarser), ui = new Float64Array(size * coarser);
+    const fd = drawingFrequency(load.path), qr = new Float64Array(size), qi = new Float64Array(size);
+    for (const [order, { re, im }] of harmonics) {
+      qr.fill(0);
+      qi.fill(0);
+      for (let k = 0; k < given; k++) {
+        const turn = 2 * Math.PI * ((order * fd * k * step) % 1);
+        qr[k] = gain[k] * Math.cos(turn);
+        qi[k] = gain[k] * Math.sin(turn);
+      }
+      transform(qr, qi);
+      for (let k = 0; k < bins; k++) {
+        const { first, shares: s } = shares[k];
+        const a = s[0] * re[first] + s[1] * re[first + 1] + s[2] * re[first + 2] + s[3] * re[first + 3];
+        const b = s[0] * im[first] + s[1] * im[first + 1] + s[2] * im[first + 2] + s[3] * im[first + 3];
+        ur[k] += a * qr[k] - b * qi[k];
+        ui[k] += a * qi[k] + b * qr[k];
+      }
+    }
+    // The transform of a real signal, from that at positive frequencies.
+    for (let k = 1; k < bins; k++) {
+      ur[ur.length - k] = ur[k];
+      ui[ui.length - k] = -ui[k];
+    }
+    ui[0] = 0;
+    transform(ur, ui, true);
+    return ur.subarray(0, n).map((value) => value / size);
+  }
+
+  /** Harmonics [order, {re, im} (f,)] of the path as a place sees them, at the pack's frequencies. */
+  harmonicsAt(x, y) {
+    const { body, load, lines: { samples } } = this;
+    const key = JSON.stringify([x, y, load.height, load.path, load.foci]);
+    if (body.seen?.key === key) return body.seen.harmonics;
+    const { used } = body.spotShares(load.height), count = samples.x.length;
+    const away = Float64Array.from(samples.x, (own, q) => Math.hypot(x - own, y - samples.y[q]));
+    const bessel = body.besselAt(away, used), nf = body.frequencies.length;
+    const fd = drawingFrequency(load.path);
+    const tones = Math.max(...gainLines(load).map(({ f }) => Math.abs(f)));
+    const most = fd > 0 ? Math.min(Math.floor((HIGHEST + tones) / fd), Math.floor((count - 1) / 2)) : 0;
+    const found = [];
+    for (let order = -most; order <= most; order++) {
+      const { re: wr, im: wi } = pathHarmonic(load, order, count);
+      const re = new Float64Array(used), im = new Float64Array(used);
+      let size = 0;
+      for (let i = 0, k = 0; i < used; i++) {
+        for (let q = 0; q < count; q++, k++) {
+          re[i] += bessel.re[k] * wr[q] - bessel.im[k] * wi[q];
+          im[i] += bessel.re[k] * wi[q] + bessel.im[k] * wr[q];
+        }
+      }
+      const spot = body.spotShares(load.height);
+      for (let i = 0; i < used; i++) {
+        size += Math.hypot(re[i], im[i]) * Math.hypot(spot.re[i], spot.im[i]);
+        [re[i], im[i]] = [re[i] * spot.re[i] - im[i] * spot.im[i], re[i] * spot.im[i] + im[i] * spot.re[i]];
+      }
+      found.push([order, { re, im }, size]);
+    }
+    const largest = Math.max(...found.map(([, , size]) => size)), n = body.k.re.length;
+    const harmonics = found.filter(([, , size]) => size > NEGLIGIBLE * largest).map(([order, h]) => {
+      const re = new Float64Array(nf), im = new Float64Array(nf);
+      for (let f = 0; f < nf; f++) {
+        let a = 0, b = 0;
+        for (let i = 0, from = f * n; i < used; i++, from++) {
+          a += body.G.re[from] * h.re[i] - body.G.im[from] * h.im[i];
+          b += body.G.re[from] * h.im[i] + body.G.im[from] * h.re[i];
+        }
+        re[f] = a;
+        im[f] = b;
+      }
+      return [order, { re, im }];
+    });
+    body.seen = { key, harmonics };
+    return harmonics;
+  }
 }
