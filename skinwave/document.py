@@ -30,9 +30,12 @@ _NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 def page(title: str, *parts: str) -> str:
     """A complete page with its policy; parts that are text are escaped."""
     body = Markup("\n").join(parts)
-    shown: str = (
-        _templates().get_template("page.html").render(title=title, body=body, policy=_policy(body))
-    )
+    return render("page.html", title=title, body=body, policy=_policy(body))
+
+
+def render(template: str, **values: object) -> str:
+    """Render a template of `templates/`; values that are text are escaped."""
+    shown: str = _templates().get_template(template).render(**values)
     return shown
 
 

@@ -1,0 +1,184 @@
+"""Values of the page's controls: of a scene, of the paper's Tactons, and of worked examples.
+
+Keys and units are those of `static/values.js`; what a record leaves out keeps its value there.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from simple_model import Tacton, Trajectory, evenly, joined
+from simple_model.drive import DRIVES
+from simple_model.joined import ROUND, parted
+from simple_model.tacton import SUPERPOSITIONS
+from simple_model.trajectory import SHAPES
+from skinwave.scene import Scene, check_load
+from skinwave.studies.paper15 import tactons
+
+Values = dict[str, Any]
+
+RATIOS = {f"{w1:g}:{w2:g}": (w1, w2) for w1, w2 in SUPERPOSITIONS}
+PROFILES = ("gaussian", "main_lobe")
+QUANTITIES = ("displacement", "velocity", "acceleration")
+CORNERS = {2: "point", 3: "line", 4: "triangle", 5: "square", ROUND + 1: "circle"}
+CLOSE = 1e-8  # m, and share of a period: a recording as close is that of named shapes
+PLAIN = {"am2": 0, "ratio": "1:0", "envelope": 0, "foci": 1, "pulses": "", "phases": "",
+         "paths": "", "polyline": "", "ramp": 0}  # fmt: skip
+
+EXAMPLES: list[dict[str, Any]] = [
+    {
+        "title": "Motion beyond the path",
+        "sentence": "AM at 200 Hz on a point: the kernel ends at the focus, waves carry it on.",
+        "values": PLAIN | {"shape": "point", "size": 0, "am": 200, "x": 15, "y": 0},
+        "tab": "maps",
+    },
+    {
+        "title": "Faster than its waves",
+        "sentence": "A focus that outruns the surface waves of soft skin drags a wake behind it.",
+        "values": PLAIN
+        | {"shape": "circle", "am": 0, "size": 40, "speed": 9, "x": 20, "y": 0},
+        "tab": "3d",
+    },
+    {
+        "title": "Two foci, two paths",
+        "sentence": "Each focus draws a circle of its own; their waves meet between them.",
+        "values": PLAIN
+        | {"am": 140, "foci": 2, "paths": "circle/10/-20/0, circle/10/20/0", "drawn": 100},
+        "tab": "maps",
+    },
+]  # fmt: skip
+
+
+def presets() -> list[dict[str, Any]]:
+    """Return the paper's 15 Tactons: name, title and the values that each sets."""
+    return [
+        {"name": name, "title": title_of(tacton), "values": _tacton_values(tacton)}
+        for name, tacton in tactons()
+    ]
+
+
+def title_of(tacton: Tacton) -> str:
+    """Return a title such as "AM 140 Hz + circle 20 mm at 12 m/s"."""
+    path, am = tacton.trajectory, tacton.am_frequency
+    parts = [f"AM {am:g} Hz"] if am else []
+    if path.size:
+        parts.append(f"{path.shape} {1e3 * path.size:g} mm at {path.speed:g} m/s")
+    words = " + ".join(parts) or "constant focus"
+    return words[:1].upper() + words[1:]
+
+
+def values_of(scene: Scene, body: str) -> Values:
+    """Return the values of the controls that give a scene, probed at its first probe.
+
+    Parameters
+    ----------
+    scene : Scene
+    body : name of its body's record
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    ValueError
+        If the scene has what no control sets.
+    """
+    check_load(scene, "the live page")
+    tacton, path, pressure = scene.tacton, scene.tacton.trajectory, scene.pressure
+    beyond = {
+        "a recorded path": path.shape == "recorded" and not _own_paths(tacton),
+        "several foci on a path that is moved": any(path.centre) and not _is_movable(tacton),
+        "a sampled signal": tacton.signal is not None,
+        "a superposition that is none of the five": tacton.superposition not in RATIOS.values(),
+        f"drive law '{pressure.law}'": pressure.drive not in DRIVES,
+        f"profile = {pressure.profile_name} of the focus": pressure.profile not in PROFILES,
+        "a probe below the surface": not scene.reading.is_on_surface,
+        scene.quantity: scene.quantity not in QUANTITIES,
+    }
+    if said := [what for what, holds in beyond.items() if holds]:
+        raise ValueError(f"The live page has no control for {' or '.join(said)}. Use skinwave run.")
+    x, y = (_rounded(1e3 * value) for value in scene.probes[0])
+    return _tacton_values(tacton) | {
+        "body": body, "height": _rounded(1e3 * pressure.height), "drive": str(pressure.drive),
+        "profile": pressure.profile, "peak": _rounded(pressure.peak_pressure),
+        "modulation": _rounded(100 * pressure.depth_of_modulation),
+        "x": x, "y": y, "quantity": scene.quantity,
+    }  # fmt: skip
+
+
+def _tacton_values(tacton: Tacton) -> Values:
+    path, rhythm = tacton.trajectory, tacton.rhythm
+    even = np.allclose(sorted(tacton.foci), evenly(len(tacton.foci)))
+    phases = "" if even else ", ".join(f"{100 * phase:g}" for phase in tacton.foci)
+    pulses = rhythm.pulses if rhythm else ()
+    return PLAIN | {
+        "amplitude": _rounded(100 * tacton.amplitude), "am": tacton.am_frequency,
+        "am2": tacton.second_am_frequency,
+        "ratio": next(k for k, weights in RATIOS.items() if weights == tacton.superposition),
+        "envelope": tacton.envelope_frequency, "duration": tacton.duration,
+        "foci": len(tacton.foci), "sharing": tacton.sharing, "phases": phases,
+        "pulses": ", ".join(f"{1e3 * on:g}/{1e3 * gap:g}" for on, gap in pulses),
+        "ramp": _rounded(1e3 * rhythm.ramp) if rhythm else 0,
+    } | _path_values(tacton, path)  # fmt: skip
+
+
+def _path_values(tacton: Tacton, path: Trajectory) -> Values:
+    if path.shape == "recorded" or any(path.centre):
+        own = _own_paths(tacton) if path.shape == "recorded" else (path,)
+        return {
+            "paths": ", ".join(map(_path_text, own)),
+            "drawn": _rounded(tacton.drawing_frequency),
+        }
+    if path.shape == "polyline":
+        points = (f"{1e3 * x:.10g}/{1e3 * y:.10g}" for x, y in path.points)
+        return {"shape": "polyline", "polyline": ", ".join(points), "speed": path.speed,
+                "sweep": path.sweep}  # fmt: skip
+    return {"shape": path.shape if path.size else "point", "size": _rounded(1e3 * path.size),
+            "speed": path.speed, "sweep": path.sweep}  # fmt: skip
+
+
+def _is_movable(tacton: Tacton) -> bool:
+    """Whether a path that is not centred is one that a focus may have for its own."""
+    path = tacton.trajectory
+    swept = path.shape == "line" and path.sweep != "there_and_back"
+    return len(tacton.foci) == 1 and path.shape in SHAPES and path.size > 0 and not swept
+
+
+def _path_text(path: Trajectory) -> str:
+    numbers = (round(1e3 * value, 6) + 0.0 for value in (path.size, *path.centre))
+    return "/".join([path.shape, *(f"{value:.10g}" for value in numbers)])
+
+
+def _own_paths(tacton: Tacton) -> tuple[Trajectory, ...]:
+    """The named shapes that a Tacton's recording joins, one for each focus; () if it is another."""
+    path, n = tacton.trajectory, tacton.n_paths
+    if path.shape != "recorded" or path.levels or path.hold or n != len(tacton.foci):
+        return ()
+    parts = parted(path, n)
+    if any(len(part) not in CORNERS for part in parts):
+        return ()
+    try:
+        paths = tuple(map(_shape_of, parts))
+        same = joined(paths, tacton.drawing_frequency)
+    except ValueError:
+        return ()
+    near = len(same.times) == len(path.times) and (
+        np.allclose(same.outline, path.outline, rtol=0, atol=CLOSE)
+        and np.allclose(same.times, path.times, rtol=0, atol=CLOSE * path.times[-1])
+    )
+    return paths if near else ()
+
+
+def _shape_of(corners: np.ndarray) -> Trajectory:
+    """The named shape of corners (k, 2) in metre, the first of them again at the end."""
+    shape = CORNERS[len(corners)]
+    x, y = corners[:-1].mean(axis=0)
+    side = float(np.linalg.norm(corners[1] - corners[0]))
+    sizes = {"point": 0.0, "circle": 2 * float(np.hypot(*(corners[0] - [x, y])))}
+    centre = (round(float(x), 9), round(float(y), 9))
+    return Trajectory(shape=shape, size=round(sizes.get(shape, side), 9), centre=centre)
+
+
+def _rounded(value: float) -> float:
+    return round(float(value), 6)
