@@ -12,6 +12,7 @@ from skinwave.commands import (
     film,
     fit,
     infer,
+    live,
     measured,
     mesh,
     plan,
@@ -31,7 +32,7 @@ from skinwave.commands import map as map_command
 
 MODULES = (
     run, compare, tradeoff, relax, dispersion, map_command, plan, sweep, plot, mesh, convert,
-    verify, report, film, web, rerun, same, doctor, cache,
+    verify, report, film, live, web, rerun, same, doctor, cache,
     measured, fit, infer,
     validate,
 )  # fmt: skip

@@ -25,6 +25,7 @@ SPREADS = (1.01, 1.5, 4.0, 100.0)  # of a factor of losses about the ratio of lo
 SAME = 1e-5  # relative: a value as close to the body's own changes nothing
 FREQUENCIES = np.linspace(10.0, 650.0, 33)  # Hz of dispersion curves
 MODES = 4
+DEEPEST = 0.04  # m that a page draws of a half-space
 SIDES = ("clamped", "absorbing", "free")
 SUPPORTS = ("clamped", "simply")
 RANGES = {  # low, high, step
@@ -87,6 +88,7 @@ def record_of(
     extent = [500 * body.width, 500 * body.height] if kind.is_bounded and not infinite else None
     return {
         "name": name or body_name(body), "title": title or title_of(body), "kind": body.kind,
+        "depth_mm": 1e3 * body.depth if isfinite(body.depth) else 1e3 * DEEPEST,
         "is_skin": body.is_skin, "is_infinite": infinite,
         "thickness_mm": 1e3 * body.depth if kind.is_plate else None, "extent_mm": extent,
         "toml": toml_of(body), "lowest_height_mm": pack.get("lowest_height_mm", 1e3 * LOWEST),

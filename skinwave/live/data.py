@@ -1,0 +1,88 @@
+"""The data of a page: records of its bodies, values to begin with, presets, examples, self-test."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from skinwave.effort import Progress, silent
+from skinwave.live import values
+from skinwave.live.packs import pack_of
+from skinwave.live.records import record_of, title_of
+from skinwave.live.selftest import selftest
+from skinwave.scene import BODIES, Body, Scene, body_name
+
+BODIES_SHOWN = ("skin-slab", "paper-sheet", "palm")  # of a page without scenes
+
+
+def data_of(
+    scenes: Sequence[Scene] = (), progress: Progress = silent, *, test: bool = True
+) -> dict[str, Any]:
+    """Return the data of a page.
+
+    Parameters
+    ----------
+    scenes : whose bodies and Tactons the page has; without any, three preset bodies
+    progress : told of each body's phases
+    test : whether to include the data of the self-test
+
+    Returns
+    -------
+    dict for JSON
+
+    Raises
+    ------
+    ValueError
+        If a scene has what no control of the page sets, or a body has no pack.
+    """
+    names = named([scene.body for scene in scenes] or [BODIES[name] for name in BODIES_SHOWN])
+    own = [values.values_of(scene, names[scene.body]) for scene in scenes]
+    records, tests = [], []
+    for number, (body, name) in enumerate(names.items()):
+        report = partial(_in_part, progress, title_of(body), number, len(names))
+        records.append(record_of(body, pack_of(body, report), name))
+        if test:
+            tests += selftest(body, name, most=-(-20 // len(names)))
+    presets = [
+        {"name": f"scene-{k}", "title": scene.name, "values": each}
+        for k, (scene, each) in enumerate(zip(scenes, own, strict=True), 1)
+    ]
+    return {
+        "bodies": records, "start": own[0] if own else {"body": records[0]["name"]},
+        "presets": presets + values.presets(), "examples": values.EXAMPLES, "selftest": tests,
+        "api": None,
+    }  # fmt: skip
+
+
+def named(bodies: Sequence[Body]) -> dict[Body, str]:
+    """Return each of the bodies once, with a name of its own."""
+    found: dict[Body, str] = {}
+    for body in bodies:
+        if body in found:
+            continue
+        name, taken = body_name(body), set(found.values())
+        numbers = range(2, len(bodies) + 2)
+        found[body] = next(n for n in (name, *(f"{name}-{k}" for k in numbers)) if n not in taken)
+    return found
+
+
+def read_scene(path: Path) -> Scene:
+    """Read a scene for the page, which is named after its file if it has no name.
+
+    Raises
+    ------
+    ValueError
+        If the file is no scene.
+    """
+    from skinwave.scene_file import read
+
+    scene = read(path)
+    return scene if scene.name != Scene.name else replace(scene, name=path.stem)
+
+
+def _in_part(
+    progress: Progress, title: str, number: int, count: int, phase: str, fraction: float
+) -> None:
+    """Report the progress of one body of several."""
+    progress(f"{title}: {phase}" if count > 1 else phase, fraction)
