@@ -4,7 +4,8 @@
 const TAU = 2 * Math.PI;
 const FEWEST_KNOTS = 132; // positions along a closed path: all harmonics below 66 f_d
 const KNOTS_PER_WIDTH = 8; // of the focal spot
-const JUMP_RATE = 25000; // positions a second of a path that jumps
+const JUMP_RATE = 25000; // positions a second of a path that jumps; at most, of joined paths
+const ROUND = 132; // straight parts of a circle that is joined to other paths (simple_model.joined)
 const PHASES = 8; // of each sinusoid; more than twice the degree of a drive law
 const ROOT3 = Math.sqrt(3);
 const CORNERS = {
@@ -102,23 +103,50 @@ function arc(corners) {
   return along;
 }
 
+const sidesOf = ({ shape }) => ({ point: 1, line: 2, triangle: 3, square: 4, circle: ROUND })[shape];
+
+/**
+ * Corners {points: [[x, y]] in metre, times in s} of foci on paths of their own, joined: one period of
+ * each path after the other, `drawn` times a second each. Foci at even phases of it are on one each.
+ */
+export function joinedCorners({ paths, drawn }) {
+  const points = [], times = [];
+  paths.forEach((path, before) => {
+    const at = positionOf({ ...path, speed: 1 }), sides = sidesOf(path);
+    for (let k = 0; k <= sides; k++) {
+      points.push(at(k / sides));
+      times.push((before + k / sides) / drawn);
+    }
+  });
+  return { points, times };
+}
+
 /** Length in metre of one period of a path. */
 export function pathLength(path) {
   if (path.shape === "point") return 0;
+  if (path.shape === "joined") return arc(joinedCorners(path).points).pop();
   if (path.shape === "circle") return Math.PI * path.size;
   const { corners, runsOn } = outline(path);
   const along = arc(corners);
   return along[along.length - 1] * (runsOn ? 1 : 2);
 }
 
-/** Periods of a path per second, Hz; 0 if the focus does not move. */
+/** Periods of a path per second, Hz; 0 if the focus does not move. Of joined paths, of all together. */
 export function drawingFrequency(path) {
+  if (path.shape === "joined") return path.drawn / path.paths.length;
   const length = pathLength(path);
   return length > 0 ? path.speed / length : 0;
 }
 
 /** Position [x, y] in metre as a function of the fraction 0..1 of the period. */
 export function positionOf(path) {
+  if (path.shape === "joined") {
+    const each = path.paths.map(polygonOf);
+    return (p) => {
+      const turn = Math.min(Math.floor(p * each.length), each.length - 1);
+      return each[turn](p * each.length - turn);
+    };
+  }
   const [cx, cy] = path.centre || [0, 0];
   if (path.shape === "point" || pathLength(path) === 0) {
     const [x, y] = path.shape === "polyline" ? path.points[0] : [0, 0];
@@ -137,6 +165,25 @@ export function positionOf(path) {
   };
 }
 
+/** Position on a named shape as a function of the fraction of its period, a circle as a polygon. */
+function polygonOf(path) {
+  const at = positionOf({ ...path, speed: 1 });
+  if (path.shape !== "circle") return at;
+  return (p) => {
+    const k = Math.min(Math.floor(p * ROUND), ROUND - 1), part = p * ROUND - k;
+    const [[x0, y0], [x1, y1]] = [at(k / ROUND), at((k + 1) / ROUND)];
+    return [x0 + part * (x1 - x0), y0 + part * (y1 - y0)];
+  };
+}
+
+/** Fractions of the period at which a focus jumps. */
+function jumpPhases(path) {
+  if (path.shape !== "joined") return jumps(path) ? [0] : [];
+  const starts = path.paths.map((own) => positionOf({ ...own, speed: 1 })(0)), n = starts.length;
+  const moved = ([x, y], [x0, y0]) => Math.max(Math.abs(x - x0), Math.abs(y - y0)) > 1e-7;
+  return starts.map((at, k) => (moved(at, starts[(k + n - 1) % n]) ? k / n : -1)).filter((p) => p >= 0);
+}
+
 /** Whether the focus jumps at the end of each period. */
 export function jumps(path) {
   if (!["line", "polyline"].includes(path.shape) || drawingFrequency(path) === 0) return false;
@@ -150,11 +197,28 @@ export function pathSamples(load) {
   if (fd > 0) {
     const enough = KNOTS_PER_WIDTH * pathLength(path) / spotWidth(load.height);
     count = 12 * Math.ceil(Math.max(enough, FEWEST_KNOTS) / 12);
-    if (jumps(path)) count = Math.ceil(Math.max(enough, FEWEST_KNOTS, JUMP_RATE / fd));
+    if (jumps(path)) count = fastLength(Math.ceil(Math.max(enough, FEWEST_KNOTS, JUMP_RATE / fd)));
+    if (path.shape === "joined") count = joinedCount(load);
   }
   const at = positionOf(path), x = new Float64Array(count), y = new Float64Array(count);
-  for (let q = 0; q < count; q++) [x[q], y[q]] = at((q + 0.5) / count);
+  for (let q = 0; q < count; q++) [x[q], y[q]] = at(fd > 0 ? (q + 0.5) / count : 0);
   return { x, y };
+}
+
+/** Smallest number from a count on with no prime factor above 11, as simple_model counts cells. */
+function fastLength(count) {
+  let rest = count;
+  for (const factor of [2, 3, 5, 7, 11]) while (rest % factor === 0) rest /= factor;
+  return rest === 1 ? count : fastLength(count + 1);
+}
+
+/** Number of cells of joined paths: corners and jumps fall between them. */
+function joinedCount({ path, height }) {
+  const { paths } = path, n = paths.length, sides = paths.map(sidesOf);
+  const longest = Math.max(...paths.map((own) => pathLength({ shape: "joined", paths: [own], drawn: 1 })));
+  const whole = sides.every((each) => each === sides[0]) ? n * sides[0] : 12 * n;
+  const enough = Math.min(KNOTS_PER_WIDTH * n * longest / spotWidth(height), JUMP_RATE * n / path.drawn);
+  return whole * Math.ceil(Math.max(enough, FEWEST_KNOTS) / whole);
 }
 
 const tones = (load) => [load.am, load.am2, load.envelope];
@@ -239,7 +303,10 @@ export function pathHarmonic(load, n, count) {
     turn += step;
     if (turn >= whole) turn -= whole;
   }
-  if (jumps(load.path)) for (const each of [re, im]) spreadJump(each);
+  for (const phase of jumpPhases(load.path)) {
+    const after = Math.round(phase * count);
+    for (const each of [re, im]) spreadJump(each, (after + count - 1) % count, after);
+  }
   return { re, im };
 }
 
@@ -284,17 +351,15 @@ export function loadLines(load, { threshold = 3e-4, lowest = 1e-6, highest = 100
     }
     return { re, im };
   });
-  return { f: Float64Array.from(lines, (line) => line.f), w, samples, parts: lines.map((line) => line.parts) };
+  const f = Float64Array.from(lines, (line) => line.f);
+  return { f, w, samples, parts: lines.map((line) => line.parts) };
 }
 
-/**
- * Give the cells on both sides of the jump, the last and the first, the moments of a jump between
- * them (simple_model.path_cells).
- */
-function spreadJump(weights) {
-  const last = weights.length - 1, share = (weights[last] - weights[0]) / 24;
-  weights[0] += share;
-  weights[last] -= share;
+/** Give the cells before and after a jump its moments (simple_model.path_cells). */
+function spreadJump(weights, before, after) {
+  const share = (weights[before] - weights[after]) / 24;
+  weights[after] += share;
+  weights[before] -= share;
 }
 
 /** Largest amplitude, at about nine points of the path, of each harmonic of the focal spot. */
@@ -307,7 +372,9 @@ function harmonicStrengths(load, { x, y }) {
       values[q] = spot((x[p] - x[q]) ** 2 + (y[p] - y[q]) ** 2, load.height, load.profile);
     }
     const found = realFourier(values);
-    for (let n = 0; n < count; n++) strongest[n] = Math.max(strongest[n], Math.hypot(found.re[n], found.im[n]) / count);
+    for (let n = 0; n < count; n++) {
+      strongest[n] = Math.max(strongest[n], Math.hypot(found.re[n], found.im[n]) / count);
+    }
   }
   return strongest;
 }
