@@ -73,6 +73,12 @@ def path_cells(pressure: MovingPressure) -> PathCells:
         phases, shares = cells(jumps, 0.0, 1 / count, count)
         times, gain = phases / (frequency or 1.0), np.ones(len(phases))
         whole = replace(pressure, tacton=replace(tacton, foci=(0.0,)))
+    if tacton.trajectory.is_static and not of_tacton:  # foci that rest have places of their own
+        at, n = tacton.trajectory.at_phase(np.mod(tacton.foci, 1.0)), len(tacton.foci)
+        return PathCells(
+            positions=at, cells=sparse.csr_array(np.full((1, n), 1 / n)), frequency=frequency,
+            of_tacton=False,
+        )  # fmt: skip
     positions, mixed = moved_load(whole, times, gain)
     mixed = (shares @ mixed).tocsr()
     return PathCells(positions=positions, cells=mixed, frequency=frequency, of_tacton=of_tacton)

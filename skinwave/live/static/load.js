@@ -143,8 +143,8 @@ export function positionOf(path) {
   if (path.shape === "joined") {
     const each = path.paths.map(polygonOf);
     return (p) => {
-      const turn = Math.min(Math.floor(p * each.length), each.length - 1);
-      return each[turn](p * each.length - turn);
+      const turn = Math.floor(p * each.length + 1e-9);
+      return each[turn % each.length](Math.max(p * each.length - turn, 0));
     };
   }
   const [cx, cy] = path.centre || [0, 0];
@@ -193,7 +193,7 @@ export function jumps(path) {
 /** Positions {x, y} in metre in the middles of equal cells of one period. */
 export function pathSamples(load) {
   const { path } = load, fd = drawingFrequency(path);
-  let count = 1;
+  let count = load.foci.length; // foci that rest have places of their own
   if (fd > 0) {
     const enough = KNOTS_PER_WIDTH * pathLength(path) / spotWidth(load.height);
     count = 12 * Math.ceil(Math.max(enough, FEWEST_KNOTS) / 12);
@@ -201,7 +201,7 @@ export function pathSamples(load) {
     if (path.shape === "joined") count = joinedCount(load);
   }
   const at = positionOf(path), x = new Float64Array(count), y = new Float64Array(count);
-  for (let q = 0; q < count; q++) [x[q], y[q]] = at(fd > 0 ? (q + 0.5) / count : 0);
+  for (let q = 0; q < count; q++) [x[q], y[q]] = at(fd > 0 ? (q + 0.5) / count : load.foci[q] % 1);
   return { x, y };
 }
 
@@ -233,7 +233,7 @@ function modulationAt(load, phases) {
 export function rhythmLevel(load, t) {
   if (!load.pulses || !load.pulses.length) return 1;
   const period = load.pulses.reduce((sum, [on, gap]) => sum + on + gap, 0);
-  let into = (t / period + 1e-12) % 1 * period;
+  let into = ((t / period + 1e-12) % 1 + 1) % 1 * period;
   for (const [on, gap] of load.pulses) {
     if (into < on) return load.ramp > 0 ? Math.min(1, into / load.ramp, (on - into) / load.ramp) : 1;
     if (into < on + gap) return 0;
@@ -249,33 +249,43 @@ export function gainAt(load, t) {
     load.depth);
 }
 
+/** Factor on the pressure of a level 0..1 of the amplitude. */
+export const levelFactor = (load, level) => DRIVES[load.drive](level, 1, load.depth);
+
 /** Lines [{f, re, im}] in Hz of either sign and Pa of the pressure at each focus. */
 export function gainLines(load) {
   const fs = tones(load), counts = fs.map((f) => (f > 0 ? PHASES : 1));
+  const strides = [counts[1] * counts[2], counts[2], 1], total = counts[0] * strides[0];
+  const places = (k) => counts.map((count, axis) => Math.floor(k / strides[axis]) % count);
   const full = load.peak * relativeIntensity(load.height) / load.foci.length;
-  const values = [], total = counts[0] * counts[1] * counts[2];
-  const split = (k) => [Math.floor(k / (counts[1] * counts[2])), Math.floor(k / counts[2]) % counts[1],
-    k % counts[2]];
-  for (let k = 0; k < total; k++) {
-    const phases = split(k).map((j, axis) => TAU * j / counts[axis]);
-    values.push(full * DRIVES[load.drive](load.amplitude, modulationAt(load, phases), load.depth));
-  }
-  const found = [];
-  for (let k = 0; k < total; k++) {
-    const orders = split(k).map((n, axis) => (n >= counts[axis] / 2 && n > 0 ? n - counts[axis] : n));
-    let re = 0, im = 0;
-    for (let j = 0; j < total; j++) {
-      const at = split(j);
-      let turn = 0;
-      for (let axis = 0; axis < 3; axis++) turn += orders[axis] * at[axis] / counts[axis];
-      re += values[j] * Math.cos(TAU * turn);
-      im -= values[j] * Math.sin(TAU * turn);
-    }
-    const f = orders[0] * fs[0] + orders[1] * fs[1] + orders[2] * fs[2];
-    found.push({ f, re: re / total, im: im / total });
-  }
+  let re = Float64Array.from({ length: total }, (_, k) => {
+    const phases = places(k).map((j, axis) => TAU * j / counts[axis]);
+    return full / total * DRIVES[load.drive](load.amplitude, modulationAt(load, phases), load.depth);
+  });
+  let im = new Float64Array(total);
+  counts.forEach((count, axis) => {
+    if (count > 1) [re, im] = transformed(re, im, count, strides[axis]);
+  });
+  const found = Array.from(re, (value, k) => {
+    const orders = places(k).map((n, axis) => (n >= counts[axis] / 2 && n > 0 ? n - counts[axis] : n));
+    return { f: orders.reduce((sum, n, axis) => sum + n * fs[axis], 0), re: value, im: im[k], orders };
+  });
   const largest = Math.max(...found.map((c) => Math.hypot(c.re, c.im)));
   return found.filter((c) => Math.hypot(c.re, c.im) > 1e-12 * largest);
+}
+
+/** Discrete Fourier transform along the axis of a table that has a count and a stride. */
+function transformed(re, im, count, stride) {
+  const { cos, sin } = turnsOf(count), a = new Float64Array(re.length), b = new Float64Array(re.length);
+  for (let k = 0; k < re.length; k++) {
+    const n = Math.floor(k / stride) % count, first = k - n * stride;
+    for (let j = 0; j < count; j++) {
+      const c = cos[n * j % count], s = sin[n * j % count], from = first + j * stride;
+      a[k] += re[from] * c + im[from] * s;
+      b[k] += im[from] * c - re[from] * s;
+    }
+  }
+  return [a, b];
 }
 
 /** Array factor [re, im] of all foci on harmonic n of the path. */
@@ -320,7 +330,7 @@ export function loadLines(load, { threshold = 3e-4, lowest = 1e-6, highest = 100
   samples = pathSamples(load) } = {}) {
   const count = samples.x.length, fd = drawingFrequency(load.path), gain = gainLines(load);
   const shares = harmonicStrengths(load, samples), byFrequency = new Map();
-  const last = Math.floor((count - 1) / 2);
+  const last = fd > 0 ? Math.floor((count - 1) / 2) : 0;
   for (let n = -last; n <= last; n++) {
     const factor = Math.hypot(...arrayFactor(load, n)) * shares[(n + count) % count];
     if (factor < 1e-12) continue;
