@@ -9,7 +9,6 @@ axe-playwright-python are missing, it says so and checks links alone.
 import sys
 from collections.abc import Iterator
 from html.parser import HTMLParser
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
@@ -23,11 +22,10 @@ FETCHED = {
     ("link", "href"),
     ("source", "src"),
 }
-OPENED = ("index", "moving-waves", "turning-waves", "tutorial/1-first-scene", "how-to",
+OPENED = ("index", "moving-waves", "tutorial/1-first-scene", "how-to",
           "explanation/load", "reference/commands", "reference/scene-keys",
           "reference/api-skinwave", "reference/verification", "gallery/index",
           "gallery/11_fingertip_with_bone")  # fmt: skip
-LARGEST = 10e6  # bytes of a page that is a program of its own
 SERIOUS = ("serious", "critical")
 
 
@@ -101,7 +99,6 @@ def inaccessible(folder: Path) -> Iterator[str]:
                     yield f"{name}: {each['id']} at {where}, {len(each['nodes'])} in all"
             page.close()
         yield from unmoved(context.new_page(), folder)
-        yield from unturned(context.new_page(), folder)
         browser.close()
 
 
@@ -124,32 +121,6 @@ def unmoved(page: Any, folder: Path) -> Iterator[str]:
     now = page.inner_text("#found"), page.inner_text("#wave-caption")
     if said[0] == now[0] or said[1] == now[1]:
         yield f"moving-waves: neither speed nor point may be without effect, and it says {now}"
-
-
-def unturned(page: Any, folder: Path) -> Iterator[str]:
-    """Sentences on what neither moves nor turns on the page with the scene."""
-    path = folder / "turning-waves.html"
-    if (size := path.stat().st_size) > LARGEST:
-        yield f"turning-waves: {size / 1e6:.1f} MB exceed {LARGEST / 1e6:.0f} MB"
-    page.goto(path.as_uri())
-    page.wait_for_function("document.getElementById('scene').dataset.drawn")
-    page.wait_for_timeout(500)
-    scene = page.locator("#scene")
-    pictures = {"at rest": scene.screenshot()}
-    for what, key in (("#time", "ArrowRight"), ("#speed", "ArrowLeft"), ("#am", "Space"),
-                      ("#larger", "ArrowRight"), ("#scene", "ArrowLeft"), ("#scene", "+"),
-                      ("#above", "Enter"), ("#home", "Enter")):  # fmt: skip
-        page.focus(what)
-        page.keyboard.press(key)
-        page.evaluate("document.activeElement.blur()")
-        page.wait_for_timeout(200)
-        pictures[f"{what} {key}"] = scene.screenshot()
-    page.get_by_role("button", name="Play").click()
-    page.wait_for_timeout(1000)
-    pictures["Play"] = scene.screenshot()
-    for (_, before), (what, after) in pairwise(pictures.items()):
-        if before == after:
-            yield f"turning-waves: {what} is without effect"
 
 
 def main() -> int:

@@ -1,4 +1,4 @@
-"""Pages on which waves move in a browser without Python, maps and a scene: recorded fields.
+"""A page on which waves move in a browser without Python, by recorded fields.
 
 Of each Tacton the page has the complex amplitudes of the strongest lines of the load, at every
 place of a grid, as the point kernel has them and as the skin slab moves: Re sum a exp(2 pi i f t)
@@ -20,7 +20,7 @@ SPEEDS = (2.0, 4.0, 6.0, 8.0, 12.0)  # m/s
 AM = (0.0, 140.0)  # Hz
 SIZE, REACH, STEP = 0.020, 0.030, 1.2e-3  # m, diameter of the path; the grid and its step
 MOST, FAINT = 10, 0.02  # lines of a Tacton, and what they are at least of the strongest
-PAGES = "moving-waves.html", "turning-waves.html"
+PAGE = "moving-waves.html"
 TEMPLATES = Path(__file__).parents[1] / "_templates"
 
 
@@ -71,29 +71,23 @@ def thresholds() -> dict[str, list[float]]:
     return {"f": [float(f"{x:.5g}") for x in f], "u": [float(f"{x:.5g}") for x in threshold(f)]}
 
 
-def pages(tactons: list[dict[str, Any]]) -> Iterator[tuple[str, str]]:
-    """Name and text of each page of these recordings."""
-    from turning import viewer
-
-    first = tactons[0]
+def page(tactons: list[dict[str, Any]]) -> str:
+    """Text of the page of these recordings."""
     data = json.dumps({"tactons": tactons, "threshold": thresholds()})
     parts = {
         "__STYLE__": (TEMPLATES / "recorded.css").read_text("utf-8"),
         "__SHARED__": (TEMPLATES / "recorded.js").read_text("utf-8").replace("__RECORDED__", data),
-        "__VIEWER__": viewer(first["side"], first["reach"], first["size"]),
     }
-    for name in PAGES:
-        text = (TEMPLATES / name).read_text("utf-8")
-        for key, part in parts.items():
-            text = text.replace(key, part)
-        yield name, text
+    text = (TEMPLATES / PAGE).read_text("utf-8")
+    for key, part in parts.items():
+        text = text.replace(key, part)
+    return text
 
 
 def write(app: "Sphinx", exception: Exception | None) -> None:
-    """Write the pages beside the others."""
+    """Write the page beside the others."""
     if exception is None and app.builder.format == "html":
-        for name, text in pages([*recordings()]):
-            (Path(app.outdir) / name).write_text(text, "utf-8")
+        (Path(app.outdir) / PAGE).write_text(page([*recordings()]), "utf-8")
 
 
 def setup(app: "Sphinx") -> dict[str, bool]:

@@ -162,7 +162,7 @@ def prepared(view: View, cut: bool = False) -> Panel:
     """A view, ready to be placed and drawn."""
     import pyvista as pv
 
-    nodes, triangles = _skin(view, cut)
+    nodes, triangles = outer_surface(view, cut)
     skin = pv.PolyData.from_regular_faces(1e3 * view.points[nodes], triangles)
     skin["motion"] = np.zeros(len(nodes), np.float32)
     path, probes = path_points(view.scene), view.scene.probe_points
@@ -181,7 +181,7 @@ def prepared(view: View, cut: bool = False) -> Panel:
     )  # fmt: skip
 
 
-def _skin(view: View, cut: bool) -> tuple[Ints, Ints]:
+def outer_surface(view: View, cut: bool = False) -> tuple[Ints, Ints]:
     """Points (n,) of a view that are seen from outside, and triangles (k, 3) of them."""
     if not len(view.tets):
         return view.surface, view.triangles

@@ -1,83 +1,81 @@
-"""A view that can be turned in a browser: one page that asks no network for anything (vtk.js).
+"""A view to turn in a browser: one page without requests, with the code of the live page."""
 
-The exporter starts a server of its own, and so it runs in a process of its own.
-"""
-
-import asyncio
-import sys
-import tempfile
-from importlib.util import find_spec
-from pathlib import Path
+import base64
+from importlib import resources
 from typing import Any
 
-from meshes import subprocess_call
-from skinwave.pictures.maps import SIGNED
-from skinwave.pictures.render import add_marks, look, place, prepared, scale
-from skinwave.pictures.views import View, load, save
+import numpy as np
+from markupsafe import Markup
 
-PATIENCE = 120.0  # s
-ICON = "https://kitware.github.io/vtk-js/icon/favicon-"  # which the page would load of the network
-EXTRA = "the extra [web], trame-pyvista, is not installed"
+from meshes.tetmesh import Floats
+from simple_model import MovingPressure
+from simple_model.load_spectrum import Complex
+from skinwave.document import render
+from skinwave.live.page import bundle, encoded
+from skinwave.live.radial import quantised
+from skinwave.pictures.figures import label
+from skinwave.pictures.render import outer_surface
+from skinwave.pictures.views import View
+
+NEGLIGIBLE = 3e-3  # of the strongest line: weaker ones are left out
+MOST_LINES = 32
+DRAWN_POINTS = 121  # of each path
 
 
-def turntable(view: View, frame: int) -> str | None:
-    """The page of a view at a frame; None if what exports it is not installed, or fails."""
-    with tempfile.TemporaryDirectory() as folder:
-        kept = Path(folder, "view.npz")
-        save(kept, view)
-        return exported(Path(__file__), kept, frame)
+def turntable(view: View, frame: int) -> str:
+    """Return a page that shows a view from any side, moving, from one of its frames on."""
+    nodes, triangles = outer_surface(view)
+    frequencies, upwards = motion_lines(view.motion[:, nodes, 2], view.period)
+    paths, foci = focus_places(view.scene.pressure, view.times)
+    data = {
+        "title": label(view.column), "unit": view.unit, "period": view.period,
+        "time": float(view.times[frame]), "frequencies": frequencies.tolist(),
+        "motion": quantised(upwards), "points": _binary(1e3 * view.points[nodes], "<f4"),
+        "triangles": _binary(triangles, "<u4"), "path": paths.tolist(), "foci": foci.tolist(),
+        "probes": view.scene.probe_points[:, :2].tolist(),
+    }  # fmt: skip
+    static = resources.files("skinwave.live") / "static"
+    return render(
+        "turntable.html", title=data["title"], data=Markup(encoded(data)),
+        script=Markup("\n" + bundle(static, "turntable.js")),
+    )  # fmt: skip
 
 
-def exported(script: Path, *given: object) -> str | None:
-    """The page that a script exports to the last of its arguments, after those given; None if
-    what exports it is not installed, or fails.
+def motion_lines(frames: Any, period: float) -> tuple[Floats, Complex]:
+    """Return the lines of motion that repeats.
+
+    Parameters
+    ----------
+    frames : (t, n) float, at equally spaced times through the period
+    period : s
+
+    Returns
+    -------
+    (l,) Hz, ascending, and (l, n) complex amplitudes in the unit of the frames, of the strongest
+    lines above 0 Hz: the motion is the real part of their sum times exp(2 pi i f t)
     """
-    if find_spec("trame_pyvista") is None:
-        return None
-    with tempfile.TemporaryDirectory() as folder:
-        page = Path(folder, "page.html")
-        # An existing folder keeps the exporter from asking a network for what it does not need.
-        quiet = {"VTK_WASM_DIR_OVERRIDE": folder}
-        try:
-            subprocess_call.run(
-                script, *given, page, folder=folder, timeout=PATIENCE, environment=quiet
-            )
-        except (ValueError, TimeoutError):
-            return None
-        return page.read_text(encoding="utf-8").replace(ICON, "data:,")
+    count = len(frames)
+    lines = 2 / count * np.fft.rfft(np.asarray(frames, np.float64), axis=0)
+    if count % 2 == 0:
+        lines[-1] /= 2
+    strength = np.abs(lines).max(axis=1)
+    strength[0] = 0.0
+    strongest = np.argsort(-strength)[:MOST_LINES]
+    kept = np.sort(strongest[strength[strongest] > NEGLIGIBLE * strength.max()])
+    return kept / period, lines[kept]
 
 
-def export(plotter: Any, path: str) -> None:
-    """Write the page of a plotter, which it closes; in a process of its own."""
-    import pyvista as pv
-    from trame_pyvista.jupyter import launch_server
-
-    async def ready() -> None:
-        await launch_server(pv.global_theme.trame.jupyter_server_name).ready
-
-    asyncio.run(ready())
-    plotter.trame.export_html(path)
-    plotter.close()
-
-
-def _drawn(view: View, frame: int) -> Any:
-    import pyvista as pv
-
-    plotter = pv.Plotter(off_screen=True, lighting="none", window_size=(800, 500))
-    plotter.set_background("white")
-    (_, limit), _ = scale([view])
-    panel = prepared(view)
-    place([panel], frame, limit)
-    plotter.add_mesh(
-        panel.skin, scalars="motion", cmap=SIGNED, clim=(-limit, limit), show_scalar_bar=False
-    )
-    add_marks(plotter, panel, "black")
-    look(plotter, "tilted", [panel])
-    plotter.camera.parallel_projection = False  # which the page does not take over
-    plotter.reset_camera()
-    plotter.camera.zoom(1.3)
-    return plotter
+def focus_places(pressure: MovingPressure, times: Floats) -> tuple[Floats, Floats]:
+    """Return the paths (m, q, 2) and the foci (t, k, 2) at times (t,), in metre."""
+    tacton, path = pressure.tacton, pressure.tacton.trajectory
+    n = tacton.n_paths
+    # From one path's end to the next one's beginning there is no line.
+    along = (np.arange(n)[:, None] + np.linspace(0, 1 - 1e-6, DRAWN_POINTS)) / n
+    paths = path.at_phase(along) if tacton.drawing_frequency else np.zeros((0, 0, 2))
+    within = np.mod(tacton.drawing_frequency * times, 1.0) / n  # each stays on its own path
+    foci = [path.at_phase((within + phase) % 1) for phase in tacton.foci]
+    return paths, np.stack(foci, axis=1)
 
 
-if __name__ == "__main__":
-    export(_drawn(load(Path(sys.argv[1])), int(sys.argv[2])), sys.argv[3])
+def _binary(values: Any, kind: str) -> str:
+    return base64.b64encode(np.ascontiguousarray(values, kind).tobytes()).decode()

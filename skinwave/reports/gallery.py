@@ -19,7 +19,7 @@ from skinwave.pictures.films import film, lasts, seam
 from skinwave.pictures.levels import levels_figure, strongest_probe
 from skinwave.pictures.renderer import renderer
 from skinwave.pictures.styles import Style
-from skinwave.pictures.turntable import EXTRA, turntable
+from skinwave.pictures.turntable import turntable
 from skinwave.pictures.views import View
 from skinwave.reports.album import Album
 from skinwave.run import Run
@@ -55,10 +55,13 @@ def pictures(album: Album, gallery: Gallery, progress: Progress) -> list[str]:
     views = list(album.views.values())
     if not views:
         return [document.paragraph(NO_VIEWS)]
-    said = f"Views in three dimensions and the film are left out: {renderer().said}."
+    said = f"Pictures in three dimensions and the film are left out: {renderer().said}."
+    own = _own(album, views)
+    frame = int(np.abs(own.pushed).max(axis=1).argmax())
     parts: list[str] = [document.paragraph(said)]
     if renderer().found:
-        parts = _spatial(album, views, gallery, progress)
+        parts = _spatial(own, frame, views, gallery, progress)
+    parts.append(_turnable(own, frame))
     for name, draw, caption in flat(views, gallery.style):
         progress(f"draw {name}", 0.0)
         parts.append(gallery.figure(name, draw(), caption))
@@ -66,13 +69,11 @@ def pictures(album: Album, gallery: Gallery, progress: Progress) -> list[str]:
 
 
 def _spatial(
-    album: Album, views: Sequence[View], gallery: Gallery, progress: Progress
+    own: View, frame: int, views: Sequence[View], gallery: Gallery, progress: Progress
 ) -> list[str]:
-    """Views in three dimensions, the film and what can be turned."""
+    """Pictures in three dimensions at a frame, and the film."""
     style = gallery.style
     parts: list[str] = []
-    own = _own(album, views)
-    frame = int(np.abs(own.pushed).max(axis=1).argmax())
     progress("draw side by side", 0.0)
     beside = render.picture(views, style, frame)
     parts.append(gallery.image("side-by-side", beside, f"{_drawn(views)} {MARKS} {COMPARED}"))
@@ -91,17 +92,13 @@ def _spatial(
     progress("draw from above", 0.0)
     above = render.picture(views, style, frame, camera="top")
     parts.append(gallery.image("from-above", above, f"The same from above. {COMPARED}"))
-    progress("draw to be turned", 0.0)
-    page = turntable(own, frame)
-    if page is None:
-        parts.append(document.paragraph(f"The view that can be turned is left out: {EXTRA}."))
-    else:
-        caption = (
-            f"To be turned with the mouse: {label(own.column)}, {render.shown_scale(own)}; red "
-            f"into the body, blue out of it, both by up to {maps.peak_text(own)}."
-        )
-        parts.append(document.inner_page(page, caption))
     return parts
+
+
+def _turnable(own: View, frame: int) -> str:
+    """A view to turn, as a part of the page."""
+    caption = f"{label(own.column)}, to turn with the mouse, a finger or the arrow keys. {TURNED}"
+    return document.inner_page(turntable(own, frame), caption)
 
 
 def flat(views: Sequence[View], style: Style) -> Iterable[tuple[str, Callable[[], Figure], str]]:
@@ -186,6 +183,10 @@ def _part(image: render.Image, caption: str, name: str) -> str:
 NO_VIEWS = (
     "No motion of whole bodies was saved here, and so there is no picture of a surface; "
     "skinwave report SCENE computes it."
+)
+TURNED = (
+    "Motion into the body is red, out of it blue, about the mean; where the legend says ≥, rare "
+    "larger values have the last colour. Black: path and focus; orange: probes."
 )
 MARKS = "Black: path and focus; yellow: probes."
 COMPARED = (

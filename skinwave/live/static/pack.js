@@ -1,6 +1,7 @@
 // Arrays of a pack: complex rows of 64-bit floats, or of whole numbers with a scale for each row.
 
-const bytes = (text) => {
+/** Bytes of text in base 64. */
+export const bytes = (text) => {
   const raw = atob(text), out = new Uint8Array(raw.length);
   for (let k = 0; k < raw.length; k++) out[k] = raw.charCodeAt(k);
   return out.buffer;

@@ -45,7 +45,7 @@ const MARK_FRAGMENT = `#version 300 es
   }`;
 const HOME = { turned: -0.5, tipped: 0.95, near: 1, moved: [0, 0] };
 const DRAWN = 0.06; // of the width: how far the largest motion is drawn at most
-const CREST = 3; // times the largest RMS: where colours end at most
+const CREST = 2.2; // times the largest RMS: where colours end at most
 const SAMPLED = 96; // times, and about as many points, of which the largest motion is taken
 const SHOWN_RATE = 0.7; // Hz at which the strongest line is seen at first
 const BARS = [1, 2, 5, 10, 20, 50, 100]; // mm
@@ -110,15 +110,15 @@ class View {
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, mesh.triangles, gl.STATIC_DRAW);
   }
 
-  table() { return this.hue === "motion" || this.given?.shade?.signed ? SIGNED : SEQUENTIAL; }
+  table() { return this.hue === "motion" ? SIGNED : SEQUENTIAL; }
 
   /**
    * Show a body and its motion.
    * @param {object} given shape: points in mm and triangles; motion: f (l,) in Hz, re and im (l * n) in
    *   metre upwards; path: points [x, y] in metre, or several paths; foci: places [x, y] in metre as a
    *   function of the time in s, or a list of them for equal parts of the period; points: places [x, y]
-   *   to mark; period: s, of the loop; largest: metre, end of the colours; shade: another quantity as
-   *   colour, {re, im, low, high, name, unit, signed}, with lines as the motion
+   *   to mark; period: s, of the loop; largest: metre, end of the colours; unit: "Pa" of a pressure, less
+   *   of which is upwards
    */
   show(given) {
     if (!this.gl) return;
@@ -129,9 +129,11 @@ class View {
       this.moved = Float32Array.from(this.mesh.places);
       this.state = new Float32Array(5 * this.mesh.source.length);
     }
-    if (given.shade) this.hue = "shade";
     this.measure();
-    if (isNew) { this.send(); this.fit(); } else if (given.shade) this.send();
+    if (isNew) {
+      this.send();
+      this.fit();
+    }
     const here = ([x, y]) => locate(this.mesh, x, y);
     this.riders = { path: dots(given.path || []).map(here).filter(Boolean),
       points: (given.points || []).map(([x, y]) => here([1e3 * x, 1e3 * y])).filter(Boolean) };
@@ -142,7 +144,7 @@ class View {
 
   /** What is the same at all times: lines, RMS, largest motion, loop and exaggeration. */
   measure() {
-    const { motion, largest, period, shade: own } = this.given, strong = strongLines(motion), { n } = strong;
+    const { motion, largest, period } = this.given, strong = strongLines(motion), { n } = strong;
     const rms = new Float32Array(n);
     for (const { f, from } of strong.lines) {
       const share = f > 0 ? 0.5 : 1;
@@ -166,22 +168,22 @@ class View {
       this.slower = SLOWER.reduce((a, b) => (off(b) < off(a) ? b : a));
       this.slow.value = this.slower;
     }
-    Object.assign(this, { strong, rms, loop, u: new Float32Array(n), v: own && new Float32Array(n), peak,
-      largest: largest || seldom || 1, most: most || 1,
-      factor: seldom ? rounded(1e-3 * DRAWN * width / seldom) : 0 });
+    Object.assign(this, { strong, rms, loop, u: new Float32Array(n), peak, largest: largest || seldom || 1,
+      most: most || 1, factor: seldom ? rounded(1e-3 * DRAWN * width / seldom) : 0 });
   }
 
   get drawnTimes() { return this.factor ? rounded(this.factor * this.relief) : 0; }
 
   say() {
-    const { hue, given, loop } = this, own = given.shade;
-    const end = `${this.peak > 1.001 * this.largest ? "≥ " : ""}${withUnit(this.largest, "m")}`;
-    const seam = loop.repeats ? "" : " The pattern jumps where the loop begins again.";
-    const times = this.drawnTimes.toLocaleString("en");
-    this.said.textContent = this.peak ? `Exaggerated ${times} times, mean removed.${seam}` : "Nothing moves.";
-    let words = [`${end} out of the body`, "0", `${end} into the body`];
-    if (hue === "rms") words = ["0", "RMS", withUnit(this.most, "m")];
-    if (hue === "shade") words = [own.low, own.name, `${own.high.toPrecision(3)} ${own.unit}`];
+    const { unit = "m" } = this.given, end = withUnit(this.largest, unit);
+    const most = this.peak > 1.001 * this.largest ? `≥ ${end}` : end;
+    const seam = this.loop.repeats ? "" : " The pattern jumps where the loop begins again.";
+    const drawn = `Exaggerated ${this.drawnTimes.toLocaleString("en")} times, mean removed.`;
+    this.said.textContent = (unit === "Pa" ? "A relief of the pressure; nothing moves." : drawn) + seam;
+    if (!this.peak) this.said.textContent = "Nothing moves.";
+    let words = unit === "Pa" ? [`${most} less`, "mean pressure", `${most} more`]
+      : [`${most} out of the body`, "0", `${most} into the body`];
+    if (this.hue === "rms") words = ["0", "RMS", withUnit(this.most, unit)];
     this.ends.replaceChildren(...words.map((text) => element("span", {}, text)));
   }
 
@@ -209,15 +211,12 @@ class View {
   place() {
     const { mesh, state, moved, u, hue, rms, given } = this, { source, places } = mesh, n = u.length;
     synthesise(this.strong, given.motion, this.time, u);
-    if (hue === "shade") synthesise(this.strong, given.shade, this.time, this.v);
-    const scale = 1e3 * this.drawnTimes, own = given.shade;
+    const scale = 1e3 * this.drawnTimes;
     for (let p = 0; p < source.length; p++) {
       const k = source[p], lift = k < n ? u[k] : 0;
       state[5 * p] = scale * lift;
       moved[3 * p + 2] = places[3 * p + 2] + scale * lift;
-      if (hue === "motion") state[5 * p + 1] = 0.5 - lift / (2 * this.largest);
-      else if (hue === "rms") state[5 * p + 1] = k < n ? rms[k] / this.most : 0;
-      else state[5 * p + 1] = k < n ? (this.v[k] - own.low) / (own.high - own.low) : 0.5;
+      state[5 * p + 1] = hue === "motion" ? 0.5 - lift / (2 * this.largest) : (k < n ? rms[k] : 0) / this.most;
     }
     shade(mesh, moved, state);
   }

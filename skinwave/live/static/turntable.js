@@ -1,0 +1,15 @@
+// The view of a report: a body that moves, of the data that skinwave.pictures.turntable wrote.
+
+import { bytes, unpack } from "./pack.js";
+import { openView } from "./view3d.js";
+
+const data = JSON.parse(document.getElementById("data").textContent);
+const view = openView(document.getElementById("view"), { wheel: "focused" });
+const { re, im } = unpack(data.motion);
+
+view.show({
+  shape: { points: new Float32Array(bytes(data.points)), triangles: new Uint32Array(bytes(data.triangles)) },
+  motion: { f: data.frequencies, re, im },
+  path: data.path, foci: data.foci, points: data.probes, period: data.period, unit: data.unit,
+});
+view.seek(data.time);
