@@ -31,6 +31,7 @@ export function withUnit(value, unit) {
   if (unit === "dB") return `${value.toFixed(1).replace("-", "−")} dB`;
   const [prefix, scale] = unit[0] !== "m" || size === 0 ? ["", 1]
     : [["n", 1e9, 1e-7], ["µ", 1e6, 1e-3], ["m", 1e3, 1], ["", 1, Infinity]].find((p) => size < p[2]);
-  const shown = scale * value, digits = size ? Math.max(0, 2 - Math.floor(Math.log10(scale * size))) : 0;
+  const shown = Number((scale * value).toPrecision(3));
+  const digits = shown ? Math.max(0, 2 - Math.floor(Math.log10(Math.abs(shown)))) : 0;
   return `${shown.toFixed(Math.min(digits, 6)).replace("-", "−")} ${prefix}${unit}`;
 }
