@@ -85,7 +85,7 @@ const isClosed = (points) => points.length > 2
   && points[0][0] === points[points.length - 1][0] && points[0][1] === points[points.length - 1][1];
 
 /** Corners of a path in metre, and whether a period is one run along them. */
-function outline(path) {
+export function outline(path) {
   if (path.shape === "polyline") {
     return { corners: path.points, runsOn: path.sweep === "one_way" || isClosed(path.points) };
   }
@@ -289,7 +289,7 @@ function transformed(re, im, count, stride) {
 }
 
 /** Array factor [re, im] of all foci on harmonic n of the path. */
-function arrayFactor(load, n) {
+export function arrayFactor(load, n) {
   let re = 0, im = 0;
   for (const ahead of load.foci) {
     re += Math.cos(TAU * n * ahead);
@@ -313,10 +313,7 @@ export function pathHarmonic(load, n, count) {
     turn += step;
     if (turn >= whole) turn -= whole;
   }
-  for (const phase of jumpPhases(load.path)) {
-    const after = Math.round(phase * count);
-    for (const each of [re, im]) spreadJump(each, (after + count - 1) % count, after);
-  }
+  for (const each of [re, im]) spreadJumps(load.path, each);
   return { re, im };
 }
 
@@ -365,22 +362,28 @@ export function loadLines(load, { threshold = 3e-4, lowest = 1e-6, highest = 100
   return { f, w, samples, parts: lines.map((line) => line.parts) };
 }
 
-/** Give the cells before and after a jump its moments (simple_model.path_cells). */
-function spreadJump(weights, before, after) {
-  const share = (weights[before] - weights[after]) / 24;
-  weights[after] += share;
-  weights[before] -= share;
+/** Give the cells before and after each jump its moments (simple_model.path_cells). */
+function spreadJumps(path, cells) {
+  const count = cells.length;
+  for (const phase of jumpPhases(path)) {
+    const after = Math.round(phase * count), before = (after + count - 1) % count;
+    const share = (cells[before] - cells[after]) / 24;
+    cells[after] += share;
+    cells[before] -= share;
+  }
 }
 
 /** Largest amplitude, at about nine points of the path, of each harmonic of the focal spot. */
-function harmonicStrengths(load, { x, y }) {
-  const count = x.length, step = Math.max(1, Math.floor(count / 8));
+export function harmonicStrengths(load, { x, y }) {
+  const count = x.length, even = Math.max(1, Math.floor(count / 8));
+  const step = load.path.shape === "joined" ? even + 1 : even; // not the same places of each path
   const strongest = new Float64Array(count);
   for (let p = 0, seen = 0; p < count && seen < 9; p += step, seen++) {
     const values = new Float64Array(count);
     for (let q = 0; q < count; q++) {
       values[q] = spot((x[p] - x[q]) ** 2 + (y[p] - y[q]) ** 2, load.height, load.profile);
     }
+    spreadJumps(load.path, values);
     const found = realFourier(values);
     for (let n = 0; n < count; n++) {
       strongest[n] = Math.max(strongest[n], Math.hypot(found.re[n], found.im[n]) / count);

@@ -1,0 +1,424 @@
+// Numbers of an answer: thresholds, levels, maps, reach, share, delay, and names of lines.
+
+import { powerOfTwo, transform } from "./fourier.js";
+import { arrayFactor, drawingFrequency, gainLines, harmonicStrengths, jumps, levelFactor, outline,
+  pathSamples, positionOf, rhythmLevel } from "./load.js";
+
+const TAU = 2 * Math.PI;
+const PACINIAN = -13, NON_PACINIAN = 12; // dB re 1 um peak, at 250 Hz for a focal spot and at any
+const LOWEST = 10, HIGHEST = 1000; // Hz, between which the thresholds are known
+const PRESSURE = 2.2, TESTED = 200; // Pa of a component, and its frequency in Hz
+const LEVELS = 4096; // instants of a rhythm
+const OUTSIDE = 0.1, NEAR = 0.5; // of the largest RMS: edge of the kernel's region, and of the spread
+const ON_PATH = 12; // places of the path at which the delay is looked for
+const HEARD = 0.1; // of its largest on the path: a weaker line has no phase
+const SYMBOLS = ["f_d", "f_AM", "f_AM2", "f_e", "f_r"];
+const SAME = 1e-3; // over the duration: lines as near to each other in Hz coincide
+const REPEATED = 1.5; // periods in the Tacton at least, to make lines
+const PULSED = 2 ** 14; // samples of a period of a rhythm
+const MOST_HARMONICS = 400, MOST_PRODUCTS = 4000; // as in simple_model.line_names
+const NEGLIGIBLE_LINE = 1e-3; // of the strongest in a table
+const MINOR = 0.05, FAINT = 0.02, ALIKE = 1e-3, WINDOW = 19, BINS = 2.5; // as in simple_model.response
+
+/** Quantities at the point: `rate` is the order of the derivative, 1 in SI is `per` in `unit`. */
+export const QUANTITIES = {
+  displacement: { words: "displacement into the body", unit: "µm", per: 1e6, rate: 0 },
+  velocity: { words: "velocity into the body", unit: "mm/s", per: 1e3, rate: 1 },
+  acceleration: { words: "acceleration into the body", unit: "m/s²", per: 1, rate: 2 },
+};
+
+/** Detection threshold of displacement in metre, peak, at a frequency in Hz; NaN if not known. */
+export function thresholdAt(frequency) {
+  if (!(frequency >= LOWEST && frequency <= HIGHEST)) return NaN;
+  const octaves = Math.log2(frequency / 250), slope = octaves < 0 ? -12 : 9;
+  return 1e-6 * 10 ** (Math.min(PACINIAN + slope * octaves, NON_PACINIAN) / 20);
+}
+
+/** Detection threshold in Pa of a component of the pressure at a frequency in Hz; NaN if not known. */
+export const pressureThresholdAt = (frequency) => PRESSURE * thresholdAt(frequency) / thresholdAt(TESTED);
+
+/** Level in dB of a peak amplitude in metre or Pa above its threshold; -Infinity if there is none. */
+export function sensationLevel(amplitude, frequency, unit = "m") {
+  const least = unit === "m" ? thresholdAt(frequency) : pressureThresholdAt(frequency);
+  return amplitude > 0 && least > 0 ? 20 * Math.log10(amplitude / least) : -Infinity;
+}
+
+/** Amplitude of lines with the pauses of the rhythm over that while a pulse is on. */
+export function meanLevel(load) {
+  if (!load.pulses) return 1;
+  const period = periodOf(load);
+  let sum = 0;
+  for (let k = 0; k < LEVELS; k++) sum += levelFactor(load, rhythmLevel(load, (k + 0.5) / LEVELS * period));
+  return sum / LEVELS;
+}
+
+const periodOf = ({ pulses }) => pulses.reduce((sum, [on, gap]) => sum + on + gap, 0);
+
+/** Amplitudes (l,) of complex lines at a place, as the `rate`-th derivative in time. */
+export function amplitudesOf(f, { re, im }, rate = 0) {
+  return Float64Array.from(f, (at, l) => (TAU * at) ** rate * Math.hypot(re[l], im[l]));
+}
+
+/**
+ * Highest level over lines at a place, with the pauses of the rhythm: {dB, f}; null if nothing moves
+ * there. `unit` is "m" or "Pa".
+ */
+export function levelOf(load, f, at, unit = "m") {
+  const mean = meanLevel(load);
+  let best = null;
+  amplitudesOf(f, at).forEach((amplitude, l) => {
+    const dB = sensationLevel(mean * amplitude, f[l], unit);
+    if (dB > (best ? best.dB : -Infinity)) best = { dB, f: f[l] };
+  });
+  return best;
+}
+
+/** The same at a place of a motion. */
+export const levelAt = (motion, load, x, y) => levelOf(load, motion.f, motion.at(x, y), motion.unit);
+
+/** Coordinates (n,) in metre of a map along one axis. */
+export const mapAxis = (side = 45, reach = 0.044) => (
+  Float64Array.from({ length: side }, (_, k) => reach * (2 * k / (side - 1) - 1)));
+
+/**
+ * Map of a motion: {xs, ys, rms, level}, row y, column x. RMS about the mean while a pulse is on; level
+ * in dB of the highest line, with the pauses of a rhythm. NaN off the body.
+ */
+export function mapOf(motion, load, xs = mapAxis(), ys = xs) {
+  const { re, im } = motion.onGrid(xs, ys), places = xs.length * ys.length, mean = meanLevel(load);
+  const rms = new Float32Array(places), level = new Float32Array(places), unit = motion.unit || "m";
+  motion.f.forEach((f, l) => {
+    const least = (unit === "m" ? thresholdAt(f) : pressureThresholdAt(f)) / mean, known = least > 0;
+    for (let p = 0, k = l * places; p < places; p++, k++) {
+      const square = re[k] * re[k] + im[k] * im[k];
+      rms[p] += square / 2;
+      if (known) level[p] = Math.max(level[p], square / (least * least));
+    }
+  });
+  for (let p = 0; p < places; p++) {
+    level[p] = Number.isNaN(rms[p]) ? NaN : 10 * Math.log10(Math.max(level[p], 1e-20));
+    rms[p] = Math.sqrt(rms[p]);
+  }
+  return { xs, ys, rms, level };
+}
+
+const largestOf = (values) => values.reduce((most, value) => (value > most ? value : most), 0);
+
+/** Share 0..1 of squared motion where the kernel is 20 dB below its largest; NaN if nothing moves. */
+export function shareOutside(kernelRms, rms) {
+  const edge = OUTSIDE * largestOf(kernelRms);
+  let outside = 0, all = 0;
+  rms.forEach((value, p) => {
+    if (Number.isNaN(value)) return;
+    all += value * value;
+    if (kernelRms[p] < edge) outside += value * value;
+  });
+  return outside / all;
+}
+
+/** Distance in metre from the path of a load, as a function of x and y in metre. */
+export function distanceFromPath(load) {
+  const { path } = load, moves = drawingFrequency(path) > 0;
+  const pieces = [];
+  for (const own of path.paths || [path]) {
+    const [cx, cy] = own.centre || [0, 0];
+    if (own.shape === "point" || !moves || (own.shape !== "polyline" && !own.size)) {
+      const at = positionOf(own), places = moves ? [0] : load.foci;
+      for (const phase of places) pieces.push({ ends: [at(phase % 1), at(phase % 1)] });
+    } else if (own.shape === "circle") pieces.push({ circle: [cx, cy, own.size / 2] });
+    else {
+      const corners = outline(own).corners.map(([x, y]) => [x + cx, y + cy]);
+      corners.slice(1).forEach((end, k) => pieces.push({ ends: [corners[k], end] }));
+    }
+  }
+  return (x, y) => Math.min(...pieces.map(({ circle, ends }) => {
+    if (circle) return Math.abs(Math.hypot(x - circle[0], y - circle[1]) - circle[2]);
+    const [[ax, ay], [bx, by]] = ends, dx = bx - ax, dy = by - ay, squared = dx * dx + dy * dy;
+    const part = squared ? Math.min(Math.max(((x - ax) * dx + (y - ay) * dy) / squared, 0), 1) : 0;
+    return Math.hypot(x - ax - part * dx, y - ay - part * dy);
+  }));
+}
+
+/**
+ * Largest distance from the path at which values (ny * nx) of a map are `least` or more, interpolated
+ * between places: {metre, beyond}, with `beyond` if they are at the edge of the map; null if nowhere.
+ */
+export function reachOf(load, { xs, ys }, values, least) {
+  const distance = distanceFromPath(load), nx = xs.length, ny = ys.length, isIn = (p) => values[p] >= least;
+  let metre = -1, beyond = false;
+  const crossing = (p, other, x, y, x1, y1) => {
+    if (Number.isNaN(values[other]) || isIn(other)) return;
+    const part = (values[p] - least) / (values[p] - values[other]);
+    metre = Math.max(metre, distance(x + part * (x1 - x), y + part * (y1 - y)));
+  };
+  for (let row = 0, p = 0; row < ny; row++) {
+    for (let column = 0; column < nx; column++, p++) {
+      if (!isIn(p)) continue;
+      const x = xs[column], y = ys[row];
+      metre = Math.max(metre, distance(x, y));
+      if (row === 0 || column === 0 || row === ny - 1 || column === nx - 1) beyond = true;
+      if (column > 0) crossing(p, p - 1, x, y, xs[column - 1], y);
+      if (column < nx - 1) crossing(p, p + 1, x, y, xs[column + 1], y);
+      if (row > 0) crossing(p, p - nx, x, y, x, ys[row - 1]);
+      if (row < ny - 1) crossing(p, p + nx, x, y, x, ys[row + 1]);
+    }
+  }
+  return metre < 0 ? null : { metre, beyond };
+}
+
+/** Reach of a map above the threshold of skin, as reachOf. */
+export const reach = (load, map) => reachOf(load, map, map.level, 0);
+
+/** Reach of a map within 6 dB of its largest RMS, as reachOf; null if nothing moves. */
+export function spread(load, map) {
+  const edge = NEAR * largestOf(map.rms);
+  return edge > 0 ? reachOf(load, map, map.rms, edge) : null;
+}
+
+/** Delay in s of a complex b behind a at a frequency in Hz: a quarter period before to three after. */
+export function phaseDelay(a, b, f) {
+  const turns = (Math.atan2(a.im, a.re) - Math.atan2(b.im, b.re)) / TAU;
+  return (turns - Math.floor(turns + 0.25)) / f;
+}
+
+/**
+ * Delay of the strongest line of a motion behind the kernel's pressure at the place of the path where
+ * the pressure has most of it: {delay in s, f in Hz}; null if they share none.
+ */
+export function delayOf(kernel, motion, load) {
+  const position = positionOf(load.path), moves = drawingFrequency(load.path) > 0;
+  const phases = moves ? Array.from({ length: ON_PATH }, (_, k) => k / ON_PATH) : load.foci.map((a) => a % 1);
+  const places = phases.map((phase) => position(phase));
+  const [a, b] = [kernel, motion].map((each) => places.map(([x, y]) => each.at(x, y)));
+  const size = (each, l) => each.map(({ re, im }) => Math.hypot(re[l], im[l]));
+  let line = -1, strongest = 0;
+  motion.f.forEach((_, l) => {
+    const most = largestOf(size(b, l));
+    if (most > strongest) [line, strongest] = [l, most];
+  });
+  if (line < 0) return null;
+  const f = motion.f[line], own = kernel.f.findIndex((at) => Math.abs(at - f) < 1e-6);
+  if (own < 0) return null;
+  const pressure = size(a, own), moved = size(b, line);
+  const heard = (sizes, k) => sizes[k] > 0 && sizes[k] >= HEARD * largestOf(sizes);
+  const best = places.reduce((top, _, k) => (heard(pressure, k) && heard(moved, k)
+    && (top < 0 || pressure[k] > pressure[top]) ? k : top), -1);
+  if (best < 0) return null;
+  const at = ({ re, im }, l) => ({ re: re[l], im: im[l] });
+  return { delay: phaseDelay(at(a[best], own), at(b[best], line), f), f };
+}
+
+/** Frequencies in Hz of SYMBOLS, 0 of those that the Tacton does not repeat. */
+function symbolsOf(load) {
+  const own = load.path.shape === "joined", turns = own ? load.path.drawn : drawingFrequency(load.path);
+  const fd = own && turns * load.duration < REPEATED ? 0 : turns;
+  const rhythm = load.pulses ? 1 / periodOf(load) : 0;
+  return [fd, load.w1 > 0 ? load.am : 0, load.w1 < 1 ? load.am2 : 0, load.envelope,
+    rhythm * load.duration >= REPEATED ? rhythm : 0];
+}
+
+/** Name of the line of orders of SYMBOLS, such as "2f_d-f_AM". */
+function nameOf(orders, symbols) {
+  const sum = orders.reduce((total, n, k) => total + n * symbols[k], 0);
+  const sign = orders[0] > 0 || (orders[0] === 0 && sum > 0) ? 1 : -1;
+  let terms = orders.map((n, k) => [sign * n, SYMBOLS[k]]).filter(([n]) => n);
+  if (!orders[0]) terms = [...terms.filter(([n]) => n > 0), ...terms.filter(([n]) => n < 0)];
+  const times = (n) => (Math.abs(n) > 1 ? Math.abs(n) : "");
+  return terms.map(([n, symbol]) => `${n < 0 ? "-" : "+"}${times(n)}${symbol}`).join("").replace(/^\+/, "");
+}
+
+/** Harmonics [{n, share}] of the path of a load, the strongest first. */
+function pathShares(load, symbols) {
+  const samples = pathSamples(load), count = samples.x.length, own = load.path.shape === "joined";
+  const strengths = harmonicStrengths(load, samples), fd = drawingFrequency(load.path);
+  const once = fd > 0 && jumps(load.path) && fd * load.duration < 1 - 1e-9;
+  const last = fd > 0 ? Math.floor((count - 1) / 2) : 0, n = own ? load.path.paths.length : 1;
+  const found = [];
+  for (let k = -last; k <= last; k++) {
+    found.push({ n: k, share: strengths[(k + count) % count] * Math.hypot(...arrayFactor(load, k)) });
+  }
+  const least = 1e-10 * Math.max(...found.map(({ share }) => share));
+  const named = (k) => (symbols[0] && !once ? k % n === 0 : k === 0);
+  return found.filter(({ n: k, share }) => (share > least || k === 0) && named(k))
+    .map(({ n: k, share }) => ({ n: k / n, share }))
+    .sort((a, b) => b.share - a.share).slice(0, MOST_HARMONICS);
+}
+
+/** Products [{orders of SYMBOLS but f_d, c}] of the sinusoids and the rhythm, c in Pa. */
+function gainProducts(load, symbols, least) {
+  const strongest = (found) => {
+    found.sort((a, b) => b.c - a.c);
+    return found.filter(({ c }, k) => c >= least * found[0].c && k < MOST_PRODUCTS);
+  };
+  const gain = strongest(gainLines(load).map(({ orders, re, im }) => (
+    { orders: [...orders, 0], c: Math.hypot(re, im) })));
+  if (!symbols[4]) return gain;
+  const re = new Float64Array(PULSED), im = new Float64Array(PULSED), period = periodOf(load);
+  for (let k = 0; k < PULSED; k++) {
+    re[k] = levelFactor(load, rhythmLevel(load, (k + 0.5) / PULSED * period)) / PULSED;
+  }
+  transform(re, im);
+  const orders = Array.from(re, (value, k) => (
+    { v: k > PULSED / 2 ? k - PULSED : k, a: Math.hypot(value, im[k]) }));
+  const top = Math.max(...orders.map(({ a }) => a));
+  const kept = orders.filter(({ a }) => a >= least * top);
+  return strongest(gain.flatMap(({ orders: own, c }) => kept.map(({ v, a }) => (
+    { orders: [...own.slice(0, 3), v], c: c * a }))));
+}
+
+/**
+ * Lines of a load above a fraction of the strongest on the path, without the mean: [{name, f in Hz,
+ * strength in Pa}], ascending, no two the same (simple_model.line_names).
+ */
+export function lineNames(load, { threshold = 1e-3, most = 200 } = {}) {
+  const symbols = symbolsOf(load), same = SAME / load.duration, shares = pathShares(load, symbols);
+  const gain = gainProducts(load, symbols, 1e-3 * threshold);
+  const base = gain.map(({ orders }) => orders.reduce((sum, n, k) => sum + n * symbols[k + 1], 0));
+  const each = (visit) => shares.forEach(({ n, share }) => {
+    for (let g = 0; g < gain.length; g++) {
+      const f = n * symbols[0] + base[g];
+      if (f > same) visit(n, g, f, 2 * share * gain[g].c);
+    }
+  });
+  let top = 0;
+  each((n, g, f, strength) => { top = Math.max(top, strength); });
+  const found = [];
+  each((n, g, f, strength) => {
+    if (strength > 1e-2 * threshold * top) found.push({ n, g, f, strength });
+  });
+  found.sort((a, b) => a.f - b.f);
+  const groups = [];
+  found.forEach((line, k) => {
+    const orders = [line.n, ...gain[line.g].orders], used = orders.filter((n) => n).length;
+    const sum = orders.reduce((total, n) => total + Math.abs(n), 0);
+    const effort = sum + (orders[0] ? 0.1 : 0) + 0.01 * used;
+    if (k === 0 || line.f - found[k - 1].f > same) groups.push({ effort: Infinity, power: 0 });
+    const group = groups[groups.length - 1];
+    group.power += line.strength ** 2;
+    if (effort < group.effort - 1e-9 || (effort < group.effort + 1e-9 && line.strength > group.best)) {
+      Object.assign(group, { effort, best: line.strength, f: line.f, orders });
+    }
+  });
+  const strongest = [...groups].sort((a, b) => b.power - a.power).slice(0, most);
+  return strongest.filter(({ power }) => power > threshold ** 2 * strongest[0].power)
+    .sort((a, b) => a.f - b.f)
+    .map(({ orders, f, power }) => ({ name: nameOf(orders, symbols), f, strength: Math.sqrt(power) }));
+}
+
+/** Names of a load's lines while a pulse is on, as a function of the frequency in Hz; "" if unknown. */
+export function namesOf(load) {
+  const known = lineNames({ ...load, pulses: null }, { threshold: 1e-4, most: 1000 });
+  const same = Math.max(SAME / load.duration, 1e-6);
+  return (f) => known.find((line) => Math.abs(line.f - f) <= same)?.name || "";
+}
+
+/**
+ * Table of lines at a point, the strongest first: [{name, f, motion, pressure, level}] of an answer
+ * {load, values, body, waves, wavesAt, kernel, kernelAt}: `motion` in SI units of the quantity, `pressure`
+ * of the kernel in Pa, `level` in dB, null where the body is not skin.
+ */
+export function lineTable({ load, values, body, waves, wavesAt, kernel, kernelAt }) {
+  const { rate } = QUANTITIES[values.quantity], mean = meanLevel(load), names = namesOf(load);
+  const [moved, motion] = [0, rate].map((order) => amplitudesOf(waves.f, wavesAt, order));
+  const pressure = amplitudesOf(kernel.f, kernelAt), least = NEGLIGIBLE_LINE * largestOf(motion);
+  return Array.from(waves.f, (f, l) => {
+    const own = kernel.f.findIndex((at) => Math.abs(at - f) < 1e-6);
+    return { name: names(f), f, motion: mean * motion[l], pressure: own < 0 ? 0 : mean * pressure[own],
+      level: body.is_skin ? sensationLevel(mean * moved[l], f) : null };
+  }).filter((_, l) => motion[l] > least).sort((a, b) => b.motion - a.motion);
+}
+
+/** Names of the lines below 1 kHz that the Tacton is too short to resolve from 0 Hz or each other. */
+export function unresolvedNames(load, settle = 0.5) {
+  const lines = lineNames(load).filter(({ f }) => f < HIGHEST), least = 1 / ((1 - settle) * load.duration);
+  const top = Math.max(...lines.map(({ strength }) => strength), 1e-300);
+  const near = (a, b, far) => Math.abs(a - b) < far;
+  let known = lines.map(({ f }) => {
+    const close = lines.filter((other) => near(f, other.f, least));
+    const sum = (some) => some.reduce((total, { strength }) => total + strength, 0);
+    const alike = close.filter((other) => Math.abs(f - other.f) <= ALIKE * least);
+    return f >= least && sum(close) - sum(alike) <= MINOR * sum(alike);
+  });
+  for (let before = -1; before !== known.filter(Boolean).length;) {
+    before = known.filter(Boolean).length;
+    const kept = lines.filter((_, k) => known[k]), lost = lines.filter((_, k) => !known[k]);
+    const gaps = kept.map(({ f }, k) => f - (k ? kept[k - 1].f : 0)).filter((gap) => gap >= least);
+    const beta = betaOf(Math.min(...gaps, Infinity) / least);
+    known = lines.map(({ f, strength }, k) => {
+      const leaks = lost.map((o) => o.strength * kaiser(Math.PI * (f - o.f) / least, beta));
+      const leak = Math.hypot(...leaks);
+      return known[k] && leak <= MINOR * Math.max(strength, FAINT * top);
+    });
+  }
+  const kept = lines.filter((_, k) => known[k]);
+  return lines.filter(({ f }, k) => !known[k] && !kept.some((other) => near(f, other.f, least)))
+    .map(({ name }) => name);
+}
+
+/** Parameter of the Kaiser window for lines so many bins apart. */
+function betaOf(bins) {
+  const lobe = Math.hypot(1, WINDOW / Math.PI) * Math.min(bins / BINS, 1);
+  return Math.PI * Math.sqrt(Math.max(lobe * lobe - 1, 0));
+}
+
+/** Transform of a Kaiser window, relative; x is pi times bins. */
+function kaiser(x, beta) {
+  const root = Math.sqrt(Math.abs(beta * beta - x * x)) + 1e-9;
+  const value = Math.abs(x) < beta ? Math.sinh(root) / root : Math.abs(Math.sin(root) / root);
+  return value * (beta ? beta / Math.sinh(beta) : 1);
+}
+
+/**
+ * Amplitude spectrum {f in Hz, amplitudes} of values at equal steps dt in s under a Hann window, as
+ * simple_model.spectrum: a sinusoid of amplitude a on a bin shows as a.
+ */
+export function spectrum(values, dt) {
+  const n = values.length, size = powerOfTwo(2 * n), count = Math.floor(n / 2) + 1;
+  const chirp = (k) => Math.PI * ((k * k) % (2 * n)) / n; // Bluestein's transform of any length
+  const [ar, ai, br, bi] = Array.from({ length: 4 }, () => new Float64Array(size));
+  let weights = 0;
+  for (let k = 0; k < n; k++) {
+    const w = n < 2 ? 1 : (1 - Math.cos(TAU * k / n)) / 2, turn = chirp(k);
+    weights += w;
+    ar[k] = values[k] * w * Math.cos(turn);
+    ai[k] = -values[k] * w * Math.sin(turn);
+    br[k] = br[(size - k) % size] = Math.cos(turn);
+    bi[k] = bi[(size - k) % size] = Math.sin(turn);
+  }
+  transform(ar, ai);
+  transform(br, bi);
+  for (let k = 0; k < size; k++) {
+    [ar[k], ai[k]] = [ar[k] * br[k] - ai[k] * bi[k], ar[k] * bi[k] + ai[k] * br[k]];
+  }
+  transform(ar, ai, true);
+  const f = Float64Array.from({ length: count }, (_, k) => k / (n * dt));
+  const amplitudes = f.map((_, k) => (k ? 2 : 1) * Math.hypot(ar[k], ai[k]) / size / weights);
+  return { f, amplitudes };
+}
+
+/**
+ * A number as text with a typeset minus: three significant digits, or as many as its relative error
+ * allows; with a sign if `signed`; "-" if it is not finite.
+ */
+export function format(value, unit = "", { error = 0.005, signed = false } = {}) {
+  if (!Number.isFinite(value)) return "-";
+  const tail = unit ? `\u00a0${unit}` : "", size = Math.abs(value);
+  const digits = Math.min(Math.max(Math.ceil(-Math.log10(error)), 1), 6);
+  let text = "0";
+  if (size > 0) {
+    const rounded = Number(size.toPrecision(digits)), decimals = digits - 1 - Math.floor(Math.log10(rounded));
+    const tiny = rounded < 1e-4 || rounded >= 1e6;
+    text = tiny ? rounded.toExponential(digits - 1).replace("e+", "e")
+      : rounded.toLocaleString("en", { minimumFractionDigits: Math.max(decimals, 0),
+        maximumFractionDigits: Math.max(decimals, 0) });
+  }
+  return `${value < 0 ? "−" : signed && value > 0 ? "+" : ""}${text}${tail}`;
+}
+
+/** A level in dB as text, whole and with its sign; "< −60" below that; "-" if there is none. */
+export function formatLevel(dB) {
+  if (!(dB > -Infinity)) return "-";
+  if (dB < -60) return "<\u00a0−60";
+  const whole = Math.round(dB);
+  return whole < 0 ? `−${-whole}` : `+${Math.abs(whole)}`;
+}
