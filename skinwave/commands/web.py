@@ -1,63 +1,62 @@
-"""Interactive tool in a browser: a Tacton's parameters, its waves and its sensation level."""
+"""The live page in a browser, served from this machine, so that its bodies can be changed."""
 
 import argparse
+import os
 import sys
 import tempfile
 from pathlib import Path
 
-SAMPLES, MOST = 64, 1000  # of bands
+from skinwave.commands.common import progress_of
+from skinwave.plain_text import say
 
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
     parser.add_argument(
-        "scene", nargs="?", type=Path, metavar="SCENE", help="scene file (TOML) to begin with"
-    )
+        "scenes", nargs="*", type=Path, metavar="SCENE",
+        help="scene files (TOML) whose bodies and Tactons the page has; without any, the bodies "
+        "skin-slab, paper-sheet and palm",
+    )  # fmt: skip
     parser.add_argument("--port", type=int, default=8080, help="0 is any (default: 8080)")
     parser.add_argument(
-        "--samples", type=int, default=SAMPLES, metavar="N",
-        help="samples of the scene's uncertain numbers, for bands; 0 is no bands "
-        f"(default: {SAMPLES})",
+        "--base-url", default="/", metavar="PATH",
+        help="path under which a proxy shows the page, such as /user/name/proxy/8080/",
     )  # fmt: skip
-    parser.add_argument("--open", action="store_true", help="open the page in the browser")
+    parser.add_argument("--no-browser", action="store_true", help="only print the address")
+    parser.add_argument("--quiet", action="store_true", help="no progress")
     parser.add_argument("--debug", action="store_true", help="traceback of an error")
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from skinwave.web import check_extra
-
     if not 0 <= options.port <= 65535:
         raise ValueError(f"port = {options.port} is outside 0..65535; leave it out for 8080")
-    if options.samples and not 2 <= options.samples <= MOST:
-        raise ValueError(
-            f"--samples = {options.samples} is outside 2..{MOST}; give 0 for a page without bands"
-        )
-    check_extra()
-    from skinwave.scene_file import dumps, read
-    from skinwave.web import front, scenes
+    from skinwave.live.data import data_of, read_scene
+    from skinwave.live.serve import Server
 
-    scene = read(options.scene) if options.scene else None
-    if scene is not None:
-        scenes.values_of(scene)  # refuses what no control says
-
-    with tempfile.TemporaryDirectory(prefix="skinwave-") as private:
-
-        def ready(address: str) -> None:
-            print(f"skinwave: {address} (Ctrl-C ends it)", file=sys.stderr, flush=True)
-            if options.open:
-                open_unseen(address, Path(private))
-
+    options.json = False
+    base = f"/{options.base_url.strip('/')}/" if options.base_url.strip("/") else "/"
+    scenes = [read_scene(path) for path in options.scenes]
+    with progress_of(options) as progress:
+        data = data_of(scenes, progress, test=False)
+    with Server(data, options.port, base) as server, tempfile.TemporaryDirectory() as private:
+        say(f"skinwave: {server.address} (Ctrl-C ends it)", sys.stderr)
+        if base != "/":
+            say(f"skinwave: behind the proxy, open {base}?token={server.token}", sys.stderr)
+        elif not options.no_browser and has_display():
+            open_unseen(server.address, Path(private))
         try:
-            text = dumps(scene) if scene is not None else ""
-            front.run(options.port, options.samples, text, ready)
+            server.serve_forever()
         except KeyboardInterrupt:
             return 0
-        except OSError as error:
-            raise ValueError(
-                f"port {options.port} cannot be used ({error.strerror}); name another with --port"
-            ) from None
     return 0
+
+
+def has_display() -> bool:
+    """Whether a browser with windows can be opened here."""
+    if sys.platform in ("win32", "darwin"):
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def open_unseen(address: str, folder: Path) -> None:

@@ -1,0 +1,255 @@
+"""Serve the live page from this machine, and give it new bodies when it asks for them.
+
+Only this machine reaches the server, and only a browser with the token gets an answer: the address
+brings it once, a cookie keeps it for the page, and requests of the page send it in `X-Token`, which
+no other site can. The server keeps no state of a page.
+"""
+
+import json
+import re
+import secrets
+import sys
+from collections.abc import Callable, Mapping
+from http import HTTPStatus
+from http.cookies import SimpleCookie
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from threading import Lock
+from typing import Any
+from urllib.parse import parse_qs, unquote, urlsplit
+
+from skinwave.live.answers import body_lines, measurement_answer, scene_answer
+from skinwave.live.page import page
+from skinwave.plain_text import printable, say
+
+LARGEST = {"body": 2**20, "scene": 2**22, "measurement": 20_000_000}  # bytes of a request
+PATIENCE = 60.0  # s that a silent connection is kept
+LONGEST_LINE = 300  # characters of a fault in the terminal
+OWN_HOST = re.compile(r"(127\.0\.0\.1|localhost|\[::1\])(:\d{1,5})?")
+BASE = re.compile(r"/([\w.~%@:+-]+/)*")
+NO_TOKEN = (
+    "The token is missing or belongs to another run. Open the address that skinwave web printed, "
+    "with its ?token=..., in this browser."
+)
+NOT_HERE = "Open this page as http://127.0.0.1 or http://localhost, or start it with --base-url."
+FAULT = "The server failed at this request; its terminal says why."
+HEADERS = {
+    "Cache-Control": "no-store", "Referrer-Policy": "no-referrer", "X-Accel-Buffering": "no",
+    "X-Content-Type-Options": "nosniff", "X-Frame-Options": "DENY",
+}  # fmt: skip
+EXPECTED = (ValueError, ArithmeticError, MemoryError, RecursionError)
+
+
+class Superseded(Exception):
+    """A newer request has come."""
+
+
+class Server(ThreadingHTTPServer):
+    """Server of a page.
+
+    Parameters
+    ----------
+    data : of the page, with its `api` left open
+    port : 0 for any
+    base : path under which a proxy shows the server, begins and ends with "/"
+    token : by default a new one
+
+    Raises
+    ------
+    ValueError
+        If `base` is not a path, or the port cannot be used.
+    """
+
+    daemon_threads = True
+    block_on_close = False
+
+    def __init__(
+        self, data: Mapping[str, Any], port: int = 0, base: str = "/", token: str = ""
+    ) -> None:
+        if not BASE.fullmatch(base):
+            raise ValueError(f"base-url = {base} must be a path such as /user/name/proxy/8123/")
+        self.base, self.token = base, token or secrets.token_urlsafe(24)
+        try:
+            super().__init__(("127.0.0.1", port), _Handler)
+        except (OSError, OverflowError) as error:
+            raise ValueError(
+                f"port {port} cannot be used ({getattr(error, 'strerror', None) or error}); name "
+                "another with --port, or 0 for any"
+            ) from None
+        api = {"base": base, "token": self.token}
+        self.page = page({**data, "api": api}).encode()
+        self._newest, self._counting, self._computing = 0, Lock(), Lock()
+
+    @property
+    def address(self) -> str:
+        """Address that opens the page on this machine."""
+        return f"http://127.0.0.1:{self.server_port}{self.base}?token={self.token}"
+
+    def compute(self, work: Callable[[Callable[[], None]], None]) -> None:
+        """Do work as the only one: older work ends at its next report of progress.
+
+        Parameters
+        ----------
+        work : called with a function that raises `Superseded` when newer work has come
+        """
+        with self._counting:
+            self._newest += 1
+            own = self._newest
+
+        def check() -> None:
+            if own != self._newest:
+                raise Superseded
+
+        with self._computing:
+            check()
+            work(check)
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Say an error in one line; a connection that was closed is none."""
+        error = sys.exc_info()[1]
+        if not isinstance(error, ConnectionError | TimeoutError):
+            text = printable(f"{type(error).__name__}: {error}"[:LONGEST_LINE], keep="")
+            say(f"skinwave: a request failed: {text}", sys.stderr)
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: Server
+    server_version, sys_version = "skinwave", ""
+    timeout = PATIENCE
+
+    def log_message(self, *_: Any) -> None:
+        """Keep the terminal free of requests."""
+
+    def do_GET(self) -> None:
+        """Send the page; an address with the token first leads to the same one without it."""
+        split = urlsplit(self.path)
+        if not self._is_local():
+            return self._text(HTTPStatus.FORBIDDEN, NOT_HERE)
+        if self._route(split.path) != "":
+            return self._text(HTTPStatus.NOT_FOUND, "There is nothing at this address.")
+        given = parse_qs(split.query).get("token", [""])[0]
+        if given and self._is_token(given):
+            cookie = f"{self._cookie}={given}; Path={self.server.base}; HttpOnly; SameSite=Lax"
+            return self._send(HTTPStatus.SEE_OTHER, b"", "text/plain",
+                              {"Location": self.server.base, "Set-Cookie": cookie})  # fmt: skip
+        if not self._is_token(self._kept_token()):
+            return self._text(HTTPStatus.FORBIDDEN, NO_TOKEN)
+        return self._send(HTTPStatus.OK, self.server.page, "text/html")
+
+    def do_POST(self) -> None:
+        """Answer a request of the page."""
+        name = self._route(urlsplit(self.path).path)
+        kind = (name or "").removeprefix("api/")
+        if not self._is_local():
+            return self._error(HTTPStatus.FORBIDDEN, NOT_HERE)
+        if not self._is_token(self.headers.get("X-Token", "")):
+            return self._error(HTTPStatus.FORBIDDEN, NO_TOKEN)
+        if name not in {f"api/{kind}" for kind in LARGEST}:
+            return self._error(HTTPStatus.NOT_FOUND, "There is nothing at this address.")
+        length = self.headers.get("Content-Length", "")
+        if not re.fullmatch(r"\d{1,12}", length) or "Transfer-Encoding" in self.headers:
+            return self._error(HTTPStatus.LENGTH_REQUIRED, "Send a Content-Length.")
+        if int(length) > LARGEST[kind]:
+            return self._error(
+                HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
+                f"{int(length) / 1e6:.3g} MB exceed {LARGEST[kind] / 1e6:.3g} MB, the most that "
+                "the page may send. Use the command line.",
+            )
+        content = self.rfile.read(int(length))
+        try:
+            if kind == "body":
+                self._stream_body(content)
+            else:
+                answer = scene_answer if kind == "scene" else measurement_answer
+                shown = answer(unquote(self.headers.get("X-Name", "")), content)
+                self._send(HTTPStatus.OK, _json(shown), "application/json")
+        except EXPECTED as error:
+            self._error(HTTPStatus.BAD_REQUEST, _sentence(error))
+        except ConnectionError:
+            raise
+        except Exception:
+            self._error(HTTPStatus.INTERNAL_SERVER_ERROR, FAULT)
+            raise
+        return None
+
+    def _stream_body(self, content: bytes) -> None:
+        """Send lines of progress, then the body; an error is a line, too."""
+        self._begin(HTTPStatus.OK, "application/x-ndjson", {})
+
+        def work(check: Callable[[], None]) -> None:
+            for line in body_lines(content, lambda phase, fraction: tell(phase, fraction, check)):
+                check()
+                self.wfile.write(_json(line) + b"\n")
+                self.wfile.flush()
+
+        def tell(phase: str, fraction: float, check: Callable[[], None]) -> None:
+            check()
+            self.wfile.write(_json({"phase": phase, "fraction": fraction}) + b"\n")
+            self.wfile.flush()
+
+        try:
+            self.server.compute(work)
+        except Superseded:
+            self.wfile.write(_json({"superseded": True}) + b"\n")
+        except EXPECTED as error:
+            self.wfile.write(_json({"error": _sentence(error)}) + b"\n")
+        except ConnectionError:
+            raise
+        except Exception:
+            self.wfile.write(_json({"error": FAULT}) + b"\n")
+            raise
+
+    def _route(self, path: str) -> str | None:
+        """Path below the base; a proxy may have removed the base from it."""
+        base = self.server.base
+        if path in (base, base.rstrip("/"), "/", ""):
+            return ""
+        return path[len(base) :] if path.startswith(base) else path.removeprefix("/")
+
+    def _is_local(self) -> bool:
+        """Whether the host is this machine's own name, unless a proxy is expected."""
+        host, origin = self.headers.get("Host", ""), self.headers.get("Origin", "")
+        if self.server.base != "/":
+            return True
+        same = not origin or origin.partition("://")[2] == host
+        return OWN_HOST.fullmatch(host) is not None and same
+
+    @property
+    def _cookie(self) -> str:
+        return f"skinwave-{self.server.server_port}"
+
+    def _kept_token(self) -> str:
+        cookies: SimpleCookie = SimpleCookie()
+        try:
+            cookies.load(self.headers.get("Cookie", ""))
+        except Exception:  # a cookie of another program that is malformed
+            return ""
+        return cookies[self._cookie].value if self._cookie in cookies else ""
+
+    def _is_token(self, given: str) -> bool:
+        return secrets.compare_digest(given.encode("utf-8", "replace"), self.server.token.encode())
+
+    def _error(self, status: HTTPStatus, sentence: str) -> None:
+        self._send(status, _json({"error": sentence}), "application/json")
+
+    def _text(self, status: HTTPStatus, sentence: str) -> None:
+        self._send(status, sentence.encode(), "text/plain")
+
+    def _send(
+        self, status: HTTPStatus, content: bytes, kind: str, more: Mapping[str, str] | None = None
+    ) -> None:
+        self._begin(status, kind, {"Content-Length": str(len(content)), **(more or {})})
+        self.wfile.write(content)
+
+    def _begin(self, status: HTTPStatus, kind: str, more: Mapping[str, str]) -> None:
+        self.send_response(status)
+        for name, value in {"Content-Type": f"{kind}; charset=utf-8", **HEADERS, **more}.items():
+            self.send_header(name, value)
+        self.end_headers()
+
+
+def _json(value: Any) -> bytes:
+    return json.dumps(value, allow_nan=False, separators=(",", ":")).encode()
+
+
+def _sentence(error: BaseException) -> str:
+    return " ".join(str(error).split()) or "There is not enough memory. Use larger elements."
