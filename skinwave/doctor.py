@@ -16,8 +16,6 @@ DRAWING = ("matplotlib", "pyvista", "vtk", "pillow")
 OPTIONAL = (
     ("mkl", "mkl", "the fastest solver: pip install mkl (x86-64)"),
     ("imageio_ffmpeg", "imageio-ffmpeg", "MP4 films: pip install imageio imageio-ffmpeg"),
-    ("trame", "trame", "the interactive tool: pip install 'skinwave[web]'"),
-    ("trame_pyvista", "trame-pyvista", "a view that can be turned: pip install trame-pyvista"),
 )
 
 

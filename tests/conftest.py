@@ -11,7 +11,7 @@ if "PYTEST_XDIST_WORKER" in os.environ:  # before anything that reads it: a core
 import pytest
 from corpus import SMALL
 from hypothesis import HealthCheck, settings
-from in_browser import chromium, ended, served
+from in_browser import chromium
 
 import meshes
 from skinwave.verify import elements
@@ -97,11 +97,3 @@ def browser():
     """A browser, as Playwright has it."""
     with chromium() as found:
         yield found
-
-
-@pytest.fixture(scope="module")
-def address():
-    """The address of the interactive tool without bands, served by a process of its own."""
-    process, found = served("--port", "0", "--samples", "0")
-    yield found
-    ended(process)

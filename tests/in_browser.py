@@ -1,4 +1,4 @@
-"""Debian's browser without a display, and the interactive tool that it opens."""
+"""Debian's browser without a display, and the live page that skinwave web serves."""
 
 import os
 import re
@@ -57,12 +57,15 @@ def settled(page: Any) -> None:
 
 def served(*arguments: str) -> tuple[Any, str]:
     """A server in a process of its own, and its address."""
-    command = [sys.executable, "-m", "skinwave", "web", *arguments]
+    command = [sys.executable, "-m", "skinwave", "web", "--no-browser", *arguments]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=dict(os.environ))
     assert process.stderr is not None
-    found = re.search(r"http://\S+", process.stderr.readline())
-    assert found
-    return process, found.group()
+    said = []
+    for line in process.stderr:
+        said.append(line)
+        if found := re.search(r"http://\S+", line):
+            return process, found.group()
+    raise AssertionError("".join(said))
 
 
 def ended(process: Any) -> None:

@@ -21,6 +21,7 @@ from skinwave import Body, dumps, loads, parametric
 from skinwave.bodies.build import build, operators
 from skinwave.fits.fit import fit
 from skinwave.fits.predicted import predicted_lines, predicted_waveforms, target
+from skinwave.live.values import values_of
 from skinwave.load import LOADS, Load, LoadKind, register
 from skinwave.measurements import Measurement
 from skinwave.models.loads import load_in_steps, surface_load
@@ -33,7 +34,6 @@ from skinwave.simulation import compute
 from skinwave.spreads import spreads_of
 from skinwave.studies.study import own_scenes
 from skinwave.sweeps.variation import varied
-from skinwave.web.scenes import values_of
 
 SOLID = Material(density=1000, shear_modulus=2e4, poisson=0.3, viscosity=6.0)
 SMALL = """
@@ -288,7 +288,7 @@ def test_models_say_which_loads_they_do_not_take(model, scene, said):
 
 def test_pages_of_a_focus_refuse_other_loads():
     with pytest.raises(ValueError, match="is about the pressure of a focus, not a shear traction"):
-        values_of(loads('[load]\nkind = "shear"'))
+        values_of(loads('[load]\nkind = "shear"'), "skin-slab")
     with pytest.raises(ValueError, match="leave out .load., or use skinwave run or sweep"):
         own_scenes(loads('[load]\nkind = "shear"'), "sheared")
 

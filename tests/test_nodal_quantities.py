@@ -11,9 +11,7 @@ from simple_model import MovingPressure, Response, Tacton, Trajectory
 from simple_model.load_spectrum import pressure_lines, synthesise
 from simple_model.tensors import hooke
 from skinwave import exports, quantity_map, surface
-from skinwave.bodies.build import build, operators
 from skinwave.cli import main
-from skinwave.effort import silent
 from skinwave.models.reduction import oscillating
 from skinwave.pictures import films, motion, render, views
 from skinwave.pictures.nodal import shade
@@ -25,8 +23,6 @@ from skinwave.reports.gallery import Gallery
 from skinwave.run import Run
 from skinwave.scene import Body, Layer, Scene
 from skinwave.scene_file import dumps
-from skinwave.simulation import compute
-from skinwave.web.waves import reduced_answer, reduced_to_path
 
 draws = pytest.mark.skipif("not renderer().found", reason="nothing draws in three dimensions here")
 PATH = Trajectory(shape="circle", size=0.008, speed=5.0)
@@ -152,18 +148,6 @@ def test_a_film_of_a_folder_has_no_other_quantity(tmp_path, monkeypatch, capsys)
     asked = ["film", str(tmp_path), "--quantity", "strain_zz", "-o", str(tmp_path / "a.gif")]
     assert main(asked) == 2
     assert "keeps the motion alone" in capsys.readouterr().err
-
-
-def test_the_interactive_tool_reads_any_quantity_of_reduced_bodies():
-    """At the point, from the reduction to the path that its maps are made of."""
-    made = build(SCENE.body, COARSE)
-    body = reduced_to_path(made, operators(made), SCENE.body, SCENE.pressure, silent)
-    for quantity, depth, most in (("largest_shear_strain", 0.7e-3, 0.01), ("stress_zz", 0.0, 0.03)):
-        scene = replace(SCENE, quantity=quantity, depth=depth, probes=((0.006, 0.003),))
-        found = reduced_answer(body, scene).response
-        assert found.quantity == quantity
-        exact = compute(scene, "fem", h=COARSE).values
-        assert np.linalg.norm(found.values - exact) < most * np.linalg.norm(exact)
 
 
 @pytest.fixture(scope="module")

@@ -23,15 +23,12 @@ from skinwave.fits import predicted
 from skinwave.fits.parameters import parse
 from skinwave.models.free_keys import free_keys, values_at, with_values
 from skinwave.models.free_materials import affine_operators, reference_of, solids_of
-from skinwave.models.loads import surface_load
 from skinwave.models.prepared import answer as own_answer
-from skinwave.models.prepared import components, typical_spots
+from skinwave.models.prepared import components
 from skinwave.models.prepared import prepare as own_body
 from skinwave.scene import BODIES, Placement, Scene
 from skinwave.sweeps import families
 from skinwave.sweeps.variation import DesignPoint
-from skinwave.web import waves
-from skinwave.web.free_bodies import free_body, reduced_at
 
 MODULUS, LOSS = "body.material.shear_modulus_pa", "body.material.loss_factor"
 DENSITY, THICKNESS = "body.material.density_kg_m3", "body.thickness_mm"
@@ -164,20 +161,6 @@ def test_air_and_vacuum_are_two_entries_of_the_cache(tmp_path, monkeypatch):
     assert not np.array_equal(first[0][1], first[1][1])
 
 
-def test_sliders_of_a_sheet_in_air_take_its_own_reduction():
-    made = build(SHEET, 1e-2)
-    P, points = surface_load(made)
-    spots = P @ typical_spots(SHEET, points)
-    whole = free_body(SHEET, made, (P, points), fem.load_subspace(spots, 4e-3), spots, silent)
-    other = replace(SHEET, material=SHEET.solid.scaled(modulus=1.8, loss=0.7))
-    S = fem.probe_operator(made.mesh, SCENE.probe_points)
-    reduced = reduced_at(whole, other)
-    found = replace(own_body(other, SCENE.probe_points, h=1e-2), body=reduced, read=S @ whole.basis)
-    expected = components(own_body(other, SCENE.probe_points, h=1e-2), SCENE.pressure).lines
-    lines = components(found, SCENE.pressure).lines
-    assert line_errors(lines, expected).max() < 0.03
-
-
 def test_thicknesses_of_a_sheet_in_air_share_a_reduction_in_a_sweep():
     keys = free_keys(SHEET, {THICKNESS: (0.08, 0.13)})
     cases = {}
@@ -207,13 +190,6 @@ def test_ranges_too_wide_for_one_model_leave_each_sheet_its_own(monkeypatch):
     monkeypatch.setattr(predicted.parametric, "prepare", refusing)
     aim = predicted.target(SCENE, "fem", SCENE.reading.asked, SCENE.probe_points)
     assert predicted.with_reduction(aim, parse([f"{MODULUS}=1e8:1e10"], []), silent) is aim
-    monkeypatch.setattr(waves, "free_body", refusing)
-    base = replace(SHEET, width=0.02, height=0.02)
-    stiffer = replace(base, material=base.solid.scaled(modulus=1.5))
-    scene = replace(SCENE, body=stiffer, probes=((1e-3, 0.0),))
-    moved = waves.BodyResponses()(scene, silent, base=base).response
-    own = waves.BodyResponses()(scene, silent).response
-    np.testing.assert_allclose(moved.values, own.values, atol=1e-6 * np.abs(own.values).max())
 
 
 @pytest.mark.parametrize(

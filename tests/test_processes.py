@@ -28,7 +28,7 @@ from skinwave.sweeps import engine
 ROOT = Path(skinwave.__file__).parents[1]
 THIRD = ("numpy", "scipy", "matplotlib", "pyvista", "vtk", "vtkmodules", "rich", "PIL", "dask",
          "pyarrow", "threadpoolctl", "tomli_w", "meshio", "pytetwild", "pymetis", "mkl", "imageio",
-         "trame", "trame_pyvista", "packaging", "pooch", "tornado", "aiohttp")  # fmt: skip
+         "packaging", "pooch", "tornado")  # fmt: skip
 OURS = ("fem", "meshes", "simple_model")
 MARK = "with open({0!r}, 'a') as file:\n    file.write(__name__ + chr(10))\n"
 # An extension: the program itself, as it was started, does these commands before its own. Those

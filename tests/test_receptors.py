@@ -28,11 +28,6 @@ from skinwave.scene_file import dumps, loads
 from skinwave.simulation import compute
 from skinwave.sweeps.measures import columns, measured
 from skinwave.sweeps.variation import DesignPoint, cases, combinations, parse
-from skinwave.web.controls import STARTS
-from skinwave.web.model import kernel
-from skinwave.web.plots import Curves, spectrum_plot
-from skinwave.web.scenes import scene_of, values_of
-from skinwave.web.waves import BodyResponses
 
 SCENE = """
 name = "below"
@@ -286,19 +281,6 @@ def test_sweeps_have_columns_of_the_quantity():
     assert min(row["peak_von_mises_stress_pa"]) > 0
     assert "peak_um" not in row
     assert "level_db" not in row
-
-
-def test_the_interactive_tool_has_quantity_and_depth():
-    values = STARTS | {"depth": 0.7, "quantity": "strain_zz", "duration": 0.1, "x": 4.0}
-    asked = scene_of(values)
-    assert values_of(asked) == values
-    response = BodyResponses()(asked, lambda phase, done: None)
-    np.testing.assert_array_equal(response.response.values, compute(asked, "flat-body").values)
-    assert all(line.sensation is None for line in response.lines)
-    curves = Curves(kernel=kernel(asked), waves=response)
-    drawn = spectrum_plot(curves, with_threshold=False)
-    assert drawn["y2"]["said"] == "strain zz, µm/m"
-    assert not any(curve["role"] == "threshold" for curve in drawn["data"])
 
 
 def test_strain_in_a_coat_is_refused():

@@ -25,7 +25,7 @@ INNER = {
     "planning": {"bodies", "models"},
     "patterns": set(),
     "measurements": {"bodies", "models", "planning", "pictures"},
-    "pictures": {"bodies", "models", "planning"},
+    "pictures": {"bodies", "live", "models", "planning"},
     "verify": {"bodies", "models", "planning", "pictures"},
     "validate": {"bodies", "models", "planning", "pictures", "measurements"},
     "uncertainty": {"bodies", "models", "planning", "pictures", "sweeps"},
@@ -33,17 +33,7 @@ INNER = {
     "reports": {"bodies", "models", "planning", "pictures", "studies", "verify"},
     "sweeps": {"bodies", "models", "planning", "pictures", "uncertainty"},
     "inference": {"bodies", "models", "planning", "pictures", "studies", "sweeps"},
-    "web": {
-        "bodies",
-        "measurements",
-        "models",
-        "patterns",
-        "planning",
-        "pictures",
-        "reports",
-        "studies",
-        "uncertainty",
-    },
+    "live": {"bodies", "measurements", "models", "planning", "studies"},
     "fits": {"bodies", "models", "planning", "pictures", "measurements", "sweeps"},
 }
 
@@ -146,8 +136,7 @@ def test_processes_are_started_where_it_is_told():
     places = (path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
     found = {str(path.relative_to(ROOT)) for path in places if re.search(starts, path.read_text())}
     assert found == {
-        "meshes/subprocess_call.py", "skinwave/processes.py", "skinwave/web/worker.py",
-        "skinwave/web/processes.py", "skinwave/commands/rerun.py",
+        "meshes/subprocess_call.py", "skinwave/processes.py", "skinwave/commands/rerun.py",
     }  # fmt: skip
 
 
@@ -161,7 +150,6 @@ def test_the_numeric_packages_load_numpy_and_scipy_only(package):
         "vtkmodules",
         "meshio",
         "pytetwild",
-        "trame",
         "rich",
         "pymetis",
         "dask",
@@ -180,11 +168,9 @@ def test_a_comparison_loads_no_statistics():
     subprocess.check_call([sys.executable, "-c", code])
 
 
-@pytest.mark.parametrize("module", ["simulation", "sweeps.sweep", "web.layout"])
+@pytest.mark.parametrize("module", ["simulation", "sweeps.sweep", "live.serve"])
 def test_what_few_commands_need_is_loaded_by_these_alone(module):
     """Each takes a tenth of a second of every process that is started."""
-    if module == "web.layout":
-        pytest.importorskip("trame_vuetify")
     code = f"import sys, skinwave.{module}\n"
     code += (
         "assert not {'scipy.interpolate', 'scipy.optimize', 'matplotlib.figure'} & {*sys.modules}"

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from skinwave.effort import Progress, silent
+from skinwave.live.wavenumbers import FURTHEST, wavenumbers
 from skinwave.scene import Body
-from skinwave.web.slabs import FURTHEST, wavenumbers
 
 LOWEST = 0.1  # m: height of the focus from which a pack serves every height
 

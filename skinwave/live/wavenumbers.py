@@ -1,16 +1,13 @@
-"""The wavenumber integral of a flat body as a table, made anew for a height within a slider's step.
+"""The compliance of a laterally infinite body on a grid of wavenumbers for its integral
 
     g(r, w) = 1/(2 pi) int_0^inf S(k) G(k, w) J0(k r) k dk
 
-in which only the transform S of the focal pressure profile depends on the height: G, which takes
-the time, is cached on a grid of wavenumbers that is fine and wide enough for the narrowest profile
-of a range of heights. As in `simple_model.wavenumber_integral` the path of integration runs above
-the real axis, away from the poles of waves.
+in which only the transform S of the focal pressure profile depends on the height of the focus: the
+grid is fine and wide enough for the narrowest profile. As in `simple_model.wavenumber_integral`
+the path of integration runs above the real axis, away from the poles of waves.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
 
 import numpy as np
 from scipy.special import jv
@@ -20,7 +17,7 @@ from meshes.tetmesh import Floats
 from simple_model.compliance import Compliance
 from simple_model.focus import spot_width
 from simple_model.wavenumber_integral import AT_ONCE, INTEGRATION_ERROR, MOST_NODES, UNRESOLVED
-from skinwave.bodies.analytic import compliance, has_exact_waves, stack
+from skinwave.bodies.analytic import compliance
 from skinwave.effort import Progress
 from skinwave.scene import Body
 
@@ -28,34 +25,10 @@ HIGHEST = 1200.0  # Hz: skin moves by less than a thousandth of its most above
 SPACING = 2.5  # Hz between frequencies of a table: motion that lasts up to 0.2 s
 MIDDLE, DAMPED = 300.0, 0.1  # Hz, and the loss factor above which motion there lasts 10 ms
 FURTHEST = 0.145  # m: from a path in one corner of the area to the other
-RANGES = 0.02, 0.08, 0.16  # m: heights that ranges begin at, whose focal spots are the narrowest
 ORDER = 16  # of Gauss and Legendre's rule on each panel
 FEWEST_NODES = 256  # of the wavenumber grid
 LOOKED = 16  # every so many frequencies and distances the grid is checked at
-PHASE = "wavenumber integral of the slab"
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Table:
-    """g (f, r) in m/Pa at `frequencies` (f,) in Hz and `distances` (r,) in metre."""
-
-    frequencies: Floats
-    distances: Floats
-    g: fem.Complex
-
-    @cached_property
-    def along_frequencies(self) -> Any:
-        """Cubic spline of a frequency (...) to (..., r)."""
-        from scipy.interpolate import CubicSpline  # which takes long to import
-
-        return CubicSpline(self.frequencies, self.g, axis=0)
-
-    @cached_property
-    def along_distances(self) -> Any:
-        """Cubic spline of a distance (...) to (f, ...)."""
-        from scipy.interpolate import CubicSpline
-
-        return CubicSpline(self.distances, self.g, axis=1)
+PHASE = "wavenumber integral"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,26 +47,14 @@ class Wavenumbers:
     G: fem.Complex
 
 
-def is_tabulated(body: Body) -> bool:
-    """Whether a body has a table: a wavenumber integral at real frequencies down to rest, where a
-    free slab has a rigid-body drift.
-    """
-    return has_exact_waves(body) and stack(body).is_fixed
-
-
-def lowest(height: float) -> float:
-    """Height in metre that the range of a height begins at."""
-    return max((low for low in RANGES if low <= height), default=RANGES[0])
-
-
 def wavenumbers(body: Body, low: float, progress: Progress) -> Wavenumbers:
-    """The compliance of a flat body on a grid that serves every height of a range.
+    """Return the compliance of a flat body on a grid that serves every height from `low` on.
 
     Parameters
     ----------
     body : Body
-    low : metre, where the range begins
-    progress : is told of the phase
+    low : metre, the lowest height of the focus
+    progress : told of the phase
 
     Returns
     -------
@@ -125,13 +86,6 @@ def _frequencies(body: Body) -> Floats:
     damped = min(modulus.imag / modulus.real for modulus in moduli) > DAMPED
     fine = np.arange(0.0, HIGHEST + SPACING, SPACING)
     return fine[(fine <= MIDDLE) | (fine % (2 * SPACING) == 0)] if damped else fine
-
-
-def tabulate(known: Wavenumbers, height: float) -> Table:
-    """The table of a flat body for a height in metre."""
-    return Table(
-        frequencies=known.frequencies, distances=known.distances, g=_tabulated(known, height)
-    )
 
 
 def _distances(height: float) -> Floats:
