@@ -1,0 +1,397 @@
+// Plots as SVG: curves, stems and names over two vertical axes that keep their scale; zoom, reading
+// by pointer and keyboard, and figures to save.
+
+const NS = "http://www.w3.org/2000/svg";
+const LEFT = 44, RIGHT = 46, TOP = 20, BOTTOM = 20;
+const NAME_HEIGHT = 12, READ_WITHIN = 14; // px
+
+/** The smallest of 1, 1.5, 2, 3, 4, 5, 6, 8 times a power of ten that is not below a value. */
+export function niceTop(value) {
+  if (!(value > 0) || !Number.isFinite(value)) return 1;
+  const unit = 10 ** Math.floor(Math.log10(value) + 1e-12);
+  return unit * ([1, 1.5, 2, 3, 4, 5, 6, 8, 10].find((step) => step * unit >= value * (1 - 1e-9)) ?? 10);
+}
+
+/**
+ * Tops of axes by name that keep while a control moves: they grow if a curve does not fit and shrink
+ * only when nothing moves or a curve fills less than a fifth of the axis.
+ */
+export function keptScales() {
+  const tops = new Map();
+  return (name, largest, moving) => {
+    const fit = niceTop(1.08 * largest), top = tops.get(name);
+    if (top === undefined || fit > top || (!moving && fit < top)) tops.set(name, fit);
+    return tops.get(name);
+  };
+}
+
+/** Round values within [low, high], about `count` of them, and the step between them. */
+export function ticks(low, high, count) {
+  const raw = (high - low) / Math.max(count, 1), unit = 10 ** Math.floor(Math.log10(raw));
+  const step = unit * [1, 2, 5, 10].find((s) => s * unit >= raw * 0.999);
+  const values = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) values.push(k * step);
+  return { values, step };
+}
+
+/** A number with as many decimals as its step needs. */
+export function atStep(value, step) {
+  const decimals = Math.max(0, Math.ceil(-Math.log10(step) - 1e-9));
+  return (Math.abs(value) < 1e-9 * step ? 0 : value).toFixed(Math.min(decimals, 6)).replace("-", "−");
+}
+
+/** A number to three digits, with a typeset minus. */
+export function rounded(value, digits = 3) {
+  if (!Number.isFinite(value)) return "–";
+  if (value === 0) return "0";
+  const decimals = Math.max(0, Math.min(digits - 1 - Math.floor(Math.log10(Math.abs(value))), 9));
+  return value.toFixed(decimals).replace("-", "−");
+}
+
+/** Text with its special characters escaped for SVG and HTML. */
+export const escaped = (text) => String(text).replace(/[&<>"]/g,
+  (c) => ({ "&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;" })[c]);
+
+/** SVG of a name such as f_d or 2 f_AM − f_d: what follows an underscore is a subscript. */
+export const subscripted = (name) => escaped(name).replace(/_(\w+)/g,
+  '<tspan dy="2.5" font-size="80%">$1</tspan><tspan dy="-2.5">&#8203;</tspan>');
+
+/** Points of a curve, at most two in each pixel column: the least and the largest. */
+function thinned(xs, ys, toX, width) {
+  if (xs.length < 3 * width) return [xs, ys];
+  const outX = [], outY = [];
+  let column = -1, low = 0, high = 0;
+  const flush = () => {
+    for (const k of low < high ? [low, high] : [high, low]) { outX.push(xs[k]); outY.push(ys[k]); }
+  };
+  for (let k = 0; k < xs.length; k++) {
+    const own = Math.floor(toX(xs[k]));
+    if (own !== column) {
+      if (column !== -1) flush();
+      column = own;
+      low = high = k;
+    } else if (ys[k] < ys[low]) low = k;
+    else if (ys[k] > ys[high]) high = k;
+  }
+  flush();
+  return [outX, outY];
+}
+
+/**
+ * A plot inside an element.
+ *
+ * `draw(spec)` takes { x: {label, range}, y: {label, range, role}, y2, curves, names, notes, kept,
+ * hatched, label }. A curve has {role, axis: "y"|"y2", x, y, name, width, dash, fill, stems, offset,
+ * faint}; names are [{x, y, axis, text}], the most important first. Zoom lasts until `kept` changes.
+ */
+export function createPlot(host, { announce = () => {}, onZoom = () => {} } = {}) {
+  const svg = document.createElementNS(NS, "svg");
+  svg.setAttribute("tabindex", "0");
+  svg.setAttribute("role", "img");
+  svg.classList.add("plot");
+  const picture = document.createElementNS(NS, "g"), over = document.createElementNS(NS, "g");
+  svg.append(picture, over);
+  host.append(svg);
+  const clip = `clip-${host.id}`;
+  let spec = null, zoom = null, kept = null, size = [0, 0], cursor = null, read = -1;
+
+  const shown = () => zoom ?? spec.x.range;
+  const area = () => [LEFT, TOP, size[0] - (spec.y2 ? RIGHT : 12), size[1] - BOTTOM];
+  const toX = (v) => {
+    const [x0, , x1] = area(), [low, high] = shown();
+    return x0 + (x1 - x0) * (v - low) / (high - low || 1);
+  };
+  const toY = (v, axis) => {
+    const [, y0, , y1] = area(), [low, high] = spec[axis].range;
+    return y1 - (y1 - y0) * (v - low) / (high - low || 1);
+  };
+
+  function render() {
+    if (!spec || !size[0]) return;
+    svg.setAttribute("viewBox", `0 0 ${size[0]} ${size[1]}`);
+    svg.setAttribute("aria-label", spec.label);
+    const [x0, y0, x1, y1] = area();
+    const parts = [`<clipPath id="${clip}"><rect x="${x0}" y="${y0 - 6}" width="${Math.max(x1 - x0, 1)}"
+      height="${Math.max(y1 - y0 + 7, 1)}"/></clipPath>`];
+    parts.push(axes(x0, y0, x1, y1), `<g clip-path="url(#${clip})">`);
+    for (const curve of spec.curves) parts.push(curve.stems ? stems(curve) : line(curve));
+    if (spec.hatched) parts.push(`<rect class="hatched" fill="url(#hatch)" x="${x0}" y="${y0}"
+      width="${Math.max(x1 - x0, 1)}" height="${Math.max(y1 - y0, 1)}"/>`);
+    parts.push("</g>", legend(x0, x1), names(x0, x1));
+    picture.innerHTML = parts.join("");
+    mark();
+  }
+
+  function axes(x0, y0, x1, y1) {
+    const parts = [`<path class="axis" d="M${x0},${y0}V${y1}H${x1}${spec.y2 ? `V${y0}` : ""}"/>`];
+    const [low, high] = shown(), label = spec.x.label, room = 6 * label.length + 8;
+    const across = ticks(low, high, (x1 - x0) / 64);
+    for (const v of across.values) {
+      const x = toX(v).toFixed(1);
+      parts.push(`<path class="grid" d="M${x},${y0}V${y1}"/>`);
+      if (x < x1 - room) parts.push(`<text x="${x}" y="${y1 + 13}" text-anchor="middle">${
+        atStep(v, across.step)}</text>`);
+    }
+    parts.push(`<text x="${x1}" y="${y1 + 13}" text-anchor="end">${escaped(label)}</text>`);
+    for (const axis of spec.y2 ? ["y", "y2"] : ["y"]) {
+      const own = spec[axis], up = ticks(...own.range, (y1 - y0) / 34);
+      const [x, anchor] = axis === "y" ? [x0 - 4, "end"] : [x1 + 4, "start"];
+      for (const v of up.values) {
+        const y = toY(v, axis);
+        if (axis === "y") parts.push(`<path class="grid${v === 0 ? " zero" : ""}" d="M${x0},${
+          y.toFixed(1)}H${x1}"/>`);
+        parts.push(`<text class="of-${own.role ?? "ink"}" x="${x}" y="${(y + 3.5).toFixed(1)}"
+          text-anchor="${anchor}">${atStep(v, up.step)}</text>`);
+      }
+      parts.push(`<text class="of-${own.role ?? "ink"} unit" x="${axis === "y" ? 2 : size[0] - 2}" y="11"
+        text-anchor="${axis === "y" ? "start" : "end"}">${escaped(own.label)}</text>`);
+    }
+    return parts.join("");
+  }
+
+  function line(curve) {
+    const [, , x1] = area();
+    const [xs, ys] = thinned(curve.x, curve.y, toX, x1 - LEFT);
+    const [low, high] = spec[curve.axis].range, reach = 2 * (high - low);
+    let d = "", on = false;
+    for (let k = 0; k < xs.length; k++) {
+      const y = ys[k];
+      if (!Number.isFinite(y)) { on = false; continue; }
+      const inside = Math.min(Math.max(y, low - reach), high + reach);
+      d += `${on ? "L" : "M"}${toX(xs[k]).toFixed(1)},${toY(inside, curve.axis).toFixed(1)}`;
+      on = true;
+    }
+    if (curve.fill && d) d += `L${toX(xs[xs.length - 1]).toFixed(1)},${toY(0, curve.axis).toFixed(1)}L${
+      toX(xs[0]).toFixed(1)},${toY(0, curve.axis).toFixed(1)}Z`;
+    return `<path class="curve is-${curve.role}${curve.fill ? " filled" : ""}${curve.faint ? " faint" : ""
+    }" d="${d}"${curve.width ? ` stroke-width="${curve.width}"` : ""}${
+      curve.dash ? ` stroke-dasharray="${curve.dash}"` : ""}/>`;
+  }
+
+  function stems(curve) {
+    const base = toY(Math.max(0, spec[curve.axis].range[0]), curve.axis);
+    let d = "", heads = "";
+    for (let k = 0; k < curve.x.length; k++) {
+      const x = toX(curve.x[k]) + (curve.offset ?? 0), y = toY(curve.y[k], curve.axis);
+      if (y > base - 0.5) continue;
+      d += `M${x.toFixed(1)},${base.toFixed(1)}V${y.toFixed(1)}`;
+      heads += curve.head === "square"
+        ? `<rect x="${(x - 2).toFixed(1)}" y="${(y - 2).toFixed(1)}" width="4" height="4"/>`
+        : `<circle cx="${x.toFixed(1)}" cy="${y.toFixed(1)}" r="2.3"/>`;
+    }
+    return `<g class="stems is-${curve.role}${curve.faint ? " faint" : ""}"><path d="${d}"/>${heads}</g>`;
+  }
+
+  /** Names of curves above the plot, between the units of the axes. */
+  function legend(x0, x1) {
+    const named = spec.curves.filter((curve) => curve.name);
+    const widths = named.map((curve) => 20 + 5.7 * curve.name.length);
+    let x = Math.max(x0, (x0 + x1 - widths.reduce((a, b) => a + b, 0)) / 2);
+    return named.map((curve, k) => {
+      const at = x;
+      x += widths[k];
+      if (x > size[0]) return "";
+      const sign = curve.stems ? `<g class="stems is-${curve.role}"><path d="M${at + 5},11V4"/><circle cx="${
+        at + 5}" cy="4" r="2.2"/></g>` : `<path class="curve is-${curve.role}" d="M${at},7h11"${
+        curve.dash ? ` stroke-dasharray="${curve.dash}"` : ""}/>`;
+      return `${sign}<text x="${at + 14}" y="11">${escaped(curve.name)}</text>`;
+    }).join("");
+  }
+
+  function names(x0, x1) {
+    const boxes = [];
+    return (spec.names ?? []).map(({ x, y, axis, text }) => {
+      const width = 5.4 * text.replace(/_/g, "").length + 4, [low, high] = shown();
+      if (x < low || x > high) return "";
+      const at = Math.min(Math.max(toX(x), x0 + width / 2), x1 - width / 2);
+      let up = Math.max(toY(y, axis) - 6, TOP + 2);
+      const hits = () => boxes.some((b) => Math.abs(b.at - at) < (b.width + width) / 2
+        && Math.abs(b.up - up) < NAME_HEIGHT);
+      for (let tries = 0; tries < 3 && hits(); tries++) up -= NAME_HEIGHT;
+      if (hits() || up < TOP - 4) return "";
+      boxes.push({ at, up, width });
+      return `<text class="name" x="${at.toFixed(1)}" y="${up.toFixed(1)}" text-anchor="middle">${
+        subscripted(text)}</text>`;
+    }).join("");
+  }
+
+  /** Cursor of the playback, and what is read or selected. */
+  function mark(selection = null) {
+    const [x0, y0, x1, y1] = area(), parts = [];
+    if (cursor !== null && cursor >= shown()[0] && cursor <= shown()[1]) {
+      parts.push(`<path class="cursor" d="M${toX(cursor).toFixed(1)},${y0}V${y1}"/>`);
+    }
+    if (selection) parts.push(`<rect class="selection" x="${Math.min(...selection)}" y="${y0}"
+      width="${Math.abs(selection[1] - selection[0])}" height="${y1 - y0}"/>`);
+    if (read >= 0 && spec.curves.length) {
+      const { x, said } = readings()[read] ?? {};
+      if (said) {
+        const at = toX(x), end = at > (x0 + x1) / 2;
+        parts.push(`<path class="reading" d="M${at.toFixed(1)},${y0}V${y1}"/>`, `<text class="read" x="${
+          (at + (end ? -5 : 5)).toFixed(1)}" y="${y0 + 10}" text-anchor="${end ? "end" : "start"}">${
+          escaped(said)}</text>`);
+      }
+    }
+    over.innerHTML = parts.join("");
+  }
+
+  /** Places that can be read: lines of a spectrum, or points of the first named curve. */
+  function readings() {
+    const curves = spec.curves.filter((curve) => curve.name && !curve.fill);
+    const lead = curves.find((curve) => curve.stems) ?? curves[0];
+    if (!lead) return [];
+    const [low, high] = shown(), found = [];
+    for (let k = 0; k < lead.x.length; k++) {
+      const x = lead.x[k];
+      if (x < low || x > high) continue;
+      const values = curves.map((curve) => {
+        const j = curve.x === lead.x ? k : nearest(curve.x, x);
+        if (j < 0 || Math.abs(curve.x[j] - x) > (high - low) / 50) return "";
+        return `${curve.name} ${rounded(curve.y[j])}`;
+      }).filter(Boolean);
+      found.push({ x, said: `${rounded(x, 4)} ${spec.x.label.split(", ").pop()}: ${values.join(", ")}` });
+    }
+    return found;
+  }
+
+  function setZoom(range) {
+    const [low, high] = spec.x.range;
+    if (range) {
+      const width = Math.min(Math.max(range[1] - range[0], (high - low) / 500), high - low);
+      const start = Math.min(Math.max(range[0], low), high - width);
+      zoom = width >= (high - low) * 0.999 ? null : [start, start + width];
+    } else zoom = null;
+    read = -1;
+    onZoom(zoom);
+    render();
+  }
+
+  const place = (event) => event.clientX - svg.getBoundingClientRect().left;
+  const fromX = (px) => {
+    const [x0, , x1] = area(), [low, high] = shown();
+    return low + (high - low) * Math.min(Math.max((px - x0) / (x1 - x0), 0), 1);
+  };
+  let pressed = null;
+  svg.addEventListener("pointerdown", (event) => {
+    if (event.pointerType === "mouse" && spec) {
+      pressed = place(event);
+      svg.setPointerCapture(event.pointerId);
+    }
+  });
+  svg.addEventListener("pointermove", (event) => {
+    if (!spec) return;
+    if (pressed !== null) mark([pressed, place(event)]);
+    else {
+      const all = readings(), x = fromX(place(event));
+      const found = nearest(all.map((each) => each.x), x);
+      read = found >= 0 && Math.abs(toX(all[found].x) - place(event)) < READ_WITHIN ? found : -1;
+      mark();
+    }
+  });
+  svg.addEventListener("pointerup", (event) => {
+    if (pressed === null) return;
+    const ends = [pressed, place(event)].sort((a, b) => a - b);
+    pressed = null;
+    if (ends[1] - ends[0] > 5) setZoom(ends.map(fromX)); else mark();
+  });
+  svg.addEventListener("pointerleave", () => { read = -1; if (spec && pressed === null) mark(); });
+  svg.addEventListener("dblclick", () => spec && setZoom(null));
+  svg.addEventListener("keydown", (event) => {
+    if (!spec || event.ctrlKey || event.metaKey || event.altKey) return;
+    const [low, high] = shown(), middle = (low + high) / 2, width = high - low;
+    const way = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    if (event.key === "+" || event.key === "=") setZoom([middle - width / 4, middle + width / 4]);
+    else if (event.key === "-") setZoom([middle - width, middle + width]);
+    else if (event.key === "Home" || event.key === "Escape") setZoom(null);
+    else if (way && event.shiftKey) {
+      const all = readings();
+      read = Math.min(Math.max(read + way * Math.max(1, Math.round(all.length / 100)), 0), all.length - 1);
+      announce(all[read]?.said ?? "nothing to read");
+      mark();
+    } else if (way) setZoom([low + way * width / 8, high + way * width / 8]);
+    else return;
+    event.preventDefault();
+  });
+  new ResizeObserver(() => {
+    size = [host.clientWidth, host.clientHeight];
+    render();
+  }).observe(host);
+
+  return {
+    svg,
+    draw(given) {
+      if (given.kept !== kept) { zoom = null; kept = given.kept; }
+      spec = given;
+      render();
+    },
+    setCursor(x) { cursor = x; if (spec && size[0]) mark(); },
+    get zoom() { return zoom; },
+  };
+}
+
+/** Index of the value nearest x among ascending ones; -1 if there are none. */
+function nearest(values, x) {
+  let low = 0, high = values.length - 1;
+  if (high < 0) return -1;
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (values[middle] <= x) low = middle; else high = middle;
+  }
+  return x - values[low] <= values[high] - x ? low : high;
+}
+
+const STYLED = ["fill", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin", "opacity",
+  "fill-opacity", "font-size", "font-family", "font-weight"];
+
+/** An SVG element as text that stands alone: styles written into it. */
+function standalone(svg, x, y) {
+  const copy = svg.cloneNode(true), from = [...svg.querySelectorAll("*")];
+  [...copy.querySelectorAll("*")].forEach((element, k) => {
+    const style = getComputedStyle(from[k]);
+    for (const name of STYLED) element.setAttribute(name, style.getPropertyValue(name));
+    element.removeAttribute("class");
+  });
+  const { width, height } = svg.getBoundingClientRect();
+  for (const [name, value] of Object.entries({ x, y, width, height })) copy.setAttribute(name, value);
+  for (const name of ["class", "tabindex", "role", "aria-label", "style"]) copy.removeAttribute(name);
+  return new XMLSerializer().serializeToString(copy);
+}
+
+/**
+ * One SVG of plots, canvases and texts where they stand on the page.
+ *
+ * `parts` are elements: svg, canvas, or ones whose text is copied. Returns {text, width, height}.
+ */
+export function figureOf(parts, paper) {
+  const seen = parts.filter((part) => part.getClientRects().length);
+  const boxes = seen.map((part) => part.getBoundingClientRect());
+  const left = Math.min(...boxes.map((b) => b.left)) - 8, top = Math.min(...boxes.map((b) => b.top)) - 8;
+  const width = Math.max(...boxes.map((b) => b.right)) - left + 8;
+  const height = Math.max(...boxes.map((b) => b.bottom)) - top + 8;
+  const inside = seen.map((part, k) => {
+    const x = boxes[k].left - left, y = boxes[k].top - top;
+    if (part instanceof SVGSVGElement) return standalone(part, x, y);
+    if (part instanceof HTMLCanvasElement) {
+      return `<image x="${x}" y="${y}" width="${boxes[k].width}" height="${boxes[k].height}" href="${
+        part.toDataURL()}"/>`;
+    }
+    const style = getComputedStyle(part);
+    return `<text x="${x}" y="${y + 0.78 * boxes[k].height}" fill="${style.color}" font-family="sans-serif"
+      font-size="${style.fontSize}" font-weight="${style.fontWeight}">${escaped(part.innerText)}</text>`;
+  });
+  const text = `<svg xmlns="${NS}" width="${width}" height="${height}" viewBox="0 0 ${width} ${height}">
+<rect width="100%" height="100%" fill="${paper}"/>${inside.join("\n")}</svg>`;
+  return { text, width, height };
+}
+
+/** PNG of an SVG text, `scale` times as large; a promise of a blob. */
+export async function pngOf({ text, width, height }, scale = 2) {
+  const picture = new Image();
+  picture.src = URL.createObjectURL(new Blob([text], { type: "image/svg+xml" }));
+  await picture.decode();
+  const canvas = document.createElement("canvas");
+  [canvas.width, canvas.height] = [Math.round(scale * width), Math.round(scale * height)];
+  canvas.getContext("2d").drawImage(picture, 0, 0, canvas.width, canvas.height);
+  URL.revokeObjectURL(picture.src);
+  return new Promise((resolve) => canvas.toBlob(resolve, "image/png"));
+}
