@@ -37,7 +37,7 @@ const HELP = {
   measurement: "A CSV file: time or frequency in the first column. It is drawn over the waves.",
 };
 const SHORT = {
-  am: "AM", am2: "Second AM", envelope: "Envelope", ratio: "Ratio AM : 2nd", shape: "Shape", speed: "Speed",
+  am: "AM", am2: "Second AM", envelope: "Envelope", ratio: "Mix", shape: "Shape", speed: "Speed",
   drawn: "Drawn", height: "Height", drive: "Drive law", profile: "Profile", foci: "Foci",
   modulation: "Modulation", peak: "Peak pressure", quantity: "Quantity", sharing: "Foci are made",
   pulses: "On/off, ms", phases: "Phases, %", polyline: "Corners, mm", sweep: "Sweep",
@@ -94,13 +94,18 @@ const section = (id, title, body, note = "") => `<details name="more" id="${id}"
   note ? `<p class="note">${note}</p>` : ""}</div></details>`;
 
 /** HTML of a body's keys: editable with a server, otherwise as they are. */
-export function bodyKeys(body, editable) {
-  const rows = (body.keys ?? []).map(({ key, label, unit, value, low, high, step }) => (editable
-    ? `<div class="row"><span class="head"><label for="key-${key}" title="${escaped(label)}">${escaped(label)
-    }</label></span><input type="range" data-body="${key}" min="${low}" max="${high}" step="${step}" value="${value}"
-      aria-label="${escaped(label)}, ${escaped(unit)}"><input class="field" id="key-${key}" data-body="${key}"
-      value="${value}" inputmode="decimal" autocomplete="off"><span class="unit">${escaped(unit)}</span></div>`
-    : `<div class="fact"><span>${escaped(label)}</span><b>${escaped(value)} ${escaped(unit)}</b></div>`));
+function bodyKeys(body, editable) {
+  const rows = (body.keys ?? []).map(({ key, label, unit, value, low, high, step, choices }) => {
+    const name = `<span class="head"><label for="key-${key}" title="${escaped(label)}">${escaped(label)}</label></span>`;
+    if (!editable) return `<div class="fact"><span>${escaped(label)}</span><b>${escaped(value)} ${escaped(unit)}</b></div>`;
+    if (choices) {
+      return `<div class="row wide">${name}<select id="key-${key}" data-body="${key}">${choices.map((each) => `<option${
+        each === value ? " selected" : ""}>${escaped(each)}</option>`).join("")}</select></div>`;
+    }
+    return `<div class="row">${name}<input type="range" data-body="${key}" min="${low}" max="${high}" step="${step}"
+      value="${value}" aria-label="${escaped(label)}, ${escaped(unit)}"><input class="field" id="key-${key}"
+      data-body="${key}" value="${value}" inputmode="decimal" autocomplete="off"><span class="unit">${escaped(unit)}</span></div>`;
+  });
   return rows.join("") || '<p class="note">This body has no values to change.</p>';
 }
 
@@ -133,7 +138,7 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
       ${choiceRow("drive")}${choiceRow("profile")}<div class="row wide"><span class="head"><span>Kernel</span>${
         question("published", "Kernel as published")}</span><label class="pair"><input type="checkbox" id="published">
         as published, too</label></div>`),
-    section("body-more", "Layers and material", '<div id="keys"></div>', editable
+    section("body-more", "Layers", '<div id="keys"></div>', editable
       ? "Moving a value computes the body again. The old result is pale meanwhile."
       : "This file holds finished bodies. Run <code>skinwave web</code> to change their values."),
     section("point-more", "Point", `${numberRow("x")}${numberRow("y")}${choiceRow("quantity")}`),
@@ -286,8 +291,14 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
       };
       for (const [id, text] of Object.entries(digest)) $(`${id}-digest`).textContent = text;
     },
-    showBody(body, own = editable) {
-      $("keys").innerHTML = bodyKeys(body, own);
+    showBodies(own) {
+      $("body").innerHTML = own.map(({ name, title }) => `<option value="${escaped(name)}">${escaped(title)}</option>`).join("");
+      $("body").value = values.body;
+    },
+    showBody(body) {
+      const focused = document.activeElement?.dataset?.body, kind = document.activeElement?.type;
+      $("keys").innerHTML = bodyKeys(body, editable);
+      if (focused) host.querySelector(`[data-body="${focused}"][type="${kind}"]`)?.focus();
       $("body-more-digest").textContent = body.title;
     },
     mark(key, wrong) {

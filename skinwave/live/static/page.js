@@ -1,4 +1,569 @@
-// The page: reads its data and shows it.
+// The page: reads its data, answers at every move of a control, and shows the answer.
+
+import { mapsOf, respond as respondTo } from "./answer.js";
+import { openBody } from "./bodies.js";
+import { buildControls } from "./controls.js";
+import { readMeasurement } from "./files.js";
+import { addressOf, createHistory, readAddress } from "./history.js";
+import { openKernel } from "./kernel.js";
+import { drawingFrequency } from "./load.js";
+import { MAP_LEGEND, drawMap, mapControls } from "./maps.js";
+import { createPlot, escaped, keptScales, rounded } from "./plots.js";
+import { OVER, commandedPlot, comparison, difference, dispersionPlot, fociAt, levelPlot, linesTable,
+  pathsOf, spanOf, spectrumPlot, tiles, waveformPlot } from "./results.js";
+import { offerSaves, playSound } from "./saving.js";
+import { runSelftest } from "./selftest.js";
+import { requestBody, sendFile } from "./server.js";
+import { LABELS, STARTS, check, fitPaths, holdFrequency, loadOf, nameBodies } from "./values.js";
+import { openView } from "./view3d.js";
 
 const data = JSON.parse(document.getElementById("data").textContent);
-document.getElementById("app").textContent = data.bodies.map((body) => body.title).join(", ");
+const $ = (id) => document.getElementById(id);
+const all = (selector) => [...document.querySelectorAll(selector)];
+
+const SPANS = { auto: "automatic", "first 20 ms": "first 20 ms", "first 60 ms": "first 60 ms",
+  "last 60 ms": "last 60 ms", "one rhythm": "one rhythm", "whole Tacton": "all" };
+const PLAYED = 3.5; // s that a period takes when played
+const QUIET = 300; // ms without a move, after which slow results are computed
+const REFINED = 1e-3; // of a control's range, to which the highest level is refined
+
+const opened = new Map(); // bodies by name
+const kernelBody = openKernel();
+const starts = { ...STARTS, ...data.start };
+const view = { look: "maps", tab: "lines", span: "auto", decibel: false, highest: 600, over: "speed", mapDecibel: 0,
+  published: false, held: 0, follow: true };
+const errors = new Map(); // what is typed wrong, by control
+const scale = keptScales();
+let values = starts, answer = null, pinned = null, measured = null, history = null, controls = null;
+let frameDue = 0, mapsDue = 0, slowDue = 0, moving = false, levels = null, solid = null, solidOf = null;
+let playing = 0, clock = 0, stale = false, editing = null, notice = "", seenWarnings = [];
+
+const recordOf = (name) => data.bodies.find((body) => body.name === name) ?? data.bodies[0];
+
+function bodyOf(name) {
+  const record = recordOf(name);
+  if (!opened.has(record.name)) opened.set(record.name, openBody(record));
+  return opened.get(record.name);
+}
+
+const respond = (own) => respondTo(own, bodyOf(own.body), kernelBody, { published: view.published });
+
+function change(key, value, settled) {
+  let next = { ...values, [key]: value };
+  if (key === "foci" || key === "paths") next = fitPaths(next, key);
+  if (view.held && ["size", "speed", "shape"].includes(key)) {
+    try { next = { ...next, ...holdFrequency(next, key, view.held) }; } catch (error) { say(error.message); return; }
+  }
+  set(next, settled);
+}
+
+/** Take values; `settled` ones are a step that can be undone. */
+function set(next, settled = true) {
+  const other = next.body !== values.body;
+  values = next;
+  if (settled) {
+    history.add(values);
+    writeAddress();
+  }
+  if (other) showBody();
+  ask();
+}
+
+const ask = () => { frameDue ||= requestAnimationFrame(showCurves); };
+
+function writeAddress() {
+  const shown = { view: view.look === "maps" ? "" : view.look, tab: view.tab === "lines" ? "" : view.tab };
+  try { window.history.replaceState(null, "", addressOf(values, starts, shown)); } catch { /* not from every host */ }
+  $("undo").disabled = !history.undoable;
+  $("redo").disabled = !history.redoable;
+}
+
+const say = (text) => { notice = text; showSlot(); };
+
+function showSlot() {
+  const wrong = [...errors.values()].find(Boolean) ?? "";
+  $("problem").textContent = wrong;
+  const { title, error } = answer?.body ?? {};
+  const expected = error ? `${title}: motion is within ${rounded(100 * error, 2)} % of the full model` : "";
+  $("notice").textContent = wrong ? "" : notice || expected;
+  const warned = [...new Set([...(answer?.body.warnings ?? []), ...(answer?.warnings ?? [])])];
+  $("warned").hidden = !warned.length;
+  $("warned").textContent = warned.length === 1 ? "1 warning" : `${warned.length} warnings`;
+  seenWarnings = warned;
+}
+
+function showCurves() {
+  frameDue = 0;
+  const began = performance.now();
+  try {
+    answer = { ...respond(values), invalid: answer?.body.name === values.body && answer.invalid };
+    errors.delete("load");
+  } catch (error) {
+    errors.set("load", error.message);
+    showSlot();
+    controls.show(values, facts());
+    return;
+  }
+  const { load } = answer, span = spanOf(view.span, load), fit = (name, largest) => scale(name, largest, moving);
+  const given = { pinned, measured, scale: fit, highest: view.highest, decibel: view.decibel };
+  plots.commanded.draw(commandedPlot(answer, span));
+  plots.waveform.draw(waveformPlot(answer, span, given));
+  plots.spectrum.draw(spectrumPlot(answer, given));
+  controls.show(values, facts());
+  $("commanded-said").textContent = `${values.drive.replaceAll("_", " ")}, ${rounded(load.duration)} s`;
+  $("follow-row").hidden = !load.pulses;
+  showTiles();
+  showPane();
+  showSlot();
+  document.documentElement.dataset.took = (performance.now() - began).toFixed(1);
+  mapsDue ||= requestAnimationFrame(showMaps);
+  clearTimeout(slowDue);
+  levels = levels?.of === keyOfLevels() ? levels : null;
+  if (view.tab === "level" && !levels) slowDue = setTimeout(computeLevels, QUIET);
+}
+
+const facts = () => {
+  try {
+    return { drawing: drawingFrequency((answer?.values === values ? answer.load : loadOf(values)).path), held: Boolean(view.held) };
+  } catch { return { drawing: 0, held: Boolean(view.held) }; }
+};
+
+function showMaps() {
+  mapsDue = 0;
+  const own = answer, before = own.invalid;
+  Object.assign(own, mapsOf(own));
+  if ((own.invalid || "") !== (before || "")) ask(); // plots are hatched, too
+  drawMaps();
+  showTiles();
+  if (view.tab === "ab") showPane();
+  if (view.look === "3d") showSolid();
+}
+
+function drawMaps() {
+  if (!answer?.maps || view.look === "3d") return;
+  const { maps, load, x, y, body } = answer, at = pinned?.maps ? pinned : null;
+  const marks = { path: pathsOf(load), point: [x, y], foci: fociAt(load, clock), influenced: maps.kernel.rms,
+    decibel: view.mapDecibel };
+  const top = (name, rms) => scale(`map ${name}`, rms.reduce((most, v) => (v > most ? v : most), 0), moving);
+  const wavesTop = Math.max(top(`waves ${body.name}`, maps.waves.rms), at ? top(`waves ${at.body.name}`, at.maps.waves.rms) : 0);
+  if (at) {
+    drawMap($("kernel-map"), { ...marks, path: pathsOf(at.load), foci: [], point: [at.x, at.y], influenced: at.maps.kernel.rms,
+      rms: at.maps.waves.rms, level: at.body.is_skin ? at.maps.waves.level : null, unit: "m", largest: wavesTop,
+      title: `A: ${at.body.title}`, hatched: at.invalid });
+  } else {
+    drawMap($("kernel-map"), { ...marks, rms: maps.kernel.rms, level: body.is_skin ? maps.kernel.level : null, unit: "Pa",
+      largest: top("kernel", maps.kernel.rms), title: "Kernel, RMS" });
+  }
+  const waves = view.look === "difference"
+    ? { rms: difference(maps.waves.rms, maps.kernel.rms), unit: "dB", largest: 20, signed: true, title: "Waves − kernel" }
+    : { rms: maps.waves.rms, level: body.is_skin ? maps.waves.level : null, unit: "m", largest: wavesTop,
+      title: at ? `B: ${body.title}` : "Waves, RMS" };
+  drawMap($("wave-map"), { ...marks, ...waves, hatched: answer.invalid, stale });
+}
+
+function showSolid() {
+  if (!answer) return;
+  solid ??= openView($("solid"), { onTime: (t) => { clock = t; showClock(); } });
+  if (solidOf === answer) return;
+  solidOf = answer;
+  const { body, waves, load, x, y } = answer, fd = drawingFrequency(load.path);
+  solid.show({ shape: body.shape, motion: { f: waves.f, ...waves.surface() }, path: pathsOf(load), points: [[x, y]],
+    foci: fd ? (t) => fociAt(load, t) : [fociAt(load, 0)] });
+}
+
+function showTiles() {
+  $("tiles").innerHTML = tiles(answer, pinned);
+  $("page").classList.toggle("invalid", Boolean(answer.invalid));
+  for (const badge of all("[data-badge]")) {
+    badge.hidden = !answer.invalid;
+    badge.textContent = answer.invalid || "";
+  }
+}
+
+function showPane() {
+  if (view.tab === "lines") $("lines").innerHTML = linesTable(answer, pinned);
+  else if (view.tab === "dispersion") {
+    const plot = dispersionPlot(answer, view.highest);
+    $("dispersion").classList.toggle("none", !plot);
+    if (plot) plots.dispersion.draw(plot);
+  } else if (view.tab === "level") {
+    if (levels) plots.level.draw(levelPlot(answer, view.over, levels, levels.best));
+    $("best").disabled = !levels?.best;
+  } else $("ab").innerHTML = pinned ? comparison(pinned, answer) : '<p class="note">Press "Pin A" to keep what is shown. Then change the body or a value to compare.</p>';
+}
+
+const keyOfLevels = () => JSON.stringify({ ...values, [view.over]: 0, over: view.over, made: answer?.body.made });
+
+/** Levels over a control in short turns, so that the page stays alive. */
+function computeLevels() {
+  const key = view.over, [low, high] = OVER[key], of = keyOfLevels(), base = values;
+  const found = { of, x: [], kernel: [], waves: [], best: null }, count = 48;
+  const levelAt = (value) => {
+    const own = respond({ ...base, [key]: value });
+    return { kernel: own.kernelLevel?.dB ?? NaN, waves: own.level?.dB ?? NaN };
+  };
+  let k = 0;
+  const turn = () => {
+    if (of !== keyOfLevels() || view.tab !== "level") return;
+    for (const until = performance.now() + 30; k <= count && performance.now() < until; k++) {
+      const value = low + (high - low) * k / count;
+      try {
+        const level = levelAt(value);
+        found.x.push(value);
+        found.kernel.push(level.kernel);
+        found.waves.push(level.waves);
+      } catch { /* a path that leaves the body */ }
+    }
+    if (k > count) {
+      const own = answer.body.is_skin ? "waves" : "kernel";
+      found.best = refine(found.x, found[own], (value) => levelAt(value)[own], REFINED * (high - low));
+    }
+    levels = found;
+    showPane();
+    if (k <= count) slowDue = setTimeout(turn, 0);
+  };
+  turn();
+}
+
+/** The highest level near the best of those that are known, by golden sections: {at, level}. */
+function refine(x, known, levelAt, within) {
+  const top = known.reduce((best, v, k) => (v > (known[best] ?? -Infinity) ? k : best), 0);
+  if (!Number.isFinite(known[top])) return null;
+  let [a, b] = [x[Math.max(top - 1, 0)], x[Math.min(top + 1, x.length - 1)]];
+  const part = (Math.sqrt(5) - 1) / 2;
+  let best = { at: x[top], level: known[top] };
+  while (b - a > within) {
+    const [c, d] = [b - part * (b - a), a + part * (b - a)].map((at) => ({ at, level: levelAt(at) }));
+    if (c.level > d.level) b = d.at; else a = c.at;
+    for (const each of [c, d]) if (each.level > best.level) best = each;
+  }
+  return best;
+}
+
+function showBody() {
+  const body = recordOf(values.body);
+  document.documentElement.dataset.kind = body.thickness_mm ? "sheet" : "solid";
+  controls?.showBody(body);
+  stale = false;
+  $("page").classList.remove("stale");
+}
+
+// ---- time -----------------------------------------------------------------------------------------
+
+/** What is played: {period in s, of}. */
+function period() {
+  const { load } = answer, fd = drawingFrequency(load.path);
+  if (load.pulses && view.follow) {
+    return { period: load.pulses.reduce((sum, [on, gap]) => sum + on + gap, 0), of: "rhythm" };
+  }
+  const tone = load.am || load.envelope;
+  return fd ? { period: 1 / fd, of: "path" } : { period: tone ? 1 / tone : 0.01, of: "tone" };
+}
+
+function showClock() {
+  const own = period();
+  $("phase").value = (clock / own.period) % 1;
+  $("phase-said").textContent = `${(1e3 * clock).toFixed(own.period > 0.1 ? 0 : 2)} of ${rounded(1e3 * own.period)} ms`;
+  for (const plot of [plots.commanded, plots.waveform]) plot.setCursor(1e3 * clock);
+  if (view.look !== "3d") drawMaps();
+}
+
+function play(on) {
+  $("play").setAttribute("aria-pressed", String(on));
+  $("play").textContent = on ? "❚❚ Pause" : "▶ Play";
+  cancelAnimationFrame(playing);
+  playing = 0;
+  if (!on) return;
+  let last = performance.now();
+  const next = (now) => {
+    const own = period();
+    clock = (clock + Math.min(now - last, 100) / 1e3 * own.period / PLAYED) % own.period;
+    last = now;
+    showClock();
+    playing = requestAnimationFrame(next);
+  };
+  playing = requestAnimationFrame(next);
+}
+
+// ---- bodies from the server -----------------------------------------------------------------------
+
+const changes = {};
+async function edit(key, text) {
+  const record = recordOf(values.body), known = record.keys.find((own) => own.key === key);
+  const value = known.choices ? text : Number(String(text).replace(",", "."));
+  if (!known.choices && !Number.isFinite(value)) {
+    errors.set(key, `${known.label}: "${text}" is not a number.`);
+    showSlot();
+    return;
+  }
+  errors.delete(key);
+  Object.assign(changes, { [key]: value });
+  editing?.abort();
+  const own = editing = new AbortController();
+  stale = true;
+  $("page").classList.add("stale");
+  $("busy").hidden = false;
+  const done = () => {
+    editing = null;
+    stale = false;
+    for (const each of Object.keys(changes)) delete changes[each];
+    $("page").classList.remove("stale");
+    $("busy").hidden = true;
+    showSlot();
+  };
+  const { toml, name, title } = record;
+  try {
+    await requestBody(data.api, { toml, name, title, changes }, own.signal, {
+      progress: (fraction, phase) => { $("done").value = fraction; $("busy-said").textContent = phase; },
+      body: (found) => { if (own === editing) { takeBody(found); done(); ask(); } },
+      dispersion: (curves) => { bodyOf(name).dispersion = curves; if (view.tab === "dispersion") ask(); },
+    });
+  } catch (error) {
+    if (own !== editing) return;
+    errors.set("body", error.name === "AbortError" ? "" : error.message);
+    controls.showBody(record);
+    done();
+  }
+}
+
+/** Take a body's record in place of that of the same name, or as another. */
+function takeBody(record) {
+  const at = data.bodies.findIndex((body) => body.name === record.name);
+  if (at < 0) data.bodies.push(record); else data.bodies[at] = record;
+  opened.set(record.name, Object.assign(openBody(record), { made: Date.now() }));
+  nameBodies(data.bodies.map((body) => body.name));
+  controls.showBodies(data.bodies);
+  errors.delete("body");
+  showBody();
+}
+
+async function takeScene(file) {
+  try {
+    const { values: own, body } = await sendFile(data.api, "scene", file);
+    if (body) takeBody(body);
+    set({ ...values, ...own, ...(body ? { body: body.name } : {}) });
+    say(`${file.name} is open.`);
+  } catch (error) { errors.set("scene", error.message); showSlot(); }
+}
+
+async function takeMeasurement(file) {
+  try {
+    measured = data.api ? await sendFile(data.api, "measurement", file) : readMeasurement(await file.text(), file.name);
+    errors.delete("measurement");
+    say([`${file.name} is drawn over the waves.`, ...(measured.remarks ?? [])].join(" "));
+  } catch (error) { errors.set("measurement", error.message); measured = null; }
+  $("measured-clear").hidden = !measured;
+  showSlot();
+  ask();
+}
+
+// ---- the page itself ------------------------------------------------------------------------------
+
+const plots = Object.fromEntries(["commanded", "waveform", "spectrum", "dispersion", "level"].map((id) => [id,
+  createPlot($(id), { announce: (text) => { $("spoken").textContent = text; } })]));
+
+function choose(group, name, own) {
+  for (const tab of all(`[data-${group}]`)) {
+    const on = tab.dataset[group] === name;
+    tab.setAttribute("aria-selected", String(on));
+    tab.tabIndex = on ? 0 : -1;
+    if (on) $(own).setAttribute("aria-labelledby", tab.id);
+  }
+}
+
+function look(name) {
+  view.look = name;
+  choose("look", name, "look");
+  const deep = name === "3d";
+  $("solid").hidden = !deep;
+  $("kernel-map").hidden = $("wave-map").hidden = deep;
+  $("views").classList.toggle("deep", deep);
+  $("map-scale").hidden = deep || name === "difference";
+  document.querySelector(".foot").hidden = $("map-legend").hidden = deep;
+  if (deep) play(false);
+  if (answer) { if (deep) showSolid(); else drawMaps(); writeAddress(); }
+}
+
+function tab(name) {
+  view.tab = name;
+  choose("tab", name, "pane");
+  for (const pane of all("[data-pane]")) pane.hidden = pane.dataset.pane !== name;
+  $("level-tools").hidden = name !== "level";
+  if (answer) { ask(); writeAddress(); }
+}
+
+function setTheme(dark) {
+  document.documentElement.dataset.theme = dark ? "dark" : "light";
+  $("dark").setAttribute("aria-pressed", String(dark));
+  drawMaps();
+}
+
+function pin() {
+  pinned = pinned ? null : { ...mapsOf(answer), ...answer };
+  $("pin").setAttribute("aria-pressed", String(Boolean(pinned)));
+  $("pin").textContent = pinned ? "Unpin A" : "Pin A";
+  $("swap").disabled = !pinned;
+  if (pinned) say("A is pinned. Change the body or a value to compare.");
+  tab(pinned ? "ab" : "lines");
+  showCurves();
+}
+
+function swap() {
+  const other = pinned.values;
+  pinned = { ...mapsOf(answer), ...answer };
+  set({ ...other });
+}
+
+function restore(found) {
+  if (!found) return;
+  values = found;
+  showBody();
+  writeAddress();
+  ask();
+}
+
+function fillMenus() {
+  const item = (title, detail, k, kind) => `<button type="button" data-${kind}="${k}">${escaped(title)}${
+    detail ? `<small>${escaped(detail)}</small>` : ""}</button>`;
+  $("presets").innerHTML = data.presets.map(({ title }, k) => item(title, "", k, "preset")).join("");
+  $("examples").innerHTML = data.examples.map(({ title, sentence }, k) => item(title, sentence, k, "example")).join("");
+  const take = (own) => set({ ...values, ...Object.fromEntries(Object.entries(own).filter(([key]) => key in STARTS)
+    .map(([key, value]) => [key, check(key, value)])) });
+  document.addEventListener("click", ({ target }) => {
+    const button = target.closest("[data-menu], [data-preset], [data-example], [data-save]");
+    if (!button) return;
+    const { menu, preset, example } = button.dataset;
+    if (menu) { openMenu(button, $(menu)); return; }
+    button.closest("[popover]").hidePopover();
+    if (preset) { take(data.presets[preset].values); say(data.presets[preset].title); }
+    if (example) {
+      const { values: own, sentence, tab: shown } = data.examples[example];
+      take(own);
+      look(["maps", "3d", "difference"].includes(shown) ? shown : "maps");
+      if (["lines", "dispersion", "level"].includes(shown)) tab(shown);
+      say(sentence);
+    }
+  });
+  for (const menu of all(".menu")) {
+    menu.addEventListener("toggle", ({ newState }) => document.querySelector(`[data-menu="${menu.id}"]`)
+      .setAttribute("aria-expanded", String(newState === "open")));
+    menu.addEventListener("keydown", (event) => {
+      const way = { ArrowDown: 1, ArrowUp: -1 }[event.key], items = [...menu.querySelectorAll("button")];
+      if (!way) return;
+      event.preventDefault();
+      items[(items.indexOf(document.activeElement) + way + items.length) % items.length].focus();
+    });
+  }
+}
+
+function openMenu(button, menu) {
+  const { left, bottom } = button.getBoundingClientRect();
+  menu.showPopover();
+  menu.style.left = `${Math.max(4, Math.min(left, innerWidth - menu.offsetWidth - 6))}px`;
+  menu.style.top = `${bottom + 3}px`;
+  menu.querySelector("button")?.focus();
+}
+
+function listen() {
+  const on = (id, name, act) => $(id).addEventListener(name, act);
+  on("undo", "click", () => restore(history.undo()));
+  on("redo", "click", () => restore(history.redo()));
+  on("pin", "click", pin);
+  on("swap", "click", swap);
+  on("link", "click", async () => {
+    const text = addressOf(values, starts, { view: view.look === "maps" ? "" : view.look });
+    try { await navigator.clipboard.writeText(text); say("The link is copied."); } catch { prompt("Copy this address:", text); }
+  });
+  on("sound", "click", () => playSound(answer, $("sound")));
+  on("dark", "click", () => setTheme(document.documentElement.dataset.theme !== "dark"));
+  on("about-open", "click", () => $("about").showModal());
+  on("warned", "click", () => controls.explain($("warned"), seenWarnings.join(" ")));
+  on("cancel", "click", () => editing?.abort());
+  on("play", "click", () => play(!playing));
+  on("phase", "input", () => { play(false); clock = Number($("phase").value) * period().period; showClock(); });
+  on("follow", "change", () => { view.follow = $("follow").checked; clock = 0; showClock(); });
+  on("span", "change", () => { view.span = $("span").value; ask(); });
+  on("decibel", "change", () => { view.decibel = $("decibel").checked; ask(); });
+  on("highest", "change", () => { view.highest = Number($("highest").value); ask(); });
+  on("map-decibel", "change", () => { view.mapDecibel = Number($("map-decibel").value); drawMaps(); });
+  on("over", "change", () => { view.over = $("over").value; ask(); });
+  on("best", "click", () => levels?.best && set({ ...values, [view.over]: check(view.over, Number(levels.best.at.toPrecision(4))) }));
+  on("sheet-toggle", "click", () => {
+    $("sheet-toggle").setAttribute("aria-expanded", String($("sheet").classList.toggle("open")));
+  });
+  on("controls", "submit", (event) => event.preventDefault());
+  for (const list of all('[role="tablist"]')) {
+    list.addEventListener("click", ({ target }) => (target.dataset.look ? look(target.dataset.look) : target.dataset.tab && tab(target.dataset.tab)));
+    list.addEventListener("keydown", (event) => {
+      const way = { ArrowRight: 1, ArrowLeft: -1 }[event.key], tabs = [...list.querySelectorAll('[role="tab"]')];
+      if (!way) return;
+      event.preventDefault();
+      const next = tabs[(tabs.indexOf(event.target) + way + tabs.length) % tabs.length];
+      next.focus();
+      next.click();
+    });
+  }
+  for (const id of ["kernel-map", "wave-map"]) {
+    let told = 0;
+    mapControls($(id), (x, y) => {
+      const at = (v) => Math.min(Math.max(Math.round(1e4 * v) / 10, -50), 50);
+      set({ ...values, x: at(x), y: at(y) }, false);
+      clearTimeout(told);
+      told = setTimeout(() => set(values), QUIET);
+    });
+  }
+  addEventListener("keydown", (event) => {
+    if (!(event.ctrlKey || event.metaKey) || event.altKey || /^(text|)$/.test(event.target.type ?? "-")) return;
+    const key = event.key.toLowerCase();
+    if (key === "z" && !event.shiftKey) restore(history.undo());
+    else if (key === "y" || key === "z") restore(history.redo());
+    else return;
+    event.preventDefault();
+  });
+  $("page").addEventListener("dragover", (event) => event.preventDefault());
+  $("page").addEventListener("drop", (event) => {
+    event.preventDefault();
+    if (event.dataTransfer.files[0]) takeMeasurement(event.dataTransfer.files[0]);
+  });
+  $("controls").addEventListener("change", ({ target }) => {
+    if (target.id === "scene" && target.files[0]) takeScene(target.files[0]);
+    if (target.id === "measurement" && target.files[0]) takeMeasurement(target.files[0]);
+  });
+  $("controls").addEventListener("click", ({ target }) => {
+    if (target.id === "measured-clear") { measured = null; target.hidden = true; $("measurement").value = ""; ask(); }
+  });
+  addEventListener("resize", drawMaps);
+  addEventListener("hashchange", begin);
+}
+
+function begin() {
+  const { values: own, refused, view: shown } = readAddress(starts);
+  values = own;
+  if (!data.bodies.some((body) => body.name === values.body)) values = { ...values, body: data.bodies[0].name };
+  notice = refused.join(" ");
+  showBody();
+  look(["maps", "3d", "difference"].includes(shown.view) ? shown.view : "maps");
+  tab(["lines", "dispersion", "level", "ab"].includes(shown.tab) ? shown.tab : "lines");
+  history = createHistory(values);
+  writeAddress();
+  showCurves();
+  if (shown.selftest !== undefined) runSelftest(data, bodyOf, loadOf);
+}
+
+nameBodies(data.bodies.map((body) => body.name));
+controls = buildControls($("controls"), {
+  bodies: data.bodies, editable: Boolean(data.api), change, edit,
+  refuse: (key, sentence) => { errors.set(key, sentence); controls.mark(key, sentence); showSlot(); },
+  moving: (on) => { if (moving && !on) ask(); moving = on; },
+  hold: (on) => { view.held = on ? facts().drawing : 0; ask(); },
+  published: (on) => { view.published = on; ask(); },
+});
+$("map-legend").innerHTML = MAP_LEGEND;
+$("span").innerHTML = Object.entries(SPANS).map(([value, words]) => `<option value="${value}">${words}</option>`).join("");
+$("over").innerHTML = Object.keys(OVER).map((key) => `<option value="${key}">${LABELS[key]}</option>`).join("");
+$("highest").value = view.highest;
+fillMenus();
+offerSaves($("save"), { answer: () => answer, view: () => ({ ...view, span: spanOf(view.span, answer.load) }), say });
+setTheme(matchMedia("(prefers-color-scheme: dark)").matches);
+listen();
+begin();

@@ -13,8 +13,8 @@ export function niceTop(value) {
 }
 
 /**
- * Tops of axes by name that keep while a control moves: they grow if a curve does not fit and shrink
- * only when nothing moves or a curve fills less than a fifth of the axis.
+ * Tops of axes by name that keep while a control moves: they grow if a curve does not fit, and shrink
+ * only when nothing moves.
  */
 export function keptScales() {
   const tops = new Map();
@@ -82,7 +82,7 @@ function thinned(xs, ys, toX, width) {
  *
  * `draw(spec)` takes { x: {label, range}, y: {label, range, role}, y2, curves, names, notes, kept,
  * hatched, label }. A curve has {role, axis: "y"|"y2", x, y, name, width, dash, fill, stems, offset,
- * faint}; names are [{x, y, axis, text}], the most important first. Zoom lasts until `kept` changes.
+ * faint}; names are [{x, y, axis, text, above}], the most important first. Zoom lasts until `kept` changes.
  */
 export function createPlot(host, { announce = () => {}, onZoom = () => {} } = {}) {
   const svg = document.createElementNS(NS, "svg");
@@ -161,15 +161,14 @@ export function createPlot(host, { announce = () => {}, onZoom = () => {} } = {}
       d += `${on ? "L" : "M"}${toX(xs[k]).toFixed(1)},${toY(inside, curve.axis).toFixed(1)}`;
       on = true;
     }
-    if (curve.fill && d) d += `L${toX(xs[xs.length - 1]).toFixed(1)},${toY(0, curve.axis).toFixed(1)}L${
-      toX(xs[0]).toFixed(1)},${toY(0, curve.axis).toFixed(1)}Z`;
-    return `<path class="curve is-${curve.role}${curve.fill ? " filled" : ""}${curve.faint ? " faint" : ""
-    }" d="${d}"${curve.width ? ` stroke-width="${curve.width}"` : ""}${
+    const [first, last] = [xs[0], xs[xs.length - 1]].map((x) => `${toX(x).toFixed(1)},${toY(0, curve.axis).toFixed(1)}`);
+    const filled = curve.fill && d ? `<path class="filled is-${curve.role}" d="${d}L${last}L${first}Z"/>` : "";
+    return `${filled}<path class="curve is-${curve.role}${curve.faint ? " faint" : ""}" d="${d}"${curve.width ? ` stroke-width="${curve.width}"` : ""}${
       curve.dash ? ` stroke-dasharray="${curve.dash}"` : ""}/>`;
   }
 
   function stems(curve) {
-    const base = toY(Math.max(0, spec[curve.axis].range[0]), curve.axis);
+    const low = spec[curve.axis].range[0], base = toY(curve.decibel ? low : Math.max(0, low), curve.axis);
     let d = "", heads = "";
     for (let k = 0; k < curve.x.length; k++) {
       const x = toX(curve.x[k]) + (curve.offset ?? 0), y = toY(curve.y[k], curve.axis);
@@ -185,7 +184,7 @@ export function createPlot(host, { announce = () => {}, onZoom = () => {} } = {}
   /** Names of curves above the plot, between the units of the axes. */
   function legend(x0, x1) {
     const named = spec.curves.filter((curve) => curve.name);
-    const widths = named.map((curve) => 20 + 5.7 * curve.name.length);
+    const widths = named.map((curve) => 24 + 6.3 * curve.name.length);
     let x = Math.max(x0, (x0 + x1 - widths.reduce((a, b) => a + b, 0)) / 2);
     return named.map((curve, k) => {
       const at = x;
@@ -200,11 +199,11 @@ export function createPlot(host, { announce = () => {}, onZoom = () => {} } = {}
 
   function names(x0, x1) {
     const boxes = [];
-    return (spec.names ?? []).map(({ x, y, axis, text }) => {
-      const width = 5.4 * text.replace(/_/g, "").length + 4, [low, high] = shown();
+    return (spec.names ?? []).map(({ x, y, axis, text, above }) => {
+      const width = 6.2 * text.replace(/_/g, "").length, [low, high] = shown();
       if (x < low || x > high) return "";
       const at = Math.min(Math.max(toX(x), x0 + width / 2), x1 - width / 2);
-      let up = Math.max(toY(y, axis) - 6, TOP + 2);
+      let up = Math.max(Math.min(toY(y, axis), above ? toY(above.y, above.axis) : Infinity) - 6, TOP + 2);
       const hits = () => boxes.some((b) => Math.abs(b.at - at) < (b.width + width) / 2
         && Math.abs(b.up - up) < NAME_HEIGHT);
       for (let tries = 0; tries < 3 && hits(); tries++) up -= NAME_HEIGHT;

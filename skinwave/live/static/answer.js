@@ -1,0 +1,65 @@
+// An answer of the page: what the kernel and a body do under the load of the controls.
+
+import { QUANTITIES, amplitudesOf, delayOf, levelOf, mapAxis, mapOf, namesOf, reach, shareOutside,
+  unresolvedNames } from "./numbers.js";
+import { loadOf } from "./values.js";
+
+const TOO_FAR = 0.5; // of a sheet's thickness, above which a linear model is not valid
+const SEEN = 0.06, STEP = 2e-4; // s of motion, and between its times, in which the largest is looked for
+
+/**
+ * What a move of a control needs at once. Maps, share, reach and delay are in `mapsOf`. Throws an Error
+ * for users if the values contradict each other.
+ */
+export function respond(values, body, kernelBody, { published = false } = {}) {
+  const load = loadOf(values, body), x = values.x / 1e3, y = values.y / 1e3;
+  const kernel = kernelBody.respond(load), waves = body.respond(load);
+  const answer = { values, body, load, x, y, kernel, waves, kernelAt: kernel.at(x, y), wavesAt: waves.at(x, y) };
+  if (published) {
+    answer.published = kernelBody.respond(load, { published: true });
+    answer.publishedAt = answer.published.at(x, y);
+  }
+  answer.level = body.is_skin ? levelOf(load, waves.f, answer.wavesAt, "m") : null;
+  answer.kernelLevel = levelOf(load, kernel.f, answer.kernelAt, "Pa");
+  return answer;
+}
+
+/** Typeset name of the line at a frequency in Hz, such as "2 f_d − f_AM"; "" if unknown. */
+export function lineName(answer, f) {
+  answer.names ??= namesOf(answer.load);
+  return typeset(answer.names(f));
+}
+
+export const typeset = (name) => name.replace(/-/g, " − ").replace(/\+/g, " + ").replace(/(\d)(?=f)/g, "$1 ")
+  .replace(/^ − /, "−");
+
+/** Maps of the kernel and the waves, and the numbers that need them. */
+export function mapsOf(answer) {
+  const { kernel, waves, load, body } = answer, axis = mapAxis();
+  const maps = { kernel: mapOf(kernel, load, axis), waves: mapOf(waves, load, axis) };
+  return {
+    maps, share: shareOutside(maps.kernel.rms, maps.waves.rms),
+    kernelShare: shareOutside(maps.kernel.rms, maps.kernel.rms),
+    reach: body.is_skin ? reach(load, maps.waves) : null, kernelReach: reach(load, maps.kernel),
+    delay: delayOf(kernel, waves, load)?.delay ?? NaN, invalid: invalidity(answer), warnings: warnings(answer),
+  };
+}
+
+/** Why a result is outside the validity of its model; "" if it is not. */
+function invalidity({ body, waves, x, y }) {
+  if (!body.thickness_mm) return "";
+  const times = Float64Array.from({ length: SEEN / STEP }, (_, k) => k * STEP);
+  const largest = Math.max(...[[0, 0], [x, y]].map((at) => waves.waveform(...at, times)
+    .reduce((most, u) => Math.max(most, Math.abs(u)), 0)));
+  const ratio = 1e3 * largest / body.thickness_mm;
+  return ratio > TOO_FAR ? `linear model, ${ratio.toPrecision(2)} × thickness` : "";
+}
+
+function warnings({ load }) {
+  const lost = unresolvedNames(load).map(typeset);
+  return lost.length ? [`The Tacton is too short to resolve ${lost.slice(0, 4).join(", ")}${
+    lost.length > 4 ? ` and ${lost.length - 4} more` : ""}.`] : [];
+}
+
+/** Amplitudes (l,) of complex lines in the unit of a quantity. */
+export const inQuantity = (f, at, name) => amplitudesOf(f, at, QUANTITIES[name].rate).map((v) => v * QUANTITIES[name].per);

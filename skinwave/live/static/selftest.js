@@ -1,0 +1,40 @@
+// The page's test of itself: random Tactons with lines that Python computed by another way.
+
+import { escaped, rounded } from "./plots.js";
+import { STARTS } from "./values.js";
+
+const NEAR = 1e-3; // Hz between a line of the page and the same of Python
+
+/** Largest error of lines {f, re, im} relative to their own size: {error, f}. */
+function compare(motion, at, lines) {
+  let worst = { error: 0, f: 0 };
+  for (const { f, re, im } of lines) {
+    const k = Array.from(motion.f).findIndex((own) => Math.abs(own - f) < NEAR);
+    const off = k < 0 ? 1 : Math.hypot(at.re[k] - re, at.im[k] - im) / Math.hypot(re, im);
+    if (off > worst.error) worst = { error: off, f };
+  }
+  return worst;
+}
+
+/** Run all tests, one in each turn, and show their table; `bodyOf(name)`, `loadOf(values)`. */
+export async function runSelftest(data, bodyOf, loadOf) {
+  const dialog = document.getElementById("selftest"), head = document.getElementById("selftest-said");
+  if (!dialog.open) dialog.showModal();
+  const rows = [];
+  let largest = 0, failed = 0;
+  for (const { body, values, lines, error: allowed } of data.selftest ?? []) {
+    await new Promise((resolve) => setTimeout(resolve));
+    const own = { ...STARTS, ...values, body }, motion = bodyOf(body).respond(loadOf(own));
+    const { error, f } = compare(motion, motion.at(own.x / 1e3, own.y / 1e3), lines);
+    largest = Math.max(largest, error);
+    if (!(error <= allowed)) failed++;
+    rows.push(`<tr><th scope="row">${escaped(bodyOf(body).title)}</th><td>${escaped(own.shape)}</td><td>${lines.length}</td><td>${
+      rounded(f)} Hz</td><td>${(100 * error).toFixed(2)} %</td><td>${(100 * allowed).toFixed(1)} %</td></tr>`);
+    head.textContent = `self-test: ${rows.length} of ${data.selftest.length}`;
+  }
+  head.textContent = rows.length ? `self-test: largest error ${(100 * largest).toFixed(2)} %` : "self-test: this file holds no test data";
+  head.dataset.error = largest;
+  document.getElementById("selftest-table").innerHTML = `<p>${rows.length - failed} of ${rows.length} Tactons agree with Python within the
+    stated error. The error is that of the worst line above −40 dB, relative to the line.</p><table><thead><tr><th>Body</th><th>path</th>
+    <th>lines</th><th>worst at</th><th>error</th><th>allowed</th></tr></thead><tbody>${rows.join("")}</tbody></table>`;
+}
