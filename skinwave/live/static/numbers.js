@@ -181,6 +181,14 @@ export function phaseDelay(a, b, f) {
   return (turns - Math.floor(turns + 0.25)) / f;
 }
 
+/** Complex lines {re, im} of a motion at each of some places; at all of them at once if it can. */
+function linesAt(motion, places) {
+  if (!motion.places) return places.map(([x, y]) => motion.at(x, y));
+  const { re, im } = motion.places(...[0, 1].map((axis) => Float64Array.from(places, (at) => at[axis])));
+  const own = (values, p) => Float64Array.from(motion.f, (_, l) => values[l * places.length + p]);
+  return places.map((_, p) => ({ re: own(re, p), im: own(im, p) }));
+}
+
 /**
  * Delay of the strongest line of a motion behind the kernel's pressure at the place of the path where
  * the pressure has most of it: {delay in s, f in Hz}; null if they share none.
@@ -189,7 +197,7 @@ export function delayOf(kernel, motion, load) {
   const position = positionOf(load.path), moves = drawingFrequency(load.path) > 0;
   const phases = moves ? Array.from({ length: ON_PATH }, (_, k) => k / ON_PATH) : load.foci.map((a) => a % 1);
   const places = phases.map((phase) => position(phase));
-  const [a, b] = [kernel, motion].map((each) => places.map(([x, y]) => each.at(x, y)));
+  const [a, b] = [kernel, motion].map((each) => linesAt(each, places));
   const size = (each, l) => each.map(({ re, im }) => Math.hypot(re[l], im[l]));
   let line = -1, strongest = 0;
   motion.f.forEach((_, l) => {

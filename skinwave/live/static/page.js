@@ -3,7 +3,6 @@
 import { mapsOf, respond as respondTo } from "./answer.js";
 import { openBody } from "./bodies.js";
 import { buildControls } from "./controls.js";
-import { readMeasurement } from "./files.js";
 import { addressOf, createHistory, readAddress } from "./history.js";
 import { openKernel } from "./kernel.js";
 import { drawingFrequency } from "./load.js";
@@ -348,7 +347,8 @@ async function takeScene(file) {
 
 async function takeMeasurement(file) {
   try {
-    measured = data.api ? await sendFile(data.api, "measurement", file) : readMeasurement(await file.text(), file.name);
+    if (!data.api) throw new Error("This file reads no measurements. Open the page with skinwave web.");
+    measured = await sendFile(data.api, "measurement", file);
     errors.delete("measurement");
     say([`${file.name} is drawn over the waves.`, ...(measured.remarks ?? [])].join(" "));
   } catch (error) { errors.set("measurement", error.message); measured = null; }
@@ -560,7 +560,7 @@ controls = buildControls($("controls"), {
 });
 $("map-legend").innerHTML = MAP_LEGEND;
 $("span").innerHTML = Object.entries(SPANS).map(([value, words]) => `<option value="${value}">${words}</option>`).join("");
-$("over").innerHTML = Object.keys(OVER).map((key) => `<option value="${key}">${LABELS[key]}</option>`).join("");
+$("over").innerHTML = Object.keys(OVER).map((key) => `<option value="${key}" title="${LABELS[key]}">${key === "am" ? "AM" : key}</option>`).join("");
 $("highest").value = view.highest;
 fillMenus();
 offerSaves($("save"), { answer: () => answer, view: () => ({ ...view, span: spanOf(view.span, answer.load) }), say });
