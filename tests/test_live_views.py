@@ -26,7 +26,9 @@ import { drawMap, mapControls, mapSvg, valueAt } from "./maps.js";
 import { openView } from "./view3d.js";
 Object.assign(window, { contours, drawMap, mapControls, mapSvg, valueAt, openView });
 """
-MAP = """<canvas id="map" style="width: 400px; height: 420px"></canvas>"""
+PAGE = """<!doctype html><meta charset=utf-8><body style="color: #000; margin: 0">
+<canvas id=map style="width: 400px; height: 420px"></canvas>
+<div id=view style="width: 500px; height: 420px"></div><script type=module>"""
 BODY = """() => {
   const points = [], re = [], triangles = [];
   for (let j = 0, a = 0; j < 21; j++) for (let i = 0; i < 21; i++, a++) {
@@ -55,13 +57,8 @@ def page(browser, tmp_path):
     folder = tmp_path / "static"
     shutil.copytree(str(resources.files("skinwave.live") / "static"), folder)
     (folder / "entry.js").write_text(MODULE)
-    script = bundle(folder, "entry.js")
-    (tmp_path / "page.html").write_text(
-        f"<!doctype html><meta charset=utf-8><body style='color: #000; margin: 0'>{MAP}"
-        f"<div id=view style='width: 500px; height: 420px'></div>"
-        f"<script type=module>{script}</script>",
-        encoding="utf-8",
-    )
+    text = f"{PAGE}{bundle(folder, 'entry.js')}</script>"
+    (tmp_path / "page.html").write_text(text, encoding="utf-8")
     found = browser.new_page(viewport={"width": 900, "height": 900})
     said: list[str] = []
     found.on("pageerror", lambda error: said.append(str(error)))

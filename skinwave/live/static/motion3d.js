@@ -1,6 +1,7 @@
 // Motion by its lines: which are seen, their sum at a time, and how long a loop of it is.
 
 const NEGLIGIBLE = 3e-3; // of the strongest line at its largest: weaker ones are not drawn
+const LOUD = 0.03; // of the strongest line: those of which a loop is made
 const LONGEST = 0.4, CLOSED = 0.02; // s of a loop; RMS misfit at its seam that is not seen
 const STEP = 0.4; // mm between dots of a path
 
@@ -38,14 +39,15 @@ export function synthesise({ n, lines }, { re, im }, time, out, at = null) {
 
 /** Time in s after which lines are the same again, or nearly so, and whether they are. */
 export function loopOf(lines) {
-  const fastest = Math.max(1, ...lines.map((line) => line.f)), step = 1 / (20 * fastest);
-  const power = lines.reduce((sum, line) => sum + line.largest ** 2, 0) || 1;
+  const most = Math.max(0, ...lines.map((line) => line.largest));
+  const heard = lines.filter((line) => line.f > 0 && line.largest > LOUD * most);
+  const power = heard.reduce((sum, line) => sum + line.largest ** 2, 0) || 1;
+  const fastest = Math.max(1, ...heard.map((line) => line.f));
+  const slowest = Math.min(fastest, ...heard.map((line) => line.f));
   let best = { period: LONGEST, misfit: Infinity };
-  const loud = lines.filter((line) => line.f > 0 && line.largest ** 2 > 0.01 * power);
-  const slowest = Math.min(fastest, ...loud.map((line) => line.f));
-  for (let period = 0.9 / slowest; period <= Math.max(LONGEST, 1.1 / slowest); period += step) {
+  for (let period = 0.9 / slowest; period <= Math.max(LONGEST, 1.1 / slowest); period += 0.05 / fastest) {
     let misfit = 0;
-    for (const line of lines) misfit += line.largest ** 2 * 2 * (1 - Math.cos(2 * Math.PI * line.f * period));
+    for (const { f, largest } of heard) misfit += 2 * largest ** 2 * (1 - Math.cos(2 * Math.PI * f * period));
     misfit = Math.sqrt(misfit / power);
     if (misfit < best.misfit) best = { period, misfit };
     else if (best.misfit < CLOSED) break;

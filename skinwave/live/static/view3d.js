@@ -216,7 +216,8 @@ class View {
       const k = source[p], lift = k < n ? u[k] : 0;
       state[5 * p] = scale * lift;
       moved[3 * p + 2] = places[3 * p + 2] + scale * lift;
-      state[5 * p + 1] = hue === "motion" ? 0.5 - lift / (2 * this.largest) : (k < n ? rms[k] : 0) / this.most;
+      if (hue === "motion") state[5 * p + 1] = 0.5 - lift / (2 * this.largest);
+      else state[5 * p + 1] = k < n ? rms[k] / this.most : 0;
     }
     shade(mesh, moved, state);
   }
