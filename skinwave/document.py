@@ -49,6 +49,14 @@ def paragraph(text: str) -> Markup:
     return Markup("<p>{}</p>").format(text)
 
 
+def live_link(file: str) -> Markup:
+    """A paragraph that leads to a live page beside this one."""
+    return Markup(
+        '<p><a href="{}">Change the Tacton and see the waves move</a>: a page that computes in the '
+        "browser.</p>"
+    ).format(file)
+
+
 def preformatted(text: str) -> Markup:
     """Text with its own lines and spaces."""
     return Markup("<pre>{}</pre>").format(text)

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from skinwave.scene import Body
     from skinwave.studies.measured_study import Measured
 
+LIVE = "live.html"
 TITLE = "The paper's 15 Tactons: point kernel, {}"
 
 
@@ -49,8 +50,9 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from skinwave import record
+    from skinwave import document, record
     from skinwave.files import folder_name
+    from skinwave.live.data import comparison_page
     from skinwave.outputs import output_folder
     from skinwave.pictures.figures import label
     from skinwave.scene import with_body
@@ -82,11 +84,15 @@ def run(options: argparse.Namespace) -> int:
         output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder,
         progress_of(options) as progress,
     ):
+        live = comparison_page(next(iter(scenes.values())).values(), progress)
+        if live:
+            (folder / LIVE).write_text(live, encoding="utf-8")
         outcome = run_study(
             scenes, folder, progress,
             title=TITLE.format(against) if scene is None else scene.name,
             command=_again(options),
             model=options.model, h=metre(options.h), solver=options.solver, measured=measured,
+            more=[document.live_link(LIVE)] if live else [],
         )  # fmt: skip
         record.write(folder, record.of_command(options), scene=asked)
     warn(outcome.warnings)

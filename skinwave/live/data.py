@@ -1,6 +1,6 @@
 """The data of a page: records of its bodies, values to begin with, presets, examples, self-test."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -9,9 +9,11 @@ from typing import Any
 from skinwave.effort import Progress, silent
 from skinwave.live import values
 from skinwave.live.packs import pack_of
+from skinwave.live.page import page
 from skinwave.live.records import record_of, title_of
-from skinwave.live.selftest import selftest
+from skinwave.live.selftest import has_exact_lines, selftest
 from skinwave.scene import BODIES, Body, Scene, body_name
+from skinwave.studies.paper15 import tactons
 
 BODIES_SHOWN = ("skin-slab", "paper-sheet", "palm")  # of a page without scenes
 
@@ -44,15 +46,22 @@ def data_of(
         records.append(record_of(body, pack_of(body, report), name))
         if test:
             tests += selftest(body, name, most=-(-20 // len(names)))
-    presets = [
-        {"name": f"scene-{k}", "title": scene.name, "values": each}
-        for k, (scene, each) in enumerate(zip(scenes, own, strict=True), 1)
-    ]
     return {
         "bodies": records, "start": own[0] if own else {"body": records[0]["name"]},
-        "presets": presets + values.presets(), "examples": values.EXAMPLES, "selftest": tests,
-        "api": None,
+        "presets": _own_presets(scenes, own) + values.presets(), "examples": values.EXAMPLES,
+        "selftest": tests, "api": None,
     }  # fmt: skip
+
+
+def comparison_page(scenes: Iterable[Scene], progress: Progress = silent) -> str | None:
+    """Return the page of those scenes whose body has a pack within seconds; None if there are none
+    or the page has no controls for them.
+    """
+    quick = [scene for scene in scenes if has_exact_lines(scene)]
+    try:
+        return page(data_of(quick, progress, test=False)) if quick else None
+    except (ValueError, ArithmeticError):
+        return None
 
 
 def named(bodies: Sequence[Body]) -> dict[Body, str]:
@@ -65,6 +74,18 @@ def named(bodies: Sequence[Body]) -> dict[Body, str]:
         numbers = range(2, len(bodies) + 2)
         found[body] = next(n for n in (name, *(f"{name}-{k}" for k in numbers)) if n not in taken)
     return found
+
+
+def _own_presets(scenes: Sequence[Scene], own: Sequence[values.Values]) -> list[dict[str, Any]]:
+    """Presets of scenes, without those of the paper and of the same Tacton on other bodies."""
+    found: dict[str, dict[str, Any]] = {}
+    for scene, each in zip(scenes, own, strict=True):
+        tacton = {key: value for key, value in each.items() if key != "body"}
+        if scene.name not in dict(tactons()) and tacton not in found.values():
+            found[f"{scene.name} ({len(found) + 1})" if scene.name in found else scene.name] = (
+                tacton
+            )
+    return [{"name": title, "title": title, "values": each} for title, each in found.items()]
 
 
 def read_scene(path: Path) -> Scene:

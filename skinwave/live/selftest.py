@@ -41,10 +41,9 @@ def selftest(body: Body, name: str, most: int) -> list[dict[str, Any]]:
     rng, found = np.random.default_rng(SEED), []
     for _ in range(most):
         scene = random_scene(body, rng)
-        exact = exact_lines(scene)
-        if exact is None:
+        if not has_exact_lines(scene):
             return []
-        f, amplitudes = exact
+        f, amplitudes = exact_lines(scene)
         size = np.abs(amplitudes)
         kept = (f > 0) & (f <= HIGHEST)
         kept &= size > SHOWN * size[kept].max(initial=0.0)
@@ -56,18 +55,25 @@ def selftest(body: Body, name: str, most: int) -> list[dict[str, Any]]:
     return found
 
 
-def exact_lines(scene: Scene) -> tuple[Floats, Complex] | None:
+def has_exact_lines(scene: Scene) -> bool:
+    """Whether `exact_lines` takes a scene: of infinite layers, or of a thin plate in its modes."""
+    return _is_infinite(scene.body) or takes(FROM_REST, scene)
+
+
+def exact_lines(scene: Scene) -> tuple[Floats, Complex]:
     """Return frequencies (f,) in Hz and complex amplitudes (f,) in metre at a scene's probe, by a
-    model that does not use the pack; None if there is no such model.
+    model that does not use the pack.
     """
     body, places = scene.body, scene.probe_points
-    if is_laterally_infinite(body) and has_exact_waves(body):
+    if _is_infinite(body):
         f, amplitudes = steady_lines(compliance(body), scene.pressure, places, threshold=1e-4)
-    elif takes(FROM_REST, scene):
-        f, amplitudes = plate_lines(scene, places)
     else:
-        return None
+        f, amplitudes = plate_lines(scene, places)
     return f, amplitudes[:, 0]
+
+
+def _is_infinite(body: Body) -> bool:
+    return is_laterally_infinite(body) and has_exact_waves(body)
 
 
 def random_scene(body: Body, rng: np.random.Generator) -> Scene:

@@ -1,7 +1,7 @@
 """The main job: Tactons on several bodies, compared, in one folder."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -76,9 +76,11 @@ def run_study(
     h: float | None = None,
     solver: str = "auto",
     measured: Measured | None = None,
+    more: Sequence[str] = (),
 ) -> StudyOutcome:
     """Run every scene, writing each run as it is finished, then the tables and the page; with a
-    measurement beside the models, if there is one of that Tacton.
+    measurement beside the models, if there is one of that Tacton. The page has `more` parts before
+    its effort.
 
     Each body has one model: the given one, or of those that plans take for its scenes the one that
     leaves out least; elements if their size h in metre is given. An interrupt ends the runs early;
@@ -134,7 +136,11 @@ def run_study(
             seconds=time.perf_counter() - started,
             peak_memory=peak_memory() + aside.submit(peak_memory).result(),
         )
-        parts += [study_page.effort_section(groups, prepared, spent), study_page.again(command)]
+        parts += [
+            *more,
+            study_page.effort_section(groups, prepared, spent),
+            study_page.again(command),
+        ]
     (folder / "index.html").write_text(document.page(title, *parts), encoding="utf-8")
     return spent
 
