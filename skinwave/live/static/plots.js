@@ -88,6 +88,7 @@ export function createPlot(host, { announce = () => {}, onZoom = () => {} } = {}
   const svg = document.createElementNS(NS, "svg");
   svg.setAttribute("tabindex", "0");
   svg.setAttribute("role", "img");
+  svg.setAttribute("aria-label", "Plot, not yet drawn");
   svg.classList.add("plot");
   const picture = document.createElementNS(NS, "g"), over = document.createElementNS(NS, "g");
   svg.append(picture, over);

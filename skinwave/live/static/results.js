@@ -251,7 +251,7 @@ export function comparison(a, b) {
   const levels = [a, b].map((own) => (own.body.is_skin ? `${signed(own.level?.dB)} dB` : "no skin"));
   rows.push(["Level at the point", ...levels], ["Reach above threshold", ...[a, b].map((own) => (own.body.is_skin ? far(own.reach) : "no skin"))],
     ["Outside the kernel's region", percent(a.share), percent(b.share)], ["Delay", delayed(a.delay), delayed(b.delay)]);
-  return `<table><thead><tr><th scope="col"></th><th scope="col" class="of-a">A, pinned</th><th scope="col" class="waves-ink">B, shown</th></tr></thead>
+  return `<table><thead><tr><th scope="col">Scene</th><th scope="col" class="of-a">A, pinned</th><th scope="col" class="waves-ink">B, shown</th></tr></thead>
     <tbody>${rows.map(([name, own, other, set]) => `<tr${set ? ' class="different"' : ""}><th scope="row">${escaped(name)}</th><td>${
     escaped(own)}</td><td>${escaped(other)}</td></tr>`).join("")}</tbody></table>`;
 }

@@ -31,7 +31,7 @@ export function offerSaves(menu, { answer, view, say, writers = [] }) {
     ["Print or PDF", null, null, () => print()],
   ]];
   const groups = [own, ...writers], items = groups.flatMap(([, each]) => each);
-  menu.innerHTML = groups.map(([heading, each]) => `<h3>${heading}</h3>${each.map((item) => `<button type="button" data-save="${
+  menu.innerHTML = groups.map(([heading, each]) => `<h2>${heading}</h2>${each.map((item) => `<button type="button" data-save="${
     items.indexOf(item)}">${item[0]}</button>`).join("")}`).join("");
   menu.addEventListener("click", async ({ target }) => {
     const item = items[target.dataset?.save];
