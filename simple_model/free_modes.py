@@ -61,23 +61,54 @@ def free_modes(modes: PlateModes, material: Material) -> FreeModes:
     -------
     FreeModes
     """
+    squared = np.maximum(modes.squared, np.finfo(float).tiny)
+    bent = squared * modes.elastic
+    return free_vibration(*relaxing_stiffness(squared - bent, bent, material))
+
+
+def relaxing_stiffness(lossless: Floats, bent: Floats, material: Material) -> tuple[Floats, Floats]:
+    """Stiffness of modes of a material with Maxwell branches.
+
+    Parameters
+    ----------
+    lossless : (m,) 1/s2, the part of the squared frequencies without loss
+    bent : (m,) 1/s2, the part that goes with the material's modulus, at its `shear_modulus`
+    material : Material, without a modulus law of its own
+
+    Returns
+    -------
+    stiffness (m, 2 + n) and times (n,) in s, as `free_vibration` takes them
+    """
     solid, mu = material.without_loss_factor(), material.shear_modulus
     terms = [term for term in solid.prony if term.modulus]
     relaxing, times = (
         np.array([getattr(term, name) for term in terms]) for name in ("modulus", "time")
     )
-    squared = np.maximum(modes.squared, np.finfo(float).tiny)
-    bent = squared * modes.elastic
     stiffness = np.column_stack([
-        squared - bent + bent * solid.shear_modulus / mu,
+        lossless + bent * solid.shear_modulus / mu,
         bent * solid.viscosity / mu,
         bent[:, None] * relaxing / mu,
     ])  # fmt: skip
+    return stiffness, times
+
+
+def free_vibration(stiffness: Floats, times: Floats) -> FreeModes:
+    """Poles and residues of modes.
+
+    Parameters
+    ----------
+    stiffness : (m, 2 + n): at rest in 1/s2, viscous in 1/s, and of each Maxwell branch in 1/s2
+    times : (n,) s, of the branches
+
+    Returns
+    -------
+    FreeModes
+    """
     poles = _poles(stiffness, times)
     apart = np.abs(poles[:, :, None] - poles[:, None]) / np.abs(poles).max(axis=1)[:, None, None]
     apart[:, range(poles.shape[1]), range(poles.shape[1])] = np.inf
     if (critical := apart.min(axis=(1, 2)) < CRITICAL).any():
-        stiffness[critical] *= STIFFER
+        stiffness = stiffness * np.where(critical, STIFFER, 1.0)[:, None]
         poles[critical] = _poles(stiffness[critical], times)
     residues = 1 / _slope(stiffness, times, poles)
     return FreeModes(poles=poles, residues=residues * (1 + np.sign(poles.imag)) / 2)

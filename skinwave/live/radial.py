@@ -1,11 +1,9 @@
 """Packs of laterally infinite bodies: their compliance over wavenumber and frequency."""
 
-import base64
 from typing import Any
 
-import numpy as np
-
 from skinwave.effort import Progress, silent
+from skinwave.live.arrays import packed, quantised
 from skinwave.live.wavenumbers import FURTHEST, wavenumbers
 from skinwave.scene import Body
 
@@ -35,22 +33,4 @@ def radial_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
         "k": packed(known.k[None]),
         "weights": packed(known.weights[None]),
         "G": quantised(known.G),
-    }
-
-
-def packed(values: np.ndarray) -> dict[str, Any]:
-    """Complex rows (n, m) as 64-bit floats in base 64."""
-    pairs = np.stack([values.real, values.imag], axis=-1).astype("<f8")
-    return {"shape": list(values.shape), "f8": base64.b64encode(pairs.tobytes()).decode()}
-
-
-def quantised(values: np.ndarray) -> dict[str, Any]:
-    """Complex rows (n, m) as whole numbers of 16 bits, each row relative to its largest."""
-    pairs = np.stack([values.real, values.imag], axis=-1)
-    largest = np.maximum(np.abs(pairs).max(axis=(1, 2)), 1e-300)
-    whole = np.rint(pairs / largest[:, None, None] * 32767).astype("<i2")
-    return {
-        "shape": list(values.shape),
-        "scale": (largest / 32767).tolist(),
-        "i2": base64.b64encode(whole.tobytes()).decode(),
     }

@@ -7,23 +7,26 @@ export const bytes = (text) => {
   return out.buffer;
 };
 
-/** Complex array {re, im, shape} of what skinwave.live.radial packs. */
+/** Array of what skinwave.live.arrays packs: {re, im, shape} of complex rows, or real values. */
 export function unpack(packed) {
-  const [rows, columns] = packed.shape, count = rows * columns;
-  const pairs = packed.f8 ? new Float64Array(bytes(packed.f8)) : new Int16Array(bytes(packed.i2));
-  const re = new Float64Array(count), im = new Float64Array(count);
+  const [rows, columns] = packed.shape, count = rows * columns, real = packed.real;
+  const values = packed.f8 ? new Float64Array(bytes(packed.f8)) : new Int16Array(bytes(packed.i2));
+  const re = new (real && packed.i2 ? Float32Array : Float64Array)(count);
+  const im = real ? null : new Float64Array(count);
   for (let row = 0, k = 0; row < rows; row++) {
     const scale = packed.scale ? packed.scale[row] : 1;
     for (let column = 0; column < columns; column++, k++) {
-      re[k] = pairs[2 * k] * scale;
-      im[k] = pairs[2 * k + 1] * scale;
+      re[k] = (real ? values[k] : values[2 * k]) * scale;
+      if (!real) im[k] = values[2 * k + 1] * scale;
     }
   }
-  return { re, im, shape: packed.shape };
+  return real ? re : { re, im, shape: packed.shape };
 }
 
 /** A pack as it is in the page's JSON, with its arrays. */
 export function opened(pack) {
-  return Object.fromEntries(Object.entries(pack).map(([name, value]) => [name,
-    value && (value.f8 || value.i2) ? unpack(value) : value]));
+  if (Array.isArray(pack)) return pack.map(opened);
+  if (!pack || typeof pack !== "object") return pack;
+  if (pack.f8 || pack.i2) return unpack(pack);
+  return Object.fromEntries(Object.entries(pack).map(([name, value]) => [name, opened(value)]));
 }

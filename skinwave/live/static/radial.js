@@ -245,21 +245,6 @@ class RadialMotion {
     return { re, im };
   }
 
-  /** Upward motion (l, n) in metre of the points of the body's shape: its sides are at rest. */
-  surface() {
-    const { side, points } = this.body.shape, n = points.length / 3, count = side * side;
-    const x = Float64Array.from({ length: count }, (_, k) => points[3 * k] / 1e3);
-    const y = Float64Array.from({ length: count }, (_, k) => points[3 * k + 1] / 1e3);
-    const found = this.places(x, y), re = new Float32Array(this.f.length * n), im = re.slice();
-    for (let l = 0; l < this.f.length; l++) {
-      for (let k = 0; k < count; k++) {
-        re[l * n + k] = -found.re[l * count + k];
-        im[l * n + k] = -found.im[l * count + k];
-      }
-    }
-    return { re, im };
-  }
-
   /**
    * Motion (t,) in metre of a place from rest, at equally spaced times (t,) in s from 0.
    *

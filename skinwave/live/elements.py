@@ -1,0 +1,155 @@
+"""Packs of bodies of finite elements: a reduced model for every path of the focus, by its poles.
+
+    u(x, w) = sum_p O_p(x) F_p / (i w - pole_p) + conj(O_p(x) F_p(-w) / (-i w - pole_p))
+
+The reduced basis is the proper orthogonal decomposition of the steady motion under focal spots all
+over the area, at frequencies of the band. Stiffness, damping and mass are symmetric: the same
+fields O_p read the motion and take up the load, but for the slope of the surface.
+"""
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+import fem
+from fem.harmonic import LineSolver
+from meshes.tetmesh import Floats
+from simple_model import MovingPressure, Tacton
+from simple_model.prony import FIT_TOLERANCE
+from skinwave.bodies.build import Build, build, operators
+from skinwave.effort import Progress, silent
+from skinwave.live.arrays import packed, quantised
+from skinwave.live.grid import SIDE, STEP, grid_line
+from skinwave.models.laws import relaxing
+from skinwave.models.loads import surface_load, surface_motion
+from skinwave.scene import Body
+
+LOWEST = 0.15  # m: least height of the focus, whose spot elements of some mm resolve
+REACH, SPACING = 0.034, 0.0058  # m from the middle to which foci are, and between training spots
+FREQUENCIES = (15.0, 50.0, 90.0, 130.0, 180.0, 240.0, 310.0, 400.0, 520.0, 700.0, 950.0)  # Hz
+MOST = 520  # dimensions of the basis
+AT_ONCE = 32  # loads that are solved together
+LEFT_OUT = 1e-4  # of the mean-square motion: what the basis need not have
+
+
+def element_pack(body: Body, h: float, progress: Progress = silent) -> dict[str, Any]:
+    """Pack of a body of finite elements.
+
+    Parameters
+    ----------
+    body : Body
+    h : metre, element size
+    progress : is told of phases and shares
+
+    Returns
+    -------
+    dict for JSON
+
+    Raises
+    ------
+    ValueError
+        As `build` does.
+    """
+    progress("mesh", 0.0)
+    body = relaxing(body, FIT_TOLERANCE)
+    made = build(body, h)
+    progress("assemble", 0.0)
+    ops = operators(made)
+    P, points = surface_load(made)
+    pressure = MovingPressure(tacton=Tacton(), height=LOWEST)
+    forces = P @ pressure.spot(points, training_knots(body)).T
+    basis = training_basis(ops, forces, partial(progress, "solve for focal spots"))
+    progress("reduce", 0.0)
+    poles, turn = reduced_poles(ops, basis)
+    places, inside, slopes, heights = surface_grid(body, made)
+    read = np.zeros((SIDE**2, turn.shape[0]))
+    read[inside] = surface_motion(body, made, places[inside]) @ basis
+    fields = (turn.T @ read.T).astype(np.complex64)
+    return {
+        "kind": "poles", "step": STEP, "side": SIDE, "lowest_height_mm": 1e3 * LOWEST,
+        "poles": packed(poles), "fields": quantised(fields), "slopes": quantised(slopes[None]),
+        "inside": "".join("01"[int(each)] for each in inside),
+        "heights": quantised(1e3 * heights[None]), "reach_mm": 1e3 * REACH,
+    }  # fmt: skip
+
+
+def training_knots(body: Body) -> Floats:
+    """Places (j, 2) in metre of focal spots all over the area, on a triangular grid."""
+    rows = int(2 * REACH / (SPACING * 0.75**0.5)) + 1
+    half = np.array([body.width, body.height]) / 2 if body.of_kind.is_bounded else np.full(2, REACH)
+    found = [
+        (SPACING * (column + 0.5 * (row % 2)), SPACING * 0.75**0.5 * row)
+        for row in range(-rows, rows + 1)
+        for column in range(-rows, rows + 1)
+    ]
+    knots = np.array(found)
+    kept = (np.hypot(*knots.T) <= REACH) & (np.abs(knots) <= half).all(axis=1)
+    return np.asarray(knots[kept])
+
+
+def training_basis(ops: fem.Operators, forces: Floats, report: Any) -> Floats:
+    """Basis (3 n, r) of the steady motion under loads (3 n, j), at all `FREQUENCIES`."""
+    solve, snapshots = LineSolver(ops), []
+    count = len(FREQUENCIES) * -(-forces.shape[1] // AT_ONCE)
+    for frequency in FREQUENCIES:
+        for first in range(0, forces.shape[1], AT_ONCE):
+            report(len(snapshots) / count)
+            part = solve(frequency, forces[:, first : first + AT_ONCE])[ops.free]
+            snapshots.append(np.hstack([part.real, part.imag]).astype(np.float32))
+    motions = np.hstack(snapshots)
+    squares, turn = np.linalg.eigh((motions.T @ motions).astype(np.float64))
+    squares, turn = squares[::-1], turn[:, ::-1]
+    left = np.sqrt(np.maximum(np.cumsum(squares[::-1])[::-1], 0.0) / squares.sum())
+    kept = min(MOST, int((left > LEFT_OUT).sum()))
+    basis = np.zeros((len(forces), kept), np.float32)
+    basis[ops.free] = motions @ (turn[:, :kept] / np.sqrt(squares[:kept])).astype(np.float32)
+    return basis
+
+
+def reduced_poles(ops: fem.Operators, basis: Floats) -> tuple[fem.Complex, fem.Complex]:
+    """Poles (p,) in 1/s with imaginary part >= 0 of the reduced body, and their combinations (r, p)
+    of the basis.
+    """
+    V = basis[ops.free].astype(np.float64)
+    projected = [V.T @ (A @ V) for A in (ops.M, ops.K, ops.C)]
+    M, K, C = ((A + A.T) / 2 for A in projected)
+    upright = np.linalg.inv(np.linalg.cholesky(M)).T
+    branches = tuple(
+        fem.MaxwellBranch(K=upright.T @ (V.T @ (each.K @ V)) @ upright, time=each.time)
+        for each in ops.branches
+    )
+    model = fem.ReducedModel(
+        basis=upright, K=upright.T @ K @ upright, C=upright.T @ C @ upright,
+        R=np.zeros_like(K), outputs=upright, moments=0, estimate=0.0, solver="", branches=branches,
+    )  # fmt: skip
+    found = fem.poles(model)
+    outputs, inputs = found.outputs, found.inputs.T
+    inputs = upright @ inputs
+    # Symmetric: inputs and outputs of a pole are the same up to a factor.
+    factor = (outputs.conj() * inputs).sum(axis=0) / (np.abs(outputs) ** 2).sum(axis=0)
+    return found.values, outputs * np.sqrt(factor)
+
+
+def surface_grid(body: Body, made: Build) -> tuple[Floats, np.ndarray, Floats, Floats]:
+    """Places (SIDE^2, 2) in metre of the grid, whether they are on the body, the area of the surface
+    per area of the grid (SIDE^2,) and its height (SIDE^2,) in metre.
+    """
+    x, y = np.meshgrid(grid_line(), grid_line())
+    places = np.column_stack([x.ravel(), y.ravel()])
+    inside = fem.on_surface(made.mesh, places)
+    heights = np.zeros(len(places))
+    heights[inside] = surface_heights(made, places[inside])
+    shown = np.where(inside, heights, np.nan).reshape(SIDE, SIDE)
+    steep = np.nan_to_num(np.stack(np.gradient(shown, STEP)))
+    return places, inside, np.sqrt(1 + (steep**2).sum(axis=0)).ravel(), heights
+
+
+def surface_heights(made: Build, places: Floats) -> Floats:
+    """Height (p,) in metre of the upper surface at places (p, 2), from its nodes."""
+    from scipy.interpolate import LinearNDInterpolator
+
+    nodes = np.unique(made.mesh.facets["top"])
+    points = made.mesh.points[nodes]
+    found = LinearNDInterpolator(points[:, :2], points[:, 2])(places)
+    return np.nan_to_num(found, nan=float(points[:, 2].max()))

@@ -1,0 +1,105 @@
+"""Packs of sheets: the modes of a thin plate by Ritz's method, as far as focal spots move them.
+
+    (diag(squared) + c(w) B - w^2) q = F
+
+where B is the stiffness of bending between the modes and c its complex modulus over that of the
+modes, less 1. The fields of the modes are on a square grid; the force of a focal spot on a mode is
+its field smoothed by the spot.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from meshes.tetmesh import Floats
+from simple_model.focus import spot_width
+from simple_model.free_modes import free_vibration, relaxing_stiffness
+from simple_model.plate_modes import PlateModes
+from simple_model.prony import FIT_TOLERANCE
+from skinwave.effort import Progress, silent
+from skinwave.live.arrays import packed, quantised
+from skinwave.live.grid import SIDE, STEP, grid_line, smoothed
+from skinwave.models.laws import relaxing
+from skinwave.models.plate_modes import modes_of, plate_of, relative_modulus
+from skinwave.scene import Body
+
+LAW_STEP, HIGHEST = 2.5, 1000.0  # Hz between values of the modulus, and of the last
+LOWEST = 0.1  # m: least height of the focus
+BAND = 1300.0  # Hz: modes below are kept as they are
+COUPLED = 1.5  # times a line's frequency: modes below are solved together
+LEFT_OUT = 0.005  # of the largest combination of modes above the band
+QUASI_STATIC = (0.0, 600.0, 1000.0)  # Hz at which these combinations are looked at
+
+
+def sheet_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
+    """Pack of a flat sheet that is held: modes of a thin plate by Ritz's method.
+
+    Parameters
+    ----------
+    body : Body
+    progress : is told of the phase
+
+    Returns
+    -------
+    dict for JSON
+    """
+    progress("modes of the sheet", 0.0)
+    modes = modes_of(plate_of(body))
+    middle, line = np.asarray(body.placement.offset), grid_line()
+    limit = np.array([body.width, body.height]) / 2
+    on = [np.abs(line - middle[axis]) <= limit[axis] + 1e-9 for axis in (0, 1)]
+    inside = np.outer(on[1], on[0]).ravel()
+    x, y = (np.clip(line - middle[axis], -limit[axis], limit[axis]) for axis in (0, 1))
+    fields = modes.on_grid(x, y).reshape(SIDE, SIDE, -1).transpose(2, 1, 0).reshape(-1, SIDE**2)
+    fields = fields * inside
+    progress("combinations of high modes", 0.5)
+    squared, bending, turn = combined(modes, fields)
+    frequencies = np.arange(0.0, HIGHEST + LAW_STEP / 2, LAW_STEP)
+    relative = relative_modulus(body, 2 * np.pi * frequencies) - 1
+    bent, stretched = np.diagonal(bending), modes.plate.tension_x or modes.plate.tension_y
+    solid = relaxing(body, FIT_TOLERANCE).solid
+    free = free_vibration(*relaxing_stiffness(squared - bent, bent, solid))
+    return {
+        "kind": "modal", "step": STEP, "side": SIDE, "lowest_height_mm": 1e3 * LOWEST,
+        "squared": packed(squared), "diagonal": packed(bent.copy()),
+        "between": quantised(bending) if stretched else None, "coupled": COUPLED,
+        "law": packed(relative.astype(np.complex128)), "law_step": LAW_STEP,
+        "V": quantised(turn.T @ fields), "inside": "".join("01"[int(each)] for each in inside),
+        "kinds": free.poles.shape[1],
+        "poles": packed(free.poles), "residues": packed(free.residues),
+    }  # fmt: skip
+
+
+def combined(modes: PlateModes, fields: Floats) -> tuple[Floats, Floats, Floats]:
+    """Modes below `BAND`, and the combinations of higher ones that focal spots move.
+
+    Returns
+    -------
+    squared : (r,) rad2/s2, ascending
+    bending : (r, r) 1/s2, stiffness of bending between them
+    turn : (m, r) orthonormal combinations of the modes
+    """
+    squared = modes.squared
+    low = squared < (2 * np.pi * BAND) ** 2
+    forces = smoothed(fields[~low], spot_width(LOWEST))
+    motions = [forces / (squared[~low] - (2 * np.pi * f) ** 2)[:, None] for f in QUASI_STATIC]
+    directions, sizes, _ = np.linalg.svd(np.hstack(motions), full_matrices=False)
+    kept = directions[:, sizes > LEFT_OUT * sizes.max(initial=0.0)]
+    own, turned = np.linalg.eigh(kept.T @ (squared[~low][:, None] * kept))
+    turn = np.zeros((len(squared), low.sum() + len(own)))
+    turn[low, : low.sum()] = np.eye(low.sum())
+    turn[~low, low.sum() :] = kept @ turned
+    values = np.concatenate([squared[low], own])
+    order = np.argsort(values)
+    turn = turn[:, order]
+    return values[order], _bending(modes, turn), turn
+
+
+def _bending(modes: PlateModes, turn: Floats) -> Floats:
+    """Stiffness of bending (r, r) in 1/s2 between combinations (m, r) of modes."""
+    found, first = np.zeros((turn.shape[1], turn.shape[1])), 0
+    for family in modes.families:
+        part = turn[first : (first := first + len(family.squared))]
+        own = np.diag(family.squared) if family.bending is None else family.bending
+        found += part.T @ own @ part
+    return found

@@ -1,0 +1,108 @@
+// Motion over time of lines and of poles, and under the pulses of a rhythm.
+
+const FAINT = 1e-6; // of the largest free vibration: what is left out
+const AT_ONCE = 64; // instants whose exponentials are made by multiplication
+
+/** Re sum_l amplitudes exp(2 pi i f t) at equally spaced times (t,) in s from 0. */
+export function oscillation(f, amplitudes, times) {
+  const found = new Float64Array(times.length), dt = times[1] - times[0];
+  f.forEach((frequency, l) => {
+    const omega = 2 * Math.PI * frequency, c = Math.cos(omega * dt), s = Math.sin(omega * dt);
+    for (let t = 0; t < times.length; t += AT_ONCE) {
+      const turn = omega * t * dt, gr = Math.cos(turn), gi = Math.sin(turn), [a, b] = amplitudes[l];
+      let zr = a * gr - b * gi, zi = a * gi + b * gr;
+      for (let i = t, end = Math.min(t + AT_ONCE, times.length); i < end; i++) {
+        found[i] += zr;
+        const next = zr * c - zi * s;
+        zi = zr * s + zi * c;
+        zr = next;
+      }
+    }
+  });
+  return found;
+}
+
+/** Pieces {start, end, level, slope} in s and 1/s of the rhythm up to a time, level at their start. */
+export function rhythmPieces(load, until) {
+  if (!load.pulses || !load.pulses.length) return [{ start: 0, end: Infinity, level: 1, slope: 0 }];
+  const found = [], { ramp = 0 } = load;
+  for (let at = 0, k = 0; at <= until; k++) {
+    const [on, gap] = load.pulses[k % load.pulses.length];
+    const add = (length, level, slope) => {
+      if (length > 0) found.push({ start: at, end: at + length, level, slope });
+      at += length;
+    };
+    if (ramp) add(ramp, 0, 1 / ramp);
+    add(on - 2 * ramp, 1, 0);
+    if (ramp) add(ramp, 1, -1 / ramp);
+    add(gap, 0, 0);
+  }
+  return found;
+}
+
+/**
+ * Add Re sum_k amplitudes exp(pole (t - start)) from `start` in s on, without what is negligible.
+ * Poles in 1/s and amplitudes are {re, im} (k,).
+ */
+export function addDecay(found, times, start, poles, amplitudes) {
+  const dt = times[1] - times[0], n = times.length, first = Math.ceil(start / dt - 1e-9);
+  let largest = 0;
+  for (let k = 0; k < poles.re.length; k++) {
+    largest = Math.max(largest, Math.hypot(amplitudes.re[k], amplitudes.im[k]));
+  }
+  for (let k = 0; k < poles.re.length; k++) {
+    const size = Math.hypot(amplitudes.re[k], amplitudes.im[k]);
+    if (!(size > FAINT * largest)) continue;
+    const lasting = Math.log(size / (FAINT * largest)) / -poles.re[k];
+    const last = Math.min(n, first + Math.ceil(lasting / dt) + 1);
+    const decay = Math.exp(poles.re[k] * dt), c = decay * Math.cos(poles.im[k] * dt);
+    const s = decay * Math.sin(poles.im[k] * dt);
+    for (let t = first; t < last; t += AT_ONCE) {
+      const since = t * dt - start, grown = Math.exp(poles.re[k] * since);
+      const turn = poles.im[k] * since, gr = grown * Math.cos(turn), gi = grown * Math.sin(turn);
+      let zr = amplitudes.re[k] * gr - amplitudes.im[k] * gi;
+      let zi = amplitudes.re[k] * gi + amplitudes.im[k] * gr;
+      for (let i = t, end = Math.min(t + AT_ONCE, last); i < end; i++) {
+        found[i] += zr;
+        const next = zr * c - zi * s;
+        zi = zr * s + zi * c;
+        zr = next;
+      }
+    }
+  }
+}
+
+/**
+ * Motion (t,) under a load that follows the rhythm of a Tacton: the steady state times the level,
+ * the lag of its ramps, and free vibration after each of its steps and corners.
+ *
+ * `steady` (t,) and `lag()` (t,) are those of a level of 1 and of a slope of 1/s; `free(start, jump,
+ * bend)` gives {poles, amplitudes} after a jump of the level and a change of its slope.
+ */
+export function underRhythm(load, times, steady, lag, free) {
+  const pieces = rhythmPieces(load, times[times.length - 1]), dt = times[1] - times[0];
+  const found = new Float64Array(times.length);
+  const lagging = pieces.some(({ slope }) => slope) ? lag() : null;
+  let before = { level: 0, slope: 0, start: 0, end: 0 };
+  for (const piece of pieces) {
+    const { start, end, level, slope } = piece;
+    const from = Math.ceil(start / dt - 1e-9), to = Math.min(Math.ceil(end / dt - 1e-9), times.length);
+    for (let k = from; k < to; k++) {
+      found[k] += (level + slope * (times[k] - start)) * steady[k] - (lagging ? slope * lagging[k] : 0);
+    }
+    const jump = level - (before.level + before.slope * (before.end - before.start));
+    const bend = slope - before.slope;
+    if (Math.abs(jump) > 1e-9 || Math.abs(bend) > 1e-9) {
+      const { poles, amplitudes } = free(start, jump, bend);
+      addDecay(found, times, start, poles, amplitudes);
+    }
+    before = piece;
+  }
+  return found;
+}
+
+/** Quotient [re, im] of a + i b and c + i d. */
+export function divided(a, b, c, d) {
+  const size = c * c + d * d;
+  return [(a * c + b * d) / size, (b * c - a * d) / size];
+}
