@@ -1,4 +1,4 @@
-"""Arrays of a pack as text: 64-bit floats, or whole numbers of 16 bits with a scale for each row."""
+"""Arrays of a pack as text: 64-bit floats, or 16-bit whole numbers with a scale for each row."""
 
 import base64
 from typing import Any

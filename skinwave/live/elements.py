@@ -132,8 +132,8 @@ def reduced_poles(ops: fem.Operators, basis: Floats) -> tuple[fem.Complex, fem.C
 
 
 def surface_grid(body: Body, made: Build) -> tuple[Floats, np.ndarray, Floats, Floats]:
-    """Places (SIDE^2, 2) in metre of the grid, whether they are on the body, the area of the surface
-    per area of the grid (SIDE^2,) and its height (SIDE^2,) in metre.
+    """Places (SIDE^2, 2) in metre of the grid, whether they are on the body, and of the surface its
+    area per area of the grid (SIDE^2,) and its height (SIDE^2,) in metre.
     """
     x, y = np.meshgrid(grid_line(), grid_line())
     places = np.column_stack([x.ravel(), y.ravel()])

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from simple_model import MovingPressure, Tacton
 from skinwave.bodies.analytic import has_exact_waves, is_laterally_infinite
 from skinwave.effort import Progress, silent
 from skinwave.live.elements import element_pack
@@ -10,7 +11,6 @@ from skinwave.live.sheets import sheet_pack
 from skinwave.models.advice import takes
 from skinwave.models.plate_modes import MODES
 from skinwave.scene import Body, Scene
-from simple_model import MovingPressure, Tacton
 
 
 def pack_of(body: Body, progress: Progress = silent) -> dict[str, Any]:
