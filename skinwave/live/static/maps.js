@@ -95,8 +95,10 @@ function draw(pen, options, state, ink) {
       for (const look of looks) pen.line(points, look);
     }
   };
-  const said = state.hover ? readout(options, state.hover) : options.note || "";
-  pen.text([box.x, box.y - 7], options.title || "", { colour: ink, size: 12, bold: true });
+  const said = state.hover ? readout(options, state.hover) : options.note || "", { title = "" } = options;
+  if (pen.width(title, 13) + pen.width(said, 11) < box.side || !state.hover) { // or the value alone
+    pen.text([box.x, box.y - 7], title, { colour: ink, size: 12, bold: true });
+  }
   if (said) pen.text([box.x + box.side, box.y - 7], said, { colour: ink, size: 11, anchor: "end" });
   pen.within(box.x, box.y, box.side, box.side, () => {
     if (rms) pen.image(state.image, box.x, box.y, box.side, box.side, options.stale ? 0.3 : 1);
@@ -152,6 +154,7 @@ function drawBar(pen, options, { box, bar: colours }, ink) {
   let words = ["0", "", end];
   if (decibel && !signed) words = [`≤ −${decibel} dB`, `−${decibel / 2}`, `0 dB = ${end}`];
   if (signed) words = [withUnit(-largest, unit), "0", `+${end}`];
+  if (words.reduce((sum, text) => sum + pen.width(text, 13), 0) > box.side) words[1] = "";
   words.forEach((text, k) => pen.text([box.x + box.side * k / 2, top + 21], text,
     { colour: ink, size: 10.5, anchor: ["start", "middle", "end"][k] }));
 }

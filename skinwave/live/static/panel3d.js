@@ -11,11 +11,11 @@ const STYLE = `.view3d { display: flex; flex-direction: column; min-height: 0; h
   .view3d canvas, .view3d .stage > svg { position: absolute; inset: 0; width: 100%; height: 100%; }
   .view3d .stage > svg { pointer-events: none; }
   .view3d canvas { cursor: grab; touch-action: none; }
-  .view3d .row { display: flex; flex-wrap: wrap; gap: 4px 10px; align-items: center; }
-  .view3d .time { flex: 1 1 90px; min-width: 60px; } .view3d .cut { width: 70px; }
+  .view3d .row { display: flex; flex-wrap: wrap; gap: 4px 8px; align-items: center; }
+  .view3d .time { flex: 1 1 50px; min-width: 40px; } .view3d .cut { width: 56px; }
   .view3d label { display: inline-flex; gap: 4px; align-items: center; }
   .view3d :is(button, select) { font: inherit; min-height: 24px; }
-  .view3d output { min-width: 5.5em; font-variant-numeric: tabular-nums; }
+  .view3d output { min-width: 4.6em; font-variant-numeric: tabular-nums; }
   .view3d .colours { height: 8px; } .view3d .ends { display: flex; justify-content: space-between; }`;
 
 export const element = (name, attributes = {}, ...children) => {
@@ -51,11 +51,11 @@ export function panel(container) {
   p.slider = range("time", 1000, "Time");
   p.now = element("output");
   p.slow = choice("How many times slower than real", SLOWER.map((s) => [s, `${s} × slower`]), 100);
-  p.hues = choice("Colours", [["motion", "motion now"], ["rms", "RMS"]], "motion");
-  p.high = choice("Height of the relief", [[0.4, "low relief"], [1, "relief"], [2.5, "high relief"]], 1);
+  p.hues = choice("Colours", [["motion", "motion"], ["rms", "RMS"]], "motion");
+  p.high = choice("Height of the relief", [[0.4, "flat"], [1, "relief"], [2.5, "high"]], 1);
   p.cutter = range("cut", 95, "Cut away from the front, per cent");
-  p.above = element("button", { type: "button" }, "From above");
-  p.home = element("button", { type: "button" }, "Reset view");
+  p.above = element("button", { type: "button", title: "Look from above" }, "Above");
+  p.home = element("button", { type: "button", title: "Show the body as at first" }, "Reset");
   p.said = element("div");
   p.colours = element("div", { class: "colours", "aria-hidden": "true" });
   p.ends = element("div", { class: "ends" });

@@ -184,6 +184,7 @@ class View {
     let words = unit === "Pa" ? [`${most} less`, "mean pressure", `${most} more`]
       : [`${most} out of the body`, "0", `${most} into the body`];
     if (this.hue === "rms") words = ["0", "RMS", withUnit(this.most, unit)];
+    this.ends.title = "≥: rare larger values have the last colour";
     this.ends.replaceChildren(...words.map((text) => element("span", {}, text)));
   }
 
