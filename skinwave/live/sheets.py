@@ -27,6 +27,7 @@ LAW_STEP, HIGHEST = 2.5, 1000.0  # Hz between values of the modulus, and of the 
 LOWEST = 0.1  # m: least height of the focus
 BAND = 1300.0  # Hz: modes below are kept as they are
 COUPLED = 1.5  # times a line's frequency: modes below are solved together
+COUPLED_BAND = 2600.0  # Hz: loss couples modes below
 LEFT_OUT = 0.005  # of the largest combination of modes above the band
 QUASI_STATIC = (0.0, 600.0, 1000.0)  # Hz at which these combinations are looked at
 
@@ -57,12 +58,13 @@ def sheet_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
     frequencies = np.arange(0.0, HIGHEST + LAW_STEP / 2, LAW_STEP)
     relative = relative_modulus(body, 2 * np.pi * frequencies) - 1
     bent, stretched = np.diagonal(bending), modes.plate.tension_x or modes.plate.tension_y
+    coupled = int(np.searchsorted(squared, (2 * np.pi * COUPLED_BAND) ** 2))
     solid = relaxing(body, FIT_TOLERANCE).solid
     free = free_vibration(*relaxing_stiffness(squared - bent, bent, solid))
     return {
         "kind": "modal", "step": STEP, "side": SIDE, "lowest_height_mm": 1e3 * LOWEST,
         "squared": packed(squared), "diagonal": packed(bent.copy()),
-        "between": quantised(bending) if stretched else None, "coupled": COUPLED,
+        "between": quantised(bending[:coupled, :coupled]) if stretched else None, "coupled": COUPLED,
         "law": packed(relative.astype(np.complex128)), "law_step": LAW_STEP,
         "V": quantised(turn.T @ fields), "inside": "".join("01"[int(each)] for each in inside),
         "kinds": free.poles.shape[1],

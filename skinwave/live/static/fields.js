@@ -1,6 +1,7 @@
 // Fields of bounded bodies on a square grid, place after place: value m of place p at [p * count + m].
 
 const POINTS = 8; // of the polynomials between places of the grid
+const LOOKED = 12, UNHEARD = 2e-3; // places of the path, and the share of the strongest line there
 
 /** The square grid of a pack, its places and what is on the body. */
 export class Grid {
@@ -96,4 +97,16 @@ export function byPlace(rows, count) {
   const places = rows.length / count, found = new Float32Array(rows.length);
   for (let m = 0, k = 0; m < count; m++) for (let p = 0; p < places; p++, k++) found[p * count + m] = rows[k];
   return found;
+}
+
+/** Indices of the lines of a motion that are not negligible along the path: those that maps show. */
+export function heard(motion) {
+  const { x, y } = motion.lines.samples, step = Math.ceil(x.length / LOOKED);
+  const largest = new Float64Array(motion.f.length);
+  for (let q = 0; q < x.length; q += step) {
+    const { re, im } = motion.at(x[q], y[q]);
+    re.forEach((value, l) => { largest[l] = Math.max(largest[l], Math.hypot(value, im[l])); });
+  }
+  const strongest = Math.max(...largest);
+  return [...largest.keys()].filter((l) => largest[l] > UNHEARD * strongest);
 }

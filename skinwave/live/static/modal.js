@@ -2,7 +2,7 @@
 //   (diag(squared) + c(w) B - w^2) q = F
 // where c is the modulus of bending over that of the modes, less 1; as skinwave.live.sheets packs it.
 
-import { Grid, byPlace } from "./fields.js";
+import { Grid, byPlace, heard } from "./fields.js";
 import { loadLines, pathSamples, spotWidth } from "./load.js";
 import { divided, oscillation, underRhythm } from "./time.js";
 
@@ -13,6 +13,7 @@ export class ModalBody {
   constructor(pack) {
     Object.assign(this, pack);
     this.modes = this.squared.length;
+    this.together = Math.sqrt(this.between?.length ?? 0); // modes that loss couples
     this.grid = new Grid(pack);
     this.fields = byPlace(this.V, this.modes);
     this.loads = new Map(); // load fields of a height
@@ -84,15 +85,18 @@ export class ModalBody {
 
   /** force - (dynamic stiffness) q. */
   residual(q, force, dr, di, [c, s]) {
-    const { modes, between } = this, re = new Float64Array(modes), im = new Float64Array(modes);
+    const { modes, between, together: n } = this;
+    const re = new Float64Array(modes), im = new Float64Array(modes);
     for (let m = 0, k = 0; m < modes; m++) {
       let a = 0, b = 0;
-      for (let i = 0; i < modes; i++, k++) {
-        a += between[k] * q.re[i];
-        b += between[k] * q.im[i];
+      if (m < n) {
+        for (let i = 0; i < n; i++, k++) {
+          a += between[k] * q.re[i];
+          b += between[k] * q.im[i];
+        }
+        a -= between[m * n + m] * q.re[m];
+        b -= between[m * n + m] * q.im[m];
       }
-      a -= between[m * modes + m] * q.re[m];
-      b -= between[m * modes + m] * q.im[m];
       re[m] = force.re[m] - dr[m] * q.re[m] + di[m] * q.im[m] - c * a + s * b;
       im[m] = force.im[m] - dr[m] * q.im[m] - di[m] * q.re[m] - c * b - s * a;
     }
@@ -103,14 +107,14 @@ export class ModalBody {
   lowBlock(frequency, dr, di, [c, s]) {
     if (this.factors.has(frequency)) return this.factors.get(frequency);
     if (this.factors.size > 64) this.factors.clear();
-    const { modes, between } = this, limit = (2 * Math.PI * this.coupled * frequency) ** 2;
+    const { between, together } = this, limit = (2 * Math.PI * this.coupled * frequency) ** 2;
     let n = 0;
-    while (n < modes && this.squared[n] <= limit) n++;
+    while (n < together && this.squared[n] <= limit) n++;
     const re = new Float64Array(n * n), im = new Float64Array(n * n);
     for (let row = 0; row < n; row++) {
       for (let column = 0; column < row; column++) {
-        re[row * n + column] = c * between[row * modes + column];
-        im[row * n + column] = s * between[row * modes + column];
+        re[row * n + column] = c * between[row * together + column];
+        im[row * n + column] = s * between[row * together + column];
       }
       re[row * n + row] = dr[row];
       im[row * n + row] = di[row];
@@ -226,7 +230,7 @@ class ModalMotion {
   onOwnGrid() {
     const { modes, fields, grid: { side } } = this.body, n = side * side;
     const re = new Float32Array(this.f.length * n), im = new Float32Array(re.length);
-    for (let l = 0; l < this.f.length; l++) {
+    for (const l of heard(this)) {
       const { re: qr, im: qi } = this.coordinates[l + this.first];
       for (let p = 0, k = 0; p < n; p++) {
         let a = 0, b = 0;

@@ -2,7 +2,7 @@
 //   u(x, w) = sum_p O_p(x) F_p(w) / (i w - pole_p) + conj(O_p(x) F_p(-w) / (-i w - pole_p))
 // with complex fields O_p (p, place), which read the motion and take up the load.
 
-import { Grid, byPlace } from "./fields.js";
+import { Grid, byPlace, heard } from "./fields.js";
 import { loadLines, pathSamples, spotWidth } from "./load.js";
 import { divided, oscillation, underRhythm } from "./time.js";
 
@@ -98,7 +98,7 @@ class PoleMotion {
     const { values, count, grid: { side } } = this.body, n = side * side, width = 2 * count;
     const re = new Float32Array(this.f.length * n), im = new Float32Array(re.length);
     const sum = new Float64Array(width), difference = new Float64Array(width);
-    for (let l = 0; l < this.f.length; l++) {
+    for (const l of heard(this)) {
       const { ahead, back } = this.states[l + this.first];
       for (let p = 0; p < count; p++) {
         sum[p] = ahead.re[p] + back.re[p];
