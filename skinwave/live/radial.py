@@ -27,6 +27,7 @@ def radial_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
     known = wavenumbers(body, LOWEST, progress)
     return {
         "kind": "radial",
+        "lowest_height_mm": 1e3 * LOWEST,
         "frequencies": known.frequencies.tolist(),
         "furthest": FURTHEST,
         "n_distances": len(known.distances),

@@ -1,5 +1,6 @@
 """Random Tactons with exact steady lines at a point, with which the page tests itself."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,21 +11,28 @@ from simple_model import MovingPressure, Tacton, Trajectory, evenly
 from simple_model.flat_body import steady_lines
 from simple_model.tacton import SUPERPOSITIONS
 from skinwave.bodies.analytic import compliance, has_exact_waves, is_laterally_infinite
+from skinwave.live.radial import LOWEST
 from skinwave.live.values import values_of
 from skinwave.models.advice import takes
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.plate_modes import steady_lines as plate_lines
+from skinwave.models.prepared import answer, components, prepare
 from skinwave.scene import Body, Scene
+from skinwave.simulation import compute
 
 SEED = 15
 SHOWN = 0.01  # of the strongest line of a point: -40 dB, down to which lines are compared
 HIGHEST = 1000.0  # Hz
-ERROR = 0.01  # relative, of a line, that the test allows
 SHAPES = ("point", "line", "circle", "triangle", "square")
 DRIVES = ("pressure_squared", "force_corrected", "linear")
+# m: where bodies of elements are read, for which the exact model is reduced.
+PLACES = ((0.0, 0.0), (0.006, -0.002), (-0.011, 0.007), (0.004, 0.016), (0.02, -0.012))
+
+Lines = Callable[[Scene], tuple[Floats, Complex]]
+Waveform = Callable[[Scene], Floats]
 
 
-def selftest(body: Body, name: str, most: int) -> list[dict[str, Any]]:
+def selftest(body: Body, name: str, most: int, lowest: float, error: float) -> list[dict[str, Any]]:
     """Return random Tactons on a body with their steady lines at a point.
 
     Parameters
@@ -32,52 +40,96 @@ def selftest(body: Body, name: str, most: int) -> list[dict[str, Any]]:
     body : Body
     name : of its record
     most : how many
+    lowest : metre, the least height of the focus
+    error : relative, of a line, that the test allows
 
     Returns
     -------
-    records of body, values, lines [{f in Hz, re, im in metre}] and the error that is allowed; []
-    of a body without an exact model
+    records of body, values, lines [{f in Hz, re, im in metre}] and the error that is allowed
     """
     rng, found = np.random.default_rng(SEED), []
+    lines_of, _, places = exact(body)
     for _ in range(most):
-        scene = random_scene(body, rng)
-        if not has_exact_lines(scene):
-            return []
-        f, amplitudes = exact_lines(scene)
+        scene = random_scene(body, rng, lowest, places)
+        f, amplitudes = lines_of(scene)
         size = np.abs(amplitudes)
         kept = (f > 0) & (f <= HIGHEST)
         kept &= size > SHOWN * size[kept].max(initial=0.0)
         lines = zip(f[kept].tolist(), amplitudes[kept].tolist(), strict=True)
         found.append({
-            "body": name, "values": values_of(scene, name), "error": ERROR,
+            "body": name, "values": values_of(scene, name), "error": error,
             "lines": [{"f": at, "re": value.real, "im": value.imag} for at, value in lines],
         })  # fmt: skip
     return found
 
 
-def has_exact_lines(scene: Scene) -> bool:
-    """Whether `exact_lines` takes a scene: of infinite layers, or of a thin plate in its modes."""
-    return _is_infinite(scene.body) or takes(FROM_REST, scene)
+def exact(body: Body) -> tuple[Lines, Waveform, tuple[tuple[float, float], ...]]:
+    """Return an exact model of a body, which does not use its pack.
 
-
-def exact_lines(scene: Scene) -> tuple[Floats, Complex]:
-    """Return frequencies (f,) in Hz and complex amplitudes (f,) in metre at a scene's probe, by a
-    model that does not use the pack.
+    Returns
+    -------
+    lines : function of a scene of one probe to frequencies (f,) in Hz and amplitudes (f,) in metre
+    waveform : function of a scene to the motion (t,) in metre of its probe from rest
+    places : (p, 2) in metre, the only ones where it can be read; () if anywhere
     """
+    if is_laterally_infinite(body) and has_exact_waves(body):
+        return (_lines_of_layers, lambda scene: compute(scene, "flat-body").values[:, 0], ())
+    if _is_plate(body):
+        return (_lines_of_sheet, lambda scene: compute(scene, FROM_REST.name).values[:, 0], ())
+    h = body.of_kind.interactive_size
+    prepared = prepare(body, np.array(PLACES), h=h)
+
+    def index(scene: Scene) -> int:
+        return int(np.linalg.norm(np.array(PLACES) - scene.probes[0], axis=1).argmin())
+
+    def lines(scene: Scene) -> tuple[Floats, Complex]:
+        motion = components(prepared, *scene.loads)
+        return motion.frequencies, motion.lines[:, index(scene)]
+
+    return lines, lambda scene: answer(prepared, scene).values[:, index(scene)], PLACES
+
+
+def has_exact_lines(scene: Scene) -> bool:
+    """Whether a scene's body has an exact model that takes no elements."""
+    body = scene.body
+    return (is_laterally_infinite(body) and has_exact_waves(body)) or _is_plate(body)
+
+
+def _is_plate(body: Body) -> bool:
+    resting = Scene(pressure=MovingPressure(tacton=Tacton()), body=body, probes=((0.0, 0.0),))
+    return takes(FROM_REST, resting)
+
+
+def _lines_of_layers(scene: Scene) -> tuple[Floats, Complex]:
     body, places = scene.body, scene.probe_points
-    if _is_infinite(body):
-        f, amplitudes = steady_lines(compliance(body), scene.pressure, places, threshold=1e-4)
-    else:
-        f, amplitudes = plate_lines(scene, places)
+    f, amplitudes = steady_lines(compliance(body), scene.pressure, places, threshold=1e-4)
     return f, amplitudes[:, 0]
 
 
-def _is_infinite(body: Body) -> bool:
-    return is_laterally_infinite(body) and has_exact_waves(body)
+def _lines_of_sheet(scene: Scene) -> tuple[Floats, Complex]:
+    f, amplitudes = plate_lines(scene, scene.probe_points)
+    return f, amplitudes[:, 0]
 
 
-def random_scene(body: Body, rng: np.random.Generator) -> Scene:
-    """Return a scene of a random Tacton that the page's controls can set, on a body."""
+def random_scene(
+    body: Body,
+    rng: np.random.Generator,
+    lowest: float = LOWEST,
+    places: tuple[tuple[float, float], ...] = (),
+) -> Scene:
+    """Return a scene of a random Tacton that the page's controls can set.
+
+    Parameters
+    ----------
+    body : Body
+    rng : of the Tacton
+    lowest : metre, the least height of the focus
+    places : (p, 2) metre, of which one is the probe; () for any
+
+    Returns
+    -------
+    Scene of one probe
+    """
     bounded = body.of_kind.is_bounded
     half = min(0.025, *((body.width / 2, body.height / 2) if bounded else ()))
     shape = str(rng.choice(SHAPES))
@@ -94,8 +146,9 @@ def random_scene(body: Body, rng: np.random.Generator) -> Scene:
         envelope_frequency=float(rng.integers(1, 20)) if rng.random() < 0.2 else 0.0,
         trajectory=Trajectory(shape=shape, **moving), foci=evenly(int(rng.integers(1, 4))),
     )  # fmt: skip
-    pressure = MovingPressure(
-        tacton=tacton, drive=str(rng.choice(DRIVES)), height=float(rng.integers(24, 60)) / 200
-    )
+    height = float(rng.integers(round(200 * lowest), 60)) / 200
+    pressure = MovingPressure(tacton=tacton, drive=str(rng.choice(DRIVES)), height=height)
     x, y = np.round(rng.uniform(-0.8 * half, 0.8 * half, 2), 4).tolist()
+    if places:
+        x, y = places[int(rng.integers(len(places)))]
     return Scene(name="self-test", pressure=pressure, body=body, probes=((x, y),))

@@ -64,7 +64,8 @@ def sheet_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
     return {
         "kind": "modal", "step": STEP, "side": SIDE, "lowest_height_mm": 1e3 * LOWEST,
         "squared": packed(squared), "diagonal": packed(bent.copy()),
-        "between": quantised(bending[:coupled, :coupled]) if stretched else None, "coupled": COUPLED,
+        "between": quantised(bending[:coupled, :coupled]) if stretched else None,
+        "coupled": COUPLED,
         "law": packed(relative.astype(np.complex128)), "law_step": LAW_STEP,
         "V": quantised(turn.T @ fields), "inside": "".join("01"[int(each)] for each in inside),
         "kinds": free.poles.shape[1],
