@@ -306,13 +306,14 @@ const MOTIONS = {
 const OTHERS = "skinwave web and skinwave compare read other formats.";
 const UNEVEN = 0.25; // of a sampling interval, from where times are not equally spaced
 
-/** Cells of a line of text, which may be in quotes. */
+/** Cells of a line of text; a delimiter in quotes or brackets does not count. */
 function cellsOf(line, delimiter) {
   const found = [""];
-  let quoted = false;
+  let quoted = false, depth = 0;
   for (const letter of line) {
+    depth += (letter === "(") - (letter === ")");
     if (letter === '"') quoted = !quoted;
-    else if (letter === delimiter && !quoted) found.push("");
+    else if (letter === delimiter && !quoted && depth <= 0) found.push("");
     else found[found.length - 1] += letter;
   }
   return found.map((text) => text.trim());
