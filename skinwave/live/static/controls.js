@@ -39,7 +39,7 @@ const HELP = {
 const SHORT = {
   am: "AM", am2: "Second AM", envelope: "Envelope", ratio: "Mix", shape: "Shape", speed: "Speed",
   drawn: "Drawn", height: "Height", drive: "Drive law", profile: "Profile", foci: "Foci",
-  modulation: "Modulation", peak: "Peak pressure", quantity: "Quantity", sharing: "Foci are made",
+  modulation: "Modulation", peak: "Peak pressure", quantity: "Quantity", sharing: "Made",
   pulses: "On/off, ms", phases: "Phases, %", polyline: "Corners, mm", sweep: "Sweep",
 };
 const WORDS = {

@@ -121,11 +121,15 @@ function showCurves() {
   if (view.tab === "level" && !levels) slowDue = setTimeout(computeLevels, QUIET);
 }
 
-const facts = () => {
+/** What the controls show that is not a value: the drawing frequency in Hz, and whether it is kept. */
+function facts() {
+  let drawing = 0;
   try {
-    return { drawing: drawingFrequency((answer?.values === values ? answer.load : loadOf(values)).path), held: Boolean(view.held) };
-  } catch { return { drawing: 0, held: Boolean(view.held) }; }
-};
+    const { path } = answer?.values === values ? answer.load : loadOf(values);
+    drawing = path.drawn ?? drawingFrequency(path);
+  } catch { /* values that contradict each other are said elsewhere */ }
+  return { drawing, held: Boolean(view.held) };
+}
 
 function showMaps() {
   mapsDue = 0;

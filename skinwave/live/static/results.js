@@ -173,7 +173,7 @@ export function dispersionPlot(answer, highest) {
   for (const { f } of strong) curves.push({ role: "now", axis: "y", x: [f, f], y: [0, top], width: 1, dash: "2 3" });
   return { label: "Phase speed of the body's waves over frequency, with the lines of the load", kept: "dispersion",
     x: { label: "frequency, Hz", range: [0, highest] }, y: { label: "m/s", range: [0, top] }, curves,
-    names: strong.map(({ f }) => ({ x: f, y: 0.93 * top, axis: "y", text: lineName(answer, f) })) };
+    names: strong.map(({ f }) => ({ x: f, y: 0.8 * top, axis: "y", text: lineName(answer, f) })) };
 }
 
 /** Plot of levels {x, kernel, waves} over a control. */
@@ -210,12 +210,12 @@ export function tiles(answer, pinned) {
   const felt = body.is_skin;
   return [
     tile("Level at the point", "Largest component over the detection threshold of skin", {
-      value: felt ? `${signed(level?.dB)} dB` : "no skin",
-      detail: felt ? (level ? `${level.f.toFixed(0)} Hz (${subscript(lineName(answer, level.f) || "line")})` : "") : "no threshold",
-      kernel: `kernel ${signed(kernelLevel?.dB)} dB`, pinned: a && (a.body.is_skin ? `${signed(a.level?.dB)} dB` : "no skin") }),
+      value: felt ? `${signed(level?.dB)} dB` : "–",
+      detail: felt ? (level ? `${level.f.toFixed(0)} Hz (${subscript(lineName(answer, level.f) || "line")})` : "") : "no threshold: not skin",
+      kernel: `kernel ${signed(kernelLevel?.dB)} dB`, pinned: a && (a.body.is_skin ? `${signed(a.level?.dB)} dB` : "–") }),
     tile("Reach above threshold", "Largest distance from the path at which a component is above threshold", {
-      value: felt ? far(reach) : "no skin", detail: felt && reach ? "from the path" : "",
-      kernel: `kernel ${far(kernelReach)}`, pinned: a && (a.body.is_skin ? far(a.reach) : "no skin") }),
+      value: felt ? far(reach) : "–", detail: felt ? (reach ? "from the path" : "") : "no threshold: not skin",
+      kernel: `kernel ${far(kernelReach)}`, pinned: a && (a.body.is_skin ? far(a.reach) : "–") }),
     tile("Outside the kernel's region", "Share of the mean-square motion where the kernel is below −20 dB of its largest", {
       value: percent(share), detail: "of the motion", kernel: `kernel ${percent(answer.kernelShare)}`, pinned: a && percent(a.share) }),
     tile("Delay", "Lag of the motion behind the pressure on the path, at the strongest component", {
@@ -248,8 +248,8 @@ export function comparison(a, b) {
       if (other && other.value !== key.value) rows.push([key.label, `${key.value} ${key.unit}`, `${other.value} ${other.unit}`, true]);
     }
   }
-  const levels = [a, b].map((own) => (own.body.is_skin ? `${signed(own.level?.dB)} dB` : "no skin"));
-  rows.push(["Level at the point", ...levels], ["Reach above threshold", ...[a, b].map((own) => (own.body.is_skin ? far(own.reach) : "no skin"))],
+  const levels = [a, b].map((own) => (own.body.is_skin ? `${signed(own.level?.dB)} dB` : "–"));
+  rows.push(["Level at the point", ...levels], ["Reach above threshold", ...[a, b].map((own) => (own.body.is_skin ? far(own.reach) : "–"))],
     ["Outside the kernel's region", percent(a.share), percent(b.share)], ["Delay", delayed(a.delay), delayed(b.delay)]);
   return `<table><thead><tr><th scope="col">Scene</th><th scope="col" class="of-a">A, pinned</th><th scope="col" class="waves-ink">B, shown</th></tr></thead>
     <tbody>${rows.map(([name, own, other, set]) => `<tr${set ? ' class="different"' : ""}><th scope="row">${escaped(name)}</th><td>${
