@@ -3,6 +3,7 @@
 import { mapsOf, respond as respondTo } from "./answer.js";
 import { openBody } from "./bodies.js";
 import { buildControls } from "./controls.js";
+import { WRITERS, readMeasurement } from "./files.js";
 import { addressOf, createHistory, readAddress } from "./history.js";
 import { openKernel } from "./kernel.js";
 import { drawingFrequency } from "./load.js";
@@ -351,8 +352,7 @@ async function takeScene(file) {
 
 async function takeMeasurement(file) {
   try {
-    if (!data.api) throw new Error("This file reads no measurements. Open the page with skinwave web.");
-    measured = await sendFile(data.api, "measurement", file);
+    measured = data.api ? await sendFile(data.api, "measurement", file) : readMeasurement(await file.text(), file.name);
     errors.delete("measurement");
     say([`${file.name} is drawn over the waves.`, ...(measured.remarks ?? [])].join(" "));
   } catch (error) { errors.set("measurement", error.message); measured = null; }
@@ -567,7 +567,7 @@ $("span").innerHTML = Object.entries(SPANS).map(([value, words]) => `<option val
 $("over").innerHTML = Object.keys(OVER).map((key) => `<option value="${key}" title="${LABELS[key]}">${key === "am" ? "AM" : key}</option>`).join("");
 $("highest").value = view.highest;
 fillMenus();
-offerSaves($("save"), { answer: () => answer, view: () => ({ ...view, span: spanOf(view.span, answer.load) }), say });
+offerSaves($("save"), { answer: () => answer, view: () => ({ ...view, span: spanOf(view.span, answer.load) }), say, writers: WRITERS });
 setTheme(matchMedia("(prefers-color-scheme: dark)").matches);
 listen();
 begin();
