@@ -326,8 +326,8 @@ export function pathHarmonic(load, n, count) {
 export function loadLines(load, { threshold = 3e-4, lowest = 1e-6, highest = 1000, most = 60,
   samples = pathSamples(load) } = {}) {
   const count = samples.x.length, fd = drawingFrequency(load.path), gain = gainLines(load);
-  const shares = harmonicStrengths(load, samples), byFrequency = new Map();
-  const last = fd > 0 ? Math.floor((count - 1) / 2) : 0;
+  const last = lastOrder(load, count, gain, highest), byFrequency = new Map();
+  const shares = harmonicStrengths(load, samples, last);
   for (let n = -last; n <= last; n++) {
     const factor = Math.hypot(...arrayFactor(load, n)) * shares[(n + count) % count];
     if (factor < 1e-12) continue;
@@ -373,8 +373,14 @@ function spreadJumps(path, cells) {
   }
 }
 
-/** Largest amplitude, at about nine points of the path, of each harmonic of the focal spot. */
-export function harmonicStrengths(load, { x, y }) {
+/** Highest order of the path's harmonics that make lines up to a frequency in Hz with lines of the gain. */
+export function lastOrder(load, count, gain, highest) {
+  const fd = drawingFrequency(load.path), top = highest + Math.max(...gain.map(({ f }) => f));
+  return fd > 0 ? Math.min(Math.floor((count - 1) / 2), Math.ceil(top / fd)) : 0;
+}
+
+/** Largest amplitude at about nine points of the path of each harmonic of the focal spot up to `last`. */
+export function harmonicStrengths(load, { x, y }, last) {
   const count = x.length, even = Math.max(1, Math.floor(count / 8));
   const step = load.path.shape === "joined" ? even + 1 : even; // not the same places of each path
   const strongest = new Float64Array(count);
@@ -384,19 +390,20 @@ export function harmonicStrengths(load, { x, y }) {
       values[q] = spot((x[p] - x[q]) ** 2 + (y[p] - y[q]) ** 2, load.height, load.profile);
     }
     spreadJumps(load.path, values);
-    const found = realFourier(values);
-    for (let n = 0; n < count; n++) {
-      strongest[n] = Math.max(strongest[n], Math.hypot(found.re[n], found.im[n]) / count);
+    const { re, im } = realFourier(values, last);
+    for (let n = 0; n <= last; n++) {
+      strongest[n] = Math.max(strongest[n], Math.hypot(re[n], im[n]) / count);
+      strongest[(count - n) % count] = strongest[n];
     }
   }
   return strongest;
 }
 
-/** Discrete Fourier transform of real values, of any length; tables of sines are kept. */
-function realFourier(values) {
+/** Discrete Fourier transform of real values up to an order; tables of sines are kept. */
+function realFourier(values, last) {
   const count = values.length, { cos, sin } = turnsOf(count);
-  const re = new Float64Array(count), im = new Float64Array(count);
-  for (let n = 0; n <= count / 2; n++) {
+  const re = new Float64Array(last + 1), im = new Float64Array(last + 1);
+  for (let n = 0; n <= last; n++) {
     let a = 0, b = 0;
     for (let q = 0, turn = 0; q < count; q++) {
       a += values[q] * cos[turn];
@@ -404,8 +411,8 @@ function realFourier(values) {
       turn += n;
       if (turn >= count) turn -= count;
     }
-    re[n] = a; im[n] = b;
-    if (n > 0) { re[count - n] = a; im[count - n] = -b; }
+    re[n] = a;
+    im[n] = b;
   }
   return { re, im };
 }

@@ -1,7 +1,7 @@
 // Numbers of an answer: thresholds, levels, maps, reach, share, delay, and names of lines.
 
 import { powerOfTwo, transform } from "./fourier.js";
-import { arrayFactor, drawingFrequency, gainLines, harmonicStrengths, jumps, levelFactor, outline,
+import { arrayFactor, drawingFrequency, gainLines, harmonicStrengths, jumps, lastOrder, levelFactor, outline,
   pathSamples, positionOf, rhythmLevel } from "./load.js";
 
 const TAU = 2 * Math.PI;
@@ -235,12 +235,12 @@ function nameOf(orders, symbols) {
   return terms.map(([n, symbol]) => `${n < 0 ? "-" : "+"}${times(n)}${symbol}`).join("").replace(/^\+/, "");
 }
 
-/** Harmonics [{n, share}] of the path of a load, the strongest first. */
-function pathShares(load, symbols) {
+/** Harmonics [{n, share}] of the path of a load that make lines up to `highest`, the strongest first. */
+function pathShares(load, symbols, highest) {
   const samples = pathSamples(load), count = samples.x.length, own = load.path.shape === "joined";
-  const strengths = harmonicStrengths(load, samples), fd = drawingFrequency(load.path);
+  const last = lastOrder(load, count, gainLines(load), highest), fd = drawingFrequency(load.path);
+  const strengths = harmonicStrengths(load, samples, last), n = own ? load.path.paths.length : 1;
   const once = fd > 0 && jumps(load.path) && fd * load.duration < 1 - 1e-9;
-  const last = fd > 0 ? Math.floor((count - 1) / 2) : 0, n = own ? load.path.paths.length : 1;
   const found = [];
   for (let k = -last; k <= last; k++) {
     found.push({ n: k, share: strengths[(k + count) % count] * Math.hypot(...arrayFactor(load, k)) });
@@ -278,8 +278,8 @@ function gainProducts(load, symbols, least) {
  * Lines of a load above a fraction of the strongest on the path, without the mean: [{name, f in Hz,
  * strength in Pa}], ascending, no two the same (simple_model.line_names).
  */
-export function lineNames(load, { threshold = 1e-3, most = 200 } = {}) {
-  const symbols = symbolsOf(load), same = SAME / load.duration, shares = pathShares(load, symbols);
+export function lineNames(load, { threshold = 1e-3, most = 200, highest = Infinity } = {}) {
+  const symbols = symbolsOf(load), same = SAME / load.duration, shares = pathShares(load, symbols, highest);
   const gain = gainProducts(load, symbols, 1e-3 * threshold);
   const base = gain.map(({ orders }) => orders.reduce((sum, n, k) => sum + n * symbols[k + 1], 0));
   const each = (visit) => shares.forEach(({ n, share }) => {
@@ -315,7 +315,7 @@ export function lineNames(load, { threshold = 1e-3, most = 200 } = {}) {
 
 /** Names of a load's lines while a pulse is on, as a function of the frequency in Hz; "" if unknown. */
 export function namesOf(load) {
-  const known = lineNames({ ...load, pulses: null }, { threshold: 1e-4, most: 1000 });
+  const known = lineNames({ ...load, pulses: null }, { threshold: 1e-4, most: 1000, highest: HIGHEST });
   const same = Math.max(SAME / load.duration, 1e-6);
   return (f) => known.find((line) => Math.abs(line.f - f) <= same)?.name || "";
 }
@@ -325,8 +325,8 @@ export function namesOf(load) {
  * {load, values, body, waves, wavesAt, kernel, kernelAt}: `motion` in SI units of the quantity, `pressure`
  * of the kernel in Pa, `level` in dB, null where the body is not skin.
  */
-export function lineTable({ load, values, body, waves, wavesAt, kernel, kernelAt }) {
-  const { rate } = QUANTITIES[values.quantity], mean = meanLevel(load), names = namesOf(load);
+export function lineTable({ load, values, body, waves, wavesAt, kernel, kernelAt, names = namesOf(load) }) {
+  const { rate } = QUANTITIES[values.quantity], mean = meanLevel(load);
   const [moved, motion] = [0, rate].map((order) => amplitudesOf(waves.f, wavesAt, order));
   const pressure = amplitudesOf(kernel.f, kernelAt), least = NEGLIGIBLE_LINE * largestOf(motion);
   return Array.from(waves.f, (f, l) => {
@@ -338,7 +338,8 @@ export function lineTable({ load, values, body, waves, wavesAt, kernel, kernelAt
 
 /** Names of the lines below 1 kHz that the Tacton is too short to resolve from 0 Hz or each other. */
 export function unresolvedNames(load, settle = 0.5) {
-  const lines = lineNames(load).filter(({ f }) => f < HIGHEST), least = 1 / ((1 - settle) * load.duration);
+  const lines = lineNames(load, { highest: HIGHEST }).filter(({ f }) => f < HIGHEST);
+  const least = 1 / ((1 - settle) * load.duration);
   const top = Math.max(...lines.map(({ strength }) => strength), 1e-300);
   const near = (a, b, far) => Math.abs(a - b) < far;
   let known = lines.map(({ f }) => {
