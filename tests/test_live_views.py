@@ -22,9 +22,9 @@ from skinwave.scene import BODIES, Scene
 N, REACH = 45, 0.044  # places of a map either way, and how far they reach, m
 MODULE = """
 import { contours } from "./contours.js";
-import { drawMap, mapControls, mapSvg, valueAt } from "./maps.js";
+import { drawMap, mapControls } from "./maps.js";
 import { openView } from "./view3d.js";
-Object.assign(window, { contours, drawMap, mapControls, mapSvg, valueAt, openView });
+Object.assign(window, { contours, drawMap, mapControls, openView });
 """
 PAGE = """<!doctype html><meta charset=utf-8><body style="color: #000; margin: 0">
 <canvas id=map style="width: 400px; height: 420px"></canvas>
@@ -127,8 +127,9 @@ def test_keys_and_a_pointer_select_points_of_a_map(page):
 
 @needs_browser
 def test_a_map_as_a_file_is_well_formed_and_has_its_words(page):
-    given = f"{{rms: {grid(lambda x, y: x + REACH)}, title: 'A < B', unit: 'm'}}"
-    text = page.evaluate(f"mapSvg({given})")
+    draw(page, grid(lambda x, y: x + REACH), title="A < B", unit="m", point=[0, 0])
+    inside = page.evaluate("document.getElementById('map').asSvg()")
+    text = f'<svg xmlns="http://www.w3.org/2000/svg">{inside}</svg>'
     root = ElementTree.fromstring(text)
     words = [each.text for each in root.iter("{http://www.w3.org/2000/svg}text")]
     assert {"A < B", "0", "88.0 mm", "0 mm"} <= set(words)

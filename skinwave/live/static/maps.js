@@ -188,7 +188,8 @@ function imagesOf(options, before) {
 }
 
 /**
- * Draw a map on a canvas, which has its size by styles.
+ * Draw a map on a canvas, which has its size by styles. `canvas.asSvg()` is the same as the inside of
+ * an SVG element.
  * @param {HTMLCanvasElement} canvas
  * @param {object} options rms: values (n * n) in `unit`, NaN off the body, none yet if not given;
  *   unit: "m", "Pa", "m/s", "dB"; largest: end of the scale, else of the values; decibel: span of a scale in
@@ -207,21 +208,17 @@ export function drawMap(canvas, options) {
   const context = canvas.getContext("2d");
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   context.clearRect(0, 0, width, height);
-  draw(new CanvasPen(context), full, state, getComputedStyle(canvas).color);
+  const ink = getComputedStyle(canvas).color;
+  draw(new CanvasPen(context), full, state, ink);
+  canvas.asSvg = () => {
+    const pen = new SvgPen();
+    draw(pen, full, { ...state, hover: null }, ink);
+    return pen.parts.join("");
+  };
   if (full.point) {
     const said = `${full.title || "Map"}. Selected point ${readout(full, full.point)}. Arrow keys move it.`;
     canvas.setAttribute("aria-label", said);
   }
-}
-
-/** A map, with the options of drawMap, as the text of an SVG file; width in pixels. */
-export function mapSvg(options, width = 420) {
-  const full = completed(options), pen = new SvgPen();
-  const height = width - MARGIN.left - MARGIN.right + MARGIN.top + MARGIN.bottom;
-  draw(pen, full, { box: boxIn(width, height), ...imagesOf(full, null) }, "#222");
-  const size = `viewBox="0 0 ${width} ${height}" width="${width}" height="${height}"`;
-  return `<svg xmlns="http://www.w3.org/2000/svg" ${size} font-family="system-ui, sans-serif">`
-    + `<rect width="100%" height="100%" fill="#fff"/>${pen.parts.join("")}</svg>`;
 }
 
 /**

@@ -341,7 +341,7 @@ function nearest(values, x) {
 }
 
 const STYLED = ["fill", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin", "opacity",
-  "fill-opacity", "font-size", "font-family", "font-weight"];
+  "fill-opacity", "font-size", "font-family", "font-weight", "paint-order"];
 
 /** An SVG element as text that stands alone: styles written into it. */
 function standalone(svg, x, y) {
@@ -371,9 +371,9 @@ export function figureOf(parts, paper) {
   const inside = seen.map((part, k) => {
     const x = boxes[k].left - left, y = boxes[k].top - top;
     if (part instanceof SVGSVGElement) return standalone(part, x, y);
-    if (part instanceof HTMLCanvasElement) {
-      return `<image x="${x}" y="${y}" width="${boxes[k].width}" height="${boxes[k].height}" href="${
-        part.toDataURL()}"/>`;
+    if (part.asSvg) {
+      const { color } = getComputedStyle(part);
+      return `<g transform="translate(${x}, ${y})" font-family="sans-serif" color="${color}">${part.asSvg()}</g>`;
     }
     const style = getComputedStyle(part);
     return `<text x="${x}" y="${y + 0.78 * boxes[k].height}" fill="${style.color}" font-family="sans-serif"

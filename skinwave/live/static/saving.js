@@ -16,7 +16,8 @@ function download(name, content, type) {
 }
 
 /** The parts of the page that make its figure, as they are shown. */
-const seen = () => [...document.querySelectorAll("#tiles .tile > span, .pairs canvas, .plot-card h2, .plot, #pane .plot")];
+const seen = () => [...document.querySelectorAll(
+  "#tiles .tile > span, .pairs canvas, #solid canvas, .plot-card h2, .plot, #pane .plot")];
 
 const figure = () => figureOf(seen(), getComputedStyle(document.documentElement).getPropertyValue("--paper"));
 

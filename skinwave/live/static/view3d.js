@@ -398,6 +398,8 @@ class View {
     };
     canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
     canvas.addEventListener("webglcontextrestored", () => { this.begin(); this.draw(); });
+    canvas.asSvg = () => `<image href="${this.png()}" width="${canvas.clientWidth}" height="${
+      canvas.clientHeight}"/>${this.over.innerHTML}`;
     new ResizeObserver(() => { this.draw(); this.run(); }).observe(canvas);
   }
 
