@@ -9,7 +9,7 @@ import { openKernel } from "./kernel.js";
 import { drawingFrequency } from "./load.js";
 import { MAP_LEGEND, drawMap, mapControls } from "./maps.js";
 import { createPlot, escaped, keptScales, rounded } from "./plots.js";
-import { OVER, commandedPlot, comparison, difference, dispersionPlot, fociAt, levelPlot, linesTable,
+import { OVER, commandedPlot, comparison, difference, dispersionPlot, factorOf, fociAt, levelPlot, linesTable,
   pathsOf, spanOf, spectrumPlot, tiles, waveformPlot } from "./results.js";
 import { offerSaves, playSound } from "./saving.js";
 import { runSelftest } from "./selftest.js";
@@ -72,7 +72,7 @@ function set(next, settled = true) {
 const ask = () => { frameDue ||= requestAnimationFrame(showCurves); };
 
 function writeAddress() {
-  const shown = { view: view.look === "maps" ? "" : view.look, tab: view.tab === "lines" ? "" : view.tab };
+  const shown = { view: view.look === "maps" ? "" : view.look, tab: ["lines", "ab"].includes(view.tab) ? "" : view.tab };
   try { window.history.replaceState(null, "", addressOf(values, starts, shown)); } catch { /* not from every host */ }
   $("undo").disabled = !history.undoable;
   $("redo").disabled = !history.redoable;
@@ -143,17 +143,20 @@ function showMaps() {
   if (view.look === "3d") showSolid();
 }
 
+const short = (title) => (title.length > 22 ? `${title.slice(0, 21)}…` : title);
+
 function drawMaps() {
   if (!answer?.maps || view.look === "3d") return;
   const { maps, load, x, y, body } = answer, at = pinned?.maps ? pinned : null;
   const marks = { path: pathsOf(load), point: [x, y], foci: fociAt(load, clock), influenced: maps.kernel.rms,
     decibel: view.mapDecibel };
   const top = (name, rms) => scale(`map ${name}`, rms.reduce((most, v) => (v > most ? v : most), 0), moving);
-  const wavesTop = Math.max(top(`waves ${body.name}`, maps.waves.rms), at ? top(`waves ${at.body.name}`, at.maps.waves.rms) : 0);
+  let wavesTop = top(`waves ${body.name}`, maps.waves.rms), topOfA = at ? top(`waves ${at.body.name}`, at.maps.waves.rms) : 0;
+  if (factorOf(topOfA, wavesTop) === 1) wavesTop = topOfA = Math.max(wavesTop, topOfA);
   if (at) {
     drawMap($("kernel-map"), { ...marks, path: pathsOf(at.load), foci: [], point: [at.x, at.y], influenced: at.maps.kernel.rms,
-      rms: at.maps.waves.rms, level: at.body.is_skin ? at.maps.waves.level : null, unit: "m", largest: wavesTop,
-      title: `A: ${at.body.title}`, hatched: at.invalid });
+      rms: at.maps.waves.rms, level: at.body.is_skin ? at.maps.waves.level : null, unit: "m", largest: topOfA,
+      title: `A: ${short(at.body.title)}`, hatched: at.invalid });
   } else {
     drawMap($("kernel-map"), { ...marks, rms: maps.kernel.rms, level: body.is_skin ? maps.kernel.level : null, unit: "Pa",
       largest: top("kernel", maps.kernel.rms), title: "Kernel, RMS" });
@@ -161,7 +164,7 @@ function drawMaps() {
   const waves = view.look === "difference"
     ? { rms: difference(maps.waves.rms, maps.kernel.rms), unit: "dB", largest: 20, signed: true, title: "Waves − kernel" }
     : { rms: maps.waves.rms, level: body.is_skin ? maps.waves.level : null, unit: "m", largest: wavesTop,
-      title: at ? `B: ${body.title}` : "Waves, RMS" };
+      title: at ? `B: ${short(body.title)}` : "Waves, RMS" };
   drawMap($("wave-map"), { ...marks, ...waves, hatched: answer.invalid, stale });
 }
 
@@ -218,7 +221,7 @@ function computeLevels() {
         found.waves.push(level.waves);
       } catch { /* a path that leaves the body */ }
     }
-    if (k > count) {
+    if (k > count && Math.max(...found.waves, ...found.kernel) > -Infinity) {
       const own = answer.body.is_skin ? "waves" : "kernel";
       found.best = refine(found.x, found[own], (value) => levelAt(value)[own], REFINED * (high - low));
     }

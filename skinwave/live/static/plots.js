@@ -295,6 +295,7 @@ export function createPlot(host, { announce = () => {}, onZoom = () => {} } = {}
     if (ends[1] - ends[0] > 5) setZoom(ends.map(fromX)); else mark();
   });
   svg.addEventListener("pointerleave", () => { read = -1; if (spec && pressed === null) mark(); });
+  svg.addEventListener("blur", () => { read = -1; if (spec) mark(); });
   svg.addEventListener("dblclick", () => spec && setZoom(null));
   svg.addEventListener("keydown", (event) => {
     if (!spec || event.ctrlKey || event.metaKey || event.altKey) return;

@@ -65,6 +65,14 @@ export function commandedPlot(answer, span) {
 
 const largestOf = (values) => values.reduce((most, v) => Math.max(most, Math.abs(v)), 0);
 
+/** A power of ten by which A is drawn larger or smaller if it differs from B by more than ten times. */
+export function factorOf(a, b) {
+  const ratio = Math.log10(b / a);
+  return Number.isFinite(ratio) && Math.abs(ratio) > 1 ? 10 ** Math.round(ratio) : 1;
+}
+
+const nameOfA = (factor) => (factor === 1 ? "A" : `A × ${factor > 1 ? factor : factor.toFixed(-Math.log10(factor))}`);
+
 /** Plot of the waveforms; `scale(name, largest)` gives the top of an axis. */
 export function waveformPlot(answer, span, { pinned, measured, scale }) {
   const quantity = QUANTITIES[answer.values.quantity], at = [answer.x, answer.y];
@@ -73,11 +81,13 @@ export function waveformPlot(answer, span, { pinned, measured, scale }) {
     curves.push({ role: "published", axis: "y", name: "as published", dash: "4 3",
       ...waveform(answer.published, at, span, PRESSURE) });
   }
+  const own = waveform(answer.waves, at, span, quantity);
   if (pinned) {
-    curves.push({ role: "pinned", axis: "y2", name: `A: ${pinned.body.title}`,
-      ...waveform(pinned.waves, [pinned.x, pinned.y], span, quantity) });
+    const { x, y } = waveform(pinned.waves, [pinned.x, pinned.y], span, quantity);
+    const factor = factorOf(largestOf(y), largestOf(own.y));
+    curves.push({ role: "pinned", axis: "y2", name: nameOfA(factor), x, y: y.map((v) => factor * v) });
   }
-  curves.push({ role: "waves", axis: "y2", name: pinned ? "B" : "waves", ...waveform(answer.waves, at, span, quantity) });
+  curves.push({ role: "waves", axis: "y2", name: pinned ? "B" : "waves", ...own });
   if (measured?.times && measured.quantity === answer.values.quantity) {
     curves.push({ role: "measured", axis: "y2", name: "measured", x: measured.times.map((t) => 1e3 * t),
       y: nearestPlace(measured, answer, measured.values).map((v) => quantity.per * v) });
@@ -128,7 +138,9 @@ export function spectrumPlot(answer, { pinned, measured, highest, decibel, scale
     curves.push({ ...stem("published", "y", "as published", answer.published.f, amplitudesOf(answer.published.f, answer.publishedAt), -1.5 * wide, "square") });
   }
   if (pinned) {
-    curves.push(stem("pinned", "y2", "A", pinned.waves.f, inQuantity(pinned.waves.f, pinned.wavesAt, answer.values.quantity), 0));
+    const found = inQuantity(pinned.waves.f, pinned.wavesAt, answer.values.quantity);
+    const factor = decibel ? 1 : factorOf(largestOf(found), largestOf(curves[1].y));
+    curves.push(stem("pinned", "y2", nameOfA(factor), pinned.waves.f, found.map((v) => factor * v), 0));
   }
   const tops = { y: scale("spectrum y", 1.2 * Math.max(largestOf(curves[0].y), largestOf(curves.find((c) => c.role === "published")?.y ?? []))),
     y2: scale(`spectrum y2 ${answer.values.quantity}`, 1.2 * Math.max(...curves.filter((c) => c.axis === "y2").map((c) => largestOf(c.y)))) };
@@ -241,7 +253,7 @@ export function linesTable(answer, pinned) {
 /** HTML of what differs between A and B. */
 export function comparison(a, b) {
   const rows = Object.keys(STARTS).filter((key) => a.values[key] !== b.values[key]).map((key) => [LABELS[key],
-    ...[a, b].map((own) => (key === "body" ? own.body.title : shown(key, own.values[key]) || "none")), true]);
+    ...[a, b].map((own) => (key === "body" ? own.body.title : shown(key, own.values[key]))), true]);
   if (a.body.title === b.body.title) {
     for (const key of a.body.keys ?? []) {
       const other = b.body.keys?.find((own) => own.key === key.key);

@@ -19,7 +19,7 @@ function download(name, content, type) {
 const seen = () => [...document.querySelectorAll(
   "#tiles .tile > span, .pairs canvas, #solid canvas, .plot-card h2, .plot, #pane .plot")];
 
-const figure = () => figureOf(seen(), getComputedStyle(document.documentElement).getPropertyValue("--paper"));
+const figure = () => figureOf(seen(), getComputedStyle(document.documentElement).getPropertyValue("--card"));
 
 /**
  * Fill the menu of saves. `answer()` is what is shown, `view()` how, `writers` texts of files by kind:
