@@ -404,30 +404,3 @@ export function spectrum(values, dt) {
   const amplitudes = f.map((_, k) => (k ? 2 : 1) * Math.hypot(ar[k], ai[k]) / size / weights);
   return { f, amplitudes };
 }
-
-/**
- * A number as text with a typeset minus: three significant digits, or as many as its relative error
- * allows; with a sign if `signed`; "-" if it is not finite.
- */
-export function format(value, unit = "", { error = 0.005, signed = false } = {}) {
-  if (!Number.isFinite(value)) return "-";
-  const tail = unit ? `\u00a0${unit}` : "", size = Math.abs(value);
-  const digits = Math.min(Math.max(Math.ceil(-Math.log10(error)), 1), 6);
-  let text = "0";
-  if (size > 0) {
-    const rounded = Number(size.toPrecision(digits)), decimals = digits - 1 - Math.floor(Math.log10(rounded));
-    const tiny = rounded < 1e-4 || rounded >= 1e6;
-    text = tiny ? rounded.toExponential(digits - 1).replace("e+", "e")
-      : rounded.toLocaleString("en", { minimumFractionDigits: Math.max(decimals, 0),
-        maximumFractionDigits: Math.max(decimals, 0) });
-  }
-  return `${value < 0 ? "−" : signed && value > 0 ? "+" : ""}${text}${tail}`;
-}
-
-/** A level in dB as text, whole and with its sign; "< −60" below that; "-" if there is none. */
-export function formatLevel(dB) {
-  if (!(dB > -Infinity)) return "-";
-  if (dB < -60) return "<\u00a0−60";
-  const whole = Math.round(dB);
-  return whole < 0 ? `−${-whole}` : `+${Math.abs(whole)}`;
-}
