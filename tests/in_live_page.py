@@ -12,7 +12,7 @@ from skinwave.scene_file import loads
 USED = {
     "files": "adaptics linesCsv pyautd3 readMeasurement sceneToml waveformCsv waveformWav",
     "kernel": "openKernel", "load": "loadLines spot", "numbers": "amplitudesOf delayOf levelAt "
-    "lineNames mapAxis mapOf meanLevel phaseDelay pressureThresholdAt reach shareOutside "
+    "levelOver lineNames mapAxis mapOf meanLevel phaseDelay pressureThresholdAt reach shareOutside "
     "spectrum spread thresholdAt unresolvedNames",
     "values": "STARTS check fromAddress loadOf toAddress",
 }  # fmt: skip

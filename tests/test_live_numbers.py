@@ -193,6 +193,32 @@ def test_thresholds_spectra_and_delays_are_those_of_python(page):
     np.testing.assert_allclose(page.evaluate(delay, [z.tolist(), f.tolist()]), wanted, atol=1e-12)
 
 
+def test_the_highest_level_over_a_control_is_found_between_values(page, starts):
+    own = starts | {"am": 0, "shape": "circle", "size": 20, "x": 10, "y": 0, "body": "none"}
+    found = page.evaluate(
+        """(own) => {
+          const levelsAt = (size) => {
+            if (size > 50) throw new Error("off the body");
+            const known = loadOf({ ...own, size });
+            const level = levelAt(kernel.respond(known), known, 0.01, 0);
+            return { kernel: level?.dB ?? NaN, waves: NaN };
+          };
+          const steps = [...levelOver(levelsAt, [2, 60], { of: "kernel", count: 24 })];
+          const dense = Array.from({ length: 400 }, (_, k) => levelsAt(10 + k / 20));
+          return { ...steps.pop(), dense };
+        }""",
+        own,
+    )
+    assert max(found["x"]) <= 50
+    assert len(found["x"]) == len(found["kernel"]) == 20
+    highest = max(each["kernel"] for each in found["dense"])
+    assert found["best"]["level"] == pytest.approx(highest, abs=0.01)
+    scene = scenes_of(page, [own | {"size": round(found["best"]["at"], 3)}])[0]
+    f, lines = pressure_lines(scene.pressure, np.array([[0.01, 0.0]]))
+    levels = sensation_level(np.abs(lines[1:, 0]), f[1:], unit="Pa")
+    assert found["best"]["level"] == pytest.approx(levels.max(), abs=0.01)
+
+
 def test_lines_have_the_names_of_python(page, starts):
     paper = [starts | preset["values"] for preset in presets()]
     brief = [own | {"duration": 0.05} for own in paper]

@@ -404,3 +404,44 @@ export function spectrum(values, dt) {
   const amplitudes = f.map((_, k) => (k ? 2 : 1) * Math.hypot(ar[k], ai[k]) / size / weights);
   return { f, amplitudes };
 }
+
+/**
+ * Levels over a value of the controls, in steps: yields {x, kernel, waves, best} after each of `count`
+ * + 1 values from low to high and, last, with the highest of the curve `of` as `best`, {at, level}, to
+ * `within` of the range. `levelsAt(value)` returns {kernel, waves} in dB or throws, which skips a value.
+ */
+export function* levelOver(levelsAt, [low, high], { of = "waves", count = 48, within = 1e-3 } = {}) {
+  const found = { x: [], kernel: [], waves: [], best: null };
+  const levelOfValue = (value) => {
+    try { return levelsAt(value); } catch { return null; } // such as a path that leaves the body
+  };
+  for (let k = 0; k <= count; k++) {
+    const value = low + (high - low) * k / count, levels = levelOfValue(value);
+    if (levels) {
+      found.x.push(value);
+      found.kernel.push(levels.kernel);
+      found.waves.push(levels.waves);
+    }
+    yield found;
+  }
+  const known = found[of], top = known.reduce((best, level, k) => (
+    Number.isFinite(level) && !(level <= known[best]) ? k : best), -1);
+  if (top < 0) return;
+  const section = (Math.sqrt(5) - 1) / 2; // golden
+  let [a, b] = [found.x[Math.max(top - 1, 0)], found.x[Math.min(top + 1, found.x.length - 1)]];
+  const measured = (at) => ({ at, level: levelOfValue(at)?.[of] ?? -Infinity });
+  let c = measured(b - section * (b - a)), d = measured(a + section * (b - a));
+  let best = { at: found.x[top], level: known[top] };
+  while (b - a > within * (high - low)) {
+    for (const each of [c, d]) if (each.level > best.level) best = each;
+    if (c.level > d.level) {
+      [b, d] = [d.at, c];
+      c = measured(b - section * (b - a));
+    } else {
+      [a, c] = [c.at, d];
+      d = measured(a + section * (b - a));
+    }
+  }
+  found.best = best;
+  yield found;
+}
