@@ -8,6 +8,7 @@ import { addressOf, createHistory, readAddress } from "./history.js";
 import { openKernel } from "./kernel.js";
 import { drawingFrequency } from "./load.js";
 import { MAP_LEGEND, drawMap, mapControls } from "./maps.js";
+import { levelOver } from "./numbers.js";
 import { createPlot, escaped, keptScales, rounded } from "./plots.js";
 import { OVER, commandedPlot, comparison, difference, dispersionPlot, factorOf, fociAt, levelPlot, linesTable,
   pathsOf, spanOf, spectrumPlot, tiles, waveformPlot } from "./results.js";
@@ -25,7 +26,6 @@ const SPANS = { auto: "automatic", "first 20 ms": "first 20 ms", "first 60 ms": 
   "last 60 ms": "last 60 ms", "one rhythm": "one rhythm", "whole Tacton": "all" };
 const PLAYED = 3.5; // s that a period takes when played
 const QUIET = 300; // ms without a move, after which slow results are computed
-const REFINED = 1e-3; // of a control's range, to which the highest level is refined
 
 const opened = new Map(); // bodies by name
 const kernelBody = openKernel();
@@ -203,48 +203,22 @@ const keyOfLevels = () => JSON.stringify({ ...values, [view.over]: 0, over: view
 
 /** Levels over a control in short turns, so that the page stays alive. */
 function computeLevels() {
-  const key = view.over, [low, high] = OVER[key], of = keyOfLevels(), base = values;
-  const found = { of, x: [], kernel: [], waves: [], best: null }, count = 48;
-  const levelAt = (value) => {
+  const key = view.over, of = keyOfLevels(), base = values;
+  const steps = levelOver((value) => {
     const own = respond({ ...base, [key]: value });
     return { kernel: own.kernelLevel?.dB ?? NaN, waves: own.level?.dB ?? NaN };
-  };
-  let k = 0;
+  }, OVER[key], { of: answer.body.is_skin ? "waves" : "kernel" });
   const turn = () => {
     if (of !== keyOfLevels() || view.tab !== "level") return;
-    for (const until = performance.now() + 30; k <= count && performance.now() < until; k++) {
-      const value = low + (high - low) * k / count;
-      try {
-        const level = levelAt(value);
-        found.x.push(value);
-        found.kernel.push(level.kernel);
-        found.waves.push(level.waves);
-      } catch { /* a path that leaves the body */ }
+    let step = null;
+    for (const until = performance.now() + 30; !step?.done && performance.now() < until;) {
+      step = steps.next();
+      if (step.value) levels = { of, ...step.value };
     }
-    if (k > count && Math.max(...found.waves, ...found.kernel) > -Infinity) {
-      const own = answer.body.is_skin ? "waves" : "kernel";
-      found.best = refine(found.x, found[own], (value) => levelAt(value)[own], REFINED * (high - low));
-    }
-    levels = found;
     showPane();
-    if (k <= count) slowDue = setTimeout(turn, 0);
+    if (!step.done) slowDue = setTimeout(turn, 0);
   };
   turn();
-}
-
-/** The highest level near the best of those that are known, by golden sections: {at, level}. */
-function refine(x, known, levelAt, within) {
-  const top = known.reduce((best, v, k) => (v > (known[best] ?? -Infinity) ? k : best), 0);
-  if (!Number.isFinite(known[top])) return null;
-  let [a, b] = [x[Math.max(top - 1, 0)], x[Math.min(top + 1, x.length - 1)]];
-  const part = (Math.sqrt(5) - 1) / 2;
-  let best = { at: x[top], level: known[top] };
-  while (b - a > within) {
-    const [c, d] = [b - part * (b - a), a + part * (b - a)].map((at) => ({ at, level: levelAt(at) }));
-    if (c.level > d.level) b = d.at; else a = c.at;
-    for (const each of [c, d]) if (each.level > best.level) best = each;
-  }
-  return best;
 }
 
 function showBody() {
