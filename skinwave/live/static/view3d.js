@@ -1,7 +1,7 @@
 // A body in three dimensions, moving: WebGL 2, in the live page and in reports.
 
 import { locate, prepare, shade } from "./mesh3d.js";
-import { dots, loopOf, rounded, strongLines, synthesise } from "./motion3d.js";
+import { dots, rmsOf, rounded, strongLines, synthesise } from "./motion3d.js";
 import { SEQUENTIAL, SIGNED, TABLE_LENGTH, withUnit } from "./palette.js";
 import { SLOWER, element, gradient, panel } from "./panel3d.js";
 
@@ -45,8 +45,8 @@ const MARK_FRAGMENT = `#version 300 es
   }`;
 const HOME = { turned: -0.5, tipped: 0.95, near: 1, moved: [0, 0] };
 const DRAWN = 0.06; // of the width: how far the largest motion is drawn at most
-const CREST = 2.2; // times the largest RMS: where colours end at most
-const SAMPLED = 96; // times, and about as many points, of which the largest motion is taken
+const CREST = 2; // times the largest RMS: where colours end
+const LOOP = 0.1; // s that are repeated, or a period of the slowest line
 const SHOWN_RATE = 0.7; // Hz at which the strongest line is seen at first
 const BARS = [1, 2, 5, 10, 20, 50, 100]; // mm
 export const NO_WEBGL = "This browser does not draw in three dimensions: WebGL 2 is off or missing. "
@@ -117,8 +117,7 @@ class View {
    * @param {object} given shape: points in mm and triangles; motion: f (l,) in Hz, re and im (l * n) in
    *   metre upwards; path: points [x, y] in metre, or several paths; foci: places [x, y] in metre as a
    *   function of the time in s, or a list of them for equal parts of the period; points: places [x, y]
-   *   to mark; period: s, of the loop; largest: metre, end of the colours; unit: "Pa" of a pressure, less
-   *   of which is upwards
+   *   to mark; period: s, of the loop; unit: "Pa" of a pressure, less of which is upwards
    */
   show(given) {
     if (!this.gl) return;
@@ -142,47 +141,31 @@ class View {
     this.run();
   }
 
-  /** What is the same at all times: lines, RMS, largest motion, loop and exaggeration. */
+  /** What is the same at all times: lines, RMS, the end of the colours, exaggeration, and the loop. */
   measure() {
-    const { motion, largest, period } = this.given, strong = strongLines(motion), { n } = strong;
-    const rms = new Float32Array(n);
-    for (const { f, from } of strong.lines) {
-      const share = f > 0 ? 0.5 : 1;
-      for (let k = 0; k < n; k++) rms[k] += share * (motion.re[from + k] ** 2 + motion.im[from + k] ** 2);
-    }
-    for (let k = 0; k < n; k++) rms[k] = Math.sqrt(rms[k]) || 0;
-    const most = rms.reduce((a, b) => Math.max(a, b), 0);
-    const loop = period ? { period, repeats: true } : loopOf(strong.lines);
-    const loud = Array.from(rms.keys()).filter((k) => rms[k] > 0.6 * most);
-    const some = loud.filter((_, k) => k % Math.ceil(loud.length / SAMPLED) === 0);
-    const seen = new Float32Array(some.length);
-    let peak = most;
-    for (let k = 0; k < SAMPLED; k++) {
-      synthesise(strong, motion, k / SAMPLED * loop.period, seen, some);
-      peak = seen.reduce((a, b) => Math.max(a, Math.abs(b)), peak);
-    }
-    const width = this.mesh.high[0] - this.mesh.low[0], seldom = Math.min(peak, CREST * most);
+    const { motion, period } = this.given, strong = strongLines(motion), rms = rmsOf(strong, motion);
+    const most = rms.reduce((a, b) => Math.max(a, b), 0), width = this.mesh.high[0] - this.mesh.low[0];
+    const loudest = strong.lines.reduce((a, b) => (b.largest > a.largest ? b : a), { f: 100, largest: 0 });
     if (!this.slower) {
-      const { f } = strong.lines.reduce((a, b) => (b.largest > a.largest ? b : a), { f: 100, largest: 0 });
-      const off = (slower) => Math.abs(Math.log(slower * SHOWN_RATE / f));
+      const off = (slower) => Math.abs(Math.log(slower * SHOWN_RATE / loudest.f));
       this.slower = SLOWER.reduce((a, b) => (off(b) < off(a) ? b : a));
       this.slow.value = this.slower;
     }
-    Object.assign(this, { strong, rms, loop, u: new Float32Array(n), peak, largest: largest || seldom || 1,
-      most: most || 1, factor: seldom ? rounded(1e-3 * DRAWN * width / seldom) : 0 });
+    Object.assign(this, { strong, rms, u: new Float32Array(strong.n), most, largest: CREST * most || 1,
+      factor: most ? rounded(1e-3 * DRAWN * width / (CREST * most)) : 0,
+      loop: period || Math.max(LOOP, 1 / Math.min(...strong.lines.map(({ f }) => f))) });
+    this.time %= this.loop;
   }
 
   get drawnTimes() { return this.factor ? rounded(this.factor * this.relief) : 0; }
 
   say() {
     const { unit = "m" } = this.given, end = withUnit(this.largest, unit);
-    const most = this.peak > 1.001 * this.largest ? `≥ ${end}` : end;
-    const seam = this.loop.repeats ? "" : " The pattern jumps where the loop begins again.";
     const drawn = `Exaggerated ${this.drawnTimes.toLocaleString("en")} times, mean removed.`;
-    this.said.textContent = (unit === "Pa" ? "A relief of the pressure; nothing moves." : drawn) + seam;
-    if (!this.peak) this.said.textContent = "Nothing moves.";
-    let words = unit === "Pa" ? [`${most} less`, "mean pressure", `${most} more`]
-      : [`${most} out of the body`, "0", `${most} into the body`];
+    this.said.textContent = unit === "Pa" ? "A relief of the pressure; nothing moves." : drawn;
+    if (!this.most) this.said.textContent = "Nothing moves.";
+    let words = unit === "Pa" ? [`≥ ${end} less`, "mean pressure", `≥ ${end} more`]
+      : [`≥ ${end} out of the body`, "0", `≥ ${end} into the body`];
     if (this.hue === "rms") words = ["0", "RMS", withUnit(this.most, unit)];
     this.ends.title = "≥: rare larger values have the last colour";
     this.ends.replaceChildren(...words.map((text) => element("span", {}, text)));
@@ -218,7 +201,7 @@ class View {
       state[5 * p] = scale * lift;
       moved[3 * p + 2] = places[3 * p + 2] + scale * lift;
       if (hue === "motion") state[5 * p + 1] = 0.5 - lift / (2 * this.largest);
-      else state[5 * p + 1] = k < n ? rms[k] / this.most : 0;
+      else state[5 * p + 1] = k < n ? rms[k] / (this.most || 1) : 0;
     }
     shade(mesh, moved, state);
   }
@@ -262,10 +245,12 @@ class View {
     common(this.marks);
     const foci = this.foci().map(([x, y]) => locate(mesh, 1e3 * x, 1e3 * y)).filter(Boolean);
     this.drawMarks(this.riders.path, 2.6 * ratio, [0.05, 0.05, 0.05], 2);
+    if (view.tipped < Math.PI / 2) gl.disable(gl.DEPTH_TEST); // seen in the hollows that they make
     this.drawMarks(this.riders.points, 11 * ratio, [0.84, 0.37, 0], 0.72);
     this.drawMarks(foci, 13 * ratio, [0.05, 0.05, 0.05], 0.75);
+    gl.enable(gl.DEPTH_TEST);
     this.drawOver(wide, tall, turn);
-    this.slider.value = 1000 * (this.time / this.loop.period);
+    this.slider.value = 1000 * (this.time / this.loop);
     this.now.textContent = `${(1e3 * this.time).toFixed(2)} ms`;
     this.slider.setAttribute("aria-valuetext", this.now.textContent);
     canvas.dataset.time = this.time;
@@ -274,7 +259,7 @@ class View {
   foci() {
     const { foci = [] } = this.given;
     if (typeof foci === "function") return foci(this.time);
-    return foci.length ? foci[Math.floor(this.time / this.loop.period * foci.length) % foci.length] : [];
+    return foci.length ? foci[Math.floor(this.time / this.loop * foci.length) % foci.length] : [];
   }
 
   /** Round marks of a width in pixels where riders are on the moved surface. */
@@ -320,7 +305,7 @@ class View {
       if (!this.playing || !this.canvas.isConnected || !this.canvas.clientWidth) return;
       const passed = last === null ? 0 : Math.min(now - last, 100) / 1e3;
       last = now;
-      this.time = (this.time + passed / this.slower) % this.loop.period;
+      this.time = (this.time + passed / this.slower) % this.loop;
       this.draw();
       this.options.onTime?.(this.time);
       this.frame = requestAnimationFrame(next);
@@ -393,7 +378,7 @@ class View {
     this.cutter.oninput = () => { this.cut = this.cutter.value / 100; this.draw(); };
     this.slider.oninput = () => {
       this.playing = false;
-      this.seek(this.slider.value / 1000 * this.loop.period);
+      this.seek(this.slider.value / 1000 * this.loop);
       this.run();
     };
     canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
@@ -406,7 +391,7 @@ class View {
   /** Show a time in s. */
   seek(time) {
     if (!this.loop) return;
-    this.time = time % this.loop.period;
+    this.time = time % this.loop;
     this.draw();
     this.options.onTime?.(this.time);
   }
