@@ -9,13 +9,15 @@ from pathlib import Path
 from skinwave.commands.common import progress_of
 from skinwave.plain_text import say
 
+QUICK = ("skin-slab", "paper-sheet")  # bodies whose packs take seconds
+
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
     parser.add_argument(
         "scenes", nargs="*", type=Path, metavar="SCENE",
         help="scene files (TOML) whose bodies and Tactons the page has; without any, the bodies "
-        "skin-slab, paper-sheet and palm",
+        f"{' and '.join(QUICK)}",
     )  # fmt: skip
     parser.add_argument("--port", type=int, default=8080, help="0 is any (default: 8080)")
     parser.add_argument(
@@ -38,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
     base = f"/{options.base_url.strip('/')}/" if options.base_url.strip("/") else "/"
     scenes = [read_scene(path) for path in options.scenes]
     with progress_of(options) as progress:
-        data = data_of(scenes, progress, test=False)
+        data = data_of(scenes, progress, bodies=QUICK, test=False)
     with Server(data, options.port, base) as server, tempfile.TemporaryDirectory() as private:
         say(f"skinwave: {server.address} (Ctrl-C ends it)", sys.stderr)
         if base != "/":

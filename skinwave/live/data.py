@@ -20,14 +20,19 @@ BODIES_SHOWN = ("skin-slab", "paper-sheet", "palm")  # of a page without scenes
 
 
 def data_of(
-    scenes: Sequence[Scene] = (), progress: Progress = silent, *, test: bool = True
+    scenes: Sequence[Scene] = (),
+    progress: Progress = silent,
+    *,
+    bodies: Sequence[str] = BODIES_SHOWN,
+    test: bool = True,
 ) -> dict[str, Any]:
     """Return the data of a page.
 
     Parameters
     ----------
-    scenes : whose bodies and Tactons the page has; without any, three preset bodies
+    scenes : whose bodies and Tactons the page has
     progress : told of each body's phases
+    bodies : names of preset bodies that a page without scenes has
     test : whether to include the data of the self-test
 
     Returns
@@ -39,7 +44,7 @@ def data_of(
     ValueError
         If a scene has what no control of the page sets, or a body has no pack.
     """
-    names = named([scene.body for scene in scenes] or [BODIES[name] for name in BODIES_SHOWN])
+    names = named([scene.body for scene in scenes] or [BODIES[name] for name in bodies])
     own = [values.values_of(scene, names[scene.body]) for scene in scenes]
     records, tests = [], []
     for number, (body, name) in enumerate(names.items()):
