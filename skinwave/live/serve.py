@@ -107,8 +107,7 @@ class Server(ThreadingHTTPServer):
         """Say an error in one line; a connection that was closed is none."""
         error = sys.exc_info()[1]
         if not isinstance(error, ConnectionError | TimeoutError):
-            text = printable(f"{type(error).__name__}: {error}"[:LONGEST_LINE], keep="")
-            say(f"skinwave: a request failed: {text}", sys.stderr)
+            say_fault(error)
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -166,9 +165,9 @@ class _Handler(BaseHTTPRequestHandler):
             self._error(HTTPStatus.BAD_REQUEST, _sentence(error))
         except ConnectionError:
             raise
-        except Exception:
+        except Exception as error:
+            say_fault(error)
             self._error(HTTPStatus.INTERNAL_SERVER_ERROR, FAULT)
-            raise
         return None
 
     def _stream_body(self, content: bytes) -> None:
@@ -194,9 +193,9 @@ class _Handler(BaseHTTPRequestHandler):
             self.wfile.write(_json({"error": _sentence(error)}) + b"\n")
         except ConnectionError:
             raise
-        except Exception:
+        except Exception as error:
+            say_fault(error)
             self.wfile.write(_json({"error": FAULT}) + b"\n")
-            raise
 
     def _route(self, path: str) -> str | None:
         """Path below the base; a proxy may have removed the base from it."""
@@ -245,6 +244,12 @@ class _Handler(BaseHTTPRequestHandler):
         for name, value in {"Content-Type": f"{kind}; charset=utf-8", **HEADERS, **more}.items():
             self.send_header(name, value)
         self.end_headers()
+
+
+def say_fault(error: BaseException | None) -> None:
+    """Say a fault of the server in one line of its terminal."""
+    text = printable(f"{type(error).__name__}: {error}"[:LONGEST_LINE], keep="")
+    say(f"skinwave: a request failed: {text}", sys.stderr)
 
 
 def _json(value: Any) -> bytes:
