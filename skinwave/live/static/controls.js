@@ -104,7 +104,7 @@ function bodyKeys(body, editable) {
     }
     return `<div class="row">${name}<input type="range" data-body="${key}" min="${low}" max="${high}" step="${step}"
       value="${value}" aria-label="${escaped(label)}, ${escaped(unit)}"><input class="field" id="key-${key}"
-      data-body="${key}" value="${value}" inputmode="decimal" autocomplete="off"><span class="unit">${escaped(unit)}</span></div>`;
+      data-body="${key}" value="${Number(value.toPrecision(4))}" inputmode="decimal" autocomplete="off"><span class="unit">${escaped(unit)}</span></div>`;
   });
   return rows.join("") || '<p class="note">This body has no values to change.</p>';
 }

@@ -35,7 +35,7 @@ const view = { look: "maps", tab: "lines", span: "auto", decibel: false, highest
 const errors = new Map(); // what is typed wrong, by control
 const scale = keptScales();
 let values = starts, answer = null, pinned = null, measured = null, history = null, controls = null;
-let frameDue = 0, mapsDue = 0, slowDue = 0, moving = false, levels = null, solid = null, solidOf = null;
+let frameDue = 0, mapsDue = 0, slowDue = 0, told = 0, moving = false, levels = null, solid = null, solidOf = null;
 let playing = 0, clock = 0, stale = false, editing = null, notice = "", seenWarnings = [];
 
 const recordOf = (name) => data.bodies.find((body) => body.name === name) ?? data.bodies[0];
@@ -139,6 +139,7 @@ function showMaps() {
   if ((own.invalid || "") !== (before || "")) ask(); // plots are hatched, too
   drawMaps();
   showTiles();
+  announce();
   if (view.tab === "ab") showPane();
   if (view.look === "3d") showSolid();
 }
@@ -185,6 +186,15 @@ function showTiles() {
     badge.hidden = !answer.invalid;
     badge.textContent = answer.invalid || "";
   }
+}
+
+/** Tell screen readers the result, once nothing moves. */
+function announce() {
+  clearTimeout(told);
+  told = setTimeout(() => {
+    $("spoken").textContent = all(".tile").map((each) => ["name", "value", "detail"].map((part) => (
+      each.querySelector(`.${part}`).textContent)).join(" ")).join("; ");
+  }, 2 * QUIET);
 }
 
 function showPane() {
@@ -331,7 +341,8 @@ async function takeMeasurement(file) {
   try {
     measured = data.api ? await sendFile(data.api, "measurement", file) : readMeasurement(await file.text(), file.name);
     errors.delete("measurement");
-    say([`${file.name} is drawn over the waves.`, ...(measured.remarks ?? [])].join(" "));
+    const remarks = measured.remarks.map((text) => `${text[0].toUpperCase()}${text.slice(1).replace(/\.$/, "")}.`);
+    say([`${file.name} is drawn over the waves.`, ...remarks].join(" "));
   } catch (error) { errors.set("measurement", error.message); measured = null; }
   $("measured-clear").hidden = !measured;
   showSlot();
@@ -485,12 +496,12 @@ function listen() {
     });
   }
   for (const id of ["kernel-map", "wave-map"]) {
-    let told = 0;
+    let resting = 0;
     mapControls($(id), (x, y) => {
       const at = (v) => Math.min(Math.max(Math.round(1e4 * v) / 10, -50), 50);
       set({ ...values, x: at(x), y: at(y) }, false);
-      clearTimeout(told);
-      told = setTimeout(() => set(values), QUIET);
+      clearTimeout(resting);
+      resting = setTimeout(() => set(values), QUIET);
     });
   }
   addEventListener("keydown", (event) => {
