@@ -19,7 +19,7 @@ from simple_model import (
 )
 from simple_model.compliance import half_space
 from simple_model.flat_body import flat_body
-from simple_model.load_spectrum import load_lines
+from simple_model.load_spectrum import load_lines, pressure_lines, synthesise
 from simple_model.material import PRESETS
 from simple_model.path_cells import path_fourier, path_samples
 from skinwave import Body, Scene, simulate
@@ -105,6 +105,15 @@ def test_lines_are_those_of_the_load_sampled(extra, foci):
     f, a = load_lines(load).gather(path_fourier(load, load.spot(PLACES, path_samples(load)).T).T)
     np.testing.assert_allclose(f[:251], np.arange(251) / 0.25, atol=1e-8)
     assert np.abs(a[:251] - sampled).max() < 2e-4 * np.abs(sampled).max()
+
+
+def test_lines_of_foci_that_rest_are_at_the_place_of_each():
+    path = Trajectory(shape="circle", size=0.02, speed=0.0)
+    pressure = MovingPressure(tacton=Tacton(trajectory=path, foci=(0.0, 0.5), am_frequency=140.0))
+    points, t = np.array([[0.01, 0.0], [-0.01, 0.0], [0.0, 0.01]]), np.arange(100) * 1e-4
+    np.testing.assert_allclose(
+        synthesise(*pressure_lines(pressure, points), t), pressure(points, t)
+    )
 
 
 def test_even_foci_leave_only_multiples_of_their_number():

@@ -80,6 +80,7 @@ def _refuse(tacton: Tacton) -> None:
     parts = {
         "several foci": len(tacton.foci) > 1,
         "a second AM frequency": tacton.superposition[1] > 0 and tacton.second_am_frequency > 0,
+        "a part of the AM": tacton.superposition[1] > 0 and tacton.am_frequency > 0,
         "an envelope frequency": tacton.envelope_frequency > 0,
         "a rhythm": tacton.rhythm is not None,
         "a sampled signal": tacton.signal is not None,
