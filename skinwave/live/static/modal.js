@@ -7,6 +7,7 @@ import { loadLines, pathSamples, spotWidth } from "./load.js";
 import { divided, oscillation, underRhythm } from "./time.js";
 
 const RESIDUAL = 1e-5, MOST_STEPS = 30; // of coupled modes
+const NEARBY = 0.25; // Hz: at which a compliance is compared for its slope
 
 /** A sheet of a pack. */
 export class ModalBody {
@@ -257,28 +258,16 @@ class ModalMotion {
       (start, jump, bend) => ({ poles: body.poles, amplitudes: this.startOf(own, start, jump, bend) }));
   }
 
-  /** Lag (t,) of a ramp of 1/s: sum_l D_l exp(i w t), D_l the force times the slope of -compliance. */
+  /** Lag (t,) of a ramp of 1/s: sum_l D_l exp(i w t), D_l = -dq/d(i w) at a force that stays. */
   lag(own, times) {
-    const { f } = this.lines;
-    const { poles, residues, kinds } = this.body;
     const amplitudes = this.forces.map((force, l) => {
-      let a = 0, b = 0;
-      const omega = 2 * Math.PI * f[l];
-      for (let m = 0; m < own.length; m++) {
-        for (let j = 0, k = m * kinds; j < kinds; j++, k++) {
-          for (const sign of [1, -1]) { // the pole and its conjugate
-            const [cr, ci] = divided(1, 0, -poles.re[k], omega - sign * poles.im[k]);
-            const [sr, si] = [cr * cr - ci * ci, 2 * cr * ci];
-            const rr = own[m] * residues.re[k], ri = sign * own[m] * residues.im[k];
-            const hr = rr * sr - ri * si, hi = rr * si + ri * sr;
-            a += hr * force.re[m] - hi * force.im[m];
-            b += hr * force.im[m] + hi * force.re[m];
-          }
-        }
-      }
-      return [a, b];
+      const f = this.lines.f[l], [a, b] = summed(own, this.body.solve(f + NEARBY, force));
+      const conjugate = { re: force.re, im: force.im.map((value) => -value) }, before = f - NEARBY;
+      const [c, d] = summed(own, this.body.solve(Math.abs(before), before < 0 ? conjugate : force));
+      const step = 4 * Math.PI * NEARBY;
+      return [(before < 0 ? -d : d) / step - b / step, (a - c) / step];
     });
-    return oscillation(f, amplitudes, times);
+    return oscillation(this.lines.f, amplitudes, times);
   }
 
   /**

@@ -48,7 +48,18 @@ function asymptoticJ0(a, b) {
 const TAIL = 0.4; // s that motion may last after the load
 const HIGHEST = 1200; // Hz up to which a body's motion from rest is computed
 const FINER = 8; // places of a map's table in each interval of the distances
+const LEVELS = 8; // of a rhythm that are averaged in a step
 const NEGLIGIBLE = 1e-4; // of the largest harmonic of a path
+
+/** Mean level of the rhythm in the step about a time in s, 0 before the start. */
+function meanLevel(load, t, step) {
+  let sum = 0;
+  for (let k = 0; k < LEVELS; k++) {
+    const at = t + ((k + 0.5) / LEVELS - 0.5) * step;
+    if (at > 0) sum += rhythmLevel(load, at);
+  }
+  return sum / LEVELS;
+}
 
 /** Fractional index of a value among ascending ones, for cubics between them. */
 const indexIn = (values, x) => {
@@ -256,8 +267,8 @@ class RadialMotion {
     const coarser = Math.max(1, Math.floor(2e-4 / dt)), step = coarser * dt;
     const given = Math.ceil(n / coarser), size = powerOfTwo(given + Math.round(TAIL / step));
     const bins = Math.min(size / 2, Math.floor(HIGHEST * size * step) + 1);
-    const gain = Float64Array.from({ length: given }, (_, k) => gainAt(load, k * step)
-      * rhythmLevel(load, k * step) * (k ? 1 : 0.5));
+    const gain = Float64Array.from({ length: given },
+      (_, k) => gainAt(load, k * step) * meanLevel(load, k * step, step));
     const harmonics = this.harmonicsAt(x, y);
     const shares = Array.from({ length: bins }, (_, k) => lagrange(body.frequencies, k / (size * step)));
     const ur = new Float64Array(size * coarser), ui = new Float64Array(size * coarser);
