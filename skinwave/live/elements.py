@@ -4,7 +4,8 @@
 
 The reduced basis is the proper orthogonal decomposition of the steady motion under focal spots all
 over the area, at frequencies of the band. Stiffness, damping and mass are symmetric: the same
-fields O_p read the motion and take up the load, but for the slope of the surface.
+fields O_p read the motion and take up the load, which per area of the grid goes with the cosine of
+the slope: its square (`skinwave.load`), over a larger area.
 """
 
 from functools import partial
@@ -26,9 +27,10 @@ from skinwave.models.loads import surface_load, surface_motion
 from skinwave.scene import Body
 
 LOWEST = 0.15  # m: least height of the focus, whose spot elements of some mm resolve
-REACH, SPACING = 0.034, 0.0058  # m from the middle to which foci are, and between training spots
-FREQUENCIES = (15.0, 50.0, 90.0, 130.0, 180.0, 240.0, 310.0, 400.0, 520.0, 700.0, 950.0)  # Hz
-MOST = 520  # dimensions of the basis
+REACH, SPACING = 0.031, 0.0058  # m from the middle to which foci are, and between training spots
+FREQUENCIES = (20.0, 70.0, 130.0, 190.0, 260.0, 350.0, 470.0, 640.0, 900.0)  # Hz
+MOST = 540  # dimensions of the basis
+FAINTNESS = 0.5  # power of the size of a frequency's motion by which it is divided
 AT_ONCE = 32  # loads that are solved together
 LEFT_OUT = 1e-4  # of the mean-square motion: what the basis need not have
 
@@ -62,13 +64,13 @@ def element_pack(body: Body, h: float, progress: Progress = silent) -> dict[str,
     basis = training_basis(ops, forces, partial(progress, "solve for focal spots"))
     progress("reduce", 0.0)
     poles, turn = reduced_poles(ops, basis)
-    places, inside, slopes, heights = surface_grid(body, made)
+    places, inside, cosines, heights = surface_grid(body, made)
     read = np.zeros((SIDE**2, turn.shape[0]))
     read[inside] = surface_motion(body, made, places[inside]) @ basis
     fields = (turn.T @ read.T).astype(np.complex64)
     return {
         "kind": "poles", "step": STEP, "side": SIDE, "lowest_height_mm": 1e3 * LOWEST,
-        "poles": packed(poles), "fields": quantised(fields), "slopes": quantised(slopes[None]),
+        "poles": packed(poles), "fields": quantised(fields), "cosines": quantised(cosines[None]),
         "inside": "".join("01"[int(each)] for each in inside),
         "heights": quantised(1e3 * heights[None]), "reach_mm": 1e3 * REACH,
     }  # fmt: skip
@@ -97,6 +99,11 @@ def training_basis(ops: fem.Operators, forces: Floats, report: Any) -> Floats:
             report(len(snapshots) / count)
             part = solve(frequency, forces[:, first : first + AT_ONCE])[ops.free]
             snapshots.append(np.hstack([part.real, part.imag]).astype(np.float32))
+        # Faint motion of high frequencies counts, too, but less than that of low ones.
+        own = snapshots[len(snapshots) - -(-forces.shape[1] // AT_ONCE) :]
+        size = np.sqrt(sum(float(np.linalg.norm(each)) ** 2 for each in own))
+        for each in own:
+            each /= size**FAINTNESS
     motions = np.hstack(snapshots)
     squares, turn = np.linalg.eigh((motions.T @ motions).astype(np.float64))
     squares, turn = squares[::-1], turn[:, ::-1]
@@ -132,8 +139,8 @@ def reduced_poles(ops: fem.Operators, basis: Floats) -> tuple[fem.Complex, fem.C
 
 
 def surface_grid(body: Body, made: Build) -> tuple[Floats, np.ndarray, Floats, Floats]:
-    """Places (SIDE^2, 2) in metre of the grid, whether they are on the body, and of the surface its
-    area per area of the grid (SIDE^2,) and its height (SIDE^2,) in metre.
+    """Places (SIDE^2, 2) in metre of the grid, whether they are on the body, and of the surface the
+    cosine of its slope (SIDE^2,) and its height (SIDE^2,) in metre.
     """
     x, y = np.meshgrid(grid_line(), grid_line())
     places = np.column_stack([x.ravel(), y.ravel()])
@@ -142,7 +149,7 @@ def surface_grid(body: Body, made: Build) -> tuple[Floats, np.ndarray, Floats, F
     heights[inside] = surface_heights(made, places[inside])
     shown = np.where(inside, heights, np.nan).reshape(SIDE, SIDE)
     steep = np.nan_to_num(np.stack(np.gradient(shown, STEP)))
-    return places, inside, np.sqrt(1 + (steep**2).sum(axis=0)).ravel(), heights
+    return places, inside, (1 + (steep**2).sum(axis=0)).ravel() ** -0.5, heights
 
 
 def surface_heights(made: Build, places: Floats) -> Floats:

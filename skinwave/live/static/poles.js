@@ -20,7 +20,7 @@ export class PoleBody {
       this.values.set(real.subarray(p * this.count, (p + 1) * this.count), p * width);
       this.values.set(imaginary.subarray(p * this.count, (p + 1) * this.count), p * width + this.count);
     }
-    this.pushed = this.values.map((value, k) => value * this.slopes[Math.floor(k / width)]);
+    this.pushed = this.values.map((value, k) => value * this.cosines[Math.floor(k / width)]);
     this.loads = new Map(); // load fields of a height
     this.paths = new Map(); // forces of unit pressure along a path
   }
