@@ -103,9 +103,9 @@ function draw(pen, options, state, ink) {
   pen.within(box.x, box.y, box.side, box.side, () => {
     if (rms) pen.image(state.image, box.x, box.y, box.side, box.side, options.stale ? 0.3 : 1);
     if (hatched) {
-      for (let k = -box.side, odd = false; k < box.side; k += 6, odd = !odd) {
+      for (let k = -box.side, odd = false; k < box.side; k += 9, odd = !odd) {
         const ends = [[box.x + k, box.y + box.side], [box.x + k + box.side, box.y]];
-        pen.line(ends, { colour: odd ? "#fff" : "#000", width: 1.5, opacity: 0.4 });
+        pen.line(ends, { colour: odd ? "#fff" : "#000", width: 1.5, opacity: 0.3 });
       }
     }
     if (options.influenced) {
