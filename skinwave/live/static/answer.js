@@ -14,7 +14,8 @@ const SEEN = 0.06, STEP = 2e-4; // s of motion, and between its times, in which 
 export function respond(values, body, kernelBody, { published = false } = {}) {
   const load = loadOf(values, body), x = values.x / 1e3, y = values.y / 1e3;
   const kernel = kernelBody.respond(load), waves = body.respond(load);
-  const answer = { values, body, load, x, y, kernel, waves, kernelAt: kernel.at(x, y), wavesAt: waves.at(x, y) };
+  const [kernelAt, wavesAt] = [kernel.at(x, y), waves.at(x, y)];
+  const answer = { values, body, load, x, y, kernel, waves, kernelAt, wavesAt };
   if (published) {
     answer.published = kernelBody.respond(load, { published: true });
     answer.publishedAt = answer.published.at(x, y);
@@ -30,8 +31,8 @@ export function lineName(answer, f) {
   return typeset(answer.names(f));
 }
 
-export const typeset = (name) => name.replace(/-/g, " − ").replace(/\+/g, " + ").replace(/(\d)(?=f)/g, "$1 ")
-  .replace(/^ − /, "−");
+export const typeset = (name) => name.replace(/-/g, " − ").replace(/\+/g, " + ")
+  .replace(/(\d)(?=f)/g, "$1 ").replace(/^ − /, "−");
 
 /** Maps of the kernel and the waves, and the numbers that need them. */
 export function mapsOf(answer) {
@@ -41,7 +42,8 @@ export function mapsOf(answer) {
     maps, share: shareOutside(maps.kernel.rms, maps.waves.rms),
     kernelShare: shareOutside(maps.kernel.rms, maps.kernel.rms),
     reach: body.is_skin ? reach(load, maps.waves) : null, kernelReach: reach(load, maps.kernel),
-    delay: delayOf(kernel, waves, load)?.delay ?? NaN, invalid: invalidity(answer), warnings: warnings(answer),
+    delay: delayOf(kernel, waves, load)?.delay ?? NaN,
+    invalid: invalidity(answer), warnings: warnings(answer),
   };
 }
 
@@ -62,4 +64,7 @@ function warnings({ load }) {
 }
 
 /** Amplitudes (l,) of complex lines in the unit of a quantity. */
-export const inQuantity = (f, at, name) => amplitudesOf(f, at, QUANTITIES[name].rate).map((v) => v * QUANTITIES[name].per);
+export function inQuantity(f, at, name) {
+  const { rate, per } = QUANTITIES[name];
+  return amplitudesOf(f, at, rate).map((v) => v * per);
+}

@@ -71,7 +71,8 @@ function numberRow(key) {
 }
 
 function choiceRow(key, words = (value) => WORDS[value] ?? value) {
-  const options = CHOICES[key].map((value) => `<option value="${escaped(value)}">${escaped(words(value))}</option>`);
+  const options = CHOICES[key].map((value) =>
+    `<option value="${escaped(value)}">${escaped(words(value))}</option>`);
   return `<div class="row wide" data-row="${key}">${head(key, key)}
     <select id="${key}" data-key="${key}">${options.join("")}</select></div>`;
 }
@@ -84,7 +85,8 @@ function shapeRow() {
   const each = Object.entries(ICONS).map(([name, path]) => `<label title="${name}"><input type="radio"
     name="shape" value="${name}" data-key="shape" aria-label="${name}"><svg viewBox="0 0 24 24"
     aria-hidden="true"><path d="${path}"/></svg></label>`);
-  return `<div class="row wide" data-row="shape"><span class="head"><span id="shape-name" title="${HELP.shape}">Shape</span>${
+  return `<div class="row wide" data-row="shape"><span class="head"><span id="shape-name"
+    title="${HELP.shape}">Shape</span>${
     question("shape", LABELS.shape)}</span>
     <span class="shapes" role="radiogroup" aria-labelledby="shape-name">${each.join("")}</span></div>`;
 }
@@ -96,15 +98,20 @@ const section = (id, title, body, note = "") => `<details name="more" id="${id}"
 /** HTML of a body's keys: editable with a server, otherwise as they are. */
 function bodyKeys(body, editable) {
   const rows = (body.keys ?? []).map(({ key, label, unit, value, low, high, step, choices }) => {
-    const name = `<span class="head"><label for="key-${key}" title="${escaped(label)}">${escaped(label)}</label></span>`;
-    if (!editable) return `<div class="fact"><span>${escaped(label)}</span><b>${escaped(value)} ${escaped(unit)}</b></div>`;
+    const name = `<span class="head"><label for="key-${key}"
+      title="${escaped(label)}">${escaped(label)}</label></span>`;
+    if (!editable) return `<div class="fact"><span>${escaped(label)}</span><b>${escaped(value)}
+      ${escaped(unit)}</b></div>`;
     if (choices) {
-      return `<div class="row wide">${name}<select id="key-${key}" data-body="${key}">${choices.map((each) => `<option${
+      return `<div class="row wide">${name}<select id="key-${key}"
+        data-body="${key}">${choices.map((each) => `<option${
         each === value ? " selected" : ""}>${escaped(each)}</option>`).join("")}</select></div>`;
     }
-    return `<div class="row">${name}<input type="range" data-body="${key}" min="${low}" max="${high}" step="${step}"
+    return `<div class="row">${name}<input type="range" data-body="${key}" min="${low}" max="${high}"
+      step="${step}"
       value="${value}" aria-label="${escaped(label)}, ${escaped(unit)}"><input class="field" id="key-${key}"
-      data-body="${key}" value="${Number(value.toPrecision(4))}" inputmode="decimal" autocomplete="off"><span class="unit">${escaped(unit)}</span></div>`;
+      data-body="${key}" value="${Number(value.toPrecision(4))}" inputmode="decimal"
+        autocomplete="off"><span class="unit">${escaped(unit)}</span></div>`;
   });
   return rows.join("") || '<p class="note">This body has no values to change.</p>';
 }
@@ -119,35 +126,45 @@ function bodyKeys(body, editable) {
 export function buildControls(host, { bodies, editable, change, refuse, moving, edit, hold, published }) {
   host.innerHTML = [
     choiceRow("body", (name) => bodies.find((body) => body.name === name)?.title ?? name),
-    ...["amplitude", "am", "am2"].map(numberRow), choiceRow("ratio"), ...["envelope", "duration"].map(numberRow),
+    ...["amplitude", "am", "am2"].map(numberRow), choiceRow("ratio"), ...["envelope",
+      "duration"].map(numberRow),
     shapeRow(), numberRow("size"), numberRow("speed"),
-    `<div class="row wide"><span class="head"><span>Drawn</span>${question("hold", "Keep the drawing frequency")}</span>
-      <span class="pair"><output id="drawing">–</output><label><input type="checkbox" id="hold"> keep</label></span></div>`,
+    `<div class="row wide"><span class="head"><span>Drawn</span>${question("hold",
+      "Keep the drawing frequency")}</span>
+      <span class="pair"><output id="drawing">–</output><label><input type="checkbox" id="hold">
+        keep</label></span></div>`,
     '<div class="more">',
     section("rhythm", "Rhythm", `<svg id="strip" viewBox="0 0 248 40" role="img" aria-label="Pulses"></svg>${
-      textRow("pulses")}${numberRow("ramp")}<div class="buttons"><button type="button" id="pulse-add">Add a pulse</button>
+      textRow("pulses")}${numberRow("ramp")}<div class="buttons"><button type="button" id="pulse-add">Add a
+        pulse</button>
       <button type="button" id="pulse-remove">Remove the last</button></div>`),
     section("foci-more", "Path and foci", `${numberRow("foci")}
-      <div class="row wide"><span class="head"><span id="own-name">Paths</span>${question("own", "Paths of the foci")}</span>
-      <span class="pair" role="radiogroup" aria-labelledby="own-name"><label><input type="radio" name="own" value=""> one</label>
+      <div class="row wide"><span class="head"><span id="own-name">Paths</span>${question("own",
+        "Paths of the foci")}</span>
+      <span class="pair" role="radiogroup" aria-labelledby="own-name"><label><input type="radio" name="own"
+        value=""> one</label>
       <label><input type="radio" name="own" value="own"> one each</label></span></div>
       <div id="one-path">${textRow("phases")}${choiceRow("sweep")}${textRow("polyline")}</div>
       <div id="own-paths" hidden>${numberRow("drawn")}<table><thead><tr><th>#</th><th>shape</th><th>size</th><th>x</th>
       <th>y, mm</th></tr></thead><tbody></tbody></table></div>${choiceRow("sharing")}`),
     section("focus", "Focus and drive", `${["height", "peak", "modulation"].map(numberRow).join("")}
-      ${choiceRow("drive")}${choiceRow("profile")}<div class="row wide"><span class="head"><span>Kernel</span>${
-        question("published", "Kernel as published")}</span><label class="pair"><input type="checkbox" id="published">
+      ${choiceRow("drive")}${choiceRow("profile")}<div class="row wide"><span
+        class="head"><span>Kernel</span>${
+        question("published", "Kernel as published")}</span><label class="pair"><input type="checkbox"
+          id="published">
         as published, too</label></div>`),
     section("body-more", "Layers", '<div id="keys"></div>', editable
       ? "Moving a value computes the body again. The old result is pale meanwhile."
       : "This file holds finished bodies. Run <code>skinwave web</code> to change their values."),
     section("point-more", "Point", `${numberRow("x")}${numberRow("y")}${choiceRow("quantity")}`),
-    section("files", "Files", `${editable ? `<div class="row wide"><span class="head"><label for="scene">Scene</label>${
+    section("files", "Files", `${editable ? `<div class="row wide"><span class="head"><label
+      for="scene">Scene</label>${
       question("scene", "Open a scene")}</span><input type="file" id="scene" accept=".toml"></div>` : ""}
       <div class="row wide"><span class="head"><label for="measurement">Measurement</label>${
       question("measurement", "Show a measurement")}</span><input type="file" id="measurement"></div>
       <p class="note" id="measured">${editable ? "CSV, .npz, .wav, .mat or Universal File." : "CSV file."}
-      Or drop it onto the plots.</p><div class="buttons"><button type="button" id="measured-clear" hidden>Remove the
+      Or drop it onto the plots.</p><div class="buttons"><button type="button" id="measured-clear"
+        hidden>Remove the
       measurement</button></div>`),
     "</div>",
     '<div id="popover" popover role="note"></div>',
@@ -192,15 +209,18 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
     if (!key || !up || !NUMBERS[key]) return;
     event.preventDefault();
     const { low, high, least = low, step } = NUMBERS[key], by = up * step * (event.shiftKey ? 10 : 1);
-    const next = Math.min(Math.max(Number((values[key] + by).toFixed(6)), least), high);
+    const now = Number(event.target.value), from = Number.isFinite(now) ? now : values[key];
+    const next = Math.min(Math.max(Number((from + by).toFixed(6)), least), high);
     event.target.value = fieldText(key, next);
     take(key, String(next), true);
   });
   host.addEventListener("click", ({ target }) => {
     const key = target.dataset?.help;
     if (key) explain(target, HELP[key]);
-    else if (target.id === "pulse-add") take("pulses", [values.pulses, "100/100"].filter(Boolean).join(", "), true);
-    else if (target.id === "pulse-remove") take("pulses", values.pulses.split(",").slice(0, -1).join(","), true);
+    else if (target.id === "pulse-add") take("pulses", [values.pulses,
+      "100/100"].filter(Boolean).join(", "), true);
+    else if (target.id === "pulse-remove") take("pulses", values.pulses.split(",").slice(0, -1).join(","),
+      true);
   });
 
   function explain(button, text) {
@@ -227,7 +247,8 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
     body.innerHTML = rows.map((row, k) => `<tr><th scope="row">${k + 1}</th><td><select data-own="1"
       aria-label="Shape of path ${k + 1}">${Object.keys(ICONS).slice(0, 5).map((name) => `<option${
       name === row[0] ? " selected" : ""}>${name}</option>`).join("")}</select></td>${row.slice(1).map((value, j) => `
-      <td><input data-own="1" inputmode="decimal" value="${escaped(value)}" aria-label="${["Size", "x", "y"][j]} of path ${
+      <td><input data-own="1" inputmode="decimal" value="${escaped(value)}" aria-label="${["Size", "x",
+        "y"][j]} of path ${
       k + 1}, mm"></td>`).join("")}</tr>`).join("");
   }
 
@@ -247,7 +268,8 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
     for (let start = 0, turn = 0; turn < 2; turn++) {
       for (const [on, gap] of pulses) {
         const r = Math.min(values.ramp / 1e3, on / 2), [a, b] = [start * scale, (start + on) * scale];
-        parts.push(`<polygon class="block${turn ? " again" : ""}" points="${a},26 ${a + r * scale},4 ${b - r * scale},4 ${b},26"/>`);
+        parts.push(`<polygon class="block${turn ? " again" : ""}" points="${a},26 ${a
+          + r * scale},4 ${b - r * scale},4 ${b},26"/>`);
         start += on + gap;
       }
     }
@@ -271,7 +293,8 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
         if (input !== document.activeElement) input.value = fieldText(key, values[key]);
       }
       const still = values.shape === "point" || Boolean(values.paths);
-      for (const key of ["size", "speed"]) toggle(key, still || (key === "size" && values.shape === "polyline"));
+      for (const key of ["size", "speed"]) toggle(key, still || (key === "size"
+        && values.shape === "polyline"));
       toggle("phases", values.foci < 2);
       toggle("sweep", !["line", "polyline"].includes(values.shape));
       toggle("polyline", values.shape !== "polyline");
@@ -285,14 +308,16 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
       $("drawing").textContent = facts.drawing ? `${facts.drawing.toFixed(1)} Hz` : "does not move";
       $("hold").checked = facts.held;
       const digest = {
-        rhythm: values.pulses || "always on", "foci-more": values.foci > 1 ? `${values.foci} foci` : "one focus",
+        rhythm: values.pulses || "always on", "foci-more": values.foci > 1 ? `${values.foci} foci`
+          : "one focus",
         focus: `${values.height} mm, ${WORDS[values.drive]}`, "point-more": `${fieldText("x", values.x)}, ${
           fieldText("y", values.y)} mm`,
       };
       for (const [id, text] of Object.entries(digest)) $(`${id}-digest`).textContent = text;
     },
     showBodies(own) {
-      $("body").innerHTML = own.map(({ name, title }) => `<option value="${escaped(name)}">${escaped(title)}</option>`).join("");
+      $("body").innerHTML = own.map(({ name, title }) =>
+        `<option value="${escaped(name)}">${escaped(title)}</option>`).join("");
       $("body").value = values.body;
     },
     showBody(body) {

@@ -30,12 +30,13 @@ const QUIET = 300; // ms without a move, after which slow results are computed
 const opened = new Map(); // bodies by name
 const kernelBody = openKernel();
 const starts = { ...STARTS, ...data.start };
-const view = { look: "maps", tab: "lines", span: "auto", decibel: false, highest: 600, over: "speed", mapDecibel: 0,
-  published: false, held: 0, follow: true };
+const view = { look: "maps", tab: "lines", span: "auto", decibel: false, highest: 600, over: "speed",
+  mapDecibel: 0, published: false, held: 0, follow: true };
 const errors = new Map(); // what is typed wrong, by control
 const scale = keptScales();
 let values = starts, answer = null, pinned = null, measured = null, history = null, controls = null;
-let frameDue = 0, mapsDue = 0, slowDue = 0, told = 0, moving = false, levels = null, solid = null, solidOf = null;
+let frameDue = 0, mapsDue = 0, slowDue = 0, told = 0, moving = false;
+let levels = null, solid = null, solidOf = null;
 let playing = 0, clock = 0, stale = false, editing = null, notice = "", seenWarnings = [];
 
 const recordOf = (name) => data.bodies.find((body) => body.name === name) ?? data.bodies[0];
@@ -52,7 +53,9 @@ function change(key, value, settled) {
   let next = { ...values, [key]: value };
   if (key === "foci" || key === "paths") next = fitPaths(next, key);
   if (view.held && ["size", "speed", "shape"].includes(key)) {
-    try { next = { ...next, ...holdFrequency(next, key, view.held) }; } catch (error) { say(error.message); return; }
+    try {
+      next = { ...next, ...holdFrequency(next, key, view.held) };
+    } catch (error) { say(error.message); return; }
   }
   set(next, settled);
 }
@@ -71,9 +74,16 @@ function set(next, settled = true) {
 
 const ask = () => { frameDue ||= requestAnimationFrame(showCurves); };
 
+/** Address of this page with what is shown, apart from what is usual. */
+function address() {
+  return addressOf(values, starts, { view: view.look === "maps" ? "" : view.look,
+    tab: ["lines", "ab"].includes(view.tab) ? "" : view.tab });
+}
+
 function writeAddress() {
-  const shown = { view: view.look === "maps" ? "" : view.look, tab: ["lines", "ab"].includes(view.tab) ? "" : view.tab };
-  try { window.history.replaceState(null, "", addressOf(values, starts, shown)); } catch { /* not from every host */ }
+  try {
+    window.history.replaceState(null, "", address());
+  } catch { /* some hosts forbid it */ }
   $("undo").disabled = !history.undoable;
   $("redo").disabled = !history.redoable;
 }
@@ -104,7 +114,8 @@ function showCurves() {
     controls.show(values, facts());
     return;
   }
-  const { load } = answer, span = spanOf(view.span, load), fit = (name, largest) => scale(name, largest, moving);
+  const { load } = answer, span = spanOf(view.span, load);
+  const fit = (name, largest) => scale(name, largest, moving);
   const given = { pinned, measured, scale: fit, highest: view.highest, decibel: view.decibel };
   plots.commanded.draw(commandedPlot(answer, span));
   plots.waveform.draw(waveformPlot(answer, span, given));
@@ -152,18 +163,21 @@ function drawMaps() {
   const marks = { path: pathsOf(load), point: [x, y], foci: fociAt(load, clock), influenced: maps.kernel.rms,
     decibel: view.mapDecibel };
   const top = (name, rms) => scale(`map ${name}`, rms.reduce((most, v) => (v > most ? v : most), 0), moving);
-  let wavesTop = top(`waves ${body.name}`, maps.waves.rms), topOfA = at ? top(`waves ${at.body.name}`, at.maps.waves.rms) : 0;
+  let wavesTop = top(`waves ${body.name}`, maps.waves.rms);
+  let topOfA = at ? top(`waves ${at.body.name}`, at.maps.waves.rms) : 0;
   if (factorOf(topOfA, wavesTop) === 1) wavesTop = topOfA = Math.max(wavesTop, topOfA);
   if (at) {
-    drawMap($("kernel-map"), { ...marks, path: pathsOf(at.load), foci: [], point: [at.x, at.y], influenced: at.maps.kernel.rms,
-      rms: at.maps.waves.rms, level: at.body.is_skin ? at.maps.waves.level : null, unit: "m", largest: topOfA,
+    drawMap($("kernel-map"), { ...marks, path: pathsOf(at.load), foci: [], point: [at.x, at.y],
+      influenced: at.maps.kernel.rms, rms: at.maps.waves.rms, level: at.body.is_skin ? at.maps.waves.level : null, unit: "m", largest: topOfA,
       title: `A: ${short(at.body.title)}`, hatched: at.invalid });
   } else {
-    drawMap($("kernel-map"), { ...marks, rms: maps.kernel.rms, level: body.is_skin ? maps.kernel.level : null, unit: "Pa",
+    const level = body.is_skin ? maps.kernel.level : null;
+    drawMap($("kernel-map"), { ...marks, rms: maps.kernel.rms, level, unit: "Pa",
       largest: top("kernel", maps.kernel.rms), title: "Kernel, RMS" });
   }
   const waves = view.look === "difference"
-    ? { rms: difference(maps.waves.rms, maps.kernel.rms), unit: "dB", largest: 20, signed: true, title: "Waves − kernel" }
+    ? { rms: difference(maps.waves.rms, maps.kernel.rms), unit: "dB", largest: 20, signed: true,
+      title: "Waves − kernel" }
     : { rms: maps.waves.rms, level: body.is_skin ? maps.waves.level : null, unit: "m", largest: wavesTop,
       title: at ? `B: ${short(body.title)}` : "Waves, RMS" };
   drawMap($("wave-map"), { ...marks, ...waves, hatched: answer.invalid, stale });
@@ -175,7 +189,8 @@ function showSolid() {
   if (solidOf === answer) return;
   solidOf = answer;
   const { body, waves, load, x, y } = answer, fd = drawingFrequency(load.path);
-  solid.show({ shape: body.shape, motion: { f: waves.f, ...waves.surface() }, path: pathsOf(load), points: [[x, y]],
+  solid.show({ shape: body.shape, motion: { f: waves.f, ...waves.surface() }, path: pathsOf(load),
+    points: [[x, y]],
     foci: fd ? (t) => fociAt(load, t) : [fociAt(load, 0)] });
 }
 
@@ -206,10 +221,14 @@ function showPane() {
   } else if (view.tab === "level") {
     if (levels) plots.level.draw(levelPlot(answer, view.over, levels, levels.best));
     $("best").disabled = !levels?.best;
-  } else $("ab").innerHTML = pinned ? comparison(pinned, answer) : '<p class="note">Press "Pin A" to keep what is shown. Then change the body or a value to compare.</p>';
+  } else {
+    $("ab").innerHTML = pinned ? comparison(pinned, answer) : `<p class="note">Press Pin A to keep what is
+      shown. Then change the body or a value to compare.</p>`;
+  }
 }
 
-const keyOfLevels = () => JSON.stringify({ ...values, [view.over]: 0, over: view.over, made: answer?.body.made });
+const keyOfLevels = () => JSON.stringify({ ...values, [view.over]: 0, over: view.over,
+  made: answer?.body.made });
 
 /** Levels over a control in short turns, so that the page stays alive. */
 function computeLevels() {
@@ -254,7 +273,8 @@ function period() {
 function showClock() {
   const own = period();
   $("phase").value = (clock / own.period) % 1;
-  $("phase-said").textContent = `${(1e3 * clock).toFixed(own.period > 0.1 ? 0 : 2)} of ${rounded(1e3 * own.period)} ms`;
+  const digits = own.period > 0.1 ? 0 : 2;
+  $("phase-said").textContent = `${(1e3 * clock).toFixed(digits)} of ${rounded(1e3 * own.period)} ms`;
   for (const plot of [plots.commanded, plots.waveform]) plot.setCursor(1e3 * clock);
   if (view.look !== "3d") drawMaps();
 }
@@ -339,9 +359,9 @@ async function takeScene(file) {
 
 async function takeMeasurement(file) {
   try {
-    measured = data.api ? await sendFile(data.api, "measurement", file) : readMeasurement(await file.text(), file.name);
-    errors.delete("measurement");
-    const remarks = measured.remarks.map((text) => `${text[0].toUpperCase()}${text.slice(1).replace(/\.$/, "")}.`);
+    measured = data.api ? await sendFile(data.api, "measurement", file)
+      : readMeasurement(await file.text(), file.name);
+    const remarks = measured.remarks.map((text) => `${text[0].toUpperCase()}${text.slice(1)}`);
     say([`${file.name} is drawn over the waves.`, ...remarks].join(" "));
   } catch (error) { errors.set("measurement", error.message); measured = null; }
   $("measured-clear").hidden = !measured;
@@ -418,9 +438,10 @@ function fillMenus() {
   const item = (title, detail, k, kind) => `<button type="button" data-${kind}="${k}">${escaped(title)}${
     detail ? `<small>${escaped(detail)}</small>` : ""}</button>`;
   $("presets").innerHTML = data.presets.map(({ title }, k) => item(title, "", k, "preset")).join("");
-  $("examples").innerHTML = data.examples.map(({ title, sentence }, k) => item(title, sentence, k, "example")).join("");
-  const take = (own) => set({ ...values, ...Object.fromEntries(Object.entries(own).filter(([key]) => key in STARTS)
-    .map(([key, value]) => [key, check(key, value)])) });
+  const examples = data.examples.map(({ title, sentence }, k) => item(title, sentence, k, "example"));
+  $("examples").innerHTML = examples.join("");
+  const take = (own) => set({ ...values, ...Object.fromEntries(Object.entries(own)
+    .filter(([key]) => key in STARTS).map(([key, value]) => [key, check(key, value)])) });
   document.addEventListener("click", ({ target }) => {
     const button = target.closest("[data-menu], [data-preset], [data-example], [data-save]");
     if (!button) return;
@@ -463,8 +484,10 @@ function listen() {
   on("pin", "click", pin);
   on("swap", "click", swap);
   on("link", "click", async () => {
-    const text = addressOf(values, starts, { view: view.look === "maps" ? "" : view.look });
-    try { await navigator.clipboard.writeText(text); say("The link is copied."); } catch { prompt("Copy this address:", text); }
+    try {
+      await navigator.clipboard.writeText(address());
+      say("The link is copied.");
+    } catch { prompt("Copy this address:", address()); }
   });
   on("sound", "click", () => playSound(answer, $("sound")));
   on("dark", "click", () => setTheme(document.documentElement.dataset.theme !== "dark"));
@@ -472,22 +495,33 @@ function listen() {
   on("warned", "click", () => controls.explain($("warned"), seenWarnings.join(" ")));
   on("cancel", "click", () => editing?.abort());
   on("play", "click", () => play(!playing));
-  on("phase", "input", () => { play(false); clock = Number($("phase").value) * period().period; showClock(); });
+  on("phase", "input", () => {
+    play(false);
+    clock = Number($("phase").value) * period().period;
+    showClock();
+  });
   on("follow", "change", () => { view.follow = $("follow").checked; clock = 0; showClock(); });
   on("span", "change", () => { view.span = $("span").value; ask(); });
   on("decibel", "change", () => { view.decibel = $("decibel").checked; ask(); });
   on("highest", "change", () => { view.highest = Number($("highest").value); ask(); });
   on("map-decibel", "change", () => { view.mapDecibel = Number($("map-decibel").value); drawMaps(); });
   on("over", "change", () => { view.over = $("over").value; ask(); });
-  on("best", "click", () => levels?.best && set({ ...values, [view.over]: check(view.over, Number(levels.best.at.toPrecision(4))) }));
+  on("best", "click", () => {
+    const best = levels?.best;
+    if (best) set({ ...values, [view.over]: check(view.over, Number(best.at.toPrecision(4))) });
+  });
   on("sheet-toggle", "click", () => {
     $("sheet-toggle").setAttribute("aria-expanded", String($("sheet").classList.toggle("open")));
   });
   on("controls", "submit", (event) => event.preventDefault());
   for (const list of all('[role="tablist"]')) {
-    list.addEventListener("click", ({ target }) => (target.dataset.look ? look(target.dataset.look) : target.dataset.tab && tab(target.dataset.tab)));
+    list.addEventListener("click", ({ target: { dataset } }) => {
+      if (dataset.look) look(dataset.look);
+      if (dataset.tab) tab(dataset.tab);
+    });
     list.addEventListener("keydown", (event) => {
-      const way = { ArrowRight: 1, ArrowLeft: -1 }[event.key], tabs = [...list.querySelectorAll('[role="tab"]')];
+      const way = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+      const tabs = [...list.querySelectorAll('[role="tab"]')];
       if (!way) return;
       event.preventDefault();
       const next = tabs[(tabs.indexOf(event.target) + way + tabs.length) % tabs.length];
@@ -505,7 +539,8 @@ function listen() {
     });
   }
   addEventListener("keydown", (event) => {
-    if (!(event.ctrlKey || event.metaKey) || event.altKey || /^(text|)$/.test(event.target.type ?? "-")) return;
+    if (!(event.ctrlKey || event.metaKey) || event.altKey
+      || /^(text|)$/.test(event.target.type ?? "-")) return;
     const key = event.key.toLowerCase();
     if (key === "z" && !event.shiftKey) restore(history.undo());
     else if (key === "y" || key === "z") restore(history.redo());
@@ -522,7 +557,11 @@ function listen() {
     if (target.id === "measurement" && target.files[0]) takeMeasurement(target.files[0]);
   });
   $("controls").addEventListener("click", ({ target }) => {
-    if (target.id === "measured-clear") { measured = null; target.hidden = true; $("measurement").value = ""; ask(); }
+    if (target.id !== "measured-clear") return;
+    measured = null;
+    target.hidden = true;
+    $("measurement").value = "";
+    ask();
   });
   addEventListener("resize", drawMaps);
   addEventListener("hashchange", begin);
@@ -531,7 +570,7 @@ function listen() {
 function begin() {
   const { values: own, refused, view: shown } = readAddress(starts);
   values = own;
-  if (!data.bodies.some((body) => body.name === values.body)) values = { ...values, body: data.bodies[0].name };
+  values = { ...values, body: recordOf(values.body).name };
   notice = refused.join(" ");
   showBody();
   look(["maps", "3d", "difference"].includes(shown.view) ? shown.view : "maps");
@@ -551,11 +590,13 @@ controls = buildControls($("controls"), {
   published: (on) => { view.published = on; ask(); },
 });
 $("map-legend").innerHTML = MAP_LEGEND;
-$("span").innerHTML = Object.entries(SPANS).map(([value, words]) => `<option value="${value}">${words}</option>`).join("");
-$("over").innerHTML = Object.keys(OVER).map((key) => `<option value="${key}" title="${LABELS[key]}">${key === "am" ? "AM" : key}</option>`).join("");
+$("span").innerHTML = Object.entries(SPANS).map(([value, words]) =>
+  `<option value="${value}">${words}</option>`).join("");
+$("over").innerHTML = Object.keys(OVER).map((key) =>
+  `<option value="${key}" title="${LABELS[key]}">${key === "am" ? "AM" : key}</option>`).join("");
 $("highest").value = view.highest;
 fillMenus();
-offerSaves($("save"), { answer: () => answer, view: () => ({ ...view, span: spanOf(view.span, answer.load) }), say, writers: WRITERS });
+offerSaves($("save"), { answer: () => answer, say, writers: WRITERS });
 setTheme(matchMedia("(prefers-color-scheme: dark)").matches);
 listen();
 begin();

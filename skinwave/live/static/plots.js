@@ -81,8 +81,7 @@ function thinned(xs, ys, toX, width) {
  * A plot inside an element.
  *
  * `draw(spec)` takes { x: {label, range}, y: {label, range, role}, y2, curves, names, notes, kept,
- * hatched, label }. A curve has {role, axis: "y"|"y2", x, y, name, width, dash, fill, stems, offset,
- * faint}; names are [{x, y, axis, text, above}], the most important first. Zoom lasts until `kept` changes.
+ * hatched, label }. A curve has {role, axis: "y"|"y2", x, y, name, width, dash, fill, stems, offset}; names are [{x, y, axis, text, above}], the most important first. Zoom lasts until `kept` changes.
  */
 export function createPlot(host, { announce = () => {}, onZoom = () => {} } = {}) {
   const svg = document.createElementNS(NS, "svg");
@@ -162,10 +161,13 @@ export function createPlot(host, { announce = () => {}, onZoom = () => {} } = {}
       d += `${on ? "L" : "M"}${toX(xs[k]).toFixed(1)},${toY(inside, curve.axis).toFixed(1)}`;
       on = true;
     }
-    const [first, last] = [xs[0], xs[xs.length - 1]].map((x) => `${toX(x).toFixed(1)},${toY(0, curve.axis).toFixed(1)}`);
-    const filled = curve.fill && d ? `<path class="filled is-${curve.role}" d="${d}L${last}L${first}Z"/>` : "";
-    return `${filled}<path class="curve is-${curve.role}${curve.faint ? " faint" : ""}" d="${d}"${curve.width ? ` stroke-width="${curve.width}"` : ""}${
-      curve.dash ? ` stroke-dasharray="${curve.dash}"` : ""}/>`;
+    const zero = toY(0, curve.axis).toFixed(1);
+    const [first, last] = [xs[0], xs[xs.length - 1]].map((x) => `${toX(x).toFixed(1)},${zero}`);
+    const filled = curve.fill && d ? `<path class="filled is-${curve.role}" d="${d}L${last}L${first}Z"/>`
+      : "";
+    const look = `${curve.width ? ` stroke-width="${curve.width}"` : ""}${
+      curve.dash ? ` stroke-dasharray="${curve.dash}"` : ""}`;
+    return `${filled}<path class="curve is-${curve.role}" d="${d}"${look}/>`;
   }
 
   function stems(curve) {
@@ -179,7 +181,7 @@ export function createPlot(host, { announce = () => {}, onZoom = () => {} } = {}
         ? `<rect x="${(x - 2).toFixed(1)}" y="${(y - 2).toFixed(1)}" width="4" height="4"/>`
         : `<circle cx="${x.toFixed(1)}" cy="${y.toFixed(1)}" r="2.3"/>`;
     }
-    return `<g class="stems is-${curve.role}${curve.faint ? " faint" : ""}"><path d="${d}"/>${heads}</g>`;
+    return `<g class="stems is-${curve.role}"><path d="${d}"/>${heads}</g>`;
   }
 
   /** Names of curves above the plot, between the units of the axes. */
@@ -374,7 +376,8 @@ export function figureOf(parts, paper) {
     if (part instanceof SVGSVGElement) return standalone(part, x, y);
     if (part.asSvg) {
       const { color } = getComputedStyle(part);
-      return `<g transform="translate(${x}, ${y})" font-family="sans-serif" color="${color}">${part.asSvg()}</g>`;
+      return `<g transform="translate(${x}, ${y})" font-family="sans-serif"
+        color="${color}">${part.asSvg()}</g>`;
     }
     const style = getComputedStyle(part);
     return `<text x="${x}" y="${y + 0.78 * boxes[k].height}" fill="${style.color}" font-family="sans-serif"

@@ -34,7 +34,8 @@ function waveform(motion, [x, y], [start, end], { per, rate }) {
       / (dt * (Math.min(k + 1, count) - Math.max(k - 1, 0))));
   }
   const first = Math.floor(start / dt);
-  return { x: Array.from(times.subarray(first), (t) => 1e3 * t), y: Array.from(values.subarray(first), (v) => per * v) };
+  return { x: Array.from(times.subarray(first), (t) => 1e3 * t), y: Array.from(values.subarray(first),
+    (v) => per * v) };
 }
 
 /** Amplitude of the sound at a focus over a span: {x in ms, y in % of full drive}. */
@@ -59,7 +60,8 @@ export function commandedPlot(answer, span) {
   return {
     label: "Commanded signal over time, in per cent of full drive", kept: `${span}`,
     x: { label: "time, ms", range: span.map((t) => 1e3 * t) }, y: { label: "%", range: [-108, 108] },
-    curves: [{ role: "drive", axis: "y", x, y, fill: true }, { role: "drive", axis: "y", x, y: mirrored, fill: true }],
+    curves: [{ role: "drive", axis: "y", x, y, fill: true }, { role: "drive", axis: "y", x, y: mirrored,
+      fill: true }],
   };
 }
 
@@ -71,12 +73,14 @@ export function factorOf(a, b) {
   return Number.isFinite(ratio) && Math.abs(ratio) > 1 ? 10 ** Math.round(ratio) : 1;
 }
 
-const nameOfA = (factor) => (factor === 1 ? "A" : `A × ${factor > 1 ? factor : factor.toFixed(-Math.log10(factor))}`);
+const nameOfA = (factor) => (factor === 1 ? "A" : `A × ${factor > 1 ? factor
+  : factor.toFixed(-Math.log10(factor))}`);
 
 /** Plot of the waveforms; `scale(name, largest)` gives the top of an axis. */
 export function waveformPlot(answer, span, { pinned, measured, scale }) {
   const quantity = QUANTITIES[answer.values.quantity], at = [answer.x, answer.y];
-  const curves = [{ role: "kernel", axis: "y", name: "kernel", ...waveform(answer.kernel, at, span, PRESSURE) }];
+  const curves = [{ role: "kernel", axis: "y", name: "kernel", ...waveform(answer.kernel, at, span,
+    PRESSURE) }];
   if (answer.published) {
     curves.push({ role: "published", axis: "y", name: "as published", dash: "4 3",
       ...waveform(answer.published, at, span, PRESSURE) });
@@ -101,7 +105,8 @@ export function waveformPlot(answer, span, { pinned, measured, scale }) {
   const [y, y2] = [axis("y", "Pa", "kernel"), axis("y2", quantity.unit, "waves")];
   const below = scale("waveform below", Math.max(-y.least / y.top, -y2.least / y2.top, 0.04));
   for (const own of [y, y2]) own.range = [-own.top * below, own.top];
-  return { label: "Waveform at the point: pressure of the kernel in Pa and motion of the body", kept: `${span}`,
+  return { label: "Waveform at the point: pressure of the kernel in Pa and motion of the body",
+    kept: `${span}`,
     x: { label: "time, ms", range: span.map((t) => 1e3 * t) }, y, y2, curves, hatched: answer.invalid };
 }
 
@@ -114,12 +119,14 @@ function nearestPlace({ places }, { x, y }, rows) {
 function measuredSpectrum(measured, answer, per, highest) {
   let f = measured.frequencies, a = f ? nearestPlace(measured, answer, measured.amplitudes) : null;
   if (!f) {
-    const values = nearestPlace(measured, answer, measured.values), mean = values.reduce((sum, v) => sum + v, 0) / values.length;
+    const values = nearestPlace(measured, answer, measured.values), mean = values.reduce((sum, v) => sum
+      + v, 0) / values.length;
     const found = spectrum(values.map((v) => v - mean), measured.times[1] - measured.times[0]);
     [f, a] = [Array.from(found.f), Array.from(found.amplitudes)];
   }
   const count = f.filter((at) => at <= highest).length;
-  return [{ role: "measured", axis: "y2", name: "measured", x: f.slice(0, count), y: a.slice(0, count).map((v) => per * v) }];
+  return [{ role: "measured", axis: "y2", name: "measured", x: f.slice(0, count), y: a.slice(0,
+    count).map((v) => per * v) }];
 }
 
 /** Plot of the spectra as stems side by side, with the detection threshold of skin. */
@@ -127,46 +134,59 @@ export function spectrumPlot(answer, { pinned, measured, highest, decibel, scale
   const quantity = QUANTITIES[answer.values.quantity], { f } = answer.waves;
   const stem = (role, axis, name, at, y, offset, head) => {
     const kept = Array.from(at, (_, k) => k).filter((k) => at[k] <= highest);
-    return { role, axis, name, stems: true, offset, head, x: kept.map((k) => at[k]), y: kept.map((k) => y[k]) };
+    return { role, axis, name, stems: true, offset, head, x: kept.map((k) => at[k]), y: kept.map((k) =>
+      y[k]) };
   };
   const wide = pinned ? 2 * APART : APART;
   const curves = [
-    stem("kernel", "y", "kernel", answer.kernel.f, amplitudesOf(answer.kernel.f, answer.kernelAt), -wide / 2, "square"),
-    stem("waves", "y2", pinned ? "B" : "waves", f, inQuantity(f, answer.wavesAt, answer.values.quantity), wide / 2),
+    stem("kernel", "y", "kernel", answer.kernel.f, amplitudesOf(answer.kernel.f, answer.kernelAt),
+      -wide / 2, "square"),
+    stem("waves", "y2", pinned ? "B" : "waves", f, inQuantity(f, answer.wavesAt, answer.values.quantity),
+      wide / 2),
   ];
   if (answer.published) {
-    curves.push({ ...stem("published", "y", "as published", answer.published.f, amplitudesOf(answer.published.f, answer.publishedAt), -1.5 * wide, "square") });
+    curves.push({ ...stem("published", "y", "as published", answer.published.f,
+      amplitudesOf(answer.published.f, answer.publishedAt), -1.5 * wide, "square") });
   }
   if (pinned) {
     const found = inQuantity(pinned.waves.f, pinned.wavesAt, answer.values.quantity);
     const factor = decibel ? 1 : factorOf(largestOf(found), largestOf(curves[1].y));
     curves.push(stem("pinned", "y2", nameOfA(factor), pinned.waves.f, found.map((v) => factor * v), 0));
   }
-  const tops = { y: scale("spectrum y", 1.2 * Math.max(largestOf(curves[0].y), largestOf(curves.find((c) => c.role === "published")?.y ?? []))),
-    y2: scale(`spectrum y2 ${answer.values.quantity}`, 1.2 * Math.max(...curves.filter((c) => c.axis === "y2").map((c) => largestOf(c.y)))) };
-  if (measured && measured.quantity === answer.values.quantity) curves.push(...measuredSpectrum(measured, answer, quantity.per, highest));
+  const tops = { y: scale("spectrum y", 1.2 * Math.max(largestOf(curves[0].y), largestOf(curves.find((c) =>
+    c.role === "published")?.y ?? []))),
+    y2: scale(`spectrum y2 ${answer.values.quantity}`, 1.2 * Math.max(...curves.filter((c) =>
+      c.axis === "y2").map((c) => largestOf(c.y)))) };
+  if (measured && measured.quantity === answer.values.quantity) curves.push(...measuredSpectrum(measured,
+    answer, quantity.per, highest));
   if (answer.body.is_skin && !quantity.rate) {
     const x = Array.from({ length: 120 }, (_, k) => 5 + k * (highest - 5) / 119);
-    curves.push({ role: "threshold", axis: "y2", name: "threshold", dash: "5 3", x, y: x.map((at) => 1e6 * thresholdAt(at)) });
+    curves.push({ role: "threshold", axis: "y2", name: "threshold", dash: "5 3", x, y: x.map((at) =>
+      1e6 * thresholdAt(at)) });
   }
   const beside = (x) => curves[0].y[curves[0].x.findIndex((own) => Math.abs(own - x) < 1e-3)] ?? 0;
-  const named = curves[1].y.map((y, k) => ({ x: curves[1].x[k], y, axis: "y2", text: lineName(answer, curves[1].x[k]),
+  const named = curves[1].y.map((y, k) => ({ x: curves[1].x[k], y, axis: "y2", text: lineName(answer,
+    curves[1].x[k]),
     above: { y: beside(curves[1].x[k]), axis: "y" } }))
     .filter(({ text }) => text).sort((a, b) => b.y - a.y).slice(0, NAMED);
-  const axes = { y: { label: "Pa", role: "kernel", range: [0, tops.y] }, y2: { label: quantity.unit, role: "waves", range: [0, tops.y2] } };
+  const axes = { y: { label: "Pa", role: "kernel", range: [0, tops.y] }, y2: { label: quantity.unit,
+    role: "waves", range: [0, tops.y2] } };
   if (decibel) {
     for (const axis of ["y", "y2"]) {
       const top = 10 * Math.ceil(2 * Math.log10(tops[axis]) + 0.2), low = top - DYNAMIC;
       Object.assign(axes[axis], { label: `dB re 1 ${axes[axis].label}`, range: [low, top] });
       const level = (v) => Math.max(20 * Math.log10(Math.max(Math.abs(v), 1e-30)), low);
-      for (const curve of curves) if (curve.axis === axis) Object.assign(curve, { y: curve.y.map(level), decibel: true });
+      for (const curve of curves) if (curve.axis === axis) Object.assign(curve, { y: curve.y.map(level),
+        decibel: true });
       for (const { own } of named.flatMap((name) => [{ own: name }, { own: name.above }])) {
         if (own.axis === axis) own.y = level(own.y);
       }
     }
   }
-  return { label: "Spectrum at the point: lines of the kernel in Pa and of the waves, side by side", kept: `${highest}`,
-    x: { label: "frequency, Hz", range: [0, highest] }, ...axes, curves, names: named, hatched: answer.invalid };
+  return { label: "Spectrum at the point: lines of the kernel in Pa and of the waves, side by side",
+    kept: `${highest}`,
+    x: { label: "frequency, Hz", range: [0, highest] }, ...axes, curves, names: named,
+      hatched: answer.invalid };
 }
 
 /** Plot of the phase speeds of a body's waves with the lines of the load; null if it has none. */
@@ -177,13 +197,18 @@ export function dispersionPlot(answer, highest) {
   const slow = dispersion.branches.map(({ c }) => c.filter((v) => v !== null).sort((a, b) => a - b))
     .map((c) => c[Math.floor(c.length / 2)]).filter(Number.isFinite);
   const top = niceTop(1.5 * Math.max(speed, ...slow, 1));
-  const curves = dispersion.branches.slice(0, 4).map(({ name, c }, k) => ({ role: `m${k + 1}`, axis: "y", name,
+  const curves = dispersion.branches.slice(0, 4).map(({ name, c }, k) => ({ role: `m${k + 1}`, axis: "y",
+    name,
     x: dispersion.f, y: c.map((v) => v ?? NaN) }));
-  if (speed) curves.push({ role: "kernel", axis: "y", name: "focus", dash: "5 3", x: [0, highest], y: [speed, speed] });
-  const strong = Array.from(amplitudesOf(answer.waves.f, answer.wavesAt), (y, k) => ({ y, f: answer.waves.f[k] }))
+  if (speed) curves.push({ role: "kernel", axis: "y", name: "focus", dash: "5 3", x: [0, highest],
+    y: [speed, speed] });
+  const strong = Array.from(amplitudesOf(answer.waves.f, answer.wavesAt), (y, k) => ({ y,
+    f: answer.waves.f[k] }))
     .filter((line) => line.f <= highest).sort((a, b) => b.y - a.y).slice(0, NAMED);
-  for (const { f } of strong) curves.push({ role: "now", axis: "y", x: [f, f], y: [0, top], width: 1, dash: "2 3" });
-  return { label: "Phase speed of the body's waves over frequency, with the lines of the load", kept: "dispersion",
+  for (const { f } of strong) curves.push({ role: "now", axis: "y", x: [f, f], y: [0, top], width: 1,
+    dash: "2 3" });
+  return { label: "Phase speed of the body's waves over frequency, with the lines of the load",
+    kept: "dispersion",
     x: { label: "frequency, Hz", range: [0, highest] }, y: { label: "m/s", range: [0, top] }, curves,
     names: strong.map(({ f }) => ({ x: f, y: 0.8 * top, axis: "y", text: lineName(answer, f) })) };
 }
@@ -191,29 +216,36 @@ export function dispersionPlot(answer, highest) {
 /** Plot of levels {x, kernel, waves} over a control. */
 export function levelPlot(answer, key, levels, best) {
   const { label, unit } = NUMBERS[key], now = answer.values[key];
-  const ends = [...levels.waves, ...levels.kernel].filter(Number.isFinite), top = Math.ceil(Math.max(...ends, 6) / 5 + 0.6) * 5;
+  const ends = [...levels.waves, ...levels.kernel].filter(Number.isFinite), top =
+    Math.ceil(Math.max(...ends, 6) / 5 + 0.6) * 5;
   const low = Math.max(Math.floor(Math.min(...ends, -5) / 5) * 5, top - 60);
   return { label: `Sensation level over ${label}`, kept: key,
-    x: { label: `${label}, ${unit}`, range: OVER[key] }, y: { label: "dB above threshold", range: [low, top] },
+    x: { label: `${label}, ${unit}`, range: OVER[key] }, y: { label: "dB above threshold", range: [low,
+      top] },
     curves: [
       { role: "kernel", axis: "y", name: "kernel", x: levels.x, y: levels.kernel },
       { role: "waves", axis: "y", name: "waves", x: levels.x, y: levels.waves },
       { role: "threshold", axis: "y", x: OVER[key], y: [0, 0], dash: "5 3" },
       { role: "now", axis: "y", name: "now", x: [now, now], y: [low, top], dash: "2 3" },
     ],
-    names: best ? [{ x: best.at, y: best.level, axis: "y", text: `${rounded(best.at)} ${unit}: ${signed(best.level)} dB` }] : [] };
+    names: best ? [{ x: best.at, y: best.level, axis: "y",
+      text: `${rounded(best.at)} ${unit}: ${signed(best.level)} dB` }] : [] };
 }
 
-export const signed = (value) => (Number.isFinite(value) ? `${value >= 0 ? "+" : "−"}${Math.abs(value).toFixed(0)}` : "–");
+export const signed = (value) => (Number.isFinite(value) ? `${value >= 0 ? "+"
+  : "−"}${Math.abs(value).toFixed(0)}` : "–");
 
 /** HTML of a tile; `kernel` and `pinned` are texts in small letters. */
-const tile = (name, title, { value, detail = "", kernel = "", pinned = "" }) => `<div class="tile" title="${escaped(title)}">
+const tile = (name, title, { value, detail = "", kernel = "", pinned = "" }) =>
+  `<div class="tile" title="${escaped(title)}">
   <span class="name">${name}</span><span class="value">${value}</span><span class="detail">${detail}</span>
   <span class="kernel">${kernel}</span><span class="of-a">${pinned ? `A: ${pinned}` : ""}</span></div>`;
 
 const subscript = (name) => escaped(name).replace(/_(\w+)/g, "<sub>$1</sub>");
-const far = (reach) => (!reach ? "nowhere" : `${reach.beyond ? "> " : ""}${(1e3 * reach.metre).toFixed(0)} mm`);
-const percent = (share) => (Number.isFinite(share) ? `${(100 * share).toFixed(share < 0.0995 ? 1 : 0)} %` : "–");
+const far = (reach) => (!reach ? "nowhere" : `${reach.beyond ? "> "
+  : ""}${(1e3 * reach.metre).toFixed(0)} mm`);
+const percent = (share) => (Number.isFinite(share) ? `${(100 * share).toFixed(share < 0.0995 ? 1 : 0)} %`
+  : "–");
 const delayed = (seconds) => (Number.isFinite(seconds) ? `${(1e3 * seconds).toFixed(1)} ms` : "–");
 
 /** HTML of the four tiles. */
@@ -223,15 +255,20 @@ export function tiles(answer, pinned) {
   return [
     tile("Level at the point", "Largest component over the detection threshold of skin", {
       value: felt ? `${signed(level?.dB)} dB` : "–",
-      detail: felt ? (level ? `${level.f.toFixed(0)} Hz (${subscript(lineName(answer, level.f) || "line")})` : "") : "no threshold: not skin",
-      kernel: `kernel ${signed(kernelLevel?.dB)} dB`, pinned: a && (a.body.is_skin ? `${signed(a.level?.dB)} dB` : "–") }),
+      detail: felt ? (level ? `${level.f.toFixed(0)} Hz (${subscript(lineName(answer, level.f) || "line")})`
+        : "") : "no threshold: not skin",
+      kernel: `kernel ${signed(kernelLevel?.dB)} dB`, pinned: a && (a.body.is_skin
+        ? `${signed(a.level?.dB)} dB` : "–") }),
     tile("Reach above threshold", "Largest distance from the path at which a component is above threshold", {
-      value: felt ? far(reach) : "–", detail: felt ? (reach ? "from the path" : "") : "no threshold: not skin",
+      value: felt ? far(reach) : "–", detail: felt ? (reach ? "from the path" : "")
+        : "no threshold: not skin",
       kernel: `kernel ${far(kernelReach)}`, pinned: a && (a.body.is_skin ? far(a.reach) : "–") }),
     tile("Outside the kernel's region", "Share of the mean-square motion where the kernel is below −20 dB of its largest", {
-      value: percent(share), detail: "of the motion", kernel: `kernel ${percent(answer.kernelShare)}`, pinned: a && percent(a.share) }),
+      value: percent(share), detail: "of the motion", kernel: `kernel ${percent(answer.kernelShare)}`,
+        pinned: a && percent(a.share) }),
     tile("Delay", "Lag of the motion behind the pressure on the path, at the strongest component", {
-      value: delayed(delay), detail: "behind the pressure", kernel: "kernel 0.0 ms", pinned: a && delayed(a.delay) }),
+      value: delayed(delay), detail: "behind the pressure", kernel: "kernel 0.0 ms", pinned: a
+        && delayed(a.delay) }),
   ].join("");
 }
 
@@ -243,10 +280,14 @@ export function linesTable(answer, pinned) {
     const k = pinned.waves.f.findIndex((at) => Math.abs(at - f) < 0.5);
     return k < 0 ? "–" : rounded(inQuantity(pinned.waves.f, pinned.wavesAt, answer.values.quantity)[k]);
   };
-  return `<thead><tr><th scope="col">Line</th><th scope="col">Hz</th><th scope="col">kernel, Pa</th><th scope="col">waves, ${
-    quantity.unit}</th>${pinned ? '<th scope="col" class="of-a">A</th>' : ""}<th scope="col" title="dB above the detection threshold">dB SL</th></tr></thead>
-    <tbody>${rows.map(({ name, f, pressure, motion, level }) => `<tr><th scope="row">${subscript(typeset(name)) || "–"}</th><td>${f.toFixed(1)}</td><td>${
-    rounded(pressure)}</td><td class="waves-ink">${rounded(quantity.per * motion)}</td>${pinned ? `<td class="of-a">${nearest(f)}</td>` : ""}<td>${
+  return `<thead><tr><th scope="col">Line</th><th scope="col">Hz</th><th scope="col">kernel, Pa</th><th
+    scope="col">waves, ${
+    quantity.unit}</th>${pinned ? '<th scope="col" class="of-a">A</th>'
+      : ""}<th scope="col" title="dB above the detection threshold">dB SL</th></tr></thead>
+    <tbody>${rows.map(({ name, f, pressure, motion, level }) =>
+      `<tr><th scope="row">${subscript(typeset(name)) || "–"}</th><td>${f.toFixed(1)}</td><td>${
+    rounded(pressure)}</td><td class="waves-ink">${rounded(quantity.per * motion)}</td>${pinned
+      ? `<td class="of-a">${nearest(f)}</td>` : ""}<td>${
     level === null ? "–" : signed(level)}</td></tr>`).join("")}</tbody>`;
 }
 
@@ -257,20 +298,26 @@ export function comparison(a, b) {
   if (a.body.title === b.body.title) {
     for (const key of a.body.keys ?? []) {
       const other = b.body.keys?.find((own) => own.key === key.key);
-      if (other && other.value !== key.value) rows.push([key.label, `${key.value} ${key.unit}`, `${other.value} ${other.unit}`, true]);
+      if (other && other.value !== key.value) rows.push([key.label, `${key.value} ${key.unit}`,
+        `${other.value} ${other.unit}`, true]);
     }
   }
   const levels = [a, b].map((own) => (own.body.is_skin ? `${signed(own.level?.dB)} dB` : "–"));
-  rows.push(["Level at the point", ...levels], ["Reach above threshold", ...[a, b].map((own) => (own.body.is_skin ? far(own.reach) : "–"))],
-    ["Outside the kernel's region", percent(a.share), percent(b.share)], ["Delay", delayed(a.delay), delayed(b.delay)]);
-  return `<table><thead><tr><th scope="col">Scene</th><th scope="col" class="of-a">A, pinned</th><th scope="col" class="waves-ink">B, shown</th></tr></thead>
-    <tbody>${rows.map(([name, own, other, set]) => `<tr${set ? ' class="different"' : ""}><th scope="row">${escaped(name)}</th><td>${
+  rows.push(["Level at the point", ...levels], ["Reach above threshold", ...[a, b].map((own) =>
+    (own.body.is_skin ? far(own.reach) : "–"))],
+    ["Outside the kernel's region", percent(a.share), percent(b.share)], ["Delay", delayed(a.delay),
+      delayed(b.delay)]);
+  return `<table><thead><tr><th scope="col">Scene</th><th scope="col" class="of-a">A, pinned</th><th
+    scope="col" class="waves-ink">B, shown</th></tr></thead>
+    <tbody>${rows.map(([name, own, other, set]) => `<tr${set ? ' class="different"'
+      : ""}><th scope="row">${escaped(name)}</th><td>${
     escaped(own)}</td><td>${escaped(other)}</td></tr>`).join("")}</tbody></table>`;
 }
 
 /** Points [[x, y]] in metre of each path of a load. */
 export function pathsOf(load) {
-  const own = load.path.shape === "joined" ? load.path.paths.map((path) => ({ speed: 1, sweep: "one_way", ...path })) : [load.path];
+  const own = load.path.shape === "joined" ? load.path.paths.map((path) => ({ speed: 1, sweep: "one_way",
+    ...path })) : [load.path];
   return own.map((path) => {
     const at = positionOf(path), count = path.shape === "circle" ? 90 : 180;
     return Array.from({ length: count + 1 }, (_, k) => at(Math.min(k / count, 1 - 1e-9)));

@@ -22,24 +22,24 @@ const seen = () => [...document.querySelectorAll(
 const figure = () => figureOf(seen(), getComputedStyle(document.documentElement).getPropertyValue("--card"));
 
 /**
- * Fill the menu of saves. `answer()` is what is shown, `view()` how, `writers` texts of files by kind:
- * [[heading, [[title, name, type, (answer, view) => text or bytes]]]].
+ * Fill the menu of saves. `answer()` is what is shown, `writers` texts of files by kind:
+ * [[heading, [[title, name, type, (answer) => text or bytes]]]].
  */
-export function offerSaves(menu, { answer, view, say, writers = [] }) {
+export function offerSaves(menu, { answer, say, writers }) {
   const own = ["Figure", [
     ["Maps and plots, SVG", "skinwave.svg", "image/svg+xml", () => figure().text],
     ["Maps and plots, PNG", "skinwave.png", "image/png", () => pngOf(figure())],
     ["Print or PDF", null, null, () => print()],
   ]];
   const groups = [own, ...writers], items = groups.flatMap(([, each]) => each);
-  menu.innerHTML = groups.map(([heading, each]) => `<h2>${heading}</h2>${each.map((item) => `<button type="button" data-save="${
-    items.indexOf(item)}">${item[0]}</button>`).join("")}`).join("");
+  const button = (item) => `<button type="button" data-save="${items.indexOf(item)}">${item[0]}</button>`;
+  menu.innerHTML = groups.map(([heading, each]) => `<h2>${heading}</h2>${each.map(button).join("")}`).join("");
   menu.addEventListener("click", async ({ target }) => {
     const item = items[target.dataset?.save];
     if (!item) return;
     const [title, name, type, write] = item;
     try {
-      const content = await write(answer(), view());
+      const content = await write(answer());
       if (!name) return;
       download(name, content, type);
       say(`${name} is saved.`);
@@ -51,7 +51,8 @@ export function offerSaves(menu, { answer, view, say, writers = [] }) {
 export function playSound({ waves, x, y, load }, button) {
   const end = () => { playing = null; button.setAttribute("aria-pressed", "false"); };
   if (playing) { playing.close(); end(); return; }
-  const context = playing = new AudioContext(), count = Math.ceil(RATE * Math.min(load.duration, LONGEST_SOUND));
+  const context = playing = new AudioContext();
+  const count = Math.ceil(RATE * Math.min(load.duration, LONGEST_SOUND));
   const motion = waves.waveform(x, y, Float64Array.from({ length: count }, (_, k) => k / RATE));
   const mean = motion.reduce((a, b) => a + b, 0) / count;
   const largest = motion.reduce((most, v) => Math.max(most, Math.abs(v - mean)), 0) || 1;

@@ -18,7 +18,7 @@ function compare(motion, at, lines) {
 
 /** Run all tests, one in each turn, and show their table; `bodyOf(name)`, `loadOf(values)`. */
 export async function runSelftest(data, bodyOf, loadOf) {
-  const dialog = document.getElementById("selftest"), head = document.getElementById("selftest-said");
+  const dialog = document.getElementById("selftest"), said = document.getElementById("selftest-said");
   if (!dialog.open) dialog.showModal();
   const rows = [];
   let largest = 0, failed = 0;
@@ -28,13 +28,17 @@ export async function runSelftest(data, bodyOf, loadOf) {
     const { error, f } = compare(motion, motion.at(own.x / 1e3, own.y / 1e3), lines);
     largest = Math.max(largest, error);
     if (!(error <= allowed)) failed++;
-    rows.push(`<tr><th scope="row">${escaped(bodyOf(body).title)}</th><td>${escaped(own.shape)}</td><td>${lines.length}</td><td>${
-      rounded(f)} Hz</td><td>${(100 * error).toFixed(2)} %</td><td>${(100 * allowed).toFixed(1)} %</td></tr>`);
-    head.textContent = `self-test: ${rows.length} of ${data.selftest.length}`;
+    const cells = [own.shape, lines.length, `${rounded(f)} Hz`, `${(100 * error).toFixed(2)} %`,
+      `${(100 * allowed).toFixed(1)} %`].map((text) => `<td>${escaped(text)}</td>`);
+    rows.push(`<tr><th scope="row">${escaped(bodyOf(body).title)}</th>${cells.join("")}</tr>`);
+    said.textContent = `self-test: ${rows.length} of ${data.selftest.length}`;
   }
-  head.textContent = rows.length ? `self-test: largest error ${(100 * largest).toFixed(2)} %` : "self-test: this file holds no test data";
-  head.dataset.error = largest;
-  document.getElementById("selftest-table").innerHTML = `<p>${rows.length - failed} of ${rows.length} Tactons agree with Python within the
-    stated error. The error is that of the worst line above −40 dB, relative to the line.</p><table><thead><tr><th>Body</th><th>path</th>
-    <th>lines</th><th>worst at</th><th>error</th><th>allowed</th></tr></thead><tbody>${rows.join("")}</tbody></table>`;
+  said.textContent = rows.length ? `self-test: largest error ${(100 * largest).toFixed(2)} %`
+    : "self-test: this file holds no test data";
+  said.dataset.error = largest;
+  document.getElementById("selftest-table").innerHTML =
+    `<p>${rows.length - failed} of ${rows.length} Tactons agree with Python within the stated error. The error
+      is that of the worst line above −40 dB, relative to the line.</p>
+    <table><thead><tr>${["Body", "path", "lines", "worst at", "error", "allowed"].map((head) => (
+      `<th scope="col">${head}</th>`)).join("")}</tr></thead><tbody>${rows.join("")}</tbody></table>`;
 }

@@ -6,9 +6,12 @@ async function post({ base, token }, name, body, { signal, headers = {} } = {}) 
   const answer = await fetch(`${base}api/${name}`, { method: "POST", body, signal,
     headers: { "X-Token": token, ...headers } }).catch((error) => {
     throw error.name === "AbortError" ? error
-      : new Error("The server does not answer. Start skinwave web again and open the address that it prints.");
+      : new Error("The server does not answer. Start skinwave web again and open its new address.");
   });
-  if (!answer.ok) throw new Error((await answer.json().catch(() => ({}))).error ?? `The server answered ${answer.status}.`);
+  if (!answer.ok) {
+    const { error } = await answer.json().catch(() => ({}));
+    throw new Error(error ?? `The server answered ${answer.status}.`);
+  }
   return answer;
 }
 
@@ -37,7 +40,9 @@ export async function requestBody(api, given, signal, told) {
 
 /** What the server makes of a file: of a "scene" {values, body}, of a "measurement" its record. */
 export async function sendFile(api, name, file) {
-  if (file.size > LARGEST_FILE) throw new Error(`${file.name}: ${(file.size / 1e6).toFixed(0)} MB exceed 20 MB.`);
+  if (file.size > LARGEST_FILE) {
+    throw new Error(`${file.name}: ${(file.size / 1e6).toFixed(0)} MB exceed 20 MB.`);
+  }
   const answer = await post(api, name, file, { headers: { "X-Name": encodeURIComponent(file.name) } });
   return answer.json();
 }
