@@ -35,7 +35,7 @@ extensions = [
     "elsewhere",  # links to files of the repository beside docs/
     "generated",  # pages from the code
     "docstrings",  # as numpydoc has them
-    "recorded",  # the page that moves
+    "live_page",  # the page that computes
 ]
 exclude_patterns = ["_build", "extension", "_templates", "gallery/*.py", "sg_execution_times.rst",
                     "gallery/sg_execution_times.rst"]  # fmt: skip

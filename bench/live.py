@@ -1,0 +1,101 @@
+"""Time of the live page in chromium: from a key to the pixels, and to a changed body.
+
+    python -m bench.live [COUNT] [BODY ...]     # by default 20 and skin-slab, paper-sheet
+
+A key moves a slider by a step. The time ends with the frame after the one that shows new tiles.
+"""
+
+import re
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+from statistics import median, quantiles
+from typing import Any
+
+from playwright.sync_api import sync_playwright
+
+from skinwave.live.data import data_of
+from skinwave.live.page import page
+from skinwave.live.serve import Server
+
+CHROMIUM = "/usr/bin/chromium"
+SLIDERS = ("AM frequency", "Drawing speed", "Size")
+# Milliseconds from a key until tiles have changed and are on the screen.
+KEY = """async ({ label, down }) => {
+  const named = (each) => (each.getAttribute("aria-label")
+    ?? each.labels?.[0]?.textContent ?? "").includes(label);
+  const slider = [...document.querySelectorAll("input[type=range]")].find(named);
+  const before = document.querySelector("#tiles").textContent, began = performance.now();
+  if (down) slider.stepDown(); else slider.stepUp();
+  slider.dispatchEvent(new Event("input", { bubbles: true }));
+  slider.dispatchEvent(new Event("change", { bubbles: true }));
+  const frame = () => new Promise(requestAnimationFrame);
+  const shown = () => document.querySelector("#spectrum").innerHTML;
+  const drawn = shown();
+  while (shown() === drawn && performance.now() - began < 5000) await frame();
+  await frame();
+  return performance.now() - began;
+}"""
+
+
+def line(name: str, times: list[float]) -> str:
+    """A row: median and 95 % of times in ms."""
+    high = quantiles(times, n=20)[-1] if len(times) > 1 else times[0]
+    return f"{name:<48}{median(times):8.0f} ms{high:8.0f} ms{len(times):6d}"
+
+
+def keys(tab: Any, count: int) -> dict[str, list[float]]:
+    """Times of keys on each slider."""
+    return {
+        label: [tab.evaluate(KEY, {"label": label, "down": k % 2 == 1}) for k in range(count)]
+        for label in SLIDERS
+    }
+
+
+def body_changes(tab: Any, count: int) -> list[float]:
+    """Times in ms from a change of the first modulus until the page is current again."""
+    tab.locator("summary", has_text="Layers").click()
+    slider = tab.get_by_role("slider", name=re.compile("modulus", re.IGNORECASE)).first
+    found = []
+    for k in range(count):
+        slider.focus()
+        began = time.perf_counter()
+        slider.press("ArrowLeft" if k % 2 else "ArrowRight")
+        tab.locator("#page.stale").wait_for()
+        tab.locator("#page:not(.stale)").wait_for()
+        found.append(1e3 * (time.perf_counter() - began))
+    return found
+
+
+def main() -> None:
+    """Measure and print."""
+    count = int(sys.argv[1]) if sys.argv[1:] else 20
+    bodies = sys.argv[2:] or ["skin-slab", "paper-sheet"]
+    print(f"{'':<48}{'median':>11}{'95 %':>11}{'of':>6}")
+    with sync_playwright() as driver, tempfile.TemporaryDirectory() as folder:
+        browser = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        for body in bodies:
+            data = data_of(bodies=[body], test=False)
+            file = Path(folder, f"{body}.html")
+            file.write_text(page(data), encoding="utf-8")
+            tab = browser.new_page(viewport={"width": 1280, "height": 800})
+            began = time.perf_counter()
+            tab.goto(file.as_uri())
+            tab.locator(".tile").first.wait_for()
+            print(line(f"{body}: page ready", [1e3 * (time.perf_counter() - began)]))
+            for label, times in keys(tab, count).items():
+                print(line(f"{body}: {label}, key to pixels", times))
+            with Server(data) as server:
+                threading.Thread(target=server.serve_forever, daemon=True).start()
+                tab.goto(server.address)
+                tab.locator(".tile").first.wait_for()
+                print(line(f"{body}: change of modulus", body_changes(tab, count // 2)))
+                server.shutdown()
+            tab.close()
+        browser.close()
+
+
+if __name__ == "__main__":
+    main()
