@@ -36,7 +36,7 @@ RANGES = {  # low, high, step
 TITLES = {
     "skin-slab": "Skin slab, 15 mm", "palm-layers": "Layered palm, 25 mm",
     "forearm-layers": "Layered forearm, 20 mm", "palm": "Palm, 15 mm on bone",
-    "fingertip": "Fingertip", "paper-sheet": "Paper sheet of the measurements",
+    "fingertip": "Fingertip", "paper-sheet": "Paper sheet, 0.13 mm",
     "paper-sheet-loose": "Loose paper sheet", "none": "No body",
 }  # fmt: skip
 
