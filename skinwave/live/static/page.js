@@ -10,11 +10,12 @@ import { drawingFrequency } from "./load.js";
 import { MAP_LEGEND, drawMap, mapControls } from "./maps.js";
 import { levelOver } from "./numbers.js";
 import { createPlot, escaped, keptScales, rounded } from "./plots.js";
-import { OVER, commandedPlot, comparison, difference, dispersionPlot, factorOf, fociAt, levelPlot, linesTable,
-  pathsOf, spanOf, spectrumPlot, tiles, waveformPlot } from "./results.js";
+import { OVER, commandedPlot, difference, dispersionPlot, factorOf, fociAt, levelPlot, pathsOf, spanOf,
+  spectrumPlot, waveformPlot } from "./results.js";
 import { offerSaves, playSound } from "./saving.js";
 import { runSelftest } from "./selftest.js";
 import { requestBody, sendFile } from "./server.js";
+import { comparison, linesTable, tiles } from "./tables.js";
 import { LABELS, STARTS, check, fitPaths, holdFrequency, loadOf, nameBodies } from "./values.js";
 import { openView } from "./view3d.js";
 
@@ -219,7 +220,7 @@ function showPane() {
     $("dispersion").classList.toggle("none", !plot);
     if (plot) plots.dispersion.draw(plot);
   } else if (view.tab === "level") {
-    if (levels) plots.level.draw(levelPlot(answer, view.over, levels, levels.best));
+    if (levels) plots.level.draw(levelPlot(answer, view.over, levels));
     $("best").disabled = !levels?.best;
   } else {
     $("ab").innerHTML = pinned ? comparison(pinned, answer) : `<p class="note">Press Pin A to keep what is
