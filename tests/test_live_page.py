@@ -2,7 +2,6 @@
 
 import json
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,9 +10,8 @@ from in_browser import needs_browser
 from skinwave.cli import main
 from skinwave.live.page import bundle, encoded, page, policy
 from skinwave.live.records import body_of, changed, editables, record_of, toml_of
-from skinwave.live.selftest import exact_lines, has_exact_lines, random_scene
 from skinwave.live.values import presets, values_of
-from skinwave.scene import BODIES, Body
+from skinwave.scene import BODIES
 from skinwave.scene_file import loads
 
 SCENE = """
@@ -188,16 +186,6 @@ def test_the_record_of_a_body_says_what_the_page_needs():
     branches = slab["dispersion"]["branches"]
     assert {len(branch["c"]) for branch in branches} == {len(slab["dispersion"]["f"])}
     assert any(3 < (branch["c"][-1] or 0) < 8 for branch in branches)
-
-
-def test_lines_of_the_self_test_are_those_of_the_model():
-    rng = np.random.default_rng(3)
-    for name in ("skin-slab", "paper-sheet"):
-        scene = random_scene(BODIES[name], rng)
-        assert has_exact_lines(scene)
-        f, amplitudes = exact_lines(scene)
-        assert f.shape == amplitudes.shape
-    assert not has_exact_lines(replace(scene, body=Body(kind="palm"), probes=((0.0, 0.0),)))
 
 
 # --- the command ------------------------------------------------------------------------------

@@ -5,8 +5,7 @@ waves, and the pack from which the page computes motion.
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
-from math import floor, inf, isclose, isfinite, log10, pi
+from math import isclose, isfinite, pi
 from typing import Any
 
 import numpy as np
@@ -28,6 +27,7 @@ MODES = 4
 DEEPEST = 0.04  # m that a page draws of a half-space
 SIDES = ("clamped", "absorbing", "free")
 SUPPORTS = ("clamped", "simply")
+MOUNTING = {"tension_x": "Tension along x", "tension_y": "Tension along y", "support": "Edges"}
 RANGES = {  # low, high, step
     "thickness": (0.05, 40.0, 0.05), "modulus": (0.5, 100.0, 0.5), "loss": (0.01, 2.0, 0.01),
     "sheet_thickness": (0.02, 1.0, 0.005), "young": (0.1, 12.0, 0.1),
@@ -40,17 +40,17 @@ TITLES = {
     "paper-sheet-loose": "Loose paper sheet", "none": "No body",
 }  # fmt: skip
 
-Change = Callable[[Body, Any], Body]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Editable:
-    """A number or choice of a body: how a page shows it, and the body with another value."""
+    """A number or choice of a body: how a page shows it, and a function of another value to the
+    body with it.
+    """
 
     key: str
     label: str
     value: Any
-    change: Change
+    change: Callable[[Any], Body]
     unit: str = ""
     range: tuple[float, float, float] = (0.0, 1.0, 0.01)
     choices: tuple[str, ...] = ()
@@ -59,12 +59,11 @@ class Editable:
         """Return the record for the page; a range that excludes the value is widened."""
         shown = {"key": self.key, "label": self.label, "unit": self.unit, "value": self.value}
         if self.choices:
-            return shown | {"choices": list(self.choices)}
+            return shown | {"choices": [*dict.fromkeys((*self.choices, self.value))]}
         low, high, step = self.range
-        return shown | {
-            "low": min(low, self.value), "high": max(high, _round_up(2 * self.value))
-            if self.value > high else high, "step": step,
-        }  # fmt: skip
+        if self.value > high:
+            high = float(f"{2 * self.value:.1g}")
+        return shown | {"low": min(low, self.value), "high": high, "step": step}
 
 
 def record_of(
@@ -152,162 +151,99 @@ def changed(body: Body, changes: Mapping[str, Any]) -> Body:
         if each.choices:
             if value not in each.choices:
                 raise ValueError(f"{key}: '{value}' is unknown. Use {', '.join(each.choices)}.")
-        elif isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+            body = each.change(value)
+            continue
+        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
             raise ValueError(f"{key} = {value!r} must be a number.")
-        same = isinstance(value, int | float) and isclose(value, each.value, rel_tol=SAME)
-        body = body if same or value == each.value else each.change(body, value)
+        if not isclose(value, each.value, rel_tol=SAME):
+            body = each.change(float(value))
     return body
 
 
 def editables(body: Body) -> list[Editable]:
-    """Return what a page may change of a body: of a sheet its thickness, material, tension and
-    support; of a solid its layers, density, base and sides.
+    """Return what a page may change of a body: its layers from the surface downwards, the density
+    of a single one, tension and support of a sheet, base and sides of a slab.
     """
     if not body.of_kind.discretise:
         return []
-    found = _of_sheet(body) if body.of_kind.is_plate else _of_solid(body)
-    if body.of_kind.is_layer and isfinite(body.depth):
-        found += [_choice("base", "Base", body.base, SIDES)]
-        if isinstance(body.sides, str):
-            found += [_choice("sides", "Sides", body.sides, SIDES)]
-    return found
-
-
-def _of_sheet(body: Body) -> list[Editable]:
-    found = [
-        Editable(
-            key="thickness", label="Thickness", unit="mm", value=_shown(1e3 * body.depth),
-            range=RANGES["sheet_thickness"],
-            change=lambda body, value: replace(body, depth=value / 1e3),
-        ),
-        Editable(
-            key="modulus", label="Young's modulus", unit="GPa",
-            value=_shown(body.solid.young / 1e9), range=RANGES["young"], change=_with_young,
-        ),
-        _loss("", "Loss factor", 0, body.solid),
-        _density(body),
-    ]  # fmt: skip
-    if body.sides != "clamped":
-        return found
-    for axis in "xy":
+    found = [each for number in range(len(body.layers) + 1) for each in _of_layer(body, number)]
+    if not body.layers:
         found.append(Editable(
-            key=f"tension_{axis}", label=f"Tension along {axis}", unit="N/m",
-            value=getattr(body.mounting, f"tension_{axis}"), range=RANGES["tension"],
-            change=partial(_with_mounting, f"tension_{axis}"),
+            key="density", label="Density", unit="kg/m\u00b3", value=_shown(body.solid.density),
+            range=RANGES["density"],
+            change=lambda value: replace(body, material=replace(body.solid, density=value)),
         ))  # fmt: skip
-    support = partial(_with_mounting, "support")
-    return [*found, _choice("support", "Edges", body.mounting.support, SUPPORTS, support)]
+    if body.of_kind.is_plate and body.sides == "clamped":
+        found += [_of_mounting(body, *each) for each in MOUNTING.items()]
+    if body.of_kind.is_layer and isfinite(body.depth):
+        found += [_support(body, name) for name in ("base", "sides")]
+    return [each for each in found if isinstance(each.value, str | float)]
 
 
-def _of_solid(body: Body) -> list[Editable]:
-    """Thickness, shear modulus and loss factor of each layer, from the surface downwards."""
-    found: list[Editable] = []
-    count = len(body.layers) + 1
-    for number in range(count):
-        material = body.layers[number].material if number < count - 1 else body.material
-        name = material if isinstance(material, str) else f"layer {number + 1}"
-        label = partial(_of_layer, name) if count > 1 else str
-        prefix, solid = f"layers.{number}." if count > 1 else "", solid_of(material)
-        thickness = _thickness(body, number)
-        if body.of_kind.is_bounded and isfinite(thickness):
-            found.append(Editable(
-                key=f"{prefix}thickness", label=label("Thickness"), unit="mm",
-                value=_shown(1e3 * thickness), range=RANGES["thickness"],
-                change=partial(_with_thickness, number),
-            ))  # fmt: skip
-        found += [
-            Editable(
-                key=f"{prefix}modulus", label=label("Shear modulus"), unit="kPa",
-                value=_shown(solid.shear_modulus / 1e3), range=RANGES["modulus"],
-                change=partial(_with_modulus, number),
-            ),
-            _loss(prefix, label("Loss factor"), number, solid),
-        ]  # fmt: skip
-    return [*found, *([_density(body)] if count == 1 else [])]
-
-
-def _loss(prefix: str, label: str, number: int, solid: Material) -> Editable:
-    return Editable(
-        key=f"{prefix}loss", label=f"{label} at {LOSS_AT:g} Hz", value=_shown(loss_factor(solid)),
-        range=RANGES["loss"], change=partial(_with_loss, number),
-    )  # fmt: skip
-
-
-def _density(body: Body) -> Editable:
-    return Editable(
-        key="density", label="Density", unit="kg/m³", value=_shown(body.solid.density),
-        range=RANGES["density"],
-        change=lambda body, value: replace(body, material=replace(body.solid, density=value)),
-    )  # fmt: skip
-
-
-def _choice(
-    key: str, label: str, value: str, choices: tuple[str, ...], change: Change | None = None
-) -> Editable:
-    return Editable(
-        key=key, label=label, value=value,
-        choices=choices if value in choices else (value, *choices),
-        change=change or (lambda body, given: replace(body, **{key: given})),
-    )  # fmt: skip
-
-
-def _of_layer(name: str, words: str) -> str:
-    return f"{name.capitalize()}: {words[:1].lower()}{words[1:]}"
-
-
-def _thickness(body: Body, number: int) -> float:
-    """Thickness in metre of a layer; the last is the body's own material."""
-    if number < len(body.layers):
-        return body.layers[number].thickness
-    return body.depth - sum(layer.thickness for layer in body.layers)
-
-
-def _with_thickness(number: int, body: Body, value: float) -> Body:
-    """The body with a thickness in mm of a layer; the layers below keep theirs."""
-    thickness = value / 1e3
-    depth = body.depth + thickness - _thickness(body, number)
-    layers = [
-        replace(layer, thickness=thickness) if k == number else layer
-        for k, layer in enumerate(body.layers)
-    ]
-    return replace(body, layers=tuple(layers), depth=depth)
-
-
-def _with_material(number: int, body: Body, change: Callable[[Material], Material]) -> Body:
-    if number == len(body.layers):
-        return replace(body, material=change(body.solid))
-    layers: list[Layer] = list(body.layers)
-    layers[number] = replace(layers[number], material=change(solid_of(layers[number].material)))
-    return replace(body, layers=tuple(layers))
-
-
-def _with_modulus(number: int, body: Body, value: float) -> Body:
-    """The body with a shear modulus in kPa of a layer, which keeps its loss factor."""
-    return _with_material(
-        number,
-        body,
-        lambda solid: solid.scaled(modulus=1e3 * _positive(value) / solid.shear_modulus),
+def _of_layer(body: Body, number: int) -> list[Editable]:
+    """Thickness, modulus and loss factor of a layer; a body's own material is its last."""
+    last, plate = number == len(body.layers), body.of_kind.is_plate
+    given = body.material if last else body.layers[number].material
+    above = sum(layer.thickness for layer in body.layers)
+    own = body.depth - above if last else body.layers[number].thickness
+    solid = solid_of(given)
+    modulus, words, unit, per = (
+        (solid.young, "Young's modulus", "GPa", 1e9)
+        if plate
+        else (solid.shear_modulus, "Shear modulus", "kPa", 1e3)
     )
 
+    def with_layer(thickness: float, material: str | Material) -> Body:
+        layers, depth = [*body.layers], body.depth + (thickness - own)
+        if last:
+            return replace(body, depth=depth, material=material)
+        layers[number] = Layer(thickness=thickness, material=material)
+        return replace(body, depth=depth, layers=tuple(layers))
 
-def _with_young(body: Body, value: float) -> Body:
-    return replace(
-        body, material=body.solid.scaled(modulus=1e9 * _positive(value) / body.solid.young)
-    )
+    def with_modulus(value: float) -> Body:
+        if not value > 0:
+            raise ValueError(f"A modulus of {value:g} {unit} is out of range. Give one above 0.")
+        return with_layer(own, solid.scaled(modulus=value * per / modulus))
+
+    def label(words: str) -> str:
+        name = given if isinstance(given, str) else f"layer {number + 1}"
+        return f"{name.capitalize()}: {words[:1].lower()}{words[1:]}" if body.layers else words
+
+    prefix = f"layers.{number}." if body.layers else ""
+    thickness = Editable(
+        key=f"{prefix}thickness", label=label("Thickness"), unit="mm", value=_shown(1e3 * own),
+        range=RANGES["sheet_thickness" if plate else "thickness"],
+        change=lambda value: with_layer(value / 1e3, given),
+    )  # fmt: skip
+    found = [thickness] if body.of_kind.is_bounded and isfinite(own) else []
+    return [
+        *found,
+        Editable(
+            key=f"{prefix}modulus", label=label(words), unit=unit, value=_shown(modulus / per),
+            range=RANGES["young" if plate else "modulus"], change=with_modulus,
+        ),
+        Editable(
+            key=f"{prefix}loss", label=f"{label('Loss factor')} at {LOSS_AT:g} Hz",
+            value=_shown(loss_factor(solid)), range=RANGES["loss"],
+            change=lambda value: with_layer(own, solid.scaled(loss=_loss_scale(solid, value))),
+        ),
+    ]  # fmt: skip
 
 
-def _with_loss(number: int, body: Body, value: float) -> Body:
-    return _with_material(number, body, lambda solid: solid.scaled(loss=_loss_scale(solid, value)))
+def _of_mounting(body: Body, name: str, label: str) -> Editable:
+    value = getattr(body.mounting, name)
+    return Editable(
+        key=name, label=label, value=value, range=RANGES["tension"],
+        unit="" if name == "support" else "N/m", choices=SUPPORTS if name == "support" else (),
+        change=lambda new: replace(body, mounting=replace(body.mounting, **{name: new})),
+    )  # fmt: skip
 
 
-def _with_mounting(name: str, body: Body, value: Any) -> Body:
-    return replace(body, mounting=replace(body.mounting, **{name: value}))
-
-
-def _positive(value: float) -> float:
-    if not value > 0:
-        raise ValueError(f"A modulus of {value:g} is out of range. Give one above 0.")
-    return value
+def _support(body: Body, name: str) -> Editable:
+    return Editable(
+        key=name, label=name.capitalize(), value=getattr(body, name), choices=SIDES,
+        change=lambda new: replace(body, **{name: new}),
+    )  # fmt: skip
 
 
 def loss_factor(solid: Material) -> float:
@@ -360,11 +296,3 @@ def dispersion_of(body: Body) -> dict[str, Any] | None:
 
 def _shown(value: float) -> float:
     return float(f"{value:.5g}")
-
-
-def _round_up(value: float) -> float:
-    """The next of 1, 2, 5, 10, ... at or above a value."""
-    if not 0 < value < inf:
-        return 1.0
-    ten = 10 ** floor(log10(value))
-    return next(float(ten * part) for part in (1, 2, 5, 10) if ten * part >= value * (1 - 1e-9))
