@@ -127,7 +127,8 @@ function showCurves() {
   showTiles();
   showPane();
   showSlot();
-  document.documentElement.dataset.took = (performance.now() - began).toFixed(1);
+  performance.clearMeasures("curves");
+  performance.measure("curves", { start: began });
   mapsDue ||= requestAnimationFrame(showMaps);
   clearTimeout(slowDue);
   levels = levels?.of === keyOfLevels() ? levels : null;
@@ -169,7 +170,8 @@ function drawMaps() {
   if (factorOf(topOfA, wavesTop) === 1) wavesTop = topOfA = Math.max(wavesTop, topOfA);
   if (at) {
     drawMap($("kernel-map"), { ...marks, path: pathsOf(at.load), foci: [], point: [at.x, at.y],
-      influenced: at.maps.kernel.rms, rms: at.maps.waves.rms, level: at.body.is_skin ? at.maps.waves.level : null, unit: "m", largest: topOfA,
+      influenced: at.maps.kernel.rms, rms: at.maps.waves.rms, level: at.body.is_skin ? at.maps.waves.level
+        : null, unit: "m", largest: topOfA,
       title: `A: ${short(at.body.title)}`, hatched: at.invalid });
   } else {
     const level = body.is_skin ? maps.kernel.level : null;

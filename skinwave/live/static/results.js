@@ -2,7 +2,7 @@
 
 import { inQuantity, lineName } from "./answer.js";
 import { drawingFrequency, gainAt, positionOf, relativeIntensity, rhythmLevel } from "./load.js";
-import { QUANTITIES, amplitudesOf, spectrum, thresholdAt } from "./numbers.js";
+import { QUANTITIES, amplitudesOf, meanLevel, spectrum, thresholdAt } from "./numbers.js";
 import { niceTop, rounded } from "./plots.js";
 import { signed } from "./tables.js";
 import { NUMBERS } from "./values.js";
@@ -132,11 +132,12 @@ function measuredSpectrum(measured, answer, per, highest) {
   return { x: f.slice(0, count), y: a.slice(0, count).map((v) => per * v) };
 }
 
-/** Plot of the spectra as stems side by side, with the detection threshold of skin. */
+/** Plot of the spectra as stems side by side, with the pauses of a rhythm, and the threshold of skin. */
 export function spectrumPlot(answer, { pinned, measured, highest, decibel, scale }) {
   const { kernel, published, waves, body, values: { quantity: name } } = answer, { unit, per, rate } =
     QUANTITIES[name];
-  const stems = (role, axis, title, f, amplitudes, offset, factor = 1) => {
+  const mean = meanLevel(answer.load);
+  const stems = (role, axis, title, f, amplitudes, offset, factor = mean) => {
     const kept = Array.from(f.keys()).filter((k) => f[k] <= highest);
     return { role, axis, name: title, stems: true, offset, head: axis === "y" ? "square" : "circle",
       x: kept.map((k) => f[k]), y: kept.map((k) => factor * amplitudes[k]) };
@@ -150,9 +151,9 @@ export function spectrumPlot(answer, { pinned, measured, highest, decibel, scale
     curves.push(stems("published", "y", "as published", published.f, amplitudes, -1.5 * wide));
   }
   if (pinned) {
-    const amplitudes = inQuantity(pinned.waves.f, pinned.wavesAt, name);
-    const factor = decibel ? 1 : factorOf(largestOf(amplitudes), largestOf(own.y));
-    curves.push(stems("pinned", "y2", nameOfA(factor), pinned.waves.f, amplitudes, 0, factor));
+    const moves = meanLevel(pinned.load), amplitudes = inQuantity(pinned.waves.f, pinned.wavesAt, name);
+    const factor = decibel ? 1 : factorOf(moves * largestOf(amplitudes), largestOf(own.y));
+    curves.push(stems("pinned", "y2", nameOfA(factor), pinned.waves.f, amplitudes, 0, factor * moves));
   }
   const axes = { y: { label: "Pa", role: "kernel" }, y2: { label: unit, role: "waves" } };
   for (const [axis, each] of Object.entries(axes)) {

@@ -1,7 +1,7 @@
 // The tiles and tables of an answer, as HTML.
 
 import { inQuantity, lineName, typeset } from "./answer.js";
-import { QUANTITIES, lineTable } from "./numbers.js";
+import { QUANTITIES, lineTable, meanLevel } from "./numbers.js";
 import { escaped, rounded } from "./plots.js";
 import { LABELS, STARTS, shown } from "./values.js";
 
@@ -17,7 +17,8 @@ const subscript = (name) => escaped(name).replace(/_(\w+)/g, "<sub>$1</sub>");
 /** A number of dB, whole and with its sign. */
 export function signed(value) {
   if (!Number.isFinite(value)) return NONE;
-  return `${value >= 0 ? "+" : "−"}${Math.abs(value).toFixed(0)}`;
+  const whole = Math.round(value);
+  return `${whole >= 0 ? "+" : "−"}${Math.abs(whole)}`;
 }
 
 /** The four numbers of an answer as text; those of the skin are none on another body. */
@@ -38,8 +39,9 @@ export function tiles(answer, pinned) {
   const skin = (text) => (body.is_skin ? text : "no threshold: not skin");
   return tile("level", "Level at the point", "Largest component over the detection threshold of skin",
     skin(line), `${signed(answer.kernelLevel?.dB)} dB`)
-    + tile("reach", "Reach above threshold", "Largest distance from the path at which a component is above threshold",
-      skin(reach ? "from the path" : ""), far(answer.kernelReach))
+    + tile("reach", "Reach above threshold",
+      "Largest distance from the path at which a component is above threshold", skin(reach ? "from the path"
+        : ""), far(answer.kernelReach))
     + tile("share", "Outside the kernel's region",
       "Share of the mean-square motion where the kernel is below −20 dB of its largest", "of the motion",
       percent(answer.kernelShare))
@@ -62,7 +64,7 @@ export function linesTable(answer, pinned) {
   const other = pinned && inQuantity(pinned.waves.f, pinned.wavesAt, name);
   const ofA = (f) => {
     const k = pinned.waves.f.findIndex((at) => Math.abs(at - f) < SAME_LINE);
-    return k < 0 ? NONE : rounded(other[k]);
+    return k < 0 ? NONE : rounded(meanLevel(pinned.load) * other[k]);
   };
   const columns = [["Line"], ["Hz"], ["kernel, Pa"], [`waves, ${unit}`, "waves-ink"], ...(pinned ? [["A",
     "of-a"]] : []),
