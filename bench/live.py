@@ -2,7 +2,7 @@
 
     python -m bench.live [COUNT] [BODY ...]     # by default 20 and skin-slab, paper-sheet
 
-A key moves a slider by a step. The time ends with the frame after the one that shows new tiles.
+A key moves a slider by a step. The time ends with the frame after the one with a new spectrum.
 """
 
 import re
@@ -22,18 +22,16 @@ from skinwave.live.serve import Server
 
 CHROMIUM = "/usr/bin/chromium"
 SLIDERS = ("AM frequency", "Drawing speed", "Size")
-# Milliseconds from a key until tiles have changed and are on the screen.
+# Milliseconds from a key until the spectrum has changed and is on the screen.
 KEY = """async ({ label, down }) => {
-  const named = (each) => (each.getAttribute("aria-label")
-    ?? each.labels?.[0]?.textContent ?? "").includes(label);
-  const slider = [...document.querySelectorAll("input[type=range]")].find(named);
-  const before = document.querySelector("#tiles").textContent, began = performance.now();
+  const slider = [...document.querySelectorAll("input[type=range]")].find((each) =>
+    (each.getAttribute("aria-label") ?? each.labels?.[0]?.textContent ?? "").includes(label));
+  const shown = () => document.querySelector("#spectrum").innerHTML;
+  const drawn = shown(), began = performance.now();
+  const frame = () => new Promise(requestAnimationFrame);
   if (down) slider.stepDown(); else slider.stepUp();
   slider.dispatchEvent(new Event("input", { bubbles: true }));
   slider.dispatchEvent(new Event("change", { bubbles: true }));
-  const frame = () => new Promise(requestAnimationFrame);
-  const shown = () => document.querySelector("#spectrum").innerHTML;
-  const drawn = shown();
   while (shown() === drawn && performance.now() - began < 5000) await frame();
   await frame();
   return performance.now() - began;
@@ -46,12 +44,21 @@ def line(name: str, times: list[float]) -> str:
     return f"{name:<48}{median(times):8.0f} ms{high:8.0f} ms{len(times):6d}"
 
 
-def keys(tab: Any, count: int) -> dict[str, list[float]]:
-    """Times of keys on each slider."""
-    return {
-        label: [tab.evaluate(KEY, {"label": label, "down": k % 2 == 1}) for k in range(count)]
-        for label in SLIDERS
-    }
+def keys(tab: Any, count: int) -> dict[str, tuple[list[float], float]]:
+    """Times of keys on each slider, and the CPU time in ms of the page's thread for each key."""
+    session = tab.context.new_cdp_session(tab)
+    session.send("Performance.enable", {"timeDomain": "threadTicks"})
+
+    def spent() -> float:
+        metrics = session.send("Performance.getMetrics")["metrics"]
+        return 1e3 * next(each["value"] for each in metrics if each["name"] == "TaskDuration")
+
+    found = {}
+    for label in SLIDERS:
+        before = spent()
+        times = [tab.evaluate(KEY, {"label": label, "down": k % 2 == 1}) for k in range(count)]
+        found[label] = times, (spent() - before) / count
+    return found
 
 
 def body_changes(tab: Any, count: int) -> list[float]:
@@ -85,8 +92,8 @@ def main() -> None:
             tab.goto(file.as_uri())
             tab.locator(".tile").first.wait_for()
             print(line(f"{body}: page ready", [1e3 * (time.perf_counter() - began)]))
-            for label, times in keys(tab, count).items():
-                print(line(f"{body}: {label}, key to pixels", times))
+            for label, (times, cpu) in keys(tab, count).items():
+                print(line(f"{body}: {label}, key to pixels", times), f"   CPU {cpu:.0f} ms")
             with Server(data) as server:
                 threading.Thread(target=server.serve_forever, daemon=True).start()
                 tab.goto(server.address)
