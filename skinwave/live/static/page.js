@@ -38,7 +38,7 @@ const scale = keptScales();
 let values = starts, answer = null, pinned = null, measured = null, history = null, controls = null;
 let frameDue = 0, mapsDue = 0, slowDue = 0, told = 0, moving = false;
 let levels = null, solid = null, solidOf = null;
-let playing = 0, clock = 0, stale = false, editing = null, notice = "", seenWarnings = [];
+let playing = 0, clock = 0, editing = null, notice = "", seenWarnings = [];
 
 const recordOf = (name) => data.bodies.find((body) => body.name === name) ?? data.bodies[0];
 
@@ -64,13 +64,25 @@ function change(key, value, settled) {
 /** Take values; `settled` ones are a step that can be undone. */
 function set(next, settled = true) {
   const other = next.body !== values.body;
-  values = next;
+  values = other ? { ...next, ...onBody(next) } : next;
   if (settled) {
     history.add(values);
     writeAddress();
   }
   if (other) showBody();
   ask();
+}
+
+/** The point, moved inside the body if it is outside. */
+function onBody({ body, x, y }) {
+  const [hx, hy] = recordOf(body).extent_mm ?? [Infinity, Infinity];
+  const within = (value, half) => Math.min(Math.max(value, -half), half);
+  return { x: within(x, hx), y: within(y, hy) };
+}
+
+/** Mark what a body shows as old while another is computed, or while the values have no answer. */
+function markOld() {
+  $("page").classList.toggle("stale", Boolean(editing) || errors.has("load"));
 }
 
 const ask = () => { frameDue ||= requestAnimationFrame(showCurves); };
@@ -109,8 +121,10 @@ function showCurves() {
   try {
     answer = { ...respond(values), invalid: answer?.body.name === values.body && answer.invalid };
     errors.delete("load");
+    markOld();
   } catch (error) {
     errors.set("load", error.message);
+    markOld();
     showSlot();
     controls.show(values, facts());
     return;
@@ -183,7 +197,7 @@ function drawMaps() {
       title: "Waves − kernel" }
     : { rms: maps.waves.rms, level: body.is_skin ? maps.waves.level : null, unit: "m", largest: wavesTop,
       title: at ? `B: ${short(body.title)}` : "Waves, RMS" };
-  drawMap($("wave-map"), { ...marks, ...waves, hatched: answer.invalid, stale });
+  drawMap($("wave-map"), { ...marks, ...waves, hatched: answer.invalid });
 }
 
 function showSolid() {
@@ -257,8 +271,6 @@ function showBody() {
   const body = recordOf(values.body);
   document.documentElement.dataset.kind = body.thickness_mm ? "sheet" : "solid";
   controls?.showBody(body);
-  stale = false;
-  $("page").classList.remove("stale");
 }
 
 // ---- time -----------------------------------------------------------------------------------------
@@ -314,14 +326,12 @@ async function edit(key, text) {
   Object.assign(changes, { [key]: value });
   editing?.abort();
   const own = editing = new AbortController();
-  stale = true;
-  $("page").classList.add("stale");
+  markOld();
   $("busy").hidden = false;
   const done = () => {
     editing = null;
-    stale = false;
     for (const each of Object.keys(changes)) delete changes[each];
-    $("page").classList.remove("stale");
+    markOld();
     $("busy").hidden = true;
     showSlot();
   };

@@ -12,7 +12,7 @@ const SAMPLES = 700, FINEST = 2.5e-4; // points of a curve at least; s between t
 const DENSE = 12, MOST = 6000; // points in a period of the fastest tone, and in all, of the signal
 const DYNAMIC = 60; // dB that a spectrum shows
 const APART = 3.5; // px between stems of the same line
-const NAMED = 7; // lines that have a name
+const NAMED = 7, NAMELESS = 0.02; // lines that have a name; of the tallest, below which they have none
 const FAR_APART = 10; // times that A and B differ, from where A is drawn by a factor
 const FLOOR = -40; // dB of the largest, which a difference of maps begins at
 const PRESSURE = { per: 1, rate: 0 };
@@ -172,7 +172,8 @@ export function spectrumPlot(answer, { pinned, measured, highest, decibel, scale
   const beside = (f) => given.y[given.x.findIndex((at) => Math.abs(at - f) < 1e-3)] ?? 0;
   const names = own.x.map((f, k) => ({ x: f, y: own.y[k], axis: "y2", text: lineName(answer, f),
     above: { y: beside(f), axis: "y" } }));
-  const named = names.filter(({ text }) => text).sort((a, b) => b.y - a.y).slice(0, NAMED);
+  const least = NAMELESS * largestOf(own.y);
+  const named = names.filter(({ text, y }) => text && y > least).sort((a, b) => b.y - a.y).slice(0, NAMED);
   if (decibel) toDecibel(axes, curves, named);
   return {
     label: "Spectrum at the point: lines of the kernel in Pa and of the waves, side by side",
