@@ -104,12 +104,13 @@ def inaccessible(folder: Path) -> Iterator[str]:
 
 def unmoved(page: Any, folder: Path) -> Iterator[str]:
     """Sentences on what does not follow a control of the live page, or differs from Python."""
-    page.goto((folder / "waves.html#selftest").as_uri().replace("%23", "#"))
+    address = (folder / "waves.html").as_uri()
+    page.goto(f"{address}#selftest")
     said = page.locator("#selftest-said", has_text="largest error")
     said.wait_for(timeout=120_000)
     if not float(said.get_attribute("data-error")) < 0.01:
         yield f"waves: {said.inner_text()}"
-    page.goto((folder / "waves.html").as_uri())
+    page.goto(f"{address}#x=10")
     page.reload()
     page.locator(".tile").first.wait_for()
     before = page.inner_text("#tiles")

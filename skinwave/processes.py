@@ -16,7 +16,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
@@ -221,15 +221,6 @@ def when_parent_ends(call: Callable[[], object]) -> None:
             call()
 
     threading.Thread(target=wait, daemon=True).start()
-
-
-def end_group(process: int) -> None:
-    """End a process by force, and all of its group if it leads one."""
-    number = getattr(signal, "SIGKILL", signal.SIGTERM)
-    for kill in (getattr(os, "killpg", os.kill), os.kill):
-        with suppress(OSError):  # no group of its own
-            kill(process, number)
-            return
 
 
 def stop(processes: "Iterable[BaseProcess]") -> None:
