@@ -57,9 +57,6 @@ def client():
     found.close()
 
 
-# --- who may use it ---------------------------------------------------------------------------
-
-
 def test_it_listens_on_this_machine_only(client):
     assert client.server.server_address[0] == "127.0.0.1"
     assert client.server.address.startswith("http://127.0.0.1:")
@@ -125,9 +122,6 @@ def test_a_prefix_that_is_no_path_is_refused(base):
         serve.Server(DATA, base=base)
 
 
-# --- what it answers --------------------------------------------------------------------------
-
-
 def test_a_changed_body_comes_after_its_progress(client):
     *phases, body, dispersion = client.change(modulus=40.0)
     assert {"phase", "fraction"} == set(phases[0])
@@ -178,47 +172,39 @@ def test_a_measurement_gives_curves_by_place(client):
 
 
 def test_newer_work_ends_older_work(client):
-    began, counted, ended = threading.Event(), threading.Event(), []
+    began, counted, said = threading.Event(), threading.Event(), []
 
     def older(check):
         began.set()
         assert counted.wait(60)
-        check()
+        with pytest.raises(serve.Superseded):
+            check()
+        said.append("older")
 
-    def ask():
-        try:
-            client.server.compute(older)
-        except serve.Superseded:
-            ended.append("older")
-
-    thread = threading.Thread(target=ask)
-    thread.start()
+    newer = [lambda check: said.append("newer")]
+    threads = [
+        threading.Thread(target=client.server.compute, args=each) for each in ([older], newer)
+    ]
+    threads[0].start()
     assert began.wait(60)
-    newer = threading.Thread(
-        target=client.server.compute, args=[lambda check: ended.append("newer")]
-    )
-    with client.server._counting:
-        newest = client.server._newest
-    newer.start()
+    newest = client.server._newest
+    threads[1].start()
     while client.server._newest == newest:  # until the newer one is counted
-        newer.join(0.01)
+        threads[1].join(0.01)
     counted.set()
-    for each in (thread, newer):
+    for each in threads:
         each.join(60)
-    assert ended == ["older", "newer"]
+    assert said == ["older", "newer"]
 
 
 def test_a_fault_is_said_here_and_not_there(client, monkeypatch, capsys):
-    def fails(name, content):
+    def fails(name, content, progress):
         raise KeyError("private")
 
     monkeypatch.setattr(serve, "scene_answer", fails)
     status, (line,) = client.post("/api/scene", b"")
     assert (status, line["error"]) == (500, serve.FAULT)
     assert capsys.readouterr().err == "skinwave: a request failed: KeyError: 'private'\n"
-
-
-# --- the command and the page -----------------------------------------------------------------
 
 
 def test_options_that_cannot_be_are_refused(client, capsys, tmp_path):

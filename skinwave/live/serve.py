@@ -153,49 +153,53 @@ class _Handler(BaseHTTPRequestHandler):
                 f"{int(length) / 1e6:.3g} MB exceed {LARGEST[kind] / 1e6:.3g} MB, the most that "
                 "the page may send. Use the command line.",
             )
-        content = self.rfile.read(int(length))
+        return self._answer(kind, self.rfile.read(int(length)))
+
+    def _answer(self, kind: str, content: bytes) -> None:
+        name = unquote(self.headers.get("X-Name", ""))
+        found: list[dict[str, Any]] = []
+
+        def work(check: Callable[[], None]) -> None:
+            found.append(scene_answer(name, content, lambda phase, fraction: check()))
+
         try:
             if kind == "body":
-                self._stream_body(content)
+                return self._stream_body(content)
+            if kind == "scene":
+                self.server.compute(work)
             else:
-                answer = scene_answer if kind == "scene" else measurement_answer
-                shown = answer(unquote(self.headers.get("X-Name", "")), content)
-                self._send(HTTPStatus.OK, _json(shown), "application/json")
-        except EXPECTED as error:
-            self._error(HTTPStatus.BAD_REQUEST, _sentence(error))
+                found.append(measurement_answer(name, content))
+            return self._send(HTTPStatus.OK, _json(found[0]), "application/json")
         except ConnectionError:
             raise
         except Exception as error:
-            say_fault(error)
-            self._error(HTTPStatus.INTERNAL_SERVER_ERROR, FAULT)
-        return None
+            return self._error(*_explained(error))
 
     def _stream_body(self, content: bytes) -> None:
         """Send lines of progress, then the body; an error is a line, too."""
         self._begin(HTTPStatus.OK, "application/x-ndjson", {})
 
-        def work(check: Callable[[], None]) -> None:
-            for line in body_lines(content, lambda phase, fraction: tell(phase, fraction, check)):
-                check()
-                self.wfile.write(_json(line) + b"\n")
-                self.wfile.flush()
-
-        def tell(phase: str, fraction: float, check: Callable[[], None]) -> None:
-            check()
-            self.wfile.write(_json({"phase": phase, "fraction": fraction}) + b"\n")
+        def send(line: dict[str, Any]) -> None:
+            self.wfile.write(_json(line) + b"\n")
             self.wfile.flush()
+
+        def work(check: Callable[[], None]) -> None:
+            def tell(phase: str, fraction: float) -> None:
+                check()
+                send({"phase": phase, "fraction": fraction})
+
+            for line in body_lines(content, tell):
+                check()
+                send(line)
 
         try:
             self.server.compute(work)
         except Superseded:
-            self.wfile.write(_json({"superseded": True}) + b"\n")
-        except EXPECTED as error:
-            self.wfile.write(_json({"error": _sentence(error)}) + b"\n")
+            send({"superseded": True})
         except ConnectionError:
             raise
         except Exception as error:
-            say_fault(error)
-            self.wfile.write(_json({"error": FAULT}) + b"\n")
+            send({"error": _explained(error)[1]})
 
     def _route(self, path: str) -> str | None:
         """Path below the base; a proxy may have removed the base from it."""
@@ -256,5 +260,12 @@ def _json(value: Any) -> bytes:
     return json.dumps(value, allow_nan=False, separators=(",", ":")).encode()
 
 
-def _sentence(error: BaseException) -> str:
-    return " ".join(str(error).split()) or "There is not enough memory. Use larger elements."
+def _explained(error: Exception) -> tuple[HTTPStatus, str]:
+    """Status and sentence of an error; a fault of the server is said in its terminal."""
+    if isinstance(error, Superseded):
+        return HTTPStatus.CONFLICT, "A newer request has come."
+    if isinstance(error, EXPECTED):
+        words = " ".join(str(error).split())
+        return HTTPStatus.BAD_REQUEST, words or "There is not enough memory. Use larger elements."
+    say_fault(error)
+    return HTTPStatus.INTERNAL_SERVER_ERROR, FAULT
