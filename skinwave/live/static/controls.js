@@ -3,179 +3,63 @@
 import { CHOICES, LABELS, NUMBERS, check, pulsesOf } from "./values.js";
 import { escaped } from "./plots.js";
 
-const HELP = {
-  body: "The body that the focus pushes. Its resonances and waves come from a finite-element or layered model.",
-  amplitude: "Share of full drive. With radiation pressure, half the drive is a quarter of the pressure.",
-  am: "Frequency of the amplitude modulation. 0 switches it off.",
-  am2: "Frequency of a second sinusoid, mixed with the first by the superposition ratio. 0 switches it off.",
-  ratio: "Weights of the first and the second sinusoid.",
-  envelope: "A slow sinusoid that multiplies the signal. It splits each line into two. 0 switches it off.",
-  duration: "Length of the Tacton. Lines closer than about 1/duration cannot be told apart.",
-  shape: "Path that the focus follows, again and again. A point does not move.",
-  size: "Diameter of a circle, side of a square or triangle, length of a line.",
-  speed: "Speed of the focus along its path. Waves add up if it is close to the speed of surface waves.",
-  hold: "Size, shape and speed then move together, so that the drawing frequency stays as it is.",
-  pulses: "On and off times in ms, repeated to the end of the Tacton, such as 100/50, 40/110.",
-  ramp: "Time that a pulse takes to rise and to fall.",
-  foci: "Several foci share the pressure: each gets 1/n.",
-  phases: "Where each focus starts, in per cent of the path. Empty means evenly spaced.",
-  own: "All foci follow one path, or each has its own.",
-  drawn: "How often each path is drawn per second.",
-  sweep: "How a line or a polyline is repeated.",
-  polyline: "Corners of the path in mm, such as 0/0, 10/0, 10/5.",
-  sharing: "How the device makes several foci. It changes device scripts, not this model's load.",
-  height: "Distance from the array to the focus. Far foci are wider and weaker.",
-  drive: "How the pressure on the skin follows from the drive. Radiation pressure goes with its square.",
-  profile: "Pressure across the focus.",
-  peak: "Pressure at the focus at full drive, 200 mm above the array. It is known to a factor of 2.",
-  modulation: "100 % modulates down to silence.",
-  published: "Also draws the point kernel as published: linear drive and main lobe.",
-  x: "Where waveform, spectrum and lines are read. Click a map or use its arrow keys.",
-  y: "Where waveform, spectrum and lines are read. Click a map or use its arrow keys.",
-  quantity: "What the plots show at the point.",
-  scene: "A scene file (TOML) sets the body and all controls.",
-  measurement: "A CSV file: time or frequency in the first column. It is drawn over the waves.",
-};
-const SHORT = {
-  am: "AM", am2: "Second AM", envelope: "Envelope", ratio: "Mix", shape: "Shape", speed: "Speed",
-  drawn: "Drawn", height: "Height", drive: "Drive law", profile: "Profile", foci: "Foci",
-  modulation: "Modulation", peak: "Peak pressure", quantity: "Quantity", sharing: "Made",
-  pulses: "On/off, ms", phases: "Phases, %", polyline: "Corners, mm", sweep: "Sweep",
-};
 const WORDS = {
   there_and_back: "there and back", one_way: "one way, then jump", sinusoidal: "sinusoidal",
   linear: "linear, as published", pressure_squared: "pressure squared", force_corrected: "force corrected",
   gaussian: "Gaussian, as the array's", main_lobe: "main lobe, as published",
   simultaneous: "all at once", time_multiplexed: "in turn",
 };
-const ICONS = {
-  point: "M12 12h.01", line: "M4 12h16", circle: "M12 4a8 8 0 1 0 .01 0z", triangle: "M12 4L3.5 19h17z",
-  square: "M5 5h14v14H5z", polyline: "M4 18L9 7l5 8 6-10",
-};
-const WIDE = new Set(["pulses", "phases", "polyline"]);
+const NAMED = ["point", "line", "circle", "triangle", "square"]; // shapes of a focus's own path
+const STRIP = 124; // px of a period of the rhythm, of which two are drawn
 
-const labelOf = (key) => SHORT[key] ?? LABELS[key];
-const fullLabel = (key) => (NUMBERS[key]?.unit ? `${LABELS[key]}, ${NUMBERS[key].unit}` : LABELS[key]);
-const question = (key, label) => `<button type="button" class="help" data-help="${key}"
-  aria-label="Help: ${escaped(label)}">?</button>`;
-const head = (key, target) => `<span class="head"><label for="${target}" title="${escaped(HELP[key])}">${
-  escaped(labelOf(key))}</label>${question(key, LABELS[key] ?? key)}</span>`;
-
-function numberRow(key) {
-  const { low, high, step, unit } = NUMBERS[key];
-  return `<div class="row" data-row="${key}">${head(key, `${key}-field`)}
-    <input type="range" id="${key}" data-key="${key}" min="${low}" max="${high}" step="${step}"
-      aria-label="${escaped(fullLabel(key))}">
-    <input class="field" id="${key}-field" data-field="${key}" inputmode="decimal" autocomplete="off"
-      aria-describedby="problem"><span class="unit">${unit}</span></div>`;
-}
-
-function choiceRow(key, words = (value) => WORDS[value] ?? value) {
-  const options = CHOICES[key].map((value) =>
-    `<option value="${escaped(value)}">${escaped(words(value))}</option>`);
-  return `<div class="row wide" data-row="${key}">${head(key, key)}
-    <select id="${key}" data-key="${key}">${options.join("")}</select></div>`;
-}
-
-const textRow = (key) => `<div class="row wide" data-row="${key}">${head(key, `${key}-field`)}
-  <input class="field" id="${key}-field" data-field="${key}" autocomplete="off" spellcheck="false"
-    aria-describedby="problem"></div>`;
-
-function shapeRow() {
-  const each = Object.entries(ICONS).map(([name, path]) => `<label title="${name}"><input type="radio"
-    name="shape" value="${name}" data-key="shape" aria-label="${name}"><svg viewBox="0 0 24 24"
-    aria-hidden="true"><path d="${path}"/></svg></label>`);
-  return `<div class="row wide" data-row="shape"><span class="head"><span id="shape-name"
-    title="${HELP.shape}">Shape</span>${
-    question("shape", LABELS.shape)}</span>
-    <span class="shapes" role="radiogroup" aria-labelledby="shape-name">${each.join("")}</span></div>`;
-}
-
-const section = (id, title, body, note = "") => `<details name="more" id="${id}"><summary>${title}
-  <span class="digest" id="${id}-digest"></span></summary><div class="inside">${body}${
-  note ? `<p class="note">${note}</p>` : ""}</div></details>`;
+const options = (values, words, chosen) => values.map((value) => `<option value="${escaped(value)}"${
+  value === chosen ? " selected" : ""}>${escaped(words(value))}</option>`).join("");
 
 /** HTML of a body's keys: editable with a server, otherwise as they are. */
 function bodyKeys(body, editable) {
   const rows = (body.keys ?? []).map(({ key, label, unit, value, low, high, step, choices }) => {
-    const name = `<span class="head"><label for="key-${key}"
-      title="${escaped(label)}">${escaped(label)}</label></span>`;
-    if (!editable) return `<div class="fact"><span>${escaped(label)}</span><b>${escaped(value)}
-      ${escaped(unit)}</b></div>`;
+    const [name, of] = [label, unit].map(escaped);
+    if (!editable) return `<div class="fact"><span>${name}</span><b>${escaped(value)} ${of}</b></div>`;
+    const head = `<span class="head"><label for="key-${key}" title="${name}">${name}</label></span>`;
     if (choices) {
-      return `<div class="row wide">${name}<select id="key-${key}"
-        data-body="${key}">${choices.map((each) => `<option${
-        each === value ? " selected" : ""}>${escaped(each)}</option>`).join("")}</select></div>`;
+      return `<div class="row wide">${head}<select id="key-${key}" data-body="${key}">${
+        options(choices, (text) => text, value)}</select></div>`;
     }
-    return `<div class="row">${name}<input type="range" data-body="${key}" min="${low}" max="${high}"
-      step="${step}"
-      value="${value}" aria-label="${escaped(label)}, ${escaped(unit)}"><input class="field" id="key-${key}"
-      data-body="${key}" value="${Number(value.toPrecision(4))}" inputmode="decimal"
-        autocomplete="off"><span class="unit">${escaped(unit)}</span></div>`;
+    return `<div class="row">${head}<input type="range" data-body="${key}" min="${low}" max="${high}"
+      step="${step}" value="${value}" aria-label="${name}, ${of}"><input class="field" id="key-${key}"
+      data-body="${key}" value="${Number(value.toPrecision(4))}" inputmode="decimal" autocomplete="off">
+      <span class="unit">${of}</span></div>`;
   });
   return rows.join("") || '<p class="note">This body has no values to change.</p>';
 }
 
 /**
- * Build the controls inside an element.
+ * Make the controls inside an element work.
  *
  * `change(key, value, settled)` receives each valid value, `refuse(key, sentence)` what was typed wrong
- * (an empty sentence once it is right), `moving(on)` whether a slider is held. Returns
- * { show(values, facts), showBody(body), popover }.
+ * (an empty sentence once it is right), `moving(on)` whether a slider is held, `edit(key, text)` a value of
+ * the body. Returns functions that show values, bodies and help.
  */
 export function buildControls(host, { bodies, editable, change, refuse, moving, edit, hold, published }) {
-  host.innerHTML = [
-    choiceRow("body", (name) => bodies.find((body) => body.name === name)?.title ?? name),
-    ...["amplitude", "am", "am2"].map(numberRow), choiceRow("ratio"), ...["envelope",
-      "duration"].map(numberRow),
-    shapeRow(), numberRow("size"), numberRow("speed"),
-    `<div class="row wide"><span class="head"><span>Drawn</span>${question("hold",
-      "Keep the drawing frequency")}</span>
-      <span class="pair"><output id="drawing">–</output><label><input type="checkbox" id="hold">
-        keep</label></span></div>`,
-    '<div class="more">',
-    section("rhythm", "Rhythm", `<svg id="strip" viewBox="0 0 248 40" role="img" aria-label="Pulses"></svg>${
-      textRow("pulses")}${numberRow("ramp")}<div class="buttons"><button type="button" id="pulse-add">Add a
-        pulse</button>
-      <button type="button" id="pulse-remove">Remove the last</button></div>`),
-    section("foci-more", "Path and foci", `${numberRow("foci")}
-      <div class="row wide"><span class="head"><span id="own-name">Paths</span>${question("own",
-        "Paths of the foci")}</span>
-      <span class="pair" role="radiogroup" aria-labelledby="own-name"><label><input type="radio" name="own"
-        value=""> one</label>
-      <label><input type="radio" name="own" value="own"> one each</label></span></div>
-      <div id="one-path">${textRow("phases")}${choiceRow("sweep")}${textRow("polyline")}</div>
-      <div id="own-paths" hidden>${numberRow("drawn")}<table><thead><tr><th>#</th><th>shape</th><th>size</th><th>x</th>
-      <th>y, mm</th></tr></thead><tbody></tbody></table></div>${choiceRow("sharing")}`),
-    section("focus", "Focus and drive", `${["height", "peak", "modulation"].map(numberRow).join("")}
-      ${choiceRow("drive")}${choiceRow("profile")}<div class="row wide"><span
-        class="head"><span>Kernel</span>${
-        question("published", "Kernel as published")}</span><label class="pair"><input type="checkbox"
-          id="published">
-        as published, too</label></div>`),
-    section("body-more", "Layers", '<div id="keys"></div>', editable
-      ? "Moving a value computes the body again. The old result is pale meanwhile."
-      : "This file holds finished bodies. Run <code>skinwave web</code> to change their values."),
-    section("point-more", "Point", `${numberRow("x")}${numberRow("y")}${choiceRow("quantity")}`),
-    section("files", "Files", `${editable ? `<div class="row wide"><span class="head"><label
-      for="scene">Scene</label>${
-      question("scene", "Open a scene")}</span><input type="file" id="scene" accept=".toml"></div>` : ""}
-      <div class="row wide"><span class="head"><label for="measurement">Measurement</label>${
-      question("measurement", "Show a measurement")}</span><input type="file" id="measurement"></div>
-      <p class="note" id="measured">${editable ? "CSV, .npz, .wav, .mat or Universal File." : "CSV file."}
-      Or drop it onto the plots.</p><div class="buttons"><button type="button" id="measured-clear"
-        hidden>Remove the
-      measurement</button></div>`),
-    "</div>",
-    '<div id="popover" popover role="note"></div>',
-  ].join("");
   const $ = (id) => host.querySelector(`#${id}`), all = (selector) => [...host.querySelectorAll(selector)];
   let values = {};
+
+  for (const input of all("input[data-key][type=range]")) {
+    const { low, high, step, unit } = NUMBERS[input.dataset.key], label = LABELS[input.dataset.key];
+    Object.assign(input, { min: low, max: high, step, ariaLabel: unit ? `${label}, ${unit}` : label });
+    input.parentNode.querySelector(".unit").textContent = unit;
+  }
+  for (const select of all("select[data-key]")) {
+    select.innerHTML = options(CHOICES[select.dataset.key], (value) => WORDS[value] ?? value);
+  }
+  for (const part of all(editable ? "[data-file]" : "[data-served]")) part.remove();
+  showBodies(bodies);
 
   function take(key, text, settled) {
     try {
       const value = check(key, text);
       refuse(key, "");
+      values = { ...values, [key]: value };
       change(key, value, settled);
     } catch (error) {
       refuse(key, error.message);
@@ -185,7 +69,7 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
   host.addEventListener("input", ({ target }) => {
     const { key, field, body } = target.dataset;
     if (key && target.type === "range") { moving(true); take(key, target.value, false); }
-    else if (field && !WIDE.has(field)) take(field, target.value, false);
+    else if (field && !("whole" in target.dataset)) take(field, target.value, false);
     else if (body && target.type === "range") target.nextElementSibling.value = target.value;
   });
   host.addEventListener("change", ({ target }) => {
@@ -215,12 +99,10 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
     take(key, String(next), true);
   });
   host.addEventListener("click", ({ target }) => {
-    const key = target.dataset?.help;
-    if (key) explain(target, HELP[key]);
-    else if (target.id === "pulse-add") take("pulses", [values.pulses,
-      "100/100"].filter(Boolean).join(", "), true);
-    else if (target.id === "pulse-remove") take("pulses", values.pulses.split(",").slice(0, -1).join(","),
-      true);
+    const pulses = values.pulses?.split(",").filter(Boolean) ?? [];
+    if (target.classList.contains("help")) explain(target, target.previousElementSibling.title);
+    else if (target.id === "pulse-add") take("pulses", [...pulses, "100/100"].join(","), true);
+    else if (target.id === "pulse-remove") take("pulses", pulses.slice(0, -1).join(","), true);
   });
 
   function explain(button, text) {
@@ -233,23 +115,27 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
 
   const startPaths = () => {
     const size = values.shape === "point" ? 0 : Math.min(values.size, 30);
-    const shape = ["polyline"].includes(values.shape) ? "circle" : values.shape;
+    const shape = values.shape === "polyline" ? "circle" : values.shape;
     return values.foci > 1 ? `${shape}/${size}/-20/0, ${shape}/${size}/20/0` : `${shape}/${size}/0/0`;
   };
-  const takePaths = () => take("paths", all("#own-paths tbody tr").map((row) => [...row.querySelectorAll(
-    "select, input")].map((input) => input.value.trim()).join("/")).join(", "), true);
+  const takePaths = () => {
+    const texts = all("#own-paths tbody tr").map((row) => [...row.querySelectorAll("select, input")]
+      .map((input) => input.value.trim()).join("/"));
+    take("paths", texts.join(", "), true);
+  };
 
   function showPaths(text) {
-    const rows = text.split(",").map((part) => part.trim().split("/")).filter((row) => row.length === 4);
     const body = host.querySelector("#own-paths tbody");
     if (body.dataset.text === text) return;
     body.dataset.text = text;
-    body.innerHTML = rows.map((row, k) => `<tr><th scope="row">${k + 1}</th><td><select data-own="1"
-      aria-label="Shape of path ${k + 1}">${Object.keys(ICONS).slice(0, 5).map((name) => `<option${
-      name === row[0] ? " selected" : ""}>${name}</option>`).join("")}</select></td>${row.slice(1).map((value, j) => `
-      <td><input data-own="1" inputmode="decimal" value="${escaped(value)}" aria-label="${["Size", "x",
-        "y"][j]} of path ${
-      k + 1}, mm"></td>`).join("")}</tr>`).join("");
+    const field = (name, value, k) => `<td><input data-own="1" inputmode="decimal" value="${escaped(value)}"
+      aria-label="${name} of path ${k + 1}, mm"></td>`;
+    body.innerHTML = text.split(",").map((part, k) => {
+      const [shape, size, x, y] = part.trim().split("/");
+      return `<tr><th scope="row">${k + 1}</th><td><select data-own="1" aria-label="Shape of path ${k + 1}">${
+        options(NAMED, (name) => name, shape)}</select></td>${field("Size", size, k)}${field("x", x, k)}${
+        field("y", y, k)}</tr>`;
+    }).join("");
   }
 
   /** The pulses over two periods of the rhythm. */
@@ -260,21 +146,23 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
     const period = pulses.reduce((sum, [on, gap]) => sum + on + gap, 0);
     strip.setAttribute("aria-label", period ? `Pulses, repeated every ${Math.round(1e3 * period)} ms`
       : "No pulses: always on");
+    const said = (text) => `<text x="${STRIP}" y="38" text-anchor="middle">${text}</text>`;
     if (!period) {
-      strip.innerHTML = '<rect class="block" x="0" y="4" width="248" height="22"/><text x="124" y="38" text-anchor="middle">always on</text>';
+      strip.innerHTML = `<rect class="block" x="0" y="4" width="${2 * STRIP}"
+        height="22"/>${said("always on")}`;
       return;
     }
-    const scale = 124 / period, parts = [];
+    const scale = STRIP / period, parts = [];
     for (let start = 0, turn = 0; turn < 2; turn++) {
       for (const [on, gap] of pulses) {
-        const r = Math.min(values.ramp / 1e3, on / 2), [a, b] = [start * scale, (start + on) * scale];
+        const r = scale * Math.min(values.ramp / 1e3, on / 2), a = scale * start, b = scale * (start + on);
         parts.push(`<polygon class="block${turn ? " again" : ""}" points="${a},26 ${a
-          + r * scale},4 ${b - r * scale},4 ${b},26"/>`);
+          + r},4 ${b - r},4 ${b},26"/>`);
         start += on + gap;
       }
     }
-    strip.innerHTML = `${parts.join("")}<path class="axis" d="M0,26H248M124,2V30"/><text x="124" y="38"
-      text-anchor="middle">${Math.round(1e3 * period)} ms, repeated</text>`;
+    strip.innerHTML = `${parts.join("")}<path class="axis" d="M0,26H${2 * STRIP}M${STRIP},2V30"/>${
+      said(`${Math.round(1e3 * period)} ms, repeated`)}`;
   }
 
   const fieldText = (key, value) => (key in NUMBERS ? String(Number(Number(value).toPrecision(6))) : value);
@@ -293,8 +181,8 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
         if (input !== document.activeElement) input.value = fieldText(key, values[key]);
       }
       const still = values.shape === "point" || Boolean(values.paths);
-      for (const key of ["size", "speed"]) toggle(key, still || (key === "size"
-        && values.shape === "polyline"));
+      toggle("size", still || values.shape === "polyline");
+      toggle("speed", still);
       toggle("phases", values.foci < 2);
       toggle("sweep", !["line", "polyline"].includes(values.shape));
       toggle("polyline", values.shape !== "polyline");
@@ -307,19 +195,15 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
       showRhythm();
       $("drawing").textContent = facts.drawing ? `${facts.drawing.toFixed(1)} Hz` : "does not move";
       $("hold").checked = facts.held;
+      const at = ["x", "y"].map((axis) => fieldText(axis, values[axis]));
       const digest = {
         rhythm: values.pulses || "always on", "foci-more": values.foci > 1 ? `${values.foci} foci`
           : "one focus",
-        focus: `${values.height} mm, ${WORDS[values.drive]}`, "point-more": `${fieldText("x", values.x)}, ${
-          fieldText("y", values.y)} mm`,
+        focus: `${values.height} mm, ${WORDS[values.drive]}`, "point-more": `${at.join(", ")} mm`,
       };
       for (const [id, text] of Object.entries(digest)) $(`${id}-digest`).textContent = text;
     },
-    showBodies(own) {
-      $("body").innerHTML = own.map(({ name, title }) =>
-        `<option value="${escaped(name)}">${escaped(title)}</option>`).join("");
-      $("body").value = values.body;
-    },
+    showBodies,
     showBody(body) {
       const focused = document.activeElement?.dataset?.body, kind = document.activeElement?.type;
       $("keys").innerHTML = bodyKeys(body, editable);
@@ -332,6 +216,11 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
     },
     explain,
   };
+
+  function showBodies(own) {
+    $("body").innerHTML = options(own.map(({ name }) => name),
+      (name) => own.find((body) => body.name === name).title, values.body);
+  }
 
   function toggle(key, off) {
     for (const input of all(`[data-row="${key}"] :is(input, select)`)) input.disabled = off;
