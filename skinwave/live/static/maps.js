@@ -54,9 +54,8 @@ function between(grid, k, n, a, b) {
   return value === value ? value : besideEdge(grid, k, n, a, b);
 }
 
-/** Mean of those of four corners that are on the body, NaN if the nearest is not. */
+/** Mean of those of four corners that are on the body, NaN if they weigh less than a half. */
 function besideEdge(grid, k, n, a, b) {
-  if (Number.isNaN(grid[k + (a > 0.5) + n * (b > 0.5)])) return NaN;
   let sum = 0, weights = 0;
   const parts = [(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b];
   [k, k + 1, k + n, k + n + 1].forEach((corner, c) => {
@@ -64,7 +63,7 @@ function besideEdge(grid, k, n, a, b) {
     sum += parts[c] * grid[corner];
     weights += parts[c];
   });
-  return sum / weights;
+  return weights < 0.5 ? NaN : sum / weights;
 }
 
 /** The colours of a scale, left to right. */
