@@ -126,7 +126,7 @@ def test_a_changed_body_comes_after_its_progress(client):
     *phases, body, dispersion = client.change(modulus=40.0)
     assert {"phase", "fraction"} == set(phases[0])
     record = body["body"]
-    assert (record["name"], record["title"], record["dispersion"]) == ("own", "Own", None)
+    assert (record["name"], record["title"], record["dispersion"]) == ("own", "Own, changed", None)
     assert next(key["value"] for key in record["keys"] if key["key"] == "modulus") == 40
     assert body_of(record["toml"]).solid.shear_modulus == pytest.approx(40e3)
     assert record["pack"]["kind"] == "radial"

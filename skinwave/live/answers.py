@@ -38,6 +38,8 @@ def body_lines(content: bytes, progress: Progress) -> Iterator[dict[str, Any]]:
     body = changed(body_of(_text(given, "toml")), _table(given, "changes"))
     pack = pack_of(body, progress)
     name, title = _text(given, "name"), _text(given, "title")
+    if title and given.get("changes"):
+        title = f"{title.partition(',')[0]}, changed"  # whatever size it has named
     yield {"body": record_of(body, pack, name, title, waves=False)}
     yield {"dispersion": dispersion_of(body)}
 
