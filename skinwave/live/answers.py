@@ -12,7 +12,7 @@ from skinwave.effort import Progress, silent
 from skinwave.live.packs import pack_of
 from skinwave.live.records import body_of, changed, dispersion_of, record_of
 from skinwave.live.values import values_of
-from skinwave.scene import Body, body_name
+from skinwave.scene import BODIES
 
 MOST_VALUES = 2_000_000  # of a measurement that is sent to a page
 
@@ -58,7 +58,8 @@ def scene_answer(name: str, content: bytes, progress: Progress = silent) -> dict
         scene = loads(content.decode("utf-8"))
     except UnicodeDecodeError:
         raise ValueError(f"{name or 'The file'} is not UTF-8 text. Give a scene file.") from None
-    own = _name_of(scene.body)
+    known = (name for name, body in BODIES.items() if body == scene.body)
+    own = next(known, f"own-{scene.body.kind}")
     values = values_of(scene, own)
     return {"values": values, "body": record_of(scene.body, pack_of(scene.body, progress), own)}
 
@@ -100,11 +101,6 @@ def measurement_answer(name: str, content: bytes) -> dict[str, Any]:
         return curves | {"frequencies": found.frequencies.tolist(), "amplitudes": amplitudes}
     times = found.times - found.times[0]
     return curves | {"times": times.tolist(), "values": mean.real.T.tolist()}
-
-
-def _name_of(body: Body) -> str:
-    name = body_name(body)
-    return name if name != body.kind else f"own-{name}"
 
 
 def _object(content: bytes) -> dict[str, Any]:
