@@ -26,6 +26,8 @@ const all = (selector) => [...document.querySelectorAll(selector)];
 const SPANS = { auto: "automatic", "first 20 ms": "first 20 ms", "first 60 ms": "first 60 ms",
   "last 60 ms": "last 60 ms", "one rhythm": "one rhythm", "whole Tacton": "all" };
 const PLAYED = 3.5; // s that a period takes when played
+const TURN = 30; // ms of slow work, between which the page draws
+const VALUES = 48, REFINED = 1e-3; // of a control; of its range, to which the highest level is refined
 const QUIET = 300; // ms without a move, after which slow results are computed
 
 const opened = new Map(); // bodies by name
@@ -247,24 +249,55 @@ function showPane() {
 const keyOfLevels = () => JSON.stringify({ ...values, [view.over]: 0, over: view.over,
   made: answer?.body.made });
 
-/** Levels over a control in short turns, so that the page stays alive. */
-function computeLevels() {
-  const key = view.over, of = keyOfLevels(), base = values;
-  const steps = levelOver((value) => {
+/** Levels over a control, refined about the highest, in short turns so that the page stays alive. */
+async function computeLevels() {
+  const key = view.over, [low, high] = OVER[key], of = keyOfLevels(), base = values;
+  const found = levels = { of, x: [], kernel: [], waves: [], best: null };
+  const lead = answer.body.is_skin ? "waves" : "kernel";
+  let until = performance.now() + TURN;
+  const levelsAt = async (value) => {
+    if (performance.now() > until) {
+      showPane();
+      await new Promise((resolve) => setTimeout(resolve));
+      until = performance.now() + TURN;
+    }
+    if (levels !== found) throw new Error("Another control has moved.");
     const own = respond({ ...base, [key]: value });
     return { kernel: own.kernelLevel?.dB ?? NaN, waves: own.level?.dB ?? NaN };
-  }, OVER[key], { of: answer.body.is_skin ? "waves" : "kernel" });
-  const turn = () => {
-    if (of !== keyOfLevels() || view.tab !== "level") return;
-    let step = null;
-    for (const until = performance.now() + 30; !step?.done && performance.now() < until;) {
-      step = steps.next();
-      if (step.value) levels = { of, ...step.value };
-    }
-    showPane();
-    if (!step.done) slowDue = setTimeout(turn, 0);
   };
-  turn();
+  try {
+    for (let k = 0; k <= VALUES; k++) {
+      const value = low + (high - low) * k / VALUES;
+      try {
+        loadOf({ ...base, [key]: value }, recordOf(base.body));
+      } catch { continue; } // a path that leaves the body
+      const own = await levelsAt(value);
+      found.x.push(value);
+      for (const name of ["kernel", "waves"]) found[name].push(own[name]);
+    }
+    found.best = await refine(found.x, found[lead], async (value) => (await levelsAt(value))[lead],
+      REFINED * (high - low));
+  } catch { return; }
+  showPane();
+}
+
+/** The highest level near the best of those that are known, by golden sections: {at, level}. */
+async function refine(x, known, levelAt, within) {
+  const top = known.reduce((best, v, k) => (v > (known[best] ?? -Infinity) ? k : best), 0);
+  if (!Number.isFinite(known[top])) return null;
+  const part = (Math.sqrt(5) - 1) / 2, best = { at: x[top], level: known[top] };
+  const tried = async (at) => {
+    const level = await levelAt(at);
+    if (level > best.level) Object.assign(best, { at, level });
+    return { at, level };
+  };
+  let [a, b] = [x[Math.max(top - 1, 0)], x[Math.min(top + 1, x.length - 1)]];
+  let [c, d] = [await tried(b - part * (b - a)), await tried(a + part * (b - a))];
+  while (b - a > within) {
+    if (c.level > d.level) [b, d, c] = [d.at, c, await tried(d.at - part * (d.at - a))];
+    else [a, c, d] = [c.at, d, await tried(c.at + part * (b - c.at))];
+  }
+  return best;
 }
 
 function showBody() {
