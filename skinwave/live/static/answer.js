@@ -34,6 +34,9 @@ export function lineName(answer, f) {
 export const typeset = (name) => name.replace(/-/g, " − ").replace(/\+/g, " + ")
   .replace(/(\d)(?=f)/g, "$1 ").replace(/^ − /, "−");
 
+/** What mapsOf finds. */
+export const OF_MAPS = ["maps", "share", "kernelShare", "reach", "kernelReach", "delay", "invalid", "warnings"];
+
 /** Maps of the kernel and the waves, and the numbers that need them. */
 export function mapsOf(answer) {
   const { kernel, waves, load, body } = answer, axis = mapAxis();

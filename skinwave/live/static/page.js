@@ -1,6 +1,6 @@
 // The page: reads its data, answers at every move of a control, and shows the answer.
 
-import { mapsOf, respond as respondTo } from "./answer.js";
+import { OF_MAPS, mapsOf, respond as respondTo } from "./answer.js";
 import { openBody } from "./bodies.js";
 import { buildControls } from "./controls.js";
 import { WRITERS, readMeasurement } from "./files.js";
@@ -67,6 +67,7 @@ function change(key, value, settled) {
 function set(next, settled = true) {
   const other = next.body !== values.body;
   values = other ? { ...next, ...onBody(next) } : next;
+  notice = "";
   if (settled) {
     history.add(values);
     writeAddress();
@@ -117,11 +118,17 @@ function showSlot() {
   seenWarnings = warned;
 }
 
+/** What mapsOf found before, of the same body: it stays until there is a new one, a frame later. */
+function mapsBefore() {
+  if (answer?.body !== bodyOf(values.body)) return {};
+  return Object.fromEntries(OF_MAPS.map((key) => [key, answer[key]]));
+}
+
 function showCurves() {
   frameDue = 0;
   const began = performance.now();
   try {
-    answer = { ...respond(values), invalid: answer?.body.name === values.body && answer.invalid };
+    answer = { ...mapsBefore(), ...respond(values) };
     errors.delete("load");
     markOld();
   } catch (error) {
@@ -165,7 +172,7 @@ function showMaps() {
   mapsDue = 0;
   const own = answer, before = own.invalid;
   Object.assign(own, mapsOf(own));
-  if ((own.invalid || "") !== (before || "")) ask(); // plots are hatched, too
+  if (own.invalid !== (before ?? "")) ask(); // plots are hatched, too
   drawMaps();
   showTiles();
   announce();
@@ -186,8 +193,8 @@ function drawMaps() {
   if (factorOf(topOfA, wavesTop) === 1) wavesTop = topOfA = Math.max(wavesTop, topOfA);
   if (at) {
     drawMap($("kernel-map"), { ...marks, path: pathsOf(at.load), foci: [], point: [at.x, at.y],
-      influenced: at.maps.kernel.rms, rms: at.maps.waves.rms, level: at.body.is_skin ? at.maps.waves.level
-        : null, unit: "m", largest: topOfA,
+      influenced: at.maps.kernel.rms, rms: at.maps.waves.rms, unit: "m", largest: topOfA,
+      level: at.body.is_skin ? at.maps.waves.level : null,
       title: `A: ${short(at.body.title)}`, hatched: at.invalid });
   } else {
     const level = body.is_skin ? maps.kernel.level : null;
@@ -209,8 +216,7 @@ function showSolid() {
   solidOf = answer;
   const { body, waves, load, x, y } = answer, fd = drawingFrequency(load.path);
   solid.show({ shape: body.shape, motion: { f: waves.f, ...waves.surface() }, path: pathsOf(load),
-    points: [[x, y]],
-    foci: fd ? (t) => fociAt(load, t) : [fociAt(load, 0)] });
+    points: [[x, y]], foci: fd ? (t) => fociAt(load, t) : [fociAt(load, 0)] });
 }
 
 function showTiles() {
@@ -457,7 +463,7 @@ function setTheme(dark) {
 }
 
 function pin() {
-  pinned = pinned ? null : { ...mapsOf(answer), ...answer };
+  pinned = pinned ? null : { ...answer, ...mapsOf(answer) };
   $("pin").setAttribute("aria-pressed", String(Boolean(pinned)));
   $("pin").textContent = pinned ? "Unpin A" : "Pin A";
   $("swap").disabled = !pinned;
@@ -468,7 +474,7 @@ function pin() {
 
 function swap() {
   const other = pinned.values;
-  pinned = { ...mapsOf(answer), ...answer };
+  pinned = { ...answer, ...mapsOf(answer) };
   set({ ...other });
 }
 
