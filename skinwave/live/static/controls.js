@@ -10,6 +10,7 @@ const WORDS = {
   simultaneous: "all at once", time_multiplexed: "in turn",
 };
 const NAMED = ["point", "line", "circle", "triangle", "square"]; // shapes of a focus's own path
+const RESTING = 120; // ms that a slider of the body rests before the body is asked for
 const STRIP = 124; // px of a period of the rhythm, of which two are drawn
 
 const options = (values, words, chosen) => values.map((value) => `<option value="${escaped(value)}"${
@@ -42,7 +43,7 @@ function bodyKeys(body, editable) {
  */
 export function buildControls(host, { bodies, editable, change, refuse, moving, edit, hold, published }) {
   const $ = (id) => host.querySelector(`#${id}`), all = (selector) => [...host.querySelectorAll(selector)];
-  let values = {};
+  let values = {}, resting = 0;
 
   for (const input of all("input[data-key][type=range]")) {
     const { low, high, step, unit } = NUMBERS[input.dataset.key], label = LABELS[input.dataset.key];
@@ -70,13 +71,17 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
     const { key, field, body } = target.dataset;
     if (key && target.type === "range") { moving(true); take(key, target.value, false); }
     else if (field && !("whole" in target.dataset)) take(field, target.value, false);
-    else if (body && target.type === "range") target.nextElementSibling.value = target.value;
+    else if (body && target.type === "range") {
+      target.nextElementSibling.value = target.value;
+      clearTimeout(resting);
+      resting = setTimeout(() => edit(body, target.value), RESTING);
+    }
   });
   host.addEventListener("change", ({ target }) => {
     const { key, field, body, own } = target.dataset;
     if (key) { moving(false); take(key, target.value, true); }
     else if (field) take(field, target.value, true);
-    else if (body) edit(body, target.value);
+    else if (body) { clearTimeout(resting); edit(body, target.value); }
     else if (own) takePaths();
     else if (target.name === "own") change("paths", target.value ? startPaths() : "", true);
     else if (target.id === "hold") hold(target.checked);
@@ -204,10 +209,16 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
       for (const [id, text] of Object.entries(digest)) $(`${id}-digest`).textContent = text;
     },
     showBodies,
+    /** Show a body's values; what is being moved stays in place. */
     showBody(body) {
-      const focused = document.activeElement?.dataset?.body, kind = document.activeElement?.type;
-      $("keys").innerHTML = bodyKeys(body, editable);
-      if (focused) host.querySelector(`[data-body="${focused}"][type="${kind}"]`)?.focus();
+      const names = JSON.stringify([body.name, body.keys?.map(({ key }) => key)]);
+      if ($("keys").dataset.names !== names) $("keys").innerHTML = bodyKeys(body, editable);
+      $("keys").dataset.names = names;
+      for (const input of all("[data-body]")) {
+        const { value } = body.keys.find(({ key }) => key === input.dataset.body);
+        if (input !== document.activeElement) input.value = typeof value === "number"
+          ? Number(value.toPrecision(4)) : value;
+      }
       $("body-more-digest").textContent = body.title;
     },
     mark(key, wrong) {

@@ -362,6 +362,7 @@ async function edit(key, text) {
     return;
   }
   errors.delete(key);
+  if (value === (changes[key] ?? known.value)) return;
   Object.assign(changes, { [key]: value });
   editing?.abort();
   const own = editing = new AbortController();
