@@ -65,8 +65,7 @@ def element_pack(body: Body, h: float, progress: Progress = silent) -> dict[str,
     progress("reduce", 0.0)
     poles, turn = reduced_poles(ops, basis)
     places, inside, cosines, heights = surface_grid(body, made)
-    read = np.zeros((SIDE**2, turn.shape[0]))
-    read[inside] = surface_motion(body, made, places[inside]) @ basis
+    read = surface_motion(body, made, places[inside]) @ basis
     fields = (turn.T @ read.T).astype(np.complex64)
     return {
         "kind": "poles", "step": STEP, "side": SIDE, "lowest_height_mm": 1e3 * LOWEST,

@@ -4,7 +4,7 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 
-STEP, SIDE = 3e-3, 33  # m between places, and places along a side
+STEP, SIDE = 3e-3, 37  # m between places, and places along a side
 
 
 def grid_line() -> Floats:

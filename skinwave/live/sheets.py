@@ -28,7 +28,7 @@ LOWEST = 0.1  # m: least height of the focus
 BAND = 1300.0  # Hz: modes below are kept as they are
 COUPLED = 1.5  # times a line's frequency: modes below are solved together
 COUPLED_BAND = 2600.0  # Hz: loss couples modes below
-LEFT_OUT = 0.005  # of the largest combination of modes above the band
+LEFT_OUT = 0.003  # of the largest combination of modes above the band
 QUASI_STATIC = (0.0, 600.0, 1000.0)  # Hz at which these combinations are looked at
 
 
@@ -67,7 +67,7 @@ def sheet_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
         "between": quantised(bending[:coupled, :coupled]) if stretched else None,
         "coupled": COUPLED,
         "law": packed(relative.astype(np.complex128)), "law_step": LAW_STEP,
-        "V": quantised(turn.T @ fields), "inside": "".join("01"[int(each)] for each in inside),
+        "V": quantised((turn.T @ fields)[:, inside]), "inside": "".join("01"[int(each)] for each in inside),
         "kinds": free.poles.shape[1],
         "poles": packed(free.poles), "residues": packed(free.residues),
     }  # fmt: skip

@@ -92,10 +92,16 @@ function neighbours(place, side) {
   return { first, weights };
 }
 
-/** Rows (m, p) as they are packed, place after place. */
-export function byPlace(rows, count) {
-  const places = rows.length / count, found = new Float32Array(rows.length);
-  for (let m = 0, k = 0; m < count; m++) for (let p = 0; p < places; p++, k++) found[p * count + m] = rows[k];
+/** Rows (m, places on the body) as they are packed, place after place; zero off the body. */
+export function byPlace(rows, count, inside) {
+  const found = new Float32Array(inside.length * count);
+  for (let p = 0, k = 0; p < inside.length; p++) {
+    if (inside[p] !== "1") continue;
+    for (let m = 0, from = k, step = rows.length / count; m < count; m++, from += step) {
+      found[p * count + m] = rows[from];
+    }
+    k++;
+  }
   return found;
 }
 

@@ -16,7 +16,7 @@ export class ModalBody {
     this.modes = this.squared.length;
     this.together = Math.sqrt(this.between?.length ?? 0); // modes that loss couples
     this.grid = new Grid(pack);
-    this.fields = byPlace(this.V, this.modes);
+    this.fields = byPlace(this.V, this.modes, this.inside);
     this.loads = new Map(); // load fields of a height
     this.paths = new Map(); // forces of unit pressure along a path
     this.factors = new Map(); // of coupled modes at a frequency

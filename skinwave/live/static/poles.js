@@ -13,13 +13,11 @@ export class PoleBody {
     this.count = this.poles.re.length;
     this.grid = new Grid(pack);
     // Real and imaginary parts of all poles after each other at a place.
-    const { re, im } = this.fields, places = re.length / this.count, width = 2 * this.count;
-    this.values = new Float32Array(places * width);
-    const real = byPlace(re, this.count), imaginary = byPlace(im, this.count);
-    for (let p = 0; p < places; p++) {
-      this.values.set(real.subarray(p * this.count, (p + 1) * this.count), p * width);
-      this.values.set(imaginary.subarray(p * this.count, (p + 1) * this.count), p * width + this.count);
-    }
+    const { fields: { re, im }, count, inside } = this, width = 2 * count;
+    const rows = new Float64Array(2 * re.length);
+    rows.set(re);
+    rows.set(im, re.length);
+    this.values = byPlace(rows, width, inside);
     this.pushed = this.values.map((value, k) => value * this.cosines[Math.floor(k / width)]);
     this.loads = new Map(); // load fields of a height
     this.paths = new Map(); // forces of unit pressure along a path
