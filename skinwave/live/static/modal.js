@@ -7,7 +7,6 @@ import { loadLines, pathSamples, spotWidth } from "./load.js";
 import { divided, oscillation, underRhythm } from "./time.js";
 
 const RESIDUAL = 1e-5, MOST_STEPS = 30; // of coupled modes
-const NEARBY = 0.25; // Hz: at which a compliance is compared for its slope
 
 /** A sheet of a pack. */
 export class ModalBody {
@@ -201,7 +200,7 @@ class ModalMotion {
     this.body = body;
     this.load = load;
     const samples = pathSamples(load);
-    this.lines = loadLines(load, { lowest: 0, samples });
+    this.lines = loadLines(load, { lowest: 0, most: 120, samples });
     const forces = body.pathForces(load, samples), { modes } = body, count = samples.x.length;
     this.forces = this.lines.w.map(({ re: wr, im: wi }) => {
       const re = new Float64Array(modes), im = new Float64Array(modes);
@@ -258,16 +257,31 @@ class ModalMotion {
       (start, jump, bend) => ({ poles: body.poles, amplitudes: this.startOf(own, start, jump, bend) }));
   }
 
-  /** Lag (t,) of a ramp of 1/s: sum_l D_l exp(i w t), D_l = -dq/d(i w) at a force that stays. */
+  /**
+   * Lag (t,) of a ramp of 1/s: sum_l D_l exp(i w t), D_l the force times the slope of -compliance, of
+   * modes apart as in `startOf`, so that both cancel at a corner.
+   */
   lag(own, times) {
+    const { f } = this.lines;
+    const { poles, residues, kinds } = this.body;
     const amplitudes = this.forces.map((force, l) => {
-      const f = this.lines.f[l], [a, b] = summed(own, this.body.solve(f + NEARBY, force));
-      const conjugate = { re: force.re, im: force.im.map((value) => -value) }, before = f - NEARBY;
-      const [c, d] = summed(own, this.body.solve(Math.abs(before), before < 0 ? conjugate : force));
-      const step = 4 * Math.PI * NEARBY;
-      return [(before < 0 ? -d : d) / step - b / step, (a - c) / step];
+      let a = 0, b = 0;
+      const omega = 2 * Math.PI * f[l];
+      for (let m = 0; m < own.length; m++) {
+        for (let j = 0, k = m * kinds; j < kinds; j++, k++) {
+          for (const sign of [1, -1]) { // the pole and its conjugate
+            const [cr, ci] = divided(1, 0, -poles.re[k], omega - sign * poles.im[k]);
+            const [sr, si] = [cr * cr - ci * ci, 2 * cr * ci];
+            const rr = own[m] * residues.re[k], ri = sign * own[m] * residues.im[k];
+            const hr = rr * sr - ri * si, hi = rr * si + ri * sr;
+            a += hr * force.re[m] - hi * force.im[m];
+            b += hr * force.im[m] + hi * force.re[m];
+          }
+        }
+      }
+      return [a, b];
     });
-    return oscillation(this.lines.f, amplitudes, times);
+    return oscillation(f, amplitudes, times);
   }
 
   /**

@@ -53,7 +53,7 @@ class PoleMotion {
     this.body = body;
     this.load = load;
     const samples = pathSamples(load);
-    this.lines = loadLines(load, { lowest: 0, samples });
+    this.lines = loadLines(load, { lowest: 0, most: 120, samples });
     const forces = body.pathForces(load, samples), { count } = body, width = 2 * count;
     // States of each line: `ahead` F / (i w - pole) and `back` F(-w) / (-i w - pole), {re, im} (p,).
     this.states = this.lines.f.length ? Array.from(this.lines.f, (f, l) => {

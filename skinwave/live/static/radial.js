@@ -3,7 +3,7 @@
 // along a path of complex k, as skinwave.live.radial packs it.
 
 import { powerOfTwo, transform } from "./fourier.js";
-import { drawingFrequency, gainAt, gainLines, loadLines, pathHarmonic, pathSamples, rhythmLevel,
+import { drawingFrequency, gainAt, gainLines, levelFactor, loadLines, pathHarmonic, pathSamples, rhythmLevel,
   spotWidth } from "./load.js";
 
 /** Bessel function J0 of a complex argument with a positive real part: [re, im], to about 1e-7. */
@@ -51,12 +51,12 @@ const FINER = 8; // places of a map's table in each interval of the distances
 const LEVELS = 8; // of a rhythm that are averaged in a step
 const NEGLIGIBLE = 1e-4; // of the largest harmonic of a path
 
-/** Mean level of the rhythm in the step about a time in s, 0 before the start. */
+/** Mean share of the pressure that the rhythm leaves in the step about a time in s, 0 before the start. */
 function meanLevel(load, t, step) {
   let sum = 0;
   for (let k = 0; k < LEVELS; k++) {
     const at = t + ((k + 0.5) / LEVELS - 0.5) * step;
-    if (at > 0) sum += rhythmLevel(load, at);
+    if (at > 0) sum += levelFactor(load, rhythmLevel(load, at));
   }
   return sum / LEVELS;
 }

@@ -1,5 +1,8 @@
 // Motion over time of lines and of poles, and under the pulses of a rhythm.
 
+import { levelFactor } from "./load.js";
+
+const RAMP = 8; // straight parts of a ramp
 const FAINT = 1e-6; // of the largest free vibration: what is left out
 const AT_ONCE = 64; // instants whose exponentials are made by multiplication
 
@@ -22,7 +25,10 @@ export function oscillation(f, amplitudes, times) {
   return found;
 }
 
-/** Pieces {start, end, level, slope} in s and 1/s of the rhythm up to a time, level at their start. */
+/**
+ * Pieces {start, end, level, slope} in s and 1/s of the share of the pressure that the rhythm leaves,
+ * up to a time; the level is that at their start. Ramps of a law that squares are made of straight ones.
+ */
 export function rhythmPieces(load, until) {
   if (!load.pulses || !load.pulses.length) return [{ start: 0, end: Infinity, level: 1, slope: 0 }];
   const found = [], { ramp = 0 } = load;
@@ -32,9 +38,15 @@ export function rhythmPieces(load, until) {
       if (length > 0) found.push({ start: at, end: at + length, level, slope });
       at += length;
     };
-    if (ramp) add(ramp, 0, 1 / ramp);
+    const slopes = (from, to) => {
+      for (let j = 0; ramp && j < RAMP; j++) {
+        const [a, b] = [j, j + 1].map((k) => levelFactor(load, from + (to - from) * k / RAMP));
+        add(ramp / RAMP, a, (b - a) * RAMP / ramp);
+      }
+    };
+    slopes(0, 1);
     add(on - 2 * ramp, 1, 0);
-    if (ramp) add(ramp, 1, -1 / ramp);
+    slopes(1, 0);
     add(gap, 0, 0);
   }
   return found;
