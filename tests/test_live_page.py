@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from in_browser import needs_browser
+from in_browser import frames, needs_browser
 
 from skinwave.cli import main
 from skinwave.live.page import bundle, encoded, page, policy
@@ -264,3 +264,69 @@ def test_keys_move_a_control_and_undo_it(opened):
     tab.keyboard.press("Control+z")
     tab.locator("#tiles", has_text="191 Hz").wait_for()
     assert tiles(tab) == before
+
+
+@needs_browser
+def test_a_preset_is_taken_and_compared_with_what_was_pinned(opened):
+    tab = opened()
+    tab.click("#pin")
+    tab.click("[data-menu=presets]")
+    tab.get_by_role("button", name="AM 80 Hz", exact=True).click()
+    rows = tab.locator("#ab tr", has_text="AM frequency")
+    rows.get_by_text("80 Hz").wait_for()
+    tab.click("#swap")
+    tab.locator("#tiles", has_text="191 Hz").wait_for()
+    assert "80 Hz" in rows.locator("td").first.inner_text()
+
+
+@needs_browser
+def test_what_is_typed_wrong_is_said_and_changes_nothing(opened):
+    tab = opened()
+    before = tiles(tab)
+    tab.fill("#am-field", "fast")
+    assert "not a number" in tab.inner_text("#problem")
+    assert tab.get_attribute("#am-field", "aria-invalid") == "true"
+    assert tiles(tab) == before
+    tab.fill("#am-field", "140")
+    assert tab.inner_text("#problem") == ""
+
+
+@needs_browser
+def test_the_highest_level_is_found_and_set(opened):
+    tab = opened()
+    before = level(tab)
+    tab.click("#tab-level")
+    tab.click("#best:enabled")
+    frames(tab, 2)
+    assert "speed=" in tab.evaluate("location.href")
+    assert level(tab) >= before
+
+
+def level(tab):
+    return int(
+        tab.inner_text("#tiles .value >> nth=0").removesuffix(" dB").replace("\N{MINUS SIGN}", "-")
+    )
+
+
+@needs_browser
+@pytest.mark.parametrize("title", ["Maps and plots, SVG", "Lines, CSV", "Scene, TOML"])
+def test_what_is_shown_can_be_saved(opened, title):
+    tab = opened()
+    tab.click("[data-menu=save]")
+    with tab.expect_download() as saved:
+        tab.get_by_role("button", name=title).click()
+    text = saved.value.path().read_text(encoding="utf-8")
+    assert {"Maps": "<svg", "Line": "f_d", "Scen": "speed_m_per_s = 12"}[title[:4]] in text
+
+
+@needs_browser
+def test_a_measurement_is_drawn_over_the_waves(opened, tmp_path):
+    file = tmp_path / "measured.csv"
+    rows = "".join(f"{1e-4 * k:.4f},{np.sin(0.1 * k):.4f}\n" for k in range(600))
+    file.write_text("time [s],displacement [µm]\n" + rows, encoding="utf-8")
+    tab = opened()
+    tab.set_input_files("#measurement", file)
+    tab.locator("#waveform .is-measured").first.wait_for(state="attached")
+    tab.evaluate("document.querySelector('#files').open = true")
+    tab.click("#measured-clear")
+    tab.locator("#waveform .is-measured").first.wait_for(state="detached")
