@@ -31,6 +31,12 @@ REACH, SPACING = 0.031, 0.0058  # m from the middle to which foci are, and betwe
 FREQUENCIES = (20.0, 70.0, 130.0, 190.0, 260.0, 350.0, 470.0, 640.0, 900.0)  # Hz
 MOST = 540  # dimensions of the basis
 FAINTNESS = 0.5  # power of the size of a frequency's motion by which it is divided
+ERROR = 0.1  # relative, of components up to `BAND` and within 20 dB of the strongest
+BAND = 300.0  # Hz
+WARNING = (
+    f"Components above {BAND:g} Hz, or more than 20 dB below the strongest one, may be off by more "
+    f"than {100 * ERROR:g} %. skinwave run computes them on the elements themselves."
+)
 AT_ONCE = 32  # loads that are solved together
 LEFT_OUT = 1e-4  # of the mean-square motion: what the basis need not have
 
@@ -72,6 +78,7 @@ def element_pack(body: Body, h: float, progress: Progress = silent) -> dict[str,
         "poles": packed(poles), "fields": quantised(fields), "cosines": quantised(cosines[None]),
         "inside": "".join("01"[int(each)] for each in inside),
         "heights": quantised(1e3 * heights[None]), "reach_mm": 1e3 * REACH,
+        "error": ERROR, "warnings": [WARNING],
     }  # fmt: skip
 
 

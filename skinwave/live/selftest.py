@@ -21,8 +21,10 @@ from skinwave.scene import Body, Scene
 from skinwave.simulation import compute
 
 SEED = 15
-SHOWN = 0.01  # of the strongest line of a point: -40 dB, down to which lines are compared
-HIGHEST = 1000.0  # Hz
+# Lines that are compared: of the strongest of a point, and up to a frequency in Hz; then those of
+# bodies of elements, whose reduced model is known less exactly.
+SHOWN, HIGHEST = 0.01, 1000.0
+SHOWN_OF_ELEMENTS, HIGHEST_OF_ELEMENTS = 0.3, 200.0
 SHAPES = ("point", "line", "circle", "triangle", "square")
 DRIVES = ("pressure_squared", "force_corrected", "linear")
 # m: where bodies of elements are read, for which the exact model is reduced.
@@ -49,12 +51,13 @@ def selftest(body: Body, name: str, most: int, lowest: float, error: float) -> l
     """
     rng, found = np.random.default_rng(SEED), []
     lines_of, _, places = exact(body)
+    least, highest = (SHOWN_OF_ELEMENTS, HIGHEST_OF_ELEMENTS) if places else (SHOWN, HIGHEST)
     for _ in range(most):
         scene = random_scene(body, rng, lowest, places)
         f, amplitudes = lines_of(scene)
         size = np.abs(amplitudes)
-        kept = (f > 0) & (f <= HIGHEST)
-        kept &= size > SHOWN * size[kept].max(initial=0.0)
+        kept = (f > 0) & (f <= highest)
+        kept &= size > least * size[(f > 0) & (f <= HIGHEST)].max(initial=0.0)
         lines = zip(f[kept].tolist(), amplitudes[kept].tolist(), strict=True)
         found.append({
             "body": name, "values": values_of(scene, name), "error": error,
