@@ -2,6 +2,7 @@
 
 import { QUANTITIES, amplitudesOf, delayOf, levelOf, mapAxis, mapOf, namesOf, reach, shareOutside,
   unresolvedNames } from "./numbers.js";
+import { pathSamples } from "./load.js";
 import { loadOf } from "./values.js";
 
 const TOO_FAR = 0.5; // of a sheet's thickness, above which a linear model is not valid
@@ -60,10 +61,18 @@ function invalidity({ body, waves, x, y }) {
   return ratio > TOO_FAR ? `linear model, ${ratio.toPrecision(2)} × thickness` : "";
 }
 
-function warnings({ load }) {
-  const lost = unresolvedNames(load).map(typeset);
-  return lost.length ? [`The Tacton is too short to resolve ${lost.slice(0, 4).join(", ")}${
-    lost.length > 4 ? ` and ${lost.length - 4} more` : ""}.`] : [];
+function warnings({ load, body }) {
+  const lost = unresolvedNames(load).map(typeset), found = [];
+  if (lost.length) {
+    const more = lost.length > 4 ? ` and ${lost.length - 4} more` : "";
+    found.push(`The Tacton is too short to resolve ${lost.slice(0, 4).join(", ")}${more}.`);
+  }
+  const { x, y } = pathSamples(load), furthest = 1e3 * Math.max(...x.map((own, q) => Math.hypot(own, y[q])));
+  if (furthest > body.reach_mm) {
+    found.push(`The focus goes ${furthest.toFixed(0)} mm from the middle. Beyond ${body.reach_mm} mm this body's motion `
+      + "is less accurate.");
+  }
+  return found;
 }
 
 /** Amplitudes (l,) of complex lines in the unit of a quantity. */
