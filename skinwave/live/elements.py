@@ -29,7 +29,7 @@ from skinwave.scene import Body
 LOWEST = 0.15  # m: least height of the focus, whose spot elements of some mm resolve
 REACH, SPACING = 0.031, 0.0058  # m from the middle to which foci are, and between training spots
 FREQUENCIES = (20.0, 70.0, 130.0, 190.0, 260.0, 350.0, 470.0, 640.0, 900.0)  # Hz
-MOST = 540  # dimensions of the basis
+MOST = 500  # dimensions of the basis
 FAINTNESS = 0.5  # power of the size of a frequency's motion by which it is divided
 ERROR = 0.1  # relative, of components up to `BAND` and within 20 dB of the strongest
 BAND = 300.0  # Hz

@@ -116,3 +116,7 @@ export function heard(motion) {
   const strongest = Math.max(...largest);
   return [...largest.keys()].filter((l) => largest[l] > UNHEARD * strongest);
 }
+
+/** Text that is the same for loads whose foci pass the same samples, however fast. */
+export const samplesKey = ({ path, foci, height }, { x }) => JSON.stringify([
+  { ...path, speed: Boolean(path.speed), drawn: 0 }, foci.length > 1 ? foci : 1, height, x.length]);

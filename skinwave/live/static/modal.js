@@ -2,7 +2,7 @@
 //   (diag(squared) + c(w) B - w^2) q = F
 // where c is the modulus of bending over that of the modes, less 1; as skinwave.live.sheets packs it.
 
-import { Grid, byPlace, heard } from "./fields.js";
+import { Grid, byPlace, heard, samplesKey } from "./fields.js";
 import { loadLines, pathSamples, spotWidth } from "./load.js";
 import { divided, oscillation, underRhythm } from "./time.js";
 
@@ -27,7 +27,7 @@ export class ModalBody {
 
   /** Modal forces (q, m) of 1 Pa at the samples of a path. */
   pathForces(load, samples) {
-    const key = JSON.stringify([load.path, load.foci.length, load.height]);
+    const key = samplesKey(load, samples);
     if (!this.paths.has(key)) {
       if (this.paths.size > 3) this.paths.clear();
       if (!this.loads.has(load.height)) {

@@ -2,7 +2,7 @@
 //   u(x, w) = sum_p O_p(x) F_p(w) / (i w - pole_p) + conj(O_p(x) F_p(-w) / (-i w - pole_p))
 // with complex fields O_p (p, place), which read the motion and take up the load.
 
-import { Grid, byPlace, heard } from "./fields.js";
+import { Grid, byPlace, heard, samplesKey } from "./fields.js";
 import { loadLines, pathSamples, spotWidth } from "./load.js";
 import { divided, oscillation, underRhythm } from "./time.js";
 
@@ -29,7 +29,7 @@ export class PoleBody {
 
   /** Forces (q, 2 p) of 1 Pa at the samples of a path. */
   pathForces(load, samples) {
-    const key = JSON.stringify([load.path, load.foci.length, load.height]), width = 2 * this.count;
+    const key = samplesKey(load, samples), width = 2 * this.count;
     if (!this.paths.has(key)) {
       if (this.paths.size > 3) this.paths.clear();
       if (!this.loads.has(load.height)) {

@@ -2,6 +2,7 @@
 //   g(r, f) = 1 / (2 pi) int S(k) G(k, f) J0(k r) k dk
 // along a path of complex k, as skinwave.live.radial packs it.
 
+import { samplesKey } from "./fields.js";
 import { powerOfTwo, transform } from "./fourier.js";
 import { drawingFrequency, gainAt, gainLines, levelFactor, loadLines, pathHarmonic, pathSamples, rhythmLevel,
   spotWidth } from "./load.js";
@@ -303,14 +304,16 @@ class RadialMotion {
   /** Harmonics [order, {re, im} (f,)] of the path as a place sees them, at the pack's frequencies. */
   harmonicsAt(x, y) {
     const { body, load, lines: { samples } } = this;
-    const key = JSON.stringify([x, y, load.height, load.path, load.foci]);
-    if (body.seen?.key === key) return body.seen.harmonics;
-    const { used } = body.spotShares(load.height), count = samples.x.length;
-    const away = Float64Array.from(samples.x, (own, q) => Math.hypot(x - own, y - samples.y[q]));
-    const bessel = body.besselAt(away, used), nf = body.frequencies.length;
-    const fd = drawingFrequency(load.path);
+    const count = samples.x.length, fd = drawingFrequency(load.path);
     const tones = Math.max(...gainLines(load).map(({ f }) => Math.abs(f)));
     const most = fd > 0 ? Math.min(Math.floor((HIGHEST + tones) / fd), Math.floor((count - 1) / 2)) : 0;
+    const key = JSON.stringify([x, y, samplesKey(load, samples), load.foci]);
+    if (body.seen?.key === key && body.seen.most >= most) {
+      return body.seen.harmonics.filter(([order]) => Math.abs(order) <= most);
+    }
+    const { used } = body.spotShares(load.height);
+    const away = Float64Array.from(samples.x, (own, q) => Math.hypot(x - own, y - samples.y[q]));
+    const bessel = body.besselAt(away, used), nf = body.frequencies.length;
     const found = [];
     for (let order = -most; order <= most; order++) {
       const { re: wr, im: wi } = pathHarmonic(load, order, count);
@@ -343,7 +346,7 @@ class RadialMotion {
       }
       return [order, { re, im }];
     });
-    body.seen = { key, harmonics };
+    body.seen = { key, most, harmonics };
     return harmonics;
   }
 }
