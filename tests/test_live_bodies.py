@@ -9,11 +9,10 @@ import pytest
 from in_browser import needs_browser
 
 from simple_model import Rhythm
-from skinwave.live.elements import element_pack
 from skinwave.live.page import bundle
 from skinwave.live.radial import radial_pack
 from skinwave.live.records import record_of
-from skinwave.live.selftest import HIGHEST, PLACES, SHOWN, exact, random_scene
+from skinwave.live.selftest import HIGHEST, SHOWN, exact, random_scene
 from skinwave.live.sheets import sheet_pack
 from skinwave.live.values import values_of
 from skinwave.scene import BODIES, Body
@@ -27,12 +26,14 @@ const bodies = new Map();
 window.open_ = (record) => { bodies.set(record.name, openBody(record)); };
 window.answer = ({ name, values }) => {
   const motion = bodies.get(name).respond(loadOf(values)), x = values.x / 1e3, y = values.y / 1e3;
-  const times = Float64Array.from({ length: Math.round(1e4 * values.duration) }, (_, k) => k * 1e-4);
+  const count = Math.round(1e4 * values.duration);
+  const times = Float64Array.from({ length: count }, (_, k) => k * 1e-4);
   const { re, im } = motion.at(x, y);
   return { f: [...motion.f], re: [...re], im: [...im], u: [...motion.waveform(x, y, times)] };
 };
 window.map_ = ({ name, values, k }) => {
-  const motion = bodies.get(name).respond(loadOf(values)), { re } = motion.onGrid(MAP_LINE, MAP_LINE);
+  const motion = bodies.get(name).respond(loadOf(values));
+  const { re } = motion.onGrid(MAP_LINE, MAP_LINE);
   const x = MAP_LINE[k % MAP_LINE.length], y = MAP_LINE[Math.floor(k / MAP_LINE.length)];
   const at = motion.at(x, y).re, size = MAP_LINE.length ** 2;
   return [...motion.f].map((_, l) => [re[l * size + k], at[l]]);

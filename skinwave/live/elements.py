@@ -96,9 +96,10 @@ def training_knots(body: Body) -> Floats:
     return np.asarray(knots[kept])
 
 
-def training_basis(ops: fem.Operators, forces: Floats, report: Any) -> Floats:
+def training_basis(ops: fem.Operators, forces: Floats, report: Any) -> np.ndarray:
     """Basis (3 n, r) of the steady motion under loads (3 n, j), at all `FREQUENCIES`."""
-    solve, snapshots = LineSolver(ops), []
+    solve = LineSolver(ops)
+    snapshots: list[np.ndarray] = []
     count = len(FREQUENCIES) * -(-forces.shape[1] // AT_ONCE)
     for frequency in FREQUENCIES:
         for first in range(0, forces.shape[1], AT_ONCE):
@@ -120,7 +121,7 @@ def training_basis(ops: fem.Operators, forces: Floats, report: Any) -> Floats:
     return basis
 
 
-def reduced_poles(ops: fem.Operators, basis: Floats) -> tuple[fem.Complex, fem.Complex]:
+def reduced_poles(ops: fem.Operators, basis: np.ndarray) -> tuple[fem.Complex, fem.Complex]:
     """Poles (p,) in 1/s with imaginary part >= 0 of the reduced body, and their combinations (r, p)
     of the basis.
     """
@@ -131,6 +132,7 @@ def reduced_poles(ops: fem.Operators, basis: Floats) -> tuple[fem.Complex, fem.C
     branches = tuple(
         fem.MaxwellBranch(K=upright.T @ (V.T @ (each.K @ V)) @ upright, time=each.time)
         for each in ops.branches
+        if isinstance(each, fem.MaxwellBranch)  # `relaxing` leaves no other
     )
     model = fem.ReducedModel(
         basis=upright, K=upright.T @ K @ upright, C=upright.T @ C @ upright,

@@ -67,7 +67,8 @@ def sheet_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
         "between": quantised(bending[:coupled, :coupled]) if stretched else None,
         "coupled": COUPLED,
         "law": packed(relative.astype(np.complex128)), "law_step": LAW_STEP,
-        "V": quantised((turn.T @ fields)[:, inside]), "inside": "".join("01"[int(each)] for each in inside),
+        "V": quantised((turn.T @ fields)[:, inside]),
+        "inside": "".join("01"[int(each)] for each in inside),
         "kinds": free.poles.shape[1],
         "poles": packed(free.poles), "residues": packed(free.residues),
     }  # fmt: skip
