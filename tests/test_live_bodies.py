@@ -9,13 +9,14 @@ import pytest
 from in_browser import needs_browser
 
 from simple_model import Rhythm
+from skinwave.live.elements import BAND, element_pack
 from skinwave.live.page import bundle
 from skinwave.live.radial import radial_pack
 from skinwave.live.records import record_of
 from skinwave.live.selftest import HIGHEST, SHOWN, exact, random_scene
 from skinwave.live.sheets import sheet_pack
 from skinwave.live.values import values_of
-from skinwave.scene import BODIES, Body
+from skinwave.scene import BODIES
 
 pytestmark = needs_browser
 
@@ -31,7 +32,7 @@ window.answer = ({ name, values }) => {
   const { re, im } = motion.at(x, y);
   return { f: [...motion.f], re: [...re], im: [...im], u: [...motion.waveform(x, y, times)] };
 };
-window.map_ = ({ name, values, k }) => {
+window.places = ({ name, values, k }) => {
   const motion = bodies.get(name).respond(loadOf(values));
   const { re } = motion.onGrid(MAP_LINE, MAP_LINE);
   const x = MAP_LINE[k % MAP_LINE.length], y = MAP_LINE[Math.floor(k / MAP_LINE.length)];
@@ -39,13 +40,12 @@ window.map_ = ({ name, values, k }) => {
   return [...motion.f].map((_, l) => [re[l * size + k], at[l]]);
 };
 """
-TETS = 9e-3  # m: element size of the body of elements
-DISC = Body(kind="palm")
+H = 0.012  # m: elements of the palm, few for the test
 
 
 @pytest.fixture(scope="module")
 def page(browser, tmp_path_factory):
-    """A page with the modules that answer, and three bodies."""
+    """A page with the modules that answer, and bodies."""
     folder = tmp_path_factory.mktemp("live") / "static"
     shutil.copytree(str(resources.files("skinwave.live") / "static"), folder)
     (folder / "entry.js").write_text(ENTRY)
@@ -55,40 +55,45 @@ def page(browser, tmp_path_factory):
     found = browser.new_page()
     found.goto(file.as_uri())
     found.wait_for_function("() => window.answer")
-    packs = {
-        "palm-layers": radial_pack(BODIES["palm-layers"]),
-        "paper-sheet": sheet_pack(BODIES["paper-sheet"]),
-    }
-    for name, pack in packs.items():
-        record = record_of(BODIES[name], pack, name, waves=False)
-        found.evaluate("record => window.open_(record)", record)
+    for name, pack_of in (("palm-layers", radial_pack), ("paper-sheet", sheet_pack)):
+        add(found, name, pack_of(BODIES[name]))
     yield found
     found.close()
 
 
-def scenes(name, count, places=(), lowest=0.15, **tacton):
-    """Random scenes on a body, as their steady and waveforms."""
+def add(page, name, pack):
+    """Open a body on the page."""
+    page.evaluate("own => window.open_(own)", record_of(BODIES[name], pack, name, waves=False))
+
+
+def scenes(name, count, places=(), **tacton):
+    """Random scenes on a body, the same every time."""
     rng = np.random.default_rng(11)
-    found = [random_scene(BODIES[name], rng, lowest, places) for _ in range(count)]
+    found = [random_scene(BODIES[name], rng, 0.15, places) for _ in range(count)]
     given = {"duration": 0.3} | tacton
     return [
         replace(s, pressure=replace(s.pressure, tacton=replace(s.tacton, **given))) for s in found
     ]
 
 
-def line_errors(page, name, made, lines_of):
-    """Errors of the page's lines above -40 dB, relative to each."""
+def answer(page, name, scene):
+    """What the page answers."""
+    values = values_of(scene, name)
+    return page.evaluate("given => window.answer(given)", {"name": name, "values": values})
+
+
+def line_errors(page, name, made, lines_of, shown=SHOWN, highest=HIGHEST):
+    """Errors of the page's lines above a share of the strongest, relative to each."""
     found = []
     for scene in made:
-        own = page.evaluate("given => window.answer(given)",
-                            {"name": name, "values": values_of(scene, name)})  # fmt: skip
+        own = answer(page, name, scene)
         lines = np.array(own["re"]) + 1j * np.array(own["im"])
         at = dict(zip(np.round(own["f"], 3), lines, strict=True))
         f, exactly = lines_of(scene)
-        heard = (f > 0) & (f <= HIGHEST)
-        heard &= np.abs(exactly) > SHOWN * np.abs(exactly[heard]).max(initial=0.0)
-        found += [abs(at[x] - a) / abs(a) for x, a in zip(np.round(f[heard], 3), exactly[heard],
-                                                          strict=True)]  # fmt: skip
+        heard = (f > 0) & (f <= highest)
+        heard &= np.abs(exactly) > shown * np.abs(exactly[f > 0]).max(initial=0.0)
+        pairs = zip(np.round(f[heard], 3), exactly[heard], strict=True)
+        found += [abs(at[x] - a) / abs(a) for x, a in pairs]
     return np.array(found)
 
 
@@ -96,10 +101,8 @@ def wave_errors(page, name, made, waveform_of):
     """Errors of the page's waveforms from rest in the L2 norm."""
     found = []
     for scene in made:
-        own = page.evaluate("given => window.answer(given)",
-                            {"name": name, "values": values_of(scene, name)})  # fmt: skip
-        exactly = waveform_of(scene)
-        found.append(np.linalg.norm(np.array(own["u"]) - exactly) / np.linalg.norm(exactly))
+        own, exactly = np.array(answer(page, name, scene)["u"]), waveform_of(scene)
+        found.append(np.linalg.norm(own - exactly) / np.linalg.norm(exactly))
     return np.array(found)
 
 
@@ -115,5 +118,27 @@ def test_lines_and_waveforms_of_layers_and_sheets(page, name):
 @pytest.mark.parametrize("ramp", [0.0, 0.01])
 def test_pulses_of_a_rhythm(page, name, ramp):
     waveform_of = exact(BODIES[name])[1]
-    made = scenes(name, 2, rhythm=Rhythm(pulses=((0.06, 0.04), (0.03, 0.05)), ramp=ramp))
+    rhythm = Rhythm(pulses=((0.06, 0.04), (0.03, 0.05)), ramp=ramp)
+    made = scenes(name, 1, rhythm=rhythm, duration=0.2)
     assert wave_errors(page, name, made, waveform_of).max() < 0.02
+
+
+def test_a_body_of_elements(page):
+    add(page, "palm", element_pack(BODIES["palm"], H))
+    lines_of, waveform_of, places = exact(BODIES["palm"], H)
+    made = scenes("palm", 12, places)
+    errors = line_errors(page, "palm", made, lines_of, shown=0.1, highest=BAND)
+    assert np.median(errors) < 0.05
+    assert np.quantile(errors, 0.9) < 0.2  # of elements that are much larger than the focal spot
+    assert np.median(wave_errors(page, "palm", made[:5], waveform_of)) < 0.12
+    for scene in made[:3]:
+        u = np.abs(answer(page, "palm", scene)["u"])
+        assert u[0] < 1e-5 * u.max()
+
+
+@pytest.mark.parametrize("name", ["palm-layers", "paper-sheet"])
+def test_maps_are_what_is_read_at_their_places(page, name):
+    (scene,) = scenes(name, 1)
+    given = {"name": name, "values": values_of(scene, name), "k": 41 * 17 + 25}
+    pairs = np.array(page.evaluate("given => window.places(given)", given))
+    assert np.abs(pairs[:, 0] - pairs[:, 1]).max() < 3e-3 * np.abs(pairs).max()

@@ -66,8 +66,15 @@ def selftest(body: Body, name: str, most: int, lowest: float, error: float) -> l
     return found
 
 
-def exact(body: Body) -> tuple[Lines, Waveform, tuple[tuple[float, float], ...]]:
+def exact(
+    body: Body, h: float | None = None
+) -> tuple[Lines, Waveform, tuple[tuple[float, float], ...]]:
     """Return an exact model of a body, which does not use its pack.
+
+    Parameters
+    ----------
+    body : Body
+    h : metre, size of elements; by default that of packs
 
     Returns
     -------
@@ -79,8 +86,7 @@ def exact(body: Body) -> tuple[Lines, Waveform, tuple[tuple[float, float], ...]]
         return (_lines_of_layers, lambda scene: compute(scene, "flat-body").values[:, 0], ())
     if _is_plate(body):
         return (_lines_of_sheet, lambda scene: compute(scene, FROM_REST.name).values[:, 0], ())
-    h = body.of_kind.interactive_size
-    prepared = prepare(body, np.array(PLACES), h=h)
+    prepared = prepare(body, np.array(PLACES), h=h or body.of_kind.interactive_size)
 
     def index(scene: Scene) -> int:
         return int(np.linalg.norm(np.array(PLACES) - scene.probes[0], axis=1).argmin())
