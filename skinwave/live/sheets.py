@@ -31,7 +31,7 @@ ERROR = (
 BAND = 1300.0  # Hz: modes below are kept as they are
 COUPLED = 1.5  # times a line's frequency: modes below are solved together
 COUPLED_BAND = 2600.0  # Hz: loss couples modes below
-LEFT_OUT = 0.003  # of the largest combination of modes above the band
+LEFT_OUT = 0.005  # of the largest combination of modes above the band
 QUASI_STATIC = (0.0, 600.0, 1000.0)  # Hz at which these combinations are looked at
 
 
@@ -91,8 +91,8 @@ def combined(modes: PlateModes, fields: Floats) -> tuple[Floats, Floats, Floats]
     low = squared < (2 * np.pi * BAND) ** 2
     forces = smoothed(fields[~low], spot_width(LOWEST))
     motions = [forces / (squared[~low] - (2 * np.pi * f) ** 2)[:, None] for f in QUASI_STATIC]
-    directions, sizes, _ = np.linalg.svd(np.hstack(motions), full_matrices=False)
-    kept = directions[:, sizes > LEFT_OUT * sizes.max(initial=0.0)]
+    squares, directions = np.linalg.eigh(sum(each @ each.T for each in motions))
+    kept = directions[:, squares > LEFT_OUT**2 * squares.max(initial=0.0)]
     own, turned = np.linalg.eigh(kept.T @ (squared[~low][:, None] * kept))
     turn = np.zeros((len(squared), low.sum() + len(own)))
     turn[low, : low.sum()] = np.eye(low.sum())
