@@ -37,7 +37,7 @@ extensions = [
     "docstrings",  # as numpydoc has them
     "live_page",  # the page that computes
 ]
-exclude_patterns = ["_build", "extension", "_templates", "gallery/*.py", "sg_execution_times.rst",
+exclude_patterns = ["_build", "extension", "gallery/*.py", "sg_execution_times.rst",
                     "gallery/sg_execution_times.rst"]  # fmt: skip
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 4

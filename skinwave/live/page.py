@@ -14,8 +14,6 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from typing import Any
 
-from markupsafe import Markup
-
 from skinwave.document import render
 
 ENTRY = "page.js"
@@ -46,11 +44,11 @@ def page(data: Mapping[str, Any], title: str = TITLE) -> str:
     str
     """
     static = resources.files("skinwave.live") / "static"
-    script = Markup("\n" + bundle(static, ENTRY))
+    script = "\n" + bundle(static, ENTRY)
     return render(
         "live.html", title=title, script=script,
-        css=Markup((static / "page.css").read_text(encoding="utf-8")),
-        data=Markup(encoded(data)), policy=policy(script, served=bool(data.get("api"))),
+        css=(static / "page.css").read_text(encoding="utf-8"),
+        data=encoded(data), policy=policy(script, served=bool(data.get("api"))),
     )  # fmt: skip
 
 

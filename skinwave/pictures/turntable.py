@@ -5,14 +5,13 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure
 from simple_model.load_spectrum import Complex
 from skinwave.document import render
+from skinwave.live.arrays import quantised
 from skinwave.live.page import bundle, encoded
-from skinwave.live.radial import quantised
 from skinwave.pictures.figures import label
 from skinwave.pictures.render import outer_surface
 from skinwave.pictures.views import View
@@ -36,8 +35,8 @@ def turntable(view: View, frame: int) -> str:
     }  # fmt: skip
     static = resources.files("skinwave.live") / "static"
     return render(
-        "turntable.html", title=data["title"], data=Markup(encoded(data)),
-        script=Markup("\n" + bundle(static, "turntable.js")),
+        "turntable.html", title=data["title"], data=encoded(data),
+        script="\n" + bundle(static, "turntable.js"),
     )  # fmt: skip
 
 
