@@ -134,6 +134,7 @@ def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile, tmp_pat
     (beside := tmp_path / "beside").mkdir()
     small = ["small.toml", "--h", "10", "--quiet"]
     hand(hostile[1] / "body.stl")
+    (hostile[1] / "flat.toml").write_text('[body]\npreset = "skin-slab"\n')
     (hostile[1] / "wave.csv").write_text("t [s], v(0,0) [m/s]\n0, 1\n1, 2\n")
     asked = {
         "run": [*small, "--out", "out"],
@@ -156,6 +157,7 @@ def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile, tmp_pat
         "dispersion": ["small.toml", "--quiet"],
         "map": ["small.toml", "--step", "10", "--quiet"],
         "tradeoff": ["small.toml", "--quiet"],
+        "live": ["flat.toml", "--quiet"],
     }  # fmt: skip
     assert set(COMMANDS) == {*asked, "rerun", "validate", "verify", "web"}
     codes = dict.fromkeys(("compare", "infer", "relax", "tradeoff"), 1)

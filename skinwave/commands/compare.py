@@ -84,7 +84,7 @@ def run(options: argparse.Namespace) -> int:
         output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder,
         progress_of(options) as progress,
     ):
-        live = comparison_page(next(iter(scenes.values())).values(), progress)
+        live = comparison_page(next(iter(scenes.values())).values())
         if live:
             (folder / LIVE).write_text(live, encoding="utf-8")
         outcome = run_study(

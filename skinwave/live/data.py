@@ -61,13 +61,13 @@ def data_of(
     }  # fmt: skip
 
 
-def comparison_page(scenes: Iterable[Scene], progress: Progress = silent) -> str | None:
+def comparison_page(scenes: Iterable[Scene]) -> str | None:
     """Return the page of those scenes whose body has a pack within seconds; None if there are none
     or the page has no controls for them.
     """
     quick = [scene for scene in scenes if has_exact_lines(scene)]
     try:
-        return page(data_of(quick, progress, test=False)) if quick else None
+        return page(data_of(quick, test=False)) if quick else None
     except (ValueError, ArithmeticError):
         return None
 

@@ -34,8 +34,8 @@ FAINTNESS = 0.5  # power of the size of a frequency's motion by which it is divi
 ERROR = 0.1  # relative, of components up to `BAND` and within 20 dB of the strongest
 BAND = 300.0  # Hz
 WARNING = (
-    f"Components above {BAND:g} Hz, or more than 20 dB below the strongest one, may be off by more "
-    f"than {100 * ERROR:g} %. skinwave run computes them on the elements themselves."
+    f"The stated {100 * ERROR:g} % holds up to {BAND:g} Hz, for components within 20 dB of the "
+    "strongest one. Faster and weaker ones err more."
 )
 AT_ONCE = 32  # loads that are solved together
 LEFT_OUT = 1e-4  # of the mean-square motion: what the basis need not have

@@ -35,7 +35,7 @@ EXAMPLES = [
                                    "y": 0}),
         ("The best drawing speed", "On the skin slab waves reach their highest level at a lower "
          "drawing speed than the kernel: near 12 instead of 16 m/s.", "level",
-         {"shape": "circle", "am": 0, "size": 20, "speed": 6, "x": 10, "y": 0}),
+         {"shape": "circle", "am": 0, "size": 20, "speed": 12, "x": 10, "y": 0}),
         ("Two foci, two paths", "Each focus draws a circle of its own; their waves meet between "
          "them.", "maps",
          {"am": 140, "foci": 2, "paths": "circle/10/-20/0, circle/10/20/0", "drawn": 100}),

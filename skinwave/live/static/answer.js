@@ -64,8 +64,9 @@ function invalidity({ body, waves, x, y }) {
 function warnings({ load, body }) {
   const lost = unresolvedNames(load).map(typeset), found = [];
   if (lost.length) {
-    const more = lost.length > 4 ? ` and ${lost.length - 4} more` : "";
-    found.push(`The Tacton is too short to resolve ${lost.slice(0, 4).join(", ")}${more}.`);
+    const named = lost.slice(0, 2).join(" and ");
+    const more = lost.length > 2 ? `, and ${lost.length - 2} others` : "";
+    found.push(`The Tacton is too short to resolve the lines ${named}${more}. Make it longer.`);
   }
   const { x, y } = pathSamples(load), furthest = 1e3 * Math.max(...x.map((own, q) => Math.hypot(own, y[q])));
   if (furthest > body.reach_mm) {

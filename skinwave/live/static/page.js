@@ -68,6 +68,7 @@ function set(next, settled = true) {
   const other = next.body !== values.body;
   values = other ? { ...next, ...onBody(next) } : next;
   notice = "";
+  forgetTyped();
   if (settled) {
     history.add(values);
     writeAddress();
@@ -202,8 +203,8 @@ function drawMaps() {
       largest: top("kernel", maps.kernel.rms), title: "Kernel, RMS" });
   }
   const waves = view.look === "difference"
-    ? { rms: difference(maps.waves.rms, maps.kernel.rms), unit: "dB", largest: 20, signed: true,
-      title: "Waves − kernel" }
+    ? { rms: difference(maps.waves.rms, at ? at.maps.waves.rms : maps.kernel.rms), unit: "dB", largest: 40,
+      signed: true, title: at ? "B − A" : "Waves − kernel" }
     : { rms: maps.waves.rms, level: body.is_skin ? maps.waves.level : null, unit: "m", largest: wavesTop,
       title: at ? `B: ${short(body.title)}` : "Waves, RMS" };
   drawMap($("wave-map"), { ...marks, ...waves, hatched: answer.invalid });
@@ -241,11 +242,10 @@ function showPane() {
   if (view.tab === "lines") $("lines").innerHTML = linesTable(answer, pinned);
   else if (view.tab === "dispersion") {
     const plot = dispersionPlot(answer, view.highest);
-    $("dispersion").classList.toggle("none", !plot);
-    if (plot) plots.dispersion.draw(plot);
+    plots.dispersion.draw(plot);
   } else if (view.tab === "level") {
     if (levels) plots.level.draw(levelPlot(answer, view.over, levels));
-    $("best").disabled = !levels?.best;
+    $("best").disabled = !levels?.best || !answer.body.is_skin;
   } else {
     $("ab").innerHTML = pinned ? comparison(pinned, answer) : `<p class="note">Press Pin A to keep what is
       shown. Then change the body or a value to compare.</p>`;
@@ -479,9 +479,19 @@ function swap() {
   set({ ...other });
 }
 
+/** Fields show their values again: what was typed wrong in one is gone with the next valid value. */
+function forgetTyped() {
+  for (const key of errors.keys()) {
+    if (!(key in STARTS)) continue;
+    errors.delete(key);
+    controls.mark(key, "");
+  }
+}
+
 function restore(found) {
   if (!found) return;
   values = found;
+  forgetTyped();
   showBody();
   writeAddress();
   ask();

@@ -196,10 +196,14 @@ function toDecibel(axes, curves, names) {
   }
 }
 
-/** Plot of the phase speeds of a body's waves with the lines of the load; null if it has none. */
+/** Plot of the phase speeds of a body's waves with the lines of the load. */
 export function dispersionPlot(answer, highest) {
   const { body: { dispersion }, load: { path }, waves } = answer;
-  if (!dispersion) return null;
+  if (!dispersion) {
+    return { label: "No dispersion curves are known for this body", kept: "none",
+      x: { label: "frequency, Hz", range: [0, highest] }, y: { label: "m/s", range: [0, 10] }, curves: [],
+      names: [{ x: highest / 2, y: 5, axis: "y", text: "No dispersion curves are known for this body." }] };
+  }
   const speed = drawingFrequency(path) ? path.speed : 0, across = [0, highest];
   const typical = dispersion.branches.map(({ c }) => c.filter((v) => v !== null).sort((a, b) => a - b))
     .map((c) => c[Math.floor(c.length / 2)]).filter(Number.isFinite);
@@ -231,8 +235,9 @@ export function levelPlot(answer, key, { x, kernel, waves, best }) {
     label: `Sensation level over ${label}`, kept: key, x: { label: `${label}, ${unit}`, range: OVER[key] },
     y: { label: "dB above threshold", range: [low, top] },
     curves: [
-      { role: "kernel", axis: "y", name: "kernel", x, y: kernel },
-      { role: "waves", axis: "y", name: "waves", x, y: waves },
+      { role: "kernel", axis: "y", name: answer.body.is_skin ? "kernel" : "kernel alone: this body is not skin",
+        x, y: kernel },
+      ...(answer.body.is_skin ? [{ role: "waves", axis: "y", name: "waves", x, y: waves }] : []),
       { role: "threshold", axis: "y", x: OVER[key], y: [0, 0], dash: "5 3" },
       { role: "now", axis: "y", name: "now", x: [now, now], y: [low, top], dash: "2 3" },
     ],
@@ -255,9 +260,9 @@ export function fociAt(load, t) {
   return load.foci.map((ahead) => at((fd * t + ahead) % 1));
 }
 
-/** Where waves move more (positive) or less than the kernel predicts, in dB, each re its largest. */
-export function difference(waves, kernel) {
-  const largest = [waves, kernel].map((values) => values.reduce((most, v) => (v > most ? v : most), 0));
+/** Where one map has more (positive) or less than another, in dB, each re its largest. */
+export function difference(one, other) {
+  const largest = [one, other].map((values) => values.reduce((most, v) => (v > most ? v : most), 0));
   const level = (v, k) => Math.max(20 * Math.log10(v / largest[k]), FLOOR);
-  return Float32Array.from(waves, (v, k) => (Number.isNaN(v) ? NaN : level(v, 0) - level(kernel[k], 1)));
+  return Float32Array.from(one, (v, k) => (Number.isNaN(v) ? NaN : level(v, 0) - level(other[k], 1)));
 }

@@ -14,11 +14,11 @@ const far = (reach) => (reach ? `${reach.beyond ? "> " : ""}${fixed(1e3 * reach.
   : "nowhere");
 const subscript = (name) => escaped(name).replace(/_(\w+)/g, "<sub>$1</sub>");
 
-/** A number of dB, whole and with its sign. */
+/** A number of dB with its sign: whole, or with one digit if it is below 1. */
 export function signed(value) {
   if (!Number.isFinite(value)) return NONE;
-  const whole = Math.round(value);
-  return `${whole >= 0 ? "+" : "−"}${Math.abs(whole)}`;
+  const text = Math.abs(value).toFixed(Math.abs(value) < 0.95 ? 1 : 0);
+  return Number(text) === 0 ? text : `${value > 0 ? "+" : "−"}${text}`;
 }
 
 /** The four numbers of an answer as text; those of the skin are none on another body. */
@@ -30,7 +30,9 @@ function numbersOf({ body, level, reach, share, delay }) {
 /** HTML of the four tiles, with the numbers of what is pinned. */
 export function tiles(answer, pinned) {
   const own = numbersOf(answer), other = pinned && numbersOf(pinned), { level, reach, body } = answer;
-  const line = level ? `${level.f.toFixed(0)} Hz (${subscript(lineName(answer, level.f) || "line")})` : "";
+  const pauses = answer.load.pulses ? ", mean with pauses" : "";
+  const line = level
+    ? `${level.f.toFixed(0)} Hz (${subscript(lineName(answer, level.f) || "line")})${pauses}` : "";
   const tile = (key, name, help, detail, kernel) => `<div class="tile" title="${help}">
     <span class="name">${name}</span><span class="value">${own[key]}</span><span
       class="detail">${detail}</span>
