@@ -19,7 +19,7 @@ import fem.affine_solution
 import fem.reduced
 import skinwave
 from simple_model import MovingPressure, Response, Tacton
-from skinwave import models
+from skinwave import extensions, models
 from skinwave.cli import main
 from skinwave.models import Model, register
 from skinwave.models.free_keys import free_keys, with_values
@@ -426,6 +426,7 @@ def parabola():
         Model(name="parabola", method="", words="", solve=solve, error=None, is_infinite=True)
     )
     del models._MODELS["parabola"]
+    os.environ.pop(extensions.VARIABLE)  # which processes of other tests would read
 
 
 def test_a_best_value_is_refined_and_has_the_interval_of_its_samples(parabola):
