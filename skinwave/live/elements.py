@@ -31,7 +31,7 @@ REACH, SPACING = 0.031, 0.0058  # m from the middle to which foci are, and betwe
 FREQUENCIES = (20.0, 70.0, 130.0, 190.0, 260.0, 350.0, 470.0, 640.0, 900.0)  # Hz
 MOST = 500  # dimensions of the basis
 FAINTNESS = 0.5  # power of the size of a frequency's motion by which it is divided
-ERROR = 0.1  # relative, of components up to `BAND` and within 20 dB of the strongest
+ERROR = 0.2  # relative, of components up to `BAND` and within 20 dB of the strongest
 BAND = 300.0  # Hz
 WARNING = (
     f"The stated {100 * ERROR:g} % holds up to {BAND:g} Hz, for components within 20 dB of the "

@@ -18,7 +18,7 @@ from skinwave.models.advice import takes
 from skinwave.models.plate_modes import MODES
 from skinwave.scene import Body, Scene
 
-FORMAT = "live pack 3"  # of cached entries
+FORMAT = "live pack 4"  # of cached entries
 
 
 def pack_of(body: Body, progress: Progress = silent) -> dict[str, Any]:

@@ -49,15 +49,18 @@ def selftest(body: Body, name: str, most: int, lowest: float, error: float) -> l
     -------
     records of body, values, lines [{f in Hz, re, im in metre}] and the error that is allowed
     """
-    rng, found = np.random.default_rng(SEED), []
+    rng = np.random.default_rng(SEED)
+    found: list[dict[str, Any]] = []
     lines_of, _, places = exact(body)
     least, highest = (SHOWN_OF_ELEMENTS, HIGHEST_OF_ELEMENTS) if places else (SHOWN, HIGHEST)
-    for _ in range(most):
+    while len(found) < most:
         scene = random_scene(body, rng, lowest, places)
         f, amplitudes = lines_of(scene)
         size = np.abs(amplitudes)
         kept = (f > 0) & (f <= highest)
         kept &= size > least * size[(f > 0) & (f <= HIGHEST)].max(initial=0.0)
+        if not kept.any():  # such as that of a focus that neither moves nor is modulated
+            continue
         lines = zip(f[kept].tolist(), amplitudes[kept].tolist(), strict=True)
         found.append({
             "body": name, "values": values_of(scene, name), "error": error,

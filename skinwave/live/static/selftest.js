@@ -39,7 +39,7 @@ export async function runSelftest(data, bodyOf, loadOf) {
   said.dataset.error = largest;
   document.getElementById("selftest-table").innerHTML =
     `<p>${rows.length - failed} of ${rows.length} Tactons agree with Python within the stated error. The error
-      is that of the worst line above −40 dB, relative to the line.</p>
+      is that of the worst line that is compared, relative to the line.</p>
     <table><thead><tr>${["Body", "path", "lines", "worst at", "error", "allowed"].map((head) => (
       `<th scope="col">${head}</th>`)).join("")}</tr></thead><tbody>${rows.join("")}</tbody></table>`;
 }
