@@ -2,7 +2,7 @@
 
 import { QUANTITIES, amplitudesOf, delayOf, levelOf, mapAxis, mapOf, namesOf, reach, shareOutside,
   unresolvedNames } from "./numbers.js";
-import { pathSamples } from "./load.js";
+import { pathSamples, spotWidth } from "./load.js";
 import { loadOf } from "./values.js";
 
 const TOO_FAR = 0.5; // of a sheet's thickness, above which a linear model is not valid
@@ -72,6 +72,11 @@ function warnings({ load, body }) {
   if (furthest > body.reach_mm) {
     found.push(`The focus goes ${furthest.toFixed(0)} mm from the middle. Beyond ${body.reach_mm} mm this body's motion `
       + "is less accurate.");
+  }
+  const half = 1e3 * (body.grid?.half ?? Infinity), spot = 3e3 * spotWidth(load.height);
+  if (furthest + spot > half && Math.max(...body.extent_mm ?? []) > half) {
+    found.push(`The focal spot reaches beyond ${half.toFixed(0)} mm from the middle, where this file knows no motion. `
+      + "Weak lines are less accurate.");
   }
   return found;
 }

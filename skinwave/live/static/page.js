@@ -111,7 +111,7 @@ function showSlot() {
   const wrong = [...errors.values()].find(Boolean) ?? "";
   $("problem").textContent = wrong;
   const { title, error } = answer?.body ?? {};
-  const expected = error && !answer.invalid ? `${title}: motion is within ${rounded(100 * error, 2)} % of the full model` : "";
+  const expected = error && !answer.invalid ? `${title}: lines are within ${rounded(100 * error, 2)} % of the full model` : "";
   $("notice").textContent = wrong ? "" : notice || expected;
   const warned = [...new Set([...(answer?.body.warnings ?? []), ...(answer?.warnings ?? [])])];
   $("warned").hidden = !warned.length;
