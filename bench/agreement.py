@@ -30,8 +30,8 @@ import skinwave
 from fem.transient import Diverged
 from simple_model import Response
 from skinwave import models
-from skinwave.scene import Scene
-from skinwave.scene_file import from_table
+from skinwave.scene.file import from_table
+from skinwave.scene.scene import Scene
 
 SLACK = 1.2  # times the sum of the stated errors
 FLOOR = 2e-3  # relative: differences below it are round-off and interpolation

@@ -25,8 +25,8 @@ from bench.codes import CODES
 from bench.problem import Problem
 from skinwave.bodies.build import build
 from skinwave.models.prepared import answer, prepare, sample_times
-from skinwave.scene import PROBES, Body, Scene
-from skinwave.studies import paper15
+from skinwave.scene import paper15
+from skinwave.scene.scene import PROBES, Body, Scene
 
 SKIN = replace(fem.PRESETS["palm"], poisson=0.45)
 BODY = Body(material=SKIN, sides="free")

@@ -17,10 +17,10 @@ from simple_model import sensation_level
 from simple_model.compliance import Compliance
 from simple_model.path_operator import PathOperator, path_operator
 from skinwave.bodies.analytic import compliance
-from skinwave.scene import Scene
-from skinwave.spreads import spreads_of, with_values
-from skinwave.sweeps.variation import varied
-from skinwave.uncertainty.sampling import quantiles
+from skinwave.scene.scene import Scene
+from skinwave.scene.spreads import spreads_of, with_values
+from skinwave.scene.variation import varied
+from skinwave.sweeps.sampling import quantiles
 
 KEY, COLUMN, RANGE = "tacton.speed_m_per_s", "level_db[0]", "2:24:12"
 LOW, HIGH, STEPS = 2, 24, 10  # m/s, and fine steps in 1 m/s

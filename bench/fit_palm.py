@@ -19,9 +19,9 @@ from pathlib import Path
 import numpy as np
 
 import skinwave
-from skinwave.measurements import Measurement
-from skinwave.measurements.writing import write
-from skinwave.sweeps.variation import varied
+from skinwave.measure import Measurement
+from skinwave.measure.writing import write
+from skinwave.scene.variation import varied
 
 SCENE = Path(__file__).parent.parent / "examples/palm.toml"
 MODULUS, VISCOSITY = "body.material.shear_modulus_pa", "body.material.viscosity_pa_s"

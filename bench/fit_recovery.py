@@ -27,12 +27,11 @@ from numpy.polynomial import chebyshev
 from simple_model.flat_body import steady_lines
 from simple_model.load_spectrum import synthesise
 from skinwave.bodies.analytic import compliance
-from skinwave.fits import predicted
-from skinwave.fits.fit import fit
-from skinwave.measurements import Measurement
-from skinwave.scene import Scene
-from skinwave.scene_file import read
-from skinwave.sweeps.variation import varied
+from skinwave.measure import Measurement, predicted
+from skinwave.measure.fit import fit
+from skinwave.scene.file import read
+from skinwave.scene.scene import Scene
+from skinwave.scene.variation import varied
 
 SCENE = "examples/am-and-stm-on-skin.toml"
 MODULUS, VISCOSITY = "body.material.shear_modulus_pa", "body.material.viscosity_pa_s"

@@ -40,7 +40,7 @@ def parts() -> dict[str, tuple[tuple[str, ...], tuple[str, ...]]]:
 def write_scenes(folder: Path) -> None:
     """The examples, and the random scenes of `bench.planned`, as files."""
     from bench.planned import scene
-    from skinwave.scene_file import dumps
+    from skinwave.scene.file import dumps
 
     folder.mkdir(parents=True)
     for path in (ROOT / "examples").glob("*.toml"):

@@ -30,8 +30,8 @@ from skinwave.bodies.build import build, operators
 from skinwave.models.loads import probe_rows, surface_load
 from skinwave.models.prepared import answer, components, prepare
 from skinwave.models.symmetry import even_part
-from skinwave.scene import PROBES, SURFACE, Body, Scene
-from skinwave.studies import paper15
+from skinwave.scene import paper15
+from skinwave.scene.scene import PROBES, SURFACE, Body, Scene
 
 BODY = Body(sides="free")
 STRONGEST = (50.986, 140.0, 190.986)  # Hz, lines that are assessed

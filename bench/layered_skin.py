@@ -18,8 +18,8 @@ from simple_model.material import Material
 from simple_model.trajectory import Floats
 from skinwave.bodies import BODIES, Body
 from skinwave.bodies.parts import solid_of
-from skinwave.validate.published import EXPONENT, Published, wave_sets
-from skinwave.validate.waves import Curves, decay_exponents, leading_wave
+from skinwave.verify.published import EXPONENT, Published, wave_sets
+from skinwave.verify.published_waves import Curves, decay_exponents, leading_wave
 
 GRID = np.arange(100.0, 701.0, 100.0)  # Hz
 NO_WAVE, FURTHEST = np.log(3.0), 2.0  # of a factor: without a wave, and the largest that counts

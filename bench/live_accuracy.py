@@ -23,7 +23,7 @@ from skinwave.live.page import bundle
 from skinwave.live.records import record_of
 from skinwave.live.selftest import exact, random_scene
 from skinwave.live.values import values_of
-from skinwave.scene import BODIES
+from skinwave.scene.scene import BODIES
 
 CHROMIUM = "/usr/bin/chromium"
 BODY = ("skin-slab", "palm-layers", "paper-sheet", "palm")

@@ -11,11 +11,11 @@ import numpy as np
 import fem
 from simple_model import point_kernel
 from skinwave.bodies.build import build
-from skinwave.effort import Clock, peak_memory, silent
 from skinwave.models.full import TRANSIENT_RATE, assembled, meshed
 from skinwave.models.prepared import answer, prepare
-from skinwave.scene import PROBES, Body
-from skinwave.studies import paper15
+from skinwave.scene import paper15
+from skinwave.scene.scene import PROBES, Body
+from skinwave.system.effort import Clock, peak_memory, silent
 
 SIZES = (10e-3, 6e-3, 4.7e-3, 3.4e-3, 2.7e-3, 1.9e-3, 1.7e-3)  # m, of elements: to 500 k dofs
 MOST_MEMORY = 16 * 2**30  # bytes

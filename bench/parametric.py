@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 
 import skinwave
 from fem.line_basis import line_errors
-from skinwave import parametric
+from skinwave.models import parametric
 from skinwave.models.free_keys import values_at, with_values
 from skinwave.models.prepared import components
 from skinwave.models.prepared import prepare as own_body

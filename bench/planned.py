@@ -22,8 +22,8 @@ from simple_model import MovingPressure, Response, Tacton, Trajectory
 from skinwave.bodies.sizes import default_size
 from skinwave.models.prepared import answer
 from skinwave.planning.plan import plan
-from skinwave.scene import Body, Scene
-from skinwave.simulation import compute
+from skinwave.planning.simulate import compute
+from skinwave.scene.scene import Body, Scene
 
 FINEST = 0.7  # of the default element size
 COARSER = (2.6, 2.0, 1.6, 1.3, 1.0, 0.8)

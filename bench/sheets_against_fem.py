@@ -32,8 +32,8 @@ from skinwave.inference.design import Candidate, hypercube, middle, plate, press
 from skinwave.inference.scenes import scene_text
 from skinwave.models.prepared import Prepared, prepare
 from skinwave.models.reduction import read_at, respond
-from skinwave.scene_file import loads
-from skinwave.studies.paper15 import tactons
+from skinwave.scene.file import loads
+from skinwave.scene.paper15 import tactons
 
 CHOSEN = ("am140", "am80-stm10", "am210-stm20")
 HIGHEST = 300.0  # Hz

@@ -17,7 +17,7 @@ from simple_model import MovingPressure, Tacton, Trajectory
 from skinwave.bodies.parts import Layer, Relief
 from skinwave.models.prepared import answer, prepare
 from skinwave.planning.refinement import about_its_rest, relative_change
-from skinwave.scene import Body, Scene
+from skinwave.scene.scene import Body, Scene
 
 MOST = 1.1  # times the stated error
 LARGEST = 8000  # degrees of freedom: of more the reference takes minutes

@@ -34,7 +34,7 @@ from simple_model.material import Floats
 from simple_model.plate_modes import Plate, plate_modes
 from skinwave.inference.assess import finest
 from skinwave.inference.design import Candidate, middle, plate, pressure, probes, sizes
-from skinwave.studies.paper15 import tactons
+from skinwave.scene.paper15 import tactons
 
 FINER = 0.05  # of a clip's radius: elements at its sides, on the coarsest mesh
 GROWTH = 1.3  # of elements away from there

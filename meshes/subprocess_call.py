@@ -1,7 +1,7 @@
 """Programs in a process of their own, with limits of time and memory, for work that may crash,
 never end or change its process: readers of files, the mesher, what draws.
 
-`skinwave.processes` calls Python functions in processes.
+`skinwave.system.processes` calls Python functions in processes.
 """
 
 import math

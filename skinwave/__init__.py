@@ -6,7 +6,7 @@
 Names are imported when they are first used, so that `skinwave --help` is immediate.
 """
 
-from skinwave.safe_path import leave_out_working_folder
+from skinwave.system.safe_path import leave_out_working_folder
 
 leave_out_working_folder()
 
@@ -14,42 +14,43 @@ from importlib import import_module  # noqa: E402
 from typing import TYPE_CHECKING, Any  # noqa: E402
 
 if TYPE_CHECKING:  # what readers of types and editors see of the names below
-    from skinwave.citations import cite
-    from skinwave.comparison import Agreement, compare
-    from skinwave.effort import SkinwaveWarning
-    from skinwave.fields import Field, field
-    from skinwave.parametric import ParametricBody, prepare
-    from skinwave.pictures.styles import paper
-    from skinwave.planning.plan import Plan, plan
-    from skinwave.scene import BODIES, Body, Load, Scene, Sides
-    from skinwave.scene_file import dumps, loads, read
-    from skinwave.simulation import simulate
-    from skinwave.support_motion import SupportMotion
+    from skinwave.models.parametric import ParametricBody, prepare
+    from skinwave.planning.plan import plan
+    from skinwave.planning.records import Plan
+    from skinwave.planning.simulate import simulate
+    from skinwave.report.fields import Field, field
+    from skinwave.report.styles import paper
+    from skinwave.results.citations import cite
+    from skinwave.results.comparison import Agreement, compare
+    from skinwave.scene.file import dumps, loads, read
+    from skinwave.scene.scene import BODIES, Body, Load, Scene, Sides
+    from skinwave.scene.support_motion import SupportMotion
     from skinwave.sweeps.best import Best
     from skinwave.sweeps.in_python import SweepTable, best_value, sweep
+    from skinwave.system.effort import SkinwaveWarning
 
 _HOMES = {
-    "BODIES": "scene",
-    "Body": "scene",
-    "Load": "scene",
-    "Sides": "scene",
-    "Scene": "scene",
-    "read": "scene_file",
-    "loads": "scene_file",
-    "dumps": "scene_file",
-    "simulate": "simulation",
-    "SkinwaveWarning": "effort",
-    "SupportMotion": "support_motion",
-    "Plan": "planning.plan",
-    "Field": "fields",
-    "field": "fields",
-    "Agreement": "comparison",
-    "compare": "comparison",
+    "BODIES": "scene.scene",
+    "Body": "scene.scene",
+    "Load": "scene.scene",
+    "Sides": "scene.scene",
+    "Scene": "scene.scene",
+    "read": "scene.file",
+    "loads": "scene.file",
+    "dumps": "scene.file",
+    "simulate": "planning.simulate",
+    "SkinwaveWarning": "system.effort",
+    "SupportMotion": "scene.support_motion",
+    "Plan": "planning.records",
+    "Field": "report.fields",
+    "field": "report.fields",
+    "Agreement": "results.comparison",
+    "compare": "results.comparison",
     "plan": "planning.plan",
-    "ParametricBody": "parametric",
-    "prepare": "parametric",
-    "cite": "citations",
-    "paper": "pictures.styles",
+    "ParametricBody": "models.parametric",
+    "prepare": "models.parametric",
+    "cite": "results.citations",
+    "paper": "report.styles",
     "sweep": "sweeps.in_python",
     "best_value": "sweeps.in_python",
     "Best": "sweeps.best",

@@ -2,6 +2,6 @@
 
 import sys
 
-from skinwave.cli import main
+from skinwave.commands.cli import main
 
 sys.exit(main())

@@ -6,8 +6,8 @@ from importlib import resources
 
 from skinwave.live.page import bundle
 from skinwave.live.records import toml_of
-from skinwave.scene import BODIES
-from skinwave.scene_file import loads
+from skinwave.scene.file import loads
+from skinwave.scene.scene import BODIES
 
 USED = {
     "files": "adaptics linesCsv pyautd3 readMeasurement sceneToml waveformCsv waveformWav",

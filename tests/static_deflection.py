@@ -7,7 +7,7 @@ import numpy as np
 from simple_model import Response
 from skinwave.models import Model, Request, register
 from skinwave.models.limits import Limit, of_body, plain_only
-from skinwave.scene import Body, Scene
+from skinwave.scene.scene import Body, Scene
 
 
 def per_pressure(body: Body) -> float:

@@ -48,7 +48,7 @@ def described(record: type) -> dict[str, str]:
 def _choices() -> dict[str, Iterable[str]]:
     """Constants that docstrings name, whose values a reader of the page wants."""
     from simple_model.trajectory import BY_POINTS, SHAPES
-    from skinwave.load import LOADS
+    from skinwave.scene.load import LOADS
 
     return {"SHAPES": SHAPES, "BY_POINTS": BY_POINTS, "LOADS": LOADS}
 
@@ -62,7 +62,7 @@ def _listed(values: Iterable[str]) -> str:
 
 def commands() -> str:
     """Every command with its options, as its parser has them."""
-    from skinwave import cli
+    from skinwave.commands import cli
 
     actions = cli.parser()._actions
     (commands,) = (each for each in actions if isinstance(each, argparse._SubParsersAction))
@@ -99,9 +99,10 @@ def scene_keys() -> str:
     """Every key of a scene file with its meaning and the value that it takes if not given."""
     from simple_model import Material, MovingPressure, PronyTerm, Tacton, Trajectory
     from simple_model.rhythm import Rhythm, Signal
-    from skinwave import Body, Load, Scene, scene_keys
+    from skinwave import Body, Load, Scene
     from skinwave.bodies import Layer, Mounting, Phalanx, Placement, Relief
-    from skinwave.support_motion import SupportMotion
+    from skinwave.scene import keys as scene_keys
+    from skinwave.scene.support_motion import SupportMotion
 
     sections = scene_keys.SECTIONS
     records: dict[str, list[type]] = {
@@ -180,7 +181,7 @@ def models() -> str:
 def _takes(model: Any, body: Any) -> str:
     from simple_model import MovingPressure, Tacton
     from skinwave.models.advice import takes
-    from skinwave.scene import Scene
+    from skinwave.scene.scene import Scene
 
     scene = Scene(pressure=MovingPressure(tacton=Tacton()), body=body, probes=((0.0, 0.0),))
     return "yes" if takes(model, scene) else ""

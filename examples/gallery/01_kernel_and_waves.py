@@ -13,7 +13,7 @@ import numpy as np
 
 from simple_model import MovingPressure, Tacton, Trajectory
 from skinwave import Body, Scene, simulate
-from skinwave.surface import body_map, grid, kernel_map
+from skinwave.results.surface import body_map, grid, kernel_map
 
 circle = Trajectory(shape="circle", size=0.020, speed=4 * np.pi)  # m, m/s: 200 Hz
 load = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.5, trajectory=circle))

@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from skinwave import loads
-from skinwave.uncertainty.propagate import propagate
+from skinwave.sweeps.propagate import propagate
 
 scene = loads("""
 [tacton]

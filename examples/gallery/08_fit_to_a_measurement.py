@@ -14,9 +14,9 @@ import numpy as np
 
 from simple_model import MovingPressure, Tacton
 from skinwave import Body, Scene, simulate
-from skinwave.fits.fit import fit
-from skinwave.measurements import Measurement
-from skinwave.sweeps.variation import varied
+from skinwave.measure import Measurement
+from skinwave.measure.fit import fit
+from skinwave.scene.variation import varied
 
 places = tuple((1e-3 * x, 0.0) for x in (0, 4, 8, 12, 16))  # m
 load = MovingPressure(tacton=Tacton(am_frequency=120, duration=0.2))

@@ -16,9 +16,9 @@ import numpy as np
 from simple_model import MovingPressure, Tacton
 from simple_model.load_spectrum import synthesise
 from skinwave import Body, Scene, simulate
-from skinwave.measurements.alignment import align
-from skinwave.measurements.lines import lines_of
-from skinwave.measurements.reading import read
+from skinwave.measure.alignment import align
+from skinwave.measure.lines import lines_of
+from skinwave.measure.reading import read
 
 places = ((0.0, 0.0), (0.005, 0.0), (0.010, 0.0))  # m
 load = MovingPressure(tacton=Tacton(am_frequency=97, duration=0.3))

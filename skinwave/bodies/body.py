@@ -17,7 +17,6 @@ from simple_model.choices import choose
 from simple_model.compliance import Compliance
 from simple_model.dispersion import DispersionCurves
 from simple_model.material import NOT_SKIN, PRESETS
-from skinwave import extensions
 from skinwave.bodies.discretised import Discretise, Discretised
 from skinwave.bodies.mounting import FRAME, Mounting, check_extent
 from skinwave.bodies.parts import (
@@ -33,6 +32,7 @@ from skinwave.bodies.parts import (
     solid_of,
 )
 from skinwave.bodies.supports import USUAL, Sides, check_base, complete
+from skinwave.system import extensions
 
 KEYS = {"width": "size_x_mm", "height": "size_y_mm", "depth": "thickness_mm"}  # in a scene file
 LARGEST = 2.0  # m: a body of more was meant in mm

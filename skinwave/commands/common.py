@@ -12,15 +12,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from skinwave.models import names
-from skinwave.plain_text import say
+from skinwave.system.plain_text import say
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from simple_model import Response
-    from skinwave.effort import Progress
-    from skinwave.planning.plan import Plan
-    from skinwave.scene import Scene
+    from skinwave.planning.records import Plan
+    from skinwave.scene.scene import Scene
+    from skinwave.system.effort import Progress
 
 TOLERANCE = "relative error of waveforms"
 
@@ -63,7 +63,7 @@ def add_show(parser: argparse.ArgumentParser) -> None:
 def show(options: argparse.Namespace, figures: "Callable[[], Mapping[str, Figure]]") -> None:
     """Open windows, if these are asked for; a warning where none can be opened."""
     if options.show:
-        from skinwave.window import MISSING, has_windows, open_windows
+        from skinwave.report.window import MISSING, has_windows, open_windows
 
         if has_windows():
             open_windows(figures())
@@ -93,7 +93,7 @@ def required_plan(
     options: argparse.Namespace, scene: "Scene", progress: "Progress | None" = None
 ) -> "Plan":
     """Plan with the user's choices; a warning for each that exceeds the tolerance."""
-    from skinwave.simulation import required_plan
+    from skinwave.planning.simulate import required_plan
 
     required = required_plan(
         scene, options.model, options.tolerance, progress,
@@ -132,7 +132,7 @@ def note_central_values(options: argparse.Namespace) -> None:
         return
     if getattr(options, "quiet", False):
         return
-    from skinwave.scene_file import content, read
+    from skinwave.scene.file import content, read
 
     with warnings.catch_warnings(), suppress(ValueError):
         warnings.simplefilter("ignore")
@@ -163,7 +163,7 @@ def progress_of(options: argparse.Namespace) -> "Iterator[Progress]":
     if options.quiet or options.json:
         yield lambda phase, fraction: None
         return
-    from skinwave.progress_bar import bar
+    from skinwave.system.progress_bar import bar
 
     with bar() as shown:
         yield shown

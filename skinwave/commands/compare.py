@@ -9,8 +9,8 @@ from skinwave.commands.common import add_mesh, add_output, metre, progress_of, s
 from skinwave.models import names
 
 if TYPE_CHECKING:
-    from skinwave.scene import Body
-    from skinwave.studies.measured_study import Measured
+    from skinwave.measure.measured_study import Measured
+    from skinwave.scene.scene import Body
 
 LIVE = "live.html"
 TITLE = "The paper's 15 Tactons: point kernel, {}"
@@ -50,16 +50,17 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from skinwave import document, record
-    from skinwave.files import folder_name
     from skinwave.live.data import comparison_page
-    from skinwave.outputs import output_folder
-    from skinwave.pictures.figures import label
-    from skinwave.scene import with_body
-    from skinwave.scene_file import read
-    from skinwave.studies import paper15
-    from skinwave.studies.measured_runs import at_measured
+    from skinwave.measure.measured_runs import at_measured
+    from skinwave.report.figures import label
+    from skinwave.results import record
+    from skinwave.results.files import folder_name
+    from skinwave.results.outputs import output_folder
+    from skinwave.scene import paper15
+    from skinwave.scene.file import read
+    from skinwave.scene.scene import with_body
     from skinwave.studies.study import own_scenes, paper_scenes, run_study
+    from skinwave.system import document
 
     paper = options.scene == "paper-15"
     scene = None if paper else read(options.scene)
@@ -139,8 +140,8 @@ def _measured(options: argparse.Namespace) -> "Measured | None":
         return None
     if options.scene == "paper-15":
         raise ValueError("--measured is of one scene, and paper-15 has 15; name its scene file")
-    from skinwave.measurements.reading import read_alone
-    from skinwave.studies.measured_study import Measured
+    from skinwave.measure.measured_study import Measured
+    from skinwave.measure.reading import read_alone
 
     delay = None if options.delay is None else options.delay / 1e3
     return Measured(measurement=read_alone(options.measured), delay=delay, gain=options.gain)
@@ -148,7 +149,7 @@ def _measured(options: argparse.Namespace) -> "Measured | None":
 
 def _chosen_body(options: argparse.Namespace) -> "dict[str, Body]":
     """By its name, the body that is asked for instead of paper and skin."""
-    from skinwave.scene import BODIES, Body
+    from skinwave.scene.scene import BODIES, Body
 
     if options.body in BODIES:
         return {options.body: BODIES[options.body]}

@@ -5,7 +5,7 @@ from math import isfinite
 from pathlib import Path
 
 from skinwave.commands.common import add_reporting, metre, summarise
-from skinwave.plain_text import number_in
+from skinwave.system.plain_text import number_in
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -30,9 +30,9 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from skinwave.outputs import output_file
     from skinwave.patterns import Options, convert
-    from skinwave.scene_file import read
+    from skinwave.results.outputs import output_file
+    from skinwave.scene.file import read
 
     asked = Options(
         rate=options.rate,

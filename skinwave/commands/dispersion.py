@@ -35,11 +35,11 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from skinwave import record
-    from skinwave.outputs import output_folder
-    from skinwave.scene import check_load
-    from skinwave.scene_file import read
-    from skinwave.simulation import check_options
+    from skinwave.planning.simulate import check_options
+    from skinwave.results import record
+    from skinwave.results.outputs import output_folder
+    from skinwave.scene.file import read
+    from skinwave.scene.scene import check_load
     from skinwave.studies.dispersion_page import observed_sentence, sentences, taken_as, write
     from skinwave.studies.driven_modes import driven_modes
 

@@ -3,7 +3,7 @@
 import argparse
 import json
 
-from skinwave.plain_text import say
+from skinwave.system.plain_text import say
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -14,7 +14,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from skinwave.doctor import examine
+    from skinwave.commands.installation import examine
 
     found = examine()
     if options.json:

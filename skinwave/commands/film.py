@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from skinwave.commands.common import add_mesh, add_reporting, metre, progress_of, summarise, warn
 
 if TYPE_CHECKING:
-    from skinwave.effort import Progress
-    from skinwave.pictures.views import View
+    from skinwave.results.views import View
+    from skinwave.system.effort import Progress
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -41,10 +41,10 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from skinwave.outputs import output_path
-    from skinwave.pictures.films import check_format, film, seam
-    from skinwave.pictures.renderer import renderer
-    from skinwave.pictures.styles import style
+    from skinwave.report.films import check_format, film, seam
+    from skinwave.report.renderer import renderer
+    from skinwave.report.styles import style
+    from skinwave.results.outputs import output_path
 
     source = options.source
     out = options.out or Path(f"{source.resolve().stem}.gif")
@@ -66,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _views(options: argparse.Namespace, progress: "Progress") -> "list[View]":
     """Motion to show: of a folder what it keeps, of a scene every model's response."""
-    from skinwave.reports.album import open_album
+    from skinwave.studies.album import open_album
 
     if not options.source.is_dir():
         return _computed(options, progress)
@@ -84,9 +84,9 @@ def _views(options: argparse.Namespace, progress: "Progress") -> "list[View]":
 
 def _computed(options: argparse.Namespace, progress: "Progress") -> "list[View]":
     """Views of a scene, coloured by the quantity that is asked for."""
-    from skinwave.document import worst_warnings
-    from skinwave.reports.album import answers, coloured, plans_of, shown_scenes
-    from skinwave.scene_file import read
+    from skinwave.scene.file import read
+    from skinwave.studies.album import answers, coloured, plans_of, shown_scenes
+    from skinwave.system.document import worst_warnings
 
     scene = read(options.source)
     if options.quantity is not None:

@@ -39,12 +39,12 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from skinwave import record
-    from skinwave.fits.findings import cautions, sentences
-    from skinwave.fits.fit import fit, sampled
-    from skinwave.fits.page import summary, write
-    from skinwave.outputs import output_folder
-    from skinwave.scene_file import read
+    from skinwave.measure.findings import cautions, sentences
+    from skinwave.measure.fit import fit, sampled
+    from skinwave.measure.fit_page import summary, write
+    from skinwave.results import record
+    from skinwave.results.outputs import output_folder
+    from skinwave.scene.file import read
 
     if options.seed < 0:
         raise ValueError(f"--seed = {options.seed} is below 0; give 0 or a whole number above")

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from skinwave.commands.common import add_reporting, progress_of, summarise
-from skinwave.plain_text import say
+from skinwave.system.plain_text import say
 
 if TYPE_CHECKING:
     from skinwave.sweeps.sweep import SweepOutcome
@@ -38,7 +38,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from skinwave import record
+    from skinwave.results import record
     from skinwave.sweeps import engine
 
     engine.check(options.scheduler)

@@ -30,7 +30,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
     from skinwave.live.data import data_of, read_scene
     from skinwave.live.page import page
-    from skinwave.outputs import output_file
+    from skinwave.results.outputs import output_file
 
     scenes = [read_scene(path) for path in options.scenes]
     inputs = [*options.scenes, *(scene.body.file for scene in scenes if scene.body.file)]

@@ -30,11 +30,11 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
     from dataclasses import replace
 
-    from skinwave import record
-    from skinwave.outputs import output_folder
-    from skinwave.quantity_map import quantity_map
-    from skinwave.scene_file import read
-    from skinwave.scene_keys import depth_of
+    from skinwave.results import record
+    from skinwave.results.outputs import output_folder
+    from skinwave.results.quantity_map import quantity_map
+    from skinwave.scene.file import read
+    from skinwave.scene.keys import depth_of
     from skinwave.studies.quantity_map_page import sentences, write
 
     scene = read(options.scene)

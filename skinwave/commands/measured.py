@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from skinwave.commands.common import add_output, summarise
 
 if TYPE_CHECKING:
-    from skinwave.measurements import Measurement
-    from skinwave.measurements.inspection import Inspection
+    from skinwave.measure import Measurement
+    from skinwave.measure.inspection import Inspection
 
 SIGNS = {"in": 1, "out": -1}
 
@@ -43,7 +43,7 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
 
 def measured_in(file: Path, options: argparse.Namespace) -> "Measurement":
     """The measurement in a file, by the options of `add_reading`."""
-    from skinwave.measurements.reading import places_of, read
+    from skinwave.measure.reading import places_of, read
 
     return read(
         file, quantity=options.quantity, unit=options.unit,
@@ -56,8 +56,8 @@ def measured_in(file: Path, options: argparse.Namespace) -> "Measurement":
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from skinwave.measurements.inspection import inspect
-    from skinwave.measurements.summary import summary, text
+    from skinwave.measure.inspection import inspect
+    from skinwave.measure.summary import summary, text
 
     measured = measured_in(options.file, options)
     found = inspect(measured, alarm=options.false_alarm)
@@ -72,9 +72,9 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _write(options: argparse.Namespace, found: "Inspection") -> None:
-    from skinwave import record
-    from skinwave.measurements.inspection_page import write
-    from skinwave.outputs import output_folder
+    from skinwave.measure.inspection_page import write
+    from skinwave.results import record
+    from skinwave.results.outputs import output_folder
 
     with output_folder(options.out, overwrite=options.overwrite, inputs=[options.file]) as folder:
         write(folder, found)

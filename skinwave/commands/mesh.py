@@ -44,7 +44,7 @@ def run(options: argparse.Namespace) -> int:
 
     from meshes import body_from_file, dihedral_angles, write
     from meshes.files.mesh_files import WRITTEN
-    from skinwave.outputs import output_path
+    from skinwave.results.outputs import output_path
 
     out = options.out or Path(f"{options.file.stem}-mesh.vtu")
     if out.suffix.lower() not in WRITTEN:

@@ -13,12 +13,12 @@ from skinwave.commands.common import (
     required_plan,
     show,
 )
-from skinwave.plain_text import say
+from skinwave.system.plain_text import say
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from skinwave.scene import Scene
+    from skinwave.scene.scene import Scene
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -36,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
 
     from skinwave.planning.budget import mesh_row
     from skinwave.planning.costs import rows
-    from skinwave.scene_file import read
+    from skinwave.scene.file import read
 
     scene = read(options.scene)
     required = required_plan(options, scene)
@@ -54,6 +54,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _figures(scene: "Scene") -> "dict[str, Figure]":
-    from skinwave.pictures.scene_plot import scene_figure
+    from skinwave.report.scene_plot import scene_figure
 
     return {scene.name: scene_figure(scene)}

@@ -38,10 +38,10 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.sweeps import dataset, engine
 
     engine.check("threads")
-    from skinwave.files import distinct_names
-    from skinwave.outputs import output_file
-    from skinwave.pictures.figures import drawn
-    from skinwave.pictures.styles import style
+    from skinwave.report.figures import drawn
+    from skinwave.report.styles import style
+    from skinwave.results.files import distinct_names
+    from skinwave.results.outputs import output_file
     from skinwave.sweeps.sweep_figures import (
         SPEED,
         finished,

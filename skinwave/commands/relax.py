@@ -27,13 +27,14 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from skinwave import document, record
-    from skinwave.outputs import output_folder
-    from skinwave.scene_file import read
-    from skinwave.simulation import check_options
+    from skinwave.planning.simulate import check_options
+    from skinwave.results import record
+    from skinwave.results.outputs import output_folder
+    from skinwave.scene.file import read
     from skinwave.studies.assumptions import DEVICE_RATES, check_rate
     from skinwave.studies.relax import hierarchy_of
     from skinwave.studies.relax_page import efforts, sentence, write
+    from skinwave.system import document
 
     h = metre(options.h)
     check_options("auto", h=h)
@@ -64,8 +65,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _mechanisms(options: argparse.Namespace, h: float | None) -> int:
-    from skinwave import record
-    from skinwave.outputs import output_folder
+    from skinwave.results import record
+    from skinwave.results.outputs import output_folder
     from skinwave.studies.mechanisms import paper_vs_skin, sentences, write
 
     out = options.out or Path("paper-vs-skin")

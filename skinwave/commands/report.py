@@ -43,11 +43,11 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from skinwave import record
-    from skinwave.outputs import output_folder
-    from skinwave.pictures.styles import style
-    from skinwave.reports.scene_report import write_report
-    from skinwave.scene_file import read
+    from skinwave.report.styles import style
+    from skinwave.results import record
+    from skinwave.results.outputs import output_folder
+    from skinwave.scene.file import read
+    from skinwave.studies.scene_report import write_report
 
     chosen = style(options.style, options.width)
     source, made = options.source, options.source.is_dir()
@@ -63,11 +63,12 @@ def run(options: argparse.Namespace) -> int:
         progress_of(options) as progress,
     ):
         if scene is not None:
-            from skinwave.reports.album import make
+            from skinwave.studies.album import make
+            from skinwave.verify.suite import quick_cases
 
             said = make(
                 folder, scene, progress, h=metre(options.h), solver=options.solver,
-                beside=options.beside, command=_again(options),
+                beside=options.beside, command=_again(options), cases=quick_cases(progress),
             )  # fmt: skip
             warn(said)
         write_report(

@@ -39,9 +39,9 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from skinwave import record
-    from skinwave.effort import threads
-    from skinwave.marks import within
+    from skinwave.results import record
+    from skinwave.results.marks import within
+    from skinwave.system.effort import threads
 
     kept = record.read(options.folder)
     if kept["threads"].items() - threads().items():  # which are set when a process begins
@@ -102,7 +102,7 @@ def _command_again(
 
 def _words(key: str, value: Any) -> Iterator[str]:
     """An option of a record as it would be typed; nothing where it was not given."""
-    from skinwave.record import REPORTING
+    from skinwave.results.record import REPORTING
 
     known = re.fullmatch(r"[a-z_]+", key) and key not in REPORTING
     if value is None or value is False or value == []:
@@ -149,12 +149,12 @@ def _model_again(options: argparse.Namespace, kept: dict[str, Any], scene: Path,
     from dataclasses import replace
     from math import nan
 
-    from skinwave.files import fill
-    from skinwave.fitting import fitting
-    from skinwave.outputs import output_folder
-    from skinwave.run import Run
-    from skinwave.scene_file import read
-    from skinwave.simulation import answered, compute
+    from skinwave.planning.simulate import answered, compute
+    from skinwave.results.files import fill
+    from skinwave.results.outputs import output_folder
+    from skinwave.results.run import Run
+    from skinwave.scene.file import read
+    from skinwave.system.json_kinds import fitting
 
     asked, by = kept["command"]["options"], kept["command"]["name"]
     kinds = {"h": float, "dt": float, "solver": str, "model": str, "tacton": str, "body": str}

@@ -23,7 +23,7 @@ from skinwave.commands.common import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from skinwave.run import Run
+    from skinwave.results.run import Run
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -45,15 +45,15 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from skinwave import record
-    from skinwave.outputs import output_folder
-    from skinwave.run import Run
-    from skinwave.scene import body_name
-    from skinwave.scene_file import read
-    from skinwave.simulation import follow
-    from skinwave.spreads import spreads_of
+    from skinwave.planning.simulate import follow
+    from skinwave.results import record
+    from skinwave.results.outputs import output_folder
+    from skinwave.results.run import Run
+    from skinwave.scene.file import read
+    from skinwave.scene.scene import body_name
+    from skinwave.scene.spreads import spreads_of
     from skinwave.studies.study_page import write_single
-    from skinwave.uncertainty.sampling import check
+    from skinwave.sweeps.sampling import check
 
     scene = read(options.scene)
     if options.samples is not None:
@@ -87,7 +87,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _figures(run: "Run") -> "dict[str, Figure]":
-    from skinwave.pictures.figures import tacton_figure
+    from skinwave.report.figures import tacton_figure
 
     return {run.tacton: tacton_figure(run.tacton, [run])}
 
@@ -96,8 +96,8 @@ def _uncertainty(
     options: argparse.Namespace, run: "Run", h: float | None, folder: Path
 ) -> list[str]:
     """Bands over samples of the uncertain numbers: their tables in the folder, parts of a page."""
-    from skinwave.effort import usable_cores
-    from skinwave.uncertainty.report import uncertainty_of, write
+    from skinwave.sweeps.ensemble_page import uncertainty_of, write
+    from skinwave.system.effort import usable_cores
 
     with progress_of(options) as progress:
         known = uncertainty_of(

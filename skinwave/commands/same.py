@@ -20,7 +20,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; 0 if they hold the same, 1 if not."""
-    from skinwave.same import differences
+    from skinwave.results.same import differences
 
     found = differences(options.first, options.second, options.rtol)
     sentence = f"the same within {options.rtol:g}"

@@ -20,10 +20,10 @@ from skinwave.commands.common import (
     summarise,
 )
 from skinwave.models import names
-from skinwave.plain_text import say
+from skinwave.system.plain_text import say
 
 if TYPE_CHECKING:
-    from skinwave.effort import Progress
+    from skinwave.system.effort import Progress
 
 SAID_EACH = 5.0  # s between two lines of progress on a pipe
 
@@ -67,14 +67,14 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
     from importlib.metadata import version
 
-    from skinwave import record
+    from skinwave.results import record
     from skinwave.sweeps import dataset, engine
 
     engine.check(options.scheduler)
+    from skinwave.scene.variation import SAMPLED, cases, combinations, parse
+    from skinwave.sweeps import of_sweep
     from skinwave.sweeps.best import Request, best_value, check
     from skinwave.sweeps.sweep import ModelOptions, sweep
-    from skinwave.sweeps.variation import SAMPLED, cases, combinations, parse
-    from skinwave.uncertainty import of_sweep
 
     if options.seed < 0:
         raise ValueError(f"--seed = {options.seed} is below 0; give 0 or a whole number above")

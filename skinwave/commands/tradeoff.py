@@ -14,9 +14,9 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from skinwave import record
-    from skinwave.outputs import output_folder
-    from skinwave.scene_file import read
+    from skinwave.results import record
+    from skinwave.results.outputs import output_folder
+    from skinwave.scene.file import read
     from skinwave.studies.tradeoff import sentences, study, write
 
     scene = read(options.scene)

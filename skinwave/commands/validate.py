@@ -28,12 +28,12 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from skinwave import record
-    from skinwave.outputs import output_folder
-    from skinwave.validate.compared import tallies
-    from skinwave.validate.finger import EXAMPLE
-    from skinwave.validate.page import write
-    from skinwave.validate.validation import sentences, validate
+    from skinwave.results import record
+    from skinwave.results.outputs import output_folder
+    from skinwave.verify.compared import tallies
+    from skinwave.verify.finger import EXAMPLE
+    from skinwave.verify.validation import sentences, validate
+    from skinwave.verify.validation_page import write
 
     zigzags = [(Path(file), _speed(speed)) for file, speed in options.zigzag]
     if options.hand == Path():
@@ -59,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _speed(text: str) -> float:
     """Longitudinal speed in m/s of a word of the command line."""
-    from skinwave.validate.zigzag import SPEEDS
+    from skinwave.verify.zigzag import SPEEDS
 
     known = ", ".join(f"{v:g}" for v in SPEEDS)
     try:

@@ -14,8 +14,8 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from skinwave import record
-    from skinwave.outputs import output_folder
+    from skinwave.results import record
+    from skinwave.results.outputs import output_folder
     from skinwave.verify.page import summary_table
     from skinwave.verify.suite import run_suite, suite
 

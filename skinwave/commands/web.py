@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 from skinwave.commands.common import progress_of
-from skinwave.plain_text import say
+from skinwave.system.plain_text import say
 
 QUICK = ("skin-slab", "paper-sheet")  # bodies whose packs take seconds
 

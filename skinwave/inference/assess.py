@@ -29,9 +29,7 @@ from skinwave.inference.design import (
     probes,
     thickness,
 )
-from skinwave.run import Run
-from skinwave.scene import BODIES, Scene
-from skinwave.studies.claims import (
+from skinwave.results.claims import (
     BOTH,
     CLAIMS,
     MUCH_LOWER,
@@ -41,7 +39,9 @@ from skinwave.studies.claims import (
     rivals,
     strongest_rival,
 )
-from skinwave.studies.paper15 import tactons
+from skinwave.results.run import Run
+from skinwave.scene.paper15 import tactons
+from skinwave.scene.scene import BODIES, Scene
 
 MODEL, BODY = "plate-modes", "sheet"
 FINEST = 1.35  # of the bending wavenumber at the frequency below: strong lines within 2 %

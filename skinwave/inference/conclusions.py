@@ -28,9 +28,9 @@ from skinwave.inference.knowledge import (
 from skinwave.inference.nearest_sheets import rival_level
 from skinwave.inference.ranking import nearest
 from skinwave.inference.stretched_words import stretched_sentences
-from skinwave.numbers import decibel, significant
-from skinwave.studies.claims import MUCH_LOWER
-from skinwave.studies.paper15 import PATHS
+from skinwave.results.claims import MUCH_LOWER
+from skinwave.scene.paper15 import PATHS
+from skinwave.system.numbers import decibel, significant
 
 FIRST = 3  # parameters that are named
 CERTAIN = 0.5  # of a claim's entropy: a parameter that takes this away decides it

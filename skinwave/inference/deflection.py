@@ -12,7 +12,7 @@ import numpy as np
 from skinwave.inference.assess import CLAIMED
 from skinwave.inference.knowledge import Mask, Row, Share, holds, in_percent, percent, share
 from skinwave.inference.ranking import PLAUSIBLE
-from skinwave.numbers import significant
+from skinwave.system.numbers import significant
 
 LINEAR = 0.5  # thicknesses: a plate that deflects further stretches
 BOUNDS = (PLAUSIBLE, 2.0, LINEAR)  # thicknesses of the linear static deflection

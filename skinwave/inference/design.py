@@ -16,7 +16,7 @@ from simple_model import MovingPressure, Tacton
 from simple_model.drive import DRIVES
 from simple_model.plate_modes import Plate
 from skinwave.inference import drive_laws
-from skinwave.sweeps.variation import Variation, combinations
+from skinwave.scene.variation import Variation, combinations
 
 Candidate = Mapping[str, Any]
 

@@ -20,9 +20,9 @@ from skinwave.inference.knowledge import (
     told,
     variance_share,
 )
-from skinwave.pictures.figures import REPORT, SPARE
-from skinwave.pictures.styles import Style
-from skinwave.studies.claims import MUCH_LOWER
+from skinwave.report.figures import REPORT, SPARE
+from skinwave.report.styles import Style
+from skinwave.results.claims import MUCH_LOWER
 
 BLUE, ORANGE = "#0072B2", "#D55E00"
 LEVEL = "strongest line but f_AM, dB re f_AM"

@@ -7,7 +7,7 @@ from skinwave.inference import stretched_table
 from skinwave.inference.nearest_sheets import sheets
 from skinwave.inference.page import drawings, page
 from skinwave.inference.scenes import scene_text
-from skinwave.outputs import output_file
+from skinwave.results.outputs import output_file
 from skinwave.sweeps import dataset
 
 PAGE = "index.html"

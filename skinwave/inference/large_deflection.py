@@ -25,9 +25,9 @@ from skinwave.models import named
 from skinwave.models.advice import beyond
 from skinwave.models.stretching import MOST_MODES, unstretched_lines
 from skinwave.planning.sheets import modes_below
-from skinwave.run import Run
-from skinwave.simulation import compute
-from skinwave.studies.paper15 import tactons
+from skinwave.planning.simulate import compute
+from skinwave.results.run import Run
+from skinwave.scene.paper15 import tactons
 
 MODEL = "fem-nonlinear"
 HIGHEST = 420.0  # Hz: 2 f_AM, the highest of the lines that decide M4 and M5

@@ -8,7 +8,7 @@ from skinwave.inference.assess import CLAIMED
 from skinwave.inference.design import PARAMETERS, Parameter, used
 from skinwave.inference.knowledge import Row, holds, value_words
 from skinwave.inference.ranking import PLAUSIBLE, is_plausible, nearest
-from skinwave.numbers import decibel, significant
+from skinwave.system.numbers import decibel, significant
 
 SHEETS = 3  # that are shown
 

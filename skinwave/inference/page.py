@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 from matplotlib.figure import Figure
 
-from skinwave import document
 from skinwave.inference.assess import CLAIMED
 from skinwave.inference.conclusions import (
     conclusions,
@@ -33,8 +32,9 @@ from skinwave.inference.knowledge import (
 )
 from skinwave.inference.nearest_sheets import heading, left_out, sheet_table, sheets
 from skinwave.inference.stretched_words import LARGE, refused_sentence, stretched_table
-from skinwave.pictures.figures import png
-from skinwave.studies.claims import MUCH_LOWER, TEXTS
+from skinwave.report.figures import png
+from skinwave.results.claims import MUCH_LOWER, TEXTS
+from skinwave.system import document
 
 TITLE = "Which sheet did they measure?"
 METHOD = (

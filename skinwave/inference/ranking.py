@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from skinwave.inference.assess import CLAIMED
-from skinwave.studies.claims import MUCH_LOWER
+from skinwave.results.claims import MUCH_LOWER
 
 PLAUSIBLE = 10.0  # thicknesses, about 1 mm, by which a sheet that was measured may sag
 Row = Mapping[str, Any]

@@ -21,8 +21,8 @@ from skinwave.inference.design import (
     tensions,
     thickness,
 )
-from skinwave.scene import Scene
-from skinwave.scene_file import from_table
+from skinwave.scene.file import from_table
+from skinwave.scene.scene import Scene
 
 EXTENSION = "skinwave.inference.registered_laws"
 TACTON = {"am_frequency_hz": 140.0, "shape": "circle", "size_mm": 20.0, "speed_m_per_s": 12.0}

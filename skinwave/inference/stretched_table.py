@@ -10,11 +10,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from skinwave.effort import Progress, one_thread
 from skinwave.inference.large_deflection import CLAIMS, deciding, stretched_row, stretched_sheets
 from skinwave.inference.ranking import Row
 from skinwave.sweeps import dataset, engine
 from skinwave.sweeps.sweep import SweepOutcome
+from skinwave.system.effort import Progress, one_thread
 
 FOLDER = "large-deflection"
 PHASE = "large deflection"

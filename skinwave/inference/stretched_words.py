@@ -6,7 +6,7 @@ from skinwave.inference.knowledge import Row, value_words
 from skinwave.inference.large_deflection import CLAIMS, claims_of, refusal, verdict
 from skinwave.inference.nearest_sheets import sheets
 from skinwave.inference.stretched_table import PHASE
-from skinwave.numbers import decibel, significant
+from skinwave.system.numbers import decibel, significant
 
 NONE = (
     f"None of the sheets was computed at {PHASE}: skinwave infer --large-deflection 3, with this "

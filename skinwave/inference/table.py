@@ -14,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from skinwave import record
-from skinwave.effort import Progress, one_thread, silent
 from skinwave.inference.assess import CLAIMED, row
 from skinwave.inference.design import PARAMETERS, Candidate, Parameter, name
 from skinwave.inference.ranking import Row, nearest
-from skinwave.outputs import output_file
+from skinwave.results import record
+from skinwave.results.outputs import output_file
 from skinwave.sweeps import dataset, engine
 from skinwave.sweeps.sweep import SweepOutcome
+from skinwave.system.effort import Progress, one_thread, silent
 
 COMMAND = "infer"
 BATCH = 4  # candidates in one file

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from skinwave.effort import Progress, silent
 from skinwave.live.packs import pack_of
 from skinwave.live.records import body_of, changed, dispersion_of, record_of
 from skinwave.live.values import values_of
-from skinwave.scene import BODIES
+from skinwave.scene.scene import BODIES
+from skinwave.system.effort import Progress, silent
 
 MOST_VALUES = 2_000_000  # of a measurement that is sent to a page
 
@@ -52,7 +52,7 @@ def scene_answer(name: str, content: bytes, progress: Progress = silent) -> dict
     ValueError
         If the file is no scene, or the page cannot show it.
     """
-    from skinwave.scene_file import loads
+    from skinwave.scene.file import loads
 
     try:
         scene = loads(content.decode("utf-8"))
@@ -77,7 +77,7 @@ def measurement_answer(name: str, content: bytes) -> dict[str, Any]:
     ValueError
         If the file is of no known kind or malformed.
     """
-    from skinwave.measurements.reading import read
+    from skinwave.measure.reading import read
 
     with TemporaryDirectory() as folder:
         file = Path(folder, f"measured{Path(name).suffix.lower()}")

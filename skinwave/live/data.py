@@ -6,14 +6,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from skinwave.effort import Progress, silent
 from skinwave.live import values
 from skinwave.live.packs import pack_of
 from skinwave.live.page import page
 from skinwave.live.records import record_of, title_of
 from skinwave.live.selftest import has_exact_lines, selftest
-from skinwave.scene import BODIES, Body, Scene, body_name
-from skinwave.studies.paper15 import tactons
+from skinwave.scene.paper15 import tactons
+from skinwave.scene.scene import BODIES, Body, Scene, body_name
+from skinwave.system.effort import Progress, silent
 
 ERROR = 0.01  # relative, of a line, of packs that state none
 BODIES_SHOWN = ("skin-slab", "paper-sheet", "palm")  # of a page without scenes
@@ -104,7 +104,7 @@ def read_scene(path: Path) -> Scene:
     ValueError
         If the file is no scene.
     """
-    from skinwave.scene_file import read
+    from skinwave.scene.file import read
 
     scene = read(path)
     return scene if scene.name != Scene.name else replace(scene, name=path.stem)

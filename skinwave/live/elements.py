@@ -5,7 +5,7 @@
 The reduced basis is the proper orthogonal decomposition of the steady motion under focal spots all
 over the area, at frequencies of the band. Stiffness, damping and mass are symmetric: the same
 fields O_p read the motion and take up the load, which per area of the grid goes with the cosine of
-the slope: its square (`skinwave.load`), over a larger area.
+the slope: its square (`skinwave.scene.load`), over a larger area.
 """
 
 from functools import partial
@@ -19,12 +19,12 @@ from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Tacton
 from simple_model.prony import FIT_TOLERANCE
 from skinwave.bodies.build import Build, build, operators
-from skinwave.effort import Progress, silent
-from skinwave.live.arrays import packed, quantised
 from skinwave.live.grid import SIDE, STEP, grid_line
 from skinwave.models.laws import relaxing
 from skinwave.models.loads import surface_load, surface_motion
-from skinwave.scene import Body
+from skinwave.scene.scene import Body
+from skinwave.system.arrays import packed, quantised
+from skinwave.system.effort import Progress, silent
 
 LOWEST = 0.15  # m: least height of the focus, whose spot elements of some mm resolve
 REACH, SPACING = 0.031, 0.0058  # m from the middle to which foci are, and between training spots

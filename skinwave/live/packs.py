@@ -10,13 +10,13 @@ import numpy as np
 from meshes import cache
 from simple_model import MovingPressure, Tacton
 from skinwave.bodies.analytic import has_exact_waves, is_laterally_infinite
-from skinwave.effort import Progress, silent, versions
 from skinwave.live.elements import element_pack
 from skinwave.live.radial import radial_pack
 from skinwave.live.sheets import sheet_pack
 from skinwave.models.advice import takes
 from skinwave.models.plate_modes import MODES
-from skinwave.scene import Body, Scene
+from skinwave.scene.scene import Body, Scene
+from skinwave.system.effort import Progress, silent, versions
 
 FORMAT = "live pack 4"  # of cached entries
 

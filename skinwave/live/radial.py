@@ -2,10 +2,10 @@
 
 from typing import Any
 
-from skinwave.effort import Progress, silent
-from skinwave.live.arrays import packed, quantised
 from skinwave.live.wavenumbers import FURTHEST, wavenumbers
-from skinwave.scene import Body
+from skinwave.scene.scene import Body
+from skinwave.system.arrays import packed, quantised
+from skinwave.system.effort import Progress, silent
 
 LOWEST = 0.1  # m: height of the focus from which a pack serves every height
 ERROR = 2e-3  # relative, of lines above -40 dB: twice the largest of 200 Tactons

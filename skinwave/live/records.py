@@ -15,8 +15,8 @@ from fem.materials import Material
 from simple_model import MovingPressure, Tacton
 from skinwave.bodies.analytic import dispersion, has_exact_waves, is_laterally_infinite
 from skinwave.live.radial import LOWEST
-from skinwave.scene import BODIES, Body, Layer, Scene, body_name, solid_of
-from skinwave.scene_file import from_table, parsed, to_table
+from skinwave.scene.file import from_table, parsed, to_table
+from skinwave.scene.scene import BODIES, Body, Layer, Scene, body_name, solid_of
 
 SECTIONS = ("body", "placement")  # of a scene file
 LOSS_AT = 200.0  # Hz

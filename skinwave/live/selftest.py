@@ -17,8 +17,8 @@ from skinwave.models.advice import takes
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.plate_modes import steady_lines as plate_lines
 from skinwave.models.prepared import answer, components, prepare
-from skinwave.scene import Body, Scene
-from skinwave.simulation import compute
+from skinwave.planning.simulate import compute
+from skinwave.scene.scene import Body, Scene
 
 SEED = 15
 # Lines that are compared: of the strongest of a point, and up to a frequency in Hz; then those of

@@ -19,7 +19,7 @@ from urllib.parse import parse_qs, unquote, urlsplit
 
 from skinwave.live.answers import body_lines, measurement_answer, scene_answer
 from skinwave.live.page import page
-from skinwave.plain_text import printable, say
+from skinwave.system.plain_text import printable, say
 
 LARGEST = {"body": 2**20, "scene": 2**22, "measurement": 20_000_000}  # bytes of a request
 PATIENCE = 60.0  # s that a silent connection is kept

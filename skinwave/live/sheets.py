@@ -16,12 +16,12 @@ from simple_model.focus import spot_width
 from simple_model.free_modes import free_vibration, relaxing_stiffness
 from simple_model.plate_modes import PlateModes
 from simple_model.prony import FIT_TOLERANCE
-from skinwave.effort import Progress, silent
-from skinwave.live.arrays import packed, quantised
 from skinwave.live.grid import SIDE, STEP, grid_line, smoothed
 from skinwave.models.laws import relaxing
 from skinwave.models.plate_modes import modes_of, plate_of, relative_modulus
-from skinwave.scene import Body
+from skinwave.scene.scene import Body
+from skinwave.system.arrays import packed, quantised
+from skinwave.system.effort import Progress, silent
 
 LAW_STEP, HIGHEST = 2.5, 1000.0  # Hz between values of the modulus, and of the last
 LOWEST = 0.1  # m: least height of the focus

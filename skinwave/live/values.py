@@ -12,8 +12,8 @@ from simple_model.drive import DRIVES
 from simple_model.joined import ROUND, parted
 from simple_model.tacton import SUPERPOSITIONS
 from simple_model.trajectory import SHAPES
-from skinwave.scene import Scene, check_load
-from skinwave.studies.paper15 import tactons
+from skinwave.scene.paper15 import tactons
+from skinwave.scene.scene import Scene, check_load
 
 Values = dict[str, Any]
 

@@ -18,8 +18,8 @@ from simple_model.compliance import Compliance
 from simple_model.focus import spot_width
 from simple_model.wavenumber_integral import AT_ONCE, INTEGRATION_ERROR, MOST_NODES, UNRESOLVED
 from skinwave.bodies.analytic import compliance
-from skinwave.effort import Progress
-from skinwave.scene import Body
+from skinwave.scene.scene import Body
+from skinwave.system.effort import Progress
 
 HIGHEST = 1200.0  # Hz: skin moves by less than a thousandth of its most above
 SPACING = 2.5  # Hz between frequencies of a table: motion that lasts up to 0.2 s

@@ -9,15 +9,15 @@ from importlib import import_module
 from math import nan
 from typing import TYPE_CHECKING, Any
 
-from skinwave import extensions
+from skinwave.system import extensions
 
 if TYPE_CHECKING:
     from meshes.tetmesh import Floats
     from simple_model import Response
     from skinwave.bodies import Body
-    from skinwave.effort import Progress
     from skinwave.models.limits import Limit
-    from skinwave.scene import Scene
+    from skinwave.scene.scene import Scene
+    from skinwave.system.effort import Progress
 
 MapFunction = Callable[..., Iterable[Any]]  # of the shape of the built-in `map`
 

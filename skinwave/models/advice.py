@@ -12,7 +12,7 @@ from skinwave.models import Model, named, names
 from skinwave.models.limits import Limit
 
 if TYPE_CHECKING:
-    from skinwave.scene import Scene
+    from skinwave.scene.scene import Scene
 
 # Models in the order in which advice names them: from rest first, then those of the steady state.
 ADVISED = (

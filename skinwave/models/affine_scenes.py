@@ -10,7 +10,7 @@ from skinwave.bodies.mounting import FRAME
 from skinwave.bodies.sheet import refuse_open_air
 from skinwave.models.free_keys import FreeKey
 from skinwave.models.laws import check_laws
-from skinwave.scene import Body, Scene
+from skinwave.scene.scene import Body, Scene
 
 MOST_LINES = 400
 

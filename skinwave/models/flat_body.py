@@ -32,7 +32,7 @@ from skinwave.models.limits import (
 )
 from skinwave.models.sheet_limits import of_alike_directions
 from skinwave.models.sources import LAYERS
-from skinwave.scene import Scene
+from skinwave.scene.scene import Scene
 
 STEP = "wavenumber integral"
 

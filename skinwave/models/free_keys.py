@@ -14,7 +14,7 @@ from simple_model.choices import choose
 from skinwave.bodies import Body
 from skinwave.bodies.parts import solid_of
 from skinwave.bodies.sizes import default_size
-from skinwave.scene_keys import MATERIAL, MODULI, PRONY, SCALES, SECTIONS, with_key, write_material
+from skinwave.scene.keys import MATERIAL, MODULI, PRONY, SCALES, SECTIONS, with_key, write_material
 
 THICKNESS = ("thickness_mm",)  # path of a key
 MOST_THICKNESSES = 2

@@ -21,7 +21,6 @@ from skinwave.bodies.build import Build, operators
 from skinwave.bodies.build import build as build_body
 from skinwave.bodies.discretised import Discretise
 from skinwave.bodies.sizes import default_size
-from skinwave.effort import Clock, Progress, peak_memory, versions
 from skinwave.models import Request
 from skinwave.models.laws import relaxing, series_tolerance
 from skinwave.models.loads import (
@@ -36,8 +35,9 @@ from skinwave.models.loads import (
     with_sag,
 )
 from skinwave.models.symmetry import even_part, images, modelled_axes
-from skinwave.scene import Body, Scene
-from skinwave.support_motion import SupportMotion
+from skinwave.scene.scene import Body, Scene
+from skinwave.scene.support_motion import SupportMotion
+from skinwave.system.effort import Clock, Progress, peak_memory, versions
 
 MOST_IMBALANCE = 0.01  # relative error of the energy balance, beyond which a response is refused
 CHECKED_EACH = 50  # steps of a transient

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 from simple_model import MovingPressure
 from simple_model.quantities import DISPLACEMENT
-from skinwave.load import PRESSURE
+from skinwave.scene.load import PRESSURE
 
 if TYPE_CHECKING:
-    from skinwave.scene import Scene
+    from skinwave.scene.scene import Scene
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,7 +20,7 @@ from skinwave.models.limits import Limit, of_body
 from skinwave.models.prepared import answer, prepare, reduction_tolerance
 from skinwave.models.sheet_limits import of_air_in_a_frame, of_vacuum
 from skinwave.models.sources import ALPHA, ARNOLDI, MACROELEMENTS, REDUCTION
-from skinwave.scene import Scene
+from skinwave.scene.scene import Scene
 
 MOST_SLENDER = 10  # sides of a sheet, of which its default elements make a mesh
 FINITE = 15e-3  # m: a finite depth in place of a half-space, or below its layers and probes

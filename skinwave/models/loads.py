@@ -27,9 +27,9 @@ from simple_model.sampling import below_half_the_rate, is_folded
 from skinwave.bodies.body import Body
 from skinwave.bodies.build import Build
 from skinwave.bodies.build import operators as operators_of
-from skinwave.load import PRESSURE, Load
 from skinwave.models.sheet_probes import sheet_rows
-from skinwave.scene import Reading
+from skinwave.scene.load import PRESSURE, Load
+from skinwave.scene.scene import Reading
 
 FAINTEST = 1e-6  # of the strongest line of a load
 

@@ -20,7 +20,7 @@ from skinwave.models.stretching import (
     reduced_answer,
     stretching_size,
 )
-from skinwave.scene import Scene
+from skinwave.scene.scene import Scene
 
 METHOD = "large deflection, step by step from rest"
 

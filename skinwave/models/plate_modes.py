@@ -28,14 +28,14 @@ from simple_model.plate_response import modal_path_forces
 from simple_model.sampling import below_half_the_rate, highest_driving
 from skinwave.bodies.body import Body
 from skinwave.bodies.mounting import EDGES
-from skinwave.effort import peak_memory, silent
 from skinwave.models import Model, Request, register
 from skinwave.models.laws import has_own_law
 from skinwave.models.limits import Limit, of_body, surface_motion
 from skinwave.models.prepared import sample_times
 from skinwave.models.sheet_limits import of_held_sheet
 from skinwave.models.sources import PLATES
-from skinwave.scene import Scene
+from skinwave.scene.scene import Scene
+from skinwave.system.effort import peak_memory, silent
 
 ERROR = 0.01  # relative, of a steady waveform beside finite elements of a frame, vacuum and air
 

@@ -6,7 +6,7 @@ from simple_model import Response, point_kernel, point_kernel_published
 from simple_model.quantities import PRESSURE
 from skinwave.models import Model, Request, register
 from skinwave.models.limits import Limit, load_limit
-from skinwave.scene import Scene
+from skinwave.scene.scene import Scene
 
 ERROR = 1.0  # relative error of the point kernel on any body, measured 0.98 to 1.04
 

@@ -18,8 +18,6 @@ from simple_model.sampling import below_half_the_rate, highest_driving
 from skinwave.bodies.build import Build
 from skinwave.bodies.discretised import Discretise
 from skinwave.bodies.sizes import default_size
-from skinwave.effort import Clock, Progress, one_thread, peak_memory, silent, versions
-from skinwave.load import PRESSURE, Load
 from skinwave.models.full import assembled, meshed, spent
 from skinwave.models.laws import relaxing
 from skinwave.models.loads import (
@@ -43,7 +41,9 @@ from skinwave.models.reduction import (
     select_lines,
 )
 from skinwave.models.symmetry import even_part, images, modelled_axes
-from skinwave.scene import SAMPLE_RATE, SURFACE, Body, Reading, Scene
+from skinwave.scene.load import PRESSURE, Load
+from skinwave.scene.scene import SAMPLE_RATE, SURFACE, Body, Reading, Scene
+from skinwave.system.effort import Clock, Progress, one_thread, peak_memory, silent, versions
 
 REDUCTION_TOLERANCE = 1e-3
 SERIES_ERROR = 5  # times that of the reduction: with `reduction_tolerance` the `series_tolerance`

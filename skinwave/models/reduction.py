@@ -23,10 +23,10 @@ from simple_model import Effort, MovingPressure
 from simple_model.load_spectrum import merge_lines, reduced_lines
 from skinwave.bodies.build import Build
 from skinwave.bodies.sheet import air
-from skinwave.effort import Progress, silent
 from skinwave.models.full import energy_balance
-from skinwave.scene import Body
-from skinwave.support_motion import SupportMotion
+from skinwave.scene.scene import Body
+from skinwave.scene.support_motion import SupportMotion
+from skinwave.system.effort import Progress, silent
 
 BAND = 1000.0  # Hz up to which a reduced model must meet its tolerance
 

@@ -27,7 +27,7 @@ from simple_model.material import Material
 from simple_model.quantities import STRAIN
 from skinwave.bodies.body import Body
 from skinwave.bodies.build import Build
-from skinwave.scene import Reading
+from skinwave.scene.scene import Reading
 
 Reader = Callable[[Floats], Floats]  # displacement or coordinates -> components (p c,)
 

@@ -20,7 +20,6 @@ from simple_model.karman_motion import linear_motion, stretched_motion
 from simple_model.plate_modes import PlateModes
 from simple_model.response import step
 from simple_model.von_karman import KarmanPlate, karman_plate
-from skinwave.effort import peak_memory, silent
 from skinwave.models import Model, Request, register
 from skinwave.models.laws import has_own_law, slowest_and_fastest
 from skinwave.models.plate_modes import ERROR as PLATE_ERROR
@@ -28,7 +27,8 @@ from skinwave.models.plate_modes import FROM_REST, limits, modes_of, plate_of
 from skinwave.models.prepared import sample_times
 from skinwave.models.sources import KARMAN, PLATES
 from skinwave.models.stretching import relative
-from skinwave.scene import Scene
+from skinwave.scene.scene import Scene
+from skinwave.system.effort import peak_memory, silent
 
 LONGEST, SHORTEST = 1e-4, 2.5e-5  # s, of time steps
 COUNTS = 42, 60, 86, 120  # modes that stretch a sheet, each number judged beside the one before

@@ -32,7 +32,6 @@ from simple_model.quantities import ACCELERATION, DISPLACEMENT, VELOCITY, Quanti
 from simple_model.sampling import below_half_the_rate, highest_driving, resolving_step
 from skinwave.bodies.build import Build, build
 from skinwave.bodies.sheet import air, bending_wavenumber, discretise
-from skinwave.effort import Clock
 from skinwave.models import Request
 from skinwave.models.advice import beyond
 from skinwave.models.full import (
@@ -58,7 +57,8 @@ from skinwave.models.reduction import (
     select_lines,
 )
 from skinwave.models.sheet_probes import full_reader, modal_reader
-from skinwave.scene import Body, Scene
+from skinwave.scene.scene import Body, Scene
+from skinwave.system.effort import Clock
 
 # Thickness of the mesh over an element's side: the shear of so thick a sheet lowers frequencies by
 # as much as elements of this side raise them. At 7 elements a wavelength 0.3 % are left of 5 %.

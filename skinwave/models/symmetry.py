@@ -11,8 +11,8 @@ from scipy import sparse
 from meshes.tetmesh import Floats
 from skinwave.bodies.body import Body
 from skinwave.bodies.parts import FLAT
-from skinwave.load import PRESSURE, Load
-from skinwave.scene import Reading
+from skinwave.scene.load import PRESSURE, Load
+from skinwave.scene.scene import Reading
 
 ON_PLANE = 1e-9  # m: nearer to a plane a probe is on it
 

@@ -12,8 +12,8 @@ from operator import add, ge, gt, le, lt, mul, sub, truediv
 from typing import Any
 
 from simple_model.choices import choose
-from skinwave.numbers import is_finite_number
-from skinwave.plain_text import as_utf_8
+from skinwave.system.numbers import is_finite_number
+from skinwave.system.plain_text import as_utf_8
 
 FORMAT = "MidAirHapticsAnimationFileFormat"
 REVISIONS = ("0.0.10-alpha.1", "0.1.0-alpha.2", "0.1.0-alpha.3")

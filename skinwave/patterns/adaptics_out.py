@@ -9,7 +9,7 @@ import numpy as np
 from simple_model import Tacton
 from skinwave.patterns.adaptics_file import FORMAT, REVISIONS
 from skinwave.patterns.pattern import ENGINE_RATE, STRAIGHT, Options, loudness, thinned
-from skinwave.scene import Scene
+from skinwave.scene.scene import Scene
 
 MOST_KEYFRAMES = 20_000
 ASIDE = 1e-9  # of a period: just before and just after a corner, so that jumps stay jumps

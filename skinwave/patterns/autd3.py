@@ -11,7 +11,7 @@ import numpy as np
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure
 from skinwave.patterns.pattern import Options, aliased, loudness
-from skinwave.scene import Scene
+from skinwave.scene.scene import Scene
 
 TICK = 40_000.0  # Hz
 MOST_PATTERNS = 8192  # of a FociSTM

@@ -4,10 +4,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from meshes import reading
-from skinwave import scene_file
 from skinwave.patterns import adaptics, adaptics_out, autd3, focal_points, waveform
 from skinwave.patterns.pattern import Options, onto, resized, wide_enough
-from skinwave.scene import Body, Scene, check_load
+from skinwave.scene import file as scene_file
+from skinwave.scene.scene import Body, Scene, check_load
 
 READERS = (".toml", ".adaptics", ".csv", ".wav")
 WRITERS = (".toml", ".adaptics", ".csv", ".wav", ".py")

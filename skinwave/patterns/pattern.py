@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Tacton
 from simple_model.tacton import tones
-from skinwave.scene import Scene
+from skinwave.scene.scene import Scene
 
 ENGINE_RATE = 20_000.0  # Hz, of samples in AdapTics
 STRAIGHT = 2e-5, 1e-3  # m and of full drive, within which straight lines stand for samples

@@ -13,7 +13,7 @@ from simple_model.choices import choose
 from simple_model.rhythm import ROLES
 from simple_model.tacton import LONGEST, level, modulation, tones
 from skinwave.patterns.pattern import Options, Pattern, aliased
-from skinwave.scene import Scene
+from skinwave.scene.scene import Scene
 
 SCALES = ("full", "peak", "rms")
 WRITTEN_RATE = 48_000.0  # Hz

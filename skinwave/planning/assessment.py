@@ -28,7 +28,7 @@ from skinwave.planning.refinement import (
 from skinwave.planning.series import series_error
 from skinwave.planning.stretching import stretching_left_out
 from skinwave.planning.warnings import of_elements, of_ends_and_band, of_stretching
-from skinwave.scene import Body, Load, Reading, Scene
+from skinwave.scene.scene import Body, Load, Reading, Scene
 
 Coarser = tuple[float, Prepared]  # element size in metre, and the body with it
 

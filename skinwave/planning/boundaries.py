@@ -16,12 +16,13 @@ from skinwave.bodies.absorbing_layer import has_layer, layer_of
 from skinwave.bodies.mounting import EDGES
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.bodies.slab import discretise
-from skinwave.effort import Progress
 from skinwave.models.prepared import answer, prepare, reduction_tolerance
 from skinwave.planning.estimates import spot_scale
-from skinwave.planning.extent import PlanRow, symmetry
+from skinwave.planning.extent import symmetry
+from skinwave.planning.records import PlanRow
 from skinwave.planning.refinement import about_its_rest, element_sizes, relative_change
-from skinwave.scene import Body, Scene
+from skinwave.scene.scene import Body, Scene
+from skinwave.system.effort import Progress
 
 WIDER = 2.0  # times the width of the layer
 # Of the change: slabs on springs, free ones and half-spaces had 1.0 to 1.3 times it in error.

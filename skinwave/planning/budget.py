@@ -24,11 +24,11 @@ from skinwave.bodies.analytic import flattened
 from skinwave.models.advice import takes
 from skinwave.models.plate_modes import MODES
 from skinwave.models.plate_modes import steady_lines as steady_lines_of_plate
-from skinwave.numbers import significant
-from skinwave.planning.extent import PlanRow
+from skinwave.planning.records import PlanRow
 from skinwave.planning.refinement import CONTROLLER, element_sizes
-from skinwave.scene import Scene
-from skinwave.spreads import PRESSURE, Spread, spreads_of, with_values
+from skinwave.scene.scene import Scene
+from skinwave.scene.spreads import PRESSURE, Spread, spreads_of, with_values
+from skinwave.system.numbers import significant
 
 SIGMA = (0.15865525393145707, 0.8413447460685429)  # quantiles a standard deviation either way
 FAINT = 1e-3  # of the load's strongest line: lines that no budget needs

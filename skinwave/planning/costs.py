@@ -10,9 +10,8 @@ from skinwave.bodies.sizes import default_size
 from skinwave.models import named
 from skinwave.models.advice import takes
 from skinwave.models.plate_modes import FROM_REST
-from skinwave.planning.extent import PlanRow
-from skinwave.planning.plan import Plan
-from skinwave.scene import Scene
+from skinwave.planning.records import Plan, PlanRow
+from skinwave.scene.scene import Scene
 
 DOFS_IN_A_CUBE = 24  # of ten-node tetrahedra, in a cube with their size as its side
 KNOWN_DOFS, KNOWN_SECONDS, KNOWN_MEMORY = 64_000, 9.0, 0.8 * 2**30  # of one reduction

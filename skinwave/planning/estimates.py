@@ -15,7 +15,7 @@ from simple_model.trajectory import BY_POINTS
 from simple_model.wavenumber_integral import point_response
 from skinwave.bodies.analytic import compliance, is_flat_layer, is_laterally_infinite, stack
 from skinwave.bodies.mounting import EDGES
-from skinwave.scene import Body, Scene
+from skinwave.scene.scene import Body, Scene
 
 REFLECTED = 0.03  # reflection coefficient of an absorbing side and the layer around it
 # Reflections of the four sides may be in phase; slabs reflected 0.5 to 0.9 times as much. Where

@@ -1,6 +1,6 @@
 """Extent of a body that a scene requires, its symmetry, its coat, and physics that is neglected."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,19 +14,11 @@ from skinwave.bodies.sheet import air_mass
 from skinwave.models.plate_modes import middle_compliance, relative_modulus
 from skinwave.models.symmetry import mirrored_axes
 from skinwave.planning.estimates import FAR, absorbed_returned, mean_gain, spot_scale
-from skinwave.scene import Body, Scene
+from skinwave.planning.records import PlanRow
+from skinwave.scene.scene import Body, Scene
 
 STIFF = 30.0  # times the modulus below, from where the error of a coat is stated
 LOWEST = 20.0  # Hz at which air is estimated where no line is higher
-
-
-@dataclass(frozen=True, kw_only=True)
-class PlanRow:
-    """One decision of a plan, and its reason."""
-
-    what: str
-    value: str
-    reason: str
 
 
 def symmetry(scene: Scene) -> str:

@@ -3,9 +3,10 @@
 from skinwave.models.prepared import reduction_tolerance
 from skinwave.models.reduction import BAND
 from skinwave.models.symmetry import axes_of_probes, mirrored_axes
-from skinwave.planning.extent import PlanRow, coat_rows, left_out
+from skinwave.planning.extent import coat_rows, left_out
+from skinwave.planning.records import PlanRow
 from skinwave.planning.refinement import Convergence, Refined
-from skinwave.scene import Scene
+from skinwave.scene.scene import Scene
 
 
 def element_rows(

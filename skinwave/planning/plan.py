@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -12,9 +12,7 @@ import fem
 from simple_model.flat_body import FINEST
 from simple_model.focus import gaussian_width
 from simple_model.sampling import resolving_step
-from skinwave import notebook
 from skinwave.bodies.sizes import check_mesh
-from skinwave.effort import Progress
 from skinwave.models import Model, named
 from skinwave.models.advice import beyond, check_taken, default_model, refusal, takers, takes
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
@@ -24,7 +22,8 @@ from skinwave.models.limits import Limit
 from skinwave.models.linear_elements import FEM
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.point_kernel import SAME_LOAD
-from skinwave.models.prepared import Prepared, answer, sample_times
+from skinwave.models.prepared import answer, sample_times
+from skinwave.models.sample_grid import sample_grid
 from skinwave.models.stretched_plate import STRETCHED
 from skinwave.planning.boundaries import absorbing_error, extended
 from skinwave.planning.estimates import (
@@ -34,8 +33,9 @@ from skinwave.planning.estimates import (
     response_spectrum,
     side_reflections,
 )
-from skinwave.planning.extent import PlanRow, extent, left_out, symmetry
+from skinwave.planning.extent import extent, left_out, symmetry
 from skinwave.planning.mesh_rows import element_rows
+from skinwave.planning.records import Plan, PlanRow
 from skinwave.planning.refinement import above_band, refined
 from skinwave.planning.sensitivity import sensitivity
 from skinwave.planning.series import with_series
@@ -50,41 +50,11 @@ from skinwave.planning.warnings import (
     start_over_tolerance,
     sudden_over_tolerance,
 )
-from skinwave.sample_grid import sample_grid
-from skinwave.scene import FLAT, Body, Scene
+from skinwave.scene.scene import FLAT, Body, Scene
+from skinwave.system.effort import Progress
 
 INTEGRAL_ERROR = 0.002  # of a wavenumber integral, beside finite elements
 WAVES_SHARE = 0.8  # of the tolerance: largest reflections of sides that may be neglected
-
-
-@dataclass(frozen=True, kw_only=True)
-class Plan:
-    """Plan of a simulation.
-
-    `model`; the `body` that is modelled, and the axes of `symmetry` that it is halved across;
-    element size `h` in metre (None without a mesh); the `highest` line in Hz that matters; the
-    expected relative `error`; predicted `seconds` and bytes of `memory` of the first response;
-    a reason for each; `warnings` where a request is not met; and the reduced body, `prepared`,
-    on the mesh that was found.
-    """
-
-    model: str
-    body: Body
-    symmetry: str = ""
-    h: float | None = None
-    highest: float = 0.0
-    error: float = 0.0
-    seconds: float = 0.1
-    memory: float = 1e8
-    rows: tuple[PlanRow, ...] = ()
-    warnings: tuple[str, ...] = ()
-    prepared: Prepared | None = field(default=None, repr=False)
-
-    def __repr__(self) -> str:
-        return notebook.plan_line(self)
-
-    def _repr_html_(self) -> str:
-        return notebook.plan_page(self)
 
 
 def plan(

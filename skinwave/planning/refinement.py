@@ -22,7 +22,6 @@ from skinwave.bodies.coat import coarsest_size
 from skinwave.bodies.hands import FINE_PALM
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.bodies.slab import cell_layers
-from skinwave.effort import Progress
 from skinwave.models.prepared import (
     Prepared,
     answer,
@@ -31,7 +30,8 @@ from skinwave.models.prepared import (
     reduction_tolerance,
 )
 from skinwave.models.reduction import BAND, oscillating
-from skinwave.scene import Body, Scene
+from skinwave.scene.scene import Body, Scene
+from skinwave.system.effort import Progress
 
 FIRST, RATIO = 2.6, 1.3  # of the default element size; of two successive sizes
 FIRST_HAND = 1.6  # of the default element size, for hands

@@ -15,8 +15,8 @@ from skinwave.bodies.coat import coarsest_size
 from skinwave.bodies.sizes import default_size
 from skinwave.models.prepared import Prepared, prepare
 from skinwave.models.reduction import reduced_forces
-from skinwave.scene import SAMPLE_RATE as RATE
-from skinwave.scene import Scene
+from skinwave.scene.scene import SAMPLE_RATE as RATE
+from skinwave.scene.scene import Scene
 
 COARSENING = 2.0  # of the default element size
 DETUNING = 0.010  # natural frequencies of the coarse mesh are too high by this: corrected first

@@ -13,13 +13,13 @@ from skinwave.bodies.analytic import compliance
 from skinwave.models import named
 from skinwave.models.laws import STRONG, own_laws, relaxing, series_tolerance
 from skinwave.models.prepared import Prepared
-from skinwave.planning.extent import PlanRow
+from skinwave.planning.records import PlanRow
 from skinwave.planning.sensitivity import sensitivity
 from skinwave.planning.warnings import over_tolerance
-from skinwave.scene import Scene
+from skinwave.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from skinwave.planning.plan import Plan
+    from skinwave.planning.records import Plan
 
 
 def with_series(found: "Plan", scene: Scene, tolerance: float) -> "Plan":

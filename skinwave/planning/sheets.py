@@ -5,7 +5,7 @@ from math import pi
 from skinwave.bodies.sheet import bending_wavenumber
 from skinwave.models.advice import takes
 from skinwave.models.plate_modes import ERROR, FROM_REST
-from skinwave.scene import Body, Scene
+from skinwave.scene.scene import Body, Scene
 
 
 def modes_below(body: Body, frequency: float) -> float:

@@ -8,12 +8,12 @@ from numpy.typing import ArrayLike
 
 from meshes.tetmesh import Floats
 from simple_model.flat_body import FINEST
-from skinwave.effort import silent
 from skinwave.models import Model, Request, named
 from skinwave.models.prepared import Prepared, answer, steady_waveforms
+from skinwave.models.sample_grid import sample_grid
 from skinwave.planning.refinement import relative_change
-from skinwave.sample_grid import sample_grid
-from skinwave.scene import Scene
+from skinwave.scene.scene import Scene
+from skinwave.system.effort import silent
 
 FOLLOWED, LONGER = 1000, 4  # samples that a start is followed for at first; factor on them
 GOES_ON = 0.02  # of its energy, in what may come after the time that it was followed for

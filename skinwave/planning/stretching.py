@@ -13,14 +13,14 @@ import numpy as np
 from meshes.tetmesh import Floats
 from simple_model import Response
 from simple_model.quantities import DISPLACEMENT
-from skinwave.effort import silent
 from skinwave.models import Model, Request
 from skinwave.models.advice import takes
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.prepared import sample_times
 from skinwave.models.stretched_plate import STRETCHED, first_part, linear_error
 from skinwave.planning.extent import mean_sag
-from skinwave.scene import Scene
+from skinwave.scene.scene import Scene
+from skinwave.system.effort import silent
 
 LINEAR = 0.5  # deflection over thickness up to which bending of a sheet may be taken as linear
 # Relative error of linear bending over (w / h)^2: 0.4 to 3.3 of paper sheets of 30 to 210 mm, on

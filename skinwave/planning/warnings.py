@@ -11,7 +11,7 @@ from skinwave.models.reduction import BAND
 from skinwave.planning.estimates import mean_gain, spot_scale
 from skinwave.planning.refinement import enough
 from skinwave.planning.stretching import LINEAR, bent, stretching_left_out
-from skinwave.scene import Scene
+from skinwave.scene.scene import Scene
 
 NONLINEAR = "plate-modes-nonlinear", "fem-nonlinear"  # the cheaper first
 DENSITIES = 20.0, 23_000.0  # kg/m3 of solids, from foam to osmium

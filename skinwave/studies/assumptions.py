@@ -19,7 +19,7 @@ from skinwave.models.advice import takes
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.stretched_plate import STRETCHED
 from skinwave.planning.estimates import response_spectrum
-from skinwave.scene import BODIES, FLAT, Body, Layer, Scene, solid_of
+from skinwave.scene.scene import BODIES, FLAT, Body, Layer, Scene, solid_of
 
 ASSUMPTIONS = {
     "linear drive": "the force follows the square of the sound's amplitude",

@@ -11,21 +11,21 @@ import numpy as np
 
 from meshes import cache
 from simple_model.response import SETTLE
-from skinwave.effort import versions
-from skinwave.marks import digest
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.planning.budget import ErrorBudget, error_budget
-from skinwave.propagation import Propagation, propagation, share_outside
-from skinwave.run import Run
-from skinwave.scene import Body, Scene
-from skinwave.scene_keys import SCALES
-from skinwave.simulation import compute
-from skinwave.spreads import spreads_of, with_values
-from skinwave.studies import paper15
-from skinwave.surface import SurfaceMap, body_map, grid, has_wavenumber_integral, kernel_map
+from skinwave.planning.simulate import compute
+from skinwave.results.marks import digest
+from skinwave.results.propagation import Propagation, propagation, share_outside
+from skinwave.results.run import Run
+from skinwave.results.surface import SurfaceMap, body_map, grid, has_wavenumber_integral, kernel_map
+from skinwave.scene import paper15
+from skinwave.scene.keys import SCALES
+from skinwave.scene.scene import Body, Scene
+from skinwave.scene.spreads import spreads_of, with_values
+from skinwave.system.effort import versions
 
 if TYPE_CHECKING:
-    from skinwave.pictures.surfaces import MeasuredPlaces
+    from skinwave.report.surfaces import MeasuredPlaces
 
 OF_MATERIAL, ENDS = "material", (0.05, 0.95)  # part of an uncertainty; its 90 % interval
 Drawn = tuple[SurfaceMap, SurfaceMap] | tuple[()]  # a body's map and the kernel's

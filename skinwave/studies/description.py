@@ -8,9 +8,9 @@ from fem.materials import Material
 from simple_model import MovingPressure, Tacton
 from skinwave.bodies.mounting import FRAME
 from skinwave.models import named
-from skinwave.pictures.figures import answered
-from skinwave.run import Run
-from skinwave.scene import Body, Scene
+from skinwave.report.figures import answered
+from skinwave.results.run import Run
+from skinwave.scene.scene import Body, Scene
 
 NAMED = 4  # lines that a sentence names
 SPOTS = {

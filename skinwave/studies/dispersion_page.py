@@ -9,20 +9,16 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from simple_model.focus import spot_width
-from skinwave import document
 from skinwave.bodies import FLAT
 from skinwave.bodies.analytic import dispersion
-from skinwave.effort import Progress
-from skinwave.numbers import significant
-from skinwave.pictures.dispersion import dispersion_figure, wavenumber_figure
-from skinwave.pictures.figures import REPORT, png
-from skinwave.pictures.styles import Style
-from skinwave.plain_text import csv_table
-from skinwave.scene import Scene
-from skinwave.scene_file import dumps
-from skinwave.simulation import compute
+from skinwave.planning.simulate import compute
+from skinwave.report.dispersion import dispersion_figure, wavenumber_figure
+from skinwave.report.figures import REPORT, png
+from skinwave.report.styles import Style
+from skinwave.scene.file import dumps
+from skinwave.scene.scene import Scene
 from skinwave.studies.driven_modes import LOWEST, DrivenLine, DrivenModes, amplitudes_of
-from skinwave.wavenumbers import (
+from skinwave.studies.wavenumbers import (
     FittedWaves,
     LineOfProbes,
     Matched,
@@ -32,6 +28,10 @@ from skinwave.wavenumbers import (
     transfer_functions,
     wavenumber_spectrum,
 )
+from skinwave.system import document
+from skinwave.system.effort import Progress
+from skinwave.system.numbers import significant
+from skinwave.system.plain_text import csv_table
 
 COLUMNS = (
     "mode", "kind", "frequency_hz", "re_k_rad_per_m", "im_k_rad_per_m", "phase_speed_m_per_s",

@@ -18,7 +18,7 @@ from simple_model.focus import lobe_width, spot_width
 from simple_model.line_names import LineNames, line_names
 from simple_model.pressure import MovingPressure
 from skinwave.bodies.analytic import dispersion
-from skinwave.scene import Scene
+from skinwave.scene.scene import Scene
 
 LOWEST, HIGHEST = 10.0, 650.0  # Hz
 SPACING = 48  # frequencies between these, beside those of the lines

@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 
-from skinwave import document
-from skinwave.numbers import FAINTEST, decibel, significant
-from skinwave.pictures.figures import answered
-from skinwave.pictures.levels import sensation_levels, strongest_probe
-from skinwave.run import Run
+from skinwave.report.figures import answered
+from skinwave.report.levels import sensation_levels, strongest_probe
+from skinwave.results.run import Run
 from skinwave.studies import description
+from skinwave.system import document
+from skinwave.system.numbers import FAINTEST, decibel, significant
 
 TABLED = 12  # lines in the table
 ROUND_OFF = 1e-9  # of the strongest line

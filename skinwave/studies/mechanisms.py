@@ -17,17 +17,17 @@ from matplotlib.figure import Figure
 
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Response, Tacton, Trajectory, lines, resolved_lines
-from skinwave import document
-from skinwave.effort import Progress
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.prepared import answer, prepare
 from skinwave.models.stretched_plate import STRETCHED
-from skinwave.pictures.figures import png
-from skinwave.plain_text import csv_table
-from skinwave.run import ASSESSED
-from skinwave.scene import BODIES, PROBES, Body, Scene
-from skinwave.simulation import compute
-from skinwave.studies.paper15 import MEASURED_ON, tactons
+from skinwave.planning.simulate import compute
+from skinwave.report.figures import png
+from skinwave.results.run import ASSESSED
+from skinwave.scene.paper15 import MEASURED_ON, tactons
+from skinwave.scene.scene import BODIES, PROBES, Body, Scene
+from skinwave.system import document
+from skinwave.system.effort import Progress
+from skinwave.system.plain_text import csv_table
 
 DURATION = 0.5  # s of each Tacton, of which the later half is read
 AMPLITUDES = (0.25, 0.5, 1.0)

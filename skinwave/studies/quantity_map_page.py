@@ -9,16 +9,16 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from simple_model.numbers import stated_error
-from skinwave import document
-from skinwave.numbers import significant
-from skinwave.pictures.figures import REPORT, measured, png
-from skinwave.pictures.maps import SEQUENTIAL, draw_path
-from skinwave.pictures.styles import Style
-from skinwave.plain_text import csv_table
-from skinwave.propagation import NEAR, distance_from_path
-from skinwave.quantity_map import QuantityMap, save
-from skinwave.scene import Scene
-from skinwave.scene_file import dumps
+from skinwave.report.figures import REPORT, measured, png
+from skinwave.report.maps import SEQUENTIAL, draw_path
+from skinwave.report.styles import Style
+from skinwave.results.propagation import NEAR, distance_from_path
+from skinwave.results.quantity_map import QuantityMap, save
+from skinwave.scene.file import dumps
+from skinwave.scene.scene import Scene
+from skinwave.system import document
+from skinwave.system.numbers import significant
+from skinwave.system.plain_text import csv_table
 
 WIDTH, HEIGHT = 5.6, 5.0  # inch of the figure
 CAPTION = (

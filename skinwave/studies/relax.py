@@ -24,14 +24,12 @@ from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Response, lines, resolved_lines, sensation_level
 from simple_model.drive import beyond_published
 from skinwave.bodies.sizes import default_size
-from skinwave.comparison import compare
-from skinwave.effort import Progress, peak_memory
 from skinwave.models import named
 from skinwave.planning.assessment import sentences
-from skinwave.processes import environment, side_by_side
-from skinwave.run import ASSESSED
-from skinwave.scene import Body, Scene, check_motion
-from skinwave.simulation import compute
+from skinwave.planning.simulate import compute
+from skinwave.results.comparison import compare
+from skinwave.results.run import ASSESSED
+from skinwave.scene.scene import Body, Scene, check_motion
 from skinwave.studies.assumptions import (
     DEVICE_RATES,
     can_be_alone,
@@ -41,6 +39,8 @@ from skinwave.studies.assumptions import (
     relaxed,
     side_step,
 )
+from skinwave.system.effort import Progress, peak_memory
+from skinwave.system.processes import environment, side_by_side
 
 HIGHEST, FAINTEST = 600.0, 0.01  # Hz of the lines that are followed; of the strongest at a probe
 TINY = np.finfo(float).tiny

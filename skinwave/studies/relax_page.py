@@ -9,13 +9,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from simple_model import Effort
-from skinwave import document
-from skinwave.comparison import compare
-from skinwave.numbers import decibel, significant
-from skinwave.pictures.figures import png
-from skinwave.plain_text import csv_table
+from skinwave.report.figures import png
+from skinwave.results.comparison import compare
 from skinwave.studies.assumptions import ASSUMPTIONS
 from skinwave.studies.relax import Effect, Hierarchy, HierarchyStep, followed_lines
+from skinwave.system import document
+from skinwave.system.numbers import decibel, significant
+from skinwave.system.plain_text import csv_table
 
 LINE_COLUMNS = (
     "step", "model", "probe_x_mm", "probe_y_mm", "line", "frequency_hz", "from_step_before_db",

@@ -9,31 +9,33 @@ from functools import lru_cache, partial
 from pathlib import Path
 
 from simple_model import Response
-from skinwave import document
 from skinwave.bodies.sizes import check_mesh, default_size
-from skinwave.effort import Progress, one_thread, peak_memory
-from skinwave.files import write_lines, write_responses, write_run
+from skinwave.measure import measured_page, measured_tables
+from skinwave.measure.measured_runs import beside, in_quantity, measured_places
+from skinwave.measure.measured_study import (
+    Measured,
+    MeasuredComparison,
+    compare_measured,
+)
 from skinwave.models import named
 from skinwave.models.advice import check_taken
 from skinwave.models.linear_elements import FEM
 from skinwave.models.prepared import Prepared, answer, prepare
 from skinwave.planning.assessment import Coarser, assessed, coarser_body
 from skinwave.planning.plan import chosen_model
-from skinwave.processes import helper
-from skinwave.run import Run
-from skinwave.scene import BODIES, Body, Scene, body_name, check_load, with_body
-from skinwave.simulation import answered, check_options, compute
-from skinwave.studies import measured_page, measured_tables, paper15, study_page
+from skinwave.planning.simulate import answered, check_options, compute
+from skinwave.results.claims import claimed, evaluate, write_claims
+from skinwave.results.files import write_lines, write_responses, write_run
+from skinwave.results.run import Run
+from skinwave.results.surface import has_wavenumber_integral
+from skinwave.scene import paper15
+from skinwave.scene.scene import BODIES, Body, Scene, body_name, check_load, with_body
+from skinwave.studies import study_page
 from skinwave.studies.changes import Drawn, Maps, first_of, quick_maps, shown, slow_maps
-from skinwave.studies.claims import claimed, evaluate, write_claims
-from skinwave.studies.measured_runs import beside, in_quantity, measured_places
-from skinwave.studies.measured_study import (
-    Measured,
-    MeasuredComparison,
-    compare_measured,
-)
 from skinwave.studies.study_page import StudyOutcome
-from skinwave.surface import has_wavenumber_integral
+from skinwave.system import document
+from skinwave.system.effort import Progress, one_thread, peak_memory
+from skinwave.system.processes import helper
 
 # Of the models that plans choose, those that leave out more come first.
 COMPLETE = (

@@ -8,18 +8,15 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from simple_model import Effort
-from skinwave import document
-from skinwave.effort import Progress
-from skinwave.files import fill
 from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.prepared import Prepared
-from skinwave.numbers import decibel
-from skinwave.pictures.figures import label, overview_figure, png, tacton_figure
-from skinwave.run import Run
-from skinwave.scene_file import dumps
+from skinwave.report.figures import label, overview_figure, png, tacton_figure
+from skinwave.results.claims import AssessedClaim
+from skinwave.results.files import fill
+from skinwave.results.run import Run
+from skinwave.scene.file import dumps
 from skinwave.studies import summary, tables
 from skinwave.studies.changes import Shown, beside_kernels, changes, quick_maps, shown
-from skinwave.studies.claims import AssessedClaim
 from skinwave.studies.description import (
     levels_of,
     modelled,
@@ -29,6 +26,9 @@ from skinwave.studies.description import (
     unresolved,
 )
 from skinwave.studies.lines_table import lines_table
+from skinwave.system import document
+from skinwave.system.effort import Progress
+from skinwave.system.numbers import decibel
 
 EXAMPLES = ("am140", "stm20", "am140-stm20")  # what the paper's comparison figure shows
 

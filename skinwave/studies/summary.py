@@ -6,17 +6,17 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from simple_model.numbers import stated_error
-from skinwave.document import Markup, paragraph, table
-from skinwave.numbers import decibel, significant
-from skinwave.pictures.figures import REPORT, label, sized
-from skinwave.pictures.styles import Style
-from skinwave.pictures.surfaces import BESIDE, SURFACES, surfaces_figure
-from skinwave.propagation import Component, Propagation, Reach, added_lines
-from skinwave.run import Run
-from skinwave.scene import Scene
-from skinwave.scene_keys import LOSSES, MODULI, SCALES
-from skinwave.spreads import spreads_of
+from skinwave.report.figures import REPORT, label, sized
+from skinwave.report.styles import Style
+from skinwave.report.surfaces import BESIDE, SURFACES, surfaces_figure
+from skinwave.results.propagation import Component, Propagation, Reach, added_lines
+from skinwave.results.run import Run
+from skinwave.scene.keys import LOSSES, MODULI, SCALES
+from skinwave.scene.scene import Scene
+from skinwave.scene.spreads import spreads_of
 from skinwave.studies.changes import Shown
+from skinwave.system.document import Markup, paragraph, table
+from skinwave.system.numbers import decibel, significant
 
 NOTHING = "Nothing vibrates: a constant pressure on a focus at rest leaves no wave."
 ABOUT_MAPS = (

@@ -6,14 +6,14 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import Effort
-from skinwave.comparison import compare, moving_rms
-from skinwave.document import Markup, paragraph, table
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
-from skinwave.numbers import significant
-from skinwave.pictures.figures import label
-from skinwave.propagation import strongest_component
-from skinwave.run import Run
-from skinwave.studies.claims import TEXTS, AssessedClaim
+from skinwave.report.figures import label
+from skinwave.results.claims import TEXTS, AssessedClaim
+from skinwave.results.comparison import compare, moving_rms
+from skinwave.results.propagation import strongest_component
+from skinwave.results.run import Run
+from skinwave.system.document import Markup, paragraph, table
+from skinwave.system.numbers import significant
 
 SILENT = 0.01  # of the strongest probe: where the reference moves less, no misfit is given
 ROUND_OFF = 1e-3  # of a millisecond, or of a misfit

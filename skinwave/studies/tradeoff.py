@@ -13,10 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from simple_model import Response, lines, resolved_lines
-from skinwave import document
 from skinwave.bodies.sizes import default_size
-from skinwave.comparison import compare
-from skinwave.effort import Progress, peak_memory
 from skinwave.models import named, names
 from skinwave.models.advice import takes
 from skinwave.models.flat_body import FLAT_BODY
@@ -25,12 +22,15 @@ from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.plate_modes import MODES as PLATES
 from skinwave.models.prepared import REDUCTION_TOLERANCE, answer, prepare
 from skinwave.models.stretched_plate import STRETCHED
-from skinwave.pictures.figures import png
 from skinwave.planning.estimates import has_wavenumber_solution
+from skinwave.planning.simulate import compute
 from skinwave.planning.stretching import beyond_linear
-from skinwave.processes import apart
-from skinwave.scene import Scene, check_load
-from skinwave.simulation import compute
+from skinwave.report.figures import png
+from skinwave.results.comparison import compare
+from skinwave.scene.scene import Scene, check_load
+from skinwave.system import document
+from skinwave.system.effort import Progress, peak_memory
+from skinwave.system.processes import apart
 
 REFINEMENTS = (2.6, 2.0, 1.6, 1.3, 1.0)  # element size over the default one
 FINEST = (0.6, 0.5)  # of the two runs whose difference decides whether the reference is accepted

@@ -16,20 +16,20 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model.choices import choose
-from skinwave.effort import Progress
 from skinwave.models.advice import takes
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
-from skinwave.numbers import significant
-from skinwave.scene import Scene
-from skinwave.spreads import PRESSURE, spreads_of
+from skinwave.scene.scene import Scene
+from skinwave.scene.spreads import PRESSURE, spreads_of
+from skinwave.scene.variation import DesignPoint, Variation
 from skinwave.sweeps import dataset
 from skinwave.sweeps.measures import columns
+from skinwave.sweeps.of_sweep import in_order
+from skinwave.sweeps.sampling import samples as samples_of
+from skinwave.sweeps.solutions import is_linear
 from skinwave.sweeps.sweep import ModelOptions, model_of, sweep
 from skinwave.sweeps.sweep_figures import at_probe, value
-from skinwave.sweeps.variation import DesignPoint, Variation
-from skinwave.uncertainty.of_sweep import in_order
-from skinwave.uncertainty.sampling import samples as samples_of
-from skinwave.uncertainty.solutions import is_linear
+from skinwave.system.effort import Progress
+from skinwave.system.numbers import significant
 
 SAMPLES, FEWEST = 199, 39  # of the spreads; those that have a 95 % interval
 ENDS = (2.5, 97.5)  # percentiles between which the interval lies

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import IO, Any
 
 from meshes import reading
-from skinwave import marks, record
-from skinwave.outputs import output_file, unwritable
-from skinwave.plain_text import csv_table
+from skinwave.results import marks, record
+from skinwave.results.outputs import output_file, unwritable
+from skinwave.system.plain_text import csv_table
 
 LOCK = ".lock"  # among the rows, of the sweep that writes them
 ROWS, CSV = "rows", "rows.csv"  # the folder of the files within that of a sweep; its table

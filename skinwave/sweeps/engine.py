@@ -12,8 +12,8 @@ from functools import partial
 from importlib.util import find_spec
 from typing import Any
 
-from skinwave.effort import usable_cores
-from skinwave.processes import as_worker, guarded, pool
+from skinwave.system.effort import usable_cores
+from skinwave.system.processes import as_worker, guarded, pool
 
 LOCAL = ("processes", "threads")
 ATTEMPTS = 4  # to finish what was lost with a killed worker

@@ -1,6 +1,6 @@
 """Families of bodies that differ in materials and thicknesses alone, each family reduced together.
 
-One parametric reduced-order model (`skinwave.parametric`) serves all bodies of a family, on two
+One parametric reduced-order model (`models.parametric`) serves all bodies of a family, on two
 meshes, by which the error of each is estimated: some factorisations in place of two a body.
 """
 
@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 
 from simple_model import named_lines
-from skinwave import parametric
-from skinwave.effort import Progress
+from skinwave.models import parametric
 from skinwave.models.affine_scenes import check_scene
 from skinwave.models.free_keys import FreeKey, free_keys, with_values
-from skinwave.parametric import ParametricBody
+from skinwave.models.parametric import ParametricBody
 from skinwave.planning.refinement import compared_with, refined
-from skinwave.scene import Body, Load, Reading, Scene
-from skinwave.sweeps.variation import DesignPoint
+from skinwave.scene.scene import Body, Load, Reading, Scene
+from skinwave.scene.variation import DesignPoint
+from skinwave.system.effort import Progress
 
 # Bodies of a family for each key that is free, and for a thickness that moves the mesh, in
 # proportion or not: fewer cost less alone.

@@ -16,14 +16,14 @@ from simple_model import drawing
 from simple_model.choices import choose
 from simple_model.conversion import library
 from simple_model.numbers import counted
-from skinwave.effort import Progress
-from skinwave.numbers import significant
-from skinwave.progress_bar import reported
-from skinwave.scene import Scene
-from skinwave.scene_file import dumps
+from skinwave.scene.file import dumps
+from skinwave.scene.scene import Scene
+from skinwave.scene.variation import Variation, cases_of, combinations, parse
 from skinwave.sweeps import best, dataset
 from skinwave.sweeps import sweep as runner
-from skinwave.sweeps.variation import Variation, cases_of, combinations, parse
+from skinwave.system.effort import Progress
+from skinwave.system.numbers import significant
+from skinwave.system.progress_bar import reported
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,11 +8,11 @@ import numpy as np
 
 from simple_model import Response, named_lines, point_kernel, sensation_level
 from simple_model.quantities import DISPLACEMENT
-from skinwave.comparison import Agreement, compare, moving_rms
 from skinwave.models.prepared import sample_times
-from skinwave.run import ASSESSED, SUPPORT, Run
-from skinwave.scene import Scene
-from skinwave.sweeps.variation import DesignPoint
+from skinwave.results.comparison import Agreement, compare, moving_rms
+from skinwave.results.run import ASSESSED, SUPPORT, Run
+from skinwave.scene.scene import Scene
+from skinwave.scene.variation import DesignPoint
 
 WEAKEST, MOST = 1e-2, 40  # of the strongest line of a load, and lines, that have columns
 SETTLE = 0.25  # of a response, before which it is not looked at

@@ -13,17 +13,16 @@ import numpy as np
 
 from simple_model import Response
 from simple_model.choices import choose
-from skinwave import parametric
 from skinwave.bodies.analytic import is_flat_layer, is_laterally_infinite
-from skinwave.effort import Progress, silent
-from skinwave.models import named, names
+from skinwave.models import named, names, parametric
 from skinwave.models.advice import default_model, takes
 from skinwave.models.flat_body import FLAT_BODY
 from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
 from skinwave.planning.assessment import assessed
 from skinwave.planning.refinement import compared_with, refined
-from skinwave.scene import Scene
-from skinwave.simulation import answered, check_options, compute
+from skinwave.planning.simulate import answered, check_options, compute
+from skinwave.scene.scene import Scene
+from skinwave.scene.variation import DesignPoint
 from skinwave.sweeps import dataset, engine
 from skinwave.sweeps.families import (
     Family,
@@ -36,7 +35,7 @@ from skinwave.sweeps.families import (
     reduced,
 )
 from skinwave.sweeps.measures import columns, commanded, measured
-from skinwave.sweeps.variation import DesignPoint
+from skinwave.system.effort import Progress, silent
 
 BATCH = 8  # runs of one body that are handed out together, at most
 KEPT = 4  # bodies that a worker caches in memory, on two meshes each

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from simple_model.choices import choose
 from simple_model.drawing import small
 from simple_model.threshold import BAND
-from skinwave.pictures.styles import Style
+from skinwave.report.styles import Style
 from skinwave.sweeps.dataset import Row
 
 SPEED = "tacton.speed_m_per_s"

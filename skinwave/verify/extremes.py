@@ -11,7 +11,7 @@ from simple_model import MovingPressure, Response, Tacton, Trajectory, lines
 from simple_model.focus import spot_width
 from skinwave.bodies.build import Build, build, operators
 from skinwave.models.prepared import Prepared, answer, prepare
-from skinwave.scene import Body, Scene
+from skinwave.scene.scene import Body, Scene
 from skinwave.verify.case import Case, below, relative
 
 BODY = Body(width=0.06, height=0.06, depth=0.015, sides="clamped")

@@ -14,8 +14,8 @@ from meshes import TetMesh
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Response, Tacton, lines
 from skinwave.models.stretching import meshed_sheet, stretching_body
-from skinwave.scene import BODIES, Body, Scene
-from skinwave.simulation import compute
+from skinwave.planning.simulate import compute
+from skinwave.scene.scene import BODIES, Body, Scene
 from skinwave.verify.case import Case, Check, Plot, below, described, misfit, relative
 from skinwave.verify.deflected import elastica as bent
 from skinwave.verify.deflected import karman_disc

@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from skinwave import document
-from skinwave.document import Markup
-from skinwave.effort import versions
-from skinwave.pictures.figures import SPARE, png
+from skinwave.report.figures import SPARE, png
+from skinwave.system import document
+from skinwave.system.document import Markup
+from skinwave.system.effort import versions
 from skinwave.verify.case import Check, Entry, Plot, Result
 
 HEADER = ("value", "reference", "error", "tolerance")

@@ -8,7 +8,7 @@ import fem
 import meshes
 from skinwave.bodies.absorbing_layer import layer_drag, layer_of
 from skinwave.bodies.slab import slab_lines
-from skinwave.scene import Body
+from skinwave.scene.scene import Body
 from skinwave.verify.case import Case, Plot, below
 from skinwave.verify.statics import WIDTH
 

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from skinwave.effort import Progress, versions
+from skinwave.system.effort import Progress, versions
 from skinwave.verify import (
     air,
     elements,
@@ -136,6 +136,19 @@ SLOW = (
     "disc", "focus-at-rest-0.4999", "focus-in-air", "lamb",
     *(f"steady-focus-{hz}-{nu:g}" for hz, nu in STEADY), "circling-on-relaxing-skin",
 )  # fmt: skip
+
+
+QUICK = ("patch", "in-plane-shear", "moving-force-0.5", "thin-sheets")  # a second or two in all
+
+
+def quick_cases(progress: Progress) -> list[dict[str, Any]]:
+    """Run a few quick cases: title, source, verdict and worst check of each, as a report keeps."""
+    progress("verify", 0.0)
+    cases = [entry.run() for entry in suite() if entry.name in QUICK]
+    return [
+        {"title": case.title, "source": case.source, "passed": case.passed, **asdict(case.worst)}
+        for case in cases
+    ]
 
 
 def suite() -> tuple[Entry, ...]:

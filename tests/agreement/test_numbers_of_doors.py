@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import skinwave
-from skinwave.cli import main
-from skinwave.parametric import answer
-from skinwave.scene_file import loads
-from skinwave.simulation import compute
+from skinwave.commands.cli import main
+from skinwave.models.parametric import answer
+from skinwave.planning.simulate import compute
+from skinwave.scene.file import loads
 
 SCENE = """
 [tacton]

@@ -20,7 +20,7 @@ from simple_model.compliance import slab
 from simple_model.flat_body import flat_body
 from simple_model.material import PRESETS
 from skinwave.models.prepared import answer, prepare
-from skinwave.scene import Body, Scene
+from skinwave.scene.scene import Body, Scene
 
 LOAD = MovingPressure(
     tacton=Tacton(

@@ -7,7 +7,7 @@ export const bytes = (text) => {
   return out.buffer;
 };
 
-/** Array of what skinwave.live.arrays packs: {re, im, shape} of complex rows, or real values. */
+/** Array of what skinwave.system.arrays packs: {re, im, shape} of complex rows, or real values. */
 export function unpack(packed) {
   const [rows, columns] = packed.shape, count = rows * columns, real = packed.real;
   const values = packed.f8 ? new Float64Array(bytes(packed.f8)) : new Int16Array(bytes(packed.i2));

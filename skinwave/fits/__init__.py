@@ -1,1 +1,0 @@
-"""Fits of a scene to a measurement: estimates, intervals, and what the data do not resolve."""

@@ -1,0 +1,201 @@
+"""Claims of Lim, Seifi and Park, assessed on a measurement alone: what its noise allows to say."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from meshes.tetmesh import Floats
+from simple_model.quantities import DISPLACEMENT
+from skinwave.measure.lines import MeasuredLines
+from skinwave.measure.significance import radius
+from skinwave.results.claims import CLAIMS, NEEDED, PAIRS, is_resolved, is_single
+from skinwave.results.named_lines import NamedLines
+from skinwave.scene.scene import Scene
+from skinwave.system.numbers import decibel
+
+HOLDS, FAILS, UNDECIDED = "holds", "fails", "cannot be decided"
+CONFIDENCE = 0.95  # that all true amplitudes are within their bounds
+OF_SEVERAL = {"M2": 2}  # Tactons that a claim is about, at least
+OF_PLACES = ("S2", "S5", "M2")  # claims about the frequencies of peaks
+SOUGHT = {  # lines that a claim says are there, where the others are to be weak
+    "S3": PAIRS, "M1": ("2f_AM", "3f_AM"), "M3": ("f_d", "2f_AM"),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LinesByName:
+    """Measured lines by name, as `NamedLines`, with the `radius` (p,) of the confidence
+    circle of each amplitude; `spectrum` is empty where there are only lines.
+    """
+
+    tacton: str
+    scene: Scene
+    places: Floats
+    frequencies: dict[str, float]
+    lines: dict[str, Floats]
+    radius: dict[str, Floats]
+    unresolved: tuple[str, ...]
+    spectrum: tuple[Floats, Floats]
+
+    @property
+    def is_am(self) -> bool:
+        """Whether the amplitude is modulated."""
+        return self.scene.tacton.am_frequency > 0
+
+    @property
+    def is_stm(self) -> bool:
+        """Whether the focus moves."""
+        return self.scene.tacton.trajectory.drawing_frequency > 0
+
+    @property
+    def is_motion(self) -> bool:
+        """Whether they are of displacement."""
+        return self.scene.reading.asked is DISPLACEMENT
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeasuredClaim:
+    """A claim and what a measurement says of it: `HOLDS`, `FAILS` or `UNDECIDED`, and why."""
+
+    claim: str
+    finding: str
+    sentence: str
+
+
+def by_name(
+    scene: Scene,
+    names: Mapping[str, tuple[str, ...]],
+    lines: MeasuredLines,
+    unresolved: Sequence[str],
+    spectrum: tuple[Floats, Floats],
+) -> LinesByName:
+    """Lines by every name that they have.
+
+    Parameters
+    ----------
+    scene : Scene, whose probes are the places
+    names : names by that of each line, in the order of the lines
+    lines : MeasuredLines
+    unresolved : names of the others
+    spectrum : frequencies (f,) in Hz and amplitudes (f, p)
+
+    Returns
+    -------
+    LinesByName
+    """
+    size = np.abs(lines.mean)
+    around = radius(lines, 1 - (1 - CONFIDENCE) / max(size.size, 1))
+    every = [(name, k) for k, own in enumerate(names.values()) for name in own]
+    return LinesByName(
+        tacton=scene.name, scene=scene, places=scene.probe_points,
+        frequencies={name: float(lines.frequencies[k]) for name, k in every},
+        lines={name: size[k] for name, k in every}, radius={name: around[k] for name, k in every},
+        unresolved=tuple(unresolved), spectrum=spectrum,
+    )  # fmt: skip
+
+
+def assess_measured(measured: LinesByName) -> list[MeasuredClaim]:
+    """Every claim that is about such a Tacton: decided where all amplitudes within the noise agree,
+    at the places where f_AM is above the noise.
+    """
+    if not is_single(measured):
+        return []
+    kind = measured.is_am, measured.is_stm
+    return [
+        _assessed(measured, claim, assess)
+        for claim, (kinds, assess) in CLAIMS.items()
+        if kind in kinds
+    ]
+
+
+def _assessed(
+    measured: LinesByName, claim: str, assess: Callable[[Sequence[NamedLines]], tuple]
+) -> MeasuredClaim:
+    if reason := _undecidable(measured, claim):
+        return MeasuredClaim(claim=claim, finding=UNDECIDED, sentence=reason)
+    if claim in OF_PLACES:
+        holds, _, _, sentence = assess([measured])
+        return MeasuredClaim(claim=claim, finding=HOLDS if holds else FAILS, sentence=sentence)
+    heard = _where_heard(measured)
+    best, worst = ([assess([_varied(heard, claim, way, am)]) for am in (-1, 1)] for way in (1, -1))
+    sentence = assess([heard])[3]
+    if len(heard.places) < len(measured.places):
+        sentence += (
+            f"; f_AM is above the noise at {len(heard.places)} of {len(measured.places)} places, "
+            "and these count"
+        )
+    if all(one[0] for one in worst):
+        return MeasuredClaim(claim=claim, finding=HOLDS, sentence=sentence)
+    if not any(one[0] for one in best):
+        return MeasuredClaim(claim=claim, finding=FAILS, sentence=sentence)
+    low, high = (pick(one[1] for one in (*best, *worst)) for pick in (min, max))
+    return MeasuredClaim(
+        claim=claim, finding=UNDECIDED,
+        sentence=f"{sentence}; the noise allows {decibel(low)} to {decibel(high)} dB, and the "
+        f"claim has {best[0][2]:g} dB for its threshold",
+    )  # fmt: skip
+
+
+def _undecidable(measured: LinesByName, claim: str) -> str:
+    """Why a claim cannot be assessed; nothing if it can."""
+    if claim in OF_SEVERAL:
+        return f"it is about {OF_SEVERAL[claim]} paths or more, and this is a record of one"
+    if not is_resolved(measured, claim):
+        lost = ", ".join(measured.unresolved) or "lines that it is about"
+        return f"the record is too short, or sampled too slowly, to resolve {lost}"
+    about = _lines_of(measured, claim)
+    if unknown := [name for name in about if np.isnan(measured.radius[name]).any()]:
+        of = f"the noise of {', '.join(unknown)}" if len(unknown) < len(about) else "its noise"
+        return f"{of} is unknown: there are no repetitions, and no bins beside the lines"
+    if claim in OF_PLACES:
+        return _no_peaks(measured, claim)
+    if not (measured.lines["f_AM"] > measured.radius["f_AM"]).any():
+        return "f_AM is not above the noise at any place"
+    return ""
+
+
+def _lines_of(measured: LinesByName, claim: str) -> list[str]:
+    """Names of the lines that a claim is about; all, unless it names some."""
+    for names in NEEDED.get(claim, ()):
+        if measured.frequencies.keys() >= set(names):
+            return list(names)
+    return list(measured.radius)
+
+
+def _no_peaks(measured: LinesByName, claim: str) -> str:
+    """Why peaks cannot be placed: there is no spectrum between the lines, or they are in noise."""
+    if not len(measured.spectrum[0]):
+        return "the record is of single lines, without the spectrum between them"
+    asked = NEEDED["M2"][0] if claim != "S5" else ("f_AM",) if measured.is_am else ("f_d",)
+    faint = [n for n in asked if not (measured.lines[n] > measured.radius[n]).any()]
+    return f"{', '.join(faint)} not above the noise at any place" if faint else ""
+
+
+def _where_heard(measured: LinesByName) -> LinesByName:
+    """The places alone where f_AM is above the noise."""
+    at = measured.lines["f_AM"] > measured.radius["f_AM"]
+    f, amplitude = measured.spectrum
+    return replace(
+        measured, places=measured.places[at],
+        lines={name: a[at] for name, a in measured.lines.items()},
+        radius={name: r[at] for name, r in measured.radius.items()},
+        spectrum=(f, amplitude[:, at] if len(f) else amplitude),
+    )  # fmt: skip
+
+
+def _varied(measured: LinesByName, claim: str, way: int, am: int) -> LinesByName:
+    """Amplitudes as far towards the claim (way 1), or against it (-1), as the noise allows; those
+    of f_AM up (am 1) or down.
+    """
+    of_am = measured.frequencies["f_AM"]
+
+    def sign(name: str) -> int:
+        if measured.frequencies[name] == of_am:
+            return am
+        return way if name in SOUGHT.get(claim, ()) else -way
+
+    return replace(measured, lines={
+        name: np.maximum(a + sign(name) * measured.radius[name], 0.0)
+        for name, a in measured.lines.items()
+    })  # fmt: skip

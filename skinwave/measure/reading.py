@@ -1,0 +1,164 @@
+"""Measurements from files: CSV and TSV, .npz, .wav, .mat, Universal File Format 58, and two
+published sets.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from simple_model.trajectory import Floats
+from skinwave.measure import arrays, labview, matlab, skinsource, sound, text, universal
+from skinwave.measure.measurement import Measurement
+from skinwave.measure.recording import Given, Recording, completed
+from skinwave.measure.units import length
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reader:
+    """A format of files: its `words`, the `suffixes` of its names, what reads it, and which options
+    choose in it.
+    """
+
+    words: str
+    suffixes: tuple[str, ...]
+    read: Callable[[Path, Given], Recording]
+    choose: tuple[str, ...] = ("columns", "direction")
+
+
+READERS = (
+    Reader(
+        words="text in columns", suffixes=(".csv", ".tsv", ".txt", ".asc", ".dat"), read=text.read
+    ),
+    Reader(words="LabVIEW's measurement", suffixes=(".lvm",), read=labview.read_lvm),
+    Reader(words="TDMS", suffixes=(".tdms",), read=labview.read_tdms),
+    Reader(words="numpy", suffixes=(".npz",), read=arrays.read, choose=("variable",)),
+    Reader(words="sound", suffixes=(".wav",), read=sound.read),
+    Reader(words="MATLAB", suffixes=(".mat",), read=matlab.read, choose=("variable",)),
+    Reader(
+        words="Universal File Format 58", suffixes=(".uff", ".unv", ".uf", ".58"),
+        read=universal.read, choose=("direction",),
+    ),
+    Reader(
+        words="SkinSource impulse responses", suffixes=(".f32",), read=skinsource.read, choose=()
+    ),
+)  # fmt: skip
+
+
+def read(
+    path: str | Path,
+    *,
+    quantity: str = "",
+    unit: str = "",
+    places: ArrayLike | None = None,
+    sign: int | None = None,
+    rate: float | None = None,
+    variable: str = "",
+    columns: Sequence[str] = (),
+    direction: str = "",
+) -> Measurement:
+    """Measurement in a file, in SI and positive into the body.
+
+    What the file does not say, or says otherwise than it should, is given.
+
+    Parameters
+    ----------
+    path : of a file whose suffix is one of those in `READERS`
+    quantity : "displacement", "velocity", "acceleration" or another of `QUANTITIES`
+    unit : "mm/s", "um", "g", ...; "20 mm/s" if 1 in the file stands for 20 mm/s
+    places : (p, 2) float, metre
+    sign : 1 if positive values are into the body, -1 if out of it, as of a vibrometer that counts
+        motion towards itself as positive
+    rate : Hz, replaces the steps of the file's times; its first sample stays as many steps from
+        zero
+    variable : name of the array in a file of several
+    columns : headings or numbers from 1 of the columns or channels of motion
+    direction : "x", "y" or "z", of the motion in a Universal File with several
+
+    Returns
+    -------
+    Measurement
+
+    Raises
+    ------
+    ValueError
+        In one sentence, if the file is of no known kind, cannot be read, is malformed, or does not
+        say what is needed; with the option of the command line that says it.
+    """
+    path = Path(path)
+    reader = reader_of(path)
+    known = None if places is None else np.asarray(places, np.float64)
+    given = Given(
+        quantity=quantity, unit=unit, places=known, sign=sign, rate=rate, variable=variable,
+        columns=tuple(columns), direction=direction,
+    )  # fmt: skip
+    for option in ("variable", "columns", "direction"):
+        if getattr(given, option) and option not in reader.choose:
+            raise ValueError(
+                f"{path}: --{option} chooses nothing in a file of {reader.words}; leave it out"
+            )
+    try:
+        return completed(reader.read(path, given), given, path)
+    except ValueError as error:
+        said = " ".join(str(error).split())
+        raise ValueError(said if said.startswith(str(path)) else f"{path}: {said}") from None
+    except (ArithmeticError, AttributeError, LookupError, TypeError) as error:
+        raise ValueError(
+            f"{path}: the content does not fit the format, {reader.words}; export it anew, or as "
+            "text in columns"
+        ) from error
+
+
+def read_alone(path: str | Path) -> Measurement:
+    """Measurement in a file that says all, for commands without options of what it does not say.
+
+    Raises
+    ------
+    ValueError
+        As `read` does, with the command that makes such a file of another.
+    """
+    try:
+        return read(path)
+    except ValueError as error:
+        raise ValueError(f"{error}; {completing(path)}") from None
+
+
+def completing(path: str | Path) -> str:
+    """Words on the command that adds to a file what it does not say."""
+    return (
+        f"`skinwave measured {path} --out DIR` takes such options, and writes DIR/measurement.npz, "
+        "which says all"
+    )
+
+
+def reader_of(path: Path) -> Reader:
+    """Reader of a file of such a name; raises a ValueError if nothing does."""
+    for reader in READERS:
+        if path.suffix.lower() in reader.suffixes:
+            return reader
+    known = ", ".join(suffix for reader in READERS for suffix in reader.suffixes)
+    raise ValueError(f"{path}: '{path.suffix}' is no known kind of file, use one of {known}")
+
+
+def places_of(words: str) -> Floats:
+    """Places (p, 2) in metre of words such as "0,0 5,0" in mm, or of a text file with the columns
+    x and y.
+
+    Raises
+    ------
+    ValueError
+        If a word is no pair of finite numbers, or the file has none.
+    """
+    if Path(words).is_file():
+        return text.places(Path(words))
+    found = []
+    for word in words.split():
+        pair = word.strip("()").split(",")
+        if len(pair) != 2:
+            raise ValueError(f"--places has '{word[:40]}', no x,y in mm; write 0,0 5,0, or a file")
+        found.append([length(part, "mm") for part in pair])
+    if not found or not np.isfinite(found).all():
+        raise ValueError("--places must be pairs of finite numbers in mm; write 0,0 5,0")
+    return np.array(found)

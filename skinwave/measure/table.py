@@ -1,0 +1,324 @@
+"""Table of columns, and which of them hold times or frequencies, motion, and the drive."""
+
+import re
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from simple_model.trajectory import Floats
+from skinwave.measure.headers import DRIVE, FREQUENCY, INDEX, TIME, Column, X, Y, Z
+from skinwave.measure.recording import Given
+from skinwave.measure.units import (
+    FREQUENCIES,
+    LENGTHS,
+    TIMES,
+    in_si,
+    per_reference,
+    plain,
+    quantity_of,
+    scale,
+)
+
+OF_DRIVES = ("V", "mV", "N", "mN", "Pa", "kPa", "A", "mA")
+DIRECTIONS = {"into the body": 1, "out of the body": -1}
+STRAIGHT = 1e-2  # of its range: how far a column of rounded times may be from rising evenly
+FEWEST = 4  # rows that show whether a column rises
+_RATE = re.compile(r"sampl\w*[ _-]*(rate|freq\w*)|abtast(rate|frequenz)|fs|rate")
+_INTERVAL = re.compile(
+    r"(sampl\w*|time)[ _-]*(interval|increment|period)|increment|delta_x|dt|tinc"
+)
+_START = re.compile(r"start|x0|t0|trigger offset|first time")
+_BAND = re.compile(r"(band[ _-]*|cent(er|re)[ _-]*)?(frequency|frequenz|fréquence)")
+_AXIS_UNIT = re.compile(r"(horizontal|x|time)[ _-]*units?")
+_AXIS = re.compile(r"(?:^|[ _])([xyz])\s*(?:[\[(]|$)")
+_UNIT = re.compile(r"(vertical|y)?[ _-]*(units?|einheit)")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Table:
+    """Columns, their numbers (n, c), and the notes above them."""
+
+    columns: tuple[Column, ...]
+    numbers: Floats
+    notes: tuple[tuple[str, str], ...] = ()
+
+    def of(self, role: str) -> int:
+        """Number of the only column of a role; -1 if there is none.
+
+        Raises
+        ------
+        ValueError
+            If there are several.
+        """
+        found = [k for k, one in enumerate(self.columns) if one.role == role]
+        if len(found) > 1:
+            raise ValueError(f"{len(found)} columns are of {role}; leave one")
+        return found[0] if found else -1
+
+    def note(self, key: re.Pattern[str]) -> str:
+        """The first value of the notes whose key is this; "" if there is none."""
+        return next((value for name, value in self.notes if key.fullmatch(name) and value), "")
+
+
+def noted(table: Table) -> tuple[str, int, tuple[str, ...]]:
+    """Name, sign (0 if it is not known) and remarks in the notes above a table."""
+    named = [value for key, value in table.notes if key == "name" and value]
+    signs = [DIRECTIONS.get(value, 0) for key, value in table.notes if key == "positive"]
+    remarks = tuple(value for key, value in table.notes if key == "remark" and value)
+    return named[0] if named else "", signs[0] if signs else 0, remarks
+
+
+def with_roles(table: Table, given: Given) -> tuple[Table, tuple[str, ...]]:
+    """The table with the roles of columns that their headings do not say, of its chosen columns,
+    and remarks.
+
+    Parameters
+    ----------
+    table : Table
+    given : Given, whose `columns` are those of motion and whose `unit` replaces that of the file
+
+    Raises
+    ------
+    ValueError
+        If columns have different times, or a chosen column does not exist.
+    """
+    numbers, said = _rows(table), []
+    columns = [replace(one, unit=per_reference(one.unit)[0]) for one in table.columns]
+    if any(per_reference(one.unit)[1] for one in table.columns):
+        said.append("values are per unit of the reference")
+    has_places = {X, Y} <= {one.role for one in columns} and any(
+        one.role in (TIME, FREQUENCY) or plain(one.unit) in LENGTHS for one in columns
+    )
+    for k, one in enumerate(columns):
+        if one.role in (X, Y, Z) and not has_places and plain(one.unit) not in LENGTHS:
+            columns[k] = replace(one, role="" if one.unit != "Sequence" else INDEX)
+    for k, one in enumerate(columns):
+        if one.role == INDEX and not _counts(numbers[:, k]) and not has_places:
+            columns[k] = replace(one, role="")
+    chosen = _chosen(columns, given.columns) or _along(columns, given.direction, has_places)
+    open_ = [k for k, one in enumerate(columns)
+             if one.is_motion and not one.is_of_motion and k not in chosen]  # fmt: skip
+    has_axis = any(one.role in (TIME, FREQUENCY) for one in columns)
+    rising = [k for k in open_ if rises(numbers[:, k])] if len(columns) > 1 else []
+    for k in rising:
+        counts = _counts(numbers[:, k]) and numbers[0, k] in (0, 1)
+        if counts or not has_axis:
+            columns[k] = replace(columns[k], role=INDEX if counts else TIME)
+        said.append(
+            f"column {k + 1} rises evenly and is taken as "
+            + ("a count of samples" if counts else "motion" if has_axis else "time")
+        )
+    columns = _one_time(columns, numbers)
+    if chosen:
+        kept = [k for k, one in enumerate(columns) if k in chosen or not one.is_motion]
+    else:
+        kept, more = _motion(columns, given)
+        said += more
+    unit = table.note(_AXIS_UNIT)
+    columns = [replace(one, unit=one.unit or unit) if one.role == TIME else one for one in columns]
+    unit = table.note(_UNIT)
+    columns = [replace(one, unit=unit) if quantity_of(unit) and one.is_motion and not one.unit
+               else one for one in columns]  # fmt: skip
+    found = replace(table, columns=tuple(columns[k] for k in kept), numbers=numbers[:, kept])
+    return found, tuple(said)
+
+
+def _rows(table: Table) -> Floats:
+    """Numbers without empty rows, if times tell which rows are missing."""
+    numbers = table.numbers
+    full = ~np.isnan(numbers).all(axis=1)
+    told = any(one.role in (TIME, FREQUENCY) for one in table.columns) or any(
+        rises(column) for column in numbers[full].T
+    )
+    return numbers[full] if told else numbers
+
+
+def _counts(numbers: Floats) -> bool:
+    """Whether numbers count rows, by ones."""
+    return bool(len(numbers) > 1 and (np.diff(numbers) == 1).all())
+
+
+def rises(numbers: Floats) -> bool:
+    """Whether numbers rise as times do: in steps that are even up to rounding, or always."""
+    if len(numbers) < FEWEST or not np.isfinite(numbers).all() or (np.diff(numbers) < 0).any():
+        return False
+    span = float(np.ptp(numbers))
+    even = np.linspace(numbers[0], numbers[-1], len(numbers))
+    straight = np.abs(numbers - even).max() <= STRAIGHT * span
+    return span > 0 and bool(straight or (len(numbers) > 2 * FEWEST and np.diff(numbers).min() > 0))
+
+
+def _one_time(columns: list[Column], numbers: Floats) -> list[Column]:
+    """Columns with one of time: clocks give way to seconds, and copies are left out.
+
+    Raises
+    ------
+    ValueError
+        If columns differ in their times.
+    """
+    found = [k for k, one in enumerate(columns) if one.role == TIME]
+    if len(found) < 2:
+        return columns
+    constant = [k for k in found if len(numbers) > 1 and not np.ptp(numbers[:, k])]
+    kept = [k for k in found if k not in constant] or found[:1]
+    kept = [k for k in kept if columns[k].unit] or kept
+    for k in kept[1:]:
+        if not np.array_equal(numbers[:, k], numbers[:, kept[0]]):
+            raise ValueError(
+                f"{len(kept)} columns are of time, and '{columns[kept[0]].text}' and "
+                f"'{columns[k].text}' differ, from {numbers[0, kept[0]]:g} and {numbers[0, k]:g} "
+                "on; export channels with the same times, or one file for each"
+            )
+    return [replace(one, role=INDEX) if k in found and k != kept[0] else one
+            for k, one in enumerate(columns)]  # fmt: skip
+
+
+def _chosen(columns: list[Column], wanted: tuple[str, ...]) -> list[int]:
+    """Numbers of the columns that a user names, by heading or by number from 1."""
+    found = []
+    for name in wanted:
+        names = [one.text.lower() for one in columns]
+        bare = [re.sub(r"\s*[\[(].*", "", text) for text in names]
+        at = [k for k, text in enumerate(names) if name.lower() in (text, bare[k])]
+        if not at and name.isdigit() and 1 <= int(name) <= len(columns):
+            at = [int(name) - 1]
+        if not at:
+            known = ", ".join(one.text or str(k + 1) for k, one in enumerate(columns))
+            raise ValueError(f"--columns has '{name[:40]}', and the columns are {known[:200]}")
+        found += at
+    return found
+
+
+def _along(columns: list[Column], direction: str, has_places: bool) -> list[int]:
+    """Numbers of the columns along the one direction that is given, if headings have several."""
+    found = [_AXIS.search(one.text.lower()) for one in columns]
+    axes = {k: one[1] for k, one in enumerate(found)
+            if one and quantity_of(columns[k].unit) and not has_places}  # fmt: skip
+    if len(set(axes.values())) < 2:
+        return []
+    if direction not in axes.values():
+        raise ValueError(
+            f"columns are of the directions {', '.join(sorted(set(axes.values())))}; choose that "
+            "normal to the body by --direction"
+        )
+    return [k for k, axis in axes.items() if axis == direction]
+
+
+def _motion(columns: list[Column], given: Given) -> tuple[list[int], list[str]]:
+    """Numbers of the columns to keep: beside columns in units of motion, one in another unit is the
+    drive and others are left out. Of several quantities the one that is wanted stays.
+    """
+    of = [quantity_of(one.unit) for one in columns]
+    of = [kind or one.role for kind, one in zip(of, columns, strict=True)]
+    motion = [k for k, one in enumerate(columns) if one.is_motion]
+    sure = [k for k in motion if quantity_of(columns[k].unit)]
+    apart = [
+        k for k in motion if np.isnan(columns[k].place[0]) and not quantity_of(columns[k].unit)
+    ]
+    names = ", ".join(columns[k].text or str(k + 1) for k in apart)
+    said = []
+    if len(apart) == len(motion) > 1 and given.places is None:
+        if all(plain(columns[k].unit) in OF_DRIVES for k in apart):
+            raise ValueError(
+                f"columns {names} are channels in {columns[apart[0]].unit}, and one may be the "
+                "drive; choose those of motion by --columns, or give the --places of all"
+            )
+        said.append(f"columns {names} are taken as places; if one is the drive, give --columns")
+    other = [k for k in motion if sure and k not in sure and columns[k].unit
+             and columns[k].part != "phase"]  # fmt: skip
+    drives = [k for k in other if plain(columns[k].unit) in OF_DRIVES]
+    if len(drives) == 1 and not any(one.role == DRIVE for one in columns):
+        k = drives[0]
+        columns[k] = replace(columns[k], role=DRIVE)
+        other.remove(k)
+        said.append(f"column '{columns[k].text}' in {columns[k].unit} is taken as the drive")
+    if other:
+        said.append(f"{len(other)} columns that are not in a unit of motion are left out")
+    kinds = {of[k] for k in sure}
+    if len(kinds) > 1 and given.quantity in kinds:
+        other += [k for k in sure if of[k] != given.quantity]
+    return [k for k in range(len(columns)) if k not in other], said
+
+
+def axis_of(table: Table, k: int, has_rate: bool) -> tuple[Floats, Floats]:
+    """Times in s and frequencies in Hz of a column; one of them is empty. With a rate that is
+    given, times need no unit.
+    """
+    if k < 0:
+        return np.empty(0), np.empty(0)
+    one = table.columns[k]
+    unit, is_time = one.unit, one.role == TIME
+    values = table.numbers[:, k]
+    if is_time and has_rate and plain(unit) not in TIMES:
+        return values, np.empty(0)
+    if not unit:
+        raise ValueError(
+            f"the column '{one.text or k + 1}' has no unit; write "
+            f"'{'t [s]' if is_time else 'f [Hz]'}'" + ", or give --rate" * is_time
+        )
+    known, what = (TIMES, "time") if is_time else (FREQUENCIES, "frequency")
+    values = in_si(values, scale(unit, known, what))
+    return (values, np.empty(0)) if is_time else (np.empty(0), values)
+
+
+def noted_axis(table: Table) -> tuple[float, float]:
+    """Sampling rate in Hz and first time in s in the notes above a table; nan and 0 without."""
+    start = _noted(table, _START, TIMES)
+    rate, interval = _noted(table, _RATE, FREQUENCIES), _noted(table, _INTERVAL, TIMES)
+    rate = rate if rate > 0 else 1 / interval if interval > 0 else np.nan
+    return rate, 0.0 if np.isnan(start) else start
+
+
+def noted_frequency(table: Table) -> float:
+    """The one frequency in Hz of an exported band; nan if there is none."""
+    return _noted(table, _BAND, FREQUENCIES)
+
+
+def _noted(table: Table, key: re.Pattern[str], units: dict[str, float]) -> float:
+    """A number of the notes in SI; nan if it is missing or in another unit."""
+    found = re.fullmatch(r"\D*?([-+.\deE,]+)\s*([^\d\s].*)?", table.note(key))
+    unit = plain((found[2] or "") if found else "")
+    unit = {"S/s": "Hz", "Sa/s": "Hz", "kS/s": "kHz", "kSa/s": "kHz"}.get(unit, unit)
+    unit = unit or (plain(table.note(_AXIS_UNIT)) if units is TIMES else "") or next(iter(units))
+    try:
+        return float(found[1].replace(",", ".")) / units[unit] if found else float("nan")
+    except (KeyError, ValueError):
+        return float("nan")
+
+
+def agreed(columns: list[Column], given: Given) -> tuple[str, str]:
+    """The one quantity and unit of columns of motion; "" where none says, or an option replaces."""
+    found = []
+    for what, replaced in (("role", given.quantity), ("unit", given.unit)):
+        said = {getattr(one, what) for one in columns} - {""}
+        mixed = what == "unit" and not all(map(quantity_of, said))
+        if len(said) > 1 and (mixed or not replaced):
+            raise ValueError(
+                f"columns differ in {'quantity' if what == 'role' else what}: "
+                f"{', '.join(sorted(said))[:80]}; choose some by --columns"
+            )
+        found.append(said.pop() if len(said) == 1 else "")
+    return found[0], found[1]
+
+
+def complex_of(columns: tuple[Column, ...], numbers: Floats, first: int, second: int) -> np.ndarray:
+    """Complex amplitudes of two columns.
+
+    Raises
+    ------
+    ValueError
+        If they are not the two parts of one, or a phase has no unit.
+    """
+    one, other = columns[first], columns[second]
+    a, b = numbers[:, first], numbers[:, second]
+    same = one.repetition == other.repetition and str(one.place) == str(other.place)
+    if same and (one.part, other.part) == ("re", "im"):
+        return a + 1j * b
+    if same and one.part in ("", "abs") and other.part == "phase":
+        if (unit := plain(other.unit)) not in ("deg", "rad"):
+            raise ValueError(f"the phase '{other.text}' needs a unit; give [deg] or [rad]")
+        return np.asarray(a * np.exp(1j * (np.deg2rad(b) if unit == "deg" else b)))
+    raise ValueError(
+        f"'{one.text}' and '{other.text}' are no complex amplitude; name them 're v(0,0) [mm/s]', "
+        "'im v(0,0) [mm/s]', or 'abs' and 'phase'"
+    )

@@ -1,0 +1,363 @@
+"""Text in columns as programs export it: encoding, delimiter, decimal sign, header, and numbers.
+
+The rows at the end of a file show what separates its cells and which columns hold numbers. Its
+table begins at the first line with numbers in these columns. The line above has the names, or the
+units below a line of names. Everything above, and cells beside the numbers, are notes.
+"""
+
+import io
+import re
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import replace
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+
+from simple_model.trajectory import Floats
+from skinwave.measure.decoding import decoded
+from skinwave.measure.headers import TIME, UNITS, X, Y, column
+from skinwave.measure.labview import lvm_table
+from skinwave.measure.layouts import EXAMPLE, in_metre, recording
+from skinwave.measure.recording import Given, Recording
+from skinwave.measure.table import Table
+from skinwave.measure.units import plain, quantity_of
+from skinwave.system.plain_text import number_in
+
+FIRST_LINE = "LabVIEW Measurement"  # of .lvm files, whatever they are called
+SHOWN = 100  # rows at the end that show what separates cells
+NO_VALUE = (
+    "", "-", "--", "---", "na", "n/a", "#n/a", "null", "none", "nan", "1.#qnan", "-1.#ind",
+    "1.#ind", "missing", "invalid",
+)  # fmt: skip
+BEYOND = ("∞", "+∞", "1.#inf", "overload", "over")  # the range of an instrument
+MARK = "#%;/!"  # before lines about the measurement
+_CLOCK = re.compile(
+    r"(?:(\d{1,4})([-/.])(\d{1,2})\2(\d{1,4}))?[T ]*"
+    r"(?:(\d{1,2}):(\d\d):(\d\d(?:[.,]\d+)?)\s*([AP]M)?(?:Z|[+-]\d\d:?\d\d)?)?"
+)
+_LEADING_ZERO = re.compile(r",0\d+(?=,|$)")
+
+
+def read(path: Path, given: Given) -> Recording:
+    """The recording in a text file.
+
+    Raises
+    ------
+    ValueError
+        If it is no table of numbers, or its columns do not make a measurement.
+    """
+    text = decoded(path)
+    if text.startswith(FIRST_LINE):
+        return recording(lvm_table(text), given)
+    return recording(table(text), given)
+
+
+def places(path: Path) -> Floats:
+    """Places (p, 2) in metre of a text file with the columns x and y, or of two columns in mm.
+
+    Raises
+    ------
+    ValueError
+        If it has no such columns, or they are no numbers.
+    """
+    found = table(decoded(path))
+    columns = found.columns
+    if len(columns) == 2 and not any(one.text for one in columns):
+        columns = (column("x [mm]"), column("y [mm]"))
+    where = [[k for k, one in enumerate(columns) if one.role == role] for role in (X, Y)]
+    if not all(len(of) == 1 for of in where):
+        raise ValueError(f"{path}: a file of places needs the columns x [mm], y [mm]; add these")
+    return in_metre(columns, found.numbers, (where[0][0], where[1][0]))
+
+
+def table(text: str) -> Table:
+    """The table in a text: columns, numbers, and notes above it.
+
+    Raises
+    ------
+    ValueError
+        If there is none, or a line in it is no row of numbers; with the number of the line.
+    """
+    lines = text.rstrip().splitlines()
+    last = [line for line in lines[-4 * SHOWN :] if line.strip()][-SHOWN:]
+    if not any(line.strip() and line.lstrip()[0] not in "#%" for line in lines):
+        raise ValueError(f"the file has no table; give a header such as {EXAMPLE}, and numbers")
+    wrong = "the file has a header and no numbers; export it anew"
+    if len(last) > 1:
+        cells = re.split(r"[\t;, ]+", last[-1].strip())
+        word = next((cell for cell in cells if number_in(cell) is None), cells[0])
+        wrong = f"line {len(lines)} has '{word[:40]}', which is no number; mend it"
+    misfits = []
+    for delimiter, comma in _separations(last):
+        kept, width = _columns(last, delimiter, comma)
+        first = next((k for k, line in enumerate(lines)
+                      if _is_row(_cells(line, delimiter, comma), kept, width)), -1)  # fmt: skip
+        if first < 0:
+            continue
+        try:
+            names, units, notes = _header(lines[:first], delimiter, kept, width)
+        except ValueError as error:
+            misfits.append(str(error))
+            continue
+        _check_text(names, units, kept, _cells(lines[first], delimiter, comma), notes)
+        numbers = _numbers(lines, first, delimiter, comma, kept, names, notes)
+        columns = [column(names[k], units[k]) for k in kept]
+        for k, cell in enumerate(_cells(lines[first], delimiter, comma)[c] for c in kept):
+            if _clock(cell) is not None:
+                numbers[:, k] -= numbers[0, k]
+                columns[k] = replace(columns[k], role=TIME, unit="s")
+        return Table(columns=tuple(columns), numbers=numbers, notes=tuple(notes))
+    raise ValueError([*misfits, wrong][0])
+
+
+def _separations(rows: list[str]) -> Iterator[tuple[str, bool]]:
+    """Delimiters, and whether decimal signs are commas, by which most rows are alike."""
+    for delimiter in "\t;, ":
+        if delimiter != " " and not any(delimiter in line for line in rows):
+            continue
+        bare = [line for line in rows if line.lstrip()[0] not in "#%"]
+        comma = any(
+            _with_point(cell) != cell
+            for line in bare if "," in line for cell in _cells(line, delimiter)
+        )  # fmt: skip
+        if len(_columns(rows, delimiter, comma)[0]):
+            yield delimiter, comma
+
+
+def _columns(rows: list[str], delimiter: str, comma: bool) -> tuple[list[int], int]:
+    """The columns of numbers at the end of a file, and how many cells its rows have."""
+    split = [_cells(line, delimiter, comma) for line in rows]
+    widths = [len(cells) for cells in split[-3:]]
+    width = max(widths, key=widths.count)
+    alike = [cells for cells in split if len(cells) == width]
+    alike = alike[len(alike) // 2 :]  # without the header of a short table
+    full = [k for k in range(width) if any(cells[k] for cells in alike)]
+    kept = [k for k in full if 2 * sum(_is_value(c[k]) for c in alike) >= len(alike)]
+    is_table = any(_is_number(c[k]) for c in alike for k in kept)
+    return kept if is_table and (delimiter != " " or kept == full) else [], width
+
+
+def _is_row(cells: list[str], kept: list[int], width: int) -> bool:
+    """Whether cells are a row of the table: values in the columns of numbers, and one at least."""
+    if not kept[-1] < len(cells) <= width:
+        return False
+    found = [cells[k] for k in kept]
+    return all(map(_is_value, found)) and any(map(_is_number, found))
+
+
+def _cells(line: str, delimiter: str, comma: bool = False) -> list[str]:
+    """Cells of a line; a delimiter within quotes or brackets is none, as in v(0,0)."""
+    if delimiter == " ":
+        joined = re.sub(r"\s+(?=[^\[\]]*\])|\s+(?=[\[(#])", "", line.strip()).replace('"', "")
+        found = joined.split()
+    elif not re.search(r'["(\[]', line):
+        found = line.split(delimiter)
+    else:
+        found, cell, depth, quoted = [], "", 0, False
+        for letter in line:
+            if letter == '"':
+                quoted = not quoted
+            elif letter == delimiter and not quoted and depth <= 0:
+                found.append(cell)
+                cell = ""
+            else:
+                depth += 0 if quoted else (letter in "([") - (letter in ")]")
+                cell += letter
+        found.append(cell)
+    found = [cell.strip().replace("\u2212", "-") for cell in found]
+    return [_with_point(cell) for cell in found] if comma else found
+
+
+def _with_point(cell: str) -> str:
+    """A number with a decimal comma as one with a point; other cells as they are."""
+    pointed = cell.replace(",", ".")
+    return pointed if "." not in cell and number_in(pointed) is not None else cell
+
+
+def _is_number(cell: str) -> bool:
+    value = _value(cell)
+    return value is not None and bool(np.isfinite(value))
+
+
+def _is_value(cell: str) -> bool:
+    return _value(cell) is not None
+
+
+def _value(cell: str) -> float | None:
+    """Number of a cell: nan of one that was not measured, inf beyond the range, s of a clock."""
+    number = number_in(cell)
+    if number is not None:
+        return number
+    if cell.lower() in NO_VALUE:
+        return np.nan
+    return np.inf if cell.lower().lstrip("-") in BEYOND else _clock(cell)
+
+
+def _clock(cell: str) -> float | None:
+    """Seconds of a date, a time of day, or both."""
+    found = _CLOCK.fullmatch(cell) if ":" in cell or cell[:1].isdigit() else None
+    if not found or not (found[1] or found[5]):
+        return None
+    seconds = 0.0
+    if found[1]:
+        parts = [int(found[k]) for k in (1, 3, 4)]
+        if found[2] != "-" and parts[0] < 32:
+            parts = [parts[2], *(parts[1::-1] if found[2] == "." else parts[:2])]
+        try:
+            seconds = 86400.0 * (date(*parts).toordinal() % 100)  # leaves digits to fractions
+        except ValueError:
+            return None
+    if found[5]:
+        hour = int(found[5]) % 12 + 12 * (found[8] == "PM") if found[8] else int(found[5])
+        seconds += 3600 * hour + 60 * int(found[6]) + float(found[7].replace(",", "."))
+    return seconds
+
+
+def _header(
+    above: list[str], delimiter: str, kept: list[int], width: int
+) -> tuple[list[str], list[str], list[tuple[str, str]]]:
+    """Names and units of columns, and notes, of the lines above a table.
+
+    Raises
+    ------
+    ValueError
+        If the line of names does not fit the columns.
+    """
+    at = [k for k, line in enumerate(above) if line.strip()]
+    notes = [_note(above[k]) for k in at]
+    rows = [_heading(above[k], delimiter) for k in at]
+    if rows:  # Rigol's "t0 = -0.01, tInc = 1e-4" behind names
+        notes += [_note(cell) for cell in rows[-1] if "=" in cell]
+        rows[-1] = [cell for cell in rows[-1] if "=" not in cell]
+    found = [rows.pop()] if rows and not _is_title(rows[-1], len(kept)) else []
+    if found and _are_units([found[0][k] for k in kept if k < len(found[0])]):
+        found = [rows.pop() if rows and len(rows[-1]) > kept[-1] else [], *found]
+    elif found and any(number_in(cell) is not None for cell in found[0]):
+        if rows and len(rows[-1]) == len(found[0]) and not any(map(number_in, rows[-1])):
+            cell = next((cell for cell in found[0] if number_in(cell) is None), "")
+            raise ValueError(f"line {at[-1] + 1} has '{cell[:40]}', which is no number; mend it")
+        found = found if column(found[0][0]).role else []
+    count = len(found[0]) if found else width
+    if count and (count <= kept[-1] or (count > width and len(found) == 1)):
+        word = {"\t": "tabs", " ": "white space"}.get(delimiter, f"'{delimiter}'")
+        raise ValueError(
+            f"line {at[-1] + 2} has {width} cells between {word} and the header {count}; give a "
+            "name for each column, and columns with decimal commas between semicolons"
+        )
+    names, units = ([*cells, *[""] * width] for cells in [*found, [], []][:2])
+    notes += [(name.lower(), unit) for k, (name, unit) in enumerate(zip(names, units, strict=False))
+              if k not in kept and name and unit]  # fmt: skip
+    return names[: max(width, count)], units, notes
+
+
+def _check_text(
+    names: list[str], units: list[str], kept: list[int], cells: list[str],
+    notes: list[tuple[str, str]],
+) -> None:  # fmt: skip
+    """Note the columns of text that are left out; refuse those whose heading is that of numbers."""
+    for k, cell in enumerate(cells[: len(names)]):
+        if k in kept or not (names[k] and cell) or _is_number(cell):
+            continue
+        if (one := column(names[k], units[k])).role or quantity_of(one.unit):
+            raise ValueError(
+                f"the column '{names[k][:40]}' holds text such as '{cell[:40]}'; export it as "
+                "numbers, times in s or as hours:minutes:seconds"
+            )
+        notes.append(("remark", f"the column '{names[k][:40]}' holds text and is left out"))
+
+
+def _is_title(cells: list[str], count: int) -> bool:
+    """Whether the cells above a table are no names of its columns."""
+    if len(cells) == 1 and count > 1:
+        one = column(cells[0])
+        return not (one.role or one.unit)
+    return not cells
+
+
+def _heading(line: str, delimiter: str) -> list[str]:
+    """Cells of a line that may be names or units; none of a note such as "key: value"."""
+    marked = line.lstrip()[0] in MARK
+    if marked and ":" in line:
+        return []
+    cells = _cells(line.lstrip(MARK + " ") if marked else line, delimiter)
+    while cells and not cells[-1]:
+        cells.pop()
+    return cells
+
+
+def _are_units(cells: list[str]) -> bool:
+    """Whether cells are units and nothing else, be they in brackets."""
+    return any(cells) and all(
+        plain(cell) in UNITS or re.fullmatch(r"[\[(].*[\])]", cell) is not None for cell in cells
+    )
+
+
+def _note(line: str) -> tuple[str, str]:
+    """Key in lower case and value of a line such as "key: value" or "key,value"."""
+    bare = re.sub(r"^[#%;/!\s]+", "", line).replace('"', "")
+    key, value = [*re.split(r"[:,;\t=]+", bare, maxsplit=1), ""][:2]
+    name, _, unit = key.strip(" )]").replace("[", "(").partition("(")
+    return name.strip().lower(), f"{value.strip(' ,;' + chr(9))} {unit}".strip()
+
+
+def _numbers(
+    lines: list[str], first: int, delimiter: str, comma: bool, kept: list[int], names: list[str],
+    notes: list[tuple[str, str]],
+) -> Floats:  # fmt: skip
+    """Numbers (n, c) of the lines from the first on; notes from cells beside them are added."""
+    rows, width = lines[first:], len(names)
+    if delimiter == "," and any(_LEADING_ZERO.search(line) for line in rows[:SHOWN]):
+        raise ValueError(
+            f"line {first + 1} seems to have decimal commas between commas; export columns between "
+            "semicolons or tabs"
+        )
+    plain_rows = "\n".join(rows)
+    if len(kept) == width > 1 and not (comma and "." in plain_rows):
+        with suppress(ValueError):
+            found = np.loadtxt(
+                io.StringIO(plain_rows.replace(",", ".") if comma else plain_rows), ndmin=2,
+                comments=None, delimiter=None if delimiter == " " else delimiter,
+            )  # fmt: skip
+            if found.shape[1] == width and not np.isinf(found).any():
+                return found
+    return np.array([
+        _row(line, k, delimiter, comma, kept, names, notes)
+        for k, line in enumerate(rows, first + 1) if line.strip() or width == 1
+    ])  # fmt: skip
+
+
+def _row(
+    line: str, number: int, delimiter: str, comma: bool, kept: list[int], names: list[str],
+    notes: list[tuple[str, str]],
+) -> list[float]:  # fmt: skip
+    """Numbers of a line; its other cells are notes."""
+    cells = _cells(line, delimiter, comma) or [""]
+    wrong = next((cell for cell in cells if comma and "." in cell and "," in cell
+                  and _clock(cell) is None), "")  # fmt: skip
+    if comma and not wrong and "." in line and ":" not in line:
+        wrong = next((cell for cell in _cells(line, delimiter) if "." in cell), "")
+    cure = "has a dot, and the file has decimal commas; leave out separators of thousands"
+    if not wrong and not kept[-1] < len(cells) <= len(names):
+        raise ValueError(
+            f"line {number} has {len(cells)} cells and the rows above {len(names)}; complete or "
+            "delete it"
+        )
+    values = [_value(cells[k]) for k in kept] if not wrong else []
+    for k, value in zip(kept, values, strict=False):
+        if value is None or np.isinf(value):
+            wrong, cure = cells[k], "is no number; mend it" if value is None else (
+                "is beyond the range of the instrument; measure with a larger range")  # fmt: skip
+    aside = {k: cell for k, cell in enumerate(cells) if cell and k not in kept}
+    for k, cell in aside.items():
+        if names[k] and _is_number(cell):
+            wrong, cure = (
+                cell,
+                f"is in the column '{names[k][:40]}', which ends early; leave it out",
+            )
+    if wrong:
+        raise ValueError(f"line {number} has '{wrong[:40]}', which {cure}")
+    if aside and not any(names[k] for k in aside):
+        notes.append((next(iter(aside.values())).lower(), " ".join([*aside.values()][1:])))
+    return [float("nan") if value is None else value for value in values]

@@ -1,5 +1,0 @@
-"""Measurements on a body: reading, inspection, comparison with models, and fits to them."""
-
-from skinwave.measurements.measurement import Measurement
-
-__all__ = ["Measurement"]

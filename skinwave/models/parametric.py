@@ -1,0 +1,369 @@
+"""Parametric reduced body: one offline stage for every material and thickness of a range.
+
+`prepare` is that stage, for a scene and ranges of some of its keys. `lines` takes milliseconds:
+Galerkin's equations of each line of the scene's load in a few states. `answer` is the waveform from
+rest, by the poles of the reduced-order model; `at` is that model, for any other Tacton. Poisson's
+ratios and the elements are fixed: with a thickness the nodes of one mesh move, or modulus and
+density of a sheet's stand for it. The absorbing layer of a slab with absorbing sides is as wide as
+the fastest shear waves need.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cache as cached
+from functools import partial
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+import fem
+from fem.affine import (
+    AffineOperators,
+    Solids,
+    interpolated,
+    operators_of,
+    weights,
+)
+from fem.line_basis import LineBasis, line_bases, steady_lines
+from fem.reduced_affine import AffineModel, Geometry, Variant, reduce_affine, steady
+from meshes import cache
+from meshes.tetmesh import Floats
+from simple_model import Effort, Response
+from simple_model.prony import FIT_TOLERANCE
+from skinwave.bodies.build import Build
+from skinwave.bodies.sizes import default_size
+from skinwave.models.affine_scenes import check_scene
+from skinwave.models.free_keys import (
+    FreeKey,
+    free_keys,
+    meshing_shares,
+    training_shares,
+    values_at,
+    with_values,
+)
+from skinwave.models.free_materials import Reference, affine_operators, reference_of, solids_of
+from skinwave.models.full import spent
+from skinwave.models.laws import relaxing
+from skinwave.models.loads import line_factor, load_lines_at, probe_rows, spread, surface_load
+from skinwave.models.parametric_cache import packed, unpacked
+from skinwave.models.prepared import Prepared, entry_name, typical_spots
+from skinwave.models.prepared import answer as answer_of
+from skinwave.models.reduction import BAND, reduced_variant
+from skinwave.models.symmetry import even_part, images, modelled_axes
+from skinwave.models.thicknesses import (
+    Range,
+    build_at,
+    geometry_shares,
+    nearest_geometry,
+    range_of,
+)
+from skinwave.scene.scene import Body, Scene
+from skinwave.system.effort import Clock, Progress, one_thread, peak_memory, silent
+
+TOLERANCE = 0.01  # relative error of a line that is not faint
+SHARE = 0.4  # of the tolerance: of the reduced-order model, and of the lines' bases
+FAINTEST = 1e-3  # of the strongest line that moves the probes: weaker ones are left out
+FAINTEST_LOAD = 1e-6  # of the strongest line of the load
+FORMAT = "parametric 3"  # of what is cached
+ARRAYS = ("outputs", "load", "points", "frequencies")
+BETWEEN = 0.3  # of each range: a body of no known geometry
+KEPT = 5  # full bodies at a time: more of them are assembled anew, for a third of the memory
+INSIDE = 128  # materials inside the ranges, for the lines' bases
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ParametricBody:
+    """Reduced body of a scene for every material and thickness of a range.
+
+    The `keys` that are free and the `bodies` of their values; the `reference` that was meshed; of
+    each of g geometries the projected matrices `parts` (g, q, r, r), whose kinds are those of
+    `affine`, and in their coordinates what the probes read, `outputs` (g, p c, r), and reduced
+    forces `load` (g, k, r) of unit pressure at the surface `points` (g, k, 3) in metre; `bases`
+    (f,) of the lines at `frequencies` (f,) in Hz; and the `effort` of the offline stage, with the
+    number of its factorisations.
+    """
+
+    scene: Scene
+    keys: tuple[FreeKey, ...]
+    bodies: Range
+    reference: Reference
+    affine: AffineOperators
+    parts: Floats
+    outputs: Floats
+    load: Floats
+    points: Floats
+    frequencies: Floats
+    bases: tuple[LineBasis, ...]
+    effort: Effort
+
+    def __repr__(self) -> str:
+        free = ", ".join(f"{key.key} {key.low:g} to {key.high:g}" for key in self.keys)
+        order = f"{len(self.parts)} geometries of order {self.outputs.shape[-1]}"
+        return f"<ParametricBody of {self.scene!r}: {free}; {order}>"
+
+
+def prepare(
+    scene: Scene,
+    free: Mapping[str, tuple[float, float]],
+    tolerance: float = TOLERANCE,
+    progress: Progress | None = None,
+    *,
+    h: float | None = None,
+    solver: str = "auto",
+) -> ParametricBody:
+    """Offline stage: reduce a scene's body once for all materials and thicknesses within ranges.
+
+    Parameters
+    ----------
+    scene : Scene
+    free : key of a scene file, such as "body.material.shear_modulus_pa", "body.thickness_mm" or
+        "body.layers.0.material.viscosity_pa_s" -> its least and largest value, in the file's unit
+    tolerance : float, relative error of each line of the load at the probes
+    progress : called with the name of the phase and the fraction done
+    h : float, metre, element size; the default of the body if not given
+    solver : a backend of `fem.linear_solver`
+
+    Returns
+    -------
+    ParametricBody
+
+    Raises
+    ------
+    ValueError
+        If a key cannot be free, the scene's probes read what depends on more than motion, or the
+        tolerance is out of reach.
+    """
+    keys = free_keys(scene.body, free)
+    check_scene(scene, keys, tolerance)
+    clock, report = Clock(), progress or silent
+    with clock("mesh"):
+        report("mesh", 0.0)
+        bodies = _range(scene.body, keys, h)
+        body = bodies.body(bodies.meshed)
+        mesh = cached(partial(build_at, bodies, symmetry=_symmetry(scene)))
+        build = mesh(bodies.meshed)
+    reference = reference_of(body, build, keys)
+    of_body = entry_name(
+        body, build, scene.probe_points, solver, tolerance, outputs=_probes(scene, body, build),
+        load=scene.load,
+    )  # fmt: skip
+    name = cache.key(FORMAT, of_body, scene.pressure, scene.reading, keys)
+    with clock("read from cache"):
+        entry = cache.load(name)
+    if not entry:
+        stage = _Stage(
+            scene=scene, bodies=bodies, mesh=mesh, reference=reference, tolerance=tolerance,
+            solver=solver,
+        )  # fmt: skip
+        entry = _reduced(stage, clock, report, build, h or default_size(body))
+        cache.store(name, **entry)
+    affine, parts, bases = unpacked(entry, entry["outputs"])
+    effort = Effort(**{**entry["meta"], "seconds": clock.seconds, "peak_memory": peak_memory()})
+    return ParametricBody(
+        scene=scene, keys=keys, bodies=bodies, reference=reference, affine=affine, parts=parts,
+        bases=bases, effort=effort, **{array: entry[array] for array in ARRAYS},
+    )  # fmt: skip
+
+
+def _range(body: Body, keys: tuple[FreeKey, ...], h: float | None) -> Range:
+    """Bodies of all values of the free keys."""
+
+    def at(shares: Sequence[float]) -> Body:
+        return relaxing(with_values(body, keys, values_at(keys, shares)), FIT_TOLERANCE)
+
+    return range_of(at, meshing_shares(keys), [key.moves for key in keys], h)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Stage:
+    """Offline stage of a scene and the bodies of a range; `mesh` is that of shares of the range."""
+
+    scene: Scene
+    bodies: Range
+    mesh: Callable[[tuple[float, ...]], Build]
+    reference: Reference
+    tolerance: float
+    solver: str
+
+    def geometry(self, at: tuple[float, ...]) -> Geometry:
+        """Full body at shares of the range."""
+        body, build = self.bodies.body(at), self.mesh(at)
+        affine = affine_operators(body, build)
+        P, points = _surface(self.scene, build)
+        return Geometry(
+            affine=affine, probes=_probes(self.scene, body, build),
+            forces=_moving(self.scene, P, points)[1][:, affine.free],
+            loads=spread(P, typical_spots(body, points)),
+        )  # fmt: skip
+
+
+def _reduced(
+    stage: _Stage, clock: Clock, report: Progress, build: Build, h: float
+) -> dict[str, Any]:
+    """Arrays and `meta`, the effort, of what is cached."""
+    bodies, tolerance, scene = stage.bodies, stage.tolerance, stage.scene
+    few_geometries = len(bodies.geometries) <= KEPT
+    geometries: dict[Any, Callable[[], Geometry]] = {
+        at: partial(stage.geometry, at) for at in bodies.geometries
+    }
+    if few_geometries:
+        geometries = {at: cached(made) for at, made in geometries.items()}
+    with clock("assemble"):
+        report("assemble", 0.0)
+        frequencies, _ = _moving(scene, *_surface(scene, build))
+        for geometry in geometries.values() if few_geometries else ():
+            geometry()
+    few = [_variant(stage, at, geometries) for at in _training(stage)]
+    with clock("factorise and reduce"), one_thread():
+        model = reduce_affine(
+            list(geometries.values()), few, frequencies, band=BAND, tolerance=SHARE * tolerance,
+            solver=stage.solver, progress=partial(report, "reduce"),
+        )  # fmt: skip
+    surface = [_reduced_surface(scene, stage.mesh(at), model) for at in geometries]
+    with clock("lines"), one_thread():
+        kept, bases, error = _bases(stage, model, frequencies, few, report)
+    effort = Effort(
+        dofs=len(model.basis), reduced_dofs=model.basis.shape[1],
+        solver=fem.available()[0] if stage.solver == "auto" else stage.solver,
+        estimate=model.error + error, factorisations=model.factorisations,
+    )  # fmt: skip
+    load, points = (np.stack(each) for each in zip(*surface, strict=True))
+    return {
+        "meta": asdict(spent(effort, clock, build, h)), "outputs": model.outputs,
+        "load": load, "points": points, "frequencies": kept, **packed(model, bases),
+    }  # fmt: skip
+
+
+def _training(stage: _Stage) -> list[tuple[float, ...]]:
+    """Shares (k,) of corners and middle, of geometries that are known, and of one between them."""
+    count = len(stage.bodies.meshed)
+    few = [nearest_geometry(stage.bodies, each) for each in training_shares(count, 0).tolist()]
+    between = [(BETWEEN,) * count] if len(stage.bodies.geometries) > 1 else []
+    return list(dict.fromkeys([*few, *between]))
+
+
+def _variant(stage: _Stage, at: tuple[float, ...], geometries: Mapping[Any, Any]) -> Variant:
+    """Body at shares of the range, of a geometry that is meshed already, or of one of its own."""
+    body = stage.bodies.body(at)
+    shares = geometry_shares(stage.bodies, body)
+    nearest = list(geometries.values())[int(np.argmax(shares))]
+    is_known = nearest_geometry(stage.bodies, at) == at
+    return Variant(
+        solids=_relaxed(solids_of(stage.reference, body)), shares=shares,
+        geometry=nearest if is_known else partial(stage.geometry, at),
+    )  # fmt: skip
+
+
+def _reduced_surface(scene: Scene, build: Build, model: AffineModel) -> tuple[Floats, Floats]:
+    """Reduced forces (c k, r) of a unit load, and the points (k, 3) where it is."""
+    P, points = _surface(scene, build)
+    return P[model.affine.free].T @ model.basis, points
+
+
+def lines(prepared: ParametricBody, values: Mapping[str, float]) -> tuple[Floats, fem.Complex]:
+    """Steady state of a body of the range at the strong lines of the scene's load.
+
+    Returns
+    -------
+    frequencies : (f,) float, Hz
+    amplitudes : (f, p c) complex, of the components that the probes read, in the quantity's unit
+    """
+    return lines_of(prepared, _body(prepared, values))
+
+
+def lines_of(prepared: ParametricBody, body: Body) -> tuple[Floats, fem.Complex]:
+    """The same of a body that differs from the scene's by values of the free keys alone."""
+    solids = solids_of(prepared.reference, body)
+    of_parts = weights(prepared.affine, solids, prepared.frequencies)
+    found = steady_lines(prepared.bases, of_parts, geometry_shares(prepared.bodies, body))
+    s = 2j * np.pi * prepared.frequencies
+    return prepared.frequencies, found * line_factor(
+        prepared.scene.reading.asked, s, (), found.shape[1]
+    )
+
+
+def answer(prepared: ParametricBody, values: Mapping[str, float]) -> Response:
+    """Response of a body of the range from rest to the scene's Tacton, all lines and the free
+    vibration.
+    """
+    return answer_of(at(prepared, values), prepared.scene)
+
+
+def at(prepared: ParametricBody, values: Mapping[str, float]) -> Prepared:
+    """Reduced body of values of the free keys, for any Tacton."""
+    body = relaxing(_body(prepared, values), FIT_TOLERANCE)
+    shares = geometry_shares(prepared.bodies, body)
+    outputs, load, points = (
+        np.tensordot(shares, each, 1) for each in (prepared.outputs, prepared.load, prepared.points)
+    )
+    affine = interpolated(prepared.affine, prepared.parts, shares)
+    small = operators_of(affine, solids_of(prepared.reference, body))
+    return Prepared(
+        probes=prepared.scene.probe_points, read=outputs, reading=prepared.scene.reading,
+        load=prepared.scene.load,
+        body=reduced_variant(small, load, points, prepared.effort),
+    )  # fmt: skip
+
+
+def _symmetry(scene: Scene) -> str:
+    """Axes, of "xy", across which the part of the body on one side gives what the probes read."""
+    return modelled_axes(scene.body, scene.probe_points, "", scene.reading, scene.load)
+
+
+def _probes(scene: Scene, body: Body, build: Build) -> sparse.csr_array:
+    """Probe operator (p c, 3 n) of a mesh."""
+    places = images(scene.probe_points, build.symmetry)
+    return probe_rows(body, build, places, scene.reading)[0]
+
+
+def _surface(scene: Scene, build: Build) -> tuple[sparse.csr_array, Floats]:
+    """Load operator (3 n, c k) of a mesh, and the points (k, 3) where it takes the load."""
+    return even_part(*surface_load(build, scene.load), build.symmetry)
+
+
+def _moving(scene: Scene, P: sparse.csr_array, points: Floats) -> tuple[Floats, fem.Complex]:
+    """Frequencies (f,) in Hz and nodal forces (f, 3 n) in N of the load's lines, without the mean
+    if the body is unconstrained, which drifts under it.
+    """
+    frequencies, pressures = load_lines_at(scene.loads, points, FAINTEST_LOAD)
+    kept = (frequencies > 0) | scene.body.is_held
+    return frequencies[kept], (P @ pressures[kept].T).T
+
+
+def _body(prepared: ParametricBody, values: Mapping[str, float]) -> Body:
+    return with_values(prepared.scene.body, prepared.keys, values)
+
+
+def _relaxed(solids: Solids) -> Solids:
+    """The materials with Prony series for modulus laws of their own."""
+    return replace(solids, materials=tuple(m.relaxing() for m in solids.materials))
+
+
+def _bases(
+    stage: _Stage,
+    model: AffineModel,
+    frequencies: Floats,
+    few: Sequence[Variant],
+    report: Progress,
+) -> tuple[Floats, tuple[LineBasis, ...], float]:
+    """Frequencies, bases and error of the lines that are strong for some of a few variants."""
+    every = range(len(frequencies))
+    strengths = np.array(
+        [np.linalg.norm(steady(model, each, frequencies, every), axis=1) for each in few]
+    )
+    moving = np.where(frequencies > 0, strengths, 0.0).max(axis=1, keepdims=True)
+    kept = (frequencies == 0) | (strengths > FAINTEST * moving).any(axis=0)
+    many = [
+        stage.bodies.body(at) for at in training_shares(len(stage.bodies.meshed), INSIDE).tolist()
+    ]
+    found, error = line_bases(
+        model.parts, model.forces[:, kept], model.outputs,
+        np.stack([weights(model.affine, solids_of(stage.reference, each), frequencies[kept])
+                  for each in many]),
+        np.stack([geometry_shares(stage.bodies, each) for each in many]),
+        SHARE * stage.tolerance, partial(report, "lines"),
+    )  # fmt: skip
+    return frequencies[kept], found, error

@@ -1,1 +1,0 @@
-"""Pictures: figures, maps, views in three dimensions, films."""

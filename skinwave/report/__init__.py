@@ -1,0 +1,1 @@
+"""Figures, maps, three-dimensional views and films."""

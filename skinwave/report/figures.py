@@ -1,0 +1,287 @@
+"""Figures for print and page (matplotlib): waveforms, spectra and spread, models overlaid."""
+
+import warnings
+from io import BytesIO
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from meshes.tetmesh import Floats
+from simple_model import spectrum
+from simple_model.drawing import small
+from simple_model.quantities import Quantity
+from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
+from skinwave.report.styles import LABELS, NARROW, SHOWN, STYLES, TEXT, Style
+from skinwave.results.comparison import moving_rms
+from skinwave.results.run import Run
+from skinwave.system.numbers import significant
+
+# Okabe and Ito's colours, distinguishable with every kind of colour vision; one model, one colour.
+COLOURS = {
+    **{model.name: model.colour for model in (SAME_LOAD, PUBLISHED)},
+    "paper-sheet": "#D55E00",
+    "skin-slab": "#0072B2",
+    "measured": "#CC79A7",
+}
+SPARE = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+MARKERS = {SAME_LOAD.name: "o", PUBLISHED.name: "x", "paper-sheet": "s", "measured": "D"}
+REPORT = STYLES["report"]
+# Titles of the columns of a Tacton's figure.
+WHOLE = (
+    "waveform about its mean, over the model's largest",
+    "spectrum, dB re the model's largest line",
+)
+WRAPPED = ("waveform about its mean,\nover the largest", "spectrum, dB re\nlargest line")
+LETTER, GAP = 0.45, 0.3  # of a line's name, and between two, over the size of its letters
+LAID_OUT = 1.2  # width of a panel with the margins of a figure, over that before
+IN_A_ROW = 3  # entries of a legend, at most
+LETTER, HANDLE = 0.07, 0.5  # inch: of a letter of a legend, and of a handle with its space
+FLOOR = -80.0  # dB
+HIGHEST = 650.0  # Hz shown
+SETTLE = 0.25  # of the response, before which it is not looked at
+
+
+def png(figure: Figure, dpi: int = 110) -> bytes:
+    """The figure as a PNG file in memory."""
+    return drawn(figure, "png", dpi)
+
+
+def drawn(figure: Figure, kind: str, dpi: int = 110) -> bytes:
+    """The figure as a file in memory: "png", "svg" or "pdf", whose text stays text."""
+    buffer = BytesIO()
+    figure.dpi = dpi
+    with warnings.catch_warnings(), mpl.rc_context(TEXT):
+        # A name in letters that the font lacks is shown as boxes.
+        warnings.filterwarnings("ignore", "Glyph")
+        _lay_out(figure)
+        figure.savefig(buffer, format=kind, dpi=dpi)
+    return buffer.getvalue()
+
+
+def _lay_out(figure: Figure) -> None:
+    """Margins as its layout has them, for files of all kinds: `savefig` computes them for each, and
+    draws the figure once more to do so.
+    """
+    if engine := figure.get_layout_engine():
+        engine.execute(figure)
+        figure.set_layout_engine(None)
+
+
+def tacton_figure(title: str, runs: list[Run], style: Style = REPORT) -> Figure:
+    """Waveform and spectrum at each probe, all models overlaid."""
+    with mpl.rc_context(style.rc):
+        return _tacton_figure(title, runs, style)
+
+
+def _tacton_figure(title: str, runs: list[Run], style: Style) -> Figure:
+    probes, narrow = runs[0].response.probes, style.is_narrow
+    size = style.size(10.5, 1.6 * len(probes) + 1.3)
+    figure = Figure(figsize=(size[0], 0.75 * len(probes) + 1.6) if narrow else size)
+    axes = figure.subplots(len(probes), 2, sharex="col", sharey="col", squeeze=False)
+    for p, (x, y) in enumerate(probes):
+        _waveforms(axes[p, 0], runs, p)
+        _spectra(axes[p, 1], runs, p, named=p == 0 and not narrow)
+        axes[p, 0].set_ylabel(f"({1e3 * x:g}, {1e3 * y:g}) mm", fontweight="bold")
+    said = WRAPPED if narrow else WHOLE
+    axes[0, 0].set_title(f"{title}\n{said[0]}", fontsize="medium", parse_math=False)
+    axes[0, 1].set_title(said[1], fontsize="medium")
+    axes[-1, 0].set_xlabel("time, ms")
+    axes[-1, 1].set_xlabel("frequency, Hz")
+    rows = _legend(figure, runs, scales=True)
+    # Fixed margins: a computed layout takes twice as long.
+    inch = style.zoom / figure.get_figheight()
+    if narrow:
+        for ax in axes[:, 1]:
+            ax.set_yticks(np.arange(FLOOR, 1, 40))
+        top = 0.75 + 0.2 * rows
+        figure.subplots_adjust(0.2, 0.55 * inch, 0.97, 1 - top * inch, wspace=0.32, hspace=0.13)
+        return figure
+    top = 0.6 + 0.2 * rows
+    figure.subplots_adjust(0.08, 0.55 * inch, 0.99, 1 - top * inch, wspace=0.14, hspace=0.13)
+    return figure
+
+
+def overview_figure(columns: dict[str, list[Run]], probe: int = 2) -> Figure:
+    """A few Tactons side by side: waveform, spectrum at one probe, and spread over all."""
+    width, height = max(7.0, 4.0 * len(columns) + 0.5), 8.2
+    figure = Figure(figsize=(width, height))
+    axes = figure.subplots(3, len(columns), sharey="row", squeeze=False)
+    for k, (title, runs) in enumerate(columns.items()):
+        where = 1e3 * np.hypot(*runs[0].response.probes[probe])
+        axes[0, k].set_title(title, parse_math=False)
+        _waveforms(axes[0, k], runs, probe)
+        _spectra(axes[1, k], runs, probe, named=True)
+        _spread(axes[2, k], runs)
+        axes[0, k].set_xlabel("time, ms")
+        axes[1, k].set_xlabel("frequency, Hz")
+        axes[2, k].set_xlabel("distance from the centre of the path, mm")
+    axes[0, 0].set_ylabel(f"motion at {where:g} mm\n/ largest of the model")
+    axes[1, 0].set_ylabel(f"spectrum at {where:g} mm,\ndB re largest line of the model")
+    axes[2, 0].set_ylabel("RMS motion,\ndB re strongest probe")
+    rows = _legend(figure, next(iter(columns.values())), scales=False)
+    # Fixed margins here, too, in inches.
+    above = 0.1 + 0.25 * rows
+    figure.subplots_adjust(
+        0.85 / width, 0.55 / height, 1 - 0.1 / width, 1 - (above + 0.3) / height,
+        wspace=0.06, hspace=0.24,
+    )  # fmt: skip
+    return figure
+
+
+def colour(column: str) -> str:
+    """The colour of a `Run.column` in every picture."""
+    return COLOURS.get(column) or SPARE[sum(map(ord, column)) % len(SPARE)]
+
+
+def inked(column: str) -> str:
+    """The same in a style whose paper may be dark, on which black is its ink."""
+    own = colour(column)
+    return str(mpl.rcParams["text.color"]) if own == "#000000" else own
+
+
+def marker(column: str) -> str:
+    """The marker of a `Run.column` in every picture."""
+    return MARKERS.get(column, "^")
+
+
+def label(column: str) -> str:
+    """The name of a `Run.column` in every legend."""
+    return LABELS.get(column, column)
+
+
+def answered(run: Run) -> str:
+    """The name of a body and of the model of its response."""
+    alone = run.body in ("none", run.model)
+    return label(run.column) if alone else f"{label(run.body)} ({run.model})"
+
+
+def sized(value: float, unit: str, digits: int = 3) -> str:
+    """A pressure in Pa, or a motion in metre as µm, with its unit."""
+    if unit == "Pa":
+        return f"{significant(value, digits)} Pa"
+    return f"{significant(1e6 * value, digits)} µm"
+
+
+def measured(value: float, asked: Quantity, digits: int = 3) -> str:
+    """A value of a quantity in SI, with the unit that it is shown in."""
+    return f"{significant(asked.per_unit * value, digits)} {asked.shown}"
+
+
+def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> int:
+    """One entry a model, with what 1 on the waveform axis stands for if that is one number; the
+    number of rows.
+    """
+    handles, labels = [], []
+    for run in runs:
+        style: dict[str, Any] = {"color": inked(run.column), "marker": marker(run.column), "lw": 2}
+        handles.append(figure.axes[0].plot([], [], **style)[0])
+        scale = measured(_largest(run, runs), run.response.record)
+        labels.append(answered(run) + f", 1 = {scale}" * scales)
+    kinds = dict.fromkeys(peak.kind for run in runs for peak in run.unnamed)
+    if kinds:
+        style = {"color": "0.3", "marker": "^", "mfc": "none", "ls": ""}
+        handles.append(figure.axes[0].plot([], [], **style)[0])
+        labels.append(f"open: {', '.join(kinds)}")
+    where: Any = "outside upper center" if figure.get_layout_engine() else "upper center"
+    ncols = len(labels) if len(labels) <= IN_A_ROW else -(-len(labels) // 2)
+    room = figure.get_figwidth() / (LETTER * max(map(len, labels)) + HANDLE)
+    ncols = 1 if figure.get_figwidth() < NARROW else max(1, min(ncols, int(room)))
+    figure.legend(handles, labels, loc=where, ncols=ncols, frameon=False)
+    return -(-len(labels) // ncols)
+
+
+def _shown(run: Run, runs: list[Run]) -> slice:
+    """The part that is shown: the last that all have, whose records may begin at other times."""
+    times = run.response.times
+    end = min(float(other.response.times[-1]) for other in runs)
+    if end - SHOWN < times[0]:
+        end = max(float(times[0]) + SHOWN, end)
+    last = int(np.searchsorted(times, end + 0.5 * (times[1] - times[0])))
+    return slice(max(0, last - 1 - round(SHOWN / (times[1] - times[0]))), last)
+
+
+def _largest(run: Run, runs: list[Run]) -> float:
+    """Largest excursion about the mean at any probe in the part that is shown."""
+    return float(np.abs(_centred(run, runs)).max()) or 1.0
+
+
+def _centred(run: Run, runs: list[Run]) -> Floats:
+    """Motion (t, p) in the part that is shown, about its mean after the start."""
+    motion = run.response.values
+    return motion[_shown(run, runs)] - motion[int(SETTLE * len(motion)) :].mean(axis=0)
+
+
+def _waveforms(ax: Axes, runs: list[Run], p: int) -> None:
+    for run in runs:
+        centred = _centred(run, runs)[:, p] / _largest(run, runs)
+        times = 1e3 * run.response.times[_shown(run, runs)]
+        ax.plot(times, centred, color=inked(run.column), lw=_width(run), zorder=_depth(run))
+    ax.margins(x=0)
+    ax.xaxis.set_major_locator(MaxNLocator(4, prune="both"))
+    ax.set_ylim(-1.1, 1.1)
+    ax.grid(alpha=0.25)
+
+
+def _spectra(ax: Axes, runs: list[Run], p: int, *, named: bool) -> None:
+    for run in runs:
+        f, amplitude = spectrum(run.response, "blackmanharris")
+        moving = f > 8.0  # the mean and its leakage are no vibration
+        top = max(float(amplitude[moving].max()), np.finfo(float).tiny)
+        level = 20 * np.log10(np.maximum(amplitude[moving, p] / top, 1e-12))
+        style: dict[str, Any] = {"color": inked(run.column), "zorder": _depth(run)}
+        ax.plot(f[moving], level, lw=_width(run) - 0.3, alpha=0.6, **style)
+        lines = [(f, run.table.amplitudes[name][p]) for name, f in run.listed.items()]
+        peaks = [(peak.frequency, peak.amplitudes[p]) for peak in run.unnamed]
+        for found, mfc in ((lines, colour(run.column)), (peaks, "none")):
+            at, size = np.array(found).reshape(-1, 2).T  # a constant pressure has none
+            height = 20 * np.log10(np.maximum(size / top, 1e-12))
+            seen = height > FLOOR
+            style |= {"ls": "", "marker": marker(run.column), "ms": 4, "mfc": mfc}
+            ax.plot(at[seen], height[seen], **style)
+    ax.set_xlim(0, HIGHEST)
+    ax.set_ylim(FLOOR, 14)
+    ax.set_yticks(np.arange(FLOOR, 1, 20))
+    ax.grid(alpha=0.25)
+    if named:
+        points, marked = small(), list[tuple[float, float]]()  # places and half widths, Hz
+        share = LAID_OUT * ax.get_position().width
+        panel = 72 * share * ax.figure.get_figwidth()  # type: ignore[union-attr]
+        for name, frequency in runs[0].frequencies.items():
+            if name in ("f_AM", "2f_AM", "f_d", "2f_d", "3f_d") and frequency < HIGHEST:
+                half = (LETTER * len(name) + GAP) * points / panel * HIGHEST / 2
+                if any(abs(frequency - other) < half + width for other, width in marked):
+                    continue
+                marked.append((frequency, half))
+                text = name.replace("f_AM", "$f_{AM}$").replace("f_d", "$f_d$")
+                ax.axvline(frequency, color="0.6", lw=0.8, ls=":", zorder=0)
+                box = {"fc": mpl.rcParams["axes.facecolor"], "ec": "none", "pad": 0.5}
+                ax.text(frequency, 12, text, ha="center", va="top", fontsize=points, bbox=box)
+
+
+def _spread(ax: Axes, runs: list[Run]) -> None:
+    for run in runs:
+        level = moving_rms(run.response)
+        radius = 1e3 * np.hypot(*run.response.probes.T)
+        decibel = 20 * np.log10(np.maximum(level / max(level.max(), 1e-300), 1e-12))
+        style: dict[str, Any] = {"color": inked(run.column), "marker": marker(run.column), "ms": 5}
+        ax.plot(radius, decibel, lw=_width(run), **style)
+    for drop in (-6, -20):
+        ax.axhline(drop, color="0.6", lw=0.8, ls="--", zorder=0)
+    path = 1e3 * runs[0].scene.tacton.trajectory.size / 2
+    if path:
+        ax.axvspan(path - 0.15, path + 0.15, color="0.85", zorder=0)
+        ax.text(path, -58, " focus path", fontsize=small(), color="0.4", va="bottom")
+    ax.set_ylim(-60, 4)
+    ax.grid(alpha=0.25)
+
+
+def _width(run: Run) -> float:
+    return 1.0 if run.body == "none" else 1.4
+
+
+def _depth(run: Run) -> int:
+    return 4 if run.body == "none" else 3

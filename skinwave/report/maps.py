@@ -1,0 +1,320 @@
+"""Maps of a surface (matplotlib): where it moves, what differs, and how waves run over it."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from matplotlib.lines import Line2D
+
+from meshes.tetmesh import Floats
+from simple_model.drawing import small
+from simple_model.threshold import BAND
+from skinwave.models.speeds import mach_angle
+from skinwave.report.figures import inked, label, sized
+from skinwave.report.styles import NARROW, Style
+from skinwave.results.views import Trace, View, path_points, spread_radius, starting_time
+from skinwave.scene.scene import Scene
+
+SIGNED, SEQUENTIAL = "RdBu_r", "cividis"  # distinguishable with every kind of colour vision
+PIXELS = 201  # of a map's side
+DEEPEST = -40.0  # dB shown
+FAINTEST = 0.1  # of the largest motion, below which that of a place is not brought up
+LINES = {"ray": ("surface wave", "dashed"), "track": ("focus", "solid")}  # of a trace
+DROPS = {-6: "solid", -20: "dashed"}
+THRESHOLD = "#ff2fd0"  # the detection contour
+MAP, LEGEND = 3.4, 0.4  # inch, side of a map and height of a legend
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Raster:
+    """A regular grid of places over the part of the surface that all models have; in metre."""
+
+    x: Floats
+    y: Floats
+
+    @property
+    def frame(self) -> tuple[float, float, float, float]:
+        """Left, right, bottom and top in mm, as images want it."""
+        x, y = 1e3 * self.x, 1e3 * self.y
+        return float(x[0]), float(x[-1]), float(y[0]), float(y[-1])
+
+
+def common_raster(views: Sequence[View]) -> Raster:
+    """A grid over what the surfaces of several views have in common."""
+    reach = np.min([np.abs(view.places).max(axis=0) for view in views], axis=0)
+    return Raster(x=np.linspace(-reach[0], reach[0], PIXELS),
+                  y=np.linspace(-reach[1], reach[1], PIXELS))  # fmt: skip
+
+
+def sampler(view: View, raster: Raster) -> Callable[[Floats], Floats]:
+    """Linear interpolation of values (s,) of a view's surface onto a grid (y, x)."""
+    X, Y = np.meshgrid(raster.x, raster.y)
+    return carrier(view, np.stack([X, Y], axis=-1))
+
+
+def carrier(view: View, places: Floats) -> Callable[[Floats], Floats]:
+    """Linear interpolation of values (s,) of a view's surface to places (..., 2)."""
+    owner = view.finder(places[..., 0], places[..., 1])
+    on = owner >= 0
+    found = view.triangles[owner[on]]
+    corners = view.places[found]  # (q, 3, 2)
+    edges = corners[:, 1:] - corners[:, :1]
+    inside = (places[on] - corners[:, 0])[..., None]
+    second_third = np.linalg.solve(edges.swapaxes(-1, -2), inside)[..., 0]
+    weights = np.column_stack([1 - second_third.sum(axis=-1), second_third])
+
+    def carried(values: Floats) -> Floats:
+        at = np.full(on.shape, np.nan)
+        at[on] = (values[found] * weights).sum(axis=-1)
+        return at
+
+    return carried
+
+
+def decibel(view: View) -> Floats:
+    """RMS motion (s,) in dB below the view's own largest."""
+    largest = max(float(view.rms.max()), 1e-300)
+    return 20 * np.log10(np.maximum(view.rms, 1e-9 * largest) / largest)
+
+
+def rms_figure(views: Sequence[View], style: Style) -> Figure:
+    """RMS motion of each model over its own largest, with its spread and detection contour."""
+    raster = common_raster(views)
+    with mpl.rc_context(style.rc):
+        figure, axes = _panels(len(views), style)
+        for ax, view in zip(axes, views, strict=True):
+            sampled = sampler(view, raster)
+            level = sampled(decibel(view))
+            image = ax.imshow(level, cmap=SEQUENTIAL, vmin=DEEPEST, vmax=0, extent=raster.frame,
+                              origin="lower")  # fmt: skip
+            for drop, dashes in DROPS.items():
+                ax.contour(1e3 * raster.x, 1e3 * raster.y, level, [drop], colors="white",
+                           linewidths=1.3, linestyles=dashes)  # fmt: skip
+            _draw_borderline(ax, raster, sampled(np.maximum(view.sensation, -100.0)))
+            draw_path(ax, view.scene, "black")
+            radii = " / ".join(f"{1e3 * spread_radius(view, d):.0f}" for d in DROPS)
+            _title(ax, view, f"spread {radii} mm")
+        figure.colorbar(image, ax=list(axes), label="RMS motion, dB re the model's largest")
+        entries: dict[str, dict[str, Any]] = {
+            "-6 dB": {"color": "0.55", "ls": "solid"},
+            "-20 dB": {"color": "0.55", "ls": "dashed"},
+            "path of the focus": {"color": style.ink, "ls": "dotted"},
+        }
+        if any((view.sensation > 0).any() for view in views):
+            entries[f"detection threshold (and ±{BAND:g} dB)"] = {"color": THRESHOLD, "ls": "solid"}
+        _legend(figure, entries)
+    return figure
+
+
+def difference_figure(reference: View, views: Sequence[View], style: Style) -> Figure:
+    """By how many dB each model moves more or less than the reference, each re its own largest."""
+    raster = common_raster([reference, *views])
+    with mpl.rc_context(style.rc):
+        figure, axes = _panels(len(views), style, 0.0)
+        base = np.maximum(sampler(reference, raster)(decibel(reference)), DEEPEST)
+        for ax, view in zip(axes, views, strict=True):
+            more = np.maximum(sampler(view, raster)(decibel(view)), DEEPEST) - base
+            image = ax.imshow(more, cmap=SIGNED, vmin=DEEPEST, vmax=-DEEPEST, extent=raster.frame,
+                              origin="lower")  # fmt: skip
+            draw_path(ax, view.scene, "black")
+            _title(ax, view, f"minus {label(reference.column)}")
+        figure.colorbar(image, ax=list(axes), label="difference of RMS levels, dB")
+    return figure
+
+
+def snapshots_figure(views: Sequence[View], style: Style, count: int = 4) -> Figure:
+    """The surface of each model, over its own largest motion, when the last of them moves most and
+    after equal parts of a turn of the focus or, if it rests, of a period of the strongest tone.
+    """
+    count = min(count, 2) if style.is_narrow else count
+    raster, frames = common_raster(views), _shown_frames(views[-1], count)
+    side = 0.8 * MAP
+    with mpl.rc_context(style.rc):
+        size = style.size(side * count + 2.0, side * len(views) + 1.0)
+        if style.is_narrow:
+            size = size[0], 0.4 * size[0] * len(views) + 0.9
+        figure = Figure(figsize=size, layout="constrained")
+        axes = figure.subplots(len(views), count, sharex=True, sharey=True, squeeze=False)
+        for row, view in zip(axes, views, strict=True):
+            sampled = sampler(view, raster)
+            for frame, ax in zip(frames, row, strict=True):
+                image = ax.imshow(
+                    sampled(view.pushed[frame] / view.peak), cmap=SIGNED, vmin=-1,
+                    vmax=1, extent=raster.frame, origin="lower",
+                )  # fmt: skip
+                draw_path(ax, view.scene, "black")
+                _draw_focus(ax, view, float(view.times[frame]))
+            row[0].set_ylabel(f"{label(view.column)}\n±1 = {peak_text(view)}\ny, mm",
+                              color=inked(view.column))  # fmt: skip
+        for frame, ax in zip(frames, axes[0], strict=True):
+            ax.set_title(f"{1e3 * views[0].times[frame]:.2f} ms")
+        for ax in axes[-1]:
+            ax.set_xlabel("x, mm")
+        figure.colorbar(image, ax=axes, label="motion into the body about its mean\n"
+                        "over the model's largest", shrink=0.6)  # fmt: skip
+        _legend(figure, _focus_legend(views, style))
+    return figure
+
+
+def _shown_frames(view: View, count: int) -> list[int]:
+    frequency = view.scene.tacton.trajectory.drawing_frequency or view.tone
+    turn = min(1 / frequency, view.period) if frequency else view.period
+    frames = len(view.times)
+    first, step = int(np.abs(view.pushed).max(axis=1).argmax()), frames * turn / view.period / count
+    return [(first + round(k * step)) % frames for k in range(count)]
+
+
+def _focus_legend(views: Sequence[View], style: Style) -> dict[str, dict[str, Any]]:
+    entries: dict[str, dict[str, Any]] = {
+        "path": {"color": style.ink, "ls": "dotted"},
+        "focus": {"color": style.ink, "marker": "o", "mfc": "none", "ls": "none"},
+    }
+    angles = []
+    for view in views:
+        angle = view.speed and mach_angle(view.speed, view.scene.tacton.trajectory.speed)
+        if angle and not view.scene.tacton.trajectory.is_static:
+            angles.append(f"{label(view.column)} {np.rad2deg(angle):.0f}°")
+    if angles:
+        between = "\n" if style.is_narrow else " "
+        said = f"Mach angle of a straight path:{between}{', '.join(angles)}"
+        entries[said] = {"color": style.ink}
+    return entries
+
+
+def waves_figure(views: Sequence[View], style: Style) -> Figure:
+    """Motion over place and time: outwards from the path after the start, and along the path."""
+    narrow = style.is_narrow
+    traced = [("ray", "distance, mm" if narrow else "distance from the path, mm")]
+    along = [("track", "along path, mm" if narrow else "place along the path, mm")]
+    traced += along if views[0].track else []
+    with mpl.rc_context(style.rc):
+        size = style.size(4.2 * len(views) + 0.6, 4.1 * len(traced) + 0.3)
+        if narrow:
+            size = size[0], 1.7 * len(views) + 0.4
+        figure = Figure(figsize=size, layout="constrained")
+        rows, columns = (views, traced) if narrow else (traced, views)
+        axes = figure.subplots(len(rows), len(columns), squeeze=False)
+        for ax in axes[:, 0]:
+            ax.set_ylabel("time, ms")
+        axes = axes.T if narrow else axes
+        for row, (name, x_label) in zip(axes, traced, strict=True):
+            for ax, view in zip(row, views, strict=True):
+                image = _draw_trace(ax, getattr(view, name), name)
+                ax.set_xlabel(x_label)
+                ax.set_title(label(view.column), color=inked(view.column))
+                _draw_world_lines(ax, view, name)
+        title = "motion about its mean over the largest\n(above: at its place)"
+        bar = figure.colorbar(image, ax=axes, label=title, shrink=0.6)
+        bar.set_ticks([-1, -0.5, 0, 0.5, 1])
+        if narrow:
+            lines = {said: {"color": style.ink, "ls": dashes} for said, dashes in LINES.values()}
+            _legend(figure, lines)
+    return figure
+
+
+def peak_text(view: View) -> str:
+    """The largest motion of a view with its unit."""
+    return sized(view.peak, view.unit)
+
+
+def _panels(count: int, style: Style, below: float = LEGEND) -> tuple[Figure, Sequence[Axes]]:
+    """Maps side by side, in mm, with so much room in inch for what stands below them."""
+    if style.is_narrow:
+        width = style.size(1, 1)[0]
+        figure = Figure(figsize=(width, 0.75 * width * count + 0.4 + below), layout="compressed")
+        axes = figure.subplots(count, 1, sharex=True, sharey=True, squeeze=False).ravel()
+        for ax in axes:
+            ax.set_ylabel("y, mm")
+        axes[-1].set_xlabel("x, mm")
+        return figure, list(axes)
+    figure = Figure(figsize=style.size(MAP * count + 1.2, MAP + 0.5 + below), layout="constrained")
+    axes = figure.subplots(1, count, sharex=True, sharey=True, squeeze=False)[0]
+    for ax in axes:
+        ax.set_xlabel("x, mm")
+    axes[0].set_ylabel("y, mm")
+    return figure, list(axes)
+
+
+def _title(ax: Axes, view: View, below: str) -> None:
+    ax.set_title(f"{label(view.column)}\n{below}", fontsize="medium")
+
+
+def draw_path(ax: Axes, scene: Scene, ink: str) -> None:
+    """The path of the focus, or the place where it rests."""
+    path = 1e3 * path_points(scene)
+    if len(path) > 1:
+        ax.plot(*path.T, color=ink, ls="dotted", lw=1.2)
+    else:
+        ax.plot(*path.T, color=ink, marker="+", ls="none")
+
+
+def _draw_borderline(ax: Axes, raster: Raster, level: Floats) -> None:
+    """Where the strongest line is at its threshold, and the band about that."""
+    for drop, width, dashes in ((-BAND, 0.7, "dotted"), (0.0, 1.6, "solid"), (BAND, 0.7, "dotted")):
+        if np.nanmin(level) < drop < np.nanmax(level):
+            ax.contour(1e3 * raster.x, 1e3 * raster.y, level, [drop], colors=THRESHOLD,
+                       linewidths=width, linestyles=dashes)  # fmt: skip
+
+
+def _draw_focus(ax: Axes, view: View, time: float) -> None:
+    """The focus, and behind it the Mach angle if it outruns the surface wave."""
+    path = view.scene.tacton.trajectory
+    x, y = 1e3 * path.position(time)
+    ax.plot(x, y, marker="o", mfc="none", mec="black", ms=6, mew=1.2)
+    if path.is_static or view.speed is None:
+        return
+    if (angle := mach_angle(view.speed, path.speed)) is None:
+        return
+    ahead = path.position(time + 1e-5) - path.position(time)
+    heading = np.arctan2(ahead[1], ahead[0])
+    for side in (-1, 1):
+        back = heading + np.pi + side * angle
+        ax.plot([x, x + 25 * np.cos(back)], [y, y + 25 * np.sin(back)], color="black", lw=1.2)
+
+
+def _draw_trace(ax: Axes, trace: Trace, name: str) -> AxesImage:
+    """Motion over its largest: on a ray, where waves fade, over the largest at each place."""
+    peak = np.abs(trace.motion).max(axis=0)  # nan off the body
+    faintest = FAINTEST if name == "ray" else 1.0
+    peak = np.maximum(peak, faintest * np.nan_to_num(peak).max(initial=1e-300))
+    frame = (0.0, 1e3 * trace.distance[-1], 0.0, 1e3 * trace.times[-1])
+    return ax.imshow(trace.motion / peak, cmap=SIGNED, vmin=-1, vmax=1, extent=frame,
+                     origin="lower", aspect="auto", interpolation="bilinear")  # fmt: skip
+
+
+def _draw_world_lines(ax: Axes, view: View, name: str) -> None:
+    """x = c t of the surface wave, and x = v t of the focus along its path."""
+    path, limits = view.scene.tacton.trajectory, (ax.get_xlim(), ax.get_ylim())
+    if name == "ray" and view.speed:
+        start = starting_time(view.scene, view.ray.places[0])
+        between = 1 / max(view.tone, 20.0)
+        for t in 1e3 * np.arange(start % between - 2 * between, view.ray.times[-1], between):
+            ax.plot([0, view.speed * 100], [t, t + 100], color="black", lw=1.1, ls="dashed")
+        ax.plot([], [], color="black", lw=1.1, ls="dashed", label=f"{view.speed:.2g} m/s")
+    if name == "track" and view.track is not None:
+        length = 1e3 * path.length
+        turns = int(view.track.times[-1] * path.drawing_frequency) + 1
+        for n in range(turns):
+            t = 1e3 * n / path.drawing_frequency
+            ax.plot([0, length], [t, t + length / path.speed], color="black", lw=1.1)
+        ax.plot([], [], color="black", lw=1.1, label=f"{path.speed:g} m/s")
+    ax.set_xlim(limits[0])
+    ax.set_ylim(limits[1])
+    handles, labels = ax.get_legend_handles_labels()
+    if handles:
+        if ax.figure.get_figwidth() >= NARROW:  # type: ignore[union-attr]
+            labels = [f"{LINES[name][0]}, {labels[0]}"]
+        ax.legend(handles, labels, loc="upper right", fontsize=small(), framealpha=0.9,
+                  labelcolor="black", facecolor="white", handlelength=1.3)  # fmt: skip
+
+
+def _legend(figure: Figure, entries: dict[str, dict[str, Any]]) -> None:
+    handles = [Line2D([], [], **style) for style in entries.values()]
+    narrow = figure.get_figwidth() < NARROW
+    figure.legend(handles, list(entries), loc="outside lower center",
+                  ncols=1 if narrow else len(entries), frameon=False)  # fmt: skip

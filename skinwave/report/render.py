@@ -1,0 +1,306 @@
+"""Views in three dimensions (pyvista, off screen): bodies side by side, cut open or from above.
+
+Ask `renderer` first whether there is anything to draw with. Lengths are in mm here, and cameras
+without perspective, so that one scale bar is right for the whole picture.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from math import floor, log10
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshes.tetmesh import Floats, Ints, boundary_facets
+from simple_model.quantities import quantity
+from skinwave.report.figures import colour, label
+from skinwave.report.maps import SIGNED, carrier
+from skinwave.report.styles import Style
+from skinwave.results.views import Singles, View, path_points, split
+
+Image = NDArray[np.uint8]
+Carrier = Callable[[Floats], Floats]  # values (s,) of a surface -> values at some places
+# Where the camera is seen from, what it looks at and half the height it sees, in widths of a body.
+CAMERAS = {
+    "tilted": ((-0.45, -1.0, 0.85), (0.0, -0.03, -0.05), 0.62),
+    "front": ((0.0, -1.0, 0.45), (0.0, 0.2, 0.0), 0.5),
+    "top": ((0.0, 0.0, 1.0), (0.0, 0.06, 0.0), 0.72),
+}
+UNSIGNED = "cividis"  # of quantities without a sign
+SHOWN = 0.06  # of the body's width: how far the largest motion is drawn at most
+BAR = 10.0  # mm, the scale bar
+COLUMN = 112  # pixels for the colour bar
+ABOVE = 0.4  # mm, by which marks are lifted off the surface
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Panel:
+    """Geometry drawn of one view: points (n, 3) in mm of a skin of triangles, their indices in the
+    view, marks that ride on it, the focus and what is under it at every frame, and the factor by
+    which motion is multiplied.
+    """
+
+    view: View
+    skin: Any
+    nodes: Ints
+    marks: tuple[tuple[Any, Carrier], ...]
+    focus: Any
+    under_focus: Carrier
+    factor: float
+
+
+def exaggeration(view: View) -> float:
+    """By what motion is multiplied so that it is seen: 1, 2 or 5 times a power of ten; 0 of the
+    point kernel, in which nothing moves.
+    """
+    if view.unit == "Pa":
+        return 0.0
+    most = SHOWN * float(np.ptp(view.places[:, 0])) / view.peak
+    power = 10.0 ** floor(log10(most))
+    return power * max(step for step in (1, 2, 5) if step * power <= most)
+
+
+def shown_scale(view: View) -> str:
+    """How motion is drawn, in words, and what colours it if that is not the motion."""
+    factor = exaggeration(view)
+    if not factor:
+        return "pressure; nothing moves"
+    named = f"{quantity(view.shade.quantity).words}; " if view.shade else ""
+    return f"{named}motion drawn {factor:,.0f} times"
+
+
+def picture(
+    views: Sequence[View], style: Style, frame: int = 0, *, camera: str = "tilted",
+    cut: bool = False,
+) -> Image:  # fmt: skip
+    """Views side by side at one frame, (height, width, 3).
+
+    Parameters
+    ----------
+    camera : "tilted", "front" or "top", the same for all
+    cut : without the half of each body that is nearer to the camera
+    """
+    with stage(views, style, camera=camera, cut=cut) as show:
+        return show(frame)
+
+
+@contextmanager
+def stage(
+    views: Sequence[View],
+    style: Style,
+    *,
+    camera: str = "tilted",
+    cut: bool = False,
+    panel: tuple[int, int] | None = None,
+) -> Iterator[Callable[[int], Image]]:
+    """A scene that is built once, and what shows it at a frame.
+
+    One colour scale serves all views: motion into the body over each model's largest or, of a
+    single view, motion in its own unit; another quantity in its unit, from 0 if it has no sign.
+    """
+    import pyvista as pv
+    from vtkmodules.vtkCommonCore import vtkLogger
+
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # of displays that are not asked for
+    width, height = panel or style.panel
+    share = [width / COLUMN] * len(views) + [1.0]
+    plotter = pv.Plotter(
+        off_screen=True, lighting="none", shape=(1, len(views) + 1), border=False,
+        col_weights=share, window_size=(width * len(views) + COLUMN, height),
+    )  # fmt: skip
+    try:
+        plotter.set_background(style.paper)
+        small = height / 432 * 11
+        limits, title = scale(views)
+        panels = []
+        for k, view in enumerate(views):
+            plotter.subplot(0, k)
+            panels.append(prepared(view, cut))
+            actor = _add(plotter, panels[-1], style, limits, small, lit=camera != "top")
+            if not cut:
+                _add_outline(plotter, view)
+            look(plotter, camera, panels)
+        plotter.subplot(0, len(views))
+        plotter.add_scalar_bar(
+            title, mapper=actor.mapper, vertical=True, color=style.ink, n_labels=5,
+            label_font_size=int(1.4 * small), title_font_size=int(1.4 * small), fmt="%.3g",
+            position_x=0.2, position_y=0.12, width=0.55, height=0.7,
+        )  # fmt: skip
+        plotter.subplot(0, 0)
+
+        def show(frame: int) -> Image:
+            place(panels, frame, limits[1])
+            plotter.subplot(0, 0)
+            stamp = f"t = {1e3 * views[0].times[frame]:.2f} ms"
+            plotter.add_text(stamp, position=(0.66, 0.03), viewport=True, font_size=small,
+                             color=style.ink, name="time", render=False)  # fmt: skip
+            plotter.render()  # or the picture before is taken again
+            return np.asarray(plotter.screenshot(None, return_img=True, scale=style.oversampling))
+
+        yield show
+    finally:
+        plotter.close()
+
+
+def scale(views: Sequence[View]) -> tuple[tuple[float, float], str]:
+    """The ends of the colour scale, and its title."""
+    shades = [view.shade for view in views if view.shade]
+    if shades:
+        asked = quantity(shades[0].quantity)
+        most = asked.per_unit * max(float(np.abs(shade.values).max()) for shade in shades) or 1.0
+        return (-most if asked.invariant is None else 0.0, most), f"{asked.shown}\n"
+    if len(views) > 1:
+        return (-1.0, 1.0), "over the\nlargest\n"
+    view = views[0]
+    most, unit = (view.peak, "Pa") if view.unit == "Pa" else (1e6 * view.peak, "µm")
+    return (-most, most), f"{unit}\n"
+
+
+def prepared(view: View, cut: bool = False) -> Panel:
+    """A view, ready to be placed and drawn."""
+    import pyvista as pv
+
+    nodes, triangles = outer_surface(view, cut)
+    skin = pv.PolyData.from_regular_faces(1e3 * view.points[nodes], triangles)
+    skin["motion"] = np.zeros(len(nodes), np.float32)
+    path, probes = path_points(view.scene), view.scene.probe_points
+    reach = np.abs(view.places).max(axis=0)
+    probes = probes[(np.abs(probes) <= reach).all(axis=1)]
+    riders = [(pv.PolyData(_lifted(probes)), probes)] if len(probes) else []
+    riders += [(_line(path, cut), path)] if len(path) > 1 else []
+    if cut:  # the upper edge of the section
+        edge = np.column_stack([np.linspace(-reach[0], reach[0], 121), np.zeros(121)])
+        riders.append((_line(edge, cut), edge))
+    marks = [(mesh, carrier(view, 0.9999 * places)) for mesh, places in riders]
+    under = carrier(view, 0.9999 * view.scene.tacton.trajectory.position(view.times))
+    return Panel(
+        view=view, skin=skin, nodes=nodes, marks=tuple(marks),
+        focus=pv.PolyData(_lifted(path[:1])), under_focus=under, factor=exaggeration(view),
+    )  # fmt: skip
+
+
+def outer_surface(view: View, cut: bool = False) -> tuple[Ints, Ints]:
+    """Points (n,) of a view that are seen from outside, and triangles (k, 3) of them."""
+    if not len(view.tets):
+        return view.surface, view.triangles
+    tets = view.tets
+    if cut:
+        tets = tets[view.points[tets[:, :4], 1].mean(axis=1) > 0]
+    nodes, triangles = np.unique(split(boundary_facets(tets)), return_inverse=True)
+    return nodes, triangles.reshape(-1, 3)
+
+
+def _line(path: Floats, cut: bool) -> Any:
+    """The path as a line, as far as there is body below it."""
+    import pyvista as pv
+
+    pairs = np.arange(len(path) - 1)[:, None] + np.arange(2)
+    if cut:
+        pairs = pairs[(path[pairs, 1] >= 0).all(axis=1)]
+    cells = np.hstack([np.full((len(pairs), 1), 2), pairs]).ravel()
+    return pv.PolyData(_lifted(path), lines=cells)
+
+
+def _lifted(places: Floats) -> Floats:
+    return np.column_stack([1e3 * places, np.full(len(places), ABOVE)])
+
+
+def _add(
+    plotter: Any, panel: Panel, style: Style, limits: tuple[float, float], small: float, *,
+    lit: bool,
+) -> Any:  # fmt: skip
+    """Everything of a panel; the actor of its skin."""
+    view = panel.view
+    actor = plotter.add_mesh(
+        panel.skin, scalars="motion", cmap=SIGNED if limits[0] else UNSIGNED, clim=limits,
+        show_scalar_bar=False,
+        ambient=0.3 if lit else 0.0, diffuse=0.8 if lit else 1.0, lighting=lit,
+    )  # fmt: skip
+    add_marks(plotter, panel, "black")
+    own = colour(view.column)
+    plotter.add_text(label(view.column), position=(0.04, 0.92), viewport=True,
+                     font_size=1.25 * small,
+                     color=style.ink if own == "#000000" else own)  # fmt: skip
+    plotter.add_text(shown_scale(view), position=(0.04, 0.86), viewport=True,
+                     font_size=0.9 * small, color=style.ink)  # fmt: skip
+    _add_scale_bar(plotter, view, style, small)
+    return actor
+
+
+def add_marks(plotter: Any, panel: Panel, ink: str) -> None:
+    """Path, probes and focus, which ride on the surface."""
+    balls = {"render_points_as_spheres": True}
+    for mark, _ in panel.marks:
+        if mark.n_lines:
+            plotter.add_mesh(mark, color=ink, line_width=2)
+        else:
+            plotter.add_mesh(mark, color="#ffd000", point_size=9, **balls)
+    plotter.add_mesh(panel.focus, color=ink, point_size=15, **balls)
+
+
+def _add_outline(plotter: Any, view: View) -> None:
+    """The rim of the surface at rest."""
+    low, high = view.places.min(axis=0), view.places.max(axis=0)
+    x, y = np.array([low, high]).T
+    rim = np.array([[x[i], y[j]] for i, j in ((0, 0), (1, 0), (1, 1), (0, 1), (0, 0))])
+    plotter.add_mesh(_line(rim, cut=False), color="#9a9a9a", line_width=1)
+
+
+def _add_scale_bar(plotter: Any, view: View, style: Style, small: float) -> None:
+    """Ten millimetre along x, in front of the body."""
+    import pyvista as pv
+
+    left, front, bottom = 1e3 * view.points.min(axis=0)
+    ends = np.array([[left, front - 5, bottom], [left + BAR, front - 5, bottom]])
+    plotter.add_mesh(pv.Line(*ends), color=style.ink, line_width=4)
+    plotter.add_point_labels(
+        ends.mean(axis=0)[None] - [0.0, 3.0, 0.0], [f"{BAR:g} mm"], font_size=int(1.35 * small),
+        text_color=style.ink, shape=None, show_points=False, always_visible=True,
+        justification_horizontal="center", justification_vertical="top",
+    )  # fmt: skip
+
+
+def look(plotter: Any, camera: str, panels: Sequence[Panel]) -> None:
+    """The same camera and light for all panels, as far away as the widest body needs."""
+    import pyvista as pv
+
+    way, aim, height = CAMERAS[camera]
+    widest = max(1e3 * float(np.ptp(panel.view.places, axis=0).max()) for panel in panels)
+    plotter.camera.focal_point = tuple(widest * np.array(aim))
+    plotter.camera.position = tuple(widest * (np.array(aim) + 4 * np.array(way)))
+    plotter.camera.up = (0.0, 1.0, 0.0) if camera == "top" else (0.0, 0.0, 1.0)
+    lamp = pv.Light(light_type="headlight", color="white", intensity=0.6)
+    above = pv.Light(position=(-1, -1, 3), light_type="scene light", color="white", intensity=0.5)
+    plotter.add_light(lamp, only_active=True)
+    plotter.add_light(above, only_active=True)
+    plotter.camera.parallel_projection = True
+    plotter.camera.parallel_scale = height * widest
+    plotter.renderer.reset_camera_clipping_range()
+
+
+def _colours(panel: Panel, frame: int, limit: float) -> Singles:
+    """Values (n,) on the colour scale, which ends at `limit`."""
+    view = panel.view
+    if view.shade is None:
+        return -np.float32(limit / view.peak) * view.motion[frame, panel.nodes, 2]
+    values = view.shade.values[frame, np.searchsorted(view.shade.nodes, panel.nodes)]
+    return np.float32(quantity(view.shade.quantity).per_unit) * values
+
+
+def place(panels: Sequence[Panel], frame: int, limit: float) -> None:
+    """Every panel at a frame, in place."""
+    for panel in panels:
+        view = panel.view
+        motion = np.asarray(view.motion[frame], np.float64)
+        drawn = 1e3 * view.points + 1e3 * panel.factor * motion
+        panel.skin.points[:] = drawn[panel.nodes]
+        panel.skin["motion"] = _colours(panel, frame, limit)
+        height = 1e3 * panel.factor * motion[view.surface, 2]
+        for mark, carried in panel.marks:
+            raised = np.array(mark.points)
+            raised[:, 2] = carried(height) + ABOVE
+            mark.points = raised
+        focus = _lifted(view.scene.tacton.trajectory.position(view.times[frame : frame + 1]))
+        panel.focus.points = focus + [0.0, 0.0, panel.under_focus(height)[frame]]

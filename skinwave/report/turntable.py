@@ -1,0 +1,80 @@
+"""A view to turn in a browser: one page without requests, with the code of the live page."""
+
+import base64
+from importlib import resources
+from typing import Any
+
+import numpy as np
+
+from meshes.tetmesh import Floats
+from simple_model import MovingPressure
+from simple_model.load_spectrum import Complex
+from skinwave.report.figures import label
+from skinwave.report.render import outer_surface
+from skinwave.results.views import View
+from skinwave.system.arrays import quantised
+from skinwave.system.document import render
+from skinwave.system.scripts import bundle, encoded
+
+NEGLIGIBLE = 3e-3  # of the strongest line: weaker ones are left out
+MOST_LINES = 32
+DRAWN_POINTS = 121  # of each path
+
+
+def turntable(view: View, frame: int) -> str:
+    """Return a page that shows a view from any side, moving, from one of its frames on."""
+    nodes, triangles = outer_surface(view)
+    frequencies, upwards = motion_lines(view.motion[:, nodes, 2], view.period)
+    paths, foci = focus_places(view.scene.pressure, view.times)
+    data = {
+        "title": label(view.column), "unit": view.unit, "period": view.period,
+        "time": float(view.times[frame]), "frequencies": frequencies.tolist(),
+        "motion": quantised(upwards), "points": _binary(1e3 * view.points[nodes], "<f4"),
+        "triangles": _binary(triangles, "<u4"), "path": paths.tolist(), "foci": foci.tolist(),
+        "probes": view.scene.probe_points[:, :2].tolist(),
+    }  # fmt: skip
+    static = resources.files("skinwave.live") / "static"
+    return render(
+        "turntable.html", title=data["title"], data=encoded(data),
+        script="\n" + bundle(static, "turntable.js"),
+    )  # fmt: skip
+
+
+def motion_lines(frames: Any, period: float) -> tuple[Floats, Complex]:
+    """Return the lines of motion that repeats.
+
+    Parameters
+    ----------
+    frames : (t, n) float, at equally spaced times through the period
+    period : s
+
+    Returns
+    -------
+    (l,) Hz, ascending, and (l, n) complex amplitudes in the unit of the frames, of the strongest
+    lines above 0 Hz: the motion is the real part of their sum times exp(2 pi i f t)
+    """
+    count = len(frames)
+    lines = 2 / count * np.fft.rfft(np.asarray(frames, np.float64), axis=0)
+    if count % 2 == 0:
+        lines[-1] /= 2
+    strength = np.abs(lines).max(axis=1)
+    strength[0] = 0.0
+    strongest = np.argsort(-strength)[:MOST_LINES]
+    kept = np.sort(strongest[strength[strongest] > NEGLIGIBLE * strength.max()])
+    return kept / period, lines[kept]
+
+
+def focus_places(pressure: MovingPressure, times: Floats) -> tuple[Floats, Floats]:
+    """Return the paths (m, q, 2) and the foci (t, k, 2) at times (t,), in metre."""
+    tacton, path = pressure.tacton, pressure.tacton.trajectory
+    n = tacton.n_paths
+    # From one path's end to the next one's beginning there is no line.
+    along = (np.arange(n)[:, None] + np.linspace(0, 1 - 1e-6, DRAWN_POINTS)) / n
+    paths = path.at_phase(along) if tacton.drawing_frequency else np.zeros((0, 0, 2))
+    within = np.mod(tacton.drawing_frequency * times, 1.0) / n  # each stays on its own path
+    foci = [path.at_phase((within + phase) % 1) for phase in tacton.foci]
+    return paths, np.stack(foci, axis=1)
+
+
+def _binary(values: Any, kind: str) -> str:
+    return base64.b64encode(np.ascontiguousarray(values, kind).tobytes()).decode()

@@ -1,0 +1,1 @@
+"""Results: motion of surfaces, maps, comparison, claims, and the folders that hold them."""

@@ -1,0 +1,75 @@
+"""References to cite for a response: the program, its model, and the solver that it used."""
+
+from dataclasses import dataclass
+
+from simple_model import Response
+from skinwave.models import named
+from skinwave.system.effort import versions
+
+VERSION, RELEASED = "0.4.0", 2026  # as CITATION.cff has them
+TACTONS = (
+    "C. Lim, H. Seifi, G. Park: An Interactive Tool for Simulating Mid-Air Ultrasound Tactons on "
+    "the Skin. Extended Abstracts of the CHI Conference on Human Factors in Computing Systems "
+    "(CHI EA '24), 2024. doi 10.1145/3613905.3650981"
+)
+SOLVERS = {
+    "pardiso": "O. Schenk, K. Gärtner: Solving unsymmetric sparse systems of linear equations with "
+    "PARDISO. Future Generation Computer Systems 20 (2004) 475-487. "
+    "doi 10.1016/j.future.2003.07.011",
+    "cholmod": "Y. Chen, T. A. Davis, W. W. Hager, S. Rajamanickam: Algorithm 887: CHOLMOD, "
+    "supernodal sparse Cholesky factorization and update/downdate. ACM Transactions on "
+    "Mathematical Software 35 (2008) 22. doi 10.1145/1391989.1391995",
+    "superlu": "J. W. Demmel, S. C. Eisenstat, J. R. Gilbert, X. S. Li, J. W. H. Liu: A "
+    "supernodal approach to sparse partial pivoting. SIAM Journal on Matrix Analysis and "
+    "Applications 20 (1999) 720-755. doi 10.1137/S0895479895291765",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Citations:
+    """References in the order in which they are to be cited, and a sentence for a methods section;
+    printed, one a line.
+    """
+
+    sentence: str
+    references: tuple[str, ...]
+
+    def __str__(self) -> str:
+        listed = (f"[{k}] {text}" for k, text in enumerate(self.references, 1))
+        return "\n".join([self.sentence, *listed])
+
+    def _repr_html_(self) -> str:
+        from simple_model.drawing import page, table
+
+        rows = [[f"[{k}]", text] for k, text in enumerate(self.references, 1)]
+        return page(self.sentence, b"", [table(rows)])
+
+
+def cite(*responses: Response) -> Citations:
+    """References for some responses: the program, what each model is computed by, and solvers.
+
+    What a model rests on is its own to say, also of one from outside.
+
+    Raises
+    ------
+    ValueError
+        If no response is given, or its model is unknown.
+    """
+    if not responses:
+        raise ValueError("there is no response to cite for; give one or more")
+    models = list(dict.fromkeys(response.model for response in responses))
+    methods = ", ".join(f"{name} ({named(name).method})" for name in models)
+    made = {**versions(), **responses[0].effort.versions}
+    release = made.get("skinwave", "of unknown version")
+    year = f", {RELEASED}" if release == VERSION else ""
+    program = (
+        "The skinwave authors: skinwave: waves in skin and paper under mid-air ultrasound haptics. "
+        f"Version {release}{year}. Software"
+    )
+    sources = [source for name in models for source in named(name).sources]
+    solvers = [text for name, text in SOLVERS.items()
+               if any(name in response.effort.solver for response in responses)]  # fmt: skip
+    return Citations(
+        sentence=f"Responses were computed with skinwave {release} by {methods}.",
+        references=tuple(dict.fromkeys([program, TACTONS, *sources, *solvers])),
+    )

@@ -1,0 +1,302 @@
+"""Claims of Lim, Seifi and Park about spectral lines, evaluated on any model's responses.
+
+S1 to S5 are claims about their simulation, M1 to M5 about their measurement on paper.
+Nothing here knows which model should fulfil which.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import astuple, dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from meshes.tetmesh import Floats
+from skinwave.results.named_lines import NamedLines
+from skinwave.results.run import Run
+from skinwave.system.numbers import decibel
+from skinwave.system.plain_text import csv_table
+
+PRESENT = -60.0  # dB re f_AM: a line this weak is still seen above a vibrometer's noise
+ABSENT = -120.0  # dB
+MUCH_LOWER = -20.0  # dB: a tenth
+NOTHING = -300.0  # dB
+ON_BIN = 1.0  # Hz: one bin of a spectrum of 1 s
+REACH = 6.0  # Hz from a line within which its spectral peak is looked for
+
+
+@dataclass(frozen=True, kw_only=True)
+class AssessedClaim:
+    """Whether a claim holds for a body and a model, by which number against which threshold."""
+
+    claim: str
+    body: str
+    model: str
+    holds: bool
+    value: float
+    bar: float
+    sentence: str
+
+    @property
+    def column(self) -> str:
+        """As `Run.column`."""
+        return self.model if self.body == "none" else self.body
+
+
+def evaluate(runs: Iterable[Run]) -> list[AssessedClaim]:
+    """Every claim on every body and model for which there are runs to assess it by, long enough to
+    resolve the lines that it is about.
+    """
+    groups: dict[tuple[str, str], list[Run]] = {}
+    for run in filter(is_single, runs):
+        groups.setdefault((run.body, run.model), []).append(run)
+    assessed_claims = []
+    for (body, model), group in groups.items():
+        for claim, (kinds, assess) in CLAIMS.items():
+            about = [run for run in group if (run.is_am, run.is_stm) in kinds]
+            if chosen := [run for run in about if is_resolved(run, claim)]:
+                holds, value, bar, sentence = assess(chosen)
+                assessed_claims.append(
+                    AssessedClaim(
+                        claim=claim, body=body, model=model, holds=bool(holds),
+                        value=float(value), bar=bar, sentence=sentence,
+                    )
+                )  # fmt: skip
+    return assessed_claims
+
+
+def claimed(runs: Iterable[Run]) -> list[Run]:
+    """Runs that claims are about: of the point kernel, and of the displacement of a surface."""
+    return [run for run in runs if run.is_motion or not run.response.record.of_body]
+
+
+def write_claims(path: Path, assessed_claims: Iterable[AssessedClaim]) -> None:
+    """Every assessed claim per body and model."""
+    rows = ((*astuple(v)[:4], f"{v.value:.6g}", v.bar, v.sentence) for v in assessed_claims)
+    path.write_bytes(csv_table([field.name for field in fields(AssessedClaim)], rows))
+
+
+Assessment = tuple[bool, float, float, str]
+
+
+def is_single(run: NamedLines) -> bool:
+    """Whether a run is of the kind that was measured: one focus, modulated evenly throughout by
+    one tone at most.
+    """
+    tacton = run.scene.tacton
+    plain = len(tacton.foci) == 1 and not tacton.is_sampled and not tacton.envelope_frequency
+    # Of two sinusoids the first is the one that claims are about, and must act alone.
+    w1, w2 = tacton.superposition
+    one = (w1 > 0 or not tacton.am_frequency) and not (w2 > 0 and tacton.second_am_frequency)
+    return bool(plain and one and tacton.trajectory.shape != "recorded")
+
+
+def is_resolved(run: NamedLines, claim: str) -> bool:
+    """Whether the lines that a claim is about are resolved; some are about all lines."""
+    if claim in NEEDED:
+        return any(run.frequencies.keys() >= set(names) for names in NEEDED[claim])
+    return "f_AM" in run.frequencies and bool(rivals(run)) and not run.unresolved
+
+
+def _single_line(runs: Sequence[NamedLines]) -> Assessment:
+    worst = max(rival_levels(run).max() for run in runs)
+    sentence = f"the strongest line other than f_AM is at {decibel(worst)} dB re f_AM"
+    return worst < ABSENT, worst, ABSENT, sentence
+
+
+def _am_harmonics(runs: Sequence[NamedLines]) -> Assessment:
+    second = min(_strongest(run, ["2f_AM"]) for run in runs)
+    third = min(_strongest(run, ["3f_AM"]) for run in runs)
+    weakest = min(second, third)
+    sentence = (
+        f"at the least 2 f_AM is at {decibel(second)} dB and 3 f_AM at {decibel(third)} dB re f_AM"
+    )
+    return weakest > PRESENT, weakest, PRESENT, sentence
+
+
+def _drawn_lines(runs: Sequence[NamedLines]) -> Assessment:
+    offset = max(
+        abs(_peak(run, f"{n}f_d".lstrip("1")) - n * run.scene.tacton.trajectory.drawing_frequency)
+        for run in runs
+        for n in (1, 2, 3)
+    )
+    sentence = f"the peaks next to 1, 2 and 3 f_d are at most {offset:.2f} Hz away from them"
+    return offset <= ON_BIN, offset, ON_BIN, sentence
+
+
+def _same_places(runs: Sequence[NamedLines]) -> Assessment:
+    names = ("f_d", "2f_d", "3f_d")
+    places = np.array([[_peak(run, name) for name in names] for run in runs])
+    drift = float(np.ptp(places, axis=0).max())
+    first = 20 * np.log10([run.lines["f_d"].max() for run in runs])
+    sentence = (
+        f"the lines of {len(runs)} paths lie within {drift:.2f} Hz of each other; "
+        f"their f_d amplitudes differ by {np.ptp(first):.1f} dB"
+    )
+    return drift <= ON_BIN, drift, ON_BIN, sentence
+
+
+def _pairs_only(runs: Sequence[NamedLines]) -> Assessment:
+    drawn = max(_strongest(run, ["f_d", "2f_d", "3f_d"], "f_AM") for run in runs)
+    weakest = min(min(_strongest(run, [name], "f_AM") for name in PAIRS) for run in runs)
+    sentence = (
+        f"the strongest line at n f_d is at {decibel(drawn)} dB re f_AM, the weakest of the pairs "
+        f"n f_d +- f_AM (n = 1, 2) at {decibel(weakest)} dB"
+    )
+    return drawn < ABSENT and weakest > PRESENT, drawn, ABSENT, sentence
+
+
+def _both_multiples(runs: Sequence[NamedLines]) -> Assessment:
+    drawn = min(_strongest(run, ["f_d"], "f_AM") for run in runs)
+    double = min(_strongest(run, ["2f_AM"], "f_AM") for run in runs)
+    sentence = (
+        f"f_d is at {decibel(drawn)} dB re f_AM or above in every Tacton, 2 f_AM at "
+        f"{decibel(double)} dB or above"
+    )
+    return drawn > PRESENT, drawn, PRESENT, sentence
+
+
+def _am_highest(runs: Sequence[NamedLines]) -> Assessment:
+    worst = max(runs, key=lambda run: rival_levels(run).max())
+    value = rival_levels(worst).max()
+    name, probe = strongest_rival(worst)
+    sentence = (
+        f"the strongest rival of f_AM is {name} at {decibel(value, signed=True)} dB "
+        f"({worst.tacton}, probe at {probe:g} mm)"
+    )
+    return value < 0, value, 0.0, sentence
+
+
+def _am_highest_measured(runs: Sequence[NamedLines]) -> Assessment:
+    holds, value, bar, sentence = _am_highest(runs)
+    beaten = [run.tacton for run in runs if rival_levels(run).max() >= 0]
+    if beaten:
+        sentence += f"; f_AM is exceeded in {', '.join(beaten)}"
+    if runs[0].is_motion:  # a vibrometer reads velocity; the point kernel has none
+        velocity = max(rival_levels(run, velocity=True).max() for run in runs)
+        sentence += f"; as velocity the strongest rival is at {decibel(velocity, signed=True)} dB"
+        value = max(value, velocity)
+    return holds and value < 0, value, bar, sentence
+
+
+def _much_lower(runs: Sequence[NamedLines]) -> Assessment:
+    levels = [multiple_levels(run).max() for run in runs]
+    value, lower = max(levels), sum(bool(level < MUCH_LOWER) for level in levels)
+    sentence = (
+        f"the strongest multiple of f_AM or f_d is at {decibel(value, signed=True)} dB re f_AM; in "
+        f"{lower} of {len(runs)} Tactons all are below {MUCH_LOWER:g} dB at every probe"
+    )
+    if value < PRESENT:
+        sentence += f"; those that the claim is about are not there, above {PRESENT:g} dB"
+    return bool(PRESENT <= value < MUCH_LOWER), value, MUCH_LOWER, sentence
+
+
+def _exact_frequencies(runs: Sequence[NamedLines]) -> Assessment:
+    offsets = [
+        abs(_peak(run, name) - run.frequencies[name])
+        for run in runs
+        for name in (["f_AM"] if run.is_am else ["f_d"])
+    ]
+    worst = max(offsets)
+    sentence = f"the spectral peaks are at most {worst:.2f} Hz from the commanded f_AM and f_d"
+    return worst <= ON_BIN, worst, ON_BIN, sentence
+
+
+# Whether the amplitude is modulated, and whether the focus moves, in runs that a claim is about.
+AM, STM, BOTH = (True, False), (False, True), (True, True)
+CLAIMS: dict[
+    str, tuple[tuple[tuple[bool, bool], ...], Callable[[Sequence[NamedLines]], Assessment]]
+] = {
+    "S1": ((AM,), _single_line),
+    "S2": ((STM,), _drawn_lines),
+    "S3": ((BOTH,), _pairs_only),
+    "S4": ((BOTH,), _am_highest),
+    "S5": ((AM, STM), _exact_frequencies),
+    "M1": ((AM,), _am_harmonics),
+    "M2": ((STM,), _same_places),
+    "M3": ((BOTH,), _both_multiples),
+    "M4": ((BOTH,), _am_highest_measured),
+    "M5": ((BOTH,), _much_lower),
+}
+# Lines, one of these sets of which a claim is about; claims not listed are about all lines.
+DRAWN = (("f_d", "2f_d", "3f_d"),)
+PAIRS = ("f_d-f_AM", "f_d+f_AM", "2f_d-f_AM", "2f_d+f_AM")
+NEEDED: dict[str, tuple[tuple[str, ...], ...]] = {
+    "S2": DRAWN,
+    "S3": (("f_AM", *DRAWN[0], *PAIRS),),
+    "S5": (("f_AM",), ("f_d",)),
+    "M1": (("f_AM", "2f_AM", "3f_AM"),),
+    "M2": DRAWN,
+    "M3": (("f_AM", "2f_AM", "f_d"),),
+}
+TEXTS = {
+    "S1": "Simulated, AM alone: a single line at f_AM.",
+    "S2": "Simulated, STM alone: lines at multiples of f_d.",
+    "S3": "Simulated, AM+STM: f_AM and the pairs n f_d +- f_AM, no line at n f_d.",
+    "S4": "Simulated, AM+STM: f_AM is the highest line, whatever the path.",
+    "S5": "Both: lines exactly at the commanded f_AM and f_d.",
+    "M1": "Measured, AM alone: lines at multiples of f_AM.",
+    "M2": "Measured, STM alone: lines at the same places for every path with the same f_d.",
+    "M3": "Measured, AM+STM: lines at multiples of both f_AM and f_d.",
+    "M4": "Measured, AM+STM: f_AM is the highest line, whatever the path.",
+    "M5": "Measured, AM+STM: the multiples of f_AM and f_d are much lower than f_AM.",
+}
+
+
+def _probe_levels(
+    run: NamedLines, names: Iterable[str], reference: str, velocity: bool = False
+) -> Floats:
+    """(line, probe) levels in dB re a reference line at the same probe."""
+    names = list(names)
+    weight = {name: run.frequencies[name] if velocity else 1.0 for name in [*names, reference]}
+    base = np.maximum(run.lines[reference] * weight[reference], np.finfo(float).tiny)
+    ratios = np.array([run.lines[name] * weight[name] for name in names]) / base
+    return 20 * np.log10(np.maximum(ratios, 1e-15))
+
+
+def rivals(run: NamedLines) -> list[str]:
+    """Names of the lines that are resolved from f_AM itself."""
+    f_am = run.frequencies["f_AM"]
+    return [n for n, f in run.frequencies.items() if abs(f - f_am) > 2 * ON_BIN]
+
+
+def rival_levels(run: NamedLines, velocity: bool = False) -> Floats:
+    """Level of the strongest line other than f_AM at each probe, dB re f_AM there."""
+    return _probe_levels(run, rivals(run), "f_AM", velocity).max(axis=0)
+
+
+def multiple_levels(run: NamedLines) -> Floats:
+    """Level of the strongest multiple of f_AM or of f_d other than f_AM at each probe, dB re f_AM
+    there: "these frequency harmonics", without the sums and differences of both.
+    """
+    names = [n for n in rivals(run) if not ("f_AM" in n and "f_d" in n)]
+    return _probe_levels(run, names, "f_AM").max(axis=0, initial=NOTHING)
+
+
+def strongest_rival(run: NamedLines) -> tuple[str, float]:
+    """Strongest line other than f_AM, and the radius in mm of the probe where it is."""
+    names = rivals(run)
+    levels = _probe_levels(run, names, "f_AM")
+    line, probe = np.unravel_index(np.argmax(levels), levels.shape)
+    return names[line], 1e3 * float(np.hypot(*run.places[probe]))
+
+
+def _strongest(run: NamedLines, names: list[str], reference: str = "f_AM") -> float:
+    """Level of the strongest of these lines at any probe, dB re the reference at that probe."""
+    return float(_probe_levels(run, names, reference).max())
+
+
+def _peak(run: NamedLines, line: str) -> float:
+    """Frequency in Hz of the spectral peak next to a line, at the probe where it is strongest.
+
+    Interpolated between bins on the logarithm; infinitely far if there is no peak in reach.
+    """
+    f, amplitude = run.spectrum
+    x = amplitude[:, int(np.argmax(run.lines[line]))]
+    near = np.flatnonzero(np.abs(f - run.frequencies[line]) <= REACH)
+    if len(near) < 3:  # too short a Tacton for its spectrum to resolve
+        return np.inf
+    top = near[np.argmax(x[near])]
+    if top in (near[0], near[-1]) or x[top] <= 0:
+        return np.inf
+    left, centre, right = np.log(np.maximum(x[top - 1 : top + 2], np.finfo(float).tiny))
+    return float(f[top] + (left - right) / (left - 2 * centre + right) / 2 * f[1])

@@ -1,0 +1,145 @@
+"""Files of a run in its folder."""
+
+import json
+import os
+import re
+import shutil
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from simple_model import Effort
+from simple_model.quantities import DISPLACEMENT, VELOCITY
+from skinwave.results import outputs, record
+from skinwave.results.run import Run
+from skinwave.scene.file import dumps
+from skinwave.system.plain_text import csv_table
+
+LINE_COLUMNS = (
+    "tacton", "body", "model", "probe_x_mm", "probe_y_mm", "line",
+    "frequency_hz", "displacement_um", "velocity_mm_s", "pressure_pa",
+)  # fmt: skip
+DEPTH = "probe_depth_mm"
+RESERVED = ("figures", "overview", "propagation")  # what a study names itself
+DEVICES = re.compile(r"con|prn|aux|nul|(com|lpt)[\d¹²³]", re.IGNORECASE)  # of Windows
+LONGEST, MOST_BYTES = 80, 200  # of a name, which gets an ending and is limited to 255 bytes
+
+
+def folder_name(name: str) -> str:
+    """A scene's name as that of a folder or file on any system: within the folder above it, no
+    device of Windows, without dots, and none that a study has, in capitals or not.
+    """
+    plain = re.sub(r"[^\w +=,()-]", "_", name).strip()[:LONGEST]
+    plain = plain.encode()[:MOST_BYTES].decode(errors="ignore").strip()
+    taken = plain.casefold() in ("", *RESERVED) or DEVICES.fullmatch(plain)
+    return f"scene_{plain}" if taken else plain
+
+
+def distinct_names(names: Iterable[str]) -> list[str]:
+    """The `folder_name` of each, no two alike on a system for which capitals are small letters."""
+    found: dict[str, str] = {}
+    for name in map(folder_name, names):
+        other, k = name, 1
+        while other.casefold() in found:
+            k += 1
+            other = f"{name}_{k}"
+        found[other.casefold()] = other
+    return [*found.values()]
+
+
+def write_run(
+    folder: Path,
+    run: Run,
+    *,
+    by: str = "compute",
+    h: float | None = None,
+    also: Callable[[Path], object] | None = None,
+) -> None:
+    """The folder of one run, all or nothing; `also` writes more into it, by and h as for `fill`."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    aside = outputs.beside(folder, Path.mkdir, f"{folder.name}.partial-", "")
+    try:
+        fill(aside, run, by=by, h=h)
+        if also:
+            also(aside)
+        os.replace(aside, folder)
+    except BaseException:
+        shutil.rmtree(aside, ignore_errors=True)
+        raise
+
+
+def fill(folder: Path, run: Run, *, by: str = "compute", h: float | None = None) -> None:
+    """scene.toml, responses.npz, lines.csv, effort.json and record.json of one run, into an empty
+    folder; `by` and h are how its model was computed, as in `record.of_model`.
+    """
+    name = run.response.quantity if run.response.record.of_body else DISPLACEMENT.name
+    write_responses(folder / record.RESPONSES[0], {name: run, run.model: run})
+    write_lines(folder / "lines.csv", [run])
+    write_effort(folder / "effort.json", run.response.effort)
+    # Only then is it a result for whoever looks for scenes in a folder that was left half-written.
+    (folder / "scene.toml").write_text(dumps(run.scene), encoding="utf-8")
+    command = record.of_model(run, by, h)
+    record.write(folder, command, scene=run.scene, response=run.response)
+
+
+def write_responses(path: Path, runs: Mapping[str, Run]) -> None:
+    """Times `t` in s, `probes` in m and, by name, values (t, p) in the unit of their quantity."""
+    first = next(iter(runs.values())).response
+    arrays: dict[str, Any] = {"t": first.times, "probes": first.probes}
+    arrays |= {name: run.response.values for name, run in runs.items()}
+    with open(path, "wb") as file:
+        np.savez(file, **arrays)
+
+
+def write_lines(path: Path, runs: Iterable[Run]) -> None:
+    """Every line's amplitude per Tacton, body, model and probe."""
+    runs = list(runs)
+    columns = line_columns(runs)
+    rows = (row for run in runs for row in line_rows(run, columns))
+    path.write_bytes(csv_table(columns, rows))
+
+
+def line_columns(runs: Iterable[Run]) -> tuple[str, ...]:
+    """Columns of lines.csv: `LINE_COLUMNS`, with the depth of probes below the surface and those of
+    other quantities than displacement, velocity and pressure where there are any.
+    """
+    runs = list(runs)
+    more = dict.fromkeys(run.response.record.column for run in runs)
+    deep = [DEPTH] * any(not run.scene.reading.is_on_surface for run in runs)
+    where, amplitudes = LINE_COLUMNS[:5], LINE_COLUMNS[5:]
+    return (*where, *deep, *amplitudes, *(name for name in more if name not in amplitudes))
+
+
+def line_rows(run: Run, columns: Sequence[str] = LINE_COLUMNS) -> Iterator[tuple[object, ...]]:
+    """Rows of lines.csv; the point kernel has a pressure where bodies have a displacement. Peaks
+    that are no single line of the load have their kind for a name, such as "free vibration".
+    """
+    asked = run.response.record
+    found = [(name, f, run.table.amplitudes[name]) for name, f in run.listed.items()]
+    found += [(peak.kind, peak.frequency, peak.amplitudes) for peak in run.unnamed]
+    for name, frequency, amplitudes in found:
+        # The point kernel's pressure is that on the surface, whatever is asked of bodies.
+        depths = run.scene.depths if asked.of_body else [0.0] * len(run.scene.depths)
+        for (x, y), z, amplitude in zip(run.response.probes, depths, amplitudes, strict=True):
+            row: dict[str, object] = {
+                "tacton": run.tacton, "body": run.body, "model": run.model, "line": name,
+                "probe_x_mm": _short(1e3 * x), "probe_y_mm": _short(1e3 * y),
+                DEPTH: _short(1e3 * z), "frequency_hz": _short(frequency),
+                asked.column: _short(asked.per_unit * amplitude),
+            }  # fmt: skip
+            if asked is DISPLACEMENT:
+                velocity = VELOCITY.per_unit * 2 * np.pi * frequency * amplitude
+                row[VELOCITY.column] = _short(velocity)
+            yield tuple(row.get(column, "") for column in columns)
+
+
+def write_effort(path: Path, effort: Effort) -> None:
+    """Cost of a response, as JSON."""
+    path.write_text(json.dumps(asdict(effort), indent=1), encoding="utf-8")
+
+
+def _short(value: float) -> str:
+    return f"{value:.6g}"

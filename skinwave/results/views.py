@@ -1,0 +1,497 @@
+"""View of one model's response in pictures: its surface through a period, and where it moves most.
+
+Motion is about its mean: a steady push bends a sheet far more than its vibration does.
+"""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import fem
+from meshes import reading
+from meshes.tetmesh import Floats, Ints, boundary_facets
+from simple_model import Effort, sensation_level
+from simple_model.flat_body import steady_lines
+from simple_model.load_spectrum import Complex, pressure_lines, synthesise
+from skinwave.bodies.analytic import compliance
+from skinwave.models.loads import surface_motion
+from skinwave.models.plate_modes import steady_lines as plate_lines
+from skinwave.models.reduction import oscillating, read_at
+from skinwave.models.speeds import repeated, shown_part, strongest_tone
+from skinwave.models.stretched_plate import STRETCHED, settled
+from skinwave.results.motion import Waves, check_values, vibration
+from skinwave.results.nodal import Shade, Tensors, shade, tensors
+from skinwave.results.run import Run
+from skinwave.scene.file import dumps, loads
+from skinwave.scene.scene import Scene
+from skinwave.system.json_kinds import effort_of, fitting
+
+STRONG = 0.1  # of the strongest line: weaker ones need no frames of their own
+SLOWEST = 20.0  # Hz: slower tones are not followed by diagrams of motion over place and time
+GRID, LAYER_GRID = 121, 81  # points along a side of the surface of the point kernel, of a layer
+NEGLIGIBLE = 1e-4  # of the load's strongest line: lines that are not shown
+ALONG, INSTANTS = 161, 241  # places and times of a diagram of motion over place and time
+TYPICAL = 140.0  # Hz, where nothing vibrates
+FIELD_FRAMES = 8  # of those that are shown, written for other programs
+PLATE_TOLERANCE = 0.05  # of the motion of a sheet at large deflection
+ROOM = 5e-3  # m beside the path that waves can be watched in
+
+Singles = NDArray[np.float32]
+Motion = Callable[[Floats, Floats], Floats]  # places (q, 2), times (t,) -> (t, q)
+
+UNITS = ("m", "Pa")  # of a body's displacement, and of the point kernel's pressure
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trace:
+    """Motion (t, q) along a line, in the unit of its view, nan off the body: `places` (q, 2) in
+    metre, `distance` (q,) in metre along it, `times` (t,) in s.
+    """
+
+    places: Floats
+    distance: Floats
+    times: Floats
+    motion: Floats
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class View:
+    """One model's response in a scene, as pictures need it.
+
+    Parameters
+    ----------
+    body : name of the body, by which it has its colour; model, unit ("m" or "Pa"), scene
+    points : (n, 3) float, metre; tets : (m, 10) int, none for the point kernel, which has no body
+    surface : (s,) int, the points of the upper surface; triangles : (k, 3) int, of these
+    times : (f,) float, s, through the part of the steady state that is played, `period`: that of
+        the whole pattern, see `speeds.shown_part`
+    motion : (f, n, 3) float32, metre; of the point kernel the pressure in Pa, along the push
+    rms, sensation : (s,) float, motion into the body about its mean in the unit, and the highest
+        sensation level of its lines in dB, of the point kernel above the threshold of a pressure;
+        minus infinity where nothing vibrates, and on a sheet, which is no skin
+    tone : Hz, the line that moves the surface most; speed : m/s, of a surface wave there, or None
+    ray : outwards along x from the path's outermost point; track : along the path, None if the
+        focus rests; both in the steady state, about the mean
+    tensors : strain and stress at some of its times, of a solid body that was saved; shade : the
+        quantity that colours it, instead of its motion; moved : the motion that it was made of,
+        which no file keeps
+    """
+
+    body: str
+    model: str
+    unit: str
+    scene: Scene
+    points: Floats
+    tets: Ints
+    surface: Ints
+    triangles: Ints
+    period: float
+    times: Floats
+    motion: Singles
+    rms: Floats
+    sensation: Floats
+    tone: float
+    speed: float | None
+    ray: Trace
+    track: Trace | None
+    effort: Effort = field(default_factory=Effort)
+    tensors: Tensors | None = None
+    shade: Shade | None = None
+    moved: Waves | None = None
+
+    @property
+    def column(self) -> str:
+        """Name in tables and figures, as `Run.column`."""
+        return self.model if self.body == "none" else self.body
+
+    @property
+    def places(self) -> Floats:
+        """Where the upper surface is, (s, 2) in metre."""
+        return self.points[self.surface, :2]
+
+    @property
+    def pushed(self) -> Singles:
+        """Motion (f, s) of the upper surface into the body, in the unit."""
+        return -self.motion[:, self.surface, 2]
+
+    @cached_property
+    def finder(self) -> Any:
+        """Function of x and y (...) in metre: which triangle is there, -1 for none."""
+        from matplotlib.tri import Triangulation
+
+        x, y = self.places.T
+        corners = np.stack([x, y], axis=1)[self.triangles]
+        along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        area = along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]
+        kept = area > 1e-6 * area.max()  # of a steep rim some are seen edge-on, or from below
+        return Triangulation(x, y, self.triangles[kept]).get_trifinder()
+
+    @property
+    def peak(self) -> float:
+        """The largest motion into or out of the body anywhere at any time, in the unit."""
+        return float(np.abs(self.pushed).max()) or 1.0
+
+
+def fastest_line(moved: Waves) -> float:
+    """The highest line in Hz that moves a body by `STRONG` of what its strongest one does."""
+    moving = oscillating(moved.motion)
+    lines = moving.lines
+    power = np.einsum("fm,mn,fn->f", lines.conj(), moved.basis.T @ moved.basis, lines).real
+    return _fastest(moving.frequencies, power)
+
+
+def _fastest(frequencies: Floats, power: Floats) -> float:
+    counts = (power > 0) & (power >= STRONG**2 * power.max(initial=0.0))
+    return float(frequencies[counts].max(initial=0.0))
+
+
+def body_view(scene: Scene, body: str, moved: Waves, part: tuple[float, int] | None = None) -> View:
+    """A body's view, from all of its motion; `part` is how long it is played, s, and in how many
+    frames, `speeds.shown_part` of its own motion if not given.
+    """
+    mesh = moved.mesh
+    period, frames = part or shown_part(scene.pressure, fastest_line(moved))
+    surface, triangles = _upper(mesh.facets["top"])
+    times = np.arange(frames) * period / frames
+    check_values(frames, len(mesh.points))
+    motion = vibration(moved, times) @ moved.basis.T
+    _, inwards = fem.node_operator(mesh, patch=scene.body.of_kind.normal_patch)
+    seen = read_at(oscillating(moved.motion), inwards @ moved.basis)
+    frequencies, amplitudes = seen.frequencies, np.abs(seen.lines)
+    levels = np.full(len(surface), -np.inf)
+    if scene.body.is_skin:
+        levels = sensation_level(amplitudes, frequencies[:, None]).max(axis=0, initial=-np.inf)
+    tone = strongest_tone(frequencies, amplitudes)
+
+    def trace(places: Floats, t: Floats) -> Floats:
+        build, found = moved.driven.build, np.full((len(t), len(places)), np.nan)
+        on = fem.on_surface(build.mesh, places)
+        read = surface_motion(scene.body, build, places[on]) @ moved.driven.basis
+        found[:, on] = vibration(moved, t) @ read.T
+        return found
+
+    speed = scene.body.of_kind.wave_speed(scene.body, tone or TYPICAL)
+    reach = np.array([scene.body.width, scene.body.height]) / 2
+    return View(
+        body=body, model="fem", unit="m", scene=scene, points=mesh.points, tets=mesh.tets,
+        surface=surface, triangles=triangles, period=period, times=times,
+        motion=motion.reshape(frames, -1, 3).astype(np.float32),
+        rms=np.sqrt((amplitudes**2).sum(axis=0) / 2), sensation=levels,
+        tone=tone, speed=speed, effort=moved.effort, moved=moved,
+        ray=_ray(scene, reach, trace), track=_track(scene, trace),
+    )  # fmt: skip
+
+
+def shaded(view: View, scene: Scene) -> View:
+    """A body's view, coloured by the quantity that a scene's probes read.
+
+    Raises
+    ------
+    ValueError
+        As `nodal.shade` does.
+    """
+    assert view.moved
+    nodes = np.unique(boundary_facets(view.tets))
+    return replace(view, shade=shade(scene, view.moved, view.times, nodes))
+
+
+def with_tensors(view: View) -> View:
+    """A view with strain and stress at `FIELD_FRAMES` of its times, if it is of a solid body."""
+    if view.moved is None or view.scene.body.of_kind.is_plate:
+        return view
+    return replace(view, tensors=tensors(view.moved, view.times, field_frames(len(view.times))))
+
+
+def field_frames(count: int) -> Ints:
+    """Numbers (k,) of the frames, of so many, that are written for other programs."""
+    return np.unique(np.arange(FIELD_FRAMES) * count // FIELD_FRAMES)
+
+
+def kernel_view(scene: Scene, reach: Floats, part: tuple[float, int] | None = None) -> View:
+    """The point kernel's view, on a flat square as far as `reach` (2,) in metre either way; `part`
+    is how long it is played, s, and in how many frames, as `body_view` takes it.
+    """
+    pressure = scene.pressure
+    points, triangles = _grid(reach, GRID)
+    frequencies, patterns = pressure_lines(pressure, points)
+    moving = frequencies > 0
+    amplitudes = np.abs(patterns[moving])
+    fastest = _fastest(frequencies[moving], (amplitudes**2).sum(axis=1))
+    period, frames = part or shown_part(pressure, fastest)
+    times = np.arange(frames) * period / frames
+    motion = np.zeros((frames, len(points), 3), np.float32)
+    motion[:, :, 2] = patterns[~moving].real.sum(axis=0) - pressure(points, times)
+    levels = sensation_level(amplitudes, frequencies[moving][:, None], unit="Pa")
+
+    def trace(places: Floats, t: Floats) -> Floats:
+        f, of_place = pressure_lines(pressure, places)
+        return pressure(places, t) - of_place[f == 0].real.sum(axis=0)
+
+    return View(
+        body="none", model="point-kernel", unit="Pa", scene=scene, points=points,
+        tets=np.zeros((0, 10), np.int64), surface=np.arange(len(points)), triangles=triangles,
+        period=period, times=times, motion=motion,
+        rms=np.sqrt((amplitudes**2).sum(axis=0) / 2),
+        sensation=levels.max(axis=0, initial=-np.inf),
+        tone=strongest_tone(frequencies[moving], amplitudes),
+        speed=None, ray=_ray(scene, reach, trace), track=_track(scene, trace),
+    )  # fmt: skip
+
+
+def layer_view(run: Run, reach: Floats, part: tuple[float, int]) -> View:
+    """The view of an infinite layer or a half-space, by its wavenumber integral, on a flat square;
+    `reach` and `part` as `kernel_view` takes them.
+    """
+    scene, body = run.scene, run.scene.body
+    waves_of = compliance(body)
+    points, triangles = _grid(reach, LAYER_GRID)
+    period, frames = part
+    times = np.arange(frames) * period / frames
+
+    def lines(places: Floats) -> tuple[Floats, Complex]:
+        f, a = steady_lines(waves_of, scene.pressure, places, threshold=NEGLIGIBLE)
+        return f[f > 0], a[f > 0]
+
+    def trace(places: Floats, t: Floats) -> Floats:
+        return synthesise(*lines(places), t)
+
+    return _surface_view(run, (points, triangles), (period, times), lines, trace, reach)
+
+
+def _surface_view(
+    run: Run,
+    shape: tuple[Floats, Ints],
+    shown: tuple[float, Floats],
+    lines: Callable[[Floats], tuple[Floats, Complex]],
+    trace: Motion,
+    reach: Floats,
+) -> View:
+    """The view of a flat surface of points (p, 3) and triangles, for a period with its times, from
+    the lines (f,), (f, p) and the motion of any places.
+    """
+    scene, body, (points, triangles), (period, times) = run.scene, run.scene.body, shape, shown
+    f, found = lines(points[:, :2])
+    amplitudes, levels = np.abs(found), np.full(len(points), -np.inf)
+    if body.is_skin:
+        levels = sensation_level(amplitudes, f[:, None]).max(axis=0, initial=-np.inf)
+    motion = np.zeros((len(times), len(points), 3), np.float32)
+    motion[:, :, 2] = -trace(points[:, :2], times)
+    tone = strongest_tone(f, amplitudes)
+    return View(
+        body=run.body, model=run.model, unit="m", scene=scene, points=points,
+        tets=np.zeros((0, 10), np.int64), surface=np.arange(len(points)), triangles=triangles,
+        period=period, times=times, motion=motion, rms=np.sqrt((amplitudes**2).sum(axis=0) / 2),
+        sensation=levels, tone=tone, speed=body.of_kind.wave_speed(body, tone or TYPICAL),
+        effort=run.response.effort, ray=_ray(scene, reach, trace), track=_track(scene, trace),
+    )  # fmt: skip
+
+
+def plate_view(run: Run, part: tuple[float, int]) -> View:
+    """The view of a sheet by the modes of a thin plate; `part` as `kernel_view` takes it.
+
+    A sheet at large deflection is shown as it moves in the later half of the scene.
+    """
+    scene, body = run.scene, run.scene.body
+    middle, reach = body.placement.offset, np.array([body.width, body.height]) / 2
+    points, triangles = _grid(reach, LAYER_GRID)
+    points[:, :2] += middle
+    period, frames = part
+    times = np.arange(frames) * period / frames
+    if run.model == STRETCHED.name:
+        from scipy.interpolate import CubicSpline  # which takes long to import
+
+        at, z, modes = settled(scene, PLATE_TOLERANCE)
+        steady = CubicSpline(at - at[0], z)
+        f = plate_lines(scene, points[:1, :2])[0]
+        window = np.hanning(len(at))
+        waves = np.exp(-2j * np.pi * np.multiply.outer(f, at)) * window
+        coordinates = 2 / window.sum() * waves @ z
+
+        def lines(places: Floats) -> tuple[Floats, Complex]:
+            return f[f > 0], (coordinates @ modes.at(places - middle).T)[f > 0]
+
+        def trace(places: Floats, t: Floats) -> Floats:
+            return np.asarray(steady(np.mod(t, at[-1] - at[0])) @ modes.at(places - middle).T)
+
+    else:
+
+        def lines(places: Floats) -> tuple[Floats, Complex]:
+            f, a = plate_lines(scene, places)
+            return f[f > 0], a[f > 0]
+
+        def trace(places: Floats, t: Floats) -> Floats:
+            return synthesise(*lines(places), t)
+
+    return _surface_view(run, (points, triangles), (period, times), lines, trace, reach)
+
+
+def spread_radius(view: View, drop: float) -> float:
+    """Distance in metre from the centre of the path to the furthest place whose RMS motion is
+    within `drop` (below 0) dB of the largest.
+    """
+    moving = view.rms >= view.rms.max() * 10 ** (drop / 20)
+    return float(np.linalg.norm(view.places[moving], axis=1).max())
+
+
+def path_points(scene: Scene, count: int = 241) -> Floats:
+    """The path (count, 2) in metre, closed; one point if the focus rests."""
+    path = scene.tacton.trajectory
+    return path.at_phase(np.zeros(1) if path.is_static else np.linspace(0, 1, count))
+
+
+def starting_time(scene: Scene, place: Floats) -> float:
+    """When, in s, the focus first comes by a place (2,) on its path."""
+    path = scene.tacton.trajectory
+    phases = np.linspace(0, 1, 720, endpoint=False)
+    nearest = np.argmin(np.linalg.norm(path.at_phase(phases) - place, axis=1))
+    return 0.0 if path.is_static else float(phases[nearest] / path.drawing_frequency)
+
+
+def save(path: Path, view: View) -> None:
+    """A view as one npz file."""
+    arrays: dict[str, Any] = {n: getattr(view, n) for n in ARRAYS}
+    for name in ("ray", "track"):
+        if (trace := getattr(view, name)) is not None:
+            arrays |= {f"{name}_{key}": value for key, value in asdict(trace).items()}
+    if (kept := with_tensors(view).tensors) is not None:
+        arrays |= {f"{TENSORS}{key}": value for key, value in vars(kept).items()}
+    meta = {n: getattr(view, n) for n in META} | {
+        "scene": dumps(view.scene), "effort": asdict(view.effort)
+    }  # fmt: skip
+    np.savez_compressed(path, meta=np.array(json.dumps(meta)), **arrays)
+
+
+def load(path: Path) -> View:
+    """A view from its file.
+
+    Raises
+    ------
+    ValueError
+        If the file is none of these.
+    """
+    try:
+        arrays = reading.arrays(path)
+        meta = json.loads(str(arrays["meta"]))
+        fitting(meta, FITTING, "meta")
+        meta |= {"scene": loads(meta["scene"]), "effort": effort_of(meta["effort"], "effort")}
+        meta |= {name: _trace(arrays, name) for name in ("ray", "track")}
+        meta |= {"tensors": _tensors(arrays)}
+        found: dict[str, Any] = {n: arrays[n] for n in ARRAYS} | meta
+        return _checked(View(**found))
+    except (KeyError, TypeError, ValueError, RecursionError) as error:
+        raise ValueError(f"{path} is no view ({error}); make it anew from its scene") from None
+
+
+ARRAYS = (
+    "points", "tets", "surface", "triangles", "times", "motion", "rms", "sensation",
+)  # fmt: skip
+TENSORS = "tensor_"  # what the names of their arrays begin with
+META = ("body", "model", "unit", "period", "tone", "speed")
+FITTING = {"body": str, "model": str, "unit": str, "period": float, "tone": float, "scene": str}
+
+
+def _checked(view: View) -> View:
+    """The view, if its arrays fit each other."""
+    n, s, f = len(view.points), len(view.surface), len(view.times)
+    shapes = {
+        "points": (n, 3), "surface": (s,), "triangles": (len(view.triangles), 3), "times": (f,),
+        "motion": (f, n, 3), "rms": (s,), "sensation": (s,), "tets": view.tets.shape,
+    }  # fmt: skip
+    for name, shape in shapes.items():
+        array = getattr(view, name)
+        is_index, most = name in ("surface", "triangles", "tets"), s if name == "triangles" else n
+        if array.shape != shape or array.dtype.kind not in ("iu" if is_index else "fiu"):
+            raise ValueError(f"'{name}' is of shape {array.shape} and type {array.dtype}")
+        if is_index and array.size and not 0 <= array.min() <= array.max() < most:
+            raise ValueError(f"'{name}' has indices beyond {most}")
+        if not is_index and (np.isnan(array).any() or np.isposinf(array).any()):
+            raise ValueError(f"'{name}' is not finite")
+    if not (n and s and f and view.period > 0 and view.unit in UNITS):
+        raise ValueError("it is empty, or its period or unit are none")
+    if (kept := view.tensors) is not None:
+        _check_numbers(kept.frames, f, "frames")
+        _check_numbers(kept.nodes, n, "nodes")
+        _check_numbers(kept.tets, len(kept.nodes), "tets")
+    if view.tets.ndim != 2 or (len(view.tets) and view.tets.shape[1] not in (4, 10)):
+        raise ValueError(f"'tets' is of shape {view.tets.shape}")
+    return view
+
+
+def _check_numbers(numbers: Ints, most: int, name: str) -> None:
+    if numbers.dtype.kind not in "iu" or not (0 <= numbers.min() <= numbers.max() < most):
+        raise ValueError(f"'{TENSORS}{name}' has numbers beyond {most}")
+
+
+def _trace(arrays: Mapping[str, Any], name: str) -> Trace | None:
+    keys = ("places", "distance", "times", "motion")
+    if f"{name}_places" not in arrays:
+        return None
+    return Trace(**{key: arrays[f"{name}_{key}"] for key in keys})
+
+
+def _tensors(arrays: Mapping[str, Any]) -> Tensors | None:
+    keys = [key.name for key in fields(Tensors)]
+    if f"{TENSORS}{keys[0]}" not in arrays:
+        return None
+    found = Tensors(**{key: arrays[f"{TENSORS}{key}"] for key in keys})
+    many, q = len(found.frames), len(found.nodes)
+    shapes = {"strain": (many, q, 6), "stress": (many, q, 6), "tets": (len(found.tets), 10)}
+    for name, shape in shapes.items():
+        array = getattr(found, name)
+        if array.shape != shape or not np.isfinite(array).all():
+            raise ValueError(f"'{TENSORS}{name}' is of shape {array.shape}, or not finite")
+    return found
+
+
+def _upper(facets: Ints) -> tuple[Ints, Ints]:
+    """Points (s,) of six-node facets and the flat triangles (k, 3), four a facet, of these."""
+    surface, local = np.unique(facets, return_inverse=True)
+    return surface, split(local.reshape(facets.shape))
+
+
+def split(facets: Ints) -> Ints:
+    """Six-node facets (k, 6) as flat triangles (4 k, 3)."""
+    return facets[:, [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]].reshape(-1, 3)
+
+
+def _grid(reach: Floats, side: int) -> tuple[Floats, Ints]:
+    """A flat rectangle of points (side^2, 3) and triangles (k, 3)."""
+    x, y = (np.linspace(-r, r, side) for r in reach)
+    X, Y = np.meshgrid(x, y, indexing="ij")
+    a = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).ravel()
+    b = a + side
+    triangles = np.vstack([np.stack([a, b, b + 1], 1), np.stack([a, b + 1, a + 1], 1)])
+    return np.column_stack([X.ravel(), Y.ravel(), np.zeros(X.size)]), triangles
+
+
+def _ray(scene: Scene, reach: Floats, motion: Motion) -> Trace:
+    path = path_points(scene)
+    origin = path[np.argmax(path[:, 0])]
+    room, way = 0.98 * reach[0] - origin[0], 1.0
+    if room < ROOM:  # the path ends where the body does
+        room, way = 0.98 * reach[0] + origin[0], -1.0
+    distance = np.linspace(0, room, ALONG)
+    places = origin + way * np.column_stack([distance, 0 * distance])
+    return _traced(scene, places, distance, motion)
+
+
+def _track(scene: Scene, motion: Motion) -> Trace | None:
+    path = scene.tacton.trajectory
+    if path.is_static:
+        return None
+    phases = np.linspace(0, 1, ALONG)
+    return _traced(scene, path.at_phase(phases), phases * path.length, motion)
+
+
+def _traced(scene: Scene, places: Floats, distance: Floats, motion: Motion) -> Trace:
+    """Motion through two periods of the slowest tone, or of the path if that is slower."""
+    path = scene.tacton.trajectory.drawing_frequency
+    tones = [f for f in repeated(scene.tacton).values() if f >= SLOWEST] + [path] * bool(path)
+    times = np.arange(INSTANTS) / INSTANTS * 2 / min(tones, default=SLOWEST)
+    return Trace(places=places, distance=distance, times=times, motion=motion(places, times))

@@ -1,0 +1,308 @@
+"""Scenes as TOML files, read and written."""
+
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import replace
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from meshes import reading
+from simple_model import MovingPressure, Tacton, Trajectory
+from simple_model.choices import choose
+from simple_model.trajectory import BY_POINTS
+from skinwave.bodies import BodyKind
+from skinwave.bodies.parts import check_material
+from skinwave.scene.distributions import Distribution, parent_of, with_spreads, without_spreads
+from skinwave.scene.keys import DERIVED, PATH, SECTIONS, as_table, as_text, checked, renamed
+from skinwave.scene.load import Load
+from skinwave.scene.material_file import with_tables
+from skinwave.scene.scene import BODIES, KINDS, Body, Placement, Scene, kind_of, solid_of
+from skinwave.system.plain_text import as_utf_8
+
+LARGEST = 16_000_000  # bytes of a file: some seconds of a path recorded at 40 kHz
+PROSE = 1_000_000  # bytes of it that are no numbers
+PAIRS = re.compile(r"\[\s+(-?\d[\d.e+-]*),\s+(-?\d[\d.e+-]*),\s+\]")  # on lines of their own
+PATHS = "write a Windows path in single quotes, 'C:\\hand.stl', or with /, \"C:/hand.stl\""
+NUMBERS = b"0123456789.,[]+-eE_ \t\r\n"
+DEEP = re.compile(  # keys of many parts, which take squares of their number
+    r"""(?<![\w"'-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){16}"""
+)
+
+
+def read(path: str | Path) -> Scene:
+    """The scene in a TOML file.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read, or is not a scene: what, got, limit, cure in one sentence.
+    """
+    text = content(path)
+    try:
+        scene = from_table(parsed(text, Path(path).parent))
+        if scene.body.file:  # is named from where the scene is
+            place = str((Path(path).parent / scene.body.file).resolve())
+            scene = replace(scene, body=replace(scene.body, file=place))
+        return scene
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def content(path: str | Path) -> str:
+    """The text of a scene file, of a size that is parsed within seconds.
+
+    Raises
+    ------
+    ValueError
+        If it cannot be read, is no UTF-8, too long, or has too many words.
+    """
+    found = reading.content(path, LARGEST)
+    try:
+        if len(found) > PROSE and len(found.translate(None, NUMBERS)) > PROSE:
+            raise ValueError(
+                f"more than {PROSE / 1e6:g} MB of it are no numbers, which no scene has; cut it"
+            )
+        return as_utf_8(found)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def loads(text: str) -> Scene:
+    """The scene in a TOML text; missing keys take the preset's value."""
+    return from_table(parsed(text))
+
+
+def parsed(text: str, folder: Path | None = None) -> dict[str, Any]:
+    """The table of a scene's TOML text, by today's keys; with a folder, with the numbers of tables
+    of moduli that are named from there.
+
+    Raises
+    ------
+    ValueError
+        If it is not valid TOML, or a table cannot be read.
+    """
+    if DEEP.search(text):
+        raise ValueError("a key has more than 16 parts, which none of a scene has; shorten it")
+    try:
+        table = tomllib.loads(text)
+    except ValueError as error:
+        raise ValueError(_not_toml(text, str(error))) from None
+    except RecursionError:
+        raise ValueError("not valid TOML: brackets within brackets beyond all depth") from None
+    _check_texts({key: value for key, value in table.items() if key != "name"})
+    return renamed(with_tables(table, folder) if folder else table)
+
+
+def _not_toml(text: str, error: str) -> str:
+    """What is wrong with a text that the parser refuses, with the line and the cure."""
+    lines = text.splitlines() or [""]
+    place = re.search(r"at line (\d+)", error)
+    k = min(int(place[1]), len(lines)) if place else len(lines)
+    if "Illegal character '\\n'" in error and k > 1:  # found where the next line begins
+        k -= not lines[k - 1].count('"') % 2
+    line = lines[k - 1].strip()
+    if "\\" in line:
+        cure = PATHS
+    elif "twice" in error or "Cannot" in error:
+        cure = "its section or key is there already; leave out one"
+    elif line.count('"') % 2 or line.count("'") % 2:
+        cure = "close the quotes"
+    else:
+        cure = (
+            "write key = value, a text in quotes, a number as 0.5 without its unit, true or false"
+        )
+    return f"not valid TOML: line {k} is {line[:60]}; {cure}"
+
+
+def _check_texts(table: Mapping[str, Any]) -> None:
+    """Refuse texts with control characters, which a path in double quotes gets from a backslash."""
+    for key, value in table.items():
+        for each in value if isinstance(value, list) else [value]:
+            if isinstance(each, dict):
+                _check_texts(each)
+            elif isinstance(each, str) and not each.isprintable():
+                raise ValueError(f"{key} = {each[:60]!r} has a control character; {PATHS}")
+
+
+def from_table(table: dict[str, Any]) -> Scene:
+    """The scene of a table by a scene file's keys; raises a ValueError as `loads` does."""
+    table, spreads = without_spreads(table)
+    sections = {"name": as_text, **dict.fromkeys(SECTIONS, as_table)}
+    preset, table = _preset(table)
+    top = checked("scene", table, sections)
+    parts = {
+        section: checked(f"[{section}]", top.get(section, {}), keys)
+        for section, keys in SECTIONS.items()
+    }
+    body = _body(parts["body"] | parts["placement"], preset)
+    load = _load(parts["load"], parts["focus"])
+    tacton, path = _split(parts["tacton"], PATH)
+    pressure = MovingPressure(
+        tacton=Tacton(**tacton, trajectory=Trajectory(**path)), **parts["focus"]
+    )
+    scene = Scene(
+        name=top.get("name", "scene"), pressure=pressure, body=body, load=load, **parts["probes"]
+    )
+    return with_distributions(scene, spreads) if spreads else scene
+
+
+def _load(values: dict[str, Any], focus: dict[str, Any]) -> Load:
+    load = Load(**values)
+    if focus and not load.of_kind.is_of_device:
+        raise ValueError(
+            f"[focus] is that of a device, which makes no load of kind '{load.kind}'; leave it out"
+        )
+    return load
+
+
+def with_distributions(scene: Scene, spreads: Mapping[str, Distribution]) -> Scene:
+    """The scene with these distributions of its numbers, by dotted key, and no others.
+
+    Raises
+    ------
+    ValueError
+        If it has no such number.
+    """
+    complete = to_table(scene)
+    found = dict(_of_shear(complete, *each) for each in spreads.items())
+    for key in found:
+        if parent_of(complete, key)[0] is None:
+            raise ValueError(f"{key} has a spread, but this scene has no such number; leave it out")
+    return replace(scene, spreads=tuple(sorted(found.items())))
+
+
+def _of_shear(complete: dict[str, Any], key: str, given: Distribution) -> tuple[str, Distribution]:
+    """The distribution of a shear modulus for that of a Young's modulus, at its Poisson's ratio."""
+    path, _, name = key.rpartition(".")
+    shear = f"{path}.shear_modulus_pa"
+    if name != "young_modulus_pa" or (table := parent_of(complete, shear)[0]) is None:
+        return key, given
+    share = 1.0 if given.is_relative else 1 / (2 * (1 + table["poisson"]))
+    return shear, replace(given, width=tuple(share * x for x in given.width))
+
+
+def dumps(scene: Scene) -> str:
+    """The complete scene as TOML; `loads` gives it back."""
+    return PAIRS.sub(r"[\1, \2]", tomli_w.dumps(to_table(scene)))
+
+
+def to_table(scene: Scene) -> dict[str, Any]:
+    """The complete scene by a scene file's keys; `from_table` gives it back."""
+    tacton, path, pressure, body = (
+        scene.tacton,
+        scene.tacton.trajectory,
+        scene.pressure,
+        scene.body,
+    )
+    sources: dict[str, tuple[Any, ...]] = {
+        "tacton": (tacton, path),
+        "focus": (pressure,),
+        "body": (body,),
+        "load": (scene.load,),
+        "placement": (body.placement,),
+        "probes": (scene,),
+    }
+    table: dict[str, Any] = {"name": scene.name}
+    left = _without_meaning(scene)
+    for section, keys in SECTIONS.items():
+        if section in left:
+            continue
+        table[section] = {}
+        for key, field in keys.items():
+            if key in DERIVED or f"{section}.{key}" in left:
+                continue
+            source = next(s for s in sources[section] if hasattr(s, field.name))
+            if section != "tacton" or key not in unused(tacton):
+                table[section][key] = field.write(getattr(source, field.name))
+    if not body.of_kind.discretise:
+        table["body"] = {"kind": "none"}
+        del table["placement"]
+    for key in _keys_of_kinds() - set(body.of_kind.keys):
+        table["body"].pop(key, None)
+    return with_spreads(table, scene.spreads)
+
+
+def _without_meaning(scene: Scene) -> set[str]:
+    """Sections and dotted keys that mean nothing with the scene's kind of load and its base."""
+    load = scene.load.of_kind
+    own = SECTIONS["load"].items()
+    has = {"kind", "gravity", *load.defaults}
+    has |= {"support_motion"} if scene.load.support_motion else set()
+    left = {f"load.{key}" for key, field in own if field.name not in has}
+    left |= set() if load.is_of_device else {"focus"}
+    return left | (set() if scene.body.base_stiffness else {"body.base_stiffness_n_per_m3"})
+
+
+def unused(tacton: Tacton) -> set[str]:
+    """Keys of a Tacton that mean nothing with the others it has."""
+    keys = {key for key in ("rhythm", "signal") if getattr(tacton, key) is None}
+    if tacton.trajectory.shape != "recorded":
+        keys |= {"times_s", "levels", "hold"}
+    return keys if tacton.trajectory.shape in BY_POINTS else keys | {"points_mm"}
+
+
+def _preset(scene: dict[str, Any]) -> tuple[Body | None, dict[str, Any]]:
+    """The body that `preset` of [body] names, and the table without it."""
+    body = scene.get("body")
+    if not isinstance(body, dict):
+        return None, scene
+    named = body.get("preset")
+    if named is None:
+        if (kind := str(body.get("kind"))) in BODIES and kind not in KINDS:
+            raise ValueError(
+                f"body kind '{kind}' is unknown, but there is a preset of that name; write "
+                f'preset = "{kind}" instead'
+            )
+        return None, scene
+    name = choose("body preset", as_text("preset", named), BODIES)
+    return BODIES[name], scene | {"body": {k: v for k, v in body.items() if k != "preset"}}
+
+
+def _body(values: dict[str, Any], preset: Body | None) -> Body:
+    kind = kind_of(values.get("kind", preset.kind if preset else Body.kind))
+    if preset and kind is not preset.of_kind:
+        raise ValueError(
+            f'[body] has kind = "{kind.name}" and a preset of kind = "{preset.kind}"; leave out one'
+        )
+    for key in (_keys_of_kinds() - set(kind.keys)) & values.keys():
+        takers = " or ".join(f'"{each.name}"' for each in KINDS.values() if key in each.keys)
+        raise ValueError(f'[body] {key} is for kind = {takers}, not "{kind.name}"')
+    shape, placement = _split(values, tuple(field.name for field in SECTIONS["placement"].values()))
+    missing = vars(preset) if preset else next(iter(kind.presets.values()), {})
+    if (grammage := shape.pop("grammage", None)) is not None:
+        shape |= _of_grammage(grammage, kind, {**missing, **shape}, "depth" in shape)
+    if preset:
+        placed = {**vars(preset.placement), **placement}
+        return replace(preset, **shape, placement=Placement(**placed))
+    return Body(**{**missing, **shape}, placement=Placement(**placement))
+
+
+def _of_grammage(
+    grammage: float, kind: BodyKind, values: dict[str, Any], thickness_is_given: bool
+) -> dict[str, Any]:
+    """The material of a sheet of so many kg/m2 and of a given thickness, or else its thickness."""
+    if not kind.is_plate:
+        raise ValueError(f'[body] grammage_g_m2 is for a sheet, not "{kind.name}"')
+    if not 0 < grammage < inf:
+        raise ValueError(f"grammage_g_m2 = {1e3 * grammage:g} must be a finite number above 0")
+    check_material(values["material"])
+    solid = solid_of(values["material"])
+    if not thickness_is_given:
+        return {"depth": grammage / solid.density}
+    if not values["depth"] > 0:
+        return {}  # which the body refuses
+    return {"material": replace(solid, density=grammage / values["depth"])}
+
+
+def _keys_of_kinds() -> set[str]:
+    """Keys that only some kinds of body take."""
+    return {key for kind in KINDS.values() for key in kind.keys}
+
+
+def _split(values: dict[str, Any], names: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, Any]]:
+    inside = {name: value for name, value in values.items() if name in names}
+    return {n: v for n, v in values.items() if n not in names}, inside

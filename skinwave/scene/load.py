@@ -1,0 +1,249 @@
+"""How a scene's load acts: as a pressure, as a shear traction, or as the force of a contact.
+
+A Tacton says where and when, by q(x, t) at the surface; a kind of load says what q is, and in which
+direction it acts on a surface of normal n. Beside it there may be gravity, which is static, and a
+support that moves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import hypot, isfinite, pi
+from typing import Any
+
+import numpy as np
+
+from meshes.tetmesh import Floats
+from simple_model import MovingPressure
+from simple_model.choices import choose
+from simple_model.focus import NOMINAL_HEIGHT, ContactSpot
+from skinwave.scene.support_motion import SupportMotion
+from skinwave.system import extensions
+
+ALONG_PATH = "path"
+STRONGEST = 30.0  # m/s2 of gravity: three times that of the earth
+
+
+@dataclass(frozen=True, kw_only=True)
+class Load:
+    """How the Tacton's load acts.
+
+    Parameters
+    ----------
+    kind : the name of one of `LOADS`
+    direction : of a shear traction (x, y) of any length, or "path", along the path of the focus; of
+        a force (x, y, z), z upwards; () for that of its kind
+    force : float, N, of a contact at full drive
+    width : float, metre, standard deviation of a contact's Gaussian traction; 0 for 2 mm
+    gravity : float, m/s2, downwards; it deflects the body before the load begins
+    support_motion : SupportMotion, of all that the body is clamped to or rests on; or None
+
+    Raises
+    ------
+    ValueError
+        If a value is unknown, not finite or out of range, or its kind has none of that name.
+    """
+
+    kind: str = "pressure"
+    direction: str | tuple[float, ...] = ()
+    force: float = 0.0
+    width: float = 0.0
+    gravity: float = 0.0
+    support_motion: SupportMotion | None = None
+
+    def __post_init__(self) -> None:
+        kind = self.of_kind
+        for name in ("direction", "force", "width"):
+            if not getattr(self, name) and name in kind.defaults:
+                object.__setattr__(self, name, kind.defaults[name])
+            elif getattr(self, name) and name not in kind.defaults:
+                raise ValueError(f"a load of kind '{kind.name}' has no {name}; leave it out")
+        if not abs(self.gravity) <= STRONGEST:
+            raise ValueError(
+                f"gravity = {self.gravity} m/s2 must be a number within {STRONGEST:g} of 0"
+            )
+        kind.check(self)
+
+    @property
+    def of_kind(self) -> LoadKind:
+        """The registered record of its kind."""
+        if self.kind not in LOADS:
+            extensions.load()
+        return LOADS[choose("load kind", self.kind, LOADS)]
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is the pressure of the focus and nothing else."""
+        return self == PRESSURE
+
+    @property
+    def is_normal(self) -> bool:
+        """Whether what moves is normal to a flat surface, as a pressure is."""
+        return not self.moving.tractions(np.array([[0.0, 0.0, 1.0]]))[..., :2].any()
+
+    @property
+    def moving(self) -> Load:
+        """The same without gravity."""
+        return replace(self, gravity=0.0)
+
+    @property
+    def words(self) -> str:
+        """Its kind, its direction, gravity and the motion of the support, in a few words."""
+        gravity = f" and gravity of {self.gravity:g} m/s2" if self.gravity else ""
+        moved = f" and {self.support_motion.words}" if self.support_motion else ""
+        return f"{self.of_kind.words(self)}{gravity}{moved}"
+
+    def pressures(self, pressure: MovingPressure) -> tuple[MovingPressure, ...]:
+        """Its components (c,), each a moving scalar load."""
+        return self.of_kind.pressures(self, pressure)
+
+    def tractions(self, normals: Floats) -> Floats:
+        """Traction vectors (c, n, 3) of its components, per unit of each, at points of a surface
+        that faces the device, of unit normals (n, 3).
+        """
+        return self.of_kind.tractions(self, normals)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LoadKind:
+    """Kind of load.
+
+    Parameters
+    ----------
+    name : str, in a scene
+    words : a load in a few words, in sentences
+    defaults : attributes of `Load` that it has beside gravity, and their values if not given
+    check : raises a ValueError, with the reason, for a load that it is not
+    acting : the Tacton's pressure -> the scalar load that moves
+    pressures, tractions : as of `Load`
+    """
+
+    name: str
+    words: Callable[[Load], str]
+    defaults: dict[str, Any]
+    tractions: Callable[[Load, Floats], Floats]
+    check: Callable[[Load], object] = lambda load: None
+    acting: Callable[[Load, MovingPressure], MovingPressure] = lambda load, pressure: pressure
+    pressures: Callable[[Load, MovingPressure], tuple[MovingPressure, ...]] = (
+        lambda load, pressure: (pressure,)
+    )
+
+    @property
+    def is_of_device(self) -> bool:
+        """Whether the device makes it, so that a scene has the focus of one."""
+        return "force" not in self.defaults
+
+
+LOADS: dict[str, LoadKind] = {}
+
+
+def register(kind: LoadKind) -> LoadKind:
+    """Add a kind of load to those that scenes may have.
+
+    Raises
+    ------
+    ValueError
+        If there is one of that name.
+    """
+    extensions.add(LOADS, kind.name, kind, kind.tractions)
+    return kind
+
+
+def _facing(normals: Floats) -> Floats:
+    """Cosines (n, 1) between normals and the direction to the device: area across the beam."""
+    return np.maximum(normals[:, 2:], 0.0)
+
+
+def _pushing(load: Load, normals: Floats) -> Floats:
+    """Radiation pressure, which goes with the square of the cosine of incidence: once for the beam
+    that is spread over a sloping surface, once for the momentum that is reflected along its normal.
+    """
+    return (-normals * _facing(normals) ** 2)[None]
+
+
+def _dragging(load: Load, normals: Floats) -> Floats:
+    """Tangential part of the direction; of the path, of both axes."""
+    along = np.eye(3)[:2] if load.direction == ALONG_PATH else _unit((*load.direction, 0.0))[None]
+    normal = np.einsum("ci,ni->cn", along, normals)[..., None] * normals
+    return (along[:, None] - normal) * _facing(normals)
+
+
+def _of_contact(load: Load, normals: Floats) -> Floats:
+    return (_unit(load.direction) * _facing(normals))[None]
+
+
+def _unit(direction: Any) -> Floats:
+    way = np.array(direction, np.float64)
+    return np.asarray(way / np.linalg.norm(way), np.float64)
+
+
+def _along(load: Load, pressure: MovingPressure) -> tuple[MovingPressure, ...]:
+    if load.direction != ALONG_PATH:
+        return (pressure,)
+    return tuple(replace(pressure, heading=axis) for axis in "xy")
+
+
+def _contact(load: Load, pressure: MovingPressure) -> MovingPressure:
+    """Traction of a contact, whose force is the commanded signal itself."""
+    return replace(
+        pressure, profile=ContactSpot(width=load.width), drive="linear", height=NOMINAL_HEIGHT,
+        depth_of_modulation=1.0, peak_pressure=load.force / (2 * pi * load.width**2),
+    )  # fmt: skip
+
+
+def _check_direction(load: Load, axes: int) -> None:
+    way = load.direction
+    if isinstance(way, str) or len(way) != axes or not (isfinite(sum(way)) and hypot(*way) > 0):
+        raise ValueError(
+            f"direction = {way!r} of a load of kind '{load.kind}' must be {axes} finite numbers, "
+            f"not all 0{', or path' if axes == 2 else ''}"
+        )
+
+
+def _check_shear(load: Load) -> None:
+    if load.direction != ALONG_PATH:
+        _check_direction(load, 2)
+
+
+def _check_contact(load: Load) -> None:
+    if not (isfinite(load.force) and load.force > 0):
+        raise ValueError(
+            f"force = {load.force} N of a load of kind '{load.kind}' must be a finite number above "
+            "0; give force_n"
+        )
+    ContactSpot(width=load.width)
+    _check_direction(load, 3)
+
+
+def _shear_in_words(load: Load) -> str:
+    way = "the path" if load.direction == ALONG_PATH else _shown(load.direction)
+    return f"a shear traction along {way}"
+
+
+def _contact_in_words(load: Load) -> str:
+    return (
+        f"a force of {load.force:g} N along {_shown(load.direction)} over a contact of "
+        f"{1e3 * load.width:g} mm"
+    )
+
+
+def _shown(direction: Any) -> str:
+    return f"({', '.join(f'{x:g}' for x in direction)})"
+
+
+register(LoadKind(name="pressure", words=lambda load: "pressure", defaults={}, tractions=_pushing))
+register(
+    LoadKind(
+        name="shear", words=_shear_in_words, defaults={"direction": (1.0, 0.0)},
+        tractions=_dragging, check=_check_shear, pressures=_along,
+    )
+)  # fmt: skip
+register(
+    LoadKind(
+        name="point_force", words=_contact_in_words,
+        defaults={"direction": (0.0, 0.0, -1.0), "force": 0.0, "width": 2e-3},
+        tractions=_of_contact, check=_check_contact, acting=_contact,
+    )
+)  # fmt: skip
+PRESSURE = Load()

@@ -1,0 +1,38 @@
+"""The 15 Tactons that Lim, Seifi and Park measured (CHI EA '24, section 3.1)."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+from simple_model import MovingPressure, Tacton, Trajectory, published
+from skinwave.scene.scene import BODIES, Body, Scene, with_body
+
+AM_FREQUENCIES = (0.0, 80.0, 140.0, 210.0)  # Hz
+MEASURED_ON = ("paper-sheet", "skin-slab")  # the sheet they had, and what they wished to
+PATHS = ((0.0, 0.0), (0.010, 6.0), (0.020, 12.0), (0.030, 18.0))  # circle diameter m, speed m/s
+
+
+def tactons() -> Iterator[tuple[str, Tacton]]:
+    """Name and Tacton of the 3 PureAM, 3 PureSTM and 9 AM+STM patterns, each 1 s."""
+    for am_frequency in AM_FREQUENCIES:
+        for size, speed in PATHS:
+            parts = [f"am{am_frequency:g}"] if am_frequency else []
+            parts += [f"stm{1e3 * size:g}"] if size else []
+            if parts:
+                path = Trajectory(shape="circle", size=size, speed=speed)
+                yield "-".join(parts), Tacton(am_frequency=am_frequency, trajectory=path)
+
+
+def scenes(name: str, tacton: Tacton, bodies: Mapping[str, Body] | None = None) -> dict[str, Scene]:
+    """One Tacton by both point kernels and on bodies by name, the paper sheet and skin if none are
+    given, which all receive the same load.
+    """
+    bodies = bodies or {key: BODIES[key] for key in MEASURED_ON}
+    scene = Scene(name=name, pressure=MovingPressure(tacton=tacton), body=BODIES["none"])
+    return beside_kernels(scene) | {key: with_body(scene, body) for key, body in bodies.items()}
+
+
+def beside_kernels(scene: Scene) -> dict[str, Scene]:
+    """The scene without its body by model: under the published load, and under its own."""
+    bare = with_body(scene, BODIES["none"])
+    paper = replace(bare, pressure=published(scene.pressure))
+    return {"point-kernel-published": paper, "point-kernel": bare}

@@ -1,0 +1,301 @@
+"""A scene: what is commanded, what it acts on, where it is probed. Physics only, one TOML file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simple_model import MovingPressure, Tacton
+from simple_model.quantities import DISPLACEMENT, STRAIN, Quantity, quantity
+from skinwave.bodies import (
+    BODIES,
+    FLAT,
+    KINDS,
+    Body,
+    Layer,
+    Mounting,
+    Phalanx,
+    Placement,
+    Relief,
+    Sides,
+    body_name,
+    kind_of,
+    solid_of,
+)
+from skinwave.scene.distributions import Distribution
+from skinwave.scene.load import PRESSURE, Load
+from skinwave.system.drawn import drawn
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = [
+    "BODIES", "FLAT", "KINDS", "PROBES", "SAMPLE_RATE", "SURFACE",
+    "Body", "Layer", "Load", "Mounting", "Phalanx", "Placement", "Reading", "Relief", "Scene",
+    "Sides",
+    "body_name", "check_motion", "kind_of", "solid_of", "with_body",
+]  # fmt: skip
+
+SAMPLE_RATE = 10_000.0  # Hz of every response: five times the highest line that matters
+MOST_VALUES = 50_000_000  # of all waveforms of one response, 400 MB
+PROBES = ((0.0, 0.0), (0.005, 0.0), (0.010, 0.0), (0.015, 0.0), (0.020, 0.0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """Name of the quantity that probes read, and the depth in metre of each; () for all at the
+    surface.
+    """
+
+    quantity: str = DISPLACEMENT.name
+    depths: tuple[float, ...] = ()
+
+    @property
+    def asked(self) -> Quantity:
+        """The record of the quantity."""
+        return quantity(self.quantity)
+
+    @property
+    def is_on_surface(self) -> bool:
+        """Whether all probes are at the surface."""
+        return not any(self.depths)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the probes read the normal displacement at the surface."""
+        return self.asked is DISPLACEMENT and self.is_on_surface
+
+    @property
+    def words(self) -> str:
+        """Quantity and depth in a few words."""
+        if self.is_on_surface:
+            return self.asked.words
+        shown = sorted({f"{1e3 * z:g}" for z in self.depths}, key=float)
+        return f"{self.asked.words} at a depth of {', '.join(shown)} mm"
+
+
+SURFACE = Reading()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """One experiment.
+
+    Parameters
+    ----------
+    name : str
+    pressure : MovingPressure, with its Tacton; of a load that no device makes, that of the load
+    body : Body
+    probes : (p, 2) positions in metre, where the surface is watched
+    depth : of the probes in metre below the surface, along its normal; one, or one a probe
+    load : how the pressure acts, and gravity
+    quantity : name of one of `simple_model.quantities.QUANTITIES`, what the probes read
+    spreads : dotted key of a scene file and the distribution of its number about the central value,
+        which is that of the scene; `scene.spreads` has those of presets and of the device, too
+
+    Raises
+    ------
+    ValueError
+        If a probe or the path of the focus is off the body, there is no probe, or the body has no
+        such quantity or depth.
+    """
+
+    name: str = "scene"
+    pressure: MovingPressure
+    body: Body
+    probes: tuple[tuple[float, float], ...] = PROBES
+    depth: float | tuple[float, ...] = 0.0
+    quantity: str = DISPLACEMENT.name
+    load: Load = PRESSURE
+    spreads: tuple[tuple[str, Distribution], ...] = ()
+
+    def __post_init__(self) -> None:
+        acting = self.load.of_kind.acting(self.load, self.pressure)
+        object.__setattr__(self, "pressure", acting)
+        self._check_probes()
+        self._check_load()
+        self._check_reading()
+        if self.body.of_kind.is_bounded:
+            self._check_extent()
+
+    def _check_probes(self) -> None:
+        if not self.probes:
+            raise ValueError("points_mm is empty; give at least one probe")
+        if (values := len(self.probes) * self.tacton.duration * SAMPLE_RATE) > MOST_VALUES:
+            raise ValueError(
+                f"{len(self.probes):,} probes for {self.tacton.duration:g} s at "
+                f"{SAMPLE_RATE:g} Hz are {values:,.0f} values, the limit is {MOST_VALUES:,}; "
+                "give fewer probes or a shorter Tacton"
+            )
+        if isinstance(self.depth, tuple) and len(self.depth) != len(self.probes):
+            raise ValueError(
+                f"depth_mm has {len(self.depth)} values for {len(self.probes)} probes; give one, "
+                "or one a probe"
+            )
+        for z in self.depths:
+            if not (np.isfinite(z) and z >= 0):
+                raise ValueError(
+                    f"depth_mm = {1e3 * z:g} of a probe must be a finite number, 0 or above"
+                )
+
+    def _check_reading(self) -> None:
+        asked, body = self.reading.asked, self.body
+        if not asked.of_body:
+            raise ValueError(
+                f"quantity '{self.quantity}' is that of the point kernel, which needs none; leave "
+                "it out"
+            )
+        if body.of_kind.is_plate:
+            _check_sheet(body, self.reading)
+        if (deepest := max(self.depths)) >= body.depth and body.of_kind.is_layer:
+            raise ValueError(
+                f"depth_mm = {1e3 * deepest:g} of a probe is not within the body, which is "
+                f"{1e3 * body.depth:g} mm thick; give less than that"
+            )
+
+    def _check_load(self) -> None:
+        _ = self.loads  # a path may have no direction
+        if self.body.of_kind.is_plate and not self.load.is_normal:
+            raise ValueError(
+                f"a {self.body.kind} takes what is normal to it, not {self.load.words}: its "
+                "elements are of another thickness, with another moment about its middle; take a "
+                "slab"
+            )
+        held = self.body.is_held and not self.body.is_on_half_space  # which sags without bound
+        if self.load.gravity and self.body.of_kind.discretise and not held:
+            raise ValueError(
+                "an unconstrained body falls under gravity; clamp its base or its sides, or leave "
+                "gravity out"
+            )
+        if self.load.support_motion:
+            _check_moved(self.body, self.load.support_motion.words)
+
+    def _check_extent(self) -> None:
+        half = np.array([self.body.width, self.body.height]) / 2
+        for x, y in self.probes:
+            if abs(x) > half[0] or abs(y) > half[1]:
+                raise ValueError(
+                    f"probe ({1e3 * x:g}, {1e3 * y:g}) mm is off the body, which ends at "
+                    f"{1e3 * half[0]:g} and {1e3 * half[1]:g} mm; move it inside"
+                )
+        path = self.tacton.trajectory.outline
+        if (reach := np.abs(path).max(axis=0) - half).max() > 1e-12:
+            axis = int(np.argmax(reach))
+            raise ValueError(
+                f"the focus path reaches {1e3 * (reach + half)[axis]:g} mm along {'xy'[axis]}, off "
+                f"the body, which ends at {1e3 * half[axis]:g} mm; shrink it (of a file: skinwave "
+                "convert --resize) or widen the body"
+            )
+
+    @property
+    def tacton(self) -> Tacton:
+        """The Tacton of the pressure."""
+        return self.pressure.tacton
+
+    @property
+    def loads(self) -> tuple[MovingPressure, ...]:
+        """Components (c,) of the load, each a moving scalar in the direction of its kind."""
+        return self.load.pressures(self.pressure)
+
+    @property
+    def probe_points(self) -> NDArray[np.float64]:
+        """Probes as an array (p, 2) in metre."""
+        return np.array(self.probes)
+
+    @property
+    def depths(self) -> tuple[float, ...]:
+        """Depth in metre of each probe."""
+        one = not isinstance(self.depth, tuple)
+        return (self.depth,) * len(self.probes) if one else self.depth  # type: ignore[return-value]
+
+    @property
+    def reading(self) -> Reading:
+        """Quantity of the probes, and their depths."""
+        return Reading(quantity=self.quantity, depths=self.depths if any(self.depths) else ())
+
+    def plot(self, *, ax: Axes | None = None) -> Axes:
+        """Draw body, path, foci at the start and probes from above, and return the axes."""
+        return drawn("scene_plot", "draw", self, ax)
+
+    def __repr__(self) -> str:
+        return drawn("scene_plot", "line", self)
+
+    def _repr_html_(self) -> str:
+        return drawn("scene_plot", "page", self)
+
+
+def _check_moved(body: Body, motion: str) -> None:
+    """Refuse the motion of a support that a body has not, or that sides at rest contradict."""
+    if not body.of_kind.discretise or body.of_kind.is_plate:
+        raise ValueError(f"{motion} is for a solid, not a body of kind '{body.kind}'; take a slab")
+    if not body.is_held:
+        raise ValueError(
+            f"{motion} moves what the body is clamped to, and this one is unconstrained; clamp its "
+            "base, or leave support_motion out"
+        )
+    if "absorbing" in (body.base, *body.conditions):
+        raise ValueError(
+            f"{motion} would move the tissue beyond absorbing sides, too, which is taken to be at "
+            'rest; take sides = "free" or "clamped", which move along'
+        )
+
+
+def _check_sheet(body: Body, reading: Reading) -> None:
+    """Refuse what a sheet has not."""
+    asked = reading.asked
+    if (deepest := max(reading.depths, default=0.0)) > body.depth:
+        raise ValueError(
+            f"depth_mm = {1e3 * deepest:g} of a probe is not within the {body.kind}, which is "
+            f"{1e3 * body.depth:g} mm thick; give that or less"
+        )
+    if asked.is_normal:
+        return
+    if body.mounting.is_curled or body.placement.is_tilted:
+        raise ValueError(
+            f"{asked.words} is that of a flat {body.kind} across the beam; lay it flat, or ask for "
+            "displacement, velocity or acceleration"
+        )
+    if asked.field == STRAIN and body.solid.orthotropy is not None:
+        raise ValueError(
+            f"{asked.words} of an orthotropic {body.kind} needs its moduli across its thickness, "
+            "which it has not; ask for its displacement, or take an isotropic material"
+        )
+
+
+def check_motion(scene: Scene, command: str) -> None:
+    """Refuse a scene for a command that is about the displacement of the surface under a pressure.
+
+    Raises
+    ------
+    ValueError
+        If its probes read something else, or its load is another.
+    """
+    check_load(scene, command)
+    if not scene.reading.is_plain:
+        raise ValueError(
+            f"{command} is about the displacement of the surface, not {scene.reading.words}; leave "
+            "out depth_mm and quantity, or use skinwave run, compare, report, film or sweep"
+        )
+
+
+def check_load(scene: Scene, command: str) -> None:
+    """Refuse a scene for a command that is about the pressure of a focus.
+
+    Raises
+    ------
+    ValueError
+        If its load is another, or it has gravity.
+    """
+    if not scene.load.is_plain:
+        raise ValueError(
+            f"{command} is about the pressure of a focus, not {scene.load.words}; leave out [load],"
+            " or use skinwave run or sweep"
+        )
+
+
+def with_body(scene: Scene, body: Body, **pressure: Any) -> Scene:
+    """The same Tacton and probes on another body, with changes to the pressure if any."""
+    return replace(scene, body=body, pressure=replace(scene.pressure, **pressure))

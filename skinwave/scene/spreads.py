@@ -1,0 +1,203 @@
+"""Uncertain numbers of a scene, and where the spread of each comes from.
+
+A scene file may give any number a spread of its own. Beside these, a preset of a material carries
+the spread that its sources leave, as a factor on all its moduli and one on all its losses, and the
+pressure of a device is known to a factor of 2 unless the file says otherwise (`spread = 0` for a
+measured one).
+
+    preset                   moduli               losses
+    palm, palm-stiff,        factor 2 [1]         factor 3 [2]
+    palm-zener
+    forearm                  24 % [3]             27 % [3]
+    layers of skin           factor 3.2 [4]       factor 3 [2]
+    paper                    factor 2 [5]         factor 1.6 [5]
+    paper-grain              factor 1.6 [5]       factor 1.6 [5]
+    ecoflex                  none known: its constants are second-hand
+    bone                     none: ten times its modulus moves a fingertip by 2 %
+
+[1] No shear modulus of a palm in vivo is published: surface waves at which a moving focus is
+    perceived as strongest run at 5 to 8 m/s (Frier et al., EuroHaptics 2018), those of fingers
+    reach 7 m/s (Manfredi et al., PLoS ONE 7:e31203 (2012)), those of forearms 3.25 m/s at 200 Hz
+    (Zhang et al. 2011): c^2 spreads over a factor of 4, 2 either way of the preset.
+[2] Decay lengths and loss factors of skin at 200 Hz differ by a factor of 5 to 9 between sources
+    (Potts et al. 1983; Manfredi et al. 2012; Zhang et al. 2011): 3 either way at most.
+[3] Zhang et al., Med Eng Phys 33:31 (2011): 7.86 +- 1.86 kPa and 5.03 +- 0.60 Pa s, whose ratio,
+    the loss, has 27 % if the two errors are independent.
+[4] Published moduli of a layer differ by a factor of 6 to 18 between methods and people, and
+    waves on hands by 1.8 in speed, 3.2 in its square, from fitted layers (bench/layered_skin.py).
+[5] Office paper: 5 to 8 GPa along and 2 to 4 GPa across the machine direction, about the 4 GPa of
+    "paper" and, each, the 5.5 and 2.5 GPa of "paper-grain"; loss factor 0.02 to 0.05.
+
+Pressure: 160 dB at 200 mm are 59 Pa or, if that level is of the peak, 28 Pa; models of the array
+give 59 to 87 Pa (Liebler et al., J Acoust Soc Am 148:1713 (2020); HandyBeam; AcousTools).
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from skinwave.bodies.parts import solid_of
+from skinwave.scene.distributions import Distribution, known_to, parent_of
+from skinwave.scene.file import from_table, to_table
+from skinwave.scene.keys import LOSSES, MODULI, SCALES
+from skinwave.scene.scene import Body, Scene
+
+PRESSURE, FACTOR = "focus.peak_pressure_pa", 2.0
+REGION = "regions."  # of a key, before the name of a region
+PARTS = {"body": "material", "focus": "device", "tacton": "device"}  # of keys by section
+
+
+@dataclass(frozen=True, kw_only=True)
+class MaterialSpread:
+    """Distributions about 1 of the factors on all moduli and on all losses of a material."""
+
+    moduli: Distribution
+    losses: Distribution
+
+
+_PALM = MaterialSpread(moduli=known_to(2.0), losses=known_to(3.0))
+_LAYER = MaterialSpread(moduli=known_to(3.2), losses=known_to(3.0))
+_FOREARM = ("forearm-epidermis", "forearm-dermis", "forearm-hypodermis", "forearm-muscle")
+OF_PRESETS: Mapping[str, MaterialSpread] = {
+    **dict.fromkeys(("palm", "palm-stiff", "palm-zener"), _PALM),
+    "forearm": MaterialSpread(
+        moduli=Distribution(width=(1.86 / 7.86,)), losses=Distribution(width=(0.27,))
+    ),
+    **dict.fromkeys(("epidermis", "dermis", "fat", "muscle"), _LAYER),
+    **dict.fromkeys(_FOREARM, _LAYER),
+    "paper": MaterialSpread(moduli=known_to(2.0), losses=known_to(1.6)),
+    "paper-grain": MaterialSpread(moduli=known_to(1.6), losses=known_to(1.6)),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spread:
+    """An uncertain number of a scene: its dotted `key`, the `value` about which it is distributed,
+    in the unit of the key, and whether the scene's file says so or a preset `implied` it.
+    """
+
+    key: str
+    value: float
+    distribution: Distribution
+    implied: bool = False
+
+    @property
+    def part(self) -> str:
+        """The part of an uncertainty that it belongs to: material, device, or placement."""
+        return PARTS.get(self.key.partition(".")[0], "placement")
+
+    @property
+    def words(self) -> str:
+        """Its key and its distribution."""
+        return f"{self.key} = {self.value:g}, {self.distribution.words}"
+
+
+def spreads_of(scene: Scene) -> tuple[Spread, ...]:
+    """Uncertain numbers of a scene: those of its file, of its presets, and the device's pressure;
+    none that is known exactly.
+    """
+    table = to_table(replace(scene, spreads=())) if scene.spreads else {}
+    found = []
+    for key, given in scene.spreads:
+        parent, last = parent_of(table, key)
+        if parent is not None:
+            found.append(Spread(key=key, value=float(parent[last]), distribution=given))
+    device = scene.load.of_kind.is_of_device
+    if device and PRESSURE not in dict(scene.spreads) and scene.pressure.peak_pressure > 0:
+        found.append(
+            Spread(key=PRESSURE, value=scene.pressure.peak_pressure,
+                   distribution=known_to(FACTOR), implied=True)
+        )  # fmt: skip
+    if scene.body.of_kind.discretise:
+        found += _of_materials(scene)
+    return tuple(each for each in found if not each.distribution.is_exact)
+
+
+def _of_materials(scene: Scene) -> Iterator[Spread]:
+    body = scene.body
+    named = {"body.material": body.material}
+    named |= {f"body.layers.{k}.material": layer.material for k, layer in enumerate(body.layers)}
+    named |= {f"body.regions.{name}": material for name, material in body.regions}
+    for key, material in named.items():
+        if isinstance(material, str) and (known := OF_PRESETS.get(material)):
+            for scale, given in ((MODULI, known.moduli), (LOSSES, known.losses)):
+                yield Spread(key=f"{key}.{scale}", value=1.0, distribution=given, implied=True)
+
+
+def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
+    """The scene with other numbers, by the dotted keys of `spreads_of`, and no spread.
+
+    Raises
+    ------
+    ValueError
+        If it has no such number, or a number makes no scene.
+    """
+    scaled = {key: x for key, x in values.items() if key.rpartition(".")[2] in SCALES}
+    plain = {key: x for key, x in values.items() if key not in scaled}
+    found = replace(scene, spreads=())
+    if plain.keys() == {PRESSURE}:
+        pressure = replace(scene.pressure, peak_pressure=plain[PRESSURE])
+        found = replace(found, pressure=pressure)
+    elif plain:
+        table = to_table(found)
+        for key, x in plain.items():
+            parent, last = parent_of(table, key)
+            if parent is None:
+                raise ValueError(f"there is no number {key} in this scene; leave it out")
+            parent[last] = x
+        found = from_table(table)
+    return _scaled(found, scaled)
+
+
+def scaled(scene: Scene, scales: Mapping[str, Any]) -> Scene:
+    """The scene with factors on all moduli or all losses of materials, by keys such as
+    "body.material.modulus_scale".
+
+    Raises
+    ------
+    ValueError
+        If the scene has no such material, or the factor is no number above 0.
+    """
+    for key, factor in scales.items():
+        parent, last = parent_of(to_table(scene), key.rpartition(".")[0])
+        if parent is None or not isinstance(parent[last], str | dict):
+            raise ValueError(f"there is no material for {key} in this scene; leave it out")
+        if isinstance(factor, bool) or not isinstance(factor, int | float) or not factor > 0:
+            raise ValueError(f"{key} = {factor!r} must be a number above 0")
+    return _scaled(scene, scales)
+
+
+def _scaled(scene: Scene, scales: Mapping[str, float]) -> Scene:
+    """The scene with all moduli, or all losses, of materials times factors, those of a material at
+    once.
+    """
+    places: dict[str, dict[str, float]] = {}
+    for key, factor in scales.items():
+        place, _, scale = key.removeprefix("body.").rpartition(".")
+        places.setdefault(place, {})[SCALES[scale]] = float(factor)
+    body = scene.body
+    for place, factors in places.items():
+        body = _with_factors(body, place, factors)
+    return replace(scene, body=body)
+
+
+def _with_factors(body: Body, place: str, factors: dict[str, float]) -> Body:
+    """The body with another material, at the place of a key."""
+    if place == "material":
+        return replace(body, material=solid_of(body.material).scaled(**factors))
+    if place.startswith(REGION):
+        return _with_region(body, place, factors)
+    k = int(place.split(".")[1])
+    material = solid_of(body.layers[k].material).scaled(**factors)
+    layers = (*body.layers[:k], replace(body.layers[k], material=material), *body.layers[k + 1 :])
+    return replace(body, layers=layers)
+
+
+def _with_region(body: Body, place: str, factors: dict[str, float]) -> Body:
+    """The body with another material in the region of a key."""
+    name = place.removeprefix(REGION)
+    regions = tuple(
+        (each, solid_of(material).scaled(**factors) if each == name else material)
+        for each, material in body.regions
+    )
+    return replace(body, regions=regions)

@@ -1,0 +1,351 @@
+"""A scene's responses by all models that pictures show side by side, in a folder.
+
+scene.toml  plan.json  trust.json  lines.csv
+COLUMN/scene.toml  responses.npz  lines.csv  effort.json  record.json  view.npz  map.npz
+"""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from meshes import reading
+from simple_model import Response, published
+from simple_model.choices import choose
+from simple_model.quantities import DISPLACEMENT, QUANTITIES
+from skinwave.bodies.sizes import default_size
+from skinwave.models import named
+from skinwave.models.advice import takes
+from skinwave.models.plate_modes import FROM_REST
+from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
+from skinwave.models.speeds import repeated, shown_part
+from skinwave.planning.costs import LARGER
+from skinwave.planning.plan import plan
+from skinwave.planning.records import Plan
+from skinwave.planning.simulate import compute, follow, has_elements, required_plan
+from skinwave.results import record, surface
+from skinwave.results.files import write_lines, write_run
+from skinwave.results.motion import Waves, probe_response, waves
+from skinwave.results.quantity_map import QuantityMap, map_of_motion
+from skinwave.results.quantity_map import load as load_map
+from skinwave.results.quantity_map import save as save_map
+from skinwave.results.run import Run
+from skinwave.results.surface import (
+    SurfaceMap,
+    body_map,
+    element_map,
+    grid,
+    has_wavenumber_integral,
+)
+from skinwave.results.views import (
+    View,
+    body_view,
+    fastest_line,
+    kernel_view,
+    layer_view,
+    load,
+    plate_view,
+    save,
+    shaded,
+)
+from skinwave.scene import paper15
+from skinwave.scene.file import dumps, read
+from skinwave.scene.scene import BODIES, Scene, body_name, check_load, with_body
+from skinwave.studies import description
+from skinwave.system.document import worst_warnings
+from skinwave.system.effort import Progress
+from skinwave.system.json_kinds import EFFORT, PLAN, TRUST, effort_of, fitting
+
+KERNEL_REACH = np.array([BODIES["skin-slab"].width, BODIES["skin-slab"].height]) / 2
+PLANNED = 0.05  # tolerance of the plan that stands on the page
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Album:
+    """Contents of a folder: runs; views by body, where there are any; the plan, how far its
+    response agrees with the pictures, and the command that made it, where these were saved; by
+    body `surfaces`, maps of the displacement of the surface, or `maps` of another quantity.
+    """
+
+    title: str
+    scene: Scene
+    runs: Sequence[Run]
+    views: Mapping[str, View]
+    planned: Mapping[str, Any] | None
+    trust: Mapping[str, Any] | None
+    maps: Mapping[str, QuantityMap] = field(default_factory=dict)
+    surfaces: Mapping[str, SurfaceMap] = field(default_factory=dict)
+
+
+def shown_scenes(scene: Scene, beside: Sequence[str] = ()) -> dict[str, Scene]:
+    """The scene by `Run.column`: by both point kernels and on its own body or, without one, on
+    those of the paper sheet and the skin slab that its path and probes fit on. All but the
+    published kernel receive the same load.
+
+    Parameters
+    ----------
+    beside : names of preset bodies that it is put on, too
+
+    Raises
+    ------
+    ValueError
+        If a body beside it is unknown, or the path or probes do not fit on it.
+    """
+    check_load(scene, "a film or report")
+    bodies: dict[str, Scene] = {}
+    if scene.body.of_kind.discretise:
+        bodies[body_name(scene.body)] = scene
+    for name in beside:
+        choose("body", name, [n for n in BODIES if n != "none"])
+        other = with_body(scene, BODIES[name])
+        if bodies.setdefault(name, other) != other:
+            raise ValueError(f"the scene's own body is shown as '{name}'; leave it out of --beside")
+    if not bodies:
+        bodies = {n: on for n in paper15.MEASURED_ON if (on := _fitting(scene, n))}
+    return paper15.beside_kernels(scene) | bodies
+
+
+def _fitting(scene: Scene, name: str) -> Scene | None:
+    """The scene on a preset body; None if its path or probes do not fit on that."""
+    try:
+        return with_body(scene, BODIES[name])
+    except ValueError:
+        return None
+
+
+def make(
+    folder: Path,
+    scene: Scene,
+    progress: Progress,
+    *,
+    h: float | None = None,
+    solver: str = "auto",
+    frames: int | None = None,
+    beside: Sequence[str] = (),
+    command: str = "",
+    cases: Sequence[Mapping[str, Any]] = (),
+) -> list[str]:
+    """Compute a scene's response by every model and fill a folder with it; the warnings of all.
+
+    Parameters
+    ----------
+    beside : names of preset bodies that are shown, too
+    cases : results of verification cases on this installation, as `verify.suite.quick_cases`
+        returns them
+
+    Raises
+    ------
+    ValueError
+        If a model refuses the scene.
+    """
+    shown = shown_scenes(scene, beside)
+    (folder / "scene.toml").write_text(dumps(scene), encoding="utf-8")
+    plans = plans_of(shown, progress, h=h, solver=solver)
+    runs, misfit = [], np.nan
+    for view, run in answers(scene, shown, plans, progress, h=h, solver=solver, frames=frames):
+        also = None if view is None else partial(keep_view, view)
+        write_run(folder / run.column, run, by="plan", h=h, also=also)
+        runs.append(run)
+        if run.scene == scene and view and view.moved:
+            misfit = _misfit(run, view.moved)
+    write_lines(folder / "lines.csv", runs)
+    own = next((plans[column] for column in plans if shown[column] == scene), None)
+    _plan(folder, own or plan(scene, PLANNED), misfit, cases, command)
+    return worst_warnings((run.body, run.response.effort) for run in runs)
+
+
+def keep_view(view: View, folder: Path) -> None:
+    """A view in a file and, of a body, the map of what its probes read."""
+    save(folder / "view.npz", view)
+    scene = view.scene
+    if not scene.reading.is_plain and view.moved is not None:
+        save_map(folder / "map.npz", map_of_motion(scene, view.moved.driven))
+    elif scene.reading.is_plain and view.unit == "m":
+        x, y = grid(scene)
+        moved = None if has_wavenumber_integral(scene) else view.moved
+        found = element_map(scene, moved.driven, x, y) if moved else body_map(scene, x, y)
+        surface.save(folder / "map.npz", found)
+
+
+def plans_of(
+    shown: Mapping[str, Scene], progress: Progress, *, h: float | None, solver: str
+) -> dict[str, Plan]:
+    """Plan of each scene with a body, by column."""
+    return {
+        column: required_plan(its, "auto", PLANNED, progress, h=h, solver=solver)
+        for column, its in shown.items() if its.body.of_kind.discretise
+    }  # fmt: skip
+
+
+def answers(
+    scene: Scene,
+    shown: Mapping[str, Scene],
+    plans: Mapping[str, Plan],
+    progress: Progress,
+    *,
+    h: float | None = None,
+    solver: str = "auto",
+    frames: int | None = None,
+) -> Iterator[tuple[View | None, Run]]:
+    """The runs of `shown_scenes` by `plans_of` them, one at a time, each with its view; there is
+    none of the published kernel, whose load is another one. Raises what `make` does.
+
+    Views of bodies are by finite elements that are larger than those of responses, or by the modes
+    of a plate.
+    """
+    moved = {
+        body: _moved(its, body, progress, h, solver)
+        for body, its in shown.items()
+        if has_elements(its, h) and not _is_plate(its, h)
+    }
+    tones = max(repeated(scene.tacton).values(), default=0.0)
+    fastest = max(map(fastest_line, moved.values()), default=tones)
+    part = shown_part(scene.pressure, fastest, frames)  # the same for all, side by side
+    for column, its in shown.items():
+        progress(f"response of {column}", 0.0)
+        if column not in plans:
+            run = Run(tacton=scene.name, body="none", scene=its, response=compute(its, column))
+            yield kernel_view(its, KERNEL_REACH, part) if column == SAME_LOAD.name else None, run
+            continue
+        response = follow(its, plans[column], PLANNED, h=h, solver=solver)
+        run = Run(tacton=scene.name, body=column, scene=its, response=response)
+        progress(f"pictures of {column}", 0.0)
+        if column in moved:
+            yield body_view(its, column, moved[column], part), run
+        else:
+            seen = plate_view(run, part) if _is_plate(its, h) else None
+            yield seen or layer_view(run, KERNEL_REACH, part), run
+
+
+def _is_plate(scene: Scene, h: float | None) -> bool:
+    """Whether pictures are by the modes of a plate: of its displacement, unless the size of
+    elements is asked for.
+    """
+    return h is None and scene.reading.is_plain and takes(FROM_REST, scene)
+
+
+def coloured(found: Sequence[tuple[View, Scene]]) -> tuple[list[View], list[str]]:
+    """Views by the quantity that their scenes' probes read, and what is left out: of another one
+    than the displacement of the surface the point kernel, which has none.
+    """
+    if all(scene.reading.asked is DISPLACEMENT for _, scene in found):
+        return [view for view, _ in found], []
+    bodies = [(view, scene) for view, scene in found if len(view.tets)]
+    if not bodies:
+        raise ValueError(f"{description.without_kernel(found[0][1])}; give the scene a body")
+    said = [description.without_kernel(scene) for view, scene in found if not len(view.tets)]
+    return [shaded(view, scene) for view, scene in bodies], said
+
+
+def _moved(scene: Scene, body: str, progress: Progress, h: float | None, solver: str) -> Waves:
+    def named(phase: str, fraction: float) -> None:
+        progress(f"{body}: {phase}", fraction)
+
+    size = h or LARGER * default_size(scene.body)
+    return waves(scene, progress=named, h=size, solver=solver)
+
+
+def _misfit(run: Run, moved: Waves) -> float:
+    """How far the motion in pictures is from the response, over all probes, relative."""
+    values = run.response.values
+    away = probe_response(run.scene, moved).values - values
+    return float(np.linalg.norm(away)) / (float(np.linalg.norm(values)) or 1.0)
+
+
+def _plan(
+    folder: Path, required: Plan, misfit: float, cases: Sequence[Mapping[str, Any]], command: str
+) -> None:
+    """Requirements of the scene, and how far the motion in pictures is from the response."""
+    table = asdict(replace(required, prepared=None)) | {"tolerance": PLANNED}
+    (folder / "plan.json").write_text(json.dumps(table, indent=1), encoding="utf-8")
+    trust: dict[str, Any] = {"command": command, "model": required.model}
+    if np.isfinite(misfit):
+        trust["misfit"] = misfit
+    trust["cases"] = list(cases)
+    (folder / "trust.json").write_text(json.dumps(trust, indent=1), encoding="utf-8")
+
+
+def open_album(folder: Path) -> Album:
+    """Results in a folder that `run`, `compare` or `report` wrote; no model is run.
+
+    Raises
+    ------
+    ValueError
+        If there is no result in it.
+    """
+    scenes = (path.parent for path in folder.rglob("scene.toml"))
+    found = [path for path in map(record.responses, scenes) if path]
+    runs = [_run(path) for path in sorted(found, key=_order)]
+    if not runs:
+        missing = f"{folder} holds no {record.RESPONSES[0]}"
+        raise ValueError(f"{missing}; give a scene file or a result folder")
+    views = [_view(path) for path in sorted(folder.glob("*/view.npz"), key=_order)]
+    own, scenes_of = folder / "scene.toml", {run.column: run.scene for run in runs}
+    kept = {path.parent.name: path for path in sorted(folder.glob("*/map.npz"), key=_order)}
+    plain = {name for name in scenes_of if scenes_of[name].reading.is_plain}
+    others = {*scenes_of} - plain
+    scene = read(own) if own.exists() else runs[-1].scene
+    return Album(
+        title=scene.name if own.exists() else folder.resolve().name, scene=scene, runs=runs,
+        views={view.column: view for view in views}, planned=_json(folder / "plan.json", PLAN),
+        trust=_json(folder / "trust.json", TRUST),
+        maps={name: load_map(kept[name], scenes_of[name]) for name in kept if name in others},
+        surfaces={name: surface.load(kept[name]) for name in kept if name in plain},
+    )  # fmt: skip
+
+
+def _order(path: Path) -> tuple[str, int, str]:
+    """By Tacton, then the point kernels, then in the order in which bodies are named everywhere."""
+    column, known = path.parent.name, [PUBLISHED.name, SAME_LOAD.name, *BODIES]
+    place = known.index(column) if column in known else len(known)
+    return str(path.parent.parent), place, column
+
+
+def _view(path: Path) -> View:
+    view = load(path)
+    return replace(view, model=_kernel_of(path, view.scene, view.model))
+
+
+def _kernel_of(path: Path, scene: Scene, model: str) -> str:
+    """The model by which a file was written: the folder `none` of releases up to 0.2 holds the
+    point kernel under the published load, by the name that now says the scene's own.
+    """
+    old = path.parent.name == "none" and model == SAME_LOAD.name
+    if old and scene.pressure == published(scene.pressure):
+        return PUBLISHED.name
+    return model
+
+
+def _run(path: Path) -> Run:
+    scene = read(path.parent / "scene.toml")
+    arrays = reading.arrays(path)
+    effort = _json(path.parent / "effort.json", EFFORT) or {}
+    expected = (_json(path.parent / record.FILE, {}) or {}).get("expected_error")
+    try:
+        if any(array.dtype.kind not in "fiu" for array in arrays.values()):
+            raise ValueError("it has arrays of other things than numbers")
+        name = next(n for n in arrays if n not in ("t", "probes", *QUANTITIES))
+        model = _kernel_of(path, scene, name)
+        response = Response(
+            model=model, times=arrays["t"], probes=arrays["probes"], values=arrays[name],
+            quantity=named(model).quantity or scene.quantity,
+            effort=effort_of(effort, "effort.json"),
+            expected_error=np.nan if expected is None else fitting(expected, float, "the error"),
+        )  # fmt: skip
+        if len(response.times) < 2 or not len(response.probes) or response.probes.shape[1] != 2:
+            raise ValueError("it has no probe in a plane, or less than two samples")
+    except (ValueError, KeyError, TypeError, StopIteration) as error:
+        raise ValueError(f"{path} is no result ({error}); run its scene again") from None
+    return Run(tacton=scene.name, body=body_name(scene.body), scene=scene, response=response)
+
+
+def _json(path: Path, pattern: dict[str, Any]) -> dict[str, Any] | None:
+    """Contents of a file, if there is one, as `fitting` takes it."""
+    if not path.exists():
+        return None
+    found: dict[str, Any] = fitting(reading.parsed(path), pattern, str(path))
+    return found

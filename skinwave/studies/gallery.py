@@ -1,0 +1,232 @@
+"""Every picture of an album, drawn once: as files, and as parts of a page."""
+
+import io
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from PIL import Image as Pillow
+from PIL import features
+
+from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
+from skinwave.report import maps, render
+from skinwave.report.figures import drawn, label, tacton_figure
+from skinwave.report.films import film, lasts, seam
+from skinwave.report.levels import levels_figure, strongest_probe
+from skinwave.report.renderer import renderer
+from skinwave.report.styles import Style
+from skinwave.report.turntable import turntable
+from skinwave.results.run import Run
+from skinwave.results.views import View
+from skinwave.studies.album import Album
+from skinwave.system import document, numbers
+from skinwave.system.effort import Progress
+
+FILM_PANEL = (352, 304)  # pixels of a model in the film of a page
+QUALITY, FILM_QUALITY = 88, 60  # of pictures inside a page
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gallery:
+    """Where pictures go, and how: `folder`, `style`, `formats` of vector figures beside PNG."""
+
+    folder: Path
+    style: Style
+    formats: Sequence[str] = ("png",)
+
+    def figure(self, name: str, figure: Figure, caption: str) -> str:
+        """A figure as files, and as a part of the page."""
+        for ending in {"png", *self.formats}:
+            path = self.folder / f"{name}.{ending}"
+            path.write_bytes(drawn(figure, ending, self.style.dpi))
+        with Pillow.open(self.folder / f"{name}.png") as image:
+            return _part(np.asarray(image.convert("RGB")), caption, name)
+
+    def image(self, name: str, image: render.Image, caption: str) -> str:
+        """A view in three dimensions as a PNG, and as a part of the page."""
+        Pillow.fromarray(image).save(self.folder / f"{name}.png", optimize=True)
+        return _part(image, caption, name)
+
+
+def pictures(album: Album, gallery: Gallery, progress: Progress) -> list[str]:
+    """Parts of a page that show an album's views, and why any of them is missing."""
+    views = list(album.views.values())
+    if not views:
+        return [document.paragraph(NO_VIEWS)]
+    said = f"Pictures in three dimensions and the film are left out: {renderer().said}."
+    own = _own(album, views)
+    frame = int(np.abs(own.pushed).max(axis=1).argmax())
+    parts: list[str] = [document.paragraph(said)]
+    if renderer().found:
+        parts = _spatial(own, frame, views, gallery, progress)
+    parts.append(_turnable(own, frame))
+    for name, draw, caption in flat(views, gallery.style):
+        progress(f"draw {name}", 0.0)
+        parts.append(gallery.figure(name, draw(), caption))
+    return parts
+
+
+def _spatial(
+    own: View, frame: int, views: Sequence[View], gallery: Gallery, progress: Progress
+) -> list[str]:
+    """Pictures in three dimensions at a frame, and the film."""
+    style = gallery.style
+    parts: list[str] = []
+    progress("draw side by side", 0.0)
+    beside = render.picture(views, style, frame)
+    parts.append(gallery.image("side-by-side", beside, f"{_drawn(views)} {MARKS} {COMPARED}"))
+    path, count = gallery.folder / "film.gif", len(own.times)
+    film(path, views, style, progress, panel=FILM_PANEL)
+    slower = numbers.significant(lasts(count) / own.period, 2)
+    parts.append(
+        _film_part(path, f"Film: {seam(own)}. {count} frames, {slower} times more slowly.")
+    )
+    if len(own.tets):
+        progress("draw cut open", 0.0)
+        cut = render.picture([own], style, _behind(own), camera="front", cut=True)
+        section = f"{label(own.column)} cut open along y = 0, the section below the black line"
+        caption = f"{section}: {render.shown_scale(own)}. {MARKS}"
+        parts.append(gallery.image("cut-open", cut, caption))
+    progress("draw from above", 0.0)
+    above = render.picture(views, style, frame, camera="top")
+    parts.append(gallery.image("from-above", above, f"The same from above. {COMPARED}"))
+    return parts
+
+
+def _turnable(own: View, frame: int) -> str:
+    """A view to turn, as a part of the page."""
+    caption = f"{label(own.column)}, to turn with the mouse, a finger or the arrow keys. {TURNED}"
+    return document.inner_page(turntable(own, frame), caption)
+
+
+def flat(views: Sequence[View], style: Style) -> Iterable[tuple[str, Callable[[], Figure], str]]:
+    """Name, how it is drawn and caption of every map."""
+    bodies = [view for view in views if view.unit == "m"]
+    kernel = next((view for view in views if view.column == SAME_LOAD.name), None)
+    yield "rms", lambda: maps.rms_figure(views, style), RMS
+    if kernel and bodies:
+        yield "difference", lambda: maps.difference_figure(kernel, bodies, style), DIFFERENCE
+    yield "snapshots", lambda: maps.snapshots_figure(views, style), SNAPSHOTS
+    yield "waves", lambda: maps.waves_figure(views, style), WAVES
+
+
+def run_figures(album: Album, gallery: Gallery, progress: Progress) -> list[str]:
+    """Waveforms, spectra and sensation levels, for every Tacton of an album."""
+    parts: list[str] = []
+    for name, runs in tactons(album).items():
+        progress(f"draw {name}", 0.0)
+        figure = tacton_figure(name, runs, gallery.style)
+        parts.append(gallery.figure(f"waveforms-{len(parts)}", figure, _waveforms(runs)))
+        if any(run.response.record.of_body for run in runs):
+            figure = levels_figure(runs, strongest_probe(runs), gallery.style)
+            parts.append(gallery.figure(f"sensation-{len(parts)}", figure, f"{name}. {SENSATION}"))
+    return parts
+
+
+def _waveforms(runs: Sequence[Run]) -> str:
+    """Caption of a Tacton's waveforms, and the cause of each difference between them."""
+    columns = [run.column for run in runs]
+    text = "Waveforms and spectra. Rows are probes."
+    if {PUBLISHED.name, SAME_LOAD.name} <= set(columns):
+        text += f" {LOADS}"
+    if SAME_LOAD.name in columns and any(run.response.record.of_body for run in runs):
+        text += f" {PROPAGATED}"
+    return text
+
+
+def tactons(album: Album) -> dict[str, list[Run]]:
+    """Runs by Tacton."""
+    groups: dict[str, list[Run]] = {}
+    for run in album.runs:
+        groups.setdefault(run.tacton, []).append(run)
+    return groups
+
+
+def _own(album: Album, views: Sequence[View]) -> View:
+    """The view of the scene's own body, or the last."""
+    same = [view for view in views if view.scene.body == album.scene.body]
+    return same[-1] if same and same[-1].unit == "m" else views[-1]
+
+
+def _drawn(views: Sequence[View]) -> str:
+    scales = (f"{label(view.column)}: {render.shown_scale(view)}" for view in views)
+    peaks = (f"{label(view.column)} {maps.peak_text(view)}" for view in views)
+    return f"{'; '.join(scales)}. The largest: {', '.join(peaks)}."
+
+
+def _behind(view: View) -> int:
+    """The frame of the largest motion among those whose focus is on the half that is drawn."""
+    largest = np.abs(view.pushed).max(axis=1)
+    seen = view.scene.tacton.trajectory.position(view.times)[:, 1] >= 0
+    return int(np.where(seen, largest, -1.0).argmax())
+
+
+def _film_part(path: Path, caption: str) -> str:
+    """A film as a part of the page, in a third of the bytes of its GIF where that can be done."""
+    if not features.check("webp"):
+        return document.picture(path.read_bytes(), caption, "film", "gif")
+    buffer = io.BytesIO()
+    with Pillow.open(path) as film:
+        film.save(buffer, format="webp", save_all=True, quality=FILM_QUALITY, method=2, loop=0)
+    return document.picture(buffer.getvalue(), caption, "film", "webp")
+
+
+def _part(image: render.Image, caption: str, name: str) -> str:
+    """A picture in as few bytes as a browser needs."""
+    buffer, kind = io.BytesIO(), "webp" if features.check("webp") else "png"
+    Pillow.fromarray(image).save(buffer, format=kind, quality=QUALITY, method=4)
+    return document.picture(buffer.getvalue(), caption, name, kind)
+
+
+NO_VIEWS = (
+    "No motion of whole bodies was saved here, and so there is no picture of a surface; "
+    "skinwave report SCENE computes it."
+)
+TURNED = (
+    "Motion into the body is red, out of it blue, about the mean; where the legend says ≥, rare "
+    "larger values have the last colour. Black: path and focus; orange: probes."
+)
+MARKS = "Black: path and focus; yellow: probes."
+COMPARED = (
+    "Colour: motion into the body about its mean, or the point kernel's pressure, over each "
+    "model's largest: a pressure and a motion have no common unit. All receive the same load."
+)
+RMS = (
+    "RMS motion about its mean over the whole steady state, relative to each model's largest. All "
+    "models receive the same load, so that a body's map differs from the kernel's by propagation "
+    "alone. Spread is the distance of the outermost -6 and -20 dB from the centre of the path. "
+    "Detection contour: where the line with the highest sensation level is at threshold: of a "
+    "body, the displacement threshold for a focal spot; of the point kernel, 2.2 Pa at 200 Hz (a "
+    "peak of 4.4 Pa with AM), at other frequencies in proportion to the displacement threshold."
+)
+DIFFERENCE = (
+    "What propagation changes: the level of a body's RMS motion minus that of the point kernel's "
+    "pressure under the same load, each relative to its own largest. Red: waves carry motion to "
+    "where the kernel predicts less; blue: the kernel predicts more than the body moves. Levels "
+    "below -40 dB count as -40 dB."
+)
+SNAPSHOTS = (
+    "The surface when the body moves most, and a quarter, half and three quarters of a turn of the "
+    "focus later (of a period of the strongest line, if it rests). Behind a focus that is faster "
+    "than the surface wave, the Mach angle asin(c/v); no clean cone forms on a circle smaller than "
+    "a wavelength."
+)
+WAVES = (
+    "Motion over place and time in the steady state, two periods of the slowest tone. Above: "
+    "outwards along x from the path's outermost point; the dashed lines are those of a surface "
+    "wave of the strongest line, far from its source, in a half-space or an infinite sheet. Near "
+    "the path and in thin slabs the phase runs ahead of them, in a clamped sheet waves stand, and "
+    "in the point kernel nothing propagates. Below: along the path; the focus runs along the black "
+    "lines."
+)
+LOADS = (
+    "The kernel as published has the paper's load, a linear drive in a sinc^2 main lobe; all "
+    "others have the scene's: the two kernels differ by drive law and focal spot."
+)
+PROPAGATED = "A body differs from the kernel under the same load by propagation alone."
+SENSATION = (
+    "Lines of the motion at the probe that moves most, and the detection threshold (for a focal "
+    "spot on the hand; Verrillo 1963 and Bolanowski et al. 1988, uncertain by 5 dB and more)."
+)

@@ -1,0 +1,1 @@
+"""What every command and record needs: files, processes, text, numbers and progress."""

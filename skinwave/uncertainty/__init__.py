@@ -1,1 +1,0 @@
-"""Uncertain numbers of a scene: samples, bands, and which of them matters."""

@@ -1,0 +1,224 @@
+"""Air around a sheet, in every model that has it; the others refuse."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+import fem
+import meshes
+from fem.added_mass import added_mass
+from simple_model import MovingPressure, Tacton, Trajectory
+from simple_model.compliance import thin_sheet
+from simple_model.wavenumber_integral import point_response
+from skinwave.bodies.build import build, operators
+from skinwave.bodies.sheet import air, air_mass, bending_wavenumber
+from skinwave.models import Request
+from skinwave.models.loads import surface_load
+from skinwave.models.prepared import answer, prepare, typical_spots
+from skinwave.models.stretching import membrane, reduced_answer
+from skinwave.planning.plan import plan
+from skinwave.planning.simulate import compute
+from skinwave.scene.file import dumps, loads
+from skinwave.scene.scene import BODIES, Body, Placement, Scene
+from skinwave.studies.assumptions import relaxed
+from skinwave.studies.tradeoff import candidates
+from skinwave.verify import references
+from skinwave.verify.exact import PAPER
+
+SHEET = replace(BODIES["paper-sheet-loose"], width=0.06, height=0.05, air=True)
+PATH = Trajectory(shape="circle", size=0.01, speed=4.0)
+LOAD = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.1, trajectory=PATH))
+SCENE = Scene(pressure=LOAD, body=SHEET, probes=((0.01, 0.0), (0.0, 0.012)))
+H = 5e-3
+
+
+def test_a_scene_says_it_and_comes_back():
+    scene = loads('[body]\nkind = "sheet"\nair = true')
+    assert scene.body == replace(BODIES["paper-sheet-loose"], air=True)
+    assert loads(dumps(scene)) == scene
+    assert "air = true" in dumps(scene)
+    assert not loads('[body]\nkind = "sheet"').body.air
+    assert "air = false" in dumps(loads('[body]\nkind = "sheet"'))
+    assert "air" not in dumps(loads(""))
+
+
+@pytest.mark.parametrize("kind", ["slab", "palm", "none"])
+def test_only_a_sheet_has_air(kind):
+    with pytest.raises(ValueError, match=f'air is for kind = "sheet", not "{kind}"'):
+        loads(f'[body]\nkind = "{kind}"\nair = true')
+    with pytest.raises(ValueError, match=f"air = true is for a sheet, .* not a {kind}"):
+        Body(kind=kind, air=True)
+    with pytest.raises(ValueError, match="must be true or false"):
+        loads('[body]\nkind = "sheet"\nair = 1.2')
+
+
+@pytest.mark.parametrize("model", ["fem-transient", "fem-harmonic", "fem-nonlinear-transient"])
+@pytest.mark.parametrize("h", [None, H])
+def test_models_without_modes_refuse_it(model, h):
+    with pytest.raises(ValueError, match=f"{model} has no air"):
+        compute(SCENE, model, h=h)
+
+
+def test_a_sheet_without_a_frame_is_refused_by_elements():
+    body = replace(SHEET, sides="absorbing", base="clamped")
+    with pytest.raises(ValueError, match="absorbing sides"):
+        prepare(body, SCENE.probe_points, h=H)
+
+
+def test_the_operator_is_symmetric_positive_and_that_of_any_position():
+    tilted = replace(SHEET, placement=Placement(tilt_x=0.5, tilt_y=-0.3, lift=0.01))
+    turned = build(tilted, H)
+    made = replace(build(SHEET, H), held=turned.held)
+    ops = operators(made)
+    M = air(SHEET, made, ops).M
+    rng = np.random.default_rng(3)
+    x, y = rng.standard_normal((2, len(ops.free)))
+    assert x @ (M @ y) == pytest.approx(y @ (M @ x), rel=1e-9)
+    assert x @ (M @ x) > 0
+    A = air(tilted, turned, operators(turned)).M
+
+    def placed(u):
+        full = ops.expand(u).reshape(-1, 3) @ tilted.placement.rotation.T
+        return full.ravel()[ops.free]
+
+    assert placed(x) @ (A @ placed(y)) == pytest.approx(x @ (M @ y), rel=1e-9)
+
+
+def test_a_sheet_of_other_cells_is_refused():
+    lines = np.linspace(-0.03, 0.03, 9)
+    uneven = np.sign(lines) * np.abs(lines) ** 1.5 / 0.03**0.5
+    mesh = meshes.extrude(uneven, lines, [-1e-3, 0])
+    with pytest.raises(meshes.MeshError, match="must be on a regular grid"):
+        added_mass(mesh, fem.assemble(mesh, fem.PRESETS["paper"], fixed="sides"), 1.2)
+    disc = meshes.sheet(0.06, 0.06, 1e-3, 0.01)
+    part = disc.facets["top"][:7]
+    with pytest.raises(meshes.MeshError, match="equal cells"):
+        added_mass(disc, fem.assemble(disc, fem.PRESETS["paper"]), 1.2, facets=part)
+
+
+def test_moments_at_rest_are_enough_and_their_error_estimate_holds():
+    made = build(SHEET, H)
+    ops = operators(made)
+    P, points = surface_load(made)
+    loads_ = P @ typical_spots(SHEET, points)
+    S = fem.probe_operator(made.mesh, SCENE.probe_points)
+    reduced = partial(fem.reduce, ops, S, 1000.0, loads=loads_, added=air(SHEET, made, ops))
+    few, many = reduced(1e-3), reduced(1e-6)
+    assert len(few.K) < len(many.K)
+    hz = np.linspace(5, 1000, 100)
+    a, b = (fem.transfer(model, model.basis.T @ loads_, hz) for model in (few, many))
+    error = np.linalg.norm(a - b, axis=(1, 2)) / np.linalg.norm(b, axis=(1, 2))
+    assert error.max() < 1e-3
+    assert few.estimate / 4 < error.max() < few.estimate * 4
+    basis = few.basis[ops.free]
+    mass = basis.T @ (ops.M @ basis + air(SHEET, made, ops).M @ basis)
+    np.testing.assert_allclose(mass, np.eye(len(mass)), atol=1e-9)
+
+
+def test_a_sheet_without_loss_is_reduced_too():
+    solid = replace(SHEET.solid, loss_factor=0.0)
+    prepared = prepare(replace(SHEET, material=solid), SCENE.probe_points, h=H)
+    lossy = prepare(SHEET, SCENE.probe_points, h=H)
+    vibrate = [p.body.poles.values[p.body.poles.values.imag > 0] for p in (prepared, lossy)]
+    lowest = [s[np.abs(s).argmin()] for s in vibrate]
+    softer = SHEET.solid.complex_modulus(-1j * lowest[1]) / SHEET.solid.shear_modulus
+    assert lowest[0] ** 2 * softer == pytest.approx(lowest[1] ** 2, rel=1e-6)
+
+
+def test_a_quarter_in_air_answers_as_the_whole():
+    still = replace(LOAD, tacton=replace(LOAD.tacton, trajectory=Trajectory()))
+    scene = replace(SCENE, pressure=still)
+    whole, part = (
+        answer(prepare(SHEET, scene.probe_points, h=H, symmetry=axes), scene).displacement
+        for axes in ("", "xy")
+    )
+    assert np.linalg.norm(part - whole) < 2e-3 * np.linalg.norm(whole)
+
+
+def test_air_and_vacuum_are_two_entries_of_the_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
+    bodies = (SHEET, replace(SHEET, air=False))
+    first = [answer(prepare(body, SCENE.probe_points, h=H), SCENE) for body in bodies]
+    assert len(list(tmp_path.glob("*.npz"))) == 2
+    again = [answer(prepare(body, SCENE.probe_points, h=H), SCENE) for body in bodies]
+    for a, b in zip(first, again, strict=True):
+        np.testing.assert_array_equal(a.displacement, b.displacement)
+    difference = first[0].displacement - first[1].displacement
+    assert np.linalg.norm(difference) > 0.1 * np.linalg.norm(first[1].displacement)
+
+
+@pytest.mark.slow
+def test_a_sheet_that_hardly_stretches_answers_as_the_linear_one():
+    """About its mean and after its start, in modes and in moments; no line meets a resonance."""
+    tacton = replace(LOAD.tacton, duration=0.4, am_frequency=60.0)
+    scene = replace(SCENE, pressure=replace(LOAD, peak_pressure=1e-3, tacton=tacton))
+    times = np.arange(4000) / 1e4
+    linear = answer(prepare(SHEET, scene.probe_points, h=2e-3), scene).displacement
+    request = Request(times=times, tolerance=0.05, report=lambda phase, done: None, h=2e-3)
+    modes = reduced_answer(scene, request).displacement
+    settled = slice(3000, None)
+    a, b = (u[settled] - u[settled].mean(axis=0) for u in (linear, modes))
+    assert np.linalg.norm(a - b) < 0.08 * np.linalg.norm(a)
+
+
+def test_the_loss_factor_is_the_material_s_in_air_too():
+    """Of one material without tension -s^2 is a real multiple of its modulus at each pole s."""
+    prepared = prepare(SHEET, SCENE.probe_points, h=H)
+    poles = prepared.body.poles.values[prepared.body.poles.values.imag > 0]
+    assert (abs(poles) < 2 * np.pi * 1500).sum() > 10
+    found = -(poles**2) / SHEET.solid.complex_modulus(-1j * poles)
+    np.testing.assert_allclose(found.imag, 0.0, atol=1e-6 * found.real.min())
+    made = build(SHEET, H)
+    ops = operators(made)
+    modes = fem.stretching_modes(
+        made.mesh, ops, membrane(SHEET, made, 1.0), 12, added=air(SHEET, made, ops)
+    )
+    solid = SHEET.solid.without_loss_factor()
+    terms = sorted(solid.prony, key=lambda term: term.time)
+    for branch, term in zip(modes.elastic.operators.branches, terms, strict=True):
+        expected = np.diag(term.modulus / solid.shear_modulus * (2 * np.pi * modes.hz) ** 2)
+        np.testing.assert_allclose(branch.K.toarray(), expected, atol=1e-6 * expected.max())
+
+
+def test_exact_waves_keep_below_what_only_decays():
+    """The lowest frequencies of a transform with damping, as `flat_body` takes them."""
+    radii, paper = np.array([0.0, 0.01, 0.03]), fem.PRESETS["paper"]
+
+    def modulus(w):
+        return complex(paper.complex_modulus(w) / paper.shear_modulus)
+
+    for air_density in (0.0, 1.2):
+        sheet = thin_sheet(fem.PRESETS["paper"], 1e-4, air_density=air_density)
+        for w in (-5.8j, 3.1 - 5.8j, -58j):
+            kernel = partial(
+                references.plate_kernel, w=w, mass=PAPER["mass_per_area"], air=air_density,
+                stiffness=PAPER["bending_stiffness"] * modulus(w),
+            )  # fmt: skip
+            exact = references.gaussian_response(kernel, radii, width=4.35e-3)
+            found = point_response(sheet, radii, [w], 4.35e-3)[0]
+            np.testing.assert_allclose(found, exact, rtol=1e-3)
+
+
+def test_waves_of_a_sheet_are_slower_in_air():
+    vacuum = replace(SHEET, air=False)
+    k = bending_wavenumber(SHEET, 191.0)
+    w = 2 * np.pi * 191.0
+    inertia = SHEET.mass_per_area + air_mass(SHEET, 191.0)
+    assert SHEET.bending_stiffness * k**4 == pytest.approx(inertia * w**2, rel=1e-9)
+    assert 1.04 < k / bending_wavenumber(vacuum, 191.0) < 1.08
+
+
+def test_studies_take_air_by_its_key():
+    vacuum = replace(SCENE, body=replace(SHEET, air=False))
+    for scene in (SCENE, vacuum):
+        kept, _ = relaxed(scene, ("sinc^2 profile", "no propagation"))
+        dropped, model = relaxed(scene, ("sinc^2 profile", "no propagation", "vacuum"))
+        assert model == "flat-body"
+        assert (kept.body, dropped.body) == (vacuum.body, SCENE.body)
+    plates = {"plate-modes", "plate-modes-transient", "plate-modes-nonlinear"}
+    assert {c.model for c in candidates(SCENE)} == {"point-kernel", "fem"} | plates
+    for scene, what in ((SCENE, "air"), (vacuum, "left out: air")):
+        rows = {row.what: row for row in plan(scene, model="fem", h=H).rows}
+        assert "air = true" in rows[what].reason

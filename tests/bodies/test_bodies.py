@@ -1,0 +1,477 @@
+"""Layers, placement and sides of bodies."""
+
+import csv
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fem
+import meshes
+import skinwave
+from meshes import graded_axis
+from meshes.shapes.palm import level_set
+from meshes.shapes.structured import Grading, with_planes
+from simple_model import MovingPressure, Tacton, Trajectory, lines
+from simple_model.focus import along_axis, array_field, spot_width
+from skinwave import compare
+from skinwave.bodies.absorbing_layer import has_layer
+from skinwave.bodies.build import build, operators
+from skinwave.commands.cli import main
+from skinwave.models.loads import surface_load
+from skinwave.models.prepared import answer, prepare
+from skinwave.planning.plan import plan
+from skinwave.planning.simulate import compute
+from skinwave.scene.file import dumps, loads
+from skinwave.scene.scene import BODIES, Body, Layer, Placement, Relief
+
+HAND = Path(__file__).parents[2] / "examples/hand/generic-hand-right.glb"
+PATH = Trajectory(shape="circle", size=0.02, speed=12.0)
+LOAD = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.25, trajectory=PATH))
+SKIN = skinwave.Scene(pressure=LOAD, body=Body(width=0.06, height=0.06))
+CLAMPED = Body(width=0.06, height=0.06, sides="clamped")  # an eighth of the cost of `SKIN`'s
+STILL = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.25))
+THREE = ((0.0, 0.0), (0.01, 0.0), (0.02, 0.0))  # probes: in the middle, on the path, beyond it
+
+
+def answered(body):
+    probes = ((0.0, 0.0), (0.01, 0.0))
+    return compute(replace(SKIN, body=body, probes=probes), "fem", h=0.006).displacement
+
+
+def test_two_layers_of_one_material_are_one():
+    layers = (Layer(thickness=0.004, material="palm"), Layer(thickness=0.002, material="palm"))
+    one, three = CLAMPED, replace(CLAMPED, layers=layers)
+    assert len(three.strata) == 1
+    np.testing.assert_allclose(answered(three), answered(one), rtol=0, atol=1e-20)
+    # and on a mesh that has the planes, with a material given to each region
+    mesh = build(replace(one, layers=(Layer(thickness=0.004, material="fat"),)), 0.006).mesh
+    assert set(mesh.region) == {0, 1}
+    palm = fem.PRESETS["palm"]
+    apart, alike = (fem.assemble(mesh, m, fixed="bottom") for m in ({0: palm, 1: palm}, palm))
+    for name in ("K", "C", "M"):
+        a, b = getattr(apart, name), getattr(alike, name)
+        assert abs(a - b).max() <= 1e-12 * abs(b).max()
+
+
+def test_a_layer_ends_on_a_plane_of_the_mesh_and_changes_the_answer():
+    body = replace(CLAMPED, layers=(Layer(thickness=0.0012, material="fat"),))
+    made = build(body, 0.006)
+    depth = -made.mesh.points[made.mesh.tets[:, :4], 2]
+    assert depth[made.mesh.region == 0].max() == pytest.approx(0.0012)
+    assert depth[made.mesh.region == 1].min() == pytest.approx(0.0012)
+    assert made.material == {0: fem.PRESETS["fat"], 1: fem.PRESETS["palm"]}
+    soft, plain = answered(body), answered(CLAMPED)
+    assert 1.03 < np.ptp(soft[:, 1]) / np.ptp(plain[:, 1]) < 1.3
+
+
+def test_planes_take_the_place_of_grid_lines_that_are_close():
+    line = graded_axis(0.015, 0.003, Grading(radius=0.0, growth=1.25))
+    with_one = with_planes(line, [0.0031, 0.0001])
+    assert {0.0, 0.0001, 0.0031, 0.015} <= set(with_one)
+    assert 0.003 not in with_one
+    assert np.diff(with_one).min() == pytest.approx(0.0001)
+
+
+def test_layers_that_do_not_fit_are_refused():
+    for layers, message in (((0.0, "fat"),), "above 0"), (((0.02, "fat"),), "20 mm thick in all"):
+        with pytest.raises(ValueError, match=message):
+            Body(layers=tuple(Layer(thickness=t, material=m) for t, m in layers))
+    with pytest.raises(ValueError, match="no layers"):
+        Body(kind="sheet", layers=(Layer(thickness=1e-5, material="paper"),))
+    with pytest.raises(ValueError, match="'fat'"):
+        Layer(thickness=1e-3, material="fatt")
+
+
+@pytest.mark.parametrize("degrees", [0.0, 20.0, 40.0])
+def test_a_tilted_body_feels_the_cosine_of_what_a_flat_one_does(degrees):
+    """cos^2 of the incidence on a focal spot that is longer by 1/cos."""
+    made = build(replace(SKIN.body, placement=Placement(tilt_y=np.radians(degrees))), 0.006)
+    P, points = surface_load(made)
+    # above or below the plane the focus is weaker; that is not asked here
+    flat = LOAD.spot(points[:, :2], np.zeros(2))
+    normal = made.mesh.points[made.mesh.facets["top"][0, :3]]
+    normal = np.cross(normal[1] - normal[0], normal[2] - normal[0])
+    normal /= np.linalg.norm(normal)
+    force = -(P @ flat).reshape(-1, 3).sum(axis=0) @ normal
+    whole = 2 * np.pi * spot_width(0.2) ** 2
+    assert force == pytest.approx(whole * np.cos(np.radians(degrees)), rel=0.01)
+    assert normal[0] == pytest.approx(np.sin(np.radians(degrees)))
+
+
+def test_an_offset_moves_the_path_the_other_way():
+    still = skinwave.Scene(
+        pressure=MovingPressure(tacton=Tacton(am_frequency=140, duration=0.05)),
+        body=replace(SKIN.body, placement=Placement(offset=(0.01, 0.0))),
+        probes=((0.0, 0.0), (0.01, 0.0)),
+    )
+    moved = compute(still, "fem", h=0.006).displacement
+    # a mesh moved by 10 mm has its nodes elsewhere under the focus
+    centred = compute(replace(still, body=SKIN.body), "fem", h=0.006).displacement
+    assert compare_columns(moved, centred) < 0.1
+
+
+def compare_columns(u, v):
+    return np.linalg.norm(u - v) / np.linalg.norm(v)
+
+
+def test_a_lifted_body_feels_what_the_focus_has_left_there():
+    raised = replace(CLAMPED, placement=Placement(lift=0.02))
+    ratio = np.abs(answered(raised)).max() / np.abs(answered(CLAMPED)).max()
+    assert ratio == pytest.approx(float(along_axis(0.02)), rel=0.02)
+
+
+@pytest.mark.parametrize("height", [0.1, 0.15, 0.2, 0.25, 0.3])
+def test_the_focus_is_as_long_as_the_array_makes_it(height):
+    offsets = np.linspace(-0.07, 0.07, 29) * (height / 0.3) ** 2
+    points = np.column_stack([0 * offsets, 0 * offsets, height + offsets])
+    intensity = np.abs(array_field(points, (0, 0, height))) ** 2
+    intensity /= intensity[14]
+    # upper and lower half together: the maximum lies below the focus
+    both = (intensity + intensity[::-1]) / 2
+    np.testing.assert_allclose(along_axis(offsets, height), both, atol=0.05)
+
+
+def test_placement_and_layers_come_back_from_a_file():
+    placed = Placement(tilt_x=np.radians(5), offset=(1e-3, -2e-3), lift=3e-3)
+    layers = (Layer(thickness=1e-3, material="dermis"), Layer(thickness=2e-3, material="fat"))
+    scene = replace(SKIN, body=replace(SKIN.body, layers=layers, placement=placed))
+    again = loads(dumps(scene))
+    assert again.body.layers == layers
+    assert again.body.placement.offset == placed.offset
+    assert again.body.placement.tilt_x == pytest.approx(placed.tilt_x, rel=1e-15)
+    for text, message in (
+        ("[[body.layers]]\nthickness_mm = 1", "lacks material"),
+        ("[body]\nlayers = 3", "must be tables"),
+        ("[placement]\ntilt_x_deg = 80", "beyond 60"),
+        ("[placement]\noffset_mm = [1]", "pair of numbers"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            loads(text)
+
+
+def test_exact_waves_refuse_tilts():
+    lifted = replace(SKIN, body=replace(SKIN.body, placement=Placement(lift=0.01)))
+    with pytest.raises(ValueError, match="use --model fem"):
+        compute(lifted, "flat-body")
+
+
+def test_the_layer_around_a_body_damps_nothing_in_it():
+    made = build(SKIN.body, 0.006)
+    inside = np.abs(made.mesh.points[made.mesh.tets[:, :4], :2].mean(axis=1)).max(axis=1) < 0.03
+    assert has_layer(SKIN.body)
+    assert (made.drag[inside] == 0).all()
+    assert (made.drag[~inside] > 0).all()
+    assert not has_layer(replace(SKIN.body, sides="clamped"))
+    ops = operators(made)
+    lost = ops.C - ops.R
+    assert abs(lost - 5.0 / 25e3 * ops.K).max() < 1e-12 * abs(ops.C).max()
+
+
+def test_a_body_of_half_the_size_answers_alike():
+    """Only the waves that its sides reflect differ; of a focus at rest a quarter is enough."""
+    scene = skinwave.Scene(pressure=STILL, body=Body(), probes=((0.0, 0.0), (0.015, 0.0)))
+    places = np.array(scene.probes)
+    whole, half = (
+        answer(prepare(Body(width=side, height=side), places, h=0.004, symmetry="xy"), scene)
+        for side in (0.1, 0.05)
+    )
+    assert compare(whole, half).relative_l2.max() < 0.05
+    early = whole.times < 0.03  # before a wave of 5 m/s is back from 50 mm further out
+    first = half.displacement[early] - whole.displacement[early]
+    assert np.linalg.norm(first) < 0.02 * np.linalg.norm(whole.displacement[early])
+    assert compare(compute(scene, "flat-body"), whole).relative_l2.max() < 0.05
+
+
+def test_a_probe_lands_on_a_curved_surface_where_it_was_asked_for():
+    flat = meshes.block((0.04, 0.04, 0.01), 0.008)
+    x, y, z = flat.points.T
+    share = 1 + z / 0.01  # of the bow: all of it at the top
+    bowed = np.column_stack([x + 1e-3 * np.sin(200 * y), y, z + 4e-3 * share * np.sin(60 * x)])
+    mesh = replace(flat, points=bowed)
+    places = np.random.default_rng(0).uniform(-0.015, 0.015, (50, 2))
+    S = fem.probe_operator(mesh, places)
+    upwards = S @ np.tile([0.0, 0.0, 1.0], len(bowed))
+    for axis in (0, 1):
+        field = np.zeros_like(bowed)
+        field[:, 2] = bowed[:, axis]  # which the elements carry exactly
+        np.testing.assert_allclose(S @ field.ravel() / upwards, places[:, axis], atol=1e-12)
+
+
+def test_a_probe_beside_a_crease_reads_along_the_mean_normal():
+    flat = meshes.block((0.04, 0.04, 0.01), 0.005)
+    bent = flat.points + np.outer(-0.3 * np.abs(flat.points[:, 0]), [0, 0, 1])
+    sideways = np.tile([1.0, 0.0, 0.0], len(bent))
+    beside = [[-1e-5, 0.001], [1e-5, 0.001], [0.015, 0.001]]
+    roof = replace(flat, points=bent)
+    own, mean = (fem.probe_operator(roof, beside, patch=s) @ sideways for s in (0.0, 3e-3))
+    slope = np.sin(np.arctan(0.3))
+    np.testing.assert_allclose(own, [slope, -slope, -slope], rtol=1e-9)
+    np.testing.assert_allclose(mean[:2], 0, atol=0.02 * slope)
+    assert mean[2] == pytest.approx(-slope, rel=1e-3)
+    for mesh in (flat, roof):
+        level = [[0.012, 0.004]]  # a plane's own normal, however small the patch
+        same = fem.probe_operator(mesh, level, patch=1e-5) - fem.probe_operator(mesh, level)
+        assert abs(same).max() < 1e-12
+
+
+@pytest.fixture
+def slab_file(tmp_path):
+    """A slab of 60 x 60 x 15 mm that the mesher made, in a file."""
+    meshes.write(tmp_path / "slab.vtu", meshes.builtin("slab"))
+    return tmp_path / "slab.vtu"
+
+
+@pytest.fixture
+def block_file(tmp_path):
+    """A block of 50 x 50 x 10 mm with few elements, in a file."""
+    block = meshes.block((0.05, 0.05, 0.01), 0.005)
+    top, bottom, sides = (block.facets[name] for name in ("top", "clamped", "absorbing"))
+    named = replace(block, facets={"top": top, "bottom": bottom, "sides": sides})
+    meshes.write(tmp_path / "block.vtu", named)
+    return tmp_path / "block.vtu"
+
+
+def hand_in(file):
+    return Body(kind="mesh", file=str(file), sides="clamped")
+
+
+@pytest.mark.slow
+def test_a_slab_from_the_mesher_answers_like_a_structured_one(slab_file):
+    scene = replace(SKIN, pressure=STILL, probes=THREE)
+    places = np.array(THREE)
+    structured = answer(prepare(CLAMPED, places, h=0.003, symmetry="xy"), scene)
+    filled = compute(replace(scene, body=hand_in(slab_file)), "fem", h=0.004)
+    error = compare(structured, filled).relative_l2
+    assert error[:2].max() < 0.02
+    assert error[2] < 0.03  # where little moves, and meshes of 4 and 2.5 mm differ by 4.6 %
+
+
+def test_a_mesh_in_a_file_is_a_body_of_a_scene(block_file, tmp_path):
+    scene = replace(SKIN, body=replace(hand_in("block.vtu"), base="absorbing"))
+    (tmp_path / "scene.toml").write_text(dumps(scene))
+    read = skinwave.read(tmp_path / "scene.toml")
+    assert read.body.file == str(block_file)  # named from where the scene file is
+    made = build(read.body)
+    assert made.fixed == {"sides": "xyz"}
+    assert len(made.absorbing) == len(made.mesh.facets["bottom"])
+    assert np.allclose(made.mesh.points[made.mesh.facets["bottom"], 2], -0.01)
+    required = plan(read, 0.1)
+    assert required.model == "fem"
+    assert any("not known" in warning for warning in required.warnings)
+
+
+@pytest.fixture
+def dome(tmp_path):
+    """A block of 40 x 40 x 10 mm whose underside slopes."""
+    block = meshes.block((0.04, 0.04, 0.01), 0.005, order=1)
+    points = block.points.copy()
+    points[:, 2] *= 1 - 40 * np.abs(points[:, 0])
+    return replace(block, points=points, facets={})
+
+
+def built(folder, mesh):
+    meshes.write(folder / "body.vtu", mesh)
+    return build(hand_in(folder / "body.vtu"), 0.005).mesh
+
+
+def test_a_mesh_in_a_file_keeps_its_own_bottom(dome, tmp_path):
+    """Half of what looks downwards, and a side; also below a top of its own."""
+    own = meshes.tag_boundary(
+        dome, bottom=lambda at, normals: (at[:, 0] < -0.0101) & (normals[:, 2] < 0.5)
+    )
+    count = len(own.facets["bottom"])
+    top = meshes.tag_boundary(own, top=lambda at, normals: (normals[:, 2] > 0.9) & (at[:, 0] > 0))
+    for mesh in (own, top):
+        assert len(built(tmp_path, mesh).facets["bottom"]) == count
+
+
+def test_a_mesh_without_a_bottom_of_its_own_rests_on_what_looks_downwards(dome, tmp_path):
+    top = meshes.tag_boundary(dome, top=lambda at, normals: (normals[:, 2] > 0.9) & (at[:, 0] > 0))
+    # What is read and written again has the bottom that reading gave it.
+    meshes.write(tmp_path / "first.vtu", dome)
+    again = meshes.body_from_file(tmp_path / "first.vtu", 0.005)
+    assert len(again.facets["bottom"])
+    for mesh in (dome, top, again):
+        meshes.write(tmp_path / "body.vtu", mesh)
+        made = build(hand_in(tmp_path / "body.vtu"), 0.005)
+        assert "bottom" not in made.mesh.facets
+        downwards = -fem.facet_normals(made.mesh, made.support.facets)[:, 2]
+        assert ((made.support.stiffness > 0) == (downwards > 0.2)).all()
+        assert not made.support.absorbed.any()
+        assert (downwards > 0.9).sum() > 100
+
+
+def test_springs_and_dashpots_of_a_support_carry_what_they_should():
+    block = meshes.block((0.02, 0.03, 0.01), 0.005)
+    facets, soft = block.facets["clamped"], replace(fem.PRESETS["palm"], viscosity=0.0)
+    x = fem.facet_points(block, facets)[:, 0]
+    rest = fem.Support(facets=facets, stiffness=2e7 * (1 + 50 * x), absorbed=(x > 0).astype(float))
+    held = fem.assemble(block, soft, fixed={}, support=rest)
+    loose = fem.assemble(block, soft, fixed={})
+    impedance = soft.density * soft.shear_speed * np.array([1, 1, 11**0.5])
+    for axis in range(3):
+        moved = np.zeros_like(block.points)
+        moved[:, axis] = 1.0
+        u = moved.ravel()
+        assert u @ (loose.K @ u) < 1e-9 * 2e7
+        assert u @ (held.K @ u) == pytest.approx(2e7 * 6e-4, rel=1e-9)
+        assert u @ (held.R @ u) == pytest.approx(impedance[axis] * 3e-4, rel=1e-6)
+    assert abs(held.C - held.R).max() < 1e-12 * abs(held.R).max()  # springs lose nothing
+
+
+def test_a_support_keeps_the_balance_of_energy():
+    block = meshes.block((0.02, 0.02, 0.01), 0.005)
+    facets = block.facets["clamped"]
+    many = np.ones(len(fem.facet_points(block, facets)))
+    rest = fem.Support(facets=facets, stiffness=1e7 * many, absorbed=many)
+    ops = fem.assemble(block, fem.PRESETS["palm"], fixed={}, support=rest)
+    push = fem.load_operator(block).sum(axis=1)
+    force = lambda t: push * 100 * np.sin(2 * np.pi * 200 * t)  # noqa: E731
+    states = islice(fem.transient(ops, force, 1e-4), 40)
+    *_, (state, spent) = fem.with_energy_balance(ops, states, force)
+    assert fem.imbalance(spent, fem.stored(ops, state)) < 1e-9
+    assert spent.radiated > 0.01 * spent.work
+
+
+def test_a_hand_without_ends_cannot_be_held_by_them(dome, tmp_path):
+    meshes.write(tmp_path / "body.vtu", dome)
+    for base in ("free", "absorbing"):
+        with pytest.raises(ValueError, match=r"has no facets 'sides' or 'cut' to fix; clamp"):
+            build(replace(hand_in(tmp_path / "body.vtu"), base=base), 0.005)
+
+
+def test_lines_of_a_body_that_nothing_holds_are_those_without_its_drift():
+    body = Body(width=0.03, height=0.03, depth=0.01, base="absorbing", sides="free")
+    tacton = Tacton(am_frequency=140, duration=0.2)
+    moved = {}
+    for drive in ("linear", "pressure_squared"):  # the second has a mean, and half the line
+        pressure = MovingPressure(tacton=tacton, drive=drive)
+        scene = skinwave.Scene(pressure=pressure, body=body, probes=((0.0, 0.0), (0.005, 0.0)))
+        moved[drive] = lines(compute(scene, "fem", h=0.005), [140.0])
+    np.testing.assert_allclose(moved["pressure_squared"], moved["linear"] / 2, rtol=1e-3)
+
+
+def test_layers_of_a_body_from_a_file_lie_below_its_top(slab_file):
+    body = replace(hand_in(slab_file), layers=(Layer(thickness=0.005, material="fat"),))
+    made = build(body, 0.004)
+    depth = -made.mesh.points[made.mesh.tets[:, :4], 2].mean(axis=1)
+    assert (made.mesh.region == (depth > 0.005)).all()
+    with pytest.raises(ValueError, match="thinner than half an element"):
+        build(replace(body, layers=(Layer(thickness=0.001, material="fat"),)), 0.004)
+
+
+def test_a_palm_without_relief_is_a_slab_with_round_edges():
+    relief = Relief(cup_depth=0, thenar_height=0, hypothenar_height=0, pad_height=0)
+    palm = Body(kind="palm", relief=relief).palm
+    inside = np.array([[0.0, 0.0, -1e-3], [0.02, 0.01, -1e-3], [0.0, -0.02, -0.014]])
+    np.testing.assert_allclose(level_set(palm, inside), -1e-3, rtol=1e-12)
+    flat = meshes.builtin("flat-palm")
+    top = flat.points[np.unique(flat.facets["top"])]
+    middle = np.linalg.norm(top[:, :2], axis=1) < 0.025
+    assert np.abs(top[middle, 2]).max() < 1e-9
+
+
+@pytest.mark.slow
+def test_a_palm_whose_curvature_goes_to_zero_answers_like_a_slab(monkeypatch):
+    """Sides free, ends with dashpots, and elements that do not cut the sharp rim off."""
+    size = {"width": 0.07, "height": 0.07, "depth": 0.01, "material": "forearm"}
+    flat = Relief(
+        cup_depth=0, thenar_height=0, hypothenar_height=0, pad_height=0, corner_radius=0.002,
+        edge_radius=0.001,
+    )  # fmt: skip
+    scene = replace(SKIN, body=Body(kind="palm", relief=flat, **size), probes=THREE)
+    palm = compute(scene, "fem", h=0.0045)
+
+    def with_ends(body, h, symmetry, *discretise):
+        made = build(body, h, symmetry, *discretise)
+        at_end = 0.999 * body.height / 2  # not the plane of symmetry, which has the same normal
+        mesh = meshes.tag_boundary(
+            made.mesh, ends=lambda centres, _: np.abs(centres[:, 1]) > at_end
+        )
+        return replace(made, mesh=mesh, absorbing=mesh.facets["ends"])
+
+    monkeypatch.setattr("skinwave.models.full.build_body", with_ends)
+    slab = compute(replace(scene, body=Body(kind="slab", sides="free", **size)), "fem", h=0.003)
+    assert compare(slab, palm).relative_l2.max() < 0.02
+
+
+@pytest.mark.slow
+def test_a_palm_answers_alike_however_it_is_meshed():
+    """A small one: elements of 5 mm of the default palm are within 1.5 % of two mesh generators'
+    2 and 2.7 mm, which differ by 0.3 %.
+    """
+    small = {"width": 0.055, "height": 0.055, "depth": 0.0145}
+    scene = replace(SKIN, body=replace(BODIES["palm"], **small), probes=THREE)
+    one, fine = (compute(scene, "fem", h=h) for h in (0.005, 0.0042))
+    assert compare(fine, one).relative_l2.max() < 0.02
+    required = plan(scene, 0.1)
+    assert compare(fine, answer(required.prepared, scene)).relative_l2.max() < 0.1
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("kind = 'mesh'", "needs a file"),
+        ("kind = 'slab'\nfile = 'hand.stl'", "is for kind"),
+        ("kind = 'slab'\nrelief = {cup_depth_mm = 3}", "is for kind"),
+        ("kind = 'palm'\nrelief = {cup_depth_mm = -3}", "cup_depth"),
+        ("kind = 'palm'\nrelief = {cup_deep_mm = 3}", "cup_depth_mm"),
+    ],
+)
+def test_bodies_that_make_no_sense_are_refused(text, message):
+    with pytest.raises(ValueError, match=message):
+        loads(f"[body]\n{text}")
+
+
+def test_tactons_are_compared_on_the_body_of_a_file(
+    in_one_process, block_file, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    scene = replace(SKIN, pressure=MovingPressure(tacton=replace(LOAD.tacton, duration=0.05)))
+    (tmp_path / "scene.toml").write_text(dumps(scene))
+    arguments = ["compare", "scene.toml", "--body", "block.vtu", "--unit", "m", "--out", "both"]
+    assert main(arguments) == 0
+    assert "3 of 3 runs" in capsys.readouterr().out
+    assert "mesh" in (tmp_path / "both/lines.csv").read_text()
+    assert main(["compare", "scene.toml", "--body", "blok.vtu"]) == 2
+    assert "is no file and none of" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_public_hand_goes_from_its_file_to_a_comparison_in_one_command(
+    in_one_process, tmp_path, monkeypatch
+):
+    """Hand of 2,314 triangles with seams, in metre, its palm towards -x, as its makers left it."""
+    monkeypatch.chdir(tmp_path)
+    short = MovingPressure(tacton=replace(STILL.tacton, duration=0.05))
+    (tmp_path / "scene.toml").write_text(dumps(replace(SKIN, pressure=short, probes=THREE[:2])))
+    ask = ["compare", "scene.toml", "--body", str(HAND), "--up", "-x", "--h", "16"]
+    assert main([*ask, "--out", "both", "--quiet"]) == 0
+    page = (tmp_path / "both/index.html").read_text()
+    assert "Body from generic-hand-right.glb, -x towards the device" in page
+    assert "thicker sheet" not in page
+    assert "elements of 16 mm" in page  # of the map, too
+    assert "--up -x --element-size 16" in page
+    rows = list(csv.DictReader((tmp_path / "both/lines.csv").read_text().splitlines()))
+    moved = [
+        float(r["displacement_um"]) for r in rows if r["line"] == "f_AM" and r["body"] == "mesh"
+    ]
+    assert 0.1 < max(moved) < 10
+    assert {path.name for path in tmp_path.iterdir()} == {"scene.toml", "both"}
+
+
+def test_what_is_seen_of_a_body_is_not_the_layer_around_it():
+    times = np.arange(20) / 1000
+    small = replace(SKIN, body=Body(width=0.03, height=0.03), probes=THREE[:2])
+    with pytest.warns(skinwave.SkinwaveWarning, match="elements of 10 mm"):
+        seen = skinwave.field(small, times, 0.2, h=0.01)
+    assert np.abs(seen.mesh.points[:, :2]).max() == pytest.approx(0.015)
+    assert seen.displacement.shape == (20, len(seen.mesh.points), 3)
+    top = seen.mesh.facets["top"]
+    corners = seen.mesh.points[top[:, :3], :2]
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() / 2
+    assert area == pytest.approx(0.03**2)

@@ -1,0 +1,97 @@
+"""Slabs in layers and on any base, as wavenumber integrals: their stack, their plan, a response."""
+
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+import pytest
+
+from simple_model import flat_body, steady_state
+from simple_model.compliance import half_space, layered
+from skinwave.bodies.analytic import compliance, has_exact_waves, stack
+from skinwave.planning.plan import plan
+from skinwave.planning.simulate import compute
+from skinwave.scene.file import loads
+from skinwave.scene.scene import Body, Layer, Placement, solid_of
+
+SKIN = loads("""
+[tacton]
+am_frequency_hz = 140
+duration_s = 0.05
+
+[body]
+kind = "slab"
+material = "muscle"
+thickness_mm = 15
+
+[[body.layers]]
+thickness_mm = 0.3
+material = "epidermis"
+
+[[body.layers]]
+thickness_mm = 4
+material = "fat"
+
+[probes]
+points_mm = [[0, 0], [10, 0]]
+""")
+TIMES = np.arange(500) / 1e4
+
+
+def changed(**body):
+    return replace(SKIN, body=replace(SKIN.body, **body))
+
+
+@pytest.mark.parametrize(
+    ("body", "base", "last"),
+    [
+        ({}, "clamped", 10.7e-3),
+        ({"base": "free"}, "free", 10.7e-3),
+        ({"base": "absorbing"}, "clamped", inf),
+        ({"depth": inf}, "clamped", inf),
+    ],
+)
+def test_a_slab_is_the_stack_of_its_layers(body, base, last):
+    found = stack(changed(**body).body)
+    assert found.materials == tuple(map(solid_of, ("epidermis", "fat", "muscle")))
+    assert found.thicknesses == pytest.approx((0.3e-3, 4e-3, last))
+    assert found.base == base or last == inf
+
+
+def test_layers_of_one_material_are_one():
+    palm = Layer(thickness=1e-3, material="palm")
+    assert stack(Body(layers=(palm, palm))).thicknesses == pytest.approx((15e-3,))
+    k, w = np.array([100 + 1j]), np.array([[500.0 + 0j]])
+    found = compliance(Body(layers=(palm,), depth=inf))(k, w)
+    np.testing.assert_allclose(found, half_space(solid_of("palm"))(k, w), rtol=1e-12)
+
+
+def test_layers_that_lose_nothing_need_one_that_does():
+    still = replace(solid_of("fat"), viscosity=0.0)
+    assert has_exact_waves(changed(layers=(Layer(thickness=1e-3, material=still),)).body)
+    assert not has_exact_waves(changed(layers=(), material=still).body)
+    assert not has_exact_waves(changed(placement=Placement(tilt_x=0.1)).body)
+
+
+@pytest.mark.parametrize("body", [{}, {"base": "free"}, {"base": "absorbing"}, {"depth": inf}])
+def test_a_plan_takes_the_wavenumber_integral_of_layers(body):
+    scene = changed(**body)
+    required = plan(scene)
+    assert required.model in ("flat-body", "flat-body-harmonic")
+    (row,) = (row for row in required.rows if row.what == "model")
+    assert "a flat slab of 3 layers without reflecting sides" in row.reason
+    found = compute(scene, "flat-body").displacement
+    own = flat_body(layered(stack(scene.body)), scene.pressure, scene.probe_points, TIMES)
+    np.testing.assert_array_equal(found, own.displacement)
+
+
+def test_tilted_layers_have_elements():
+    tilted = changed(placement=Placement(tilt_x=0.1))
+    with pytest.raises(ValueError, match="lies flat"):
+        compute(tilted, "flat-body")
+
+
+def test_layers_have_a_steady_state():
+    found = compute(SKIN, "flat-body-harmonic").displacement
+    own = steady_state(layered(stack(SKIN.body)), SKIN.pressure, SKIN.probe_points, TIMES)
+    np.testing.assert_array_equal(found, own.displacement)

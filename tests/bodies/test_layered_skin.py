@@ -1,0 +1,51 @@
+"""Presets of layered skin: the speeds that docs/scenes.md states, and the ranges of the fit."""
+
+import numpy as np
+import pytest
+
+from bench.layered_skin import RANGES, residuals, values_of, with_values
+from skinwave.bodies import BODIES
+from skinwave.verify.published import OPTIMUM, wave_sets
+from skinwave.verify.published_waves import leading_wave
+
+
+@pytest.mark.parametrize(
+    ("preset", "speeds", "lengths"),
+    [("palm-layers", (8.5, 5.1), (40, 30)), ("forearm-layers", (3.5, 3.2), (21, 7.8))],
+)
+def test_waves_of_layers_are_as_fast_as_the_manual_says(preset, speeds, lengths):
+    wave = leading_wave(BODIES[preset], [100.0, 200.0])
+    assert wave.speed == pytest.approx(speeds, rel=0.03)
+    assert 1e3 * wave.length == pytest.approx(lengths, rel=0.03)
+
+
+@pytest.mark.parametrize("preset", RANGES)
+def test_each_fitted_number_is_within_its_range(preset):
+    found = values_of(BODIES[preset], RANGES[preset])
+    for name, each in RANGES[preset].items():
+        assert each.low <= found[name] <= each.high or found[name] == pytest.approx(each.low)
+        assert each.source
+
+
+@pytest.mark.parametrize("preset", RANGES)
+def test_numbers_that_are_read_from_a_body_make_it_again(preset):
+    body = BODIES[preset]
+    assert with_values(body, values_of(body, RANGES[preset])).strata == body.strata
+
+
+def test_palm_layers_predict_the_optimum_of_a_focus_and_are_fitted_to_waves_of_hands():
+    fitted = {each.name for each in wave_sets() if "palm-layers" in each.built}
+    assert {name.partition(":")[0] for name in fitted} == {"Potts", "Manfredi", "SkinSource"}
+    assert "palm-layers" in OPTIMUM.bodies
+    assert "palm-layers" not in OPTIMUM.built
+
+
+def test_a_doubled_modulus_changes_residuals_of_a_fit():
+    body = BODIES["palm-layers"]
+    values = values_of(body, RANGES["palm-layers"])
+    (potts,) = (each for each in wave_sets() if each.name == "Potts: speed")
+    misses = (
+        residuals(body, [potts]),
+        residuals(with_values(body, values | {"hypodermis": 2 * values["hypodermis"]}), [potts]),
+    )
+    assert np.square(misses[1]).sum() < np.square(misses[0]).sum()

@@ -1,0 +1,306 @@
+"""Bodies of several materials: regions of a file, and a fingertip with a bone inside."""
+
+from dataclasses import replace
+
+import meshio
+import numpy as np
+import pytest
+
+import fem
+import meshes
+import skinwave
+from fem.geometry import jacobians, shape_nodes
+from fem.line_basis import line_errors
+from fem.load_and_probe import on_surface
+from meshes.tetmesh import FACES, interface_facets
+from simple_model import MovingPressure, Tacton, Trajectory
+from skinwave.bodies import BODIES, Body, Layer, Phalanx
+from skinwave.bodies.build import build, operators
+from skinwave.models import parametric
+from skinwave.models.affine_scenes import has_affine_operators
+from skinwave.models.free_keys import free_keys, values_at
+from skinwave.models.free_keys import with_values as with_free_values
+from skinwave.models.laws import check_laws, has_own_law, relaxing
+from skinwave.models.prepared import components, prepare
+from skinwave.planning.simulate import compute
+from skinwave.scene.file import dumps, loads, read
+from skinwave.scene.scene import Scene
+from skinwave.scene.spreads import spreads_of, with_values
+
+FINGER = BODIES["fingertip"]
+SHAPE = meshes.Fingertip(
+    breadth=0.016, length=0.025, thickness=0.013, bone_breadth=0.007, bone_thickness=0.004,
+    cover=0.006, tip=0.004,
+)  # fmt: skip
+SOFT, BONE = fem.PRESETS["palm"], fem.PRESETS["bone"]
+SCENE = """
+name = "two materials"
+[tacton]
+am_frequency_hz = 140
+duration_s = 0.05
+[body]
+kind = "mesh"
+file = "finger.vtu"
+base = "free"
+sides = "clamped"
+[probes]
+points_mm = [[0, 0], [3, 0]]
+"""
+
+
+@pytest.fixture(scope="module")
+def finger():
+    return meshes.fingertip_mesh(SHAPE, 4e-3)
+
+
+@pytest.fixture
+def body(finger, tmp_path):
+    """A body of a file with the regions `tissue` and `bone`."""
+    meshes.write(tmp_path / "finger.vtu", finger)
+    regions = (("bone", "bone"),)
+    file = str(tmp_path / "finger.vtu")
+    return Body(kind="mesh", file=file, base="free", sides="clamped", regions=regions)
+
+
+# Files.
+
+
+@pytest.mark.parametrize("suffix", [".vtu", ".msh"])
+def test_regions_keep_their_numbers_and_names_in_files(finger, tmp_path, suffix):
+    named = replace(finger, region=finger.region + 4, region_names={4: "soft tissue", 5: "bone"})
+    meshes.write(tmp_path / f"a{suffix}", named)
+    found = meshes.read(tmp_path / f"a{suffix}")
+    np.testing.assert_array_equal(found.region, named.region)
+    assert found.region_names == named.region_names
+
+
+def test_regions_of_other_programs_have_their_names_or_numbers(finger, tmp_path):
+    corners, tets = np.unique(finger.tets[:, :4], return_inverse=True)
+    points, cells = finger.points[corners], [("tetra", tets.reshape(-1, 4))]
+    tags = 7 + 2 * finger.region.astype(np.int32)
+    raw = meshio.Mesh(
+        points, cells, cell_data={"gmsh:physical": [tags], "gmsh:geometrical": [tags]},
+        field_data={"skin": np.array([7, 3]), "phalanx": np.array([9, 3])},
+    )  # fmt: skip
+    meshio.write(tmp_path / "a.msh", raw, file_format="gmsh22")
+    meshio.write(
+        tmp_path / "a.mesh", meshio.Mesh(points, cells, cell_data={"medit:ref": [tags]}),
+        file_format="medit",
+    )  # fmt: skip
+    of_gmsh, of_medit = (meshes.read(tmp_path / name) for name in ("a.msh", "a.mesh"))
+    for found in (of_gmsh, of_medit):
+        np.testing.assert_array_equal(found.region, tags)
+    assert of_gmsh.region_names == {7: "skin", 9: "phalanx"}
+    assert not of_medit.region_names
+    for file, name in (("a.msh", "phalanx"), ("a.msh", "9"), ("a.mesh", "9")):
+        file = str(tmp_path / file)
+        made = build(Body(kind="mesh", file=file, regions=((name, "bone"),)), 5e-3)
+        used = [made.material[r] for r in made.mesh.region.tolist()]
+        assert used == [BONE if r else SOFT for r in finger.region.tolist()]
+
+
+# Scenes.
+
+
+def test_a_scene_has_regions_by_name_with_presets_or_tables():
+    text = SCENE + '[body.regions]\nbone = "bone"\n3 = "fat"\n[body.regions.nail]\n'
+    text += "density_kg_m3 = 1300\nshear_modulus_pa = 1e9\npoisson = 0.3\n"
+    scene = loads(text)
+    nail = fem.Material(density=1300, shear_modulus=1e9, poisson=0.3)
+    assert scene.body.regions == (("bone", "bone"), ("3", "fat"), ("nail", nail))
+    assert loads(dumps(scene)) == scene
+    with pytest.raises(ValueError, match="material 'bones' is unknown"):
+        loads(SCENE + '[body.regions]\nbone = "bones"\n')
+    with pytest.raises(ValueError, match='regions is for kind = "mesh" or "finger", not "palm"'):
+        loads('[body]\nkind = "palm"\n[body.regions]\nbone = "bone"\n')
+    with pytest.raises(ValueError, match="has two materials"):
+        replace(scene.body, regions=(("a", "fat"), ("a", "bone")))
+    with pytest.raises(ValueError, match="is orthotropic, which is for a sheet"):
+        replace(scene.body, regions=(("a", "paper-grain"),))
+
+
+def test_materials_of_regions_have_tables_and_spreads_like_any_other(tmp_path):
+    (tmp_path / "gel.csv").write_text(
+        "frequency_hz,storage_pa,loss_pa\n" + "".join(f"{f},3e4,3e3\n" for f in (10, 100, 1000))
+    )
+    text = SCENE + "[body.regions.gel]\ndensity_kg_m3 = 1000\npoisson = 0.49\n"
+    (tmp_path / "a.toml").write_text(text + 'table = "gel.csv"\n')
+    scene = read(tmp_path / "a.toml")
+    assert has_own_law(scene.body)
+    check_laws(scene.body, scene.pressure)
+    assert not has_own_law(relaxing(scene.body, 1e-2))
+    scene = loads(SCENE + '[body.regions]\nfat = "fat"\nbone = "bone"\n')
+    assert {s.key for s in spreads_of(scene)} >= {"body.regions.fat.modulus_scale"}
+    stiffer = with_values(scene, {"body.regions.fat.modulus_scale": 2.0})
+    assert dict(stiffer.body.regions)["fat"] == fem.PRESETS["fat"].scaled(modulus=2.0)
+    assert dict(stiffer.body.regions)["bone"] == "bone"
+
+
+# Meshed bodies.
+
+
+def test_elements_have_the_material_of_their_region_and_the_rest_that_of_the_body(body, finger):
+    made = build(body, 4e-3)
+    used = [made.material[r] for r in made.mesh.region.tolist()]
+    assert used == [BONE if r else SOFT for r in finger.region.tolist()]
+    layered = replace(body, layers=(Layer(thickness=3e-3, material="fat"),))
+    made = build(layered, 4e-3)
+    used = [made.material[r] for r in made.mesh.region.tolist()]
+    assert [solid is BONE for solid in used] == (finger.region == 1).tolist()
+    assert {solid for solid in used if solid is not BONE} == {SOFT, fem.PRESETS["fat"]}
+
+
+def test_regions_that_a_file_has_not_are_named_with_those_that_it_has(body, finger):
+    volume = 1e6 * meshes.corner_volumes(finger.points, finger.tets)
+    shown = rf"tissue 0 \({volume[finger.region == 0].sum():.3g} cm3\), bone 1 \(0.3\d+ cm3\)"
+    with pytest.raises(ValueError, match=rf"has 'bones', but the regions of .* are {shown}; take"):
+        build(replace(body, regions=(("bones", "bone"),)), 4e-3)
+    with pytest.raises(ValueError, match=rf"has regions {shown}, and the scene does not say"):
+        build(replace(body, regions=()), 4e-3)
+    both = (("tissue", "fat"), ("bone", "bone"))
+    with pytest.raises(ValueError, match="none of them is of \\[body\\] material"):
+        build(replace(body, regions=both), 4e-3)
+    build(replace(body, regions=both, material="fat"), 4e-3)
+
+
+def test_a_bone_does_not_pass_for_what_waves_run_in(body):
+    speed = body.of_kind.wave_speed(body, 140.0)
+    soft = replace(body, regions=())
+    assert speed == soft.of_kind.wave_speed(soft, 140.0)
+    around = replace(body, material="bone", regions=(("tissue", "palm"),))
+    assert around.of_kind.wave_speed(around, 140.0) == speed
+    resting = [build(replace(b, base="clamped"), 4e-3).support for b in (body, around)]
+    np.testing.assert_array_equal(resting[0].stiffness, resting[1].stiffness)
+
+
+TISSUE, IN_BONE = "body.material.shear_modulus_pa", "body.regions.bone.shear_modulus_pa"
+DENSITY = "body.regions.bone.density_kg_m3"
+
+
+@pytest.mark.parametrize("base", ["free", "clamped"])
+def test_materials_of_tissue_and_bone_are_free(body, base):
+    body = replace(body, base=base)
+    assert has_affine_operators(body)
+    tacton = Tacton(trajectory=Trajectory(shape="circle", size=0.006, speed=3.0))
+    probes = ((0.0, 0.0), (3e-3, 2e-3))
+    scene = Scene(pressure=MovingPressure(tacton=tacton), body=body, probes=probes)
+    ranges = {TISSUE: (15e3, 40e3), IN_BONE: (1e6, 1e9), DENSITY: (1200.0, 2000.0)}
+    free = skinwave.prepare(scene, ranges, h=4e-3)
+    largest = []
+    for shares in np.random.default_rng(1).random((2, 3)):
+        values = values_at(free.keys, shares)
+        changed = with_free_values(body, free.keys, values)
+        assert dict(changed.regions)["bone"].density == values[DENSITY]
+        frequencies, found = parametric.lines(free, values)
+        own = components(prepare(changed, scene.probe_points, h=4e-3), scene.pressure)
+        expected = own.lines[[np.argmin(np.abs(own.frequencies - f)) for f in frequencies]]
+        assert line_errors(found, expected).max() < 0.01
+        largest.append(np.abs(found).max())
+    assert largest[0] != pytest.approx(largest[1], rel=0.05)
+
+
+def test_a_region_that_the_scene_does_not_name_cannot_be_free(body):
+    with pytest.raises(ValueError, match="it gives those of bone"):
+        free_keys(body, {"body.regions.nail.shear_modulus_pa": (1e4, 4e4)})
+    with pytest.raises(ValueError, match="only moduli, losses, times and densities"):
+        free_keys(body, {"body.regions.bone.poisson": (0.3, 0.4)})
+
+
+# The fingertip.
+
+
+def test_a_fingertip_has_the_volumes_of_its_ellipsoids():
+    mesh = meshes.fingertip_mesh(SHAPE, 1.5e-3)
+    volumes = jacobians(shape_nodes(mesh), 5, 0)[2].sum(axis=1)
+    for region, (x, y, z), bar in ((1, (7, 4, 4), 2e-3), (0, (16, 8, 13), 2e-4)):
+        exact = np.pi * x * z * (17 / 4 + y / 6) * 1e-9
+        own = volumes[mesh.region == 1].sum() if region else volumes.sum()
+        assert own == pytest.approx(exact, rel=bar)
+    assert meshes.dihedral_angles(mesh).min() > 15
+    assert meshes.jacobian_ratios(mesh.points, mesh.tets).min() > 0.3
+    assert mesh.points[:, 2].max() == pytest.approx(0, abs=1e-12)
+    np.testing.assert_allclose(np.abs(mesh.points).max(axis=0), [8e-3, 12.5e-3, 13e-3])
+
+
+def test_elements_of_tissue_and_bone_share_the_facets_between_them(finger):
+    shared = {tuple(sorted(facet)) for facet in interface_facets(finger).tolist()}
+    faces = np.sort(finger.tets[:, FACES], axis=2)
+    of = [{tuple(f) for f in faces[finger.region == r].reshape(-1, 6).tolist()} for r in (0, 1)]
+    assert shared == of[0] & of[1]
+    cut = finger.points[:, 1] < -0.0125 + 1e-9
+    bone = np.unique(finger.tets[finger.region == 1])
+    tissue = np.unique(finger.tets[finger.region == 0])
+    assert set(np.intersect1d(bone, tissue)) == {node for facet in shared for node in facet}
+    assert cut[bone].any()
+    assert len(finger.facets["top"]) == len(finger.facets["bottom"])
+
+
+def test_every_node_of_a_top_can_be_read(finger):
+    for mesh in (finger, build(BODIES["silicone-disc"], 1e-2).mesh):
+        top = mesh.points[np.unique(mesh.facets["top"])]
+        assert on_surface(mesh, top[:, :2]).all()
+
+
+def test_a_disc_is_a_prism_whose_quarters_are_meshed_alone():
+    disc = BODIES["silicone-disc"]
+    made = build(disc, 1e-2, "xy")
+    volume = meshes.corner_volumes(made.mesh.points, made.mesh.tets).sum()
+    assert 4 * volume == pytest.approx(16 * np.sin(np.pi / 16) * 0.04**2 * 0.02)
+    assert made.fixed == {"bottom": "xyz", "mirror_x": "x", "mirror_y": "y"}
+    with pytest.raises(ValueError, match="give it one diameter"):
+        replace(disc, width=0.05)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"depth": 0.009}, "is not inside a fingertip of 16 x 9 mm"),
+        ({"bone": Phalanx(tip=0.008)}, "is not inside a fingertip"),
+        ({"bone": Phalanx(cover=0.0)}, "cover = 0.0 m of a fingertip must be finite and above 0"),
+        ({"height": 0.008}, "no longer than its round end"),
+    ],
+)
+def test_a_bone_outside_a_finger_is_refused(changes, message):
+    with pytest.raises(ValueError, match=message):
+        replace(FINGER, **changes)
+
+
+def test_a_fingertip_of_the_scene_is_that_of_a_file(body):
+    text = '[tacton]\nduration_s = 0.05\n[body]\nkind = "finger"\n'
+    scene = loads(text + "[body.bone]\ncover_mm = 5\n[probes]\npoints_mm = [[0, 0]]\n")
+    assert scene.body == replace(FINGER, bone=Phalanx(cover=0.005))
+    assert loads(dumps(scene)) == scene
+    own, file = (operators(build(each, 4e-3)) for each in (FINGER, body))
+    assert own.K.shape == file.K.shape
+    for name in ("K", "C", "M"):
+        one, other = getattr(own, name), getattr(file, name)
+        assert abs(one - other).max() < 1e-12 * abs(one).max()
+
+
+def test_every_linear_model_takes_a_bone_and_they_agree():
+    text = '[tacton]\nam_frequency_hz = 100\nduration_s = 0.05\n[body]\nkind = "finger"\n'
+    scene = loads(text + "[probes]\npoints_mm = [[0, 0], [0, 6]]\n")
+    found = {
+        model: compute(scene, model, h=6e-3, **given).displacement[400:]  # after the start
+        for model, given in (("fem", {}), ("fem-harmonic", {}), ("fem-transient", {"dt": 2e-4}))
+    }
+    size = np.linalg.norm(found["fem-harmonic"])
+    assert np.linalg.norm(found["fem"] - found["fem-harmonic"]) < 2e-3 * size
+    assert np.linalg.norm(found["fem-transient"] - found["fem-harmonic"]) < 2e-2 * size
+
+
+def test_a_bone_halves_the_motion_of_a_fingertip_that_rests_on_its_back():
+    resting = replace(FINGER, base="clamped")
+    without = replace(resting, regions=(("bone", resting.material),))
+    moved = []
+    for each in (resting, without):
+        made = build(each, 3e-3)
+        ops = operators(made)
+        points = fem.facet_points(made.mesh)
+        push = fem.load_operator(made.mesh) @ np.exp(-(points[:, :2] ** 2).sum(axis=1) / 4e-5)
+        S = fem.probe_operator(made.mesh, np.array([[0.0, 0.0], [0.0, 6e-3]]))
+        moved.append(S @ fem.static(ops, push))
+    assert (np.array(moved) > 0).all()
+    ratio = moved[1] / moved[0]
+    assert (ratio > 1.7).all()
+    assert (ratio < 2.7).all()

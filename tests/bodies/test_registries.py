@@ -1,0 +1,222 @@
+"""Kinds of body and models are records in registries: a file from outside adds one."""
+
+import ast
+import csv
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import skinwave
+from skinwave import models
+from skinwave.bodies import BODIES, KINDS, Body, BodyKind, register
+from skinwave.bodies.build import build
+from skinwave.commands.cli import main
+from skinwave.models import Model, named, names
+from skinwave.models import register as register_model
+from skinwave.planning.simulate import compute
+from skinwave.scene.file import dumps, loads
+from skinwave.sweeps import dataset
+from skinwave.system import extensions
+
+ROOT = Path(__file__).parents[2]
+SCENE = """
+name = "disc"
+[tacton]
+am_frequency_hz = 100
+duration_s = 0.05
+shape = "circle"
+size_mm = 20
+speed_m_per_s = 4
+[body]
+kind = "cylinder"
+[probes]
+points_mm = [[0, 0], [10, 0], [25, 0]]
+"""
+MESH = ["--h", "8", "--quiet"]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def static_deflection():
+    """The modules from outside; what they register is gone afterwards, for all other tests."""
+    import_module("cylinder")
+    yield import_module("static_deflection")
+    del KINDS["cylinder"], BODIES["silicone-cylinder"], models._MODELS["static-deflection"]
+    os.environ.pop(extensions.VARIABLE)
+    for name in ("cylinder", "static_deflection"):
+        del sys.modules[name]
+
+
+@pytest.fixture
+def disc(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("disc.toml").write_text(SCENE)
+    return loads(SCENE)
+
+
+def table(path):
+    with Path(path).open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_scene_of_a_new_kind_is_read_and_written(disc):
+    assert disc.body == BODIES["silicone-cylinder"]
+    assert disc.body.width == 0.08
+    assert disc.body.depth == 0.02
+    assert loads(dumps(disc)) == disc
+    with pytest.raises(ValueError, match="one diameter"):
+        loads(SCENE.replace('kind = "cylinder"', 'kind = "cylinder"\nsize_x_mm = 60'))
+    with pytest.raises(ValueError, match='relief is for kind = "palm", not "cylinder"'):
+        loads(SCENE.replace('kind = "cylinder"', 'kind = "cylinder"\nrelief = {}'))
+
+
+def test_the_mesh_of_a_cylinder_is_one():
+    made = build(BODIES["silicone-cylinder"], 4e-3)
+    points = made.mesh.points
+    assert np.hypot(*points[:, :2].T).max() == pytest.approx(0.04)
+    assert np.ptp(points[:, 2]) == pytest.approx(0.02)
+    volume = skinwave_volume(made.mesh)
+    assert volume == pytest.approx(np.pi * 0.04**2 * 0.02, rel=0.01)
+    assert made.fixed == {"bottom": "xyz"}
+
+
+def skinwave_volume(mesh):
+    from meshes import corner_volumes
+
+    return corner_volumes(mesh.points, mesh.tets).sum()
+
+
+def test_a_soft_cylinder_deflects_as_its_slab_in_the_middle(disc):
+    """At a low frequency, far from its rim: within the difference of their meshes."""
+    still = replace(disc.tacton, am_frequency=20.0, trajectory=type(disc.tacton.trajectory)())
+    scene = replace(disc, pressure=replace(disc.pressure, tacton=still), probes=((0.0, 0.0),))
+    own = skinwave.simulate(scene, "fem", 0.5, h=5e-3).displacement
+    slab = replace(scene, body=replace(scene.body, kind="slab", sides="free"))
+    other = skinwave.simulate(slab, "fem", 0.5, h=5e-3).displacement
+    assert np.abs(own - other).max() < 0.05 * np.abs(other).max()
+
+
+def test_a_new_kind_runs(disc, capsys):
+    assert main(["run", "disc.toml", "--model", "fem", *MESH, "--out", "out"]) == 0
+    rows = table("out/lines.csv")
+    assert {row["body"] for row in rows} == {"silicone-cylinder"}
+    assert main(["plan", "disc.toml", "--tolerance", "0.5", "--h", "8"]) == 0
+    assert "a body of kind 'cylinder' has no wavenumber integral" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_a_new_kind_is_compared_and_swept_in_other_processes(disc):
+    assert main(["compare", "disc.toml", *MESH, "--out", "compared"]) == 0
+    assert {row["body"] for row in table("compared/lines.csv")} == {"none", "silicone-cylinder"}
+    assert "Cylinder of 80 x 20 mm" in Path("compared/index.html").read_text()
+    vary = ["--vary", "tacton.am_frequency_hz=80,120", "--model", "fem", "--out", "swept"]
+    assert main(["sweep", "disc.toml", *vary, "--workers", "2", *MESH, "--json"]) == 0
+
+
+def test_a_new_model_runs(disc, capsys, static_deflection):
+    said = "the error of static-deflection is not estimated"
+    with pytest.warns(skinwave.SkinwaveWarning, match=said):
+        found = skinwave.simulate(disc, "static-deflection")
+    assert found.model == "static-deflection"
+    pressure = disc.pressure(disc.probe_points, found.times[7])
+    assert found.displacement[7] == pytest.approx(
+        static_deflection.per_pressure(disc.body) * pressure
+    )
+    assert np.isnan(found.expected_error)
+    words = ["run", "disc.toml", "--model", "static-deflection", "--out", "out", "--quiet"]
+    assert main(words) == 0
+    assert {row["model"] for row in table("out/lines.csv")} == {"static-deflection"}
+    assert said in capsys.readouterr().err
+    assert said in Path("out/index.html").read_text()
+    assert main(["plan", "disc.toml", "--model", "static-deflection"]) == 0
+    planned = capsys.readouterr()
+    assert static_deflection.STATIC.method in planned.out
+    assert said in planned.err
+    assert main(["sweep", "disc.toml", "--vary", "tacton.am_frequency_hz=80,120", *words[2:4],
+                 "--out", "swept", "--quiet", "--scheduler", "threads"]) == 0  # fmt: skip
+    assert all(said in row["warnings"] for row in dataset.read(Path("swept")))
+    with pytest.raises(SystemExit):
+        main(["run", "disc.toml", "--model", "no-model"])
+    assert "static-deflection" in capsys.readouterr().err
+
+
+def test_a_new_model_refuses_a_body(disc):
+    floating = replace(disc, body=replace(disc.body, base="free", sides="clamped"))
+    with pytest.raises(ValueError, match="with a clamped base, not a free one; take base"):
+        skinwave.simulate(floating, "static-deflection")
+
+
+def test_both_models_are_compared_in_python(disc):
+    static = compute(disc, "static-deflection")
+    waves = skinwave.simulate(disc, "fem", 0.5, h=8e-3)
+    assert skinwave.compare(static, waves).relative_l2.shape == (3,)
+
+
+def test_names_are_given_once(static_deflection):
+    with pytest.raises(ValueError, match="'slab' is registered already"):
+        register(BodyKind(name="slab"))
+    with pytest.raises(ValueError, match="'fem' is registered already"):
+        register_model(Model(name="fem", method="", words="", solve=static_deflection.solve))
+    assert list(KINDS)[:5] == ["none", "sheet", "slab", "palm", "mesh"]
+    assert set(names()) > {"fem", "static-deflection"}
+    with pytest.raises(ValueError, match="model"):
+        named("nothing")
+
+
+def test_a_preset_is_added_at_run_time(tmp_path, monkeypatch):
+    monkeypatch.setitem(BODIES, "pad", Body(width=0.03, height=0.03, depth=0.004))
+    monkeypatch.chdir(tmp_path)
+    assert skinwave.scene.scene.body_name(Body(width=0.03, height=0.03, depth=0.004)) == "pad"
+
+
+def test_a_module_of_the_environment_is_loaded_by_the_command_line(tmp_path):
+    (tmp_path / "disc.toml").write_text(SCENE)
+    env = os.environ | {
+        "SKINWAVE_EXTENSIONS": "cylinder,static_deflection",
+        "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests")]),
+    }
+    command = [sys.executable, "-m", "skinwave", "plan", str(tmp_path / "disc.toml"), "--json"]
+    said = subprocess.run([*command, "--model", "static-deflection"], env=env, check=True,
+                          capture_output=True, text=True).stdout  # fmt: skip
+    assert json.loads(said)["model"] == "static-deflection"
+    env["SKINWAVE_EXTENSIONS"] = "no_such_module"
+    found = subprocess.run(command, env=env, check=False, capture_output=True, text=True)
+    assert found.returncode == 2
+    assert "SKINWAVE_EXTENSIONS names the module 'no_such_module'" in found.stderr
+
+
+def compared(tree):
+    """Strings that something is compared with, and attributes that are."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Compare):
+            parts = [node.left, *node.comparators]
+        elif isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "startswith":
+            parts = [node.func.value, *node.args]
+        else:
+            continue
+        inner = [leaf for part in parts for leaf in ast.walk(part)]
+        yield node.lineno, inner
+
+
+def test_nobody_else_compares_kinds_or_models():
+    """But for `bodies` and `models` themselves: everyone else asks the record."""
+    found = []
+    for path in (ROOT / "skinwave").rglob("*.py"):
+        if path.parent.name in ("bodies", "models"):
+            continue
+        for line, leaves in compared(ast.parse(path.read_text(encoding="utf-8"))):
+            words = {leaf.value for leaf in leaves if isinstance(leaf, ast.Constant)}
+            of_body = any(
+                isinstance(leaf, ast.Attribute) and leaf.attr == "kind"
+                and getattr(leaf.value, "attr", getattr(leaf.value, "id", "")) in ("body", "solid")
+                for leaf in leaves
+            )  # fmt: skip
+            if of_body or words & {*names(), "fem-nonlinear", "flat-body"} - {"none"}:
+                found.append(f"{path.relative_to(ROOT)}:{line}")
+    assert found == []

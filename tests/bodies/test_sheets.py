@@ -1,0 +1,460 @@
+"""Sheets that are orthotropic, stretched or held in part: closed forms, elements beside Ritz."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import fem
+import meshes
+from fem import nonlinear
+from simple_model import MovingPressure, Tacton, from_young, orthotropic
+from simple_model.compliance import thin_sheet
+from simple_model.plate_modes import plate_modes
+from simple_model.sheet_modes import sheet_curves
+from skinwave import dumps, loads, plan
+from skinwave.bodies.build import build, operators
+from skinwave.bodies.mounting import EDGES, Mounting
+from skinwave.bodies.sheet import air_mass, bending_equivalent, bending_wavenumber
+from skinwave.models import Request, named
+from skinwave.models.advice import beyond
+from skinwave.models.plate_modes import middle_compliance, plate_of
+from skinwave.models.prepared import prepare
+from skinwave.planning.extent import mean_sag, symmetry
+from skinwave.scene.scene import BODIES, Body, Scene
+from skinwave.studies.assumptions import droppable
+
+PAPER = orthotropic(density=800, young_x=5.5e9, young_y=2.5e9, poisson_xy=0.35)
+WIDE, HIGH, DEEP = 0.12, 0.09, 1e-4
+TENSION = (3.0, 1.0)  # N/m, as much as bending in the lowest mode
+SIMPLY = {"left": "yz", "right": "yz", "front": "xz", "back": "xz"}
+SMALL = Body(
+    kind="sheet", width=0.06, height=0.05, depth=DEEP, material=PAPER, base="free", sides="clamped"
+)
+
+
+def stiffnesses(material=PAPER):
+    """D1, D2 and D3 of physics of thin plates, N m."""
+    nu_yx = material.orthotropy.poisson_xy * material.orthotropy.young_y / 5.5e9
+    inner = 12 * (1 - material.orthotropy.poisson_xy * nu_yx)
+    D1, D2 = (E * DEEP**3 / inner for E in (5.5e9, 2.5e9))
+    mean = np.sqrt(material.orthotropy.poisson_xy * nu_yx)
+    shear = np.sqrt(5.5e9 * 2.5e9) / (2 * (1 + mean))
+    return D1, D2, D1 * nu_yx + 2 * shear * DEEP**3 / 12
+
+
+def closed_form(tension, most=6):
+    """Natural frequencies in Hz of a simply supported plate, by half waves along x and y."""
+    p, q = np.arange(1, most)[:, None], np.arange(1, most)
+    a, b = p * np.pi / WIDE, q * np.pi / HIGH
+    D1, D2, D3 = stiffnesses()
+    stiffness = D1 * a**4 + 2 * D3 * a**2 * b**2 + D2 * b**4
+    return np.sqrt((stiffness + tension[0] * a**2 + tension[1] * b**2) / 0.08) / (2 * np.pi)
+
+
+def equivalent(thickness, material=PAPER):
+    return bending_equivalent(material, DEEP / thickness)
+
+
+def quarter(thickness, cells, x, y):
+    """Quarter of the simply supported plate, even or odd about its middles x = 0 and y = 0."""
+    lines = (np.linspace(0, side / 2, cells + 1) for side in (WIDE, HIGH))
+    mesh = meshes.extrude(*lines, [-thickness, 0])
+    middle = {"left": "x" if x == "even" else "yz", "front": "y" if y == "even" else "xz"}
+    return mesh, {"right": "yz", "back": "xz", **middle}
+
+
+@pytest.mark.parametrize("tension", [(0.0, 0.0), TENSION])
+def test_six_frequencies_of_an_orthotropic_stretched_plate(tension):
+    exact, thickness, found = np.sort(closed_form(tension), axis=None)[:6], 0.01 * HIGH, []
+    for x, y in (("even", "even"), ("even", "odd"), ("odd", "even"), ("odd", "odd")):
+        mesh, fixed = quarter(thickness, 15, x, y)
+        ops = fem.assemble(
+            mesh,
+            equivalent(thickness),
+            fixed=fixed,
+            tension=fem.Tension(x=tension[0], y=tension[1]),
+        )
+        found.extend(fem.modes(ops, 3)[0])
+    np.testing.assert_allclose(np.sort(found)[:6], exact, rtol=5e-3)
+    body = replace(
+        SMALL, width=WIDE, height=HIGH,
+        mounting=Mounting(support="simply", tension_x=tension[0], tension_y=tension[1]),
+    )  # fmt: skip
+    np.testing.assert_allclose(plate_modes(plate_of(body)).frequencies[:6], exact, rtol=1e-6)
+
+
+def test_static_deflection_of_an_orthotropic_stretched_plate_is_naviers_series():
+    D1, D2, D3 = stiffnesses()
+    p, q = np.arange(1, 60, 2)[:, None], np.arange(1, 60, 2)
+    a, b = p * np.pi / WIDE, q * np.pi / HIGH
+    stiffness = D1 * a**4 + 2 * D3 * a**2 * b**2 + D2 * b**4 + TENSION[0] * a**2 + TENSION[1] * b**2
+    exact = 16 / (np.pi**2 * p * q) * np.sin(p * np.pi / 2) * np.sin(q * np.pi / 2) / stiffness
+    thickness = 0.01 * HIGH
+    mesh, fixed = quarter(thickness, 14, "even", "even")
+    ops = fem.assemble(
+        mesh, equivalent(thickness), fixed=fixed, tension=fem.Tension(x=TENSION[0], y=TENSION[1])
+    )
+    P = fem.load_operator(mesh)
+    u = fem.probe_operator(mesh, [[1e-9, 1e-9]]) @ fem.static(ops, P @ np.ones(P.shape[1]))
+    assert u[0] == pytest.approx(exact.sum(), rel=4e-3)
+
+
+def test_stiffness_turns_with_the_axes_of_the_sheet():
+    # A sheet that is tilted, and one whose grain is along y and whose sides are exchanged.
+    mesh = meshes.sheet(0.06, 0.05, 1e-3, 0.012)
+    material = equivalent(1e-3)
+    ops = fem.assemble(
+        mesh, material, fixed="sides", tension=fem.Tension(x=TENSION[0], y=TENSION[1])
+    )
+    turn = np.array([[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]])
+    tilted = replace(mesh, points=mesh.points @ turn.T)
+    other = fem.assemble(
+        tilted,
+        material,
+        fixed="sides",
+        tension=fem.Tension(x=TENSION[0], y=TENSION[1]),
+        axes=turn.T[:2],
+    )
+    np.testing.assert_allclose(fem.modes(other, 3)[0], fem.modes(ops, 3)[0], rtol=1e-6)
+    exchanged = orthotropic(density=800, young_x=2.5e9, young_y=5.5e9, poisson_xy=0.35 * 2.5 / 5.5)
+    axes = np.eye(3)[[1, 0]] * [[1], [-1]]
+    third = fem.assemble(
+        mesh,
+        equivalent(1e-3, exchanged),
+        fixed="sides",
+        tension=fem.Tension(x=TENSION[1], y=TENSION[0]),
+        axes=axes,
+    )
+    assert abs(third.K - ops.K).max() < 1e-9 * abs(ops.K).max()
+
+
+def test_strips_held_at_two_opposite_edges_are_beams():
+    # Clamped beams, w l^2 sqrt(m / D) = 22.373, 61.673, 120.90 (Blevins 1979, table 8-1), nu = 0.
+    material = orthotropic(density=800, young_x=5.5e9, young_y=2.5e9, poisson_xy=0.0)
+    edges = Mounting(edges=("left", "right"))
+    body = replace(SMALL, width=0.1, height=0.02, material=material, mounting=edges)
+    beam = np.array([22.373, 61.673, 120.90]) * np.sqrt(5.5e9 * DEEP**3 / 12 / 0.08)
+    hz = fem.modes(operators(build(body, 0.1 / 40, symmetry="y")), 3)[0]  # without twist
+    np.testing.assert_allclose(hz, beam / (2 * np.pi * 0.1**2), rtol=5e-3)
+    modes = plate_modes(plate_of(body))
+    at_middle = abs(modes.at([[0.011, 0.0]])[0])
+    bending = np.sqrt(modes.squared[at_middle > 1e-6 * at_middle.max()]) / (2 * np.pi)
+    np.testing.assert_allclose(np.sort(bending)[:3], beam / (2 * np.pi * 0.1**2), rtol=1e-3)
+
+
+def test_a_stretched_sheet_without_stiffness_is_a_membrane():
+    thickness, T = 1e-3, 50.0
+    mesh = meshes.sheet(0.06, 0.05, thickness, 0.05 / 14)
+    soft = from_young(density=0.08 / thickness, young=1e2, poisson=0.3)
+    fixed = np.ones(mesh.points.shape, bool)
+    fixed[:, 2] = False  # in its plane it is as soft
+    fixed[np.unique(mesh.facets["sides"]), 2] = True
+    ops = fem.assemble(mesh, soft, fixed=fixed, tension=fem.Tension(x=T, y=T))
+    hz = fem.modes(ops, 3)[0]
+    waves = np.hypot(np.array([1, 2, 1]) / 0.06, np.array([1, 1, 2]) / 0.05)
+    np.testing.assert_allclose(hz, np.sqrt(T / 0.08) / 2 * waves, rtol=5e-3)
+
+
+@pytest.mark.parametrize("rise", [0.5e-3, 2e-3])
+def test_frequencies_of_a_curled_sheet_are_those_of_a_shallow_shell(rise):
+    # m w^2 = D k^4 + E h kappa^2 b^4 / k^4, k^2 = a^2 + b^2: Donnell's equations on shear
+    # diaphragms, by Airy's function of the membrane forces.
+    solid, thickness = from_young(density=800, young=4e9, poisson=0.3), 0.01 * HIGH
+    a, b = np.arange(1, 6, 2)[:, None] * np.pi / WIDE, np.arange(1, 6, 2) * np.pi / HIGH
+    bent = 4e9 * DEEP**3 / 12 / 0.91 * (a**2 + b**2) ** 2
+    shell = 4e9 * DEEP * (8 * rise / WIDE**2) ** 2 * b**4 / (a**2 + b**2) ** 2
+    exact = np.sort(np.sqrt((bent + shell) / 0.08), axis=None)[:2] / (2 * np.pi)
+    mesh, fixed = quarter(thickness, 15, "even", "even")
+    middle = fem.Membrane(triangles=meshes.middle_plane(mesh), thickness=DEEP, material=solid)
+    stiffener = fem.shell_stiffness(
+        mesh, middle, lambda at: at * [-8 * rise / WIDE**2, 0], meshed=(DEEP / thickness) ** 2
+    )
+    ops = fem.assemble(mesh, equivalent(thickness, solid), fixed=fixed, stiffener=stiffener)
+    assert exact[0] > 1.5 * np.sqrt(bent[0, 0] / 0.08) / (2 * np.pi)
+    np.testing.assert_allclose(fem.modes(ops, 2)[0], exact, rtol=7e-3)
+
+
+TWO = Mounting(edges=("left", "right"), tension_x=30.0, tension_y=10.0)
+CLIPPED = Mounting(edges=("back",), clips=((-0.02, -0.02), (0.02, -0.02)), clip_radius=4e-3)
+
+
+@pytest.mark.parametrize(
+    "mounting", [TWO, CLIPPED, Mounting(support="simply"), Mounting(edges=("front", "left"))]
+)
+def test_elements_deflect_as_ritzs_plate_does(mounting):
+    body, places = replace(SMALL, mounting=mounting), np.array([[0, 0], [0.011, 0.004]])
+    made = build(body, 0.05 / 20)
+    P = fem.load_operator(made.mesh)
+    points = fem.facet_points(made.mesh)
+    spot = np.exp(-(points[:, :2] ** 2).sum(axis=1) / 2 / 0.00435**2)
+    u = fem.probe_operator(made.mesh, places) @ fem.static(operators(made), P @ spot)
+    modes = plate_modes(plate_of(body))
+    x, weight = np.polynomial.legendre.leggauss(40)
+    shapes = modes.on_grid(0.025 * x, 0.025 * x)
+    y = np.exp(-((0.025 * x) ** 2) / 2 / 0.00435**2) * weight * 0.025
+    exact = modes.at(places) @ (np.outer(y, y).ravel() @ shapes / modes.squared)
+    np.testing.assert_allclose(u, exact, rtol=0.025 if mounting.clips else 0.015)
+
+
+def test_modes_of_a_sheet_in_clips_are_those_of_ritzs_plate():
+    corners = tuple((x, y) for x in (-0.025, 0.025) for y in (-0.02, 0.02))
+    body = replace(SMALL, mounting=Mounting(edges=(), clips=corners, clip_radius=5e-3))
+    found = fem.modes(operators(build(body, 0.05 / 32, symmetry="xy")), 4)[0]
+    even = plate_modes(plate_of(body)).families[0].squared[:4]
+    np.testing.assert_allclose(found, np.sqrt(even) / 2 / np.pi, rtol=4e-3)
+
+
+@pytest.mark.parametrize("mounting", [TWO, replace(CLIPPED, edges=("front", "back"))])
+def test_half_a_sheet_and_its_mirror_images_are_the_whole(mounting):
+    both = tuple((x, y) for x in (-0.02, 0.02) for y in (-0.02, 0.02)) * bool(mounting.clips)
+    body = replace(SMALL, mounting=replace(mounting, clips=both))
+    scene = Scene(pressure=MovingPressure(tacton=Tacton(am_frequency=140)), body=body)
+    assert symmetry(scene) == "xy"
+    whole, part = (build(body, 0.05 / 8, symmetry=axes) for axes in ("", "xy"))
+    found = []
+    for made in (whole, part):
+        P = fem.load_operator(made.mesh)
+        u = fem.static(operators(made), P @ np.ones(P.shape[1]))
+        found.append(fem.probe_operator(made.mesh, [[0.01, 0.007]]) @ u)
+    assert found[1] == pytest.approx(found[0], rel=1e-8)
+
+
+def test_supports_that_are_not_mirrored_have_no_symmetry():
+    assert Mounting(edges=("left",)).symmetry == "y"
+    assert Mounting(edges=("left", "back")).symmetry == ""
+    assert Mounting(clips=((0.01, 0.0),)).symmetry == "y"
+
+
+def test_steady_motion_by_plate_modes_is_that_of_elements():
+    lossy = replace(PAPER, loss_factor=0.03)
+    body = replace(SMALL, material=lossy, mounting=replace(TWO, edges=tuple(EDGES),
+                   support="simply"), air=True)  # fmt: skip
+    pressure = MovingPressure(tacton=Tacton(am_frequency=140, duration=1.0))
+    scene = Scene(pressure=pressure, body=body, probes=((0.0, 0.0), (0.01, 0.005)))
+    request = Request(
+        times=np.arange(10_000) / 1e4, tolerance=0.05, report=lambda *_: None, h=2.5e-3
+    )
+    found = [named(model).solve(scene, request).values[9000:] for model in ("plate-modes", "fem")]
+    wave = np.exp(-2j * np.pi * 140 * np.arange(1000) / 1e4)
+    ritz, elements = (abs(wave @ values) for values in found)
+    np.testing.assert_allclose(ritz, elements, rtol=0.01)
+
+
+def test_waves_of_an_infinite_stretched_sheet():
+    solid, T, w = from_young(density=800, young=4e9, poisson=0.3, loss_factor=0.03), 20.0, 880.0
+    curves = sheet_curves(solid, DEEP, [w / 2 / np.pi], tension=T)
+    D = solid.complex_modulus(w) * DEEP**3 / 6 / 0.7
+    for mode in curves.modes:
+        k = complex(mode.wavenumbers[0])
+        assert D * k**5 + T * k**3 == pytest.approx((0.08 * k + 2.4) * w**2, rel=1e-9)
+    k = np.array([100.0 + 0j])
+    G = thin_sheet(solid, DEEP, tension=T)(k, np.array([[w + 0j]]))
+    assert 1 / G[0, 0] == pytest.approx(D * k[0] ** 4 + T * k[0] ** 2 - (0.08 + 0.024) * w**2)
+    body = replace(SMALL, material=solid, air=True, mounting=Mounting(tension_x=30, tension_y=10))
+    k = bending_wavenumber(body, 140.0)
+    total = body.bending_stiffness * k**4 + T * k**2
+    assert total == pytest.approx((0.08 + air_mass(body, 140.0)) * (280 * np.pi) ** 2, rel=1e-9)
+
+
+def strip(cells, material, tension, length=0.1):
+    """Strip across which nothing changes, at large deflection."""
+    h = length / cells
+    thickness = 0.48 * h
+    mesh = meshes.sheet(length, 2 * h, thickness, h)
+    missing = (1 - (DEEP / thickness) ** 2) * DEEP
+    layer = fem.Membrane(triangles=meshes.middle_plane(mesh), thickness=missing, material=material)
+    fixed = {"left": "xyz", "right": "xyz", "front": "y", "back": "y"}
+    solid = equivalent(thickness, material)
+    return mesh, fem.finite_strain(
+        mesh, solid, fixed=fixed, membrane=layer, tension=fem.Tension(x=tension, y=0.0)
+    )
+
+
+@pytest.mark.parametrize("tension", [0.0, 20.0])
+def test_large_cylindrical_bending_of_a_stretched_orthotropic_strip(tension):
+    # Timoshenko and Woinowsky-Krieger (1959), section 3: immovable clamped edges.
+    length, q, Q = 0.1, 20.0, PAPER.plane_stress[0, 0]
+    x = np.linspace(-length / 2, length / 2, 2001)
+
+    def deflection(N):
+        k, half = np.sqrt(N / (Q * DEEP**3 / 12)), length / 2
+        bent = half * (np.cosh(k * x) - np.cosh(k * half)) / (k * np.sinh(k * half))
+        return q / N * (bent + (half**2 - x**2) / 2)
+
+    def lacking(S):
+        slope = np.gradient(deflection(tension + S), x)
+        return S - Q * DEEP / 2 / length * np.trapezoid(slope**2, x)
+
+    exact = deflection(tension + brentq(lacking, 1e-3, 1e4)).max()
+    mesh, body = strip(20, PAPER, tension)
+    P = fem.load_operator(mesh)
+    u = nonlinear.static(body, P @ np.full(P.shape[1], q))
+    assert exact > 4 * DEEP
+    assert (fem.probe_operator(mesh, [[0, 0]]) @ u)[0] == pytest.approx(exact, rel=7e-3)
+
+
+def test_the_tangent_is_the_derivative_of_the_force_and_that_of_the_energy():
+    _, body = strip(6, PAPER, 20.0)
+    rng, n, e = np.random.default_rng(0), len(body.operators.free), 1e-4
+    u, v = 1e-4 * rng.normal(size=(2, n))
+    rate = (body.internal(u + e * v) - body.internal(u - e * v)) / 2 / e
+    np.testing.assert_allclose(body.tangent(u) @ v, rate, atol=1e-6 * abs(rate).max())
+    work = (body.energy(u + e * v) - body.energy(u - e * v)) / 2 / e
+    assert body.internal(u) @ v == pytest.approx(work, rel=1e-6)
+    rest = body.tangent(np.zeros(n)) - body.operators.K
+    assert abs(rest).max() < 1e-9 * abs(body.operators.K).max()
+
+
+def test_stretched_sheets_at_large_deflection_begin_as_linear_ones():
+    body = replace(SMALL, material=replace(PAPER, loss_factor=0.1), mounting=TWO)
+    tacton = Tacton(am_frequency=140, duration=0.02, amplitude=0.05)
+    scene = Scene(pressure=MovingPressure(tacton=tacton), body=body, probes=((0.0, 0.0),))
+    request = Request(times=np.arange(200) / 1e4, tolerance=0.05, report=lambda *_: None)
+    nonlinear_, plate = (
+        named(m).solve(scene, replace(request, h=0.05 / 16 if m == "fem-nonlinear" else None))
+        for m in ("fem-nonlinear", "plate-modes-transient")
+    )
+    apart = np.linalg.norm(nonlinear_.values - plate.values)
+    assert apart < 0.05 * np.linalg.norm(plate.values)
+
+
+def test_the_sag_of_any_support():
+    scene = Scene(pressure=MovingPressure(tacton=Tacton(am_frequency=140)), body=SMALL)
+    elastic = replace(fem.PRESETS["paper"], loss_factor=0.0)
+    square = replace(SMALL, width=0.1, height=0.1, material=elastic)
+    simply = replace(square, mounting=Mounting(support="simply"))
+    # Timoshenko and Woinowsky-Krieger (1959), tables 23 and 37.
+    for body, published in ((square, 0.0056), (simply, 0.0116)):
+        found = middle_compliance(body) * body.bending_stiffness / 0.1**2
+        assert found == pytest.approx(published, rel=5e-3)
+    lossy = replace(elastic, loss_factor=0.1)
+    sags = [mean_sag(replace(scene, body=replace(b, material=lossy))) for b in (simply, square)]
+    assert sags[0] / sags[1] == pytest.approx(0.0116 / 0.0056, rel=5e-3)
+    softer = lossy.complex_modulus(0.0).real / lossy.shear_modulus
+    assert sags[1] * softer == pytest.approx(mean_sag(replace(scene, body=square)), rel=1e-9)
+
+
+STRETCHED = """
+[body]
+kind = "sheet"
+grammage_g_m2 = 60
+[body.material]
+density_kg_m3 = 750
+young_x_pa = 6e9
+young_y_pa = 2.5e9
+poisson_xy = 0.3
+shear_xy_pa = 1.4e9
+[body.mounting]
+clips_mm = [[-40, 40], [40, 40]]
+clip_radius_mm = 6
+tension_y_n_per_m = 12.5
+curl_x_mm = -1.5
+"""
+
+
+def test_scenes_of_sheets_are_read_and_written():
+    scene = loads(STRETCHED)
+    assert loads(dumps(scene)) == scene
+    body = scene.body
+    assert body.depth == pytest.approx(80e-6)
+    assert body.mass_per_area == pytest.approx(0.06)
+    assert (body.mounting.edges, body.mounting.tension_y) == ((), 12.5)
+    assert body.solid.plane_stress[2, 2] == 1.4e9
+    thick = loads(STRETCHED.replace("grammage_g_m2 = 60", "grammage_g_m2 = 60\nthickness_mm = 0.1"))
+    assert (thick.body.depth, thick.body.solid.density) == (1e-4, pytest.approx(600))
+    assert loads(dumps(thick)) == thick
+    assert loads(dumps(replace(scene, body=BODIES["a4-sheet"]))).body == BODIES["a4-sheet"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('[body]\nkind = "slab"\nmaterial = "paper-grain"', "orthotropic material is for a sheet"),
+        ('[body]\nkind = "slab"\ngrammage_g_m2 = 80', "grammage_g_m2 is for a sheet"),
+        ('[body]\nkind = "slab"\nmounting = {}', "mounting is for kind"),
+        ('[body]\nkind = "sheet"\nmounting = {edges = ["top"]}', "edge 'top'"),
+        ('[body]\nkind = "sheet"\nmounting = {edges = []}', "unconstrained"),
+        ('[body]\nkind = "sheet"\nmounting = {tension_x_n_per_m = -1}', "0 or above"),
+        ('[body]\nkind = "sheet"\nmounting = {clips_mm = [[80, 0]]}', "off the sheet"),
+        (
+            '[body]\nkind = "sheet"\nmounting = {edges = ["left"], support = "simply"}',
+            "turns about",
+        ),
+        (
+            '[body]\nkind = "sheet"\nsides = "absorbing"\nmounting = {tension_x_n_per_m = 1}',
+            "absorb",
+        ),
+        ('[body]\nkind = "sheet"\n[body.material]\ndensity_kg_m3 = 800\nyoung_x_pa = 1e9', "lacks"),
+        ('[body]\nkind = "sheet"\ngrammage_g_m2 = 0', "above 0"),
+    ],
+)
+def test_what_no_sheet_has_is_refused(text, said):
+    with pytest.raises(ValueError, match=said):
+        loads(text)
+
+
+def test_models_say_which_sheets_they_are_not_for():
+    def refused(model, body):
+        load = MovingPressure(tacton=Tacton(am_frequency=140))
+        return beyond(named(model), Scene(pressure=load, body=body, probes=((0.0, 0.0),)))
+
+    assert [limit.cure for limit in refused("flat-body", SMALL)] == ["take an isotropic material"]
+    two = replace(SMALL, material="paper", mounting=TWO)
+    (limit,) = refused("flat-body", two)
+    assert "stretched by 30 and 10 N/m" in limit.why
+    assert not refused("flat-body", replace(two, mounting=replace(TWO, tension_y=30.0)))
+    for model in ("flat-body", "plate-modes", "fem-nonlinear"):
+        (limit,) = refused(model, replace(two, mounting=Mounting(curl_y=1e-3)))
+        assert "curled" in limit.why
+    for model in ("fem", "fem-transient"):
+        (limit,) = refused(model, replace(two, air=True))
+        assert limit.cure == "leave out its air"
+    assert not refused("plate-modes", replace(two, air=True))
+    (limit,) = refused("plate-modes", replace(SMALL, sides="absorbing"))
+    assert "that is held" in limit.why
+    scene = Scene(pressure=MovingPressure(tacton=Tacton(am_frequency=140)), body=two)
+    required = plan(scene, model="plate-modes")
+    assert (required.model, required.h) == ("plate-modes", None)
+
+
+def test_assumptions_that_a_sheet_keeps_by_its_mounting():
+    scene = Scene(
+        pressure=MovingPressure(tacton=Tacton(am_frequency=140)),
+        body=replace(SMALL, material="paper", mounting=replace(TWO, tension_y=30.0)),
+    )
+    framed = replace(scene, body=replace(scene.body, mounting=Mounting()))
+    assert set(droppable(framed)) - set(droppable(scene)) == {"vacuum"}  # without a frame, no air
+    grained = set(droppable(replace(scene, body=SMALL)))
+    assert grained - set(droppable(scene)) >= {"alike in all directions"}
+
+
+def test_elements_damp_each_mode_of_a_stretched_sheet_by_its_loss_factor():
+    """Navier's modes: m s^2 + D h(s) k^4 + T k^2 = 0, h the relative modulus of bending."""
+    solid, T = from_young(density=800, young=4e9, poisson=0.3, loss_factor=0.1), 20.0
+    held = Mounting(edges=tuple(EDGES), support="simply", tension_x=T, tension_y=T)
+    body = replace(SMALL, material=solid, mounting=held)
+    found = prepare(body, np.zeros((1, 2)), h=5e-3).body.poles.values
+    k2, D = (np.pi / 0.06) ** 2 + (np.pi / 0.05) ** 2, body.bending_stiffness
+    h = s = 1.0
+    for _ in range(20):
+        s = 1j * np.sqrt((D * h * k2**2 + T * k2) / 0.08)
+        h = solid.complex_modulus(-1j * s) / solid.shear_modulus
+    nearest = found[np.abs(found - s).argmin()]
+    assert nearest.imag == pytest.approx(s.imag, rel=0.01)
+    assert nearest.real == pytest.approx(s.real, rel=0.03)
+
+
+@pytest.mark.parametrize("losses", [{"viscosity": 5e4}, {"loss_factor": 0.3}])
+def test_a_sheet_from_rest_starts_by_pressure_over_mass(losses):
+    solid = from_young(density=800, young=1.3e9, poisson=0.3, **losses)
+    body = replace(SMALL, material=solid, width=0.02, height=0.02, depth=2e-4)
+    scene = Scene(
+        pressure=MovingPressure(tacton=Tacton(duration=0.03)), body=body,
+        probes=((0.0, 0.0), (0.005, 0.0)), quantity="acceleration",
+    )  # fmt: skip
+    request = Request(times=np.arange(300) / 1e4, tolerance=0.05, report=lambda *_: None)
+    found = named("plate-modes-transient").solve(scene, request).values[0]
+    pressed = scene.pressure(np.array([[0.0, 0.0, 0.0], [0.005, 0.0, 0.0]]), 0.0)
+    np.testing.assert_allclose(found, pressed / 0.16, rtol=0.03)

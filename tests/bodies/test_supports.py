@@ -1,0 +1,275 @@
+"""Supports of a body: Young's modulus, sides one by one, and an elastic base."""
+
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+import pytest
+
+import fem
+from fem.boundary import springs
+from fem.load_and_probe import facet_normals
+from meshes import block, boundary_facets
+from simple_model import Material, Stack, from_young
+from simple_model.compliance import layered
+from simple_model.dispersion import dispersion_curves
+from simple_model.flat_quantities import quantity_field
+from simple_model.layered import surface_compliance
+from simple_model.quantities import DISPLACEMENT
+from simple_model.wavenumber_integral import point_integrals
+from skinwave import Body, dumps, loads
+from skinwave.bodies import Sides
+from skinwave.bodies.analytic import stack
+from skinwave.bodies.build import build, operators
+from skinwave.bodies.hands import support
+from skinwave.models.free_keys import FreeKey, with_values
+from skinwave.models.loads import surface_load
+from skinwave.models.prepared import answer, prepare
+from skinwave.planning.boundaries import absorbing_error
+from skinwave.planning.estimates import side_reflections
+from skinwave.planning.extent import symmetry
+from skinwave.planning.plan import plan
+from skinwave.planning.simulate import compute
+from skinwave.scene.scene import Load
+from skinwave.scene.variation import varied
+
+SOLID = Material(density=1000, shear_modulus=2e4, poisson=0.3, viscosity=6.0)
+SOFT = Material(density=1000, shear_modulus=6e3, poisson=0.49, viscosity=2.0)
+YOUNG = "[body.material]\ndensity_kg_m3 = 1000\npoisson = 0.25\nyoung_modulus_pa = 75e3\n"
+WIDTH = 7e-3  # m, standard deviation: a spot that coarse elements resolve
+BED = 3e6  # N/m3: a slab of 10 mm of SOLID is about twice as stiff in shear
+
+
+def test_youngs_modulus_is_another_name_of_the_shear_modulus():
+    scene = loads(YOUNG)
+    assert scene.body.solid == from_young(density=1000, young=75e3, poisson=0.25)
+    assert scene.body.solid.shear_modulus == 30e3
+    assert "shear_modulus_pa = 30000.0" in dumps(scene)
+    assert "young" not in dumps(scene)
+    assert loads(dumps(scene)) == scene
+    assert loads(YOUNG + "shear_modulus_pa = 30e3").body == scene.body
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (YOUNG + "shear_modulus_pa = 29e3", r"a shear modulus of 30000 Pa .* = 29000; leave out"),
+        (YOUNG.replace("poisson = 0.25", ""), "has young_modulus_pa without poisson"),
+        (YOUNG.replace("75e3", "-1"), "has young_modulus_pa = -1; give one above 0"),
+    ],
+)
+def test_contradictory_moduli_are_refused(text, said):
+    with pytest.raises(ValueError, match=said):
+        loads(text)
+
+
+def test_youngs_modulus_is_varied_and_free_like_the_shear_modulus():
+    scene = loads("[body]")
+    young = "body.material.young_modulus_pa"
+    assert varied(scene, {young: 60e3}).body.solid.young == pytest.approx(60e3)
+    key = FreeKey(key=young, part=None, path=("young_modulus_pa",), low=1e4, high=1e5)
+    assert with_values(scene.body, [key], {young: 60e3}).solid.young == pytest.approx(60e3)
+
+
+@pytest.mark.parametrize(
+    ("given", "width"),
+    [("spread = 0.3", (0.3,)), ("standard_error = 5e3", (2e3,)), ("low = 50e3, high = 100e3",
+     (20e3, 40e3))],
+)  # fmt: skip
+def test_a_spread_of_youngs_modulus_is_one_of_the_shear_modulus(given, width):
+    """E / 2 (1 + nu), 0.4 of it."""
+    scene = loads(YOUNG.replace("75e3", f"{{ value = 75e3, {given} }}"))
+    ((key, found),) = scene.spreads
+    assert key == "body.material.shear_modulus_pa"
+    np.testing.assert_allclose(found.width, width)
+    assert loads(dumps(scene)) == scene
+
+
+def test_sides_are_named_one_by_one_and_alike_they_are_one_word():
+    scene = loads('[body]\nsides = { left = "clamped", right = "free" }')
+    assert scene.body.sides == Sides(
+        left="clamped", right="free", front="absorbing", back="absorbing"
+    )
+    assert loads(dumps(scene)) == scene
+    assert scene.body.is_held
+    assert scene.body.symmetry == symmetry(scene) == "y"
+    every = ", ".join(f'{side} = "free"' for side in ("left", "right", "front", "back"))
+    assert loads(f"[body]\nsides = {{ {every} }}").body == loads('[body]\nsides = "free"').body
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('sides = { lft = "free" }', "did you mean 'left'"),
+        ('sides = { left = "elastic" }', "side 'elastic' is unknown, use one of clamped"),
+        ('kind = "palm"\nsides = { left = "free" }', "its sides are front and back"),
+        ('kind = "sheet"\nsides = { left = "free" }', "edges in its mounting"),
+        ('base = "elastic"', "base_stiffness = 0 N/m3 of an elastic base must be"),
+        ("base_stiffness_n_per_m3 = 1e6", "is that of an elastic base, and this one is clamped"),
+        ('base = "elastic"\nbase_stiffness_n_per_m3 = 1e6\nthickness_mm = inf', "not a half-space"),
+        ('kind = "sheet"\nbase = "elastic"\nbase_stiffness_n_per_m3 = 1e6', "not a sheet"),
+    ],
+)
+def test_supports_that_a_body_has_not_are_refused(text, said):
+    with pytest.raises(ValueError, match=said):
+        loads(f"[body]\n{text}")
+
+
+def only(side):
+    """A block that is clamped at one side."""
+    free = dict.fromkeys(("left", "right", "front", "back"), "free")
+    return Sides(**free | {side: "clamped"})
+
+
+@pytest.mark.parametrize(("side", "axis", "end"), [("left", 0, 1), ("back", 1, -1)])
+def test_a_block_that_one_side_holds_is_a_cantilever(side, axis, end):
+    """Tip deflection q L^4 / 8 E I + q L^2 / 2 kappa G A (Timoshenko, kappa = 5/6)."""
+    length, across, depth, solid = 0.02, 0.004, 0.004, replace(SOLID, poisson=0.0)
+    size = {"width": across, "height": across} | {("width", "height")[axis]: length}
+    body = Body(material=solid, **size, depth=depth, base="free", sides=only(side))
+    made = build(body, 2e-3)
+    assert made.fixed == {side: "xyz"}
+    P, points = surface_load(made)
+    u = fem.static(operators(made), P @ np.ones(len(points)))
+    tip = np.zeros((1, 2))
+    tip[0, axis] = end * length / 2
+    bent = across * length**4 / (8 * solid.young * across * depth**3 / 12)
+    sheared = across * length**2 / (2 * 5 / 6 * solid.shear_modulus * across * depth)
+    found = (fem.probe_operator(made.mesh, tip) @ u)[0]
+    assert found == pytest.approx(bent + sheared, rel=0.02)
+
+
+def test_a_side_that_absorbs_stands_for_more_of_the_body():
+    """A slab clamped at its left: moving the absorbing right side away changes nothing."""
+    sides = Sides(left="clamped", right="absorbing", front="absorbing", back="absorbing")
+    base = {"material": SOLID, "height": 0.03, "depth": 0.006, "sides": sides}
+    near = Body(width=0.03, **base)
+    beyond = Body(width=0.05, **base)
+    found = []
+    for body, shift in ((near, 0.0), (beyond, 0.010)):
+        made = build(body, 3e-3)
+        probes = np.array([[-0.005, 0.0], [0.0, 0.003], [0.005, 0.0]]) - [shift, 0]
+        P, points = surface_load(made)
+        spot = np.exp(-((points[:, :2] + [shift, 0]) ** 2).sum(axis=1) / 2 / 4.35e-3**2)
+        u = fem.harmonic(operators(made), P @ spot, [200.0])[0]
+        found.append(fem.probe_operator(made.mesh, probes) @ u)
+        assert made.fixed == {"bottom": "xyz", "left": "xyz"}
+    assert np.abs(found[0] - found[1]).max() < 0.01 * np.abs(found[1]).max()
+
+
+def errors_beside_the_wavenumber_integral(scene, found):
+    exact = compute(scene, "flat-body").values
+    return np.linalg.norm(found - exact, axis=0) / np.linalg.norm(exact, axis=0)
+
+
+def test_an_absorbing_base_stands_for_a_half_space():
+    """From rest and with the mean, at 20 Hz, where a wave is 250 mm long."""
+    scene = loads(
+        "[tacton]\nam_frequency_hz = 20\nduration_s = 0.06\n[body]\nbase = 'absorbing'\n"
+        "size_x_mm = 30\nsize_y_mm = 30\nthickness_mm = 12\n[probes]\npoints_mm = [[0, 0], [12, 0]]"
+    )
+    prepared = prepare(scene.body, scene.probe_points, h=10e-3, symmetry="xy")
+    found = answer(prepared, scene).values
+    assert errors_beside_the_wavenumber_integral(scene, found).max() < 0.08
+    with pytest.raises(ValueError, match="gravity"):
+        replace(scene, load=Load(gravity=9.81))
+
+
+def test_reflections_of_sides_above_springs_are_in_the_stated_error():
+    scene = loads(
+        "[tacton]\nam_frequency_hz = 212\nduration_s = 0.05\nsuperposition = [1.0, 0.0]\n"
+        "[body]\nsize_x_mm = 24\nsize_y_mm = 24\nthickness_mm = 2.6\nbase = 'elastic'\n"
+        "base_stiffness_n_per_m3 = 1.83e6\nmaterial = {density_kg_m3 = 1000, "
+        "shear_modulus_pa = 9290, poisson = 0.45, viscosity_pa_s = 0.84}\n"
+        "[probes]\npoints_mm = [[9, 0], [0, 6]]"
+    )
+    found = plan(scene, 0.1, model="fem", h=2.6e-3)
+    true = errors_beside_the_wavenumber_integral(scene, answer(found.prepared, scene).values)
+    assert true.max() < 0.1
+    assert true.max() < 1.1 * found.error
+    assert absorbing_error(scene, scene.body) > 0.003
+    assert absorbing_error(scene, replace(scene.body, sides="clamped")) == 0
+
+
+def test_only_sides_that_reflect_count_as_reflecting():
+    text = "[tacton]\nam_frequency_hz = 200\nduration_s = 0.03\n[probes]\npoints_mm = [[15, 0]]\n"
+    text += "[body]\nsize_x_mm = 50\nsize_y_mm = 50\nthickness_mm = 8\n"
+    all_free, near, far = (
+        side_reflections(loads(text + sides))
+        for sides in ('sides = "free"', 'sides = {right = "free"}', 'sides = {left = "free"}')
+    )
+    assert far < 0.3 * near < near < all_free
+
+
+def elastic(*thicknesses, stiffness=BED, solids=(SOFT, SOLID)):
+    return Stack(
+        materials=solids[: len(thicknesses)], thicknesses=thicknesses, base="elastic",
+        base_stiffness=stiffness,
+    )  # fmt: skip
+
+
+def test_a_column_on_springs_yields_by_both():
+    """u = q (1 / k + sum H / M) of a uniform static pressure, and a resonance of the rigid slab."""
+    stack = elastic(4e-3, 6e-3)
+    moduli = [m.first_lame + 2 * m.shear_modulus for m in stack.materials]
+    column = 1 / BED + 4e-3 / moduli[0] + 6e-3 / moduli[1]
+    found = surface_compliance(stack, np.array([1e-2 + 0j]), np.zeros((1, 1), complex))
+    assert found[0, 0].real == pytest.approx(column, rel=1e-5)
+    hard = elastic(5e-3, solids=(replace(SOLID, shear_modulus=1e9),))
+    w = np.array([[0.9 * np.sqrt(BED / 5.0)]], complex)
+    rigid = surface_compliance(hard, np.array([1e-3 + 0j]), w)[0, 0]
+    assert rigid.real == pytest.approx(1 / (BED * (1 - 0.81)), rel=1e-3)
+
+
+@pytest.mark.parametrize(("stiffness", "base"), [(1e14, "clamped"), (1e-3, "free")])
+def test_a_hard_bed_is_rigid_and_a_soft_one_none(stiffness, base):
+    stack = elastic(4e-3, 6e-3, stiffness=stiffness)
+    limit = replace(stack, base=base, base_stiffness=0.0)
+    k, w = np.geomspace(5, 900, 9) + 3j, 2 * np.pi * np.array([[30.0], [200], [600]]) + 0j
+    np.testing.assert_allclose(layered(stack)(k, w), layered(limit)(k, w), rtol=1e-6)
+
+
+def test_dispersion_on_springs_has_the_poles_of_the_wavenumber_integral():
+    layers = elastic(4e-3, 6e-3)
+    f = np.linspace(150.0, 155.0, 6)
+    mode = dispersion_curves(layers, f, most=1).modes[0]
+    along = np.gradient(mode.wavenumbers.real, 2 * np.pi * f)[1:-1]
+    np.testing.assert_allclose(mode.group_speed[1:-1], 1 / along, rtol=1e-3)
+    for hz, k in zip(f, mode.wavenumbers, strict=True):
+        w, beside = np.array([[2 * np.pi * hz]], complex), np.array([1e-6, 2e-6, 0.5])
+        near, twice, far = surface_compliance(layers, k * (1 + beside), w)[0]
+        assert near / twice == pytest.approx(2, rel=1e-3)
+        assert abs(near) > 100 * abs(far)
+
+
+def test_elements_on_springs_meet_the_wavenumber_integral():
+    body = Body(
+        material=SOLID, width=0.06, height=0.06, depth=0.006, base="elastic", base_stiffness=BED
+    )
+    made, xy, hz = build(body, 3e-3), np.array([[0.0, 0.0], [6e-3, 0], [0, 9e-3]]), 150.0
+    P, points = surface_load(made)
+    spot = np.exp(-(points[:, :2] ** 2).sum(axis=1) / 2 / WIDTH**2)
+    u = fem.probe_operator(made.mesh, xy) @ fem.harmonic(operators(made), P @ spot, [hz])[0]
+    field = quantity_field(DISPLACEMENT, stack(body))
+    exact = point_integrals(field, np.hypot(*xy.T), [2 * np.pi * hz], WIDTH)[1, 0]
+    # Of it 1.6 %: elements of 3 mm, and what the absorbing layer returns without a plan.
+    assert np.abs(u - exact).max() < 0.02 * np.abs(exact).max()
+
+
+def test_a_hand_rests_on_springs_where_it_looks_down():
+    """All of the base of a block of 20 x 30 mm, which has no facets of that name; and no end."""
+    body = Body(kind="palm", base="elastic", base_stiffness=BED, sides="free")
+    mesh = block((0.02, 0.03, 0.01), 5e-3)
+    mesh = replace(mesh, facets={"top": mesh.facets["top"]})
+    found = support(body, mesh, facet_normals(mesh, boundary_facets(mesh.tets)), [])
+    below = facet_normals(mesh, found.facets)[:, 2] < -0.5
+    np.testing.assert_array_equal(found.stiffness > 0, below)
+    forces = springs(mesh, found) @ np.ones(mesh.n_dofs)
+    np.testing.assert_allclose(forces.reshape(-1, 3).sum(axis=0), BED * 0.02 * 0.03)
+    assert not found.absorbed.any()
+
+
+def test_a_stack_has_a_stiffness_where_its_base_is_elastic():
+    for given in ({"base": "elastic"}, {"base_stiffness": 1e6}):
+        with pytest.raises(ValueError, match="give an elastic one a finite stiffness"):
+            Stack(materials=(SOLID,), thicknesses=(inf,), **given)

@@ -1,0 +1,248 @@
+"""The command line as its users meet it: results, refusals, interruption."""
+
+import csv
+import json
+import os
+import re
+import sys
+from argparse import Namespace
+from functools import partial
+from itertools import count
+
+import numpy as np
+import pytest
+from corpus import GOOD, SMALL
+
+from skinwave.commands.cli import main, parser
+from skinwave.commands.common import progress_of
+from skinwave.system.steps import follower
+
+CLAMPED = SMALL.replace("[body]", '[body]\nthickness_mm = 8\nsides = "clamped"')
+
+
+def table(path):
+    return list(csv.DictReader(path.read_text().splitlines()))
+
+
+def test_run_leaves_a_folder_that_reproduces_it(scene, capsys):
+    fem = ["--model", "fem", "--h", "6"]
+    assert main(["run", str(scene), "--out", "first", *fem, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["model"] == "fem"
+    assert main(["run", "first/scene.toml", "--out", "second", *fem, "--quiet"]) == 0
+    first, second = (np.load(f"{folder}/responses.npz") for folder in ("first", "second"))
+    assert first["displacement"].shape == (500, 2)
+    np.testing.assert_array_equal(first["fem"], first["displacement"])
+    np.testing.assert_allclose(first["displacement"], second["displacement"], rtol=1e-9)
+    page = (scene.parent / "first/index.html").read_text()
+    assert "data:image/png;base64," in page
+    assert "http:" not in page.replace("https:", "http:").split("<body>")[0]
+    assert json.loads((scene.parent / "first/effort.json").read_text())["dofs"] > 1000
+
+
+@pytest.mark.parametrize("model", ["point-kernel", "flat-body", "fem-harmonic", "fem-transient"])
+def test_run_with_each_model(scene, model):
+    scene.write_text(CLAMPED)
+    arguments = ["run", str(scene), "--model", model, "--h", "15", "--dt", "1e-4", "--quiet"]
+    assert main(arguments) == 0
+    rows = table(scene.parent / "short-out/lines.csv")
+    assert {row["model"] for row in rows} == {model}
+    empty, filled = ("displacement_um", "pressure_pa")[:: 1 if model == "point-kernel" else -1]
+    assert all(row[empty] == "" and float(row[filled]) >= 0 for row in rows)
+
+
+@pytest.mark.usefixtures("in_one_process")
+def test_compare_a_scene_of_ones_own(scene, capsys):
+    scene.write_text(
+        CLAMPED.replace("duration_s = 0.05", "duration_s = 0.3")
+    )  # to tell lines apart
+    assert main(["compare", str(scene), "--h", "6", "--out", "both"]) == 0
+    assert "3 of 3 runs" in capsys.readouterr().out
+    folder = scene.parent / "both"
+    rows = table(folder / "lines.csv")
+    assert ",".join(rows[0]) == (
+        "tacton,body,model,probe_x_mm,probe_y_mm,line,frequency_hz,"
+        "displacement_um,velocity_mm_s,pressure_pa"
+    )
+    assert {(row["body"], row["model"]) for row in rows} == {
+        ("none", "point-kernel-published"), ("none", "point-kernel"), ("slab", "fem"),
+    }  # fmt: skip
+    row = next(r for r in rows if r["body"] == "slab" and r["line"] == "f_AM")
+    velocity = 2 * np.pi * 200 * float(row["displacement_um"]) / 1e3
+    assert float(row["velocity_mm_s"]) == pytest.approx(velocity, rel=1e-4)
+    claims = table(folder / "claims.csv")
+    assert list(claims[0]) == ["claim", "body", "model", "holds", "value", "bar", "sentence"]
+    assert (folder / "short/slab/scene.toml").exists()
+    assert (folder / "short/point-kernel/responses.npz").exists()
+    assert (folder / "figures/short.png").stat().st_size > 10_000
+
+
+def test_plan_gives_a_reason_for_every_row(scene, capsys):
+    assert main(["plan", str(scene), "--tolerance", "0.02"]) == 0
+    printed = capsys.readouterr().out
+    assert "flat-body" in printed
+    assert "highest line" in printed
+    scene.write_text(GOOD)  # its sides are clamped
+    assert main(["plan", str(scene), "--json"]) == 0
+    required = json.loads(capsys.readouterr().out)
+    assert required["model"] == "fem"
+    assert 0.001 < required["h"] < 0.008
+    assert all(row["reason"] for row in required["rows"])
+
+
+def refused(capsys, *arguments):
+    """The one sentence with which a call is refused."""
+    assert main([str(argument) for argument in arguments]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.count("\n") == 1
+    assert "Traceback" not in captured.err
+    return captured.err
+
+
+def test_a_run_without_the_cache_leaves_nothing_in_it(scene, monkeypatch, tmp_path, capsys):
+    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path / "cache"))
+    scene.write_text(GOOD)  # soon reduced
+    run = ["run", str(scene), "--model", "fem", "--h", "10", "--quiet", "--overwrite"]
+    assert main([*run, "--no-cache"]) == 0
+    assert not (tmp_path / "cache").exists()
+    assert os.environ["SKINWAVE_CACHE"] == str(tmp_path / "cache")  # as before
+    assert main(run) == 0
+    kept = {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").iterdir()}
+    assert kept
+    assert main([*run, "--no-cache"]) == 0
+    assert {p: p.stat().st_mtime_ns for p in (tmp_path / "cache").iterdir()} == kept
+    with pytest.raises(SystemExit):
+        main(["run", "--help"])
+    assert "SKINWAVE_CACHE" in capsys.readouterr().out
+
+
+def test_what_exists_is_kept(scene, capsys):
+    (scene.parent / "kept").mkdir()
+    (scene.parent / "kept/note.txt").write_text("mine")
+    assert "pass --overwrite" in refused(capsys, "run", scene, "--out", "kept")
+    assert "pass --overwrite" in refused(capsys, "compare", scene, "--out", "kept")
+    assert (scene.parent / "kept/note.txt").read_text() == "mine"
+
+
+def test_overwriting_replaces_only_when_all_is_written(scene, capsys):
+    arguments = ["run", scene, "--out", "kept", "--overwrite"]
+    known = ["--model", "point-kernel", "--quiet"]
+    assert main([*map(str, arguments), *known]) == 0
+    capsys.readouterr()
+    before = (scene.parent / "kept/record.json").stat()
+
+    def written():  # not when it was read
+        now = (scene.parent / "kept/record.json").stat()
+        return now.st_ino, now.st_mtime_ns, now.st_size
+
+    as_before = written()
+    assert "solver 'nonsense' is unknown" in refused(capsys, *arguments, "--solver", "nonsense")
+    assert written() == as_before
+    assert main([*map(str, arguments), *known]) == 0
+    assert (scene.parent / "kept/record.json").stat().st_ino != before.st_ino
+    assert (scene.parent / "kept/index.html").exists()
+    assert sorted(p.name for p in scene.parent.iterdir()) == ["kept", "short.toml"]
+
+
+def test_bad_input_is_one_sentence(scene, capsys):
+    assert "cannot be read" in refused(capsys, "run", "missing.toml")
+    scene.write_text("[tacton\n")
+    assert "not valid TOML" in refused(capsys, "run", scene)
+    scene.write_bytes(b"\xff\xfe\x00")
+    assert "short.toml" in refused(capsys, "run", scene)
+    scene.write_text(SMALL)
+    assert "element size -1 mm must" in refused(capsys, "run", scene, "--h", "-1")
+    assert "time step -1 s" in refused(
+        capsys, "run", scene, "--h", "15", "--model", "fem-transient", "--dt", "-1"
+    )
+    assert not (scene.parent / "short-out").exists()
+
+
+def test_unwritable_folders_are_refused(scene, capsys):
+    (scene.parent / "file").write_text("")
+    assert "is a file" in refused(capsys, "run", scene, "--out", "file", "--overwrite")
+    assert "cannot be written" in refused(capsys, "run", scene, "--out", "file/below")
+
+
+def test_wrong_options_exit_with_two(capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["run", "x.toml", "--model", "magic"])
+    assert stop.value.code == 2
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_progress_says_the_step_and_the_time_left(capsys, monkeypatch, terminal):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal)
+    monkeypatch.setenv("COLUMNS", "100")
+    clock = count(0.0, 0.1).__next__
+    monkeypatch.setattr("skinwave.system.progress_bar.follower", partial(follower, clock=clock))
+    with progress_of(Namespace(quiet=False, json=False)) as progress:
+        for phase in ("mesh", "assemble", "factorise"):
+            progress(phase, 0.0)
+        progress("reduce", 0.5)
+        progress("reduce", 0.9)
+    said = capsys.readouterr().err
+    if terminal:
+        assert re.search(r"reduce \(step 4 of 4\) +.* about 1 s left", said)
+    else:
+        assert said.splitlines() == [
+            "mesh (step 1 of 4)", "assemble (step 2 of 4)", "factorise (step 3 of 4)",
+            "reduce (step 4 of 4)",
+        ]  # fmt: skip
+
+
+@pytest.mark.usefixtures("in_one_process")
+def test_ctrl_c_leaves_what_is_finished(scene, monkeypatch, capsys):
+    """Both kernels are finished before the body is reduced."""
+    scene.write_text(CLAMPED)
+    monkeypatch.setattr("skinwave.studies.study.prepare", interrupted)
+    assert main(["compare", str(scene), "--h", "8", "--out", "cut", "--quiet"]) == 1
+    page = (scene.parent / "cut/index.html").read_text()
+    assert "Interrupted: 2 of 3 runs" in page
+    found = sorted((scene.parent / "cut").glob("*/*/responses.npz"))
+    assert [path.parent.name for path in found] == ["point-kernel", "point-kernel-published"]
+    assert sorted(path.name for path in scene.parent.iterdir()) == ["cut", "short.toml"]
+
+
+def interrupted(*given, **options):
+    raise KeyboardInterrupt
+
+
+def test_what_a_page_is_warned_of_is_on_it_whoever_planned(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.toml").write_text(
+        "[tacton]\nam_frequency_hz = 140\nduration_s = 0.02\n"
+        '[body]\nsize_x_mm = 30\nsize_y_mm = 30\nsides = "free"\n[probes]\npoints_mm = [[0, 0]]\n'
+    )
+    for model, cause in (
+        ("fem", "elements of 15 mm will have a relative error"),
+        ("flat-body", "flat-body, which leaves out reflections"),
+    ):
+        asked = ["run", "scene.toml", "--model", model, "--h", "15", "--quiet", "--overwrite"]
+        assert main(asked) == 0
+        said = capsys.readouterr().err
+        assert said.count(f"warning: {cause}") == 1
+        assert f"Take care: {cause}" in (tmp_path / "scene-out/index.html").read_text()
+
+
+def test_a_body_too_demanding_for_any_mesh_is_said_to_be(tmp_path, capsys, monkeypatch):
+    """A run that was left to plan its mesh, with a sequence of meshes that ends too early."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("skinwave.planning.refinement.FINEST", 2.0)
+    (tmp_path / "scene.toml").write_text(
+        '[tacton]\nam_frequency_hz = 140\nshape = "point"\nduration_s = 0.05\n'
+        '[body]\nkind = "sheet"\nmaterial = "paper"\nsize_x_mm = 40\nsize_y_mm = 40\n'
+        'thickness_mm = 0.1\nbase = "free"\nsides = "clamped"\n[probes]\npoints_mm = [[0, 0]]\n'
+    )
+    assert main(["run", "scene.toml", "--model", "fem", "--tolerance", "0.001", "--quiet"]) == 0
+    said = capsys.readouterr().err
+    assert "warning: elements of" in said
+    assert "more than the tolerance of 0.1 %" in said
+    assert "Take care: elements of" in (tmp_path / "scene-out/index.html").read_text()
+
+
+@pytest.mark.parametrize("command", ["run scene.toml", "relax scene.toml", "mesh hand.stl"])
+def test_the_element_size_has_its_name_of_0_2_too(command):
+    sizes = [
+        parser().parse_args([*command.split(), name, "3"]).h for name in ("--element-size", "--h")
+    ]
+    assert sizes == [3.0, 3.0]

@@ -1,0 +1,446 @@
+"""Coats of thin layers: patch tests, closed forms, wavenumber integrals, and bodies with them."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.sparse.linalg import eigsh
+
+import fem
+import meshes
+from fem.assembly import by_region
+from fem.boundary import fixed_dofs
+from fem.coat import coat_operators, coat_stiffness, surface_of
+from simple_model import Stack
+from simple_model.compliance import layered
+from simple_model.material import PronyTerm
+from simple_model.wavenumber_integral import point_response
+from skinwave.bodies import BODIES, Body, Layer, Relief
+from skinwave.bodies.build import build, operators
+from skinwave.bodies.coat import coarsest_size, coat, coat_count, meshed_strata
+from skinwave.bodies.sizes import check_mesh, default_size
+from skinwave.models.loads import surface_load
+from skinwave.planning.extent import coat_rows
+from skinwave.planning.simulate import compute
+from skinwave.scene.file import dumps, loads
+
+SOFT = fem.Material(density=1000, shear_modulus=1.0, poisson=0.4999)
+STIFF = fem.Material(density=1100, shear_modulus=1e5, poisson=0.3)
+THIN = fem.Coat(materials=(STIFF,), thicknesses=(0.4e-3,))
+EPIDERMIS = Layer(thickness=0.3e-3, material="epidermis")
+PLANE_STRESS = STIFF.young / (1 - STIFF.poisson**2)
+
+
+@cache
+def block(bent=(0.0, 0.0)):
+    """Block of 24 x 24 x 6 mm with an irregular surface grid, whose top has two curvatures."""
+    rng = np.random.default_rng(3)
+    x, y = (
+        np.sort(1e-3 * (np.arange(-12, 12.1, 3) + np.r_[0, rng.uniform(-0.8, 0.8, 7), 0]))
+        for _ in "xy"
+    )
+    flat = meshes.extrude(x, y, np.array([-6e-3, -3e-3, 0.0]))
+    points = flat.points.copy()
+    for axis, curvature in enumerate(bent):
+        if curvature:
+            angle, radius = curvature * points[:, axis], 1 / curvature + points[:, 2]
+            points[:, axis] = radius * np.sin(angle)
+            points[:, 2] = radius * np.cos(angle) - 1 / curvature
+    return replace(flat, points=points)
+
+
+def added(mesh, coat=THIN, soft=SOFT, fixed=None):
+    held = np.zeros(mesh.points.shape, bool) if fixed is None else fixed
+    return coat_operators(mesh, coat, *by_region(mesh, soft), fixed_dofs(mesh, held))
+
+
+def inside(mesh, margin=4.5e-3):
+    """Bump (n,) that vanishes next to the sides of the block."""
+    across = np.abs(mesh.points[:, :2]).max(axis=1)
+    return np.clip(1 - (across / (across.max() - margin)) ** 2, 0, None)
+
+
+def test_a_coat_of_the_material_that_it_replaces_changes_nothing():
+    same = fem.Coat(materials=(SOFT, SOFT), thicknesses=(0.1e-3, 0.3e-3))
+    K, C, M, branches = added(block(), same)
+    assert K.nnz == C.nnz == M.nnz == len(branches) == 0 or abs(K).max() == abs(M).max() == 0
+
+
+def test_a_uniform_strain_in_the_plane_is_exact():
+    mesh, strain = block(), np.array([[2e-3, 7e-4], [7e-4, -1e-3]])
+    u = np.zeros_like(mesh.points)
+    u[:, :2] = mesh.points[:, :2] @ strain
+    force = (added(mesh)[0] @ u.ravel()).reshape(-1, 3)
+    top, sides = np.unique(mesh.facets["top"]), np.unique(mesh.facets["sides"])
+    # A facet at the edge takes part in the moment that acts there, about the surface.
+    at_edge = mesh.facets["top"][np.isin(mesh.facets["top"], sides).any(axis=1)]
+    free = np.setdiff1d(top, at_edge)
+    assert len(free)
+    scale = np.abs(force).max()
+    assert np.abs(force[free]).max() < 1e-9 * scale
+    assert np.abs(np.delete(force, top, axis=0)).max() == 0
+    energy = u.ravel() @ force.ravel()
+    stress = [
+        m.shear_modulus
+        * (2 * strain + 2 * m.poisson / (1 - m.poisson) * np.trace(strain) * np.eye(2))
+        for m in (STIFF, SOFT)
+    ]
+    expected = 0.4e-3 * 24e-3**2 * ((stress[0] - stress[1]) * strain).sum()
+    assert energy == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_uniform_curvature_is_exact():
+    """Normals stay normal: the strain at a height z is z times the curvature."""
+    mesh, curvature = block(), 0.3
+    u = np.zeros_like(mesh.points)
+    u[:, 2] = -curvature * mesh.points[:, 0] ** 2 / 2
+    soft = SOFT.young / (1 - SOFT.poisson**2)
+    energy = u.ravel() @ (added(mesh)[0] @ u.ravel())
+    stiffness = (PLANE_STRESS - soft) * 0.4e-3**3 / 3
+    assert energy == pytest.approx(stiffness * curvature**2 * 24e-3**2, rel=1e-9)
+
+
+def test_layers_of_a_coat_are_stacked_from_the_surface_downwards():
+    """Bending about the surface: the lower of two layers has seven times the stiffness."""
+    mesh = block()
+    u = np.zeros_like(mesh.points)
+    u[:, 2] = mesh.points[:, 0] ** 2
+    weak = STIFF.scaled(modulus=1e-9)
+    energy = {}
+    for materials in ((STIFF, weak), (weak, STIFF)):
+        pair = fem.Coat(materials=materials, thicknesses=(0.2e-3, 0.2e-3))
+        energy[materials[0] is STIFF] = u.ravel() @ (
+            added(mesh, pair, SOFT.scaled(modulus=1e-9))[0] @ u.ravel()
+        )
+    assert energy[False] == pytest.approx(7 * energy[True], rel=1e-6)
+
+
+@pytest.mark.parametrize("bent", [(0.0, 0.0), (40.0, 0.0), (40.0, 40.0)])
+def test_a_rigid_rotation_has_no_energy(bent):
+    mesh = block(bent)
+    turned = np.cross([0.3, -0.5, 0.8], mesh.points).ravel()
+    K = added(mesh)[0]
+    assert np.abs(K @ turned).max() < 1e-9 * abs(K).max() * np.abs(turned).max()
+
+
+@pytest.mark.parametrize("bent", [(0.0, 0.0), (40.0, 40.0)])
+def test_a_coat_alone_has_no_negative_stiffness(bent):
+    """At the least penalty that is enough: with 0.85 of it some modes are negative."""
+    mesh, free = block(bent), np.zeros(block().n_dofs, bool)
+    surface = surface_of(mesh, THIN, free)
+    alike = np.full((1, len(surface.facets)), STIFF.shear_modulus)
+    stiffness = np.linalg.eigvalsh(coat_stiffness(surface, THIN, alike, 0.9 * alike).toarray())
+    assert stiffness[0] > -1e-12 * stiffness[-1]
+
+
+def test_a_coat_couples_only_facets_with_a_common_edge():
+    mesh = block()
+    surface = surface_of(mesh, THIN, np.zeros(mesh.n_dofs, bool))
+    alike = np.full((1, len(surface.facets)), STIFF.shear_modulus)
+    K = coat_stiffness(surface, THIN, alike, alike).tocoo()
+    corners = [set(facet[:3].tolist()) for facet in surface.facets]
+    allowed = {
+        (a, b)
+        for one, ends in zip(surface.facets.tolist(), corners, strict=True)
+        for other, others in zip(surface.facets.tolist(), corners, strict=True)
+        if len(ends & others) >= 2
+        for a in one
+        for b in other
+    }
+    entries = abs(K.data) > 1e-12 * abs(K.data).max()
+    coupled = {(i // 3, j // 3) for i, j in zip(K.row[entries], K.col[entries], strict=True)}
+    assert coupled <= allowed
+
+
+def test_a_coat_on_linear_facets_is_refused():
+    mesh = meshes.extrude(*(np.linspace(0, 1e-2, 3) for _ in "xyz"), order=1)
+    with pytest.raises(ValueError, match="facets of a coat have 3 nodes, and bend with 6"):
+        added(mesh)
+
+
+@pytest.mark.parametrize("bent", [(40.0, 0.0), (40.0, 40.0)], ids=["cylinder", "sphere"])
+def test_a_curved_membrane_under_pressure_has_the_tension_of_laplace(bent):
+    """p = t (sigma_1 / R_1 + sigma_2 / R_2), by the virtual work of a bump."""
+    mesh, radius, growth = block(bent), 25e-3, 1e-6
+    thin = fem.Coat(materials=(STIFF,), thicknesses=(1e-5,))
+    centre = np.array([0.0 if bent[0] else np.nan, 0.0, -radius])
+    out = mesh.points - centre
+    out[:, 1] *= bent[1] > 0
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    u, bump = growth * out, inside(mesh)[:, None] * out
+    strain = growth / radius * np.array([1.0, float(bent[1] > 0)])
+    sigma = PLANE_STRESS * (strain + STIFF.poisson * strain[::-1])
+    pressure = 1e-5 * (sigma[0] + sigma[1] * (bent[1] > 0)) / radius
+    found = bump.ravel() @ (added(mesh, thin)[0] @ u.ravel())
+    P = fem.load_operator(mesh)  # into the body
+    expected = -bump.ravel() @ (P @ np.full(P.shape[1], pressure))
+    assert found == pytest.approx(expected, rel=0.01)
+
+
+def test_the_mass_of_a_coat_is_that_of_what_it_replaces_and_the_difference():
+    mesh = block((40.0, 40.0))
+    up = np.tile([0.0, 0.0, 1.0], len(mesh.points))
+    M = added(mesh)[2]
+    area = np.linalg.norm(fem.load_and_probe.facet_geometry(mesh, mesh.facets["top"])[1], axis=2)
+    inner = area.sum() * ((1 - 40 * 0.4e-3 / 2) ** 2 + (40 * 0.4e-3) ** 2 / 12)
+    assert up @ (M @ up) == pytest.approx(100 * 0.4e-3 * inner, rel=2e-3)
+
+
+def test_moduli_of_a_coat_depend_on_frequency_as_those_of_a_body_do():
+    """Viscosity, Prony terms, and the material replaced, each by its own complex modulus."""
+    zener = PronyTerm(modulus=3e4, time=1e-3)
+    skin = replace(STIFF, viscosity=20.0, prony=(zener, PronyTerm(modulus=1e4, time=1e-4)))
+    below = fem.Material(
+        density=1000, shear_modulus=2e4, poisson=0.49, viscosity=4.0, prony=(zener,)
+    )
+    mesh, w = block(), 2 * np.pi * 140
+    coat = fem.Coat(materials=(skin,), thicknesses=(0.4e-3,))
+    K, C, _, branches = added(mesh, coat, below)
+    assert [branch.time for branch in branches] == [1e-4, 1e-3]
+    surface = surface_of(mesh, coat, np.zeros(mesh.n_dofs, bool))
+    expected = 0
+    for m, sign in ((skin, 1), (below, -1)):
+        alike = np.ones((1, len(surface.facets)))
+        lam = 2 * m.shear_modulus * m.poisson / (1 - m.poisson)
+        part = coat_stiffness(surface, coat, m.shear_modulus * alike, lam * alike)
+        expected += sign * m.complex_modulus(w) / m.shear_modulus * part
+    found = K + 1j * w * C + sum(branch.share(1j * w) * branch.K for branch in branches)
+    dofs = (3 * surface.nodes[:, None] + np.arange(3)).ravel()
+    difference = found[dofs][:, dofs] - expected
+    assert abs(difference).max() < 1e-12 * abs(expected).max()
+
+
+@pytest.mark.parametrize("below", ["palm", "palm-zener"])
+@pytest.mark.parametrize("skin", ["epidermis", "palm-zener", "ecoflex"])
+def test_a_coated_body_has_its_damping_and_branches_as_those_of_the_body_but_at_its_surface(
+    below, skin
+):
+    """Of losses like the body's, of other losses, and of a law of its own."""
+    mesh = block()
+    coat = fem.Coat(materials=(fem.PRESETS[skin],), thicknesses=(0.4e-3,))
+    body, coated = (
+        fem.assemble(mesh, fem.PRESETS[below], fixed="bottom", absorbing="right", coat=each)
+        for each in (None, coat)
+    )
+    assert coated.laws.hold(coated.K, coated.C, coated.M, coated.branches)
+    alike = (below, skin) in [("palm", "epidermis"), ("palm-zener", "palm-zener")]
+    for own, part in zip(body.laws.parts, coated.laws.parts, strict=False):
+        assert (part.stiffness, part.mass) == (own.stiffness, own.mass)
+    if alike:  # one ratio of viscosity, or of the branch, to the modulus
+        damping, *branches = coated.laws.parts
+        assert damping.rest is coated.R
+        assert [part.rest for part in branches] == [None] * len(body.branches)
+
+
+def test_a_body_and_its_coat_share_branches_of_one_time():
+    term = (PronyTerm(modulus=1e3, time=1e-3),)
+    mesh, below = block(), fem.Material(density=1000, shear_modulus=2e4, poisson=0.3, prony=term)
+    stronger = (PronyTerm(modulus=9e3, time=1e-3),)
+    skin = fem.Coat(materials=(replace(STIFF, prony=stronger),), thicknesses=(0.4e-3,))
+    plain = fem.assemble(mesh, below, fixed="bottom")
+    coated = fem.assemble(mesh, below, fixed="bottom", coat=skin)
+    assert len(coated.branches) == 1
+    extra = added(mesh, skin, below, {"bottom": "xyz"})[3][0].K
+    difference = coated.branches[0].K - plain.branches[0].K - extra[plain.free][:, plain.free]
+    assert abs(difference).max() < 1e-12 * abs(extra).max()
+
+
+def test_half_of_a_symmetric_body_moves_as_all_of_it():
+    """Normals do not turn across a plane of symmetry."""
+    x = np.linspace(-9e-3, 9e-3, 7)
+    mesh = meshes.extrude(x, x, np.array([-6e-3, -3e-3, 0.0]))
+    soft = fem.Material(density=1000, shear_modulus=2e4, poisson=0.4)
+    found = {}
+    for axes in ("", "x", "xy"):
+        part, fixed = mesh, {"bottom": "xyz"}
+        for axis in axes:
+            part = meshes.half(part, axis)
+            fixed[f"mirror_{axis}"] = axis
+        operators = fem.assemble(part, soft, fixed=fixed, coat=THIN)
+        at = fem.facet_points(part)
+        load = np.exp(-(at[:, :2] ** 2).sum(axis=1) / 2 / 3e-3**2)
+        u = fem.static(operators, fem.load_operator(part) @ load)
+        found[axes] = fem.probe_operator(part, [[0.0, 0.0], [2e-3, 3e-3]]) @ u
+    np.testing.assert_allclose(found["x"], found[""], rtol=1e-7)
+    np.testing.assert_allclose(found["xy"], found[""], rtol=1e-7)
+
+
+@pytest.mark.parametrize("ratio", [1e-3, 1.0, 1e3])
+def test_a_coat_of_half_an_element_leaves_the_stiffness_positive(ratio):
+    soft = fem.Material(density=1000, shear_modulus=2e4, poisson=0.4999)
+    thick = fem.Coat(materials=(soft.scaled(modulus=ratio),), thicknesses=(1.5e-3,))
+    operators = fem.assemble(block(), soft, fixed="bottom", coat=thick)
+    lowest = eigsh(operators.K, 1, M=operators.M, sigma=0, return_eigenvectors=False)
+    assert lowest[0] > 0
+
+
+FOREARM = fem.PRESETS["forearm"]
+SKIN = fem.from_young(density=1000, young=300e3, poisson=0.4999, viscosity=40.0)
+WIDTH, DEPTH = 4.35e-3, 15e-3
+RADII = np.arange(5) * 5e-3
+
+
+@cache
+def quarter():
+    """Quarter of a slab of 60 x 60 x 15 mm with elements of 3 mm, its operators, load, probes."""
+    x = np.arange(0, 30.1, 3) * 1e-3
+    mesh = meshes.extrude(x, x, np.arange(-15, 0.1, 3) * 1e-3)
+    held = np.zeros(mesh.points.shape, bool)
+    for axis in (0, 1):
+        held[mesh.points[:, axis] < 1e-9, axis] = True
+        held[mesh.points[:, axis] > x[-1] - 1e-9] = True
+    held[mesh.points[:, 2] < -DEPTH + 1e-9] = True
+    at = fem.facet_points(mesh)
+    load = fem.load_operator(mesh) @ np.exp(-(at[:, :2] ** 2).sum(axis=1) / 2 / WIDTH**2)
+    probes = fem.probe_operator(mesh, np.c_[RADII, 0 * RADII])
+    return mesh, held, fem.assemble(mesh, FOREARM, fixed=held), load, probes
+
+
+@cache
+def response(hertz, coat=None):
+    """Motion (p,) of the quarter slab under a focal spot of 1 Pa."""
+    mesh, held, plain, load, S = quarter()
+    if coat is None:
+        return S @ fem.harmonic(plain, load, hertz)[0]
+    K, C, M, _ = added(mesh, coat, FOREARM, held)
+    free = plain.free
+    parts = {name: part[free][:, free] for name, part in zip("KCM", (K, C, M), strict=True)}
+    coated = replace(plain, **{name: getattr(plain, name) + part for name, part in parts.items()})
+    return S @ fem.harmonic(coated, load, hertz)[0]
+
+
+@pytest.mark.parametrize(
+    ("thickness", "hertz", "most"),
+    [(0.3e-3, 140.0, 0.03), (0.3e-3, 400.0, 0.03), (1e-3, 140.0, 0.05)],
+)
+def test_a_coated_slab_moves_as_its_wavenumber_integral_says(thickness, hertz, most):
+    coated = Stack(materials=(SKIN, FOREARM), thicknesses=(thickness, DEPTH - thickness))
+    plain = Stack(materials=(FOREARM,), thicknesses=(DEPTH,))
+    true, bare = (
+        point_response(layered(stack), RADII, [2 * np.pi * hertz], WIDTH)[0]
+        for stack in (coated, plain)
+    )
+    found = response(hertz, fem.Coat(materials=(SKIN,), thicknesses=(thickness,)))
+    size = np.abs(true).max()
+    assert np.abs(found - true).max() < most * size
+    # What the coat changes is met closer: with and without it the mesh has its own error.
+    change = np.abs(found - response(hertz) - (true - bare)).max()
+    assert change < 0.25 * np.abs(true - bare).max()
+
+
+def test_a_coat_without_layers_or_thickness_is_refused():
+    with pytest.raises(ValueError, match="0 materials and 1 thicknesses"):
+        fem.Coat(materials=(), thicknesses=(1e-3,))
+    with pytest.raises(ValueError, match="each must be finite and above 0"):
+        fem.Coat(materials=(STIFF,), thicknesses=(0.0,))
+
+
+def palm(*layers):
+    return Body(kind="palm", layers=layers)
+
+
+def test_thin_layers_on_a_palm_are_a_coat_and_leave_its_elements_as_they_are():
+    body = palm(EPIDERMIS)
+    assert default_size(body) == default_size(BODIES["palm"])
+    check_mesh(body, 5e-3)
+    found = coat(body, 5e-3)
+    assert found.materials == (fem.PRESETS["epidermis"],)
+    assert found.thicknesses == (0.3e-3,)
+    assert [m for _, m in meshed_strata(body, 5e-3)] == [fem.PRESETS["palm"]]
+    (row,) = coat_rows(body, 5e-3)
+    assert row.value == "epidermis of 0.3 mm"
+    assert "thinner than half an element of 5 mm" in row.reason
+    assert not coat_rows(BODIES["palm"], 5e-3)
+    assert coat_rows(BODIES["palm-layers"], 5e-3)[0].what == "layers"
+    fat = Layer(thickness=4e-3, material="fat")
+    _, row = coat_rows(palm(EPIDERMIS, fat), 5e-3)
+    assert (row.what, row.value) == ("layers", "fat of 4 mm")
+    assert "half an element of 5 mm or more" in row.reason
+    assert "times as stiff" not in row.reason
+    stiff = Layer(thickness=0.3e-3, material="forearm-epidermis")
+    (row,) = coat_rows(replace(body, layers=(stiff,), material="forearm-dermis"), 5e-3)
+    assert "it is 100 times as stiff as what it covers, and of 100 times the error is" in row.reason
+
+
+def test_as_few_layers_as_need_be_are_a_coat():
+    dermis = Layer(thickness=0.8e-3, material="dermis")
+    both = palm(EPIDERMIS, dermis)
+    assert coarsest_size(both) == np.inf
+    assert coat_count(both, 5e-3) == 2
+    assert coat_count(both, 2e-3) == 1
+    assert [start for start, _ in meshed_strata(both, 2e-3)] == [0.0, pytest.approx(1.1e-3)]
+
+
+@pytest.mark.parametrize(
+    ("layers", "reason"),
+    [
+        ((Layer(thickness=3e-3, material="fat"), EPIDERMIS), "3.3 mm, too thick for a coat"),
+        ((Layer(thickness=0.8e-3, material="forearm-hypodermis"),), "at most 0.56 mm, a tenth of"),
+    ],
+)
+def test_thin_layers_that_are_no_coat_are_refused_with_the_reason(layers, reason):
+    with pytest.raises(ValueError, match=reason):
+        check_mesh(palm(*layers), 5e-3)
+
+
+def test_a_slab_has_flat_elements_in_its_layers_and_no_coat():
+    assert coat(Body(kind="slab", layers=(EPIDERMIS,)), 3e-3) is None
+
+
+@pytest.fixture(scope="module")
+def lump(tmp_path_factory):
+    """Scene of a body from a file, small, with and without epidermis on it."""
+    x = np.linspace(-15e-3, 15e-3, 7)
+    mesh = meshes.extrude(x, x, np.linspace(-12e-3, 0, 4))
+    file = tmp_path_factory.mktemp("coat") / "lump.vtu"
+    meshes.write(file, replace(mesh, facets={}))
+    layer = "\n[[body.layers]]\nthickness_mm = {}\nmaterial = 'forearm-epidermis'"
+    text = (
+        "[tacton]\nam_frequency_hz = 140\nduration_s = 0.03\n"
+        "[probes]\npoints_mm = [[0, 0], [5, 0]]\n"
+        f"[body]\nkind = 'mesh'\nfile = '{file}'\n"
+    )
+    return {mm: loads(text + (layer.format(mm) if mm else "")) for mm in (0, 0.3)}
+
+
+def test_all_linear_models_have_the_coat(lump):
+    reduced = {mm: compute(scene, "fem").displacement for mm, scene in lump.items()}
+    assert np.linalg.norm(reduced[0.3]) < 0.95 * np.linalg.norm(reduced[0])
+    stepped = compute(lump[0.3], "fem-transient", dt=1e-4).displacement
+    assert np.linalg.norm(stepped - reduced[0.3]) < 0.01 * np.linalg.norm(stepped)
+    steady = compute(lump[0.3], "fem-harmonic").displacement
+    late = slice(len(steady) // 2, None)
+    assert np.linalg.norm((steady - reduced[0.3])[late]) < 0.03 * np.linalg.norm(steady[late])
+
+
+@pytest.mark.parametrize("name", ["palm-layers", "forearm-layers"])
+def test_presets_of_layers_are_scenes(name):
+    body = BODIES[name]
+    check_mesh(body, default_size(body))
+    scene = replace(loads(""), body=body)
+    assert loads(dumps(scene)).body == body
+    assert body.strata[0][1].shear_modulus > body.strata[1][1].shear_modulus
+
+
+@pytest.mark.slow
+def test_a_small_palm_is_meshed_with_its_coat():
+    """On coarse elements: stiff epidermis on the same mesh holds the surface back, at rest."""
+    small = Relief(
+        cup_depth=1e-3, thenar_height=2e-3, hypothenar_height=1e-3, pad_height=0.5e-3,
+        corner_radius=14e-3, edge_radius=4e-3,
+    )  # fmt: skip
+    stiff = Layer(thickness=0.3e-3, material="forearm-epidermis")
+    plain = Body(kind="palm", width=0.04, height=0.045, depth=0.014, relief=small)
+    made = {name: build(replace(plain, layers=layers), 7e-3)
+            for name, layers in (("plain", ()), ("coated", (stiff,)))}  # fmt: skip
+    assert made["plain"].coat is None
+    assert made["coated"].coat.thicknesses == (0.3e-3,)
+    np.testing.assert_array_equal(made["coated"].mesh.points, made["plain"].mesh.points)
+    motion = {}
+    for name, each in made.items():
+        P, points = surface_load(each)
+        force = P @ np.exp(-(points[:, :2] ** 2).sum(axis=1) / 2 / WIDTH**2)
+        u = fem.static(operators(each), force)
+        motion[name] = float((fem.probe_operator(each.mesh, [[0.0, 0.0]]) @ u)[0])
+    assert 0.7 < motion["coated"] / motion["plain"] < 0.99

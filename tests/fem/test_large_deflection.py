@@ -1,0 +1,236 @@
+"""Large displacement beyond the cases of the verification suite, and what it refuses."""
+
+from dataclasses import replace
+from itertools import islice
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy import sparse
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+import fem
+import meshes
+from fem import nonlinear
+from simple_model import MovingPressure, Tacton, Trajectory, from_young
+from simple_model.focus import along_axis
+from skinwave.bodies.mounting import Mounting
+from skinwave.models.stretching import membrane, meshed_sheet, stretching_body
+from skinwave.planning.plan import plan
+from skinwave.planning.simulate import compute
+from skinwave.scene.scene import BODIES, Body, Placement, Scene
+
+PAPER = replace(BODIES["paper-sheet-loose"], width=0.06, height=0.06)
+CIRCLING = MovingPressure(
+    tacton=Tacton(
+        am_frequency=140, duration=0.02, trajectory=Trajectory(shape="circle", size=0.02, speed=12)
+    ),
+    drive="pressure_squared",
+)
+SCENE = Scene(pressure=CIRCLING, body=PAPER, probes=((0.0, 0.0), (0.01, 0.005)))
+
+
+@pytest.fixture(scope="module")
+def sheet():
+    made = meshed_sheet(PAPER, 0.01)
+    return made, stretching_body(PAPER, made)
+
+
+def test_a_follower_presses_against_the_displaced_surface():
+    mesh = meshes.block((0.02, 0.02, 0.01), 0.01)
+    closed = meshes.boundary_facets(mesh.tets)
+    dead, follower = (fem.pressure_force(mesh, closed, kind=k) for k in ("dead", "follower"))
+    q = np.ones(6 * len(closed))
+    np.testing.assert_allclose(follower(q, np.zeros(mesh.n_dofs)), dead(q, q), atol=1e-18)
+    turn = np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+    turned = (mesh.points @ turn.T - mesh.points).ravel()
+    expected = dead(q, q).reshape(-1, 3) @ turn.T
+    np.testing.assert_allclose(follower(q, turned).reshape(-1, 3), expected, atol=1e-18)
+    bent = 1e-3 * np.random.default_rng(0).standard_normal(mesh.n_dofs)
+    assert np.abs(follower(q, bent).reshape(-1, 3).sum(axis=0)).max() < 1e-18
+    with pytest.raises(ValueError, match="use dead or follower"):
+        fem.pressure_force(mesh, kind="live")
+
+
+def test_a_sheet_rests_under_a_follower_almost_as_under_a_dead_pressure(sheet):
+    made, body = sheet
+    S = fem.probe_operator(made.mesh, [[0, 0]])
+    q = np.full(6 * len(made.mesh.facets["top"]), 5.0)
+    rest = []
+    for kind in ("dead", "follower"):
+        push = fem.pressure_force(made.mesh, kind=kind)
+        rest.append(S @ nonlinear.static(body, lambda u, push=push: push(q, u)))
+    assert rest[0] > 0.5 * PAPER.depth
+    assert rest[0] == pytest.approx(rest[1], rel=1e-3)
+    assert rest[0] != rest[1]
+
+
+def test_the_membrane_makes_up_for_what_a_thick_equivalent_lacks_of_stretching(sheet):
+    made, _ = sheet
+    x = made.mesh.points
+    stretched = np.zeros_like(x)
+    stretched[:, :2] = 1e-4 * x[:, :2]
+    stretched[:, 2] = -2 * 0.3 / 0.7 * 1e-4 * (x[:, 2] - x[:, 2].mean())
+    free = fem.finite_strain(
+        made.mesh, made.material, fixed=np.zeros(x.shape, bool), membrane=membrane(PAPER, made)
+    )
+    solid = PAPER.solid
+    relaxed = (solid.complex_modulus(0.0) / solid.shear_modulus).real
+    area = PAPER.width * PAPER.height
+    exact = relaxed * solid.young / (1 - 0.3) * (1e-4) ** 2 * PAPER.depth * area
+    assert free.energy(stretched.ravel()) == pytest.approx(exact, rel=1e-3)
+
+
+def test_the_motion_starts_from_rest():
+    response = compute(SCENE, "fem-nonlinear", h=0.01)
+    assert np.abs(response.displacement[0]).max() < 1e-12 * np.abs(response.displacement).max()
+    assert response.model == "fem-nonlinear"
+    assert response.effort.reduced_dofs == 40
+    assert response.effort.steps == 398
+    assert 0 < response.effort.energy_imbalance < 0.01
+
+
+def test_a_sheet_that_hardly_bends_moves_from_rest_as_a_linear_plate():
+    """Under next to no pressure, by Ritz's modes of a thin plate, with the mean deflection."""
+    lossy = from_young(density=800, young=8e8, poisson=0.3, viscosity=1.2e4)
+    held = Mounting(edges=("front",))
+    body = replace(PAPER, width=0.03, height=0.03, depth=2.5e-4, material=lossy, mounting=held)
+    weak = MovingPressure(tacton=Tacton(am_frequency=60, duration=0.02), peak_pressure=1e-3)
+    scene = Scene(pressure=weak, body=body, probes=((0.0, 0.0), (5e-3, 5e-3)))
+    for quantity, bound in (("displacement", 0.03), ("acceleration", 0.04)):
+        asked = replace(scene, quantity=quantity)
+        linear = compute(asked, "plate-modes-transient").values
+        found = compute(asked, "fem-nonlinear", h=2e-3, dt=1e-4)
+        difference = np.linalg.norm(found.values - linear, axis=0)
+        error = (difference / np.linalg.norm(linear, axis=0)).max()
+        assert error < bound
+        assert error < 1.1 * found.expected_error
+
+
+def test_a_step_that_fails_is_halved(sheet, monkeypatch):
+    monkeypatch.setattr(nonlinear, "MOST_ITERATIONS", 4)
+    made, body = sheet
+    P = fem.load_operator(made.mesh)
+    push, asked = P @ np.full(P.shape[1], 20.0), set()
+
+    def force(t, u):
+        asked.add(round(t, 9))
+        return push
+
+    states = list(islice(nonlinear.dynamic(body, force, 2e-3), 2))
+    assert [s.time for s in states] == [0, 2e-3]
+    assert {1e-3, 2e-3} < asked
+    assert np.isfinite(states[1].displacement).all()
+
+
+def test_states_before_a_failure_are_kept(sheet):
+    made, body = sheet
+    P = fem.load_operator(made.mesh)
+    push = P @ np.ones(P.shape[1])
+    states = nonlinear.dynamic(body, lambda t, u: push * (np.nan if t > 2.5e-4 else 1), 1e-4)
+    kept = [next(states) for _ in range(3)]
+    with pytest.raises(fem.Diverged, match=r"step 3 of dt = 0.0001 s.*residual.*shorten dt"):
+        next(states)
+    assert [s.time for s in kept] == pytest.approx([0, 1e-4, 2e-4])
+
+
+def elastica(load):
+    """Deflection and shortening over length of a clamped rod: angle'' = -load cos(angle)."""
+
+    def shot(curvature):
+        return solve_ivp(
+            lambda s, y: [y[1], -load * np.cos(y[0]), np.sin(y[0]), np.cos(y[0])],
+            (0, 1), [0, curvature, 0, 0], rtol=1e-10, atol=1e-12,
+        ).y[:, -1]  # fmt: skip
+
+    _, _, down, along = shot(brentq(lambda k: shot(k)[1], 0, load))
+    return down, 1 - along
+
+
+def thin_strip(cells):
+    """A strip of 1 : 100, and nodal forces of 1 N, shared by its free end, that point down."""
+    mesh = meshes.extrude(np.linspace(0, 1, cells + 1), [0, 0.05], [-0.01, 0])
+    material = fem.from_young(density=1, young=1e9, poisson=0.0)
+    end = np.isin(np.arange(len(mesh.points)), mesh.facets["right"][:, 3:])
+    share = np.zeros_like(mesh.points)
+    share[end, 2] = [-1 / end.sum()] * end.sum()
+    return fem.finite_strain(mesh, material, fixed={"left": "xyz"}), share, 1e9 * 0.05 * 1e-6 / 12
+
+
+def test_a_thin_strip_bends_as_the_elastica():
+    (body, share, stiffness), load = thin_strip(40), 10.0
+    u = nonlinear.static(body, load * stiffness * share.ravel()).reshape(-1, 3)
+    tip = u[share[:, 2] != 0].mean(axis=0)
+    np.testing.assert_allclose((-tip[2], -tip[0]), elastica(load), rtol=1e-3)
+
+
+def test_round_off_of_a_thin_strip_is_no_lack_of_convergence():
+    body, share, stiffness = thin_strip(40)
+    u = nonlinear.static(body, 0.02 * stiffness * share.ravel()).reshape(-1, 3)
+    tip = u[share[:, 2] != 0].mean(axis=0)
+    assert -tip[2] == pytest.approx(elastica(0.02)[0], rel=1e-3)
+
+
+def test_newton_stops_at_an_indefinite_tangent_though_its_solver_does_not_tell():
+    body = SimpleNamespace(tangent=lambda u: -sparse.eye_array(2, format="csc"))
+    with pytest.raises(nonlinear._Stuck):
+        nonlinear._newton(body, lambda u: (np.ones(2), 1.0), np.zeros(2), 1e-8, "superlu")
+
+
+@pytest.mark.parametrize("iterations", [1, 3])
+def test_a_body_that_has_not_come_to_rest_is_refused(iterations, monkeypatch):
+    monkeypatch.setattr(nonlinear, "MOST_ITERATIONS", iterations)
+    body, share, stiffness = thin_strip(4)
+    said = "no equilibrium was found at 1.56 % of the load: a residual"
+    with pytest.raises(fem.Diverged, match=said):
+        nonlinear.static(body, 100 * stiffness * share.ravel())
+
+
+def test_what_it_does_not_answer_is_refused():
+    mesh = meshes.block((0.02, 0.02, 0.01), 0.01)
+    with pytest.raises(ValueError, match=r"poisson = 0.49 exceeds 0.45.*use the linear fem"):
+        fem.finite_strain(mesh, fem.Material(density=1, shear_modulus=1, poisson=0.49))
+    with pytest.raises(meshes.MeshError, match="extrude it with order 2"):
+        meshes.middle_plane(meshes.block((0.02, 0.02, 0.01), 0.01, order=1))
+    layer = fem.Membrane(
+        triangles=mesh.facets["left"], thickness=1e-3, material=fem.PRESETS["paper"]
+    )
+    with pytest.raises(meshes.MeshError, match="one horizontal plane"):
+        fem.finite_strain(mesh, fem.PRESETS["paper"], membrane=layer)
+
+
+@pytest.mark.parametrize("model", ["fem-nonlinear", "fem-nonlinear-transient"])
+@pytest.mark.parametrize(
+    ("body", "got"),
+    [(Body(), "not a slab"), (replace(PAPER, sides="absorbing"), "a sheet")],
+)
+def test_nonlinear_models_are_for_sheets_that_are_held(model, body, got):
+    for h in (None, 0.01):
+        with pytest.raises(ValueError, match=f"{got}.*--model fem"):
+            compute(replace(SCENE, body=body), model, h=h)
+
+
+def test_the_plan_of_a_nonlinear_sheet_says_what_is_wrong_with_large_elements():
+    assert not plan(SCENE, model="fem-nonlinear").warnings
+    coarse = plan(SCENE, model="fem-nonlinear-transient", h=0.01)
+    assert "elements of 10 mm will have a relative error" in coarse.warnings[0]
+    assert not any("stretching" in row.what for row in coarse.rows)
+
+
+@pytest.mark.parametrize("model", ["fem-nonlinear", "fem-nonlinear-transient"])
+def test_a_lifted_sheet_feels_what_the_focus_has_left_there(model):
+    """Under next to no pressure, where the response is linear."""
+    still = Tacton(am_frequency=140, duration=0.02)
+    scene = replace(SCENE, pressure=MovingPressure(tacton=still, peak_pressure=1e-3))
+    lifted = replace(scene, body=replace(scene.body, placement=Placement(lift=0.02)))
+    moved, level = (
+        np.ptp(compute(one, model, h=0.0125, dt=1e-4).displacement) for one in (lifted, scene)
+    )
+    assert moved / level == pytest.approx(float(along_axis(0.02)), rel=1e-3)
+
+
+def test_a_tilted_sheet_is_refused():
+    tilted = replace(SCENE.body, placement=Placement(tilt_x=0.1))
+    with pytest.raises(ValueError, match="not a tilted one"):
+        compute(replace(SCENE, body=tilted), "fem-nonlinear", h=0.0125)

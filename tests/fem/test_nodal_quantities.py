@@ -1,0 +1,225 @@
+"""Quantities of whole bodies: tensors of files for other programs, and what colours films."""
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from simple_model import MovingPressure, Response, Tacton, Trajectory
+from simple_model.load_spectrum import pressure_lines, synthesise
+from simple_model.tensors import hooke
+from skinwave.commands.cli import main
+from skinwave.models.reduction import oscillating
+from skinwave.report import films, render
+from skinwave.report.renderer import renderer
+from skinwave.report.styles import style
+from skinwave.results import exports, motion, quantity_map, surface, views
+from skinwave.results.nodal import shade
+from skinwave.results.run import Run
+from skinwave.scene.file import dumps
+from skinwave.scene.scene import Body, Layer, Scene
+from skinwave.studies import album, scene_report
+from skinwave.studies.album import coloured
+from skinwave.studies.gallery import Gallery
+
+draws = pytest.mark.skipif("not renderer().found", reason="nothing draws in three dimensions here")
+PATH = Trajectory(shape="circle", size=0.008, speed=5.0)
+SCENE = Scene(
+    pressure=MovingPressure(tacton=Tacton(trajectory=PATH, duration=0.05, am_frequency=100)),
+    body=Body(width=0.036, height=0.036, depth=0.009, sides="clamped"),
+    probes=((0.0, 0.0), (0.006, 0.003), (-0.009, 0.0)),
+)
+COARSE = 3e-3
+
+
+@pytest.fixture(scope="module")
+def moved():
+    return motion.waves(SCENE, h=COARSE)
+
+
+@pytest.fixture(scope="module")
+def view(moved):
+    return views.body_view(SCENE, "slab", moved, (0.01, 4))
+
+
+def test_stress_at_the_surface_meets_the_load(view, moved):
+    """sigma_zz = -p and no shear on a flat surface, at every time, to which viscous stress adds."""
+    kept, mesh = views.with_tensors(view).tensors, moved.mesh
+    np.testing.assert_array_equal(kept.nodes, np.arange(len(mesh.points)))
+    top = np.unique(mesh.facets["top"])
+    top = top[np.abs(mesh.points[top, :2]).max(axis=1) < 0.014]  # at clamped edges it is singular
+    x = mesh.points[top, :2]
+    f, patterns = pressure_lines(SCENE.pressure, x)
+    p = SCENE.pressure(x, view.times[kept.frames]) - patterns[f == 0].real.sum(axis=0)
+    stress = kept.stress[:, top] / np.abs(p).max()
+    assert np.abs(stress[..., 2] + p / np.abs(p).max()).max() < 0.05
+    assert np.abs(stress[..., 4:]).max() < 0.06
+    elastic = kept.strain[:, top] @ hooke(SCENE.body.solid)[:, 2] / np.abs(p).max()
+    assert np.abs(elastic + p / np.abs(p).max()).max() > 0.12  # without the viscous part
+
+
+def test_files_for_other_programs_have_the_tensors_of_a_view_from_a_file(view, tmp_path):
+    pv = pytest.importorskip("pyvista")
+    views.save(tmp_path / "view.npz", view)
+    again = views.load(tmp_path / "view.npz")
+    exports.write_field(tmp_path, again)
+    grid = pv.read(tmp_path / "slab_002.vtu")
+    own = views.with_tensors(view).tensors
+    np.testing.assert_array_equal(grid["stress_pa"][:, [0, 1, 2, 3, 5, 4]], own.stress[2])
+    assert "stress_pa: Pa" in list(grid.field_data["units"])
+    arrays = dict(np.load(tmp_path / "view.npz", allow_pickle=False))
+    arrays["tensor_nodes"] = arrays["tensor_nodes"] + len(again.points)
+    np.savez(tmp_path / "view.npz", **arrays)
+    with pytest.raises(ValueError, match="has numbers beyond"):
+        views.load(tmp_path / "view.npz")
+
+
+def test_between_two_materials_strain_jumps_and_traction_does_not():
+    layers = (Layer(thickness=3e-3, material="palm-stiff"),)
+    scene = replace(SCENE, body=replace(SCENE.body, layers=layers))
+    seen = views.body_view(scene, "slab", motion.waves(scene, h=COARSE), (0.01, 2))
+    kept = views.with_tensors(seen).tensors
+    assert len(kept.nodes) > len(seen.points)
+    twice = np.flatnonzero(np.bincount(kept.nodes) == 2)
+    places = seen.points[twice]
+    np.testing.assert_allclose(places[:, 2], -3e-3, atol=1e-12)
+    order = np.argsort(kept.nodes, kind="stable")
+    pairs = order[np.isin(kept.nodes[order], twice)].reshape(-1, 2)
+    inner = np.abs(places[:, :2]).max(axis=1) < 7e-3
+    one, other = (kept.stress[1, pairs[inner, k]] for k in (0, 1))
+    size = np.abs(kept.stress[1, pairs[inner]][..., 2]).max()
+    assert np.abs(one[:, 2] - other[:, 2]).max() < 0.15 * size  # on elements as coarse as these
+    assert np.abs(one[:, 0] - other[:, 0]).max() > 0.3 * size
+
+
+@pytest.mark.parametrize(
+    "quantity", ["strain_zz", "stress_xx", "largest_shear_strain", "displacement_x", "acceleration"]
+)
+def test_the_colour_at_a_node_is_what_a_probe_reads_there(quantity, moved):
+    """Probes by operators at points, nodes by polynomials about them: a corner of the surface."""
+    corners = np.unique(moved.mesh.tets[:, :4])
+    x = moved.mesh.points[corners]
+    away = np.linalg.norm(x - np.array([6e-3, 3e-3, 0.0]), axis=1)
+    node = corners[[np.argmin(away)]]
+    place = tuple(moved.mesh.points[node[0], :2].tolist())
+    scene = replace(SCENE, quantity=quantity, probes=(place,))
+    times = np.arange(5) * 2e-3
+    asked, lines = scene.reading.asked, motion.probe_lines(scene, moved)
+    lines = lines if asked.invariant else oscillating(lines)
+    expected = asked.waveforms(synthesise(lines.frequencies, lines.lines, times), 1)
+    found = shade(scene, moved, times, node).values
+    np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-4 * np.abs(expected).max())
+
+
+def test_what_has_no_such_quantity_is_left_out_and_says_so(view):
+    scene = replace(SCENE, quantity="strain_zz")
+    kernel = views.kernel_view(SCENE, np.array([0.01, 0.01]), (0.01, 4))
+    (seen,), (said,) = coloured([(kernel, scene), (view, scene)])
+    assert said == "the point kernel has no strain zz, and predicts a pressure alone"
+    assert seen.shade.quantity == "strain_zz"
+    with pytest.raises(ValueError, match="has no strain zz.*; give the scene a body"):
+        coloured([(kernel, scene)])
+    (low, high), unit = render.scale([seen])
+    assert (low, high) == (-high, pytest.approx(1e6 * np.abs(seen.shade.values).max()))
+    assert unit == "µm/m\n"
+    shear = views.shaded(view, replace(SCENE, quantity="largest_shear_strain"))
+    assert render.scale([shear])[0][0] == 0
+    assert render.shown_scale(shear).startswith("largest shear strain; motion drawn ")
+
+
+@draws
+def test_a_film_is_of_the_quantity(view, tmp_path):
+    """A signed one, and the same motion: another picture."""
+    for name in ("strain_zz", "displacement_x"):
+        seen = views.shaded(view, replace(SCENE, quantity=name))
+        films.film(tmp_path / f"{name}.gif", [seen], style("report"), panel=(240, 200))
+    pictures = []
+    for name in ("strain_zz", "displacement_x"):
+        with Image.open(tmp_path / f"{name}.gif") as film:
+            pictures.append(np.asarray(film.convert("RGB"), float))
+    assert np.abs(pictures[0] - pictures[1]).mean() > 1
+
+
+def test_a_film_of_a_folder_has_no_other_quantity(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("skinwave.report.renderer.renderer", renderer)
+    (tmp_path / "scene.toml").write_text(dumps(SCENE))
+    asked = ["film", str(tmp_path), "--quantity", "strain_zz", "-o", str(tmp_path / "a.gif")]
+    assert main(asked) == 2
+    assert "keeps the motion alone" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory):
+    out = tmp_path_factory.mktemp("compared")
+    tacton = replace(SCENE.tacton, duration=0.1)
+    scene = replace(SCENE, pressure=replace(SCENE.pressure, tacton=tacton), depth=0.7e-3)
+    (out / "below.toml").write_text(dumps(replace(scene, quantity="strain_zz")))
+    asked = [str(out / "below.toml"), "--element-size", "4.5", "--quiet"]
+    assert main(["compare", *asked, "-o", str(out / "compared")]) == 0
+    return out
+
+
+def test_a_comparison_has_the_columns_of_the_quantity(compared):
+    page = (compared / "compared" / "index.html").read_text()
+    assert "the point kernel has no strain zz at a depth of 0.7 mm, and predicts a pressure" in page
+    assert "slab (fem), µm/m peak" in page
+    with open(compared / "compared" / "lines.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    kernels = [row for row in rows if row["body"] == "none"]
+    bodies = [row for row in rows if row["body"] == "slab"]
+    assert kernels
+    assert all(row["pressure_pa"] and not row["strain_zz_um_m"] for row in kernels)
+    assert all(row["strain_zz_um_m"] and not row["displacement_um"] for row in bodies)
+    with open(compared / "compared" / "claims.csv", newline="") as file:
+        assert {row["body"] for row in csv.DictReader(file)} <= {"none"}
+
+
+def test_a_report_of_a_folder_has_the_quantity(compared, tmp_path):
+    """Of a folder that a comparison wrote, which runs no model."""
+    assert main(["report", str(compared / "compared"), "--quiet", "-o", str(tmp_path / "r")]) == 0
+    page = (tmp_path / "r" / "index.html").read_text()
+    assert "they read" in page
+    assert "Probes read strain zz at a depth of 0.7 mm, in µm/m" in page
+
+
+@pytest.mark.parametrize("quantity", ["strain_zz", "largest_shear_strain"])
+def test_a_report_keeps_and_draws_a_map_of_the_quantity_at_its_depth(
+    quantity, view, moved, tmp_path
+):
+    """Where a probe is, the map is the RMS of the lines that the probe reads."""
+    scene = replace(SCENE, quantity=quantity, depth=0.7e-3)
+    album.keep_view(replace(view, scene=scene), tmp_path)
+    found = quantity_map.load(tmp_path / "map.npz", scene)
+    assert found.depth == 0.7e-3
+    if quantity == "strain_zz":
+        seen = motion.probe_lines(scene, moved)
+        rms = np.sqrt((np.abs(seen.lines[seen.frequencies > 0]) ** 2).sum(axis=0) / 2)
+        at = np.searchsorted(found.x, -1e-9), np.searchsorted(found.y, -1e-9)
+        assert found.rms[at[1], at[0]] == pytest.approx(rms[0], rel=1e-6)
+    run = Run(
+        tacton="", body="slab", scene=scene,
+        response=Response(
+            model="fem", times=np.arange(2.0), probes=scene.probe_points, quantity=quantity,
+            values=np.zeros((2, 3)),
+        ),
+    )  # fmt: skip
+    kept = album.Album(
+        title="", scene=scene, runs=[run], views={}, planned=None, trust=None, maps={"slab": found}
+    )
+    gallery = Gallery(folder=tmp_path, style=style("report"))
+    (section,) = scene_report.mapped(kept, gallery)
+    assert f"The RMS of the {scene.reading.words} is largest at" in section
+    assert (tmp_path / "quantity-slab.png").stat().st_size > 10_000
+
+
+def test_a_report_of_motion_keeps_the_map_of_its_surface(view, tmp_path):
+    album.keep_view(view, tmp_path)
+    found = surface.load(tmp_path / "map.npz")
+    at = np.unravel_index(np.nanargmax(found.rms), found.rms.shape)
+    assert found.rms[at] == pytest.approx(view.rms.max(), rel=0.05)  # at places, and at nodes
+    (tmp_path / "map.npz").write_bytes(b"none")
+    for load in (surface.load, lambda path: quantity_map.load(path, SCENE)):
+        with pytest.raises(ValueError, match="is no map"):
+            load(tmp_path / "map.npz")

@@ -1,0 +1,560 @@
+"""Every solver has the same solution, and the reduced-order model that of the full one."""
+
+import gc
+import os
+import pickle
+import shutil
+import sys
+import tempfile
+from dataclasses import replace
+from itertools import islice
+from unittest.mock import Mock
+
+import numpy as np
+import pytest
+from scipy import sparse
+from scipy.signal import lfilter
+
+import fem
+import meshes
+import skinwave
+from fem import linear_solver, memory, products, reduced
+from fem.harmonic import dynamic_stiffness
+from fem.sparsity import on_one_pattern, upper_triangle
+from simple_model import MovingPressure, Tacton, Trajectory
+from simple_model.load_spectrum import reduced_lines
+from skinwave.bodies.build import build as build_body
+from skinwave.bodies.build import operators
+from skinwave.models.full import energy_balance
+from skinwave.models.prepared import prepare
+from skinwave.planning.simulate import compute
+from skinwave.report.fields import field
+from skinwave.scene.paper15 import scenes
+
+PROBES = np.column_stack([[0, 5, 10, 15, 20], np.zeros(5)]) * 1e-3
+CIRCLING = Tacton(
+    am_frequency=140,
+    duration=0.2,
+    trajectory=Trajectory(shape="circle", size=0.02, speed=12),
+)
+
+
+@pytest.fixture(scope="module")
+def stiff():
+    """A small dynamic stiffness and a right-hand side."""
+    mesh = meshes.block((0.025, 0.025, 0.01), 0.005)
+    ops = fem.assemble(mesh, fem.PRESETS["palm"], absorbing="sides")
+    A = ops.K + 1e3 * ops.C + 1e6 * ops.M
+    return ops, A, np.random.default_rng(0).standard_normal((A.shape[0], 3))
+
+
+@pytest.fixture(scope="module")
+def fill(stiff):
+    """Entries of a factor in the order of the mesh."""
+    options = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+    return sparse.linalg.splu(sparse.csc_array(stiff[1]), permc_spec="NATURAL", **options).L.nnz
+
+
+@pytest.mark.parametrize("backend", linear_solver.BACKENDS)
+def test_every_solver_solves(stiff, backend):
+    if backend not in fem.available():
+        pytest.skip(f"{backend} is not installed")
+    _, A, b = stiff
+    factor = fem.factorise(A, backend=backend)
+    assert factor.backend == backend
+    x = factor.solve(b)
+    assert np.abs(A @ x - b).max() < 1e-9 * np.abs(b).max()
+    np.testing.assert_allclose(factor.solve(b[:, 0]), x[:, 0], rtol=1e-9)
+    complex_b = b[:, 0] * (1 + 2j)
+    np.testing.assert_allclose(factor.solve(complex_b), (1 + 2j) * x[:, 0], rtol=1e-9)
+
+
+def test_a_factor_larger_than_the_memory_is_kept_in_files(stiff, monkeypatch, tmp_path, caplog):
+    if "pardiso" not in fem.available():
+        pytest.skip("pardiso is not installed")
+    _, A, b = stiff
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setenv("MKL_PARDISO_OOC_PATH", "the user's own")
+    factor = fem.factorise(A, memory=1e5)
+    assert f"{A.shape[0]:,} dofs takes" in caplog.text
+    assert list(tmp_path.glob("skinwave-factor-*/*")), "no file"
+    x = factor.solve(b)
+    assert np.abs(A @ x - b).max() < 1e-9 * np.abs(b).max()
+    np.testing.assert_allclose(x, fem.factorise(A).solve(b), rtol=0, atol=1e-9 * np.abs(x).max())
+    del factor
+    gc.collect()
+    assert not list(tmp_path.iterdir())
+    assert os.environ["MKL_PARDISO_OOC_PATH"] == "the user's own"
+
+
+def test_a_factor_larger_than_memory_and_disk_is_refused(stiff, monkeypatch):
+    if "pardiso" not in fem.available():
+        pytest.skip("pardiso is not installed")
+    usage = shutil._ntuple_diskusage(1, 1, 1000)
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: usage)
+    with pytest.raises(MemoryError, match="disk under .*; coarsen the mesh, or set TMPDIR"):
+        fem.factorise(stiff[1], memory=1e5)
+
+
+def test_a_body_larger_than_the_memory_is_refused_before_it_is_assembled(monkeypatch):
+    monkeypatch.setattr(memory, "free_memory", lambda: 1e7)
+    mesh = meshes.block((0.025, 0.025, 0.01), 0.005)
+    cure = "2,028 degrees of freedom take about .* enough for 1,205; take larger elements"
+    with pytest.raises(MemoryError, match=cure):
+        fem.assemble(mesh, fem.PRESETS["palm"])
+
+
+def test_memory_of_a_container_bounds_that_of_the_machine(monkeypatch, tmp_path):
+    (tmp_path / "memory.max").write_text("3000\n")
+    (tmp_path / "memory.current").write_text("1000\n")
+    assert memory.free_memory() > 2**20
+    monkeypatch.setattr(memory, "CGROUP", tmp_path)
+    assert memory.free_memory() == 2000
+    (tmp_path / "memory.max").write_text("max\n")
+    assert memory.free_memory() > 2**20
+
+
+@pytest.mark.parametrize("backend", ["pardiso", "superlu"])
+def test_complex_symmetric_matrices_are_solved(stiff, backend):
+    if backend not in fem.available():
+        pytest.skip(f"{backend} is not installed")
+    ops, _, b = stiff
+    A = ops.K + 1j * 900 * ops.C - 900**2 * ops.M
+    x = fem.factorise(A, backend=backend).solve(b.astype(complex))
+    assert np.abs(A @ x - b).max() < 1e-9 * np.abs(b).max()
+
+
+@pytest.mark.parametrize("backend", ["pardiso", "superlu"])
+@pytest.mark.parametrize("known", [True, False])
+def test_lines_are_solved_one_after_the_other(stiff, backend, known):
+    """Also by a solver that another process is sent between two of them."""
+    if backend not in fem.available():
+        pytest.skip(f"{backend} is not installed")
+    b = stiff[2]
+    terms = (fem.PronyTerm(modulus=5e3, time=1e-3), fem.PronyTerm(modulus=9e3, time=1e-4))
+    mesh = meshes.block((0.025, 0.025, 0.01), 0.005)
+    ops = fem.assemble(mesh, replace(fem.PRESETS["palm"], prony=terms), absorbing="sides")
+    solve = fem.LineSolver(ops if known else replace(ops, laws=None), backend)
+    for hertz in (0.0, 50.0, 700.0):
+        A = dynamic_stiffness(ops.K, ops.C, ops.M, ops.branches, 2j * np.pi * hertz)
+        x = solve(hertz, ops.expand(b))[ops.free]
+        assert np.abs(A @ x - b).max() < 1e-9 * np.abs(b).max()
+        solve = pickle.loads(pickle.dumps(solve))
+
+
+@pytest.mark.parametrize("slowest", [0.2, 0.0])
+def test_a_factor_in_single_precision_is_refined_or_made_in_double(stiff, monkeypatch, slowest):
+    if "pardiso" not in fem.available(complex_valued=True):
+        pytest.skip("mkl is not installed")
+    monkeypatch.setattr(linear_solver, "SLOWEST", slowest)
+    ops, _, b = stiff
+    columns = b[:, 0], b.astype(complex)
+    A = [(ops.K + 1j * w * ops.C - w**2 * ops.M).tocsr() for w in (300.0, 2000.0)]
+    _, indices, indptr = upper_triangle(A[0])
+    factorised = linear_solver.factoriser(indices, indptr)
+    for each in A:
+        factor = factorised(upper_triangle(each)[0])
+        for right in columns:
+            x = factor.solve(right.astype(complex))
+            assert np.abs(each @ x - right).max() < 1e-9 * np.abs(right).max()
+    assert factorised._is_single == (slowest > 0)
+
+
+def test_lines_of_a_thin_sheet_are_solved_as_well_as_its_matrix_allows():
+    """In single precision nothing is left of its stiffness against bending."""
+    mesh = meshes.sheet(0.1, 0.1, 1e-4, 0.005)
+    ops = fem.assemble(mesh, fem.PRESETS["paper"], fixed="sides")
+    force = fem.load_operator(mesh) @ np.ones(len(fem.facet_points(mesh)))
+    S = fem.probe_operator(mesh, PROBES)
+    for hertz in (80.0, 140.0):
+        s = 2j * np.pi * hertz
+        A = dynamic_stiffness(ops.K, ops.C, ops.M, ops.branches, s)
+        exact = S[:, ops.free] @ fem.factorise(A).solve(force[ops.free].astype(complex))
+        np.testing.assert_allclose(S @ fem.harmonic(ops, force, hertz)[0], exact, rtol=1e-3)
+
+
+def test_patterns_that_differ_are_united():
+    rng = np.random.default_rng(3)
+    full = [sparse.random_array((9, 9), density=0.2, rng=rng, format="csr") for _ in range(3)]
+    matrices = [(A + A.T).tocsr() for A in full]
+    values, columns, starts = on_one_pattern(matrices)
+    for A, each in zip(matrices, values, strict=True):
+        found = sparse.csr_array((each, columns, starts), shape=A.shape)
+        np.testing.assert_array_equal(found.toarray(), np.triu(A.toarray()))
+
+
+def test_without_mkl_and_metis_superlu_carries_it(stiff, monkeypatch):
+    _, A, b = stiff
+    monkeypatch.setitem(sys.modules, "pymetis", None)
+    monkeypatch.setitem(sys.modules, "sksparse.cholmod", None)
+    monkeypatch.setattr(linear_solver, "mkl", lambda: None)
+    factor = fem.factorise(A)
+    assert factor.backend == "superlu"
+    assert np.abs(A @ factor.solve(b) - b).max() < 1e-9 * np.abs(b).max()
+
+
+@pytest.mark.parametrize("metis", [True, False])
+def test_superlu_is_ordered_to_save_fill(stiff, fill, monkeypatch, metis):
+    _, A, b = stiff
+    if metis:
+        pytest.importorskip("pymetis")
+        order = linear_solver.dissect(A)
+        np.testing.assert_array_equal(np.sort(order), np.arange(A.shape[0]))
+    else:
+        monkeypatch.setitem(sys.modules, "pymetis", None)
+    made = []
+
+    def recorded(*args, **kwargs):
+        made.append(sparse.linalg.splu(*args, **kwargs))
+        return made[-1]
+
+    monkeypatch.setattr(linear_solver, "splu", recorded)
+    x = fem.factorise(A, backend="superlu").solve(b)
+    assert np.abs(A @ x - b).max() < 1e-9 * np.abs(b).max()
+    assert made[0].L.nnz < 0.6 * fill
+
+
+@pytest.mark.parametrize("with_mkl", [True, False])
+def test_products_with_blocks_are_scipys(stiff, monkeypatch, with_mkl):
+    if not with_mkl:
+        monkeypatch.setattr(products, "mkl", lambda: None)
+    A = stiff[1]
+    times, rng = products.product(A), np.random.default_rng(0)
+    gc.collect()
+    for shape in ((A.shape[0],), *((A.shape[0], k) for k in (1, 2, 5, 12))):
+        block = np.asarray(rng.normal(size=shape), order="F")  # as MKL does not take it
+        np.testing.assert_allclose(times(block), A @ block, rtol=0, atol=1e-14 * abs(A).max())
+    applied = sparse.linalg.aslinearoperator(A)
+    np.testing.assert_array_equal(products.product(applied)(block), applied @ block)
+
+
+def test_unknown_or_missing_solvers_are_named():
+    with pytest.raises(ValueError, match=r"'umfpack' is not installed; choose one of .*superlu"):
+        fem.factorise(sparse.eye_array(3).tocsr(), backend="umfpack")
+
+
+@pytest.mark.parametrize("backend", ["pardiso", "superlu"])
+def test_a_floating_body_is_refused_with_the_cure(backend):
+    if backend not in fem.available():
+        pytest.skip(f"{backend} is not installed")
+    singular = sparse.csr_array(np.array([[1.0, -1.0], [-1.0, 1.0]]))
+    with pytest.raises(ValueError, match="is the body constrained anywhere"):
+        fem.factorise(singular, backend=backend)
+
+
+def test_how_long_error_estimates_take_changes_no_model(stiff, monkeypatch):
+    mesh = meshes.block((0.025, 0.025, 0.01), 0.005)
+    outputs = fem.probe_operator(mesh, np.array([[0.0, 0.0], [0.004, 0.001]]))
+
+    class Executor:
+        """Computes at once, or only when the result is needed."""
+
+        def __init__(self, *_):
+            pass
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            pass
+
+        def submit(self, look, *given):
+            found = look(*given) if at_once else None
+            return Mock(done=lambda: at_once, result=lambda: found or look(*given))
+
+    monkeypatch.setattr(reduced, "ThreadPoolExecutor", Executor)
+    at_once = True
+    prompt = fem.reduce(stiff[0], outputs, tolerance=1e-4)
+    at_once = False
+    slow = fem.reduce(stiff[0], outputs, tolerance=1e-4)
+    assert (slow.moments, slow.estimate) == (prompt.moments, prompt.estimate)
+    np.testing.assert_array_equal(slow.basis, prompt.basis)
+    np.testing.assert_array_equal(slow.K, prompt.K)
+
+
+def body(kind, h=0.1 / 24):
+    if kind == "skin":
+        mesh = meshes.block((0.06, 0.06, 0.015), h, grading=meshes.Grading(radius=0.02, growth=1.2))
+        return mesh, fem.assemble(mesh, fem.PRESETS["palm"], absorbing="sides")
+    mesh = meshes.sheet(0.1, 0.1, 1e-3, h)
+    return mesh, fem.assemble(
+        mesh, fem.from_young(density=80, young=4e6, poisson=0.3, loss_factor=0.03)
+    )
+
+
+def reduced_for_circling(kind, h=0.1 / 24):
+    """A body, its load and probe operators, and its reduced-order model."""
+    mesh, ops = body(kind, h)
+    P, points = fem.load_operator(mesh), fem.facet_points(mesh)[:, :2]
+    S = fem.probe_operator(mesh, PROBES)
+    load = MovingPressure(tacton=CIRCLING)
+    typical = P @ load.spot(points, CIRCLING.trajectory.at_phase(np.linspace(0, 1, 12))).T
+    return ops, P, points, S, load, fem.reduce(ops, S, 1000.0, 2e-4, loads=typical)
+
+
+def marched(ops, read, force, dt, seconds=0.2):
+    """(t, p) from rest."""
+    states = islice(fem.transient(ops, force, dt), round(seconds / dt))
+    return np.array([read @ state.displacement for state in states])
+
+
+def misfit(candidate, reference):
+    return (np.linalg.norm(candidate - reference, axis=0) / np.linalg.norm(reference, axis=0)).max()
+
+
+@pytest.mark.slow
+def test_the_reduced_model_follows_the_transient_from_rest():
+    ops, P, points, S, load, model = reduced_for_circling("skin", 0.0075)
+    dt = 2.5e-5
+    full = marched(ops, S, lambda t: P @ load(points, t), dt, 0.02)
+    frequencies, forces = reduced_lines(load, points, P.T @ model.basis)
+    poles = fem.poles(model)
+    lines, start = fem.line_response(poles, forces, frequencies)
+    rates = np.concatenate([2j * np.pi * frequencies, poles.values])
+    times = np.arange(len(full)) * dt
+    reduced = fem.exponential_sum(rates, np.vstack([lines, start]), times)
+    assert misfit(reduced, full) <= 1e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "h"), [("skin", 0.0065), ("sheet", 0.1 / 16)])
+def test_reduction_alone_costs_less_than_a_thousandth(kind, h):
+    """Both marched by the same scheme at the same step, so that only the reduction differs."""
+    ops, P, points, S, load, model = reduced_for_circling(kind, h)
+    assert len(ops.free) > 5000
+    r = len(model.K)
+    small = fem.Operators(
+        K=sparse.csr_array(model.K), C=sparse.csr_array(model.C), M=sparse.eye_array(r).tocsr(),
+        R=sparse.csr_array((r, r)), free=np.arange(r), n_dofs=r,
+        branches=tuple(replace(b, K=sparse.csr_array(b.K)) for b in model.branches),
+    )  # fmt: skip
+    project = model.basis.T @ P
+    full = marched(ops, S, lambda t: P @ load(points, t), 1e-4, 0.02)
+    reduced = marched(small, model.outputs, lambda t: project @ load(points, t), 1e-4, 0.02)
+    assert misfit(reduced, full) <= 1e-3
+
+
+@pytest.mark.parametrize(("kind", "h"), [("skin", 0.0075), ("sheet", 0.1 / 16)])
+def test_the_estimate_is_near_the_true_error(kind, h):
+    """Also where moments converge ever faster, as those of sheets with little loss do."""
+    mesh, ops = body(kind, h)
+    P, points = fem.load_operator(mesh), fem.facet_points(mesh)[:, :2]
+    S = fem.probe_operator(mesh, PROBES)
+    centres = np.random.default_rng(2).uniform(-0.02, 0.02, (12, 2))
+    F = P @ MovingPressure(tacton=Tacton()).spot(points, centres).T
+    frequencies = [0.0, 250.0, 700.0, 1000.0]
+    exact = np.array([S @ fem.harmonic(ops, F, f)[0] for f in frequencies])
+    for tolerance in (5e-3, 1e-3, 1e-4):
+        model = fem.reduce(ops, S, 1000.0, tolerance, loads=F)
+        found = fem.transfer(model, model.basis.T @ F, frequencies)
+        error = np.linalg.norm(found - exact, axis=(1, 2)) / np.linalg.norm(exact, axis=(1, 2))
+        assert model.estimate <= tolerance
+        assert model.estimate / 4 < error.max() < model.estimate * 4
+
+
+def test_a_space_that_holds_all_of_a_body_is_the_body():
+    """More moments bring nothing but round-off, which is no direction."""
+    mesh = meshes.block((0.06, 0.06, 0.015), 0.06)
+    ops = fem.assemble(mesh, replace(fem.PRESETS["palm"], viscosity=0.0))
+    S = fem.probe_operator(mesh, np.column_stack([np.linspace(0, 0.02, 40)] * 2))
+    F = fem.load_operator(mesh).toarray()
+    for probes, tolerance in ((S, 0.5), (S, 1e-3), (S[:6], 1e-3)):
+        model = fem.reduce(ops, probes, 1000.0, tolerance, loads=F)
+        assert len(model.K) <= len(ops.free)
+        basis = model.basis[ops.free]
+        np.testing.assert_allclose(basis.T @ (ops.M @ basis), np.eye(len(model.K)), atol=1e-9)
+        found = fem.transfer(model, model.basis.T @ F, [100.0, 700.0])
+        exact = np.array([probes @ fem.harmonic(ops, F, f)[0] for f in (100.0, 700.0)])
+        assert np.linalg.norm(found - exact) < max(1e-9, 4 * model.estimate) * np.linalg.norm(exact)
+
+
+def test_probes_in_one_element_are_no_more_than_what_moves_it():
+    """Their seeds depend on each other: forty-one probes, two of them in one place."""
+    mesh = meshes.block((0.03, 0.03, 0.01), 0.008)
+    ops = fem.assemble(mesh, fem.PRESETS["palm"], absorbing="sides")
+    places = np.column_stack([np.linspace(0, 0.01, 41), np.zeros(41)])
+    places[1] = places[0]
+    F = (fem.load_operator(mesh) @ np.ones(len(fem.facet_points(mesh))))[:, None]
+    S = fem.probe_operator(mesh, places)
+    model = fem.reduce(ops, S, 300.0, 1e-3, loads=F)
+    found = fem.transfer(model, model.basis.T @ F, [140.0])[0]
+    exact = S @ fem.harmonic(ops, F, 140.0)[0]
+    assert np.linalg.norm(found - exact) < 2e-3 * np.linalg.norm(exact)
+    np.testing.assert_array_equal(found[0], found[1])
+
+
+def test_poles_answer_like_the_model(stiff):
+    ops, _, _ = stiff
+    mesh = meshes.block((0.025, 0.025, 0.01), 0.005)
+    S = fem.probe_operator(mesh, [[0.0, 0.0], [0.004, 0.001]])
+    model = fem.reduce(ops, S, 500.0, 1e-2)
+    assert (np.linalg.eigvalsh(model.K) > 0).all()
+    poles = fem.poles(model)
+    assert (poles.values.real < 0).all()
+    force = np.random.default_rng(0).standard_normal(len(model.K))
+    s = 2j * np.pi * 140.0
+    half = poles.outputs @ (poles.inputs @ force / (s - poles.values))
+    mirrored = poles.outputs.conj() @ (poles.inputs.conj() @ force / (s - poles.values.conj()))
+    np.testing.assert_allclose(
+        half + mirrored, fem.transfer(model, force[:, None], 140.0)[0, :, 0], rtol=1e-8
+    )
+
+
+def test_a_response_starts_from_rest_whatever_the_load_begins_with():
+    poles = fem.Poles(
+        values=np.array([-3.0 + 40j]), inputs=np.array([[1.0 + 0j]]), outputs=np.array([[-0.5j]])
+    )
+    t = np.arange(2001) * 1e-3
+    lines, start = fem.line_response(poles, np.ones((1, 1), complex), np.zeros(1))
+    found = fem.exponential_sum(np.append([0j], poles.values), np.vstack([lines, start]), t)[:, 0]
+    # 2 Re(c (exp(s t) - 1)/s), the step response.
+    expected = 2 * np.real(-0.5j * (np.exp((-3 + 40j) * t) - 1) / (-3 + 40j))
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def integrated(poles, load, dt):
+    """Displacement from rest by an exponential integrator, exact for a load linear within steps."""
+    found = np.zeros((len(poles.outputs), len(load)))
+    for value, modal, output in zip(poles.values, poles.inputs, poles.outputs.T, strict=True):
+        x, drive = value * dt, modal[0] * load
+        end = (np.exp(x) - 1 - x) / x**2
+        start = (np.exp(x) - 1) / x - end
+        z, _ = lfilter([dt * end, dt * start], [1, -np.exp(x)], drive, zi=[-dt * end * drive[0]])
+        found += 2 * (output[:, None] * z).real
+    return found.T
+
+
+def test_lines_from_rest_are_the_recurrence_at_a_fine_step():
+    poles = fem.Poles(
+        values=np.array([-30.0 + 400j, -900.0 + 0j]),
+        inputs=np.array([[1.0 + 0.5j], [2.0 + 0j]]),
+        outputs=np.array([[-0.5j, 0.1], [0.2, 0.3]]),
+    )
+    t = np.arange(5000) * 2e-5
+    load = 2.0 + np.real((1 - 0.5j) * np.exp(2j * np.pi * 90 * t))
+    recurrence = integrated(poles, load, 2e-5)
+    frequencies, forces = np.array([0.0, 90.0]), np.array([[2.0 + 0j], [1 - 0.5j]])
+    lines, start = fem.line_response(poles, forces, frequencies)
+    rates = np.concatenate([2j * np.pi * frequencies, poles.values])
+    summed = fem.exponential_sum(rates, np.vstack([lines, start]), t)
+    assert misfit(summed, recurrence) < 1e-5
+    # Chunks of times end nowhere in particular.
+    short = fem.exponential_sum(rates, np.vstack([lines, start]), t[:300])
+    np.testing.assert_allclose(short, summed[:300], atol=1e-15)
+
+
+def test_a_load_subspace_spans_the_load():
+    centres = np.linspace(-0.01, 0.01, 40)
+    x = np.linspace(-0.03, 0.03, 500)
+    loads = np.exp(-((x[:, None] - centres) ** 2) / 2 / 0.004**2)
+    columns = fem.load_subspace(loads, 1e-3)
+    assert columns.shape[1] < 12
+    np.testing.assert_allclose(columns.T @ columns, np.eye(columns.shape[1]), atol=1e-8)
+    left = loads - columns @ (columns.T @ loads)
+    assert np.linalg.norm(left) < 1e-3 * np.linalg.norm(loads)
+
+
+@pytest.mark.slow
+def test_a_field_is_the_transients_everywhere():
+    path = Trajectory(shape="circle", size=0.01, speed=6.0)
+    body = skinwave.Body(width=0.04, height=0.04, depth=0.01)
+    pressure = MovingPressure(tacton=Tacton(am_frequency=140, trajectory=path))
+    scene = skinwave.Scene(pressure=pressure, body=body, probes=((0.0, 0.0),))
+    with pytest.warns(skinwave.SkinwaveWarning, match="elements of 8 mm"):
+        found = field(scene, np.arange(5) * 2e-3, tolerance=5e-3, h=0.008)
+    build = build_body(body, 0.008)
+    ops = operators(build)
+    P, points = fem.load_operator(build.mesh), fem.facet_points(build.mesh)[:, :2]
+    states = islice(fem.transient(ops, lambda t: P @ pressure(points, t), 5e-5), 0, 161, 40)
+    full = np.array([state.displacement.reshape(-1, 3) for state in states])
+    full = full[:, meshes.part(build.mesh, build.drag == 0)[1]]  # without the layer around it
+    assert np.linalg.norm(found.displacement - full) < 0.01 * np.linalg.norm(full)
+
+
+def test_an_unreachable_tolerance_is_said(monkeypatch):
+    monkeypatch.setattr("fem.reduced.MOST_MOMENTS", 20)
+    mesh, ops = body("sheet")
+    S = fem.probe_operator(mesh, PROBES[:1])
+    with pytest.raises(ValueError, match="raise the tolerance"):
+        fem.reduce(ops, S, 1000.0, 1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["paper-sheet-loose", "skin-slab"])
+def test_fem_and_fem_transient_agree_on_a_scene(name):
+    body = replace(skinwave.BODIES[name], width=0.05, height=0.05, sides="clamped")
+    scene = scenes("short", Tacton(am_frequency=210, duration=0.006), {name: body})[name]
+    h = 0.008 if name == "skin-slab" else 0.005
+    reduced = compute(scene, "fem", h=h)
+    full = compute(scene, "fem-transient", h=h, dt=2.5e-5)
+    misfit = np.linalg.norm(reduced.displacement - full.displacement, axis=0)
+    assert (misfit / np.linalg.norm(full.displacement, axis=0)).max() < 3e-3
+    assert full.effort.steps == 4 * (len(full.times) - 1)
+    coarse = compute(scene, "fem-transient", h=h, dt=3e-4)
+    assert coarse.effort.steps < full.effort.steps / 10
+    assert coarse.displacement.shape == full.displacement.shape
+
+
+def test_preparing_says_what_it_cost(monkeypatch):
+    monkeypatch.setenv("SKINWAVE_CACHE", "")
+    phases = []
+    prepared = prepare(
+        skinwave.Body(width=0.04, height=0.04, depth=0.01, sides="clamped"), np.zeros((1, 2)),
+        lambda phase, fraction: phases.append(phase), h=0.006,
+    )  # fmt: skip
+    assert list(dict.fromkeys(phases)) == ["mesh", "assemble", "factorise", "reduce"]
+    assert prepared.effort.solver == fem.available()[0]
+    assert prepared.effort.dofs > 500  # of a quarter
+    assert prepared.effort.peak_memory > 1e7
+    assert 0 < prepared.effort.estimate <= 1e-3
+
+
+@pytest.mark.parametrize("model", ["fem", "fem-harmonic", "fem-transient"])
+def test_every_element_answer_accounts_for_its_energy(model):
+    path = Trajectory(shape="circle", size=0.01, speed=6.0)
+    scene = skinwave.Scene(
+        pressure=MovingPressure(tacton=Tacton(am_frequency=140, duration=0.01, trajectory=path)),
+        body=skinwave.Body(width=0.04, height=0.04, depth=0.01),
+        probes=((0.0, 0.0),),
+    )
+    found = compute(scene, model, h=0.008)
+    assert 0 < found.effort.energy_imbalance < 1e-9
+    assert 0.003 < found.effort.radiated < 0.5  # through the sides; the rest in the skin
+    closed = replace(scene, body=replace(scene.body, sides="clamped"))
+    assert compute(closed, model, h=0.008).effort.radiated == 0
+
+
+def test_an_answer_that_makes_energy_is_refused():
+    mesh = meshes.block((0.03, 0.03, 0.01), 0.006)
+    ops = fem.assemble(mesh, fem.PRESETS["palm"])
+    push = fem.load_operator(mesh) @ np.ones(fem.load_operator(mesh).shape[1])
+    states = list(islice(fem.transient(ops, lambda t: push, 1e-4), 50))
+    *_, (state, spent) = fem.with_energy_balance(ops, iter(states), lambda t: push)
+    stored = fem.stored(ops, state)
+    assert fem.imbalance(spent, stored) < 1e-9
+    *_, (state, spent) = fem.with_energy_balance(ops, iter(states), lambda t: 1.1 * push)
+    stored = fem.stored(ops, state)
+    assert 0.05 < fem.imbalance(spent, stored) < 0.15
+    with pytest.raises(fem.Diverged, match="energy balance is off by 9"):
+        energy_balance(spent, stored)
+
+
+def test_a_march_that_blows_up_stops_within_a_few_steps(monkeypatch):
+    """Displacements that double at every step stand for whatever makes energy."""
+    scene = skinwave.Scene(
+        pressure=MovingPressure(tacton=Tacton(am_frequency=140, duration=0.2)),
+        body=skinwave.Body(width=0.04, height=0.04, depth=0.01),
+        probes=((0.0, 0.0),),
+    )
+    marched = fem.transient
+    steps = []
+
+    def exploding(operators, force, dt, **model_options):
+        for k, state in enumerate(marched(operators, force, dt, **model_options)):
+            steps.append(k)
+            yield replace(state, displacement=state.displacement * 2.0 ** max(0, k - 60))
+
+    monkeypatch.setattr("skinwave.models.full.fem.transient", exploding)
+    with pytest.raises(fem.Diverged, match=r"at t = 0.005 s, step 100, above the limit of 1 %"):
+        compute(scene, "fem-transient", h=0.008)
+    assert steps[-1] < 102

@@ -1,0 +1,145 @@
+"""Files of the live page, in a browser: tables, sound, patterns of devices and measurements."""
+
+import re
+from ast import literal_eval
+from dataclasses import replace
+from io import BytesIO
+
+import numpy as np
+import pytest
+from in_browser import needs_browser
+from in_live_page import modules, scenes_of, some_values
+from scipy.io import wavfile
+
+from skinwave.measure.reading import read
+from skinwave.patterns import Options, adaptics, adaptics_out, autd3
+
+pytestmark = needs_browser
+
+PLACES = np.array([[0.0, 0.0], [0.01, -0.003], [-0.02, 0.015]])
+PARTS = re.compile(r"PLACES = (\[.*?\n\])\n|MODULATION = (\[.*?\])|SamplingConfig\((\d+)\)", re.S)
+ANSWER = """(own) => { const load = loadOf(own), x = own.x / 1e3, y = own.y / 1e3;
+  const motion = kernel.respond(load), at = motion.at(x, y);
+  return { values: own, load, x, y, body: { is_skin: true }, kernel: motion, kernelAt: at,
+    waves: motion, wavesAt: at }; }"""
+
+
+@pytest.fixture(scope="module")
+def page(browser, tmp_path_factory):
+    """A page with the functions of the modules."""
+    found = modules(browser, tmp_path_factory.mktemp("live") / "static")
+    yield found
+    found.close()
+
+
+@pytest.fixture(scope="module")
+def starts(page):
+    """Values of the controls at the start."""
+    return page.evaluate("() => STARTS")
+
+
+def test_tables_and_sound_are_of_the_waveform_and_the_lines(page, starts, tmp_path):
+    table, lines, sound = page.evaluate(
+        f"""(own) => {{ const answer = ({ANSWER})(own);
+          return [waveformCsv(answer), linesCsv(answer), [...waveformWav(answer)]]; }}""",
+        starts | {"duration": 0.2},
+    )
+    (tmp_path / "waveform.csv").write_text(table)
+    measured = read(tmp_path / "waveform.csv")
+    assert measured.quantity == "displacement"
+    np.testing.assert_allclose(measured.places, [[0.01, 0]])
+    rate, samples = wavfile.read(BytesIO(bytes(sound)))
+    values = measured.values[0, :, 0] - measured.values.mean()
+    assert rate == 10_000
+    np.testing.assert_allclose(samples, 32767 * values / np.abs(values).max(), atol=1)
+    header, *rows = lines.splitlines()
+    assert header.startswith('line,"frequency, Hz","displacement, µm"')
+    assert {"f_AM", "f_d", "f_d-f_AM"} <= {row.split(",")[0] for row in rows}
+
+
+@pytest.mark.parametrize(
+    ("header", "mark", "quantity"),
+    [
+        ("t [s],displacement(0,0) [m],displacement(10,-5) [m]", ",", "displacement"),
+        ("Time (ms);Velocity (mm/s);Velocity 2 (mm/s)", ";", "velocity"),
+        ("# from a vibrometer\ntime [s]\ta [m/s²]\tb [m/s²]", "\t", "acceleration"),
+    ],
+)
+def test_measurements_are_read_as_python_reads_them(page, tmp_path, header, mark, quantity):
+    t = np.arange(40) * 1e-3
+    rows = (mark.join(f"{x:.9f}" for x in (a, np.sin(a), np.cos(a))) for a in t)
+    text = "\n".join([header, *((row.replace(".", ",") if mark == ";" else row) for row in rows)])
+    file = tmp_path / "measured.csv"
+    file.write_text(text, encoding="utf-8")
+    found = page.evaluate("(text) => readMeasurement(text, 'a.csv')", text)
+    wanted = read(file)
+    assert found["quantity"] == wanted.quantity == quantity
+    np.testing.assert_allclose(found["values"], wanted.values[0].T, rtol=1e-12)
+    np.testing.assert_allclose(found["times"], wanted.times - wanted.times[0], atol=1e-12)
+    if "(0,0)" in header:
+        np.testing.assert_allclose(found["places"], wanted.places)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("time [s],signal [V]\n0,1\n1,2\n2,3", '"signal [V]" has no unit of motion.'),
+        ("0,1\n1,2\n2,3", "the first line has no titles of columns."),
+        ("time [s],u [m]\n0,1\n1,2\n5,3\n6,2", "its times are not equally spaced."),
+        ("time [s],u [m]\n0,1\n1,x\n2,3", "row 2 below the titles has a cell"),
+        ("f [Hz],re v [m/s],im v [m/s]\n1,1,1\n2,2,1\n3,1,1", "its spectrum has real"),
+    ],
+)
+def test_other_files_are_refused_with_the_reason_and_where_to_go(page, text, said):
+    found = page.evaluate("(text) => attempt(() => readMeasurement(text, 'a.csv'))", text)
+    assert said in found["refused"]
+    assert found["refused"].endswith("skinwave web and skinwave compare read other formats.")
+
+
+def test_patterns_of_devices_mean_the_same_as_those_of_python(page, starts):
+    many = [own | {"duration": 0.05} for own in some_values(starts, 25, rhythm=True)]
+    plain = {"foci": 1, "phases": "", "paths": "", "pulses": "", "ratio": "1:0", "am2": 0,
+             "envelope": 0, "drive": "pressure_squared", "modulation": 100}  # fmt: skip
+    many += [own | plain for own in many]
+    found = page.evaluate(
+        """(many) => many.map((own) => { const load = loadOf(own); return [
+          attempt(() => adaptics(load)), attempt(() => pyautd3(load, own.sharing))]; })""",
+        many,
+    )
+    scenes = scenes_of(page, many)
+    drawn = [_same_adaptics(scene, own) for scene, (own, _) in zip(scenes, found, strict=True)]
+    played = [_same_script(scene, own) for scene, (_, own) in zip(scenes, found, strict=True)]
+    assert sum(drawn) >= 25
+    assert sum(played) >= 40
+
+
+def _same_adaptics(scene, own):
+    """Whether both write an .adaptics file, which then must mean the same."""
+    try:
+        wanted = adaptics.read(adaptics_out.write(scene, Options())[0], Options())
+    except ValueError:
+        assert "refused" in own
+        return False
+    given, t = adaptics.read(own["made"].encode(), Options()), np.linspace(0, 0.0499, 150)
+    one, other = (
+        replace(scene.pressure, tacton=each.tacton, **each.pressure)(PLACES, t)
+        for each in (given, wanted)
+    )
+    off = np.abs(one - other).max(axis=1) > 5e-3 * scene.pressure.peak_pressure
+    assert off.mean() < 0.01  # times of jumps
+    return True
+
+
+def _same_script(scene, own):
+    """Whether both write a script for AUTD3, which then must play the same."""
+    try:
+        theirs = autd3.write(scene, Options())[0].decode()
+    except ValueError:
+        assert "refused" in own
+        return False
+    compile(own["made"], "tacton.py", "exec")
+    for ours, other in zip(PARTS.findall(own["made"]), PARTS.findall(theirs), strict=True):
+        ours, other = (literal_eval(max(x, key=len)) for x in (ours, other))
+        within = 1.01 if np.ndim(ours) == 1 else 2e-3  # of 255, and mm
+        np.testing.assert_allclose(ours, other, rtol=0, atol=within)
+    return True

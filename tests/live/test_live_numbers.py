@@ -1,0 +1,247 @@
+"""Controls, loads, kernel and numbers of the live page in a browser, against Python."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from in_browser import needs_browser
+from in_live_page import modules, scenes_of, some_values
+
+import simple_model.path_cells
+from simple_model import Response, published, sensation_level, spectrum, threshold
+from simple_model.line_names import line_names
+from simple_model.line_table import resolved_lines
+from simple_model.load_spectrum import pressure_lines
+from simple_model.path_cells import is_abrupt
+from simple_model.point_kernel import point_kernel
+from simple_model.threshold import pressure_threshold
+from skinwave.live.values import presets, values_of
+from skinwave.results.comparison import phase_delays
+from skinwave.results.propagation import distance_from_path, reach_of, share_outside
+
+pytestmark = needs_browser
+
+PLACES = [[0.0, 0.0], [0.01, -0.003], [-0.02, 0.015]]
+TIMES = np.arange(301) * 1e-4
+JOINED = 5e-5  # of lines of joined paths and of paths that jump, whose weak parts are left out
+
+
+@pytest.fixture(scope="module")
+def page(browser, tmp_path_factory):
+    """A page with the functions of the modules."""
+    found = modules(browser, tmp_path_factory.mktemp("live") / "static")
+    yield found
+    found.close()
+
+
+@pytest.fixture(scope="module")
+def starts(page):
+    """Values of the controls at the start."""
+    return page.evaluate("() => STARTS")
+
+
+def steady(pressure):
+    """A load while a pulse is on."""
+    return replace(pressure, tacton=replace(pressure.tacton, rhythm=None))
+
+
+def test_scene_files_and_addresses_give_the_values_back(page, starts):
+    many = some_values(starts, 100, rhythm=True)
+    addressed = "(many) => many.map((own) => fromAddress(`#${toAddress(own)}`))"
+    assert page.evaluate(addressed, many) == [{"values": own, "refused": []} for own in many]
+    for scene, own in zip(scenes_of(page, many), many, strict=True):
+        back = values_of(scene, "none")
+        same = {"amplitude", "am", "am2", "ratio", "envelope", "duration", "height", "drive", "x",
+                "y", "peak", "modulation", "profile", "foci", "sharing", "quantity"}  # fmt: skip
+        assert {key: back[key] for key in same} == pytest.approx({key: own[key] for key in same})
+        texts = [re.sub(r"(?<=point)/\d+", "/0", own["paths"]), own["pulses"]]
+        assert [back["paths"], back["pulses"]] == texts
+
+
+@pytest.mark.parametrize(
+    ("key", "text", "said"),
+    [
+        ("am", "high", 'AM frequency: "high" is not a number. Give 0 to 500 Hz.'),
+        ("height", "90", "Height of the focus: 90 mm is outside 100 to 600 mm."),
+        ("foci", "2.5", "Focal points: 2.5 is not a whole number. Give 1 to 8."),
+        ("pulses", "100", "is not a pulse. Give on/off times in ms, such as 100/50."),
+        (
+            "paths",
+            "circle/20/45/0",
+            "reaches 55 mm, outside the area of ±50 mm. Move or shrink it.",
+        ),
+    ],
+)
+def test_what_is_typed_wrong_is_refused_in_a_sentence(page, key, text, said):
+    found = page.evaluate("([key, text]) => attempt(() => check(key, text))", [key, text])
+    assert said in found["refused"]
+    assert page.evaluate('() => check("am", "12,5")') == 12.5
+
+
+def test_a_ramp_longer_than_half_a_pulse_and_a_path_off_the_body_are_refused(page, starts):
+    own = starts | {"pulses": "10/10", "ramp": 8}
+    loaded = "([own, body]) => attempt(() => loadOf(own, body))"
+    assert "half the shortest pulse of 10 ms" in page.evaluate(loaded, [own, None])["refused"]
+    body = {"extent_mm": [9, 50], "lowest_height_mm": 100, "title": "strip"}
+    assert "reaches 10 mm along x, off the body" in page.evaluate(loaded, [starts, body])["refused"]
+
+
+def test_lines_of_the_load_are_those_of_python(page, starts, monkeypatch):
+    monkeypatch.setattr(simple_model.path_cells, "NODES_PER_WIDTH", 1e7)  # else to 1e-5 of a circle
+    simple_model.path_cells.path_cells.cache_clear()
+    many = some_values(starts, 100, rhythm=False)
+    found = page.evaluate(
+        """([many, places]) => many.map((own) => {
+          const known = loadOf(own), all = { threshold: -1, lowest: 0, highest: 1e4, most: 1e9 };
+          const { f, w, samples } = loadLines(known, all);
+          return { f: [...f], lines: w.map(({ re, im }) => places.map(([x, y]) => {
+            let a = 0, b = 0;
+            for (let q = 0; q < re.length; q++) {
+              const away = (x - samples.x[q]) ** 2 + (y - samples.y[q]) ** 2;
+              const s = spot(away, known.height, known.profile);
+              a += re[q] * s;
+              b += im[q] * s;
+            }
+            return [a, b];
+          })) };
+        })""",
+        [many, PLACES],
+    )
+    for scene, own in zip(scenes_of(page, many), found, strict=True):
+        pressure = scene.pressure
+        on_path = pressure.tacton.trajectory.at_phase(np.linspace(0, 1, 24))
+        f, lines = pressure_lines(pressure, np.vstack([PLACES, on_path]), 1e-13)
+        kept = f <= 1e4
+        f, lines, largest = f[kept], lines[kept], np.abs(lines).max()
+        given = np.reshape(own["lines"], (-1, len(PLACES), 2)) @ [1, 1j]
+        at = np.abs(np.subtract.outer(f, own["f"])).argmin(axis=1)
+        known = np.abs(np.array(own["f"])[at] - f) < 1e-6
+        missed = np.where(known[:, None], given[at], 0) - lines[:, : len(PLACES)]
+        rough = pressure.tacton.n_paths > 1 or pressure.tacton.trajectory.shape == "recorded"
+        bound = JOINED if rough or is_abrupt(pressure) else 1e-6
+        assert np.abs(missed).max() < bound * largest
+
+
+def test_the_kernel_is_that_of_python_in_time_and_on_a_map(page, starts):
+    many = some_values(starts, 40, rhythm=True)
+    found = page.evaluate(
+        """([many, times]) => many.map((own) => {
+          const known = loadOf(own), motion = kernel.respond(known), axis = mapAxis();
+          const paper = kernel.respond(known, { published: true });
+          const [map, other] = [motion, paper].map((each) => mapOf(each, known, axis, axis));
+          return { f: [...motion.f], map: [...map.rms], other: [...other.rms],
+            levels: [...map.level],
+            waveforms: [motion, paper].map((each) => [...each.waveform(0.008, -0.003, times)]),
+            at: [...amplitudesOf(motion.f, motion.at(0.008, -0.003))], mean: meanLevel(known),
+            level: levelAt(motion, known, 0.008, -0.003), share: shareOutside(map.rms, other.rms),
+            reach: reach(known, map), spread: spread(known, map), axis: [...axis] };
+        })""",
+        [many, TIMES.tolist()],
+    )
+    for scene, own in zip(scenes_of(page, many), found, strict=True):
+        pressure = scene.pressure
+        top = pressure.peak_pressure
+        for load, given in zip((pressure, published(pressure)), own["waveforms"], strict=True):
+            wanted = point_kernel(load, [[0.008, -0.003]], TIMES).values[:, 0]
+            np.testing.assert_allclose(given, wanted, rtol=0, atol=1e-9 * top)
+        f, lines = pressure_lines(steady(pressure), np.array([[0.008, -0.003]]), 1e-9)
+        at = [np.abs(f - each).argmin() for each in own["f"]]
+        amplitudes = own["at"]
+        np.testing.assert_allclose(amplitudes, np.abs(lines[at, 0]), rtol=0, atol=2e-5 * top)
+        _check_map(scene, own, amplitudes)
+
+
+def _check_map(scene, own, amplitudes):
+    """Levels and distances of a map are those of their definitions in Python."""
+    levels = sensation_level(own["mean"] * np.array(amplitudes), own["f"], unit="Pa")
+    if own["level"] is not None:
+        assert own["level"]["dB"] == pytest.approx(levels.max(), abs=1e-6)
+    rms, other, level = (np.reshape(own[k], (45, 45)) for k in ("map", "other", "levels"))
+    if rms.any() and other.any():
+        assert own["share"] == pytest.approx(share_outside(rms, other), abs=1e-6)
+    places = np.stack(np.meshgrid(own["axis"], own["axis"]), axis=-1)
+    away, step = distance_from_path(scene, places), 0.002
+    if scene.tacton.trajectory.is_static:
+        return  # foci that rest apart have distances of their own
+    for found, inside in ((own["reach"], level >= 0), (own["spread"], rms >= rms.max() / 2)):
+        if found is None or not inside.any():
+            assert found is None or not rms.any()
+            continue
+        wanted = reach_of(inside, away)
+        assert wanted.metre - 1e-4 <= found["metre"] <= wanted.metre + step
+        assert found["beyond"] == wanted.beyond
+
+
+def test_thresholds_spectra_and_delays_are_those_of_python(page):
+    f = np.array([5.0, 10, 20, 100, 137, 250, 400, 1000, 1001])
+    given = page.evaluate("(f) => [f.map(thresholdAt), f.map(pressureThresholdAt)]", f.tolist())
+    for found, wanted in zip(given, (threshold(f), pressure_threshold(f)), strict=True):
+        np.testing.assert_allclose(np.array(found, float), wanted, rtol=1e-12)
+    rng = np.random.default_rng(5)
+    x = rng.normal(size=777)
+    response = Response(model="x", times=np.arange(777) / 1e4, probes=np.zeros((1, 2)),
+                        values=x[:, None], quantity="displacement")  # fmt: skip
+    shown = page.evaluate("(x) => [...spectrum(x, 1e-4).amplitudes]", x.tolist())
+    np.testing.assert_allclose(shown, spectrum(response)[1][:, 0], rtol=0, atol=1e-12)
+    z, f = rng.normal(size=(40, 2, 2)), rng.uniform(10, 500, 40)
+    delay = """([z, f]) => z.map(([a, b], k) => phaseDelay(
+      { re: a[0], im: a[1] }, { re: b[0], im: b[1] }, f[k]))"""
+    lines = (z @ [1, 1j]).T[:, :, None]
+    wanted = [phase_delays(*lines[:, k : k + 1], f[k : k + 1], np.zeros((1, 2)))[0, 0]
+              for k in range(40)]  # fmt: skip
+    np.testing.assert_allclose(page.evaluate(delay, [z.tolist(), f.tolist()]), wanted, atol=1e-12)
+
+
+def test_the_highest_level_over_a_control_is_found_between_values(page, starts):
+    own = starts | {"am": 0, "shape": "circle", "size": 20, "x": 10, "y": 0, "body": "none"}
+    found = page.evaluate(
+        """(own) => {
+          const levelsAt = (size) => {
+            if (size > 50) throw new Error("off the body");
+            const known = loadOf({ ...own, size });
+            const level = levelAt(kernel.respond(known), known, 0.01, 0);
+            return { kernel: level?.dB ?? NaN, waves: NaN };
+          };
+          const steps = [...levelOver(levelsAt, [2, 60], { of: "kernel", count: 24 })];
+          const dense = Array.from({ length: 400 }, (_, k) => levelsAt(10 + k / 20));
+          return { ...steps.pop(), dense };
+        }""",
+        own,
+    )
+    assert max(found["x"]) <= 50
+    assert len(found["x"]) == len(found["kernel"]) == 20
+    highest = max(each["kernel"] for each in found["dense"])
+    assert found["best"]["level"] == pytest.approx(highest, abs=0.01)
+    scene = scenes_of(page, [own | {"size": round(found["best"]["at"], 3)}])[0]
+    f, lines = pressure_lines(scene.pressure, np.array([[0.01, 0.0]]))
+    levels = sensation_level(np.abs(lines[1:, 0]), f[1:], unit="Pa")
+    assert found["best"]["level"] == pytest.approx(levels.max(), abs=0.01)
+
+
+def test_lines_have_the_names_of_python(page, starts):
+    paper = [starts | preset["values"] for preset in presets()]
+    brief = [own | {"duration": 0.05} for own in paper]
+    many = [*paper, *brief, *some_values(starts, 50, rhythm=True)]
+    found = page.evaluate("""(many) => many.map((own) => [lineNames(loadOf(own), { most: 2000 }),
+      unresolvedNames(loadOf(own))])""", many)  # fmt: skip
+    for k, (scene, (own, lost)) in enumerate(zip(scenes_of(page, many), found, strict=True)):
+        lines = line_names(scene.pressure, most=2000)
+        theirs = dict(zip(lines.names, lines.frequencies.tolist(), strict=True))
+        ours = {line["name"]: line["f"] for line in own}
+        if k < 30:
+            assert ours == pytest.approx(theirs)
+            t = np.arange(round(1e4 * scene.tacton.duration)) / 1e4
+            silent = Response(model="x", times=t, probes=np.zeros((1, 2)), quantity="pressure",
+                              values=np.zeros((len(t), 1)))  # fmt: skip
+            assert set(lost) == set(
+                resolved_lines(scene.pressure, silent, highest=1e3, settle=0.5)[1]
+            )
+        near = np.array([*ours.values(), np.inf])
+        strong = lines.strengths > 1e-2 * lines.strengths.max(initial=0)
+        for name in np.array(lines.names)[strong].tolist():
+            assert np.abs(near - theirs[name]).min() < 1e-6
+            assert name in ours or "f_r" in name  # multiples of f_r that coincide have many names
+        assert all(
+            ours[name] == pytest.approx(theirs[name]) for name in ours.keys() & theirs.keys()
+        )

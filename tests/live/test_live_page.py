@@ -1,0 +1,332 @@
+"""The live page: its assembly, its records, and how it behaves in a browser from a file."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from in_browser import frames, needs_browser
+
+from skinwave.commands.cli import main
+from skinwave.live.page import bundle, encoded, page, policy
+from skinwave.live.records import body_of, changed, editables, record_of, toml_of
+from skinwave.live.values import presets, values_of
+from skinwave.scene.file import loads
+from skinwave.scene.scene import BODIES
+
+SCENE = """
+name = "circle on skin"
+[tacton]
+am_frequency_hz = 140
+shape = "circle"
+size_mm = 20
+speed_m_per_s = 12
+duration_s = 0.5
+[body]
+preset = "skin-slab"
+[probes]
+points_mm = [[10, 0]]
+"""
+
+
+def modules(folder, **texts):
+    for name, text in texts.items():
+        (folder / f"{name}.js").write_text(text)
+    return folder
+
+
+def test_modules_are_joined_in_the_order_in_which_they_need_each_other(tmp_path):
+    text = bundle(
+        modules(
+            tmp_path,
+            page='import { twice as double } from "./b.js";\nconst own = 1;\nshow(double(own));\n',
+            b='import {\n  one,\n} from "./a.js";\nconst own = 2;\n'
+            "export function twice(x) { return own * x * one; }\n",
+            a="export const one = 1;\nexport class A {}\nexport async function later() {}\n"
+            "const script = `\nimport numpy as np\nfrom a import b\n`;\n",
+        ),
+        "page.js",
+    )
+    assert re.findall(r"^const (\$\w+) = ", text, re.MULTILINE) == ["$a", "$b", "$page"]
+    assert "const { twice: double } = $b;" in text
+    assert "return { A, later, one };" in text
+    assert "import numpy as np" in text, "of a text in the module"
+    assert not re.search(r"^(export|import \{)", text, re.MULTILINE)
+
+
+REFUSED = {
+    'import a from "./a.js";': "is not understood", 'import * as a from "./a.js";': "understood",
+    'import "./a.js";': "is not understood", 'const a = import("./a.js");': "is not understood",
+    "const here = import.meta.url;": "is not understood", "export { a };": "is not understood",
+    "export default function a() {}": "is not understood", "export let a = 1;": "understood",
+    'import { a b } from "./a.js";': "import of 'a b' is not understood",
+    'import { none } from "./a.js";': "a.js does not export none, which page.js imports",
+    'import { a } from "./missing.js";': "there is no module missing.js",
+    'import { b } from "./b.js";': "modules import each other",
+    "export const a = 1;\nexport const a = 2;": "exports a twice",
+    "const text = '</script>';": "would end the script of the page",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("source", "said"), REFUSED.items())
+def test_what_is_not_understood_is_refused(tmp_path, source, said):
+    folder = modules(
+        tmp_path, page=source, a="export const a = 1;",
+        b='import { c } from "./c.js";\nexport const b = c;',
+        c='import { b } from "./b.js";\nexport const c = b;',
+    )  # fmt: skip
+    with pytest.raises(ValueError, match=re.escape(said)):
+        bundle(folder, "page.js")
+
+
+def test_data_cannot_end_its_script():
+    text = encoded({"name": "</script><!--é"})
+    assert "<" not in text
+    assert json.loads(text) == {"name": "</script><!--é"}
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        encoded({"x": np.nan})
+
+
+def test_only_a_served_page_may_ask_its_server():
+    assert "connect-src 'none'" in policy("")
+    assert "connect-src 'self'" in policy("", served=True)
+    data = {"bodies": [], "start": {}, "presets": [], "examples": [], "selftest": [], "api": None}
+    text = page(data, title="a <b>")
+    assert "<title>a &lt;b&gt;</title>" in text
+    assert not re.search(r'(src|href)="(?!data:)[^"#]', text.partition("<script")[0])
+
+
+def test_presets_are_the_papers_tactons():
+    titles = [each["title"] for each in presets()]
+    assert len(titles) == 15
+    assert {"AM 140 Hz", "Circle 10 mm at 6 m/s", "AM 140 Hz + circle 20 mm at 12 m/s"} <= {*titles}
+
+
+@pytest.mark.parametrize(
+    ("tacton", "expected"),
+    [
+        ("", {"shape": "circle", "size": 20.0, "speed": 12.0, "am": 140.0, "x": 10.0}),
+        ("centre_mm = [5, 0]", {"paths": "circle/20/5/0", "foci": 1, "drawn": 190.985932}),
+        ("foci = [0, 0.25]", {"foci": 2, "phases": "0, 25"}),
+        ("rhythm.pulses_ms = [[100, 50]]\nrhythm.ramp_ms = 5", {"pulses": "100/50", "ramp": 5.0}),
+    ],
+)
+def test_values_are_those_of_a_scene(tacton, expected):
+    found = values_of(loads(SCENE.replace("[body]", f"{tacton}\n[body]")), "skin-slab")
+    assert expected.items() <= found.items()
+    assert found["body"] == "skin-slab"
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [("depth_mm = 1", "no control for a probe below"), ('quantity = "strain_zz"', "strain_zz"),
+     ('[load]\nkind = "shear"', "is about the pressure of a focus")],
+)  # fmt: skip
+def test_what_no_control_sets_is_refused(more, said):
+    with pytest.raises(ValueError, match=said):
+        values_of(loads(SCENE + more), "skin-slab")
+
+
+@pytest.mark.parametrize("name", [name for name in BODIES if name != "none"])
+def test_each_value_of_a_body_can_be_changed(name):
+    body = BODIES[name]
+    assert body_of(toml_of(body)) == body
+    for each in editables(body):
+        if each.choices:
+            continue
+        other = each.value * 1.2 + 0.01
+        found = {new.key: new.value for new in editables(changed(body, {each.key: other}))}
+        assert found[each.key] == pytest.approx(other, rel=1e-3)
+        assert changed(body, {each.key: each.value}) == body
+
+
+def test_a_change_keeps_the_other_values_of_a_layer():
+    body = changed(BODIES["palm-layers"], {"layers.1.modulus": 140.0, "layers.1.thickness": 2.0})
+    values = {each.key: each.value for each in editables(body)}
+    before = {each.key: each.value for each in editables(BODIES["palm-layers"])}
+    moved = {key for key in before if values[key] != pytest.approx(before[key])}
+    assert moved == {"layers.1.modulus", "layers.1.thickness"}
+    assert body.depth == pytest.approx(26e-3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [({"width": 3}, "width is no value"), ({"modulus": "3"}, "must be a number"),
+     ({"modulus": float("nan")}, "must be a number"), ({"modulus": -3}, "Give one above 0"),
+     ({"base": "glued"}, "'glued' is unknown"), ({"base": "free", "sides": "free"}, "unconst")],
+)  # fmt: skip
+def test_changes_that_cannot_be_are_refused(changes, said):
+    with pytest.raises(ValueError, match=said):
+        changed(BODIES["skin-slab"], changes)
+
+
+def test_the_record_of_a_body_says_what_the_page_needs():
+    slab, sheet = (record_of(BODIES[name], {}) for name in ("skin-slab", "paper-sheet"))
+    assert (slab["is_infinite"], slab["extent_mm"], slab["thickness_mm"]) == (True, None, None)
+    assert (sheet["is_infinite"], sheet["extent_mm"]) == (False, [74.0, 52.5])
+    assert sheet["thickness_mm"] == pytest.approx(0.13375)
+    branches = slab["dispersion"]["branches"]
+    assert {len(branch["c"]) for branch in branches} == {len(slab["dispersion"]["f"])}
+    assert any(3 < (branch["c"][-1] or 0) < 8 for branch in branches)
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("live")
+    (folder / "circle.toml").write_text(SCENE)
+    asked = ["live", str(folder / "circle.toml"), "-o", str(folder / "live.html"), "--quiet"]
+    assert main(asked) == 0
+    return folder / "live.html"
+
+
+def test_the_command_writes_one_file(file, capsys):
+    data = json.loads(re.search(r'id="data">(.*?)</script>', file.read_text(), re.DOTALL)[1])
+    assert [body["name"] for body in data["bodies"]] == ["skin-slab"]
+    assert data["start"]["am"] == 140
+    assert data["presets"][0]["title"] == "circle on skin"
+    assert len(data["selftest"]) == 20
+    assert file.stat().st_size < 1.5e6
+    assert main(["live", "-o", str(file)]) == 2
+    assert "exists and is kept" in capsys.readouterr().err
+    assert sorted(path.name for path in file.parent.iterdir()) == ["circle.toml", "live.html"]
+
+
+def test_a_scene_that_is_malformed_is_refused_in_a_sentence(tmp_path, capsys):
+    (tmp_path / "bad.toml").write_text("[tacton]\nshape = 3\n")
+    assert main(["live", str(tmp_path / "bad.toml"), "-o", str(tmp_path / "a.html")]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+    assert not (tmp_path / "a.html").exists()
+
+
+@pytest.fixture
+def opened(browser, file):
+    """A function that opens the page with a width and a part of its address; what the browser says
+    and asks for is collected.
+    """
+    made = []
+
+    def opening(width=1280, height=800, part=""):
+        tab = browser.new_page(viewport={"width": width, "height": height}, reduced_motion="reduce")
+        made.append(tab)
+        tab.said = []
+        tab.on("console", lambda message: tab.said.append(message.text))
+        tab.on("pageerror", lambda error: tab.said.append(str(error)))
+        tab.on("request", lambda request: tab.said.append(request.url))
+        tab.goto(f"{file.as_uri()}{part}")
+        tab.locator(".tile").first.wait_for(state="attached")
+        return tab
+
+    yield opening
+    for tab in made:
+        tab.close()
+
+
+def tiles(tab):
+    return tab.inner_text("#tiles")
+
+
+@needs_browser
+def test_it_opens_from_a_file_without_a_request(opened, file):
+    tab = opened()
+    assert "191 Hz" in tiles(tab)
+    assert tab.said == [file.as_uri()]
+
+
+@needs_browser
+def test_the_self_test_agrees_with_python(opened):
+    tab = opened(part="#selftest")
+    tab.locator("#selftest-said", has_text="largest error").wait_for(timeout=60_000)
+    assert float(tab.get_attribute("#selftest-said", "data-error")) < 0.01
+
+
+@needs_browser
+@pytest.mark.parametrize("width", [1280, 390])
+def test_it_is_accessible_and_fits(opened, width):
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    tab = opened(width=width)
+    found = axe.run(tab, options={"resultTypes": ["violations"], "preload": False}).response
+    serious = [each for each in found["violations"] if each["impact"] in ("serious", "critical")]
+    assert [(each["id"], each["nodes"][0]["target"]) for each in serious] == []
+    root = tab.evaluate("(({ scrollWidth, scrollHeight }) => [scrollWidth, scrollHeight])"
+                        "(document.documentElement)")  # fmt: skip
+    assert root[0] <= width
+    assert width == 390 or root[1] <= 800, "one screen holds all"
+
+
+@needs_browser
+def test_keys_move_a_control_and_undo_it(opened):
+    tab = opened()
+    before = tiles(tab)
+    tab.get_by_role("slider", name="Drawing speed").first.focus()
+    tab.keyboard.press("ArrowRight")
+    tab.locator("#tiles", has_text="193 Hz").wait_for()
+    assert "speed=12.1" in tab.evaluate("location.href")
+    tab.keyboard.press("Control+z")
+    tab.locator("#tiles", has_text="191 Hz").wait_for()
+    assert tiles(tab) == before
+
+
+@needs_browser
+def test_a_preset_is_taken_and_compared_with_what_was_pinned(opened):
+    tab = opened()
+    tab.click("#pin")
+    tab.click("[data-menu=presets]")
+    tab.get_by_role("button", name="AM 80 Hz", exact=True).click()
+    rows = tab.locator("#ab tr", has_text="AM frequency")
+    rows.get_by_text("80 Hz").wait_for()
+    tab.click("#swap")
+    tab.locator("#tiles", has_text="191 Hz").wait_for()
+    assert "80 Hz" in rows.locator("td").first.inner_text()
+
+
+@needs_browser
+def test_what_is_typed_wrong_is_said_and_changes_nothing(opened):
+    tab = opened()
+    before = tiles(tab)
+    tab.fill("#am-field", "fast")
+    assert "not a number" in tab.inner_text("#problem")
+    assert tab.get_attribute("#am-field", "aria-invalid") == "true"
+    assert tiles(tab) == before
+    tab.fill("#am-field", "140")
+    assert tab.inner_text("#problem") == ""
+
+
+@needs_browser
+def test_the_highest_level_is_found_and_set(opened):
+    tab = opened()
+    before = level(tab)
+    tab.click("#tab-level")
+    tab.click("#best:enabled")
+    frames(tab, 2)
+    assert "speed=" in tab.evaluate("location.href")
+    assert level(tab) >= before
+
+
+def level(tab):
+    return int(
+        tab.inner_text("#tiles .value >> nth=0").removesuffix(" dB").replace("\N{MINUS SIGN}", "-")
+    )
+
+
+@needs_browser
+@pytest.mark.parametrize("title", ["Maps and plots, SVG", "Lines, CSV", "Scene, TOML"])
+def test_what_is_shown_can_be_saved(opened, title):
+    tab = opened()
+    tab.click("[data-menu=save]")
+    with tab.expect_download() as saved:
+        tab.get_by_role("button", name=title).click()
+    text = saved.value.path().read_text(encoding="utf-8")
+    assert {"Maps": "<svg", "Line": "f_d", "Scen": "speed_m_per_s = 12"}[title[:4]] in text
+
+
+@needs_browser
+def test_a_measurement_is_drawn_over_the_waves(opened, tmp_path):
+    file = tmp_path / "measured.csv"
+    rows = "".join(f"{1e-4 * k:.4f},{np.sin(0.1 * k):.4f}\n" for k in range(600))
+    file.write_text("time [s],displacement [µm]\n" + rows, encoding="utf-8")
+    tab = opened()
+    tab.set_input_files("#measurement", file)
+    tab.locator("#waveform .is-measured").first.wait_for(state="attached")
+    tab.evaluate("document.querySelector('#files').open = true")
+    tab.click("#measured-clear")
+    tab.locator("#waveform .is-measured").first.wait_for(state="detached")

@@ -1,0 +1,245 @@
+"""The server of the live page: who may use it, what it answers, and the page that asks it."""
+
+import json
+import re
+import threading
+from http.client import HTTPConnection
+from urllib.parse import urlsplit
+
+import pytest
+from in_browser import ended, needs_browser, served
+
+from skinwave.commands.cli import main
+from skinwave.live import serve
+from skinwave.live.records import body_of, toml_of
+from skinwave.scene.scene import BODIES
+
+SLAB = BODIES["skin-slab"]
+DATA = {"bodies": [], "start": {}, "presets": [], "examples": [], "selftest": []}
+SCENE = b'name = "s"\n[tacton]\nam_frequency_hz = 90\n[body]\npreset = "skin-slab"\n'
+
+
+class Client:
+    """Requests to a server of this process."""
+
+    def __init__(self, base="/"):
+        self.server = serve.Server(DATA, base=base, token="right")
+        self.thread = threading.Thread(target=self.server.serve_forever, daemon=True)
+        self.thread.start()
+
+    def ask(self, method, path, body=None, **headers):
+        connection = HTTPConnection("127.0.0.1", self.server.server_port, timeout=60)
+        named = {name.replace("_", "-"): value for name, value in headers.items()}
+        connection.request(method, path, body, named)
+        answer = connection.getresponse()
+        content = answer.read()
+        connection.close()
+        return answer, content
+
+    def post(self, name, body, **headers):
+        answer, content = self.ask("POST", name, body, X_Token="right", **headers)
+        return answer.status, [json.loads(line) for line in content.splitlines()]
+
+    def change(self, body=SLAB, **changes):
+        asked = {"toml": toml_of(body), "name": "own", "title": "Own", "changes": changes}
+        return self.post("/api/body", json.dumps(asked).encode())[1]
+
+    def close(self):
+        self.server.shutdown()
+        self.server.server_close()
+        self.thread.join()
+
+
+@pytest.fixture(scope="module")
+def client():
+    found = Client()
+    yield found
+    found.close()
+
+
+def test_it_listens_on_this_machine_only(client):
+    assert client.server.server_address[0] == "127.0.0.1"
+    assert client.server.address.startswith("http://127.0.0.1:")
+    with serve.Server(DATA) as other:
+        assert len(other.token) >= 32
+
+
+def test_the_address_brings_the_token_and_a_cookie_keeps_it(client):
+    assert client.ask("GET", "/")[0].status == 403
+    assert client.ask("GET", "/?token=wrong")[0].status == 403
+    answer, _ = client.ask("GET", "/?token=right")
+    assert (answer.status, answer.headers["Location"]) == (303, "/")
+    cookie = answer.headers["Set-Cookie"]
+    assert "HttpOnly" in cookie
+    answer, content = client.ask("GET", "/", Cookie=f"a=b; {cookie.split(';')[0]}")
+    assert answer.status == 200
+    assert b'"token":"right"' in content
+    assert answer.headers["Referrer-Policy"] == "no-referrer"
+    assert client.ask("GET", "/", Cookie="malformed;;=")[0].status == 403
+    assert client.ask("GET", "/other?token=right")[0].status == 404
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Host": "evil.example"},
+        {"Host": "127.0.0.1.evil.example"},
+        {"Origin": "http://evil.example"},
+    ],
+    ids=str,
+)
+def test_other_sites_are_refused(client, headers):
+    assert client.ask("GET", "/?token=right", **headers)[0].status == 403
+    answer, _ = client.ask("POST", "/api/body", b"{}", X_Token="right", **headers)
+    assert answer.status == 403
+
+
+def test_requests_without_the_token_are_refused(client):
+    for headers in ({}, {"X_Token": "wrong"}, {"X_Token": "ü"}, {"Cookie": "skinwave=right"}):
+        answer, content = client.ask("POST", "/api/body", b"{}", **headers)
+        assert answer.status == 403
+        assert "token is missing" in json.loads(content)["error"]
+
+
+def test_a_proxy_may_show_it_under_a_prefix():
+    base = "/user/me/proxy/8123/"
+    client = Client(base)
+    try:
+        for path in (base, "/", base[:-1]):
+            answer, _ = client.ask("GET", f"{path}?token=right", Host="hub.example")
+            assert answer.headers["Location"] == base
+            assert f"Path={base}" in answer.headers["Set-Cookie"]
+        for path in (f"{base}api/scene", "/api/scene"):
+            status, (found,) = client.post(path, SCENE, Host="hub.example")
+            assert (status, found["values"]["am"]) == (200, 90)
+    finally:
+        client.close()
+
+
+@pytest.mark.parametrize("base", ["//evil.example/", "/a b/", "/a", '/"/', "/a\r\nX: b/"])
+def test_a_prefix_that_is_no_path_is_refused(base):
+    with pytest.raises(ValueError, match="must be a path"):
+        serve.Server(DATA, base=base)
+
+
+def test_a_changed_body_comes_after_its_progress(client):
+    *phases, body, dispersion = client.change(modulus=40.0)
+    assert {"phase", "fraction"} == set(phases[0])
+    record = body["body"]
+    assert (record["name"], record["title"], record["dispersion"]) == ("own", "Own, changed", None)
+    assert next(key["value"] for key in record["keys"] if key["key"] == "modulus") == 40
+    assert body_of(record["toml"]).solid.shear_modulus == pytest.approx(40e3)
+    assert record["pack"]["kind"] == "radial"
+    assert dispersion["dispersion"]["branches"]
+
+
+def test_errors_are_sentences(client):
+    assert "'glued' is unknown" in client.change(base="glued")[-1]["error"]
+    for sent in (b"", b"[]", b"\xff", b'{"toml": 3}', b'{"toml": "", "changes": []}', b"[" * 9999):
+        (line,) = client.post("/api/body", sent)[1]
+        assert set(line) == {"error"}
+    for name, sent in (("scene", b"\xff"), ("scene", b"a ="), ("measurement", b"t,u\n")):
+        status, (line,) = client.post(f"/api/{name}", sent, X_Name="a.csv")
+        assert status == 400
+        assert "\n" not in line["error"]
+
+
+def test_what_is_too_large_or_unknown_is_refused(client):
+    assert client.post("/api/other", b"")[0] == 404
+    connection = HTTPConnection("127.0.0.1", client.server.server_port, timeout=60)
+    for length, status in (("99999999", 413), ("-1", 411), ("many", 411)):
+        connection.putrequest("POST", "/api/body")
+        connection.putheader("X-Token", "right")
+        connection.putheader("Content-Length", length)
+        connection.endheaders()
+        assert connection.getresponse().status == status
+        connection.close()
+
+
+def test_a_scene_gives_values_and_a_body(client):
+    status, (found,) = client.post("/api/scene", SCENE, X_Name="s.toml")
+    assert status == 200
+    assert (found["values"]["am"], found["values"]["body"]) == (90, found["body"]["name"])
+
+
+def test_a_measurement_gives_curves_by_place(client):
+    sent = b"time_s,displacement_um\n0.1,0\n0.101,1\n0.102,0.5\n"
+    status, (found,) = client.post("/api/measurement", sent, X_Name="m%C3%A4.csv")
+    assert (status, found["name"], found["quantity"]) == (200, "mä.csv", "displacement")
+    assert found["values"] == [pytest.approx([0, 1e-6, 5e-7])]
+    assert found["times"] == pytest.approx([0, 1e-3, 2e-3])
+    assert found["places"] == [None]
+
+
+def test_newer_work_ends_older_work(client):
+    began, counted, said = threading.Event(), threading.Event(), []
+
+    def older(check):
+        began.set()
+        assert counted.wait(60)
+        with pytest.raises(serve.Superseded):
+            check()
+        said.append("older")
+
+    newer = [lambda check: said.append("newer")]
+    threads = [
+        threading.Thread(target=client.server.compute, args=each) for each in ([older], newer)
+    ]
+    threads[0].start()
+    assert began.wait(60)
+    newest = client.server._newest
+    threads[1].start()
+    while client.server._newest == newest:  # until the newer one is counted
+        threads[1].join(0.01)
+    counted.set()
+    for each in threads:
+        each.join(60)
+    assert said == ["older", "newer"]
+
+
+def test_a_fault_is_said_here_and_not_there(client, monkeypatch, capsys):
+    def fails(name, content, progress):
+        raise KeyError("private")
+
+    monkeypatch.setattr(serve, "scene_answer", fails)
+    status, (line,) = client.post("/api/scene", b"")
+    assert (status, line["error"]) == (500, serve.FAULT)
+    assert capsys.readouterr().err == "skinwave: a request failed: KeyError: 'private'\n"
+
+
+def test_options_that_cannot_be_are_refused(client, capsys, tmp_path):
+    for asked in (["--port", "70000"], ["--port", str(client.server.server_port)],
+                  ["--base-url", "a b"], [str(tmp_path / "none.toml")]):  # fmt: skip
+        (tmp_path / "s.toml").write_bytes(SCENE)
+        scene = [] if asked[0].endswith("none.toml") else [str(tmp_path / "s.toml")]
+        assert main(["web", *scene, "--no-browser", "--quiet", *asked]) == 2
+        assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+@pytest.fixture
+def address(tmp_path):
+    (tmp_path / "s.toml").write_bytes(SCENE)
+    process, found = served("--port", "0", "--quiet", str(tmp_path / "s.toml"))
+    yield found
+    ended(process)
+
+
+@needs_browser
+def test_a_page_changes_its_body(browser, address):
+    tab, asked = browser.new_page(reduced_motion="reduce"), []
+    tab.on("request", lambda request: asked.append(request.url))
+    tab.on("pageerror", lambda error: asked.append(str(error)))
+    tab.goto(address)
+    assert "token" not in tab.url
+    tab.locator(".tile").first.wait_for()
+    before = tab.inner_text("#tiles")
+    tab.locator("summary", has_text="Layers").click()
+    field = tab.get_by_role("slider", name=re.compile("Shear modulus")).first
+    field.focus()
+    with tab.expect_response(re.compile("api/body")):
+        field.press("PageUp")
+    tab.locator("#page:not(.stale)").wait_for()
+    assert tab.inner_text("#tiles") != before
+    host = urlsplit(address).netloc
+    assert {urlsplit(each).netloc for each in asked} == {host}
+    tab.close()

@@ -1,0 +1,187 @@
+"""Maps and views in three dimensions of the live page, drawn in a browser; the page of a report."""
+
+import json
+import shutil
+from importlib import resources
+from io import BytesIO
+from xml.etree import ElementTree
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from in_browser import needs_browser, settled
+from PIL import Image
+
+from simple_model import MovingPressure, Tacton, Trajectory
+from simple_model.load_spectrum import synthesise
+from skinwave.live.page import bundle
+from skinwave.report.turntable import focus_places, motion_lines, turntable
+from skinwave.results.views import kernel_view
+from skinwave.scene.scene import BODIES, Scene
+
+N, REACH = 45, 0.044  # places of a map either way, and how far they reach, m
+MODULE = """
+import { contours } from "./contours.js";
+import { drawMap, mapControls } from "./maps.js";
+import { openView } from "./view3d.js";
+Object.assign(window, { contours, drawMap, mapControls, openView });
+"""
+PAGE = """<!doctype html><meta charset=utf-8><body style="color: #000; margin: 0">
+<canvas id=map style="width: 400px; height: 420px"></canvas>
+<div id=view style="width: 500px; height: 420px"></div><script type=module>"""
+BODY = """() => {
+  const points = [], re = [], triangles = [];
+  for (let j = 0, a = 0; j < 21; j++) for (let i = 0; i < 21; i++, a++) {
+    points.push(4 * i - 40, 4 * j - 40, 0);
+    re.push(1e-6 * Math.exp(-((i - 10) ** 2 + (j - 10) ** 2) / 9));
+    if (i < 20 && j < 20) triangles.push(a, a + 1, a + 22, a, a + 22, a + 21);
+  }
+  window.view = openView(document.getElementById("view"));
+  view.show({
+    shape: { points: Float32Array.from(points), triangles: Uint32Array.from(triangles) },
+    motion: { f: [100], re, im: re.map(() => 0) }, path: [[-0.01, 0], [0.01, 0]],
+    foci: () => [[0, 0]],
+  });
+}"""
+CHANGES = (
+    "view.seek(0.005)", "view.above.click()", "view.cutter.value = 60; view.cutter.oninput()",
+    "view.hues.value = 'rms'; view.hues.onchange()",
+)  # fmt: skip
+LOAD = MovingPressure(
+    tacton=Tacton(trajectory=Trajectory(shape="circle", size=0.02, speed=12.0), am_frequency=140.0)
+)
+
+
+@pytest.fixture
+def page(browser, tmp_path):
+    folder = tmp_path / "static"
+    shutil.copytree(str(resources.files("skinwave.live") / "static"), folder)
+    (folder / "entry.js").write_text(MODULE)
+    text = f"{PAGE}{bundle(folder, 'entry.js')}</script>"
+    (tmp_path / "page.html").write_text(text, encoding="utf-8")
+    found = browser.new_page(viewport={"width": 900, "height": 900})
+    said: list[str] = []
+    found.on("pageerror", lambda error: said.append(str(error)))
+    found.goto((tmp_path / "page.html").as_uri())
+    yield found
+    found.close()
+    assert said == []
+
+
+def grid(of):
+    """Values of a function of x and y in metre at the places of a map, as a page takes them."""
+    x, y = np.meshgrid(*2 * [np.linspace(-REACH, REACH, N)])
+    return f"Float32Array.from({json.dumps(of(x, y).ravel().tolist())})"
+
+
+def picture(page, selector):
+    return np.asarray(Image.open(BytesIO(page.locator(selector).screenshot())).convert("RGB"))
+
+
+def draw(page, rms, **options):
+    given = f"{{...{json.dumps(options)}, rms: {rms}}}"
+    page.evaluate(f"drawMap(document.getElementById('map'), {given})")
+    return picture(page, "#map")
+
+
+@needs_browser
+@pytest.mark.parametrize("kind", ["linear", "decibel", "signed"])
+def test_a_map_has_the_colours_of_its_values_and_is_empty_off_the_body(page, kind):
+    scale, options = {
+        "linear": (lambda v: v / 0.1, {}),
+        "decibel": (lambda v: 1 + 20 * np.log10(v / 0.1) / 40, {"decibel": 40}),
+        "signed": (lambda v: 0.5 + v / 0.2, {"signed": True}),
+    }[kind]
+    rms = grid(lambda x, y: np.where(y > 0, x + REACH, np.nan))
+    drawn = draw(page, rms, largest=0.1, **options)
+    table = mpl.colormaps["RdBu_r" if kind == "signed" else "cividis"]
+    left, top, side = 32, 20, 400 - 42  # of the map in the canvas
+    for x in (-0.02, 0.0, 0.03):
+        at = left + round(side * (x + REACH) / (2 * REACH))
+        expected = 255 * np.array(table(scale(x + REACH))[:3])
+        np.testing.assert_allclose(drawn[top + side // 3, at], expected, atol=8)
+        assert tuple(drawn[top + 2 * side // 3, at]) == (255, 255, 255)
+
+
+@needs_browser
+def test_a_contour_is_where_values_are_zero(page):
+    lines = page.evaluate(f"contours({grid(lambda x, y: np.hypot(x, y) - 0.015)}, {N})")
+    (line,) = np.asarray(lines)
+    assert tuple(line[0]) == tuple(line[-1])
+    away = np.hypot(*(REACH * (2 * line / (N - 1) - 1)).T)
+    np.testing.assert_allclose(away, 0.015, atol=1e-4)
+
+
+@needs_browser
+def test_keys_and_a_pointer_select_points_of_a_map(page):
+    draw(page, grid(lambda x, y: x), point=[0.01, 0.0], title="Skin slab", unit="Pa")
+    page.evaluate("mapControls(document.getElementById('map'), (...at) => { window.at = at; })")
+    page.focus("#map")
+    for key, expected in (("ArrowRight", [0.011, 0.0]), ("Shift+ArrowDown", [0.01, -0.005])):
+        page.keyboard.press(key)
+        np.testing.assert_allclose(page.evaluate("at"), expected, atol=1e-9)
+    assert "10, 0 mm: 0.0100 Pa" in page.get_attribute("#map", "aria-label")
+    page.mouse.click(32 + 358 / 2, 20 + 358 / 4)
+    np.testing.assert_allclose(page.evaluate("at"), [0.0, REACH / 2], atol=1e-3)
+
+
+@needs_browser
+def test_a_map_as_a_file_is_well_formed_and_has_its_words(page):
+    draw(page, grid(lambda x, y: x + REACH), title="A < B", unit="m", point=[0, 0])
+    inside = page.evaluate("document.getElementById('map').asSvg()")
+    text = f'<svg xmlns="http://www.w3.org/2000/svg">{inside}</svg>'
+    root = ElementTree.fromstring(text)
+    words = [each.text for each in root.iter("{http://www.w3.org/2000/svg}text")]
+    assert {"A < B", "0", "88.0 mm", "0 mm"} <= set(words)
+    assert "data:image/png;base64," in text
+
+
+@needs_browser
+def test_a_body_moves_turns_and_says_how_it_is_drawn(page):
+    page.emulate_media(reduced_motion="reduce")
+    page.evaluate(BODY)
+    settled(page)
+    assert "Exaggerated 3,000 times" in page.inner_text("#view")
+    assert page.evaluate("view.loop") == pytest.approx(0.1)
+    seen = [picture(page, "#view canvas")]
+    assert seen[0].std() > 10  # not blank
+    for change in CHANGES:
+        page.evaluate(change)
+        seen.append(picture(page, "#view canvas"))
+        assert np.abs(seen[-1].astype(int) - seen[-2]).max() > 30
+    page.focus("#view canvas")
+    page.keyboard.press("Space")
+    page.wait_for_function("view.time > 0.006")
+
+
+def test_lines_of_motion_that_repeats_add_up_to_it():
+    t, k = np.arange(40) / 40 * 0.02, np.arange(7)
+    frames = np.cos(2 * np.pi * 150 * t[:, None] + k) + 0.2 * np.sin(2 * np.pi * 400 * t)[:, None]
+    f, lines = motion_lines(frames, 0.02)
+    assert f.tolist() == pytest.approx([150, 400])
+    np.testing.assert_allclose(synthesise(f, lines, t), frames, atol=1e-9)
+
+
+def test_foci_are_where_the_path_is():
+    times = np.linspace(0, 0.05, 5)
+    paths, foci = focus_places(LOAD, times)
+    np.testing.assert_allclose(np.hypot(*paths[0].T), 0.01)
+    np.testing.assert_allclose(foci[:, 0], LOAD.tacton.trajectory.position(times), atol=1e-12)
+
+
+@needs_browser
+def test_the_view_of_a_report_opens_from_a_file_without_requests(browser, tmp_path):
+    scene = Scene(name="s", pressure=LOAD, body=BODIES["skin-slab"], probes=((0.0, 0.0),))
+    view = kernel_view(scene, np.array([0.03, 0.03]))
+    (tmp_path / "view.html").write_text(turntable(view, 1), encoding="utf-8")
+    page, asked, said = browser.new_page(), [], []
+    page.on("request", lambda request: asked.append(request.url))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.goto((tmp_path / "view.html").as_uri())
+    page.wait_for_selector("canvas[data-time]")
+    time = page.evaluate("Number(document.querySelector('canvas').dataset.time)")
+    assert time >= view.times[1] - 1e-9
+    assert picture(page, "canvas").std() > 3
+    page.close()
+    assert len(asked) == 1
+    assert said == []

@@ -1,0 +1,394 @@
+"""Models beside a measurement: differences beyond the noise, claims of the data, the command."""
+
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from simple_model import MovingPressure, Tacton, Trajectory
+from skinwave.commands import cli
+from skinwave.measure import Measurement, measured_page
+from skinwave.measure.lines import MeasuredLines
+from skinwave.measure.measured_claims import FAILS, HOLDS, UNDECIDED, assess_measured, by_name
+from skinwave.measure.measured_runs import at_measured, beside
+from skinwave.measure.measured_study import (
+    AGREES,
+    DIFFERS,
+    NUMERICAL,
+    SILENT,
+    UNKNOWN,
+    Measured,
+    compare_measured,
+    main_column,
+)
+from skinwave.measure.writing import write
+from skinwave.planning.simulate import compute
+from skinwave.results.run import Run
+from skinwave.scene.file import dumps
+from skinwave.scene.paper15 import beside_kernels
+from skinwave.scene.scene import BODIES, Body, Scene
+
+DELAY, GAIN = 2.4e-3, 0.6
+CIRCLE = Trajectory(shape="circle", size=0.02, speed=12.0)
+
+
+def scene_of(duration=0.25, body=BODIES["skin-slab"], **tacton):
+    return Scene(pressure=MovingPressure(tacton=Tacton(duration=duration, **tacton)), body=body,
+                 quantity="velocity")  # fmt: skip
+
+
+AM = scene_of(am_frequency=140.0)
+BOTH = scene_of(am_frequency=140.0, trajectory=CIRCLE)
+
+
+def runs_of(scene, stiffness=1.0):
+    """Both kernels and the steady state of the body."""
+    bare = beside_kernels(replace(scene, quantity="displacement"))
+    soft = replace(scene.body, material=scene.body.solid.scaled(modulus=stiffness))
+    of_body = compute(replace(scene, body=soft), "flat-body-harmonic")
+    kernels = [Run(tacton="one", body="none", scene=s, response=compute(s, model))
+               for model, s in bare.items()]  # fmt: skip
+    return [*kernels, Run(tacton="one", body="skin-slab", scene=scene, response=of_body)]
+
+
+@pytest.fixture(scope="module")
+def models():
+    return {True: runs_of(AM), False: runs_of(AM, stiffness=1.3)}
+
+
+def record(run, rng, repetitions=5, sigma=1e-4, **changes):
+    """A record of a response: late, weak and noisy, at 4 kHz."""
+    times = np.arange(900) / 4000
+    late = CubicSpline(run.response.times, run.response.values)(times + 0.007 - DELAY)
+    noise = sigma * rng.normal(size=(repetitions, *late.shape))
+    given = {"quantity": run.response.quantity, "places": run.response.probes, "times": times,
+             "values": GAIN * late + noise} | changes  # fmt: skip
+    return Measurement(**given)
+
+
+def test_a_true_model_agrees_but_for_the_stated_rate(models):
+    rng = np.random.default_rng(1)
+    any_at_all, delays, gains = [], [], []
+    for _ in range(25):
+        found = compare_measured(Measured(measurement=record(models[True][-1], rng)), models[True])
+        column = main_column(found)
+        any_at_all.append(column.differs.any())
+        a = column.alignment
+        gains.append(abs(a.gain - GAIN) < 1.96 * a.gain_error)
+        off = (a.delay - (DELAY - 0.007) + 1 / 280) % (1 / 140) - 1 / 280
+        delays.append(abs(off) < 1.96 * a.delay_error)
+        assert a.repeats == pytest.approx(1 / 140, rel=1e-3)
+    assert np.mean(any_at_all) <= 0.05 + 2.6 * np.sqrt(0.05 * 0.95 / 25)
+    assert np.mean(gains) > 0.85
+    assert np.mean(delays) > 0.85
+
+
+def test_a_model_three_tenths_too_stiff_is_found_out(models):
+    rng = np.random.default_rng(2)
+    measured = Measured(measurement=record(models[True][-1], rng, sigma=2e-5))
+    found = compare_measured(measured, models[False])
+    column = main_column(found)
+    assert column.differs[list(found.names).index("f_AM")].sum() >= 3
+    assert column.misfit > 3 * found.noise
+    assert (found.findings(column) == DIFFERS).any()
+    assert "does not agree with the data everywhere" in measured_page.conclusion(
+        found, main_column(found)
+    )
+    assert "f_AM at" in measured_page.conclusion(found, main_column(found))
+    same = compare_measured(measured, models[True])
+    assert main_column(same).misfit < column.misfit / 3
+    assert "agrees with the data within the noise" in measured_page.conclusion(
+        same, main_column(same)
+    )
+    assert {*np.unique(same.findings(main_column(same)))} == {AGREES, SILENT}
+
+
+def test_a_model_that_misfits_has_a_delay_at_which_the_record_lies_within_the_tacton():
+    """The true delay is 0; 393 ms off, where 108 of 500 ms overlap, the misfit is a tenth less."""
+    slow = replace(CIRCLE, speed=8.0)
+    scene = scene_of(duration=0.5, am_frequency=140.0, trajectory=slow)
+    true, stiff = (runs_of(scene, stiffness)[-1] for stiffness in (0.8, 1.0))
+    noise = 1e-5 * np.random.default_rng(3).normal(size=(4, *true.response.values.shape))
+    measured = Measurement(
+        quantity="velocity",
+        places=scene.probe_points,
+        times=true.response.times,
+        values=true.response.values + noise,
+    )
+    found = compare_measured(Measured(measurement=measured), [stiff])
+    column = main_column(found)
+    assert column.misfit > 0.2
+    assert abs(column.alignment.delay) < 1e-3
+    assert not any("lie within the Tacton" in said for said in measured_page.remarks(found))
+    far = compare_measured(Measured(measurement=measured, delay=-0.3926), [stiff])
+    assert any("only 107 of the 500 ms" in said for said in measured_page.remarks(far))
+
+
+def test_differences_within_the_numerical_error_are_marked(models):
+    rng = np.random.default_rng(2)
+    rough = [replace(run, response=replace(run.response, expected_error=0.5))
+             for run in models[False]]  # fmt: skip
+    found = compare_measured(Measured(measurement=record(models[True][-1], rng, sigma=2e-5)), rough)
+    findings = found.findings(main_column(found))
+    assert (findings == NUMERICAL).any()
+    assert "within the model's numerical error of 50 %" in measured_page.conclusion(
+        found, main_column(found)
+    )
+
+
+def test_delay_and_gain_are_those_given(models):
+    rng = np.random.default_rng(3)
+    asked = Measured(measurement=record(models[True][-1], rng), delay=DELAY - 0.007, gain=GAIN)
+    found = compare_measured(asked, models[True])
+    *kernels, body = found.columns
+    assert (body.alignment.gain, body.alignment.delay) == (GAIN, DELAY - 0.007)
+    assert all(k.alignment.gain != GAIN and k.alignment.gain_error > 0 for k in kernels)
+    assert not body.differs.any()
+    late = compare_measured(replace(asked, delay=0.0), models[True])
+    assert main_column(late).differs.any()
+
+
+def test_one_repetition_has_a_noise_where_some_lines_have_none(models):
+    measured = record(models[True][-1], np.random.default_rng(4), repetitions=1)
+    found = compare_measured(Measured(measurement=measured), models[True])
+    variance = found.lines.variance.copy()
+    variance[1] = np.nan
+    part = replace(found, lines=replace(found.lines, variance=variance))
+    assert part.noise == pytest.approx(found.noise, rel=0.5)
+    assert "unknown for 1 line." in measured_page.remarks(part)[0]
+
+
+def test_a_measurement_with_its_sign_turned_is_told(models):
+    rng = np.random.default_rng(8)
+    run = models[True][-1]
+    measured = record(run, rng)
+    true, turned = (
+        compare_measured(
+            Measured(measurement=replace(measured, values=sign * measured.values)), models[True]
+        )
+        for sign in (1, -1)
+    )
+    said = "check which direction"
+    assert not any(said in each for each in measured_page.remarks(true))
+    assert any(said in each for each in measured_page.remarks(turned))
+
+
+def test_a_record_that_begins_before_the_motion_is_told(models):
+    rng = np.random.default_rng(8)
+    steady = record(models[True][-1], rng)
+    values = steady.values.copy()
+    values[:, :400] = 0  # of 900, of which the first 225 are left out
+    early = record(models[True][-1], rng, values=values)
+    said = [measured_page.remarks(compare_measured(Measured(measurement=m), models[True]))
+            for m in (steady, early)]  # fmt: skip
+    assert not any("not steady" in text for text in said[0])
+    assert "cut off what lies before and after the Tacton" in said[1][-1]
+
+
+def test_clipping_and_hum_on_a_line_of_the_load_are_told():
+    scene = scene_of(am_frequency=120.0, duration=0.5)
+    runs = runs_of(scene)
+    clean = record(runs[-1], np.random.default_rng(8))
+    top = 0.7 * np.abs(clean.values).max()
+    hum = 0.3 * clean.values.std() * np.sin(2 * np.pi * 60 * clean.times)[:, None]
+    said = [
+        " ".join(measured_page.remarks(compare_measured(Measured(measurement=m), runs)))
+        for m in (clean, replace(clean, values=clean.values.clip(-top, top)),
+                  replace(clean, values=clean.values + hum))
+    ]  # fmt: skip
+    assert ["is clipped" in text for text in said] == [False, True, False]
+    assert ["mains hum of 60 Hz, and f_AM" in text for text in said] == [False, False, True]
+
+
+def test_a_record_is_drawn_on_the_clock_of_the_model(models):
+    run = models[True][-1]
+    found = compare_measured(
+        Measured(measurement=record(run, np.random.default_rng(4), sigma=1e-7)), models[True]
+    )
+    drawn = beside(found, models[True])[-1]
+    assert (drawn.body, drawn.column) == ("measured", "measured")
+    times = drawn.response.times
+    inside = (times > 0.05) & (times < 0.2)
+    model = CubicSpline(run.response.times, run.response.values)(times[inside])
+    assert np.abs(drawn.response.values[inside] - GAIN * model).max() < 1e-3 * np.abs(model).max()
+
+
+def test_a_spectrum_of_lines_is_compared_and_drawn(models):
+    run = models[True][-1]
+    waveform = record(run, np.random.default_rng(5), sigma=1e-9)
+    lines = compare_measured(Measured(measurement=waveform), models[True]).lines
+    spectra = Measurement(
+        quantity="velocity", places=run.response.probes, frequencies=lines.frequencies[:2],
+        values=lines.each[:1, :2],
+    )  # fmt: skip
+    found = compare_measured(Measured(measurement=spectra), models[True])
+    assert list(found.names) == ["f_AM", "2f_AM"]
+    assert "3f_AM" in found.unresolved
+    assert (found.findings(main_column(found)) == UNKNOWN).all()
+    assert "cannot be said, since the noise of the data is unknown" in measured_page.conclusion(
+        found, main_column(found))  # fmt: skip
+    assert main_column(found).misfit < 1e-4
+    drawn = beside(found, models[True])[-1].response
+    size = np.ptp(run.response.values, axis=0)
+    model = GAIN * (run.response.values - run.response.values.mean(axis=0))
+    assert np.abs(drawn.values - model).max() < 2e-3 * size.max()
+
+
+NO_SPECTRUM = np.empty(0), np.empty((0, 2))
+
+
+def claims_of(scene, amplitudes, noise, spectrum=NO_SPECTRUM, unresolved=()):
+    """Findings from amplitudes by name at two places, of four repetitions."""
+    names = [*amplitudes]
+    size = np.array([amplitudes[n] for n in names])[:, None] * np.ones(2)
+    scatter = noise * np.array([1, 1j, -1, -1j])[:, None, None]
+    each = size + scatter + 0j
+    lines = MeasuredLines(
+        frequencies=np.array([FREQUENCIES[n] for n in names]), each=each, shifts=np.zeros(4),
+        variance=each.var(axis=0, ddof=1) / 4, freedom=6.0,
+    )  # fmt: skip
+    at = replace(scene, probes=((0.0, 0.0), (0.01, 0.0)))
+    named = by_name(at, {n: (n,) for n in names}, lines, unresolved, spectrum)
+    return {c.claim: (c.finding, c.sentence) for c in assess_measured(named)}
+
+
+F_D = 12 / (np.pi * 0.02)
+FREQUENCIES = {
+    **{f"{n}f_AM".lstrip("1"): n * 140.0 for n in range(1, 6)},
+    **{f"{n}f_d".lstrip("1"): n * F_D for n in range(1, 4)},
+    **{f"{n}f_d{s}f_AM".lstrip("1"): n * F_D + (140 if s == "+" else -140)
+       for n in (1, 2) for s in "+-"},
+}  # fmt: skip
+
+
+def test_harmonics_above_the_noise_decide_claims_about_them():
+    clear = claims_of(AM, {"f_AM": 1.0, "2f_AM": 0.2, "3f_AM": 0.05}, 1e-3)
+    assert clear["M1"][0] == HOLDS
+    assert clear["S1"][0] == FAILS
+    none = claims_of(AM, {"f_AM": 1.0, "2f_AM": 0.2, "3f_AM": 0.0}, 1e-5)
+    assert none["M1"][0] == FAILS
+    assert {"S1", "M1", "S5"} == set(none)  # the others are not about AM alone
+
+
+def test_lines_within_the_noise_decide_nothing():
+    hidden = claims_of(AM, {"f_AM": 1.0, "2f_AM": 0.2, "3f_AM": 0.0}, 0.02)
+    assert hidden["M1"][0] == UNDECIDED
+    assert "the noise allows" in hidden["M1"][1]
+    single = claims_of(AM, {"f_AM": 1.0, "2f_AM": 1e-7, "3f_AM": 1e-7}, 1e-5)
+    assert single["S1"][0] == UNDECIDED
+    assert "-120 dB" in single["S1"][1]
+    faint = claims_of(AM, {"f_AM": 0.01, "2f_AM": 0.2, "3f_AM": 0.1}, 0.1)
+    assert faint["M1"] == (UNDECIDED, "f_AM is not above the noise at any place")
+
+
+def test_claims_about_both_modulations():
+    plain = dict.fromkeys(FREQUENCIES, 0.02) | {"f_AM": 1.0}
+    found = claims_of(BOTH, plain, 1e-4)
+    assert [found[c][0] for c in ("S3", "S4", "M3", "M4", "M5")] == [
+        FAILS, HOLDS, HOLDS, HOLDS, HOLDS,
+    ]  # fmt: skip
+    strong = claims_of(BOTH, plain | {"f_d": 1.05}, 1e-4)
+    assert [strong[c][0] for c in ("S4", "M4", "M5")] == [FAILS] * 3
+    # M5 is about the multiples of f_AM and f_d, M4 about all lines.
+    paired = claims_of(BOTH, plain | {"f_d-f_AM": 1.5}, 1e-4)
+    assert [paired[c][0] for c in ("S4", "M4", "M5")] == [FAILS, FAILS, HOLDS]
+    close = claims_of(BOTH, plain | {"f_d": 0.99}, 0.02)
+    assert close["S4"][0] == UNDECIDED
+    pairs = dict.fromkeys(FREQUENCIES, 0.0) | {"f_AM": 1.0}
+    pairs |= dict.fromkeys(("f_d-f_AM", "f_d+f_AM", "2f_d-f_AM", "2f_d+f_AM"), 0.1)
+    assert claims_of(BOTH, pairs, 1e-9)["S3"][0] == HOLDS
+    assert claims_of(BOTH, pairs, 1e-5)["S3"][0] == UNDECIDED
+
+
+def test_claims_that_a_record_cannot_decide_say_why():
+    stm = scene_of(trajectory=CIRCLE)
+    drawn = {"f_d": 1.0, "2f_d": 0.5, "3f_d": 0.2}
+    found = claims_of(stm, drawn, 1e-3)
+    assert "paths or more, and this is a record of one" in found["M2"][1]
+    assert "single lines" in found["S2"][1]
+    short = claims_of(stm, {"3f_d": 1.0}, 1e-3, unresolved=("f_d", "2f_d"))
+    assert short["S2"] == (
+        UNDECIDED, "the record is too short, or sampled too slowly, to resolve f_d, 2f_d"
+    )  # fmt: skip
+    unknown = claims_of(AM, {"f_AM": 1.0, "2f_AM": 0.2, "3f_AM": 0.1}, np.nan)
+    assert "its noise is unknown" in unknown["M1"][1]
+    three = {"f_AM": 1.0, "2f_AM": 0.2, "3f_AM": 0.05}
+    part = claims_of(AM, three | {"4f_AM": 0.01}, np.array([1e-3, 1e-3, 1e-3, np.nan])[:, None])
+    assert part["M1"][0] == HOLDS  # which is about the three others alone
+    assert "the noise of 4f_AM is unknown" in part["S1"][1]
+    f = np.arange(0, 1000.0)
+    peaks = np.exp(-((f - 140.3) ** 2) / 4)[:, None] * np.ones(2)
+    assert claims_of(AM, {"f_AM": 1.0, "2f_AM": 0.2, "3f_AM": 0.1}, 1e-3, (f, peaks))["S5"] == (
+        HOLDS, "the spectral peaks are at most 0.30 Hz from the commanded f_AM and f_d"
+    )  # fmt: skip
+
+
+def test_places_are_those_of_the_measurement_or_as_many():
+    times = np.arange(100) / 1000
+    places = np.array([[0.0, 0.001], [0.004, 0.0]])
+    given = {"quantity": "velocity", "times": times, "values": np.zeros((1, 100, 2))}
+    moved = at_measured(AM, Measurement(places=places, **given))
+    assert moved.probe_points == pytest.approx(places)
+    unknown = Measurement(places=np.full((2, 2), np.nan), **given)
+    with pytest.raises(ValueError, match="2 signals are unknown, and the scene has 5 probes"):
+        at_measured(AM, unknown)
+    two = replace(AM, probes=((0.0, 0.0), (0.002, 0.0)))
+    assert at_measured(two, unknown) == replace(two, quantity="displacement")
+    with pytest.raises(ValueError, match="off the body"):
+        at_measured(AM, Measurement(places=places + 1, **given))
+    with pytest.raises(ValueError, match="strain xx cannot be compared; give one of displacement"):
+        at_measured(AM, Measurement(places=places, **(given | {"quantity": "strain_xx"})))
+
+
+def test_records_that_show_no_line_are_refused(models):
+    measured = record(models[True][-1], np.random.default_rng(6))
+    short = Measurement(quantity="velocity", places=measured.places, times=measured.times[:12],
+                        values=measured.values[:, :12])  # fmt: skip
+    with pytest.raises(ValueError, match="resolves no line of the scene's load; give a longer"):
+        at_measured(AM, short)
+
+
+@pytest.fixture
+def compared(tmp_path_factory, in_one_process):
+    """A folder of `compare --measured` on a small slab, and its summary."""
+    folder = tmp_path_factory.mktemp("measured")
+    body = Body(kind="slab", width=0.04, height=0.04, depth=0.008, sides="clamped")
+    scene = replace(scene_of(am_frequency=140.0, body=body), quantity="displacement",
+                    probes=((0.0, 0.0), (0.008, 0.0)), name="small")  # fmt: skip
+    (folder / "scene.toml").write_text(dumps(scene), encoding="utf-8")
+    steady = compute(replace(scene, quantity="velocity"), "flat-body-harmonic")
+    run = Run(tacton="small", body="slab", scene=scene, response=steady)
+    write(record(run, np.random.default_rng(7)), folder / "record.npz")
+    words = ["compare", f"{folder}/scene.toml", "--measured", f"{folder}/record.npz", "--json",
+             "--element-size", "10", "--out", f"{folder}/out"]  # fmt: skip
+    return folder, words, cli.main(words)
+
+
+@pytest.mark.slow
+def test_the_command_puts_the_measurement_beside_the_models(compared, capsys):
+    folder, _, code = compared
+    assert code == 0
+    out = folder / "out"
+    rows = [*csv.DictReader((out / "measured.csv").read_text("utf-8").splitlines())]
+    assert {row["model"] for row in rows} == {"point-kernel-published", "point-kernel", "slab"}
+    of_am = [row for row in rows if row["line"] == "f_AM" and row["model"] == "slab"]
+    assert [row["place"] for row in of_am] == ["1", "2"]
+    z = float(of_am[0]["measured_velocity_mm_s"]), float(of_am[0]["model_velocity_mm_s"])
+    assert z[0] == pytest.approx(z[1], rel=0.3)
+    assert 0 <= float(of_am[0]["p_adjusted"]) <= 1
+    page = (out / "index.html").read_text("utf-8")
+    assert page.index("Beside the measurement") < page.index("What propagation changes")
+    assert (out / "figures" / "measured.png").stat().st_size > 10_000
+    assert "M1," in (out / "measured-claims.csv").read_text("utf-8")
+    kept = json.loads((out / "record.json").read_text("utf-8"))
+    assert kept["command"]["options"]["measured"] == str((folder / "record.npz").resolve())
+
+
+def test_options_of_a_measurement_need_one(capsys, tmp_path):
+    assert cli.main(["compare", "--delay", "1", "--out", f"{tmp_path}/out"]) == 2
+    assert "give --measured FILE, too" in capsys.readouterr().err
+    assert cli.main(["compare", "--measured", "x.npz", "--out", f"{tmp_path}/out"]) == 2
+    assert "paper-15 has 15; name its scene file" in capsys.readouterr().err

@@ -1,0 +1,362 @@
+"""Lines of measurements, their noise, delay and gain against a model, and coherence.
+
+Measurements are sums of sinusoids of known phasors, with normal noise of known size, and what is
+stated of them is counted over many draws.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from skinwave.measure import Measurement
+from skinwave.measure.alignment import align
+from skinwave.measure.coherence import coherence, floor, over_places, unbiased
+from skinwave.measure.lines import MeasuredLines, lines_of, measurable
+from skinwave.measure.significance import ellipses, holm, radius, significances
+
+RATE, SAMPLES = 2000.0, 1000
+LINES = np.array([51.0, 140.0, 190.0, 280.0, 332.0, 381.0])  # Hz
+DELAY, GAIN = 3.217e-3, 0.7
+RNG = np.random.default_rng(5)
+MODEL = (RNG.normal(size=(6, 4)) + 1j * RNG.normal(size=(6, 4))) * np.array(
+    [0.1, 1.0, 1.5, 0.2, 0.5, 0.6]
+)[:, None]
+TIMES = np.arange(SAMPLES) / RATE
+
+
+def waveforms(phasors, frequencies=LINES, times=TIMES):
+    turned = np.exp(2j * np.pi * np.multiply.outer(times, frequencies))
+    return (turned @ phasors).real
+
+
+def measured(rng, repetitions, sigma, phasors=None, **changes):
+    truth = GAIN * np.exp(-2j * np.pi * LINES * DELAY)[:, None] * MODEL
+    clean = waveforms(truth if phasors is None else phasors)
+    noise = sigma * rng.normal(size=(repetitions, *clean.shape))
+    given = {"quantity": "velocity", "places": np.full((clean.shape[1], 2), np.nan),
+             "times": TIMES, "values": clean + noise} | changes  # fmt: skip
+    return Measurement(**given)
+
+
+def only(each, variance=None):
+    """Lines of amplitudes (r, f, p) as they are."""
+    return MeasuredLines(
+        frequencies=LINES[: each.shape[1]], each=each, freedom=2.0 * (len(each) - 1),
+        variance=each.var(axis=0, ddof=1) / len(each) if variance is None else variance,
+        shifts=np.zeros(len(each)),
+    )  # fmt: skip
+
+
+def complex_noise(rng, *shape):
+    return (rng.normal(size=shape) + 1j * rng.normal(size=shape)) / np.sqrt(2)
+
+
+def test_lines_without_noise_are_those_that_were_put_in():
+    found = lines_of(measured(RNG, 2, 0.0), LINES)
+    truth = GAIN * np.exp(-2j * np.pi * LINES * DELAY)[:, None] * MODEL
+    assert np.abs(found.mean - truth).max() < 1e-9
+    assert not found.variance.max() > 1e-18
+    assert not found.shifts.any()
+
+
+@pytest.mark.parametrize("repetitions", [1, 4])
+def test_amplitudes_are_within_their_circles_as_often_as_is_said(repetitions):
+    rng = np.random.default_rng(repetitions)
+    truth = GAIN * np.exp(-2j * np.pi * LINES * DELAY)[:, None] * MODEL
+    inside = []
+    for _ in range(30):
+        found = lines_of(measured(rng, repetitions, 0.3), LINES)
+        inside.append(np.abs(found.mean - truth) < radius(found, 0.95))
+    assert 0.93 < np.mean(inside) < 0.97
+
+
+def test_standard_errors_are_those_of_least_squares_of_white_noise():
+    """Under a window w the variance is 4 sigma^2 sum w^2 / (sum w)^2, more where lines are close;
+    w = 1 has the least, 4 sigma^2 / n.
+    """
+    rng = np.random.default_rng(8)
+    spread = np.mean([lines_of(measured(rng, 5, 0.3), LINES).variance * 5 for _ in range(20)])
+    least = 4 * 0.3**2 / (0.75 * SAMPLES)
+    assert least < spread < 4 * least
+
+
+@pytest.mark.parametrize("repetitions", [1, 4])
+def test_delay_and_gain_are_within_their_errors_as_often_as_is_said(repetitions):
+    rng = np.random.default_rng(20 + repetitions)
+    found = [
+        align(lines_of(measured(rng, repetitions, 0.2), LINES), MODEL, window=0.05)
+        for _ in range(100)
+    ]
+    of_delay = np.array([(a.delay - DELAY) / a.delay_error for a in found])
+    of_gain = np.array([(a.gain - GAIN) / a.gain_error for a in found])
+    for off in (of_delay, of_gain):  # the binomial bounds of 95 % in 100 draws at 0.1 %
+        assert 87 <= np.count_nonzero(np.abs(off) < 1.96) <= 100
+        assert 0.7 < off.std() < 1.3
+    assert 0.8 < np.median([a.chi_square for a in found]) < 1.25
+
+
+def test_a_delay_is_known_up_to_the_period_of_what_was_measured():
+    delay = 10e-3
+    model = MODEL[1:2]
+    each = GAIN * np.exp(-2j * np.pi * 140 * delay) * model + 0.01 * complex_noise(RNG, 4, 1, 4)
+    lines = MeasuredLines(
+        frequencies=np.array([140.0]), each=each, variance=each.var(axis=0, ddof=1) / 4,
+        freedom=6.0, shifts=np.zeros(4),
+    )  # fmt: skip
+    found = align(lines, model)
+    assert found.delay == pytest.approx(delay - 1 / 140, abs=5 * found.delay_error)
+    assert found.repeats == pytest.approx(1 / 140, rel=1e-6)
+
+
+def test_two_incommensurate_lines_tell_delays_longer_than_either_period():
+    delay = 31.3e-3
+    f = np.array([140.0, 600 / np.pi])
+    model = MODEL[1:3]
+    each = np.exp(-2j * np.pi * f * delay)[:, None] * model + 0.002 * complex_noise(RNG, 4, 2, 4)
+    lines = MeasuredLines(
+        frequencies=f, each=each, variance=each.var(axis=0, ddof=1) / 4, freedom=6.0,
+        shifts=np.zeros(4),
+    )  # fmt: skip
+    found = align(lines, model, window=0.1)
+    assert found.delay == pytest.approx(delay, abs=5 * found.delay_error)
+    assert found.delay_error < 1e-5
+
+
+def test_delay_and_gain_can_be_given():
+    lines = only(MODEL * np.exp(-2j * np.pi * LINES * 1e-3)[:, None] + np.zeros((2, 1, 1)))
+    free = align(lines, MODEL)
+    assert (free.delay, free.gain) == (pytest.approx(1e-3), pytest.approx(1.0))
+    of_delay = align(lines, MODEL, delay=0.0)
+    assert (of_delay.delay, of_delay.delay_error) == (0.0, 0.0)
+    assert of_delay.gain < 0.9
+    of_gain = align(lines, MODEL, gain=0.5)
+    assert (of_gain.gain, of_gain.gain_error) == (0.5, 0.0)
+    assert of_gain.delay == pytest.approx(1e-3)
+    reversed_sign = align(lines, -MODEL, gain=-1.0)
+    assert reversed_sign.delay == pytest.approx(1e-3)
+    with pytest.raises(ValueError, match="must be a finite number"):
+        align(lines, MODEL, gain=np.inf)
+    with pytest.raises(ValueError, match="none of the measured lines"):
+        align(lines, 0 * MODEL)
+
+
+def test_repetitions_out_of_step_are_shifted_into_it():
+    rng = np.random.default_rng(3)
+    late = np.array([0.0, 0.4e-3, -0.7e-3, 1.1e-3, 0.1e-3])
+    truth = GAIN * MODEL
+    values = np.array([waveforms(truth, times=TIMES - x) for x in late])
+    found = lines_of(measured(rng, 5, 0.05, values=values + 0.05 * rng.normal(size=values.shape)),
+                     LINES)  # fmt: skip
+    assert np.abs(found.shifts - (late - late.mean())).max() < 2e-5
+    assert np.abs(np.abs(found.mean) - np.abs(truth)).max() < 0.02
+    record = measured(rng, 5, 0.0, values=values)
+    assert coherence(record, LINES).over_time.min() > 1 - 1e-6  # of segments, shifted alike
+    assert found.shift_error == pytest.approx(late.std(ddof=1) / np.sqrt(5), rel=0.05)
+
+
+def test_repetitions_in_step_are_left_as_they_are():
+    rng = np.random.default_rng(4)
+    moved = sum(bool(lines_of(measured(rng, 4, 0.3), LINES).shifts.any()) for _ in range(30))
+    assert moved <= 1  # a thousandth of them
+
+
+def test_significances_are_uniform_where_there_is_noise_alone():
+    rng = np.random.default_rng(6)
+    for repetitions in (2, 5):
+        lines = only(complex_noise(rng, repetitions, 6, 2000))
+        p = significances(lines.mean, lines)
+        assert stats.kstest(p.ravel(), "uniform").pvalue > 1e-3
+        f = np.abs(lines.mean) ** 2 / lines.variance
+        assert np.allclose(p, stats.f.sf(f, 2, 2 * (repetitions - 1)))
+
+
+def test_the_chance_of_any_false_difference_is_as_stated():
+    rng = np.random.default_rng(7)
+    single, any_at_all = [], []
+    for _ in range(60):
+        lines = lines_of(measured(rng, 5, 0.2), LINES)
+        away = lines.mean - align(lines, MODEL, window=0.05).applied(LINES, MODEL)
+        p = significances(away, lines)
+        single.append(np.mean(p < 0.05))
+        any_at_all.append(holm(p).min() < 0.05)
+    assert 0.03 < np.mean(single) < 0.06
+    assert np.mean(any_at_all) < 0.05 + 2.6 * np.sqrt(0.05 * 0.95 / 60)
+
+
+def test_differences_of_five_standard_errors_are_found():
+    rng = np.random.default_rng(9)
+    other = MODEL.copy()
+    other[2, 1] *= 1.3
+    found = 0
+    for _ in range(30):
+        lines = lines_of(measured(rng, 5, 0.2), LINES)
+        away = lines.mean - align(lines, other, window=0.05).applied(LINES, other)
+        found += holm(significances(away, lines))[2, 1] < 0.05
+    assert found == 30
+
+
+def test_holms_correction_is_its_definition():
+    p = np.array([0.01, 0.04, np.nan, 0.03, 0.005])
+    assert np.allclose(holm(p), [0.03, 0.06, np.nan, 0.06, 0.02], equal_nan=True)
+    assert holm(np.array([[0.9, 0.8]])).max() == 1.0
+
+
+def test_ellipses_hold_the_true_value_as_often_as_is_said_whatever_their_shape():
+    rng = np.random.default_rng(10)
+    each = 3 * rng.normal(size=(8, 1, 4000)) + 0.5j * rng.normal(size=(8, 1, 4000))
+    lines = only(each * np.exp(0.4j))
+    major, minor, angle = ellipses(lines)
+    off = lines.mean * np.exp(-1j * angle)
+    inside = (off.real / major) ** 2 + (off.imag / minor) ** 2 < 1
+    assert 0.935 < inside.mean() < 0.965
+    assert np.median(major / minor) > 4
+
+
+def test_a_hum_beside_a_line_does_not_move_its_noise():
+    rng = np.random.default_rng(11)
+    calm = lines_of(measured(rng, 1, 0.1), LINES)
+    record = measured(rng, 1, 0.1)
+    hum = 0.5 * np.sin(2 * np.pi * 60 * TIMES)[:, None]
+    loud = lines_of(Measurement(quantity="velocity", places=record.places, times=TIMES,
+                                values=record.values + hum), LINES)  # fmt: skip
+    assert np.median(loud.variance[0] / calm.variance[0]) < 3
+
+
+def test_lines_that_leave_no_bins_between_have_a_noise_of_their_own():
+    """Nine lines 4.8 bins apart, whose middle ones have neighbours wherever noise is looked for."""
+    rng = np.random.default_rng(14)
+    times, f = np.arange(2000) / 4000, 300 + 12.68 * np.arange(9)
+    record = Measurement(quantity="velocity", places=np.zeros((300, 2)), times=times,
+                         values=rng.normal(size=(1, 2000, 300)))  # fmt: skip
+    found = lines_of(record, f)
+    true = (np.abs(found.mean) ** 2).mean(axis=1)
+    assert found.variance.mean(axis=1) / true == pytest.approx(np.ones(9), abs=0.25)
+
+
+BIN = 1 / (0.75 * SAMPLES / RATE)
+SPACED = {apart: 150 + apart * BIN * np.arange(5) for apart in (1.2, 2.0, 3.0, 5.0)}
+SPACED["low"] = np.array([3.75, 12.0, 40.0]) * BIN
+
+
+def noisy(rng, frequencies, colour, repetitions, draws=200):
+    """Lines of amplitude 3 in white noise or a random walk, a draw at each place."""
+    noise = rng.normal(size=(repetitions, SAMPLES, draws))
+    if colour == "1/f2":
+        noise = noise.cumsum(axis=1)
+    return Measurement(
+        quantity="velocity", places=np.zeros((draws, 2)), times=TIMES,
+        values=waveforms(np.full((len(frequencies), draws), 3.0), frequencies) + noise,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("repetitions", [1, 2, 3])
+@pytest.mark.parametrize("colour", ["white", "1/f2"])
+def test_intervals_hold_the_truth_however_close_the_lines_and_steep_the_noise(colour, repetitions):
+    """95 % circles and intervals of a sum of all lines and of a difference of two, in 200 draws of
+    each spacing.
+    """
+    rng, inside, ratios = np.random.default_rng(repetitions), [], []
+    for f in SPACED.values():
+        found = lines_of(noisy(rng, f, colour, repetitions), f)
+        off = found.mean - 3.0
+        inside.append((np.abs(off) < radius(found, 0.95)).mean(axis=1).mean())
+        one = replace(found, each=found.each[:, :, :1], variance=found.variance[:, :1])
+        for factors in (np.ones(len(f)), np.r_[1.0, -1.0, np.zeros(len(f) - 2)]):
+            own = np.sqrt(found.variance / found.variance[:, :1])  # of each draw, over the first's
+            true = np.var((factors @ (off / own)).real)
+            ratios.append(one.variance_of(factors[:, None]) / true)
+    assert 0.93 < np.mean(inside) < 0.98
+    assert min(inside) > 0.92
+    assert max(inside) < 0.985
+    assert np.mean(ratios) == pytest.approx(1, abs=0.1)
+    assert 0.6 < min(ratios) < max(ratios) < 1.5
+
+
+def test_a_short_record_has_errors_and_no_lines_where_there_are_none():
+    """0.1 s in which a load has 41 lines, 1.4 resolutions apart, and the motion two of them."""
+    rate, f = 1e4, 18.59 * np.arange(1, 42)
+    times = np.arange(1000) / rate
+    moving = np.zeros((41, 1))
+    moving[[6, 13], 0] = 1.0, 0.1
+    rng = np.random.default_rng(16)
+    record = Measurement(
+        quantity="velocity", places=np.zeros((1, 2)), times=times,
+        values=(waveforms(moving, f, times) + 0.01 * rng.normal(size=(1000, 1)))[None],
+    )  # fmt: skip
+    found = lines_of(record, f)
+    assert np.isfinite(found.variance).all()
+    assert np.flatnonzero(holm(significances(found.mean, found))[:, 0] < 0.05).tolist() == [6, 13]
+    white = np.sqrt(found.variance / (4 * 0.01**2 / 750))
+    assert 0.8 < np.median(white) < 2.5
+
+
+def test_a_gain_that_changes_between_repetitions_is_in_the_errors():
+    rng = np.random.default_rng(15)
+    record = noisy(rng, SPACED[5.0], "white", 3)
+    gain = 1 + 0.5 * rng.normal(size=(3, 1, 200))
+    record = replace(record, values=gain * waveforms(np.full((5, 200), 3.0), SPACED[5.0])
+                     + 0.1 * rng.normal(size=(3, SAMPLES, 200)))  # fmt: skip
+    found = lines_of(record, SPACED[5.0])
+    assert 0.91 < (np.abs(found.mean - 3.0) < radius(found, 0.95)).mean() < 0.98
+
+
+def test_coherence_of_noise_is_its_bias_and_of_lines_is_one():
+    rng = np.random.default_rng(12)
+    silent = coherence(measured(rng, 5, 1.0, phasors=0 * MODEL), LINES)
+    assert silent.segments > silent.repetitions == 5
+    many = [coherence(measured(rng, 5, 1.0, phasors=0 * MODEL), LINES) for _ in range(16)]
+    for values, k in (
+        ([c.over_time for c in many], silent.segments),
+        ([c.over_repetitions for c in many], 5),
+    ):
+        values = np.concatenate(values)
+        assert np.mean(values) == pytest.approx(1 / k, rel=0.2)
+        assert 0.9 < np.mean(values < floor(k)) < 0.99
+        assert np.mean(unbiased(values, k)) < np.mean(values)
+    clear = coherence(measured(rng, 5, 1e-6), LINES)
+    assert clear.over_time.min() > 1 - 1e-6
+    assert clear.over_repetitions.min() > 1 - 1e-6
+    assert np.isnan(floor(1))
+
+
+def test_patterns_over_places_agree_up_to_gain_and_phase():
+    assert over_places(MODEL * 2j, MODEL) == pytest.approx(np.ones(6))
+    assert over_places(np.array([[1.0, 1.0]]), np.array([[1.0, -1.0]])) == pytest.approx([0])
+    assert np.isnan(over_places(MODEL[:, :1], MODEL[:, :1])).all()
+
+
+def spectra(repetitions, sigma, frequencies, amplitudes):
+    rng = np.random.default_rng(13)
+    noise = sigma * complex_noise(rng, repetitions, *amplitudes.shape)
+    return Measurement(
+        quantity="velocity", places=np.zeros((amplitudes.shape[1], 2)), frequencies=frequencies,
+        values=amplitudes + noise,
+    )  # fmt: skip
+
+
+def test_spectra_have_lines_in_their_bins_and_noise_beside_them():
+    axis = np.arange(1.0, 501.0)
+    amplitudes = np.zeros((500, 4), complex)
+    amplitudes[LINES.astype(int) - 1] = MODEL
+    found = lines_of(spectra(1, 0.02, axis, amplitudes), LINES)
+    assert np.abs(found.mean - MODEL).max() < 0.08
+    assert np.sqrt(np.median(found.variance)) == pytest.approx(0.02, rel=0.3)
+    record = spectra(1, 0.02, axis, amplitudes)
+    assert measurable(record, np.array([140.4, 499.6, 700.0])).tolist() == [True, True, False]
+    with pytest.raises(ValueError, match="no line at 700 Hz: it reaches 500 Hz"):
+        lines_of(record, np.array([700.0]))
+
+
+def test_single_lines_once_have_no_known_noise():
+    found = lines_of(spectra(1, 0.0, LINES, MODEL), LINES)
+    assert np.isnan(found.variance).all()
+    assert np.isnan(significances(found.mean, found)).all()
+    a = align(found, MODEL)
+    assert (a.delay, a.gain) == (pytest.approx(0, abs=1e-12), pytest.approx(1))
+
+
+def test_lines_beyond_the_sampling_are_refused():
+    with pytest.raises(ValueError, match="1000 Hz, half its sampling rate; leave that line out"):
+        lines_of(measured(RNG, 2, 0.1), np.array([2500.0]))

@@ -1,0 +1,250 @@
+"""Inspection of measurements of known content: lines, noise, hum, clipping, and what is missing."""
+
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from skinwave.commands.cli import main
+from skinwave.measure import Measurement
+from skinwave.measure.clipping import clipped
+from skinwave.measure.inspection import inspect
+from skinwave.measure.mains import hum_of
+from skinwave.measure.spectral_lines import SpectralLine, spectral_lines
+from skinwave.measure.summary import text
+from skinwave.measure.writing import write
+
+RATE = 2000.0
+T = np.arange(2000) / RATE
+
+
+def coloured(rng, shape, power):
+    """Gaussian noise (r, t, p) whose density falls as 1 over f to a power."""
+    runs, count, places = shape
+    f = np.fft.rfftfreq(4 * count)
+    f[0] = f[1]
+    white = np.fft.rfft(rng.normal(size=(runs, 4 * count, places)), axis=1)
+    return np.fft.irfft(white * (f ** (-power / 2))[None, :, None], axis=1)[:, :count]
+
+
+@pytest.mark.parametrize("power", [0, 2])
+def test_noise_alone_has_lines_as_rarely_as_told(power):
+    """Told 20 %: in 75 files 15, and at most 25 by the binomial distribution at 0.3 %."""
+    rng = np.random.default_rng(power)
+    alarms = sum(
+        len(spectral_lines(coloured(rng, (2, 512, 2), power), RATE, alarm=0.2).lines) > 0
+        for _ in range(75)
+    )
+    assert 1 <= alarms <= 25
+
+
+def test_lines_are_found_with_the_errors_that_are_told():
+    """Three lines, two of them 3/T apart and 30 dB different, in noise of known density."""
+    rng = np.random.default_rng(4)
+    deviations, floors = [], []
+    for _ in range(40):
+        f = np.array([60.0, 140.0, 143.0]) + rng.uniform(-0.5, 0.5, 3)
+        a = np.array([0.5, 2.0, 0.06])
+        phases = rng.uniform(0, 2 * np.pi, 3)
+        x = (a * np.cos(2 * np.pi * f * T[:, None] + phases)).sum(axis=1)
+        x = x[None, :, None] + 0.1 * rng.normal(size=(1, len(T), 1))
+        found = spectral_lines(x, RATE)
+        assert len(found.lines) == 3
+        deviations.append([(line.frequency - g) / line.error for line, g in zip(
+            found.lines, f, strict=True)])  # fmt: skip
+        floors.append(np.median(found.floor))
+        assert [line.amplitudes[0] for line in found.lines] == pytest.approx(a, abs=0.02)
+    # 120 deviations: their mean square is 1 +- 0.13.
+    assert 0.6 < np.mean(np.square(deviations)) < 1.4
+    assert np.sqrt(np.mean(floors)) == pytest.approx(0.1 * np.sqrt(2 / RATE), rel=0.03)
+
+
+def test_the_error_of_one_line_is_the_published_bound():
+    """Of amplitude A over T in noise of density S, sqrt(3 S / (pi^2 A^2 T^3)); places add up."""
+    rng = np.random.default_rng(5)
+    x = np.cos(2 * np.pi * 141.3 * T)[None, :, None] * np.array([1.0, 0.5])
+    x = x + 0.2 * rng.normal(size=(2, len(T), 2))
+    (line,) = spectral_lines(x, RATE).lines
+    density, duration = 0.2**2 * 2 / RATE, len(T) / RATE
+    bound = np.sqrt(3 * density / (np.pi**2 * 2 * (1 + 0.25) * duration**3))
+    assert line.error == pytest.approx(bound, rel=0.1)
+    assert line.amplitudes == pytest.approx([1, 0.5], abs=0.02)
+    assert line.false_alarm < 1e-20
+
+
+def test_weak_lines_beside_strong_ones_are_not_side_lobes():
+    """Lines 80 dB apart, and no others than these."""
+    rng = np.random.default_rng(6)
+    f, a = np.array([100.4, 110.7, 333.3]), np.array([1.0, 3e-4, 1e-4])
+    x = (a * np.cos(2 * np.pi * f * T[:, None])).sum(axis=1) + 1e-5 * rng.normal(size=len(T))
+    found = spectral_lines(x[None, :, None], RATE).lines
+    assert [line.frequency for line in found] == pytest.approx(f, abs=2e-2)
+    assert [line.amplitudes[0] for line in found] == pytest.approx(a, rel=0.01)
+
+
+def test_errors_are_larger_beside_what_is_no_steady_line():
+    """A decaying line, whose skirts disturb the fit of another far more than the noise does."""
+    rng = np.random.default_rng(10)
+    x = 6 * np.sin(2 * np.pi * 200 * T) * np.exp(-3 * T) + np.sin(2 * np.pi * 60 * T)
+    found = spectral_lines((x + 1e-3 * rng.normal(size=len(T)))[None, :, None], RATE).lines
+    assert len(found) == 2
+    bound = np.sqrt(3 * 1e-6 * 2 / RATE / np.pi**2)
+    assert 10 * bound < found[0].error < 0.02
+    assert abs(found[0].frequency - 60) < 3 * found[0].error
+
+
+@pytest.mark.parametrize("seconds", [0.1, 0.5])
+@pytest.mark.parametrize("decay", [0.005, 0.02, 0.1])
+def test_lines_of_a_motion_from_rest_are_within_their_errors(seconds, decay):
+    """Two lines, and a free vibration of as much that starts them from rest."""
+    t = np.arange(round(1e4 * seconds)) / 1e4
+    own = np.cos(2 * np.pi * 118 * t) + 0.3 * np.sin(2 * np.pi * 61 * t)
+    x = (
+        np.cos(2 * np.pi * 130 * t)
+        + 0.1 * np.cos(2 * np.pi * 260 * t + 1)
+        - own * np.exp(-t / decay)
+    )
+    found = spectral_lines(x[None, :, None], 1e4)
+    assert found.begun >= (0.025 if decay < 0.1 or seconds > 0.1 else 0.0)
+    assert [line.frequency for line in found.lines] == pytest.approx([130, 260], abs=20)
+    for line, true in zip(found.lines, (130, 260), strict=True):
+        assert np.isfinite(line.error)
+        assert abs(line.frequency - true) < 2 * line.error
+
+
+def test_round_off_has_no_lines():
+    """A harmonic rounded to nine digits, and a constant with rounding errors alone."""
+    t = np.arange(1000) / 1e4
+    x = np.cos(2 * np.pi * 130 * t)
+    rounded = np.array([float(f"{value:.9g}") for value in x])
+    (line,) = spectral_lines(rounded[None, :, None], 1e4).lines
+    assert line.frequency == pytest.approx(130, abs=1e-3)
+    assert 0 < line.error < 0.1
+    still = 1e-6 + 1e-22 * np.random.default_rng(0).integers(-2, 3, 1000)
+    still += 1e-21 * np.cos(2 * np.pi * 111 * t)
+    assert not spectral_lines(still[None, :, None], 1e4).lines
+
+
+def lines(*frequencies):
+    return [SpectralLine(frequency=f, error=2e-3, amplitudes=np.ones(1), false_alarm=0.0)
+            for f in frequencies]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("frequencies", "expected"),
+    [
+        ((49.98, 99.96, 140), {0: "mains 50 Hz", 1: "mains 2 x 50 Hz"}),
+        ((59.99, 120.5, 179.97), {0: "mains 60 Hz", 2: "mains 3 x 60 Hz"}),
+        ((99.96, 149.94), {0: "mains 2 x 50 Hz", 1: "mains 3 x 50 Hz"}),
+        ((200.0, 400.0, 600.0), {}),  # multiples of 50 Hz, and of a load's 200 Hz
+        ((49.98, 100.6, 250.3), {0: "mains 50 Hz"}),  # no multiples of 49.98 Hz
+        ((47.0, 61.0), {}),
+        ((), {}),
+    ],
+)  # fmt: skip
+def test_mains_hum_is_resolved_from_lines_of_the_load(frequencies, expected):
+    assert hum_of(lines(*frequencies), 1.0) == expected
+
+
+def test_what_may_be_of_the_load_is_not_called_mains():
+    loud = [*lines(50.0), replace(lines(150.0)[0], amplitudes=np.full(1, 20.0))]
+    assert hum_of(loud, 1.0) == {0: "mains 50 Hz", 1: "3 x 50 Hz, mains or load"}
+    assert hum_of(lines(60.0, 120.0), 1.0, {0}) == {}  # multiples of the drive's
+
+
+def test_clipping_is_not_rounding():
+    sine = np.sin(2 * np.pi * 7.3 * T)
+    for cut in (0.5, 0.9, 0.97):
+        assert clipped(np.clip(sine, -cut, cut)) == (np.abs(sine) >= cut).sum()
+        coarse = np.round(np.clip(sine, -cut, cut) * 500)
+        assert clipped(coarse) == (np.abs(coarse) == coarse.max()).sum()
+    assert clipped(np.minimum(sine, 0.8)) == (sine >= 0.8).sum()
+    for steps in (2, 3, 20, 1000):
+        assert clipped(np.round(sine * steps)) == 0
+    noise = np.random.default_rng(7).normal(size=5000)
+    assert clipped(noise) == clipped(np.round(100 * noise)) == clipped(np.ones(50)) == 0
+
+
+def scan(**changes):
+    rng = np.random.default_rng(8)
+    x = 2e-3 * np.sin(2 * np.pi * 140 * T) + 3e-4 * np.sin(2 * np.pi * 49.97 * T)
+    x = x + 5e-4 * np.sin(2 * np.pi * 191.3 * T)
+    noise = rng.normal(size=(2, len(T), 4)) * np.array([1e-4, 1e-4, 2e-4, 0])
+    values = (x[:, None] * np.array([1, 0.3, 0.5, 0]))[None] + noise
+    values[:, :, 2] = np.clip(values[:, :, 2], -7e-4, 7e-4)
+    given = {"quantity": "velocity", "times": T, "values": values, "name": "scan",
+             "places": [[0, 0], [0.01, 0], [0, 0.01], [0.01, 0.01]],
+             "drive": np.sin(2 * np.pi * 140 * T)} | changes  # fmt: skip
+    return Measurement(**given)
+
+
+def test_what_a_scan_has():
+    found = inspect(scan())
+    what = {round(line.frequency): origin for line, origin in zip(
+        found.lines, found.origins, strict=True)}  # fmt: skip
+    assert what[140] == "drive"
+    assert what[191] == ""
+    assert what[50] == "mains 50 Hz"
+    assert found.noise[:2] == pytest.approx(1e-4 * np.sqrt(2 / RATE), rel=0.1)
+    assert list(found.kept) == [0, 1, 2]
+    assert list(found.constant) == [3]
+    assert (found.clipped.sum(axis=0) > 100).tolist() == [False, False, True, False]
+    assert found.missing == ()
+    said = text(found)
+    assert "Clipped" in said
+    assert "(0, 10) mm" in said
+    bare = inspect(scan(drive=[], values=scan().values[:1], places=np.full((4, 2), np.nan)))
+    assert [said.split(";")[0].split(":")[0] for said in bare.missing] == [
+        "places are not known", "no drive is recorded", "one repetition",
+    ]  # fmt: skip
+
+
+def test_lines_of_spectra():
+    rng = np.random.default_rng(9)
+    f = np.arange(400) + 1.0
+    values = rng.normal(size=(3, 400, 1)) + 1j * rng.normal(size=(3, 400, 1))
+    values[:, 139] += 20
+    measured = Measurement(
+        quantity="displacement", frequencies=f, places=[[0, 0]], values=values * 1e-9
+    )
+    (line,) = inspect(measured).lines
+    assert line.frequency == 140
+    assert line.amplitudes[0] == pytest.approx(20e-9, rel=0.1)
+    assert inspect(measured).noise[0] == pytest.approx(np.sqrt(2) * 1e-9, rel=0.1)
+    assert inspect(
+        Measurement(quantity="velocity", frequencies=[1.0], places=[[0, 0]], values=[[[1j]]])
+    ).lines == ()  # fmt: skip
+
+
+@pytest.mark.parametrize("count", [1, 2, 31, 33, 64])
+@pytest.mark.parametrize("scale", [0.0, 1e-150, 1e150])
+def test_short_and_extreme_measurements_are_inspected(count, scale):
+    values = scale * np.random.default_rng(1).normal(size=(1, count, 2))
+    measured = Measurement(
+        quantity="velocity", times=T[:count], places=np.full((2, 2), np.nan), values=values
+    )
+    assert "velocity" in text(inspect(measured)).lower()
+
+
+def test_the_command_prints_and_writes(tmp_path, capsys):
+    path, out = tmp_path / "scan.npz", tmp_path / "out"
+    write(scan(), path)
+    assert main(["measured", str(path)]) == 0
+    said = capsys.readouterr().out
+    assert "Velocity at 4 places, 2 repetitions: 2,000 samples at 2,000 Hz, 1.00 s" in said
+    assert main(["measured", str(path), "--out", str(out), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [line["what"] for line in told["lines"] if abs(line["frequency_hz"] - 140) < 1] == [
+        "drive"
+    ]
+    assert {p.name for p in out.iterdir()} == {
+        "index.html", "measured.png", "measurement.npz", "measurement.csv", "found-lines.csv",
+        "record.json",
+    }  # fmt: skip
+    with (out / "found-lines.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert float(rows[0]["frequency_hz"]) == pytest.approx(49.97, abs=0.05)
+    assert "Nothing varies at 1 of the places" in (out / "index.html").read_text()
+    assert main(["measured", str(out / "measurement.csv"), "--quiet"]) == 0

@@ -1,0 +1,395 @@
+"""One reduced body for every material of a range, against each material's own bodies."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+import fem
+import skinwave
+from fem.affine import Solids, assemble_affine, operators_of, weights
+from fem.harmonic import dynamic_stiffness
+from fem.line_basis import line_bases, line_errors, steady_lines
+from fem.load_and_probe import facet_normals
+from meshes import boundary_facets
+from simple_model import MovingPressure, PronyTerm, Tacton, Trajectory
+from simple_model.load_spectrum import pressure_lines
+from skinwave.bodies import hands
+from skinwave.bodies.absorbing_layer import layer_drag, layer_of
+from skinwave.bodies.build import build, operators
+from skinwave.models import parametric
+from skinwave.models.free_keys import free_keys, values_at, with_values
+from skinwave.models.free_materials import meshed_materials, reference_of, solids_of
+from skinwave.models.loads import surface_load, surface_motion
+from skinwave.models.prepared import answer as own_answer
+from skinwave.models.prepared import components
+from skinwave.models.prepared import prepare as own_body
+from skinwave.models.thicknesses import build_at, geometry_shares
+from skinwave.scene.scene import BODIES, Body, Layer, Scene
+
+MODULUS, VISCOSITY = "body.material.shear_modulus_pa", "body.material.viscosity_pa_s"
+RANGES = {MODULUS: (15e3, 40e3), VISCOSITY: (3.0, 10.0)}
+H = 5e-3
+SMALL = {"width": 0.04, "height": 0.04, "depth": 0.01}
+
+
+def scene_of(body, **changes):
+    tacton = Tacton(
+        am_frequency=140, duration=0.1,
+        trajectory=Trajectory(shape="circle", size=0.012, speed=5.0),
+    )  # fmt: skip
+    pressure = MovingPressure(tacton=tacton)
+    probes = ((0.0, 0.0), (0.006, 0.0), (0.01, 0.004))
+    return Scene(pressure=pressure, body=body, probes=probes, **changes)
+
+
+@pytest.fixture(scope="module")
+def slab():
+    """A small slab whose clamped sides send waves back."""
+    return scene_of(Body(sides="clamped", **SMALL))
+
+
+@pytest.fixture(scope="module")
+def prepared(slab):
+    return skinwave.prepare(slab, RANGES, h=H)
+
+
+def random_values(keys, count, seed=1):
+    shares = np.random.default_rng(seed).random((count, len(keys)))
+    return [values_at(keys, each) for each in shares]
+
+
+def full_lines(scene, body, frequencies, h=H, made=None):
+    """Steady state (f, p) of the full body by a factorisation a line, without any reduction."""
+    made = made or build(body, h)
+    P, points = surface_load(made)
+    every, pressures = pressure_lines(scene.pressure, points)
+    S = surface_motion(body, made, scene.probe_points)
+    found = []
+    for f in frequencies:
+        force = P @ pressures[np.argmin(np.abs(every - f))]
+        found.append(S @ fem.harmonic(operators(made), force, f)[0])
+    return np.array(found)
+
+
+def test_lines_are_those_of_each_materials_own_reduction(slab, prepared):
+    for values in random_values(prepared.keys, 3):
+        frequencies, found = parametric.lines(prepared, values)
+        body = with_values(slab.body, prepared.keys, values)
+        own = components(own_body(body, slab.probe_points, h=H), slab.pressure)
+        expected = own.lines[[np.argmin(np.abs(own.frequencies - f)) for f in frequencies]]
+        assert line_errors(found, expected).max() < 0.01
+        assert np.linalg.norm(expected) > 0.999 * np.linalg.norm(own.lines)  # those left out
+
+
+def test_lines_are_those_of_the_full_body_at_least_loss(slab, prepared):
+    strong = [280.0, prepared.frequencies[2]]
+    assert prepared.effort.estimate < 0.01
+    for shares in ((0, 0), (1, 0)):
+        values = values_at(prepared.keys, shares)
+        frequencies, found = parametric.lines(prepared, values)
+        body = with_values(slab.body, prepared.keys, values)
+        expected = full_lines(slab, body, strong)
+        near = found[[np.argmin(np.abs(frequencies - f)) for f in strong]]
+        assert np.linalg.norm(near - expected, axis=1) == pytest.approx(
+            0, abs=0.01 * np.linalg.norm(expected, axis=1).min()
+        )
+
+
+def test_the_waveform_from_rest_is_that_of_the_materials_own_body(slab, prepared):
+    (values,) = random_values(prepared.keys, 1, seed=2)
+    body = with_values(slab.body, prepared.keys, values)
+    own = own_answer(own_body(body, slab.probe_points, h=H), slab)
+    found = parametric.answer(prepared, values)
+    moving = np.linalg.norm(own.values - own.values.mean(axis=0))
+    assert np.linalg.norm(found.values - own.values) < 0.005 * moving
+    other = replace(slab.pressure.tacton, am_frequency=90.0)
+    scene = replace(slab, pressure=replace(slab.pressure, tacton=other))
+    expected = own_answer(own_body(body, slab.probe_points, h=H), scene).values
+    found = own_answer(parametric.at(prepared, values), scene).values
+    assert np.linalg.norm(found - expected) < 0.01 * np.linalg.norm(expected)
+
+
+def test_the_offline_stage_is_cached(slab, tmp_path, monkeypatch):
+    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
+    few = replace(slab, probes=slab.probes[:1])
+    free = {VISCOSITY: (9.0, 10.0)}
+    first = skinwave.prepare(few, free, 0.05, h=9e-3)
+    monkeypatch.setattr(parametric, "reduce_affine", None)  # of no use from here on
+    again = skinwave.prepare(few, free, 0.05, h=9e-3)
+    for function in (parametric.lines, lambda *given: vars(parametric.answer(*given)).values()):
+        for one, other in zip(
+            function(first, {VISCOSITY: 9.4}), function(again, {VISCOSITY: 9.4}), strict=True
+        ):
+            if isinstance(one, np.ndarray):
+                assert np.array_equal(one, other)
+    with pytest.raises(TypeError, match="not callable"):
+        skinwave.prepare(few, {VISCOSITY: (9.0, 11.0)}, 0.05, h=9e-3)
+
+
+def test_modulus_and_viscosity_are_fitted_without_a_further_factorisation(slab, prepared):
+    hidden = {MODULUS: 21e3, VISCOSITY: 6.5}
+    frequencies, _ = parametric.lines(prepared, hidden)
+    strong = [280.0, *frequencies[1:3]]
+    measured = full_lines(slab, with_values(slab.body, prepared.keys, hidden), strong)
+    chosen = [np.argmin(np.abs(frequencies - f)) for f in strong]
+    evaluated = 0
+
+    def misfit(shares):
+        nonlocal evaluated
+        evaluated += 1
+        found = parametric.lines(prepared, values_at(prepared.keys, shares))[1][chosen]
+        apart = (found - measured).ravel() / np.abs(measured).max()
+        return np.concatenate([apart.real, apart.imag])
+
+    starts = np.random.default_rng(0).random((6, 2))
+    fits = [least_squares(misfit, start, bounds=(0, 1), x_scale=0.1) for start in starts]
+    best = min(fits, key=lambda fit: fit.cost)
+    fitted = values_at(prepared.keys, best.x)
+    assert fitted[MODULUS] == pytest.approx(21e3, rel=0.01)
+    assert fitted[VISCOSITY] == pytest.approx(6.5, rel=0.01)
+    assert evaluated >= 20 * prepared.effort.factorisations
+
+
+def test_layers_prony_terms_and_density_are_free_on_an_absorbing_base():
+    soft = fem.Material(
+        density=1000, shear_modulus=20e3, poisson=0.45, viscosity=5.0,
+        prony=(PronyTerm(modulus=10e3, time=1e-3),),
+    )  # fmt: skip
+    top = Layer(thickness=0.003, material=replace(soft, viscosity=8.0))
+    body = Body(
+        material=soft, layers=(top,), width=0.024, height=0.024, depth=0.006, base="absorbing",
+        sides="clamped",
+    )  # fmt: skip
+    scene = scene_of(body)
+    free = {
+        "body.layers.0.material.shear_modulus_pa": (30e3, 60e3),
+        "body.material.prony.0.modulus_pa": (5e3, 20e3),
+        "body.material.density_kg_m3": (900.0, 1100.0),
+    }
+    prepared = skinwave.prepare(scene, free, 0.02, h=6e-3)
+    (values,) = random_values(prepared.keys, 1)
+    frequencies, found = parametric.lines(prepared, values)
+    changed = with_values(body, prepared.keys, values)
+    assert changed.layers[0].material.shear_modulus == min(values.values(), key=lambda x: -x)
+    expected = full_lines(scene, changed, frequencies[1:3], h=6e-3)
+    errors = np.linalg.norm(found[1:3] - expected, axis=1) / np.linalg.norm(expected, axis=1)
+    assert errors.max() < 0.02
+
+
+def test_springs_and_absorbing_layers_go_with_the_material():
+    soft = fem.Material(
+        density=1000, shear_modulus=30e3, poisson=0.45,
+        prony=(PronyTerm(modulus=10e3, time=1e-3),),
+    )  # fmt: skip
+    other = replace(soft, density=900.0, shear_modulus=24e3)
+    before, after = (Body(material=m, width=0.03, height=0.03, depth=0.01) for m in (soft, other))
+    made = build(before, 1e-2)
+    mesh = made.mesh
+    outward = facet_normals(mesh, boundary_facets(mesh.tets))
+    rests = [hands.support(body, mesh, outward, []).stiffness for body in (before, after)]
+    keys = free_keys(before, {MODULUS: (20e3, 40e3)})
+    on_springs = replace(made, support=hands.support(before, mesh, outward, []))
+    solids = solids_of(reference_of(before, on_springs, keys), after)
+    assert solids.materials == (other,)
+    assert rests[1] == pytest.approx(solids.springs * rests[0])
+    drags = [layer_drag(body, layer_of(body), mesh) for body in (before, after)]
+    assert drags[1] == pytest.approx(solids.drag * drags[0])
+    assert solids.springs != pytest.approx(solids.drag)
+
+
+def test_affine_sums_are_the_operators():
+    """Two layers under a coat of two, on springs and dashpots, in an absorbing layer."""
+    upper = Layer(thickness=0.004, material="dermis")
+    made = build(Body(material="fat", layers=(upper,), width=0.02, height=0.02, depth=0.01), 1e-2)
+    prony = (PronyTerm(modulus=9e3, time=1e-3), PronyTerm(modulus=5e3, time=1e-2))
+    materials = (
+        fem.Material(density=1100, shear_modulus=90e3, poisson=0.45, viscosity=9.0),
+        fem.Material(density=1000, shear_modulus=60e3, poisson=0.49, prony=prony[:1]),
+        fem.Material(density=900, shear_modulus=30e3, poisson=0.48, loss_factor=0.1),
+        fem.Material(density=1000, shear_modulus=20e3, poisson=0.4, loss_factor=0.2, prony=prony),
+    )
+    assert meshed_materials(made) == tuple(made.material.values())
+    facets = made.mesh.facets["sides"]
+    shares = np.random.default_rng(0).random((2, 6 * len(facets)))
+    made = replace(
+        made, material=dict(enumerate(materials[2:])), fixed={"bottom": "xyz"},
+        coat=fem.Coat(materials=materials[:2], thicknesses=(1e-4, 3e-4)),
+        support=fem.Support(facets=facets, stiffness=1e6 * shares[0], absorbed=shares[1]),
+    )  # fmt: skip
+    assert made.drag is not None
+    assert made.drag.any()
+    expected = operators(made)
+    affine = assemble_affine(
+        made.mesh, materials, fixed=made.fixed, absorbing=made.absorbing, drag=made.drag,
+        support=made.support, coat=made.coat,
+    )  # fmt: skip
+    solids = Solids(materials=materials)
+    found = operators_of(affine, solids)
+    for one in "KCMR":
+        wanted = getattr(expected, one)
+        assert abs(getattr(found, one) - wanted).max() <= 1e-12 * abs(wanted).max(), one
+    assert len(affine.parts) == 4 + 4 + 4 + 4 + 1
+    stiff = dynamic_stiffness(expected.K, expected.C, expected.M, expected.branches, 2e3j)
+    (at,) = weights(affine, solids, [1e3 / np.pi])
+    summed = sum(w * A for w, A in zip(at, affine.parts, strict=True))
+    assert abs(summed - stiff).max() < 1e-12 * abs(stiff).max()
+
+
+LAYERED = Body(
+    layers=(Layer(thickness=0.003, material="dermis"),), sides="clamped",
+    width=0.024, height=0.024, depth=0.01,
+)  # fmt: skip
+THICK = {"body.layers.0.thickness_mm": (2.0, 4.0), "body.thickness_mm": (8.0, 12.0)}
+
+
+@pytest.mark.parametrize(
+    "layered", [LAYERED, replace(LAYERED, kind="disc", sides="absorbing")], ids=["slab", "disc"]
+)
+def test_matrices_of_a_stretched_body_are_sums_over_known_geometries(layered):
+    keys = free_keys(layered, THICK)
+    bodies = parametric._range(layered, keys, 5e-3)
+    assert len(bodies.geometries) == 5  # 1, two thicknesses and their inverses
+    at = [key.share(value) for key, value in zip(keys, (2.7, 11.0), strict=True)]
+    shares = geometry_shares(bodies, bodies.body(at))
+    assert shares.sum() == pytest.approx(1)
+    wanted = operators(build_at(bodies, at))
+    known = [operators(build_at(bodies, each)) for each in bodies.geometries]
+    for one in "KCM":
+        A = getattr(wanted, one)
+        found = sum(s * getattr(each, one) for s, each in zip(shares, known, strict=True))
+        assert abs(found - A).max() < 1e-9 * abs(A).max()
+
+
+def test_elements_of_a_disc_do_not_cross_its_layers():
+    made = build(replace(LAYERED, kind="disc"), 5e-3).mesh
+    depths = -made.points[made.tets[:, :4], 2]
+    upper = made.region == 0
+    assert depths[upper].max() == pytest.approx(3e-3)
+    assert depths[~upper].min() == pytest.approx(3e-3)
+
+
+def test_the_thickness_of_a_disc_is_free():
+    disc = replace(BODIES["silicone-disc"], width=0.03, height=0.03, depth=0.01)
+    tacton = Tacton(trajectory=Trajectory(shape="circle", size=0.01, speed=3.0))
+    pressure = MovingPressure(tacton=tacton)
+    scene = Scene(pressure=pressure, body=disc, probes=((0.0, 0.0), (4e-3, 3e-3)))
+    key = "body.thickness_mm"
+    prepared = skinwave.prepare(scene, {key: (8.0, 11.0)}, 0.02, h=5e-3)
+    for thickness in (8.0, 9.7):
+        frequencies, found = parametric.lines(prepared, {key: thickness})
+        made = build_at(prepared.bodies, [prepared.keys[0].share(thickness)])
+        assert made.mesh.points[:, 2].min() == pytest.approx(-1e-3 * thickness)
+        strong = np.argsort(-np.linalg.norm(found, axis=1))[:2]
+        expected = full_lines(scene, disc, frequencies[strong], made=made)
+        assert line_errors(found[strong], expected).max() < 0.01
+
+
+def test_thicknesses_are_free():
+    scene = replace(scene_of(LAYERED), probes=((0.0, 0.0),))
+    key = "body.thickness_mm"
+    prepared = skinwave.prepare(scene, {key: THICK[key]}, 0.05, h=8e-3)
+    body = with_values(LAYERED, prepared.keys, {key: 9.0})
+    assert body.depth == pytest.approx(9e-3)
+    frequencies, found = parametric.lines(prepared, {key: 9.0})
+    k = int(np.argmax(np.abs(found[:, 0])))
+    made = build_at(prepared.bodies, [prepared.keys[0].share(9.0)])
+    (expected,) = full_lines(scene, body, frequencies[[k]], made=made)
+    assert found[k] == pytest.approx(expected, rel=0.01)
+    other = parametric.lines(prepared, {key: 11.5})[1][k]
+    assert abs(other - found[k]) > 0.05 * abs(found[k])
+
+
+@pytest.mark.parametrize("thickness", [10.0, 12.0])
+def test_the_ends_of_a_range_of_thickness_are_as_accurate_as_its_middle(thickness):
+    """Vectors of one thickness alone change the others little, and are off by 3 % there."""
+    tacton = Tacton(am_frequency=200, trajectory=Trajectory(shape="circle", size=0.01, speed=6.0))
+    body = Body(sides="clamped", **(SMALL | {"depth": 1e-3 * thickness}))
+    probes = ((0.0, 0.0), (0.01, 0.0))
+    scene = Scene(pressure=MovingPressure(tacton=tacton), body=body, probes=probes)
+    key = "body.thickness_mm"
+    prepared = skinwave.prepare(scene, {key: (10.0, 12.0)}, h=7e-3)
+    frequencies, found = parametric.lines(prepared, {key: thickness})
+    made = build_at(prepared.bodies, [prepared.keys[0].share(thickness)])
+    assert prepared.effort.dofs < 0.6 * len(operators(made).free), "the part on one side alone"
+    strong = np.argsort(-np.linalg.norm(found, axis=1))[:3]
+    expected = full_lines(scene, body, frequencies[strong], made=made)
+    assert line_errors(found[strong], expected).max() < 0.01
+
+
+def test_a_line_takes_no_more_states_than_its_manifold_has():
+    # (1 + w) x = f: one direction, whatever the weight.
+    parts = np.stack([np.eye(6), np.eye(6)])
+    force, outputs = np.ones((1, 6), complex), np.eye(2, 6)
+    at = np.stack([np.ones(20), 1j * np.linspace(0, 3, 20)], axis=1)[:, None]
+    (basis,), error = line_bases(
+        parts[None], force[None], outputs[None], at, np.ones((20, 1)), 1e-3, lambda x: None
+    )
+    assert basis.states.shape == (6, 1)
+    assert error < 1e-12
+    found = steady_lines((basis,), np.array([[1.0, 0.7j]]), np.ones(1))
+    assert found == pytest.approx(np.full((1, 2), 1 / (1 + 0.7j)))
+
+
+def test_ranges_that_few_states_do_not_span_are_refused():
+    # Each material resonates elsewhere, without loss: no few states span that.
+    at = np.random.default_rng(0).uniform(0, 1, (30, 1, 30)).astype(complex)
+    parts = np.stack([np.diag(row) for row in np.eye(30)])
+    with pytest.raises(ValueError, match=r"^30 materials of the ranges leave an error of .*"):
+        line_bases(
+            parts[None], np.ones((1, 1, 30), complex), np.ones((1, 1, 30)), at, np.ones((30, 1)),
+            1e-6, lambda x: None,
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("free", "words"),
+    [
+        ({}, "names no key"),
+        ({"body.size_x_mm": (30, 40)}, "serves materials and thicknesses alone"),
+        ({"body.material.poisson": (0.4, 0.45)}, "reduce a body for each value"),
+        ({"body.material.shear_modulus": (1e4, 2e4)}, "body.material.shear_modulus'"),
+        ({"body.layers.0.thickness_mm": (1.0, 2.0)}, "it has 0, counted from 0"),
+        ({"body.thickness_mm": (0.0, 2.0)}, "give a least value above 0"),
+        ({MODULUS: (2e4, 1e4)}, "give a finite range, low to high"),
+        ({MODULUS: (-1e4, 1e4)}, "has shear_modulus_pa = -10000, outside 0.001"),
+        ({"body.layers.2.material.density_kg_m3": (900, 1000)}, "it has 0, counted from 0"),
+        ({"body.material.prony.0.modulus_pa": (1e3, 2e3)}, "there is no Prony term 0 in 0"),
+        ({"body.material.prony.0": (1e3, 2e3)}, "is no number of a Prony term"),
+    ],
+)
+def test_keys_that_cannot_be_free_are_refused(slab, free, words):
+    with pytest.raises(ValueError, match=words):
+        free_keys(slab.body, free)
+
+
+def test_thicknesses_that_no_mesh_follows_are_refused(slab):
+    with pytest.raises(ValueError, match="no mesh of a finger follows its thickness"):
+        free_keys(BODIES["fingertip"], {"body.thickness_mm": (13.0, 15.0)})
+    strain = replace(slab, quantity="largest_shear_strain", depth=1e-3)
+    with pytest.raises(ValueError, match="is not smooth in it"):
+        skinwave.prepare(strain, {"body.thickness_mm": (8.0, 12.0)})
+
+
+def test_values_out_of_range_are_refused(prepared):
+    for values, words in (
+        ({MODULUS: 50e3, VISCOSITY: 5.0}, "outside its range, 15000 to 40000"),
+        ({MODULUS: 20e3}, "the values lack body.material.viscosity_pa_s"),
+        ({MODULUS: 20e3, VISCOSITY: 5.0, "body.size_x_mm": 3.0}, "is not free"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            parametric.lines(prepared, values)
+
+
+def test_scenes_that_an_affine_sum_cannot_answer_are_refused(slab):
+    for quantity in ("von_mises_stress", "energy_density"):
+        with pytest.raises(ValueError, match="depends on the material beyond the motion"):
+            skinwave.prepare(replace(slab, quantity=quantity), RANGES)
+
+
+@pytest.mark.parametrize("mounting", ["tension_x_n_per_m = 60", 'edges = ["left", "right"]'])
+def test_a_sheet_that_is_stretched_or_not_framed_is_refused(mounting):
+    scene = skinwave.loads(f"[body]\npreset = 'paper-sheet-loose'\n[body.mounting]\n{mounting}")
+    with pytest.raises(ValueError, match="an isotropic sheet in a frame"):
+        skinwave.prepare(scene, free={"body.material.density_kg_m3": (700, 900)})

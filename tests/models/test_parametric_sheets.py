@@ -1,0 +1,218 @@
+"""One reduced sheet for every material and thickness of a range, in air and in vacuum, against each
+sheet's own bodies.
+"""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+import fem
+import skinwave
+from fem import affine_solution
+from fem.affine import Solids, fluid_of, in_vacuum, operators_of, project, weights, with_parts
+from fem.affine_solution import line_solution
+from fem.line_basis import line_errors
+from simple_model import MovingPressure, Tacton, Trajectory
+from skinwave.bodies.build import build, operators
+from skinwave.bodies.sheet import air
+from skinwave.measure import predicted
+from skinwave.measure.parameters import parse
+from skinwave.models import parametric
+from skinwave.models.free_keys import free_keys, values_at, with_values
+from skinwave.models.free_materials import affine_operators, reference_of, solids_of
+from skinwave.models.prepared import answer as own_answer
+from skinwave.models.prepared import components
+from skinwave.models.prepared import prepare as own_body
+from skinwave.scene.scene import BODIES, Placement, Scene
+from skinwave.scene.variation import DesignPoint
+from skinwave.sweeps import families
+from skinwave.system.effort import silent
+
+MODULUS, LOSS = "body.material.shear_modulus_pa", "body.material.loss_factor"
+DENSITY, THICKNESS = "body.material.density_kg_m3", "body.thickness_mm"
+RANGES = {
+    MODULUS: (0.7e9, 1.4e9),
+    LOSS: (0.02, 0.08),
+    DENSITY: (600, 1000),
+    THICKNESS: (0.08, 0.14),
+}
+H = 6e-3
+SHEET = replace(BODIES["paper-sheet-loose"], width=0.06, height=0.06, air=True)
+PATH = Trajectory(shape="circle", size=0.012, speed=5.0)
+LOAD = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.1, trajectory=PATH))
+SCENE = Scene(pressure=LOAD, body=SHEET, probes=((0.0, 0.0), (0.01, 0.004)))
+
+
+@pytest.fixture(scope="module")
+def prepared():
+    return skinwave.prepare(SCENE, RANGES, h=H)
+
+
+def random_values(keys, count, seed=1):
+    shares = np.random.default_rng(seed).random((count, len(keys)))
+    return [values_at(keys, each) for each in shares]
+
+
+def own_lines(scene, body, frequencies):
+    own = components(own_body(body, scene.probe_points, h=H), scene.pressure)
+    return own.lines[[np.argmin(np.abs(own.frequencies - f)) for f in frequencies]]
+
+
+def test_lines_in_air_are_those_of_each_sheets_own_reduction(prepared):
+    for values in random_values(prepared.keys, 4):
+        frequencies, found = parametric.lines(prepared, values)
+        body = with_values(SHEET, prepared.keys, values)
+        assert line_errors(found, own_lines(SCENE, body, frequencies)).max() < 0.003
+        still = own_lines(SCENE, replace(body, air=False), frequencies)
+        assert line_errors(found, still).max() > 0.1
+
+
+def test_the_waveform_from_rest_is_that_of_the_sheets_own_body_and_balances_energy(prepared):
+    (values,) = random_values(prepared.keys, 1, seed=2)
+    own = own_body(with_values(SHEET, prepared.keys, values), SCENE.probe_points, h=H)
+    found, expected = parametric.answer(prepared, values), own_answer(own, SCENE)
+    moving = np.linalg.norm(expected.values - expected.values.mean(axis=0))
+    assert np.linalg.norm(found.values - expected.values) < 1e-3 * moving
+    assert found.effort.energy_imbalance < 1e-6
+    free = [np.abs(each.body.poles.values).min() for each in (parametric.at(prepared, values), own)]
+    assert free[0] == pytest.approx(free[1], rel=1e-4)
+
+
+def test_a_thickness_is_free_without_air_too():
+    scene = replace(SCENE, body=replace(SHEET, air=False), probes=((0.0, 0.0),))
+    free = skinwave.prepare(scene, {THICKNESS: (0.08, 0.14)}, h=H)
+    assert len(free.parts) == 1, "one mesh"
+    whole = operators(build(scene.body, H))
+    assert free.effort.dofs < 0.3 * len(whole.free), "a quarter"
+    for thickness in (0.08, 0.1, 0.14):
+        frequencies, found = parametric.lines(free, {THICKNESS: thickness})
+        body = replace(scene.body, depth=1e-3 * thickness)
+        assert line_errors(found, own_lines(scene, body, frequencies)).max() < 0.003
+
+
+def test_a_quarter_in_air_has_the_lines_of_the_whole():
+    scene = replace(SCENE, probes=((0.0, 0.0),))
+    free = {DENSITY: (700.0, 900.0)}
+    quarter = skinwave.prepare(scene, free, h=H)
+    whole = skinwave.prepare(replace(scene, probes=((0.0, 0.0), (1e-3, 2e-3))), free, h=H)
+    assert quarter.effort.dofs < 0.3 * whole.effort.dofs
+    values = {DENSITY: 730.0}
+    (f, one), (g, other) = (parametric.lines(each, values) for each in (quarter, whole))
+    strong = np.argsort(-np.abs(one[:, 0]))[:4]
+    same = [np.argmin(np.abs(g - each)) for each in f[strong]]
+    assert np.abs(one[strong, 0] - other[same, 0]).max() < 2e-3 * np.abs(one).max()
+
+
+@pytest.fixture(scope="module")
+def small():
+    """Matrices of a tilted sheet in few elements, and of its operators in vacuum."""
+    body = replace(SHEET, placement=Placement(tilt_x=0.3, lift=5e-3))
+    made = build(body, 1.5e-2)
+    return body, made, affine_operators(body, made)
+
+
+def test_projected_sums_in_air_are_those_of_the_operators(small):
+    body, made, affine = small
+    thin = replace(body, depth=0.6 * body.depth, material=replace(body.solid, loss_factor=0.07))
+    solids = solids_of(reference_of(body, made, ()), thin)
+    other = operators(build(thin, 1.5e-2))
+    around = air(thin, made, other)
+    basis = np.random.default_rng(0).standard_normal((len(affine.free), 5))
+    parts = project(affine, basis, np.zeros((len(affine.parts), 0, 0)))
+    found = operators_of(with_parts(affine, parts), solids)
+    fluid = basis.T @ (around.M @ basis)
+    for one, more in (("K", 0), ("C", 0), ("M", fluid), ("R", 0)):
+        expected = basis.T @ getattr(other, one) @ basis + more
+        assert np.abs(getattr(found, one) - expected).max() <= 1e-9 * np.abs(expected).max(), one
+    assert fluid_of(affine) is not None
+    sparse = operators_of(in_vacuum(affine), solids)
+    assert abs(sparse.M - other.M).max() <= 1e-12 * abs(other.M).max()
+
+
+@pytest.mark.parametrize("fluid_share", [0.0, 0.5])
+def test_a_line_of_the_full_body_in_air_is_that_of_dense_matrices(small, fluid_share, monkeypatch):
+    _, made, affine = small
+    solids = Solids(materials=tuple(made.material.values()))
+    (of_line,) = weights(affine, solids, [180.0])
+    n = len(affine.free)
+    A = sum(w * (part @ np.eye(n)) for w, part in zip(of_line, affine.parts, strict=True))
+    force = np.random.default_rng(0).standard_normal((2, n)) * [[1], [1j]]
+    expected = np.linalg.solve(A, force.sum(axis=0))
+    found = line_solution(affine, of_line, force.sum(axis=0), fluid_share=fluid_share)
+    assert np.linalg.norm(found - expected) < 1e-6 * np.linalg.norm(expected)
+    monkeypatch.setattr(affine_solution, "RESTART", 1)
+    monkeypatch.setattr(affine_solution, "CYCLES", 1)
+    with pytest.raises(fem.Diverged, match="not solved to a residual of 1e-08 by 1 iterations"):
+        line_solution(affine, of_line, force.sum(axis=0), fluid_share=fluid_share)
+
+
+def test_air_and_vacuum_are_two_entries_of_the_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
+    free, value = {DENSITY: (790.0, 800.0)}, {DENSITY: 794.0}
+    both = [replace(SCENE, body=replace(SHEET, air=air), probes=((0, 0),)) for air in (True, False)]
+    first = [parametric.lines(skinwave.prepare(each, free, h=0.015), value) for each in both]
+    assert len(list(tmp_path.glob("*.npz"))) == 2
+    monkeypatch.setattr(parametric, "reduce_affine", None)  # of no use from here on
+    again = [parametric.lines(skinwave.prepare(each, free, h=0.015), value) for each in both]
+    for (_, one), (_, other) in zip(first, again, strict=True):
+        assert np.array_equal(one, other)
+    assert not np.array_equal(first[0][1], first[1][1])
+
+
+def test_thicknesses_of_a_sheet_in_air_share_a_reduction_in_a_sweep():
+    keys = free_keys(SHEET, {THICKNESS: (0.08, 0.13)})
+    cases = {}
+    for thickness in np.linspace(0.08, 0.13, 6).tolist():
+        scene = replace(SCENE, body=with_values(SHEET, keys, {THICKNESS: thickness}))
+        varied = {THICKNESS: thickness}
+        point = DesignPoint(varied=varied, keys={}, text="", scene=scene, before=scene)
+        cases[scene.body, scene.probes, scene.reading, scene.load] = point
+    ((family, members),) = families.families(cases, 0.05)
+    assert family.members == len(members) == 6, "as many as for a modulus: there is one mesh"
+    assert family.scene.body.depth == pytest.approx(8e-5), "the shortest waves"
+
+
+def test_a_fit_reduces_a_sheet_in_air_once(monkeypatch):
+    monkeypatch.setattr(predicted.parametric, "prepare", partial(parametric.prepare, h=0.015))
+    aim = predicted.target(SCENE, "fem", SCENE.reading.asked, SCENE.probe_points)
+    parameters = parse([f"{MODULUS}=0.9e9:1.1e9", f"{THICKNESS}=0.09:0.11"], [])
+    found = predicted.with_reduction(aim, parameters, silent).reduced
+    assert found
+    assert {key.key for key in found.keys} == {MODULUS, THICKNESS}
+
+
+def test_ranges_too_wide_for_one_model_leave_each_sheet_its_own(monkeypatch):
+    def refusing(*given, **options):
+        raise fem.reduced.NotReduced("200 moments are not enough")
+
+    monkeypatch.setattr(predicted.parametric, "prepare", refusing)
+    aim = predicted.target(SCENE, "fem", SCENE.reading.asked, SCENE.probe_points)
+    assert predicted.with_reduction(aim, parse([f"{MODULUS}=1e8:1e10"], []), silent) is aim
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        (replace(SHEET, depth=4e-4), "up to 0.7 mm, the limit is 0.6 mm for this sheet"),
+        (replace(SHEET, width=0.03), "up to 0.7 mm, the limit is 0.3 mm for this sheet"),
+    ],
+)
+def test_ranges_that_reach_elements_as_thick_as_the_sheet_are_refused(body, words):
+    with pytest.raises(ValueError, match=words):
+        free_keys(body, {THICKNESS: (0.2, 0.7)})
+    assert free_keys(body, {THICKNESS: (0.2, 0.3)})
+
+
+@pytest.mark.parametrize("quantity", ["largest_shear_strain", "displacement_x"])
+def test_motion_that_goes_with_the_thickness_itself_is_refused(quantity):
+    scene = replace(SCENE, quantity=quantity)
+    with pytest.raises(ValueError, match="goes with the thickness of a sheet beyond"):
+        skinwave.prepare(scene, {THICKNESS: (0.1, 0.2)})
+
+
+def test_air_around_a_free_edge_is_refused():
+    open_edged = replace(SHEET, sides="absorbing", base="clamped")
+    with pytest.raises(ValueError, match="absorbing sides"):
+        skinwave.prepare(replace(SCENE, body=open_edged), {DENSITY: (700, 900)})

@@ -1,0 +1,407 @@
+"""Properties of every load, body and mesh, on examples that Hypothesis draws."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, reject, settings
+from hypothesis import strategies as st
+
+import fem
+import meshes
+from meshes import TetMesh
+from simple_model import MovingPressure, Rhythm, Signal, Tacton, Trajectory, flat_body
+from simple_model.compliance import half_space, slab
+from simple_model.drive import DRIVES
+from simple_model.flat_body import steady_lines
+from simple_model.focus import FOCI
+from simple_model.load_spectrum import load_lines, reduced_lines
+from simple_model.path_cells import path_fourier, path_samples
+from simple_model.rhythm import ROLES
+from simple_model.tacton import SHARINGS
+from simple_model.trajectory import SHAPES, SWEEPS
+from skinwave import BODIES, Body, Scene, SkinwaveWarning, dumps, loads
+from skinwave.bodies.supports import CONDITIONS
+from skinwave.models import named, names
+from skinwave.models.advice import takes
+from skinwave.models.prepared import prepare
+from skinwave.planning.plan import plan
+from skinwave.planning.simulate import compute, simulate
+
+
+def numbers(low, high):
+    return st.floats(low, high, allow_nan=False)
+
+
+seeds = st.integers(0, 2**32 - 1).map(np.random.default_rng)
+frequencies = st.just(0.0) | numbers(5.0, 400.0)
+materials = st.builds(
+    fem.Material,
+    density=numbers(300, 3000),
+    shear_modulus=numbers(5e3, 1e5),
+    poisson=numbers(-0.3, 0.499),
+    viscosity=numbers(1, 10),
+    loss_factor=numbers(0, 0.3),
+)
+places = st.lists(st.tuples(numbers(-0.008, 0.008), numbers(-0.008, 0.008)), min_size=2, max_size=6)
+sized = st.builds(
+    Trajectory,
+    shape=st.sampled_from(SHAPES),
+    size=st.just(0.0) | numbers(0.002, 0.012),
+    speed=st.just(0.0) | numbers(0.5, 6),
+    sweep=st.sampled_from(SWEEPS),
+    centre=st.just((0.0, 0.0)) | st.tuples(numbers(-0.002, 0.002), numbers(-0.002, 0.002)),
+)
+
+
+@st.composite
+def recordings(draw):
+    """Paths with times of their own, which may jump."""
+    points = draw(places)
+    steps = draw(
+        st.lists(
+            st.just(0.0) | numbers(1e-3, 5e-3), min_size=len(points) - 1, max_size=len(points) - 1
+        )
+    )
+    times = np.concatenate([[0.0], np.cumsum(steps) + 1e-3 * (np.arange(len(steps)) > -1)])
+    levels = draw(st.just([]) | st.lists(numbers(0, 1), min_size=len(points), max_size=len(points)))
+    return Trajectory(
+        shape="recorded", points=tuple(points), times=tuple(times.tolist()),
+        levels=tuple(levels), hold=draw(st.booleans()),
+    )  # fmt: skip
+
+
+@st.composite
+def polylines(draw):
+    """Paths through points, drawn at most 300 times a second."""
+    points = tuple(draw(places))
+    path = Trajectory(
+        shape="polyline", points=points, sweep=draw(st.sampled_from(SWEEPS)), speed=0.0
+    )
+    return replace(path, speed=draw(numbers(0, 300)) * path.length)
+
+
+rhythms = st.builds(
+    Rhythm,
+    pulses=st.lists(
+        st.tuples(numbers(2e-3, 0.02), st.just(0.0) | numbers(1e-4, 0.02)), min_size=1, max_size=3
+    ).map(tuple),
+    ramp=st.just(0.0) | numbers(0, 1e-3),
+)
+signals = st.builds(
+    Signal,
+    rate=numbers(50, 2000),
+    samples=st.lists(numbers(0, 1), min_size=2, max_size=8).map(tuple),
+    role=st.sampled_from(ROLES),
+)
+several = st.lists(numbers(0, 1), min_size=1, max_size=8).map(tuple)
+tactons = st.builds(
+    Tacton,
+    amplitude=numbers(0, 1),
+    am_frequency=frequencies,
+    second_am_frequency=frequencies,
+    superposition=numbers(0, 1).map(lambda w: (w, 1 - w)),
+    envelope_frequency=st.just(0.0) | numbers(1, 20),
+    duration=numbers(0.001, 0.03),
+    trajectory=sized,
+    foci=st.just((0.0,)) | several,
+    sharing=st.sampled_from(SHARINGS),
+)
+every_tacton = (
+    tactons
+    | st.builds(
+        replace, tactons, rhythm=st.none() | rhythms, signal=st.none() | signals
+    )
+    | st.builds(
+        Tacton,
+        am_frequency=frequencies,
+        duration=numbers(0.001, 0.03),
+        trajectory=recordings() | polylines(),
+        foci=st.just((0.0,)) | several,
+    )
+)  # fmt: skip
+pressures = st.builds(
+    MovingPressure,
+    tacton=tactons,
+    profile=st.sampled_from(FOCI),
+    drive=st.sampled_from(sorted(DRIVES)),
+    depth_of_modulation=numbers(0, 1),
+    peak_pressure=st.just(0.0) | numbers(1e-3, 1e3),
+    height=numbers(0.1, 0.4),
+)
+papers = st.builds(
+    fem.from_young, density=numbers(300, 1500), young=numbers(1e8, 1e10), poisson=numbers(0, 0.45),
+    loss_factor=numbers(0.02, 0.1),
+)  # fmt: skip
+held = st.sampled_from([(b, s) for b in CONDITIONS for s in CONDITIONS if "clamped" in (b, s)])
+
+
+@st.composite
+def scenes(draw):
+    """Small bodies, with probes that may coincide or lie on the rim."""
+    base, sides = draw(held)
+    kind = draw(st.sampled_from(("none", "sheet", "slab")))
+    width, height = draw(numbers(0.02, 0.04)), draw(numbers(0.02, 0.04))
+    depth = draw(numbers(0.003, 0.01) if kind == "slab" else numbers(1e-4, 5e-4))
+    solids = st.just("paper") | papers if kind == "sheet" else st.just("palm") | materials
+    body = Body(
+        kind=kind, material=draw(solids),
+        width=width, height=height, depth=depth, base=base, sides=sides,
+    )  # fmt: skip
+    share = st.sampled_from((0.0, 0.25, -0.5, 0.5)) | numbers(-0.5, 0.5)
+    points = draw(st.lists(st.tuples(share, share), min_size=1, max_size=4))
+    probes = tuple((x * width, y * height) for x, y in points)
+    return Scene(name=draw(st.text()), pressure=draw(pressures), body=body, probes=probes)
+
+
+SMALL = Body(width=0.03, height=0.03, depth=0.006, sides="clamped")
+SHEET = replace(BODIES["paper-sheet-loose"], width=0.03, height=0.03)
+WATCHED = ((0.0, 0.0), (0.006, 0.003))
+
+
+def small_scene(tacton, body=SMALL, **pressure):
+    load = MovingPressure(tacton=tacton, **pressure)
+    return Scene(pressure=load, body=body, probes=WATCHED)
+
+
+def taken(model):
+    """A small body that a model takes."""
+    slab = small_scene(Tacton())
+    return SMALL if takes(named(model), slab) else SHEET
+
+
+@pytest.mark.parametrize("model", [m for m in names() if "nonlinear" not in m])
+@settings(max_examples=3)
+@given(tactons, numbers(0.01, 100))
+def test_every_linear_model_is_linear_in_the_pressure(model, tacton, factor):
+    model_options = {"h": 0.01, "dt": 1e-3 if tacton.duration > 2e-3 else None}
+    body = taken(model)
+    once = compute(
+        small_scene(tacton, body, peak_pressure=10.0), model, 0.3, **model_options
+    ).displacement
+    scaled = small_scene(tacton, body, peak_pressure=10.0 * factor)
+    many = compute(scaled, model, 0.3, **model_options).displacement
+    np.testing.assert_allclose(many, factor * once, atol=1e-9 * np.abs(many).max())
+
+
+def pushed_and_read(material, rng):
+    """A small body, and the operator that reads, or pushes, two places of its surface."""
+    mesh = meshes.block((0.03, 0.02, 0.01), 0.005)
+    places = rng.uniform(-0.5, 0.5, (2, 2)) * [0.03, 0.02]
+    operators = fem.assemble(mesh, material, absorbing="sides")
+    return mesh, operators, fem.probe_operator(mesh, places)
+
+
+@given(materials, seeds, numbers(0, 800))
+def test_a_push_here_read_there_is_a_push_there_read_here(material, rng, hertz):
+    _, operators, S = pushed_and_read(material, rng)
+    there = S @ fem.harmonic(operators, S[[0]].toarray()[0], hertz)[0]
+    here = S @ fem.harmonic(operators, S[[1]].toarray()[0], hertz)[0]
+    assert abs(there[1] - here[0]) < 1e-9 * np.sqrt(abs(there[0] * here[1]))
+
+
+@settings(max_examples=8)
+@given(materials, seeds)
+def test_the_reduced_model_is_reciprocal_too(material, rng):
+    _, operators, S = pushed_and_read(material, rng)
+    model = fem.reduce(operators, S, 500.0, 1e-2)
+    found = fem.transfer(model, model.basis.T @ S.T, [0.0, 90.0, 400.0])
+    np.testing.assert_allclose(
+        found[:, 0, 1], found[:, 1, 0], rtol=0, atol=1e-9 * np.abs(found).max()
+    )
+
+
+SLOW = {"density": 1000.0, "shear_modulus": 9e3, "poisson": 0.3, "viscosity": 0.05}
+REACH = 0.016  # m of a focus, beyond which it is below a thousandth
+
+
+@settings(max_examples=6)
+@given(numbers(0.06, 0.09), frequencies, st.sampled_from(("half-space", "slab")))
+def test_no_wave_of_an_endless_body_arrives_before_it_can(distance, am, kind):
+    body = (
+        half_space(fem.Material(**SLOW))
+        if kind == "half-space"
+        else slab(fem.Material(**SLOW), 0.02)
+    )
+    load = MovingPressure(tacton=Tacton(am_frequency=am, duration=0.05))
+    times = np.arange(500) / 1e4
+    x = np.abs(flat_body(body, load, [[distance, 0.0]], times).displacement[:, 0])
+    arrival = (distance - REACH) / fem.Material(**SLOW).pressure_speed
+    assert x[times < arrival].max() < 0.01 * x.max()
+
+
+@settings(max_examples=3)
+@given(st.sampled_from((0.04, 0.055)), st.sampled_from((0.0, 80.0, 200.0)))
+def test_no_wave_of_a_mesh_arrives_before_it_can(distance, am):
+    material = fem.Material(**SLOW | {"viscosity": 1.0})
+    body = Body(material=material, width=0.112, height=0.02, depth=0.01, sides="clamped")
+    tacton = Tacton(am_frequency=am, duration=0.03)
+    for model in ("fem", "fem-transient"):
+        scene = Scene(
+            pressure=MovingPressure(tacton=tacton), body=body, probes=((0, 0), (distance, 0))
+        )
+        x = np.abs(compute(scene, model, 0.05, h=0.005, dt=2e-4).displacement)
+        times = np.arange(len(x)) / 1e4
+        arrival = (distance - REACH) / material.pressure_speed
+        assert x[times < arrival, 1].max() < 0.01 * x[:, 1].max()
+        assert x[0].max() < 1e-6 * x.max()
+
+
+@pytest.mark.parametrize("model", ["point-kernel", "flat-body", "fem", "fem-transient"])
+@settings(max_examples=4)
+@given(tactons)
+def test_what_the_load_does_later_changes_nothing_before(model, tacton):
+    """The load lasts as long as its Tacton, so that the longer one goes on pushing."""
+    tacton = replace(tacton, duration=max(tacton.duration, 0.005))
+    longer = replace(tacton, duration=2 * tacton.duration)
+    arguments = (model, 0.3, None)
+    short, long = (
+        compute(small_scene(t), *arguments, h=0.01, dt=1e-4).displacement for t in (tacton, longer)
+    )
+    bound = 2e-3 if model == "flat-body" else 1e-9  # a transform over another period
+    assert np.abs(long[: len(short)] - short).max() <= bound * np.abs(long).max()
+
+
+@pytest.mark.parametrize("model", ["point-kernel", "flat-body", "fem"])
+@settings(max_examples=10)
+@given(every_tacton, numbers(0.01, 100))
+def test_pulses_and_recordings_are_linear_in_the_pressure_too(model, tacton, factor):
+    once, many = (
+        compute(small_scene(tacton, peak_pressure=p), model, 0.3, h=0.01).displacement
+        for p in (10.0, 10.0 * factor)
+    )
+    np.testing.assert_allclose(many, factor * once, atol=1e-9 * np.abs(many).max())
+
+
+circles = st.builds(
+    Tacton,
+    am_frequency=frequencies,
+    trajectory=st.builds(
+        Trajectory, shape=st.just("circle"), size=numbers(0.005, 0.03), speed=numbers(1, 12)
+    ),
+)
+
+
+def turned(distance, angles):
+    return distance * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+@settings(max_examples=8)
+@given(circles, numbers(0.001, 0.03), numbers(0, 6.2))
+def test_probes_around_a_circle_see_the_same_lines(tacton, distance, angle):
+    load = MovingPressure(tacton=replace(tacton, am_frequency=0.0))
+    probes = turned(distance, np.array([0.0, angle]))
+    _, waves = steady_lines(half_space(fem.Material(**SLOW)), load, probes)
+    spots = path_fourier(load, load.spot(probes, path_samples(load)).T)  # the point kernel's
+    lines = load_lines(load)
+    kernel = lines.coefficients * spots[:, lines.harmonics]
+    for amplitudes in (np.abs(waves.T), np.abs(kernel)):
+        np.testing.assert_allclose(
+            amplitudes[0], amplitudes[1], rtol=0, atol=1e-5 * amplitudes.max()
+        )
+
+
+@settings(max_examples=6)
+@given(circles, st.sampled_from(("sheet", "slab")), numbers(0, 0.014), numbers(0, 6.2))
+def test_a_body_turned_by_half_a_turn_answers_a_circle_the_same(tacton, kind, distance, angle):
+    path = replace(tacton.trajectory, size=min(tacton.trajectory.size, 0.02))
+    load = MovingPressure(tacton=replace(tacton, am_frequency=0.0, trajectory=path))
+    body = Body(kind=kind, width=0.03, height=0.03, depth=0.006, sides="clamped")
+    probes = turned(distance, np.array([angle, angle + np.pi]))
+    prepared = prepare(body, probes, h=0.006)
+    hertz, forces = reduced_lines(load, prepared.body.points, prepared.body.load)
+    motion = fem.line_response(prepared.body.poles, forces, hertz)[0]
+    lines = np.abs(motion @ prepared.read.T)
+    np.testing.assert_allclose(lines[:, 0], lines[:, 1], rtol=0, atol=2e-3 * lines.max())
+
+
+@st.composite
+def bodies(draw):
+    """A shaken block, straight or bowed, in four- or ten-node tetrahedra."""
+    rng, order = draw(seeds), draw(st.sampled_from((1, 2)))
+    mesh = meshes.block((0.03, 0.02, 0.01), 0.006, order=order)
+    shaken = mesh.points + rng.uniform(-3e-4, 3e-4, mesh.points.shape)
+    return TetMesh(points=shaken, tets=mesh.tets, facets=mesh.facets)
+
+
+@given(bodies(), materials)
+def test_stiffness_and_damping_do_not_feel_a_rigid_motion(mesh, material):
+    free = np.zeros(mesh.points.shape, bool)
+    operators = fem.assemble(mesh, material, fixed=free)
+    x = mesh.points - mesh.points.mean(axis=0)
+    axes = np.eye(3)
+    motions = [np.ones((len(x), 1)) * axis for axis in axes]
+    motions += [np.cross(axis, x) / 0.01 for axis in axes]
+    for u in map(np.ravel, motions):
+        for operator in (operators.K, operators.C):
+            assert np.abs(operator @ u).max() < 1e-11 * abs(operator).max() * np.abs(u).max()
+
+
+@given(bodies(), materials, seeds)
+def test_an_answer_moves_and_turns_with_its_body(mesh, material, rng):
+    R = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    R *= np.linalg.det(R)
+    moved = TetMesh(
+        points=mesh.points @ R.T + rng.uniform(-1, 1, 3), tets=mesh.tets, facets=mesh.facets
+    )
+    force = rng.standard_normal(mesh.points.shape)
+    u = fem.static(fem.assemble(mesh, material), force.ravel())
+    turned = fem.static(fem.assemble(moved, material), (force @ R.T).ravel())
+    expected = (u.reshape(-1, 3) @ R.T).ravel()
+    np.testing.assert_allclose(turned, expected, rtol=0, atol=1e-8 * np.abs(u).max())
+
+
+@given(bodies(), materials, seeds)
+def test_the_order_of_nodes_and_elements_does_not_matter(mesh, material, rng):
+    n = len(mesh.points)
+    new = rng.permutation(n)  # the new number of each node
+    points = np.empty_like(mesh.points)
+    points[new] = mesh.points
+    shuffled = TetMesh(
+        points=points,
+        tets=new[mesh.tets][rng.permutation(len(mesh.tets))],
+        facets={name: new[f][rng.permutation(len(f))] for name, f in mesh.facets.items()},
+    )
+    place = [rng.uniform(-0.4, 0.4, 2) * [0.03, 0.02]]
+    answers = []
+    for each in (mesh, shuffled):
+        operators = fem.assemble(each, material, absorbing="sides")
+        spots = np.exp(-(fem.facet_points(each)[:, :2] ** 2).sum(axis=1) / 2 / 0.00435**2)
+        u = fem.harmonic(operators, fem.load_operator(each) @ spots, 120.0)[0]
+        answers.append((fem.probe_operator(each, place) @ u)[0])
+    assert abs(answers[1] - answers[0]) < 1e-9 * abs(answers[0])
+
+
+@settings(max_examples=100)
+@given(scenes(), st.none() | every_tacton)
+def test_a_scene_comes_back_from_its_file(scene, tacton):
+    if tacton:
+        scene = replace(scene, body=Body(), pressure=replace(scene.pressure, tacton=tacton))
+    once = loads(dumps(scene))
+    assert dumps(once) == dumps(scene)
+    assert loads(dumps(once)) == once
+    assert once.name == scene.name
+    assert once.pressure.drive == scene.pressure.drive
+    np.testing.assert_allclose(once.probe_points, scene.probe_points, rtol=1e-14)
+    assert once.tacton.trajectory.size == pytest.approx(scene.tacton.trajectory.size, rel=1e-14)
+    if scene.body.kind != "none":
+        assert once.body.width == pytest.approx(scene.body.width, rel=1e-14)
+
+
+@settings(max_examples=6)
+@given(scenes())
+def test_what_is_planned_runs(scene):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("skinwave.bodies.sheet.SHEET_CELLS", 16)
+        patch.setattr("skinwave.bodies.slab.SLAB_CELL", 6e-3)
+        try:
+            required = plan(scene, 0.3)
+        except ValueError:
+            reject()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SkinwaveWarning)  # of a sheet that deflects far, say
+            found = simulate(scene, "auto", 0.3)
+    assert found.model == required.model
+    assert found.displacement.shape == (len(found.times), len(scene.probes))
+    assert np.isfinite(found.displacement).all()

@@ -1,0 +1,309 @@
+"""Quantities that probes read, at the surface and below it, by every model that has them."""
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from test_stress import boussinesq
+
+from fem.coat import Coat
+from simple_model import lines
+from simple_model.focus import spot_width
+from simple_model.material import PRESETS
+from simple_model.quantities import QUANTITIES, Quantity, register
+from simple_model.tensors import energy_root, largest_shear, von_mises
+from skinwave.bodies.parts import Layer
+from skinwave.commands.cli import main
+from skinwave.models import named
+from skinwave.models.advice import check_taken, takes
+from skinwave.models.loads import probe_rows
+from skinwave.models.prepared import sample_times
+from skinwave.planning.simulate import compute
+from skinwave.results.run import Run
+from skinwave.scene.file import dumps, loads
+from skinwave.scene.scene import BODIES, Body
+from skinwave.scene.variation import DesignPoint, cases, combinations, parse
+from skinwave.studies.album import open_album
+from skinwave.sweeps.measures import columns, measured
+
+SCENE = """
+name = "below"
+[tacton]
+am_frequency_hz = 140
+duration_s = 0.05
+[body]
+size_x_mm = 32
+size_y_mm = 32
+thickness_mm = 6
+[body.material]
+density_kg_m3 = 1000
+shear_modulus_pa = 25e3
+poisson = 0.4999
+viscosity_pa_s = 5.0
+prony = [{ modulus_pa = 10e3, time_s = 0.5e-3 }]
+[probes]
+points_mm = [[0, 0], [4, 1]]
+"""
+H = 5e-3
+MODELS = ("fem", "fem-harmonic")
+
+
+def scene(quantity="displacement", depth="0"):
+    return loads(f'{SCENE}depth_mm = {depth}\nquantity = "{quantity}"\n')
+
+
+def strain(depth, model, **options):
+    """Strain (t, p, 6) by one response for each component."""
+    each = [compute(scene(f"strain_{c}", depth), model, **options).values
+            for c in ("xx", "yy", "zz", "xy", "xz", "yz")]  # fmt: skip
+    return np.stack(each, axis=-1)
+
+
+def test_keys_of_a_scene_are_read_and_written():
+    assert loads(SCENE).reading.is_plain
+    assert scene("strain_zz", '"meissner"').depths == (0.7e-3, 0.7e-3)
+    assert scene("strain_zz", '["surface", 2]').depths == (0.0, 2e-3)
+    for asked in (scene("stress_xz", "[0.7, 2]"), scene("velocity"), scene(depth='"pacini"')):
+        assert loads(dumps(asked)) == asked
+    assert "depth_mm = 2.0" in dumps(scene(depth='"pacini"'))
+
+
+@pytest.mark.parametrize(
+    ("quantity", "depth", "sentence"),
+    [
+        ("strain_zy", "0", r"quantity 'strain_zy' is unknown, use one of displacement.*strain_"),
+        ("pressure", "0", "quantity 'pressure' is that of the point kernel"),
+        ("velocity", "[1]", "depth_mm has 1 values for 2 probes"),
+        ("velocity", "-1", "depth_mm = -1 of a probe must be a finite number"),
+        ("strain_zz", "6", "depth_mm = 6 of a probe is not within the body, which is 6 mm"),
+        ("strain_zz", '"pacinian"', "depth_mm 'pacinian' is unknown.*pacini"),
+        ("strain_zz", "true", "depth_mm = True must be a number"),
+    ],
+)
+def test_what_cannot_be_read_is_refused_in_a_sentence(quantity, depth, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        scene(quantity, depth)
+
+
+def test_a_sheet_has_quantities_within_its_thickness():
+    words = '[body]\nkind = "sheet"\nmaterial = "paper"\n[probes]\npoints_mm = [[0, 0]]\n'
+    assert loads(f'{words}quantity = "acceleration"').reading.asked.unit == "m/s2"
+    assert loads(f'{words}quantity = "strain_xx"\ndepth_mm = 0.02').depths == (2e-5,)
+    with pytest.raises(ValueError, match="is not within the sheet, which is 0.1 mm thick"):
+        loads(words + "depth_mm = 0.2")
+
+
+def test_a_model_without_the_quantity_refuses_it():
+    sheet = loads('[tacton]\nduration_s = 0.01\n[body]\nkind = "sheet"\nmaterial = "paper"\n'
+                  'sides = "clamped"\n[probes]\npoints_mm = [[0, 0]]\n')  # fmt: skip
+    assert takes(named("plate-modes"), replace(sheet, quantity="velocity"))
+    assert takes(named("fem-nonlinear"), replace(sheet, quantity="strain_xx"))
+    kernel = compute(scene("strain_zz", "2"), "point-kernel")
+    assert (kernel.quantity, kernel.unit) == ("pressure", "Pa")
+    assert not takes(named("plate-modes"), replace(sheet, quantity="strain_xx"))
+    with pytest.raises(ValueError, match="plate-modes takes a sheet, not a slab"):
+        check_taken(named("plate-modes"), scene("strain_zz", "2"))
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.4999])
+def test_a_half_space_at_rest_is_boussinesqs(poisson):
+    """The mean of the steady state: stress below a focus, times its mean pressure."""
+    text = f"""
+    [tacton]
+    duration_s = 0.01
+    [body]
+    thickness_mm = inf
+    [body.material]
+    density_kg_m3 = 1000
+    shear_modulus_pa = 25e3
+    poisson = {poisson}
+    viscosity_pa_s = 5.0
+    [probes]
+    points_mm = [[0, 0], [3, 0], [0, 6]]
+    """
+    for depth in (0.0, 0.7, 5.0):
+        asked = {
+            c: loads(f'{text}depth_mm = {depth}\nquantity = "stress_{c}"')
+            for c in ("xx", "yy", "zz", "xz", "yz")
+        }
+        found = {c: compute(each, "flat-body-harmonic").values[0] for c, each in asked.items()}
+        pressure = asked["zz"].pressure
+        size = pressure(np.zeros((1, 2)), 0.0)[0]
+        width = spot_width(pressure.height)
+        for p, r in enumerate((0.0, 3e-3, 6e-3)):
+            rr, tt, down, rz = boussinesq(poisson, r, 1e-3 * depth, width)
+            exact = (rr, tt, down, rz, 0.0) if p < 2 else (tt, rr, down, 0.0, rz)
+            got = [found[c][p] / size for c in ("xx", "yy", "zz", "xz", "yz")]
+            np.testing.assert_allclose(got, exact, rtol=0, atol=1e-4)
+
+
+def test_finite_elements_and_wavenumber_integrals_read_the_same_strain():
+    """At 0.7 and 2 mm under the focus and beside it, in motion at 140 Hz, waveform against
+    waveform, with elements as coarse as these: docs/accuracy.md has finer ones.
+    """
+    text = SCENE.replace("[[0, 0], [4, 1]]", "[[0, 0], [4, 1], [4, 1]]").replace("= 6", "= 8")
+    asked = loads(f'{text}depth_mm = [2, 2, 0.7]\nquantity = "strain_zz"\n')
+    exact = compute(asked, "flat-body").values
+    found = compute(asked, "fem", h=3.3e-3).values
+    misfit = np.linalg.norm(found - exact, axis=0) / np.linalg.norm(exact, axis=0)
+    assert misfit.max() < 0.06
+
+
+@pytest.mark.parametrize("quantity", ["stress_xz", "energy_density"])
+def test_reduced_harmonic_and_transient_models_read_the_same(quantity):
+    """With viscosity and a Prony term, whose stresses are part of it."""
+    small = replace(scene(quantity, "[1, 2]"), probes=((0.0, 0.0), (3e-3, 2e-3)))
+    small = replace(small, body=replace(small.body, width=0.02, height=0.02, sides="clamped"))
+    reduced, steady = (compute(small, model, 0.02, h=6e-3).values for model in MODELS)
+    late = slice(350, None)
+    assert np.linalg.norm((steady - reduced)[late]) < 0.01 * np.linalg.norm(steady[late])
+    tacton = replace(small.tacton, duration=0.01)
+    short = replace(small, pressure=replace(small.pressure, tacton=tacton))
+    stepped = compute(short, "fem-transient", 0.02, h=6e-3, dt=5e-5).values
+    first = reduced[: len(stepped)]
+    assert np.linalg.norm(stepped - first) < 0.02 * np.linalg.norm(first)
+
+
+@pytest.mark.parametrize("model", ["flat-body", "flat-body-harmonic"])
+def test_rates_are_frequency_times_displacement(model):
+    position, velocity, acceleration = (
+        lines(compute(scene(q, "[0.7, 2]"), model), [140.0, 280.0])
+        for q in ("displacement", "velocity", "acceleration")
+    )
+    w = 2 * np.pi * np.array([[140.0], [280.0]])
+    np.testing.assert_allclose(velocity, w * position, rtol=2e-3)
+    np.testing.assert_allclose(acceleration, w**2 * position, rtol=5e-3)
+
+
+def test_normal_displacement_is_minus_z_and_decays_with_depth():
+    down = compute(scene("displacement", "[2, 2]"), "flat-body").values
+    up = compute(scene("displacement_z", "[2, 2]"), "flat-body").values
+    np.testing.assert_allclose(up, -down, rtol=1e-12)
+    by_elements = compute(scene("displacement", "[2, 2]"), "fem-harmonic", h=H).values
+    other = compute(scene("displacement_z", "[2, 2]"), "fem-harmonic", h=H).values
+    np.testing.assert_allclose(other, -by_elements, rtol=1e-9, atol=1e-15)
+    surface = compute(scene(), "flat-body").values
+    assert np.abs(down[:, 0]).max() < np.abs(surface[:, 0]).max()
+
+
+def test_quantities_that_are_not_linear_are_computed_in_time():
+    """From the six strains at each time, not from lines; energy at the moduli at rest."""
+    e, solid = strain("[0.7, 2]", "flat-body-harmonic"), scene().body.solid
+    shear = compute(scene("largest_shear_strain", "[0.7, 2]"), "flat-body-harmonic").values
+    np.testing.assert_allclose(shear, largest_shear(e), rtol=1e-6)
+    energy = compute(scene("energy_density", "[0.7, 2]"), "flat-body-harmonic").values
+    expected = ((e @ energy_root(solid).T) ** 2).sum(axis=-1)
+    np.testing.assert_allclose(energy, expected, rtol=1e-6)
+    assert (shear > 0).all()
+    assert (energy > 0).all()
+    stress = np.stack(
+        [compute(scene(f"stress_{c}", "[0.7, 2]"), "flat-body-harmonic").values
+         for c in ("xx", "yy", "zz", "xy", "xz", "yz")], axis=-1,
+    )  # fmt: skip
+    mises = compute(scene("von_mises_stress", "[0.7, 2]"), "flat-body-harmonic").values
+    np.testing.assert_allclose(mises, von_mises(stress), rtol=1e-6)
+
+
+def test_a_layer_has_its_own_strain_and_the_traction_of_its_neighbour():
+    layered = SCENE + '\n[[body.layers]]\nthickness_mm = 1\nmaterial = "epidermis"\n'
+    head, probes = layered.split("[probes]\n")
+    points, layers = probes.split("\n\n")
+
+    def read(quantity, depth):
+        text = f'{head}\n{layers}\n[probes]\n{points}\ndepth_mm = {depth}\nquantity = "{quantity}"'
+        return compute(loads(text), "flat-body-harmonic").values[:, 1]
+
+    above, below = (read("stress_zz", [z, z]) for z in (1 - 1e-6, 1 + 1e-6))
+    np.testing.assert_allclose(above, below, rtol=1e-4)
+    stiff, soft = (read("strain_xz", [z, z]) for z in (1 - 1e-6, 1 + 1e-6))
+    assert 0.04 < np.abs(stiff).max() / np.abs(soft).max() < 0.08  # 25 to 35 kPa over 500 kPa
+
+
+def test_silicone_is_no_skin_but_layers_of_skin_and_own_materials_are():
+    slab = Body()
+    assert slab.is_skin
+    dermis = Layer(thickness=1e-3, material="dermis")
+    assert replace(slab, material="ecoflex", layers=(dermis,)).is_skin
+    assert replace(slab, material=replace(PRESETS["palm"], viscosity=3.0)).is_skin
+    for body in (BODIES["silicone-disc"], replace(slab, material=PRESETS["ecoflex"])):
+        assert body.is_solid
+        assert not body.is_skin
+    assert not BODIES["paper-sheet-loose"].is_solid
+
+
+def test_a_run_is_written_and_read_again(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("below.toml").write_text(dumps(scene("strain_zz", "[0.7, 2]")))
+    words = ["run", "below.toml", "--model", "flat-body", "--quiet", "--out", "out"]
+    assert main(words) == 0
+    with open("out/lines.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["probe_depth_mm"] for row in rows} == {"0.7", "2"}
+    assert all(float(row["strain_zz_um_m"]) > 0 for row in rows)
+    assert not any(row["displacement_um"] or row["pressure_pa"] for row in rows)
+    arrays = np.load("out/responses.npz")
+    assert set(arrays) == {"t", "probes", "strain_zz", "flat-body"}
+    (run,) = open_album(Path("out")).runs
+    assert run.response.quantity == "strain_zz"
+    np.testing.assert_array_equal(run.response.values, arrays["strain_zz"])
+    assert not run.is_skin
+    assert not run.is_motion
+    with pytest.raises(ValueError, match="this response is of strain_zz; take its `values`"):
+        run.response.displacement  # noqa: B018
+    assert main(["report", "out", "--quiet"]) == 0
+    page = Path("out/report/index.html").read_text()
+    assert "µm/m peak" in page
+    assert "dB re threshold" not in page
+    assert main(["relax", "below.toml", "--quiet", "--out", "other"]) == 2
+
+
+def test_a_displacement_keeps_its_columns_and_old_files_load(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("plain.toml").write_text(SCENE)
+    assert main(["run", "plain.toml", "--model", "flat-body", "--quiet", "--out", "out"]) == 0
+    header = Path("out/lines.csv").read_text().splitlines()[0]
+    assert header.endswith("line,frequency_hz,displacement_um,velocity_mm_s,pressure_pa")
+    old = Path("out/scene.toml").read_text().split("depth_mm = 0.0")[0]
+    Path("out/scene.toml").write_text(old)
+    (run,) = open_album(Path("out")).runs
+    assert run.response.quantity == "displacement"
+    assert run.is_skin
+
+
+def test_sweeps_have_columns_of_the_quantity():
+    asked = scene("von_mises_stress", "[0.7, 2]")
+    case = DesignPoint(varied={}, keys={}, text="", scene=asked)
+    row = measured(asked, compute(asked, "flat-body-harmonic"))
+    assert set(row) - {"status", "error"} <= set(columns([case]))
+    assert min(row["peak_von_mises_stress_pa"]) > 0
+    assert "peak_um" not in row
+    assert "level_db" not in row
+
+
+def test_strain_in_a_coat_is_refused():
+    """Elements there are of the material below it."""
+    coat = Coat(materials=(scene().body.solid,), thicknesses=(0.3e-3,))
+    build = SimpleNamespace(coat=coat)
+    reading = replace(scene("strain_zz", "[0.1, 2]").reading)
+    with pytest.raises(ValueError, match="at a depth of 0.1 mm is in layers of 0.3 mm that are a"):
+        probe_rows(scene().body, build, np.zeros((2, 2)), reading)
+
+
+def test_names_of_quantities_are_given_once():
+    with pytest.raises(ValueError, match="'velocity' is registered already"):
+        register(QUANTITIES["velocity"])
+    assert all(isinstance(q, Quantity) and q.words and q.unit for q in QUANTITIES.values())
+    assert len({q.column for q in QUANTITIES.values()}) == len(QUANTITIES)
+    assert len(sample_times(scene())) == 500
+    run = Run(tacton="", body="", scene=scene(), response=compute(scene(), "flat-body-harmonic"))
+    assert run.is_motion
+
+
+def test_a_depth_by_its_name_is_a_number_in_the_table_of_a_sweep(tmp_path):
+    (tmp_path / "scene.toml").write_text("[body]\nkind = 'slab'\n")
+    varied = parse("probes.depth_mm=0.5,meissner")
+    found = cases(tmp_path / "scene.toml", combinations([varied]))
+    assert [case.keys["probes.depth_mm"] for case in found] == [0.5, 0.7]

@@ -1,0 +1,82 @@
+"""Half of a body for probes on its plane of symmetry, under loads that have none."""
+
+import numpy as np
+import pytest
+
+from fem.linear_solver import factorise
+from simple_model import MovingPressure, Tacton, Trajectory
+from skinwave.bodies import Body
+from skinwave.bodies.build import build, operators
+from skinwave.bodies.supports import Sides
+from skinwave.models import prepared, symmetry
+from skinwave.models.symmetry import axes_of_probes, mirrored_axes
+from skinwave.planning.simulate import compute
+from skinwave.scene.scene import SURFACE, Scene
+
+CIRCLE = Tacton(
+    am_frequency=140, duration=0.1, trajectory=Trajectory(shape="circle", size=0.02, speed=8)
+)
+SLAB = Body(kind="slab", width=0.06, height=0.05, depth=0.01, material="palm")
+SHEET = Body(kind="sheet", width=0.08, height=0.06, material="paper", base="free", sides="clamped",
+             depth=1e-4)  # fmt: skip
+IN_AIR = Body(kind="sheet", width=0.08, height=0.06, material="paper", base="free", sides="clamped",
+              depth=1e-4, air=True)  # fmt: skip
+ON_X = ((0.0, 0.0), (0.007, 0.0), (-0.012, 0.0))
+
+
+def motions(monkeypatch, body, probes, h):
+    """Responses by the part that the probes see, and by all of the body."""
+    scene, found = Scene(pressure=MovingPressure(tacton=CIRCLE), body=body, probes=probes), []
+    for axes in (axes_of_probes, lambda probes, among: ""):
+        monkeypatch.setattr(symmetry, "axes_of_probes", axes)
+        reduced = prepared.prepare(body, scene.probe_points, h=h, tolerance=1e-6)
+        found.append(prepared.answer(reduced, scene))
+    return found
+
+
+@pytest.mark.parametrize(("body", "h"), [(SLAB, 5e-3), (SHEET, 4e-3), (IN_AIR, 5e-3)])
+def test_probes_on_the_plane_see_the_even_part_alone(monkeypatch, body, h):
+    part, whole = motions(monkeypatch, body, ON_X, h)
+    assert part.effort.dofs < 0.6 * whole.effort.dofs
+    error = np.abs(part.displacement - whole.displacement).max()
+    assert error < 1e-4 * np.abs(whole.displacement).max()  # above the band of the reductions
+
+
+def test_lines_are_solved_on_the_part_that_the_probes_see(monkeypatch):
+    scene, found = Scene(pressure=MovingPressure(tacton=CIRCLE), body=SLAB, probes=ON_X), []
+    for axes in (axes_of_probes, lambda probes, among: ""):
+        monkeypatch.setattr(symmetry, "axes_of_probes", axes)
+        found.append(compute(scene, "fem-harmonic", h=0.01))
+    part, whole = found
+    assert part.effort.dofs < 0.6 * whole.effort.dofs
+    error = np.abs(part.displacement - whole.displacement).max()
+    assert error < 1e-9 * np.abs(whole.displacement).max()
+    assert part.effort.energy_imbalance < 1e-9
+
+
+def test_a_probe_at_the_middle_sees_a_quarter(monkeypatch):
+    part, whole = motions(monkeypatch, SLAB, ((0.0, 0.0),), 5e-3)
+    assert part.effort.dofs < 0.4 * whole.effort.dofs
+    error = np.abs(part.displacement - whole.displacement).max()
+    assert error < 1e-4 * np.abs(whole.displacement).max()  # above the band of the reductions
+
+
+def test_probes_beside_the_plane_see_all_of_it(monkeypatch):
+    part, whole = motions(monkeypatch, SLAB, (*ON_X, (0.0, 0.004)), 6e-3)
+    assert part.effort.dofs == whole.effort.dofs
+
+
+def test_bodies_that_are_no_mirror_image_have_no_axes():
+    assert mirrored_axes(SLAB, SURFACE, prepared.PRESSURE) == "xy"
+    assert mirrored_axes(Body(kind="palm"), SURFACE, prepared.PRESSURE) == ""
+    ends = Sides(left="clamped", right="free", front="absorbing", back="absorbing")
+    one_sided = Body(kind="slab", sides=ends)
+    assert mirrored_axes(one_sided, SURFACE, prepared.PRESSURE) == "y"
+
+
+def test_half_of_a_coarse_disc_is_factorised():
+    """Its matrix of 504 dofs is nearly dense, of which blocks of rows made PARDISO crash."""
+    disc = Body(kind="disc", width=0.03, height=0.03, depth=0.01, material="ecoflex")
+    K = operators(build(disc, 0.0106, "y")).K
+    b = np.ones(K.shape[0])
+    np.testing.assert_allclose(K @ factorise(K).solve(b), b, atol=1e-6)

@@ -1,0 +1,756 @@
+"""Pattern files: import, export and round trip; what is malformed is refused in one line."""
+
+import io
+import json
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import wavfile
+
+from simple_model import MovingPressure, Rhythm, Signal, Tacton, Trajectory, lines, point_kernel
+from skinwave import Body, Scene, dumps, loads, read, simulate
+from skinwave.commands.cli import main
+from skinwave.patterns import Options, read_pattern, write_pattern
+from skinwave.patterns.adaptics_file import FORMAT, REVISIONS
+from skinwave.patterns.autd3 import steps
+from skinwave.system.effort import SkinwaveWarning
+
+LINEAR, STEP = {"name": "linear", "params": {}}, {"name": "step", "params": {}}
+ALONE = {"circle": {"radius": 10.0}, "line": {"length": 10.0, "thickness": 1.0, "rotation": 30.0}}
+
+
+def f64(value):
+    return {"type": "f64", "value": value}
+
+
+def brush(name="circle", **numbers):
+    numbers = ALONE.get(name, {}) | {"am_freq": 0.0, "stm_freq": 80.0} | numbers
+    params = {k: v if isinstance(v, dict) else f64(v) for k, v in numbers.items()}
+    return {"brush": {"name": name, "params": params}, "transition": LINEAR}
+
+
+def keyframe(time, xy=(0.0, 0.0), drawn=None, intensity=1.0, transition=LINEAR):
+    """A standard keyframe, or a pause where there is no place."""
+    constant = {"name": "constant", "params": {"value": f64(intensity)}}
+    frame = {
+        "time": time,
+        "type": "standard" if xy else "pause",
+        "brush": drawn or brush(),
+        "intensity": {"intensity": constant, "transition": transition},
+        "cjumps": [],
+    }
+    if xy:
+        place = {"x": xy[0], "y": xy[1], "z": 0.0}
+        frame["coords"] = {"coords": place, "transition": transition}
+    return frame
+
+
+def stop(time):
+    return {"time": time, "type": "stop"}
+
+
+def jump(parameter, operator, value, to):
+    condition = {"parameter": parameter, "operator": {"name": operator, "params": {}},
+                 "value": value}  # fmt: skip
+    return {"condition": condition, "jump_to": to}
+
+
+def adaptics(*keyframes, revision=REVISIONS[-1], **transform):
+    zero, one = f64(0.0), f64(1.0)
+    simple = {
+        "translate": {"x": zero, "y": zero, "z": f64(180.0)},
+        "rotation": zero,
+        "scale": {"x": one, "y": one, "z": one},
+    }
+    return {
+        "$DATA_FORMAT": FORMAT,
+        "$REVISION": revision,
+        "name": "made",
+        "keyframes": list(keyframes),
+        "pattern_transform": {
+            "geometric_transforms": simple, "intensity_factor": one, "playback_speed": one,
+        } | transform,
+        "user_parameter_definitions": {"size": {"default": 7.0, "min": 0, "max": 6.0, "step": 1}},
+    }  # fmt: skip
+
+
+def imported(folder, content, suffix=".adaptics", **options):
+    path = folder / f"pattern{suffix}"
+    if isinstance(content, dict):
+        content = json.dumps(content)
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return read_pattern(path, Options(**options))
+
+
+def exported(scene, suffix, **options):
+    return write_pattern(scene, suffix, Options(**options))[0]
+
+
+def flat(tacton, **pressure):
+    return Scene(pressure=MovingPressure(tacton=tacton, **pressure), body=Body())
+
+
+@pytest.mark.parametrize("name", ["circle", "line"])
+@pytest.mark.parametrize("revision", REVISIONS)
+def test_a_brush_comes_back_on_the_same_path_at_the_same_frequency(tmp_path, name, revision):
+    drawn = brush(name, am_freq=140.0, stm_freq=190.98593171027443)
+    source = adaptics(keyframe(0, (3.0, -4.0), drawn), stop(500), revision=revision)
+    scene, _ = imported(tmp_path, source)
+    path = scene.tacton.trajectory
+    assert path.drawing_frequency == pytest.approx(190.98593171027443, rel=1e-14)
+    assert (scene.tacton.am_frequency, scene.tacton.duration) == (140.0, 0.5)
+    assert (scene.pressure.drive, scene.pressure.height) == ("pressure_squared", 0.18)
+    u = np.linspace(0, 2 * np.pi, 50, endpoint=False)
+    offset = {
+        "circle": np.stack([np.cos(u), np.sin(u)], -1),
+        "line": np.cos(u)[:, None] * [np.cos(np.pi / 6), np.sin(np.pi / 6)],
+    }[name]
+    np.testing.assert_allclose(
+        path.at_phase(u / 2 / np.pi), [0.003, -0.004] + 0.01 * offset, atol=1e-15
+    )
+    back, _ = imported(tmp_path, exported(loads(dumps(scene)), ".adaptics"))
+    t = np.linspace(0, 0.5, 5001)
+    np.testing.assert_allclose(
+        back.tacton.trajectory.position(t), path.position(t), rtol=0, atol=1e-9
+    )
+    frequency = back.tacton.trajectory.drawing_frequency
+    assert frequency == pytest.approx(path.drawing_frequency, rel=1e-12)
+    assert back.tacton.am_frequency == 140.0
+    assert back.pressure.height == pytest.approx(0.18, rel=1e-12)
+
+
+def test_an_old_brush_without_a_frequency_is_drawn_at_100_hz(tmp_path):
+    drawn = brush()
+    del drawn["brush"]["params"]["stm_freq"]
+    scene, _ = imported(tmp_path, adaptics(keyframe(0, drawn=drawn), revision=REVISIONS[0]))
+    assert scene.tacton.trajectory.drawing_frequency == pytest.approx(100.0)
+
+
+def test_parameters_and_formulas_take_their_bounded_defaults(tmp_path):
+    half = {"type": "divide", "value": [{"type": "parameter", "value": "size"},
+                                        {"type": "constant", "value": 2.0}]}  # fmt: skip
+    drawn = brush(radius={"type": "param", "value": "size"},
+                  am_freq={"type": "formula", "value": half})  # fmt: skip
+    scene, notes = imported(tmp_path, adaptics(keyframe(0, drawn=drawn)))
+    assert scene.tacton.trajectory.size == pytest.approx(0.012)  # 7 mm are cut to 6
+    assert scene.tacton.am_frequency == 3.0
+    assert "parameter 'size' at its default, 6" in notes
+
+
+def test_keyframes_move_pause_fade_and_jump(tmp_path):
+    point = brush(radius=0.0)
+    source = adaptics(
+        keyframe(0, (-10.0, 0.0), point),
+        keyframe(100, (10.0, 0.0), point),
+        keyframe(200, None, point),
+        keyframe(300, (10.0, 20.0), point, 0.0, STEP),
+        keyframe(400, (0.0, 0.0), point, 0.5),
+        stop(450),
+    )
+    scene, _ = imported(tmp_path, source)
+    path = scene.tacton.trajectory
+    assert scene.tacton.duration == pytest.approx(0.45)
+    t = np.array([0.05, 0.15, 0.25, 0.35, 0.42])
+    expected = [[0, 0], [10, 0], [10, 10], [10, 20], [0, 0]]
+    np.testing.assert_allclose(1e3 * path.position(t), expected, atol=1e-6)
+    np.testing.assert_allclose(path.level_at_phase(path.phase(t)), [1, 1, 0.5, 0, 0.5], atol=1e-6)
+
+
+def test_places_are_scaled_turned_and_moved_but_brushes_are_not(tmp_path):
+    transform = {
+        "translate": {"x": f64(5.0), "y": f64(0.0), "z": f64(200.0)},
+        "rotation": f64(90.0),
+        "scale": {"x": f64(2.0), "y": f64(1.0), "z": f64(1.0)},
+    }
+    source = adaptics(keyframe(0, (4.0, 0.0)), geometric_transforms=transform)
+    scene, _ = imported(tmp_path, source)
+    assert scene.tacton.trajectory.centre == pytest.approx((0.005, 0.008))
+    assert scene.tacton.trajectory.size == pytest.approx(0.020)
+
+
+def test_a_lissajous_is_recorded_as_the_engine_draws_it(tmp_path):
+    drawn = brush("lissajous", x_scale=10.0, y_scale=6.0, a=2.0, b=3.0, d=0.5, rotation=0.0)
+    scene, notes = imported(tmp_path, adaptics(keyframe(0, drawn=drawn), stop(100)))
+    t = np.arange(2000) / 20_000
+    u = 2 * np.pi * 80 * t
+    expected = np.stack([0.010 * np.sin(2 * u + 0.5), 0.006 * np.sin(3 * u)], -1)
+    np.testing.assert_allclose(scene.tacton.trajectory.position(t), expected, atol=2e-5)
+    assert any("played at 20000 Hz" in note for note in notes)
+
+
+def test_am_of_a_moving_brush_is_in_the_levels(tmp_path):
+    drawn = brush(am_freq=50.0)
+    scene, _ = imported(tmp_path, adaptics(keyframe(0, drawn=drawn), keyframe(100, (5, 0), drawn)))
+    path, t = scene.tacton.trajectory, np.arange(2000) / 20_000
+    expected = (1 + np.cos(2 * np.pi * 50 * t)) / 2
+    np.testing.assert_allclose(path.level_at_phase(path.phase(t)), expected, atol=1e-3)
+
+
+POINT = brush(radius=0.0)
+LEFT, RIGHT = (-10.0, 0.0), (10.0, 0.0)
+BACK = jump("near", "lt", 1.0, 0.0)
+CIRCUIT = [
+    keyframe(0, LEFT, POINT),
+    keyframe(500, RIGHT, POINT) | {"cjumps": [BACK]},
+    keyframe(800, (10.0, 30.0), POINT) | {"cjumps": [jump("near", "gt_eq", 2.0, 600.0)]},
+    stop(1000),
+]
+NEAR = {"near": {"default": 0.0, "min": 0.0, "max": 2.0, "step": 0.1}}
+
+
+@pytest.mark.parametrize(
+    ("near", "note", "period", "expected"),
+    [
+        ({}, "parameter 'near' at its default, 0", 0.5, {0.125: (-5, 0), 0.4: (6, 0)}),
+        ({"near": 1.0}, "parameter 'near' = 1", 1.0, {0.4: (6, 0), 0.65: (10, 15), 0.9: (10, 30)}),
+        ({"near": 2.0}, "the first 800 ms are left out", 0.2, {0.1: (10, 20), 0.15: (10, 25)}),
+        ({"near": 9.0}, "= 2, the nearest that the file allows", 0.2, {0.05: (10, 15)}),
+    ],
+)
+def test_jumps_are_taken_at_the_values_of_parameters(tmp_path, near, note, period, expected):
+    source = adaptics(*CIRCUIT) | {"user_parameter_definitions": NEAR}
+    scene, notes = imported(tmp_path, source, parameters=near)
+    assert any(note in each for each in notes)
+    assert scene.tacton.duration == pytest.approx(period)
+    assert 1 / scene.tacton.trajectory.drawing_frequency == pytest.approx(period)
+    places = 1e3 * scene.tacton.trajectory.position(list(expected))
+    np.testing.assert_allclose(places, list(expected.values()), atol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("frames", "lasts"),
+    [
+        ([keyframe(0), keyframe(100, RIGHT) | {"cjumps": [BACK]}, stop(100)], 0.1),
+        ([keyframe(0), keyframe(100, RIGHT) | {"cjumps": [BACK | {"jump_to": 250}]},
+          stop(200), stop(300)], 0.1),
+        ([keyframe(0) | {"cjumps": [BACK]}, keyframe(100, RIGHT), stop(130)], 0.13),
+        ([keyframe(0), keyframe(100, RIGHT) | {"cjumps": [BACK | {"jump_to": 200}]},
+          stop(150), keyframe(200, LEFT), stop(300)], 0.2),
+    ],
+    ids=["before a stop", "behind a stop", "not at the start", "past a stop"],
+)  # fmt: skip
+def test_a_jump_is_met_in_passing_and_before_a_stop(tmp_path, frames, lasts):
+    source = adaptics(*frames) | {"user_parameter_definitions": NEAR}
+    scene, _ = imported(tmp_path, source)
+    assert scene.tacton.duration == pytest.approx(lasts)
+
+
+def test_a_loop_is_as_many_rounds_as_bring_its_brush_back(tmp_path):
+    """A loop of 125 ms with a brush at 90 Hz repeats after four, at 90.1 Hz within none of 10 s."""
+    for f_d, period, jumps in ((90.0, 0.5, False), (90.001, 0.5, True)):
+        drawn = brush(radius=5.0, stm_freq=f_d)
+        frames = [keyframe(0, LEFT, drawn), keyframe(125, RIGHT, drawn) | {"cjumps": [BACK]}]
+        source = adaptics(*frames) | {"user_parameter_definitions": NEAR}
+        scene, notes = imported(tmp_path, source)
+        assert scene.tacton.duration == pytest.approx(period)
+        assert any("brush jumps" in note for note in notes) == jumps
+        t = np.arange(1000) / 2000
+        u = 2 * np.pi * f_d * t
+        centre = np.stack([-10 + 20 * np.mod(t, 0.125) / 0.125, 0 * t], -1)
+        expected = centre + 5 * np.stack([np.cos(u), np.sin(u)], -1)
+        away = np.linalg.norm(1e3 * scene.tacton.trajectory.position(t) - expected, axis=1)
+        assert (away < 0.02).mean() > 0.99  # but where it jumps back
+
+
+def test_an_unknown_parameter_is_named_with_those_that_are(tmp_path):
+    source = adaptics(*CIRCUIT) | {"user_parameter_definitions": NEAR}
+    with pytest.raises(ValueError, match="'nera' is unknown, use one of near; did you mean 'near'"):
+        imported(tmp_path, source, parameters={"nera": 1.0})
+    bare = adaptics(keyframe(0)) | {"user_parameter_definitions": {}}
+    with pytest.raises(ValueError, match="no parameters; leave out --parameter"):
+        imported(tmp_path, bare, parameters={"near": 1.0})
+
+
+def test_a_wide_pattern_needs_no_body_but_in_a_scene(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    drawn = brush(radius=20.0, stm_freq=100.0)
+    wide = adaptics(keyframe(0, (-100.0, 0.0), drawn), keyframe(500, (100.0, 0.0), drawn))
+    Path("wide.adaptics").write_text(json.dumps(wide))
+    Path("base.toml").write_text("[body]\nkind = 'slab'\n")
+    assert main(["convert", "wide.adaptics", "wide.csv", "--scene", "base.toml"]) == 0
+    x = np.loadtxt("wide.csv", delimiter=",", skiprows=1)[:, 2]
+    assert (x.min(), x.max()) == (pytest.approx(-0.118, abs=5e-5), pytest.approx(0.12, abs=5e-5))
+    assert main(["convert", "wide.adaptics", "wide.toml"]) == 0
+    assert "the default slab is 260 mm x 100 mm" in capsys.readouterr().out
+    assert read("wide.toml").body.width == pytest.approx(0.26, abs=1e-3)
+    assert main(["convert", "wide.adaptics", "on.toml", "--scene", "base.toml"]) == 2
+    assert "--resize" in capsys.readouterr().err
+    smaller = ["--scene", "base.toml", "--resize", "0.4"]
+    assert main(["convert", "wide.adaptics", "on.toml", *smaller]) == 0
+    path = read("on.toml").tacton.trajectory
+    assert np.abs(path.outline[:, 0]).max() == pytest.approx(0.048, abs=2e-4)
+    assert path.drawing_frequency == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    "header",
+    ["time,x,y,z,intensity", "t_ms,x_mm,y_mm,z_mm,intensity", "Time [s],X (cm),Y (mm),z,Amplitude"],
+)
+def test_columns_of_other_tools_are_read_in_their_units(tmp_path, header):
+    scale = [{"ms": 1e3, "mm": 1e3, "cm": 1e2}.get(word.strip(" )]")[-2:], 1.0)
+             for word in header.split(",")]  # fmt: skip
+    rows = np.array([[0, 0.01, 0, 0.2, 1], [0.01, 0, 0.01, 0.2, 0.5], [0.02, -0.01, 0, 0.2, 1]])
+    text = header + "\n" + "\n".join(",".join(f"{v:.9g}" for v in row * scale) for row in rows)
+    scene, _ = imported(tmp_path, text, ".csv")
+    path = scene.tacton.trajectory
+    np.testing.assert_allclose(path.position([0, 0.01, 0.02]), rows[:, 1:3], atol=1e-12)
+    assert path.levels[:3] == (1.0, 0.5, 1.0)
+    assert (scene.pressure.height, scene.tacton.duration) == (0.2, pytest.approx(0.03))
+
+
+def test_four_plain_columns_are_places_and_intensity_at_a_rate(tmp_path):
+    text = "0.01,0,0.2,1\n0,0.01,0.2,0.5\n-0.01,0,0.2,0\n"
+    scene, _ = imported(tmp_path, text, ".csv", rate=1000.0)
+    path = scene.tacton.trajectory
+    assert path.levels[:3] == (1.0, 0.5, 0.0)
+    np.testing.assert_allclose(path.position(0.001), (0.0, 0.01), atol=1e-12)
+    with pytest.raises(ValueError, match="--rate HZ"):
+        imported(tmp_path, text, ".csv")
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        Trajectory(shape="square", size=0.02, speed=5.0),
+        Trajectory(shape="line", size=0.02, speed=3.0, centre=(0.01, 0.0)),
+        Trajectory(shape="line", size=0.02, speed=3.0, sweep="one_way"),
+        Trajectory(shape="polyline", points=((0, 0), (0.01, 0.004), (0, 0.01)), speed=2.0),
+        Trajectory(shape="circle", size=0.01, speed=2.0),
+        Trajectory(shape="polyline", points=((0, 0), (0.01, 0.004), (0, 0.01)), speed=2.0,
+                   sweep="sinusoidal"),
+        Trajectory(shape="recorded", points=((0, 0), (0.01, 0), (0, 0.01)), times=(0, 0.01, 0.02),
+                   hold=True),
+    ],
+    ids=lambda path: f"{path.shape} {path.sweep} {path.hold}",
+)  # fmt: skip
+def test_paths_that_no_brush_draws_become_keyframes(tmp_path, path):
+    scene = flat(Tacton(trajectory=path, duration=0.1, foci=(0.2,)))
+    back, _ = imported(tmp_path, exported(scene, ".adaptics"))
+    t = np.arange(2000) / 20_000
+    asked = path.at_phase(np.mod(path.phase(t) + 0.2, 1.0))
+    away = np.linalg.norm(back.tacton.trajectory.position(t) - asked, axis=1)
+    assert (away < 4e-5).mean() > 0.99  # 0.02 mm out and in, but where it jumps
+
+
+def test_what_adaptics_has_no_words_for_is_said():
+    for tacton, said in (
+        (Tacton(foci=(0.0, 0.5)), "several foci"),
+        (Tacton(envelope_frequency=3.0), "an envelope frequency"),
+        (Tacton(rhythm=Rhythm(pulses=((0.1, 0.1),))), "a rhythm"),
+        (Tacton(second_am_frequency=80.0, superposition=(0.5, 0.5)), "a second AM frequency"),
+        (Tacton(trajectory=Trajectory(shape="line", size=2e-4, speed=4)), "keyframes"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            exported(flat(tacton), ".adaptics")
+    with pytest.raises(ValueError, match="take 'pressure_squared'"):
+        exported(flat(Tacton(am_frequency=80.0), drive="linear"), ".adaptics")
+
+
+CIRCLE = Trajectory(shape="circle", size=0.02, speed=12.0)
+
+
+@pytest.mark.parametrize("hold", [False, True])
+def test_a_circle_in_csv_at_40_khz_has_the_lines_it_had(tmp_path, hold):
+    scene = flat(Tacton(trajectory=CIRCLE), profile="main_lobe")
+    back, _ = imported(tmp_path, exported(scene, ".csv", rate=40_000), ".csv", hold=hold)
+    times = np.arange(48_000) / 48_000  # between the samples
+    wanted = CIRCLE.drawing_frequency * np.arange(5)
+    before, after = (
+        lines(
+            point_kernel(MovingPressure(tacton=s.tacton, profile="main_lobe"), PROBES, times),
+            wanted,
+        )
+        for s in (scene, back)
+    )
+    assert np.abs(after - before).max() < 1e-3 * before.max()
+    strong = before > 0.01 * before.max()
+    np.testing.assert_allclose(after[strong], before[strong], rtol=1e-3)
+
+
+PROBES = [[0.010, 0.0], [0.015, 0.0], [0.0, 0.005]]
+
+
+@pytest.mark.parametrize(
+    ("tacton", "drive"),
+    [
+        (Tacton(am_frequency=140, trajectory=CIRCLE, duration=0.1), "pressure_squared"),
+        (Tacton(amplitude=0.6, trajectory=CIRCLE, duration=0.1), "linear"),
+        (Tacton(rhythm=Rhythm(pulses=((0.02, 0.01),)), duration=0.1), "force_corrected"),
+        (Tacton(foci=(0.0, 0.25, 0.5), trajectory=CIRCLE, duration=0.1), "pressure_squared"),
+    ],
+)
+def test_csv_carries_the_load_of_any_tacton(tmp_path, tacton, drive):
+    scene = flat(tacton, drive=drive)
+    back, _ = imported(tmp_path, exported(scene, ".csv", rate=20_000), ".csv")
+    t = np.arange(1999) / 20_000
+    before, after = (s.pressure(np.array(PROBES), t) for s in (scene, back))
+    assert np.abs(after - before).max() < 1e-9 * before.max()
+    assert len(back.tacton.foci) == len(tacton.foci)
+
+
+def test_tidy_csv_takes_its_columns_in_any_order_and_different_paths(tmp_path):
+    text = "# made by hand\nx_m,y_m,t_s,point\n" + "".join(
+        f"{0.001 * k},{0.002 * point},{0.01 * k},{point}\n" for k in range(5) for point in range(3)
+    )
+    scene, notes = imported(tmp_path, text, ".csv")
+    load = scene.pressure
+    t = np.array([0.0, 0.015, 0.03])
+    foci = [[0.0015, 0.002 * point] for point in range(3)]
+    alone = [load.spot(np.array(PROBES), np.array(focus)) for focus in foci]
+    np.testing.assert_allclose(load(np.array(PROBES), t)[1], 50 / 3 * sum(alone), rtol=1e-9)
+    assert any("1/3 of the pressure" in note for note in notes)
+
+
+def test_bare_csv_needs_a_rate(tmp_path):
+    text = "\n".join(f"{x:.6f},{y:.6f},0.15" for x, y in CIRCLE.position(np.arange(400) / 2e4))
+    scene, _ = imported(tmp_path, text, ".csv", rate=20_000)
+    assert scene.tacton.duration == pytest.approx(0.02)
+    assert scene.pressure.height == 0.15
+    with pytest.raises(ValueError, match="--rate"):
+        imported(tmp_path, text, ".csv")
+
+
+def test_a_focus_that_rises_needs_a_height(tmp_path):
+    text = "t_s,x_m,y_m,z_m\n0,0,0,0.2\n0.1,0.01,0,0.21\n"
+    with pytest.raises(ValueError, match="from 200 to 210 mm above the array"):
+        imported(tmp_path, text, ".csv")
+    assert imported(tmp_path, text, ".csv", height=0.2)[0].pressure.height == 0.2
+
+
+@pytest.mark.parametrize("kind", [np.int16, np.int32, np.uint8, np.float32])
+def test_wav_is_a_modulation_at_any_rate(tmp_path, kind):
+    t = np.arange(4410) / 44_100
+    wave = 0.5 * np.sin(2 * np.pi * 140 * t)
+    full = {np.int16: 2**15, np.int32: 2**31, np.uint8: 2**7, np.float32: 1}[kind]
+    samples = (wave * full + (128 if kind is np.uint8 else 0)).astype(kind)
+    wavfile.write(tmp_path / "a.wav", 44_100, samples)
+    content = (tmp_path / "a.wav").read_bytes()
+    for scale, peak in (("full", 0.5), ("peak", 1.0), ("rms", 1.0)):
+        scene, notes = imported(tmp_path, content, ".wav", scale=scale)
+        signal = scene.tacton.signal
+        assert max(signal.samples) == pytest.approx(peak, abs=0.02)
+        assert scene.tacton.duration == pytest.approx(0.1)
+        assert any(f"scale '{scale}'" in note for note in notes)
+    near = np.abs(signal.at(t) - np.sin(2 * np.pi * 140 * t)).max()
+    assert near < 0.02
+
+
+def test_wav_is_an_envelope_of_the_scene_it_is_put_on(tmp_path):
+    wavfile.write(tmp_path / "a.wav", 8000, np.linspace(0, 1, 800).astype(np.float32))
+    base = flat(Tacton(am_frequency=140, trajectory=CIRCLE))
+    scene, _ = read_pattern(tmp_path / "a.wav", Options(role="envelope"), base)
+    assert scene.tacton.trajectory == CIRCLE
+    t = np.array([0.01, 0.05])
+    gain = base.pressure.gain(t) * (t / (799 / 8000)) ** 2
+    np.testing.assert_allclose(scene.pressure.gain(t), gain, rtol=1e-6)
+
+
+PULSES = Rhythm(pulses=((0.02, 0.01),), ramp=0.005)
+LEVELS = Trajectory(
+    shape="recorded", times=(0, 0.025, 0.05), points=((0, 0),) * 3, levels=(0.2, 1, 0.2)
+)
+ENVELOPE = Signal(rate=1000, samples=(0.0, 0.5, 1.0, 0.5), role="envelope")
+TONES = Signal(rate=1000, samples=(0.0, 1.0, 0.0, -1.0))
+
+
+@pytest.mark.parametrize("drive", ["linear", "pressure_squared", "force_corrected"])
+@pytest.mark.parametrize(
+    ("kept", "more", "role"),
+    [
+        ({}, {"am_frequency": 80}, "modulation"),
+        ({}, {"am_frequency": 80, "envelope_frequency": 20}, "modulation"),
+        ({}, {"signal": TONES}, "modulation"),
+        ({}, {"rhythm": PULSES}, "envelope"),
+        ({"rhythm": PULSES}, {"am_frequency": 80}, "modulation"),
+        ({"am_frequency": 80}, {"signal": ENVELOPE, "rhythm": PULSES}, "envelope"),
+        ({}, {"trajectory": LEVELS}, "envelope"),
+        ({}, {"trajectory": LEVELS, "am_frequency": 80}, None),
+    ],
+)
+def test_wav_and_back_is_the_same_load_over_time(tmp_path, kept, more, role, drive):
+    """At half the amplitude, on a scene with what is said to stay with it, and on its own."""
+    role = role or ("modulation" if drive == "linear" else "envelope")
+    tacton, bare = (Tacton(amplitude=0.5, duration=0.05, **x) for x in ({**kept, **more}, kept))
+    scene = flat(tacton, drive=drive, depth_of_modulation=0.8)
+    content, notes = write_pattern(scene, ".wav", Options(rate=16_000))
+    assert any("amplitude" in note and "with the scene" in note for note in notes)
+    assert (role == "envelope") == any("--role envelope" in note for note in notes)
+    (tmp_path / "a.wav").write_bytes(content)
+    t = np.arange(800) / 16_000
+    before = scene.pressure([[0.0, 0.0]], t)
+    own = [] if tacton.trajectory.levels else [scene]
+    for base in (replace(scene, pressure=replace(scene.pressure, tacton=bare)), *own):
+        back, _ = read_pattern(tmp_path / "a.wav", Options(role=role), base)
+        after = back.pressure([[0.0, 0.0]], t)
+        np.testing.assert_allclose(after, before, atol=1e-5 * before.max())
+
+
+@pytest.mark.parametrize("asked", [0.5, 4.0, 80.0, 190.98593171027443, 700.0])
+@pytest.mark.parametrize("foci", [1, 3])
+def test_autd_draws_at_the_nearest_frequency_it_can(asked, foci):
+    count, division = steps(asked, foci)
+    assert count % foci == 0
+    assert count <= 8192
+    drawn = 40_000 / count / division
+    assert abs(drawn / asked - 1) < 0.6 * foci * division * asked / 40_000
+
+
+@pytest.mark.parametrize("sharing", ["simultaneous", "time_multiplexed"])
+def test_the_script_states_its_frequency_and_holds_its_foci(sharing):
+    tacton = Tacton(trajectory=CIRCLE, foci=(0.0, 0.5), am_frequency=80, sharing=sharing)
+    script, notes = write_pattern(flat(tacton), ".py", Options())
+    drawn = {"simultaneous": "191.388", "time_multiplexed": "190.476"}[sharing]
+    assert any(f"draws {drawn} Hz where 190.986 Hz" in note for note in notes)
+    tree = compile(script, "script", "exec")
+    assert "FociSTM" in tree.co_names
+    places = next(c for c in (eval_list(script, "PLACES"),))
+    radii = np.linalg.norm(np.array(places), axis=2)
+    np.testing.assert_allclose(radii, 10.0, atol=1e-3)
+    assert radii.shape[1] == (2 if sharing == "simultaneous" else 1)
+    assert max(eval_list(script, "MODULATION")) == 255
+
+
+@pytest.mark.parametrize("foci", [(0.0,), (0.0, 0.25, 0.5)])
+@pytest.mark.parametrize("sharing", ["simultaneous", "time_multiplexed"])
+def test_a_focus_that_rests_has_the_two_points_that_the_device_needs(foci, sharing):
+    still = Tacton(trajectory=replace(CIRCLE, speed=0.0), foci=foci, sharing=sharing)
+    places = np.array(eval_list(write_pattern(flat(still), ".py", Options())[0], "PLACES"))
+    assert places.shape[0] * places.shape[1] >= 2
+    expected = 1e3 * CIRCLE.at_phase(list(foci))
+    for turn, pattern in enumerate(places):
+        mine = expected[turn % len(foci)][None] if len(pattern) == 1 else expected
+        np.testing.assert_allclose(pattern, mine, atol=1e-3)
+
+
+def eval_list(script, name):
+    text = script.decode().split(f"{name} = ", 1)[1].split("\n\n")[0]
+    text = text.split("\nMODULATION")[0]
+    lines_ = [line.split("#")[0] for line in text.splitlines()]
+    return json.loads("".join(lines_).replace(",]", "]").replace(" ", "").replace(",]", "]"))
+
+
+def test_a_pull_has_no_sound():
+    with pytest.raises(ValueError, match="has negative pressure half of the time"):
+        exported(flat(Tacton(am_frequency=80), drive="linear"), ".csv")
+
+
+def test_an_imported_pattern_runs_on_a_body(tmp_path):
+    text = "t_s,x_m,y_m\n0,0,0\n0.01,0.004,0\n0.02,0,0.004\n"
+    pattern, _ = imported(tmp_path, text, ".csv")
+    body = Body(width=0.03, height=0.03, depth=0.006, sides="clamped")
+    scene = Scene(pressure=pattern.pressure, body=body, probes=((0.0, 0.0),))
+    assert np.isfinite(simulate(scene, "auto", 0.3).displacement).all()
+
+
+def test_convert_writes_a_scene_that_runs_and_keeps_what_is_there(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("in.adaptics").write_text(json.dumps(adaptics(keyframe(0), stop(20))))
+    assert main(["convert", "in.adaptics", "out.toml"]) == 0
+    assert "wrote out.toml" in capsys.readouterr().out
+    assert read("out.toml").tacton.trajectory.shape == "circle"
+    assert main(["convert", "in.adaptics", "out.toml"]) == 2
+    assert "out.toml exists and is kept" in capsys.readouterr().err
+    assert main(["convert", "in.adaptics", "out.toml", "--overwrite", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["out"] == "out.toml"
+    assert main(["convert", "out.toml", "again.csv", "--rate", "20000", "--quiet"]) == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["again.csv", "in.adaptics", "out.toml"]
+    assert len(Path("again.csv").read_text().splitlines()) == 401
+    model = ["--model", "point-kernel", "--quiet"]
+    assert main(["run", "out.toml", "--out", "run", *model]) == 0
+
+
+def malformed():
+    """Files that are no patterns, by what is wrong with them."""
+    good = adaptics(keyframe(0), stop(100))
+
+    def with_(**changes):
+        return json.dumps(good | changes).encode()
+
+    rising = keyframe(100, (0.0, 0.0))
+    rising["coords"]["coords"]["z"] = 30.0
+    random = keyframe(0)
+    random["intensity"]["intensity"] = {"name": "random", "params": {}}
+    nested = {"type": "constant", "value": 1.0}
+    for _ in range(400):
+        nested = {"type": "negate", "value": nested}
+    header = "t_s,point,x_m,y_m,z_m,intensity\n"
+    return {
+        "empty.adaptics": (b"", "not valid JSON"),
+        "cut.adaptics": (with_()[:200], "not valid JSON"),
+        "deep.adaptics": (b"[" * 100_000, "not valid JSON"),
+        "list.adaptics": (b"[]", "not an .adaptics file"),
+        "other.adaptics": (b'{"a": 1}', "not an .adaptics file"),
+        "revision.adaptics": (with_(**{"$REVISION": "2.0"}), "revision '2.0' is unknown"),
+        "none.adaptics": (with_(keyframes=[]), "no keyframes"),
+        "number.adaptics": (with_(keyframes=3), "keyframes = 3 must be a list"),
+        "text.adaptics": (with_(keyframes=["a"]), "must be an object"),
+        "kind.adaptics": (with_(keyframes=[{"time": 0, "type": "hop"}]), "'hop' is unknown"),
+        "time.adaptics": (with_(keyframes=[stop("now")]), "must be a finite number"),
+        "before.adaptics": (with_(keyframes=[keyframe(-5)]), "before the start"),
+        "brush.adaptics": (with_(keyframes=[keyframe(0, drawn=brush("star"))]), "brush 'star'"),
+        "radius.adaptics": (with_(keyframes=[keyframe(0, drawn=brush(radius="x"))]), "radius"),
+        "nan.adaptics": (with_().replace(b"10.0", b"NaN"), "must be a finite number"),
+        "param.adaptics": (
+            with_(keyframes=[keyframe(0, drawn=brush(radius={"type": "param", "value": "q"}))]),
+            "parameter 'q' is not defined",
+        ),
+        "formula.adaptics": (
+            with_(keyframes=[keyframe(0, drawn=brush(
+                radius={"type": "formula", "value": {"type": "power", "value": [1, 2]}}))]),
+            "type 'power'",
+        ),
+        "jump.adaptics": (
+            with_(keyframes=[keyframe(0) | {"cjumps": [jump("size", "near", 1, 0)]}, stop(9)]),
+            "operator of a jump 'near' is unknown",
+        ),
+        "random.adaptics": (with_(keyframes=[random]), "intensity 'random'"),
+        "rising.adaptics": (with_(keyframes=[keyframe(0), rising]), "above the array"),
+        "long.adaptics": (with_(keyframes=[keyframe(0), stop(40_000)]), "outside 0.0001..30 s"),
+        "speed.adaptics": (
+            with_(pattern_transform={"playback_speed": f64(0.0)}), "must be above 0"
+        ),
+        "far.adaptics": (with_(keyframes=[keyframe(0, (310.0, 0.0))]), "within 300 mm"),
+        "empty.csv": (b"", "no focal points"),
+        "binary.csv": (b"\xff\xfe\x00\x01", "no text in UTF-8"),
+        "header.csv": (header.encode(), "without focal points"),
+        "column.csv": (b"t_s,xx_m,y_m\n0,0,0\n", "did you mean 'x_m'"),
+        "twice.csv": (b"t_s,x_m,x_m,y_m\n0,0,0,0\n", "twice"),
+        "missing.csv": (b"t_s,x_m\n0,0\n", "column y_m is missing"),
+        "short.csv": (header.encode() + b"0,0,0,0\n", "line 2 has 4 columns"),
+        "word.csv": (header.encode() + b"0,0,a,0,0.2,1\n", "line 2 has 'a'"),
+        "infinite.csv": (header.encode() + b"0,0,inf,0,0.2,1\n", "line 2"),
+        "loud.csv": (header.encode() + b"0,0,0,0,0.2,1.5\n", "0..1"),
+        "points.csv": (header.encode() + b"0,3,0,0,0.2,1\n", "number them from 0"),
+        "falls.csv": (header.encode() + b"0,0,0,0,0,1\n1,0,0,0,0,1\n0.5,0,0,0,0,1\n", "times fall"),
+        "uneven.csv": (header.encode() + b"0,0,0,0,0,1\n0,1,0,0,0,1\n1,1,0,0,0,1\n", "samples"),
+        "bare.csv": (b"0,0\n0.01,0\n", "--rate"),
+        "stands.csv": (header.encode() + b"0,0,0,0,0,1\n0,0,0.01,0,0,1\n", "last 0 s"),
+        "wide.csv": (header.encode() + b"0,0,0,0,0,1\n1,0,0.4,0,0,1\n", "within 300 mm"),
+        "empty.wav": (b"", "not a WAV"),
+        "text.wav": (b"RIFFxxxxWAVE" * 5, "not a WAV"),
+        "silent.wav": (wav(np.zeros(100, np.int16)), "silent"),
+        "stereo.wav": (wav(np.ones((100, 2), np.int16)), "2 channels"),
+        "long.wav": (wav(np.ones(100, np.int16), 3), "longer than 30 s"),
+        "infinite.wav": (wav(np.array([1, np.inf], np.float32)), "not finite"),
+        "loud.wav": (wav(np.array([1, 1.5], np.float32)), "beyond full drive"),
+        "what.txt": (b"", "no known kind of file"),
+    }  # fmt: skip
+
+
+def wav(samples, rate=8000):
+    import io
+
+    file = io.BytesIO()
+    wavfile.write(file, rate, samples)
+    return file.getvalue()
+
+
+MALFORMED = malformed()
+
+
+@pytest.mark.parametrize("name", MALFORMED)
+def test_no_pattern_is_refused_in_one_line(tmp_path, monkeypatch, capsys, name):
+    monkeypatch.chdir(tmp_path)
+    content, said = MALFORMED[name]
+    Path(name).write_bytes(content)
+    assert main(["convert", name, "out.toml"]) == 2
+    printed = capsys.readouterr().err
+    assert printed.startswith("skinwave: ")
+    assert printed.count("\n") == 1
+    assert f"{name}: " in printed
+    assert said in printed
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_a_damaged_pattern_is_read_or_refused(tmp_path, monkeypatch, capsys, seed):
+    rng = np.random.default_rng(seed)
+    suffix = (".adaptics", ".csv", ".wav")[seed % 3]
+    good = {
+        ".adaptics": json.dumps(adaptics(keyframe(0), keyframe(50, (5.0, 0.0)), stop(60))).encode(),
+        ".csv": exported(flat(Tacton(trajectory=CIRCLE, duration=0.01)), ".csv", rate=4000),
+        ".wav": exported(flat(Tacton(am_frequency=80, duration=0.01)), ".wav", rate=4000),
+    }[suffix]
+    changed = bytearray(good)
+    for at in rng.integers(0, len(changed), rng.choice((1, 2, 5))):
+        changed[at] = rng.choice((rng.integers(256), 48, 45))
+    content = bytes(changed[: len(changed) if seed % 2 else rng.integers(len(changed))])
+    (tmp_path / f"pattern{suffix}").write_bytes(content)
+    monkeypatch.chdir(tmp_path)
+    assert main(["convert", f"pattern{suffix}", "out.toml", "--quiet"]) in (0, 2)
+    assert capsys.readouterr().err.count("\n") <= 1
+
+
+WRONG_COMMANDS = [
+    (["missing.csv", "out.toml"], "cannot be read"),
+    (["good.csv", "out.mp3"], "'.mp3' is no known kind of file"),
+    (["good.csv", "nowhere/out.toml"], "cannot be written"),
+    (["good.csv", "."], "is a folder"),
+    (["good.csv", "out.toml", "--height", "900"], "outside 20..600 mm"),
+    (["good.csv", "out.csv", "--rate", "1e6"], "outside 1..40000 Hz"),
+    (["good.csv", "out.wav", "--rate", "0.5"], "choose one"),
+    (["good.csv", "out.toml", "--scene", "missing.toml"], "missing.toml: cannot be read"),
+    (["good.wav", "out.toml", "--role", "sound"], "role of a WAV 'sound' is unknown"),
+    (["good.wav", "out.toml", "--scale", "loud"], "scale 'loud' is unknown"),
+    (["good.wav", "out.toml", "--role", "envelope"], "take it as a modulation"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "said"), WRONG_COMMANDS)
+def test_no_conversion_is_refused_in_one_line(tmp_path, monkeypatch, capsys, arguments, said):
+    monkeypatch.chdir(tmp_path)
+    Path("good.csv").write_text("t_s,x_m,y_m\n0,0,0\n0.01,0.004,0\n")
+    Path("good.wav").write_bytes(wav(np.array([0.5, -0.5, 0.2], np.float32)))
+    before = sorted(tmp_path.iterdir())
+    assert main(["convert", *arguments]) == 2
+    printed = capsys.readouterr().err
+    assert said in printed
+    assert printed.count("\n") == 1
+    assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("suffix", "options", "alias"),
+    [(".wav", {"rate": 300}, 100), (".csv", {"rate": 250}, 50), (".py", {}, None)],
+)
+def test_a_rate_that_does_not_reach_the_modulation_is_noted(suffix, options, alias):
+    """By the tone that the samples have instead: their spectrum has its line there."""
+    scene = loads("[tacton]\nam_frequency_hz = 200\nduration_s = 0.5\n")
+    content, notes = write_pattern(scene, suffix, Options(**options))
+    said = [note for note in notes if "above half the rate" in note]
+    assert len(said) == (alias is not None)
+    if suffix == ".wav":
+        rate, samples = wavfile.read(io.BytesIO(content))
+        strongest = np.abs(np.fft.rfft(samples - samples.mean())).argmax() * rate / len(samples)
+        assert strongest == pytest.approx(alias, abs=2)
+    if alias:
+        assert f"played at {alias} Hz" in said[0]
+
+
+def test_a_recorded_path_that_repeats_has_a_steady_state(tmp_path):
+    """Four points held for 10 ms each, twice: the lines are of the last of ten rounds from rest,
+    and what is stated is how far the motion from rest is from them.
+    """
+    points = [(0.01, 0), (0, 0.01), (-0.01, 0), (0, -0.01)] * 2
+    rows = [f"{0.01 * k:.2f},0,{x},{y},0.2,1" for k, (x, y) in enumerate(points)]
+    text = "\n".join(["t_s,point,x_m,y_m,z_m,intensity", *rows])
+    scene, _ = imported(tmp_path, text, ".csv", hold=True)
+    assert scene.tacton.trajectory.drawing_frequency == pytest.approx(12.5)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SkinwaveWarning)
+        rest, steady = (simulate(scene, m) for m in ("flat-body", "flat-body-harmonic"))
+        tacton = replace(scene.tacton, duration=0.8)
+        later = simulate(
+            replace(scene, pressure=replace(scene.pressure, tacton=tacton)), "flat-body"
+        )
+        mesh = simulate(scene, "fem-harmonic", 0.5, h=0.012)
+    assert np.abs(steady.values - later.values[-800:]).max() < 1e-3 * np.abs(later.values).max()
+    off = [np.sqrt((x**2).sum(axis=0)) for x in (steady.values - rest.values, rest.values)]
+    assert steady.expected_error == pytest.approx((off[0] / off[1]).max(), rel=0.01)
+    assert "flat-body is enough" in steady.effort.warnings[0]
+    assert rest.expected_error < 0.05
+    away = np.linalg.norm(mesh.values - steady.values) / np.linalg.norm(steady.values)
+    assert away < mesh.expected_error

@@ -1,0 +1,139 @@
+"""What messages advise works: the input as they say is accepted."""
+
+import os
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+from skinwave import loads
+from skinwave.commands.cli import main
+
+TACTON = "[tacton]\nduration_s = 0.05\n"
+KEYS = [
+    ("size = 10", "size_mm = 10"),
+    ("speed = 8", "speed_m_per_s = 8"),
+    ("am_frequency = 140", "am_frequency_hz = 140"),
+    ("amplitude = 50", "amplitude_percent = 50"),
+    ("[tacton.rhythm]\npulses = [[1, 2]]", "[tacton.rhythm]\npulses_ms = [[1, 2]]"),
+    ("[probes]\npoints = [[0, 0]]", "[probes]\npoints_mm = [[0, 0]]"),
+    ("[probes]\ndepth = 1", "[probes]\ndepth_mm = 1"),
+    ("[focus]\nheight = 200", "[focus]\nheight_mm = 200"),
+    ("[focus]\npeak_pressure = 3", "[focus]\npeak_pressure_pa = 3"),
+    ("[body]\nthickness = 3", "[body]\nthickness_mm = 3"),
+    ("[body]\nsize_x = 80", "[body]\nsize_x_mm = 80"),
+    ("[body]\n[body.material]\nyoung = 3", "young_modulus_pa"),
+    ("[placement]\ntilt_x = 3", "[placement]\ntilt_x_deg = 3"),
+    ("[body]\nsize_mm = 10", "it belongs to [tacton]"),
+    ("[body]\nkind = slab", '[body]\nkind = "slab"'),
+    ('[body]\nkind = "slab', '[body]\nkind = "slab"'),
+    ('[body]\nkind = "sheet"\nair = True', '[body]\nkind = "sheet"\nair = true'),
+    ("size_mm = 0,5", "size_mm = 0.5"),
+    ("size_mm = 5 mm", "size_mm = 5"),
+    ("size_mm: 5", "size_mm = 5"),
+]
+
+
+@pytest.mark.parametrize(("wrong", "right"), KEYS, ids=[wrong for wrong, _ in KEYS])
+def test_the_right_key_is_named_with_its_unit(wrong, right):
+    with pytest.raises(ValueError) as refusal:  # noqa: PT011
+        loads(TACTON + wrong)
+    said = str(refusal.value)
+    named = right.split("\n")[-1].split(" = ")[0]
+    assert named in said or "; write key = value" in said or "close the quotes" in said
+    if " = " in right:
+        loads(TACTON + right)
+
+
+PATHS = [
+    r'"C:\Users\me\hand.stl"',
+    r'"C:\temp\thumb.stl"',
+    r'"D:\data\x.stl"',
+    r'"""C:\temp\thumb.stl"""',
+    r"C:\temp\thumb.stl",
+    r'"meshes\new.stl"',
+    r'"\\server\share\a.stl"',
+]
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_a_windows_path_is_written_in_single_quotes_or_with_slashes(path):
+    scene = '[body]\nkind = "mesh"\nmaterial = "palm"\nfile = '
+    with pytest.raises(ValueError, match="in single quotes, .* or with /"):
+        loads(scene + path)
+    plain = path.strip('"')
+    for cured, name in (
+        (f"'{plain}'", plain),
+        (f"'''{plain}'''", plain),
+        (f'"{plain}"'.replace("\\", "/"), plain.replace("\\", "/")),
+    ):
+        assert loads(scene + cured).body.file == name
+    table = '[body.material]\nlaw = "table"\ntable = "C:\\temp.csv"'
+    with pytest.raises(ValueError, match="in single quotes"):
+        loads(table)
+
+
+TEXTS = {
+    "latin.toml": 'name = "Größe"'.encode("latin-1"),
+    "utf16.toml": TACTON.encode("utf-16"),
+    "bare.toml": TACTON.encode("utf-16-le"),
+    "bytes.toml": bytes(range(256)),
+    "picture.toml": b"\x89PNG\r\n\x1a\n" + bytes(20),
+}
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_other_encodings_are_to_be_saved_as_utf_8(tmp_path, monkeypatch, capsys, name):
+    monkeypatch.chdir(tmp_path)
+    Path(name).write_bytes(TEXTS[name])
+    assert main(["plan", name]) == 2
+    assert capsys.readouterr().err.endswith("save it as UTF-8\n")
+
+
+@pytest.mark.skipif(sys.platform == "win32" or not os.getuid(), reason="root reads all files")
+def test_a_file_without_permission_is_named(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("x.toml").write_text(TACTON)
+    Path("x.toml").chmod(0)
+    assert main(["plan", "x.toml"]) == 2
+    assert "x.toml: cannot be read (Permission denied)" in capsys.readouterr().err
+
+
+OPTIONS = [
+    (["runn", "s.toml"], "'run'"),
+    (["pln", "s.toml"], "'plan'"),
+    (["run", "s.toml", "--modle", "fem"], "'--model'"),
+    (["run", "s.toml", "--model", "femm"], "'fem'"),
+    (["run", "s.toml", "--tolerence=0.1"], "'--tolerance'"),
+    (["run", "s.toml", "--elementsize", "1"], "'--element-size'"),
+    (["convert", "a.csv", "b.csv", "--rte", "3"], "'--rate'"),
+    (["film", "s.toml", "--camera", "tilt"], "'tilted'"),
+    (["cache", "--clean"], "'--clear'"),
+    (["--vesion"], "'--version'"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "near"), OPTIONS, ids=lambda a: " ".join(a))
+def test_the_nearest_option_command_or_value_is_suggested(capsys, arguments, near):
+    with pytest.raises(SystemExit) as stop:
+        main(arguments)
+    assert stop.value.code == 2
+    printed = capsys.readouterr().err
+    assert f"did you mean {near}; see skinwave" in printed
+    assert printed.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "limits"),
+    [
+        ("density_kg_m3", "1e-200", "1e-09 to 1e+06"),
+        ("shear_modulus_pa", "1e300", "0.001 to 1e+13"),
+        ("viscosity_pa_s", "1e200", "0 to 1e+07"),
+    ],
+)
+def test_a_material_that_no_solid_is_names_its_limits(key, value, limits):
+    given = {"density_kg_m3": "1000", "shear_modulus_pa": "1e4", "poisson": "0.49", key: value}
+    text = "".join(f"{name} = {number}\n" for name, number in given.items())
+    with pytest.raises(ValueError, match=rf"{key} = .*{re.escape(limits)}, .*; check its unit"):
+        loads(f"[body.material]\n{text}")

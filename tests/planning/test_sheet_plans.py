@@ -1,0 +1,138 @@
+"""Sheets from rest by their modes, linear and stretched, and plans that choose them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fem.reduced
+from simple_model import MovingPressure, Tacton, Trajectory, from_young
+from simple_model.drive import DRIVES
+from simple_model.plate_modes import plate_modes
+from skinwave import plan
+from skinwave.bodies.mounting import Mounting
+from skinwave.inference.design import hypercube
+from skinwave.inference.drive_laws import LAWS
+from skinwave.inference.scenes import scene_text
+from skinwave.models import Request, named
+from skinwave.models.advice import cures_for
+from skinwave.models.plate_modes import FROM_REST, plate_of
+from skinwave.planning.plan import chosen_model
+from skinwave.planning.sheets import modes_below, why_modes
+from skinwave.planning.simulate import compute, follow
+from skinwave.planning.warnings import NONLINEAR, of_stretching
+from skinwave.results.comparison import compare
+from skinwave.scene.file import loads
+from skinwave.scene.scene import BODIES, Body, Scene
+
+SOLID = from_young(density=800, young=4e9, poisson=0.3)
+VISCOUS = replace(SOLID, viscosity=0.06 * SOLID.shear_modulus / (2 * np.pi * 200))
+STRETCHED = Body(
+    kind="sheet", width=0.06, height=0.05, depth=1e-4, material=VISCOUS, base="free",
+    sides="clamped", mounting=Mounting(support="simply", tension_x=20.0, tension_y=20.0),
+)  # fmt: skip
+
+
+def test_modes_from_rest_are_elements_from_rest():
+    """A viscous loss is the same of a mode and of elements."""
+    circle = Trajectory(shape="circle", size=0.012, speed=3.0)
+    pressure = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.1, trajectory=circle))
+    scene = Scene(pressure=pressure, body=STRETCHED, probes=((0.0, 0.0), (0.01, 0.005)))
+    request = Request(times=np.arange(1000) / 1e4, tolerance=0.05, report=lambda *_: None, h=2.5e-3)
+    elements, modes, steady = (
+        named(model).solve(scene, request).values
+        for model in ("fem", FROM_REST.name, "plate-modes")
+    )
+    size = np.linalg.norm(elements)
+    assert np.linalg.norm(modes - elements) < 0.02 * size
+    assert np.linalg.norm(steady - elements) > 0.3 * size
+    assert np.abs(modes[0]).max() < 1e-5 * np.abs(modes).max()
+    velocity = replace(scene, quantity="velocity")
+    rate = compute(velocity, FROM_REST.name).values[1:-1]
+    assert rate == pytest.approx(np.gradient(modes, 1e-4, axis=0)[1:-1], abs=0.01 * rate.max())
+
+
+@pytest.mark.parametrize("name", ["a4-sheet", "a5-sheet"])
+def test_weyls_law_counts_the_modes_of_a_sheet(name):
+    found = plate_modes(plate_of(BODIES[name])).frequencies
+    assert modes_below(BODIES[name], 1000.0) == pytest.approx((found < 1000).sum(), rel=0.2)
+
+
+def test_sheets_that_an_inference_writes_are_planned_and_run(monkeypatch):
+    """In clips and between two edges with air, of which elements have none, and A4 in a frame."""
+    for name, law in LAWS.items():
+        monkeypatch.setitem(DRIVES, name, law)
+    frames = [x for x in hypercube(60) if x["size"] == "A4" and x["support"] == "clamped"]
+    others = [x for x in hypercube(60) if x["size"] == "A5" and x["support"] == "two_edges"]
+    for candidate, why in ((frames[0], "need no mesh"), (others[0], "in a frame, not one")):
+        scene = loads(scene_text(candidate))
+        weak = replace(scene.pressure, peak_pressure=0.01)
+        scene = replace(scene, pressure=weak)
+        required = plan(scene)
+        assert (required.model, required.h) == (FROM_REST.name, None)
+        assert why in required.rows[1].reason
+        found = follow(scene, required)
+        assert found.model == FROM_REST.name
+        assert 0 < found.expected_error <= 0.05
+        assert np.isfinite(found.values).all()
+        assert np.abs(found.values[0]).max() < 0.01 * np.abs(found.values).max()
+
+
+def test_curled_sheets_other_bodies_and_small_tolerances_stay_with_elements():
+    curled = replace(BODIES["a4-sheet"], mounting=Mounting(curl_x=1e-3))
+    for body, tolerance in (
+        (BODIES["skin-slab"], 0.05),
+        (curled, 0.05),
+        (BODIES["a4-sheet"], 5e-3),
+    ):
+        scene = Scene(pressure=MovingPressure(tacton=Tacton()), body=body)
+        assert why_modes(scene, tolerance) == ""
+
+
+@pytest.mark.parametrize(
+    ("pressure", "model"),
+    [(50.0, "plate-modes-nonlinear"), (5.0, "plate-modes-nonlinear"), (0.1, FROM_REST.name)],
+)
+def test_a_sheet_that_stretches_is_planned_as_one(pressure, model):
+    """Under 5 Pa this sheet deflects by a fifth of its thickness; linear it would be 10 % off."""
+    load = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.05), peak_pressure=pressure)
+    scene = Scene(pressure=load, body=BODIES["paper-sheet-loose"], probes=((0.01, 0.005),))
+    assert plan(scene).model == model
+    assert chosen_model(scene) == model
+
+
+@pytest.mark.parametrize("pressure", [1.0, 3.0, 10.0])
+def test_the_error_of_linear_bending_is_stated(pressure):
+    load = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.1), peak_pressure=pressure)
+    scene = Scene(pressure=load, body=BODIES["paper-sheet-loose"], probes=((0.01, 0.005),))
+    required = plan(scene, model=FROM_REST.name)
+    linear = follow(scene, required)
+    true = compare(compute(scene, "plate-modes-nonlinear"), linear).relative_l2.max()
+    assert true < 1.1 * linear.expected_error
+    assert linear.expected_error < 2 * true + 0.02
+
+
+@pytest.mark.parametrize("mounting", ["", 'edges = ["left", "right"]', "tension_x_n_per_m = 5"])
+def test_what_a_warning_of_stretching_advises_is_computed(mounting):
+    text = (
+        "[tacton]\nam_frequency_hz = 140\nduration_s = 0.02\n[body]\nkind = 'sheet'\n"
+        "size_x_mm = 40\nsize_y_mm = 40\nair = true\n[body.mounting]\n" + mounting
+    )
+    scene = loads(text + "\n[probes]\npoints_mm = [[0, 0]]")
+    response = compute(scene, FROM_REST.name)
+    (said,) = of_stretching(scene, response, 0.05)
+    (cure,) = cures_for(scene, named(NONLINEAR[0]))
+    assert cure.words in said
+    assert cure.model in said
+    assert np.isfinite(compute(cure.scene, cure.model).values).all()
+
+
+def test_a_reduction_out_of_reach_names_the_model_that_works(monkeypatch):
+    monkeypatch.setattr(fem.reduced, "MOST_MOMENTS", 6)
+    pressure = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.05))
+    scene = Scene(pressure=pressure, body=STRETCHED, probes=((0.01, 0.005),))
+    with pytest.raises(ValueError, match="6 moments leave.*use --model"):
+        plan(scene, model="fem", h=0.005)
+    slab = Scene(pressure=pressure, body=Body(width=0.04, height=0.04, sides="clamped"))
+    with pytest.raises(ValueError, match="6 moments leave.*use --model"):
+        plan(slab, model="fem", h=0.01)

@@ -1,0 +1,63 @@
+"""How-to pages: a user's own code, at most 30 lines a block, does what the page says, in an empty
+folder, block after block.
+"""
+
+import re
+import shlex
+import warnings
+from pathlib import Path
+
+import pytest
+
+from skinwave import SkinwaveWarning
+from skinwave.commands import cli
+
+DOCS = Path(__file__).parents[2] / "docs"
+WRITTEN = {
+    "labelled-data": ("tactons.csv",),
+    "fit-a-vibrometer": (
+        "palm.csv",
+        "seen/index.html",
+        "fitted/scene.toml",
+        "fitted/estimates.csv",
+    ),
+    "own-sheet": ("sheet/lines.csv", "clips/rows"),
+    "silicone-disc": ("disc/responses.npz", "disc.gif", "disc.pvd", "waves/index.html"),
+    "fingertip": (),
+    "bands": ("skin/percentiles.csv", "skin/samples.csv"),
+    "in-a-notebook": ("waves.csv", "waves.pdf"),
+    "own-laws": (),
+    "supplement": ("supplement/record.json", "again/record.json"),
+}
+LONGEST = 30  # lines of code
+
+
+def blocks(page):
+    """Language and text of each block of code; scenes first, as they are files."""
+    found = re.findall(r"```(\w+)\n(.*?)```", (DOCS / f"{page}.md").read_text("utf-8"), re.DOTALL)
+    return sorted(found, key=lambda block: block[0] != "toml")
+
+
+def run(language, text):
+    if language == "toml":
+        Path(text.partition("\n")[0].removeprefix("# ")).write_text(text, encoding="utf-8")
+    elif language == "python":
+        exec(compile(text, "how-to", "exec"), {})
+    else:
+        for line in text.splitlines():
+            assert (
+                cli.main([*shlex.split(line)[1:], "--quiet"][: None if "plan" not in line else -1])
+                == 0
+            )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", WRITTEN)
+def test_a_how_to_does_what_it_says(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SkinwaveWarning)  # coarse elements, on purpose
+        for language, text in blocks(page):
+            assert len(text.splitlines()) <= LONGEST
+            run(language, text)
+    assert [name for name in WRITTEN[page] if not Path(name).exists()] == []

@@ -1,0 +1,216 @@
+"""Who may import whom, what importing costs, and what the project ships."""
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+ROOMS = {
+    "simple_model": set(),
+    "meshes": set(),
+    "fem": {"simple_model", "meshes"},
+    "skinwave": {"simple_model", "meshes", "fem"},
+}
+
+# Rooms within skinwave, in order: each imports those before it only.
+INNER = (
+    "system", "bodies", "scene", "models", "planning", "results", "report", "patterns", "sweeps",
+    "measure", "live", "verify", "studies", "inference", "commands",
+)  # fmt: skip
+MESHES = ("surface", "shapes", "volume", "files")  # within meshes, likewise
+WITHIN = {"meshes": MESHES, "skinwave": INNER}
+
+
+def imported(path: Path) -> set[str]:
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names.add(node.module.split(".")[0])
+    return names
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_rooms_import_only_what_they_may(room):
+    for path in (ROOT / room).rglob("*.py"):
+        others = imported(path) & set(ROOMS) - {room}
+        assert others <= ROOMS[room], path
+
+
+def imports_of(path: Path) -> set[str]:
+    """Dotted names that a module imports, in functions and for type checkers, too."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative imports are not read here"
+            names |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return names
+
+
+@pytest.fixture(scope="module")
+def graph() -> dict[str, set[str]]:
+    """The modules of the four packages, and which of them each imports."""
+    files = {}
+    for path in (path for room in ROOMS for path in (ROOT / room).rglob("*.py")):
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        files[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    found = {}
+    for module, path in files.items():
+        names = imports_of(path)
+        used = {name if name in files else name.rpartition(".")[0] for name in names}
+        found[module] = used & files.keys() - {module}
+    return found
+
+
+def test_no_modules_import_each_other_in_a_circle(graph):
+    assert len(graph) > 200
+    assert {"meshes", "fem.assembly"} <= graph["fem"] | graph["fem.geometry"]
+    assert "meshes.files.mesh_files" in graph["skinwave.commands.mesh"]  # within a function
+    list(TopologicalSorter(graph).static_order())  # whose CycleError names the circle
+
+
+def rooms_of(package: str, modules: set[str]) -> set[str]:
+    """The rooms within a package that modules are in."""
+    parts = [module.split(".") for module in modules]
+    return {own[1] for own in parts if own[0] == package and own[1:2] and own[1] in WITHIN[package]}
+
+
+@pytest.mark.parametrize("package", WITHIN)
+def test_rooms_import_only_rooms_below_them(package, graph):
+    order = WITHIN[package]
+    for module, used in graph.items():
+        for own in rooms_of(package, {module}):
+            assert rooms_of(package, used) <= {*order[: order.index(own) + 1]}, module
+
+
+def test_modules_of_skinwave_are_in_rooms():
+    loose = {path.name for path in (ROOT / "skinwave").glob("*.py")}
+    assert loose == {"__init__.py", "__main__.py"}
+    folders = {path.parent.name for path in (ROOT / "skinwave").glob("*/__init__.py")}
+    assert folders == set(INNER)
+
+
+def test_processes_are_started_where_it_is_told():
+    """Programs by one function, Python functions by another; for the rest see the latter."""
+    starts = r"subprocess\.(run|Popen|check_)|create_subprocess|get_context|os\.(fork|exec|sys)"
+    places = (path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
+    found = {str(path.relative_to(ROOT)) for path in places if re.search(starts, path.read_text())}
+    assert found == {
+        "meshes/subprocess_call.py", "skinwave/system/processes.py", "skinwave/commands/rerun.py",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("package", ["fem", "simple_model", "meshes"])
+def test_the_numeric_packages_load_numpy_and_scipy_only(package):
+    code = f"import sys, {package}; print(*{{name.split('.')[0] for name in sys.modules}})"
+    loaded = set(subprocess.check_output([sys.executable, "-c", code], text=True).split())
+    heavy = {
+        "matplotlib",
+        "pyvista",
+        "vtkmodules",
+        "meshio",
+        "pytetwild",
+        "rich",
+        "pymetis",
+        "dask",
+        "pyarrow",
+        "platformdirs",
+        "jinja2",
+    }
+    assert not loaded & heavy
+    assert {"numpy"} <= loaded
+
+
+def test_a_comparison_loads_no_statistics():
+    """Both of its processes would, for a second each."""
+    code = "import sys, skinwave.studies.study\n"
+    code += "assert not {'scipy.stats', 'scipy.interpolate', 'scipy.optimize'} & {*sys.modules}"
+    subprocess.check_call([sys.executable, "-c", code])
+
+
+@pytest.mark.parametrize("module", ["planning.simulate", "sweeps.sweep", "live.serve"])
+def test_what_few_commands_need_is_loaded_by_these_alone(module):
+    """Each takes a tenth of a second of every process that is started."""
+    code = f"import sys, skinwave.{module}\n"
+    code += (
+        "assert not {'scipy.interpolate', 'scipy.optimize', 'matplotlib.figure'} & {*sys.modules}"
+    )
+    subprocess.check_call([sys.executable, "-c", code])
+
+
+def test_help_loads_nothing_heavy():
+    code = (
+        "import sys, skinwave.commands.cli as c\ntry: c.main(['--help'])\nexcept SystemExit: pass\n"
+    )
+    code += "assert not {'numpy', 'scipy', 'matplotlib', 'rich', 'dask'} & set(sys.modules)\n"
+    code += "assert not {'jinja2', 'markupsafe', 'platformdirs'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)
+
+
+def test_functions_are_looked_up_even_after_their_modules():
+    code = (
+        "import skinwave.planning.simulate, skinwave.results.comparison, skinwave\n"
+        "assert callable(skinwave.simulate) and callable(skinwave.compare)\n"
+        "assert all(hasattr(skinwave, name) for name in skinwave.__all__)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_public_names_are_listed_and_found():
+    code = (
+        "import skinwave\n"
+        "names = dir(skinwave)\n"
+        "assert {*skinwave.__all__, '__version__'} <= set(names)\n"
+        "import skinwave.planning.plan\n"
+        "assert callable(skinwave.plan) and 'plan' in names\n"
+        "assert 'scene' in skinwave.plan.__annotations__"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_the_version_is_what_is_installed(capsys):
+    from importlib.metadata import version
+
+    import skinwave
+    from skinwave.commands.cli import main
+
+    assert skinwave.__version__ == version("skinwave")
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"skinwave {version('skinwave')}\n"
+
+
+def test_sources_that_are_not_installed_have_a_version_too():
+    code = (
+        "import importlib.metadata as m\n"
+        "def none(name): raise m.PackageNotFoundError(name)\n"
+        "m.version = none\n"
+        "import skinwave\n"
+        "assert skinwave.__version__ == 'unknown'"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_dependencies_have_lower_bounds_only():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = [d for group in project["optional-dependencies"].values() for d in group]
+    for dependency in project["dependencies"] + extras:
+        requirement = dependency.split(";")[0]
+        assert ">=" in requirement
+        assert not set("<,~") & set(requirement), dependency
+        assert "==" not in requirement
+
+
+def test_the_packages_are_named_and_typed():
+    build = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["hatch"]["build"]
+    packages = build["targets"]["wheel"]["packages"]
+    assert packages == sorted(ROOMS)
+    assert all((ROOT / package / "py.typed").exists() for package in packages)

@@ -1,0 +1,264 @@
+"""Pages show what a user or a file has written, and run none of it."""
+
+import ast
+import json
+import re
+from contextlib import contextmanager
+from dataclasses import replace
+from html import unescape
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomli_w
+from in_browser import needs_browser, settled
+
+import skinwave
+from simple_model import Effort, Response
+from skinwave.commands.cli import main
+from skinwave.scene.file import loads
+from skinwave.studies import mechanisms, relax_page, tradeoff
+from skinwave.studies.assumptions import ASSUMPTIONS
+from skinwave.studies.relax import Hierarchy, HierarchyStep
+from skinwave.studies.tradeoff import Candidate, Measured, Study
+from skinwave.system import document
+from skinwave.system.document import Markup
+from skinwave.verify import page as verify_page
+from skinwave.verify.case import Case, Check, Entry, Result
+
+FIRST_ASSUMPTION = next(iter(ASSUMPTIONS))
+# Begins as HTML of a cell did, and leaves an attribute, a title, an element of text and a frame.
+HOSTILE = (
+    "<b>'\"></title></pre></script></iframe><script>top.ran=1</script>"
+    "<img src=x onerror=top.ran=1><svg onload=top.ran=1>$title{}"
+)
+RAN = "() => window.ran || document.querySelectorAll('body script, [onerror], [onload]').length"
+
+
+def table(**sections):
+    """A scene of a tenth of a second of work, its name hostile."""
+    point = {"am_frequency_hz": 140, "duration_s": 0.05} | sections.pop("tacton", {})
+    rest = {"probes": {"points_mm": [[0, 0], [5, 0]]}} | sections
+    return tomli_w.dumps({"name": HOSTILE, "tacton": point} | rest)
+
+
+def response(model="point-kernel", **fields):
+    times = np.arange(500) / 1e4
+    motion = np.sin(2 * np.pi * 140 * times)[:, None] * (
+        [1.0, 0.5] if model == "point-kernel" else [0.5, 1.0]
+    )
+    probes = np.array([[0, 0], [5e-3, 0]])
+    return Response(model=model, times=times, probes=probes, values=motion, **fields)
+
+
+def relaxed(folder):
+    steps = [HierarchyStep(name="a", dropped=(), model=HOSTILE, response=response())]
+    steps += [
+        HierarchyStep(
+            name=FIRST_ASSUMPTION,
+            dropped=(FIRST_ASSUMPTION,),
+            model="m",
+            response=response("other"),
+        )
+    ]
+    failed = HierarchyStep(name="f", dropped=(), model="m", error=HOSTILE)
+    scene = loads(table())
+    found = Hierarchy(scene=scene, steps=(*steps, failed), side_steps=(), leave_one_out=())
+    relax_page.write(folder, found)
+
+
+def traded(folder):
+    measured = Measured(
+        candidate=Candidate(model=HOSTILE), errors=(0.1,), line_errors={HOSTILE: 0.1}, delay=0.0,
+        cold=1.0, warm=0.1, memory=1, dofs=1,
+    )  # fmt: skip
+    known = replace(measured, candidate=Candidate(model="fem"))
+    found = Study(
+        measured=(measured, known), reference=Candidate(model="fem"), self_convergence=0.001
+    )
+    tradeoff.write(folder, loads(table()), found)
+
+
+def verified(folder):
+    check = Check(what=HOSTILE, value=1.0, reference=1.0, error=0.0, bar=0.1, unit=HOSTILE)
+    case = Case(title=HOSTILE, source=HOSTILE, mesh=HOSTILE, checks=(check,), note=HOSTILE,
+                said=HOSTILE)  # fmt: skip
+    entry = Entry(name=HOSTILE, topic=HOSTILE, run=lambda: case)
+    shown = verify_page.page([Result(entry=entry, case=case, seconds=1.0)], [entry], 0)
+    (folder / "index.html").write_text(shown, encoding="utf-8")
+
+
+def mechanised(folder):
+    line = mechanisms.MechanismLine(
+        tacton=HOSTILE, body=HOSTILE, mechanism=HOSTILE, line=HOSTILE, frequency=1.0, amplitude=1e-6
+    )
+    found = mechanisms.Findings(lines=(line,), ratios=(), failed=(HOSTILE,))
+    mechanisms.write(folder, found)
+
+
+def ran(folder):
+    (folder / "scene.toml").write_text(table(body={"kind": "none"}), encoding="utf-8")
+    out = ["--out", str(folder / "out"), "--quiet"]
+    assert main(["run", str(folder / "scene.toml"), *out]) == 0
+
+
+def reported(folder):
+    """Report of a folder of results that someone else has made."""
+    ran(folder)
+    result = folder / "out"
+    row = {"what": HOSTILE, "value": HOSTILE, "reason": HOSTILE}
+    plan = {"rows": [row], "tolerance": 0.05, "warnings": [HOSTILE]}
+    check = {"title": HOSTILE, "value": 1.0, "reference": 1.0, "error": 0.0, "bar": 1.0}
+    trust = {"command": HOSTILE, "model": HOSTILE, "misfit": 0.1}
+    trust["cases"] = [check | {"passed": True, "source": HOSTILE}]
+    effort = json.loads((result / "effort.json").read_text())
+    effort |= {"warnings": [HOSTILE], "solver": HOSTILE, "versions": {HOSTILE: HOSTILE}}
+    for name, content in (("plan", plan), ("trust", trust), ("effort", effort)):
+        (result / f"{name}.json").write_text(json.dumps(content))
+    out = ["--out", str(folder / "report"), "--quiet"]
+    assert main(["report", str(result), *out]) == 0
+
+
+def compared(folder):
+    body = {"size_x_mm": 30, "size_y_mm": 30, "thickness_mm": 6, "sides": "clamped"}
+    (folder / "scene.toml").write_text(table(body=body), encoding="utf-8")
+    out = ["--out", str(folder / "out"), "--quiet"]
+    assert main(["compare", str(folder / "scene.toml"), "--h", "6", *out]) == 0
+
+
+WRITERS = (relaxed, traded, verified, mechanised, ran, reported, compared)
+
+
+@contextmanager
+def opened(browser, path, obeyed=False):
+    """A page and what its console said; without its policy if the page is to be `obeyed`. It is
+    closed in the end: the pictures of reports move as long as they are open.
+    """
+    context = browser.new_context(bypass_csp=obeyed)
+    tab, said = context.new_page(), []
+    tab.on("console", lambda message: said.append(message.text))
+    tab.on("pageerror", lambda error: said.append(str(error)))
+    tab.set_default_timeout(120_000)
+    tab.goto(f"file://{path}")
+    settled(tab)
+    yield tab, said
+    context.close()
+
+
+class Tags(HTMLParser):
+    """What elements a page has, and its text."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.found, self.text = set(), ""
+        self.feed(page)
+
+    def handle_starttag(self, tag, attrs):
+        self.found |= {tag, *(name for name, _ in attrs if name.startswith("on"))}
+
+    def handle_data(self, data):
+        self.text += data
+
+
+@pytest.mark.parametrize("write", WRITERS[:5], ids=lambda write: write.__name__)
+def test_a_text_that_looks_like_markup_is_text(tmp_path, write):
+    write(tmp_path)
+    for path in tmp_path.rglob("index.html"):
+        page = Tags(path.read_text(encoding="utf-8"))
+        assert not page.found & {"b", "script", "svg", "onerror", "onload"}
+        assert HOSTILE in page.text
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("write", WRITERS, ids=lambda write: write.__name__)
+@needs_browser
+def test_a_script_in_any_text_is_shown_and_never_runs(browser, tmp_path, write):
+    write(tmp_path)
+    pages = sorted(tmp_path.rglob("index.html"))
+    assert pages
+    for path in pages:
+        for obeyed in (False, True):  # escaped, whatever the policy would stop
+            with opened(browser, path, obeyed) as (tab, said):
+                assert said == []
+                assert tab.evaluate(RAN) == 0
+                assert HOSTILE[:40] in tab.inner_text("body")
+                policy = tab.evaluate("document.querySelector('meta[http-equiv]').content")
+                assert policy == document.POLICY
+
+
+@pytest.mark.slow
+@needs_browser
+def test_the_policy_stops_what_is_not_escaped(browser, tmp_path):
+    """The second line of defence, by itself."""
+    page = document.page("t", Markup(f"<p>{HOSTILE}</p>"), document.inner_page("<p>inner", "c"))
+    (tmp_path / "index.html").write_text(page, encoding="utf-8")
+    with opened(browser, tmp_path / "index.html") as (tab, said):
+        assert not tab.evaluate("window.ran")
+        assert any("Content Security Policy" in text for text in said)
+    with opened(browser, tmp_path / "index.html", obeyed=True) as (tab, _):
+        assert tab.evaluate("window.ran")  # it would run otherwise
+
+
+@pytest.mark.slow
+@needs_browser
+def test_a_page_within_a_page_runs_its_own_scripts_only(browser, tmp_path):
+    inner = (
+        "<body><script>document.body.append('drawn');\nlet a = '<é>';</script><script>"
+        "try { top.ran = 1 } catch { document.body.append(' alone') }</script>"
+    )
+    page = document.page("t", document.inner_page(inner, HOSTILE), document.paragraph(HOSTILE))
+    (tmp_path / "index.html").write_text(page, encoding="utf-8")
+    with opened(browser, tmp_path / "index.html") as (tab, said):
+        assert said == []
+        assert tab.frames[1].inner_text("body") == "drawn alone"
+        assert tab.evaluate(RAN) == 0
+    changed = page.replace("drawn", "changed")
+    (tmp_path / "changed.html").write_text(changed, encoding="utf-8")
+    with opened(browser, tmp_path / "changed.html") as (tab, said):
+        assert tab.frames[1].inner_text("body").strip() == "alone"
+        assert len(said) == 1
+
+
+def test_only_html_made_here_is_taken_as_it_is():
+    cells = ["<b>1</b>", Markup("<b>2</b>"), Markup("<i>{}</i>").format("<b>"), "-1e+3"]
+    made = document.table([], [cells])
+    assert "<td>&lt;b&gt;1&lt;/b&gt;</td><td><b>2</b></td><td><i>&lt;b&gt;</i></td>" in made
+    assert '<td class="number">-1e+3</td>' in made
+    assert "&lt;p&gt;<b>" in document.page("", "<p>" + Markup("<b>"))
+    for made in (
+        document.page("<t>", "<p>"), document.section("<t>", "<p>"), document.paragraph("<p><t>"),
+        document.table(["<t>"], [["<p>", "< -120"]]),
+        document.picture(b"", "<p>\"'", '<t>"'), document.inner_page("<p>", "<t>"),
+        document.preformatted("<p><t>"),
+        document.warnings_banner([("<t>", Effort(warnings=("<p>",)))]),
+    ):  # fmt: skip
+        assert not re.search(r"<[pt]>[^<]*(?!</p>)<[pt]>|<t>|<p>\"", made)
+        assert "&lt;p&gt;" in made
+        assert "&lt;t&gt;" in made
+
+
+def test_every_page_has_its_policy(tmp_path):
+    verified(tmp_path)
+    page = (tmp_path / "index.html").read_text()
+    assert page.index("Content-Security-Policy") < page.index("<title>")
+    assert "default-src 'none'" in unescape(page)
+    assert "script-src" not in page
+    for path in Path(skinwave.__file__).parent.rglob("*.py"):  # pages come from a template alone
+        assert "<!doctype" not in path.read_text(encoding="utf-8").lower(), path
+
+
+def called(call):
+    """The last name of what a call calls."""
+    return getattr(call.func, "attr", getattr(call.func, "id", ""))
+
+
+def test_markup_is_made_of_literals_alone():
+    made = 0
+    for path in Path(skinwave.__file__).parent.rglob("*.py"):
+        text = path.read_text(encoding="utf-8")
+        for call in ast.walk(ast.parse(text)) if "Markup" in text else ():
+            if isinstance(call, ast.Call) and called(call) == "Markup":
+                made += 1
+                assert all(isinstance(each, ast.Constant) for each in call.args), path
+    assert made > 5

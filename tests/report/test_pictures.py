@@ -1,0 +1,510 @@
+"""Pictures: that they show what their captions say."""
+
+import gc
+import json
+import re
+import shutil
+import subprocess
+import wave
+from dataclasses import replace
+from hashlib import sha256
+from importlib.util import find_spec
+from io import BytesIO
+from itertools import combinations, pairwise
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from in_browser import needs_browser, settled
+from legible import illegible, sizes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from PIL import Image
+
+from fem import PRESETS
+from simple_model import MovingPressure, Tacton, Trajectory, published
+from simple_model.flat_body import steady_lines
+from simple_model.tacton import pattern_period
+from skinwave.bodies.analytic import compliance
+from skinwave.commands.cli import main
+from skinwave.models import speeds
+from skinwave.report import films, maps, render
+from skinwave.report.figures import tacton_figure
+from skinwave.report.levels import levels_figure
+from skinwave.report.renderer import Renderer, renderer
+from skinwave.report.styles import style
+from skinwave.results import exports, motion, views
+from skinwave.scene.file import dumps
+from skinwave.scene.scene import Body, Scene
+from skinwave.studies import album, gallery
+
+ONLY = "point-kernel-published,point-kernel,skin-slab"
+ARTEFACTS = Path(__file__).parents[2] / ".ci" / "artefacts"
+draws = pytest.mark.skipif("not renderer().found", reason="nothing draws in three dimensions here")
+
+
+def circling(frequency=200.0, **tacton):
+    path = Trajectory(shape="circle", size=12 / np.pi / frequency, speed=12.0)
+    return MovingPressure(tacton=Tacton(trajectory=path, duration=0.05, **tacton))
+
+
+@pytest.fixture(scope="module")
+def scene():
+    """Periodic: AM at 100 Hz on a circle that is drawn 200 times a second."""
+    probes = ((0.0, 0.0), (0.005, 0.0), (0.01, 0.0))
+    return Scene(name="small", pressure=circling(am_frequency=100), body=Body(), probes=probes)
+
+
+@pytest.fixture(scope="module")
+def moved(scene):
+    return motion.waves(scene, h=0.012)
+
+
+@pytest.fixture(scope="module")
+def folder(scene, tmp_path_factory):
+    """Folder that the report of a scene is built from, on coarse meshes."""
+    out = tmp_path_factory.mktemp("album")
+    asked = {"h": 0.015, "frames": 12, "beside": ["paper-sheet-loose"], "command": "as tested"}
+    album.make(out, scene, lambda phase, done: None, **asked)
+    return out
+
+
+@pytest.fixture(scope="module")
+def seen(folder):
+    return album.open_album(folder).views
+
+
+@pytest.fixture(scope="module")
+def page(folder, tmp_path_factory):
+    """The report's folder, from the command line, of both kernels and one body."""
+    out = tmp_path_factory.mktemp("page") / "report"
+    kinds = ["--format", "svg", "--format", "pdf", "--only", ONLY]
+    assert main(["report", str(folder), "--out", str(out), *kinds, "--quiet"]) == 0
+    return out
+
+
+def test_models_stand_side_by_side_with_the_scenes_own_body(scene, seen):
+    assert list(seen) == ["point-kernel", "paper-sheet-loose", "skin-slab"]
+    assert seen["skin-slab"].scene == scene
+    assert {view.unit for view in seen.values()} == {"Pa", "m"}
+
+
+def test_all_but_the_published_kernel_receive_the_same_load(scene, folder):
+    loads = {run.column: run.scene.pressure for run in album.open_album(folder).runs}
+    assert list(loads) == [
+        "point-kernel-published", "point-kernel", "paper-sheet-loose", "skin-slab",
+    ]  # fmt: skip
+    assert loads.pop("point-kernel-published") == published(scene.pressure) != scene.pressure
+    assert set(loads.values()) == {scene.pressure}
+
+
+@pytest.mark.parametrize("drive", ["linear", "pressure_squared"])
+def test_a_body_of_ones_own_is_shown_alone_and_changes_no_load(scene, drive):
+    own = replace(scene.pressure, drive=drive, profile="array")
+    shown = album.shown_scenes(replace(scene, pressure=own, body=Body(depth=0.02)))
+    assert list(shown) == ["point-kernel-published", "point-kernel", "slab"]
+    assert shown["point-kernel"].pressure == shown["slab"].pressure == own
+    bare = album.shown_scenes(replace(scene, pressure=own, body=Body(kind="none")))
+    assert list(bare)[2:] == ["paper-sheet", "skin-slab"]
+    assert {its.pressure for its in list(bare.values())[1:]} == {own}
+    asked = album.shown_scenes(scene, ["paper-sheet-loose", "skin-slab"])
+    assert list(asked)[2:] == ["skin-slab", "paper-sheet-loose"]
+    with pytest.raises(ValueError, match="body 'paper' is unknown"):
+        album.shown_scenes(scene, ["paper"])
+
+
+def test_a_folder_of_an_older_release_names_its_kernel_by_its_load(folder, tmp_path):
+    """Up to 0.2 the folder `none` held the published kernel, by the name of the scene's own."""
+    shutil.copytree(folder / "skin-slab", tmp_path / "skin-slab")
+    shutil.copytree(folder / "point-kernel", tmp_path / "none")
+    text = (folder / "point-kernel-published/scene.toml").read_text()
+    (tmp_path / "none/scene.toml").write_text(text)
+    old = album.open_album(tmp_path)
+    assert [run.column for run in old.runs] == ["point-kernel-published", "skin-slab"]
+    assert old.runs[0].response.unit == "Pa"
+    same = (folder / "point-kernel/scene.toml").read_text()
+    (tmp_path / "none/scene.toml").write_text(same)
+    assert album.open_album(tmp_path).runs[0].column == "point-kernel"
+
+
+def test_a_view_comes_back_from_its_file(seen, tmp_path):
+    views.save(tmp_path / "view.npz", seen["skin-slab"])
+    back = views.load(tmp_path / "view.npz")
+    np.testing.assert_array_equal(back.motion, seen["skin-slab"].motion)
+    assert back.scene == seen["skin-slab"].scene
+    (tmp_path / "view.npz").write_bytes(b"spoilt")
+    with pytest.raises(ValueError, match="make it anew"):
+        views.load(tmp_path / "view.npz")
+
+
+def test_a_point_moves_in_a_view_as_its_probe_does(scene, moved):
+    """Late enough for the start to be forgotten, and about the mean."""
+    view = views.body_view(scene, "skin-slab", moved, (0.01, 10))
+    response = motion.probe_response(scene, moved)
+    at_probe = maps.carrier(view, scene.probe_points[2:3])
+    drawn = np.array([at_probe(np.asarray(frame, float))[0] for frame in view.pushed])
+    sampled = response.displacement[-100:, 2].reshape(10, 10)[:, 0]
+    assert view.period == pytest.approx(0.01)
+    assert np.ptp(drawn) > 1e-7
+    np.testing.assert_allclose(drawn, sampled - response.displacement[-100:, 2].mean(), atol=3e-8)
+
+
+def test_a_constant_pressure_at_rest_makes_still_pictures():
+    still = MovingPressure(tacton=Tacton(duration=0.02))
+    scene = Scene(pressure=still, body=Body(width=0.06, height=0.06))
+    view = views.body_view(scene, "slab", motion.waves(scene, h=0.015), (0.02, 3))
+    assert not view.motion.any()
+    assert view.tone == 0
+    assert len(maps.snapshots_figure([view], style("print"), 2).axes) == 3
+
+
+def test_the_kernels_brightest_place_lies_on_the_path(seen):
+    view = seen["point-kernel"]
+    radius = view.scene.tacton.trajectory.size / 2
+    step = np.ptp(view.places[:, 0]) / (views.GRID - 1)
+    brightest = view.places[view.rms.argmax()]
+    assert abs(np.hypot(*brightest) - radius) < 1.5 * step
+    for t, frame in zip(view.times, np.abs(view.pushed), strict=True):
+        if frame.max() > 0.2 * view.peak:  # where the modulation is not at its zero
+            focus = view.scene.tacton.trajectory.position(float(t))
+            assert np.linalg.norm(view.places[frame.argmax()] - focus) < 1.5 * step
+
+
+def test_waves_spread_further_than_the_kernel(seen):
+    radii = {name: views.spread_radius(view, -20.0) for name, view in seen.items()}
+    assert radii["skin-slab"] > 1.5 * radii["point-kernel"]
+    assert radii["paper-sheet-loose"] > 1.5 * radii["point-kernel"]
+    assert all(views.spread_radius(v, -6.0) <= views.spread_radius(v, -20.0) for v in seen.values())
+
+
+def apparent_speed(distances, times, motion, frequency):
+    """Apparent phase speed in m/s of a line of motion (t, p) along distances (p,) in metre.
+
+    The phase of its part at `frequency` Hz is fitted by a straight line, weighted by amplitude;
+    the times (t,) in s should span whole periods. Negative where waves come in.
+    """
+    wave = motion.T @ np.exp(-2j * np.pi * frequency * times)
+    phase = np.unwrap(np.angle(wave))
+    slope = np.polyfit(distances, phase, 1, w=np.abs(wave))[0]
+    return float(-2 * np.pi * frequency / slope)
+
+
+@pytest.mark.slow
+def test_the_wake_of_a_fast_focus_runs_at_the_speed_of_surface_waves():
+    """Slope of the x-t diagram outside the path, Rayleigh speed, and wavenumber integral."""
+    soft = replace(PRESETS["palm"], viscosity=2.0)
+    body = Body(width=0.06, height=0.05, material=soft)
+    scene = Scene(pressure=circling(250.0), body=body, probes=((0.0, 0.0),))
+    view = views.body_view(scene, "skin-slab", motion.waves(scene, 0.3, h=0.0045), (0.02, 4))
+    outside = (view.ray.distance > 0.005) & (view.ray.distance < 0.03)
+    distance, times = view.ray.distance[outside], view.ray.times
+    found = apparent_speed(distance, times, view.ray.motion[:, outside], 250.0)
+    frequencies, lines = steady_lines(
+        compliance(body), scene.pressure, view.ray.places[outside]
+    )  # fmt: skip
+    line = lines[np.argmin(np.abs(frequencies - 250))]
+    exact = (np.exp(2j * np.pi * 250 * times)[:, None] * line).real
+    assert found == pytest.approx(body.of_kind.wave_speed(body, 250.0), rel=0.05)
+    assert found == pytest.approx(apparent_speed(distance, times, exact, 250.0), rel=0.05)
+    assert scene.tacton.trajectory.speed > 2 * found  # there is a wake
+
+
+def test_a_running_wave_has_the_speed_that_it_runs_at():
+    x, t = np.linspace(0, 0.04, 50), np.arange(100) / 100 / 50
+    running = np.cos(2 * np.pi * 150 * (t[:, None] - x / 3.3)) * np.exp(-x / 0.02)
+    assert apparent_speed(x, t, running, 150.0) == pytest.approx(3.3, rel=1e-3)
+
+
+def test_a_sheet_bends_at_the_speed_of_plates():
+    """80 g/m2 paper at 140 Hz."""
+    sheet = Body(kind="sheet", material="paper", depth=1e-4, base="free", sides="clamped")
+    assert sheet.of_kind.wave_speed(sheet, 140.0) == pytest.approx(7.7, abs=0.1)
+    skin = Body(material="forearm")
+    assert skin.of_kind.wave_speed(skin, 200.0) == pytest.approx(3.22, abs=0.03)
+
+
+def test_a_mach_angle_is_there_only_behind_a_focus_that_is_faster():
+    assert speeds.mach_angle(4.78, 12.0) == pytest.approx(np.deg2rad(23.5), abs=1e-3)
+    assert speeds.mach_angle(4.78, 4.0) is None
+
+
+def test_a_load_has_the_period_of_all_its_tones():
+    assert speeds.period(circling(am_frequency=100)) == pytest.approx(0.01)
+    assert speeds.period(circling(200.0, am_frequency=140)) == pytest.approx(0.05)
+    assert speeds.period(circling(190.986, am_frequency=140)) is None
+
+
+def test_what_is_played_returns_after_the_slowest_beat():
+    """f_d - f_AM = 51 Hz is the slowest line: the load is another one after one period of AM."""
+    beating = circling(190.986, am_frequency=140)
+    span = pattern_period(beating.tacton)
+    assert span >= 1 / 50.986
+    assert speeds.seam(beating.tacton, 1 / 140) == pytest.approx(190.986 / 140 - 1)
+    whole = circling(200.0, am_frequency=140)
+    assert speeds.shown_part(whole, 340.0) == pytest.approx((0.05, 8 * 0.05 * 340))
+    assert speeds.shown_part(whole, 340.0, 12) == (pattern_period(whole.tacton), 12)
+    assert speeds.shown_part(circling(200.0), 200.0) == pytest.approx((0.005, speeds.FEWEST))
+
+
+def test_a_pattern_too_long_to_play_is_played_in_part_and_says_so():
+    long = replace(circling(200.0, am_frequency=100.5).tacton, duration=2.0)
+    load = MovingPressure(tacton=long)
+    assert speeds.period(load) == pytest.approx(2.0)
+    span, frames = speeds.shown_part(load, 300.0)
+    assert frames == speeds.MOST
+    assert frames / (span * 300.0) >= speeds.EACH
+    said = films.seam(SimpleNamespace(scene=Scene(pressure=load, body=Body()), period=span))
+    assert "of a pattern of 2,000 ms" in said
+    assert "phases jump by up to" in said
+
+
+def test_frames_follow_the_fastest_line_that_moves_the_body(scene, moved):
+    fastest = views.fastest_line(moved)
+    view = views.body_view(scene, "skin-slab", moved)
+    assert view.period == pytest.approx(0.01)
+    assert len(view.times) == max(speeds.FEWEST, round(speeds.EACH * fastest * view.period))
+    amplitude = np.abs(np.fft.rfft(view.pushed, axis=0)).max(axis=1)
+    strong = np.flatnonzero(amplitude > 0.1 * amplitude.max()) / view.period
+    assert strong.max() <= 1.5 * fastest <= 1.5 * 800
+
+
+@draws
+def test_a_signed_field_shows_both_signs(seen):
+    view = seen["skin-slab"]
+    frame = int(np.abs(view.pushed).max(axis=1).argmax())
+    image = render.picture([view], style("report"), frame, camera="top").astype(int)
+    inside = image[80:-60, 60:420]
+    red, _, blue = np.moveaxis(inside, -1, 0)
+    assert (red - blue > 40).sum() > 200  # pushed in
+    assert (blue - red > 15).sum() > 200  # coming out
+    assert np.ptp(image) > 200
+
+
+@draws
+def test_motion_is_drawn_as_many_times_as_the_caption_says(seen):
+    view = seen["paper-sheet-loose"]
+    panel = render.prepared(view)
+    render.place([panel], 5, 1.0)
+    drawn = np.asarray(panel.skin.points) - 1e3 * view.points[panel.nodes]
+    moved = 1e3 * view.motion[5, panel.nodes]
+    factor = float((drawn * moved).sum() / (moved**2).sum())
+    said = re.search(r"drawn ([\d,]+) times", render.shown_scale(view))
+    assert said
+    assert factor == pytest.approx(float(said[1].replace(",", "")), rel=1e-3)
+    assert 0.015 < factor * view.peak / 0.1 <= render.SHOWN
+    assert render.shown_scale(seen["point-kernel"]) == "pressure; nothing moves"
+
+
+@draws
+def test_every_frame_of_a_film_differs_and_the_last_leads_to_the_first(seen, tmp_path):
+    films.film(tmp_path / "film.gif", [seen["skin-slab"]], style("report"), panel=(160, 144))
+    with Image.open(tmp_path / "film.gif") as film:
+        assert film.n_frames == 12
+        frames = []
+        for k in range(film.n_frames):
+            film.seek(k)
+            whole = np.asarray(film.convert("RGB"), int)
+            frames.append(whole[20:-15])  # without titles and the time stamp
+    assert len({sha256(frame.tobytes()).hexdigest() for frame in frames}) == 12
+    steps = [np.abs(a - b).mean() for a, b in zip(frames, frames[1:] + frames[:1], strict=True)]
+    assert steps[-1] < 1.5 * max(steps[:-1])
+
+
+@draws
+@pytest.mark.skipif(not all(map(find_spec, films.ENCODER)), reason="the extra [film] is missing")
+@pytest.mark.filterwarnings(  # imageio-ffmpeg leaves its encoder's pipe to the collector
+    "ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
+)
+def test_a_film_may_be_an_mp4(seen, tmp_path):
+    import imageio.v2 as imageio
+
+    path = tmp_path / "film.mp4"
+    films.film(path, [seen["skin-slab"]], style("report"), panel=(160, 144))
+    with imageio.get_reader(path) as film:
+        frames = [np.asarray(frame, int) for frame in film]
+        assert film.get_meta_data()["fps"] == pytest.approx(12 / films.LASTS)
+    assert len(frames) == 12
+    assert min(np.abs(a - b).max() for a, b in pairwise(frames)) > 60
+    gc.collect()
+
+
+def test_a_film_that_cannot_be_written_is_refused_at_once(tmp_path, monkeypatch):
+    with pytest.raises(ValueError, match="ends in none of"):
+        films.check_format(tmp_path / "film.avi")
+    monkeypatch.setattr(films, "find_spec", lambda name: None)
+    with pytest.raises(ValueError, match="MP4 needs imageio"):
+        films.check_format(tmp_path / "film.mp4")
+
+
+def test_tables_have_units_and_places_in_their_headers(page):
+    rows = (page / "data/skin-slab_probes.csv").read_text().splitlines()
+    assert rows[0].startswith('t [s],"displacement(0,0) [m]"')
+    values = np.loadtxt(rows[1:], delimiter=",")
+    kept = np.load(page / "data/skin-slab_probes.npz")
+    np.testing.assert_allclose(values[:, 1:], kept["displacement"], rtol=1e-7, atol=1e-18)
+    assert '"pressure(0,0) [Pa]"' in (page / "data/point-kernel_probes.csv").read_text()
+
+
+def test_a_sound_has_the_scale_in_its_name(seen, page):
+    (path,) = (page / "data").glob("*.wav")
+    scale = float(re.search(r"full_scale_([\d.e-]+)_um", path.name)[1])
+    with wave.open(str(path)) as sound:
+        assert sound.getframerate() == 10_000
+        samples = np.frombuffer(sound.readframes(sound.getnframes()), np.int16)
+    motion = np.load(page / "data/skin-slab_probes.npz")["displacement"]
+    probe = np.abs(motion - motion.mean(axis=0)).max(axis=0).argmax()
+    expected = 1e6 * (motion[:, probe] - motion[:, probe].mean())
+    np.testing.assert_allclose(samples / exports.FULL_SCALE * scale, expected, atol=1e-3 * scale)
+
+
+def test_fields_are_opened_again_with_their_times(seen, page):
+    pv = pytest.importorskip("pyvista")
+    reader = pv.get_reader(str(page / "data/skin-slab.pvd"))
+    assert len(reader.time_values) == views.FIELD_FRAMES
+    reader.set_active_time_point(3)
+    (grid,) = reader.read()
+    view = seen["skin-slab"]
+    frame = int(np.argmin(np.abs(view.times - reader.time_values[3])))
+    np.testing.assert_array_equal(grid["displacement_m"], view.motion[frame])
+    np.testing.assert_allclose(grid.points, view.points)
+    for name, values in (("strain", view.tensors.strain), ("stress_pa", view.tensors.stress)):
+        xy, yz, xz = grid[name].T[3:]  # in ParaView's order
+        np.testing.assert_array_equal([xy, xz, yz], values[3].T[3:])
+    assert list(grid.field_data["units"]) == ["displacement_m: m", "strain: 1", "stress_pa: Pa"]
+
+
+FIGURES = ("rms", "difference", "snapshots", "waves", "waveforms-0", "sensation-1")
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_text_of_vector_figures_is_text(page, name):
+    assert (page / f"pictures/{name}.png").stat().st_size > 10_000
+    svg = (page / f"pictures/{name}.svg").read_text()
+    assert "skin slab" in re.sub("<[^>]+>", " ", svg)
+    assert svg.count("<text") > 10
+    assert 'id="DejaVu' not in svg  # no glyph as a path
+    pdf = page / f"pictures/{name}.pdf"
+    assert b"/Type3" not in pdf.read_bytes()
+    assert b"/FontFile2" in pdf.read_bytes()  # TrueType
+    if shutil.which("pdffonts"):
+        told = subprocess.run(["pdffonts", str(pdf)], capture_output=True, text=True, check=True)
+        assert "TrueType" in told.stdout
+        assert "Type 3" not in told.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("dressed", ["talk", "print", "narrow"])
+def test_no_text_of_a_figure_is_cut(folder, dressed):
+    kept = album.open_album(folder)
+    chosen = style("report", 3.5) if dressed == "narrow" else style(dressed)
+    shown, runs = list(kept.views.values()), gallery.tactons(kept)["small"]
+    figures = [draw() for _, draw, _ in gallery.flat(shown, chosen)]
+    figures += [tacton_figure("small", runs, chosen), levels_figure(runs, 0, chosen)]
+    for figure in figures:
+        canvas = FigureCanvasAgg(figure)
+        figure.draw_without_rendering()
+        drawn = figure.get_tightbbox(canvas.get_renderer())  # inch
+        assert illegible(figure) == []
+        assert min(drawn.x0, drawn.y0) > -0.02
+        assert drawn.x1 < figure.get_figwidth() + 0.02
+        assert drawn.y1 < figure.get_figheight() + 0.02
+        titles = [ax.title for ax in figure.axes if ax.get_title()]
+        boxes = [title.get_window_extent(canvas.get_renderer()) for title in titles]
+        assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
+        if chosen.columns:
+            assert figure.get_figwidth() in chosen.columns
+            assert sizes(figure) == {8.0}
+
+
+def test_the_page_says_everything_and_stands_alone(page):
+    text = (page / "index.html").read_text()
+    for heading in ("What was asked", "What was modelled", "What comes out", "Effort",
+                    "How far to trust it", "Do it again"):  # fmt: skip
+        assert f"<h2>{heading}" in text
+    outside = text.split("<iframe")[0] + text.split("</iframe>")[-1]
+    for address in ('src="http', 'href="http', "url(http", "<script"):
+        assert address not in outside
+    assert "as tested" in text
+    assert "differ by" in text  # the energy balance
+    assert len(text) < 8e6
+    assert "@page { size: A4" in text
+
+
+@needs_browser
+def test_the_page_opens_in_a_browser_without_a_network(page, browser):
+    said, asked = [], []
+    tab = browser.new_page(viewport={"width": 1200, "height": 900})
+    tab.on("console", lambda m: said.append(m.text) if m.type == "error" else None)
+    tab.on("pageerror", lambda error: said.append(str(error)))
+    tab.route(re.compile("^(https?|wss?)://"), lambda r: (asked.append(r.request.url), r.abort()))
+    tab.set_default_timeout(120_000)
+    tab.goto(f"file://{page / 'index.html'}")
+    settled(tab)
+    for frame in tab.frames[1:]:
+        frame.wait_for_function("() => document.querySelector('canvas')")
+    broken = tab.evaluate("[...document.images].filter(i => !i.naturalWidth).length")
+    ARTEFACTS.mkdir(parents=True, exist_ok=True)
+    tab.screenshot(path=ARTEFACTS / "report.png", full_page=True)
+    tab.close()
+    assert broken == 0
+    assert [text for text in said if "favicon" not in text and "ERR_FAILED" not in text] == []
+    assert all("favicon" in url for url in asked), asked
+
+
+NO_GL = Renderer(found=False, said="missing; apt install libegl1 libgl1-mesa-dri")
+
+
+def test_a_report_is_rebuilt_without_a_model_and_without_gl(folder, tmp_path, monkeypatch):
+    def run(*arguments, **options):
+        raise AssertionError("a model was run")
+
+    for name in ("waves", "plan", "compute", "follow", "required_plan", "kernel_view", "suite"):
+        monkeypatch.setattr(album, name, run)
+    monkeypatch.setattr(gallery, "renderer", lambda: NO_GL)
+    blank = BytesIO()  # what is on the figures is looked at in those of `page`
+    Image.new("RGB", (8, 8)).save(blank, "PNG")
+    monkeypatch.setattr(gallery, "drawn", lambda *figure: blank.getvalue())
+    assert main(["report", str(folder), "--out", str(tmp_path / "flat"), "--quiet"]) == 0
+    text = (tmp_path / "flat/index.html").read_text()
+    assert "apt install libegl1 libgl1-mesa-dri" in text
+    assert text.count("data:image/") == 8
+    assert (tmp_path / "flat/pictures/rms.png").exists()
+    assert not (tmp_path / "flat/pictures/film.gif").exists()
+
+
+def test_a_window_that_ends_its_process_is_found_out(monkeypatch, tmp_path):
+    (tmp_path / "ends.py").write_text("import os; os.abort()")
+    monkeypatch.setattr("skinwave.report.renderer.PROBE", tmp_path / "ends.py")
+    found = renderer.__wrapped__()
+    assert not found.found
+    assert "libegl1 libgl1-mesa-dri" in found.said
+
+
+def test_a_run_of_one_model_has_a_report_too(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    kernel = Scene(name="kernel", pressure=circling(am_frequency=100), body=Body(kind="none"))
+    Path("kernel.toml").write_text(dumps(kernel))
+    assert main(["run", "kernel.toml", "--out", "one", "--quiet"]) == 0
+    assert main(["report", "one"]) == 0
+    assert "open one/report/index.html" in capsys.readouterr().out
+    text = Path("one/report/index.html").read_text()
+    assert "skinwave report SCENE computes it" in text
+    assert main(["report", "one", "--quiet"]) == 0  # its own folder is made anew
+    assert main(["report", "one/report/pictures"]) == 2
+    assert "holds no responses.npz" in capsys.readouterr().err
+    assert main(["film", "one"]) == 2
+    assert "keeps no motion of whole bodies" in capsys.readouterr().err
+
+
+def test_the_doctor_names_what_there_is_and_what_is_missing(capsys):
+    assert main(["doctor", "--json"]) == 0
+    found = {row["what"]: row for row in json.loads(capsys.readouterr().out)}
+    assert {"python", "pyvista", "solver", "renderer", "threads"} <= set(found)
+    assert bool(found["renderer"]["cure"]) != renderer().found
+    assert main(["doctor"]) == 0
+    assert "superlu" in capsys.readouterr().out
+
+
+def test_an_unknown_style_is_refused():
+    with pytest.raises(ValueError, match="did you mean 'report'"):
+        style("reports")

@@ -1,0 +1,594 @@
+"""Records draw and convert themselves: responses, meshes, fields, scenes, plans, sweeps."""
+
+import ast
+import inspect
+import re
+import sys
+import tomllib
+from dataclasses import replace
+from importlib import import_module
+from importlib.util import find_spec
+from itertools import pairwise
+from pathlib import Path
+from types import SimpleNamespace
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from legible import illegible, sizes, texts
+
+import meshes
+import skinwave
+from simple_model import Effort, Response, phasors
+from simple_model.focus import spot_width
+from simple_model.numbers import stated_error
+from skinwave.commands.cli import main
+from skinwave.models import BUILT_IN, named
+from skinwave.planning.budget import error_budget
+from skinwave.planning.records import PlanRow
+from skinwave.report import films, scene_plot, window
+from skinwave.report.fields import Field
+from skinwave.report.styles import style
+from skinwave.results import citations
+from skinwave.studies.album import Album
+from skinwave.studies.chosen import only
+from skinwave.sweeps import sweep_figures
+from skinwave.sweeps.in_python import SweepTable
+
+# What is tested here is not how accurate a model is.
+pytestmark = pytest.mark.filterwarnings("ignore::skinwave.SkinwaveWarning")
+ROOT = Path(__file__).parents[2]
+RATE = 10_000.0
+SCENE = """
+name = "disc <b>"
+[tacton]
+am_frequency_hz = 100
+duration_s = 0.1
+shape = "circle"
+size_mm = 20
+speed_m_per_s = 4
+[body]
+kind = "slab"
+[probes]
+points_mm = [[0, 0], [10, 0], [25, 5]]
+"""
+PLACES = np.array([[0.0, 0.0], [0.1 / 3, -0.02]])
+
+
+@pytest.fixture(autouse=True)
+def closed_figures():
+    mpl.use("Agg")
+    yield
+    import matplotlib.pyplot as plt
+
+    plt.close("all")
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return skinwave.loads(SCENE)
+
+
+def replace_duration(scene, duration):
+    tacton = replace(scene.tacton, duration=duration)
+    return replace(scene, pressure=replace(scene.pressure, tacton=tacton))
+
+
+def wave(frequency=130.0, quantity="displacement", n=1000, warnings=("too <coarse>",)):
+    """a sin w t at one probe, half of it at another."""
+    times = np.arange(n) / RATE
+    x = 3e-6 * np.sin(2 * np.pi * frequency * times)
+    return Response(
+        model="made", times=times, probes=PLACES, values=np.column_stack([x, x / 2]),
+        quantity=quantity, effort=Effort(warnings=warnings), expected_error=0.03,
+    )  # fmt: skip
+
+
+def same(one, other):
+    for name in ("times", "probes", "values"):
+        assert np.array_equal(getattr(one, name), getattr(other, name)), name
+    assert (one.model, one.quantity, one.unit) == (other.model, other.quantity, other.unit)
+    assert one.expected_error == other.expected_error
+    assert one.effort.warnings == other.effort.warnings
+
+
+def test_an_array_of_xarray_has_all_of_a_response():
+    array = wave().to_xarray()
+    assert array.dims == ("time", "probe")
+    assert [array[name].attrs["units"] for name in ("time", "x", "y")] == ["s", "m", "m"]
+    assert array.attrs["units"] == "m"
+    same(Response.from_xarray(array.transpose("probe", "time")), wave())
+    assert float(array.sel(time=0.01, method="nearest")[0]) == wave().values[100, 0]
+    array.values[:] = 0  # its own copy
+    assert wave().values.any()
+
+
+def test_a_table_of_pandas_has_all_of_a_response():
+    table = wave(quantity="strain_xz").to_pandas()
+    assert table.index.name == "time_s"
+    assert table.columns.names == ["x_m", "y_m"]
+    assert table.attrs["units"] == "1"
+    same(Response.from_pandas(table), wave(quantity="strain_xz"))
+
+
+def test_other_units_and_shapes_are_refused():
+    array = wave().to_xarray()
+    array.attrs["units"] = "mm"
+    with pytest.raises(ValueError, match="values are in mm, not m; convert"):
+        Response.from_xarray(array)
+    with pytest.raises(ValueError, match="give time and probe"):
+        Response.from_xarray(array[0])
+    with pytest.raises(ValueError, match="give time_s"):
+        Response.from_pandas(wave().to_pandas().reset_index(drop=True))
+
+
+@pytest.mark.parametrize("name", ["xarray", "pandas"])
+def test_a_library_that_is_missing_is_named_with_its_cure(name, monkeypatch):
+    monkeypatch.setitem(sys.modules, name, None)
+    with pytest.raises(ImportError, match=f"{name} is not installed; pip install {name}"):
+        getattr(wave(), f"to_{name}")()
+
+
+def test_rates_of_a_sinusoid_are_those_of_the_closed_form():
+    f, inner = 900.0, slice(20, -20)
+    found, turn = wave(f), 2 * np.pi * f
+    velocity = turn * 3e-6 * np.cos(turn * found.times)
+    error = np.abs(found.velocity[:, 0] - velocity)
+    assert error[inner].max() < 1e-8 * velocity.max()
+    assert error.max() < 1e-3 * velocity.max()
+    acceleration = -turn * 3e-6 * turn * np.sin(turn * found.times)
+    error = np.abs(found.acceleration[:, 0] - acceleration)[inner].max()
+    assert error < 1e-7 * acceleration.max()
+    again = wave(f, "velocity")
+    assert np.array_equal(again.velocity, again.values)
+    assert np.array_equal(wave(f, "strain_xx").strain, again.values)
+
+
+def test_what_does_not_follow_from_a_response_is_refused():
+    with pytest.raises(ValueError, match='quantity = "strain_xx"'):
+        _ = wave().strain
+    with pytest.raises(ValueError, match=r"no velocity into the body follows.*\"velocity\""):
+        _ = wave(quantity="acceleration").velocity
+    with pytest.raises(ValueError, match="no acceleration"):
+        _ = wave(quantity="pressure").acceleration
+    with pytest.raises(ValueError, match="too few to differentiate"):
+        _ = wave(n=9).velocity
+    with pytest.raises(ValueError, match=r"load of this response is unknown.*phasors"):
+        _ = wave().lines
+
+
+def test_lines_are_complex_and_have_the_names_of_the_load(scene):
+    still = replace(scene.tacton, trajectory=type(scene.tacton.trajectory)())
+    rest = replace(scene, pressure=replace(scene.pressure, tacton=still))
+    found = skinwave.simulate(rest, "point-kernel", 0.999)
+    lines = found.lines
+    assert lines.names == ("f_AM", "2f_AM")
+    # p0 sin^2 = p0 (1 - cos 2 w t) / 2, over whole periods: a sum without any window.
+    t, x = found.times, found.values
+    by_sum = 2 * np.exp(-2j * np.pi * 200 * t) @ x / len(t)
+    assert lines["2f_AM"] == pytest.approx(by_sum, rel=1e-6)
+    assert np.array_equal(lines.amplitudes, phasors(found, lines.frequencies))
+    with pytest.raises(ValueError, match="line 'f_D' is unknown"):
+        lines["f_D"]
+
+
+def test_curves_have_the_values_and_axes_their_units():
+    found = wave()
+    ax = found.plot()
+    assert len(ax.lines) == 2
+    assert ax.lines[1].get_xdata() * 1e-3 == pytest.approx(found.times)
+    assert ax.lines[1].get_ydata() * 1e-6 == pytest.approx(found.values[:, 1])
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("time, ms", "displacement into the body, µm")
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["(0, 0)", "(33.33, -20)"]
+    assert len(found.plot([1]).lines) == 1
+    spectrum = found.spectrum()
+    ax = spectrum.plot()
+    assert ax.lines[0].get_xdata()[np.argmax(ax.lines[0].get_ydata())] == 130
+    assert ax.lines[0].get_ydata().max() == pytest.approx(3)
+    assert ax.get_ylabel() == "amplitude, µm"
+    assert wave(quantity="strain_xx").plot().get_ylabel() == "strain xx, µm/m"
+
+
+def test_a_plot_goes_where_it_is_asked_to():
+    import matplotlib.pyplot as plt
+
+    _, axes = plt.subplots(1, 2)
+    assert wave().plot(ax=axes[1]) is axes[1]
+    assert not axes[0].lines
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_mesh_of_pyvista_is_the_same(order):
+    mesh = meshes.block((2e-3, 2e-3, 1e-3), 1e-3, order=1)
+    mesh = replace(mesh, region=np.arange(len(mesh.tets)), facets={**mesh.facets, "no": []})
+    mesh = meshes.quadratic(mesh) if order == 2 else mesh
+    grid = mesh.to_pyvista()
+    assert set(grid.celltypes) == {10 if order == 1 else 24}
+    assert grid.volume == pytest.approx(4e-9)
+    again = meshes.TetMesh.from_pyvista(grid)
+    for name in ("points", "tets", "region"):
+        assert np.array_equal(getattr(again, name), getattr(mesh, name)), name
+    assert set(again.facets) == set(mesh.facets)
+    assert all(np.array_equal(again.facets[name], mesh.facets[name]) for name in mesh.facets)
+
+
+def test_other_cells_are_refused():
+    import pyvista as pv
+
+    with pytest.raises(ValueError, match="VTK type 11; give tetrahedra"):
+        meshes.TetMesh.from_pyvista(pv.ImageData(dimensions=(2, 2, 2)).cast_to_unstructured_grid())
+
+
+@pytest.fixture(scope="module")
+def field():
+    """A wave that runs along x through a block."""
+    block = meshes.tag_boundary(meshes.block((8e-3, 4e-3, 2e-3), 2e-3))
+    times = np.arange(9) * 1e-3
+    phase = 2 * np.pi * (100 * times[:, None] - block.points[:, 0] / 8e-3)
+    up = 1e-6 * (1 + times[:, None]) * np.sin(phase)
+    moved = np.stack([1e-7 * np.cos(phase), 0 * phase, up], 2)
+    return Field(mesh=block, times=times, displacement=moved, effort=Effort())
+
+
+def test_a_grid_has_the_displacement_of_a_time(field):
+    grid = field.to_pyvista(0.0032)
+    assert np.array_equal(grid["displacement"], field.displacement[3])
+    assert grid.field_data["time_s"][0] == 0.003
+    assert np.array_equal(meshes.TetMesh.from_pyvista(grid).tets, field.mesh.tets)
+    for time in (-0.001, 0.009):
+        with pytest.raises(ValueError, match=r"outside the field's, 0 to 0\.008 s"):
+            field.to_pyvista(time)
+
+
+def test_grids_of_pyvista_have_an_accessor(field):
+    import pyvista as pv
+
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"]
+    import_module(declared["pyvista.accessors"]["skinwave"])  # as pyvista does where it is used
+    grid = field.to_pyvista(0.0032)
+    assert np.array_equal(grid.skinwave.to_mesh().tets, field.mesh.tets)
+    moved = grid.skinwave.displaced(1e3)
+    assert moved.points == pytest.approx(grid.points + 1e3 * grid["displacement"])
+    away = np.linalg.norm(grid.skinwave.displaced().points - grid.points, axis=1)
+    assert away.max() == pytest.approx(0.05 * grid.length)
+    with pytest.raises(ValueError, match="no point data of the name displacement"):
+        field.mesh.to_pyvista().skinwave.displaced()
+    with pytest.raises(ValueError, match="tetrahedra"):
+        pv.ImageData(dimensions=(2, 2, 2)).cast_to_unstructured_grid().skinwave.to_mesh()
+
+
+def test_paraview_reads_what_a_field_saves(field, tmp_path):
+    import pyvista as pv
+
+    path = field.save(tmp_path / "wave.pvd")
+    reader = pv.get_reader(path)
+    assert reader.time_values == pytest.approx(field.times)
+    reader.set_active_time_value(reader.time_values[5])
+    assert np.array_equal(reader.read()[0]["displacement"], field.displacement[5])
+    with pytest.raises(ValueError, match="exists; choose another"):
+        field.save(path, frames=2)
+    assert len(pv.get_reader(field.save(path, frames=2, overwrite=True)).time_values) == 2
+    with pytest.raises(ValueError, match=r"name it \.pvd"):
+        field.save(tmp_path / "wave.vtk")
+
+
+def test_a_map_is_of_the_upper_surface_into_the_body(field, tmp_path):
+    ax = field.plot(0.002)
+    image = ax.collections[0]
+    top = np.unique(field.mesh.facets["top"])
+    assert np.asarray(image.get_array()) == pytest.approx(-1e6 * field.displacement[2, top, 2])
+    low, high = image.get_clim()
+    assert -low == high == pytest.approx(1e6 * np.abs(field.displacement[:, top, 2]).max())
+    assert ax.get_title() == "t = 2.00 ms"
+    film = field.animate(2)
+    film.save(tmp_path / "wave.gif", dpi=20)
+    from PIL import Image
+
+    with Image.open(tmp_path / "wave.gif") as kept:
+        assert kept.n_frames == 2
+
+
+@pytest.mark.skipif(not all(map(find_spec, films.ENCODER)), reason="the extra [film] is missing")
+def test_a_film_is_saved_as_mp4_with_its_extra_and_named_without(field, tmp_path, monkeypatch):
+    import imageio_ffmpeg
+
+    film = field.animate(3)
+    film.save(tmp_path / "wave.mp4", dpi=20)
+    frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "wave.mp4"))
+    assert (frames, seconds) == (3, pytest.approx(0.15, abs=0.01))
+    monkeypatch.setattr(films, "find_spec", lambda name: None)
+    with pytest.raises(ValueError, match=r"install the extra \[film\], or name it .gif"):
+        film.save(tmp_path / "wave.mp4")
+
+
+def test_a_scene_is_drawn_before_anything_is_solved(scene):
+    two = replace(scene.tacton, foci=(0.0, 0.5))
+    ax = replace(scene, pressure=replace(scene.pressure, tacton=two)).plot()
+    by_name = {line.get_label(): line for line in ax.lines}
+    assert 1e-3 * by_name["probes"].get_xydata() == pytest.approx(scene.probe_points)
+    assert np.hypot(*by_name["path"].get_xydata().T) == pytest.approx(10.0)
+    reach = 1e3 * spot_width(scene.pressure.height) * np.sqrt(2 * np.log(2))  # of a Gaussian
+    for contour, centre in zip(ax.collections, (10.0, -10.0), strict=True):
+        places = contour.get_paths()[0].vertices - [centre, 0.0]
+        assert np.hypot(*places.T) == pytest.approx(reach, rel=2e-3)
+    assert ax.patches[0].get_label() == "slab of 100 x 100 x 15 mm"
+    assert not skinwave.loads("[body]\nkind = 'none'").plot().patches
+
+
+def test_pages_have_a_figure_and_every_warning_and_no_markup_of_others(scene):
+    response = skinwave.simulate(scene, "point-kernel", 0.999)
+    kernel = replace(response, model="<i>")
+    agreement = skinwave.compare(kernel, response, (100.0,))
+    row = PlanRow(what="model", value="fem", reason="as <than> said")
+    plan = skinwave.Plan(model="fem", body=scene.body, symmetry="x", rows=(row,),
+                         warnings=("less <than> asked",))  # fmt: skip
+    for record in (scene, response, kernel, agreement, plan, wave(quantity="pressure")):
+        page = record._repr_html_()
+        assert "data:image/png;base64," in page
+        assert "<table>" in page
+        assert not any(mark in page for mark in ("<b>d", "<i>", "<than>", "<coarse>"))
+    assert "disc &lt;b&gt;" in scene._repr_html_()
+    assert "less &lt;than&gt; asked" in plan._repr_html_()
+    assert "too &lt;coarse&gt;" in wave()._repr_html_()
+    assert "100 Hz" in scene._repr_html_()
+
+
+def test_records_print_as_a_short_line(scene, field):
+    response = skinwave.simulate(scene, "flat-body")
+    table = SweepTable(rows=({"status": "done", "focus.height_mm": 200},), varied=("height",))
+    agreement = skinwave.compare(response, response, (100.0,))
+    for record in (scene, response, response.spectrum(), response.lines, skinwave.plan(scene),
+                   agreement, field, field.mesh, table):  # fmt: skip
+        assert repr(record) == str(record)
+        assert len(repr(record)) < 260
+        assert "array" not in repr(record)
+    assert repr(scene) == (
+        "<Scene 'disc <b>': AM 100 Hz, circle of 20 mm at 4 m/s, 0.1 s; slab of 100 x 100 x 15 mm, "
+        "palm; 3 probes, displacement into the body>"
+    )
+    assert "(1,000 times, 3 probes) from 0 to 99.9 ms, at most" in repr(response)
+    assert "expected error 3.0 %; 1 warning>" in repr(wave())
+
+
+def test_scenes_that_differ_have_different_keys_in_the_cache(scene):
+    """Keys are of the records that a scene has, whose repr is of all of their numbers."""
+    thicker = replace(scene.body, depth=0.015000001)
+    assert meshes.cache.key(thicker) != meshes.cache.key(scene.body)
+    louder = replace(scene.pressure, peak_pressure=scene.pressure.peak_pressure * (1 + 1e-12))
+    assert meshes.cache.key(louder) != meshes.cache.key(scene.pressure)
+
+
+def test_an_expected_error_is_said_alike_everywhere(scene):
+    said = "below 0.50 %"
+    found = skinwave.simulate(scene, "flat-body")
+    assert stated_error(found.expected_error) == said
+    assert 0 < found.to_xarray().attrs["expected_error"] == found.expected_error
+    assert error_budget(scene, found.expected_error).words.count(f"numerical {said}") == 1
+    for record in (found, skinwave.plan(scene, model="flat-body")):
+        assert said in record._repr_html_()
+        assert f"expected error {said}" in repr(record)
+    assert [stated_error(x) for x in (0.0213, 1.5, np.nan)] == ["2.1 %", "150 %", "not known"]
+
+
+@pytest.mark.parametrize("quantity", ["pressure", "strain_xz", "displacement", "acceleration"])
+def test_what_a_response_has_not_is_looked_for_without_an_error(quantity):
+    response = wave(quantity=quantity)
+    found = dict(inspect.getmembers(response))
+    assert found["record"] is response.record
+    has = {name: hasattr(response, name) for name in ("velocity", "acceleration", "strain")}
+    assert has == {
+        "velocity": quantity == "displacement",
+        "acceleration": quantity in ("displacement", "acceleration"),
+        "strain": quantity == "strain_xz",
+    }
+    assert not hasattr(response, "lines")
+    with pytest.raises(ValueError, match="the load of this response is unknown"):
+        _ = response.lines
+
+
+def test_the_page_of_a_scene_has_its_load_and_its_regions():
+    regions = '[body]\nkind = "mesh"\nfile = "hand.vtu"\nregions = { ring = "bone" }\n'
+    load = '[load]\nkind = "point_force"\nforce_n = 0.1\ngravity_m_per_s2 = 9.8\n'
+    page = scene_plot._facts(skinwave.loads(regions + load))
+    assert ["region ring", "bone"] in page
+    said = dict(page)["load"]
+    assert "0.1 N along (0, 0, -1)" in said
+    assert "gravity of 9.8 m/s2" in said
+    assert "pressure" not in dict(page), "a contact has no focus"
+
+
+def test_a_sweep_in_python_has_the_runs_of_each_scene(scene, tmp_path):
+    short = replace(scene.pressure, tacton=replace(scene.tacton, duration=0.03))
+    base = replace(scene, pressure=short)
+    vary = {"tacton.speed_m_per_s": np.array([4.0, 6.0]), "focus.peak_pressure_pa": "20,-1"}
+    table = skinwave.sweep(base, vary, model="flat-body-harmonic", folder=tmp_path / "kept")
+    assert len(table) == 4
+    assert len(table.failed) == 2
+    assert "peak_pressure" in table.failed[0]
+    rows = [row for row in table.rows if row["status"] == "done"]
+    for row, speed in zip(rows, (4.0, 6.0), strict=True):
+        path = replace(base.tacton.trajectory, speed=speed)
+        load = replace(short, tacton=replace(base.tacton, trajectory=path), peak_pressure=20.0)
+        found = skinwave.planning.simulate.compute(
+            replace(base, pressure=load), "flat-body-harmonic"
+        )
+        assert row["peak_um"] == pytest.approx(1e6 * np.abs(found.values).max(axis=0), rel=1e-6)
+    assert table.to_pandas()["tacton.speed_m_per_s"].tolist() == table["tacton.speed_m_per_s"]
+    again = skinwave.sweep(base, vary, model="flat-body-harmonic", folder=tmp_path / "kept")
+    assert again["seconds"] == table["seconds"]  # which were not run again
+    ax = table.plot("peak_um[1]")
+    assert ax.get_ylabel() == "largest displacement at probe 1, µm"
+    assert "<img" in table._repr_html_()
+    with pytest.raises(ValueError, match=r"'tacton\.sped' is no key"):
+        skinwave.sweep(base, {"tacton.sped": [1]})
+
+
+def test_references_are_those_of_the_models():
+    found = skinwave.cite(replace(wave(), model="flat-body"), replace(wave(), model="point-kernel"))
+    assert "flat-body (wavenumber integral), point-kernel" in found.sentence
+    assert "Kausel" in found.references[2]
+    assert "10.1145/3613905.3650981" in str(found)
+    assert len(found.references) == 3
+    cited = dict(line.split(": ", 1) for line in (ROOT / "CITATION.cff").read_text().split("\n")
+                 if re.match(r"(version|date-released): ", line))  # fmt: skip
+    assert cited["version"] == citations.VERSION
+    assert str(citations.RELEASED) == cited["date-released"][:4]
+    now = {"skinwave": citations.VERSION}
+    made = replace(wave(), model="flat-body", effort=Effort(versions=now))
+    said = f"Version {citations.VERSION}, {citations.RELEASED}. Software"
+    assert said in str(skinwave.cite(made))
+    made = replace(made, effort=Effort(versions={"skinwave": "0.3.0"}))
+    assert "Version 0.3.0. Software" in str(skinwave.cite(made)), "of another year, perhaps"
+    assert {name for name in BUILT_IN if not named(name).sources} == {
+        "point-kernel", "point-kernel-published",
+    }  # fmt: skip
+    steps = replace(wave(), model="fem-transient", effort=Effort(solver="pardiso"))
+    assert [name in str(skinwave.cite(steps)) for name in ("Chung", "PARDISO", "Kausel")] == [
+        True, True, False,
+    ]  # fmt: skip
+    with pytest.raises(ValueError, match="unknown"):
+        skinwave.cite(wave())
+
+
+@pytest.mark.parametrize("model", ["point-kernel", "flat-body"])
+def test_times_are_a_part_of_the_whole_response(scene, model):
+    whole = skinwave.planning.simulate.compute(scene, model)
+    part = skinwave.planning.simulate.compute(scene, model, times=np.arange(1600, 1800) / 20_000)
+    assert part.times[::2] == pytest.approx(whole.times[800:900])
+    assert part.values[::2] == pytest.approx(
+        whole.values[800:900], abs=1e-6 * np.abs(whole.values).max()
+    )
+
+
+def test_the_reduced_body_has_those_times_too(scene):
+    small = replace(scene, body=replace(scene.body, width=0.06, height=0.06, sides="clamped"))
+    whole = skinwave.simulate(small, "fem", 0.9, h=10e-3)
+    part = skinwave.simulate(small, "fem", 0.9, h=10e-3, times=np.arange(300, 400) / RATE)
+    scale = np.abs(whole.values).max()
+    assert part.values == pytest.approx(whole.values[300:400], abs=1e-9 * scale)
+
+
+@pytest.mark.parametrize(
+    ("times", "said"),
+    [
+        ([0.0], "two or more"),
+        ([0.0, 1e-3, 3e-3], "equal steps"),
+        ([0.0, 0.2], "the duration of the Tacton"),
+        ([5e-4, 1.5e-3, 2.5e-3], "no multiple of their step"),
+        ([0.0, np.nan], "finite"),
+        (np.arange(10) * 1e-9 + 0.05, "give a larger step"),
+    ],
+)
+def test_other_times_are_refused(scene, times, said):
+    with pytest.raises(ValueError, match=said):
+        skinwave.simulate(scene, "point-kernel", times=times)
+
+
+def test_progress_is_shown_where_it_is_asked_for(scene, capsys):
+    small = replace(scene, body=replace(scene.body, width=0.06, height=0.06, sides="clamped"))
+    skinwave.simulate(small, "fem", 0.9, h=10e-3, progress=True)
+    assert "lines" in capsys.readouterr().err.split("\n")
+    skinwave.simulate(small, "fem", 0.9, h=10e-3)
+    assert not capsys.readouterr().err
+    for model in ("flat-body", "flat-body-harmonic"):
+        skinwave.simulate(scene, model, 0.9, progress=True)
+        assert "wavenumber integral" in capsys.readouterr().err.split("\n")
+
+
+def test_figures_are_put_into_windows(monkeypatch):
+    import matplotlib.pyplot as plt
+    from matplotlib.figure import Figure
+
+    shown = []
+    monkeypatch.setattr(plt, "show", lambda: shown.extend(plt.get_figlabels()))
+    figure = Figure(figsize=(3, 2))
+    figure.subplots().plot([1, 2])
+    window.open_windows({"a response": figure})
+    assert shown == ["a response"]
+    assert plt.figure("a response").canvas.manager.canvas.figure is figure
+    assert not window.has_windows()  # Agg draws into none
+
+
+def test_a_window_that_cannot_be_opened_is_a_warning(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("scene.toml").write_text(SCENE.replace('"slab"', '"none"'))
+    assert main(["plan", "scene.toml", "--show"]) == 0
+    assert "no window can be opened here" in capsys.readouterr().err
+    opened = []
+    monkeypatch.setattr(window, "has_windows", lambda: True)
+    monkeypatch.setattr(window, "open_windows", opened.append)
+    assert main(["plan", "scene.toml", "--show"]) == 0
+    assert main(["run", "scene.toml", "--show", "--quiet"]) == 0
+    assert [list(figures) for figures in opened] == [["disc <b>"], ["disc <b>"]]
+
+
+def test_figures_of_a_paper_have_its_width_letters_and_fonts(tmp_path):
+    with skinwave.paper(3.5, 2.5):
+        assert mpl.rcParams["font.size"] == 8
+        figure = wave().plot().figure
+        for ending in ("pdf", "svg", "png"):
+            figure.savefig(tmp_path / f"w.{ending}")
+    assert mpl.rcParams["font.size"] != 8
+    pdf = (tmp_path / "w.pdf").read_bytes()
+    assert b"/FontFile2" in pdf  # TrueType
+    assert b"/Type3" not in pdf
+    assert b"MediaBox [ 0 0 252 180 ]" in pdf  # points
+    assert "<text" in (tmp_path / "w.svg").read_text()
+    from PIL import Image
+
+    with Image.open(tmp_path / "w.png") as image:
+        assert image.size == (1050, 750)
+    assert style("talk", 7.0).size(6.0, 3.0) == (7.0, 3.5)
+    with pytest.raises(ValueError, match="one column of a journal is 3.5 inch"):
+        style("print", 90.0)
+
+
+@pytest.mark.parametrize("width", [3.5, 7.0])
+def test_all_letters_of_a_figure_of_a_paper_are_of_8_points(scene, width):
+    waves = skinwave.simulate(replace_duration(scene, 0.3), "flat-body-harmonic", 0.999)
+    with skinwave.paper(width):
+        drawn = [scene.plot(), waves.plot(), waves.spectrum().plot(), waves.lines.plot()]
+    rows = [{"tacton.speed_m_per_s": float(v), "tacton.size_mm": float(d), "status": "done",
+             "peak_um": v * d, "level_db": v, "rayleigh_speed_m_per_s": 5.0}
+            for v in (4, 8) for d in (10, 20)]  # fmt: skip
+    by, chosen = "tacton.size_mm", style("print", width)
+    figures = [ax.figure for ax in drawn]
+    figures += [sweep_figures.line_figure(rows, "peak_um", sweep_figures.SPEED, by, chosen),
+                sweep_figures.heat_figure(rows, "peak_um", sweep_figures.SPEED, by, chosen),
+                sweep_figures.speed_figure(rows, by, chosen)]  # fmt: skip
+    for figure in figures:
+        assert sizes(figure) == {8.0}
+        assert illegible(figure) == []
+
+
+def test_a_figure_without_lines_says_why(scene):
+    short = skinwave.simulate(replace_duration(scene, 0.02), "flat-body-harmonic", 0.999)
+    assert len(short.lines) == 0
+    assert any("no line of the load is resolved" in text.get_text()
+               for text, _ in texts(short.lines.plot().figure))  # fmt: skip
+
+
+def test_chosen_columns_of_a_folder_alone():
+    runs = [SimpleNamespace(column=name) for name in ("point-kernel", "skin-slab", "paper-sheet")]
+    found = Album(title="", scene=None, runs=runs, views={"skin-slab": 1, "paper-sheet": 2},
+                  planned=None, trust=None)  # fmt: skip
+    assert only(found, []).runs == runs
+    chosen = only(found, ["point-kernel", "skin-slab"])
+    assert [run.column for run in chosen.runs] == ["point-kernel", "skin-slab"]
+    assert chosen.views == {"skin-slab": 1}
+    with pytest.raises(ValueError, match="did you mean 'skin-slab'"):
+        only(found, ["skin_slab"])
+
+
+def test_types_and_names_of_the_package_are_those_that_it_has():
+    tree = ast.parse((ROOT / "skinwave/__init__.py").read_text())
+    typed = {
+        alias.name: node.module
+        for branch in tree.body if isinstance(branch, ast.If)
+        for node in branch.body if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }  # fmt: skip
+    assert typed == {name: f"skinwave.{home}" for name, home in skinwave._HOMES.items()}
+    assert set(skinwave.__all__) == set(typed)
+    assert all(getattr(skinwave, name).__doc__ for name in typed if name != "BODIES")
+    assert all(a < b for a, b in pairwise(sorted(dir(skinwave))))

@@ -1,0 +1,116 @@
+"""Maps of any quantity at any depth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from simple_model import MovingPressure, Tacton, Trajectory
+from simple_model.load_spectrum import load_lines
+from simple_model.response import phasors
+from skinwave import Body, Scene
+from skinwave.commands.cli import main
+from skinwave.planning.simulate import compute
+from skinwave.results.quantity_map import quantity_map
+from skinwave.results.surface import body_map, grid
+from skinwave.scene.file import dumps
+
+CIRCLE = Trajectory(shape="circle", size=0.012, speed=7.0)
+AM = Tacton(am_frequency=140.0, trajectory=CIRCLE, duration=0.2)
+LAYER = Scene(
+    pressure=MovingPressure(tacton=AM, drive="pressure_squared"),
+    body=Body(width=0.06, height=0.06, depth=0.008),
+    probes=((0.0, 0.0), (0.006, 0.002)),
+)
+PLACES = {"reach": 0.012, "step": 0.003}
+
+
+def test_motion_is_that_of_the_maps_of_reports():
+    found = quantity_map(LAYER, **PLACES)
+    known = body_map(LAYER, *grid(LAYER, **PLACES))
+    np.testing.assert_allclose(found.rms, known.rms, rtol=1e-4)  # which has a spline
+    assert np.isnan(found.error)
+
+
+@pytest.mark.parametrize("quantity", ["largest_shear_strain", "energy_density"])
+def test_an_invariant_is_alike_all_around_a_circle(quantity):
+    """Neither of two frequencies that have no common period is ahead of the other anywhere."""
+    rms = quantity_map(replace(LAYER, quantity=quantity, depth=0.7e-3), **PLACES).rms
+    np.testing.assert_allclose(np.rot90(rms), rms, rtol=5e-3)
+
+
+def test_the_invariant_of_one_frequency_has_the_mean_square_of_its_period():
+    """u(t) = |a cos| has the RMS about its mean of a rectified sine: a sqrt(1/2 - 4/pi^2)."""
+    still = replace(AM, trajectory=Trajectory(shape="point"))
+    linear = replace(LAYER.pressure, tacton=still, drive="linear")
+    scene = replace(LAYER, pressure=linear, quantity="strain_zz", depth=0.001)
+    one = quantity_map(scene, **PLACES)
+    rms = quantity_map(replace(scene, quantity="energy_density"), **PLACES).rms
+    # On the axis the strain is (-e/2, -e/2, e) nearly, so that W = 3/2 mu e^2: about its mean
+    # mu e0^2 3/4 cos(2 w t), of RMS 3/2 mu e_rms^2 / sqrt(2).
+    middle = rms.shape[0] // 2, rms.shape[1] // 2
+    mu = LAYER.body.solid.shear_modulus
+    expected = 1.5 * mu * one.rms[middle] ** 2 / np.sqrt(2)
+    assert rms[middle] == pytest.approx(expected, rel=2e-3)
+
+
+def test_an_invariant_is_of_the_whole_tensor_its_mean_included():
+    scene = replace(LAYER, quantity="largest_shear_strain", depth=0.001)
+    rms = quantity_map(scene, **PLACES).rms
+    long = replace(scene.pressure, tacton=replace(AM, duration=1.0))
+    probes = replace(scene, probes=((0.0, 0.0), (0.006, 0.003)), pressure=long)
+    seen = compute(probes, "flat-body-harmonic").values.std(axis=0)
+    np.testing.assert_allclose(rms[[4, 5], [4, 6]], seen, rtol=0.01)
+
+
+def test_elements_read_what_probes_read():
+    still = replace(AM, trajectory=Trajectory(shape="point"), duration=0.5)
+    scene = replace(
+        LAYER, quantity="strain_zz", depth=0.002,
+        body=replace(LAYER.body, width=0.04, height=0.04, sides="clamped"),
+        pressure=replace(LAYER.pressure, tacton=still),
+    )  # fmt: skip
+    found = quantity_map(scene, reach=0.006, step=0.002, h=8e-3)
+    probes = replace(scene, probes=((0.0, 0.0), (0.006, 0.002), (-0.004, 0.006)))
+    response = compute(probes, "fem", h=8e-3)
+    frequencies = np.unique(np.round(load_lines(scene.pressure, 1e-4).frequencies, 6))
+    lines = np.abs(phasors(response, frequencies[(frequencies > 0) & (frequencies < 2000)]))
+    expected = np.sqrt((lines**2).sum(axis=0) / 2)
+    read = found.rms[[3, 4, 6], [3, 6, 1]]
+    np.testing.assert_allclose(read, expected, rtol=0.02)
+    assert 0 < found.error < 0.5
+
+
+def test_the_command_writes_a_page_and_tables(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "layer.toml").write_text(dumps(LAYER))
+    asked = ["map", "layer.toml", "--quantity", "velocity", "--reach", "6", "--step", "3"]
+    assert main([*asked, "--depth", "meissner"]) == 0
+    said = capsys.readouterr().out
+    assert "velocity into the body at a depth of 0.7 mm is largest at" in said
+    table = np.genfromtxt("layer-map/map.csv", delimiter=",", names=True)
+    kept = np.load("layer-map/map.npz")
+    np.testing.assert_allclose(table["rms_velocity_mm_s"], 1e3 * kept["rms"].ravel(), rtol=1e-6)
+    assert {"index.html", "map.png", "record.json", "scene.toml"} <= {
+        path.name for path in (tmp_path / "layer-map").iterdir()
+    }
+    assert main(["rerun", "layer-map", "--quiet"]) == 0
+    np.testing.assert_array_equal(np.load("layer-map-rerun/map.npz")["rms"], kept["rms"])
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--step", "0"], "choose another step"),
+        (["--step", "0.01"], "more than 40,000"),
+        (["--depth", "nose"], "one of surface, meissner"),
+        (["--depth", "9"], "is not within the body"),
+        (["--quantity", "speed"], "quantity 'speed' is unknown"),
+    ],
+)
+def test_what_cannot_be_mapped_is_refused(words, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "layer.toml").write_text(dumps(LAYER))
+    assert main(["map", "layer.toml", *words]) == 2
+    assert said in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["layer.toml"]

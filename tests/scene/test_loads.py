@@ -1,0 +1,386 @@
+"""Loads beside pressure: shear tractions, forces of a small contact, and gravity."""
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pytest
+
+import fem
+import skinwave
+from fem.line_basis import line_errors
+from fem.load_and_probe import facet_normals, load_operator, traction_operator
+from meshes import block
+from simple_model import Material, MovingPressure, Stack, Tacton, Trajectory
+from simple_model.flat_quantities import traction_field
+from simple_model.load_spectrum import pressure_lines, synthesise
+from simple_model.quantities import DISPLACEMENT
+from simple_model.response import fit_lines
+from simple_model.wavenumber_integral import point_integrals
+from skinwave import Body, dumps, loads
+from skinwave.bodies.build import build, operators
+from skinwave.live.values import values_of
+from skinwave.measure import Measurement
+from skinwave.measure.fit import fit
+from skinwave.measure.predicted import predicted_lines, predicted_waveforms, target
+from skinwave.models import parametric
+from skinwave.models.loads import load_in_steps, surface_load
+from skinwave.models.prepared import answer, components, prepare
+from skinwave.patterns.conversion import write_pattern
+from skinwave.patterns.pattern import Options
+from skinwave.planning.extent import symmetry
+from skinwave.planning.plan import plan
+from skinwave.planning.simulate import compute
+from skinwave.scene.load import LOADS, Load, LoadKind, register
+from skinwave.scene.spreads import spreads_of
+from skinwave.scene.variation import varied
+from skinwave.studies.study import own_scenes
+
+SOLID = Material(density=1000, shear_modulus=2e4, poisson=0.3, viscosity=6.0)
+SMALL = """
+[body]
+size_x_mm = 44
+size_y_mm = 44
+thickness_mm = 10
+sides = "clamped"
+[body.material]
+density_kg_m3 = 1000
+shear_modulus_pa = 2e4
+poisson = 0.0
+viscosity_pa_s = 20
+[probes]
+points_mm = [[5, 2], [9, 0], [-6, 3]]
+"""
+TONE = '[tacton]\nam_frequency_hz = 200\nduration_s = 0.03\n[focus]\ndrive = "linear"\n'
+AROUND = TONE.replace("[focus]", 'shape = "circle"\nsize_mm = 10\nspeed_m_per_s = 2\n[focus]')
+FORCE = '[load]\nkind = "point_force"\nforce_n = 0.02\nwidth_mm = 5\n'
+IMPULSE = "[tacton]\nduration_s = 0.03\nrhythm = { pulses_ms = [[2, 28]], ramp_ms = 1 }\n"
+CIRCLE = Trajectory(shape="circle", size=0.01, speed=2.0)
+SQUARE = Trajectory(shape="square", size=0.01, speed=2.0)
+H = 3e-3
+
+
+def far(found, expected):
+    """Largest relative error (p,) of waveforms."""
+    return np.linalg.norm(found - expected, axis=0) / np.linalg.norm(expected, axis=0)
+
+
+def test_a_shear_traction_on_a_half_space_is_that_of_cerruti():
+    """u_z = F (1 - 2 nu) x / 4 pi mu r^2 (Johnson, Contact Mechanics, eq. 3.75), of a Gaussian
+    what is within the radius; and with a pressure, that of their sum.
+    """
+    half, w = Stack(materials=(SOLID,), thicknesses=(np.inf,)), 3e-3
+    places = np.array([[5e-3, 2e-3], [-4e-3, 6e-3], [12e-3, 0.0]])
+    r, force = np.hypot(*places.T), 2 * pi * w**2
+
+    def at(direction):
+        field = traction_field(DISPLACEMENT, half, direction)
+        integrals = point_integrals(field, r, [0.01 + 0j], w)[:, 0]
+        return np.einsum("mcp,cp->p", field.weights(places), integrals).real
+
+    within = (1 - np.exp(-(r**2) / 2 / w**2)) / r**2
+    closed = force * (1 - 2 * 0.3) / (4 * pi * 2e4) * places[:, 0] * within
+    np.testing.assert_allclose(at((1.0, 0.0, 0.0)), closed, rtol=1e-4)
+    both = 0.6 * at((1.0, 0.0, 0.0)) + 0.8 * at((0.0, 0.0, -1.0))
+    np.testing.assert_allclose(at((0.6, 0.0, -0.8)), both, rtol=1e-9)
+
+
+def test_the_unit_tangent_goes_the_way_of_the_focus():
+    phase = np.array([0.1, 0.3, 0.85])
+    angle = 2 * pi * phase
+    around = np.column_stack([-np.sin(angle), np.cos(angle)])
+    np.testing.assert_allclose(CIRCLE.tangent_at_phase(phase), around, atol=1e-9)
+    np.testing.assert_allclose(
+        SQUARE.tangent_at_phase(phase), [[-1, 0], [0, -1], [0, 1]], atol=1e-9
+    )
+    line = Trajectory(shape="line", size=0.02, speed=1.0)
+    np.testing.assert_allclose(line.tangent_at_phase([0.2, 0.7]), [[1, 0], [-1, 0]], atol=1e-9)
+
+
+@pytest.mark.parametrize("path", [CIRCLE, SQUARE], ids=["circle", "square"])
+def test_the_lines_along_a_path_are_those_of_the_load_in_time(path):
+    """A direction that jumps at corners has lines 1/n: those beyond the 250th harmonic, of which
+    there are none, hold some 5 % of the waveform of a point there.
+    """
+    tacton = Tacton(am_frequency=90.0, trajectory=path)
+    load = MovingPressure(tacton=tacton, heading="x", drive="linear")
+    points = np.array([[5e-3, 1e-3, 0], [-4e-3, -3e-3, 0], [0.0, 5e-3, 0]])
+    t = np.linspace(0, 0.05, 701)
+    f, a = pressure_lines(load, points, 1e-6)
+    direct = load(points, t)
+    assert far(synthesise(f, a, t), direct).max() < (1e-5 if path is CIRCLE else 0.07)
+    y = replace(load, heading="y")(points, t)
+    np.testing.assert_allclose(direct**2 + y**2, replace(load, heading="")(points, t) ** 2)
+
+
+def test_tractions_have_the_force_of_their_direction():
+    """In all N_a t_i dA sum to q A t; an inward normal is a pressure."""
+    mesh = block((0.02, 0.03, 0.01), 5e-3)
+    normals = facet_normals(mesh)
+    tilted = np.broadcast_to([0.6, 0.0, -0.8], normals.shape)
+    force = traction_operator(mesh, tilted) @ np.full(len(normals), 7.0)
+    np.testing.assert_allclose(
+        force.reshape(-1, 3).sum(axis=0), 7 * 0.02 * 0.03 * tilted[0], atol=1e-15
+    )
+    inwards = traction_operator(mesh, -normals) - load_operator(mesh)
+    assert abs(inwards).max() < 1e-18
+
+
+def test_on_a_slope_shear_is_tangential_and_a_force_keeps_its_size():
+    """Per area across the beam, cos a of that of the slope."""
+    a = 0.5
+    normal = np.array([[np.sin(a), 0.0, np.cos(a)]])
+    (shear,) = Load(kind="shear").tractions(normal)[:, 0]
+    np.testing.assert_allclose(shear, np.cos(a) ** 2 * np.array([np.cos(a), 0, -np.sin(a)]))
+    both = Load(kind="shear", direction="path").tractions(normal)[:, 0]
+    np.testing.assert_allclose(both, [shear, [0, np.cos(a), 0]])
+    (force,) = Load(kind="point_force", force=1.0).tractions(normal)[:, 0]
+    np.testing.assert_allclose(force, [0, 0, -np.cos(a)])
+    (pushed,) = Load().tractions(normal)[:, 0]
+    np.testing.assert_allclose(pushed, -(np.cos(a) ** 2) * normal[0])
+
+
+def test_elements_under_tractions_meet_the_wavenumber_integral():
+    """At rest, without Poisson's effect, which all but cancels the normal motion under shear."""
+    solid, width = replace(SOLID, poisson=0.0), 6e-3
+    body = Body(material=solid, width=0.05, height=0.05, depth=0.01, sides="clamped")
+    each = (
+        Load(kind="shear", direction=(1.0, 0.5)),
+        Load(kind="point_force", force=1.0, direction=(0.6, 0.0, -0.8)),
+    )
+    made, places = build(body, H), np.array([[8e-3, 2e-3], [-4e-3, -5e-3]])
+    operators_of = [surface_load(made, load) for load in each]
+    spot = np.exp(-(operators_of[0][1][:, :2] ** 2).sum(axis=1) / 2 / width**2)
+    u = fem.static(operators(made), np.column_stack([P @ spot for P, _ in operators_of]))
+    layer = Stack(materials=(solid,), thicknesses=(0.01,))
+    for load, found in zip(each, (fem.probe_operator(made.mesh, places) @ u).T, strict=True):
+        (direction,) = load.tractions(np.array([[0.0, 0.0, 1.0]]))[:, 0]
+        field = traction_field(DISPLACEMENT, layer, direction)
+        integrals = point_integrals(field, np.hypot(*places.T), [1e-3 + 0j], width)[:, 0]
+        exact = np.einsum("mcp,cp->p", field.weights(places), integrals).real
+        assert np.abs(found - exact).max() < 0.01 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        AROUND + '[load]\nkind = "shear"\ndirection = "path"\n',
+        IMPULSE + FORCE + "direction = [0.3, 0, -1]\n",
+    ],
+    ids=["along a circle", "impulse"],
+)
+def test_models_agree_on_loads_beside_pressure(text):
+    """The reduced model, time steps, and the wavenumber integral, each from rest."""
+    scene = loads(text + SMALL)
+    flat = compute(scene, "flat-body").values
+    assert far(compute(scene, "fem", 0.02, h=H).values, flat).max() < 0.05
+    if scene.load.direction != "path":
+        return
+    made = build(scene.body, H)
+    P, points = surface_load(made, scene.load)
+    assert P.shape[1] == 2 * len(points)
+    q = load_in_steps(scene.loads, points, np.arange(200) / 1e4, 5e-5)(0.0123)
+    x, y = np.split(q, 2)
+    np.testing.assert_allclose(np.hypot(x, y), abs(scene.pressure(points, 0.0123)))
+
+
+def test_steady_states_agree_on_a_shear_traction():
+    scene = loads(TONE + '[load]\nkind = "shear"\ndirection = [1, 1]\n' + SMALL)
+    flat = compute(scene, "flat-body-harmonic").values
+    assert far(compute(scene, "fem-harmonic", h=H).values, flat).max() < 0.05
+
+
+def column(base, stiffness=0.0):
+    """A column without Poisson's effect, as free sides leave it."""
+    solid = replace(SOLID, poisson=0.0)
+    return Body(
+        material=solid, width=0.01, height=0.01, depth=0.012, base=base, sides="free",
+        base_stiffness=stiffness,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("body", "model", "soft"),
+    [
+        (column("clamped"), "fem", 0.0),
+        (column("clamped"), "fem-transient", 0.0),
+        (column("elastic", 2e6), "fem-harmonic", 1000 * 0.012 / 2e6),
+    ],
+)
+def test_a_column_sags_under_its_own_weight(body, model, soft):
+    """u = rho g H^2 / 2 E, and rho g H / k of springs below; the moving load comes on top."""
+    scene = loads("[tacton]\nam_frequency_hz = 150\nduration_s = 0.01\n[probes]\npoints_mm=[[0,0]]")
+    still = replace(scene, body=body)
+    heavy = replace(still, load=Load(gravity=9.81))
+    u, moved = (compute(each, model, h=6e-3).values for each in (heavy, still))
+    sag = 9.81 * (1000 * 0.012**2 / (2 * 4e4) + soft)
+    np.testing.assert_allclose(u - moved, sag, rtol=1e-6)
+    fast = [replace(each, quantity="velocity") for each in (heavy, still)]
+    both = [compute(each, model, h=6e-3).values for each in fast]
+    np.testing.assert_allclose(*both, atol=1e-12)
+
+
+def test_probes_read_the_stress_of_weight():
+    """sigma_zz = -rho g z at a depth z, beside that of the load."""
+    scene = loads('[probes]\npoints_mm = [[0, 0]]\ndepth_mm = 6\nquantity = "stress_zz"\n[focus]\n'
+                  "peak_pressure_pa = 0\n[tacton]\nduration_s = 0.01")  # fmt: skip
+    heavy = replace(scene, body=column("clamped"), load=Load(gravity=9.81))
+    found = compute(heavy, "fem", h=3e-3).values
+    np.testing.assert_allclose(found, -1000 * 9.81 * 6e-3, rtol=0.03)
+
+
+@pytest.mark.parametrize("load", ['kind = "shear"\ndirection = [1, 2]', 'direction = "path"\n'
+                                  'kind = "shear"', "gravity_m_per_s2 = 9.81"])  # fmt: skip
+def test_scenes_of_loads_come_back_from_their_files(load):
+    scene = loads(f'[tacton]\nshape = "circle"\nsize_mm = 10\nspeed_m_per_s = 4\n[load]\n{load}')
+    assert loads(dumps(scene)) == scene
+    assert not scene.load.is_plain
+    still = replace(scene.tacton, trajectory=Trajectory())
+    if scene.load.direction != "path":
+        at_rest = replace(scene, pressure=replace(scene.pressure, tacton=still))
+        assert symmetry(at_rest) == ("xy" if scene.load.gravity else "")
+    assert loads(dumps(replace(scene, load=Load()))).load.is_plain
+
+
+def test_a_force_has_no_device():
+    scene = loads(IMPULSE + FORCE + SMALL)
+    assert loads(dumps(scene)) == scene
+    assert "[focus]" not in dumps(scene)
+    assert scene.pressure.peak_pressure * 2 * pi * 5e-3**2 == pytest.approx(0.02)
+    assert not [each for each in spreads_of(scene) if each.part == "device"]
+    found = plan(scene, 0.1)
+    assert found.model.startswith("flat-body")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('kind = "sheer"', "did you mean 'shear'"),
+        ("force_n = 1", "a load of kind 'pressure' has no force; leave it out"),
+        ('kind = "shear"\ndirection = [1, 0, 0]', "must be 2 finite numbers, not all 0, or path"),
+        ('kind = "shear"\ndirection = "path"', "rests or jumps from point to point"),
+        ('kind = "point_force"', "must be a finite number above 0; give force_n"),
+        ('kind = "point_force"\nforce_n = 1\nwidth_mm = 0.01', "is outside 0.2..20 mm"),
+        ('kind = "point_force"\nforce_n = 1\nwidth_mm = 0', "width_mm = 0 is no contact"),
+        ('kind = "point_force"\nforce_n = 1\ndirection = [0, 0, 0]', "must be 3 finite numbers"),
+        ('kind = "point_force"\nforce_n = 1\n[focus]\nheight_mm = 300', r"\[focus\] is that of a"),
+        ("gravity_m_per_s2 = 99", "must be a number within 30 of 0"),
+        ('gravity_m_per_s2 = 9.8\n[body]\nbase = "free"', "falls under gravity; clamp"),
+    ],
+)
+def test_loads_that_make_no_sense_are_refused(text, said):
+    with pytest.raises(ValueError, match=said):
+        loads(f"[load]\n{text}")
+
+
+@pytest.mark.parametrize(
+    ("model", "scene", "said"),
+    [
+        ("point-kernel", TONE + '[load]\nkind = "shear"\n', "not a shear traction along"),
+        ("flat-body", TONE + "[load]\ngravity_m_per_s2 = 9\n", "pressure and gravity of 9 m/s2"),
+        ("flat-body", TONE + '[probes]\nquantity = "strain_zz"\n[load]\nkind = "shear"\n',
+         "has no strain zz under a shear traction along .*use --model fem"),
+    ],
+)  # fmt: skip
+def test_models_say_which_loads_they_do_not_take(model, scene, said):
+    with pytest.raises(ValueError, match=said):
+        compute(loads(scene), model)
+
+
+def test_pages_of_a_focus_refuse_other_loads():
+    with pytest.raises(ValueError, match="is about the pressure of a focus, not a shear traction"):
+        values_of(loads('[load]\nkind = "shear"'), "skin-slab")
+    with pytest.raises(ValueError, match="leave out .load., or use skinwave run or sweep"):
+        own_scenes(loads('[load]\nkind = "shear"'), "sheared")
+
+
+def test_kinds_of_load_are_registered_once():
+    with pytest.raises(ValueError, match="'shear' is registered already"):
+        register(LoadKind(name="shear", words=str, defaults={}, tractions=LOADS["shear"].tractions))
+
+
+SHEAR = '[load]\nkind = "shear"\ndirection = [1, 0]\n'
+
+
+def test_what_is_computed_for_a_pressure_alone_refuses_other_loads():
+    scene = loads(SHEAR + SMALL)
+    heavy = replace(scene, load=Load(gravity=9.81))
+    with pytest.raises(ValueError, match="focus alone, not pressure and gravity"):
+        target(heavy, "flat-body", DISPLACEMENT, scene.probe_points)
+    assert target(heavy, "fem", DISPLACEMENT, scene.probe_points).linear == ("gain",)
+    with pytest.raises(ValueError, match="a pattern of a device is about"):
+        write_pattern(scene, ".csv", Options())
+    with pytest.raises(ValueError, match="takes what is normal to it"):
+        loads(SHEAR + "[body]\npreset = 'paper-sheet-loose'")
+    reduced = prepare(scene.body, scene.probe_points, h=6e-3)
+    assert np.isfinite(answer(reduced, replace(scene, load=Load())).values).all()
+    with pytest.raises(ValueError, match="is reduced for"):
+        answer(reduced, scene)
+
+
+def test_gravity_does_not_hide_the_error_of_a_mesh():
+    """A sag of many times the motion."""
+    scene = loads(SMALL)
+    heavy = replace(scene, load=Load(gravity=9.81))
+    without, under = (skinwave.simulate(s, "fem", h=5e-3) for s in (scene, heavy))
+    assert np.abs(under.values).max() > 3 * np.abs(without.values).max()
+    assert under.expected_error == pytest.approx(without.expected_error, rel=0.2)
+
+
+MODULUS = "body.material.shear_modulus_pa"
+
+
+@pytest.mark.parametrize("load", [FORCE, SHEAR, '[load]\nkind = "shear"\ndirection = "path"\n'])
+def test_materials_are_free_under_any_moving_load(load):
+    start = IMPULSE if load == FORCE else AROUND
+    scene = loads((start.partition("[focus]")[0] if load == FORCE else start) + SMALL + load)
+    free = skinwave.prepare(scene, {MODULUS: (1.5e4, 3e4)}, h=6e-3)
+    values = {MODULUS: 2.6e4}
+    own = varied(scene, values)
+    reduced = prepare(own.body, own.probe_points, h=6e-3, load=own.load)
+    found, expected = parametric.answer(free, values).values, answer(reduced, own).values
+    assert far(found, expected).max() < 0.01
+    frequencies, lines = parametric.lines(free, values)
+    motion = components(reduced, *own.loads)
+    near = [np.argmin(np.abs(motion.frequencies - f)) for f in frequencies]
+    assert line_errors(lines, motion.lines[near]).max() < 0.01
+
+
+def test_what_depends_on_the_material_beside_the_moving_load_is_refused():
+    gravity = loads(SMALL + "[load]\ngravity_m_per_s2 = 9.81\n")
+    with pytest.raises(ValueError, match="the static deflection is that of each modulus"):
+        skinwave.prepare(gravity, {MODULUS: (1.5e4, 3e4)})
+    shaken = "[load.support_motion]\nfrequency_hz = 100\namplitude_um = 1\n"
+    with pytest.raises(ValueError, match="inertial force goes with the density"):
+        skinwave.prepare(loads(SMALL + shaken), {MODULUS: (1.5e4, 3e4)})
+
+
+def test_a_fit_recovers_the_modulus_and_the_force_of_a_contact():
+    scene = loads(IMPULSE.replace("0.03", "0.06") + SMALL.replace("44", "24") + FORCE)
+    hidden = varied(scene, {MODULUS: 2.4e4, "load.force_n": 0.03})
+    found = compute(hidden, "fem")
+    measured = Measurement(
+        quantity="displacement", places=scene.probe_points, times=found.times,
+        values=found.values[None],
+    )  # fmt: skip
+    fitted = fit(
+        scene, measured, [f"{MODULUS}=12000:40000", "load.force_n=0.005:0.1"], model="fem", starts=2
+    )  # fmt: skip
+    assert fitted.target.reduced is not None, "no factorisation for each modulus"
+    assert fitted.values[MODULUS] == pytest.approx(2.4e4, rel=0.01)
+    assert fitted.values["load.force_n"] == pytest.approx(0.03, rel=0.01)
+
+
+def test_predictions_of_layers_under_tractions_are_those_of_the_model():
+    text = AROUND.replace("0.03", "0.2") + SMALL.replace("poisson = 0.0", "poisson = 0.49") + SHEAR
+    scene = loads(text)
+    aim = target(scene, "flat-body", DISPLACEMENT, scene.probe_points)
+    found = compute(scene, "flat-body-harmonic")
+    expected, _ = fit_lines(found, np.array([200.0]))
+    np.testing.assert_allclose(
+        predicted_lines(aim, np.array([200.0]))({}), expected, rtol=0.02,
+        atol=1e-3 * np.abs(expected).max(),
+    )  # fmt: skip
+    rest = compute(scene, "flat-body")
+    waveforms = predicted_waveforms(aim, rest.times)({})
+    assert far(waveforms, rest.values).max() < 1e-3

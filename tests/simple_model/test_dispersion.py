@@ -1,0 +1,485 @@
+"""Dispersion curves beside closed forms, published roots and a determinant that shares no code."""
+
+from dataclasses import replace
+from math import inf, pi
+
+import numpy as np
+import pytest
+from legible import illegible, sizes, texts
+
+from simple_model.compliance import half_space, layered, slab, thin_sheet
+from simple_model.dispersion import dispersion_curves
+from simple_model.layers import Stack
+from simple_model.material import PRESETS, Material
+from simple_model.sheet_modes import sheet_curves
+from simple_model.wavenumber_integral import point_response
+from skinwave.report.dispersion import dispersion_figure
+from skinwave.report.styles import STYLES, style
+from skinwave.studies.driven_modes import driven_modes
+
+WIDTH = 4.35e-3  # m, of the focal spot
+SOFT = Material(density=1000, shear_modulus=8e3, poisson=0.45, viscosity=1.0)
+STIFF = Material(density=1100, shear_modulus=60e3, poisson=0.4, loss_factor=0.1)
+
+
+def solid(poisson, **loss):
+    return Material(density=1000, shear_modulus=25e3, poisson=poisson, **loss)
+
+
+def roots_of(curves, n=0):
+    """Wavenumbers of all modes at a frequency."""
+    return np.array([mode.wavenumbers[n] for mode in curves.modes])
+
+
+@pytest.mark.parametrize(
+    ("poisson", "ratio"), [(0.25, 0.919402), (0.3, 0.927413), (0.4, 0.942195), (0.49, 0.954074),
+                       (0.499, 0.955189), (0.4999, 0.955300)],
+)  # fmt: skip
+def test_rayleigh_wave_of_a_half_space(poisson, ratio):
+    material = solid(poisson)
+    (mode,) = dispersion_curves(Stack(materials=(material,), thicknesses=(inf,)), [50, 200]).modes
+    assert mode.name == "Rayleigh wave"
+    assert mode.phase_speed / material.shear_speed == pytest.approx([ratio] * 2, rel=1e-6)
+    assert mode.group_speed == pytest.approx(mode.phase_speed, rel=1e-6)
+    assert set(mode.kinds) == {"propagating"}
+
+
+def test_rayleigh_wave_with_viscosity_goes_with_the_complex_modulus():
+    forearm = PRESETS["forearm"]
+    (mode,) = dispersion_curves(Stack(materials=(forearm,), thicknesses=(inf,)), [80, 200]).modes
+    speed = 0.955300 * np.sqrt(forearm.complex_modulus(2 * pi * mode.frequencies) / 1000)
+    assert mode.wavenumbers == pytest.approx(2 * pi * mode.frequencies / speed, rel=1e-5)
+    assert mode.decay_length[1] == pytest.approx(7.3e-3, rel=0.01)  # published beside 3.25 m/s
+
+
+@pytest.mark.parametrize("poisson", [0.25, 0.49, 0.4999])
+def test_layers_of_the_material_of_the_half_space_below_have_its_rayleigh_wave(poisson):
+    """The thin-layer method, the matched layer and the refinement beside the closed form."""
+    material = solid(poisson, loss_factor=0.1)
+    stack = Stack(materials=(material, material), thicknesses=(0.004, inf))
+    rayleigh = Stack(materials=(material,), thicknesses=(inf,))
+    f = np.linspace(100, 300, 5)
+    (expected,) = dispersion_curves(rayleigh, f).modes
+    found = dispersion_curves(stack, f)
+    (waves,) = [mode for mode in found.modes if (mode.kinds == "propagating").any()]
+    assert waves.wavenumbers == pytest.approx(expected.wavenumbers, rel=1e-8)
+    assert waves.group_speed == pytest.approx(expected.group_speed, rel=1e-5)
+    assert waves.residues == pytest.approx(expected.residues, rel=1e-5)
+    own, closed = (x.shapes[0] / x.shapes[0, 0, 1] for x in (waves, expected))
+    at, depths = found.depths.searchsorted(0.0035), dispersion_curves(rayleigh, f).depths
+    for axis in (0, 1):
+        there = np.interp(found.depths[at], depths, closed[:, axis])
+        assert own[at, axis] == pytest.approx(there, abs=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("poisson", "w", "a0", "s0"), [(0.3, 0.1, 0.21697, 1.69026), (0.3, 0.25, 0.33424, None),
+                           (0.3, 0.5, 0.45358, None), (0.3, 1, 0.59464, 1.68562),
+                           (0.3, 2, 0.73800, None), (0.3, 5, 0.87612, None)],
+)  # fmt: skip
+def test_rayleigh_lamb_waves_of_a_plate(poisson, w, a0, s0):
+    material, thickness = solid(poisson), 0.01
+    plate = Stack(materials=(material,), thicknesses=(thickness,), base="free")
+    found = dispersion_curves(plate, [w * material.shear_speed / thickness / (2 * pi)])
+    speeds = np.sort([m.phase_speed[0] for m in found.modes if m.is_wave[0]]) / material.shear_speed
+    assert speeds[0] == pytest.approx(a0, rel=1e-4)
+    if s0:
+        assert speeds[1] == pytest.approx(s0, rel=1e-4)
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.49, 0.4999])
+def test_cut_offs_of_a_slab_on_a_rigid_base(poisson):
+    """At odd multiples of c_s/4H and of c_p/4H: there a mode has k = 0."""
+    material, depth = solid(poisson), 0.015
+    stack = Stack(materials=(material,), thicknesses=(depth,))
+    shear, pressure = (c / (4 * depth) for c in (material.shear_speed, material.pressure_speed))
+    expected = [shear, 3 * shear, 5 * shear] + [pressure, 3 * pressure] * (poisson == 0.3)
+    for cut_off in expected:
+        found = dispersion_curves(stack, cut_off * np.array([0.999, 1.0, 1.001]))
+        below, at, above = (np.nanmin(np.abs(roots_of(found, n))) for n in range(3))
+        assert at < 0.05 * min(below, above), cut_off
+    first = dispersion_curves(stack, np.linspace(20, 200, 10)).modes[0]
+    assert first.cut_on == pytest.approx(shear, rel=1e-3)  # between two frequencies
+    assert set(first.kinds[first.frequencies < shear]) == {"evanescent"}
+
+
+def waves_in(material, omega, k):
+    """Motion and stress (4, 4) at z of waves e^{+-p z}, e^{+-s z}, as a function of z."""
+    mu = complex(material.complex_modulus(omega))
+    lam = 2 * material.poisson / (1 - 2 * material.poisson) * mu
+    p = np.sqrt(k**2 - material.density * omega**2 / (lam + 2 * mu) + 0j)
+    s = np.sqrt(k**2 - material.density * omega**2 / mu + 0j)
+
+    def at(z, reference):
+        columns = []
+        for b, is_shear in ((p, 0), (-p, 0), (s, 1), (-s, 1)):
+            # u = (d phi/dx - d psi/dz, d phi/dz + d psi/dx) of e^{-ikx + b (z - z0)}
+            u, w = (-b, -1j * k) if is_shear else (-1j * k, b)
+            normal = lam * -1j * k * u + (lam + 2 * mu) * b * w
+            z0 = reference[0] if b.real < 0 else reference[1]
+            columns.append(
+                np.array([u, w, normal, mu * (b * u - 1j * k * w)]) * np.exp(b * (z - z0))
+            )
+        return np.array(columns).T
+
+    return at
+
+
+def secular(stack, omega, k):
+    """Determinant of the boundary conditions of layers on a rigid or free base."""
+    n = len(stack.materials)
+    matrix, top, row = np.zeros((4 * n, 4 * n), complex), 0.0, 2
+    for j, (material, thickness) in enumerate(zip(stack.materials, stack.thicknesses, strict=True)):
+        at, ends = waves_in(material, omega, k), (top, top + thickness)
+        upper, lower = at(ends[0], ends), at(ends[1], ends)
+        scale = np.array([k, k, 1e4, 1e4]) / 1e4
+        upper, lower = upper / scale[:, None], lower / scale[:, None]
+        columns = slice(4 * j, 4 * j + 4)
+        if j == 0:
+            matrix[:2, columns] = upper[2:]
+        else:
+            matrix[row - 4 : row, columns] = -upper
+        if j == n - 1:
+            matrix[row:, columns] = lower[2:] if stack.base == "free" else lower[:2]
+        else:
+            matrix[row : row + 4, columns] = lower
+        row, top = row + 4, ends[1]
+    sign, size = np.linalg.slogdet(matrix / np.abs(matrix).max(axis=1, keepdims=True))
+    return sign * np.exp(size)
+
+
+def refined(stack, omega, start):
+    """The root of the determinant by the secant method."""
+    k, before = start * (1 + 1e-4), start * (1 - 2e-4j)
+    last = secular(stack, omega, before)
+    for _ in range(40):
+        value = secular(stack, omega, k)
+        if value == last or abs(k - before) < 1e-12 * abs(k):
+            break
+        k, before, last = k - value * (k - before) / (value - last), k, value
+    return k
+
+
+@pytest.mark.parametrize("base", ["clamped", "free"])
+@pytest.mark.parametrize("f", [60.0, 210.0])
+def test_modes_of_layers_are_roots_of_a_determinant_that_shares_no_code(base, f):
+    stack = Stack(materials=(SOFT, STIFF, SOFT), thicknesses=(0.003, 0.004, 0.005), base=base)
+    roots = roots_of(dispersion_curves(stack, [f]))
+    assert len(roots) == 6
+    for k in roots:
+        assert abs(refined(stack, 2 * pi * f, k) - k) < 1e-6 * abs(k)
+
+
+def test_group_speed_is_the_derivative_of_refined_phase_curves():
+    stack = Stack(materials=(SOFT, STIFF), thicknesses=(0.004, 0.008))
+    f = np.array([140.0])
+    found, step = dispersion_curves(stack, f), 1e-4
+    for mode in found.modes:
+        ends = [refined(stack, 2 * pi * 140 * (1 + d), mode.wavenumbers[0]) for d in (-step, step)]
+        slowness = (ends[1] - ends[0]) / (2 * pi * 140 * 2 * step)
+        assert abs(mode.slowness[0] - slowness) < 1e-4 * abs(slowness)
+        if abs(slowness.imag) > abs(slowness.real):
+            assert np.isnan(mode.group_speed[0])
+        else:
+            assert mode.group_speed[0] == pytest.approx(1 / slowness.real, rel=1e-3)
+    assert any(np.isfinite(mode.group_speed[0]) for mode in found.modes)
+
+
+@pytest.mark.parametrize("f", [60.0, 140.0, 300.0])
+def test_modes_of_a_slab_add_up_to_its_wavenumber_integral(f):
+    """Residues of all poles: what each mode carries of the motion beyond the focal spot."""
+    palm = PRESETS["palm"]
+    stack = Stack(materials=(palm,), thicknesses=(0.015,))
+    ((expected,),) = point_response(slab(palm, 0.015), [0.03], [2 * pi * f], WIDTH)
+    found = sum(m.amplitude(WIDTH, 0.03)[0] for m in dispersion_curves(stack, [f], most=12).modes)
+    assert abs(found - expected) < 1e-6 * abs(expected)
+
+
+@pytest.mark.parametrize("name", ["palm", "forearm", "paper"])
+def test_residues_are_those_of_the_compliance(name):
+    """G (k^2 - k_m^2) next to the pole, of a half-space and of a sheet with air."""
+    material, f = PRESETS[name], 140.0
+    (mode,) = dispersion_curves(Stack(materials=(material,), thicknesses=(inf,)), [f]).modes
+    bending = sheet_curves(material, 1e-3, [f]).modes[0]
+    for wave, compliance in ((mode, half_space(material)), (bending, thin_sheet(material, 1e-3))):
+        k, beside = wave.wavenumbers[0], wave.wavenumbers[0] * (1 + 1e-5 * np.array([1, -1]))
+        near = compliance(beside, np.array(2 * pi * f + 0j)) * (beside**2 - k**2)
+        assert abs(near.mean() / wave.residues[0] - 1) < 1e-6
+
+
+def test_bending_waves_of_a_sheet_in_vacuum_and_in_air():
+    paper = PRESETS["paper"]
+    bare = sheet_curves(paper, 1e-4, [140.0], air_density=0)
+    ((expected,),) = point_response(
+        thin_sheet(paper, 1e-4, air_density=0), [0.02], [280 * pi], WIDTH
+    )
+    assert abs(sum(m.amplitude(WIDTH, 0.02)[0] for m in bare.modes) / expected - 1) < 1e-6
+    elastic = replace(paper, loss_factor=0.0)
+    (wave, _) = sheet_curves(elastic, 1e-4, [140.0], air_density=0).modes
+    assert wave.group_speed[0] == pytest.approx(2 * wave.phase_speed[0], rel=1e-6)
+    aired, not_aired = (
+        sheet_curves(paper, 1e-4, [80.0, 191.0], air_density=air).modes[0].phase_speed
+        for air in (1.2, 0.0)
+    )
+    slower = aired / not_aired
+    assert (np.abs(slower - 0.94) < 0.03).all()  # by 4 to 8 %, less at higher ones
+    assert slower[1] > slower[0]
+
+
+def test_a_mode_keeps_its_name_along_frequency():
+    """Tracked in steps of 20 Hz as in steps of 2 Hz, across cut-offs and where curves are close."""
+    stack = Stack(materials=(PRESETS["palm"],), thicknesses=(0.015,))
+    coarse, fine = (dispersion_curves(stack, np.arange(20, 601, step)) for step in (20, 2))
+    for mode in coarse.modes[:3]:
+        assert np.isfinite(mode.wavenumbers).all()
+        same = min(fine.modes, key=lambda m: abs(m.wavenumbers[-1] - mode.wavenumbers[-1]))
+        assert np.abs(same.wavenumbers[::10] - mode.wavenumbers).max() < 1e-3
+        between = np.sqrt(mode.squared_at(fine.frequencies))
+        apart = np.abs(between.real - np.abs(same.wavenumbers.real))
+        assert apart.max() < 0.02 * np.abs(same.wavenumbers).max()
+
+
+def test_a_stiff_skin_on_a_softer_half_space_begins_to_leak():
+    """Its wave is slower than shear waves below at first, and then faster."""
+    stack = Stack(materials=(PRESETS["dermis"], PRESETS["muscle"]), thicknesses=(0.002, inf))
+    mode = dispersion_curves(stack, np.arange(20, 301, 20)).modes[0]
+    assert mode.kinds[0] == "propagating"
+    assert mode.kinds[-1] == "leaky"
+    below = np.sqrt(PRESETS["muscle"].complex_modulus(2 * pi * mode.frequencies) / 1000)
+    below = 1 / (1 / below).real
+    slower = mode.phase_speed < below
+    assert slower[[0, -1]].tolist() == [True, False]
+
+
+@pytest.mark.parametrize("f", [[], [0.0, 10.0], [20.0, 10.0], [10.0, inf]])
+def test_frequencies_are_checked(f):
+    with pytest.raises(ValueError, match="above 0 Hz and ascending"):
+        dispersion_curves(Stack(materials=(SOFT,), thicknesses=(0.01,)), f)
+
+
+def scene_of(text):
+    from skinwave.scene.file import loads
+
+    return loads(text)
+
+
+CIRCLE = """
+[tacton]
+am_frequency_hz = 140
+duration_s = 0.5
+shape = "circle"
+size_mm = 20
+speed_m_per_s = 12
+[body]
+"""
+
+
+@pytest.fixture(scope="module")
+def driven():
+    return driven_modes(scene_of(CIRCLE + 'kind = "slab"'), spacing=24)
+
+
+@pytest.mark.parametrize("width", [None, 2.5, 3.5, 5.0, 7.0])
+@pytest.mark.parametrize("kind", ["slab", "sheet"])
+def test_no_text_of_the_curves_is_cut_or_over_another(driven, kind, width):
+    found = driven
+    if kind == "sheet":
+        found = driven_modes(scene_of(CIRCLE + 'kind = "sheet"\nmaterial = "paper"'))
+    lines = {line.name: line.frequency for line in found.lines}
+    chosen = style("print", width) if width else STYLES["report"]
+    figure = dispersion_figure(found.curves, lines, 12.0, found.lines[0].frequency, chosen)
+    assert illegible(figure) == []
+    if width:
+        assert figure.get_figwidth() == width
+        assert sizes(figure) == {8.0}
+    named = [text.get_text() for text, _ in texts(figure) if "$" in text.get_text()]
+    assert "$f_{d}$" in named  # the strongest
+    assert len(named) == len(set(named)) >= 3
+
+
+def test_lines_of_a_load_are_at_their_own_frequencies_on_the_curves(driven):
+    line = driven.lines[0]
+    assert line.name == "f_d"
+    assert line.frequency == pytest.approx(12 / (pi * 0.02))
+    assert driven.curves.frequencies[line.at] == line.frequency
+    (alone,) = [m for m in dispersion_curves(
+        Stack(materials=(PRESETS["palm"],), thicknesses=(0.015,)), [line.frequency]).modes
+        if abs(m.phase_speed[0] / line.phase_speed - 1) < 1e-6]  # fmt: skip
+    assert alone.decay_length[0] == pytest.approx(line.decay_length, rel=1e-6)
+    assert line.mach_angle == pytest.approx(np.degrees(np.arcsin(line.phase_speed / 12)))
+    below = next(line for line in driven.lines if line.name == "f_d-f_AM")  # 51 Hz
+    assert (below.kind, below.mach_angle) == ("evanescent", None)
+
+
+def test_driven_mode_is_the_one_that_carries_most_of_the_motion(driven):
+    """Beyond the focal spot it leaves less of the wavenumber integral than any other wave does."""
+    line = next(line for line in driven.lines if line.name == "2f_d-f_AM")
+    at, k = 0.0232, line.at
+    ((whole,),) = point_response(
+        slab(PRESETS["palm"], 0.015), [at], [2 * pi * line.frequency], WIDTH
+    )
+    parts = {m.name: m.amplitude(WIDTH, at)[k] for m in driven.curves.modes if m.is_wave[k]}
+    left = {name: abs(whole - part) for name, part in parts.items()}
+    assert min(left, key=left.get) == line.mode.name
+    assert len(left) > 1
+
+
+def test_sentences_say_speed_decay_focus_and_cut_off(driven):
+    from skinwave.studies.dispersion_page import sentences
+
+    mode, focus, cut_off = sentences(driven)
+    assert mode.startswith("The strongest line, f_d at 191 Hz, drives most of all mode 2 (prop")
+    assert "5.95 m/s" in mode
+    assert "1/e in 18.4 mm" in mode
+    assert "2.02 times as fast: a Mach angle of 30 degrees" in focus
+    assert cut_off == "Below 84 Hz no wave propagates."
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [('kind = "palm"', "as deep as the middle of the palm, 15 mm"),
+     ('kind = "slab"\nbase = "absorbing"', "taken as a half-space of the lowest material"),
+     ('kind = "slab"\nthickness_mm = inf', "Rayleigh wave"),
+     ('kind = "sheet"', "bending wave"),
+     ('kind = "slab"\n[[body.layers]]\nthickness_mm = 1.5\nmaterial = "dermis"', "mode 1")],
+)  # fmt: skip
+def test_every_kind_of_body_with_a_depth_has_curves(body, said):
+    from skinwave.studies.dispersion_page import sentences, taken_as
+
+    found = driven_modes(scene_of(CIRCLE + body), spacing=12)
+    text = " ".join([*sentences(found), *taken_as(found.scene), found.curves.modes[0].name])
+    assert said in text
+    assert all(line.decay_length > 0 for line in found.lines)
+
+
+def test_command_writes_a_page_a_table_and_arrays(tmp_path, capsys):
+    from skinwave.commands.cli import main
+
+    (tmp_path / "scene.toml").write_text(CIRCLE + 'kind = "slab"')
+    out = tmp_path / "out"
+    asked = [str(tmp_path / "scene.toml"), "--modes", "3", "--highest", "300"]
+    assert main(["dispersion", *asked, "-o", str(out)]) == 0
+    assert capsys.readouterr().out.startswith("The strongest line, f_d at 191 Hz, drives")
+    header, first = (out / "dispersion.csv").read_text().splitlines()[:2]
+    assert header.split(",")[:4] == ["mode", "kind", "frequency_hz", "re_k_rad_per_m"]
+    assert first.split(",")[2] == "10"
+    page = (out / "index.html").read_text()
+    assert page.index("The strongest line") < page.index('id="dispersion"') < page.index("<table")
+    arrays = np.load(out / "dispersion.npz")
+    assert arrays["wavenumber_per_m"].shape == (3, len(arrays["frequency_hz"]))
+    assert arrays["frequency_hz"].max() == 300
+
+
+@pytest.mark.parametrize(
+    ("body", "asked", "said"),
+    [('kind = "none"', [], "take a slab of its depth and layers"),
+     ('kind = "slab"', ["--highest", "5"], "must be above 20 Hz"),
+     ('kind = "slab"', ["--highest", "nan"], "must be above 20 Hz"),
+     ('kind = "slab"', ["--modes", "0"], "outside 1..12"),
+     ('kind = "slab"\nthickness_mm = 500', [], "elements in depth, the limit is 20"),
+     ('kind = "slab"', ["--highest", "1e9"], "elements in depth, the limit is 20"),
+     ('kind = "slab"\nsize_x_mm = 45', ["--model", "flat-body"], "too near to see waves")],
+)  # fmt: skip
+def test_command_refuses_in_one_sentence(tmp_path, capsys, body, asked, said):
+    from skinwave.commands.cli import main
+
+    (tmp_path / "scene.toml").write_text(CIRCLE + body)
+    out = str(tmp_path / "out")
+    assert main(["dispersion", str(tmp_path / "scene.toml"), "--quiet", "--out", out, *asked]) == 2
+    told = capsys.readouterr().err
+    assert said in told
+    assert told.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_wavenumbers_in_the_motion_are_those_of_the_modes(driven):
+    """By the wavenumber integral from rest; that of finite elements is seen the same way."""
+    from skinwave.studies.dispersion_page import observe
+    from skinwave.system.effort import silent
+
+    found = observe(driven, "flat-body", silent)
+    f, apart = found.matched.frequencies, found.matched.apart
+    assert len(f) > 25
+    assert apart.max() < 0.03
+    assert np.median(apart) < 0.01
+    # Both modes are seen, each where it leads.
+    assert np.ptp(found.matched.modes.real[(f > 150) & (f < 200)]) > 80
+
+
+def test_wavenumbers_are_those_of_the_motion_whatever_a_scene_reads(driven):
+    from dataclasses import replace
+
+    from skinwave.studies.wavenumbers import pulse_scene
+
+    below = replace(driven.scene, quantity="strain_zz", depth=(7e-4,) * len(driven.scene.probes))
+    assert pulse_scene(below) == pulse_scene(driven.scene)
+
+
+def test_only_wavenumbers_that_the_line_resolves_are_reported():
+    """Two waves in noise, one of which fades ever sooner: errors are standard."""
+    from scipy.special import hankel2
+
+    from skinwave.studies.wavenumbers import UNSURE, LineOfProbes, fitted_waves
+
+    r, f = np.arange(5e-3, 45.5e-3, 1e-3), np.linspace(100.0, 400.0, 25)
+    first, second = f * 1.3 - 1j * (30 + f / 20), 20 + f * 0.4 - 1j * (20 + (f / 45) ** 2.2)
+    waves = hankel2(0, first[:, None] * r) + 1.5 * hankel2(0, second[:, None] * r)
+    rng = np.random.default_rng(0)
+    noise = rng.standard_normal((2, *waves.shape))
+    size = 0.015 * np.abs(waves[:, 12:13])  # where the fit begins
+    line = LineOfProbes(
+        frequencies=f, distances=r, transfer=waves + size * (noise[0] + 1j * noise[1])
+    )
+    found = fitted_waves(line, 0.2)
+    nearest = np.nanargmin(np.abs(found.wavenumbers - second[:, None]), axis=1)
+    own = np.arange(len(f)), nearest
+    resolved, errors = found.is_resolved[own], found.errors[own]
+    apart = np.abs(found.wavenumbers[own].real / second.real - 1)
+    assert 8 <= resolved.sum() < len(f)
+    assert (apart < 3 * errors)[resolved].all()
+    assert apart[resolved].max() < 2 * UNSURE
+    assert apart[~resolved].max() > UNSURE
+    faded = np.abs(second.imag) * found.aperture > 3.5
+    assert faded.any()
+    assert not resolved[faded].any()
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.4999])
+def test_a_thin_layer_leaves_long_waves_to_the_half_space_below(poisson):
+    """Without loss, so that bound waves are real, and with as many modes as there may be."""
+    below, thin = solid(poisson), Material(density=1000, shear_modulus=50e3, poisson=poisson)
+    stack = Stack(materials=(thin, below), thicknesses=(2e-4, inf))
+    mode = dispersion_curves(stack, [5.0, 10.0, 40.0, 160.0], most=12).modes[0]
+    assert set(mode.kinds) == {"propagating"}
+    ratio = mode.phase_speed / below.rayleigh_speed
+    assert (np.diff(ratio) > 0).all()  # shorter waves have more of it in the stiffer layer
+    assert ratio[0] == pytest.approx(1, abs=1e-3)
+    assert np.abs(mode.wavenumbers.imag).max() < 1e-9 * mode.wavenumbers.real.max()
+
+
+def bound_speeds(stack, hertz, slowest, fastest):
+    """Speeds of the waves between two, ascending, where the compliance of the surface is infinite:
+    without loss 1/G is real, and each sign of it that changes through 0 is one.
+    """
+    w = 2 * np.pi * hertz
+    k = np.linspace(w / fastest, w / slowest, 20_000)
+    stiff = (1 / layered(stack)(k + 0j, np.array([[w + 0j]])))[0].real
+    size = np.abs(stiff)
+    crossing = np.flatnonzero(stiff[1:-2] * stiff[2:-1] < 0) + 1
+    found = [i for i in crossing if size[i - 1] > size[i] and size[i + 2] > size[i + 1]]
+    return w / k[found][::-1]
+
+
+@pytest.mark.parametrize("depth", [inf, 6.0])
+def test_few_frequencies_lose_no_wave(depth):
+    """Soft ground of 6 m, on a half-space or on a layer with a clamped base, at a few frequencies
+    that are far from each other.
+    """
+    solids = [Material(density=1900, shear_modulus=1900 * c**2, poisson=0.4) for c in (200, 700)]
+    stack = Stack(materials=tuple(solids), thicknesses=(6.0, depth))
+    hertz = np.array([10.0, 20.0, 40.0, 60.0, 100.0])
+    curves = dispersion_curves(stack, hertz, most=4)
+    for j, f in enumerate(hertz):
+        speeds = np.array([mode.phase_speed[j] for mode in curves.modes])
+        for exact in bound_speeds(stack, f, 180.0, 690.0)[:4]:
+            assert np.nanmin(np.abs(speeds / exact - 1)) < 1e-3, (f, exact)

@@ -1,0 +1,283 @@
+"""Loads faster than their samples: lines above half the rate, jumps, and ends of records."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from simple_model import (
+    MovingPressure,
+    Rhythm,
+    Tacton,
+    Trajectory,
+    flat_body,
+    joined,
+    lines,
+    point_kernel,
+    steady_state,
+)
+from simple_model.compliance import slab
+from simple_model.flat_body import steady_lines
+from simple_model.flat_quantities import from_rest, steady, surface_field
+from simple_model.focus import spot_width
+from simple_model.load_spectrum import load_lines, pressure_lines, synthesise
+from simple_model.material import PRESETS
+from simple_model.path_cells import path_fourier, path_samples
+from simple_model.quantities import ACCELERATION, DISPLACEMENT, VELOCITY
+from simple_model.sampling import resolving_step
+from simple_model.wavenumber_integral import point_response
+from skinwave import Body, Scene
+from skinwave.bodies import BODIES
+from skinwave.models import stretching
+from skinwave.planning.simulate import answered, compute
+
+PALM = slab(PRESETS["palm"], 0.015)
+PROBES = np.array([[0.01, 0.0], [0.02, 0.0]])
+TIMES = np.arange(4000) / 1e4
+LATE = slice(2500, 3800)  # the transient has died out, and the end has no effect yet
+SKIN = Body(width=0.06, height=0.06, sides="clamped")
+
+
+def circling(size, speed, am=0.0, **load):
+    path = Trajectory(shape="circle", size=size, speed=speed)
+    return MovingPressure(
+        tacton=Tacton(am_frequency=am, trajectory=path), **{"peak_pressure": 1.0} | load
+    )
+
+
+def misfit(found, expected, alternating, late=LATE):
+    """Root mean square (p,) of what differs late, relative to that of the alternating part."""
+    return np.sqrt(((found - expected)[late] ** 2).mean(axis=0)) / alternating
+
+
+def alternating(load):
+    f, a = steady_lines(PALM, load, PROBES)
+    return np.sqrt((np.abs(a[f > 0]) ** 2).sum(axis=0) / 2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("size", "speed", "am"),
+    [(5e-3, 100.0, 140.0), (10e-3, 100.0, 0.0), (20e-3, 30.0, 140.0), (20e-3, 100.0, 140.0),
+     (40e-3, 100.0, 140.0)],
+)  # fmt: skip
+def test_flat_body_settles_into_the_steady_state_on_fast_circles(size, speed, am):
+    load, times = circling(size, speed, am), TIMES[:3000]
+    found, expected = (
+        model(PALM, load, PROBES, times).displacement for model in (flat_body, steady_state)
+    )
+    late = slice(2500, 2850)
+    assert misfit(found, expected, alternating(load), late).max() < 0.01
+
+
+@pytest.mark.parametrize("model", [flat_body, steady_state])
+@pytest.mark.parametrize(
+    ("size", "speed", "folded"),
+    [(0.02, 100.0, 450.7), (0.01, 100.0, 3633.8), (0.005, 60.0, 2360.6)],
+)
+def test_no_line_of_a_fast_circle_shows_at_another_frequency(model, size, speed, folded):
+    load = circling(size, speed)
+    false = lines(model(PALM, load, PROBES, TIMES), [folded], settle=0.5)
+    assert (false < 1e-3 * alternating(load)).all()
+
+
+def test_a_fast_recorded_circle_moves_a_body_as_the_circle_does():
+    load = circling(0.02, 100.0)
+    path = load.tacton.trajectory
+    recorded = joined([path], path.drawing_frequency)
+    again = replace(load, tacton=replace(load.tacton, trajectory=recorded))
+    found = flat_body(PALM, again, PROBES, TIMES).displacement
+    expected = steady_state(PALM, load, PROBES, TIMES).displacement
+    differs = (found - expected)[LATE].std(axis=0)  # the polygon's mean is another by 3e-5
+    assert (differs < 0.01 * alternating(load)).all()
+
+
+def test_pulses_of_a_fast_circle_do_not_fold():
+    load = circling(0.02, 100.0)
+    pulsed = Tacton(trajectory=load.tacton.trajectory, rhythm=Rhythm(pulses=((0.3, 0.0),)))
+    found, expected = (
+        model(PALM, its, PROBES, TIMES[:2850]).displacement
+        for model, its in ((flat_body, replace(load, tacton=pulsed)), (steady_state, load))
+    )
+    assert misfit(found, expected, alternating(load), slice(2500, 2850)).max() < 0.01
+
+
+@pytest.mark.parametrize("load", [circling(0.02, 100.0, 140.0), circling(0.0, 0.0, 6200.0)])
+def test_the_kernel_has_the_lines_of_its_load_below_half_the_rate(load):
+    found = point_kernel(load, PROBES, TIMES).displacement
+    parts = load_lines(load)
+    spots = path_fourier(load, load.spot(PROBES, path_samples(load)).T)
+    f, a = parts.gather(spots.T)
+    expected = synthesise(f[f < 4800], a[f < 4800], TIMES)
+    misfit = np.abs(lines_of(found) - lines_of(expected))[:4600] / np.ptp(expected)
+    assert misfit.max() < 1e-4
+
+
+def lines_of(x):
+    """Amplitudes (f, p) at 0, 1, 2, ... Hz."""
+    window = np.hanning(len(x))[:, None]
+    return 2 * np.abs(np.fft.rfft(window * x, n=10_000, axis=0)) / window.sum()
+
+
+@pytest.mark.parametrize("am", [0.0, 200.0])
+@pytest.mark.parametrize("speed", [6.0, 18.0])
+def test_the_kernel_of_ordinary_paths_is_the_load_itself(speed, am):
+    load = circling(0.03, speed, am)
+    found = point_kernel(load, PROBES, TIMES).displacement
+    np.testing.assert_array_equal(found, load(PROBES, TIMES))
+
+
+def test_elements_answer_no_line_at_another_frequency():
+    load = circling(0.005, 60.0)
+    load = replace(load, tacton=replace(load.tacton, duration=0.4))
+    found = answered(Scene(pressure=load, body=SKIN, probes=((0.005, 0.0),)), "fem", h=6e-3)
+    false, true = lines(found, [2360.6, 3819.7], settle=0.5)[:, 0]
+    assert false < 1e-3 * true
+
+
+def test_time_steps_resolve_a_fast_focus_and_leave_others_alone():
+    assert resolving_step(circling(0.03, 18.0, 200.0), 5e-5) == 5e-5
+    load = circling(0.005, 100.0)
+    assert 1 / resolving_step(load, 5e-5) > 6 * load.tacton.drawing_frequency
+    brief = replace(load, tacton=replace(load.tacton, duration=0.01))
+    found = compute(Scene(pressure=brief, body=SKIN), "fem-transient", h=10e-3)
+    assert found.effort.steps > 0.0099 * 6 * load.tacton.drawing_frequency
+
+
+THIN = slab(PRESETS["palm"], 0.004)
+BESIDE = np.array([[0.009, 0.0], [0.013, 0.002]])
+ONE_WAY = Trajectory(shape="line", size=0.02, speed=0.05, sweep="one_way")  # 0.4 s
+
+
+def at_rest(load, times):
+    """Static deflection (t, p) under the focus where it is at each time."""
+    away = np.linalg.norm(BESIDE[:, None] - load.tacton.trajectory.position(times), axis=-1)
+    r = np.linspace(0, 0.03, 200)
+    g = point_response(THIN, r, [0.0], spot_width(0.2))[0].real
+    return load.gain(0.0) * CubicSpline(r, g)(away).T
+
+
+@pytest.mark.parametrize("model", [flat_body, steady_state])
+def test_a_slow_line_jumps_back_at_once(model):
+    load = MovingPressure(tacton=Tacton(trajectory=ONE_WAY, duration=0.44))
+    times = np.arange(4400) / 1e4
+    found, expected = model(THIN, load, BESIDE, times).displacement, at_rest(load, times)
+    settled = (np.abs(times - 0.410) > 0.010) & (np.abs(times - 0.005) > 0.005)
+    assert np.abs(found - expected)[settled].max() < 5e-3 * np.abs(expected).max()
+    late = (times > 0.38) & (times < 0.399)  # just before it, where the motion is largest
+    assert np.abs(found - expected)[late].max() < 5e-3 * np.abs(expected).max()
+
+
+def test_lines_of_a_slow_line_are_followed_to_the_band_of_bodies():
+    load = MovingPressure(tacton=Tacton(trajectory=ONE_WAY, duration=0.44))
+    times = 0.4 + np.array([-0.5, -0.1, 0.1, 0.5]) * 1e-3  # seen through 10 kHz
+    f, a = pressure_lines(load, BESIDE)
+    sine = 0.09 * load(BESIDE, [0.3999])  # what is left of a jump that is followed so far
+    assert np.abs(synthesise(f, a, times) - load(BESIDE, times)).max() < sine.max()
+
+
+def test_jumps_of_a_recording_are_where_they_are():
+    """Between samples and at the end of its period, against eight times as many samples."""
+    path = Trajectory(
+        shape="recorded", points=((0.006, 0.006), (0.006, -0.006), (-0.006, -0.006)) * 2,
+        times=(0.0, 0.01055, 0.01055, 0.01705, 0.02203, 0.02203),
+    )  # fmt: skip
+    for hold in (False, True):
+        load = MovingPressure(
+            tacton=Tacton(trajectory=replace(path, hold=hold), duration=0.06), peak_pressure=1.0
+        )
+        found, fine = (
+            flat_body(THIN, load, BESIDE, np.arange(600 * n) / (1e4 * n)).displacement[::n]
+            for n in (1, 8)
+        )
+        error = np.linalg.norm(found - fine, axis=0) / np.linalg.norm(fine, axis=0)
+        assert error.max() < 4e-3
+        steady = steady_state(THIN, load, BESIDE, np.arange(600) / 1e4).displacement
+        error = np.linalg.norm((found - steady)[300:], axis=0) / np.linalg.norm(steady, axis=0)
+        assert error.max() < 2e-3
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_rates_are_right_to_the_last_sample(order):
+    tacton = Tacton(am_frequency=49.46, duration=0.2)
+    load = MovingPressure(tacton=tacton, depth_of_modulation=0.1)  # the start is strong beside it
+    asked = (DISPLACEMENT, VELOCITY, ACCELERATION)[order]
+    field, times = surface_field(asked, THIN), np.arange(2000) / 1e4
+    found, expected = (model(field, asked, load, BESIDE, times) for model in (from_rest, steady))
+    differs = (found - expected)[1500:]
+    assert np.abs(differs).max() < 1e-3 * np.ptp(expected, axis=0).min()
+
+
+@pytest.mark.parametrize("model", [flat_body, steady_state, point_kernel])
+def test_few_samples_show_no_line_above_half_their_rate(model):
+    load, times = MovingPressure(tacton=Tacton(am_frequency=310.0)), np.arange(200) / 500
+    arguments = (load, BESIDE, times) if model is point_kernel else (THIN, load, BESIDE, times)
+    found = model(*arguments).displacement[100:]
+    assert (np.ptp(found, axis=0) < 1e-3 * np.abs(found).max(axis=0)).all()
+
+
+def test_coarse_samples_are_those_of_fine_ones():
+    load = circling(0.02, 6.0, 140.0)
+    load = replace(load, tacton=replace(load.tacton, duration=0.1))
+    f, a = steady_lines(THIN, load, BESIDE)
+    above = f > 1000
+    coarse = flat_body(THIN, load, BESIDE, np.arange(200) / 2000).displacement
+    fine = flat_body(THIN, load, BESIDE, np.arange(1000) / 1e4).displacement[::5]
+    allowed = np.abs(a[above]).sum(axis=0) + 2e-3 * np.abs(fine).max(axis=0)
+    assert (np.abs(coarse - fine).max(axis=0) < allowed).all()
+
+
+def test_lines_that_are_left_out_are_named():
+    load = MovingPressure(tacton=Tacton(am_frequency=310.0, duration=0.4))
+    scene = Scene(pressure=load, body=replace(SKIN, sides="absorbing"))
+    found = answered(scene, "flat-body-harmonic", times=np.arange(200) / 500)
+    assert np.ptp(found.values, axis=0).max() < 1e-3 * np.abs(found.values).max()
+    (said,) = [each for each in found.effort.warnings if "sampling rate" in each]
+    assert "above 250 Hz" in said
+    assert "f_AM at 310 Hz and 1 more" in said
+    cured = answered(scene, "flat-body-harmonic", times=np.arange(400) / 1300)
+    assert not any("sampling rate" in each for each in cured.effort.warnings)
+
+
+def test_every_model_answers_at_the_times_asked_for():
+    load = circling(0.005, 6.0)
+    load = replace(load, tacton=replace(load.tacton, duration=0.02))
+    times = 0.005 + np.arange(30) / 2e3
+    for model in ("point-kernel", "flat-body", "flat-body-harmonic", "fem", "fem-transient"):
+        body = replace(SKIN, sides="absorbing") if "flat" in model else SKIN
+        found = compute(Scene(pressure=load, body=body), model, times=times, h=10e-3)
+        np.testing.assert_allclose(found.times, times, atol=1e-12)
+
+
+STEPPED = {
+    "a jump between steps": (
+        {"trajectory": Trajectory(
+            shape="recorded", points=((0.004, 0.0), (-0.004, 0.0), (0.004, 0.004)),
+            times=(0.0, 0.005033, 0.0107), hold=True)},
+        None,
+    ),
+    "a line above half the rate": ({"am_frequency": 310.0}, np.arange(20) / 1e3),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", STEPPED)
+def test_time_steps_follow_the_load_of_lines(name):
+    tacton, times = STEPPED[name]
+    load = MovingPressure(tacton=Tacton(duration=0.02, **tacton))
+    scene = Scene(pressure=load, body=SKIN, probes=((0.005, 0.0),))
+    x, y = (compute(scene, model, times=times, h=10e-3) for model in ("fem", "fem-transient"))
+    assert np.linalg.norm(x.values - y.values) < 3e-3 * np.linalg.norm(y.values)
+
+
+def test_many_lines_push_a_stretching_sheet_as_their_sum_does(monkeypatch):
+    load = MovingPressure(
+        tacton=Tacton(duration=0.01, rhythm=Rhythm(pulses=((0.0033, 0.0031),))), peak_pressure=0.1
+    )
+    sheet = replace(BODIES["paper-sheet-loose"], width=0.06, height=0.06, air=False)
+    scene = Scene(pressure=load, body=sheet, probes=((0.005, 0.0),))
+    found, expected = [], []
+    for most, values in ((10, found), (10_000, expected)):
+        monkeypatch.setattr(stretching, "MOST_LINES", most)
+        values.append(compute(scene, "fem-nonlinear", h=12e-3).values)
+    assert np.linalg.norm(found[0] - expected[0]) < 1e-2 * np.linalg.norm(expected[0])

@@ -1,0 +1,177 @@
+"""Foci on paths of their own: one recording, and what every model makes of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from simple_model import (
+    MovingPressure,
+    Rhythm,
+    Signal,
+    Tacton,
+    Trajectory,
+    evenly,
+    flat_body,
+    joined,
+    lines,
+    named_lines,
+    point_kernel,
+)
+from simple_model.compliance import half_space
+from simple_model.joined import parted
+from simple_model.load_spectrum import load_lines
+from simple_model.material import PRESETS
+from simple_model.path_cells import path_fourier, path_samples
+from skinwave.models.speeds import period
+from skinwave.planning.simulate import compute
+from skinwave.scene.file import dumps, loads
+from skinwave.scene.scene import Body, Scene
+
+FREQUENCY = 185.0
+STRAIGHT = (
+    Trajectory(shape="square", size=0.015, centre=(-0.015, 0.010)),
+    Trajectory(shape="line", size=0.020, centre=(0.020, 0.0)),
+    Trajectory(shape="triangle", size=0.010, centre=(0.0, -0.020)),
+    Trajectory(shape="point", centre=(0.0, 0.020)),
+)
+WITH_ROUND = (Trajectory(shape="circle", size=0.020, centre=(-0.010, 0.0)), STRAIGHT[1])
+PULSES = Rhythm(pulses=((0.010, 0.006), (0.004, 0.013)), ramp=0.001)
+SKIN = half_space(replace(PRESETS["palm"], poisson=0.45))
+PLACES = np.array([[0.0, 0.0], [-0.015, 0.010], [0.020, 0.001], [0.004, -0.018]])
+
+
+def together(paths, **more):
+    """The load of all paths at once."""
+    path = joined(paths, FREQUENCY)
+    return MovingPressure(tacton=Tacton(trajectory=path, foci=evenly(len(paths)), **more))
+
+
+def alone(path, **more):
+    """The load of one of them."""
+    own = replace(path, speed=FREQUENCY * path.length)
+    return MovingPressure(tacton=Tacton(trajectory=own, **more))
+
+
+@pytest.mark.parametrize("more", [{"am_frequency": 140.0}, {"rhythm": PULSES}])
+def test_the_pressure_is_the_mean_of_each(more):
+    rng = np.random.default_rng(1)
+    points, times = rng.uniform(-0.04, 0.04, (200, 2)), rng.random(300)
+    for paths, error in ((STRAIGHT, 1e-6), (STRAIGHT[1:2], 1e-6), (WITH_ROUND, 2e-3)):
+        summed = sum(alone(path, **more)(points, times) for path in paths) / len(paths)
+        found = together(paths, **more)(points, times)
+        assert np.abs(found - summed).max() < error * np.abs(summed).max()
+
+
+@pytest.mark.parametrize("more", [{"am_frequency": 140.0}, {"rhythm": PULSES}])
+def test_exact_waves_are_the_mean_of_each(more):
+    times, paths = np.arange(100) / 1e4, STRAIGHT[:2]
+
+    def waves(load):
+        return flat_body(SKIN, load, PLACES[:2], times).displacement
+
+    found = waves(together(paths, **more))
+    each = [waves(alone(path, **more)) for path in paths]
+    assert np.linalg.norm(found - np.mean(each, axis=0)) < 5e-3 * np.linalg.norm(found)
+    # Sample by sample they are the mean, but for those about the jumps from path to path.
+    each = [waves(together([path], **more)) for path in paths]
+    assert np.abs(found - np.mean(each, axis=0)).max() < 1e-4 * np.abs(found).max()
+
+
+@pytest.mark.parametrize("paths", [STRAIGHT, WITH_ROUND], ids=["straight", "with a circle"])
+@pytest.mark.parametrize("more", [{"am_frequency": 140.0}, {"rhythm": PULSES, "duration": 0.297}])
+def test_lines_are_those_of_the_load_sampled(paths, more):
+    load = together(paths, **({"duration": 0.2} | more))
+    count = round(load.tacton.duration * 320_000)
+    sampled = np.fft.rfft(load(PLACES, (np.arange(count) + 0.5) / 320_000), axis=0)[:200] / count
+    sampled *= np.exp(-1j * np.pi * np.arange(200) / count)[:, None]
+    sampled[1:] *= 2
+    f, a = load_lines(load).gather(path_fourier(load, load.spot(PLACES, path_samples(load)).T).T)
+    found = np.zeros_like(sampled)
+    rank = np.round(f * load.tacton.duration).astype(int)
+    np.testing.assert_allclose(f, rank / load.tacton.duration, atol=1e-6)
+    found[rank[rank < 200]] = a[rank < 200]
+    assert np.abs(found - sampled).max() < 5e-4 * np.abs(sampled).max()
+
+
+@pytest.mark.parametrize("more", [{"am_frequency": 140.0}, {"rhythm": PULSES}])
+def test_bodies_answer_them_by_lines_as_by_time_steps(more):
+    small = [replace(p, size=0.6 * p.size, centre=(0.4 * p.centre[0], 0.4 * p.centre[1]))
+             for p in STRAIGHT[:3]]  # fmt: skip
+    scene = Scene(
+        pressure=together(small, duration=0.02, **more),
+        body=Body(width=0.03, height=0.03, depth=0.01, sides="clamped"),
+        probes=((0.0, 0.0), (0.005, 0.001)),
+    )  # fmt: skip
+    x = compute(scene, "fem", h=0.01).displacement
+    y = compute(scene, "fem-transient", h=0.01, dt=5e-5).displacement
+    assert (np.linalg.norm(x - y, axis=0) < 2e-3 * np.linalg.norm(y, axis=0)).all()
+    mean = np.mean([
+        compute(replace(scene, pressure=alone(path, duration=0.02, **more)), "fem",
+                 h=0.01).displacement for path in small
+    ], axis=0)  # fmt: skip
+    assert np.linalg.norm(x - mean) < 2e-3 * np.linalg.norm(mean)
+
+
+def test_lines_have_the_names_of_the_common_frequency():
+    load = together(STRAIGHT, am_frequency=83.0, duration=0.2)
+    names = named_lines(load)
+    assert load.tacton.drawing_frequency == pytest.approx(FREQUENCY)
+    assert [name for name in names if name.endswith("f_d")][:5] == ["f_d", "2f_d", "3f_d", "4f_d",
+                                                                    "5f_d"]  # fmt: skip
+    assert names["f_d"] == pytest.approx(FREQUENCY)
+    assert names["2f_d-f_AM"] == pytest.approx(2 * FREQUENCY - 83)
+    # A quarter of it cancels between them and is named by nothing.
+    found = load_lines(together(STRAIGHT)).frequencies
+    assert len(found) > 8
+    np.testing.assert_allclose(found / FREQUENCY, np.round(found / FREQUENCY), atol=1e-9)
+    response = point_kernel(load, PLACES, np.arange(8000) / 4e4)
+    assert (lines(response, [names["f_d"], names["f_d-f_AM"]]).max(axis=1) > 0.1).all()
+    assert period(together(STRAIGHT)) == pytest.approx(1 / FREQUENCY)
+
+
+def test_a_recording_that_is_run_through_once_has_no_drawing_frequency():
+    once = together(STRAIGHT, duration=1 / FREQUENCY)
+    assert not named_lines(once)
+    assert named_lines(together(STRAIGHT, duration=2 / FREQUENCY))
+
+
+def test_each_path_is_there_again_among_the_parts():
+    for path, part in zip(STRAIGHT, parted(joined(STRAIGHT, 3.0), 4), strict=True):
+        corners = path.at_phase(np.linspace(0, 1, len(part)))
+        np.testing.assert_allclose(part, corners, atol=1e-12)
+    round_ = parted(joined([WITH_ROUND[0]], 3.0), 1)[0]
+    middles = (round_[1:] + round_[:-1]) / 2 - WITH_ROUND[0].centre
+    assert np.linalg.norm(middles, axis=1) == pytest.approx(0.010, abs=1e-5)
+
+
+def test_a_scene_keeps_them():
+    scene = Scene(pressure=together(STRAIGHT, rhythm=PULSES), body=Body(), probes=((0.0, 0.0),))
+    assert loads(dumps(scene)) == scene
+
+
+def test_a_path_with_levels_takes_no_rhythm_and_a_long_one_has_one_line_at_each_frequency():
+    path = joined(STRAIGHT[:1], 1.0)
+    for more in ({"rhythm": PULSES}, {"signal": Signal(rate=800, samples=(0.0, 1.0))}):
+        Tacton(trajectory=path, **more)
+        with pytest.raises(ValueError, match="levels of its own"):
+            Tacton(trajectory=replace(path, levels=(1.0,) * len(path.times)), **more)
+    rng = np.random.default_rng(0)
+    places = tuple(map(tuple, rng.uniform(-0.02, 0.02, (4001, 2)).tolist()))
+    noise = Trajectory(shape="recorded", points=places, times=tuple(np.arange(4001) / 1e3))
+    load = MovingPressure(tacton=Tacton(trajectory=noise, rhythm=PULSES, duration=4.0))
+    assert len(load_lines(load, 1e-9).frequencies) == 40_001  # up to 10 kHz, one each 0.25 Hz
+
+
+@pytest.mark.parametrize(
+    ("paths", "frequency", "said"),
+    [
+        ((), 100.0, "no paths to join"),
+        (STRAIGHT, 0.0, "above 0"),
+        (STRAIGHT, float("nan"), "above 0"),
+        ((joined(STRAIGHT, 1.0),), 1.0, "a recorded path has points of its own"),
+    ],
+)
+def test_what_cannot_be_joined_is_refused(paths, frequency, said):
+    with pytest.raises(ValueError, match=said):
+        joined(paths, frequency)

@@ -1,0 +1,335 @@
+"""Every line by its name: named from the load's own spectrum, and all else listed by its kind."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from simple_model import (
+    SUPERPOSITIONS,
+    MovingPressure,
+    Response,
+    Rhythm,
+    Signal,
+    Tacton,
+    Trajectory,
+    line_table,
+    lines,
+    named_lines,
+    point_kernel,
+    resolved_lines,
+    sensation_level,
+)
+from simple_model.drive import DRIVES
+from simple_model.line_names import SYMBOLS, line_frequency, line_name, line_names, symbols
+from simple_model.line_table import FREE, UNNAMED, UNRESOLVED
+from simple_model.response import SETTLE, fit_lines
+from skinwave.planning.simulate import compute
+from skinwave.results.files import line_rows
+from skinwave.results.run import ASSESSED, Run
+from skinwave.scene.scene import BODIES, Body, Scene
+
+TIMES = np.arange(6000) / 6000
+PLACES = [[0.0, 0.0], [0.006, 0.0], [0.012, 0.002]]
+
+
+def circle(f_d, size=0.02):
+    return Trajectory(shape="circle", size=size, speed=size * np.pi * f_d)
+
+
+def answered(drive="linear", places=PLACES, times=TIMES, **tacton):
+    load = MovingPressure(tacton=Tacton(**tacton), drive=drive)
+    return load, point_kernel(load, places, times)
+
+
+# By hand, from the closed form
+
+
+@pytest.mark.parametrize("f_e", [5.0, 7.3])
+def test_an_envelope_makes_side_lines(f_e):
+    """sin a sin b = [cos(a - b) - cos(a + b)] / 2: 25 Pa at f_AM +- f_e, nothing at f_AM."""
+    load, response = answered(am_frequency=140, envelope_frequency=f_e)
+    table = line_table(load, response, candidates=["f_AM"])
+    assert table.frequencies == pytest.approx(
+        {"f_AM-f_e": 140 - f_e, "f_AM": 140.0, "f_AM+f_e": 140 + f_e}
+    )
+    found = {name: a[0] for name, a in table.amplitudes.items()}
+    assert found["f_AM-f_e"] == pytest.approx(25, rel=1e-6)
+    assert found["f_AM+f_e"] == pytest.approx(25, rel=1e-6)
+    assert found["f_AM"] < 1e-6
+    assert table.unnamed == ()
+
+
+def test_an_envelope_under_the_squared_law():
+    """50/4 (1 + M E)^2 Pa: 12.5 at f_AM +- f_e; 50/16 [1 - cos 2a][1 - cos 2b] of its square."""
+    load, response = answered("pressure_squared", am_frequency=140, envelope_frequency=7)
+    found = {name: a[0] for name, a in line_table(load, response).amplitudes.items()}
+    assert found == pytest.approx(
+        {"2f_e": 3.125, "f_AM-f_e": 12.5, "f_AM+f_e": 12.5, "2f_AM-2f_e": 1.5625, "2f_AM": 3.125,
+         "2f_AM+2f_e": 1.5625}, rel=1e-6,
+    )  # fmt: skip
+
+
+def test_two_sinusoids_with_an_envelope():
+    load, response = answered(
+        am_frequency=140, second_am_frequency=217, superposition=(0.75, 0.25), envelope_frequency=9
+    )
+    found = {name: a[0] for name, a in line_table(load, response).amplitudes.items()}
+    assert found == pytest.approx(
+        {"f_AM-f_e": 18.75, "f_AM+f_e": 18.75, "f_AM2-f_e": 6.25, "f_AM2+f_e": 6.25}, rel=1e-6
+    )
+
+
+def test_two_sinusoids_squared_make_their_sum_and_difference():
+    load, response = answered(
+        "pressure_squared", am_frequency=140, second_am_frequency=217, superposition=(0.5, 0.5)
+    )
+    found = {name: a[0] for name, a in line_table(load, response).amplitudes.items()}
+    assert found == pytest.approx(
+        {"f_AM2-f_AM": 3.125, "f_AM": 12.5, "f_AM2": 12.5, "2f_AM": 1.5625,
+         "f_AM+f_AM2": 3.125, "2f_AM2": 1.5625}, rel=1e-6,
+    )  # fmt: skip
+
+
+def test_the_squared_law_has_pairs_about_multiples_of_f_d_at_twice_f_am():
+    """(1 + M)^2 / 4 = 3/8 + M / 2 - cos(2a) / 8: n f_d +- 2 f_AM are 1/6 of n f_d."""
+    load, response = answered("pressure_squared", am_frequency=140, trajectory=circle(190.986))
+    found = line_table(load, response).amplitudes
+    for n in ("", "2", "3"):
+        for sign in "-+":
+            both = found[f"{n}f_d{sign}2f_AM"][1] / found[f"{n}f_d"][1]
+            assert both == pytest.approx(1 / 6, rel=1e-6)
+    assert found["f_d+2f_AM"][2] > found["2f_AM"][2] / 2
+
+
+# Names
+
+
+def test_names_say_their_frequencies():
+    tacton = Tacton(
+        am_frequency=140, second_am_frequency=217, superposition=(0.5, 0.5), envelope_frequency=7,
+        trajectory=circle(190.986), rhythm=Rhythm(pulses=((0.05, 0.03),)),
+    )  # fmt: skip
+    rng = np.random.default_rng(0)
+    for orders in rng.integers(-3, 4, (200, len(SYMBOLS))):
+        orders[4] = 0  # there is no signal
+        frequency = abs(float(orders @ symbols(tacton)))
+        if orders.any():
+            name = line_name(orders.tolist(), symbols(tacton))
+            assert line_frequency(tacton, name) == pytest.approx(frequency, abs=1e-9)
+            assert line_name((-orders).tolist(), symbols(tacton)) == name
+    assert line_frequency(Tacton(am_frequency=140), "f_d-f_AM") is None
+    with pytest.raises(ValueError, match="'f_x' is no line; add multiples of f_d, f_AM"):
+        line_frequency(tacton, "f_x")
+
+
+def test_canonical_names():
+    load = MovingPressure(
+        tacton=Tacton(am_frequency=300, second_am_frequency=217, superposition=(0.5, 0.5),
+                      trajectory=circle(190.986)),
+    )  # fmt: skip
+    names = named_lines(load)
+    assert names["f_d-f_AM"] == pytest.approx(300 - 190.986, abs=1e-3)
+    assert names["2f_d-f_AM"] == pytest.approx(2 * 190.986 - 300, abs=1e-3)
+    assert names["f_AM-f_AM2"] == pytest.approx(83)
+    assert not {"f_AM-f_d", "f_AM2-f_AM"} & names.keys()
+
+
+def test_coinciding_lines_are_listed_once_by_the_simplest_name():
+    load, response = answered("pressure_squared", am_frequency=140, trajectory=circle(70.0))
+    names = named_lines(load)
+    assert len(set(np.round(list(names.values()), 3))) == len(names)
+    assert {"f_d", "f_AM"} <= names.keys()
+    assert "2f_d" not in names
+    scene = Scene(pressure=load, body=BODIES["none"], probes=tuple(map(tuple, PLACES)))
+    run = Run(tacton="a", body="none", scene=scene, response=response)
+    assert "2f_d" not in run.listed
+    assert run.lines["2f_d"] is run.lines["f_AM"]
+    assert run.frequencies["2f_d"] == run.frequencies["f_AM"]
+    assert len([row for row in line_rows(run) if row[5] in ("f_AM", "2f_d")]) == len(PLACES)
+
+
+def test_lines_that_are_judged_are_listed_even_if_they_are_absent():
+    load, response = answered(am_frequency=140, trajectory=circle(190.986))
+    table = line_table(load, response, candidates=ASSESSED)
+    assert set(ASSESSED) <= table.frequencies.keys()
+    assert table.amplitudes["2f_d"].max() < 1e-6 * table.amplitudes["f_AM"].max()
+    assert "2f_d" not in named_lines(load)
+
+
+def test_a_rhythm_and_a_signal_have_side_lines():
+    pulses = Rhythm(pulses=((0.05, 0.03),))
+    load, response = answered(am_frequency=140, rhythm=pulses)
+    found = line_table(load, response).amplitudes
+    assert found["f_AM"][0] == pytest.approx(50 * 5 / 8, rel=0.01)
+    side = 50 * np.sin(5 / 8 * np.pi) / np.pi
+    assert found["f_AM-f_r"][0] == pytest.approx(side, rel=0.01)
+    assert found["f_AM+f_r"][0] == pytest.approx(side, rel=0.01)
+    wave = Signal(rate=1200, samples=tuple(np.sin(2 * np.pi * np.arange(12) / 12).tolist()))
+    load, response = answered(am_frequency=30, signal=wave)
+    found = line_table(load, response).amplitudes
+    assert max(found, key=lambda name: found[name][0]) in ("f_AM-f_s", "f_s-f_AM", "f_AM+f_s")
+    assert set(named_lines(load, 0.1)) == {"f_s-f_AM", "f_AM+f_s"}
+
+
+# For any load
+
+
+tones = st.just(0.0) | st.floats(20.0, 400.0)
+loads = st.builds(
+    MovingPressure,
+    tacton=st.builds(
+        Tacton,
+        am_frequency=tones,
+        second_am_frequency=tones,
+        superposition=st.sampled_from(SUPERPOSITIONS),
+        envelope_frequency=st.just(0.0) | st.floats(5.0, 60.0),
+        trajectory=st.just(Trajectory()) | st.builds(circle, st.floats(30.0, 300.0)),
+        rhythm=st.none() | st.none()
+        | st.builds(lambda on, gap: Rhythm(pulses=((on, gap),), ramp=0.3 * on),
+                    st.floats(0.02, 0.1), st.floats(0.01, 0.1)),
+    ),
+    drive=st.sampled_from(sorted(DRIVES)),
+)  # fmt: skip
+
+
+@given(loads)
+def test_the_table_is_the_spectrum(load):
+    """The strongest line of the table is the strongest of the spectrum, and what is listed leaves a
+    thousandth of the power at most; not of a rhythm, whose lines have no end, nor of what one
+    second does not resolve.
+    """
+    response = point_kernel(load, PLACES, TIMES)
+    table = line_table(load, response)
+    listed = [(f, table.amplitudes[name]) for name, f in table.frequencies.items()]
+    listed += [(peak.frequency, peak.amplitudes) for peak in table.unnamed]
+    kept = response.displacement[round(SETTLE * len(TIMES)) :]
+    moving = kept - kept.mean(axis=0)
+    if np.abs(moving).max() < 1e-6:
+        assert not [f for f, a in listed if a.max() > 1e-6]
+        return
+    assert not [peak for peak in table.unnamed if peak.kind == FREE]
+    f, made = np.fft.rfftfreq(len(TIMES), TIMES[1]), line_names(load)
+    strongest = made.strengths.max()
+    for p in range(len(PLACES)):
+        window = np.blackman(len(TIMES))
+        x = response.displacement[:, p]
+        bins = 2 * np.abs(np.fft.rfft((x - kept[:, p].mean()) * window)) / window.sum()
+        bins[:4] = 0
+        top = int(np.argmax(bins))
+        if bins[top] < 1e-6:
+            continue
+        # Lines within a lobe of the window are one peak of the spectrum.
+        if (made.strengths[np.abs(made.frequencies - f[top]) < 5] > 0.02 * strongest).sum() > 1:
+            continue
+        nearest, amplitude = min(((f, a[p]) for f, a in listed), key=lambda x: abs(x[0] - f[top]))
+        away = abs(nearest - f[top])
+        assert away < 1
+        # Between two bins a Blackman window shows a line by up to 12 % less.
+        assert amplitude * (1 - 0.48 * away**2) == pytest.approx(bins[top], rel=0.05)
+        assert max(a[p] for _, a in listed) < 1.15 * bins[top]
+    left = fit_lines(response, [f for f, _ in listed])[1][round(SETTLE * len(TIMES)) :]
+    if load.tacton.rhythm is None and not table.unresolved:
+        assert (left**2).mean() < 1e-3 * (moving**2).mean()
+
+
+@settings(max_examples=10)
+@given(loads)
+def test_amplitudes_of_resolved_lines_are_those_of_a_longer_response(load):
+    """Within 5 %: ten seconds resolve what one does not."""
+    if load.tacton.rhythm is not None:
+        load = replace(load, tacton=replace(load.tacton, rhythm=None))
+    short = line_table(load, point_kernel(load, PLACES, TIMES))
+    times = np.arange(40_000) / 4000
+    longer = replace(load, tacton=replace(load.tacton, duration=10.0))
+    response = point_kernel(longer, PLACES, times)
+    names, _ = resolved_lines(longer, response, highest=1900.0)
+    exact = dict(zip(names, lines(response, list(names.values())), strict=True))
+    strongest = max((a.max() for a in short.amplitudes.values()), default=0.0)
+    for name, amplitude in short.amplitudes.items():
+        if name in exact and amplitude.max() > 0.03 * strongest:
+            p = int(np.argmax(amplitude))
+            assert amplitude[p] == pytest.approx(exact[name][p], rel=0.05)
+
+
+# What a body adds
+
+
+def struck(frequency=87.0, decay=6.0, strength=0.3, quantity="displacement"):
+    """A line of the load, and a free vibration that decays."""
+    load = MovingPressure(tacton=Tacton(am_frequency=140))
+    free = strength * np.exp(-decay * TIMES) * np.sin(2 * np.pi * frequency * TIMES)
+    x = 1e-6 * (np.sin(2 * np.pi * 140 * TIMES) + 0.25 * np.cos(2 * np.pi * 280 * TIMES) + free)
+    response = Response(
+        model="fem", times=TIMES, probes=np.zeros((1, 2)), values=x[:, None], quantity=quantity
+    )
+    return load, response
+
+
+def test_a_free_vibration_is_told_from_a_line_of_the_load():
+    table = line_table(*struck())
+    assert [peak.kind for peak in table.unnamed] == [FREE]
+    assert table.unnamed[0].frequency == pytest.approx(87, abs=0.2)
+    assert set(table.frequencies) == {"f_AM", "2f_AM"}
+    assert table.amplitudes["f_AM"][0] == pytest.approx(1e-6, rel=0.01)
+    assert line_table(*struck(strength=3e-3)).unnamed == ()  # below -40 dB
+
+
+def test_what_neither_decays_nor_is_in_the_load_is_unnamed():
+    table = line_table(*struck(decay=0.0))
+    assert [peak.kind for peak in table.unnamed] == [UNNAMED]
+    assert table.unnamed[0].amplitudes[0] == pytest.approx(0.3e-6, rel=0.02)
+
+
+def test_every_file_lists_what_has_no_name():
+    load, response = struck()
+    scene = Scene(pressure=load, body=BODIES["skin-slab"], probes=((0.0, 0.0),))
+    rows = list(line_rows(Run(tacton="a", body="slab", scene=scene, response=response)))
+    assert [row[5] for row in rows if row[5] == FREE] == [FREE]
+    assert rows[-1][6] == "87"
+
+
+def test_lines_that_are_not_resolved_are_listed_together():
+    load, response = answered(am_frequency=140, second_am_frequency=140.6, superposition=(0.5, 0.5))
+    table = line_table(load, response)
+    assert table.frequencies == {}
+    assert set(table.unresolved) == {"f_AM", "f_AM2"}
+    assert [peak.kind for peak in table.unnamed] == [UNRESOLVED]
+    assert table.unnamed[0].frequency == pytest.approx(140, abs=1)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_steady_lines_of_a_linear_body_are_those_of_its_load(seed):
+    rng = np.random.default_rng(seed)
+    more = [{}, {"second_am_frequency": 201.0, "superposition": (0.5, 0.5)},
+            {"envelope_frequency": 11.0}][seed % 3]  # fmt: skip
+    tacton = Tacton(
+        am_frequency=rng.uniform(40, 250), duration=1.0, **more,
+        trajectory=circle(rng.uniform(60, 220), rng.uniform(0.008, 0.02)),
+    )  # fmt: skip
+    drive = str(rng.choice(sorted(DRIVES)))
+    scene = Scene(
+        pressure=MovingPressure(tacton=tacton, drive=drive), body=Body(kind="slab"),
+        probes=((0.0, 0.0), (0.01, 0.0), (0.02, 0.0)),
+    )  # fmt: skip
+    response = compute(scene, "flat-body-harmonic")
+    table = line_table(scene.pressure, response)
+    assert table.unresolved == {}
+    assert table.unnamed == ()
+    rest = fit_lines(response, list(table.frequencies.values()))[1][round(SETTLE * len(TIMES)) :]
+    window = np.blackman(len(rest))[:, None]
+    left = 2 * np.abs(np.fft.rfft(rest * window, axis=0)) / window.sum()
+    assert left[4:].max() < 1e-3 * max(a.max() for a in table.amplitudes.values())
+
+
+# Sensation level
+
+
+def test_levels_are_of_what_vibrates_and_of_skin_only():
+    assert sensation_level(1.0, 0.0) == sensation_level(1.0, 0.0, unit="Pa") == -np.inf
+    assert sensation_level(2.2, 200.0, unit="Pa") == pytest.approx(0)
+    assert sensation_level(22.0, 200.0, unit="Pa") == pytest.approx(20)
+    with pytest.raises(ValueError, match="unit 'N' is unknown"):
+        sensation_level(1.0, 100.0, unit="N")

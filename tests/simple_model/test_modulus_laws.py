@@ -1,0 +1,476 @@
+"""Fractional and measured modulus laws, their Prony series, and what no solid can be."""
+
+import cmath
+from dataclasses import replace
+from itertools import islice, pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.special import j0
+
+import fem
+import meshes
+import skinwave
+from simple_model import (
+    FractionalKelvinVoigt,
+    FractionalZener,
+    Material,
+    MovingPressure,
+    PronyTerm,
+    Tacton,
+    Trajectory,
+    fit_prony,
+    modulus_table,
+    of_law,
+    tabulated,
+)
+from simple_model.compliance import half_space, slab
+from simple_model.flat_body import flat_body, steady_lines, steady_state
+from simple_model.focus import spot_width
+from simple_model.load_spectrum import load_lines
+from simple_model.material import PRESETS
+from simple_model.wavenumber_integral import point_response
+from skinwave.bodies.analytic import compliance
+from skinwave.models.laws import relaxing
+from skinwave.planning.simulate import compute
+from skinwave.scene.file import dumps, loads, read
+from skinwave.scene.scene import Body, Layer, Scene
+from skinwave.scene.variation import cases
+
+ECOFLEX = PRESETS["ecoflex"]
+ZENER = of_law(
+    density=1000.0,
+    poisson=0.45,
+    law=FractionalZener(shear_modulus=20e3, fast_modulus=60e3, exponent=0.6, time=0.5e-3),
+)
+COMPLEX = 2 * np.pi * np.array([0.0, 3.0, 140.0, 140.0 - 20j, -60.0, 900.0 - 5j, -30j])
+HERTZ = np.geomspace(5.0, 1500.0, 26)
+PROBES = ((0.0, 0.0), (0.006, 0.0))
+
+
+def ecoflex(w):
+    """The law of the preset by polar coordinates, w > 0."""
+    return 25e3 * (1 + cmath.rect((w * 0.3e-3) ** 0.33, 0.33 * cmath.pi / 2))
+
+
+def zener(w):
+    power = cmath.rect((w * 0.5e-3) ** 0.6, 0.6 * cmath.pi / 2)
+    return (20e3 + 60e3 * power) / (1 + power)
+
+
+def table_of(material, hertz=HERTZ):
+    return tabulated(
+        density=material.density, poisson=material.poisson, frequencies=hertz,
+        moduli=material.complex_modulus(2 * np.pi * np.asarray(hertz)),
+    )  # fmt: skip
+
+
+def scene(material, drive="linear", **tacton):
+    """A load of zero mean: creep under a mean one takes far longer than a Tacton."""
+    load = MovingPressure(
+        tacton=Tacton(**{"am_frequency": 140, "duration": 0.1} | tacton), drive=drive
+    )
+    body = Body(material=material, width=0.03, height=0.03, depth=0.008, sides="clamped")
+    return Scene(pressure=load, body=body, probes=PROBES)
+
+
+# The laws
+
+
+def test_with_the_exponent_1_they_are_kelvin_voigt_and_standard_linear_solid():
+    viscous = Material(density=1.0, shear_modulus=25e3, poisson=0.4, viscosity=25e3 * 0.3e-3)
+    linear = Material(
+        density=1.0, shear_modulus=20e3, poisson=0.4, prony=(PronyTerm(modulus=40e3, time=5e-4),)
+    )
+    for exponent in (1.0, 1 - 1e-14):
+        found = FractionalKelvinVoigt(shear_modulus=25e3, exponent=exponent, time=0.3e-3)
+        np.testing.assert_allclose(found(COMPLEX), viscous.complex_modulus(COMPLEX), rtol=1e-12)
+        found = FractionalZener(
+            shear_modulus=20e3, fast_modulus=60e3, exponent=exponent, time=0.5e-3
+        )
+        np.testing.assert_allclose(found(COMPLEX), linear.complex_modulus(COMPLEX), rtol=1e-12)
+
+
+def test_they_are_analytic_below_the_real_axis_and_real_in_time():
+    """Cauchy-Riemann by differences, and mu(-w*) = mu(w)*."""
+    w = 2 * np.pi * np.array([20.0 - 3j, 500.0 - 100j, -80.0 - 9j])
+    for law in (ECOFLEX.law, ZENER.law):
+        along, down = ((law(w + step) - law(w - step)) / (2 * step) for step in (1e-3, 1e-3j))
+        np.testing.assert_allclose(along, down, rtol=1e-6)
+        np.testing.assert_allclose(law(-w.conj()), law(w).conj(), rtol=1e-14)
+
+
+def test_scaled_laws_have_their_moduli_or_losses_scaled():
+    w = 2 * np.pi * HERTZ
+    for solid in (ECOFLEX, ZENER):
+        rest = solid.shear_modulus
+        found = solid.scaled(modulus=2.0, loss=0.5)
+        expected = 2 * (rest + 0.5 * (solid.complex_modulus(w) - rest))
+        np.testing.assert_allclose(found.complex_modulus(w), expected, rtol=1e-12)
+    table = table_of(ZENER)
+    expected = 2 * table.complex_modulus(w)
+    found = table.scaled(modulus=2.0, loss=0.5).complex_modulus(w)
+    np.testing.assert_allclose(found, expected.real + 0.5j * expected.imag, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("law", "said"),
+    [({"exponent": 1.5}, "exponent = 1.5 is outside 0 < exponent <= 1"),
+     ({"time": -1.0}, "time = -1.0 s must be"), ({"shear_modulus": 0.0}, "shear_modulus = 0.0"),
+     ({"fast_modulus": 1e3}, "at least the shear_modulus at rest, 20000 Pa")],
+)  # fmt: skip
+def test_constants_out_of_range_are_refused(law, said):
+    with pytest.raises(ValueError, match=said):
+        replace(ZENER.law, **law)
+
+
+def test_a_material_has_the_modulus_of_its_law_at_rest():
+    with pytest.raises(ValueError, match="30000 Pa is not that of the material's modulus law at"):
+        replace(ECOFLEX, shear_modulus=30e3)
+
+
+# Steady waves by the law itself
+
+
+def half_space_response(mu, density, nu, r, w):
+    """g(r, w) of a Gaussian spot, by adaptive quadrature along the real axis."""
+    width = spot_width(0.2)
+    s2 = density * w**2 / mu
+    p2 = s2 * (1 - 2 * nu) / (2 - 2 * nu)
+
+    def integrand(k):
+        a, b = cmath.sqrt(k * k - p2), cmath.sqrt(k * k - s2)
+        rayleigh = 4 * k * k * a * b - (2 * k * k - s2) ** 2
+        spot = width**2 * np.exp(-((k * width) ** 2) / 2)
+        return spot * a * s2 / (mu * rayleigh) * j0(k * r) * k
+
+    near = abs(cmath.sqrt(s2))
+    ends = [0, 0.5 * near, 0.9 * near, 1.1 * near, 1.5 * near, 3 * near, 8 / width]
+    return sum(
+        quad(integrand, *each, complex_func=True, epsabs=0, epsrel=1e-10, limit=500)[0]
+        for each in pairwise(ends)
+    )
+
+
+@pytest.mark.parametrize("of", ["law", "table"])
+@pytest.mark.parametrize(("solid", "modulus"), [(ECOFLEX, ecoflex), (ZENER, zener)])
+def test_steady_lines_are_those_of_an_independent_quadrature(of, solid, modulus):
+    """A table at its own frequencies, which the lines of the load are."""
+    hertz = [20.0, 90.0, 140.0, 400.0]
+    material = solid if of == "law" else table_of(solid, hertz)
+    for f in (90.0, 140.0):
+        load = MovingPressure(tacton=Tacton(am_frequency=f), drive="linear")
+        lines = load_lines(load)
+        found, amplitudes = steady_lines(half_space(material), load, PROBES)
+        assert found.tolist() == lines.frequencies.tolist() == [f]
+        w = 2 * np.pi * f
+        for amplitude, (r, _) in zip(amplitudes[0], PROBES, strict=True):
+            g = half_space_response(modulus(w), solid.density, solid.poisson, r, w)
+            assert abs(amplitude / lines.coefficients[0] - g) < 1e-6 * abs(g)
+
+
+def test_a_slab_at_rest_has_the_modulus_at_rest():
+    """Not that at the slow motion which stands for rest elsewhere: Ecoflex is 5 % stiffer in it."""
+    width = spot_width(0.2)
+    still = [
+        point_response(slab(m, 0.01), [0.0, 0.004], [0.0], width)
+        for m in (ECOFLEX, replace(ECOFLEX, law=None, viscosity=1.0))
+    ]
+    np.testing.assert_allclose(*still, rtol=1e-6)
+
+
+# Motion from rest by the law itself
+
+
+@pytest.mark.parametrize("solid", [ECOFLEX, ZENER])
+def test_motion_from_rest_settles_to_the_steady_lines(solid):
+    own, times = scene(solid), np.arange(2000) / 1e4
+    body = slab(solid, 0.008)
+    steady = steady_state(body, own.pressure, PROBES, times).displacement
+    found = flat_body(body, own.pressure, PROBES, times).displacement
+    assert np.abs(found - steady)[1500:].max() < 1e-3 * np.abs(steady).max()
+    assert np.abs(found - steady)[:20].max() > 0.01 * np.abs(steady).max()  # of the start
+
+
+# Prony series
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
+@pytest.mark.parametrize(("solid", "modulus"), [(ECOFLEX, ecoflex), (ZENER, zener)])
+def test_a_series_is_as_near_as_it_says_and_no_longer_than_it_must_be(solid, modulus, tolerance):
+    series = solid.series(tolerance)
+    f = np.geomspace(*series.band, 997)
+    law = np.array([modulus(w) for w in 2 * np.pi * f])
+    away = (np.abs(series(2 * np.pi * f) - law) / np.abs(law)).max()
+    assert away == pytest.approx(series.error, rel=0.05)
+    assert away < tolerance
+    assert series.shear_modulus == solid.shear_modulus
+    assert len(series.terms) <= {1e-2: 6, 1e-3: 9}[tolerance]
+    assert len(solid.series(10 * tolerance).terms) < len(series.terms)
+    relaxed = solid.relaxing(tolerance).complex_modulus(2 * np.pi * f)
+    np.testing.assert_allclose(relaxed, series(2 * np.pi * f), rtol=1e-13)
+
+
+def test_the_series_of_a_prony_series_is_as_near_as_asked():
+    own = fit_prony(ZENER.law, tolerance=1e-3)
+    again = fit_prony(own, rest=own.shear_modulus, tolerance=1e-3)
+    assert again.error <= 1e-3
+    assert len(again.terms) <= len(own.terms)
+
+
+@pytest.fixture(scope="module")
+def element():
+    """Two cells, the force of a pressure on their top, and a probe."""
+    mesh = meshes.block((0.01, 0.01, 0.01), 0.01)
+    P = fem.load_operator(mesh)
+    return mesh, P @ np.ones(P.shape[1]), fem.probe_operator(mesh, [[0.0, 0.0]])
+
+
+@pytest.mark.parametrize("solid", [ECOFLEX, ZENER, table_of(ECOFLEX)])
+def test_stepping_and_reduction_by_the_series_are_the_harmonic_motion_of_the_law(element, solid):
+    mesh, force, S = element
+    own, series = (fem.assemble(mesh, m) for m in (solid, solid.relaxing()))
+    hertz = np.array([20.0, 60.0, 140.0, 210.0, 420.0, 900.0])
+    expected = (S @ fem.harmonic(own, force, hertz).T)[0]
+    model = fem.reduce(series, S, 1000.0, 1e-6)
+    forces = np.tile((model.basis.T @ force)[:, None], 1)
+    found = np.array([fem.transfer(model, forces, f).ravel()[0] for f in hertz])
+    assert np.linalg.norm(found - expected) < 0.01 * np.linalg.norm(expected)
+    dt, w = 2.5e-5, 2 * np.pi * 140.0
+    states = islice(fem.transient(series, lambda t: force * np.sin(w * t), dt), 2401)
+    stepped = np.array([(S @ state.displacement)[0] for state in states])[-600:]
+    steady = (expected[2] * np.exp(1j * w * dt * np.arange(1801, 2401))).imag
+    assert np.abs(stepped - steady).max() < 0.01 * abs(expected[2])
+
+
+@pytest.mark.parametrize("solid", [ECOFLEX, table_of(ECOFLEX)])
+def test_models_in_time_take_the_series_and_are_near_the_law(solid):
+    own = scene(solid)
+    expected = compute(own, "fem-harmonic", h=0.008).displacement
+    settled = slice(len(expected) // 2, None)
+    for model in ("fem", "fem-transient"):
+        found = compute(own, model, h=0.008).displacement
+        away = np.linalg.norm((found - expected)[settled])
+        assert away < 0.01 * np.linalg.norm(expected[settled])
+
+
+def test_flat_body_takes_the_series_of_a_table_at_complex_frequencies():
+    circle = Trajectory(shape="circle", size=0.01, speed=4.0)
+    # From 0 Hz on, where a table does not leave open what it creeps to.
+    table = table_of(ECOFLEX, [0.0, *np.geomspace(1.0, 3000.0, 60)])
+    own, law = (scene(m, drive="pressure_squared", trajectory=circle) for m in (table, ECOFLEX))
+    found, expected = (compute(each, "flat-body").displacement for each in (own, law))
+    assert np.linalg.norm(found - expected) < 0.01 * np.linalg.norm(expected)
+
+
+# What a plan says of it
+
+
+def test_a_plan_counts_the_series_in_its_error():
+    noise = np.random.default_rng(0).standard_normal((2, len(HERTZ)))
+    moduli = ECOFLEX.complex_modulus(2 * np.pi * HERTZ) * (1 + 0.03 * (noise[0] + 1j * noise[1]))
+    rough = tabulated(density=1070, poisson=0.4999, frequencies=HERTZ, moduli=moduli)
+    wide = replace(scene(rough).body, width=0.1, height=0.1, sides="absorbing")
+    own = replace(scene(rough), body=wide)
+    found = skinwave.plan(own, model="flat-body")
+    steady, series = (
+        steady_lines(compliance(body), own.pressure, PROBES)[1] for body in
+        (own.body, relaxing(own.body, 0.01))
+    )  # fmt: skip
+    away = np.linalg.norm(series - steady, axis=0) / np.linalg.norm(steady, axis=0)
+    assert found.error > 0.95 * away.max() > 0.01
+    said = next(row for row in found.rows if row.what == "modulus law")
+    assert said.value == rough.law.series.words
+    assert "% from the law between 5 and 1500 Hz" in said.value
+    assert skinwave.plan(own, 0.01, model="flat-body").warnings[-1].startswith("the Prony series")
+    assert not [r for r in skinwave.plan(own, model="flat-body-harmonic").rows if r == said]
+
+
+def test_a_plan_of_elements_counts_the_series():
+    own = scene(ECOFLEX)
+    found, harmonic = (skinwave.plan(own, model=name, h=0.008) for name in ("fem", "fem-harmonic"))
+    assert any(row.what == "modulus law" for row in found.rows)
+    assert not any(row.what == "modulus law" for row in harmonic.rows)
+    assert found.error > ECOFLEX.series().error
+    assert np.isfinite(harmonic.error)
+
+
+def test_a_load_beyond_a_table_is_refused():
+    for measured in ([20.0, 60.0, 130.0], [300.0, 350.0, 400.0]):
+        own = scene(table_of(ECOFLEX, measured))
+        ends = f"from {measured[0]:g} to {measured[-1]:g} Hz, .* to 140 Hz; extend the table"
+        for ask in (skinwave.plan, compute):
+            with pytest.raises(ValueError, match=ends):
+                ask(own, model="flat-body-harmonic")
+
+
+def test_a_table_continues_by_its_series():
+    table = table_of(ECOFLEX)
+    assert table.complex_modulus(2 * np.pi * 1500.0) == ECOFLEX.complex_modulus(2 * np.pi * 1500.0)
+    for f in (2000.0, 2.0, 100.0 - 30j):
+        found, law = (m.complex_modulus(2 * np.pi * f) for m in (table, ECOFLEX))
+        assert abs(found - law) < 0.02 * abs(law), f
+    assert table.shear_modulus == table.complex_modulus(0.0).real
+    rested = table_of(ECOFLEX, [0.0, *HERTZ])
+    assert rested.shear_modulus == ECOFLEX.shear_modulus
+    halfway = np.mean(ECOFLEX.complex_modulus(2 * np.pi * HERTZ[3:5]))
+    assert table.complex_modulus(2 * np.pi * HERTZ[3:5].mean()) == pytest.approx(halfway, rel=1e-12)
+
+
+# What no solid can be
+
+
+def lossy_at_300_hz(w):
+    return 25e3 + 20e3j * np.exp(-(np.log(w / (2 * np.pi * 300)) ** 2) * 4)
+
+
+@pytest.mark.parametrize(
+    ("law", "said"),
+    [(lambda w: 25e3 + 10e3j * np.sign(w), r"not causal.* \(root mean square.*at 1 Hz 3\d %"),
+     (lossy_at_300_hz, r"not causal.*at (29\d|30\d) Hz [4-9]\d %"),
+     (lambda w: 25e3 * (1 - 1e-4j * w), r"loss modulus is -15.71 Pa at 1 Hz"),
+     (lambda w: 25e3 - 10 * w + 1j * w, r"storage modulus is -\d+.* Pa at 4\d\d.* Hz"),
+     (lambda w: np.nan * w, r"modulus is nan Pa at 1 Hz")],
+)  # fmt: skip
+def test_a_law_of_no_solid_is_refused_by_every_model(law, said):
+    own = scene(replace(ECOFLEX, law=law))
+    with pytest.raises(ValueError, match=said):
+        skinwave.plan(own)
+    for model in ("flat-body-harmonic", "flat-body", "fem-harmonic", "fem"):
+        with pytest.raises(ValueError, match=said):
+            compute(own, model)
+
+
+def test_a_table_of_no_solid_is_refused_with_its_frequency():
+    mu = ECOFLEX.complex_modulus(2 * np.pi * HERTZ)
+    refused = {"loss modulus is -3 Pa at 5 Hz": 0, "not causal.* 10 %": slice(None)}
+    for said, rows in refused.items():
+        wrong = mu.copy()
+        wrong[rows] = mu[0].real - 3j if rows == 0 else 25e3 + 12e3j
+        with pytest.raises(ValueError, match=said):
+            tabulated(density=1.0, poisson=0.4, frequencies=HERTZ, moduli=wrong)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_measured_noise_of_some_per_cent_is_taken(seed):
+    noise = np.random.default_rng(seed).standard_normal((2, len(HERTZ)))
+    law = ECOFLEX.complex_modulus(2 * np.pi * HERTZ)
+    moduli = law * (1 + 0.04 * (noise[0] + 1j * noise[1]))
+    found = tabulated(density=1.0, poisson=0.4, frequencies=HERTZ, moduli=moduli)
+    assert 0.02 < found.law.series.error < 0.2
+    away = np.abs(found.law.series(2 * np.pi * HERTZ) - law) / np.abs(law)
+    assert np.sqrt(np.mean(away**2)) < 0.04  # nearer to the law than the data are
+
+
+# Scene files
+
+
+BODY = "[body.material]\ndensity_kg_m3 = 1070\npoisson = 0.4999\n"
+HEADER = "frequency_hz,storage_pa,loss_pa\n"
+FRACTIONAL = 'law = "fractional-kelvin-voigt"\nshear_modulus_pa = 25e3\nexponent = 0.33\n'
+
+
+@pytest.mark.parametrize("solid", [ECOFLEX, ZENER, table_of(ZENER), "ecoflex"])
+def test_a_scene_file_holds_them(solid):
+    own = scene(solid)
+    layered = replace(own.body, layers=(Layer(thickness=2e-3, material=solid),))
+    for each in (own, replace(own, body=layered)):
+        assert loads(dumps(each)) == each
+    assert loads(BODY + FRACTIONAL + "time_s = 0.3e-3").body.solid == ECOFLEX
+
+
+def test_a_table_is_read_from_beside_the_scene(tmp_path):
+    """The complete scene has its numbers, and needs the file no more."""
+    rows = "200,27e3,5e3\n20,25e3,1e3\n# a comment\n60, 26e3 ,3e3\n"
+    (tmp_path / "moduli.csv").write_text(HEADER + rows)
+    (tmp_path / "scene.toml").write_text(BODY + 'table = "moduli.csv"\n')
+    own = read(tmp_path / "scene.toml")
+    expected = tabulated(
+        density=1070, poisson=0.4999, frequencies=[20, 60, 200],
+        moduli=[25e3 + 1e3j, 26e3 + 3e3j, 27e3 + 5e3j],
+    )  # fmt: skip
+    assert own.body.solid == expected
+    (point,) = cases(tmp_path / "scene.toml", [{"body.size_x_mm": 60.0}])
+    assert point.scene.body.solid == expected
+    (tmp_path / "moduli.csv").unlink()
+    assert loads(dumps(own)) == own
+    with pytest.raises(ValueError, match=r"'moduli.csv' names a file.*give its numbers"):
+        loads(BODY + 'table = "moduli.csv"\n')
+
+
+def test_a_design_varies_the_constants_of_a_preset(tmp_path):
+    (tmp_path / "scene.toml").write_text('[body]\nmaterial = "ecoflex"\n')
+    found = cases(tmp_path / "scene.toml", [{"body.material.exponent": n} for n in (0.3, 0.5)])
+    assert [point.scene.body.solid.law.exponent for point in found] == [0.3, 0.5]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [('law = "fractional"\n', "law 'fractional' is unknown"),
+     (FRACTIONAL, r"\[body.material\] lacks time_s"),
+     (FRACTIONAL + "time_s = 1e-3\nviscosity_pa_s = 2.0\n", "has no viscosity_pa_s"),
+     ("shear_modulus_pa = 1e4\nexponent = 0.3\n", "is without a law and has no exponent"),
+     ("table = 3\n", "must be a table"),
+     ("table = { frequency_hz = [1.0], storage_pa = [1e4] }\n", "lacks loss_pa"),
+     ("table = { frequency_hz = [1.0], storage_pa = [1e4], loss_pa = [1.0, 2.0] }\n",
+      "has 1 frequencies, 1 storage and 2 loss moduli"),
+     ("shear_modulus_pa = 1e4\ntable = { frequency_hz = [1.0], storage_pa = [1e4], "
+      "loss_pa = [1.0] }\n", "is a table of complex moduli and has no shear_modulus_pa")],
+)  # fmt: skip
+def test_a_material_of_wrong_keys_is_refused(text, said):
+    with pytest.raises(ValueError, match=said):
+        loads(BODY + text)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [("", "lacks the column frequency_hz"), ("f,storage_pa,loss_pa\n", "lacks the column freq"),
+     (HEADER, "has 0 frequencies"), (HEADER + "1,2\n", "the row '1,2'; give three numbers"),
+     (HEADER + "10,x,3\n", "the row '10,x,3'"), (HEADER + "10,0,3\n", "storage modulus is 0 Pa at"),
+     (HEADER + "10,1e4,3\n10,1e4,4\n", "has 10 Hz after 10 Hz"),
+     (HEADER + "-1,1e4,3\n5,1e4,3\n", "the frequency -1 Hz, which is outside"),
+     (HEADER + "0,1e4,3\n10,1e4,4\n", "loss modulus is 3 Pa at 0 Hz"),
+     (HEADER + "210,1e4,-3\n", "loss modulus is -3 Pa at 210 Hz"),
+     (HEADER + "10,nan,0\n", "is nan Pa at 10 Hz"),
+     (HEADER + "1,2,3\n" * 10_001, "at most 10000")],
+)  # fmt: skip
+def test_a_file_of_moduli_of_bad_content_is_refused(text, said):
+    with pytest.raises(ValueError, match=said):
+        modulus_table(text)
+
+
+@pytest.mark.parametrize("eta", [1e-3, 0.03, 0.4, 2.0])
+def test_a_loss_factor_is_nearly_constant_and_its_law_causal(eta):
+    solid = Material(density=1000, shear_modulus=25e3, poisson=0.49, loss_factor=eta)
+    mu = solid.complex_modulus(2 * np.pi * np.geomspace(10, 2000, 200))
+    np.testing.assert_allclose(mu.imag / mu.real, eta, rtol=0.025)
+    w = 2 * np.pi * 150
+    assert solid.complex_modulus(w).real == pytest.approx(25e3, rel=1e-9)
+    q = 2 / np.pi * np.arctan(eta)  # Kjartansson's constant Q
+    power = np.geomspace(10 / 150, 2000 / 150, 200) ** q
+    np.testing.assert_allclose(mu.real, 25e3 * power, rtol=0.035)
+    # Kramers and Kronig: mu(inf) - mu(0) = 2 / pi int mu''(x) / x dx, without the viscosity.
+    x = 2 * np.pi * np.geomspace(1e-4, 1e8, 20_000)
+    loss = solid.complex_modulus(x).imag - solid.without_loss_factor().viscosity * x
+    slow, fast = solid.complex_modulus(x[[0, -1]]).real
+    assert fast - slow == pytest.approx(2 / np.pi * np.trapezoid(loss, np.log(x)), rel=1e-3)
+
+
+def test_a_body_with_a_loss_factor_moves_after_its_load_and_settles():
+    solid = Material(density=1000, shear_modulus=25e3, poisson=0.4999, loss_factor=0.4)
+    layer, times = slab(solid, 0.015), np.arange(3000) / 1e4
+    load = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.3))
+    found = flat_body(layer, load, [[0.0, 0.0]], times).values[:, 0]
+    steady = steady_state(layer, load, [[0.0, 0.0]], times).values[:, 0]
+    assert np.linalg.norm((found - steady)[2000:]) < 1e-3 * np.linalg.norm(steady[2000:])
+    assert abs(found[0]) < 2e-3 * np.abs(found).max()
+
+
+@pytest.mark.parametrize(("exponent", "time"), [(0.05, 1e-4), (0.1, 1e-3), (0.18, 0.1)])
+def test_laws_that_relax_far_below_the_band_have_a_series(exponent, time):
+    law = FractionalZener(shear_modulus=10e3, fast_modulus=1e5, exponent=exponent, time=time)
+    series, w = fit_prony(law, rest=10e3), 2 * np.pi * np.geomspace(1, 2000, 501)
+    assert series.error <= 0.005
+    assert np.abs(series(w) / law(w) - 1).max() < 0.006
+    assert complex(series(0.0)) == pytest.approx(10e3, rel=1e-9)

@@ -1,0 +1,402 @@
+"""Drive laws, focus profiles, paths and materials of a user's own, without editing the source."""
+
+import importlib
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+import pytest
+
+import fem
+import meshes
+from meshes import cache
+from simple_model import (
+    DRIVES,
+    DriveLaw,
+    MovingPressure,
+    PressureMap,
+    PronyTerm,
+    Rhythm,
+    Signal,
+    Tacton,
+    Trajectory,
+    arc_path,
+    focal_spot,
+    named_lines,
+    point_kernel,
+    read_pressure_map,
+    steady_state,
+    tabulated,
+    timed_path,
+)
+from simple_model.compliance import slab
+from simple_model.flat_body import flat_body
+from simple_model.load_spectrum import load_lines
+from simple_model.sampling import highest
+from skinwave.patterns import waveform
+from skinwave.patterns.pattern import Options
+from skinwave.planning.simulate import compute
+from skinwave.scene.file import dumps, loads
+from skinwave.scene.scene import Body, Scene
+
+PROBES = np.array([[0.0, 0.0], [0.005, 0.0]])
+CIRCLE = Trajectory(shape="circle", size=0.01, speed=1.0)
+TWO = fem.Material(
+    density=1000.0, shear_modulus=20e3, poisson=0.45,
+    prony=(PronyTerm(modulus=8e3, time=0.4e-3), PronyTerm(modulus=6e3, time=3e-3)),
+)  # fmt: skip
+HERTZ = np.array([0.0, 30.0, 140.0, 600.0])
+
+
+def saturating(amplitude, modulation, depth):
+    """A transducer that saturates: no polynomial of the modulation."""
+    return np.tanh(3 * amplitude * (1 + depth * modulation) / (1 + depth)) ** 2 / np.tanh(3) ** 2
+
+
+SATURATING = DriveLaw(name="saturating", pressure=saturating)
+CUBIC = DriveLaw(
+    name="cubic", degree=3,
+    pressure=lambda A, M, m: (A * (1 + m * M) / (1 + m)) ** 3,
+)  # fmt: skip
+
+SOFT = DriveLaw(
+    name="soft", degree=1, pressure=lambda A, M, m: np.asarray(A) ** 2 * (1 + m * M) / (1 + m)
+)
+
+
+def scene(material=TWO, **load):
+    tacton = Tacton(am_frequency=140, duration=0.05, trajectory=CIRCLE)
+    body = Body(material=material, width=0.03, height=0.03, depth=0.008, sides="clamped")
+    pressure = MovingPressure(**{"tacton": tacton} | load)
+    return Scene(pressure=pressure, body=body, probes=tuple(map(tuple, PROBES.tolist())))
+
+
+# A drive law
+
+
+@pytest.mark.parametrize("law", [SATURATING, CUBIC])
+def test_lines_of_any_law_are_those_of_its_waveform(law):
+    """Without aliasing: as many as there are, against a Fourier transform in time."""
+    tacton = Tacton(am_frequency=100.0, envelope_frequency=20.0, duration=1.0)
+    load = MovingPressure(tacton=tacton, drive=law)
+    lines = load_lines(load, 1e-6)
+    count = 2**16
+    spectrum = np.fft.rfft(load.gain(np.arange(count) / count)) / count
+    spectrum[1:] *= 2
+    found = np.zeros(len(spectrum), np.complex128)
+    np.add.at(found, np.round(lines.frequencies).astype(int), lines.coefficients)
+    assert np.abs(found - spectrum).max() < 1e-4 * np.abs(spectrum).max()
+    above = np.flatnonzero(np.abs(spectrum) > 1e-3 * np.abs(spectrum).max()).max()
+    assert above > 2 * 120  # beyond the second order
+    assert highest(load, 0.0) >= above
+    assert "3f_AM" in named_lines(replace(load, tacton=replace(tacton, envelope_frequency=0.0)))
+
+
+def test_a_law_without_decaying_harmonics_is_refused():
+    gate = DriveLaw(name="gate", pressure=lambda A, M, m: A * (np.asarray(M) > 0.3))
+    with pytest.raises(ValueError, match=r"law 'gate' .* do not fall to 0.0001"):
+        load_lines(MovingPressure(tacton=Tacton(am_frequency=140), drive=gate))
+
+
+def test_a_law_that_is_not_of_its_degree_is_refused():
+    with pytest.raises(ValueError, match="'wrong' is no polynomial of degree 2"):
+        DriveLaw(name="wrong", degree=2, pressure=saturating)
+
+
+def test_lines_of_a_sampled_modulation_are_named_under_any_law():
+    samples = tuple(np.sin(2 * np.pi * np.arange(200) / 200).tolist())
+    tone = Tacton(signal=Signal(rate=20e3, samples=samples), duration=0.2)
+    names = named_lines(MovingPressure(tacton=tone, drive=SATURATING), 1e-2)
+    plain = named_lines(
+        MovingPressure(tacton=Tacton(am_frequency=100, duration=0.2), drive=SATURATING), 1e-2
+    )
+    assert [name.replace("f_s", "f_AM") for name in names] == list(plain)
+
+
+def test_levels_that_are_no_factor_are_refused():
+    beaten = Tacton(am_frequency=140, rhythm=Rhythm(pulses=((0.1, 0.05),), ramp=0.01))
+    with pytest.raises(ValueError, match="'saturating' is no product of a factor of the level"):
+        MovingPressure(tacton=beaten, drive=SATURATING)
+    assert MovingPressure(tacton=beaten, drive=CUBIC).weight(0.0) == 1.0
+
+
+@pytest.mark.parametrize("law", [CUBIC, SOFT, *(law for law in DRIVES.values() if law.degree)])
+def test_levels_are_exported_by_the_inverse_of_the_law(law):
+    path = Trajectory(
+        shape="recorded", points=((0.0, 0.0), (0.01, 0.0)), times=(0.0, 0.05), levels=(0.2, 1.0)
+    )
+    tacton = Tacton(am_frequency=140, duration=0.05, trajectory=path, amplitude=0.8)
+    own = scene(tacton=tacton, drive=law)
+    content, notes = waveform.write(own, Options(rate=20e3))
+    role = "envelope" if "to be read back with --role envelope" in notes else "modulation"
+    assert (role == "modulation") == law.is_signed
+    base = scene(tacton=Tacton(trajectory=CIRCLE, amplitude=0.8), drive=law)
+    back = waveform.read(content, Options(role=role), base).tacton
+    t = np.arange(10, 900) / 20e3
+    found = MovingPressure(tacton=back, drive=law).gain(t)
+    expected = own.pressure.gain(t) * own.pressure.weight(path.phase(t))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
+
+
+def test_a_law_without_an_inverse_is_not_exported_with_levels():
+    hollow = DriveLaw(name="hollow", degree=2, pressure=lambda A, M, m: A * (1 + M**2) / 2 * 1.5)
+    path = Trajectory(
+        shape="recorded", points=((0.0, 0.0), (0.01, 0.0)), times=(0.0, 0.05), levels=(0.2, 1.0)
+    )
+    tacton = Tacton(am_frequency=140, duration=0.05, trajectory=path)
+    folded = DriveLaw(name="folded", degree=1, pressure=lambda A, M, m: A * (2 - np.asarray(M)) / 3)
+    assert waveform.write(scene(tacton=tacton, drive=hollow), Options())
+    with pytest.raises(ValueError, match="'folded' has no amplitude for some of these pressures"):
+        waveform.write(scene(tacton=tacton, drive=folded), Options())
+
+
+def test_a_registered_law_is_one_of_all(monkeypatch):
+    """One line in a registry: scene files and all models know it."""
+    monkeypatch.setitem(DRIVES, CUBIC.name, CUBIC)
+    own = scene(drive="cubic")
+    assert 'drive = "cubic"' in dumps(own)
+    assert loads(dumps(own)) == own
+    assert dumps(scene(drive=CUBIC)) == dumps(own)
+    times = np.arange(1000) / 1e4
+    steady, whole, kernel = (
+        steady_state(slab(TWO, 0.008), own.pressure, PROBES, times).displacement,
+        flat_body(slab(TWO, 0.008), own.pressure, PROBES, times).displacement,
+        point_kernel(own.pressure, PROBES, times).displacement,
+    )
+    late = slice(500, None)
+    assert np.abs(steady - whole)[late].max() < 1e-3 * np.abs(whole).max()
+    gain = own.pressure.gain(times)[:, None]
+    np.testing.assert_allclose(kernel, gain * own.pressure.spot(PROBES, CIRCLE.position(times)))
+
+
+def test_a_law_that_no_scene_file_names_is_refused_there():
+    with pytest.raises(ValueError, match="drive law 'cubic' is a Python function, which a scene"):
+        dumps(scene(drive=CUBIC))
+
+
+# A focus profile
+
+
+def measured(path, spacing=1.0):
+    """A file of the main lobe on a grid, stronger on one side."""
+    line = np.arange(-15.0, 15.0 + spacing / 2, spacing)
+    x, y = (each.ravel() for each in np.meshgrid(line, line))
+    relative = focal_spot(np.column_stack([x, y]) / 1e3) * (1 + 0.01 * x)
+    table = np.column_stack([x, y, 7.0 * relative])
+    np.savetxt(path, np.random.default_rng(0).permutation(table), delimiter=",", header="x,y,p")
+    return read_pressure_map(path)
+
+
+def test_a_measured_map_is_the_focal_spot(tmp_path):
+    found = measured(tmp_path / "map.csv", 0.5)
+    load = MovingPressure(tacton=Tacton(trajectory=CIRCLE), profile=found)
+    offsets = np.random.default_rng(1).uniform(-12e-3, 12e-3, (200, 2))
+    expected = focal_spot(offsets) * (1 + 10 * offsets[:, 0])
+    spots = load.spot(offsets + [0.003, 0.001], [0.003, 0.001])
+    np.testing.assert_allclose(spots, expected, atol=4e-3)
+    assert load.spot([[0.05, 0.0]], [0.0, 0.0]) == 0
+
+
+def test_models_take_a_measured_map(tmp_path):
+    """The steady state of elements is that of the built-in profile that was measured."""
+    line = np.linspace(-0.03, 0.03, 121)
+    grid = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1)
+    spot = PressureMap(x=line, y=line, pressure=focal_spot(grid, profile="gaussian"))
+    still = Tacton(am_frequency=140, duration=0.03)
+    found, expected = (
+        compute(scene(tacton=still, profile=focus), "fem-harmonic", h=0.008).displacement
+        for focus in (spot, "gaussian")
+    )
+    assert np.abs(found - expected).max() < 5e-3 * np.abs(expected).max()
+    with pytest.raises(ValueError, match="flat-body"):
+        compute(scene(profile=spot), "flat-body")
+    with pytest.raises(ValueError, match="focus profile is a map or a Python function, which"):
+        dumps(scene(profile=spot))
+
+
+def test_any_function_is_a_focal_spot():
+    load = scene(profile=lambda offsets: np.exp(-((offsets / 0.004) ** 2).sum(axis=-1))).pressure
+    assert load([[0.005, 0.0]], [0.0])[0, 0] == load.gain([0.0])[0]
+
+
+def test_a_map_without_mirror_symmetry_is_meshed_whole(tmp_path):
+    extent = importlib.import_module("skinwave.planning.extent")
+    still = scene(tacton=Tacton())
+    assert extent.symmetry(still) == "xy"
+    own = replace(still.pressure, profile=measured(tmp_path / "map.csv"))
+    assert extent.symmetry(replace(still, pressure=own)) == ""
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [("0,0,1\n0,1,2\n1,0,3\n", "3 points, which are no grid of 2 by 2"),
+     ("0,0\n1,1\n", "is no pressure map"), ("0,0,1\n0,1,x\n", "is no pressure map"),
+     ("0,0,0\n0,1,0\n1,0,0\n1,1,0\n", "above 0 somewhere")],
+)  # fmt: skip
+def test_a_file_that_is_no_map_is_refused(tmp_path, rows, said):
+    (tmp_path / "map.csv").write_text(f"x,y,p\n{rows}")
+    with pytest.raises(ValueError, match=said):
+        read_pressure_map(tmp_path / "map.csv")
+
+
+def test_what_depends_on_a_function_is_not_found_in_the_cache(tmp_path):
+    one, other = (measured(tmp_path / "map.csv", spacing) for spacing in (1.0, 0.5))
+    again = measured(tmp_path / "map.csv", 1.0)
+    assert cache.key(one) == cache.key(again) != cache.key(other)
+    assert cache.key(scene(drive=CUBIC).pressure) != cache.key(scene(drive=CUBIC).pressure)
+
+
+# A path
+
+
+def lissajous(t):
+    turn = 2 * np.pi * np.asarray(t) / 0.05
+    return 0.01 * np.stack([np.cos(turn), np.sin(2 * turn)], axis=-1)
+
+
+def test_a_function_of_time_is_a_path_that_a_scene_file_holds():
+    path = timed_path(lissajous, 0.05)
+    t = np.random.default_rng(0).uniform(0, 0.2, 500)
+    assert np.linalg.norm(path.position(t) - lissajous(t), axis=1).max() < 2e-5
+    own = scene(tacton=Tacton(trajectory=path, duration=0.05))
+    np.testing.assert_allclose(
+        loads(dumps(own)).tacton.trajectory.position(t), path.position(t), atol=1e-12
+    )
+
+
+def test_a_function_of_arc_is_run_at_its_speed():
+    path = arc_path(lambda u: 0.005 * np.stack(
+        [np.cos(2 * np.pi * u**2), np.sin(2 * np.pi * u**2)], axis=-1), speed=1.0)  # fmt: skip
+    t = np.linspace(0, 0.02, 400)
+    expected = Trajectory(shape="circle", size=0.01, speed=1.0)
+    assert path.drawing_frequency == pytest.approx(expected.drawing_frequency, rel=1e-3)
+    assert np.linalg.norm(path.position(t) - expected.position(t), axis=1).max() < 5e-5
+
+
+@pytest.mark.parametrize(
+    ("function", "said"),
+    [(lambda t: np.stack([np.sign(t - 0.0123), 0 * t], axis=-1) * 0.01, "function jumps"),
+     (lambda t: t, r"function gives shape \(65,\) for 65 arguments"),
+     (lambda t: np.full((len(t), 2), np.nan), "return finite positions")],
+)  # fmt: skip
+def test_a_function_that_is_no_path_is_refused(function, said):
+    with pytest.raises(ValueError, match=said):
+        timed_path(function, 0.05)
+
+
+# A material
+
+
+def closed_form(w):
+    return 20e3 + 8e3 / (1 + 1 / (0.4e-3j * w)) + 6e3 / (1 + 1 / (3e-3j * w))
+
+
+def test_a_prony_series_is_its_closed_form_for_arrays():
+    w = 2 * np.pi * HERTZ[1:]
+    np.testing.assert_allclose(TWO.complex_modulus(w), closed_form(w), rtol=1e-13)
+    np.testing.assert_allclose(TWO.complex_modulus(w[:, None]), closed_form(w)[:, None])
+    assert TWO.complex_modulus(0.0) == 20e3
+    assert TWO.complex_modulus(1e12) == pytest.approx(34e3)
+
+
+@pytest.fixture(scope="module")
+def element():
+    """Two cells, the force of a pressure on their top, and a probe."""
+    mesh = meshes.block((0.01, 0.01, 0.01), 0.01)
+    P = fem.load_operator(mesh)
+    return mesh, P @ np.ones(P.shape[1]), fem.probe_operator(mesh, [[0.0, 0.0]])
+
+
+def answers(element, material):
+    mesh, force, S = element
+    found = fem.harmonic(fem.assemble(mesh, replace(material, density=1e-6)), force, HERTZ)
+    return (S @ found.T)[0]
+
+
+def test_an_element_is_as_stiff_as_the_closed_form_at_each_frequency(element):
+    found = answers(element, TWO)
+    again = replace(TWO, prony=(*TWO.prony, TWO.prony[0]))  # two terms of one time
+    doubled = replace(TWO, prony=(PronyTerm(modulus=16e3, time=0.4e-3), TWO.prony[1]))
+    np.testing.assert_allclose(answers(element, again), answers(element, doubled), rtol=1e-12)
+    modulus = found[0] / found[1:] * 20e3  # without inertia
+    np.testing.assert_allclose(modulus, closed_form(2 * np.pi * HERTZ[1:]), rtol=1e-6)
+
+
+@pytest.mark.parametrize("of", ["table", "function"])
+def test_a_measured_modulus_is_that_of_the_law_in_the_frequency_domain(element, of):
+    f = np.linspace(1, 1500, 3000)
+    table = tabulated(
+        density=1000.0, poisson=0.45, frequencies=f, moduli=closed_form(2 * np.pi * f)
+    )
+    function = replace(TWO, prony=(), law=closed_form)
+    own = table if of == "table" else replace(function, law=lambda w: closed_form(w + 1e-9))
+    np.testing.assert_allclose(answers(element, own), answers(element, TWO), rtol=2e-3)
+    load, times = scene().pressure, np.arange(400) / 1e4
+    found, expected = (
+        steady_state(slab(m, 0.008), load, PROBES, times).displacement for m in (own, TWO)
+    )
+    assert np.abs(found - expected).max() < 1e-3 * np.abs(expected).max()
+    power = compute(scene(own), "fem-harmonic", h=0.01).effort
+    assert power.energy_imbalance < 1e-6
+
+
+def test_elements_refuse_a_law_without_internal_variables(element):
+    mesh, force, S = element
+    ops = fem.assemble(mesh, replace(TWO, prony=(), law=closed_form))
+    for ask in (
+        lambda: next(fem.transient(ops, lambda t: force, 1e-4)),
+        lambda: fem.reduce(ops, S, 500.0, 1e-2),
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match="has no internal variables"):
+            ask()
+
+
+def test_a_scene_file_refuses_a_law_that_it_cannot_hold():
+    with pytest.raises(ValueError, match="material has a modulus law of its own, .* scene file"):
+        dumps(scene(replace(TWO, prony=(), law=closed_form)))
+
+
+def test_several_terms_in_a_scene_file_and_layers():
+    own = scene()
+    assert loads(dumps(own)) == own
+    assert (
+        loads("""[body.material]
+density_kg_m3 = 1000
+shear_modulus_pa = 20e3
+poisson = 0.45
+[[body.material.prony]]
+modulus_pa = 8e3
+time_s = 0.4e-3
+[[body.material.prony]]
+modulus_pa = 6e3
+time_s = 3e-3
+""").body.solid
+        == TWO
+    )
+
+
+def test_stepping_and_reduction_with_two_terms_are_the_harmonic_motion(element):
+    mesh, force, S = element
+    ops = fem.assemble(mesh, TWO)
+    assert [branch.time for branch in ops.branches] == [0.4e-3, 3e-3]
+    expected = (S @ fem.harmonic(ops, force, 140.0)[0])[0]
+    model = fem.reduce(ops, S, 500.0, 1e-6)
+    reduced = fem.transfer(model, (model.basis.T @ force)[:, None], 140.0)[0, 0, 0]
+    assert reduced == pytest.approx(expected, rel=1e-5)
+    dt, w = 2.5e-5, 2 * np.pi * 140.0
+    states = islice(fem.transient(ops, lambda t: force * np.sin(w * t), dt), 3001)
+    found = np.array([(S @ state.displacement)[0] for state in states])[-600:]
+    steady = (expected * np.exp(1j * w * dt * np.arange(2401, 3001))).imag
+    assert np.abs(found - steady).max() < 2e-3 * abs(expected)
+
+
+@pytest.mark.slow
+def test_elements_from_rest_are_the_wavenumber_integral_with_two_terms():
+    """A slab so lossy and large that its clamped sides are not seen."""
+    wide = replace(scene(), body=replace(scene().body, width=0.05, height=0.05))
+    expected = compute(wide, "flat-body").displacement
+    found = compute(wide, "fem", h=0.004).displacement
+    assert np.linalg.norm(found - expected) < 0.08 * np.linalg.norm(expected)
+    one = replace(wide.body, material=replace(TWO, prony=TWO.prony[:1]))
+    other = compute(replace(wide, body=one), "flat-body").displacement
+    assert np.linalg.norm(other - expected) > 0.2 * np.linalg.norm(expected)

@@ -1,0 +1,341 @@
+"""The standard linear solid: what it is in its limits, and the same in every model."""
+
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+import pytest
+from scipy import sparse
+from scipy.integrate import solve_ivp
+
+import fem
+import meshes
+import skinwave
+from fem.reduced_nonlinear import modal_elastic
+from meshes import cache
+from simple_model import MovingPressure, Tacton, Trajectory
+from simple_model.compliance import half_space, slab, thin_sheet
+from simple_model.load_spectrum import reduced_lines
+from simple_model.material import PronyTerm
+from skinwave.bodies.analytic import compliance
+from skinwave.models.prepared import prepare
+from skinwave.planning.simulate import compute
+from skinwave.scene import file as scene_file
+from skinwave.scene.scene import BODIES, Body, Layer
+
+ZENER = fem.PRESETS["palm-zener"]
+HERTZ = np.array([0.0, 40.0, 140.0, 400.0])
+LOAD = MovingPressure(
+    tacton=Tacton(
+        am_frequency=140,
+        duration=0.01,
+        trajectory=Trajectory(shape="circle", size=0.01, speed=6.0),
+    )
+)
+SCENE = skinwave.Scene(
+    pressure=LOAD,
+    body=Body(material="palm-zener", width=0.04, height=0.04, depth=0.01),
+    probes=((0.0, 0.0), (0.005, 0.0)),
+)
+
+
+@pytest.fixture(scope="module")
+def block():
+    """A mesh, the force of a focus on it, and two probes."""
+    mesh = meshes.block((0.03, 0.03, 0.01), 0.005)
+    points, P = fem.facet_points(mesh)[:, :2], fem.load_operator(mesh)
+    force = P @ np.exp(-(points**2).sum(axis=1) / 2 / 0.00435**2)
+    return mesh, force, fem.probe_operator(mesh, [[0.0, 0.0], [0.005, 0.0]])
+
+
+def answers(block, material):
+    """Steady motion (f, p) at all frequencies."""
+    mesh, force, S = block
+    return np.array([S @ u for u in fem.harmonic(fem.assemble(mesh, material), force, HERTZ)])
+
+
+def test_the_modulus_goes_from_what_lasts_to_the_whole():
+    solid = fem.Material(
+        density=1000, shear_modulus=25e3, poisson=0.45, prony=(PronyTerm(modulus=10e3, time=5e-4),)
+    )
+    assert solid.complex_modulus(0.0) == 25e3
+    assert solid.complex_modulus(1e12) == pytest.approx(35e3)
+    assert solid.complex_modulus(1 / 5e-4) == pytest.approx(30e3 + 5e3j)  # the peak of the loss
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"time": 0.0}, r"time of a Prony term = 0.0 s must be a finite number above 0; give"),
+        (
+            {"modulus": -1.0},
+            "modulus of a Prony term = -1.0 Pa must be a finite number, 0 or above",
+        ),
+        ({"time": np.nan}, "time of a Prony term = nan s must be a finite number above 0"),
+    ],
+)
+def test_a_relaxing_part_that_cannot_be_is_refused(values, said):
+    with pytest.raises(ValueError, match=said):
+        PronyTerm(**{"modulus": 1e4, "time": 1e-3} | values)
+
+
+def test_exact_waves_have_the_modulus_of_the_material():
+    k, w = np.array([[300.0 + 0j]]), np.array([[900.0 + 0j]])
+    mu = ZENER.complex_modulus(900.0)
+    twin = replace(ZENER, shear_modulus=mu.real, viscosity=mu.imag / 900, prony=())
+    for body, size in (
+        (half_space, {}),
+        (slab, {"depth": 0.01}),
+        (thin_sheet, {"thickness": 1e-4}),
+    ):
+        found, expected = (body(solid, **size)(k, w)[0, 0] for solid in (ZENER, twin))
+        assert found == pytest.approx(expected, rel=1e-12)
+    paper = replace(BODIES["paper-sheet-loose"], material=ZENER)
+    stiffness = paper.bending_stiffness * mu / 25e3
+    plain = 1 / (stiffness * k**4 - paper.mass_per_area * w**2)
+    assert compliance(paper)(k, w)[0, 0] == pytest.approx(plain[0, 0], rel=1e-12)
+
+
+def test_what_relaxes_at_once_is_a_viscosity(block):
+    """tau -> 0 with relaxing_modulus tau = viscosity is Kelvin and Voigt's solid."""
+    tau = 1e-8
+    fast = replace(ZENER, prony=(PronyTerm(modulus=5.0 / tau, time=tau),))
+    viscous = replace(ZENER, prony=(), viscosity=5.0)
+    found, expected = answers(block, fast), answers(block, viscous)
+    assert np.abs(found - expected).max() < 1e-4 * np.abs(expected).max()
+
+
+def test_what_never_relaxes_is_stiffness(block):
+    slow = replace(ZENER, prony=(PronyTerm(modulus=10e3, time=1e4),))
+    stiff = replace(ZENER, prony=(), shear_modulus=35e3)
+    found, expected = answers(block, slow)[1:], answers(block, stiff)[1:]
+    assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()
+    soft = answers(block, replace(stiff, shear_modulus=25e3))[0]
+    np.testing.assert_allclose(answers(block, slow)[0], soft, rtol=1e-9)  # at rest it has
+
+
+def test_a_sheet_bends_with_the_law_of_its_material():
+    """The thicker twin that stands for a sheet: its steady motion is that of a real modulus."""
+    stiff = fem.PRESETS["paper"]
+    solid = replace(stiff, loss_factor=0.0, prony=(PronyTerm(modulus=4e8, time=1e-3),))
+    sheet = replace(BODIES["paper-sheet-loose"], width=0.05, height=0.05, material=solid)
+    still = Tacton(am_frequency=140, duration=0.02)
+    scene = skinwave.Scene(
+        pressure=MovingPressure(tacton=still, drive="linear"), body=sheet, probes=((0.0, 0.0),)
+    )
+    mu = solid.complex_modulus(2 * np.pi * 140)
+    twin = replace(solid, prony=(), shear_modulus=mu.real, viscosity=mu.imag / 2 / np.pi / 140)
+    found, expected = (
+        np.ptp(compute(replace(scene, body=replace(sheet, material=m)), "fem-harmonic", h=0.01)
+               .displacement)
+        for m in (solid, twin)
+    )  # fmt: skip
+    assert found == pytest.approx(expected, rel=1e-6)
+
+
+def layered(mesh):
+    """Two materials that relax in different times on one that does not."""
+    depth = -mesh.points[mesh.tets[:, :4], 2].mean(axis=1)
+    slower = replace(ZENER, prony=(PronyTerm(modulus=10e3, time=2e-3),), viscosity=1.0)
+    layers = {0: slower, 1: ZENER, 2: fem.PRESETS["palm"]}
+    return replace(mesh, region=np.searchsorted([0.003, 0.006], depth)), layers
+
+
+def test_layers_relax_each_in_its_own_time():
+    mesh, layers = layered(meshes.extrude(*2 * [np.linspace(-0.01, 0.01, 5)], [-0.009, -0.006,
+                                          -0.003, 0.0]))  # fmt: skip
+    ops = fem.assemble(mesh, layers, fixed="bottom")
+    assert [branch.time for branch in ops.branches] == [0.5e-3, 2e-3]
+    w = 2 * np.pi * 140
+    frozen = {
+        r: replace(m, prony=(), shear_modulus=(mu := m.complex_modulus(w)).real,
+                   viscosity=mu.imag / w)
+        for r, m in layers.items()
+    }  # fmt: skip
+    force = np.random.default_rng(0).standard_normal(mesh.n_dofs)
+    found = fem.harmonic(ops, force, 140.0)
+    expected = fem.harmonic(fem.assemble(mesh, frozen, fixed="bottom"), force, 140.0)
+    assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
+    # Reduced, and in its own coordinates, where two thirds of the springs are missing.
+    S = fem.probe_operator(mesh, [[0.0, 0.0], [0.005, 0.0]])
+    model = fem.reduce(ops, S, 500.0, 1e-4)
+    push = model.basis.T @ force
+    u = S @ found[0]
+    small = fem.transfer(model, push[:, None], 140.0)[0, :, 0]
+    np.testing.assert_allclose(small, u, rtol=2e-4, atol=2e-4 * np.abs(u).max())
+    poles = fem.poles(model)
+    assert len(poles.values) < 4 * len(model.K)
+    assert (poles.values.real < 0).all()
+    lines, _ = fem.line_response(poles, push[None], np.array([140.0]))
+    np.testing.assert_allclose(lines[0], small, rtol=1e-8)
+
+
+def test_the_estimate_knows_the_law(block):
+    mesh, force, S = block
+    ops = fem.assemble(mesh, ZENER)
+    model = fem.reduce(ops, S, 1000.0, 5e-3, loads=force[:, None])
+    hertz = np.linspace(0, 1000, 11)
+    found = fem.transfer(model, (model.basis.T @ force)[:, None], hertz)[:, :, 0]
+    exact = fem.harmonic(ops, force, hertz) @ S.T
+    error = np.linalg.norm(found - exact, axis=1) / np.linalg.norm(exact, axis=1)
+    assert error.max() < 3 * model.estimate <= 0.015
+    # Without the Maxwell branch the same space is that of another body.
+    elastic = fem.transfer(
+        replace(model, branches=()), (model.basis.T @ force)[:, None], hertz
+    )[:, :, 0]  # fmt: skip
+    assert np.abs(elastic - exact).max() > 0.2 * np.abs(exact).max()
+
+
+@pytest.mark.slow
+def test_reduced_motion_from_rest_is_that_of_the_transient():
+    mesh = meshes.block((0.03, 0.03, 0.01), 0.005)
+    ops = fem.assemble(mesh, ZENER, absorbing="sides")
+    P, points = fem.load_operator(mesh), fem.facet_points(mesh)[:, :2]
+    S = fem.probe_operator(mesh, [[0.0, 0.0], [0.005, 0.0], [0.01, 0.0]])
+    load = replace(LOAD, drive="linear")  # which begins at 0: a jump would ask for smaller steps
+    path = load.tacton.trajectory
+    typical = P @ load.spot(points, path.at_phase(np.linspace(0, 1, 12))).T
+    model = fem.reduce(ops, S, 1000.0, 2e-4, loads=typical)
+    dt = 1.25e-5
+    states = islice(fem.transient(ops, lambda t: P @ load(points, t), dt), 500)
+    full = np.array([S @ state.displacement for state in states])
+    poles = fem.poles(model)
+    frequencies, forces = reduced_lines(load, points, P.T @ model.basis)
+    lines, start = fem.line_response(poles, forces, frequencies)
+    rates = np.concatenate([2j * np.pi * frequencies, poles.values])
+    reduced = fem.exponential_sum(rates, np.vstack([lines, start]), np.arange(500) * dt)
+    misfit = np.linalg.norm(reduced - full, axis=0) / np.linalg.norm(full, axis=0)
+    assert misfit.max() <= 1e-3
+
+
+@pytest.mark.parametrize("model", ["fem", "fem-harmonic", "fem-transient"])
+def test_what_is_lost_in_dashpots_of_the_law_is_accounted_for(model):
+    found = compute(SCENE, model, h=0.008)
+    assert found.effort.energy_imbalance < 1e-6
+    assert 0 < found.effort.radiated < 0.9  # all that is not radiated is lost in the law
+
+
+def test_a_march_goes_on_where_it_stopped(block):
+    mesh, force, _ = block
+    ops = fem.assemble(mesh, ZENER)
+    whole = list(islice(fem.transient(ops, lambda t: force, 1e-4), 21))
+    rest = list(islice(fem.transient(ops, lambda t: force, 1e-4, initial=whole[10]), 11))
+    np.testing.assert_allclose(
+        rest[-1].displacement, whole[-1].displacement, rtol=0,
+        atol=1e-9 * np.abs(whole[-1].displacement).max(),
+    )  # fmt: skip
+
+
+def test_another_time_is_another_body_on_disk(monkeypatch, tmp_path):
+    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
+    probes = np.array([[0.0, 0.0]])
+
+    def kept(modulus=10e3, time=0.5e-3):
+        solid = replace(ZENER, prony=(PronyTerm(modulus=modulus, time=time),))
+        body = replace(SCENE.body, material=solid, sides="clamped")
+        effort = prepare(body, probes, h=0.01, tolerance=1e-2).effort
+        return "factorise and reduce" not in effort.seconds
+
+    assert cache.folder() == tmp_path
+    assert [kept(), kept()] == [False, True]
+    assert not kept(time=0.6e-3)
+    assert not kept(modulus=11e3)
+    assert kept()
+
+
+def test_a_scene_has_the_law_in_its_file_with_units():
+    text = scene_file.dumps(replace(SCENE, body=replace(SCENE.body, material=ZENER)))
+    assert "prony = [" in text
+    assert "modulus_pa = 10000.0" in text
+    assert "time_s = 0.0005" in text
+    assert scene_file.loads(text).body.solid == ZENER
+
+
+OLD = """[body.material]
+density_kg_m3 = 1000.0
+shear_modulus_pa = 25000.0
+poisson = 0.4999
+relaxing_modulus_pa = {}
+relaxation_time_s = {}
+"""
+
+
+@pytest.mark.parametrize("branch", [(10000.0, 0.0005), (0.0, 0.0)])
+def test_the_keys_of_one_maxwell_branch_still_load(branch):
+    with pytest.warns(FutureWarning, match=r"relaxation_time_s of \[body.material\] are now "):
+        found = scene_file.loads(OLD.format(*branch)).body.solid
+    assert found == (ZENER if branch[0] else replace(ZENER, prony=()))
+
+
+def test_a_branch_of_the_old_keys_needs_its_time():
+    with (
+        pytest.warns(FutureWarning, match="prony"),
+        pytest.raises(ValueError, match="time of a Prony term = 0"),
+    ):
+        scene_file.loads(OLD.format(10000.0, 0.0))
+
+
+def test_layers_may_relax_in_a_scene():
+    layers = (Layer(thickness=0.005, material="fat"),)
+    body = replace(SCENE.body, layers=layers, sides="clamped")
+    found = compute(replace(SCENE, body=body), "fem", h=0.01)
+    assert found.effort.energy_imbalance < 1e-6
+
+
+@pytest.mark.parametrize("losses", [{}, {"prony": (), "loss_factor": 0.3}])
+def test_small_motion_at_large_displacement_relaxes_as_linear_motion_does(losses):
+    """Tetrahedra and a membrane among their nodes, and the energy balance of both."""
+    solid = replace(ZENER, poisson=0.3, **losses)
+    mesh = meshes.sheet(0.02, 0.02, 0.002, 0.01)
+    layer = fem.Membrane(triangles=meshes.middle_plane(mesh), thickness=1e-3, material=solid)
+    body = fem.finite_strain(mesh, solid, fixed="sides", membrane=layer)
+    shape, dt = np.zeros(mesh.n_dofs), 1e-4
+    shape[2::3] = 1e-9
+
+    def force(t):
+        return np.sin(2 * np.pi * 200 * t) * shape
+
+    linear = list(islice(fem.transient(body.operators, force, dt), 60))
+    found = list(islice(fem.nonlinear.with_energy_balance(
+        body, fem.nonlinear.dynamic(body, lambda t, u: force(t), dt, tolerance=1e-9), force), 60,
+    ))  # fmt: skip
+    moved = np.array([[state.displacement, each.displacement]
+                      for each, (state, _) in zip(linear, found, strict=True)])  # fmt: skip
+    assert np.linalg.norm(moved[:, 0] - moved[:, 1]) < 1e-6 * np.linalg.norm(moved[:, 1])
+    state, spent = found[-1]
+    stored = fem.nonlinear.total_energy(body, state)
+    assert spent.dissipated > 0.05 * spent.work
+    assert abs(spent.work - stored - spent.lost) < 1e-6 * spent.work
+
+
+def test_modes_of_a_sheet_relax_as_the_sheet_does():
+    """Its bending and, at large deflection, its stretching."""
+    solid = replace(ZENER, poisson=0.3)
+    modal = fem.Operators(
+        K=sparse.diags_array([4e4, 9e4]).tocsr(), C=sparse.csr_array((2, 2)),
+        M=sparse.eye_array(2).tocsr(), R=sparse.csr_array((2, 2)), free=np.arange(2), n_dofs=2,
+        branches=(fem.MaxwellBranch(K=sparse.diags_array([16e3, 36e3]).tocsr(), time=0.5e-3),),
+    )  # fmt: skip
+    H = np.array([[[3e5, 1e5], [1e5, 2e5]]])
+    body = modal_elastic(modal, H, solid)
+    force, dt = np.array([300.0, 100.0]), 1e-5
+    states = islice(fem.nonlinear.with_energy_balance(
+        body, fem.nonlinear.dynamic(body, lambda t, u: force, dt, tolerance=1e-9), lambda t: force,
+    ), 400)  # fmt: skip
+    # The same equations, by a solver of ordinary differential equations.
+    share = 10e3 / 25e3
+
+    def rate(t, x):
+        z, v, d, q = x[:2], x[2:4], x[4:6], x[6]
+        Hz = H[0] @ z
+        pull = modal.K @ z + modal.branches[0].K @ d + (z @ Hz / 2 + share * q) * Hz
+        return np.concatenate([v, force - pull, v - d / 0.5e-3, [v @ Hz - q / 0.5e-3]])
+
+    exact = solve_ivp(rate, (0, 399 * dt), np.zeros(7), rtol=1e-9, atol=1e-12,
+                      t_eval=np.arange(400) * dt).y[:2].T  # fmt: skip
+    found = list(states)
+    moved = np.array([state.displacement for state, _ in found])
+    assert np.linalg.norm(moved - exact) < 2e-3 * np.linalg.norm(exact)
+    state, spent = found[-1]
+    stored = fem.nonlinear.total_energy(body, state)
+    assert abs(spent.work - stored - spent.lost) < 2e-3 * spent.work

@@ -1,0 +1,466 @@
+"""The published model's assumptions, dropped one by one."""
+
+import csv
+import json
+from concurrent.futures import Future
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fem
+import skinwave
+from simple_model import (
+    MovingPressure,
+    Response,
+    Tacton,
+    Trajectory,
+    lines,
+    point_kernel,
+    published,
+)
+from simple_model.material import Material, PronyTerm
+from skinwave.commands.cli import main
+from skinwave.planning.simulate import compute
+from skinwave.scene.file import dumps
+from skinwave.scene.scene import BODIES, Body, Layer, solid_of
+from skinwave.studies import mechanisms
+from skinwave.studies.assumptions import (
+    DEVICE_RATES,
+    LAYERS,
+    as_one,
+    as_relaxing,
+    as_viscous,
+    can_be_alone,
+    droppable,
+    held,
+    relaxed,
+    side_step,
+    strongest_line,
+)
+from skinwave.studies.mechanisms import paper_vs_skin, signatures, write
+from skinwave.studies.relax import Hierarchy, HierarchyStep, hierarchy_of, line_changes
+
+PATH = Trajectory(shape="circle", size=0.02, speed=12.0)
+LOAD = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.1, trajectory=PATH))
+SKIN = skinwave.Scene(pressure=LOAD, body=Body(width=0.04, height=0.04), probes=((0.01, 0.0),))
+PAPER = replace(SKIN, body=replace(BODIES["paper-sheet-loose"], width=0.05, height=0.05))
+
+
+def test_a_slab_and_a_sheet_have_their_own_ladders():
+    assert droppable(SKIN) == (
+        "linear drive", "sinc^2 profile", "no propagation", "little loss", "laterally-infinite",
+        "main lobe only", "continuous path", "one material", "flat",
+    )  # fmt: skip
+    assert side_step(SKIN) == (
+        "linear drive", "sinc^2 profile", "no propagation", "little loss", "viscous loss",
+    )  # fmt: skip
+    assert side_step(PAPER) == ()
+    assert droppable(PAPER) == (
+        "linear drive", "sinc^2 profile", "no propagation", "laterally-infinite", "vacuum",
+        "main lobe only",
+        "continuous path", "small deflection",
+    )  # fmt: skip
+    with pytest.raises(ValueError, match="keeps every assumption"):
+        droppable(replace(SKIN, body=BODIES["none"]))
+
+
+@pytest.mark.parametrize("depth", [0.004, np.inf])
+def test_a_body_without_room_for_a_palm_stays_flat(depth):
+    body = replace(SKIN.body, depth=depth)
+    names = droppable(replace(SKIN, body=body))
+    assert "flat" not in names
+    assert "no propagation" in names
+    layers = (Layer(thickness=0.001, material="dermis"), Layer(thickness=0.002, material="fat"))
+    assert "one material" in droppable(replace(SKIN, body=replace(body, layers=layers)))
+
+
+def test_nothing_dropped_is_the_published_model():
+    scene, model = relaxed(SKIN, ())
+    assert model == "point-kernel-published"
+    assert scene.body.kind == "none"
+    assert scene.pressure == published(SKIN.pressure)
+
+
+@pytest.mark.parametrize("own", [SKIN, PAPER])
+def test_the_step_of_propagation_changes_propagation_alone(own):
+    """The load before it is the scene's own, by the name that it has everywhere."""
+    names = droppable(own)
+    k = names.index("no propagation")
+    before, kernel = relaxed(own, names[:k])
+    after, waves = relaxed(own, names[: k + 1])
+    assert (kernel, waves) == ("point-kernel", "flat-body")
+    assert before.pressure == after.pressure == own.pressure
+    assert before == replace(after, body=BODIES["none"])
+
+
+@pytest.mark.parametrize("own", [SKIN, PAPER])
+def test_each_step_of_the_load_changes_one_thing(own):
+    loads = [relaxed(own, droppable(own)[:k])[0].pressure for k in range(3)]
+    assert loads[1] == replace(loads[0], drive="pressure_squared")
+    assert loads[2] == replace(loads[1], profile="gaussian")
+    # With and without propagation the load is the same, whatever else is dropped.
+    for name in droppable(own):
+        kept = [n for n in droppable(own) if n != name]
+        still = [n for n in kept if n != "no propagation"]
+        assert relaxed(own, kept)[0].pressure == relaxed(own, still)[0].pressure
+
+
+def test_a_profile_that_no_integral_has_is_answered_by_elements():
+    names = [name for name in droppable(SKIN)[:3] if name != "sinc^2 profile"]
+    scene, model = relaxed(SKIN, names)
+    assert (scene.pressure.profile, scene.body.sides, model) == ("main_lobe", "absorbing", "fem")
+    assert not can_be_alone("sinc^2 profile", droppable(SKIN), SKIN)  # the array's field has none
+
+
+def test_an_endless_body_of_elements_has_sides_that_absorb():
+    thin = replace(SKIN, body=replace(SKIN.body, depth=0.004, sides="clamped"))
+    names = droppable(thin)
+    body = {
+        name: relaxed(thin, [n for n in names if n != name])[0].body
+        for name in ("laterally-infinite", "flat")
+    }
+    assert body["laterally-infinite"].sides == "absorbing"
+    assert body["flat"].sides == "clamped"
+    assert can_be_alone("laterally-infinite", names, thin)
+    for kept in ({"sides": "absorbing"}, {"base": "free"}):  # no other body; none that stays
+        other = replace(thin, body=replace(thin.body, **kept))
+        assert not can_be_alone("laterally-infinite", droppable(other), other)
+    assert not can_be_alone("laterally-infinite", droppable(SKIN), SKIN)  # a palm ends
+    assert not can_be_alone("laterally-infinite", droppable(PAPER), PAPER)
+
+
+def test_all_dropped_is_the_richest():
+    scene, model = relaxed(SKIN, droppable(SKIN))
+    assert model == "fem"
+    assert scene.body.kind == "palm"
+    assert (scene.pressure.drive, scene.pressure.profile) == ("pressure_squared", "array")
+    assert scene.tacton.trajectory.hold
+    assert len(scene.body.layers) == 1
+    sheet, model = relaxed(PAPER, droppable(PAPER))
+    assert model == "plate-modes-nonlinear"
+    assert sheet.body == replace(PAPER.body, air=True)
+
+
+@pytest.mark.parametrize("rate", DEVICE_RATES)
+def test_a_device_holds_its_focus_at_a_whole_number_of_points(rate):
+    path = held(PATH, rate)
+    assert path.hold
+    assert path.drawing_frequency == pytest.approx(PATH.drawing_frequency)
+    assert len(path.points) - 1 == round(rate / PATH.drawing_frequency)
+    assert np.hypot(*np.array(path.points).T) == pytest.approx(0.01)
+
+
+def test_a_few_points_are_equally_far_apart_and_held_equally_long():
+    path = held(PATH, points=5)
+    corners = np.array(path.points)
+    sides = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+    np.testing.assert_allclose(sides, 0.02 * np.sin(np.pi / 5), rtol=1e-9)
+    np.testing.assert_allclose(np.diff(path.times), 1 / PATH.drawing_frequency / 5, rtol=1e-9)
+    late = path.position(0.99 * path.times[1] * np.ones(1))
+    np.testing.assert_allclose(late[0], corners[0], atol=1e-12)
+    scene, model = relaxed(SKIN, ("no propagation", "continuous path"), points=5)
+    assert (scene.tacton.trajectory, model) == (path, "fem")
+
+
+@pytest.mark.parametrize(
+    ("device", "said"),
+    [
+        ((30e3,), r"update_rate = 30 kHz is no device's; take 20 or 40"),
+        ((20e3, 1), r"points = 1 on the path must be 2 to 105"),
+        ((20e3, 106), r"points = 106 on the path must be 2 to 105, .* 20000 Hz"),
+    ],
+)
+def test_a_device_that_cannot_be_is_refused_before_anything_is_computed(device, said):
+    with pytest.raises(ValueError, match=said):
+        held(PATH, *device)
+    names = dict(zip(("update_rate", "points"), device, strict=False))
+    with pytest.raises(ValueError, match=said):
+        hierarchy_of(SKIN, lambda phase, done: pytest.fail("computed"), **names)
+
+
+def test_both_laws_of_loss_are_the_same_at_the_frequency_of_the_fit():
+    for name, hz in (("palm", 140.0), ("forearm", 140.0), ("forearm", 600.0)):
+        w = 2 * np.pi * hz
+        viscous = fem.PRESETS[name]
+        relaxing = as_relaxing(viscous, w)
+        assert relaxing.viscosity == 0
+        assert relaxing.shear_modulus >= 0.499 * viscous.shear_modulus
+        assert relaxing.complex_modulus(w) == pytest.approx(viscous.complex_modulus(w), rel=1e-12)
+        assert relaxing.complex_modulus(3 * w).imag < 0.9 * viscous.complex_modulus(3 * w).imag
+        back = as_viscous(relaxing, w)
+        assert (back.prony, back.viscosity) == ((), pytest.approx(viscous.viscosity))
+        assert back.shear_modulus == pytest.approx(viscous.shear_modulus)
+
+
+@pytest.mark.parametrize("material", ["palm", "palm-zener"])
+def test_little_loss_is_a_tenth_of_it_and_as_stiff(material):
+    own = replace(SKIN, body=replace(SKIN.body, material=material))
+    w = 2 * np.pi * strongest_line(own)
+    little, all_of_it = (
+        relaxed(own, ("no propagation", *dropped))[0].body.solid.complex_modulus(w)
+        for dropped in ((), ("little loss",))
+    )
+    assert little.real == pytest.approx(all_of_it.real, rel=1e-9)
+    assert little.imag == pytest.approx(0.1 * all_of_it.imag, rel=1e-9)
+    assert all_of_it == pytest.approx(own.body.solid.complex_modulus(w), rel=1e-9)
+
+
+@pytest.mark.parametrize("law", [as_relaxing, as_viscous])
+def test_what_is_lost_by_hysteresis_stays_when_the_law_changes(law):
+    both = Material(
+        density=1000, shear_modulus=25e3, poisson=0.49, loss_factor=0.2,
+        **({"viscosity": 5.0} if law is as_relaxing else
+           {"prony": (PronyTerm(modulus=1e4, time=5e-4), PronyTerm(modulus=5e3, time=2e-3))}),
+    )  # fmt: skip
+    w = 2 * np.pi * 140
+    assert law(both, w).complex_modulus(w) == pytest.approx(both.complex_modulus(w), rel=1e-9)
+
+
+def test_the_law_of_loss_is_one_rung():
+    before, _ = relaxed(SKIN, ("sinc^2 profile", "no propagation", "little loss"))
+    after, model = relaxed(
+        SKIN, ("sinc^2 profile", "no propagation", "little loss", "viscous loss")
+    )
+    assert model == "flat-body"
+    assert before.body.solid == SKIN.body.solid
+    line = 2 * np.pi * strongest_line(SKIN)
+    laws = [scene.body.solid.complex_modulus(line) for scene in (before, after)]
+    assert laws[1] == pytest.approx(laws[0], rel=1e-9)
+    # A body that relaxes keeps its own law at the end, and has its viscous twin before.
+    own = replace(SKIN, body=replace(SKIN.body, material="palm-zener"))
+    assert "viscous loss" in droppable(own)
+    assert side_step(own) == ()
+    before, _ = relaxed(own, ("no propagation", "little loss"))
+    after, _ = relaxed(own, ("no propagation", "little loss", "viscous loss"))
+    assert before.body.solid.fast_modulus == 0 < before.body.solid.viscosity
+    assert after.body.solid == own.body.solid
+
+
+def test_the_square_of_a_sine_makes_its_second_harmonic_and_no_third():
+    """q = ((1 + sin) / 2)^2 has 2f at a quarter of f, and nothing at 3f."""
+    times = np.arange(10_000) / 10_000
+    still = replace(LOAD, tacton=replace(LOAD.tacton, trajectory=Trajectory(), duration=1.0))
+    load = point_kernel(still, np.array([[0.0, 0.0]]), times)
+    f, twice, thrice = lines(load, [140.0, 280.0, 420.0])[:, 0]
+    assert twice / f == pytest.approx(0.25, rel=1e-9)
+    assert thrice / f < 1e-5  # -100 dB
+
+
+def test_layers_as_one_keep_their_mass_and_mean_stiffness():
+    one = as_one((Layer(thickness=1e-3, material="dermis"), Layer(thickness=3e-3, material="fat")))
+    assert one.thickness == pytest.approx(4e-3)
+    assert one.material.shear_modulus == pytest.approx((70e3 + 3 * 15e3) / 4, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    scene = replace(SKIN, body=Body(width=0.032, height=0.032, depth=0.004))  # too thin for layers
+    monkeypatch.setattr(
+        "skinwave.studies.relax.droppable",
+        lambda scene: tuple(n for n in droppable(scene) if n not in ("flat", "one material")),
+    )
+    # Here; each in a process of its own in `test_a_rung_that_fails_leaves_the_others`.
+    monkeypatch.setattr("skinwave.studies.relax.side_by_side", in_turn)
+    (tmp_path / "scene.toml").write_text(dumps(scene))
+    assert main(["relax", "scene.toml", "--h", "9", "--quiet"]) == 0
+    coarse = "elements of 9 mm are wider than twice the standard deviation of the focal spot"
+    assert coarse in capsys.readouterr().err
+    record = json.loads((tmp_path / "scene-relaxed/relax.json").read_text())
+    effects = {effect["name"]: effect for effect in record["effects"]}
+    assert [e["waveform"] for e in record["effects"]] == sorted(
+        (e["waveform"] for e in record["effects"]), reverse=True
+    )
+    assert set(effects) == {
+        "linear drive", "sinc^2 profile", "no propagation", "little loss", "viscous loss",
+        "laterally-infinite", "main lobe only", "continuous path",
+    }  # fmt: skip
+    # with a mean in the load its lines at multiples of f_d come from nothing
+    assert effects["linear drive"]["decibel"]["f_d"] > 40
+    assert effects["continuous path"]["waveform"] < 0.1 < effects["no propagation"]["waveform"]
+    # One is a side step, absorbing sides stand for an infinite body anyway, and the array's field
+    # has no profile of its own.
+    told = {name for name, e in effects.items() if e["alone"] is not None}
+    assert told == set(effects) - {"viscous loss", "laterally-infinite", "sinc^2 profile"}
+    assert all(step["seconds"] > 0 for step in record["steps"])
+    with np.load(tmp_path / "scene-relaxed/responses.npz") as kept:
+        assert {"t", "probes", "as published", "laterally-infinite"} <= set(kept.files)
+    with open(tmp_path / "scene-relaxed/relax.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    # In so short a Tacton 2 f_AM is not resolved from 3 f_d - 2 f_AM.
+    assert {row["line"] for row in rows} >= {"f_AM", "2f_d", "f_d"}
+    page = (tmp_path / "scene-relaxed/index.html").read_text()
+    assert "What each assumption changes" in page
+    assert coarse in page
+
+
+def test_little_loss_is_that_of_layers_too():
+    dropped = [name for name in droppable(SKIN) if name not in ("little loss", "flat")]
+    body = relaxed(SKIN, dropped)[0].body
+    for layer in body.layers:
+        known = next(x for x in LAYERS if x.thickness == layer.thickness)
+        assert solid_of(layer.material).viscosity == pytest.approx(
+            0.1 * solid_of(known.material).viscosity
+        )
+
+
+def test_what_follows_a_failed_rung_is_not_told_as_one_assumption():
+    times = np.arange(4.0)
+    told = Response(model="fem", times=times, probes=np.zeros((1, 2)), values=times[:, None])
+    steps = [
+        HierarchyStep(name=name, dropped=dropped, model="fem", response=response)
+        for name, dropped, response in (
+            ("as published", (), told), ("a", ("a",), None), ("b", ("a", "b"), told),
+            ("c", ("a", "b", "c"), told),
+        )
+    ]  # fmt: skip
+    found = Hierarchy(scene=SKIN, steps=tuple(steps), side_steps=(), leave_one_out=())
+    assert [(a.name, b.name) for a, b in found.pairs()] == [("b", "c")]
+
+
+def test_a_rung_that_fails_leaves_the_others(monkeypatch):
+    monkeypatch.setattr(
+        "skinwave.studies.relax.droppable", lambda scene: ("linear drive", "one material")
+    )
+    monkeypatch.setattr(
+        "skinwave.studies.relax.relaxed",
+        lambda scene, dropped, **device: (
+            replace(scene, body=replace(scene.body, depth=0.001)), "flat-body",
+        ) if not dropped else (scene, "no such model"),
+    )  # fmt: skip
+    found = hierarchy_of(SKIN, lambda phase, done: None)
+    assert found.steps[0].response is not None
+    assert all("no such model" in step.error for step in found.steps[1:])
+    assert found.effects() == []
+
+
+def in_turn(calls, may_begin, begun):
+    """What `side_by_side` yields, computed here."""
+    for k, call in enumerate(calls):
+        begun(k)
+        future = Future()
+        try:
+            future.set_result(call())
+        except (ValueError, ArithmeticError) as error:
+            future.set_exception(error)
+        yield k, future
+
+
+def test_a_body_that_steps_share_is_reduced_once_and_counts_in_each(monkeypatch, tmp_path):
+    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
+    small = Body(width=0.03, height=0.03, depth=0.004)
+    monkeypatch.setattr(
+        "skinwave.studies.relax.droppable", lambda scene: ("linear drive", "sinc^2 profile")
+    )
+    monkeypatch.setattr(
+        "skinwave.studies.relax.relaxed",
+        lambda scene, dropped, **device: (replace(scene, body=small), "fem"),
+    )
+    monkeypatch.setattr("skinwave.studies.relax.side_by_side", in_turn)
+    monkeypatch.setattr("skinwave.studies.relax.sentences", lambda *scene, h: ())
+    found = hierarchy_of(SKIN, lambda phase, done: None, h=4e-3).steps
+    first, *others = [step.response.effort.seconds for step in found]
+    reduction = {"assemble", "factorise and reduce"}
+    assert reduction <= set(first)
+    for step, own in zip(found[1:], others, strict=True):
+        assert not reduction & set(own)
+        assert step.seconds > first["factorise and reduce"]
+        assert (step.response.values == found[0].response.values).all()
+
+
+def test_a_body_that_cannot_be_reduced_is_refused_on_a_coarse_mesh(monkeypatch):
+    asked = []
+
+    def not_reduced(scene, model, h=None):
+        asked.append(h)
+        if "fem" in model:
+            raise fem.NotReduced("200 moments leave an error")
+        return compute(scene, model)
+
+    monkeypatch.setattr("skinwave.studies.relax.compute", not_reduced)
+    monkeypatch.setattr("skinwave.studies.relax.sentences", lambda *scene, h: ())
+    monkeypatch.setattr("skinwave.studies.relax.side_by_side", in_turn)
+    monkeypatch.setattr(
+        "skinwave.studies.relax.droppable", lambda scene: ("linear drive", "little loss", "flat")
+    )
+    monkeypatch.setattr(
+        "skinwave.studies.relax.relaxed",
+        lambda scene, dropped, **device: (
+            scene, "fem" if set(dropped) == {"linear drive", "flat"} else "point-kernel",
+        ),
+    )  # fmt: skip
+    found = hierarchy_of(SKIN, lambda phase, done: None, h=5e-3)
+    (failed,) = [step for step in found.every if step.error]
+    assert failed.name == "all but: little loss"
+    assert "200 moments" in failed.error
+    assert asked.count(pytest.approx(15e-3)) == 1  # and never on the fine one
+    assert len([h for h in asked if h == 5e-3]) == len(found.every) - 1
+
+
+def test_line_changes_are_of_lines_that_count():
+    times = np.arange(1000) / 10_000
+    loud = np.sin(2 * np.pi * 140 * times)[:, None]
+    first = skinwave.simulate(replace(SKIN, body=BODIES["none"]), "point-kernel")
+    before, after = (replace(first, values=a * loud, quantity="displacement") for a in (1.0, 2.0))
+    changes = line_changes(SKIN, before, after)
+    assert changes["f_AM"] == pytest.approx(6.02, abs=0.01)
+
+
+def test_patterns_of_loads_are_those_of_their_fourier_series():
+    found = signatures()
+    expected = {
+        "square of the sound's amplitude": (0.25, 0, 0),
+        "contact on one side only": (0.424, 0, 0.085),
+        "clipped sound, squared": (0.589, 0.2, 0),
+        "square root of the command": (0.2, 0.086, 0.048),
+    }
+    for name, ratios in expected.items():
+        assert found[name] == pytest.approx(ratios, abs=2e-3)
+
+
+@pytest.mark.slow
+def test_a_line_of_the_sheet_grows_with_the_amplitude_and_one_of_the_load_does_not(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(mechanisms, "DURATION", 0.2)  # s; after half of it these bodies are steady
+    monkeypatch.setattr(mechanisms, "AMPLITUDES", (0.25, 1.0))
+    bodies = {
+        "paper-sheet-loose": replace(BODIES["paper-sheet-loose"], width=0.06, height=0.06),
+        "skin-slab": Body(width=0.042, height=0.042, depth=0.01, sides="clamped"),
+    }
+    still = [("am140", Tacton(am_frequency=140, trajectory=Trajectory()))]
+    found = paper_vs_skin(lambda phase, done: None, h=0.0075, chosen=still, bodies=bodies)
+    ratio = {(r.body, r.mechanism, r.amplitude): r.ratio for r in found.ratios}
+    for body in bodies:
+        assert ratio[body, "linear load", 1.0] < 1e-5
+        quiet, loud = (ratio[body, "squared load", a] for a in (0.25, 1.0))
+        assert quiet == pytest.approx(loud, rel=1e-3)
+    quiet, loud = (ratio["paper-sheet-loose", "squared load, stretching", a] for a in (0.25, 1.0))
+    assert abs(loud / quiet - 1) > 0.05
+    write(tmp_path, found)
+    assert "a line of the sheet" in (tmp_path / "index.html").read_text()
+    with open(tmp_path / "lines.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["mechanism"] for row in rows} == {
+        "linear load", "squared load", "squared load, stretching",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["scene.toml", "--update-rate", "30"], "update_rate = 30 kHz is no device's; take 20 or"),
+        (["scene.toml", "--update-rate", "40", "--points", "999"], "must be 2 to 209"),
+        (["paper-vs-skin", "--points", "9"], "leave them out"),
+    ],
+)
+def test_the_command_line_refuses_such_devices_in_one_sentence(
+    options, said, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.toml").write_text(dumps(SKIN))
+    assert main(["relax", *options, "--quiet"]) == 2
+    told = capsys.readouterr().err
+    assert said in told
+    assert told.count("\n") == 1

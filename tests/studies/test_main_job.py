@@ -1,0 +1,111 @@
+"""The main job, end to end: the paper's 15 Tactons on a paper sheet and on skin."""
+
+import csv
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from skinwave.results.claims import TEXTS
+
+pytestmark = pytest.mark.slow
+PUBLISHED = "point-kernel-published"
+
+
+@pytest.fixture(scope="module")
+def job(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("main") / "paper-15"
+    command = [sys.executable, "-m", "skinwave", "compare", "--out", str(folder), "--json"]
+    return folder, json.loads(subprocess.check_output(command, text=True))
+
+
+@pytest.fixture(scope="module")
+def claims(job):
+    rows = csv.DictReader((job[0] / "claims.csv").read_text().splitlines())
+    return {
+        (row["model"] if row["body"] == "none" else row["body"], row["claim"]): row for row in rows
+    }
+
+
+def test_all_runs_are_there(job):
+    folder, summary = job
+    assert summary["runs"] == summary["planned"] == 60
+    assert len(list(folder.glob("*/*/scene.toml"))) == 60
+    assert len(list((folder / "figures").glob("*.png"))) == 17
+    responses = np.load(folder / "responses.npz")
+    assert responses["am140/skin-slab/flat-body"].shape == (10_000, 5)
+    assert responses["am140/paper-sheet/plate-modes-nonlinear"].shape == (10_000, 5)
+
+
+def test_every_response_is_within_the_tolerance_and_the_memory_is_bounded(job):
+    folder, summary = job
+    assert summary["warnings"] == []
+    for body in ("paper-sheet", "skin-slab"):
+        for record in folder.glob(f"*/{body}/record.json"):
+            assert 0 < json.loads(record.read_text())["expected_error"] <= 0.05
+    assert summary["peak_memory_gib"] <= 6
+
+
+def test_the_papers_statements_about_its_simulation_hold_in_its_model(claims):
+    published = {claim: row for (column, claim), row in claims.items() if column == PUBLISHED}
+    assert set(TEXTS) == set(published)
+    for claim in ("S1", "S2", "S3", "S4", "S5"):
+        assert published[claim]["holds"] == "True", published[claim]
+    assert float(published["S3"]["value"]) < -120
+    # What the measurement had and the model lacks.
+    for claim in ("M1", "M3", "M5"):  # M5 is about lines that are not there
+        assert published[claim]["holds"] == "False"
+
+
+def test_what_lines_there_are_follows_from_the_load_and_not_from_waves(claims):
+    """The same components exist in the kernel under the same load and in a linear body."""
+    for claim in ("S1", "S2", "S3", "S5", "M1", "M2", "M3"):
+        of_both = [claims[column, claim]["holds"] for column in ("point-kernel", "skin-slab")]
+        assert of_both[0] == of_both[1], claim
+    assert claims["point-kernel", "M3"]["holds"] == "True"
+    assert claims["point-kernel", "M1"]["holds"] == "False"  # a square has no third harmonic
+
+
+def test_a_sheet_that_stretches_has_harmonics_that_the_load_lacks(claims):
+    """M1 was measured on paper: 2 f_AM and 3 f_AM under AM alone."""
+    assert claims["paper-sheet", "M1"]["holds"] == "True"
+
+
+def test_second_harmonic_is_the_loads_times_the_bodys(job):
+    """AM 140 on skin: 2 f / f is a quarter in the load, and no body adds 3 f."""
+    rows = csv.DictReader((job[0] / "am140/skin-slab/lines.csv").read_text().splitlines())
+    centre = {r["line"]: float(r["displacement_um"]) for r in rows if r["probe_x_mm"] == "0"}
+    assert 0.05 < centre["2f_AM"] / centre["f_AM"] < 0.25
+    assert centre["3f_AM"] < 1e-6 * centre["f_AM"]
+
+
+def test_waves_spread_further_than_the_point_kernel(job):
+    responses = np.load(job[0] / "responses.npz")
+
+    def level(body, model):
+        motion = responses[f"am140/{body}/{model}"][2500:].std(axis=0)
+        return 20 * np.log10(motion[2:] / motion[0])  # 10 mm and beyond
+
+    kernel = level("none", "point-kernel")
+    assert (level("skin-slab", "flat-body") > kernel + 10).all()
+
+
+def test_the_centre_of_a_circle_does_not_feel_the_drawing_frequency(job):
+    rows = csv.DictReader((job[0] / "stm20/skin-slab/lines.csv").read_text().splitlines())
+    drawn = {r["probe_x_mm"]: float(r["displacement_um"]) for r in rows if r["line"] == "f_d"}
+    assert drawn["0"] < 1e-3 * drawn["10"]
+
+
+def test_the_page_stands_alone(job):
+    page = (job[0] / "index.html").read_text()
+    assert page.count("data:image/png;base64,") == 17
+    for outside in ('src="http', 'href="http', "url(http", "<script"):
+        assert outside not in page
+    assert "peak memory" in page
+    assert "contradicts M4" in page
+    first = page.split("<h2>")[0]
+    assert "Waves carry" in first.split("<img")[0]
+    assert "not propagation, add the component" in first.split("<img")[0]
+    assert "same load" in first.split("<table")[1]

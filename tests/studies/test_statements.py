@@ -1,0 +1,205 @@
+"""Claims of pages about a run follow from its scene."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import simple_model
+from simple_model import MovingPressure, Response, Rhythm, Signal, Tacton, Trajectory
+from skinwave.report.levels import sensation_levels
+from skinwave.results.claims import evaluate
+from skinwave.results.files import line_rows
+from skinwave.results.run import Run
+from skinwave.scene.scene import BODIES, Body, Layer, Placement, Scene
+from skinwave.studies.description import above, modelled, unresolved
+from skinwave.studies.scene_report import _asked_rows
+from skinwave.studies.study_page import caption, write_single
+from skinwave.studies.summary import known_of
+from skinwave.sweeps.measures import measured
+
+LAYERS = (Layer(thickness=1e-3, material="dermis"),)
+CIRCLE = Trajectory(shape="circle", size=0.02, speed=12.0)
+
+
+def run(body, drive="pressure_squared", **tacton):
+    pressure = MovingPressure(tacton=Tacton(duration=0.5, **tacton), drive=drive)
+    scene = Scene(pressure=pressure, body=body)
+    times = np.arange(5000) / 1e4
+    motion = 1e-6 * np.sin(2 * np.pi * 140 * times)[:, None] * np.ones(len(scene.probes))
+    response = Response(model="fem", times=times, probes=scene.probe_points, values=motion)
+    return Run(tacton="one", body=body.kind, scene=scene, response=response)
+
+
+ABOVE = "; on it, from the surface down: 1 mm of dermis"
+
+
+@pytest.mark.parametrize(
+    ("body", "stated", "absent"),
+    [
+        (BODIES["palm"], "Left out: layers.", "sheet"),
+        (BODIES["skin-slab"], "Left out: layers and curvature.", "sheet"),
+        (
+            Body(layers=LAYERS),
+            "; on it, from the surface down: 1 mm of dermis. Left out: curvature.",
+            "layers",
+        ),
+        (BODIES["paper-sheet"], "The mesh is a thicker sheet", "curvature"),
+    ],
+)
+def test_what_is_left_out_is_that_of_the_body(body, stated, absent):
+    sentence = modelled([run(body)])[0]
+    assert stated in sentence
+    assert absent not in sentence
+
+
+def test_a_drive_law_that_was_not_used_is_not_named():
+    squared, corrected = (
+        " ".join(modelled([run(BODIES["palm"], drive, am_frequency=140)]))
+        for drive in ("pressure_squared", "force_corrected")
+    )
+    assert "pressure_squared" in squared
+    assert "pressure_squared" not in corrected
+    assert "force_corrected" in corrected
+
+
+@pytest.mark.parametrize(
+    "tones",
+    [
+        {"am_frequency": 140, "second_am_frequency": 200, "superposition": (0.0, 1.0)},
+        {"second_am_frequency": 200, "superposition": (0.0, 1.0), "trajectory": CIRCLE},
+        {"am_frequency": 140, "superposition": (0.0, 1.0)},
+        {"am_frequency": 140, "envelope_frequency": 10},
+    ],
+)
+def test_statements_on_one_tone_are_not_judged_by_others(tones):
+    assert evaluate([run(BODIES["skin-slab"], **tones)]) == []
+    assert evaluate([run(BODIES["skin-slab"], am_frequency=140)])
+
+
+def at_the_focus(seconds, **tacton):
+    """A made-up motion of 2 um at f_AM, 1 um at twice it and 3 um in the mean."""
+    one = run(BODIES["skin-slab"], **tacton)
+    times = np.arange(round(seconds * 1e4)) / 1e4
+    angle = 2 * np.pi * tacton["am_frequency"] * times
+    motion = 1e-6 * (3 + 2 * np.sin(angle) + np.cos(2 * angle))[:, None] * np.ones(5)
+    response = replace(one.response, times=times, values=motion)
+    pressure = replace(one.scene.pressure, tacton=Tacton(duration=seconds, **tacton))
+    return replace(one, scene=replace(one.scene, pressure=pressure), response=response)
+
+
+def test_a_name_of_the_last_release_loads_with_a_warning():
+    with pytest.warns(DeprecationWarning, match="is now simple_model.are_resolved"):
+        assert simple_model.told_apart is simple_model.are_resolved
+    assert not hasattr(simple_model, "nothing")
+
+
+def test_lines_that_cannot_be_resolved_are_not_reported():
+    short, long = at_the_focus(0.5, am_frequency=2), at_the_focus(2.0, am_frequency=2)
+    assert short.frequencies == short.lines == sensation_levels(short, 0) == {}
+    assert short.unresolved == ("f_AM", "2f_AM", "3f_AM", "4f_AM", "5f_AM")
+    assert list(line_rows(short)) == []
+    assert (
+        "5 lines, f_AM, 2f_AM, 3f_AM, 4f_AM, ..., cannot be resolved in 0.5 s"
+        in unresolved([short])[0]
+    )
+    assert evaluate([short]) == []
+    assert long.unresolved == ()
+    assert unresolved([long]) == []
+    assert long.lines["f_AM"][0] == pytest.approx(2e-6, rel=1e-3)
+    assert long.lines["2f_AM"][0] == pytest.approx(1e-6, rel=1e-3)
+    row = measured(short.scene, short.response)
+    assert not [name for name in row if name.startswith(("f_AM", "2f_AM"))]
+
+
+def test_lines_beside_those_that_cannot_be_told_are_not_judged_either():
+    """The path of 141 Hz is too near to 140 Hz, and 282 Hz to 280; pairs lie near 0 Hz. At 700 Hz
+    no line is, but at 703 and 704 Hz two are that are unresolved, and so not subtracted.
+    """
+    near = Trajectory(shape="circle", size=0.02, speed=0.02 * np.pi * 141)
+    one = at_the_focus(0.5, am_frequency=140, trajectory=near)
+    assert {"f_AM", "f_d", "2f_d-f_AM", "f_d-f_AM"} <= set(one.unresolved)
+    assert "5f_AM" in one.unresolved
+    assert one.frequencies == {}
+    assert evaluate([one]) == []
+    row = measured(one.scene, one.response)
+    assert "5f_AM_um" not in row
+    assert not {"level_db", "sensation_line"} & row.keys()
+
+
+def test_two_names_of_one_frequency_are_told():
+    half = Trajectory(shape="circle", size=0.02, speed=0.02 * np.pi * 70)
+    one = at_the_focus(0.5, am_frequency=140, trajectory=half)
+    assert one.unresolved == ()
+    assert one.lines["2f_d"][0] == pytest.approx(2e-6, rel=1e-3)
+
+
+def test_a_page_says_how_many_lines_are_left_out(tmp_path):
+    write_single(tmp_path, at_the_focus(0.5, am_frequency=2))
+    assert "5 lines, f_AM, 2f_AM" in (tmp_path / "index.html").read_text()
+
+
+CORNERS = ((-0.01, 0.0), (0.01, 0.0), (0.01, 0.01))
+RECORDED = Trajectory(
+    shape="recorded", times=(0, 0.1, 0.25), points=CORNERS, levels=(0.0, 1.0, 0.5)
+)
+POLYLINE = Trajectory(shape="polyline", points=CORNERS, speed=3.0)
+ONE_WAY = Trajectory(shape="line", size=0.02, speed=4.0, sweep="one_way", centre=(0.0, 0.005))
+SECOND = {"second_am_frequency": 200, "superposition": (0.25, 0.75)}
+
+
+@pytest.mark.parametrize(
+    ("tacton", "row", "said"),
+    [
+        ({}, "focus", "at rest"),
+        ({}, "amplitude modulation", "none"),
+        ({}, "amplitude", "100 % of full drive"),
+        ({"am_frequency": 80, **SECOND}, "amplitude modulation",
+         "f_AM = 80 Hz, f_AM2 = 200 Hz, weights 0.25 and 0.75"),
+        ({"second_am_frequency": 200, "superposition": (0.0, 1.0)}, "amplitude modulation",
+         "f_AM2 = 200 Hz"),
+        ({"envelope_frequency": 5}, "amplitude modulation", "f_e = 5 Hz"),
+        ({"trajectory": RECORDED}, "focus", "a path recorded for 0.25 s with levels of its own"),
+        ({"trajectory": POLYLINE}, "focus", "polyline of 60 mm a period at 3 m/s, f_d = 50.000 Hz"),
+        ({"trajectory": ONE_WAY}, "focus",
+         "line of 20 mm at 4 m/s, one way, f_d = 200.000 Hz about (0, 5) mm"),
+        ({"trajectory": CIRCLE, "foci": (0.0, 0.5)}, "focus",
+         "circle of 20 mm at 12 m/s, f_d = 190.986 Hz, 2 foci simultaneous"),
+        ({"amplitude": 0.5, "rhythm": Rhythm(pulses=((0.03, 0.02),), ramp=0.005)}, "amplitude",
+         "50 % of full drive, 1 pulse in 50 ms with ramps of 5 ms"),
+        ({"signal": Signal(rate=100, samples=(0.0, 1.0))}, "amplitude", "a sampled modulation"),
+    ],
+)  # fmt: skip
+def test_a_page_says_all_that_was_commanded(tacton, row, said):
+    one = run(BODIES["skin-slab"], **tacton)
+    assert dict(_asked_rows(one.scene))[row] == said
+    if tacton:
+        assert said in caption("one", [one])
+
+
+def test_a_page_says_how_a_body_lies_and_what_lies_above():
+    place = Placement(tilt_x=np.radians(10), offset=(0.0, 0.005), lift=0.002)
+    body = Body(layers=LAYERS, placement=place)
+    said = f"{ABOVE}; tilted by 10 degrees about x and 0 degrees about y; moved by (0, 5, 2) mm"
+    one = run(body)
+    assert dict(_asked_rows(one.scene))["body"].endswith(said)
+    assert said in modelled([one])[0]
+
+
+def test_a_page_lists_layers_from_the_surface_down():
+    words = above(BODIES["palm-layers"])
+    assert words == (
+        "; on it, from the surface down: 0.27 mm of epidermis, 1 mm of dermis, 2 mm of fat"
+    )
+
+
+def test_what_is_known_of_a_material_is_that_of_its_preset():
+    """The page has the same numbers as `spreads_of`; of one's own material none is known."""
+
+    def known(body):
+        return known_of(Scene(pressure=MovingPressure(tacton=Tacton()), body=body))
+
+    words = "moduli known to a factor of 2 (90 %), losses known to a factor of 3 (90 %)"
+    assert known(BODIES["skin-slab"]) == words
+    assert "23.7 %" in known(Body(material="forearm"))
+    assert known(Body(material=Body().solid)) == ""
