@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
     from skinwave.live.data import comparison_page
     from skinwave.measure.measured_runs import at_measured
-    from skinwave.report.figures import label
+    from skinwave.report.palette import label
     from skinwave.results import record
     from skinwave.results.files import folder_name
     from skinwave.results.outputs import output_folder

@@ -20,7 +20,8 @@ from skinwave.inference.knowledge import (
     told,
     variance_share,
 )
-from skinwave.report.figures import REPORT, SPARE
+from skinwave.report.figures import REPORT
+from skinwave.report.palette import SPARE
 from skinwave.report.styles import Style
 from skinwave.results.claims import MUCH_LOWER
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from importlib import resources
 from typing import Any
 
-from skinwave.system.document import render
 from skinwave.system.scripts import bundle, encoded
+from skinwave.system.templates import render
 
 ENTRY = "page.js"
 TITLE = "skinwave: waves in skin and paper under mid-air ultrasound haptics"

@@ -10,12 +10,12 @@ from matplotlib.figure import Figure
 from skinwave.measure import summary, writing
 from skinwave.measure.inspection import Inspection
 from skinwave.measure.spectral_lines import LOWEST
-from skinwave.report.figures import REPORT, SPARE, png
+from skinwave.report.figures import REPORT, png
+from skinwave.report.palette import SERIES
 from skinwave.report.styles import Style
 from skinwave.system import document
 from skinwave.system.plain_text import csv_table
 
-COLOURS = ("#0072B2", "#D55E00", *SPARE)
 SHOWN = 4  # places
 WINDOW = 0.1  # s
 MOST_CELLS = 2_000_000  # of a CSV file
@@ -108,7 +108,7 @@ def _waveforms(ax: Axes, found: Inspection, at: np.ndarray) -> None:
         offset = (len(shown) - 1 - k) * step
         name = summary.place_words(measured, int(p))
         ax.plot(1e3 * measured.times[part], offset + record.per_unit * mean[part, p],
-                color=COLOURS[k], lw=0.9, label=name)  # fmt: skip
+                color=SERIES[k], lw=0.9, label=name)  # fmt: skip
     ax.set_xlabel("time, ms")
     apart = f", {step:.2g} apart" if len(shown) > 1 else ""
     ax.set_ylabel(f"{record.words}, {record.shown}{apart}")
@@ -140,7 +140,7 @@ def _spectra(ax: Axes, found: Inspection, at: np.ndarray) -> None:
     for k, p in enumerate(at):
         name = summary.place_words(measured, int(found.kept[p]))
         level = record.per_unit * np.sqrt(spectrum.density[inner, p])
-        ax.plot(f, level, color=COLOURS[k], lw=0.8, label=name)
+        ax.plot(f, level, color=SERIES[k], lw=0.8, label=name)
     floor = record.per_unit * np.sqrt(np.median(spectrum.floor[inner][:, at], axis=1))
     ax.plot(f, floor, color=mpl.rcParams["text.color"], lw=1.4, ls="--", label="noise floor")
     _mark(ax, found, at)
@@ -191,7 +191,7 @@ def _few(ax: Axes, found: Inspection) -> None:
     for k, p in enumerate(found.kept[_largest(found)]):
         level = measured.record.per_unit * np.abs(measured.values[:, :, p]).mean(axis=0)
         name = summary.place_words(measured, int(p))
-        ax.plot(measured.frequencies, level, "o-", color=COLOURS[k], lw=0.8, label=name)
+        ax.plot(measured.frequencies, level, "o-", color=SERIES[k], lw=0.8, label=name)
     ax.set_ylabel(f"{measured.record.name}, {measured.record.shown}")
     ax.legend(fontsize="small")
 

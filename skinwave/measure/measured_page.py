@@ -24,8 +24,9 @@ from skinwave.measure.measured_tables import (
     differences_table,
 )
 from skinwave.measure.significance import radius
-from skinwave.report.figures import label, measured
+from skinwave.report.figures import measured
 from skinwave.report.measured import MOST_LINES, lines_figure
+from skinwave.report.palette import label
 from skinwave.system import document
 from skinwave.system.document import Markup, paragraph
 from skinwave.system.numbers import significant

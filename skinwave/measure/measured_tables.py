@@ -9,7 +9,7 @@ from skinwave.measure.coherence import floor, over_places
 from skinwave.measure.measured_claims import FAILS, HOLDS
 from skinwave.measure.measured_study import UNKNOWN, Column, MeasuredComparison, main_column
 from skinwave.measure.significance import ellipses
-from skinwave.report.figures import label
+from skinwave.report.palette import label
 from skinwave.results.claims import TEXTS
 from skinwave.system.document import Markup, paragraph, table
 from skinwave.system.numbers import significant

@@ -12,11 +12,11 @@ from matplotlib.ticker import FuncFormatter
 from meshes.tetmesh import Floats
 from simple_model.dispersion import DispersionCurves, Mode
 from simple_model.drawing import small
-from skinwave.report.figures import REPORT, SPARE
+from skinwave.report.figures import REPORT
 from skinwave.report.levels import written
+from skinwave.report.palette import SERIES
 from skinwave.report.styles import Style
 
-COLOURS = ("#0072B2", "#D55E00", *SPARE)
 FINE = 600  # frequencies of a drawn curve
 PALE = 0.35  # opacity of a curve where its mode is evanescent
 ROWS = 3  # of the names of lines above the panels, two in a narrow figure
@@ -34,7 +34,7 @@ LABELS = (
 
 def colour(number: int) -> str:
     """Colour of a mode by its number in the curves, from 0."""
-    return COLOURS[number % len(COLOURS)]
+    return SERIES[number % len(SERIES)]
 
 
 def dispersion_figure(

@@ -18,6 +18,7 @@ from simple_model.quantities import DISPLACEMENT
 from skinwave.models.reduction import from_rest, oscillating
 from skinwave.planning.assessment import told
 from skinwave.report.films import encoder
+from skinwave.report.palette import SIGNED
 from skinwave.results.exports import collection
 from skinwave.results.files import folder_name
 from skinwave.results.motion import Waves, check_values, probe_lines, probe_response, waves
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-SIGNED = "RdBu_r"  # distinguishable with every kind of colour vision
 INTERVAL = 50  # ms between frames of a film
 NEAR = 0.5  # of a sampling interval: how far outside a time may be
 

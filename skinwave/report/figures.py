@@ -14,21 +14,12 @@ from meshes.tetmesh import Floats
 from simple_model import spectrum
 from simple_model.drawing import small
 from simple_model.quantities import Quantity
-from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
-from skinwave.report.styles import LABELS, NARROW, SHOWN, STYLES, TEXT, Style
+from skinwave.report.palette import colour, inked, label, marker
+from skinwave.report.styles import NARROW, SHOWN, STYLES, TEXT, Style
 from skinwave.results.comparison import moving_rms
 from skinwave.results.run import Run
 from skinwave.system.numbers import significant
 
-# Okabe and Ito's colours, distinguishable with every kind of colour vision; one model, one colour.
-COLOURS = {
-    **{model.name: model.colour for model in (SAME_LOAD, PUBLISHED)},
-    "paper-sheet": "#D55E00",
-    "skin-slab": "#0072B2",
-    "measured": "#CC79A7",
-}
-SPARE = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-MARKERS = {SAME_LOAD.name: "o", PUBLISHED.name: "x", "paper-sheet": "s", "measured": "D"}
 REPORT = STYLES["report"]
 # Titles of the columns of a Tacton's figure.
 WHOLE = (
@@ -130,27 +121,6 @@ def overview_figure(columns: dict[str, list[Run]], probe: int = 2) -> Figure:
         wspace=0.06, hspace=0.24,
     )  # fmt: skip
     return figure
-
-
-def colour(column: str) -> str:
-    """The colour of a `Run.column` in every picture."""
-    return COLOURS.get(column) or SPARE[sum(map(ord, column)) % len(SPARE)]
-
-
-def inked(column: str) -> str:
-    """The same in a style whose paper may be dark, on which black is its ink."""
-    own = colour(column)
-    return str(mpl.rcParams["text.color"]) if own == "#000000" else own
-
-
-def marker(column: str) -> str:
-    """The marker of a `Run.column` in every picture."""
-    return MARKERS.get(column, "^")
-
-
-def label(column: str) -> str:
-    """The name of a `Run.column` in every legend."""
-    return LABELS.get(column, column)
 
 
 def answered(run: Run) -> str:

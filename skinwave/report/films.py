@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from skinwave.models import speeds
-from skinwave.report.figures import COLOURS, SPARE
+from skinwave.report.palette import COLOURS, SPARE
 from skinwave.report.render import Image, stage
 from skinwave.report.styles import Style
 from skinwave.results.views import View

@@ -14,7 +14,8 @@ from simple_model import sensation_level, threshold
 from simple_model.drawing import small
 from simple_model.quantities import DISPLACEMENT
 from simple_model.threshold import BAND, HIGHEST, LOWEST
-from skinwave.report.figures import answered, colour, marker
+from skinwave.report.figures import answered
+from skinwave.report.palette import colour, marker
 from skinwave.report.styles import NARROW, Style
 from skinwave.results.run import Run
 

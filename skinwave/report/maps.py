@@ -15,12 +15,12 @@ from meshes.tetmesh import Floats
 from simple_model.drawing import small
 from simple_model.threshold import BAND
 from skinwave.models.speeds import mach_angle
-from skinwave.report.figures import inked, label, sized
+from skinwave.report.figures import sized
+from skinwave.report.palette import SEQUENTIAL, SIGNED, inked, label
 from skinwave.report.styles import NARROW, Style
 from skinwave.results.views import Trace, View, path_points, spread_radius, starting_time
 from skinwave.scene.scene import Scene
 
-SIGNED, SEQUENTIAL = "RdBu_r", "cividis"  # distinguishable with every kind of colour vision
 PIXELS = 201  # of a map's side
 DEEPEST = -40.0  # dB shown
 FAINTEST = 0.1  # of the largest motion, below which that of a place is not brought up

@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 
 from meshes.tetmesh import Floats
 from simple_model.quantities import Quantity
-from skinwave.report.figures import REPORT, inked, label, marker
+from skinwave.report.figures import REPORT
+from skinwave.report.palette import inked, label, marker
 from skinwave.report.styles import Style
 
 MOST_LINES = 6

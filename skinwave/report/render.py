@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from meshes.tetmesh import Floats, Ints, boundary_facets
 from simple_model.quantities import quantity
-from skinwave.report.figures import colour, label
-from skinwave.report.maps import SIGNED, carrier
+from skinwave.report.maps import carrier
+from skinwave.report.palette import SEQUENTIAL, SIGNED, colour, label
 from skinwave.report.styles import Style
 from skinwave.results.views import Singles, View, path_points, split
 
@@ -28,7 +28,6 @@ CAMERAS = {
     "front": ((0.0, -1.0, 0.45), (0.0, 0.2, 0.0), 0.5),
     "top": ((0.0, 0.0, 1.0), (0.0, 0.06, 0.0), 0.72),
 }
-UNSIGNED = "cividis"  # of quantities without a sign
 SHOWN = 0.06  # of the body's width: how far the largest motion is drawn at most
 BAR = 10.0  # mm, the scale bar
 COLUMN = 112  # pixels for the colour bar
@@ -214,7 +213,7 @@ def _add(
     """Everything of a panel; the actor of its skin."""
     view = panel.view
     actor = plotter.add_mesh(
-        panel.skin, scalars="motion", cmap=SIGNED if limits[0] else UNSIGNED, clim=limits,
+        panel.skin, scalars="motion", cmap=SIGNED if limits[0] else SEQUENTIAL, clim=limits,
         show_scalar_bar=False,
         ambient=0.3 if lit else 0.0, diffuse=0.8 if lit else 1.0, lighting=lit,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""How pictures are dressed for a report, a talk or a printed page; what legends call columns."""
+"""How pictures are dressed for a report, a talk or a printed page."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -6,14 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from simple_model.choices import choose
-from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 
-LABELS = {
-    **{model.name: model.label for model in (SAME_LOAD, PUBLISHED)},
-    "paper-sheet": "paper sheet",
-    "paper-sheet-loose": "loose sheet",
-    "skin-slab": "skin slab",
-}
 # Read when a file is written: text as text in SVG, and TrueType fonts in PDF, none of Type 3.
 TEXT: Any = {"svg.fonttype": "none", "pdf.fonttype": 42, "ps.fonttype": 42}
 SHOWN = 0.030  # s of waveform shown, at the end of the Tacton

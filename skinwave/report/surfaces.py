@@ -12,19 +12,18 @@ from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 
 from meshes.tetmesh import Floats
-from skinwave.report import figures
-from skinwave.report.figures import REPORT, label
+from skinwave.report.figures import REPORT
 from skinwave.report.maps import draw_path
+from skinwave.report.palette import COLOURS, SEQUENTIAL, label
 from skinwave.report.styles import Style
 from skinwave.results.propagation import NEAR, OUTSIDE
 from skinwave.results.surface import SurfaceMap
 from skinwave.scene.scene import Scene
 
-COLOURS = "cividis"  # distinct for every kind of colour vision
 SIDE = 3.1  # inch of a map with its title and its axis
 # Inch from the left and the bottom to a map, of the map, to its bar, of the bar, of what is beside.
 LEFT, BOTTOM, MAP, GAP, BAR, BESIDE_BAR = 0.65, 0.97, 2.52, 0.08, 0.14, 0.76
-MEASURED_EDGE = figures.COLOURS["measured"]
+MEASURED_EDGE = COLOURS["measured"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -77,7 +76,9 @@ def _surfaces_figure(
         x, y = 1e3 * surface.x, 1e3 * surface.y
         scale, unit = (1e6, "µm") if surface.unit == "m" else (1.0, "Pa")
         extent = (x[0], x[-1], y[0], y[-1])
-        image = ax.imshow(scale * surface.rms, cmap=COLOURS, vmin=0, origin="lower", extent=extent)
+        image = ax.imshow(
+            scale * surface.rms, cmap=SEQUENTIAL, vmin=0, origin="lower", extent=extent
+        )
         for field, drop, colour, dashes in (
             (kernel.rms, OUTSIDE, "#ff9e4a", "dashed"),
             (surface.rms, NEAR, "white", "solid"),

@@ -9,12 +9,12 @@ import numpy as np
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure
 from simple_model.load_spectrum import Complex
-from skinwave.report.figures import label
+from skinwave.report.palette import label
 from skinwave.report.render import outer_surface
 from skinwave.results.views import View
 from skinwave.system.arrays import quantised
-from skinwave.system.document import render
 from skinwave.system.scripts import bundle, encoded
+from skinwave.system.templates import render
 
 NEGLIGIBLE = 3e-3  # of the strongest line: weaker ones are left out
 MOST_LINES = 32

@@ -12,9 +12,10 @@ from PIL import features
 
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.report import maps, render
-from skinwave.report.figures import drawn, label, tacton_figure
+from skinwave.report.figures import drawn, tacton_figure
 from skinwave.report.films import film, lasts, seam
 from skinwave.report.levels import levels_figure, strongest_probe
+from skinwave.report.palette import label
 from skinwave.report.renderer import renderer
 from skinwave.report.styles import Style
 from skinwave.report.turntable import turntable

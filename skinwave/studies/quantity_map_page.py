@@ -10,7 +10,8 @@ from matplotlib.lines import Line2D
 
 from simple_model.numbers import stated_error
 from skinwave.report.figures import REPORT, measured, png
-from skinwave.report.maps import SEQUENTIAL, draw_path
+from skinwave.report.maps import draw_path
+from skinwave.report.palette import SEQUENTIAL
 from skinwave.report.styles import Style
 from skinwave.results.propagation import NEAR, distance_from_path
 from skinwave.results.quantity_map import QuantityMap, save

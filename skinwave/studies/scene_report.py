@@ -5,8 +5,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from skinwave.report.figures import label
 from skinwave.report.levels import strongest_probe
+from skinwave.report.palette import label
 from skinwave.report.renderer import renderer
 from skinwave.report.styles import Style
 from skinwave.results.claims import claimed, evaluate

@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from simple_model import Effort
 from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.prepared import Prepared
-from skinwave.report.figures import label, overview_figure, png, tacton_figure
+from skinwave.report.figures import overview_figure, png, tacton_figure
+from skinwave.report.palette import label
 from skinwave.results.claims import AssessedClaim
 from skinwave.results.files import fill
 from skinwave.results.run import Run

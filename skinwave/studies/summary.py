@@ -6,7 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from simple_model.numbers import stated_error
-from skinwave.report.figures import REPORT, label, sized
+from skinwave.report.figures import REPORT, sized
+from skinwave.report.palette import label
 from skinwave.report.styles import Style
 from skinwave.report.surfaces import BESIDE, SURFACES, surfaces_figure
 from skinwave.results.propagation import Component, Propagation, Reach, added_lines

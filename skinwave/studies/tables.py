@@ -7,7 +7,7 @@ import numpy as np
 from meshes.tetmesh import Floats
 from simple_model import Effort
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
-from skinwave.report.figures import label
+from skinwave.report.palette import label
 from skinwave.results.claims import TEXTS, AssessedClaim
 from skinwave.results.comparison import compare, moving_rms
 from skinwave.results.propagation import strongest_component

@@ -14,7 +14,7 @@ from simple_model import threshold
 from simple_model.line_names import line_frequency
 from skinwave.report.figures import HIGHEST
 from skinwave.report.levels import written
-from skinwave.report.maps import SEQUENTIAL
+from skinwave.report.palette import SEQUENTIAL
 from skinwave.report.styles import STYLES, Style
 from skinwave.results.views import path_points
 from skinwave.sweeps.indices import SobolIndices, Tornado

@@ -1,20 +1,23 @@
-"""Parts of a page: one HTML file with its pictures inside.
+"""Pages: a `Report` is a title, a verdict and parts, written as one HTML file.
 
-Templates are those of Jinja in `templates/`, which escape text wherever it enters a page; only
-`Markup` is taken as it is. It is made of templates and literals alone: see its `format` and `join`.
+Parts are text (a paragraph each), `Table`, `Picture`, `Section`, `Details` or `Markup`. Templates
+are those of Jinja in `templates/`, which escape text wherever it enters a page; only `Markup` is
+taken as it is. It is made of templates and literals alone: see its `format` and `join`.
 """
 
 import hashlib
 import re
 from base64 import b64encode
-from collections.abc import Iterable
-from functools import cache
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from html import unescape
-from typing import Any
+from pathlib import Path
 
 from markupsafe import Markup
 
 from simple_model import Effort
+from skinwave.system.table import Table
+from skinwave.system.templates import part, render
 
 # What a page may load: pictures inside it and its own styles. No network, form or script but those
 # of a page within it, by their digests: it inherits this policy.
@@ -27,21 +30,106 @@ _SCRIPT = re.compile(r"<script\b[^>]*>(.*?)</script\s*>", re.DOTALL | re.IGNOREC
 _NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 
-def page(title: str, *parts: str) -> str:
-    """A complete page with its policy; parts that are text are escaped."""
-    body = Markup("\n").join(parts)
+@dataclass(frozen=True)
+class Picture:
+    """An image with a caption; with a `name`, its file is written beside the page.
+
+    `kind` is its format, "png" or another one that browsers know.
+    """
+
+    image: bytes
+    caption: str
+    name: str = ""
+    kind: str = "png"
+
+    def html(self) -> Markup:
+        """The image inside the page, with its caption."""
+        return part("picture", b64encode(self.image).decode(), self.caption, self.name, self.kind)
+
+
+@dataclass(frozen=True)
+class Section:
+    """A headed part of a page; level 3 is for one within another."""
+
+    heading: str
+    parts: "Sequence[Part]"
+    level: int = 2
+
+    def html(self) -> Markup:
+        """Heading and parts."""
+        return part("section", self.heading, self.level, list(map(_html, self.parts)))
+
+
+@dataclass(frozen=True)
+class Details:
+    """Parts that a reader unfolds."""
+
+    summary: str
+    parts: "Sequence[Part]"
+
+    def html(self) -> Markup:
+        """Summary and parts."""
+        return part("details", self.summary, list(map(_html, self.parts)))
+
+
+Part = str | Table | Picture | Section | Details
+
+
+@dataclass(frozen=True)
+class Report:
+    """A page: its title, its verdict in a few sentences, and its parts in order.
+
+    Parameters
+    ----------
+    title : text
+    verdict : paragraphs at the top of the page
+    parts : text (a paragraph each), `Table`, `Picture`, `Section`, `Details` or `Markup`
+    efforts : names and `Effort` of responses, whose warnings stand above all else
+    """
+
+    title: str
+    verdict: Sequence[str] = ()
+    parts: Sequence[Part] = ()
+    efforts: Sequence[tuple[str, Effort]] = ()
+
+    def html(self) -> str:
+        """The page, complete with its policy."""
+        return page(self.title, warnings_banner(self.efforts), *self.verdict, *self.parts)
+
+    def write(self, folder: Path) -> None:
+        """Write index.html into a folder, and a file of every picture and table with a name."""
+        for one in _flat(self.parts):
+            if isinstance(one, Picture) and one.name:
+                (folder / f"{one.name}.{one.kind}").write_bytes(one.image)
+            elif isinstance(one, Table) and one.name:
+                (folder / f"{one.name}.csv").write_bytes(one.to_csv())
+        (folder / "index.html").write_text(self.html(), encoding="utf-8")
+
+
+def _flat(parts: Iterable[Part]) -> Iterator[Part]:
+    """All parts, also those within others."""
+    for each in parts:
+        yield each
+        if isinstance(each, Section | Details):
+            yield from _flat(each.parts)
+
+
+def _html(one: Part) -> Markup:
+    """A part as HTML; text is a paragraph."""
+    if isinstance(one, Markup):
+        return one
+    return paragraph(one) if isinstance(one, str) else one.html()
+
+
+def page(title: str, *parts: Part) -> str:
+    """A complete page with its policy."""
+    body = Markup("\n").join(map(_html, parts))
     return render("page.html", title=title, body=body, policy=_policy(body))
-
-
-def render(template: str, **values: object) -> str:
-    """Render a template of `templates/`; values that are text are escaped."""
-    shown: str = _templates().get_template(template).render(**values)
-    return shown
 
 
 def section(heading: str, *parts: str) -> Markup:
     """A headed part of the page."""
-    return _part("section", heading, parts)
+    return Section(heading, parts).html()
 
 
 def paragraph(text: str) -> Markup:
@@ -64,22 +152,22 @@ def preformatted(text: str) -> Markup:
 
 def warnings_banner(efforts: Iterable[tuple[str, Effort]]) -> Markup:
     """All warnings of some responses by name, for the top of a page; nothing if there are none."""
-    return _part("warnings", worst_warnings(efforts))
+    return part("warnings", worst_warnings(efforts))
 
 
 def picture(drawn: bytes, caption: str, name: str = "", kind: str = "png") -> Markup:
     """A picture inside the page: PNG, or another kind that browsers know."""
-    return _part("picture", b64encode(drawn).decode(), caption, name, kind)
+    return Picture(drawn, caption, name, kind).html()
 
 
 def inner_page(page: str, caption: str) -> Markup:
     """A page within the page, on screens only; its scripts reach nothing outside of it."""
-    return _part("inner_page", str(page), caption)
+    return part("inner_page", str(page), caption)
 
 
 def table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> Markup:
     """A table; cells that read as numbers are set to the right."""
-    return _part("table", header, rows)
+    return part("table", header, rows)
 
 
 def worst_warnings(efforts: Iterable[tuple[str, Effort]]) -> list[str]:
@@ -96,28 +184,6 @@ def worst_warnings(efforts: Iterable[tuple[str, Effort]]) -> list[str]:
         of = f"{name}, and {len(group) - 1} more" if len(group) > 1 else name
         found.append(f"{sentence} ({of})" if name else sentence)
     return found
-
-
-@cache
-def _templates() -> Any:
-    import jinja2
-
-    found = jinja2.Environment(
-        loader=jinja2.PackageLoader("skinwave"), autoescape=True, trim_blocks=True,
-        lstrip_blocks=True, undefined=jinja2.StrictUndefined,
-    )  # fmt: skip
-    found.tests["a_number"] = _is_number
-    return found
-
-
-def _part(name: str, *values: object) -> Markup:
-    """A macro of the template of parts, applied to values."""
-    made: Markup = getattr(_templates().get_template("parts.html").module, name)(*values)
-    return made
-
-
-def _is_number(cell: str) -> bool:
-    return re.sub("[,+.e-]", "", cell).isdigit()
 
 
 def _policy(body: Markup) -> str:

@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from skinwave.report.figures import SPARE, png
+from skinwave.report.figures import png
+from skinwave.report.palette import SPARE
 from skinwave.system import document
 from skinwave.system.document import Markup
 from skinwave.system.effort import versions

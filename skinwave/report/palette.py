@@ -1,0 +1,47 @@
+"""Colours, markers and names of bodies and models, the same in every picture.
+
+Colours are Okabe and Ito's, distinguishable with every kind of colour vision.
+"""
+
+import matplotlib as mpl
+
+from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
+
+BLUE, ORANGE = "#0072B2", "#D55E00"
+SPARE = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+SERIES = (BLUE, ORANGE, *SPARE)  # of curves that are no body or model
+COLOURS = {
+    **{model.name: model.colour for model in (SAME_LOAD, PUBLISHED)},
+    "paper-sheet": ORANGE,
+    "skin-slab": BLUE,
+    "measured": "#CC79A7",
+}
+MARKERS = {SAME_LOAD.name: "o", PUBLISHED.name: "x", "paper-sheet": "s", "measured": "D"}
+LABELS = {
+    **{model.name: model.label for model in (SAME_LOAD, PUBLISHED)},
+    "paper-sheet": "paper sheet",
+    "paper-sheet-loose": "loose sheet",
+    "skin-slab": "skin slab",
+}
+SIGNED, SEQUENTIAL = "RdBu_r", "cividis"  # colour maps, of quantities with and without a sign
+
+
+def colour(column: str) -> str:
+    """The colour of a `Run.column`."""
+    return COLOURS.get(column) or SPARE[sum(map(ord, column)) % len(SPARE)]
+
+
+def inked(column: str) -> str:
+    """The same in a style whose paper may be dark, on which black is its ink."""
+    own = colour(column)
+    return str(mpl.rcParams["text.color"]) if own == "#000000" else own
+
+
+def marker(column: str) -> str:
+    """The marker of a `Run.column`."""
+    return MARKERS.get(column, "^")
+
+
+def label(column: str) -> str:
+    """The name of a `Run.column`, as legends and tables have it."""
+    return LABELS.get(column, column)

@@ -1,0 +1,118 @@
+"""A table of a result: one definition for pages, CSV files and JSON."""
+
+import json
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any
+
+from markupsafe import Markup
+
+from simple_model.numbers import significant
+from skinwave.system.plain_text import csv_table
+from skinwave.system.templates import part
+
+STORED = 6  # significant digits of numbers in CSV files
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table.
+
+    Parameters
+    ----------
+    name : heading in CSV files and key in JSON, with its unit, such as "frequency_hz"
+    heading : heading on pages, the name if not given
+    unit : follows the heading on pages
+    digits : significant digits on pages
+    """
+
+    name: str
+    heading: str = ""
+    unit: str = ""
+    digits: int = 3
+
+    @property
+    def title(self) -> str:
+        """Heading on pages, with the unit."""
+        return ", ".join(filter(None, (self.heading or self.name, self.unit)))
+
+
+@dataclass(frozen=True, init=False)
+class Table:
+    """Columns and rows. Cells are text, `Markup`, numbers, or None where there is no value.
+
+    Parameters
+    ----------
+    columns : `Column` or, where name and heading are the same, text
+    rows : one value per column
+    name : of the CSV file beside a page; a table without a name is on the page only
+    stored : significant digits of numbers in CSV files
+
+    >>> table = Table([Column("f_hz", "frequency", "Hz"), "line"], [(127.38, "f_d"), (None, "-")])
+    >>> table.to_csv()
+    b'f_hz,line\\r\\n127.38,f_d\\r\\n,-\\r\\n'
+    """
+
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Any, ...], ...]
+    name: str
+    stored: int
+
+    def __init__(
+        self, columns: Iterable[Column | str], rows: Iterable[Sequence[Any]], name: str = "",
+        stored: int = STORED,
+    ) -> None:  # fmt: skip
+        known = (c if isinstance(c, Column) else Column(c) for c in columns)
+        object.__setattr__(self, "columns", tuple(known))
+        object.__setattr__(self, "rows", tuple(map(tuple, rows)))
+        object.__setattr__(self, "name", name)
+        object.__setattr__(self, "stored", stored)
+
+    def only(self, *names: str, most: int | None = None) -> "Table":
+        """Return the columns of these names, and at most so many rows, for a page."""
+        at = [[column.name for column in self.columns].index(name) for name in names]
+        at = at or list(range(len(self.columns)))
+        rows = ([row[k] for k in at] for row in self.rows[:most])
+        return Table([self.columns[k] for k in at], rows)
+
+    def to_csv(self) -> bytes:
+        """Return a CSV file in UTF-8; a cell without a value is empty."""
+        header = (column.name for column in self.columns)
+        return csv_table(header, self._converted(lambda value: _stored(value, self.stored)))
+
+    def to_json(self) -> str:
+        """Return a list of objects, one a row, as JSON; null where there is no value."""
+        names = [column.name for column in self.columns]
+        rows = self._converted(lambda value: value if _is_known(value) else None)
+        return json.dumps([dict(zip(names, row, strict=True)) for row in rows])
+
+    def html(self) -> Markup:
+        """Return the table for a page; "-" where there is no value."""
+        digits = [column.digits for column in self.columns]
+        rows = ([shown(v, n) for v, n in zip(row, digits, strict=True)] for row in self.rows)
+        return part("table", [column.title for column in self.columns], rows)
+
+    def _converted(self, convert: Callable[[Any], Any]) -> Iterable[list[Any]]:
+        return ([convert(value) for value in row] for row in self.rows)
+
+
+def shown(value: Any, digits: int = 3) -> str:
+    """A cell as a page shows it: numbers to so many significant digits, "-" for no value."""
+    if isinstance(value, str):
+        return value
+    if not _is_known(value):
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:,}" if isinstance(value, int) else significant(float(value), digits)
+
+
+def _is_known(value: Any) -> bool:
+    return value is not None and (not isinstance(value, float) or isfinite(value))
+
+
+def _stored(value: Any, digits: int) -> Any:
+    if not _is_known(value):
+        return None
+    return f"{value:.{digits}g}" if isinstance(value, float) else value
