@@ -3,7 +3,7 @@
 `python -m bench.agreement N SEED` draws N scenes over the keys of a scene file, computes each by
 every model that accepts it, and compares each pair of answers. A pair agrees if, at the worst
 probe, the relative L2 difference over the whole record is at most 1.2 times the sum of both
-expected errors. What disagrees is printed as a scene file, and with `--shrink` reduced first.
+expected errors. What disagrees is printed as a scene file.
 
 A scene depends on the seed and its number alone: `--first K` draws from number K on.
 """
@@ -260,13 +260,10 @@ class TooSlow(Exception):
 
 @dataclass(frozen=True)
 class Pair:
-    """Difference of two models' answers: at the worst probe and, relative to the peak there, at
-    the worst sample; and the sum of what they state.
-    """
+    """Difference of two models' answers at the worst probe, and the sum of what they state."""
 
     models: tuple[str, str]
     difference: float
-    sample: float
     stated: float
 
     @property
@@ -277,7 +274,7 @@ class Pair:
 
 @dataclass
 class Outcome:
-    """Outcome of one scene: its pairs, what is wrong, refusals by model, seconds by model."""
+    """Outcome of one scene: its pairs, what is wrong, refusals and stated errors by model."""
 
     number: int
     scene: Table
@@ -285,7 +282,6 @@ class Outcome:
     faults: list[str] = field(default_factory=list)
     slow: list[str] = field(default_factory=list)
     refusals: dict[str, str] = field(default_factory=dict)
-    seconds: dict[str, float] = field(default_factory=dict)
     stated: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -315,7 +311,6 @@ def outcome(
             found.refusals[name] = str(error)
         except Exception:
             found.faults.append(f"{name}: {traceback.format_exc(limit=-2)}")
-        found.seconds[name] = time.process_time() - started
     found.stated = {name: each.expected_error for name, each in answers.items()}
     found.pairs = list(_pairs(answers))
     return found
@@ -340,7 +335,7 @@ def _pairs(answers: dict[str, Response]) -> Iterator[Pair]:
         stated = a.expected_error + b.expected_error
         if math.isnan(stated):
             continue
-        yield Pair((one, other), *_difference(np.asarray(a.values), np.asarray(b.values)), stated)
+        yield Pair((one, other), _difference(np.asarray(a.values), np.asarray(b.values)), stated)
 
 
 def _is_bent(*answers: Response) -> bool:
@@ -349,38 +344,14 @@ def _is_bent(*answers: Response) -> bool:
     )
 
 
-def _difference(a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
-    """Relative L2 difference at the worst probe, and of the worst sample relative to the peak."""
+def _difference(a: np.ndarray, b: np.ndarray) -> float:
+    """Relative L2 difference at the worst probe."""
     if a.shape != b.shape:
-        return math.inf, math.inf
+        return math.inf
     sizes = np.maximum(np.linalg.norm(a, axis=0), np.linalg.norm(b, axis=0))
     seen = sizes > WEAKEST * sizes.max()
-    if not seen.any():
-        return 0.0, 0.0
-    away = (a - b)[:, seen]
-    peaks = np.maximum(abs(a), abs(b))[:, seen].max(axis=0)
-    worst = (np.linalg.norm(away, axis=0) / sizes[seen]).max()
-    return float(worst), float((abs(away).max(axis=0) / peaks).max())
-
-
-def shrunk(found: Outcome, attempts: int = 40) -> Outcome:
-    """Smaller scene with a disagreement of the same pair: keys are left out one by one."""
-    pair = found.disagreements[0].models
-    left = attempts
-    progress = True
-    while progress and left > 0:
-        progress = False
-        for section, key in [(s, k) for s in found.scene for k in found.scene[s]]:
-            if left <= 0:
-                break
-            smaller = copy.deepcopy(found.scene)
-            del smaller[section][key]
-            left -= 1
-            tried = outcome(found.number, smaller, pair)
-            if tried.disagreements:
-                found, progress = tried, True
-                break
-    return found
+    apart = np.linalg.norm(a - b, axis=0)[seen] / sizes[seen]
+    return float(apart.max(initial=0.0))
 
 
 def _from_number(given: tuple[int, int, tuple[str, ...], float]) -> Outcome:
@@ -395,82 +366,47 @@ def main() -> int:
     parser.add_argument("seed", type=int)
     parser.add_argument("--first", type=int, default=0, help="number of the first scene")
     parser.add_argument("--workers", type=int, default=1)
-    parser.add_argument("--shrink", action="store_true", help="reduce scenes that disagree")
-    parser.add_argument("--kind", help="only scenes with this kind of body")
     parser.add_argument("--models", nargs="+", default=(), help="only these, in place of all")
     parser.add_argument(
         "--slowest", type=float, default=SLOWEST, help="s of CPU time of a response"
     )
-    parser.add_argument("--verbose", action="store_true", help="every pair and refusal")
     given = parser.parse_args()
-    numbers = (
-        k
-        for k in range(given.first, given.first + given.count)
-        if given.kind in (None, table(k, given.seed)["body"]["kind"])
-    )
+    numbers = range(given.first, given.first + given.count)
     work = [(k, given.seed, tuple(given.models), given.slowest) for k in numbers]
     found = []
     with get_context("spawn").Pool(given.workers, maxtasksperchild=20) as pool:
         for each in pool.imap(_from_number, work):
             found.append(each)
-            _show(each, given.shrink, given.verbose)
+            _show(each)
     _summary(found)
     return int(any(each.disagreements or each.faults for each in found))
 
 
-def _show(found: Outcome, shrink: bool, verbose: bool) -> None:
-    bad = found.disagreements
-    seconds = sum(found.seconds.values())
-    verdict = "scene refused" if "scene" in found.refusals else f"{len(found.pairs)} pairs"
-    if bad or found.faults:
-        verdict = f"{len(bad)} of {verdict} disagree, {len(found.faults)} faults"
+def _show(found: Outcome) -> None:
+    bad, kind = found.disagreements, found.scene["body"]["kind"]
     slow = f", slow: {', '.join(found.slow)}" if found.slow else ""
-    print(f"scene {found.number}: {found.scene['body']['kind']}, {verdict}, {seconds:.1f} s{slow}")
-    if verbose or bad:
-        for pair in found.pairs if verbose else bad:
-            one, other = pair.models
-            print(
-                f"  {one} ({found.stated[one]:.2%}) and {other} ({found.stated[other]:.2%}): "
-                f"{pair.difference:.2%}, at the worst sample {pair.sample:.2%}"
-            )
+    print(f"scene {found.number}: {kind}, {len(found.pairs)} pairs, {len(bad)} disagree{slow}")
+    for pair in bad:
+        names = " and ".join(f"{name} ({found.stated[name]:.2%})" for name in pair.models)
+        print(f"  {names}: {pair.difference:.2%}")
     for fault in found.faults:
         print(f"  fault: {fault}")
-    if verbose:
-        for name, words in found.refusals.items():
-            print(f"  {name} refuses: {words}")
     if bad or found.faults:
-        small = shrunk(found) if shrink and bad else found
-        print("    " + tomli_w.dumps(small.scene).replace("\n", "\n    "))
+        print("    " + tomli_w.dumps(found.scene).replace("\n", "\n    "))
     sys.stdout.flush()
 
 
 def _summary(found: list[Outcome]) -> None:
-    pairs = [(each.number, pair) for each in found for pair in each.pairs]
-    shared = Counter(pair.models for _, pair in pairs)
-    tight = Counter(pair.models for _, pair in pairs if pair.stated < 0.2)
-    bad = Counter(pair.models for _, pair in pairs if not pair.agrees)
-    print(f"\n{'pair':<50} {'scenes':>7} {'stated < 20 %':>14} {'disagree':>9}")
+    pairs = [pair for each in found for pair in each.pairs]
+    shared = Counter(pair.models for pair in pairs)
+    bad = Counter(pair.models for pair in pairs if not pair.agrees)
+    print(f"\n{'pair':<50} {'scenes':>7} {'disagree':>9}")
     for one, other in sorted(shared):
-        of = (one, other)
-        print(f"{one + ', ' + other:<50} {shared[of]:>7} {tight[of]:>14} {bad[of]:>9}")
-    took: dict[str, list[float]] = {}
-    for each in found:
-        for name, seconds in each.seconds.items():
-            if name in each.stated:
-                took.setdefault(name, []).append(seconds)
-    slow = Counter(name for each in found for name in each.slow)
-    for name in sorted(took | slow):
-        median = f"{np.median(took[name]):.2f} s" if name in took else "-"
-        print(f"{name}: {len(took.get(name, []))} answers, median {median}, {slow[name]} too slow")
-    faults = sum(len(each.faults) for each in found)
+        print(f"{one + ', ' + other:<50} {shared[one, other]:>7} {bad[one, other]:>9}")
     refused = sum("scene" in each.refusals for each in found)
-    alone = sum(len(each.stated) == 1 for each in found)
-    none = sum(not each.stated and "scene" not in each.refusals for each in found)
-    print(
-        f"{len(found)} scenes ({refused} refused, {none} without a model, {alone} with one): "
-        f"{len(pairs)} pairs, {sum(bad.values())} disagree in "
-        f"{len([each for each in found if each.disagreements])} scenes; {faults} faults"
-    )
+    faults = sum(len(each.faults) for each in found)
+    print(f"{len(found)} scenes, {refused} refused: {len(pairs)} pairs, {sum(bad.values())} "
+          f"disagree; {faults} faults")  # fmt: skip
 
 
 if __name__ == "__main__":

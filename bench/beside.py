@@ -1,219 +1,162 @@
-"""skinwave against other codes: the same mesh, material and load, in turn.
+"""Cost of other codes over ours: `python -m bench.beside [assembly | waves]`.
 
-The skin slab of the scenes with two changes that let every code take part: free sides, as
-absorbing ones are not in all of them, and Poisson's ratio 0.45, up to which plain quadratic
-tetrahedra do not lock. Nodal forces are skinwave's own, computed beforehand
-and carried over by the nodes' coordinates, so that no code pays for them while it steps.
+Both tables use one mesh, material and load, and a process for each code. The skin slab has free
+sides, because not every code has absorbing ones, and Poisson's ratio 0.45, up to which plain
+quadratic tetrahedra do not lock. Nodal forces are computed by skinwave beforehand. A code that is
+not installed is a row that says so.
 """
 
-import subprocess
+import contextlib
 import sys
-import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from pathlib import Path
+from importlib.metadata import version
+from multiprocessing import get_context
+from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import LinearOperator, cg
 
 import fem
 import meshes
-from bench import codes
-from bench.child import march
-from bench.codes import CODES
-from bench.problem import Problem
+from bench.codes import CODES, Assembled, Problem
 from skinwave.bodies.build import build
-from skinwave.models.prepared import answer, prepare, sample_times
+from skinwave.models.prepared import answer, prepare
 from skinwave.scene import paper15
-from skinwave.scene.scene import PROBES, Body, Scene
+from skinwave.scene.scene import PROBES, Body
 
 SKIN = replace(fem.PRESETS["palm"], poisson=0.45)
 BODY = Body(material=SKIN, sides="free")
 TACTON = "am140-stm20"
-SMALL = 9e-3  # m, elements of the small mesh, on which waveforms are compared
-SHORT = 0.1  # s of those waveforms
-RATES = (4_000, 5_000, 6_000, 8_000, 10_000, 12_000, 16_000, 20_000)  # Hz, the longest step first
-FINE = 80_000  # Hz, the steps by which those are assessed
-WRONG = 0.01  # relative error that the time steps may make at the worst probe
-STEPS = 1000  # at most, from which a second is extrapolated
-PATIENCE = 1800  # s for all that one code is asked for
-DEBIAN = "/usr/bin/python3"  # dolfinx has no wheels; this is where its package puts it
+ACROSS = (8, 40)  # cells of the blocks of the assembly, the first a warm-up
+SIZE = 4.7e-3  # m, elements of the waves
+RATE, STEPS = 10_000, 1000  # steps a second, which is what 1 % takes, and those that are timed
 
 
-def assembly(across: int) -> None:
-    """Time to assemble K and M of a block of 6 across^2 across/4 tetrahedra, by every code."""
-    small, large = block(8), block(across)
-    print(f"\nK and M of {len(large.cells):,} ten-node tetrahedra")
-    print(f"{'code':<12} {'version':<12} {'s':>7} {'ratio':>7}  {'energy J':>14} {'mass kg':>10}")
+def assembly() -> None:
+    """Time to assemble K and M of a block, by every code."""
+    small, large = (problem(block(n)) for n in ACROSS)
+    print(f"K and M of {len(large.cells):,} ten-node tetrahedra")
+    print(f"{'code':<12}{'version':<12}{'s':>8}{'ratio':>7}{'energy J':>15}{'mass kg':>10}")
     first = None
-    for name, result in in_turn(small, large):
-        if isinstance(result, str):
-            print(f"{name:<12} {result}")
-            continue
-        seconds, (energy, mass) = float(result["assemble"]), result["check"]
+    for name, found in each_code(assembled, small, large):
+        seconds, (energy, mass) = found["seconds"], found["check"]
         first = first or seconds
-        print(
-            f"{name:<12} {str(result['version'])[:12]:<12} {seconds:7.2f} {seconds / first:7.1f}  "
-            f"{energy:14.6e} {mass:10.6f}"
-        )
+        print(f"{name:<12}{found['version']:<12}{seconds:8.2f}{seconds / first:7.1f}"
+              f"{energy:15.6e}{mass:10.6f}", flush=True)  # fmt: skip
 
 
-def waves(h: float) -> None:
-    """Time for one Tacton of a second, and for fifteen, on the skin slab with elements of h."""
-    reference = reduced_waveform()
-    rate = slowest_rate()
-    small, large = problem(SMALL, rate, SHORT), problem(h, rate, STEPS / rate)
-    free = large.fixed.size - int(large.fixed.sum())
-    print(
-        f"\none Tacton of 1 s (AM 140 Hz, circle of 20 mm at 12 m/s) at {len(PROBES)} probes, "
-        f"cold: {free:,} dofs, {rate:,} steps"
-    )
-    print(f"{'code':<12} {'solver':<24} {'assemble':>8} {'factorise':>9} {'ms/step':>8} "
-          f"{'from':>5} {'1 Tacton':>9} {'ratio':>6} {'15':>9} {'ratio':>6} {'wave':>8} "
-          f"{'to ours':>8}")  # fmt: skip
-    one, fifteen = ours(h)
-    print(f"{'skinwave':<12} {'reduced, all measured':<24} {'':>33} "
-          f"{one:8.1f}s {1:6.1f} {fifteen:8.1f}s {1:6.1f}")  # fmt: skip
-    stepped = None
-    for name, result in in_turn(small, large):
-        if isinstance(result, str):
-            print(f"{name:<12} {result}")
-            continue
-        fixed_cost = float(result["assemble"] + result["factorise"])
-        second = float(result["step"]) * rate
-        waveform = resampled(result["waveform"], rate)
-        stepped = waveform if stepped is None else stepped
-        solver = f"fem, {fem.available()[0]}" if name == "skinwave" else CODES[name].solver
-        print(
-            f"{name:<12} {solver:<24} {result['assemble']:7.2f}s {result['factorise']:8.2f}s "
-            f"{1e3 * result['step']:8.2f} {result['steps']:5d} "
-            f"{fixed_cost + second:8.1f}s {(fixed_cost + second) / one:6.1f} "
-            f"{fixed_cost + 15 * second:8.0f}s {(fixed_cost + 15 * second) / fifteen:6.0f} "
-            f"{difference(waveform, stepped):8.1e} {difference(waveform, reference):8.1e}"
-        )
-    compared = small.fixed.size - int(small.fixed.sum())
-    print(
-        f"""all but the first row: seconds extrapolated from the median of the steps under 'from'
-wave, to ours: relative L2 difference of the worst probe's first {SHORT:g} s, on {compared:,}
-dofs, to skinwave's steps and to its reduced model"""
-    )
-
-
-def ours(h: float) -> tuple[float, float]:
-    """Seconds of the first Tacton and of all fifteen, meshing included."""
-    scenes = {name: scene_of(tacton) for name, tacton in paper15.tactons()}
-    first, every = [], []
-    for _ in range(2):
-        started = time.perf_counter()
-        prepared = prepare(BODY, np.array(PROBES), h=h)
-        ready = time.perf_counter() - started
-        seconds = {}
-        for name, scene in scenes.items():
-            started = time.perf_counter()
-            answer(prepared, scene)
-            seconds[name] = time.perf_counter() - started
-        first.append(ready + seconds[TACTON])
-        every.append(ready + sum(seconds.values()))
-    return min(first), min(every)
-
-
-def slowest_rate() -> int:
-    """Time steps a second that a code needs, by skinwave's own steps on the small mesh."""
-    body = codes.skinwave(problem(SMALL, RATES[0], SHORT))
-
-    def stepped(rate: int) -> np.ndarray:
-        return resampled(march(body, problem(SMALL, rate, SHORT))["seen"], rate)
-
-    fine, errors = stepped(FINE), {}
-    for rate in RATES:
-        errors[rate] = difference(stepped(rate), fine)
-        if errors[rate] <= WRONG:
-            break
-    listed = ", ".join(f"{rate:,} {100 * error:.2f} %" for rate, error in errors.items())
-    print(f"\nerror of time steps against {FINE:,} a second, worst probe: {listed}")
-    return rate
-
-
-def reduced_waveform() -> np.ndarray:
-    scene = scene_of(replace(the_tacton(), duration=SHORT))
-    return answer(prepare(BODY, np.array(PROBES), h=SMALL), scene).displacement
-
-
-def the_tacton() -> paper15.Tacton:
-    return dict(paper15.tactons())[TACTON]
-
-
-def scene_of(tacton: paper15.Tacton) -> Scene:
-    return replace(
-        paper15.scenes("bench", tacton)["skin-slab"], body=Body(material=SKIN, sides="free")
-    )
-
-
-def resampled(seen: np.ndarray, rate: int) -> np.ndarray:
-    """Waveforms (t, p) at the times of every response, as the time stepping of a scene reads."""
-    times = sample_times(scene_of(replace(the_tacton(), duration=SHORT)))
-    return CubicSpline(np.arange(len(seen)) / rate, seen)(times)
-
-
-def difference(waveform: np.ndarray, reference: np.ndarray) -> float:
-    squares = ((waveform - reference) ** 2).sum(axis=0) / (reference**2).sum(axis=0)
-    return float(np.sqrt(squares.max()))
-
-
-def block(across: int) -> Problem:
-    line = np.linspace(-0.05, 0.05, across + 1)
-    return unloaded(meshes.extrude(line, line, np.linspace(-0.02, 0, across // 4 + 1)))
-
-
-def problem(h: float, rate: int, seconds: float) -> Problem:
-    """The skin slab under the Tacton, in `rate` steps a second."""
-    mesh, times = build(BODY, h).mesh, np.arange(round(seconds * rate) + 1) / rate
+def waves() -> None:
+    """Time of one Tacton of a second and of fifteen on the skin slab, extrapolated from steps."""
+    scene = replace(paper15.scenes("bench", dict(paper15.tactons())[TACTON])["skin-slab"],
+                    body=BODY)  # fmt: skip
+    mesh, times = build(BODY, SIZE).mesh, np.arange(STEPS + 1) / RATE
     P, points = fem.load_operator(mesh), fem.facet_points(mesh)
-    pushed = np.flatnonzero(abs(P).sum(axis=1) > 0)
-    fixed = np.zeros(mesh.points.shape, bool)
-    fixed[np.unique(mesh.facets["bottom"])] = True
-    pressure = scene_of(the_tacton()).pressure
-    return replace(
-        unloaded(mesh),
-        fixed=fixed.ravel(),
-        lag=np.array(SKIN.viscosity / SKIN.shear_modulus),
-        dt=np.array(1 / rate),
-        pushed=pushed,
-        forces=np.vstack([(P[pushed] @ pressure(points, part).T).T for part in np.array_split(
-            times, len(times) // 100 + 1)]),
-        probes=fem.probe_operator(mesh, PROBES).toarray(),
+    load = {
+        "held": np.isin(np.arange(len(mesh.points)), mesh.facets["bottom"]),
+        "forces": csr_array(P @ scene.pressure(points, times).T),
+        "probes": fem.probe_operator(mesh, PROBES),
+    }
+    started = time.perf_counter()
+    prepared = prepare(BODY, np.array(PROBES), h=SIZE)
+    ready = time.perf_counter()
+    answer(prepared, scene)
+    one = time.perf_counter() - started
+    fifteen = one + 14 * (time.perf_counter() - ready)
+    print(f"{mesh.n_dofs:,} dofs, {RATE:,} steps a second")
+    print(f"{'code':<12}{'assemble':>9}{'factorise':>10}{'ms/step':>8}{'1 Tacton':>10}{'ratio':>7}"
+          f"{'15':>9}{'ratio':>7}{'to ours':>9}")  # fmt: skip
+    print(f"{'skinwave, reduced':<39}{one:9.1f}s{1:7.1f}{fifteen:8.1f}s{1:7.1f}")
+    ours = None
+    for name, found in each_code(stepped, problem(mesh), load):
+        once, second = found["seconds"] + found["factorise"], found["step"] * RATE
+        ours = found["seen"] if ours is None else ours
+        apart = np.linalg.norm(found["seen"] - ours) / np.linalg.norm(ours)
+        print(f"{name:<12}{found['seconds']:8.2f}s{found['factorise']:9.2f}s"
+              f"{1e3 * found['step']:8.2f}{once + second:9.1f}s{(once + second) / one:7.1f}"
+              f"{once + 15 * second:8.0f}s{(once + 15 * second) / fifteen:7.0f}{apart:9.1e}",
+              flush=True)  # fmt: skip
+
+
+def assembled(name: str, small: Problem, large: Problem) -> dict[str, Any]:
+    """Seconds of a code after a warm-up, with strain energy and mass."""
+    with threads(name):
+        CODES[name][0](small)
+        body = CODES[name][0](large)
+        return {"seconds": body.seconds, "check": body.check(large.nodes)}
+
+
+def stepped(name: str, of: Problem, load: dict[str, Any]) -> dict[str, Any]:
+    """Seconds of assembly, factorisation and a step of average acceleration from rest, and the
+    displacement (t, p) of the probes.
+    """
+    with threads(name):
+        body, dt, lag = CODES[name][0](of), 1 / RATE, SKIN.viscosity / SKIN.shear_modulus
+        held = np.repeat(load["held"], 3)
+        free = abs(body.to_nodes[np.flatnonzero(held)]).sum(axis=0) == 0
+        forces, read = body.to_nodes.T @ load["forces"], load["probes"] @ body.to_nodes
+        started = time.perf_counter()
+        solve = body.factorise(dt / 2 * lag + dt**2 / 4, free)
+        factorised = time.perf_counter() - started
+        u = v = np.zeros(len(free))
+        a = first_acceleration(body, forces[:, [0]].toarray().ravel(), free)
+        seen, seconds = [read @ u], []
+        for k in range(1, STEPS + 1):
+            force, started = forces[:, [k]].toarray().ravel(), time.perf_counter()
+            u, v = u + dt * v + dt**2 / 4 * a, v + dt / 2 * a
+            a = solve(force - body.K @ (u + lag * v))
+            u, v = u + dt**2 / 4 * a, v + dt / 2 * a
+            seen.append(read @ u)
+            seconds.append(time.perf_counter() - started)
+    # The median leaves out steps that other processes held up.
+    return {"seconds": body.seconds, "factorise": factorised, "step": np.median(seconds),
+            "seen": np.array(seen)}  # fmt: skip
+
+
+def first_acceleration(body: Assembled, force: np.ndarray, free: np.ndarray) -> np.ndarray:
+    n = len(force)
+    M = LinearOperator((n, n), matvec=lambda x: np.where(free, body.M @ (free * x), x), dtype=float)
+    a, failed = cg(M, free * force, maxiter=5000)
+    if failed:
+        raise ArithmeticError("the mass matrix could not be inverted")
+    return a
+
+
+def threads(name: str) -> contextlib.AbstractContextManager[Any]:
+    if name != "ngsolve":
+        return contextlib.nullcontext()
+    from ngsolve import TaskManager
+
+    return TaskManager()
+
+
+def block(across: int) -> meshes.TetMesh:
+    line = np.linspace(-0.05, 0.05, across + 1)
+    return meshes.extrude(line, line, np.linspace(-0.02, 0, across // 4 + 1))
+
+
+def problem(mesh: meshes.TetMesh) -> Problem:
+    return Problem(
+        nodes=np.array(mesh.points), cells=np.array(mesh.tets), mu=SKIN.shear_modulus,
+        surface=meshes.boundary_facets(mesh.tets[:, :4]), nu=SKIN.poisson, rho=SKIN.density,
     )  # fmt: skip
 
 
-def unloaded(mesh: meshes.TetMesh) -> Problem:
-    return Problem(
-        nodes=np.array(mesh.points),
-        cells=np.array(mesh.tets),
-        surface=meshes.boundary_facets(mesh.tets[:, :4]),
-        material=np.array([SKIN.shear_modulus, SKIN.poisson, SKIN.density]),
-    )
-
-
-def in_turn(small: Problem, large: Problem) -> Iterator[tuple[str, dict | str]]:
-    """Measurements of every code, one process after the other, or why there are none."""
-    with tempfile.TemporaryDirectory() as folder:
-        paths = [p.save(Path(folder, f"{k}.npz")) for k, p in enumerate((small, large))]
-        result = Path(folder, "result.npz")
-        for name in CODES:
-            python = DEBIAN if name == "dolfinx" else sys.executable
-            command = [python, "-m", "bench.child", name, result, *paths]
-            root = Path(__file__).parents[1]
+def each_code(run: Callable[..., dict], *given: Any) -> Iterator[tuple[str, dict]]:
+    """Measurements of every code that is installed, each in a process of its own."""
+    for name, (_, package) in CODES.items():
+        with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as alone:
             try:
-                subprocess.run(
-                    command, cwd=root, capture_output=True, check=True, timeout=PATIENCE, text=True
-                )
-            except subprocess.CalledProcessError as error:
-                lines = error.stderr.strip().splitlines() or [f"exit code {error.returncode}"]
-                yield name, f"not measured: {lines[-1]}"
-                continue
-            except (OSError, subprocess.TimeoutExpired) as error:
-                yield name, f"not measured: {error}"
-                continue
-            with np.load(result) as file:
-                yield name, dict(file)
+                found = alone.submit(run, name, *given).result()
+                yield name, found | {"version": version(package)[:11]}
+            except ImportError as error:
+                print(f"{name:<12}not measured: {error}", flush=True)
+
+
+if __name__ == "__main__":
+    tables = {"assembly": assembly, "waves": waves}
+    for table in sys.argv[1:] or tables:
+        tables[table]()

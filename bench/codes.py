@@ -1,7 +1,7 @@
 """Assembly of K and M and factorisation of M + c K by each code, as its user would do it.
 
-Nothing else of a code is needed to step in time, so that all share one loop. Loads and probes are
-those of the mesh's nodes, carried over by `to_nodes`; only assembly and factorisation differ.
+All codes share one time loop, loads and probes: those of the mesh's nodes, which `to_nodes` maps to
+a code's own dofs. Only assembly and factorisation differ.
 """
 
 import time
@@ -14,9 +14,36 @@ from scipy import sparse
 from scipy.sparse.linalg import splu, spsolve
 from scipy.spatial import cKDTree
 
-from bench.problem import Problem
-
 Solve = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Problem:
+    """A body of straight 10-node tetrahedra.
+
+    `nodes` (n, 3) in metre, corners first; `cells` (m, 10) in VTK's order; `surface` (k, 3) the
+    boundary's corners; `mu` in Pa, `nu`, `rho` in kg/m3.
+    """
+
+    nodes: np.ndarray
+    cells: np.ndarray
+    surface: np.ndarray
+    mu: float
+    nu: float
+    rho: float
+
+    @property
+    def tets(self) -> np.ndarray:
+        return self.cells[:, :4]
+
+    @property
+    def points(self) -> np.ndarray:
+        """The corners, all that most codes take."""
+        return self.nodes[: self.tets.max() + 1]
+
+    @property
+    def lam(self) -> float:
+        return 2 * self.mu * self.nu / (1 - 2 * self.nu)
 
 
 @dataclass
@@ -172,107 +199,6 @@ def felupe(p: Problem) -> Assembled:
     return _scipy(seconds, K, M, np.arange(K.shape[0]), _superlu)
 
 
-def sfepy(p: Problem) -> Assembled:
-    from sfepy.base.base import Struct, output
-    from sfepy.discrete import FieldVariable, Integral, Material
-    from sfepy.discrete.fem import FEDomain, Field, Mesh
-    from sfepy.mechanics.matcoefs import stiffness_from_lame
-    from sfepy.solvers import Solver
-    from sfepy.terms import Term
-
-    output.set_output(quiet=True)
-    cells = [np.asarray(p.tets, np.int32)]
-    mesh = Mesh.from_data("body", p.points, None, cells, [np.zeros(len(p.tets), np.int32)], ["3_4"])
-    domain = FEDomain("domain", mesh)
-    omega = domain.create_region("Omega", "all")
-    started = time.perf_counter()
-    space = Field.from_args("u", np.float64, "vector", omega, approx_order=2)
-    u = FieldVariable("u", "unknown", space)
-    v = FieldVariable("v", "test", space, primary_var_name="u")
-    m = Material("m", D=stiffness_from_lame(3, p.lam, p.mu), rho=p.rho)
-    elastic = Term.new("dw_lin_elastic(m.D, v, u)", Integral("i", 2), omega, m=m, v=v, u=u)
-    inertia = Term.new("dw_dot(m.rho, v, u)", Integral("j", 4), omega, m=m, v=v, u=u)
-    matrices = []
-    for term in (elastic, inertia):
-        term.setup()
-        matrices.append(_sfepy_matrix(term, u))
-    seconds = time.perf_counter() - started
-
-    def factorised(A: Any) -> Solve:
-        # As its example of elastodynamics does: factorised once for all steps.
-        conf = Struct(name="ls", kind="ls.auto_direct", use_presolve=True, use_mtx_digest=False)
-        solver = Solver.any_from_conf(conf)
-        solver.presolve(A, use_mtx_digest=False)
-        return lambda b: solver(b, mtx=A)
-
-    nodes = _matched(space.get_coor(), p.nodes)
-    return _scipy(seconds, *matrices, (3 * nodes[:, None] + np.arange(3)).ravel(), factorised)
-
-
-def _sfepy_matrix(term: Any, u: Any) -> Any:
-    blocks, _ = term.evaluate(mode="weak", diff_var="u", standalone=True, asm_obj=None)
-    econn = u.field.econn
-    n, a = len(econn), econn.shape[1]
-    # Element matrices are ordered component by component.
-    dofs = (3 * econn[:, None, :] + np.arange(3)[None, :, None]).reshape(n, 3 * a)
-    rows = np.repeat(dofs, 3 * a, axis=1).ravel()
-    columns = np.tile(dofs, (1, 3 * a)).ravel()
-    size = 3 * u.field.n_nod
-    return sparse.coo_array((np.ravel(blocks), (rows, columns)), shape=(size, size)).tocsr()
-
-
-def dolfinx(p: Problem) -> Assembled:
-    """Version 0.5, which is what Debian 12 has; its names have changed since."""
-    import ufl
-    from dolfinx import fem, mesh
-    from mpi4py import MPI
-    from petsc4py import PETSc
-
-    coordinates = ufl.Mesh(ufl.VectorElement("Lagrange", ufl.tetrahedron, 1))
-    body = mesh.create_mesh(MPI.COMM_SELF, p.tets, p.points, coordinates)
-    started = time.perf_counter()
-    space = fem.VectorFunctionSpace(body, ("Lagrange", 2))
-    u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
-
-    def strain(w: Any) -> Any:
-        return ufl.sym(ufl.grad(w))
-
-    # Constants, so that the compiled forms serve every material.
-    mu, lam, rho = (fem.Constant(body, value) for value in (p.mu, p.lam, p.rho))
-    elastic = 2 * mu * ufl.inner(strain(u), strain(v)) + lam * ufl.div(u) * ufl.div(v)
-    K, M = (
-        fem.petsc.assemble_matrix(fem.form(term * ufl.dx))
-        for term in (elastic, rho * ufl.inner(u, v))
-    )
-    K.assemble()
-    M.assemble()
-    seconds = time.perf_counter() - started
-
-    def factorise(c: float, free: np.ndarray) -> Solve:
-        A = M.copy()
-        A.axpy(c, K, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-        A.zeroRowsColumns(np.flatnonzero(~free).astype(np.int32))
-        A.setOption(PETSc.Mat.Option.SPD, True)
-        solver = PETSc.KSP().create(MPI.COMM_SELF)
-        solver.setOperators(A)
-        solver.setType("preonly")
-        solver.getPC().setType("cholesky")
-        solver.getPC().setFactorSolverType("mumps")
-        solver.setUp()
-        x = A.createVecRight()
-
-        def solve(b: np.ndarray) -> np.ndarray:
-            solver.solve(PETSc.Vec().createWithArray(np.where(free, b, 0)), x)
-            return x.array.copy()
-
-        return solve
-
-    nodes = _matched(space.tabulate_dof_coordinates(), p.nodes)
-    numbers = (3 * nodes[:, None] + np.arange(3)).ravel()
-    plain = (sparse.csr_array(A.getValuesCSR()[::-1], shape=A.getSize()) for A in (K, M))
-    return Assembled(seconds, *plain, _renumbered(numbers), factorise)
-
-
 def _scipy(
     seconds: float, K: Any, M: Any, numbers: np.ndarray, factorised: Callable[[Any], Solve]
 ) -> Assembled:
@@ -309,20 +235,10 @@ def _matched(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     return number
 
 
-@dataclass(frozen=True, kw_only=True)
-class Code:
-    """How a code is called, by which name it is installed, and the solver it steps with."""
-
-    assemble: Callable[[Problem], Assembled]
-    package: str
-    solver: str
-
-
+# Code -> its assembly and the name of its package.
 CODES = {
-    "skinwave": Code(assemble=skinwave, package="skinwave", solver="fem.factorise"),
-    "scikit-fem": Code(assemble=scikit_fem, package="scikit-fem", solver="SuperLU (scipy splu)"),
-    "ngsolve": Code(assemble=ngsolve, package="ngsolve", solver="sparsecholesky"),
-    "felupe": Code(assemble=felupe, package="felupe", solver="SuperLU (scipy splu)"),
-    "sfepy": Code(assemble=sfepy, package="sfepy", solver="SuperLU (auto_direct)"),
-    "dolfinx": Code(assemble=dolfinx, package="fenics-dolfinx", solver="MUMPS Cholesky (PETSc)"),
+    "skinwave": (skinwave, "skinwave"),
+    "scikit-fem": (scikit_fem, "scikit-fem"),
+    "ngsolve": (ngsolve, "ngsolve"),
+    "felupe": (felupe, "felupe"),
 }

@@ -1,10 +1,9 @@
 """Regression check of all numbers: `python -m bench.frozen write DIR`, then, after a change of the
 code, `python -m bench.frozen compare DIR`.
 
-Everything goes through the command line, on scenes that are kept in DIR, so that what is inside may
-be rebuilt in between: `compare` runs the same commands again. Text may differ (it is counted), and
-what took how long; numbers must agree to 1e-9 of the largest of their column, or of their tolerance
-in a verification.
+`compare` runs the same commands on the scenes in DIR again. Texts may differ (they are counted) and
+so may times. Numbers must agree to 1e-9 of the largest of their column. Each check of a
+verification must agree with one of the old checks, to 1e-9 of its reference or its tolerance.
 """
 
 import argparse
@@ -23,6 +22,7 @@ ROOT = Path(__file__).parent.parent
 AGREE = 1e-9
 NOT_COMPARED = ("seconds", "memory", "versions", "peak", "typed", "arguments")
 SCENES, PLANNED = ("skin-slab", "paper-sheet"), 20
+CHECK = "check of a verification"
 
 
 def parts() -> dict[str, tuple[tuple[str, ...], tuple[str, ...]]]:
@@ -92,7 +92,7 @@ def _leaves(value: object, name: str) -> Iterator[tuple[str, object]]:
     """Everything in a JSON value; the checks of a verification over their tolerances."""
     if isinstance(value, dict) and "bar" in value:
         unit = max(abs(value["reference"] or 0.0), 1e6 * value["bar"])
-        yield f"{name} check", float(value["value"] or 0.0) / (unit or 1.0)
+        yield CHECK, float(value["value"] or 0.0) / (unit or 1.0)
     elif isinstance(value, dict):
         for key, inner in value.items():
             yield from _leaves(inner, f"{name} {key}".strip())
@@ -120,6 +120,9 @@ def _split(found: Iterator[tuple[str, object]]) -> tuple[dict[str, np.ndarray], 
 def differences(before: Path, after: Path) -> Iterator[str]:
     """Differences between two files beyond the tolerance; names may have changed, order not."""
     (old, old_text), (new, new_text) = numbers(before), numbers(after)
+    if CHECK in old:
+        yield from _changed_checks(old[CHECK], new[CHECK])
+        return
     changed = sum(a != b for a, b in zip(old_text, new_text, strict=False))
     if changed:
         print(f"  {after.name}: {changed} of {len(old_text)} texts differ")
@@ -134,6 +137,15 @@ def differences(before: Path, after: Path) -> Iterator[str]:
         elif not np.allclose(a, b, rtol=0, atol=AGREE * _size(a), equal_nan=True):
             worst = np.nanmax(np.abs(a - b)) / _size(a)
             yield f"{name}: differs by {worst:.2g} of its largest (may by {AGREE:g})"
+
+
+def _changed_checks(old: np.ndarray, new: np.ndarray) -> Iterator[str]:
+    """Checks whose value no old check has; cases may have been regrouped or removed."""
+    print(f"  {len(old)} checks, now {len(new)}")
+    apart = np.abs(new[:, None] - old).min(axis=1)
+    yield from (
+        f"check {k}: by {apart[k]:.2g} from the nearest" for k in np.flatnonzero(apart > AGREE)
+    )
 
 
 def _size(values: np.ndarray) -> float:

@@ -29,5 +29,5 @@ def test_models_agree_within_their_stated_errors(number):
 def test_a_difference_above_the_stated_errors_is_found():
     """As 3 % between answers that state 1 % each."""
     found = Outcome(0, {})
-    found.pairs = [Pair(("a", "b"), 0.03, 0.03, 0.02), Pair(("a", "c"), 0.02, 0.02, 0.02)]
+    found.pairs = [Pair(("a", "b"), 0.03, 0.02), Pair(("a", "c"), 0.02, 0.02)]
     assert [pair.models for pair in found.disagreements] == [("a", "b")]
