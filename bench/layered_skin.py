@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from simple_model.material import Material
-from simple_model.trajectory import Floats
+from simple_model import Material
+from simple_model.typing import Floats
 from skinwave.bodies import BODIES, Body
 from skinwave.bodies.parts import solid_of
 from skinwave.verify.published import EXPONENT, Published, wave_sets

@@ -70,7 +70,8 @@ from fem.stress import (
     stress_operator,
 )
 from fem.transient import Diverged, State, at_rest, transient
-from simple_model.material import PRESETS, Material, PronyTerm, from_young, of_law, tabulated
+from simple_model import Material, PronyTerm, from_young, of_law, tabulated
+from simple_model.layers.material import PRESETS
 
 __all__ = [
     "PRESETS",

@@ -31,7 +31,7 @@ from fem.maxwell import NO_INTERNAL
 from fem.pressure_projection import dilatation_operator
 from meshes import TetMesh
 from meshes.tetmesh import Floats, Ints
-from simple_model.tensors import DIAGONAL, MEAN, TENSOR, hooke
+from simple_model.layers.tensors import DIAGONAL, MEAN, TENSOR, hooke
 
 TOUCHING = 1e-6  # barycentric: an element touches a point that is so little outside it
 POINTS = 4  # quadrature points of an element, of the rule for degree 2

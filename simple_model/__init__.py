@@ -1,38 +1,36 @@
 """Tactons, the load that they put on the skin, and all models without a mesh."""
 
-import warnings
-
-from simple_model.drive import DRIVES, DriveLaw
-from simple_model.flat_body import flat_body, steady_state
-from simple_model.flat_motion import flat_motion, steady_motion
-from simple_model.focus import (
-    PressureMap,
-    array_field,
-    focal_spot,
-    read_pressure_map,
-    relative_intensity,
-)
-from simple_model.joined import evenly, joined
-from simple_model.layers import Stack
-from simple_model.line_names import named_lines
-from simple_model.line_table import LineTable, Unnamed, line_table, resolved_lines
-from simple_model.material import Material, from_young, of_law, orthotropic, tabulated
-from simple_model.modulus_laws import (
+from simple_model.layers.flat_body import flat_body, steady_state
+from simple_model.layers.flat_motion import flat_motion, steady_motion
+from simple_model.layers.material import Material, from_young, of_law, orthotropic, tabulated
+from simple_model.layers.modulus_laws import (
     MODULUS_LAWS,
     FractionalKelvinVoigt,
     FractionalZener,
     ModulusTable,
     modulus_table,
 )
-from simple_model.orthotropy import Orthotropy
+from simple_model.layers.orthotropy import Orthotropy
+from simple_model.layers.prony import PronySeries, PronyTerm, fit_prony
+from simple_model.layers.stack import Stack
+from simple_model.line_table import LineTable, Unnamed, line_table, resolved_lines
+from simple_model.load.drive import DRIVES, DriveLaw
+from simple_model.load.focus import (
+    PressureMap,
+    array_field,
+    focal_spot,
+    read_pressure_map,
+    relative_intensity,
+)
+from simple_model.load.joined import evenly, joined
+from simple_model.load.line_names import named_lines
+from simple_model.load.pressure import MovingPressure
+from simple_model.load.rhythm import Rhythm, Signal
+from simple_model.load.tacton import SUPERPOSITIONS, Tacton, commanded, modulation, pattern_period
+from simple_model.load.trajectory import SHAPES, Trajectory, arc_path, timed_path
 from simple_model.point_kernel import point_kernel, point_kernel_published, published
-from simple_model.pressure import MovingPressure
-from simple_model.prony import PronySeries, PronyTerm, fit_prony
 from simple_model.response import Effort, Response, are_resolved, lines, phasors, spectrum
-from simple_model.rhythm import Rhythm, Signal
-from simple_model.tacton import SUPERPOSITIONS, Tacton, commanded, modulation, pattern_period
 from simple_model.threshold import sensation_level, threshold
-from simple_model.trajectory import SHAPES, Trajectory, arc_path, timed_path
 
 __all__ = [
     "DRIVES",
@@ -92,12 +90,3 @@ __all__ = [
     "threshold",
     "timed_path",
 ]
-
-
-def __getattr__(name: str) -> object:
-    if name != "told_apart":  # of version 0.2, which loads for one release
-        raise AttributeError(f"module 'simple_model' has no attribute '{name}'")
-    warnings.warn(
-        "simple_model.told_apart is now simple_model.are_resolved", DeprecationWarning, stacklevel=2
-    )
-    return are_resolved

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

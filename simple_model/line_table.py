@@ -6,10 +6,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from simple_model.line_names import MOST, SAME, WEAKEST, LineNames, line_names
-from simple_model.pressure import MovingPressure
+from simple_model.load.line_names import MOST, SAME, WEAKEST, LineNames, line_names
+from simple_model.load.pressure import MovingPressure
+from simple_model.load.sampling import step
 from simple_model.response import (
     ALIKE,
     SETTLE,
@@ -18,13 +18,10 @@ from simple_model.response import (
     fit_lines,
     hidden,
     resolution,
-    step,
     unmixed,
 )
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats, Mask
 from simple_model.windows import cosines
-
-Mask = NDArray[np.bool_]
 
 FITTED = 1e-4  # of the strongest line of the load: weaker ones are not fitted
 FAINTEST = 1e-6  # of it: what a line of the load must have to be found in a response

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simple_model.quantities import NotOfThis, Quantity
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 
 if TYPE_CHECKING:
     from simple_model.response import Response

@@ -15,12 +15,12 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from simple_model.drive import PUBLISHED
-from simple_model.pressure import MovingPressure
+from simple_model.load.drive import PUBLISHED
+from simple_model.load.pressure import MovingPressure
+from simple_model.load.sampling import fold_parts, low_passed
 from simple_model.quantities import PRESSURE
 from simple_model.response import Effort, Response
-from simple_model.sampling import fold_parts, low_passed
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 
 
 def published(pressure: MovingPressure) -> MovingPressure:

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from simple_model.choices import choose
-from simple_model.material import Material
-from simple_model.tensors import (
+from simple_model.layers.material import Material
+from simple_model.layers.tensors import (
     COMPONENTS,
     energy_root,
     hooke,
@@ -26,7 +26,7 @@ from simple_model.tensors import (
     squared,
     von_mises,
 )
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 
 NORMAL, VECTOR, STRAIN = "normal displacement", "displacement", "strain"  # fields
 Rows = Callable[[Material], Floats]

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simple_model import conversion, drawing, motion_rates, response_page
-from simple_model.line_names import line_names
-from simple_model.pressure import MovingPressure
+from simple_model.load.line_names import line_names
+from simple_model.load.pressure import MovingPressure
+from simple_model.load.sampling import step
 from simple_model.quantities import (
     ACCELERATION,
     DISPLACEMENT,
@@ -23,7 +24,7 @@ from simple_model.quantities import (
     quantity,
 )
 from simple_model.spectra import Lines, Spectrum
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 from simple_model.windows import kaiser, named
 
 if TYPE_CHECKING:
@@ -517,11 +518,6 @@ def _beta(bins: float) -> float:
     """Kaiser beta of the window for lines so many bins apart, its main lobe in proportion."""
     lobe = np.hypot(1.0, LINE_BETA / np.pi) * min(bins / LINE_BINS, 1.0)
     return float(np.pi * np.sqrt(max(lobe**2 - 1, 0.0)))
-
-
-def step(times: Floats) -> float:
-    """Sampling interval in s of equally spaced times (t,)."""
-    return float((times[-1] - times[0]) / (len(times) - 1))
 
 
 def _distinct(frequencies: Floats, resolution: float) -> tuple[Floats, np.ndarray]:

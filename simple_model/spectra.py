@@ -10,7 +10,7 @@ from simple_model.choices import choose
 from simple_model.drawing import curves, new_axes, small
 from simple_model.numbers import counted
 from simple_model.quantities import Quantity, quantity
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from simple_model.choices import choose
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 
 BAND = 5.0  # dB, between people and between laboratories
 LOWEST, HIGHEST = 10.0, 1000.0  # Hz

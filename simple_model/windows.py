@@ -6,7 +6,7 @@
 import numpy as np
 from scipy.special import i0
 
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 
 # Weights of cosines (Harris 1978, doi:10.1109/PROC.1978.10837).
 COSINES = {"hann": (0.5, 0.5), "blackmanharris": (0.35875, 0.48829, 0.14128, 0.01168)}

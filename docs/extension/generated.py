@@ -47,7 +47,8 @@ def described(record: type) -> dict[str, str]:
 
 def _choices() -> dict[str, Iterable[str]]:
     """Constants that docstrings name, whose values a reader of the page wants."""
-    from simple_model.trajectory import BY_POINTS, SHAPES
+    from simple_model import SHAPES
+    from simple_model.load.trajectory import BY_POINTS
     from skinwave.scene.load import LOADS
 
     return {"SHAPES": SHAPES, "BY_POINTS": BY_POINTS, "LOADS": LOADS}
@@ -97,8 +98,7 @@ def _option(parser: argparse.ArgumentParser, action: argparse.Action) -> list[st
 
 def scene_keys() -> str:
     """Every key of a scene file with its meaning and the value that it takes if not given."""
-    from simple_model import Material, MovingPressure, PronyTerm, Tacton, Trajectory
-    from simple_model.rhythm import Rhythm, Signal
+    from simple_model import Material, MovingPressure, PronyTerm, Rhythm, Signal, Tacton, Trajectory
     from skinwave import Body, Load, Scene
     from skinwave.bodies import Layer, Mounting, Phalanx, Placement, Relief
     from skinwave.scene import keys as scene_keys
@@ -216,7 +216,7 @@ def materials() -> str:
     """Material presets: moduli at rest, loss and wave speed at `HERTZ`."""
     import numpy as np
 
-    from simple_model.material import PRESETS
+    from simple_model.layers.material import PRESETS
 
     w, rows = 2 * np.pi * HERTZ, []
     for name, solid in PRESETS.items():
@@ -250,7 +250,7 @@ def quantities() -> str:
 
 def drives() -> str:
     """Drive laws, with the sentence that pages have of each."""
-    from simple_model.drive import DRIVES
+    from simple_model import DRIVES
 
     rows = [[f"`{law.name}`", law.words, law.note] for law in DRIVES.values()]
     return table(["drive law", "", "lines of AM"], rows)

@@ -11,9 +11,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from simple_model import Material, MovingPressure, Tacton, Trajectory
-from simple_model.compliance import half_space
-from simple_model.flat_body import steady_lines
-from simple_model.load_spectrum import synthesise
+from simple_model.layers.compliance import half_space
+from simple_model.layers.flat_body import steady_lines
+from simple_model.load.spectrum import synthesise
 
 gel = Material(density=1000, shear_modulus=6e3, poisson=0.4999, loss_factor=0.02)
 speed = 2 * gel.rayleigh_speed  # m/s, so that the angle is 30 degrees

@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from simple_model import Material, Stack
-from simple_model.dispersion import dispersion_curves
+from simple_model.layers.dispersion import dispersion_curves
 
 layer = Material(density=1000, shear_modulus=10e3, poisson=0.4999, loss_factor=1e-4)
 below = Material(density=1000, shear_modulus=40e3, poisson=0.4999, loss_factor=1e-4)

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.integrate import quad
 
 from simple_model import MovingPressure, Tacton, lines
-from simple_model.focus import gaussian_width
+from simple_model.load.focus import gaussian_width
 from skinwave import Body, Scene, simulate
 
 load = MovingPressure(tacton=Tacton(am_frequency=1.0, duration=10.0))  # slow: no inertia

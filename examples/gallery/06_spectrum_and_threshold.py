@@ -11,8 +11,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from simple_model import MovingPressure, Tacton, sensation_level, threshold
-from simple_model.compliance import slab
-from simple_model.focus import gaussian_width
+from simple_model.layers.compliance import slab
+from simple_model.load.focus import gaussian_width
 from skinwave import Body, Scene, simulate
 
 load = MovingPressure(tacton=Tacton(am_frequency=100, duration=1.0))

@@ -10,7 +10,7 @@ vacuum; air that moves along lowers it.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from simple_model.plate_modes import Plate, plate_modes
+from simple_model.plates.modes import Plate, plate_modes
 
 side, D, mass, nu = 0.15, 2e-4, 0.080, 0.3  # m, N m, kg/m2
 paper = Plate(

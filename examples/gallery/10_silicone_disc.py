@@ -13,8 +13,8 @@ import pyvista as pv
 
 import fem
 from meshes.shapes.disc import disc
-from simple_model.compliance import slab
-from simple_model.wavenumber_integral import point_response
+from simple_model.layers.compliance import slab
+from simple_model.layers.wavenumber_integral import point_response
 
 silicone = fem.Material(density=1070, shear_modulus=25e3, poisson=0.4999, viscosity=20.0)
 width = 8e-3  # m, standard deviation of a focus that is broad enough for large elements

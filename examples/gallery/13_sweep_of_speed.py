@@ -11,9 +11,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from simple_model import MovingPressure, Tacton, Trajectory
-from simple_model.compliance import half_space
-from simple_model.flat_body import steady_lines
-from simple_model.material import PRESETS
+from simple_model.layers.compliance import half_space
+from simple_model.layers.flat_body import steady_lines
+from simple_model.layers.material import PRESETS
 
 skin = PRESETS["forearm"]
 speeds = np.arange(1.0, 6.1, 0.25)  # m/s

@@ -14,7 +14,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from simple_model import MovingPressure, Tacton
-from simple_model.load_spectrum import synthesise
+from simple_model.load.spectrum import synthesise
 from skinwave import Body, Scene, simulate
 from skinwave.measure.alignment import align
 from skinwave.measure.lines import lines_of

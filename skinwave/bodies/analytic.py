@@ -3,9 +3,10 @@
 from math import inf, isfinite
 
 from meshes.tetmesh import Floats
-from simple_model.compliance import Compliance
-from simple_model.dispersion import DispersionCurves, dispersion_curves
-from simple_model.layers import BASES, Stack
+from simple_model import Stack
+from simple_model.layers.compliance import Compliance
+from simple_model.layers.dispersion import DispersionCurves, dispersion_curves
+from simple_model.layers.stack import BASES
 from skinwave.bodies.body import Body
 from skinwave.bodies.parts import FLAT
 

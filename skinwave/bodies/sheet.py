@@ -18,9 +18,9 @@ from fem.shallow_shell import shell_stiffness
 from meshes import TetMesh, middle_plane, sheet
 from meshes.shapes.structured import check_size, round_up
 from meshes.tetmesh import Floats
-from simple_model.compliance import AIR_DENSITY, Compliance, thin_sheet
-from simple_model.dispersion import DispersionCurves
-from simple_model.sheet_modes import sheet_curves
+from simple_model.layers.compliance import AIR_DENSITY, Compliance, thin_sheet
+from simple_model.layers.dispersion import DispersionCurves
+from simple_model.plates.sheet_waves import sheet_curves
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.build import Build
 from skinwave.bodies.discretised import Discretised

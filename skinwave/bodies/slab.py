@@ -8,7 +8,7 @@ from meshes import Grading, extrude, graded_axis
 from meshes.files.import_body import FINE_RADIUS
 from meshes.shapes.structured import Lines, check_size, mirrored, with_planes
 from meshes.tetmesh import Floats
-from simple_model.compliance import layered
+from simple_model.layers.compliance import layered
 from skinwave.bodies.absorbing_layer import (
     far_springs,
     has_layer,

@@ -12,14 +12,13 @@ from typing import Any
 import numpy as np
 
 from meshes.tetmesh import Floats
-from simple_model import Response
-from simple_model.constant_loss import constant_loss
-from simple_model.load_spectrum import load_lines, synthesise
-from simple_model.material import Complex
-from simple_model.plate_modes import PlateModes, plate_modes, steady_response
-from simple_model.plate_response import modal_path_forces
+from simple_model import Response, Trajectory
+from simple_model.layers.constant_loss import constant_loss
+from simple_model.load.spectrum import load_lines, synthesise
+from simple_model.plates.modes import PlateModes, plate_modes, steady_response
+from simple_model.plates.path_forces import modal_path_forces
 from simple_model.quantities import quantity
-from simple_model.trajectory import Trajectory
+from simple_model.typing import Complex
 from skinwave.inference.design import (
     Candidate,
     middle,

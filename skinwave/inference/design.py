@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 
 from meshes.tetmesh import Floats
-from simple_model import MovingPressure, Tacton
-from simple_model.drive import DRIVES
-from simple_model.plate_modes import Plate
+from simple_model import DRIVES, MovingPressure, Tacton
+from simple_model.plates.modes import Plate
 from skinwave.inference import drive_laws
 from skinwave.scene.variation import Variation, combinations
 

@@ -5,8 +5,8 @@ Scene files that name them are read where `SKINWAVE_EXTENSIONS` has the name of 
 
 import numpy as np
 
-from simple_model.drive import DriveLaw
-from simple_model.trajectory import Floats
+from simple_model import DriveLaw
+from simple_model.typing import Floats
 
 COMPRESSION = 0.25  # of the pressure at small drive over that at full drive, less 1
 

@@ -3,7 +3,7 @@
 Named in `SKINWAVE_EXTENSIONS`, it lets scene files have them; nothing here imports it.
 """
 
-from simple_model.drive import DRIVES
+from simple_model import DRIVES
 from skinwave.inference.drive_laws import LAWS
 
 DRIVES.update({name: law for name, law in LAWS.items() if name not in DRIVES})

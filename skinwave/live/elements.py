@@ -17,7 +17,7 @@ import fem
 from fem.harmonic import LineSolver
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Tacton
-from simple_model.prony import FIT_TOLERANCE
+from simple_model.layers.prony import FIT_TOLERANCE
 from skinwave.bodies.build import Build, build, operators
 from skinwave.live.grid import SIDE, STEP, grid_line
 from skinwave.models.laws import relaxing

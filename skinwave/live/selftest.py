@@ -7,9 +7,8 @@ import numpy as np
 
 from fem import Complex
 from meshes.tetmesh import Floats
-from simple_model import MovingPressure, Tacton, Trajectory, evenly
-from simple_model.flat_body import steady_lines
-from simple_model.tacton import SUPERPOSITIONS
+from simple_model import SUPERPOSITIONS, MovingPressure, Tacton, Trajectory, evenly
+from simple_model.layers.flat_body import steady_lines
 from skinwave.bodies.analytic import compliance, has_exact_waves, is_laterally_infinite
 from skinwave.live.radial import LOWEST
 from skinwave.live.values import values_of

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from meshes.tetmesh import Floats
-from simple_model.focus import spot_width
-from simple_model.free_modes import free_vibration, relaxing_stiffness
-from simple_model.plate_modes import PlateModes
-from simple_model.prony import FIT_TOLERANCE
+from simple_model.layers.prony import FIT_TOLERANCE
+from simple_model.load.focus import spot_width
+from simple_model.plates.free_modes import free_vibration, relaxing_stiffness
+from simple_model.plates.modes import PlateModes
 from skinwave.live.grid import SIDE, STEP, grid_line, smoothed
 from skinwave.models.laws import relaxing
 from skinwave.models.plate_modes import modes_of, plate_of, relative_modulus

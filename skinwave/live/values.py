@@ -7,11 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from simple_model import Tacton, Trajectory, evenly, joined
-from simple_model.drive import DRIVES
-from simple_model.joined import ROUND, parted
-from simple_model.tacton import SUPERPOSITIONS
-from simple_model.trajectory import SHAPES
+from simple_model import DRIVES, SHAPES, SUPERPOSITIONS, Tacton, Trajectory, evenly, joined
+from simple_model.load.joined import ROUND, parted
 from skinwave.scene.paper15 import tactons
 from skinwave.scene.scene import Scene, check_load
 

@@ -3,8 +3,8 @@
     g(r, w) = 1/(2 pi) int_0^inf S(k) G(k, w) J0(k r) k dk
 
 in which only the transform S of the focal pressure profile depends on the height of the focus: the
-grid is fine and wide enough for the narrowest profile. As in `simple_model.wavenumber_integral`
-the path of integration runs above the real axis, away from the poles of waves.
+grid is fine and wide enough for the narrowest profile. The path of integration runs above the real
+axis, away from the poles of waves, as in `simple_model.layers.wavenumber_integral`.
 """
 
 from dataclasses import dataclass
@@ -14,9 +14,14 @@ from scipy.special import jv
 
 import fem
 from meshes.tetmesh import Floats
-from simple_model.compliance import Compliance
-from simple_model.focus import spot_width
-from simple_model.wavenumber_integral import AT_ONCE, INTEGRATION_ERROR, MOST_NODES, UNRESOLVED
+from simple_model.layers.compliance import Compliance
+from simple_model.layers.wavenumber_integral import (
+    AT_ONCE,
+    INTEGRATION_ERROR,
+    MOST_NODES,
+    UNRESOLVED,
+)
+from simple_model.load.focus import spot_width
 from skinwave.bodies.analytic import compliance
 from skinwave.scene.scene import Body
 from skinwave.system.effort import Progress

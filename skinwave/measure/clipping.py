@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 from skinwave.measure.measurement import Measurement
 
 RUN = 3  # samples in a row at the same extreme,

@@ -4,11 +4,11 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure
-from simple_model.flat_body import field_lines, steady_lines
-from simple_model.flat_quantities import from_rest, steady, surface_field
-from simple_model.load_spectrum import merge_lines
-from simple_model.material import Complex
-from simple_model.wavenumber_integral import Field
+from simple_model.layers.flat_body import field_lines, steady_lines
+from simple_model.layers.flat_quantities import from_rest, steady, surface_field
+from simple_model.layers.wavenumber_integral import Field
+from simple_model.load.spectrum import merge_lines
+from simple_model.typing import Complex
 from skinwave.bodies.analytic import compliance
 from skinwave.models.flat_body import fields_read
 from skinwave.scene.scene import Scene

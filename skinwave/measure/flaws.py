@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from simple_model.line_names import line_names
-from simple_model.pressure import MovingPressure
+from simple_model import MovingPressure
+from simple_model.load.line_names import line_names
 from skinwave.measure.clipping import clipped_samples
 from skinwave.measure.mains import MAINS, WANDER, mains_in
 from skinwave.measure.measurement import Measurement

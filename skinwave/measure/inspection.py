@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 from skinwave.measure.clipping import clipped_samples
 from skinwave.measure.mains import hum_of
 from skinwave.measure.measurement import Measurement

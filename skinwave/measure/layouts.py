@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 from skinwave.measure import headers
 from skinwave.measure.headers import Column
 from skinwave.measure.recording import Given, Recording

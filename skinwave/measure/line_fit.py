@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 
 STEPS = 12  # of Gauss and Newton, at most
 SMALL = 0.01  # of a standard error, or of the farthest step: a step that is the last

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from meshes.tetmesh import Floats
-from simple_model.line_names import line_names
-from simple_model.line_table import resolved_lines
-from simple_model.material import Complex
-from simple_model.pressure import MovingPressure
+from simple_model import MovingPressure, resolved_lines
+from simple_model.load.line_names import line_names
+from simple_model.typing import Complex
 from skinwave.measure import Measurement
 from skinwave.measure.lines import MeasuredLines, as_response, lines_of, measurable
 from skinwave.measure.predicted import SAME, Target

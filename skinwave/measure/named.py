@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 from skinwave.measure import units
 from skinwave.measure.headers import NAMES, TIME, column
 from skinwave.measure.recording import Given, Recording, nowhere

@@ -12,8 +12,8 @@ from math import pi
 import numpy as np
 
 from meshes.tetmesh import Floats
-from simple_model.material import Complex
 from simple_model.response import SETTLE, fit_lines
+from simple_model.typing import Complex
 from skinwave.measure import Measurement
 from skinwave.measure.lines import as_response
 from skinwave.measure.measured_lines import (

@@ -15,9 +15,9 @@ from scipy.interpolate import CubicSpline
 
 import fem
 from meshes.tetmesh import Floats
-from simple_model.material import Complex
 from simple_model.quantities import Quantity
 from simple_model.response import fit_lines
+from simple_model.typing import Complex
 from skinwave.measure.flat_lines import flat_history, flat_lines
 from skinwave.measure.parameters import (
     DELAY,

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 from skinwave.measure import arrays, labview, matlab, skinsource, sound, text, universal
 from skinwave.measure.measurement import Measurement
 from skinwave.measure.recording import Given, Recording, completed

@@ -7,7 +7,7 @@ import numpy as np
 
 from simple_model.choices import choose
 from simple_model.quantities import QUANTITIES
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 from skinwave.measure import sampling, units
 from skinwave.measure.measurement import UNEVEN, Measurement
 

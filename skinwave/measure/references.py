@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.signal import correlate
 
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 
 LEAST_LEFT = 0.5  # of the samples, after what is not common to all places is cut off
 ALIKE = 0.8  # correlation of references that are of one signal

@@ -3,9 +3,9 @@
 import numpy as np
 
 from meshes.tetmesh import Floats
-from simple_model import Response
-from simple_model.line_table import resolved_lines
-from simple_model.response import SETTLE, spectrum, step
+from simple_model import Response, resolved_lines, spectrum
+from simple_model.load.sampling import step
+from simple_model.response import SETTLE
 from skinwave.measure.lines import as_response, bin_width, evenly, measurable
 from skinwave.measure.measurement import Measurement
 from skinwave.models.prepared import sample_times

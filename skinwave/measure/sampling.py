@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 from skinwave.measure.measurement import UNEVEN
 
 CLOCK = 1e8  # s: later times are counted from an epoch, and become those from the first

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from meshes import reading
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 from skinwave.measure.recording import Given, Recording, nowhere
 
 SAMPLES, SENSORS, AXES, RATE = 522, 72, 3, 1300.0

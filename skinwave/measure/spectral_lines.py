@@ -16,7 +16,7 @@ from scipy.signal import detrend
 from scipy.signal.windows import hann
 from scipy.special import chdtrc
 
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 from skinwave.measure.line_fit import LineFit, fitted
 from skinwave.measure.noise_floor import floor_of, tail
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 from skinwave.measure.headers import DRIVE, FREQUENCY, INDEX, TIME, Column, X, Y, Z
 from skinwave.measure.recording import Given
 from skinwave.measure.units import (

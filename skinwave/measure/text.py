@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 from skinwave.measure.decoding import decoded
 from skinwave.measure.headers import TIME, UNITS, X, Y, column
 from skinwave.measure.labview import lvm_table

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from meshes import reading
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 from skinwave.measure import units
 from skinwave.measure.recording import Given, Recording, nowhere
 from skinwave.measure.references import ONE_AFTER_ANOTHER, aligned

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 from skinwave.measure import named
 from skinwave.measure.recording import Given, Recording, nowhere
 from skinwave.measure.references import aligned

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from simple_model.load_spectrum import load_lines
+from simple_model.load.spectrum import load_lines
 from simple_model.quantities import STRAIN
 from skinwave.bodies.mounting import FRAME
 from skinwave.bodies.sheet import refuse_open_air

@@ -9,15 +9,15 @@ import numpy as np
 import simple_model
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response, steady_state
-from simple_model.flat_quantities import (
+from simple_model.layers.flat_quantities import (
     from_rest,
     quantity_field,
     steady,
     surface_field,
     traction_field,
 )
-from simple_model.focus import gaussian_width
-from simple_model.wavenumber_integral import Field
+from simple_model.layers.wavenumber_integral import Field
+from simple_model.load.focus import gaussian_width
 from skinwave.bodies.analytic import compliance, stack
 from skinwave.bodies.parts import FLAT
 from skinwave.models import Model, Request, register

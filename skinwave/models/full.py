@@ -12,11 +12,10 @@ from scipy import sparse
 import fem
 from meshes import cache
 from meshes.tetmesh import Floats
-from simple_model import Effort, Response
-from simple_model.load_spectrum import load_lines, synthesise
-from simple_model.material import Material
+from simple_model import Effort, Material, Response
+from simple_model.load.sampling import below_half_the_rate, resolving_step
+from simple_model.load.spectrum import load_lines, synthesise
 from simple_model.quantities import Quantity
-from simple_model.sampling import below_half_the_rate, resolving_step
 from skinwave.bodies.build import Build, operators
 from skinwave.bodies.build import build as build_body
 from skinwave.bodies.discretised import Discretise

@@ -9,8 +9,8 @@ import numpy as np
 
 from fem.materials import Material
 from simple_model import ModulusTable, MovingPressure
-from simple_model.load_spectrum import load_lines
-from simple_model.prony import FIT_TOLERANCE
+from simple_model.layers.prony import FIT_TOLERANCE
+from simple_model.load.spectrum import load_lines
 from skinwave.bodies import Body
 from skinwave.bodies.parts import solid_of
 

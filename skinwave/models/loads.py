@@ -18,12 +18,11 @@ from fem.load_and_probe import (
 )
 from fem.stress import materials_at, strain_operator
 from meshes.tetmesh import Floats
-from simple_model import MovingPressure
-from simple_model.load_spectrum import merge_lines, pressure_lines
-from simple_model.material import Material
-from simple_model.path_cells import jump_times
+from simple_model import Material, MovingPressure
+from simple_model.load.path_cells import jump_times
+from simple_model.load.sampling import below_half_the_rate, is_folded
+from simple_model.load.spectrum import merge_lines, pressure_lines
 from simple_model.quantities import STRAIN, Quantity
-from simple_model.sampling import below_half_the_rate, is_folded
 from skinwave.bodies.body import Body
 from skinwave.bodies.build import Build
 from skinwave.bodies.build import operators as operators_of

@@ -32,7 +32,7 @@ from fem.reduced_affine import AffineModel, Geometry, Variant, reduce_affine, st
 from meshes import cache
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
-from simple_model.prony import FIT_TOLERANCE
+from simple_model.layers.prony import FIT_TOLERANCE
 from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
 from skinwave.models.affine_scenes import check_scene

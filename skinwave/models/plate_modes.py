@@ -14,18 +14,19 @@ from numpy.typing import ArrayLike
 import fem
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
-from simple_model.compliance import AIR_DENSITY
-from simple_model.free_modes import free_modes
-from simple_model.load_spectrum import Complex, lines_from_rest, synthesise
-from simple_model.plate_modes import (
+from simple_model.layers.compliance import AIR_DENSITY
+from simple_model.load.sampling import below_half_the_rate, highest_driving
+from simple_model.load.spectrum import lines_from_rest, synthesise
+from simple_model.plates.free_modes import free_modes
+from simple_model.plates.modes import (
     Plate,
     PlateModes,
     modal_motion,
     modal_motion_apart,
     plate_modes,
 )
-from simple_model.plate_response import modal_path_forces
-from simple_model.sampling import below_half_the_rate, highest_driving
+from simple_model.plates.path_forces import modal_path_forces
+from simple_model.typing import Complex
 from skinwave.bodies.body import Body
 from skinwave.bodies.mounting import EDGES
 from skinwave.models import Model, Request, register
@@ -41,7 +42,7 @@ ERROR = 0.01  # relative, of a steady waveform beside finite elements of a frame
 
 
 def plate_of(body: Body) -> Plate:
-    """Thin plate of a sheet in the record of `simple_model.plate_modes`."""
+    """Thin plate of a sheet in the record of `simple_model.plates.modes`."""
     held, Q = body.mounting, body.solid.plane_stress * body.depth**3 / 12
     support = {edge: held.support if edge in held.edges else "free" for edge in EDGES}
     return Plate(

@@ -9,12 +9,11 @@ from scipy import sparse
 import fem
 from meshes import cache
 from meshes.tetmesh import Floats
-from simple_model import Effort, MovingPressure, Response
-from simple_model.focus import spot_width
-from simple_model.load_spectrum import merge_lines, synthesise
-from simple_model.material import Material
+from simple_model import Effort, Material, MovingPressure, Response
+from simple_model.load.focus import spot_width
+from simple_model.load.sampling import below_half_the_rate, highest_driving
+from simple_model.load.spectrum import merge_lines, synthesise
 from simple_model.quantities import Quantity
-from simple_model.sampling import below_half_the_rate, highest_driving
 from skinwave.bodies.build import Build
 from skinwave.bodies.discretised import Discretise
 from skinwave.bodies.sizes import default_size

@@ -20,7 +20,7 @@ import fem
 from fem.maxwell import with_internal
 from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure
-from simple_model.load_spectrum import merge_lines, reduced_lines
+from simple_model.load.spectrum import merge_lines, reduced_lines
 from skinwave.bodies.build import Build
 from skinwave.bodies.sheet import air
 from skinwave.models.full import energy_balance

@@ -23,7 +23,7 @@ from fem.sheet_reading import (
 )
 from meshes import middle_plane
 from meshes.tetmesh import Floats
-from simple_model.material import Material
+from simple_model import Material
 from simple_model.quantities import STRAIN
 from skinwave.bodies.body import Body
 from skinwave.bodies.build import Build

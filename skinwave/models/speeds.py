@@ -6,8 +6,8 @@ from math import asin, ceil
 import numpy as np
 
 from meshes.tetmesh import Floats
-from simple_model import MovingPressure, Tacton
-from simple_model.tacton import pattern_period, repeated
+from simple_model import MovingPressure, Tacton, pattern_period
+from simple_model.load.tacton import repeated
 
 FEWEST, MOST = 40, 256  # frames of an animation
 EACH = 8  # frames to a period of the fastest line that counts

@@ -16,10 +16,10 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response
-from simple_model.karman_motion import linear_motion, stretched_motion
-from simple_model.plate_modes import PlateModes
-from simple_model.response import step
-from simple_model.von_karman import KarmanPlate, karman_plate
+from simple_model.load.sampling import step
+from simple_model.plates.karman_motion import linear_motion, stretched_motion
+from simple_model.plates.modes import PlateModes
+from simple_model.plates.von_karman import KarmanPlate, karman_plate
 from skinwave.models import Model, Request, register
 from skinwave.models.laws import has_own_law, slowest_and_fastest
 from skinwave.models.plate_modes import ERROR as PLATE_ERROR

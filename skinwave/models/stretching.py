@@ -25,11 +25,11 @@ import fem
 from fem import nonlinear
 from meshes import middle_plane
 from meshes.tetmesh import Floats
-from simple_model import Effort, Response
-from simple_model.load_spectrum import Complex, load_lines
-from simple_model.material import Material
+from simple_model import Effort, Material, Response
+from simple_model.load.sampling import below_half_the_rate, highest_driving, resolving_step
+from simple_model.load.spectrum import load_lines
 from simple_model.quantities import ACCELERATION, DISPLACEMENT, VELOCITY, Quantity
-from simple_model.sampling import below_half_the_rate, highest_driving, resolving_step
+from simple_model.typing import Complex
 from skinwave.bodies.build import Build, build
 from skinwave.bodies.sheet import air, bending_wavenumber, discretise
 from skinwave.models import Request

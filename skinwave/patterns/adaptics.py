@@ -19,8 +19,8 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import Tacton, Trajectory
-from simple_model.tacton import COMMENSURATE, LONGEST, RETURNED
-from simple_model.trajectory import LARGEST
+from simple_model.load.tacton import COMMENSURATE, LONGEST, RETURNED
+from simple_model.load.trajectory import LARGEST
 from skinwave.patterns.adaptics_file import Brush, Track, parse
 from skinwave.patterns.pattern import ENGINE_RATE, STRAIGHT, Options, Pattern, one_height, thinned
 

@@ -14,7 +14,7 @@ import numpy as np
 from meshes.tetmesh import Floats
 from simple_model import Tacton, Trajectory, evenly
 from simple_model.choices import meant
-from simple_model.tacton import LONGEST, MOST_FOCI
+from simple_model.load.tacton import LONGEST, MOST_FOCI
 from skinwave.patterns.pattern import Options, Pattern, aliased, loudness, one_height
 from skinwave.scene.scene import Scene
 from skinwave.system.plain_text import as_utf_8, csv_table, number_in

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Tacton
-from simple_model.tacton import tones
+from simple_model.load.tacton import tones
 from skinwave.scene.scene import Scene
 
 ENGINE_RATE = 20_000.0  # Hz, of samples in AdapTics

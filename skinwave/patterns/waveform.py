@@ -8,10 +8,10 @@ import numpy as np
 from scipy.io import wavfile
 
 from meshes.tetmesh import Floats
-from simple_model import Signal
+from simple_model import Signal, modulation
 from simple_model.choices import choose
-from simple_model.rhythm import ROLES
-from simple_model.tacton import LONGEST, level, modulation, tones
+from simple_model.load.rhythm import ROLES
+from simple_model.load.tacton import LONGEST, level, tones
 from skinwave.patterns.pattern import Options, Pattern, aliased
 from skinwave.scene.scene import Scene
 

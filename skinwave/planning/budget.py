@@ -16,10 +16,10 @@ from math import isfinite, nan
 import numpy as np
 
 from meshes.tetmesh import Floats
-from simple_model.compliance import layered
-from simple_model.flat_body import steady_lines
-from simple_model.load_spectrum import Complex
+from simple_model.layers.compliance import layered
+from simple_model.layers.flat_body import steady_lines
 from simple_model.numbers import percent, stated_error
+from simple_model.typing import Complex
 from skinwave.bodies.analytic import flattened
 from skinwave.models.advice import takes
 from skinwave.models.plate_modes import MODES

@@ -6,13 +6,14 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Trajectory
-from simple_model.flat_body import steady_lines
-from simple_model.flat_quantities import from_rest, surface_field
-from simple_model.focus import gaussian_width, spot_width
-from simple_model.load_spectrum import Complex, load_lines, merge_lines
+from simple_model.layers.flat_body import steady_lines
+from simple_model.layers.flat_quantities import from_rest, surface_field
+from simple_model.layers.wavenumber_integral import point_response
+from simple_model.load.focus import gaussian_width, spot_width
+from simple_model.load.spectrum import load_lines, merge_lines
+from simple_model.load.trajectory import BY_POINTS
 from simple_model.quantities import DISPLACEMENT
-from simple_model.trajectory import BY_POINTS
-from simple_model.wavenumber_integral import point_response
+from simple_model.typing import Complex
 from skinwave.bodies.analytic import compliance, is_flat_layer, is_laterally_infinite, stack
 from skinwave.bodies.mounting import EDGES
 from skinwave.scene.scene import Body, Scene

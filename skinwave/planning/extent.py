@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from fem.coat import Coat
-from simple_model.focus import spot_width
+from simple_model.load.focus import spot_width
 from skinwave.bodies.analytic import is_flat_layer
 from skinwave.bodies.coat import AT, layer_name, thicknesses
 from skinwave.bodies.coat import coat as coat_of

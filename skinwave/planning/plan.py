@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import fem
-from simple_model.flat_body import FINEST
-from simple_model.focus import gaussian_width
-from simple_model.sampling import resolving_step
+from simple_model.layers.flat_body import FINEST
+from simple_model.load.focus import gaussian_width
+from simple_model.load.sampling import resolving_step
 from skinwave.bodies.sizes import check_mesh
 from skinwave.models import Model, named
 from skinwave.models.advice import beyond, check_taken, default_model, refusal, takers, takes

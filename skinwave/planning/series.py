@@ -7,8 +7,8 @@ import numpy as np
 
 from fem.materials import Material
 from simple_model import MovingPressure
-from simple_model.flat_body import steady_lines
-from simple_model.load_spectrum import load_lines
+from simple_model.layers.flat_body import steady_lines
+from simple_model.load.spectrum import load_lines
 from skinwave.bodies.analytic import compliance
 from skinwave.models import named
 from skinwave.models.laws import STRONG, own_laws, relaxing, series_tolerance

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from meshes.tetmesh import Floats
-from simple_model.flat_body import FINEST
+from simple_model.layers.flat_body import FINEST
 from skinwave.models import Model, Request, named
 from skinwave.models.prepared import Prepared, answer, steady_waveforms
 from skinwave.models.sample_grid import sample_grid

@@ -3,8 +3,8 @@
 import numpy as np
 
 from simple_model import Response
-from simple_model.line_names import line_names
-from simple_model.response import step
+from simple_model.load.line_names import line_names
+from simple_model.load.sampling import step
 from skinwave.models import Model, named
 from skinwave.models.advice import cures_for, in_words
 from skinwave.models.reduction import BAND

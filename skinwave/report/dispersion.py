@@ -10,8 +10,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter
 
 from meshes.tetmesh import Floats
-from simple_model.dispersion import DispersionCurves, Mode
 from simple_model.drawing import small
+from simple_model.layers.dispersion import DispersionCurves, Mode
 from skinwave.report.figures import REPORT
 from skinwave.report.levels import written
 from skinwave.report.palette import SERIES

@@ -6,7 +6,7 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import drawing
-from simple_model.focus import spot_width
+from simple_model.load.focus import spot_width
 from simple_model.numbers import counted
 
 if TYPE_CHECKING:

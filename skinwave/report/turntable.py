@@ -8,7 +8,7 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure
-from simple_model.load_spectrum import Complex
+from simple_model.typing import Complex
 from skinwave.report.palette import label
 from skinwave.report.render import outer_surface
 from skinwave.results.views import View

@@ -9,7 +9,8 @@ from scipy.fft import irfft, next_fast_len, rfft
 
 from meshes.tetmesh import Floats
 from simple_model import Response, phasors
-from simple_model.response import SETTLE, step
+from simple_model.load.sampling import step
+from simple_model.response import SETTLE
 from skinwave.system.drawn import drawn
 
 ROUND_OFF = 1e-6  # of the largest RMS motion: a line as weak as that is none

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from meshes.tetmesh import Floats
 from simple_model import Response
-from simple_model.response import step
+from simple_model.load.sampling import step
 from skinwave.results.files import folder_name
 from skinwave.results.views import View, field_frames
 from skinwave.system.plain_text import csv_table

@@ -9,7 +9,7 @@ import fem
 from meshes import TetMesh, part
 from meshes.tetmesh import Floats, Ints
 from simple_model import Effort, Response
-from simple_model.path_cells import path_samples
+from simple_model.load.path_cells import path_samples
 from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
 from skinwave.models import reduction

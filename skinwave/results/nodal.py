@@ -13,10 +13,10 @@ import numpy as np
 
 import fem
 from meshes.tetmesh import Floats, Ints
-from simple_model.load_spectrum import synthesise
-from simple_model.material import Material
+from simple_model import Material
+from simple_model.layers.tensors import hooke
+from simple_model.load.spectrum import synthesise
 from simple_model.quantities import NORMAL, STRAIN, VECTOR, Quantity
-from simple_model.tensors import hooke
 from skinwave.models import reduction
 from skinwave.models.loads import check_coat
 from skinwave.results.motion import Waves, check_values

@@ -14,8 +14,8 @@ import fem
 from fem.load_and_probe import surface_frame
 from meshes import reading
 from meshes.tetmesh import Floats
-from simple_model.flat_body import field_lines
-from simple_model.load_spectrum import synthesise
+from simple_model.layers.flat_body import field_lines
+from simple_model.load.spectrum import synthesise
 from simple_model.quantities import Quantity
 from skinwave.bodies.sizes import default_size
 from skinwave.models.advice import takes

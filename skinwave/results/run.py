@@ -6,7 +6,7 @@ from functools import cached_property
 
 from meshes.tetmesh import Floats
 from simple_model import LineTable, Response, Unnamed, line_table, spectrum
-from simple_model.line_names import SAME, line_frequency
+from simple_model.load.line_names import SAME, line_frequency
 from skinwave.scene.scene import Scene
 
 # Lines that claims are about, of one focus, whether or not the load has them.

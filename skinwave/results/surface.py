@@ -14,8 +14,8 @@ import fem
 from meshes import reading
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, sensation_level
-from simple_model.flat_body import steady_lines
-from simple_model.load_spectrum import load_lines, pressure_lines
+from simple_model.layers.flat_body import steady_lines
+from simple_model.load.spectrum import load_lines, pressure_lines
 from skinwave.bodies.analytic import compliance, has_exact_waves, is_laterally_infinite
 from skinwave.bodies.sizes import default_size
 from skinwave.models.advice import takes

@@ -17,8 +17,9 @@ import fem
 from meshes import reading
 from meshes.tetmesh import Floats, Ints, boundary_facets
 from simple_model import Effort, sensation_level
-from simple_model.flat_body import steady_lines
-from simple_model.load_spectrum import Complex, pressure_lines, synthesise
+from simple_model.layers.flat_body import steady_lines
+from simple_model.load.spectrum import pressure_lines, synthesise
+from simple_model.typing import Complex
 from skinwave.bodies.analytic import compliance
 from skinwave.models.loads import surface_motion
 from skinwave.models.plate_modes import steady_lines as plate_lines

@@ -13,7 +13,7 @@ import tomli_w
 from meshes import reading
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.choices import choose
-from simple_model.trajectory import BY_POINTS
+from simple_model.load.trajectory import BY_POINTS
 from skinwave.bodies import BodyKind
 from skinwave.bodies.parts import check_material
 from skinwave.scene.distributions import Distribution, parent_of, with_spreads, without_spreads

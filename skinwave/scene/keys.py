@@ -7,13 +7,11 @@ from functools import partial
 from math import inf, isfinite, nextafter, pi
 from typing import Any
 
-from simple_model import ModulusTable, Rhythm, Signal
+from simple_model import DRIVES, DriveLaw, Material, ModulusTable, PronyTerm, Rhythm, Signal
 from simple_model.choices import choose, meant
-from simple_model.drive import DRIVES, DriveLaw
-from simple_model.focus import FOCI, FocalSpot
-from simple_model.material import Material, PronyTerm
-from simple_model.modulus_laws import COLUMNS
-from simple_model.trajectory import Points
+from simple_model.layers.modulus_laws import COLUMNS
+from simple_model.load.focus import FOCI, FocalSpot
+from simple_model.load.trajectory import Points
 from skinwave.scene.material_file import material_of, values_of, written_table
 from skinwave.scene.scene import Layer, Mounting, Phalanx, Relief, Sides
 from skinwave.scene.support_motion import SupportMotion

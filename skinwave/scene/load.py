@@ -17,7 +17,7 @@ import numpy as np
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure
 from simple_model.choices import choose
-from simple_model.focus import NOMINAL_HEIGHT, ContactSpot
+from simple_model.load.focus import NOMINAL_HEIGHT, ContactSpot
 from skinwave.scene.support_motion import SupportMotion
 from skinwave.system import extensions
 

@@ -9,7 +9,7 @@ from typing import Any
 from meshes import reading
 from simple_model import MODULUS_LAWS, Material, ModulusTable, modulus_table, of_law, orthotropic
 from simple_model.choices import choose
-from simple_model.modulus_laws import COLUMNS
+from simple_model.layers.modulus_laws import COLUMNS
 
 PLAIN = ("density", "shear_modulus", "poisson")  # and losses, which may be left out
 LOSSES = ("viscosity", "loss_factor", "prony")

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from meshes import Palm
-from simple_model import MovingPressure, Trajectory
-from simple_model.drive import PUBLISHED, beyond_published
-from simple_model.material import PRESETS, Material, PronyTerm
+from simple_model import Material, MovingPressure, PronyTerm, Trajectory
+from simple_model.layers.material import PRESETS
+from simple_model.load.drive import PUBLISHED, beyond_published
 from skinwave.models.advice import takes
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.stretched_plate import STRETCHED

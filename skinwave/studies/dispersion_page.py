@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from simple_model.focus import spot_width
+from simple_model.load.focus import spot_width
 from skinwave.bodies import FLAT
 from skinwave.bodies.analytic import dispersion
 from skinwave.planning.simulate import compute

@@ -13,10 +13,10 @@ from math import asin, degrees, isfinite
 import numpy as np
 
 from meshes.tetmesh import Floats
-from simple_model.dispersion import DispersionCurves, Mode
-from simple_model.focus import lobe_width, spot_width
-from simple_model.line_names import LineNames, line_names
-from simple_model.pressure import MovingPressure
+from simple_model import MovingPressure
+from simple_model.layers.dispersion import DispersionCurves, Mode
+from simple_model.load.focus import lobe_width, spot_width
+from simple_model.load.line_names import LineNames, line_names
 from skinwave.bodies.analytic import dispersion
 from skinwave.scene.scene import Scene
 
@@ -73,7 +73,7 @@ class DrivenLine:
 
     @property
     def kind(self) -> str:
-        """Kind of the mode at this frequency, one of `simple_model.dispersion.KINDS`."""
+        """Kind of the mode at this frequency, one of `simple_model.layers.dispersion.KINDS`."""
         return str(self.mode.kinds[self.at])
 
     @property

@@ -22,7 +22,7 @@ import numpy as np
 from fem import NotReduced
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Response, lines, resolved_lines, sensation_level
-from simple_model.drive import beyond_published
+from simple_model.load.drive import beyond_published
 from skinwave.bodies.sizes import default_size
 from skinwave.models import named
 from skinwave.planning.assessment import sentences

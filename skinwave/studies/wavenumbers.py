@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from scipy.special import hankel2
 
 from meshes.tetmesh import Floats
-from simple_model import MovingPressure, Rhythm, Tacton
-from simple_model.dispersion import DispersionCurves
-from simple_model.focus import lobe_width
-from simple_model.material import Complex
+from simple_model import MovingPressure, Response, Rhythm, Tacton
+from simple_model.layers.dispersion import DispersionCurves
+from simple_model.load.focus import lobe_width
+from simple_model.load.sampling import step
 from simple_model.quantities import DISPLACEMENT
-from simple_model.response import Response, step
+from simple_model.typing import Complex
 from skinwave.scene.load import PRESSURE
 from skinwave.scene.scene import Scene
 

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from meshes.tetmesh import Floats
-from simple_model.line_names import line_frequency
+from simple_model.load.line_names import line_frequency
 from skinwave.report.figures import png
 from skinwave.scene.scene import Scene
 from skinwave.scene.spreads import Spread

@@ -12,13 +12,13 @@ from functools import lru_cache
 import numpy as np
 
 from meshes.tetmesh import Floats
-from simple_model import sensation_level
-from simple_model.flat_body import steady_lines
-from simple_model.line_names import line_frequency
-from simple_model.load_spectrum import Complex, synthesise
-from simple_model.path_operator import PathOperator, path_operator
-from simple_model.pressure import MovingPressure
-from simple_model.response import SETTLE, phasors
+from simple_model import MovingPressure, phasors, sensation_level
+from simple_model.layers.flat_body import steady_lines
+from simple_model.layers.path_operator import PathOperator, path_operator
+from simple_model.load.line_names import line_frequency
+from simple_model.load.spectrum import synthesise
+from simple_model.response import SETTLE
+from simple_model.typing import Complex
 from skinwave.bodies.analytic import compliance
 from skinwave.bodies.sizes import default_size
 from skinwave.models import named

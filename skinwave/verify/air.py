@@ -8,8 +8,8 @@ from scipy import sparse
 import fem
 import meshes
 from fem.added_mass import near_field
-from simple_model.compliance import AIR_DENSITY, thin_sheet
-from simple_model.wavenumber_integral import point_response
+from simple_model.layers.compliance import AIR_DENSITY, thin_sheet
+from simple_model.layers.wavenumber_integral import point_response
 from skinwave.verify.case import Case, Plot, described, misfit, order, relative
 from skinwave.verify.exact import PAPER, THICKNESS
 from skinwave.verify.references import Complex, Floats

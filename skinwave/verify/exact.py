@@ -10,11 +10,11 @@ import fem
 import meshes
 from meshes import TetMesh
 from simple_model import MovingPressure, Tacton, Trajectory
-from simple_model.compliance import Compliance, half_space, slab, thin_sheet
-from simple_model.flat_body import steady_lines
-from simple_model.load_spectrum import load_lines
-from simple_model.path_cells import path_fourier, path_samples
-from simple_model.wavenumber_integral import point_response
+from simple_model.layers.compliance import Compliance, half_space, slab, thin_sheet
+from simple_model.layers.flat_body import steady_lines
+from simple_model.layers.wavenumber_integral import point_response
+from simple_model.load.path_cells import path_fourier, path_samples
+from simple_model.load.spectrum import load_lines
 from skinwave.verify import references
 from skinwave.verify.case import Case, Plot, below, described, largest, misfit, relative
 from skinwave.verify.references import Complex, Floats

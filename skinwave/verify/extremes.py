@@ -8,7 +8,7 @@ import numpy as np
 import fem
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Response, Tacton, Trajectory, lines
-from simple_model.focus import spot_width
+from simple_model.load.focus import spot_width
 from skinwave.bodies.build import Build, build, operators
 from skinwave.models.prepared import Prepared, answer, prepare
 from skinwave.scene.scene import Body, Scene

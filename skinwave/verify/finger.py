@@ -7,7 +7,7 @@ import numpy as np
 
 import fem
 from simple_model import MovingPressure, Tacton
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 from skinwave.bodies import Body
 from skinwave.bodies.build import Build, build, operators
 from skinwave.measure import Measurement

@@ -5,9 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from simple_model import MovingPressure, Tacton, Trajectory
-from simple_model.flat_body import steady_state
-from simple_model.trajectory import Floats
+from simple_model import MovingPressure, Tacton, Trajectory, steady_state
+from simple_model.typing import Floats
 from skinwave.bodies import Body
 from skinwave.bodies.analytic import compliance
 from skinwave.verify.compared import Compared, compared

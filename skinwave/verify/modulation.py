@@ -4,10 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simple_model import MovingPressure, Response, Rhythm, Tacton
-from simple_model.drive import DRIVES
+from simple_model import DRIVES, MovingPressure, Response, Rhythm, Tacton
 from simple_model.response import fit_lines
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import Scene
 from skinwave.verify.published_waves import BODIES

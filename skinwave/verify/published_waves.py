@@ -7,10 +7,10 @@ from math import inf
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simple_model.dispersion import Mode
-from simple_model.focus import NOMINAL_HEIGHT, lobe_width, spot_width
-from simple_model.trajectory import Floats
-from simple_model.wavenumber_integral import point_response
+from simple_model.layers.dispersion import Mode
+from simple_model.layers.wavenumber_integral import point_response
+from simple_model.load.focus import NOMINAL_HEIGHT, lobe_width, spot_width
+from simple_model.typing import Floats
 from skinwave.bodies import BODIES as PRESETS
 from skinwave.bodies import Body
 from skinwave.bodies.analytic import compliance, dispersion

@@ -6,8 +6,8 @@ from itertools import islice
 import numpy as np
 
 import fem
-from simple_model.compliance import half_space
-from simple_model.wavenumber_integral import point_response
+from simple_model.layers.compliance import half_space
+from simple_model.layers.wavenumber_integral import point_response
 from skinwave.verify import references
 from skinwave.verify.case import Case, below, misfit
 from skinwave.verify.exact import RADII, circling_on_skin

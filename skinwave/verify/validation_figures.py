@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from simple_model.trajectory import Floats
+from simple_model.typing import Floats
 from skinwave.report.figures import REPORT
 from skinwave.verify import zigzag
 from skinwave.verify.compared import Compared, tallies

@@ -11,9 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from simple_model import MovingPressure, Tacton, Trajectory
-from simple_model.flat_body import flat_body
-from simple_model.trajectory import Floats
+from simple_model import MovingPressure, Tacton, Trajectory, flat_body
+from simple_model.typing import Floats
 from skinwave.bodies.analytic import compliance
 from skinwave.measure import Measurement
 from skinwave.measure.reading import completing, read_alone

@@ -10,8 +10,8 @@ import fem
 import meshes
 from fem.added_mass import added_mass
 from simple_model import MovingPressure, Tacton, Trajectory
-from simple_model.compliance import thin_sheet
-from simple_model.wavenumber_integral import point_response
+from simple_model.layers.compliance import thin_sheet
+from simple_model.layers.wavenumber_integral import point_response
 from skinwave.bodies.build import build, operators
 from skinwave.bodies.sheet import air, air_mass, bending_wavenumber
 from skinwave.models import Request

@@ -14,8 +14,8 @@ import skinwave
 from meshes import graded_axis
 from meshes.shapes.palm import level_set
 from meshes.shapes.structured import Grading, with_planes
-from simple_model import MovingPressure, Tacton, Trajectory, lines
-from simple_model.focus import along_axis, array_field, spot_width
+from simple_model import MovingPressure, Tacton, Trajectory, array_field, lines
+from simple_model.load.focus import along_axis, spot_width
 from skinwave import compare
 from skinwave.bodies.absorbing_layer import has_layer
 from skinwave.bodies.build import build, operators

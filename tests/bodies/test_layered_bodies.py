@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from simple_model import flat_body, steady_state
-from simple_model.compliance import half_space, layered
+from simple_model.layers.compliance import half_space, layered
 from skinwave.bodies.analytic import compliance, has_exact_waves, stack
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute

@@ -10,9 +10,9 @@ import fem
 import meshes
 from fem import nonlinear
 from simple_model import MovingPressure, Tacton, from_young, orthotropic
-from simple_model.compliance import thin_sheet
-from simple_model.plate_modes import plate_modes
-from simple_model.sheet_modes import sheet_curves
+from simple_model.layers.compliance import thin_sheet
+from simple_model.plates.modes import plate_modes
+from simple_model.plates.sheet_waves import sheet_curves
 from skinwave import dumps, loads, plan
 from skinwave.bodies.build import build, operators
 from skinwave.bodies.mounting import EDGES, Mounting

@@ -11,12 +11,12 @@ from fem.boundary import springs
 from fem.load_and_probe import facet_normals
 from meshes import block, boundary_facets
 from simple_model import Material, Stack, from_young
-from simple_model.compliance import layered
-from simple_model.dispersion import dispersion_curves
-from simple_model.flat_quantities import quantity_field
-from simple_model.layered import surface_compliance
+from simple_model.layers.compliance import layered
+from simple_model.layers.dispersion import dispersion_curves
+from simple_model.layers.flat_quantities import quantity_field
+from simple_model.layers.layered import surface_compliance
+from simple_model.layers.wavenumber_integral import point_integrals
 from simple_model.quantities import DISPLACEMENT
-from simple_model.wavenumber_integral import point_integrals
 from skinwave import Body, dumps, loads
 from skinwave.bodies import Sides
 from skinwave.bodies.analytic import stack

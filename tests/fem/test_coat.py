@@ -12,10 +12,9 @@ import meshes
 from fem.assembly import by_region
 from fem.boundary import fixed_dofs
 from fem.coat import coat_operators, coat_stiffness, surface_of
-from simple_model import Stack
-from simple_model.compliance import layered
-from simple_model.material import PronyTerm
-from simple_model.wavenumber_integral import point_response
+from simple_model import PronyTerm, Stack
+from simple_model.layers.compliance import layered
+from simple_model.layers.wavenumber_integral import point_response
 from skinwave.bodies import BODIES, Body, Layer, Relief
 from skinwave.bodies.build import build, operators
 from skinwave.bodies.coat import coarsest_size, coat, coat_count, meshed_strata

@@ -14,7 +14,7 @@ import fem
 import meshes
 from fem import nonlinear
 from simple_model import MovingPressure, Tacton, Trajectory, from_young
-from simple_model.focus import along_axis
+from simple_model.load.focus import along_axis
 from skinwave.bodies.mounting import Mounting
 from skinwave.models.stretching import membrane, meshed_sheet, stretching_body
 from skinwave.planning.plan import plan

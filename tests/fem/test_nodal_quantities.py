@@ -8,8 +8,8 @@ import pytest
 from PIL import Image
 
 from simple_model import MovingPressure, Response, Tacton, Trajectory
-from simple_model.load_spectrum import pressure_lines, synthesise
-from simple_model.tensors import hooke
+from simple_model.layers.tensors import hooke
+from simple_model.load.spectrum import pressure_lines, synthesise
 from skinwave.commands.cli import main
 from skinwave.models.reduction import oscillating
 from skinwave.report import films, render

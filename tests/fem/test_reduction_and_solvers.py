@@ -22,7 +22,7 @@ from fem import linear_solver, memory, products, reduced
 from fem.harmonic import dynamic_stiffness
 from fem.sparsity import on_one_pattern, upper_triangle
 from simple_model import MovingPressure, Tacton, Trajectory
-from simple_model.load_spectrum import reduced_lines
+from simple_model.load.spectrum import reduced_lines
 from skinwave.bodies.build import build as build_body
 from skinwave.bodies.build import operators
 from skinwave.models.full import energy_balance

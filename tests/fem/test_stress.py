@@ -10,7 +10,7 @@ from scipy.special import j0, j1
 import fem
 import meshes
 from fem.stress import strain_operator, stress_operator
-from simple_model.tensors import energy_root, hooke, largest_shear, von_mises
+from simple_model.layers.tensors import energy_root, hooke, largest_shear, von_mises
 
 WIDTH = 4.5e-3  # m, standard deviation of the pressure
 POISSON = [0.3, 0.4999]

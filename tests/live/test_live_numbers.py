@@ -8,13 +8,19 @@ import pytest
 from in_browser import needs_browser
 from in_live_page import modules, scenes_of, some_values
 
-import simple_model.path_cells
-from simple_model import Response, published, sensation_level, spectrum, threshold
-from simple_model.line_names import line_names
-from simple_model.line_table import resolved_lines
-from simple_model.load_spectrum import pressure_lines
-from simple_model.path_cells import is_abrupt
-from simple_model.point_kernel import point_kernel
+import simple_model.load.path_cells
+from simple_model import (
+    Response,
+    point_kernel,
+    published,
+    resolved_lines,
+    sensation_level,
+    spectrum,
+    threshold,
+)
+from simple_model.load.line_names import line_names
+from simple_model.load.path_cells import is_abrupt
+from simple_model.load.spectrum import pressure_lines
 from simple_model.threshold import pressure_threshold
 from skinwave.live.values import presets, values_of
 from skinwave.results.comparison import phase_delays
@@ -88,8 +94,9 @@ def test_a_ramp_longer_than_half_a_pulse_and_a_path_off_the_body_are_refused(pag
 
 
 def test_lines_of_the_load_are_those_of_python(page, starts, monkeypatch):
-    monkeypatch.setattr(simple_model.path_cells, "NODES_PER_WIDTH", 1e7)  # else to 1e-5 of a circle
-    simple_model.path_cells.path_cells.cache_clear()
+    # Interpolation along the path is exact to 1e-5 of a circle only.
+    monkeypatch.setattr(simple_model.load.path_cells, "NODES_PER_WIDTH", 1e7)
+    simple_model.load.path_cells.path_cells.cache_clear()
     many = some_values(starts, 100, rhythm=False)
     found = page.evaluate(
         """([many, places]) => many.map((own) => {

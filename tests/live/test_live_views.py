@@ -13,7 +13,7 @@ from in_browser import needs_browser, settled
 from PIL import Image
 
 from simple_model import MovingPressure, Tacton, Trajectory
-from simple_model.load_spectrum import synthesise
+from simple_model.load.spectrum import synthesise
 from skinwave.live.page import bundle
 from skinwave.report.turntable import focus_places, motion_lines, turntable
 from skinwave.results.views import kernel_view

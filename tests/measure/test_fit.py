@@ -7,8 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from simple_model.flat_body import flat_body, steady_lines
-from simple_model.load_spectrum import synthesise
+from simple_model import flat_body
+from simple_model.layers.flat_body import steady_lines
+from simple_model.load.spectrum import synthesise
 from skinwave.bodies.analytic import compliance
 from skinwave.commands import cli
 from skinwave.measure import Measurement, measured_lines, observed

@@ -7,8 +7,7 @@ import pytest
 
 import fem
 import meshes
-from simple_model import MovingPressure, Tacton, Trajectory
-from simple_model.response import phasors
+from simple_model import MovingPressure, Tacton, Trajectory, phasors
 from skinwave import Body, Scene
 from skinwave.bodies import BODIES
 from skinwave.bodies.build import build

@@ -14,7 +14,7 @@ from fem.line_basis import line_bases, line_errors, steady_lines
 from fem.load_and_probe import facet_normals
 from meshes import boundary_facets
 from simple_model import MovingPressure, PronyTerm, Tacton, Trajectory
-from simple_model.load_spectrum import pressure_lines
+from simple_model.load.spectrum import pressure_lines
 from skinwave.bodies import hands
 from skinwave.bodies.absorbing_layer import layer_drag, layer_of
 from skinwave.bodies.build import build, operators

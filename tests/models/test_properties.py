@@ -11,16 +11,24 @@ from hypothesis import strategies as st
 import fem
 import meshes
 from meshes import TetMesh
-from simple_model import MovingPressure, Rhythm, Signal, Tacton, Trajectory, flat_body
-from simple_model.compliance import half_space, slab
-from simple_model.drive import DRIVES
-from simple_model.flat_body import steady_lines
-from simple_model.focus import FOCI
-from simple_model.load_spectrum import load_lines, reduced_lines
-from simple_model.path_cells import path_fourier, path_samples
-from simple_model.rhythm import ROLES
-from simple_model.tacton import SHARINGS
-from simple_model.trajectory import SHAPES, SWEEPS
+from simple_model import (
+    DRIVES,
+    SHAPES,
+    MovingPressure,
+    Rhythm,
+    Signal,
+    Tacton,
+    Trajectory,
+    flat_body,
+)
+from simple_model.layers.compliance import half_space, slab
+from simple_model.layers.flat_body import steady_lines
+from simple_model.load.focus import FOCI
+from simple_model.load.path_cells import path_fourier, path_samples
+from simple_model.load.rhythm import ROLES
+from simple_model.load.spectrum import load_lines, reduced_lines
+from simple_model.load.tacton import SHARINGS
+from simple_model.load.trajectory import SWEEPS
 from skinwave import BODIES, Body, Scene, SkinwaveWarning, dumps, loads
 from skinwave.bodies.supports import CONDITIONS
 from skinwave.models import named, names

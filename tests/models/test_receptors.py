@@ -11,10 +11,10 @@ from test_stress import boussinesq
 
 from fem.coat import Coat
 from simple_model import lines
-from simple_model.focus import spot_width
-from simple_model.material import PRESETS
+from simple_model.layers.material import PRESETS
+from simple_model.layers.tensors import energy_root, largest_shear, von_mises
+from simple_model.load.focus import spot_width
 from simple_model.quantities import QUANTITIES, Quantity, register
-from simple_model.tensors import energy_root, largest_shear, von_mises
 from skinwave.bodies.parts import Layer
 from skinwave.commands.cli import main
 from skinwave.models import named

@@ -241,7 +241,12 @@ def test_a_banner_shows_the_worst_of_sentences_that_differ_by_numbers():
 
 def test_deprecations_are_errors_where_they_are_ours():
     """Deprecations between other packages are theirs to mend."""
-    for module in ("fem", "meshes.files.mesh_files", "simple_model.drive", "skinwave.live.serve"):
+    for module in (
+        "fem",
+        "meshes.files.mesh_files",
+        "simple_model.load.drive",
+        "skinwave.live.serve",
+    ):
         for kind in (DeprecationWarning, PendingDeprecationWarning):
             with pytest.raises(kind):
                 warnings.warn_explicit("old", kind, "file.py", 1, module=module)

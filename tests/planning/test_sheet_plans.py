@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import fem.reduced
-from simple_model import MovingPressure, Tacton, Trajectory, from_young
-from simple_model.drive import DRIVES
-from simple_model.plate_modes import plate_modes
+from simple_model import DRIVES, MovingPressure, Tacton, Trajectory, from_young
+from simple_model.plates.modes import plate_modes
 from skinwave import plan
 from skinwave.bodies.mounting import Mounting
 from skinwave.inference.design import hypercube

@@ -22,9 +22,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
 from fem import PRESETS
-from simple_model import MovingPressure, Tacton, Trajectory, published
-from simple_model.flat_body import steady_lines
-from simple_model.tacton import pattern_period
+from simple_model import MovingPressure, Tacton, Trajectory, pattern_period, published
+from simple_model.layers.flat_body import steady_lines
 from skinwave.bodies.analytic import compliance
 from skinwave.commands.cli import main
 from skinwave.models import speeds

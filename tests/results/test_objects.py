@@ -20,7 +20,7 @@ from legible import illegible, sizes, texts
 import meshes
 import skinwave
 from simple_model import Effort, Response, phasors
-from simple_model.focus import spot_width
+from simple_model.load.focus import spot_width
 from simple_model.numbers import stated_error
 from skinwave.commands.cli import main
 from skinwave.models import BUILT_IN, named

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simple_model import MovingPressure, Response, Tacton, Trajectory, phasors
-from simple_model.load_spectrum import load_lines
+from simple_model.load.spectrum import load_lines
 from skinwave.planning.simulate import compute, simulate
 from skinwave.results.claims import evaluate
 from skinwave.results.comparison import compare

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simple_model import MovingPressure, Tacton, Trajectory
-from simple_model.load_spectrum import load_lines
-from simple_model.response import phasors
+from simple_model import MovingPressure, Tacton, Trajectory, phasors
+from simple_model.load.spectrum import load_lines
 from skinwave import Body, Scene
 from skinwave.commands.cli import main
 from skinwave.planning.simulate import compute

@@ -12,11 +12,11 @@ from fem.line_basis import line_errors
 from fem.load_and_probe import facet_normals, load_operator, traction_operator
 from meshes import block
 from simple_model import Material, MovingPressure, Stack, Tacton, Trajectory
-from simple_model.flat_quantities import traction_field
-from simple_model.load_spectrum import pressure_lines, synthesise
+from simple_model.layers.flat_quantities import traction_field
+from simple_model.layers.wavenumber_integral import point_integrals
+from simple_model.load.spectrum import pressure_lines, synthesise
 from simple_model.quantities import DISPLACEMENT
 from simple_model.response import fit_lines
-from simple_model.wavenumber_integral import point_integrals
 from skinwave import Body, dumps, loads
 from skinwave.bodies.build import build, operators
 from skinwave.live.values import values_of

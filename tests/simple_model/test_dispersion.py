@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from legible import illegible, sizes, texts
 
-from simple_model.compliance import half_space, layered, slab, thin_sheet
-from simple_model.dispersion import dispersion_curves
-from simple_model.layers import Stack
-from simple_model.material import PRESETS, Material
-from simple_model.sheet_modes import sheet_curves
-from simple_model.wavenumber_integral import point_response
+from simple_model import Material, Stack
+from simple_model.layers.compliance import half_space, layered, slab, thin_sheet
+from simple_model.layers.dispersion import dispersion_curves
+from simple_model.layers.material import PRESETS
+from simple_model.layers.wavenumber_integral import point_response
+from simple_model.plates.sheet_waves import sheet_curves
 from skinwave.report.dispersion import dispersion_figure
 from skinwave.report.styles import STYLES, style
 from skinwave.studies.driven_modes import driven_modes

@@ -17,16 +17,16 @@ from simple_model import (
     point_kernel,
     steady_state,
 )
-from simple_model.compliance import slab
-from simple_model.flat_body import steady_lines
-from simple_model.flat_quantities import from_rest, steady, surface_field
-from simple_model.focus import spot_width
-from simple_model.load_spectrum import load_lines, pressure_lines, synthesise
-from simple_model.material import PRESETS
-from simple_model.path_cells import path_fourier, path_samples
+from simple_model.layers.compliance import slab
+from simple_model.layers.flat_body import steady_lines
+from simple_model.layers.flat_quantities import from_rest, steady, surface_field
+from simple_model.layers.material import PRESETS
+from simple_model.layers.wavenumber_integral import point_response
+from simple_model.load.focus import spot_width
+from simple_model.load.path_cells import path_fourier, path_samples
+from simple_model.load.sampling import resolving_step
+from simple_model.load.spectrum import load_lines, pressure_lines, synthesise
 from simple_model.quantities import ACCELERATION, DISPLACEMENT, VELOCITY
-from simple_model.sampling import resolving_step
-from simple_model.wavenumber_integral import point_response
 from skinwave import Body, Scene
 from skinwave.bodies import BODIES
 from skinwave.models import stretching

@@ -7,11 +7,11 @@ import pytest
 from scipy.integrate import quad_vec
 from scipy.special import j0
 
-from simple_model import MovingPressure, Tacton, Trajectory, flat_body, point_kernel
-from simple_model.compliance import half_space, slab, thin_sheet
-from simple_model.flat_body import steady_lines
-from simple_model.material import PRESETS, Material
-from simple_model.wavenumber_integral import point_response
+from simple_model import Material, MovingPressure, Tacton, Trajectory, flat_body, point_kernel
+from simple_model.layers.compliance import half_space, slab, thin_sheet
+from simple_model.layers.flat_body import steady_lines
+from simple_model.layers.material import PRESETS
+from simple_model.layers.wavenumber_integral import point_response
 
 FOREARM = {"density": 1000, "shear_modulus": 7.86e3, "viscosity": 5.03}
 PAPER = thin_sheet(PRESETS["paper"], 1e-4)
@@ -115,8 +115,8 @@ def test_flat_bodies_take_a_gaussian_focus_only():
 
 
 def test_load_lines_add_up_to_the_load():
-    from simple_model.load_spectrum import load_lines
-    from simple_model.path_cells import path_fourier, path_samples
+    from simple_model.load.path_cells import path_fourier, path_samples
+    from simple_model.load.spectrum import load_lines
 
     load = circling(0.02, 12, am=140, drive="pressure_squared")
     points, times = np.array([[0.01, 0.0], [0.0, 0.004]]), np.arange(300) / 1e4

@@ -18,11 +18,11 @@ from simple_model import (
     named_lines,
     point_kernel,
 )
-from simple_model.compliance import half_space
-from simple_model.joined import parted
-from simple_model.load_spectrum import load_lines
-from simple_model.material import PRESETS
-from simple_model.path_cells import path_fourier, path_samples
+from simple_model.layers.compliance import half_space
+from simple_model.layers.material import PRESETS
+from simple_model.load.joined import parted
+from simple_model.load.path_cells import path_fourier, path_samples
+from simple_model.load.spectrum import load_lines
 from skinwave.models.speeds import period
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads

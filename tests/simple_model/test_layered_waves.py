@@ -20,15 +20,15 @@ from simple_model import (
     steady_motion,
     timed_path,
 )
-from simple_model.compliance import Compliance, half_space, layered, slab, thin_sheet
-from simple_model.flat_body import steady_lines
-from simple_model.flat_motion import point_motion
-from simple_model.flat_quantities import from_rest, quantity_field
-from simple_model.layered import transfer
-from simple_model.load_spectrum import load_lines
-from simple_model.material import PRESETS
+from simple_model.layers.compliance import Compliance, half_space, layered, slab, thin_sheet
+from simple_model.layers.flat_body import steady_lines
+from simple_model.layers.flat_motion import point_motion
+from simple_model.layers.flat_quantities import from_rest, quantity_field
+from simple_model.layers.layered import transfer
+from simple_model.layers.material import PRESETS
+from simple_model.layers.wavenumber_integral import point_response
+from simple_model.load.spectrum import load_lines
 from simple_model.quantities import quantity
-from simple_model.wavenumber_integral import point_response
 
 WIDTH = 4.35e-3
 RADII = np.arange(5) * 5e-3

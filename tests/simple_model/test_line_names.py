@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simple_model import (
+    DRIVES,
     SUPERPOSITIONS,
     MovingPressure,
     Response,
@@ -22,9 +23,8 @@ from simple_model import (
     resolved_lines,
     sensation_level,
 )
-from simple_model.drive import DRIVES
-from simple_model.line_names import SYMBOLS, line_frequency, line_name, line_names, symbols
 from simple_model.line_table import FREE, UNNAMED, UNRESOLVED
+from simple_model.load.line_names import SYMBOLS, line_frequency, line_name, line_names, symbols
 from simple_model.response import SETTLE, fit_lines
 from skinwave.planning.simulate import compute
 from skinwave.results.files import line_rows

@@ -21,16 +21,18 @@ from simple_model import (
     Tacton,
     Trajectory,
     fit_prony,
+    flat_body,
     modulus_table,
     of_law,
+    steady_state,
     tabulated,
 )
-from simple_model.compliance import half_space, slab
-from simple_model.flat_body import flat_body, steady_lines, steady_state
-from simple_model.focus import spot_width
-from simple_model.load_spectrum import load_lines
-from simple_model.material import PRESETS
-from simple_model.wavenumber_integral import point_response
+from simple_model.layers.compliance import half_space, slab
+from simple_model.layers.flat_body import steady_lines
+from simple_model.layers.material import PRESETS
+from simple_model.layers.wavenumber_integral import point_response
+from simple_model.load.focus import spot_width
+from simple_model.load.spectrum import load_lines
 from skinwave.bodies.analytic import compliance
 from skinwave.models.laws import relaxing
 from skinwave.planning.simulate import compute

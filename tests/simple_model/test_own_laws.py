@@ -21,6 +21,7 @@ from simple_model import (
     Tacton,
     Trajectory,
     arc_path,
+    flat_body,
     focal_spot,
     named_lines,
     point_kernel,
@@ -29,10 +30,9 @@ from simple_model import (
     tabulated,
     timed_path,
 )
-from simple_model.compliance import slab
-from simple_model.flat_body import flat_body
-from simple_model.load_spectrum import load_lines
-from simple_model.sampling import highest
+from simple_model.layers.compliance import slab
+from simple_model.load.sampling import highest
+from simple_model.load.spectrum import load_lines
 from skinwave.patterns import waveform
 from skinwave.patterns.pattern import Options
 from skinwave.planning.simulate import compute

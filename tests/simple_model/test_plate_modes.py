@@ -7,15 +7,14 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 from scipy.sparse.linalg import eigsh
 
-from simple_model import MovingPressure, Tacton, Trajectory
-from simple_model.constant_loss import constant_loss
-from simple_model.free_modes import free_modes
-from simple_model.load_spectrum import load_lines, reduced_lines
-from simple_model.material import Material, PronyTerm
-from simple_model.plate_air import air_mass
-from simple_model.plate_modes import Plate, plate_modes, steady_response
-from simple_model.plate_response import modal_path_forces, plate_lines
-from simple_model.polynomials import line_basis, piecewise_basis
+from simple_model import Material, MovingPressure, PronyTerm, Tacton, Trajectory
+from simple_model.layers.constant_loss import constant_loss
+from simple_model.load.spectrum import load_lines, reduced_lines
+from simple_model.plates.air import air_mass
+from simple_model.plates.free_modes import free_modes
+from simple_model.plates.modes import Plate, plate_modes, steady_response
+from simple_model.plates.path_forces import modal_path_forces, plate_lines
+from simple_model.plates.polynomials import line_basis, piecewise_basis
 
 D, MASS, SIDE = 3.66e-4, 0.08, 0.1  # N m, kg/m2, m
 

@@ -12,16 +12,16 @@ from simple_model import (
     Tacton,
     Trajectory,
     commanded,
+    flat_body,
     line_table,
     lines,
     named_lines,
     point_kernel,
 )
-from simple_model.compliance import half_space
-from simple_model.flat_body import flat_body
-from simple_model.load_spectrum import load_lines, pressure_lines, synthesise
-from simple_model.material import PRESETS
-from simple_model.path_cells import path_fourier, path_samples
+from simple_model.layers.compliance import half_space
+from simple_model.layers.material import PRESETS
+from simple_model.load.path_cells import path_fourier, path_samples
+from simple_model.load.spectrum import load_lines, pressure_lines, synthesise
 from skinwave import Body, Scene, simulate
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute

@@ -13,10 +13,9 @@ import meshes
 import skinwave
 from fem.reduced_nonlinear import modal_elastic
 from meshes import cache
-from simple_model import MovingPressure, Tacton, Trajectory
-from simple_model.compliance import half_space, slab, thin_sheet
-from simple_model.load_spectrum import reduced_lines
-from simple_model.material import PronyTerm
+from simple_model import MovingPressure, PronyTerm, Tacton, Trajectory
+from simple_model.layers.compliance import half_space, slab, thin_sheet
+from simple_model.load.spectrum import reduced_lines
 from skinwave.bodies.analytic import compliance
 from skinwave.models.prepared import prepare
 from skinwave.planning.simulate import compute

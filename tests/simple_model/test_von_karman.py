@@ -10,17 +10,17 @@ import pytest
 from scipy.optimize import brentq
 
 from simple_model import MovingPressure, Tacton, Trajectory, from_young
-from simple_model.karman_motion import (
+from simple_model.load.spectrum import synthesise
+from simple_model.plates.karman_motion import (
     forced_motion,
     linear_motion,
     static_deflection,
     stretched_motion,
 )
-from simple_model.load_spectrum import synthesise
-from simple_model.plate_modes import Plate, plate_modes
-from simple_model.plate_response import plate_lines
-from simple_model.polynomials import continuous_basis
-from simple_model.von_karman import area_forces, karman_plate
+from simple_model.plates.modes import Plate, plate_modes
+from simple_model.plates.path_forces import plate_lines
+from simple_model.plates.polynomials import continuous_basis
+from simple_model.plates.von_karman import area_forces, karman_plate
 
 YOUNG, THICKNESS, SIDE, MASS = 4e9, 1e-4, 0.1, 0.08  # Pa, m, m, kg/m2
 FRAME = ("left", "right", "front", "back")

@@ -11,7 +11,9 @@ import pytest
 import fem
 import skinwave
 from simple_model import (
+    Material,
     MovingPressure,
+    PronyTerm,
     Response,
     Tacton,
     Trajectory,
@@ -19,7 +21,6 @@ from simple_model import (
     point_kernel,
     published,
 )
-from simple_model.material import Material, PronyTerm
 from skinwave.commands.cli import main
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from simple_model import Response
-from simple_model.drive import DRIVES
-from simple_model.plate_modes import plate_modes
+from simple_model import DRIVES, Response
+from simple_model.plates.modes import plate_modes
 from skinwave.commands.cli import main
 from skinwave.inference import (
     assess,

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import simple_model
 from simple_model import MovingPressure, Response, Rhythm, Signal, Tacton, Trajectory
 from skinwave.report.levels import sensation_levels
 from skinwave.results.claims import evaluate
@@ -86,12 +85,6 @@ def at_the_focus(seconds, **tacton):
     response = replace(one.response, times=times, values=motion)
     pressure = replace(one.scene.pressure, tacton=Tacton(duration=seconds, **tacton))
     return replace(one, scene=replace(one.scene, pressure=pressure), response=response)
-
-
-def test_a_name_of_the_last_release_loads_with_a_warning():
-    with pytest.warns(DeprecationWarning, match="is now simple_model.are_resolved"):
-        assert simple_model.told_apart is simple_model.are_resolved
-    assert not hasattr(simple_model, "nothing")
 
 
 def test_lines_that_cannot_be_resolved_are_not_reported():

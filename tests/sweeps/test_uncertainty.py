@@ -11,9 +11,9 @@ import pytest
 from scipy import stats
 
 from simple_model import Trajectory
-from simple_model.compliance import slab
-from simple_model.flat_body import steady_lines
-from simple_model.path_operator import path_operator
+from simple_model.layers.compliance import slab
+from simple_model.layers.flat_body import steady_lines
+from simple_model.layers.path_operator import path_operator
 from skinwave.commands.cli import main
 from skinwave.commands.common import note_central_values
 from skinwave.planning.budget import error_budget, mesh_row

@@ -9,7 +9,7 @@ import pytest
 from scipy.io import savemat
 from scipy.special import i0e
 
-from simple_model.focus import spot_width
+from simple_model.load.focus import spot_width
 from skinwave.commands.cli import main
 from skinwave.measure import skinsource
 from skinwave.verify import finger, zigzag

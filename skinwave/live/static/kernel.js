@@ -127,7 +127,7 @@ function pressureAt(load, x, y) {
   };
 }
 
-/** Highest line in Hz of a load at any place (simple_model.sampling); jumps have none. */
+/** Highest line in Hz of a load at any place (simple_model.load.sampling); jumps have none. */
 function highestLine(load) {
   const { path } = load, own = path.shape === "joined" ? path.paths : null;
   let speed = own ? Math.max(...own.map((each) => each.size * lengthPerSize(each) * path.drawn)) : path.speed;

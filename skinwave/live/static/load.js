@@ -14,7 +14,7 @@ const CORNERS = {
   square: [[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]],
 };
 
-// Force on a disc of 10 mm radius by height in mm, relative to 200 mm (simple_model.focus).
+// Force on a disc of 10 mm radius by height in mm, relative to 200 mm (simple_model.load.focus).
 const HEIGHTS = [20, 40, 60, 80, 100, 120, 150, 180, 200, 220, 250, 300, 350, 400, 500, 600];
 const FORCES = [0.2395, 0.4048, 0.5717, 0.6989, 0.785, 0.8502, 0.9319, 0.986, 1, 0.9963, 0.9634,
   0.8655, 0.7505, 0.6411, 0.4644, 0.3414];
@@ -362,7 +362,7 @@ export function loadLines(load, { threshold = 3e-4, lowest = 1e-6, highest = 100
   return { f, w, samples, parts: lines.map((line) => line.parts) };
 }
 
-/** Give the cells before and after each jump its moments (simple_model.path_cells). */
+/** Give the cells before and after each jump its moments (simple_model.load.path_cells). */
 function spreadJumps(path, cells) {
   const count = cells.length;
   for (const phase of jumpPhases(path)) {

@@ -16,7 +16,7 @@ const SYMBOLS = ["f_d", "f_AM", "f_AM2", "f_e", "f_r"];
 const SAME = 1e-3; // over the duration: lines as near to each other in Hz coincide
 const REPEATED = 1.5; // periods in the Tacton at least, to make lines
 const PULSED = 2 ** 14; // samples of a period of a rhythm
-const MOST_HARMONICS = 400, MOST_PRODUCTS = 4000; // as in simple_model.line_names
+const MOST_HARMONICS = 400, MOST_PRODUCTS = 4000; // as in simple_model.load.line_names
 const NEGLIGIBLE_LINE = 1e-3; // of the strongest in a table
 const MINOR = 0.05, FAINT = 0.02, ALIKE = 1e-3, WINDOW = 19, BINS = 2.5; // as in simple_model.response
 
@@ -276,7 +276,7 @@ function gainProducts(load, symbols, least) {
 
 /**
  * Lines of a load above a fraction of the strongest on the path, without the mean: [{name, f in Hz,
- * strength in Pa}], ascending, no two the same (simple_model.line_names).
+ * strength in Pa}], ascending, no two the same (simple_model.load.line_names).
  */
 export function lineNames(load, { threshold = 1e-3, most = 200, highest = Infinity } = {}) {
   const symbols = symbolsOf(load), same = SAME / load.duration, shares = pathShares(load, symbols, highest);

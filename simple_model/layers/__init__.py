@@ -1,0 +1,1 @@
+"""Material laws, and wavenumber integrals and dispersion curves of flat layers."""

@@ -1,0 +1,116 @@
+"""Surface compliance (Green's function) of laterally infinite bodies: u = G q at each wavenumber.
+
+Frequencies w are complex, in rad/s; time goes as exp(+i w t).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from math import inf
+
+import numpy as np
+
+from simple_model.layers.layered import clearance, surface_compliance
+from simple_model.layers.material import Material
+from simple_model.layers.stack import Stack
+from simple_model.typing import Complex
+
+
+@dataclass(frozen=True)
+class Compliance:
+    """Compliance G: (k, w) -> displacement into the body per pressure, m/Pa; k (k,) in 1/m, w
+    (f, 1) in rad/s.
+
+    At frequencies w (f,) no pole (wave) lies between the real axis of k and `clearance`, 1/m,
+    above it.
+    """
+
+    answer: Callable[[Complex, Complex], Complex]
+    clearance: Callable[[Complex], float] = lambda w: inf
+
+    def __call__(self, k: Complex, w: Complex) -> Complex:
+        """Compliance G at each k and w."""
+        return self.answer(k, w)
+
+
+AIR_DENSITY = 1.2  # kg/m3
+
+
+def layered(stack: Stack) -> Compliance:
+    """Stack of layers, by their stiffness matrices; a half-space alone by its closed form."""
+    if stack.thicknesses == (inf,):
+        return half_space(stack.materials[0])
+    return Compliance(partial(surface_compliance, stack), partial(clearance, stack))
+
+
+def slab(material: Material, depth: float) -> Compliance:
+    """Laterally infinite layer of `depth` metre bonded to a rigid base."""
+    return layered(Stack(materials=(material,), thicknesses=(depth,)))
+
+
+def half_space(material: Material, *, poisson: float | None = None) -> Compliance:
+    """Half-space: G = -b_p k_s^2 / (mu R), R = (2 k^2 - k_s^2)^2 - 4 k^2 b_p b_s, where k_s^2 is
+    divided out of both, so that it holds at rest, too; kappa = k_p^2 / k_s^2.
+
+    `poisson` stands in for the material's: here it may be 0.5, incompressible.
+    """
+    nu = material.poisson if poisson is None else poisson
+    kappa = (0.5 - nu) / (1 - nu)
+
+    def compliance(k: Complex, w: Complex) -> Complex:
+        mu = material.complex_modulus(w)
+        k2, ks2 = k**2, material.density * w**2 / mu
+        bp, bs = np.sqrt(k2 - kappa * ks2), np.sqrt(k2 - ks2)
+        apart = (k2 * (1 + kappa) - kappa * ks2) / (k2 + bp * bs)  # (k^2 - b_p b_s) / k_s^2
+        return np.asarray(bp / (mu * (4 * k2 * (1 - apart) - ks2)))
+
+    return Compliance(compliance)
+
+
+def thin_sheet(
+    material: Material,
+    thickness: float,
+    *,
+    air_density: float = AIR_DENSITY,
+    tension: float = 0.0,
+) -> Compliance:
+    """Infinite thin sheet: G = 1 / [D* k^4 + T k^2 - (m + 2 rho_air/k) w^2].
+
+    m = rho d, D* = mu* d^3 / 6 (1 - nu). The deflection of an infinite sheet under a static load
+    has no bound: motion is given about a mean that is left out, G = 0 at w = 0.
+
+    Parameters
+    ----------
+    material : Material
+    thickness : metre
+    air_density : kg/m3; 0 for vacuum
+    tension : N/m, the same in all directions
+
+    Returns
+    -------
+    Compliance, m/Pa
+    """
+    mass_per_area = material.density * thickness
+
+    def bending(w: Complex) -> Complex:
+        return np.asarray(material.complex_modulus(w) * thickness**3 / (6 * (1 - material.poisson)))
+
+    def compliance(k: Complex, w: Complex) -> Complex:
+        inertia = (mass_per_area + 2 * air_density / k) * w**2
+        return np.where(w == 0, 0, 1 / (bending(w) * k**4 + tension * k**2 - inertia))
+
+    def clearance(w: Complex) -> float:
+        """Height above the real axis of the evanescent pole: D* k^5 + T k^3 - m w^2 k
+        - 2 rho_air w^2 = 0 in the first quadrant, at 90 degrees for a real w, but without tension
+        at 45 in vacuum and 36 in air for a w that is purely imaginary.
+        """
+        companion = np.zeros((len(w), 5, 5), np.complex128)
+        companion[:, range(1, 5), range(4)] = 1
+        companion[:, 0, 1] = -tension / bending(w)
+        companion[:, 0, 3] = mass_per_area * w**2 / bending(w)
+        companion[:, 0, 4] = 2 * air_density * w**2 / bending(w)
+        k = np.linalg.eigvals(companion)
+        still = (k.real > 0) & (k.imag > 0.1 * np.abs(k))
+        return float(k.imag[still].min(initial=inf))
+
+    return Compliance(compliance, clearance)

@@ -1,0 +1,329 @@
+"""Dispersion curves of laterally infinite bodies: wavenumbers of their modes at each frequency.
+
+A mode goes as exp(i (w t - k x)), with Im k <= 0: it decays away from its source, at x < 0. Phase
+speed is w / Re k, group speed 1 / Re(dk/dw), 1/e length 1 / |Im k|. Near a pole the compliance of
+the surface is G = R / (k^2 - k_m^2), so that a pressure of the transform S(k) on a spot moves the
+surface at a distance r from it by -(i/4) R S(k_m) H_0^(2)(k_m r) in this mode.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import hankel2e
+
+from simple_model.layers.half_space_below import modes_above_half_space, rayleigh_mode
+from simple_model.layers.mode_tracking import Found, between, merged, tracked
+from simple_model.layers.stack import Stack
+from simple_model.layers.thin_layers import eigenpairs, outgoing, pencil
+from simple_model.typing import Complex, Floats
+
+KINDS = ("propagating", "backward", "leaky", "evanescent")
+MOST = 6  # modes
+ROUNDS = 4  # of further frequencies between those that are asked for
+CANDIDATES = 3  # roots that are tracked over the modes that are kept
+FASTEST_DECAY = 2 / np.pi  # |Im k| / |Re k| of a wave that falls to 1/e in a quarter of its length
+SLOWEST_FLUX = 0.05  # of the phase speed: energy of a mode that moves no faster stays where it is
+DIFFERENCE = 1e-4  # of a frequency, for the derivative of a modulus
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Mode:
+    """A mode along frequency, NaN where it is not found.
+
+    Parameters
+    ----------
+    name : str
+    frequencies : (f,) float, Hz
+    wavenumbers : (f,) complex, 1/m, k of exp(i (w t - k x)), Im k <= 0; Re k < 0 of a backward wave
+    slowness : (f,) complex, s/m, dk/dw
+    residues : (f,) complex, 1/Pa/m, of the surface's compliance in k^2
+    kinds : (f,) str, each one of `KINDS`, or "" where it is not found
+    shapes : (f, d, 2) complex, displacement along x over i, and downwards, at the depths of the
+        curves, over the largest magnitude
+    """
+
+    name: str
+    frequencies: Floats
+    wavenumbers: Complex
+    slowness: Complex
+    residues: Complex
+    kinds: NDArray[np.str_]
+    shapes: Complex
+
+    @property
+    def phase_speed(self) -> Floats:
+        """Phase speed (f,) in m/s, of a backward wave too above 0."""
+        return 2 * np.pi * self.frequencies / np.abs(self.wavenumbers.real)
+
+    @property
+    def group_speed(self) -> Floats:
+        """Group speed 1 / Re dk/dw (f,) in m/s; NaN where the imaginary part of dk/dw is larger:
+        a packet changes its shape there before it moves on.
+        """
+        real, imaginary = self.slowness.real, self.slowness.imag
+        return np.where(np.abs(imaginary) > np.abs(real), np.nan, 1 / real)
+
+    @property
+    def decay_length(self) -> Floats:
+        """1/e length (f,) of the amplitude of a plane wave, metre; inf without loss."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(1 / np.abs(self.wavenumbers.imag))
+
+    @property
+    def is_wave(self) -> NDArray[np.bool_]:
+        """Whether it carries energy at each frequency (f,)."""
+        return np.asarray((self.kinds != "evanescent") & (self.kinds != ""))
+
+    @cached_property
+    def cut_on(self) -> float:
+        """Lowest frequency in Hz at which it carries energy: where k^2 crosses the imaginary axis,
+        by its cubic Hermite interpolant between the frequencies on either side; inf if nowhere.
+        """
+        if not self.is_wave.any():
+            return np.inf
+        first = int(np.argmax(self.is_wave))
+        f = self.frequencies
+        if first == 0 or not np.isfinite(self.wavenumbers[first - 1]):
+            return float(f[first])
+        fine = np.linspace(f[first - 1], f[first], 200)
+        squared = self.squared_at(fine).real
+        crossing = np.flatnonzero((squared[:-1] < 0) & (squared[1:] >= 0))
+        if not len(crossing):
+            return float(f[first])
+        k = crossing[-1]
+        return float(np.interp(0.0, squared[k : k + 2], fine[k : k + 2]))
+
+    def squared_at(self, frequencies: ArrayLike) -> Complex:
+        """Squared wavenumber (g,) in 1/m2 between the frequencies, in Hz, by cubic Hermite
+        interpolation: unlike k it is smooth at a cut-off.
+        """
+        f = np.asarray(frequencies, np.float64)
+        known = np.isfinite(self.wavenumbers)
+        if known.sum() < 2:
+            return np.full(f.shape, np.nan + 0j)
+        x, k = self.frequencies[known], self.wavenumbers[known]
+        slope = 4 * np.pi * k * self.slowness[known]
+        at = np.clip(np.searchsorted(x, f) - 1, 0, len(x) - 2)
+        h = x[at + 1] - x[at]
+        s = (f - x[at]) / h
+        low, high = k[at] ** 2, k[at + 1] ** 2
+        found = low * (1 + 2 * s) * (1 - s) ** 2 + high * (3 - 2 * s) * s**2
+        found = found + h * (slope[at] * s * (1 - s) ** 2 - slope[at + 1] * s**2 * (1 - s))
+        return np.asarray(np.where((f < x[0]) | (f > x[-1]), np.nan, found))
+
+    def amplitude(self, width: float, distance: float) -> Complex:
+        """Motion (f,) of the surface in m/Pa by this mode.
+
+        Parameters
+        ----------
+        width : metre, standard deviation of the Gaussian spot on which the pressure is, 1 Pa
+        distance : metre, from the middle of the spot
+
+        Returns
+        -------
+        (f,) complex, the mode's part of `flat_body.point_response` beyond the spot
+        """
+        # A backward wave goes outwards by its energy, and so is of the Hankel function at its k.
+        k = self.wavenumbers
+        spot = 2 * np.pi * width**2 * np.exp(-((k * width) ** 2) / 2)
+        wave = hankel2e(0, k * distance) * np.exp(-1j * k * distance)
+        return np.asarray(-0.25j * self.residues * spot * wave)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DispersionCurves:
+    """Modes of a body at frequencies (f,) in Hz, those first that carry energy at the lowest; their
+    shapes are at `depths` (d,) in metre below the surface.
+    """
+
+    frequencies: Floats
+    depths: Floats
+    modes: tuple[Mode, ...]
+
+
+def dispersion_curves(
+    stack: Stack, frequencies: ArrayLike, *, most: int = MOST
+) -> DispersionCurves:
+    """Dispersion curves of a stack of layers.
+
+    Finite stacks by the thin-layer method; of layers on a half-space its roots with a perfectly
+    matched layer, refined on the exact stiffness of the half-space, by which those of the radiating
+    continuum are left out; of a half-space alone the Rayleigh wave, a closed form.
+
+    Parameters
+    ----------
+    stack : Stack
+    frequencies : (f,) float, Hz, above 0 and ascending
+    most : how many modes, the least evanescent
+
+    Returns
+    -------
+    DispersionCurves, with a mode at least
+
+    Raises
+    ------
+    ValueError
+        If frequencies are not above 0 and ascending, or layers are very many wavelengths thick.
+    """
+    f = checked_frequencies(frequencies)
+    omega = 2 * np.pi * f
+    if stack.is_half_space and len(stack.materials) == 1:
+        found, depths = rayleigh_mode(stack.materials[0], omega)
+        return curves(f, depths, found, ("Rayleigh wave",))
+    most_roots = CANDIDATES * most
+    fine, (found, depths) = omega, _roots(stack, omega, most_roots)
+    for _ in range(ROUNDS):
+        is_bound = np.abs(found.wavenumbers.real) > _leaking(stack, fine)[:, None]
+        is_wave = is_bound & ~_is_evanescent(found.wavenumbers)
+        further = between(found, fine, is_wave, most)
+        if not len(further):
+            break
+        # Layers are cut, and depths are taken, for the ends of the band.
+        other, _ = _roots(stack, np.concatenate([omega[:1], further, omega[-1:]]), most_roots)
+        inner = Found(**{name: values[1:-1] for name, values in vars(other).items()})
+        found, fine = merged(found, fine, inner, further)
+    found = tracked(found, fine, most, np.searchsorted(fine, omega))
+    return curves(f, depths, found, (), _leaking(stack, omega) if stack.is_half_space else None)
+
+
+def _leaking(stack: Stack, omega: Floats) -> Floats:
+    """Wavenumber (f,) in 1/m below which waves leak into the half-space of a stack; 0 without."""
+    if not stack.is_half_space:
+        return np.zeros(len(omega))
+    below = stack.materials[-1]
+    return np.asarray((omega * np.sqrt(below.density / below.complex_modulus(omega))).real)
+
+
+def _roots(stack: Stack, omega: Floats, most: int) -> tuple[Found, Floats]:
+    """Roots of a stack at frequencies (f,) in rad/s, so many of each, and depths of shapes."""
+    moduli, slopes = modulus_and_slope(stack, omega)
+    solve = modes_above_half_space if stack.is_half_space else _finite
+    return solve(stack, omega, moduli, slopes, most)
+
+
+def _is_evanescent(wavenumbers: Complex) -> NDArray[np.bool_]:
+    return np.asarray(np.abs(wavenumbers.imag) > FASTEST_DECAY * np.abs(wavenumbers.real))
+
+
+def checked_frequencies(frequencies: ArrayLike) -> Floats:
+    """Frequencies (f,) in Hz; a ValueError unless they are finite, above 0 and ascending."""
+    f = np.atleast_1d(np.asarray(frequencies, np.float64))
+    if (
+        f.ndim != 1
+        or not len(f)
+        or not (np.isfinite(f).all() and (np.diff(f, prepend=0) > 0).all())
+    ):
+        raise ValueError(
+            "frequencies of dispersion curves must be finite, above 0 Hz and ascending; "
+            "give one or more"
+        )
+    return f
+
+
+def modulus_and_slope(stack: Stack, omega: Floats) -> tuple[Complex, Complex]:
+    """Shear moduli (f, l) of the layers in Pa, and their derivatives in Pa s at (f,) in rad/s."""
+    at = omega[:, None] * np.array([1.0, 1 - DIFFERENCE, 1 + DIFFERENCE])
+    mu = [np.broadcast_to(m.complex_modulus(at), at.shape) for m in stack.materials]
+    values = np.stack(mu, axis=1).astype(np.complex128)
+    step = 2 * DIFFERENCE * omega[:, None]
+    return values[..., 0], (values[..., 2] - values[..., 1]) / step
+
+
+def _without_springs(stack: Stack) -> Stack:
+    """The stack with a free base for an elastic one, whose stiffness is the same at all
+    frequencies.
+    """
+    return replace(stack, base="free", base_stiffness=0.0) if stack.base_stiffness else stack
+
+
+def _finite(
+    stack: Stack, omega: Floats, moduli: Complex, slopes: Complex, most: int
+) -> tuple[Found, Floats]:
+    """The least evanescent roots of a finite stack, and the depths of their shapes."""
+    of, change = pencil(stack, omega, moduli), pencil(_without_springs(stack), omega, slopes)
+    squared, V, W = eigenpairs(of, omega)
+    order = np.argsort(np.abs(np.sqrt(squared).imag), axis=1)[:, :most]
+    squared = np.take_along_axis(squared, order, axis=1)
+    V, W = (np.take_along_axis(x, order[:, None], axis=2) for x in (V, W))
+
+    def form(left: Complex, matrix: Complex, right: Complex) -> Complex:
+        return np.asarray(np.einsum("fam,fab,fbm->fm", left, matrix, right, optimize=True))
+
+    def diagonal(left: Complex, matrix: Complex, right: Complex) -> Complex:
+        return np.asarray(np.einsum("fam,fa,fam->fm", left, matrix, right))
+
+    # Left eigenvectors are (V, k^2 W); the derivative of the linear pencil in k^2, then in w.
+    norm = form(V, of.Auu, V) + form(V, of.Buw, W) + squared * diagonal(W, of.Aww, W)
+    by_frequency = squared * (
+        form(V, change.Auu, V) + 2 * form(V, change.Buw, W) + form(W, change.Gww, W)
+        + squared * diagonal(W, change.Aww, W)
+    ) + form(V, change.Guu, V) - 2 * omega[:, None] * (
+        diagonal(V, of.M, V) + squared * diagonal(W, of.M, W)
+    )  # fmt: skip
+    slope = -by_frequency / norm
+    k = outgoing(squared, slope)
+    U = V / k[:, None]
+    carried = form(U.conj(), of.traction, W) + form(
+        W.conj(), (of.Buw - of.traction).swapaxes(1, 2), U)  # fmt: skip
+    carried += k * (form(U.conj(), of.Auu, U) + diagonal(W.conj(), of.Aww, W))
+    stored = omega[:, None] * sum(diagonal(x.conj(), of.M, x) for x in (U, W))
+    shapes = np.zeros((*k.shape, len(of.depths), 2), np.complex128)
+    for axis, x in enumerate((U, W)):
+        shapes[:, :, : x.shape[1], axis] = x.swapaxes(1, 2)
+    found = Found(
+        squared=squared, slope=slope, wavenumbers=k, residues=squared * W[:, 0] ** 2 / norm,
+        energy_speed=np.abs(carried.real / stored.real), shapes=shapes,
+    )  # fmt: skip
+    return found, of.depths
+
+
+def curves(
+    frequencies: Floats,
+    depths: Floats,
+    found: Found,
+    names: tuple[str, ...] = (),
+    bound: Floats | None = None,
+) -> DispersionCurves:
+    """Curves of tracked modes.
+
+    Parameters
+    ----------
+    frequencies : (f,) float, Hz
+    depths : (d,) float, metre
+    found : Found, of each mode at each frequency
+    names : of the modes, numbers in the order of their cut-on if there are none
+    bound : (f,) float, 1/m, wavenumber of the shear wave of a half-space below, into which waves
+        of smaller wavenumber leak; None without one
+
+    Returns
+    -------
+    DispersionCurves
+    """
+    k = found.wavenumbers
+    known = np.isfinite(k)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        omega = 2 * np.pi * frequencies[:, None]
+        decays = _is_evanescent(k)
+        stays = found.energy_speed < SLOWEST_FLUX * omega / np.abs(k.real)
+        leaks = np.zeros(k.shape, bool) if bound is None else np.abs(k.real) < bound[:, None]
+        kinds = np.select(
+            [~known, decays | stays, leaks, k.real < 0],
+            ["", "evanescent", "leaky", "backward"], "propagating",
+        )  # fmt: skip
+        largest = np.abs(found.shapes).max(axis=(2, 3), keepdims=True)
+        shapes = found.shapes / np.where(largest > 0, largest, 1.0)
+        slowness = found.slope / (2 * k)
+    modes = [
+        Mode(
+            name=names[m] if names else "", frequencies=frequencies, wavenumbers=k[:, m],
+            slowness=slowness[:, m], residues=found.residues[:, m], kinds=kinds[:, m],
+            shapes=shapes[:, m],
+        )
+        for m in range(k.shape[1])
+    ]  # fmt: skip
+    if not names:
+        modes.sort(key=lambda mode: (mode.cut_on, -np.nanmax(mode.wavenumbers.imag)))
+        modes = [replace(mode, name=f"mode {n}") for n, mode in enumerate(modes, start=1)]
+    return DispersionCurves(frequencies=frequencies, depths=depths, modes=tuple(modes))

@@ -1,0 +1,385 @@
+"""Wavenumber-integral solution, without a mesh, for layers, a half-space or a thin sheet, all
+laterally infinite, under a moving focus.
+
+Where a focal spot at rest displaces a point by g(x, w) (`wavenumber_integral`; time exp(+i w t)), a
+focus that runs a closed path at f_d = 1/T, x(t) = X(f_d t), moves a probe by
+
+    u(w) = sum_n h_n(w) Q(w - 2 pi n f_d),   h_n = int_0^1 g(x_p - X(a), w) exp(-2 pi i n a) da
+
+where Q is the transform of the pressure at the focus. With splines B_j(r) that interpolate g(r, w)
+= sum_j g_j(w) B_j(r), the path and the probes are apart from the body: in the steady state
+
+    h_n = sum_j g_j(w) int_0^1 B_j(|x_p - X(a)|) exp(-2 pi i n a) da
+
+and from rest
+
+    u(w) = sum_j g_j(w) int_0^inf q(t) B_j(|x_p - x(t)|) exp(-i w t) dt
+
+Displacement normal to the surface is one component, g(r) itself. A `Field` has m, each a sum of
+integrals times weights that depend on x_p - x.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.fft import next_fast_len, rfft
+from scipy.special import erfc
+
+from simple_model.layers.compliance import Compliance
+from simple_model.layers.wavenumber_integral import Field, normal_field, point_integrals
+from simple_model.load.focus import gaussian_width
+from simple_model.load.path_cells import cells, jump_times, moved_load, path_fourier, path_samples
+from simple_model.load.pressure import MovingPressure, check_lines
+from simple_model.load.sampling import below_half_the_rate, finer, is_folded, reached, step
+from simple_model.load.spectrum import load_lines, synthesise
+from simple_model.response import Effort, Response
+from simple_model.typing import Complex, Floats
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
+
+PADDING = 2, 256  # the transform's samples for each of the record, and more: what wraps round is
+WRAPPED = 1e-5  # damped by this
+FINEST = 20_000.0  # Hz of its samples
+BAND_END = 3.0  # of the error function that ends its band from half the highest frequency on
+ABRUPT = 2  # samples of a load that jumps, or turns, in each of these
+ENDING = 6.0  # of the error function that ends a load after the record
+FEW_DISTANCES = 40  # are integrated one by one, without a spline
+AT_ONCE = 2**22  # values that are transformed at a time, some hundred megabytes
+STEPS_PER_WIDTH = 6  # distances of a spline in a standard deviation of the focal spot
+FEWEST_STEPS = 8  # of them
+ANYWHERE = np.array([[1.0, 0.3], [0.2, 1.0], [-0.7, 0.4]])  # of no symmetry
+NEGLIGIBLE = 1e-4  # of the largest response, where a transient stops looking at frequencies
+
+Splines = Callable[[Floats], Floats]
+
+
+def steady_lines(
+    compliance: Compliance, pressure: MovingPressure, probes: ArrayLike, *, threshold: float = 1e-6
+) -> tuple[Floats, Complex]:
+    """Steady-state lines, by wavenumber integrals.
+
+    Parameters
+    ----------
+    compliance : Compliance
+    pressure : MovingPressure, with a Gaussian focus
+    probes : (p, 2) float, metre; may be a whole map
+    threshold : of the strongest line of the load; only its lines above this are computed
+
+    Returns
+    -------
+    frequencies (f,) in Hz >= 0 and complex amplitudes a (f, p) in metre of Re a exp(2 pi i f t)
+
+    Raises
+    ------
+    ValueError
+        If the focus is not Gaussian, or as `pressure.check_lines` does.
+    """
+    f, amplitudes = field_lines(normal_field(compliance), pressure, probes, threshold=threshold)
+    return f, amplitudes[..., 0]
+
+
+def field_lines(
+    field: Field, pressure: MovingPressure, probes: ArrayLike, *, threshold: float = 1e-6
+) -> tuple[Floats, Complex]:
+    """Steady-state lines of all components of a field.
+
+    Parameters
+    ----------
+    field : Field
+    pressure, probes, threshold : as of `steady_lines`
+
+    Returns
+    -------
+    frequencies (f,) in Hz >= 0 and complex amplitudes a (f, p, m) of Re a exp(2 pi i f t)
+
+    Raises
+    ------
+    ValueError
+        As `steady_lines` does.
+    """
+    _check(pressure)
+    lines, probes = load_lines(pressure, threshold), np.atleast_2d(np.asarray(probes, np.float64))
+    f, which = np.unique(np.round(lines.frequencies, 9), return_inverse=True)
+    orders, order = np.unique(lines.harmonics, return_inverse=True)
+    knots, width = path_samples(pressure), _width(pressure)
+    table, splines = _interpolation(probes, knots, width)
+    g = point_integrals(field, table, 2 * np.pi * f, width)
+    amplitudes = np.zeros((len(f), len(probes), len(field.weights(ANYWHERE))), np.complex128)
+    count = min(len(probes), max(1, len(probes) * len(table) * len(knots) // AT_ONCE))
+    for some in np.array_split(np.arange(len(probes)), count):
+        carried = carriers(field, splines, probes[some, None] - knots)
+        h = path_fourier(pressure, carried, orders)
+        for line, (k, n) in enumerate(zip(which, order, strict=True)):
+            moved = np.einsum("cj,mcjp->pm", g[:, k], h[..., n])
+            amplitudes[k, some] += lines.coefficients[line] * moved
+    return f, amplitudes
+
+
+def carriers(field: Field, splines: Splines, away: Floats) -> Floats:
+    """Splines with the weights of a field.
+
+    Parameters
+    ----------
+    field : Field
+    splines : from distances (...) to (..., j)
+    away : (..., q, 2) float, metre, offsets of probes from positions of a focus
+
+    Returns
+    -------
+    (m, c, j, ..., q) float: components are these times the integrals (c, j), in sum over both
+    """
+    of_distance = np.moveaxis(splines(np.linalg.norm(away, axis=-1)), -1, 0)
+    return np.asarray(field.weights(away)[:, :, None] * of_distance)
+
+
+def sampled_lines(
+    field: Field, pressure: MovingPressure, probes: ArrayLike, times: Floats
+) -> tuple[Floats, Complex]:
+    """Lines of `field_lines` that samples at some times can show.
+
+    Parameters
+    ----------
+    field, pressure, probes : as of `field_lines`, with its errors
+    times : (t,) float, s, equally spaced
+
+    Returns
+    -------
+    frequencies (f,) in Hz >= 0 and complex amplitudes a (f, p, m)
+    """
+    f, a = field_lines(field, pressure, probes)
+    below = below_half_the_rate(f, times)
+    return f[below], a[below]
+
+
+def steady_state(
+    compliance: Compliance, pressure: MovingPressure, probes: ArrayLike, times: Floats
+) -> Response:
+    """Steady state, as if the load had always been there: its lines below half the sampling rate.
+
+    That is `flat_body` without its initial transient, for a twentieth of the time.
+
+    Parameters
+    ----------
+    compliance : Compliance
+    pressure : MovingPressure, with a Gaussian focus
+    probes : (p, 2) float, metre
+    times : (t,) float, s, equally spaced
+
+    Returns
+    -------
+    Response, displacement (t, p) in metre
+
+    Raises
+    ------
+    ValueError
+        As `steady_lines` does.
+    """
+    started = time.perf_counter()
+    probes = np.atleast_2d(np.array(probes, np.float64))
+    times = np.array(times)
+    f, a = sampled_lines(normal_field(compliance), pressure, probes, times)
+    found = synthesise(f, a[..., 0], times)
+    return _timed("flat-body-harmonic", started, times, probes, found, steps=len(f), dofs=len(f))
+
+
+def flat_body(
+    compliance: Compliance, pressure: MovingPressure, probes: ArrayLike, times: Floats
+) -> Response:
+    """Motion of probes from rest.
+
+    By FFT over twice the duration with exponential damping, which reduces the wrap-around to 1e-5.
+    The load goes on after the record and ends smoothly. Its lines above half the sampling rate are
+    left out. The rest position is that before the load: the deflection of an infinite sheet under a
+    load with non-zero mean grows without bound.
+
+    Parameters
+    ----------
+    compliance : Compliance
+    pressure : MovingPressure, with a Gaussian focus
+    probes : (p, 2) float, metre
+    times : (t,) float, s, equally spaced
+
+    Returns
+    -------
+    Response, displacement (t, p) in metre
+
+    Raises
+    ------
+    ValueError
+        If the focus is not Gaussian, or as `pressure.check_lines` does.
+    """
+    started = time.perf_counter()
+    probes, times = np.atleast_2d(np.array(probes, np.float64)), np.array(times)
+    found = field_history(normal_field(compliance), pressure, probes, times)[..., 0]
+    effort = {"steps": len(times), "dofs": len(times) + 1}
+    return _timed("flat-body", started, times, probes, found, **effort)
+
+
+def field_history(
+    field: Field, pressure: MovingPressure, probes: ArrayLike, times: Floats
+) -> Floats:
+    """All components of a field from rest, as `flat_body` computes them.
+
+    Parameters
+    ----------
+    field : Field
+    pressure, probes, times : as of `flat_body`
+
+    Returns
+    -------
+    (t, p, m) float
+
+    Raises
+    ------
+    ValueError
+        As `flat_body` does.
+    """
+    _check(pressure)
+    probes = np.atleast_2d(np.asarray(probes, np.float64))
+    within = max(1, int(np.ceil(step(times) * FINEST - 1e-6)))
+    dt, n = step(times) / within, (len(times) - 1) * within + 1
+    padded = next_fast_len(PADDING[0] * n + PADDING[1], real=True)
+    damping = -np.log(WRAPPED) / (padded * dt)
+    w = 2 * np.pi * np.fft.rfftfreq(padded, dt) - 1j * damping
+    folded = is_folded(pressure, times)
+    if not folded and finer(reached(pressure), step(times)) > 1:
+        passed = below_half_the_rate(w.real / (2 * np.pi), times).astype(float)
+    else:  # a spectrum that ended at once would ring after the start of an acceleration
+        passed = erfc(BAND_END * (4 * w.real * dt / np.pi - 3)) / 2
+
+    def lasting(t: Floats) -> Floats:
+        """Factor of the load at times (t,) in s, with the damping of the transform."""
+        after = (t - n * dt) / ((padded - n) * dt)
+        ended = erfc(ENDING * (2 * after - 1)) / 2
+        return np.asarray(np.where(t < 0, 0.0, ended * np.exp(-damping * t)))
+
+    jumps = jump_times(pressure, 0.0, padded * dt)
+    parts = finer(reached(pressure), dt)
+    if folded:
+        knots, of_load = _low_passed(pressure, 0.5 / step(times), padded, dt, lasting)
+        parts = 1
+    else:
+        turns = len(pressure.tacton.trajectory.parts[1]) > 1
+        parts = max(parts, ABRUPT if len(jumps) or turns else 1)
+        knots, of_load = _as_it_is(pressure, jumps, padded, dt, parts, lasting)
+    table, splines = _interpolation(probes, knots, _width(pressure))
+    g = point_integrals(field, table, w, _width(pressure), negligible=NEGLIGIBLE)
+    u = np.zeros((len(w), len(probes), len(field.weights(ANYWHERE))), np.complex128)
+    for i, probe in enumerate(probes):
+        carried = carriers(field, splines, probe - knots)
+        for m, c in np.argwhere(field.weights(ANYWHERE).any(axis=-1)):
+            blocks = min(len(table), len(table) * padded * parts // AT_ONCE + 1)
+            for some in np.array_split(np.arange(len(table)), blocks):
+                x = of_load(carried[m, c, some].T)
+                transformed = rfft(x, axis=0)[: len(w)] / parts
+                u[:, i, m] += np.einsum("wj,wj->w", g[c][:, some], transformed)
+    t = dt * np.arange(n)[::within]
+    u *= passed[:, None, None]
+    return np.fft.irfft(u, padded, axis=0)[:n:within] * np.exp(damping * t[:, None, None])
+
+
+def _as_it_is(
+    pressure: MovingPressure, jumps: Floats, padded: int, dt: float, parts: int,
+    lasting: Callable[[Floats], Floats],
+) -> tuple[Floats, Callable[[Floats], Floats]]:  # fmt: skip
+    """Positions (q, 2) in metre of the foci, and the function from what a focus of unit pressure
+    does there (q, j) to what the load does (t, j), in samples of dt / parts from 0.
+    """
+    fine = dt / parts
+    at, shares = cells(np.append(jumps, 0.0), -fine / 2, fine, padded * parts)
+    gain = pressure.gain(np.maximum(at, 0.0)) * lasting(at)
+    knots, mixed = moved_load(pressure, at, gain)
+    return knots, (shares @ mixed).__matmul__
+
+
+def _low_passed(
+    pressure: MovingPressure, highest: float, padded: int, dt: float,
+    lasting: Callable[[Floats], Floats],
+) -> tuple[Floats, Callable[[Floats], Floats]]:  # fmt: skip
+    """The same in samples of dt, of the load's lines below a frequency in Hz alone."""
+    lines = load_lines(pressure)
+    below = lines.frequencies < highest
+    f, orders = lines.frequencies[below], lines.harmonics[below]
+    t = np.asarray(dt * np.arange(padded), np.float64)
+    window = lasting(t)
+    window[0] /= 2  # the load begins in the middle of a sample
+
+    def of_load(values: Floats) -> Floats:
+        amplitudes = lines.coefficients[below, None] * path_fourier(pressure, values.T, orders).T
+        return synthesise(f, amplitudes, t) * window[:, None]
+
+    return path_samples(pressure), of_load
+
+
+def _timed(
+    model: str, started: float, times: Floats, probes: Floats, displacement: Floats, **effort: int
+) -> Response:
+    """The response, with the seconds since its computation started."""
+    seconds = {"evaluate": time.perf_counter() - started}
+    return Response(
+        model=model,
+        times=times,
+        probes=probes,
+        values=displacement,
+        effort=Effort(seconds=seconds, **effort),  # type: ignore[arg-type]
+    )
+
+
+def distance_table(furthest: float, width: float) -> Floats:
+    """Distances (j,) in metre up to `furthest` to interpolate between: the response is as smooth as
+    the focal spot, of standard deviation `width` in metre.
+    """
+    steps = max(FEWEST_STEPS, int(np.ceil(furthest / width * STEPS_PER_WIDTH)))
+    return np.linspace(0, furthest, steps)
+
+
+def radial_spline(table: Floats, values: Complex | Floats, axis: int = 0) -> CubicSpline:
+    """Cubic spline through values at distances, flat at distance 0.
+
+    Parameters
+    ----------
+    table : (j,) float, metre, from 0
+    values : array of j along `axis`
+    axis : int
+
+    Returns
+    -------
+    CubicSpline of a distance (...), which replace that axis
+    """
+    from scipy.interpolate import CubicSpline  # which takes long to import
+
+    flat = (1, np.zeros(np.delete(values.shape, axis), values.dtype))
+    return CubicSpline(table, values, axis=axis, bc_type=(flat, "not-a-knot"))
+
+
+def _check(pressure: MovingPressure) -> None:
+    check_lines(pressure)
+    if gaussian_width(pressure.height, pressure.profile) is None:
+        raise ValueError(
+            f"focus '{pressure.profile_name}' has no flat-body solution; use 'gaussian'"
+        )
+
+
+def _width(pressure: MovingPressure) -> float:
+    """Standard deviation in metre of the focal spot, which `_check` has found to be Gaussian."""
+    width = gaussian_width(pressure.height, pressure.profile)
+    assert width is not None
+    return width
+
+
+def _interpolation(probes: Floats, knots: Floats, width: float) -> tuple[Floats, Splines]:
+    """Distances (j,) in metre to integrate at, and the function of distances (...) to the shares
+    (..., j) that interpolate between them: of few distances each one, between many splines.
+    """
+    if len(knots) * len(probes) <= FEW_DISTANCES:
+        unique = np.unique(np.linalg.norm(probes[:, None] - knots, axis=-1))
+        return unique, lambda r: (r[..., None] == unique).astype(float)
+    furthest = max(np.linalg.norm(probe - knots, axis=1).max() for probe in probes)
+    table = distance_table(furthest, width)
+    return table, radial_spline(table, np.eye(len(table)))

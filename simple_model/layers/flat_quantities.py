@@ -1,0 +1,184 @@
+"""Quantities of a stack of layers at any depth, by wavenumber integrals.
+
+Of the field of a surface pressure J0(kr) exp(i w t), u_r = U J1(kr), u_z = W J0(kr), sigma_zz =
+N J0(kr) and sigma_rz = T J1(kr), z downwards (`layered.transfer`), the strains are
+
+    (e_rr + e_tt)/2 = kU/2 J0,  (e_rr - e_tt)/2 = -kU/2 J2,  e_rz = T/(2 mu) J1,
+    e_zz = (N/mu - l kU)/(l + 2) J0,  l = lam/mu = 2 nu/(1 - 2 nu)
+
+The vertical strain is that of the traction: as a difference of displacements it would lose the
+dilatation of a nearly incompressible solid, and with it the pressure. Components are given along
+the axes of scenes, with z upwards.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from simple_model.layers.compliance import Compliance
+from simple_model.layers.flat_body import field_history, sampled_lines
+from simple_model.layers.flat_motion import motion_field
+from simple_model.layers.layered import clearance, transfer
+from simple_model.layers.material import Material
+from simple_model.layers.stack import Stack
+from simple_model.layers.wavenumber_integral import Field, normal_field
+from simple_model.load.pressure import MovingPressure
+from simple_model.load.spectrum import synthesise
+from simple_model.quantities import NORMAL, VECTOR, Quantity
+from simple_model.typing import Complex, Floats
+
+
+def strain_field(stack: Stack, depth: float = 0.0) -> Field:
+    """Strain xx, yy, zz, xy, xz, yz at a depth in metre, z upwards."""
+    moved, solid = transfer(stack, [depth]), material_at(stack, depth)
+    ratio = solid.first_lame / solid.shear_modulus
+
+    def answer(k: Complex, w: Complex) -> Complex:
+        U, _, N, T = moved(k, w)[:, 0]
+        mu = solid.complex_modulus(w)
+        vertical = (N / mu - ratio * k * U) / (ratio + 2)
+        return np.array([k * U / 2, vertical, -k * U / 2, T / (2 * mu)])
+
+    def weights(away: Floats) -> Floats:
+        x, y = np.moveaxis(away, -1, 0)
+        none, one, turned = np.zeros_like(x), np.ones_like(x), x**2 - y**2
+        return np.array(
+            [
+                [one, none, turned, none],
+                [one, none, -turned, none],
+                [none, one, none, none],
+                [none, none, 2 * x * y, none],
+                [none, none, none, -x],
+                [none, none, none, -y],
+            ]
+        )
+
+    return Field(
+        answer=answer, orders=(0, 0, 2, 1), clearance=lambda w: clearance(stack, w), weights=weights
+    )
+
+
+def material_at(stack: Stack, depth: float) -> Material:
+    """Material at a depth in metre; at an interface, the one below."""
+    bottoms = np.cumsum(stack.thicknesses)[:-1]
+    return stack.materials[int(np.searchsorted(bottoms, depth, side="right"))]
+
+
+def quantity_field(asked: Quantity, stack: Stack, depth: float = 0.0) -> Field:
+    """Components of a quantity at a depth of a stack.
+
+    Parameters
+    ----------
+    asked : Quantity
+    stack : Stack
+    depth : metre below the surface
+
+    Returns
+    -------
+    Field, of the components before any `invariant`
+
+    Raises
+    ------
+    ValueError
+        If the depth is outside the stack.
+    """
+    solid = material_at(stack, depth)
+    if asked.field in (NORMAL, VECTOR):
+        field = motion_field(stack, depth)
+        rows = np.diag([1.0, 1.0, -1.0]) if asked.field == VECTOR else np.eye(3)[[2]]
+    else:
+        field, rows = strain_field(stack, depth), np.eye(6)
+    rows = asked.rows(solid) @ rows
+    own = replace(field, weights=lambda away: np.tensordot(rows, field.weights(away), axes=1))
+    return _in_motion(asked, own, solid)
+
+
+def _in_motion(asked: Quantity, field: Field, solid: Material | None = None) -> Field:
+    """A field with the rate of a quantity, and the relaxation of stress in a material."""
+
+    def answer(k: Complex, w: Complex) -> Complex:
+        modulus = solid.complex_modulus(w) / solid.shear_modulus if solid else 1.0
+        found: Complex = field.answer(k, w) * asked.factor(1j * w, modulus)
+        return found
+
+    return replace(field, answer=answer) if asked.rate or asked.relaxes else field
+
+
+def surface_field(asked: Quantity, compliance: Compliance) -> Field:
+    """A quantity of the normal motion of any surface that has a compliance."""
+    return _in_motion(asked, normal_field(compliance))
+
+
+def traction_field(asked: Quantity, stack: Stack, direction: ArrayLike) -> Field:
+    """Normal motion of the surface under tractions of the focal spot's profile in one direction.
+
+    By reciprocity the vertical motion at x under a force along x' at 0 is the motion along x' at 0
+    under a vertical force at x, which is that of `motion_field`.
+
+    Parameters
+    ----------
+    asked : Quantity, of normal motion
+    stack : Stack
+    direction : (3,) float, unit vector, z upwards
+
+    Returns
+    -------
+    Field
+    """
+    along = np.asarray(direction, np.float64)
+    moved = motion_field(stack)
+
+    def weights(away: Floats) -> Floats:
+        beside = -(away @ along[:2])
+        return np.stack([beside, np.full_like(beside, -along[2])])[None]
+
+    return _in_motion(asked, replace(moved, weights=weights))
+
+
+def from_rest(
+    field: Field, asked: Quantity, pressure: MovingPressure, probes: ArrayLike, times: Floats
+) -> Floats:
+    """Waveforms of a quantity from rest.
+
+    Parameters
+    ----------
+    field : Field, of the quantity's components
+    asked : Quantity
+    pressure : MovingPressure, with a Gaussian focus
+    probes : (p, 2) float, metre
+    times : (t,) float, s, equally spaced
+
+    Returns
+    -------
+    (t, p) float, in the unit of the quantity
+
+    Raises
+    ------
+    ValueError
+        As `flat_body` does.
+    """
+    found = field_history(field, pressure, probes, times)
+    return asked.waveforms(found.reshape(len(found), -1), found.shape[1])
+
+
+def steady(
+    field: Field, asked: Quantity, pressure: MovingPressure, probes: ArrayLike, times: Floats
+) -> Floats:
+    """Waveforms of a quantity in the steady state.
+
+    Parameters
+    ----------
+    field, asked, pressure, probes, times : as of `from_rest`
+
+    Returns
+    -------
+    (t, p) float, in the unit of the quantity
+
+    Raises
+    ------
+    ValueError
+        As `steady_lines` does.
+    """
+    f, a = sampled_lines(field, pressure, probes, times)
+    return asked.waveforms(synthesise(f, a.reshape(len(f), -1), times), a.shape[1])

@@ -1,0 +1,394 @@
+"""Linear viscoelastic materials, of every model, and the presets that scenes name.
+
+The complex shear modulus (time exp(+i w t)) is
+
+    mu(w) = mu h(w) + i w viscosity + sum_j mu_j i w tau_j / (1 + i w tau_j)
+
+where h is 1, or with a loss factor that of `constant_loss`. With viscosity alone that is the
+Kelvin-Voigt model, with Prony terms a generalised Maxwell solid (Simo and Hughes, Computational
+Inelasticity (1998), chapter 10), with one of them the standard linear solid (C. Zener, Elasticity
+and Anelasticity of Metals, 1948): mu in slow and mu + sum mu_j in fast motion. A `law` replaces all
+of it, and models that need internal variables take its Prony series. Poisson's ratio is constant,
+so that the whole stiffness scales with mu; that of an orthotropic sheet is of its isotropic mean.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import isfinite, sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from simple_model.layers.constant_loss import LARGEST_LOSS_FACTOR, constant_loss
+from simple_model.layers.modulus_laws import FractionalKelvinVoigt, ModulusTable, ScaledLaw
+from simple_model.layers.orthotropy import Orthotropy
+from simple_model.layers.prony import FIT_TOLERANCE, ModulusLaw, PronySeries, PronyTerm, fit_prony
+from simple_model.typing import Floats
+
+
+@dataclass(frozen=True, kw_only=True)
+class Material:
+    """An isotropic solid; give `shear_modulus`, or build it with `from_young`, `of_law` or
+    `tabulated`, or that of a sheet with `orthotropic`.
+
+    Parameters
+    ----------
+    density : float, kg/m3
+    shear_modulus : float, Pa, at equilibrium: fully relaxed; with a loss factor, the storage
+        modulus at 150 Hz without viscosity and Prony terms
+    poisson : float, -1 < poisson < 0.5
+    viscosity : float, Pa s, Kelvin-Voigt: shear stress per shear rate
+    loss_factor : float, loss over storage modulus, nearly constant from 10 Hz to 2 kHz, as of
+        `constant_loss`
+    prony : Prony terms, each with the modulus that it adds in fast motion, and its time
+    law : angular frequencies (...) in rad/s -> complex shear moduli (...) in Pa, in place of all
+        other terms, or None: a record of `modulus_laws`, or any function that is analytic at
+        frequencies with imaginary part <= 0; `shear_modulus` is its value at rest
+    orthotropy : in-plane moduli of a sheet, whose isotropic mean has `shear_modulus` and `poisson`,
+        or None
+
+    Raises
+    ------
+    ValueError
+        If a value is not finite or outside these limits, or a law is given beside other losses or
+        an orthotropy.
+    """
+
+    density: float
+    shear_modulus: float
+    poisson: float
+    viscosity: float = 0.0
+    loss_factor: float = 0.0
+    prony: tuple[PronyTerm, ...] = ()
+    law: ModulusLaw | None = None
+    orthotropy: Orthotropy | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("density", "shear_modulus"):
+            value = getattr(self, name)
+            if not (isfinite(value) and value > 0):
+                raise ValueError(f"{name} = {value} must be a finite number above 0")
+        for name in ("viscosity", "loss_factor"):
+            value = getattr(self, name)
+            if not (isfinite(value) and value >= 0):
+                raise ValueError(f"{name} = {value} must be a finite number, 0 or above")
+        if self.loss_factor > LARGEST_LOSS_FACTOR:
+            raise ValueError(
+                f"loss_factor = {self.loss_factor:g} is above {LARGEST_LOSS_FACTOR:g}, which is "
+                "more liquid than solid; give a viscosity instead"
+            )
+        if not -1 < self.poisson < 0.5:
+            raise ValueError(
+                f"poisson = {self.poisson} is outside -1 < poisson < 0.5; "
+                "for an incompressible solid use 0.4999"
+            )
+        if self.law is not None and (self.viscosity or self.loss_factor or self.prony):
+            raise ValueError(
+                "a material with a modulus law of its own has all losses in it; leave out "
+                "viscosity, loss_factor and prony"
+            )
+        at_rest = getattr(self.law, "shear_modulus", self.shear_modulus)
+        if abs(at_rest - self.shear_modulus) > 1e-6 * self.shear_modulus:
+            raise ValueError(
+                f"shear_modulus = {self.shear_modulus:g} Pa is not that of the material's modulus "
+                f"law at rest, {at_rest:g} Pa; build the material with of_law"
+            )
+        if self.orthotropy is not None:
+            self._check_orthotropy(self.orthotropy)
+
+    def _check_orthotropy(self, along: Orthotropy) -> None:
+        if self.law is not None:
+            raise ValueError(
+                "a modulus law is one of an isotropic material, and this one is orthotropic; give "
+                "it a viscosity, a loss_factor or Prony terms"
+            )
+        if not np.allclose(
+            (self.shear_modulus, self.poisson), (along.shear, along.poisson), rtol=1e-6
+        ):
+            raise ValueError(
+                f"shear_modulus = {self.shear_modulus:g} Pa and poisson = {self.poisson:g} are not "
+                f"those of the material's isotropic mean, {along.shear:g} Pa and "
+                f"{along.poisson:g}; build the material with orthotropic"
+            )
+
+    @property
+    def has_loss(self) -> bool:
+        """Whether the material dissipates energy; a law of its own is taken to."""
+        return self.law is not None or self.viscosity + self.loss_factor + self.fast_modulus > 0
+
+    @property
+    def fast_modulus(self) -> float:
+        """Sum of the moduli of all Prony terms, those of a law's series too, in Pa: what fast
+        motion meets beside the modulus.
+        """
+        terms = self.prony if self.law is None else self.series().terms
+        return sum((term.modulus for term in terms), 0.0)
+
+    @property
+    def young(self) -> float:
+        """Young's modulus, Pa."""
+        return 2 * self.shear_modulus * (1 + self.poisson)
+
+    @property
+    def first_lame(self) -> float:
+        """Lame's first parameter, Pa."""
+        return 2 * self.shear_modulus * self.poisson / (1 - 2 * self.poisson)
+
+    def complex_modulus(self, omega: ArrayLike) -> Any:
+        """Complex shear modulus (...) in Pa of motion exp(+i w t), at w (...) in rad/s, which may
+        be complex.
+        """
+        omega = np.asarray(omega)
+        if self.law is not None:
+            return self.law(omega)
+        solid = self.without_loss_factor()
+        lasting = solid.shear_modulus + 1j * omega * solid.viscosity
+        return lasting + solid.relaxing_modulus(omega)
+
+    def relaxing_modulus(self, omega: ArrayLike) -> Any:
+        """The part (...) in Pa of the complex modulus that the given Prony terms add."""
+        return sum((term(omega) for term in self.prony), np.zeros((), np.complex128))
+
+    def series(self, tolerance: float = FIT_TOLERANCE) -> PronySeries:
+        """Prony series of its modulus law, that of a table over the table; raises a ValueError if
+        the law is not passive or not causal.
+        """
+        assert self.law is not None
+        if isinstance(self.law, ModulusTable):
+            return self.law.series
+        return fit_prony(self.law, rest=self.shear_modulus, tolerance=tolerance)
+
+    def relaxing(self, tolerance: float = FIT_TOLERANCE) -> Material:
+        """The material with internal variables alone: Prony series in place of its law or its loss
+        factor.
+        """
+        if self.law is None:
+            return self.without_loss_factor()
+        series = self.series(tolerance)
+        return replace(
+            self,
+            shear_modulus=series.shear_modulus,
+            viscosity=series.viscosity,
+            prony=series.terms,
+            law=None,
+        )
+
+    def without_loss_factor(self) -> Material:
+        """The same material with its loss factor as Prony terms."""
+        if not self.loss_factor:
+            return self
+        factor = constant_loss(self.loss_factor)
+        series = factor.scaled(self.shear_modulus)
+        return replace(
+            self,
+            shear_modulus=series.shear_modulus,
+            viscosity=self.viscosity + series.viscosity,
+            loss_factor=0.0,
+            prony=(*self.prony, *series.terms),
+            orthotropy=self.orthotropy and self.orthotropy.scaled(factor.shear_modulus),
+        )
+
+    def scaled(self, *, modulus: float = 1.0, loss: float = 1.0) -> Material:
+        """The same law with all its moduli, or all its losses, multiplied by a factor."""
+        both = modulus * loss
+        law = self.law and _scaled_law(self.law, modulus, loss)
+        return replace(
+            self,
+            shear_modulus=getattr(law, "shear_modulus", modulus * self.shear_modulus),
+            viscosity=both * self.viscosity,
+            loss_factor=loss * self.loss_factor,
+            prony=tuple(replace(term, modulus=both * term.modulus) for term in self.prony),
+            law=law,
+            orthotropy=self.orthotropy and self.orthotropy.scaled(modulus),
+        )
+
+    @property
+    def plane_stress(self) -> Floats:
+        """Stiffness Q (3, 3) in Pa at equilibrium in plane stress, for the strains xx, yy, 2 xy."""
+        if self.orthotropy is not None:
+            return self.orthotropy.plane_stress
+        inner = self.young / (1 - self.poisson**2)
+        across = self.poisson * inner
+        return np.array([[inner, across, 0], [across, inner, 0], [0, 0, self.shear_modulus]])
+
+    @property
+    def shear_speed(self) -> float:
+        """Speed of shear waves without loss, m/s."""
+        return sqrt(self.shear_modulus / self.density)
+
+    @property
+    def pressure_speed(self) -> float:
+        """Speed of pressure waves without loss, m/s."""
+        return sqrt((self.first_lame + 2 * self.shear_modulus) / self.density)
+
+    @property
+    def rayleigh_speed(self) -> float:
+        """Speed of surface waves without loss, m/s: of the squares of speeds over that of shear
+        waves, the root below 1 of Rayleigh's equation s^3 - 8 s^2 + (24 - 16 r) s - 16 (1 - r) = 0.
+        """
+        ratio = self.shear_modulus / (self.first_lame + 2 * self.shear_modulus)
+        roots = np.roots([1.0, -8.0, 24 - 16 * ratio, 16 * (ratio - 1)])
+        (below_one,) = roots[(roots.imag == 0) & (roots.real < 1)].real
+        return self.shear_speed * sqrt(below_one)
+
+
+def from_young(*, young: float, poisson: float, **rest: Any) -> Material:
+    """Material by its Young's modulus in Pa; the rest as in `Material`."""
+    return Material(shear_modulus=young / (2 * (1 + poisson)), poisson=poisson, **rest)
+
+
+def orthotropic(
+    *,
+    density: float,
+    young_x: float,
+    young_y: float,
+    poisson_xy: float,
+    shear_xy: float | None = None,
+    **losses: Any,
+) -> Material:
+    """Material of a sheet by its moduli along x and y; its losses, `viscosity`, `loss_factor` and
+    `prony` as of `Material`, are the same in all directions.
+
+    Parameters
+    ----------
+    density : float, kg/m3
+    young_x, young_y, poisson_xy, shear_xy : as of `Orthotropy`
+
+    Returns
+    -------
+    Material
+        Whose shear modulus and Poisson's ratio are those of the isotropic mean.
+
+    Raises
+    ------
+    ValueError
+        As `Orthotropy` and `Material` do.
+    """
+    along = Orthotropy(young_x=young_x, young_y=young_y, poisson_xy=poisson_xy, shear_xy=shear_xy)
+    return Material(
+        density=density,
+        shear_modulus=along.shear,
+        poisson=along.poisson,
+        orthotropy=along,
+        **losses,
+    )
+
+
+def of_law(*, density: float, poisson: float, law: Any) -> Material:
+    """Material by a modulus law.
+
+    Parameters
+    ----------
+    density : float, kg/m3
+    poisson : float
+    law : `FractionalKelvinVoigt`, `FractionalZener` or `ModulusTable`
+
+    Returns
+    -------
+    Material
+        Whose modulus at rest is that of the law.
+
+    Raises
+    ------
+    ValueError
+        As `Material` does.
+    """
+    return Material(density=density, shear_modulus=law.shear_modulus, poisson=poisson, law=law)
+
+
+def tabulated(
+    *, density: float, poisson: float, frequencies: ArrayLike, moduli: ArrayLike
+) -> Material:
+    """Material by measured complex shear moduli.
+
+    Parameters
+    ----------
+    density : float, kg/m3
+    poisson : float
+    frequencies : (k,) float, Hz, ascending; the first may be 0
+    moduli : (k,) complex, Pa, at each frequency
+
+    Returns
+    -------
+    Material
+        Whose modulus at rest is that at 0 Hz or, without one, that of the table's Prony series.
+
+    Raises
+    ------
+    ValueError
+        As `ModulusTable` does.
+    """
+    f, mu = np.asarray(frequencies, np.float64), np.asarray(moduli, np.complex128)
+    table = ModulusTable(frequencies=tuple(f.tolist()), moduli=tuple(mu.tolist()))
+    return of_law(density=density, poisson=poisson, law=table)
+
+
+def _scaled_law(law: Any, modulus: float, loss: float) -> Any:
+    if hasattr(law, "scaled"):
+        return law.scaled(modulus=modulus, loss=loss)
+    return ScaledLaw(law=law, modulus=modulus, loss=loss)
+
+
+def _tissue(shear: float, loss: float = 2e-4) -> Material:
+    """Soft tissue of a shear modulus in Pa; `loss` in s is its viscosity over that modulus."""
+    return Material(density=1000, shear_modulus=shear, poisson=0.4999, viscosity=loss * shear)
+
+
+FOREARM_LOSS = 5e-4  # s
+
+PRESETS: Mapping[str, Material] = {
+    # Effective homogeneous half-spaces: Zhang et al., Med Eng Phys 33:31 (2011), forearm; the
+    # palms bracket the 5-8 m/s at which a moving focus is perceived as strongest.
+    "forearm": Material(density=1000, shear_modulus=7.86e3, poisson=0.4999, viscosity=5.03),
+    "palm": Material(density=1000, shear_modulus=25e3, poisson=0.4999, viscosity=5.0),
+    "palm-stiff": Material(density=1000, shear_modulus=50e3, poisson=0.4999, viscosity=10.0),
+    # The palm as a standard linear solid, the law that fits forearms best (Kearney et al., Phys Med
+    # Biol 60:6975 (2015)). No constants of a palm are published: these give it the modulus of
+    # "palm" at rest, and loss factors of 0.06, 0.14 and 0.16 at 50, 140 and 200 Hz, where "palm"
+    # has 0.06, 0.18 and 0.25.
+    "palm-zener": Material(
+        density=1000,
+        shear_modulus=25e3,
+        poisson=0.4999,
+        prony=(PronyTerm(modulus=10e3, time=0.5e-3),),
+    ),
+    # Silicone of skin replicas, Ecoflex 00-30: density by its maker's data sheet, the law that of
+    # Lanoy et al., PNAS 117 (2020), doi 10.1073/pnas.2010812117. The constants are second-hand and
+    # were not checked against that paper: a plausible silicone, not a measured one.
+    "ecoflex": of_law(
+        density=1070,
+        poisson=0.4999,
+        law=FractionalKelvinVoigt(shear_modulus=25e3, exponent=0.33, time=0.3e-3),
+    ),
+    # Layers of a palm, fitted to published waves within published ranges (bench/layered_skin.py has
+    # both). The epidermis is not fitted: 1 to 2 MPa (Young's modulus) in vitro, with and without
+    # stratum corneum (Geerligs et al., J Biomech 44:1176 (2011)).
+    "epidermis": _tissue(shear=500e3),
+    "dermis": _tissue(shear=70e3),
+    "fat": _tissue(shear=15e3),
+    "muscle": _tissue(shear=25e3),
+    # Layers of a forearm. Three have Young's moduli of waves of 4 to 10 kHz (epidermis with stratum
+    # corneum, 4 MPa) and of 0.2 to 1 kHz (40 and 15 kPa): Feng et al., Acta Biomater 146:295
+    # (2022). The muscle and all losses are fitted to the waves of Zhang et al. (2011).
+    "forearm-epidermis": _tissue(shear=1.33e6, loss=FOREARM_LOSS),
+    "forearm-dermis": _tissue(shear=13.3e3, loss=FOREARM_LOSS),
+    "forearm-hypodermis": _tissue(shear=5e3, loss=FOREARM_LOSS),
+    "forearm-muscle": _tissue(shear=10e3, loss=FOREARM_LOSS),
+    # Compact bone, isotropic: human femora have shear moduli of 3.3 and Young's moduli of 17 GPa
+    # along and 11.5 GPa across (Reilly and Burstein, J Biomech 8:393 (1975), doi
+    # 10.1016/0021-9290(75)90075-5); ten times the modulus moves a fingertip by 2 %
+    # less or more, and the loss of so stiff a part does not show.
+    "bone": Material(density=1900, shear_modulus=4e9, poisson=0.3),
+    # 80 g/m2 office paper of 0.1 mm, geometric mean of the two in-plane directions.
+    "paper": from_young(density=800, young=4e9, poisson=0.3, loss_factor=0.03),
+    # The same with its grain along x; values of handbooks, 5-8 and 2-4 GPa, whose mean is that of
+    # "paper". No sheet was measured.
+    "paper-grain": orthotropic(
+        density=800, young_x=5.5e9, young_y=2.5e9, poisson_xy=0.35, loss_factor=0.03
+    ),
+}
+# Those whose motion no skin has: thresholds of detection are not theirs.
+NOT_SKIN = ("ecoflex", "bone", "paper", "paper-grain")

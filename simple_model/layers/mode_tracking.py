@@ -1,0 +1,172 @@
+"""Modes followed along frequency: which root at a frequency continues which one at the last."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simple_model.typing import Complex, Floats
+
+LONGEST_GAP = 3  # frequencies at which a mode is not found: about where it begins to leak
+UNLIKE = 0.3  # misfit of two roots that are not of one mode
+SURE, RIVAL = 0.06, 0.15  # misfit of two roots that are surely of one; of others with either
+NARROW = 1.05  # ratio of two frequencies between which no mode is lost
+ROUND_OFF = 1e-9  # of a wavenumber: a smaller imaginary part of it is none
+SHAPE_WEIGHT = 0.1  # of unlike shapes in the misfit
+Ints = NDArray[np.int_]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Found:
+    """Roots of a body at frequencies (f,), m of each.
+
+    Parameters
+    ----------
+    squared : (f, m) complex, 1/m2, of the wavenumbers
+    slope : (f, m) complex, s/m2, their derivative by the angular frequency
+    wavenumbers : (f, m) complex, 1/m, with Im k <= 0
+    residues : (f, m) complex, 1/Pa/m, of the surface's compliance in k^2
+    energy_speed : (f, m) float, m/s, of the energy of a mode, inf where not known
+    shapes : (f, m, d, 2) complex
+    """
+
+    squared: Complex
+    slope: Complex
+    wavenumbers: Complex
+    residues: Complex
+    energy_speed: Floats
+    shapes: Complex
+
+
+def tracked(found: Found, omega: Floats, most: int, kept: Ints) -> Found:
+    """Roots with one mode in each column, NaN where it is not found.
+
+    The square of a wavenumber is smooth in frequency, at a cut-off too, and its derivative is
+    known: a root continues another if the trapezoidal rule leads from it to the other, and if their
+    shapes are alike.
+
+    Parameters
+    ----------
+    found : Found, in any order at each frequency
+    omega : (f,) float, rad/s
+    most : how many modes are kept, the least evanescent anywhere, of these the slowest
+    kept : (g,) int, which of the frequencies the modes are wanted at
+
+    Returns
+    -------
+    Found, of at most so many modes at these frequencies
+    """
+    from scipy.optimize import linear_sum_assignment  # which takes long to import
+
+    count = len(omega)
+    index = np.full((count, 0), -1)
+    for f in range(count):
+        known = np.flatnonzero(np.isfinite(found.squared[f]))
+        seen = np.where(index >= 0, np.arange(count)[:, None], -1).max(axis=0, initial=-1)
+        alive = np.flatnonzero(f - seen <= 1 + LONGEST_GAP)
+        roots = index[seen[alive], alive]
+        # Pairs that are none cost alike, or they would break up others.
+        costs = np.minimum(_misfit(found, omega, (seen[alive], roots), (f, known)), UNLIKE)
+        pairs = [(alive[i], known[j]) for i, j in zip(*linear_sum_assignment(costs), strict=True)
+                 if costs[i, j] < UNLIKE]  # fmt: skip
+        for column, root in pairs:
+            index[f, column] = root
+        new = np.setdiff1d(known, [root for _, root in pairs])
+        begun = np.full((count, len(new)), -1)
+        begun[f] = new
+        index = np.hstack([index, begun])
+    index = index[kept]
+    index = index[:, (index >= 0).any(axis=0)]
+    found = Found(**{each.name: getattr(found, each.name)[kept] for each in fields(found)})
+    decay = np.abs(found.wavenumbers.imag)
+    decay = np.where(decay > ROUND_OFF * np.abs(found.wavenumbers), decay, 0.0)
+    least = np.where(index >= 0, _at(decay, index), np.inf).min(axis=0)
+    slowness = np.where(decay == 0, np.abs(found.wavenumbers.real) / omega[kept, None], 0.0)
+    slowest = np.where(index >= 0, _at(slowness, index), 0.0).max(axis=0)
+    least = np.lexsort([-slowest, least])[:most]
+    index = index[:, least]
+    picked = {}
+    for field in fields(found):
+        values = _at(getattr(found, field.name), index)
+        missing = (index < 0).reshape(index.shape + (1,) * (values.ndim - 2))
+        none = complex(np.nan, np.nan) if np.iscomplexobj(values) else np.nan
+        picked[field.name] = np.where(missing, none, values)
+    return Found(**picked)
+
+
+def between(found: Found, omega: Floats, waves: NDArray[np.bool_], most: int) -> Floats:
+    """Frequencies in the middle of gaps across which modes are not surely followed.
+
+    Parameters
+    ----------
+    found, omega, most : as of `tracked`
+    waves : (f, m) bool, whether a root is a wave; the slowest have to be followed
+
+    Returns
+    -------
+    (g,) float, rad/s
+    """
+    from scipy.optimize import linear_sum_assignment  # which takes long to import
+
+    further = []
+    for f in np.flatnonzero(omega[1:] > NARROW * omega[:-1]).tolist():
+        here, there = (np.flatnonzero(np.isfinite(found.squared[g])) for g in (f, f + 1))
+        costs = _misfit(found, omega, (np.full(len(here), f), here), (f + 1, there))
+        costs = np.minimum(costs, UNLIKE)
+        pairs = linear_sum_assignment(costs)
+        is_sure = np.zeros(costs.shape, bool)
+        is_sure[pairs] = costs[pairs] <= SURE
+        rivals = costs < RIVAL
+        is_sure &= (rivals.sum(axis=1, keepdims=True) == 1) & (rivals.sum(axis=0) == 1)
+        for g, roots, axis in ((f, here, 1), (f + 1, there, 0)):
+            slowness = np.where(waves[g, roots], np.abs(found.wavenumbers[g, roots].real), 0.0)
+            slowest = np.argsort(-slowness)[:most]
+            slowest = slowest[slowness[slowest] > 0]
+            if not np.any(is_sure, axis=axis, keepdims=True).ravel()[slowest].all():
+                further.append(np.sqrt(omega[f] * omega[f + 1]))
+                break
+    return np.array(further)
+
+
+def merged(found: Found, omega: Floats, other: Found, further: Floats) -> tuple[Found, Floats]:
+    """Roots at two sets of frequencies together.
+
+    Parameters
+    ----------
+    found, other : Found, roots at each set
+    omega, further : (f,) and (g,) float, rad/s, these sets
+
+    Returns
+    -------
+    Found, and frequencies (f + g,) in rad/s, ascending
+    """
+    both = np.concatenate([omega, further])
+    order = np.argsort(both)
+    pairs = ((each.name, getattr(found, each.name), getattr(other, each.name))
+             for each in fields(found))  # fmt: skip
+    return Found(**{name: np.concatenate(pair)[order] for name, *pair in pairs}), both[order]
+
+
+def _at(values: Complex | Floats, index: np.ndarray) -> np.ndarray:
+    """Values (f, n, ...) of the roots (f, m, ...) of these indices (f, n)."""
+    return np.asarray(values[np.arange(len(index))[:, None], index])
+
+
+def _misfit(
+    found: Found, omega: Floats, before: tuple[Ints, Ints], after: tuple[int, Ints]
+) -> Floats:
+    """Misfit (n, m) of the roots at n places (f, m) before with m roots at a later frequency."""
+    (f, m), (g, roots) = before, after
+    start, end = found.squared[f, m][:, None], found.squared[g, roots]
+    rise, later = found.slope[f, m][:, None], found.slope[g, roots]
+    led = start + (omega[g] - omega[f])[:, None] * (rise + later) / 2
+    size = np.abs(start) + np.abs(end) + 0.01 * np.abs(end).max(initial=0.0)
+    missed = np.abs(led - end) / size
+    # In logarithms it leads further, but not through a cut-off.
+    w, v = omega[f][:, None], omega[g]
+    power = (w * rise / start + v * later / end) / 2
+    missed = np.minimum(missed, np.abs(np.log(end / start) - power * np.log(v / w)) / 2)
+    a, b = (x.reshape(len(x), found.shapes[0, 0].size)
+            for x in (found.shapes[f, m], found.shapes[g, roots]))  # fmt: skip
+    a, b = (x / np.maximum(np.linalg.norm(x, axis=1), 1e-300)[:, None] for x in (a, b))
+    return np.asarray(missed + SHAPE_WEIGHT * (1 - np.abs(a.conj() @ b.T)))

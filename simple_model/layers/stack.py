@@ -1,0 +1,71 @@
+"""Stack of flat isotropic layers: what wavenumber integrals and dispersion curves are asked of."""
+
+from dataclasses import dataclass
+from math import inf
+
+from simple_model.choices import choose
+from simple_model.layers.material import Material
+
+BASES = ("clamped", "free", "elastic")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stack:
+    """Laterally infinite layers from the surface downwards, each bonded to the next.
+
+    Parameters
+    ----------
+    materials : of each layer
+    thicknesses : metre, of each layer, above 0; the last may be inf, a half-space
+    base : what is below the last layer unless it is a half-space: "clamped", a rigid base,
+        "free", nothing, or "elastic", a Winkler foundation
+    base_stiffness : N/m3, traction per displacement of an elastic base, in every direction
+
+    Raises
+    ------
+    ValueError
+        If there is no layer, their numbers differ, a thickness is out of range, the base is
+        another, or an elastic one has no stiffness.
+    """
+
+    materials: tuple[Material, ...]
+    thicknesses: tuple[float, ...]
+    base: str = "clamped"
+    base_stiffness: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.materials or len(self.materials) != len(self.thicknesses):
+            raise ValueError(
+                f"a stack has {len(self.materials)} materials and {len(self.thicknesses)} "
+                "thicknesses; give as many of each, one or more, from the surface downwards"
+            )
+        if not all(0 < thickness < inf for thickness in self.thicknesses[:-1]):
+            raise ValueError("layers above the last must have a finite thickness above 0")
+        if not self.thicknesses[-1] > 0:
+            raise ValueError(f"thickness = {self.thicknesses[-1]} m of a layer must be above 0")
+        choose("base", self.base, BASES)
+        if (self.base == "elastic") != (0 < self.base_stiffness < inf):
+            raise ValueError(
+                f"base_stiffness = {self.base_stiffness} N/m3 of a base that is {self.base}; give "
+                "an elastic one a finite stiffness above 0, and no other"
+            )
+
+    @property
+    def thickness(self) -> float:
+        """Thickness of all layers, metre; inf with a half-space below."""
+        return sum(self.thicknesses)
+
+    @property
+    def is_half_space(self) -> bool:
+        """Whether the last layer is a half-space."""
+        return self.thicknesses[-1] == inf
+
+    @property
+    def is_rigid(self) -> bool:
+        """Whether it ends on a rigid base or a half-space."""
+        return self.base == "clamped" or self.is_half_space
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether it is constrained, and does not drift: it ends on one of these or is elastic."""
+        return self.is_rigid or self.base == "elastic"

@@ -1,0 +1,283 @@
+"""Wavenumber integrals: the field about a focal spot at rest, at each frequency.
+
+A pressure q exp(i w t) moves a body by u = G q at each wavenumber k. A focal spot S of unit
+pressure makes at a distance r
+
+    g(r, w) = 1/(2 pi) int_0^inf S(k) G(k, w) J_n(kr)/r^n k dk
+
+with n = 0 for the vertical displacement and for pressures. A horizontal displacement goes as J_1
+and has the direction of (x, y), so that its components are x and y times an integral with n = 1;
+second derivatives likewise have n = 2. In this form all are as smooth as the focal spot.
+
+Frequencies of a transient are close to each other, below the real axis by its damping, and far from
+the poles, which lie above it by the body's own loss: what they make is smooth. Each batch of them
+is interpolated by a polynomial through Chebyshev points, whose error falls geometrically with their
+number (Berrut and Trefethen, SIAM Rev 46:501 (2004)), to below that of the integrals.
+
+The path of integration over k runs above the real axis, away from the poles of forward waves, which
+lie below it for any loss; and below those of backward waves, which lie above it.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from math import factorial
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import jv
+
+from simple_model.layers.compliance import Compliance
+from simple_model.typing import Complex, Floats
+
+INTEGRATION_ERROR = 1e-5  # relative change at which the wavenumber grid is fine enough
+FEWEST_NODES, MOST_NODES = 128, 2**16  # of the wavenumber grid
+AT_ONCE = 2**12  # pairs of frequency and wavenumber, in arrays that stay in cache
+UNRESOLVED = "the wavenumber integral does not converge; add some loss, or give a free slab a base"
+CHECKED_EACH = 8  # batches: how often the grid is checked by halving
+BATCH = 256  # frequencies at a time
+FIRST_BATCH = 64  # of a transient, whose later batches are as long as all before
+FEWEST_POINTS = 8  # intervals of the first Chebyshev points that a batch is interpolated between
+INTERPOLATION_ERROR = 1e-7  # relative, so that lines far weaker than the largest are right, too
+COMPARED = 16  # frequencies of a smooth batch at which two wavenumber grids are compared
+
+
+@dataclass(frozen=True, kw_only=True)
+class Field:
+    """Field of a surface pressure, of m components that are made of c integrals.
+
+    Parameters
+    ----------
+    answer : (k (k,) in 1/m, w (f, 1) in rad/s) -> (c, f, k), per pressure
+    orders : (c,) order n of each integral
+    clearance : as of `Compliance`
+    weights : horizontal offsets (..., 2) in metre from the focus -> (m, c, ...), so that the
+        components are weights times integrals, in sum over c
+    """
+
+    answer: Callable[[Complex, Complex], Complex]
+    orders: tuple[int, ...]
+    clearance: Callable[[Complex], float]
+    weights: Callable[[Floats], Floats]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Grid:
+    """Nodes `k` (n,) of the path of integration, and what values there are multiplied by for the
+    integrals of each order at all distances, (n, r).
+    """
+
+    k: Complex
+    kernels: dict[int, Complex]
+
+
+def normal_field(compliance: Compliance) -> Field:
+    """Displacement of the surface into the body, metre."""
+    return Field(
+        answer=lambda k, w: compliance(k, w)[None],
+        orders=(0,),
+        clearance=compliance.clearance,
+        weights=lambda away: np.ones((1, 1, *away.shape[:-1])),
+    )
+
+
+def point_response(
+    compliance: Compliance,
+    distances: ArrayLike,
+    frequencies: ArrayLike,
+    width: float,
+    *,
+    negligible: float = 0.0,
+) -> Complex:
+    """Response g(r, w) to a Gaussian focal spot of 1 Pa.
+
+    Parameters
+    ----------
+    compliance : Compliance
+    distances : (r,) float, metre
+    frequencies : (f,) float or complex, rad/s, with imaginary part <= 0
+    width : metre, standard deviation of the spot
+    negligible : as of `point_integrals`
+
+    Returns
+    -------
+    (f, r) complex, m/Pa
+
+    Raises
+    ------
+    ArithmeticError
+        If the wavenumber grid cannot be made fine enough.
+    """
+    field = normal_field(compliance)
+    return point_integrals(field, distances, frequencies, width, negligible=negligible)[0]
+
+
+def point_integrals(
+    field: Field,
+    distances: ArrayLike,
+    frequencies: ArrayLike,
+    width: float,
+    *,
+    negligible: float = 0.0,
+) -> Complex:
+    """Integrals of a field about a Gaussian focal spot of 1 Pa.
+
+    Parameters
+    ----------
+    field : Field
+    distances : (r,) float, metre
+    frequencies : (f,) float or complex, rad/s, with imaginary part <= 0
+    width : metre, standard deviation of the spot
+    negligible : a batch of frequencies in which each integral stays below this fraction of its
+        largest value so far is the last one computed; for frequencies that rise
+
+    Returns
+    -------
+    (c, f, r) complex
+
+    Raises
+    ------
+    ArithmeticError
+        If the wavenumber grid cannot be made fine enough.
+    """
+    r = np.atleast_1d(np.asarray(distances, np.float64))
+    w = np.atleast_1d(np.asarray(frequencies, np.complex128))
+    found = np.zeros((len(field.orders), len(w), len(r)), np.complex128)
+
+    @lru_cache(maxsize=2)
+    def grid(lift: float, n: int) -> _Grid:
+        return _grid(field.orders, r, width, lift, n)
+
+    n, before = FEWEST_NODES, 0.0
+    for part in _batches(w):
+        lift = _lift(field, r, w[part], width)
+        if lift != before or part.start % (CHECKED_EACH * BATCH) == 0:
+            least = n if lift == before else FEWEST_NODES
+            n, found[:, part] = _resolved(field, w[part], partial(grid, lift), least)
+        else:
+            found[:, part] = _batch(field, w[part], grid(lift, n))
+        before = lift
+        largest = np.abs(found[:, : part.stop]).max(axis=(1, 2))
+        if (np.abs(found[:, part]).max(axis=(1, 2)) < negligible * largest).all():
+            break
+    return found
+
+
+def _batches(w: Complex) -> Iterator[slice]:
+    start = 0
+    while start < len(w):
+        stop = start + (max(FIRST_BATCH, start) if _is_damped(w) else BATCH)
+        yield slice(start, stop)
+        start = stop
+
+
+def _lift(field: Field, r: Floats, w: Complex, width: float) -> float:
+    """Height above the real axis, 1/m, of the path of integration."""
+    highest = 1.5 / max(float(r.max()), 5 * width)  # J_n grows by e^1.5 at most
+    lift = min(highest, field.clearance(w))
+    if not lift > 0:
+        raise ArithmeticError(UNRESOLVED)
+    return lift
+
+
+def _resolved(
+    field: Field, w: Complex, grid: Callable[[int], _Grid], n: int
+) -> tuple[int, Complex]:
+    """The fewest wavenumbers, from n, that twice as many do not improve on; the integrals with
+    these.
+    """
+    some = w[:: -(-len(w) // COMPARED)] if _is_damped(w) else w
+    coarse = _integrated(field, some, grid(n))
+    while n < MOST_NODES:
+        fine = _integrated(field, some, grid(2 * n))
+        largest = np.abs(fine).max(axis=(1, 2))
+        if (np.abs(fine - coarse).max(axis=(1, 2)) <= INTEGRATION_ERROR * largest).all():
+            return n, fine if some is w else _batch(field, w, grid(2 * n))
+        coarse, n = fine, 2 * n
+    raise ArithmeticError(UNRESOLVED)
+
+
+def _batch(field: Field, w: Complex, grid: _Grid) -> Complex:
+    """The integrals (c, f, r) at the frequencies of a batch: interpolated where they are smooth."""
+    found = _interpolated(field, w, grid) if _is_damped(w) else None
+    return _integrated(field, w, grid) if found is None else found
+
+
+def _is_damped(w: Complex) -> bool:
+    """Whether frequencies are many on a line below the real axis, as those of a transient are."""
+    return bool(len(w) > 4 * FEWEST_POINTS and w.imag.max() < 0 and np.ptp(w.imag) == 0)
+
+
+def _interpolated(field: Field, w: Complex, grid: _Grid) -> Complex | None:
+    """The integrals (c, f, r) at frequencies on a line, by a polynomial; None if that takes more
+    than half as many.
+    """
+    middle, half = (w.real.max() + w.real.min()) / 2, np.ptp(w.real) / 2
+
+    def at(x: Floats) -> Complex:
+        return _integrated(field, middle + half * x + 1j * w.imag[0], grid)
+
+    n, error = FEWEST_POINTS, np.nan
+    values = at(_chebyshev(n))
+    while 4 * n <= len(w):
+        between = _chebyshev(2 * n)[1::2]
+        finer = np.repeat(values, 2, axis=1)[:, :-1]
+        finer[:, 1::2] = at(between)
+        before, errors = error, np.abs(_through(values, between) - finer[:, 1::2]).max(axis=(1, 2))
+        error = (errors / np.abs(finer).max(axis=(1, 2))).max()
+        values, n = finer, 2 * n
+        foreseen = error * (error / before) ** 2  # as it falls geometrically
+        if np.fmin(error, foreseen) <= INTERPOLATION_ERROR:
+            return _through(values, (w.real - middle) / half)
+        if error ** (len(w) / n) > INTERPOLATION_ERROR**0.5:  # at as many as are allowed
+            return None
+    return None
+
+
+def _chebyshev(n: int) -> Floats:
+    """Chebyshev points (n + 1,) of the second kind on [-1, 1]."""
+    return np.asarray(np.cos(np.pi * np.arange(n + 1) / n))
+
+
+def _through(values: Complex, x: Floats) -> Complex:
+    """Polynomials through values (c, j, r) at Chebyshev points, at x (f,): (c, f, r), by the
+    barycentric formula.
+    """
+    n = values.shape[1] - 1
+    away = x[:, None] - _chebyshev(n)
+    weights = (-1.0) ** np.arange(n + 1)
+    weights[[0, -1]] /= 2
+    shares = weights / np.where(away, away, 1e-300)  # all of it at a point itself
+    shares /= shares.sum(axis=1, keepdims=True)
+    return np.asarray(shares @ values)
+
+
+def _integrated(field: Field, w: Complex, grid: _Grid) -> Complex:
+    """The integrals (c, f, r), some frequencies at a time."""
+    parts = []
+    for some in np.array_split(w[:, None], max(1, len(w) * len(grid.k) // AT_ONCE)):
+        values = field.answer(grid.k, some)
+        parts.append([v @ grid.kernels[n] for v, n in zip(values, field.orders, strict=True)])
+    return np.concatenate(parts, axis=1)
+
+
+def _grid(orders: tuple[int, ...], r: Floats, width: float, lift: float, n: int) -> _Grid:
+    """Gauss-Legendre nodes on panels along the raised path."""
+    nodes, weights = np.polynomial.legendre.leggauss(16)
+    # Panels grow away from k = 0, near which the waves of low frequencies have their poles.
+    edges = 6.5 / width * np.linspace(0, 1, n // 16 + 1) ** 2
+    half, middle = np.diff(edges) / 2, (edges[1:] + edges[:-1]) / 2
+    x = (middle[:, None] + half[:, None] * nodes).ravel()
+    dx = (half[:, None] * weights).ravel()
+    ramp = np.tanh(x / lift)
+    k, dk = x + 1j * lift * ramp, 1 + 1j * (1 - ramp**2)
+    spot = 2 * np.pi * width**2 * np.exp(-((k * width) ** 2) / 2)
+    weight = spot * k * dk * dx / (2 * np.pi)
+    kernels = {order: weight[:, None] * _bessel(order, k[:, None], r) for order in set(orders)}
+    return _Grid(k=k, kernels=kernels)
+
+
+def _bessel(n: int, k: Complex, r: Floats) -> Complex:
+    """J_n(k r) / r^n."""
+    away = np.where(r > 0, r, 1.0) ** n
+    return np.where(r > 0, jv(n, k * r) / away, (k / 2) ** n / factorial(n))

@@ -1,0 +1,373 @@
+"""Samples of a moving load in equal cells of time, exact about its jumps.
+
+The transform of a load that is smooth but for jumps is that of its samples v in the middles of
+cells of length h,
+
+    int q(t) exp(-i w t) dt = h sum_i v_i exp(-i w t_i)
+
+if samples about a jump d have its moments. At e cells from the middle of cell 0 it makes
+
+    v_-1 += (p + s) d,   v_0 = (1/2 + e) q_before + (1/2 - e) q_after - 2 s d,   v_1 += (s - p) d
+
+with p = e^2/4 - 1/24 and s = -e^3/6, with an error of (w h)^4/100 of the jump.
+"""
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from math import lcm
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft, sparse
+
+from simple_model.load.focus import spot_detail
+from simple_model.load.pressure import MovingPressure
+from simple_model.load.tacton import Tacton, tones
+from simple_model.load.trajectory import STILL, Trajectory, differ
+from simple_model.typing import Complex, Floats
+
+FEWEST_KNOTS = 132  # positions along a closed path: all harmonics below 66 f_d
+KNOTS_PER_WIDTH = 8  # of the focal spot, which makes corners accurate to 1e-4
+NODES_PER_WIDTH = 16  # between which values are interpolated along the path, to 1e-6
+HIGHEST = 10_000.0  # Hz of lines of jumps, pulses and recordings: others move bodies by 0.1 %
+PER_HIGHEST = 2.5  # samples in a period of it
+SAMPLED = 40_000.0  # Hz of a rhythm or signal: periods in milliseconds are whole cells
+PASSED = 5.7 / (2 * np.pi)  # f s / v, at which a passing focal spot's spectrum is 1e-7
+BRIEF = 0.01  # of a recording's time, for which it may move faster: a jump has no highest line
+SAME = 1e-9  # of a cell or a period
+AT_ONCE = 2**22  # values that are transformed at a time, some hundred megabytes
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PathCells:
+    """One repetition of a load in equal cells, `frequency` times a second.
+
+    What the load does in each of k cells is `cells` (k, q) times what a focus of unit pressure does
+    at `positions` (q, 2) in metre. That is one focus of unit pressure that runs once along the
+    path; or all `of_tacton` in Pa, where that is modulated by a rhythm or signal, or too short for
+    a path that jumps.
+    """
+
+    positions: Floats
+    cells: sparse.csr_array
+    frequency: float
+    of_tacton: bool
+
+
+@lru_cache(maxsize=4)
+def path_cells(pressure: MovingPressure) -> PathCells:
+    """Cells of a load's path or of the whole Tacton."""
+    tacton = pressure.tacton
+    of_tacton = tacton.is_sampled or is_cut_short(pressure)
+    if of_tacton:
+        count = max(2, int(np.ceil(_rate(pressure) * tacton.duration)))
+        jumps = jump_times(pressure, 0.0, tacton.duration)
+        if not _ends_as_it_begins(pressure):
+            jumps = np.append(jumps, 0.0)
+        times, shares = cells(jumps, 0.0, tacton.duration / count, count)
+        whole, gain, frequency = pressure, pressure.gain(times), 1 / tacton.duration
+    else:
+        frequency = tacton.trajectory.drawing_frequency
+        jumps, count = jump_phases(pressure), _count(pressure)
+        phases, shares = cells(jumps, 0.0, 1 / count, count)
+        times, gain = phases / (frequency or 1.0), np.ones(len(phases))
+        whole = replace(pressure, tacton=replace(tacton, foci=(0.0,)))
+    if tacton.trajectory.is_static and not of_tacton:  # foci that rest have places of their own
+        at, n = tacton.trajectory.at_phase(np.mod(tacton.foci, 1.0)), len(tacton.foci)
+        return PathCells(
+            positions=at, cells=sparse.csr_array(np.full((1, n), 1 / n)), frequency=frequency,
+            of_tacton=False,
+        )  # fmt: skip
+    positions, mixed = moved_load(whole, times, gain)
+    mixed = (shares @ mixed).tocsr()
+    return PathCells(positions=positions, cells=mixed, frequency=frequency, of_tacton=of_tacton)
+
+
+def _ends_as_it_begins(pressure: MovingPressure) -> bool:
+    """Whether the load at the end of the Tacton is that of its beginning, so that it is repeated
+    without a jump.
+    """
+    tacton = pressure.tacton
+    ends = tacton.duration * np.array([SAME, 1 - SAME])
+    begins, stops = pressure.gain(ends)
+    path = tacton.trajectory
+    each = [np.mod(path.phase(ends) + ahead, 1.0) for ahead in tacton.foci]
+    places = [np.column_stack([path.at_phase(p), path.level_at_phase(p)]) for p in each]
+    moved = any(differ(place[:1], place[1:]).any() for place in places)
+    return not moved and bool(
+        abs(begins - stops) <= STILL[1] * abs(pressure.driven(np.ones(1))).max()
+    )
+
+
+def moved_load(
+    pressure: MovingPressure, times: Floats, factors: Floats
+) -> tuple[Floats, sparse.csr_array]:
+    """Load of all foci at some times.
+
+    Parameters
+    ----------
+    pressure : MovingPressure
+    times : (m,) float, s
+    factors : (m,) float, in Pa, of the foci
+
+    Returns
+    -------
+    positions (q, 2) in metre, and the matrix (m, q) in Pa by which the load at each time is made of
+    foci of unit pressure at these
+    """
+    tacton = pressure.tacton
+    path, detail = tacton.trajectory, spot_detail(pressure.height, pressure.profile)
+    each = [np.mod(path.phase(times) + ahead, 1.0) for ahead in tacton.foci]
+    parts = [along_path(path, phases, detail) for phases in each]
+    mixed = [
+        sparse.diags_array(factors * pressure.weight(phases)) @ mixing
+        for phases, (_, mixing) in zip(each, parts, strict=True)
+    ]
+    positions, first, which = np.unique(
+        np.vstack([at for at, _ in parts]), axis=0, return_index=True, return_inverse=True
+    )
+    order = np.argsort(first)  # along the path
+    ranks = np.argsort(order)[which.ravel()]
+    merged = sparse.csr_array((np.ones(len(ranks)), (np.arange(len(ranks)), ranks)))
+    return positions[order], (sparse.hstack(mixed) @ merged).tocsr()
+
+
+def path_samples(pressure: MovingPressure) -> Floats:
+    """Positions (q, 2) in metre that a load is made of; one if the focus is static."""
+    return path_cells(pressure).positions
+
+
+def path_fourier(
+    pressure: MovingPressure, values: Floats | Complex, orders: NDArray[np.int_] | None = None
+) -> Complex:
+    """Fourier coefficients of what a load does.
+
+    Parameters
+    ----------
+    pressure : MovingPressure
+    values : (..., q), of a focus of unit pressure at each of `path_samples`
+    orders : (n,) int, of the harmonics wanted
+
+    Returns
+    -------
+    (..., n) complex; without orders all, of which -n is harmonic -n
+    """
+    mixing = path_cells(pressure).cells
+    k, shape, rows = mixing.shape[0], values.shape[:-1], values.reshape(-1, values.shape[-1])
+    wanted = np.arange(k) if orders is None else orders
+    shift = np.exp(-1j * np.pi * np.fft.fftfreq(k)[wanted]) / k
+    blocks = np.array_split(rows, max(1, len(rows) * k // AT_ONCE))
+    found = [fft.fft((mixing @ block.T).T, axis=-1)[:, wanted] * shift for block in blocks]
+    return np.asarray(np.concatenate(found).reshape(*shape, len(wanted)))
+
+
+def harmonics(pressure: MovingPressure) -> NDArray[np.int_]:
+    """Orders of the harmonics of `path_fourier` that its cells resolve, ascending."""
+    k = path_cells(pressure).cells.shape[0]
+    return np.arange(-((k - 1) // 2), (k + 1) // 2)
+
+
+def cells(
+    jumps: Floats, start: float, width: float, count: int, *, closed: bool = True
+) -> tuple[Floats, sparse.csr_array]:
+    """Samples of cells.
+
+    Parameters
+    ----------
+    jumps : (j,) float, s, times between the beginning of the first cell and the end of the last
+    start, width : s
+    count : of cells
+    closed : whether the first cell follows the last
+
+    Returns
+    -------
+    times (m,) in s of the samples, and their shares (count, m) in the cells
+    """
+    at = np.unique(np.round((jumps - start) / width, 9))
+    at = np.unique(np.mod(at, count)) if closed else at[(at >= 0) & (at <= count)]
+    bounds = np.union1d(np.arange(count + 1), at)
+    middles, lengths = (bounds[1:] + bounds[:-1]) / 2, np.diff(bounds)
+    rows, columns, shares = [middles.astype(int)], [np.arange(len(middles))], [lengths]
+    if len(at):
+        cell = np.minimum(at.astype(int), count - 1)
+        after = np.searchsorted(middles, at)
+        if not closed:  # outside it is 0 or unknown
+            inside = (after > 0) & (after < len(middles))
+            at, cell, after = at[inside], cell[inside], after[inside]
+        e = at - cell - 0.5
+        p, s = e**2 / 4 - 1 / 24, -(e**3) / 6
+        for row, share in ((cell - 1, s + p), (cell, -2 * s), (cell + 1, s - p)):
+            within = np.ones(len(row), bool) if closed else (row >= 0) & (row < count)
+            for sign, piece in ((1, after), (-1, after - 1)):
+                rows.append(row[within] % count)
+                columns.append(piece[within] % len(middles))
+                shares.append(sign * share[within])
+    table = (np.concatenate(shares), (np.concatenate(rows), np.concatenate(columns)))
+    return start + width * middles, sparse.csr_array(table, shape=(count, len(middles)))
+
+
+def jump_phases(pressure: MovingPressure) -> Floats:
+    """Fractions (j,) of the period at which a focus jumps, in position or in level or, of a load
+    along the path, in direction; and at which moves begin and end that last no longer than a cell.
+    """
+    path = pressure.tacton.trajectory
+    bounds, lengths = path.parts
+    if pressure.heading:
+        return np.union1d(path.jumps, path.turns)
+    if path.shape != "recorded":
+        return path.jumps
+    brief = np.diff(bounds) * path.times[-1] < 1 / (PER_HIGHEST * HIGHEST)
+    brief &= lengths > spot_detail(pressure.height, pressure.profile) / 2
+    return np.unique(np.mod(np.concatenate([path.jumps, bounds[:-1][brief], bounds[1:][brief]]), 1))
+
+
+def jump_times(pressure: MovingPressure, start: float, end: float) -> Floats:
+    """Times at which the load jumps at some place.
+
+    Parameters
+    ----------
+    pressure : MovingPressure
+    start, end : float, s, between which they are
+
+    Returns
+    -------
+    (j,) float, s
+    """
+    tacton, phases = pressure.tacton, jump_phases(pressure)
+    f_d = tacton.trajectory.drawing_frequency
+    found = [np.empty(0)]
+    for ahead in tacton.foci if f_d and len(phases) else ():
+        turns = np.arange(np.floor(f_d * start), np.ceil(f_d * end) + 2)
+        found.append((turns[:, None] + phases - ahead).ravel() / f_d)
+    if tacton.rhythm and len(edges := tacton.rhythm.edges):
+        period = tacton.rhythm.period
+        turns = np.arange(np.floor(start / period), np.ceil(end / period) + 1)
+        found.append((turns[:, None] * period + edges).ravel())
+    times = np.unique(np.concatenate(found))
+    return times[(times >= start) & (times <= end)]
+
+
+def along_path(path: Trajectory, phases: Floats, detail: float) -> tuple[Floats, sparse.csr_array]:
+    """Positions along a path, and the interpolation from them to phases.
+
+    By cubics along each part of the path that has more phases than nodes.
+
+    Parameters
+    ----------
+    path : Trajectory
+    phases : (m,) float, fractions of the period
+    detail : float, metre, of the focal spot
+
+    Returns
+    -------
+    positions (q, 2) in metre, and the matrix (m, q) that interpolates what is known there
+    """
+    bounds, lengths = path.parts
+    part = np.clip(np.searchsorted(bounds, phases, side="right") - 1, 0, len(lengths) - 1)
+    nodes = np.ceil(NODES_PER_WIDTH * lengths / detail).astype(int) + 4
+    dense = (np.bincount(part, minlength=len(lengths)) > nodes) & (lengths > 0)
+    own = np.flatnonzero(~dense[part])
+    positions, q = [path.at_phase(phases[own])], len(own)
+    rows, columns, shares = [own], [np.arange(q)], [np.ones(q)]
+    for k in np.flatnonzero(dense).tolist():
+        mine = np.flatnonzero(part == k)
+        at = path.within_part(k, np.linspace(0, 1, nodes[k]))
+        u = (phases[mine] - bounds[k]) / (bounds[k + 1] - bounds[k]) * (nodes[k] - 1)
+        base = np.clip(np.floor(u).astype(int) - 1, 0, nodes[k] - 4)
+        x = u - base
+        cardinal = (
+            -(x - 1) * (x - 2) * (x - 3) / 6, x * (x - 2) * (x - 3) / 2,
+            -x * (x - 1) * (x - 3) / 2, x * (x - 1) * (x - 2) / 6,
+        )  # fmt: skip
+        for j, share in enumerate(cardinal):
+            rows.append(mine)
+            columns.append(q + base + j)
+            shares.append(share)
+        positions.append(at)
+        q += nodes[k]
+    table = (np.concatenate(shares), (np.concatenate(rows), np.concatenate(columns)))
+    return np.vstack(positions), sparse.csr_array(table, shape=(len(phases), q))
+
+
+def is_abrupt(pressure: MovingPressure) -> bool:
+    """Whether a load jumps at some place as its foci move, or has levels, which may change as fast,
+    so that its lines fall off slowly.
+
+    Of foci on paths of their own, which are joined, none jumps where all paths are closed.
+    """
+    tacton, jumps = pressure.tacton, jump_phases(pressure)
+    n, path = tacton.n_paths, tacton.trajectory
+    within = jumps * n - np.round(jumps * n)
+    if (
+        path.levels
+        or (np.abs(within) > SAME).any()
+        or (len(jumps) and (n == 1 or pressure.heading))
+    ):
+        return True
+    begins, ends = path.beside(np.arange(n) / n)[1], path.beside(np.arange(1, n + 1) / n)[0]
+    return bool(len(jumps) and differ(begins, ends).any())
+
+
+def is_cut_short(pressure: MovingPressure) -> bool:
+    """Whether a path that jumps takes longer than the Tacton."""
+    f_d, duration = pressure.tacton.trajectory.drawing_frequency, pressure.tacton.duration
+    return 0 < f_d * duration < 1 - SAME and is_abrupt(pressure)
+
+
+def unsampled(pressure: MovingPressure) -> MovingPressure:
+    """The same without rhythm and signal."""
+    return replace(pressure, tacton=replace(pressure.tacton, rhythm=None, signal=None))
+
+
+def highest_passing(pressure: MovingPressure) -> float:
+    """Highest line in Hz, above 1e-7 of all, that the moving focus makes at a place; of a
+    recording, whose fastest moves are jumps, at most `HIGHEST`.
+    """
+    found = PASSED * _speed(pressure.tacton) / spot_detail(pressure.height, pressure.profile)
+    return min(found, HIGHEST) if pressure.tacton.trajectory.shape == "recorded" else found
+
+
+def _count(pressure: MovingPressure) -> int:
+    """Number of cells of a path; one if the focus is static."""
+    path, n = pressure.tacton.trajectory, pressure.tacton.n_paths
+    detail = spot_detail(pressure.height, pressure.profile)
+    if path.is_static:
+        return 1
+    enough, whole = KNOTS_PER_WIDTH * path.length / detail, 12
+    lines = PER_HIGHEST * HIGHEST / path.drawing_frequency
+    if path.shape == "recorded":
+        moves = (steps := np.diff(path.times)) > 0
+        even = np.ptp(steps[moves]) < 1e-9 * path.times[-1]
+        whole = lcm(int(moves.sum()), n) if even else 12 * n
+        if not is_abrupt(pressure):
+            lengths = np.linalg.norm(np.diff(path.outline, axis=0), axis=1)
+            fastest = float((lengths[moves] / steps[moves]).max())
+            enough = min(KNOTS_PER_WIDTH * fastest * path.times[-1] / detail, lines)
+    if is_abrupt(pressure):
+        return int(fft.next_fast_len(int(np.ceil(max(enough, lines, FEWEST_KNOTS)))))
+    return whole * int(np.ceil(max(enough, FEWEST_KNOTS) / whole))
+
+
+def _rate(pressure: MovingPressure) -> float:
+    """Samples a second of a Tacton with a rhythm or signal, none of whose lines folds back below
+    `HIGHEST`.
+    """
+    tacton, degree = pressure.tacton, pressure.law.degree
+    made = highest_passing(pressure) + (degree or KNOTS_PER_WIDTH) * sum(tones(tacton))
+    made += tacton.signal.rate if tacton.signal else 0.0
+    return max(SAMPLED, HIGHEST + made)
+
+
+def _speed(tacton: Tacton) -> float:
+    """The greatest speed of a focus in m/s; of a recording but for `BRIEF` moves."""
+    path = tacton.trajectory
+    if path.shape != "recorded":
+        return path.drawing_frequency * path.length * (np.pi / 2 if path.is_eased else 1.0)
+    steps = np.diff(path.times)
+    moves = steps > 0
+    lengths = np.linalg.norm(np.diff(path.outline, axis=0), axis=1)
+    speeds, lasting = lengths[moves] / steps[moves], steps[moves]
+    order = np.argsort(speeds)
+    passed = np.cumsum(lasting[order])
+    at = np.searchsorted(passed, (1 - BRIEF) * passed[-1])
+    return float(speeds[order[min(at, len(order) - 1)]])

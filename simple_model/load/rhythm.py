@@ -1,0 +1,135 @@
+"""Rhythms (pulses) and sampled signals, which modulate a Tacton's amplitude in time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import isfinite
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from simple_model.choices import choose
+from simple_model.typing import Floats
+
+ROLES = ("modulation", "envelope")
+MOST_SAMPLES = 2_000_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rhythm:
+    """Pulses and gaps, repeated from the start of the Tacton to its end.
+
+    Parameters
+    ----------
+    pulses : (n, 2), s: how long each pulse lasts, above 0, and the gap after it, 0 or above
+    ramp : float, s, linear rise at the start of each pulse and fall at its end, both within it
+
+    Raises
+    ------
+    ValueError
+        If there is no pulse, or a value is not finite or out of range.
+    """
+
+    pulses: tuple[tuple[float, float], ...]
+    ramp: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.pulses:
+            raise ValueError("a rhythm has no pulses; give at least one, or leave the rhythm out")
+        for on, gap in self.pulses:
+            if not (isfinite(on) and isfinite(gap) and on > 0 and gap >= 0):
+                raise ValueError(
+                    f"a pulse of {1e3 * on:g} ms with a gap of {1e3 * gap:g} ms must last longer "
+                    "than 0 and its gap 0 or longer"
+                )
+        shortest = min(on for on, _ in self.pulses)
+        if not (isfinite(self.ramp) and 0 <= self.ramp <= shortest / 2):
+            raise ValueError(
+                f"ramp = {1e3 * self.ramp:g} ms is outside 0..{1e3 * shortest / 2:g} ms, half the "
+                "shortest pulse; shorten it"
+            )
+
+    @property
+    def period(self) -> float:
+        """Seconds after which the pulses repeat."""
+        return float(np.sum(self.pulses))
+
+    @cached_property
+    def edges(self) -> Floats:
+        """Times (k,) in s within a period at which the level jumps."""
+        if self.ramp:
+            return np.empty(0)
+        lengths = np.array(self.pulses)
+        starts = np.cumsum(lengths.sum(axis=1)) - lengths.sum(axis=1)
+        gaps = lengths[:, 1] > 0
+        return np.concatenate([starts[np.roll(gaps, 1)], (starts + lengths[:, 0])[gaps]])
+
+    def level(self, t: ArrayLike) -> Floats:
+        """Level (...), 0..1, at times (...) in s from the start of the Tacton."""
+        knots, levels = self._knots
+        t = np.asarray(t, np.float64)
+        # The first sample of a pulse belongs to it, whatever the rounding of its time.
+        into = np.mod(t / self.period + 1e-12, 1.0) * self.period
+        before = np.minimum(np.searchsorted(knots, into, side="right") - 1, len(knots) - 2)
+        step = np.maximum(knots[before + 1] - knots[before], 1e-300)
+        part = np.clip((into - knots[before]) / step, 0.0, 1.0)
+        return np.asarray(levels[before] + part * (levels[before + 1] - levels[before]))
+
+    @cached_property
+    def _knots(self) -> tuple[Floats, Floats]:
+        """Times (k,) in s and levels (k,) between which the level is linear."""
+        starts = np.concatenate([[0.0], np.cumsum(np.sum(self.pulses, axis=1))])
+        knots = [
+            (start, start + self.ramp, start + on - self.ramp, start + on, end)
+            for start, end, (on, _) in zip(starts, starts[1:], self.pulses, strict=False)
+        ]
+        return np.ravel(knots), np.tile([0.0, 1.0, 1.0, 0.0, 0.0], len(knots))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Signal:
+    """A sampled waveform, straight from sample to sample and repeated to the Tacton's end.
+
+    Parameters
+    ----------
+    rate : float, Hz, samples per second
+    samples : (k,) of the modulation, -1..1, or of the amplitude, 0..1
+    role : "modulation" multiplies the AM sinusoids, within the drive law; "envelope" multiplies
+        the amplitude, as a rhythm does
+
+    Raises
+    ------
+    ValueError
+        If there are no samples, or a value is unknown, not finite or out of range.
+    """
+
+    rate: float
+    samples: tuple[float, ...]
+    role: str = "modulation"
+
+    def __post_init__(self) -> None:
+        choose("signal role", self.role, ROLES)
+        if not (isfinite(self.rate) and self.rate > 0):
+            raise ValueError(f"signal rate = {self.rate} Hz must be a finite number above 0")
+        if not 1 < len(self.samples) <= MOST_SAMPLES:
+            raise ValueError(
+                f"a signal of {len(self.samples)} samples is outside 2..{MOST_SAMPLES:,}"
+            )
+        low = -1 if self.role == "modulation" else 0
+        if not ((self._values >= low) & (self._values <= 1)).all():
+            raise ValueError(f"samples of a signal must lie in {low}..1; scale them to full drive")
+
+    def at(self, t: ArrayLike) -> Floats:
+        """Value (...) at times (...) in s."""
+        at = np.mod(np.asarray(t, np.float64) * self.rate, len(self.samples))
+        return np.asarray(np.interp(at, np.arange(len(self._values) + 1), self._round))
+
+    @cached_property
+    def _values(self) -> Floats:
+        return np.array(self.samples, np.float64)
+
+    @cached_property
+    def _round(self) -> Floats:
+        """The samples and the first of them again."""
+        return np.append(self._values, self._values[0])

@@ -1,0 +1,301 @@
+"""Line spectrum of a periodic load, exact, before any body responds to it.
+
+    q(x, t) = Q(t) sum_j S(x - X(f_d t + a_j))
+    Q = sum_m c_m exp(2 pi i f_m t),  S = sum_n s_n(x) exp(2 pi i n f_d t)
+
+so that a line at f = f_m + n f_d has the pattern c_m s_n(x) sum_j exp(2 pi i n a_j): n foci at even
+phases leave only every n-th harmonic of the path.
+
+A rhythm or a signal makes Q more than a few sinusoids, and a path that jumps may be longer than the
+Tacton. The lines are then those of the Tacton repeated periodically, at multiples of one over its
+duration, as if it were a path of that period with Q along it. From rest that is the same load
+within that time, by causality.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from simple_model.load.drive import DriveLaw
+from simple_model.load.focus import spot_reach
+from simple_model.load.path_cells import (
+    HIGHEST,
+    harmonics,
+    is_abrupt,
+    path_cells,
+    path_fourier,
+    path_samples,
+)
+from simple_model.load.pressure import MovingPressure, check_lines
+from simple_model.load.tacton import modulation_at_phases, tones
+from simple_model.typing import Complex, Floats
+
+PHASES = 8  # of each sinusoid at least; more than twice the degree of a drive law
+MOST_PHASES = 2**10, 2**20  # of one sinusoid, and of all, for a drive law that is no polynomial
+ALIASED = 1e-4  # of the strongest: a drive law's harmonics beyond those that are sampled
+MANY, RAISED = 20, 8  # lines of a jump; the power of frequency with which the last are raised
+LINES_AT_ONCE = 2**24  # lines at places, some hundred megabytes
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LoadSpectrum:
+    """Spectral lines of a load at `frequencies` (f,) in Hz >= 0, several of which may coincide.
+
+    Re (`coefficients` (f,) in Pa times harmonic `harmonics` (f,) of the focal spot along the path
+    times exp(2 pi i f t)) is the pressure of a line; `strengths` (f,) in Pa is its largest
+    amplitude on the path.
+    """
+
+    frequencies: Floats
+    harmonics: NDArray[np.int_]
+    coefficients: Complex
+    strengths: Floats
+
+    def gather(self, of_path: Complex) -> tuple[Floats, Complex]:
+        """Distinct frequencies (g,) in Hz and the sum (g, ...) of the lines at each, from the
+        harmonics (n, ...) along the path.
+        """
+        distinct, which = np.unique(np.round(self.frequencies, 9), return_inverse=True)
+        shape = (len(distinct), len(of_path))
+        orders = self.harmonics % len(of_path)
+        table = sparse.csr_array((self.coefficients, (which, orders)), shape=shape)
+        return distinct, np.asarray(table @ of_path)
+
+
+def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadSpectrum:
+    """Lines whose pressure, at the path, exceeds a fraction of the strongest line's; of a load
+    that is zero, the mean alone.
+
+    Raises
+    ------
+    ValueError
+        As `pressure.check_lines` does.
+    """
+    check_lines(pressure)
+    tacton, (n, of_spot) = pressure.tacton, path_strengths(pressure, threshold)
+    whole, frequency = path_cells(pressure).of_tacton, path_cells(pressure).frequency
+    tone, gain = (np.zeros(1), np.ones(1)) if whole else _gain_lines(pressure)
+    f = (n[:, None] * frequency + tone).ravel()
+    f, order = np.round(f, 9), np.repeat(n, len(tone))  # f_AM - 2 f_d may be 0 but for round-off
+    c = (foci_harmonics(pressure, n)[:, None] * gain).ravel() * np.where(f > 0, 2, 1)
+    strength = np.abs(c) * np.repeat(of_spot, len(tone))
+    kept = (f >= 0) & (strength > threshold * strength.max())
+    if whole or tacton.trajectory.shape == "recorded" or is_abrupt(pressure):
+        kept &= f <= HIGHEST
+    if not kept.any():
+        kept = (order == 0) & (f == 0)
+    return LoadSpectrum(
+        frequencies=np.abs(f[kept]),
+        harmonics=order[kept],
+        coefficients=c[kept],
+        strengths=strength[kept],
+    )
+
+
+def lines_from_rest(pressure: MovingPressure) -> LoadSpectrum:
+    """Lines that give a body the impulse of the load after its start.
+
+    The lines of a jump d that end at a frequency F lack an impulse of d / (2 pi^2 F) after it, as
+    if it came 5 us late. With factors of 1 + (n - 1) (f / F)^n, whose integral over 1/f^2 is that
+    of the lines beyond F, many lines have it.
+
+    Parameters
+    ----------
+    pressure : MovingPressure
+
+    Returns
+    -------
+    LoadSpectrum
+
+    Raises
+    ------
+    ValueError
+        As `load_lines` does.
+    """
+    lines, whole = load_lines(pressure), path_cells(pressure)
+    few = whole.frequency * MANY > HIGHEST
+    if few or not (whole.of_tacton or is_abrupt(pressure)):
+        return lines
+    raised = 1 + (RAISED - 1) * (lines.frequencies / HIGHEST) ** RAISED
+    return replace(lines, coefficients=lines.coefficients * raised)
+
+
+def pressure_lines(
+    pressure: MovingPressure, points: Floats, threshold: float = 1e-6
+) -> tuple[Floats, Complex]:
+    """Load spectrum at points of the surface.
+
+    Parameters
+    ----------
+    pressure : MovingPressure
+    points : (n, 2 or 3) float, metre
+    threshold : as of `load_lines`
+
+    Returns
+    -------
+    frequencies : (f,) float, Hz, of the distinct lines
+    amplitudes : (f, n) complex, Pa
+    """
+    lines, knots = load_lines(pressure, threshold), path_samples(pressure)
+    points = np.asarray(points, np.float64)
+    count = max(1, len(points) * path_cells(pressure).cells.shape[0] // LINES_AT_ONCE)
+    parts = [
+        lines.gather(path_fourier(pressure, pressure.spot(some, knots).T).T)
+        for some in np.array_split(points, count)
+    ]
+    return parts[0][0], np.hstack([amplitudes for _, amplitudes in parts])
+
+
+def reduced_lines(pressure: MovingPressure, points: Floats, load: Floats) -> tuple[Floats, Complex]:
+    """Load spectrum in reduced coordinates, of `lines_from_rest`.
+
+    Parameters
+    ----------
+    pressure : MovingPressure
+    points : (k, 2 or 3) float, metre, of the surface
+    load : (k, r) float, reduced forces of unit pressure at each point
+
+    Returns
+    -------
+    frequencies : (f,) float, Hz, of the distinct lines
+    forces : (f, r) complex, reduced forces of the lines
+
+    Raises
+    ------
+    ValueError
+        As `pressure.check_lines` does.
+    """
+    return lines_from_rest(pressure).gather(path_forces(pressure, points, load))
+
+
+def path_forces(pressure: MovingPressure, points: Floats, load: Floats) -> Complex:
+    """Reduced forces of unit pressure on the path, by harmonic of the path.
+
+    Parameters
+    ----------
+    pressure, points, load : as for `reduced_lines`; but for a rhythm or signal the modulation does
+        not matter
+
+    Returns
+    -------
+    (n, r) complex, -n is harmonic -n
+    """
+    knots, reach = path_samples(pressure), spot_reach(pressure.height, pressure.profile)
+    forces = []
+    for part in np.array_split(knots, len(knots) // 64 + 1):
+        low, high = part.min(axis=0) - reach, part.max(axis=0) + reach
+        near = ((points[:, :2] > low) & (points[:, :2] < high)).all(axis=1)
+        forces.append(pressure.spot(points[near], part) @ load[near])
+    return path_fourier(pressure, np.vstack(forces).T).T
+
+
+def path_strengths(pressure: MovingPressure, threshold: float) -> tuple[NDArray[np.int_], Floats]:
+    """Orders (n,) of the harmonics of `path_cells` that, with all foci, exceed a fraction of the
+    strongest, and 0; and their largest amplitude (n,) at about eight points of the path.
+    """
+    of_spot, n = _largest_harmonics(pressure), harmonics(pressure)
+    share = np.abs(foci_harmonics(pressure, n)) * of_spot[n]
+    heard = (share > threshold * share.max()) | (n == 0)
+    return n[heard], of_spot[n[heard]]
+
+
+@lru_cache(maxsize=8)  # lines, their names and maps are of the same load
+def _largest_harmonics(pressure: MovingPressure) -> Floats:
+    knots = path_samples(pressure)
+    spots = pressure.spot(knots[:: max(1, len(knots) // 8)][:9], knots).T
+    found = np.abs(path_fourier(pressure, spots)).max(axis=0)
+    found.setflags(write=False)
+    return found
+
+
+def foci_harmonics(pressure: MovingPressure, n: NDArray[np.int_]) -> Complex:
+    """Array factor (k,) of all foci on harmonics n (k,) of one; 1 for a single focus, and where the
+    harmonics are those of the Tacton.
+    """
+    if path_cells(pressure).of_tacton:
+        return np.ones(len(n), np.complex128)
+    return np.asarray(np.exp(2j * np.pi * n[:, None] * pressure.tacton.foci).sum(axis=1))
+
+
+def synthesise(frequencies: Floats, amplitudes: Complex, times: Floats) -> Floats:
+    """Fourier synthesis Re sum a exp(2 pi i f t).
+
+    Parameters
+    ----------
+    frequencies : (f,) float, Hz
+    amplitudes : (f, p) complex
+    times : (t,) float, s
+
+    Returns
+    -------
+    (t, p) float, in the unit of the amplitudes
+    """
+    turn = np.exp(2j * np.pi * np.outer(times, frequencies))
+    return np.asarray(turn.real @ amplitudes.real - turn.imag @ amplitudes.imag)
+
+
+def merge_lines(frequencies: Floats, amplitudes: Complex) -> tuple[Floats, Complex]:
+    """Lines merged by frequency: distinct ones (g,) in Hz and the sums (g, ...) of amplitudes."""
+    distinct, which = np.unique(np.round(frequencies, 9), return_inverse=True)
+    total = np.zeros((len(distinct), *amplitudes.shape[1:]), np.complex128)
+    np.add.at(total, which, amplitudes)
+    return distinct, total
+
+
+def _gain_lines(pressure: MovingPressure) -> tuple[Floats, Complex]:
+    """Frequencies (m,) in Hz of either sign and coefficients (m,) in Pa of the gain."""
+    orders, (c,) = gain_orders(pressure)
+    kept = np.abs(c) >= 1e-12 * np.abs(c).max()
+    return orders[kept] @ np.array(tones(pressure.tacton)), c[kept]
+
+
+def gain_orders(
+    pressure: MovingPressure, factors: Sequence[float] = (1.0,)
+) -> tuple[NDArray[np.int_], Complex]:
+    """Orders (m, 3) of f_AM, f_AM2 and f_e in the gain, of either sign, and its coefficients (k, m)
+    in Pa where the modulation is multiplied by factors (k,). All of a polynomial drive law; of
+    another the phases are doubled until harmonics in the upper half of the orders are below
+    `ALIASED`.
+
+    Raises
+    ------
+    ValueError
+        If `MOST_PHASES` are not enough for that.
+    """
+    law, n_tones = pressure.law, np.count_nonzero(tones(pressure.tacton))
+    count = PHASES if law.degree is None else max(PHASES, 2 * law.degree + 2)
+    each, together = MOST_PHASES
+    while law.degree is not None or (count <= each and count**n_tones <= together):
+        orders, c = _at_phases(pressure, factors, count)
+        beyond = (4 * np.abs(orders) >= count).any(axis=1)
+        strongest = np.abs(c).max()
+        if law.degree is not None or np.abs(c[:, beyond]).max(initial=0.0) <= ALIASED * strongest:
+            return orders, c
+        count *= 2
+    raise harmonics_unbounded(law)
+
+
+def harmonics_unbounded(law: DriveLaw) -> ValueError:
+    """Error of a drive law whose harmonics do not fall off."""
+    return ValueError(
+        f"the harmonics that drive law '{law}' makes of the modulation do not fall to {ALIASED:g} "
+        "of the strongest; make it smoother, or modulate by fewer tones"
+    )
+
+
+def _at_phases(
+    pressure: MovingPressure, factors: Sequence[float], count: int
+) -> tuple[NDArray[np.int_], Complex]:
+    """Orders (m, 3) and coefficients (k, m) from so many phases of each sinusoid."""
+    tacton = pressure.tacton
+    counts = [count if f else 1 for f in tones(tacton)]
+    grid = np.meshgrid(*(2 * np.pi * np.arange(n) / n for n in counts), indexing="ij")
+    modulation = modulation_at_phases(tacton, *grid)
+    of_each = np.meshgrid(*(np.fft.fftfreq(n, 1 / n) for n in counts), indexing="ij")
+    orders = np.stack([np.round(each).astype(int).ravel() for each in of_each], axis=1)
+    driven = (pressure.driven(factor * modulation) for factor in factors)
+    return orders, np.stack([(np.fft.fftn(each) / each.size).ravel() for each in driven])

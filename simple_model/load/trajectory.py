@@ -1,0 +1,361 @@
+"""Trajectory of the focus: a named shape, a polyline at constant speed, or a path recorded in time.
+
+Named shapes: Lim, Seifi and Park, CHI EA '24, section 2.2. Positions are computed from the phase
+of the drawing period, never by adding steps, and so are as exact at 10 s as at 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from math import isfinite, pi, sqrt
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from simple_model.choices import choose
+from simple_model.typing import Floats, Points
+
+SHAPES = ("point", "line", "circle", "triangle", "square")  # defined by a size alone
+BY_POINTS = ("polyline", "recorded")
+SWEEPS = ("there_and_back", "one_way", "sinusoidal")
+LARGEST = 0.060  # m, the size of a palm
+FURTHEST = 0.300  # m of a point's coordinates, which devices steer to
+MOST_POINTS = 1_000_000
+STRAIGHT = 1e-5  # m between a path that is a function and the points that stand for it
+NEARBY = 1e-6  # of a period, over which a tangent is taken; and of its part between two points
+STRAIGHT_ON = 1e-3  # of a unit tangent, below which it does not turn
+STILL = 1e-7, 1e-6  # m and of the level, below which nothing jumps
+JUST_AFTER = 1e-9  # of the mean step of a recording, so that a sample holds at its own time
+
+_TRIANGLE = np.array([[0, 1 / sqrt(3)], [-0.5, -0.5 / sqrt(3)], [0.5, -0.5 / sqrt(3)]])
+_SQUARE = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])
+_LINE = np.array([[-0.5, 0.0], [0.5, 0.0]])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trajectory:
+    """A path in the skin plane; the named shapes are run anticlockwise about the centre.
+
+    Parameters
+    ----------
+    shape : one of `SHAPES` or `BY_POINTS`
+    size : float, metre, 0..0.06: length of the line, diameter of the circle, side of the others;
+        0 for "polyline" and "recorded", whose points say it
+    speed : float, m/s, along the path; 0 for "recorded", whose times say it
+    sweep : how a line or an open polyline is repeated: "there_and_back" (f_d = speed / 2 length),
+        "one_way" (f_d = speed / length, then a jump back) or "sinusoidal" (there and back as a
+        cosine of time, with `speed` on average); devices differ
+    centre : (x, y), metre, what all positions are moved by
+    points : (k, 2), metre, corners of a polyline, which runs round without end if its last is its
+        first; or the positions of a recording
+    times : (k,), s, from 0, never falling: when a recording is at its points. It ends with the
+        last and begins anew, so that its period is times[-1]; equal times are a jump
+    levels : (k,), 0..1, of the amplitude, at those times; 1 throughout if empty
+    hold : bool, whether a recording stays at a point until the next (zero-order hold, what
+        devices do), rather than going there in a straight line
+
+    Raises
+    ------
+    ValueError
+        If a value is unknown, not finite or out of range.
+    """
+
+    shape: str = "point"
+    size: float = 0.0
+    speed: float = 0.0
+    sweep: str = "there_and_back"
+    centre: tuple[float, float] = (0.0, 0.0)
+    points: Points = ()
+    times: tuple[float, ...] = ()
+    levels: tuple[float, ...] = ()
+    hold: bool = False
+
+    def __post_init__(self) -> None:
+        choose("shape", self.shape, (*SHAPES, *BY_POINTS))
+        choose("sweep", self.sweep, SWEEPS)
+        if not (isfinite(self.size) and 0 <= self.size <= LARGEST):
+            cure = "make the path smaller" if self.size > LARGEST else "give a size of 0 or above"
+            raise ValueError(
+                f"size = {1e3 * self.size:g} mm is outside 0..{1e3 * LARGEST:g} mm, "
+                f"the size of a palm; {cure}"
+            )
+        if not (isfinite(self.speed) and self.speed >= 0):
+            raise ValueError(f"speed = {self.speed} m/s must be a finite number, 0 or above")
+        _check_points(self)
+        if self.shape == "recorded":
+            _check_recording(self)
+
+    @property
+    def length(self) -> float:
+        """Path length of one period, metre."""
+        if self.shape in BY_POINTS:
+            steps = float(self._arc[-1])
+            return steps if self._runs_on else 2 * steps
+        sides = {"point": 0.0, "line": 2.0, "circle": pi, "triangle": 3.0, "square": 4.0}
+        one_way = self.shape == "line" and self.sweep == "one_way"
+        return self.size * (1.0 if one_way else sides[self.shape])
+
+    @property
+    def drawing_frequency(self) -> float:
+        """Periods per second, Hz; 0 where the focus does not move."""
+        if self.shape == "recorded":
+            return 1 / self.times[-1]
+        return self.speed / self.length if self.length > 0 else 0.0
+
+    @property
+    def is_static(self) -> bool:
+        """Whether the focus stays where it starts."""
+        return self.drawing_frequency == 0
+
+    @property
+    def is_eased(self) -> bool:
+        """Whether the speed goes as a sine, and is pi/2 times the mean at its greatest."""
+        open_ended = self.shape == "line" or (self.shape == "polyline" and not self._runs_on)
+        return self.sweep == "sinusoidal" and open_ended
+
+    @property
+    def outline(self) -> Floats:
+        """Positions (k, 2) in metre whose convex hull contains the path."""
+        if self.shape in BY_POINTS:
+            return self._corners + self.centre
+        return self.at_phase(np.linspace(0, 1, 721))
+
+    def phase(self, t: ArrayLike) -> Floats:
+        """Fraction 0..1 of the period at times t in s, same shape as t."""
+        return np.mod(self.drawing_frequency * np.asarray(t, np.float64), 1.0)
+
+    def position(self, t: ArrayLike) -> Floats:
+        """Position (..., 2) in metre at times (...) in s."""
+        return self.at_phase(self.phase(t))
+
+    def at_phase(self, phase: ArrayLike) -> Floats:
+        """Position (..., 2) in metre at fractions (...) of the period, 0 to 1."""
+        around = self._about_origin(np.asarray(phase, np.float64))
+        return around + self.centre if any(self.centre) else around
+
+    def tangent_at_phase(self, phase: ArrayLike) -> Floats:
+        """Unit tangent (..., 2), the way the focus goes at fractions (...) of the period; 0 where
+        it rests.
+        """
+        phase = np.asarray(phase, np.float64)
+        step = NEARBY / max(1, len(self.points))
+        way = np.subtract(*(self.at_phase(np.mod(phase + d, 1.0)) for d in (step, -step)))
+        length = np.linalg.norm(way, axis=-1, keepdims=True)
+        return np.asarray(way / np.where(length > 0, length, 1.0))
+
+    def level_at_phase(self, phase: ArrayLike) -> Floats:
+        """Level (...) of the amplitude, 0..1, at fractions (...) of the period."""
+        phase = np.asarray(phase, np.float64)
+        if not self.levels:
+            return np.ones_like(phase)
+        before, part = self._between(phase)
+        level = np.array(self.levels)
+        return np.asarray(level[before] + part * (level[before + 1] - level[before]))
+
+    @cached_property
+    def parts(self) -> tuple[Floats, Floats]:
+        """Fractions (s + 1,) of the period, from 0 to 1, between which the path is smooth, and the
+        length (s,) of each part in metre.
+        """
+        if self.shape == "recorded":
+            clock = self._clock
+            bounds = np.unique(clock) / clock[-1]
+            steps = np.linalg.norm(np.diff(self._corners, axis=0), axis=1)[np.diff(clock) > 0]
+            return bounds, np.zeros_like(steps) if self.hold else steps
+        if self.shape == "polyline" and self.length > 0:
+            bounds = np.unique(self._arc) / self._arc[-1]
+            if not self._runs_on:
+                way = np.arccos(1 - 2 * bounds) / pi if self.is_eased else bounds
+                bounds = np.concatenate([way, 2 - way[-2::-1]]) / 2
+        else:
+            sides = {"triangle": 3, "square": 4, "line": 2}.get(self.shape, 1)
+            whole = self.is_eased or self.sweep == "one_way"
+            bounds = np.linspace(0, 1, (1 if self.shape == "line" and whole else sides) + 1)
+        share = pi / 2 if self.is_eased else 1.0  # at its fastest
+        return bounds, share * self.length * np.diff(bounds)
+
+    @cached_property
+    def jumps(self) -> Floats:
+        """Fractions (j,) of the period, 0 included and 1 not, at which position or level jumps."""
+        starts = self.parts[0][:-1]
+        return starts[differ(*self.beside(starts))]
+
+    @cached_property
+    def turns(self) -> Floats:
+        """Fractions (j,) of the period, 0 included and 1 not, at which the direction jumps."""
+        starts, aside = self.parts[0][:-1], 2 * NEARBY / max(1, len(self.points))
+        ways = self.tangent_at_phase(np.mod([starts - aside, starts + aside], 1.0))
+        return starts[np.abs(ways[1] - ways[0]).max(axis=-1) > STRAIGHT_ON]
+
+    def beside(self, phases: Floats) -> tuple[Floats, Floats]:
+        """Positions and level (k, 3) just before and just after fractions (k,) of the period."""
+        aside = np.mod([phases - self._nearby, phases + self._nearby], 1.0)
+        before, after = (np.column_stack([self.at_phase(a), self.level_at_phase(a)]) for a in aside)
+        return before, after
+
+    def within_part(self, part: int, along: Floats) -> Floats:
+        """Positions (k, 2) in metre at fractions (k,) of the time of a part, ends included."""
+        start, end = self.parts[0][part : part + 2]
+        phases = start + (end - start) * along
+        return self.at_phase(np.clip(phases, start + self._nearby, end - self._nearby))
+
+    @property
+    def _nearby(self) -> float:
+        """Fraction of the period that nothing moves in, but that tells a time from the next."""
+        return 2 * JUST_AFTER / max(1, len(self.points) - 1)
+
+    def _about_origin(self, phase: Floats) -> Floats:
+        if self.shape == "point":
+            return np.zeros((*phase.shape, 2))
+        if self.shape == "circle":
+            angle = 2 * pi * phase
+            return self.size / 2 * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        if self.shape == "recorded":
+            before, part = self._between(phase)
+            start = self._corners[before]
+            return np.asarray(start + part[..., None] * (self._corners[before + 1] - start))
+        if self.shape == "polyline":
+            return self._along(self._corners, self._arc, phase)
+        if self.shape == "line" and self.sweep == "sinusoidal":
+            return self.size * self._along(_LINE, np.array([0.0, 1.0]), phase)
+        corners = {"line": _LINE, "triangle": _TRIANGLE, "square": _SQUARE}[self.shape]
+        if not (self.shape == "line" and self.sweep == "one_way"):
+            corners = np.vstack([corners, corners[:1]])
+        knots = np.linspace(0, 1, len(corners))
+        unit = [np.interp(phase, knots, corners[:, axis]) for axis in range(2)]
+        return self.size * np.stack(unit, axis=-1)
+
+    def _along(self, corners: Floats, arc: Floats, phase: Floats) -> Floats:
+        """Position where the sweep has got to on the line through corners at arc lengths."""
+        if self.sweep == "sinusoidal" and not self._runs_on:
+            phase = (1 - np.cos(2 * pi * phase)) / 2
+        elif not self._runs_on:
+            phase = 1 - np.abs(1 - 2 * phase)
+        at = phase * arc[-1]
+        return np.stack([np.interp(at, arc, corners[:, axis]) for axis in range(2)], axis=-1)
+
+    @property
+    def _runs_on(self) -> bool:
+        """Whether a period is one run along the points."""
+        closed = len(self.points) > 2 and self.points[0] == self.points[-1]
+        return self.shape == "recorded" or self.sweep == "one_way" or closed
+
+    @cached_property
+    def _corners(self) -> Floats:
+        return np.array(self.points, np.float64)
+
+    @cached_property
+    def _arc(self) -> Floats:
+        """Arc length (k,) in metre up to each point."""
+        steps = np.linalg.norm(np.diff(self._corners, axis=0), axis=1)
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
+    @cached_property
+    def _clock(self) -> Floats:
+        return np.array(self.times, np.float64)
+
+    def _between(self, phase: Floats) -> tuple[NDArray[np.int_], Floats]:
+        """Index of the last point of a recording, and the fraction of the way to the next."""
+        clock = self._clock
+        t = phase * clock[-1]
+        late = t + JUST_AFTER * clock[-1] / (len(clock) - 1)
+        before = np.minimum(np.searchsorted(clock, late, side="right") - 1, len(clock) - 2)
+        if self.hold:
+            return before, np.zeros_like(t)
+        step = np.maximum(clock[before + 1] - clock[before], 1e-300)
+        return before, np.clip((t - clock[before]) / step, 0.0, 1.0)
+
+
+def differ(before: Floats, after: Floats) -> NDArray[np.bool_]:
+    """Mask (k,) of positions and levels (k, 3) that are not the same."""
+    place, level = STILL
+    apart = np.abs(after - before)
+    return (apart[:, :2] > place).any(axis=1) | (apart[:, 2] > level)
+
+
+def timed_path(position: Callable[[Floats], Floats], period: float) -> Trajectory:
+    """Recorded path whose positions (k, 2) in metre are a function of times (k,) in s, from 0 to
+    `period`, within `STRAIGHT`.
+
+    Raises
+    ------
+    ValueError
+        If the function jumps, or returns no positions.
+    """
+    t = _resolving(position, period)
+    points = tuple(map(tuple, position(t).tolist()))
+    return Trajectory(shape="recorded", points=points, times=tuple(t.tolist()))
+
+
+def arc_path(position: Callable[[Floats], Floats], speed: float) -> Trajectory:
+    """Polyline at a constant speed in m/s whose positions (k, 2) in metre are a function of
+    parameters (k,) from 0 to 1, within `STRAIGHT`; closed if it ends where it begins.
+
+    Raises
+    ------
+    ValueError
+        If the function jumps, or returns no positions.
+    """
+    points = np.array(position(_resolving(position, 1.0)), np.float64)
+    if np.linalg.norm(points[-1] - points[0]) < STRAIGHT:
+        points[-1] = points[0]
+    return Trajectory(shape="polyline", points=tuple(map(tuple, points.tolist())), speed=speed)
+
+
+def _resolving(position: Callable[[Floats], Floats], end: float) -> Floats:
+    """Arguments (k,) from 0 to `end` between which the path is straight."""
+    count = 64
+    while count < MOST_POINTS:
+        u = np.linspace(0, end, count + 1)
+        x, between = (np.asarray(position(each), np.float64) for each in (u, u[1:] - u[1] / 2))
+        if x.shape != (count + 1, 2) or not np.isfinite(x).all():
+            raise ValueError(
+                f"the path's function gives shape {x.shape} for {count + 1} arguments; return "
+                "finite positions (k, 2) in metre"
+            )
+        if np.linalg.norm(between - (x[1:] + x[:-1]) / 2, axis=1).max() <= STRAIGHT:
+            return u
+        count *= 2
+    raise ValueError(
+        "the path's function jumps; give its points and times as a recorded Trajectory"
+    )
+
+
+def _check_points(path: Trajectory) -> None:
+    given = path.shape in BY_POINTS
+    if given and (path.size != 0 or len(path.points) < 2):
+        raise ValueError(
+            f"a {path.shape} path has {len(path.points)} points and size {1e3 * path.size:g} mm; "
+            "give it two points or more and no size"
+        )
+    if not given and path.points:
+        raise ValueError(f"a {path.shape} has no points; leave them out or take shape 'polyline'")
+    if len(path.points) > MOST_POINTS:
+        raise ValueError(f"{len(path.points):,} points exceed the limit of {MOST_POINTS:,}")
+    try:
+        places = np.array([path.centre, *path.points], np.float64)
+        outside = not (np.abs(places) <= FURTHEST).all()  # and where it is no number
+    except (TypeError, ValueError):
+        raise ValueError("points and centre must be pairs of numbers, such as (0.01, 0)") from None
+    if places.shape[1:] != (2,) or outside:
+        raise ValueError(
+            f"points and centre must be pairs within {1e3 * FURTHEST:g} mm of the origin, "
+            "where devices steer to; move or shrink the path"
+        )
+
+
+def _check_recording(path: Trajectory) -> None:
+    times, levels = np.array(path.times, np.float64), np.array(path.levels, np.float64)
+    if path.speed != 0:
+        raise ValueError("a recorded path has its own timing; leave speed out")
+    if len(times) != len(path.points) or len(levels) not in (0, len(times)):
+        raise ValueError(
+            f"a recorded path has {len(path.points)} points, {len(times)} times and {len(levels)} "
+            "levels; give as many of each, or no levels"
+        )
+    if not (np.isfinite(times).all() and times[0] == 0 < times[-1] and (np.diff(times) >= 0).all()):
+        raise ValueError("times of a recorded path must be finite, begin with 0 and never fall")
+    if not ((levels >= 0) & (levels <= 1)).all():
+        raise ValueError("levels of a recorded path must lie in 0..1; scale them to full drive")

@@ -1,0 +1,1 @@
+"""Thin plates: modes, the air on them, sheet waves and large deflection."""

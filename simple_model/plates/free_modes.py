@@ -1,0 +1,147 @@
+"""Free vibration of a plate's modes with Maxwell branches in bending.
+
+A mode of squared frequency w^2, of which a share e is bending, has the dynamic stiffness
+
+    D(s) = s^2 + w^2 [1 - e + e h(s)],   h(s) = h_0 + lag s + sum_j h_j s tau_j / (1 + s tau_j),
+
+and, by its poles p, the compliance 1 / D(s) = sum_p 1 / (D'(p) (s - p)): a vibration, and the creep
+of each branch. Poles are eigenvalues of the equations with the stretches d_j of the branches,
+
+    u'' = -w^2 [(1 - e + e h_0) u + e lag u' + e sum_j h_j d_j],   d_j' = u' - d_j / tau_j.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from simple_model.layers.material import Material
+from simple_model.plates.modes import PlateModes
+from simple_model.typing import Complex, Floats
+
+POLISHED = 3  # steps of Newton's method on eigenvalues
+CRITICAL = 1e-6  # relative distance of two poles below which a mode is made a little stiffer
+STIFFER = 1.0001
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FreeModes:
+    """Poles (m, j) in 1/s of m modes and `residues` (m, j) in s of their compliances. Of conjugate
+    poles one has all, the other none, and real ones have half: twice the real part counts all.
+    """
+
+    poles: Complex
+    residues: Complex
+
+    def start(self, frequencies: Floats, forces: Complex) -> Complex:
+        """Amplitudes (m, j) of exp(pole t) that end the rest of all modes before t = 0, under modal
+        forces Re sum F exp(2 pi i f t), with F (f, m) at frequencies (f,) in Hz.
+
+        A line makes F residue [exp(2 pi i f t) - exp(pole t)] / (2 pi i f - pole).
+        """
+        found = np.zeros(self.poles.shape, np.complex128)
+        for s, force in zip(2j * np.pi * frequencies, forces, strict=True):
+            found -= force[:, None] / (s - self.poles) + force.conj()[:, None] / (-s - self.poles)
+        return found * self.residues
+
+    def impulse(self, place: Floats, speed: Floats) -> Complex:
+        """Amplitudes (m, j) of exp(pole t) after modes have been set to a place (m,) and a speed
+        (m,), metre kg^1/2 and per s.
+        """
+        return 2 * self.residues * (self.poles * place[:, None] + speed[:, None])
+
+
+def free_modes(modes: PlateModes, material: Material) -> FreeModes:
+    """Poles and residues of the modes of a plate.
+
+    Parameters
+    ----------
+    modes : PlateModes, with the `shear_modulus` of the material
+    material : Material, without a modulus law of its own
+
+    Returns
+    -------
+    FreeModes
+    """
+    squared = np.maximum(modes.squared, np.finfo(float).tiny)
+    bent = squared * modes.elastic
+    return free_vibration(*relaxing_stiffness(squared - bent, bent, material))
+
+
+def relaxing_stiffness(lossless: Floats, bent: Floats, material: Material) -> tuple[Floats, Floats]:
+    """Stiffness of modes of a material with Maxwell branches.
+
+    Parameters
+    ----------
+    lossless : (m,) 1/s2, the part of the squared frequencies without loss
+    bent : (m,) 1/s2, the part that goes with the material's modulus, at its `shear_modulus`
+    material : Material, without a modulus law of its own
+
+    Returns
+    -------
+    stiffness (m, 2 + n) and times (n,) in s, as `free_vibration` takes them
+    """
+    solid, mu = material.without_loss_factor(), material.shear_modulus
+    terms = [term for term in solid.prony if term.modulus]
+    relaxing, times = (
+        np.array([getattr(term, name) for term in terms]) for name in ("modulus", "time")
+    )
+    stiffness = np.column_stack([
+        lossless + bent * solid.shear_modulus / mu,
+        bent * solid.viscosity / mu,
+        bent[:, None] * relaxing / mu,
+    ])  # fmt: skip
+    return stiffness, times
+
+
+def free_vibration(stiffness: Floats, times: Floats) -> FreeModes:
+    """Poles and residues of modes.
+
+    Parameters
+    ----------
+    stiffness : (m, 2 + n): at rest in 1/s2, viscous in 1/s, and of each Maxwell branch in 1/s2
+    times : (n,) s, of the branches
+
+    Returns
+    -------
+    FreeModes
+    """
+    poles = _poles(stiffness, times)
+    apart = np.abs(poles[:, :, None] - poles[:, None]) / np.abs(poles).max(axis=1)[:, None, None]
+    apart[:, range(poles.shape[1]), range(poles.shape[1])] = np.inf
+    if (critical := apart.min(axis=(1, 2)) < CRITICAL).any():
+        stiffness = stiffness * np.where(critical, STIFFER, 1.0)[:, None]
+        poles[critical] = _poles(stiffness[critical], times)
+    residues = 1 / _slope(stiffness, times, poles)
+    return FreeModes(poles=poles, residues=residues * (1 + np.sign(poles.imag)) / 2)
+
+
+def _poles(stiffness: Floats, times: Floats) -> Complex:
+    """Poles (m, 2 + n) of modes with `stiffness` (m, 2 + n) in 1/s2, the viscous part in 1/s, and
+    relaxation times (n,) in s.
+    """
+    n = 2 + len(times)
+    speed = np.sqrt(stiffness[:, 0])  # so that u' / speed is as large as u
+    companion = np.zeros((len(stiffness), n, n))
+    companion[:, 0, 1] = speed
+    companion[:, 1, 0] = -speed
+    companion[:, 1, 1] = -stiffness[:, 1]
+    companion[:, 1, 2:] = -stiffness[:, 2:] / speed[:, None]
+    companion[:, 2:, 1] = speed[:, None]
+    companion[:, range(2, n), range(2, n)] = -1 / times
+    poles = np.linalg.eigvals(companion).astype(np.complex128)
+    for _ in range(POLISHED):
+        poles -= _stiffness(stiffness, times, poles) / _slope(stiffness, times, poles)
+    return poles
+
+
+def _stiffness(stiffness: Floats, times: Floats, s: Complex) -> Complex:
+    """Dynamic stiffness D (m, j) at s (m, j) in rad/s."""
+    turned = s[..., None] * times
+    rest, viscous, relaxing = stiffness[:, :1], stiffness[:, 1:2], stiffness[:, None, 2:]
+    return s**2 + rest + viscous * s + (relaxing * turned / (1 + turned)).sum(axis=-1)
+
+
+def _slope(stiffness: Floats, times: Floats, s: Complex) -> Complex:
+    """Derivative D' (m, j) at s (m, j) in rad/s."""
+    relaxing = stiffness[:, None, 2:] * times / (1 + s[..., None] * times) ** 2
+    return 2 * s + stiffness[:, 1:2] + relaxing.sum(axis=-1)

@@ -1,0 +1,204 @@
+"""In-plane displacement of a rectangular plate that relieves a strain, by Ritz's method.
+
+    iint (A (e + sym grad (u, v))) : sym grad (du, dv) dA = 0
+
+u and v are products of continuous Legendre polynomials, of one symmetry. They are zero at edges and
+clips that hold the plate in its plane. At the other edges the energy makes the traction zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from simple_model.plates.modes import Plate, outside_clips
+from simple_model.plates.polynomials import LineBasis, continuous_basis
+from simple_model.typing import Floats
+
+# Whether a supported edge holds the in-plane displacement across it, and along it.
+IN_PLANE = {"held": (True, True), "sliding": (True, False), "movable": (False, False)}
+SHIFT = 1e-10  # of the mean stiffness, so that a plate which nothing holds can be solved
+MOVES = "xi,yj,ijp->pxy"
+GATHERS = "xi,yj,pxy->ijp"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Grid:
+    """Gauss points of a plate and the polynomials on it.
+
+    Along x and along y: `breaks` (e + 1,) in metre, whether functions are `split` in even and odd
+    ones, the `degrees` (e,) of polynomials on each piece, and the `points` and `weights` in metre.
+    """
+
+    breaks: tuple[Floats, Floats]
+    split: tuple[bool, bool]
+    degrees: tuple[list[int], list[int]]
+    points: tuple[Floats, Floats]
+    weights: tuple[Floats, Floats]
+
+    @staticmethod
+    def of(breaks: Sequence[Floats], split: Sequence[bool], degrees: Sequence[list[int]]) -> Grid:
+        """The grid that integrates products of two polynomials of these degrees exactly."""
+        (x, of_x), (y, of_y) = (
+            _gauss(ends, [n + 2 for n in each]) for ends, each in zip(breaks, degrees, strict=True)
+        )
+        return Grid(
+            breaks=(breaks[0], breaks[1]), split=(split[0], split[1]),
+            degrees=(degrees[0], degrees[1]), points=(x, y), weights=(of_x, of_y),
+        )  # fmt: skip
+
+    @property
+    def areas(self) -> Floats:
+        """Areas (x, y) of the points, m2."""
+        return np.outer(*self.weights)
+
+
+def _gauss(breaks: Floats, counts: Sequence[int]) -> tuple[Floats, Floats]:
+    """Gauss points and weights in metre on the pieces of a line."""
+    points, weights = [], []
+    for low, high, count in zip(breaks[:-1], breaks[1:], counts, strict=True):
+        nodes, each = np.polynomial.legendre.leggauss(count)
+        points.append((low + high) / 2 + (high - low) / 2 * nodes)
+        weights.append((high - low) / 2 * each)
+    return np.concatenate(points), np.concatenate(weights)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class InPlane:
+    """In-plane displacement for strains of one symmetry.
+
+    Parameters
+    ----------
+    A : (3, 3) N/m, stress resultants xx, yy, xy of strains xx, yy and 2 xy
+    grid : Grid
+    u, v : values and slopes of the functions of each component along x and along y
+    free : (n,) products of functions that no clip holds
+    factor : Cholesky factor of their stiffness
+    """
+
+    A: Floats
+    grid: Grid
+    u: tuple[_Line, _Line]
+    v: tuple[_Line, _Line]
+    free: NDArray[np.int_]
+    factor: Any
+
+    @staticmethod
+    def of(plate: Plate, A: Floats, grid: Grid, odd: tuple[int, int], in_plane: str) -> InPlane:
+        """The in-plane problem of a plate.
+
+        Parameters
+        ----------
+        plate : Plate
+        A : (3, 3) N/m
+        grid : Grid
+        odd : whether the strains xx are odd along x and along y, where functions are split
+        in_plane : one of `IN_PLANE`
+
+        Returns
+        -------
+        InPlane
+        """
+        u, v = (
+            tuple(
+                _Line.of(grid, axis, _functions(plate, grid, axis, component, odd[axis], in_plane))
+                for axis in (0, 1)
+            )
+            for component in (0, 1)
+        )
+        K = np.block([
+            [_stiffness(u, A[0, 0], A[2, 2]), _coupling(u, v, A)],
+            [_coupling(u, v, A).T, _stiffness(v, A[2, 2], A[1, 1])],
+        ])  # fmt: skip
+        M = linalg.block_diag(*(np.kron(x.basis.mass, y.basis.mass) for x, y in (u, v)))
+        free = np.flatnonzero(np.concatenate([_free_of_clips(plate, *lines) for lines in (u, v)]))
+        K, M = K[np.ix_(free, free)], M[np.ix_(free, free)]
+        factor = None
+        if len(free):
+            factor = linalg.cho_factor(K + SHIFT * np.trace(K) / np.trace(M) * M)
+        return InPlane(A=A, grid=grid, u=(u[0], u[1]), v=(v[0], v[1]), free=free, factor=factor)
+
+    def incompatible(self, strains: Floats) -> Floats:
+        """Strains (3, p, x, y) less those of the in-plane displacement that relieves them."""
+        if not len(self.free):
+            return strains
+        xx, yy, xy = np.tensordot(self.A, strains, axes=1) * self.grid.areas
+        (ux, uy), (vx, vy) = self.u, self.v
+        of_u = _sum(GATHERS, (ux.slopes, uy.values, xx), (ux.values, uy.slopes, xy))
+        of_v = _sum(GATHERS, (vx.values, vy.slopes, yy), (vx.slopes, vy.values, xy))
+        forces = np.concatenate([f.reshape(-1, f.shape[2]) for f in (of_u, of_v)])
+        moved = np.zeros_like(forces)
+        moved[self.free] = -linalg.cho_solve(self.factor, forces[self.free])
+        size = of_u.shape[0] * of_u.shape[1]
+        u, v = moved[:size].reshape(of_u.shape), moved[size:].reshape(of_v.shape)
+        return strains + np.stack([
+            _sum(MOVES, (ux.slopes, uy.values, u)), _sum(MOVES, (vx.values, vy.slopes, v)),
+            _sum(MOVES, (ux.values, uy.slopes, u), (vx.slopes, vy.values, v)),
+        ])  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Line:
+    """Functions along x or y with their values and slopes (points, i) on the grid, and the weights
+    (points,) of the grid.
+    """
+
+    basis: LineBasis
+    values: Floats
+    slopes: Floats
+    weights: Floats
+
+    @staticmethod
+    def of(grid: Grid, axis: int, basis: LineBasis) -> _Line:
+        at = grid.points[axis]
+        return _Line(
+            basis=basis, values=basis(at), slopes=basis.slopes(at), weights=grid.weights[axis]
+        )
+
+
+def _functions(
+    plate: Plate, grid: Grid, axis: int, component: int, odd: int, in_plane: str
+) -> LineBasis:
+    """Functions of u or v along x or y."""
+    names = (("left", "right"), ("front", "back"))[axis]
+    holds = IN_PLANE[in_plane][axis != component]
+    ends = ["simply" if holds and getattr(plate, name) != "free" else "free" for name in names]
+    lines = continuous_basis(grid.breaks[axis], ends, grid.degrees[axis], grid.split[axis])
+    # An even strain xx has a u that is odd along x and even along y.
+    return lines[odd ^ (axis == component)] if len(lines) == 2 else lines[0]
+
+
+def _free_of_clips(plate: Plate, x: _Line, y: _Line) -> NDArray[np.bool_]:
+    """Products (n,) that no clip holds; a clip without a radius holds none."""
+    if not (plate.clips and plate.clip_radius):
+        return np.ones(x.basis.size * y.basis.size, bool)
+    return outside_clips(plate, x.basis, y.basis)
+
+
+def _stiffness(lines: Sequence[_Line], along_x: float, along_y: float) -> Floats:
+    x, y = (line.basis for line in lines)
+    return np.asarray(along_x * np.kron(x.slope, y.mass) + along_y * np.kron(x.mass, y.slope))
+
+
+def _coupling(u: Sequence[_Line], v: Sequence[_Line], A: Floats) -> Floats:
+    """Stiffness (u, v) of Poisson's contraction and of shear."""
+    poisson, shear = (
+        np.kron(_integral(u[0], v[0], flipped), _integral(u[1], v[1], not flipped))
+        for flipped in (False, True)
+    )
+    return np.asarray(A[0, 1] * poisson + A[2, 2] * shear)
+
+
+def _integral(first: _Line, second: _Line, flipped: bool) -> Floats:
+    """Integrals (i, j) of the slopes of the first with the values of the second, or flipped."""
+    a, b = (first.values, second.slopes) if flipped else (first.slopes, second.values)
+    return np.asarray((a * first.weights[:, None]).T @ b)
+
+
+def _sum(subscripts: str, *operands: tuple[Floats, Floats, Floats]) -> Floats:
+    return np.asarray(sum(np.einsum(subscripts, *each, optimize=True) for each in operands))

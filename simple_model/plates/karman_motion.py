@@ -1,0 +1,352 @@
+"""Static deflection and motion of von Karman's plate in its modes.
+
+    z'' + K z + sum_k s_k H_k z = f,  y_k = z^T H_k z / 2
+
+s_k is the stress of the state y_k, without loss y_k itself. Bending and stretching both have the
+loss of the material: a viscosity and Maxwell branches.
+
+Time steps of dt are linearly implicit, with y between steps:
+
+    y^(n+1/2) = z^(n+1) H z^n / 2,  force at n: (y^(n+1/2) + y^(n-1/2)) / 2 . H z^n
+
+As y^(n+1/2) - y^(n-1/2) = z^n H (z^(n+1) - z^(n-1)) / 2, the work of this force is exactly the
+change of y^2 / 2. Without load and loss the energy at half steps,
+
+    v M v / 2 + z^(n+1) K z^n / 2 + y^(n+1/2)^2 / 2,  v = (z^(n+1) - z^n) / dt,
+
+is constant to round-off. It is never negative, so the motion is bounded for any dt. Each step
+solves one positive definite linear system (Bilbao, Numer Methods Partial Differ Equ 24:193 (2008);
+Bilbao, Thomas, Touze and Ducceschi, ibid. 31:1948 (2015), doi 10.1002/num.21974). The scheme is an
+energy quadratisation. Its auxiliary variables y are quadratic in z and therefore do not drift. A
+single scalar auxiliary variable (Bilbao, Ducceschi and Zama, J Comput Phys 472:111697 (2023)) needs
+no linear system, but drifts; the system is small here.
+
+M is a little above 1, so that a mode without stretching has its exact frequency. `stretched_motion`
+goes further: its forces are those under which the steps of the linear plate are an exact linear
+motion, so that the error of the steps is in proportion to what stretching changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+from scipy.linalg.lapack import dposv
+
+from simple_model.layers.material import Material
+from simple_model.load.pressure import MovingPressure
+from simple_model.load.spectrum import lines_from_rest, synthesise
+from simple_model.plates.free_modes import FreeModes, free_modes
+from simple_model.plates.modes import PlateModes, modal_motion, modal_motion_apart
+from simple_model.plates.path_forces import MIDDLE, modal_path_forces
+from simple_model.plates.von_karman import KarmanPlate
+from simple_model.typing import Floats
+
+TOLERANCE = 1e-10  # of the load: unbalanced force of a static deflection
+MOST_ITERATIONS = 200
+FLAT = 1e-12  # of the largest curvature of the energy: round-off
+HIGHEST_PHASE = 1.2  # rad per half step; faster modes are slowed to it
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Motion:
+    """Modal coordinates (n, r) in kg^1/2 m at steps, and `energy` (n - 1,) in J between them."""
+
+    coordinates: Floats
+    energy: Floats
+
+
+def static_deflection(
+    plate: KarmanPlate, forces: Floats, material: Material | None = None
+) -> Floats:
+    """Modal coordinates at rest under a constant load.
+
+    Parameters
+    ----------
+    plate : KarmanPlate
+    forces : (m,) N kg^-1/2, modal forces of all modes of the plate, as of `area_forces`
+    material : Material, whose modulus at rest resists; without it the modulus of the modes does
+
+    Returns
+    -------
+    (m,) kg^1/2 m, of all modes. Modes that are not in `plate.chosen` deflect as a linear plate. A
+    plate that buckles has several states of rest; this is a stable one.
+
+    Raises
+    ------
+    ArithmeticError
+        If Newton's method does not converge.
+    """
+    rest, modes = _Loss.of(material).rest, plate.modes
+    found = forces / (modes.squared * (1 + (rest - 1) * modes.elastic))
+    found[plate.chosen] = _equilibrium(plate, forces[plate.chosen], rest)
+    return np.asarray(found)
+
+
+def linear_motion(
+    modes: PlateModes,
+    pressure: MovingPressure,
+    material: Material,
+    times: Floats,
+    *,
+    middle: Sequence[float] = MIDDLE,
+    chosen: NDArray[np.int_] | None = None,
+    highest: float = np.inf,
+) -> Floats:
+    """Modal coordinates from rest of a plate that does not stretch, without time steps.
+
+    Parameters
+    ----------
+    modes : PlateModes
+    pressure : MovingPressure
+    material : Material, with the `shear_modulus` of the modes and no modulus law of its own
+    times : (t,) s, 0 or above
+    middle : (2,) metre, of the plate in the scene
+    chosen : (r,) int, indices of the modes to return; all if not given
+    highest : Hz, lines of the load from there on are left out
+
+    Returns
+    -------
+    (t, r) kg^1/2 m
+    """
+
+    def modulus(omega: Floats) -> Floats:
+        return np.asarray(material.complex_modulus(omega) / material.shear_modulus)
+
+    chosen = np.arange(len(modes.squared)) if chosen is None else chosen
+    f, forces = lines_from_rest(pressure).gather(modal_path_forces(modes, pressure, middle))
+    f, forces = f[f < highest], forces[f < highest]
+    motion = modal_motion(modes, f, forces, modulus)[:, chosen]
+    beside = motion - modal_motion_apart(modes, f, forces, modulus)[:, chosen]
+    every = free_modes(modes, material)
+    free = FreeModes(poles=every.poles[chosen], residues=every.residues[chosen])
+    start = free.start(f, forces[:, chosen])
+    start -= free.impulse(beside.real.sum(axis=0), (2j * np.pi * f @ beside).real)
+    found = synthesise(f, motion, times)
+    for poles, amplitudes in zip(free.poles.T, start.T, strict=True):
+        moving = amplitudes != 0
+        decay = np.exp(np.multiply.outer(times, poles[moving]))
+        found[:, moving] += (decay * amplitudes[moving]).real
+    return found
+
+
+def stretched_motion(
+    plate: KarmanPlate, linear: Floats, dt: float, material: Material | None = None
+) -> Motion:
+    """Motion from rest under the load that moves the plate linearly if it does not stretch.
+
+    Parameters
+    ----------
+    plate : KarmanPlate
+    linear : (n, r) kg^1/2 m, linear motion of the chosen modes at 0, dt, ..., (n - 1) dt, as of
+        `linear_motion`
+    dt : s
+    material : Material, the one of the linear motion; no loss if not given
+
+    Returns
+    -------
+    Motion
+        At the n times of the linear motion.
+
+    Raises
+    ------
+    ArithmeticError
+        If a step is not finite.
+    """
+    scheme = _Scheme.of(plate, dt, material)
+    return _march(plate, scheme, scheme.forces(linear), np.zeros((2, len(plate.squared))))
+
+
+def forced_motion(
+    plate: KarmanPlate,
+    forces: Floats,
+    dt: float,
+    material: Material | None = None,
+    *,
+    start: Floats | None = None,
+) -> Motion:
+    """Motion under forces that are known at the steps.
+
+    Parameters
+    ----------
+    plate : KarmanPlate
+    forces : (n, r) N kg^-1/2, on the chosen modes at 0, dt, ..., (n - 1) dt
+    dt : s
+    material : Material; no loss if not given
+    start : (2, r), coordinates in kg^1/2 m and their rates in kg^1/2 m/s at time 0, with relaxed
+        branches; at rest if not given
+
+    Returns
+    -------
+    Motion
+        At the n + 1 times 0, dt, ..., n dt.
+
+    Raises
+    ------
+    ArithmeticError
+        If a step is not finite.
+    """
+    start = np.zeros((2, len(plate.squared))) if start is None else start
+    return _march(plate, _Scheme.of(plate, dt, material), forces, start)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Loss:
+    """Modulus of a material over that of the modes: at `rest`, viscous `lag` in s, and `shares`
+    (j,) of Maxwell branches with relaxation `times` (j,) in s.
+    """
+
+    rest: float
+    lag: float
+    shares: Floats
+    times: Floats
+
+    @staticmethod
+    def of(material: Material | None) -> _Loss:
+        if material is None:
+            return _Loss(rest=1.0, lag=0.0, shares=np.zeros(0), times=np.ones(0))
+        solid, mu = material.relaxing(), material.shear_modulus
+        terms = [term for term in solid.prony if term.modulus]
+        return _Loss(
+            rest=solid.shear_modulus / mu, lag=solid.viscosity / mu,
+            shares=np.array([term.modulus / mu for term in terms]),
+            times=np.array([term.time for term in terms]),
+        )  # fmt: skip
+
+    def storage(self, omega: Floats) -> Floats:
+        """Relative storage modulus (...) at angular frequencies (...) in rad/s."""
+        squared = np.multiply.outer(omega, self.times) ** 2
+        return np.asarray(self.rest + (self.shares * squared / (1 + squared)).sum(axis=-1))
+
+
+def _equilibrium(plate: KarmanPlate, forces: Floats, rest: float) -> Floats:
+    """Minimum (r,) of the energy, by Newton's method with negative curvatures made positive. It
+    leaves a saddle along the direction of the most negative curvature.
+    """
+    K, z = plate.slow_stiffness(rest), np.zeros(len(forces))
+    size = float(np.linalg.norm(forces)) or 1.0
+    for _ in range(MOST_ITERATIONS):
+        G = plate.gradients(z)
+        y = G @ z / 2
+        unbalanced = forces - K @ z - rest * (y @ G)
+        tangent = K + rest * (np.tensordot(y, plate.H, axes=1) + G.T @ G)
+        curvatures, directions = linalg.eigh(tangent)
+        least = FLAT * curvatures[-1]
+        step = directions @ (directions.T @ unbalanced / np.maximum(np.abs(curvatures), least))
+        if float(np.linalg.norm(unbalanced)) <= TOLERANCE * size:
+            if curvatures[0] >= -least:
+                return z
+            step = directions[:, 0]
+        # The energy along the step is a polynomial of degree four.
+        first, second = G @ step, plate.gradients(step) @ step / 2
+        quadratic = float(step @ K @ step + rest * (first @ first + 2 * (y @ second))) / 2
+        linear, cubic, quartic = -step @ unbalanced, rest * first @ second, rest * second @ second
+        energy = np.array([0.0, linear, quadratic, cubic, quartic / 2])
+        z = z + _lowest_place(energy) * step
+    raise ArithmeticError(
+        f"the plate was not at rest after {MOST_ITERATIONS} iterations; lower the load"
+    )
+
+
+def _lowest_place(coefficients: Floats) -> float:
+    """Where a polynomial, coefficients in ascending order, is least."""
+    polynomial = np.polynomial.Polynomial(coefficients)
+    places = np.roots(polynomial.deriv().coef[::-1])
+    real = places[np.abs(places.imag) <= FLAT**0.5 * np.abs(places)].real
+    return float(min(real, key=polynomial))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Scheme:
+    """Coefficients of steps of dt in s.
+
+    `mass` (r,) of modes, stiffness `K` (r, r) at rest and `bending` (r, r), and the modulus: at
+    `rest`, viscous `lag` in s, and `shares` (j,) of Maxwell branches. The stretch d of a branch
+    follows the strain: over a step it becomes `keep` (j,) d + `follow` (j,) times the change.
+    """
+
+    dt: float
+    mass: Floats
+    K: Floats
+    bending: Floats
+    rest: float
+    lag: float
+    shares: Floats
+    keep: Floats
+    follow: Floats
+
+    @staticmethod
+    def of(plate: KarmanPlate, dt: float, material: Material | None) -> _Scheme:
+        loss, squared = _Loss.of(material), np.maximum(plate.squared, 0.0)
+        bending = np.diagonal(plate.bending) * (loss.storage(np.sqrt(squared)) - 1)
+        half = np.sqrt(np.maximum(squared + bending, 0.0)) * dt / 2
+        mass = 1 / np.sinc(np.minimum(half, HIGHEST_PHASE) / np.pi) ** 2
+        mass *= np.maximum(half / HIGHEST_PHASE, 1) ** 2
+        share = dt / 2 / loss.times
+        return _Scheme(
+            dt=dt, mass=mass, K=plate.slow_stiffness(loss.rest), bending=plate.bending,
+            rest=loss.rest, lag=loss.lag, shares=loss.shares,
+            keep=(1 - share) / (1 + share), follow=1 / (1 + share),
+        )  # fmt: skip
+
+    @property
+    def pull(self) -> Floats:
+        """Stress (j,) per stretch of branches at the beginning of a step."""
+        return self.shares * self.follow
+
+    @property
+    def stiff(self) -> float:
+        """Stress of viscosity and branches per change of strain over a step."""
+        return self.lag / self.dt + float(self.pull.sum()) / 2
+
+    def forces(self, motion: Floats) -> Floats:
+        """Forces (n - 1, r) under which the steps without stretching are a motion (n, r) from
+        rest.
+        """
+        from scipy.signal import lfilter  # which takes long to import
+
+        z, dt = motion, self.dt
+        change = np.vstack([z[1:2] - z[:1], z[2:] - z[:-2]]) / 2
+        stress = self.stiff * change
+        for pull, keep, follow in zip(self.pull, self.keep, self.follow, strict=True):
+            stretch = lfilter([follow], [1, -keep], change, axis=0)
+            stress[1:] += pull * stretch[:-1]
+        stress[0] = 0.0
+        inertia = np.vstack([2 * (z[1:2] - z[:1]), z[2:] - 2 * z[1:-1] + z[:-2]]) / dt**2
+        return np.asarray(self.mass * inertia + z[:-1] @ self.K + stress @ self.bending)
+
+
+def _march(plate: KarmanPlate, scheme: _Scheme, forces: Floats, start: Floats) -> Motion:
+    """Motion (n + 1, r) under forces (n, r) from coordinates and rates (2, r)."""
+    dt, M, K, B, rest = scheme.dt, scheme.mass, scheme.K, scheme.bending, scheme.rest
+    shares, pull, stiff = scheme.shares, scheme.pull, scheme.stiff
+    keep, follow = scheme.keep[:, None], scheme.follow[:, None]
+    z, energy = np.empty((len(forces) + 1, len(M))), np.empty(len(forces))
+    z[0], rate = start
+    G = plate.gradients(z[0])
+    y = G @ z[0] / 2
+    unbalanced = forces[0] - K @ z[0] - rest * (y @ G) - scheme.lag * (B @ rate)
+    z[1] = z[0] + dt * rate + dt**2 / 2 * unbalanced / M
+    bent, stretched = follow * (z[1] - z[0]) / 2, follow * (G @ z[1] / 2 - y)  # of the branches
+    y = G @ z[1] / 2
+    linear, hardening = np.diag(M / dt**2) + stiff / 2 * B, (rest / 2 + stiff) / 2
+    for n in range(len(forces)):
+        if n:
+            G = plate.gradients(z[n])
+            rhs = forces[n] - K @ z[n] + 2 / dt**2 * M * (z[n] - z[n - 1])
+            rhs -= (rest * y + pull @ stretched) @ G + B @ (pull @ bent)
+            _, change, failed = dposv(linear + hardening * (G.T @ G), rhs)
+            if failed:
+                raise ArithmeticError(f"step {n} of dt = {dt:g} s is not finite; lower the load")
+            z[n + 1] = z[n - 1] + change
+            following = G @ z[n + 1] / 2
+            bent = keep * bent + follow * (change / 2)
+            stretched = keep * stretched + follow * (following - y)
+            y = following
+        v = (z[n + 1] - z[n]) / dt
+        springs = shares @ ((bent @ B * bent).sum(axis=1) + (stretched**2).sum(axis=1))
+        energy[n] = (v @ (M * v) + z[n + 1] @ K @ z[n] + rest * (y @ y) + springs) / 2
+    return Motion(coordinates=z, energy=energy)

@@ -1,0 +1,443 @@
+"""Modes of a rectangular, orthotropic, stretched thin plate on any edges and clips, with its air.
+
+Ritz's method: w(x, y) = sum c_ij X_i(x) Y_j(y) makes stationary the energies (Leissa, Vibration of
+Plates (1969), eqs. 9.4 and 10.1; orthotropic: Timoshenko and Woinowsky-Krieger, section 85)
+
+    2 U = iint D11 w_xx^2 + 2 D12 w_xx w_yy + D22 w_yy^2 + 4 D66 w_xy^2 + Tx w_x^2 + Ty w_y^2 dA
+    2 T = w^2 iint m w^2 dA + w^2 rho/pi iint iint w(x) w(y) / |x - y| dA dA
+
+X_i and Y_j are combinations of Legendre polynomials that meet the supports of the edges; what a
+free edge asks follows from the energies. A clip holds a square: between its sides the polynomials
+are their own, and products that would move it are left out. Where a plate is the same on both sides
+of its middle, even and odd modes are found apart. The second term of T is the air on both sides of
+a plate in a baffle, 2 rho / k at each wavenumber k: see `plate_air`.
+
+Tension has no loss, so that the complex modulus of bending couples the modes of a stretched plate,
+close ones most.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import linalg, sparse
+from scipy.sparse.linalg import LinearOperator, gmres
+
+from simple_model.layers.compliance import AIR_DENSITY
+from simple_model.layers.material import ModulusLaw
+from simple_model.plates.air import air_mass
+from simple_model.plates.polynomials import LineBasis, line_basis, piecewise_basis
+from simple_model.typing import Complex, Floats
+
+SUPPORTS = ("clamped", "simply", "free")
+FINEST = 350.0  # rad/m: beyond it a focal spot of 4.35 mm has a third of its force
+MARGIN = 8  # polynomials beyond those that a wavenumber requires
+BESIDE = 3  # the same of pieces between the sides of clips
+NEARLY = 0.01  # of a clip's radius: a side of it so near another, or an edge of the plate, is there
+LAYER = 0.1  # of a clip's radius, beside its sides
+SHIFT = 1e-12  # of the mean squared frequency
+MOST_DOFS = 6000  # of one symmetry: some minutes
+COUPLED = 1.5  # of a line's frequency: modes above it are almost what they are by themselves
+RESIDUAL = 1e-6  # relative, of coupled modes
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plate:
+    """Rectangular thin plate, its middle at (0, 0), its sides along x and y.
+
+    Parameters
+    ----------
+    size_x, size_y : metre
+    d11, d22, d12, d66 : N m, bending stiffnesses; of an isotropic plate D, D, nu D, (1 - nu) D / 2
+    mass_per_area : kg/m2
+    tension_x, tension_y : N/m, uniform
+    left, right, front, back : "clamped", "simply" or "free", the edges of least and greatest x, of
+        least and greatest y
+    clips : ((x, y), ...) metre, where the plate is fixed
+    clip_radius : metre, half a side of the square that is; 0 fixes the deflection of a point alone
+    air_density : kg/m3, 0 in vacuum
+
+    Raises
+    ------
+    ValueError
+        If a value is not finite or out of range, or a clip is off the plate.
+    """
+
+    size_x: float
+    size_y: float
+    d11: float
+    d22: float
+    d12: float
+    d66: float
+    mass_per_area: float
+    tension_x: float = 0.0
+    tension_y: float = 0.0
+    left: str = "clamped"
+    right: str = "clamped"
+    front: str = "clamped"
+    back: str = "clamped"
+    clips: tuple[tuple[float, float], ...] = ()
+    clip_radius: float = 0.0
+    air_density: float = AIR_DENSITY
+
+    def __post_init__(self) -> None:
+        for name in ("size_x", "size_y", "d11", "d22", "d66", "mass_per_area"):
+            if not (np.isfinite(value := getattr(self, name)) and value > 0):
+                raise ValueError(f"{name} = {value} of a plate must be finite and above 0")
+        for name in ("tension_x", "tension_y", "clip_radius", "air_density"):
+            if not (np.isfinite(value := getattr(self, name)) and value >= 0):
+                raise ValueError(f"{name} = {value} of a plate must be finite, 0 or above")
+        if not self.d12**2 < self.d11 * self.d22:
+            raise ValueError(
+                f"d12 = {self.d12} of a plate is not below sqrt(d11 d22) = "
+                f"{(self.d11 * self.d22) ** 0.5:.4g}, so that it would bend by itself; lower it"
+            )
+        for name in ("left", "right", "front", "back"):
+            if (said := getattr(self, name)) not in SUPPORTS:
+                raise ValueError(f"{name} = '{said}' is none of {', '.join(SUPPORTS)}")
+        for x, y in self.clips:
+            if not (abs(x) <= self.size_x / 2 and abs(y) <= self.size_y / 2):
+                raise ValueError(
+                    f"clip ({1e3 * x:g}, {1e3 * y:g}) mm is off the plate of "
+                    f"{1e3 * self.size_x:g} by {1e3 * self.size_y:g} mm; move it inside"
+                )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Family:
+    """Modes of one symmetry: `squared` (m,) angular frequencies in rad2/s2, ascending; stiffness
+    of `bending` (m, m) between them in rad2/s2, None without tension, where it is `squared` alone;
+    and coefficients `shapes` (i, j, m) on `x`, `y`.
+    """
+
+    x: LineBasis
+    y: LineBasis
+    squared: Floats
+    bending: Floats | None
+    shapes: Floats
+
+    @property
+    def elastic(self) -> Floats:
+        """Shares (m,) of the stiffness that are bending."""
+        if self.bending is None:
+            return np.ones(len(self.squared))
+        largest = np.maximum(self.squared, np.finfo(float).tiny)
+        return np.asarray(np.clip(np.diagonal(self.bending) / largest, 0.0, 1.0))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlateModes:
+    """Modes of a plate of unit modal mass, in families of one symmetry each."""
+
+    plate: Plate
+    families: tuple[Family, ...]
+
+    @property
+    def squared(self) -> Floats:
+        """Squared angular frequencies (m,) in rad2/s2, family by family."""
+        return np.concatenate([family.squared for family in self.families])
+
+    @property
+    def elastic(self) -> Floats:
+        """Shares (m,) of the stiffness that are bending, whose loss damps a mode."""
+        return np.concatenate([family.elastic for family in self.families])
+
+    @property
+    def frequencies(self) -> Floats:
+        """Natural frequencies (m,) in Hz, ascending."""
+        return np.sort(np.sqrt(np.maximum(self.squared, 0.0))) / (2 * np.pi)
+
+    def at(self, points: ArrayLike) -> Floats:
+        """Shapes (p, m) in kg^-1/2 at points (p, 2) in metre."""
+        x, y = np.asarray(points, np.float64).T
+        return np.hstack([
+            np.einsum("pi,ijm,pj->pm", f.x(x), f.shapes, f.y(y), optimize=True)
+            for f in self.families
+        ])  # fmt: skip
+
+    def on_grid(self, x: Floats, y: Floats) -> Floats:
+        """Shapes (x y, m) in kg^-1/2 at each x (x,) with each y (y,) in metre, y the faster."""
+        each = [
+            np.einsum("pi,ijm,qj->pqm", f.x(x), f.shapes, f.y(y), optimize=True)
+            for f in self.families
+        ]
+        return np.concatenate(each, axis=2).reshape(len(x) * len(y), -1)
+
+
+def plate_modes(plate: Plate, finest: float | Sequence[float] = FINEST) -> PlateModes:
+    """All modes of a plate that polynomials up to a wavenumber make.
+
+    The lowest are accurate; those near `finest` only stand in for the static deflection that
+    they share in.
+
+    Parameters
+    ----------
+    plate : Plate
+    finest : rad/m, the greatest wavenumber that is resolved; one, or that along x and along y
+
+    Returns
+    -------
+    PlateModes
+
+    Raises
+    ------
+    ValueError
+        If that takes more than `MOST_DOFS` degrees of freedom.
+    """
+    resolved, mirrored = np.broadcast_to(finest, 2), _symmetries(plate)
+    bases = [_line_bases(plate, axis, resolved[axis], mirrored[axis]) for axis in (0, 1)]
+    if (dofs := max(x.size * y.size for x, y in product(*bases))) > MOST_DOFS:
+        raise ValueError(
+            f"a plate of {1e3 * plate.size_x:g} by {1e3 * plate.size_y:g} mm takes {dofs:,} "
+            f"degrees of freedom, the limit is {MOST_DOFS:,}; lower finest = {max(resolved):g}"
+        )
+    return PlateModes(plate=plate, families=tuple(_family(plate, x, y) for x, y in product(*bases)))
+
+
+def steady_response(
+    modes: PlateModes,
+    frequencies: Floats,
+    forces: Complex,
+    outputs: Floats,
+    modulus: ModulusLaw,
+) -> Complex:
+    """Steady displacement: the shapes of the modes times their `modal_motion`.
+
+    Parameters
+    ----------
+    modes, frequencies, forces, modulus : as of `modal_motion`
+    outputs : (p, m) shapes where it is read, of `PlateModes.at`
+
+    Returns
+    -------
+    (f, p) complex, metre
+    """
+    return np.asarray(modal_motion(modes, frequencies, forces, modulus) @ outputs.T)
+
+
+def modal_motion(
+    modes: PlateModes, frequencies: Floats, forces: Complex, modulus: ModulusLaw
+) -> Complex:
+    """Steady modal coordinates q of (diag(w_m^2) + (h - 1) B - w^2) q = force, B the stiffness of
+    bending between the modes and h its relative modulus.
+
+    Parameters
+    ----------
+    modes : PlateModes
+    frequencies : (f,) Hz
+    forces : (f, m) modal forces in N kg^-1/2
+    modulus : angular frequencies (...) in rad/s -> complex modulus (...) over that of the modes
+
+    Returns
+    -------
+    (f, m) complex, metre kg^1/2
+
+    Raises
+    ------
+    ArithmeticError
+        If the coupled modes of a stretched plate are not solved to `RESIDUAL`.
+    """
+    w = 2 * np.pi * np.asarray(frequencies)
+    added = np.broadcast_to(modulus(w) - 1, w.shape)
+    found = modal_motion_apart(modes, frequencies, forces, modulus)
+    first = 0
+    for family in modes.families:
+        part = slice(first, first := first + len(family.squared))
+        if family.bending is not None:
+            lossy = np.flatnonzero(added)
+            found[lossy, part] = _coupled(family, w[lossy], added[lossy], forces[lossy, part])
+    return found
+
+
+def modal_motion_apart(
+    modes: PlateModes, frequencies: Floats, forces: Complex, modulus: ModulusLaw
+) -> Complex:
+    """Modal coordinates as of `modal_motion`, without the coupling of the modes.
+
+    Parameters
+    ----------
+    modes, frequencies, forces, modulus : as of `modal_motion`
+
+    Returns
+    -------
+    (f, m) complex
+    """
+    w = 2 * np.pi * np.asarray(frequencies)[:, None]
+    bending = modulus(w) * modes.elastic
+    found = forces / (modes.squared * (1 - modes.elastic + bending) - w**2)
+    return np.asarray(found, np.complex128)
+
+
+def _coupled(family: Family, w: Floats, added: Complex, forces: Complex) -> Complex:
+    """Modal coordinates (f, m) of a stretched plate, by GMRES: the low modes are solved together
+    before, the high ones are almost what they are apart.
+    """
+    assert family.bending is not None
+    found, B = np.empty(forces.shape, np.complex128), family.bending
+    _, first, which = np.unique(np.round(w, 6), return_index=True, return_inverse=True)
+    for each, k in enumerate(first.tolist()):
+        n = int(np.searchsorted(family.squared, (COUPLED * w[k]) ** 2))
+        low = added[k] * B[:n, :n]
+        low[np.diag_indices(n)] += family.squared[:n] - w[k] ** 2
+        factor = linalg.lu_factor(low, check_finite=False) if n else None
+        own = family.squared * (1 + added[k] * family.elastic) - w[k] ** 2
+        of_mode = partial(_low_together, factor, own, n)
+        full = partial(_modal_forces, B, added[k], family.squared - w[k] ** 2)
+        size = len(family.squared)
+        system, before = (
+            LinearOperator((size, size), matvec=f, dtype=np.complex128) for f in (full, of_mode)
+        )
+        for line in np.flatnonzero(which == each).tolist():  # of several loads
+            found[line], failed = gmres(system, forces[line], M=before, rtol=RESIDUAL, maxiter=10)
+            if failed:
+                raise ArithmeticError(
+                    f"the modes of a stretched plate are not solved to a residual of {RESIDUAL:g} "
+                    f"at {w[k] / 2 / np.pi:.4g} Hz; lower its loss"
+                )
+    return found
+
+
+def _low_together(factor: Any, own: Complex, n: int, forces: Complex) -> Complex:
+    """Modal coordinates of the n low modes together, and of the others apart."""
+    found = forces / own
+    if n:
+        found[:n] = linalg.lu_solve(factor, forces[:n], check_finite=False)
+    return found
+
+
+def _modal_forces(B: Floats, added: complex, diagonal: Floats, q: Complex) -> Complex:
+    """Modal forces of modal coordinates q (m,)."""
+    bent = B @ np.column_stack([q.real, q.imag])  # real, which is faster
+    return np.asarray(diagonal * q + added * (bent @ [1, 1j]))
+
+
+def _symmetries(plate: Plate) -> tuple[bool, bool]:
+    """Whether a plate is the same on both sides of its middle, along x and along y."""
+    clips = np.array(plate.clips).reshape(-1, 2)
+
+    def same(mirror: tuple[int, int]) -> bool:
+        images = clips * mirror
+        return all(np.abs(clips - image).max(axis=1).min() < 1e-9 for image in images)
+
+    return (
+        plate.left == plate.right and same((-1, 1)),
+        plate.front == plate.back and same((1, -1)),
+    )
+
+
+def _line_bases(plate: Plate, axis: int, finest: float, mirrored: bool) -> tuple[LineBasis, ...]:
+    """Functions along x or y that resolve a wavenumber in rad/m, on pieces between the sides of
+    clips.
+    """
+    size = (plate.size_x, plate.size_y)[axis]
+    ends = ((plate.left, plate.right), (plate.front, plate.back))[axis]
+    if not (inner := _breaks(plate, axis, size)):
+        return line_basis(size, ends, int(np.ceil(finest * size / 2)) + MARGIN, mirrored)
+    breaks = np.array([-size / 2, *inner, size / 2])
+    degrees = [int(np.ceil(finest * piece / 2)) + BESIDE for piece in np.diff(breaks)]
+    return piecewise_basis(breaks, ends, degrees, mirrored)
+
+
+def _breaks(plate: Plate, axis: int, size: float) -> list[float]:
+    """Sides of the clips along an axis that are within the plate, in metre, and lines beside them:
+    at the corners of a clip the curvature has no bound.
+    """
+    reach = plate.clip_radius
+    sides = [clip[axis] + turn * reach for clip in plate.clips for turn in (-1, 1) if reach]
+    kept = _apart([], sides, size / 2, NEARLY * reach)
+    beside = [at + turn * LAYER * reach for at in kept for turn in (-1, 1)]
+    return sorted(_apart(kept, beside, size / 2, LAYER * reach / 2))
+
+
+def _apart(kept: Sequence[float], others: Sequence[float], end: float, gap: float) -> list[float]:
+    """Places and those of others that are farther than a gap from them and from both ends."""
+    found = [-end, *kept, end]
+    for place in sorted(others, key=abs):
+        if abs(place) < end and all(abs(place - each) > gap for each in found):
+            found.append(place)
+    return [place for place in found if abs(place) < end]
+
+
+def _family(plate: Plate, x: LineBasis, y: LineBasis) -> Family:
+    bending, stretching = _stiffness(plate, x, y)
+    mass = np.asarray(plate.mass_per_area * np.kron(x.mass, y.mass), np.float64)
+    if plate.air_density:
+        mass += air_mass(x, y, plate.air_density)
+    K = bending if stretching is None else bending + stretching
+    free = _free_of_clips(plate, x, y)
+    if free is None:
+        squared, shapes = _modes(K, mass)
+    else:
+        held = (np.asarray(free.T @ each @ free, np.float64) for each in (K, mass))
+        squared, shapes = _modes(*held)
+        shapes = free @ shapes
+    between = None if stretching is None else np.asarray(shapes.T @ (bending @ shapes))
+    return Family(
+        x=x, y=y, squared=squared, bending=between, shapes=shapes.reshape(x.size, y.size, -1)
+    )
+
+
+def _modes(K: Floats, M: Floats) -> tuple[Floats, Floats]:
+    """Squared angular frequencies (m,) in rad2/s2 and shapes (n, m) of unit modal mass, ascending.
+
+    Of M x = K x / w^2, as the error of eigenvalues goes with the largest: narrow pieces have
+    frequencies that are 1e7 of the lowest. A rigid plate's, 0, are shifted.
+    """
+    shift = SHIFT * np.trace(K) / np.trace(M)
+    inverse, shapes = linalg.eigh(M, K + shift * M, check_finite=False, overwrite_b=True)
+    inverse = np.maximum(inverse[::-1], np.finfo(float).eps * inverse[-1])
+    return 1 / inverse - shift, shapes[:, ::-1] / np.sqrt(inverse)
+
+
+def _stiffness(plate: Plate, x: LineBasis, y: LineBasis) -> tuple[Floats, Floats | None]:
+    """Stiffness (n, n) in N/m per kg/m2 of bending, and of tension if there is any."""
+    cross = np.kron(x.mixed, y.mixed.T)
+    bending = (
+        np.kron(plate.d11 * x.curvature, y.mass)
+        + np.kron(x.mass, plate.d22 * y.curvature)
+        + plate.d12 * (cross + cross.T)
+        + np.kron(4 * plate.d66 * x.slope, y.slope)
+    )
+    if not (plate.tension_x or plate.tension_y):
+        return bending, None
+    along, across = plate.tension_x * x.slope, plate.tension_y * y.slope
+    return bending, np.kron(along, y.mass) + np.kron(x.mass, across)
+
+
+def _free_of_clips(plate: Plate, x: LineBasis, y: LineBasis) -> sparse.csr_array | Floats | None:
+    """Basis (n, r) of what leaves the clips at rest; None without clips."""
+    if not plate.clips:
+        return None
+    if plate.clip_radius:
+        return sparse.csr_array(np.eye(x.size * y.size)[:, outside_clips(plate, x, y)])
+    xs, ys = np.array(plate.clips).T
+    rows = np.einsum("pi,pj->pij", x(xs), y(ys)).reshape(len(xs), -1)
+    _, strength, known = linalg.svd(rows, full_matrices=False)
+    independent = known[strength > 1e-7 * max(strength[0], np.finfo(float).tiny)]
+    everything, _ = linalg.qr(independent.T, mode="full")
+    return np.asarray(everything[:, len(independent) :])
+
+
+def outside_clips(plate: Plate, x: LineBasis, y: LineBasis) -> NDArray[np.bool_]:
+    """Products of functions that are zero on all clips.
+
+    Parameters
+    ----------
+    plate : Plate
+    x, y : LineBasis along both sides, with breaks at the sides of the clips
+
+    Returns
+    -------
+    (x y,) bool, the index of y the faster
+    """
+    found, reach = np.ones((x.size, y.size), bool), plate.clip_radius
+    for along, across in plate.clips:
+        moved = (
+            line.moved_within(at - reach, at + reach) for line, at in ((x, along), (y, across))
+        )
+        found &= ~np.outer(*moved)
+    return found.ravel()

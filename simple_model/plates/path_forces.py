@@ -1,0 +1,86 @@
+"""Steady response of a plate to a moving pressure, by its modes."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from simple_model.layers.material import ModulusLaw
+from simple_model.load.focus import spot_detail, spot_reach
+from simple_model.load.path_cells import path_samples
+from simple_model.load.pressure import MovingPressure
+from simple_model.load.spectrum import load_lines, path_forces
+from simple_model.plates.modes import PlateModes, steady_response
+from simple_model.typing import Complex, Floats
+
+MIDDLE = (0.0, 0.0)
+CLOSEST = 0.9  # standard deviations of the focal spot between Gauss points, about
+SPARE = 8  # more of them
+
+
+def modal_path_forces(
+    modes: PlateModes, pressure: MovingPressure, middle: Sequence[float] = MIDDLE
+) -> Complex:
+    """Modal forces of unit pressure on the path, for all loads on the same path.
+
+    Parameters
+    ----------
+    modes : PlateModes
+    pressure : MovingPressure, of which path, focal spot, rhythm and signal are taken
+    middle : (2,) metre, of the plate, where the scene's middle is (0, 0)
+
+    Returns
+    -------
+    (n, m) complex, N kg^-1/2 per Pa, by harmonic of the path; -n is harmonic -n
+    """
+    knots, reach = path_samples(pressure), spot_reach(pressure.height, pressure.profile)
+    detail = spot_detail(pressure.height, pressure.profile)
+    sizes = modes.plate.size_x, modes.plate.size_y
+    lines = [
+        _gauss(max(low - reach, at - size / 2), min(high + reach, at + size / 2), detail)
+        for low, high, at, size in zip(
+            knots.min(axis=0), knots.max(axis=0), middle, sizes, strict=True)
+    ]  # fmt: skip
+    (x, of_x), (y, of_y) = lines
+    shapes = modes.on_grid(x - middle[0], y - middle[1])
+    points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    return path_forces(pressure, points, shapes * np.outer(of_x, of_y).reshape(-1, 1))
+
+
+def plate_lines(
+    modes: PlateModes,
+    pressure: MovingPressure,
+    probes: ArrayLike,
+    modulus: ModulusLaw,
+    *,
+    middle: Sequence[float] = MIDDLE,
+    path: Complex | None = None,
+) -> tuple[Floats, Complex]:
+    """Lines of the steady displacement, positive the way the pressure pushes.
+
+    Parameters
+    ----------
+    modes : PlateModes
+    pressure : MovingPressure
+    probes : (p, 2) metre, in the scene
+    modulus : of bending, as of `modal_motion`
+    middle : (2,) metre, of the plate in the scene
+    path : (n, m) of `modal_path_forces`, if they are known
+
+    Returns
+    -------
+    frequencies : (f,) Hz
+    amplitudes : (f, p) complex, metre
+    """
+    path = modal_path_forces(modes, pressure, middle) if path is None else path
+    frequencies, forces = load_lines(pressure).gather(path)
+    outputs = modes.at(np.asarray(probes, np.float64) - middle)
+    return frequencies, steady_response(modes, frequencies, forces, outputs, modulus)
+
+
+def _gauss(low: float, high: float, detail: float) -> tuple[Floats, Floats]:
+    """Gauss points and weights (k,) in metre between two places, for a detail in metre."""
+    half = max(high - low, 0.0) / 2
+    count = int(np.ceil(np.pi * half / (CLOSEST * detail))) + SPARE
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    return np.asarray((low + high) / 2 + half * nodes), np.asarray(half * weights)

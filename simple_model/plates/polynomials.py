@@ -1,0 +1,288 @@
+"""Polynomials on the pieces of a line that meet the supports of its ends, for Ritz's method.
+
+On one piece they are orthonormal combinations of Legendre polynomials P_n(2 x / a), of which
+n / (a / 2) resolves a wavenumber k. On several they are continuous with their slope, and each is
+zero on all pieces but one or two, so that what rests on a piece leaves some of them out: Hermite
+functions of the value and of the slope at each break, and bubbles within each piece (Babuska, Szabo
+and Katz, SIAM J Numer Anal 18:515 (1981)).
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+from simple_model.typing import Floats
+
+# Derivatives that are zero at an end.
+FIXED: Mapping[str, tuple[int, ...]] = {"clamped": (0, 1), "simply": (0,), "free": ()}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LineBasis:
+    """Functions u_i on the pieces of a line, of one symmetry or of none.
+
+    `breaks` (e + 1,) in metre from the middle: the ends of its pieces. `legendre` (e, n, i):
+    coefficients of each function in the orthonormal Legendre polynomials of each piece. Integrals
+    (i, i): `mass` of u_i u_k, `slope` of u_i' u_k', `curvature` of u_i'' u_k'', `mixed` of u_i''
+    u_k.
+    """
+
+    breaks: Floats
+    legendre: Floats
+    mass: Floats
+    slope: Floats
+    curvature: Floats
+    mixed: Floats
+
+    @property
+    def size(self) -> int:
+        """How many functions there are."""
+        return self.legendre.shape[2]
+
+    @property
+    def length(self) -> float:
+        """Length of the line, metre."""
+        return float(np.ptp(self.breaks))
+
+    def __call__(self, x: Floats) -> Floats:
+        """Values (p, i) in m^-1/2 at x (p,) in metre from the middle."""
+        return self._values(x, self.legendre)
+
+    def slopes(self, x: Floats) -> Floats:
+        """First derivatives (p, i) in m^-3/2 at x (p,) in metre from the middle."""
+        per_piece = (2 / np.diff(self.breaks))[:, None, None]
+        d = _derivative(self.legendre.shape[1] - 1)
+        return self._values(x, per_piece * (d @ self.legendre))
+
+    def integrals(self) -> Floats:
+        """Integrals (i,) of the functions along the line, in m^1/2."""
+        return np.asarray(np.sqrt(np.diff(self.breaks)) @ self.legendre[:, 0])
+
+    def _values(self, x: Floats, legendre_coefficients: Floats) -> Floats:
+        """Values (p, i) at x (p,) of functions with coefficients (e, n, i)."""
+        x = np.asarray(x, np.float64)
+        piece = np.searchsorted(self.breaks[1:-1], x)
+        low, size = self.breaks[piece], np.diff(self.breaks)[piece]
+        n = np.arange(self.legendre.shape[1])
+        polynomials = legendre.legvander(2 * (x - low) / size - 1, len(n) - 1)
+        polynomials *= np.sqrt((2 * n + 1) / size[:, None])
+        values = np.empty((len(x), self.size))
+        for e, coefficients in enumerate(legendre_coefficients):
+            values[piece == e] = polynomials[piece == e] @ coefficients
+        return values
+
+    def moved_within(self, low: float, high: float) -> NDArray[np.bool_]:
+        """Functions (i,) that are not zero everywhere between two breaks, in metre."""
+        middles = (self.breaks[1:] + self.breaks[:-1]) / 2
+        within = (low < middles) & (middles < high)
+        return np.asarray((self.legendre[within] != 0).any(axis=(0, 1)))
+
+
+def line_basis(
+    length: float, ends: Sequence[str], degree: int, split: bool
+) -> tuple[LineBasis, ...]:
+    """Orthonormal functions on one piece that meet the supports of both ends.
+
+    Parameters
+    ----------
+    length : metre
+    ends : two of "clamped", "simply", "free"
+    degree : the highest
+    split : whether even and odd functions are apart, where both ends are alike
+
+    Returns
+    -------
+    One basis, or that of even and that of odd functions
+    """
+    n = np.arange(degree + 1)
+    breaks = np.array([-length / 2, length / 2])
+    return tuple(
+        _basis(breaks, _bubbles(degree, part, ends)[None])
+        for part in ([n[::2], n[1::2]] if split else [n])
+    )
+
+
+def piecewise_basis(
+    breaks: Floats, ends: Sequence[str], degrees: Sequence[int], split: bool
+) -> tuple[LineBasis, ...]:
+    """Functions that are continuous with their slope at the breaks of a line.
+
+    Parameters
+    ----------
+    breaks : (e + 1,) metre, increasing, from the middle, where the ends of the line are as far
+    ends : two of "clamped", "simply", "free"
+    degrees : (e,) the highest of each piece, 3 or more
+    split : whether even and odd functions are apart, where both ends and all breaks are alike
+
+    Returns
+    -------
+    One basis, or that of even and that of odd functions
+    """
+    breaks = np.asarray(breaks, np.float64)
+    functions = np.stack([*_hermite(breaks, ends, degrees), *_inner(degrees)], axis=2)
+    if not split:
+        return (_basis(breaks, functions),)
+    return tuple(_basis(breaks, part) for part in _symmetric(functions))
+
+
+def continuous_basis(
+    breaks: Floats, ends: Sequence[str], degrees: Sequence[int], split: bool
+) -> tuple[LineBasis, ...]:
+    """Functions that are continuous at the breaks of a line, with kinks there.
+
+    Parameters
+    ----------
+    breaks : (e + 1,) metre, increasing, from the middle, where the ends of the line are as far
+    ends : two of "simply", which holds the value, and "free"
+    degrees : (e,) the highest of each piece, 2 or more
+    split : whether even and odd functions are apart, where both ends and all breaks are alike
+
+    Returns
+    -------
+    One basis, or that of even and that of odd functions; `mixed` has no meaning across kinks
+    """
+    breaks = np.asarray(breaks, np.float64)
+    if len(breaks) == 2:
+        return line_basis(float(np.ptp(breaks)), ends, degrees[0], split)
+    inner = _inner(degrees, ("simply", "simply"))
+    functions = np.stack([*_hats(breaks, ends, degrees), *inner], axis=2)
+    if not split:
+        return (_basis(breaks, functions),)
+    return tuple(_basis(breaks, part) for part in _symmetric(functions))
+
+
+def _hats(breaks: Floats, ends: Sequence[str], degrees: Sequence[int]) -> Iterator[Floats]:
+    """Coefficients (e, n) of a function of each value at a break that is not held, orthogonal to
+    the bubbles.
+    """
+    last = len(breaks) - 1
+    for k in range(last + 1):
+        if {0: ends[0], last: ends[1]}.get(k, "free") != "free":
+            continue
+        found = np.zeros((last, max(degrees) + 1))
+        for piece, side in ((k - 1, 1), (k, -1)):
+            if 0 <= piece < last:
+                n = np.arange(degrees[piece] + 1)
+                rows = np.array([_at_end(n, 0, side), _at_end(n, 0, -side)])
+                size = breaks[piece + 1] - breaks[piece]
+                found[piece, : len(n)] = np.sqrt(size) * np.linalg.pinv(rows)[:, 0]
+        yield found / np.linalg.norm(found)
+
+
+def _basis(breaks: Floats, coefficients: Floats) -> LineBasis:
+    """Basis of functions with coefficients (e, n, i), and their integrals."""
+    d = _derivative(coefficients.shape[1] - 1)
+    per_piece = (2 / np.diff(breaks))[:, None, None]
+    first = per_piece * (d @ coefficients)
+    second = per_piece * (d @ first)
+
+    def integral(u: Floats, v: Floats) -> Floats:
+        return np.asarray(np.einsum("eni,enj->ij", u, v, optimize=True))
+
+    return LineBasis(
+        breaks=breaks, legendre=coefficients, mass=integral(coefficients, coefficients),
+        slope=integral(first, first), curvature=integral(second, second),
+        mixed=integral(second, coefficients),
+    )  # fmt: skip
+
+
+def _hermite(breaks: Floats, ends: Sequence[str], degrees: Sequence[int]) -> Iterator[Floats]:
+    """Coefficients (e, n) of a function of each value and each slope at a break that is not fixed,
+    orthogonal to the bubbles.
+    """
+    sizes, last = np.diff(breaks), len(breaks) - 1
+    of_piece = [_end_functions(*each) for each in zip(degrees, sizes, strict=True)]
+    for k in range(last + 1):
+        end = ends[0] if k == 0 else ends[1] if k == last else "free"
+        for derivative in sorted({0, 1} - set(FIXED[end])):
+            found = np.zeros((last, max(degrees) + 1))
+            for piece, side in ((k - 1, 1), (k, 0)):
+                if 0 <= piece < last:
+                    found[piece, : degrees[piece] + 1] = of_piece[piece][2 * side + derivative]
+            yield found / np.linalg.norm(found)
+
+
+def _end_functions(degree: int, size: float) -> Floats:
+    """Coefficients (4, n) of the smallest polynomials of value 1 at the low end of a piece, of
+    slope 1 there, and of these at the high end; the other three are 0.
+    """
+    n = np.arange(degree + 1)
+    rows = np.array([_at_end(n, derivative, side) for side in (-1, 1) for derivative in (0, 1)])
+    scale = np.tile([np.sqrt(1 / size), np.sqrt(1 / size) * 2 / size], 2)
+    strength = np.linalg.norm(rows, axis=1)
+    return np.asarray(np.linalg.pinv(rows / strength[:, None]) / strength / scale).T
+
+
+def _inner(
+    degrees: Sequence[int], ends: Sequence[str] = ("clamped", "clamped")
+) -> Iterator[Floats]:
+    """Coefficients (e, n) of the bubbles of each piece: those that meet the supports of its ends,
+    orthonormal, each even or odd about its middle.
+    """
+    for piece, degree in enumerate(degrees):
+        n = np.arange(degree + 1)
+        for orders in (n[::2], n[1::2]):
+            for bubble in _bubbles(max(degrees), orders, ends).T:
+                found = np.zeros((len(degrees), max(degrees) + 1))
+                found[piece] = bubble
+                yield found
+
+
+def _symmetric(functions: Floats) -> tuple[Floats, Floats]:
+    """Even and odd combinations (e, n, i) of functions (e, n, k), each of whose mirror images is
+    one of them or its negative.
+    """
+    sign = np.where(np.arange(functions.shape[1]) % 2, -1.0, 1.0)
+    mirrored = functions[::-1] * sign[:, None]
+    overlap = np.einsum("eni,enj->ij", mirrored, functions, optimize=True)
+    image = np.argmax(np.abs(overlap), axis=0)
+    first = np.flatnonzero(image >= np.arange(len(image)))
+    both = [(functions + mirrored)[..., first], (functions - mirrored)[..., first]]
+    even, odd = (part[..., np.abs(part).max(axis=(0, 1)) > 1e-6] for part in both)
+    return even, odd
+
+
+def _bubbles(degree: int, orders: NDArray[np.int_], ends: Sequence[str]) -> Floats:
+    """Coefficients (n, i) up to a degree of orthonormal polynomials of some orders that meet the
+    supports of both ends.
+    """
+    rows = [
+        _unit(_at_end(orders, derivative, side))
+        for end, side in zip(ends, (-1, 1), strict=True)
+        for derivative in FIXED[end]
+    ]
+    coefficients = np.zeros((degree + 1, len(orders)))
+    coefficients[orders, np.arange(len(orders))] = 1
+    return np.asarray(coefficients @ _null_space(np.array(rows).reshape(-1, len(orders))))
+
+
+def _at_end(orders: NDArray[np.int_], derivative: int, side: int) -> Floats:
+    """sqrt(2 n + 1) P_n or P_n' at -1 or 1."""
+    n = orders.astype(float)
+    value = np.sqrt(2 * n + 1) * float(side) ** (orders + derivative)
+    return np.asarray(value * (n * (n + 1) / 2) ** derivative)
+
+
+def _unit(row: Floats) -> Floats:
+    return np.asarray(row / np.linalg.norm(row))
+
+
+def _null_space(rows: Floats) -> Floats:
+    """Orthonormal columns (n, r) that are orthogonal to all rows (c, n)."""
+    if not len(rows):
+        return np.eye(rows.shape[1])
+    _, strength, known = np.linalg.svd(rows)
+    rank = int((strength > 1e-10 * strength[0]).sum())
+    return np.asarray(known[rank:].T)
+
+
+def _derivative(degree: int) -> Floats:
+    """Derivative (n, n) of orthonormal Legendre polynomials in themselves:
+    P_n' = sum (2 k + 1) P_k over k = n - 1, n - 3, ..., as (2 k + 1) P_k = P_(k+1)' - P_(k-1)'.
+    """
+    n = np.arange(degree + 1)
+    below = (n[:, None] < n) & ((n[:, None] + n) % 2 == 1)
+    return np.where(below, np.sqrt(np.outer(2 * n + 1, 2 * n + 1)), 0.0)
