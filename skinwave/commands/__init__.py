@@ -11,7 +11,6 @@ from skinwave.commands import (
     doctor,
     film,
     fit,
-    infer,
     live,
     measured,
     mesh,
@@ -33,7 +32,7 @@ from skinwave.commands import map as map_command
 MODULES = (
     run, compare, tradeoff, relax, dispersion, map_command, plan, sweep, plot, mesh, convert,
     verify, report, film, live, web, rerun, same, doctor, cache,
-    measured, fit, infer,
+    measured, fit,
     validate,
 )  # fmt: skip
 COMMANDS = {module.__name__.rpartition(".")[2]: module for module in MODULES}

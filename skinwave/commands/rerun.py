@@ -14,14 +14,14 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
-from skinwave.commands import compare, dispersion, fit, infer, measured, report, validate
+from skinwave.commands import compare, dispersion, fit, measured, report, validate
 from skinwave.commands import map as map_command
 from skinwave.commands import run as run_command
 from skinwave.commands.common import add_output, progress_of, summarise
 
 REPEATED = {
     "run": run_command, "compare": compare, "report": report, "dispersion": dispersion,
-    "map": map_command, "fit": fit, "infer": infer, "validate": validate, "measured": measured,
+    "map": map_command, "fit": fit, "validate": validate, "measured": measured,
 }  # fmt: skip
 ONCE_EACH = ("format", "vary", "tie")  # options that are given once for each of their values
 PLACES = ("source", "file", "scene")  # arguments without a name, of which a command has one
@@ -31,7 +31,7 @@ def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
     parser.add_argument(
         "folder", type=Path, metavar="DIR", help="folder that run, compare, report, dispersion, "
-        "map, fit, infer, validate or measured wrote, or a folder of one run in it; the new one is "
+        "map, fit, validate or measured wrote, or a folder of one run in it; the new one is "
         "DIR-rerun",
     )  # fmt: skip
     add_output(parser)

@@ -29,7 +29,6 @@ from simple_model import Effort, Material, Response
 from simple_model.load.sampling import below_half_the_rate, highest_driving, resolving_step
 from simple_model.load.spectrum import load_lines
 from simple_model.quantities import ACCELERATION, DISPLACEMENT, VELOCITY, Quantity
-from simple_model.typing import Complex
 from skinwave.bodies.build import Build, build
 from skinwave.bodies.sheet import air, bending_wavenumber, discretise
 from skinwave.models import Request
@@ -225,27 +224,6 @@ def _from_rest(
     components = in_motion(read_at(motion, rows), asked, solids)
     below = below_half_the_rate(components.frequencies, times)
     return from_rest(select_lines(components, below), times)
-
-
-def unstretched_lines(
-    scene: Scene, h: float | None = None, solver: str = "auto"
-) -> tuple[Floats, Complex]:
-    """Steady displacement of the modes of `reduced_answer` under each line of a load so small that
-    the sheet does not stretch: what is left of a difference is large deflection.
-
-    Parameters
-    ----------
-    scene : Scene, of the normal displacement
-    h, solver : as of a request
-
-    Returns
-    -------
-    frequencies (f,) in Hz and complex amplitudes (f, p) in metre
-    """
-    sheet = _reduced(scene.body, h or stretching_size(scene.body, reduced=True), solver)
-    shapes = fem.probe_operator(sheet.made.mesh, scene.probe_points) @ sheet.modes.basis
-    motion = read_at(respond(sheet.linear, scene.pressure), shapes)
-    return motion.frequencies, motion.lines
 
 
 @lru_cache(maxsize=1)

@@ -93,7 +93,7 @@ def read(folder: Path) -> dict[str, Any]:
     if not path.exists():
         raise ValueError(
             f"{path} cannot be read; name a folder that run, compare, report, dispersion, map, "
-            "fit, infer, validate or measured wrote"
+            "fit, validate or measured wrote"
         )
     try:
         record = fitting(reading.parsed(path), FITTING, "record")

@@ -1,4 +1,4 @@
-"""Folders of infer, validate and measured, had again from their record.json."""
+"""Folders of validate and measured, had again from their record.json."""
 
 import json
 import os
@@ -9,11 +9,8 @@ import numpy as np
 import pytest
 
 from skinwave.commands.cli import main
-from skinwave.inference import table
-from skinwave.inference.design import name
 from skinwave.measure import Measurement
 from skinwave.measure.writing import write
-from skinwave.sweeps import dataset
 
 
 def command_of(folder):
@@ -44,39 +41,6 @@ def test_an_inspection_is_had_again_from_anywhere(record, tmp_path, monkeypatch)
     for file in ("found-lines.csv", "measurement.csv", "index.html"):
         assert (again / file).read_bytes() == (tmp_path / "inspected" / file).read_bytes()
     assert command_of(again)["options"] == command_of(tmp_path / "inspected")["options"]
-
-
-def quick_row(candidate, release):
-    """A row as of a candidate that was computed."""
-    found = dict.fromkeys(table.COLUMNS) | dict(candidate)
-    return found | {"key": name(candidate, release), "version": release, "status": "done"}
-
-
-def in_this_process(work, batches, scheduler, count, written):
-    for k, batch in enumerate(batches):
-        written(k, work(batch))
-
-
-def test_an_inference_is_had_again_with_its_search(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(table, "row", quick_row)
-    monkeypatch.setattr(table.engine, "run_all", in_this_process)
-    monkeypatch.setattr("skinwave.inference.files.write", dataset.read)
-    monkeypatch.setattr("skinwave.inference.conclusions.conclusions", lambda *rows: ["none"])
-    monkeypatch.setattr(table, "offspring", lambda rows, count, seed: [
-        {**rows[k], "height_mm": 150.5 + k + len(rows)} for k in range(count)
-    ])  # fmt: skip
-    asked = ["infer", "--samples", "5", "--seed", "3", "-o", "which"]
-    assert main([*asked, "--quiet"]) == 0
-    assert main([*asked, "--search", "2", "--quiet"]) == 0  # goes on
-    assert command_of("which")["options"]["search"] == 2
-    assert main(["rerun", "which", "--quiet"]) == 0
-    first, again = (
-        sorted((row["stage"], row["key"]) for row in dataset.read(Path(folder)))
-        for folder in ("which", "which-rerun")
-    )
-    assert len(first) == 7
-    assert first == again
 
 
 def test_a_validation_is_had_again_with_all_its_files(record, tmp_path, monkeypatch):

@@ -21,7 +21,7 @@ ROOMS = {
 # Rooms within skinwave, in order: each imports those before it only.
 INNER = (
     "system", "bodies", "scene", "models", "planning", "results", "report", "patterns", "sweeps",
-    "measure", "live", "verify", "studies", "inference", "commands",
+    "measure", "live", "verify", "studies", "commands",
 )  # fmt: skip
 MESHES = ("surface", "shapes", "volume", "files")  # within meshes, likewise
 WITHIN = {"meshes": MESHES, "skinwave": INNER}

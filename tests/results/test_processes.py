@@ -149,7 +149,6 @@ def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile, tmp_pat
         "doctor": [],
         "measured": ["wave.csv", "--out", "measured"],
         "fit": ["small.toml", "--measured", "wave.csv", "--vary", "gain=0.1:10"],
-        "infer": ["--samples", "2", "--workers", "1", "--quiet"],
         "cache": [],
         "report": ["out", "--quiet"],
         "film": ["out", "--out", "film.gif"],
@@ -160,7 +159,7 @@ def test_nothing_of_a_hostile_folder_is_imported_by_any_command(hostile, tmp_pat
         "live": ["flat.toml", "--quiet"],
     }  # fmt: skip
     assert set(COMMANDS) == {*asked, "rerun", "validate", "verify", "web"}
-    codes = dict.fromkeys(("compare", "infer", "relax", "tradeoff"), 1)
+    codes = dict.fromkeys(("compare", "relax", "tradeoff"), 1)
     codes |= {"film": 2, "fit": 2}  # no report is there, and no motion measured
     in_turn = [([name, *words], codes.get(name, 0)) for name, words in asked.items()]
     in_turn.append((["run", "nothing.toml"], 2))

@@ -1,1 +1,0 @@
-"""Inference: which bodies and measurements would show what was measured."""
