@@ -15,7 +15,7 @@ def made(candidate):
     """A row in which the drive law decides M1 and the loss the level of the strongest rival."""
     level = 1000 * candidate["loss_factor"] - 30
     values = {"M1": -40.0, "M2": 0.0, "M3": -30.0, "M4": level, "M5": level - 1}
-    shown = {claim: 1 for claim in values}
+    shown = dict.fromkeys(values, 1)
     shown |= {"M1": int(candidate["drive"] in ("clipped", "compressed")), "M4": int(level < 0)}
     return {
         **candidate, "first_mode_hz": 30.0, "sag_over_thickness": candidate["off_middle"] * 40,
