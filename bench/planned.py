@@ -16,6 +16,7 @@ from fem import Material
 from fem.materials import from_young
 from simple_model import MovingPressure, Response, Tacton, Trajectory
 from skinwave.bodies.sizes import default_size
+from skinwave.models.options import SolveOptions
 from skinwave.models.prepared import answer
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute
@@ -74,7 +75,7 @@ def followed(scene: Scene, tolerance: float) -> tuple[str, Response, float, floa
     A plan that has reduced the body on the mesh it chose has that time taken from its own.
     """
     started = time.perf_counter()
-    chosen = plan(scene, tolerance)
+    chosen = plan(scene, SolveOptions(tolerance=tolerance))
     planning, started = time.perf_counter() - started, time.perf_counter()
     if chosen.prepared:
         found, prepared = answer(chosen.prepared, scene), chosen.seconds

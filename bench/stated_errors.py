@@ -63,7 +63,7 @@ def random_scene(rng: np.random.Generator) -> Scene:
 
 def stated_and_true(scene: Scene, tolerance: float, h: float | None = None) -> tuple[float, float]:
     """Stated error of `fem` with its planned elements, or those of h in metre, and the true one."""
-    plan = skinwave.plan(scene, tolerance, model="fem", h=h)
+    plan = skinwave.plan(scene, skinwave.SolveOptions(tolerance=tolerance, model="fem", h=h))
     assert plan.prepared
     assert plan.h
     if plan.prepared.effort.dofs > LARGEST:

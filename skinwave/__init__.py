@@ -14,6 +14,7 @@ from importlib import import_module  # noqa: E402
 from typing import TYPE_CHECKING, Any  # noqa: E402
 
 if TYPE_CHECKING:  # what readers of types and editors see of the names below
+    from skinwave.models.options import SolveOptions
     from skinwave.models.parametric import ParametricBody, prepare
     from skinwave.planning.plan import plan
     from skinwave.planning.records import Plan
@@ -46,6 +47,7 @@ _HOMES = {
     "field": "report.fields",
     "Agreement": "results.comparison",
     "compare": "results.comparison",
+    "SolveOptions": "models.options",
     "plan": "planning.plan",
     "ParametricBody": "models.parametric",
     "prepare": "models.parametric",
@@ -58,8 +60,8 @@ _HOMES = {
 }
 __all__ = [
     "BODIES", "Agreement", "Best", "Body", "Field", "Load", "ParametricBody", "Plan", "Scene",
-    "Sides", "SkinwaveWarning", "SupportMotion", "SweepTable", "best_value", "cite", "compare",
-    "dumps", "field", "loads", "paper", "plan", "prepare", "read", "simulate", "sweep",
+    "Sides", "SkinwaveWarning", "SolveOptions", "SupportMotion", "SweepTable", "best_value", "cite",
+    "compare", "dumps", "field", "loads", "paper", "plan", "prepare", "read", "simulate", "sweep",
 ]  # fmt: skip
 
 

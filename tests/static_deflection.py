@@ -4,9 +4,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from meshes.tetmesh import Floats
 from simple_model import Response
-from skinwave.models import Model, Request, register
+from skinwave.models import Model, register
 from skinwave.models.limits import Limit, of_body, plain_only
+from skinwave.models.options import SolveOptions
 from skinwave.scene.scene import Body, Scene
 
 
@@ -27,10 +29,10 @@ def limits(scene: Scene) -> Iterator[Limit]:
     yield from plain_only(scene)
 
 
-def solve(scene: Scene, request: Request) -> Response:
-    pressure = np.array([scene.pressure(scene.probe_points, t) for t in request.times])
+def solve(scene: Scene, times: Floats, options: SolveOptions) -> Response:
+    pressure = np.array([scene.pressure(scene.probe_points, t) for t in times])
     return Response(
-        model="static-deflection", times=request.times, probes=scene.probe_points,
+        model="static-deflection", times=times, probes=scene.probe_points,
         values=per_pressure(scene.body) * pressure,
     )  # fmt: skip
 

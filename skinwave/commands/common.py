@@ -89,16 +89,18 @@ def add_model(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--dt", type=float, metavar="S", help="time step of transient models, s")
 
 
-def required_plan(
-    options: argparse.Namespace, scene: "Scene", progress: "Progress | None" = None
-) -> "Plan":
-    """Plan with the user's choices; a warning for each that exceeds the tolerance."""
-    from skinwave.planning.simulate import required_plan
+def required_plan(options: argparse.Namespace, scene: "Scene", **more: Any) -> "Plan":
+    """Plan with the user's choices, and more options; a warning for each that exceeds the
+    tolerance.
+    """
+    from skinwave.models.options import SolveOptions
+    from skinwave.planning.plan import plan
 
-    required = required_plan(
-        scene, options.model, options.tolerance, progress,
-        h=metre(options.h), dt=options.dt, solver=options.solver,
+    asked = SolveOptions(
+        model=options.model, tolerance=options.tolerance, h=metre(options.h), dt=options.dt,
+        solver=options.solver, **more,
     )  # fmt: skip
+    required = plan(scene, asked)
     warn(required.warnings)
     return required
 

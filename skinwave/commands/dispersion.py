@@ -35,7 +35,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from skinwave.planning.simulate import check_options
+    from skinwave.models.options import SolveOptions
     from skinwave.results import record
     from skinwave.results.outputs import output_folder
     from skinwave.scene.file import read
@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.studies.dispersion_page import observed_sentence, sentences, taken_as, write
     from skinwave.studies.driven_modes import driven_modes
 
-    check_options(options.solver, h=metre(options.h))
+    SolveOptions(solver=options.solver, h=metre(options.h))  # which refuses what is out of range
     if not 1 <= options.modes <= 12:
         raise ValueError(f"--modes {options.modes} is outside 1..12; give one of these")
     scene = read(options.scene)

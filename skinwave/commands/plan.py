@@ -32,7 +32,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from dataclasses import asdict, replace
+    from dataclasses import replace
 
     from skinwave.planning.budget import mesh_row
     from skinwave.planning.costs import rows
@@ -43,8 +43,7 @@ def run(options: argparse.Namespace) -> int:
     row = mesh_row(replace(scene, body=required.body), required.h, required.error)
     required = replace(required, rows=(*required.rows, row, *rows(scene, required)))
     if options.json:
-        table = asdict(replace(required, prepared=None))
-        say(json.dumps({key: value for key, value in table.items() if key != "prepared"}))
+        say(json.dumps(required.table()))
         return 0
     width = [max(len(getattr(row, f)) for row in required.rows) for f in ("what", "value")]
     for row in required.rows:

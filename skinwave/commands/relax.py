@@ -27,7 +27,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from skinwave.planning.simulate import check_options
+    from skinwave.models.options import SolveOptions
     from skinwave.results import record
     from skinwave.results.outputs import output_folder
     from skinwave.scene.file import read
@@ -37,7 +37,7 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.system import document
 
     h = metre(options.h)
-    check_options("auto", h=h)
+    SolveOptions(h=h)  # which refuses what is out of range
     rate = 1e3 * options.update_rate
     check_rate(rate)
     if options.scene == "paper-vs-skin":

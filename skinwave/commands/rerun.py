@@ -149,7 +149,9 @@ def _model_again(options: argparse.Namespace, kept: dict[str, Any], scene: Path,
     from dataclasses import replace
     from math import nan
 
-    from skinwave.planning.simulate import answered, compute
+    from skinwave.models.options import SolveOptions
+    from skinwave.planning.plan import plan
+    from skinwave.planning.simulate import compute, solve
     from skinwave.results.files import fill
     from skinwave.results.outputs import output_folder
     from skinwave.results.run import Run
@@ -172,9 +174,9 @@ def _model_again(options: argparse.Namespace, kept: dict[str, Any], scene: Path,
         progress_of(options) as progress,
     ):
         if by == "plan" and its.body.of_kind.discretise:
-            response = answered(its, "auto", 0.05, progress, h=h, solver=solver)
+            response = solve(its, plan(its, SolveOptions(h=h, solver=solver, progress=progress)))
         else:
-            response = compute(its, asked["model"], 0.05, progress, h=h, dt=asked["dt"],
+            response = compute(its, asked["model"], progress=progress, h=h, dt=asked["dt"],
                                solver=solver)  # fmt: skip
         error = kept["expected_error"]
         response = replace(response, expected_error=nan if error is None else error)

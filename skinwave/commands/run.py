@@ -45,7 +45,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from skinwave.planning.simulate import follow
+    from skinwave.planning.simulate import solve
     from skinwave.results import record
     from skinwave.results.outputs import output_folder
     from skinwave.results.run import Run
@@ -63,11 +63,8 @@ def run(options: argparse.Namespace) -> int:
         out, overwrite=options.overwrite, inputs=[options.scene, scene.body.file]
     ) as folder:
         with progress_of(options) as progress, _mapped(options.scheduler) as mapped:
-            required = required_plan(options, scene, progress)
-            response = follow(
-                scene, required, options.tolerance, progress,
-                h=metre(options.h), dt=options.dt, solver=options.solver, mapped=mapped,
-            )  # fmt: skip
+            required = required_plan(options, scene, progress=progress, mapped=mapped)
+            response = solve(scene, required)
         warn(w for w in response.effort.warnings if w not in required.warnings)
         run = Run(tacton=scene.name, body=body_name(scene.body), scene=scene, response=response)
         more = _uncertainty(options, run, required.h, folder) if options.samples else []

@@ -8,7 +8,7 @@ from simple_model.load.sampling import step
 from simple_model.response import SETTLE
 from skinwave.measure.lines import as_response, bin_width, evenly, measurable
 from skinwave.measure.measurement import Measurement
-from skinwave.models.prepared import sample_times
+from skinwave.models.options import sample_times
 from skinwave.results.run import ASSESSED, own_names
 from skinwave.scene.scene import Scene
 

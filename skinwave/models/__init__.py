@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib import import_module
 from math import nan
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from skinwave.system import extensions
 
@@ -16,10 +16,8 @@ if TYPE_CHECKING:
     from simple_model import Response
     from skinwave.bodies import Body
     from skinwave.models.limits import Limit
+    from skinwave.models.options import SolveOptions
     from skinwave.scene.scene import Scene
-    from skinwave.system.effort import Progress
-
-MapFunction = Callable[..., Iterable[Any]]  # of the shape of the built-in `map`
 
 BUILT_IN = {  # name -> the file that registers it
     "point-kernel": "point_kernel",
@@ -43,22 +41,6 @@ def _plain_only(scene: "Scene") -> "Iterable[Limit]":
     return plain_only(scene)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Request:
-    """Request of a response: sample `times` (t,) in s, relative error that may be made, whom to
-    `report` progress to, element size `h` in metre and time step `dt` in s if given, a backend of
-    `fem.linear_solver`, and a function like the built-in `map` for independent parts.
-    """
-
-    times: "Floats"
-    tolerance: float
-    report: "Progress"
-    h: float | None = None
-    dt: float | None = None
-    solver: str = "auto"
-    mapped: MapFunction = map
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Model:
     """Model: how it computes a scene's response, and what is known of that.
@@ -68,7 +50,7 @@ class Model:
     name, label : str, in commands and tables; in legends
     method : str, in a plan: what is computed, in a few words
     words : str, on pages: what it computes and leaves out, one clause
-    solve : response of a scene to a request
+    solve : response of a scene at times (t,) in s, equally spaced from 0, with some options
     limits : of a scene with a body, each `Limit` of the model that it is beyond; none if the model
         takes it; the displacement of the surface under a pressure alone if not given
     error : expected relative error with elements of a size in metre, nan if it is unknown; None for
@@ -90,7 +72,7 @@ class Model:
     name: str
     method: str
     words: str
-    solve: "Callable[[Scene, Request], Response]"
+    solve: "Callable[[Scene, Floats, SolveOptions], Response]"
     limits: "Callable[[Scene], Iterable[Limit]]" = _plain_only
     error: "Callable[[Scene, float | None], float] | None" = lambda scene, h: nan
     default_size: "Callable[[Body], float] | None" = None

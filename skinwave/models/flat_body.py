@@ -20,7 +20,7 @@ from simple_model.layers.wavenumber_integral import Field
 from simple_model.load.focus import gaussian_width
 from skinwave.bodies.analytic import compliance, stack
 from skinwave.bodies.parts import FLAT
-from skinwave.models import Model, Request, register
+from skinwave.models import Model, register
 from skinwave.models.laws import has_table
 from skinwave.models.limits import (
     Limit,
@@ -30,6 +30,7 @@ from skinwave.models.limits import (
     read_at_surface,
     reading_limit,
 )
+from skinwave.models.options import SolveOptions
 from skinwave.models.sheet_limits import of_alike_directions
 from skinwave.models.sources import LAYERS
 from skinwave.scene.scene import Scene
@@ -37,25 +38,23 @@ from skinwave.scene.scene import Scene
 STEP = "wavenumber integral"
 
 
-def _from_rest(scene: Scene, request: Request) -> Response:
-    request.report(STEP, 0.0)
+def _from_rest(scene: Scene, times: Floats, options: SolveOptions) -> Response:
+    options.progress(STEP, 0.0)
     if not (scene.reading.is_plain and scene.load.is_plain):
-        return _read("flat-body", from_rest, scene, request)
-    return simple_model.flat_body(
-        compliance(scene.body), scene.pressure, scene.probe_points, request.times
-    )
+        return _read("flat-body", from_rest, scene, times)
+    return simple_model.flat_body(compliance(scene.body), scene.pressure, scene.probe_points, times)
 
 
-def _steady(scene: Scene, request: Request) -> Response:
-    request.report(STEP, 0.0)
+def _steady(scene: Scene, times: Floats, options: SolveOptions) -> Response:
+    options.progress(STEP, 0.0)
     if not (scene.reading.is_plain and scene.load.is_plain):
-        return _read("flat-body-harmonic", steady, scene, request)
-    return steady_state(compliance(scene.body), scene.pressure, scene.probe_points, request.times)
+        return _read("flat-body-harmonic", steady, scene, times)
+    return steady_state(compliance(scene.body), scene.pressure, scene.probe_points, times)
 
 
-def _read(model: str, waveforms: Callable[..., Floats], scene: Scene, request: Request) -> Response:
+def _read(model: str, waveforms: Callable[..., Floats], scene: Scene, times: Floats) -> Response:
     """Response of a quantity, the probes of one depth together."""
-    started, times = time.perf_counter(), request.times
+    started = time.perf_counter()
     asked, depths = scene.reading.asked, np.array(scene.depths)
     values = np.empty((len(times), len(depths)))
     for depth in np.unique(depths).tolist():

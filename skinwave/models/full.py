@@ -20,7 +20,6 @@ from skinwave.bodies.build import Build, operators
 from skinwave.bodies.build import build as build_body
 from skinwave.bodies.discretised import Discretise
 from skinwave.bodies.sizes import default_size
-from skinwave.models import Request
 from skinwave.models.laws import relaxing, series_tolerance
 from skinwave.models.loads import (
     inertia,
@@ -33,6 +32,7 @@ from skinwave.models.loads import (
     translation,
     with_sag,
 )
+from skinwave.models.options import SolveOptions
 from skinwave.models.symmetry import even_part, images, modelled_axes
 from skinwave.scene.scene import Body, Scene
 from skinwave.scene.support_motion import SupportMotion
@@ -117,13 +117,13 @@ def energy_balance(
     return imbalance, radiated
 
 
-def transient_answer(scene: Scene, request: Request) -> Response:
+def transient_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     """Direct time integration of all dofs in steps of dt, interpolated by a cubic spline."""
-    times, report, solver = request.times, request.report, request.solver
-    dt = request.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
+    report, solver = options.progress, options.solver
+    dt = options.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
     steps = step_count(float(times[-1]), dt)
-    clock, body = Clock(), relaxing(scene.body, series_tolerance(request.tolerance))
-    build = meshed(body, request.h, clock, report)
+    clock, body = Clock(), relaxing(scene.body, series_tolerance(options.tolerance))
+    build = meshed(body, options.h, clock, report)
     ops = assembled(build, clock, report)
     P, points = surface_load(build, scene.load)
     S, solids = probe_rows(scene.body, build, scene.probe_points, scene.reading)
@@ -149,7 +149,7 @@ def transient_answer(scene: Scene, request: Request) -> Response:
     return Response(
         model="fem-transient", times=times, probes=scene.probe_points, quantity=scene.quantity,
         values=in_time(stepped, dt, times, scene, solids, sag=still),
-        effort=spent(effort, clock, build, request.h or default_size(scene.body)),
+        effort=spent(effort, clock, build, options.h or default_size(scene.body)),
     )  # fmt: skip
 
 
@@ -260,17 +260,17 @@ def step_count(duration: float, dt: float) -> int:
     return max(3, ceil(duration / dt - 1e-9))
 
 
-def harmonic_answer(scene: Scene, request: Request) -> Response:
+def harmonic_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     """Steady state: one factorisation for each line of the load above a threshold, but for the mean
     if the body is unconstrained. Of a body that is its own mirror image only one side is modelled
     where all probes lie on the plane.
     """
-    times, report, solver = request.times, request.report, request.solver
-    threshold = request.tolerance / 50  # of the strongest line
+    report, solver = options.progress, options.solver
+    threshold = options.tolerance / 50  # of the strongest line
     clock = Clock()
     probes, reading = scene.probe_points, scene.reading
     axes = modelled_axes(scene.body, probes, "", reading, scene.load)
-    build = meshed(scene.body, request.h, clock, report, axes)
+    build = meshed(scene.body, options.h, clock, report, axes)
     ops = assembled(build, clock, report)
     P, points = even_part(*surface_load(build, scene.load), axes)
     S, solids = probe_rows(scene.body, build, images(probes, axes), reading)
@@ -288,7 +288,7 @@ def harmonic_answer(scene: Scene, request: Request) -> Response:
         amplitudes = np.empty((len(frequencies), S.shape[0]), np.complex128)
         total = fem.EnergyBalance()
         report("lines", 0.0)
-        answers = request.mapped(partial(_line, ops, P, S, solve), frequencies, pressures)
+        answers = options.mapped(partial(_line, ops, P, S, solve), frequencies, pressures)
         for k, (amplitudes[k], power) in enumerate(answers):
             report("lines", (k + 1) / len(frequencies))
             energy_balance(power, when=f" at {frequencies[k]:g} Hz")
@@ -312,7 +312,7 @@ def harmonic_answer(scene: Scene, request: Request) -> Response:
             with_sag(synthesise(frequencies[below], amplitudes[below], times), still, asked),
             len(scene.probes),
         ),
-        effort=spent(effort, clock, build, request.h or default_size(scene.body)),
+        effort=spent(effort, clock, build, options.h or default_size(scene.body)),
     )  # fmt: skip
 
 

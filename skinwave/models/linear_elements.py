@@ -8,15 +8,17 @@ from math import isfinite
 import numpy as np
 
 from meshes import MeshError
+from meshes.tetmesh import Floats
 from simple_model import Response
 from simple_model.numbers import significant
 from skinwave.bodies.body import Body
 from skinwave.bodies.parts import PHALANX, PLAIN
 from skinwave.bodies.sizes import check_mesh, default_size
-from skinwave.models import Model, Request, register
+from skinwave.models import Model, register
 from skinwave.models.full import harmonic_answer, transient_answer
 from skinwave.models.laws import has_own_law
 from skinwave.models.limits import Limit, of_body
+from skinwave.models.options import SolveOptions
 from skinwave.models.prepared import answer, prepare, reduction_tolerance
 from skinwave.models.sheet_limits import of_air_in_a_frame, of_vacuum
 from skinwave.models.sources import ALPHA, ARNOLDI, MACROELEMENTS, REDUCTION
@@ -102,12 +104,12 @@ def _limits(
         )
 
 
-def _reduced(scene: Scene, request: Request) -> Response:
+def _reduced(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     prepared = prepare(
-        scene.body, scene.probe_points, request.report, h=request.h, solver=request.solver,
-        tolerance=reduction_tolerance(request.tolerance), reading=scene.reading, load=scene.load,
+        scene.body, scene.probe_points, options.progress, h=options.h, solver=options.solver,
+        tolerance=reduction_tolerance(options.tolerance), reading=scene.reading, load=scene.load,
     )  # fmt: skip
-    return answer(prepared, scene, request.report, times=request.times)
+    return answer(prepared, scene, options.progress, times=times)
 
 
 FEM = register(

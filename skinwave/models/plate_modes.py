@@ -29,14 +29,14 @@ from simple_model.plates.path_forces import modal_path_forces
 from simple_model.typing import Complex
 from skinwave.bodies.body import Body
 from skinwave.bodies.mounting import EDGES
-from skinwave.models import Model, Request, register
+from skinwave.models import Model, register
 from skinwave.models.laws import has_own_law
 from skinwave.models.limits import Limit, of_body, surface_motion
-from skinwave.models.prepared import sample_times
+from skinwave.models.options import SolveOptions, sample_times
 from skinwave.models.sheet_limits import of_held_sheet
 from skinwave.models.sources import PLATES
 from skinwave.scene.scene import Scene
-from skinwave.system.effort import peak_memory, silent
+from skinwave.system.effort import peak_memory
 
 ERROR = 0.01  # relative, of a steady waveform beside finite elements of a frame, vacuum and air
 
@@ -84,40 +84,40 @@ class Driven:
     outputs: Floats
 
 
-def steady_answer(scene: Scene, request: Request) -> Response:
+def steady_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     """Steady state of the modes under every line of the load below half the sampling rate."""
-    started, driven = time.perf_counter(), _driven(scene, request)
-    values = _steady(scene, driven, _motion(scene, driven), request.times)
-    return _response(scene, request, MODES.name, driven, values, started)
+    started, driven = time.perf_counter(), _driven(scene, times, options)
+    values = _steady(scene, driven, _motion(scene, driven), times)
+    return _response(scene, times, MODES.name, driven, values, started)
 
 
 def steady_lines(scene: Scene, places: Floats | None = None) -> tuple[Floats, Complex]:
     """Frequencies (f,) in Hz and complex amplitudes (f, p) of a scene's quantity in the steady
     state, at places (p, 2) in metre, or its probes; a ValueError of a load without lines.
     """
-    driven = _driven(scene, Request(times=sample_times(scene), tolerance=ERROR, report=silent))
+    driven = _driven(scene, sample_times(scene), SolveOptions())
     if places is not None:
         outputs = driven.modes.at(places - scene.body.placement.offset)
         driven = replace(driven, outputs=outputs)
     return driven.frequencies, _amplitudes(scene, driven, _motion(scene, driven))
 
 
-def answer_from_rest(scene: Scene, request: Request) -> Response:
+def answer_from_rest(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     """The steady state and the free vibration that a start from rest leaves."""
-    started, driven = time.perf_counter(), _driven(scene, request)
-    motion, times = _motion(scene, driven), request.times
+    started, driven = time.perf_counter(), _driven(scene, times, options)
+    motion = _motion(scene, driven)
     values = _steady(scene, driven, motion, times) + _transient(scene, driven, motion, times)
-    return _response(scene, request, FROM_REST.name, driven, values, started)
+    return _response(scene, times, FROM_REST.name, driven, values, started)
 
 
-def _driven(scene: Scene, request: Request) -> Driven:
+def _driven(scene: Scene, times: Floats, options: SolveOptions) -> Driven:
     body, pressure = scene.body, scene.pressure
-    request.report("modes", 0.0)
+    options.progress("modes", 0.0)
     modes: PlateModes = modes_of(plate_of(body))
-    request.report("lines", 0.0)
+    options.progress("lines", 0.0)
     middle = body.placement.offset
     f, forces = lines_from_rest(pressure).gather(modal_path_forces(modes, pressure, middle))
-    driving = f < highest_driving(pressure, request.times)
+    driving = f < highest_driving(pressure, times)
     return Driven(
         modes=modes, frequencies=f[driving], forces=forces[driving],
         outputs=modes.at(scene.probe_points - middle),
@@ -125,10 +125,10 @@ def _driven(scene: Scene, request: Request) -> Driven:
 
 
 def _response(
-    scene: Scene, request: Request, model: str, driven: Driven, values: Floats, started: float
+    scene: Scene, times: Floats, model: str, driven: Driven, values: Floats, started: float
 ) -> Response:
     return Response(
-        model=model, times=request.times, probes=scene.probe_points,
+        model=model, times=times, probes=scene.probe_points,
         quantity=scene.reading.asked.name, values=values,
         effort=Effort(
             seconds={"evaluate": time.perf_counter() - started}, dofs=len(driven.modes.squared),

@@ -2,21 +2,23 @@
 
 from collections.abc import Iterator
 
+from meshes.tetmesh import Floats
 from simple_model import Response, point_kernel, point_kernel_published
 from simple_model.quantities import PRESSURE
-from skinwave.models import Model, Request, register
+from skinwave.models import Model, register
 from skinwave.models.limits import Limit, load_limit
+from skinwave.models.options import SolveOptions
 from skinwave.scene.scene import Scene
 
 ERROR = 1.0  # relative error of the point kernel on any body, measured 0.98 to 1.04
 
 
-def _same_load(scene: Scene, request: Request) -> Response:
-    return point_kernel(scene.pressure, scene.probe_points, request.times)
+def _same_load(scene: Scene, times: Floats, options: SolveOptions) -> Response:
+    return point_kernel(scene.pressure, scene.probe_points, times)
 
 
-def _published(scene: Scene, request: Request) -> Response:
-    return point_kernel_published(scene.pressure, scene.probe_points, request.times)
+def _published(scene: Scene, times: Floats, options: SolveOptions) -> Response:
+    return point_kernel_published(scene.pressure, scene.probe_points, times)
 
 
 def _limits(scene: Scene) -> Iterator[Limit]:

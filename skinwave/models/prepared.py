@@ -29,6 +29,7 @@ from skinwave.models.loads import (
     translation,
     with_sag,
 )
+from skinwave.models.options import sample_times
 from skinwave.models.reduction import (
     BAND,
     ReducedBody,
@@ -41,7 +42,7 @@ from skinwave.models.reduction import (
 )
 from skinwave.models.symmetry import even_part, images, modelled_axes
 from skinwave.scene.load import PRESSURE, Load
-from skinwave.scene.scene import SAMPLE_RATE, SURFACE, Body, Reading, Scene
+from skinwave.scene.scene import SURFACE, Body, Reading, Scene
 from skinwave.system.effort import Clock, Progress, one_thread, peak_memory, silent, versions
 
 REDUCTION_TOLERANCE = 1e-3
@@ -56,11 +57,6 @@ NEGLIGIBLE_LINE = 1e-7  # of the strongest line at the probes
 def reduction_tolerance(tolerance: float) -> float:
     """Tolerance of a reduction: a small share of the relative error that a waveform may have."""
     return min(REDUCTION_TOLERANCE, tolerance / 50)
-
-
-def sample_times(scene: Scene, rate: float = SAMPLE_RATE) -> Floats:
-    """Sample times (t,) in s of a response: from 0 up to the duration, at least two."""
-    return np.arange(max(2, round(scene.tacton.duration * rate))) / rate
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -20,15 +20,15 @@ from simple_model.load.sampling import step
 from simple_model.plates.karman_motion import linear_motion, stretched_motion
 from simple_model.plates.modes import PlateModes
 from simple_model.plates.von_karman import KarmanPlate, karman_plate
-from skinwave.models import Model, Request, register
+from skinwave.models import Model, register
 from skinwave.models.laws import has_own_law, slowest_and_fastest
+from skinwave.models.options import SolveOptions, sample_times
 from skinwave.models.plate_modes import ERROR as PLATE_ERROR
 from skinwave.models.plate_modes import FROM_REST, limits, modes_of, plate_of
-from skinwave.models.prepared import sample_times
 from skinwave.models.sources import KARMAN, PLATES
 from skinwave.models.stretching import relative
 from skinwave.scene.scene import Scene
-from skinwave.system.effort import peak_memory, silent
+from skinwave.system.effort import peak_memory
 
 LONGEST, SHORTEST = 1e-4, 2.5e-5  # s, of time steps
 COUNTS = 42, 60, 86, 120  # modes that stretch a sheet, each number judged beside the one before
@@ -39,13 +39,13 @@ DEGREE = 5  # of the splines that are differentiated
 _karman = lru_cache(maxsize=6)(karman_plate)
 
 
-def _answer(scene: Scene, request: Request) -> Response:
-    started, times = time.perf_counter(), request.times
-    linear = FROM_REST.solve(scene, request)
+def _answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
+    started = time.perf_counter()
+    linear = FROM_REST.solve(scene, times, options)
     modes: PlateModes = modes_of(plate_of(scene.body))
-    request.report("large deflection", 0.0)
-    count, parts, error = _resolved(scene, request, modes, linear.values)
-    request.report("large deflection", 0.2)
+    options.progress("large deflection", 0.0)
+    count, parts, error = _resolved(scene, times, options, modes, linear.values)
+    options.progress("large deflection", 0.2)
     effort = Effort(
         seconds={"evaluate": time.perf_counter() - started}, dofs=len(modes.squared),
         reduced_dofs=count, steps=parts * (len(times) - 1), dt=step(times) / parts,
@@ -100,9 +100,10 @@ def settled(scene: Scene, tolerance: float) -> tuple[Floats, Floats, PlateModes]
     times (t,) in s, coordinates (t, m) in kg^1/2 m of all modes, and the modes
     """
     times = sample_times(scene)
-    request = Request(times=times, tolerance=tolerance, report=silent)
+    options = SolveOptions(tolerance=tolerance)
     modes: PlateModes = modes_of(plate_of(scene.body))
-    count, parts, _ = _resolved(scene, request, modes, FROM_REST.solve(scene, request).values)
+    linear = FROM_REST.solve(scene, times, options).values
+    count, parts, _ = _resolved(scene, times, options, modes, linear)
     kept = slice(len(times) // 2, None)
     middle = scene.body.placement.offset
     z = linear_motion(modes, scene.pressure, scene.body.solid, times[kept], middle=middle)
@@ -112,34 +113,34 @@ def settled(scene: Scene, tolerance: float) -> tuple[Floats, Floats, PlateModes]
 
 
 def _resolved(
-    scene: Scene, request: Request, modes: PlateModes, linear: Floats
+    scene: Scene, times: Floats, options: SolveOptions, modes: PlateModes, linear: Floats
 ) -> tuple[int, int, float]:
     """Number of modes that stretch the sheet and of time steps a sample, and the error they make:
     measured over the first part of an answer, and as small as the tolerance asks or as can be had.
     """
-    sample = step(request.times)
-    parts = ceil(sample / (request.dt or LONGEST) - 1e-9)
+    sample = step(times)
+    parts = ceil(sample / (options.dt or LONGEST) - 1e-9)
     counts = [min(count, len(modes.squared)) for count in COUNTS]
-    times = first_part(scene.pressure, request.times)
+    start = first_part(scene.pressure, times)
     known: dict[tuple[int, int], Floats] = {}
 
     def added(count: int, parts: int) -> Floats:
         if (count, parts) not in known:
-            known[count, parts] = _added(scene, times, modes, count, parts)
+            known[count, parts] = _added(scene, start, modes, count, parts)
         return known[count, parts]
 
     for fewer, count in pairwise(counts):
         while True:
             part = added(count, parts)
-            size = linear[: len(times)] + part
+            size = linear[: len(start)] + part
             # Steps are of second order: a quarter of the error with steps half as long.
             by_steps = 4 / 3 * float(relative(added(count, 2 * parts) - part, size).max())
             by_modes = float(relative(added(fewer, parts) - part, size).max())
-            may_be_shorter = request.dt is None and sample / parts > SHORTEST
-            if by_steps <= SHARE * request.tolerance or not may_be_shorter:
+            may_be_shorter = options.dt is None and sample / parts > SHORTEST
+            if by_steps <= SHARE * options.tolerance or not may_be_shorter:
                 break
             parts *= 2
-        if by_modes <= SHARE * request.tolerance:
+        if by_modes <= SHARE * options.tolerance:
             break
     return count, parts, by_steps + by_modes
 

@@ -31,7 +31,6 @@ from simple_model.load.spectrum import load_lines
 from simple_model.quantities import ACCELERATION, DISPLACEMENT, VELOCITY, Quantity
 from skinwave.bodies.build import Build, build
 from skinwave.bodies.sheet import air, bending_wavenumber, discretise
-from skinwave.models import Request
 from skinwave.models.advice import beyond
 from skinwave.models.full import (
     TRANSIENT_RATE,
@@ -42,6 +41,7 @@ from skinwave.models.full import (
     step_count,
 )
 from skinwave.models.loads import load_in_steps, surface_load
+from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import ERROR as PLATE_ERROR
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.prepared import in_motion
@@ -118,27 +118,27 @@ def stretching_body(body: Body, made: Build) -> fem.Elastic:
     )
 
 
-def full_answer(scene: Scene, request: Request) -> Response:
+def full_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     """Direct time integration of all dofs, from rest."""
-    clock, size = Clock(), request.h or stretching_size(scene.body, reduced=False)
+    clock, size = Clock(), options.h or stretching_size(scene.body, reduced=False)
     with clock("assemble"):
-        request.report("assemble", 0.0)
+        options.progress("assemble", 0.0)
         made = meshed_sheet(scene.body, size)
         body = stretching_body(scene.body, made)
     P, points = surface_load(made)
-    dt = request.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
-    load = load_in_steps((scene.pressure,), points, request.times, dt)
+    dt = options.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
+    load = load_in_steps((scene.pressure,), points, times, dt)
     march = _march(
-        body, lambda t: P @ load(t), dt, request, clock,
+        body, lambda t: P @ load(t), dt, times, options, clock,
         read=full_reader(scene.body, made, scene.probe_points, scene.reading),
         rows=fem.probe_operator(made.mesh, scene.probe_points),
     )  # fmt: skip
-    values = in_time(march.steps, dt, request.times, scene, _solids(scene))
+    values = in_time(march.steps, dt, times, scene, _solids(scene))
     plain = _normal(scene)
-    linear = in_time(march.linear, dt, request.times, plain)
+    linear = in_time(march.linear, dt, times, plain)
     return _response(
-        "fem-nonlinear-transient", scene, request, clock, made, size,
-        values=values, error=_plate_error(plain, request, linear, size),
+        "fem-nonlinear-transient", scene, times, clock, made, size,
+        values=values, error=_plate_error(plain, times, options, linear, size),
         effort=replace(march.effort, dofs=len(body.operators.free)),
     )  # fmt: skip
 
@@ -153,23 +153,23 @@ class _Reduced:
     operators: fem.Operators
 
 
-def reduced_answer(scene: Scene, request: Request) -> Response:
+def reduced_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     """Time integration of the sheet's bending modes, from rest, with an exact linear part."""
-    clock, size = Clock(), request.h or stretching_size(scene.body, reduced=True)
-    asked, probes, times = scene.reading.asked, scene.probe_points, request.times
+    clock, size = Clock(), options.h or stretching_size(scene.body, reduced=True)
+    asked, probes = scene.reading.asked, scene.probe_points
     with clock("reduce"):
-        request.report("reduce", 0.0)
-        sheet = _reduced(scene.body, size, request.solver)
+        options.progress("reduce", 0.0)
+        sheet = _reduced(scene.body, size, options.solver)
         read = modal_reader(
             scene.body, sheet.made, sheet.modes, sheet.operators, probes, scene.reading,
-            request.solver,
+            options.solver,
         )  # fmt: skip
 
     each = np.eye(len(sheet.modes.hz))
     rows = np.stack([(read(z) - read(-z)) / 2 for z in each], axis=1)  # the rest is quadratic
-    dt = request.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
+    dt = options.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
     force = _modal_force(scene, sheet.linear, times, dt)
-    march = _march(sheet.modes.elastic, force, dt, request, clock, read=read, rows=rows)
+    march = _march(sheet.modes.elastic, force, dt, times, options, clock, read=read, rows=rows)
     with clock("linear part"):
         solids, plain = _solids(scene), _normal(scene)
         highest = highest_driving(scene.pressure, times)
@@ -184,13 +184,13 @@ def reduced_answer(scene: Scene, request: Request) -> Response:
         )
         shapes = fem.probe_operator(sheet.made.mesh, probes) @ sheet.modes.basis
         elements = _plate_error(
-            plain, request, _from_rest(motion, shapes, times, plain.reading.asked, ()), size
+            plain, times, options, _from_rest(motion, shapes, times, plain.reading.asked, ()), size
         )
     # Steps of the linear part are corrected: what they do to the rest is as small as it is.
     share = np.minimum(relative(values - exact, values), 1)
     error = elements + float((share * relative(stepped - exact, values)).max())
     return _response(
-        "fem-nonlinear", scene, request, clock, sheet.made, size, values=values, error=error,
+        "fem-nonlinear", scene, times, clock, sheet.made, size, values=values, error=error,
         effort=replace(
             march.effort, dofs=len(sheet.operators.free), reduced_dofs=len(sheet.modes.hz),
             estimate=sheet.modes.left_out,
@@ -264,11 +264,11 @@ class _March:
 
 
 def _march(
-    body: fem.Elastic, force: Callable[[float], Floats], dt: float, request: Request, clock: Clock,
-    *, read: Callable[[Floats], Floats], rows: Any,
+    body: fem.Elastic, force: Callable[[float], Floats], dt: float, times: Floats,
+    options: SolveOptions, clock: Clock, *, read: Callable[[Floats], Floats], rows: Any,
 ) -> _March:  # fmt: skip
     """Time integration from rest, and of the linear part, of which `rows` (p c, r) are read."""
-    solver, steps = request.solver, step_count(float(request.times[-1]), dt)
+    solver, steps = options.solver, step_count(float(times[-1]), dt)
     kept, linear = lru_cache(maxsize=2)(force), []
 
     def states() -> Iterator[fem.State]:
@@ -281,7 +281,7 @@ def _march(
     with clock("march"):
         stepped, (imbalance, _) = marched(
             nonlinear.with_energy_balance(body, states(), kept), steps, read,
-            lambda state: nonlinear.total_energy(body, state), request.report,
+            lambda state: nonlinear.total_energy(body, state), options.progress,
         )  # fmt: skip
     effort = Effort(
         steps=steps, solver=fem.available()[0] if solver == "auto" else solver,
@@ -303,11 +303,13 @@ def _normal(scene: Scene) -> Scene:
     return replace(scene, quantity=RATES[rate].name, depth=0.0)
 
 
-def _plate_error(plain: Scene, request: Request, linear: Floats, h: float) -> float:
+def _plate_error(
+    plain: Scene, times: Floats, options: SolveOptions, linear: Floats, h: float
+) -> float:
     """Relative error of a linear part (t, p) of the normal motion, by that of a thin plate."""
     if beyond(FROM_REST, plain):
         return expected_error(plain.body, h)
-    plate = FROM_REST.solve(plain, request).values
+    plate = FROM_REST.solve(plain, times, options).values
     error = float(relative(linear - plate, plate).max())
     return error + PLATE_ERROR
 
@@ -321,10 +323,10 @@ def relative(change: Floats, values: Floats) -> Floats:
 
 
 def _response(
-    model: str, scene: Scene, request: Request, clock: Clock, made: Build, h: float, *,
+    model: str, scene: Scene, times: Floats, clock: Clock, made: Build, h: float, *,
     values: Floats, error: float, effort: Effort,
 ) -> Response:  # fmt: skip
     return Response(
-        model=model, times=request.times, probes=scene.probe_points, quantity=scene.quantity,
+        model=model, times=times, probes=scene.probe_points, quantity=scene.quantity,
         values=values, expected_error=error, effort=spent(effort, clock, made, h),
     )  # fmt: skip

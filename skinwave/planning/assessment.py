@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from simple_model import Response
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.models import named
+from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
 from skinwave.planning.boundaries import absorbing_error
 from skinwave.planning.plan import plan
@@ -39,9 +40,7 @@ def assessed(
     scene: Scene,
     response: Response,
     prepared: Prepared,
-    h: float | None = None,
-    tolerance: float = 0.05,
-    solver: str = "auto",
+    options: SolveOptions = DEFAULT,
     *,
     compared: Coarser | None = None,
     meshed: Body | None = None,
@@ -53,8 +52,7 @@ def assessed(
     scene : Scene
     response : Response, of the reduced body
     prepared : Prepared
-    h : float, metre, element size, the default of the body if not given
-    tolerance, solver : as for `simulate`
+    options : SolveOptions; h is the default of the body if not given
     compared : element size in metre to compare with, and the body with it; chosen if not given
     meshed : body whose mesh both sizes are of, if its nodes were moved to those of the scene's
 
@@ -63,16 +61,14 @@ def assessed(
     Response
     """
     fine = quantity_of_interest(prepared, scene, response)
-    return told(scene, response, fine, h, tolerance, solver, compared=compared, meshed=meshed)
+    return told(scene, response, fine, options, compared=compared, meshed=meshed)
 
 
 def told(
     scene: Scene,
     response: Response,
     fine: NDArray[Any],
-    h: float | None = None,
-    tolerance: float = 0.05,
-    solver: str = "auto",
+    options: SolveOptions = DEFAULT,
     *,
     compared: Coarser | None = None,
     meshed: Body | None = None,
@@ -81,7 +77,7 @@ def told(
 
     Parameters
     ----------
-    scene, response, h, tolerance, solver, compared, meshed : as for `assessed`
+    scene, response, options, compared, meshed : as for `assessed`
     fine : quantity of interest of the response: waveforms (t, p), or the lines (f, p) of an
         unconstrained body
 
@@ -89,14 +85,15 @@ def told(
     -------
     Response
     """
-    body, size = scene.body, h or default_size(scene.body)
-    other, coarse = compared or coarser_body(scene, h, tolerance, solver)
+    body, tolerance = scene.body, options.tolerance
+    size = options.h or default_size(body)
+    other, coarse = compared or coarser_body(scene, options)
     same = coarse.effort.dofs == response.effort.dofs
     fine = about_its_rest(scene, fine)
     found = fine if same else quantity_of_interest(coarse, scene, answer(coarse, scene))
     _, error = convergence(meshed or body, (other, size), (found, fine), tolerance, same=same)
     series = series_error(scene, response.model, tolerance, coarse)
-    at_ends = absorbing_error(scene, body, tolerance, solver=solver)
+    at_ends = absorbing_error(scene, body, options)
     sudden = above_band(response.values, response.times[1] - response.times[0])
     warnings = (
         *sentences(scene, response, tolerance, h=size, error=error),
@@ -108,23 +105,21 @@ def told(
     return replace(response, expected_error=error, effort=effort)
 
 
-def coarser_body(
-    scene: Scene, h: float | None = None, tolerance: float = 0.05, solver: str = "auto"
-) -> Coarser:
+def coarser_body(scene: Scene, options: SolveOptions = DEFAULT) -> Coarser:
     """Coarser mesh that `assessed` compares with.
 
     Parameters
     ----------
-    scene, h, tolerance, solver : as for `assessed`
+    scene, options : as for `assessed`
 
     Returns
     -------
     element size in metre, and the body reduced with it
     """
-    body = scene.body
+    body, h = scene.body, options.h
     other = compared_with(body, h) if h else _coarser(body, default_size(body))
-    reduction = reduction_tolerance(tolerance)
-    asked = (body, scene.probes, other, solver, reduction)
+    reduction = reduction_tolerance(options.tolerance)
+    asked = (body, scene.probes, other, options.solver, reduction)
     return other, _prepared(*asked, reading=scene.reading, load=scene.load)
 
 
@@ -153,7 +148,8 @@ def sentences(
     if named(response.model).default_size and h:
         known = of_elements(scene, h, error, tolerance)
     else:
-        known = plan(scene, tolerance, model=response.model, times=response.times).warnings
+        asked = SolveOptions(tolerance=tolerance, model=response.model, times=response.times)
+        known = plan(scene, asked).warnings
     return (*known, *of_stretching(scene, response, tolerance))
 
 

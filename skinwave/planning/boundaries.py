@@ -16,13 +16,13 @@ from skinwave.bodies.absorbing_layer import has_layer, layer_of
 from skinwave.bodies.mounting import EDGES
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.bodies.slab import discretise
+from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.prepared import answer, prepare, reduction_tolerance
 from skinwave.planning.estimates import spot_scale
-from skinwave.planning.extent import symmetry
+from skinwave.planning.extent import symmetry, within_reflections
 from skinwave.planning.records import PlanRow
 from skinwave.planning.refinement import about_its_rest, element_sizes, relative_change
 from skinwave.scene.scene import Body, Scene
-from skinwave.system.effort import Progress
 
 WIDER = 2.0  # times the width of the layer
 # Of the change: slabs on springs, free ones and half-spaces had 1.0 to 1.3 times it in error.
@@ -32,14 +32,7 @@ SHARE = 0.25  # of the tolerance: what absorbing ends may leave before the body 
 MOST_EXTENSIONS = 2
 
 
-def absorbing_error(
-    scene: Scene,
-    body: Body,
-    tolerance: float = 0.05,
-    progress: Progress | None = None,
-    *,
-    solver: str = "auto",
-) -> float:
+def absorbing_error(scene: Scene, body: Body, options: SolveOptions = DEFAULT) -> float:
     """Relative error of the worst probe's waveform that the absorbing base and sides of a slab
     leave.
 
@@ -47,7 +40,7 @@ def absorbing_error(
     ----------
     scene : Scene, with load and probes
     body : Body that is meshed, the scene's or an extended one
-    tolerance, progress, solver : as for `refinement.refined`
+    options : SolveOptions
 
     Returns
     -------
@@ -60,8 +53,8 @@ def absorbing_error(
 
     def answered(wider: float, reduction: float) -> Floats:
         prepared = prepare(
-            body, scene.probe_points, progress, h=size, symmetry=axes, solver=solver,
-            tolerance=reduction, reading=scene.reading, load=scene.load,
+            body, scene.probe_points, options.progress, h=size, symmetry=axes,
+            solver=options.solver, tolerance=reduction, reading=scene.reading, load=scene.load,
             discretise=partial(discretise, wider=wider),
         )  # fmt: skip
         return about_its_rest(scene, answer(prepared, scene).values)
@@ -70,48 +63,45 @@ def absorbing_error(
         return relative_change(answered(1.0, reduction), answered(WIDER, reduction))
 
     try:
-        return MARGIN * change(reduction_tolerance(tolerance))
+        return MARGIN * change(reduction_tolerance(options.tolerance))
     except fem.NotReduced:  # a free body has hundreds of modes in a wide layer
         return MARGIN * change(COARSE)
 
 
-def extended(
-    scene: Scene,
-    body: Body,
-    tolerance: float,
-    progress: Progress | None = None,
-    *,
-    solver: str = "auto",
-) -> tuple[Body, float, list[PlanRow]]:
-    """Body that is extended at its absorbing ends until these leave a small share of the tolerance.
+def extent(
+    scene: Scene, options: SolveOptions, highest: float
+) -> tuple[Body, list[PlanRow], float]:
+    """Body without what reflects too little to matter, or extended at its absorbing ends until
+    these leave a small share of the tolerance.
 
     Parameters
     ----------
-    scene, body, tolerance, progress, solver : as for `absorbing_error`
+    scene, options : as for `absorbing_error`
+    highest : Hz, of the lines that count
 
     Returns
     -------
-    Body, the error that its absorbing ends leave, and a row if it is not the one that was given
+    Body, a row if it is not all of the scene's, and the error that its absorbing ends leave
     """
-    error = partial(absorbing_error, scene, tolerance=tolerance, progress=progress, solver=solver)
-    found, left = body, error(body)
+    body, rows = within_reflections(scene, options.tolerance, highest)
+    found, left = body, absorbing_error(scene, body, options)
     for _ in range(MOST_EXTENSIONS):
         larger = _larger(found)
-        if left <= SHARE * tolerance or larger == found:
+        if left <= SHARE * options.tolerance or larger == found:
             break
         try:
             check_mesh(larger, default_size(larger))
         except ValueError:  # too large
             break
-        found, left = larger, error(larger)
+        found, left = larger, absorbing_error(scene, larger, options)
     if found == body:
-        return body, left, []
+        return body, rows, left
     size = f"{1e3 * found.width:.0f} x {1e3 * found.height:.0f} x {1e3 * found.depth:.0f} mm"
     row = PlanRow(
         what="extent", value=size,
         reason=f"absorbing ends further away; they leave an error of {100 * left:.2g} %",
     )  # fmt: skip
-    return found, left, [row]
+    return found, [row], left
 
 
 def _larger(body: Body) -> Body:

@@ -34,7 +34,9 @@ def symmetry(scene: Scene) -> str:
     )
 
 
-def extent(scene: Scene, tolerance: float, highest: float) -> tuple[Body, list[PlanRow]]:
+def within_reflections(
+    scene: Scene, tolerance: float, highest: float
+) -> tuple[Body, list[PlanRow]]:
     """Extent of the body out to where reflections are negligible.
 
     Only absorbing sides are moved inwards: reflections from others belong to the response.

@@ -6,9 +6,9 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 import fem
+from meshes.tetmesh import Floats
 from simple_model.layers.flat_body import FINEST
 from simple_model.load.focus import gaussian_width
 from simple_model.load.sampling import resolving_step
@@ -20,12 +20,12 @@ from skinwave.models.full import TRANSIENT_RATE, step_count
 from skinwave.models.laws import check_laws
 from skinwave.models.limits import Limit
 from skinwave.models.linear_elements import FEM
+from skinwave.models.options import DEFAULT, SolveOptions, sample_grid, sample_times
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.point_kernel import SAME_LOAD
-from skinwave.models.prepared import answer, sample_times
-from skinwave.models.sample_grid import sample_grid
+from skinwave.models.prepared import answer
 from skinwave.models.stretched_plate import STRETCHED
-from skinwave.planning.boundaries import absorbing_error, extended
+from skinwave.planning.boundaries import absorbing_error, extent
 from skinwave.planning.estimates import (
     NO_BOUND,
     cutoff_frequency,
@@ -33,7 +33,7 @@ from skinwave.planning.estimates import (
     response_spectrum,
     side_reflections,
 )
-from skinwave.planning.extent import extent, left_out, symmetry
+from skinwave.planning.extent import left_out, symmetry
 from skinwave.planning.mesh_rows import element_rows
 from skinwave.planning.records import Plan, PlanRow
 from skinwave.planning.refinement import above_band, refined
@@ -51,33 +51,20 @@ from skinwave.planning.warnings import (
     sudden_over_tolerance,
 )
 from skinwave.scene.scene import FLAT, Body, Scene
-from skinwave.system.effort import Progress
 
 INTEGRAL_ERROR = 0.002  # of a wavenumber integral, beside finite elements
+Grid = tuple[Floats, int]  # as of `sample_grid`
 WAVES_SHARE = 0.8  # of the tolerance: largest reflections of sides that may be neglected
 
 
-def plan(
-    scene: Scene,
-    tolerance: float = 0.05,
-    *,
-    model: str | None = None,
-    h: float | None = None,
-    dt: float | None = None,
-    solver: str = "auto",
-    progress: Progress | None = None,
-    times: ArrayLike | None = None,
-) -> Plan:
+def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
     """Plan a scene's simulation to a relative error in its probes' waveforms.
 
     Parameters
     ----------
     scene : Scene
-    tolerance : that error, 0..1
-    model, h, dt : given choices: a model's name, element size in metre, time step in s; with both
-        a model and h all of the body is modelled, and h alone asks for elements of a sheet
-    solver, progress : for the meshes that are tried where the scene needs elements
-    times : (t,) float, s, of the response, as for `simulate`: over which a start counts
+    options : SolveOptions; with both a model and h all of the body is modelled, and h alone asks
+        for elements of a sheet
 
     Returns
     -------
@@ -86,122 +73,120 @@ def plan(
     Raises
     ------
     ValueError
-        If the tolerance is not between 0 and 1, there is no body for the model, or h or dt
-        cannot be computed with.
+        If the model is unknown or does not take the scene, or the times, h or dt do not fit it.
     """
-    if not 0 < tolerance < 1:
-        raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
-    found = _planned(
-        scene, tolerance, model=model, h=h, dt=dt, solver=solver, progress=progress, times=times
-    )
-    left = stretching_left_out(scene, named(found.model), tolerance)
-    return replace(found, error=found.error + left)
+    grid = sample_grid(scene, options.times)
+    found = _planned(scene, options, grid)
+    left = stretching_left_out(scene, named(found.model), options.tolerance)
+    return replace(found, error=found.error + left, options=options)
 
 
-def _planned(
-    scene: Scene,
-    tolerance: float,
-    *,
-    model: str | None,
-    times: ArrayLike | None,
-    h: float | None = None,
-    dt: float | None = None,
-    solver: str = "auto",
-    progress: Progress | None = None,
-) -> Plan:
+def _planned(scene: Scene, options: SolveOptions, grid: Grid) -> Plan:
     """The plan, but for what linear bending of a sheet leaves out."""
-    asked = named(model) if model else None
-    if dt is not None:
-        step_count(float(sample_times(scene)[-1]), dt)
+    asked = None if options.model == "auto" else named(options.model)
+    if options.dt is not None:
+        step_count(float(sample_times(scene)[-1]), options.dt)
     if not scene.body.of_kind.discretise:
-        if asked and asked.needs_body:
-            check_taken(asked, scene)
-        kernel = model or SAME_LOAD.name
-        row = PlanRow(what="model", value=kernel, reason="there is no body to move")
-        return Plan(model=kernel, body=scene.body, rows=(row,))
+        return _of_no_body(scene, asked)
     if asked:
         check_taken(asked, scene)
-        if asked.error and not asked.needs_body:
-            return _unplanned(scene, tolerance, asked, h, times)
-    check_laws(scene.body, scene.pressure)
+    if not asked or asked.needs_body:
+        check_laws(scene.body, scene.pressure)
     if asked and asked.error:
-        return _unplanned(scene, tolerance, asked, h, times)
-    meshed = h is not None and scene.body.of_kind.is_plate and takes(FEM, scene)
-    chosen = asked or (FEM if meshed else named(chosen_model(scene, tolerance, times)))
+        return _unplanned(scene, options, asked, grid)
+    chosen = asked or _chosen(scene, options, grid)
     if chosen is STRETCHED:
-        return _stretched(scene, tolerance, times)
-    spectrum = response_spectrum(scene, tolerance)
-    motion = scene.load.support_motion
-    highest = max(cutoff_frequency(*spectrum, tolerance), motion.frequency if motion else 0.0)
-    rows = [
-        PlanRow(
-            what="highest line",
-            value=f"{highest:.0f} Hz",
-            reason=f"of {len(spectrum[0])} lines in the load; those above move the probes by less "
-            f"than {100 * tolerance / 3:.2g} % of the whole",
-        )
-    ]
+        return _stretched(scene, options, grid)
+    highest, row = _highest_line(scene, options.tolerance)
     if chosen.is_infinite:
-        found = _without_mesh(scene, tolerance, chosen, highest, rows, times)
-        return with_series(found, scene, tolerance)
+        found = _without_mesh(scene, options, chosen, highest, row, grid)
+        return with_series(found, scene, options.tolerance)
     if chosen is FROM_REST:
-        return _by_modes(scene, tolerance, highest, rows)
+        return _by_modes(scene, options.tolerance, highest, row)
     if asked is None and chosen is not FEM:
-        found = _planned(scene, tolerance, model=chosen.name, dt=dt, solver=solver, times=times)
+        found = _planned(scene, replace(options, model=chosen.name, h=None), grid)
         why = f"{FEM.name} {beyond(FEM, scene)[0].why}"
         rows = [replace(row, reason=why) if row.what == "model" else row for row in found.rows]
         return replace(found, rows=tuple(rows))
-    returned = _returned(scene)
-    body: Body = scene.body
-    cut: list[PlanRow] = []
-    reduced = asked is None or asked.is_reduced
-    axes = symmetry(scene) if reduced else ""
+    return _by_elements(scene, options, chosen, highest, row, grid)
+
+
+def _chosen(scene: Scene, options: SolveOptions, grid: Grid) -> Model:
+    meshed = options.h is not None and scene.body.of_kind.is_plate and takes(FEM, scene)
+    return FEM if meshed else named(chosen_model(scene, options.tolerance, grid))
+
+
+def _of_no_body(scene: Scene, asked: Model | None) -> Plan:
+    if asked:
+        check_taken(asked, scene)
+    kernel = (asked or SAME_LOAD).name
+    row = PlanRow(what="model", value=kernel, reason="there is no body to move")
+    return Plan(model=kernel, body=scene.body, rows=(row,))
+
+
+def _highest_line(scene: Scene, tolerance: float) -> tuple[float, PlanRow]:
+    """Highest line in Hz that matters, and why."""
+    spectrum, motion = response_spectrum(scene, tolerance), scene.load.support_motion
+    highest = max(cutoff_frequency(*spectrum, tolerance), motion.frequency if motion else 0.0)
+    return highest, PlanRow(
+        what="highest line",
+        value=f"{highest:.0f} Hz",
+        reason=f"of {len(spectrum[0])} lines in the load; those above move the probes by less "
+        f"than {100 * tolerance / 3:.2g} % of the whole",
+    )
+
+
+def _by_elements(
+    scene: Scene, options: SolveOptions, chosen: Model, highest: float, row: PlanRow, grid: Grid
+) -> Plan:
+    """Plan of a model of linear elements, with its mesh."""
+    tolerance, whole = options.tolerance, scene
+    axes = symmetry(scene) if chosen.is_reduced else ""
     try:
-        if model is None or h is None:
-            body, cut = extent(scene, tolerance, highest)
-            body, at_ends, more = extended(scene, body, tolerance, progress, solver=solver)
-            cut = more or cut
+        if options.model == "auto" or options.h is None:
+            body, cut, at_ends = extent(scene, options, highest)
         else:  # all of it is meshed, as asked
-            at_ends = absorbing_error(scene, body, tolerance, progress, solver=solver)
-        rows += [
-            PlanRow(what="model", value=model or "fem", reason=_why_elements(scene, returned)),
-            *cut,
-        ]
-        for_mesh = max(tolerance - at_ends, tolerance / 2)
-        mesh = refined(scene, body, for_mesh, progress, symmetry=axes, solver=solver, h=h)
+            body, cut, at_ends = scene.body, [], absorbing_error(scene, scene.body, options)
+        for_mesh = replace(options, tolerance=max(tolerance - at_ends, tolerance / 2))
+        mesh = refined(scene, body, for_mesh, symmetry=axes)
     except fem.NotReduced as error:
         limit = Limit(why=f"cannot reduce this body: {error}")
-        raise refusal(scene, named(model or "fem"), [limit]) from None
+        raise refusal(scene, chosen, [limit]) from None
     scene = replace(scene, body=body)
-    step = dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
-    step_error = _march_error(scene, step) if asked and asked.is_stepped else 0.0
-    start = start_left_out(scene, asked, mesh.prepared, times) if asked else 0.0
-    grid, _ = sample_grid(scene, times)
-    sudden = above_band(answer(mesh.prepared, scene, times=grid).values, grid[1])
+    step = options.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
+    step_error = _march_error(scene, step) if chosen.is_stepped else 0.0
+    start = start_left_out(scene, chosen, grid, mesh.prepared)
+    times, _ = grid
+    sudden = above_band(answer(mesh.prepared, scene, times=times).values, times[1])
     found = Plan(
-        model=model or "fem", body=body, symmetry=axes, h=mesh.h, highest=highest,
+        model=chosen.name, body=body, symmetry=axes, h=mesh.h, highest=highest,
         error=mesh.error + mesh.prepared.effort.estimate + at_ends + sudden + step_error + start,
         seconds=sum(mesh.prepared.effort.seconds.values()),
         memory=mesh.prepared.effort.peak_memory,
-        rows=(*rows, *element_rows(scene, tolerance, axes, mesh, highest, h)),
+        rows=(
+            row, PlanRow(what="model", value=chosen.name, reason=_why_elements(whole)), *cut,
+            *element_rows(scene, tolerance, axes, mesh, highest, options.h),
+        ),
         warnings=(
             *of_elements(scene, mesh.h, mesh.error, tolerance),
             *of_ends_and_band(scene, at_ends, sudden, tolerance),
             *over_tolerance(f"a time step of {1e3 * step:.3g} ms", step_error, tolerance,
                       "a smaller one is"),
-            *start_over_tolerance(asked, start, tolerance),
+            *start_over_tolerance(chosen, start, tolerance),
         ),
         prepared=mesh.prepared,
     )  # fmt: skip
     return with_series(found, scene, tolerance)
 
 
-def chosen_model(scene: Scene, tolerance: float = 0.05, times: ArrayLike | None = None) -> str:
+def chosen_model(scene: Scene, tolerance: float = 0.05, grid: Grid | None = None) -> str:
     """Name of the model that a plan takes: the cheapest within the tolerance.
 
     Parameters
     ----------
-    scene, tolerance, times : as for `plan`
+    scene : Scene
+    tolerance : float, relative error that may be made
+    grid : as of `sample_grid`, that of the scene if not given
 
     Returns
     -------
@@ -218,7 +203,7 @@ def chosen_model(scene: Scene, tolerance: float = 0.05, times: ArrayLike | None 
         return STRETCHED.name
     if _returned(scene) <= WAVES_SHARE * tolerance and takes(FLAT_BODY, scene):
         try:  # reflections are of the load's lines, the start of the body's own: their powers add
-            start = start_left_out(scene, HARMONIC, times=times)
+            start = start_left_out(scene, HARMONIC, grid or sample_grid(scene))
         except (ValueError, ArithmeticError):  # no steady state
             return FLAT_BODY.name
         steady = np.hypot(_returned(scene), start) <= tolerance
@@ -232,13 +217,11 @@ def _returned(scene: Scene) -> float:
     return side_reflections(scene) if has_wavenumber_solution(scene) else NO_BOUND
 
 
-def _unplanned(
-    scene: Scene, tolerance: float, model: Model, h: float | None, times: ArrayLike | None
-) -> Plan:
+def _unplanned(scene: Scene, options: SolveOptions, model: Model, grid: Grid) -> Plan:
     """Plan of a model that states its own error. That of a sheet at large deflection does not come
     from the linear response: stiffened by stretching it has longer waves and fewer resonances.
     """
-    start = start_left_out(scene, model, times=times)
+    tolerance, h, start = options.tolerance, options.h, start_left_out(scene, model, grid)
     reason = f"as asked: {model.method}{_without(start)}"
     rows = [PlanRow(what="model", value=model.name, reason=reason)]
     what, size = f"the {model.method}", None
@@ -263,10 +246,10 @@ def _unplanned(
     )  # fmt: skip
 
 
-def _stretched(scene: Scene, tolerance: float, times: ArrayLike | None) -> Plan:
+def _stretched(scene: Scene, options: SolveOptions, grid: Grid) -> Plan:
     """Plan of a sheet at large deflection."""
-    found = _unplanned(scene, tolerance, STRETCHED, None, times)
-    left = stretching_left_out(scene, FROM_REST, tolerance)
+    found = _unplanned(scene, replace(options, h=None), STRETCHED, grid)
+    left = stretching_left_out(scene, FROM_REST, options.tolerance)
     reason = (
         f"a linear sheet would deflect by {deflection(scene):.2g} thicknesses, and stretching "
         f"changes its motion by {100 * left:.2g} %"
@@ -275,11 +258,11 @@ def _stretched(scene: Scene, tolerance: float, times: ArrayLike | None) -> Plan:
     return replace(found, rows=tuple(rows))
 
 
-def _by_modes(scene: Scene, tolerance: float, highest: float, rows: list[PlanRow]) -> Plan:
+def _by_modes(scene: Scene, tolerance: float, highest: float, row: PlanRow) -> Plan:
     """Plan of a sheet by its modes, from rest."""
     reason = why_modes(scene, tolerance)
     rows = [
-        *rows, PlanRow(what="model", value=FROM_REST.name, reason=reason),
+        row, PlanRow(what="model", value=FROM_REST.name, reason=reason),
         *left_out(scene, highest),
     ]  # fmt: skip
     error = FROM_REST.error(scene, None) if FROM_REST.error else np.nan
@@ -291,16 +274,11 @@ def _by_modes(scene: Scene, tolerance: float, highest: float, rows: list[PlanRow
 
 
 def _without_mesh(
-    scene: Scene,
-    tolerance: float,
-    asked: Model,
-    highest: float,
-    rows: list[PlanRow],
-    times: ArrayLike | None,
+    scene: Scene, options: SolveOptions, asked: Model, highest: float, row: PlanRow, grid: Grid
 ) -> Plan:
-    returned, start = _returned(scene), start_left_out(scene, asked, times=times)
-    model, left = asked.name, start if asked.is_steady else 0.0
-    sudden = sudden_left_out(scene, asked, times)
+    returned, left = _returned(scene), start_left_out(scene, asked, grid)
+    model, tolerance = asked.name, options.tolerance
+    sudden = sudden_left_out(scene, asked, grid)
     reason = f"{_section(scene.body)} without reflecting sides: wavenumber integral, no mesh"
     if scene.body.sides != "absorbing":
         reason = f"reflections from the sides are {100 * returned:.2g} %: wavenumber integral"
@@ -316,7 +294,7 @@ def _without_mesh(
         *sudden_over_tolerance(scene, FINEST / 4, sudden, tolerance),
     )
     rows = [
-        *rows,
+        row,
         PlanRow(what="model", value=model, reason="as asked" if warnings else reason),
         *left_out(scene, highest),
     ]
@@ -343,8 +321,8 @@ def _march_error(scene: Scene, dt: float) -> float:
     return min(1.0, known.value * (2 * np.pi * known.frequency * dt) ** 2 / 12)
 
 
-def _why_elements(scene: Scene, returned: float) -> str:
-    body = scene.body
+def _why_elements(scene: Scene) -> str:
+    body, returned = scene.body, _returned(scene)
     if not scene.load.is_plain and not takes(FLAT_BODY, scene):
         return f"the wavenumber integral has no {scene.reading.words} under {scene.load.words}"
     if gaussian_width(scene.pressure.height, scene.pressure.profile) is None:

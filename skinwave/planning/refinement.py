@@ -22,6 +22,7 @@ from skinwave.bodies.coat import coarsest_size
 from skinwave.bodies.hands import FINE_PALM
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.bodies.slab import cell_layers
+from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.prepared import (
     Prepared,
     answer,
@@ -31,7 +32,6 @@ from skinwave.models.prepared import (
 )
 from skinwave.models.reduction import BAND, oscillating
 from skinwave.scene.scene import Body, Scene
-from skinwave.system.effort import Progress
 
 FIRST, RATIO = 2.6, 1.3  # of the default element size; of two successive sizes
 FIRST_HAND = 1.6  # of the default element size, for hands
@@ -114,12 +114,9 @@ class Refined:
 def refined(
     scene: Scene,
     body: Body,
-    tolerance: float,
-    progress: Progress | None = None,
+    options: SolveOptions = DEFAULT,
     *,
     symmetry: str = "",
-    solver: str = "auto",
-    h: float | None = None,
 ) -> Refined:
     """Coarsest mesh of a sequence that is accurate to a tolerance, or that of a given h, with its
     expected error.
@@ -128,10 +125,8 @@ def refined(
     ----------
     scene : Scene, with load and probes
     body : Body that is meshed, the scene's or a part of it
-    tolerance : relative error that is asked for
-    progress, solver : as for `simulate`
+    options : SolveOptions
     symmetry : as in `bodies.build.build`
-    h : metre, element size
 
     Returns
     -------
@@ -142,11 +137,12 @@ def refined(
     ValueError
         If the body has no mesh of that size.
     """
+    h, tolerance = options.h, options.tolerance
 
     def answered(size: float) -> tuple[Prepared, NDArray[Any]]:
         prepared = prepare(
-            body, scene.probe_points, progress, h=size,
-            tolerance=reduction_tolerance(tolerance), symmetry=symmetry, solver=solver,
+            body, scene.probe_points, options.progress, h=size,
+            tolerance=reduction_tolerance(tolerance), symmetry=symmetry, solver=options.solver,
             reading=scene.reading, load=scene.load,
         )  # fmt: skip
         return prepared, quantity_of_interest(prepared, scene, answer(prepared, scene))

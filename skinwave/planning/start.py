@@ -4,16 +4,14 @@ from collections.abc import Callable
 from math import ceil
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from meshes.tetmesh import Floats
 from simple_model.layers.flat_body import FINEST
-from skinwave.models import Model, Request, named
+from skinwave.models import Model, named
+from skinwave.models.options import SolveOptions
 from skinwave.models.prepared import Prepared, answer, steady_waveforms
-from skinwave.models.sample_grid import sample_grid
 from skinwave.planning.refinement import relative_change
 from skinwave.scene.scene import Scene
-from skinwave.system.effort import silent
 
 FOLLOWED, LONGER = 1000, 4  # samples that a start is followed for at first; factor on them
 GOES_ON = 0.02  # of its energy, in what may come after the time that it was followed for
@@ -22,7 +20,7 @@ EXACT = 1e-3  # relative error of the models that are compared
 
 
 def start_left_out(
-    scene: Scene, model: Model, prepared: Prepared | None = None, times: ArrayLike | None = None
+    scene: Scene, model: Model, grid: tuple[Floats, int], prepared: Prepared | None = None
 ) -> float:
     """Difference of a steady state from the motion from rest, relative to the latter: the largest
     of all probes.
@@ -31,8 +29,8 @@ def start_left_out(
     ----------
     scene : Scene
     model : Model, of the steady state
+    grid : times (t,) in s and the first that counts, as of `sample_grid`
     prepared : Prepared, the reduced body of a model of elements
-    times : (t,) float, s, of the response, as for `simulate`
 
     Returns
     -------
@@ -45,19 +43,19 @@ def start_left_out(
     """
     if not model.is_steady:
         return 0.0
-    grid, first = sample_grid(scene, times)
-
-    def solved(which: Model, grid: Floats) -> Floats:
-        return which.solve(scene, Request(times=grid, tolerance=EXACT, report=silent)).values
-
+    times, first = grid
     if prepared:
-        whole = answer(prepared, scene, times=grid).values
-        return _share(steady_waveforms(prepared, scene, grid), lambda n: whole[:n], first)
+        whole = answer(prepared, scene, times=times).values
+        return _share(steady_waveforms(prepared, scene, times), lambda n: whole[:n], first)
+
+    def solved(which: Model, n: int) -> Floats:
+        return which.solve(scene, times[:n], SolveOptions(tolerance=EXACT)).values
+
     whole_by = named(model.from_rest)
-    return _share(solved(model, grid), lambda n: solved(whole_by, grid[:n]), first)
+    return _share(solved(model, len(times)), lambda n: solved(whole_by, n), first)
 
 
-def sudden_left_out(scene: Scene, model: Model, times: ArrayLike | None = None) -> float:
+def sudden_left_out(scene: Scene, model: Model, grid: tuple[Floats, int]) -> float:
     """Part of a wavenumber integral from rest that is above its band, relative and of the worst
     probe.
 
@@ -67,7 +65,7 @@ def sudden_left_out(scene: Scene, model: Model, times: ArrayLike | None = None) 
 
     Parameters
     ----------
-    scene, model, times : as for `start_left_out`
+    scene, model, grid : as for `start_left_out`
 
     Returns
     -------
@@ -75,12 +73,11 @@ def sudden_left_out(scene: Scene, model: Model, times: ArrayLike | None = None) 
     """
     if model.is_steady or not scene.reading.asked.rate:
         return 0.0
-    grid, first = sample_grid(scene, times)
-    parts = max(2, ceil(2 * FINEST * grid[1]))  # of a step, with twice the band
-    fine = np.asarray(grid[1] / parts * np.arange(parts * (len(grid) - 1) + 1), np.float64)
+    times, first = grid
+    parts = max(2, ceil(2 * FINEST * times[1]))  # of a step, with twice the band
+    fine = np.asarray(times[1] / parts * np.arange(parts * (len(times) - 1) + 1), np.float64)
     usual, wide = (
-        model.solve(scene, Request(times=t, tolerance=EXACT, report=silent)).values
-        for t in (grid, fine)
+        model.solve(scene, t, SolveOptions(tolerance=EXACT)).values for t in (times, fine)
     )
     change = relative_change(usual[first:], wide[::parts][first:])
     return (1 + scene.reading.asked.rate) * change

@@ -13,14 +13,13 @@ import numpy as np
 from meshes.tetmesh import Floats
 from simple_model import Response
 from simple_model.quantities import DISPLACEMENT
-from skinwave.models import Model, Request
+from skinwave.models import Model
 from skinwave.models.advice import takes
+from skinwave.models.options import SolveOptions, sample_times
 from skinwave.models.plate_modes import FROM_REST
-from skinwave.models.prepared import sample_times
 from skinwave.models.stretched_plate import STRETCHED, first_part, linear_error
 from skinwave.planning.extent import mean_sag
 from skinwave.scene.scene import Scene
-from skinwave.system.effort import silent
 
 LINEAR = 0.5  # deflection over thickness up to which bending of a sheet may be taken as linear
 # Relative error of linear bending over (w / h)^2: 0.4 to 3.3 of paper sheets of 30 to 210 mm, on
@@ -48,15 +47,15 @@ def _from_rest(scene: Scene) -> float:
     seen = replace(scene, probes=tuple(dict.fromkeys((*scene.probes, (middle[0], middle[1])))))
     if not takes(FROM_REST, seen):
         return 0.0
-    u = FROM_REST.solve(seen, _request(seen)).values
+    u = FROM_REST.solve(seen, _first_part(seen), SolveOptions()).values
     return float(np.abs(u).max()) / scene.body.depth
 
 
 @lru_cache(maxsize=64)
 def _measured(scene: Scene) -> float:
     """Relative error of linear bending in the first part of a displacement."""
-    request = _request(scene)
-    return linear_error(scene, request.times, FROM_REST.solve(scene, request).values)
+    times = _first_part(scene)
+    return linear_error(scene, times, FROM_REST.solve(scene, times, SolveOptions()).values)
 
 
 def _plain(scene: Scene) -> Scene:
@@ -64,9 +63,9 @@ def _plain(scene: Scene) -> Scene:
     return replace(scene, quantity=DISPLACEMENT.name, depth=0.0, name="", spreads=())
 
 
-def _request(scene: Scene) -> Request:
+def _first_part(scene: Scene) -> Floats:
     times: Floats = first_part(scene.pressure, sample_times(scene))
-    return Request(times=times, tolerance=0.05, report=silent)
+    return times
 
 
 def stretching_left_out(scene: Scene, model: Model, tolerance: float) -> float:

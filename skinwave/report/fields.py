@@ -15,6 +15,7 @@ from simple_model import Effort, Response
 from simple_model.drawing import new_axes
 from simple_model.numbers import counted, significant, stated_error
 from simple_model.quantities import DISPLACEMENT
+from skinwave.models.options import SolveOptions
 from skinwave.models.reduction import from_rest, oscillating
 from skinwave.planning.assessment import told
 from skinwave.report.films import encoder
@@ -172,10 +173,11 @@ def assessed_probes(
     Response, (t, p) of the scene's quantity
     """
     found = probe_response(scene, moved)
+    options = SolveOptions(h=h, tolerance=tolerance, solver=solver)
     if scene.body.is_held:
-        return told(scene, found, found.values, h, tolerance, solver)
+        return told(scene, found, found.values, options)
     lines = oscillating(probe_lines(scene, moved)).lines
-    return told(scene, found, lines, h, tolerance, solver)
+    return told(scene, found, lines, options)
 
 
 def nearest_frame(times: Floats, time: float) -> int:

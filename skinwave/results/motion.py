@@ -16,8 +16,8 @@ from skinwave.models import reduction
 from skinwave.models.full import assembled, meshed, spent
 from skinwave.models.laws import relaxing, series_tolerance
 from skinwave.models.loads import probe_rows, spread, surface_load
-from skinwave.models.prepared import in_motion, sample_times
-from skinwave.planning.simulate import check_options
+from skinwave.models.options import SolveOptions, sample_times
+from skinwave.models.prepared import in_motion
 from skinwave.scene.scene import Scene
 from skinwave.system.effort import Clock, Progress, silent
 
@@ -121,7 +121,7 @@ def driven(
     -------
     DrivenBody
     """
-    check_options(solver, h=h)
+    SolveOptions(solver=solver, h=h, tolerance=tolerance)  # which refuses what is out of range
     clock, report = Clock(), progress or silent
     body = relaxing(scene.body, series_tolerance(tolerance))
     build = meshed(body, h, clock, report)

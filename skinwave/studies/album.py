@@ -6,7 +6,7 @@ COLUMN/scene.toml  responses.npz  lines.csv  effort.json  record.json  view.npz 
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,16 +17,18 @@ from meshes import reading
 from simple_model import Response, published
 from simple_model.choices import choose
 from simple_model.quantities import DISPLACEMENT, QUANTITIES
-from skinwave.bodies.sizes import default_size
+from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.models import named
 from skinwave.models.advice import takes
+from skinwave.models.flat_body import FLAT_BODY
+from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.models.speeds import repeated, shown_part
 from skinwave.planning.costs import LARGER
 from skinwave.planning.plan import plan
 from skinwave.planning.records import Plan
-from skinwave.planning.simulate import compute, follow, has_elements, required_plan
+from skinwave.planning.simulate import compute, solve
 from skinwave.results import record, surface
 from skinwave.results.files import write_lines, write_run
 from skinwave.results.motion import Waves, probe_response, waves
@@ -154,7 +156,7 @@ def make(
             misfit = _misfit(run, view.moved)
     write_lines(folder / "lines.csv", runs)
     own = next((plans[column] for column in plans if shown[column] == scene), None)
-    _plan(folder, own or plan(scene, PLANNED), misfit, cases, command)
+    _plan(folder, own or plan(scene, SolveOptions(tolerance=PLANNED)), misfit, cases, command)
     return worst_warnings((run.body, run.response.effort) for run in runs)
 
 
@@ -175,8 +177,9 @@ def plans_of(
     shown: Mapping[str, Scene], progress: Progress, *, h: float | None, solver: str
 ) -> dict[str, Plan]:
     """Plan of each scene with a body, by column."""
+    options = SolveOptions(tolerance=PLANNED, h=h, solver=solver, progress=progress)
     return {
-        column: required_plan(its, "auto", PLANNED, progress, h=h, solver=solver)
+        column: plan(its, options)
         for column, its in shown.items() if its.body.of_kind.discretise
     }  # fmt: skip
 
@@ -200,7 +203,7 @@ def answers(
     moved = {
         body: _moved(its, body, progress, h, solver)
         for body, its in shown.items()
-        if has_elements(its, h) and not _is_plate(its, h)
+        if _has_elements(its, h) and not _is_plate(its, h)
     }
     tones = max(repeated(scene.tacton).values(), default=0.0)
     fastest = max(map(fastest_line, moved.values()), default=tones)
@@ -211,7 +214,7 @@ def answers(
             run = Run(tacton=scene.name, body="none", scene=its, response=compute(its, column))
             yield kernel_view(its, KERNEL_REACH, part) if column == SAME_LOAD.name else None, run
             continue
-        response = follow(its, plans[column], PLANNED, h=h, solver=solver)
+        response = solve(its, plans[column])
         run = Run(tacton=scene.name, body=column, scene=its, response=response)
         progress(f"pictures of {column}", 0.0)
         if column in moved:
@@ -219,6 +222,25 @@ def answers(
         else:
             seen = plate_view(run, part) if _is_plate(its, h) else None
             yield seen or layer_view(run, KERNEL_REACH, part), run
+
+
+def _has_elements(scene: Scene, h: float | None) -> bool:
+    """Whether pictures are by elements: the body can be meshed, or has no model without a mesh.
+
+    Raises
+    ------
+    ValueError
+        If only elements are a model of the body, or their size is given, and it cannot be meshed.
+    """
+    if not scene.body.of_kind.discretise:
+        return False
+    try:
+        check_mesh(scene.body, h or default_size(scene.body))
+    except ValueError:
+        if h or not takes(FLAT_BODY, scene):
+            raise
+        return False
+    return True
 
 
 def _is_plate(scene: Scene, h: float | None) -> bool:
@@ -260,7 +282,7 @@ def _plan(
     folder: Path, required: Plan, misfit: float, cases: Sequence[Mapping[str, Any]], command: str
 ) -> None:
     """Requirements of the scene, and how far the motion in pictures is from the response."""
-    table = asdict(replace(required, prepared=None)) | {"tolerance": PLANNED}
+    table = required.table() | {"tolerance": PLANNED}
     (folder / "plan.json").write_text(json.dumps(table, indent=1), encoding="utf-8")
     trust: dict[str, Any] = {"command": command, "model": required.model}
     if np.isfinite(misfit):

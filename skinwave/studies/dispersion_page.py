@@ -97,7 +97,7 @@ def observe(
         If the model refuses the body, or that ends too near to the focus.
     """
     scene = pulse_scene(found.scene)
-    response = compute(scene, model, 0.05, progress, h=h, solver=solver)
+    response = compute(scene, model, progress=progress, h=h, solver=solver)
     highest = min(float(found.curves.frequencies[-1]), HIGHEST_OBSERVED)
     line = transfer_functions(scene, response, highest)
     height = scene.pressure.height

@@ -20,10 +20,11 @@ from skinwave.measure.measured_study import (
 from skinwave.models import named
 from skinwave.models.advice import check_taken
 from skinwave.models.linear_elements import FEM
+from skinwave.models.options import SolveOptions
 from skinwave.models.prepared import Prepared, answer, prepare
 from skinwave.planning.assessment import Coarser, assessed, coarser_body
-from skinwave.planning.plan import chosen_model
-from skinwave.planning.simulate import answered, check_options, compute
+from skinwave.planning.plan import chosen_model, plan
+from skinwave.planning.simulate import compute, solve
 from skinwave.results.claims import claimed, evaluate, write_claims
 from skinwave.results.files import write_lines, write_responses, write_run
 from skinwave.results.run import Run
@@ -88,7 +89,7 @@ def run_study(
     leaves out least; elements if their size h in metre is given. An interrupt ends the runs early;
     those that are finished are still compared and written.
     """
-    check_options(solver, h=h)
+    SolveOptions(solver=solver, h=h)  # which refuses what is out of range
     models = _models(scenes, FEM.name if h and model == "auto" else model, h)
     started = time.perf_counter()
     with helper() as aside, one_thread():
@@ -201,7 +202,7 @@ def _begun_bodies(
     others, last = list(solids)[:-1], next(reversed(solids), None)
     begun = {body: aside.submit(_prepared, solids[body][1], h, solver) for body in others}
     coarse = {
-        body: aside.submit(coarser_body, scene, h, solver=solver)
+        body: aside.submit(coarser_body, scene, SolveOptions(h=h, solver=solver))
         for body, (_, scene) in solids.items()
     }
 
@@ -248,12 +249,10 @@ def _begun_responses(
     }
 
 
-def _response(
-    scene: Scene, model: str, h: float | None, solver: str, progress: Progress | None = None
-) -> Response:
+def _response(scene: Scene, model: str, h: float | None, solver: str) -> Response:
     if not scene.body.of_kind.discretise:
         return compute(scene, model)
-    return answered(scene, model, progress=progress, h=h, solver=solver)
+    return solve(scene, plan(scene, SolveOptions(model=model, h=h, solver=solver)))
 
 
 def _begun_maps(
@@ -298,7 +297,11 @@ def _answered(
                 prepared[column], coarser = bodies(scene)
                 found = answer(prepared[column], scene)
                 response = assessed(
-                    scene, found, prepared[column], how.h, solver=how.solver, compared=coarser
+                    scene,
+                    found,
+                    prepared[column],
+                    SolveOptions(h=how.h, solver=how.solver),
+                    compared=coarser,
                 )
             elif scene in begun and not begun[scene].cancel():
                 response = begun[scene].result()

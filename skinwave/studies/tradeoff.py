@@ -263,7 +263,7 @@ def _run(scene: Scene, candidate: Candidate) -> tuple[Response, float, float, in
     if candidate.half_space:
         scene = replace(scene, body=replace(scene.body, depth=inf))
     tolerance = candidate.tolerance or PLANNED
-    response = compute(scene, candidate.model, tolerance, h=candidate.h, dt=candidate.dt)
+    response = compute(scene, candidate.model, tolerance=tolerance, h=candidate.h, dt=candidate.dt)
     cold = time.perf_counter() - started
     return response, cold, cold, peak_memory()
 

@@ -15,6 +15,7 @@ from simple_model import named_lines
 from skinwave.models import parametric
 from skinwave.models.affine_scenes import check_scene
 from skinwave.models.free_keys import FreeKey, free_keys, with_values
+from skinwave.models.options import SolveOptions
 from skinwave.models.parametric import ParametricBody
 from skinwave.planning.refinement import compared_with, refined
 from skinwave.scene.scene import Body, Load, Reading, Scene
@@ -115,7 +116,8 @@ def mesh_of(family: Family, tolerance: float, h: float | None, solver: str) -> M
         If its bodies cannot be reduced together.
     """
     scene = family.scene
-    size = h or refined(scene, family.hardest, tolerance, solver=solver).h
+    options = SolveOptions(tolerance=tolerance, solver=solver)
+    size = h or refined(scene, family.hardest, options).h
     bodies = reduced(family, size, tolerance, solver).bodies
     meshed = bodies.body(bodies.meshed)
     coarser = compared_with(meshed, size)

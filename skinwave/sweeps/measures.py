@@ -8,7 +8,7 @@ import numpy as np
 
 from simple_model import Response, named_lines, point_kernel, sensation_level
 from simple_model.quantities import DISPLACEMENT
-from skinwave.models.prepared import sample_times
+from skinwave.models.options import sample_times
 from skinwave.results.comparison import Agreement, compare, moving_rms
 from skinwave.results.run import ASSESSED, SUPPORT, Run
 from skinwave.scene.scene import Scene

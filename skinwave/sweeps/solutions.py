@@ -22,8 +22,9 @@ from simple_model.typing import Complex
 from skinwave.bodies.analytic import compliance
 from skinwave.bodies.sizes import default_size
 from skinwave.models import named
+from skinwave.models.options import sample_times
 from skinwave.models.parametric import lines_of
-from skinwave.models.prepared import components, prepare, reduction_tolerance, sample_times
+from skinwave.models.prepared import components, prepare, reduction_tolerance
 from skinwave.planning.simulate import compute
 from skinwave.report.styles import SHOWN
 from skinwave.results.surface import REACH, SILENT, grid, has_wavenumber_integral
@@ -159,7 +160,9 @@ def _solved(scene: Scene, method: Method) -> Solution:
 
 def _computed(scene: Scene, method: Method, frequencies: Floats) -> Solution:
     """Solution by a model, at the probes."""
-    response = compute(scene, method.model, method.tolerance, h=method.h, solver=method.solver)
+    response = compute(
+        scene, method.model, tolerance=method.tolerance, h=method.h, solver=method.solver
+    )
     settled = response.values[int(SETTLE * len(response.times)) :]
     motion = response.values[-len(shown_times(scene)) :] - settled.mean(axis=0)
     lines = np.abs(phasors(response, frequencies)) * (frequencies > 0)[:, None]

@@ -17,10 +17,12 @@ from skinwave.bodies.analytic import is_flat_layer, is_laterally_infinite
 from skinwave.models import named, names, parametric
 from skinwave.models.advice import default_model, takes
 from skinwave.models.flat_body import FLAT_BODY
+from skinwave.models.options import SolveOptions
 from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
 from skinwave.planning.assessment import assessed
+from skinwave.planning.plan import plan
 from skinwave.planning.refinement import compared_with, refined
-from skinwave.planning.simulate import answered, check_options, compute
+from skinwave.planning.simulate import compute, solve
 from skinwave.scene.scene import Scene
 from skinwave.scene.variation import DesignPoint
 from skinwave.sweeps import dataset, engine
@@ -179,10 +181,17 @@ def model_of(scene: Scene, asked: str) -> str:
 
 
 def _check(model_options: ModelOptions) -> None:
-    check_options(model_options.solver, h=model_options.h)
+    _options(model_options)  # which refuses what is out of range
     choose("model", model_options.model, ("auto", *names()))
-    if not 0 < model_options.tolerance < 1:
-        raise ValueError(f"tolerance = {model_options.tolerance} is outside 0 < tolerance < 1")
+
+
+def _options(
+    model_options: ModelOptions, model: str = "auto", h: float | None = None
+) -> SolveOptions:
+    return SolveOptions(
+        model=model, h=h or model_options.h, tolerance=model_options.tolerance,
+        solver=model_options.solver,
+    )  # fmt: skip
 
 
 def _key(scene: Scene) -> Solid:
@@ -264,7 +273,7 @@ def _mesh(model_options: ModelOptions, scene: Scene) -> Mesh:
             coarser = compared_with(scene.body, model_options.h)
             _prepared(_key(scene), coarser, model_options, None, ())
             return Mesh(h=model_options.h, coarser=coarser)
-        found = refined(scene, scene.body, model_options.tolerance, solver=model_options.solver)
+        found = refined(scene, scene.body, _options(model_options))
         return Mesh(h=found.h, coarser=found.compared)
     except Exception as error:  # any: it is that of every run on this body
         return Mesh(error=_said(error))
@@ -327,13 +336,11 @@ def _row(case: DesignPoint, model_options: ModelOptions, mesh: Mesh | None) -> d
         if mesh is None:
             model = model_of(case.scene, model_options.model)
             has_mesh = named(model).default_size is not None
-            run = answered if model_options.is_assessed or has_mesh else compute
-            response = run(
-                case.scene,
-                model,
-                model_options.tolerance,
-                h=model_options.h,
-                solver=model_options.solver,
+            asked = _options(model_options, model)
+            response = (
+                solve(case.scene, plan(case.scene, asked))
+                if model_options.is_assessed or has_mesh
+                else compute(case.scene, model, tolerance=asked.tolerance)
             )
         else:
             response, mesh = _on_mesh(case.scene, model_options, mesh)
@@ -358,8 +365,8 @@ def _on_mesh(scene: Scene, model_options: ModelOptions, mesh: Mesh) -> tuple[Res
         for h in (mesh.h, mesh.coarser)
     )
     response = assessed(
-        scene, answer(prepared, scene), prepared, mesh.h, model_options.tolerance,
-        model_options.solver, compared=(mesh.coarser or 0.0, coarse), meshed=mesh.meshed,
+        scene, answer(prepared, scene), prepared, _options(model_options, h=mesh.h),
+        compared=(mesh.coarser or 0.0, coarse), meshed=mesh.meshed,
     )  # fmt: skip
     is_shared = mesh.family and not model_options.h
     if is_shared and response.expected_error > model_options.tolerance:

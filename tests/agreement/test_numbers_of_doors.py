@@ -47,7 +47,7 @@ def test_a_sweep_of_one_scene_is_its_simulation(simulated):
 
 def test_a_body_with_a_free_modulus_is_that_of_its_own_value():
     scene = loads(SCENE)
-    own = compute(scene, "fem", 1e-4, h=SIZE)
+    own = compute(scene, "fem", tolerance=1e-4, h=SIZE)
     body = skinwave.prepare(scene, {MODULUS: (1e4, 5e4)}, tolerance=1e-6, h=SIZE)
     found = answer(body, {MODULUS: scene.body.solid.shear_modulus})
     np.testing.assert_allclose(found.values, own.values, atol=2e-6 * np.abs(own.values).max())

@@ -14,8 +14,8 @@ from simple_model.layers.compliance import thin_sheet
 from simple_model.layers.wavenumber_integral import point_response
 from skinwave.bodies.build import build, operators
 from skinwave.bodies.sheet import air, air_mass, bending_wavenumber
-from skinwave.models import Request
 from skinwave.models.loads import surface_load
+from skinwave.models.options import SolveOptions
 from skinwave.models.prepared import answer, prepare, typical_spots
 from skinwave.models.stretching import membrane, reduced_answer
 from skinwave.planning.plan import plan
@@ -156,8 +156,7 @@ def test_a_sheet_that_hardly_stretches_answers_as_the_linear_one():
     scene = replace(SCENE, pressure=replace(LOAD, peak_pressure=1e-3, tacton=tacton))
     times = np.arange(4000) / 1e4
     linear = answer(prepare(SHEET, scene.probe_points, h=2e-3), scene).displacement
-    request = Request(times=times, tolerance=0.05, report=lambda phase, done: None, h=2e-3)
-    modes = reduced_answer(scene, request).displacement
+    modes = reduced_answer(scene, times, SolveOptions(h=2e-3)).displacement
     settled = slice(3000, None)
     a, b = (u[settled] - u[settled].mean(axis=0) for u in (linear, modes))
     assert np.linalg.norm(a - b) < 0.08 * np.linalg.norm(a)
@@ -220,5 +219,5 @@ def test_studies_take_air_by_its_key():
     plates = {"plate-modes", "plate-modes-transient", "plate-modes-nonlinear"}
     assert {c.model for c in candidates(SCENE)} == {"point-kernel", "fem"} | plates
     for scene, what in ((SCENE, "air"), (vacuum, "left out: air")):
-        rows = {row.what: row for row in plan(scene, model="fem", h=H).rows}
+        rows = {row.what: row for row in plan(scene, SolveOptions(model="fem", h=H)).rows}
         assert "air = true" in rows[what].reason

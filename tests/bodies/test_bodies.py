@@ -21,6 +21,7 @@ from skinwave.bodies.absorbing_layer import has_layer
 from skinwave.bodies.build import build, operators
 from skinwave.commands.cli import main
 from skinwave.models.loads import surface_load
+from skinwave.models.options import SolveOptions
 from skinwave.models.prepared import answer, prepare
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute
@@ -258,7 +259,7 @@ def test_a_mesh_in_a_file_is_a_body_of_a_scene(block_file, tmp_path):
     assert made.fixed == {"sides": "xyz"}
     assert len(made.absorbing) == len(made.mesh.facets["bottom"])
     assert np.allclose(made.mesh.points[made.mesh.facets["bottom"], 2], -0.01)
-    required = plan(read, 0.1)
+    required = plan(read, SolveOptions(tolerance=0.1))
     assert required.model == "fem"
     assert any("not known" in warning for warning in required.warnings)
 
@@ -407,7 +408,7 @@ def test_a_palm_answers_alike_however_it_is_meshed():
     scene = replace(SKIN, body=replace(BODIES["palm"], **small), probes=THREE)
     one, fine = (compute(scene, "fem", h=h) for h in (0.005, 0.0042))
     assert compare(fine, one).relative_l2.max() < 0.02
-    required = plan(scene, 0.1)
+    required = plan(scene, SolveOptions(tolerance=0.1))
     assert compare(fine, answer(required.prepared, scene)).relative_l2.max() < 0.1
 
 

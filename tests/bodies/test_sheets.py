@@ -17,8 +17,9 @@ from skinwave import dumps, loads, plan
 from skinwave.bodies.build import build, operators
 from skinwave.bodies.mounting import EDGES, Mounting
 from skinwave.bodies.sheet import air_mass, bending_equivalent, bending_wavenumber
-from skinwave.models import Request, named
+from skinwave.models import named
 from skinwave.models.advice import beyond
+from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import middle_compliance, plate_of
 from skinwave.models.prepared import prepare
 from skinwave.planning.extent import mean_sag, symmetry
@@ -233,10 +234,10 @@ def test_steady_motion_by_plate_modes_is_that_of_elements():
                    support="simply"), air=True)  # fmt: skip
     pressure = MovingPressure(tacton=Tacton(am_frequency=140, duration=1.0))
     scene = Scene(pressure=pressure, body=body, probes=((0.0, 0.0), (0.01, 0.005)))
-    request = Request(
-        times=np.arange(10_000) / 1e4, tolerance=0.05, report=lambda *_: None, h=2.5e-3
-    )
-    found = [named(model).solve(scene, request).values[9000:] for model in ("plate-modes", "fem")]
+    times, options = np.arange(10_000) / 1e4, SolveOptions(h=2.5e-3)
+    found = [
+        named(model).solve(scene, times, options).values[9000:] for model in ("plate-modes", "fem")
+    ]
     wave = np.exp(-2j * np.pi * 140 * np.arange(1000) / 1e4)
     ritz, elements = (abs(wave @ values) for values in found)
     np.testing.assert_allclose(ritz, elements, rtol=0.01)
@@ -311,9 +312,9 @@ def test_stretched_sheets_at_large_deflection_begin_as_linear_ones():
     body = replace(SMALL, material=replace(PAPER, loss_factor=0.1), mounting=TWO)
     tacton = Tacton(am_frequency=140, duration=0.02, amplitude=0.05)
     scene = Scene(pressure=MovingPressure(tacton=tacton), body=body, probes=((0.0, 0.0),))
-    request = Request(times=np.arange(200) / 1e4, tolerance=0.05, report=lambda *_: None)
+    times = np.arange(200) / 1e4
     nonlinear_, plate = (
-        named(m).solve(scene, replace(request, h=0.05 / 16 if m == "fem-nonlinear" else None))
+        named(m).solve(scene, times, SolveOptions(h=0.05 / 16 if m == "fem-nonlinear" else None))
         for m in ("fem-nonlinear", "plate-modes-transient")
     )
     apart = np.linalg.norm(nonlinear_.values - plate.values)
@@ -415,7 +416,7 @@ def test_models_say_which_sheets_they_are_not_for():
     (limit,) = refused("plate-modes", replace(SMALL, sides="absorbing"))
     assert "that is held" in limit.why
     scene = Scene(pressure=MovingPressure(tacton=Tacton(am_frequency=140)), body=two)
-    required = plan(scene, model="plate-modes")
+    required = plan(scene, SolveOptions(model="plate-modes"))
     assert (required.model, required.h) == ("plate-modes", None)
 
 
@@ -454,7 +455,7 @@ def test_a_sheet_from_rest_starts_by_pressure_over_mass(losses):
         pressure=MovingPressure(tacton=Tacton(duration=0.03)), body=body,
         probes=((0.0, 0.0), (0.005, 0.0)), quantity="acceleration",
     )  # fmt: skip
-    request = Request(times=np.arange(300) / 1e4, tolerance=0.05, report=lambda *_: None)
-    found = named("plate-modes-transient").solve(scene, request).values[0]
+    times = np.arange(300) / 1e4
+    found = named("plate-modes-transient").solve(scene, times, SolveOptions()).values[0]
     pressed = scene.pressure(np.array([[0.0, 0.0, 0.0], [0.005, 0.0, 0.0]]), 0.0)
     np.testing.assert_allclose(found, pressed / 0.16, rtol=0.03)

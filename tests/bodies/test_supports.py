@@ -24,6 +24,7 @@ from skinwave.bodies.build import build, operators
 from skinwave.bodies.hands import support
 from skinwave.models.free_keys import FreeKey, with_values
 from skinwave.models.loads import surface_load
+from skinwave.models.options import SolveOptions
 from skinwave.models.prepared import answer, prepare
 from skinwave.planning.boundaries import absorbing_error
 from skinwave.planning.estimates import side_reflections
@@ -183,7 +184,7 @@ def test_reflections_of_sides_above_springs_are_in_the_stated_error():
         "shear_modulus_pa = 9290, poisson = 0.45, viscosity_pa_s = 0.84}\n"
         "[probes]\npoints_mm = [[9, 0], [0, 6]]"
     )
-    found = plan(scene, 0.1, model="fem", h=2.6e-3)
+    found = plan(scene, SolveOptions(tolerance=0.1, model="fem", h=2.6e-3))
     true = errors_beside_the_wavenumber_integral(scene, answer(found.prepared, scene).values)
     assert true.max() < 0.1
     assert true.max() < 1.1 * found.error

@@ -16,6 +16,7 @@ from fem import nonlinear
 from simple_model import MovingPressure, Tacton, Trajectory, from_young
 from simple_model.load.focus import along_axis
 from skinwave.bodies.mounting import Mounting
+from skinwave.models.options import SolveOptions
 from skinwave.models.stretching import membrane, meshed_sheet, stretching_body
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute
@@ -212,8 +213,8 @@ def test_nonlinear_models_are_for_sheets_that_are_held(model, body, got):
 
 
 def test_the_plan_of_a_nonlinear_sheet_says_what_is_wrong_with_large_elements():
-    assert not plan(SCENE, model="fem-nonlinear").warnings
-    coarse = plan(SCENE, model="fem-nonlinear-transient", h=0.01)
+    assert not plan(SCENE, SolveOptions(model="fem-nonlinear")).warnings
+    coarse = plan(SCENE, SolveOptions(model="fem-nonlinear-transient", h=0.01))
     assert "elements of 10 mm will have a relative error" in coarse.warnings[0]
     assert not any("stretching" in row.what for row in coarse.rows)
 

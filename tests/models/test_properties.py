@@ -33,6 +33,7 @@ from skinwave import BODIES, Body, Scene, SkinwaveWarning, dumps, loads
 from skinwave.bodies.supports import CONDITIONS
 from skinwave.models import named, names
 from skinwave.models.advice import takes
+from skinwave.models.options import SolveOptions
 from skinwave.models.prepared import prepare
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute, simulate
@@ -186,10 +187,10 @@ def test_every_linear_model_is_linear_in_the_pressure(model, tacton, factor):
     model_options = {"h": 0.01, "dt": 1e-3 if tacton.duration > 2e-3 else None}
     body = taken(model)
     once = compute(
-        small_scene(tacton, body, peak_pressure=10.0), model, 0.3, **model_options
+        small_scene(tacton, body, peak_pressure=10.0), model, tolerance=0.3, **model_options
     ).displacement
     scaled = small_scene(tacton, body, peak_pressure=10.0 * factor)
-    many = compute(scaled, model, 0.3, **model_options).displacement
+    many = compute(scaled, model, tolerance=0.3, **model_options).displacement
     np.testing.assert_allclose(many, factor * once, atol=1e-9 * np.abs(many).max())
 
 
@@ -249,7 +250,7 @@ def test_no_wave_of_a_mesh_arrives_before_it_can(distance, am):
         scene = Scene(
             pressure=MovingPressure(tacton=tacton), body=body, probes=((0, 0), (distance, 0))
         )
-        x = np.abs(compute(scene, model, 0.05, h=0.005, dt=2e-4).displacement)
+        x = np.abs(compute(scene, model, tolerance=0.05, h=0.005, dt=2e-4).displacement)
         times = np.arange(len(x)) / 1e4
         arrival = (distance - REACH) / material.pressure_speed
         assert x[times < arrival, 1].max() < 0.01 * x[:, 1].max()
@@ -276,7 +277,7 @@ def test_what_the_load_does_later_changes_nothing_before(model, tacton):
 @given(every_tacton, numbers(0.01, 100))
 def test_pulses_and_recordings_are_linear_in_the_pressure_too(model, tacton, factor):
     once, many = (
-        compute(small_scene(tacton, peak_pressure=p), model, 0.3, h=0.01).displacement
+        compute(small_scene(tacton, peak_pressure=p), model, tolerance=0.3, h=0.01).displacement
         for p in (10.0, 10.0 * factor)
     )
     np.testing.assert_allclose(many, factor * once, atol=1e-9 * np.abs(many).max())
@@ -404,7 +405,7 @@ def test_what_is_planned_runs(scene):
         patch.setattr("skinwave.bodies.sheet.SHEET_CELLS", 16)
         patch.setattr("skinwave.bodies.slab.SLAB_CELL", 6e-3)
         try:
-            required = plan(scene, 0.3)
+            required = plan(scene, SolveOptions(tolerance=0.3))
         except ValueError:
             reject()
         with warnings.catch_warnings():

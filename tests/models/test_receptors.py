@@ -20,7 +20,7 @@ from skinwave.commands.cli import main
 from skinwave.models import named
 from skinwave.models.advice import check_taken, takes
 from skinwave.models.loads import probe_rows
-from skinwave.models.prepared import sample_times
+from skinwave.models.options import sample_times
 from skinwave.planning.simulate import compute
 from skinwave.results.run import Run
 from skinwave.scene.file import dumps, loads
@@ -157,12 +157,12 @@ def test_reduced_harmonic_and_transient_models_read_the_same(quantity):
     """With viscosity and a Prony term, whose stresses are part of it."""
     small = replace(scene(quantity, "[1, 2]"), probes=((0.0, 0.0), (3e-3, 2e-3)))
     small = replace(small, body=replace(small.body, width=0.02, height=0.02, sides="clamped"))
-    reduced, steady = (compute(small, model, 0.02, h=6e-3).values for model in MODELS)
+    reduced, steady = (compute(small, model, tolerance=0.02, h=6e-3).values for model in MODELS)
     late = slice(350, None)
     assert np.linalg.norm((steady - reduced)[late]) < 0.01 * np.linalg.norm(steady[late])
     tacton = replace(small.tacton, duration=0.01)
     short = replace(small, pressure=replace(small.pressure, tacton=tacton))
-    stepped = compute(short, "fem-transient", 0.02, h=6e-3, dt=5e-5).values
+    stepped = compute(short, "fem-transient", tolerance=0.02, h=6e-3, dt=5e-5).values
     first = reduced[: len(stepped)]
     assert np.linalg.norm(stepped - first) < 0.02 * np.linalg.norm(first)
 

@@ -14,8 +14,10 @@ import pytest
 import skinwave
 from simple_model import Effort, MovingPressure, Response, Tacton
 from skinwave.commands.cli import main
+from skinwave.models.options import SolveOptions
 from skinwave.planning.assessment import sentences
-from skinwave.planning.simulate import answered, compute
+from skinwave.planning.plan import plan
+from skinwave.planning.simulate import compute, solve
 from skinwave.planning.warnings import implausible, of_stretching
 from skinwave.scene.file import loads
 from skinwave.scene.scene import Body, Scene
@@ -117,7 +119,7 @@ def test_run_and_simulate_say_the_same(name, tmp_path, monkeypatch, capsys):
 )  # fmt: skip
 def test_a_row_of_a_sweep_says_the_same(name, tmp_path, monkeypatch):
     text, arguments, part = KNOWN[name]
-    said = answered(loads(text), **arguments).effort.warnings
+    said = solve(loads(text), plan(loads(text), SolveOptions(**arguments))).effort.warnings
     assert any(part in sentence for sentence in said)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(text)
@@ -130,7 +132,9 @@ def test_a_row_of_a_sweep_says_the_same(name, tmp_path, monkeypatch):
 
 
 def test_pages_of_several_models_say_the_same(tmp_path, monkeypatch, capsys):
-    said = answered(loads(SOFT_PAPER), "fem", h=0.005).effort.warnings
+    said = solve(
+        loads(SOFT_PAPER), plan(loads(SOFT_PAPER), SolveOptions(model="fem", h=0.005))
+    ).effort.warnings
     assert len(said) >= 2
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(SOFT_PAPER)
@@ -144,7 +148,7 @@ def test_pages_of_several_models_say_the_same(tmp_path, monkeypatch, capsys):
 
 @pytest.mark.slow
 def test_a_report_says_the_same(tmp_path, monkeypatch, capsys):
-    said = answered(loads(SLAB), "fem", h=0.008).effort.warnings
+    said = solve(loads(SLAB), plan(loads(SLAB), SolveOptions(model="fem", h=0.008))).effort.warnings
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(SLAB)
     monkeypatch.setattr("skinwave.studies.album.shown_scenes", lambda scene, _: {"slab": scene})
@@ -158,7 +162,7 @@ def test_a_report_says_the_same(tmp_path, monkeypatch, capsys):
 
 def test_a_field_says_the_same_of_its_mesh():
     times = np.arange(4) * 2.5e-3
-    said = answered(loads(SLAB), "fem", h=0.008).effort.warnings
+    said = solve(loads(SLAB), plan(loads(SLAB), SolveOptions(model="fem", h=0.008))).effort.warnings
     with pytest.warns(skinwave.SkinwaveWarning) as caught:
         field = skinwave.field(loads(SLAB), times, 0.05, h=0.008)
     assert [str(w.message) for w in caught] == list(field.effort.warnings) == list(said)
@@ -218,7 +222,7 @@ def test_a_sheet_is_linear_up_to_half_its_thickness():
 def test_one_function_gives_the_sentences_of_any_response():
     for model, h in (("fem", 0.008), ("point-kernel", None)):
         scene = loads(SLAB)
-        found = answered(scene, model, h=h)
+        found = solve(scene, plan(scene, SolveOptions(model=model, h=h)))
         again = sentences(scene, found, h=h, error=found.expected_error)
         about = [
             [each.split(" will have")[0] for each in some]

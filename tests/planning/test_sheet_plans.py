@@ -9,12 +9,13 @@ import fem.reduced
 from simple_model import MovingPressure, Tacton, Trajectory, from_young
 from skinwave import plan
 from skinwave.bodies.mounting import Mounting
-from skinwave.models import Request, named
+from skinwave.models import named
 from skinwave.models.advice import cures_for
+from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.planning.plan import chosen_model
 from skinwave.planning.sheets import why_modes
-from skinwave.planning.simulate import compute, follow
+from skinwave.planning.simulate import compute, solve
 from skinwave.planning.warnings import NONLINEAR, of_stretching
 from skinwave.results.comparison import compare
 from skinwave.scene.file import loads
@@ -33,9 +34,9 @@ def test_modes_from_rest_are_elements_from_rest():
     circle = Trajectory(shape="circle", size=0.012, speed=3.0)
     pressure = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.1, trajectory=circle))
     scene = Scene(pressure=pressure, body=STRETCHED, probes=((0.0, 0.0), (0.01, 0.005)))
-    request = Request(times=np.arange(1000) / 1e4, tolerance=0.05, report=lambda *_: None, h=2.5e-3)
+    times, options = np.arange(1000) / 1e4, SolveOptions(h=2.5e-3)
     elements, modes, steady = (
-        named(model).solve(scene, request).values
+        named(model).solve(scene, times, options).values
         for model in ("fem", FROM_REST.name, "plate-modes")
     )
     size = np.linalg.norm(elements)
@@ -65,7 +66,7 @@ def test_sheets_in_frames_and_between_edges_are_planned_and_run(size, edges, why
     required = plan(scene)
     assert (required.model, required.h) == (FROM_REST.name, None)
     assert why in required.rows[1].reason
-    found = follow(scene, required)
+    found = solve(scene, required)
     assert found.model == FROM_REST.name
     assert 0 < found.expected_error <= 0.05
     assert np.abs(found.values[0]).max() < 0.01 * np.abs(found.values).max()
@@ -98,8 +99,8 @@ def test_a_sheet_that_stretches_is_planned_as_one(pressure, model):
 def test_the_error_of_linear_bending_is_stated(pressure):
     load = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.1), peak_pressure=pressure)
     scene = Scene(pressure=load, body=BODIES["paper-sheet-loose"], probes=((0.01, 0.005),))
-    required = plan(scene, model=FROM_REST.name)
-    linear = follow(scene, required)
+    required = plan(scene, SolveOptions(model=FROM_REST.name))
+    linear = solve(scene, required)
     true = compare(compute(scene, "plate-modes-nonlinear"), linear).relative_l2.max()
     assert true < 1.1 * linear.expected_error
     assert linear.expected_error < 2 * true + 0.02
@@ -125,7 +126,7 @@ def test_a_reduction_out_of_reach_names_the_model_that_works(monkeypatch):
     pressure = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.05))
     scene = Scene(pressure=pressure, body=STRETCHED, probes=((0.01, 0.005),))
     with pytest.raises(ValueError, match="6 moments leave.*use --model"):
-        plan(scene, model="fem", h=0.005)
+        plan(scene, SolveOptions(model="fem", h=0.005))
     slab = Scene(pressure=pressure, body=Body(width=0.04, height=0.04, sides="clamped"))
     with pytest.raises(ValueError, match="6 moments leave.*use --model"):
-        plan(slab, model="fem", h=0.01)
+        plan(slab, SolveOptions(model="fem", h=0.01))

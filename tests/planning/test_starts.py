@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from skinwave import SkinwaveWarning, plan, simulate
-from skinwave.models import Request, named
+from skinwave.models import named
+from skinwave.models.options import SolveOptions
 from skinwave.planning.simulate import compute
 from skinwave.results.comparison import compare
 from skinwave.scene.file import loads
@@ -61,7 +62,7 @@ def test_modes_of_a_plate_state_the_start(quantity):
     assert left > 0.2
     assert left <= error < 1.05 * left + 0.02
     assert any("plate-modes-transient is enough" in sentence for sentence in said)
-    assert plan(scene, model="plate-modes-transient").warnings == ()
+    assert plan(scene, SolveOptions(model="plate-modes-transient")).warnings == ()
 
 
 @pytest.mark.parametrize("quantity", ["displacement", "acceleration", "strain_zz"])
@@ -80,19 +81,19 @@ def test_wavenumber_integrals_state_a_jump_above_their_band(quantity):
     scene = loads(f'{LAYER}quantity = "{quantity}"')
     found = compute(scene, "flat-body")
     times = found.times[1] / 16 * np.arange(16 * len(found.times))
-    fine = named("flat-body").solve(
-        scene, Request(times=times, tolerance=1e-3, report=lambda phase, share: None)
-    )
+    fine = named("flat-body").solve(scene, times, SolveOptions(tolerance=1e-3))
     true = compare(replace(found, values=fine.values[::16]), found).relative_l2.max()
     assert true > (5e-3 if quantity == "acceleration" else 1e-3)
-    assert true < 1.1 * plan(scene, model="flat-body").error < 5 * true
+    assert true < 1.1 * plan(scene, SolveOptions(model="flat-body")).error < 5 * true
 
 
 def test_elements_state_the_start_of_the_quantity():
     scene = loads(f'{BLOCK}quantity = "acceleration"')
     error, left, _ = stated(scene, "fem-harmonic", "fem", h=6e-3)
     assert left > 0.1
-    assert error - plan(scene, model="fem", h=6e-3).error == pytest.approx(left, rel=0.05)
+    assert error - plan(scene, SolveOptions(model="fem", h=6e-3)).error == pytest.approx(
+        left, rel=0.05
+    )
 
 
 def test_a_start_counts_over_the_times_that_are_asked_for():

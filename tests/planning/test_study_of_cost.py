@@ -16,8 +16,8 @@ from skinwave.bodies.build import build
 from skinwave.bodies.coat import coarsest_size
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.bodies.slab import cell_layers
-from skinwave.models import Request
 from skinwave.models.full import harmonic_answer
+from skinwave.models.options import SolveOptions
 from skinwave.models.prepared import answer, prepare
 from skinwave.planning.estimates import (
     has_wavenumber_solution,
@@ -35,7 +35,7 @@ from skinwave.planning.refinement import (
     refined,
 )
 from skinwave.planning.sensitivity import sensitivity
-from skinwave.planning.simulate import compute, follow, required_plan
+from skinwave.planning.simulate import compute, solve
 from skinwave.results.comparison import compare
 from skinwave.scene.paper15 import scenes, tactons
 from skinwave.scene.scene import BODIES, Body, Layer
@@ -69,7 +69,7 @@ LOSSLESS = (
 def test_a_slab_that_loses_nothing_is_planned(viscosity):
     text = SHORT.replace("[body]", f"[body]\n{LOSSLESS}")
     scene = loads(text.replace("VISCOUS", viscosity))
-    for required in (plan(scene), plan(scene, model="flat-body")):
+    for required in (plan(scene), plan(scene, SolveOptions(model="flat-body"))):
         assert required.model == "flat-body"
         assert required.error < 0.05
         assert required.warnings == ()
@@ -80,8 +80,7 @@ def test_elements_of_a_body_that_loses_nothing_balance_their_energy():
     text = SHORT.replace("[body]", f"[body]\nsides = 'clamped'\n{LOSSLESS}")
     scene = loads(text.replace("VISCOUS", "0"))
     times = np.arange(500) / 1e4
-    request = Request(times=times, tolerance=0.05, report=lambda what, done: None, h=0.01)
-    found = harmonic_answer(scene, request)
+    found = harmonic_answer(scene, times, SolveOptions(h=0.01))
     assert found.effort.energy_imbalance < 0.01
 
 
@@ -94,7 +93,10 @@ def test_elements_of_a_body_that_loses_nothing_balance_their_energy():
 )
 def test_the_plan_takes_elements_where_sides_reflect_or_the_focus_has_lobes(text):
     text = "[tacton]\nduration_s = 0.1\n" + text + "\n[probes]\npoints_mm = [[0, 0], [5, 0]]"
-    loose, tight = plan(loads(text), 0.3), plan(loads(text), 0.1)
+    loose, tight = (
+        plan(loads(text), SolveOptions(tolerance=0.3)),
+        plan(loads(text), SolveOptions(tolerance=0.1)),
+    )
     assert loose.model == tight.model == "fem"
     assert loose.h is not None
     assert tight.h is not None
@@ -105,7 +107,12 @@ def test_the_plan_takes_elements_where_sides_reflect_or_the_focus_has_lobes(text
 
 
 def test_a_sheets_plan_says_what_it_leaves_out():
-    rows = {row.what: row for row in plan(loads("[body]\nkind = 'sheet'"), 0.4, model="fem").rows}
+    rows = {
+        row.what: row
+        for row in plan(
+            loads("[body]\nkind = 'sheet'"), SolveOptions(tolerance=0.4, model="fem")
+        ).rows
+    }
     assert "%" in rows["left out: air"].value
     assert "stiffens" in rows["left out: stretching"].reason
 
@@ -117,7 +124,7 @@ def test_a_long_steady_pattern_needs_no_start():
         path = Trajectory(shape=shape, size=0.02, speed=9.0)
         asked = replace(scene, pressure=replace(scene.pressure, tacton=replace(
             scene.tacton, trajectory=path)))  # fmt: skip
-        required = plan(asked, 0.25)
+        required = plan(asked, SolveOptions(tolerance=0.25))
         assert required.model == "flat-body-harmonic"
         whole, steady = (compute(asked, model) for model in ("flat-body", required.model))
         left = compare(whole, steady).relative_l2.max()
@@ -127,10 +134,10 @@ def test_a_long_steady_pattern_needs_no_start():
         np.testing.assert_allclose(steady.displacement[late], whole.displacement[late],
                                    atol=3e-3 * np.abs(whole.displacement).max())  # fmt: skip
         tight = 0.9 * left
-        assert plan(asked, tight).model == "flat-body"
-        said = plan(asked, tight, model="flat-body-harmonic").warnings
+        assert plan(asked, SolveOptions(tolerance=tight)).model == "flat-body"
+        said = plan(asked, SolveOptions(tolerance=tight, model="flat-body-harmonic")).warnings
         assert any("leaves out the initial transient" in warning for warning in said)
-    assert plan(scene, 0.25, model="fem").model == "fem"
+    assert plan(scene, SolveOptions(tolerance=0.25, model="fem")).model == "fem"
 
 
 def test_sides_that_send_nothing_back_need_no_elements():
@@ -139,7 +146,7 @@ def test_sides_that_send_nothing_back_need_no_elements():
     )
     text = f"[tacton]\nam_frequency_hz = 200\n[body]\nsides = 'free'\n{lossy}"
     for tolerance, model in ((0.12, "flat-body-harmonic"), (0.08, "flat-body")):
-        required = plan(loads(text), tolerance)
+        required = plan(loads(text), SolveOptions(tolerance=tolerance))
         assert required.model == model
         assert 0 < required.error < tolerance
 
@@ -193,7 +200,7 @@ def test_refinement_ends_at_the_finest_mesh_with_its_error(monkeypatch):
         "[tacton]\nduration_s = 0.05\n[body]\nkind = 'sheet'\nsize_x_mm = 60\nsize_y_mm = 60\n"
         "[probes]\npoints_mm = [[0, 0]]"
     )
-    found = refined(scene, scene.body, 0.01)
+    found = refined(scene, scene.body, SolveOptions(tolerance=0.01))
     assert found.h == pytest.approx(2.1 * default_size(scene.body))
     assert found.error > 0.01
     assert found.convergence is Convergence.NOT_REACHED
@@ -241,7 +248,7 @@ def test_two_meshes_have_one_of_four_outcomes(kind, same, tolerance, expected):
 def test_what_is_expected_of_a_mesh_is_near_its_true_error(h):
     """Also where it has as many layers as the next coarser one, or twice as many."""
     scene = loads(SHORT.replace("size_x_mm = 60\nsize_y_mm = 60", "size_x_mm = 40\nsize_y_mm = 40"))
-    found = refined(scene, scene.body, 0.05, h=h)
+    found = refined(scene, scene.body, SolveOptions(tolerance=0.05, h=h))
     true = compare(answer(found.prepared, scene), compute(scene, "flat-body")).relative_l2.max()
     assert 0.4 < found.error / true < 2.5
 
@@ -257,7 +264,8 @@ def test_a_body_that_nothing_holds_is_warned_of():
     text = SHORT.replace("size_x_mm = 60", ADRIFT)
     scene = loads(text)
     assert any(
-        "is unconstrained" in said for said in plan(scene, 0.3, model="fem", h=0.01).warnings
+        "is unconstrained" in said
+        for said in plan(scene, SolveOptions(tolerance=0.3, model="fem", h=0.01)).warnings
     )
     steady = compute(scene, "fem-harmonic", h=0.01).displacement
     assert np.abs(steady).max() < 1e-4  # and no mean, which would have no bound
@@ -267,7 +275,9 @@ def test_a_drift_does_not_hide_the_error_of_what_moves_beside_it():
     """However long the body has been pushed."""
     text = SHORT.replace("size_x_mm = 60", ADRIFT).replace("size_y_mm = 60", "size_y_mm = 30")
     scenes = [loads(text.replace("0.05", seconds)) for seconds in ("0.1", "1")]
-    found = [refined(scene, scene.body, 0.05, h=0.0075).error for scene in scenes]
+    found = [
+        refined(scene, scene.body, SolveOptions(tolerance=0.05, h=0.0075)).error for scene in scenes
+    ]
     assert found[0] == pytest.approx(found[1], rel=0.02)
     assert found[0] > 0.02
 
@@ -317,7 +327,7 @@ def test_sides_that_reflect_are_where_they_are(sides):
     soft = "material = {density_kg_m3=1000, shear_modulus_pa=25e3, poisson=0.499, viscosity_pa_s=2}"
     text = f"{SHORT}\n[body]\nsides = '{sides}'\nsize_x_mm = 100\nsize_y_mm = 100\n{soft}"
     body = loads(text.replace("[body]\nsize_x_mm = 60\nsize_y_mm = 60\n", "", 1)).body
-    required = plan(replace(loads(SHORT), body=body), 0.05, h=0.015)
+    required = plan(replace(loads(SHORT), body=body), SolveOptions(tolerance=0.05, h=0.015))
     assert required.model == "fem"
     assert required.body == body
 
@@ -325,7 +335,9 @@ def test_sides_that_reflect_are_where_they_are(sides):
 def test_only_as_much_of_a_body_is_meshed_as_waves_come_back_from():
     wide = "[focus]\nprofile = 'main_lobe'\n[body]\nsize_x_mm = 600\nsize_y_mm = 40"
     probes = "\n[probes]\npoints_mm = [[0, 0]]"
-    required = plan(loads("[tacton]\nam_frequency_hz = 200\n" + wide + probes), 0.4)
+    required = plan(
+        loads("[tacton]\nam_frequency_hz = 200\n" + wide + probes), SolveOptions(tolerance=0.4)
+    )
     assert required.body.width < 0.3
     assert required.body.height == 0.04
     assert "extent" in {row.what for row in required.rows}
@@ -350,7 +362,7 @@ size_y_mm = 60
 points_mm = [[0, 0], [-5, 3]]
 """
     scene = loads(text)
-    required = plan(scene, 0.3, model="fem")
+    required = plan(scene, SolveOptions(tolerance=0.3, model="fem"))
     assert required.symmetry == axes
     assert required.error <= 0.3
     whole = answer(prepare(scene.body, scene.probe_points, h=0.008), scene)
@@ -364,7 +376,9 @@ points_mm = [[0, 0], [-5, 3]]
 def test_meshes_are_refined_until_they_are_good_enough():
     text = "[tacton]\nam_frequency_hz = 80\nduration_s = 0.1\n[body]\nkind = 'sheet'\n"
     scene = loads(text + "[focus]\npeak_pressure_pa = 0.1\n[probes]\npoints_mm = [[0, 0], [5, 0]]")
-    loose, tight = (plan(scene, tolerance, model="fem") for tolerance in (0.2, 0.04))
+    loose, tight = (
+        plan(scene, SolveOptions(tolerance=tolerance, model="fem")) for tolerance in (0.2, 0.04)
+    )
     assert tight.h < loose.h
     finer = answer(prepare(scene.body, scene.probe_points, h=1.6e-3, symmetry="xy"), scene)
     for required in (loose, tight):
@@ -373,7 +387,7 @@ def test_meshes_are_refined_until_they_are_good_enough():
 
 
 def test_a_mesh_coarser_than_the_body_is_not_taken_for_converged():
-    required = plan(loads(SHORT), 0.1, model="fem", h=0.05)
+    required = plan(loads(SHORT), SolveOptions(tolerance=0.1, model="fem", h=0.05))
     assert 0.5 < required.error <= 1.0
     assert required.warnings
 
@@ -382,7 +396,7 @@ def test_what_breaks_the_tolerance_is_said_with_its_number():
     text = "[tacton]\nam_frequency_hz = 80\nduration_s = 0.05\n[body]\nkind = 'sheet'\n"
     small = "size_x_mm = 60\nsize_y_mm = 60\n[probes]\npoints_mm = [[0, 0], [5, 0]]"
     scene = loads(text + small)
-    assert plan(scene, 0.1).warnings == ()
+    assert plan(scene, SolveOptions(tolerance=0.1)).warnings == ()
     for arguments, sentence in [
         ({"model": "point-kernel"}, "the point kernel will have a relative error of about"),
         ({"model": "flat-body"}, "which leaves out reflections from the sides"),
@@ -394,7 +408,7 @@ def test_what_breaks_the_tolerance_is_said_with_its_number():
         ),
         ({"model": "fem-harmonic", "h": 0.005}, "leaves out the initial transient"),
     ]:
-        warnings = plan(scene, 0.1, **arguments).warnings
+        warnings = plan(scene, SolveOptions(tolerance=0.1, **arguments)).warnings
         assert any(sentence in warning for warning in warnings), sentence
         assert any(" %" in warning for warning in warnings), sentence
 
@@ -608,7 +622,7 @@ def test_a_plan_is_the_same_again_with_and_without_a_cache(monkeypatch, tmp_path
     scene, found = loads(FREE), []
     for folder in ("one", "one", ""):
         monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path / folder) if folder else "")
-        found.append(follow(scene, required_plan(scene, tolerance=0.2), 0.2))
+        found.append(solve(scene, plan(scene, SolveOptions(tolerance=0.2))))
     for other in found[1:]:
         assert cache.digest(other.values) == cache.digest(found[0].values)
         assert other.effort.mesh == found[0].effort.mesh

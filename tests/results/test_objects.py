@@ -364,7 +364,7 @@ def test_an_expected_error_is_said_alike_everywhere(scene):
     assert stated_error(found.expected_error) == said
     assert 0 < found.to_xarray().attrs["expected_error"] == found.expected_error
     assert error_budget(scene, found.expected_error).words.count(f"numerical {said}") == 1
-    for record in (found, skinwave.plan(scene, model="flat-body")):
+    for record in (found, skinwave.plan(scene, skinwave.SolveOptions(model="flat-body"))):
         assert said in record._repr_html_()
         assert f"expected error {said}" in repr(record)
     assert [stated_error(x) for x in (0.0213, 1.5, np.nan)] == ["2.1 %", "150 %", "not known"]

@@ -25,6 +25,7 @@ from skinwave.measure.fit import fit
 from skinwave.measure.predicted import predicted_lines, predicted_waveforms, target
 from skinwave.models import parametric
 from skinwave.models.loads import load_in_steps, surface_load
+from skinwave.models.options import SolveOptions
 from skinwave.models.prepared import answer, components, prepare
 from skinwave.patterns.conversion import write_pattern
 from skinwave.patterns.pattern import Options
@@ -173,7 +174,7 @@ def test_models_agree_on_loads_beside_pressure(text):
     """The reduced model, time steps, and the wavenumber integral, each from rest."""
     scene = loads(text + SMALL)
     flat = compute(scene, "flat-body").values
-    assert far(compute(scene, "fem", 0.02, h=H).values, flat).max() < 0.05
+    assert far(compute(scene, "fem", tolerance=0.02, h=H).values, flat).max() < 0.05
     if scene.load.direction != "path":
         return
     made = build(scene.body, H)
@@ -248,7 +249,7 @@ def test_a_force_has_no_device():
     assert "[focus]" not in dumps(scene)
     assert scene.pressure.peak_pressure * 2 * pi * 5e-3**2 == pytest.approx(0.02)
     assert not [each for each in spreads_of(scene) if each.part == "device"]
-    found = plan(scene, 0.1)
+    found = plan(scene, SolveOptions(tolerance=0.1))
     assert found.model.startswith("flat-body")
 
 

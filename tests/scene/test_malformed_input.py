@@ -10,6 +10,7 @@ import pytest
 
 from skinwave import loads
 from skinwave.commands.cli import main
+from skinwave.models.options import SolveOptions
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute
 
@@ -174,19 +175,19 @@ def test_overwriting_keeps_the_neighbours_and_a_link(folder):
 def test_a_probe_on_a_clamped_edge_stays_and_spoils_no_other():
     rim = corpus.GOOD.replace("[5, 0]", "[15, 0]")
     scene, alone = loads(rim), loads(rim.replace("[0, 0], ", ""))
-    motion = compute(scene, "fem", 0.3, h=0.006).displacement
+    motion = compute(scene, "fem", tolerance=0.3, h=0.006).displacement
     assert np.abs(motion[:, 0]).max() > 0
     assert np.abs(motion[:, 1]).max() < 1e-12 * np.abs(motion[:, 0]).max()
     with pytest.raises(ValueError, match="no probe can move"):
-        compute(alone, "fem", 0.3, h=0.006)
+        compute(alone, "fem", tolerance=0.3, h=0.006)
 
 
 @pytest.mark.parametrize("model", ["point-kernel", "flat-body", "fem", "fem-harmonic"])
 def test_a_silent_tacton_moves_nothing(model):
     silent = loads(corpus.GOOD.replace("[tacton]", "[tacton]\namplitude_percent = 0"))
-    assert not compute(silent, model, 0.3, h=0.006).displacement.any()
+    assert not compute(silent, model, tolerance=0.3, h=0.006).displacement.any()
 
 
 def test_a_silent_tacton_is_planned():
     sheet = corpus.GOOD.replace("[tacton]", "[tacton]\namplitude_percent = 0")
-    assert plan(loads(sheet), 0.3, model="fem", h=0.006).error < 1e-3
+    assert plan(loads(sheet), SolveOptions(tolerance=0.3, model="fem", h=0.006)).error < 1e-3

@@ -8,6 +8,7 @@ import pytest
 import fem
 import skinwave
 from skinwave import Body, Load, SupportMotion, dumps, loads
+from skinwave.models.options import SolveOptions
 from skinwave.models.prepared import prepare
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute
@@ -137,7 +138,7 @@ def test_scenes_with_it_come_back_from_their_files_and_are_planned():
     assert scene.load.support_motion == UP
     assert "support_motion" not in dumps(replace(scene, load=Load()))
     small = shaken()
-    found = plan(small, 0.2)
+    found = plan(small, SolveOptions(tolerance=0.2))
     assert found.model == "fem"
     assert found.highest == 140.0
     assert "a support that moves by 5 um at 140 Hz" in str(found.rows)

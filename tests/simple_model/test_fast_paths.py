@@ -30,13 +30,17 @@ from simple_model.quantities import ACCELERATION, DISPLACEMENT, VELOCITY
 from skinwave import Body, Scene
 from skinwave.bodies import BODIES
 from skinwave.models import stretching
-from skinwave.planning.simulate import answered, compute
+from skinwave.planning.simulate import compute
 
 PALM = slab(PRESETS["palm"], 0.015)
 PROBES = np.array([[0.01, 0.0], [0.02, 0.0]])
 TIMES = np.arange(4000) / 1e4
 LATE = slice(2500, 3800)  # the transient has died out, and the end has no effect yet
 SKIN = Body(width=0.06, height=0.06, sides="clamped")
+
+
+def solved(scene, **options):
+    return solve(scene, plan(scene, SolveOptions(**options)))
 
 
 def circling(size, speed, am=0.0, **load):
@@ -131,7 +135,7 @@ def test_the_kernel_of_ordinary_paths_is_the_load_itself(speed, am):
 def test_elements_answer_no_line_at_another_frequency():
     load = circling(0.005, 60.0)
     load = replace(load, tacton=replace(load.tacton, duration=0.4))
-    found = answered(Scene(pressure=load, body=SKIN, probes=((0.005, 0.0),)), "fem", h=6e-3)
+    found = solved(Scene(pressure=load, body=SKIN, probes=((0.005, 0.0),)), model="fem", h=6e-3)
     false, true = lines(found, [2360.6, 3819.7], settle=0.5)[:, 0]
     assert false < 1e-3 * true
 
@@ -231,12 +235,12 @@ def test_coarse_samples_are_those_of_fine_ones():
 def test_lines_that_are_left_out_are_named():
     load = MovingPressure(tacton=Tacton(am_frequency=310.0, duration=0.4))
     scene = Scene(pressure=load, body=replace(SKIN, sides="absorbing"))
-    found = answered(scene, "flat-body-harmonic", times=np.arange(200) / 500)
+    found = solved(scene, model="flat-body-harmonic", times=np.arange(200) / 500)
     assert np.ptp(found.values, axis=0).max() < 1e-3 * np.abs(found.values).max()
     (said,) = [each for each in found.effort.warnings if "sampling rate" in each]
     assert "above 250 Hz" in said
     assert "f_AM at 310 Hz and 1 more" in said
-    cured = answered(scene, "flat-body-harmonic", times=np.arange(400) / 1300)
+    cured = solved(scene, model="flat-body-harmonic", times=np.arange(400) / 1300)
     assert not any("sampling rate" in each for each in cured.effort.warnings)
 
 

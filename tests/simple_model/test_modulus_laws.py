@@ -275,7 +275,7 @@ def test_a_plan_counts_the_series_in_its_error():
     rough = tabulated(density=1070, poisson=0.4999, frequencies=HERTZ, moduli=moduli)
     wide = replace(scene(rough).body, width=0.1, height=0.1, sides="absorbing")
     own = replace(scene(rough), body=wide)
-    found = skinwave.plan(own, model="flat-body")
+    found = skinwave.plan(own, skinwave.SolveOptions(model="flat-body"))
     steady, series = (
         steady_lines(compliance(body), own.pressure, PROBES)[1] for body in
         (own.body, relaxing(own.body, 0.01))
@@ -285,13 +285,24 @@ def test_a_plan_counts_the_series_in_its_error():
     said = next(row for row in found.rows if row.what == "modulus law")
     assert said.value == rough.law.series.words
     assert "% from the law between 5 and 1500 Hz" in said.value
-    assert skinwave.plan(own, 0.01, model="flat-body").warnings[-1].startswith("the Prony series")
-    assert not [r for r in skinwave.plan(own, model="flat-body-harmonic").rows if r == said]
+    assert (
+        skinwave.plan(own, skinwave.SolveOptions(tolerance=0.01, model="flat-body"))
+        .warnings[-1]
+        .startswith("the Prony series")
+    )
+    assert not [
+        r
+        for r in skinwave.plan(own, skinwave.SolveOptions(model="flat-body-harmonic")).rows
+        if r == said
+    ]
 
 
 def test_a_plan_of_elements_counts_the_series():
     own = scene(ECOFLEX)
-    found, harmonic = (skinwave.plan(own, model=name, h=0.008) for name in ("fem", "fem-harmonic"))
+    found, harmonic = (
+        skinwave.plan(own, skinwave.SolveOptions(model=name, h=0.008))
+        for name in ("fem", "fem-harmonic")
+    )
     assert any(row.what == "modulus law" for row in found.rows)
     assert not any(row.what == "modulus law" for row in harmonic.rows)
     assert found.error > ECOFLEX.series().error

@@ -23,6 +23,7 @@ from simple_model.layers.material import PRESETS
 from simple_model.load.path_cells import path_fourier, path_samples
 from simple_model.load.spectrum import load_lines, pressure_lines, synthesise
 from skinwave import Body, Scene, simulate
+from skinwave.models.options import SolveOptions
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute
 from skinwave.results.views import kernel_view
@@ -287,7 +288,11 @@ def test_exact_waves_of_a_recorded_circle_are_the_circles():
 @pytest.mark.parametrize("name", LOADS)
 def test_every_load_is_planned_and_run(name):
     scene = small_scene(**LOADS[name])
-    assert plan(scene, 0.3).model in ("fem", "flat-body", "flat-body-harmonic")
+    assert plan(scene, SolveOptions(tolerance=0.3)).model in (
+        "fem",
+        "flat-body",
+        "flat-body-harmonic",
+    )
     assert np.isfinite(simulate(scene, "auto", 0.3).displacement).all()
 
 

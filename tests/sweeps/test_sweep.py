@@ -413,13 +413,13 @@ def test_the_forearm_gives_way_most_near_the_rayleigh_speed(tmp_path, monkeypatc
 def parabola():
     """A model whose motion is a parabola over the speed, largest at 1.5 times the shear speed."""
 
-    def solve(scene, request):
+    def solve(scene, times, options):
         c = (scene.body.solid.shear_modulus / scene.body.solid.density) ** 0.5
         speed, pressure = scene.tacton.trajectory.speed, scene.pressure.peak_pressure
         size = 1e-8 * pressure * (30 - (speed / c - 1.5) ** 2)
-        waves = size * np.sin(2 * np.pi * 100 * request.times)
+        waves = size * np.sin(2 * np.pi * 100 * times)
         return Response(
-            model="parabola", times=request.times, probes=scene.probe_points,
+            model="parabola", times=times, probes=scene.probe_points,
             values=np.outer(waves, np.ones(len(scene.probes))),
         )  # fmt: skip
 
