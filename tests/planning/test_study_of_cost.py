@@ -293,7 +293,8 @@ def test_a_body_without_loss_is_judged_by_its_load():
 
 def test_exact_waves_are_not_planned_for_what_has_none():
     tilted = SHORT + "[placement]\ntilt_x_deg = 5"
-    for do in (plan, lambda scene, model: simulate(scene, model)):
+    planned = lambda scene, model: plan(scene, SolveOptions(model=model))  # noqa: E731
+    for do in (planned, simulate):
         with pytest.raises(ValueError, match="lies flat"):
             do(loads(tilted), model="flat-body")
 

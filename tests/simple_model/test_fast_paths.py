@@ -30,7 +30,9 @@ from simple_model.quantities import ACCELERATION, DISPLACEMENT, VELOCITY
 from skinwave import Body, Scene
 from skinwave.bodies import BODIES
 from skinwave.models import stretching
-from skinwave.planning.simulate import compute
+from skinwave.models.options import SolveOptions
+from skinwave.planning.plan import plan
+from skinwave.planning.simulate import compute, solve
 
 PALM = slab(PRESETS["palm"], 0.015)
 PROBES = np.array([[0.01, 0.0], [0.02, 0.0]])
