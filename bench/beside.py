@@ -24,7 +24,6 @@ import fem
 import meshes
 from bench.codes import CODES, Assembled, Problem
 from skinwave.bodies.build import build
-from skinwave.models.options import sample_times
 from skinwave.models.prepared import answer, prepare
 from skinwave.scene import paper15
 from skinwave.scene.scene import PROBES, Body

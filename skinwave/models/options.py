@@ -11,7 +11,7 @@ import fem
 from meshes.tetmesh import Floats
 from simple_model import Response
 from simple_model.choices import choose
-from simple_model.load.sampling import UNEVEN
+from simple_model.response import UNEVEN
 from skinwave.scene.scene import MOST_VALUES, SAMPLE_RATE, Scene
 from skinwave.system.effort import Progress, silent
 
