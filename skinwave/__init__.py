@@ -6,12 +6,8 @@
 Names are imported when they are first used, so that `skinwave --help` is immediate.
 """
 
-from skinwave.system.safe_path import leave_out_working_folder
-
-leave_out_working_folder()
-
-from importlib import import_module  # noqa: E402
-from typing import TYPE_CHECKING, Any  # noqa: E402
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # what readers of types and editors see of the names below
     from skinwave.models.options import SolveOptions

@@ -86,10 +86,10 @@ def in_one_process(monkeypatch):
     """Comparisons without a process beside this one, where that is not what is tested."""
 
     @contextmanager
-    def here():
+    def here(count):
         yield Here()
 
-    monkeypatch.setattr("skinwave.studies.study.helper", here)
+    monkeypatch.setattr("skinwave.studies.study.pool", here)
 
 
 @pytest.fixture(scope="module")

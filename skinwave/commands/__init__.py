@@ -4,7 +4,6 @@ The one line of a module is its help. Slow imports are made in `run`.
 """
 
 from skinwave.commands import (
-    cache,
     compare,
     convert,
     dispersion,
@@ -18,9 +17,7 @@ from skinwave.commands import (
     plot,
     relax,
     report,
-    rerun,
     run,
-    same,
     sweep,
     tradeoff,
     validate,
@@ -31,7 +28,7 @@ from skinwave.commands import map as map_command
 
 MODULES = (
     run, compare, tradeoff, relax, dispersion, map_command, plan, sweep, plot, mesh, convert,
-    verify, report, film, live, web, rerun, same, doctor, cache,
+    verify, report, film, live, web, doctor,
     measured, fit,
     validate,
 )  # fmt: skip

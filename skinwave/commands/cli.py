@@ -4,6 +4,8 @@ Only argparse is imported before a command is known, so that help is immediate.
 """
 
 import argparse
+import errno
+import os
 import sys
 from collections.abc import Sequence
 from functools import partial
@@ -14,57 +16,61 @@ from skinwave.commands import COMMANDS
 from skinwave.commands.common import note_central_values
 from skinwave.system import extensions
 from skinwave.system.plain_text import printable, say
-from skinwave.system.processes import SAFE_PATH, ended_by_signals, environment
-from skinwave.system.safe_path import leave_out_working_settings
-from skinwave.system.streams import CLOSED, explained, flushed, reader_gone
+from skinwave.system.processes import SAFE_PATH, environment
 
 CACHE = "SKINWAVE_CACHE"
 NO_CACHE = f"neither read nor write cached meshes and reduced bodies; {CACHE} names their folder"
 # Commands that compute nothing, or always anew.
-UNCACHED = ("cache", "convert", "doctor", "measured", "plot", "same", "tradeoff")
+UNCACHED = ("convert", "doctor", "measured", "plot", "tradeoff")
+READER_GONE = 141  # 128 + SIGPIPE, as a shell has it of `yes | head -1`
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
-@flushed
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command; 0 if it succeeded, 1 if interrupted or refuted, 2 if its input was wrong.
-
-    Raises
-    ------
-    SystemExit
-        With 128 and the signal's number, if SIGTERM or SIGHUP ends it.
-    """
+    """Run a command; 0 if it succeeded, 1 if interrupted or refuted, 2 if its input was wrong."""
     typed = list(sys.argv[1:] if arguments is None else arguments)
+    debug = "--debug" in typed
+    try:
+        code = _command(typed)
+        sys.stdout.flush()
+        return code
+    except KeyboardInterrupt as interrupt:
+        said, code = f"interrupted; {interrupt or 'nothing was finished'}", 1
+    except BrokenPipeError:  # nobody reads what is written
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return READER_GONE
+    except (ValueError, ArithmeticError, MemoryError, OSError) as error:
+        if debug:
+            raise
+        said, code = _explained(error), 2
+    say(f"skinwave: {' '.join(said.split())}", sys.stderr)
+    return code
+
+
+def _command(typed: list[str]) -> int:
     if typed[:1] == ["--version"]:  # looked up here, because help need not wait for it
         print(f"skinwave {skinwave.__version__}")
         return 0
-    try:
-        extensions.load()
-    except ValueError as error:
-        say(f"skinwave: {error}", sys.stderr)
-        return 2
+    extensions.load()
     options = parser().parse_args(_joined(typed))
     if options.command_name is None:
         parser().error(f"no command is given; use one of {', '.join(COMMANDS)}")
     options.typed = typed
-    leave_out_working_settings()
-    try:
-        no_cache = {CACHE: ""} if getattr(options, "no_cache", False) else {}
-        with environment({**SAFE_PATH, **no_cache}), ended_by_signals():
-            note_central_values(options)
-            return int(options.command(options))
-    except KeyboardInterrupt as interrupt:
-        kept = str(interrupt) or "nothing was finished"
-        say(f"skinwave: interrupted; {kept}", sys.stderr)
-        return 1
-    except (ValueError, ArithmeticError, MemoryError, OSError) as error:
-        if reader_gone(error):
-            return CLOSED
-        if options.debug:
-            raise
-        text = explained(error) if isinstance(error, OSError) else str(error)
-        said = " ".join(text.split()) or "not enough memory; take larger elements"
-        say(f"skinwave: {said}", sys.stderr)
-        return 2
+    no_cache = {CACHE: ""} if getattr(options, "no_cache", False) else {}
+    with environment({**SAFE_PATH, **no_cache}):
+        note_central_values(options)
+        return int(options.command(options))
+
+
+def _explained(error: Exception) -> str:
+    """The sentence of an error; those of the system and of memory lack a cure of their own."""
+    if isinstance(error, MemoryError):
+        return str(error) or "not enough memory; take larger elements"
+    if not isinstance(error, OSError) or not error.strerror:
+        return str(error)
+    place = "a file" if error.filename is None else error.filename
+    cure = "make room there" if error.errno in FULL else "check its name, place and permissions"
+    return f"{place} cannot be read or written ({error.strerror}); {cure}"
 
 
 def _joined(arguments: Sequence[str]) -> list[str]:

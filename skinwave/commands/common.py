@@ -78,8 +78,8 @@ def add_mesh(parser: argparse.ArgumentParser) -> None:
 
 
 def add_size(parser: argparse.ArgumentParser, **how: Any) -> None:
-    """The element size in mm; `--h` is its name in version 0.2."""
-    parser.add_argument("--element-size", "--h", dest="h", type=float, metavar="MM", **how)
+    """The element size in mm."""
+    parser.add_argument("--element-size", dest="h", type=float, metavar="MM", **how)
 
 
 def add_model(parser: argparse.ArgumentParser) -> None:

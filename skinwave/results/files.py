@@ -50,19 +50,13 @@ def distinct_names(names: Iterable[str]) -> list[str]:
     return [*found.values()]
 
 
-def write_run(
-    folder: Path,
-    run: Run,
-    *,
-    by: str = "compute",
-    h: float | None = None,
-    also: Callable[[Path], object] | None = None,
-) -> None:
-    """The folder of one run, all or nothing; `also` writes more into it, by and h as for `fill`."""
+def write_run(folder: Path, run: Run, *, also: Callable[[Path], object] | None = None) -> None:
+    """Write the folder of one run, all or nothing; `also` writes more into it."""
     folder.parent.mkdir(parents=True, exist_ok=True)
-    aside = outputs.beside(folder, Path.mkdir, f"{folder.name}.partial-", "")
+    aside = outputs.beside(folder, "partial")
+    aside.mkdir()
     try:
-        fill(aside, run, by=by, h=h)
+        fill(aside, run)
         if also:
             also(aside)
         os.replace(aside, folder)
@@ -71,17 +65,15 @@ def write_run(
         raise
 
 
-def fill(folder: Path, run: Run, *, by: str = "compute", h: float | None = None) -> None:
-    """scene.toml, responses.npz, lines.csv, effort.json and record.json of one run, into an empty
-    folder; `by` and h are how its model was computed, as in `record.of_model`.
-    """
+def fill(folder: Path, run: Run) -> None:
+    """Write scene.toml, responses.npz, lines.csv, effort.json and record.json of one run."""
     name = run.response.quantity if run.response.record.of_body else DISPLACEMENT.name
-    write_responses(folder / record.RESPONSES[0], {name: run, run.model: run})
+    write_responses(folder / record.RESPONSES, {name: run, run.model: run})
     write_lines(folder / "lines.csv", [run])
     write_effort(folder / "effort.json", run.response.effort)
-    # Only then is it a result for whoever looks for scenes in a folder that was left half-written.
     (folder / "scene.toml").write_text(dumps(run.scene), encoding="utf-8")
-    command = record.of_model(run, by, h)
+    options = {"tacton": run.tacton, "body": run.body, "model": run.model}
+    command = {"typed": "", "name": "simulate", "options": options}
     record.write(folder, command, scene=run.scene, response=run.response)
 
 

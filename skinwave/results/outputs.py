@@ -1,34 +1,26 @@
-"""Output folders and files: written under a name of their own beside the target, then renamed.
+"""Output folders and files: written under another name beside the target, then renamed.
 
-Names are new ones that no other process has, and nothing is removed or replaced but what this
-program wrote. Whoever finishes first has the target's name; a run that finds there what was not
-there when it began keeps its result beside it and says where.
+A folder is replaced only if this program wrote it and everything in it: its record.json lists the
+files that were written beside it.
 """
 
-import contextlib
-import errno
+import hashlib
 import json
 import os
 import secrets
 import shlex
 import shutil
-import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, NoReturn
+from typing import IO
 
-from skinwave.results import marks, record
+from skinwave.results import record
 
+FILES = "files"  # key in record.json: path below its folder -> SHA-256
+REPORT = "report"  # the folder that the command of that name makes within a result
+OF_SYSTEM = (".DS_Store", "Thumbs.db", "desktop.ini")  # written by file browsers
 LONGEST = 50  # characters of a name that a temporary one begins with
-ATTEMPTS = 100  # at a name that is not taken, of 4e9
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-TAKEN = (errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR, errno.ENOENT)  # of a rename to a new name
-ELSEWHERE = (ConnectionError, TimeoutError, ChildProcessError)  # system errors of no file
-
-
-class _Taken(Exception):
-    """The target is no longer what it was when the writing began."""
 
 
 @contextmanager
@@ -39,45 +31,46 @@ def output_folder(
     inputs: Iterable[str | Path] = (),
     report: Sequence[str] = (),
 ) -> Iterator[Path]:
-    """A folder to write in, which becomes `out` when all is written.
+    """Yield a folder to write in, which becomes `out` when all is written.
 
-    Until then its name is `<out>.partial-` and eight digits. An error removes it, with the folders
-    above that were made for it, and leaves what was there before untouched. An interrupt keeps it
-    if it holds finished runs, and names the command that makes a report of them.
+    Until then its name is `<out>.partial-` and eight digits. An error removes it and leaves `out`
+    untouched. An interrupt keeps it if it holds finished runs.
 
     Parameters
     ----------
+    out : folder to make
+    overwrite : whether a folder that this program wrote may be replaced
     inputs : what the command reads, which is never replaced
-    report : options of that command
+    report : options of the command that makes a page of finished runs
 
     Raises
     ------
     ValueError
-        If `out` exists and may not be overwritten, or cannot be written.
+        If `out` exists and may not be replaced.
     KeyboardInterrupt
         With a sentence that names what is kept, if there is anything.
     """
-    out = Path(os.path.realpath(out))  # a link stays one, and points to what is written
-    _refuse_existing(out, overwrite, inputs)
-    there, above, aside = _identity(out), list[Path](), None
+    out = Path(os.path.realpath(out))  # a link remains one, and points to what is written
+    _refuse_folder(out, overwrite, inputs)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    aside = beside(out, "partial")
+    aside.mkdir()
     try:
-        _make_parents(out.parent, above)
-        aside = beside(out, Path.mkdir, f"{out.name[:LONGEST]}.partial-", "")
         yield aside
-        marks.seal(aside)
-        _put_in_place(aside, out, there)
-    except _Taken:
-        _refuse_taken(out, aside)
+        seal(aside)
+        _put_in_place(aside, out, overwrite)
     except KeyboardInterrupt:
-        if aside and any(aside.rglob(record.FILE)):
-            _drop_unfinished(aside)
-            raise KeyboardInterrupt(_kept(aside, report)) from None
-        _remove(aside, above)
+        if not any(aside.rglob(record.FILE)):
+            shutil.rmtree(aside, ignore_errors=True)
+            raise
+        command = shlex.join(["skinwave", "report", str(aside), *report])
+        raise KeyboardInterrupt(
+            f"the runs that were finished are kept in {aside}; {command} makes a page of them"
+        ) from None
+    except _TakenError:
         raise
-    except BaseException as error:
-        _remove(aside, above)
-        if isinstance(error, OSError):
-            _refuse_unwritable(out, aside, error, "choose another --out")
+    except BaseException:
+        shutil.rmtree(aside, ignore_errors=True)
         raise
 
 
@@ -85,214 +78,143 @@ def output_folder(
 def output_path(
     out: Path, *, overwrite: bool = False, inputs: Iterable[str | Path] = ()
 ) -> Iterator[Path]:
-    """The path of an empty file of the same kind, which becomes `out` when all is written; an
-    error or an interrupt leaves no trace.
+    """Yield a path of the same suffix; what is written there becomes `out`, or leaves no trace.
 
     Raises
     ------
     ValueError
-        If `out` exists and may not be overwritten, is one of the `inputs` of the command, or
-        cannot be written.
+        If `out` exists and may not be overwritten, or is one of the `inputs` of the command.
     """
     out = Path(os.path.realpath(out))
-    _refuse_file(out, overwrite, inputs)
-    aside = None
+    if out.is_dir():
+        raise ValueError(f"{out} is a folder; name a file")
+    if os.path.lexists(out) and not overwrite:
+        raise ValueError(f"{out} exists and is kept; pass --overwrite or choose another")
+    if any(os.path.exists(path) and os.path.samefile(path, out) for path in inputs if out.exists()):
+        raise ValueError(f"{out} is read by this command; choose another")
+    aside = beside(out, "partial").with_suffix(out.suffix)
     try:
-        aside = beside(out, _new_file, f".{out.stem[:LONGEST]}.partial-", out.suffix)
         yield aside
-        _name_file(aside, out, overwrite)
-    except _Taken:
-        _refuse_taken(out, aside)
-    except BaseException as error:
-        with contextlib.suppress(OSError):
-            if aside:
-                aside.unlink()
-        if isinstance(error, OSError):
-            _refuse_unwritable(out, aside, error, "choose another")
-        raise
+        os.replace(aside, out)
+    finally:
+        aside.unlink(missing_ok=True)
 
 
 @contextmanager
 def output_file(
     out: Path, *, overwrite: bool = False, inputs: Iterable[str | Path] = ()
 ) -> Iterator[IO[bytes]]:
-    """A file to write to, which becomes `out` as that of `output_path` does."""
-    with output_path(out, overwrite=overwrite, inputs=inputs) as aside, open(aside, "wb") as file:
+    """Yield a file to write to, which becomes `out` as that of `output_path` does."""
+    with output_path(out, overwrite=overwrite, inputs=inputs) as aside, open(aside, "xb") as file:
         yield file
 
 
-def beside(out: Path, make: Callable[[Path], object], begin: str, end: str) -> Path:
-    """A new path in the folder of `out`, with the permissions that new files have; `make` makes it
-    and fails if it exists, be it a link.
+def beside(out: Path, what: str) -> Path:
+    """Return a new path in the folder of `out`, which no other process has."""
+    return out.with_name(f"{out.name[:LONGEST]}.{what}-{secrets.token_hex(4)}")
+
+
+def seal(folder: Path) -> None:
+    """Enter every file below a folder in its record.json, once all is written.
+
+    Raises
+    ------
+    ValueError
+        If the folder has no record.
     """
-    with contextlib.suppress(FileNotFoundError):
-        out.lstat()  # a name that is too long is refused now, not when all is written
-    for _ in range(ATTEMPTS):
-        path = out.with_name(f"{begin}{secrets.token_hex(4)}{end}")
-        with contextlib.suppress(FileExistsError):
-            make(path)
-            return path
-    raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
+    listed = {
+        path.relative_to(folder).as_posix(): digest(path)
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path != folder / record.FILE
+    }
+    content = record.read(folder) | {FILES: listed}
+    (folder / record.FILE).write_text(json.dumps(content, indent=1), encoding="utf-8")
 
 
-def _new_file(path: Path) -> None:
-    os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+def digest(path: Path) -> str:
+    """SHA-256 of a file's content."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _refuse_existing(out: Path, overwrite: bool, inputs: Iterable[str | Path]) -> None:
-    if out.exists() and marks.within(Path.cwd(), out):
-        raise ValueError(f"{out} holds the current folder; choose another --out")
-    if os.path.lexists(out) and not overwrite:
-        raise ValueError(f"{out} exists and is kept; pass --overwrite or another --out")
-    if os.path.lexists(out) and not out.is_dir():
-        raise ValueError(f"{out} is a file; choose a folder with --out")
-    if out.exists():
-        marks.refuse_unmarked(out, inputs)
-
-
-def _refuse_file(out: Path, overwrite: bool, inputs: Iterable[str | Path]) -> None:
-    if not os.path.lexists(out):
-        return
-    if out.is_dir():
-        raise ValueError(f"{out} is a folder; name a file or choose another")
-    if not overwrite:
-        raise ValueError(f"{out} exists and is kept; pass --overwrite or choose another")
-    if not out.is_file():
-        raise ValueError(f"{out} is no regular file; choose another")
-    if any(os.path.exists(path) and os.path.samefile(path, out) for path in inputs):
-        raise ValueError(f"{out} is read by this command; choose another")
-
-
-def _refuse_taken(out: Path, aside: Path | None) -> NoReturn:
-    raise ValueError(
-        f"{out} was written or changed by another program meanwhile and is kept; this result is "
-        f"{aside}, rename it as you like"
-    ) from None
-
-
-def _refuse_unwritable(out: Path, aside: Path | None, error: OSError, cure: str) -> None:
-    """Say it of `out` if it is an error of writing there."""
-    ours = (str(out.with_name(out.name[:LONGEST])), str(aside))
-    other = error.filename is not None and not str(error.filename).startswith(ours)
-    if not error.strerror or isinstance(error, ELSEWHERE) or (other and aside):
-        return
-    raise unwritable(out, error, cure) from error
-
-
-def unwritable(out: Path, error: OSError, cure: str) -> ValueError:
-    """The sentence that a folder or file cannot be written."""
-    room = "make room there or " * (error.errno in FULL)
-    return ValueError(f"{out} cannot be written ({error.strerror}); {room}{cure}")
-
-
-def _drop_unfinished(aside: Path) -> None:
-    """Leave finished runs and what was planned, which a page is made from, and no half of a file.
-
-    The folder of a run appears whole, so that all in one with a record is.
-    """
-    runs = {path.parent for path in aside.rglob(record.FILE)}
-    loose = [p for p in aside.rglob("*") if p.is_file() and not runs & {*p.parents}]
-    for path in loose:
-        if path.suffix != ".toml" and not _is_json(path):
-            path.unlink()
-    for folder in sorted((p for p in aside.rglob("*") if p.is_dir()), reverse=True):
-        with contextlib.suppress(OSError):
-            folder.rmdir()  # if it is empty
-
-
-def _is_json(path: Path) -> bool:
-    if path.suffix != ".json":
-        return False
+def listed_files(folder: Path) -> dict[str, str] | None:
+    """SHA-256 by path of the files that a folder was written with; None if it is no result."""
     try:
-        json.loads(path.read_text(encoding="utf-8"))
+        found = record.read(folder).get(FILES)
     except ValueError:
-        return False
-    return True
-
-
-def _kept(aside: Path, report: Sequence[str]) -> str:
-    command = shlex.join(["skinwave", "report", str(aside), *report])
-    return f"the runs that were finished are kept in {aside}; {command} makes a page of them"
-
-
-def _identity(out: Path) -> tuple[int, int] | None:
-    """Identity of a folder, which another of the same name has not; None if there is none."""
-    if not os.path.lexists(out):
         return None
-    mark = out / record.FILE
-    return out.stat().st_ino, mark.stat().st_mtime_ns if mark.exists() else 0
+    return found if isinstance(found, dict) else None
 
 
-def _make_parents(folder: Path, made: list[Path]) -> None:
-    """Make what is missing of a folder; `made` is filled with what was, the innermost first."""
-    for missing in reversed([p for p in (folder, *folder.parents) if not os.path.lexists(p)]):
-        with contextlib.suppress(FileExistsError):
-            missing.mkdir()
-            made.insert(0, missing)
+def foreign_file(folder: Path) -> Path | None:
+    """The first file below a folder that was added or changed since this program wrote it.
+
+    A report within it has a list of its own.
+    """
+    listed = listed_files(folder) or {}
+    own = listed_files(folder / REPORT) or {}
+    listed |= {f"{REPORT}/{name}": known for name, known in own.items()}
+    records = [folder / record.FILE, *[folder / REPORT / record.FILE] * bool(own)]
+    for path in sorted(folder.rglob("*")):
+        is_folder = path.is_dir() and not path.is_symlink()
+        if not is_folder and path.name not in OF_SYSTEM and path not in records:
+            name = path.relative_to(folder).as_posix()
+            if not is_as_listed(path, listed.get(name)):
+                return path
+    return None
 
 
-def _put_in_place(aside: Path, out: Path, there: tuple[int, int] | None) -> None:
-    """Give what is written its name, unless the name has come to mean another folder."""
-    now = _identity(out)
-    if now is not None and (now != there or marks.foreign(out)):
-        raise _Taken
-    try:
-        if now is None:
-            aside.rename(out)
-        else:
-            _exchange(aside, out)
-    except OSError as error:
-        if error.errno in TAKEN:
-            raise _Taken from None
-        raise
+def is_as_listed(path: Path, entry: object) -> bool:
+    """Whether a path is a regular file, no link, with the content that its entry in a list has."""
+    return path.is_file() and not path.is_symlink() and digest(path) == entry
 
 
-def _exchange(aside: Path, out: Path) -> None:
-    """Replace a folder; it is put back if that fails."""
-    shutil.copymode(out, aside)
-    kept = Path(tempfile.mkdtemp(prefix=f"{out.name[:LONGEST]}.replaced-", dir=out.parent))
-    kept /= out.name
-    try:
-        out.rename(kept)
-        aside.rename(out)
-    except BaseException:
-        if kept.exists() and not os.path.lexists(out):
-            kept.rename(out)
-        with contextlib.suppress(OSError):
-            kept.parent.rmdir()
-        raise
-    _remove(kept.parent, ())
+def within(path: str | Path, folder: Path) -> bool:
+    """Whether something that exists is a folder or lies below it, whatever either is called."""
+    real = Path(os.path.realpath(path))
+    both = real.exists() and folder.exists()
+    return both and any(p.samefile(folder) for p in (real, *real.parents))
 
 
-def _name_file(aside: Path, out: Path, overwrite: bool) -> None:
-    """Give a file its name, over another only if that may be overwritten."""
-    if overwrite:
-        with contextlib.suppress(OSError):
-            shutil.copymode(out, aside)
-        os.replace(aside, out)
+class _TakenError(ValueError):
+    """The target was written by another program meanwhile; the result is kept beside it."""
+
+
+def _refuse_folder(out: Path, overwrite: bool, inputs: Iterable[str | Path]) -> None:
+    """Refuse a target that exists, unless it may be replaced and holds nothing of the user's."""
+    if not os.path.lexists(out):
         return
+    if not overwrite:
+        raise ValueError(f"{out} exists and is kept; pass --overwrite or another --out")
+    if not out.is_dir():
+        raise ValueError(f"{out} is a file; choose a folder with --out")
+    for used in (Path.cwd(), *(path for path in inputs if path)):
+        if within(used, out):
+            raise ValueError(f"{out} holds {used}, which is in use; choose another --out")
+    if any(out.iterdir()) and listed_files(out) is None:
+        raise ValueError(
+            f"{out} was not written by skinwave (it has no {record.FILE} that lists its files); "
+            "remove it yourself or choose another --out"
+        )
+    if (path := foreign_file(out)) is not None:
+        raise ValueError(
+            f"{out} holds {path.relative_to(out)}, which was added or changed since skinwave "
+            "wrote it; move that elsewhere or choose another --out"
+        )
+
+
+def _put_in_place(aside: Path, out: Path, overwrite: bool) -> None:
+    """Give a folder its name; what had the name is removed, if it is still wholly ours."""
+    old = beside(out, "replaced")
     try:
-        os.link(aside, out)  # which fails if there is one; a rename does not everywhere
-    except FileExistsError:
-        raise _Taken from None
-    except (OSError, AttributeError):  # a disk without links
-        if os.path.lexists(out):
-            raise _Taken from None
+        _refuse_folder(out, overwrite, ())
+        if out.exists():
+            out.rename(old)
         aside.rename(out)
-    else:
-        aside.unlink()
-
-
-def _remove(aside: Path | None, above: Iterable[Path]) -> None:
-    """A folder, and those above it that are empty then; no signal stops it halfway."""
-    try:
-        if aside:
-            shutil.rmtree(aside, ignore_errors=True)
-    except BaseException:  # SIGTERM is a SystemExit
-        if aside:
-            shutil.rmtree(aside, ignore_errors=True)
-        raise
-    finally:
-        with contextlib.suppress(OSError):
-            for folder in above:
-                folder.rmdir()
+    except (OSError, ValueError) as error:
+        if old.exists() and not os.path.lexists(out):
+            old.rename(out)
+        raise _TakenError(
+            f"{out} cannot be replaced ({error}); this result is {aside}, rename it as you like"
+        ) from None
+    shutil.rmtree(old, ignore_errors=True)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from meshes import reading
-from simple_model import Response, published
+from simple_model import Response
 from simple_model.choices import choose
 from simple_model.quantities import DISPLACEMENT, QUANTITIES
 from skinwave.bodies.sizes import check_mesh, default_size
@@ -150,7 +150,7 @@ def make(
     runs, misfit = [], np.nan
     for view, run in answers(scene, shown, plans, progress, h=h, solver=solver, frames=frames):
         also = None if view is None else partial(keep_view, view)
-        write_run(folder / run.column, run, by="plan", h=h, also=also)
+        write_run(folder / run.column, run, also=also)
         runs.append(run)
         if run.scene == scene and view and view.moved:
             misfit = _misfit(run, view.moved)
@@ -300,12 +300,12 @@ def open_album(folder: Path) -> Album:
         If there is no result in it.
     """
     scenes = (path.parent for path in folder.rglob("scene.toml"))
-    found = [path for path in map(record.responses, scenes) if path]
+    found = [scene / record.RESPONSES for scene in scenes if (scene / record.RESPONSES).is_file()]
     runs = [_run(path) for path in sorted(found, key=_order)]
     if not runs:
-        missing = f"{folder} holds no {record.RESPONSES[0]}"
+        missing = f"{folder} holds no {record.RESPONSES}"
         raise ValueError(f"{missing}; give a scene file or a result folder")
-    views = [_view(path) for path in sorted(folder.glob("*/view.npz"), key=_order)]
+    views = [load(path) for path in sorted(folder.glob("*/view.npz"), key=_order)]
     own, scenes_of = folder / "scene.toml", {run.column: run.scene for run in runs}
     kept = {path.parent.name: path for path in sorted(folder.glob("*/map.npz"), key=_order)}
     plain = {name for name in scenes_of if scenes_of[name].reading.is_plain}
@@ -327,21 +327,6 @@ def _order(path: Path) -> tuple[str, int, str]:
     return str(path.parent.parent), place, column
 
 
-def _view(path: Path) -> View:
-    view = load(path)
-    return replace(view, model=_kernel_of(path, view.scene, view.model))
-
-
-def _kernel_of(path: Path, scene: Scene, model: str) -> str:
-    """The model by which a file was written: the folder `none` of releases up to 0.2 holds the
-    point kernel under the published load, by the name that now says the scene's own.
-    """
-    old = path.parent.name == "none" and model == SAME_LOAD.name
-    if old and scene.pressure == published(scene.pressure):
-        return PUBLISHED.name
-    return model
-
-
 def _run(path: Path) -> Run:
     scene = read(path.parent / "scene.toml")
     arrays = reading.arrays(path)
@@ -351,10 +336,9 @@ def _run(path: Path) -> Run:
         if any(array.dtype.kind not in "fiu" for array in arrays.values()):
             raise ValueError("it has arrays of other things than numbers")
         name = next(n for n in arrays if n not in ("t", "probes", *QUANTITIES))
-        model = _kernel_of(path, scene, name)
         response = Response(
-            model=model, times=arrays["t"], probes=arrays["probes"], values=arrays[name],
-            quantity=named(model).quantity or scene.quantity,
+            model=name, times=arrays["t"], probes=arrays["probes"], values=arrays[name],
+            quantity=named(name).quantity or scene.quantity,
             effort=effort_of(effort, "effort.json"),
             expected_error=np.nan if expected is None else fitting(expected, float, "the error"),
         )  # fmt: skip

@@ -14,7 +14,7 @@ from simple_model.response import SETTLE
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.planning.budget import ErrorBudget, error_budget
 from skinwave.planning.simulate import compute
-from skinwave.results.marks import digest
+from skinwave.results.outputs import digest
 from skinwave.results.propagation import Propagation, propagation, share_outside
 from skinwave.results.run import Run
 from skinwave.results.surface import SurfaceMap, body_map, grid, has_wavenumber_integral, kernel_map

@@ -36,7 +36,7 @@ from skinwave.studies.changes import Drawn, Maps, first_of, quick_maps, shown, s
 from skinwave.studies.study_page import StudyOutcome
 from skinwave.system import document
 from skinwave.system.effort import Progress, one_thread, peak_memory
-from skinwave.system.processes import helper
+from skinwave.system.processes import pool
 
 # Of the models that plans choose, those that leave out more come first.
 COMPLETE = (
@@ -92,7 +92,7 @@ def run_study(
     SolveOptions(solver=solver, h=h)  # which refuses what is out of range
     models = _models(scenes, FEM.name if h and model == "auto" else model, h)
     started = time.perf_counter()
-    with helper() as aside, one_thread():
+    with pool(1) as aside, one_thread():
         how = _How(models=models, h=h, solver=solver)
         bodies = _begun_bodies(scenes, aside, progress, how)
         begun = _begun_responses(scenes, aside, how)

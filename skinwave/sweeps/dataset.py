@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import IO, Any
 
 from meshes import reading
-from skinwave.results import marks, record
-from skinwave.results.outputs import output_file, unwritable
+from skinwave.results import outputs, record
+from skinwave.results.outputs import output_file
 from skinwave.system.plain_text import csv_table
 
 LOCK = ".lock"  # among the rows, of the sweep that writes them
@@ -42,12 +42,9 @@ def open_folder(out: Path, command: Mapping[str, Any] | None = None) -> Path:
     """
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         _refuse_foreign(out)
-    try:
-        (out / ROWS).mkdir(parents=True, exist_ok=True)
-        if not _is_recorded(out):
-            record.write(out, command or UNKNOWN)
-    except OSError as error:
-        raise unwritable(out, error, "choose another --out") from None
+    (out / ROWS).mkdir(parents=True, exist_ok=True)
+    if not _is_recorded(out):
+        record.write(out, command or UNKNOWN)
     return out
 
 
@@ -68,8 +65,6 @@ def locked(out: Path) -> Iterator[None]:
         raise ValueError(
             f"another sweep writes into {out}; wait for its end, or choose another --out"
         ) from None
-    except OSError as error:
-        raise unwritable(out, error, "choose another --out") from None
     try:
         yield
     finally:
@@ -126,7 +121,7 @@ def _is_recorded(out: Path) -> bool:
 
 def _visible(folder: Path) -> set[str]:
     """Names in a folder, but for what systems and killed processes leave."""
-    hidden = marks.OF_SYSTEM
+    hidden = outputs.OF_SYSTEM
     return {p.name for p in folder.iterdir() if p.name[0] != "." and p.name not in hidden}
 
 
@@ -237,8 +232,8 @@ def refuse_changed(out: Path, name: str) -> None:
     links = [p for p in (out / record.FILE, path.parent, path) if p != out and p.is_symlink()]
     if links:
         raise ValueError(f"{links[0]} is a link, which is not written through; remove it")
-    known = marks.listed(out) or {}
-    if os.path.lexists(path) and not marks.is_as_listed(path, known.get(name)):
+    known = outputs.listed_files(out) or {}
+    if os.path.lexists(path) and not outputs.is_as_listed(path, known.get(name)):
         raise ValueError(
             f"{path} was added or changed since skinwave wrote it and is kept; move it elsewhere"
         )
@@ -246,10 +241,8 @@ def refuse_changed(out: Path, name: str) -> None:
 
 def enter(out: Path, name: str) -> None:
     """List a file, as it is now, in the record of a sweep's folder."""
-    if not os.path.lexists(out / record.FILE):  # releases up to 0.2 wrote none
-        record.write(out, UNKNOWN)
-    listed = (marks.listed(out) or {}) | {name: marks.digest(out / name)}
-    kept = record.read(out) | {marks.FILES: listed}
+    listed = (outputs.listed_files(out) or {}) | {name: outputs.digest(out / name)}
+    kept = record.read(out) | {outputs.FILES: listed}
     with output_file(out / record.FILE, overwrite=True) as file:
         file.write(json.dumps(kept, indent=1).encode())
 

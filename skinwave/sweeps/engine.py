@@ -13,7 +13,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from skinwave.system.effort import usable_cores
-from skinwave.system.processes import as_worker, guarded, pool
+from skinwave.system.processes import pool
 
 LOCAL = ("processes", "threads")
 ATTEMPTS = 4  # to finish what was lost with a killed worker
@@ -116,10 +116,9 @@ def _run_here(
 
     own = scheduler == "processes"
     get: Callable[..., Any] = multiprocessing.get if own else threaded.get
-    called = partial(guarded, work) if own else work
-    graph = {k: (partial(called, item),) for k, item in items.items()}
+    graph = {k: (partial(work, item),) for k, item in items.items()}
     threads = max(1, usable_cores() // count)  # of linear algebra in each process
-    several = pool(count, partial(as_worker, threads)) if own else _threads(count)
+    several = pool(count, threads) if own else _threads(count)
     with several as executor, Callback(posttask=finished):
         get(graph, list(graph), pool=executor, num_workers=count, chunksize=1)
 

@@ -19,7 +19,7 @@ from skinwave.sweeps.sampling import one_at_a_time, samples
 from skinwave.sweeps.shared_body import has, shared_body
 from skinwave.sweeps.solutions import Method, Solution, has_exact_map, map_axes, solve
 from skinwave.system.effort import Progress, one_thread, silent
-from skinwave.system.processes import as_worker, pool
+from skinwave.system.processes import pool
 
 PERCENTILES = (5, 25, 50, 75, 95)
 WEAKEST, MOST = 1e-2, 24  # of the strongest line of the load, and lines, that are looked at
@@ -163,7 +163,7 @@ def ensemble(
         with one_thread():
             found = [_reported(work(b), k, len(batches), report) for k, b in enumerate(batches)]
     else:
-        with pool(workers, as_worker) as processes:
+        with pool(workers) as processes:
             futures = [processes.submit(work, batch) for batch in batches]
             found = [
                 _reported(future.result(), k, len(batches), report)

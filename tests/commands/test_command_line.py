@@ -15,7 +15,7 @@ from corpus import GOOD, SMALL
 
 from skinwave.commands.cli import main, parser
 from skinwave.commands.common import progress_of
-from skinwave.system.steps import follower
+from skinwave.system.progress_bar import follower
 
 CLAMPED = SMALL.replace("[body]", '[body]\nthickness_mm = 8\nsides = "clamped"')
 

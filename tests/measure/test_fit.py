@@ -486,6 +486,3 @@ def test_the_command_writes_a_scene_and_a_page(scene, lines, tmp_path, capsys):
     assert "Take care: the data do not resolve gain" in page
     names = {"estimates.csv", "fit.json", "fit.npz", "fitted.png", "residuals.png", "record.json"}
     assert names <= {path.name for path in (tmp_path / "out").iterdir()}
-    assert cli.main(["rerun", str(tmp_path / "out"), "--quiet"]) == 0
-    again = tmp_path / "out-rerun/estimates.csv"
-    assert again.read_text() == (tmp_path / "out/estimates.csv").read_text()

@@ -151,53 +151,6 @@ def result(tmp_path, monkeypatch):
     return tmp_path / "result"
 
 
-def test_a_record_sets_nothing_but_threads(result, capsys, monkeypatch):
-    """The environment of a process is more than these: libraries that it loads, for one."""
-
-    def never(*asked, **named):
-        raise AssertionError
-
-    record = json.loads((result / "record.json").read_text())
-    record["threads"] = record["threads"] | {"LD_PRELOAD": "/tmp/x.so"}
-    (result / "record.json").write_text(json.dumps(record))
-    monkeypatch.setattr("subprocess.run", never)
-    assert main(["rerun", "result", "--out", "again"]) == 2
-    assert "LD_PRELOAD" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("name", "options"),
-    [
-        ("web", {}), ("convert", {}), ("run", {"command": "x"}), ("run", {"h": "x"}),
-        ("run", {"tolerance": "x"}), ("run", {"unknown": 1}), ("run", {"model": {}}),
-        ("run", {"scheduler": "tcp://127.0.0.1:1"}), ("run", {"scheduler": 7}),
-        ("run", {"schedule": "tcp://127.0.0.1:1"}), ("run", {"model": "--help"}),
-        ("run", {"help": True}), ("run", {"out": "x"}), ("run", {"h": True}),
-    ],
-)  # fmt: skip
-def test_a_record_repeats_commands_that_wrote_results(result, capsys, name, options):
-    record = json.loads((result / "record.json").read_text())
-    record["command"]["name"] = name
-    record["command"]["options"] |= options
-    (result / "record.json").write_text(json.dumps(record))
-    assert main(["rerun", "result", "--out", "again", "--quiet"]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
-    assert not Path("again").exists()
-
-
-@pytest.mark.parametrize(
-    "options",
-    [{"format": ["pgf"]}, {"format": True}, {"beside": 5}, {"style": 5}, {"h": "x"}, {"--": 1}],
-)
-def test_a_record_of_a_report_has_choices_that_the_command_has(result, capsys, options):
-    record = json.loads((result / "record.json").read_text())
-    record["command"] |= {"name": "report", "options": {"source": "scene.toml"} | options}
-    (result / "record.json").write_text(json.dumps(record))
-    assert main(["rerun", "result", "--out", "again", "--quiet"]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
-    assert not Path("again").exists()
-
-
 @pytest.mark.slow
 def test_names_in_a_result_are_no_paths(result, tmp_path):
     """A report writes tables by the names of its scenes."""

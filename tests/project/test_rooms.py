@@ -104,9 +104,7 @@ def test_processes_are_started_where_it_is_told():
     starts = r"subprocess\.(run|Popen|check_)|create_subprocess|get_context|os\.(fork|exec|sys)"
     places = (path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
     found = {str(path.relative_to(ROOT)) for path in places if re.search(starts, path.read_text())}
-    assert found == {
-        "meshes/subprocess_call.py", "skinwave/system/processes.py", "skinwave/commands/rerun.py",
-    }  # fmt: skip
+    assert found == {"meshes/subprocess_call.py", "skinwave/system/processes.py"}
 
 
 @pytest.mark.parametrize("package", ["fem", "simple_model", "meshes"])

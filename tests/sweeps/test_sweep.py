@@ -112,14 +112,6 @@ def test_the_spreads_of_presets_can_be_varied(scene):
         cases(scene, combinations(varied("body.material.loss_scale=0,-1")))
 
 
-def test_a_sweep_is_not_had_again_but_by_its_command(scene, capsys):
-    swept("--vary", "tacton.duration_s=0.01", *(f"--vary={each}" for each in SMALL),
-          "--model", "flat-body-harmonic")  # fmt: skip
-    said = refused(capsys, "rerun", "short-sweep")
-    assert "'sweep' is none of run" in said
-    assert "type it again, with another --out: skinwave sweep short.toml" in said
-
-
 def test_rows_say_what_was_commanded_and_what_came_out(scene):
     asked = ("tacton.speed_m_per_s=4,6", "body=skin-slab,none", "tacton.duration_s=0.3")
     rows = swept("--vary", *asked, "--csv")
