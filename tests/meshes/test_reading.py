@@ -1,11 +1,9 @@
 """Files of users come through one door: regular, of limited size, whatever they claim."""
 
-import json
 import os
 import re
 import shutil
 import sys
-from pathlib import Path
 
 import hostile
 import numpy as np
