@@ -24,7 +24,8 @@ def test_control_characters_are_escapes():
     assert printable(HOSTILE) == shown
     assert printable("µm, 掌, é\n") == "µm, 掌, é\n"
     raw = io.BytesIO()
-    say("掌 5 µm", io.TextIOWrapper(raw, encoding="ascii", newline="\n"))
+    file = io.TextIOWrapper(raw, encoding="ascii", newline="\n")
+    say("掌 5 µm", file)
     assert raw.getvalue() == b"\\u638c 5 \\xb5m\n"
 
 
