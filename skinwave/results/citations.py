@@ -6,7 +6,7 @@ from simple_model import Response
 from skinwave.models import named
 from skinwave.system.effort import versions
 
-VERSION, RELEASED = "0.4.0", 2026  # as CITATION.cff has them
+VERSION, RELEASED = "1.0.0", 2026  # as CITATION.cff has them
 TACTONS = (
     "C. Lim, H. Seifi, G. Park: An Interactive Tool for Simulating Mid-Air Ultrasound Tactons on "
     "the Skin. Extended Abstracts of the CHI Conference on Human Factors in Computing Systems "
