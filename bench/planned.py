@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from fem import Material
-from fem.materials import from_young
 from simple_model import MovingPressure, Response, Tacton, Trajectory
+from simple_model.layers.material import from_young
 from skinwave.bodies.sizes import default_size
 from skinwave.models.options import SolveOptions
 from skinwave.models.prepared import answer

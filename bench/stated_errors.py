@@ -12,8 +12,8 @@ from itertools import count
 import numpy as np
 
 import skinwave
-from fem.materials import Material
 from simple_model import MovingPressure, Tacton, Trajectory
+from simple_model.layers.material import Material
 from skinwave.bodies.parts import Layer, Relief
 from skinwave.models.prepared import answer, prepare
 from skinwave.planning.refinement import about_its_rest, relative_change

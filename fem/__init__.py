@@ -24,11 +24,8 @@ einsum in this package:
     g    geometry
 """
 
-import warnings
-from typing import Any
-
 from fem import nonlinear
-from fem.added_mass import AddedMass, added_mass
+from fem.added_mass import added_mass
 from fem.assembly import Operators, assemble
 from fem.boundary import Support
 from fem.coat import Coat
@@ -36,6 +33,7 @@ from fem.energy import EnergyBalance, imbalance, mean_power, stored, with_energy
 from fem.finite_strain import Elastic, Membrane, finite_strain
 from fem.harmonic import LineSolver, harmonic
 from fem.interior import displacement_operator, is_inside, locate
+from fem.krylov import NotReduced, load_subspace, reduce
 from fem.linear_solver import Factor, available, factorise
 from fem.load_and_probe import (
     facet_normals,
@@ -48,17 +46,17 @@ from fem.load_and_probe import (
     surface_frame,
 )
 from fem.maxwell import DispersiveBranch, MaxwellBranch
-from fem.modal import (
-    Complex,
+from fem.nodal_strain import SolidPart, nodal_strain, solid_parts
+from fem.plane_stiffness import Tension
+from fem.reduced import (
     Poles,
+    ReducedModel,
     exponential_sum,
     impulse_response,
     line_response,
     poles,
+    transfer,
 )
-from fem.nodal_strain import SolidPart, nodal_strain, solid_parts
-from fem.plane_stiffness import Tension
-from fem.reduced import NotReduced, ReducedModel, load_subspace, reduce, transfer
 from fem.reduced_nonlinear import StretchingModes, stretching_modes
 from fem.shallow_shell import shell_stiffness
 from fem.static import modes, static
@@ -70,92 +68,20 @@ from fem.stress import (
     stress_operator,
 )
 from fem.transient import Diverged, State, at_rest, transient
+from fem.typing import Complex
 from simple_model import Material, PronyTerm, from_young, of_law, tabulated
 from simple_model.layers.material import PRESETS
 
 __all__ = [
-    "PRESETS",
-    "AddedMass",
-    "Coat",
-    "Complex",
-    "DispersiveBranch",
-    "Diverged",
-    "Elastic",
-    "EnergyBalance",
-    "Factor",
-    "LineSolver",
-    "Material",
-    "MaxwellBranch",
-    "Membrane",
-    "NotReduced",
-    "Operators",
-    "Poles",
-    "PronyTerm",
-    "ReducedModel",
-    "SolidPart",
-    "State",
-    "StretchingModes",
-    "Support",
-    "Tension",
-    "added_mass",
-    "assemble",
-    "at_rest",
-    "available",
-    "displacement_operator",
-    "exponential_sum",
-    "facet_normals",
-    "facet_points",
-    "factorise",
-    "finite_strain",
-    "from_young",
-    "harmonic",
-    "imbalance",
-    "impulse_response",
-    "is_inside",
-    "line_response",
-    "load_operator",
-    "load_subspace",
-    "locate",
-    "materials_at",
-    "mean_power",
-    "modes",
-    "nodal_strain",
-    "node_operator",
-    "nonlinear",
-    "of_law",
-    "on_surface",
-    "poles",
-    "pressure_force",
-    "probe_operator",
-    "reduce",
-    "relaxation",
-    "relaxed",
-    "shell_stiffness",
-    "solid_parts",
-    "static",
-    "stored",
-    "strain_operator",
-    "stress_operator",
-    "stretching_modes",
-    "surface_frame",
-    "tabulated",
-    "transfer",
-    "transient",
-    "with_energy_balance",
-]
-
-# Names of version 0.2, which load for one release.
-_RENAMED = {
-    "Added": "AddedMass",
-    "Branch": "MaxwellBranch",
-    "Spent": "EnergyBalance",
-    "audited": "with_energy_balance",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _RENAMED:
-        raise AttributeError(f"module 'fem' has no attribute '{name}'")
-    new = _RENAMED[name]
-    warnings.warn(f"fem.{name} is now fem.{new}", DeprecationWarning, stacklevel=2)
-    return globals()[new]
+    "PRESETS", "Coat", "Complex", "DispersiveBranch", "Diverged", "Elastic", "EnergyBalance",
+    "Factor", "LineSolver", "Material", "MaxwellBranch", "Membrane", "NotReduced", "Operators",
+    "Poles", "PronyTerm", "ReducedModel", "SolidPart", "State", "StretchingModes", "Support",
+    "Tension", "added_mass", "assemble", "at_rest", "available", "displacement_operator",
+    "exponential_sum", "facet_normals", "facet_points", "factorise", "finite_strain", "from_young",
+    "harmonic", "imbalance", "impulse_response", "is_inside", "line_response", "load_operator",
+    "load_subspace", "locate", "materials_at", "mean_power", "modes", "nodal_strain",
+    "node_operator", "nonlinear", "of_law", "on_surface", "poles", "pressure_force",
+    "probe_operator", "reduce", "relaxation", "relaxed", "shell_stiffness", "solid_parts", "static",
+    "stored", "strain_operator", "stress_operator", "stretching_modes", "surface_frame",
+    "tabulated", "transfer", "transient", "with_energy_balance",
+]  # fmt: skip

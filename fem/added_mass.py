@@ -21,49 +21,34 @@ of a mode u with a net volume displacement: 0.006 to 0.007 for such
 modes of a clamped sheet of office paper, 100 mm wide, below 300 Hz, where paper's own is 0.03.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import fft, sparse
 from scipy.sparse.linalg import LinearOperator
 
-from fem.assembly import Operators
+from fem.typing import Floats, Ints
 from meshes import MeshError, TetMesh, facet_set
-from meshes.tetmesh import Floats, Ints
-
-if TYPE_CHECKING:
-    from fem.affine import AffineOperators
 
 FLAT = np.eye(3)[:2]
 UNEVEN = 1e-6  # of a spacing: how far a node may be from its place on the grid
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class AddedMass:
-    """Added mass `M` (n_free, n_free) of a fluid in kg."""
-
-    M: LinearOperator
-
-
 def added_mass(
     mesh: TetMesh,
-    operators: Operators | AffineOperators,
+    free: Ints,
     density: float,
     *,
     axes: Floats = FLAT,
     mirrored: str = "",
     facets: str | Ints = "top",
-) -> AddedMass:
+) -> LinearOperator:
     """Added mass of the fluid on both sides of a sheet in a baffle, without loss of its own.
 
     Parameters
     ----------
     mesh : TetMesh, of a rectangle in equal cells
-    operators : of the same mesh
+    free : (n_free,) int, free degrees of freedom
     density : float, kg/m3, of the fluid
     axes : (2, 3) unit vectors along the sides of the rectangle
     mirrored : those of "xy" in whose positive half the mesh lies, the motion being the same in the
@@ -72,8 +57,8 @@ def added_mass(
 
     Returns
     -------
-    AddedMass
-        Of the free degrees of freedom, kg.
+    LinearOperator
+        (n_free, n_free) of the free degrees of freedom, kg.
 
     Raises
     ------
@@ -93,18 +78,17 @@ def added_mass(
     places = np.broadcast_to((rows * shape[1] + columns)[:, None], dofs.shape)
     read = sparse.csr_array(
         (normal.ravel(), (places.ravel(), dofs.ravel())), shape=(len(nodes), mesh.n_dofs)
-    )[:, operators.free]
+    )[:, free]
     field = near_field(shape, (dy, dx), [axis in mirrored for axis in "yx"])
 
     def apply(u: Floats) -> Floats:
         w = (read @ u).T.reshape(u.shape[1], *shape)
         return density / np.pi * dy * dx * (read.T @ field(w).reshape(u.shape[1], len(nodes)).T)
 
-    n = len(operators.free)
-    M = LinearOperator(
+    n = len(free)
+    return LinearOperator(
         (n, n), dtype=np.float64, matmat=apply, matvec=lambda u: apply(u.reshape(n, 1))
     )
-    return AddedMass(M=M)
 
 
 def near_field(

@@ -1,40 +1,48 @@
-"""Operators of a body as sums over its materials, of matrices that no modulus or density changes.
-
-    K = sum_r mu_r K_r + held S,   M = sum_r rho_r M_r
-    C = sum_r viscosity_r K_r + sqrt(mu_r rho_r) R_r + drag rho_r D_r
-
-with springs S and dashpots R at surfaces, and the absorbing layer D. The added mass F of a fluid,
-which can only be applied, joins M (`added_mass`). Poisson's ratios are fixed, so that the dynamic
-stiffness
+"""Operators of a body as affine sums, of matrices that no modulus or density changes.
 
     A(s) = sum_q w_q(s) A_q
 
-is an affine sum with scalar weights, and its projection onto one basis serves every material
-(Prud'homme et al., J Fluids Eng 124:70 (2002)). In the steady state mu_r(s) may be the complex
-modulus of any law. On a mesh whose nodes move smoothly with a thickness the projected matrices A_q
-are smooth in it, and interpolated between those of a few geometries (`interpolated`).
+Each term q is of a kind, and of one of the body's materials r:
+
+    stiffness  mu_r(s) K_r, of the complex modulus of any law
+    mass       rho_r s^2 M_r
+    dashpots   sqrt(mu_r rho_r) s R_r
+    layer      drag rho_r s D_r, of an absorbing layer
+    springs    held S, of a support
+    fluid      s^2 F, an added mass, which can only be applied (`added_mass`)
+
+Poisson's ratios are fixed, so that the projections of the A_q onto one basis serve every material
+(Prud'homme et al., J Fluids Eng 124:70 (2002)). Operators of given materials are the same sum with
+constant weights (`operators_of`).
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, gmres
 
-from fem.added_mass import AddedMass
 from fem.assembly import Operators, assemble
 from fem.boundary import Support, springs
 from fem.coat import Coat
-from fem.materials import Material
+from fem.linear_solver import factoriser
 from fem.maxwell import MaxwellBranch
-from fem.products import product
+from fem.pardiso import product
+from fem.sparsity import on_one_pattern
+from fem.transient import Diverged
+from fem.typing import Complex, Floats, Ints
 from meshes import TetMesh
-from meshes.tetmesh import Floats, Ints
+from simple_model.layers.material import Material
 
+KINDS = ("stiffness", "mass", "dashpots", "layer", "springs", "fluid")  # of terms
 ABSENT = 1e-30  # of a modulus and a density beside 1: below all round-off
-KINDS = ("stiffness", "mass", "dashpots", "layer", "springs", "fluid")  # of matrices
+RESIDUAL = 1e-8  # relative, of GMRES: a resonance makes some hundred times as much of it
+RESTART, CYCLES = 60, 5  # of GMRES
+
+Terms = tuple[tuple[str, int], ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,27 +58,34 @@ class Solids:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AffineOperators:
-    """Matrices (n, n), sparse or projected, of each material (r,) or none of a kind that is not
-    there: `stiffness` per shear modulus, `mass` per density, `dashpots` per impedance
-    sqrt(mu rho), absorbing `layer` per density; and one matrix or none of `springs`, and of the
-    added mass of a `fluid` in kg, a LinearOperator until it is projected.
-
-    `free` (n_free,) and `n_dofs` as of `Operators`.
+    """Matrices `parts` (q,), sparse or dense (n, n), each of a term: its kind, and the index of its
+    material. `free` (n,) and `n_dofs` as of `Operators`.
     """
 
-    stiffness: tuple[Any, ...]
-    mass: tuple[Any, ...]
-    dashpots: tuple[Any, ...]
-    layer: tuple[Any, ...]
-    springs: tuple[Any, ...]
+    terms: Terms
+    parts: Any
     free: Ints
     n_dofs: int
-    fluid: tuple[Any, ...] = ()
+
+    def of(self, *kinds: str) -> list[Any]:
+        """Matrices of some kinds."""
+        each = zip(self.terms, self.parts, strict=True)
+        return [part for (kind, _), part in each if kind in kinds]
 
     @property
-    def parts(self) -> tuple[Any, ...]:
-        """All matrices A_q, in the order of `weights`."""
-        return tuple(part for kind in KINDS for part in getattr(self, kind))
+    def fluid(self) -> Any:
+        """Added mass in kg of a fluid; None without one."""
+        return next(iter(self.of("fluid")), None)
+
+    def with_fluid(self, added: LinearOperator) -> "AffineOperators":
+        """The same with the added mass of a fluid."""
+        return replace(self, terms=(*self.terms, ("fluid", 0)), parts=(*self.parts, added))
+
+    def in_vacuum(self) -> "AffineOperators":
+        """The same without a fluid, whose added mass leaves no matrix sparse."""
+        kept = [q for q, (kind, _) in enumerate(self.terms) if kind != "fluid"]
+        terms, parts = (tuple(each[q] for q in kept) for each in (self.terms, self.parts))
+        return replace(self, terms=terms, parts=parts)
 
 
 def assemble_affine(
@@ -107,15 +122,19 @@ def assemble_affine(
         )  # fmt: skip
 
     found = [assembled(each, absorbing=absorbing, support=dashpots_only) for each in alone]
-    layer = [] if drag is None else [assembled(each, drag=drag).R for each in alone]
     free = found[0].free
-    is_sprung = support and support.stiffness.any()
-    held = (springs(mesh, support)[free][:, free],) if support and is_sprung else ()
+    by_kind = {
+        "stiffness": [each.K for each in found],
+        "mass": [each.M for each in found],
+        "dashpots": [each.R for each in found],
+        "layer": [] if drag is None else [assembled(each, drag=drag).R for each in alone],
+        "springs": [springs(mesh, support)[free][:, free]] if support else [],
+    }
+    parts = {(kind, r): A for kind, each in by_kind.items() for r, A in enumerate(each)
+             if abs(A).sum() > 0}  # fmt: skip
     return AffineOperators(
-        stiffness=tuple(o.K for o in found), mass=tuple(o.M for o in found),
-        dashpots=_present([o.R for o in found]), layer=_present(layer), springs=_present(held),
-        free=free, n_dofs=mesh.n_dofs,
-    )  # fmt: skip
+        terms=tuple(parts), parts=tuple(parts.values()), free=free, n_dofs=mesh.n_dofs
+    )
 
 
 def operators_of(affine: AffineOperators, solids: Solids) -> Operators:
@@ -124,61 +143,57 @@ def operators_of(affine: AffineOperators, solids: Solids) -> Operators:
     Impedances of dashpots are those of the moduli that materials are given by.
     """
     materials = [m.without_loss_factor() for m in solids.materials]
-    terms = [[term for term in m.prony if term.modulus] for m in materials]
-    mu, rho, eta = (
-        np.array([getattr(m, name) for m in materials])
-        for name in ("shear_modulus", "density", "viscosity")
+    prony = [[term for term in m.prony if term.modulus] for m in materials]
+    first = affine.parts[0]
+    nothing = sparse.csr_array(first.shape) if sparse.issparse(first) else np.zeros(first.shape)
+
+    def summed(**factors: Sequence[float]) -> Any:
+        """Sum of the terms of some kinds with a factor for each material."""
+        each = zip(affine.terms, affine.parts, strict=True)
+        return sum(
+            (w * A for (kind, r), A in each if kind in factors and (w := factors[kind][r])),
+            start=nothing,
+        )
+
+    rho = [m.density for m in materials]
+    R = summed(
+        dashpots=[m.density * m.shear_speed for m in solids.materials],
+        layer=[solids.drag * x for x in rho],
     )
-    impedance = [m.density * m.shear_speed for m in solids.materials]
-    R = _sum(affine.dashpots, impedance) + _sum(affine.layer, solids.drag * rho)
-    K = _sum(affine.stiffness, mu) + _sum(affine.springs, [solids.springs])
-    M = _sum(affine.mass, rho) + _sum(affine.fluid, [1.0])
-    C = _sum(affine.stiffness, eta) + R
     branches = [
-        MaxwellBranch(K=_sum(affine.stiffness, shares), time=time)
-        for time in sorted({term.time for each in terms for term in each})
-        if any(shares := [sum(t.modulus for t in each if t.time == time) for each in terms])
+        MaxwellBranch(K=summed(stiffness=shares), time=time)
+        for time in sorted({term.time for each in prony for term in each})
+        if any(shares := [sum(t.modulus for t in each if t.time == time) for each in prony])
     ]
-    K, C, M, R = (_like(affine.stiffness[0], part) for part in (K, C, M, R))
     return Operators(
-        K=K, C=C, M=M, R=R, free=affine.free, n_dofs=affine.n_dofs, branches=tuple(branches)
-    )
+        K=summed(stiffness=[m.shear_modulus for m in materials], springs=[solids.springs]),
+        C=summed(stiffness=[m.viscosity for m in materials]) + R,
+        M=summed(mass=rho, fluid=[1.0]),
+        R=R, free=affine.free, n_dofs=affine.n_dofs, branches=tuple(branches),
+    )  # fmt: skip
 
 
-def in_vacuum(affine: AffineOperators) -> AffineOperators:
-    """The same without a fluid, whose added mass leaves no matrix sparse."""
-    return replace(affine, fluid=())
-
-
-def fluid_of(affine: AffineOperators) -> AddedMass | None:
-    """Added mass of a fluid apart from `operators_of` the body in vacuum; None without any."""
-    return next((AddedMass(M=F) for F in affine.fluid), None)
-
-
-def weights(affine: AffineOperators, solids: Solids, frequencies: ArrayLike) -> NDArray[Any]:
-    """Weights (f, q) of the matrices in the dynamic stiffness.
-
-    Parameters
-    ----------
-    affine : AffineOperators, of q matrices
-    solids : of any modulus laws
-    frequencies : (f,) float, Hz
-
-    Returns
-    -------
-    (f, q) complex
+def weights(terms: Terms, solids: Solids, frequencies: ArrayLike) -> Complex:
+    """Weights (f, q) of terms (q,) in the dynamic stiffness of materials of any modulus laws, at
+    frequencies (f,) in Hz.
     """
     s = 2j * np.pi * np.asarray(frequencies, np.float64)
-    each = solids.materials
-    columns = [
-        *(m.complex_modulus(s.imag) for m, _ in zip(each, affine.stiffness, strict=True)),
-        *(m.density * s**2 for m, _ in zip(each, affine.mass, strict=True)),
-        *(s * m.density * m.shear_speed for m, _ in zip(each, affine.dashpots)),  # noqa: B905
-        *(s * solids.drag * m.density for m, _ in zip(each, affine.layer)),  # noqa: B905
-        *(np.full_like(s, solids.springs) for _ in affine.springs),
-        *(s**2 for _ in affine.fluid),
-    ]
-    return np.stack(columns, axis=-1)
+
+    def of_kind(kind: str, m: Material) -> Any:
+        match kind:
+            case "stiffness":
+                return m.complex_modulus(s.imag)
+            case "mass":
+                return m.density * s**2
+            case "dashpots":
+                return s * m.density * m.shear_speed
+            case "layer":
+                return s * solids.drag * m.density
+            case "springs":
+                return np.full_like(s, solids.springs)
+        return s**2
+
+    return np.stack([of_kind(kind, solids.materials[r]) for kind, r in terms], axis=-1)
 
 
 def project(affine: AffineOperators, basis: Floats, before: Floats) -> Floats:
@@ -204,29 +219,68 @@ def project(affine: AffineOperators, basis: Floats, before: Floats) -> Floats:
     return found
 
 
-def with_parts(affine: AffineOperators, parts: Iterable[Any]) -> AffineOperators:
-    """The same with other matrices (q,), in the order of `weights`."""
-    left = iter(parts)
-    found: dict[str, Any] = {
-        kind: tuple(next(left) for _ in getattr(affine, kind)) for kind in KINDS
-    }
-    return replace(affine, **found)
+def line_solution(
+    affine: AffineOperators,
+    weights: Complex,
+    force: Complex,
+    *,
+    solver: str = "auto",
+    fluid_share: float = 0.0,
+) -> Complex:
+    """Steady state of a full body at one line.
 
-
-def interpolated(affine: AffineOperators, parts: Floats, shares: Floats) -> AffineOperators:
-    """Projected operators of a geometry between others.
+    The added mass F of a fluid can only be applied: P = A - w F + E is factorised, with the
+    equivalent added mass E of the line's bending waves as so much more of the body's own mass.
+    Waves of other wavenumbers have another added mass, but do not resonate at the line:
+    P^-1 (P + w F - E) is near the identity, and GMRES takes some iterations with it.
 
     Parameters
     ----------
-    affine : AffineOperators, of any matrices of the same kinds
-    parts : (g, q, m, m) float, matrices of each geometry
-    shares : (g,) float, of each, with sum 1
+    affine : AffineOperators, sparse, of q matrices
+    weights : (q,) complex, of the matrices at the line
+    force : (n_free,) complex, N
+    solver : a backend of `linear_solver`
+    fluid_share : equivalent added mass of the fluid at the line over the body's own mass
 
     Returns
     -------
-    AffineOperators
+    (n_free,) complex, metre
+
+    Raises
+    ------
+    Diverged
+        If the equations with the added mass of a fluid are not solved to a residual of `RESIDUAL`.
     """
-    return with_parts(affine, np.tensordot(shares, parts, 1))
+    dry = affine.in_vacuum()
+    values, *pattern = on_one_pattern([sparse.csr_array(part) for part in dry.parts])
+    is_mass = np.array([kind == "mass" for kind, _ in dry.terms])
+    own = weights[: len(is_mass)]
+    factor = factoriser(*pattern, backend=solver)((own * (1 + fluid_share * is_mass)) @ values)
+    force = force.astype(np.complex128)
+    if affine.fluid is None:
+        return factor.solve(force)
+    E = fluid_share * sum(w * M for w, M in zip(own[is_mass], dry.of("mass"), strict=True))
+    return _with_fluid(factor.solve, weights[-1], affine.fluid, E, force)
+
+
+def _with_fluid(
+    solve: Callable[[Complex], Complex], w: complex, F: LinearOperator, E: Any, force: Complex
+) -> Complex:
+    """Solution of P u + w F u - E u = force, with that of P."""
+
+    def preconditioned(u: Complex) -> Complex:
+        fluid = F @ np.column_stack([u.real, u.imag])  # of real fields
+        return u + solve(w * (fluid @ [1, 1j]) - E @ u)
+
+    n = len(force)
+    system = LinearOperator((n, n), matvec=preconditioned, dtype=np.complex128)
+    u, failed = gmres(system, solve(force), rtol=RESIDUAL, restart=RESTART, maxiter=CYCLES)
+    if failed:
+        raise Diverged(
+            f"a line in air is not solved to a residual of {RESIDUAL:g} by {RESTART * CYCLES} "
+            "iterations; take a smaller sheet or larger elements, or leave air out"
+        )
+    return np.asarray(u, np.complex128)
 
 
 def _alone(materials: Sequence[Material], r: int) -> tuple[Material, ...]:
@@ -236,20 +290,3 @@ def _alone(materials: Sequence[Material], r: int) -> tuple[Material, ...]:
         Material(density=x, shear_modulus=x, poisson=m.poisson)
         for m, x in zip(materials, size, strict=True)
     )
-
-
-def _present(matrices: Sequence[Any]) -> tuple[Any, ...]:
-    """The matrices, or none if all are 0."""
-    return tuple(matrices) if any(abs(A).sum() > 0 for A in matrices) else ()
-
-
-def _sum(matrices: Sequence[Any], factors: Sequence[float] | Floats) -> Any:
-    """Sum of matrices with factors that are not 0; 0 if there is none."""
-    return sum(w * A for A, w in zip(matrices, factors) if w)  # noqa: B905
-
-
-def _like(one: Any, found: Any) -> Any:
-    """A sum of matrices, as sparse or as dense as one of them if it has no terms."""
-    if not isinstance(found, int):
-        return found.tocsr() if sparse.issparse(found) else found
-    return sparse.csr_array(one.shape) if sparse.issparse(one) else np.zeros(one.shape)

@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import sparse
 
 from fem.boundary import Support, dashpots, fixed_dofs, springs
@@ -34,7 +34,6 @@ from fem.coat import Coat, coat_operators
 from fem.combination import Laws, proportional, with_added
 from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradient_integrals, jacobians, shape_nodes
-from fem.materials import Material
 from fem.maxwell import Branch, MaxwellBranch, on_free
 from fem.memory import check_memory
 from fem.plane_stiffness import (
@@ -53,9 +52,10 @@ from fem.sparsity import (
     selected,
     slabs,
 )
+from fem.typing import Bools, Floats, Ints
 from fem.viscoelastic import Matrices, property_of, together, viscoelastic
 from meshes import TetMesh, facet_set
-from meshes.tetmesh import Floats, Ints
+from simple_model.layers.material import Material
 
 LOCKING_FREE = 9.001  # lam / mu just beyond nu = 0.45: 10-node tetrahedra do not lock up to it
 UNPROJECTED = (
@@ -122,7 +122,7 @@ class MovingNodes:
         """A matrix on these nodes on the free degrees of freedom."""
         return restricted(A, self.free)
 
-    def of_elements(self, own: NDArray[np.bool_] | Ints) -> SparsityPattern:
+    def of_elements(self, own: Bools | Ints) -> SparsityPattern:
         """The pattern with the slots of some of the elements."""
         return replace(self.pattern, slot=self.pattern.slot[own])
 
@@ -198,35 +198,19 @@ def assemble(
     if len(materials) == 1 and materials[0].law is None:
         K, M = volume[0](np.ones(1)), volume[1](np.array([materials[0].density]))
         del volume  # whose parts free their memory
-        found = _of_one_material(materials[0], (K, M), (beside, R), free, mesh.n_dofs)
+        K = K + beside if beside.nnz else K
+        C, branches, laws = proportional(materials[0], K, beside, R)
     else:
         K, C, M, branches = viscoelastic(materials, *volume)
         del volume
         K, C = (A + B if B.nnz else A for A, B in ((K, beside), (C, R)))
-        found = Operators(K=K, C=C, M=M, R=R, free=free, n_dofs=mesh.n_dofs, branches=branches)
+        laws = None
+    found = Operators(
+        K=K, C=C, M=M, R=R, free=free, n_dofs=mesh.n_dofs, branches=branches, laws=laws
+    )
     if coat is None:
         return found
     return _coated(found, coat_operators(mesh, coat, materials, region, fixed_dofs(mesh, fixed)))
-
-
-def _of_one_material(
-    m: Material,
-    volume: tuple[sparse.csr_array, sparse.csr_array],
-    surfaces: tuple[sparse.csr_array, sparse.csr_array],
-    free: Ints,
-    n_dofs: int,
-) -> Operators:
-    """Operators of one material, whose C and branches are combinations of K and M: with what K has
-    beside its stiffness, and R, on the free degrees of freedom.
-    """
-    (K, M), (beside, R) = volume, surfaces
-    K = K + beside if beside.nnz else K
-    laws, times = proportional(m, surfaces)
-    each = zip(laws.branches, times, strict=True)
-    return Operators(
-        K=K, C=laws.damping.of(K, M), M=M, R=R, free=free, n_dofs=n_dofs, laws=laws,
-        branches=tuple(MaxwellBranch(K=part.of(K, M), time=time) for part, time in each),
-    )  # fmt: skip
 
 
 def _coated(body: Operators, coat: Matrices) -> Operators:
@@ -240,7 +224,8 @@ def _coated(body: Operators, coat: Matrices) -> Operators:
             branch.time: branch.K for branch in relaxing if isinstance(branch, MaxwellBranch)
         }
         each = [of_time[b.time] if isinstance(b, MaxwellBranch) else b.K for b in whole[3]]
-        laws = with_added(body.laws, (K, C, M), each)
+        matrices = whole[0], whole[1], *(b.K for b in whole[3])
+        laws = with_added(body.laws, (K, C, each), matrices)
     return replace(body, K=whole[0], C=whole[1], M=whole[2], branches=whole[3], laws=laws)
 
 
@@ -284,7 +269,7 @@ def direct_part(lam: Floats, mu: Floats) -> Floats:
     return np.where(lam > LOCKING_FREE * mu, UNPROJECTED * mu, lam)
 
 
-def elements_of(mesh: TetMesh, chosen: NDArray[np.bool_] | Ints) -> TetMesh:
+def elements_of(mesh: TetMesh, chosen: Bools | Ints) -> TetMesh:
     """Some of the elements (m,) of a mesh, among all its nodes."""
     return replace(mesh, tets=mesh.tets[chosen], region=mesh.region[chosen], facets={})
 

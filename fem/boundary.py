@@ -6,13 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import sparse
 
 from fem.load_and_probe import facet_geometry, facet_normals
-from fem.materials import Material
+from fem.typing import Bools, Floats, Ints
 from meshes import MeshError, TetMesh, facet_set
-from meshes.tetmesh import FACES, Floats, Ints, facet_keys
+from meshes.tetmesh import FACES, facet_keys
+from simple_model.layers.material import Material
 
 ABSORBED_RATIO = 11.0  # (c_p / c_s)**2 at nu = 0.45; a stiffer dashpot would pin the normal motion
 
@@ -36,7 +37,7 @@ class Support:
     absorbed: Floats
 
 
-def fixed_dofs(mesh: TetMesh, fixed: str | Mapping[str, str] | ArrayLike) -> NDArray[np.bool_]:
+def fixed_dofs(mesh: TetMesh, fixed: str | Mapping[str, str] | ArrayLike) -> Bools:
     """Mask (3 n,) bool of the fixed degrees of freedom, whose displacement is 0."""
     if isinstance(fixed, str):
         fixed = {fixed: "xyz"}

@@ -36,16 +36,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from fem.boundary import owners
 from fem.elements import TRIANGLE_EDGES, shape_derivatives, shape_functions, triangle_rule
 from fem.load_and_probe import facet_areas
-from fem.materials import Material
+from fem.typing import Bools, Floats, Ints
 from fem.viscoelastic import Matrices, property_of, viscoelastic
 from meshes import TetMesh, facet_set
-from meshes.tetmesh import Floats, Ints
+from simple_model.layers.material import Material
 
 QUADRATIC = 6  # nodes of a facet
 STATIONS, STATION_WEIGHTS = np.polynomial.legendre.leggauss(2)  # through each layer, along edges
@@ -131,7 +130,7 @@ class Edges:
     sides: Ints
 
 
-def surface_of(mesh: TetMesh, coat: Coat, fixed: NDArray[np.bool_]) -> Surface:
+def surface_of(mesh: TetMesh, coat: Coat, fixed: Bools) -> Surface:
     """Surface of a coat, whose normals do not turn at a border that is fixed in the direction
     across it.
 
@@ -179,7 +178,7 @@ def _frames(points: Floats, slopes: Floats) -> tuple[Floats, Floats]:
     return tangents, normals / np.linalg.norm(normals, axis=2, keepdims=True)
 
 
-def _edges(facets: Ints, points: Floats, held: NDArray[np.bool_]) -> Edges:
+def _edges(facets: Ints, points: Floats, held: Bools) -> Edges:
     """Edges of facets (e, a) with nodes at points (e, a, i), of which components (e, a, i) are
     held: all but the free border.
     """
@@ -351,7 +350,7 @@ def coat_operators(
     coat: Coat,
     materials: list[Material],
     region: Ints,
-    fixed: NDArray[np.bool_],
+    fixed: Bools,
 ) -> Matrices:
     """Contribution of a coat to K, C, M and the branches of a body, on all dofs of its mesh.
 

@@ -9,7 +9,8 @@ from itertools import permutations
 
 import numpy as np
 
-from meshes.tetmesh import EDGES, Floats
+from fem.typing import Floats
+from meshes.tetmesh import EDGES
 
 TRIANGLE_EDGES = np.array([[0, 1], [1, 2], [2, 0]])
 

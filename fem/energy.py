@@ -16,12 +16,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem.assembly import Operators
 from fem.maxwell import Branch, with_internal
 from fem.transient import State
-from meshes.tetmesh import Floats, Ints
+from fem.typing import Complex, Floats, Ints
 
 ROUND_OFF = 1e-6  # of the reactive power
 TINY = np.finfo(np.float64).tiny / np.finfo(np.float64).eps  # numbers below it lose digits
@@ -138,8 +137,8 @@ def imbalance(spent: EnergyBalance, stored: float = 0.0) -> float:
 def mean_power(
     C: Floats,
     R: Floats,
-    forces: NDArray[np.complex128],
-    motion: NDArray[np.complex128],
+    forces: Complex,
+    motion: Complex,
     frequencies: Floats,
     branches: Sequence[Branch] = (),
 ) -> EnergyBalance:

@@ -24,12 +24,12 @@ from scipy import sparse
 from fem.assembly import Operators, assemble, by_region
 from fem.elements import shape_derivatives, triangle_rule
 from fem.geometry import gradients, shape_nodes
-from fem.materials import Material
 from fem.maxwell import MaxwellBranch, with_internal
 from fem.plane_stiffness import SIDES, Tension, directional_parts, tension_stiffness
 from fem.sparsity import UPPER, SparsityPattern, restricted, slabs
+from fem.typing import Floats, Ints
 from meshes import MeshError, TetMesh
-from meshes.tetmesh import Floats, Ints
+from simple_model.layers.material import Material
 
 LARGEST_POISSON = 0.45  # beyond it the linear code projects the dilatation, which this one does not
 

@@ -6,8 +6,9 @@ import numpy as np
 
 from fem.elements import shape_derivatives, tetrahedron_rule
 from fem.sparsity import slabs
+from fem.typing import Floats
 from meshes import MeshError, TetMesh
-from meshes.tetmesh import EDGES, Floats
+from meshes.tetmesh import EDGES
 
 
 def is_straight(mesh: TetMesh) -> bool:

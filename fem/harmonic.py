@@ -8,14 +8,14 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fem.assembly import Operators
 from fem.combination import laws_of
 from fem.linear_solver import Factor, factoriser
 from fem.maxwell import Branch, relaxing_stiffness
 from fem.sparsity import on_one_pattern
-from meshes.tetmesh import Floats
+from fem.typing import Complex, Floats
 
 
 def dynamic_stiffness(K: Any, C: Any, M: Any, branches: Sequence[Branch], s: Any) -> Any:
@@ -48,18 +48,18 @@ class LineSolver:
 
     def __init__(self, operators: Operators, solver: str = "auto") -> None:
         """Take `Operators`, and a solver of `linear_solver.factorise`."""
-        K, C, M, branches = operators.K, operators.C, operators.M, operators.branches
-        self._laws = laws_of(K, C, M, branches, operators.laws)
+        K, C, branches = operators.K, operators.C, operators.branches
+        self._laws = laws_of(K, C, branches, operators.laws)
         self._branches, self._operators, self._solver = branches, operators, solver
         rests = [part.rest for part in self._laws.parts if part.rest is not None]
-        self._values, self._indices, self._indptr = on_one_pattern([K, M, *rests])
+        self._values, self._indices, self._indptr = on_one_pattern([K, operators.M, *rests])
         self._factorise: Callable[[Any], Factor] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """State for other processes, without what a solver has analysed."""
         return {**vars(self), "_factorise": None}
 
-    def __call__(self, frequency: float, force: Any) -> NDArray[np.complex128]:
+    def __call__(self, frequency: float, force: Any) -> Complex:
         """Displacement (3 n,) or (3 n, k) complex in metre at a frequency in Hz, under forces of
         the same shape in N.
 
@@ -72,7 +72,7 @@ class LineSolver:
         factors = s, *(branch.share(s) for branch in self._branches)
         parts = zip(factors, self._laws.parts, strict=True)
         rests = [factor for factor, part in parts if part.rest is not None]
-        weights = np.array([*self._laws.multiples(factors), *rests], np.complex128)
+        weights = np.array([self._laws.multiple(factors), s**2, *rests], np.complex128)
         A = np.empty(self._values.shape[1], np.complex128)
         A.real, A.imag = weights.real @ self._values, weights.imag @ self._values
         if self._factorise is None:
@@ -83,7 +83,7 @@ class LineSolver:
 
 def harmonic(
     operators: Operators, force: Floats, frequencies: ArrayLike, *, solver: str = "auto"
-) -> NDArray[np.complex128]:
+) -> Complex:
     """Frequency response by one factorisation per frequency.
 
     Parameters

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import sparse
 
 from fem.elements import shape_functions
 from fem.load_and_probe import on_curved
+from fem.typing import Bools, Floats, Ints
 from meshes import TetMesh
-from meshes.tetmesh import Floats, Ints
 
 OUTSIDE = 1e-6  # barycentric: how far outside all elements a point still counts as in the body
 BOWED = 0.3  # of an element's size: the same where the straight element stands for a curved one
@@ -32,12 +32,12 @@ def locate(mesh: TetMesh, points: ArrayLike) -> tuple[Ints, Floats]:
     return owner, barycentric
 
 
-def is_inside(mesh: TetMesh, points: ArrayLike) -> NDArray[np.bool_]:
+def is_inside(mesh: TetMesh, points: ArrayLike) -> Bools:
     """Mask (p,) of the points (p, 3) in metre that are in the body."""
     return _located(mesh, np.atleast_2d(np.asarray(points, np.float64)))[2]
 
 
-def _located(mesh: TetMesh, points: Floats) -> tuple[Ints, Floats, NDArray[np.bool_]]:
+def _located(mesh: TetMesh, points: Floats) -> tuple[Ints, Floats, Bools]:
     """Element (p,) of each point (p, 3), its coordinates (p, 4), and whether it is inside of it."""
     corners = mesh.points[mesh.tets[:, :4]]
     low, high = corners.min(axis=1), corners.max(axis=1)

@@ -1,7 +1,7 @@
 """Sparse direct solvers behind one interface: `factorise(A).solve(b)`.
 
-All of them factorise symmetric matrices, real or complex. MKL PARDISO and CHOLMOD are used if
-they are installed; SciPy's SuperLU needs nothing.
+Both factorise symmetric matrices, real or complex. MKL PARDISO is used if it is installed; SciPy's
+SuperLU needs nothing.
 """
 
 from __future__ import annotations
@@ -10,19 +10,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from fem.pardiso import Pardiso, PardisoError, mkl
-from fem.sparsity import Index, upper_triangle
+from fem.sparsity import upper_triangle
+from fem.typing import Array, Index, Ints
 
-Array = NDArray[Any]  # float64 or complex128
 REFINED, SLOWEST = 1e-10, 0.2  # residual over the right-hand side, and over that of a step before
-BACKENDS = ("pardiso", "cholmod", "superlu")
+BACKENDS = ("pardiso", "superlu")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -33,23 +31,18 @@ class Factor:
     backend: str
 
 
-def available(*, complex_valued: bool = False) -> tuple[str, ...]:
-    """Installed backends for real or for complex matrices, the fastest first."""
-    # CHOLMOD has no complex symmetric factorisation, only the Hermitian one.
-    cholmod = _cholmod() is not None and not complex_valued
-    found = {"pardiso": mkl() is not None, "cholmod": cholmod, "superlu": True}
-    return tuple(name for name in BACKENDS if found[name])
+def available() -> tuple[str, ...]:
+    """Installed backends, the fastest first."""
+    return BACKENDS if mkl() is not None else BACKENDS[1:]
 
 
-def factorise(A: sparse.csr_array, *, backend: str = "auto", memory: float | None = None) -> Factor:
+def factorise(A: sparse.csr_array, *, backend: str = "auto") -> Factor:
     """Factorise a symmetric matrix A (n, n), positive definite if real.
 
     Parameters
     ----------
     A : sparse (n, n), float or complex
     backend : "auto" for the fastest that is installed, or one of `BACKENDS`
-    memory : bytes that a factor of PARDISO may take, which is kept in files if it takes more; what
-        is free if not given
 
     Returns
     -------
@@ -62,22 +55,16 @@ def factorise(A: sparse.csr_array, *, backend: str = "auto", memory: float | Non
     MemoryError
         If there is no room for the factor, on the disk neither.
     """
-    names = available(complex_valued=np.iscomplexobj(A.data))
+    names = available()
     backend = names[0] if backend == "auto" else backend
     if backend not in names:
-        kind = " for complex matrices" if np.iscomplexobj(A.data) else ""
-        raise ValueError(
-            f"solver '{backend}' is not installed{kind}; choose one of {', '.join(names)}"
-        )
+        raise ValueError(f"solver '{backend}' is not installed; choose one of {', '.join(names)}")
     A = sparse.csr_array(A)
     A.sort_indices()
     _check_finite(A.data)
     complex_valued, only = np.iscomplexobj(A.data), [A]
     del A  # for PARDISO to free the whole of it, of which it needs half
-    solvers: dict[str, Callable[[sparse.csr_array], Callable[[Array], Array]]] = {
-        "pardiso": partial(_pardiso, memory), "cholmod": _cholmod_solve, "superlu": _superlu
-    }  # fmt: skip
-    solve = solvers[backend](only.pop())
+    solve = (_pardiso if backend == "pardiso" else _superlu)(only.pop())
     return Factor(solve=solve if complex_valued else _by_parts(solve), backend=backend)
 
 
@@ -133,13 +120,13 @@ def _singular(detail: object) -> ValueError:
     )
 
 
-def _pardiso(memory: float | None, A: sparse.csr_array) -> Callable[[Array], Array]:
+def _pardiso(A: sparse.csr_array) -> Callable[[Array], Array]:
     values, indices, indptr = upper_triangle(A)
     kind = 6 if np.iscomplexobj(values) else 2
     del A
     indices += 1
     indptr += 1
-    matrix = Pardiso(indices, indptr, kind, memory=memory)
+    matrix = Pardiso(indices, indptr, kind)
     _factorised(matrix, values)
     if kind == 2:
         del values, indices, indptr
@@ -230,7 +217,7 @@ def _superlu(A: sparse.csr_array) -> Callable[[Array], Array]:
     return solve
 
 
-def dissect(A: sparse.csr_array) -> NDArray[np.int64]:
+def dissect(A: sparse.csr_array) -> Ints:
     """Fill-reducing ordering (n,) of a symmetric matrix: METIS's nested dissection of its graph.
 
     Degrees of freedom with the same neighbours, as the components of one node, are ordered as one.
@@ -249,15 +236,3 @@ def dissect(A: sparse.csr_array) -> NDArray[np.int64]:
     rank = np.empty(len(first), np.int64)
     rank[groups] = np.arange(len(first))
     return np.argsort(rank[group], kind="stable")
-
-
-def _cholmod():  # type: ignore[no-untyped-def]
-    try:
-        from sksparse.cholmod import cholesky
-    except ImportError:
-        return None
-    return cholesky
-
-
-def _cholmod_solve(A: sparse.csr_array) -> Callable[[Array], Array]:
-    return _cholmod()(sparse.csc_matrix(A))

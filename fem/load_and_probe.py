@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import sparse
 
 from fem.elements import shape_derivatives, shape_functions, triangle_rule
+from fem.typing import Bools, Floats, Ints
 from meshes import TetMesh, facet_set
-from meshes.tetmesh import Floats, Ints
 
 BESIDE = 1e-6  # barycentric: how far outside a facet a point still counts as on it
 CLOSE = 1e-9  # of a facet's size: Newton's method has found a point
@@ -279,7 +279,7 @@ def on_curved(elements: Floats, barycentric: Floats, points: Floats) -> Floats:
     return barycentric
 
 
-def on_surface(mesh: TetMesh, points: Floats, facets: str | Ints = "top") -> NDArray[np.bool_]:
+def on_surface(mesh: TetMesh, points: Floats, facets: str | Ints = "top") -> Bools:
     """Points at which `probe_operator` can read.
 
     Parameters
@@ -340,7 +340,7 @@ def _near(facets: Floats, points: Floats) -> tuple[Ints, Ints]:
     return np.concatenate(who), np.concatenate(which)
 
 
-def _within(facets: Floats, points: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+def _within(facets: Floats, points: Floats) -> tuple[Floats, Bools]:
     """Barycentric coordinates (m, 3) of points (m, 2) on facets (m, a, 2), and whether each is on
     its facet.
     """

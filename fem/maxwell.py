@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from meshes.tetmesh import Floats
+from fem.typing import Floats
 
 NO_INTERNAL = (
     "a material with a modulus law of its own has no internal variables, which motion from rest "
@@ -90,18 +90,6 @@ def relaxing_stiffness(branches: Sequence[Branch], s: Any) -> Any:
 def branch_force(branches: Sequence[Branch], stretch: Floats) -> Any:
     """Forces (n,) in N of branches at internal variables (j, n) in metre; 0 without branches."""
     return sum(branch.K @ d for branch, d in zip(branches, stretch, strict=True))
-
-
-def factors(branch: MaxwellBranch) -> tuple[Floats, float]:
-    """Low-rank factor L (n, k) of a branch, K = L L^T, as many columns as K has rank; and its time
-    in s.
-
-    With z = L^T (u - d) the branch is z' = (L^T u - z) / tau with the force L (L^T u - z): it has
-    an internal variable only where it has a spring.
-    """
-    squares, vectors = np.linalg.eigh(branch.K)
-    kept = squares > 1e-12 * squares.max()
-    return vectors[:, kept] * np.sqrt(squares[kept]), branch.time
 
 
 def on_free(branches: Sequence[Branch], free: Any) -> tuple[Branch, ...]:

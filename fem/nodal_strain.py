@@ -15,11 +15,12 @@ from scipy import sparse
 from fem.assembly import by_region, direct_part, elements_of
 from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradients, shape_nodes
-from fem.materials import Material
 from fem.pressure_projection import projected_dilatation
 from fem.stress import LOCAL, SYMMETRIC, fitted_polynomial, polynomials
+from fem.typing import Floats, Ints
 from meshes import TetMesh
-from meshes.tetmesh import EDGES, Floats, Ints
+from meshes.tetmesh import EDGES
+from simple_model.layers.material import Material
 
 AT_ONCE = 100  # corner nodes, whose elements are looked at together
 

@@ -23,7 +23,7 @@ from fem.energy import EnergyBalance, with_losses
 from fem.finite_strain import Elastic
 from fem.linear_solver import Factor, factorise
 from fem.transient import Diverged, State, acceleration, at_rest, weights
-from meshes.tetmesh import Floats
+from fem.typing import Floats
 
 MOST_ITERATIONS = 25
 MOST_HALVINGS = 6  # of a load or time step

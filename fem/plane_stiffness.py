@@ -20,10 +20,10 @@ import numpy as np
 from scipy import sparse
 
 from fem.geometry import gradient_integrals
-from fem.materials import Material
 from fem.sparsity import UPPER, SparsityPattern
+from fem.typing import Floats
 from meshes import TetMesh
-from meshes.tetmesh import Floats
+from simple_model.layers.material import Material
 
 SIDES = np.eye(3)[:2]  # unit vectors (2, 3) along the sides x and y of a sheet that lies flat
 

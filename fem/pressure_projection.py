@@ -10,13 +10,13 @@ and K stays positive definite.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradients, jacobians, shape_nodes
+from fem.typing import Bools, Floats, Ints
 from meshes import TetMesh
-from meshes.tetmesh import EDGES, FACES, Floats, Ints, neighbours
+from meshes.tetmesh import EDGES, FACES, neighbours
 
 
 def projected_divergence(mesh: TetMesh) -> sparse.bsr_array:
@@ -69,7 +69,7 @@ def _coefficients(mesh: TetMesh, cluster: Ints, q: Floats) -> sparse.bsr_array:
     return sparse.bsr_array((ones, order, starts)) @ by_element
 
 
-def linear_functions(mesh: TetMesh, cluster: Ints, sloping: NDArray[np.bool_]) -> Floats:
+def linear_functions(mesh: TetMesh, cluster: Ints, sloping: Bools) -> Floats:
     """Orthonormal linear pressure functions over each macroelement.
 
     Parameters
@@ -98,7 +98,7 @@ def linear_functions(mesh: TetMesh, cluster: Ints, sloping: NDArray[np.bool_]) -
     return q @ np.linalg.inv(np.linalg.cholesky(products)).swapaxes(1, 2)[cluster]
 
 
-def macroelements(mesh: TetMesh) -> tuple[Ints, NDArray[np.bool_]]:
+def macroelements(mesh: TetMesh) -> tuple[Ints, Bools]:
     """Macroelements: the one (e,) that each element is in, and whether each (c,) has an inner edge.
 
     A macroelement is all elements around an inner edge, the longest edges first: in a box that is

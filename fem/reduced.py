@@ -1,183 +1,47 @@
-"""Reduced-order model of the probes' response to any surface load, by Krylov moment matching.
+"""Reduced-order model of a body: its transfer function, its poles, and its motion under loads.
 
-With A(s) = K + s C + s^2 M (and s tau_j / (1 + s tau_j) K_j for each generalised Maxwell branch),
-symmetric, the transfer function from a load f to a probe s_p is, by reciprocity,
+    M u'' + C u' + K u = basis^T f,  probes = outputs u
 
-    H(s) = s_p^T A(s)^-1 f = f^T y(s),   A(s) y(s) = s_p
+In modal (pole-residue) form
 
-and Galerkin projection onto a basis V gives H_r(s) = f^T V (V^T A V)^-1 V^T s_p = f^T V c. As the
-residual A (y - V c) is orthogonal to V, the error is, for any coefficients g,
+    z' = pole z + inputs f(t),  probes = 2 Re(outputs z)
 
-    H(s) - H_r(s) = (A(s)^-1 f - V g)^T A(s) (y(s) - V c)
+and, exact in time for a load of lines F exp(i w t), the lines themselves and the free vibration
+that the start leaves:
 
-V holds the first n moments of y, its Taylor coefficients about one real expansion point s_0: then
-those of H and of H_r are the same (Bai and Su, SIAM J Sci Comput 26:1692, 2005), which costs one
-real factorisation. V is built by the two-level orthogonal Arnoldi procedure (TOAR: Lu, Su and Bai,
-SIAM J Matrix Anal Appl 37:195, 2016): with proportional damping the plain recurrence loses all
-accuracy after a few dozen moments. The dashpot stretches of Maxwell branches, y / (1 + s tau_j),
-are further parts of the linearised vectors: their moments lie in the same space, so that the
-moments matched are those of the exact constitutive law.
-The basis is mass-orthonormal: the reduced mass is the identity, and field norms are vector norms.
-Added mass of a fluid is dense and can only be applied: with it the expansion point is 0, where no
-mass is factorised.
-
-The error estimate needs no solution of the full system: it is the difference from the response of
-the model with some more moments, which by Galerkin orthogonality solves the residual equation in
-the larger space. Those further moments are then dropped: the error of the larger model would be
-unknown, because convergence may become steep or stall at any moment.
+    z(t) = inputs F [exp(i w t) - exp(pole t)] / (i w - pole)
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy import sparse
-from scipy.sparse.linalg import aslinearoperator
+from numpy.typing import ArrayLike
+from scipy import linalg
 
-from fem.added_mass import AddedMass
 from fem.assembly import Operators
-from fem.combination import Laws, factors_at, laws_of
 from fem.harmonic import dynamic_stiffness
-from fem.linear_solver import Factor, factorise
-from fem.maxwell import Branch, MaxwellBranch, with_internal
-from fem.products import product
-from meshes.tetmesh import Floats
+from fem.maxwell import with_internal
+from fem.typing import Complex, Floats
 
-Complex = NDArray[np.complex128]
-
-EXPANSION_POINT = 2 * np.pi * 200.0  # rad/s: best at 200 to 400 Hz for a band of 1 to 2 kHz
-# Expansion point over the band with Maxwell branches: waves of high frequency lose little then, and
-# many of them count. Best between 0.8 and 1.6; the one above takes nearly twice as many moments.
-RELAXING_POINT = 1.0
-# Moments between two error estimates: at least so many, which give it to a factor of 4, and this
-# share of all, because estimating the error of a large model costs more than its moments.
-FEWEST_BETWEEN = 3
-SHARE_BETWEEN = 1 / 16
-MOST_MOMENTS = 200
-LOOKED_AT, AT_FIRST = 41, 5  # frequencies that the error is looked at, and every which at first
-SMALLEST = np.finfo(np.float64).tiny
-DISTINCT = 1e-6  # of the largest singular value: probes that differ by less count as dependent
-ROUND_OFF = 1e-12  # of a direction: what orthogonalisation leaves of it is round-off
-DEPENDENT = 1e-10  # squared sine below which a direction counts as not new
-ALIKE = 1e-6  # squared sine below which directions are orthonormalised once more
-AT_ONCE = 32  # vectors that are multiplied together
-# Rows of tall matrices whose inner products are taken at a time, which stay in the processor's
-# cache: 100 by 5 inner products of 128,000 rows take 5.5 ms so, and 18 by one multiplication.
-ROWS = 512
-
-
-class NotReduced(ValueError):
-    """A body whose response takes more moments than a reduced-order model is made of."""
+CHUNK = 256  # times that share their exponentials
+MOST_RATES = 8192  # summed at a time, to bound memory
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReducedModel:
-    """Reduced-order model u'' + C u' + K u = basis^T f, displacement at the probes = outputs u.
-
-    `basis` (3 n, r) in kg^-1/2, `K`, `C` and `R` (r, r), `outputs` (p, r), Maxwell `branches` in
-    parallel with K of (r, r) each; `estimate` is the relative change of the probes' response by
-    some more moments, `moments` how many there are.
+    """Projected `operators` of r basis vectors, with a `basis` (3 n, r) in kg^-1/2 and the probes'
+    `outputs` (p, r); `estimate` is the relative change of the probes' response by some more
+    moments, `moments` how many there are.
     """
 
+    operators: Operators
     basis: Floats
-    K: Floats
-    C: Floats
-    R: Floats
     outputs: Floats
     moments: int
     estimate: float
     solver: str
-    branches: tuple[MaxwellBranch, ...] = ()
-
-
-def reduce(
-    operators: Operators,
-    probes: sparse.csr_array,
-    band: float = 1000.0,
-    tolerance: float = 1e-3,
-    *,
-    loads: Floats | None = None,
-    added: AddedMass | None = None,
-    solver: str = "auto",
-    progress: Callable[[float], None] | None = None,
-) -> ReducedModel:
-    """Reduced-order model of the motion of a body's probes.
-
-    Parameters
-    ----------
-    operators : Operators, of the full body
-    probes : (p, 3 n) sparse, from `probe_operator`; for whole fields the rows of a
-        `load_subspace` as well, without `loads`
-    band : float, Hz, highest frequency at which the tolerance must be met
-    tolerance : float, relative error of the probes' displacement at any frequency of the band
-    loads : (3 n, k), typical nodal forces that the error is estimated for; without any it is
-        that of the probes' adjoint fields in the whole body, which takes far more moments
-    added : added mass of a fluid, as `added_mass` gives it; the body must be constrained then
-    solver : of `linear_solver.factorise`
-    progress : called with the fraction done, as the error estimate approaches the tolerance
-
-    Returns
-    -------
-    ReducedModel
-        With an `estimate` of at most the tolerance.
-
-    Raises
-    ------
-    NotReduced
-        If the tolerance is out of reach.
-    ValueError
-        If no probe can move.
-    """
-    free, report = operators.free, progress or (lambda fraction: None)
-    start_vectors = probes[:, free].toarray().T
-    if not start_vectors.any():
-        raise ValueError("no probe can move, all lie where the body is fixed; move one inwards")
-    point, operators = _expansion(operators, added, band)
-    full = operators.K, operators.C, operators.M, operators.branches
-    laws = laws_of(*full, operators.laws)
-    factors = factors_at(operators.branches, point)
-    factor = factorise(laws.at(factors).of(operators.K, operators.M), backend=solver)
-    report(0.0)
-
-    independent = _independent(start_vectors)
-    space = KrylovBasis(operators, laws, independent.shape[1] * (MOST_MOMENTS + 1))
-    seen = start_vectors if loads is None else np.hstack([start_vectors, loads[free]])
-    growing = _moments(space, operators, laws, point, factor, independent)
-    look = partial(_look, space, seen, start_vectors.shape[1], band, tolerance)
-    moments, size, estimate = _converged(growing, look, tolerance, report)
-
-    backend = factor.backend
-    del factor  # whose memory the basis takes
-    K, C, _, branches = space.model(size)
-    R = space.radiation(operators.R, size)
-    return ReducedModel(
-        basis=space.expanded(size),
-        K=K.copy(),
-        C=C.copy(),
-        R=R,
-        outputs=space.seen(size)[:, : start_vectors.shape[1]].T.copy(),
-        moments=moments,
-        estimate=estimate,
-        solver=backend,
-        branches=branches,
-    )
-
-
-def load_subspace(loads: Floats, tolerance: float = 1e-3) -> Floats:
-    """Proper orthogonal basis (3 n, s) of loads (3 n, k), to a relative error in the 2-norm.
-
-    A circling focus needs about twenty at 1e-3, however many positions it is given at.
-    """
-    squares, vectors = np.linalg.eigh(loads.T @ loads)
-    left_out = np.sqrt(np.cumsum(np.maximum(squares, 0)) / squares.sum())
-    kept = left_out > tolerance
-    return loads @ (vectors[:, kept] / np.sqrt(squares[kept]))
 
 
 def transfer(model: ReducedModel, forces: Floats, frequencies: ArrayLike) -> Complex:
@@ -199,339 +63,125 @@ def transfer(model: ReducedModel, forces: Floats, frequencies: ArrayLike) -> Com
         If the model has no loss and a natural frequency among the frequencies.
     """
     s = 2j * np.pi * np.atleast_1d(np.asarray(frequencies, np.float64))[:, None, None]
-    A = dynamic_stiffness(model.K, model.C, np.eye(len(model.K)), model.branches, s)
+    ops = model.operators
+    A = dynamic_stiffness(ops.K, ops.C, ops.M, ops.branches, s)
     fields: Complex = np.linalg.solve(A, np.broadcast_to(forces, (len(s), *forces.shape)))
     return model.outputs @ fields
 
 
-class KrylovBasis:
-    """Mass-orthonormal basis that grows, and what is projected onto it.
-
-    Only the vectors are kept: their products with sparse matrices are formed where they are needed,
-    in less time than it takes to read them from memory. Memory is touched only as far as used, and
-    new vectors are orthonormalised in place: memory touched anew costs as much as the arithmetic.
-    """
-
-    def __init__(self, operators: Operators, laws: Laws, most: int) -> None:
-        self._branches, self._laws = operators.branches, laws
-        self._M, self._K = product(operators.M), product(operators.K)
-        rests = (part.rest for part in laws.parts)
-        self._rests = [None if rest is None else product(rest) for rest in rests]
-        self._free, n_dofs = operators.free, operators.n_dofs
-        self._all_dofs = np.empty((n_dofs, most), order="F")  # for `expanded`
-        self._columns = self._all_dofs[: len(operators.free)]
-        # Projected K and rests (size, size), and what is seen of a response (size, k).
-        self._small_K = np.empty((0, 0))
-        self._small_rests = [None if times is None else self._small_K for times in self._rests]
-        self._seen = np.empty((0, 0))
-        self.size = 0
-
-    @property
-    def basis(self) -> Floats:
-        """Vectors (n, size)."""
-        return self._columns[:, : self.size]
-
-    def expanded(self, size: int) -> Floats:
-        """The first vectors on all dofs (n_dofs, size), 0 where the body is fixed; in the memory of
-        the basis, which there is none of afterwards.
-        """
-        for column in self._all_dofs[:, :size].T:
-            values = column[: len(self._free)].copy()
-            column[:] = 0
-            column[self._free] = values
-        return self._all_dofs[:, :size]
-
-    def model(self, size: int) -> tuple[Floats, Floats, Floats, tuple[MaxwellBranch, ...]]:
-        """Projected K, C, M and Maxwell branches, in the first vectors, as far as projected."""
-        K, M = self._small_K[:size, :size], np.eye(size)
-        rests = (None if rest is None else rest[:size, :size] for rest in self._small_rests)
-        each = (replace(part, rest=r) for part, r in zip(self._laws.parts, rests, strict=True))
-        C, *relaxing = (part.of(K, M) for part in each)
-        return K, C, M, _branches(relaxing, self._branches)
-
-    def seen(self, size: int) -> Floats:
-        """Components (size, k) of the vectors that `project` was given."""
-        return self._seen[:size]
-
-    def radiation(self, R: sparse.csr_array, size: int) -> Floats:
-        """Projected damping (size, size) of absorbing boundaries, which may be the rest of C."""
-        if R is self._laws.damping.rest:
-            return np.array(self._small_rests[0])[:size, :size]
-        basis = self.basis[:, :size]
-        return _products(product(R), basis, basis)
-
-    def forces(self, of_mass: Floats, of_rests: Sequence[Floats]) -> Floats:
-        """Nodal forces M z + sum_j rest_j r_j (n, k) of coordinates z and r_j (size, k)."""
-        acting = [(self._M, of_mass)]
-        acting += [(A, r) for A, r in zip(self._rests, of_rests, strict=True) if A is not None]
-        fields = _combined(self.basis, np.hstack([r for _, r in acting]))  # reads the basis once
-        each = np.split(fields, len(acting), axis=1)
-        forces = acting[0][0](each[0])
-        for (A, _), field in zip(acting[1:], each[1:], strict=True):
-            forces += A(field)
-        return forces
-
-    def extend(self, block: Floats) -> Floats:
-        """Add the linearly independent directions of a block (n, k), by block Gram-Schmidt and a
-        decomposition of its Gram matrix; its coordinates (size, k).
-        """
-        M, Q = self._M, self.basis
-        moved = M(block)
-        scale = _norms(block, moved)
-        first = _inner(Q, moved)
-        block = block - _combined(Q, first)
-        # Twice is enough, and once is not: after 90 moments vectors were orthogonal to 1e-3.
-        moved = M(block)
-        second = _inner(Q, moved)
-        gram = block.T @ moved - second.T @ second
-        block -= _combined(Q, second)
-        size = np.sqrt(np.maximum(np.diag(gram), 0.0))
-        # A space of all of a body's dofs has no new direction.
-        inverse = np.divide(1, size, out=np.zeros_like(size), where=size > ROUND_OFF * scale)
-        squares, directions = np.linalg.eigh(gram * np.outer(inverse, inverse))
-        distinct = squares > max(DEPENDENT * squares.max(), SMALLEST)
-        squares, directions = squares[distinct], directions[:, distinct]
-        upright = inverse[:, None] * directions / np.sqrt(squares)
-        if len(squares) and squares.min() < ALIKE * squares.max():
-            upright = self._again(block, upright)
-        start, self.size = self.size, self.size + upright.shape[1]
-        np.matmul(block, upright, out=self._columns[:, start : self.size])
-        return np.vstack([first + second, upright.T @ gram])
-
-    def _again(self, block: Floats, upright: Floats) -> Floats:
-        """Orthonormalise directions of a block that are much alike once more: scaled, their
-        round-off is no longer small, also that of what is in the basis.
-        """
-        new = block @ upright
-        block -= _combined(self.basis, self.basis.T @ self._M(new)) @ np.linalg.pinv(upright)
-        new = block @ upright
-        return upright @ np.linalg.inv(np.linalg.cholesky(new.T @ self._M(new))).T
-
-    def project(self, seen: Floats, size: int) -> None:
-        """Project the matrices, and what is seen (n, k), onto those of the first vectors that are
-        new since.
-        """
-        Q, new = self._columns[:, :size], self._columns[:, len(self._small_K) : size]
-        self._seen = np.vstack([self._seen.reshape(-1, seen.shape[1]), new.T @ seen])
-        self._small_K = _bordered(self._small_K, _products(self._K, Q, new))
-        for j, (times, small) in enumerate(zip(self._rests, self._small_rests, strict=True)):
-            if times is not None and small is not None:
-                self._small_rests[j] = _bordered(small, _products(times, Q, new))
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Look:
-    """Responses of the model of so many moments and vectors, and by them the relative error of the
-    model that was looked at before; infinite if there was none.
+class Poles:
+    """Pole-residue form of a model: z' = pole z + inputs f, probes = 2 Re(outputs z).
+
+    `values` (m,) in 1/s with imaginary part >= 0, `inputs` (m, r), `outputs` (p, m).
     """
 
-    moments: int
-    size: int
-    responses: Complex
-    error: float
+    values: Complex
+    inputs: Complex
+    outputs: Complex
 
 
-def _look(
-    space: KrylovBasis,
-    seen: Floats,
-    probes: int,
-    band: float,
-    tolerance: float,
-    before: Look | None,
-    moments: int,
-    size: int,
-) -> Look:
-    """The next look, by what is seen (n, probes + loads) of a response."""
-    space.project(seen, size)
-    # Nearly from 0 Hz: at 0 Hz itself an unconstrained body has no finite response.
-    fine = np.asarray(2j * np.pi * np.linspace(1e-3 * band, band, LOOKED_AT), np.complex128)
-    coarse = fine[::AT_FIRST]  # until the error is below the tolerance there
-    responses, error = _band_response(space, probes, coarse, size), np.inf
-    if before:
-        error = _largest_change(before.responses, responses)
-        if error <= tolerance:
-            both = (_band_response(space, probes, fine, each) for each in (before.size, size))
-            error = _largest_change(*both)
-    return Look(moments=moments, size=size, responses=responses, error=error)
+def poles(operators: Operators, outputs: Floats | None = None) -> Poles:
+    """Diagonalise projected operators in first-order form, once; one of each conjugate pair is
+    returned.
 
+    Internal variables of Maxwell branches are part of that form:
+    z_j' = (L_j^T u - z_j) / tau_j, K_j = L_j L_j^T.
 
-def _converged(
-    growing: Iterable[tuple[int, int]],
-    look: Callable[[Look | None, int, int], Look],
-    tolerance: float,
-    report: Callable[[float], None],
-) -> tuple[int, int, float]:
-    """Moments and vectors of the first model within the tolerance, and its error, as both grow.
-
-    A second thread looks while further moments are computed, because solutions keep a core waiting
-    for memory. How long it takes decides what is computed in vain, and nothing else.
+    Parameters
+    ----------
+    operators : Operators, dense, in any coordinates (r,)
+    outputs : (p, r), what is read of these; the coordinates themselves if not given
     """
-    looks: list[Look] = []
-
-    def reached(found: Look) -> bool:
-        looks.append(found)
-        if len(looks) > 1:
-            first = looks[1].error
-            report(max(0.0, np.log(found.error / first) / np.log(tolerance / first)))
-        return found.error <= tolerance
-
-    with ThreadPoolExecutor(1) as aside:
-        at, waited = 0, None
-        for moments, size in growing:
-            due = moments >= at + max(FEWEST_BETWEEN, SHARE_BETWEEN * moments)
-            if waited and (due or waited.done()):
-                if reached(waited.result()):
-                    break
-                waited = None
-            if due:
-                at = moments
-                waited = aside.submit(look, looks[-1] if looks else None, moments, size)
-        else:
-            if not (waited and reached(waited.result())):
-                raise NotReduced(
-                    f"{MOST_MOMENTS} moments leave an error of {looks[-1].error:.2g}, above the "
-                    f"tolerance {tolerance:g}; raise the tolerance, narrow the band or add damping"
-                )
-    return looks[-2].moments, looks[-2].size, looks[-1].error
+    r, branches = len(operators.K), with_internal(operators.branches)
+    upright = np.linalg.inv(np.linalg.cholesky(operators.M)).T  # coordinates of unit mass
+    K, C, *relaxing = (
+        upright.T @ A @ upright for A in (operators.K, operators.C, *(b.K for b in branches))
+    )
+    companion = np.block([[np.zeros((r, r)), np.eye(r)], [-(K + sum(relaxing)), -C]])
+    for L, time in zip(map(factor, relaxing), (b.time for b in branches), strict=True):
+        size, k = len(companion), L.shape[1]
+        pulled, followed = np.zeros((size, k)), np.zeros((k, size))
+        pulled[r : 2 * r], followed[:, :r] = L, L.T / time
+        companion = np.block([[companion, pulled], [followed, -np.eye(k) / time]])
+    values, vectors = linalg.eig(companion)
+    kept = values.imag >= 0
+    inverse = np.linalg.solve(vectors, np.eye(len(values))[:, r : 2 * r])[kept]
+    # A real pole stands alone, so that twice the real part counts it double.
+    weight = np.where(values[kept].imag > 0, 1.0, 0.5)
+    read = upright if outputs is None else outputs @ upright
+    return Poles(
+        values=values[kept], inputs=inverse @ upright.T,
+        outputs=(read @ vectors[:r, kept]) * weight,
+    )  # fmt: skip
 
 
-def _expansion(
-    operators: Operators, added: AddedMass | None, band: float
-) -> tuple[float, Operators]:
-    """Expansion point in rad/s, and the operators with an added mass, of which M can only be
-    applied.
+def factor(K: Floats) -> Floats:
+    """Low-rank factor L (n, k) of a positive semidefinite K = L L^T, as many columns as its rank.
+
+    With z = L^T (u - d) a Maxwell branch is z' = (L^T u - z) / tau with the force L (L^T u - z): it
+    has an internal variable only where it has a spring.
     """
-    if added is None:
-        relaxing = 2 * np.pi * RELAXING_POINT * band
-        return relaxing if operators.branches else EXPANSION_POINT, operators
-    return 0.0, replace(operators, M=aslinearoperator(operators.M) + added.M)
+    squares, vectors = np.linalg.eigh(K)
+    kept = squares > 1e-12 * squares.max()
+    return np.asarray(vectors[:, kept] * np.sqrt(squares[kept]))
 
 
-def _independent(start_vectors: Floats) -> Floats:
-    """Independent directions of vectors (n, p), of length 1: probes on a clamped edge do not move,
-    and those in one element may be linearly dependent. Opposite vectors have opposite directions.
+def line_response(poles: Poles, forces: Complex, frequencies: Floats) -> tuple[Complex, Complex]:
+    """Steady state and free vibration under a load Re sum_f forces exp(2 pi i f t) from t = 0 on.
+
+    Parameters
+    ----------
+    poles : Poles, of p outputs
+    forces : (f, r) reduced forces of the lines, N kg^-1/2
+    frequencies : (f,) float, Hz
+
+    Returns
+    -------
+    lines : (f, p) complex amplitudes in metre of the steady state
+    start : (m, p) complex amplitudes of exp(pole t), the free vibration from rest at t = 0
     """
-    squares, directions = np.linalg.eigh(start_vectors.T @ start_vectors)
-    kept = squares > DISTINCT**2 * squares[-1]
-    return start_vectors @ (directions[:, kept] / np.sqrt(squares[kept]))[:, ::-1]
+    iw, values = 2j * np.pi * frequencies[:, None], poles.values
+    forwards = (forces @ poles.inputs.T) / (iw - values)  # (f, m)
+    backwards = (forces.conj() @ poles.inputs.T) / (-iw - values)
+    lines = forwards @ poles.outputs.T + (backwards @ poles.outputs.T).conj()
+    return lines, -(forwards + backwards).sum(axis=0)[:, None] * poles.outputs.T
 
 
-def _moments(
-    space: KrylovBasis,
-    operators: Operators,
-    laws: Laws,
-    point: float,
-    factor: Factor,
-    start_vectors: Floats,
-) -> Iterator[tuple[int, int]]:
-    """Numbers of the moments of start vectors (n, p), from 1, by each of which the space has been
-    extended, and of its vectors.
+def impulse_response(poles: Poles, impulse: Floats) -> Complex:
+    """Free vibration (m, p), complex amplitudes of exp(pole t), after an impulse (r,) in
+    N s kg^-1/2 at t = 0.
     """
-    branches = with_internal(operators.branches)
-    lags = [branch.time / (1 + point * branch.time) for branch in branches]
-    factors = factors_at(branches, point)
-    scale = point or EXPANSION_POINT
-    # Coordinates in the basis of the linearised Krylov vectors (y, y' / scale, dashpot stretches):
-    # those of all moments are orthonormalised, so that nothing grows however many there are.
-    earlier = np.zeros((2 + len(lags), 0, 0))
-    upper = space.extend(factor.solve(start_vectors))
-    relaxed = [(1 - point * lag) * upper for lag in lags]
-    latest = np.stack([upper, np.zeros_like(upper), *relaxed])
-    for moment in range(1, MOST_MOMENTS + 1):
-        yield moment, space.size
-        earlier, latest = _orthonormalised(earlier, latest)
-        y, y_before, *y_relaxed = latest
-        stretches = [lag * part for lag, part in zip(lags, y_relaxed, strict=True)]
-        known, of_mass, of_rests = laws.without_stiffness(
-            factors, [y, *stretches], 2 * point * y + scale * y_before
+    return 2 * (poles.inputs @ impulse)[:, None] * poles.outputs.T
+
+
+def exponential_sum(rates: Complex, amplitudes: Complex, times: Floats) -> Floats:
+    """Exponential sum Re sum_j amplitudes exp(rates t).
+
+    Exponentials are computed within one chunk of times and at the start of each, and multiplied.
+
+    Parameters
+    ----------
+    rates : (j,) complex, 1/s
+    amplitudes : (j, p) complex
+    times : (t,) float, s, equally spaced from 0
+
+    Returns
+    -------
+    (t, p) float, in the unit of the amplitudes
+    """
+    j, p = amplitudes.shape
+    if j > MOST_RATES:
+        parts = range(0, j, MOST_RATES)
+        return np.sum(
+            [
+                exponential_sum(rates[k : k + MOST_RATES], amplitudes[k : k + MOST_RATES], times)
+                for k in parts
+            ],
+            axis=0,
         )
-        upper = -space.extend(factor.solve(space.forces(of_mass, of_rests)))
-        upper -= _padded(known, len(upper))
-        lower, _, *before = (_padded(part, len(upper)) for part in latest)
-        relaxed = [
-            (1 - point * lag) * upper - lag * part for lag, part in zip(lags, before, strict=True)
-        ]
-        latest = np.stack([upper, lower / scale, *relaxed])
-
-
-def _combined(basis: Floats, coordinates: Floats) -> Floats:
-    """Vectors (n, k) of coordinates (size, k), column by column as the basis, which is faster."""
-    found = np.empty((len(basis), coordinates.shape[1]), order="F")
-    return np.matmul(basis, coordinates, out=found)
-
-
-def _inner(basis: Floats, block: Floats) -> Floats:
-    """Inner products basis^T block (size, k) of tall matrices."""
-    found = np.zeros((block.shape[1], basis.shape[1]))
-    for start in range(0, len(basis), ROWS):
-        found += block[start : start + ROWS].T @ basis[start : start + ROWS]
-    return found.T
-
-
-def _norms(block: Floats, product: Floats) -> Floats:
-    """Mass norms (m,) of columns with their product with M.
-
-    At rest every second moment of a body without loss is 0, which is no direction.
-    """
-    return np.maximum(np.sqrt(np.einsum("nm,nm->m", block, product)), SMALLEST)
-
-
-def _padded(coordinates: Floats, size: int) -> Floats:
-    return np.vstack([coordinates, np.zeros((size - len(coordinates), coordinates.shape[1]))])
-
-
-def _orthonormalised(earlier: Floats, latest: Floats) -> tuple[Floats, Floats]:
-    """Earlier vectors (parts, size, k) with the latest, orthonormalised to them; and the latest."""
-    parts, size, width = latest.shape
-    padded = np.zeros((parts, size, earlier.shape[2]))
-    padded[:, : earlier.shape[1]] = earlier
-    W, X = padded.reshape(parts * size, -1), latest.reshape(parts * size, width)
-    X = X / np.linalg.norm(X, axis=0)
-    for _ in range(2):
-        X = X - W @ (W.T @ X)
-    X = np.linalg.qr(X)[0]
-    return np.hstack([W, X]).reshape(parts, size, -1), X.reshape(parts, size, width)
-
-
-def _products(times: Callable[[Floats], Floats], basis: Floats, vectors: Floats) -> Floats:
-    """Matrix basis^T A vectors (size, k) of a symmetric A, some vectors at a time."""
-    starts = range(0, vectors.shape[1], AT_ONCE)
-    columns = [_inner(basis, times(vectors[:, k : k + AT_ONCE])) for k in starts]
-    return np.hstack(columns) if columns else np.empty((basis.shape[1], 0))
-
-
-def _bordered(small: Floats, columns: Floats) -> Floats:
-    """Symmetric matrix bordered by its last columns (r, k) and rows."""
-    r, k = columns.shape
-    whole = np.empty((r, r))
-    whole[: r - k, : r - k] = small
-    whole[:, r - k :] = columns
-    whole[r - k :] = columns.T
-    return whole
-
-
-def _branches(small: list[Floats], large: tuple[Branch, ...]) -> tuple[MaxwellBranch, ...]:
-    """The full model's Maxwell branches with the reduced stiffness."""
-    return tuple(
-        MaxwellBranch(K=K, time=b.time) for K, b in zip(small, with_internal(large), strict=True)
-    )
-
-
-def _band_response(space: KrylovBasis, probes: int, s: Complex, size: int) -> Complex:
-    """Responses (f, k, p) of the probes to the loads that the space has seen beside them, or their
-    fields (f, size, p), at complex frequencies s (f,) in rad/s, by the first vectors of the basis.
-    """
-    K, C, M, branches = space.model(size)
-    start_vectors, loads = np.split(space.seen(size), [probes], axis=1)
-    # One by one: all at once would be as large as the body's own factors.
-    fields: Iterator[Any] = (
-        np.linalg.solve(dynamic_stiffness(K, C, M, branches, at), start_vectors) for at in s
-    )
-    return np.array([loads.T @ x if loads.shape[1] else x for x in fields])
-
-
-def _largest_change(before: Complex, now: Complex) -> float:
-    """Largest relative change at any frequency."""
-    change = now.copy()
-    change[:, : before.shape[1]] -= before
-    return float((np.linalg.norm(change, axis=(1, 2)) / np.linalg.norm(now, axis=(1, 2))).max())
+    within = np.exp(rates * times[:CHUNK, None])
+    starts = np.exp(rates * times[::CHUNK, None])
+    driven = (starts[:, :, None] * amplitudes).transpose(1, 0, 2).reshape(j, -1)
+    summed = within.real @ driven.real - within.imag @ driven.imag
+    return summed.reshape(len(within), -1, p).swapaxes(0, 1).reshape(-1, p)[: len(times)]

@@ -20,10 +20,9 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg, sparse
+from scipy.sparse.linalg import LinearOperator
 
-from fem.added_mass import AddedMass
 from fem.assembly import Operators
 from fem.finite_strain import (
     Elastic,
@@ -38,13 +37,13 @@ from fem.finite_strain import (
     tangent,
 )
 from fem.linear_solver import factorise
-from fem.materials import Material
 from fem.maxwell import with_internal
 from fem.sheet_reading import SheetReading, modal_slopes
 from fem.sparsity import restricted
 from fem.static import modes
+from fem.typing import Bools, Floats, Ints
 from meshes import TetMesh
-from meshes.tetmesh import Floats, Ints
+from simple_model.layers.material import Material
 
 PAIRS = 200  # of modes that are enforced
 RESONANT = 2 * np.pi * 200.0  # rad/s below which modes are taken to have equal amplitudes
@@ -73,7 +72,7 @@ def stretching_modes(
     membrane: Membrane,
     n: int,
     *,
-    added: AddedMass | None = None,
+    added: LinearOperator | None = None,
     solver: str = "auto",
     progress: Callable[[float], None] | None = None,
 ) -> StretchingModes:
@@ -131,10 +130,10 @@ def stretching_modes(
 
 
 def _with_added(
-    operators: Operators, added: AddedMass, hz: Floats, shapes: Floats
+    operators: Operators, added: LinearOperator, hz: Floats, shapes: Floats
 ) -> tuple[Floats, Floats]:
     """Modes with an added mass, by the Rayleigh-Ritz method from those without."""
-    mass = np.eye(len(hz)) + _projected(added.M, shapes[operators.free])
+    mass = np.eye(len(hz)) + _projected(added, shapes[operators.free])
     squares, turn = linalg.eigh(np.diag((2 * np.pi * hz) ** 2), mass)
     return np.sqrt(squares) / (2 * np.pi), shapes @ turn
 
@@ -238,7 +237,7 @@ def in_plane_matrices(
 
 
 def _states_of_stress(
-    part: Part, fixed: NDArray[np.bool_], slopes: Floats, hz: Floats, solver: str
+    part: Part, fixed: Bools, slopes: Floats, hz: Floats, solver: str
 ) -> tuple[Floats, float]:
     """Strains (k, e, q, k, l) of states of stress, orthonormal in energy; the truncated share."""
     reach = 1 / np.maximum(2 * np.pi * hz, RESONANT) ** 2
@@ -273,7 +272,7 @@ class _Plane:
     solve: Callable[[Floats], Floats]
 
     @staticmethod
-    def of(part: Part, fixed: NDArray[np.bool_], solver: str) -> _Plane:
+    def of(part: Part, fixed: Bools, solver: str) -> _Plane:
         n = part.D.shape[1]
         horizontal = np.zeros((n, 3), bool)
         horizontal[np.unique(part.nodes), :2] = True

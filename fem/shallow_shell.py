@@ -21,8 +21,8 @@ from scipy import sparse
 from fem.elements import triangle_rule
 from fem.finite_strain import Membrane, membrane_part, tangent_blocks
 from fem.sparsity import slabs
+from fem.typing import Floats
 from meshes import TetMesh
-from meshes.tetmesh import Floats
 
 
 def shell_stiffness(

@@ -20,8 +20,8 @@ from scipy import sparse
 from fem.elements import shape_functions, triangle_rule
 from fem.finite_strain import Membrane, Part, membrane_part
 from fem.stress import LOCAL, fitted_polynomial
+from fem.typing import Floats, Ints
 from meshes import TetMesh
-from meshes.tetmesh import Floats, Ints
 
 PAIRS = ((0, 0), (1, 1), (0, 1))  # xx, yy, xy
 ON_EDGE = 1e-9  # barycentric: how far outside all triangles a point still counts as on the sheet

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from fem.typing import Bools, Floats, Ints
 from meshes import MeshError
-from meshes.tetmesh import Floats, Ints
 
 Index = NDArray[np.int32]
 SLAB = 256  # elements at a time: their temporaries stay near the processor
@@ -161,7 +161,7 @@ def on_one_pattern(matrices: Sequence[sparse.csr_array]) -> tuple[Floats, Index,
     return found, union.indices, union.indptr
 
 
-def starts_of_kept(kept: NDArray[np.bool_], indptr: NDArray[np.integer[Any]]) -> Index:
+def starts_of_kept(kept: Bools, indptr: NDArray[np.integer[Any]]) -> Index:
     """Starts (n + 1,) of the rows of a matrix of which some entries (nnz,) are kept."""
     before = np.zeros(len(kept) + 1, np.int32)
     np.cumsum(kept, out=before[1:])

@@ -10,7 +10,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from fem.assembly import Operators
 from fem.linear_solver import Factor, factorise
 from fem.transient import Diverged
-from meshes.tetmesh import Floats
+from fem.typing import Floats
 
 FLOATING = (1e-6, 1e-9, 1e-12)  # of the square of the highest frequency: shifts of free bodies
 RIGID = 1e-14  # of it: a mode below is a rigid-body mode

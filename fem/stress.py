@@ -26,11 +26,11 @@ from fem.assembly import by_region, direct_part, elements_of
 from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradients, shape_nodes
 from fem.interior import locate
-from fem.materials import Material
 from fem.maxwell import NO_INTERNAL
 from fem.pressure_projection import dilatation_operator
+from fem.typing import Floats, Ints
 from meshes import TetMesh
-from meshes.tetmesh import Floats, Ints
+from simple_model.layers.material import Material
 from simple_model.layers.tensors import DIAGONAL, MEAN, TENSOR, hooke
 
 TOUCHING = 1e-6  # barycentric: an element touches a point that is so little outside it

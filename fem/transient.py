@@ -19,7 +19,7 @@ from scipy.sparse.linalg import cg
 from fem.assembly import Operators
 from fem.linear_solver import factorise
 from fem.maxwell import branch_force, relaxing_stiffness, with_internal
-from meshes.tetmesh import Floats
+from fem.typing import Floats
 
 
 class Diverged(ArithmeticError):

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from fem.materials import Material
 from fem.maxwell import Branch, DispersiveBranch, MaxwellBranch
-from meshes.tetmesh import Floats
+from fem.typing import Floats
+from simple_model.layers.material import Material
 
 Matrices = tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array, tuple[Branch, ...]]
 

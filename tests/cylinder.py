@@ -4,8 +4,8 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 import meshes
-from fem.materials import Material
 from meshes import TetMesh
+from simple_model.layers.material import Material
 from skinwave.bodies import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised, in_layers
 

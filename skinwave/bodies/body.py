@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from fem.materials import Material
 from meshes import Palm
 from meshes.shapes.structured import Lines
 from meshes.tetmesh import Floats
 from simple_model.choices import choose
 from simple_model.layers.compliance import Compliance
 from simple_model.layers.dispersion import DispersionCurves
-from simple_model.layers.material import NOT_SKIN, PRESETS
+from simple_model.layers.material import NOT_SKIN, PRESETS, Material
 from skinwave.bodies.discretised import Discretise, Discretised
 from skinwave.bodies.mounting import FRAME, Mounting, check_extent
 from skinwave.bodies.parts import (

@@ -9,10 +9,10 @@ from scipy import sparse
 from fem.assembly import Operators, assemble
 from fem.boundary import Support, fixed_dofs
 from fem.coat import Coat
-from fem.materials import Material
 from fem.plane_stiffness import SIDES, Tension
 from meshes import TetMesh, half
 from meshes.tetmesh import Floats, Ints
+from simple_model.layers.material import Material
 from skinwave.bodies.body import Body
 from skinwave.bodies.discretised import Discretise
 from skinwave.bodies.sizes import checked, default_size

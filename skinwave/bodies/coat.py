@@ -10,7 +10,7 @@ from math import inf
 import numpy as np
 
 from fem.coat import Coat
-from fem.materials import Material
+from simple_model.layers.material import Material
 from skinwave.bodies.body import Body
 from skinwave.bodies.discretised import THINNEST, Strata
 from skinwave.bodies.parts import solid_of

@@ -10,10 +10,10 @@ from scipy import sparse
 
 from fem.boundary import Support
 from fem.coat import Coat
-from fem.materials import Material
 from fem.plane_stiffness import Tension
 from meshes import TetMesh
 from meshes.tetmesh import Floats
+from simple_model.layers.material import Material
 
 THINNEST = 0.5  # of an element that does not follow layers: the thinnest of them that it resolves
 Strata = Sequence[tuple[float, Material]]  # depth in metre where each begins, and its material

@@ -9,9 +9,9 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.materials import PRESETS, Material
 from meshes import Palm
 from simple_model.choices import choose
+from simple_model.layers.material import PRESETS, Material
 
 
 @dataclass(frozen=True, kw_only=True)

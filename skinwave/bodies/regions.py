@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from fem.materials import Material
 from meshes import MeshError, TetMesh, corner_volumes
 from meshes.tetmesh import Ints
+from simple_model.layers.material import Material
 from skinwave.bodies.body import Body
 from skinwave.bodies.parts import solid_of
 

@@ -7,19 +7,18 @@ from math import pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse.linalg import LinearOperator
 
-from fem.added_mass import AddedMass, added_mass
-from fem.affine import AffineOperators
-from fem.assembly import Operators
+from fem.added_mass import added_mass
 from fem.finite_strain import Membrane
-from fem.materials import Material
 from fem.plane_stiffness import Tension
 from fem.shallow_shell import shell_stiffness
 from meshes import TetMesh, middle_plane, sheet
 from meshes.shapes.structured import check_size, round_up
-from meshes.tetmesh import Floats
+from meshes.tetmesh import Floats, Ints
 from simple_model.layers.compliance import AIR_DENSITY, Compliance, thin_sheet
 from simple_model.layers.dispersion import DispersionCurves
+from simple_model.layers.material import Material
 from simple_model.plates.sheet_waves import sheet_curves
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.build import Build
@@ -201,18 +200,18 @@ def refuse_open_air(body: Body) -> None:
         )
 
 
-def air(body: Body, build: Build, operators: Operators | AffineOperators) -> AddedMass | None:
+def air(body: Body, build: Build, free: Ints) -> LinearOperator | None:
     """Added mass of the air around a meshed sheet, for `fem.reduce`.
 
     Parameters
     ----------
     body : Body, a sheet
     build : its mesh
-    operators : those of the mesh
+    free : (n_free,) int, free degrees of freedom
 
     Returns
     -------
-    AddedMass, or None in vacuum
+    LinearOperator (n_free, n_free), kg; None in vacuum
 
     Raises
     ------
@@ -223,7 +222,7 @@ def air(body: Body, build: Build, operators: Operators | AffineOperators) -> Add
         return None
     refuse_open_air(body)
     sides = body.placement.rotation.T[:2]
-    return added_mass(build.mesh, operators, AIR_DENSITY, axes=sides, mirrored=build.symmetry)
+    return added_mass(build.mesh, free, AIR_DENSITY, axes=sides, mirrored=build.symmetry)
 
 
 SHEET = register(

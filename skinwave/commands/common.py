@@ -74,7 +74,7 @@ def show(options: argparse.Namespace, figures: "Callable[[], Mapping[str, Figure
 def add_mesh(parser: argparse.ArgumentParser) -> None:
     """Solver options: element size and direct solver."""
     add_size(parser, help="element size, mm (default: planned)")
-    parser.add_argument("--solver", default="auto", help="auto, pardiso, cholmod or superlu")
+    parser.add_argument("--solver", default="auto", help="auto, pardiso or superlu")
 
 
 def add_size(parser: argparse.ArgumentParser, **how: Any) -> None:

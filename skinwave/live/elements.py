@@ -128,19 +128,16 @@ def reduced_poles(ops: fem.Operators, basis: np.ndarray) -> tuple[fem.Complex, f
     V = basis[ops.free].astype(np.float64)
     projected = [V.T @ (A @ V) for A in (ops.M, ops.K, ops.C)]
     M, K, C = ((A + A.T) / 2 for A in projected)
-    upright = np.linalg.inv(np.linalg.cholesky(M)).T
     branches = tuple(
-        fem.MaxwellBranch(K=upright.T @ (V.T @ (each.K @ V)) @ upright, time=each.time)
+        fem.MaxwellBranch(K=V.T @ (each.K @ V), time=each.time)
         for each in ops.branches
         if isinstance(each, fem.MaxwellBranch)  # `relaxing` leaves no other
     )
-    model = fem.ReducedModel(
-        basis=upright, K=upright.T @ K @ upright, C=upright.T @ C @ upright,
-        R=np.zeros_like(K), outputs=upright, moments=0, estimate=0.0, solver="", branches=branches,
-    )  # fmt: skip
-    found = fem.poles(model)
+    small = fem.Operators(
+        K=K, C=C, M=M, R=np.zeros_like(K), free=np.arange(len(K)), n_dofs=len(K), branches=branches
+    )
+    found = fem.poles(small)
     outputs, inputs = found.outputs, found.inputs.T
-    inputs = upright @ inputs
     # Symmetric: inputs and outputs of a pole are the same up to a factor.
     factor = (outputs.conj() * inputs).sum(axis=0) / (np.abs(outputs) ** 2).sum(axis=0)
     return found.values, outputs * np.sqrt(factor)

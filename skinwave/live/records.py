@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from fem.materials import Material
 from simple_model import MovingPressure, Tacton
+from simple_model.layers.material import Material
 from skinwave.bodies.analytic import dispersion, has_exact_waves, is_laterally_infinite
 from skinwave.live.radial import LOWEST
 from skinwave.scene.file import from_table, parsed, to_table

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from fem.materials import Material
 from meshes.tetmesh import Floats
 from simple_model.choices import choose
+from simple_model.layers.material import Material
 from skinwave.bodies import Body
 from skinwave.bodies.parts import solid_of
 from skinwave.bodies.sizes import default_size

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fem.affine import AffineOperators, Solids, assemble_affine
-from fem.materials import Material
 from meshes.tetmesh import Floats
+from simple_model.layers.material import Material
 from skinwave.bodies import Body
 from skinwave.bodies.absorbing_layer import has_layer, layer_of
 from skinwave.bodies.build import Build
@@ -101,8 +101,8 @@ def affine_operators(body: Body, build: Build) -> AffineOperators:
         build.mesh, meshed_materials(build), fixed=build.constraints, absorbing=build.absorbing,
         drag=build.drag, support=build.support, coat=build.coat,
     )  # fmt: skip
-    around = air(body, build, affine)
-    return replace(affine, fluid=(around.M,)) if around else affine
+    around = air(body, build, affine.free)
+    return affine if around is None else affine.with_fluid(around)
 
 
 def solids_of(reference: Reference, body: Body) -> Solids:

@@ -304,7 +304,7 @@ def harmonic_answer(scene: Scene, times: Floats, options: SolveOptions) -> Respo
     below = below_half_the_rate(frequencies, times)
     effort = Effort(
         dofs=len(ops.free), steps=len(frequencies), energy_imbalance=energy[0], radiated=energy[1],
-        solver=fem.available(complex_valued=True)[0] if solver == "auto" else solver,
+        solver=fem.available()[0] if solver == "auto" else solver,
     )  # fmt: skip
     return Response(
         model="fem-harmonic", times=times, probes=scene.probe_points, quantity=scene.quantity,

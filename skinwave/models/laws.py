@@ -7,8 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from fem.materials import Material
 from simple_model import ModulusTable, MovingPressure
+from simple_model.layers.material import Material
 from simple_model.layers.prony import FIT_TOLERANCE
 from simple_model.load.spectrum import load_lines
 from skinwave.bodies import Body

@@ -20,15 +20,10 @@ import numpy as np
 from scipy import sparse
 
 import fem
-from fem.affine import (
-    AffineOperators,
-    Solids,
-    interpolated,
-    operators_of,
-    weights,
-)
-from fem.line_basis import LineBasis, line_bases, steady_lines
-from fem.reduced_affine import AffineModel, Geometry, Variant, reduce_affine, steady
+from fem.affine import Solids, weights
+from fem.affine_model import AffineModel, operators_at, steady, steady_lines
+from fem.boundary import fixed_dofs
+from fem.greedy import Geometry, Variant, line_bases, reduce_affine
 from meshes import cache
 from meshes.tetmesh import Floats
 from simple_model import Effort, Response
@@ -67,8 +62,8 @@ TOLERANCE = 0.01  # relative error of a line that is not faint
 SHARE = 0.4  # of the tolerance: of the reduced-order model, and of the lines' bases
 FAINTEST = 1e-3  # of the strongest line that moves the probes: weaker ones are left out
 FAINTEST_LOAD = 1e-6  # of the strongest line of the load
-FORMAT = "parametric 3"  # of what is cached
-ARRAYS = ("outputs", "load", "points", "frequencies")
+FORMAT = "parametric 4"  # of what is cached
+ARRAYS = ("load", "points", "frequencies")
 BETWEEN = 0.3  # of each range: a body of no known geometry
 KEPT = 5  # full bodies at a time: more of them are assembled anew, for a third of the memory
 INSIDE = 128  # materials inside the ranges, for the lines' bases
@@ -79,29 +74,27 @@ class ParametricBody:
     """Reduced body of a scene for every material and thickness of a range.
 
     The `keys` that are free and the `bodies` of their values; the `reference` that was meshed; of
-    each of g geometries the projected matrices `parts` (g, q, r, r), whose kinds are those of
-    `affine`, and in their coordinates what the probes read, `outputs` (g, p c, r), and reduced
-    forces `load` (g, k, r) of unit pressure at the surface `points` (g, k, 3) in metre; `bases`
-    (f,) of the lines at `frequencies` (f,) in Hz; and the `effort` of the offline stage, with the
-    number of its factorisations.
+    g geometries the reduced `model`, whose outputs (g, p c, r) the probes read, with the reduced
+    forces `load` (g, k, r) of unit pressure at the surface `points` (g, k, 3) in metre; models
+    `bases` (f,) in it of the lines at `frequencies` (f,) in Hz; and the `effort` of the offline
+    stage, with the number of its factorisations.
     """
 
     scene: Scene
     keys: tuple[FreeKey, ...]
     bodies: Range
     reference: Reference
-    affine: AffineOperators
-    parts: Floats
-    outputs: Floats
+    model: AffineModel
     load: Floats
     points: Floats
     frequencies: Floats
-    bases: tuple[LineBasis, ...]
+    bases: tuple[AffineModel, ...]
     effort: Effort
 
     def __repr__(self) -> str:
         free = ", ".join(f"{key.key} {key.low:g} to {key.high:g}" for key in self.keys)
-        order = f"{len(self.parts)} geometries of order {self.outputs.shape[-1]}"
+        geometries, *_, r = self.model.parts.shape
+        order = f"{geometries} geometries of order {r}"
         return f"<ParametricBody of {self.scene!r}: {free}; {order}>"
 
 
@@ -160,10 +153,10 @@ def prepare(
         )  # fmt: skip
         entry = _reduced(stage, clock, report, build, h or default_size(body))
         cache.store(name, **entry)
-    affine, parts, bases = unpacked(entry, entry["outputs"])
+    model, bases = unpacked(entry)
     effort = Effort(**{**entry["meta"], "seconds": clock.seconds, "peak_memory": peak_memory()})
     return ParametricBody(
-        scene=scene, keys=keys, bodies=bodies, reference=reference, affine=affine, parts=parts,
+        scene=scene, keys=keys, bodies=bodies, reference=reference, model=model,
         bases=bases, effort=effort, **{array: entry[array] for array in ARRAYS},
     )  # fmt: skip
 
@@ -218,22 +211,22 @@ def _reduced(
             geometry()
     few = [_variant(stage, at, geometries) for at in _training(stage)]
     with clock("factorise and reduce"), one_thread():
-        model = reduce_affine(
+        model, error, factorisations = reduce_affine(
             list(geometries.values()), few, frequencies, band=BAND, tolerance=SHARE * tolerance,
             solver=stage.solver, progress=partial(report, "reduce"),
         )  # fmt: skip
     surface = [_reduced_surface(scene, stage.mesh(at), model) for at in geometries]
     with clock("lines"), one_thread():
-        kept, bases, error = _bases(stage, model, frequencies, few, report)
+        kept, bases, of_lines = _bases(stage, model, frequencies, few, report)
     effort = Effort(
         dofs=len(model.basis), reduced_dofs=model.basis.shape[1],
         solver=fem.available()[0] if stage.solver == "auto" else stage.solver,
-        estimate=model.error + error, factorisations=model.factorisations,
+        estimate=error + of_lines, factorisations=factorisations,
     )  # fmt: skip
     load, points = (np.stack(each) for each in zip(*surface, strict=True))
     return {
-        "meta": asdict(spent(effort, clock, build, h)), "outputs": model.outputs,
-        "load": load, "points": points, "frequencies": kept, **packed(model, bases),
+        "meta": asdict(spent(effort, clock, build, h)), "load": load, "points": points,
+        "frequencies": kept, **packed(model, bases),
     }  # fmt: skip
 
 
@@ -260,7 +253,7 @@ def _variant(stage: _Stage, at: tuple[float, ...], geometries: Mapping[Any, Any]
 def _reduced_surface(scene: Scene, build: Build, model: AffineModel) -> tuple[Floats, Floats]:
     """Reduced forces (c k, r) of a unit load, and the points (k, 3) where it is."""
     P, points = _surface(scene, build)
-    return P[model.affine.free].T @ model.basis, points
+    return P[~fixed_dofs(build.mesh, build.constraints)].T @ model.basis, points
 
 
 def lines(prepared: ParametricBody, values: Mapping[str, float]) -> tuple[Floats, fem.Complex]:
@@ -277,7 +270,7 @@ def lines(prepared: ParametricBody, values: Mapping[str, float]) -> tuple[Floats
 def lines_of(prepared: ParametricBody, body: Body) -> tuple[Floats, fem.Complex]:
     """The same of a body that differs from the scene's by values of the free keys alone."""
     solids = solids_of(prepared.reference, body)
-    of_parts = weights(prepared.affine, solids, prepared.frequencies)
+    of_parts = weights(prepared.model.terms, solids, prepared.frequencies)
     found = steady_lines(prepared.bases, of_parts, geometry_shares(prepared.bodies, body))
     s = 2j * np.pi * prepared.frequencies
     return prepared.frequencies, found * line_factor(
@@ -296,11 +289,11 @@ def at(prepared: ParametricBody, values: Mapping[str, float]) -> Prepared:
     """Reduced body of values of the free keys, for any Tacton."""
     body = relaxing(_body(prepared, values), FIT_TOLERANCE)
     shares = geometry_shares(prepared.bodies, body)
+    model = prepared.model
     outputs, load, points = (
-        np.tensordot(shares, each, 1) for each in (prepared.outputs, prepared.load, prepared.points)
+        np.tensordot(shares, each, 1) for each in (model.outputs, prepared.load, prepared.points)
     )
-    affine = interpolated(prepared.affine, prepared.parts, shares)
-    small = operators_of(affine, solids_of(prepared.reference, body))
+    small = operators_at(model, solids_of(prepared.reference, body), shares)
     return Prepared(
         probes=prepared.scene.probe_points, read=outputs, reading=prepared.scene.reading,
         load=prepared.scene.load,
@@ -348,20 +341,23 @@ def _bases(
     frequencies: Floats,
     few: Sequence[Variant],
     report: Progress,
-) -> tuple[Floats, tuple[LineBasis, ...], float]:
+) -> tuple[Floats, tuple[AffineModel, ...], float]:
     """Frequencies, bases and error of the lines that are strong for some of a few variants."""
     every = range(len(frequencies))
-    strengths = np.array(
-        [np.linalg.norm(steady(model, each, frequencies, every), axis=1) for each in few]
-    )
+
+    def strength(each: Variant) -> Floats:
+        at = weights(model.terms, each.solids, frequencies)
+        return np.asarray(np.linalg.norm(steady(model, at, each.shares, every), axis=1))
+
+    strengths = np.array([strength(each) for each in few])
     moving = np.where(frequencies > 0, strengths, 0.0).max(axis=1, keepdims=True)
     kept = (frequencies == 0) | (strengths > FAINTEST * moving).any(axis=0)
     many = [
         stage.bodies.body(at) for at in training_shares(len(stage.bodies.meshed), INSIDE).tolist()
     ]
     found, error = line_bases(
-        model.parts, model.forces[:, kept], model.outputs,
-        np.stack([weights(model.affine, solids_of(stage.reference, each), frequencies[kept])
+        replace(model, forces=model.forces[:, kept]),
+        np.stack([weights(model.terms, solids_of(stage.reference, each), frequencies[kept])
                   for each in many]),
         np.stack([geometry_shares(stage.bodies, each) for each in many]),
         SHARE * stage.tolerance, partial(report, "lines"),

@@ -1,55 +1,42 @@
-"""Cached projections and bases of a body with free materials: arrays of an entry, and back."""
+"""Cached models of a body with free materials: arrays of an entry, and back."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from fem.affine import KINDS, AffineOperators
-from fem.line_basis import LineBasis
-from fem.reduced_affine import AffineModel
-from meshes.tetmesh import Floats
+from fem.affine import KINDS
+from fem.affine_model import AffineModel
 
-OF_A_BASIS = ("parts", "force", "outputs", "states")
+OF_ALL = ("parts", "forces", "outputs")
+OF_A_LINE = (*OF_ALL, "basis")
 
 
-def packed(model: AffineModel, bases: Sequence[LineBasis]) -> dict[str, np.ndarray]:
-    """Arrays of projected matrices and of the bases of lines, end to end."""
-    counts = [len(getattr(model.affine, kind)) for kind in KINDS]
+def packed(model: AffineModel, bases: Sequence[AffineModel]) -> dict[str, np.ndarray]:
+    """Arrays of a model without its basis, and of those of lines in it, end to end."""
     return {
-        "matrices": model.parts,
-        "counts": np.array([*counts, model.affine.n_dofs]),
-        "free": model.affine.free,
-        "sizes": np.array([basis.states.shape[1] for basis in bases]),
-        **{
-            f"basis_{name}": np.concatenate([getattr(basis, name).ravel() for basis in bases])
-            for name in OF_A_BASIS
-        },
-    }
+        "terms": np.array([(KINDS.index(kind), r) for kind, r in model.terms]),
+        **{name: getattr(model, name) for name in OF_ALL},
+        "sizes": np.array([line.basis.shape[1] for line in bases]),
+        **{f"line_{name}": np.concatenate([getattr(line, name).ravel() for line in bases])
+           for name in OF_A_LINE},
+    }  # fmt: skip
 
 
-def unpacked(
-    entry: Mapping[str, Any], outputs: Floats
-) -> tuple[AffineOperators, Floats, tuple[LineBasis, ...]]:
-    """Projected matrices of one geometry by their kinds and of all (g, q, r, r), and bases of an
-    entry, with its outputs (g, p, r).
-    """
-    matrices, (*counts, n_dofs) = entry["matrices"], entry["counts"].tolist()
-    groups = [tuple(part) for part in np.split(matrices[0], np.cumsum(counts)[:-1])]
-    affine = AffineOperators(
-        **dict(zip(KINDS, groups, strict=True)), free=entry["free"], n_dofs=n_dofs
+def unpacked(entry: Mapping[str, Any]) -> tuple[AffineModel, tuple[AffineModel, ...]]:
+    """Model of an entry, its basis without rows, and those of lines in it."""
+    terms = tuple((KINDS[kind], r) for kind, r in entry["terms"].tolist())
+    (g, q, r, _), p = entry["parts"].shape, entry["outputs"].shape[1]
+    model = AffineModel(
+        terms=terms, basis=np.zeros((0, r)), **{name: entry[name] for name in OF_ALL}
     )
-    (g, q), (p, r), sizes = matrices.shape[:2], outputs.shape[1:], entry["sizes"].tolist()
-    shapes = {"parts": (g * q, -1, 0), "force": (g, 0), "outputs": (g, p, 0), "states": (r, 0)}
-    columns = {name: _split(entry[f"basis_{name}"], sizes, shapes[name]) for name in OF_A_BASIS}
-    each = (
-        dict(zip(OF_A_BASIS, parts, strict=True)) for parts in zip(*columns.values(), strict=True)
-    )
-    return affine, matrices, tuple(LineBasis(**basis) for basis in each)
-
-
-def _split(flat: Any, sizes: Sequence[int], shape: tuple[int, ...]) -> list[Any]:
-    """Arrays of a shape in which m, a size, stands for 0 and -1."""
-    shapes = [tuple(m if k < 1 else k for k in shape) for m in sizes]
-    ends = np.cumsum([np.prod(each, dtype=int) for each in shapes])
-    return [part.reshape(s) for part, s in zip(np.split(flat, ends[:-1]), shapes, strict=True)]
+    starts, lines = dict.fromkeys(OF_A_LINE, 0), []
+    for m in entry["sizes"].tolist():
+        shapes = {"parts": (g, q, m, m), "forces": (g, 1, m), "outputs": (g, p, m), "basis": (r, m)}
+        arrays = {}
+        for name, shape in shapes.items():
+            start = starts[name]
+            starts[name] += int(np.prod(shape))
+            arrays[name] = entry[f"line_{name}"][start : starts[name]].reshape(shape)
+        lines.append(AffineModel(terms=terms, **arrays))
+    return model, tuple(lines)

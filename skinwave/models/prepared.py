@@ -242,8 +242,8 @@ def _prepared_anew(
         "read": model.outputs,
         "sag": still,
         "carried": outputs @ translation(build, motion.unit if motion else (0.0, 0.0, 0.0)),
-        "relaxing": np.array([b.K for b in model.branches]).reshape(-1, *model.K.shape),
-        "relaxation_times": np.array([b.time for b in model.branches]),
+        "relaxing": np.array([b.K for b in reduced.branches]).reshape(-1, *reduced.damping.shape),
+        "relaxation_times": np.array([b.time for b in reduced.branches]),
         **{name: getattr(reduced, name) for name in ARRAYS},
     }
     cache.store(name, asdict(effort), **asdict(reduced.poles), **arrays)

@@ -11,6 +11,7 @@ load, for the motion of all of it.
 
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,17 +107,16 @@ def reduce_body(
         size = np.linalg.norm(loads) / np.linalg.norm(inertia)
         loads = np.column_stack([loads, size * inertia])
     model = fem.reduce(
-        operators, outputs, BAND, tolerance, loads=loads, added=air(body, build, operators),
+        operators, outputs, BAND, tolerance, loads=loads, added=air(body, build, operators.free),
         solver=solver, progress=partial(report, "reduce"),
     )  # fmt: skip
     P = P.tocsr()
     pushed = np.flatnonzero(np.diff(P.indptr))  # a few of all dofs
     reduced = ReducedBody(
-        poles=fem.poles(model, outputs=np.eye(len(model.K))), damping=model.C, radiation=model.R,
-        branches=model.branches, load=P[pushed].T @ model.basis[pushed], points=points,
-        inertia=np.zeros(len(model.K)) if inertia is None else inertia @ model.basis,
+        **_own(model.operators), load=P[pushed].T @ model.basis[pushed], points=points,
+        inertia=np.zeros(model.basis.shape[1]) if inertia is None else inertia @ model.basis,
         effort=Effort(
-            dofs=len(operators.free), reduced_dofs=len(model.K), solver=model.solver,
+            dofs=len(operators.free), reduced_dofs=model.basis.shape[1], solver=model.solver,
             factorisations=1, estimate=model.estimate,
         ),
     )  # fmt: skip
@@ -139,19 +139,15 @@ def reduced_variant(
     -------
     ReducedBody
     """
-    upright = np.linalg.inv(np.linalg.cholesky(operators.M)).T  # coordinates of unit mass
-    K, C, R = (upright.T @ A @ upright for A in (operators.K, operators.C, operators.R))
-    branches = with_internal(operators.branches)
-    model = fem.ReducedModel(
-        basis=upright, K=K, C=C, R=R, outputs=upright, moments=0, estimate=effort.estimate,
-        solver=effort.solver,
-        branches=tuple(replace(each, K=upright.T @ each.K @ upright) for each in branches),
-    )  # fmt: skip
-    poles = fem.poles(model)
-    return ReducedBody(
-        poles=replace(poles, inputs=poles.inputs @ upright.T), damping=operators.C,
-        radiation=operators.R, branches=tuple(branches), load=load, points=points, effort=effort,
-    )  # fmt: skip
+    return ReducedBody(**_own(operators), load=load, points=points, effort=effort)
+
+
+def _own(operators: fem.Operators) -> dict[str, Any]:
+    """Fields of a `ReducedBody` by its projected operators."""
+    return {
+        "poles": fem.poles(operators), "damping": operators.C, "radiation": operators.R,
+        "branches": with_internal(operators.branches),
+    }  # fmt: skip
 
 
 def reduced_forces(reduced: ReducedBody, *pressures: MovingPressure) -> tuple[Floats, fem.Complex]:

@@ -233,7 +233,7 @@ def _reduced(body: Body, h: float, solver: str) -> _Reduced:
     operators = stretching_body(body, made).operators
     modes = fem.stretching_modes(
         made.mesh, operators, membrane(body, made, 1.0), mode_count(body),
-        added=air(body, made, operators), solver=solver,
+        added=air(body, made, operators.free), solver=solver,
     )  # fmt: skip
     P, points = surface_load(made)
     modal = modes.elastic.operators

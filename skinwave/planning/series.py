@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fem.materials import Material
 from simple_model import MovingPressure
 from simple_model.layers.flat_body import steady_lines
+from simple_model.layers.material import Material
 from simple_model.load.spectrum import load_lines
 from skinwave.bodies.analytic import compliance
 from skinwave.models import named

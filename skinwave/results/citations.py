@@ -16,9 +16,6 @@ SOLVERS = {
     "pardiso": "O. Schenk, K. Gärtner: Solving unsymmetric sparse systems of linear equations with "
     "PARDISO. Future Generation Computer Systems 20 (2004) 475-487. "
     "doi 10.1016/j.future.2003.07.011",
-    "cholmod": "Y. Chen, T. A. Davis, W. W. Hager, S. Rajamanickam: Algorithm 887: CHOLMOD, "
-    "supernodal sparse Cholesky factorization and update/downdate. ACM Transactions on "
-    "Mathematical Software 35 (2008) 22. doi 10.1145/1391989.1391995",
     "superlu": "J. W. Demmel, S. C. Eisenstat, J. R. Gilbert, X. S. Li, J. W. H. Liu: A "
     "supernodal approach to sparse partial pivoting. SIAM Journal on Matrix Analysis and "
     "Applications 20 (1999) 720-755. doi 10.1137/S0895479895291765",

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from fem.materials import PRESETS
 from meshes import reading
 from simple_model.choices import choose, meant
+from simple_model.layers.material import PRESETS
 from skinwave.scene.distributions import Distribution, called, without_spreads
 from skinwave.scene.file import content, dumps, from_table, loads, parsed, read, to_table
 from skinwave.scene.keys import SCALES, SECTIONS, renamed, with_key, write_material

@@ -4,8 +4,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from fem.materials import Material
 from simple_model import MovingPressure, Tacton
+from simple_model.layers.material import Material
 from skinwave.bodies.mounting import FRAME
 from skinwave.models import named
 from skinwave.report.figures import answered

@@ -57,9 +57,12 @@ def lambs_disc() -> Case:
         fixed[np.abs(mesh.points[:, axis]) < 1e-9, axis] = True
     ops = fem.assemble(mesh, material, fixed=fixed)
     centre = fem.probe_operator(mesh, [[1e-9, 1e-9]])
+    models = (
+        fem.reduce(ops, centre, 300.0, added=added)
+        for added in (None, fem.added_mass(mesh, ops.free, AIR_DENSITY, mirrored="xy"))
+    )
     vacuum, air = (
-        np.sqrt(np.linalg.eigvalsh(fem.reduce(ops, centre, 300.0, added=added).K)[0]) / (2 * np.pi)
-        for added in (None, fem.added_mass(mesh, ops, AIR_DENSITY, mirrored="xy"))
+        np.sqrt(np.linalg.eigvalsh(model.operators.K)[0]) / (2 * np.pi) for model in models
     )
     beta = 2 * LAMBS_FACTOR * AIR_DENSITY * a / PAPER["mass_per_area"]
     return Case(
@@ -90,7 +93,7 @@ def focus_on_a_sheet_in_air() -> Case:
 
     model = fem.reduce(
         ops, sparse.csr_array(force.T), hz.max(), 2e-3,
-        added=fem.added_mass(mesh, ops, AIR_DENSITY, mirrored="xy"),
+        added=fem.added_mass(mesh, ops.free, AIR_DENSITY, mirrored="xy"),
     )  # fmt: skip
     model = replace(model, outputs=read @ model.basis)
     found = fem.transfer(model, model.basis.T @ force, hz)[..., 0]

@@ -9,8 +9,8 @@ import pytest
 import fem
 import meshes
 import skinwave
+from fem.affine_model import line_errors
 from fem.geometry import jacobians, shape_nodes
-from fem.line_basis import line_errors
 from fem.load_and_probe import on_surface
 from meshes.tetmesh import FACES, interface_facets
 from simple_model import MovingPressure, Tacton, Trajectory

@@ -222,10 +222,12 @@ def test_a_coated_body_has_its_damping_and_branches_as_those_of_the_body_but_at_
         fem.assemble(mesh, fem.PRESETS[below], fixed="bottom", absorbing="right", coat=each)
         for each in (None, coat)
     )
-    assert coated.laws.hold(coated.K, coated.C, coated.M, coated.branches)
+    stiffness = coated.C, *(branch.K for branch in coated.branches)
+    for A, part in zip(stiffness, coated.laws.parts, strict=True):
+        assert abs(part.of(coated.K) - A).max() < 1e-12 * abs(A).max()
     alike = (below, skin) in [("palm", "epidermis"), ("palm-zener", "palm-zener")]
     for own, part in zip(body.laws.parts, coated.laws.parts, strict=False):
-        assert (part.stiffness, part.mass) == (own.stiffness, own.mass)
+        assert part.stiffness == own.stiffness
     if alike:  # one ratio of viscosity, or of the branch, to the modulus
         damping, *branches = coated.laws.parts
         assert damping.rest is coated.R

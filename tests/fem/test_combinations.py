@@ -68,14 +68,13 @@ def test_moments_without_products_are_those_with_them(material):
     )
     np.testing.assert_allclose(one, other, atol=1e-8 * np.abs(other).max())
     assert not np.delete(found.basis, ops.free, axis=0).any()
-    basis = found.basis[ops.free]
-    for name in "KCR":
+    basis, projected = found.basis[ops.free], found.operators
+    for name in "KCMR":
+        small = getattr(projected, name)
         np.testing.assert_allclose(
-            basis.T @ (getattr(ops, name) @ basis), getattr(found, name),
-            atol=1e-9 * np.abs(getattr(found, name)).max(),
-        )  # fmt: skip
-    np.testing.assert_allclose(basis.T @ (ops.M @ basis), np.eye(len(found.K)), atol=1e-10)
-    for full, small in zip(ops.branches, found.branches, strict=True):
+            basis.T @ (getattr(ops, name) @ basis), small, atol=1e-9 * np.abs(small).max()
+        )
+    for full, small in zip(ops.branches, projected.branches, strict=True):
         np.testing.assert_allclose(
             basis.T @ (full.K @ basis), small.K, atol=1e-9 * np.abs(small.K).max()
         )
@@ -83,14 +82,8 @@ def test_moments_without_products_are_those_with_them(material):
 
 def test_combinations_of_replaced_matrices_are_not_used():
     mesh, ops, _ = block(PALM)
-    stiffer = replace(ops, K=2 * ops.K)
-    damped = replace(ops, C=ops.C + 1e-3 * abs(ops.C).max() / abs(ops.M).max() * ops.M)
-    assert ops.laws.hold(ops.K, ops.C, ops.M, ops.branches)
     S = fem.probe_operator(mesh, [[0.0, 0.0]])
-    for changed in (stiffer, damped):
-        assert not ops.laws.hold(changed.K, changed.C, changed.M, changed.branches)
+    damped = replace(ops, C=ops.C + 1e-3 * abs(ops.C).max() / abs(ops.M).max() * ops.M)
+    for changed in (replace(ops, K=2 * ops.K), damped):
         found, plain = (fem.reduce(o, S, 300.0) for o in (changed, replace(changed, laws=None)))
-        np.testing.assert_allclose(
-            fem.transfer(found, found.outputs.T, [200.0]),
-            fem.transfer(plain, plain.outputs.T, [200.0]), rtol=1e-6,
-        )  # fmt: skip
+        np.testing.assert_array_equal(found.operators.C, plain.operators.C)

@@ -185,10 +185,3 @@ def test_probes_read_the_displacement_along_the_push(distorted_cube):
     u[:, 2] = -(1 + distorted_cube.points[:, 0] ** 2)
     S = fem.probe_operator(distorted_cube, [[0.3, 0.4], [0.71, 0.2]])
     np.testing.assert_allclose(S @ u.ravel(), [1.09, 1.5041], rtol=1e-12)
-
-
-@pytest.mark.parametrize(("old", "new"), fem._RENAMED.items())
-def test_a_name_of_the_last_release_loads_with_a_warning(old, new):
-    with pytest.warns(DeprecationWarning, match=f"fem.{old} is now fem.{new}"):
-        assert getattr(fem, old) is getattr(fem, new)
-    assert not hasattr(fem, "nothing")

@@ -9,8 +9,9 @@ from scipy.optimize import least_squares
 import fem
 import skinwave
 from fem.affine import Solids, assemble_affine, operators_of, weights
+from fem.affine_model import AffineModel, line_errors, steady_lines
+from fem.greedy import line_bases
 from fem.harmonic import dynamic_stiffness
-from fem.line_basis import line_bases, line_errors, steady_lines
 from fem.load_and_probe import facet_normals
 from meshes import boundary_facets
 from simple_model import MovingPressure, PronyTerm, Tacton, Trajectory
@@ -232,7 +233,7 @@ def test_affine_sums_are_the_operators():
         assert abs(getattr(found, one) - wanted).max() <= 1e-12 * abs(wanted).max(), one
     assert len(affine.parts) == 4 + 4 + 4 + 4 + 1
     stiff = dynamic_stiffness(expected.K, expected.C, expected.M, expected.branches, 2e3j)
-    (at,) = weights(affine, solids, [1e3 / np.pi])
+    (at,) = weights(affine.terms, solids, [1e3 / np.pi])
     summed = sum(w * A for w, A in zip(at, affine.parts, strict=True))
     assert abs(summed - stiff).max() < 1e-12 * abs(stiff).max()
 
@@ -318,29 +319,32 @@ def test_the_ends_of_a_range_of_thickness_are_as_accurate_as_its_middle(thicknes
     assert line_errors(found[strong], expected).max() < 0.01
 
 
+def of_one_line(parts, outputs):
+    """Equations (q, r, r) of one line with forces of 1 and outputs (p, r)."""
+    q, r, _ = parts.shape
+    return AffineModel(
+        terms=(("stiffness", 0),) * q, parts=parts[None], outputs=outputs[None], basis=np.eye(r),
+        forces=np.ones((1, 1, r), complex),
+    )  # fmt: skip
+
+
 def test_a_line_takes_no_more_states_than_its_manifold_has():
     # (1 + w) x = f: one direction, whatever the weight.
-    parts = np.stack([np.eye(6), np.eye(6)])
-    force, outputs = np.ones((1, 6), complex), np.eye(2, 6)
+    model = of_one_line(np.stack([np.eye(6), np.eye(6)]), np.eye(2, 6))
     at = np.stack([np.ones(20), 1j * np.linspace(0, 3, 20)], axis=1)[:, None]
-    (basis,), error = line_bases(
-        parts[None], force[None], outputs[None], at, np.ones((20, 1)), 1e-3, lambda x: None
-    )
-    assert basis.states.shape == (6, 1)
+    (line,), error = line_bases(model, at, np.ones((20, 1)), 1e-3, lambda x: None)
+    assert line.basis.shape == (6, 1)
     assert error < 1e-12
-    found = steady_lines((basis,), np.array([[1.0, 0.7j]]), np.ones(1))
+    found = steady_lines((line,), np.array([[1.0, 0.7j]]), np.ones(1))
     assert found == pytest.approx(np.full((1, 2), 1 / (1 + 0.7j)))
 
 
 def test_ranges_that_few_states_do_not_span_are_refused():
     # Each material resonates elsewhere, without loss: no few states span that.
     at = np.random.default_rng(0).uniform(0, 1, (30, 1, 30)).astype(complex)
-    parts = np.stack([np.diag(row) for row in np.eye(30)])
+    model = of_one_line(np.stack([np.diag(row) for row in np.eye(30)]), np.ones((1, 30)))
     with pytest.raises(ValueError, match=r"^30 materials of the ranges leave an error of .*"):
-        line_bases(
-            parts[None], np.ones((1, 1, 30), complex), np.ones((1, 1, 30)), at, np.ones((30, 1)),
-            1e-6, lambda x: None,
-        )  # fmt: skip
+        line_bases(model, at, np.ones((30, 1)), 1e-6, lambda x: None)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from test_parametric import full_lines, scene_of
 
 import meshes
 import skinwave
-from fem.line_basis import line_errors
+from fem.affine_model import line_errors
 from meshes import MeshError, jacobian_ratios, mapped_palm, stretched_palm
 from meshes.shapes.palm import level_set
 from skinwave.bodies.build import build

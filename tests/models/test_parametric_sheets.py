@@ -10,10 +10,9 @@ import pytest
 
 import fem
 import skinwave
-from fem import affine_solution
-from fem.affine import Solids, fluid_of, in_vacuum, operators_of, project, weights, with_parts
-from fem.affine_solution import line_solution
-from fem.line_basis import line_errors
+from fem import affine as affine_sums
+from fem.affine import Solids, line_solution, operators_of, project, weights
+from fem.affine_model import line_errors
 from simple_model import MovingPressure, Tacton, Trajectory
 from skinwave.bodies.build import build, operators
 from skinwave.bodies.sheet import air
@@ -118,16 +117,16 @@ def test_projected_sums_in_air_are_those_of_the_operators(small):
     thin = replace(body, depth=0.6 * body.depth, material=replace(body.solid, loss_factor=0.07))
     solids = solids_of(reference_of(body, made, ()), thin)
     other = operators(build(thin, 1.5e-2))
-    around = air(thin, made, other)
+    around = air(thin, made, other.free)
     basis = np.random.default_rng(0).standard_normal((len(affine.free), 5))
     parts = project(affine, basis, np.zeros((len(affine.parts), 0, 0)))
-    found = operators_of(with_parts(affine, parts), solids)
-    fluid = basis.T @ (around.M @ basis)
+    found = operators_of(replace(affine, parts=parts), solids)
+    fluid = basis.T @ (around @ basis)
     for one, more in (("K", 0), ("C", 0), ("M", fluid), ("R", 0)):
         expected = basis.T @ getattr(other, one) @ basis + more
         assert np.abs(getattr(found, one) - expected).max() <= 1e-9 * np.abs(expected).max(), one
-    assert fluid_of(affine) is not None
-    sparse = operators_of(in_vacuum(affine), solids)
+    assert affine.fluid is not None
+    sparse = operators_of(affine.in_vacuum(), solids)
     assert abs(sparse.M - other.M).max() <= 1e-12 * abs(other.M).max()
 
 
@@ -135,15 +134,15 @@ def test_projected_sums_in_air_are_those_of_the_operators(small):
 def test_a_line_of_the_full_body_in_air_is_that_of_dense_matrices(small, fluid_share, monkeypatch):
     _, made, affine = small
     solids = Solids(materials=tuple(made.material.values()))
-    (of_line,) = weights(affine, solids, [180.0])
+    (of_line,) = weights(affine.terms, solids, [180.0])
     n = len(affine.free)
     A = sum(w * (part @ np.eye(n)) for w, part in zip(of_line, affine.parts, strict=True))
     force = np.random.default_rng(0).standard_normal((2, n)) * [[1], [1j]]
     expected = np.linalg.solve(A, force.sum(axis=0))
     found = line_solution(affine, of_line, force.sum(axis=0), fluid_share=fluid_share)
     assert np.linalg.norm(found - expected) < 1e-6 * np.linalg.norm(expected)
-    monkeypatch.setattr(affine_solution, "RESTART", 1)
-    monkeypatch.setattr(affine_solution, "CYCLES", 1)
+    monkeypatch.setattr(affine_sums, "RESTART", 1)
+    monkeypatch.setattr(affine_sums, "CYCLES", 1)
     with pytest.raises(fem.Diverged, match="not solved to a residual of 1e-08 by 1 iterations"):
         line_solution(affine, of_line, force.sum(axis=0), fluid_share=fluid_share)
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import fem.reduced
+import fem.krylov
 from simple_model import MovingPressure, Tacton, Trajectory, from_young
 from skinwave import plan
 from skinwave.bodies.mounting import Mounting
@@ -122,7 +122,7 @@ def test_what_a_warning_of_stretching_advises_is_computed(mounting):
 
 
 def test_a_reduction_out_of_reach_names_the_model_that_works(monkeypatch):
-    monkeypatch.setattr(fem.reduced, "MOST_MOMENTS", 6)
+    monkeypatch.setattr(fem.krylov, "MOST_MOMENTS", 6)
     pressure = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.05))
     scene = Scene(pressure=pressure, body=STRETCHED, probes=((0.01, 0.005),))
     with pytest.raises(ValueError, match="6 moments leave.*use --model"):

@@ -8,7 +8,7 @@ import pytest
 
 import fem
 import skinwave
-from fem.line_basis import line_errors
+from fem.affine_model import line_errors
 from fem.load_and_probe import facet_normals, load_operator, traction_operator
 from meshes import block
 from simple_model import Material, MovingPressure, Stack, Tacton, Trajectory

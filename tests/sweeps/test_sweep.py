@@ -15,8 +15,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-import fem.affine_solution
-import fem.reduced
+import fem.affine
+import fem.krylov
 import skinwave
 from simple_model import MovingPressure, Response, Tacton
 from skinwave import models
@@ -186,7 +186,7 @@ def counted(monkeypatch, folder):
     sweeping._prepared.cache_clear()
     families.reduced.cache_clear()
     made = []
-    for module, name in ((fem.reduced, "factorise"), (fem.affine_solution, "factoriser")):
+    for module, name in ((fem.krylov, "factorise"), (fem.affine, "factoriser")):
         inner = getattr(module, name)
         counting = lambda *a, inner=inner, **k: made.append(a) or inner(*a, **k)  # noqa: E731
         monkeypatch.setattr(module, name, counting)
