@@ -277,7 +277,8 @@ def line_bases(
         If `MOST_STATES` are not enough.
     """
     lines = range(model.forces.shape[1])
-    bases, errors = [_of_line(model, k, np.zeros((len(model.basis), 0))) for k in lines], []
+    nothing = np.zeros((model.parts.shape[-1], 0))
+    bases, errors = [_of_line(model, k, nothing) for k in lines], []
     before = np.zeros((len(weights), len(bases), model.outputs.shape[1]), complex)
     changes, left = np.zeros(len(weights)), np.ones(len(weights), bool)
     for _ in range(min(MOST_STATES, len(weights))):
