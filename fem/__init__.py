@@ -30,7 +30,7 @@ from fem.assembly import Operators, assemble
 from fem.boundary import Support
 from fem.coat import Coat
 from fem.energy import EnergyBalance, imbalance, mean_power, stored, with_energy_balance
-from fem.finite_strain import Elastic, Membrane, finite_strain
+from fem.finite_strain import Elastic, Membrane, finite_strain, shell_stiffness
 from fem.harmonic import LineSolver, harmonic
 from fem.interior import displacement_operator, is_inside, locate
 from fem.krylov import NotReduced, load_subspace, reduce
@@ -58,7 +58,6 @@ from fem.reduced import (
     transfer,
 )
 from fem.reduced_nonlinear import StretchingModes, stretching_modes
-from fem.shallow_shell import shell_stiffness
 from fem.static import modes, static
 from fem.stress import (
     materials_at,

@@ -34,7 +34,15 @@ from fem.coat import Coat, coat_operators
 from fem.combination import Laws, proportional, with_added
 from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradient_integrals, jacobians, shape_nodes
-from fem.maxwell import Branch, MaxwellBranch, on_free
+from fem.maxwell import (
+    Branch,
+    Matrices,
+    MaxwellBranch,
+    on_free,
+    property_of,
+    together,
+    viscoelastic,
+)  # fmt: skip
 from fem.memory import check_memory
 from fem.plane_stiffness import (
     SIDES,
@@ -53,7 +61,6 @@ from fem.sparsity import (
     slabs,
 )
 from fem.typing import Bools, Floats, Ints
-from fem.viscoelastic import Matrices, property_of, together, viscoelastic
 from meshes import TetMesh, facet_set
 from simple_model.layers.material import Material
 
@@ -156,7 +163,7 @@ def assemble(
     axes : (2, 3) float, unit vectors along x and y of a sheet that is orthotropic or stretched,
         those of the coordinates if not given
     stiffener : (3 n, 3 n) N/m, elastic stiffness beside that of the elements, such as that of a
-        `shallow_shell`, which scales with the modulus of the first material; or None
+        `shell_stiffness`, which scales with the modulus of the first material; or None
 
     Returns
     -------

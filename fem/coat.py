@@ -41,8 +41,8 @@ from scipy import sparse
 from fem.boundary import owners
 from fem.elements import TRIANGLE_EDGES, shape_derivatives, shape_functions, triangle_rule
 from fem.load_and_probe import facet_areas
+from fem.maxwell import Matrices, property_of, viscoelastic
 from fem.typing import Bools, Floats, Ints
-from fem.viscoelastic import Matrices, property_of, viscoelastic
 from meshes import TetMesh, facet_set
 from simple_model.layers.material import Material
 

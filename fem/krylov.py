@@ -1,38 +1,29 @@
-"""Reduced-order model of the probes' response to any surface load, by Krylov moment matching.
+"""Krylov moment matching: the basis of a reduced-order model of probes under any surface load.
 
 With A(s) = K + s C + s^2 M (and s tau_j / (1 + s tau_j) K_j for each generalised Maxwell branch),
 symmetric, the transfer function from a load f to a probe s_p is, by reciprocity,
 
     H(s) = s_p^T A(s)^-1 f = f^T y(s),   A(s) y(s) = s_p
 
-and Galerkin projection onto a basis V gives H_r(s) = f^T V (V^T A V)^-1 V^T s_p = f^T V c. As the
-residual A (y - V c) is orthogonal to V, the error is, for any coefficients g,
+V holds the first n moments of y, its Taylor coefficients about one real expansion point s_0. Then
+Galerkin projection onto V has the same moments of H (Bai and Su, SIAM J Sci Comput 26:1692, 2005),
+at the cost of one real factorisation. V is built by the two-level orthogonal Arnoldi procedure
+(TOAR: Lu, Su and Bai, SIAM J Matrix Anal Appl 37:195, 2016): with proportional damping the plain
+recurrence loses all accuracy after a few dozen moments. The dashpot stretches of Maxwell branches,
+y / (1 + s tau_j), are further parts of the linearised vectors; their moments lie in the same space.
+The basis is mass-orthonormal. Added mass of a fluid is dense and can only be applied: with it the
+expansion point is 0, where no mass is factorised.
 
-    H(s) - H_r(s) = (A(s)^-1 f - V g)^T A(s) (y(s) - V c)
-
-V holds the first n moments of y, its Taylor coefficients about one real expansion point s_0: then
-those of H and of H_r are the same (Bai and Su, SIAM J Sci Comput 26:1692, 2005), which costs one
-real factorisation. V is built by the two-level orthogonal Arnoldi procedure (TOAR: Lu, Su and Bai,
-SIAM J Matrix Anal Appl 37:195, 2016): with proportional damping the plain recurrence loses all
-accuracy after a few dozen moments. The dashpot stretches of Maxwell branches, y / (1 + s tau_j),
-are further parts of the linearised vectors: their moments lie in the same space, so that the
-moments matched are those of the exact constitutive law.
-The basis is mass-orthonormal: the reduced mass is the identity, and field norms are vector norms.
-Added mass of a fluid is dense and can only be applied: with it the expansion point is 0, where no
-mass is factorised.
-
-The error estimate needs no solution of the full system: it is the difference from the response of
-the model with some more moments, which by Galerkin orthogonality solves the residual equation in
-the larger space. Those further moments are then dropped: the error of the larger model would be
-unknown, because convergence may become steep or stall at any moment.
+The error estimate is the difference from the response of the model with some more moments, which by
+Galerkin orthogonality solves the residual equation in the larger space. Those further moments are
+then dropped: the error of the larger model would be unknown, because convergence may become steep
+or stall at any moment.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -125,8 +116,9 @@ def reduce(
     space = KrylovBasis(operators, laws, independent.shape[1] * (MOST_MOMENTS + 1))
     seen = start_vectors if loads is None else np.hstack([start_vectors, loads[free]])
     growing = _moments(space, operators, laws, point, factor, independent)
-    look = partial(_look, space, seen, start_vectors.shape[1], band, tolerance)
-    moments, size, estimate = _converged(growing, look, tolerance, report)
+    moments, size, estimate = _converged(
+        space, seen, start_vectors.shape[1], band, tolerance, growing, report
+    )
 
     backend = factor.backend
     del factor  # whose memory the basis takes
@@ -181,8 +173,8 @@ class KrylovBasis:
         return self._columns[:, : self.size]
 
     def expanded(self, size: int) -> Floats:
-        """The first vectors on all dofs (n_dofs, size), 0 where the body is fixed; in the memory of
-        the basis, which there is none of afterwards.
+        """The first vectors on all dofs (n_dofs, size), 0 where the body is fixed. Reuses the basis
+        buffer; the basis is invalid afterwards.
         """
         for column in self._all_dofs[:, :size].T:
             values = column[: len(self._free)].copy()
@@ -268,80 +260,42 @@ class KrylovBasis:
                 self._small_rests[j] = _bordered(small, _products(times, Q, new))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Look:
-    """Responses of the model of so many moments and vectors, and by them the relative error of the
-    model that was looked at before; infinite if there was none.
-    """
-
-    moments: int
-    size: int
-    responses: Complex
-    error: float
-
-
-def _look(
+def _converged(
     space: KrylovBasis,
     seen: Floats,
     probes: int,
     band: float,
     tolerance: float,
-    before: Look | None,
-    moments: int,
-    size: int,
-) -> Look:
-    """The next look, by what is seen (n, probes + loads) of a response."""
-    space.project(seen, size)
+    growing: Iterable[tuple[int, int]],
+    report: Callable[[float], None],
+) -> tuple[int, int, float]:
+    """Moments and vectors of the first model within the tolerance, and its error, as both grow, by
+    what is seen (n, probes + loads) of a response.
+    """
     # Nearly from 0 Hz: at 0 Hz itself an unconstrained body has no finite response.
     fine = np.asarray(2j * np.pi * np.linspace(1e-3 * band, band, LOOKED_AT), np.complex128)
     coarse = fine[::AT_FIRST]  # until the error is below the tolerance there
-    responses, error = _band_response(space, probes, coarse, size), np.inf
-    if before:
-        error = _largest_change(before.responses, responses)
-        if error <= tolerance:
-            both = (_band_response(space, probes, fine, each) for each in (before.size, size))
-            error = _largest_change(*both)
-    return Look(moments=moments, size=size, responses=responses, error=error)
-
-
-def _converged(
-    growing: Iterable[tuple[int, int]],
-    look: Callable[[Look | None, int, int], Look],
-    tolerance: float,
-    report: Callable[[float], None],
-) -> tuple[int, int, float]:
-    """Moments and vectors of the first model within the tolerance, and its error, as both grow.
-
-    A second thread looks while further moments are computed, because solutions keep a core waiting
-    for memory. How long it takes decides what is computed in vain, and nothing else.
-    """
-    looks: list[Look] = []
-
-    def reached(found: Look) -> bool:
-        looks.append(found)
-        if len(looks) > 1:
-            first = looks[1].error
-            report(max(0.0, np.log(found.error / first) / np.log(tolerance / first)))
-        return found.error <= tolerance
-
-    with ThreadPoolExecutor(1) as aside:
-        at, waited = 0, None
-        for moments, size in growing:
-            due = moments >= at + max(FEWEST_BETWEEN, SHARE_BETWEEN * moments)
-            if waited and (due or waited.done()):
-                if reached(waited.result()):
-                    break
-                waited = None
-            if due:
-                at = moments
-                waited = aside.submit(look, looks[-1] if looks else None, moments, size)
-        else:
-            if not (waited and reached(waited.result())):
-                raise NotReduced(
-                    f"{MOST_MOMENTS} moments leave an error of {looks[-1].error:.2g}, above the "
-                    f"tolerance {tolerance:g}; raise the tolerance, narrow the band or add damping"
-                )
-    return looks[-2].moments, looks[-2].size, looks[-1].error
+    at, before, response, first, error = 0, (0, 0), None, np.inf, np.inf
+    for moments, size in growing:
+        if moments < at + max(FEWEST_BETWEEN, SHARE_BETWEEN * moments):
+            continue
+        at = moments
+        space.project(seen, size)
+        now = _band_response(space, probes, coarse, size)
+        if response is not None:
+            error = _largest_change(response, now)
+            if error <= tolerance:
+                both = (_band_response(space, probes, fine, each) for each in (before[1], size))
+                error = _largest_change(*both)
+            first = error if first == np.inf else first
+            report(max(0.0, np.log(error / first) / np.log(tolerance / first)))
+            if error <= tolerance:
+                return *before, error
+        before, response = (moments, size), now
+    raise NotReduced(
+        f"{MOST_MOMENTS} moments leave an error of {error:.2g}, above the tolerance {tolerance:g}; "
+        "raise the tolerance, narrow the band or add damping"
+    )
 
 
 def _expansion(

@@ -29,14 +29,7 @@ def load_operator(mesh: TetMesh, facets: str | Ints = "top") -> sparse.csr_array
 
     Pressure pushes into the body, against the outward normal.
     """
-    nodes = facet_set(mesh, facets)
-    N, normals = facet_geometry(mesh, nodes)  # normals carry the quadrature weight and area
-    k, q = normals.shape[:2]
-    forces = -np.einsum("qa,eqi->eaiq", N, normals)
-    rows = (3 * nodes[:, :, None, None] + np.arange(3)[:, None]).repeat(q, axis=3)
-    columns = np.broadcast_to(np.arange(k * q).reshape(k, 1, 1, q), rows.shape)
-    shape = (mesh.n_dofs, k * q)
-    return sparse.csr_array((forces.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
+    return traction_operator(mesh, -facet_normals(mesh, facets), facets)
 
 
 def traction_operator(

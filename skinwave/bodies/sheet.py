@@ -10,9 +10,8 @@ from scipy import sparse
 from scipy.sparse.linalg import LinearOperator
 
 from fem.added_mass import added_mass
-from fem.finite_strain import Membrane
+from fem.finite_strain import Membrane, shell_stiffness
 from fem.plane_stiffness import Tension
-from fem.shallow_shell import shell_stiffness
 from meshes import TetMesh, middle_plane, sheet
 from meshes.shapes.structured import check_size, round_up
 from meshes.tetmesh import Floats, Ints
