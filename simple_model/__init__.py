@@ -22,12 +22,11 @@ from simple_model.load.focus import (
     read_pressure_map,
     relative_intensity,
 )
-from simple_model.load.joined import evenly, joined
 from simple_model.load.line_names import named_lines
 from simple_model.load.pressure import MovingPressure
 from simple_model.load.rhythm import Rhythm, Signal
 from simple_model.load.tacton import SUPERPOSITIONS, Tacton, commanded, modulation, pattern_period
-from simple_model.load.trajectory import SHAPES, Trajectory, arc_path, timed_path
+from simple_model.load.trajectory import SHAPES, Trajectory, evenly, joined, timed_path
 from simple_model.point_kernel import point_kernel, point_kernel_published, published
 from simple_model.response import Effort, Response, are_resolved, lines, phasors, spectrum
 from simple_model.threshold import sensation_level, threshold
@@ -56,7 +55,6 @@ __all__ = [
     "Tacton",
     "Trajectory",
     "Unnamed",
-    "arc_path",
     "are_resolved",
     "array_field",
     "commanded",

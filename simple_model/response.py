@@ -4,34 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simple_model import conversion, drawing, motion_rates, response_page
+from simple_model import drawing
 from simple_model.load.line_names import line_names
 from simple_model.load.pressure import MovingPressure
 from simple_model.load.sampling import step
+from simple_model.numbers import counted, significant, stated_error
 from simple_model.quantities import (
     ACCELERATION,
     DISPLACEMENT,
     PRESSURE,
-    STRAIN,
     VELOCITY,
     NotOfThis,
     Quantity,
     quantity,
 )
 from simple_model.spectra import Lines, Spectrum
-from simple_model.typing import Floats
-from simple_model.windows import kaiser, named
+from simple_model.typing import Complex, Floats, Mask
+from simple_model.windows import cosines, kaiser
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
+DEGREE = 9  # of the splines that are differentiated
+SHOWN = 0.030  # s of waveforms on a page, at their end
+MOST_ROWS = 12  # probes in a table
 # Side lobes of the Kaiser window below -140 dB resolve lines as weak as that from strong ones.
 LINE_BETA, LINE_BINS = 19.0, 2.5  # it resolves lines that are so many bins apart
 SETTLE = 0.25  # of a response, before which no line is fitted
@@ -150,24 +155,30 @@ class Response:
         1e-8 of lines below a tenth of the sampling rate and 1e-4 below a quarter; within 20
         samples of its ends of 1e-3 and more.
         """
-        return motion_rates.derivative(self, VELOCITY)
+        return self._derivative(VELOCITY)
 
     @property
     def acceleration(self) -> Floats:
-        """Acceleration (t, p) in m/s2 into the body, likewise, of a velocity, too."""
-        return motion_rates.derivative(self, ACCELERATION)
+        """Acceleration (t, p) in m/s2 into the body, likewise; of a velocity, too."""
+        return self._derivative(ACCELERATION)
 
-    @property
-    def strain(self) -> Floats:
-        """Strain (t, p) of a response that is of one; a ValueError of anything else, of which no
-        strain is known.
-        """
-        if self.record.field != STRAIN or self.unit != "1":
+    def _derivative(self, wanted: Quantity) -> Floats:
+        own, order = self.record, wanted.rate - self.record.rate
+        if not own.is_normal or order < 0:
             raise NotOfThis(
-                f"this response is of {self.record.words}, from which no strain follows; simulate "
-                'the scene with quantity = "strain_xx" or another strain'
+                f"this response is of {own.words}, from which no {wanted.words} follows; simulate "
+                f'the scene with quantity = "{wanted.name}"'
             )
-        return self.values
+        if not order:
+            return self.values
+        if len(self.times) <= DEGREE:
+            raise NotOfThis(
+                f"{len(self.times)} times are too few to differentiate, which takes {DEGREE + 1}; "
+                "sample it longer"
+            )
+        from scipy.interpolate import make_interp_spline  # which takes long to import
+
+        return np.asarray(make_interp_spline(self.times, self.values, DEGREE)(self.times, order))
 
     @property
     def lines(self) -> Lines:
@@ -216,33 +227,93 @@ class Response:
         """The values as an array with dimensions time and probe, times in s and x, y in metre of
         the probes as coordinates, units as attributes.
         """
-        return conversion.to_xarray(self)
+        places = {
+            axis: ("probe", x.copy(), {"units": "m"})
+            for axis, x in zip("xyz", self.probes.T, strict=False)
+        }
+        return library("xarray").DataArray(
+            self.values.copy(), dims=("time", "probe"), name=self.quantity,
+            coords={"time": ("time", self.times.copy(), {"units": "s"}), **places},
+            attrs=self._attributes(),
+        )  # fmt: skip
 
     def to_pandas(self) -> pd.DataFrame:
         """The values as a table, rows by time_s and columns by x_m and y_m of the probes, the unit
         in its `attrs`.
         """
-        return conversion.to_pandas(self)
+        pandas = library("pandas")
+        names = [f"{axis}_m" for axis in "xyz"[: self.probes.shape[1]]]
+        frame = pandas.DataFrame(
+            self.values.copy(),
+            index=pandas.Index(self.times.copy(), name="time_s"),
+            columns=pandas.MultiIndex.from_arrays(self.probes.T.copy(), names=names),
+        )
+        frame.attrs = self._attributes()
+        return frame
 
-    @classmethod
-    def from_xarray(cls, array: xr.DataArray) -> Response:
-        """The response of such an array; its effort and load are not in it."""
-        return _converted(**conversion.of_xarray(array))
-
-    @classmethod
-    def from_pandas(cls, table: pd.DataFrame) -> Response:
-        """The response of such a table; its effort and load are not in it."""
-        return _converted(**conversion.of_pandas(table))
+    def _attributes(self) -> dict[str, Any]:
+        """Quantity, unit, model, error and warnings, of types that netCDF takes."""
+        return {
+            "units": self.unit,
+            "long_name": self.record.words,
+            "quantity": self.quantity,
+            "model": self.model,
+            "expected_error": float(self.expected_error),
+            "warnings": "\n".join(self.effort.warnings),
+        }
 
     def __repr__(self) -> str:
-        return response_page.line(self)
+        record, times = self.record, self.times
+        largest = record.per_unit * float(np.abs(self.values).max(initial=0.0))
+        size = f"{counted(len(times), 'time')}, {counted(len(self.probes), 'probe')}"
+        said = [
+            f"{record.words} ({size}) from {1e3 * times[0]:g} to {1e3 * times[-1]:.5g} ms, at most "
+            f"{significant(largest)} {record.shown}",
+            f"expected error {stated_error(self.expected_error)}",
+            counted(len(self.effort.warnings), "warning"),
+        ]
+        return f"<Response of {self.model}: {'; '.join(said)}>"
 
     def _repr_html_(self) -> str:
-        return response_page.html(self)
+        """A small page: the last waveforms, the spectrum, facts, and the size at every probe."""
+
+        def draw(figure: Figure) -> None:
+            left, right = figure.subplots(1, 2)
+            end = 1e3 * self.times[-1]
+            self.plot(ax=left).set_xlim(max(1e3 * self.times[0], end - 1e3 * SHOWN), end)
+            self.spectrum().plot(ax=right)
+            if legend := right.get_legend():  # the same as that on the left
+                legend.remove()
+
+        image = drawing.picture(draw, 8, 2.6) if len(self.times) > 1 else b""
+        title, times, unit = f"{self.model}: {self.record.words}", self.times, self.record.shown
+        dofs, seconds = self.effort.dofs, sum(self.effort.seconds.values())
+        facts = [
+            ["times", f"{len(times):,} from {1e3 * times[0]:g} to {1e3 * times[-1]:.5g} ms"],
+            ["expected error", stated_error(self.expected_error)],
+            ["degrees of freedom", f"{dofs:,}" if dofs else "none"],
+            ["cost", f"{seconds:.2g} s"],
+        ]
+        values = self.record.per_unit * self.values
+        largest, rms = np.abs(values).max(axis=0), values[int(SETTLE * len(values)) :].std(axis=0)
+        rows = [
+            [drawing.place_name(place), f"{peak:.4g}", f"{level:.4g}"]
+            for place, peak, level in zip(self.probes, largest, rms, strict=True)
+        ]
+        header = ["probe, mm", f"largest, {unit}", f"RMS about the mean, {unit}"]
+        left = [[f"{len(rows) - MOST_ROWS:,} further probes"]] if len(rows) > MOST_ROWS else []
+        tables = [drawing.table(facts), drawing.table([*rows[:MOST_ROWS], *left], header)]
+        return drawing.page(title, image, tables, self.effort.warnings)
 
 
-def _converted(warnings: tuple[str, ...], **fields: Any) -> Response:
-    return Response(effort=Effort(warnings=warnings), **fields)
+def library(name: str) -> Any:
+    """An optional library; raises an ImportError with its cure if it is not installed."""
+    try:
+        return import_module(name)
+    except ModuleNotFoundError as error:
+        if error.name != name:
+            raise
+        raise ImportError(f"{name} is not installed; pip install {name}", name=name) from None
 
 
 def _check_shapes(times: Floats, probes: Floats, values: Floats) -> None:
@@ -275,11 +346,11 @@ def _check_spacing(times: Floats) -> None:
 def spectrum(response: Response, window: str = "hann") -> tuple[Floats, Floats]:
     """Amplitude spectrum: frequencies (f,) in Hz and amplitudes (f, p) in the response's unit.
 
-    A sinusoid of amplitude a on a bin shows as a, whatever the window (any name that
-    `scipy.signal.get_window` knows).
+    A sinusoid of amplitude a on a bin shows as a, whatever the window, a name of
+    `windows.COSINES`.
     """
     n = len(response.times)
-    weights = named(window, n)
+    weights = cosines(window, n)
     amplitude = np.abs(np.fft.rfft(response.values * weights[:, None], axis=0))
     amplitude *= 2 / weights.sum()
     amplitude[0] /= 2
@@ -287,22 +358,11 @@ def spectrum(response: Response, window: str = "hann") -> tuple[Floats, Floats]:
 
 
 def lines(response: Response, frequencies: ArrayLike, *, settle: float = SETTLE) -> Floats:
-    """Line amplitudes: the moduli of `phasors`.
-
-    Parameters
-    ----------
-    response, frequencies, settle : as for `phasors`
-
-    Returns
-    -------
-    (f, p) float, in the unit of the response
-    """
+    """Line amplitudes (f, p) in the unit of the response: the moduli of `phasors`."""
     return np.abs(phasors(response, frequencies, settle=settle))
 
 
-def phasors(
-    response: Response, frequencies: ArrayLike, *, settle: float = SETTLE
-) -> NDArray[np.complex128]:
+def phasors(response: Response, frequencies: ArrayLike, *, settle: float = SETTLE) -> Complex:
     """Phasors: complex amplitudes a of Re a exp(2 pi i f t), by weighted least squares.
 
     All lines and the mean are fitted together under a Kaiser window, so that neither the position
@@ -323,7 +383,7 @@ def phasors(
     Raises
     ------
     ValueError
-        If a frequency is not below half the sampling rate.
+        If a frequency is not below half the sampling rate, or the samples are too few.
     """
     return fit_lines(response, frequencies, settle=settle)[0]
 
@@ -339,7 +399,7 @@ def are_resolved(
     *,
     settle: float = SETTLE,
     strengths: ArrayLike | None = None,
-) -> NDArray[np.bool_]:
+) -> Mask:
     """Mask of frequencies that `lines` resolves from 0 Hz and from the others.
 
     Frequencies that differ by at most `ALIKE` of the resolution are one line and need not be
@@ -368,18 +428,9 @@ def are_resolved(
         told = clear
 
 
-def unmixed(frequencies: Floats, strengths: Floats, least: float) -> NDArray[np.bool_]:
-    """Mask of lines of which no near line, nor rest, has 5 %.
-
-    Parameters
-    ----------
-    frequencies : (f,) float, Hz
-    strengths : (f,) float, of any unit
-    least : Hz, below which lines are near each other
-
-    Returns
-    -------
-    (f,) bool
+def unmixed(frequencies: Floats, strengths: Floats, least: float) -> Mask:
+    """Mask (f,) of lines at frequencies in Hz of which neither lines nearer than `least` Hz, nor
+    the mean, have 5 %, by strengths (f,) of any unit.
     """
     away = np.abs(frequencies[:, None] - frequencies)
     near, alike = away < least, away <= ALIKE * least
@@ -392,25 +443,12 @@ def hidden(
     frequencies: Floats,
     strengths: Floats,
     rest: Floats,
-    fitted: NDArray[np.bool_],
+    fitted: Mask,
     *,
     settle: float = SETTLE,
-) -> NDArray[np.bool_]:
-    """Mask of lines of which more than 5 %, or of a fiftieth of the strongest if that is more, are
-    likely to be side lobes of those that are not fitted.
-
-    Parameters
-    ----------
-    response : Response
-    frequencies : (f,) float, Hz
-    strengths : (f,) float, amplitudes of the lines
-    rest : (f,) float, in the same unit, amplitudes that are not fitted
-    fitted : (f,) bool
-    settle : fraction of the response that is left out at its start
-
-    Returns
-    -------
-    (f,) bool
+) -> Mask:
+    """Mask (f,) of lines of which more than 5 %, or of a fiftieth of the strongest if that is more,
+    are likely to be side lobes of those that are not fitted, whose amplitudes are `rest` (f,).
     """
     least = resolution(response, settle=settle)
     distinct, _ = _distinct(frequencies[fitted], least)
@@ -428,22 +466,9 @@ def _kaiser_transform(x: Floats, beta: float) -> Floats:
 
 def fit_lines(
     response: Response, frequencies: ArrayLike, *, settle: float = SETTLE
-) -> tuple[NDArray[np.complex128], Floats]:
-    """Phasors and remainder of a response.
-
-    Parameters
-    ----------
-    response, frequencies, settle : as for `phasors`
-
-    Returns
-    -------
-    complex amplitudes (f, p), and the remainder (t, p) of the whole response without these lines
-    and the mean, in its unit
-
-    Raises
-    ------
-    ValueError
-        If a frequency is not below half the sampling rate, or the samples are too few.
+) -> tuple[Complex, Floats]:
+    """Phasors (f, p), as `phasors` has them, and the remainder (t, p) of the whole response without
+    these lines and the mean.
     """
     t, x = response.times, response.values
     basis, weighted, inverse, which = _weighted_waves(t, frequencies, settle)
@@ -457,11 +482,6 @@ def line_rows(
     times: Floats, frequencies: ArrayLike, *, settle: float = SETTLE
 ) -> tuple[Floats, Floats, NDArray[np.intp]]:
     """Rows of the least squares of `fit_lines`, from which the errors of lines follow.
-
-    Parameters
-    ----------
-    times : (t,) float, s, equally spaced
-    frequencies, settle : as for `phasors`
 
     Returns
     -------

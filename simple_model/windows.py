@@ -6,14 +6,20 @@
 import numpy as np
 from scipy.special import i0
 
+from simple_model.choices import choose
 from simple_model.typing import Floats
 
 # Weights of cosines (Harris 1978, doi:10.1109/PROC.1978.10837).
-COSINES = {"hann": (0.5, 0.5), "blackmanharris": (0.35875, 0.48829, 0.14128, 0.01168)}
+COSINES = {
+    "boxcar": (1.0,),
+    "hann": (0.5, 0.5),
+    "blackmanharris": (0.35875, 0.48829, 0.14128, 0.01168),
+}
 
 
 def cosines(name: str, n: int) -> Floats:
-    """A periodic window (n,) of so many cosines."""
+    """A periodic window (n,) of a name of `COSINES`."""
+    choose("window", name, COSINES)
     if n < 2:
         return np.ones(n)
     turn = np.linspace(-np.pi, np.pi, n + 1)[:n]
@@ -29,12 +35,3 @@ def kaiser(n: int, beta: float) -> Floats:
         return np.ones(n)
     half = (n - 1) / 2
     return np.asarray(i0(beta * np.sqrt(1 - ((np.arange(n) - half) / half) ** 2)) / i0(beta))
-
-
-def named(name: str, n: int) -> Floats:
-    """A periodic window (n,) of any name that `scipy.signal.get_window` knows."""
-    if name in COSINES:
-        return cosines(name, n)
-    from scipy.signal import get_window
-
-    return np.asarray(get_window(name, n))

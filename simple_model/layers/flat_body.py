@@ -97,11 +97,6 @@ def field_lines(
     Returns
     -------
     frequencies (f,) in Hz >= 0 and complex amplitudes a (f, p, m) of Re a exp(2 pi i f t)
-
-    Raises
-    ------
-    ValueError
-        As `steady_lines` does.
     """
     _check(pressure)
     lines, probes = load_lines(pressure, threshold), np.atleast_2d(np.asarray(probes, np.float64))
@@ -174,11 +169,6 @@ def steady_state(
     Returns
     -------
     Response, displacement (t, p) in metre
-
-    Raises
-    ------
-    ValueError
-        As `steady_lines` does.
     """
     started = time.perf_counter()
     probes = np.atleast_2d(np.array(probes, np.float64))
@@ -234,11 +224,6 @@ def field_history(
     Returns
     -------
     (t, p, m) float
-
-    Raises
-    ------
-    ValueError
-        As `flat_body` does.
     """
     _check(pressure)
     probes = np.atleast_2d(np.asarray(probes, np.float64))

@@ -152,11 +152,6 @@ def from_rest(
     Returns
     -------
     (t, p) float, in the unit of the quantity
-
-    Raises
-    ------
-    ValueError
-        As `flat_body` does.
     """
     found = field_history(field, pressure, probes, times)
     return asked.waveforms(found.reshape(len(found), -1), found.shape[1])
@@ -174,11 +169,6 @@ def steady(
     Returns
     -------
     (t, p) float, in the unit of the quantity
-
-    Raises
-    ------
-    ValueError
-        As `steady_lines` does.
     """
     f, a = sampled_lines(field, pressure, probes, times)
     return asked.waveforms(synthesise(f, a.reshape(len(f), -1), times), a.shape[1])

@@ -261,11 +261,6 @@ def orthotropic(
     -------
     Material
         Whose shear modulus and Poisson's ratio are those of the isotropic mean.
-
-    Raises
-    ------
-    ValueError
-        As `Orthotropy` and `Material` do.
     """
     along = Orthotropy(young_x=young_x, young_y=young_y, poisson_xy=poisson_xy, shear_xy=shear_xy)
     return Material(
@@ -290,11 +285,6 @@ def of_law(*, density: float, poisson: float, law: Any) -> Material:
     -------
     Material
         Whose modulus at rest is that of the law.
-
-    Raises
-    ------
-    ValueError
-        As `Material` does.
     """
     return Material(density=density, shear_modulus=law.shear_modulus, poisson=poisson, law=law)
 
@@ -315,11 +305,6 @@ def tabulated(
     -------
     Material
         Whose modulus at rest is that at 0 Hz or, without one, that of the table's Prony series.
-
-    Raises
-    ------
-    ValueError
-        As `ModulusTable` does.
     """
     f, mu = np.asarray(frequencies, np.float64), np.asarray(moduli, np.complex128)
     table = ModulusTable(frequencies=tuple(f.tolist()), moduli=tuple(mu.tolist()))

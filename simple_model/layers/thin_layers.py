@@ -120,11 +120,6 @@ def pencil(stack: Stack, omega: Floats, moduli: Complex) -> Pencil:
     Returns
     -------
     Pencil
-
-    Raises
-    ------
-    ValueError
-        As `elements` does.
     """
     layers, length = elements(stack, omega)
     nodes, w, D = lobatto()

@@ -64,16 +64,7 @@ def named_lines(
     most: int = MOST,
     candidates: Iterable[str] = (),
 ) -> dict[str, float]:
-    """Names and frequencies of the lines of a load.
-
-    Parameters
-    ----------
-    pressure, threshold, most, candidates : as for `line_names`
-
-    Returns
-    -------
-    frequencies in Hz by name
-    """
+    """Frequencies in Hz by name of the lines of a load, as `line_names` has them."""
     found = line_names(pressure, threshold, most=most, candidates=candidates)
     return dict(zip(found.names, found.frequencies.tolist(), strict=True))
 
@@ -102,13 +93,6 @@ def line_names(
     -------
     LineNames, Hz and Pa
     """
-    return _line_names(pressure, threshold, most, tuple(candidates))
-
-
-@lru_cache(maxsize=16)  # several models take each load; of one with a rhythm up to some MB
-def _line_names(
-    pressure: MovingPressure, threshold: float, most: int, candidates: tuple[str, ...]
-) -> LineNames:
     orders, strengths = _load_orders(pressure, threshold)
     of_tacton = symbols(pressure.tacton)
     asked = [_orders(name) for name in candidates]
@@ -151,13 +135,7 @@ def line_name(orders: Sequence[int], of_tacton: Floats) -> str:
 
 
 def _orders(name: str) -> Orders:
-    """Orders (6,) of `SYMBOLS` that a name says.
-
-    Raises
-    ------
-    ValueError
-        If the name is no sum of them.
-    """
+    """Orders (6,) of `SYMBOLS` in a name; raises a ValueError if it is no sum of them."""
     found = np.zeros(len(SYMBOLS), int)
     terms = re.findall(r"([+-]?)(\d*)(f_[A-Za-z0-9]+)", name)
     if "".join(map("".join, terms)) != name or any(term[2] not in SYMBOLS for term in terms):
@@ -167,6 +145,7 @@ def _orders(name: str) -> Orders:
     return found
 
 
+@lru_cache(maxsize=16)  # several models take each load; of one with a rhythm up to some MB
 def _load_orders(pressure: MovingPressure, threshold: float) -> tuple[Orders, Floats]:
     """Orders (f, 6) of the lines and their amplitudes on the path (f,) in Pa."""
     tacton = pressure.tacton
@@ -201,14 +180,14 @@ def _load_orders(pressure: MovingPressure, threshold: float) -> tuple[Orders, Fl
 def _gain_products(pressure: MovingPressure, threshold: float) -> tuple[Orders, Floats]:
     """Orders (m, 5) of f_AM, f_AM2, f_e, f_s and f_r in the gain, and amplitudes (m,) in Pa."""
     tacton, of_tacton = pressure.tacton, symbols(pressure.tacton)
+    factor = pressure.law.level_factor
     of_signal, powers = np.ones((1, 1), np.complex128), np.ones(1, np.complex128)
-    coefficients = None
-    signal = tacton.signal
+    coefficients, signal = None, tacton.signal
     if signal is not None and of_tacton[4]:
         samples = max(PULSED, 2 * len(signal.samples))
         values = signal.at((np.arange(samples) + 0.5) / samples * len(signal.samples) / signal.rate)
         if signal.role == "envelope":
-            of_signal = _fourier(_factor(pressure, values))[None]
+            of_signal = _fourier(factor(values, pressure.depth_of_modulation))[None]
         else:
             orders, coefficients = _in_powers(pressure)
             of_signal = np.stack([_fourier(values**j) for j in range(len(coefficients))])
@@ -216,11 +195,13 @@ def _gain_products(pressure: MovingPressure, threshold: float) -> tuple[Orders, 
         orders, coefficients = gain_orders(unsampled(pressure))
     if tacton.rhythm is not None and of_tacton[5]:
         level = tacton.rhythm.level((np.arange(PULSED) + 0.5) / PULSED * tacton.rhythm.period)
-        powers = _fourier(_factor(pressure, level))
+        powers = _fourier(factor(level, pressure.depth_of_modulation))
     c = np.abs(np.einsum("jm,ju->mu", coefficients, of_signal))
     (m, u), c = _strongest(c, threshold)
     (k, v), c = _strongest(c[:, None] * np.abs(powers), threshold)
-    return np.column_stack([orders[m[k]], _ranks(u[k], of_signal), _ranks(v, powers[None])]), c
+    n, p = of_signal.shape[1], len(powers)
+    signed = np.where(u > n // 2, u - n, u)[k], np.where(v > p // 2, v - p, v)
+    return np.column_stack([orders[m[k]], *signed]), c
 
 
 def _in_powers(pressure: MovingPressure) -> tuple[Orders, NDArray]:
@@ -238,19 +219,8 @@ def _in_powers(pressure: MovingPressure) -> tuple[Orders, NDArray]:
     raise harmonics_unbounded(law)
 
 
-def _factor(pressure: MovingPressure, level: Floats) -> Floats:
-    """Factor (k,) on the pressure of a level (k,) of the amplitude."""
-    return pressure.law.level_factor(level, pressure.depth_of_modulation)
-
-
 def _fourier(values: Floats) -> NDArray[np.complex128]:
     return np.asarray(np.fft.fft(values) / len(values))
-
-
-def _ranks(k: Orders, transform: NDArray) -> Orders:
-    """Orders of either sign of places in a transform (j, n)."""
-    n = transform.shape[1]
-    return np.where(k > n // 2, k - n, k)
 
 
 def _strongest(c: Floats, threshold: float) -> tuple[tuple[Orders, Orders], Floats]:
@@ -277,17 +247,8 @@ def _distinct(
         orders, axis=1)  # fmt: skip
     simplest = np.lexsort((-strengths, effort, group))[first]
     power = np.bincount(group, strengths**2).astype(np.float64)
-    wanted = np.bincount(group, strengths == 0) > 0
-    kept = wanted | _strong(power, threshold, most)
+    kept = np.bincount(group, strengths == 0) > 0  # candidates
+    strongest = np.argsort(-power, kind="stable")[:most]
+    kept[strongest] |= power[strongest] > threshold**2 * power.max(initial=0.0)
     names = tuple(line_name(orders[k].tolist(), of_tacton) for k in simplest[kept])
-    return LineNames(
-        names=names, frequencies=f[simplest[kept]], strengths=np.sqrt(power[kept])
-    )  # fmt: skip
-
-
-def _strong(power: Floats, threshold: float, most: int) -> NDArray[np.bool_]:
-    """The strongest, at most so many, above a fraction of the strongest's amplitude."""
-    kept = np.zeros(len(power), bool)
-    order = np.argsort(-power, kind="stable")[:most]
-    kept[order] = power[order] > threshold**2 * power.max(initial=0.0)
-    return kept
+    return LineNames(names=names, frequencies=f[simplest[kept]], strengths=np.sqrt(power[kept]))

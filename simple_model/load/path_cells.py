@@ -102,18 +102,8 @@ def _ends_as_it_begins(pressure: MovingPressure) -> bool:
 def moved_load(
     pressure: MovingPressure, times: Floats, factors: Floats
 ) -> tuple[Floats, sparse.csr_array]:
-    """Load of all foci at some times.
-
-    Parameters
-    ----------
-    pressure : MovingPressure
-    times : (m,) float, s
-    factors : (m,) float, in Pa, of the foci
-
-    Returns
-    -------
-    positions (q, 2) in metre, and the matrix (m, q) in Pa by which the load at each time is made of
-    foci of unit pressure at these
+    """Load of all foci at times (m,) in s, with factors (m,) in Pa: positions (q, 2) in metre, and
+    the matrix (m, q) in Pa by which the load is made of foci of unit pressure at these.
     """
     tacton = pressure.tacton
     path, detail = tacton.trajectory, spot_detail(pressure.height, pressure.profile)
@@ -140,17 +130,8 @@ def path_samples(pressure: MovingPressure) -> Floats:
 def path_fourier(
     pressure: MovingPressure, values: Floats | Complex, orders: NDArray[np.int_] | None = None
 ) -> Complex:
-    """Fourier coefficients of what a load does.
-
-    Parameters
-    ----------
-    pressure : MovingPressure
-    values : (..., q), of a focus of unit pressure at each of `path_samples`
-    orders : (n,) int, of the harmonics wanted
-
-    Returns
-    -------
-    (..., n) complex; without orders all, of which -n is harmonic -n
+    """Fourier coefficients (..., n) of what a load does where a focus of unit pressure at each of
+    `path_samples` has values (..., q): of some orders (n,), or of all, of which -n is harmonic -n.
     """
     mixing = path_cells(pressure).cells
     k, shape, rows = mixing.shape[0], values.shape[:-1], values.reshape(-1, values.shape[-1])
@@ -167,41 +148,27 @@ def harmonics(pressure: MovingPressure) -> NDArray[np.int_]:
     return np.arange(-((k - 1) // 2), (k + 1) // 2)
 
 
-def cells(
-    jumps: Floats, start: float, width: float, count: int, *, closed: bool = True
-) -> tuple[Floats, sparse.csr_array]:
-    """Samples of cells.
+def cells(jumps: Floats, start: float, width: float, count: int) -> tuple[Floats, sparse.csr_array]:
+    """Times (m,) in s of samples of cells, and their shares (count, m) in the cells.
 
     Parameters
     ----------
     jumps : (j,) float, s, times between the beginning of the first cell and the end of the last
     start, width : s
-    count : of cells
-    closed : whether the first cell follows the last
-
-    Returns
-    -------
-    times (m,) in s of the samples, and their shares (count, m) in the cells
+    count : of cells, of which the first follows the last
     """
-    at = np.unique(np.round((jumps - start) / width, 9))
-    at = np.unique(np.mod(at, count)) if closed else at[(at >= 0) & (at <= count)]
+    at = np.unique(np.mod(np.round((jumps - start) / width, 9), count))
     bounds = np.union1d(np.arange(count + 1), at)
     middles, lengths = (bounds[1:] + bounds[:-1]) / 2, np.diff(bounds)
     rows, columns, shares = [middles.astype(int)], [np.arange(len(middles))], [lengths]
-    if len(at):
-        cell = np.minimum(at.astype(int), count - 1)
-        after = np.searchsorted(middles, at)
-        if not closed:  # outside it is 0 or unknown
-            inside = (after > 0) & (after < len(middles))
-            at, cell, after = at[inside], cell[inside], after[inside]
-        e = at - cell - 0.5
-        p, s = e**2 / 4 - 1 / 24, -(e**3) / 6
-        for row, share in ((cell - 1, s + p), (cell, -2 * s), (cell + 1, s - p)):
-            within = np.ones(len(row), bool) if closed else (row >= 0) & (row < count)
-            for sign, piece in ((1, after), (-1, after - 1)):
-                rows.append(row[within] % count)
-                columns.append(piece[within] % len(middles))
-                shares.append(sign * share[within])
+    cell, after = np.minimum(at.astype(int), count - 1), np.searchsorted(middles, at)
+    e = at - cell - 0.5
+    p, s = e**2 / 4 - 1 / 24, -(e**3) / 6
+    for row, share in ((cell - 1, s + p), (cell, -2 * s), (cell + 1, s - p)):
+        for sign, piece in ((1, after), (-1, after - 1)):
+            rows.append(row % count)
+            columns.append(piece % len(middles))
+            shares.append(sign * share)
     table = (np.concatenate(shares), (np.concatenate(rows), np.concatenate(columns)))
     return start + width * middles, sparse.csr_array(table, shape=(count, len(middles)))
 
@@ -222,17 +189,7 @@ def jump_phases(pressure: MovingPressure) -> Floats:
 
 
 def jump_times(pressure: MovingPressure, start: float, end: float) -> Floats:
-    """Times at which the load jumps at some place.
-
-    Parameters
-    ----------
-    pressure : MovingPressure
-    start, end : float, s, between which they are
-
-    Returns
-    -------
-    (j,) float, s
-    """
+    """Times (j,) in s, from start to end, at which the load jumps at some place."""
     tacton, phases = pressure.tacton, jump_phases(pressure)
     f_d = tacton.trajectory.drawing_frequency
     found = [np.empty(0)]
@@ -248,19 +205,9 @@ def jump_times(pressure: MovingPressure, start: float, end: float) -> Floats:
 
 
 def along_path(path: Trajectory, phases: Floats, detail: float) -> tuple[Floats, sparse.csr_array]:
-    """Positions along a path, and the interpolation from them to phases.
-
-    By cubics along each part of the path that has more phases than nodes.
-
-    Parameters
-    ----------
-    path : Trajectory
-    phases : (m,) float, fractions of the period
-    detail : float, metre, of the focal spot
-
-    Returns
-    -------
-    positions (q, 2) in metre, and the matrix (m, q) that interpolates what is known there
+    """Positions (q, 2) in metre along a path, and the matrix (m, q) that interpolates from them to
+    phases (m,), fractions of the period: by cubics along each part of the path that has more phases
+    than nodes, for which the detail of the focal spot in metre decides.
     """
     bounds, lengths = path.parts
     part = np.clip(np.searchsorted(bounds, phases, side="right") - 1, 0, len(lengths) - 1)

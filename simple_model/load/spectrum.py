@@ -69,11 +69,6 @@ class LoadSpectrum:
 def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadSpectrum:
     """Lines whose pressure, at the path, exceeds a fraction of the strongest line's; of a load
     that is zero, the mean alone.
-
-    Raises
-    ------
-    ValueError
-        As `pressure.check_lines` does.
     """
     check_lines(pressure)
     tacton, (n, of_spot) = pressure.tacton, path_strengths(pressure, threshold)
@@ -97,24 +92,11 @@ def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadSpectru
 
 
 def lines_from_rest(pressure: MovingPressure) -> LoadSpectrum:
-    """Lines that give a body the impulse of the load after its start.
+    """`load_lines` that give a body the impulse of the load after its start.
 
     The lines of a jump d that end at a frequency F lack an impulse of d / (2 pi^2 F) after it, as
     if it came 5 us late. With factors of 1 + (n - 1) (f / F)^n, whose integral over 1/f^2 is that
     of the lines beyond F, many lines have it.
-
-    Parameters
-    ----------
-    pressure : MovingPressure
-
-    Returns
-    -------
-    LoadSpectrum
-
-    Raises
-    ------
-    ValueError
-        As `load_lines` does.
     """
     lines, whole = load_lines(pressure), path_cells(pressure)
     few = whole.frequency * MANY > HIGHEST
@@ -127,18 +109,8 @@ def lines_from_rest(pressure: MovingPressure) -> LoadSpectrum:
 def pressure_lines(
     pressure: MovingPressure, points: Floats, threshold: float = 1e-6
 ) -> tuple[Floats, Complex]:
-    """Load spectrum at points of the surface.
-
-    Parameters
-    ----------
-    pressure : MovingPressure
-    points : (n, 2 or 3) float, metre
-    threshold : as of `load_lines`
-
-    Returns
-    -------
-    frequencies : (f,) float, Hz, of the distinct lines
-    amplitudes : (f, n) complex, Pa
+    """Frequencies (f,) in Hz of the distinct `load_lines`, and their complex amplitudes (f, n) in
+    Pa at points (n, 2 or 3) in metre of the surface.
     """
     lines, knots = load_lines(pressure, threshold), path_samples(pressure)
     points = np.asarray(points, np.float64)
@@ -151,38 +123,15 @@ def pressure_lines(
 
 
 def reduced_lines(pressure: MovingPressure, points: Floats, load: Floats) -> tuple[Floats, Complex]:
-    """Load spectrum in reduced coordinates, of `lines_from_rest`.
-
-    Parameters
-    ----------
-    pressure : MovingPressure
-    points : (k, 2 or 3) float, metre, of the surface
-    load : (k, r) float, reduced forces of unit pressure at each point
-
-    Returns
-    -------
-    frequencies : (f,) float, Hz, of the distinct lines
-    forces : (f, r) complex, reduced forces of the lines
-
-    Raises
-    ------
-    ValueError
-        As `pressure.check_lines` does.
+    """Frequencies (f,) in Hz of the distinct `lines_from_rest`, and their complex forces (f, r) in
+    reduced coordinates, whose forces of unit pressure at points (k, 2 or 3) are `load` (k, r).
     """
     return lines_from_rest(pressure).gather(path_forces(pressure, points, load))
 
 
 def path_forces(pressure: MovingPressure, points: Floats, load: Floats) -> Complex:
-    """Reduced forces of unit pressure on the path, by harmonic of the path.
-
-    Parameters
-    ----------
-    pressure, points, load : as for `reduced_lines`; but for a rhythm or signal the modulation does
-        not matter
-
-    Returns
-    -------
-    (n, r) complex, -n is harmonic -n
+    """Reduced forces (n, r) of unit pressure on the path, by harmonic of the path, as
+    `reduced_lines` has them; but for a rhythm or signal the modulation does not matter.
     """
     knots, reach = path_samples(pressure), spot_reach(pressure.height, pressure.profile)
     forces = []
@@ -222,17 +171,8 @@ def foci_harmonics(pressure: MovingPressure, n: NDArray[np.int_]) -> Complex:
 
 
 def synthesise(frequencies: Floats, amplitudes: Complex, times: Floats) -> Floats:
-    """Fourier synthesis Re sum a exp(2 pi i f t).
-
-    Parameters
-    ----------
-    frequencies : (f,) float, Hz
-    amplitudes : (f, p) complex
-    times : (t,) float, s
-
-    Returns
-    -------
-    (t, p) float, in the unit of the amplitudes
+    """Waveforms (t, p) = Re sum a exp(2 pi i f t) of amplitudes a (f, p) at frequencies (f,) in Hz
+    and times (t,) in s.
     """
     turn = np.exp(2j * np.pi * np.outer(times, frequencies))
     return np.asarray(turn.real @ amplitudes.real - turn.imag @ amplitudes.imag)

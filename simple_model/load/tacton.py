@@ -153,17 +153,7 @@ def level(tacton: Tacton, t: ArrayLike) -> Floats | float:
 
 
 def modulation_at_phases(tacton: Tacton, first: Floats, second: Floats, envelope: Floats) -> Floats:
-    """Modulation by the phases of its three sinusoids.
-
-    Parameters
-    ----------
-    tacton : Tacton
-    first, second, envelope : (...) float, rad
-
-    Returns
-    -------
-    (...) float, without unit
-    """
+    """Modulation (...), -1..1, by the phases (...) in rad of its three sinusoids."""
     w1, w2 = tacton.superposition
     m1, m2, e = (
         np.sin(phase) if f > 0 else np.ones_like(phase)
@@ -187,7 +177,7 @@ def commanded(tacton: Tacton, t: ArrayLike) -> Floats:
 
 
 def repeated(tacton: Tacton) -> dict[str, float]:
-    """Names and frequencies in Hz of all that a Tacton repeats: f_AM, f_AM2, f_e, f_d of the foci
+    """Frequencies in Hz by name of all that a Tacton repeats: f_AM, f_AM2, f_e, f_d of the foci
     together (n f_d of n evenly spaced ones), f_r of the rhythm and f_s of a signal.
     """
     w1, w2 = tacton.superposition
@@ -207,12 +197,10 @@ def pattern_period(tacton: Tacton) -> float:
     """Period in s of the whole pattern: the shortest time, at most the duration, after which both
     AM sinusoids, the envelope, all foci, the rhythm and the signal repeat together.
 
-    Incommensurate frequencies (f_d = 190.986 Hz with f_AM = 140 Hz) have no such time. Returned is
-    then the shortest near-return: a time within the duration, no shorter than the slowest beat
-    between them (1 / (f_d - f_AM) here), after which every phase is back within 1 % of a turn
-    (here 11 periods of AM and 15 of the path, 78.5 ms) or, if there is none, the time when the
-    worst phase comes nearest. The duration is returned if nothing repeats within it, or nothing
-    varies.
+    Incommensurate frequencies (f_d = 190.986 Hz with f_AM = 140 Hz) have no such time. Their period
+    is the shortest time, no shorter than the slowest beat between them, after which every phase is
+    back within 1 % of a turn (here 11 periods of AM and 15 of the path, 78.5 ms), or comes nearest
+    to that. If nothing repeats within the duration, the period is the duration.
     """
     found = repeated(tacton)
     f = np.array(list(found.values()))

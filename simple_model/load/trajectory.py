@@ -6,7 +6,7 @@ of the drawing period, never by adding steps, and so are as exact at 10 s as at 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite, pi, sqrt
@@ -27,6 +27,9 @@ STRAIGHT = 1e-5  # m between a path that is a function and the points that stand
 NEARBY = 1e-6  # of a period, over which a tangent is taken; and of its part between two points
 STRAIGHT_ON = 1e-3  # of a unit tangent, below which it does not turn
 STILL = 1e-7, 1e-6  # m and of the level, below which nothing jumps
+ROUND = 132  # corners for a circle, 0.01 mm from the largest; and for a line swept as a cosine
+SAME = 1e-9  # of a period
+CORNERS = {"point": 1, "line": 2, "triangle": 3, "square": 4}
 JUST_AFTER = 1e-9  # of the mean step of a recording, so that a sample holds at its own time
 
 _TRIANGLE = np.array([[0, 1 / sqrt(3)], [-0.5, -0.5 / sqrt(3)], [0.5, -0.5 / sqrt(3)]])
@@ -136,9 +139,7 @@ class Trajectory:
         return around + self.centre if any(self.centre) else around
 
     def tangent_at_phase(self, phase: ArrayLike) -> Floats:
-        """Unit tangent (..., 2), the way the focus goes at fractions (...) of the period; 0 where
-        it rests.
-        """
+        """Unit tangent (..., 2) of the motion at fractions (...) of the period; 0 at rest."""
         phase = np.asarray(phase, np.float64)
         step = NEARBY / max(1, len(self.points))
         way = np.subtract(*(self.at_phase(np.mod(phase + d, 1.0)) for d in (step, -step)))
@@ -284,43 +285,76 @@ def timed_path(position: Callable[[Floats], Floats], period: float) -> Trajector
     ValueError
         If the function jumps, or returns no positions.
     """
-    t = _resolving(position, period)
-    points = tuple(map(tuple, position(t).tolist()))
-    return Trajectory(shape="recorded", points=points, times=tuple(t.tolist()))
-
-
-def arc_path(position: Callable[[Floats], Floats], speed: float) -> Trajectory:
-    """Polyline at a constant speed in m/s whose positions (k, 2) in metre are a function of
-    parameters (k,) from 0 to 1, within `STRAIGHT`; closed if it ends where it begins.
-
-    Raises
-    ------
-    ValueError
-        If the function jumps, or returns no positions.
-    """
-    points = np.array(position(_resolving(position, 1.0)), np.float64)
-    if np.linalg.norm(points[-1] - points[0]) < STRAIGHT:
-        points[-1] = points[0]
-    return Trajectory(shape="polyline", points=tuple(map(tuple, points.tolist())), speed=speed)
-
-
-def _resolving(position: Callable[[Floats], Floats], end: float) -> Floats:
-    """Arguments (k,) from 0 to `end` between which the path is straight."""
     count = 64
     while count < MOST_POINTS:
-        u = np.linspace(0, end, count + 1)
-        x, between = (np.asarray(position(each), np.float64) for each in (u, u[1:] - u[1] / 2))
+        t = np.linspace(0, period, count + 1)
+        x, between = (np.asarray(position(each), np.float64) for each in (t, t[1:] - t[1] / 2))
         if x.shape != (count + 1, 2) or not np.isfinite(x).all():
             raise ValueError(
-                f"the path's function gives shape {x.shape} for {count + 1} arguments; return "
+                f"the path's function gives shape {x.shape} for {count + 1} times; return "
                 "finite positions (k, 2) in metre"
             )
         if np.linalg.norm(between - (x[1:] + x[:-1]) / 2, axis=1).max() <= STRAIGHT:
-            return u
+            points = tuple(map(tuple, x.tolist()))
+            return Trajectory(shape="recorded", points=points, times=tuple(t.tolist()))
         count *= 2
     raise ValueError(
         "the path's function jumps; give its points and times as a recorded Trajectory"
     )
+
+
+def joined(paths: Sequence[Trajectory], frequency: float) -> Trajectory:
+    """Several foci on paths of their own, as one recorded path that they share.
+
+    One period of each path follows the other: n paths, each drawn in T, make a recording of period
+    n T. Give it `evenly(n)` as foci, which are then at every time one on each path. Straight sides
+    are exact; a circle of diameter d is a polygon within d/2 (1 - cos(pi / 132)): 0.009 mm of one
+    of 60 mm.
+
+    Parameters
+    ----------
+    paths : named shapes; each is drawn `frequency` times a second, whatever its own speed
+    frequency : float, Hz, above 0
+
+    Raises
+    ------
+    ValueError
+        If there is no path, one has points of its own, or the frequency is not above 0.
+    """
+    if not paths:
+        raise ValueError("no paths to join; give one for each focus")
+    if not (isfinite(frequency) and frequency > 0):
+        raise ValueError(f"frequency = {frequency} Hz must be finite and above 0 to draw paths")
+    points, times = list[tuple[float, float]](), list[float]()
+    for before, path in enumerate(paths):
+        phases = _corners(path)
+        points += map(tuple, path.at_phase(phases).tolist())
+        times += ((before + phases) / frequency).tolist()
+    return Trajectory(shape="recorded", points=tuple(points), times=tuple(times))
+
+
+def evenly(n: int) -> tuple[float, ...]:
+    """Phases (n,) of n foci that share a path evenly."""
+    return tuple(j / n for j in range(n))
+
+
+def parted(path: Trajectory, n: int) -> tuple[Floats, ...]:
+    """Corners (k, 2) in metre of each of n parts that take a recording equally long."""
+    clock = np.array(path.times) * n / path.times[-1]
+    # At a jump from part to part there are two corners: the first ends one, the second begins one.
+    first = np.searchsorted(clock, np.arange(n) + SAME, side="right") - 1
+    last = np.searchsorted(clock, np.arange(1, n + 1) - SAME)
+    return tuple(path.outline[a : b + 1] for a, b in zip(first, last, strict=True))
+
+
+def _corners(path: Trajectory) -> Floats:
+    """Fractions (k,) of the period, from 0 to 1, between which a named shape is straight."""
+    if path.shape not in SHAPES:
+        raise ValueError(f"a {path.shape} path has points of its own; join named shapes")
+    if path.shape == "circle" or path.sweep == "sinusoidal":
+        return np.linspace(0, 1, ROUND + 1)
+    sides = 1 if path.sweep == "one_way" and path.shape == "line" else CORNERS[path.shape]
+    return np.linspace(0, 1, sides + 1)
 
 
 def _check_points(path: Trajectory) -> None:

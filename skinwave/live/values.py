@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from simple_model import DRIVES, SHAPES, SUPERPOSITIONS, Tacton, Trajectory, evenly, joined
-from simple_model.load.joined import ROUND, parted
+from simple_model.load.trajectory import ROUND, parted
 from skinwave.scene.paper15 import tactons
 from skinwave.scene.scene import Scene, check_load
 

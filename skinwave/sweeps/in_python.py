@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from simple_model import drawing
 from simple_model.choices import choose
-from simple_model.conversion import library
 from simple_model.numbers import counted
+from simple_model.response import library
 from skinwave.scene.file import dumps
 from skinwave.scene.scene import Scene
 from skinwave.scene.variation import Variation, cases_of, combinations, parse

@@ -20,7 +20,7 @@ from simple_model import (
 )
 from simple_model.layers.compliance import half_space
 from simple_model.layers.material import PRESETS
-from simple_model.load.joined import parted
+from simple_model.load.trajectory import parted
 from simple_model.load.path_cells import path_fourier, path_samples
 from simple_model.load.spectrum import load_lines
 from skinwave.models.speeds import period

@@ -61,7 +61,6 @@ def test_windows_are_scipys(n):
     for beta in (0.0, 3.3, LINE_BETA):
         symmetric = signal.get_window(("kaiser", beta), n, fftbins=False)
         np.testing.assert_array_equal(windows.kaiser(n, beta), symmetric)
-    np.testing.assert_array_equal(windows.named("flattop", n), signal.get_window("flattop", n))
 
 
 def test_what_few_commands_need_is_not_imported_by_all():
