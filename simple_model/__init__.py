@@ -1,8 +1,14 @@
 """Tactons, the load that they put on the skin, and all models without a mesh."""
 
 from simple_model.layers.flat_body import flat_body, steady_state
-from simple_model.layers.flat_motion import flat_motion, steady_motion
-from simple_model.layers.material import Material, from_young, of_law, orthotropic, tabulated
+from simple_model.layers.material import (
+    Material,
+    Orthotropy,
+    from_young,
+    of_law,
+    orthotropic,
+    tabulated,
+)
 from simple_model.layers.modulus_laws import (
     MODULUS_LAWS,
     FractionalKelvinVoigt,
@@ -10,7 +16,6 @@ from simple_model.layers.modulus_laws import (
     ModulusTable,
     modulus_table,
 )
-from simple_model.layers.orthotropy import Orthotropy
 from simple_model.layers.prony import PronySeries, PronyTerm, fit_prony
 from simple_model.layers.stack import Stack
 from simple_model.line_table import LineTable, Unnamed, line_table, resolved_lines
@@ -61,7 +66,6 @@ __all__ = [
     "evenly",
     "fit_prony",
     "flat_body",
-    "flat_motion",
     "focal_spot",
     "from_young",
     "joined",
@@ -82,7 +86,6 @@ __all__ = [
     "resolved_lines",
     "sensation_level",
     "spectrum",
-    "steady_motion",
     "steady_state",
     "tabulated",
     "threshold",

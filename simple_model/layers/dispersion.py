@@ -114,16 +114,9 @@ class Mode:
         return np.asarray(np.where((f < x[0]) | (f > x[-1]), np.nan, found))
 
     def amplitude(self, width: float, distance: float) -> Complex:
-        """Motion (f,) of the surface in m/Pa by this mode.
-
-        Parameters
-        ----------
-        width : metre, standard deviation of the Gaussian spot on which the pressure is, 1 Pa
-        distance : metre, from the middle of the spot
-
-        Returns
-        -------
-        (f,) complex, the mode's part of `flat_body.point_response` beyond the spot
+        """Motion (f,) of the surface in m/Pa by this mode, at a distance in metre from the middle
+        of a Gaussian spot of standard deviation `width`: its part of
+        `wavenumber_integral.point_response` beyond the spot.
         """
         # A backward wave goes outwards by its energy, and so is of the Hankel function at its k.
         k = self.wavenumbers
@@ -210,11 +203,8 @@ def _is_evanescent(wavenumbers: Complex) -> NDArray[np.bool_]:
 def checked_frequencies(frequencies: ArrayLike) -> Floats:
     """Frequencies (f,) in Hz; a ValueError unless they are finite, above 0 and ascending."""
     f = np.atleast_1d(np.asarray(frequencies, np.float64))
-    if (
-        f.ndim != 1
-        or not len(f)
-        or not (np.isfinite(f).all() and (np.diff(f, prepend=0) > 0).all())
-    ):
+    rises = np.isfinite(f).all() and f.ndim == 1 and (np.diff(f, prepend=0) > 0).all()
+    if not (len(f) and rises):
         raise ValueError(
             "frequencies of dispersion curves must be finite, above 0 Hz and ascending; "
             "give one or more"
@@ -231,18 +221,12 @@ def modulus_and_slope(stack: Stack, omega: Floats) -> tuple[Complex, Complex]:
     return values[..., 0], (values[..., 2] - values[..., 1]) / step
 
 
-def _without_springs(stack: Stack) -> Stack:
-    """The stack with a free base for an elastic one, whose stiffness is the same at all
-    frequencies.
-    """
-    return replace(stack, base="free", base_stiffness=0.0) if stack.base_stiffness else stack
-
-
 def _finite(
     stack: Stack, omega: Floats, moduli: Complex, slopes: Complex, most: int
 ) -> tuple[Found, Floats]:
     """The least evanescent roots of a finite stack, and the depths of their shapes."""
-    of, change = pencil(stack, omega, moduli), pencil(_without_springs(stack), omega, slopes)
+    springless = replace(stack, base="free", base_stiffness=0.0) if stack.base_stiffness else stack
+    of, change = pencil(stack, omega, moduli), pencil(springless, omega, slopes)
     squared, V, W = eigenpairs(of, omega)
     order = np.argsort(np.abs(np.sqrt(squared).imag), axis=1)[:, :most]
     squared = np.take_along_axis(squared, order, axis=1)
@@ -286,20 +270,10 @@ def curves(
     names: tuple[str, ...] = (),
     bound: Floats | None = None,
 ) -> DispersionCurves:
-    """Curves of tracked modes.
+    """Curves of tracked modes at frequencies (f,) in Hz, with shapes at depths (d,) in metre.
 
-    Parameters
-    ----------
-    frequencies : (f,) float, Hz
-    depths : (d,) float, metre
-    found : Found, of each mode at each frequency
-    names : of the modes, numbers in the order of their cut-on if there are none
-    bound : (f,) float, 1/m, wavenumber of the shear wave of a half-space below, into which waves
-        of smaller wavenumber leak; None without one
-
-    Returns
-    -------
-    DispersionCurves
+    Modes without names have numbers in the order of their cut-on. `bound` (f,) in 1/m is the
+    wavenumber of the shear wave of a half-space below, into which waves of smaller ones leak.
     """
     k = found.wavenumbers
     known = np.isfinite(k)

@@ -23,15 +23,21 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.fft import next_fast_len, rfft
 from scipy.special import erfc
 
 from simple_model.layers.compliance import Compliance
-from simple_model.layers.wavenumber_integral import Field, normal_field, point_integrals
+from simple_model.layers.wavenumber_integral import (
+    Field,
+    normal_field,
+    point_integrals,
+    point_response,
+)
 from simple_model.load.focus import gaussian_width
 from simple_model.load.path_cells import cells, jump_times, moved_load, path_fourier, path_samples
 from simple_model.load.pressure import MovingPressure, check_lines
@@ -117,17 +123,8 @@ def field_lines(
 
 
 def carriers(field: Field, splines: Splines, away: Floats) -> Floats:
-    """Splines with the weights of a field.
-
-    Parameters
-    ----------
-    field : Field
-    splines : from distances (...) to (..., j)
-    away : (..., q, 2) float, metre, offsets of probes from positions of a focus
-
-    Returns
-    -------
-    (m, c, j, ..., q) float: components are these times the integrals (c, j), in sum over both
+    """Splines (m, c, j, ..., q) with the weights of a field, at offsets (..., q, 2) in metre of
+    probes from positions of a focus: components are these times the integrals (c, j), in sum.
     """
     of_distance = np.moveaxis(splines(np.linalg.norm(away, axis=-1)), -1, 0)
     return np.asarray(field.weights(away)[:, :, None] * of_distance)
@@ -136,20 +133,70 @@ def carriers(field: Field, splines: Splines, away: Floats) -> Floats:
 def sampled_lines(
     field: Field, pressure: MovingPressure, probes: ArrayLike, times: Floats
 ) -> tuple[Floats, Complex]:
-    """Lines of `field_lines` that samples at some times can show.
-
-    Parameters
-    ----------
-    field, pressure, probes : as of `field_lines`, with its errors
-    times : (t,) float, s, equally spaced
-
-    Returns
-    -------
-    frequencies (f,) in Hz >= 0 and complex amplitudes a (f, p, m)
-    """
+    """Lines of `field_lines` that samples at equally spaced times (t,) in s can show."""
     f, a = field_lines(field, pressure, probes)
     below = below_half_the_rate(f, times)
     return f[below], a[below]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PathOperator:
+    """Load of a path on some probes, as a linear operator on the response of a body to a focus at
+    rest: with g_j(w) = g(r_j, w) the line at f = f_m + n f_d is, at a probe x_p,
+
+        u(f) = c sum_j g_j(f) h_nj(x_p),   h_nj = int_0^1 B_j(|x_p - X(a)|) exp(-2 pi i n a) da
+
+    Parameters
+    ----------
+    width : metre, standard deviation of the focal spot
+    distances : (j,) float, metre
+    frequencies : (f,) float, Hz, distinct
+    lines : (l,) int, the frequency of each line
+    orders : (l,) int, the harmonic of each line, an index of `harmonics`
+    coefficients : (l,) complex, Pa
+    harmonics : (n, p, j) complex, h of the distinct orders
+    """
+
+    width: float
+    distances: Floats
+    frequencies: Floats
+    lines: NDArray[np.int_]
+    orders: NDArray[np.int_]
+    coefficients: Complex
+    harmonics: Complex
+
+    def steady_lines(self, compliance: Compliance) -> tuple[Floats, Complex]:
+        """Frequencies (f,) in Hz and amplitudes (f, p) in metre on a body, as of `steady_lines`."""
+        omega = 2 * np.pi * self.frequencies
+        g = point_response(compliance, self.distances, omega, self.width)
+        found = np.zeros((len(g), self.harmonics.shape[1]), np.complex128)
+        for order, harmonic in enumerate(self.harmonics):
+            own = self.orders == order
+            moved = self.coefficients[own, None] * (g[self.lines[own]] @ harmonic.T)
+            np.add.at(found, self.lines[own], moved)
+        return self.frequencies, found
+
+
+def path_operator(
+    pressure: MovingPressure, probes: ArrayLike, *, threshold: float = 1e-6
+) -> PathOperator:
+    """Operator of a load on probes, for many bodies; takes what `steady_lines` takes."""
+    _check(pressure)
+    load = load_lines(pressure, threshold)
+    frequencies, lines = np.unique(np.round(load.frequencies, 9), return_inverse=True)
+    distinct, orders = np.unique(load.harmonics, return_inverse=True)
+    knots, width = path_samples(pressure), _width(pressure)
+    places = np.atleast_2d(np.asarray(probes, np.float64))
+    away = np.linalg.norm(places[:, None] - knots, axis=-1)
+    table = distance_table(away.max(), width)
+    splines = radial_spline(table, np.eye(len(table)))
+    blocks = np.array_split(away, max(1, away.size * len(table) // AT_ONCE))
+    parts = [path_fourier(pressure, splines(part).swapaxes(1, 2), distinct) for part in blocks]
+    return PathOperator(
+        width=width, distances=table, frequencies=frequencies, lines=lines, orders=orders,
+        coefficients=load.coefficients,
+        harmonics=np.ascontiguousarray(np.moveaxis(np.concatenate(parts), -1, 0)),
+    )  # fmt: skip
 
 
 def steady_state(
@@ -157,25 +204,15 @@ def steady_state(
 ) -> Response:
     """Steady state, as if the load had always been there: its lines below half the sampling rate.
 
-    That is `flat_body` without its initial transient, for a twentieth of the time.
-
-    Parameters
-    ----------
-    compliance : Compliance
-    pressure : MovingPressure, with a Gaussian focus
-    probes : (p, 2) float, metre
-    times : (t,) float, s, equally spaced
-
-    Returns
-    -------
-    Response, displacement (t, p) in metre
+    That is `flat_body`, whose parameters it has, without its initial transient, for a twentieth of
+    the time.
     """
     started = time.perf_counter()
     probes = np.atleast_2d(np.array(probes, np.float64))
     times = np.array(times)
     f, a = sampled_lines(normal_field(compliance), pressure, probes, times)
     found = synthesise(f, a[..., 0], times)
-    return _timed("flat-body-harmonic", started, times, probes, found, steps=len(f), dofs=len(f))
+    return _timed("flat-body-harmonic", started, times, probes, found, len(f), len(f))
 
 
 def flat_body(
@@ -207,24 +244,13 @@ def flat_body(
     started = time.perf_counter()
     probes, times = np.atleast_2d(np.array(probes, np.float64)), np.array(times)
     found = field_history(normal_field(compliance), pressure, probes, times)[..., 0]
-    effort = {"steps": len(times), "dofs": len(times) + 1}
-    return _timed("flat-body", started, times, probes, found, **effort)
+    return _timed("flat-body", started, times, probes, found, len(times), len(times) + 1)
 
 
 def field_history(
     field: Field, pressure: MovingPressure, probes: ArrayLike, times: Floats
 ) -> Floats:
-    """All components of a field from rest, as `flat_body` computes them.
-
-    Parameters
-    ----------
-    field : Field
-    pressure, probes, times : as of `flat_body`
-
-    Returns
-    -------
-    (t, p, m) float
-    """
+    """All components (t, p, m) of a field from rest, as `flat_body` computes them."""
     _check(pressure)
     probes = np.atleast_2d(np.asarray(probes, np.float64))
     within = max(1, int(np.ceil(step(times) * FINEST - 1e-6)))
@@ -303,17 +329,12 @@ def _low_passed(
 
 
 def _timed(
-    model: str, started: float, times: Floats, probes: Floats, displacement: Floats, **effort: int
+    model: str, started: float, times: Floats, probes: Floats, values: Floats, steps: int, dofs: int
 ) -> Response:
     """The response, with the seconds since its computation started."""
     seconds = {"evaluate": time.perf_counter() - started}
-    return Response(
-        model=model,
-        times=times,
-        probes=probes,
-        values=displacement,
-        effort=Effort(seconds=seconds, **effort),  # type: ignore[arg-type]
-    )
+    effort = Effort(seconds=seconds, steps=steps, dofs=dofs)
+    return Response(model=model, times=times, probes=probes, values=values, effort=effort)
 
 
 def distance_table(furthest: float, width: float) -> Floats:
@@ -325,17 +346,8 @@ def distance_table(furthest: float, width: float) -> Floats:
 
 
 def radial_spline(table: Floats, values: Complex | Floats, axis: int = 0) -> CubicSpline:
-    """Cubic spline through values at distances, flat at distance 0.
-
-    Parameters
-    ----------
-    table : (j,) float, metre, from 0
-    values : array of j along `axis`
-    axis : int
-
-    Returns
-    -------
-    CubicSpline of a distance (...), which replace that axis
+    """Cubic spline of a distance (...) through values of j along `axis` at distances (j,) in metre
+    from 0, where it is flat.
     """
     from scipy.interpolate import CubicSpline  # which takes long to import
 

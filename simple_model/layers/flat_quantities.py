@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 
 from simple_model.layers.compliance import Compliance
 from simple_model.layers.flat_body import field_history, sampled_lines
-from simple_model.layers.flat_motion import motion_field
 from simple_model.layers.layered import clearance, transfer
 from simple_model.layers.material import Material
 from simple_model.layers.stack import Stack
@@ -27,6 +26,23 @@ from simple_model.load.pressure import MovingPressure
 from simple_model.load.spectrum import synthesise
 from simple_model.quantities import NORMAL, VECTOR, Quantity
 from simple_model.typing import Complex, Floats
+
+
+def motion_field(stack: Stack, depth: float = 0.0) -> Field:
+    """Displacement along x, y and, downwards, z at a depth in metre."""
+    moved = transfer(stack, [depth])
+
+    def answer(k: Complex, w: Complex) -> Complex:
+        return moved(k, w)[:2, 0]
+
+    def weights(away: Floats) -> Floats:
+        x, y = np.moveaxis(away, -1, 0)
+        none, one = np.zeros_like(x), np.ones_like(x)
+        return np.array([[x, none], [y, none], [none, one]])
+
+    return Field(
+        answer=answer, orders=(1, 0), clearance=lambda w: clearance(stack, w), weights=weights
+    )
 
 
 def strain_field(stack: Stack, depth: float = 0.0) -> Field:
@@ -43,16 +59,14 @@ def strain_field(stack: Stack, depth: float = 0.0) -> Field:
     def weights(away: Floats) -> Floats:
         x, y = np.moveaxis(away, -1, 0)
         none, one, turned = np.zeros_like(x), np.ones_like(x), x**2 - y**2
-        return np.array(
-            [
-                [one, none, turned, none],
-                [one, none, -turned, none],
-                [none, one, none, none],
-                [none, none, 2 * x * y, none],
-                [none, none, none, -x],
-                [none, none, none, -y],
-            ]
-        )
+        return np.array([
+            [one, none, turned, none],
+            [one, none, -turned, none],
+            [none, one, none, none],
+            [none, none, 2 * x * y, none],
+            [none, none, none, -x],
+            [none, none, none, -y],
+        ])  # fmt: skip
 
     return Field(
         answer=answer, orders=(0, 0, 2, 1), clearance=lambda w: clearance(stack, w), weights=weights
@@ -66,22 +80,8 @@ def material_at(stack: Stack, depth: float) -> Material:
 
 
 def quantity_field(asked: Quantity, stack: Stack, depth: float = 0.0) -> Field:
-    """Components of a quantity at a depth of a stack.
-
-    Parameters
-    ----------
-    asked : Quantity
-    stack : Stack
-    depth : metre below the surface
-
-    Returns
-    -------
-    Field, of the components before any `invariant`
-
-    Raises
-    ------
-    ValueError
-        If the depth is outside the stack.
+    """Components of a quantity, before any `invariant`, at a depth in metre of a stack; raises a
+    ValueError if that is outside the stack.
     """
     solid = material_at(stack, depth)
     if asked.field in (NORMAL, VECTOR):
@@ -116,15 +116,7 @@ def traction_field(asked: Quantity, stack: Stack, direction: ArrayLike) -> Field
     By reciprocity the vertical motion at x under a force along x' at 0 is the motion along x' at 0
     under a vertical force at x, which is that of `motion_field`.
 
-    Parameters
-    ----------
-    asked : Quantity, of normal motion
-    stack : Stack
-    direction : (3,) float, unit vector, z upwards
-
-    Returns
-    -------
-    Field
+    The quantity is one of normal motion, the direction (3,) a unit vector, z upwards.
     """
     along = np.asarray(direction, np.float64)
     moved = motion_field(stack)
@@ -139,19 +131,8 @@ def traction_field(asked: Quantity, stack: Stack, direction: ArrayLike) -> Field
 def from_rest(
     field: Field, asked: Quantity, pressure: MovingPressure, probes: ArrayLike, times: Floats
 ) -> Floats:
-    """Waveforms of a quantity from rest.
-
-    Parameters
-    ----------
-    field : Field, of the quantity's components
-    asked : Quantity
-    pressure : MovingPressure, with a Gaussian focus
-    probes : (p, 2) float, metre
-    times : (t,) float, s, equally spaced
-
-    Returns
-    -------
-    (t, p) float, in the unit of the quantity
+    """Waveforms (t, p) of a quantity from rest, of whose components the field is; load, probes and
+    times as of `flat_body`.
     """
     found = field_history(field, pressure, probes, times)
     return asked.waveforms(found.reshape(len(found), -1), found.shape[1])
@@ -160,15 +141,6 @@ def from_rest(
 def steady(
     field: Field, asked: Quantity, pressure: MovingPressure, probes: ArrayLike, times: Floats
 ) -> Floats:
-    """Waveforms of a quantity in the steady state.
-
-    Parameters
-    ----------
-    field, asked, pressure, probes, times : as of `from_rest`
-
-    Returns
-    -------
-    (t, p) float, in the unit of the quantity
-    """
+    """Waveforms (t, p) of a quantity in the steady state, otherwise as of `from_rest`."""
     f, a = sampled_lines(field, pressure, probes, times)
     return asked.waveforms(synthesise(f, a.reshape(len(f), -1), times), a.shape[1])

@@ -35,9 +35,7 @@ THIN = 0.3  # thickness times wavenumber below which differences of exponentials
 NEARLY = 0.05  # x below which tanh x / x is summed as a series, exact to 1e-15
 BACKWARD = 0.5  # of a stack's second resonance: where some of its modes become backward waves
 WEAKEST = 0.1  # of the mean decay, that of a mode that is mostly in a layer without loss
-YIELDING = (
-    0.5  # of that estimate, poles above an elastic base, on which layers and springs are in series
-)
+YIELDING = 0.5  # of that estimate: poles above an elastic base, where layers meet springs in series
 Transfer = Callable[[Complex, Complex], Complex]
 Pair = tuple[Any, Any]  # horizontal and vertical
 Symmetric = tuple[Any, Any, Any]  # of complex arrays, a, b, c of [[a, b], [b, c]]
@@ -64,30 +62,16 @@ class Impedances(NamedTuple):
 
 
 def surface_compliance(stack: Stack, k: Complex, w: Complex) -> Complex:
-    """Displacement of the surface into the stack per pressure; 0 at w = 0 of a free stack, which
-    has no static deflection.
-
-    Parameters
-    ----------
-    stack : Stack
-    k : (k,) complex, 1/m, with a real part above 0
-    w : (f, 1) rad/s, with an imaginary part <= 0
-
-    Returns
-    -------
-    (f, k) complex, m/Pa
+    """Displacement (f, k) of the surface into the stack per pressure, in m/Pa, at wavenumbers k
+    (k,) in 1/m with Re k > 0 and frequencies w (f, 1) in rad/s with Im w <= 0; 0 at w = 0 of a free
+    stack, which has no static deflection.
     """
     a, b, c = _impedances(stack, k, w).surface
     return _about_mean(stack, w, a / (a * c - b * b))
 
 
 def transfer(stack: Stack, depths: Sequence[float]) -> Transfer:
-    """Motion and stress at depths for a unit surface pressure, at each wavenumber.
-
-    Parameters
-    ----------
-    stack : Stack
-    depths : (d,) metre below the surface, each within the stack
+    """Motion and stress at depths (d,) in metre for a unit surface pressure.
 
     Returns
     -------
@@ -165,9 +149,8 @@ def _bending(stack: Stack, w: Complex) -> float:
     mass = sum(m.density * t for m, t in zip(stack.materials, stack.thicknesses, strict=True))
     moving = np.ones(w.shape, bool) if stack.is_fixed else w != 0
     w, bending = (np.broadcast_to(x, w.shape)[moving] for x in (w, bending))
-    k = ((mass * w**2 - stack.base_stiffness) / bending + 0j) ** 0.25 * np.array([1, 1j, -1, -1j])[
-        :, None
-    ]
+    quarter = ((mass * w**2 - stack.base_stiffness) / bending + 0j) ** 0.25
+    k = quarter * np.array([1, 1j, -1, -1j])[:, None]
     return float(k.imag[(k.real > 0) & (k.imag > 0.1 * np.abs(k))].min(initial=inf))
 
 
@@ -272,18 +255,8 @@ def _downwards(known: Impedances) -> list[tuple[Pair, Pair]]:
 
 
 def layer_stiffness(material: Material, thickness: float, k: Complex, w: Complex) -> Layer:
-    """Stiffness of a layer or, of infinite thickness, a half-space.
-
-    Parameters
-    ----------
-    material : Material
-    thickness : metre, may be inf
-    k : (k,) complex, 1/m, with a real part above 0
-    w : (f, 1) rad/s, with an imaginary part <= 0; 0 at rest
-
-    Returns
-    -------
-    Layer, of arrays (f, k)
+    """Stiffness, of arrays (f, k), of a layer of a thickness in metre or, of inf, a half-space, at
+    wavenumbers and frequencies as of `surface_compliance`.
     """
     mu, kappa = _shear(material, w), (0.5 - material.poisson) / (1 - material.poisson)
     k2, ks2, over_k = k * k, material.density * w**2 / mu, 1 / k

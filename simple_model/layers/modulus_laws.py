@@ -38,11 +38,6 @@ class FractionalKelvinVoigt:
     shear_modulus : float, Pa, above 0, at rest
     exponent : float, n, above 0 and at most 1
     time : float, tau in s, 0 or above
-
-    Raises
-    ------
-    ValueError
-        If a value is not finite or outside these limits.
     """
 
     shear_modulus: float
@@ -78,13 +73,7 @@ class FractionalZener:
     ----------
     shear_modulus : float, mu_0 in Pa, above 0, at rest
     fast_modulus : float, mu_inf in Pa, at least mu_0, in fast motion
-    exponent : float, n, above 0 and at most 1
-    time : float, tau in s, 0 or above
-
-    Raises
-    ------
-    ValueError
-        If a value is not finite or outside these limits.
+    exponent, time : as of `FractionalKelvinVoigt`
     """
 
     shear_modulus: float
@@ -103,7 +92,7 @@ class FractionalZener:
     def __call__(self, omega: ArrayLike) -> Any:
         """Complex modulus (...) in Pa at angular frequencies (...) in rad/s."""
         turned = _power(omega, self.time, self.exponent)
-        return self.shear_modulus + self._relaxing * turned / (1 + turned)
+        return self.shear_modulus + (self.fast_modulus - self.shear_modulus) * turned / (1 + turned)
 
     @property
     def words(self) -> str:
@@ -115,14 +104,8 @@ class FractionalZener:
 
     def scaled(self, *, modulus: float = 1.0, loss: float = 1.0) -> FractionalZener:
         """The law with all its moduli, or what relaxes of them, multiplied by a factor."""
-        rest = modulus * self.shear_modulus
-        return replace(
-            self, shear_modulus=rest, fast_modulus=rest + modulus * loss * self._relaxing
-        )
-
-    @property
-    def _relaxing(self) -> float:
-        return self.fast_modulus - self.shear_modulus
+        rest, fast = modulus * self.shear_modulus, self.fast_modulus - self.shear_modulus
+        return replace(self, shear_modulus=rest, fast_modulus=rest + modulus * loss * fast)
 
 
 def _power(omega: ArrayLike, time: float, exponent: float) -> Any:
@@ -144,10 +127,10 @@ def _check(law: FractionalKelvinVoigt | FractionalZener) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class ModulusTable:
-    """Measured complex shear moduli, straight between their frequencies; a modulus law.
+    """Measured complex shear moduli, linear between their frequencies; a modulus law.
 
     Beyond them, and at complex frequencies, the modulus is that of the table's Prony series, which
-    is causal; how far from the table it is, is its `error`.
+    is causal; its `error` says how far it is from the table.
 
     Parameters
     ----------

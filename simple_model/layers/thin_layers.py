@@ -80,12 +80,8 @@ def gauss() -> tuple[Floats, Floats, Floats]:
 
 
 def elements(stack: Stack, omega: Floats) -> tuple[list[int], Complex]:
-    """Layer of each element, and the lengths (f, e) of elements in metre at frequencies (f,).
-
-    Raises
-    ------
-    ValueError
-        If there are too many of them.
+    """Layer of each element, and the lengths (f, e) of elements in metre at frequencies (f,);
+    raises a ValueError if there are too many.
     """
     layers, lengths = [], []
     finite = sum(thickness for thickness in stack.thicknesses if np.isfinite(thickness))
@@ -109,17 +105,8 @@ def elements(stack: Stack, omega: Floats) -> tuple[list[int], Complex]:
 
 
 def pencil(stack: Stack, omega: Floats, moduli: Complex) -> Pencil:
-    """Pencil of a stack.
-
-    Parameters
-    ----------
-    stack : Stack
-    omega : (f,) float, rad/s, by which elements are sized
-    moduli : (f, l) complex, Pa, shear modulus of each layer
-
-    Returns
-    -------
-    Pencil
+    """Pencil of a stack whose layers have shear moduli (f, l) in Pa at omega (f,) in rad/s, by
+    which elements are sized.
     """
     layers, length = elements(stack, omega)
     nodes, w, D = lobatto()

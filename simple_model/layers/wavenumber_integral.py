@@ -82,34 +82,12 @@ def normal_field(compliance: Compliance) -> Field:
 
 
 def point_response(
-    compliance: Compliance,
-    distances: ArrayLike,
-    frequencies: ArrayLike,
-    width: float,
-    *,
-    negligible: float = 0.0,
+    compliance: Compliance, distances: ArrayLike, frequencies: ArrayLike, width: float
 ) -> Complex:
-    """Response g(r, w) to a Gaussian focal spot of 1 Pa.
-
-    Parameters
-    ----------
-    compliance : Compliance
-    distances : (r,) float, metre
-    frequencies : (f,) float or complex, rad/s, with imaginary part <= 0
-    width : metre, standard deviation of the spot
-    negligible : as of `point_integrals`
-
-    Returns
-    -------
-    (f, r) complex, m/Pa
-
-    Raises
-    ------
-    ArithmeticError
-        If the wavenumber grid cannot be made fine enough.
+    """Response g(r, w) (f, r) in m/Pa to a Gaussian focal spot of 1 Pa; parameters and errors as of
+    `point_integrals`.
     """
-    field = normal_field(compliance)
-    return point_integrals(field, distances, frequencies, width, negligible=negligible)[0]
+    return point_integrals(normal_field(compliance), distances, frequencies, width)[0]
 
 
 def point_integrals(
@@ -120,7 +98,7 @@ def point_integrals(
     *,
     negligible: float = 0.0,
 ) -> Complex:
-    """Integrals of a field about a Gaussian focal spot of 1 Pa.
+    """Integrals (c, f, r) of a field about a Gaussian focal spot of 1 Pa.
 
     Parameters
     ----------
@@ -130,10 +108,6 @@ def point_integrals(
     width : metre, standard deviation of the spot
     negligible : a batch of frequencies in which each integral stays below this fraction of its
         largest value so far is the last one computed; for frequencies that rise
-
-    Returns
-    -------
-    (c, f, r) complex
 
     Raises
     ------

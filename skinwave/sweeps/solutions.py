@@ -13,8 +13,7 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, phasors, sensation_level
-from simple_model.layers.flat_body import steady_lines
-from simple_model.layers.path_operator import PathOperator, path_operator
+from simple_model.layers.flat_body import PathOperator, path_operator, steady_lines
 from simple_model.load.line_names import line_frequency
 from simple_model.load.spectrum import synthesise
 from simple_model.response import SETTLE

@@ -20,9 +20,9 @@ from simple_model import (
 )
 from simple_model.layers.compliance import half_space
 from simple_model.layers.material import PRESETS
-from simple_model.load.trajectory import parted
 from simple_model.load.path_cells import path_fourier, path_samples
 from simple_model.load.spectrum import load_lines
+from simple_model.load.trajectory import parted
 from skinwave.models.speeds import period
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads

@@ -8,7 +8,7 @@ from scipy.linalg import eigh
 from scipy.sparse.linalg import eigsh
 
 from simple_model import Material, MovingPressure, PronyTerm, Tacton, Trajectory
-from simple_model.layers.constant_loss import constant_loss
+from simple_model.layers.prony import constant_loss
 from simple_model.load.spectrum import load_lines, reduced_lines
 from simple_model.plates.air import air_mass
 from simple_model.plates.free_modes import free_modes

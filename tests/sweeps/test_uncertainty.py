@@ -12,8 +12,7 @@ from scipy import stats
 
 from simple_model import Trajectory
 from simple_model.layers.compliance import slab
-from simple_model.layers.flat_body import steady_lines
-from simple_model.layers.path_operator import path_operator
+from simple_model.layers.flat_body import path_operator, steady_lines
 from skinwave.commands.cli import main
 from skinwave.commands.common import note_central_values
 from skinwave.planning.budget import error_budget, mesh_row
