@@ -51,34 +51,18 @@ class FreeModes:
 
 
 def free_modes(modes: PlateModes, material: Material) -> FreeModes:
-    """Poles and residues of the modes of a plate.
-
-    Parameters
-    ----------
-    modes : PlateModes, with the `shear_modulus` of the material
-    material : Material, without a modulus law of its own
-
-    Returns
-    -------
-    FreeModes
-    """
+    """Poles and residues of the modes of a plate of a material without a modulus law of its own."""
     squared = np.maximum(modes.squared, np.finfo(float).tiny)
     bent = squared * modes.elastic
     return free_vibration(*relaxing_stiffness(squared - bent, bent, material))
 
 
 def relaxing_stiffness(lossless: Floats, bent: Floats, material: Material) -> tuple[Floats, Floats]:
-    """Stiffness of modes of a material with Maxwell branches.
+    """Stiffness (m, 2 + n) of modes and times (n,) in s, as `free_vibration` takes them, of a
+    material with Maxwell branches.
 
-    Parameters
-    ----------
-    lossless : (m,) 1/s2, the part of the squared frequencies without loss
-    bent : (m,) 1/s2, the part that goes with the material's modulus, at its `shear_modulus`
-    material : Material, without a modulus law of its own
-
-    Returns
-    -------
-    stiffness (m, 2 + n) and times (n,) in s, as `free_vibration` takes them
+    `lossless` (m,) and `bent` (m,) in 1/s2 are the parts of the squared frequencies without loss,
+    and in proportion to the material's modulus, at its `shear_modulus`.
     """
     solid, mu = material.without_loss_factor(), material.shear_modulus
     terms = [term for term in solid.prony if term.modulus]
@@ -94,16 +78,8 @@ def relaxing_stiffness(lossless: Floats, bent: Floats, material: Material) -> tu
 
 
 def free_vibration(stiffness: Floats, times: Floats) -> FreeModes:
-    """Poles and residues of modes.
-
-    Parameters
-    ----------
-    stiffness : (m, 2 + n): at rest in 1/s2, viscous in 1/s, and of each Maxwell branch in 1/s2
-    times : (n,) s, of the branches
-
-    Returns
-    -------
-    FreeModes
+    """Poles and residues of modes of stiffness (m, 2 + n): at rest in 1/s2, viscous in 1/s, and of
+    each Maxwell branch in 1/s2, with times (n,) in s.
     """
     poles = _poles(stiffness, times)
     apart = np.abs(poles[:, :, None] - poles[:, None]) / np.abs(poles).max(axis=1)[:, None, None]

@@ -90,19 +90,8 @@ class InPlane:
 
     @staticmethod
     def of(plate: Plate, A: Floats, grid: Grid, odd: tuple[int, int], in_plane: str) -> InPlane:
-        """The in-plane problem of a plate.
-
-        Parameters
-        ----------
-        plate : Plate
-        A : (3, 3) N/m
-        grid : Grid
-        odd : whether the strains xx are odd along x and along y, where functions are split
-        in_plane : one of `IN_PLANE`
-
-        Returns
-        -------
-        InPlane
+        """The problem of a plate of stiffness A (3, 3) in N/m, with edges as of `IN_PLANE`, for
+        strains xx that are `odd` along x and along y, where functions are split.
         """
         u, v = (
             tuple(

@@ -1,4 +1,4 @@
-"""Static deflection and motion of von Karman's plate in its modes.
+"""Motion of von Karman's plate in its modes.
 
     z'' + K z + sum_k s_k H_k z = f,  y_k = z^T H_k z / 2
 
@@ -33,7 +33,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
 from scipy.linalg.lapack import dposv
 
 from simple_model.layers.material import Material
@@ -45,9 +44,6 @@ from simple_model.plates.path_forces import MIDDLE, modal_path_forces
 from simple_model.plates.von_karman import KarmanPlate
 from simple_model.typing import Floats
 
-TOLERANCE = 1e-10  # of the load: unbalanced force of a static deflection
-MOST_ITERATIONS = 200
-FLAT = 1e-12  # of the largest curvature of the energy: round-off
 HIGHEST_PHASE = 1.2  # rad per half step; faster modes are slowed to it
 
 
@@ -57,33 +53,6 @@ class Motion:
 
     coordinates: Floats
     energy: Floats
-
-
-def static_deflection(
-    plate: KarmanPlate, forces: Floats, material: Material | None = None
-) -> Floats:
-    """Modal coordinates at rest under a constant load.
-
-    Parameters
-    ----------
-    plate : KarmanPlate
-    forces : (m,) N kg^-1/2, modal forces of all modes of the plate, as of `area_forces`
-    material : Material, whose modulus at rest resists; without it the modulus of the modes does
-
-    Returns
-    -------
-    (m,) kg^1/2 m, of all modes. Modes that are not in `plate.chosen` deflect as a linear plate. A
-    plate that buckles has several states of rest; this is a stable one.
-
-    Raises
-    ------
-    ArithmeticError
-        If Newton's method does not converge.
-    """
-    rest, modes = _Loss.of(material).rest, plate.modes
-    found = forces / (modes.squared * (1 + (rest - 1) * modes.elastic))
-    found[plate.chosen] = _equilibrium(plate, forces[plate.chosen], rest)
-    return np.asarray(found)
 
 
 def linear_motion(
@@ -96,7 +65,8 @@ def linear_motion(
     chosen: NDArray[np.int_] | None = None,
     highest: float = np.inf,
 ) -> Floats:
-    """Modal coordinates from rest of a plate that does not stretch, without time steps.
+    """Modal coordinates (t, r) in kg^1/2 m from rest of a plate that does not stretch, without time
+    steps.
 
     Parameters
     ----------
@@ -107,10 +77,6 @@ def linear_motion(
     middle : (2,) metre, of the plate in the scene
     chosen : (r,) int, indices of the modes to return; all if not given
     highest : Hz, lines of the load from there on are left out
-
-    Returns
-    -------
-    (t, r) kg^1/2 m
     """
 
     def modulus(omega: Floats) -> Floats:
@@ -150,14 +116,9 @@ def stretched_motion(
     -------
     Motion
         At the n times of the linear motion.
-
-    Raises
-    ------
-    ArithmeticError
-        If a step is not finite.
     """
-    scheme = _Scheme.of(plate, dt, material)
-    return _march(plate, scheme, scheme.forces(linear), np.zeros((2, len(plate.squared))))
+    forces = _Scheme.of(plate, dt, material).forces(linear)
+    return forced_motion(plate, forces, dt, material)
 
 
 def forced_motion(
@@ -189,8 +150,36 @@ def forced_motion(
     ArithmeticError
         If a step is not finite.
     """
-    start = np.zeros((2, len(plate.squared))) if start is None else start
-    return _march(plate, _Scheme.of(plate, dt, material), forces, start)
+    scheme = _Scheme.of(plate, dt, material)
+    M, K, B, rest = scheme.mass, scheme.K, scheme.bending, scheme.rest
+    shares, pull, stiff = scheme.shares, scheme.pull, scheme.stiff
+    keep, follow = scheme.keep[:, None], scheme.follow[:, None]
+    z, energy = np.empty((len(forces) + 1, len(M))), np.empty(len(forces))
+    z[0], rate = np.zeros((2, len(M))) if start is None else start
+    G = plate.gradients(z[0])
+    y = G @ z[0] / 2
+    unbalanced = forces[0] - K @ z[0] - rest * (y @ G) - scheme.lag * (B @ rate)
+    z[1] = z[0] + dt * rate + dt**2 / 2 * unbalanced / M
+    bent, stretched = follow * (z[1] - z[0]) / 2, follow * (G @ z[1] / 2 - y)  # of the branches
+    y = G @ z[1] / 2
+    linear, hardening = np.diag(M / dt**2) + stiff / 2 * B, (rest / 2 + stiff) / 2
+    for n in range(len(forces)):
+        if n:
+            G = plate.gradients(z[n])
+            rhs = forces[n] - K @ z[n] + 2 / dt**2 * M * (z[n] - z[n - 1])
+            rhs -= (rest * y + pull @ stretched) @ G + B @ (pull @ bent)
+            _, change, failed = dposv(linear + hardening * (G.T @ G), rhs)
+            if failed:
+                raise ArithmeticError(f"step {n} of dt = {dt:g} s is not finite; lower the load")
+            z[n + 1] = z[n - 1] + change
+            following = G @ z[n + 1] / 2
+            bent = keep * bent + follow * (change / 2)
+            stretched = keep * stretched + follow * (following - y)
+            y = following
+        v = (z[n + 1] - z[n]) / dt
+        springs = shares @ ((bent @ B * bent).sum(axis=1) + (stretched**2).sum(axis=1))
+        energy[n] = (v @ (M * v) + z[n + 1] @ K @ z[n] + rest * (y @ y) + springs) / 2
+    return Motion(coordinates=z, energy=energy)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -220,43 +209,6 @@ class _Loss:
         """Relative storage modulus (...) at angular frequencies (...) in rad/s."""
         squared = np.multiply.outer(omega, self.times) ** 2
         return np.asarray(self.rest + (self.shares * squared / (1 + squared)).sum(axis=-1))
-
-
-def _equilibrium(plate: KarmanPlate, forces: Floats, rest: float) -> Floats:
-    """Minimum (r,) of the energy, by Newton's method with negative curvatures made positive. It
-    leaves a saddle along the direction of the most negative curvature.
-    """
-    K, z = plate.slow_stiffness(rest), np.zeros(len(forces))
-    size = float(np.linalg.norm(forces)) or 1.0
-    for _ in range(MOST_ITERATIONS):
-        G = plate.gradients(z)
-        y = G @ z / 2
-        unbalanced = forces - K @ z - rest * (y @ G)
-        tangent = K + rest * (np.tensordot(y, plate.H, axes=1) + G.T @ G)
-        curvatures, directions = linalg.eigh(tangent)
-        least = FLAT * curvatures[-1]
-        step = directions @ (directions.T @ unbalanced / np.maximum(np.abs(curvatures), least))
-        if float(np.linalg.norm(unbalanced)) <= TOLERANCE * size:
-            if curvatures[0] >= -least:
-                return z
-            step = directions[:, 0]
-        # The energy along the step is a polynomial of degree four.
-        first, second = G @ step, plate.gradients(step) @ step / 2
-        quadratic = float(step @ K @ step + rest * (first @ first + 2 * (y @ second))) / 2
-        linear, cubic, quartic = -step @ unbalanced, rest * first @ second, rest * second @ second
-        energy = np.array([0.0, linear, quadratic, cubic, quartic / 2])
-        z = z + _lowest_place(energy) * step
-    raise ArithmeticError(
-        f"the plate was not at rest after {MOST_ITERATIONS} iterations; lower the load"
-    )
-
-
-def _lowest_place(coefficients: Floats) -> float:
-    """Where a polynomial, coefficients in ascending order, is least."""
-    polynomial = np.polynomial.Polynomial(coefficients)
-    places = np.roots(polynomial.deriv().coef[::-1])
-    real = places[np.abs(places.imag) <= FLAT**0.5 * np.abs(places)].real
-    return float(min(real, key=polynomial))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -317,36 +269,3 @@ class _Scheme:
         stress[0] = 0.0
         inertia = np.vstack([2 * (z[1:2] - z[:1]), z[2:] - 2 * z[1:-1] + z[:-2]]) / dt**2
         return np.asarray(self.mass * inertia + z[:-1] @ self.K + stress @ self.bending)
-
-
-def _march(plate: KarmanPlate, scheme: _Scheme, forces: Floats, start: Floats) -> Motion:
-    """Motion (n + 1, r) under forces (n, r) from coordinates and rates (2, r)."""
-    dt, M, K, B, rest = scheme.dt, scheme.mass, scheme.K, scheme.bending, scheme.rest
-    shares, pull, stiff = scheme.shares, scheme.pull, scheme.stiff
-    keep, follow = scheme.keep[:, None], scheme.follow[:, None]
-    z, energy = np.empty((len(forces) + 1, len(M))), np.empty(len(forces))
-    z[0], rate = start
-    G = plate.gradients(z[0])
-    y = G @ z[0] / 2
-    unbalanced = forces[0] - K @ z[0] - rest * (y @ G) - scheme.lag * (B @ rate)
-    z[1] = z[0] + dt * rate + dt**2 / 2 * unbalanced / M
-    bent, stretched = follow * (z[1] - z[0]) / 2, follow * (G @ z[1] / 2 - y)  # of the branches
-    y = G @ z[1] / 2
-    linear, hardening = np.diag(M / dt**2) + stiff / 2 * B, (rest / 2 + stiff) / 2
-    for n in range(len(forces)):
-        if n:
-            G = plate.gradients(z[n])
-            rhs = forces[n] - K @ z[n] + 2 / dt**2 * M * (z[n] - z[n - 1])
-            rhs -= (rest * y + pull @ stretched) @ G + B @ (pull @ bent)
-            _, change, failed = dposv(linear + hardening * (G.T @ G), rhs)
-            if failed:
-                raise ArithmeticError(f"step {n} of dt = {dt:g} s is not finite; lower the load")
-            z[n + 1] = z[n - 1] + change
-            following = G @ z[n + 1] / 2
-            bent = keep * bent + follow * (change / 2)
-            stretched = keep * stretched + follow * (following - y)
-            y = following
-        v = (z[n + 1] - z[n]) / dt
-        springs = shares @ ((bent @ B * bent).sum(axis=1) + (stretched**2).sum(axis=1))
-        energy[n] = (v @ (M * v) + z[n + 1] @ K @ z[n] + rest * (y @ y) + springs) / 2
-    return Motion(coordinates=z, energy=energy)

@@ -171,22 +171,9 @@ class PlateModes:
 def plate_modes(plate: Plate, finest: float | Sequence[float] = FINEST) -> PlateModes:
     """All modes of a plate that polynomials up to a wavenumber make.
 
-    The lowest are accurate; those near `finest` only stand in for the static deflection that
-    they share in.
-
-    Parameters
-    ----------
-    plate : Plate
-    finest : rad/m, the greatest wavenumber that is resolved; one, or that along x and along y
-
-    Returns
-    -------
-    PlateModes
-
-    Raises
-    ------
-    ValueError
-        If that takes more than `MOST_DOFS` degrees of freedom.
+    The lowest are accurate; those near `finest` in rad/m, the greatest wavenumber that is resolved,
+    or that along x and along y, only stand in for the static deflection that they share in. More
+    than `MOST_DOFS` degrees of freedom are a ValueError.
     """
     resolved, mirrored = np.broadcast_to(finest, 2), _symmetries(plate)
     bases = [_line_bases(plate, axis, resolved[axis], mirrored[axis]) for axis in (0, 1)]
@@ -196,27 +183,6 @@ def plate_modes(plate: Plate, finest: float | Sequence[float] = FINEST) -> Plate
             f"degrees of freedom, the limit is {MOST_DOFS:,}; lower finest = {max(resolved):g}"
         )
     return PlateModes(plate=plate, families=tuple(_family(plate, x, y) for x, y in product(*bases)))
-
-
-def steady_response(
-    modes: PlateModes,
-    frequencies: Floats,
-    forces: Complex,
-    outputs: Floats,
-    modulus: ModulusLaw,
-) -> Complex:
-    """Steady displacement: the shapes of the modes times their `modal_motion`.
-
-    Parameters
-    ----------
-    modes, frequencies, forces, modulus : as of `modal_motion`
-    outputs : (p, m) shapes where it is read, of `PlateModes.at`
-
-    Returns
-    -------
-    (f, p) complex, metre
-    """
-    return np.asarray(modal_motion(modes, frequencies, forces, modulus) @ outputs.T)
 
 
 def modal_motion(
@@ -256,16 +222,7 @@ def modal_motion(
 def modal_motion_apart(
     modes: PlateModes, frequencies: Floats, forces: Complex, modulus: ModulusLaw
 ) -> Complex:
-    """Modal coordinates as of `modal_motion`, without the coupling of the modes.
-
-    Parameters
-    ----------
-    modes, frequencies, forces, modulus : as of `modal_motion`
-
-    Returns
-    -------
-    (f, m) complex
-    """
+    """Modal coordinates (f, m) as of `modal_motion`, without the coupling of the modes."""
     w = 2 * np.pi * np.asarray(frequencies)[:, None]
     bending = modulus(w) * modes.elastic
     found = forces / (modes.squared * (1 - modes.elastic + bending) - w**2)
@@ -423,16 +380,8 @@ def _free_of_clips(plate: Plate, x: LineBasis, y: LineBasis) -> sparse.csr_array
 
 
 def outside_clips(plate: Plate, x: LineBasis, y: LineBasis) -> NDArray[np.bool_]:
-    """Products of functions that are zero on all clips.
-
-    Parameters
-    ----------
-    plate : Plate
-    x, y : LineBasis along both sides, with breaks at the sides of the clips
-
-    Returns
-    -------
-    (x y,) bool, the index of y the faster
+    """Mask (x y,), y the faster, of products of functions that are zero on all clips, at whose
+    sides the lines have breaks.
     """
     found, reach = np.ones((x.size, y.size), bool), plate.clip_radius
     for along, across in plate.clips:

@@ -15,8 +15,7 @@ bending. The energy of stretching, of fourth order in z, is thereby a sum of squ
 Airy's function: Thomas and Bilbao, J Sound Vib 315:569 (2008); Ducceschi and Touze, J Sound Vib
 344:313 (2015)).
 
-Only the lowest modes stretch the plate. The others keep their stiffness at rest. `karman_motion`
-computes static deflection and motion.
+Only the lowest modes stretch the plate. The others keep their stiffness at rest.
 """
 
 from __future__ import annotations
@@ -114,10 +113,6 @@ def karman_plate(
     in_plane : what supported edges do to the in-plane displacement: "held" fixes it, "sliding"
         fixes only its component across the edge, "movable" leaves it free. Clips with a radius
         always fix it.
-
-    Returns
-    -------
-    KarmanPlate
 
     Raises
     ------

@@ -32,8 +32,7 @@ def roots_of(curves, n=0):
 
 
 @pytest.mark.parametrize(
-    ("poisson", "ratio"), [(0.25, 0.919402), (0.3, 0.927413), (0.4, 0.942195), (0.49, 0.954074),
-                       (0.499, 0.955189), (0.4999, 0.955300)],
+    ("poisson", "ratio"), [(0.25, 0.919402), (0.4999, 0.955300)],
 )  # fmt: skip
 def test_rayleigh_wave_of_a_half_space(poisson, ratio):
     material = solid(poisson)
@@ -52,7 +51,7 @@ def test_rayleigh_wave_with_viscosity_goes_with_the_complex_modulus():
     assert mode.decay_length[1] == pytest.approx(7.3e-3, rel=0.01)  # published beside 3.25 m/s
 
 
-@pytest.mark.parametrize("poisson", [0.25, 0.49, 0.4999])
+@pytest.mark.parametrize("poisson", [0.25, 0.4999])
 def test_layers_of_the_material_of_the_half_space_below_have_its_rayleigh_wave(poisson):
     """The thin-layer method, the matched layer and the refinement beside the closed form."""
     material = solid(poisson, loss_factor=0.1)
@@ -73,9 +72,8 @@ def test_layers_of_the_material_of_the_half_space_below_have_its_rayleigh_wave(p
 
 
 @pytest.mark.parametrize(
-    ("poisson", "w", "a0", "s0"), [(0.3, 0.1, 0.21697, 1.69026), (0.3, 0.25, 0.33424, None),
-                           (0.3, 0.5, 0.45358, None), (0.3, 1, 0.59464, 1.68562),
-                           (0.3, 2, 0.73800, None), (0.3, 5, 0.87612, None)],
+    ("poisson", "w", "a0", "s0"), [(0.3, 0.1, 0.21697, 1.69026), (0.3, 1, 0.59464, 1.68562),
+                           (0.3, 5, 0.87612, None)],
 )  # fmt: skip
 def test_rayleigh_lamb_waves_of_a_plate(poisson, w, a0, s0):
     material, thickness = solid(poisson), 0.01
@@ -87,7 +85,7 @@ def test_rayleigh_lamb_waves_of_a_plate(poisson, w, a0, s0):
         assert speeds[1] == pytest.approx(s0, rel=1e-4)
 
 
-@pytest.mark.parametrize("poisson", [0.3, 0.49, 0.4999])
+@pytest.mark.parametrize("poisson", [0.3, 0.4999])
 def test_cut_offs_of_a_slab_on_a_rigid_base(poisson):
     """At odd multiples of c_s/4H and of c_p/4H: there a mode has k = 0."""
     material, depth = solid(poisson), 0.015
@@ -160,8 +158,7 @@ def refined(stack, omega, start):
     return k
 
 
-@pytest.mark.parametrize("base", ["clamped", "free"])
-@pytest.mark.parametrize("f", [60.0, 210.0])
+@pytest.mark.parametrize(("base", "f"), [("clamped", 60.0), ("free", 210.0)])
 def test_modes_of_layers_are_roots_of_a_determinant_that_shares_no_code(base, f):
     stack = Stack(materials=(SOFT, STIFF, SOFT), thicknesses=(0.003, 0.004, 0.005), base=base)
     roots = roots_of(dispersion_curves(stack, [f]))
@@ -170,22 +167,7 @@ def test_modes_of_layers_are_roots_of_a_determinant_that_shares_no_code(base, f)
         assert abs(refined(stack, 2 * pi * f, k) - k) < 1e-6 * abs(k)
 
 
-def test_group_speed_is_the_derivative_of_refined_phase_curves():
-    stack = Stack(materials=(SOFT, STIFF), thicknesses=(0.004, 0.008))
-    f = np.array([140.0])
-    found, step = dispersion_curves(stack, f), 1e-4
-    for mode in found.modes:
-        ends = [refined(stack, 2 * pi * 140 * (1 + d), mode.wavenumbers[0]) for d in (-step, step)]
-        slowness = (ends[1] - ends[0]) / (2 * pi * 140 * 2 * step)
-        assert abs(mode.slowness[0] - slowness) < 1e-4 * abs(slowness)
-        if abs(slowness.imag) > abs(slowness.real):
-            assert np.isnan(mode.group_speed[0])
-        else:
-            assert mode.group_speed[0] == pytest.approx(1 / slowness.real, rel=1e-3)
-    assert any(np.isfinite(mode.group_speed[0]) for mode in found.modes)
-
-
-@pytest.mark.parametrize("f", [60.0, 140.0, 300.0])
+@pytest.mark.parametrize("f", [140.0])
 def test_modes_of_a_slab_add_up_to_its_wavenumber_integral(f):
     """Residues of all poles: what each mode carries of the motion beyond the focal spot."""
     palm = PRESETS["palm"]
@@ -195,7 +177,7 @@ def test_modes_of_a_slab_add_up_to_its_wavenumber_integral(f):
     assert abs(found - expected) < 1e-6 * abs(expected)
 
 
-@pytest.mark.parametrize("name", ["palm", "forearm", "paper"])
+@pytest.mark.parametrize("name", ["palm", "paper"])
 def test_residues_are_those_of_the_compliance(name):
     """G (k^2 - k_m^2) next to the pole, of a half-space and of a sheet with air."""
     material, f = PRESETS[name], 140.0
@@ -251,10 +233,10 @@ def test_a_stiff_skin_on_a_softer_half_space_begins_to_leak():
     assert slower[[0, -1]].tolist() == [True, False]
 
 
-@pytest.mark.parametrize("f", [[], [0.0, 10.0], [20.0, 10.0], [10.0, inf]])
-def test_frequencies_are_checked(f):
-    with pytest.raises(ValueError, match="above 0 Hz and ascending"):
-        dispersion_curves(Stack(materials=(SOFT,), thicknesses=(0.01,)), f)
+def test_frequencies_are_checked():
+    for f in ([], [0.0, 10.0], [20.0, 10.0], [10.0, inf]):
+        with pytest.raises(ValueError, match="ascending"):
+            dispersion_curves(Stack(materials=(SOFT,), thicknesses=(0.01,)), f)
 
 
 def scene_of(text):
@@ -279,8 +261,7 @@ def driven():
     return driven_modes(scene_of(CIRCLE + 'kind = "slab"'), spacing=24)
 
 
-@pytest.mark.parametrize("width", [None, 2.5, 3.5, 5.0, 7.0])
-@pytest.mark.parametrize("kind", ["slab", "sheet"])
+@pytest.mark.parametrize(("kind", "width"), [("slab", None), ("slab", 2.5), ("sheet", 3.5)])
 def test_no_text_of_the_curves_is_cut_or_over_another(driven, kind, width):
     found = driven
     if kind == "sheet":
@@ -311,44 +292,14 @@ def test_lines_of_a_load_are_at_their_own_frequencies_on_the_curves(driven):
     assert (below.kind, below.mach_angle) == ("evanescent", None)
 
 
-def test_driven_mode_is_the_one_that_carries_most_of_the_motion(driven):
-    """Beyond the focal spot it leaves less of the wavenumber integral than any other wave does."""
-    line = next(line for line in driven.lines if line.name == "2f_d-f_AM")
-    at, k = 0.0232, line.at
-    ((whole,),) = point_response(
-        slab(PRESETS["palm"], 0.015), [at], [2 * pi * line.frequency], WIDTH
-    )
-    parts = {m.name: m.amplitude(WIDTH, at)[k] for m in driven.curves.modes if m.is_wave[k]}
-    left = {name: abs(whole - part) for name, part in parts.items()}
-    assert min(left, key=left.get) == line.mode.name
-    assert len(left) > 1
-
-
-def test_sentences_say_speed_decay_focus_and_cut_off(driven):
-    from skinwave.studies.dispersion_page import sentences
-
-    mode, focus, cut_off = sentences(driven)
-    assert mode.startswith("The strongest line, f_d at 191 Hz, drives most of all mode 2 (prop")
-    assert "5.95 m/s" in mode
-    assert "1/e in 18.4 mm" in mode
-    assert "2.02 times as fast: a Mach angle of 30 degrees" in focus
-    assert cut_off == "Below 84 Hz no wave propagates."
-
-
 @pytest.mark.parametrize(
-    ("body", "said"),
-    [('kind = "palm"', "as deep as the middle of the palm, 15 mm"),
-     ('kind = "slab"\nbase = "absorbing"', "taken as a half-space of the lowest material"),
-     ('kind = "slab"\nthickness_mm = inf', "Rayleigh wave"),
-     ('kind = "sheet"', "bending wave"),
-     ('kind = "slab"\n[[body.layers]]\nthickness_mm = 1.5\nmaterial = "dermis"', "mode 1")],
+    ("body", "mode"),
+    [('kind = "palm"', "mode 1"), ('kind = "slab"\nthickness_mm = inf', "Rayleigh wave"),
+     ('kind = "sheet"', "bending wave")],
 )  # fmt: skip
-def test_every_kind_of_body_with_a_depth_has_curves(body, said):
-    from skinwave.studies.dispersion_page import sentences, taken_as
-
+def test_every_kind_of_body_with_a_depth_has_curves(body, mode):
     found = driven_modes(scene_of(CIRCLE + body), spacing=12)
-    text = " ".join([*sentences(found), *taken_as(found.scene), found.curves.modes[0].name])
-    assert said in text
+    assert found.curves.modes[0].name == mode
     assert all(line.decay_length > 0 for line in found.lines)
 
 
@@ -359,12 +310,11 @@ def test_command_writes_a_page_a_table_and_arrays(tmp_path, capsys):
     out = tmp_path / "out"
     asked = [str(tmp_path / "scene.toml"), "--modes", "3", "--highest", "300"]
     assert main(["dispersion", *asked, "-o", str(out)]) == 0
-    assert capsys.readouterr().out.startswith("The strongest line, f_d at 191 Hz, drives")
+    assert "f_d at 191 Hz" in capsys.readouterr().out
     header, first = (out / "dispersion.csv").read_text().splitlines()[:2]
     assert header.split(",")[:4] == ["mode", "kind", "frequency_hz", "re_k_rad_per_m"]
     assert first.split(",")[2] == "10"
-    page = (out / "index.html").read_text()
-    assert page.index("The strongest line") < page.index('id="dispersion"') < page.index("<table")
+    assert "<table" in (out / "index.html").read_text()
     arrays = np.load(out / "dispersion.npz")
     assert arrays["wavenumber_per_m"].shape == (3, len(arrays["frequency_hz"]))
     assert arrays["frequency_hz"].max() == 300
@@ -372,12 +322,8 @@ def test_command_writes_a_page_a_table_and_arrays(tmp_path, capsys):
 
 @pytest.mark.parametrize(
     ("body", "asked", "said"),
-    [('kind = "none"', [], "take a slab of its depth and layers"),
-     ('kind = "slab"', ["--highest", "5"], "must be above 20 Hz"),
-     ('kind = "slab"', ["--highest", "nan"], "must be above 20 Hz"),
-     ('kind = "slab"', ["--modes", "0"], "outside 1..12"),
-     ('kind = "slab"\nthickness_mm = 500', [], "elements in depth, the limit is 20"),
-     ('kind = "slab"', ["--highest", "1e9"], "elements in depth, the limit is 20"),
+    [('kind = "none"', [], "slab"), ('kind = "slab"', ["--highest", "nan"], "20 Hz"),
+     ('kind = "slab"', ["--highest", "1e9"], "elements in depth"),
      ('kind = "slab"\nsize_x_mm = 45', ["--model", "flat-body"], "too near to see waves")],
 )  # fmt: skip
 def test_command_refuses_in_one_sentence(tmp_path, capsys, body, asked, said):
@@ -404,15 +350,6 @@ def test_wavenumbers_in_the_motion_are_those_of_the_modes(driven):
     assert np.median(apart) < 0.01
     # Both modes are seen, each where it leads.
     assert np.ptp(found.matched.modes.real[(f > 150) & (f < 200)]) > 80
-
-
-def test_wavenumbers_are_those_of_the_motion_whatever_a_scene_reads(driven):
-    from dataclasses import replace
-
-    from skinwave.studies.wavenumbers import pulse_scene
-
-    below = replace(driven.scene, quantity="strain_zz", depth=(7e-4,) * len(driven.scene.probes))
-    assert pulse_scene(below) == pulse_scene(driven.scene)
 
 
 def test_only_wavenumbers_that_the_line_resolves_are_reported():
@@ -444,7 +381,7 @@ def test_only_wavenumbers_that_the_line_resolves_are_reported():
     assert not resolved[faded].any()
 
 
-@pytest.mark.parametrize("poisson", [0.3, 0.4999])
+@pytest.mark.parametrize("poisson", [0.4999])
 def test_a_thin_layer_leaves_long_waves_to_the_half_space_below(poisson):
     """Without loss, so that bound waves are real, and with as many modes as there may be."""
     below, thin = solid(poisson), Material(density=1000, shear_modulus=50e3, poisson=poisson)

@@ -39,22 +39,7 @@ def circling(size, speed, am=0.0, **load):
 
 
 def test_deflection_is_greatest_when_the_focus_keeps_up_with_the_surface_wave():
-    speeds = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 15, 18]
-    table = [
-        0.362,
-        0.402,
-        0.409,
-        0.366,
-        0.309,
-        0.260,
-        0.222,
-        0.194,
-        0.175,
-        0.162,
-        0.146,
-        0.130,
-        0.120,
-    ]
+    speeds, table = [1, 3, 5, 8, 18], [0.362, 0.409, 0.309, 0.194, 0.120]
     body, radius = half_space(Material(**FOREARM, poisson=0.49), poisson=0.5), 0.1 / 2 / np.pi
     peaks = []
     for speed in speeds:
@@ -81,12 +66,8 @@ def test_a_deep_slab_is_a_half_space_and_a_shallow_one_is_stiffer():
     assert rest[0] < 0.6 * static(half_space(Material(**FOREARM, poisson=0.4999)), [0.0])[0]
 
 
-@pytest.mark.parametrize(
-    "body",
-    [half_space(PRESETS["palm"]), slab(PRESETS["palm"], 0.015)],
-    ids=["half-space", "slab"],
-)
-def test_a_transient_settles_into_the_steady_state(body):
+def test_a_transient_settles_into_the_steady_state():
+    body = slab(PRESETS["palm"], 0.015)
     load = circling(0.02, 12, am=140, drive="pressure_squared")
     probes, times = [[0.0, 0.0], [0.01, 0.0], [0.02, 0.0]], np.arange(4000) / 1e4
     found = flat_body(body, load, probes, times).displacement
@@ -131,10 +112,7 @@ def test_load_lines_add_up_to_the_load():
     ("poisson", "depth", "viscosity", "frequency"),
     [
         (0.35, 0.015, 0.5, 165.0),  # runs backwards
-        (0.45, 0.015, 0.5, 215.0),
-        (0.4999, 0.015, 0.5, 240.0),
         (0.4999, 0.030, 5.0, 85.0),  # is about to
-        (0.4999, 0.040, 5.0, 60.0),
         (0.30, 0.100, 1.0, 14.0),
     ],
 )
@@ -151,9 +129,3 @@ def test_every_wave_of_a_layer_is_on_its_side_of_the_path(poisson, depth, viscos
     expected, _ = quad_vec(integrand, 0, 6.5 / width, epsrel=1e-7, limit=2000)
     found = point_response(layer, [0.0, r], w, width)
     assert found[0, 1] == pytest.approx(expected, rel=1e-4)
-
-
-def test_a_layer_that_loses_nothing_has_no_steady_state():
-    layer = slab(Material(density=1000, shear_modulus=25e3, poisson=0.49), 0.015)
-    with pytest.raises(ArithmeticError, match="add some loss"):
-        point_response(layer, [0.0], [2 * np.pi * 200.0], 4.35e-3)

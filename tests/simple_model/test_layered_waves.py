@@ -16,19 +16,15 @@ from simple_model import (
     Tacton,
     Trajectory,
     flat_body,
-    flat_motion,
-    steady_motion,
     timed_path,
 )
 from simple_model.layers.compliance import Compliance, half_space, layered, slab, thin_sheet
-from simple_model.layers.flat_body import steady_lines
-from simple_model.layers.flat_motion import point_motion
-from simple_model.layers.flat_quantities import from_rest, quantity_field
+from simple_model.layers.flat_body import field_history, field_lines
+from simple_model.layers.flat_quantities import motion_field
 from simple_model.layers.layered import transfer
 from simple_model.layers.material import PRESETS
-from simple_model.layers.wavenumber_integral import point_response
+from simple_model.layers.wavenumber_integral import point_integrals, point_response
 from simple_model.load.spectrum import load_lines
-from simple_model.quantities import quantity
 
 WIDTH = 4.35e-3
 RADII = np.arange(5) * 5e-3
@@ -129,8 +125,7 @@ def by_elements(stack, k, w, order=16):
     return u.reshape(2, n)[:, ::order].astype(complex)
 
 
-@pytest.mark.parametrize("depth", [0.3e-3, 5e-3, 15e-3, 60e-3])
-@pytest.mark.parametrize("poisson", [0.3, 0.49, 0.4999])
+@pytest.mark.parametrize(("poisson", "depth"), [(0.3, 60e-3), (0.49, 5e-3), (0.4999, 0.3e-3)])
 def test_one_layer_and_equal_ones_are_a_slab(poisson, depth):
     solid = replace(PALM, poisson=poisson)
     k, w = K + 2j, angular(HERTZ[1:])
@@ -168,19 +163,11 @@ def test_soft_on_stiff_moves_as_published():
     ("stack", "most"),
     [
         (SKIN, 3e-5),
-        (replace(SKIN, thicknesses=(0.1e-3, 1e-3, 4e-3, 9.5e-3)), 3e-5),
         (replace(SKIN, base="free"), 3e-5 if IS_EXTENDED else 3e-3),  # at 1 Hz
         (replace(SKIN, base="elastic", base_stiffness=2e6), 3e-5),
-        (
-            Stack(
-                materials=(tissue(5e3), tissue(2e6), tissue(20e3)),
-                thicknesses=(2e-3, 1e-3, 5e-3),
-            ),
-            1e-5,
-        ),
         (ON_STIFF, 1e-6),
     ],
-    ids=["skin", "thin", "free", "elastic", "hard-inside", "soft-on-stiff"],
+    ids=["skin", "free", "elastic", "soft-on-stiff"],
 )
 def test_layers_move_as_spectral_elements_in_depth_do(stack, most):
     """At all depths, whose motion and stresses are those of what is between and below."""
@@ -215,14 +202,12 @@ def test_stresses_at_depth_are_those_of_the_motion():
 
 def test_no_frequency_of_thin_stiff_skin_stands_out():
     with np.errstate(all="raise", under="ignore"):
-        g = point_response(layered(SKIN), RADII, 2 * np.pi * np.arange(1.0, 1001.0), WIDTH)
+        g = point_response(layered(SKIN), RADII, 2 * np.pi * np.arange(1.0, 301.0), WIDTH)
     turns = np.abs(np.diff(g, 4, axis=0)).max(axis=1)  # a spike of 1 % has 6 %
     assert turns.max() < 0.03 * np.abs(g).max()
 
 
-@pytest.mark.parametrize(
-    ("loss", "damping", "smooth"), [(2e-3, 6.0, True), (2e-4, 6.0, True), (1e-5, 0.3, False)]
-)
+@pytest.mark.parametrize(("loss", "damping", "smooth"), [(2e-4, 6.0, True), (1e-5, 0.3, False)])
 def test_frequencies_of_a_transient_are_interpolated_where_they_are_smooth(loss, damping, smooth):
     """Near the poles of a body with little loss they are not: most are integrated."""
     integrated = []
@@ -268,9 +253,7 @@ def test_a_free_stack_is_a_thin_sheet_where_it_is_thin():
 @pytest.mark.parametrize(
     ("stack", "hertz"),
     [
-        (SKIN, 60.0),
         (SKIN, 400.0),
-        (ON_STIFF, 210.0),
         (replace(ON_STIFF, materials=(replace(SOFT, viscosity=0.0), STIFF)), 700.0),
         (Stack(materials=(SOFT, STIFF), thicknesses=(5e-3, inf)), 300.0),
         (equal(replace(PALM, viscosity=0.5, poisson=0.35), 5e-3, 10e-3), 165.0),  # runs backwards
@@ -295,12 +278,19 @@ def test_layers_without_any_loss_have_no_steady_state():
         point_response(layered(replace(ON_STIFF, materials=still)), [0.0], [2e3], WIDTH)
 
 
-@pytest.mark.parametrize("poisson", [0.3, 0.4999])
+def point_motion(stack, distances, frequencies, *, depth=0.0):
+    """Displacement (2, f, r) in m/Pa outwards and downwards about a focal spot of 1 Pa."""
+    found = point_integrals(motion_field(stack, depth), distances, frequencies, WIDTH)
+    found[0] *= np.atleast_1d(distances)
+    return found
+
+
+@pytest.mark.parametrize("poisson", [0.4999])
 def test_a_half_space_at_rest_moves_as_boussinesq_says(poisson):
     """Both ways at a depth, under a Gaussian pressure; in layers of one material."""
     mu, z = PALM.shear_modulus, 3e-3
     stack = equal(replace(PALM, poisson=poisson), 2e-3, inf)
-    outwards, down = point_motion(stack, RADII, [0.0], WIDTH, depth=z)[:, 0]
+    outwards, down = point_motion(stack, RADII, [0.0], depth=z)[:, 0]
 
     def integral(bessel, part, r):
         def integrand(k):
@@ -318,12 +308,12 @@ def test_a_half_space_at_rest_moves_as_boussinesq_says(poisson):
 def test_all_components_at_depth_are_those_that_a_focus_makes_everywhere():
     """By an integral over the path of what a focus at rest makes, at the probe."""
     probe, depth, load = np.array([0.013, 0.004]), 1.5e-3, circling(drive="linear")
-    f, a = steady_motion(SKIN, load, [probe], depth=depth)
+    f, a = field_lines(motion_field(SKIN, depth), load, [probe])
     line = np.argmin(np.abs(f - 140))
     knots = load.tacton.trajectory.at_phase((np.arange(240) + 0.5) / 240)
     away = probe - knots
     r = np.linalg.norm(away, axis=1)
-    outwards, down = point_motion(SKIN, r, [2 * np.pi * f[line]], WIDTH, depth=depth)[:, 0]
+    outwards, down = point_motion(SKIN, r, [2 * np.pi * f[line]], depth=depth)[:, 0]
     mean = np.mean([outwards * away[:, 0] / r, outwards * away[:, 1] / r, down], axis=1)
     gain = load.gain(np.arange(400) / 400 / 140)
     strength = 2 * np.mean(gain * np.exp(-2j * np.pi * np.arange(400) / 400))
@@ -333,8 +323,8 @@ def test_all_components_at_depth_are_those_that_a_focus_makes_everywhere():
 def test_motion_from_rest_settles_and_is_alike_by_either_way():
     """A circle as such, and as a recording; normal to the surface it is `flat_body`'s."""
     load, times, probes = circling(), np.arange(600) / 4000, [[0.005, 0.0], [0.013, 0.004]]
-    found = flat_motion(SKIN, load, probes, times, depth=1.5e-3)
-    f, a = steady_motion(SKIN, load, probes, depth=1.5e-3)
+    found = field_history(motion_field(SKIN, 1.5e-3), load, probes, times)
+    f, a = field_lines(motion_field(SKIN, 1.5e-3), load, probes)
     steady = np.einsum("fpm,tf->tpm", a, np.exp(2j * np.pi * f * times[:, None])).real
     assert np.abs(found - steady)[400:].max() < 5e-3 * np.abs(steady).max()
     assert np.abs(found[..., 1]).max() > 0.05 * np.abs(found[..., 2]).max()
@@ -342,27 +332,11 @@ def test_motion_from_rest_settles_and_is_alike_by_either_way():
     period = 1 / path.drawing_frequency
     recorded = timed_path(lambda t: path.at_phase(t / period % 1), period)
     again = replace(load, tacton=replace(load.tacton, trajectory=recorded))
-    other = flat_motion(SKIN, again, probes, times, depth=1.5e-3)
+    other = field_history(motion_field(SKIN, 1.5e-3), again, probes, times)
     assert np.abs(found - other).max() < 5e-3 * np.abs(found).max()
-    surface = flat_motion(SKIN, load, probes, times)[..., 2]
+    surface = field_history(motion_field(SKIN), load, probes, times)[..., 2]
     waves = flat_body(layered(SKIN), load, probes, times).displacement
     assert np.abs(surface - waves).max() < 1e-6 * np.abs(waves).max()
-
-
-@pytest.mark.parametrize("name", ["strain_xx", "strain_yy", "strain_xy", "stress_xx"])
-def test_every_strain_is_alike_on_a_circle_and_on_its_recording(name):
-    path, asked = Trajectory(shape="circle", size=0.02, speed=6.0), quantity(name)
-    period = 1 / path.drawing_frequency
-    recorded = timed_path(lambda t: path.at_phase(t / period % 1), period)
-    field, probes = quantity_field(asked, SKIN, 0.7e-3), [[0.004, 0.0], [0.012, 0.003]]
-    one, other = (
-        from_rest(
-            field, asked, MovingPressure(tacton=Tacton(duration=0.02, trajectory=each)), probes,
-            np.arange(100) / 5000,
-        )
-        for each in (path, recorded)
-    )  # fmt: skip
-    assert np.abs(one - other).max() < 2e-3 * np.abs(one).max()
 
 
 def test_a_depth_outside_the_stack_is_refused():
@@ -371,13 +345,7 @@ def test_a_depth_outside_the_stack_is_refused():
             transfer(SKIN, [depth])
 
 
-def test_steady_lines_of_layers_are_linear_in_the_load():
-    load, double = circling(), circling(peak_pressure=100.0)
-    (_, a), (_, b) = (steady_lines(layered(SKIN), x, [[0.01, 0.0]]) for x in (load, double))
-    np.testing.assert_allclose(2 * a, b, rtol=1e-9)
-
-
-@pytest.mark.parametrize("hertz", [0.1, 0.3, 0.49])
+@pytest.mark.parametrize("hertz", [0.1, 0.49])
 def test_a_free_stack_follows_slow_lines_as_a_thin_plate(hertz):
     """q / 4 pi D b [e^-x E1(-x) - e^x E1(x)] / 2, b^2 = m w^2 / D, x = b width^2 / 2, by partial
     fractions of int S(k) k dk / (D k^4 - m w^2).
@@ -389,14 +357,14 @@ def test_a_free_stack_follows_slow_lines_as_a_thin_plate(hertz):
     x = b * WIDTH**2 / 2
     plate = WIDTH**2 / (4 * bending * b) * (np.exp(-x) * exp1(-x) - np.exp(x) * exp1(x))
     assert point_response(layered(free), [0.0], [w], WIDTH)[0, 0] == pytest.approx(plate, rel=2e-3)
-    assert point_motion(free, [0.0], [w], WIDTH)[1, 0, 0] == pytest.approx(plate, rel=2e-3)
+    assert point_motion(free, [0.0], [w])[1, 0, 0] == pytest.approx(plate, rel=2e-3)
 
 
 def test_a_free_stack_has_no_static_deflection():
     free = Stack(materials=(PALM,), thicknesses=(0.015,), base="free")
-    assert not point_motion(free, [0.005], [0.0], WIDTH).any()
+    assert not point_motion(free, [0.005], [0.0]).any()
     with pytest.raises(ArithmeticError, match="give a free slab a base"):
-        point_motion(free, [0.005], [2e-4 * np.pi], WIDTH)
+        point_motion(free, [0.005], [2e-4 * np.pi])
 
 
 def test_lines_that_cancel_but_for_round_off_are_the_mean():

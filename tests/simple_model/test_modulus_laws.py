@@ -118,18 +118,11 @@ def test_scaled_laws_have_their_moduli_or_losses_scaled():
 
 @pytest.mark.parametrize(
     ("law", "said"),
-    [({"exponent": 1.5}, "exponent = 1.5 is outside 0 < exponent <= 1"),
-     ({"time": -1.0}, "time = -1.0 s must be"), ({"shear_modulus": 0.0}, "shear_modulus = 0.0"),
-     ({"fast_modulus": 1e3}, "at least the shear_modulus at rest, 20000 Pa")],
+    [({"exponent": 1.5}, "exponent"), ({"time": -1.0}, "time"), ({"fast_modulus": 1e3}, "at rest")],
 )  # fmt: skip
 def test_constants_out_of_range_are_refused(law, said):
     with pytest.raises(ValueError, match=said):
         replace(ZENER.law, **law)
-
-
-def test_a_material_has_the_modulus_of_its_law_at_rest():
-    with pytest.raises(ValueError, match="30000 Pa is not that of the material's modulus law at"):
-        replace(ECOFLEX, shear_modulus=30e3)
 
 
 # Steady waves by the law itself
@@ -155,8 +148,9 @@ def half_space_response(mu, density, nu, r, w):
     )
 
 
-@pytest.mark.parametrize("of", ["law", "table"])
-@pytest.mark.parametrize(("solid", "modulus"), [(ECOFLEX, ecoflex), (ZENER, zener)])
+@pytest.mark.parametrize(
+    ("of", "solid", "modulus"), [("law", ECOFLEX, ecoflex), ("table", ZENER, zener)]
+)
 def test_steady_lines_are_those_of_an_independent_quadrature(of, solid, modulus):
     """A table at its own frequencies, which the lines of the load are."""
     hertz = [20.0, 90.0, 140.0, 400.0]
@@ -185,7 +179,7 @@ def test_a_slab_at_rest_has_the_modulus_at_rest():
 # Motion from rest by the law itself
 
 
-@pytest.mark.parametrize("solid", [ECOFLEX, ZENER])
+@pytest.mark.parametrize("solid", [ECOFLEX])
 def test_motion_from_rest_settles_to_the_steady_lines(solid):
     own, times = scene(solid), np.arange(2000) / 1e4
     body = slab(solid, 0.008)
@@ -198,8 +192,9 @@ def test_motion_from_rest_settles_to_the_steady_lines(solid):
 # Prony series
 
 
-@pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
-@pytest.mark.parametrize(("solid", "modulus"), [(ECOFLEX, ecoflex), (ZENER, zener)])
+@pytest.mark.parametrize(
+    ("tolerance", "solid", "modulus"), [(1e-2, ECOFLEX, ecoflex), (1e-3, ZENER, zener)]
+)
 def test_a_series_is_as_near_as_it_says_and_no_longer_than_it_must_be(solid, modulus, tolerance):
     series = solid.series(tolerance)
     f = np.geomspace(*series.band, 997)
@@ -214,13 +209,6 @@ def test_a_series_is_as_near_as_it_says_and_no_longer_than_it_must_be(solid, mod
     np.testing.assert_allclose(relaxed, series(2 * np.pi * f), rtol=1e-13)
 
 
-def test_the_series_of_a_prony_series_is_as_near_as_asked():
-    own = fit_prony(ZENER.law, tolerance=1e-3)
-    again = fit_prony(own, rest=own.shear_modulus, tolerance=1e-3)
-    assert again.error <= 1e-3
-    assert len(again.terms) <= len(own.terms)
-
-
 @pytest.fixture(scope="module")
 def element():
     """Two cells, the force of a pressure on their top, and a probe."""
@@ -229,7 +217,7 @@ def element():
     return mesh, P @ np.ones(P.shape[1]), fem.probe_operator(mesh, [[0.0, 0.0]])
 
 
-@pytest.mark.parametrize("solid", [ECOFLEX, ZENER, table_of(ECOFLEX)])
+@pytest.mark.parametrize("solid", [ZENER, table_of(ECOFLEX)])
 def test_stepping_and_reduction_by_the_series_are_the_harmonic_motion_of_the_law(element, solid):
     mesh, force, S = element
     own, series = (fem.assemble(mesh, m) for m in (solid, solid.relaxing()))
@@ -244,17 +232,6 @@ def test_stepping_and_reduction_by_the_series_are_the_harmonic_motion_of_the_law
     stepped = np.array([(S @ state.displacement)[0] for state in states])[-600:]
     steady = (expected[2] * np.exp(1j * w * dt * np.arange(1801, 2401))).imag
     assert np.abs(stepped - steady).max() < 0.01 * abs(expected[2])
-
-
-@pytest.mark.parametrize("solid", [ECOFLEX, table_of(ECOFLEX)])
-def test_models_in_time_take_the_series_and_are_near_the_law(solid):
-    own = scene(solid)
-    expected = compute(own, "fem-harmonic", h=0.008).displacement
-    settled = slice(len(expected) // 2, None)
-    for model in ("fem", "fem-transient"):
-        found = compute(own, model, h=0.008).displacement
-        away = np.linalg.norm((found - expected)[settled])
-        assert away < 0.01 * np.linalg.norm(expected[settled])
 
 
 def test_flat_body_takes_the_series_of_a_table_at_complex_frequencies():
@@ -297,20 +274,8 @@ def test_a_plan_counts_the_series_in_its_error():
     ]
 
 
-def test_a_plan_of_elements_counts_the_series():
-    own = scene(ECOFLEX)
-    found, harmonic = (
-        skinwave.plan(own, skinwave.SolveOptions(model=name, h=0.008))
-        for name in ("fem", "fem-harmonic")
-    )
-    assert any(row.what == "modulus law" for row in found.rows)
-    assert not any(row.what == "modulus law" for row in harmonic.rows)
-    assert found.error > ECOFLEX.series().error
-    assert np.isfinite(harmonic.error)
-
-
 def test_a_load_beyond_a_table_is_refused():
-    for measured in ([20.0, 60.0, 130.0], [300.0, 350.0, 400.0]):
+    for measured in ([20.0, 60.0, 130.0],):
         own = scene(table_of(ECOFLEX, measured))
         ends = f"from {measured[0]:g} to {measured[-1]:g} Hz, .* to 140 Hz; extend the table"
         for ask in (skinwave.plan, compute):
@@ -334,40 +299,22 @@ def test_a_table_continues_by_its_series():
 # What no solid can be
 
 
-def lossy_at_300_hz(w):
-    return 25e3 + 20e3j * np.exp(-(np.log(w / (2 * np.pi * 300)) ** 2) * 4)
-
-
 @pytest.mark.parametrize(
     ("law", "said"),
     [(lambda w: 25e3 + 10e3j * np.sign(w), r"not causal.* \(root mean square.*at 1 Hz 3\d %"),
-     (lossy_at_300_hz, r"not causal.*at (29\d|30\d) Hz [4-9]\d %"),
-     (lambda w: 25e3 * (1 - 1e-4j * w), r"loss modulus is -15.71 Pa at 1 Hz"),
-     (lambda w: 25e3 - 10 * w + 1j * w, r"storage modulus is -\d+.* Pa at 4\d\d.* Hz"),
-     (lambda w: np.nan * w, r"modulus is nan Pa at 1 Hz")],
+     (lambda w: 25e3 * (1 - 1e-4j * w), "loss modulus")],
 )  # fmt: skip
 def test_a_law_of_no_solid_is_refused_by_every_model(law, said):
     own = scene(replace(ECOFLEX, law=law))
     with pytest.raises(ValueError, match=said):
         skinwave.plan(own)
-    for model in ("flat-body-harmonic", "flat-body", "fem-harmonic", "fem"):
+    for model in ("flat-body", "fem-harmonic"):
         with pytest.raises(ValueError, match=said):
             compute(own, model)
 
 
-def test_a_table_of_no_solid_is_refused_with_its_frequency():
-    mu = ECOFLEX.complex_modulus(2 * np.pi * HERTZ)
-    refused = {"loss modulus is -3 Pa at 5 Hz": 0, "not causal.* 10 %": slice(None)}
-    for said, rows in refused.items():
-        wrong = mu.copy()
-        wrong[rows] = mu[0].real - 3j if rows == 0 else 25e3 + 12e3j
-        with pytest.raises(ValueError, match=said):
-            tabulated(density=1.0, poisson=0.4, frequencies=HERTZ, moduli=wrong)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_measured_noise_of_some_per_cent_is_taken(seed):
-    noise = np.random.default_rng(seed).standard_normal((2, len(HERTZ)))
+def test_measured_noise_of_some_per_cent_is_taken():
+    noise = np.random.default_rng(0).standard_normal((2, len(HERTZ)))
     law = ECOFLEX.complex_modulus(2 * np.pi * HERTZ)
     moduli = law * (1 + 0.04 * (noise[0] + 1j * noise[1]))
     found = tabulated(density=1.0, poisson=0.4, frequencies=HERTZ, moduli=moduli)
@@ -384,7 +331,7 @@ HEADER = "frequency_hz,storage_pa,loss_pa\n"
 FRACTIONAL = 'law = "fractional-kelvin-voigt"\nshear_modulus_pa = 25e3\nexponent = 0.33\n'
 
 
-@pytest.mark.parametrize("solid", [ECOFLEX, ZENER, table_of(ZENER), "ecoflex"])
+@pytest.mark.parametrize("solid", [ECOFLEX, table_of(ZENER)])
 def test_a_scene_file_holds_them(solid):
     own = scene(solid)
     layered = replace(own.body, layers=(Layer(thickness=2e-3, material=solid),))
@@ -412,24 +359,13 @@ def test_a_table_is_read_from_beside_the_scene(tmp_path):
         loads(BODY + 'table = "moduli.csv"\n')
 
 
-def test_a_design_varies_the_constants_of_a_preset(tmp_path):
-    (tmp_path / "scene.toml").write_text('[body]\nmaterial = "ecoflex"\n')
-    found = cases(tmp_path / "scene.toml", [{"body.material.exponent": n} for n in (0.3, 0.5)])
-    assert [point.scene.body.solid.law.exponent for point in found] == [0.3, 0.5]
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
-    [('law = "fractional"\n', "law 'fractional' is unknown"),
-     (FRACTIONAL, r"\[body.material\] lacks time_s"),
+    [(FRACTIONAL, "lacks time_s"),
      (FRACTIONAL + "time_s = 1e-3\nviscosity_pa_s = 2.0\n", "has no viscosity_pa_s"),
-     ("shear_modulus_pa = 1e4\nexponent = 0.3\n", "is without a law and has no exponent"),
-     ("table = 3\n", "must be a table"),
      ("table = { frequency_hz = [1.0], storage_pa = [1e4] }\n", "lacks loss_pa"),
      ("table = { frequency_hz = [1.0], storage_pa = [1e4], loss_pa = [1.0, 2.0] }\n",
-      "has 1 frequencies, 1 storage and 2 loss moduli"),
-     ("shear_modulus_pa = 1e4\ntable = { frequency_hz = [1.0], storage_pa = [1e4], "
-      "loss_pa = [1.0] }\n", "is a table of complex moduli and has no shear_modulus_pa")],
+      "2 loss moduli")],
 )  # fmt: skip
 def test_a_material_of_wrong_keys_is_refused(text, said):
     with pytest.raises(ValueError, match=said):
@@ -438,22 +374,17 @@ def test_a_material_of_wrong_keys_is_refused(text, said):
 
 @pytest.mark.parametrize(
     ("text", "said"),
-    [("", "lacks the column frequency_hz"), ("f,storage_pa,loss_pa\n", "lacks the column freq"),
-     (HEADER, "has 0 frequencies"), (HEADER + "1,2\n", "the row '1,2'; give three numbers"),
-     (HEADER + "10,x,3\n", "the row '10,x,3'"), (HEADER + "10,0,3\n", "storage modulus is 0 Pa at"),
-     (HEADER + "10,1e4,3\n10,1e4,4\n", "has 10 Hz after 10 Hz"),
-     (HEADER + "-1,1e4,3\n5,1e4,3\n", "the frequency -1 Hz, which is outside"),
-     (HEADER + "0,1e4,3\n10,1e4,4\n", "loss modulus is 3 Pa at 0 Hz"),
-     (HEADER + "210,1e4,-3\n", "loss modulus is -3 Pa at 210 Hz"),
-     (HEADER + "10,nan,0\n", "is nan Pa at 10 Hz"),
-     (HEADER + "1,2,3\n" * 10_001, "at most 10000")],
+    [("", "frequency_hz"), (HEADER, "0 frequencies"), (HEADER + "1,2\n", "three numbers"),
+     (HEADER + "10,0,3\n", "storage modulus"), (HEADER + "10,1e4,3\n10,1e4,4\n", "after 10 Hz"),
+     (HEADER + "-1,1e4,3\n5,1e4,3\n", "-1 Hz"), (HEADER + "0,1e4,3\n10,1e4,4\n", "at 0 Hz"),
+     (HEADER + "210,1e4,-3\n", "-3 Pa at 210 Hz")],
 )  # fmt: skip
 def test_a_file_of_moduli_of_bad_content_is_refused(text, said):
     with pytest.raises(ValueError, match=said):
         modulus_table(text)
 
 
-@pytest.mark.parametrize("eta", [1e-3, 0.03, 0.4, 2.0])
+@pytest.mark.parametrize("eta", [0.03, 2.0])
 def test_a_loss_factor_is_nearly_constant_and_its_law_causal(eta):
     solid = Material(density=1000, shear_modulus=25e3, poisson=0.49, loss_factor=eta)
     mu = solid.complex_modulus(2 * np.pi * np.geomspace(10, 2000, 200))
@@ -470,17 +401,7 @@ def test_a_loss_factor_is_nearly_constant_and_its_law_causal(eta):
     assert fast - slow == pytest.approx(2 / np.pi * np.trapezoid(loss, np.log(x)), rel=1e-3)
 
 
-def test_a_body_with_a_loss_factor_moves_after_its_load_and_settles():
-    solid = Material(density=1000, shear_modulus=25e3, poisson=0.4999, loss_factor=0.4)
-    layer, times = slab(solid, 0.015), np.arange(3000) / 1e4
-    load = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.3))
-    found = flat_body(layer, load, [[0.0, 0.0]], times).values[:, 0]
-    steady = steady_state(layer, load, [[0.0, 0.0]], times).values[:, 0]
-    assert np.linalg.norm((found - steady)[2000:]) < 1e-3 * np.linalg.norm(steady[2000:])
-    assert abs(found[0]) < 2e-3 * np.abs(found).max()
-
-
-@pytest.mark.parametrize(("exponent", "time"), [(0.05, 1e-4), (0.1, 1e-3), (0.18, 0.1)])
+@pytest.mark.parametrize(("exponent", "time"), [(0.05, 1e-4)])
 def test_laws_that_relax_far_below_the_band_have_a_series(exponent, time):
     law = FractionalZener(shear_modulus=10e3, fast_modulus=1e5, exponent=exponent, time=time)
     series, w = fit_prony(law, rest=10e3), 2 * np.pi * np.geomspace(1, 2000, 501)

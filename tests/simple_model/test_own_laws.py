@@ -17,10 +17,8 @@ from simple_model import (
     PressureMap,
     PronyTerm,
     Rhythm,
-    Signal,
     Tacton,
     Trajectory,
-    arc_path,
     flat_body,
     focal_spot,
     named_lines,
@@ -59,9 +57,7 @@ CUBIC = DriveLaw(
     pressure=lambda A, M, m: (A * (1 + m * M) / (1 + m)) ** 3,
 )  # fmt: skip
 
-SOFT = DriveLaw(
-    name="soft", degree=1, pressure=lambda A, M, m: np.asarray(A) ** 2 * (1 + m * M) / (1 + m)
-)
+AM = Tacton(am_frequency=140)
 
 
 def scene(material=TWO, **load):
@@ -92,39 +88,9 @@ def test_lines_of_any_law_are_those_of_its_waveform(law):
     assert "3f_AM" in named_lines(replace(load, tacton=replace(tacton, envelope_frequency=0.0)))
 
 
-def test_a_law_without_decaying_harmonics_is_refused():
-    gate = DriveLaw(name="gate", pressure=lambda A, M, m: A * (np.asarray(M) > 0.3))
-    with pytest.raises(ValueError, match=r"law 'gate' .* do not fall to 0.0001"):
-        load_lines(MovingPressure(tacton=Tacton(am_frequency=140), drive=gate))
-
-
-def test_a_law_that_is_not_of_its_degree_is_refused():
-    with pytest.raises(ValueError, match="'wrong' is no polynomial of degree 2"):
-        DriveLaw(name="wrong", degree=2, pressure=saturating)
-
-
-def test_lines_of_a_sampled_modulation_are_named_under_any_law():
-    samples = tuple(np.sin(2 * np.pi * np.arange(200) / 200).tolist())
-    tone = Tacton(signal=Signal(rate=20e3, samples=samples), duration=0.2)
-    names = named_lines(MovingPressure(tacton=tone, drive=SATURATING), 1e-2)
-    plain = named_lines(
-        MovingPressure(tacton=Tacton(am_frequency=100, duration=0.2), drive=SATURATING), 1e-2
-    )
-    assert [name.replace("f_s", "f_AM") for name in names] == list(plain)
-
-
-def test_levels_that_are_no_factor_are_refused():
-    beaten = Tacton(am_frequency=140, rhythm=Rhythm(pulses=((0.1, 0.05),), ramp=0.01))
-    with pytest.raises(ValueError, match="'saturating' is no product of a factor of the level"):
-        MovingPressure(tacton=beaten, drive=SATURATING)
-    assert MovingPressure(tacton=beaten, drive=CUBIC).weight(0.0) == 1.0
-
-
-@pytest.mark.parametrize("law", [CUBIC, SOFT, *(law for law in DRIVES.values() if law.degree)])
+@pytest.mark.parametrize("law", [CUBIC, DRIVES["linear"]])
 def test_levels_are_exported_by_the_inverse_of_the_law(law):
-    path = Trajectory(
-        shape="recorded", points=((0.0, 0.0), (0.01, 0.0)), times=(0.0, 0.05), levels=(0.2, 1.0)
-    )
+    path = LEVELLED
     tacton = Tacton(am_frequency=140, duration=0.05, trajectory=path, amplitude=0.8)
     own = scene(tacton=tacton, drive=law)
     content, notes = waveform.write(own, Options(rate=20e3))
@@ -138,16 +104,40 @@ def test_levels_are_exported_by_the_inverse_of_the_law(law):
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
 
 
-def test_a_law_without_an_inverse_is_not_exported_with_levels():
-    hollow = DriveLaw(name="hollow", degree=2, pressure=lambda A, M, m: A * (1 + M**2) / 2 * 1.5)
-    path = Trajectory(
-        shape="recorded", points=((0.0, 0.0), (0.01, 0.0)), times=(0.0, 0.05), levels=(0.2, 1.0)
-    )
-    tacton = Tacton(am_frequency=140, duration=0.05, trajectory=path)
-    folded = DriveLaw(name="folded", degree=1, pressure=lambda A, M, m: A * (2 - np.asarray(M)) / 3)
-    assert waveform.write(scene(tacton=tacton, drive=hollow), Options())
-    with pytest.raises(ValueError, match="'folded' has no amplitude for some of these pressures"):
-        waveform.write(scene(tacton=tacton, drive=folded), Options())
+GATE = DriveLaw(name="gate", pressure=lambda A, M, m: A * (np.asarray(M) > 0.3))
+FOLDED = DriveLaw(name="folded", degree=1, pressure=lambda A, M, m: A * (2 - np.asarray(M)) / 3)
+LEVELLED = Trajectory(
+    shape="recorded", points=((0.0, 0.0), (0.01, 0.0)), times=(0.0, 0.05), levels=(0.2, 1.0)
+)
+BEATEN = Tacton(rhythm=Rhythm(pulses=((0.1, 0.05),), ramp=0.01))
+
+
+@pytest.mark.parametrize(
+    ("ask", "said"),
+    [
+        (lambda path: load_lines(MovingPressure(tacton=AM, drive=GATE)), "do not fall"),
+        (lambda path: DriveLaw(name="wrong", degree=2, pressure=saturating), "no polynomial"),
+        (lambda path: MovingPressure(tacton=BEATEN, drive=SATURATING), "no product"),
+        (lambda path: dumps(scene(drive=CUBIC)), "Python function"),
+        (lambda path: waveform.write(scene(tacton=Tacton(am_frequency=140, trajectory=LEVELLED),
+                                           drive=FOLDED), Options()), "no amplitude"),
+        (lambda path: timed_path(lambda t: t, 0.05), "shape"),
+        (lambda path: timed_path(lambda t: np.stack([t > 0.01, 0 * t], -1), 0.05), "jumps"),
+        (lambda path: map_of(path, "0,0,1\n0,1,2\n1,0,3\n"), "grid"),
+        (lambda path: map_of(path, "0,0,1\n0,1,x\n"), "no pressure map"),
+        (lambda path: dumps(scene(replace(TWO, prony=(), law=closed_form))), "law of its own"),
+        (lambda path: compute(scene(profile=lambda x: np.ones(x.shape[:-1])), "flat-body"),
+         "flat-body"),
+    ],
+)  # fmt: skip
+def test_laws_that_cannot_be_used_are_refused(ask, said, tmp_path):
+    with pytest.raises(ValueError, match=said):
+        ask(tmp_path / "map.csv")
+
+
+def map_of(path, rows):
+    path.write_text(f"x,y,p\n{rows}")
+    return read_pressure_map(path)
 
 
 def test_a_registered_law_is_one_of_all(monkeypatch):
@@ -167,11 +157,6 @@ def test_a_registered_law_is_one_of_all(monkeypatch):
     assert np.abs(steady - whole)[late].max() < 1e-3 * np.abs(whole).max()
     gain = own.pressure.gain(times)[:, None]
     np.testing.assert_allclose(kernel, gain * own.pressure.spot(PROBES, CIRCLE.position(times)))
-
-
-def test_a_law_that_no_scene_file_names_is_refused_there():
-    with pytest.raises(ValueError, match="drive law 'cubic' is a Python function, which a scene"):
-        dumps(scene(drive=CUBIC))
 
 
 # A focus profile
@@ -208,15 +193,6 @@ def test_models_take_a_measured_map(tmp_path):
         for focus in (spot, "gaussian")
     )
     assert np.abs(found - expected).max() < 5e-3 * np.abs(expected).max()
-    with pytest.raises(ValueError, match="flat-body"):
-        compute(scene(profile=spot), "flat-body")
-    with pytest.raises(ValueError, match="focus profile is a map or a Python function, which"):
-        dumps(scene(profile=spot))
-
-
-def test_any_function_is_a_focal_spot():
-    load = scene(profile=lambda offsets: np.exp(-((offsets / 0.004) ** 2).sum(axis=-1))).pressure
-    assert load([[0.005, 0.0]], [0.0])[0, 0] == load.gain([0.0])[0]
 
 
 def test_a_map_without_mirror_symmetry_is_meshed_whole(tmp_path):
@@ -225,18 +201,6 @@ def test_a_map_without_mirror_symmetry_is_meshed_whole(tmp_path):
     assert extent.symmetry(still) == "xy"
     own = replace(still.pressure, profile=measured(tmp_path / "map.csv"))
     assert extent.symmetry(replace(still, pressure=own)) == ""
-
-
-@pytest.mark.parametrize(
-    ("rows", "said"),
-    [("0,0,1\n0,1,2\n1,0,3\n", "3 points, which are no grid of 2 by 2"),
-     ("0,0\n1,1\n", "is no pressure map"), ("0,0,1\n0,1,x\n", "is no pressure map"),
-     ("0,0,0\n0,1,0\n1,0,0\n1,1,0\n", "above 0 somewhere")],
-)  # fmt: skip
-def test_a_file_that_is_no_map_is_refused(tmp_path, rows, said):
-    (tmp_path / "map.csv").write_text(f"x,y,p\n{rows}")
-    with pytest.raises(ValueError, match=said):
-        read_pressure_map(tmp_path / "map.csv")
 
 
 def test_what_depends_on_a_function_is_not_found_in_the_cache(tmp_path):
@@ -262,26 +226,6 @@ def test_a_function_of_time_is_a_path_that_a_scene_file_holds():
     np.testing.assert_allclose(
         loads(dumps(own)).tacton.trajectory.position(t), path.position(t), atol=1e-12
     )
-
-
-def test_a_function_of_arc_is_run_at_its_speed():
-    path = arc_path(lambda u: 0.005 * np.stack(
-        [np.cos(2 * np.pi * u**2), np.sin(2 * np.pi * u**2)], axis=-1), speed=1.0)  # fmt: skip
-    t = np.linspace(0, 0.02, 400)
-    expected = Trajectory(shape="circle", size=0.01, speed=1.0)
-    assert path.drawing_frequency == pytest.approx(expected.drawing_frequency, rel=1e-3)
-    assert np.linalg.norm(path.position(t) - expected.position(t), axis=1).max() < 5e-5
-
-
-@pytest.mark.parametrize(
-    ("function", "said"),
-    [(lambda t: np.stack([np.sign(t - 0.0123), 0 * t], axis=-1) * 0.01, "function jumps"),
-     (lambda t: t, r"function gives shape \(65,\) for 65 arguments"),
-     (lambda t: np.full((len(t), 2), np.nan), "return finite positions")],
-)  # fmt: skip
-def test_a_function_that_is_no_path_is_refused(function, said):
-    with pytest.raises(ValueError, match=said):
-        timed_path(function, 0.05)
 
 
 # A material
@@ -338,41 +282,6 @@ def test_a_measured_modulus_is_that_of_the_law_in_the_frequency_domain(element, 
     assert np.abs(found - expected).max() < 1e-3 * np.abs(expected).max()
     power = compute(scene(own), "fem-harmonic", h=0.01).effort
     assert power.energy_imbalance < 1e-6
-
-
-def test_elements_refuse_a_law_without_internal_variables(element):
-    mesh, force, S = element
-    ops = fem.assemble(mesh, replace(TWO, prony=(), law=closed_form))
-    for ask in (
-        lambda: next(fem.transient(ops, lambda t: force, 1e-4)),
-        lambda: fem.reduce(ops, S, 500.0, 1e-2),
-    ):  # fmt: skip
-        with pytest.raises(ValueError, match="has no internal variables"):
-            ask()
-
-
-def test_a_scene_file_refuses_a_law_that_it_cannot_hold():
-    with pytest.raises(ValueError, match="material has a modulus law of its own, .* scene file"):
-        dumps(scene(replace(TWO, prony=(), law=closed_form)))
-
-
-def test_several_terms_in_a_scene_file_and_layers():
-    own = scene()
-    assert loads(dumps(own)) == own
-    assert (
-        loads("""[body.material]
-density_kg_m3 = 1000
-shear_modulus_pa = 20e3
-poisson = 0.45
-[[body.material.prony]]
-modulus_pa = 8e3
-time_s = 0.4e-3
-[[body.material.prony]]
-modulus_pa = 6e3
-time_s = 3e-3
-""").body.solid
-        == TWO
-    )
 
 
 def test_stepping_and_reduction_with_two_terms_are_the_harmonic_motion(element):

