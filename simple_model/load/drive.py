@@ -15,7 +15,6 @@ from simple_model.typing import Floats
 
 PUBLISHED = "linear"  # of the point kernel of Lim, Seifi and Park
 EXACT = 1e-9  # relative misfit within which a law is what it is said to be
-HALVINGS = 60  # of the amplitude, in a numerical inverse
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,8 +25,6 @@ class DriveLaw:
     ----------
     name : str, of messages, pages and, if it is registered in `DRIVES`, scene files
     pressure : amplitude (...), modulation (...), depth -> pressure (...) over that at full drive
-    inverse : pressure (...) over that at full drive -> amplitude (...) that makes it without
-        modulation; by bisection if None
     degree : int, of a polynomial in the modulation; None if it is no polynomial, whose harmonics
         are followed down to `load_spectrum.ALIASED`
     words : str, a few more for a choice on a page
@@ -41,7 +38,6 @@ class DriveLaw:
 
     name: str
     pressure: Callable[[Floats | float, Floats, float], Floats]
-    inverse: Callable[[Floats], Floats] | None = None
     degree: int | None = None
     words: str = ""
     note: str = ""
@@ -67,11 +63,6 @@ class DriveLaw:
         return np.asarray(self.pressure(amplitude, modulation, depth))
 
     @property
-    def is_signed(self) -> bool:
-        """Whether pressure may be negative, which no device makes."""
-        return bool((self(1.0, np.linspace(-1, 1, 9), 1.0) < 0).any())
-
-    @property
     def uses_depth(self) -> bool:
         """Whether the depth of modulation changes the pressure."""
         M = np.linspace(-1, 1, 9)
@@ -89,65 +80,28 @@ class DriveLaw:
         factors = self.level_factor(level, depth) * self(amplitude * np.ones_like(M), M, depth)
         return bool(np.abs(both - factors).max() <= EXACT * np.abs(both).max())
 
-    def amplitude(self, pressure: Floats, depth: float) -> Floats:
-        """Amplitude (...) that makes a pressure (...) over that at full drive without modulation.
-
-        Raises
-        ------
-        ValueError
-            If none from 0 to 1 does.
-        """
-        if self.inverse is not None:
-            return np.asarray(self.inverse(pressure))
-        one = np.ones_like(pressure)
-        low, high = 0 * one, one
-        for _ in range(HALVINGS):
-            middle = (low + high) / 2
-            under = self(middle, one, depth) < pressure
-            low, high = np.where(under, middle, low), np.where(under, high, middle)
-        if not np.allclose(self(high, one, depth), pressure, rtol=0, atol=EXACT):
-            raise ValueError(
-                f"drive law '{self.name}' has no amplitude for some of these pressures; give it an "
-                "inverse, or write the modulation without levels"
-            )
-        return high
-
-
-def _linear(amplitude: Floats | float, modulation: Floats, depth: float) -> Floats:
-    """A M: pressure is the commanded signal itself, with its sign (Lim et al.); depth unused."""
-    return amplitude * modulation
-
-
-def _pressure_squared(amplitude: Floats | float, modulation: Floats, depth: float) -> Floats:
-    """[A (1 + m M)/(1 + m)]^2: sound pressure is modulated; radiation pressure is its square.
-
-    Traditional AM (US 11704983 B2); adds a line at twice the AM frequency.
-    """
-    return (amplitude * (1 + depth * modulation) / (1 + depth)) ** 2
-
-
-def _force_corrected(amplitude: Floats | float, modulation: Floats, depth: float) -> Floats:
-    """A (1 + m M)/(1 + m): the device takes the square root first, so that pressure follows M."""
-    return amplitude * (1 + depth * modulation) / (1 + depth)
-
 
 DRIVES = {
     law.name: law
     for law in (
+        # Pressure is the commanded signal itself, with its sign (Lim et al.).
         DriveLaw(
-            name="linear", pressure=_linear, inverse=np.asarray, degree=1,
+            name="linear", degree=1, pressure=lambda A, M, m: A * M,
             words="the signal itself, as published",
         ),
+        # Sound pressure is modulated, and radiation pressure is its square: traditional AM (US
+        # 11704983 B2), with a line at twice the AM frequency.
         DriveLaw(
-            name="pressure_squared", pressure=_pressure_squared, inverse=np.sqrt, degree=2,
-            words="usual AM",
+            name="pressure_squared", degree=2,
+            pressure=lambda A, M, m: (A * (1 + m * M) / (1 + m)) ** 2, words="usual AM",
             note="Lines at 2 f_AM and, in AM+STM, at n f_d come from the drive law, not from "
             "propagation: pressure_squared, because a device that modulates its sound pressure "
             "pushes with the square of it. The point kernel under the same load has them, too.",
         ),
+        # The device takes the square root first, so that pressure follows M.
         DriveLaw(
-            name="force_corrected", pressure=_force_corrected, inverse=np.asarray, degree=1,
-            words="square root first",
+            name="force_corrected", degree=1,
+            pressure=lambda A, M, m: A * (1 + m * M) / (1 + m), words="square root first",
         ),
     )
 }  # fmt: skip

@@ -11,7 +11,7 @@ from skinwave.system.plain_text import number_in
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
     parser.add_argument("source", type=Path, metavar="IN", help=".toml .adaptics .csv .wav")
-    parser.add_argument("target", type=Path, metavar="OUT", help=".toml .adaptics .csv .wav .py")
+    parser.add_argument("target", type=Path, metavar="OUT", help=".toml .adaptics .csv .py")
     parser.add_argument("--scene", type=Path, metavar="SCENE", help="what to put the pattern on")
     parser.add_argument("--rate", type=float, metavar="HZ", help="samples a second of CSV or WAV")
     parser.add_argument("--height", type=float, metavar="MM", help="focus above the array, mm")

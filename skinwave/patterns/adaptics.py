@@ -30,12 +30,8 @@ UNBOUNDED = 1.0  # s that stand for a pattern that nothing ends
 def read(content: bytes, options: Options) -> Pattern:
     """The pattern in an .adaptics file.
 
-    A pattern that jumps back for ever is its loop: what comes before is left out.
-
-    Raises
-    ------
-    ValueError
-        If it is none, or lasts too long.
+    A pattern that jumps back for ever is its loop: what comes before is left out. One that lasts
+    too long is a ValueError.
     """
     animation = parse(content, options.parameters)
     notes = list(animation.notes)

@@ -78,16 +78,8 @@ class Animation:
 
 
 def parse(content: bytes, parameters: Mapping[str, float]) -> Animation:
-    """The animation in a file.
-
-    Parameters
-    ----------
-    parameters : values of the file's user parameters, instead of their defaults
-
-    Raises
-    ------
-    ValueError
-        If it is none, has random intensity, or has no such parameter.
+    """The animation in a file at values of its user parameters, instead of their defaults; raises a
+    ValueError if it is none, has random intensity, or has no such parameter.
     """
     text = as_utf_8(content)
     try:

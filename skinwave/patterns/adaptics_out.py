@@ -16,12 +16,8 @@ ASIDE = 1e-9  # of a period: just before and just after a corner, so that jumps 
 
 
 def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
-    """The .adaptics file of a scene's Tacton, in the newest revision, and notes.
-
-    Raises
-    ------
-    ValueError
-        If the format has no words for it: which part, and the cure.
+    """The .adaptics file of a scene's Tacton, in the newest revision, and notes; raises a
+    ValueError if the format has no words for a part of it.
     """
     tacton, notes = scene.tacton, []
     _refuse(tacton)
@@ -41,7 +37,7 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
         amplitude = tacton.amplitude
     brush, place = _brush(tacton)
     if brush is None:
-        brush = _circle(0.0, tacton, 0.0)
+        brush = _named("circle", {"radius": 0.0}, tacton, 0.0)
         f_d, ahead = path.drawing_frequency, tacton.foci[0]
         corners = np.add.outer(np.arange(int(end * f_d) + 3) - 1, path.parts[0]).ravel() - ahead
         sides = np.concatenate([corners - ASIDE, corners + ASIDE]) / f_d
@@ -69,7 +65,15 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
         "$REVISION": REVISIONS[-1],
         "name": scene.name,
         "keyframes": keyframes,
-        "pattern_transform": _transform(scene.pressure.height),
+        "pattern_transform": {
+            "geometric_transforms": {
+                "translate": {"x": _f64(0), "y": _f64(0), "z": _f64(1e3 * scene.pressure.height)},
+                "rotation": _f64(0),
+                "scale": dict.fromkeys("xyz", _f64(1)),
+            },
+            "intensity_factor": _f64(1),
+            "playback_speed": _f64(1),
+        },
         "user_parameter_definitions": {},
     }
     return json.dumps(table, indent=1).encode(), tuple(notes)
@@ -94,10 +98,11 @@ def _brush(tacton: Tacton) -> tuple[dict[str, Any] | None, tuple[float, float]]:
     """The brush that draws a path by itself, if one does, and its place in metre."""
     path = tacton.trajectory
     if path.shape == "circle" and tacton.foci[0] == 0:
-        return _circle(1e3 * path.size / 2, tacton, path.drawing_frequency), path.centre
+        radius = {"radius": 1e3 * path.size / 2}
+        return _named("circle", radius, tacton, path.drawing_frequency), path.centre
     if path.shape == "point" or (path.is_static and path.shape != "recorded"):
         x, y = path.position(0.0).tolist()
-        return _circle(0.0, tacton, 100.0), (x, y)
+        return _named("circle", {"radius": 0.0}, tacton, 100.0), (x, y)
     ends = path.outline
     straight = path.shape == "line" or (path.shape == "polyline" and len(ends) == 2)
     if not straight or path.sweep != "sinusoidal" or tacton.foci[0] != 0:
@@ -124,26 +129,9 @@ def _keyframe(t: float, place: Any, level: float, brush: dict[str, Any]) -> dict
     }
 
 
-def _circle(radius: float, tacton: Tacton, f_d: float) -> dict[str, Any]:
-    return _named("circle", {"radius": radius}, tacton, f_d)
-
-
 def _named(name: str, numbers: dict[str, float], tacton: Tacton, f_d: float) -> dict[str, Any]:
     numbers = {**numbers, "am_freq": tacton.am_frequency, "stm_freq": f_d}
     return {"name": name, "params": {key: _f64(value) for key, value in numbers.items()}}
-
-
-def _transform(height: float) -> dict[str, Any]:
-    zero, one = _f64(0.0), _f64(1.0)
-    return {
-        "geometric_transforms": {
-            "translate": {"x": zero, "y": zero, "z": _f64(1e3 * height)},
-            "rotation": zero,
-            "scale": {"x": one, "y": one, "z": one},
-        },
-        "intensity_factor": one,
-        "playback_speed": one,
-    }
 
 
 def _f64(value: float) -> dict[str, Any]:

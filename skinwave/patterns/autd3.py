@@ -22,12 +22,8 @@ RESOLUTION = 0.025  # mm, to which devices round
 
 
 def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
-    """The script, and notes on what it can only come near to.
-
-    Raises
-    ------
-    ValueError
-        If the path is too slow or the load one that no sound makes.
+    """The script, and notes on what it can only come near to; raises a ValueError if the path is
+    too slow or the load one that no sound makes.
     """
     pressure, path = scene.pressure, scene.tacton.trajectory
     foci, turns = len(scene.tacton.foci), scene.tacton.sharing == "time_multiplexed"
@@ -50,12 +46,8 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
 
 def steps(frequency: float, multiple: int = 1) -> tuple[int, int]:
     """How many points to a period, a multiple, and ticks to a point come nearest to a drawing
-    frequency in Hz; two points, the least that a FociSTM takes, for a focus that rests.
-
-    Raises
-    ------
-    ValueError
-        If no list is long enough.
+    frequency in Hz; two points, the least that a FociSTM takes, for a focus that rests. No list is
+    long enough for very slow ones: a ValueError.
     """
     if frequency == 0:
         return 2 * multiple, 1

@@ -10,7 +10,7 @@ from skinwave.scene import file as scene_file
 from skinwave.scene.scene import Body, Scene, check_load
 
 READERS = (".toml", ".adaptics", ".csv", ".wav")
-WRITERS = (".toml", ".adaptics", ".csv", ".wav", ".py")
+WRITERS = (".toml", ".adaptics", ".csv", ".py")
 LARGEST = {".adaptics": 16_000_000, ".csv": 128_000_000, ".wav": 32_000_000}  # bytes
 
 
@@ -29,7 +29,8 @@ def convert(
     ValueError
         If a file is of no known kind or malformed, or the pattern cannot be expressed.
     """
-    suffix = _known(target, WRITERS)
+    if (suffix := target.suffix.lower()) not in WRITERS:
+        raise ValueError(f"{target}: '{suffix}' cannot be written, use {', '.join(WRITERS)}")
     if suffix != ".toml":
         base = replace(base or scene_file.loads(""), body=Body(kind="none"))
     scene, notes = read_pattern(source, options, base)
@@ -40,14 +41,11 @@ def convert(
 def read_pattern(
     path: Path, options: Options, base: Scene | None = None
 ) -> tuple[Scene, tuple[str, ...]]:
-    """The scene of a pattern file on a base, by default a slab that the path lies on, and notes.
-
-    Raises
-    ------
-    ValueError
-        If it is of no known kind, cannot be read or is malformed, in one sentence.
+    """The scene of a pattern file on a base, by default a slab that the path lies on, and notes;
+    errors as of `convert`.
     """
-    suffix = _known(path, READERS)
+    if (suffix := path.suffix.lower()) not in READERS:
+        raise ValueError(f"{path}: '{suffix}' is no known kind of file, use {', '.join(READERS)}")
     if suffix == ".toml":
         scene = scene_file.read(path)
         tacton = resized(scene.tacton, options.resize)
@@ -68,22 +66,9 @@ def read_pattern(
 
 
 def write_pattern(scene: Scene, suffix: str, options: Options) -> tuple[bytes, tuple[str, ...]]:
-    """A scene in the format of a suffix, and notes.
-
-    Raises
-    ------
-    ValueError
-        If the format cannot express it.
-    """
+    """A scene in the format of a suffix, and notes; a ValueError if it has no words for it."""
     if suffix == ".toml":
         return scene_file.dumps(scene).encode(), ()
     check_load(scene, "a pattern of a device")
-    modules = {".adaptics": adaptics_out, ".csv": focal_points, ".wav": waveform, ".py": autd3}
+    modules = {".adaptics": adaptics_out, ".csv": focal_points, ".py": autd3}
     return modules[suffix].write(scene, options)
-
-
-def _known(path: Path, suffixes: tuple[str, ...]) -> str:
-    suffix = path.suffix.lower()
-    if suffix not in suffixes:
-        raise ValueError(f"{path}: '{suffix}' is no known kind of file, use {', '.join(suffixes)}")
-    return suffix

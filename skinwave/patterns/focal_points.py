@@ -31,13 +31,7 @@ MOST_ROWS = 1_000_000
 
 
 def read(content: bytes, options: Options) -> Pattern:
-    """The pattern in a focal-point CSV.
-
-    Raises
-    ------
-    ValueError
-        If it is none: the line, what is wrong with it and the cure, in one sentence.
-    """
+    """The pattern in a focal-point CSV; raises a ValueError with the line and the cure."""
     rows = _rows(content)
     tidy = number_in(rows[0][1][0]) is None
     table = _tidy(rows) if tidy else _bare(rows, options.rate)
@@ -115,15 +109,13 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
     tacton, path = scene.tacton, scene.tacton.trajectory
     t = np.arange(max(2, round(tacton.duration * rate))) / rate
     amplitude = loudness(scene.pressure, t)
-    columns = []
-    for ahead in tacton.foci:
-        phase = np.mod(path.phase(t) + ahead, 1.0)
-        levels = amplitude * np.sqrt(scene.pressure.weight(phase))
-        columns.append((path.at_phase(phase).tolist(), levels.tolist()))
+    phases = [np.mod(path.phase(t) + ahead, 1.0) for ahead in tacton.foci]
+    places = [path.at_phase(phase).tolist() for phase in phases]
+    levels = [(amplitude * np.sqrt(scene.pressure.weight(phase))).tolist() for phase in phases]
     rows = (
-        (time, point, *places[k], scene.pressure.height, levels[k])
+        (time, point, *places[point][k], scene.pressure.height, levels[point][k])
         for k, time in enumerate(t.tolist())
-        for point, (places, levels) in enumerate(columns)
+        for point in range(len(phases))
     )
     notes = (
         f"{len(t):,} samples of {len(tacton.foci)} focal points at {rate:g} Hz",

@@ -36,7 +36,7 @@ class Options:
 
     Parameters
     ----------
-    rate : float, Hz, of samples: of a CSV without times when read; of CSV and WAV when written
+    rate : float, Hz, of samples: of a CSV without times when read; of a CSV when written
     height : float, metre, of the focus, in place of the file's
     hold : bool, whether a focal point stays until the next sample, rather than going there straight
     role : "modulation" or "envelope", what a WAV is
@@ -100,12 +100,8 @@ def aliased(tacton: Tacton, rate: float) -> list[str]:
 
 
 def one_height(z: Floats, options: Options, notes: list[str]) -> dict[str, float]:
-    """The pressure key for a focus at heights (k,) in metre, which must be one.
-
-    Raises
-    ------
-    ValueError
-        If it is not, and no other is given.
+    """The pressure key for a focus at heights (k,) in metre, which must be the same, a ValueError
+    otherwise, unless another is given.
     """
     if options.height is not None:
         return {"height": options.height}
@@ -137,14 +133,8 @@ def thinned(t: Floats, places: Floats, levels: Floats) -> np.ndarray:
 
 
 def loudness(pressure: MovingPressure, t: ArrayLike) -> Floats:
-    """Sound pressure (...) of each focus at times (...) in s over that at full drive, 0..1.
-
-    The root of the radiation pressure, whatever the drive law; without a recording's levels.
-
-    Raises
-    ------
-    ValueError
-        If the load is negative at times, which no radiation pressure is.
+    """Sound pressure (...) of each focus at times (...) in s over that at full drive, 0..1: the
+    root of the radiation pressure, without a recording's levels; a negative one is a ValueError.
     """
     full = replace(pressure, tacton=Tacton(foci=pressure.tacton.foci)).gain(np.zeros(1))
     relative = pressure.gain(t) / full if full else np.zeros(np.shape(t))

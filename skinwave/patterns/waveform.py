@@ -8,27 +8,22 @@ import numpy as np
 from scipy.io import wavfile
 
 from meshes.tetmesh import Floats
-from simple_model import Signal, modulation
+from simple_model import Signal
 from simple_model.choices import choose
 from simple_model.load.rhythm import ROLES
-from simple_model.load.tacton import LONGEST, level, tones
-from skinwave.patterns.pattern import Options, Pattern, aliased
+from simple_model.load.tacton import LONGEST
+from skinwave.patterns.pattern import Options, Pattern
 from skinwave.scene.scene import Scene
 
 SCALES = ("full", "peak", "rms")
-WRITTEN_RATE = 48_000.0  # Hz
 CUT = 0.02  # beyond full drive that is cut off: what rounding adds to a sine of 8 bits
 STEP = 2.0**-15  # of full scale, the resolution of 16 bits: rounding below 0 is no negative load
 
 
 def read(content: bytes, options: Options, base: Scene) -> Pattern:
     """The base scene's Tacton for as long as the WAV lasts, with it as its envelope in place of the
-    rhythm, or as its modulation in place of the sinusoids.
-
-    Raises
-    ------
-    ValueError
-        If it is no WAV of one channel, too long, or cannot be what it is said to be.
+    rhythm, or as its modulation in place of the sinusoids; raises a ValueError if it is no WAV of
+    one channel, too long, or cannot be what it is said to be.
     """
     choose("role of a WAV", options.role, ROLES)
     choose("scale", options.scale, SCALES)
@@ -54,70 +49,6 @@ def read(content: bytes, options: Options, base: Scene) -> Pattern:
         tacton = replace(tacton, rhythm=None)
     notes = (f"{len(samples):,} samples at {rate:g} Hz as {options.role}, {said}",)
     return Pattern(tacton=tacton, notes=notes)
-
-
-def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
-    """Modulation of the amplitude, or its level in time, 32-bit float, and notes on how it is read
-    back to the same load.
-    """
-    rate = options.rate or WRITTEN_RATE
-    if not (1 <= rate <= 192_000 and rate == int(rate)):
-        raise ValueError(f"rate = {rate:g} Hz is outside the whole numbers 1..192000; choose one")
-    t = np.arange(max(2, round(scene.tacton.duration * rate))) / rate
-    path = scene.tacton.trajectory
-    samples, said = (_with_levels if path.levels else _one_role)(scene, t)
-    notes = [f"{len(t):,} samples at {rate:g} Hz; full scale is the scene's amplitude", *said]
-    notes += aliased(scene.tacton, rate)
-    if not path.is_static:
-        notes.append("a WAV has no positions: the path is left out")
-    file = io.BytesIO()
-    wavfile.write(file, int(rate), samples.astype(np.float32))
-    return file.getvalue(), tuple(notes)
-
-
-def _one_role(scene: Scene, t: Floats) -> tuple[Floats, list[str]]:
-    """Samples (t,) that stand for all modulation, or for the level, and notes.
-
-    The other stays with the scene, as a product of the two would pass the drive law in another
-    way than they do.
-    """
-    tacton, modulated = scene.tacton, _is_modulated(scene)
-    enveloped = tacton.signal is not None and tacton.signal.role == "envelope"
-    if enveloped or (tacton.rhythm and not modulated):
-        kept = "amplitude and modulation stay" if modulated else "amplitude stays"
-        notes = [f"{kept} with the scene", "to be read back with --role envelope"]
-        return np.broadcast_to(level(tacton, t), t.shape), notes
-    kept = "amplitude and rhythm stay" if tacton.rhythm else "amplitude stays"
-    return modulation(tacton, t), [f"{kept} with the scene"]
-
-
-def _with_levels(scene: Scene, t: Floats) -> tuple[Floats, list[str]]:
-    """Samples (t,) of levels of a recorded path and of the modulation, and notes.
-
-    They are read onto another path, so that both must be in them: as the level that gives the same
-    pressure without modulation or, where pressure has a sign, as a modulation that is a product.
-    """
-    tacton, pressure = scene.tacton, scene.pressure
-    path = tacton.trajectory
-    levels = path.level_at_phase(np.mod(path.phase(t) + tacton.foci[0], 1.0))
-    notes = ["levels of the first focus"] if len(tacton.foci) > 1 else []
-    notes.append("amplitude stays with the scene, but a recorded path has levels of its own: "
-                 "to be read onto another path")  # fmt: skip
-    if _is_modulated(scene):
-        law, depth, full = pressure.law, pressure.depth_of_modulation, tacton.amplitude or 1.0
-        shown = modulation(tacton, t)
-        driven = law(full * levels, shown, depth)
-        if law.is_signed and np.allclose(law(full, levels * shown, depth), driven):
-            return levels * shown, notes
-        levels = law.amplitude(driven, depth) / full
-        notes.append("the modulation is in these levels, and must not be in that scene")
-    return levels, [*notes, "to be read back with --role envelope"]
-
-
-def _is_modulated(scene: Scene) -> bool:
-    tacton = scene.tacton
-    sampled = tacton.signal is not None and tacton.signal.role == "modulation"
-    return sampled or any(f > 0 for f in tones(tacton))
 
 
 def _decoded(content: bytes) -> tuple[int, Floats]:

@@ -31,8 +31,6 @@ from simple_model import (
 from simple_model.layers.compliance import slab
 from simple_model.load.sampling import highest
 from simple_model.load.spectrum import load_lines
-from skinwave.patterns import waveform
-from skinwave.patterns.pattern import Options
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads
 from skinwave.scene.scene import Body, Scene
@@ -88,27 +86,7 @@ def test_lines_of_any_law_are_those_of_its_waveform(law):
     assert "3f_AM" in named_lines(replace(load, tacton=replace(tacton, envelope_frequency=0.0)))
 
 
-@pytest.mark.parametrize("law", [CUBIC, DRIVES["linear"]])
-def test_levels_are_exported_by_the_inverse_of_the_law(law):
-    path = LEVELLED
-    tacton = Tacton(am_frequency=140, duration=0.05, trajectory=path, amplitude=0.8)
-    own = scene(tacton=tacton, drive=law)
-    content, notes = waveform.write(own, Options(rate=20e3))
-    role = "envelope" if "to be read back with --role envelope" in notes else "modulation"
-    assert (role == "modulation") == law.is_signed
-    base = scene(tacton=Tacton(trajectory=CIRCLE, amplitude=0.8), drive=law)
-    back = waveform.read(content, Options(role=role), base).tacton
-    t = np.arange(10, 900) / 20e3
-    found = MovingPressure(tacton=back, drive=law).gain(t)
-    expected = own.pressure.gain(t) * own.pressure.weight(path.phase(t))
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
-
-
 GATE = DriveLaw(name="gate", pressure=lambda A, M, m: A * (np.asarray(M) > 0.3))
-FOLDED = DriveLaw(name="folded", degree=1, pressure=lambda A, M, m: A * (2 - np.asarray(M)) / 3)
-LEVELLED = Trajectory(
-    shape="recorded", points=((0.0, 0.0), (0.01, 0.0)), times=(0.0, 0.05), levels=(0.2, 1.0)
-)
 BEATEN = Tacton(rhythm=Rhythm(pulses=((0.1, 0.05),), ramp=0.01))
 
 
@@ -119,8 +97,6 @@ BEATEN = Tacton(rhythm=Rhythm(pulses=((0.1, 0.05),), ramp=0.01))
         (lambda path: DriveLaw(name="wrong", degree=2, pressure=saturating), "no polynomial"),
         (lambda path: MovingPressure(tacton=BEATEN, drive=SATURATING), "no product"),
         (lambda path: dumps(scene(drive=CUBIC)), "Python function"),
-        (lambda path: waveform.write(scene(tacton=Tacton(am_frequency=140, trajectory=LEVELLED),
-                                           drive=FOLDED), Options()), "no amplitude"),
         (lambda path: timed_path(lambda t: t, 0.05), "shape"),
         (lambda path: timed_path(lambda t: np.stack([t > 0.01, 0 * t], -1), 0.05), "jumps"),
         (lambda path: map_of(path, "0,0,1\n0,1,2\n1,0,3\n"), "grid"),
