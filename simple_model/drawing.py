@@ -47,16 +47,8 @@ def place_name(place: Floats) -> str:
 
 
 def curves(ax: "Axes", x: Floats, values: Floats, places: Floats, **style: Any) -> None:
-    """Draw a curve for each probe, from dark to bright, and a legend of at most `NAMED` of them.
-
-    Parameters
-    ----------
-    ax : Axes
-    x : (k,) float, along the axis
-    values : (k, p) float
-    places : (p, 2) float, metre, of the probes
-
-    Anything else is a property of matplotlib's lines.
+    """Draw a curve of values (k, p) along x (k,) for each probe, at places (p, 2) in metre, from
+    dark to bright, with a style of matplotlib's lines and a legend of at most `NAMED` of them.
     """
     import matplotlib as mpl
 
@@ -66,34 +58,18 @@ def curves(ax: "Axes", x: Floats, values: Floats, places: Floats, **style: Any) 
     for k in range(count):
         label = place_name(places[k]) if k in named else None
         ax.plot(x, values[:, k], color=colours[k], label=label, **{"lw": 1.2, **style})
+    inch = ax.get_window_extent().width / ax.figure.get_dpi()
+    columns = max(1, min(len(named), int(inch / (ENTRY * mpl.rcParams["font.size"]))))
     ax.legend(
-        loc="lower left", bbox_to_anchor=(0, 1), ncols=columns_of(ax, len(named)), frameon=False,
+        loc="lower left", bbox_to_anchor=(0, 1), ncols=columns, frameon=False,
         title=PROBES, alignment="left", fontsize=small(), borderaxespad=0.2, columnspacing=1.0,
         handlelength=1.2,
     )  # fmt: skip
     ax.grid(alpha=0.25)
 
 
-def columns_of(ax: "Axes", entries: int) -> int:
-    """Columns of a legend above axes, as many as they have room for."""
-    import matplotlib as mpl
-
-    inch = ax.get_window_extent().width / ax.figure.get_dpi()
-    return max(1, min(entries, int(inch / (ENTRY * mpl.rcParams["font.size"]))))
-
-
 def picture(draw: Callable[["Figure"], object], width: float, height: float) -> bytes:
-    """Draw a figure, as a PNG file in memory.
-
-    Parameters
-    ----------
-    draw : what is called with the figure
-    width, height : float, inch
-
-    Returns
-    -------
-    bytes
-    """
+    """PNG file of a figure of a width and height in inch, which a function draws."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
@@ -117,18 +93,8 @@ def table(rows: Iterable[Sequence[str]], header: Sequence[str] = ()) -> str:
 
 
 def page(title: str, image: bytes, tables: Iterable[str], warnings: Iterable[str] = ()) -> str:
-    """Small page of a record: figure, tables and warnings.
-
-    Parameters
-    ----------
-    title : of the page, and what the figure is called where it cannot be seen
-    image : PNG file, empty if there is none
-    tables : HTML
-    warnings : sentences
-
-    Returns
-    -------
-    HTML
+    """Small page in HTML of a record: a figure in PNG, if there is one, tables in HTML, and
+    warnings in sentences.
     """
     shown = b64encode(image).decode()
     figure = f'<img alt="{escape(title)}" src="data:image/png;base64,{shown}">' if image else ""

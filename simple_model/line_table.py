@@ -93,10 +93,6 @@ def line_table(
     most : how many lines of the load are looked for, the strongest
     highest : Hz, up to which lines are looked for
     settle : fraction of the response that is left out at its start
-
-    Returns
-    -------
-    LineTable, Hz and the unit of the response
     """
     highest = min(highest, 0.5 / step(response.times))
     found = line_names(pressure, FITTED, most=most, candidates=candidates)
@@ -121,17 +117,8 @@ def resolved_lines(
     highest: float = np.inf,
     settle: float = SETTLE,
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Resolved and unresolved lines of a load, so that `lines` can be asked for the resolved ones.
-
-    Parameters
-    ----------
-    pressure : MovingPressure, whose lines above -60 dB are taken
-    response : Response, which is long enough to resolve a line or not
-    candidates, highest, settle : as for `line_table`
-
-    Returns
-    -------
-    frequencies in Hz by name, of the resolved lines and of the unresolved ones
+    """Frequencies in Hz by name of the lines of a load above -60 dB that a response resolves, and
+    of those that it is too short to resolve; parameters as of `line_table`.
     """
     highest = min(highest, 0.5 / step(response.times))
     found = _below(line_names(pressure, candidates=candidates), highest)

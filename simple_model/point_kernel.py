@@ -29,16 +29,7 @@ def published(pressure: MovingPressure) -> MovingPressure:
 
 
 def point_kernel_published(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> Response:
-    """Stimulation under the published load, whatever drive law and focus are given.
-
-    Parameters
-    ----------
-    pressure, probes, times : as for `point_kernel`
-
-    Returns
-    -------
-    Response, stimulation (t, p) in Pa
-    """
+    """`point_kernel` under the published load, whatever drive law and focus are given."""
     response = point_kernel(published(pressure), probes, times)
     return replace(response, model="point-kernel-published")
 
@@ -58,11 +49,6 @@ def point_kernel(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> 
     Returns
     -------
     Response, stimulation (t, p) in Pa
-
-    Raises
-    ------
-    ValueError
-        If probes do not have two coordinates.
     """
     probes = np.array(probes, np.float64)
     if probes.ndim != 2 or probes.shape[1] != 2:
@@ -71,10 +57,6 @@ def point_kernel(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> 
     stimulation = low_passed(partial(pressure, probes), times, fold_parts(pressure, times))
     effort = Effort(seconds={"evaluate": time.perf_counter() - started}, steps=len(times))
     return Response(
-        model="point-kernel",
-        times=np.array(times),
-        probes=probes,
-        values=stimulation,
-        quantity=PRESSURE.name,
-        effort=effort,
-    )
+        model="point-kernel", times=np.array(times), probes=probes, values=stimulation,
+        quantity=PRESSURE.name, effort=effort,
+    )  # fmt: skip

@@ -50,13 +50,12 @@ UNEVEN = 1e-6  # of a sampling interval
 class Effort:
     """Cost of a response, and how it was computed.
 
-    `seconds` by phase; `dofs` solved for, at so many `steps` or lines; `peak_memory` of the
-    process in bytes; element size `h` in metre and time step `dt` in s, 0 where there are none;
-    SHA-256 of the `mesh`; `solver` used, with so many `factorisations` of the body where these are
-    counted; `estimate` of the relative error of the reduction;
-    `energy_imbalance`, relative error of the energy balance, and the share of the losses that was
-    `radiated` through absorbing boundaries;
-    `versions` of the software; `warnings`, sentences on where it falls short of what was asked for.
+    `seconds` by phase; `dofs` solved for, at so many `steps` or lines; `peak_memory` of the process
+    in bytes; element size `h` in metre and time step `dt` in s, 0 without; SHA-256 of the `mesh`;
+    `solver`, with so many `factorisations` where these are counted; `estimate` of the relative
+    error of the reduction; `energy_imbalance`, relative error of the energy balance, and the share
+    of the losses that was `radiated` through absorbing boundaries; `versions` of the software;
+    `warnings`, sentences on where it falls short of the request.
     """
 
     seconds: Mapping[str, float] = field(default_factory=dict)
@@ -89,20 +88,15 @@ class Response:
     times : (t,) float, s, equally spaced
     probes : (p, 2) float, metre
     values : (t, p) float, in the unit of the quantity
-    quantity : name of one of `quantities.QUANTITIES`. That of bodies is the displacement normal to
-        the surface, positive the way a pressure pushes, unless a scene asks for another; the point
-        kernel has no body to displace: its response is the stimulation it predicts, a pressure
+    quantity : name of one of `quantities.QUANTITIES`: of bodies the displacement normal to the
+        surface, positive the way a pressure pushes, unless a scene asks for another; of the point
+        kernel, which has no body, the pressure that it predicts
     effort : Effort
     expected_error : float, relative to the waveforms, as estimated beforehand; nan if unknown
     load : MovingPressure whose `lines` it has; None if unknown
 
-    The arrays are copied, and the copies cannot be written to.
-
-    Raises
-    ------
-    ValueError
-        If shapes do not fit, a number is not finite, times are not equally spaced, or the quantity
-        is unknown.
+    The arrays are copied and read-only. Shapes that do not fit, numbers that are not finite, times
+    that are not equally spaced and an unknown quantity are a ValueError.
     """
 
     model: str
@@ -122,8 +116,7 @@ class Response:
             array.setflags(write=False)
             object.__setattr__(self, name, array)
         quantity(self.quantity)  # which refuses an unknown one
-        _check_shapes(self.times, self.probes, self.values)
-        _check_spacing(self.times)
+        _check(self.times, self.probes, self.values)
 
     @property
     def record(self) -> Quantity:
@@ -137,12 +130,8 @@ class Response:
 
     @property
     def displacement(self) -> Floats:
-        """The values (t, p) of a normal displacement or, of the point kernel, of its pressure.
-
-        Raises
-        ------
-        ValueError, which is an AttributeError, too
-            If they are of another quantity.
+        """The values (t, p) of a normal displacement or, of the point kernel, of its pressure; a
+        ValueError, which is an AttributeError, too, of another quantity.
         """
         if self.record not in (DISPLACEMENT, PRESSURE):
             raise NotOfThis(f"this response is of {self.quantity}; take its `values`")
@@ -182,12 +171,8 @@ class Response:
 
     @property
     def lines(self) -> Lines:
-        """Resolved lines of its load by name, with complex amplitudes (f, p).
-
-        Raises
-        ------
-        ValueError, which is an AttributeError, too
-            If its load is unknown.
+        """Resolved lines of its load by name, with complex amplitudes (f, p); a ValueError, and an
+        AttributeError, too, if its load is unknown.
         """
         if self.load is None:
             raise NotOfThis(
@@ -316,7 +301,8 @@ def library(name: str) -> Any:
         raise ImportError(f"{name} is not installed; pip install {name}", name=name) from None
 
 
-def _check_shapes(times: Floats, probes: Floats, values: Floats) -> None:
+def _check(times: Floats, probes: Floats, values: Floats) -> None:
+    """Refuse times (t,), probes (p, 2 or 3) and values (t, p) that do not fit or are uneven."""
     if times.ndim != 1 or not len(times):
         raise ValueError(f"times of a response have shape {times.shape}; give (t,) in s")
     if probes.ndim != 2 or probes.shape[1] not in (2, 3):
@@ -329,14 +315,9 @@ def _check_shapes(times: Floats, probes: Floats, values: Floats) -> None:
             f"values of a response have shape {values.shape}, and its times and probes are "
             f"{expected}; give (t, p)"
         )
-
-
-def _check_spacing(times: Floats) -> None:
     steps = np.diff(times)
-    if not len(steps):
-        return
-    mean = steps.mean()
-    if not (mean > 0 and np.abs(steps - mean).max() <= UNEVEN * mean):
+    mean = steps.mean() if len(steps) else 1.0
+    if not (mean > 0 and np.abs(steps - mean).max(initial=0.0) <= UNEVEN * mean):
         raise ValueError(
             f"times of a response must rise in equal steps, and theirs are {steps.min():g} to "
             f"{steps.max():g} s; sample it evenly"
@@ -373,17 +354,12 @@ def phasors(response: Response, frequencies: ArrayLike, *, settle: float = SETTL
     Parameters
     ----------
     response : Response
-    frequencies : (f,) float, Hz, exactly these; 0 gives the mean
+    frequencies : (f,) float, Hz, below half the sampling rate; 0 gives the mean
     settle : fraction of the response that is left out at its start
 
     Returns
     -------
     (f, p) complex, in the unit of the response
-
-    Raises
-    ------
-    ValueError
-        If a frequency is not below half the sampling rate, or the samples are too few.
     """
     return fit_lines(response, frequencies, settle=settle)[0]
 
@@ -400,22 +376,12 @@ def are_resolved(
     settle: float = SETTLE,
     strengths: ArrayLike | None = None,
 ) -> Mask:
-    """Mask of frequencies that `lines` resolves from 0 Hz and from the others.
+    """Mask (f,) of frequencies (f,) in Hz that `lines` resolves from 0 Hz and from the others.
 
     Frequencies that differ by at most `ALIKE` of the resolution are one line and need not be
-    resolved; nor does a line from others that have, by their strengths, at most 5 % of it together.
-    Unresolved lines, which are not fitted, must not leak more than 5 % into it.
-
-    Parameters
-    ----------
-    response : Response
-    frequencies : (f,) float, Hz
-    strengths : (f,) float, of any unit; all the same if not given
-    settle : fraction of the response that is left out at its start
-
-    Returns
-    -------
-    (f,) bool
+    resolved; nor does a line from others that have, by their strengths (f,) of any unit, all the
+    same if not given, at most 5 % of it together. Unresolved lines, which are not fitted, must not
+    leak more than 5 % into it.
     """
     frequencies = np.atleast_1d(np.asarray(frequencies, np.float64))
     strengths = np.ones_like(frequencies) if strengths is None else np.asarray(strengths)

@@ -34,18 +34,10 @@ TESTED = 200.0  # Hz
 
 
 def threshold(frequency: ArrayLike, area: str = "focal_spot") -> Floats:
-    """Detection threshold (...) of displacement in metre, peak, at frequencies (...) in Hz.
+    """Detection threshold (...) of displacement in metre, peak, at frequencies (...) in Hz; not a
+    number below 10 and above 1000 Hz, where this curve says nothing.
 
-    Parameters
-    ----------
-    area : "focal_spot", 0.58 cm2, or "large_contactor", 2.9 cm2, with which it was measured
-
-    Not a number below 10 and above 1000 Hz, where this curve says nothing.
-
-    Raises
-    ------
-    ValueError
-        If the area is unknown.
+    The area is "focal_spot", 0.58 cm2, or "large_contactor", 2.9 cm2, with which it was measured.
     """
     choose("area", area, AREAS)
     f = np.asarray(frequency, np.float64)
@@ -84,11 +76,6 @@ def sensation_level(
     -------
     (...) float, dB; minus infinity where nothing vibrates, at 0 Hz, or where the threshold is not
     known
-
-    Raises
-    ------
-    ValueError
-        If the area or unit is unknown.
     """
     choose("unit", unit, ("m", "Pa"))
     least = threshold(frequency, area) if unit == "m" else pressure_threshold(frequency)

@@ -193,11 +193,8 @@ def _cut(stack: Stack, depths: Sequence[float]) -> tuple[Stack, list[int]]:
     new = [depth for depth in depths if np.abs(edges - depth).min() > 1e-9 * (1 + depth)]
     planes = np.unique(np.concatenate([edges, new]))
     which = np.searchsorted(edges, planes[:-1], side="right") - 1
-    fine = replace(
-        stack,
-        materials=tuple(stack.materials[i] for i in which),
-        thicknesses=tuple(np.diff(planes).tolist()),
-    )
+    materials = tuple(stack.materials[i] for i in which)
+    fine = replace(stack, materials=materials, thicknesses=tuple(np.diff(planes).tolist()))
     return fine, [int(np.abs(planes - depth).argmin()) for depth in depths]
 
 
@@ -206,16 +203,11 @@ def _impedances(stack: Stack, k: Complex, w: Complex) -> Impedances:
         layer_stiffness(material, thickness, k, w)
         for material, thickness in zip(stack.materials, stack.thicknesses, strict=True)
     ]
-    below: list[Symmetric | None] = [None if stack.is_rigid else _base(stack)]
+    spring, none = np.full(1, stack.base_stiffness, np.complex128), np.zeros(1, np.complex128)
+    below: list[Symmetric | None] = [None if stack.is_rigid else (spring, none, spring)]
     for layer in layers[:0:-1]:
         below.append(_condensed(layer, below[-1]))
     return Impedances(_condensed(layers[0], below[-1]), layers, below[::-1])
-
-
-def _base(stack: Stack) -> Symmetric:
-    """Impedance Z of springs below a stack, which meet both displacements alike."""
-    spring = np.full(1, stack.base_stiffness, np.complex128)
-    return spring, np.zeros(1, np.complex128), spring
 
 
 def _condensed(layer: Layer, below: Symmetric | None) -> Symmetric:

@@ -100,12 +100,9 @@ class Orthotropy:
 
     def scaled(self, factor: float) -> Orthotropy:
         """The same ratios with all moduli multiplied by a factor."""
-        return replace(
-            self,
-            young_x=factor * self.young_x,
-            young_y=factor * self.young_y,
-            shear_xy=None if self.shear_xy is None else factor * self.shear_xy,
-        )
+        shear = None if self.shear_xy is None else factor * self.shear_xy
+        young_x, young_y = factor * self.young_x, factor * self.young_y
+        return replace(self, young_x=young_x, young_y=young_y, shear_xy=shear)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -248,12 +245,9 @@ class Material:
             return self.without_loss_factor()
         series = self.series(tolerance)
         return replace(
-            self,
-            shear_modulus=series.shear_modulus,
-            viscosity=series.viscosity,
-            prony=series.terms,
-            law=None,
-        )
+            self, shear_modulus=series.shear_modulus, viscosity=series.viscosity,
+            prony=series.terms, law=None,
+        )  # fmt: skip
 
     def without_loss_factor(self) -> Material:
         """The same material with its loss factor as Prony terms."""
@@ -262,27 +256,24 @@ class Material:
         factor = constant_loss(self.loss_factor)
         series = factor.scaled(self.shear_modulus)
         return replace(
-            self,
-            shear_modulus=series.shear_modulus,
-            viscosity=self.viscosity + series.viscosity,
-            loss_factor=0.0,
-            prony=(*self.prony, *series.terms),
+            self, shear_modulus=series.shear_modulus, viscosity=self.viscosity + series.viscosity,
+            loss_factor=0.0, prony=(*self.prony, *series.terms),
             orthotropy=self.orthotropy and self.orthotropy.scaled(factor.shear_modulus),
-        )
+        )  # fmt: skip
 
     def scaled(self, *, modulus: float = 1.0, loss: float = 1.0) -> Material:
         """The same law with all its moduli, or all its losses, multiplied by a factor."""
-        both = modulus * loss
-        law = self.law and _scaled_law(self.law, modulus, loss)
+        both, law = modulus * loss, self.law
+        if law is not None and hasattr(law, "scaled"):
+            law = law.scaled(modulus=modulus, loss=loss)
+        elif law is not None:
+            law = ScaledLaw(law=law, modulus=modulus, loss=loss)
         return replace(
-            self,
-            shear_modulus=getattr(law, "shear_modulus", modulus * self.shear_modulus),
-            viscosity=both * self.viscosity,
-            loss_factor=loss * self.loss_factor,
+            self, shear_modulus=getattr(law, "shear_modulus", modulus * self.shear_modulus),
+            viscosity=both * self.viscosity, loss_factor=loss * self.loss_factor, law=law,
             prony=tuple(replace(term, modulus=both * term.modulus) for term in self.prony),
-            law=law,
             orthotropy=self.orthotropy and self.orthotropy.scaled(modulus),
-        )
+        )  # fmt: skip
 
     @property
     def plane_stress(self) -> Floats:
@@ -320,25 +311,17 @@ def from_young(*, young: float, poisson: float, **rest: Any) -> Material:
 
 
 def orthotropic(
-    *,
-    density: float,
-    young_x: float,
-    young_y: float,
-    poisson_xy: float,
-    shear_xy: float | None = None,
-    **losses: Any,
-) -> Material:
+    *, density: float, young_x: float, young_y: float, poisson_xy: float,
+    shear_xy: float | None = None, **losses: Any,
+) -> Material:  # fmt: skip
     """Material of a sheet by its density in kg/m3 and the moduli of `Orthotropy`, whose isotropic
     mean it has; its losses, as of `Material`, are the same in all directions.
     """
     along = Orthotropy(young_x=young_x, young_y=young_y, poisson_xy=poisson_xy, shear_xy=shear_xy)
     return Material(
-        density=density,
-        shear_modulus=along.shear,
-        poisson=along.poisson,
-        orthotropy=along,
+        density=density, shear_modulus=along.shear, poisson=along.poisson, orthotropy=along,
         **losses,
-    )
+    )  # fmt: skip
 
 
 def of_law(*, density: float, poisson: float, law: Any) -> Material:
@@ -359,12 +342,6 @@ def tabulated(
     return of_law(density=density, poisson=poisson, law=table)
 
 
-def _scaled_law(law: Any, modulus: float, loss: float) -> Any:
-    if hasattr(law, "scaled"):
-        return law.scaled(modulus=modulus, loss=loss)
-    return ScaledLaw(law=law, modulus=modulus, loss=loss)
-
-
 def _tissue(shear: float, loss: float = 2e-4) -> Material:
     """Soft tissue of a shear modulus in Pa; `loss` in s is its viscosity over that modulus."""
     return Material(density=1000, shear_modulus=shear, poisson=0.4999, viscosity=loss * shear)
@@ -383,17 +360,14 @@ PRESETS: Mapping[str, Material] = {
     # "palm" at rest, and loss factors of 0.06, 0.14 and 0.16 at 50, 140 and 200 Hz, where "palm"
     # has 0.06, 0.18 and 0.25.
     "palm-zener": Material(
-        density=1000,
-        shear_modulus=25e3,
-        poisson=0.4999,
+        density=1000, shear_modulus=25e3, poisson=0.4999,
         prony=(PronyTerm(modulus=10e3, time=0.5e-3),),
     ),
     # Silicone of skin replicas, Ecoflex 00-30: density by its maker's data sheet, the law that of
     # Lanoy et al., PNAS 117 (2020), doi 10.1073/pnas.2010812117. The constants are second-hand and
     # were not checked against that paper: a plausible silicone, not a measured one.
     "ecoflex": of_law(
-        density=1070,
-        poisson=0.4999,
+        density=1070, poisson=0.4999,
         law=FractionalKelvinVoigt(shear_modulus=25e3, exponent=0.33, time=0.3e-3),
     ),
     # Layers of a palm, fitted to published waves within published ranges (bench/layered_skin.py has
@@ -422,6 +396,6 @@ PRESETS: Mapping[str, Material] = {
     "paper-grain": orthotropic(
         density=800, young_x=5.5e9, young_y=2.5e9, poisson_xy=0.35, loss_factor=0.03
     ),
-}
+}  # fmt: skip
 # Those whose motion no skin has: thresholds of detection are not theirs.
 NOT_SKIN = ("ecoflex", "bone", "paper", "paper-grain")

@@ -94,12 +94,9 @@ class PronySeries:
 
     def scaled(self, factor: float) -> PronySeries:
         """The series with all its moduli multiplied by a factor."""
-        return replace(
-            self,
-            shear_modulus=factor * self.shear_modulus,
-            viscosity=factor * self.viscosity,
-            terms=tuple(replace(term, modulus=factor * term.modulus) for term in self.terms),
-        )
+        terms = tuple(replace(term, modulus=factor * term.modulus) for term in self.terms)
+        shear, viscosity = factor * self.shear_modulus, factor * self.viscosity
+        return replace(self, shear_modulus=shear, viscosity=viscosity, terms=terms)
 
     @property
     def words(self) -> str:

@@ -44,9 +44,7 @@ def highest(pressure: MovingPressure, passing: float) -> float:
 
 @lru_cache(maxsize=32)
 def _highest_order(pressure: MovingPressure) -> int:
-    """Highest order of a sinusoid in the gain: the degree of the drive law, or as its harmonics
-    fall off.
-    """
+    """Highest order of a sinusoid in the gain: the degree of the law, or as its harmonics fall."""
     if pressure.law.degree is not None:
         return pressure.law.degree
     orders, (c,) = gain_orders(pressure)

@@ -73,7 +73,11 @@ def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadSpectru
     check_lines(pressure)
     tacton, (n, of_spot) = pressure.tacton, path_strengths(pressure, threshold)
     whole, frequency = path_cells(pressure).of_tacton, path_cells(pressure).frequency
-    tone, gain = (np.zeros(1), np.ones(1)) if whole else _gain_lines(pressure)
+    tone, gain = np.zeros(1), np.ones(1, np.complex128)
+    if not whole:
+        gains, (gain,) = gain_orders(pressure)
+        audible = np.abs(gain) >= 1e-12 * np.abs(gain).max()
+        tone, gain = gains[audible] @ np.array(tones(tacton)), gain[audible]
     f = (n[:, None] * frequency + tone).ravel()
     f, order = np.round(f, 9), np.repeat(n, len(tone))  # f_AM - 2 f_d may be 0 but for round-off
     c = (foci_harmonics(pressure, n)[:, None] * gain).ravel() * np.where(f > 0, 2, 1)
@@ -84,11 +88,9 @@ def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadSpectru
     if not kept.any():
         kept = (order == 0) & (f == 0)
     return LoadSpectrum(
-        frequencies=np.abs(f[kept]),
-        harmonics=order[kept],
-        coefficients=c[kept],
+        frequencies=np.abs(f[kept]), harmonics=order[kept], coefficients=c[kept],
         strengths=strength[kept],
-    )
+    )  # fmt: skip
 
 
 def lines_from_rest(pressure: MovingPressure) -> LoadSpectrum:
@@ -184,13 +186,6 @@ def merge_lines(frequencies: Floats, amplitudes: Complex) -> tuple[Floats, Compl
     total = np.zeros((len(distinct), *amplitudes.shape[1:]), np.complex128)
     np.add.at(total, which, amplitudes)
     return distinct, total
-
-
-def _gain_lines(pressure: MovingPressure) -> tuple[Floats, Complex]:
-    """Frequencies (m,) in Hz of either sign and coefficients (m,) in Pa of the gain."""
-    orders, (c,) = gain_orders(pressure)
-    kept = np.abs(c) >= 1e-12 * np.abs(c).max()
-    return orders[kept] @ np.array(tones(pressure.tacton)), c[kept]
 
 
 def gain_orders(

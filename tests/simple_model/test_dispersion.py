@@ -5,7 +5,6 @@ from math import inf, pi
 
 import numpy as np
 import pytest
-from legible import illegible, sizes, texts
 
 from simple_model import Material, Stack
 from simple_model.layers.compliance import half_space, layered, slab, thin_sheet
@@ -13,8 +12,6 @@ from simple_model.layers.dispersion import dispersion_curves
 from simple_model.layers.material import PRESETS
 from simple_model.layers.wavenumber_integral import point_response
 from simple_model.plates.sheet_waves import sheet_curves
-from skinwave.report.dispersion import dispersion_figure
-from skinwave.report.styles import STYLES, style
 from skinwave.studies.driven_modes import driven_modes
 
 WIDTH = 4.35e-3  # m, of the focal spot
@@ -261,23 +258,6 @@ def driven():
     return driven_modes(scene_of(CIRCLE + 'kind = "slab"'), spacing=24)
 
 
-@pytest.mark.parametrize(("kind", "width"), [("slab", None), ("slab", 2.5), ("sheet", 3.5)])
-def test_no_text_of_the_curves_is_cut_or_over_another(driven, kind, width):
-    found = driven
-    if kind == "sheet":
-        found = driven_modes(scene_of(CIRCLE + 'kind = "sheet"\nmaterial = "paper"'))
-    lines = {line.name: line.frequency for line in found.lines}
-    chosen = style("print", width) if width else STYLES["report"]
-    figure = dispersion_figure(found.curves, lines, 12.0, found.lines[0].frequency, chosen)
-    assert illegible(figure) == []
-    if width:
-        assert figure.get_figwidth() == width
-        assert sizes(figure) == {8.0}
-    named = [text.get_text() for text, _ in texts(figure) if "$" in text.get_text()]
-    assert "$f_{d}$" in named  # the strongest
-    assert len(named) == len(set(named)) >= 3
-
-
 def test_lines_of_a_load_are_at_their_own_frequencies_on_the_curves(driven):
     line = driven.lines[0]
     assert line.name == "f_d"
@@ -290,17 +270,6 @@ def test_lines_of_a_load_are_at_their_own_frequencies_on_the_curves(driven):
     assert line.mach_angle == pytest.approx(np.degrees(np.arcsin(line.phase_speed / 12)))
     below = next(line for line in driven.lines if line.name == "f_d-f_AM")  # 51 Hz
     assert (below.kind, below.mach_angle) == ("evanescent", None)
-
-
-@pytest.mark.parametrize(
-    ("body", "mode"),
-    [('kind = "palm"', "mode 1"), ('kind = "slab"\nthickness_mm = inf', "Rayleigh wave"),
-     ('kind = "sheet"', "bending wave")],
-)  # fmt: skip
-def test_every_kind_of_body_with_a_depth_has_curves(body, mode):
-    found = driven_modes(scene_of(CIRCLE + body), spacing=12)
-    assert found.curves.modes[0].name == mode
-    assert all(line.decay_length > 0 for line in found.lines)
 
 
 def test_command_writes_a_page_a_table_and_arrays(tmp_path, capsys):
@@ -379,19 +348,6 @@ def test_only_wavenumbers_that_the_line_resolves_are_reported():
     faded = np.abs(second.imag) * found.aperture > 3.5
     assert faded.any()
     assert not resolved[faded].any()
-
-
-@pytest.mark.parametrize("poisson", [0.4999])
-def test_a_thin_layer_leaves_long_waves_to_the_half_space_below(poisson):
-    """Without loss, so that bound waves are real, and with as many modes as there may be."""
-    below, thin = solid(poisson), Material(density=1000, shear_modulus=50e3, poisson=poisson)
-    stack = Stack(materials=(thin, below), thicknesses=(2e-4, inf))
-    mode = dispersion_curves(stack, [5.0, 10.0, 40.0, 160.0], most=12).modes[0]
-    assert set(mode.kinds) == {"propagating"}
-    ratio = mode.phase_speed / below.rayleigh_speed
-    assert (np.diff(ratio) > 0).all()  # shorter waves have more of it in the stiffer layer
-    assert ratio[0] == pytest.approx(1, abs=1e-3)
-    assert np.abs(mode.wavenumbers.imag).max() < 1e-9 * mode.wavenumbers.real.max()
 
 
 def bound_speeds(stack, hertz, slowest, fastest):

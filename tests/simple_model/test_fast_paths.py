@@ -8,7 +8,6 @@ from scipy.interpolate import CubicSpline
 
 from simple_model import (
     MovingPressure,
-    Rhythm,
     Tacton,
     Trajectory,
     flat_body,
@@ -27,8 +26,6 @@ from simple_model.load.sampling import resolving_step
 from simple_model.load.spectrum import load_lines, synthesise
 from simple_model.quantities import ACCELERATION, DISPLACEMENT, VELOCITY
 from skinwave import Body, Scene
-from skinwave.bodies import BODIES
-from skinwave.models import stretching
 from skinwave.models.options import SolveOptions
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute, solve
@@ -174,14 +171,6 @@ def test_rates_are_right_to_the_last_sample(order):
     assert np.abs(differs).max() < 1e-3 * np.ptp(expected, axis=0).min()
 
 
-@pytest.mark.parametrize("model", [flat_body, steady_state, point_kernel])
-def test_few_samples_show_no_line_above_half_their_rate(model):
-    load, times = MovingPressure(tacton=Tacton(am_frequency=310.0)), np.arange(200) / 500
-    arguments = (load, BESIDE, times) if model is point_kernel else (THIN, load, BESIDE, times)
-    found = model(*arguments).displacement[100:]
-    assert (np.ptp(found, axis=0) < 1e-3 * np.abs(found).max(axis=0)).all()
-
-
 def test_lines_that_are_left_out_are_named():
     load = MovingPressure(tacton=Tacton(am_frequency=310.0, duration=0.4))
     scene = Scene(pressure=load, body=replace(SKIN, sides="absorbing"))
@@ -202,36 +191,3 @@ def test_every_model_answers_at_the_times_asked_for():
         body = replace(SKIN, sides="absorbing") if "flat" in model else SKIN
         found = compute(Scene(pressure=load, body=body), model, times=times, h=10e-3)
         np.testing.assert_allclose(found.times, times, atol=1e-12)
-
-
-STEPPED = {
-    "a jump between steps": (
-        {"trajectory": Trajectory(
-            shape="recorded", points=((0.004, 0.0), (-0.004, 0.0), (0.004, 0.004)),
-            times=(0.0, 0.005033, 0.0107), hold=True)},
-        None,
-    ),
-    "a line above half the rate": ({"am_frequency": 310.0}, np.arange(20) / 1e3),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", STEPPED)
-def test_time_steps_follow_the_load_of_lines(name):
-    tacton, times = STEPPED[name]
-    load = MovingPressure(tacton=Tacton(duration=0.02, **tacton))
-    scene = Scene(pressure=load, body=SKIN, probes=((0.005, 0.0),))
-    x, y = (compute(scene, model, times=times, h=10e-3) for model in ("fem", "fem-transient"))
-    assert np.linalg.norm(x.values - y.values) < 3e-3 * np.linalg.norm(y.values)
-
-
-def test_many_lines_push_a_stretching_sheet_as_their_sum_does(monkeypatch):
-    load = MovingPressure(
-        tacton=Tacton(duration=0.01, rhythm=Rhythm(pulses=((0.0033, 0.0031),))), peak_pressure=0.1
-    )
-    sheet = replace(BODIES["paper-sheet-loose"], width=0.06, height=0.06, air=False)
-    scene = Scene(pressure=load, body=sheet, probes=((0.005, 0.0),))
-    found, expected = [], []
-    for most, values in ((10, found), (10_000, expected)):
-        monkeypatch.setattr(stretching, "MOST_LINES", most)
-        values.append(compute(scene, "fem-nonlinear", h=12e-3).values)
-    assert np.linalg.norm(found[0] - expected[0]) < 1e-2 * np.linalg.norm(expected[0])

@@ -20,8 +20,6 @@ from simple_model.layers.compliance import half_space
 from simple_model.layers.material import PRESETS
 from simple_model.load.path_cells import path_fourier, path_samples
 from simple_model.load.spectrum import load_lines
-from skinwave.planning.simulate import compute
-from skinwave.scene.scene import Body, Scene
 
 FREQUENCY = 185.0
 STRAIGHT = (
@@ -78,25 +76,6 @@ def test_lines_are_those_of_the_load_sampled(paths, more):
     np.testing.assert_allclose(f, rank / load.tacton.duration, atol=1e-6)
     found[rank[rank < 200]] = a[rank < 200]
     assert np.abs(found - sampled).max() < 5e-4 * np.abs(sampled).max()
-
-
-@pytest.mark.parametrize("more", [{"am_frequency": 140.0}])
-def test_bodies_answer_them_by_lines_as_by_time_steps(more):
-    small = [replace(p, size=0.6 * p.size, centre=(0.4 * p.centre[0], 0.4 * p.centre[1]))
-             for p in STRAIGHT[:3]]  # fmt: skip
-    scene = Scene(
-        pressure=together(small, duration=0.02, **more),
-        body=Body(width=0.03, height=0.03, depth=0.01, sides="clamped"),
-        probes=((0.0, 0.0), (0.005, 0.001)),
-    )  # fmt: skip
-    x = compute(scene, "fem", h=0.01).displacement
-    y = compute(scene, "fem-transient", h=0.01, dt=5e-5).displacement
-    assert (np.linalg.norm(x - y, axis=0) < 2e-3 * np.linalg.norm(y, axis=0)).all()
-    mean = np.mean([
-        compute(replace(scene, pressure=alone(path, duration=0.02, **more)), "fem",
-                 h=0.01).displacement for path in small
-    ], axis=0)  # fmt: skip
-    assert np.linalg.norm(x - mean) < 2e-3 * np.linalg.norm(mean)
 
 
 def test_lines_have_the_names_of_the_common_frequency():

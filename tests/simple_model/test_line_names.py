@@ -17,14 +17,11 @@ from simple_model import (
     line_table,
     named_lines,
     point_kernel,
-    sensation_level,
 )
 from simple_model.line_table import FREE, UNNAMED, UNRESOLVED
 from simple_model.load.line_names import SYMBOLS, line_frequency, line_name, line_names, symbols
 from simple_model.response import SETTLE, fit_lines
-from skinwave.planning.simulate import compute
 from skinwave.results.run import ASSESSED
-from skinwave.scene.scene import Body, Scene
 
 TIMES = np.arange(6000) / 6000
 PLACES = [[0.0, 0.0], [0.006, 0.0], [0.012, 0.002]]
@@ -245,36 +242,4 @@ def test_lines_that_are_not_resolved_are_listed_together():
     assert table.unnamed[0].frequency == pytest.approx(140, abs=1)
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_steady_lines_of_a_linear_body_are_those_of_its_load(seed):
-    rng = np.random.default_rng(seed)
-    more = [{}, {"second_am_frequency": 201.0, "superposition": (0.5, 0.5)},
-            {"envelope_frequency": 11.0}][seed % 3]  # fmt: skip
-    tacton = Tacton(
-        am_frequency=rng.uniform(40, 250), duration=1.0, **more,
-        trajectory=circle(rng.uniform(60, 220), rng.uniform(0.008, 0.02)),
-    )  # fmt: skip
-    drive = str(rng.choice(sorted(DRIVES)))
-    scene = Scene(
-        pressure=MovingPressure(tacton=tacton, drive=drive), body=Body(kind="slab"),
-        probes=((0.0, 0.0), (0.01, 0.0), (0.02, 0.0)),
-    )  # fmt: skip
-    response = compute(scene, "flat-body-harmonic")
-    table = line_table(scene.pressure, response)
-    assert table.unresolved == {}
-    assert table.unnamed == ()
-    rest = fit_lines(response, list(table.frequencies.values()))[1][round(SETTLE * len(TIMES)) :]
-    window = np.blackman(len(rest))[:, None]
-    left = 2 * np.abs(np.fft.rfft(rest * window, axis=0)) / window.sum()
-    assert left[4:].max() < 1e-3 * max(a.max() for a in table.amplitudes.values())
-
-
 # Sensation level
-
-
-def test_levels_are_of_what_vibrates_and_of_skin_only():
-    assert sensation_level(1.0, 0.0) == sensation_level(1.0, 0.0, unit="Pa") == -np.inf
-    assert sensation_level(2.2, 200.0, unit="Pa") == pytest.approx(0)
-    assert sensation_level(22.0, 200.0, unit="Pa") == pytest.approx(20)
-    with pytest.raises(ValueError, match="unit 'N' is unknown"):
-        sensation_level(1.0, 100.0, unit="N")

@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-import fem
-import meshes
 import skinwave
 from simple_model import (
     MovingPressure,
@@ -41,20 +39,6 @@ def test_the_focus_keeps_its_speed_and_comes_back(shape):
     assert steps.sum() == pytest.approx(path.length, rel=1e-6)
     assert np.median(steps) / np.diff(t)[0] == pytest.approx(5.0, rel=1e-6)
     np.testing.assert_allclose(path.position(0.0), path.position(period), atol=1e-12)
-
-
-def test_a_one_way_line_jumps_back():
-    path = Trajectory(shape="line", size=0.02, speed=2.0, sweep="one_way")
-    np.testing.assert_allclose(path.position([0.0, 0.0099999]), [[-0.01, 0], [0.01, 0]], atol=1e-6)
-    np.testing.assert_allclose(path.position(0.0100001), [-0.01, 0], atol=1e-6)
-
-
-def test_the_square_and_the_triangle_have_the_side_they_are_asked_for():
-    for shape, corners in (("square", 4), ("triangle", 3)):
-        at = Trajectory(shape=shape, size=0.06, speed=1).at_phase(np.arange(corners) / corners)
-        sides = np.linalg.norm(at - np.roll(at, 1, axis=0), axis=1)
-        np.testing.assert_allclose(sides, 0.06, rtol=1e-12)
-        np.testing.assert_allclose(at.mean(axis=0), 0, atol=1e-15)
 
 
 def test_frequency_zero_is_a_factor_of_one():
@@ -216,33 +200,6 @@ def test_half_the_sound_pressure_pushes_a_quarter():
         amplitudes("pressure_squared") / 4, abs=1e-12
     )
     assert MovingPressure(tacton=Tacton())([[0.0, 0.0]], 0.3) == pytest.approx(50)
-
-
-def test_the_load_is_vectorised_over_time():
-    path = Trajectory(shape="square", size=0.02, speed=5)
-    load = MovingPressure(tacton=Tacton(am_frequency=80, trajectory=path))
-    points, t = np.random.default_rng(0).uniform(-0.02, 0.02, (7, 2)), np.linspace(0, 0.1, 5)
-    assert load(points, t).shape == (5, 7)
-    one_by_one = [load(points, time) for time in t]
-    np.testing.assert_allclose(load(points, t), one_by_one, rtol=1e-12)
-
-
-@pytest.mark.parametrize("focus", ["gaussian", "main_lobe"])
-def test_total_force_survives_the_quadrature_of_a_mesh(focus):
-    mesh = meshes.block(
-        (0.1, 0.1, 0.015), 0.003, grading=meshes.Grading(radius=0.03, growth=1.25, coarsest=0.006)
-    )
-    P, points = fem.load_operator(mesh), fem.facet_points(mesh)[:, :2]
-    fine = np.linspace(-0.05, 0.05, 1001)
-    grid = np.stack(np.meshgrid(fine, fine), axis=-1).reshape(-1, 2)
-    load = MovingPressure(
-        tacton=Tacton(trajectory=Trajectory(shape="circle", size=0.03, speed=18)), profile=focus
-    )
-    for t in (0.0, 0.0007, 0.0031):
-        force = (P @ load(points, t)).reshape(-1, 3).sum(axis=0)
-        exact = load(grid, t).sum() * 1e-8
-        assert -force[2] == pytest.approx(exact, rel=0.01)
-        np.testing.assert_allclose(force[:2], 0, atol=1e-12 * exact)
 
 
 class Louder(MovingPressure):

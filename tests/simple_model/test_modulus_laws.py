@@ -2,15 +2,13 @@
 
 import cmath
 from dataclasses import replace
-from itertools import islice, pairwise
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.special import j0
 
-import fem
-import meshes
 import skinwave
 from simple_model import (
     FractionalKelvinVoigt,
@@ -21,23 +19,20 @@ from simple_model import (
     Tacton,
     Trajectory,
     fit_prony,
-    flat_body,
     modulus_table,
     of_law,
-    steady_state,
     tabulated,
 )
-from simple_model.layers.compliance import half_space, slab
+from simple_model.layers.compliance import half_space
 from simple_model.layers.flat_body import steady_lines
 from simple_model.layers.material import PRESETS
-from simple_model.layers.wavenumber_integral import point_response
 from simple_model.load.focus import spot_width
 from simple_model.load.spectrum import load_lines
 from skinwave.bodies.analytic import compliance
 from skinwave.models.laws import relaxing
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads, read
-from skinwave.scene.scene import Body, Layer, Scene
+from skinwave.scene.scene import Body, Scene
 from skinwave.scene.variation import cases
 
 ECOFLEX = PRESETS["ecoflex"]
@@ -166,27 +161,7 @@ def test_steady_lines_are_those_of_an_independent_quadrature(of, solid, modulus)
             assert abs(amplitude / lines.coefficients[0] - g) < 1e-6 * abs(g)
 
 
-def test_a_slab_at_rest_has_the_modulus_at_rest():
-    """Not that at the slow motion which stands for rest elsewhere: Ecoflex is 5 % stiffer in it."""
-    width = spot_width(0.2)
-    still = [
-        point_response(slab(m, 0.01), [0.0, 0.004], [0.0], width)
-        for m in (ECOFLEX, replace(ECOFLEX, law=None, viscosity=1.0))
-    ]
-    np.testing.assert_allclose(*still, rtol=1e-6)
-
-
 # Motion from rest by the law itself
-
-
-@pytest.mark.parametrize("solid", [ECOFLEX])
-def test_motion_from_rest_settles_to_the_steady_lines(solid):
-    own, times = scene(solid), np.arange(2000) / 1e4
-    body = slab(solid, 0.008)
-    steady = steady_state(body, own.pressure, PROBES, times).displacement
-    found = flat_body(body, own.pressure, PROBES, times).displacement
-    assert np.abs(found - steady)[1500:].max() < 1e-3 * np.abs(steady).max()
-    assert np.abs(found - steady)[:20].max() > 0.01 * np.abs(steady).max()  # of the start
 
 
 # Prony series
@@ -207,31 +182,6 @@ def test_a_series_is_as_near_as_it_says_and_no_longer_than_it_must_be(solid, mod
     assert len(solid.series(10 * tolerance).terms) < len(series.terms)
     relaxed = solid.relaxing(tolerance).complex_modulus(2 * np.pi * f)
     np.testing.assert_allclose(relaxed, series(2 * np.pi * f), rtol=1e-13)
-
-
-@pytest.fixture(scope="module")
-def element():
-    """Two cells, the force of a pressure on their top, and a probe."""
-    mesh = meshes.block((0.01, 0.01, 0.01), 0.01)
-    P = fem.load_operator(mesh)
-    return mesh, P @ np.ones(P.shape[1]), fem.probe_operator(mesh, [[0.0, 0.0]])
-
-
-@pytest.mark.parametrize("solid", [ZENER, table_of(ECOFLEX)])
-def test_stepping_and_reduction_by_the_series_are_the_harmonic_motion_of_the_law(element, solid):
-    mesh, force, S = element
-    own, series = (fem.assemble(mesh, m) for m in (solid, solid.relaxing()))
-    hertz = np.array([20.0, 60.0, 140.0, 210.0, 420.0, 900.0])
-    expected = (S @ fem.harmonic(own, force, hertz).T)[0]
-    model = fem.reduce(series, S, 1000.0, 1e-6)
-    forces = np.tile((model.basis.T @ force)[:, None], 1)
-    found = np.array([fem.transfer(model, forces, f).ravel()[0] for f in hertz])
-    assert np.linalg.norm(found - expected) < 0.01 * np.linalg.norm(expected)
-    dt, w = 2.5e-5, 2 * np.pi * 140.0
-    states = islice(fem.transient(series, lambda t: force * np.sin(w * t), dt), 2401)
-    stepped = np.array([(S @ state.displacement)[0] for state in states])[-600:]
-    steady = (expected[2] * np.exp(1j * w * dt * np.arange(1801, 2401))).imag
-    assert np.abs(stepped - steady).max() < 0.01 * abs(expected[2])
 
 
 def test_flat_body_takes_the_series_of_a_table_at_complex_frequencies():
@@ -328,16 +278,6 @@ def test_measured_noise_of_some_per_cent_is_taken():
 
 BODY = "[body.material]\ndensity_kg_m3 = 1070\npoisson = 0.4999\n"
 HEADER = "frequency_hz,storage_pa,loss_pa\n"
-FRACTIONAL = 'law = "fractional-kelvin-voigt"\nshear_modulus_pa = 25e3\nexponent = 0.33\n'
-
-
-@pytest.mark.parametrize("solid", [ECOFLEX, table_of(ZENER)])
-def test_a_scene_file_holds_them(solid):
-    own = scene(solid)
-    layered = replace(own.body, layers=(Layer(thickness=2e-3, material=solid),))
-    for each in (own, replace(own, body=layered)):
-        assert loads(dumps(each)) == each
-    assert loads(BODY + FRACTIONAL + "time_s = 0.3e-3").body.solid == ECOFLEX
 
 
 def test_a_table_is_read_from_beside_the_scene(tmp_path):
@@ -357,19 +297,6 @@ def test_a_table_is_read_from_beside_the_scene(tmp_path):
     assert loads(dumps(own)) == own
     with pytest.raises(ValueError, match=r"'moduli.csv' names a file.*give its numbers"):
         loads(BODY + 'table = "moduli.csv"\n')
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [(FRACTIONAL, "lacks time_s"),
-     (FRACTIONAL + "time_s = 1e-3\nviscosity_pa_s = 2.0\n", "has no viscosity_pa_s"),
-     ("table = { frequency_hz = [1.0], storage_pa = [1e4] }\n", "lacks loss_pa"),
-     ("table = { frequency_hz = [1.0], storage_pa = [1e4], loss_pa = [1.0, 2.0] }\n",
-      "2 loss moduli")],
-)  # fmt: skip
-def test_a_material_of_wrong_keys_is_refused(text, said):
-    with pytest.raises(ValueError, match=said):
-        loads(BODY + text)
 
 
 @pytest.mark.parametrize(

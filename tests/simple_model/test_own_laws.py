@@ -1,8 +1,6 @@
 """Drive laws, focus profiles, paths and materials of a user's own, without editing the source."""
 
-import importlib
 from dataclasses import replace
-from itertools import islice
 
 import numpy as np
 import pytest
@@ -171,14 +169,6 @@ def test_models_take_a_measured_map(tmp_path):
     assert np.abs(found - expected).max() < 5e-3 * np.abs(expected).max()
 
 
-def test_a_map_without_mirror_symmetry_is_meshed_whole(tmp_path):
-    extent = importlib.import_module("skinwave.planning.extent")
-    still = scene(tacton=Tacton())
-    assert extent.symmetry(still) == "xy"
-    own = replace(still.pressure, profile=measured(tmp_path / "map.csv"))
-    assert extent.symmetry(replace(still, pressure=own)) == ""
-
-
 def test_what_depends_on_a_function_is_not_found_in_the_cache(tmp_path):
     one, other = (measured(tmp_path / "map.csv", spacing) for spacing in (1.0, 0.5))
     again = measured(tmp_path / "map.csv", 1.0)
@@ -209,14 +199,6 @@ def test_a_function_of_time_is_a_path_that_a_scene_file_holds():
 
 def closed_form(w):
     return 20e3 + 8e3 / (1 + 1 / (0.4e-3j * w)) + 6e3 / (1 + 1 / (3e-3j * w))
-
-
-def test_a_prony_series_is_its_closed_form_for_arrays():
-    w = 2 * np.pi * HERTZ[1:]
-    np.testing.assert_allclose(TWO.complex_modulus(w), closed_form(w), rtol=1e-13)
-    np.testing.assert_allclose(TWO.complex_modulus(w[:, None]), closed_form(w)[:, None])
-    assert TWO.complex_modulus(0.0) == 20e3
-    assert TWO.complex_modulus(1e12) == pytest.approx(34e3)
 
 
 @pytest.fixture(scope="module")
@@ -258,21 +240,6 @@ def test_a_measured_modulus_is_that_of_the_law_in_the_frequency_domain(element, 
     assert np.abs(found - expected).max() < 1e-3 * np.abs(expected).max()
     power = compute(scene(own), "fem-harmonic", h=0.01).effort
     assert power.energy_imbalance < 1e-6
-
-
-def test_stepping_and_reduction_with_two_terms_are_the_harmonic_motion(element):
-    mesh, force, S = element
-    ops = fem.assemble(mesh, TWO)
-    assert [branch.time for branch in ops.branches] == [0.4e-3, 3e-3]
-    expected = (S @ fem.harmonic(ops, force, 140.0)[0])[0]
-    model = fem.reduce(ops, S, 500.0, 1e-6)
-    reduced = fem.transfer(model, (model.basis.T @ force)[:, None], 140.0)[0, 0, 0]
-    assert reduced == pytest.approx(expected, rel=1e-5)
-    dt, w = 2.5e-5, 2 * np.pi * 140.0
-    states = islice(fem.transient(ops, lambda t: force * np.sin(w * t), dt), 3001)
-    found = np.array([(S @ state.displacement)[0] for state in states])[-600:]
-    steady = (expected * np.exp(1j * w * dt * np.arange(2401, 3001))).imag
-    assert np.abs(found - steady).max() < 2e-3 * abs(expected)
 
 
 @pytest.mark.slow

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy import sparse
 from scipy.integrate import solve_ivp
-from scipy.linalg import eigh
 from scipy.sparse.linalg import eigsh
 
 from simple_model import Material, MovingPressure, PronyTerm, Tacton, Trajectory
@@ -14,7 +13,7 @@ from simple_model.plates.air import air_mass
 from simple_model.plates.free_modes import free_modes
 from simple_model.plates.modes import Plate, modal_motion, plate_modes
 from simple_model.plates.path_forces import modal_path_forces, plate_lines
-from simple_model.plates.polynomials import line_basis, piecewise_basis
+from simple_model.plates.polynomials import line_basis
 
 D, MASS, SIDE = 3.66e-4, 0.08, 0.1  # N m, kg/m2, m
 
@@ -95,15 +94,6 @@ def test_clamped_orthotropic_stretched_plates_are_those_of_conforming_elements()
     assert (order < 4.3).all()
 
 
-def test_a_membrane_is_a_string_along_its_tension():
-    plate = Plate(
-        size_x=0.2, size_y=0.05, d11=1e-9, d22=1e-9, d12=0.0, d66=1e-9, mass_per_area=MASS,
-        tension_x=50.0, air_density=0.0, **edges("simply", "simply", "free", "free"),
-    )  # fmt: skip
-    string = np.sqrt(50.0 / MASS) / (2 * 0.2)
-    assert plate_modes(plate).frequencies[0] == pytest.approx(string, rel=1e-5)
-
-
 # Leissa, J Sound Vib 31:257 (1973), tables C: nu = 0.3; upper bounds, the free ones of 36 terms.
 @pytest.mark.parametrize(
     ("supports", "published", "least", "most"),
@@ -122,13 +112,6 @@ def test_frequencies_of_square_plates_are_those_published(supports, published, l
     assert (error < most).all()
 
 
-def test_a_strip_between_two_clamped_edges_is_a_beam():
-    # Without Poisson's ratio the beam's modes are the plate's, whatever its width.
-    plate = isotropic(0.1, 0.02, nu=0.0, **edges("clamped", "clamped", "free", "free"))
-    found = parameters(plate)
-    assert np.abs(found[:, None] - [22.3733, 61.6728, 120.9034]).min(axis=0).max() < 2e-3
-
-
 def test_static_and_steady_deflection_are_those_of_naviers_series():
     modes = plate_modes(SIMPLY, 900.0)
     points, loaded = np.array([[0.011, -0.007], [0.0, 0.0]]), np.array([[-0.013, 0.009]])
@@ -144,14 +127,6 @@ def test_static_and_steady_deflection_are_those_of_naviers_series():
         series = 4 / (SIMPLY.size_x * SIMPLY.size_y) / (stiffness - MASS * (2 * np.pi * f) ** 2)
         exact = [(series * shapes(p) * shapes(loaded[0])).sum() for p in points]
         np.testing.assert_allclose(line, exact, rtol=2e-3)
-
-
-def test_loss_is_of_bending_and_not_of_tension():
-    modes = plate_modes(SIMPLY)
-    a, b, stiffness = navier(SIMPLY)
-    pulled = SIMPLY.tension_x * a[0, 0] ** 2 + SIMPLY.tension_y * b[0] ** 2
-    first = np.argmin(modes.squared)
-    assert modes.elastic[first] == pytest.approx(1 - pulled / stiffness[0, 0], rel=1e-8)
 
 
 def clamped_beam(tension, loss, frequency):
@@ -217,19 +192,6 @@ def test_clips_across_a_strip_clamp_what_is_between_them(air_density):
     between = isotropic(0.08, 0.01, air_density=air_density, **clamped)
     found, exact = (plate_modes(plate).frequencies[:8] for plate in (whole, between))
     np.testing.assert_allclose(found, exact, rtol=2e-4)
-
-
-def test_lines_between_pieces_change_no_mode():
-    breaks, ends = np.array([-0.5, -0.41, -0.4, 0.4, 0.41, 0.5]) * SIDE, ("simply", "simply")
-    pieces = piecewise_basis(breaks, ends, [5, 4, 14, 4, 5], True)
-    for line, order in zip(pieces, (1, 2), strict=True):
-        k4, shapes = eigh(line.curvature, line.mass)
-        assert (k4[0] / (order * np.pi / SIDE) ** 4) == pytest.approx(1, rel=1e-6)
-        # Continuous with its slope, as the sine that it is.
-        x = np.linspace(-SIDE / 2, SIDE / 2, 201)
-        sine = (np.cos if order == 1 else np.sin)(order * np.pi * x / SIDE) * np.sqrt(2 / SIDE)
-        shape = line(x) @ shapes[:, 0]
-        np.testing.assert_allclose(shape * np.sign(shape @ sine), sine, atol=1e-5 / SIDE**0.5)
 
 
 def test_the_moving_load_is_that_of_a_fine_grid():

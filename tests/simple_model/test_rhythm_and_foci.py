@@ -21,7 +21,7 @@ from simple_model import (
 from simple_model.layers.compliance import half_space
 from simple_model.layers.material import PRESETS
 from simple_model.load.path_cells import path_fourier, path_samples
-from simple_model.load.spectrum import load_lines, pressure_lines, synthesise
+from simple_model.load.spectrum import load_lines
 from skinwave import Body, Scene
 from skinwave.planning.simulate import compute
 
@@ -104,15 +104,6 @@ def test_lines_are_those_of_the_load_sampled(extra, foci):
     assert np.abs(a[:251] - sampled).max() < 2e-4 * np.abs(sampled).max()
 
 
-def test_lines_of_foci_that_rest_are_at_the_place_of_each():
-    path = Trajectory(shape="circle", size=0.02, speed=0.0)
-    pressure = MovingPressure(tacton=Tacton(trajectory=path, foci=(0.0, 0.5), am_frequency=140.0))
-    points, t = np.array([[0.01, 0.0], [-0.01, 0.0], [0.0, 0.01]]), np.arange(100) * 1e-4
-    np.testing.assert_allclose(
-        synthesise(*pressure_lines(pressure, points), t), pressure(points, t)
-    )
-
-
 def test_even_foci_leave_only_multiples_of_their_number():
     for n in (2, 3):
         foci = tuple(np.arange(n) / n)
@@ -156,13 +147,6 @@ def test_polylines_run_at_constant_speed_round_or_there_and_back():
             np.diff(path.at_phase(np.linspace(0, 1, 28001)[:-1]), axis=0), axis=1
         )
         assert np.median(steps) == pytest.approx(path.length / 28000, rel=1e-6)
-
-
-def test_a_cosine_line_is_slow_at_its_ends():
-    path = Trajectory(shape="line", size=0.02, speed=4.0, sweep="sinusoidal")
-    assert path.drawing_frequency == pytest.approx(100.0)
-    x = -0.01 * np.cos(2 * np.pi * 100 * TIMES)
-    np.testing.assert_allclose(path.position(TIMES)[:, 0], x, atol=1e-14)
 
 
 def test_a_recording_is_where_and_when_it_was():
@@ -241,14 +225,6 @@ def test_exact_waves_of_several_foci_are_the_mean_of_each():
     np.testing.assert_allclose(
         waves(trajectory=CIRCLE, foci=phases), np.mean(each, axis=0), atol=1e-6 * np.abs(each).max()
     )
-
-
-def test_exact_waves_of_a_pulse_are_those_without_until_it_ends():
-    whole, pulse = (
-        waves(trajectory=CIRCLE, rhythm=r) for r in (None, Rhythm(pulses=((0.01503, 0.1),)))
-    )
-    assert np.abs(pulse - whole)[:150].max() < 2e-3 * np.abs(whole).max()
-    assert np.abs(pulse[-1]).max() < 0.1 * np.abs(whole).max()
 
 
 @pytest.mark.parametrize(

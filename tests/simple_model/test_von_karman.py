@@ -18,7 +18,6 @@ from simple_model.plates.karman_motion import (
 )
 from simple_model.plates.modes import Plate, plate_modes
 from simple_model.plates.path_forces import plate_lines
-from simple_model.plates.polynomials import continuous_basis
 from simple_model.plates.von_karman import area_forces, karman_plate
 
 YOUNG, THICKNESS, SIDE, MASS = 4e9, 1e-4, 0.1, 0.08  # Pa, m, m, kg/m2
@@ -119,16 +118,6 @@ def test_a_strip_between_two_edges_stretches_as_in_its_closed_form(support, tens
         )
         found = middle_deflection(karman, pressure) * THICKNESS
         assert found == pytest.approx(exact, rel=tolerance)
-
-
-def test_edges_that_may_move_in_the_plane_do_not_stretch_a_strip():
-    D = YOUNG * THICKNESS**3 / 12
-    plate = Plate(
-        size_x=SIDE, size_y=0.02, d11=D, d22=D, d12=0.0, d66=D / 2, mass_per_area=MASS,
-        air_density=0.0, left="simply", right="simply", front="free", back="free",
-    )  # fmt: skip
-    found = middle_deflection(reduced(plate, 20, "movable"), 1.0) * THICKNESS
-    assert found == pytest.approx(5 / 384 * SIDE**4 / D, rel=1e-6)
 
 
 def least_energy_deflection(plate, pressure, terms, guess):
@@ -288,18 +277,6 @@ def test_at_small_amplitude_it_is_the_linear_plate(tension):
     assert np.abs(moved - steady).max() < 1e-4 * np.abs(steady).max()
 
 
-def test_a_small_force_moves_each_mode_as_its_line():
-    plate = reduced(framed("clamped", tension_x=5.0), 6)
-    dt, omega, push = 2e-5, 2 * np.pi * 90, 1e-7 * np.arange(1.0, 7.0)
-    times = np.arange(20000) * dt
-    z = forced_motion(plate, np.outer(np.cos(omega * times), push), dt, DULL).coordinates[:-1]
-    added = relative_modulus(omega) - 1
-    stiffness = np.diag(plate.squared) + added * plate.bending - omega**2 * np.eye(6)
-    line = np.linalg.solve(stiffness, push.astype(complex))
-    steady = (np.exp(1j * omega * times[-1000:, None]) * line).real
-    assert np.abs(z[-1000:] - steady).max() < 1e-4 * np.abs(line).max()
-
-
 def test_steps_converge_with_the_square_of_their_length():
     plate, load = reduced(framed("clamped"), 12), circling(20.0, 0.04)
     found = []
@@ -311,50 +288,6 @@ def test_steps_converge_with_the_square_of_their_length():
     coarse, fine = (np.abs(b - a).max() for a, b in pairwise(found))
     assert fine < 0.01 * np.abs(found[-1]).max()
     assert 3.0 < coarse / fine < 6.0
-
-
-def test_a_clip_across_a_strip_is_a_clamped_edge():
-    D, end = YOUNG * THICKNESS**3 / 12, 0.04
-    plate = Plate(
-        size_x=0.11, size_y=0.02, d11=D, d22=D, d12=0.0, d66=D / 2, mass_per_area=MASS,
-        air_density=0.0, right="free", front="free", back="free", clips=((0.05, 0.0),),
-        clip_radius=0.05 - end,
-    )  # fmt: skip
-    karman, length = reduced(plate, 20), end + plate.size_x / 2
-    q = resting(karman, area_forces(karman.modes))
-    found = karman.modes.at([[end - length / 2, 0.0]])[0] @ q
-    exact = strip_deflection(1.0, D, YOUNG * THICKNESS, length, 0.0, True)
-    assert found == pytest.approx(exact, rel=2e-3)
-
-
-@pytest.mark.parametrize("breaks", [(-0.5, 0.5), (-0.5, -0.2, 0.2, 0.5)])
-@pytest.mark.parametrize("ends", [("simply", "simply"), ("free", "simply")])
-def test_in_plane_functions_are_continuous_and_complete(breaks, ends):
-    breaks, degrees = np.array(breaks), [5] * (len(breaks) - 1)
-    split = ends[0] == ends[1]
-    x = np.linspace(-0.5, 0.5, 400)  # no break is one of them
-    lines = continuous_basis(breaks, ends, degrees, split)
-    values = np.hstack([line(x) for line in lines])
-    slopes = np.hstack([line.slopes(x) for line in lines])
-    if split:
-        for line, parity in zip(lines, (1, -1), strict=True):
-            np.testing.assert_allclose(line(-x), parity * line(x), atol=1e-9)
-    at, weights = np.polynomial.legendre.leggauss(600)
-    for line in lines:
-        np.testing.assert_allclose(line.integrals(), weights / 2 @ line(at / 2), atol=1e-3)
-    near = 1e-9
-    for b in breaks[1:-1]:
-        jumps = np.hstack([np.diff(line([b - near, b + near]), axis=0) for line in lines])
-        np.testing.assert_allclose(jumps, 0, atol=1e-6)
-    middle = np.gradient(values, x, axis=0)[1:-1]
-    kinked = [np.abs(x[1:-1] - b) < 2 * (x[1] - x[0]) for b in breaks[1:-1]]
-    smooth = ~np.any(kinked, axis=0) if kinked else np.ones(len(x) - 2, bool)
-    np.testing.assert_allclose(slopes[1:-1][smooth], middle[smooth], atol=2e-3 * np.ptp(slopes))
-    bend = np.interp(x, breaks, np.arange(len(breaks)) % 2) + x**4
-    low, high = (0.0 if end == "simply" else 1.0 for end in ends)
-    held = bend - (1 - low) * bend[0] * (0.5 - x) - (1 - high) * bend[-1] * (0.5 + x)
-    left = held - values @ np.linalg.lstsq(values, held, rcond=None)[0]
-    assert np.abs(left).max() < 1e-8
 
 
 def test_it_refuses_what_is_out_of_range():
