@@ -110,7 +110,11 @@ class Lines:
         width, height = LEFT * 72 / ax.figure.dpi * np.array(ax.get_window_extent().size)  # points
         apart = BROAD * small() / width * end
         low, high = np.log10([LOUD / 3 * largest, 10 * largest])
-        for k in loud[_with_room(self.frequencies[loud], heights[loud], apart)]:
+        chosen = list[int]()  # whose names have room: none is near a stronger one
+        for k in loud[np.argsort(-heights[loud], kind="stable")].tolist():
+            if (np.abs(self.frequencies[k] - self.frequencies[chosen]) > apart).all():
+                chosen.append(k)
+        for k in chosen:
             ax.annotate(
                 self.names[k], (self.frequencies[k], heights[k]), xytext=(0, 5),
                 textcoords="offset points", rotation=90, ha="center", fontsize=small(),
@@ -126,12 +130,3 @@ class Lines:
         ax.set_xlabel("frequency, Hz")
         ax.set_ylabel(f"amplitude, {self.record.shown}")
         return ax
-
-
-def _with_room(frequencies: Floats, heights: Floats, apart: float) -> list[int]:
-    """Numbers of lines whose names have room: none is nearer to a stronger one than some Hz."""
-    chosen = list[int]()
-    for k in np.argsort(-heights, kind="stable").tolist():
-        if all(abs(frequencies[k] - frequencies[other]) > apart for other in chosen):
-            chosen.append(k)
-    return chosen

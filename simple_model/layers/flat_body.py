@@ -93,16 +93,8 @@ def steady_lines(
 def field_lines(
     field: Field, pressure: MovingPressure, probes: ArrayLike, *, threshold: float = 1e-6
 ) -> tuple[Floats, Complex]:
-    """Steady-state lines of all components of a field.
-
-    Parameters
-    ----------
-    field : Field
-    pressure, probes, threshold : as of `steady_lines`
-
-    Returns
-    -------
-    frequencies (f,) in Hz >= 0 and complex amplitudes a (f, p, m) of Re a exp(2 pi i f t)
+    """Steady-state lines of all components of a field: frequencies (f,) in Hz and amplitudes
+    (f, p, m), as of `steady_lines`.
     """
     _check(pressure)
     lines, probes = load_lines(pressure, threshold), np.atleast_2d(np.asarray(probes, np.float64))

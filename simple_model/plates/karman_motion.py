@@ -102,20 +102,9 @@ def linear_motion(
 def stretched_motion(
     plate: KarmanPlate, linear: Floats, dt: float, material: Material | None = None
 ) -> Motion:
-    """Motion from rest under the load that moves the plate linearly if it does not stretch.
-
-    Parameters
-    ----------
-    plate : KarmanPlate
-    linear : (n, r) kg^1/2 m, linear motion of the chosen modes at 0, dt, ..., (n - 1) dt, as of
-        `linear_motion`
-    dt : s
-    material : Material, the one of the linear motion; no loss if not given
-
-    Returns
-    -------
-    Motion
-        At the n times of the linear motion.
+    """Motion from rest, at 0, dt, ..., (n - 1) dt in s, under the load that moves the plate by
+    `linear` (n, r) in kg^1/2 m, as of `linear_motion` of the same material and the chosen modes, if
+    it does not stretch.
     """
     forces = _Scheme.of(plate, dt, material).forces(linear)
     return forced_motion(plate, forces, dt, material)

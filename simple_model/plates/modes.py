@@ -200,12 +200,7 @@ def modal_motion(
 
     Returns
     -------
-    (f, m) complex, metre kg^1/2
-
-    Raises
-    ------
-    ArithmeticError
-        If the coupled modes of a stretched plate are not solved to `RESIDUAL`.
+    (f, m) complex, metre kg^1/2; an ArithmeticError if coupled modes are not solved to `RESIDUAL`
     """
     w = 2 * np.pi * np.asarray(frequencies)
     added = np.broadcast_to(modulus(w) - 1, w.shape)

@@ -106,11 +106,8 @@ def piecewise_basis(
     breaks : (e + 1,) metre, increasing, from the middle, where the ends of the line are as far
     ends : two of "clamped", "simply", "free"
     degrees : (e,) the highest of each piece, 3 or more
-    split : whether even and odd functions are apart, where both ends and all breaks are alike
-
-    Returns
-    -------
-    One basis, or that of even and that of odd functions
+    split : whether even and odd functions are apart, in two bases, where both ends and all breaks
+        are alike
     """
     breaks = np.asarray(breaks, np.float64)
     functions = np.stack([*_hermite(breaks, ends, degrees), *_inner(degrees)], axis=2)

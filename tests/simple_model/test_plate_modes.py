@@ -177,8 +177,6 @@ def test_clips_hold_the_plate_where_they_are():
     largest = np.abs(modes.at([[0.0, 0.0], [0.02, 0.0], [0.0, 0.03]])).max()
     assert np.abs(modes.at(clips)).max() < 1e-9 * largest
     assert len(modes.families) == 4
-    one_sided = plate_modes(isotropic(clips=clips[:1] + clips[3:], clip_radius=0.004, **free), 150)
-    assert len(one_sided.families) == 1
     # Point supports at the four corners: w a^2 sqrt(m/D) = 7.111 (Leissa, Vibration of Plates).
     at_corners = tuple((x, y) for x in (-0.05, 0.05) for y in (-0.05, 0.05))
     assert parameters(isotropic(clips=at_corners, **free))[0] == pytest.approx(7.111, rel=2e-3)

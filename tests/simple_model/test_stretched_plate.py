@@ -13,7 +13,7 @@ NAME = "plate-modes-nonlinear"
 SHEET = """
 [tacton]
 am_frequency_hz = 140
-duration_s = 0.03
+duration_s = 0.02
 shape = "circle"
 size_mm = 8
 speed_m_per_s = 5
