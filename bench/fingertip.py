@@ -1,7 +1,7 @@
-"""`python -m bench.fingertip`: the verification suite's fingertip by scikit-fem, on its mesh.
+"""The fingertip of the verification by scikit-fem on the same mesh: `python -m bench.fingertip`.
 
 Prints the largest difference of any node's motion over the largest motion, and the values that
-`skinwave/verify/fingertip.py` compares with.
+`skinwave/verify/statics.py` compares with.
 """
 
 from typing import Any
@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 import fem
 from meshes import TetMesh
-from skinwave.verify import fingertip as ours
+from skinwave.verify import statics as ours
 
 
 def scikit_fem(mesh: TetMesh, materials: dict[int, fem.Material]) -> tuple[np.ndarray, np.ndarray]:
@@ -22,8 +22,7 @@ def scikit_fem(mesh: TetMesh, materials: dict[int, fem.Material]) -> tuple[np.nd
     from skfem.helpers import ddot, dot, eye, sym_grad, trace
 
     corners, tets = np.unique(mesh.tets[:, :4], return_inverse=True)
-    tets = tets.reshape(-1, 4)
-    peer = MeshTet(mesh.points[corners].T.copy(), tets.T.copy(), sort_t=False)
+    peer = MeshTet(mesh.points[corners].T.copy(), tets.reshape(-1, 4).T.copy(), sort_t=False)
     basis = Basis(peer, ElementVector(ElementTetP2()), intorder=2)
     fine = Basis(peer, basis.elem, intorder=4)
 
@@ -50,30 +49,27 @@ def scikit_fem(mesh: TetMesh, materials: dict[int, fem.Material]) -> tuple[np.nd
         component[basis.nodal_dofs[i]] = component[basis.edge_dofs[i]] = i
     away, node = cKDTree(mesh.points).query(basis.doflocs.T)
     assert away.max() < 1e-12
-    dof = 3 * node + component
-    held = np.isin(node, mesh.facets["sides"])
-    force = ours.push(mesh)[dof]
-    w = 2 * np.pi * ours.FREQUENCY
-    return tuple(_solved(A, force, ~held, dof) for A in (K, K + 1j * w * C - w**2 * M))  # type: ignore[return-value]
+    dof, free = 3 * node + component, np.flatnonzero(~np.isin(node, mesh.facets["sides"]))
+    force, w = ours.fingertip_push(mesh)[dof], 2 * np.pi * ours.FREQUENCY
 
+    def solved(A: Any) -> np.ndarray:
+        found = np.zeros(len(dof), A.dtype)
+        factor = splu(sparse.csc_matrix(A)[free][:, free])
+        found[dof[free]] = factor.solve(force[free].astype(A.dtype))
+        return found
 
-def _solved(A: Any, force: np.ndarray, free: np.ndarray, dof: np.ndarray) -> np.ndarray:
-    """Solution by node, component fastest; 0 where it is held."""
-    free = np.flatnonzero(free)
-    found = np.zeros(len(dof), A.dtype)
-    found[dof[free]] = splu(sparse.csc_matrix(A)[free][:, free]).solve(force[free].astype(A.dtype))
-    return found
+    return solved(K), solved(K + 1j * w * C - w**2 * M)
 
 
 def main() -> None:
     """Compare, and print the values."""
-    mesh = ours.straight_fingertip()
-    for name, materials in ours.CASES.items():
-        found, expected = ours.motion(mesh, materials), scikit_fem(mesh, materials)
-        for when, own, other in zip(("rest", "140 Hz"), found, expected, strict=True):
+    mesh = ours.fingertip()
+    for name, materials in ours.FINGERTIPS.items():
+        motions = ours.fingertip_motion(mesh, materials), scikit_fem(mesh, materials)
+        for own, other in zip(*motions, strict=True):
             error = np.abs(own - other).max() / np.abs(other).max()
-            print(f"{name}, {when}: largest difference {error:.1e}")
-            print(ours.summary(mesh, other).tolist())
+            print(f"{name}: largest difference {error:.1e}")
+            print(ours.fingertip_summary(mesh, other).tolist())
 
 
 if __name__ == "__main__":

@@ -1,10 +1,8 @@
-"""Layered skin fitted to published waves, and sources held out: `python -m bench.layered_skin`.
+"""Layered skin fitted to published waves: `python -m bench.layered_skin [--presets]`.
 
 Shear moduli, thicknesses and one loss of all layers are fitted, within published ranges, to phase
-speeds, 1/e lengths and decay exponents by frequency, as `skinwave validate` defines them. Squared
-logarithms of the factors of a set are averaged, and the sets summed. Then the same without one
-source, which the fit predicts (*). Last, a modulus of a preset at a time is doubled, to see which
-one limits the speed. `--presets` leaves out all fits.
+speeds, 1/e lengths and decay exponents by frequency. Squared logarithms of the factors of a set are
+averaged, and the sets summed. `--presets` leaves out the fits.
 """
 
 import sys
@@ -18,8 +16,8 @@ from simple_model import Material
 from simple_model.typing import Floats
 from skinwave.bodies import BODIES, Body
 from skinwave.bodies.parts import solid_of
+from skinwave.verify.predictions import Curves, decay_exponents, leading_wave
 from skinwave.verify.published import EXPONENT, Published, wave_sets
-from skinwave.verify.published_waves import Curves, decay_exponents, leading_wave
 
 GRID = np.arange(100.0, 701.0, 100.0)  # Hz
 NO_WAVE, FURTHEST = np.log(3.0), 2.0  # of a factor: without a wave, and the largest that counts
@@ -65,7 +63,6 @@ FOREARM: Mapping[str, Range] = {
     "loss": LOSS,
 }  # fmt: skip
 RANGES = {"palm-layers": PALM, "forearm-layers": FOREARM}
-HELD_OUT = {"palm-layers": ("Manfredi", "Potts"), "forearm-layers": ()}
 
 
 def values_of(body: Body, names: Iterable[str]) -> dict[str, float]:
@@ -96,22 +93,16 @@ def with_values(body: Body, values: Mapping[str, float]) -> Body:
                    depth=values.get("depth", body.depth))  # fmt: skip
 
 
-def source_of(published: Published) -> str:
-    """First word of a set's name, of its source."""
-    return published.name.partition(":")[0]
-
-
-def ours(body: Body, curves: Curves, published: Published) -> tuple[Floats, Floats, Floats]:
-    """Frequencies (n,) of a set from 100 Hz, our values, and the logarithms of their factors over
-    the published value or, where only a range is published, its nearer end; nan without a wave.
+def misses(body: Body, curves: Curves, published: Published) -> Floats:
+    """Logarithms (n,) of the factors of a set from 100 Hz: ours over the published value or, where
+    only a range is published, its nearer end; nan without a wave.
     """
     f, values = np.array(published.frequencies), np.array(published.values)
     lows, highs = np.array([published.between(k) for k in range(len(f))]).T
-    known = f >= GRID[0]
-    f, lows, highs, values = f[known], lows[known], highs[known], values[known]
-    is_exponent = published.quantity is EXPONENT
+    known, is_exponent = f >= GRID[0], published.quantity is EXPONENT
     found = decay_exponents(body, f) if is_exponent else curves.at(published.quantity, f)
-    return f, found, np.log(found / np.where(np.isnan(values), np.clip(found, lows, highs), values))
+    nearest = np.where(np.isnan(values), np.clip(found, lows, highs), values)
+    return np.log(found / nearest)[known]
 
 
 def residuals(body: Body, sets: Sequence[Published]) -> Floats:
@@ -119,9 +110,9 @@ def residuals(body: Body, sets: Sequence[Published]) -> Floats:
     curves = leading_wave(body, GRID)
     parts = []
     for each in sets:
-        misses = ours(body, curves, each)[2]
-        bounded = np.where(np.isnan(misses), NO_WAVE, np.clip(misses, -FURTHEST, FURTHEST))
-        parts.append(bounded / np.sqrt(len(misses)))
+        logs = misses(body, curves, each)
+        bounded = np.where(np.isnan(logs), NO_WAVE, np.clip(logs, -FURTHEST, FURTHEST))
+        parts.append(bounded / np.sqrt(len(logs)))
     return np.concatenate(parts)
 
 
@@ -135,85 +126,39 @@ def fit(preset: str, sets: Sequence[Published]) -> dict[str, float]:
     def named(x: Floats) -> dict[str, float]:
         return dict(zip(ranges, np.exp(x).tolist(), strict=True))
 
-    def misses(x: Floats) -> Floats:
+    def left(x: Floats) -> Floats:
         return residuals(with_values(body, named(x)), sets)
 
     draws = np.random.default_rng(0).uniform(low, high, (DRAWS, len(low)))
     own = np.log(list(values_of(body, ranges).values()))
     draws = np.clip([own, *draws], low + 1e-3, high - 1e-3)
-    first = np.argsort([np.square(misses(x)).sum() for x in draws])[:STARTS]
+    first = np.argsort([np.square(left(x)).sum() for x in draws])[:STARTS]
     found = [
-        least_squares(misses, x, bounds=(low, high), diff_step=STEP, max_nfev=MOST,
+        least_squares(left, x, bounds=(low, high), diff_step=STEP, max_nfev=MOST,
                       x_scale=high - low)
         for x in draws[first]
     ]  # fmt: skip
     return named(min(found, key=lambda each: each.cost).x)
 
 
-def compare(
-    bodies: Mapping[str, Body], sets: Sequence[Published], names: Mapping[str, str]
-) -> None:
-    """Print published and our values by set and frequency, and the median factor of each set.
-
-    Parameters
-    ----------
-    bodies : to compare, by the heads of their columns
-    sets : to compare them with
-    names : by source, the column that was fitted without it
-    """
-    curves = {name: leading_wave(body, GRID) for name, body in bodies.items()}
-    print(f"{'set':30}{'Hz':>5}{'published':>13}", *(f"{name:>20}" for name in bodies))
-    for each in sets:
-        found = {name: ours(body, curves[name], each) for name, body in bodies.items()}
-        size = each.quantity.size
-        for f in next(iter(found.values()))[0]:
-            k = each.frequencies.index(f)
-            low, high = (x / size for x in each.between(k))
-            shown = f"{low:.3g}" if low == high else f"{low:.3g} to {high:.3g}"
-            cells = [_cell(f, *columns, size, names.get(source_of(each)) == name)
-                     for name, columns in found.items()]  # fmt: skip
-            print(f"{each.name:30}{f:5g}{shown:>13}", *cells)
-        middle = [f"{_factor(columns[2]):.2f}" for columns in found.values()]
-        print(f"{each.name:30}{'median factor':>18}", *(f"{each:>20}" for each in middle))
-
-
-def _factor(misses: Floats) -> float:
-    return float(np.exp(np.median(np.where(np.isnan(misses), NO_WAVE, np.abs(misses)))))
-
-
-def _cell(at: float, f: Floats, found: Floats, misses: Floats, size: float, held: bool) -> str:
-    k = int(np.flatnonzero(f == at)[0])
-    if np.isnan(found[k]):
-        return f"{'no wave':>20}"
-    star = "*" if held else ""
-    text = f"{found[k] / size:.3g} ({np.exp(misses[k]):.2f}){star}"
-    return f"{text:>20}"
-
-
 def main(*arguments: str) -> None:
-    """Print fits and predictions of both presets."""
+    """Print the numbers of both presets and their fits, and the median factor of each set."""
     for preset, ranges in RANGES.items():
         sets = [each for each in wave_sets() if preset in each.bodies]
-        train = [each for each in sets if preset in each.built]
         numbers = {"preset": values_of(BODIES[preset], ranges)}
         if "--presets" not in arguments:
-            numbers["all"] = fit(preset, train)
-            for source in HELD_OUT[preset]:
-                rest = [each for each in train if source_of(each) != source]
-                numbers[f"without {source}"] = fit(preset, rest)
+            numbers["fit"] = fit(preset, [each for each in sets if preset in each.built])
         print(f"\n{preset}: shear moduli in Pa, thicknesses in m, loss in s")
-        print(f"{'':22}{'range':>22}", *(f"{name:>20}" for name in numbers))
+        print(f"{'':30}{'range':>22}", *(f"{name:>12}" for name in numbers))
         for name, each in ranges.items():
-            cells = (f"{values[name]:>20.3g}" for values in numbers.values())
-            print(f"{name:22}{f'{each.low:.3g} to {each.high:.3g}':>22}", *cells)
-        bodies = {name: with_values(BODIES[preset], v) for name, v in numbers.items()}
-        compare(bodies, sets, {source: f"without {source}" for source in HELD_OUT[preset]})
-        preset_values = numbers["preset"]
-        for name in (name for name in preset_values if name in (*LAYERS, "muscle")):
-            doubled = with_values(BODIES[preset], preset_values | {name: 2 * preset_values[name]})
-            speeds = leading_wave(doubled, GRID).speed
-            print(f"twice the modulus of {name}: {speeds[1]:.2f} m/s at 200 Hz, "
-                  f"{speeds[3]:.2f} m/s at 400 Hz")  # fmt: skip
+            cells = (f"{values[name]:>12.3g}" for values in numbers.values())
+            print(f"{name:30}{f'{each.low:.3g} to {each.high:.3g}':>22}", *cells)
+        bodies = [with_values(BODIES[preset], values) for values in numbers.values()]
+        curves = [leading_wave(body, GRID) for body in bodies]
+        for each in sets:
+            logs = [misses(*found, each) for found in zip(bodies, curves, strict=True)]
+            factors = [np.exp(np.median(np.where(np.isnan(x), NO_WAVE, np.abs(x)))) for x in logs]
+            print(f"{each.name:30}{'median factor':>22}", *(f"{x:>12.2f}" for x in factors))
 
 
 if __name__ == "__main__":

@@ -222,7 +222,7 @@ def damaged_scenes() -> list[bytes]:
 def command_lines() -> list[list[str]]:
     """Arguments that are refused in one sentence, beside good.toml, none.toml and kept/note."""
     run, compare, plan = ["run", "good.toml"], ["compare", "good.toml"], ["plan", "good.toml"]
-    trade, fem_run = ["tradeoff", "good.toml"], [*run, "--model", "fem"]
+    trade, fem_run = ["verify", "--tradeoff", "good.toml"], [*run, "--model", "fem"]
     found = [
         [*command, "--h", h]
         for command in (run, fem_run, compare, plan)
@@ -252,8 +252,8 @@ def command_lines() -> list[list[str]]:
         found += [[*command, "--overwrite", "--out", out] for out in over]
     files = ("missing.toml", "kept", "", "kept/note", "x\0y", "n" * 300, "good.toml/x")
     files += ("/dev/zero",)
-    found += [[c, f] for c in ("run", "compare", "plan", "tradeoff") for f in files]
-    found += [["tradeoff", "none.toml"], [*run, "--model", "flat-body", "--h", "nan"]]
+    found += [[c, f] for c in ("run", "compare", "plan") for f in files]
+    found += [["verify", "--tradeoff", "none.toml"], [*run, "--model", "flat-body", "--h", "nan"]]
     found += [["run", "none.toml", "--model", m] for m in ("fem", "fem-transient", "flat-body")]
     return found
 
@@ -261,7 +261,8 @@ def command_lines() -> list[list[str]]:
 def wrong_usage() -> list[list[str]]:
     """Arguments that no command takes."""
     run = ["run", "good.toml"]
-    found: list[list[str]] = [[], ["fly"], ["run"], ["plan"], ["tradeoff"], ["run", "a", "b"]]
+    found: list[list[str]] = [[], ["fly"], ["run"], ["plan"], ["run", "a", "b"]]
+    found += [["verify", "--tradeoff"]]
     found += [["--version-of-what"], ["run", "--quick", "good.toml"], ["verify", "good.toml"]]
     found += [[*run, "--model", m] for m in ("magic", "", "FEM", "fem-static")]
     found += [[*run, "--h", h] for h in ("", "abc", "1,5", "1 mm", "0x10", "--quiet")]

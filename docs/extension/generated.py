@@ -265,10 +265,10 @@ def verification() -> str:
     Errors are those that `skinwave verify` wrote into the folder that the environment variable
     SKINWAVE_VERIFIED names; cases that it lacks are listed without.
     """
-    from skinwave.verify.suite import TOPICS
+    from skinwave.verify.suite import CASES, TOPICS
 
     done: dict[str, Any] = {}
-    parts = [f"`skinwave verify` has {sum(map(len, TOPICS.values()))} cases."]
+    parts = [f"`skinwave verify` has {len(CASES)} cases."]
     if folder := os.environ.get("SKINWAVE_VERIFIED"):
         record = json.loads(Path(folder, "verify.json").read_text("utf-8"))
         done = {case["name"]: case for case in record["cases"]}
@@ -277,7 +277,7 @@ def verification() -> str:
             f"{record['passed']} passed, {record['failed']} failed.\n"
         )
     for topic, cases in TOPICS.items():
-        rows = [row for name in cases for row in _case(name, done.get(name))]
+        rows = [row for each in cases for row in _case(each.name, done.get(each.name))]
         head = ["case", "compared", "error", "at most", "with"]
         parts.append(f"## {topic}\n\n{table(head, rows)}")
     return "\n".join(parts)

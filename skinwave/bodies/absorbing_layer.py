@@ -39,7 +39,7 @@ def layer_of(body: Body, wider: float = 1.0) -> AbsorbingLayer:
     Dashpots alone reflect a quarter of a shear wave at 30 degrees. Lengths are multiples of the
     depth, at most that whose first mode cuts on at `LOWEST_CUT_ON`. On a rigid base waves are long
     near the cut-on, and decay below it: the reflection of a plane slab of 50 mm is at most 1.4 % of
-    the motion at the focus at any line, that of dashpots alone 17 % (`skinwave.verify.sides`). A
+    the motion at the focus at any line, that of dashpots alone 17 % (`skinwave.verify.waves`). A
     free or elastic base has bending waves at any frequency, which a layer has to damp alone. Above
     an absorbing base waves are spherical, and as long as those of the lowest material.
 

@@ -7,7 +7,6 @@ from skinwave.commands import (
     compare,
     convert,
     dispersion,
-    doctor,
     film,
     fit,
     live,
@@ -19,17 +18,13 @@ from skinwave.commands import (
     report,
     run,
     sweep,
-    tradeoff,
-    validate,
     verify,
     web,
 )
 from skinwave.commands import map as map_command
 
 MODULES = (
-    run, compare, tradeoff, relax, dispersion, map_command, plan, sweep, plot, mesh, convert,
-    verify, report, film, live, web, doctor,
-    measured, fit,
-    validate,
+    run, compare, relax, dispersion, map_command, plan, sweep, plot, mesh, convert, verify, report,
+    film, live, web, measured, fit,
 )  # fmt: skip
 COMMANDS = {module.__name__.rpartition(".")[2]: module for module in MODULES}

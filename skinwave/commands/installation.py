@@ -64,3 +64,15 @@ def _optional(module: str, name: str, lost: str) -> Finding:
     installed = _version(name)
     missing = installed == "not installed" and find_spec(module) is None
     return Finding(what=name, value=installed, cure=lost if missing else "")
+
+
+def text(found: list[Finding]) -> str:
+    """Findings as lines, each cure below what it is for, and how many there are."""
+    width = max(len(each.what) for each in found)
+    rows = []
+    for each in found:
+        rows.append(f"{each.what:<{width}}  {each.value}")
+        rows += [f"{'':<{width}}  -> {each.cure}"] if each.cure else []
+    missing = sum(bool(each.cure) for each in found)
+    total = f"{missing} of {len(found)} could be better" if missing else "nothing is missing"
+    return "\n".join([*rows, total])

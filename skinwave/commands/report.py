@@ -64,11 +64,11 @@ def run(options: argparse.Namespace) -> int:
     ):
         if scene is not None:
             from skinwave.studies.album import make
-            from skinwave.verify.suite import quick_cases
+            from skinwave.verify.suite import quick_results
 
             said = make(
                 folder, scene, progress, h=metre(options.h), solver=options.solver,
-                beside=options.beside, command=_again(options), cases=quick_cases(progress),
+                beside=options.beside, command=_again(options), cases=quick_results(progress),
             )  # fmt: skip
             warn(said)
         write_report(

@@ -136,7 +136,7 @@ def make(
     Parameters
     ----------
     beside : names of preset bodies that are shown, too
-    cases : results of verification cases on this installation, as `verify.suite.quick_cases`
+    cases : results of verification cases on this installation, as `verify.suite.quick_results`
         returns them
 
     Raises

@@ -28,9 +28,10 @@ from skinwave.planning.stretching import beyond_linear
 from skinwave.report.figures import png
 from skinwave.results.comparison import compare
 from skinwave.scene.scene import Scene, check_load
-from skinwave.system import document
+from skinwave.system.document import Picture, Report
 from skinwave.system.effort import Progress, peak_memory
 from skinwave.system.processes import apart
+from skinwave.system.table import Column, Table
 
 REFINEMENTS = (2.6, 2.0, 1.6, 1.3, 1.0)  # element size over the default one
 FINEST = (0.6, 0.5)  # of the two runs whose difference decides whether the reference is accepted
@@ -161,26 +162,22 @@ def study(scene: Scene, progress: Progress, chosen: Iterable[Candidate] | None =
 
 
 def write(folder: Path, scene: Scene, found: Study) -> None:
-    """index.html, tradeoff.png and tradeoff.json of a study."""
+    """index.html, tradeoff.png, tradeoff.csv and tradeoff.json of a study."""
     (folder / "tradeoff.json").write_text(json.dumps(asdict(found), indent=1), encoding="utf-8")
-    drawn = png(figure(found), dpi=130)
-    (folder / "tradeoff.png").write_bytes(drawn)
-    front = {m.candidate.name for m in found.front()}
-    rows = [
-        [
-            m.candidate.name + (" *" if m.candidate.name in front else ""),
-            f"{100 * m.error:.3g}", f"{max(map(abs, m.line_errors.values()), default=0):.2f}",
-            f"{1e3 * m.delay:+.2f}", f"{m.cold:.2g}", f"{m.warm:.2g}",
-            f"{m.memory / 2**20:.0f}", f"{m.dofs:,}",
-        ]
-        for m in found.measured
-    ]  # fmt: skip
-    header = ["candidate (* on the front)", "waveform error, %", "largest line error, dB"]
-    header += ["delay, ms", "cold, s", "warm, s", "peak memory, MiB", "dofs"]
-    parts = [document.picture(drawn, CAPTION, "tradeoff"), document.table(header, rows)]
-    parts += map(document.paragraph, sentences(found))
-    page = document.page(f"Speed against accuracy: {scene.name}", *parts)
-    (folder / "index.html").write_text(page, encoding="utf-8")
+    front = found.front()
+    table = Table(
+        ["candidate", Column("front", "on the front"), Column("error_percent", "error", "%"),
+         Column("line_error_db", "largest line error", "dB"), Column("delay_ms", "delay", "ms"),
+         Column("cold_s", "cold", "s", digits=2), Column("warm_s", "warm", "s", digits=2),
+         Column("memory_mib", "peak memory", "MiB"), "dofs"],
+        [(m.candidate.name, m in front, 100 * m.error,
+          max(map(abs, m.line_errors.values()), default=0.0), 1e3 * m.delay, m.cold, m.warm,
+          m.memory / 2**20, m.dofs)
+         for m in found.measured], name="tradeoff",
+    )  # fmt: skip
+    picture = Picture(png(figure(found), dpi=130), CAPTION, "tradeoff")
+    title = f"Speed against accuracy: {scene.name}"
+    Report(title, [" ".join(sentences(found))], [picture, table]).write(folder)
 
 
 CAPTION = (

@@ -1,13 +1,12 @@
-"""Verification case, the checks that decide it, and its place in the suite."""
+"""A verification case and the checks that decide it."""
 
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import SupportsFloat
 
 import numpy as np
 from numpy.typing import ArrayLike
-
-from meshes import TetMesh
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,57 +26,73 @@ class Check:
         return bool(self.error <= self.bar)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Plot:
-    """Curves `lines`, name -> (x, y); measured ones have markers, those in `drawn` a line only."""
-
-    x: str
-    y: str
-    lines: Mapping[str, tuple[ArrayLike, ArrayLike]]
-    drawn: tuple[str, ...] = ()
-    log: bool = False
+Checks = Iterator[Check]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True)
 class Case:
-    """A case with its checks; `source` is outside this project, `said` the message of a refusal."""
+    """A verification case: `checks` yields its checks; `source` is outside this project."""
 
+    name: str
     title: str
     source: str
     mesh: str
+    note: str
+    slow: bool
+    checks: Callable[[], Iterable[Check]]
+
+    def run(self, debug: bool = False) -> "Result":
+        """Run the case; one that raises an error fails, or raises it if `debug`."""
+        started, found, error = time.perf_counter(), list[Check](), ""
+        try:
+            found.extend(self.checks())
+        except (ValueError, ArithmeticError, MemoryError) as raised:
+            if debug:
+                raise
+            error = str(raised)
+        seconds = time.perf_counter() - started
+        return Result(case=self, checks=tuple(found), seconds=seconds, error=error)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Result:
+    """A finished case, the seconds it took, and the error that ended it early, if one did."""
+
+    case: Case
     checks: tuple[Check, ...]
-    plot: Plot | None = None
-    note: str = ""
-    said: str = ""
+    seconds: float
+    error: str = ""
 
     @property
     def passed(self) -> bool:
         """Whether every check passed, and there is one."""
-        return bool(self.checks) and all(check.passed for check in self.checks)
+        return not self.error and bool(self.checks) and all(c.passed for c in self.checks)
 
     @property
     def worst(self) -> Check:
         """The check that is nearest to its tolerance, or farthest beyond."""
-        return max(self.checks, key=lambda c: np.inf if not c.passed else c.error / (c.bar or 1))
+        nothing = [yes("it has a check", False)]
+        return max(
+            self.checks or nothing, key=lambda c: np.inf if not c.passed else c.error / (c.bar or 1)
+        )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Entry:
-    """A case by name; a slow one is left out of the quick suite."""
+def case(
+    source: str, *, mesh: str = "none", note: str = "", slow: bool = False
+) -> Callable[[Callable[[], Iterable[Check]]], Case]:
+    """Make a case of a function that yields checks: its title is the docstring.
 
-    name: str
-    topic: str
-    run: Callable[[], Case]
-    slow: bool = False
+    `source` is of the reference; a slow case is left out of the quick suite.
+    """
 
+    def made(checks: Callable[[], Iterable[Check]]) -> Case:
+        title = " ".join((checks.__doc__ or "").split()).rstrip(".")
+        name = checks.__name__.replace("_", "-")
+        return Case(
+            name=name, title=title, source=source, mesh=mesh, note=note, slow=slow, checks=checks
+        )
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Result:
-    """A finished case and the seconds it took."""
-
-    entry: Entry
-    case: Case
-    seconds: float
+    return made
 
 
 def relative(
@@ -119,8 +134,19 @@ def yes(what: str, is_so: bool) -> Check:
 
 
 def order(what: str, sizes: ArrayLike, errors: ArrayLike, expected: float, band: float) -> Check:
-    """Fitted slope of log error against log size; its error is absolute."""
-    return absolute(what, slope(sizes, errors), expected, band)
+    """Slope of log error against log size, by least squares; its error is absolute."""
+    slope = float(np.polyfit(np.log(sizes), np.log(errors), 1)[0])
+    return absolute(what, slope, expected, band)
+
+
+def refused(act: Callable[[], object], kind: type[Exception], words: str) -> Check:
+    """A check that invalid input is refused with a message that has these words."""
+    try:
+        act()
+        message = "nothing: it was accepted"
+    except kind as error:
+        message = str(error)
+    return yes(f"refused with: {message}", words in message)
 
 
 def _check(
@@ -131,14 +157,3 @@ def _check(
         what=what, value=float(scale * value), reference=float(scale * reference),
         error=float(error), bar=bar, unit=unit,
     )  # fmt: skip
-
-
-def slope(sizes: ArrayLike, errors: ArrayLike) -> float:
-    """Slope of log error against log size, by least squares."""
-    return float(np.polyfit(np.log(sizes), np.log(errors), 1)[0])
-
-
-def described(mesh: TetMesh, rest: str = "") -> str:
-    """A mesh in words."""
-    text = f"{len(mesh.tets):,} ten-node tetrahedra, {mesh.n_dofs:,} dofs"
-    return f"{text}; {rest}" if rest else text

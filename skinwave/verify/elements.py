@@ -1,7 +1,8 @@
-"""Element tests: patch tests on distorted meshes, and input that must be refused."""
+"""Elements: patch tests on distorted meshes, manufactured solutions, and input to refuse."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,15 +11,170 @@ import fem
 import meshes
 from fem.assembly import element_stiffness
 from fem.boundary import fixed_dofs
+from fem.elements import shape_derivatives, shape_functions, tetrahedron_rule
 from meshes import MeshError, TetMesh
-from meshes.tetmesh import EDGES
-from skinwave.verify.case import Case, Check, below, described, yes
+from skinwave.verify.case import Check, Checks, below, case, order, refused, yes
 from skinwave.verify.references import Floats
 
-DisplacementField = Callable[[Floats], Floats]
 FLATTEST_ANGLE = 0.5  # degrees
 ZIENKIEWICZ = "Zienkiewicz and Taylor, The Finite Element Method, volume 1 (2000)"
 PATCH = f"Irons and Razzaque (1972); {ZIENKIEWICZ}, chapter 10"
+MANUFACTURED = "Roache, Verification and Validation in Computational Science and Engineering (1998)"
+CUBE = "unit cube of 3 by 3 by 3 cells"
+RATIO = "largest error / largest displacement"
+
+
+@case(f"{PATCH}: must be exact", mesh=f"{CUBE}, inner corners shaken")
+def patch() -> Checks:
+    """Patch test: a linear field on distorted tetrahedra."""
+    mesh = distorted_cube()
+    return (_follows(mesh, nu, 1e-10, f", nu = {nu:g}") for nu in (0.0, 0.3, 0.49, 0.4999))
+
+
+@case(f"{PATCH}: exact for elements of second order", mesh=f"{CUBE}, inner corners shaken")
+def patch_quadratic() -> Checks:
+    """Patch test: a quadratic field with its body force, nu = 0.3."""
+    mesh, mu, lam = distorted_cube(), 1.0, 1.5
+    x = mesh.points
+    field = np.stack([x[:, 0] ** 2 + x[:, 1] * x[:, 2], x[:, 1] ** 2, x[:, 0] * x[:, 2]], axis=1)
+    minus_force = np.array([(lam + mu) * 3 + 2 * mu, (lam + mu) * 2 + 2 * mu, 0.0])
+    force = np.broadcast_to(-minus_force, x.shape)
+    M = fem.assemble(mesh, unit(0.3), fixed=np.zeros(x.shape, bool)).M
+    yield below(
+        RATIO, _gap(_held_outside(mesh, 0.3, field.ravel(), M @ force.ravel()), field), 1e-9
+    )
+
+
+@case(f"{PATCH}: must be exact on any mesh", mesh=f"{CUBE}, one corner moved near a facet")
+def slivers() -> Checks:
+    """Slivers: a dihedral angle of half a degree."""
+    mesh = cube_with_slivers()
+    ops, P = fem.assemble(mesh, unit(0.3), fixed="bottom"), fem.load_operator(mesh)
+    force = P @ np.ones(P.shape[1])
+    f = force[ops.free]
+    left = f - ops.K @ fem.static(ops, force)[ops.free]
+    yield _follows(mesh, 0.3, 1e-8)
+    yield below("residual under load / load", np.linalg.norm(left) / np.linalg.norm(f), 1e-8)
+
+
+@case(f"{ZIENKIEWICZ}, chapter 9: det J > 0", mesh="a cell, one mid-side node moved far")
+def inverted() -> Checks:
+    """Expected invalid: an inverted element is refused with its number."""
+    mesh = meshes.block((1.0, 1.0, 1.0), 1.0)
+    points = mesh.points.copy()
+    points[mesh.tets[3, 4]] += 2.0
+    bent = replace(mesh, points=points)
+    found = refused(
+        lambda: next(element_stiffness(bent, *np.ones((2, len(mesh.tets))))), MeshError,
+        "is inverted",
+    )  # fmt: skip
+    touched = np.flatnonzero((mesh.tets == mesh.tets[3, 4]).any(axis=1))
+    yield found
+    named = any(f"element {e} " in found.what for e in touched)
+    yield yes("the element that it names has the moved node", named)
+
+
+@case("Hughes, The Finite Element Method (1987), chapter 4: lambda is infinite")
+def incompressible() -> Checks:
+    """Expected invalid: Poisson's ratio 0.5 is refused with the limit."""
+    yield refused(lambda: unit(0.5), ValueError, "-1 < poisson < 0.5")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Manufactured:
+    """A field (..., 3), its gradient (..., i, j), the body force (..., 3) that it needs, and what
+    is prescribed on an eighth of the unit cube.
+    """
+
+    u: Callable[[Floats], Floats]
+    gradient: Callable[[Floats], Floats]
+    force: Callable[[Floats], Floats]
+    fixed: Mapping[str, str]
+
+
+CURL = np.cross(np.eye(3), [1.0, 0.0, 0.0]).T  # CURL @ grad = grad x e_x
+# What is 0 on the middle planes of the cube, by the symmetry of the fields.
+OUTSIDE = {"left": "xyz", "front": "xyz", "bottom": "xyz"}
+TURNING = OUTSIDE | {"right": "x", "back": "xz", "top": "xy"}
+ALONG = OUTSIDE | {"right": "yz", "back": "y", "top": "z"}
+
+
+def _divergence_free(lam: float) -> Manufactured:
+    """curl(psi e_x) with psi = sin pi x sin pi y sin pi z: no pressure at any nu; mu = 1."""
+    return Manufactured(
+        u=lambda x: _psi_gradient(x) @ CURL.T,
+        gradient=lambda x: CURL @ _psi_hessian(x),
+        force=lambda x: 3 * np.pi**2 * (_psi_gradient(x) @ CURL.T),
+        fixed=TURNING,
+    )
+
+
+def _dilating(lam: float) -> Manufactured:
+    """psi e_x: its dilatation is as large as its shear, its pressure lam times that."""
+    along = np.array([1.0, 0.0, 0.0])
+    return Manufactured(
+        u=lambda x: _psi(x)[..., None] * along,
+        gradient=lambda x: along[:, None] * _psi_gradient(x)[..., None, :],
+        force=lambda x: (
+            3 * np.pi**2 * _psi(x)[..., None] * along - (lam + 1) * _psi_hessian(x)[..., 0]
+        ),
+        fixed=ALONG,
+    )
+
+
+def _balanced(lam: float) -> Manufactured:
+    """The first plus 5 grad sin pi x cos pi y cos pi z / (1 + lam): pressure and shear of like size
+    at any nu, and both with the same symmetry.
+    """
+    free, share, shift = _divergence_free(lam), 5 / (1 + lam), np.array([0.0, 0.5, 0.5])
+    pushed = (lam + 2) * 3 * np.pi**2 * share
+    return Manufactured(
+        u=lambda x: free.u(x) + share * _psi_gradient(x + shift),
+        gradient=lambda x: free.gradient(x) + share * _psi_hessian(x + shift),
+        force=lambda x: free.force(x) + pushed * _psi_gradient(x + shift),
+        fixed=TURNING,
+    )
+
+
+FIELDS = {"divergence-free": _divergence_free, "balanced": _balanced, "dilating": _dilating}
+# Poisson's ratio, cells along half a side, and largest errors in L2 and H1 on the finest mesh. The
+# pressure of the dilating field is lam times its divergence, and errors are as much larger.
+CONVERGENCE: tuple[tuple[float, tuple[int, ...], dict[str, tuple[float, float]]], ...] = (
+    (0.3, (2, 4, 7), {"divergence-free": (1e-3, 2e-2)}),
+    (0.3, (3, 5, 8), {"dilating": (5e-4, 1e-2)}),
+    (0.49, (3, 5, 9), {"divergence-free": (5e-4, 1e-2), "dilating": (2e-3, 0.03)}),
+    (0.4999, (3, 5, 9), {"divergence-free": (5e-4, 1e-2), "balanced": (5e-4, 1e-2),
+                         "dilating": (0.2, 3.0)}),
+)  # fmt: skip
+
+
+@case(
+    f"{MANUFACTURED}; orders: Ciarlet, The Finite Element Method for Elliptic Problems (1978), "
+    "section 3.2; near 1/2 Stenberg, Math Comp 42:9 (1984)",
+    mesh="an eighth of the unit cube on three meshes, 4 to 18 cells a side of the cube",
+)
+def manufactured() -> Checks:
+    """Manufactured fields converge with orders 3 and 2, nu = 0.3 to 0.4999."""
+    for nu, cells, bars in CONVERGENCE:
+        problems = [FIELDS[name](unit(nu).first_lame) for name in bars]
+        errors = np.array([_errors(n, nu, problems) for n in cells])  # (meshes, fields, norms)
+        for k, (name, ceilings) in enumerate(bars.items()):
+            for j, norm in enumerate(("L2", "H1 seminorm")):
+                e, what = errors[:, k, j], f"{name}, nu = {nu:g}"
+                yield order(f"{what}: order in {norm}", 0.5 / np.array(cells), e, 3 - j, 0.1)
+                yield below(f"{what}: relative error in {norm}, finest mesh", e[-1], ceilings[j])
+
+
+@case(
+    f"{MANUFACTURED}; Brenner and Sung, Math Comp 59:321 (1992): uniform in lambda",
+    mesh="an eighth of the unit cube, 10 cells a side of the cube",
+)
+def no_locking() -> Checks:
+    """No locking: pressure and shear of like size, nu = 0.3 to 0.49999."""
+    errors = np.array([_errors(5, nu, [_balanced(unit(nu).first_lame)])[0]
+                       for nu in (0.3, 0.45, 0.49, 0.499, 0.4999, 0.49999)])  # fmt: skip
+    yield below("relative error in L2, worst", errors[:, 0].max(), 3e-3)
+    yield below("relative error in H1 seminorm, worst", errors[:, 1].max(), 3e-2)
 
 
 def distorted_cube() -> TetMesh:
@@ -35,8 +191,8 @@ def cube_with_slivers() -> TetMesh:
     straight = meshes.extrude(*[np.linspace(0, 1, 4)] * 3, order=1)
     corner = int(np.argmin(np.linalg.norm(straight.points - 1 / 3, axis=1)))
     tet = next(t for t in straight.tets if corner in t)
-    others = straight.points[[n for n in tet if n != corner]]
-    start, end = straight.points[corner], others.mean(axis=0)
+    start = straight.points[corner]
+    end = straight.points[[n for n in tet if n != corner]].mean(axis=0)
 
     def bent(fraction: float) -> TetMesh:
         points = straight.points.copy()
@@ -46,129 +202,31 @@ def cube_with_slivers() -> TetMesh:
     low, high = 0.0, 0.9999
     for _ in range(40):
         middle = (low + high) / 2
-        flat = dihedral_angles(bent(middle)).min() < FLATTEST_ANGLE
+        flat = meshes.dihedral_angles(bent(middle)).min() < FLATTEST_ANGLE
         low, high = (low, middle) if flat else (middle, high)
     return meshes.quadratic(bent(low))
 
 
-def dihedral_angles(mesh: TetMesh) -> Floats:
-    """The six angles (m, 6) between the sides of each tetrahedron, degrees."""
-    x = mesh.points[mesh.tets[:, :4]]
-    gradients = np.linalg.inv(x[:, 1:] - x[:, :1]).transpose(0, 2, 1)
-    normals = np.concatenate([-gradients.sum(axis=1, keepdims=True), gradients], axis=1)
-    normals /= np.linalg.norm(normals, axis=2, keepdims=True)
-    pairs = np.einsum("eki,eki->ek", normals[:, EDGES[:, 0]], normals[:, EDGES[:, 1]])
-    return np.degrees(np.arccos(np.clip(-pairs, -1, 1)))
+def unit(poisson: float) -> fem.Material:
+    """Density 1 and shear modulus 1."""
+    return fem.Material(density=1, shear_modulus=1, poisson=poisson)
 
 
-def patch() -> Case:
-    """A linear field on distorted tetrahedra."""
-    mesh = distorted_cube()
-    return Case(
-        title="Patch test: a linear field on distorted tetrahedra",
-        source=f"{PATCH}: must be exact",
-        mesh=described(mesh, f"least dihedral angle {dihedral_angles(mesh).min():.0f} degrees"),
-        checks=tuple(
-            _followed(mesh, nu, 1e-10, f", nu = {nu:g}") for nu in (0.0, 0.3, 0.49, 0.4999)
-        ),
-    )
-
-
-def quadratic_patch() -> Case:
-    """A quadratic field with its body force, which ten nodes represent exactly."""
-    mesh, mu, lam = distorted_cube(), 1.0, 1.5
-    x = mesh.points
-    field = np.stack([x[:, 0] ** 2 + x[:, 1] * x[:, 2], x[:, 1] ** 2, x[:, 0] * x[:, 2]], axis=1)
-    minus_force = np.array([(lam + mu) * 3 + 2 * mu, (lam + mu) * 2 + 2 * mu, 0.0])
-    force = np.broadcast_to(-minus_force, x.shape)
-    M = fem.assemble(mesh, unit(0.3), fixed=np.zeros(x.shape, bool)).M
-    found = held_outside(mesh, 0.3, field.ravel(), M @ force.ravel())
-    return Case(
-        title="Patch test: a quadratic field with its body force, nu = 0.3",
-        source=f"{PATCH}: exact for elements of second order",
-        mesh=described(mesh),
-        checks=(below("largest error / largest displacement", _gap(found, field), 1e-9),),
-    )
-
-
-def slivers() -> Case:
-    """A patch test among nearly flat tetrahedra, and a solution under load."""
-    mesh = cube_with_slivers()
-    ops = fem.assemble(mesh, unit(0.3), fixed="bottom")
-    P = fem.load_operator(mesh)
-    f = (P @ np.ones(P.shape[1]))[ops.free]
-    left = f - ops.K @ fem.static(ops, P @ np.ones(P.shape[1]))[ops.free]
-    flattest = float(dihedral_angles(mesh).min())
-    return Case(
-        title=f"Slivers: a dihedral angle of {flattest:.2f} degrees",
-        source=f"{PATCH}: must be exact on any mesh",
-        mesh=described(mesh, f"least dihedral angle {flattest:.2f} degrees"),
-        checks=(
-            _followed(mesh, 0.3, 1e-8),
-            below("residual under load / load", np.linalg.norm(left) / np.linalg.norm(f), 1e-8),
-        ),
-    )
-
-
-def inverted() -> Case:
-    """An element turned inside out by a mid-side node."""
-    mesh = meshes.block((1.0, 1.0, 1.0), 1.0)
-    points = mesh.points.copy()
-    points[mesh.tets[3, 4]] += 2.0
-    bent = replace(mesh, points=points)
-    case = refused(
-        "Expected invalid: an inverted element is refused with its number",
-        f"{ZIENKIEWICZ}, chapter 9: det J > 0",
-        described(mesh, "one mid-side node moved by two edge lengths"),
-        lambda: next(element_stiffness(bent, *np.ones((2, len(mesh.tets))))),
-        MeshError,
-        "is inverted",
-    )
-    touched = np.flatnonzero((mesh.tets == mesh.tets[3, 4]).any(axis=1))
-    named = any(case.said.startswith(f"element {e} ") for e in touched)
-    check = yes("the element that it names has the moved node", named)
-    return replace(case, checks=(*case.checks, check))
-
-
-def incompressible() -> Case:
-    """Poisson's ratio 1/2, beyond a pure displacement formulation."""
-    return refused(
-        "Expected invalid: Poisson's ratio 0.5 is refused with the limit",
-        "Hughes, The Finite Element Method (1987), chapter 4: lambda is infinite",
-        "none",
-        lambda: unit(0.5),
-        ValueError,
-        "-1 < poisson < 0.5",
-    )
-
-
-def refused(
-    title: str, source: str, mesh: str, act: Callable[[], object], kind: type[ValueError], said: str
-) -> Case:
-    """A case of invalid input: it passes if the program refuses and names the limit."""
-    try:
-        act()
-        sentence = "nothing: it was accepted"
-    except kind as error:
-        sentence = str(error)
-    check = yes(f'refused, naming "{said}"', said in sentence)
-    return Case(title=title, source=source, mesh=mesh, checks=(check,), said=sentence)
-
-
-def _followed(mesh: TetMesh, poisson: float, bar: float, where: str = "") -> Check:
+def _follows(mesh: TetMesh, poisson: float, bar: float, where: str = "") -> Check:
+    """Whether a mesh has the linear field that is prescribed on its boundary."""
     exact = mesh.points @ np.random.default_rng(0).standard_normal((3, 3)).T
-    found = held_outside(mesh, poisson, exact.ravel(), np.zeros(mesh.n_dofs))
-    return below(f"largest error / largest displacement{where}", _gap(found, exact), bar)
+    found = _held_outside(mesh, poisson, exact.ravel(), np.zeros(mesh.n_dofs))
+    return below(f"{RATIO}{where}", _gap(found, exact), bar)
 
 
-def held_outside(mesh: TetMesh, poisson: float, field: Floats, force: Floats) -> Floats:
+def _held_outside(mesh: TetMesh, poisson: float, field: Floats, force: Floats) -> Floats:
     """Displacement (3 n,) of the mesh with the field prescribed on its boundary."""
     fixed = np.zeros(mesh.points.shape, bool)
     fixed[np.unique(meshes.boundary_facets(mesh.tets))] = True
-    return solver_held(mesh, poisson, fixed)(field, force)
+    return _solver_held(mesh, poisson, fixed)(field, force)
 
 
-def solver_held(
+def _solver_held(
     mesh: TetMesh, poisson: float, fixed: Mapping[str, str] | ArrayLike
 ) -> Callable[[Floats, Floats], Floats]:
     """The same for any field and force by one factor, where `fixed` is prescribed."""
@@ -189,6 +247,48 @@ def _gap(found: Floats, exact: Floats) -> float:
     return float(np.abs(found - exact.ravel()).max() / np.abs(exact).max())
 
 
-def unit(poisson: float) -> fem.Material:
-    """Density 1 and shear modulus 1."""
-    return fem.Material(density=1, shear_modulus=1, poisson=poisson)
+def _errors(n: int, nu: float, problems: Iterable[Manufactured]) -> list[tuple[float, float]]:
+    """Relative errors in L2 and in the H1 seminorm of each field, by the 14-point rule."""
+    mesh = meshes.extrude(*[np.linspace(0, 0.5, n + 1)] * 3)
+    solver = cache(lambda fixed: _solver_held(mesh, nu, dict(fixed)))
+    barycentric, weights = tetrahedron_rule(5)
+    N, D = shape_functions(barycentric, 10), shape_derivatives(barycentric, 10)
+    corners = mesh.points[mesh.tets[:, :4]]
+    edges = corners[:, 1:] - corners[:, :1]
+    W = np.linalg.det(edges)[:, None] / 6 * weights
+    x = np.einsum("qa,eai->eqi", barycentric, corners)
+
+    def size(values: Floats) -> float:
+        return float(np.sqrt((W * (values.reshape(*W.shape, -1) ** 2).sum(axis=-1)).sum()))
+
+    errors = []
+    for problem in problems:
+        local = np.einsum("eq,qa,eqi->eai", W, N, problem.force(x), optimize=True)
+        force = np.zeros_like(mesh.points)
+        np.add.at(force, mesh.tets, local)
+        solve = solver(tuple(problem.fixed.items()))
+        u = solve(problem.u(mesh.points).ravel(), force.ravel()).reshape(-1, 3)[mesh.tets]
+        slopes = np.einsum("eai,qal,ejl->eqij", u, D, np.linalg.inv(edges), optimize=True)
+        exact, gradient = problem.u(x), problem.gradient(x)
+        value = size(np.einsum("qa,eai->eqi", N, u) - exact) / size(exact)
+        errors.append((value, size(slopes - gradient) / size(gradient)))
+    return errors
+
+
+def _psi(x: Floats) -> Floats:
+    return np.prod(np.sin(np.pi * x), axis=-1)
+
+
+def _psi_gradient(x: Floats) -> Floats:
+    s, c = np.sin(np.pi * x), np.cos(np.pi * x)
+    return np.pi * np.stack([np.prod(np.where(np.eye(3)[i], c, s), axis=-1) for i in range(3)], -1)
+
+
+def _psi_hessian(x: Floats) -> Floats:
+    s, c = np.sin(np.pi * x), np.cos(np.pi * x)
+    hessian = np.empty((*x.shape, 3))
+    for i in range(3):
+        for j in range(3):
+            turned = np.prod(np.where(np.eye(3)[i] + np.eye(3)[j], c, s), axis=-1)
+            hessian[..., i, j] = -_psi(x) if i == j else turned
+    return np.pi**2 * hessian

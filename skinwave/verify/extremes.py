@@ -12,12 +12,101 @@ from simple_model.load.focus import spot_width
 from skinwave.bodies.build import Build, build, operators
 from skinwave.models.prepared import Prepared, answer, prepare
 from skinwave.scene.scene import Body, Scene
-from skinwave.verify.case import Case, below, relative
+from skinwave.verify.case import Checks, below, case, refused, relative
 
 BODY = Body(width=0.06, height=0.06, depth=0.015, sides="clamped")
 PROBES = ((0.0, 0.0), (0.01, 0.0))
 H = 5e-3  # m
+MESH = "skin, 60 x 60 x 15 mm, elements of 5 mm"
+POINT = MovingPressure(tacton=Tacton(), drive="linear")
 LIMITS = "limit of the linear equation of motion: Graff, Wave Motion in Elastic Solids (1975)"
+
+
+@case(f"{LIMITS}: a slow load is quasi-static, a fast one acts by its mean", mesh=MESH)
+def focus_speeds() -> Checks:
+    """A focus from 0.01 to 100 m/s (Mach 0.002 to 20)."""
+    path = Trajectory(shape="circle", size=0.02, speed=1.0)
+    pressure = MovingPressure(tacton=Tacton(trajectory=path), drive="linear")
+    under = _at_rest(pressure, 1)[1]  # the path starts at the second probe
+    creeping = _moved(6.3, speed=0.01).displacement
+    peak = creeping[60000:, 1].max()
+    yield relative("0.01 m/s: peak where it passes, over rest", peak, under, 0.02, "m")
+    ring = _at_rest(pressure, 96)
+    fast = _moved(1.0, speed=100.0).displacement
+    for k, place in enumerate(("centre", "rim")):
+        mean = fast[len(fast) // 2 :, k].mean()
+        yield relative(f"100 m/s: mean at the {place}", mean, ring[k], 0.005, "m")
+    for speed in (0.1, 1.0, 10.0):
+        ratio = np.abs(_moved(1.0, speed=speed).displacement).max() / under
+        yield below(f"{speed:g} m/s: largest motion over that at rest", ratio, 3.0)
+
+
+@case(f"{LIMITS}: a slow load is quasi-static, a fast one is in its steady state", mesh=MESH)
+def modulation_frequencies() -> Checks:
+    """Amplitude modulation from 1 Hz to 1 kHz."""
+    slow, rest = lines(_moved(4.0, am=1.0), [1.0])[0], _at_rest(POINT, 1)
+    for k, (x, _) in enumerate(PROBES):
+        yield relative(f"1 Hz: amplitude at {1e3 * x:g} mm", slow[k], rest[k], 0.005, "m")
+    fast = lines(_moved(0.5, am=1000.0), [1000.0])[0, 0]
+    made, ops = _meshed()
+    force = fem.load_operator(made.mesh) @ POINT(fem.facet_points(made.mesh)[:, :2], 0.0)
+    u = fem.probe_operator(made.mesh, PROBES) @ fem.harmonic(ops, force, 1000.0)[0]
+    yield relative("1 kHz: amplitude at the focus", fast, abs(u[0]), 0.005, "m")
+
+
+@case(
+    "the integral of a Gaussian; quadrature: Dunavant, Int J Numer Methods Eng 21:1129 (1985)",
+    mesh="10-node tetrahedra, 60 x 60 x 15 mm",
+    note="The displacement under such a focus is another matter: the plan warns of elements wider "
+    "than twice the standard deviation of the focal spot.",
+)
+def narrow_focus() -> Checks:
+    """A focus down to a third of the size of an element keeps its force."""
+    fine = np.linspace(-0.03, 0.03, 1201)
+    grid = np.column_stack([axis.ravel() for axis in np.meshgrid(fine, fine)])
+    for height, h in ((0.2, 2.9e-3), (0.02, 2.9e-3), (0.02, 5e-3)):
+        load = replace(POINT, height=height)
+        exact = load(grid, 0.0).sum() * (fine[1] - fine[0]) ** 2
+        places = [np.array([x, x / 2]) for x in (0.0, 0.6e-3, 1.2e-3, 1.8e-3, 2.4e-3)]
+        worst = max(abs(_total_force(load, h, place) / exact - 1) for place in places)
+        width = f"focal spot of {1e3 * spot_width(height):.1f} mm, elements of {1e3 * h:g} mm"
+        yield below(f"{width}: force, worst of 5 places", worst, 0.01)
+
+
+@case("the integral of half a Gaussian", mesh=MESH)
+def degenerate_paths() -> Checks:
+    """A path of no size is a focus at rest, and one on the rim loses half of its force."""
+    rest = _moved(0.1, am=140.0).displacement
+    none = _moved(0.1, am=140.0, speed=5.0, size=0.0).displacement
+    apart = np.abs(none - rest).max() / np.abs(rest).max()
+    yield below("circle of 0 mm beside a point: difference", apart, 1e-12)
+    middle, rim = (_total_force(POINT, 2.9e-3, np.array([x, 0.0])) for x in (0.0, 0.03))
+    yield relative("force on the rim over force in the middle", rim / middle, 0.5, 0.01)
+
+
+@case(
+    "conservation of energy: Hughes, The Finite Element Method (1987), chapter 9", mesh=MESH
+)  # fmt: skip
+def durations() -> Checks:
+    """A duration of one sample, and of ten seconds."""
+    short, long = _moved(1e-4, am=140.0), _moved(10.0, am=140.0)
+    seconds = [long.displacement[k * 10_000 : (k + 1) * 10_000] for k in (1, 9)]
+    first, last = (
+        float(lines(replace(long, times=np.arange(10_000) / 10_000, values=u), [140.0])[0, 0])
+        for u in seconds
+    )
+    drift = abs(seconds[1][:, 0].mean() - seconds[0][:, 0].mean()) / first
+    imbalance = long.effort.energy_imbalance
+    yield below("one sample: largest motion", np.abs(short.displacement).max(), 1e-6, "m")
+    yield below("10 s: power put in that is not dissipated, relative", imbalance, 1e-6)
+    yield relative("10 s: the line in the last second", last, first, 1e-6, "m")
+    yield below("10 s: drift of the mean over the line", drift, 1e-6)
+
+
+@case("Shannon, Proc IRE 37:10 (1949)")
+def sampling() -> Checks:
+    """Expected invalid: a line above half the sampling rate."""
+    yield refused(lambda: lines(_moved(0.1, am=140.0), [6000.0]), ValueError, "5000 Hz")
 
 
 @cache
@@ -31,95 +120,22 @@ def _meshed() -> tuple[Build, fem.Operators]:
     return made, operators(made)
 
 
-@cache
-def _static(pressure: MovingPressure, ring: int) -> tuple[float, ...]:
+def _at_rest(pressure: MovingPressure, ring: int) -> Floats:
     """Displacement of the probes at rest under the mean of so many focal spots along the path."""
     made, ops = _meshed()
     points = fem.facet_points(made.mesh)[:, :2]
     centres = pressure.tacton.trajectory.at_phase(np.arange(ring) / ring)
     spot = pressure.spot(points, centres).mean(axis=0) * float(pressure.gain(np.zeros(1))[0])
     u = fem.static(ops, fem.load_operator(made.mesh) @ spot)
-    return tuple(fem.probe_operator(made.mesh, PROBES) @ u)
+    return fem.probe_operator(made.mesh, PROBES) @ u
 
 
-def _answered(
-    duration: float, *, am: float = 0.0, size: float = 0.0, speed: float = 0.0
-) -> Response:
+def _moved(duration: float, *, am: float = 0.0, speed: float = 0.0, size: float = 0.02) -> Response:
     """Under a focus at rest, or on a circle."""
     path = Trajectory(shape="circle", size=size, speed=speed) if speed else Trajectory()
     tacton = Tacton(am_frequency=am, duration=duration, trajectory=path)
     pressure = MovingPressure(tacton=tacton, drive="linear")
     return answer(_prepared(), Scene(pressure=pressure, body=BODY, probes=PROBES))
-
-
-def focus_speeds() -> Case:
-    """From a focus that creeps to one at twenty times the speed of shear waves."""
-    pressure = MovingPressure(
-        tacton=Tacton(trajectory=Trajectory(shape="circle", size=0.02, speed=1.0)), drive="linear"
-    )
-    under = _static(pressure, 1)[1]  # the path starts at the second probe
-    creeping = _answered(6.3, speed=0.01, size=0.02).displacement
-    peak = creeping[60000:, 1].max()
-    checks = [relative("0.01 m/s: peak where it passes, over rest", peak, under, 0.02, "m")]
-    ring = _static(pressure, 96)
-    fast = _answered(1.0, speed=100.0, size=0.02).displacement
-    for k, place in enumerate(("centre", "rim")):
-        mean = fast[len(fast) // 2 :, k].mean()
-        checks.append(relative(f"100 m/s: mean at the {place}", mean, ring[k], 0.005, "m"))
-    for speed in (0.1, 1.0, 10.0):
-        u = _answered(1.0, speed=speed, size=0.02).displacement
-        ratio = np.abs(u).max() / under
-        checks.append(below(f"{speed:g} m/s: largest motion over that at rest", ratio, 3.0))
-    return Case(
-        title="A focus from 0.01 to 100 m/s (Mach 0.002 to 20)",
-        source=LIMITS + ": a slow load is quasi-static, a fast one acts by its mean",
-        mesh=_mesh(),
-        checks=tuple(checks),
-    )
-
-
-def modulation_frequencies() -> Case:
-    """AM at 1 Hz is quasi-static; at 1 kHz the steady state is that of one harmonic solve."""
-    slow = lines(_answered(4.0, am=1.0), [1.0])[0]
-    rest = _static(MovingPressure(tacton=Tacton(), drive="linear"), 1)
-    checks = [
-        relative(f"1 Hz: amplitude at {1e3 * x:g} mm", slow[k], rest[k], 0.005, "m")
-        for k, (x, _) in enumerate(PROBES)
-    ]
-    fast = float(lines(_answered(0.5, am=1000.0), [1000.0])[0, 0])
-    (made, ops), load = _meshed(), MovingPressure(tacton=Tacton(), drive="linear")
-    force = fem.load_operator(made.mesh) @ load(fem.facet_points(made.mesh)[:, :2], 0.0)
-    u = fem.probe_operator(made.mesh, PROBES) @ fem.harmonic(ops, force, 1000.0)[0]
-    checks.append(relative("1 kHz: amplitude at the focus", fast, abs(u[0]), 0.005, "m"))
-    return Case(
-        title="Amplitude modulation from 1 Hz to 1 kHz",
-        source=LIMITS + ": a slow load is quasi-static, a fast one is in its steady state",
-        mesh=_mesh(),
-        checks=tuple(checks),
-    )
-
-
-def narrow_focus() -> Case:
-    """A focus narrower than an element keeps its total force."""
-    checks = []
-    fine = np.linspace(-0.03, 0.03, 1201)
-    grid = np.column_stack([axis.ravel() for axis in np.meshgrid(fine, fine)])
-    for height, h in ((0.2, 2.9e-3), (0.02, 2.9e-3), (0.02, 5e-3)):
-        load = MovingPressure(tacton=Tacton(), height=height, drive="linear")
-        exact = load(grid, 0.0).sum() * (fine[1] - fine[0]) ** 2
-        places = [np.array([x, x / 2]) for x in (0.0, 0.6e-3, 1.2e-3, 1.8e-3, 2.4e-3)]
-        worst = max(abs(_total_force(load, h, place) / exact - 1) for place in places)
-        width = f"focal spot of {1e3 * spot_width(height):.1f} mm, elements of {1e3 * h:g} mm"
-        checks.append(below(f"{width}: force, worst of 5 places", worst, 0.01))
-    return Case(
-        title="A focus down to a third of the size of an element keeps its force",
-        source="the integral of a Gaussian; quadrature: Dunavant, Int J Numer Methods Eng 21:1129 "
-        "(1985)",
-        mesh="10-node tetrahedra, 60 x 60 x 15 mm",
-        checks=tuple(checks),
-        note="The displacement under such a focus is another matter: the plan warns of elements "
-        "wider than twice the standard deviation of the focal spot.",
-    )
 
 
 def _total_force(load: MovingPressure, h: float, place: Floats) -> float:
@@ -128,64 +144,3 @@ def _total_force(load: MovingPressure, h: float, place: Floats) -> float:
     P, points = fem.load_operator(mesh), fem.facet_points(mesh)[:, :2]
     pressure = load.spot(points, place) * float(load.gain(np.zeros(1))[0])
     return -float((P @ pressure).reshape(-1, 3)[:, 2].sum())
-
-
-def degenerate_paths() -> Case:
-    """A path of no size is a focus at rest, and one at the rim loses the force beside the body."""
-    rest = _answered(0.1, am=140.0).displacement
-    none = _answered(0.1, am=140.0, size=0.0, speed=5.0).displacement
-    apart = np.abs(none - rest).max() / np.abs(rest).max()
-    load = MovingPressure(tacton=Tacton(), drive="linear")
-    middle, rim = (_total_force(load, 2.9e-3, np.array([x, 0.0])) for x in (0.0, 0.03))
-    return Case(
-        title="A path of no size, and a focus on the rim",
-        source="the integral of half a Gaussian",
-        mesh=_mesh(),
-        checks=(
-            below("circle of 0 mm beside a point: difference", apart, 1e-12),
-            relative("force on the rim over force in the middle", rim / middle, 0.5, 0.01),
-        ),
-    )
-
-
-def durations() -> Case:
-    """One sample, and ten seconds: energy stays balanced, nothing drifts."""
-    short, long = _answered(1e-4, am=140.0), _answered(10.0, am=140.0)
-    seconds = [long.displacement[k * 10_000 : (k + 1) * 10_000] for k in (1, 9)]
-    first, last = (
-        float(lines(replace(long, times=np.arange(10_000) / 10_000, values=u), [140.0])[0, 0])
-        for u in seconds
-    )
-    drift = abs(seconds[1][:, 0].mean() - seconds[0][:, 0].mean()) / first
-    imbalance, largest = long.effort.energy_imbalance, np.abs(short.displacement).max()
-    return Case(
-        title="A duration of one sample, and of ten seconds",
-        source="conservation of energy: Hughes, The Finite Element Method (1987), chapter 9",
-        mesh=_mesh(),
-        checks=(
-            below("one sample: largest motion", largest, 1e-6, "m"),
-            below("10 s: power put in that is not dissipated, relative", imbalance, 1e-6),
-            relative("10 s: the line in the last second", last, first, 1e-6, "m"),
-            below("10 s: drift of the mean over the line", drift, 1e-6),
-        ),
-    )
-
-
-def sampling() -> Case:
-    """A line above half the sampling rate is refused, not folded down."""
-    said = ""
-    try:
-        lines(_answered(0.1, am=140.0), [6000.0])
-    except ValueError as error:
-        said = str(error)
-    return Case(
-        title="Expected invalid: a line above half the sampling rate",
-        source="Shannon, Proc IRE 37:10 (1949)",
-        mesh="none",
-        checks=(below("refused: 0 yes, 1 no", float("5000 Hz" not in said), 0.0),),
-        said=said,
-    )
-
-
-def _mesh() -> str:
-    return f"{_prepared().effort.dofs:,} dofs, skin, 60 x 60 x 15 mm, elements of 5 mm"

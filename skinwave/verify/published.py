@@ -1,17 +1,15 @@
-"""Published values that models are compared with: each set with its conditions, spread and source.
+"""Published values that models are compared with: each set with conditions, spread and source.
 
-Numbers are facts of the sources named. `how` says whether one was read in the source or where it is
-quoted, in its abstract only, or computed from what the source gives. `built` names the presets that
-were fitted to a source or chosen by it: there agreement is no evidence. All others predict it.
+`how` says whether a number was read in the source or where it is quoted, in the abstract only, or
+computed from what the source gives. `built` names the presets that were fitted to a source or
+chosen by it: there agreement is no evidence. All others predict it.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
+from itertools import product
 
 import numpy as np
 
-READ = "read in a stored copy"
 ABSTRACT = "seen in the abstract only"
 QUOTED = "read where another source quotes it"
 COMPUTED = "computed from the source's numbers"
@@ -22,7 +20,7 @@ SKIN_DENSITY = 1000.0  # kg/m3
 RAYLEIGH = 0.955313  # speed of the Rayleigh wave over that of shear waves, nu = 0.5
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Quantity:
     """Quantity that sources publish: its name, unit on pages, and that unit in SI."""
 
@@ -31,10 +29,10 @@ class Quantity:
     size: float = 1.0
 
 
-SPEED = Quantity(name="phase speed", unit="m/s")
-LENGTH = Quantity(name="1/e length", unit="mm", size=1e-3)
-EXPONENT = Quantity(name="decay exponent", unit="")
-FOCUS_SPEED = Quantity(name="speed of the focus", unit="m/s")
+SPEED = Quantity("phase speed", "m/s")
+LENGTH = Quantity("1/e length", "mm", 1e-3)
+EXPONENT = Quantity("decay exponent", "")
+FOCUS_SPEED = Quantity("speed of the focus", "m/s")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,15 +41,12 @@ class Published:
 
     Parameters
     ----------
-    name, site, conditions : str, of pages
-    quantity : Quantity
     frequencies : (n,) float, Hz; nan of a value at no frequency
     values : (n,) float, SI; nan where only a range is published
     lows, highs : (n,) float, SI, of people, or a standard deviation about the value; () if no
         spread is published
-    source : str, with its doi if it has one
-    how : one of the words above
-    bodies : names of `waves.BODIES` that are compared with it
+    how : how surely the numbers are known
+    bodies : names of `predictions.BODIES` that are compared with it
     built : those of them that were made from it
     remark : what contradicts it, or was assumed
     """
@@ -70,19 +65,14 @@ class Published:
     built: tuple[str, ...] = ()
     remark: str = ""
 
-    def __post_init__(self) -> None:
-        n = len(self.frequencies)
-        if len(self.values) != n or {len(self.lows), len(self.highs)} not in ({0}, {n}):
-            raise ValueError(f"{self.name} has {n} frequencies and not as many values; mend it")
-
-    @property
-    def has_spread(self) -> bool:
-        """Whether a spread is published."""
-        return bool(self.lows)
-
     def between(self, k: int) -> tuple[float, float]:
         """Lowest and highest value, SI, at one of its frequencies."""
         return (self.lows[k], self.highs[k]) if self.lows else (self.values[k], self.values[k])
+
+    def at(self, frequency: float) -> tuple[float, float] | None:
+        """The same at a frequency in Hz, None if the source does not have it."""
+        known = np.flatnonzero(np.isclose(self.frequencies, frequency))
+        return self.between(int(known[0])) if len(known) else None
 
 
 def rayleigh_wave(modulus: float, viscosity: float, frequency: float) -> tuple[float, float]:
@@ -92,20 +82,6 @@ def rayleigh_wave(modulus: float, viscosity: float, frequency: float) -> tuple[f
     w = 2 * np.pi * frequency
     k = w * np.sqrt(SKIN_DENSITY / (modulus + 1j * w * viscosity)) / RAYLEIGH
     return float(w / k.real), float(1 / abs(k.imag))
-
-
-def _length(frequency: float, modulus: float, viscosity: float) -> float:
-    return rayleigh_wave(modulus, viscosity, frequency)[1]
-
-
-def spread_of(
-    of: Callable[[float, float], float], first: tuple[float, float], second: tuple[float, float]
-) -> tuple[float, float]:
-    """Lowest and highest value of a function of two numbers, each mean +- standard deviation."""
-    found = [
-        of(first[0] + a * first[1], second[0] + b * second[1]) for a in (-1, 1) for b in (-1, 1)
-    ]
-    return min(found), max(found)
 
 
 _GRID = (0.0, 100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0)
@@ -136,7 +112,7 @@ _PLATEAU = Published(
     built=("palm-stiff", "palm-layers"),
     remark="Contradicts the values digitised from the same paper, which fall from 18 to 5 m/s",
 )  # fmt: skip
-_MODULUS, _VISCOSITY = (7.86e3, 1.86e3), (5.03, 0.60)  # Pa, Pa s, mean and standard deviation
+VOIGT = (7.86e3, 1.86e3), (5.03, 0.60)  # Pa, Pa s, mean and standard deviation
 _VOIGT_AT = (100.0, 200.0, 300.0, 400.0)
 _ZHANG = Published(
     name="Zhang: speed", site="forearm", quantity=SPEED, frequencies=(200.0,), values=(3.25,),
@@ -192,15 +168,12 @@ OPTIMUM = Published(
 
 def voigt_lengths() -> Published:
     """1/e lengths that Zhang's constants give, with the spread of the two."""
-    found = [
-        (rayleigh_wave(_MODULUS[0], _VISCOSITY[0], f)[1],
-         *spread_of(partial(_length, f), _MODULUS, _VISCOSITY))
-        for f in _VOIGT_AT
-    ]  # fmt: skip
-    values, lows, highs = (tuple(column) for column in zip(*found, strict=True))
+    ends = list(product(*((mean - spread, mean + spread) for mean, spread in VOIGT)))
+    spread = [[rayleigh_wave(mu, eta, f)[1] for mu, eta in ends] for f in _VOIGT_AT]
     return replace(
         _ZHANG, name="Zhang: 1/e length by Voigt's law", quantity=LENGTH, frequencies=_VOIGT_AT,
-        values=values, lows=lows, highs=highs, how=COMPUTED,
+        values=tuple(rayleigh_wave(VOIGT[0][0], VOIGT[1][0], f)[1] for f in _VOIGT_AT),
+        lows=tuple(map(min, spread)), highs=tuple(map(max, spread)), how=COMPUTED,
         conditions="from mu1 = 7.86 +- 1.86 kPa and mu2 = 5.03 +- 0.60 Pa s, fitted to speeds of "
         "100 to 400 Hz",
         remark="A loss that was inferred from the dispersion of speed, not measured as decay",
@@ -235,7 +208,7 @@ NOT_COMPARED = (
      "which energy, and within which part of the hand, the file does not say"),
     ("Reardon et al. (2023), doi 10.1126/sciadv.adf2037",
      "shear shock patterns that extend more than ten times as far as the focus",
-     "how extent was defined was not readable; see the zigzag below"),
+     "how extent was defined was not readable"),
 )  # fmt: skip
 
 
@@ -247,7 +220,7 @@ def all_sources(quantity: Quantity) -> Published:
     frequencies that two of them have or more.
     """
     sets = [each for each in wave_sets() if each.quantity is quantity]
-    found = {f: [pair for each in sets if (pair := at(each, f))] for f in _GRID[1:]}
+    found = {f: [pair for each in sets if (pair := each.at(f))] for f in _GRID[1:]}
     shared = {f: pairs for f, pairs in found.items() if len(pairs) > 1}
     return Published(
         name=f"{ALL}: {quantity.name}", site="back of the hand, finger, forearm",
@@ -260,9 +233,3 @@ def all_sources(quantity: Quantity) -> Published:
         remark="Sites and methods differ, so that this is wider than people are at one site; sets "
         "that presets were fitted to are among them",
     )  # fmt: skip
-
-
-def at(published: Published, frequency: float) -> tuple[float, float] | None:
-    """Lowest and highest value, SI, at a frequency in Hz that the source has; else None."""
-    known = np.flatnonzero(np.isclose(published.frequencies, frequency))
-    return published.between(int(known[0])) if len(known) else None

@@ -1,6 +1,5 @@
-"""Bodies at rest: half-space, layers, columns."""
+"""Bodies at rest: half-space, layers, columns, and a fingertip by another code."""
 
-from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -14,8 +13,8 @@ from fem.pressure_projection import linear_functions, macroelements, projected_d
 from meshes import TetMesh
 from meshes.tetmesh import Ints
 from skinwave.verify import references
-from skinwave.verify.case import Case, Plot, below, described, largest, relative
-from skinwave.verify.references import Floats
+from skinwave.verify.case import Checks, below, case, largest, relative
+from skinwave.verify.references import Complex, Floats
 
 WIDTH = 4.35e-3  # m, standard deviation of the Gaussian focus
 RADII = np.array([0, 5, 10, 15, 20]) * 1e-3
@@ -41,135 +40,104 @@ def on_axis(mesh: TetMesh, radii: Floats) -> sparse.csr_array:
     return fem.probe_operator(mesh, np.column_stack([radii, 0 * radii]))
 
 
-def disc_on_half_space() -> Case:
-    """Uniform pressure on a disc, whose rim is a line of the mesh."""
+@case(
+    "Boussinesq (1885); Johnson, Contact Mechanics (1985), section 3.4",
+    mesh="a quarter; 8 cells a radius, sides at 400 radii", slow=True,
+)  # fmt: skip
+def disc() -> Checks:
+    """Boussinesq: uniform pressure on a disc, nu = 0.3."""
     a, material = 0.01, fem.from_young(density=1000, young=20e3, poisson=0.3)
     square = quarter_space(4.0, 2.0, a, a / 8)
     x = square.points.copy()
     radius = np.hypot(x[:, 0], x[:, 1])
     x[:, :2] *= (np.abs(x[:, :2]).max(axis=1) / np.where(radius > 0, radius, 1))[:, None]
-    # Squares become circles; straight-sided again through the corners of the round mesh.
-    mesh = _round(x, square)
+    # Squares become circles, with straight sides through their corners.
+    mesh = straight_sided(square, x)
     top = mesh.facets["top"]
     centres = mesh.points[top[:, :3]].mean(axis=1)
     P = fem.load_operator(mesh, top[np.hypot(centres[:, 0], centres[:, 1]) < a])
-    force = P @ np.ones(P.shape[1])
-    ops = fem.assemble(mesh, material, fixed=QUARTER)
+    u = fem.static(fem.assemble(mesh, material, fixed=QUARTER), P @ np.ones(P.shape[1]))
     places = {"the centre": 0.0, "half the radius": a / 2, "the rim": a}
-    found = on_axis(mesh, np.array(list(places.values()))) @ fem.static(ops, force)
-    expected = [
-        references.boussinesq_disc(r, radius=a, young=20e3, poisson=0.3) for r in places.values()
-    ]
-    return Case(
-        title="Boussinesq: uniform pressure on a disc, nu = 0.3",
-        source="Boussinesq (1885); Johnson, Contact Mechanics (1985), section 3.4",
-        mesh=described(mesh, "a quarter; 8 cells a radius, sides at 400 radii"),
-        checks=tuple(
-            relative(f"deflection at {name}, 1 Pa", u, w, 0.02, "um")
-            for name, u, w in zip(places, found, expected, strict=True)
-        ),
-    )
+    found = on_axis(mesh, np.array(list(places.values()))) @ u
+    for (name, r), w in zip(places.items(), found, strict=True):
+        exact = references.boussinesq_disc(r, radius=a, young=20e3, poisson=0.3)
+        yield relative(f"deflection at {name}, 1 Pa", w, exact, 0.02, "um")
 
 
-def focus_at_rest_on_half_space(poisson: float) -> Case:
-    """Deflection under a Gaussian focus, and the mean pressure below it."""
-    material = fem.Material(density=1000, shear_modulus=7.86e3, poisson=poisson)
+@case(
+    "Boussinesq's kernel; Gradshteyn and Ryzhik, 6.618.1; Johnson (1985), section 3.2",
+    mesh="a quarter; 2.5 mm at the focus, sides at 4 m", slow=True,
+)  # fmt: skip
+def focus_at_rest() -> Checks:
+    """Gaussian focus at rest on a half-space, nu = 0.4999."""
+    material = fem.Material(density=1000, shear_modulus=7.86e3, poisson=0.4999)
     mesh = quarter_space(4.0, 1.7, 0.01)
     u = fem.static(fem.assemble(mesh, material, fixed=QUARTER), focus_force(mesh))
     found = on_axis(mesh, RADII) @ u
-    expected_at = partial(
-        references.gaussian_at_rest, width=WIDTH, shear_modulus=7.86e3, poisson=poisson
-    )
-    expected, r = expected_at(RADII), np.linspace(0, 0.02, 100)
+    exact = references.gaussian_at_rest(RADII, width=WIDTH, shear_modulus=7.86e3, poisson=0.4999)
     pressure, checkerboard = _pressure_errors(mesh, u, material)
-    return Case(
-        title=f"Gaussian focus at rest on a half-space, nu = {poisson:g}",
-        source="Boussinesq's kernel; Gradshteyn and Ryzhik, 6.618.1; Johnson (1985), section 3.2",
-        mesh=described(mesh, "a quarter; 2.5 mm at the focus, sides at 4 m"),
-        checks=(
-            relative("deflection at the focus, 1 Pa", found[0], expected[0], 0.01, "um"),
-            largest("deflection at 0 to 20 mm, worst", found, expected, 0.03, "um"),
-            below("mean pressure of elements within 12 mm, relative L2 error", pressure, 0.10),
-            below("its part that alternates within a cell", checkerboard, 0.10),
-        ),
-        plot=Plot(
-            x="distance, mm", y="deflection, um", drawn=("closed form",),
-            lines={"finite elements": (1e3 * RADII, 1e6 * found),
-                   "closed form": (1e3 * r, 1e6 * expected_at(r))},
-        ),
-    )  # fmt: skip
+    yield relative("deflection at the focus, 1 Pa", found[0], exact[0], 0.01, "um")
+    yield largest("deflection at 0 to 20 mm, worst", found, exact, 0.03, "um")
+    yield below("mean pressure of elements within 12 mm, relative L2 error", pressure, 0.10)
+    yield below("its part that alternates within a cell", checkerboard, 0.10)
 
 
-def focus_at_rest_on_a_layer() -> Case:
-    """Elements of 3 mm on a bonded layer, up to incompressibility."""
+@case(
+    "Vorovich, Aleksandrov and Babeshko (1974): kernel of a bonded layer",
+    mesh="a quarter; 3 mm, sides fixed at 60 mm",
+)
+def poisson_ratios() -> Checks:
+    """Gaussian focus on a bonded layer of 15 mm, Poisson's ratio 0 to 0.49999."""
     depth, radii = 0.015, np.array([0.0, 0.01])
     axis = meshes.graded_axis(0.06, 0.003, meshes.Grading(radius=0.015, growth=1.5))
     mesh = meshes.extrude(axis, axis, np.linspace(-depth, 0, 6))
-    answers, closed = [], []
-    for poisson in RATIOS:
-        material = fem.Material(density=1000, shear_modulus=25e3, poisson=poisson)
+    found, exact = [], []
+    for nu in RATIOS:
+        material = fem.Material(density=1000, shear_modulus=25e3, poisson=nu)
         u = fem.static(fem.assemble(mesh, material, fixed=QUARTER), focus_force(mesh))
-        answers.append(on_axis(mesh, radii) @ u)
-        layer = {"width": WIDTH, "shear_modulus": 25e3, "poisson": poisson, "depth": depth}
-        closed.append(references.gaussian_on_bonded_layer(radii, **layer))
-    found, expected = np.array(answers), np.array(closed)
-    checks = []
+        found.append(on_axis(mesh, radii) @ u)
+        exact.append(references.gaussian_on_bonded_layer(
+            radii, width=WIDTH, shear_modulus=25e3, poisson=nu, depth=depth))  # fmt: skip
     for k, (place, bar) in enumerate((("the focus", 0.02), ("10 mm", 0.03))):
-        for nu, f, e in zip(RATIOS, found[:, k], expected[:, k], strict=True):
-            checks.append(relative(f"deflection at {place}, nu = {nu:g}", f, e, bar, "um"))
-    errors = 100 * np.abs(found / expected - 1)
-    far = [1 / (1 - 2 * nu) for nu in RATIOS]
-    return Case(
-        title="Gaussian focus on a bonded layer of 15 mm, Poisson's ratio 0 to 0.49999",
-        source="Vorovich, Aleksandrov and Babeshko (1974): kernel of a bonded layer",
-        mesh=described(mesh, "a quarter; 3 mm, sides fixed at 60 mm"),
-        checks=tuple(checks),
-        plot=Plot(
-            x="1 / (1 - 2 nu)", y="error, %", log=True,
-            lines={"at the focus": (far, errors[:, 0]), "at 10 mm": (far, errors[:, 1])},
-        ),
-    )  # fmt: skip
+        for nu, f, e in zip(RATIOS, found, exact, strict=True):
+            yield relative(f"deflection at {place}, nu = {nu:g}", f[k], e[k], bar, "um")
 
 
-def column_of_two_layers() -> Case:
-    """A layer a million times softer than the one below it, at rest and in motion."""
+@case(
+    "Meirovitch, Principles and Techniques of Vibrations (1997), chapter 7",
+    mesh="40 cells high, one across",
+)
+def stiffness_contrast() -> Checks:
+    """Column of two layers, stiffness ratio 1e6."""
     lengths, mus, rho, lag = [0.01, 0.02], [1e9, 1e3], 1000.0, 1e-4
-    mesh = layered_column_mesh(lengths, 20)
     solids = {
         r: fem.Material(density=rho, shear_modulus=mu, poisson=0.45, viscosity=lag * mu)
         for r, mu in enumerate(mus)
     }
-    ops, force, read = column(mesh, solids)
+    ops, force, read = column(lengths, 20, solids)
     moduli = [m.first_lame + 2 * m.shear_modulus for m in solids.values()]
     rest = sum(length / m for length, m in zip(lengths, moduli, strict=True))
     hz = np.array([5.0, 20.0, 50.0, 100.0])
     dynamic = [m * (1 + 2j * np.pi * hz * lag) for m in moduli]
-    expected = references.layered_column(2 * np.pi * hz, lengths, [rho, rho], dynamic)
+    exact = references.layered_column(2 * np.pi * hz, lengths, [rho, rho], dynamic)
     found = fem.harmonic(ops, force, hz) @ read
-    return Case(
-        title="Column of two layers, stiffness ratio 1e6",
-        source="Meirovitch, Principles and Techniques of Vibrations (1997), chapter 7",
-        mesh=described(mesh, "40 cells high, one across"),
-        checks=(
-            relative("deflection at rest, 1 Pa", read @ fem.static(ops, force), rest, 1e-6, "um"),
-            largest("amplitude, 5 to 100 Hz, worst", found, expected, 0.005, "um"),
-        ),
-    )
+    yield relative("deflection at rest, 1 Pa", read @ fem.static(ops, force), rest, 1e-6, "um")
+    yield largest("amplitude, 5 to 100 Hz, worst", found, exact, 0.005, "um")
 
 
-def layered_column_mesh(lengths: list[float], cells: int) -> TetMesh:
-    """A column of one cell across, regions numbered from the base upwards."""
+def column(
+    lengths: list[float], cells: int, solids: dict[int, fem.Material]
+) -> tuple[fem.Operators, Floats, Floats]:
+    """Operators of a column of layers, from the base upwards, one cell across with sliding sides;
+    the force of 1 Pa and the mean of its top as (3 n,).
+    """
     ends = np.concatenate([[0], np.cumsum(lengths)]) - sum(lengths)
     z = np.concatenate([[ends[0]], *(np.linspace(a, b, cells + 1)[1:] for a, b in pairwise(ends))])
     side = [0.0, min(lengths) / cells * 2]
     mesh = meshes.extrude(side, side, z)
     middle = mesh.points[mesh.tets[:, :4]].mean(axis=1)[:, 2]
     region = np.searchsorted(ends[1:-1], middle)
-    return TetMesh(points=mesh.points, tets=mesh.tets, region=region, facets=mesh.facets)
-
-
-def column(mesh: TetMesh, solids: dict[int, fem.Material]) -> tuple[fem.Operators, Floats, Floats]:
-    """Operators of a column whose sides slide, the force of 1 Pa, and its mean top as (3 n,)."""
+    mesh = TetMesh(points=mesh.points, tets=mesh.tets, region=region, facets=mesh.facets)
     ops = fem.assemble(
         mesh, solids,
         fixed={"bottom": "xyz", "left": "x", "right": "x", "front": "y", "back": "y"},
@@ -179,22 +147,102 @@ def column(mesh: TetMesh, solids: dict[int, fem.Material]) -> tuple[fem.Operator
     return ops, force, force / np.abs(force).sum()
 
 
+# The fingertip: at most nu = 0.45, up to which no stiffness is projected, as in the other code.
+SHAPE = meshes.Fingertip(
+    breadth=0.016, length=0.025, thickness=0.013, bone_breadth=0.007, bone_thickness=0.004,
+    cover=0.006, tip=0.004,
+)  # fmt: skip
+TISSUE = fem.Material(density=1000, shear_modulus=25e3, poisson=0.45, viscosity=5.0)
+FINGERTIPS = {"with bone": {0: TISSUE, 1: fem.PRESETS["bone"]}, "without": {0: TISSUE, 1: TISSUE}}
+FREQUENCY = 140.0  # Hz
+THEIRS = {  # `fingertip_summary` of scikit-fem's motion, at rest and at the frequency
+    "with bone": (
+        (0.6418072421356115, 0.2466061863954612, -0.007529687876997654, -0.0002901458322150343),
+        (0.8508287974499185 - 0.2190162904349815j, 0.3712460537507848,
+         -0.017453927090571798 + 0.008148737831427976j,
+         -0.00048347458229874884 + 6.596109094444294e-05j),
+    ),
+    "without": (
+        (11.987988648899172, 9.834520952415195, -0.6431852902491929, -0.5354230496036667),
+        (-0.795102341766092 - 0.21451826572482777j, 0.9398216117609057,
+         -0.020991473820314372 - 0.010003558544689699j,
+         0.0027056627747315894 - 0.0056167850245336624j),
+    ),
+}  # fmt: skip
+
+
+@case(
+    "scikit-fem 12.0.2 on the same nodes, elements and forces (Gustafsson and McBain, J Open "
+    "Source Softw 5:2369 (2020)): python -m bench.fingertip, where all nodes are compared",
+    mesh="ten-node tetrahedra with straight sides, 4 mm, held at its cut",
+)
+def fingertip_with_bone() -> Checks:
+    """A fingertip with a bone inside, two materials of one mesh, beside another code."""
+    mesh = fingertip()
+    for name, materials in FINGERTIPS.items():
+        motions = zip(("at rest", f"{FREQUENCY:g} Hz"), fingertip_motion(mesh, materials),
+                      THEIRS[name], strict=True)  # fmt: skip
+        for when, u, theirs in motions:
+            names = ("work", "motion", "tip", "end of the bone")
+            for what, one, other in zip(names, fingertip_summary(mesh, u), theirs, strict=True):
+                yield largest(f"{what}, {name}, {when}", one, other, 1e-9)
+
+
+def fingertip() -> TetMesh:
+    """Ten-node tetrahedra of the fingertip with straight sides."""
+    mesh = meshes.fingertip_mesh(SHAPE, 4e-3)
+    return straight_sided(mesh, mesh.points)
+
+
+def fingertip_push(mesh: TetMesh) -> Floats:
+    """Nodal forces (3 n,) in N, downwards on the nodes of the top about the origin."""
+    top = np.unique(mesh.facets["top"])
+    force = np.zeros(mesh.points.shape)
+    force[top, 2] = -np.exp(-(mesh.points[top, :2] ** 2).sum(axis=1) / 2 / WIDTH**2)
+    return force.ravel()
+
+
+def fingertip_motion(mesh: TetMesh, materials: dict[int, fem.Material]) -> tuple[Floats, Complex]:
+    """Motion (3 n,) in metre at rest and at `FREQUENCY`, of a fingertip held at its cut."""
+    ops, force = fem.assemble(mesh, materials, fixed="sides"), fingertip_push(mesh)
+    return fem.static(ops, force), fem.harmonic(ops, force, FREQUENCY)[0]
+
+
+def fingertip_summary(mesh: TetMesh, u: Complex) -> Complex:
+    """Work of the push in J, the root of the summed squares of u (3 n,), and the height of the tip
+    and of the end of the bone, in metre.
+    """
+    inside = np.unique(mesh.tets[mesh.region == 1])
+    ends = [nodes[np.argmax(mesh.points[nodes, 1])] for nodes in (np.unique(mesh.tets), inside)]
+    return np.array([fingertip_push(mesh) @ u, np.linalg.norm(u), *u.reshape(-1, 3)[ends, 2]])
+
+
+def straight_sided(mesh: TetMesh, points: Floats) -> TetMesh:
+    """Ten-node tetrahedra with straight sides between the corners of a mesh, moved to points."""
+    used, tets = np.unique(mesh.tets[:, :4], return_inverse=True)
+    facets = {name: np.searchsorted(used, f[:, :3]) for name, f in mesh.facets.items()}
+    return meshes.quadratic(TetMesh(
+        points=points[used], tets=tets.reshape(-1, 4), region=mesh.region, facets=facets
+    ))  # fmt: skip
+
+
 def _pressure_errors(mesh: TetMesh, u: Floats, material: fem.Material) -> tuple[float, float]:
     """Element means of pressure near the focus: error in L2, and its share within cells."""
     corners = mesh.points[mesh.tets[:, :4]]
     middle = corners.mean(axis=1)
     near = np.flatnonzero(np.linalg.norm(middle, axis=1) < 0.012)
     found, volume = _element_pressures(mesh, u, material, near)
-    r, depth, nu = np.hypot(*middle[near, :2].T), -middle[near, 2], material.poisson
-    closed = references.gaussian_mean_pressure(r, depth, width=WIDTH, poisson=nu)
-    error = found - closed
-    cell = _cells(mesh, near)
+    r, depth = np.hypot(*middle[near, :2].T), -middle[near, 2]
+    exact = references.gaussian_mean_pressure(r, depth, width=WIDTH, poisson=material.poisson)
+    error = found - exact
+    _, cell = np.unique(corners[near].min(axis=1).round(9), axis=0, return_inverse=True)
+    cell = cell.ravel()  # the grid cell of each tetrahedron
     average = np.bincount(cell, volume * error) / np.bincount(cell, volume)
 
     def size(values: Floats) -> float:
         return float(np.sqrt(volume @ values**2))
 
-    return size(error) / size(closed), size(error - average[cell]) / size(closed)
+    return size(error) / size(exact), size(error - average[cell]) / size(exact)
 
 
 def _element_pressures(
@@ -215,17 +263,3 @@ def _element_pressures(
     direct = direct_part(lam, mu)
     pressure = -(direct + 2 / 3 * mu) * dilatation - (lam - direct) * projected
     return pressure[chosen], np.linalg.det(edges)[chosen] / 6
-
-
-def _cells(mesh: TetMesh, chosen: Ints) -> Ints:
-    """Number, from 0, of the grid cell that each tetrahedron lies in."""
-    corners = mesh.points[mesh.tets[chosen, :4]]
-    _, cell = np.unique(corners.min(axis=1).round(9), axis=0, return_inverse=True)
-    return cell.ravel()
-
-
-def _round(points: Floats, square: TetMesh) -> TetMesh:
-    """Ten-node tetrahedra between the corners of a mesh, which are moved to other points."""
-    used, tets = np.unique(square.tets[:, :4], return_inverse=True)
-    facets = {name: np.searchsorted(used, f[:, :3]) for name, f in square.facets.items()}
-    return meshes.quadratic(TetMesh(points=points[used], tets=tets.reshape(-1, 4), facets=facets))

@@ -1,206 +1,135 @@
-"""The suite of verification cases, and running it."""
+"""The suite of verification cases, running it, and its page."""
 
 import json
 import math
-import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict
-from functools import partial
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
+from markupsafe import Markup
+
+from skinwave.system.document import Report, Section
 from skinwave.system.effort import Progress, versions
-from skinwave.verify import (
-    air,
-    elements,
-    exact,
-    extremes,
-    fingertip,
-    nonlinear,
-    plates,
-    relaxing,
-    sides,
-    statics,
-    stepping,
-    waves,
-)
-from skinwave.verify import manufactured as fields
-from skinwave.verify.case import Case, Entry, Result, yes
-from skinwave.verify.page import page
+from skinwave.system.table import Table
+from skinwave.verify import elements, exact, extremes, nonlinear, plates, statics, stepping, waves
+from skinwave.verify.case import Case, Check, Result
 
-# Poisson's ratio, cells along half a side, and fields with the largest errors in L2 and H1. The
-# pressure of the dilating one is lam times its divergence, and errors are as much larger.
-FREE, DILATING = fields.divergence_free, fields.dilating
-FIELDS = {
-    "divergence-free-0.3": (0.3, (2, 4, 7), {"divergence-free": (FREE, (1e-3, 2e-2))}),
-    "dilating-0.3": (0.3, (3, 5, 8), {"dilating": (DILATING, (5e-4, 1e-2))}),
-    "fields-0.49": (
-        0.49, (3, 5, 9),
-        {"divergence-free": (FREE, (5e-4, 1e-2)), "dilating": (DILATING, (2e-3, 0.03))},
-    ),
-    "fields-0.4999": (
-        0.4999, (3, 5, 9),
-        {
-            "divergence-free": (FREE, (5e-4, 1e-2)),
-            "balanced": (fields.balanced, (5e-4, 1e-2)),
-            "dilating": (DILATING, (0.2, 3.0)),
-        },
-    ),
+MODULES: Mapping[str, ModuleType] = {
+    "Elements": elements, "At rest": statics, "Plates and beams": plates, "Waves": waves,
+    "Wavenumber integrals": exact, "Time, damping, units": stepping,
+    "The load at its extremes": extremes, "Large deflection": nonlinear,
 }  # fmt: skip
-STEADY = ((80, 0.4999), (140, 0.4999), (210, 0.49))  # Hz, nu
-TOPICS: Mapping[str, Mapping[str, Callable[[], Case]]] = {
-    "Elements": {
-        "patch": elements.patch,
-        "patch-quadratic": elements.quadratic_patch,
-        "slivers": elements.slivers,
-        "inverted": elements.inverted,
-        "incompressible": elements.incompressible,
-    },
-    "Convergence": {
-        **{name: partial(fields.manufactured, *given) for name, given in FIELDS.items()},
-        "no-locking": fields.no_locking,
-    },
-    "At rest": {
-        "disc": statics.disc_on_half_space,
-        "focus-at-rest-0.4999": partial(statics.focus_at_rest_on_half_space, 0.4999),
-        "poisson-ratios": statics.focus_at_rest_on_a_layer,
-        "stiffness-contrast": statics.column_of_two_layers,
-        "fingertip-with-bone": fingertip.beside_another_code,
-    },
-    "Plates and beams": {
-        "clamped-sheet": plates.clamped_sheet,
-        "thin-sheets": plates.thin_sheets,
-        "in-plane-shear": plates.in_plane_shear,
-        "navier-convergence-steel": partial(plates.navier_convergence, plates.STEEL),
-        "navier-steel": partial(plates.navier_plate, plates.STEEL),
-        "navier-convergence-soft": partial(plates.navier_convergence, plates.SOFT),
-        "navier-soft": partial(plates.navier_plate, plates.SOFT),
-        "moving-force-0.25": partial(plates.force_crossing_a_beam, 0.25),
-        "moving-force-0.5": partial(plates.force_crossing_a_beam, 0.5),
-        "circling-on-plate": plates.force_circling_on_a_plate,
-        "air-operator": air.gaussian_and_lambs_shape,
-        "disc-in-air": air.lambs_disc,
-        "focus-in-air": air.focus_on_a_sheet_in_air,
-    },
-    "Waves": {
-        **{f"steady-focus-{hz}-{nu:g}": partial(waves.steady_focus, hz, nu) for hz, nu in STEADY},
-        "lamb": waves.lamb,
-        "rayleigh": waves.rayleigh_speed,
-        "plate-waves": waves.plate_waves,
-        "absorbed-pulse": waves.absorbed_pulse,
-        "oblique-sh": waves.oblique_shear,
-        "oblique-p-sv": waves.oblique_in_plane,
-        "absorbing-layer": sides.layer_around_a_slab,
-    },
-    "Wavenumber integrals": {
-        "exact-half-space": exact.exact_half_space,
-        "exact-sheet": exact.exact_sheet,
-        "exact-slab": exact.exact_slab,
-        "exact-circles": exact.exact_circles,
-        "circling-on-skin": exact.circling_on_skin,
-        "relaxing-half-space": relaxing.half_space_that_relaxes,
-        "circling-on-relaxing-skin": relaxing.circling_on_skin_that_relaxes,
-        "circling-on-paper": exact.circling_on_paper,
-    },
-    "Time, damping, units": {
-        "order-in-time": stepping.order_in_time,
-        "numerical-damping": stepping.numerical_damping,
-        "energy": stepping.energy_kept,
-        "extreme-steps": stepping.extreme_steps,
-        "kelvin-voigt": stepping.columns,
-        "relaxing-column": relaxing.column_that_relaxes,
-        "relaxing-spring": relaxing.oscillator_that_relaxes,
-        "units": stepping.units,
-    },
-    "The load at its extremes": {
-        "focus-speeds": extremes.focus_speeds,
-        "modulation-frequencies": extremes.modulation_frequencies,
-        "narrow-focus": extremes.narrow_focus,
-        "degenerate-paths": extremes.degenerate_paths,
-        "durations": extremes.durations,
-        "sampling": extremes.sampling,
-    },
-    "Large deflection": {
-        "elastica": nonlinear.elastica,
-        "clamped-disc": nonlinear.clamped_disc,
-        "rigid-rotation": nonlinear.rigid_rotation,
-        "tangent": nonlinear.tangent,
-        "linear-limit": nonlinear.linear_limit,
-        "free-energy": nonlinear.free_energy,
-        "too-much": nonlinear.too_much,
-        "amplitude": nonlinear.amplitude_test,
-        "modes-or-all": nonlinear.reduced_against_full,
-    },
+TOPICS: Mapping[str, tuple[Case, ...]] = {
+    topic: tuple(found for found in vars(module).values() if isinstance(found, Case))
+    for topic, module in MODULES.items()
 }
-SLOW = (
-    "disc", "focus-at-rest-0.4999", "focus-in-air", "lamb",
-    *(f"steady-focus-{hz}-{nu:g}" for hz, nu in STEADY), "circling-on-relaxing-skin",
-)  # fmt: skip
+CASES = {found.name: found for cases in TOPICS.values() for found in cases}
+QUICK = ("patch", "in-plane-shear", "moving-force", "thin-sheets")  # a second or two in all
+SCOPE = (
+    "Verification asks whether the equations are solved right. Most references are closed forms, "
+    "series or integrals from the literature, computed without this program's solvers. Other cases "
+    "compare two of its models, or one model with its own limits or in other units. Whether these "
+    "are the right equations for a hand is another question: see `skinwave verify --published`. "
+    "Errors are relative unless they are called absolute. A case passes if each of its errors is "
+    "within its tolerance; the first table shows the check nearest to its tolerance."
+)
+VALUES = ("value", "reference", "error", "tolerance", "")
 
 
-QUICK = ("patch", "in-plane-shear", "moving-force-0.5", "thin-sheets")  # a second or two in all
-
-
-def quick_cases(progress: Progress) -> list[dict[str, Any]]:
+def quick_results(progress: Progress) -> list[dict[str, Any]]:
     """Run a few quick cases: title, source, verdict and worst check of each, as a report keeps."""
     progress("verify", 0.0)
-    cases = [entry.run() for entry in suite() if entry.name in QUICK]
+    results = [CASES[name].run() for name in QUICK]
     return [
-        {"title": case.title, "source": case.source, "passed": case.passed, **asdict(case.worst)}
-        for case in cases
+        {"title": r.case.title, "source": r.case.source, "passed": r.passed, **asdict(r.worst)}
+        for r in results
     ]
 
 
-def suite() -> tuple[Entry, ...]:
-    """Every case, in the order of the page."""
-    return tuple(
-        Entry(name=name, topic=topic, run=run, slow=name in SLOW)
-        for topic, cases in TOPICS.items()
-        for name, run in cases.items()
-    )
-
-
 def run_suite(
-    entries: Iterable[Entry],
-    folder: Path,
-    progress: Progress,
-    *,
-    left_out: int = 0,
-    debug: bool = False,
+    cases: Iterable[Case], folder: Path, progress: Progress, *, debug: bool = False
 ) -> list[Result]:
-    """Run cases, leaving verify.json after each and index.html at the end.
+    """Run cases, write verify.json after each and index.html at the end.
 
-    An interrupt ends the running early; what is finished is still written. `left_out` says how
-    many cases were not asked for.
+    An interrupt ends the run early; what is finished is written.
     """
-    entries, results = list(entries), []
+    cases, results = list(cases), list[Result]()
     try:
-        for k, entry in enumerate(entries):
-            progress(f"verify {entry.name}", k / len(entries))
-            started = time.perf_counter()
-            case = entry.run() if debug else _guarded(entry)
-            seconds = time.perf_counter() - started
-            results.append(Result(entry=entry, case=case, seconds=seconds))
-            _write_json(folder / "verify.json", results, len(entries))
+        for k, each in enumerate(cases):
+            progress(f"verify {each.name}", k / len(cases))
+            results.append(each.run(debug))
+            _write_json(folder / "verify.json", results, len(cases))
     except KeyboardInterrupt:
         if not results:
             raise
-    progress("draw", 1.0)
-    (folder / "index.html").write_text(page(results, entries, left_out), encoding="utf-8")
+    page(results, len(cases)).write(folder)
     return results
 
 
-def _guarded(entry: Entry) -> Case:
-    """The case; one that raises an error is one that failed."""
-    try:
-        return entry.run()
-    except (ValueError, ArithmeticError, MemoryError) as error:
-        title, checks = f"{entry.name} broke off", (yes("ran to its end", False),)
-        return Case(title=title, source="", mesh="", checks=checks, said=str(error))
+def page(results: list[Result], planned: int) -> Report:
+    """A summary of all cases, then each with its source, mesh and checks."""
+    left_out = len(CASES) - planned
+    verdict = [
+        f"Interrupted: {len(results)} of {planned} cases are finished." * (len(results) < planned),
+        f"{counted(results)}.",
+        f"{left_out} slower cases are left out (skinwave verify without --quick)." * (left_out > 0),
+        f"{sum(r.seconds for r in results):.0f} s with "
+        + ", ".join(f"{name} {version}" for name, version in versions().items()) + ".",
+    ]  # fmt: skip
+    summary = Table(
+        ["case", "check nearest to the tolerance", *VALUES, "s"],
+        [[r.case.title, *_row(r.worst), r.seconds] for r in results],
+    )
+    topics = [
+        Section(topic, [_shown(r) for r in results if r.case in cases])
+        for topic, cases in TOPICS.items()
+        if any(r.case in cases for r in results)
+    ]
+    return Report("Verification", [" ".join(filter(None, verdict))], [SCOPE, summary, *topics])
+
+
+def summary(results: list[Result]) -> str:
+    """A line per case, and how many passed."""
+    width = max((len(r.case.name) for r in results), default=0)
+    rows = [f"{'case':<{width}}  {'error':>8}  {'tolerance':>9}"]
+    rows += [
+        f"{r.case.name:<{width}}  {r.worst.error:>8.1e}  {r.worst.bar:>9.1e}  "
+        f"{'passed' if r.passed else 'FAILED'}" + f"  {r.error}" * bool(r.error)
+        for r in results
+    ]
+    return "\n".join([*rows, counted(results)])
+
+
+def counted(results: list[Result]) -> str:
+    """How many cases passed and failed."""
+    failed = sum(not r.passed for r in results)
+    return f"{len(results) - failed} passed, {failed} failed"
+
+
+def _shown(result: Result) -> Section:
+    """One case on the page."""
+    found = result.case
+    words = [found.note, f"It ended early: {result.error}" if result.error else ""]
+    table = Table(["quantity", *VALUES], map(_row, result.checks))
+    source = f"Source: {found.source}. Mesh: {found.mesh}."
+    return Section(found.title, [source, table, *filter(None, words)], level=3)
+
+
+def _row(check: Check) -> list[Any]:
+    """Cells of a check; a yes-or-no check has no tolerance."""
+    what = f"{check.what}, {check.unit}" if check.unit else check.what
+    word = "passed" if check.passed else "FAILED"
+    verdict = Markup('<span class="{}">{}</span>').format("yes" if check.passed else "no", word)
+    if check.bar == 0 and check.reference == 1:
+        return [what, "yes" if check.passed else "no", "yes", None, None, verdict]
+    return [what, f"{check.value:.5g}", f"{check.reference:.5g}", f"{check.error:.2g}",
+            f"{check.bar:.2g}", verdict]  # fmt: skip
 
 
 def _write_json(path: Path, results: list[Result], planned: int) -> None:
-    passed = sum(r.case.passed for r in results)
+    passed = sum(r.passed for r in results)
     record = {
         "passed": passed,
         "failed": len(results) - passed,
@@ -213,12 +142,13 @@ def _write_json(path: Path, results: list[Result], planned: int) -> None:
 
 
 def _record(result: Result) -> dict[str, Any]:
-    case = result.case
-    fields = {name: getattr(case, name) for name in ("title", "source", "mesh", "note", "said")}
+    """A finished case as JSON; null where a number is not finite."""
     checks = [
         {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in row.items()}
-        for row in ({**asdict(c), "passed": c.passed} for c in case.checks)
+        for row in ({**asdict(c), "passed": c.passed} for c in result.checks)
     ]
-    spent = round(result.seconds, 2)
-    name = {"name": result.entry.name, "passed": case.passed, "seconds": spent}
-    return {**name, **fields, "checks": checks}
+    about = {
+        name: getattr(result.case, name) for name in ("name", "title", "source", "mesh", "note")
+    }
+    return about | {"passed": result.passed, "seconds": round(result.seconds, 2),
+                    "error": result.error, "checks": checks}  # fmt: skip

@@ -1,248 +1,404 @@
-"""All comparisons with published measurements, and what they come to in sentences."""
+"""Models beside published measurements: rows, verdict, figures and page."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import inf, isfinite, nan
 from pathlib import Path
+from typing import Any
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
+from skinwave.report.figures import REPORT, png
+from skinwave.system.document import Details, Picture, Report, Section
 from skinwave.system.effort import Progress
 from skinwave.system.numbers import significant
-from skinwave.verify import finger, zigzag
-from skinwave.verify.compared import (
-    ABOVE,
-    BELOW,
-    DIGITISED,
-    NONE,
-    WITHIN,
-    Compared,
-    compared,
-    times,
-    worst,
+from skinwave.system.table import Column, Table
+from skinwave.verify import predictions
+from skinwave.verify.predictions import BODIES, FOUND, Curves, Finger, Harmonics, Sweep
+from skinwave.verify.published import (
+    ALL,
+    EXPONENT,
+    LENGTH,
+    NOT_COMPARED,
+    OPTIMUM,
+    SKINSOURCE,
+    SPEED,
+    Published,
+    Quantity,
+    all_sources,
+    wave_sets,
 )
-from skinwave.verify.focus_speed import PERIMETERS, Sweep, compare_sweeps, sweep
-from skinwave.verify.modulation import FOUND, Harmonics, harmonics
-from skinwave.verify.published import ALL, EXPONENT, LENGTH, OPTIMUM, SPEED
-from skinwave.verify.published_waves import BODIES, Curves, compare_waves, leading_wave, ours_of
-from skinwave.verify.zigzag import Profile
+
+NONE, WITHIN, ABOVE, BELOW = "no wave", "within", "above", "below"
+DIGITISED = 0.05  # of a value without a spread: no nearer can one be read off a curve
+HAND = "hand, finite elements"
+COLOURS = {
+    "forearm": "#D55E00", "palm": "#0072B2", "palm-stiff": "#56B4E9", "skin-slab": "#009E73",
+    "palm-layers": "#CC79A7", "forearm-layers": "#E69F00", HAND: "#000000",
+}  # fmt: skip
+BAND, MARKERS = "#dddddd", "osv^DPX"
+FURTHEST = 10.0  # factors beyond it are drawn at it
+SCOPE = (
+    "Verification asks whether the equations are solved right. This page asks whether they are the "
+    "right ones, as far as published numbers tell. A preset agrees by construction with a source "
+    "that it was fitted to or chosen by; tables mark these pairs as fitted. All other values are "
+    "predictions. A factor is ours over the published value, or over the nearer end of its spread."
+)
+FACTORS = (
+    "Each point is a preset at a frequency; grey: within 5 %, what can be read off a curve. "
+    "Hollow: the preset was fitted to that source; filled: it predicts it. "
+    f"Factors beyond {FURTHEST:g} are drawn there."
+)
+WAVES = (
+    "Points: sources, with the spread between people, or a standard deviation, where one is "
+    "published. Grey: from the lowest to the highest source at each frequency. Lines: the wave of "
+    "each preset that moves the surface most at the edge of the focal spot (half-spaces solid, "
+    "layers on bone dashed); a line breaks where another mode takes the lead, and is missing where "
+    "none propagates. Lengths are those of plane waves, without geometric spreading."
+)
+FOCUS = (
+    "Largest deflection on a circle under a constant pressure that runs along it, by the "
+    "wavenumber integral; triangles: its maximum. Grey: the published range."
+)
+HARMONICS = (
+    f"{predictions.PHANTOM} (abstract): sine AM gives {FOUND['sine']}, square AM "
+    f"{FOUND['square']}. Ours is on the half-space palm at {predictions.AM:g} Hz. The abstract has "
+    "neither frequency nor amplitudes, so that only the larger harmonic is compared. Ratios are "
+    "amplitudes over that at f."
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Compared:
+    """A published value and ours: of `body`, at `frequency` in Hz, SI, ours nan without a wave."""
+
+    published: Published
+    body: str
+    frequency: float
+    ours: float
+    value: float
+    low: float
+    high: float
+
+    @property
+    def is_built(self) -> bool:
+        """Whether the body was made from this source, so that agreement is no evidence."""
+        return self.body in self.published.built
+
+    @property
+    def factor(self) -> float:
+        """Ours over the nearest published value: 1 within the spread, nan without ours."""
+        if not isfinite(self.ours):
+            return self.ours
+        near = 0.0 if self.published.lows else DIGITISED
+        if (1 - near) * self.low <= self.ours <= (1 + near) * self.high:
+            return 1.0
+        return self.ours / (self.high if self.ours > self.high else self.low)
+
+    @property
+    def miss(self) -> float:
+        """The factor, or one over it, whichever is above 1."""
+        return max(self.factor, 1 / self.factor) if self.factor else inf
+
+    @property
+    def outcome(self) -> str:
+        """One of the words above."""
+        if self.factor != self.factor:
+            return NONE
+        return WITHIN if self.factor == 1.0 else ABOVE if self.factor > 1 else BELOW
+
+
+def compared(published: Published, body: str, ours: Iterable[float]) -> list[Compared]:
+    """Rows of a set beside a body, whose values (n,) are SI at the frequencies of the set."""
+    return [
+        Compared(
+            published=published, body=body, frequency=published.frequencies[k], ours=float(value),
+            value=published.values[k], low=low, high=high,
+        )
+        for k, value in enumerate(ours)
+        for low, high in [published.between(k)]
+    ]  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Validation:
-    """Curves and sweeps by body, rows of all sets, harmonics, zigzags predicted and measured, and
-    decay along a finger: of the hand if it was computed, and of people whose files were given.
-    """
+    """Waves and sweeps by body, rows of all sets, harmonics, and decay along a finger if asked."""
 
     curves: Mapping[str, Curves]
     sweeps: Mapping[str, tuple[Sweep, ...]]
     rows: tuple[Compared, ...]
     harmonics: tuple[Harmonics, ...]
-    predicted: tuple[Profile, ...]
-    measured: tuple[Profile, ...]
-    hand: finger.Decay | None = None
-    people: tuple[finger.Decay, ...] = ()
+    finger: Finger | None = None
 
 
-def validate(
-    report: Progress,
-    *,
-    hand: Path | None = None,
-    zigzags: Sequence[tuple[Path, float]] = (),
-    skinsource: Path | None = None,
-) -> Validation:
+def validate(report: Progress, *, hand: Path | None = None) -> Validation:
     """Published measurements beside the models.
 
     Parameters
     ----------
     report : called with the name of the phase and the fraction done
     hand : file of a hand, for the decay along its finger by finite elements; left out if None
-    zigzags : recordings of the zigzag, each with its longitudinal speed in m/s
-    skinsource : folder of SkinSource's impulse responses
-
-    Returns
-    -------
-    Validation
 
     Raises
     ------
     ValueError
-        If a file is not there or cannot be read.
+        If the file of the hand is not there or is no body.
     """
-    if hand:
-        finger.check_hand(hand)
-    report("read the files", 0.0)
-    measured = [zigzag.measured(file, speed) for file, speed in zigzags]
-    people = finger.of_skinsource(skinsource) if skinsource else []
+    finger = predictions.along_finger(hand, report) if hand else None
     report("waves", 0.02)
-    curves = {name: leading_wave(body) for name, body in BODIES.items()}
+    curves = {name: predictions.leading_wave(body) for name, body in BODIES.items()}
     rows = compare_waves(curves)
-    rows += _of_people(people, curves)
     report("speed of the focus", 0.15)
     sweeps = {
-        name: tuple(sweep(BODIES[name], around) for around in PERIMETERS) for name in OPTIMUM.bodies
+        name: tuple(predictions.focus_speeds(BODIES[name], x) for x in predictions.PERIMETERS)
+        for name in OPTIMUM.bodies
     }
-    rows += compare_sweeps(sweeps)
+    rows += [row for name, each in sweeps.items() for one in each for row in _optima(name, one)]
+    rows += compare_finger(finger) if finger else []
     report("harmonics", 0.4)
-    of_force = harmonics()
-    report("zigzag", 0.45)
-    predicted = [
-        zigzag.predicted(body, speed) for body in zigzag.BODIES_SHOWN for speed in zigzag.SPEEDS
-    ]
-    of_hand = finger.of_hand(hand, report) if hand else None
-    if of_hand:
-        rows += finger.compare_hand(of_hand)
     return Validation(
-        curves=curves, sweeps=sweeps, rows=tuple(rows), harmonics=tuple(of_force),
-        predicted=tuple(predicted), measured=tuple(measured), hand=of_hand, people=tuple(people),
+        curves=curves, sweeps=sweeps, rows=tuple(rows), harmonics=tuple(predictions.harmonics()),
+        finger=finger,
     )  # fmt: skip
 
 
-def _of_people(people: list[finger.Decay], curves: Mapping[str, Curves]) -> list[Compared]:
-    """Rows of SkinSource's set as a user's files give it."""
-    if not people:
-        return []
-    own = finger.from_files(people)
-    return [row for name in own.bodies
-            for row in compared(own, name, ours_of(own, name, curves[name]))]  # fmt: skip
+def compare_waves(curves: Mapping[str, Curves]) -> list[Compared]:
+    """Rows of all published sets of waves, by the curves of `BODIES`."""
+
+    def ours(published: Published, name: str) -> Any:
+        if published.quantity is EXPONENT:
+            return predictions.decay_exponents(BODIES[name], published.frequencies)
+        return curves[name].at(published.quantity, published.frequencies)
+
+    sets = (*wave_sets(), all_sources(SPEED), all_sources(LENGTH))
+    return [row for each in sets for name in each.bodies
+            for row in compared(each, name, ours(each, name))]  # fmt: skip
 
 
-def sentences(found: Validation) -> list[str]:
-    """All sentences of the page's beginning."""
-    return [*headline(found), *particulars(found)]
-
-
-def headline(found: Validation) -> list[str]:
-    """How many values agree, and by how much speed, length and exponent miss."""
-    quantities = ((SPEED, "Phase speeds"), (LENGTH, "1/e lengths"), (EXPONENT, "Decay exponents"))
+def _optima(body: str, sweep: Sweep) -> list[Compared]:
+    """Rows of the optimum of a body: of the largest deflection and peak to peak."""
     return [
-        _counted(found.rows),
-        *(_of_quantity(found.rows, q.name, words) for q, words in quantities),
-        *(_of_all_sources(found.rows, q.name) for q, _ in quantities[:2]),
-    ]
-
-
-def particulars(found: Validation) -> list[str]:
-    """Sentences on the speed of the focus, harmonics, the zigzag and the finger."""
-    return [_optima(found), _of_harmonics(found.harmonics), _of_zigzags(found), _of_hand(found)]
-
-
-def _own(rows: Iterable[Compared]) -> list[Compared]:
-    """Rows of single sources, without those that a preset was made from."""
-    return [row for row in rows
-            if not row.is_built and not row.published.name.startswith(ALL)]  # fmt: skip
-
-
-def _counted(rows: Sequence[Compared]) -> str:
-    own = _own(rows)
-    built = sum(row.is_built and not row.published.name.startswith(ALL) for row in rows)
-    within = sum(row.outcome == WITHIN for row in own)
-    without = sum(row.outcome == NONE for row in own)
-    far = worst(own)
-    said = (
-        f"Of {len(own)} comparisons of a published value with a model that was not made from it, "
-        f"{within} agree: within the published spread or, where none is published, within "
-        f"{100 * DIGITISED:g} %; in {without} the model has no wave, and "
-        f"{len(own) - within - without} miss, by a median factor of {significant(_median(own), 2)}"
-    )
-    if far:
-        at = f" at {far.frequency:g} Hz" if far.frequency == far.frequency else ""
-        said += (
-            f", and by {significant(far.miss, 2)} at most ({far.published.name}, {far.body}{at}, "
-            f"{far.outcome} it)"
+        row for what, speed in sweep.optima().items()
+        for row in compared(
+            replace(OPTIMUM, name=f"{OPTIMUM.name}, {what}, {1e3 * sweep.perimeter:g} mm around"),
+            body, [speed],
         )
-    return f"{said}. {built} more are of presets that were made from the source, and prove nothing."
-
-
-def _median(rows: Iterable[Compared]) -> float:
-    """Median factor of the rows that miss."""
-    return float(np.median([row.miss for row in rows if row.outcome in (ABOVE, BELOW)] or [1.0]))
-
-
-def _of_quantity(rows: Iterable[Compared], quantity: str, words: str) -> str:
-    own = [row for row in _own(rows) if row.published.quantity.name == quantity]
-    parts = []
-    for outcome in (BELOW, ABOVE):
-        missed = [row for row in own if row.outcome == outcome]
-        if missed:
-            parts.append(
-                f"{outcome} the published in {len(missed)} of {len(own)}, by a median factor of "
-                f"{significant(_median(missed), 2)}"
-            )
-    return f"{words} are {' and '.join(parts)}." if parts else f"{words} all agree."
-
-
-def _of_all_sources(rows: Iterable[Compared], quantity: str) -> str:
-    """How far sources are from each other, and how often each preset is between them."""
-    band = [row for row in rows if row.published.name == f"{ALL}: {quantity}"]
-    apart = max(row.high / row.low for row in band)
-    inside = {
-        name: sum(row.outcome == WITHIN for row in band if row.body == name) for name in BODIES
-    }
-    each = ", ".join(f"{name} {count}" for name, count in inside.items())
-    return (
-        f"The sources themselves differ in {quantity} by a factor of up to {significant(apart, 2)} "
-        f"at one frequency; between the lowest and the highest of them are, of "
-        f"{len(band) // len(BODIES)} frequencies: {each}."
-    )
-
-
-def _optima(found: Validation) -> str:
-    low, high = OPTIMUM.lows[0], OPTIMUM.highs[0]
-    said = []
-    for name in found.sweeps:
-        own = [row for row in found.rows
-               if row.body == name
-               and row.published.name.startswith(f"{OPTIMUM.name}, largest")]  # fmt: skip
-        shown = " and ".join(significant(row.ours, 2) for row in own)
-        missed = [row for row in own if row.outcome != WITHIN]
-        outcome = ", ".join(f"{row.outcome} by {times(row.miss)}" for row in missed)
-        chosen = ", chosen by it" if own[0].is_built else ""
-        said.append(f"{name} at {shown} m/s ({outcome or 'within'}{chosen})")
-    around = " and ".join(f"{1e3 * each:g}" for each in PERIMETERS)
-    return (
-        f"On circles of {around} mm around the focus deflects most, where {low:g} to {high:g} m/s "
-        f"is published whatever the path: {'; '.join(said)}."
-    )
-
-
-def _of_harmonics(found: Sequence[Harmonics]) -> str:
-    said = []
-    for wave, words in FOUND.items():
-        right = [h.drive for h in found if h.wave == wave and h.agrees]
-        wrong = [h.drive for h in found if h.wave == wave and not h.agrees]
-        but = f", and not with {' and '.join(wrong)}" if wrong else ""
-        said.append(f"{wave} AM has {words} with the drive law {' and '.join(right)}{but}")
-    return f"As in the phantom, {'; '.join(said)}."
-
-
-def _of_zigzags(found: Validation) -> str:
-    said = []
-    for body in zigzag.BODIES_SHOWN:
-        own = [each for each in found.predicted if each.name == body]
-        most = max(own, key=lambda each: each.middle)
-        least = min(own, key=lambda each: each.middle)
-        said.append(
-            f"{body} moves most at {most.speed:g} m/s, {significant(1e3 * most.middle, 2)} mm/s "
-            f"RMS, and least at {least.speed:g} m/s, {significant(1e3 * least.middle, 2)} mm/s"
-        )
-    text = f"Under the zigzag {'; '.join(said)}"
-    if not found.measured:
-        return f"{text}: predictions, beside which no recording was given."
-    ratios = [
-        f"{significant(ratio, 2)} at {m.speed:g} m/s ({p.name})"
-        for m in found.measured for p in found.predicted if p.speed == m.speed
-        for ratio in [p.middle / m.middle]
     ]  # fmt: skip
-    if not ratios:
-        return f"{text}; no recording is of one of these speeds."
-    return f"{text}; predicted over measured, medians of the places: {', '.join(ratios)}."
 
 
-def _of_hand(found: Validation) -> str:
-    if found.hand is None:
-        return "Decay along a finger of a hand in finite elements was left out (--hand)."
-    lengths = [1e3 * row.ours for row in found.rows if row.body == found.hand.name]
-    claims = [f"{row.frequency:g} Hz: {row.words}" for row in found.rows
-              if row.body == found.hand.name]  # fmt: skip
-    shown = ", ".join(significant(x, 2) for x in lengths)
-    return f"Along a finger of the hand motion falls to 1/e in {shown} mm ({'; '.join(claims)})."
+def compare_finger(finger: Finger) -> list[Compared]:
+    """Rows of a finger beside the people of SkinSource, at the frequencies of the finger."""
+    at = [SKINSOURCE.frequencies.index(f) for f in finger.frequencies]
+    own = replace(
+        SKINSOURCE, frequencies=tuple(finger.frequencies), values=(nan,) * len(at),
+        lows=tuple(SKINSOURCE.lows[k] for k in at), highs=tuple(SKINSOURCE.highs[k] for k in at),
+    )  # fmt: skip
+    return compared(own, HAND, finger.lengths)
+
+
+def verdict(found: Validation) -> list[str]:
+    """What the comparisons come to, in sentences."""
+    single = [row for row in found.rows if not row.published.name.startswith(ALL)]
+    own = [row for row in single if not row.is_built]
+    within, missed = _count(own, WITHIN), [row for row in own if row.outcome in (ABOVE, BELOW)]
+    sentences = [
+        f"{within} of {len(own)} independent comparisons agree, within the published spread or "
+        f"{100 * DIGITISED:g} %; {len(missed)} miss, by a factor of {_median(missed)} in the "
+        f"median; in {_count(own, NONE)} the model has no wave. {len(single) - len(own)} more are "
+        "of presets that were fitted to the source, and are no evidence."
+    ]
+    for quantity, words in ((SPEED, "Phase speeds"), (LENGTH, "1/e lengths"),
+                            (EXPONENT, "Decay exponents")):  # fmt: skip
+        of = [row for row in own if row.published.quantity is quantity]
+        parts = [
+            f"{outcome} the published in {len(group)} of {len(of)}, by {_median(group)}"
+            for outcome in (BELOW, ABOVE)
+            if (group := [row for row in of if row.outcome == outcome])
+        ]
+        sentences.append(f"{words} are {' and '.join(parts) or 'all within'}.")
+    for quantity in (SPEED, LENGTH):
+        band = all_sources(quantity)
+        apart = max(high / low for low, high in zip(band.lows, band.highs, strict=True))
+        sentences.append(f"The sources themselves differ in {quantity.name} by a factor of up to "
+                         f"{significant(apart, 2)} at one frequency.")  # fmt: skip
+    optima = [f"{name} {' and '.join(significant(each.optima()['largest'], 2) for each in sweeps)}"
+              for name, sweeps in found.sweeps.items()]  # fmt: skip
+    around = " and ".join(f"{1e3 * each:g}" for each in predictions.PERIMETERS)
+    sentences.append(
+        f"Speeds in m/s of the largest deflection, on circles of {around} mm around, where "
+        f"{OPTIMUM.lows[0]:g} to {OPTIMUM.highs[0]:g} are published: {'; '.join(optima)}."
+    )
+    for wave, words in FOUND.items():
+        right = [h.drive for h in found.harmonics if h.wave == wave and h.agrees]
+        sentences.append(f"As in the phantom, {wave} AM has {words} with {' and '.join(right)}.")
+    if found.finger:
+        lengths = ", ".join(significant(1e3 * x, 2) for x in found.finger.lengths)
+        sentences.append(f"Along a finger of the hand motion falls to 1/e in {lengths} mm.")
+    return sentences
+
+
+def report(found: Validation) -> Report:
+    """The page, with its figures and validation.csv."""
+    rows = found.rows
+    sources = {row.published.name: row.published for row in rows}
+    harmonics = Table(
+        ["modulation", "drive law", "load, 2f", "load, 3f", "displacement, 2f", "displacement, 3f",
+         Column("as_published", "as published")],
+        [(h.wave, h.drive, *(_ratio(x) for x in (*h.load[1:], *h.motion[1:])), h.agrees)
+         for h in found.harmonics], name="harmonics",
+    )  # fmt: skip
+    return Report("Models beside published measurements", [" ".join(verdict(found))], [
+        _picture("factors", _factors, (10.5, 0.3 * len(sources) + 1.6), FACTORS, rows),
+        SCOPE,
+        _summary(rows),
+        Details("Every value", [_table(rows)]),
+        Section("Speed and decay of waves",
+                [_picture("waves", _waves, (11.5, 5.6), WAVES, found.curves)]),
+        Section("Speed of the focus at the largest deflection",
+                [_picture("focus-speed", _speeds, (10.5, 3.8), FOCUS, found.sweeps)]),
+        Section("Harmonics of amplitude-modulated radiation force", [HARMONICS, harmonics]),
+        Section("Sources", [Table(
+            ["set", "site", "conditions", "source", "how sure", "contradictions and assumptions"],
+            [(s.name, s.site, s.conditions, s.source, s.how, s.remark) for s in sources.values()],
+        )]),
+        Section("Published, and not compared",
+                [Table(["source", "what", "why not"], NOT_COMPARED)]),
+        Section("Presets", [Table(["name", "what it is"], list(predictions.WORDS.items()))]),
+    ])  # fmt: skip
+
+
+def _count(rows: Iterable[Compared], outcome: str) -> int:
+    return sum(row.outcome == outcome for row in rows)
+
+
+def _median(rows: Iterable[Compared]) -> str:
+    """Median factor of rows that miss."""
+    return significant(float(np.median([row.miss for row in rows] or [1.0])), 2)
+
+
+def _ratio(x: float) -> float:
+    """A ratio of harmonics, 0 of what is round-off."""
+    return float(x) if x > predictions.ABSENT else 0.0
+
+
+def _summary(rows: Sequence[Compared]) -> Table:
+    """A row for each set and preset: how many values agree, and the median factor of the others."""
+    groups: dict[tuple[str, str], list[Compared]] = {}
+    for row in rows:
+        groups.setdefault((row.published.name, row.body), []).append(row)
+    return Table(
+        ["set", "preset", "fitted to it or predicts it", "values", WITHIN, BELOW, ABOVE, NONE,
+         "median factor of a miss"],
+        [(name, body, "fitted" if group[0].is_built else "predicts", len(group),
+          *(_count(group, outcome) for outcome in (WITHIN, BELOW, ABOVE, NONE)),
+          _median(row for row in group if row.outcome in (ABOVE, BELOW)))
+         for (name, body), group in groups.items()],
+    )  # fmt: skip
+
+
+def _table(rows: Sequence[Compared]) -> Table:
+    """Every published value and preset."""
+
+    def cells(row: Compared) -> list[Any]:
+        of = row.published
+        low, high = (row.low, row.high) if of.lows else (nan, nan)
+        numbers = (x / of.quantity.size for x in (row.value, low, high, row.ours))
+        return [of.name, of.site, of.quantity.name, of.quantity.unit, row.frequency, row.body,
+                *numbers, row.factor, row.outcome, row.is_built, of.how, of.source]  # fmt: skip
+
+    return Table(
+        ["set", "site", "quantity", "unit", Column("frequency_hz", "frequency", "Hz"), "body",
+         "published", Column("published_low", "lowest"), Column("published_high", "highest"),
+         "ours", Column("ours_over_nearest_published", "factor"), "outcome",
+         Column("preset_made_from_it", "fitted"), "how", "source"],
+        map(cells, rows), name="validation",
+    )  # fmt: skip
+
+
+def _picture(
+    name: str, draw: Callable[[Figure, Any], None], size: tuple[float, float], caption: str,
+    of: Any,
+) -> Picture:  # fmt: skip
+    with mpl.rc_context(REPORT.rc):
+        figure = Figure(figsize=REPORT.size(*size), layout="constrained")
+        draw(figure, of)
+    return Picture(png(figure), caption, name)
+
+
+def _style(name: str) -> dict[str, Any]:
+    """Colour and line of a preset: half-spaces solid, layers dashed."""
+    return {"color": COLOURS[name], "ls": "-" if BODIES[name].depth == inf else "--"}
+
+
+def _factors(figure: Figure, rows: Sequence[Compared]) -> None:
+    """Ours over the nearest published value, a line of points for each set."""
+    ax, names = figure.subplots(), list(dict.fromkeys(row.published.name for row in rows))
+    ax.axvspan(1 - DIGITISED, 1 + DIGITISED, color=BAND, lw=0)
+    for row in (row for row in rows if row.factor == row.factor):
+        offset, colour = (list(COLOURS).index(row.body) - 3) / 9, COLOURS[row.body]
+        ax.plot(
+            np.clip(row.factor, 1 / FURTHEST, FURTHEST), names.index(row.published.name) + offset,
+            "o", ms=4, mew=1, color=colour, mfc="none" if row.is_built else None,
+        )  # fmt: skip
+    ax.set(xscale="log", xlim=(0.9 / FURTHEST, FURTHEST / 0.9), ylim=(len(names) - 0.5, -0.5),
+           xlabel="ours over the nearest published value")  # fmt: skip
+    ticks = [0.1, 0.2, 0.5, 1, 2, 5, 10]
+    ax.set_xticks(ticks, [f"{x:g}" for x in ticks])
+    ax.minorticks_off()
+    ax.set_yticks(range(len(names)), names)
+    ax.grid(alpha=0.25)
+    marks = [Line2D([], [], color=c, marker="o", ls="", ms=4, label=n) for n, c in COLOURS.items()]
+    figure.legend(handles=marks, loc="outside upper right", ncols=7, fontsize=8, frameon=False)
+
+
+def _waves(figure: Figure, curves: Mapping[str, Curves]) -> None:
+    """Phase speed and 1/e length by frequency: sources as points, presets as lines."""
+    for ax, quantity in zip(figure.subplots(1, 2), (SPEED, LENGTH), strict=True):
+        _sources(ax, quantity)
+        for name, c in curves.items():
+            shown = c.frequencies >= 10
+            ends = 1 + np.flatnonzero(np.diff(c.mode[shown]))  # where another mode leads
+            values = (c.speed if quantity is SPEED else c.length) / quantity.size
+            parts = (np.split(x[shown], ends) for x in (c.frequencies, values))
+            for f, y in zip(*parts, strict=True):
+                ax.plot(f, y, lw=1.3, **_style(name))
+        ax.set(xlim=(-15, 720), xlabel="frequency, Hz", ylabel=f"{quantity.name}, {quantity.unit}")
+        ax.set(**{"ylim": (0, 20)} if quantity is SPEED else {"yscale": "log", "ylim": (1, 300)})
+        ax.grid(alpha=0.25)
+        ax.legend(fontsize=7, frameon=False, loc="upper right")
+    handles = [Line2D([], [], label=name, **_style(name)) for name in curves]
+    figure.legend(handles=handles, loc="outside upper center", ncols=6, fontsize=8, frameon=False)
+
+
+def _sources(ax: Axes, quantity: Quantity) -> None:
+    """Published values with their spread, or their range alone, and the range of all of them."""
+    size, whole = quantity.size, all_sources(quantity)
+    low, high = (np.array(x) / size for x in (whole.lows, whole.highs))
+    ax.fill_between(whole.frequencies, low, high, color=BAND, lw=0, zorder=0)
+    sets = [each for each in wave_sets() if each.quantity is quantity]
+    for marker, each in zip(MARKERS, sets, strict=False):
+        low, high = np.array([each.between(k) for k in range(len(each.values))]).T / size
+        middle = np.where(np.isnan(each.values), (low + high) / 2, np.array(each.values) / size)
+        errors = np.stack([middle - low, high - middle]) if each.lows else None
+        ax.errorbar(each.frequencies, middle, errors, fmt=marker, ms=5, color="k", mfc="w", lw=1,
+                    capsize=2, label=f"{each.name}, {each.site}", zorder=3)  # fmt: skip
+
+
+def _speeds(figure: Figure, sweeps: Mapping[str, tuple[Sweep, ...]]) -> None:
+    """Largest deflection on the path over the speed of the focus, a panel for each perimeter."""
+    axes = figure.subplots(1, len(predictions.PERIMETERS), sharey=True)
+    for k, ax in enumerate(axes):
+        ax.axvspan(OPTIMUM.lows[0], OPTIMUM.highs[0], color=BAND, lw=0)
+        for name, of_body in sweeps.items():
+            each = of_body[k]
+            ax.plot(each.speeds, each.largest / each.largest.max(), label=name, **_style(name))
+            ax.plot(each.optima()["largest"], 1, "v", color=COLOURS[name], ms=6)
+        ax.set(title=f"circle of {1e3 * predictions.PERIMETERS[k]:g} mm around", ylim=(0, 1.08),
+               xlabel="speed of the focus, m/s")  # fmt: skip
+        ax.grid(alpha=0.25)
+    axes[0].set_ylabel("largest deflection over its maximum")
+    axes[-1].legend(fontsize=8, frameon=False)

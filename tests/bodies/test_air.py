@@ -25,7 +25,7 @@ from skinwave.scene.scene import BODIES, Body, Placement, Scene
 from skinwave.studies.assumptions import relaxed
 from skinwave.studies.tradeoff import candidates
 from skinwave.verify import references
-from skinwave.verify.exact import PAPER
+from skinwave.verify.plates import PAPER
 
 SHEET = replace(BODIES["paper-sheet-loose"], width=0.06, height=0.05, air=True)
 PATH = Trajectory(shape="circle", size=0.01, speed=4.0)

@@ -5,8 +5,8 @@ import pytest
 
 from bench.layered_skin import RANGES, residuals, values_of, with_values
 from skinwave.bodies import BODIES
+from skinwave.verify.predictions import leading_wave
 from skinwave.verify.published import OPTIMUM, wave_sets
-from skinwave.verify.published_waves import leading_wave
 
 
 @pytest.mark.parametrize(

@@ -24,8 +24,8 @@ from skinwave.studies.relax import Hierarchy, HierarchyStep
 from skinwave.studies.tradeoff import Candidate, Measured, Study
 from skinwave.system import document
 from skinwave.system.document import Markup
-from skinwave.verify import page as verify_page
-from skinwave.verify.case import Case, Check, Entry, Result
+from skinwave.verify import suite
+from skinwave.verify.case import Case, Check, Result
 
 FIRST_ASSUMPTION = next(iter(ASSUMPTIONS))
 # Begins as HTML of a cell did, and leaves an attribute, a title, an element of text and a frame.
@@ -82,11 +82,12 @@ def traded(folder):
 
 def verified(folder):
     check = Check(what=HOSTILE, value=1.0, reference=1.0, error=0.0, bar=0.1, unit=HOSTILE)
-    case = Case(title=HOSTILE, source=HOSTILE, mesh=HOSTILE, checks=(check,), note=HOSTILE,
-                said=HOSTILE)  # fmt: skip
-    entry = Entry(name=HOSTILE, topic=HOSTILE, run=lambda: case)
-    shown = verify_page.page([Result(entry=entry, case=case, seconds=1.0)], [entry], 0)
-    (folder / "index.html").write_text(shown, encoding="utf-8")
+    found = Case(name=HOSTILE, title=HOSTILE, source=HOSTILE, mesh=HOSTILE, note=HOSTILE,
+                 slow=False, checks=lambda: [check])  # fmt: skip
+    result = Result(case=found, checks=(check,), seconds=1.0, error=HOSTILE)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(suite, "TOPICS", {HOSTILE: (found,)})
+        suite.page([result], 1).write(folder)
 
 
 def mechanised(folder):

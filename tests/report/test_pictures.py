@@ -495,12 +495,12 @@ def test_a_run_of_one_model_has_a_report_too(tmp_path, monkeypatch, capsys):
     assert "keeps no motion of whole bodies" in capsys.readouterr().err
 
 
-def test_the_doctor_names_what_there_is_and_what_is_missing(capsys):
-    assert main(["doctor", "--json"]) == 0
-    found = {row["what"]: row for row in json.loads(capsys.readouterr().out)}
+def test_the_installation_names_what_there_is_and_what_is_missing(capsys):
+    assert main(["verify", "--installation", "--json"]) == 0
+    found = {row["what"]: row for row in json.loads(capsys.readouterr().out)["findings"]}
     assert {"python", "pyvista", "solver", "renderer", "threads"} <= set(found)
     assert bool(found["renderer"]["cure"]) != renderer().found
-    assert main(["doctor"]) == 0
+    assert main(["verify", "--installation"]) == 0
     assert "superlu" in capsys.readouterr().out
 
 

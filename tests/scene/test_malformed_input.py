@@ -17,7 +17,7 @@ from skinwave.planning.simulate import compute
 SCENES, COMMANDS, MESHES = corpus.scenes(), corpus.command_lines(), corpus.broken_meshes()
 MORE_COMMANDS = [
     ["run", "good.toml", "--model", "fem", "--h", "nan", "--out", "new/below"],
-    ["tradeoff", "none.toml"],
+    ["verify", "--tradeoff", "none.toml"],
 ]
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="paths differ")
 
@@ -57,7 +57,7 @@ def test_the_corpus_is_large_and_the_same_every_time():
 @pytest.mark.parametrize("name", SCENES)
 def test_no_scene_is_refused_in_one_line(folder, capsys, name):
     (folder / "wrong.toml").write_bytes(SCENES[name])
-    command = ("run", "compare", "plan", "tradeoff")[len(name) % 4]
+    command = ("run", "compare", "plan")[len(name) % 3]
     assert "wrong.toml: " in said(capsys, folder, [command, "wrong.toml"])
 
 

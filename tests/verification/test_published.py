@@ -1,0 +1,176 @@
+"""Published measurements beside the models: factors, closed forms, the command."""
+
+from dataclasses import replace
+from math import inf, nan
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.special import i0e
+
+from simple_model.load.focus import spot_width
+from skinwave.commands.cli import main
+from skinwave.system.effort import silent
+from skinwave.verify import predictions
+from skinwave.verify.predictions import BODIES, Finger, decay_exponents, focus_speeds, leading_wave
+from skinwave.verify.published import (
+    LENGTH,
+    OPTIMUM,
+    SPEED,
+    all_sources,
+    rayleigh_wave,
+    voigt_lengths,
+    wave_sets,
+)
+from skinwave.verify.validation import (
+    ABOVE,
+    BELOW,
+    NONE,
+    WITHIN,
+    compare_finger,
+    compare_waves,
+    compared,
+)
+
+SPREAD = replace(
+    OPTIMUM, frequencies=(1.0, 2.0, 3.0, 4.0, 5.0), values=(nan,) * 5, lows=(2.0,) * 5,
+    highs=(4.0,) * 5,
+)  # fmt: skip
+COARSE = np.arange(50.0, 701.0, 50.0)  # Hz, so as to be quick
+HAND = Path(__file__).parents[2] / "examples/hand/generic-hand-right.glb"
+
+
+def test_a_factor_is_to_the_nearer_end_of_the_spread():
+    rows = compared(SPREAD, "palm-layers", [1.0, 3.0, 8.0, nan, inf])
+    assert [row.outcome for row in rows] == [BELOW, WITHIN, ABOVE, NONE, ABOVE]
+    assert [row.factor for row in rows[:3]] == [0.5, 1.0, 2.0]
+    assert not rows[0].is_built
+    assert compared(SPREAD, "palm", [1.0])[0].is_built
+
+
+def test_without_a_spread_agreement_is_as_near_as_a_curve_is_read():
+    alone = replace(SPREAD, values=(3.0,) * 5, lows=(), highs=())
+    rows = compared(alone, "palm", [3.1, 2.9, 3.2, 2.0, 6.0])
+    assert [row.outcome for row in rows] == [WITHIN, WITHIN, ABOVE, BELOW, ABOVE]
+
+
+def test_voigt_lengths_are_those_of_the_closed_form_and_within_their_spread():
+    """With mu = 7.86 kPa and 5.03 Pa s the 1/e length is 7.3 mm at 200 Hz, the speed 3.22 m/s."""
+    speed, length = rayleigh_wave(7.86e3, 5.03, 200.0)
+    assert speed == pytest.approx(3.22, abs=0.005)
+    assert length == pytest.approx(7.3e-3, abs=5e-5)
+    found = voigt_lengths()
+    assert found.values[1] == pytest.approx(length)
+    assert (np.array(found.lows) < found.values).all()
+    assert (np.array(found.highs) > found.values).all()
+
+
+@pytest.fixture(scope="module")
+def curves():
+    return {name: leading_wave(body, COARSE) for name, body in BODIES.items()}
+
+
+def test_the_wave_of_a_half_space_is_that_of_the_closed_form(curves):
+    f = np.array([100.0, 200.0, 700.0])
+    expected = np.array([rayleigh_wave(25e3, 5.0, x) for x in f]).T
+    assert curves["palm"].at(SPEED, f) == pytest.approx(expected[0], rel=2e-4)
+    assert curves["palm"].at(LENGTH, f) == pytest.approx(expected[1], rel=2e-4)
+
+
+def test_a_layer_on_bone_has_no_wave_at_rest():
+    slab = leading_wave(BODIES["skin-slab"])
+    assert np.isnan(slab.at(SPEED, np.array([0.0, 50.0]))).all()
+    # 15 mm and c_s = 5 m/s: nothing propagates below a quarter of a shear wave, 83 Hz.
+    assert slab.frequencies[np.isfinite(slab.speed)][0] == pytest.approx(83, abs=10)
+
+
+def test_an_exponent_at_rest_is_that_of_the_closed_form_and_grows_with_loss():
+    """Statically a Gaussian spot deflects a half-space as exp(-x) I_0(x), x = r^2 / 4 s^2."""
+    r = np.geomspace(0.010, 0.040, 12)
+    at_rest, moving = decay_exponents(BODIES["palm"], np.array([0.01, 300.0]))
+    static = i0e(r**2 / (4 * spot_width(0.200) ** 2))
+    assert at_rest == pytest.approx(-np.polyfit(np.log(r), np.log(static), 1)[0], abs=1e-3)
+    # Where waves outweigh the near field, they spread as r^-1/2 and lose exp(-r/L).
+    wave = -0.5 * np.log(r) - r / rayleigh_wave(25e3, 5.0, 300.0)[1]
+    assert moving == pytest.approx(-np.polyfit(np.log(r), wave, 1)[0], abs=0.05)
+
+
+def test_all_sources_span_each_of_them():
+    both = all_sources(SPEED), all_sources(LENGTH)
+    assert np.array(both[0].lows)[[0, 1, 3]].tolist() == [8.0, 3.06, 5.0]
+    assert np.array(both[0].highs)[[0, 1, 3]].tolist() == [18.0, 10.0, 10.0]
+    assert both[1].highs[1] == pytest.approx(0.081)
+    assert both[1].frequencies == (100.0, 200.0, 300.0, 400.0)  # beyond, Potts alone
+
+
+def test_each_published_set_has_a_source_and_a_row_for_each_of_its_bodies(curves):
+    rows = compare_waves(curves)
+    for each in wave_sets():
+        assert each.source
+        assert set(each.built) <= set(BODIES)
+        assert {len(each.values), len(each.frequencies)} == {len(each.frequencies)}
+        own = [row for row in rows if row.published.name == each.name]
+        assert len(own) == len(each.bodies) * len(each.frequencies)
+    built = {(row.published.name, row.body) for row in rows if row.is_built}
+    assert ("Zhang: speed", "forearm") in built
+
+
+def test_the_optimum_of_a_half_space_is_near_its_surface_wave():
+    """Deflection of the half-space forearm at 2, 3 and 5 m/s: 0.402, 0.409, 0.309 um/Pa."""
+    found = focus_speeds(BODIES["forearm"], 0.100)
+    at = {v: 1e6 * u for v, u in zip(found.speeds, found.largest, strict=True)}
+    assert [at[2.0], at[3.0], at[5.0]] == pytest.approx([0.402, 0.409, 0.309], abs=6e-4)
+    assert 2.4 < found.optima()["largest"] < 3.3
+    assert np.isnan(predictions.top(np.arange(3.0), np.array([3.0, 2.0, 1.0])))
+    assert predictions.top(np.arange(5.0), -((np.arange(5.0) - 2.3) ** 2)) == pytest.approx(2.3)
+
+
+def test_harmonics_of_the_load_are_those_of_the_drive_law():
+    found = {(h.wave, h.drive): h for h in predictions.harmonics()}
+    squared = found["sine", "pressure_squared"]
+    assert squared.load == pytest.approx([1, 0.25, 0], abs=1e-6)
+    # At 140 Hz the compliance of this half-space at 2f is 0.63 of that at f.
+    assert squared.motion[1] == pytest.approx(0.63 * 0.25, abs=2e-3)
+    assert squared.agrees
+    assert not found["sine", "force_corrected"].agrees
+    square = found["square", "pressure_squared"]
+    assert square.load == pytest.approx([1, 0, 1 / 3], abs=2e-3)
+    assert square.agrees
+
+
+def test_a_finger_is_compared_at_its_own_frequencies():
+    finger = Finger(frequencies=np.array([200.0, 300.0]), lengths=np.array([0.020, 0.045]), dofs=1)
+    rows = compare_finger(finger)
+    assert [row.frequency for row in rows] == [200.0, 300.0]
+    assert rows[0].factor == pytest.approx(20 / 42)
+    assert rows[1].outcome == WITHIN
+
+
+def test_a_hand_loses_more_along_its_finger_at_a_higher_frequency(monkeypatch):
+    """Coarse: by 6.5 mm the lengths are 23, 14 and 9.8 mm at 200, 300 and 400 Hz."""
+    monkeypatch.setattr(predictions, "HAND_SIZE", 0.014)
+    found = predictions.along_finger(HAND, silent, (200.0, 300.0))
+    assert found.dofs > 10_000
+    assert found.lengths == pytest.approx([0.023, 0.014], rel=0.2)
+    assert compare_finger(found)[1].outcome == BELOW
+
+
+@pytest.mark.parametrize("asked", [["--published", "--hand", "no-hand.glb"], ["--hand", "x.glb"]])
+def test_command_refuses_in_one_sentence(tmp_path, monkeypatch, capsys, asked):
+    monkeypatch.chdir(tmp_path)
+    assert main(["verify", "--quiet", *asked]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not (tmp_path / "validation").exists()
+
+
+def test_command_writes_a_page_and_a_table(tmp_path, monkeypatch):
+    """With few speeds and frequencies, so as to be quick."""
+    monkeypatch.setattr(predictions, "SPEEDS", np.array([2.0, 5.0, 12.0]))
+    monkeypatch.setattr(predictions, "GRID", COARSE)
+    out = tmp_path / "out"
+    assert main(["verify", "--published", "-o", str(out), "--quiet"]) == 0
+    page = (out / "index.html").read_text("utf-8")
+    assert page.index("agree") < page.index('id="factors"') < page.index('id="waves"')
+    rows = (out / "validation.csv").read_text("utf-8").splitlines()
+    assert rows[0].startswith("set,site,quantity,unit,frequency_hz,body,published")
+    assert sum("Potts" in row for row in rows) == 8 * 8
