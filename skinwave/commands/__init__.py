@@ -7,7 +7,6 @@ from skinwave.commands import (
     compare,
     convert,
     dispersion,
-    film,
     fit,
     live,
     measured,
@@ -21,10 +20,9 @@ from skinwave.commands import (
     verify,
     web,
 )
-from skinwave.commands import map as map_command
 
 MODULES = (
-    run, compare, relax, dispersion, map_command, plan, sweep, plot, mesh, convert, verify, report,
-    film, live, web, measured, fit,
+    run, compare, relax, dispersion, plan, sweep, plot, mesh, convert, verify, report,
+    live, web, measured, fit,
 )  # fmt: skip
 COMMANDS = {module.__name__.rpartition(".")[2]: module for module in MODULES}

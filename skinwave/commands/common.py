@@ -5,7 +5,7 @@ import json
 import re
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from math import isfinite
 from pathlib import Path
@@ -15,8 +15,6 @@ from skinwave.models import names
 from skinwave.system.plain_text import say
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from simple_model import Response
     from skinwave.planning.records import Plan
     from skinwave.scene.scene import Scene
@@ -53,22 +51,6 @@ def add_width(parser: argparse.ArgumentParser) -> None:
         help="of every figure, for print, with letters of 8 points (subscripts 5.6): 3.5 or 7 for "
         "a journal",
     )  # fmt: skip
-
-
-def add_show(parser: argparse.ArgumentParser) -> None:
-    """Windows of the desktop."""
-    parser.add_argument("--show", action="store_true", help="open what was drawn in a window, too")
-
-
-def show(options: argparse.Namespace, figures: "Callable[[], Mapping[str, Figure]]") -> None:
-    """Open windows, if these are asked for; a warning where none can be opened."""
-    if options.show:
-        from skinwave.report.window import MISSING, has_windows, open_windows
-
-        if has_windows():
-            open_windows(figures())
-        else:
-            warn([MISSING])
 
 
 def add_mesh(parser: argparse.ArgumentParser) -> None:

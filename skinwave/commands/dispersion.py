@@ -2,20 +2,8 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from skinwave.commands.common import (
-    add_mesh,
-    add_output,
-    add_scene,
-    metre,
-    progress_of,
-    summarise,
-)
-
-if TYPE_CHECKING:
-    from skinwave.studies.dispersion_page import Observed
-    from skinwave.studies.driven_modes import DrivenModes
+from skinwave.commands.common import add_output, add_scene, summarise
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -25,25 +13,18 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--highest", type=float, default=650.0, metavar="HZ", help="up to which frequency"
     )
     parser.add_argument("--modes", type=int, default=6, metavar="N", help="how many modes, 1 to 12")
-    parser.add_argument(
-        "--model", choices=("fem", "flat-body"),
-        help="also the wavenumbers in the motion of a line of probes along x, by this model",
-    )  # fmt: skip
-    add_mesh(parser)
     add_output(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from skinwave.models.options import SolveOptions
     from skinwave.results import record
     from skinwave.results.outputs import output_folder
     from skinwave.scene.file import read
     from skinwave.scene.scene import check_load
-    from skinwave.studies.dispersion_page import observed_sentence, sentences, taken_as, write
+    from skinwave.studies.dispersion_page import sentences, taken_as, write
     from skinwave.studies.driven_modes import driven_modes
 
-    SolveOptions(solver=options.solver, h=metre(options.h))  # which refuses what is out of range
     if not 1 <= options.modes <= 12:
         raise ValueError(f"--modes {options.modes} is outside 1..12; give one of these")
     scene = read(options.scene)
@@ -52,19 +33,9 @@ def run(options: argparse.Namespace) -> int:
     out = options.out or Path(f"{options.scene.stem}-dispersion")
     inputs = [options.scene, scene.body.file]
     with output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
-        observed = _observed(options, found) if options.model else None
-        write(folder, found, observed)
+        write(folder, found)
         record.write(folder, record.of_command(options), scene=scene)
     said = [" ".join(sentences(found)), *taken_as(scene)]
-    said += [observed_sentence(observed)] if observed else []
     summary = {"out": str(out), "sentences": said}
     summarise(options, summary, "\n".join([*said, f"open {out}/index.html"]))
     return 0
-
-
-def _observed(options: argparse.Namespace, found: "DrivenModes") -> "Observed":
-    """Motion along a line of probes, and the waves in it."""
-    from skinwave.studies.dispersion_page import observe
-
-    with progress_of(options) as progress:
-        return observe(found, options.model, progress, h=metre(options.h), solver=options.solver)

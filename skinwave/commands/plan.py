@@ -9,16 +9,12 @@ from skinwave.commands.common import (
     add_model,
     add_reporting,
     add_scene,
-    add_show,
     required_plan,
-    show,
 )
 from skinwave.system.plain_text import say
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from skinwave.scene.scene import Scene
+    pass
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -26,7 +22,6 @@ def options(parser: argparse.ArgumentParser) -> None:
     add_scene(parser)
     add_model(parser)
     add_mesh(parser)
-    add_show(parser)
     add_reporting(parser)
 
 
@@ -48,11 +43,4 @@ def run(options: argparse.Namespace) -> int:
     width = [max(len(getattr(row, f)) for row in required.rows) for f in ("what", "value")]
     for row in required.rows:
         say(f"{row.what:<{width[0]}}  {row.value:<{width[1]}}  {row.reason}")
-    show(options, lambda: _figures(scene))
     return 0
-
-
-def _figures(scene: "Scene") -> "dict[str, Figure]":
-    from skinwave.report.scene_plot import scene_figure
-
-    return {scene.name: scene_figure(scene)}

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from skinwave.commands.common import add_reporting, add_show, add_width, show, summarise
+from skinwave.commands.common import add_reporting, add_width, summarise
 
 FORMATS = ("png", "svg", "pdf")
 PRESETS = ("speed",)
@@ -26,7 +26,6 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--format", choices=FORMATS, default="png")
     parser.add_argument("--style", default="report", help="report, talk or print")
     add_width(parser)
-    add_show(parser)
     parser.add_argument("-o", "--out", type=Path, metavar="DIR", help="default: DIR/figures")
     parser.add_argument("--overwrite", action="store_true", help="replace figures in that folder")
     parser.add_argument("--quiet", action="store_true", help="no summary")
@@ -84,5 +83,4 @@ def run(options: argparse.Namespace) -> int:
         dataset.enter(options.folder, name)
     said = "\n".join(f"wrote {path}" for path in paths)
     summarise(options, {"figures": [str(path) for path in paths], "runs": len(rows)}, said)
-    show(options, lambda: figures)
     return 0

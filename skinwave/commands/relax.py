@@ -3,15 +3,20 @@
 import argparse
 from pathlib import Path
 
-from skinwave.commands.common import add_output, add_size, metre, progress_of, summarise, warn
+from skinwave.commands.common import (
+    add_output,
+    add_scene,
+    add_size,
+    metre,
+    progress_of,
+    summarise,
+    warn,
+)
 
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
-    parser.add_argument(
-        "scene", metavar="SCENE", help="scene file, or paper-vs-skin: which mechanism makes which "
-        "line of the 15 Tactons",
-    )  # fmt: skip
+    add_scene(parser)
     add_size(parser, help="element size of all steps, mm")
     parser.add_argument(
         "--update-rate", type=float, default=20.0, metavar="KHZ",
@@ -31,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.results import record
     from skinwave.results.outputs import output_folder
     from skinwave.scene.file import read
-    from skinwave.studies.assumptions import DEVICE_RATES, check_rate
+    from skinwave.studies.assumptions import check_rate
     from skinwave.studies.relax import hierarchy_of
     from skinwave.studies.relax_page import efforts, sentence, write
     from skinwave.system import document
@@ -40,15 +45,8 @@ def run(options: argparse.Namespace) -> int:
     SolveOptions(h=h)  # which refuses what is out of range
     rate = 1e3 * options.update_rate
     check_rate(rate)
-    if options.scene == "paper-vs-skin":
-        if options.points is not None or rate != DEVICE_RATES[0]:
-            raise ValueError(
-                "--update-rate and --points are of a scene's path; paper-vs-skin draws its paths "
-                "without jumps, leave them out"
-            )
-        return _mechanisms(options, h)
     scene = read(options.scene)
-    out = options.out or Path(f"{Path(options.scene).stem}-relaxed")
+    out = options.out or Path(f"{options.scene.stem}-relaxed")
     inputs = [options.scene, scene.body.file]
     with output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
         with progress_of(options) as progress:
@@ -61,21 +59,4 @@ def run(options: argparse.Namespace) -> int:
     failed = [f"'{step.name}' failed: {step.error}" for step in found.steps if step.error]
     summary = {"out": str(out), "sentences": sentences, "failed": failed, "warnings": warnings}
     summarise(options, summary, "\n".join([*sentences, *failed, f"open {out}/index.html"]))
-    return 0
-
-
-def _mechanisms(options: argparse.Namespace, h: float | None) -> int:
-    from skinwave.results import record
-    from skinwave.results.outputs import output_folder
-    from skinwave.studies.mechanisms import paper_vs_skin, sentences, write
-
-    out = options.out or Path("paper-vs-skin")
-    with output_folder(out, overwrite=options.overwrite) as folder:
-        with progress_of(options) as progress:
-            found = paper_vs_skin(progress, h=h)
-        write(folder, found)
-        record.write(folder, record.of_command(options))
-    said = [*sentences(found), *found.failed]
-    summary = {"out": str(out), "sentences": said, "failed": list(found.failed)}
-    summarise(options, summary, "\n".join([*said, f"open {out}/index.html"]))
     return 0

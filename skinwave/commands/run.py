@@ -10,19 +10,15 @@ from skinwave.commands.common import (
     add_model,
     add_output,
     add_scene,
-    add_show,
     metre,
     progress_of,
     required_plan,
-    show,
     summarise,
     told,
     warn,
 )
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from skinwave.results.run import Run
 
 
@@ -39,7 +35,6 @@ def options(parser: argparse.ArgumentParser) -> None:
         help="samples of the scene's uncertain numbers, for bands and percentiles",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, default=0, help="of the samples")
-    add_show(parser)
     add_output(parser)
 
 
@@ -79,14 +74,7 @@ def run(options: argparse.Namespace) -> int:
         **told(response),
     }
     summarise(options, summary, f"{response.model}: wrote {out}/index.html")
-    show(options, lambda: _figures(run))
     return 0
-
-
-def _figures(run: "Run") -> "dict[str, Figure]":
-    from skinwave.report.figures import tacton_figure
-
-    return {run.tacton: tacton_figure(run.tacton, [run])}
 
 
 def _uncertainty(

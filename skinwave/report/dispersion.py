@@ -79,56 +79,6 @@ def dispersion_figure(
     return figure
 
 
-def wavenumber_figure(
-    curves: DispersionCurves,
-    spectrum: tuple[Floats, Floats, Floats],
-    fitted: tuple[Floats, Floats],
-    title: str,
-    style: Style = REPORT,
-) -> Figure:
-    """Magnitude over frequency and wavenumber of the motion of a line of probes, over the curves.
-
-    Parameters
-    ----------
-    curves : DispersionCurves
-    spectrum : frequencies (f,) in Hz, wavenumbers (k,) in 1/m, and magnitudes (f, k), 0..1 at each
-        frequency
-    fitted : frequencies (g,) in Hz and fitted wavenumbers (g,) in 1/m
-    title : str
-    style : Style
-
-    Returns
-    -------
-    Figure
-    """
-    f, k, magnitude = spectrum
-    with mpl.rc_context(style.rc):
-        figure = Figure(figsize=style.size(8.5, 5.6), layout="constrained")
-        ax = figure.add_subplot()
-        mesh = ax.pcolormesh(f, k, magnitude.T, cmap="Greys", vmin=0, vmax=1, shading="nearest")
-        for n, mode in enumerate(curves.modes):
-            fine, squared, wave = _fine(mode)
-            real = np.abs(np.sqrt(squared).real)
-            if wave[fine <= f[-1]].any():
-                ax.plot(fine, np.where(wave, real, np.nan), color=colour(n), lw=2, label=mode.name)
-        ax.plot(
-            *fitted,
-            "o",
-            mfc="none",
-            color="#A33C00",
-            ms=7,
-            mew=1.4,
-            label="fitted, where one mode leads and is resolved",
-        )
-        ax.set(xlim=(f[0], f[-1]), ylim=(0, k[-1]), xlabel="frequency, Hz",
-               ylabel="wavenumber Re k, rad/m")  # fmt: skip
-        ax.set_title(title, fontsize="medium", parse_math=False)
-        ax.legend(loc="upper left", fontsize=small())
-        bar = figure.colorbar(mesh, ax=ax)
-        bar.set_label("magnitude over the largest at each frequency")
-    return figure
-
-
 def _is_narrow(style: Style) -> bool:
     """Whether the shapes have room below the curves only."""
     return style.columns is not None and max(style.columns) < WIDE

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,11 +18,10 @@ from simple_model.quantities import DISPLACEMENT
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduction import from_rest, oscillating
 from skinwave.planning.assessment import told
-from skinwave.report.films import encoder
 from skinwave.report.palette import SIGNED
 from skinwave.results.exports import collection
 from skinwave.results.files import folder_name
-from skinwave.results.motion import Waves, check_values, probe_lines, probe_response, waves
+from skinwave.results.motion import BodyMotion, check_values, probe_lines, probe_response, waves
 from skinwave.results.outputs import output_file
 from skinwave.results.views import split
 from skinwave.scene.scene import Scene
@@ -31,13 +30,9 @@ from skinwave.system.progress_bar import reported
 
 if TYPE_CHECKING:
     import pyvista as pv
-    from matplotlib.animation import FuncAnimation
     from matplotlib.axes import Axes
-    from matplotlib.collections import TriMesh
-    from matplotlib.figure import Figure
 
 
-INTERVAL = 50  # ms between frames of a film
 NEAR = 0.5  # of a sampling interval: how far outside a time may be
 
 
@@ -94,12 +89,6 @@ class Field:
         """
         return _draw(self, self.frame(time), ax)
 
-    def animate(self, frames: int = 40, *, ax: Axes | None = None) -> FuncAnimation:
-        """The same as a film of so many of its times, evenly spaced; `.save("film.gif")` writes it,
-        or `.save("film.mp4")` with the extra [film]; `.to_jshtml()` shows it in a notebook.
-        """
-        return _animation(self, frames, ax)
-
     def save(self, path: str | Path, frames: int | None = None, *, overwrite: bool = False) -> Path:
         """Write a ParaView collection, `path` ending in .pvd, and a .vtu file beside it of each of
         so many times, evenly spaced, or of all; the path.
@@ -146,7 +135,7 @@ def field(
     with reported(progress) as report:
         moved = waves(scene, tolerance, report, h=h, solver=solver)
     check_values(len(times), len(moved.mesh.points))
-    displacement = (from_rest(moved.motion, times) @ moved.basis.T).reshape(len(times), -1, 3)
+    displacement = (from_rest(moved.motion, times) @ moved.own_basis.T).reshape(len(times), -1, 3)
     surface = replace(scene, depth=0.0, quantity=DISPLACEMENT.name)  # what is assessed is motion
     at_probes = assessed_probes(surface, moved, h, tolerance, solver)
     for sentence in at_probes.effort.warnings:
@@ -158,14 +147,14 @@ def field(
 
 
 def assessed_probes(
-    scene: Scene, moved: Waves, h: float | None, tolerance: float, solver: str
+    scene: Scene, moved: BodyMotion, h: float | None, tolerance: float, solver: str
 ) -> Response:
     """Response of the probes with its expected error, from a coarser mesh, and all warnings.
 
     Parameters
     ----------
     scene : Scene
-    moved : Waves, of the scene
+    moved : BodyMotion, of the scene
     h, tolerance, solver : as for `simulate`
 
     Returns
@@ -206,37 +195,21 @@ def _upper(field: Field) -> tuple[Ints, Ints]:
 
 def _draw(field: Field, k: int, ax: Axes | None) -> Axes:
     """A map of one frame, with its colour bar."""
-    ax = new_axes(ax)
-    image, pushed = _map(field, ax)
-    image.set_array(pushed[k])
-    ax.set_title(_stamp(field, k), fontsize="medium")
+    from matplotlib.tri import Triangulation
+
+    ax, (surface, triangles) = new_axes(ax), _upper(field)
+    x, y = 1e3 * field.mesh.points[surface, :2].T
+    pushed = -DISPLACEMENT.per_unit * field.displacement[:, surface, 2]
+    limit = float(np.abs(pushed).max()) or 1.0
+    image = ax.tripcolor(
+        Triangulation(x, y, triangles), pushed[k], shading="gouraud", cmap=SIGNED, vmin=-limit,
+        vmax=limit,
+    )  # fmt: skip
+    ax.set_aspect("equal")
+    ax.set(xlabel="x, mm", ylabel="y, mm")
+    ax.set_title(f"t = {1e3 * field.times[k]:.2f} ms", fontsize="medium")
+    ax.figure.colorbar(image, ax=ax, label=f"{DISPLACEMENT.words}, {DISPLACEMENT.shown}")
     return ax
-
-
-def _animation(field: Field, frames: int, ax: Axes | None) -> FuncAnimation:
-    """A film of some frames."""
-    from matplotlib import rc_context
-    from matplotlib.animation import FuncAnimation
-
-    class Film(FuncAnimation):
-        """An animation that is saved as GIF or, by the encoder of the extra [film], as MP4."""
-
-        def save(self, filename: Any, writer: Any = None, *rest: Any, **options: Any) -> None:
-            suffix = Path(filename).suffix
-            if writer is None and suffix == ".gif":
-                writer = "pillow"
-            with rc_context(encoder() if suffix == ".mp4" else {}):
-                super().save(filename, writer, *rest, **options)
-
-    ax = new_axes(ax)
-    image, pushed = _map(field, ax)
-
-    def show(k: int) -> tuple[Any, ...]:
-        image.set_array(pushed[k])
-        return image, ax.set_title(_stamp(field, k), fontsize="medium")
-
-    shown, figure = _spread(len(field.times), frames), cast("Figure", ax.figure)
-    return Film(figure, show, shown.tolist(), interval=INTERVAL)
 
 
 def _save(field: Field, path: Path, frames: int | None, *, overwrite: bool) -> Path:
@@ -253,33 +226,6 @@ def _save(field: Field, path: Path, frames: int | None, *, overwrite: bool) -> P
     with output_file(path, overwrite=overwrite) as file:
         file.write(collection(names, field.times[chosen].tolist()).encode())
     return path
-
-
-def _map(field: Field, ax: Axes) -> tuple[TriMesh, Floats]:
-    """Colours of a surface that are still to be set, and its displacement (t, s) as shown."""
-    from matplotlib.tri import Triangulation
-
-    surface, triangles = _upper(field)
-    x, y = 1e3 * field.mesh.points[surface, :2].T
-    pushed = -DISPLACEMENT.per_unit * field.displacement[:, surface, 2]
-    limit = float(np.abs(pushed).max()) or 1.0
-    image = ax.tripcolor(
-        Triangulation(x, y, triangles),
-        pushed[0],
-        shading="gouraud",
-        cmap=SIGNED,
-        vmin=-limit,
-        vmax=limit,
-    )
-    ax.set_aspect("equal")
-    ax.set_xlabel("x, mm")
-    ax.set_ylabel("y, mm")
-    ax.figure.colorbar(image, ax=ax, label=f"{DISPLACEMENT.words}, {DISPLACEMENT.shown}")
-    return image, pushed
-
-
-def _stamp(field: Field, k: int) -> str:
-    return f"t = {1e3 * field.times[k]:.2f} ms"
 
 
 def _spread(count: int, frames: int) -> Ints:

@@ -13,12 +13,11 @@ from matplotlib.ticker import MaxNLocator
 from meshes.tetmesh import Floats
 from simple_model import spectrum
 from simple_model.drawing import small
-from simple_model.quantities import Quantity
+from simple_model.numbers import with_unit
 from skinwave.report.palette import colour, inked, label, marker
 from skinwave.report.styles import NARROW, SHOWN, STYLES, TEXT, Style
 from skinwave.results.comparison import moving_rms
 from skinwave.results.run import Run
-from skinwave.system.numbers import significant
 
 REPORT = STYLES["report"]
 # Titles of the columns of a Tacton's figure.
@@ -123,22 +122,39 @@ def overview_figure(columns: dict[str, list[Run]], probe: int = 2) -> Figure:
     return figure
 
 
+def panels(
+    count: int, style: Style, width: float, height: float, below: float = 0.4
+) -> tuple[Figure, list[Axes]]:
+    """Maps in mm side by side, below each other in a narrow figure.
+
+    Parameters
+    ----------
+    count : of maps
+    style : Style
+    width, height : inch of each, at letters of 10 points
+    below : inch for a legend below them
+
+    Returns
+    -------
+    Figure, and count axes
+    """
+    size = style.size(width * count, height + below)
+    if style.is_narrow:
+        size = size[0], 0.8 * size[0] * count + 0.2 + below
+    figure = Figure(figsize=size, layout="constrained")
+    shape = (count, 1) if style.is_narrow else (1, count)
+    axes = figure.subplots(*shape, sharex=True, sharey=True, squeeze=False).ravel()
+    for ax in axes[-1:] if style.is_narrow else axes:
+        ax.set_xlabel("x, mm")
+    for ax in axes if style.is_narrow else axes[:1]:
+        ax.set_ylabel("y, mm")
+    return figure, list(axes)
+
+
 def answered(run: Run) -> str:
     """The name of a body and of the model of its response."""
     alone = run.body in ("none", run.model)
     return label(run.column) if alone else f"{label(run.body)} ({run.model})"
-
-
-def sized(value: float, unit: str, digits: int = 3) -> str:
-    """A pressure in Pa, or a motion in metre as µm, with its unit."""
-    if unit == "Pa":
-        return f"{significant(value, digits)} Pa"
-    return f"{significant(1e6 * value, digits)} µm"
-
-
-def measured(value: float, asked: Quantity, digits: int = 3) -> str:
-    """A value of a quantity in SI, with the unit that it is shown in."""
-    return f"{significant(asked.per_unit * value, digits)} {asked.shown}"
 
 
 def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> int:
@@ -149,7 +165,7 @@ def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> int:
     for run in runs:
         style: dict[str, Any] = {"color": inked(run.column), "marker": marker(run.column), "lw": 2}
         handles.append(figure.axes[0].plot([], [], **style)[0])
-        scale = measured(_largest(run, runs), run.response.record)
+        scale = with_unit(_largest(run, runs), run.response.record)
         labels.append(answered(run) + f", 1 = {scale}" * scales)
     kinds = dict.fromkeys(peak.kind for run in runs for peak in run.unnamed)
     if kinds:

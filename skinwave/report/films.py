@@ -65,20 +65,6 @@ def check_format(path: Path) -> None:
         )
 
 
-def encoder() -> dict[Any, Any]:
-    """Settings of matplotlib by which it writes MP4.
-
-    Raises
-    ------
-    ValueError
-        If the extra [film] is not installed.
-    """
-    check_format(Path("film.mp4"))
-    import imageio_ffmpeg
-
-    return {"animation.ffmpeg_path": imageio_ffmpeg.get_ffmpeg_exe()}
-
-
 def seam(view: View) -> str:
     """Part of a view's motion that is shown, and whether it repeats without a seam, in words."""
     span, whole = f"{significant(1e3 * view.period)} ms", speeds.period(view.scene.pressure)

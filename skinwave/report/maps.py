@@ -1,4 +1,4 @@
-"""Maps of a surface (matplotlib): where it moves, what differs, and how waves run over it."""
+"""How waves run over a surface: snapshots, and motion over place and time."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,21 +13,17 @@ from matplotlib.lines import Line2D
 
 from meshes.tetmesh import Floats
 from simple_model.drawing import small
-from simple_model.threshold import BAND
+from simple_model.numbers import with_unit
 from skinwave.models.speeds import mach_angle
-from skinwave.report.figures import sized
-from skinwave.report.palette import SEQUENTIAL, SIGNED, inked, label
+from skinwave.report.palette import SIGNED, inked, label
 from skinwave.report.styles import NARROW, Style
-from skinwave.results.views import Trace, View, path_points, spread_radius, starting_time
-from skinwave.scene.scene import Scene
+from skinwave.report.surfaces import draw_path
+from skinwave.results.views import Trace, View, starting_time
 
 PIXELS = 201  # of a map's side
-DEEPEST = -40.0  # dB shown
 FAINTEST = 0.1  # of the largest motion, below which that of a place is not brought up
 LINES = {"ray": ("surface wave", "dashed"), "track": ("focus", "solid")}  # of a trace
-DROPS = {-6: "solid", -20: "dashed"}
-THRESHOLD = "#ff2fd0"  # the detection contour
-MAP, LEGEND = 3.4, 0.4  # inch, side of a map and height of a legend
+MAP = 2.7  # inch, side of a snapshot
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -76,66 +72,14 @@ def carrier(view: View, places: Floats) -> Callable[[Floats], Floats]:
     return carried
 
 
-def decibel(view: View) -> Floats:
-    """RMS motion (s,) in dB below the view's own largest."""
-    largest = max(float(view.rms.max()), 1e-300)
-    return 20 * np.log10(np.maximum(view.rms, 1e-9 * largest) / largest)
-
-
-def rms_figure(views: Sequence[View], style: Style) -> Figure:
-    """RMS motion of each model over its own largest, with its spread and detection contour."""
-    raster = common_raster(views)
-    with mpl.rc_context(style.rc):
-        figure, axes = _panels(len(views), style)
-        for ax, view in zip(axes, views, strict=True):
-            sampled = sampler(view, raster)
-            level = sampled(decibel(view))
-            image = ax.imshow(level, cmap=SEQUENTIAL, vmin=DEEPEST, vmax=0, extent=raster.frame,
-                              origin="lower")  # fmt: skip
-            for drop, dashes in DROPS.items():
-                ax.contour(1e3 * raster.x, 1e3 * raster.y, level, [drop], colors="white",
-                           linewidths=1.3, linestyles=dashes)  # fmt: skip
-            _draw_borderline(ax, raster, sampled(np.maximum(view.sensation, -100.0)))
-            draw_path(ax, view.scene, "black")
-            radii = " / ".join(f"{1e3 * spread_radius(view, d):.0f}" for d in DROPS)
-            _title(ax, view, f"spread {radii} mm")
-        figure.colorbar(image, ax=list(axes), label="RMS motion, dB re the model's largest")
-        entries: dict[str, dict[str, Any]] = {
-            "-6 dB": {"color": "0.55", "ls": "solid"},
-            "-20 dB": {"color": "0.55", "ls": "dashed"},
-            "path of the focus": {"color": style.ink, "ls": "dotted"},
-        }
-        if any((view.sensation > 0).any() for view in views):
-            entries[f"detection threshold (and ±{BAND:g} dB)"] = {"color": THRESHOLD, "ls": "solid"}
-        _legend(figure, entries)
-    return figure
-
-
-def difference_figure(reference: View, views: Sequence[View], style: Style) -> Figure:
-    """By how many dB each model moves more or less than the reference, each re its own largest."""
-    raster = common_raster([reference, *views])
-    with mpl.rc_context(style.rc):
-        figure, axes = _panels(len(views), style, 0.0)
-        base = np.maximum(sampler(reference, raster)(decibel(reference)), DEEPEST)
-        for ax, view in zip(axes, views, strict=True):
-            more = np.maximum(sampler(view, raster)(decibel(view)), DEEPEST) - base
-            image = ax.imshow(more, cmap=SIGNED, vmin=DEEPEST, vmax=-DEEPEST, extent=raster.frame,
-                              origin="lower")  # fmt: skip
-            draw_path(ax, view.scene, "black")
-            _title(ax, view, f"minus {label(reference.column)}")
-        figure.colorbar(image, ax=list(axes), label="difference of RMS levels, dB")
-    return figure
-
-
 def snapshots_figure(views: Sequence[View], style: Style, count: int = 4) -> Figure:
     """The surface of each model, over its own largest motion, when the last of them moves most and
     after equal parts of a turn of the focus or, if it rests, of a period of the strongest tone.
     """
     count = min(count, 2) if style.is_narrow else count
     raster, frames = common_raster(views), _shown_frames(views[-1], count)
-    side = 0.8 * MAP
     with mpl.rc_context(style.rc):
-        size = style.size(side * count + 2.0, side * len(views) + 1.0)
+        size = style.size(MAP * count + 2.0, MAP * len(views) + 1.0)
         if style.is_narrow:
             size = size[0], 0.4 * size[0] * len(views) + 0.9
         figure = Figure(figsize=size, layout="constrained")
@@ -149,8 +93,9 @@ def snapshots_figure(views: Sequence[View], style: Style, count: int = 4) -> Fig
                 )  # fmt: skip
                 draw_path(ax, view.scene, "black")
                 _draw_focus(ax, view, float(view.times[frame]))
-            row[0].set_ylabel(f"{label(view.column)}\n±1 = {peak_text(view)}\ny, mm",
-                              color=inked(view.column))  # fmt: skip
+            largest = with_unit(view.peak, view.quantity)
+            name = f"{label(view.column)}\n±1 = {largest}\ny, mm"
+            row[0].set_ylabel(name, color=inked(view.column))
         for frame, ax in zip(frames, axes[0], strict=True):
             ax.set_title(f"{1e3 * views[0].times[frame]:.2f} ms")
         for ax in axes[-1]:
@@ -215,50 +160,6 @@ def waves_figure(views: Sequence[View], style: Style) -> Figure:
             lines = {said: {"color": style.ink, "ls": dashes} for said, dashes in LINES.values()}
             _legend(figure, lines)
     return figure
-
-
-def peak_text(view: View) -> str:
-    """The largest motion of a view with its unit."""
-    return sized(view.peak, view.unit)
-
-
-def _panels(count: int, style: Style, below: float = LEGEND) -> tuple[Figure, Sequence[Axes]]:
-    """Maps side by side, in mm, with so much room in inch for what stands below them."""
-    if style.is_narrow:
-        width = style.size(1, 1)[0]
-        figure = Figure(figsize=(width, 0.75 * width * count + 0.4 + below), layout="compressed")
-        axes = figure.subplots(count, 1, sharex=True, sharey=True, squeeze=False).ravel()
-        for ax in axes:
-            ax.set_ylabel("y, mm")
-        axes[-1].set_xlabel("x, mm")
-        return figure, list(axes)
-    figure = Figure(figsize=style.size(MAP * count + 1.2, MAP + 0.5 + below), layout="constrained")
-    axes = figure.subplots(1, count, sharex=True, sharey=True, squeeze=False)[0]
-    for ax in axes:
-        ax.set_xlabel("x, mm")
-    axes[0].set_ylabel("y, mm")
-    return figure, list(axes)
-
-
-def _title(ax: Axes, view: View, below: str) -> None:
-    ax.set_title(f"{label(view.column)}\n{below}", fontsize="medium")
-
-
-def draw_path(ax: Axes, scene: Scene, ink: str) -> None:
-    """The path of the focus, or the place where it rests."""
-    path = 1e3 * path_points(scene)
-    if len(path) > 1:
-        ax.plot(*path.T, color=ink, ls="dotted", lw=1.2)
-    else:
-        ax.plot(*path.T, color=ink, marker="+", ls="none")
-
-
-def _draw_borderline(ax: Axes, raster: Raster, level: Floats) -> None:
-    """Where the strongest line is at its threshold, and the band about that."""
-    for drop, width, dashes in ((-BAND, 0.7, "dotted"), (0.0, 1.6, "solid"), (BAND, 0.7, "dotted")):
-        if np.nanmin(level) < drop < np.nanmax(level):
-            ax.contour(1e3 * raster.x, 1e3 * raster.y, level, [drop], colors=THRESHOLD,
-                       linewidths=width, linestyles=dashes)  # fmt: skip
 
 
 def _draw_focus(ax: Axes, view: View, time: float) -> None:

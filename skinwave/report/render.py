@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshes.tetmesh import Floats, Ints, boundary_facets
-from simple_model.quantities import quantity
+from simple_model.quantities import PRESSURE, quantity
 from skinwave.report.maps import carrier
 from skinwave.report.palette import SEQUENTIAL, SIGNED, colour, label
 from skinwave.report.styles import Style
@@ -54,7 +54,7 @@ def exaggeration(view: View) -> float:
     """By what motion is multiplied so that it is seen: 1, 2 or 5 times a power of ten; 0 of the
     point kernel, in which nothing moves.
     """
-    if view.unit == "Pa":
+    if view.quantity is PRESSURE:
         return 0.0
     most = SHOWN * float(np.ptp(view.places[:, 0])) / view.peak
     power = 10.0 ** floor(log10(most))
@@ -153,8 +153,8 @@ def scale(views: Sequence[View]) -> tuple[tuple[float, float], str]:
     if len(views) > 1:
         return (-1.0, 1.0), "over the\nlargest\n"
     view = views[0]
-    most, unit = (view.peak, "Pa") if view.unit == "Pa" else (1e6 * view.peak, "µm")
-    return (-most, most), f"{unit}\n"
+    most = view.quantity.per_unit * view.peak
+    return (-most, most), f"{view.quantity.shown}\n"
 
 
 def prepared(view: View, cut: bool = False) -> Panel:

@@ -44,15 +44,6 @@ def draw(scene: "Scene", ax: "Axes | None") -> "Axes":
     return ax
 
 
-def scene_figure(scene: "Scene") -> "Figure":
-    """The same as a figure of its own."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(6.0, 5.6), layout="constrained")
-    draw(scene, figure.subplots())
-    return figure
-
-
 def draw_body(ax: "Axes", body: "Body", symmetry: str = "") -> None:
     """Draw the outline of a body from above; of one that is halved, shade the half that is
     modelled. The surface of a file or of none is not known here.

@@ -27,7 +27,7 @@ def turntable(view: View, frame: int) -> str:
     frequencies, upwards = motion_lines(view.motion[:, nodes, 2], view.period)
     paths, foci = focus_places(view.scene.pressure, view.times)
     data = {
-        "title": label(view.column), "unit": view.unit, "period": view.period,
+        "title": label(view.column), "unit": view.quantity.unit, "period": view.period,
         "time": float(view.times[frame]), "frequencies": frequencies.tolist(),
         "motion": quantised(upwards), "points": _binary(1e3 * view.points[nodes], "<f4"),
         "triangles": _binary(triangles, "<u4"), "path": paths.tolist(), "foci": foci.tolist(),

@@ -1,6 +1,7 @@
 """Motion of a whole body, for pictures."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -26,9 +27,15 @@ MOST_VALUES = 500_000_000  # of the motion of a whole body, 4 GB
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class DrivenBody:
-    """All of a meshed body's motion under a load: `basis` (3 n, r) of the nodes of the mesh times
-    `motion` in reduced coordinates (r,).
+class BodyMotion:
+    """Motion of a meshed body under a load, line by line.
+
+    Parameters
+    ----------
+    build : Build, with the mesh
+    basis : (3 n, r) float, of all nodes of that mesh
+    motion : ReducedResponse, in reduced coordinates (r,)
+    effort : Effort
     """
 
     build: Build
@@ -36,38 +43,38 @@ class DrivenBody:
     motion: reduction.ReducedResponse
     effort: Effort
 
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Waves:
-    """The same of the `mesh` alone that is the body, whose nodes are the `nodes` (n,) of the one
-    that is `driven`, which may have an absorbing layer around it.
-    """
-
-    mesh: TetMesh
-    nodes: Ints
-    basis: Floats
-    driven: DrivenBody
+    @cached_property
+    def _own(self) -> tuple[TetMesh, Ints]:
+        mesh, drag = self.build.mesh, self.build.drag
+        return (mesh, np.arange(len(mesh.points))) if drag is None else part(mesh, drag == 0)
 
     @property
-    def motion(self) -> reduction.ReducedResponse:
-        """Its motion in reduced coordinates."""
-        return self.driven.motion
+    def mesh(self) -> TetMesh:
+        """The mesh of the body itself, without an absorbing layer around it."""
+        return self._own[0]
 
     @property
-    def effort(self) -> Effort:
-        """Its cost."""
-        return self.driven.effort
+    def nodes(self) -> Ints:
+        """Its nodes (m,) among all nodes."""
+        return self._own[1]
+
+    @cached_property
+    def own_basis(self) -> Floats:
+        """Rows (3 m, r) of the basis of these nodes."""
+        if self.build.drag is None:
+            return self.basis
+        each = self.basis.reshape(-1, 3, self.basis.shape[1])
+        return each[self.nodes].reshape(3 * len(self.nodes), -1)
 
 
-def probe_lines(scene: Scene, moved: Waves) -> reduction.ReducedResponse:
+def probe_lines(scene: Scene, moved: BodyMotion) -> reduction.ReducedResponse:
     """Components of the quantity that the probes of a scene read, from its body's motion."""
-    build = moved.driven.build
-    rows, solids = probe_rows(scene.body, build, scene.probe_points, scene.reading)
-    seen = reduction.read_at(moved.motion, rows @ moved.driven.basis)
+    rows, solids = probe_rows(scene.body, moved.build, scene.probe_points, scene.reading)
+    seen = reduction.read_at(moved.motion, rows @ moved.basis)
     return in_motion(seen, scene.reading.asked, solids)
 
 
-def probe_response(scene: Scene, moved: Waves) -> Response:
+def probe_response(scene: Scene, moved: BodyMotion) -> Response:
     """Quantity that the probes of a scene read, from its body's motion."""
     times, points, asked = sample_times(scene), scene.probe_points, scene.reading.asked
     components = reduction.from_rest(probe_lines(scene, moved), times)
@@ -84,7 +91,7 @@ def waves(
     *,
     h: float | None = None,
     solver: str = "auto",
-) -> Waves:
+) -> BodyMotion:
     """Motion of a whole body at any times, as `skinwave.field` reads it; raises what that does."""
     if scene.load.gravity:
         raise ValueError(
@@ -94,13 +101,7 @@ def waves(
         raise ValueError(
             "the motion of a whole body is that on a support at rest; leave support_motion out"
         )
-    moved = driven(scene, tolerance, progress, h=h, solver=solver)
-    mesh, basis = moved.build.mesh, moved.basis
-    nodes = np.arange(len(mesh.points))
-    if moved.build.drag is not None:  # the layer around a body is none of it
-        mesh, nodes = part(mesh, moved.build.drag == 0)
-        basis = basis.reshape(-1, 3, basis.shape[1])[nodes].reshape(3 * len(nodes), -1)
-    return Waves(mesh=mesh, nodes=nodes, basis=basis, driven=moved)
+    return driven(scene, tolerance, progress, h=h, solver=solver)
 
 
 def driven(
@@ -110,7 +111,7 @@ def driven(
     *,
     h: float | None = None,
     solver: str = "auto",
-) -> DrivenBody:
+) -> BodyMotion:
     """A meshed body under a load, reduced to the subspace of its path.
 
     Parameters
@@ -119,7 +120,7 @@ def driven(
 
     Returns
     -------
-    DrivenBody
+    BodyMotion
     """
     SolveOptions(solver=solver, h=h, tolerance=tolerance)  # which refuses what is out of range
     clock, report = Clock(), progress or silent
@@ -143,7 +144,7 @@ def driven(
         radiated=motion.radiated,
     )  # fmt: skip
     basis = np.ascontiguousarray(model.basis)  # of which some rows are read at a time
-    return DrivenBody(build=build, basis=basis, motion=motion, effort=effort)
+    return BodyMotion(build=build, basis=basis, motion=motion, effort=effort)
 
 
 def check_values(frames: int, nodes: int) -> None:
@@ -161,7 +162,7 @@ def check_values(frames: int, nodes: int) -> None:
         )
 
 
-def vibration(moved: Waves, times: Floats) -> Floats:
+def vibration(moved: BodyMotion, times: Floats) -> Floats:
     """Reduced coordinates (t, r) of the steady state about its mean at times as in `from_rest`."""
     moving = reduction.oscillating(moved.motion)
     if not len(moving.frequencies):
@@ -170,7 +171,7 @@ def vibration(moved: Waves, times: Floats) -> Floats:
     return fem.exponential_sum(rates, moving.lines, times)
 
 
-def line_amplitudes(moved: DrivenBody, read: sparse.csr_array) -> tuple[Floats, Floats]:
+def line_amplitudes(moved: BodyMotion, read: sparse.csr_array) -> tuple[Floats, Floats]:
     """Frequencies (f,) in Hz above 0 and amplitudes (f, p) in metre that an operator (p, 3 n)
     reads.
     """

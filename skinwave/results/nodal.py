@@ -19,7 +19,7 @@ from simple_model.load.spectrum import synthesise
 from simple_model.quantities import NORMAL, STRAIN, VECTOR, Quantity
 from skinwave.models import reduction
 from skinwave.models.loads import check_coat
-from skinwave.results.motion import Waves, check_values
+from skinwave.results.motion import BodyMotion, check_values
 from skinwave.scene.scene import Reading, Scene
 
 INWARDS = np.array([[0.0, 0.0, -1.0]])  # what is drawn of normal motion
@@ -50,12 +50,12 @@ class Shade:
     values: Floats
 
 
-def tensors(moved: Waves, times: Floats, frames: Ints) -> Tensors:
+def tensors(moved: BodyMotion, times: Floats, frames: Ints) -> Tensors:
     """Strain and stress of a body at some frames.
 
     Parameters
     ----------
-    moved : Waves, of a solid body
+    moved : BodyMotion, of a solid body
     times : (f,) float, s, of all frames
     frames : (t,) int, which of them
 
@@ -68,7 +68,7 @@ def tensors(moved: Waves, times: Floats, frames: Ints) -> Tensors:
     for part, own in _parts(moved):
         z = _coordinates(waves, times[frames], None)
         relaxed = _coordinates(waves, times[frames], part.material)
-        u = moved.driven.basis @ np.vstack([z, relaxed]).T
+        u = moved.basis @ np.vstack([z, relaxed]).T
         found = fem.nodal_strain(part, u, own).astype(np.float32)
         still, moving = np.split(np.moveaxis(found, -1, 0), 2)
         here = part.nodes[own]
@@ -86,13 +86,13 @@ def tensors(moved: Waves, times: Floats, frames: Ints) -> Tensors:
     )  # fmt: skip
 
 
-def shade(scene: Scene, moved: Waves, times: Floats, nodes: Ints) -> Shade:
+def shade(scene: Scene, moved: BodyMotion, times: Floats, nodes: Ints) -> Shade:
     """Quantity that a scene's probes read, at nodes of its body.
 
     Parameters
     ----------
     scene : Scene
-    moved : Waves, of the scene
+    moved : BodyMotion, of the scene
     times : (t,) float, s
     nodes : (q,) int, of `moved.mesh`
 
@@ -114,17 +114,19 @@ def shade(scene: Scene, moved: Waves, times: Floats, nodes: Ints) -> Shade:
         )
     check_values(len(times), len(nodes))
     if asked.field == STRAIN:
-        check_coat(moved.driven.build, Reading(quantity=asked.name))
+        check_coat(moved.build, Reading(quantity=asked.name))
         values = _of_strain(asked, scene, moved, times, nodes)
     else:
         rows = {NORMAL: INWARDS, VECTOR: asked.rows(scene.body.solid)}[asked.field]
-        basis = moved.basis.reshape(len(moved.mesh.points), 3, -1)[nodes]
+        basis = moved.own_basis.reshape(len(moved.mesh.points), 3, -1)[nodes]
         z = _coordinates(_lines(asked, scene, moved), times, None, asked)
         values = z @ np.einsum("ci,nim->nm", rows, basis).T
     return Shade(quantity=asked.name, nodes=nodes, values=values.astype(np.float32))
 
 
-def _of_strain(asked: Quantity, scene: Scene, moved: Waves, times: Floats, nodes: Ints) -> Floats:
+def _of_strain(
+    asked: Quantity, scene: Scene, moved: BodyMotion, times: Floats, nodes: Ints
+) -> Floats:
     """Values (t, q) of a quantity of strain; between materials the mean of those on both sides."""
     lines, total = _lines(asked, scene, moved), np.zeros((len(times), len(nodes)))
     count = np.zeros(len(nodes))
@@ -132,7 +134,7 @@ def _of_strain(asked: Quantity, scene: Scene, moved: Waves, times: Floats, nodes
         here = np.searchsorted(moved.nodes, part.nodes[own])
         seen = np.isin(here, nodes)
         z = _coordinates(lines, times, part.material, asked)
-        strain = fem.nodal_strain(part, moved.driven.basis @ z.T, own[seen])
+        strain = fem.nodal_strain(part, moved.basis @ z.T, own[seen])
         found = np.einsum("vc,qct->tqv", asked.rows(part.material), strain, optimize=True)
         at = np.searchsorted(nodes, here[seen])
         values = asked.waveforms(found.reshape(len(times), -1), int(seen.sum()))
@@ -141,15 +143,15 @@ def _of_strain(asked: Quantity, scene: Scene, moved: Waves, times: Floats, nodes
     return total / count
 
 
-def _lines(asked: Quantity, scene: Scene, moved: Waves) -> reduction.ReducedResponse:
+def _lines(asked: Quantity, scene: Scene, moved: BodyMotion) -> reduction.ReducedResponse:
     """Lines that a quantity is made of: with the mean, or about it."""
     whole = asked.invariant is not None and scene.body.is_held
     return moved.motion if whole else reduction.oscillating(moved.motion)
 
 
-def _parts(moved: Waves) -> Iterator[tuple[fem.SolidPart, Ints]]:
+def _parts(moved: BodyMotion) -> Iterator[tuple[fem.SolidPart, Ints]]:
     """Parts of a driven mesh, of one material each, and which of their nodes are the body's."""
-    build = moved.driven.build
+    build = moved.build
     for part in fem.solid_parts(build.mesh, build.material):
         own = np.flatnonzero(np.isin(part.nodes, moved.nodes))
         if len(own):

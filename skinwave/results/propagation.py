@@ -16,7 +16,7 @@ from meshes.tetmesh import Floats
 from simple_model import sensation_level
 from skinwave.results.comparison import heard_phasors, phase_delays
 from skinwave.results.run import Run
-from skinwave.results.surface import SurfaceMap
+from skinwave.results.surface import SurfaceField
 from skinwave.results.views import path_points
 from skinwave.scene.scene import Scene
 
@@ -76,8 +76,8 @@ class Propagation:
 def propagation(
     run: Run,
     kernel: Run,
-    surface: SurfaceMap | None = None,
-    kernel_surface: SurfaceMap | None = None,
+    surface: SurfaceField | None = None,
+    kernel_surface: SurfaceField | None = None,
 ) -> Propagation:
     """Difference of a body's response from the point kernel's under the same load.
 
@@ -186,7 +186,9 @@ def _delay(run: Run, kernel: Run, frequency: float) -> float | None:
     return float(delays[nearest]) if np.isfinite(away[nearest]) else None
 
 
-def _above_threshold(surface: SurfaceMap, away: Floats) -> tuple[Reach | None, ...]:
+def _above_threshold(surface: SurfaceField, away: Floats) -> tuple[Reach | None, ...]:
+    if surface.level is None:
+        return ()
     insides = [surface.level >= -more for more in (-FACTOR_OF_TWO, 0.0, FACTOR_OF_TWO)]
     return tuple(reach_of(inside, away) if inside.any() else None for inside in insides)
 

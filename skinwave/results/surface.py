@@ -1,31 +1,37 @@
-"""Steady vibration of a whole surface, line by line: the point kernel's pressure and a body's
-motion under the same load, on one grid.
+"""Steady vibration over a surface: RMS of a quantity on a grid, of the point kernel or of a body.
 
-A body's motion is its wavenumber integral where it has one, else that of its reduced-order model.
+A body's map is by its wavenumber integral where it has one, by the modes of a thin plate, or by its
+reduced-order model of finite elements.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 import fem
+from fem.load_and_probe import surface_frame
 from meshes import reading
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, sensation_level
-from simple_model.layers.flat_body import steady_lines
-from simple_model.load.spectrum import load_lines, pressure_lines
+from simple_model.layers.flat_body import field_lines, steady_lines
+from simple_model.load.spectrum import load_lines, pressure_lines, synthesise
+from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity
 from skinwave.bodies.analytic import compliance, has_exact_waves, is_laterally_infinite
 from skinwave.bodies.sizes import default_size
 from skinwave.models.advice import takes
-from skinwave.models.loads import surface_motion
+from skinwave.models.flat_body import field_read
+from skinwave.models.loads import line_factor, probe_rows, surface_motion
+from skinwave.models.plate_modes import ERROR as PLATE_ERROR
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.plate_modes import steady_lines as plate_lines
+from skinwave.models.reduction import read_at
 from skinwave.models.stretched_plate import settled
 from skinwave.planning.stretching import beyond_linear
-from skinwave.results.motion import DrivenBody, driven, line_amplitudes
-from skinwave.scene.scene import Scene
+from skinwave.results.motion import TOLERANCE, BodyMotion, driven, line_amplitudes
+from skinwave.scene.scene import Reading, Scene
 from skinwave.system.effort import Progress
 
 REACH, STEP = 0.044, 0.001  # m of a map either way from the middle, and between its places
@@ -35,35 +41,52 @@ RADIAL = 0.5e-3  # m between the radii that stand for a map where it is a figure
 # Than the default element size, of solids and sheets: a map is not looked at as closely as a probe.
 COARSER = (1.5, 2.0)
 REDUCED = 0.1  # relative error of the reduced-order model of a map
+SECOND, ORDER = 1.5, 2  # element size of a second map, and its order: Richardson extrapolation
+# Times at which an invariant is looked at, in steps of s that are no multiple of any period. Its
+# mean over all phases of a load of several frequencies is that of a smooth window over them: Das,
+# Saiki, Sander and Yorke, Nonlinearity 30:4111 (2017).
+MANY, BETWEEN = 1024, 0.01 * (1 + 5**0.5) / 2
+STILL = 1e-9  # Hz: a line below it is the mean
+AT_ONCE = 2_000_000  # values in time of places that are looked at together
+MOST_PLACES = 40_000
 
 Lines = tuple[Floats, fem.Complex]  # frequencies (f,) in Hz, complex amplitudes (f, p)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SurfaceMap:
-    """Steady vibration of a surface about its mean, on a grid.
+class SurfaceField:
+    """Steady vibration of a quantity about its mean, on a grid of places.
 
     Parameters
     ----------
     x, y : (nx,), (ny,) float, metre, equally spaced
-    rms : (ny, nx) float, in `unit`, "m" or "Pa"; nan off the body
-    level : (ny, nx) float, dB, the sensation level of the component where it is highest,
-        were the body skin; nan off the body, minus infinity of a pressure, and of a
-        sheet that stretches
-    note : str, how it was computed, if another way than the probes
+    rms : (ny, nx) float, in the SI unit of the quantity; nan off the body
+    quantity : Quantity; of the point kernel the pressure
+    level : (ny, nx) float, dB, sensation level of the component where it is highest; nan off the
+        body; None of anything but the displacement of the surface of skin
+    depth : metre, below the surface
+    note : str, how it was computed
+    error : expected error relative to the largest, nan where it is not estimated
     """
 
     x: Floats
     y: Floats
     rms: Floats
-    level: Floats
-    unit: str
+    quantity: Quantity = DISPLACEMENT
+    level: Floats | None = None
+    depth: float = 0.0
     note: str = ""
+    error: float = np.nan
 
     @property
     def places(self) -> Floats:
         """Positions (ny, nx, 2) in metre."""
         return np.stack(np.meshgrid(self.x, self.y), axis=-1)
+
+    @property
+    def shown(self) -> Floats:
+        """RMS (ny, nx) in the unit of figures."""
+        return self.quantity.per_unit * self.rms
 
 
 def grid(scene: Scene, reach: float = REACH, step: float = STEP) -> tuple[Floats, Floats]:
@@ -75,13 +98,10 @@ def grid(scene: Scene, reach: float = REACH, step: float = STEP) -> tuple[Floats
     return x, y
 
 
-def kernel_map(pressure: MovingPressure, x: Floats, y: Floats) -> SurfaceMap:
-    """The pressure itself, in Pa, at places x (nx,) and y (ny,) in metre."""
-
-    def answer(places: Floats) -> Lines:
-        return pressure_lines(pressure, places, FAINT)
-
-    return _mapped(pressure, answer, x, y, "Pa")
+def kernel_map(pressure: MovingPressure, x: Floats, y: Floats) -> SurfaceField:
+    """The point kernel's pressure at places x (nx,) and y (ny,) in metre."""
+    amplitudes = _amplitudes(pressure, lambda at: pressure_lines(pressure, at, FAINT), x, y)
+    return _field(x, y, _rms_and_level(amplitudes)[0], quantity=PRESSURE)
 
 
 def body_map(
@@ -92,10 +112,19 @@ def body_map(
     *,
     h: float | None = None,
     solver: str = "auto",
-) -> SurfaceMap:
-    """The body's motion, in m; x (nx,) and y (ny,) in metre: by a wavenumber integral, by the modes
-    of a thin plate, stretched where it deflects that far, or by finite elements. These are coarser
-    than by default, and at least `h` large.
+) -> SurfaceField:
+    """Displacement of a body's surface, with sensation levels.
+
+    Parameters
+    ----------
+    scene : Scene
+    x, y : (nx,), (ny,) float, metre
+    progress, solver : as for `simulate`
+    h : metre, of finite elements; they are coarser than by default
+
+    Returns
+    -------
+    SurfaceField
 
     Raises
     ------
@@ -110,29 +139,33 @@ def body_map(
         return replace(element_map(scene, moved, x, y), note=f"elements of {1e3 * size:.2g} mm")
     waves_of = compliance(scene.body)
 
-    def answer(places: Floats) -> Lines:
+    def lines_at(places: Floats) -> Lines:
         return steady_lines(waves_of, scene.pressure, places, threshold=FAINT)
 
-    found = _mapped(scene.pressure, answer, x, y, "m")
-    return replace(found, note="laterally infinite layer")
+    rms, level = _rms_and_level(_amplitudes(scene.pressure, lines_at, x, y))
+    return _field(x, y, rms, level if scene.body.is_skin else None, note="laterally infinite layer")
 
 
-def _plate_map(scene: Scene, x: Floats, y: Floats) -> SurfaceMap:
+def element_map(scene: Scene, moved: BodyMotion, x: Floats, y: Floats) -> SurfaceField:
+    """Displacement of a meshed body's surface, which is read as probes read it."""
+    places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    seen = fem.on_surface(moved.build.mesh, places)
+    lines = line_amplitudes(moved, surface_motion(scene.body, moved.build, places[seen]))
+    found = np.full((2, len(places)), np.nan)
+    found[:, seen] = _rms_and_level(lines)
+    return _field(x, y, found[0], found[1] if scene.body.is_skin else None)
+
+
+def _plate_map(scene: Scene, x: Floats, y: Floats) -> SurfaceField:
     """Map of a thin plate in its modes."""
-    places = np.stack(np.meshgrid(x, y), axis=-1)
-    flat, shape = places.reshape(-1, 2), places.shape[:2]
+    places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     if beyond_linear(scene, REDUCED):
         _, z, modes = settled(scene, REDUCED)
-        shapes, spread = modes.at(flat - scene.body.placement.offset), np.cov(z, rowvar=False)
+        shapes, spread = modes.at(places - scene.body.placement.offset), np.cov(z, rowvar=False)
         rms = np.sqrt(np.einsum("pi,ij,pj->p", shapes, spread, shapes, optimize=True))
-        level, note = np.full(len(flat), -np.inf), "stretching plate"
-    else:
-        lines, amplitudes = plate_lines(scene, flat)
-        rms, level = _rms_and_level((lines, np.abs(amplitudes)), "m")
-        note = "thin plate"
-    return SurfaceMap(
-        x=x, y=y, rms=rms.reshape(shape), level=level.reshape(shape), unit="m", note=note
-    )
+        return _field(x, y, rms, note="stretching plate")
+    lines, amplitudes = plate_lines(scene, places)
+    return _field(x, y, _rms_and_level((lines, np.abs(amplitudes)))[0], note="thin plate")
 
 
 def has_wavenumber_integral(scene: Scene) -> bool:
@@ -142,23 +175,91 @@ def has_wavenumber_integral(scene: Scene) -> bool:
     return plain and is_laterally_infinite(scene.body) and has_exact_waves(scene.body)
 
 
-def element_map(scene: Scene, moved: DrivenBody, x: Floats, y: Floats) -> SurfaceMap:
-    """Map of a meshed body's motion, which is read as probes read it."""
-    places = np.stack(np.meshgrid(x, y), axis=-1)
-    seen = fem.on_surface(moved.build.mesh, places.reshape(-1, 2)).reshape(places.shape[:2])
-    lines = line_amplitudes(moved, surface_motion(scene.body, moved.build, places[seen]))
-    found = np.full((2, *seen.shape), np.nan)
-    found[:, seen] = _rms_and_level(lines, "m")
-    return SurfaceMap(x=x, y=y, rms=found[0], level=found[1], unit="m")
+def quantity_map(
+    scene: Scene,
+    progress: Progress | None = None,
+    *,
+    reach: float,
+    step: float,
+    h: float | None = None,
+    solver: str = "auto",
+) -> SurfaceField:
+    """Map of the quantity that a scene's probes read, at the depth of the first of them.
+
+    Parameters
+    ----------
+    scene : Scene
+    progress, h, solver : as for `simulate`
+    reach : metre either way from the middle, at most to the edges of the body
+    step : metre between places
+
+    Returns
+    -------
+    SurfaceField
+
+    Raises
+    ------
+    ValueError
+        If there is no body or too many places, or the quantity cannot be read there.
+    """
+    if not scene.body.of_kind.discretise:
+        raise ValueError("a map is of a body, and the scene has none; give it one under [body]")
+    if not (0 < step <= reach and (2 * reach / step + 1) ** 2 <= MOST_PLACES):
+        raise ValueError(
+            f"a map of {1e3 * reach:g} mm either way in steps of {1e3 * step:g} mm has no places "
+            f"or more than {MOST_PLACES:,}; choose another step"
+        )
+    asked, (x, y) = scene.reading.asked, grid(scene, reach, step)
+    if has_wavenumber_integral(scene):
+        places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        lines = field_lines(field_read(scene, scene.depths[0]), scene.pressure, places,
+                            threshold=FAINT)  # fmt: skip
+        note = "wavenumber integral of the laterally infinite body"
+        return _of_probes(scene, x, y, _rms(asked, lines, len(places)), note)
+    if h is None and scene.reading.is_plain and takes(FROM_REST, scene):
+        return replace(body_map(scene, x, y), error=PLATE_ERROR)
+    if scene.load.support_motion or (scene.load.gravity and asked.invariant):
+        raise ValueError(
+            "a map is of motion about the rest without gravity, on a support at rest; leave "
+            "gravity and support_motion out"
+        )
+    size = h or default_size(scene.body)
+    fine, coarse = (
+        map_of_motion(scene, driven(scene, TOLERANCE, progress, h=each, solver=solver), x, y)
+        for each in (size, SECOND * size)
+    )
+    away = np.nanmax(np.abs(coarse.rms - fine.rms)) / (SECOND**ORDER - 1)
+    note = f"finite elements of {1e3 * size:.2g} mm"
+    return replace(fine, note=note, error=float(away / np.nanmax(fine.rms)))
 
 
-def save(path: Path, found: SurfaceMap) -> None:
+def map_of_motion(scene: Scene, moved: BodyMotion, x: Floats, y: Floats) -> SurfaceField:
+    """Map of the quantity that probes read, of a meshed body whose motion is known."""
+    asked, depth = scene.reading.asked, scene.depths[0]
+    places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    seen = fem.on_surface(moved.build.mesh, places)
+    seen[seen] = _is_above(scene, moved, places[seen], depth)
+    count = int(seen.sum())
+    there = Reading(quantity=asked.name, depths=(depth,) * count if depth else ())
+    rows, solids = probe_rows(scene.body, moved.build, places[seen], there)
+    motion = read_at(moved.motion, rows @ moved.basis)
+    factor = line_factor(asked, 2j * np.pi * motion.frequencies, solids, rows.shape[0])
+    rms = np.full(len(places), np.nan)
+    rms[seen] = _rms(asked, (motion.frequencies, motion.lines * factor), count)
+    return _of_probes(scene, x, y, rms, "finite elements")
+
+
+def save(path: Path, found: SurfaceField) -> None:
     """A map as one npz file."""
-    np.savez(path, x=found.x, y=found.y, rms=found.rms, level=found.level)
+    arrays = {"x": found.x, "y": found.y, "rms": found.rms, "depth": np.array(found.depth),
+              "note": np.array(found.note)}  # fmt: skip
+    if found.level is not None:
+        arrays["level"] = found.level
+    np.savez(path, **arrays)  # type: ignore[arg-type]
 
 
-def load(path: Path) -> SurfaceMap:
-    """A map of a body's motion from its file.
+def load(path: Path, scene: Scene) -> SurfaceField:
+    """A map of the quantity that a scene's probes read, from its file.
 
     Raises
     ------
@@ -167,46 +268,50 @@ def load(path: Path) -> SurfaceMap:
     """
     try:
         arrays = reading.arrays(path)
-        x, y, rms, level = (np.asarray(arrays[n], np.float64) for n in ("x", "y", "rms", "level"))
-        if x.ndim != 1 or not rms.shape == level.shape == (*y.shape, *x.shape):
-            raise ValueError(f"'rms' is of shape {rms.shape}, and 'level' of {level.shape}")
+        x, y, rms = (np.asarray(arrays[name], np.float64) for name in ("x", "y", "rms"))
+        level = np.asarray(arrays["level"], np.float64) if "level" in arrays else None
+        depth, note = float(arrays["depth"]), str(arrays["note"])
+        if x.ndim != 1 or rms.shape != (*y.shape, *x.shape) or not np.isfinite(rms).any():
+            raise ValueError(f"'rms' is of shape {rms.shape}, or nowhere a number")
+        if level is not None and level.shape != rms.shape:
+            raise ValueError(f"'level' is of shape {level.shape}")
     except (KeyError, TypeError, ValueError) as error:
         raise ValueError(f"{path} is no map ({error}); make it anew from its scene") from None
-    return SurfaceMap(x=x, y=y, rms=rms, level=level, unit="m")
+    found = SurfaceField(x=x, y=y, rms=rms, level=level, depth=depth, note=note)
+    return found if scene.reading.is_plain else replace(found, quantity=scene.reading.asked)
 
 
-def _mapped(
-    pressure: MovingPressure, answer: Callable[[Floats], Lines], x: Floats, y: Floats, unit: str
-) -> SurfaceMap:
-    """Map on a grid from a function that returns the lines (f,), (f, p) at places (p, 2)."""
+def _field(
+    x: Floats, y: Floats, rms: Floats, level: Floats | None = None, *, note: str = "",
+    quantity: Quantity = DISPLACEMENT,
+) -> SurfaceField:  # fmt: skip
+    """A map of values (ny nx,)."""
+    shape = len(y), len(x)
+    return SurfaceField(
+        x=x, y=y, rms=rms.reshape(shape), quantity=quantity, note=note,
+        level=None if level is None else level.reshape(shape),
+    )  # fmt: skip
+
+
+def _of_probes(scene: Scene, x: Floats, y: Floats, rms: Floats, note: str) -> SurfaceField:
+    found = _field(x, y, rms, note=note, quantity=scene.reading.asked)
+    return replace(found, depth=scene.depths[0])
+
+
+def _amplitudes(
+    pressure: MovingPressure, lines_at: Callable[[Floats], Lines], x: Floats, y: Floats
+) -> tuple[Floats, Floats]:
+    """Frequencies (f,) and amplitudes (f, ny nx) on a grid, from a function of places (p, 2)."""
     X, Y = np.meshgrid(x, y)
-    radius = np.hypot(X, Y)
-    if _is_round(pressure):
-        from scipy.interpolate import CubicSpline  # which takes long to import
+    if not _is_round(pressure):
+        frequencies, found = lines_at(np.column_stack([X.ravel(), Y.ravel()]))
+        return frequencies, np.abs(found)
+    from scipy.interpolate import CubicSpline  # which takes long to import
 
-        radii = np.arange(0, radius.max() + 2 * RADIAL, RADIAL)
-        frequencies, along = answer(np.column_stack([radii, 0 * radii]))
-        amplitudes = np.abs(CubicSpline(radii, np.abs(along), axis=1)(radius.ravel()))
-    else:
-        frequencies, found = answer(np.column_stack([X.ravel(), Y.ravel()]))
-        amplitudes = np.abs(found)
-    rms, level = (
-        values.reshape(X.shape) for values in _rms_and_level((frequencies, amplitudes), unit)
-    )
-    return SurfaceMap(x=x, y=y, rms=rms, level=level, unit=unit)
-
-
-def _rms_and_level(lines: tuple[Floats, Floats], unit: str) -> tuple[Floats, Floats]:
-    """RMS (p,) about the mean and the highest sensation level (p,) in dB of lines of amplitudes
-    (f, p).
-    """
-    moving = lines[0] > 1e-9
-    frequencies, amplitudes = (each[moving] for each in lines)
-    rms = np.sqrt((amplitudes**2).sum(axis=0) / 2)
-    if unit == "Pa":
-        return rms, np.full_like(rms, -np.inf)
-    levels = sensation_level(amplitudes, frequencies[:, None])
-    return rms, np.maximum(levels.max(axis=0, initial=-np.inf), SILENT)
+    radius = np.hypot(X, Y).ravel()
+    radii = np.arange(0, radius.max() + 2 * RADIAL, RADIAL)
+    frequencies, along = lines_at(np.column_stack([radii, 0 * radii]))
+    return frequencies, np.abs(CubicSpline(radii, np.abs(along), axis=1)(radius))
 
 
 def _is_round(pressure: MovingPressure) -> bool:
@@ -219,3 +324,43 @@ def _is_round(pressure: MovingPressure) -> bool:
     lines = load_lines(pressure, FAINT)
     pairs = {(round(f, 6), n) for f, n in zip(lines.frequencies, lines.harmonics, strict=True)}
     return len(pairs) == len({f for f, _ in pairs})
+
+
+def _rms_and_level(lines: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    """RMS (p,) about the mean and the highest sensation level (p,) in dB of lines of amplitudes
+    (f, p).
+    """
+    moving = lines[0] > STILL
+    frequencies, amplitudes = (each[moving] for each in lines)
+    rms = np.sqrt((amplitudes**2).sum(axis=0) / 2)
+    levels = sensation_level(amplitudes, frequencies[:, None])
+    return rms, np.maximum(levels.max(axis=0, initial=-np.inf), SILENT)
+
+
+def _is_above(scene: Scene, moved: BodyMotion, places: Floats, depth: float) -> NDArray[np.bool_]:
+    """Mask of places (p, 2) below which the body has a depth in metre along its normal."""
+    if not depth:
+        return np.ones(len(places), bool)
+    patch = scene.body.of_kind.normal_patch
+    points, normals = surface_frame(moved.build.mesh, places, patch=patch)
+    return fem.is_inside(moved.build.mesh, points - depth * normals)
+
+
+def _rms(asked: Quantity, lines: Lines, places: int) -> Floats:
+    """RMS (p,) about the mean of lines (f,), (f, p c) of the components of a quantity."""
+    f, a = lines[0], lines[1].reshape(len(lines[0]), places, -1)
+    if asked.invariant is None:
+        return np.asarray(np.sqrt((np.abs(a[f > STILL, :, 0]) ** 2).sum(axis=0) / 2))
+    return np.concatenate([*_parts(asked, f, a)])  # of the whole tensor, its mean included
+
+
+def _parts(asked: Quantity, f: Floats, a: fem.Complex) -> Iterator[Floats]:
+    """RMS (q,) of some places after the other, of an invariant of components (f, p, c) in time."""
+    times = BETWEEN * np.arange(1.0, MANY)
+    window = np.sin(np.pi * np.arange(1, MANY) / MANY) ** 4
+    window /= window.sum()
+    many = max(1, AT_ONCE // (len(times) * a.shape[2]))
+    for start in range(0, a.shape[1], many):
+        part = a[:, start : start + many]
+        here = asked.waveforms(synthesise(f, part.reshape(len(f), -1), times), part.shape[1])
+        yield np.sqrt(window @ (here - window @ here) ** 2)

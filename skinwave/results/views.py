@@ -1,4 +1,4 @@
-"""View of one model's response in pictures: its surface through a period, and where it moves most.
+"""View of one model's response in pictures: its surface through a period of the steady state.
 
 Motion is about its mean: a steady push bends a sheet far more than its vibration does.
 """
@@ -6,7 +6,7 @@ Motion is about its mean: a steady push bends a sheet far more than its vibratio
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -16,19 +16,21 @@ from numpy.typing import NDArray
 import fem
 from meshes import reading
 from meshes.tetmesh import Floats, Ints, boundary_facets
-from simple_model import Effort, sensation_level
+from simple_model import Effort
 from simple_model.layers.flat_body import steady_lines
 from simple_model.load.spectrum import pressure_lines, synthesise
-from simple_model.typing import Complex
+from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity, quantity
 from skinwave.bodies.analytic import compliance
 from skinwave.models.loads import surface_motion
 from skinwave.models.plate_modes import steady_lines as plate_lines
+from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.reduction import oscillating, read_at
 from skinwave.models.speeds import repeated, shown_part, strongest_tone
 from skinwave.models.stretched_plate import STRETCHED, settled
-from skinwave.results.motion import Waves, check_values, vibration
+from skinwave.results.motion import BodyMotion, check_values, vibration
 from skinwave.results.nodal import Shade, Tensors, shade, tensors
 from skinwave.results.run import Run
+from skinwave.results.surface import FAINT, Lines
 from skinwave.scene.file import dumps, loads
 from skinwave.scene.scene import Scene
 from skinwave.system.json_kinds import effort_of, fitting
@@ -36,7 +38,6 @@ from skinwave.system.json_kinds import effort_of, fitting
 STRONG = 0.1  # of the strongest line: weaker ones need no frames of their own
 SLOWEST = 20.0  # Hz: slower tones are not followed by diagrams of motion over place and time
 GRID, LAYER_GRID = 121, 81  # points along a side of the surface of the point kernel, of a layer
-NEGLIGIBLE = 1e-4  # of the load's strongest line: lines that are not shown
 ALONG, INSTANTS = 161, 241  # places and times of a diagram of motion over place and time
 TYPICAL = 140.0  # Hz, where nothing vibrates
 FIELD_FRAMES = 8  # of those that are shown, written for other programs
@@ -44,9 +45,8 @@ PLATE_TOLERANCE = 0.05  # of the motion of a sheet at large deflection
 ROOM = 5e-3  # m beside the path that waves can be watched in
 
 Singles = NDArray[np.float32]
-Motion = Callable[[Floats, Floats], Floats]  # places (q, 2), times (t,) -> (t, q)
-
-UNITS = ("m", "Pa")  # of a body's displacement, and of the point kernel's pressure
+LinesAt = Callable[[Floats], Lines]  # places (q, 2) -> frequencies (f,) in Hz, lines (f, q)
+MotionAt = Callable[[Floats, Floats], Floats]  # places (q, 2), times (t,) -> (t, q)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,15 +67,13 @@ class View:
 
     Parameters
     ----------
-    body : name of the body, by which it has its colour; model, unit ("m" or "Pa"), scene
-    points : (n, 3) float, metre; tets : (m, 10) int, none for the point kernel, which has no body
+    body : name of the body, by which it has its colour; model, scene
+    quantity : of its motion: a displacement, or the pressure of the point kernel
+    points : (n, 3) float, metre; tets : (m, 10) int, none of a surface without elements
     surface : (s,) int, the points of the upper surface; triangles : (k, 3) int, of these
     times : (f,) float, s, through the part of the steady state that is played, `period`: that of
         the whole pattern, see `speeds.shown_part`
     motion : (f, n, 3) float32, metre; of the point kernel the pressure in Pa, along the push
-    rms, sensation : (s,) float, motion into the body about its mean in the unit, and the highest
-        sensation level of its lines in dB, of the point kernel above the threshold of a pressure;
-        minus infinity where nothing vibrates, and on a sheet, which is no skin
     tone : Hz, the line that moves the surface most; speed : m/s, of a surface wave there, or None
     ray : outwards along x from the path's outermost point; track : along the path, None if the
         focus rests; both in the steady state, about the mean
@@ -86,8 +84,8 @@ class View:
 
     body: str
     model: str
-    unit: str
     scene: Scene
+    quantity: Quantity
     points: Floats
     tets: Ints
     surface: Ints
@@ -95,8 +93,6 @@ class View:
     period: float
     times: Floats
     motion: Singles
-    rms: Floats
-    sensation: Floats
     tone: float
     speed: float | None
     ray: Trace
@@ -104,7 +100,7 @@ class View:
     effort: Effort = field(default_factory=Effort)
     tensors: Tensors | None = None
     shade: Shade | None = None
-    moved: Waves | None = None
+    moved: BodyMotion | None = None
 
     @property
     def column(self) -> str:
@@ -118,7 +114,7 @@ class View:
 
     @property
     def pushed(self) -> Singles:
-        """Motion (f, s) of the upper surface into the body, in the unit."""
+        """Motion (f, s) of the upper surface into the body, in SI."""
         return -self.motion[:, self.surface, 2]
 
     @cached_property
@@ -135,15 +131,15 @@ class View:
 
     @property
     def peak(self) -> float:
-        """The largest motion into or out of the body anywhere at any time, in the unit."""
+        """The largest motion into or out of the body anywhere at any time, in SI."""
         return float(np.abs(self.pushed).max()) or 1.0
 
 
-def fastest_line(moved: Waves) -> float:
+def fastest_line(moved: BodyMotion) -> float:
     """The highest line in Hz that moves a body by `STRONG` of what its strongest one does."""
-    moving = oscillating(moved.motion)
+    moving, basis = oscillating(moved.motion), moved.own_basis
     lines = moving.lines
-    power = np.einsum("fm,mn,fn->f", lines.conj(), moved.basis.T @ moved.basis, lines).real
+    power = np.einsum("fm,mn,fn->f", lines.conj(), basis.T @ basis, lines).real
     return _fastest(moving.frequencies, power)
 
 
@@ -152,40 +148,36 @@ def _fastest(frequencies: Floats, power: Floats) -> float:
     return float(frequencies[counts].max(initial=0.0))
 
 
-def body_view(scene: Scene, body: str, moved: Waves, part: tuple[float, int] | None = None) -> View:
+def body_view(
+    scene: Scene, body: str, moved: BodyMotion, part: tuple[float, int] | None = None
+) -> View:
     """A body's view, from all of its motion; `part` is how long it is played, s, and in how many
     frames, `speeds.shown_part` of its own motion if not given.
     """
-    mesh = moved.mesh
+    mesh, basis = moved.mesh, moved.own_basis
     period, frames = part or shown_part(scene.pressure, fastest_line(moved))
     surface, triangles = _upper(mesh.facets["top"])
     times = np.arange(frames) * period / frames
     check_values(frames, len(mesh.points))
-    motion = vibration(moved, times) @ moved.basis.T
+    motion = vibration(moved, times) @ basis.T
     _, inwards = fem.node_operator(mesh, patch=scene.body.of_kind.normal_patch)
-    seen = read_at(oscillating(moved.motion), inwards @ moved.basis)
-    frequencies, amplitudes = seen.frequencies, np.abs(seen.lines)
-    levels = np.full(len(surface), -np.inf)
-    if scene.body.is_skin:
-        levels = sensation_level(amplitudes, frequencies[:, None]).max(axis=0, initial=-np.inf)
-    tone = strongest_tone(frequencies, amplitudes)
+    seen = read_at(oscillating(moved.motion), inwards @ basis)
+    tone = strongest_tone(seen.frequencies, np.abs(seen.lines))
 
-    def trace(places: Floats, t: Floats) -> Floats:
-        build, found = moved.driven.build, np.full((len(t), len(places)), np.nan)
+    def motion_at(places: Floats, t: Floats) -> Floats:
+        build, found = moved.build, np.full((len(t), len(places)), np.nan)
         on = fem.on_surface(build.mesh, places)
-        read = surface_motion(scene.body, build, places[on]) @ moved.driven.basis
+        read = surface_motion(scene.body, build, places[on]) @ moved.basis
         found[:, on] = vibration(moved, t) @ read.T
         return found
 
-    speed = scene.body.of_kind.wave_speed(scene.body, tone or TYPICAL)
     reach = np.array([scene.body.width, scene.body.height]) / 2
     return View(
-        body=body, model="fem", unit="m", scene=scene, points=mesh.points, tets=mesh.tets,
-        surface=surface, triangles=triangles, period=period, times=times,
-        motion=motion.reshape(frames, -1, 3).astype(np.float32),
-        rms=np.sqrt((amplitudes**2).sum(axis=0) / 2), sensation=levels,
-        tone=tone, speed=speed, effort=moved.effort, moved=moved,
-        ray=_ray(scene, reach, trace), track=_track(scene, trace),
+        body=body, model="fem", quantity=DISPLACEMENT, scene=scene, points=mesh.points,
+        tets=mesh.tets, surface=surface, triangles=triangles, period=period, times=times,
+        motion=motion.reshape(frames, -1, 3).astype(np.float32), tone=tone,
+        speed=scene.body.of_kind.wave_speed(scene.body, tone or TYPICAL), effort=moved.effort,
+        moved=moved, ray=_ray(scene, reach, motion_at), track=_track(scene, motion_at),
     )  # fmt: skip
 
 
@@ -216,81 +208,35 @@ def field_frames(count: int) -> Ints:
 
 def kernel_view(scene: Scene, reach: Floats, part: tuple[float, int] | None = None) -> View:
     """The point kernel's view, on a flat square as far as `reach` (2,) in metre either way; `part`
-    is how long it is played, s, and in how many frames, as `body_view` takes it.
+    as `body_view` takes it.
     """
     pressure = scene.pressure
-    points, triangles = _grid(reach, GRID)
-    frequencies, patterns = pressure_lines(pressure, points)
-    moving = frequencies > 0
-    amplitudes = np.abs(patterns[moving])
-    fastest = _fastest(frequencies[moving], (amplitudes**2).sum(axis=1))
-    period, frames = part or shown_part(pressure, fastest)
-    times = np.arange(frames) * period / frames
-    motion = np.zeros((frames, len(points), 3), np.float32)
-    motion[:, :, 2] = patterns[~moving].real.sum(axis=0) - pressure(points, times)
-    levels = sensation_level(amplitudes, frequencies[moving][:, None], unit="Pa")
 
-    def trace(places: Floats, t: Floats) -> Floats:
-        f, of_place = pressure_lines(pressure, places)
-        return pressure(places, t) - of_place[f == 0].real.sum(axis=0)
+    def motion_at(places: Floats, t: Floats) -> Floats:
+        f, lines = pressure_lines(pressure, places)
+        return pressure(places, t) - lines[f == 0].real.sum(axis=0)
 
-    return View(
-        body="none", model="point-kernel", unit="Pa", scene=scene, points=points,
-        tets=np.zeros((0, 10), np.int64), surface=np.arange(len(points)), triangles=triangles,
-        period=period, times=times, motion=motion,
-        rms=np.sqrt((amplitudes**2).sum(axis=0) / 2),
-        sensation=levels.max(axis=0, initial=-np.inf),
-        tone=strongest_tone(frequencies[moving], amplitudes),
-        speed=None, ray=_ray(scene, reach, trace), track=_track(scene, trace),
+    if part is None:
+        f, lines = pressure_lines(pressure, _grid(reach, GRID)[0])
+        part = shown_part(pressure, _fastest(f[f > 0], (np.abs(lines[f > 0]) ** 2).sum(axis=1)))
+    found = _flat_view(
+        scene, "none", SAME_LOAD.name, part, _grid(reach, GRID), reach,
+        lambda places: pressure_lines(pressure, places), motion_at,
     )  # fmt: skip
+    return replace(found, quantity=PRESSURE)
 
 
 def layer_view(run: Run, reach: Floats, part: tuple[float, int]) -> View:
     """The view of an infinite layer or a half-space, by its wavenumber integral, on a flat square;
     `reach` and `part` as `kernel_view` takes them.
     """
-    scene, body = run.scene, run.scene.body
-    waves_of = compliance(body)
-    points, triangles = _grid(reach, LAYER_GRID)
-    period, frames = part
-    times = np.arange(frames) * period / frames
+    waves_of = compliance(run.scene.body)
 
-    def lines(places: Floats) -> tuple[Floats, Complex]:
-        f, a = steady_lines(waves_of, scene.pressure, places, threshold=NEGLIGIBLE)
-        return f[f > 0], a[f > 0]
+    def lines_at(places: Floats) -> Lines:
+        return steady_lines(waves_of, run.scene.pressure, places, threshold=FAINT)
 
-    def trace(places: Floats, t: Floats) -> Floats:
-        return synthesise(*lines(places), t)
-
-    return _surface_view(run, (points, triangles), (period, times), lines, trace, reach)
-
-
-def _surface_view(
-    run: Run,
-    shape: tuple[Floats, Ints],
-    shown: tuple[float, Floats],
-    lines: Callable[[Floats], tuple[Floats, Complex]],
-    trace: Motion,
-    reach: Floats,
-) -> View:
-    """The view of a flat surface of points (p, 3) and triangles, for a period with its times, from
-    the lines (f,), (f, p) and the motion of any places.
-    """
-    scene, body, (points, triangles), (period, times) = run.scene, run.scene.body, shape, shown
-    f, found = lines(points[:, :2])
-    amplitudes, levels = np.abs(found), np.full(len(points), -np.inf)
-    if body.is_skin:
-        levels = sensation_level(amplitudes, f[:, None]).max(axis=0, initial=-np.inf)
-    motion = np.zeros((len(times), len(points), 3), np.float32)
-    motion[:, :, 2] = -trace(points[:, :2], times)
-    tone = strongest_tone(f, amplitudes)
-    return View(
-        body=run.body, model=run.model, unit="m", scene=scene, points=points,
-        tets=np.zeros((0, 10), np.int64), surface=np.arange(len(points)), triangles=triangles,
-        period=period, times=times, motion=motion, rms=np.sqrt((amplitudes**2).sum(axis=0) / 2),
-        sensation=levels, tone=tone, speed=body.of_kind.wave_speed(body, tone or TYPICAL),
-        effort=run.response.effort, ray=_ray(scene, reach, trace), track=_track(scene, trace),
-    )  # fmt: skip
+    shape = _grid(reach, LAYER_GRID)
+    return _of_run(run, _flat_view(run.scene, run.body, run.model, part, shape, reach, lines_at))
 
 
 def plate_view(run: Run, part: tuple[float, int]) -> View:
@@ -302,42 +248,66 @@ def plate_view(run: Run, part: tuple[float, int]) -> View:
     middle, reach = body.placement.offset, np.array([body.width, body.height]) / 2
     points, triangles = _grid(reach, LAYER_GRID)
     points[:, :2] += middle
-    period, frames = part
-    times = np.arange(frames) * period / frames
+
+    lines_at: LinesAt = partial(plate_lines, scene)
+    motion_at = None
     if run.model == STRETCHED.name:
-        from scipy.interpolate import CubicSpline  # which takes long to import
-
-        at, z, modes = settled(scene, PLATE_TOLERANCE)
-        steady = CubicSpline(at - at[0], z)
-        f = plate_lines(scene, points[:1, :2])[0]
-        window = np.hanning(len(at))
-        waves = np.exp(-2j * np.pi * np.multiply.outer(f, at)) * window
-        coordinates = 2 / window.sum() * waves @ z
-
-        def lines(places: Floats) -> tuple[Floats, Complex]:
-            return f[f > 0], (coordinates @ modes.at(places - middle).T)[f > 0]
-
-        def trace(places: Floats, t: Floats) -> Floats:
-            return np.asarray(steady(np.mod(t, at[-1] - at[0])) @ modes.at(places - middle).T)
-
-    else:
-
-        def lines(places: Floats) -> tuple[Floats, Complex]:
-            f, a = plate_lines(scene, places)
-            return f[f > 0], a[f > 0]
-
-        def trace(places: Floats, t: Floats) -> Floats:
-            return synthesise(*lines(places), t)
-
-    return _surface_view(run, (points, triangles), (period, times), lines, trace, reach)
+        lines_at, motion_at = _stretched(scene, np.array(middle))
+    shape = points, triangles
+    found = _flat_view(scene, run.body, run.model, part, shape, reach, lines_at, motion_at)
+    return _of_run(run, found)
 
 
-def spread_radius(view: View, drop: float) -> float:
-    """Distance in metre from the centre of the path to the furthest place whose RMS motion is
-    within `drop` (below 0) dB of the largest.
+def _of_run(run: Run, view: View) -> View:
+    """A body's view with the cost of its run and the speed of its waves."""
+    speed = run.scene.body.of_kind.wave_speed(run.scene.body, view.tone or TYPICAL)
+    return replace(view, speed=speed, effort=run.response.effort)
+
+
+def _stretched(scene: Scene, middle: Floats) -> tuple[LinesAt, MotionAt]:
+    """Lines and motion of a sheet at large deflection, in the later half of the scene."""
+    from scipy.interpolate import CubicSpline  # which takes long to import
+
+    at, z, modes = settled(scene, PLATE_TOLERANCE)
+    steady = CubicSpline(at - at[0], z)
+    f = plate_lines(scene, middle[None])[0]
+    window = np.hanning(len(at))
+    coordinates = 2 / window.sum() * (np.exp(-2j * np.pi * np.multiply.outer(f, at)) * window) @ z
+
+    def lines_at(places: Floats) -> Lines:
+        return f, (coordinates @ modes.at(places - middle).T)
+
+    def motion_at(places: Floats, t: Floats) -> Floats:
+        return np.asarray(steady(np.mod(t, at[-1] - at[0])) @ modes.at(places - middle).T)
+
+    return lines_at, motion_at
+
+
+def _flat_view(
+    scene: Scene, body: str, model: str, part: tuple[float, int], shape: tuple[Floats, Ints],
+    reach: Floats, lines_at: LinesAt, motion_at: MotionAt | None = None,
+) -> View:  # fmt: skip
+    """The view of a flat surface of points (p, 3) and triangles, from its lines at any places;
+    `motion_at` its motion, if it is not the sum of these lines.
     """
-    moving = view.rms >= view.rms.max() * 10 ** (drop / 20)
-    return float(np.linalg.norm(view.places[moving], axis=1).max())
+    (points, triangles), (period, frames) = shape, part
+    times = np.arange(frames) * period / frames
+
+    def summed(places: Floats, t: Floats) -> Floats:
+        f, lines = lines_at(places)
+        return synthesise(f[f > 0], lines[f > 0], t)
+
+    motion_at = motion_at or summed
+    f, lines = lines_at(points[:, :2])
+    tone = strongest_tone(f[f > 0], np.abs(lines[f > 0]))
+    motion = np.zeros((frames, len(points), 3), np.float32)
+    motion[:, :, 2] = -motion_at(points[:, :2], times)
+    return View(
+        body=body, model=model, quantity=DISPLACEMENT, scene=scene, points=points,
+        tets=np.zeros((0, 10), np.int64), surface=np.arange(len(points)), triangles=triangles,
+        period=period, times=times, motion=motion, tone=tone,
+        speed=None, ray=_ray(scene, reach, motion_at), track=_track(scene, motion_at),
+    )  # fmt: skip
 
 
 def path_points(scene: Scene, count: int = 241) -> Floats:
@@ -363,7 +333,7 @@ def save(path: Path, view: View) -> None:
     if (kept := with_tensors(view).tensors) is not None:
         arrays |= {f"{TENSORS}{key}": value for key, value in vars(kept).items()}
     meta = {n: getattr(view, n) for n in META} | {
-        "scene": dumps(view.scene), "effort": asdict(view.effort)
+        "quantity": view.quantity.name, "scene": dumps(view.scene), "effort": asdict(view.effort)
     }  # fmt: skip
     np.savez_compressed(path, meta=np.array(json.dumps(meta)), **arrays)
 
@@ -381,20 +351,18 @@ def load(path: Path) -> View:
         meta = json.loads(str(arrays["meta"]))
         fitting(meta, FITTING, "meta")
         meta |= {"scene": loads(meta["scene"]), "effort": effort_of(meta["effort"], "effort")}
+        meta |= {"quantity": quantity(meta["quantity"]), "tensors": _tensors(arrays)}
         meta |= {name: _trace(arrays, name) for name in ("ray", "track")}
-        meta |= {"tensors": _tensors(arrays)}
         found: dict[str, Any] = {n: arrays[n] for n in ARRAYS} | meta
         return _checked(View(**found))
     except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise ValueError(f"{path} is no view ({error}); make it anew from its scene") from None
 
 
-ARRAYS = (
-    "points", "tets", "surface", "triangles", "times", "motion", "rms", "sensation",
-)  # fmt: skip
+ARRAYS = ("points", "tets", "surface", "triangles", "times", "motion")
 TENSORS = "tensor_"  # what the names of their arrays begin with
-META = ("body", "model", "unit", "period", "tone", "speed")
-FITTING = {"body": str, "model": str, "unit": str, "period": float, "tone": float, "scene": str}
+META = ("body", "model", "period", "tone", "speed")
+FITTING = {"body": str, "model": str, "quantity": str, "period": float, "tone": float, "scene": str}
 
 
 def _checked(view: View) -> View:
@@ -402,7 +370,7 @@ def _checked(view: View) -> View:
     n, s, f = len(view.points), len(view.surface), len(view.times)
     shapes = {
         "points": (n, 3), "surface": (s,), "triangles": (len(view.triangles), 3), "times": (f,),
-        "motion": (f, n, 3), "rms": (s,), "sensation": (s,), "tets": view.tets.shape,
+        "motion": (f, n, 3), "tets": view.tets.shape,
     }  # fmt: skip
     for name, shape in shapes.items():
         array = getattr(view, name)
@@ -411,10 +379,10 @@ def _checked(view: View) -> View:
             raise ValueError(f"'{name}' is of shape {array.shape} and type {array.dtype}")
         if is_index and array.size and not 0 <= array.min() <= array.max() < most:
             raise ValueError(f"'{name}' has indices beyond {most}")
-        if not is_index and (np.isnan(array).any() or np.isposinf(array).any()):
+        if not is_index and not np.isfinite(array).all():
             raise ValueError(f"'{name}' is not finite")
-    if not (n and s and f and view.period > 0 and view.unit in UNITS):
-        raise ValueError("it is empty, or its period or unit are none")
+    if not (n and s and f and view.period > 0):
+        raise ValueError("it is empty, or has no period")
     if (kept := view.tensors) is not None:
         _check_numbers(kept.frames, f, "frames")
         _check_numbers(kept.nodes, n, "nodes")
@@ -471,7 +439,7 @@ def _grid(reach: Floats, side: int) -> tuple[Floats, Ints]:
     return np.column_stack([X.ravel(), Y.ravel(), np.zeros(X.size)]), triangles
 
 
-def _ray(scene: Scene, reach: Floats, motion: Motion) -> Trace:
+def _ray(scene: Scene, reach: Floats, motion_at: MotionAt) -> Trace:
     path = path_points(scene)
     origin = path[np.argmax(path[:, 0])]
     room, way = 0.98 * reach[0] - origin[0], 1.0
@@ -479,20 +447,20 @@ def _ray(scene: Scene, reach: Floats, motion: Motion) -> Trace:
         room, way = 0.98 * reach[0] + origin[0], -1.0
     distance = np.linspace(0, room, ALONG)
     places = origin + way * np.column_stack([distance, 0 * distance])
-    return _traced(scene, places, distance, motion)
+    return _traced(scene, places, distance, motion_at)
 
 
-def _track(scene: Scene, motion: Motion) -> Trace | None:
+def _track(scene: Scene, motion_at: MotionAt) -> Trace | None:
     path = scene.tacton.trajectory
     if path.is_static:
         return None
     phases = np.linspace(0, 1, ALONG)
-    return _traced(scene, path.at_phase(phases), phases * path.length, motion)
+    return _traced(scene, path.at_phase(phases), phases * path.length, motion_at)
 
 
-def _traced(scene: Scene, places: Floats, distance: Floats, motion: Motion) -> Trace:
+def _traced(scene: Scene, places: Floats, distance: Floats, motion_at: MotionAt) -> Trace:
     """Motion through two periods of the slowest tone, or of the path if that is slower."""
     path = scene.tacton.trajectory.drawing_frequency
     tones = [f for f in repeated(scene.tacton).values() if f >= SLOWEST] + [path] * bool(path)
     times = np.arange(INSTANTS) / INSTANTS * 2 / min(tones, default=SLOWEST)
-    return Trace(places=places, distance=distance, times=times, motion=motion(places, times))
+    return Trace(places=places, distance=distance, times=times, motion=motion_at(places, times))

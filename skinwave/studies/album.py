@@ -31,17 +31,15 @@ from skinwave.planning.records import Plan
 from skinwave.planning.simulate import compute, solve
 from skinwave.results import record, surface
 from skinwave.results.files import write_lines, write_run
-from skinwave.results.motion import Waves, probe_response, waves
-from skinwave.results.quantity_map import QuantityMap, map_of_motion
-from skinwave.results.quantity_map import load as load_map
-from skinwave.results.quantity_map import save as save_map
+from skinwave.results.motion import BodyMotion, probe_response, waves
 from skinwave.results.run import Run
 from skinwave.results.surface import (
-    SurfaceMap,
+    SurfaceField,
     body_map,
     element_map,
     grid,
     has_wavenumber_integral,
+    map_of_motion,
 )
 from skinwave.results.views import (
     View,
@@ -69,8 +67,8 @@ PLANNED = 0.05  # tolerance of the plan that stands on the page
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Album:
     """Contents of a folder: runs; views by body, where there are any; the plan, how far its
-    response agrees with the pictures, and the command that made it, where these were saved; by
-    body `surfaces`, maps of the displacement of the surface, or `maps` of another quantity.
+    response agrees with the pictures, and the command that made it, where these were saved; `maps`
+    of the quantity that the probes of each body read.
     """
 
     title: str
@@ -79,8 +77,7 @@ class Album:
     views: Mapping[str, View]
     planned: Mapping[str, Any] | None
     trust: Mapping[str, Any] | None
-    maps: Mapping[str, QuantityMap] = field(default_factory=dict)
-    surfaces: Mapping[str, SurfaceMap] = field(default_factory=dict)
+    maps: Mapping[str, SurfaceField] = field(default_factory=dict)
 
 
 def shown_scenes(scene: Scene, beside: Sequence[str] = ()) -> dict[str, Scene]:
@@ -163,13 +160,12 @@ def make(
 def keep_view(view: View, folder: Path) -> None:
     """A view in a file and, of a body, the map of what its probes read."""
     save(folder / "view.npz", view)
-    scene = view.scene
-    if not scene.reading.is_plain and view.moved is not None:
-        save_map(folder / "map.npz", map_of_motion(scene, view.moved.driven))
-    elif scene.reading.is_plain and view.unit == "m":
-        x, y = grid(scene)
-        moved = None if has_wavenumber_integral(scene) else view.moved
-        found = element_map(scene, moved.driven, x, y) if moved else body_map(scene, x, y)
+    scene, moved, (x, y) = view.scene, view.moved, grid(view.scene)
+    if not scene.reading.is_plain and moved is not None:
+        surface.save(folder / "map.npz", map_of_motion(scene, moved, x, y))
+    elif scene.reading.is_plain and view.body != "none":
+        moved = None if has_wavenumber_integral(scene) else moved
+        found = element_map(scene, moved, x, y) if moved else body_map(scene, x, y)
         surface.save(folder / "map.npz", found)
 
 
@@ -250,20 +246,33 @@ def _is_plate(scene: Scene, h: float | None) -> bool:
     return h is None and scene.reading.is_plain and takes(FROM_REST, scene)
 
 
-def coloured(found: Sequence[tuple[View, Scene]]) -> tuple[list[View], list[str]]:
-    """Views by the quantity that their scenes' probes read, and what is left out: of another one
-    than the displacement of the surface the point kernel, which has none.
+def coloured(
+    scene: Scene, progress: Progress, *, h: float | None = None, solver: str = "auto",
+    frames: int | None = None, beside: Sequence[str] = (),
+) -> tuple[list[View], list[str]]:  # fmt: skip
+    """Views of a scene on all that it is shown on, coloured by the quantity that its probes read,
+    and warnings. The point kernel is left out of other quantities than the displacement.
+
+    Raises
+    ------
+    ValueError
+        If a model refuses the scene, or there is no body whose quantity could be shown.
     """
-    if all(scene.reading.asked is DISPLACEMENT for _, scene in found):
-        return [view for view, _ in found], []
-    bodies = [(view, scene) for view, scene in found if len(view.tets)]
+    shown = shown_scenes(scene, beside)
+    plans = plans_of(shown, progress, h=h, solver=solver)
+    found = list(answers(scene, shown, plans, progress, h=h, solver=solver, frames=frames))
+    said = worst_warnings((run.body, run.response.effort) for _, run in found)
+    views = [(view, run.scene) for view, run in found if view]
+    if all(scene.reading.asked is DISPLACEMENT for _, scene in views):
+        return [view for view, _ in views], said
+    bodies = [(view, its) for view, its in views if len(view.tets)]
     if not bodies:
-        raise ValueError(f"{description.without_kernel(found[0][1])}; give the scene a body")
-    said = [description.without_kernel(scene) for view, scene in found if not len(view.tets)]
-    return [shaded(view, scene) for view, scene in bodies], said
+        raise ValueError(f"{description.without_kernel(scene)}; give the scene a body")
+    said += [description.without_kernel(its) for view, its in views if not len(view.tets)]
+    return [shaded(view, its) for view, its in bodies], said
 
 
-def _moved(scene: Scene, body: str, progress: Progress, h: float | None, solver: str) -> Waves:
+def _moved(scene: Scene, body: str, progress: Progress, h: float | None, solver: str) -> BodyMotion:
     def named(phase: str, fraction: float) -> None:
         progress(f"{body}: {phase}", fraction)
 
@@ -271,7 +280,7 @@ def _moved(scene: Scene, body: str, progress: Progress, h: float | None, solver:
     return waves(scene, progress=named, h=size, solver=solver)
 
 
-def _misfit(run: Run, moved: Waves) -> float:
+def _misfit(run: Run, moved: BodyMotion) -> float:
     """How far the motion in pictures is from the response, over all probes, relative."""
     values = run.response.values
     away = probe_response(run.scene, moved).values - values
@@ -308,15 +317,12 @@ def open_album(folder: Path) -> Album:
     views = [load(path) for path in sorted(folder.glob("*/view.npz"), key=_order)]
     own, scenes_of = folder / "scene.toml", {run.column: run.scene for run in runs}
     kept = {path.parent.name: path for path in sorted(folder.glob("*/map.npz"), key=_order)}
-    plain = {name for name in scenes_of if scenes_of[name].reading.is_plain}
-    others = {*scenes_of} - plain
     scene = read(own) if own.exists() else runs[-1].scene
     return Album(
         title=scene.name if own.exists() else folder.resolve().name, scene=scene, runs=runs,
         views={view.column: view for view in views}, planned=_json(folder / "plan.json", PLAN),
         trust=_json(folder / "trust.json", TRUST),
-        maps={name: load_map(kept[name], scenes_of[name]) for name in kept if name in others},
-        surfaces={name: surface.load(kept[name]) for name in kept if name in plain},
+        maps={n: surface.load(path, scenes_of[n]) for n, path in kept.items() if n in scenes_of},
     )  # fmt: skip
 
 
@@ -335,10 +341,10 @@ def _run(path: Path) -> Run:
     try:
         if any(array.dtype.kind not in "fiu" for array in arrays.values()):
             raise ValueError("it has arrays of other things than numbers")
-        name = next(n for n in arrays if n not in ("t", "probes", *QUANTITIES))
+        model = next(n for n in arrays if n not in ("t", "probes", *QUANTITIES))
         response = Response(
-            model=name, times=arrays["t"], probes=arrays["probes"], values=arrays[name],
-            quantity=named(name).quantity or scene.quantity,
+            model=model, times=arrays["t"], probes=arrays["probes"], values=arrays[model],
+            quantity=named(model).quantity or scene.quantity,
             effort=effort_of(effort, "effort.json"),
             expected_error=np.nan if expected is None else fitting(expected, float, "the error"),
         )  # fmt: skip
@@ -355,3 +361,24 @@ def _json(path: Path, pattern: dict[str, Any]) -> dict[str, Any] | None:
         return None
     found: dict[str, Any] = fitting(reading.parsed(path), pattern, str(path))
     return found
+
+
+def only(album: Album, columns: Sequence[str]) -> Album:
+    """An album with these columns alone, such as "point-kernel" and "skin-slab"; all of them if
+    none is named.
+
+    Raises
+    ------
+    ValueError
+        If it has no such column.
+    """
+    known = list(dict.fromkeys(run.column for run in album.runs))
+    for name in columns:
+        choose("column", name, known)
+    wanted = columns or known
+    return replace(
+        album,
+        runs=[run for run in album.runs if run.column in wanted],
+        views={name: view for name, view in album.views.items() if name in wanted},
+        maps={name: found for name, found in album.maps.items() if name in wanted},
+    )

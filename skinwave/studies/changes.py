@@ -17,7 +17,13 @@ from skinwave.planning.simulate import compute
 from skinwave.results.outputs import digest
 from skinwave.results.propagation import Propagation, propagation, share_outside
 from skinwave.results.run import Run
-from skinwave.results.surface import SurfaceMap, body_map, grid, has_wavenumber_integral, kernel_map
+from skinwave.results.surface import (
+    SurfaceField,
+    body_map,
+    grid,
+    has_wavenumber_integral,
+    kernel_map,
+)
 from skinwave.scene import paper15
 from skinwave.scene.keys import SCALES
 from skinwave.scene.scene import Body, Scene
@@ -28,7 +34,7 @@ if TYPE_CHECKING:
     from skinwave.report.surfaces import MeasuredPlaces
 
 OF_MATERIAL, ENDS = "material", (0.05, 0.95)  # part of an uncertainty; its 90 % interval
-Drawn = tuple[SurfaceMap, SurfaceMap] | tuple[()]  # a body's map and the kernel's
+Drawn = tuple[SurfaceField, SurfaceField] | tuple[()]  # a body's map and the kernel's
 Maps = Callable[[Run], Drawn]
 FIRST = ("am140-stm20",)  # of the paper's Tactons, the one with both modulations in the middle
 
@@ -45,7 +51,7 @@ class Shown:
     published: Run
     bodies: Sequence[Run]
     changes: Mapping[str, Propagation]
-    surfaces: Mapping[str, SurfaceMap] = field(default_factory=dict)
+    surfaces: Mapping[str, SurfaceField] = field(default_factory=dict)
     error: float = np.nan
     shares: tuple[float, float] | None = None
     budget: ErrorBudget | None = None
@@ -76,7 +82,7 @@ def shown(groups: Mapping[str, Sequence[Run]], maps: Maps) -> Shown | None:
     published = next((r for r in group if r.model == PUBLISHED.name), None)
     if kernel is None or published is None or not bodies:
         return None
-    surfaces: dict[str, SurfaceMap] = {}
+    surfaces: dict[str, SurfaceField] = {}
     found: dict[str, Propagation] = {}
     for run in bodies:
         drawn = maps(run)
@@ -111,7 +117,7 @@ def quick_maps(run: Run) -> Drawn:
 
 
 @lru_cache(maxsize=16)  # of a scene and others of its materials, which several parts of a page show
-def _layer_map(scene: Scene) -> SurfaceMap:
+def _layer_map(scene: Scene) -> SurfaceField:
     """Map of a laterally infinite body."""
     return body_map(scene, *grid(scene))
 
@@ -134,10 +140,10 @@ def slow_maps(scene: Scene, h: float | None, solver: str) -> Drawn:
     name = cache.key(
         "surface", scene.body, content_of(scene.body), scene.pressure, x, y, h, solver, versions()
     )
-    names = ("x", "y", "rms", "level")
+    names = ("x", "y", "rms", *(("level",) if scene.body.is_skin else ()))
     if (entry := cache.load(name)) is not None:
         arrays = {n: entry[n] for n in names}
-        return SurfaceMap(**arrays, unit="m", note=entry["meta"]["note"]), below
+        return SurfaceField(**arrays, note=entry["meta"]["note"]), below
     surface = body_map(scene, x, y, h=h, solver=solver)
     cache.store(name, {"note": surface.note}, **{n: getattr(surface, n) for n in names})
     return surface, below

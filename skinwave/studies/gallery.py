@@ -1,7 +1,7 @@
-"""Every picture of an album, drawn once: as files, and as parts of a page."""
+"""Every picture of an album, drawn once: parts of a page, with their files."""
 
 import io
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from PIL import Image as Pillow
 from PIL import features
 
+from simple_model.numbers import significant, with_unit
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.report import maps, render
 from skinwave.report.figures import drawn, tacton_figure
@@ -22,7 +23,7 @@ from skinwave.report.turntable import turntable
 from skinwave.results.run import Run
 from skinwave.results.views import View
 from skinwave.studies.album import Album
-from skinwave.system import document, numbers
+from skinwave.system.document import Part, Picture, inner_page
 from skinwave.system.effort import Progress
 
 FILM_PANEL = (352, 304)  # pixels of a model in the film of a page
@@ -31,91 +32,78 @@ QUALITY, FILM_QUALITY = 88, 60  # of pictures inside a page
 
 @dataclass(frozen=True, kw_only=True)
 class Gallery:
-    """Where pictures go, and how: `folder`, `style`, `formats` of vector figures beside PNG."""
+    """How pictures are drawn: `style`, `formats` of figures beside PNG; `folder` of films."""
 
     folder: Path
     style: Style
     formats: Sequence[str] = ("png",)
 
-    def figure(self, name: str, figure: Figure, caption: str) -> str:
-        """A figure as files, and as a part of the page."""
-        for ending in {"png", *self.formats}:
-            path = self.folder / f"{name}.{ending}"
-            path.write_bytes(drawn(figure, ending, self.style.dpi))
-        with Pillow.open(self.folder / f"{name}.png") as image:
-            return _part(np.asarray(image.convert("RGB")), caption, name)
+    def figure(self, name: str, figure: Figure, caption: str) -> Picture:
+        """A figure, with its files."""
+        kinds = dict.fromkeys(("png", *self.formats))
+        files = {kind: drawn(figure, kind, self.style.dpi) for kind in kinds}
+        with Pillow.open(io.BytesIO(files["png"])) as image:
+            small, kind = _compressed(image.convert("RGB"))
+        return Picture(small, caption, name, kind, files)
 
-    def image(self, name: str, image: render.Image, caption: str) -> str:
-        """A view in three dimensions as a PNG, and as a part of the page."""
-        Pillow.fromarray(image).save(self.folder / f"{name}.png", optimize=True)
-        return _part(image, caption, name)
+    def image(self, name: str, pixels: render.Image, caption: str) -> Picture:
+        """A view in three dimensions, with its file."""
+        image, buffer = Pillow.fromarray(pixels), io.BytesIO()
+        image.save(buffer, format="png", optimize=True)
+        small, kind = _compressed(image)
+        return Picture(small, caption, name, kind, {"png": buffer.getvalue()})
 
 
-def pictures(album: Album, gallery: Gallery, progress: Progress) -> list[str]:
+def pictures(album: Album, gallery: Gallery, progress: Progress) -> list[Part]:
     """Parts of a page that show an album's views, and why any of them is missing."""
     views = list(album.views.values())
     if not views:
-        return [document.paragraph(NO_VIEWS)]
-    said = f"Pictures in three dimensions and the film are left out: {renderer().said}."
+        return [NO_VIEWS]
     own = _own(album, views)
     frame = int(np.abs(own.pushed).max(axis=1).argmax())
-    parts: list[str] = [document.paragraph(said)]
+    parts: list[Part] = [
+        f"Pictures in three dimensions and the film are left out: {renderer().said}."
+    ]
     if renderer().found:
         parts = _spatial(own, frame, views, gallery, progress)
-    parts.append(_turnable(own, frame))
-    for name, draw, caption in flat(views, gallery.style):
+    caption = f"{label(own.column)}, to turn with the mouse, a finger or the arrow keys. {TURNED}"
+    parts.append(inner_page(turntable(own, frame), caption))
+    drawings: dict[str, tuple[Callable[[Sequence[View], Style], Figure], str]] = {
+        "snapshots": (maps.snapshots_figure, SNAPSHOTS), "waves": (maps.waves_figure, WAVES),
+    }  # fmt: skip
+    for name, (draw, caption) in drawings.items():
         progress(f"draw {name}", 0.0)
-        parts.append(gallery.figure(name, draw(), caption))
+        parts.append(gallery.figure(name, draw(views, gallery.style), caption))
     return parts
 
 
 def _spatial(
     own: View, frame: int, views: Sequence[View], gallery: Gallery, progress: Progress
-) -> list[str]:
+) -> list[Part]:
     """Pictures in three dimensions at a frame, and the film."""
     style = gallery.style
-    parts: list[str] = []
     progress("draw side by side", 0.0)
     beside = render.picture(views, style, frame)
-    parts.append(gallery.image("side-by-side", beside, f"{_drawn(views)} {MARKS} {COMPARED}"))
+    parts: list[Part] = [
+        gallery.image("side-by-side", beside, f"{_drawn(views)} {MARKS} {COMPARED}")
+    ]
     path, count = gallery.folder / "film.gif", len(own.times)
     film(path, views, style, progress, panel=FILM_PANEL)
-    slower = numbers.significant(lasts(count) / own.period, 2)
-    parts.append(
-        _film_part(path, f"Film: {seam(own)}. {count} frames, {slower} times more slowly.")
-    )
+    slower = significant(lasts(count) / own.period, 2)
+    caption = f"Film: {seam(own)}. {count} frames, {slower} times more slowly."
+    parts.append(_film_part(path, caption))
     if len(own.tets):
         progress("draw cut open", 0.0)
         cut = render.picture([own], style, _behind(own), camera="front", cut=True)
         section = f"{label(own.column)} cut open along y = 0, the section below the black line"
         caption = f"{section}: {render.shown_scale(own)}. {MARKS}"
         parts.append(gallery.image("cut-open", cut, caption))
-    progress("draw from above", 0.0)
-    above = render.picture(views, style, frame, camera="top")
-    parts.append(gallery.image("from-above", above, f"The same from above. {COMPARED}"))
     return parts
 
 
-def _turnable(own: View, frame: int) -> str:
-    """A view to turn, as a part of the page."""
-    caption = f"{label(own.column)}, to turn with the mouse, a finger or the arrow keys. {TURNED}"
-    return document.inner_page(turntable(own, frame), caption)
-
-
-def flat(views: Sequence[View], style: Style) -> Iterable[tuple[str, Callable[[], Figure], str]]:
-    """Name, how it is drawn and caption of every map."""
-    bodies = [view for view in views if view.unit == "m"]
-    kernel = next((view for view in views if view.column == SAME_LOAD.name), None)
-    yield "rms", lambda: maps.rms_figure(views, style), RMS
-    if kernel and bodies:
-        yield "difference", lambda: maps.difference_figure(kernel, bodies, style), DIFFERENCE
-    yield "snapshots", lambda: maps.snapshots_figure(views, style), SNAPSHOTS
-    yield "waves", lambda: maps.waves_figure(views, style), WAVES
-
-
-def run_figures(album: Album, gallery: Gallery, progress: Progress) -> list[str]:
+def run_figures(album: Album, gallery: Gallery, progress: Progress) -> list[Part]:
     """Waveforms, spectra and sensation levels, for every Tacton of an album."""
-    parts: list[str] = []
+    parts: list[Part] = []
     for name, runs in tactons(album).items():
         progress(f"draw {name}", 0.0)
         figure = tacton_figure(name, runs, gallery.style)
@@ -147,13 +135,13 @@ def tactons(album: Album) -> dict[str, list[Run]]:
 
 def _own(album: Album, views: Sequence[View]) -> View:
     """The view of the scene's own body, or the last."""
-    same = [view for view in views if view.scene.body == album.scene.body]
-    return same[-1] if same and same[-1].unit == "m" else views[-1]
+    same = [v for v in views if v.scene.body == album.scene.body and v.quantity.of_body]
+    return (same or views)[-1]
 
 
 def _drawn(views: Sequence[View]) -> str:
     scales = (f"{label(view.column)}: {render.shown_scale(view)}" for view in views)
-    peaks = (f"{label(view.column)} {maps.peak_text(view)}" for view in views)
+    peaks = (f"{label(view.column)} {with_unit(view.peak, view.quantity)}" for view in views)
     return f"{'; '.join(scales)}. The largest: {', '.join(peaks)}."
 
 
@@ -164,21 +152,22 @@ def _behind(view: View) -> int:
     return int(np.where(seen, largest, -1.0).argmax())
 
 
-def _film_part(path: Path, caption: str) -> str:
+def _film_part(path: Path, caption: str) -> Picture:
     """A film as a part of the page, in a third of the bytes of its GIF where that can be done."""
+    gif = {"gif": path.read_bytes()}
     if not features.check("webp"):
-        return document.picture(path.read_bytes(), caption, "film", "gif")
+        return Picture(gif["gif"], caption, "film", "gif")
     buffer = io.BytesIO()
     with Pillow.open(path) as film:
         film.save(buffer, format="webp", save_all=True, quality=FILM_QUALITY, method=2, loop=0)
-    return document.picture(buffer.getvalue(), caption, "film", "webp")
+    return Picture(buffer.getvalue(), caption, "film", "webp", gif)
 
 
-def _part(image: render.Image, caption: str, name: str) -> str:
-    """A picture in as few bytes as a browser needs."""
+def _compressed(image: Pillow.Image) -> tuple[bytes, str]:
+    """A picture in as few bytes as a browser needs, and their format."""
     buffer, kind = io.BytesIO(), "webp" if features.check("webp") else "png"
-    Pillow.fromarray(image).save(buffer, format=kind, quality=QUALITY, method=4)
-    return document.picture(buffer.getvalue(), caption, name, kind)
+    image.save(buffer, format=kind, quality=QUALITY, method=4)
+    return buffer.getvalue(), kind
 
 
 NO_VIEWS = (
@@ -193,20 +182,6 @@ MARKS = "Black: path and focus; yellow: probes."
 COMPARED = (
     "Colour: motion into the body about its mean, or the point kernel's pressure, over each "
     "model's largest: a pressure and a motion have no common unit. All receive the same load."
-)
-RMS = (
-    "RMS motion about its mean over the whole steady state, relative to each model's largest. All "
-    "models receive the same load, so that a body's map differs from the kernel's by propagation "
-    "alone. Spread is the distance of the outermost -6 and -20 dB from the centre of the path. "
-    "Detection contour: where the line with the highest sensation level is at threshold: of a "
-    "body, the displacement threshold for a focal spot; of the point kernel, 2.2 Pa at 200 Hz (a "
-    "peak of 4.4 Pa with AM), at other frequencies in proportion to the displacement threshold."
-)
-DIFFERENCE = (
-    "What propagation changes: the level of a body's RMS motion minus that of the point kernel's "
-    "pressure under the same load, each relative to its own largest. Red: waves carry motion to "
-    "where the kernel predicts less; blue: the kernel predicts more than the body moves. Levels "
-    "below -40 dB count as -40 dB."
 )
 SNAPSHOTS = (
     "The surface when the body moves most, and a quarter, half and three quarters of a turn of the "

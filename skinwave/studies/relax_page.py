@@ -1,7 +1,7 @@
 """Effects of dropping assumptions, as a page, a picture and tables."""
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 
@@ -9,19 +9,32 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from simple_model import Effort
+from simple_model.numbers import decibel, significant
 from skinwave.report.figures import png
+from skinwave.report.palette import BLUE
 from skinwave.results.comparison import compare
 from skinwave.studies.assumptions import ASSUMPTIONS
 from skinwave.studies.relax import Effect, Hierarchy, HierarchyStep, followed_lines
-from skinwave.system import document
-from skinwave.system.numbers import decibel, significant
-from skinwave.system.plain_text import csv_table
+from skinwave.system.document import Part, Picture, Report, Section
+from skinwave.system.table import Column, Table
 
 LINE_COLUMNS = (
     "step", "model", "probe_x_mm", "probe_y_mm", "line", "frequency_hz", "from_step_before_db",
     "from_richest_db",
 )  # fmt: skip
-
+EFFECT_COLUMNS = (
+    "assumption dropped", "waveform changes by, % of the strongest probe's", "at, mm",
+    "sensation level changes by, dB", "waveform, if it is the only one made, %", "costs, s",
+    "lines change by, dB",
+)  # fmt: skip
+STEP_COLUMNS = (
+    "step", "model", "dofs", Column("seconds, all from the start", digits=2), "GiB", "why not",
+)  # fmt: skip
+INTRODUCTION = (
+    "From the published model to the richest one that this scene has, one assumption after "
+    "another. Waveforms are compared after the factor that fits best where one is a pressure and "
+    "the other a displacement."
+)
 BARS = "What dropping each assumption changes: the waveform, and the sensation level (SL)."
 
 
@@ -45,29 +58,21 @@ def write(folder: Path, found: Hierarchy) -> None:
     steps = [_record(step) for step in found.every]
     record = {"effects": [asdict(e) for e in effects], "steps": steps}
     (folder / "relax.json").write_text(json.dumps(record, indent=1), encoding="utf-8")
-    (folder / "relax.csv").write_bytes(csv_table(LINE_COLUMNS, _line_rows(found)))
-    answered = [r for r in found.every if r.response]
-    arrays = {r.name: r.response.values for r in answered if r.response}
-    first = next(r.response for r in answered if r.response)
+    lines = Table(LINE_COLUMNS, _line_rows(found))
+    (folder / "relax.csv").write_bytes(lines.to_csv())
+    answered = {step.name: step.response for step in found.every if step.response}
+    arrays = {name: response.values for name, response in answered.items()}
+    first = next(iter(answered.values()))
     arrays |= {"t": first.times, "probes": first.probes}
     np.savez(folder / "responses.npz", **arrays)  # type: ignore[arg-type]
-    drawn = png(figure(effects), dpi=130)
-    (folder / "relax.png").write_bytes(drawn)
-    said = map(document.paragraph, map(sentence, effects))
-    parts = [
-        document.warnings_banner(efforts(found)),
-        document.paragraph(
-            "From the published model to the richest one that this scene has, one assumption after "
-            "another. Waveforms are compared after the factor that fits best where one is a "
-            "pressure and the other a displacement."
-        ),
-        document.section("What each assumption changes", *said),
-        document.picture(drawn, BARS, "effects"),
-        document.table(*effect_table(effects)),
-        document.section("Steps", document.table(*step_table(found))),
+    parts: list[Part] = [
+        Section("What each assumption changes", list(map(sentence, effects))),
+        Picture(png(figure(effects), dpi=130), BARS, "relax"),
+        Table(EFFECT_COLUMNS, map(_effect_row, effects)),
+        Section("Steps", [Table(STEP_COLUMNS, map(_step_row, found.every))]),
     ]
     title = f"{found.scene.name}: assumptions, one by one"
-    (folder / "index.html").write_text(document.page(title, *parts), encoding="utf-8")
+    Report(title, [INTRODUCTION], parts, efforts(found)).write(folder)
 
 
 def efforts(found: Hierarchy) -> list[tuple[str, Effort]]:
@@ -75,38 +80,12 @@ def efforts(found: Hierarchy) -> list[tuple[str, Effort]]:
     return [(step.name, step.response.effort) for step in found.every if step.response]
 
 
-def effect_table(effects: Iterable[Effect]) -> tuple[list[str], list[list[str]]]:
-    """Header and rows, the greatest effect first."""
-    rows = [
-        [
-            e.name, significant(100 * e.waveform), f"({1e3 * e.where[0]:g}, {1e3 * e.where[1]:g})",
-            "" if e.level is None else decibel(e.level, signed=True),
-            "" if e.alone is None else significant(100 * e.alone), f"{e.seconds:+.1f}",
-            ", ".join(f"{name} {decibel(x, signed=True)}" for name, x in e.decibel.items()),
-        ]
-        for e in effects
-    ]  # fmt: skip
-    header = ["assumption dropped", "waveform changes by, % of the strongest probe's", "at, mm"]
-    header += ["sensation level changes by, dB", "waveform, if it is the only one made, %"]
-    return [*header, "costs, s", "lines change by, dB"], rows
-
-
-def step_table(found: Hierarchy) -> tuple[list[str], list[list[str]]]:
-    """Header and rows of all steps, in the order of the model hierarchy."""
-    rows = []
-    for step in found.every:
-        dofs = f"{step.response.effort.dofs:,}" if step.response else ""
-        memory = f"{step.memory / 2**30:.2f}" if step.response else ""
-        rows.append([step.name, step.model, dofs, f"{step.seconds:.1f}", memory, step.error])
-    return ["step", "model", "dofs", "seconds, all from the start", "GiB", "why not"], rows
-
-
 def figure(effects: list[Effect]) -> Figure:
     """A bar for each assumption, the greatest effect at the top."""
     drawn = Figure(figsize=(7, 1 + 0.32 * len(effects)), layout="constrained")
     axes = drawn.add_subplot()
     changes = [100 * e.waveform for e in effects]
-    bars = axes.barh([e.name for e in effects], changes, color="#0072B2", height=0.7)
+    bars = axes.barh([e.name for e in effects], changes, color=BLUE, height=0.7)
     texts = [
         f"{significant(change)} %"
         + ("" if e.level is None else f",  {decibel(e.level, signed=True)} dB SL")
@@ -118,6 +97,22 @@ def figure(effects: list[Effect]) -> Figure:
     axes.set_xlabel("change of the waveform, % of the strongest probe's")
     axes.spines[["top", "right"]].set_visible(False)
     return drawn
+
+
+def _effect_row(e: Effect) -> list[object]:
+    return [
+        e.name, 100 * e.waveform, f"({1e3 * e.where[0]:g}, {1e3 * e.where[1]:g})",
+        None if e.level is None else decibel(e.level, signed=True),
+        None if e.alone is None else 100 * e.alone, f"{e.seconds:+.1f}",
+        ", ".join(f"{name} {decibel(x, signed=True)}" for name, x in e.decibel.items()),
+    ]  # fmt: skip
+
+
+def _step_row(step: HierarchyStep) -> list[object]:
+    dofs, memory = (
+        (step.response.effort.dofs, step.memory / 2**30) if step.response else 2 * (None,)
+    )
+    return [step.name, step.model, dofs, step.seconds, memory, step.error]
 
 
 def _record(step: HierarchyStep) -> dict[str, object]:
@@ -135,8 +130,8 @@ def _line_rows(found: Hierarchy) -> Iterator[list[object]]:
         ratios = [_ratios(step, other, names) for other in (before, richest)]
         for k, (name, f) in enumerate(names.items()):
             for p, (x, y) in enumerate(found.scene.probes):
-                changes = [f"{r[k, p]:.4g}" if np.isfinite(r[k, p]) else "" for r in ratios]
-                yield [step.name, step.model, 1e3 * x, 1e3 * y, name, f"{f:.6g}", *changes]
+                changes = [f"{r[k, p]:.4g}" if np.isfinite(r[k, p]) else None for r in ratios]
+                yield [step.name, step.model, 1e3 * x, 1e3 * y, name, f, *changes]
 
 
 def _ratios(step: HierarchyStep, other: HierarchyStep, names: dict[str, float]) -> np.ndarray:
@@ -144,5 +139,4 @@ def _ratios(step: HierarchyStep, other: HierarchyStep, names: dict[str, float]) 
     assert other.response
     found = compare(other.response, step.response, tuple(names.values()))
     with np.errstate(divide="ignore", invalid="ignore"):
-        decibel = 20 * np.log10(found.line_ratios)
-    return np.asarray(decibel)
+        return np.asarray(20 * np.log10(found.line_ratios))

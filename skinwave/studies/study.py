@@ -79,7 +79,7 @@ def run_study(
     h: float | None = None,
     solver: str = "auto",
     measured: Measured | None = None,
-    more: Sequence[str] = (),
+    more: Sequence[document.Part] = (),
 ) -> StudyOutcome:
     """Run every scene, writing each run as it is finished, then the tables and the page; with a
     measurement beside the models, if there is one of that Tacton. The page has `more` parts before
@@ -130,7 +130,7 @@ def run_study(
             first = shown(groups, maps) if outcome.runs == outcome.planned else None
             if first and found:
                 first = replace(first, measured=measured_places(found[-1]))
-        parts = study_page.page_parts(folder, groups, drawn, first, outcome, progress, figures)
+        parts = study_page.page_parts(groups, drawn, first, outcome, progress, figures)
         for comparison in found:
             measured_tables.write_tables(folder, comparison)
             parts[:0] = measured_page.page_parts(comparison, partial(study_page.kept, folder))
@@ -144,7 +144,7 @@ def run_study(
             study_page.effort_section(groups, prepared, spent),
             study_page.again(command),
         ]
-    (folder / "index.html").write_text(document.page(title, *parts), encoding="utf-8")
+    document.Report(title, parts=parts, pictures=study_page.FIGURES).write(folder)
     return spent
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from simple_model import Effort
+from simple_model.numbers import counted, decibel
 from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.prepared import Prepared
 from skinwave.report.figures import overview_figure, png, tacton_figure
@@ -16,7 +17,7 @@ from skinwave.results.claims import AssessedClaim
 from skinwave.results.files import fill
 from skinwave.results.run import Run
 from skinwave.scene.file import dumps
-from skinwave.studies import summary, tables
+from skinwave.studies import summary
 from skinwave.studies.changes import Shown, beside_kernels, changes, quick_maps, shown
 from skinwave.studies.description import (
     levels_of,
@@ -26,12 +27,28 @@ from skinwave.studies.description import (
     tones_of,
     unresolved,
 )
-from skinwave.studies.lines_table import lines_table
-from skinwave.system import document
+from skinwave.studies.tables import agreement_table, claims_table, effort_table, lines_table
+from skinwave.system.document import (
+    Part,
+    Picture,
+    Report,
+    Section,
+    preformatted,
+    warnings_banner,
+)
 from skinwave.system.effort import Progress
-from skinwave.system.numbers import decibel
 
 EXAMPLES = ("am140", "stm20", "am140-stm20")  # what the paper's comparison figure shows
+FIGURES = "figures"  # folder of a comparison's figures
+LEVELS = (
+    "Levels are relative to f_AM at the same probe, and those of the probe where that is largest, "
+    "which may be one where f_AM is weak."
+)
+OVERVIEW_CAPTION = (
+    "Top: motion about its mean at one probe, relative to each model's largest motion at any "
+    "probe. Middle: its spectrum; filled markers are lines of the load, open ones free vibrations "
+    "excited by the start of the Tacton. Bottom: how far the motion spreads."
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,39 +63,35 @@ class StudyOutcome:
     peak_memory: int = 0
 
 
-def write_single(folder: Path, run: Run, more: Sequence[str] = ()) -> None:
+def write_single(folder: Path, run: Run, more: Sequence[Part] = ()) -> None:
     """The folder of one run, with its page, which may have more parts before the effort."""
     fill(folder, run)
-    figure = tacton_figure(run.tacton, [run])
     group = beside_kernels(run) if run.is_motion and run.scene.load.is_plain else []
     first = shown({run.tacton: group}, quick_maps)
     parts = [
-        *(summary.top(first, lambda f, text: document.picture(png(f), text)) if first else []),
-        document.warnings_banner([("", run.response.effort)]),
-        document.picture(png(figure), caption(run.tacton, [run]), "tacton"),
-        *map(document.paragraph, unresolved([run])),
+        *(summary.top(first, lambda figure, text: Picture(png(figure), text)) if first else []),
+        warnings_banner([("", run.response.effort)]),
+        Picture(png(tacton_figure(run.tacton, [run])), caption(run.tacton, [run])),
+        *unresolved([run]),
         *more,
-        document.section("Effort", tables.effort_table({run.body: run.response.effort}, 1)),
-        document.section("The scene", document.preformatted(dumps(run.scene))),
+        Section("Effort", effort_table({run.body: run.response.effort}, 1)),
+        Section("The scene", [preformatted(dumps(run.scene))]),
     ]
-    title = f"{run.tacton} on {run.body}: {run.model}"
-    (folder / "index.html").write_text(document.page(title, *parts), encoding="utf-8")
+    Report(f"{run.tacton} on {run.body}: {run.model}", parts=parts).write(folder)
 
 
 def page_parts(
-    folder: Path,
     groups: Mapping[str, list[Run]],
     drawn_runs: Mapping[str, list[Run]],
     first: Shown | None,
     outcome: StudyOutcome,
     progress: Progress,
     figures: Mapping[str, Future[bytes]],
-) -> list[str]:
-    """Parts of index.html, and a PNG of each figure in it.
+) -> list[Part]:
+    """Parts of the page of a comparison.
 
     Parameters
     ----------
-    folder : Path
     groups : runs by Tacton
     drawn_runs : runs that figures show, by Tacton
     first : the Tacton of the first screen, if there is one
@@ -87,42 +100,44 @@ def page_parts(
     figures : by Tacton and "overview", as far as they are begun
     """
     runs = [run for group in groups.values() for run in group]
-    (folder / "figures").mkdir()
-
-    def drawn(figure: Figure, caption: str) -> str:
-        return kept(folder, "propagation", figure, caption)
-
+    name = first.kernel.tacton * (len(groups) > 1) if first else ""
     begun = not figures["overview"].cancel()
     overview = figures["overview"].result() if begun else overview_png(drawn_runs)
-    parts = [
-        *(summary.top(first, drawn, first.kernel.tacton * (len(groups) > 1)) if first else []),
-        document.warnings_banner(efforts(runs)),
+    parts: list[Part] = [
+        *(summary.top(first, _propagation, name) if first else []),
+        warnings_banner(efforts(runs)),
         _introduction(outcome, groups),
-        *map(document.paragraph, [*other_quantity(runs[-1].scene), *unresolved(runs)]),
-        _kept(folder, "overview", overview, OVERVIEW_CAPTION),
-        *_changes(groups),
-        document.section(
+        *other_quantity(runs[-1].scene),
+        *unresolved(runs),
+        Picture(overview, OVERVIEW_CAPTION, "overview"),
+        _changes(groups),
+        Section(
             "Which of the paper's claims hold where",
-            document.paragraph(LEVELS),
-            tables.claims_table(outcome.assessed_claims),
-            *map(document.paragraph, _disagreements(outcome.assessed_claims)),
+            [
+                LEVELS,
+                claims_table(outcome.assessed_claims),
+                *_disagreements(outcome.assessed_claims),
+            ],
         ),
-        document.section("What was modelled, and what was left out",
-                         *map(document.paragraph, modelled(runs))),
-        document.section("How far the models agree", tables.agreement_table(groups)),
-    ]  # fmt: skip
+        Section("What was modelled, and what was left out", modelled(runs)),
+        Section("How far the models agree", [agreement_table(groups)]),
+    ]
     images = _images(drawn_runs, figures, progress)
-    pictures = [_kept(folder, n, images[n], caption(n, group)) for n, group in groups.items()]
-    return [*parts, document.section("Every Tacton", *pictures)]
+    every = [Picture(images[n], caption(n, group), n) for n, group in groups.items()]
+    return [*parts, Section("Every Tacton", every)]
 
 
-def _changes(groups: Mapping[str, list[Run]]) -> list[str]:
+def _propagation(figure: Figure, text: str) -> Picture:
+    return Picture(png(figure), text, "propagation")
+
+
+def _changes(groups: Mapping[str, list[Run]]) -> Section:
     """Effect of propagation; of another quantity than the displacement, for which the point kernel
     has nothing to compare with, its lines.
     """
     if found := changes(groups):
-        return [document.section("What propagation changes", summary.per_tacton(found))]
-    return [document.section("Lines", *map(lines_table, groups.values()))]
+        return Section("What propagation changes", summary.per_tacton(found))
+    return Section("Lines", [part for group in groups.values() for part in lines_table(group)])
 
 
 def tacton_png(name: str, group: list[Run]) -> bytes:
@@ -144,7 +159,7 @@ def efforts(runs: list[Run]) -> list[tuple[str, Effort]]:
 
 def effort_section(
     groups: Mapping[str, list[Run]], prepared: Mapping[str, Prepared], outcome: StudyOutcome
-) -> str:
+) -> Section:
     """Cost of each body and of the whole."""
     runs = [run for group in groups.values() for run in group]
     efforts = {}
@@ -153,14 +168,13 @@ def effort_section(
         worst = max(e.energy_imbalance for e in spent), max(e.radiated for e in spent)
         first = prepared[body].effort if body in prepared else spent[0]
         efforts[body] = replace(first, energy_imbalance=worst[0], radiated=worst[1])
-    return document.section("Effort", tables.effort_table(efforts, len(groups), outcome.seconds))
+    return Section("Effort", effort_table(efforts, len(groups), outcome.seconds))
 
 
-def again(command: str) -> str:
+def again(command: str) -> Section:
     """Command that repeats the comparison."""
-    return document.section("Do it again", document.paragraph(
-        f"{command}; or, for one run, skinwave run TACTON/BODY/scene.toml in this folder."
-    ))  # fmt: skip
+    text = f"{command}; or, for one run, skinwave run TACTON/BODY/scene.toml in this folder."
+    return Section("Do it again", [text])
 
 
 def _images(
@@ -176,22 +190,19 @@ def _images(
 
 
 def kept(folder: Path, name: str, figure: Figure, caption: str) -> str:
-    """A figure as a file, and inside the page."""
-    return _kept(folder, name, png(figure), caption)
-
-
-def _kept(folder: Path, name: str, image: bytes, caption: str) -> str:
-    """A figure drawn once: as a file, and inside the page."""
-    (folder / "figures" / f"{name}.png").write_bytes(image)
-    return document.picture(image, caption, name)
+    """A figure as a file in a comparison's folder, and inside the page."""
+    image = png(figure)
+    (folder / FIGURES).mkdir(exist_ok=True)
+    (folder / FIGURES / f"{name}.png").write_bytes(image)
+    return Picture(image, caption, name).html()
 
 
 def _introduction(outcome: StudyOutcome, groups: Mapping[str, list[Run]]) -> str:
     if outcome.runs == outcome.planned:
-        state = f"{len(groups)} Tacton{'s' * (len(groups) != 1)}, {outcome.runs} runs."
+        state = f"{counted(len(groups), 'Tacton')}, {outcome.runs} runs."
     else:
         state = f"Interrupted: {outcome.runs} of {outcome.planned} runs are finished and shown."
-    return document.paragraph(
+    return (
         f"{state} The point-kernel model of Lim, Seifi and Park (CHI EA '24, "
         "doi 10.1145/3613905.3650981), as published and under the load that the bodies "
         "receive, beside the motion of these bodies. Amplitudes of every line are in "
@@ -199,10 +210,10 @@ def _introduction(outcome: StudyOutcome, groups: Mapping[str, list[Run]]) -> str
     )
 
 
-def _disagreements(assessed_claims: list[AssessedClaim]) -> list[str]:
+def _disagreements(assessed_claims: list[AssessedClaim]) -> list[Part]:
     """Claims measured on paper that a body contradicts, and whether propagation is the cause."""
     of_kernel = {v.claim: v for v in assessed_claims if v.model == SAME_LOAD.name}
-    texts = []
+    texts: list[Part] = []
     for assessed in assessed_claims:
         kernel = of_kernel.get(assessed.claim)
         if assessed.body == "none" or not assessed.claim.startswith("M") or assessed.holds:
@@ -220,17 +231,6 @@ def _disagreements(assessed_claims: list[AssessedClaim]) -> list[str]:
             )
         texts.append(text)
     return texts
-
-
-LEVELS = (
-    "Levels are relative to f_AM at the same probe, and those of the probe where that is largest, "
-    "which may be one where f_AM is weak."
-)
-OVERVIEW_CAPTION = (
-    "Top: motion about its mean at one probe, relative to each model's largest motion at any "
-    "probe. Middle: its spectrum; filled markers are lines of the load, open ones free vibrations "
-    "excited by the start of the Tacton. Bottom: how far the motion spreads."
-)
 
 
 def caption(name: str, group: list[Run]) -> str:

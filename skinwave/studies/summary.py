@@ -5,8 +5,9 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from simple_model.numbers import stated_error
-from skinwave.report.figures import REPORT, sized
+from simple_model.numbers import decibel, percent, significant, stated_error, with_unit
+from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity
+from skinwave.report.figures import REPORT
 from skinwave.report.palette import label
 from skinwave.report.styles import Style
 from skinwave.report.surfaces import BESIDE, SURFACES, surfaces_figure
@@ -16,8 +17,8 @@ from skinwave.scene.keys import LOSSES, MODULI, SCALES
 from skinwave.scene.scene import Scene
 from skinwave.scene.spreads import spreads_of
 from skinwave.studies.changes import Shown
-from skinwave.system.document import Markup, paragraph, table
-from skinwave.system.numbers import decibel, significant
+from skinwave.system.document import Details, Part
+from skinwave.system.table import Table
 
 NOTHING = "Nothing vibrates: a constant pressure on a focus at rest leaves no wave."
 ABOUT_MAPS = (
@@ -31,22 +32,23 @@ NAMED = 3  # lines that a sentence names
 
 
 def top(
-    shown: Shown, draw: Callable[[Figure, str], str], name: str = "", style: Style = REPORT
-) -> list[str]:
+    shown: Shown, picture: Callable[[Figure, str], Part], name: str = "", style: Style = REPORT
+) -> list[Part]:
     """Parts of a page: what a reader of ten seconds reads of the Tacton that is shown first.
 
     Parameters
     ----------
-    draw : makes a part of the page of a figure and its caption
+    shown : Shown
+    picture : makes a part of the page of a figure and its caption
     name : of the Tacton, on a page of several
     style : of the figure
     """
-    parts: list[str] = [paragraph(text) for text in sentences(shown)]
+    parts: list[Part] = [*sentences(shown)]
     if name:
-        parts[0] = paragraph(f"{name}, one of the Tactons below: {sentences(shown)[0]}")
+        parts[0] = f"{name}, one of the Tactons below: {parts[0]}"
     if shown.surfaces and shown.changes[shown.body.column].strongest:
         figure = surfaces_figure(shown.kernel.scene, shown.surfaces, style, measured=shown.measured)
-        parts.append(draw(figure, f"{SURFACES} {BESIDE}" if shown.measured else SURFACES))
+        parts.append(picture(figure, f"{SURFACES} {BESIDE}" if shown.measured else SURFACES))
     bodies = small_table(list(shown.changes.values()), shown.kernel.tacton)
     return [*parts, bodies, beside_published(shown.kernel, shown.published)]
 
@@ -58,10 +60,8 @@ def sentences(shown: Shown) -> list[str]:
     return [_propagated(found), driven, f"{_above_threshold(found)} {_sure(shown)}"]
 
 
-def small_table(columns: Sequence[Propagation], name: str) -> str:
+def small_table(columns: Sequence[Propagation], name: str) -> Table:
     """Kernel and bodies under the same load, a column each."""
-    if not columns:
-        return ""
     first = columns[0]
     rows = [
         ["share of motion outside the kernel's -20 dB region"]
@@ -69,38 +69,38 @@ def small_table(columns: Sequence[Propagation], name: str) -> str:
         ["spread from the path at -6 dB, mm"]
         + [_reach(first.kernel_spread), *(_reach(c.spread) for c in columns)],
         ["phase delay of the strongest component at the path, ms"]
-        + ["0", *("-" if c.delay is None else significant(1e3 * c.delay, 2) for c in columns)],
+        + ["0", *(_delay(c) for c in columns)],
         ["strongest component"]
-        + [_component(first.kernel_strongest, "Pa"), *(_component(c.strongest) for c in columns)],
+        + [_component(first.kernel_strongest, PRESSURE)]
+        + [_component(c.strongest) for c in columns],
         ["component of highest sensation level"]
         + ["-", *(_highest_sensation(c.highest_sensation) for c in columns)],
     ]
-    return table([f"{name}: same load", "point kernel", *(label(c.column) for c in columns)], rows)
+    return Table([f"{name}: same load", "point kernel", *(label(c.column) for c in columns)], rows)
 
 
-def beside_published(kernel: Run, published: Run) -> Markup:
+def beside_published(kernel: Run, published: Run) -> Details:
     """Effect of drive law and focus: the kernel as published beside the same load."""
     names = [n for n in kernel.frequencies if n in published.frequencies]
-    levels = [
-        [20 * np.log10(max(float(r.lines[n].max()), 1e-300) / top) if top else -np.inf
-         for n in names]
-        for r in (published, kernel)
-        for top in [max((float(x.max()) for x in r.lines.values()), default=0.0)]
-    ]  # fmt: skip
+    levels = []
+    for run in (published, kernel):
+        top = max((float(x.max()) for x in run.lines.values()), default=0.0)
+        peaks = [max(float(run.lines[n].max()), 1e-300) for n in names]
+        levels.append([20 * np.log10(peak / top) if top else -np.inf for peak in peaks])
     shown = sorted(range(len(names)), key=lambda k: -max(levels[0][k], levels[1][k]))[:8]
     rows = [
         [names[k], f"{kernel.frequencies[names[k]]:.1f}", *(decibel(x[k]) for x in levels)]
         for k in shown
     ]
-    header = ["component", "frequency, Hz", "as published, dB re its strongest"]
-    folded = table([*header, "same load, dB re its strongest"], rows)
+    columns = ["component", "frequency, Hz", "as published, dB re its strongest"]
     drives = " against ".join(
         f"{r.scene.pressure.drive}, {r.scene.pressure.profile_name}" for r in (kernel, published)
     )
-    return Markup(
-        "<details><summary>Kernel as published beside the same load: what the drive law and the "
-        "focus change</summary>{}{}</details>"
-    ).format(paragraph(drives + "; largest at any probe."), folded)
+    return Details(
+        "Kernel as published beside the same load: what the drive law and the focus change",
+        [f"{drives}; largest at any probe.",
+         Table([*columns, "same load, dB re its strongest"], rows)],
+    )  # fmt: skip
 
 
 def _propagated(found: Propagation) -> str:
@@ -194,10 +194,14 @@ def known_of(scene: Scene) -> str:
     )
 
 
-def _component(found: Component | None, unit: str = "m") -> str:
+def _component(found: Component | None, quantity: Quantity = DISPLACEMENT) -> str:
     if found is None:
         return "none"
-    return f"{found.name}, {found.frequency:.0f} Hz, {sized(found.amplitude, unit, 2)}"
+    return f"{found.name}, {found.frequency:.0f} Hz, {with_unit(found.amplitude, quantity, 2)}"
+
+
+def _delay(found: Propagation) -> str:
+    return "-" if found.delay is None else significant(1e3 * found.delay, 2)
 
 
 def _highest_sensation(found: Component | None) -> str:
@@ -207,7 +211,7 @@ def _highest_sensation(found: Component | None) -> str:
 
 
 def _percent(share: float | None) -> str:
-    return "-" if share is None else f"{significant(100 * share, 2)} %"
+    return "-" if share is None else percent(share)
 
 
 def _reach(found: Reach | None) -> str:
@@ -216,17 +220,15 @@ def _reach(found: Reach | None) -> str:
     return f"{'> ' * found.beyond}{1e3 * found.metre:.0f}"
 
 
-def per_tacton(found: Mapping[str, Mapping[str, Propagation]]) -> Markup:
+def per_tacton(found: Mapping[str, Mapping[str, Propagation]]) -> list[Part]:
     """Tacton -> body -> what propagation changes, a row each."""
     rows = [
         [name, label(c.column), _percent(c.share), _reach(c.kernel_spread), _reach(c.spread),
-         "-" if c.delay is None else significant(1e3 * c.delay, 2),
-         _component(c.kernel_strongest, "Pa"), _component(c.strongest),
+         _delay(c), _component(c.kernel_strongest, PRESSURE), _component(c.strongest),
          _highest_sensation(c.highest_sensation)]
         for name, columns in found.items()
         for c in columns.values()
     ]  # fmt: skip
-    header = ["Tacton", "body", "share outside", "spread of kernel, mm", "of body, mm"]
-    header += ["phase delay of strongest in body, ms", "strongest in kernel", "in body"]
-    header += ["highest sensation level"]
-    return paragraph(ABOUT_MAPS) + table(header, rows)
+    columns = ["Tacton", "body", "share outside", "spread of kernel, mm", "of body, mm"]
+    columns += ["phase delay of strongest in body, ms", "strongest in kernel", "in body"]
+    return [ABOUT_MAPS, Table([*columns, "highest sensation level"], rows)]

@@ -8,8 +8,8 @@ taken as it is. It is made of templates and literals alone: see its `format` and
 import hashlib
 import re
 from base64 import b64encode
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from html import unescape
 from pathlib import Path
 
@@ -32,15 +32,17 @@ _NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 @dataclass(frozen=True)
 class Picture:
-    """An image with a caption; with a `name`, its file is written beside the page.
+    """An image with a caption; with a `name`, its files are written beside the page.
 
-    `kind` is its format, "png" or another one that browsers know.
+    `kind` is its format, "png" or another one that browsers know; `files` those to be written, by
+    their endings, if not the image itself.
     """
 
     image: bytes
     caption: str
     name: str = ""
     kind: str = "png"
+    files: Mapping[str, bytes] = field(default_factory=dict)
 
     def html(self) -> Markup:
         """The image inside the page, with its caption."""
@@ -85,12 +87,14 @@ class Report:
     verdict : paragraphs at the top of the page
     parts : text (a paragraph each), `Table`, `Picture`, `Section`, `Details` or `Markup`
     efforts : names and `Effort` of responses, whose warnings stand above all else
+    pictures : folder beside the page for files of pictures, if not the page's own
     """
 
     title: str
     verdict: Sequence[str] = ()
     parts: Sequence[Part] = ()
     efforts: Sequence[tuple[str, Effort]] = ()
+    pictures: str = ""
 
     def html(self) -> str:
         """The page, complete with its policy."""
@@ -98,9 +102,12 @@ class Report:
 
     def write(self, folder: Path) -> None:
         """Write index.html into a folder, and a file of every picture and table with a name."""
+        beside = folder / self.pictures
+        beside.mkdir(exist_ok=True)
         for one in _flat(self.parts):
             if isinstance(one, Picture) and one.name:
-                (folder / f"{one.name}.{one.kind}").write_bytes(one.image)
+                for ending, content in (one.files or {one.kind: one.image}).items():
+                    (beside / f"{one.name}.{ending}").write_bytes(content)
             elif isinstance(one, Table) and one.name:
                 (folder / f"{one.name}.csv").write_bytes(one.to_csv())
         (folder / "index.html").write_text(self.html(), encoding="utf-8")

@@ -18,7 +18,7 @@ import skinwave
 from simple_model import Effort, Response
 from skinwave.commands.cli import main
 from skinwave.scene.file import loads
-from skinwave.studies import mechanisms, relax_page, tradeoff
+from skinwave.studies import relax_page, tradeoff
 from skinwave.studies.assumptions import ASSUMPTIONS
 from skinwave.studies.relax import Hierarchy, HierarchyStep
 from skinwave.studies.tradeoff import Candidate, Measured, Study
@@ -90,14 +90,6 @@ def verified(folder):
         suite.page([result], 1).write(folder)
 
 
-def mechanised(folder):
-    line = mechanisms.MechanismLine(
-        tacton=HOSTILE, body=HOSTILE, mechanism=HOSTILE, line=HOSTILE, frequency=1.0, amplitude=1e-6
-    )
-    found = mechanisms.Findings(lines=(line,), ratios=(), failed=(HOSTILE,))
-    mechanisms.write(folder, found)
-
-
 def ran(folder):
     (folder / "scene.toml").write_text(table(body={"kind": "none"}), encoding="utf-8")
     out = ["--out", str(folder / "out"), "--quiet"]
@@ -128,7 +120,7 @@ def compared(folder):
     assert main(["compare", str(folder / "scene.toml"), "--h", "6", *out]) == 0
 
 
-WRITERS = (relaxed, traded, verified, mechanised, ran, reported, compared)
+WRITERS = (relaxed, traded, verified, ran, reported, compared)
 
 
 @contextmanager
@@ -162,7 +154,7 @@ class Tags(HTMLParser):
         self.text += data
 
 
-@pytest.mark.parametrize("write", WRITERS[:5], ids=lambda write: write.__name__)
+@pytest.mark.parametrize("write", WRITERS[:4], ids=lambda write: write.__name__)
 def test_a_text_that_looks_like_markup_is_text(tmp_path, write):
     write(tmp_path)
     for path in tmp_path.rglob("index.html"):

@@ -4,10 +4,7 @@ import ast
 import inspect
 import re
 import sys
-import tomllib
 from dataclasses import replace
-from importlib import import_module
-from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -22,16 +19,15 @@ import skinwave
 from simple_model import Effort, Response, phasors
 from simple_model.load.focus import spot_width
 from simple_model.numbers import stated_error
-from skinwave.commands.cli import main
 from skinwave.models import BUILT_IN, named
 from skinwave.planning.budget import error_budget
 from skinwave.planning.records import PlanRow
-from skinwave.report import films, scene_plot, window
+from skinwave.report import scene_plot
 from skinwave.report.fields import Field
 from skinwave.report.styles import style
 from skinwave.results import citations
 from skinwave.studies.album import Album
-from skinwave.studies.chosen import only
+from skinwave.studies.album import Album, only
 from skinwave.sweeps import sweep_figures
 from skinwave.sweeps.in_python import SweepTable
 
@@ -228,23 +224,6 @@ def test_a_grid_has_the_displacement_of_a_time(field):
             field.to_pyvista(time)
 
 
-def test_grids_of_pyvista_have_an_accessor(field):
-    import pyvista as pv
-
-    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"]
-    import_module(declared["pyvista.accessors"]["skinwave"])  # as pyvista does where it is used
-    grid = field.to_pyvista(0.0032)
-    assert np.array_equal(grid.skinwave.to_mesh().tets, field.mesh.tets)
-    moved = grid.skinwave.displaced(1e3)
-    assert moved.points == pytest.approx(grid.points + 1e3 * grid["displacement"])
-    away = np.linalg.norm(grid.skinwave.displaced().points - grid.points, axis=1)
-    assert away.max() == pytest.approx(0.05 * grid.length)
-    with pytest.raises(ValueError, match="no point data of the name displacement"):
-        field.mesh.to_pyvista().skinwave.displaced()
-    with pytest.raises(ValueError, match="tetrahedra"):
-        pv.ImageData(dimensions=(2, 2, 2)).cast_to_unstructured_grid().skinwave.to_mesh()
-
-
 def test_paraview_reads_what_a_field_saves(field, tmp_path):
     import pyvista as pv
 
@@ -268,27 +247,6 @@ def test_a_map_is_of_the_upper_surface_into_the_body(field, tmp_path):
     low, high = image.get_clim()
     assert -low == high == pytest.approx(1e6 * np.abs(field.displacement[:, top, 2]).max())
     assert ax.get_title() == "t = 2.00 ms"
-    film = field.animate(2)
-    film.save(tmp_path / "wave.gif", dpi=20)
-    from PIL import Image
-
-    with Image.open(tmp_path / "wave.gif") as kept:
-        assert kept.n_frames == 2
-
-
-@pytest.mark.skipif(not all(map(find_spec, films.ENCODER)), reason="the extra [film] is missing")
-def test_a_film_is_saved_as_mp4_with_its_extra_and_named_without(field, tmp_path, monkeypatch):
-    import imageio_ffmpeg
-
-    film = field.animate(3)
-    film.save(tmp_path / "wave.mp4", dpi=20)
-    frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "wave.mp4"))
-    assert (frames, seconds) == (3, pytest.approx(0.15, abs=0.01))
-    monkeypatch.setattr(films, "find_spec", lambda name: None)
-    with pytest.raises(ValueError, match=r"install the extra \[film\], or name it .gif"):
-        film.save(tmp_path / "wave.mp4")
-
-
 def test_a_scene_is_drawn_before_anything_is_solved(scene):
     two = replace(scene.tacton, foci=(0.0, 0.5))
     ax = replace(scene, pressure=replace(scene.pressure, tacton=two)).plot()
@@ -480,33 +438,6 @@ def test_progress_is_shown_where_it_is_asked_for(scene, capsys):
     for model in ("flat-body", "flat-body-harmonic"):
         skinwave.simulate(scene, model, 0.9, progress=True)
         assert "wavenumber integral" in capsys.readouterr().err.split("\n")
-
-
-def test_figures_are_put_into_windows(monkeypatch):
-    import matplotlib.pyplot as plt
-    from matplotlib.figure import Figure
-
-    shown = []
-    monkeypatch.setattr(plt, "show", lambda: shown.extend(plt.get_figlabels()))
-    figure = Figure(figsize=(3, 2))
-    figure.subplots().plot([1, 2])
-    window.open_windows({"a response": figure})
-    assert shown == ["a response"]
-    assert plt.figure("a response").canvas.manager.canvas.figure is figure
-    assert not window.has_windows()  # Agg draws into none
-
-
-def test_a_window_that_cannot_be_opened_is_a_warning(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    Path("scene.toml").write_text(SCENE.replace('"slab"', '"none"'))
-    assert main(["plan", "scene.toml", "--show"]) == 0
-    assert "no window can be opened here" in capsys.readouterr().err
-    opened = []
-    monkeypatch.setattr(window, "has_windows", lambda: True)
-    monkeypatch.setattr(window, "open_windows", opened.append)
-    assert main(["plan", "scene.toml", "--show"]) == 0
-    assert main(["run", "scene.toml", "--show", "--quiet"]) == 0
-    assert [list(figures) for figures in opened] == [["disc <b>"], ["disc <b>"]]
 
 
 def test_figures_of_a_paper_have_its_width_letters_and_fonts(tmp_path):

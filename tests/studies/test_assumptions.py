@@ -25,7 +25,6 @@ from skinwave.commands.cli import main
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps
 from skinwave.scene.scene import BODIES, Body, Layer, solid_of
-from skinwave.studies import mechanisms
 from skinwave.studies.assumptions import (
     DEVICE_RATES,
     LAYERS,
@@ -39,7 +38,6 @@ from skinwave.studies.assumptions import (
     side_step,
     strongest_line,
 )
-from skinwave.studies.mechanisms import paper_vs_skin, signatures, write
 from skinwave.studies.relax import Hierarchy, HierarchyStep, hierarchy_of, line_changes
 
 PATH = Trajectory(shape="circle", size=0.02, speed=12.0)
@@ -408,52 +406,11 @@ def test_line_changes_are_of_lines_that_count():
     assert changes["f_AM"] == pytest.approx(6.02, abs=0.01)
 
 
-def test_patterns_of_loads_are_those_of_their_fourier_series():
-    found = signatures()
-    expected = {
-        "square of the sound's amplitude": (0.25, 0, 0),
-        "contact on one side only": (0.424, 0, 0.085),
-        "clipped sound, squared": (0.589, 0.2, 0),
-        "square root of the command": (0.2, 0.086, 0.048),
-    }
-    for name, ratios in expected.items():
-        assert found[name] == pytest.approx(ratios, abs=2e-3)
-
-
-@pytest.mark.slow
-def test_a_line_of_the_sheet_grows_with_the_amplitude_and_one_of_the_load_does_not(
-    tmp_path, monkeypatch
-):
-    monkeypatch.setattr(mechanisms, "DURATION", 0.2)  # s; after half of it these bodies are steady
-    monkeypatch.setattr(mechanisms, "AMPLITUDES", (0.25, 1.0))
-    bodies = {
-        "paper-sheet-loose": replace(BODIES["paper-sheet-loose"], width=0.06, height=0.06),
-        "skin-slab": Body(width=0.042, height=0.042, depth=0.01, sides="clamped"),
-    }
-    still = [("am140", Tacton(am_frequency=140, trajectory=Trajectory()))]
-    found = paper_vs_skin(lambda phase, done: None, h=0.0075, chosen=still, bodies=bodies)
-    ratio = {(r.body, r.mechanism, r.amplitude): r.ratio for r in found.ratios}
-    for body in bodies:
-        assert ratio[body, "linear load", 1.0] < 1e-5
-        quiet, loud = (ratio[body, "squared load", a] for a in (0.25, 1.0))
-        assert quiet == pytest.approx(loud, rel=1e-3)
-    quiet, loud = (ratio["paper-sheet-loose", "squared load, stretching", a] for a in (0.25, 1.0))
-    assert abs(loud / quiet - 1) > 0.05
-    write(tmp_path, found)
-    assert "a line of the sheet" in (tmp_path / "index.html").read_text()
-    with open(tmp_path / "lines.csv", newline="") as file:
-        rows = list(csv.DictReader(file))
-    assert {row["mechanism"] for row in rows} == {
-        "linear load", "squared load", "squared load, stretching",
-    }  # fmt: skip
-
-
 @pytest.mark.parametrize(
     ("options", "said"),
     [
         (["scene.toml", "--update-rate", "30"], "update_rate = 30 kHz is no device's; take 20 or"),
         (["scene.toml", "--update-rate", "40", "--points", "999"], "must be 2 to 209"),
-        (["paper-vs-skin", "--points", "9"], "leave them out"),
     ],
 )
 def test_the_command_line_refuses_such_devices_in_one_sentence(
