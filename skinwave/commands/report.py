@@ -198,13 +198,13 @@ def _film(options: argparse.Namespace) -> int:
 def _views(options: argparse.Namespace, progress: "Progress") -> "list[View]":
     """Motion to show: of a folder what it keeps, of a scene every model's response."""
     from skinwave.scene.file import read
-    from skinwave.studies.album import coloured, open_album
+    from skinwave.studies.album import open_album, shown_views
 
     if not options.source.is_dir():
         scene = read(options.source)
         if options.quantity is not None:
             scene = replace(scene, quantity=options.quantity)
-        views, said = coloured(
+        views, said = shown_views(
             replace(scene, depth=0.0),  # what is seen is the surface
             progress, h=metre(options.h), solver=options.solver, frames=options.frames,
             beside=options.beside,

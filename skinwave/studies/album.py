@@ -246,30 +246,36 @@ def _is_plate(scene: Scene, h: float | None) -> bool:
     return h is None and scene.reading.is_plain and takes(FROM_REST, scene)
 
 
-def coloured(
+def shown_views(
     scene: Scene, progress: Progress, *, h: float | None = None, solver: str = "auto",
     frames: int | None = None, beside: Sequence[str] = (),
 ) -> tuple[list[View], list[str]]:  # fmt: skip
-    """Views of a scene on all that it is shown on, coloured by the quantity that its probes read,
-    and warnings. The point kernel is left out of other quantities than the displacement.
-
-    Raises
-    ------
-    ValueError
-        If a model refuses the scene, or there is no body whose quantity could be shown.
+    """Views of a scene on all that it is shown on, `coloured`, and warnings; options and errors as
+    of `make`.
     """
     shown = shown_scenes(scene, beside)
     plans = plans_of(shown, progress, h=h, solver=solver)
     found = list(answers(scene, shown, plans, progress, h=h, solver=solver, frames=frames))
-    said = worst_warnings((run.body, run.response.effort) for _, run in found)
-    views = [(view, run.scene) for view, run in found if view]
-    if all(scene.reading.asked is DISPLACEMENT for _, scene in views):
-        return [view for view, _ in views], said
-    bodies = [(view, its) for view, its in views if len(view.tets)]
+    views, said = coloured([(view, run.scene) for view, run in found if view])
+    return views, worst_warnings((run.body, run.response.effort) for _, run in found) + said
+
+
+def coloured(found: Sequence[tuple[View, Scene]]) -> tuple[list[View], list[str]]:
+    """Views by the quantity that their scenes' probes read, and what is left out: of another one
+    than the displacement of the surface the point kernel, which has none.
+
+    Raises
+    ------
+    ValueError
+        If there is no body whose quantity could be shown.
+    """
+    if all(scene.reading.asked is DISPLACEMENT for _, scene in found):
+        return [view for view, _ in found], []
+    bodies = [(view, scene) for view, scene in found if len(view.tets)]
     if not bodies:
-        raise ValueError(f"{description.without_kernel(scene)}; give the scene a body")
-    said += [description.without_kernel(its) for view, its in views if not len(view.tets)]
-    return [shaded(view, its) for view, its in bodies], said
+        raise ValueError(f"{description.without_kernel(found[0][1])}; give the scene a body")
+    said = [description.without_kernel(scene) for view, scene in found if not len(view.tets)]
+    return [shaded(view, scene) for view, scene in bodies], said
 
 
 def _moved(scene: Scene, body: str, progress: Progress, h: float | None, solver: str) -> BodyMotion:
