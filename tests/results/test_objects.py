@@ -26,7 +26,6 @@ from skinwave.report import scene_plot
 from skinwave.report.fields import Field
 from skinwave.report.styles import style
 from skinwave.results import citations
-from skinwave.studies.album import Album
 from skinwave.studies.album import Album, only
 from skinwave.sweeps import sweep_figures
 from skinwave.sweeps.in_python import SweepTable
@@ -247,6 +246,8 @@ def test_a_map_is_of_the_upper_surface_into_the_body(field, tmp_path):
     low, high = image.get_clim()
     assert -low == high == pytest.approx(1e6 * np.abs(field.displacement[:, top, 2]).max())
     assert ax.get_title() == "t = 2.00 ms"
+
+
 def test_a_scene_is_drawn_before_anything_is_solved(scene):
     two = replace(scene.tacton, foci=(0.0, 0.5))
     ax = replace(scene, pressure=replace(scene.pressure, tacton=two)).plot()

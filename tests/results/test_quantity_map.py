@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from skinwave.results.quantity_map import quantity_map
 
 from simple_model import MovingPressure, Tacton, Trajectory, phasors
 from simple_model.load.spectrum import load_lines
 from skinwave import Body, Scene
 from skinwave.commands.cli import main
 from skinwave.planning.simulate import compute
-from skinwave.results.quantity_map import quantity_map
 from skinwave.results.surface import body_map, grid
 from skinwave.scene.file import dumps
 
