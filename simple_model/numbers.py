@@ -5,10 +5,6 @@ a range, `decibel`, `percent`, and `stated_error` for an expected relative error
 """
 
 from math import floor, isfinite, log10
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from simple_model.quantities import Quantity
 
 LARGEST, SMALLEST = 1e6, 1e-4  # written without an exponent between these
 LEAST = 0.005  # error that is stated: wavenumber integrals and elements agree to 0.002
@@ -24,11 +20,6 @@ def significant(value: float, digits: int = 3) -> str:
         return f"{value:.{digits}g}"
     value = float(f"{value:.{digits - 1}e}")
     return f"{value:,.{max(digits - 1 - floor(log10(abs(value))), 0)}f}"
-
-
-def with_unit(value: float, quantity: "Quantity", digits: int = 3) -> str:
-    """A value of a quantity in SI, with the unit that it is shown in."""
-    return f"{significant(quantity.per_unit * value, digits)} {quantity.shown}"
 
 
 def with_error(value: float, error: float, digits: int = 3) -> str:

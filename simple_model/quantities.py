@@ -26,6 +26,7 @@ from simple_model.layers.tensors import (
     squared,
     von_mises,
 )
+from simple_model.numbers import significant
 from simple_model.typing import Floats
 
 NORMAL, VECTOR, STRAIN = "normal displacement", "displacement", "strain"  # fields
@@ -82,6 +83,10 @@ class Quantity:
         `modulus` is the complex modulus there over that at rest.
         """
         return np.asarray(s) ** self.rate * (modulus if self.relaxes else 1.0)
+
+    def text(self, value: float, digits: int = 3) -> str:
+        """A value in SI as text, with the unit that it is shown in."""
+        return f"{significant(self.per_unit * value, digits)} {self.shown}"
 
     def waveforms(self, components: Floats, probes: int) -> Floats:
         """Values (t, p) of components (t, p c), those of a probe next to each other."""

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from matplotlib.figure import Figure
 
-from simple_model.numbers import stated_error, with_unit
+from simple_model.numbers import stated_error
 from skinwave.measure.alignment import opposite_sign
 from skinwave.measure.flaws import flaws
 from skinwave.measure.measured_runs import drawn_places
@@ -143,7 +143,7 @@ def _where(found: MeasuredComparison, column: Column) -> str:
     for k in lines[:MOST_NAMED]:
         p = int(np.argmax(away[k]))
         x, y = 1e3 * found.scene.probe_points[p]
-        has, shows = (with_unit(float(np.abs(z[k, p])), asked)
+        has, shows = (asked.text(float(np.abs(z[k, p])))
                       for z in (column.model, found.lines.mean))  # fmt: skip
         said.append(
             f"{names[k]} at {shown[k].sum()} of {away.shape[1]} places (most at "
@@ -227,6 +227,6 @@ def _changes(found: MeasuredComparison) -> list[str]:
         return []
     asked, name = found.measurement.record, list(found.names)[k]
     return [
-        f"The motion is not steady: over the record {name} changes from {with_unit(low, asked)} to "
-        f"{with_unit(high, asked)} at one place; cut off what lies before and after the Tacton."
+        f"The motion is not steady: over the record {name} changes from {asked.text(low)} to "
+        f"{asked.text(high)} at one place; cut off what lies before and after the Tacton."
     ]

@@ -13,7 +13,6 @@ from matplotlib.ticker import MaxNLocator
 from meshes.tetmesh import Floats
 from simple_model import spectrum
 from simple_model.drawing import small
-from simple_model.numbers import with_unit
 from skinwave.report.palette import colour, inked, label, marker
 from skinwave.report.styles import NARROW, SHOWN, STYLES, TEXT, Style
 from skinwave.results.comparison import moving_rms
@@ -165,7 +164,7 @@ def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> int:
     for run in runs:
         style: dict[str, Any] = {"color": inked(run.column), "marker": marker(run.column), "lw": 2}
         handles.append(figure.axes[0].plot([], [], **style)[0])
-        scale = with_unit(_largest(run, runs), run.response.record)
+        scale = run.response.record.text(_largest(run, runs))
         labels.append(answered(run) + f", 1 = {scale}" * scales)
     kinds = dict.fromkeys(peak.kind for run in runs for peak in run.unnamed)
     if kinds:

@@ -13,7 +13,6 @@ from matplotlib.lines import Line2D
 
 from meshes.tetmesh import Floats
 from simple_model.drawing import small
-from simple_model.numbers import with_unit
 from skinwave.models.speeds import mach_angle
 from skinwave.report.palette import SIGNED, inked, label
 from skinwave.report.styles import NARROW, Style
@@ -93,7 +92,7 @@ def snapshots_figure(views: Sequence[View], style: Style, count: int = 4) -> Fig
                 )  # fmt: skip
                 draw_path(ax, view.scene, "black")
                 _draw_focus(ax, view, float(view.times[frame]))
-            largest = with_unit(view.peak, view.quantity)
+            largest = view.quantity.text(view.peak)
             name = f"{label(view.column)}\n±1 = {largest}\ny, mm"
             row[0].set_ylabel(name, color=inked(view.column))
         for frame, ax in zip(frames, axes[0], strict=True):

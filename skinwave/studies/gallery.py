@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from PIL import Image as Pillow
 from PIL import features
 
-from simple_model.numbers import significant, with_unit
+from simple_model.numbers import significant
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.report import maps, render
 from skinwave.report.figures import drawn, tacton_figure
@@ -141,7 +141,7 @@ def _own(album: Album, views: Sequence[View]) -> View:
 
 def _drawn(views: Sequence[View]) -> str:
     scales = (f"{label(view.column)}: {render.shown_scale(view)}" for view in views)
-    peaks = (f"{label(view.column)} {with_unit(view.peak, view.quantity)}" for view in views)
+    peaks = (f"{label(view.column)} {view.quantity.text(view.peak)}" for view in views)
     return f"{'; '.join(scales)}. The largest: {', '.join(peaks)}."
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from simple_model.numbers import significant, stated_error, with_unit
+from simple_model.numbers import significant, stated_error
 from skinwave.report.figures import png
 from skinwave.report.surfaces import surfaces_figure
 from skinwave.results.propagation import NEAR, distance_from_path
@@ -33,7 +33,7 @@ def sentences(scene: Scene, found: SurfaceField) -> list[str]:
     error = f"; expected error {stated_error(found.error)} of the largest"
     return [
         f"The RMS of the {scene.reading.words} is largest at ({x:g}, {y:g}) mm, "
-        f"{with_unit(largest, found.quantity)}, and above {NEAR:g} dB of that up to "
+        f"{found.quantity.text(largest)}, and above {NEAR:g} dB of that up to "
         f"{significant(reach, 2)} mm from the path"
         + (", or further: the map ends there." if border.any() else "."),
         f"Computed by {found.note}{error * isfinite(found.error)}.",

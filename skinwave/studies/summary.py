@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from simple_model.numbers import decibel, percent, significant, stated_error, with_unit
+from simple_model.numbers import decibel, percent, significant, stated_error
 from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity
 from skinwave.report.figures import REPORT
 from skinwave.report.palette import label
@@ -197,7 +197,7 @@ def known_of(scene: Scene) -> str:
 def _component(found: Component | None, quantity: Quantity = DISPLACEMENT) -> str:
     if found is None:
         return "none"
-    return f"{found.name}, {found.frequency:.0f} Hz, {with_unit(found.amplitude, quantity, 2)}"
+    return f"{found.name}, {found.frequency:.0f} Hz, {quantity.text(found.amplitude, 2)}"
 
 
 def _delay(found: Propagation) -> str:

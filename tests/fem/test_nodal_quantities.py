@@ -145,7 +145,15 @@ def test_a_film_is_of_the_quantity(view, tmp_path):
 def test_a_film_of_a_folder_has_no_other_quantity(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("skinwave.report.renderer.renderer", renderer)
     (tmp_path / "scene.toml").write_text(dumps(SCENE))
-    asked = ["film", str(tmp_path), "--quantity", "strain_zz", "-o", str(tmp_path / "a.gif")]
+    asked = [
+        "report",
+        str(tmp_path),
+        "--film",
+        "--quantity",
+        "strain_zz",
+        "-o",
+        str(tmp_path / "a.gif"),
+    ]
     assert main(asked) == 2
     assert "keeps the motion alone" in capsys.readouterr().err
 

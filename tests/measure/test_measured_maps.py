@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from simple_model import MovingPressure, Tacton
-from simple_model.quantities import quantity
+from simple_model.quantities import PRESSURE, quantity
 from skinwave.measure import measured_runs
 from skinwave.measure.lines import MeasuredLines
 from skinwave.report.surfaces import MeasuredPlaces, surfaces_figure
-from skinwave.results.surface import SurfaceMap
+from skinwave.results.surface import SurfaceField
 from skinwave.scene.scene import BODIES, Scene
 
 SCENE = Scene(
@@ -40,8 +40,8 @@ def test_lines_of_a_velocity_are_read_as_displacement():
 def test_places_have_the_colour_of_the_map_and_none_on_a_pressure(factor, end):
     x = np.linspace(-0.01, 0.01, 21)
     r = np.hypot(*np.meshgrid(x, x))
-    body = SurfaceMap(x=x, y=x, rms=1e-6 * np.exp(-r / 0.005), level=np.zeros_like(r), unit="m")
-    kernel = replace(body, rms=1e7 * body.rms**1.5, unit="Pa")
+    body = SurfaceField(x=x, y=x, rms=1e-6 * np.exp(-r / 0.005))
+    kernel = replace(body, rms=1e7 * body.rms**1.5, quantity=PRESSURE)
     rms = factor * 1e-6 * np.array([1.0, np.exp(-np.hypot(4, 2) / 5), 0.3])
     measured = MeasuredPlaces(places=SCENE.probe_points, rms=rms)
     surfaces = {"point-kernel": kernel, "skin-slab": body}

@@ -108,7 +108,7 @@ OPTIONS = [
     (["run", "s.toml", "--tolerence=0.1"], "'--tolerance'"),
     (["run", "s.toml", "--elementsize", "1"], "'--element-size'"),
     (["convert", "a.csv", "b.csv", "--rte", "3"], "'--rate'"),
-    (["film", "s.toml", "--camera", "tilt"], "'tilted'"),
+    (["report", "s.toml", "--camera", "tilt"], "'tilted'"),
     (["cache", "--clean"], "'--clear'"),
     (["--vesion"], "'--version'"),
 ]

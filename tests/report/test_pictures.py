@@ -32,6 +32,7 @@ from skinwave.report.figures import tacton_figure
 from skinwave.report.levels import levels_figure
 from skinwave.report.renderer import Renderer, renderer
 from skinwave.report.styles import style
+from skinwave.report.surfaces import surfaces_figure
 from skinwave.results import exports, motion, views
 from skinwave.scene.file import dumps
 from skinwave.scene.scene import Body, Scene
@@ -85,7 +86,7 @@ def page(folder, tmp_path_factory):
 def test_models_stand_side_by_side_with_the_scenes_own_body(scene, seen):
     assert list(seen) == ["point-kernel", "paper-sheet-loose", "skin-slab"]
     assert seen["skin-slab"].scene == scene
-    assert {view.unit for view in seen.values()} == {"Pa", "m"}
+    assert {view.quantity.unit for view in seen.values()} == {"Pa", "m"}
 
 
 def test_all_but_the_published_kernel_receive_the_same_load(scene, folder):
@@ -110,20 +111,6 @@ def test_a_body_of_ones_own_is_shown_alone_and_changes_no_load(scene, drive):
     assert list(asked)[2:] == ["skin-slab", "paper-sheet-loose"]
     with pytest.raises(ValueError, match="body 'paper' is unknown"):
         album.shown_scenes(scene, ["paper"])
-
-
-def test_a_folder_of_an_older_release_names_its_kernel_by_its_load(folder, tmp_path):
-    """Up to 0.2 the folder `none` held the published kernel, by the name of the scene's own."""
-    shutil.copytree(folder / "skin-slab", tmp_path / "skin-slab")
-    shutil.copytree(folder / "point-kernel", tmp_path / "none")
-    text = (folder / "point-kernel-published/scene.toml").read_text()
-    (tmp_path / "none/scene.toml").write_text(text)
-    old = album.open_album(tmp_path)
-    assert [run.column for run in old.runs] == ["point-kernel-published", "skin-slab"]
-    assert old.runs[0].response.unit == "Pa"
-    same = (folder / "point-kernel/scene.toml").read_text()
-    (tmp_path / "none/scene.toml").write_text(same)
-    assert album.open_album(tmp_path).runs[0].column == "point-kernel"
 
 
 def test_a_view_comes_back_from_its_file(seen, tmp_path):
@@ -161,19 +148,12 @@ def test_the_kernels_brightest_place_lies_on_the_path(seen):
     view = seen["point-kernel"]
     radius = view.scene.tacton.trajectory.size / 2
     step = np.ptp(view.places[:, 0]) / (views.GRID - 1)
-    brightest = view.places[view.rms.argmax()]
+    brightest = view.places[view.pushed.std(axis=0).argmax()]
     assert abs(np.hypot(*brightest) - radius) < 1.5 * step
     for t, frame in zip(view.times, np.abs(view.pushed), strict=True):
         if frame.max() > 0.2 * view.peak:  # where the modulation is not at its zero
             focus = view.scene.tacton.trajectory.position(float(t))
             assert np.linalg.norm(view.places[frame.argmax()] - focus) < 1.5 * step
-
-
-def test_waves_spread_further_than_the_kernel(seen):
-    radii = {name: views.spread_radius(view, -20.0) for name, view in seen.items()}
-    assert radii["skin-slab"] > 1.5 * radii["point-kernel"]
-    assert radii["paper-sheet-loose"] > 1.5 * radii["point-kernel"]
-    assert all(views.spread_radius(v, -6.0) <= views.spread_radius(v, -20.0) for v in seen.values())
 
 
 def apparent_speed(distances, times, motion, frequency):
@@ -206,12 +186,6 @@ def test_the_wake_of_a_fast_focus_runs_at_the_speed_of_surface_waves():
     assert found == pytest.approx(body.of_kind.wave_speed(body, 250.0), rel=0.05)
     assert found == pytest.approx(apparent_speed(distance, times, exact, 250.0), rel=0.05)
     assert scene.tacton.trajectory.speed > 2 * found  # there is a wake
-
-
-def test_a_running_wave_has_the_speed_that_it_runs_at():
-    x, t = np.linspace(0, 0.04, 50), np.arange(100) / 100 / 50
-    running = np.cos(2 * np.pi * 150 * (t[:, None] - x / 3.3)) * np.exp(-x / 0.02)
-    assert apparent_speed(x, t, running, 150.0) == pytest.approx(3.3, rel=1e-3)
 
 
 def test_a_sheet_bends_at_the_speed_of_plates():
@@ -372,7 +346,7 @@ def test_fields_are_opened_again_with_their_times(seen, page):
     assert list(grid.field_data["units"]) == ["displacement_m: m", "strain: 1", "stress_pa: Pa"]
 
 
-FIGURES = ("rms", "difference", "snapshots", "waves", "waveforms-0", "sensation-1")
+FIGURES = ("propagation", "snapshots", "waveforms-0", "sensation-1")
 
 
 @pytest.mark.parametrize("name", FIGURES)
@@ -397,7 +371,8 @@ def test_no_text_of_a_figure_is_cut(folder, dressed):
     kept = album.open_album(folder)
     chosen = style("report", 3.5) if dressed == "narrow" else style(dressed)
     shown, runs = list(kept.views.values()), gallery.tactons(kept)["small"]
-    figures = [draw() for _, draw, _ in gallery.flat(shown, chosen)]
+    figures = [draw(shown, chosen) for draw in (maps.snapshots_figure, maps.waves_figure)]
+    figures += [surfaces_figure(kept.scene, kept.maps, chosen)]
     figures += [tacton_figure("small", runs, chosen), levels_figure(runs, 0, chosen)]
     for figure in figures:
         canvas = FigureCanvasAgg(figure)
@@ -457,7 +432,7 @@ def test_a_report_is_rebuilt_without_a_model_and_without_gl(folder, tmp_path, mo
     def run(*arguments, **options):
         raise AssertionError("a model was run")
 
-    for name in ("waves", "plan", "compute", "follow", "required_plan", "kernel_view", "suite"):
+    for name in ("waves", "plan", "compute", "follow", "required_plan", "kernel_view"):
         monkeypatch.setattr(album, name, run)
     monkeypatch.setattr(gallery, "renderer", lambda: NO_GL)
     blank = BytesIO()  # what is on the figures is looked at in those of `page`
@@ -466,8 +441,8 @@ def test_a_report_is_rebuilt_without_a_model_and_without_gl(folder, tmp_path, mo
     assert main(["report", str(folder), "--out", str(tmp_path / "flat"), "--quiet"]) == 0
     text = (tmp_path / "flat/index.html").read_text()
     assert "apt install libegl1 libgl1-mesa-dri" in text
-    assert text.count("data:image/") == 8
-    assert (tmp_path / "flat/pictures/rms.png").exists()
+    assert text.count("data:image/") == 6
+    assert (tmp_path / "flat/pictures/waves.png").exists()
     assert not (tmp_path / "flat/pictures/film.gif").exists()
 
 
@@ -491,7 +466,7 @@ def test_a_run_of_one_model_has_a_report_too(tmp_path, monkeypatch, capsys):
     assert main(["report", "one", "--quiet"]) == 0  # its own folder is made anew
     assert main(["report", "one/report/pictures"]) == 2
     assert "holds no responses.npz" in capsys.readouterr().err
-    assert main(["film", "one"]) == 2
+    assert main(["report", "one", "--film"]) == 2
     assert "keeps no motion of whole bodies" in capsys.readouterr().err
 
 

@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from skinwave.results.quantity_map import quantity_map
 
 from simple_model import MovingPressure, Tacton, Trajectory, phasors
 from simple_model.load.spectrum import load_lines
 from skinwave import Body, Scene
 from skinwave.commands.cli import main
 from skinwave.planning.simulate import compute
-from skinwave.results.surface import body_map, grid
+from skinwave.results.surface import body_map, grid, quantity_map
 from skinwave.scene.file import dumps
 
 CIRCLE = Trajectory(shape="circle", size=0.012, speed=7.0)
@@ -83,7 +82,17 @@ def test_elements_read_what_probes_read():
 def test_the_command_writes_a_page_and_tables(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "layer.toml").write_text(dumps(LAYER))
-    asked = ["map", "layer.toml", "--quantity", "velocity", "--reach", "6", "--step", "3"]
+    asked = [
+        "report",
+        "layer.toml",
+        "--map",
+        "--quantity",
+        "velocity",
+        "--reach",
+        "6",
+        "--step",
+        "3",
+    ]
     assert main([*asked, "--depth", "meissner"]) == 0
     said = capsys.readouterr().out
     assert "velocity into the body at a depth of 0.7 mm is largest at" in said
@@ -108,6 +117,6 @@ def test_the_command_writes_a_page_and_tables(tmp_path, monkeypatch, capsys):
 def test_what_cannot_be_mapped_is_refused(words, said, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "layer.toml").write_text(dumps(LAYER))
-    assert main(["map", "layer.toml", *words]) == 2
+    assert main(["report", "layer.toml", "--map", *words]) == 2
     assert said in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["layer.toml"]

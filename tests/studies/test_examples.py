@@ -34,9 +34,10 @@ def test_every_command_takes_an_example_and_they_agree(path, tmp_path, monkeypat
         monkeypatch.setattr(f"skinwave.studies.scene_report.{part}", lambda *given: [])
     scene, size = read(path), SIZE[path.stem]
     options = {"run": ["--model", "fem", *size] if path.stem in MESHED else [],
-               "compare": size, "map": [*size, "--step", "5"], "report": size}  # fmt: skip
-    for command, own in options.items():
-        assert main([command, str(path), *own, "--quiet", "--out", command]) == 0
+               "compare": size, "report": size, "map": ["--map", *size, "--step", "5"]}  # fmt: skip
+    for out, own in options.items():
+        command = "report" if out == "map" else out
+        assert main([command, str(path), *own, "--quiet", "--out", out]) == 0
 
     run, compared, reported = (body_response(name) for name in ("run", "compare", "report"))
     if run.model == compared.model:
