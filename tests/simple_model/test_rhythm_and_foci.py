@@ -253,15 +253,3 @@ def test_what_cannot_be_is_refused_in_one_sentence(build):
     with pytest.raises(ValueError, match="[a-z]") as error:
         build()
     assert "\n" not in str(error.value)
-<<<<<<< HEAD
-=======
-
-
-def test_the_picture_of_a_pressure_has_the_levels_of_its_recording():
-    load = MovingPressure(tacton=Tacton(trajectory=wandering(), duration=0.03))
-    scene = Scene(pressure=load, body=Body(kind="none"), probes=((0.0, 0.0),))
-    shown = kernel_view(scene, np.array([0.012, 0.012]), (0.03, 600))
-    truth = load(shown.points, np.arange(600) * 0.03 / 600).std(axis=0)
-    assert np.linalg.norm(shown.motion[..., 2].std(axis=0) - truth) < 0.02 * np.linalg.norm(truth)
-    assert np.abs(shown.motion[..., 2].mean(axis=0)).max() < 0.02 * truth.max()
->>>>>>> aafc742 (Test one field of a surface and films and maps as reports)
