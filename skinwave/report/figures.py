@@ -140,7 +140,7 @@ def panels(
     size = style.size(width * count, height + below)
     if style.is_narrow:
         size = size[0], 0.8 * size[0] * count + 0.2 + below
-    figure = Figure(figsize=size, layout="constrained")
+    figure = Figure(figsize=size, layout="compressed")
     shape = (count, 1) if style.is_narrow else (1, count)
     axes = figure.subplots(*shape, sharex=True, sharey=True, squeeze=False).ravel()
     for ax in axes[-1:] if style.is_narrow else axes:

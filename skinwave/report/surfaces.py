@@ -21,7 +21,7 @@ from skinwave.results.surface import SurfaceField
 from skinwave.results.views import path_points
 from skinwave.scene.scene import Scene
 
-SIDE = 3.85  # inch of a map with its bar
+SIDE, ALONE = 3.85, 5.0  # inch of a map with its bar, beside others and alone
 KERNEL, THRESHOLD = "#ff9e4a", "#ff2fd0"  # borders: the kernel's -20 dB, the detection threshold
 MEASURED_EDGE = COLOURS["measured"]
 SURFACES = (
@@ -68,7 +68,8 @@ def surfaces_figure(
     """
     kernel = next((each for each in surfaces.values() if each.quantity is PRESSURE), None)
     with mpl.rc_context(style.rc):
-        figure, axes = panels(len(surfaces), style, SIDE, SIDE)
+        alone = len(surfaces) == 1
+        figure, axes = panels(len(surfaces), style, *(2 * (ALONE if alone else SIDE,)))
         entries: dict[str, Any] = {"path of the focus": {"color": "0.6", "ls": "dotted"}}
         for ax, (column, found) in zip(axes, surfaces.items(), strict=True):
             extent = tuple(1e3 * np.array([*found.x[[0, -1]], *found.y[[0, -1]]]))
@@ -83,11 +84,12 @@ def surfaces_figure(
                 entries["threshold of detection"] = {"color": THRESHOLD, "ls": "solid"}
             draw_path(ax, scene, "white")
             beyond = _draw_measured(ax, found, image, measured) if measured else "neither"
-            ax.set_title(label(column) + f" ({found.note})" * bool(found.note), fontsize="medium")
+            note = f" ({found.note})" * bool(found.note and not alone)
+            ax.set_title(label(column) + note, fontsize="medium")
             asked = found.quantity
             symbol = "" if asked in (DISPLACEMENT, PRESSURE) else f" ${asked.symbol}$,"
             title = f"RMS about the mean,{symbol} {asked.shown}"
-            bar = figure.colorbar(image, ax=ax, shrink=0.85, label=title, extend=beyond)
+            bar = figure.colorbar(image, ax=ax, label=title, extend=beyond)
             bar.ax.ticklabel_format(axis="y", scilimits=(-3, 4))  # labels of a few letters
         handles = [Line2D([], [], **entry) for entry in entries.values()]
         if measured:

@@ -6,7 +6,7 @@ COLUMN/scene.toml  responses.npz  lines.csv  effort.json  record.json  view.npz 
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any

@@ -84,7 +84,7 @@ def write_report(
             Details("The scene in full", [preformatted(dumps(album.scene))]),
         ]),
         Section("What was modelled, and what was left out", _modelled(album)),
-        *_mapped(album, gallery),
+        *mapped(album, gallery),
         Section("What comes out", views),
         Section("What the probes see",
                 [*drawn, *(part for runs in groups.values() for part in tables.lines_table(runs))]),
@@ -142,7 +142,7 @@ def _write_data(folder: Path, album: Album) -> None:
         write_field(folder, view)
 
 
-def _mapped(album: Album, gallery: Gallery) -> list[Part]:
+def mapped(album: Album, gallery: Gallery) -> list[Part]:
     """Maps of the quantity that the probes read, where it is not the motion of the surface."""
     scenes = {run.column: run.scene for run in album.runs}
     parts = []
