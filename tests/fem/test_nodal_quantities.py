@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import fem
 from simple_model import MovingPressure, Response, Tacton, Trajectory
 from simple_model.layers.tensors import hooke
 from simple_model.load.spectrum import pressure_lines, synthesise
