@@ -67,18 +67,29 @@ def text(path: PathLike, limit: int = LARGEST_TEXT) -> str:
 
 
 def exported_text(path: PathLike, limit: int = LARGEST_TEXT) -> str:
-    """The text of a regular file as other programs export it: UTF-8, UTF-16 that begins with a byte
-    order mark, or else Windows' Latin-1; raises what `text` does.
+    """The text of a regular file as other programs export it: UTF-8, UTF-16, or else Windows'
+    Latin-1.
+
+    Raises
+    ------
+    ValueError
+        What `opened` raises, and if the file is no text.
     """
     found = content(path, limit)
-    utf_16 = found.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
-    plain = not (utf_16 or CONTROL.search(found))
-    for encoding in ("utf-16",) if utf_16 else ("utf-8-sig", *["cp1252"] * plain):
+    encodings = ["utf-8-sig", "cp1252", "latin-1"]
+    if found.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        encodings = ["utf-16"]
+    elif b"\0" in found[:2000] and not len(found) % 2:
+        encodings = ["utf-16-le" if found[1:2] == b"\0" else "utf-16-be"]
+    for encoding in encodings:
         try:
-            return found.decode(encoding)
-        except UnicodeDecodeError as error:
-            reason = error.reason
-    raise ValueError(f"{path}: no UTF-8 text ({reason}); save it as such")
+            text = found.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        if not CONTROL.search(text.encode()):
+            return text
+        break
+    raise ValueError(f"{path}: no text; save it as text in UTF-8")
 
 
 def on_disk(path: PathLike) -> int:

@@ -9,7 +9,6 @@ from skinwave.commands import (
     dispersion,
     fit,
     live,
-    measured,
     mesh,
     plan,
     plot,
@@ -23,6 +22,6 @@ from skinwave.commands import (
 
 MODULES = (
     run, compare, relax, dispersion, plan, sweep, plot, mesh, convert, verify, report,
-    live, web, measured, fit,
+    live, web, fit,
 )  # fmt: skip
 COMMANDS = {module.__name__.rpartition(".")[2]: module for module in MODULES}

@@ -9,7 +9,7 @@ from skinwave.commands.common import add_mesh, add_output, metre, progress_of, s
 from skinwave.models import names
 
 if TYPE_CHECKING:
-    from skinwave.measure.measured_study import Measured
+    from skinwave.measure.comparison import Measured
     from skinwave.scene.scene import Body
 
 LIVE = "live.html"
@@ -51,7 +51,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
     from skinwave.live.data import comparison_page
-    from skinwave.measure.measured_runs import at_measured
+    from skinwave.measure.comparison import at_measured
     from skinwave.report.palette import label
     from skinwave.results import record
     from skinwave.results.files import folder_name
@@ -140,7 +140,7 @@ def _measured(options: argparse.Namespace) -> "Measured | None":
         return None
     if options.scene == "paper-15":
         raise ValueError("--measured is of one scene, and paper-15 has 15; name its scene file")
-    from skinwave.measure.measured_study import Measured
+    from skinwave.measure.comparison import Measured
     from skinwave.measure.reading import read_alone
 
     delay = None if options.delay is None else options.delay / 1e3

@@ -1,23 +1,25 @@
-"""A scene's material, or any of its numbers, fitted to a measurement, with intervals."""
+"""A scene's material, or any of its numbers, fitted to a measurement; or what a file holds."""
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from skinwave.commands.common import add_output, add_scene, progress_of, summarise, warn
-from skinwave.commands.measured import add_reading, measured_in
+from skinwave.commands.common import add_output, progress_of, summarise, warn
 from skinwave.models import names
 
+if TYPE_CHECKING:
+    from skinwave.measure import Measurement
+
 KINDS = ("waveforms", "lines", "amplitudes")
+SIGNS = {"in": 1, "out": -1}
 
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
-    add_scene(parser)
+    parser.add_argument("scene", type=Path, nargs="?", metavar="SCENE.toml", help="what was moved")
+    parser.add_argument("--measured", type=Path, metavar="FILE", help="what was measured")
     parser.add_argument(
-        "--measured", type=Path, required=True, metavar="FILE", help="what was measured"
-    )
-    parser.add_argument(
-        "--vary", action="extend", nargs="+", metavar="KEY=LOW:HIGH", required=True,
+        "--vary", action="extend", nargs="+", metavar="KEY=LOW:HIGH", default=[],
         help="what is fitted: body.material.shear_modulus_pa=5000:50000; gain, delay_ms, "
         "offset_x_mm and offset_y_mm of the measurement",
     )  # fmt: skip
@@ -33,14 +35,37 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--samples", type=int, default=0, metavar="N",
         help="sample the posterior, too, by so many steps of each walker",
     )  # fmt: skip
-    add_reading(parser)
+    parser.add_argument(
+        "--inspect", type=Path, metavar="FILE", help="say what a file holds and lacks, without a "
+        "fit: .csv .txt .lvm .tdms .npz .wav .mat .uff .f32",
+    )  # fmt: skip
+    parser.add_argument(
+        "--false-alarm", type=float, default=0.01, metavar="P",
+        help="of --inspect: probability that noise alone has any line (default: 0.01)",
+    )  # fmt: skip
+    for name, metavar, words in (
+        ("quantity", "NAME", "displacement, velocity or acceleration"),
+        ("unit", "UNIT", 'mm/s, um, g, or "20 mm/s" of 1'),
+        ("places", "XY", 'places in mm, "0,0 5,0", or a file'),
+        ("variable", "NAME", "array of a file of several"),
+        ("columns", "NAMES", 'columns of motion, "CH1,CH3" or numbers from 1'),
+    ):
+        parser.add_argument(f"--{name}", default="", metavar=metavar, help=words)
+    parser.add_argument("--positive", choices=tuple(SIGNS), help="into the body or out of it")
+    parser.add_argument("--rate", type=float, metavar="HZ", help="samples a second")
+    parser.add_argument("--direction", choices=("x", "y", "z"),
+                        help="of the motion in a file of several")  # fmt: skip
     add_output(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
+    if options.inspect:
+        return _inspect(options)
+    if not (options.scene and options.measured):
+        raise ValueError("give a scene and --measured FILE, or --inspect FILE")
     from skinwave.measure.findings import cautions, sentences
-    from skinwave.measure.fit import fit, sampled
+    from skinwave.measure.fit import fit
     from skinwave.measure.fit_page import summary, write
     from skinwave.results import record
     from skinwave.results.outputs import output_folder
@@ -49,17 +74,16 @@ def run(options: argparse.Namespace) -> int:
     if options.seed < 0:
         raise ValueError(f"--seed = {options.seed} is below 0; give 0 or a whole number above")
     scene = read(options.scene)
-    measured = measured_in(options.measured, options)
+    measured = _measured(options.measured, options)
     out = options.out or Path(f"{options.scene.stem}-fit")
     inputs = [options.scene, options.measured, scene.body.file]
     with output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
         with progress_of(options) as progress:
             found = fit(
                 scene, measured, options.vary, tie=options.tie, kind=options.to or "",
-                model=options.model, starts=options.starts, seed=options.seed, progress=progress,
+                model=options.model, starts=options.starts, seed=options.seed,
+                samples=options.samples, progress=progress,
             )  # fmt: skip
-            if options.samples:
-                found = sampled(found, options.samples, options.seed, progress)
         write(folder, found)
         record.write(folder, record.of_command(options), scene=scene)
     if not options.json and not options.quiet:
@@ -67,3 +91,38 @@ def run(options: argparse.Namespace) -> int:
     said = "\n".join([*sentences(found), f"open {out}/index.html"])
     summarise(options, {"out": str(out), **summary(found)}, said)
     return 0 if found.solution.converged else 1
+
+
+def _inspect(options: argparse.Namespace) -> int:
+    """Say what a file holds and, if a folder is given, write it."""
+    from skinwave.measure.inspection import inspect
+    from skinwave.measure.inspection_page import summary, text, write
+    from skinwave.results import record
+    from skinwave.results.outputs import output_folder
+
+    if options.scene or options.measured or options.vary:
+        raise ValueError("--inspect fits nothing; leave out the scene, --measured and --vary")
+    out, inputs = options.out, [options.inspect]
+    found = inspect(_measured(options.inspect, options), alarm=options.false_alarm)
+    told, said = summary(found), text(found)
+    if out:
+        with output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
+            write(folder, found)
+            record.write(folder, record.of_command(options))
+        told["out"] = str(out)
+        said += f"\nopen {out}/index.html"
+    summarise(options, told, said)
+    return 0
+
+
+def _measured(file: Path, options: argparse.Namespace) -> "Measurement":
+    """The measurement in a file, by the options of what it does not say."""
+    from skinwave.measure.reading import places_of, read
+
+    return read(
+        file, quantity=options.quantity, unit=options.unit,
+        places=places_of(options.places) if options.places else None,
+        sign=SIGNS[options.positive] if options.positive else None,
+        rate=options.rate, variable=options.variable, direction=options.direction or "",
+        columns=tuple(name.strip() for name in options.columns.split(",") if name.strip()),
+    )  # fmt: skip

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import stdtrit
 
-from meshes.tetmesh import Floats
+from simple_model.typing import Floats
 from skinwave.measure.delays import correlation, maxima
 from skinwave.measure.lines import MeasuredLines
 

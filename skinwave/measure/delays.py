@@ -1,12 +1,14 @@
 """Delays that bring lines into step: maxima of the correlation of two sums of sinusoids."""
 
 import numpy as np
+from scipy.special import fdtrc
 
-from meshes.tetmesh import Floats
+from simple_model.typing import Floats
 
 A_PERIOD = 8  # trial delays in a period of the highest line
 NEWTON = 5  # steps
 MOST_TRIALS = 2**21
+JITTER = 1e-3  # chance below which repetitions are out of step
 
 
 def correlation(
@@ -54,8 +56,64 @@ def maxima(frequencies: Floats, products: np.ndarray, window: float) -> tuple[Fl
     return delays, correlation(frequencies, products, delays)
 
 
-def best_delay(frequencies: Floats, products: np.ndarray, window: float) -> float:
+def in_step(each: np.ndarray, frequencies: Floats) -> tuple[np.ndarray, Floats]:
+    """Repetitions (r, f, p) shifted onto their mean where they are out of step, and by how much.
+
+    Delays are those of least squares over all lines and places, within a period of the lowest line.
+    They are taken where an F test of what they leave against what there was is significant for as
+    many independent delays as there were to choose from.
+
+    Parameters
+    ----------
+    each : (r, f, p) complex, at least two repetitions
+    frequencies : (f,) float, Hz
+
+    Returns
+    -------
+    (r, f, p) complex, and the shifts (r,) in s, of mean zero
+    """
+    r = len(each)
+    if not frequencies.size:
+        return each, np.zeros(r)
+    period = 1 / float(frequencies.min())
+    spread = _squares(each).mean(axis=1, keepdims=True)  # of lines, over places
+    weights = 1 / np.where(spread > 0, spread, 1)
+    reference, shifts = each[0], np.zeros(r)
+    for _ in range(3):
+        products = (weights * reference.conj() * each).sum(axis=2)
+        shifts = np.array([_best_delay(frequencies, s, period) for s in products])
+        shifted = each * _turned(frequencies, shifts)
+        reference = shifted.mean(axis=0)
+        left = _squares(shifted).mean(axis=1, keepdims=True)
+        weights = 1 / np.where(left > 0, left, 1)
+    shifts = shifts - shifts.mean()
+    shifted = each * _turned(frequencies, shifts)
+    before, after = ((weights * _squares(x)).sum() for x in (each, shifted))
+    if not after > 0:
+        return each, np.zeros(r)
+    freedom = max(2 * each[0].size * (r - 1) - (r - 1), 1)
+    gained = (before - after) / (r - 1) / (after / freedom)
+    chance = fdtrc(r - 1, freedom, max(gained, 0.0))
+    choices = 2 * period * float(frequencies.max())
+    power = float((weights * np.abs(shifted) ** 2).sum())
+    in_common = 1 - float(after) / power if power > 0 else 0.0
+    # Of noise alone delays can be found that bring it into step in part.
+    if chance * choices ** (r - 1) < JITTER and in_common > (1 + 1 / r) / 2:
+        return shifted, shifts
+    return each, np.zeros(r)
+
+
+def _best_delay(frequencies: Floats, products: np.ndarray, window: float) -> float:
     """Delay in s of the highest correlation, the least of those that are as high."""
     delays, heights = maxima(frequencies, products, window)
     alike = heights >= heights.max() - 1e-9 * np.abs(products).sum()
     return float(delays[alike][np.argmin(np.abs(delays[alike]))])
+
+
+def _turned(frequencies: Floats, shifts: Floats) -> np.ndarray:
+    return np.exp(2j * np.pi * np.multiply.outer(shifts, frequencies))[:, :, None]
+
+
+def _squares(each: np.ndarray) -> Floats:
+    """Sum (f, p) of squared deviations from the mean."""
+    return np.asarray((np.abs(each - each.mean(axis=0)) ** 2).sum(axis=0))

@@ -4,14 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from simple_model.numbers import counted, percent, significant
 from skinwave.measure.alignment import opposite_sign
 from skinwave.measure.fit import Fit
-from skinwave.measure.flaws import flaws
-from skinwave.measure.identify import Direction, Estimate, combined, sharing
-from skinwave.measure.measured_lines import some
+from skinwave.measure.inspection import flaws
+from skinwave.measure.intervals import LONG, Direction, Estimate, combined, sharing
+from skinwave.measure.observed import some
 from skinwave.measure.parameters import DELAY
-from skinwave.measure.posterior import LONG
-from skinwave.system.numbers import significant
 
 MISFIT = 1.5  # chi squared over its degrees of freedom, of known errors, from which a model misfits
 LEFT_OUT = 1e-3  # of the measured power in lines that are not fitted, from which that is said
@@ -21,22 +20,18 @@ LEAST = 1e-9  # probability that is shown
 def sentences(found: Fit) -> list[str]:
     """Sentences on what was fitted, and how well."""
     solution, data = found.solution, found.solution.problem.data
-    n = len(solution.starts)
-    ratio = solution.cost / solution.dof
-    expected = ", of errors that are known" if data.is_known else ""
-    return [
+    ratio = significant(solution.cost / solution.dof)
+    known = f"; chi squared over its degrees of freedom is {ratio}, of errors that are known"
+    said = [
         f"{found.target.model} was fitted to {data.words}.",
-        f"{solution.reached} of {n} start{'s' * (n > 1)} reached the solution, "
-        f"which leaves {significant(100 * found.misfit, 2)} % of the measured motion"
-        + (f"; chi squared over its degrees of freedom is {significant(ratio)}{expected}."
-           if expected else "."),
-        *(_resolved(each) for each in found.estimates if each.is_resolved and not each.at_limit),
+        f"{solution.reached} of {counted(len(solution.starts), 'start')} reached the solution, "
+        f"which leaves {percent(found.misfit)} of the measured motion{known * data.is_known}.",
     ]  # fmt: skip
-
-
-def _resolved(each: Estimate) -> str:
-    value, low, high = shown(each.value, each.low, each.high)
-    return f"{each.key} = {value}, 95 % interval {low} to {high}."
+    for each in found.estimates:
+        if each.is_resolved and not each.at_limit:
+            value, low, high = shown(each.value, each.low, each.high)
+            said.append(f"{each.key} = {value}, 95 % interval {low} to {high}.")
+    return said
 
 
 def shown(value: float, low: float, high: float) -> tuple[str, str, str]:
@@ -50,7 +45,8 @@ def shown(value: float, low: float, high: float) -> tuple[str, str, str]:
 def cautions(found: Fit) -> list[str]:
     """Sentences, without a full stop, on what is not to be trusted."""
     solution = found.solution
-    said = _turned(found) + [
+    turned = opposite_sign(found.target.model, DELAY in solution.problem.parameters.keys)
+    said = [turned] * solution.may_be_turned + [
         "the fit did not converge: its steps ended before chi squared was least; give more starts "
         "or closer limits"
     ] * (not solution.converged)
@@ -123,7 +119,7 @@ def _beyond_errors(found: Fit) -> list[str]:
 
 
 def _coloured(found: Fit) -> list[str]:
-    if found.whiteness.is_white or np.isnan(found.whiteness.p):
+    if found.whiteness.is_white:
         return []
     return [
         f"the residuals are not white (Ljung-Box, p {probability(found.whiteness.p)}): what is "
@@ -155,11 +151,6 @@ def _short(found: Fit) -> list[str]:
     ]
 
 
-def _turned(found: Fit) -> list[str]:
-    has_delay = DELAY in found.solution.problem.parameters.keys
-    return [opposite_sign(found.target.model, has_delay)] * found.solution.may_be_turned
-
-
 def _left_out(found: Fit) -> list[str]:
     """Sentence on lines that are strong in the measurement, and not fitted."""
     strong = [line for line in found.solution.problem.data.left_out if line.share > 0]
@@ -168,7 +159,7 @@ def _left_out(found: Fit) -> list[str]:
         return []
     return [
         f"lines that are not fitted, {some(tuple(line.name for line in strong))}, have "
-        f"{significant(100 * share, 2)} % of the measured power, and in the model next to none; "
+        f"{percent(share)} of the measured power, and in the model next to none; "
         "check the drive and the path of the scene"
     ]
 

@@ -1,37 +1,50 @@
-"""Fit of a scene to a measurement: estimates with intervals, and how far to trust them."""
+"""Fit of a scene to a measurement: estimates with intervals, and the scene that has them."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import expm1, sqrt
+from typing import Any
 
 import numpy as np
+from scipy.special import ndtri
 
-from meshes.tetmesh import Floats
 from simple_model.choices import choose
-from skinwave.measure import Measurement
-from skinwave.measure.fitted import fitted
-from skinwave.measure.identify import (
+from simple_model.numbers import significant
+from simple_model.typing import Floats
+from skinwave.bodies.parts import solid_of
+from skinwave.measure.intervals import (
+    LEVEL,
     Direction,
     Estimate,
+    Posterior,
+    Profile,
     Whiteness,
     correlations,
     estimates,
+    half_widths,
+    posterior,
+    profiles,
     unresolved,
     whiteness,
     widenings,
 )
+from skinwave.measure.measurement import Measurement
 from skinwave.measure.observed import KINDS, data_of
-from skinwave.measure.parameters import check, parse
-from skinwave.measure.posterior import Posterior, posterior
+from skinwave.measure.parameters import Parameter, check, of_scene, parse
 from skinwave.measure.predicted import Target, target, with_reduction
-from skinwave.measure.problem import Problem
-from skinwave.measure.profile import Profile, profiles
-from skinwave.measure.solve import Solution, solve
+from skinwave.measure.search import Problem, Solution, solve
 from skinwave.models.advice import takes
 from skinwave.models.flat_body import FLAT_BODY
+from skinwave.scene.distributions import Distribution, parent_of
+from skinwave.scene.file import to_table, with_distributions
+from skinwave.scene.keys import DERIVED, LOSSES, SCALES, write_material
 from skinwave.scene.scene import Scene
+from skinwave.scene.spreads import spreads_of
+from skinwave.scene.variation import varied
 from skinwave.system.effort import Progress, silent
 
 STARTS = 8
+CORRELATED = 0.1  # from which it is said that a correlation is dropped
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -71,7 +84,7 @@ class Fit:
     @property
     def scene(self) -> Scene:
         """The scene with the estimates, each with its spread."""
-        return fitted(self.target.scene, self.solution, self.estimates)
+        return _fitted_scene(self)
 
     @property
     def predicted(self) -> Floats:
@@ -95,6 +108,7 @@ def fit(
     model: str = "auto",
     starts: int = STARTS,
     seed: int = 0,
+    samples: int = 0,
     progress: Progress = silent,
 ) -> Fit:
     """Weighted least-squares fit of keys of a scene to a measurement.
@@ -110,7 +124,8 @@ def fit(
         or, of spectra, lines
     model : name of a model, or "auto": the wavenumber integral where the body has one, else "fem"
     starts : how many, between the limits
-    seed : of the starts
+    seed : of the starts, and of the samples
+    samples : steps of each walker that samples the posterior; 0 for none
     progress : called with the name of the phase and the fraction done
 
     Returns
@@ -124,56 +139,116 @@ def fit(
     """
     parameters = parse(vary, tie)
     kind = choose("kind", kind or ("lines" if measured.is_spectrum else "waveforms"), KINDS)
-    aim = target(scene, _model(scene, model), measured.record, measured.places)
+    if model == "auto":
+        model = FLAT_BODY.name if takes(FLAT_BODY, scene) else "fem"
+    aim = target(scene, model, measured.record, measured.places)
     check(scene, parameters)
     aim = with_reduction(aim, parameters, progress)
     problem = Problem(
         parameters=parameters, data=data_of(kind, measured, aim), linear=aim.linear
     )  # fmt: skip
-    return assessed(measured, aim, solve(problem, starts, seed, progress), progress)
-
-
-def assessed(
-    measured: Measurement, aim: Target, solution: Solution, progress: Progress = silent
-) -> Fit:
-    """Solution of a fit with all that is said of it.
-
-    Parameters
-    ----------
-    measured, aim : as of the fit
-    solution : Solution
-    progress : called with the name of the phase and the fraction done
-
-    Returns
-    -------
-    Fit
-    """
+    solution = solve(problem, starts, seed, progress)
     return Fit(
         measured=measured, target=aim, solution=solution, estimates=estimates(solution),
         correlations=correlations(solution), unresolved=unresolved(solution),
         profiles=profiles(solution, progress), whiteness=whiteness(solution.residual),
         widenings=widenings(solution),
+        posterior=posterior(solution, samples, seed, progress) if samples else None,
     )  # fmt: skip
 
 
-def sampled(found: Fit, steps: int, seed: int = 0, progress: Progress = silent) -> Fit:
-    """A fit with samples of its posterior.
-
-    Parameters
-    ----------
-    found : Fit
-    steps : of each walker
-    seed : of the walkers
-    progress : called with the name of the phase and the fraction done
-
-    Returns
-    -------
-    Fit
+def _fitted_scene(found: Fit) -> Scene:
+    """The scene with the estimates. A number has the standard error of its interval, normal or, if
+    it was varied by its logarithm, lognormal; one without an interval, or at a limit, is uniform
+    between its limits. Numbers of a preset that were not fitted keep what is known of the preset.
     """
-    return replace(found, posterior=posterior(found.solution, steps, seed, progress))
+    scene, parameters = found.target.scene, found.solution.problem.parameters
+    changed = varied(scene, of_scene(found.values))
+    given = dict(changed.spreads) | _of_presets(scene, changed)
+    given = {key: x for key, x in given.items() if key not in parameters.ties}
+    each = zip(parameters.free, found.estimates, half_widths(found.solution), strict=True)
+    spreads = {limits.key: _distribution(limits, one, float(half)) for limits, one, half in each}
+    for key in of_scene(dict.fromkeys(spreads, 0.0)):
+        if _has_place(changed, key):
+            given[key] = spreads[key]
+    return with_distributions(changed, given)
 
 
-def _model(scene: Scene, model: str) -> str:
-    if model != "auto":
-        return model
-    return FLAT_BODY.name if takes(FLAT_BODY, scene) else "fem"
+def _distribution(limits: Parameter, found: Estimate, half: float) -> Distribution:
+    """Distribution of an estimate by half of its interval, in parts of the range."""
+    if not found.is_resolved or found.at_limit:
+        return Distribution(shape="uniform", measure="bounds", width=(limits.low, limits.high))
+    deviation = half * limits.span / float(ndtri((1 + LEVEL) / 2))
+    shape = "lognormal" if limits.is_log else "normal"
+    error = found.value * sqrt(expm1(deviation**2)) if limits.is_log else deviation
+    return Distribution(shape=shape, measure="standard_error", width=(error,))
+
+
+def _has_place(scene: Scene, key: str) -> bool:
+    """Whether a scene file can hold a spread at a key: not of one that is not written, nor of a
+    coordinate.
+    """
+    if key.partition(".")[2] in DERIVED:
+        return False
+    path, _, name = key.rpartition(".")
+    at = parent_of(to_table(scene), f"{path}.shear_modulus_pa" if "young_modulus" in name else key)
+    return isinstance(at[0], dict)
+
+
+def _of_presets(scene: Scene, changed: Scene) -> dict[str, Distribution]:
+    """Distributions of the numbers of presets that became tables: of all moduli, and all losses."""
+    left = {spread.key for spread in spreads_of(changed)}
+    found: dict[str, Distribution] = {}
+    for spread in spreads_of(scene):
+        place, _, scale = spread.key.rpartition(".")
+        if spread.key not in left and scale in SCALES:
+            keys = _scaled_keys(to_table(scene), place, scale)
+            found |= {key: spread.distribution for key in keys if _has_place(changed, key)}
+    return found
+
+
+def _scaled_keys(table: Mapping[str, Any], place: str, scale: str) -> Iterator[str]:
+    """Dotted keys of the numbers of a preset that are moduli, or that are losses."""
+    parent, last = parent_of(table, place)
+    plain = solid_of(parent[last])
+    with_loss = set(_changed(write_material(plain), write_material(plain.scaled(loss=2.0)), place))
+    stiff = _changed(write_material(plain), write_material(plain.scaled(modulus=2.0)), place)
+    yield from with_loss if scale == LOSSES else (key for key in stiff if key not in with_loss)
+
+
+def _changed(one: Any, other: Any, path: str) -> Iterator[str]:
+    """Dotted keys of the numbers in which two tables differ."""
+    if isinstance(one, dict | list):
+        for key, inner in one.items() if isinstance(one, dict) else enumerate(one):
+            yield from _changed(inner, other[key], f"{path}.{key}")
+    elif one != other:
+        yield path
+
+
+def notes(found: Fit) -> list[str]:
+    """Sentences, without a full stop, on what a scene with the estimates does not hold."""
+    parameters = found.solution.problem.parameters
+    said = [
+        f"{key} = {value:.6g} of the measurement, which is no part of the scene"
+        for key, value in found.values.items() if "." not in key
+    ]  # fmt: skip
+    for each in found.estimates:
+        if not each.is_resolved and "." in each.key:
+            said.append(f"{each.key} is not resolved by the measurement: its spread is that "
+                        "between its limits")  # fmt: skip
+        elif each.is_resolved and each.at_limit:
+            said.append(f"{each.key} is at a limit of its range, and its spread is that range")
+    said += [
+        f"{key} was tied to others, and has no spread" for key in parameters.ties if "." in key
+    ]
+    keys = parameters.keys
+    is_part = np.array(["." in key for key in keys])
+    table = np.where(np.outer(is_part, is_part), np.nan_to_num(found.correlations), 0.0)
+    np.fill_diagonal(table, 0.0)
+    first, second = divmod(int(np.argmax(np.abs(table))), len(keys))
+    if abs(largest := float(table[first, second])) >= CORRELATED:
+        said.append(
+            "spreads are independent of each other: correlations of the estimates are dropped, as "
+            f"{significant(largest, 2)} between {keys[first]} and {keys[second]}"
+        )
+    return said

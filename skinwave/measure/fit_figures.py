@@ -1,18 +1,18 @@
-"""Figures of a fit: fitted against measured, residuals, likelihood profiles, correlations."""
+"""Figures of a fit: fitted against measured, residuals, likelihood profiles."""
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from meshes.tetmesh import Floats
+from simple_model.typing import Floats
 from skinwave.measure.fit import Fit
-from skinwave.measure.observed import place_names
-from skinwave.measure.profile import Profile
+from skinwave.measure.intervals import Profile
 from skinwave.report.figures import REPORT
+from skinwave.report.palette import BLUE, ORANGE
 from skinwave.report.styles import Style
 
-MEASURED, FITTED, LEFT = "#222222", "#0072B2", "#D55E00"
+MEASURED, FITTED, LEFT = "#222222", BLUE, ORANGE
 MOST = 4  # places that are drawn
 SHOWN = 0.05  # s of waveforms
 FAINTEST = 1e-5  # of the largest amplitude, down to which lines are drawn
@@ -59,7 +59,7 @@ def _lines(found: Fit, style: Style) -> Figure:
     complex_ones = len(data.labels) > len(found.measured.places)
     measured, fitted = (_amplitudes(x, complex_ones) for x in (data.values, found.predicted))
     error = per_unit * data.error[:, : measured.shape[1]]
-    places, names = _strongest(np.abs(measured)), place_names(found.measured.places)
+    places = _strongest(np.abs(measured))
     rows = 2 if complex_ones else 1
     size = style.size(max(5.0, 2.9 * len(places) + 0.6), 2.6 * rows + 0.6)
     figure = Figure(figsize=size, layout="constrained")
@@ -72,7 +72,7 @@ def _lines(found: Fit, style: Style) -> Figure:
         column[0].plot(data.axis, per_unit * np.abs(fitted[:, p]), "x", color=FITTED, ms=6,
                        label="fitted")  # fmt: skip
         column[0].set_yscale("log")
-        column[0].set_title(names[p], fontsize="medium")
+        column[0].set_title(found.measured.place_name(p), fontsize="medium")
         if complex_ones:
             _phases(column[1], data.axis, measured[:, p], fitted[:, p], error[:, p] / per_unit)
         column[-1].set_xlabel("frequency, Hz")
@@ -178,24 +178,3 @@ def _profile(ax: Axes, found: Fit, profile: Profile) -> None:
     ax.xaxis.set_major_locator(mpl.ticker.MaxNLocator(3))
     ax.set_xlabel(profile.key)
     ax.grid(alpha=0.25)
-
-
-def correlation_figure(found: Fit, style: Style = REPORT) -> Figure:
-    """Correlations of the estimates that are resolved."""
-    keys = found.solution.problem.parameters.keys
-    k = len(keys)
-    with mpl.rc_context(style.rc):
-        left = 0.09 * max(map(len, keys)) + 0.4
-        size = style.size(left + 1.2 + 0.62 * k, 0.5 + 0.62 * k)
-        figure = Figure(figsize=size, layout="constrained")
-        ax = figure.subplots()
-        drawn = ax.imshow(found.correlations, cmap="RdBu_r", vmin=-1, vmax=1)
-        ax.set_xticks(range(k), [str(n) for n in range(1, k + 1)])
-        ax.set_yticks(range(k), [f"{key}  {n}" for n, key in enumerate(keys, 1)])
-        for i, j in np.ndindex(k, k):
-            value = found.correlations[i, j]
-            text = "-" if np.isnan(value) else f"{value:.2f}"
-            dark = not np.isnan(value) and abs(value) > 0.6
-            ax.text(j, i, text, ha="center", va="center", color="white" if dark else MEASURED)
-        figure.colorbar(drawn, label="correlation", shrink=0.9)
-    return figure

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 
 from meshes import reading
-from skinwave.measure.decoding import decoded
+from meshes.reading import exported_text
 from skinwave.measure.headers import column
-from skinwave.measure.layouts import recording
 from skinwave.measure.recording import Given, Recording
-from skinwave.measure.table import Table
+from skinwave.measure.table import Table, recording
 from skinwave.measure.units import plain
 
 LARGEST = 1_000_000_000  # bytes
@@ -27,7 +26,7 @@ def read_lvm(path: Path, given: Given) -> Recording:
     ValueError
         If it is none, or its segments do not fit together.
     """
-    return recording(lvm_table(decoded(path)), given)
+    return recording(lvm_table(exported_text(path, LARGEST)), given)
 
 
 def lvm_table(text: str) -> Table:

@@ -16,15 +16,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import fdtrc
 
-from meshes.tetmesh import Floats
 from simple_model import Response
 from simple_model.response import SETTLE, line_rows
+from simple_model.typing import Floats
 from simple_model.windows import cosines
+from skinwave.measure.delays import in_step
 from skinwave.measure.measurement import Measurement
 from skinwave.measure.noise_floor import floor_of, freedom
-from skinwave.measure.repetitions import in_step
-
-Complex = np.ndarray
 
 DISAGREES = 1e-3  # chance below which repetitions of a line vary by other than the noise floor
 BESIDE = 2  # bins of a spectrum beside a line, which may have some of it
@@ -51,14 +49,14 @@ class MeasuredLines:
     """
 
     frequencies: Floats
-    each: Complex
+    each: np.ndarray
     variance: Floats
     freedom: float | Floats
     shifts: Floats
     correlation: Floats | None = None
 
     @property
-    def mean(self) -> Complex:
+    def mean(self) -> np.ndarray:
         """Mean (f, p) over the repetitions."""
         return np.asarray(self.each.mean(axis=0))
 
@@ -67,21 +65,11 @@ class MeasuredLines:
         """Standard errors (f, p) of amplitudes, of circular noise."""
         return np.sqrt(self.variance / 2)
 
-    def variance_of(self, factors: Complex) -> float:
-        """Variance of the real part of the sum of the means times factors (f, p); lines of unknown
-        noise count as if they had none.
-        """
-        parts = np.nan_to_num(self.amplitude_error) * factors.conj()
-        parts = np.vstack([parts.real, parts.imag])
-        if self.correlation is None:
-            return float((parts**2).sum())
-        return float((parts * (self.correlation @ parts)).sum())
-
     @property
     def phase_error(self) -> Floats:
         """Standard errors (f, p) of phases, rad; pi where the line is below the noise."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.minimum(np.sqrt(self.variance / 2) / np.abs(self.mean), np.pi)
+            return np.minimum(self.amplitude_error / np.abs(self.mean), np.pi)
 
     @property
     def shift_error(self) -> float:
@@ -89,16 +77,52 @@ class MeasuredLines:
         r = len(self.shifts)
         return float(self.shifts.std(ddof=1) / np.sqrt(r)) if r > 1 else 0.0
 
+    def variance_of(self, factors: np.ndarray) -> float:
+        """Variance of the real part of the sum of the means times factors (f, p); lines of unknown
+        noise count as if they had none.
+        """
+        parts = np.nan_to_num(self.amplitude_error) * factors.conj()
+        parts = np.vstack([parts.real, parts.imag])
+        shared = parts if self.correlation is None else self.correlation @ parts
+        return float((parts * shared).sum())
+
     def taken(self, chosen: np.ndarray) -> "MeasuredLines":
         """The lines of a mask or of indices."""
-        at = np.arange(len(self.frequencies))[chosen]
-        both = np.append(at, at + len(self.frequencies))
+        count = len(self.frequencies)
+        at = np.arange(count)[chosen]
+        both = np.append(at, at + count)
         return replace(
             self, frequencies=self.frequencies[at], each=self.each[:, at],
-            variance=self.variance[at], freedom=np.broadcast_to(
-                self.freedom, (len(self.frequencies), 1))[at],
+            variance=self.variance[at], freedom=np.broadcast_to(self.freedom, (count, 1))[at],
             correlation=None if self.correlation is None else self.correlation[np.ix_(both, both)],
         )  # fmt: skip
+
+    def radius(self, level: float) -> Floats:
+        """Radius (f, p) about the means within which the true amplitudes lie with a confidence."""
+        half = self.freedom / 2
+        return np.sqrt(self.variance * half * ((1 - level) ** (-1 / half) - 1))
+
+    def significances(self, away: np.ndarray) -> Floats:
+        """P-values (f, p) that deviations (f, p) from the means are noise, taken as circular: away
+        squared over the variance is F distributed with 2 and `freedom` degrees of freedom (Victor
+        and Mast 1991, doi 10.1016/0013-4694(91)90099-P); nan where the noise is unknown.
+        """
+        half = self.freedom / 2
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found = (1 + np.abs(away) ** 2 / self.variance / half) ** -half
+        return np.where(np.isnan(self.variance), np.nan, np.where(np.abs(away) == 0, 1.0, found))
+
+
+def holm(p: Floats) -> Floats:
+    """P-values adjusted for their number, so that with a threshold of a the chance of any false
+    one among them is at most a (Holm 1979); nan stays.
+    """
+    known = np.flatnonzero(np.isfinite(p.ravel()))
+    order = known[np.argsort(p.ravel()[known], kind="stable")]
+    adjusted = np.full(p.size, np.nan)
+    times = len(order) - np.arange(len(order))
+    adjusted[order] = np.minimum(np.maximum.accumulate(times * p.ravel()[order]), 1.0)
+    return adjusted.reshape(p.shape)
 
 
 def measurable(measurement: Measurement, frequencies: Floats) -> np.ndarray:
@@ -126,7 +150,7 @@ def lines_of(
     Their noise is that of the floor under them. Where repetitions vary, it is drawn to the variance
     of their mean, by the degrees of freedom of both; of a line whose repetitions vary by other than
     the floor (F test at 0.1 %), as of a gain that changes, it is this variance alone. Repetitions
-    that are out of step (F test at 0.1 %, as of a trigger that jitters) are shifted by the delay
+    that are out of step (F test at 0.1 %), as of a trigger that jitters, are shifted by the delay
     that fits each best.
 
     Parameters
@@ -145,12 +169,13 @@ def lines_of(
         If a frequency is beyond a waveform's sampling, or not in a spectrum.
     """
     frequencies = np.asarray(frequencies, np.float64)
-    if not measurable(measurement, frequencies).all():
-        lost = frequencies[~measurable(measurement, frequencies)][0]
+    lost = frequencies[~measurable(measurement, frequencies)]
+    if len(lost):
         reach = f"{measurement.axis[-1]:g} Hz" if measurement.is_spectrum else (
             f"{measurement.rate / 2:g} Hz, half its sampling rate")  # fmt: skip
         raise ValueError(
-            f"the measurement has no line at {lost:g} Hz: it reaches {reach}; leave that line out"
+            f"the measurement has no line at {lost[0]:g} Hz: it reaches {reach}; leave that line "
+            "out"
         )
     read = _of_spectra if measurement.is_spectrum else _of_waveforms
     each, floor, freedom, correlation = read(measurement, frequencies, settle)
@@ -164,7 +189,7 @@ def lines_of(
     )  # fmt: skip
 
 
-def _drawn(each: Complex, floor: Floats, freedom: Floats) -> tuple[Floats, Floats]:
+def _drawn(each: np.ndarray, floor: Floats, freedom: Floats) -> tuple[Floats, Floats]:
     """Variances (f, p) of the mean of amplitudes (r, f, p), and their degrees of freedom (f,), by a
     floor (f, p) of so many degrees (f,) and by the repetitions.
     """
@@ -186,8 +211,7 @@ def _agree(variance: Floats, floor: Floats, own: float, freedom: Floats) -> np.n
     """Mask (f,) of lines whose variance over repetitions is that of the floor, at all places."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = (variance / floor).mean(axis=1)
-    degrees = own * floor.shape[1], freedom * floor.shape[1]
-    chance = fdtrc(*degrees, ratio)
+    chance = fdtrc(own * floor.shape[1], freedom * floor.shape[1], ratio)
     return np.asarray(np.minimum(chance, 1 - chance) > DISAGREES / 2)
 
 
@@ -196,8 +220,9 @@ def evenly(measurement: Measurement) -> Floats:
     return np.linspace(measurement.times[0], measurement.times[-1], len(measurement.times))
 
 
-def as_response(measurement: Measurement, values: Floats) -> Response:
-    """Waveforms (t, n) at a measurement's times as a response."""
+def as_response(measurement: Measurement, values: Floats | None = None) -> Response:
+    """The mean of the repetitions, or waveforms (t, n) at the same times, as a response."""
+    values = measurement.mean if values is None else values
     return Response(
         model="measured", times=evenly(measurement), probes=np.zeros((values.shape[1], 2)),
         values=values, quantity=measurement.quantity,
@@ -206,7 +231,7 @@ def as_response(measurement: Measurement, values: Floats) -> Response:
 
 def _of_waveforms(
     measurement: Measurement, frequencies: Floats, settle: float
-) -> tuple[Complex, Floats, Floats, Floats]:
+) -> tuple[np.ndarray, Floats, Floats, Floats]:
     """Amplitudes (r, f, p), the variance (f, p) of their mean, its degrees of freedom (f,), and the
     correlation (2 f, 2 f).
     """
@@ -225,15 +250,15 @@ def _of_waveforms(
     sides = np.full(len(floor), 2.0)
     sides[0] = 1.0
     sides[-1] = 2.0 - (n % 2 == 0)
-    power = (np.abs(spectra) ** 2).reshape(2, len(frequencies), len(floor)).sum(axis=0)
-    variance = (power * sides) @ floor / n / runs
+    power = (np.abs(spectra) ** 2).reshape(2, len(frequencies), len(floor)).sum(axis=0) * sides
     shape = floor.mean(axis=1)
-    parts = (spectra * (sides * shape)) @ spectra.conj().T
-    parts = parts.real * np.outer(*[np.repeat([1.0, -1.0], len(frequencies))] * 2)
-    size = np.tile(np.sqrt((power * sides) @ shape / 2), 2)
+    parts = ((spectra * (sides * shape)) @ spectra.conj().T).real
+    sign, size = np.repeat([1.0, -1.0], len(frequencies)), np.tile(np.sqrt(power @ shape / 2), 2)
     nearest = np.round(frequencies * n / measurement.rate).astype(int)
-    each = found[:, cosine] - 1j * found[:, sine]
-    return each, variance, freedom(runs, kept)[nearest], parts / np.outer(size, size)
+    return (
+        found[:, cosine] - 1j * found[:, sine], power @ floor / n / runs,
+        freedom(runs, kept)[nearest], parts * np.outer(sign / size, sign / size),
+    )  # fmt: skip
 
 
 def _kept(window: Floats, waves: Floats, rows: Floats) -> Floats:
@@ -248,16 +273,15 @@ def _kept(window: Floats, waves: Floats, rows: Floats) -> Floats:
 
 def _of_spectra(
     measurement: Measurement, frequencies: Floats, settle: float
-) -> tuple[Complex, Floats, Floats, None]:
+) -> tuple[np.ndarray, Floats, Floats, None]:
     """The same of the nearest bins of spectra, with a floor where they are equally spaced."""
     axis, values = measurement.frequencies, measurement.values
     nearest = np.abs(frequencies[:, None] - axis).argmin(axis=1)
     kept = np.ones(len(axis))
     kept[np.abs(np.arange(len(axis))[:, None] - nearest).min(axis=1, initial=9) <= BESIDE] = 0.0
     if not bin_width(measurement) or kept[1:].sum() < FEWEST_CLEAR:
-        unknown = np.full((len(frequencies), values.shape[2]), np.nan)
-        return values[:, nearest], unknown, np.ones(len(frequencies)), None
+        variance = np.full((len(frequencies), values.shape[2]), np.nan)
+        return values[:, nearest], variance, np.ones(len(frequencies)), None
     floor = floor_of((np.abs(values) ** 2).mean(axis=0), len(values), kept)
-    return (
-        values[:, nearest], floor[nearest] / len(values), freedom(len(values), kept)[nearest], None
-    )  # fmt: skip
+    variance = floor[nearest] / len(values)
+    return values[:, nearest], variance, freedom(len(values), kept)[nearest], None

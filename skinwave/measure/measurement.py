@@ -8,6 +8,7 @@ from simple_model.quantities import Quantity, quantity
 from simple_model.typing import Floats
 
 UNEVEN = 1e-3  # of a sampling interval: what rounding in text files may leave
+MOST_NAMED = 5  # places
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -76,13 +77,13 @@ class Measurement:
         expected = len(self.axis), len(self.places)
         if self.values.ndim != 3 or not len(self.values) or self.values.shape[1:] != expected:
             raise ValueError(
-                f"values of a measurement have shape {self.values.shape}, and its times or "
-                f"frequencies and places are {expected}; give (repetitions, *{expected})"
+                f"values of a measurement have shape {self.values.shape}; give (repetitions, "
+                f"{expected[0]}, {expected[1]}), by its times or frequencies and places"
             )
         if len(self.drive) not in (0, len(self.axis)):
             raise ValueError(
-                f"the drive of a measurement has {len(self.drive)} values, and there are "
-                f"{len(self.axis)} times or frequencies; give as many, or none"
+                f"the drive of a measurement has {len(self.drive)} values; give {len(self.axis)}, "
+                "or none"
             )
         steps = np.diff(self.axis)
         if len(steps) and not steps.min() > 0:
@@ -118,3 +119,13 @@ class Measurement:
     def mean(self) -> np.ndarray:
         """Mean (t or f, p) over the repetitions."""
         return np.asarray(self.values.mean(axis=0))
+
+    def place_name(self, place: int) -> str:
+        """A place: (5, 0) mm, or its number, from 1, where it is not known."""
+        x, y = 1e3 * self.places[place]
+        return f"({x:.4g}, {y:.4g}) mm" if np.isfinite([x, y]).all() else f"place {place + 1}"
+
+    def place_names(self, places: np.ndarray) -> str:
+        """The first of some places."""
+        names = ", ".join(self.place_name(int(p)) for p in places[:MOST_NAMED])
+        return names + f" and {len(places) - MOST_NAMED} more" * (len(places) > MOST_NAMED)

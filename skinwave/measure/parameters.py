@@ -4,14 +4,16 @@ A fit works in the unit interval between the limits of each parameter, by its lo
 limits are above 0, as those of moduli are.
 """
 
+import ast
 import math
+import operator
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from meshes.tetmesh import Floats
+from simple_model.typing import Floats
 from skinwave.scene import variation
 from skinwave.scene.scene import Scene
 from skinwave.scene.variation import varied
@@ -21,6 +23,13 @@ GAIN, DELAY, OFFSET_X, OFFSET_Y = "gain", "delay_ms", "offset_x_mm", "offset_y_m
 NUISANCES = {GAIN: 1.0, DELAY: 0.0, OFFSET_X: 0.0, OFFSET_Y: 0.0}  # and where they are not fitted
 PRESSURE, FORCE = "focus.peak_pressure_pa", "load.force_n"  # which linear waves go with
 Values = Mapping[str, float]
+OPERATORS: dict[type, Callable[[float, float], float]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.Pow: math.pow,
+}  # fmt: skip
+FUNCTIONS: dict[str, Callable[[float], float]] = {
+    name: getattr(math, name) for name in ("sqrt", "exp", "log", "log10", "sin", "cos", "tan")
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,41 +132,47 @@ def _tie(text: str) -> tuple[str, str]:
 
 
 def _key(text: str) -> str:
-    """A nuisance parameter, or a key of a scene by today's name."""
+    """A nuisance parameter, or a key of a scene."""
     key = text.strip()
     return key if key in NUISANCES else variation.parse(f"{key}=0").key
 
 
 def _tied(values: Values, ties: Mapping[str, str]) -> dict[str, float]:
-    """Values of expressions of the others, which lmfit evaluates."""
-    try:
-        from lmfit import Parameters as Named
-    except ImportError:
-        raise ValueError('--tie needs lmfit; pip install "skinwave[measure]"') from None
-    keys = sorted([*values, *ties], key=len, reverse=True)
-    pattern = re.compile("|".join(rf"(?<![\w.]){re.escape(key)}(?![\w.])" for key in keys))
-    named = Named()
-    for key, value in values.items():
-        named.add(_identifier(key), value=value)
-    for key in ties:
-        named.add(_identifier(key), value=0.0)
+    """Values of expressions of the others, each of those before it, too."""
+    known, found = dict(values), {}
     for key, text in ties.items():
-        expression = pattern.sub(lambda found: _identifier(found.group()), text)
+        names = {each: f"key_{n}" for n, each in enumerate(known)}
+        for each in sorted(names, key=len, reverse=True):
+            pattern = rf"(?<![\w.]){re.escape(each)}(?![\w.])"
+            text = re.sub(pattern, names[each], text)
+        numbers = {names[each]: value for each, value in known.items()}
         try:
-            named[_identifier(key)].expr = expression
-            value = float(named[_identifier(key)].value)
-        except Exception as error:
+            value = float(_evaluated(ast.parse(text.strip(), mode="eval").body, numbers))
+        except (ArithmeticError, LookupError, SyntaxError, TypeError, ValueError):
             raise ValueError(
-                f"--tie {key}={text} cannot be evaluated ({' '.join(str(error).split())}); write "
-                "an expression of numbers and of keys that are varied"
+                f"--tie {key}={ties[key]} cannot be evaluated; write an expression of numbers and "
+                "of keys that are varied"
             ) from None
         if not math.isfinite(value):
-            raise ValueError(f"--tie {key}={text} is {value}; write one that is finite")
-    return {key: float(named[_identifier(key)].value) for key in ties}
+            raise ValueError(f"--tie {key}={ties[key]} is {value}; write one that is finite")
+        known[key] = found[key] = value
+    return found
 
 
-def _identifier(key: str) -> str:
-    return key.replace(".", "_")
+def _evaluated(node: ast.AST, numbers: Values) -> float:
+    """Value of an expression of numbers, names, + - * / **, and functions of `FUNCTIONS`."""
+    match node:
+        case ast.Constant(value=int() | float() as value):
+            return value
+        case ast.Name(id=name):
+            return numbers[name]
+        case ast.BinOp(left=left, op=op, right=right):
+            return OPERATORS[type(op)](_evaluated(left, numbers), _evaluated(right, numbers))
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            return -_evaluated(operand, numbers)
+        case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]):
+            return FUNCTIONS[name](_evaluated(argument, numbers))
+    raise ValueError
 
 
 def of_scene(values: Values) -> dict[str, float]:

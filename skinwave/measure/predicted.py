@@ -14,11 +14,15 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 import fem
-from meshes.tetmesh import Floats
+from simple_model import MovingPressure
+from simple_model.layers.flat_body import field_lines, steady_lines
+from simple_model.layers.flat_quantities import from_rest, steady, surface_field
+from simple_model.layers.wavenumber_integral import Field
+from simple_model.load.spectrum import merge_lines
 from simple_model.quantities import Quantity
 from simple_model.response import fit_lines
-from simple_model.typing import Complex
-from skinwave.measure.flat_lines import flat_history, flat_lines
+from simple_model.typing import Complex, Floats
+from skinwave.bodies.analytic import compliance
 from skinwave.measure.parameters import (
     DELAY,
     FORCE,
@@ -33,6 +37,7 @@ from skinwave.measure.parameters import (
 from skinwave.models import Model, named, parametric
 from skinwave.models.advice import check_taken
 from skinwave.models.affine_scenes import check_scene
+from skinwave.models.flat_body import fields_read
 from skinwave.models.free_keys import free_keys
 from skinwave.models.parametric import ParametricBody
 from skinwave.planning.simulate import compute
@@ -43,6 +48,10 @@ from skinwave.system.effort import Progress
 Predict = Callable[[Values], np.ndarray]
 SAME = 1e-3  # of a frequency: lines as near as that are one
 KEPT = 32  # predictions
+THRESHOLD = 1e-5  # of the strongest line of the load: weaker ones are left out of a prediction
+SETTLED = 1e-4  # of the largest motion: what is left of the transient where it is left out
+PARTS = (1 / 12, 1 / 4)  # of a record, after which the transient may have decayed
+BEFORE_END = 0.9  # of such a part: its last samples see it end
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -216,7 +225,7 @@ def _kept(function: Callable[[Values], Any]) -> Callable[[Values], Any]:
 
 def _flat_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
     """Lines by wavenumber integrals."""
-    f, a = flat_lines(aim.varied(values))
+    f, a = _flat_lines_of(aim.varied(values))
     at = np.abs(f[:, None] - frequencies).argmin(axis=0)
     _check_lines(f[at], frequencies, values)
     return np.asarray(a[at])
@@ -254,4 +263,55 @@ def _history(aim: Target, values: Values, last: float) -> CubicSpline:
         found = compute(scene, aim.model)
         return CubicSpline(found.times, found.values)
     times = np.asarray(np.arange(int(np.ceil(last * SAMPLE_RATE)) + 2) / SAMPLE_RATE, np.float64)
-    return CubicSpline(times, flat_history(scene, times))
+    return CubicSpline(times, _flat_history(scene, times))
+
+
+def _flat_lines_of(scene: Scene) -> tuple[Floats, Complex]:
+    """Lines of what a scene's probes read: frequencies (f,) in Hz, amplitudes (f, p), SI.
+
+    Parameters
+    ----------
+    scene : Scene, of a quantity of normal motion at the surface
+    """
+    points = scene.probe_points
+    if scene.load.is_plain:
+        body = compliance(scene.body)
+        f, a = steady_lines(body, scene.pressure, points, threshold=THRESHOLD)
+        return f, a * scene.reading.asked.factor(2j * np.pi * f)[:, None]
+    each = [field_lines(*part, points, threshold=THRESHOLD) for part in _parts(scene)]
+    frequencies, amplitudes = zip(*each, strict=True)
+    return merge_lines(np.concatenate(frequencies), np.vstack(amplitudes)[..., 0])
+
+
+def _flat_history(scene: Scene, times: Floats) -> Floats:
+    """Waveforms (t, p) of what a scene's probes read, SI: from rest until that is the steady state.
+
+    Parameters
+    ----------
+    scene : as for `flat_lines`
+    times : (t,) float, s, equally spaced from 0
+    """
+    parts, asked, points = _parts(scene), scene.reading.asked, scene.probe_points
+
+    def begun(until: Floats) -> Floats:
+        each = (from_rest(field, asked, load, points, until) for field, load in parts)
+        return np.asarray(sum(each), np.float64)
+
+    if scene.tacton.trajectory.shape == "recorded":
+        return begun(times)
+    later = np.asarray(sum(steady(field, asked, load, points, times) for field, load in parts))
+    for part in PARTS:
+        n = int(part * len(times))
+        first = begun(times[:n])[: int(BEFORE_END * n)]
+        left = np.abs(first - later[: len(first)])[2 * n // 3 :].max()
+        if left <= SETTLED * np.abs(later).max():
+            return np.concatenate([first, later[len(first) :]])
+    return begun(times)
+
+
+def _parts(scene: Scene) -> list[tuple[Field, MovingPressure]]:
+    """Field of each component of the load, and that."""
+    if scene.load.is_plain:
+        body = compliance(scene.body)
+        return [(surface_field(scene.reading.asked, body), scene.pressure)]
+    return list(zip(fields_read(scene, 0.0), scene.loads, strict=True))

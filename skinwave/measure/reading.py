@@ -1,7 +1,9 @@
-"""Measurements from files: CSV and TSV, .npz, .wav, .mat, Universal File Format 58, and two
-published sets.
+"""Measurements from files: text in columns, LabVIEW, .npz, .wav, .mat, Universal File Format 58,
+and two published sets.
 """
 
+import io
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,11 +11,47 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from meshes import reading
 from simple_model.typing import Floats
-from skinwave.measure import arrays, labview, matlab, skinsource, sound, text, universal
+from skinwave.measure import arrays, labview, skinsource, text, universal
+from skinwave.measure.headers import Column
 from skinwave.measure.measurement import Measurement
 from skinwave.measure.recording import Given, Recording, completed
+from skinwave.measure.table import Table, recording
 from skinwave.measure.units import length
+
+LARGEST_WAV = 500_000_000  # bytes
+
+
+def read_wav(path: Path, given: Given) -> Recording:
+    """The channels of a WAV, a place each; samples that are whole numbers are fractions of full
+    scale.
+
+    Raises
+    ------
+    ValueError
+        If it is none, or has fewer than two samples.
+    """
+    from scipy.io import wavfile
+
+    content = reading.content(path, LARGEST_WAV)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", wavfile.WavFileWarning)  # of chunks beside the samples
+            rate, data = wavfile.read(io.BytesIO(content))
+    except Exception:  # whatever is made of spoilt bytes
+        raise ValueError("the file is damaged or not a WAV file; export it anew as PCM") from None
+    if len(data) < 2:
+        raise ValueError(f"the WAV has {len(data)} samples; give two or more")
+    middle, full = {"u": (128, 128), "f": (0, 1)}.get(
+        data.dtype.kind, (0, 2.0 ** (8 * data.dtype.itemsize - 1))
+    )  # 24 bits are the upper of 32
+    with np.errstate(invalid="ignore"):  # of what is no number, which is refused later
+        values = (data.reshape(len(data), -1).astype(np.float64) - middle) / full
+    columns = tuple(Column(text=f"channel {k + 1}", role="") for k in range(values.shape[1]))
+    return recording(
+        Table(columns=columns, numbers=values, notes=(("rate", repr(float(rate))),)), given
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,9 +72,9 @@ READERS = (
     ),
     Reader(words="LabVIEW's measurement", suffixes=(".lvm",), read=labview.read_lvm),
     Reader(words="TDMS", suffixes=(".tdms",), read=labview.read_tdms),
-    Reader(words="numpy", suffixes=(".npz",), read=arrays.read, choose=("variable",)),
-    Reader(words="sound", suffixes=(".wav",), read=sound.read),
-    Reader(words="MATLAB", suffixes=(".mat",), read=matlab.read, choose=("variable",)),
+    Reader(words="numpy", suffixes=(".npz",), read=arrays.read_npz, choose=("variable",)),
+    Reader(words="sound", suffixes=(".wav",), read=read_wav),
+    Reader(words="MATLAB", suffixes=(".mat",), read=arrays.read_mat, choose=("variable",)),
     Reader(
         words="Universal File Format 58", suffixes=(".uff", ".unv", ".uf", ".58"),
         read=universal.read, choose=("direction",),
@@ -128,8 +166,8 @@ def read_alone(path: str | Path) -> Measurement:
 def completing(path: str | Path) -> str:
     """Words on the command that adds to a file what it does not say."""
     return (
-        f"`skinwave measured {path} --out DIR` takes such options, and writes DIR/measurement.npz, "
-        "which says all"
+        f"`skinwave fit --inspect {path} --out DIR` takes such options, and writes "
+        "DIR/measurement.npz, which says all"
     )
 
 

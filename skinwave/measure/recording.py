@@ -1,4 +1,6 @@
-"""A file's recording as it stands, what a user adds to it, and the measurement that both make."""
+"""A file's recording as it stands, what a user adds to it, and the measurement that both make: in
+SI, positive into the body, at even times without gaps.
+"""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -8,12 +10,19 @@ import numpy as np
 from simple_model.choices import choose
 from simple_model.quantities import QUANTITIES
 from simple_model.typing import Floats
-from skinwave.measure import sampling, units
+from skinwave.measure import units
 from skinwave.measure.measurement import UNEVEN, Measurement
 
 LARGEST = 1e100  # of any value in SI: squares of larger ones may overflow
 SLOWEST = 40.0  # Hz of samples: half of it is below all vibrations that are felt
 EXAMPLE = "--quantity velocity --unit mm/s"
+CLOCK = 1e8  # s: later times are counted from an epoch, and become those from the first
+DIGITS = 7  # of times as programs round them
+COARSEST = 0.25  # of a sampling interval: what rounding may leave
+LARGEST_GAPS = 0.1  # of the samples
+LARGEST_ERROR = 0.1  # of the RMS: what interpolation may be wrong by
+TRIALS = 16  # places in a record at which it is tried
+BESIDE = 8  # samples on both sides of each
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -94,33 +103,21 @@ def completed(found: Recording, given: Given, path: Path) -> Measurement:
         If neither the file nor the user say what is needed, with the option that says it.
     """
     quantity, unit = _quantity(found, given)
-    sign, said = _sign(found, given)
+    sign, directed = _sign(found, given)
     places, placed = _places(found, given)
-    found, missing = _measured(replace(found, places=places))
+    found, said = _measured(replace(found, places=places))
     axis, found, filled = _sampled(found, given)
-    if len(axis) > 1 and (rate := 1 / (axis[1] - axis[0])) < SLOWEST:
-        filled.append(
-            f"samples at {rate:.3g} Hz show no vibration that is felt; check the times, or give "
-            "--rate"
-        )
     values = sign * units.in_si(found.values, units.per_unit(unit, quantity))
     if values.size and not np.abs(values).max() < LARGEST:
         raise ValueError(
             f"values reach {np.abs(values).max():g} in SI; leave out nan and inf, and check --unit"
         )
+    said = [*found.remarks, *said, *filled, *placed, *_constant(values), *directed]
     return Measurement(
-        quantity=quantity,
-        places=found.places,
-        times=axis,
-        frequencies=found.frequencies,
-        values=values,
-        drive=found.drive,
-        name=found.name or path.stem,
-        source=path.name,
-        remarks=tuple(
-            dict.fromkeys((*found.remarks, *missing, *filled, *placed, *_constant(values), *said))
-        ),
-    )
+        quantity=quantity, places=found.places, times=axis, frequencies=found.frequencies,
+        values=values, drive=found.drive, name=found.name or path.stem, source=path.name,
+        remarks=tuple(dict.fromkeys(said)),
+    )  # fmt: skip
 
 
 def _constant(values: np.ndarray) -> list[str]:
@@ -140,18 +137,18 @@ def _measured(found: Recording) -> tuple[Recording, list[str]]:
     gone = np.isnan(found.values)
     if not gone.any():
         return found, []
-    place = ~gone.all(axis=(0, 1))
+    place, said = ~gone.all(axis=(0, 1)), []
     if not place.any():
         raise ValueError("no place has a value; export the measured values")
-    said = [f"{(~place).sum()} of {len(place)} places have no value and are left out"] * int(
-        not place.all()
-    )
+    if not place.all():
+        said.append(f"{(~place).sum()} of {len(place)} places have no value and are left out")
     found = replace(found, values=found.values[:, :, place], places=found.places[place])
     if len(found.frequencies):
         at = ~np.isnan(found.values).any(axis=(0, 2))
         if 2 * at.sum() < len(at):
             raise ValueError(f"only {at.sum()} of {len(at)} frequencies have values of all places")
-        said += [f"{(~at).sum()} frequencies without values are left out"] * int(not at.all())
+        if not at.all():
+            said.append(f"{(~at).sum()} frequencies without values are left out")
         drive = found.drive[at] if len(found.drive) else found.drive
         found = replace(
             found, values=found.values[:, at], frequencies=found.frequencies[at], drive=drive
@@ -165,9 +162,11 @@ def _quantity(found: Recording, given: Given) -> tuple[str, str]:
     of_unit = units.quantity_of(unit)
     quantity = given.quantity or (of_unit if given.unit else "") or found.quantity or of_unit
     if not unit:
-        missing = "the unit" if quantity else "what was measured, and its unit"
-        option = f"--unit {_usual(quantity)}" if quantity else EXAMPLE
-        raise ValueError(f"{missing} is not in the file; give {option}")
+        if not quantity:
+            raise ValueError(f"what was measured, and its unit, is not in the file; give {EXAMPLE}")
+        known = QUANTITIES.get(quantity)
+        usual = units.plain(known.shown) if known and quantity in units.MOTION else "UNIT"
+        raise ValueError(f"the unit is not in the file; give --unit {usual}")
     if not given.unit and not quantity and "dB" not in unit:
         raise ValueError(
             f"the values are in {unit[:40]}, and how much motion that is is not in the file; give "
@@ -176,11 +175,6 @@ def _quantity(found: Recording, given: Given) -> tuple[str, str]:
     if not quantity:
         units.per_unit(unit, "displacement")  # whose sentence names what is wrong with it
     return choose("quantity", quantity, [name for name, q in QUANTITIES.items() if q.of_body]), unit
-
-
-def _usual(quantity: str) -> str:
-    found = QUANTITIES.get(quantity)
-    return units.plain(found.shown) if found and quantity in units.MOTION else "UNIT"
 
 
 def _sign(found: Recording, given: Given) -> tuple[int, list[str]]:
@@ -192,56 +186,6 @@ def _sign(found: Recording, given: Given) -> tuple[int, list[str]]:
         return found.sign, []
     return 1, ["its direction is not in the file and taken as positive into the body; "
                "--positive out turns it"]  # fmt: skip
-
-
-def _sampled(found: Recording, given: Given) -> tuple[Floats, Recording, list[str]]:
-    """Even times, the recording at each of them, and sentences on what was filled or replaced."""
-    if len(found.frequencies):
-        if found.frequencies.min() < 0:
-            raise ValueError("frequencies fall below 0 Hz; export the one-sided spectrum")
-        return np.empty(0), found, []
-    times, index, said = _times(found, given)
-    together = found.values
-    if len(found.drive) == together.shape[1]:
-        drive = np.broadcast_to(found.drive[:, None], (len(together), len(found.drive), 1))
-        together = np.concatenate([together, drive], axis=2)
-    full, part, more = sampling.complete(np.moveaxis(together, 1, 2), index, len(times))
-    full = np.moveaxis(full, 2, 1)
-    count = found.values.shape[2]
-    drive = full[0, :, count] if full.shape[2] > count else found.drive
-    return times[part], replace(found, values=full[..., :count], drive=drive), [*said, *more]
-
-
-def _times(found: Recording, given: Given) -> tuple[Floats, np.ndarray, list[str]]:
-    """Times of samples, the number of each sample of the file, and sentences. A rate that is given
-    replaces steps; the first sample stays as many steps from zero.
-    """
-    count = found.values.shape[1]
-    rate = found.rate if given.rate is None else given.rate
-    if given.rate is None and len(found.times):
-        return *sampling.even(found.times), []
-    if np.isnan(rate):
-        raise ValueError("the sampling rate is not in the file; give --rate in Hz")
-    if not 0 < rate < np.inf:
-        raise ValueError(f"the rate of {rate:g} Hz must be above 0 and finite; give --rate in Hz")
-    if len(found.times) < 2:
-        return np.arange(count) / rate, np.arange(count), []
-    try:
-        times, index = sampling.even(found.times)
-    except ValueError:
-        span = float(found.times[-1] - found.times[0])
-        steps = np.diff(found.times)
-        if not (
-            span > 0 and steps.max() <= max(3 * steps.mean(), 1.5 * np.median(steps[steps > 0]))
-        ):
-            raise
-        times, index = found.times[0] + span * np.linspace(0, 1, count), np.arange(count)
-    step = float(times[-1] - times[0]) / (len(times) - 1)
-    start, said = float(times[0]), []
-    if not np.isclose(step * rate, 1, rtol=UNEVEN):
-        start /= step * rate
-        said.append(f"the file's steps of {step:g} are replaced by 1/{rate:g} s")
-    return start + np.arange(len(times)) / rate, index, said
 
 
 def _places(found: Recording, given: Given) -> tuple[Floats, list[str]]:
@@ -257,3 +201,156 @@ def _places(found: Recording, given: Given) -> tuple[Floats, list[str]]:
             '--places "0,0 5,0" in mm'
         )
     return places, []
+
+
+def _sampled(found: Recording, given: Given) -> tuple[Floats, Recording, list[str]]:
+    """Even times, the recording at each of them, and sentences on what was filled or replaced."""
+    if len(found.frequencies):
+        if found.frequencies.min() < 0:
+            raise ValueError("frequencies fall below 0 Hz; export the one-sided spectrum")
+        return np.empty(0), found, []
+    times, index, said = _times(found, given)
+    together, count = found.values, found.values.shape[2]
+    if len(found.drive) == together.shape[1]:
+        drive = np.broadcast_to(found.drive[:, None], (len(together), len(found.drive), 1))
+        together = np.concatenate([together, drive], axis=2)
+    full, part, more = _complete(np.moveaxis(together, 1, 2), index, len(times))
+    full, times = np.moveaxis(full, 2, 1), times[part]
+    drive = full[0, :, count] if full.shape[2] > count else found.drive
+    said += more
+    if len(times) > 1 and (rate := 1 / (times[1] - times[0])) < SLOWEST:
+        said.append(f"samples at {rate:.3g} Hz show no vibration that is felt; check the times, or "
+                    "give --rate")  # fmt: skip
+    return times, replace(found, values=full[..., :count], drive=drive), said
+
+
+def _times(found: Recording, given: Given) -> tuple[Floats, np.ndarray, list[str]]:
+    """Times of samples, the number of each sample of the file, and sentences. A rate that is given
+    replaces steps; the first sample stays as many steps from zero.
+    """
+    count = found.values.shape[1]
+    rate = found.rate if given.rate is None else given.rate
+    if given.rate is None and len(found.times):
+        return *_even(found.times), []
+    if np.isnan(rate):
+        raise ValueError("the sampling rate is not in the file; give --rate in Hz")
+    if not 0 < rate < np.inf:
+        raise ValueError(f"the rate of {rate:g} Hz must be above 0 and finite; give --rate in Hz")
+    if len(found.times) < 2:
+        return np.arange(count) / rate, np.arange(count), []
+    try:
+        times, index = _even(found.times)
+    except ValueError:
+        span, steps = float(found.times[-1] - found.times[0]), np.diff(found.times)
+        if not span > 0 or steps.max() > max(3 * steps.mean(), 1.5 * np.median(steps[steps > 0])):
+            raise
+        times, index = found.times[0] + span * np.linspace(0, 1, count), np.arange(count)
+    step = float(times[-1] - times[0]) / (len(times) - 1)
+    start, said = float(times[0]), []
+    if not np.isclose(step * rate, 1, rtol=UNEVEN):
+        start /= step * rate
+        said.append(f"the file's steps of {step:g} are replaced by 1/{rate:g} s")
+    return start + np.arange(len(times)) / rate, index, said
+
+
+def _even(times: Floats) -> tuple[Floats, np.ndarray]:
+    """Even times (n,) in s of rounded ones with missing rows, and the number (t,) of each.
+
+    Times that are even within `UNEVEN` come back as they are.
+    """
+    largest = float(np.abs(times).max(initial=0.0))
+    if largest > CLOCK:
+        times = times - times[0]
+    steps, index = np.diff(times), np.arange(len(times))
+    if not np.isfinite(times).all():
+        raise ValueError("a time is missing or not finite; complete the times, or give --rate")
+    if len(times) < 2:
+        return times, index
+    if not steps.min() > 0:
+        raise ValueError(
+            "times must rise, and some repeat or fall; sort them, or give --rate if they are "
+            "rounded"
+        )
+    if np.abs(steps - steps.mean()).max() <= UNEVEN * steps.mean():
+        return times, index
+    step = float(np.median(steps))
+    index = np.concatenate([[0], np.cumsum(np.rint(steps / step).astype(int))])
+    step, start = np.polyfit(index, times, 1)
+    away = float(np.abs(times - start - step * index).max())
+    rounding = 0.51 * 10.0 ** (np.floor(np.log10(largest)) + 1 - DIGITS)
+    if np.diff(index).min() < 1 or away > max(UNEVEN * step, min(rounding, COARSEST * step)):
+        raise ValueError(
+            f"times of a measurement must rise in equal steps, and theirs are {steps.min():g} to "
+            f"{steps.max():g} s; sample it evenly, or give --rate"
+        )
+    if (missing := index[-1] + 1 - len(index)) > LARGEST_GAPS * len(index):
+        raise ValueError(
+            f"{missing} rows are missing between {len(index)} in equal steps of {step:g} s; "
+            "measure again, or give the part without gaps"
+        )
+    full = start + step * np.arange(index[-1] + 1)
+    if away <= UNEVEN * step:
+        full[index] = times
+    return full, index
+
+
+def _complete(values: Floats, index: np.ndarray, count: int) -> tuple[Floats, slice, list[str]]:
+    """Values (..., t), nan where nothing was measured, at every sample of a count; those that are
+    missing are interpolated by cubic splines.
+
+    Returns
+    -------
+    values (..., m), the samples that these are, and sentences: samples at the start and the end at
+    which a row has no value are cut off
+    """
+    full = np.full((*values.shape[:-1], count), np.nan)
+    full[..., index] = values
+    if np.isfinite(full).all():
+        return full, slice(0, count), []
+    rows = full.reshape(-1, count)
+    known = ~np.isnan(rows)
+    inside = np.maximum.accumulate(known, axis=1) & np.maximum.accumulate(
+        known[:, ::-1], axis=1)[:, ::-1]  # fmt: skip
+    kept = np.flatnonzero(inside.all(axis=0))
+    if len(kept) < (1 - LARGEST_GAPS) * count:
+        raise ValueError(
+            f"of {count} samples only {len(kept)} lie between the first and the last value of "
+            "every place; give the part, or the --columns, with values"
+        )
+    part = slice(int(kept[0]), int(kept[-1]) + 1)
+    rows, gaps, said = rows[:, part], ~known[:, part], []
+    if cut := count - rows.shape[1]:
+        said.append(f"{cut} samples at the start or the end without a value are left out")
+    if gaps.any():
+        worst = max(_fill(row, gap) for row, gap in zip(rows, gaps, strict=True) if gap.any())
+        said.append(
+            f"{int(gaps.any(axis=0).sum())} samples are missing and interpolated, with an error of "
+            f"about {100 * worst:.2g} % of the RMS"
+        )
+    return rows.reshape(*values.shape[:-1], -1), part, said
+
+
+def _fill(row: Floats, gap: np.ndarray) -> float:
+    """Fill the gaps of a row; the error of gaps as long elsewhere, as a fraction of the RMS."""
+    from scipy.interpolate import CubicSpline  # only where it is needed: it takes a while
+
+    known = np.flatnonzero(~gap)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], gap, [False]]).astype(int)))
+    longest = int((edges[1::2] - edges[::2]).max())
+    width = longest + 2 * BESIDE
+    free = np.flatnonzero(np.convolve(gap, np.ones(width), "valid") == 0)
+    size, error = float(row[known].std()), np.inf
+    if len(free) >= TRIALS and gap.sum() <= LARGEST_GAPS * len(row):
+        hidden, wrong = slice(BESIDE, BESIDE + longest), []
+        for first in free[np.linspace(0, len(free) - 1, TRIALS).astype(int)]:
+            at = np.arange(first, first + width)
+            beside = np.delete(at, hidden)
+            wrong.append(CubicSpline(beside, row[beside])(at[hidden]) - row[at[hidden]])
+        error = float(np.sqrt(np.mean(np.square(wrong)))) / size if size > 0 else 0.0
+    if not error <= LARGEST_ERROR:
+        raise ValueError(
+            f"{int(gap.sum())} samples are missing, up to {longest} in a row, which is too long to "
+            "interpolate; give the part without them, or leave out that place by --columns"
+        )
+    row[gap] = CubicSpline(known, row[known])(np.flatnonzero(gap))
+    return error

@@ -1,48 +1,53 @@
-"""Spectral lines in measured waveforms: which frequencies rise above the noise, and how surely.
+"""Spectral lines in waveforms: which frequencies rise above the noise, and how surely.
 
-A line is a peak of the periodogram, with a Hann window and averaged over repetitions, above the
-noise floor, a running median. A start from which the lines differ by more than the noise, as of a
-motion from rest, is left out. In Gaussian noise their ratio has the F distribution with 2 R and nu
-degrees of freedom: R repetitions, and nu by the variance of the median (Welch 1967; the median of a
-gamma distribution). The probability of a false alarm is of any in the whole file: that of one bin
-times bins and places (Bonferroni). Lines are found strongest first and fitted together, so that the
-side lobes of one are not taken for others.
+A line is a peak of the periodogram (Hann window, mean of R repetitions) above the noise floor, a
+running median. In Gaussian noise their ratio has the F distribution with 2 R and nu degrees of
+freedom, nu by the variance of the median (Welch 1967). The probability of a false alarm is that of
+one bin times bins and places (Bonferroni).
+
+Lines are found strongest first and fitted together beside a linear trend, so that side lobes of one
+are not taken for others. Their frequencies follow by Gauss-Newton steps with the amplitudes
+projected out (Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973); standard errors are the
+Cramer-Rao bound, of one sinusoid of amplitude A over a time T in noise of the one-sided density S
+3 S / (pi^2 A^2 T^3) (Rife and Boorstyn, IEEE Trans. Inf. Theory 20, 1974, eq. 17).
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 from scipy.signal import detrend
 from scipy.signal.windows import hann
 from scipy.special import chdtrc
 
 from simple_model.typing import Floats
-from skinwave.measure.line_fit import LineFit, fitted
 from skinwave.measure.noise_floor import floor_of, tail
 
 ALARM = 0.01  # probability that a file of noise has any line
-RESOLVED = 1.5  # 1/T: lines nearer to each other are one
-LOWEST = 4  # bins: what is slower is drift, and as near to half the rate not determined
+RESOLVED = 1.5  # bins: lines nearer to each other are one
+LOWEST = 4  # bins: slower motion is drift; as near to half the rate lines are not determined
 FEWEST = 32  # samples
 MOST = 60  # lines
 PASSES = 12
-NEAR = 4.0  # bins: what is as near to a line may be left by others that are not yet known
+NEAR = 4.0  # bins from a known line: what the fit leaves there may be of unknown lines
 LEAK = 4.0  # times the bound of the Hann window's side lobes
-ROUND_OFF = 1e-9  # of the largest value: a line as weak as that is none
-STARTS = (0.0, 0.25, 0.5)  # of a record, which are left out until the rest is steady
+ROUND_OFF = 1e-9  # of the largest value: weaker lines are round-off
+STARTS = (0.0, 0.25, 0.5)  # shares of a record that are left out until the rest is steady
 HALF = 0.5  # of a line
-CHANGES = 1e-3  # chance below which what a fit leaves at the start is no noise
+CHANGES = 1e-3  # chance below which the start of a record differs from its lines
 
-
-NONE = LineFit(
-    frequencies=np.empty(0), errors=np.empty(0), amplitudes=np.empty((0, 1)), rest=np.empty((0, 1))
-)
+STEPS = 12  # of Gauss and Newton, at most
+SMALL = 0.01  # of a standard error, or of the farthest step: the last step
+FARTHEST = 0.5  # bins, of a step
+BLOCKS = 64  # that a waveform is averaged in, turned back by a line's frequency
+MOST_READ = 32  # waveforms that a first frequency is read from
+CHUNK = 2**15  # samples
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SpectralLine:
     """A line: `frequency` and its standard `error` in Hz, `amplitudes` (p,) in SI, root mean square
-    over repetitions, and `false_alarm`, the probability of any such in noise alone.
+    over repetitions, and `false_alarm`, the probability of any such line in noise alone.
     """
 
     frequency: float
@@ -54,8 +59,8 @@ class SpectralLine:
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LineSpectrum:
     """Lines by frequency, and the one-sided densities (f, p), unit^2/Hz, at `frequencies` (f,) of
-    the whole and of the noise `floor` without the lines; of what is after `begun` in s, before
-    which the motion is not steady.
+    the whole and of the noise `floor` without the lines. What is before `begun` in s is left out,
+    where the motion is not steady.
     """
 
     lines: tuple[SpectralLine, ...]
@@ -63,6 +68,23 @@ class LineSpectrum:
     density: Floats
     floor: Floats
     begun: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Fit:
+    """Lines fitted to waveforms: frequencies (l,) with errors (l,) in Hz, amplitudes (l, q) of Re a
+    exp(2 pi i f t), and the rest (t, q) without lines and trend.
+    """
+
+    frequencies: Floats
+    errors: Floats
+    amplitudes: np.ndarray
+    rest: Floats
+
+
+_NONE = _Fit(
+    frequencies=np.empty(0), errors=np.empty(0), amplitudes=np.empty((0, 1)), rest=np.empty((0, 1))
+)
 
 
 def spectral_lines(values: Floats, rate: float, *, alarm: float = ALARM) -> LineSpectrum:
@@ -86,23 +108,20 @@ def spectral_lines(values: Floats, rate: float, *, alarm: float = ALARM) -> Line
     count = values.shape[1]
     if count < FEWEST:
         raise ValueError(f"{count} samples are too few for a spectrum; measure {FEWEST} or more")
-    found: LineSpectrum | None = None
-    for start in STARTS:
-        first = int(start * count)
+    found: list[LineSpectrum] = []
+    for first in (int(start * count) for start in STARTS):
         if count - first < FEWEST:
             break
-        before = found
-        found, is_steady = _found(values[:, first:], rate, alarm)
-        found = replace(found, begun=first / rate)
+        spectrum, is_steady = _found(values[:, first:], rate, alarm)
+        found.append(replace(spectrum, begun=first / rate))
         if is_steady:
-            return found
-    assert found is not None
-    return _moving(found, before) if before else found
+            return found[-1]
+    return _moving(found[-1], found[-2]) if len(found) > 1 else found[-1]
 
 
 def _moving(found: LineSpectrum, before: LineSpectrum) -> LineSpectrum:
-    """Lines of a record that is not steady, with how far they have moved since an earlier start in
-    their errors; those that have moved by a bin or changed by half since are none.
+    """Lines of an unsteady record: their errors have how far they moved since an earlier start, and
+    lines that moved by a bin or changed by half are left out.
     """
     lines, old = [], np.array([line.frequency for line in before.lines])
     for line in found.lines if len(old) else ():
@@ -119,11 +138,11 @@ def _found(values: Floats, rate: float, alarm: float) -> tuple[LineSpectrum, boo
     runs, count, places = values.shape
     x = np.moveaxis(values, 0, 1).reshape(count, runs * places)
     least = 2 / rate * (ROUND_OFF * np.abs(values).max()) ** 2
-    density = densities(detrend(x, axis=0), runs, rate)
+    density = _densities(detrend(x, axis=0), runs, rate)
     floor, bin_ = np.maximum(floor_of(density, runs), least), rate / count
-    fit, chance = NONE, np.empty(0)
+    fit, chance = _NONE, np.empty(0)
     for _ in range(PASSES):
-        left = densities(fit.rest, runs, rate) if len(chance) else density
+        left = _densities(fit.rest, runs, rate) if len(chance) else density
         floor = np.maximum(floor_of(left, runs), least)
         new, surely = peaks(left, floor, runs, alarm, fit.frequencies / bin_)
         if not len(new):
@@ -132,20 +151,18 @@ def _found(values: Floats, rate: float, alarm: float) -> tuple[LineSpectrum, boo
         chosen = away >= min(NEAR, away.max())
         new, surely = new[chosen], surely[chosen]
         start, chance = np.append(fit.frequencies, new * bin_), np.append(chance, surely)
-        fit = fitted(x, start, rate, _at(floor, start / bin_, runs), len(new))
+        fit = _fitted(x, start, rate, _at(floor, start / bin_, runs), len(new))
         fit, chance = _pruned(x, fit, chance, rate, floor, runs, alarm)
         if len(chance) >= MOST:
             break
     spectrum = LineSpectrum(
         lines=_lines(fit, _errors(fit, rate, floor, runs), chance, runs),
-        frequencies=np.arange(len(density)) * bin_,
-        density=density,
-        floor=floor,
-    )
+        frequencies=np.arange(len(density)) * bin_, density=density, floor=floor,
+    )  # fmt: skip
     return spectrum, _is_steady(fit, floor, rate, runs)
 
 
-def _is_steady(fit: LineFit, floor: Floats, rate: float, runs: int) -> bool:
+def _is_steady(fit: _Fit, floor: Floats, rate: float, runs: int) -> bool:
     """Whether what a fit leaves of the first quarter is noise at the frequencies of the lines."""
     if not len(fit.frequencies):
         return True
@@ -158,12 +175,12 @@ def _is_steady(fit: LineFit, floor: Floats, rate: float, runs: int) -> bool:
     return bool(chance.min() * len(chance) > CHANGES)
 
 
-def densities(x: Floats, runs: int, rate: float, window: Floats | None = None) -> Floats:
-    """One-sided densities (f, p) of waveforms (t, r p), the mean of repetitions, with a window
-    (t, 1), that of Hann if none is given.
+def _densities(x: Floats, runs: int, rate: float, *, bare: bool = False) -> Floats:
+    """One-sided densities (f, p) of waveforms (t, r p), the mean of repetitions, with a Hann window
+    or a bare one.
     """
-    window = hann(len(x), sym=False)[:, None] if window is None else window
-    spectra = np.abs(np.fft.rfft(x * window, axis=0)) ** 2
+    window = np.ones(len(x)) if bare else hann(len(x), sym=False)
+    spectra = np.abs(np.fft.rfft(x * window[:, None], axis=0)) ** 2
     density = 2 * spectra / (rate * np.sum(window**2))
     return density.reshape(len(density), runs, -1).mean(axis=1)
 
@@ -186,9 +203,7 @@ def peaks(
     """
     tests = density[LOWEST:-1].size
     chance = np.minimum(1.0, tests * tail(density / floor, runs, len(density)))
-    surest = chance.argmin(axis=1)
-    each = np.arange(len(density))
-    least, height = chance[each, surest], (density / floor).max(axis=1)
+    least, height = chance.min(axis=1), (density / floor).max(axis=1)
     inner = height[1:-1]
     top = np.r_[False, (inner >= height[:-2]) & (inner > height[2:]), False]
     top[:LOWEST] = top[-LOWEST:] = False
@@ -211,14 +226,11 @@ def _side_lobe(bins: int) -> float:
 
 
 def _pruned(
-    x: Floats, fit: LineFit, chance: Floats, rate: float, floor: Floats, runs: int, alarm: float
-) -> tuple[LineFit, Floats]:
-    """The lines that still rise above the noise beside all others, fitted without the rest.
-
-    What a fit of one line leaves before its neighbour is known may look like a line.
+    x: Floats, fit: _Fit, chance: Floats, rate: float, floor: Floats, runs: int, alarm: float
+) -> tuple[_Fit, Floats]:
+    """The lines that rise above the noise beside all others, fitted without the rest: what a fit
+    leaves before the neighbour of a line is known may look like a line.
     """
-    if not len(chance):
-        return fit, chance
     count, places = len(x), floor.shape[1]
     bins = np.clip(np.round(fit.frequencies * count / rate), 1, len(floor) - 1).astype(int)
     squared = np.abs(fit.amplitudes.reshape(len(chance), runs, places)) ** 2
@@ -229,9 +241,9 @@ def _pruned(
     if sure.all():
         return fit, chance
     if not sure.any():
-        return NONE, np.empty(0)
+        return _NONE, np.empty(0)
     start = fit.frequencies[sure]
-    return fitted(x, start, rate, _at(floor, start * count / rate, runs)), chance[sure]
+    return _fitted(x, start, rate, _at(floor, start * count / rate, runs)), chance[sure]
 
 
 def _at(floor: Floats, positions: Floats, runs: int) -> Floats:
@@ -240,31 +252,142 @@ def _at(floor: Floats, positions: Floats, runs: int) -> Floats:
     return np.tile(floor[bins], (1, runs))
 
 
-def _errors(fit: LineFit, rate: float, floor: Floats, runs: int) -> Floats:
+def _errors(fit: _Fit, rate: float, floor: Floats, runs: int) -> Floats:
     """Standard errors in Hz in the noise that least squares meet: what is left without a window,
     where transients and drifting lines leave more than with one.
     """
     if not len(fit.frequencies):
         return fit.errors
     bins = fit.frequencies * len(fit.rest) / rate
-    bare = floor_of(densities(fit.rest, runs, rate, np.ones((len(fit.rest), 1))), runs)
+    bare = floor_of(_densities(fit.rest, runs, rate, bare=True), runs)
     noise = _at(floor, bins, runs)
     weight = np.abs(fit.amplitudes) ** 2 / noise
     excess = np.sum(weight * _at(bare, bins, runs) / noise, axis=1) / np.sum(weight, axis=1)
     return fit.errors * np.sqrt(np.maximum(excess, 1.0))
 
 
-def _lines(fit: LineFit, errors: Floats, chance: Floats, runs: int) -> tuple[SpectralLine, ...]:
+def _lines(fit: _Fit, errors: Floats, chance: Floats, runs: int) -> tuple[SpectralLine, ...]:
     """Lines by frequency."""
-    if not len(chance):
-        return ()
-    squared = np.abs(fit.amplitudes.reshape(len(fit.frequencies), runs, -1)) ** 2
+    squared = np.abs(fit.amplitudes.reshape(len(chance), runs, -1)) ** 2 if len(chance) else ()
     return tuple(
         SpectralLine(
-            frequency=float(fit.frequencies[k]),
-            error=float(errors[k]),
-            amplitudes=np.sqrt(squared[k].mean(axis=0)),
-            false_alarm=float(chance[k]),
+            frequency=float(fit.frequencies[k]), error=float(errors[k]),
+            amplitudes=np.sqrt(squared[k].mean(axis=0)), false_alarm=float(chance[k]),
         )
         for k in np.argsort(fit.frequencies)
-    )
+    )  # fmt: skip
+
+
+def _fitted(x: Floats, start: Floats, rate: float, noise: Floats, fresh: int = 0) -> _Fit:
+    """Lines fitted together.
+
+    Parameters
+    ----------
+    x : (t, q) waveforms
+    start : (l,) Hz, no two nearer than a bin
+    rate : Hz
+    noise : (l, q) one-sided densities at the lines
+    fresh : how many lines, the last, are known to a bin only
+
+    Returns
+    -------
+    _Fit
+    """
+    found = start.copy()
+    if fresh:
+        _, _, known = _step(x, start, rate, noise)
+        rest, own = _without(x, start, known, rate), _complex(known)
+        for k in range(len(found) - fresh, len(found)):
+            found[k] = _nearest_peak(rest, own[k], found[k], rate, 1 / noise[k])
+    limit = FARTHEST * rate / len(x)
+    for _ in range(STEPS):
+        step, errors, _ = _step(x, found, rate, noise)
+        found = np.clip(found + np.clip(step, -limit, limit), limit, rate / 2 - limit)
+        if (np.abs(step) < SMALL * np.minimum(errors, limit)).all():
+            break
+    _, errors, last = _step(x, found, rate, noise)
+    rest = _without(x, found, last, rate)
+    return _Fit(frequencies=found, errors=errors, amplitudes=_complex(last), rest=rest)
+
+
+def _step(
+    x: Floats, frequencies: Floats, rate: float, noise: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """A Gauss-Newton step of the frequencies, their standard errors, and the coefficients (2 l + 2,
+    q) of `_basis`.
+    """
+    count = len(frequencies)
+    half, size = 2 * count + 2, 4 * count + 2
+    gram, right = np.zeros((size, size)), np.zeros((size, x.shape[1]))
+    for part in _parts(len(x)):
+        basis = _basis(part, len(x), frequencies, rate)
+        time = (np.arange(part.start, part.stop) - len(x) / 2)[:, None] / rate
+        both = np.hstack([basis, time * basis[:, :-2]])
+        gram += both.T @ both
+        right += both.T @ x[part]
+    inner = gram[:half, :half]
+    lower = np.linalg.lstsq(inner, gram[:half, half:], rcond=1e-13)[0]
+    linear = np.asarray(np.linalg.lstsq(inner, right[:half], rcond=1e-13)[0], np.float64)
+    schur = gram[half:, half:] - gram[half:, :half] @ lower
+    slope = right[half:] - gram[half:, :half] @ linear
+    cosine, sine = np.split(linear[:-2], 2)
+    # d/df of c cos + s sin is 2 pi t (s cos - c sin), weighted by the noise of a sample, S rate/2.
+    deviation = np.sqrt(noise * rate / 2)
+    change = 2 * np.pi / deviation * np.stack([sine, -cosine])  # (2, l, q)
+    blocks = schur.reshape(2, count, 2, count)
+    fisher = np.einsum("alq,albm,bmq->lm", change, blocks, change, optimize=True)
+    gradient = np.einsum("alq,alq->l", change, slope.reshape(2, count, -1) / deviation)
+    inverse = np.linalg.pinv(fisher, hermitian=True)
+    return inverse @ gradient, np.sqrt(np.maximum(np.diag(inverse), 0.0)), linear
+
+
+def _without(x: Floats, frequencies: Floats, found: Floats, rate: float) -> Floats:
+    """Waveforms (t, q) less lines and trend of such coefficients."""
+    left = x.copy()
+    for part in _parts(len(x)):
+        left[part] -= _basis(part, len(x), frequencies, rate) @ found
+    return left
+
+
+def _complex(found: Floats) -> np.ndarray:
+    """Complex amplitudes (l, q) of coefficients."""
+    cosine, sine = np.split(found[:-2], 2)
+    return np.asarray(cosine - 1j * sine)
+
+
+def _parts(count: int) -> list[slice]:
+    return [slice(k, min(k + CHUNK, count)) for k in range(0, count, CHUNK)]
+
+
+def _basis(part: slice, count: int, frequencies: Floats, rate: float) -> Floats:
+    """Columns (t, 2 l + 2): cosines, sines, a constant and a trend from -1 to 1."""
+    k = np.arange(part.start, part.stop)[:, None]
+    angle = 2 * np.pi * k / rate * frequencies
+    trend = 2 * k / count - 1
+    return np.hstack([np.cos(angle), np.sin(angle), np.ones_like(trend), trend])
+
+
+def _nearest_peak(
+    rest: Floats, own: np.ndarray, frequency: float, rate: float, weight: Floats
+) -> float:
+    """Frequency within a bin where the weighted periodogram of a line and the rest is largest."""
+    count = len(rest)
+    best = np.argsort(-weight * np.abs(own) ** 2)[:MOST_READ]  # waveforms in which it is clearest
+    k = np.arange(count)
+    turned = rest[:, best] * np.exp(-2j * np.pi * frequency / rate * k)[:, None]
+    edges = np.linspace(0, count, min(BLOCKS, count) + 1).astype(int)
+    sizes, edges = np.diff(edges), edges[:-1]
+    sums = np.add.reduceat(turned, edges, axis=0) + sizes[:, None] * own[best] / 2
+    times = np.add.reduceat(k / rate, edges) / sizes
+
+    def power(shift: float) -> float:
+        return float(weight[best] @ np.abs(np.exp(-2j * np.pi * shift * times) @ sums) ** 2)
+
+    grid = np.linspace(-1, 1, 33) * rate / count
+    near = grid[int(np.argmax([power(shift) for shift in grid]))]
+    step = grid[1] - grid[0]
+    found = minimize_scalar(
+        lambda shift: -power(shift), bounds=(near - step, near + step), method="bounded",
+        options={"xatol": 1e-3 * step},
+    )  # fmt: skip
+    return float(np.clip(frequency + found.x, rate / count, rate / 2 - rate / count))

@@ -15,16 +15,16 @@ from pathlib import Path
 
 import numpy as np
 
+from meshes.reading import exported_text
 from simple_model.typing import Floats
-from skinwave.measure.decoding import decoded
 from skinwave.measure.headers import TIME, UNITS, X, Y, column
 from skinwave.measure.labview import lvm_table
-from skinwave.measure.layouts import EXAMPLE, in_metre, recording
 from skinwave.measure.recording import Given, Recording
-from skinwave.measure.table import Table
+from skinwave.measure.table import EXAMPLE, Table, in_metre, recording
 from skinwave.measure.units import plain, quantity_of
 from skinwave.system.plain_text import number_in
 
+LARGEST = 256_000_000  # bytes
 FIRST_LINE = "LabVIEW Measurement"  # of .lvm files, whatever they are called
 SHOWN = 100  # rows at the end that show what separates cells
 NO_VALUE = (
@@ -48,7 +48,7 @@ def read(path: Path, given: Given) -> Recording:
     ValueError
         If it is no table of numbers, or its columns do not make a measurement.
     """
-    text = decoded(path)
+    text = exported_text(path, LARGEST)
     if text.startswith(FIRST_LINE):
         return recording(lvm_table(text), given)
     return recording(table(text), given)
@@ -62,7 +62,7 @@ def places(path: Path) -> Floats:
     ValueError
         If it has no such columns, or they are no numbers.
     """
-    found = table(decoded(path))
+    found = table(exported_text(path, LARGEST))
     columns = found.columns
     if len(columns) == 2 and not any(one.text for one in columns):
         columns = (column("x [mm]"), column("y [mm]"))

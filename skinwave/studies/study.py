@@ -10,12 +10,14 @@ from pathlib import Path
 
 from simple_model import Response
 from skinwave.bodies.sizes import check_mesh, default_size
-from skinwave.measure import measured_page, measured_tables
-from skinwave.measure.measured_runs import beside, in_quantity, measured_places
-from skinwave.measure.measured_study import (
+from skinwave.measure import comparison_page
+from skinwave.measure.comparison import (
     Measured,
     MeasuredComparison,
+    beside,
     compare_measured,
+    in_quantity,
+    measured_places,
 )
 from skinwave.models import named
 from skinwave.models.advice import check_taken
@@ -132,8 +134,8 @@ def run_study(
                 first = replace(first, measured=measured_places(found[-1]))
         parts = study_page.page_parts(groups, drawn, first, outcome, progress, figures)
         for comparison in found:
-            measured_tables.write_tables(folder, comparison)
-            parts[:0] = measured_page.page_parts(comparison, partial(study_page.kept, folder))
+            comparison_page.write_tables(folder, comparison)
+            parts[:0] = comparison_page.page_parts(comparison, partial(study_page.kept, folder))
         spent = replace(
             outcome,
             seconds=time.perf_counter() - started,

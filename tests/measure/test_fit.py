@@ -12,17 +12,22 @@ from simple_model.layers.flat_body import steady_lines
 from simple_model.load.spectrum import synthesise
 from skinwave.bodies.analytic import compliance
 from skinwave.commands import cli
-from skinwave.measure import Measurement, measured_lines, observed
+from skinwave.measure import Measurement, observed
 from skinwave.measure.findings import cautions, shown
-from skinwave.measure.fit import fit, sampled
+from skinwave.measure.fit import fit
 from skinwave.measure.fit_page import fitted_scene, summary
-from skinwave.measure.identify import correlations, estimates, whiteness, width
+from skinwave.measure.intervals import (
+    correlations,
+    estimates,
+    posterior,
+    profiles,
+    whiteness,
+    width,
+)
 from skinwave.measure.observed import Data, is_steady
 from skinwave.measure.parameters import Parameter, check, parse
 from skinwave.measure.predicted import predicted_lines, target
-from skinwave.measure.problem import Problem
-from skinwave.measure.profile import profiles
-from skinwave.measure.solve import solve
+from skinwave.measure.search import Problem, solve
 from skinwave.measure.writing import write
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import loads
@@ -118,8 +123,6 @@ def test_a_profile_of_a_linear_fit_ends_at_the_closed_form(of_one_gain):
 
 
 def test_samples_of_the_posterior_are_as_wide_as_the_closed_form(of_one_gain):
-    from skinwave.measure.posterior import posterior
-
     found, best, error = of_one_gain
     drawn = posterior(found, 400, 0, quiet)
     half = 1.96 * error * np.sqrt(found.scale)
@@ -177,7 +180,7 @@ def test_gains_of_close_lines_hold_the_truth(monkeypatch, colour, repetitions, k
         measured = Measurement(quantity="velocity", places=np.zeros((draws, 2)), times=times,
                                values=clean + noise)  # fmt: skip
         lines = {f"line {k}": each for k, each in enumerate(f)}
-        monkeypatch.setattr(measured_lines, "resolved_lines", lambda *_, lines=lines: (lines, {}))
+        monkeypatch.setattr(observed, "resolved_lines", lambda *_, lines=lines: (lines, {}))
         monkeypatch.setattr(observed, "predicted_lines", lambda *_, a=model: lambda values: a)
         aim = SimpleNamespace(scene=loads(TEXT), predicts=lambda f: np.full(len(f), True))
         data = observed.data_of(kind, measured, aim)
@@ -281,7 +284,7 @@ def test_what_is_not_resolved_is_anywhere_between_its_limits_in_the_fitted_scene
 
 
 def test_short_chains_of_the_posterior_are_told(scene, lines):
-    found = sampled(fit(scene, spectra(scene, lines, 0.01), vary("gain"), starts=1), 12)
+    found = fit(scene, spectra(scene, lines, 0.01), vary("gain"), starts=1, samples=12)
     assert any("autocorrelation times long, and below 50" in said for said in cautions(found))
     assert 0 < summary(found)["posterior_autocorrelation_times"] < 50
     long = replace(found, posterior=replace(found.posterior, lengths=60.0))

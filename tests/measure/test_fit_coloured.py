@@ -4,13 +4,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from skinwave.measure.coloured import widening
-from skinwave.measure.identify import estimates, widenings
+from skinwave.measure.intervals import estimates, profiles, widening, widenings
 from skinwave.measure.observed import Data
 from skinwave.measure.parameters import parse
-from skinwave.measure.problem import Problem
-from skinwave.measure.profile import profiles
-from skinwave.measure.solve import solve
+from skinwave.measure.search import Problem, solve
 
 N = 400
 SHAPE = 1 + np.sin(2 * np.pi * np.arange(N) / 150)

@@ -10,13 +10,10 @@ from skinwave.measure import Measurement
 from skinwave.measure.findings import cautions
 from skinwave.measure.fit import fit
 from skinwave.measure.fit_page import left_out_table
-from skinwave.measure.measured_lines import FAINT, predicted_part
-from skinwave.measure.observed import Data
+from skinwave.measure.observed import NOT_PREDICTED, Data, load_lines
 from skinwave.measure.parameters import parse
 from skinwave.measure.predicted import predicted_lines, target
-from skinwave.measure.problem import Problem
-from skinwave.measure.solve import solve
-from skinwave.measure.starts import best_placed, descended, refine, search
+from skinwave.measure.search import Problem, best_placed, descended, refine, search, solve
 from skinwave.scene.file import loads
 from skinwave.system.effort import silent
 
@@ -127,12 +124,12 @@ def test_a_fit_hints_at_a_turned_sign(lines):
 
 def test_lines_that_a_reduced_body_does_not_have_are_told(lines):
     scene, aim, measured = lines
-    every = predicted_part(measured, aim)
+    every = load_lines(measured, aim)
     assert every.left_out == ()
-    small = replace(aim, reduced=SimpleNamespace(frequencies=every.frequencies[:1]))
-    (left,) = predicted_part(measured, small).left_out
-    power = (np.abs(every.amplitudes) ** 2 - 2 * every.error**2).sum(axis=1)
-    assert (left.frequency, left.why) == (280.0, FAINT)
+    small = replace(aim, reduced=SimpleNamespace(frequencies=every.found.frequencies[:1]))
+    (left,) = load_lines(measured, small).left_out
+    power = (np.abs(every.found.mean) ** 2 - 2 * every.error**2).sum(axis=1)
+    assert (left.frequency, left.why) == (280.0, NOT_PREDICTED)
     assert left.share == pytest.approx(power[1] / power.sum())
     found = fit(scene, measured, ["gain=0.2:5"], starts=1)
     solution = found.solution
@@ -142,9 +139,9 @@ def test_lines_that_a_reduced_body_does_not_have_are_told(lines):
     (said,) = (text for text in cautions(found) if "not fitted" in text)
     assert left.name in said
     assert f"{100 * left.share:.2g} %" in said
-    rows = left_out_table(found)[1]
+    rows = left_out_table(found).rows
     assert [row[0] for row in rows] == [left.name] * 2
-    assert rows[1][2] == "not resolved"
+    assert np.isnan(rows[1][2])
 
 
 def test_a_line_of_noise_that_is_left_out_has_no_share(lines):
@@ -154,5 +151,5 @@ def test_a_line_of_noise_that_is_left_out_has_no_share(lines):
     size = 0.1 * np.abs(values[:, 0]).max()
     values[:, 1] = size * (rng.standard_normal((4, 2)) + 1j * rng.standard_normal((4, 2)))
     small = replace(aim, reduced=SimpleNamespace(frequencies=np.array([140.0])))
-    (left,) = predicted_part(replace(measured, values=values), small).left_out
+    (left,) = load_lines(replace(measured, values=values), small).left_out
     assert left.share == 0.0

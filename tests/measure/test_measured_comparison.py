@@ -10,20 +10,21 @@ from scipy.interpolate import CubicSpline
 
 from simple_model import MovingPressure, Tacton, Trajectory
 from skinwave.commands import cli
-from skinwave.measure import Measurement, measured_page
-from skinwave.measure.lines import MeasuredLines
-from skinwave.measure.measured_claims import FAILS, HOLDS, UNDECIDED, assess_measured, by_name
-from skinwave.measure.measured_runs import at_measured, beside
-from skinwave.measure.measured_study import (
+from skinwave.measure import Measurement
+from skinwave.measure import comparison_page as measured_page
+from skinwave.measure.claims import FAILS, HOLDS, UNDECIDED, assess_measured, by_name
+from skinwave.measure.comparison import (
     AGREES,
     DIFFERS,
     NUMERICAL,
     SILENT,
     UNKNOWN,
     Measured,
+    at_measured,
+    beside,
     compare_measured,
-    main_column,
 )
+from skinwave.measure.lines import MeasuredLines
 from skinwave.measure.writing import write
 from skinwave.planning.simulate import compute
 from skinwave.results.run import Run
@@ -74,7 +75,7 @@ def test_a_true_model_agrees_but_for_the_stated_rate(models):
     any_at_all, delays, gains = [], [], []
     for _ in range(25):
         found = compare_measured(Measured(measurement=record(models[True][-1], rng)), models[True])
-        column = main_column(found)
+        column = found.main
         any_at_all.append(column.differs.any())
         a = column.alignment
         gains.append(abs(a.gain - GAIN) < 1.96 * a.gain_error)
@@ -90,20 +91,16 @@ def test_a_model_three_tenths_too_stiff_is_found_out(models):
     rng = np.random.default_rng(2)
     measured = Measured(measurement=record(models[True][-1], rng, sigma=2e-5))
     found = compare_measured(measured, models[False])
-    column = main_column(found)
+    column = found.main
     assert column.differs[list(found.names).index("f_AM")].sum() >= 3
     assert column.misfit > 3 * found.noise
     assert (found.findings(column) == DIFFERS).any()
-    assert "does not agree with the data everywhere" in measured_page.conclusion(
-        found, main_column(found)
-    )
-    assert "f_AM at" in measured_page.conclusion(found, main_column(found))
+    assert "does not agree with the data everywhere" in measured_page.conclusion(found, found.main)
+    assert "f_AM at" in measured_page.conclusion(found, found.main)
     same = compare_measured(measured, models[True])
-    assert main_column(same).misfit < column.misfit / 3
-    assert "agrees with the data within the noise" in measured_page.conclusion(
-        same, main_column(same)
-    )
-    assert {*np.unique(same.findings(main_column(same)))} == {AGREES, SILENT}
+    assert same.main.misfit < column.misfit / 3
+    assert "agrees with the data within the noise" in measured_page.conclusion(same, same.main)
+    assert {*np.unique(same.findings(same.main))} == {AGREES, SILENT}
 
 
 def test_a_model_that_misfits_has_a_delay_at_which_the_record_lies_within_the_tacton():
@@ -119,7 +116,7 @@ def test_a_model_that_misfits_has_a_delay_at_which_the_record_lies_within_the_ta
         values=true.response.values + noise,
     )
     found = compare_measured(Measured(measurement=measured), [stiff])
-    column = main_column(found)
+    column = found.main
     assert column.misfit > 0.2
     assert abs(column.alignment.delay) < 1e-3
     assert not any("lie within the Tacton" in said for said in measured_page.remarks(found))
@@ -132,10 +129,10 @@ def test_differences_within_the_numerical_error_are_marked(models):
     rough = [replace(run, response=replace(run.response, expected_error=0.5))
              for run in models[False]]  # fmt: skip
     found = compare_measured(Measured(measurement=record(models[True][-1], rng, sigma=2e-5)), rough)
-    findings = found.findings(main_column(found))
+    findings = found.findings(found.main)
     assert (findings == NUMERICAL).any()
     assert "within the model's numerical error of 50 %" in measured_page.conclusion(
-        found, main_column(found)
+        found, found.main
     )
 
 
@@ -148,7 +145,7 @@ def test_delay_and_gain_are_those_given(models):
     assert all(k.alignment.gain != GAIN and k.alignment.gain_error > 0 for k in kernels)
     assert not body.differs.any()
     late = compare_measured(replace(asked, delay=0.0), models[True])
-    assert main_column(late).differs.any()
+    assert late.main.differs.any()
 
 
 def test_one_repetition_has_a_noise_where_some_lines_have_none(models):
@@ -227,10 +224,10 @@ def test_a_spectrum_of_lines_is_compared_and_drawn(models):
     found = compare_measured(Measured(measurement=spectra), models[True])
     assert list(found.names) == ["f_AM", "2f_AM"]
     assert "3f_AM" in found.unresolved
-    assert (found.findings(main_column(found)) == UNKNOWN).all()
+    assert (found.findings(found.main) == UNKNOWN).all()
     assert "cannot be said, since the noise of the data is unknown" in measured_page.conclusion(
-        found, main_column(found))  # fmt: skip
-    assert main_column(found).misfit < 1e-4
+        found, found.main)  # fmt: skip
+    assert found.main.misfit < 1e-4
     drawn = beside(found, models[True])[-1].response
     size = np.ptp(run.response.values, axis=0)
     model = GAIN * (run.response.values - run.response.values.mean(axis=0))

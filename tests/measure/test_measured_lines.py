@@ -12,9 +12,7 @@ from scipy import stats
 
 from skinwave.measure import Measurement
 from skinwave.measure.alignment import align
-from skinwave.measure.coherence import coherence, floor, over_places, unbiased
-from skinwave.measure.lines import MeasuredLines, lines_of, measurable
-from skinwave.measure.significance import ellipses, holm, radius, significances
+from skinwave.measure.lines import MeasuredLines, holm, lines_of, measurable
 
 RATE, SAMPLES = 2000.0, 1000
 LINES = np.array([51.0, 140.0, 190.0, 280.0, 332.0, 381.0])  # Hz
@@ -68,7 +66,7 @@ def test_amplitudes_are_within_their_circles_as_often_as_is_said(repetitions):
     inside = []
     for _ in range(30):
         found = lines_of(measured(rng, repetitions, 0.3), LINES)
-        inside.append(np.abs(found.mean - truth) < radius(found, 0.95))
+        inside.append(np.abs(found.mean - truth) < found.radius(0.95))
     assert 0.93 < np.mean(inside) < 0.97
 
 
@@ -151,8 +149,6 @@ def test_repetitions_out_of_step_are_shifted_into_it():
                      LINES)  # fmt: skip
     assert np.abs(found.shifts - (late - late.mean())).max() < 2e-5
     assert np.abs(np.abs(found.mean) - np.abs(truth)).max() < 0.02
-    record = measured(rng, 5, 0.0, values=values)
-    assert coherence(record, LINES).over_time.min() > 1 - 1e-6  # of segments, shifted alike
     assert found.shift_error == pytest.approx(late.std(ddof=1) / np.sqrt(5), rel=0.05)
 
 
@@ -166,7 +162,7 @@ def test_significances_are_uniform_where_there_is_noise_alone():
     rng = np.random.default_rng(6)
     for repetitions in (2, 5):
         lines = only(complex_noise(rng, repetitions, 6, 2000))
-        p = significances(lines.mean, lines)
+        p = lines.significances(lines.mean)
         assert stats.kstest(p.ravel(), "uniform").pvalue > 1e-3
         f = np.abs(lines.mean) ** 2 / lines.variance
         assert np.allclose(p, stats.f.sf(f, 2, 2 * (repetitions - 1)))
@@ -178,7 +174,7 @@ def test_the_chance_of_any_false_difference_is_as_stated():
     for _ in range(60):
         lines = lines_of(measured(rng, 5, 0.2), LINES)
         away = lines.mean - align(lines, MODEL, window=0.05).applied(LINES, MODEL)
-        p = significances(away, lines)
+        p = lines.significances(away)
         single.append(np.mean(p < 0.05))
         any_at_all.append(holm(p).min() < 0.05)
     assert 0.03 < np.mean(single) < 0.06
@@ -193,7 +189,7 @@ def test_differences_of_five_standard_errors_are_found():
     for _ in range(30):
         lines = lines_of(measured(rng, 5, 0.2), LINES)
         away = lines.mean - align(lines, other, window=0.05).applied(LINES, other)
-        found += holm(significances(away, lines))[2, 1] < 0.05
+        found += holm(lines.significances(away))[2, 1] < 0.05
     assert found == 30
 
 
@@ -201,17 +197,6 @@ def test_holms_correction_is_its_definition():
     p = np.array([0.01, 0.04, np.nan, 0.03, 0.005])
     assert np.allclose(holm(p), [0.03, 0.06, np.nan, 0.06, 0.02], equal_nan=True)
     assert holm(np.array([[0.9, 0.8]])).max() == 1.0
-
-
-def test_ellipses_hold_the_true_value_as_often_as_is_said_whatever_their_shape():
-    rng = np.random.default_rng(10)
-    each = 3 * rng.normal(size=(8, 1, 4000)) + 0.5j * rng.normal(size=(8, 1, 4000))
-    lines = only(each * np.exp(0.4j))
-    major, minor, angle = ellipses(lines)
-    off = lines.mean * np.exp(-1j * angle)
-    inside = (off.real / major) ** 2 + (off.imag / minor) ** 2 < 1
-    assert 0.935 < inside.mean() < 0.965
-    assert np.median(major / minor) > 4
 
 
 def test_a_hum_beside_a_line_does_not_move_its_noise():
@@ -261,7 +246,7 @@ def test_intervals_hold_the_truth_however_close_the_lines_and_steep_the_noise(co
     for f in SPACED.values():
         found = lines_of(noisy(rng, f, colour, repetitions), f)
         off = found.mean - 3.0
-        inside.append((np.abs(off) < radius(found, 0.95)).mean(axis=1).mean())
+        inside.append((np.abs(off) < found.radius(0.95)).mean(axis=1).mean())
         one = replace(found, each=found.each[:, :, :1], variance=found.variance[:, :1])
         for factors in (np.ones(len(f)), np.r_[1.0, -1.0, np.zeros(len(f) - 2)]):
             own = np.sqrt(found.variance / found.variance[:, :1])  # of each draw, over the first's
@@ -287,7 +272,7 @@ def test_a_short_record_has_errors_and_no_lines_where_there_are_none():
     )  # fmt: skip
     found = lines_of(record, f)
     assert np.isfinite(found.variance).all()
-    assert np.flatnonzero(holm(significances(found.mean, found))[:, 0] < 0.05).tolist() == [6, 13]
+    assert np.flatnonzero(holm(found.significances(found.mean))[:, 0] < 0.05).tolist() == [6, 13]
     white = np.sqrt(found.variance / (4 * 0.01**2 / 750))
     assert 0.8 < np.median(white) < 2.5
 
@@ -299,32 +284,7 @@ def test_a_gain_that_changes_between_repetitions_is_in_the_errors():
     record = replace(record, values=gain * waveforms(np.full((5, 200), 3.0), SPACED[5.0])
                      + 0.1 * rng.normal(size=(3, SAMPLES, 200)))  # fmt: skip
     found = lines_of(record, SPACED[5.0])
-    assert 0.91 < (np.abs(found.mean - 3.0) < radius(found, 0.95)).mean() < 0.98
-
-
-def test_coherence_of_noise_is_its_bias_and_of_lines_is_one():
-    rng = np.random.default_rng(12)
-    silent = coherence(measured(rng, 5, 1.0, phasors=0 * MODEL), LINES)
-    assert silent.segments > silent.repetitions == 5
-    many = [coherence(measured(rng, 5, 1.0, phasors=0 * MODEL), LINES) for _ in range(16)]
-    for values, k in (
-        ([c.over_time for c in many], silent.segments),
-        ([c.over_repetitions for c in many], 5),
-    ):
-        values = np.concatenate(values)
-        assert np.mean(values) == pytest.approx(1 / k, rel=0.2)
-        assert 0.9 < np.mean(values < floor(k)) < 0.99
-        assert np.mean(unbiased(values, k)) < np.mean(values)
-    clear = coherence(measured(rng, 5, 1e-6), LINES)
-    assert clear.over_time.min() > 1 - 1e-6
-    assert clear.over_repetitions.min() > 1 - 1e-6
-    assert np.isnan(floor(1))
-
-
-def test_patterns_over_places_agree_up_to_gain_and_phase():
-    assert over_places(MODEL * 2j, MODEL) == pytest.approx(np.ones(6))
-    assert over_places(np.array([[1.0, 1.0]]), np.array([[1.0, -1.0]])) == pytest.approx([0])
-    assert np.isnan(over_places(MODEL[:, :1], MODEL[:, :1])).all()
+    assert 0.91 < (np.abs(found.mean - 3.0) < found.radius(0.95)).mean() < 0.98
 
 
 def spectra(repetitions, sigma, frequencies, amplitudes):
@@ -352,7 +312,7 @@ def test_spectra_have_lines_in_their_bins_and_noise_beside_them():
 def test_single_lines_once_have_no_known_noise():
     found = lines_of(spectra(1, 0.0, LINES, MODEL), LINES)
     assert np.isnan(found.variance).all()
-    assert np.isnan(significances(found.mean, found)).all()
+    assert np.isnan(found.significances(found.mean)).all()
     a = align(found, MODEL)
     assert (a.delay, a.gain) == (pytest.approx(0, abs=1e-12), pytest.approx(1))
 

@@ -7,7 +7,7 @@ import pytest
 
 from simple_model import MovingPressure, Tacton
 from simple_model.quantities import PRESSURE, quantity
-from skinwave.measure import measured_runs
+from skinwave.measure.comparison import measured_places
 from skinwave.measure.lines import MeasuredLines
 from skinwave.report.surfaces import MeasuredPlaces, surfaces_figure
 from skinwave.results.surface import SurfaceField
@@ -31,7 +31,7 @@ def test_lines_of_a_velocity_are_read_as_displacement():
         scene, measurement = SCENE, type("M", (), {"record": quantity("velocity")})
 
     Comparison.lines = lines
-    found = measured_runs.measured_places(Comparison)
+    found = measured_places(Comparison)
     assert found.rms == pytest.approx(1e-6 * np.sqrt([6.5, 0, 0.5]))
     np.testing.assert_array_equal(found.places, SCENE.probe_points)
 

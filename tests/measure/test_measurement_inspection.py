@@ -9,11 +9,9 @@ import pytest
 
 from skinwave.commands.cli import main
 from skinwave.measure import Measurement
-from skinwave.measure.clipping import clipped
-from skinwave.measure.inspection import inspect
-from skinwave.measure.mains import hum_of
+from skinwave.measure.inspection import clipped, hum_of, inspect
+from skinwave.measure.inspection_page import text
 from skinwave.measure.spectral_lines import SpectralLine, spectral_lines
-from skinwave.measure.summary import text
 from skinwave.measure.writing import write
 
 RATE = 2000.0
@@ -231,10 +229,10 @@ def test_short_and_extreme_measurements_are_inspected(count, scale):
 def test_the_command_prints_and_writes(tmp_path, capsys):
     path, out = tmp_path / "scan.npz", tmp_path / "out"
     write(scan(), path)
-    assert main(["measured", str(path)]) == 0
+    assert main(["fit", "--inspect", str(path)]) == 0
     said = capsys.readouterr().out
     assert "Velocity at 4 places, 2 repetitions: 2,000 samples at 2,000 Hz, 1.00 s" in said
-    assert main(["measured", str(path), "--out", str(out), "--json"]) == 0
+    assert main(["fit", "--inspect", str(path), "--out", str(out), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert [line["what"] for line in told["lines"] if abs(line["frequency_hz"] - 140) < 1] == [
         "drive"
@@ -247,4 +245,4 @@ def test_the_command_prints_and_writes(tmp_path, capsys):
         rows = list(csv.DictReader(file))
     assert float(rows[0]["frequency_hz"]) == pytest.approx(49.97, abs=0.05)
     assert "Nothing varies at 1 of the places" in (out / "index.html").read_text()
-    assert main(["measured", str(out / "measurement.csv"), "--quiet"]) == 0
+    assert main(["fit", "--inspect", str(out / "measurement.csv"), "--quiet"]) == 0

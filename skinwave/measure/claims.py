@@ -5,14 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from meshes.tetmesh import Floats
+from simple_model.numbers import decibel
 from simple_model.quantities import DISPLACEMENT
+from simple_model.typing import Floats
 from skinwave.measure.lines import MeasuredLines
-from skinwave.measure.significance import radius
 from skinwave.results.claims import CLAIMS, NEEDED, PAIRS, is_resolved, is_single
 from skinwave.results.named_lines import NamedLines
 from skinwave.scene.scene import Scene
-from skinwave.system.numbers import decibel
 
 HOLDS, FAILS, UNDECIDED = "holds", "fails", "cannot be decided"
 CONFIDENCE = 0.95  # that all true amplitudes are within their bounds
@@ -85,7 +84,7 @@ def by_name(
     LinesByName
     """
     size = np.abs(lines.mean)
-    around = radius(lines, 1 - (1 - CONFIDENCE) / max(size.size, 1))
+    around = lines.radius(1 - (1 - CONFIDENCE) / max(size.size, 1))
     every = [(name, k) for k, own in enumerate(names.values()) for name in own]
     return LinesByName(
         tacton=scene.name, scene=scene, places=scene.probe_points,

@@ -1,0 +1,413 @@
+"""Models beside a measurement: lines, delay, gain, and differences that exceed the noise."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from simple_model import Response, resolved_lines, spectrum
+from simple_model.load.sampling import step
+from simple_model.quantities import DISPLACEMENT, QUANTITIES
+from simple_model.response import SETTLE, fit_lines
+from simple_model.typing import Floats
+from skinwave.measure.alignment import AS_GOOD, Alignment, align
+from skinwave.measure.claims import MeasuredClaim, assess_measured, by_name
+from skinwave.measure.lines import (
+    MeasuredLines,
+    as_response,
+    bin_width,
+    evenly,
+    holm,
+    lines_of,
+    measurable,
+)
+from skinwave.measure.measurement import Measurement
+from skinwave.models.options import sample_times
+from skinwave.models.prepared import Prepared, answer
+from skinwave.planning.simulate import compute
+from skinwave.report.surfaces import MeasuredPlaces
+from skinwave.results.comparison import heard_phasors
+from skinwave.results.run import ASSESSED, Run, own_names
+from skinwave.scene.scene import Scene, check_motion
+
+WITHIN = 0.75  # of a record, or of the Tacton, that is to lie within the other
+LEVEL = 0.05  # chance that any difference at all is declared where there is none
+AGREES, DIFFERS, NUMERICAL, SILENT, UNKNOWN = (
+    "within the noise", "beyond the noise", "beyond the noise, within the numerical error",
+    "no line above the noise", "noise unknown",
+)  # fmt: skip
+MEASURED = "measured"  # body and model of what is drawn beside the models
+MOST_DRAWN = 8  # places
+MOST_SEGMENTS = 8  # of a record
+RESOLVED = 2.5  # bins, which lines of a segment are apart at least
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Measured:
+    """A measurement to compare with, and its delay in s and its gain if they are known; the gain is
+    that of bodies, since kernels are of another unit.
+    """
+
+    measurement: Measurement
+    delay: float | None = None
+    gain: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ModelColumn:
+    """A model beside a measurement.
+
+    Parameters
+    ----------
+    run : Run, in the measurement's quantity or, of a kernel, in Pa
+    alignment : Alignment
+    model : (f, p) complex, its lines with gain and delay, in the unit of the measurement
+    significance : (f, p) float, of differences, adjusted for their number (Holm); nan if unknown
+    misfit : float, RMS difference of the lines over all places over that of the measured lines
+    may_be_turned : bool, whether the measurement with its sign turned fits as well
+    """
+
+    run: Run
+    alignment: Alignment
+    model: np.ndarray
+    significance: Floats
+    misfit: float
+    may_be_turned: bool = False
+
+    @property
+    def differs(self) -> np.ndarray:
+        """Mask (f, p) of differences beyond the noise."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(self.significance < LEVEL)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MeasuredComparison:
+    """A measurement beside models.
+
+    Parameters
+    ----------
+    measurement : Measurement
+    scene : Scene, at the places and in the quantity of the measurement
+    names : names of each line by the first of them, in the order of the lines
+    lines : MeasuredLines, of these
+    present : (f, p) float, significance of each line, adjusted for their number; nan if unknown
+    unresolved : names of lines of the load that the record cannot resolve
+    extremes : (2, f, p) float, least and largest amplitude of each line in a segment of the record,
+        mean over repetitions: the same if the motion is steady
+    segments : their number
+    columns : of the models
+    claims : what the measurement alone says of the paper's claims
+    """
+
+    measurement: Measurement
+    scene: Scene
+    names: Mapping[str, tuple[str, ...]]
+    lines: MeasuredLines
+    present: Floats
+    unresolved: tuple[str, ...]
+    extremes: Floats
+    segments: int
+    columns: tuple[ModelColumn, ...]
+    claims: tuple[MeasuredClaim, ...]
+
+    @property
+    def noise(self) -> float:
+        """Misfit that noise alone would leave; nan if it is unknown. Lines of unknown noise count
+        as the others do.
+        """
+        known = self.lines.variance[np.isfinite(self.lines.variance)]
+        whole = float((np.abs(self.lines.mean) ** 2).sum())
+        return float(np.sqrt(known.mean() * self.lines.variance.size / whole)) if len(known) else (
+            np.nan)  # fmt: skip
+
+    @property
+    def bodies(self) -> list[ModelColumn]:
+        """The columns of waves: of the bodies, or of the last kernel if there is none."""
+        bodies = [c for c in self.columns if c.run.response.record.of_body]
+        return bodies or list(self.columns[-1:])
+
+    @property
+    def main(self) -> ModelColumn:
+        """The last column of waves."""
+        return self.bodies[-1]
+
+    def is_numerical(self, column: ModelColumn) -> np.ndarray:
+        """Mask (f, p) of differences no larger than the numerical error that a model's waveform is
+        expected to have at that place.
+        """
+        away = np.abs(self.lines.mean - column.model)
+        error = np.nan_to_num(column.run.response.expected_error)
+        return np.asarray(away <= error * np.linalg.norm(column.model, axis=0))
+
+    def findings(self, column: ModelColumn) -> np.ndarray:
+        """Finding (f, p) of each difference: one of `AGREES` to `UNKNOWN`."""
+        with np.errstate(invalid="ignore"):
+            silent = self.present >= LEVEL
+        found = np.where(silent, SILENT, AGREES).astype(object)
+        found[column.differs] = DIFFERS
+        found[column.differs & self.is_numerical(column)] = NUMERICAL
+        found[np.isnan(column.significance)] = UNKNOWN
+        return found
+
+    @property
+    def drawn_places(self) -> np.ndarray:
+        """Indices of the places that figures show: all, or some, the strongest and the weakest."""
+        size = np.linalg.norm(self.lines.mean, axis=0)
+        if len(size) <= MOST_DRAWN:
+            return np.arange(len(size))
+        order = np.argsort(-size, kind="stable")
+        return np.sort(order[np.linspace(0, len(size) - 1, MOST_DRAWN).round().astype(int)])
+
+
+def compare_measured(asked: Measured, runs: Sequence[Run]) -> MeasuredComparison:
+    """Models beside a measurement, line by line.
+
+    Parameters
+    ----------
+    asked : Measured
+    runs : of one Tacton, at the places of the measurement and, of bodies, in its quantity
+
+    Returns
+    -------
+    MeasuredComparison
+
+    Raises
+    ------
+    ValueError
+        If the record resolves no line of the load.
+    """
+    measurement = asked.measurement
+    bodies = [run for run in runs if run.response.record.of_body]
+    scene = (bodies or list(runs))[-1].scene  # of a body, whose load is the scene's own
+    names, frequencies, unresolved = lines_to_compare(measurement, scene)
+    lines = lines_of(measurement, frequencies)
+    named = by_name(scene, names, lines, unresolved, _spectrum_of(measurement))
+    segments = _segments(measurement, lines)
+    return MeasuredComparison(
+        measurement=measurement, scene=scene, names=names, lines=lines,
+        present=holm(lines.significances(lines.mean)), unresolved=unresolved,
+        extremes=np.array([segments.min(axis=0), segments.max(axis=0)]), segments=len(segments),
+        columns=tuple(_column(asked, run, lines) for run in runs),
+        claims=tuple(assess_measured(named)),
+    )  # fmt: skip
+
+
+def lines_to_compare(
+    measurement: Measurement, scene: Scene
+) -> tuple[dict[str, tuple[str, ...]], Floats, tuple[str, ...]]:
+    """Lines of the load that both the record and a response of the scene resolve, and the others.
+
+    Returns
+    -------
+    names by the first of each, frequencies (f,) in Hz, and the names of those left out
+
+    Raises
+    ------
+    ValueError
+        If the record resolves none.
+    """
+    candidates = ASSESSED if len(scene.tacton.foci) == 1 else ()
+    clocks = [*_clock(measurement), _silence(sample_times(scene))]
+    highest = min(0.5 / step(clock.times) for clock in clocks)
+    found: dict[str, float] = {}
+    lost: dict[str, float] = {}
+    for clock in clocks:
+        good, bad = resolved_lines(scene.pressure, clock, candidates=candidates, highest=highest)
+        found, lost = (found | good), (lost | bad)
+    reached = dict(zip(found, measurable(measurement, np.array([*found.values()])), strict=True))
+    lost |= {name: f for name, f in sorted(found.items(), key=lambda x: x[1]) if not reached[name]}
+    kept = {n: f for n, f in sorted(found.items(), key=lambda x: x[1]) if n not in lost}
+    if not kept:
+        raise ValueError(
+            "the measurement resolves no line of the scene's load; give a longer record, a higher "
+            "sampling rate, or the scene that was measured"
+        )
+    own = own_names(scene, kept)
+    names = {name: (name, *(n for n, o in own.items() if o == name != n)) for name in kept}
+    return names, np.array([*kept.values()]), tuple(lost)
+
+
+def _clock(measurement: Measurement) -> list[Response]:
+    """Silence at the times of a measurement, by which lines are resolved; of a spectrum with equal
+    bins at times whose transform has them.
+    """
+    if not measurement.is_spectrum:
+        return [_silence(evenly(measurement))]
+    width, rate = bin_width(measurement), 2.1 * measurement.frequencies[-1]
+    return [_silence(np.arange(int(rate / width)) / rate / (1 - SETTLE))] if width else []
+
+
+def _silence(times: Floats) -> Response:
+    return Response(
+        model=MEASURED, times=times, probes=np.zeros((1, 2)), values=np.zeros((len(times), 1))
+    )
+
+
+def _spectrum_of(measurement: Measurement) -> tuple[Floats, Floats]:
+    """Amplitude spectrum of the mean, for peaks; empty of spectra of single lines."""
+    if not measurement.is_spectrum:
+        return spectrum(as_response(measurement))
+    if not bin_width(measurement):
+        return np.empty(0), np.empty((0, len(measurement.places)))
+    return measurement.frequencies, np.abs(measurement.mean)
+
+
+def _column(asked: Measured, run: Run, lines: MeasuredLines) -> ModelColumn:
+    z = heard_phasors(run.response, tuple(lines.frequencies.tolist()))
+    gain = asked.gain if run.response.record.of_body else None
+    window, centre = _delay_window(asked.measurement, run, lines)
+    aligned = partial(align, window=window, centre=centre, delay=asked.delay, gain=gain)
+    found = aligned(lines, z)
+    model = found.applied(lines.frequencies, z)
+    away = lines.mean - model
+    turned = aligned(replace(lines, each=-lines.each), z)
+    fits = 2 * lines.variance.size * (turned.chi_square - found.chi_square) < AS_GOOD
+    nearer = abs(turned.delay) < abs(found.delay) or turned.chi_square < found.chi_square
+    return ModelColumn(
+        run=run, alignment=found, model=model, significance=holm(lines.significances(away)),
+        misfit=float(np.linalg.norm(away) / np.linalg.norm(lines.mean)),
+        may_be_turned=bool(fits and nearer),
+    )  # fmt: skip
+
+
+def _delay_window(measurement: Measurement, run: Run, lines: MeasuredLines) -> tuple[float, float]:
+    """Width and centre in s of the delays at which most of a record lies within the Tacton, or most
+    of the Tacton within the record; at least a period of the lowest line wide.
+    """
+    begin, end = (float(t) for t in run.response.times[[0, -1]])
+    period = 1 / float(lines.frequencies.min())
+    if measurement.is_spectrum:
+        return 2 * max(end - begin, period), 0.0
+    first, last = (float(t) for t in measurement.times[[0, -1]])
+    within = WITHIN * min(last - first, end - begin)
+    low, high = first + within - end, last - within - begin
+    return max(high - low, period), (low + high) / 2
+
+
+def overlap(measurement: Measurement, run: Run, delay: float) -> float:
+    """Time in s of a record that lies within the Tacton, at a delay of the record."""
+    begin, end = (float(t) + delay for t in run.response.times[[0, -1]])
+    return min(float(measurement.times[-1]), end) - max(float(measurement.times[0]), begin)
+
+
+def _segments(measurement: Measurement, lines: MeasuredLines) -> Floats:
+    """Amplitudes (k, f, p), mean over repetitions, in as many segments of a record as resolve the
+    lines; of spectra the one that there is.
+    """
+    if measurement.is_spectrum:
+        return np.abs(lines.mean)[None]
+    r, t, p = measurement.values.shape
+    first = int(np.ceil(SETTLE * t))
+    apart = np.diff(np.concatenate([[0.0], np.sort(lines.frequencies)])).min()
+    count = int(np.clip((t - first) / measurement.rate * apart / RESOLVED, 1, MOST_SEGMENTS))
+    length = (t - first) // count
+    whole = as_response(measurement, measurement.values.transpose(1, 0, 2).reshape(t, r * p))
+    turned = np.exp(2j * np.pi * np.multiply.outer(lines.frequencies, lines.shifts))
+    found = []
+    for k in range(count):
+        cut = slice(first + k * length, first + (k + 1) * length)
+        part = replace(whole, times=whole.times[cut], values=whole.values[cut])
+        z = fit_lines(part, lines.frequencies, settle=0.0)[0].reshape(-1, r, p)
+        found.append(np.abs((z * turned[:, :, None]).mean(axis=1)))
+    return np.array(found)
+
+
+def at_measured(scene: Scene, measurement: Measurement) -> Scene:
+    """The scene with probes where was measured or, where that is unknown, with as many; they read
+    displacement, as every comparison, and are read in the measured quantity beside it.
+
+    Raises
+    ------
+    ValueError
+        If the quantity is not of normal motion, places are unknown and not as many as probes, or
+        the record resolves no line of the load.
+    """
+    if not measurement.record.is_normal:
+        known = ", ".join(name for name, q in QUANTITIES.items() if q.is_normal and q.of_body)
+        raise ValueError(
+            f"a measured {measurement.record.words} cannot be compared; give one of {known}"
+        )
+    if scene.reading.is_on_surface and scene.reading.asked.is_normal:
+        scene = replace(scene, quantity=DISPLACEMENT.name)
+    check_motion(scene, "a comparison with a measurement")
+    if np.isfinite(measurement.places).all():
+        scene = replace(scene, probes=tuple(map(tuple, measurement.places.tolist())))
+    elif len(scene.probes) != len(measurement.places):
+        raise ValueError(
+            f"the places of the measurement's {len(measurement.places)} signals are unknown, and "
+            f"the scene has {len(scene.probes)} probes; give as many, in the same order"
+        )
+    lines_to_compare(measurement, scene)
+    return scene
+
+
+def in_quantity(run: Run, quantity: str, prepared: Mapping[str, Prepared]) -> Run:
+    """A body's run read in another quantity of normal motion; a kernel's as it is."""
+    if not run.response.record.of_body or run.response.quantity == quantity:
+        return run
+    scene = replace(run.scene, quantity=quantity)
+    if run.column in prepared:
+        found = answer(replace(prepared[run.column], reading=scene.reading), scene)
+    else:
+        found = compute(scene, run.model)
+    found = replace(found, expected_error=run.response.expected_error)
+    return replace(run, scene=scene, response=found)
+
+
+def measured_places(comparison: MeasuredComparison) -> MeasuredPlaces:
+    """Places of a measurement with the RMS of its lines, read as displacement, to mark on a map."""
+    lines, record = comparison.lines, comparison.measurement.record
+    factor = record.factor(2j * np.pi * lines.frequencies)[:, None]
+    rms = np.sqrt((np.abs(lines.mean / factor) ** 2).sum(axis=0) / 2)
+    return MeasuredPlaces(places=comparison.scene.probe_points, rms=rms)
+
+
+def beside(comparison: MeasuredComparison, group: Sequence[Run]) -> list[Run]:
+    """Runs to draw: models in the measured quantity, and the measurement on their clock."""
+    chosen = comparison.drawn_places
+    return [_at_places(run, chosen) for run in (*group, _measured_run(comparison))]
+
+
+def _measured_run(comparison: MeasuredComparison) -> Run:
+    """The mean over the repetitions as a run to draw, on the clock of a model's response; of
+    spectra the sum of the lines, since their waveform is not there.
+    """
+    measurement, like = comparison.measurement, comparison.main.run
+    delay = comparison.main.alignment.delay
+    if measurement.is_spectrum:
+        times = like.response.times
+        turned = np.exp(2j * np.pi * np.multiply.outer(times + delay, comparison.lines.frequencies))
+        values = (turned @ comparison.lines.mean).real
+    else:
+        times, values = evenly(measurement) - delay, _mean_in_step(comparison)
+    response = Response(
+        model=MEASURED, times=times, probes=comparison.scene.probe_points, values=values,
+        quantity=measurement.quantity,
+    )  # fmt: skip
+    return Run(tacton=like.tacton, body=MEASURED, scene=comparison.scene, response=response)
+
+
+def _mean_in_step(comparison: MeasuredComparison) -> Floats:
+    """Mean (t, p) of repetitions, each shifted as its lines were."""
+    measurement, shifts = comparison.measurement, comparison.lines.shifts
+    if not shifts.any():
+        return measurement.mean
+    from scipy.interpolate import CubicSpline  # which takes long to import
+
+    times = evenly(measurement)
+    shifted = [
+        CubicSpline(times, values)(np.clip(times + shift, times[0], times[-1]))
+        for values, shift in zip(measurement.values, shifts, strict=True)
+    ]
+    return np.asarray(np.mean(shifted, axis=0))
+
+
+def _at_places(run: Run, chosen: np.ndarray) -> Run:
+    """A run at some of its probes."""
+    response = run.response
+    scene = replace(run.scene, probes=tuple(run.scene.probes[k] for k in chosen), depth=0.0)
+    return replace(run, scene=scene, response=replace(
+        response, probes=response.probes[chosen], values=response.values[:, chosen]
+    ))  # fmt: skip
