@@ -12,7 +12,6 @@ from simple_model.numbers import counted, percent, significant, stated_error, wi
 from skinwave.measure.alignment import opposite_sign
 from skinwave.measure.claims import FAILS, HOLDS
 from skinwave.measure.comparison import LEVEL, UNKNOWN, MeasuredComparison, ModelColumn, overlap
-from skinwave.report.figures import measured
 from skinwave.report.measured import MOST_LINES, lines_figure
 from skinwave.report.palette import label
 from skinwave.results.claims import TEXTS
@@ -232,8 +231,8 @@ def _where(found: MeasuredComparison, column: ModelColumn) -> str:
         off = f", {turn:+.0f} degrees off" if abs(b) > 0.1 * abs(a) and abs(turn) >= 1 else ""
         said.append(
             f"{names[k]} at {shown[k].sum()} of {away.shape[1]} places (most at "
-            f"{x:.3g}, {y:.3g} mm: measured {measured(abs(a), asked)}, model "
-            f"{measured(abs(b), asked)}{off})"
+            f"{x:.3g}, {y:.3g} mm: measured {asked.text(float(abs(a)))}, model "
+            f"{asked.text(float(abs(b)))}{off})"
         )
     more = len(lines) - len(said)
     return ", ".join(said) + (f" and {counted(more, 'more line')}" if more else "")
@@ -300,6 +299,6 @@ def _changes(found: MeasuredComparison) -> list[str]:
         return []
     asked, name = found.measurement.record, list(found.names)[k]
     return [
-        f"The motion is not steady: over the record {name} changes from {measured(low, asked)} to "
-        f"{measured(high, asked)} at one place; cut off what lies before and after the Tacton."
+        f"The motion is not steady: over the record {name} changes from {asked.text(low)} to "
+        f"{asked.text(high)} at one place; cut off what lies before and after the Tacton."
     ]
