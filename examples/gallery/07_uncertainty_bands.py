@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from skinwave import loads
-from skinwave.sweeps.propagate import propagate
+from skinwave.sweeps.ensemble import propagate
 
 scene = loads("""
 [tacton]

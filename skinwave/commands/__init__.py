@@ -11,7 +11,6 @@ from skinwave.commands import (
     live,
     mesh,
     plan,
-    plot,
     relax,
     report,
     run,
@@ -21,7 +20,7 @@ from skinwave.commands import (
 )
 
 MODULES = (
-    run, compare, relax, dispersion, plan, sweep, plot, mesh, convert, verify, report,
+    run, compare, relax, dispersion, plan, sweep, mesh, convert, verify, report,
     live, web, fit,
 )  # fmt: skip
 COMMANDS = {module.__name__.rpartition(".")[2]: module for module in MODULES}

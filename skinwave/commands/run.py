@@ -20,6 +20,7 @@ from skinwave.commands.common import (
 
 if TYPE_CHECKING:
     from skinwave.results.run import Run
+    from skinwave.system.document import Part
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -79,18 +80,17 @@ def run(options: argparse.Namespace) -> int:
 
 def _uncertainty(
     options: argparse.Namespace, run: "Run", h: float | None, folder: Path
-) -> list[str]:
+) -> "list[Part]":
     """Bands over samples of the uncertain numbers: their tables in the folder, parts of a page."""
-    from skinwave.sweeps.ensemble_page import uncertainty_of, write
+    from skinwave.sweeps.uncertainty_page import write_ensemble
     from skinwave.system.effort import usable_cores
 
     with progress_of(options) as progress:
-        known = uncertainty_of(
-            run.scene, options.samples, run.model, progress,
+        return write_ensemble(
+            folder, run.scene, options.samples, run.model, progress,
             h=h or metre(options.h), solver=options.solver, seed=options.seed,
             workers=usable_cores(),
         )  # fmt: skip
-    return write(folder, known)
 
 
 def _mapped(scheduler: str | None) -> AbstractContextManager[Any]:

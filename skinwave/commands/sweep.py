@@ -1,4 +1,4 @@
-"""Many scenes in one table, on all cores or a cluster; goes on where it ended."""
+"""Many scenes in one table, on all cores or a cluster, and its figures; resumes."""
 
 import argparse
 import sys
@@ -8,13 +8,13 @@ from contextlib import contextmanager
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from skinwave.commands.common import (
     TOLERANCE,
     add_mesh,
     add_reporting,
-    add_scene,
+    add_width,
     metre,
     progress_of,
     summarise,
@@ -23,16 +23,22 @@ from skinwave.models import names
 from skinwave.system.plain_text import say
 
 if TYPE_CHECKING:
+    from skinwave.sweeps.best import Best
+    from skinwave.sweeps.sweep import SweepOutcome
     from skinwave.system.effort import Progress
 
 SAID_EACH = 5.0  # s between two lines of progress on a pipe
+FORMATS = ("png", "svg", "pdf")
 
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
-    add_scene(parser)
     parser.add_argument(
-        "--vary", action="extend", nargs="+", metavar="KEY=VALUES", required=True,
+        "scene", type=Path, metavar="FILE", help="scene (TOML); or the folder of a sweep, for "
+        "--plot and --csv",
+    )  # fmt: skip
+    parser.add_argument(
+        "--vary", action="extend", nargs="+", metavar="KEY=VALUES", default=[],
         help="tacton.speed_m_per_s=1:12:12, body.thickness_mm=10,15, body=skin-slab,palm; "
         "start:stop or normal(25e3,0.3), lognormal, factor, uniform, triangular of lhs and sobol",
     )  # fmt: skip
@@ -59,91 +65,153 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--tolerance", type=float, default=0.05, help=TOLERANCE)
     add_mesh(parser)
     parser.add_argument("--csv", action="store_true", help="write rows.csv, too")
+    _figure_options(parser)
     parser.add_argument("--quiet", action="store_true", help="no progress, no summary")
     add_reporting(parser)
 
 
+def _figure_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--plot", nargs="*", metavar="COLUMN",
+        help="draw columns of the table, such as peak_um (default), level_db, f_AM_um[2] at one "
+        "probe, into its folder figures",
+    )  # fmt: skip
+    parser.add_argument("--x", metavar="KEY", help="along the axis (default: most values)")
+    parser.add_argument("--by", metavar="KEY", help="a curve for each value (default: the next)")
+    parser.add_argument("--heat", action="store_true", help="a map over --x and --by instead")
+    parser.add_argument("--format", choices=FORMATS, default="png")
+    parser.add_argument("--style", default="report", help="report, talk or print")
+    add_width(parser)
+
+
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from importlib.metadata import version
-
-    from skinwave.results import record
     from skinwave.sweeps import dataset, engine
 
     engine.check(options.scheduler)
+    summary: dict[str, Any] = {}
+    said: list[str] = []
+    out, missing = options.scene, 0
+    if options.scene.is_dir():
+        if options.vary or not (options.csv or options.plot is not None):
+            raise ValueError(
+                f"{out} is a folder; give --plot or --csv without --vary, or a scene with --vary"
+            )
+        dataset.check_folder(out)
+    else:
+        out = options.out or Path(f"{options.scene.stem}-sweep")
+        found, best, files = _swept(options, out)
+        summary, missing = _summary(out, found, best, files), found.missing
+        said = [best.words] if best else []
+        said.append(
+            f"{found.done} of {found.planned} runs done in {found.seconds:.0f} s, {found.failed} "
+            f"failed, {found.found} were there; {out}/{dataset.ROWS} is the table"
+            + (f", {out}/{files[-1]} its percentiles" if files else "")
+        )
+        if found.planned == missing:
+            options.csv, options.plot = False, None
+    if options.csv:
+        dataset.write_beside(out, {dataset.CSV: dataset.csv_of(dataset.read(out))})
+    if options.plot is not None:
+        summary["figures"] = _drawn(options, out)
+        said += [f"wrote {path}" for path in summary["figures"]]
+    summarise(options, summary, "\n".join(said))
+    return 1 if missing else 0
+
+
+def _swept(options: argparse.Namespace, out: Path) -> "tuple[SweepOutcome, Best | None, list[str]]":
+    """Run what is missing; the outcome, the best value, and the names of tables of percentiles."""
+    from skinwave.results import record
     from skinwave.scene.variation import SAMPLED, cases, combinations, parse
-    from skinwave.sweeps import of_sweep
-    from skinwave.sweeps.best import Request, best_value, check
-    from skinwave.sweeps.sweep import ModelOptions, sweep
+    from skinwave.sweeps import best, dataset, uncertainty_page
+    from skinwave.sweeps.sweep import ModelOptions, in_order, sweep
 
     if options.seed < 0:
         raise ValueError(f"--seed = {options.seed} is below 0; give 0 or a whole number above")
+    if options.best and options.design in SAMPLED:
+        raise ValueError(
+            f"--best takes a grid of values, not --design {options.design}; leave it out"
+        )
     variations = [parse(text) for text in options.vary]
-    design = options.design
-    if options.best and design in SAMPLED:
-        raise ValueError(f"--best takes a grid of values, not --design {design}; leave it out")
     samples = None if options.best else options.samples
-    combined = combinations(variations, design, samples, options.seed)
+    combined = combinations(variations, options.design, samples, options.seed)
     wanted = cases(options.scene, combined)
     if options.best:
-        check(variations, options.best, wanted, options.samples)
-    is_sampled = design in SAMPLED and not any(each.values for each in variations)
-    model_options = ModelOptions(
+        best.check(variations, options.best, wanted, options.samples)
+    is_sampled = options.design in SAMPLED and not any(each.values for each in variations)
+    tables = uncertainty_page.SAMPLED_FILES if is_sampled else ()
+    dataset.refuse_changed(out, [*tables, *[dataset.CSV] * options.csv])  # before all is computed
+    how = ModelOptions(
         model=options.model, tolerance=options.tolerance, h=metre(options.h), solver=options.solver
     )
-    out = options.out or Path(f"{options.scene.stem}-sweep")
-    if options.csv:
-        dataset.refuse_changed(out, dataset.CSV)  # now, not when all is computed
-    if is_sampled:
-        of_sweep.refuse_changed(out)
+    where = {"scheduler": options.scheduler, "workers": options.workers,
+             "command": record.of_command(options)}  # fmt: skip
+    optimum, files = None, list[str]()
     with _progress(options, len(wanted)) as progress:
-        found = sweep(
-            wanted, out, model_options, progress, scheduler=options.scheduler,
-            workers=options.workers, command=record.of_command(options),
-        )  # fmt: skip
-        best = None
+        found = sweep(wanted, out, how, progress, **where)
         if options.best and not found.missing:
-            request = Request(
-                cases=partial(cases, options.scene), variation=variations[0], column=options.best,
-                folder=out, model_options=model_options, samples=options.samples,
-                seed=options.seed, scheduler=options.scheduler, workers=options.workers,
-                command=record.of_command(options),
+            runner = best.Runner(folder=out, model_options=how, progress=progress, **where)
+            optimum = best.best_value(
+                runner, partial(cases, options.scene), variations[0], options.best,
+                options.samples, options.seed,
             )  # fmt: skip
-            best = best_value(request, progress)
-    if options.csv and found.planned > found.missing:
-        dataset.write_csv(out, dataset.read(out))
-    sampled: list[str] = []
-    if is_sampled and found.done + found.found and not found.missing:
-        names = {case.name(version("skinwave"), model_options): case for case in wanted}
-        has_indices = design == "sobol"
-        rows = of_sweep.in_order(dataset.read(out), names, combined)
-        sampled = of_sweep.write(
-            out, of_sweep.Sampled(rows=rows, variations=variations, has_indices=has_indices)
+    if is_sampled and not found.missing:
+        rows = in_order(dataset.read(out), wanted, how, combined)
+        sampled = uncertainty_page.Sampled(
+            rows=rows, variations=variations, has_indices=options.design == "sobol"
         )
-    summary = {
-        "out": str(out),
-        "planned": found.planned,
-        "there_before": found.found,
-        "done": found.done,
-        "failed": found.failed,
-        "missing": found.missing,
-        "seconds": round(found.seconds, 1),
-        "files": sampled,
-    }
-    if best:
-        summary["best"] = asdict(best) | {"is_at_end": best.is_at_end}
-    sentence = (
-        f"{found.done} of {found.planned} runs done in {found.seconds:.0f} s, {found.failed} "
-        f"failed, {found.found} were there; {out}/{dataset.ROWS} is the table"
-    ) + (f", {out}/{of_sweep.PAGE} its percentiles" if sampled else "")
-    if best:
-        sentence = f"{best.words}\n{sentence}"
-    summarise(options, summary, sentence)
+        files = uncertainty_page.write_sampled(out, sampled)
     if found.missing:
         why = "interrupted" if found.interrupted else "workers were killed"
         say(f"skinwave: {why}; {found.missing} runs are missing, the same command goes on with "
             "them", sys.stderr)  # fmt: skip
-    return 1 if found.missing else 0
+    return found, optimum, files
+
+
+def _summary(
+    out: Path, found: "SweepOutcome", best: "Best | None", files: list[str]
+) -> dict[str, Any]:
+    summary = {
+        "out": str(out), "planned": found.planned, "there_before": found.found,
+        "done": found.done, "failed": found.failed, "missing": found.missing,
+        "seconds": round(found.seconds, 1), "files": files,
+    }  # fmt: skip
+    if best:
+        summary["best"] = asdict(best) | {"is_at_end": best.is_at_end}
+    return summary
+
+
+def _drawn(options: argparse.Namespace, out: Path) -> list[str]:
+    """Draw columns of a sweep's table; the paths of the figures."""
+    from skinwave.report.figures import drawn
+    from skinwave.report.styles import style
+    from skinwave.results.files import distinct_names
+    from skinwave.sweeps import dataset
+    from skinwave.sweeps.table_figures import finished, heat_figure, line_figure, varied
+
+    chosen = style(options.style, options.width)
+    rows = finished(dataset.read(out))
+    keys = varied(rows)
+    x = options.x or next(iter(keys), None)
+    if x is None:
+        raise ValueError(f"{out} varies no key; name a column with --x")
+    by = options.by or next((key for key in keys if key != x), None)
+    figures = {}
+    for column in options.plot or ["peak_um"]:
+        name = f"{column} over {x}" + (f" and {by}" if by else "")
+        if not options.heat:
+            figures[name] = line_figure(rows, column, x, by, chosen)
+        elif by:
+            figures[f"{name} map"] = heat_figure(rows, column, x, by, chosen)
+        else:
+            raise ValueError("a map needs two varied keys; leave out --heat or give --by")
+    stems = distinct_names(name.replace(" ", "-") for name in figures)
+    files = {
+        f"figures/{stem}.{options.format}": drawn(figure, options.format, chosen.dpi)
+        for stem, figure in zip(stems, figures.values(), strict=True)
+    }
+    dataset.write_beside(out, files)
+    return [str(out / name) for name in files]
 
 
 @contextmanager

@@ -8,7 +8,7 @@ of them, and is wider by a tenth of a step of the grid at each end, to which the
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib.metadata import version
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,15 +19,14 @@ from simple_model.choices import choose
 from skinwave.models.advice import takes
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
 from skinwave.scene.scene import Scene
-from skinwave.scene.spreads import PRESSURE, spreads_of
+from skinwave.scene.spreads import PRESSURE, Spread, spreads_of
 from skinwave.scene.variation import DesignPoint, Variation
 from skinwave.sweeps import dataset
+from skinwave.sweeps.ensemble import is_linear
 from skinwave.sweeps.measures import columns
-from skinwave.sweeps.of_sweep import in_order
 from skinwave.sweeps.sampling import samples as samples_of
-from skinwave.sweeps.solutions import is_linear
-from skinwave.sweeps.sweep import ModelOptions, model_of, sweep
-from skinwave.sweeps.sweep_figures import at_probe, value
+from skinwave.sweeps.sweep import ModelOptions, in_order, model_of, sweep
+from skinwave.sweeps.table_figures import at_probe, value
 from skinwave.system.effort import Progress
 from skinwave.system.numbers import significant
 
@@ -82,22 +81,31 @@ class Best:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Request:
-    """What a best value is asked of: the `cases` of combinations of values, the `variation`, the
-    `column`, the `folder` of the sweep, its `model_options`, how many `samples` of the spreads with
-    which `seed`, and the `scheduler`, `workers` and `command` of `sweep`.
+class Runner:
+    """What runs cases: the `folder` of the sweep, its `model_options`, `progress`, and the
+    `scheduler`, `workers` and `command` of `sweep`.
     """
 
-    cases: Callable[[Combined], list[DesignPoint]]
-    variation: Variation
-    column: str
     folder: Path
     model_options: ModelOptions
-    samples: int | None = None
-    seed: int = 0
+    progress: Progress
     scheduler: str = "processes"
     workers: int | None = None
     command: Mapping[str, Any] | None = None
+
+    def column(self, cases: list[DesignPoint], column: str, combined: Combined) -> Floats:
+        """A column (n,) of the cases of combinations of values, nan where there is none."""
+        found = sweep(
+            cases, self.folder, self.model_options, self.progress, scheduler=self.scheduler,
+            workers=self.workers, command=self.command,
+        )  # fmt: skip
+        if found.interrupted:
+            raise KeyboardInterrupt
+        if found.missing:
+            raise ValueError(f"workers were killed; {found.missing} runs are missing, start again")
+        rows = dataset.read(self.folder, (at_probe(column)[0],))
+        ordered = in_order(rows, cases, self.model_options, combined)
+        return np.array([value(row, column) for row in ordered])
 
 
 def check(
@@ -149,62 +157,74 @@ def check(
         )
 
 
-def best_value(request: Request, progress: Progress) -> Best:
-    """Best value of a request that `check` accepts; resumes an interrupted one.
+def best_value(
+    runner: Runner,
+    cases: Callable[[Combined], list[DesignPoint]],
+    variation: Variation,
+    column: str,
+    samples: int | None = None,
+    seed: int = 0,
+) -> Best:
+    """Best value of a key that `check` accepts; resumes an interrupted one.
 
     Parameters
     ----------
-    request : Request
-    progress : called with the name of the phase and the fraction done
-
-    Returns
-    -------
-    Best
+    runner : Runner
+    cases : combinations of values -> cases
+    variation : of the key
+    column : of the table
+    samples : of the spreads, `SAMPLES` if not given, with their `seed`
 
     Raises
     ------
     ValueError
         If no run has the column, or too few samples have it.
     """
-    n = request.samples or SAMPLES
-    key, grid = request.variation.key, request.variation.values
-    (best,), (result,) = optima(_evaluate(request, progress, "run"), key, grid, [{}])
+    n, key, grid = samples or SAMPLES, variation.key, variation.values
+
+    def evaluate(own: Runner, combined: Combined) -> Floats:
+        return own.column(cases(combined), column, combined)
+
+    (best,), (result,) = optima(partial(evaluate, runner), key, grid, [{}])
     if not np.isfinite(result):
-        raise ValueError(
-            f"column '{request.column}' has no finite number in this sweep; choose another"
-        )
+        raise ValueError(f"column '{column}' has no finite number in this sweep; choose another")
     found = Best(
-        key=key, column=request.column, value=float(best), result=float(result),
+        key=key, column=column, value=float(best), result=float(result),
         limits=(float(min(grid)), float(max(grid))),
     )  # fmt: skip
-    runs = [case for case in request.cases([{key: x} for x in grid]) if case.scene]
+    runs = [case for case in cases([{key: x} for x in grid]) if case.scene]
     scenes = [case.scene for case in runs if case.scene]
-    asked = request.model_options.model
-    # Pressure moves no largest value of what is in proportion to it.
-    is_proportional = all(is_linear(scene, model_of(scene, asked)) for scene in scenes)
-    fixed = {key, PRESSURE} if is_proportional else {key}
-    uncertain = spreads_of(runs[0].before or scenes[0])
-    spreads = [each for each in uncertain if each.key not in fixed]
+    spreads = _that_move(key, runs[0].before or scenes[0], scenes, runner.model_options.model)
     if not spreads:
         return found
     names = tuple(each.key for each in spreads)
-    drawn = samples_of(spreads, n, request.seed).tolist()
-    settings = [dict(zip(names, row, strict=True)) for row in drawn]
+    drawn = samples_of(spreads, n, seed).tolist()
     own = replace(
-        request, folder=request.folder / FOLDER,
-        model_options=_of_samples(request.model_options, scenes),
+        runner, folder=runner.folder / FOLDER,
+        model_options=_of_samples(runner.model_options, scenes),
+        progress=lambda step, part: runner.progress("samples" if step == "run" else step, part),
     )  # fmt: skip
-    values, results = optima(_evaluate(own, progress, "samples"), key, grid, settings)
+    settings = [dict(zip(names, row, strict=True)) for row in drawn]
+    values, results = optima(partial(evaluate, own), key, grid, settings)
     values = values[np.isfinite(results)]
     if len(values) < FEWEST:
         raise ValueError(
-            f"only {len(values)} of {n} samples have a number in column '{request.column}'; narrow "
+            f"only {len(values)} of {n} samples have a number in column '{column}'; narrow "
             "their distributions or choose another column"
         )
     low, high = np.percentile(values, ENDS, method="weibull")
     margin = RESOLUTION * np.diff(np.unique(grid)).max()
     low, high = np.clip((low - margin, high + margin), *found.limits).tolist()
     return replace(found, interval=(low, high), samples=len(values), uncertain=names)
+
+
+def _that_move(key: str, base: Scene, scenes: Sequence[Scene], model: str) -> list[Spread]:
+    """Uncertain numbers of a scene that move the best value of a key: not the pressure of what is
+    in proportion to it.
+    """
+    in_proportion = all(is_linear(scene, model_of(scene, model)) for scene in scenes)
+    fixed = {key, PRESSURE} if in_proportion else {key}
+    return [each for each in spreads_of(base) if each.key not in fixed]
 
 
 def optima(
@@ -272,28 +292,3 @@ def _of_samples(asked: ModelOptions, scenes: Sequence[Scene]) -> ModelOptions:
         for scene in scenes
     )
     return replace(asked, model=HARMONIC.name if has_steady else asked.model, is_assessed=False)
-
-
-def _evaluate(request: Request, progress: Progress, phase: str) -> Evaluate:
-    """The column of a request in runs of a sweep; their progress has the name of a phase."""
-
-    def report(step: str, fraction: float) -> None:
-        progress(phase if step == "run" else step, fraction)
-
-    def evaluate(combined: Combined) -> Floats:
-        wanted = request.cases(combined)
-        found = sweep(
-            wanted, request.folder, request.model_options, report, scheduler=request.scheduler,
-            workers=request.workers, command=request.command,
-        )  # fmt: skip
-        if found.interrupted:
-            raise KeyboardInterrupt
-        if found.missing:
-            raise ValueError(f"workers were killed; {found.missing} runs are missing, start again")
-        release = version("skinwave")
-        names = {case.name(release, request.model_options): case for case in wanted}
-        rows = dataset.read(request.folder, (at_probe(request.column)[0],))
-        ordered = in_order(rows, names, combined)
-        return np.array([value(row, request.column) for row in ordered])
-
-    return evaluate

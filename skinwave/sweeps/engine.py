@@ -1,14 +1,13 @@
-"""Many runs at once, by Dask: in threads, in processes, or on the workers of a scheduler.
+"""Many runs at once: in threads, in processes, or on the workers of a Dask scheduler.
 
 Nothing that loads numpy is imported here: a worker process sets its threads before that.
 """
 
 import operator
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
-from functools import partial
 from importlib.util import find_spec
 from typing import Any
 
@@ -26,9 +25,9 @@ def check(scheduler: str) -> None:
     Raises
     ------
     ValueError
-        If Dask or pyarrow or, for an address, distributed is missing.
+        If pyarrow or, for an address, distributed is missing.
     """
-    extra, needed = "sweep", ["dask", "pyarrow"]
+    extra, needed = "sweep", ["pyarrow"]
     if scheduler not in LOCAL:
         extra, needed = "cluster", [*needed, "distributed"]
         if ":" not in scheduler:
@@ -36,11 +35,9 @@ def check(scheduler: str) -> None:
                 f"scheduler '{scheduler}' is none of {', '.join(LOCAL)} and no address; "
                 "write one such as tcp://host:8786"
             )
-    if missing := [name for name in needed if find_spec(name) is None]:
-        raise ValueError(
-            f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} not installed; "
-            f"pip install 'skinwave[{extra}]'"
-        )
+    for name in needed:
+        if find_spec(name) is None:
+            raise ValueError(f"{name} is not installed; pip install 'skinwave[{extra}]'")
 
 
 def workers(scheduler: str, asked: int | None = None) -> int:
@@ -68,22 +65,20 @@ def run_all(
 ) -> None:
     """Call `done` here with the index and the result of each item as soon as its work is finished.
 
-    What a killed worker was at is done again by another; what kills every worker is left out.
+    If a worker is killed, others repeat what it was at; what kills every worker is left out.
     """
     if not items:
         return
     if scheduler not in LOCAL:
         _run_on_cluster(work, items, scheduler, done)
         return
-    left = set(range(len(items)))
-
-    def finished(key: Any, result: Any, *_: Any) -> None:
-        done(key, result)
-        left.discard(key)
-
+    left = dict(enumerate(items))
     for _ in range(ATTEMPTS):
-        with suppress(BrokenProcessPool):
-            _run_here(work, {k: items[k] for k in sorted(left)}, scheduler, count, finished)
+        with suppress(BrokenProcessPool), _executor(scheduler, count) as executor:
+            futures = {executor.submit(work, item): k for k, item in left.items()}
+            for future in as_completed(futures):
+                done(futures[future], future.result())
+                del left[futures[future]]
         if not left:
             return
 
@@ -103,43 +98,30 @@ def mapped_on(address: str) -> Iterator[Callable[..., Iterable[Any]]]:
         yield mapped
 
 
-def _run_here(
-    work: Callable[[Any], Any],
-    items: Mapping[int, Any],
-    scheduler: str,
-    count: int,
-    finished: Callable[..., None],
-) -> None:
-    """Dask's own loop over threads or over processes that end with this one."""
-    from dask import multiprocessing, threaded
-    from dask.callbacks import Callback
-
-    own = scheduler == "processes"
-    get: Callable[..., Any] = multiprocessing.get if own else threaded.get
-    graph = {k: (partial(work, item),) for k, item in items.items()}
-    threads = max(1, usable_cores() // count)  # of linear algebra in each process
-    several = pool(count, threads) if own else _threads(count)
-    with several as executor, Callback(posttask=finished):
-        get(graph, list(graph), pool=executor, num_workers=count, chunksize=1)
-
-
 @contextmanager
-def _threads(count: int) -> Iterator[Executor]:
-    executor = ThreadPoolExecutor(count)
+def _executor(scheduler: str, count: int) -> Iterator[Executor]:
+    """Workers of this machine; what they have not done at the end of this is given up."""
+    if scheduler == "processes":
+        threads = max(1, usable_cores() // count)  # of linear algebra in each process
+        with pool(count, threads) as executor:
+            yield executor
+        return
+    several = ThreadPoolExecutor(count)
     try:
-        yield executor
+        yield several
     finally:
-        executor.shutdown(wait=False, cancel_futures=True)
+        several.shutdown(wait=False, cancel_futures=True)
 
 
 def _run_on_cluster(
     work: Callable[[Any], Any], items: Sequence[Any], address: str, done: Callable[[int, Any], None]
 ) -> None:
-    from distributed import KilledWorker, as_completed
+    from distributed import KilledWorker
+    from distributed import as_completed as finished_futures
 
     with _client(address) as client:
         futures = {client.submit(work, item, pure=False): k for k, item in enumerate(items)}
-        for future in as_completed(list(futures), loop=client.loop):
+        for future in finished_futures(list(futures), loop=client.loop):
             with suppress(KilledWorker):
                 done(futures[future], future.result())
             future.release()

@@ -48,6 +48,10 @@ class Family:
     ranges: Ranges
     members: int
 
+    def has(self, values: Mapping[str, float]) -> bool:
+        """Whether a body, of values by key, is in all ranges."""
+        return all(low <= values[key] <= high for key, low, high in self.ranges)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Mesh:

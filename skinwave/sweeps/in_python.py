@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import tempfile
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,12 +17,12 @@ from simple_model.numbers import counted
 from simple_model.response import library
 from skinwave.scene.file import dumps
 from skinwave.scene.scene import Scene
-from skinwave.scene.variation import Variation, cases_of, combinations, parse
+from skinwave.scene.variation import DesignPoint, Variation, cases_of, combinations, parse
 from skinwave.sweeps import best, dataset
 from skinwave.sweeps import sweep as runner
 from skinwave.system.effort import Progress
-from skinwave.system.numbers import significant
 from skinwave.system.progress_bar import reported
+from skinwave.system.table import shown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -73,7 +72,7 @@ class SweepTable:
         """Draw a column over a key, with a curve for each value of another; those that were varied
         if they are not given. Of what is told at every probe the largest, or that of "peak_um[2]".
         """
-        from skinwave.sweeps.sweep_figures import axis_label, curves, finished
+        from skinwave.sweeps.table_figures import axis_label, curves, finished
 
         choose("column", column.partition("[")[0], self.columns)
         x = x or self.varied[0]
@@ -90,7 +89,7 @@ class SweepTable:
 
     def _repr_html_(self) -> str:
         names = [*self.varied, *(name for name in RESULTS if name in self.columns)]
-        rows = [[_cell(row.get(name)) for name in names] for row in self.rows[:SHOWN]]
+        rows = [[shown(_cell(row.get(name))) for name in names] for row in self.rows[:SHOWN]]
         image = b""
         if len(self.failed) < len(self):
             image = drawing.picture(lambda figure: self.plot(ax=figure.subplots()), 4.5, 3.0)
@@ -129,7 +128,7 @@ def sweep(
     samples : int, runs of "lhs", rows of each matrix of "sobol"
     seed : int, of the samples
     model, tolerance, h, solver : of every run, as for `skinwave.simulate`
-    folder : where rows are kept and a sweep that was ended goes on; nowhere if not given
+    folder : where rows are kept and an interrupted sweep is resumed; nowhere if not given
     scheduler : "threads", "processes" (of a script with a main guard), or the address of a Dask
         scheduler
     workers : int, runs at a time on this machine; all cores if not given
@@ -145,17 +144,14 @@ def sweep(
         If a key or a value is none of a scene, or the extra "sweep" is not installed.
     """
     variations = [_variation(key, values) for key, values in vary.items()]
-    combined = combinations(variations, design, samples, seed)
-    table = tomllib.loads(dumps(scene))
-    wanted = cases_of(table, table, combined)
+    wanted = _cases(scene)(combinations(variations, design, samples, seed))
     options = runner.ModelOptions(model=model, tolerance=tolerance, h=h, solver=solver)
     with _kept(folder) as kept, reported(progress) as report:
         found = runner.sweep(wanted, kept, options, report, scheduler=scheduler, workers=workers)
         if found.interrupted:
             raise KeyboardInterrupt
         there = {row[dataset.KEY]: row for row in dataset.read(kept)}
-    names = (case.name(version("skinwave"), options) for case in wanted)
-    rows = tuple(there[name] for name in names if name in there)
+    rows = tuple(there[name] for name in runner.by_name(wanted, options) if name in there)
     return SweepTable(rows=rows, varied=tuple(v.key for v in variations))
 
 
@@ -195,30 +191,29 @@ def best_value(
         If several keys vary, their values are not numbers, there is no such column of numbers, or
         as `sweep` does.
     """
-    variations = [_variation(key, values) for key, values in vary.items()]
-    table = tomllib.loads(dumps(scene))
-    cases = partial(cases_of, table, table)
+    variations, cases = [_variation(key, values) for key, values in vary.items()], _cases(scene)
     best.check(variations, column, cases(combinations(variations)), samples)
     options = runner.ModelOptions(model=model, tolerance=tolerance, h=h, solver=solver)
     with _kept(folder) as kept, reported(progress) as report:
-        request = best.Request(
-            cases=cases, variation=variations[0], column=column, folder=kept,
-            model_options=options, samples=samples, seed=seed, scheduler=scheduler,
+        sweeps = best.Runner(
+            folder=kept, model_options=options, progress=report, scheduler=scheduler,
             workers=workers,
         )  # fmt: skip
-        return best.best_value(request, report)
+        return best.best_value(sweeps, cases, variations[0], column, samples, seed)
+
+
+def _cases(scene: Scene) -> Callable[[Sequence[Mapping[str, Any]]], list[DesignPoint]]:
+    table = tomllib.loads(dumps(scene))
+    return partial(cases_of, table, table)
 
 
 def _variation(key: str, values: Values) -> Variation:
     if isinstance(values, str):
         return parse(f"{key}={values}")
     checked = parse(f"{key}=0")  # which refuses an unknown key
-    return Variation(key=checked.key, values=tuple(_plain(value) for value in values))
-
-
-def _plain(value: Any) -> Any:
-    """A value as a file has it, of numpy's kinds, too."""
-    return value.item() if hasattr(value, "item") else value
+    # Numbers of numpy as a file has them.
+    plain = (value.item() if hasattr(value, "item") else value for value in values)
+    return Variation(key=checked.key, values=tuple(plain))
 
 
 @contextmanager
@@ -230,9 +225,8 @@ def _kept(folder: str | Path | None) -> Iterator[Path]:
         yield Path(own) / "sweep"
 
 
-def _cell(value: Any) -> str:
+def _cell(value: Any) -> Any:
+    """The largest entry of a list over the probes."""
     if isinstance(value, list):
-        value = max((x for x in value if x is not None), default=None)
-    if isinstance(value, float):
-        return significant(value)
-    return "" if value is None else str(value)
+        return max((x for x in value if x is not None), default=None)
+    return value

@@ -1,7 +1,7 @@
 """Parameter sweep: many scenes in one table, each body reduced once, each run once."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from importlib.metadata import version
@@ -66,7 +66,7 @@ class SweepOutcome:
     done: int
     failed: int
     interrupted: bool
-    seconds: float
+    seconds: float = 0.0
 
     @property
     def missing(self) -> int:
@@ -103,37 +103,52 @@ def sweep(
         is not that of a sweep, or another sweep writes into it.
     """
     started = time.perf_counter()
-    report = progress or silent
     _check(model_options)
     engine.check(scheduler)
     count = engine.workers(scheduler, workers)
     with dataset.locked(dataset.open_folder(folder, command)):
-        return _swept(
-            wanted, folder, model_options, report, scheduler=scheduler, count=count,
-            started=started,
+        found = _swept(
+            by_name(wanted, model_options), folder, model_options, progress or silent, scheduler,
+            count,
         )  # fmt: skip
+        return replace(found, seconds=time.perf_counter() - started)
+
+
+def by_name(cases: Iterable[DesignPoint], model_options: ModelOptions) -> dict[str, DesignPoint]:
+    """Cases by the names of their rows."""
+    release = version("skinwave")
+    return {case.name(release, model_options): case for case in cases}
+
+
+def in_order(
+    rows: Iterable[dataset.Row],
+    cases: Iterable[DesignPoint],
+    model_options: ModelOptions,
+    combined: Sequence[Mapping[str, Any]],
+) -> list[dataset.Row]:
+    """Row of each combination of values, in the order of its design."""
+    by_key = {row[dataset.KEY]: row for row in rows}
+    named = by_name(cases, model_options)
+    by_values = {tuple(case.varied.items()): by_key[name] for name, case in named.items()}
+    return [by_values[tuple(each.items())] for each in combined]
 
 
 def _swept(
-    wanted: Sequence[DesignPoint],
+    named: Mapping[str, DesignPoint],
     folder: Path,
     model_options: ModelOptions,
     report: Progress,
-    *,
     scheduler: str,
     count: int,
-    started: float,
 ) -> SweepOutcome:
     """Run the cases that a folder has no rows of, while no other sweep writes there."""
     there = dataset.names(folder)
-    release = version("skinwave")
-    named = {case.name(release, model_options): case for case in wanted}
     left = {name: case for name, case in named.items() if name not in there}
     index = dataset.numbered(list(named), there)
-    types = columns(wanted)
+    types = columns(named.values())
     tally = {"done": 0, "failed": 0}
     constant = {
-        "version": release, "asked_model": model_options.model,
+        "version": version("skinwave"), "asked_model": model_options.model,
         "tolerance": model_options.tolerance,
         "asked_h_mm": 1e3 * model_options.h if model_options.h else None,
     }  # fmt: skip
@@ -162,7 +177,6 @@ def _swept(
         found=len(named) - len(left),
         **tally,
         interrupted=interrupted,
-        seconds=time.perf_counter() - started,
     )
 
 

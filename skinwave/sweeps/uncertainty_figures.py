@@ -14,15 +14,14 @@ from simple_model import threshold
 from simple_model.load.line_names import line_frequency
 from skinwave.report.figures import HIGHEST
 from skinwave.report.levels import written
-from skinwave.report.palette import SEQUENTIAL
+from skinwave.report.palette import SEQUENTIAL, SERIES
 from skinwave.report.styles import STYLES, Style
 from skinwave.results.views import path_points
-from skinwave.sweeps.indices import SobolIndices, Tornado
-from skinwave.sweeps.propagate import PERCENTILES, Ensemble, percentiles
-from skinwave.sweeps.solutions import map_axes, shown_times
+from skinwave.sweeps.ensemble import Ensemble, map_axes, shown_times
+from skinwave.sweeps.sampling import PERCENTILES, SobolIndices, Tornado, percentiles
 
 REPORT = STYLES["report"]
-BAND, CENTRE, ONE = "#0072B2", "#D55E00", "#009E73"  # Okabe and Ito's
+BAND, CENTRE, ONE = SERIES[:3]
 WIDE, NARROW = 0.22, 0.4  # opacity of the bands of 90 and 50 %
 DEEPEST = -30.0  # dB of a map, below the largest median
 SHARED = 3  # maps of one colour bar, before the last
@@ -30,17 +29,8 @@ NAMED_LINES = 8
 
 
 def bands_figure(found: Ensemble, centre: Floats, style: Style = REPORT) -> Figure:
-    """Waveforms and lines at each probe: median, and bands of 50 and 90 % of the samples.
-
-    Parameters
-    ----------
-    found : Ensemble
-    centre : (t, p) float, the waveform of the central values
-    style : Style
-
-    Returns
-    -------
-    Figure
+    """Waveforms and lines at each probe: median, bands of 50 and 90 % of the samples, and the
+    waveform (t, p) of the central values.
     """
     per, probes = found.scene.reading.asked.per_unit, found.scene.probes
     with mpl.rc_context(style.rc):
@@ -65,14 +55,10 @@ def bands_figure(found: Ensemble, centre: Floats, style: Style = REPORT) -> Figu
             axes[0, 0].plot([], [], color=BAND, label="median")[0],
             axes[0, 0].plot([], [], color=CENTRE, label="central values")[0],
         ]
-        if _is_skin(found):
+        if found.is_skin:
             handles.append(axes[0, 0].plot([], [], color="0.45", label="detection threshold")[0])
         figure.legend(handles=handles, loc="outside upper center", ncols=5, frameon=False)
     return figure
-
-
-def _is_skin(found: Ensemble) -> bool:
-    return found.scene.reading.is_plain and found.scene.body.is_skin
 
 
 def _waveform(ax: Axes, times: Floats, bands: Floats) -> None:
@@ -97,7 +83,7 @@ def _lines(ax: Axes, found: Ensemble, bands: Floats, *, named: bool) -> None:
     top = float(median.max(initial=1e-9))
     ax.set_ylim(1e-3 * top, 30 * top)
     ax.set_xlim(0, HIGHEST)
-    if _is_skin(found):
+    if found.is_skin:
         grid = np.geomspace(max(10.0, np.nanmin(f) / 1.2), min(1000.0, np.nanmax(f) * 1.2), 200)
         ax.plot(grid, 1e6 * threshold(grid), color="0.45", lw=1.2, zorder=0)
     ax.grid(alpha=0.25)
@@ -118,7 +104,7 @@ def maps_figure(found: Ensemble, style: Style = REPORT) -> Figure:
     step = x[1] - x[0]
     frame = (x[0] - step / 2, x[-1] + step / 2, y[0] - step / 2, y[-1] + step / 2)
     share = 100 * (found.map_level >= 0).mean(axis=0)
-    skin = _is_skin(found)
+    skin = found.is_skin
     with mpl.rc_context(style.rc):
         figure = Figure(figsize=style.size(10.5, 3.2), layout="constrained")
         axes = figure.subplots(1, SHARED + skin, sharey=True)
@@ -148,18 +134,7 @@ def _image(ax: Axes, values: Floats, frame: tuple[float, ...], **limits: Any) ->
 
 
 def distances_figure(radii: Floats, bands: Mapping[str, Floats], style: Style = REPORT) -> Figure:
-    """Bands of 50 and 90 % of quantities at the probes, over their distance.
-
-    Parameters
-    ----------
-    radii : (p,) float, mm
-    bands : percentiles (5, p) by label
-    style : Style
-
-    Returns
-    -------
-    Figure
-    """
+    """Percentiles (5, p) of quantities by label at the probes, over their distances (p,) in mm."""
     order = np.argsort(radii, kind="stable")
     with mpl.rc_context(style.rc):
         figure = Figure(figsize=style.size(10.5, 3.2), layout="constrained")
@@ -180,18 +155,8 @@ def tornado_figure(
     ends: Sequence[str] = ENDS,
     style: Style = REPORT,
 ) -> Figure:
-    """Tornado charts: each output with one number at a time at either end.
-
-    Parameters
-    ----------
-    charts : by name of the output
-    keys : (d,) names of the numbers
-    ends : what a legend calls the low and the high end
-    style : Style
-
-    Returns
-    -------
-    Figure
+    """Tornado charts by name of the output, of numbers (d,) by their keys; `ends` are what a legend
+    calls the low and the high end.
     """
     with mpl.rc_context(style.rc):
         figure = Figure(figsize=style.size(10.5, 1.2 + 0.35 * len(keys)), layout="constrained")
@@ -215,18 +180,7 @@ def tornado_figure(
 def indices_figure(
     found: Mapping[str, SobolIndices], keys: Sequence[str], style: Style = REPORT
 ) -> Figure:
-    """Sobol' indices of each output, of first order and total, with 95 % intervals.
-
-    Parameters
-    ----------
-    found : by name of the output
-    keys : (d,) names of the numbers
-    style : Style
-
-    Returns
-    -------
-    Figure
-    """
+    """Sobol' indices by name of the output, of numbers (d,) by their keys, with 95 % intervals."""
     rows = np.arange(len(keys))
     with mpl.rc_context(style.rc):
         figure = Figure(figsize=style.size(10.5, 1.4 + 0.5 * len(keys)), layout="constrained")

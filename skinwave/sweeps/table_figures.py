@@ -1,4 +1,4 @@
-"""Pictures of a sweep: one column over one or two varied keys (matplotlib)."""
+"""Figures of a sweep: one column over one or two varied keys (matplotlib)."""
 
 import re
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from skinwave.sweeps.dataset import Row
 SPEED = "tacton.speed_m_per_s"
 MARKERS = "osD^vP*X"
 MOST_NAMED = len(MARKERS)  # curves that a legend names; of more numbers a colour bar does
-FILLED = 0.5  # of a grid: where fewer of its cells have a run, runs are drawn as points
+FILLED = 0.5  # of the cells of a grid, which have a run at least
 UNITS = {  # by the end of a column's name
     "_m_per_s": "m/s", "_um": "µm", "_mm": "mm", "_db": "dB", "_hz": "Hz",
     "_pa": "Pa", "_ms": "ms", "_s": "s", "_percent": "%", "_deg": "°", "_gib": "GiB",
@@ -76,24 +76,38 @@ def value(row: Row, column: str) -> float:
 def line_figure(rows: Sequence[Row], column: str, x: str, by: str | None, style: Style) -> Figure:
     """A column over one key, a curve for each value of another; points where a value of that is
     met once, as in a Latin hypercube, or where what else is varied would be joined with it.
+
+    Beside levels the threshold of detection is drawn, and over drawing speeds that of surface
+    waves. Raises a ValueError if there is no such column of numbers.
     """
     _check(rows, (column, x, *([by] if by else [])))
     with mpl.rc_context(style.rc):
         figure = Figure(figsize=style.size(6.4, 4.4), layout="constrained")
         ax = figure.subplots()
+        if at_probe(column)[0].endswith("_db"):
+            ax.axhspan(-BAND, BAND, color="0.5", alpha=0.25, lw=0,
+                       label=f"threshold, ±{BAND:g} dB between people")  # fmt: skip
+        waves = {value(row, "rayleigh_speed_m_per_s") for row in rows} if x == SPEED else set()
+        for k, wave in enumerate(sorted(filter(np.isfinite, waves))):
+            said = "_" if k else "Rayleigh speed $c_R$ without loss"
+            ax.axvline(wave, color="0.4", ls="--", lw=1.2, label=said)
         curves(ax, rows, column, x, by)
         ax.set(xlabel=axis_label(x), ylabel=axis_label(column))
     return figure
 
 
 def heat_figure(rows: Sequence[Row], column: str, x: str, y: str, style: Style) -> Figure:
-    """A column over two keys, of what they share the mean; cells without a run stay empty. Runs
-    that lie on no grid are points.
+    """A column over two keys, of what they share the mean; cells without a run stay empty.
+
+    Raises
+    ------
+    ValueError
+        If there is no such column, or the runs lie on no grid.
     """
     _check(rows, (column, x, y))
-    if _off_grid(rows, x, y):
-        return _point_figure(rows, column, x, y, style)
     across, up = _levels(rows, x), _levels(rows, y)
+    if len({(row.get(x), row.get(y)) for row in rows}) < FILLED * len(across) * len(up):
+        raise ValueError(f"the runs lie on no grid of {x} and {y}; leave out --heat")
     cells: dict[tuple[int, int], list[float]] = {}
     for row in rows:
         where = up.index(_plain(row.get(y))), across.index(_plain(row.get(x)))
@@ -109,49 +123,6 @@ def heat_figure(rows: Sequence[Row], column: str, x: str, y: str, style: Style) 
         _ticks(ax, across, up)
         ax.set(xlabel=axis_label(x), ylabel=axis_label(y))
         figure.colorbar(image, ax=ax, label=axis_label(column))
-    return figure
-
-
-def _off_grid(rows: Sequence[Row], x: str, y: str) -> bool:
-    """Whether runs meet few of the pairs of two keys that are numbers."""
-    levels = [_levels(rows, key) for key in (x, y)]
-    met = {(_plain(row.get(x)), _plain(row.get(y))) for row in rows}
-    numbers = all(isinstance(level, float) for found in levels for level in found)
-    return numbers and len(met) < FILLED * len(levels[0]) * len(levels[1])
-
-
-def _point_figure(rows: Sequence[Row], column: str, x: str, y: str, style: Style) -> Figure:
-    """A column as the colour of points over two keys."""
-    with mpl.rc_context(style.rc):
-        figure = Figure(figsize=style.size(6.4, 4.8), layout="constrained")
-        ax = figure.subplots()
-        across, up, colours = ([value(row, key) for row in rows] for key in (x, y, column))
-        drawn = ax.scatter(across, up, c=colours, cmap="viridis", edgecolors=style.ink, lw=0.4)
-        ax.set(xlabel=axis_label(x), ylabel=axis_label(y))
-        ax.grid(alpha=0.25)
-        figure.colorbar(drawn, ax=ax, label=axis_label(column))
-    return figure
-
-
-def speed_figure(rows: Sequence[Row], by: str | None, style: Style) -> Figure:
-    """Displacement and sensation level over the drawing speed, and the speed of surface waves."""
-    _check(rows, (SPEED, "peak_um"))
-    with mpl.rc_context(style.rc):
-        figure = Figure(figsize=style.size(6.4, 6.6), layout="constrained")
-        axes = figure.subplots(2, 1, sharex=True)
-        for ax, column in zip(axes, ("peak_um", "level_db"), strict=True):
-            curves(ax, rows, column, SPEED, by)
-            waves = {value(row, "rayleigh_speed_m_per_s") for row in rows}
-            for k, wave in enumerate(sorted(filter(np.isfinite, waves))):
-                said = "Rayleigh speed $c_R$ without loss" if k == 0 else None
-                ax.axvline(wave, color="0.4", ls="--", lw=1.2, label=said)
-            ax.set_ylabel(axis_label(column))
-        axes[0].set_ylim(bottom=0)
-        axes[0].legend(fontsize=small(), frameon=False)
-        band = axes[1].axhspan(-BAND, BAND, color="0.5", alpha=0.25, lw=0)
-        said = f"threshold, ±{BAND:g} dB between people"
-        axes[1].legend([band], [said], fontsize=small(), frameon=False)
-        axes[1].set_xlabel(axis_label(SPEED))
     return figure
 
 
@@ -184,7 +155,7 @@ def curves(ax: Axes, rows: Sequence[Row], column: str, x: str, by: str | None) -
         ax.set_xticks(range(len(at)), [str(level) for level in at])
     if by is not None and many:
         ax.figure.colorbar(scale, ax=ax, label=axis_label(by))
-    elif by is not None:
+    if ax.get_legend_handles_labels()[1]:
         ax.legend(fontsize=small(), frameon=False)
     ax.grid(alpha=0.25)
 

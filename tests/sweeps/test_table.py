@@ -1,0 +1,263 @@
+"""The table of a sweep: what it holds, what is added, what is kept, and what ends while it grows."""
+
+import csv
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from skinwave.commands.cli import main
+from skinwave.planning.simulate import compute
+from skinwave.report.styles import style
+from skinwave.scene.file import read
+from skinwave.scene.scene import Body
+from skinwave.scene.variation import combinations, parse
+from skinwave.sweeps import dataset, engine, table_figures
+from skinwave.sweeps import sweep as sweeping
+
+THREADS = ["--scheduler", "threads", "--quiet"]
+KERNEL = ["--model", "point-kernel"]
+SPEED, SIZE = "tacton.speed_m_per_s", "tacton.size_mm"
+OUT = Path("short-sweep")
+
+
+def swept(*arguments):
+    assert main(["sweep", "short.toml", *map(str, arguments), *THREADS]) == 0
+    return dataset.read(OUT)
+
+
+def refused(capsys, *arguments):
+    """The one sentence with which a call is refused."""
+    assert main([str(argument) for argument in arguments]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    return said
+
+
+def test_rows_keep_the_order_of_the_design_and_are_not_run_again(scene, monkeypatch):
+    vary = ["--vary", f"{SPEED}=8,4,70,6", f"{SIZE}=9,8", *KERNEL]
+    rows = swept(*vary)
+    design = [(v, d) for v in (8, 4, 70, 6) for d in (9, 8)]
+    assert [(row[SPEED], row[SIZE]) for row in rows] == design
+    assert [row["index"] for row in rows] == list(range(8))
+    for part in list((OUT / "rows").glob("*.parquet"))[::2]:
+        part.unlink()
+    assert [row["key"] for row in swept(*vary)] == [row["key"] for row in rows]  # resumed
+    with monkeypatch.context() as patch:
+        patch.setattr(sweeping, "_row", None)  # any run would fail
+        swept(*vary)
+    more = swept("--vary", f"{SPEED}=5,4", f"{SIZE}=9", "--csv", *KERNEL)
+    assert [(row[SPEED], row[SIZE]) for row in more] == [*design, (5, 9)]
+    with (OUT / "rows.csv").open(newline="") as file:
+        lines = list(csv.DictReader(file))
+    assert [line["index"] for line in lines] == list(map(str, range(9)))
+    assert float(lines[0]["kernel_peak_pa[1]"]) == pytest.approx(rows[0]["kernel_peak_pa"][1])
+
+
+def test_wrong_keys_and_values_are_one_sentence(scene, capsys):
+    for cure, *words in (
+        ("did you mean 'tacton.speed_m_per_s'", "tacton.speed_m_s=1,2"),
+        ("of the form tacton.size_mm", "zzzz=1"),
+        ("lacks values", "tacton.size_mm="),
+        ("did you mean 'square'", "tacton.shape=circle,sqare"),
+        ("is no file and none of", "body=moon"),
+        ("varied twice", "tacton.size_mm=1", "tacton.size_mm=2"),
+        ("whole number", "tacton.size_mm=1:2:2.5"),
+        ("add :n", "tacton.size_mm=1:2"),
+        ("no combination makes a scene", "tacton.size_mm=70,80"),
+        ("runs are outside", "tacton.size_mm=1:2:1000", "body.thickness_mm=1:2:1000"),
+        ("lhs needs it", "tacton.size_mm=1:2", "--design", "lhs"),
+        ("design 'latin' is unknown", "tacton.size_mm=1,2", "--design", "latin"),
+        ("below 1", "tacton.size_mm=1,2", "--workers", "0"),
+        ("is none of processes, threads", "tacton.size_mm=1,2", "--scheduler", "cloud"),
+        ("holds no sweep", "tacton.size_mm=1,2", "--out", "."),
+    ):
+        assert cure in refused(capsys, "sweep", scene, "--vary", *words)
+    assert "nothing is varied" in refused(capsys, "sweep", scene)
+    assert "holds no sweep" in refused(capsys, "sweep", ".", "--plot")
+    assert not OUT.exists()
+
+
+def test_what_is_not_installed_or_not_there_is_one_sentence(scene, capsys, monkeypatch):
+    vary = ["--vary", "tacton.size_mm=1,2", "--scheduler"]
+    with monkeypatch.context() as patch:
+        patch.setattr(engine, "find_spec", lambda name: None)
+        assert "skinwave[sweep]" in refused(capsys, "sweep", scene, *vary, "threads")
+        assert "skinwave[cluster]" in refused(capsys, "sweep", scene, *vary, "tcp://a:1")
+    monkeypatch.setattr(engine, "CONNECTED", 0.5)
+    nowhere = "tcp://127.0.0.1:9"
+    assert nowhere in refused(capsys, "sweep", scene, *vary, nowhere)
+    assert nowhere in refused(capsys, "run", scene, "--quiet", "--scheduler", nowhere)
+    assert sorted(path.name for path in scene.parent.iterdir()) == ["short.toml"]
+
+
+def test_a_file_of_the_user_is_kept_and_another_table_refused(scene, capsys):
+    vary = ["--vary", f"{SPEED}=4,6", *KERNEL]
+    swept(*vary, "--csv", "--plot", "kernel_peak_pa")
+    swept(*vary, "--csv", "--plot", "kernel_peak_pa")
+    (figure,) = (OUT / "figures").iterdir()
+    for path, words in ((OUT / "rows.csv", ["--csv"]), (figure, ["--plot", "kernel_peak_pa"])):
+        path.write_bytes(b"mine")
+        assert f"{path.name} was added or changed" in refused(capsys, "sweep", OUT, *words)
+        path.unlink()
+    pq.write_table(pa.table({"price": [1.0]}), OUT / "rows/part-mine.parquet")
+    assert "cannot be read" in refused(capsys, "sweep", "short.toml", *vary, *THREADS)
+    (OUT / "rows/part-mine.parquet").write_text("no Parquet")
+    assert "cannot be read" in refused(capsys, "sweep", OUT, "--csv")
+
+
+def test_one_sweep_at_a_time_writes_into_a_folder(scene, capsys):
+    """Its rows would be doubled; a process that ends releases them."""
+    folder = dataset.open_folder(OUT)
+    arguments = ["sweep", "short.toml", "--vary", "body.thickness_mm=10,15", *THREADS]
+    with dataset.locked(folder):
+        assert "another sweep writes into short-sweep" in refused(capsys, *arguments)
+    there = "import os, sys; from pathlib import Path; from skinwave.sweeps import dataset; "
+    held = "held = dataset.locked(Path(sys.argv[1])); held.__enter__(); os._exit(0)"
+    subprocess.run([sys.executable, "-c", there + held, str(folder)], check=True)
+    with dataset.locked(folder):
+        assert not dataset.names(folder)
+
+
+def test_an_interrupted_sweep_goes_on_without_a_row_lost_or_doubled(scene, monkeypatch, capsys):
+    """Ctrl-C as the fourth row is written."""
+    command = ["--vary", f"{SPEED}=3:8:7", *KERNEL]
+    inner, written = dataset.append, []
+
+    def interrupted(*given):
+        if len(written) == 3:
+            raise KeyboardInterrupt
+        written.append(given)
+        inner(*given)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(dataset, "append", interrupted)
+        assert main(["sweep", "short.toml", *command, *THREADS]) == 1
+    assert "4 runs are missing" in capsys.readouterr().err
+    assert len(dataset.read(OUT)) == 3
+    rows = swept(*command)
+    assert len({row[SPEED] for row in rows}) == len(rows) == 7
+    parts = (OUT / "rows").glob("part-*.parquet")
+    assert sum(pq.read_metadata(part).num_rows for part in parts) == 7
+
+
+DYING = """
+import os
+def work(mark, item):  # the second item ends the process when it is first computed
+    if item == 1 and not mark.exists():
+        mark.touch()
+        os._exit(9)
+    return item
+"""
+
+
+def test_what_a_worker_was_at_when_it_died_is_done_again(tmp_path, monkeypatch):
+    (tmp_path / "dying.py").write_text(DYING)
+    monkeypatch.syspath_prepend(tmp_path)
+    work = partial(import_module("dying").work, tmp_path / "died")
+    found = {}
+    engine.run_all(work, range(4), "processes", 1, found.__setitem__)
+    assert found == {k: k for k in range(4)}
+
+
+@pytest.fixture
+def address(monkeypatch):
+    """The address of a Dask scheduler with two workers, each a process."""
+    from distributed import LocalCluster
+
+    path = os.pathsep.join([str(Path(__file__).parents[2]), *sys.path])
+    monkeypatch.setenv("PYTHONPATH", path)  # workers find this checkout, whatever is installed
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        yield cluster.scheduler_address
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")  # of Dask's own event loop
+def test_processes_and_a_cluster_give_the_same_table(scene, address):
+    small = ["body.size_x_mm=40", "body.size_y_mm=40", "body.sides=clamped"]
+    sweep = ["sweep", "short.toml", "--vary", f"{SPEED}=4,6", "tacton.am_frequency_hz=0,100",
+             *small, "--model", "fem", "--h", "10", "--quiet"]  # fmt: skip
+    assert main([*sweep, "--out", "here"]) == 0
+    assert main([*sweep, "--out", "there", "--scheduler", address]) == 0
+    here, there = dataset.read(Path("here")), dataset.read(Path("there"))
+    assert [row["key"] for row in here] == [row["key"] for row in there]
+    for name in ("peak_um", "level_db", "expected_error"):
+        first, second = (np.array([row[name] for row in rows], float) for rows in (here, there))
+        np.testing.assert_allclose(first, second, rtol=1e-10, atol=1e-12)
+    short = replace(read(scene), body=Body(width=0.04, height=0.04, sides="clamped"))
+    with engine.mapped_on(address) as mapped:
+        spread = compute(short, "fem-harmonic", h=0.015, mapped=mapped).displacement
+    here = compute(short, "fem-harmonic", h=0.015).displacement
+    np.testing.assert_allclose(spread, here, rtol=1e-10, atol=1e-10 * abs(here).max())
+
+
+# Figures
+
+
+def test_figures_have_units_and_names_in_every_format(scene, capsys):
+    swept("--vary", f"{SPEED}=4,6", f"{SIZE}=8,10,70")
+    for kind in ("png", "svg", "pdf"):
+        drawn = ["sweep", "short-sweep", "--format", kind, "--quiet"]
+        assert main([*drawn, "--plot", "f_AM_um[1]", "level_db"]) == 0
+        assert main([*drawn, "--plot", "spread_6db_mm", "--heat"]) == 0
+        files = list((OUT / "figures").glob(f"*.{kind}"))
+        assert len(files) == 3
+        assert all(file.stat().st_size > 5000 for file in files)
+    text = "".join(file.read_text() for file in (OUT / "figures").glob("*.svg"))
+    assert "drawing speed, m/s" in text
+    assert "size of the path, mm" in text
+    assert not any(b"/Type3" in file.read_bytes() for file in (OUT / "figures").glob("*.pdf"))
+    capsys.readouterr()
+    for cure, words in (
+        ("did you mean 'peak_um'", ["peak"]),
+        ("no finite number", ["sensation_line"]),
+        ("give --plot or --csv", ["peak_um", "--vary", f"{SPEED}=1"]),
+    ):
+        assert cure in refused(capsys, "sweep", OUT, "--plot", *words)
+
+
+def test_a_plot_of_factors_groups_by_them_and_not_by_the_material_they_make(scene, capsys):
+    swept("--vary", "body.material.modulus_scale=0.5,1,2", f"{SIZE}=8,9", *KERNEL)
+    capsys.readouterr()
+    assert main(["sweep", "short-sweep", "--plot", "kernel_peak_pa", "--json"]) == 0
+    name = Path(json.loads(capsys.readouterr().out)["figures"][0]).stem
+    assert name == "kernel_peak_pa-over-body_material_modulus_scale-and-tacton_size_mm"
+
+
+def test_a_latin_hypercube_is_drawn_as_points_with_the_other_key_as_colour():
+    met = combinations([parse(f"{SPEED}=2:12"), parse(f"{SIZE}=5:20")], "lhs", 20)
+    rows = [each | {"status": "done", "peak_um": sum(each.values())} for each in met]
+    figure = table_figures.line_figure(rows, "peak_um", SPEED, SIZE, style("report"))
+    ax, bar = figure.axes
+    assert bar.get_ylabel() == "size of the path, mm"
+    assert ax.get_legend() is None
+    drawn = sorted((line.get_xdata()[0], line.get_ydata()[0]) for line in ax.lines)
+    assert drawn == sorted((row[SPEED], row["peak_um"]) for row in rows)
+    assert max(len(line.get_xdata()) for line in ax.lines) == 1  # nothing is joined
+    with pytest.raises(ValueError, match="no grid"):
+        table_figures.heat_figure(rows, "peak_um", SPEED, SIZE, style("report"))
+    third = [row | {"body.thickness_mm": 10.0 + k} for k, row in enumerate(rows)]
+    alone = table_figures.line_figure(third, "peak_um", SPEED, None, style("report"))
+    assert [line.get_linestyle() for line in alone.axes[0].lines] == ["None"]
+
+
+def test_curves_of_many_values_have_a_colour_bar_and_levels_the_threshold():
+    rows = [{SPEED: float(v), SIZE: float(d), "status": "done", "level_db": float(v + d),
+             "rayleigh_speed_m_per_s": 1.5} for v in range(3) for d in range(12)]  # fmt: skip
+    figure = table_figures.line_figure(rows, "level_db", SPEED, SIZE, style("print"))
+    curves = [line for line in figure.axes[0].lines if line.get_linestyle() == "-"]
+    assert [len(line.get_xdata()) for line in curves] == 12 * [3]
+    assert len(figure.axes) == 2
+    legend = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert [words.split()[0] for words in legend] == ["threshold,", "Rayleigh"]
+    assert figure.get_figwidth() == 3.5
