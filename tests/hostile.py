@@ -20,6 +20,7 @@ import tomli_w
 from scipy.io import wavfile
 
 from skinwave.patterns.adaptics_file import FORMAT, REVISIONS
+from skinwave.sweeps import dataset
 
 SEED = 1907
 Write = Callable[[Path], list[str]]
@@ -438,10 +439,10 @@ def tables() -> dict[str, Write]:
     }
     found = {}
     for name, content in contents.items():
-        for command in ("plot", "sweep"):
+        for command in ("--plot", "sweep"):
 
             def write(folder: Path, content=content, command=command) -> list[str]:
-                (folder / "s/rows").mkdir(parents=True)
+                dataset.open_folder(folder / "s")
                 place = folder / "s/rows/part-k.parquet"
                 if callable(content):
                     content(place)
@@ -451,7 +452,7 @@ def tables() -> dict[str, Write]:
                 vary = ["--vary", "tacton.size_mm=nonsense", "--scheduler", "threads"]
                 if command == "sweep":
                     return ["sweep", "scene.toml", *vary, "--out", "s", "--quiet"]
-                return ["plot", "s", "--quiet", "--x", "peak_um"]
+                return ["sweep", "s", "--plot", "--quiet", "--x", "peak_um"]
 
             found[f"table, {name}, {command}"] = write
     return found

@@ -21,7 +21,7 @@ from skinwave.system.processes import SAFE_PATH, environment
 CACHE = "SKINWAVE_CACHE"
 NO_CACHE = f"neither read nor write cached meshes and reduced bodies; {CACHE} names their folder"
 # Commands that compute nothing, or always anew.
-UNCACHED = ("convert", "plot")
+UNCACHED = ("convert",)
 READER_GONE = 141  # 128 + SIGPIPE, as a shell has it of `yes | head -1`
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 

@@ -113,7 +113,6 @@ def test_results(made, tmp_path, monkeypatch, capsys):
 @pytest.mark.slow
 def test_tables(tmp_path, monkeypatch, capsys):
     pytest.importorskip("pyarrow")
-    pytest.importorskip("dask")
     check_all(hostile.tables(), tmp_path, monkeypatch, capsys)
 
 

@@ -27,7 +27,7 @@ from skinwave.report.fields import Field
 from skinwave.report.styles import style
 from skinwave.results import citations
 from skinwave.studies.album import Album, only
-from skinwave.sweeps import sweep_figures
+from skinwave.sweeps import table_figures
 from skinwave.sweeps.in_python import SweepTable
 
 # What is tested here is not how accurate a model is.
@@ -472,9 +472,10 @@ def test_all_letters_of_a_figure_of_a_paper_are_of_8_points(scene, width):
             for v in (4, 8) for d in (10, 20)]  # fmt: skip
     by, chosen = "tacton.size_mm", style("print", width)
     figures = [ax.figure for ax in drawn]
-    figures += [sweep_figures.line_figure(rows, "peak_um", sweep_figures.SPEED, by, chosen),
-                sweep_figures.heat_figure(rows, "peak_um", sweep_figures.SPEED, by, chosen),
-                sweep_figures.speed_figure(rows, by, chosen)]  # fmt: skip
+    figures += [table_figures.line_figure(rows, "peak_um", table_figures.SPEED, by, chosen),
+                table_figures.line_figure(rows, "level_db", table_figures.SPEED, by, chosen),
+                table_figures.heat_figure(rows, "peak_um", table_figures.SPEED, by, chosen),
+                ]  # fmt: skip
     for figure in figures:
         assert sizes(figure) == {8.0}
         assert illegible(figure) == []

@@ -18,7 +18,7 @@ from skinwave.sweeps import dataset, families
 from skinwave.sweeps import sweep as sweeping
 
 SMALL = ["body.size_x_mm=40", "body.size_y_mm=40", "body.sides=clamped"]
-ON_SMALL = [*SMALL, "tacton.duration_s=0.3", "--model", "fem", "--h", 7, "--workers", 1]
+ON_SMALL = [*SMALL, "tacton.duration_s=0.3", "--model", "fem", "--element-size", 7, "--workers", 1]
 MODULI = "body.material.shear_modulus_pa=20e3:50e3:8"
 SCALED, LOSSES = "body.material.modulus_scale", "body.material.loss_scale"
 FOREARM = Path(__file__).parents[2] / "examples/speed-on-forearm.toml"
@@ -53,7 +53,7 @@ def test_a_failing_combination_is_a_row_with_its_error(scene):
     assert (len(rows), len(failed)) == (12, 8)
     assert sum("off the body" in error for error in failed) == 4
     assert sum("outside 0..60 mm" in error for error in failed) == 4
-    words = ["body.thickness_mm=inf", "tacton.size_mm=11", "--model", "fem", "--h", 15]
+    words = ["body.thickness_mm=inf", "tacton.size_mm=11", "--model", "fem", "--element-size", 15]
     assert "inf has no mesh" in swept(*words, out="another")[0]["error"]
 
 

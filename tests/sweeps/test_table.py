@@ -1,4 +1,4 @@
-"""The table of a sweep: what it holds, what is added, what is kept, and what ends while it grows."""
+"""The table of a sweep: its rows and files, what is kept, what interrupts it, its figures."""
 
 import csv
 import json
@@ -186,7 +186,7 @@ def address(monkeypatch):
 def test_processes_and_a_cluster_give_the_same_table(scene, address):
     small = ["body.size_x_mm=40", "body.size_y_mm=40", "body.sides=clamped"]
     sweep = ["sweep", "short.toml", "--vary", f"{SPEED}=4,6", "tacton.am_frequency_hz=0,100",
-             *small, "--model", "fem", "--h", "10", "--quiet"]  # fmt: skip
+             *small, "--model", "fem", "--element-size", "10", "--quiet"]  # fmt: skip
     assert main([*sweep, "--out", "here"]) == 0
     assert main([*sweep, "--out", "there", "--scheduler", address]) == 0
     here, there = dataset.read(Path("here")), dataset.read(Path("there"))
