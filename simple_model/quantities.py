@@ -100,10 +100,7 @@ QUANTITIES: dict[str, Quantity] = {}
 def register(quantity: Quantity) -> Quantity:
     """Add a quantity to those that scenes may ask for.
 
-    Raises
-    ------
-    ValueError
-        If there is one of that name.
+    Raises a ValueError if there is one of that name.
     """
     if quantity.name in QUANTITIES:
         raise ValueError(f"'{quantity.name}' is registered already; choose another name")

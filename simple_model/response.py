@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 
 DEGREE = 9  # of the splines that are differentiated
 SHOWN = 0.030  # s of waveforms on a page, at their end
-MOST_ROWS = 12  # probes in a table
 # Side lobes of the Kaiser window below -140 dB resolve lines as weak as that from strong ones.
 LINE_BETA, LINE_BINS = 19.0, 2.5  # it resolves lines that are so many bins apart
 SETTLE = 0.25  # of a response, before which no line is fitted
@@ -260,7 +259,7 @@ class Response:
         return f"<Response of {self.model}: {'; '.join(said)}>"
 
     def _repr_html_(self) -> str:
-        """A small page: the last waveforms, the spectrum, facts, and the size at every probe."""
+        """A small page: the last waveforms and the spectrum."""
 
         def draw(figure: Figure) -> None:
             left, right = figure.subplots(1, 2)
@@ -271,24 +270,7 @@ class Response:
                 legend.remove()
 
         image = drawing.picture(draw, 8, 2.6) if len(self.times) > 1 else b""
-        title, times, unit = f"{self.model}: {self.record.words}", self.times, self.record.shown
-        dofs, seconds = self.effort.dofs, sum(self.effort.seconds.values())
-        facts = [
-            ["times", f"{len(times):,} from {1e3 * times[0]:g} to {1e3 * times[-1]:.5g} ms"],
-            ["expected error", stated_error(self.expected_error)],
-            ["degrees of freedom", f"{dofs:,}" if dofs else "none"],
-            ["cost", f"{seconds:.2g} s"],
-        ]
-        values = self.record.per_unit * self.values
-        largest, rms = np.abs(values).max(axis=0), values[int(SETTLE * len(values)) :].std(axis=0)
-        rows = [
-            [drawing.place_name(place), f"{peak:.4g}", f"{level:.4g}"]
-            for place, peak, level in zip(self.probes, largest, rms, strict=True)
-        ]
-        header = ["probe, mm", f"largest, {unit}", f"RMS about the mean, {unit}"]
-        left = [[f"{len(rows) - MOST_ROWS:,} further probes"]] if len(rows) > MOST_ROWS else []
-        tables = [drawing.table(facts), drawing.table([*rows[:MOST_ROWS], *left], header)]
-        return drawing.page(title, image, tables, self.effort.warnings)
+        return drawing.page(repr(self).strip("<>"), image, (), self.effort.warnings)
 
 
 def library(name: str) -> Any:

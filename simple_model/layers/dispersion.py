@@ -155,10 +155,8 @@ def dispersion_curves(
     -------
     DispersionCurves, with a mode at least
 
-    Raises
-    ------
-    ValueError
-        If frequencies are not above 0 and ascending, or layers are very many wavelengths thick.
+    Raises a ValueError if frequencies are not above 0 and ascending, or layers are very many
+    wavelengths thick.
     """
     f = checked_frequencies(frequencies)
     omega = 2 * np.pi * f

@@ -81,10 +81,7 @@ def steady_lines(
     -------
     frequencies (f,) in Hz >= 0 and complex amplitudes a (f, p) in metre of Re a exp(2 pi i f t)
 
-    Raises
-    ------
-    ValueError
-        If the focus is not Gaussian, or as `pressure.check_lines` does.
+    Raises a ValueError if the focus is not Gaussian, or as `pressure.check_lines` does.
     """
     f, amplitudes = field_lines(normal_field(compliance), pressure, probes, threshold=threshold)
     return f, amplitudes[..., 0]
@@ -228,10 +225,7 @@ def flat_body(
     -------
     Response, displacement (t, p) in metre
 
-    Raises
-    ------
-    ValueError
-        If the focus is not Gaussian, or as `pressure.check_lines` does.
+    Raises a ValueError if the focus is not Gaussian, or as `pressure.check_lines` does.
     """
     started = time.perf_counter()
     probes, times = np.atleast_2d(np.array(probes, np.float64)), np.array(times)

@@ -79,10 +79,7 @@ def transfer(stack: Stack, depths: Sequence[float]) -> Transfer:
     Pa/Pa, of the field of a surface pressure J0(kr) exp(i w t); of a free stack 0 as in
     `surface_compliance`.
 
-    Raises
-    ------
-    ValueError
-        If a depth is outside the stack.
+    Raises a ValueError if a depth is outside the stack.
     """
     for depth in depths:
         if not (0 <= depth <= stack.thickness and isfinite(depth)):

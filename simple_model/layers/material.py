@@ -50,10 +50,7 @@ class Orthotropy:
     poisson_xy : float, contraction along y under a stress along x, 0 or above
     shear_xy : float, Pa, or None for sqrt(E_x E_y) / 2 (1 + sqrt(nu_xy nu_yx))
 
-    Raises
-    ------
-    ValueError
-        If a modulus is not finite and above 0, or the contraction is out of range.
+    Raises a ValueError if a modulus is not finite and above 0, or the contraction is out of range.
     """
 
     young_x: float
@@ -126,11 +123,8 @@ class Material:
     orthotropy : in-plane moduli of a sheet, whose isotropic mean has `shear_modulus` and `poisson`,
         or None
 
-    Raises
-    ------
-    ValueError
-        If a value is not finite or outside these limits, or a law is given beside other losses or
-        an orthotropy.
+    Raises a ValueError if a value is not finite or outside these limits, or a law is given beside
+    other losses or an orthotropy.
     """
 
     density: float

@@ -137,10 +137,7 @@ class ModulusTable:
     frequencies : (k,) Hz, ascending and above 0; the first may be 0, with a loss modulus of 0
     moduli : (k,) complex, Pa, with real parts above 0 and imaginary parts of 0 or above
 
-    Raises
-    ------
-    ValueError
-        If these are none, or not those of a passive, causal solid.
+    Raises a ValueError if these are none, or not those of a passive, causal solid.
     """
 
     frequencies: tuple[float, ...]
@@ -256,10 +253,7 @@ def modulus_table(text: str) -> ModulusTable:
     """Table of complex shear moduli from CSV with the columns frequency_hz, storage_pa and loss_pa
     in any order; lines that begin with # are left out, rows may be in any order.
 
-    Raises
-    ------
-    ValueError
-        If a column is missing, an entry is no number, or as `ModulusTable` does.
+    Raises a ValueError if a column is missing, an entry is no number, or as `ModulusTable` does.
     """
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     header, *rows = [[cell.strip() for cell in line.split(",")] for line in lines] or [[]]

@@ -131,10 +131,7 @@ def fit_prony(
     PronySeries
         With its deviation; of a noisy law the shortest that is about as near as any.
 
-    Raises
-    ------
-    ValueError
-        If the law is not passive or not causal in the band.
+    Raises a ValueError if the law is not passive or not causal in the band.
     """
     count = 2 + round(PER_DECADE * np.log10(band[1] / band[0]))
     f = np.unique([*np.geomspace(*band, count), *(x for x in frequencies if x > 0)])

@@ -21,11 +21,8 @@ class Stack:
         "free", nothing, or "elastic", a Winkler foundation
     base_stiffness : N/m3, traction per displacement of an elastic base, in every direction
 
-    Raises
-    ------
-    ValueError
-        If there is no layer, their numbers differ, a thickness is out of range, the base is
-        another, or an elastic one has no stiffness.
+    Raises a ValueError if there is no layer, their numbers differ, a thickness is out of range, the
+    base is another, or an elastic one has no stiffness.
     """
 
     materials: tuple[Material, ...]

@@ -109,10 +109,7 @@ def point_integrals(
     negligible : a batch of frequencies in which each integral stays below this fraction of its
         largest value so far is the last one computed; for frequencies that rise
 
-    Raises
-    ------
-    ArithmeticError
-        If the wavenumber grid cannot be made fine enough.
+    Raises an ArithmeticError if the wavenumber grid cannot be made fine enough.
     """
     r = np.atleast_1d(np.asarray(distances, np.float64))
     w = np.atleast_1d(np.asarray(frequencies, np.complex128))

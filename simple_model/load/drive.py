@@ -30,10 +30,7 @@ class DriveLaw:
     words : str, a few more for a choice on a page
     note : str, a sentence for pages about the lines that it makes of AM
 
-    Raises
-    ------
-    ValueError
-        If it is no polynomial of its degree in the modulation.
+    Raises a ValueError if it is no polynomial of its degree in the modulation.
     """
 
     name: str

@@ -56,10 +56,7 @@ class PressureMap:
     x, y : (i,) and (j,) metre from the focus, ascending
     pressure : (i, j) of any unit, its largest above 0
 
-    Raises
-    ------
-    ValueError
-        If they are no such grid.
+    Raises a ValueError if they are no such grid.
     """
 
     x: Floats
@@ -110,10 +107,7 @@ class ContactSpot:
     ----------
     width : float, metre, standard deviation
 
-    Raises
-    ------
-    ValueError
-        If the width is outside `CONTACTS`.
+    Raises a ValueError if the width is outside `CONTACTS`.
     """
 
     width: float
@@ -140,10 +134,7 @@ def read_pressure_map(path: str | Path) -> PressureMap:
     """Pressure map from a CSV file with a header and columns x and y in mm, pressure in any unit;
     one row for each point of a grid, in any order.
 
-    Raises
-    ------
-    ValueError
-        If the file cannot be read, or its points are no grid.
+    Raises a ValueError if the file cannot be read, or its points are no grid.
     """
     try:
         table = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
@@ -183,10 +174,7 @@ def array_field(points: ArrayLike, focus: ArrayLike) -> NDArray[np.complex128]:
 def relative_intensity(height: float) -> float:
     """Intensity at a height in metre relative to 200 mm, where it is greatest.
 
-    Raises
-    ------
-    ValueError
-        If the height is outside 20..600 mm.
+    Raises a ValueError if the height is outside 20..600 mm.
     """
     low, high = _HEIGHTS[[0, -1]]
     if not low <= 1e3 * height <= high:

@@ -53,10 +53,8 @@ class MovingPressure:
     heading : "x" or "y", the component of the path's unit tangent that multiplies it, as of a
         traction along the path; or "", none
 
-    Raises
-    ------
-    ValueError
-        If a value is unknown, not finite or out of range, or a path without tangent has a heading.
+    Raises a ValueError if a value is unknown, not finite or out of range, or a path without tangent
+    has a heading.
     """
 
     tacton: Tacton

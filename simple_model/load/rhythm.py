@@ -25,10 +25,7 @@ class Rhythm:
     pulses : (n, 2), s: how long each pulse lasts, above 0, and the gap after it, 0 or above
     ramp : float, s, linear rise at the start of each pulse and fall at its end, both within it
 
-    Raises
-    ------
-    ValueError
-        If there is no pulse, or a value is not finite or out of range.
+    Raises a ValueError if there is no pulse, or a value is not finite or out of range.
     """
 
     pulses: tuple[tuple[float, float], ...]
@@ -98,10 +95,7 @@ class Signal:
     role : "modulation" multiplies the AM sinusoids, within the drive law; "envelope" multiplies
         the amplitude, as a rhythm does
 
-    Raises
-    ------
-    ValueError
-        If there are no samples, or a value is unknown, not finite or out of range.
+    Raises a ValueError if there are no samples, or a value is unknown, not finite or out of range.
     """
 
     rate: float

@@ -196,10 +196,7 @@ def gain_orders(
     another the phases are doubled until harmonics in the upper half of the orders are below
     `ALIASED`.
 
-    Raises
-    ------
-    ValueError
-        If `MOST_PHASES` are not enough for that.
+    Raises a ValueError if `MOST_PHASES` are not enough for that.
     """
     law, n_tones = pressure.law, np.count_nonzero(tones(pressure.tacton))
     count = PHASES if law.degree is None else max(PHASES, 2 * law.degree + 2)

@@ -53,11 +53,8 @@ class Tacton:
     rhythm : Rhythm or None
     signal : Signal or None
 
-    Raises
-    ------
-    ValueError
-        If a value is not finite or out of range, or a path with levels of its own is given a rhythm
-        or a signal.
+    Raises a ValueError if a value is not finite or out of range, or a path with levels of its own
+    is given a rhythm or a signal.
     """
 
     amplitude: float = 1.0

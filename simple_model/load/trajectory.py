@@ -59,10 +59,7 @@ class Trajectory:
     hold : bool, whether a recording stays at a point until the next (zero-order hold, what
         devices do), rather than going there in a straight line
 
-    Raises
-    ------
-    ValueError
-        If a value is unknown, not finite or out of range.
+    Raises a ValueError if a value is unknown, not finite or out of range.
     """
 
     shape: str = "point"
@@ -280,10 +277,7 @@ def timed_path(position: Callable[[Floats], Floats], period: float) -> Trajector
     """Recorded path whose positions (k, 2) in metre are a function of times (k,) in s, from 0 to
     `period`, within `STRAIGHT`.
 
-    Raises
-    ------
-    ValueError
-        If the function jumps, or returns no positions.
+    Raises a ValueError if the function jumps, or returns no positions.
     """
     count = 64
     while count < MOST_POINTS:
@@ -316,10 +310,8 @@ def joined(paths: Sequence[Trajectory], frequency: float) -> Trajectory:
     paths : named shapes; each is drawn `frequency` times a second, whatever its own speed
     frequency : float, Hz, above 0
 
-    Raises
-    ------
-    ValueError
-        If there is no path, one has points of its own, or the frequency is not above 0.
+    Raises a ValueError if there is no path, one has points of its own, or the frequency is not
+    above 0.
     """
     if not paths:
         raise ValueError("no paths to join; give one for each focus")

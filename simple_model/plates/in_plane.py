@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from simple_model.plates.modes import Plate, outside_clips
-from simple_model.plates.polynomials import LineBasis, continuous_basis
+from simple_model.plates.polynomials import LineBasis, continuous_basis, gauss_points
 from simple_model.typing import Floats
 
 # Whether a supported edge holds the in-plane displacement across it, and along it.
@@ -45,7 +45,8 @@ class Grid:
     def of(breaks: Sequence[Floats], split: Sequence[bool], degrees: Sequence[list[int]]) -> Grid:
         """The grid that integrates products of two polynomials of these degrees exactly."""
         (x, of_x), (y, of_y) = (
-            _gauss(ends, [n + 2 for n in each]) for ends, each in zip(breaks, degrees, strict=True)
+            gauss_points(ends, [n + 2 for n in each])
+            for ends, each in zip(breaks, degrees, strict=True)
         )
         return Grid(
             breaks=(breaks[0], breaks[1]), split=(split[0], split[1]),
@@ -56,16 +57,6 @@ class Grid:
     def areas(self) -> Floats:
         """Areas (x, y) of the points, m2."""
         return np.outer(*self.weights)
-
-
-def _gauss(breaks: Floats, counts: Sequence[int]) -> tuple[Floats, Floats]:
-    """Gauss points and weights in metre on the pieces of a line."""
-    points, weights = [], []
-    for low, high, count in zip(breaks[:-1], breaks[1:], counts, strict=True):
-        nodes, each = np.polynomial.legendre.leggauss(count)
-        points.append((low + high) / 2 + (high - low) / 2 * nodes)
-        weights.append((high - low) / 2 * each)
-    return np.concatenate(points), np.concatenate(weights)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -134,10 +134,7 @@ def forced_motion(
     Motion
         At the n + 1 times 0, dt, ..., n dt.
 
-    Raises
-    ------
-    ArithmeticError
-        If a step is not finite.
+    Raises an ArithmeticError if a step is not finite.
     """
     scheme = _Scheme.of(plate, dt, material)
     M, K, B, rest = scheme.mass, scheme.K, scheme.bending, scheme.rest

@@ -61,10 +61,7 @@ class Plate:
     clip_radius : metre, half a side of the square that is; 0 fixes the deflection of a point alone
     air_density : kg/m3, 0 in vacuum
 
-    Raises
-    ------
-    ValueError
-        If a value is not finite or out of range, or a clip is off the plate.
+    Raises a ValueError if a value is not finite or out of range, or a clip is off the plate.
     """
 
     size_x: float

@@ -11,6 +11,7 @@ from simple_model.load.path_cells import path_samples
 from simple_model.load.pressure import MovingPressure
 from simple_model.load.spectrum import load_lines, path_forces
 from simple_model.plates.modes import PlateModes, modal_motion
+from simple_model.plates.polynomials import gauss_points
 from simple_model.typing import Complex, Floats
 
 MIDDLE = (0.0, 0.0)
@@ -61,7 +62,6 @@ def plate_lines(
 
 def _gauss(low: float, high: float, detail: float) -> tuple[Floats, Floats]:
     """Gauss points and weights (k,) in metre between two places, for a detail in metre."""
-    half = max(high - low, 0.0) / 2
-    count = int(np.ceil(np.pi * half / (CLOSEST * detail))) + SPARE
-    nodes, weights = np.polynomial.legendre.leggauss(count)
-    return np.asarray((low + high) / 2 + half * nodes), np.asarray(half * weights)
+    high = max(low, high)
+    count = int(np.ceil(np.pi / 2 * (high - low) / (CLOSEST * detail))) + SPARE
+    return gauss_points(np.array([low, high]), [count])

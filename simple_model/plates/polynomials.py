@@ -81,6 +81,16 @@ class LineBasis:
         return np.asarray((self.legendre[within] != 0).any(axis=(0, 1)))
 
 
+def gauss_points(breaks: Floats, counts: Sequence[int]) -> tuple[Floats, Floats]:
+    """So many Gauss points, and their weights, in metre on each piece of a line between breaks."""
+    points, weights = [], []
+    for low, high, count in zip(breaks[:-1], breaks[1:], counts, strict=True):
+        nodes, each = legendre.leggauss(count)
+        points.append((low + high) / 2 + (high - low) / 2 * nodes)
+        weights.append((high - low) / 2 * each)
+    return np.concatenate(points), np.concatenate(weights)
+
+
 def line_basis(
     length: float, ends: Sequence[str], degree: int, split: bool
 ) -> tuple[LineBasis, ...]:
@@ -109,11 +119,7 @@ def piecewise_basis(
     split : whether even and odd functions are apart, in two bases, where both ends and all breaks
         are alike
     """
-    breaks = np.asarray(breaks, np.float64)
-    functions = np.stack([*_hermite(breaks, ends, degrees), *_inner(degrees)], axis=2)
-    if not split:
-        return (_basis(breaks, functions),)
-    return tuple(_basis(breaks, part) for part in _symmetric(functions))
+    return _pieces(breaks, ends, degrees, split, "clamped")
 
 
 def continuous_basis(
@@ -123,32 +129,21 @@ def continuous_basis(
     has no meaning; otherwise as `piecewise_basis`, with ends of "simply", which holds the value, or
     "free".
     """
-    breaks = np.asarray(breaks, np.float64)
     if len(breaks) == 2:
         return line_basis(float(np.ptp(breaks)), ends, degrees[0], split)
-    inner = _inner(degrees, ("simply", "simply"))
-    functions = np.stack([*_hats(breaks, ends, degrees), *inner], axis=2)
+    return _pieces(breaks, ends, degrees, split, "simply")
+
+
+def _pieces(
+    breaks: Floats, ends: Sequence[str], degrees: Sequence[int], split: bool, inner: str
+) -> tuple[LineBasis, ...]:
+    """Bases of functions that are continuous in what a support of a bubble, `inner`, fixes."""
+    breaks = np.asarray(breaks, np.float64)
+    nodal = _at_breaks(breaks, ends, degrees, FIXED[inner])
+    functions = np.stack([*nodal, *_inner(degrees, (inner, inner))], axis=2)
     if not split:
         return (_basis(breaks, functions),)
     return tuple(_basis(breaks, part) for part in _symmetric(functions))
-
-
-def _hats(breaks: Floats, ends: Sequence[str], degrees: Sequence[int]) -> Iterator[Floats]:
-    """Coefficients (e, n) of a function of each value at a break that is not held, orthogonal to
-    the bubbles.
-    """
-    last = len(breaks) - 1
-    for k in range(last + 1):
-        if {0: ends[0], last: ends[1]}.get(k, "free") != "free":
-            continue
-        found = np.zeros((last, max(degrees) + 1))
-        for piece, side in ((k - 1, 1), (k, -1)):
-            if 0 <= piece < last:
-                n = np.arange(degrees[piece] + 1)
-                rows = np.array([_at_end(n, 0, side), _at_end(n, 0, -side)])
-                size = breaks[piece + 1] - breaks[piece]
-                found[piece, : len(n)] = np.sqrt(size) * np.linalg.pinv(rows)[:, 0]
-        yield found / np.linalg.norm(found)
 
 
 def _basis(breaks: Floats, coefficients: Floats) -> LineBasis:
@@ -168,36 +163,40 @@ def _basis(breaks: Floats, coefficients: Floats) -> LineBasis:
     )  # fmt: skip
 
 
-def _hermite(breaks: Floats, ends: Sequence[str], degrees: Sequence[int]) -> Iterator[Floats]:
-    """Coefficients (e, n) of a function of each value and each slope at a break that is not fixed,
-    orthogonal to the bubbles.
+def _at_breaks(
+    breaks: Floats, ends: Sequence[str], degrees: Sequence[int], derivatives: Sequence[int]
+) -> Iterator[Floats]:
+    """Coefficients (e, n) of a function of each value, and each slope, at a break that is not
+    fixed, orthogonal to the bubbles.
     """
-    sizes, last = np.diff(breaks), len(breaks) - 1
-    of_piece = [_end_functions(*each) for each in zip(degrees, sizes, strict=True)]
+    last, count = len(breaks) - 1, len(derivatives)
+    of_piece = [
+        _end_functions(*each, derivatives) for each in zip(degrees, np.diff(breaks), strict=True)
+    ]
     for k in range(last + 1):
         end = ends[0] if k == 0 else ends[1] if k == last else "free"
-        for derivative in sorted({0, 1} - set(FIXED[end])):
+        for derivative in sorted({*derivatives} - {*FIXED[end]}):
             found = np.zeros((last, max(degrees) + 1))
             for piece, side in ((k - 1, 1), (k, 0)):
                 if 0 <= piece < last:
-                    found[piece, : degrees[piece] + 1] = of_piece[piece][2 * side + derivative]
+                    found[piece, : degrees[piece] + 1] = of_piece[piece][count * side + derivative]
             yield found / np.linalg.norm(found)
 
 
-def _end_functions(degree: int, size: float) -> Floats:
-    """Coefficients (4, n) of the smallest polynomials of value 1 at the low end of a piece, of
-    slope 1 there, and of these at the high end; the other three are 0.
+def _end_functions(degree: int, size: float, derivatives: Sequence[int]) -> Floats:
+    """Coefficients (2 d, n) of the smallest polynomials of one derivative of 1 at the low end of a
+    piece, then at the high end, the others of which are 0.
     """
     n = np.arange(degree + 1)
-    rows = np.array([_at_end(n, derivative, side) for side in (-1, 1) for derivative in (0, 1)])
-    scale = np.tile([np.sqrt(1 / size), np.sqrt(1 / size) * 2 / size], 2)
+    rows = np.array(
+        [_at_end(n, derivative, side) for side in (-1, 1) for derivative in derivatives]
+    )
+    scale = np.tile([np.sqrt(1 / size) * (2 / size) ** each for each in derivatives], 2)
     strength = np.linalg.norm(rows, axis=1)
     return np.asarray(np.linalg.pinv(rows / strength[:, None]) / strength / scale).T
 
 
-def _inner(
-    degrees: Sequence[int], ends: Sequence[str] = ("clamped", "clamped")
-) -> Iterator[Floats]:
+def _inner(degrees: Sequence[int], ends: Sequence[str]) -> Iterator[Floats]:
     """Coefficients (e, n) of the bubbles of each piece: those that meet the supports of its ends,
     orthonormal, each even or odd about its middle.
     """
