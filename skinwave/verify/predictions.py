@@ -33,16 +33,6 @@ BODIES: Mapping[str, Body] = {
        for name in ("forearm", "palm", "palm-stiff")},
     **{name: PRESETS[name] for name in ("skin-slab", "palm-layers", "forearm-layers")},
 }  # fmt: skip
-WORDS: Mapping[str, str] = {
-    "forearm": "half-space, Kelvin-Voigt, from Zhang's constants",
-    "palm": "half-space, Kelvin-Voigt, chosen for an optimum speed of the focus of 5 m/s",
-    "palm-stiff": "half-space, Kelvin-Voigt, chosen for an optimum speed of 7 m/s",
-    "skin-slab": "15 mm of palm on rigid bone",
-    "palm-layers": "epidermis, dermis, fat and muscle on rigid bone, 25 mm, fitted within "
-    "published ranges",
-    "forearm-layers": "epidermis, dermis, hypodermis and muscle on rigid bone, 20 mm; upper layers "
-    "of Feng's moduli, the rest fitted within published ranges",
-}
 GRID = np.arange(10.0, 701.0, 10.0)  # Hz: fine enough for modes to be tracked
 AT_REST = 1e-3  # Hz, in place of 0, where a half-space without loss has its static speed
 FITTED = (0.010, 0.040)  # m, between which an exponent is fitted

@@ -8,18 +8,10 @@ from numpy.typing import NDArray
 from scipy.integrate import simpson, solve_bvp, solve_ivp
 from scipy.linalg import eigh
 from scipy.optimize import brentq
-from scipy.special import ellipe, ive, jv
+from scipy.special import ive, jv
 
 Floats = NDArray[Any]  # float64
 Complex = NDArray[Any]  # complex128
-
-
-def boussinesq_disc(r: float, *, radius: float, young: float, poisson: float) -> float:
-    """Deflection under a disc of 1 Pa on a half-space, r <= radius; 4 (1 - nu^2) a E(r/a) / pi E.
-
-    K L Johnson, Contact Mechanics (1985), section 3.4.
-    """
-    return float(4 * (1 - poisson**2) * radius * ellipe((r / radius) ** 2) / np.pi / young)
 
 
 def gaussian_at_rest(r: Floats, *, width: float, shear_modulus: float, poisson: float) -> Floats:

@@ -18,7 +18,7 @@ from skinwave.system.effort import Progress
 from skinwave.system.numbers import significant
 from skinwave.system.table import Column, Table
 from skinwave.verify import predictions
-from skinwave.verify.predictions import BODIES, FOUND, Curves, Finger, Harmonics, Sweep
+from skinwave.verify.predictions import BODIES, FOUND, Curves, Finger, Harmonics
 from skinwave.verify.published import (
     ALL,
     EXPONENT,
@@ -59,10 +59,6 @@ WAVES = (
     "each preset that moves the surface most at the edge of the focal spot (half-spaces solid, "
     "layers on bone dashed); a line breaks where another mode takes the lead, and is missing where "
     "none propagates. Lengths are those of plane waves, without geometric spreading."
-)
-FOCUS = (
-    "Largest deflection on a circle under a constant pressure that runs along it, by the "
-    "wavenumber integral; triangles: its maximum. Grey: the published range."
 )
 HARMONICS = (
     f"{predictions.PHANTOM} (abstract): sine AM gives {FOUND['sine']}, square AM "
@@ -126,13 +122,11 @@ def compared(published: Published, body: str, ours: Iterable[float]) -> list[Com
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Validation:
-    """Waves and sweeps by body, rows of all sets, harmonics, and decay along a finger if asked."""
+    """Waves by body, rows of all sets, and harmonics."""
 
     curves: Mapping[str, Curves]
-    sweeps: Mapping[str, tuple[Sweep, ...]]
     rows: tuple[Compared, ...]
     harmonics: tuple[Harmonics, ...]
-    finger: Finger | None = None
 
 
 def validate(report: Progress, *, hand: Path | None = None) -> Validation:
@@ -148,22 +142,15 @@ def validate(report: Progress, *, hand: Path | None = None) -> Validation:
     ValueError
         If the file of the hand is not there or is no body.
     """
-    finger = predictions.along_finger(hand, report) if hand else None
+    of_hand = compare_finger(predictions.along_finger(hand, report)) if hand else []
     report("waves", 0.02)
     curves = {name: predictions.leading_wave(body) for name, body in BODIES.items()}
     rows = compare_waves(curves)
     report("speed of the focus", 0.15)
-    sweeps = {
-        name: tuple(predictions.focus_speeds(BODIES[name], x) for x in predictions.PERIMETERS)
-        for name in OPTIMUM.bodies
-    }
-    rows += [row for name, each in sweeps.items() for one in each for row in _optima(name, one)]
-    rows += compare_finger(finger) if finger else []
+    rows += [row for name in OPTIMUM.bodies for row in compare_optima(name)]
     report("harmonics", 0.4)
-    return Validation(
-        curves=curves, sweeps=sweeps, rows=tuple(rows), harmonics=tuple(predictions.harmonics()),
-        finger=finger,
-    )  # fmt: skip
+    harmonics = tuple(predictions.harmonics())
+    return Validation(curves=curves, rows=(*rows, *of_hand), harmonics=harmonics)
 
 
 def compare_waves(curves: Mapping[str, Curves]) -> list[Compared]:
@@ -179,15 +166,14 @@ def compare_waves(curves: Mapping[str, Curves]) -> list[Compared]:
             for row in compared(each, name, ours(each, name))]  # fmt: skip
 
 
-def _optima(body: str, sweep: Sweep) -> list[Compared]:
-    """Rows of the optimum of a body: of the largest deflection and peak to peak."""
-    return [
-        row for what, speed in sweep.optima().items()
-        for row in compared(
-            replace(OPTIMUM, name=f"{OPTIMUM.name}, {what}, {1e3 * sweep.perimeter:g} mm around"),
-            body, [speed],
-        )
-    ]  # fmt: skip
+def compare_optima(body: str) -> list[Compared]:
+    """Rows of the speed of the focus at which a body deflects most, on circles of two sizes."""
+    rows = []
+    for perimeter in predictions.PERIMETERS:
+        for what, speed in predictions.focus_speeds(BODIES[body], perimeter).optima().items():
+            name = f"{OPTIMUM.name}, {what}, {1e3 * perimeter:g} mm around"
+            rows += compared(replace(OPTIMUM, name=name), body, [speed])
+    return rows
 
 
 def compare_finger(finger: Finger) -> list[Compared]:
@@ -225,19 +211,17 @@ def verdict(found: Validation) -> list[str]:
         apart = max(high / low for low, high in zip(band.lows, band.highs, strict=True))
         sentences.append(f"The sources themselves differ in {quantity.name} by a factor of up to "
                          f"{significant(apart, 2)} at one frequency.")  # fmt: skip
-    optima = [f"{name} {' and '.join(significant(each.optima()['largest'], 2) for each in sweeps)}"
-              for name, sweeps in found.sweeps.items()]  # fmt: skip
-    around = " and ".join(f"{1e3 * each:g}" for each in predictions.PERIMETERS)
+    optima = [f"{row.body} {significant(row.ours, 2)}" for row in own
+              if row.published.name.startswith(f"{OPTIMUM.name}, largest")]  # fmt: skip
     sentences.append(
-        f"Speeds in m/s of the largest deflection, on circles of {around} mm around, where "
-        f"{OPTIMUM.lows[0]:g} to {OPTIMUM.highs[0]:g} are published: {'; '.join(optima)}."
+        f"Predicted speeds of the focus at the largest deflection are {', '.join(optima)} m/s; "
+        f"{OPTIMUM.lows[0]:g} to {OPTIMUM.highs[0]:g} m/s is published."
     )
     for wave, words in FOUND.items():
         right = [h.drive for h in found.harmonics if h.wave == wave and h.agrees]
         sentences.append(f"As in the phantom, {wave} AM has {words} with {' and '.join(right)}.")
-    if found.finger:
-        lengths = ", ".join(significant(1e3 * x, 2) for x in found.finger.lengths)
-        sentences.append(f"Along a finger of the hand motion falls to 1/e in {lengths} mm.")
+    if lengths := [significant(1e3 * row.ours, 2) for row in found.rows if row.body == HAND]:
+        sentences.append(f"Along a finger motion falls to 1/e in {', '.join(lengths)} mm.")
     return sentences
 
 
@@ -258,8 +242,6 @@ def report(found: Validation) -> Report:
         Details("Every value", [_table(rows)]),
         Section("Speed and decay of waves",
                 [_picture("waves", _waves, (11.5, 5.6), WAVES, found.curves)]),
-        Section("Speed of the focus at the largest deflection",
-                [_picture("focus-speed", _speeds, (10.5, 3.8), FOCUS, found.sweeps)]),
         Section("Harmonics of amplitude-modulated radiation force", [HARMONICS, harmonics]),
         Section("Sources", [Table(
             ["set", "site", "conditions", "source", "how sure", "contradictions and assumptions"],
@@ -267,7 +249,6 @@ def report(found: Validation) -> Report:
         )]),
         Section("Published, and not compared",
                 [Table(["source", "what", "why not"], NOT_COMPARED)]),
-        Section("Presets", [Table(["name", "what it is"], list(predictions.WORDS.items()))]),
     ])  # fmt: skip
 
 
@@ -386,19 +367,3 @@ def _sources(ax: Axes, quantity: Quantity) -> None:
         errors = np.stack([middle - low, high - middle]) if each.lows else None
         ax.errorbar(each.frequencies, middle, errors, fmt=marker, ms=5, color="k", mfc="w", lw=1,
                     capsize=2, label=f"{each.name}, {each.site}", zorder=3)  # fmt: skip
-
-
-def _speeds(figure: Figure, sweeps: Mapping[str, tuple[Sweep, ...]]) -> None:
-    """Largest deflection on the path over the speed of the focus, a panel for each perimeter."""
-    axes = figure.subplots(1, len(predictions.PERIMETERS), sharey=True)
-    for k, ax in enumerate(axes):
-        ax.axvspan(OPTIMUM.lows[0], OPTIMUM.highs[0], color=BAND, lw=0)
-        for name, of_body in sweeps.items():
-            each = of_body[k]
-            ax.plot(each.speeds, each.largest / each.largest.max(), label=name, **_style(name))
-            ax.plot(each.optima()["largest"], 1, "v", color=COLOURS[name], ms=6)
-        ax.set(title=f"circle of {1e3 * predictions.PERIMETERS[k]:g} mm around", ylim=(0, 1.08),
-               xlabel="speed of the focus, m/s")  # fmt: skip
-        ax.grid(alpha=0.25)
-    axes[0].set_ylabel("largest deflection over its maximum")
-    axes[-1].legend(fontsize=8, frameon=False)

@@ -20,8 +20,7 @@ GATE = (
     "patch", "patch-quadratic", "slivers", "inverted", "incompressible", "manufactured",
     "stiffness-contrast", "fingertip-with-bone", "thin-sheets", "in-plane-shear", "moving-force",
     "air-operator", "rayleigh", "oblique-sh", "exact-half-space", "exact-slab", "exact-sheet",
-    "numerical-damping", "kelvin-voigt", "relaxing-column", "degenerate-paths", "durations",
-    "sampling", "elastica", "rigid-rotation", "tangent",
+    "numerical-damping", "columns", "degenerate-paths", "durations", "elastica", "tangent",
 )  # fmt: skip
 
 
