@@ -7,7 +7,6 @@ L2 norm, and of the level of the strongest line in dB.
 """
 
 import argparse
-import json
 import tempfile
 from dataclasses import replace
 from importlib import resources
@@ -17,7 +16,6 @@ from shutil import copytree
 import numpy as np
 from playwright.sync_api import sync_playwright
 
-import skinwave
 from skinwave.live.packs import pack_of
 from skinwave.live.page import bundle
 from skinwave.live.records import record_of
@@ -59,15 +57,10 @@ def answers(record: dict, cases: list[dict]) -> list[dict]:
         return page.evaluate("given => window.answer(given)", {"record": record, "cases": cases})
 
 
-def of_body(name: str, count: int, waveforms: int, kept: Path | None) -> None:
+def of_body(name: str, count: int, waveforms: int) -> None:
     """Print the errors of a body."""
     body, rng = BODIES[name], np.random.default_rng(7)
-    if kept and kept.exists():
-        pack = json.loads(kept.read_text())
-    else:
-        pack = pack_of(body)
-        if kept:
-            kept.write_text(json.dumps(pack))
+    pack = pack_of(body)
     lines_of, waveform_of, places = exact(body)
     scenes = [random_scene(body, rng, pack["lowest_height_mm"] / 1e3, places) for _ in range(count)]
     scenes = [
@@ -85,27 +78,20 @@ def of_body(name: str, count: int, waveforms: int, kept: Path | None) -> None:
         amplitudes = np.array(own["re"]) + 1j * np.array(own["im"])
         at = {round(x, 3): a for x, a in zip(own["f"], amplitudes, strict=True)}
         heard = (f > 1e-6) & (f <= HIGHEST)
-        f, exactly = f[heard], exactly[heard]
-        if not len(f):
+        size = np.abs(exactly[heard])
+        if not len(size):
             continue
-        size = np.abs(exactly)
+        ours = np.array([at.get(round(x, 3), 0.0) for x in f[heard]])
         strong = size > SHOWN * size.max()
-        for x, a, share in zip(f[strong], exactly[strong], size[strong] / size.max(), strict=True):
-            errors.append((abs(at.get(round(x, 3), 0.0) - a) / abs(a), share))
+        errors += (np.abs(ours - exactly[heard]) / size)[strong].tolist()
         best = int(size.argmax())
-        levels.append(abs(20 * np.log10(abs(at.get(round(f[best], 3), 0.0)) / size[best])))
+        levels.append(abs(20 * np.log10(abs(ours[best]) / size[best])))
         if k < waveforms:
             u = waveform_of(scene)
             of_waves.append(np.linalg.norm(np.array(own["u"]) - u) / np.linalg.norm(u))
-    sizes = np.array([error for error, _ in errors])
-    loud = np.array([error for error, share in errors if share > 0.1])
-    print(
-        f"{name}: {len(scenes)} Tactons, {len(errors)} lines; error of lines above -40 dB: median "
-        f"{np.median(sizes):.1e}, 90 % {np.quantile(sizes, 0.9):.1e}, largest {sizes.max():.1e}; "
-        f"above -20 dB: 90 % {np.quantile(loud, 0.9):.1e}, largest {loud.max():.1e}; "
-        f"level {max(levels):.2f} dB; waveform: largest {max(of_waves, default=np.nan):.1e}",
-        flush=True,
-    )
+    print(f"{name:<16}{len(errors):6d}{np.median(errors):10.1e}{np.quantile(errors, 0.9):10.1e}"
+          f"{max(errors):10.1e}{max(levels):8.2f} dB{max(of_waves, default=np.nan):10.1e}",
+          flush=True)  # fmt: skip
 
 
 def main() -> None:
@@ -114,13 +100,12 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--waveforms", type=int, default=20)
     parser.add_argument("--body", nargs="*", default=BODY)
-    parser.add_argument("--packs", type=Path, help="folder that keeps packs from run to run")
     given = parser.parse_args()
+    print(f"{'body':<16}{'lines':>6}{'median':>10}{'90 %':>10}{'largest':>10}{'level':>11}"
+          f"{'waveform':>10}")  # fmt: skip
     for name in given.body:
-        kept = given.packs / f"{name}.json" if given.packs else None
-        of_body(name, given.count, given.waveforms, kept)
+        of_body(name, given.count, given.waveforms)
 
 
 if __name__ == "__main__":
-    print(f"skinwave {skinwave.__version__}")
     main()
