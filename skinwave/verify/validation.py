@@ -201,7 +201,7 @@ def verdict(found: Validation) -> list[str]:
                             (EXPONENT, "Decay exponents")):  # fmt: skip
         of = [row for row in own if row.published.quantity is quantity]
         parts = [
-            f"{outcome} the published in {len(group)} of {len(of)}, by {_median(group)}"
+            f"{outcome} the published in {len(group)} of {len(of)}, by a factor of {_median(group)}"
             for outcome in (BELOW, ABOVE)
             if (group := [row for row in of if row.outcome == outcome])
         ]
