@@ -143,10 +143,6 @@ def recording(arrays: Arrays, given: Given) -> Recording:
     arrays : arrays of numbers and texts, by name; of a structure as "structure.name"
     given : Given, whose variable is the array of motion
 
-    Returns
-    -------
-    Recording
-
     Raises
     ------
     ValueError

@@ -78,10 +78,6 @@ def by_name(
     lines : MeasuredLines
     unresolved : names of the others
     spectrum : frequencies (f,) in Hz and amplitudes (f, p)
-
-    Returns
-    -------
-    LinesByName
     """
     size = np.abs(lines.mean)
     around = lines.radius(1 - (1 - CONFIDENCE) / max(size.size, 1))

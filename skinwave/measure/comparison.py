@@ -169,10 +169,6 @@ def compare_measured(asked: Measured, runs: Sequence[Run]) -> MeasuredComparison
     asked : Measured
     runs : of one Tacton, at the places of the measurement and, of bodies, in its quantity
 
-    Returns
-    -------
-    MeasuredComparison
-
     Raises
     ------
     ValueError

@@ -128,10 +128,6 @@ def fit(
     samples : steps of each walker that samples the posterior; 0 for none
     progress : called with the name of the phase and the fraction done
 
-    Returns
-    -------
-    Fit
-
     Raises
     ------
     ValueError

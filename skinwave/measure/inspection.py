@@ -78,10 +78,6 @@ def inspect(measured: Measurement, *, alarm: float = ALARM) -> Inspection:
     measured : Measurement
     alarm : probability that noise alone has any line, 0..1
 
-    Returns
-    -------
-    Inspection
-
     Raises
     ------
     ValueError
@@ -207,10 +203,6 @@ def hum_of(
     lines : of a record
     duration : of it, s
     driven : numbers of lines that are in the recorded drive, whose multiples are none of the mains
-
-    Returns
-    -------
-    names by number
     """
     found: dict[int, str] = {}
     for mains, line, first in _bases(lines, driven):

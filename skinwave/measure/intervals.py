@@ -163,10 +163,6 @@ def widening(residual: Floats, rows: Floats) -> Floats:
     ----------
     residual : (n, s) float
     rows : (k, n, s) float, combinations P of the errors
-
-    Returns
-    -------
-    (k,) float
     """
     power = np.abs(np.fft.fft(residual, axis=0)) ** 2 / len(residual)
     power[0] = power[1:3].mean(axis=0)  # a fit may have taken the mean out
@@ -366,10 +362,6 @@ def posterior(solution: Solution, steps: int, seed: int, progress: Progress) -> 
     steps : of each walker
     seed : of the walkers
     progress : called with the name of the phase and the fraction done
-
-    Returns
-    -------
-    Posterior
 
     Raises
     ------

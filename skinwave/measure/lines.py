@@ -159,10 +159,6 @@ def lines_of(
     frequencies : (f,) float, Hz, lines that the measurement resolves; see `measurable`
     settle : fraction of waveforms that is left out at their start
 
-    Returns
-    -------
-    MeasuredLines
-
     Raises
     ------
     ValueError

@@ -145,10 +145,6 @@ def data_of(kind: str, measured: Measurement, aim: Target) -> Data:
     measured : Measurement
     aim : Target, whose model predicts them
 
-    Returns
-    -------
-    Data
-
     Raises
     ------
     ValueError

@@ -125,10 +125,6 @@ def target(scene: Scene, model: str, quantity: Quantity, places: Floats) -> Targ
     quantity : Quantity, of the normal motion
     places : (p, 2) float, metre
 
-    Returns
-    -------
-    Target
-
     Raises
     ------
     ValueError
@@ -163,10 +159,6 @@ def with_reduction(aim: Target, parameters: Parameters, progress: Progress) -> T
     aim : Target
     parameters : Parameters of the fit
     progress : called with the name of the phase and the fraction done
-
-    Returns
-    -------
-    Target
     """
     ranges = {each.key: (each.low, each.high) for each in parameters.free}
     ranges = {key: ranges[key] for key in aim.rest(dict.fromkeys(ranges, 1.0))}

@@ -115,10 +115,6 @@ def read(
     columns : headings or numbers from 1 of the columns or channels of motion
     direction : "x", "y" or "z", of the motion in a Universal File with several
 
-    Returns
-    -------
-    Measurement
-
     Raises
     ------
     ValueError

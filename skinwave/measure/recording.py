@@ -93,10 +93,6 @@ def completed(found: Recording, given: Given, path: Path) -> Measurement:
     given : Given
     path : of the file
 
-    Returns
-    -------
-    Measurement
-
     Raises
     ------
     ValueError

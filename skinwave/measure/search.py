@@ -175,10 +175,6 @@ def solve(problem: Problem, starts: int, seed: int, progress: Progress) -> Solut
     seed : of the hypercube
     progress : called with the name of the phase and the fraction done
 
-    Returns
-    -------
-    Solution
-
     Raises
     ------
     ValueError
@@ -268,10 +264,6 @@ def search(problem: Problem, starts: Sequence[Floats], progress: Progress) -> li
     problem : Problem
     starts : candidates (c, k) of each, points of the unit cube
     progress : called with the name of the phase and the fraction done
-
-    Returns
-    -------
-    list of Start
     """
     found: list[Start] = []
     lowest: list[tuple[Start, Start]] = []  # of each minimum the one that scans lead to
@@ -337,10 +329,6 @@ def refine(
     u : (k,) float
     most : steps
     tolerance : relative change of chi squared, below which they end
-
-    Returns
-    -------
-    Start
     """
     inside = np.clip(u, 1e-6, 1 - 1e-6)
     found = least_squares(

@@ -96,10 +96,6 @@ def spectral_lines(values: Floats, rate: float, *, alarm: float = ALARM) -> Line
     rate : Hz
     alarm : probability that noise alone has any line
 
-    Returns
-    -------
-    LineSpectrum
-
     Raises
     ------
     ValueError
@@ -288,10 +284,6 @@ def _fitted(x: Floats, start: Floats, rate: float, noise: Floats, fresh: int = 0
     rate : Hz
     noise : (l, q) one-sided densities at the lines
     fresh : how many lines, the last, are known to a bin only
-
-    Returns
-    -------
-    _Fit
     """
     found = start.copy()
     if fresh:

@@ -51,13 +51,13 @@ def test_intervals_of_white_residuals_stay_as_they_are():
 
 
 def test_intervals_under_coloured_noise_hold_the_truth():
-    """95 % of 200 draws; by independent errors it is 60 %."""
+    """95 % of 100 draws; by independent errors it is 60 %."""
     rng, inside, by_profile = np.random.default_rng(3), [], []
-    for draw in range(200):
+    for draw in range(100):
         found = fitted(1.3 * SHAPE[:, None] + 0.1 * coloured(rng, 0.8))
         truth = {"gain": 1.3, "offset_x_mm": 0.0}
         inside += [each.low <= truth[each.key] <= each.high for each in estimates(found)]
-        if draw < 40:
+        if draw < 20:
             by_profile += [p.low <= 1.3 <= p.high for p in profiles(found, quiet)[:1]]
-    assert 0.88 <= np.mean(inside) <= 0.99
-    assert np.mean(by_profile) >= 0.85
+    assert 0.86 <= np.mean(inside) <= 0.99
+    assert np.mean(by_profile) >= 0.8

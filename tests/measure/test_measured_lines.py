@@ -60,27 +60,6 @@ def test_lines_without_noise_are_those_that_were_put_in():
 
 
 @pytest.mark.parametrize("repetitions", [1, 4])
-def test_amplitudes_are_within_their_circles_as_often_as_is_said(repetitions):
-    rng = np.random.default_rng(repetitions)
-    truth = GAIN * np.exp(-2j * np.pi * LINES * DELAY)[:, None] * MODEL
-    inside = []
-    for _ in range(30):
-        found = lines_of(measured(rng, repetitions, 0.3), LINES)
-        inside.append(np.abs(found.mean - truth) < found.radius(0.95))
-    assert 0.93 < np.mean(inside) < 0.97
-
-
-def test_standard_errors_are_those_of_least_squares_of_white_noise():
-    """Under a window w the variance is 4 sigma^2 sum w^2 / (sum w)^2, more where lines are close;
-    w = 1 has the least, 4 sigma^2 / n.
-    """
-    rng = np.random.default_rng(8)
-    spread = np.mean([lines_of(measured(rng, 5, 0.3), LINES).variance * 5 for _ in range(20)])
-    least = 4 * 0.3**2 / (0.75 * SAMPLES)
-    assert least < spread < 4 * least
-
-
-@pytest.mark.parametrize("repetitions", [1, 4])
 def test_delay_and_gain_are_within_their_errors_as_often_as_is_said(repetitions):
     rng = np.random.default_rng(20 + repetitions)
     found = [
@@ -106,20 +85,6 @@ def test_a_delay_is_known_up_to_the_period_of_what_was_measured():
     found = align(lines, model)
     assert found.delay == pytest.approx(delay - 1 / 140, abs=5 * found.delay_error)
     assert found.repeats == pytest.approx(1 / 140, rel=1e-6)
-
-
-def test_two_incommensurate_lines_tell_delays_longer_than_either_period():
-    delay = 31.3e-3
-    f = np.array([140.0, 600 / np.pi])
-    model = MODEL[1:3]
-    each = np.exp(-2j * np.pi * f * delay)[:, None] * model + 0.002 * complex_noise(RNG, 4, 2, 4)
-    lines = MeasuredLines(
-        frequencies=f, each=each, variance=each.var(axis=0, ddof=1) / 4, freedom=6.0,
-        shifts=np.zeros(4),
-    )  # fmt: skip
-    found = align(lines, model, window=0.1)
-    assert found.delay == pytest.approx(delay, abs=5 * found.delay_error)
-    assert found.delay_error < 1e-5
 
 
 def test_delay_and_gain_can_be_given():
@@ -209,17 +174,6 @@ def test_a_hum_beside_a_line_does_not_move_its_noise():
     assert np.median(loud.variance[0] / calm.variance[0]) < 3
 
 
-def test_lines_that_leave_no_bins_between_have_a_noise_of_their_own():
-    """Nine lines 4.8 bins apart, whose middle ones have neighbours wherever noise is looked for."""
-    rng = np.random.default_rng(14)
-    times, f = np.arange(2000) / 4000, 300 + 12.68 * np.arange(9)
-    record = Measurement(quantity="velocity", places=np.zeros((300, 2)), times=times,
-                         values=rng.normal(size=(1, 2000, 300)))  # fmt: skip
-    found = lines_of(record, f)
-    true = (np.abs(found.mean) ** 2).mean(axis=1)
-    assert found.variance.mean(axis=1) / true == pytest.approx(np.ones(9), abs=0.25)
-
-
 BIN = 1 / (0.75 * SAMPLES / RATE)
 SPACED = {apart: 150 + apart * BIN * np.arange(5) for apart in (1.2, 2.0, 3.0, 5.0)}
 SPACED["low"] = np.array([3.75, 12.0, 40.0]) * BIN
@@ -236,8 +190,7 @@ def noisy(rng, frequencies, colour, repetitions, draws=200):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("repetitions", [1, 2, 3])
-@pytest.mark.parametrize("colour", ["white", "1/f2"])
+@pytest.mark.parametrize(("colour", "repetitions"), [("white", 1), ("1/f2", 1), ("1/f2", 3)])
 def test_intervals_hold_the_truth_however_close_the_lines_and_steep_the_noise(colour, repetitions):
     """95 % circles and intervals of a sum of all lines and of a difference of two, in 200 draws of
     each spacing.

@@ -27,12 +27,11 @@ def coloured(rng, shape, power):
     return np.fft.irfft(white * (f ** (-power / 2))[None, :, None], axis=1)[:, :count]
 
 
-@pytest.mark.parametrize("power", [0, 2])
-def test_noise_alone_has_lines_as_rarely_as_told(power):
+def test_noise_alone_has_lines_as_rarely_as_told():
     """Told 20 %: in 75 files 15, and at most 25 by the binomial distribution at 0.3 %."""
-    rng = np.random.default_rng(power)
+    rng = np.random.default_rng(2)
     alarms = sum(
-        len(spectral_lines(coloured(rng, (2, 512, 2), power), RATE, alarm=0.2).lines) > 0
+        len(spectral_lines(coloured(rng, (2, 512, 2), 2), RATE, alarm=0.2).lines) > 0
         for _ in range(75)
     )
     assert 1 <= alarms <= 25
@@ -82,19 +81,7 @@ def test_weak_lines_beside_strong_ones_are_not_side_lobes():
     assert [line.amplitudes[0] for line in found] == pytest.approx(a, rel=0.01)
 
 
-def test_errors_are_larger_beside_what_is_no_steady_line():
-    """A decaying line, whose skirts disturb the fit of another far more than the noise does."""
-    rng = np.random.default_rng(10)
-    x = 6 * np.sin(2 * np.pi * 200 * T) * np.exp(-3 * T) + np.sin(2 * np.pi * 60 * T)
-    found = spectral_lines((x + 1e-3 * rng.normal(size=len(T)))[None, :, None], RATE).lines
-    assert len(found) == 2
-    bound = np.sqrt(3 * 1e-6 * 2 / RATE / np.pi**2)
-    assert 10 * bound < found[0].error < 0.02
-    assert abs(found[0].frequency - 60) < 3 * found[0].error
-
-
-@pytest.mark.parametrize("seconds", [0.1, 0.5])
-@pytest.mark.parametrize("decay", [0.005, 0.02, 0.1])
+@pytest.mark.parametrize(("seconds", "decay"), [(0.1, 0.1), (0.1, 0.005), (0.5, 0.02)])
 def test_lines_of_a_motion_from_rest_are_within_their_errors(seconds, decay):
     """Two lines, and a free vibration of as much that starts them from rest."""
     t = np.arange(round(1e4 * seconds)) / 1e4
@@ -130,9 +117,8 @@ def lines(*frequencies):
             for f in frequencies]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("frequencies", "expected"),
-    [
+def test_mains_hum_is_resolved_from_lines_of_the_load():
+    for frequencies, expected in (
         ((49.98, 99.96, 140), {0: "mains 50 Hz", 1: "mains 2 x 50 Hz"}),
         ((59.99, 120.5, 179.97), {0: "mains 60 Hz", 2: "mains 3 x 60 Hz"}),
         ((99.96, 149.94), {0: "mains 2 x 50 Hz", 1: "mains 3 x 50 Hz"}),
@@ -140,10 +126,8 @@ def lines(*frequencies):
         ((49.98, 100.6, 250.3), {0: "mains 50 Hz"}),  # no multiples of 49.98 Hz
         ((47.0, 61.0), {}),
         ((), {}),
-    ],
-)  # fmt: skip
-def test_mains_hum_is_resolved_from_lines_of_the_load(frequencies, expected):
-    assert hum_of(lines(*frequencies), 1.0) == expected
+    ):
+        assert hum_of(lines(*frequencies), 1.0) == expected
 
 
 def test_what_may_be_of_the_load_is_not_called_mains():
@@ -216,8 +200,7 @@ def test_lines_of_spectra():
     ).lines == ()  # fmt: skip
 
 
-@pytest.mark.parametrize("count", [1, 2, 31, 33, 64])
-@pytest.mark.parametrize("scale", [0.0, 1e-150, 1e150])
+@pytest.mark.parametrize(("count", "scale"), [(1, 1e150), (2, 1.0), (33, 0.0), (64, 1e-150)])
 def test_short_and_extreme_measurements_are_inspected(count, scale):
     values = scale * np.random.default_rng(1).normal(size=(1, count, 2))
     measured = Measurement(
