@@ -36,7 +36,7 @@ from scipy.stats import binomtest
 
 from simple_model import DRIVES, DriveLaw, Response
 from simple_model.load.spectrum import load_lines, synthesise
-from simple_model.plates.modes import PlateModes, plate_modes, steady_response
+from simple_model.plates.modes import PlateModes, modal_motion, plate_modes
 from simple_model.plates.path_forces import modal_path_forces
 from simple_model.quantities import quantity
 from skinwave.models.plate_modes import plate_of, relative_modulus
@@ -210,7 +210,7 @@ def _forces(scene: Scene, modes: PlateModes) -> Iterator[tuple[str, Floats, NDAr
 def _run(scene: Scene, modes: PlateModes, name: str, f: Floats, forces: NDArray[Any]) -> Run:
     """Steady state of a Tacton, of the quantity that the vibrometer reads."""
     shapes = modes.at(scene.probe_points - scene.body.placement.offset)
-    u = steady_response(modes, f, forces, shapes, partial(relative_modulus, scene.body))
+    u = modal_motion(modes, f, forces, partial(relative_modulus, scene.body)) @ shapes.T
     read = scene.reading.asked.name
     values = synthesise(f, quantity(read).factor(2j * np.pi * f)[:, None] * u, TIMES)
     own = replace(scene, pressure=replace(scene.pressure, tacton=dict(tactons())[name]))

@@ -46,7 +46,7 @@ sys.path.append(str(Path(skinwave.__file__).parents[1] / "examples"))
 from which_sheet import assess, draw, findings, holds, hypercube
 
 small = [each for each in hypercube(200) if each["size"] == "A6"]
-rows = [assess(each) for each in small[:10]]
+rows = [assess(each) for each in small[:6]]
 print(findings(rows))
 
 # %%

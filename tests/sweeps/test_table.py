@@ -191,7 +191,7 @@ def test_processes_and_a_cluster_give_the_same_table(scene, address):
     assert main([*sweep, "--out", "there", "--scheduler", address]) == 0
     here, there = dataset.read(Path("here")), dataset.read(Path("there"))
     assert [row["key"] for row in here] == [row["key"] for row in there]
-    for name in ("peak_um", "level_db", "expected_error"):
+    for name in ("peak_um", "rms_um", "expected_error"):
         first, second = (np.array([row[name] for row in rows], float) for rows in (here, there))
         np.testing.assert_allclose(first, second, rtol=1e-10, atol=1e-12)
     short = replace(read(scene), body=Body(width=0.04, height=0.04, sides="clamped"))
