@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from simple_model.load.line_names import MOST, SAME, WEAKEST, LineNames, line_names
+from simple_model.load.line_names import SAME, WEAKEST, LineNames, line_names
 from simple_model.load.pressure import MovingPressure
 from simple_model.load.sampling import step
 from simple_model.response import (
@@ -74,9 +74,6 @@ def line_table(
     *,
     candidates: Iterable[str] = (),
     beside: Mapping[str, float] | None = None,
-    most: int = MOST,
-    highest: float = np.inf,
-    settle: float = SETTLE,
 ) -> LineTable:
     """Lines of a response to a load.
 
@@ -90,23 +87,20 @@ def line_table(
     candidates : names of lines that are listed whether or not the load has them
     beside : names and frequencies in Hz of what moves the body beside the pressure; those that
         coincide with a line of the pressure are listed as this
-    most : how many lines of the load are looked for, the strongest
-    highest : Hz, up to which lines are looked for
-    settle : fraction of the response that is left out at its start
     """
-    highest = min(highest, 0.5 / step(response.times))
-    found = line_names(pressure, FITTED, most=most, candidates=candidates)
+    nyquist = 0.5 / step(response.times)
+    found = line_names(pressure, FITTED, candidates=candidates)
     same = SAME / pressure.tacton.duration
-    found = _below(_merged(found, _apart(beside or {}, found, same)), highest)
-    fit = _fit(found, response, settle)
-    peaks = _peaks(response, fit, highest, settle)
+    found = _below(_merged(found, _apart(beside or {}, found, same)), nyquist)
+    fit = _fit(found, response)
+    peaks = _peaks(response, fit)
     steady = [peak.frequency for peak in peaks if peak.kind != FREE]
     if steady:  # lines that are weak in the load may be strong in a response
-        weak = _below(line_names(pressure, FAINTEST, most=10**6), highest)
-        found = _with_weak(found, weak, np.array(steady), resolution(response, settle=settle))
-        fit = _fit(found, response, settle)
-        peaks = _peaks(response, fit, highest, settle)
-    return _table(found, fit, peaks, response, settle)
+        weak = _below(line_names(pressure, FAINTEST, most=10**6), nyquist)
+        found = _with_weak(found, weak, steady, resolution(response))
+        fit = _fit(found, response)
+        peaks = _peaks(response, fit)
+    return _table(found, fit, peaks, response)
 
 
 def resolved_lines(
@@ -118,7 +112,8 @@ def resolved_lines(
     settle: float = SETTLE,
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Frequencies in Hz by name of the lines of a load above -60 dB that a response resolves, and
-    of those that it is too short to resolve; parameters as of `line_table`.
+    of those that it is too short to resolve, with the candidates of `line_table`, below `highest`
+    Hz, and a fraction `settle` of the response left out at its start.
     """
     highest = min(highest, 0.5 / step(response.times))
     found = _below(line_names(pressure, candidates=candidates), highest)
@@ -149,29 +144,29 @@ class _Fit:
     rest: Floats
 
 
-def _fit(found: LineNames, response: Response, settle: float) -> _Fit:
-    f, least = found.frequencies, resolution(response, settle=settle)
+def _fit(found: LineNames, response: Response) -> _Fit:
+    f, least = found.frequencies, resolution(response)
     strengths = _floored(found)
     fitted = np.zeros(len(f), bool)
     for k in np.argsort(-strengths, kind="stable"):
         fitted[k] = f[k] >= least and not _near(f[k : k + 1], f[fitted], least)[0]
     amplitudes = np.zeros((len(f), response.values.shape[1]))
-    complex_amplitudes, rest = fit_lines(response, f[fitted], settle=settle)
+    complex_amplitudes, rest = fit_lines(response, f[fitted])
     amplitudes[fitted] = np.abs(complex_amplitudes)
     resolved = fitted & unmixed(f, strengths, least)
     left = np.where(_near(f, f[fitted], ALIKE * least), 0.0, strengths)
-    resolved &= ~hidden(response, f, strengths, left, fitted, settle=settle)
+    resolved &= ~hidden(response, f, strengths, left, fitted)
     return _Fit(resolved=resolved, fitted=fitted, amplitudes=amplitudes, rest=rest)
 
 
-def _peaks(response: Response, fit: _Fit, highest: float, settle: float) -> list[Unnamed]:
+def _peaks(response: Response, fit: _Fit) -> list[Unnamed]:
     """Peaks in the spectrum of the whole response less the fitted lines."""
-    dt, begun = step(response.times), round(settle * len(fit.rest))
+    dt, begun = step(response.times), round(SETTLE * len(fit.rest))
     amplitude = _windowed(fit.rest)
     round_off = ROUND_OFF * float(np.abs(response.values).max(initial=0.0))
     loudest = _loudest(np.vstack([amplitude[LOBE:], fit.amplitudes]))
     level = amplitude / np.maximum(loudest, round_off / SEEN)
-    of_any = level.max(axis=1)[: int(highest * dt * len(fit.rest)) + 1]
+    of_any = level.max(axis=1)[: len(fit.rest) // 2 + 1]
     inner = of_any[1:-1]
     tops = 1 + np.flatnonzero((inner > SEEN) & (inner >= of_any[:-2]) & (inner > of_any[2:]))
     chosen: list[int] = []
@@ -215,7 +210,9 @@ def _decays(x: Floats, turns: float) -> bool:
     return bool(second < DECAYED * first)
 
 
-def _with_weak(found: LineNames, weak: LineNames, steady: Floats, least: float) -> LineNames:
+def _with_weak(
+    found: LineNames, weak: LineNames, steady: Sequence[float], least: float
+) -> LineNames:
     """Lines and, of weaker ones, the strongest near each of the frequencies (k,) in Hz."""
     more = []
     for f in steady:
@@ -229,19 +226,16 @@ def _apart(beside: Mapping[str, float], found: LineNames, same: float) -> LineNa
     """Lines by name that coincide with none of a load's, as strong as the strongest of these."""
     f = np.array(list(beside.values()), np.float64)
     strongest = found.strengths.max(initial=0.0) or 1.0
-    lines = LineNames(
-        names=tuple(beside), frequencies=f, strengths=np.full(len(f), strongest)
-    )  # fmt: skip
+    strengths = np.full(len(f), strongest)
+    lines = LineNames(names=tuple(beside), frequencies=f, strengths=strengths)
     return _some(lines, np.flatnonzero(~_near(f, found.frequencies, same)).tolist())
 
 
 def _merged(found: LineNames, more: LineNames) -> LineNames:
     """Lines of both, in ascending order."""
     f = np.concatenate([found.frequencies, more.frequencies])
-    names = (*found.names, *more.names)
-    both = LineNames(
-        names=names, frequencies=f, strengths=np.concatenate([found.strengths, more.strengths])
-    )
+    strengths = np.concatenate([found.strengths, more.strengths])
+    both = LineNames(names=(*found.names, *more.names), frequencies=f, strengths=strengths)
     return _some(both, np.argsort(f, kind="stable").tolist())
 
 
@@ -252,11 +246,9 @@ def _some(found: LineNames, chosen: list[int]) -> LineNames:
     )  # fmt: skip
 
 
-def _table(
-    found: LineNames, fit: _Fit, peaks: list[Unnamed], response: Response, settle: float
-) -> LineTable:
+def _table(found: LineNames, fit: _Fit, peaks: list[Unnamed], response: Response) -> LineTable:
     f, loudest = found.frequencies, _loudest(fit.amplitudes)
-    least = resolution(response, settle=settle)
+    least = resolution(response)
     relative = (fit.amplitudes / loudest).max(axis=1, initial=0.0)
     wanted = (found.strengths >= WEAKEST * found.strengths.max(initial=0.0)) | (relative > WEAKEST)
     wanted |= found.strengths == 0
