@@ -1,13 +1,9 @@
 """Tetrahedral meshes of bodies: structured, from files, and of a parametric palm."""
 
-import warnings
-from typing import Any
-
 from meshes.facets import seen_from_above, tag_boundary
-from meshes.files.contents import read, read_surface
+from meshes.files.contents import read
 from meshes.files.import_body import body_from_file
 from meshes.files.mesh_files import write
-from meshes.shapes.fingertip import Fingertip
 from meshes.shapes.palm import Palm
 from meshes.shapes.structured import (
     Grading,
@@ -31,11 +27,9 @@ from meshes.tetmesh import (
     part,
     quadratic,
 )
-from meshes.volume.builtin import builtin
 from meshes.volume.curving import curve_boundary
-from meshes.volume.fingertip_mesh import fingertip_mesh
+from meshes.volume.fingertip import Fingertip, fingertip_mesh
 from meshes.volume.mapped_palm import mapped_palm
-from meshes.volume.palm_mesh import palm_mesh
 from meshes.volume.quality import dihedral_angles, edge_lengths, jacobian_ratios
 from meshes.volume.stretched_palm import stretched_palm
 from meshes.volume.tetrahedralise import graded, tetrahedralise
@@ -50,7 +44,6 @@ __all__ = [
     "block",
     "body_from_file",
     "boundary_facets",
-    "builtin",
     "corner_volumes",
     "curve_boundary",
     "dihedral_angles",
@@ -66,11 +59,9 @@ __all__ = [
     "jacobian_ratios",
     "mapped_palm",
     "middle_plane",
-    "palm_mesh",
     "part",
     "quadratic",
     "read",
-    "read_surface",
     "repaired",
     "seen_from_above",
     "sheet",
@@ -79,14 +70,3 @@ __all__ = [
     "tetrahedralise",
     "write",
 ]
-
-# Names of version 0.2, which load for one release.
-_RENAMED = {"curved": "curve_boundary", "named": "tag_boundary", "ready": "builtin"}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _RENAMED:
-        raise AttributeError(f"module 'meshes' has no attribute '{name}'")
-    new = _RENAMED[name]
-    warnings.warn(f"meshes.{name} is now meshes.{new}", DeprecationWarning, stacklevel=2)
-    return globals()[new]

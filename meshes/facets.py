@@ -60,20 +60,19 @@ def seen_from_above(mesh: TetMesh) -> np.ndarray:
     count = [len(found) for found in near]
     who = np.repeat(asked, count)
     over = np.concatenate([np.asarray(found, np.int64) for found in near])
-    hides = _covers(corners[over], centroids[who])
+    hides = heights_over(corners[over], centroids[who, :2]) > centroids[who, 2]
     seen[who[hides]] = False
     return seen
 
 
-def _covers(triangles: Floats, points: Floats) -> np.ndarray:
-    """Whether each triangle (m, 3, 3) lies vertically above its point (m, 3)."""
-    flat = triangles[..., :2] - points[:, None, :2]
+def heights_over(triangles: Floats, places: Floats) -> Floats:
+    """Height (m,) in metre of triangles (m, 3, 3) over places (m, 2) or (2,); -inf beside them."""
+    flat = triangles[..., :2] - places[..., None, :]
     x, y = flat[..., 0], flat[..., 1]
     share = np.stack(
         [x[:, b] * y[:, c] - x[:, c] * y[:, b] for b, c in ((1, 2), (2, 0), (0, 1))], axis=1
     )
     total = share.sum(axis=1)
-    inside = (share * np.sign(total)[:, None] >= 0).all(axis=1) & (total != 0)
+    over = (share * np.sign(total)[:, None] >= 0).all(axis=1) & (total != 0)
     weights = share / np.where(total == 0, 1, total)[:, None]
-    height = np.einsum("ea,ea->e", weights, triangles[..., 2])
-    return inside & (height > points[:, 2])
+    return np.where(over, np.einsum("ea,ea->e", weights, triangles[..., 2]), -np.inf)

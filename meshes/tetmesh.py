@@ -16,8 +16,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from meshes import vtk_grid
-
 if TYPE_CHECKING:
     import pyvista as pv
 
@@ -30,6 +28,7 @@ EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
 FACES = np.array([[1, 2, 3, 5, 9, 8], [0, 3, 2, 7, 9, 6], [0, 1, 3, 4, 8, 7], [0, 2, 1, 6, 5, 4]])
 # Exchanging corners 2 and 3 turns a tetrahedron inside out; the mid-side nodes follow.
 MIRRORED = np.array([0, 1, 3, 2, 4, 8, 7, 6, 5, 9])
+VTK_KINDS, VTK_SETS = {4: 10, 10: 24}, "facets:"  # types by nodes; before names of facet sets
 # A tetrahedron flatter than this (volume over longest edge cubed) has no usable shape.
 FLATTEST = 1e-9
 FURTHEST = 1e50  # m: beyond it, products of lengths overflow
@@ -83,11 +82,6 @@ class TetMesh:
                 f"region has shape {region.shape} for {len(tets)} tetrahedra; give one per "
                 "element, 0 or above"
             )
-        if self.unmoved is not None and self.unmoved.shape != points.shape:
-            raise MeshError(
-                f"unmoved has shape {self.unmoved.shape} for {len(points)} points; give each of "
-                "them as it was, or none"
-            )
         facets = {name: _facets(name, nodes, points, tets) for name, nodes in self.facets.items()}
         for array in (points, tets, region, *facets.values()):
             array.setflags(write=False)
@@ -98,11 +92,11 @@ class TetMesh:
         object.__setattr__(self, "region_names", MappingProxyType(dict(self.region_names)))
 
     def __repr__(self) -> str:
-        elements = f"{len(self.tets):,} tetrahedra of {self.tets.shape[1]} nodes"
-        regions = len(np.unique(self.region))
-        said = [f"{len(self.points):,} nodes", elements, f"{regions} region{'s' * (regions != 1)}"]
         sets = f"; facets {', '.join(sorted(self.facets))}" if self.facets else ""
-        return f"<TetMesh: {', '.join(said)}{sets}>"
+        return (
+            f"<TetMesh: {len(self.points):,} nodes, {len(self.tets):,} tetrahedra of "
+            f"{self.tets.shape[1]} nodes, {len(np.unique(self.region))} regions{sets}>"
+        )
 
     @property
     def order(self) -> int:
@@ -116,9 +110,19 @@ class TetMesh:
 
     def to_pyvista(self) -> pv.UnstructuredGrid:
         """The mesh as a grid of pyvista, in metre: linear or quadratic tetrahedra, `region` as cell
-        data, and each facet set as field data, such as "facets:top".
+        data, and each facet set that is not empty as field data, such as "facets:top".
         """
-        return vtk_grid.to_grid(self.points, self.tets, self.region, self.facets)
+        import pyvista as pv
+
+        nodes = self.tets.shape[1]
+        cells = np.insert(self.tets, 0, nodes, axis=1).ravel()
+        kinds = np.full(len(self.tets), VTK_KINDS[nodes], np.uint8)
+        grid = pv.UnstructuredGrid(cells, kinds, self.points.copy())
+        grid.cell_data["region"] = self.region.copy()
+        for name, facets in self.facets.items():
+            if len(facets):  # no array of VTK is empty
+                grid.field_data[VTK_SETS + name] = facets.copy()
+        return grid
 
     @classmethod
     def from_pyvista(cls, grid: pv.UnstructuredGrid) -> TetMesh:
@@ -126,10 +130,23 @@ class TetMesh:
 
         Raises
         ------
-        MeshError, ValueError
+        MeshError
             If it has other cells, or no element can be built on them.
         """
-        return cls(**vtk_grid.of_grid(grid))
+        cells = {int(kind): nodes for kind, nodes in grid.cells_dict.items()}
+        if len(cells) != 1 or not cells.keys() <= set(VTK_KINDS.values()):
+            raise MeshError(
+                f"the grid has cells of VTK types {sorted(cells)}; give tetrahedra of 4 nodes (10) "
+                "or of 10 (24)"
+            )
+        (tets,) = cells.values()
+        sets = [name for name in grid.field_data if name.startswith(VTK_SETS)]
+        return cls(
+            points=np.array(grid.points),
+            tets=tets,
+            region=np.array(grid.cell_data.get("region", [])),
+            facets={name.removeprefix(VTK_SETS): np.array(grid.field_data[name]) for name in sets},
+        )
 
 
 def corner_volumes(points: Floats, tets: Ints) -> Floats:

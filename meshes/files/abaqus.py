@@ -25,15 +25,14 @@ FACES = {3: "triangle", 4: "quad"}
 GENERATING = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM")
 MOST_INCLUDED = 20  # levels of files that include others
 LARGEST = 500_000_000  # bytes
+AGAIN = "save it again from the program that it comes from"
 
 Rows = list[list[str]]
 
 
 @dataclass
 class _Part:
-    """Nodes and elements by their numbers, sets of elements, and those sets that lines of *ELEMENT
-    and sections name.
-    """
+    """Nodes and elements by number, sets of elements, and those that *ELEMENT and sections name."""
 
     name: str
     nodes: dict[int, list[float]] = field(default_factory=dict)
@@ -44,15 +43,8 @@ class _Part:
 
 
 def read_abaqus(path: Path) -> Any:
-    """All instances of the parts in a file, or what it holds outside of parts.
-
-    Parameters
-    ----------
-    path : of the `.inp` file
-
-    Returns
-    -------
-    meshio.Mesh; its `info` has `notes`, and `names` of regions: element sets, or parts
+    """All instances of the parts in a file, or what it holds outside of parts: a meshio.Mesh whose
+    `info` has `notes`, and `names` of regions, which are element sets or parts.
 
     Raises
     ------
@@ -65,18 +57,16 @@ def read_abaqus(path: Path) -> Any:
     for keyword, options, rows in _blocks(path):
         if keyword in GENERATING or (keyword == "NODE" and options.get("SYSTEM", "R") != "R"):
             raise MeshError(
-                f"{path} has *{keyword}, which places or makes nodes or elements by a rule; save "
-                "it with all of them written out, from Abaqus/CAE or as .vtu"
+                f"{path} has *{keyword}, which makes nodes or elements by a rule; save it with all "
+                "of them written out, from Abaqus/CAE or as .vtu"
             )
         if keyword == "PART":
             current = parts[options.get("NAME", "").upper()] = _Part(options.get("NAME", ""))
         elif keyword == "INSTANCE":
             own = parts.get(options.get("PART", "").upper())
             if own is None:
-                raise MeshError(
-                    f"{path} has an instance of the part '{options.get('PART', '')}', which it "
-                    "does not hold; save it with its parts"
-                )
+                missing = options.get("PART", "")
+                raise MeshError(f"{path} has no part '{missing}' of an instance; save it with all")
             current = deepcopy(own)  # which may have nodes and elements of its own
             instances.append((current, rows))
         elif keyword in ("END PART", "END INSTANCE"):
@@ -86,8 +76,8 @@ def read_abaqus(path: Path) -> Any:
                 _add(current, keyword, options, rows)
             except (ValueError, IndexError):
                 raise MeshError(
-                    f"{path} cannot be read: a line below *{keyword} is not of whole numbers and "
-                    "coordinates; save it again from the program that it comes from"
+                    f"{path}: a line below *{keyword} is not of whole numbers and coordinates; "
+                    f"{AGAIN}"
                 ) from None
     placed = [(loose, []), *instances] if instances else [(p, []) for p in (loose, *parts.values())]
     return _joined(path, [(part, rows) for part, rows in placed if part.elements])
@@ -117,10 +107,7 @@ def _lines(path: Path, level: int = 0) -> Iterator[str]:
         if keyword in ("INCLUDE", "NODE", "ELEMENT", "ELSET") and "INPUT" in options:
             other = path.parent / options["INPUT"]
             if level == MOST_INCLUDED or not other.is_file():
-                raise MeshError(
-                    f"{path} includes '{options['INPUT']}', which cannot be found; put that file "
-                    "beside it"
-                )
+                raise MeshError(f"{path} includes '{options['INPUT']}'; put that file beside it")
             yield from _lines(other, level + 1)
 
 
@@ -199,10 +186,8 @@ def _joined(path: Path, placed: list[tuple[_Part, Rows]]) -> Any:
             try:
                 cells.setdefault(name, []).append([number[node] for node in nodes])
             except KeyError as error:
-                raise MeshError(
-                    f"{path} has no node {error} of its element {element}; save it again from the "
-                    "program that it comes from"
-                ) from None
+                missing = f"{path} has no node {error} of its element {element}"
+                raise MeshError(f"{missing}; {AGAIN}") from None
             regions.setdefault(name, []).append(region.get(element, 0))
     notes = list(dict.fromkeys(notes))  # of several instances of a part
     notes += [f"left out {count:,} elements of type {kind}" for kind, count in left_out.items()]
@@ -271,8 +256,6 @@ def _moved(path: Path, points: Floats, rows: Rows) -> Floats:
             axis = (b - a) / np.linalg.norm(b - a)
             points = a + Rotation.from_rotvec(np.radians(angle) * axis).apply(points - a)
     except (ValueError, IndexError):
-        raise MeshError(
-            f"{path} has an instance whose lines are no translation and rotation; save it again "
-            "from the program that it comes from"
-        ) from None
+        wrong = f"{path} has an instance whose lines are no translation and rotation"
+        raise MeshError(f"{wrong}; {AGAIN}") from None
     return np.asarray(points)

@@ -4,23 +4,14 @@
 """
 
 import re
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from meshes.surface.repair import first_of_same
-from meshes.tetmesh import (
-    EDGES,
-    FACES,
-    Floats,
-    Ints,
-    MeshError,
-    TetMesh,
-    corner_volumes,
-    facet_keys,
-)
+from meshes.tetmesh import EDGES, FACES, Floats, Ints, MeshError, corner_volumes, facet_keys
 
 FACETS, REGION, NAMED = "facets:", "region ", "region:"
 # Cell arrays that number regions: of this package, of others, and of meshio's readers.
@@ -40,17 +31,31 @@ SMALLER = ("vertex", "line", "line3")
 FLAT = 1e-9  # of the volume of its cell: a tetrahedron of a collapsed one
 
 
-def contents(path: Path, raw: Any) -> dict[str, Any]:
-    """The arrays of `Contents`, by name.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Contents:
+    """Tetrahedra in a file, or triangles if it has no solid elements.
 
     Parameters
     ----------
-    path : file that messages name
-    raw : mesh as meshio has it, whose `info` has `notes` and `names` of regions
+    points : (n, 3) float, in the unit of the file
+    tets : (m, 4) or (m, 10) int, m = 0 for a surface
+    triangles : (k, 3) int of a surface; none of a mesh, whose facets are in its sets
+    region : (m,) int, and `names` of those that have one
+    facets : name -> (j, 3) or (j, 6) int
+    notes : a sentence on each thing that was left out, merged or split
+    """
 
-    Returns
-    -------
-    dict of arrays, for `numpy.savez`
+    points: Floats
+    tets: Ints = field(default_factory=lambda: np.zeros((0, 4), int))
+    triangles: Ints = field(default_factory=lambda: np.zeros((0, 3), int))
+    region: Ints = field(default_factory=lambda: np.zeros(0, int))
+    names: dict[int, str] = field(default_factory=dict)
+    facets: dict[str, Ints] = field(default_factory=dict)
+    notes: list[str]
+
+
+def contents(path: Path, raw: Any) -> Contents:
+    """The contents of a mesh as meshio has it, whose `info` has `notes` and `names` of regions.
 
     Raises
     ------
@@ -79,24 +84,17 @@ def contents(path: Path, raw: Any) -> dict[str, Any]:
     notes = [*raw.info["notes"], *notes]
     points = np.zeros((len(raw.points), 3))
     points[:, : raw.points.shape[1]] = raw.points
-    arrays = {
-        "points": points, "tets": np.zeros((0, 4), int), "region": np.zeros(0, int),
-        "triangles": np.zeros((0, 3), int), "numbers": np.zeros(0, int),
-        "names": np.zeros(0, str), "sets": np.zeros(0, str),
-    }  # fmt: skip
     if solid:
-        arrays |= _tetrahedra(path, raw, points, solid, notes)
-    else:
-        fans = [fan(joined(raw.cells, kind), PLANE[kind])[0] for kind in PLANE if kind in held]
-        arrays["triangles"] = np.vstack(fans)
-    return arrays | {"notes": np.array(notes, str)}
+        return _tetrahedra(path, raw, points, solid, notes)
+    fans = [_fan(_joined(raw.cells, kind), PLANE[kind])[0] for kind in PLANE if kind in held]
+    return Contents(points=points, triangles=np.vstack(fans), notes=notes)
 
 
 def _tetrahedra(
     path: Path, raw: Any, points: Floats, solid: list[str], notes: list[str]
-) -> dict[str, Any]:
+) -> Contents:
     """Tetrahedra, each once, with nodes that are used, each once; their regions and facet sets."""
-    used = np.unique(np.concatenate([joined(raw.cells, kind).ravel() for kind in solid]))
+    used = np.unique(np.concatenate([_joined(raw.cells, kind).ravel() for kind in solid]))
     if bad := int((~np.isfinite(points[used])).any(axis=1).sum()):
         raise MeshError(f"{path} has {bad:,} nodes whose coordinates are no numbers; mend them")
     same = np.arange(len(points))
@@ -106,10 +104,10 @@ def _tetrahedra(
     names = {abs(number): name for number, name in raw.info["names"].items()}
     parts: list[tuple[Ints, Ints]] = []
     for kind in solid:
-        nodes, (own, titles) = same[joined(raw.cells, kind)], regions(raw, kind)
+        nodes, (own, titles) = same[_joined(raw.cells, kind)], _regions(raw, kind)
         names |= titles
         if kind == "tetra10":
-            nodes = nodes[:, node_order(path, points, nodes)]
+            nodes = nodes[:, _node_order(path, points, nodes)]
         if kind in SPLIT:
             count = len(nodes)
             nodes, cell = _split(path, points, nodes, kind)
@@ -135,14 +133,11 @@ def _tetrahedra(
     tets = numbers.reshape(tets.shape)
     if inside_out := int((corner_volumes(points[used], tets) < 0).sum()):
         notes.append(f"turned round {inside_out:,} of {len(tets):,} tetrahedra")
-    sets = facet_sets(raw, new[same], tets, notes)
+    sets = _facet_sets(raw, new[same], tets, notes)
     names = {number: name for number, name in names.items() if number in region}
-    return {
-        "points": points[used], "tets": tets, "region": region,
-        "numbers": np.array(list(names), int), "names": np.array(list(names.values()), str),
-        "sets": np.array(list(sets), str),
-        **{f"facets{k}": facets for k, facets in enumerate(sets.values())},
-    }  # fmt: skip
+    return Contents(
+        points=points[used], tets=tets, region=region, names=names, facets=sets, notes=notes
+    )
 
 
 def _once(tets: Ints, region: Ints) -> Ints:
@@ -153,7 +148,7 @@ def _once(tets: Ints, region: Ints) -> Ints:
     return np.sort(order[first])
 
 
-def fan(nodes: Ints, corners: int) -> tuple[Ints, Ints]:
+def _fan(nodes: Ints, corners: int) -> tuple[Ints, Ints]:
     """Triangles (k, 3) of plane cells with 3 or 4 corners, from the lowest of a cell's node
     numbers, and the cell (k,) of each.
     """
@@ -171,16 +166,11 @@ def _split(path: Path, points: Floats, nodes: Ints, kind: str) -> tuple[Ints, In
     They join the lowest of a cell's node numbers with the triangles of the faces that do not have
     it, each of which is split from its own lowest. So neighbours split a common face alike:
     Dompierre et al, How to subdivide pyramids, prisms and hexahedra into tetrahedra, 8th
-    International Meshing Roundtable (1999).
-
-    Raises
-    ------
-    MeshError
-        If a cell is so warped that some of its tetrahedra are inside out.
+    International Meshing Roundtable (1999). Cells with tetrahedra that are inside out are refused.
     """
     least, tets, cells = nodes.min(axis=1), [], []
     for face in SPLIT[kind]:
-        triangles, cell = fan(nodes[:, face], len(face))
+        triangles, cell = _fan(nodes[:, face], len(face))
         away = (nodes[cell][:, face] != least[cell, None]).all(axis=1)
         tets.append(np.column_stack([least[cell], triangles])[away])
         cells.append(cell[away])
@@ -197,26 +187,15 @@ def _split(path: Path, points: Floats, nodes: Ints, kind: str) -> tuple[Ints, In
     return found[solid], cell[solid]
 
 
-def joined(cells: Any, kind: str) -> Ints:
+def _joined(cells: Any, kind: str) -> Ints:
     """Nodes (e, a) of all blocks of a kind."""
     return np.vstack(
         [np.asarray(block.data).astype(np.int64) for block in cells if block.type == kind]
     )
 
 
-def values(raw: Any, name: str, kind: str) -> np.ndarray:
-    """Cell array over all blocks of a kind, in native byte order.
-
-    Parameters
-    ----------
-    raw : mesh as meshio reads it
-    name : of the array
-    kind : meshio's cell type
-
-    Returns
-    -------
-    (e,) int
-    """
+def _values(raw: Any, name: str, kind: str) -> np.ndarray:
+    """Cell array (e,) by name over all blocks of a kind, in native byte order."""
     found = [
         np.asarray(values) for block, values in zip(raw.cells, raw.cell_data[name], strict=True)
         if block.type == kind
@@ -224,29 +203,29 @@ def values(raw: Any, name: str, kind: str) -> np.ndarray:
     return np.concatenate(found).astype(np.int64)
 
 
-def regions(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
+def _regions(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
     """Region (e,) of each element: an array called so, physical groups, or element sets; and the
     names of those that have one.
     """
     for name in NUMBERED:
         if name in raw.cell_data:
-            region = values(raw, name, kind)
+            region = _values(raw, name, kind)
             region = -region if name == "cell_tags" else region  # MED's are negative
             flags = [title for title in raw.cell_data if title.startswith(NAMED)]
-            marked = {title: region[values(raw, title, kind) == 1] for title in flags}
+            marked = {title: region[_values(raw, title, kind) == 1] for title in flags}
             return region, {
                 int(of[0]): t.removeprefix(NAMED) for t, of in marked.items() if len(of)
             }
     if "gmsh:physical" in raw.cell_data:
-        return physical_groups(raw, kind)
-    return element_sets(raw, kind)
+        return _physical_groups(raw, kind)
+    return _element_sets(raw, kind)
 
 
-def physical_groups(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
+def _physical_groups(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
     """Physical group (e,) of each element, by the number in its title if it was written here, and
     the names of groups.
     """
-    tags, place = np.unique(values(raw, "gmsh:physical", kind), return_inverse=True)
+    tags, place = np.unique(_values(raw, "gmsh:physical", kind), return_inverse=True)
     numbers, names = {}, {}
     for title, (tag, dimension) in raw.field_data.items():
         if dimension == 3:
@@ -257,7 +236,7 @@ def physical_groups(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
     return np.array([numbers.get(tag, tag) for tag in tags.tolist()], np.int64)[place], names
 
 
-def element_sets(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
+def _element_sets(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
     """The number, from 1, of the last set that each element is in, or 0; and names of sets."""
     blocks = [i for i, block in enumerate(raw.cells) if block.type == kind]
     regions = [np.zeros(len(raw.cells[i].data), np.int64) for i in blocks]
@@ -273,7 +252,7 @@ def element_sets(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
     return np.concatenate(regions), dict(enumerate(filled, start=1))
 
 
-def facet_sets(raw: Any, new: Ints, tets: Ints, notes: list[str]) -> dict[str, Ints]:
+def _facet_sets(raw: Any, new: Ints, tets: Ints, notes: list[str]) -> dict[str, Ints]:
     """Facets (k, 3) or (k, 6) of sets by name, of arrays `facets:<name>` or physical groups, seen
     from outside. Plane cells that are no faces of tetrahedra are left out.
 
@@ -283,10 +262,6 @@ def facet_sets(raw: Any, new: Ints, tets: Ints, notes: list[str]) -> dict[str, I
     new : (n,) number of each of its nodes among those of the tetrahedra, or -1
     tets : (m, 4) or (m, 10)
     notes : gets a sentence if some are left out
-
-    Returns
-    -------
-    dict of arrays
     """
     titles = {name.removeprefix(FACETS): name for name in raw.cell_data if name.startswith(FACETS)}
     groups = {title: tag for title, (tag, d) in raw.field_data.items() if d == 2}
@@ -294,11 +269,11 @@ def facet_sets(raw: Any, new: Ints, tets: Ints, notes: list[str]) -> dict[str, I
     sets: dict[str, list[Ints]] = {title: [] for title in (*titles, *groups)}
     lost = 0
     for kind in [kind for kind in PLANE if any(block.type == kind for block in raw.cells)]:
-        facets, is_face, cell = _faces_of(new[joined(raw.cells, kind)], PLANE[kind], tets, width)
+        facets, is_face, cell = _faces_of(new[_joined(raw.cells, kind)], PLANE[kind], tets, width)
         lost += int((~is_face).sum())
-        marked = {title: values(raw, name, kind) == 1 for title, name in titles.items()}
+        marked = {title: _values(raw, name, kind) == 1 for title, name in titles.items()}
         if "gmsh:physical" in raw.cell_data:
-            tags = values(raw, "gmsh:physical", kind)
+            tags = _values(raw, "gmsh:physical", kind)
             other = set(tags.tolist()) - {0, *groups.values()}
             every = groups | {f"group {tag}": tag for tag in other}
             marked |= {title: tags == tag for title, tag in every.items()}
@@ -315,7 +290,7 @@ def _faces_of(nodes: Ints, corners: int, tets: Ints, width: int) -> tuple[Ints, 
 
     One that a tetrahedron of the boundary has the other way round is exchanged.
     """
-    triangles, cell = fan(nodes, corners)
+    triangles, cell = _fan(nodes, corners)
     n = int(tets.max()) + 1
     faces = tets[:, FACES[:, :width]].reshape(-1, width)
     keys, place, count = np.unique(facet_keys(faces, n), return_index=True, return_counts=True)
@@ -328,23 +303,9 @@ def _faces_of(nodes: Ints, corners: int, tets: Ints, width: int) -> tuple[Ints, 
     return np.where((alike | (count[at] > 1))[:, None], given, face), is_face, cell
 
 
-def node_order(path: Path, points: Floats, tets: Ints) -> list[int]:
-    """Node order of ten-node tetrahedra; mid-side nodes are identified by their positions.
-
-    Parameters
-    ----------
-    path : file that the message names
-    points : (n, 3) float, metre
-    tets : (e, 10) int
-
-    Returns
-    -------
-    column of `tets` for each of the ten nodes
-
-    Raises
-    ------
-    MeshError
-        If nodes are too far from the middles of edges.
+def _node_order(path: Path, points: Floats, tets: Ints) -> list[int]:
+    """The column of ten-node tetrahedra (e, 10) for each of the ten nodes, in VTK's order; mid-side
+    nodes are identified by their positions.
     """
     nodes = points[tets]
     middles = nodes[:, EDGES].mean(axis=2)
@@ -364,71 +325,3 @@ def node_order(path: Path, points: Floats, tets: Ints) -> list[int]:
         f"{OFF_MIDDLE:.0%} of an edge from its middle; save it with straight edges, or in VTK's "
         "order of nodes"
     )
-
-
-def vtu_tags(mesh: TetMesh, names: list[str]) -> dict[str, list[np.ndarray]]:
-    """Cell arrays of a mesh by block: regions, 1 for the elements of each that has a name, and 1
-    for the facets of each set.
-    """
-    sizes = [len(mesh.facets[name]) for name in names]
-    tags = {"region": [mesh.region, *(np.full(n, -1) for n in sizes)]}
-    for number, title in mesh.region_names.items():
-        own = (mesh.region == number).astype(np.int8)
-        tags[NAMED + title] = [own, *(np.zeros(n, np.int8) for n in sizes)]
-    for name in names:
-        flags = [np.full(n, other == name, np.int8) for n, other in zip(sizes, names, strict=True)]
-        tags[FACETS + name] = [np.zeros(len(mesh.tets), np.int8), *flags]
-    return tags
-
-
-def gmsh_tags(mesh: TetMesh, names: list[str]) -> dict[str, list[np.ndarray]]:
-    """Physical groups from 1, as gmsh wants them: 0 is no group there."""
-    groups = [mesh.region + 1, *(np.full(len(mesh.facets[n]), i + 1) for i, n in enumerate(names))]
-    groups = [group.astype(np.int32) for group in groups]
-    return {"gmsh:physical": groups, "gmsh:geometrical": groups}
-
-
-def gmsh_names(mesh: TetMesh, names: list[str]) -> dict[str, np.ndarray]:
-    """Number and dimension of each physical group by its name."""
-    titles = {r: f"{REGION}{r} {mesh.region_names.get(r, '')}" for r in set(mesh.region.tolist())}
-    regions = {title.strip(): np.array([r + 1, 3]) for r, title in sorted(titles.items())}
-    return regions | {name: np.array([i + 1, 2]) for i, name in enumerate(names)}
-
-
-def placed(
-    mesh: TetMesh, sizes: list[int], fields: dict[str, ArrayLike]
-) -> tuple[dict[str, np.ndarray], dict[str, list[np.ndarray]]]:
-    """Fields at points, and those of tetrahedra with nothing at the facets.
-
-    Parameters
-    ----------
-    mesh : TetMesh
-    sizes : facets in each block of them
-    fields : (n, ...) or (e, ...) by name
-
-    Returns
-    -------
-    fields at points (n, ...), and fields by block (e, ...), each by name
-
-    Raises
-    ------
-    MeshError
-        If a name is one that the mesh uses, or a field is neither at points nor at tetrahedra.
-    """
-    at_points, at_cells = {}, {}
-    for name, given in fields.items():
-        values = np.asarray(given)
-        if name == "region" or name.startswith((FACETS, NAMED, "gmsh:")):
-            raise MeshError(f"a field cannot be called '{name}', which the mesh uses; rename it")
-        if values.ndim and len(values) == len(mesh.points):
-            at_points[name] = values
-        elif values.ndim and len(values) == len(mesh.tets):
-            none = np.nan if values.dtype.kind == "f" else 0
-            empty = [np.full((n, *values.shape[1:]), none, values.dtype) for n in sizes]
-            at_cells[name] = [values, *empty]
-        else:
-            raise MeshError(
-                f"field '{name}' has shape {values.shape}; give one value for each of "
-                f"{len(mesh.points)} points or {len(mesh.tets)} tetrahedra"
-            )
-    return at_points, at_cells

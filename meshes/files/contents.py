@@ -5,19 +5,14 @@ and take whatever time and memory a file asks for. VTK reads its own formats and
 meshio those of mesh generators.
 """
 
-from __future__ import annotations
-
 import os
+import pickle
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from meshes import subprocess_call
-from meshes.surface.alignment import turned
-from meshes.surface.triangulation import Surface
-from meshes.tetmesh import Floats, Ints, MeshError, TetMesh
+from meshes.files.cells import Contents
+from meshes.tetmesh import MeshError, TetMesh
 
 BY_VTK = (
     ".vtu", ".pvtu", ".vtk", ".vtm", ".vtkhdf", ".xdmf", ".xmf", ".exo", ".e", ".vtp", ".stl",
@@ -30,29 +25,6 @@ BY_MESHIO = {
 FORMATS = (*BY_VTK, *BY_MESHIO, ".inp")
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 25.4e-3}
 CHILD = Path(__file__).with_name("reader_child.py")
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Contents:
-    """Tetrahedra in a file, or triangles if it has no solid elements.
-
-    Parameters
-    ----------
-    points : (n, 3) float, in the unit of the file
-    tets : (m, 4) or (m, 10) int, m = 0 for a surface
-    triangles : (k, 3) int of a surface; none of a mesh, whose facets are in its sets
-    region : (m,) int, and `names` of those that have one
-    facets : name -> (j, 3) or (j, 6) int
-    notes : a sentence on each thing that was left out, merged or split
-    """
-
-    points: Floats
-    tets: Ints
-    triangles: Ints
-    region: Ints
-    names: dict[int, str]
-    facets: dict[str, Ints]
-    notes: list[str]
 
 
 def read_contents(path: str | os.PathLike[str]) -> Contents:
@@ -70,25 +42,17 @@ def read_contents(path: str | os.PathLike[str]) -> Contents:
     if not path.is_file():
         raise MeshError(f"{path} is no file that is there; check its name")
     with tempfile.TemporaryDirectory(prefix="skinwave-") as folder:
-        target = Path(folder, "contents.npz")
+        target = Path(folder, "contents")
         try:
             subprocess_call.read(CHILD, path, target, folder=folder)
         except subprocess_call.Refused as error:
             raise MeshError(str(error).replace(str(path.resolve()), str(path))) from None
         except subprocess_call.Crashed:
-            raise MeshError(
-                f"{path} is damaged or cut short; save it again from the program that it comes from"
-            ) from None
+            raise MeshError(f"{path} is damaged or cut short; save it again") from None
         except MeshError as error:
             raise MeshError(f"{path} cannot be read: {error}") from None
-        with np.load(target) as found:
-            return Contents(
-                points=found["points"], tets=found["tets"], triangles=found["triangles"],
-                region=found["region"],
-                names=dict(zip(found["numbers"].tolist(), found["names"].tolist(), strict=True)),
-                facets={str(name): found[f"facets{k}"] for k, name in enumerate(found["sets"])},
-                notes=found["notes"].tolist(),
-            )  # fmt: skip
+        found: Contents = pickle.loads(target.read_bytes())
+        return found
 
 
 def scale_of(unit: str) -> float:
@@ -125,8 +89,8 @@ def read(path: str | os.PathLike[str], *, unit: str = "m") -> TetMesh:
     scale, found = scale_of(unit), read_contents(path)
     if not len(found.tets):
         raise MeshError(
-            f"{path} is a surface without solid elements; read it as such, with "
-            "`meshes.read_surface`, or fill it: skinwave mesh"
+            f"{path} is a surface without solid elements; fill it: skinwave mesh, or "
+            "`meshes.body_from_file`"
         )
     return mesh_of(found, scale)
 
@@ -137,27 +101,3 @@ def mesh_of(found: Contents, scale: float) -> TetMesh:
         points=found.points * scale if scale != 1 else found.points, tets=found.tets,
         region=found.region, region_names=found.names, facets=found.facets,
     )  # fmt: skip
-
-
-def read_surface(path: str | os.PathLike[str], *, unit: str = "m", up: str = "+z") -> Surface:
-    """Triangles of a surface file, as they are in it.
-
-    Parameters
-    ----------
-    path : the file
-    unit : of the coordinates in the file: m, cm, mm, um or in.
-    up : which axis of the file points away from the palm, towards the device: +x, -x, ... -z.
-
-    Returns
-    -------
-    Surface, metre, turned so that `up` is +z
-
-    Raises
-    ------
-    MeshError
-        If the file cannot be read or holds solid elements, or unit or axis are unknown.
-    """
-    scale, found = scale_of(unit), read_contents(path)
-    if len(found.tets):
-        raise MeshError(f"{path} is a mesh already; give a surface, such as .stl, .ply or .obj")
-    return turned(Surface(points=found.points * scale, triangles=found.triangles), up)

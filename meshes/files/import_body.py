@@ -16,11 +16,10 @@ from meshes.surface.alignment import aligned, clipped, cut_to, off_origin, on_pl
 from meshes.surface.repair import check, repaired
 from meshes.surface.triangulation import Surface, compact, volume
 from meshes.surface.winding import check_inside
-from meshes.tetmesh import MeshError, TetMesh, boundary_facets
-from meshes.volume.inner import REST
-from meshes.volume.quality import dihedral_angles, edge_lengths, element_volumes
+from meshes.tetmesh import MeshError, TetMesh, boundary_facets, corner_volumes
+from meshes.volume.quality import dihedral_angles, edge_lengths
 from meshes.volume.repair import one_body
-from meshes.volume.tetrahedralise import EPSILON, check_size, graded, tetrahedralise
+from meshes.volume.tetrahedralise import EPSILON, REST, check_size, graded, tetrahedralise
 
 FINE_RADIUS, GROWTH, COARSEST = 30e-3, 1.25, 2.0  # m about the palm's middle; elements; of h
 SMALLEST, LARGEST = 5e-3, 1.0  # m: diagonal of what can be a hand, or part of one
@@ -197,7 +196,7 @@ def _with_sides(mesh: TetMesh, planes: Sequence[float] = (), tolerance: float = 
 
 
 def _described(mesh: TetMesh, say: Say) -> TetMesh:
-    volumes = element_volumes(mesh.points, mesh.tets)
+    volumes = corner_volumes(mesh.points, mesh.tets)
     numbers = np.unique(mesh.region).tolist()
     for number in numbers if len(numbers) > 1 or mesh.region_names else []:
         name, own = mesh.region_names.get(number, number), mesh.region == number

@@ -6,73 +6,84 @@ and each facet set is a block of triangles for which the cell array `facets:<nam
 2.2 they are physical groups.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os
-import tempfile
 import warnings
 from pathlib import Path
+from typing import Any
 
-from numpy.typing import ArrayLike
+import numpy as np
 
-from meshes.files.cells import gmsh_names, gmsh_tags, placed, vtu_tags
+from meshes.files.cells import FACETS, NAMED, REGION
 from meshes.tetmesh import MeshError, TetMesh
 
 WRITTEN = {".vtu": "vtu", ".msh": "gmsh22"}  # version 4.1 of meshio is refused by gmsh itself
 
 
-def write(path: str | os.PathLike[str], mesh: TetMesh, **fields: ArrayLike) -> None:
-    """Write a mesh with its regions, facet sets and fields to `.vtu`, or `.msh` 2.2 for gmsh.
+def write(path: str | os.PathLike[str], mesh: TetMesh) -> None:
+    """Write a mesh with its regions and facet sets to `.vtu`, or `.msh` 2.2 for gmsh.
 
     It is written aside and renamed, so that no half of it can be found.
-
-    Parameters
-    ----------
-    fields : name -> (n, ...) per point or (m, ...) per tetrahedron.
 
     Raises
     ------
     MeshError
-        If the kind of file is unknown, or a field fits neither points nor tetrahedra.
+        If the kind of file is unknown.
     """
     import meshio
 
     path = Path(path)
-    if path.suffix.lower() not in WRITTEN:
+    kind = WRITTEN.get(path.suffix.lower())
+    if kind is None:
         raise MeshError(
-            f"{path} cannot be written; choose one of the kinds {', '.join(sorted(WRITTEN))}"
+            f"{path} cannot be written; name a file that ends in {' or '.join(WRITTEN)}"
         )
-    kind = WRITTEN[path.suffix.lower()]
     names = sorted(mesh.facets)
     facets = [(("triangle", "triangle6")[mesh.order - 1], mesh.facets[name]) for name in names]
     cells = [(("tetra", "tetra10")[mesh.order - 1], mesh.tets), *facets]
-    tags = vtu_tags(mesh, names) if kind == "vtu" else gmsh_tags(mesh, names)
-    at_points, at_cells = placed(mesh, [len(nodes) for _, nodes in facets], fields)
+    tags, groups = (_vtu_tags if kind == "vtu" else _gmsh_tags)(mesh, names)
     # Blocks without cells are left out; what names them is not.
     keep = [i for i, (_, nodes) in enumerate(cells) if len(nodes)]
     raw = meshio.Mesh(
         mesh.points,
         [cells[i] for i in keep],
-        point_data=at_points,
-        cell_data={n: [v[i] for i in keep] for n, v in (tags | at_cells).items()},
-        field_data={} if kind == "vtu" else gmsh_names(mesh, names),
+        cell_data={name: [values[i] for i in keep] for name, values in tags.items()},
+        field_data=groups,
     )
-    handle, aside = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
-    os.close(handle)
+    aside = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with warnings.catch_warnings(), contextlib.redirect_stdout(io.StringIO()):
             warnings.simplefilter("ignore")
             meshio.write(aside, raw, file_format=kind)
-        os.chmod(aside, 0o666 & ~_umask())
         os.replace(aside, path)
-    except BaseException:
-        os.unlink(aside)
-        raise
+    finally:
+        aside.unlink(missing_ok=True)
 
 
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+def _vtu_tags(mesh: TetMesh, names: list[str]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Cell arrays by block: regions, 1 for the elements of each that has a name, and 1 for the
+    facets of each set; no groups.
+    """
+    sizes = [len(mesh.facets[name]) for name in names]
+    tags = {"region": [mesh.region, *(np.full(n, -1) for n in sizes)]}
+    for number, title in mesh.region_names.items():
+        own = (mesh.region == number).astype(np.int8)
+        tags[NAMED + title] = [own, *(np.zeros(n, np.int8) for n in sizes)]
+    for name in names:
+        flags = [np.full(n, other == name, np.int8) for n, other in zip(sizes, names, strict=True)]
+        tags[FACETS + name] = [np.zeros(len(mesh.tets), np.int8), *flags]
+    return tags, {}
+
+
+def _gmsh_tags(mesh: TetMesh, names: list[str]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Physical groups of each block, from 1 as 0 is no group in gmsh, and the number and dimension
+    of each group by its name.
+    """
+    tags = [mesh.region + 1, *(np.full(len(mesh.facets[n]), i + 1) for i, n in enumerate(names))]
+    tags = [tag.astype(np.int32) for tag in tags]
+    regions = np.unique(mesh.region).tolist()
+    titles = {r: f"{REGION}{r} {mesh.region_names.get(r, '')}".strip() for r in regions}
+    groups = {title: np.array([r + 1, 3]) for r, title in titles.items()}
+    groups |= {name: np.array([i + 1, 2]) for i, name in enumerate(names)}
+    return {"gmsh:physical": tags, "gmsh:geometrical": tags}, groups

@@ -1,14 +1,13 @@
 """Run by `read_contents` in a process of its own: reads FILE and writes its contents.
 
-    python reader_child.py FILE OUTPUT.npz
+    python reader_child.py FILE OUTPUT
 
 What is wrong with the file is the last line of standard error.
 """
 
 import contextlib
 import io
-import json
-import struct
+import pickle
 import sys
 import warnings
 from collections.abc import Iterator
@@ -18,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from meshes import subprocess_call
-from meshes.files.abaqus import read_abaqus
+from meshes.files.abaqus import AGAIN, read_abaqus
 from meshes.files.cells import contents
 from meshes.files.contents import BY_MESHIO
 from meshes.tetmesh import MeshError
@@ -30,7 +29,6 @@ VTK_CELLS = {
 }  # fmt: skip
 SOLID = 3  # dimension
 VOXEL, BRICK = 11, [0, 1, 3, 2, 4, 5, 7, 6]  # its corners in the order of a hexahedron's
-AGAIN = "save it again from the program that it comes from"
 
 
 def main() -> int:
@@ -44,23 +42,23 @@ def main() -> int:
                 raise MeshError(f"{path} is damaged or cut short; {AGAIN}")
             found = contents(path, raw)
     except MeshError as error:
-        print(error, file=sys.stderr)
-        return subprocess_call.REFUSED
+        return _refuse(error)
     except ImportError as error:  # MED files are read by h5py
-        print(
-            f"{path} is read with {error.name}, which is not installed; pip install "
-            '"skinwave[measure]", or save it as .vtu', file=sys.stderr,
-        )  # fmt: skip
-        return subprocess_call.REFUSED
+        return _refuse(f'{path} is read with {error.name}, which is not installed; pip install '
+                       '"skinwave[measure]", or save it as .vtu')  # fmt: skip
     except (Exception, SystemExit) as error:
         why = "is damaged, or holds what its reader does not know"
         if isinstance(error, MemoryError):
             why = "asks for more memory than a mesh of its size needs"
         cure = "save it as version 2.2 (gmsh -format msh22)" if path.suffix == ".msh" else AGAIN
-        print(f"{path} cannot be read: it {why}; {cure}", file=sys.stderr)
-        return subprocess_call.REFUSED
-    np.savez(target, **found)
+        return _refuse(f"{path} cannot be read: it {why}; {cure}")
+    target.write_bytes(pickle.dumps(found))
     return 0
+
+
+def _refuse(why: object) -> int:
+    print(why, file=sys.stderr)
+    return subprocess_call.REFUSED
 
 
 def _read(path: Path) -> Any:
@@ -77,8 +75,6 @@ def _read(path: Path) -> Any:
         families = getattr(raw, "cell_tags", {})  # of MED
         raw.info = {"notes": [], "names": {int(n): ", ".join(of) for n, of in families.items()}}
         return raw
-    if suffix in (".glb", ".gltf"):
-        _check_gltf(path)
     return _read_vtk(path)
 
 
@@ -188,20 +184,6 @@ def _check_unread(path: Path, kind: str) -> None:
                     f"{path} gives nodes in coordinate system {system.strip()}; save it with all "
                     "nodes in the basic one"
                 )
-
-
-def _check_gltf(path: Path) -> None:
-    """Refuse compressed geometry, which VTK leaves out."""
-    content = path.read_bytes()
-    if content[:4] == b"glTF":  # the first chunk of a binary file is its JSON
-        content = content[20 : 20 + struct.unpack_from("<I", content, 12)[0]]
-    needed = json.loads(content).get("extensionsRequired", [])
-    packed = [name for name in needed if "draco" in name or "meshopt" in name]
-    if packed:
-        raise MeshError(
-            f"{path} is compressed ({', '.join(packed)}), which is not read here; export it "
-            "without compression"
-        )
 
 
 if __name__ == "__main__":

@@ -12,19 +12,15 @@ surface F is the distance from it, within a few percent. Without cup and mounds 
 whose top is the plane z = 0 up to `edge_radius` from its sides.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from meshes.surface.level_set import project_to_level_set
-from meshes.surface.repair import repaired
-from meshes.surface.triangulation import Surface
 from meshes.tetmesh import Floats, MeshError
 
 LevelSet = tuple[Floats, Floats]  # values (n,) and gradients (n, 3)
-EPSILON = 0.2  # of h: how far the straight mesh may lie from the surface
 PADS = (-0.33, -0.11, 0.11, 0.33)  # of the breadth: where the fingers begin
 
 
@@ -91,44 +87,6 @@ def level_set(palm: Palm, points: ArrayLike) -> Floats:
 def gradient(palm: Palm, points: ArrayLike) -> Floats:
     """Derivatives (n, 3) of `level_set`; about a unit vector outwards near the surface."""
     return _field(palm, np.asarray(points, np.float64))[1]
-
-
-def surface(palm: Palm, h: float) -> Surface:
-    """The closed surface of a palm by contouring its level set on a grid of h in metre.
-
-    Raises
-    ------
-    MeshError
-        If h is not above 0, larger than half the thickness, or so small that the grid is too large.
-    """
-    import pyvista
-
-    low, high = _box(palm)
-    if not 0 < h <= palm.thickness / 2:
-        raise MeshError(
-            f"h = {h} m must be above 0 and at most half the thickness {palm.thickness} m"
-        )
-    cells = np.ceil((high - low) / h).astype(int) + 4
-    if cells.prod() > 2e7:
-        raise MeshError(f"h = {h} m takes a grid of {cells.prod():.2g} points; the limit is 2e7")
-    # Off the symmetric position no grid point lies on a flat top, where contours degenerate.
-    grid = pyvista.ImageData(
-        dimensions=tuple(cells), spacing=(h, h, h), origin=tuple(low - 1.63 * h)
-    )
-    values = level_set(palm, np.asarray(grid.points, np.float64))
-    contour = grid.contour([0.0], scalars=values, method="flying_edges")
-    triangles = np.asarray(contour.faces).reshape(-1, 4)[:, 1:]
-    points = project_to_level_set(
-        np.asarray(contour.points, np.float64), *level_set_and_gradient(palm)
-    )
-    return repaired(points, triangles)[0]
-
-
-def level_set_and_gradient(
-    palm: Palm,
-) -> tuple[Callable[[Floats], Floats], Callable[[Floats], Floats]]:
-    """`level_set` and `gradient` of this palm, as functions of points (n, 3)."""
-    return lambda points: level_set(palm, points), lambda points: gradient(palm, points)
 
 
 def rise(palm: Palm, places: Floats) -> Floats:
@@ -208,11 +166,3 @@ def _join(one: LevelSet, other: LevelSet, width: float) -> LevelSet:
     slope_high = np.where(lesser[:, None], slope_b, slope_a)
     slope = slope_low + share[:, None] * (slope_high - slope_low)
     return np.minimum(a, b) - width * gap**3 / 6, slope
-
-
-def _box(palm: Palm) -> tuple[Floats, Floats]:
-    """Corners of a box around the palm."""
-    mound = max(palm.thenar_height, palm.hypothenar_height, palm.pad_height)
-    half = np.array([0.56 * palm.breadth, 0.53 * palm.length])  # mounds may bulge sideways
-    top = mound + 2.5 * palm.cup_depth
-    return np.array([*-half, -palm.thickness]), np.array([*half, top])

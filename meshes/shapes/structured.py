@@ -9,13 +9,14 @@ conforms without a search, and has the mirror symmetries of its grid.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import prod
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from meshes.facets import tag_boundary
 from meshes.tetmesh import (
     Floats,
     Ints,
@@ -27,6 +28,7 @@ from meshes.tetmesh import (
     quadratic,
 )
 
+SECTORS = 8  # of a disc, so that no element crosses x = 0 or y = 0
 CLOSEST = 0.4  # of a cell: a grid line nearer to a plane is replaced by it
 MOST_UNKNOWNS = 3_000_000  # of a mesh: beyond it no factorisation fits in a workstation
 
@@ -55,11 +57,7 @@ class Grading:
 
     def __post_init__(self) -> None:
         if not (self.radius >= 0 and 1 <= self.growth < np.inf and self.coarsest > 0):
-            raise MeshError(
-                f"grading of radius {self.radius} m, growth {self.growth} and coarsest cell "
-                f"{self.coarsest} m: give a radius of 0 or above, a growth of 1 or above, and a "
-                "cell above 0"
-            )
+            raise MeshError(f"{self} needs a radius >= 0, a growth >= 1 and a coarsest cell > 0")
 
 
 def sheet(
@@ -121,7 +119,7 @@ def block(
         lines = (
             mirrored(graded_axis(x_length / 2, h, grading)),
             mirrored(graded_axis(y_length / 2, h, grading)),
-            -graded_axis(depth, h, Grading(radius=0, **_beyond(grading)))[::-1],
+            -graded_axis(depth, h, replace(grading, radius=0))[::-1],
         )
     return _with_roles(extrude(*lines, order=order), clamped="bottom", absorbing="sides")
 
@@ -142,12 +140,63 @@ def middle_plane(mesh: TetMesh) -> Ints:
     above = np.unique(top)
     by_place = [nodes[np.lexsort(mesh.points[nodes, :2].T)] for nodes in (layer, above)]
     if len(layer) != len(above) or (np.diff(mesh.points[by_place, :2], axis=0) != 0).any():
-        raise MeshError(
-            "the mesh has no nodes half way below those of its top; extrude it with order 2"
-        )
+        raise MeshError("the mesh has no nodes half way below its top; extrude it with order 2")
     below = np.zeros(len(mesh.points), np.int64)
     below[by_place[1]] = by_place[0]
     return below[top]
+
+
+def disc(diameter: float, thickness: float, h: float, planes: Iterable[float] = ()) -> TetMesh:
+    """Ten-node tetrahedra of a cylinder below the plane z = 0, about the z axis: a prism on a
+    polygon of 8 sides for each ring of elements.
+
+    Parameters
+    ----------
+    diameter, thickness : float, metre
+    h : float, metre, largest edge along a radius and downwards
+    planes : depths in metre that elements do not cross
+
+    Returns
+    -------
+    TetMesh with the facet sets `top`, `bottom`, `sides` and `surface`
+
+    Raises
+    ------
+    MeshError
+        If a length is not above 0, or there would be too many elements.
+    """
+    for name, length in (("diameter", diameter), ("thickness", thickness), ("h", h)):
+        if not 0 < length < np.inf:
+            raise MeshError(f"{name} = {length} m of a disc must be finite and above 0")
+    rings, layers = (max(2, round_up(length / h)) for length in (diameter / 2, thickness))
+    down = with_planes(np.linspace(0.0, thickness, layers + 1), planes)
+    check_size((2 * rings, 2 * rings, len(down) - 1), order=2)
+    plane, triangles = _rings(rings)
+    mesh = extruded(plane * diameter / 2, triangles, -down[::-1])
+    return tag_boundary(
+        mesh,
+        bottom=lambda centroids, normals: normals[:, 2] < -0.9,
+        sides=lambda centroids, normals: np.abs(normals[:, 2]) < 0.1,
+    )
+
+
+def _rings(rings: int) -> tuple[Floats, Ints]:
+    """Points (n, 2) on rings of a unit disc, 8 k on ring k, and triangles (8 r^2, 3) of them."""
+    start = np.cumsum([0, 1, *(SECTORS * np.arange(1, rings))])
+    points, triangles = [np.zeros((1, 2))], []
+    for k in range(1, rings + 1):
+        angle = 2 * np.pi * np.arange(SECTORS * k) / (SECTORS * k)
+        points.append(k / rings * np.column_stack([np.cos(angle), np.sin(angle)]))
+        sector, i = np.divmod(np.arange(SECTORS * k), k)
+        outer = start[k] + np.arange(SECTORS * k)
+        following = start[k] + np.arange(1, SECTORS * k + 1) % (SECTORS * k)
+        around = max(1, SECTORS * (k - 1))
+        inner = start[k - 1] + (sector * (k - 1) + i) % around
+        triangles.append(np.column_stack([outer, following, inner]))
+        between = i < k - 1
+        beside = start[k - 1] + (sector * (k - 1) + i + 1) % around
+        triangles.append(np.column_stack([inner, following, beside])[between])
+    return np.vstack(points), np.vstack(triangles)
 
 
 def graded_axis(length: float, h: float, grading: Grading) -> Floats:
@@ -155,9 +204,7 @@ def graded_axis(length: float, h: float, grading: Grading) -> Floats:
 
     Parameters
     ----------
-    length : metre
-    h : metre, size of the first cells
-    grading : Grading
+    length, h, grading : in metre the end, and the size of the first cells
 
     Returns
     -------
@@ -285,13 +332,8 @@ def _rectangle_triangles(x: Floats, y: Floats) -> Ints:
 def _prism_tets(triangles: Ints, per_layer: int) -> Ints:
     a0, a1, a2 = triangles.T
     b0, b1, b2 = triangles.T + per_layer
-    return np.vstack(
-        [
-            np.column_stack([a0, a1, a2, b2]),
-            np.column_stack([a0, a1, b2, b1]),
-            np.column_stack([a0, b1, b2, b0]),
-        ]
-    )
+    prisms = ([a0, a1, a2, b2], [a0, a1, b2, b1], [a0, b1, b2, b0])
+    return np.vstack([np.column_stack(nodes) for nodes in prisms])
 
 
 def _sides(points: Floats, facets: Ints) -> dict[str, Ints]:
@@ -310,9 +352,7 @@ def _sides(points: Floats, facets: Ints) -> dict[str, Ints]:
 def _with_roles(mesh: TetMesh, **roles: str) -> TetMesh:
     """The mesh with some of its facet sets known by what is done to them, too."""
     named = {role: mesh.facets[name] for role, name in roles.items()}
-    return TetMesh(
-        points=mesh.points, tets=mesh.tets, region=mesh.region, facets={**mesh.facets, **named}
-    )
+    return replace(mesh, facets={**mesh.facets, **named})
 
 
 def _even(length: float, h: float, *, least: int = 2) -> Floats:
@@ -351,7 +391,3 @@ def round_up(ratio: float) -> int:
 def mirrored(half: Floats) -> Floats:
     """A line (2 n - 1,) from its half (n,) that begins at 0."""
     return np.concatenate([-half[:0:-1], half])
-
-
-def _beyond(grading: Grading) -> dict[str, float]:
-    return {"growth": grading.growth, "coarsest": grading.coarsest}

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from meshes.facets import Predicate
+from meshes.facets import Predicate, heights_over
 from meshes.surface.repair import repaired
 from meshes.surface.triangulation import Surface, compact, n_pieces, pieces
 from meshes.tetmesh import Floats, MeshError
@@ -102,12 +102,11 @@ def _outline(surface: Surface) -> tuple[Floats, float, Floats]:
 
 
 def height_at(surface: Surface, x: float, y: float) -> float:
-    """Greatest z of the surface above a point of the plane.
+    """Greatest z in metre of the surface above a point of the plane.
 
     Parameters
     ----------
-    surface : Surface
-    x, y : metre
+    surface, x, y : the surface, and the point in metre
 
     Returns
     -------
@@ -118,19 +117,11 @@ def height_at(surface: Surface, x: float, y: float) -> float:
     MeshError
         If there is no surface there.
     """
-    corners = surface.points[surface.triangles]
-    u, v = (corners[..., :2] - [x, y]).transpose(2, 0, 1)
-    share = np.stack(
-        [u[:, b] * v[:, c] - u[:, c] * v[:, b] for b, c in ((1, 2), (2, 0), (0, 1))], axis=1
-    )
-    total = share.sum(axis=1)
-    over = (share * np.sign(total)[:, None] >= 0).all(axis=1) & (total != 0)
-    if not over.any():
-        raise MeshError(
-            f"the surface is not above ({1e3 * x:.4g}, {1e3 * y:.4g}) mm; choose another place"
-        )
-    weights = share[over] / total[over, None]
-    return float(np.einsum("ea,ea->e", weights, corners[over, :, 2]).max())
+    highest = heights_over(surface.points[surface.triangles], np.array([x, y])).max()
+    if highest == -np.inf:
+        place = f"({1e3 * x:.4g}, {1e3 * y:.4g}) mm"
+        raise MeshError(f"the surface is not above {place}; choose another place")
+    return float(highest)
 
 
 def clipped(surface: Surface, box: Sequence[float]) -> tuple[Surface, list[str]]:

@@ -9,7 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from meshes.surface.self_intersection import self_intersections
-from meshes.surface.triangulation import Surface, centred_corners, compact, n_pieces, pieces, volume
+from meshes.surface.triangulation import (
+    Surface,
+    areas_of,
+    centred_corners,
+    compact,
+    n_pieces,
+    pieces,
+    volume,
+)
 from meshes.tetmesh import Floats, Ints, MeshError
 
 MOST_OFF_PLANE = 0.1  # of its width: how far the edge of a hole that is capped may leave a plane
@@ -122,8 +130,7 @@ def repaired(
 def _largest(surface: Surface) -> tuple[Surface, float]:
     """The piece with the largest area, and its share of all."""
     piece = pieces(surface)
-    a, b, c = centred_corners(surface)
-    areas = np.bincount(piece, np.linalg.norm(np.cross(b - a, c - a), axis=1))
+    areas = np.bincount(piece, areas_of(surface))
     largest = int(areas.argmax())
     kept = compact(surface.points, surface.triangles[piece == largest])
     return kept, float(areas[largest] / areas.sum())

@@ -62,10 +62,15 @@ def volume(surface: Surface) -> float:
     return float(np.einsum("ei,ei->", np.cross(a, b), c)) / 6
 
 
+def areas_of(surface: Surface) -> Floats:
+    """Area (k,) in square metre of each triangle."""
+    a, b, c = centred_corners(surface)
+    return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
+
+
 def area(surface: Surface) -> float:
     """Area in square metre."""
-    a, b, c = centred_corners(surface)
-    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2
+    return float(areas_of(surface).sum())
 
 
 def thinnest(surface: Surface) -> float:

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from meshes.surface.level_set import project_to_level_set
 from meshes.tetmesh import (
     EDGES,
     Floats,
@@ -74,6 +73,17 @@ def curve_boundary(
     points, kept = keep_jacobians(mesh.tets, straight, points)
     log.info("curved %d edges, %d stay straight", len(middles) - kept, kept)
     return replace(mesh, points=points)
+
+
+def project_to_level_set(
+    points: Floats, level_set: Function, gradient: Function, steps: int = 4
+) -> Floats:
+    """Points (n, 3) moved onto a level set that is near by Newton steps along its gradient."""
+    for _ in range(steps):
+        slope = gradient(points)
+        steepness = np.maximum(np.einsum("ni,ni->n", slope, slope), 1e-12)
+        points = points - (level_set(points) / steepness)[:, None] * slope
+    return points
 
 
 def _mean_edge(mesh: TetMesh) -> Floats:

@@ -10,15 +10,16 @@ take those inside along by transfinite interpolation (Gordon and Hall, Int J Num
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, permutations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from meshes.shapes.kuhn import kuhn_tets
+from meshes.facets import seen_from_above, tag_boundary
 from meshes.shapes.palm import Palm, gradient, level_set, rise
-from meshes.tetmesh import Floats, MeshError, TetMesh, corner_volumes
-from meshes.volume.palm_mesh import curved_palm
+from meshes.shapes.structured import check_size
+from meshes.tetmesh import Floats, Ints, MeshError, TetMesh, corner_volumes, quadratic
+from meshes.volume.curving import curve_boundary
 from meshes.volume.quality import angles_between_faces
 from meshes.volume.tetrahedralise import SHARPEST
 
@@ -40,7 +41,8 @@ def mapped_palm(palm: Palm, x: Floats, y: Floats, z: Floats) -> TetMesh:
 
     Returns
     -------
-    TetMesh with the facet sets of `palm_mesh`
+    TetMesh with the facet sets `surface` (all of it), `top` (what the device sees), `wrist` and
+    `fingers` (the ends, which look along the hand) and `back`, the rest
 
     Raises
     ------
@@ -57,9 +59,39 @@ def mapped_palm(palm: Palm, x: Floats, y: Floats, z: Floats) -> TetMesh:
         raise MeshError(
             f"a mapped mesh of this palm has a dihedral angle of {sharpest:.2g} degrees, the least "
             f"that is accepted is {SHARPEST:g}, and misses its surface by {1e3 * off:.2g} mm; take "
-            "a lower relief or `palm_mesh`"
+            "a lower relief"
         )
-    return curved_palm(palm, TetMesh(points=points, tets=tets))
+    mesh = quadratic(TetMesh(points=points, tets=tets))
+    mesh = curve_boundary(mesh, lambda p: level_set(palm, p), lambda p: gradient(palm, p))
+    return tag_boundary(
+        mesh,
+        rest="back",
+        top=seen_from_above(mesh),
+        wrist=lambda centroids, normals: normals[:, 1] < -(0.5**0.5),
+        fingers=lambda centroids, normals: normals[:, 1] > 0.5**0.5,
+    )
+
+
+def kuhn_tets(cells: tuple[int, int, int]) -> Ints:
+    """Tetrahedra (6 n, 4), with positive volume, of a grid of so many cells along three axes, whose
+    nodes are numbered with the last axis fastest.
+
+    The diagonals of the boxes run outwards from the middle of the grid (Kuhn, or Freudenthal,
+    triangulation of each octant), so that no tetrahedron has two facets on its boundary: a smooth
+    surface may be wrapped around edges and corners without a flat element.
+    """
+    check_size(cells)
+    places = np.stack(np.meshgrid(*map(np.arange, cells), indexing="ij"), axis=-1).reshape(-1, 3)
+    outwards = np.where(places >= np.array(cells) // 2, 1, -1)
+    strides = np.array([(cells[1] + 1) * (cells[2] + 1), cells[2] + 1, 1])
+    inner = (places + (outwards < 0)) @ strides
+    steps = outwards * strides
+    tets = []
+    for order in permutations(range(3)):
+        b, c, d = inner + np.cumsum(steps[:, order], axis=1).T
+        turned = outwards.prod(axis=1) * np.linalg.det(np.eye(3)[list(order)]) < 0
+        tets.append(np.column_stack([inner, b, np.where(turned, d, c), np.where(turned, c, d)]))
+    return np.vstack(tets)
 
 
 def _sharpest(points: Floats, tets: NDArray[np.int_]) -> float:

@@ -31,22 +31,6 @@ def edge_lengths(mesh: TetMesh) -> Floats:
     return np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
 
 
-def element_volumes(points: Floats, tets: Ints) -> Floats:
-    """Volume (m,) in cubic metre of each element, with its curved edges if it has 10 nodes.
-
-    The determinant is cubic in the place, which the five points of Keast's rule integrate exactly
-    (Comput Methods Appl Mech Eng 55:339 (1986)).
-    """
-    if tets.shape[1] == 4:
-        return corner_volumes(points, tets)
-    inner = np.full((4, 4), 1 / 6) + np.eye(4) / 3
-    at = np.vstack([np.full(4, 1 / 4), inner])
-    weights = np.array([-4 / 5, *[9 / 20] * 4]) / 6
-    return np.asarray(
-        sum(w * _determinants(points[tets], p) for w, p in zip(weights, at, strict=True))
-    )
-
-
 def _determinants(nodes: Floats, at: Floats) -> Floats:
     """det J (m,) of 10-node elements (m, 10, 3) at barycentric coordinates (4,)."""
     by_corner = np.zeros((10, 4))  # dN / dl: l_a (2 l_a - 1) at corners, 4 l_a l_b at edges

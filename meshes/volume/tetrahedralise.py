@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import logging
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
@@ -23,17 +24,14 @@ from meshes.facets import tag_boundary
 from meshes.shapes.structured import Grading, extrude
 from meshes.surface.repair import check, repaired
 from meshes.surface.triangulation import Surface, area, n_pieces, thinnest, volume
-from meshes.surface.winding import joined
+from meshes.surface.winding import joined, winding_number
 from meshes.tetmesh import Floats, MeshError, TetMesh, boundary_facets, corner_volumes
-from meshes.volume.inner import with_regions
 from meshes.volume.quality import dihedral_angles
-from meshes.volume.smoothing import smoothed
+from meshes.volume.smoothing import Sizing, smoothed
 
 log = logging.getLogger(__name__)
 
 MESHER = Path(__file__).with_name("tetwild_child.py")
-
-Sizing = Callable[[Floats], Floats]
 
 EPSILON = 0.05  # of h: how far the mesh may lie from the surface
 SMALLEST_EPSILON = 1e-4  # of the diagonal: below, the mesher takes minutes to hours
@@ -41,8 +39,9 @@ MOST_OF_INNER = 0.025  # likewise of what is inside it, whose volume may differ 
 MOST_OF_THICKNESS = 0.1  # what the envelope may be of the body's thickness, or it swallows it
 MOST_TETRAHEDRA = 1_000_000
 SHARPEST = 5.0  # degrees: least dihedral angle of a mesh that is accepted
-VOLUME_ERROR = 0.005
+VOLUME_ERROR, INNER_VOLUME_ERROR = 0.005, 0.02  # of the volumes within surfaces
 LOST_SHELL = 0.3  # of the shell between surface and envelope: what chords of curves may cut off
+REST = "tissue"  # name of the region that is in no inner surface
 GRID_CELLS = 32  # along the longest side of the background grid of sizes
 
 
@@ -103,8 +102,8 @@ def tetrahedralise(
     name = cache.key("tetrahedralise 3", *(inputs[part] for part in sorted(inputs)))
     entry = cache.load(name) or {}
     if {"points", "tets"} <= entry.keys():
-        return with_regions(_accepted(surface, epsilon, entry["points"], entry["tets"]), inner)
-    found = with_regions(_accepted(surface, epsilon, *_run(inputs, timeout)), inner)
+        return _with_regions(_accepted(surface, epsilon, entry["points"], entry["tets"]), inner)
+    found = _with_regions(_accepted(surface, epsilon, *_run(inputs, timeout)), inner)
     mesh = smoothed(found, sizing)
     cache.store(name, {}, points=mesh.points, tets=mesh.tets)
     return mesh
@@ -136,26 +135,21 @@ def _checked_epsilon(surface: Surface, h: float, epsilon: float | None) -> float
     if epsilon is None:
         return min(max(EPSILON * h, least), most)
     if not least <= epsilon <= most:
-        raise MeshError(
-            f"epsilon = {epsilon} m must be from {least:.2g} m, below which the mesher does not "
-            f"end, to {most:.2g} m, a tenth of the body's thickness; leave it out for a good one"
-        )
+        raise MeshError(f"epsilon = {epsilon} m must be from {least:.2g} to {most:.2g} m")
     return epsilon
 
 
 def check_size(surface: Surface, name: str, length: float) -> None:
-    """Check that a body can be meshed with an edge length.
+    """Refuse a length in metre that is longer than the body, or shorter than a thousandth of it.
 
     Parameters
     ----------
-    surface : Surface
-    name : of the length in the message
-    length : metre
+    surface, name, length : the body, and the length with its name in the message
 
     Raises
     ------
     MeshError
-        If it is longer than the body, or shorter than a thousandth of it.
+        If it is so.
     """
     longest = float(np.ptp(surface.points, axis=0).max())
     if not 1e-3 * longest <= length <= longest:
@@ -177,10 +171,7 @@ def _size_grid(surface: Surface, h: float, sizing: Sizing | None) -> dict[str, n
     if sizing:
         sizes = np.asarray(sizing(grid.points), np.float64)
         if sizes.shape != (len(grid.points),) or not np.isfinite(sizes).all():
-            raise MeshError(
-                f"sizing gave an array of shape {sizes.shape} for {len(grid.points)} points; "
-                "return one finite edge length in metre for each"
-            )
+            raise MeshError(f"sizing gave shape {sizes.shape}; return one finite length a point")
         check_size(surface, "least size", float(sizes.min()))
         sizes = np.minimum(sizes, (high - low).max())
     expected = (corner_volumes(grid.points, grid.tets) / sizes[grid.tets].mean(axis=1) ** 3).sum()
@@ -197,18 +188,17 @@ def _run(inputs: dict[str, np.ndarray], timeout: float) -> tuple[Floats, np.ndar
     """Run the mesher on its input, in a process and a folder of its own."""
     if find_spec("pytetwild") is None:
         raise MeshError(
-            "tetrahedra need the package pytetwild, which is not installed and has no wheel for "
-            "Intel Macs; install it, build the mesh on another machine, or read one from a file"
+            "tetrahedra need the package pytetwild, which has no wheel for Intel Macs; install it, "
+            "or give a file that has a mesh"
         )
     with tempfile.TemporaryDirectory(prefix="skinwave-") as folder:
         source, target = Path(folder, "input.npz"), Path(folder, "output.npz")
         np.savez(source, **inputs)  # type: ignore[arg-type]
         try:
-            subprocess_call.run(MESHER, source, target, timeout, folder=folder, timeout=timeout)
+            subprocess_call.run(MESHER, source, target, folder=folder, timeout=timeout)
         except TimeoutError:
             raise MeshError(
-                f"the mesher was stopped after {timeout:g} s; take larger elements or a longer "
-                "timeout"
+                f"the mesher was stopped after {timeout:g} s; take larger elements or more time"
             ) from None
         except MeshError as error:
             raise MeshError(f"the mesher failed: {error}; simplify or smooth the surface") from None
@@ -216,13 +206,33 @@ def _run(inputs: dict[str, np.ndarray], timeout: float) -> tuple[Floats, np.ndar
             return result["points"], result["tets"].astype(np.int64)
 
 
+def _with_regions(mesh: TetMesh, inner: Mapping[str, Surface]) -> TetMesh:
+    """Mesh with a region for each inner surface, from 1, and 0 for the rest.
+
+    A tetrahedron is in the smallest surface whose winding number about its middle is above 1/2.
+    """
+    if not inner:
+        return mesh
+    middles = mesh.points[mesh.tets].mean(axis=1)
+    region = np.zeros(len(mesh.tets), np.int64)
+    volumes, enclosed = corner_volumes(mesh.points, mesh.tets), [volume(s) for s in inner.values()]
+    for k in np.argsort(enclosed)[::-1].tolist():
+        name, surface = list(inner.items())[k]
+        inside = winding_number(surface, middles) > 0.5
+        region[inside] = k + 1
+        ratio = volumes[inside].sum() / enclosed[k]
+        if not abs(ratio - 1) <= INNER_VOLUME_ERROR:
+            raise MeshError(
+                f"the region {name} has {100 * ratio:.3g} % of the volume within its surface, and "
+                f"may differ by {100 * INNER_VOLUME_ERROR:g} %; take smaller elements"
+            )
+    return replace(mesh, region=region, region_names=dict(enumerate([REST, *inner])))
+
+
 def _accepted(surface: Surface, epsilon: float, points: Floats, tets: np.ndarray) -> TetMesh:
     """The mesh, if it fills the surface and has no bad element."""
     if not len(tets):
-        raise MeshError(
-            "the mesher returned no tetrahedra, as for a body thinner than its tolerance; use a "
-            "thicker one or a smaller epsilon"
-        )
+        raise MeshError("the mesher returned no tetrahedra; give a thicker body")
     used, numbers = np.unique(tets, return_inverse=True)
     mesh = tag_boundary(TetMesh(points=points[used], tets=numbers.reshape(-1, 4)))
     boundary = boundary_facets(mesh.tets)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from meshes import TetMesh
-from meshes.shapes.disc import disc
+from meshes.shapes.structured import disc
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretise, Discretised, in_layers
 

@@ -3,7 +3,7 @@
 import fem
 from fem.load_and_probe import facet_normals
 from meshes import Fingertip, TetMesh, boundary_facets, fingertip_mesh
-from meshes.volume.fingertip_mesh import quarter_of, shells_of
+from meshes.volume.fingertip import quarter_of, shells_of
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.coat import coarsest_size
 from skinwave.bodies.discretised import Discretised

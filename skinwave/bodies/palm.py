@@ -1,6 +1,5 @@
 """Parametric palm: soft tissue on bone, meshed finely under the focus."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -15,13 +14,11 @@ from meshes import (
     boundary_facets,
     graded_axis,
     mapped_palm,
-    palm_mesh,
     stretched_palm,
 )
 from meshes.files.import_body import GROWTH
 from meshes.shapes.palm import gradient
 from meshes.shapes.structured import Lines, mirrored
-from meshes.tetmesh import Floats
 from skinwave.bodies.analytic import stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.coat import meshed_strata, thickest_coat
@@ -38,7 +35,6 @@ SURFACE, FINE_RADIUS, DOWNWARDS = 0.8, 25e-3, 0.6
 # default size they grow by its third root, because a row of boxes is as fine from side to side, and
 # 2 mm would take 560,000 dofs, where 230,000 are within 0.3 %.
 CELL = 0.85
-LOWER, ROUNDER = (0.6, 0.3, 0.0), (0.6, 0.9)  # shares of lengths of a relief that are tried
 
 
 def discretise(body: Body, h: float) -> Discretised:
@@ -52,34 +48,12 @@ def discretise(body: Body, h: float) -> Discretised:
     """
     try:
         mesh = mapped_palm(body.palm, *body_lines(body, h))
-    except MeshError:  # a relief that a structured mesh cannot follow
-        try:
-            mesh = palm_mesh(body.palm, h, sizing=_sizes(h, _coarsest(body, h)))
-        except MeshError as error:
-            raise MeshError(
-                f"this palm has no mesh: its relief is too steep; {_cure(body, h)}"
-            ) from error
+    except MeshError as error:
+        raise MeshError(
+            "this palm has no mesh: its relief is too steep; lower thenar_height_mm, "
+            "hypothenar_height_mm, pad_height_mm or cup_depth_mm, or take a mesh from a file"
+        ) from error
     return _supported(body, h, mesh)
-
-
-def _cure(body: Body, h: float) -> str:
-    """The first key of a palm's relief with another value of which it has a mesh."""
-    palm = body.palm
-    heights = ("thenar_height", "hypothenar_height", "pad_height", "cup_depth")
-    half = min(palm.breadth, palm.length) / 2
-    trials = [
-        *({name: part * getattr(palm, name)} for name in heights for part in LOWER),
-        *({"corner_radius": max(palm.edge_radius, part * half)} for part in LOWER),
-        *({"edge_radius": part * min(palm.thickness / 2, palm.corner_radius)} for part in ROUNDER),
-        dict.fromkeys(heights, 0.0),
-    ]
-    for values in trials:
-        try:
-            mapped_palm(replace(palm, **values), *body_lines(body, h))
-        except MeshError:
-            continue
-        return "take " + " and ".join(f"{name}_mm = {1e3 * x:.3g}" for name, x in values.items())
-    return "take a mesh from a file"
 
 
 def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
@@ -156,7 +130,9 @@ def _coarsest(body: Body, h: float) -> float:
 
 
 def body_lines(body: Body, h: float) -> Lines:
-    """Grid lines in metre along x, y and z of the box around a palm, for cells as `_sizes` asks."""
+    """Grid lines in metre along x, y and z of the box around a palm, for cells that grow away from
+    its middle, and from its surface.
+    """
     side = CELL * max(1.0, HAND_CELL / h) ** (1 / 3)
     finest, coarsest = side * SURFACE * h, side * _coarsest(body, h)
     along = Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=coarsest)
@@ -167,20 +143,6 @@ def body_lines(body: Body, h: float) -> Lines:
     while (below := sum(heights)) < body.depth:
         heights.append(min(heights[-1] * GROWTH**DOWNWARDS, coarsest))
     return x, y, -np.append(0.0, np.cumsum(heights))[::-1] * (body.depth / below)
-
-
-def _sizes(h: float, coarsest: float) -> Callable[[Floats], Floats]:
-    """Edge lengths (n,) in metre aimed at in points (n, 3): 0.8 h where the focus travels, h some
-    5 mm below it, growing further down and out.
-    """
-    slope = float(np.log(GROWTH))
-
-    def sizes(points: Floats) -> Floats:
-        beside = np.maximum(np.linalg.norm(points[:, :2], axis=1) - FINE_RADIUS, 0.0)
-        below = DOWNWARDS * np.minimum(points[:, 2], 0.0)
-        return np.minimum(SURFACE * h + slope * np.hypot(beside, below), coarsest)
-
-    return sizes
 
 
 def _support(body: Body, mesh: TetMesh) -> fem.Support:

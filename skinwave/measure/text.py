@@ -26,6 +26,7 @@ from skinwave.system.plain_text import number_in
 
 LARGEST = 256_000_000  # bytes
 FIRST_LINE = "LabVIEW Measurement"  # of .lvm files, whatever they are called
+LARGEST = 256_000_000  # bytes
 SHOWN = 100  # rows at the end that show what separates cells
 NO_VALUE = (
     "", "-", "--", "---", "na", "n/a", "#n/a", "null", "none", "nan", "1.#qnan", "-1.#ind",

@@ -208,13 +208,20 @@ def read_distribution(key: str, table: Mapping[str, Any]) -> Distribution:
     return found
 
 
-CALLED = re.compile(r"\s*(normal|lognormal|factor|uniform|triangular)\s*\(([^()]*)\)\s*")
-ARGUMENTS = {"normal": 2, "lognormal": 2, "factor": 2, "uniform": 2, "triangular": 3}
+# Texts of distributions: shape, measure, and an example with all of its numbers.
+CALLS = {
+    "normal": ("normal", "spread", "normal(25e3, 0.3)"),
+    "lognormal": ("lognormal", "spread", "lognormal(25e3, 0.3)"),
+    "factor": ("lognormal", "factor", "factor(25e3, 2)"),
+    "uniform": ("uniform", "bounds", "uniform(10, 20)"),
+    "triangular": ("triangular", "bounds", "triangular(10, 15, 20)"),
+}
+CALLED = re.compile(rf"\s*({'|'.join(CALLS)})\s*\(([^()]*)\)\s*")
 
 
 def called(text: str) -> tuple[float, Distribution] | None:
-    """Central value and distribution of a text such as normal(25e3, 0.3), lognormal(25e3, 0.3),
-    factor(25e3, 2), uniform(10, 20) or triangular(10, 15, 20); None of any other text.
+    """Central value and distribution of a text such as normal(25e3, 0.3), factor(25e3, 2),
+    uniform(10, 20) or triangular(10, 15, 20); None of any other text.
 
     The first number is the central value and the second its relative standard deviation or factor;
     of the last two all are limits, with the mode of a triangular one between them.
@@ -227,30 +234,18 @@ def called(text: str) -> tuple[float, Distribution] | None:
     match = CALLED.fullmatch(text)
     if match is None:
         return None
-    name, words = match[1], match[2].split(",")
-    numbers = [x for x in map(number_in, words) if x is not None]
-    if len(numbers) != len(words) or len(numbers) != ARGUMENTS[name]:
-        raise ValueError(f"{text.strip()} needs {ARGUMENTS[name]} numbers; write {EXAMPLES[name]}")
-    if name in ("uniform", "triangular"):
+    shape, measure, example = CALLS[match[1]]
+    numbers = [x for x in map(number_in, match[2].split(",")) if x is not None]
+    if len(numbers) != example.count(",") + 1 or len(numbers) != match[2].count(",") + 1:
+        raise ValueError(f"{text.strip()} has other numbers than it needs; write {example}")
+    if measure == "bounds":
         low, *mode, high = numbers
-        found = Distribution(shape=name, measure="bounds", width=(low, high))
-        value = mode[0] if mode else (low + high) / 2
+        value, width = (mode[0] if mode else (low + high) / 2), [low, high]
     else:
-        value, width = numbers
-        plain = {"shape": "lognormal", "measure": "factor"}
-        kind = plain if name == "factor" else {"shape": name, "measure": "spread"}
-        found = Distribution(**kind, width=(width,))
+        value, *width = numbers
+    found = Distribution(shape=shape, measure=measure, width=tuple(width))
     found.check(value)
     return value, found
-
-
-EXAMPLES = {
-    "normal": "normal(25e3, 0.3)",
-    "lognormal": "lognormal(25e3, 0.3)",
-    "factor": "factor(25e3, 2)",
-    "uniform": "uniform(10, 20)",
-    "triangular": "triangular(10, 15, 20)",
-}
 
 
 def _number(key: str, own: str, value: Any) -> float:

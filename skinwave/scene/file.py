@@ -17,20 +17,15 @@ from simple_model.load.trajectory import BY_POINTS
 from skinwave.bodies import BodyKind
 from skinwave.bodies.parts import check_material
 from skinwave.scene.distributions import Distribution, parent_of, with_spreads, without_spreads
-from skinwave.scene.keys import DERIVED, PATH, SECTIONS, as_table, as_text, checked, renamed
+from skinwave.scene.keys import DERIVED, PATH, SECTIONS, as_table, as_text, checked
 from skinwave.scene.load import Load
 from skinwave.scene.material_file import with_tables
 from skinwave.scene.scene import BODIES, KINDS, Body, Placement, Scene, kind_of, solid_of
 from skinwave.system.plain_text import as_utf_8
 
 LARGEST = 16_000_000  # bytes of a file: some seconds of a path recorded at 40 kHz
-PROSE = 1_000_000  # bytes of it that are no numbers
 PAIRS = re.compile(r"\[\s+(-?\d[\d.e+-]*),\s+(-?\d[\d.e+-]*),\s+\]")  # on lines of their own
 PATHS = "write a Windows path in single quotes, 'C:\\hand.stl', or with /, \"C:/hand.stl\""
-NUMBERS = b"0123456789.,[]+-eE_ \t\r\n"
-DEEP = re.compile(  # keys of many parts, which take squares of their number
-    r"""(?<![\w"'-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){16}"""
-)
 
 
 def read(path: str | Path) -> Scene:
@@ -53,19 +48,9 @@ def read(path: str | Path) -> Scene:
 
 
 def content(path: str | Path) -> str:
-    """The text of a scene file, of a size that is parsed within seconds.
-
-    Raises
-    ------
-    ValueError
-        If it cannot be read, is no UTF-8, too long, or has too many words.
-    """
+    """The text of a scene file; raises a ValueError if it cannot be read or is no UTF-8."""
     found = reading.content(path, LARGEST)
     try:
-        if len(found) > PROSE and len(found.translate(None, NUMBERS)) > PROSE:
-            raise ValueError(
-                f"more than {PROSE / 1e6:g} MB of it are no numbers, which no scene has; cut it"
-            )
         return as_utf_8(found)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
@@ -77,16 +62,14 @@ def loads(text: str) -> Scene:
 
 
 def parsed(text: str, folder: Path | None = None) -> dict[str, Any]:
-    """The table of a scene's TOML text, by today's keys; with a folder, with the numbers of tables
-    of moduli that are named from there.
+    """The table of a scene's TOML text; with a folder, with the numbers of tables of moduli that
+    are named from there.
 
     Raises
     ------
     ValueError
         If it is not valid TOML, or a table cannot be read.
     """
-    if DEEP.search(text):
-        raise ValueError("a key has more than 16 parts, which none of a scene has; shorten it")
     try:
         table = tomllib.loads(text)
     except ValueError as error:
@@ -94,7 +77,7 @@ def parsed(text: str, folder: Path | None = None) -> dict[str, Any]:
     except RecursionError:
         raise ValueError("not valid TOML: brackets within brackets beyond all depth") from None
     _check_texts({key: value for key, value in table.items() if key != "name"})
-    return renamed(with_tables(table, folder) if folder else table)
+    return with_tables(table, folder) if folder else table
 
 
 def _not_toml(text: str, error: str) -> str:
@@ -139,7 +122,9 @@ def from_table(table: dict[str, Any]) -> Scene:
         for section, keys in SECTIONS.items()
     }
     body = _body(parts["body"] | parts["placement"], preset)
-    load = _load(parts["load"], parts["focus"])
+    load = Load(**parts["load"])
+    if parts["focus"] and not load.of_kind.is_of_device:
+        raise ValueError(f"[focus] is not for a load of kind '{load.kind}'; leave it out")
     tacton, path = _split(parts["tacton"], PATH)
     pressure = MovingPressure(
         tacton=Tacton(**tacton, trajectory=Trajectory(**path)), **parts["focus"]
@@ -148,15 +133,6 @@ def from_table(table: dict[str, Any]) -> Scene:
         name=top.get("name", "scene"), pressure=pressure, body=body, load=load, **parts["probes"]
     )
     return with_distributions(scene, spreads) if spreads else scene
-
-
-def _load(values: dict[str, Any], focus: dict[str, Any]) -> Load:
-    load = Load(**values)
-    if focus and not load.of_kind.is_of_device:
-        raise ValueError(
-            f"[focus] is that of a device, which makes no load of kind '{load.kind}'; leave it out"
-        )
-    return load
 
 
 def with_distributions(scene: Scene, spreads: Mapping[str, Distribution]) -> Scene:
@@ -192,15 +168,10 @@ def dumps(scene: Scene) -> str:
 
 def to_table(scene: Scene) -> dict[str, Any]:
     """The complete scene by a scene file's keys; `from_table` gives it back."""
-    tacton, path, pressure, body = (
-        scene.tacton,
-        scene.tacton.trajectory,
-        scene.pressure,
-        scene.body,
-    )
+    tacton, body = scene.tacton, scene.body
     sources: dict[str, tuple[Any, ...]] = {
-        "tacton": (tacton, path),
-        "focus": (pressure,),
+        "tacton": (tacton, tacton.trajectory),
+        "focus": (scene.pressure,),
         "body": (body,),
         "load": (scene.load,),
         "placement": (body.placement,),

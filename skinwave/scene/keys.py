@@ -1,6 +1,5 @@
 """The keys of a scene file: each with its unit, what it may hold, and the attribute behind it."""
 
-import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import partial
@@ -32,60 +31,79 @@ class SceneKey:
     write: Callable[[Any], Any]
 
 
-def written(keys: Mapping[str, SceneKey], record: Any) -> dict[str, Any]:
-    """The table of a record, by the keys of a file."""
-    return {key: field.write(getattr(record, field.name)) for key, field in keys.items()}
+Keys = Mapping[str, SceneKey]
+
+
+def written(keys: Keys, record: Any) -> dict[str, Any]:
+    """The table of a record, by the keys of a file, without what is None."""
+    values = ((key, field, getattr(record, field.name)) for key, field in keys.items())
+    return {key: field.write(value) for key, field, value in values if value is not None}
+
+
+def _wrong(key: str, value: Any, must: str) -> ValueError:
+    text = repr(value)
+    return ValueError(f"{key} = {text if len(text) <= 60 else f'{text[:57]}...'} must be {must}")
 
 
 def _number(key: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{key} = {_shown(value)} must be a number")
+        raise _wrong(key, value, "a number")
     try:
         return float(value)
     except OverflowError:
         raise ValueError(f"{key} is too large a number; give one below 1e308") from None
 
 
-def _shown(value: Any) -> str:
-    """A value as a message quotes it."""
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
-
-
 def as_text(key: str, value: Any) -> str:
     """The text itself; an error for anything else."""
     if not isinstance(value, str):
-        raise ValueError(f"{key} = {_shown(value)} must be a text in quotes")
+        raise _wrong(key, value, "a text in quotes")
     return value
 
 
 def as_table(key: str, value: Any) -> dict[str, Any]:
     """The table itself; an error for anything else."""
     if not isinstance(value, dict):
-        raise ValueError(f"{key} = {_shown(value)} must be a table, [{key}]")
+        raise _wrong(key, value, f"a table, [{key}]")
     return value
+
+
+def _list(key: str, value: Any, of: str) -> list[Any]:
+    if not isinstance(value, list):
+        raise _wrong(key, value, f"a list of {of}")
+    return value
+
+
+def _switch(key: str, value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise _wrong(key, value, "true or false")
+    return value
+
+
+def _numbers(key: str, value: Any) -> tuple[float, ...]:
+    return tuple(_number(key, x) for x in _list(key, value, "numbers"))
+
+
+def _words(key: str, value: Any) -> tuple[str, ...]:
+    return tuple(as_text(key, word) for word in _list(key, value, 'words, such as ["left"]'))
 
 
 def _pair(key: str, value: Any) -> tuple[float, float]:
     if not isinstance(value, list) or len(value) != 2:
-        raise ValueError(f"{key} = {_shown(value)} must be a pair of numbers, such as [1.0, 0.0]")
+        raise _wrong(key, value, "a pair of numbers, such as [1.0, 0.0]")
     return _number(key, value[0]), _number(key, value[1])
 
 
-def _place(key: str, value: Any) -> tuple[float, float]:
-    return _points(key, [value])[0]
+def _pair_in_mm(key: str, value: Any) -> tuple[float, float]:
+    x, y = _pair(key, value)
+    if not (isfinite(x) and isfinite(y)):
+        raise ValueError(f"{key} has the point [{x}, {y}]; coordinates must be finite")
+    return x / 1e3, y / 1e3
 
 
 def _points(key: str, value: Any) -> Points:
-    if not isinstance(value, list):
-        raise ValueError(
-            f"{key} = {_shown(value)} must be a list of pairs, such as [[0, 0], [5, 0]]"
-        )
-    points = [_pair(key, point) for point in value]
-    for x, y in points:
-        if not (isfinite(x) and isfinite(y)):
-            raise ValueError(f"{key} has the point [{x}, {y}]; coordinates must be finite")
-    return tuple((x / 1e3, y / 1e3) for x, y in points)
+    pairs = _list(key, value, "pairs, such as [[0, 0], [5, 0]]")
+    return tuple(_pair_in_mm(key, pair) for pair in pairs)
 
 
 def _write_pair(pair: tuple[float, float]) -> list[float]:
@@ -96,63 +114,44 @@ def _write_points(points: Points) -> list[list[float]]:
     return [_write_pair(point) for point in points]
 
 
-def _numbers(key: str, value: Any) -> tuple[float, ...]:
-    if not isinstance(value, list):
-        raise ValueError(f"{key} = {_shown(value)} must be a list of numbers")
-    return tuple(_number(key, x) for x in value)
-
-
-def _words(key: str, value: Any) -> tuple[str, ...]:
-    if not isinstance(value, list):
-        raise ValueError(f'{key} = {_shown(value)} must be a list of words, such as ["left"]')
-    return tuple(as_text(key, word) for word in value)
-
-
-def _switch(key: str, value: Any) -> bool:
-    if not isinstance(value, bool):
-        raise ValueError(f"{key} = {_shown(value)} must be true or false")
-    return value
-
-
-def _pulses(key: str, value: Any) -> Points:
-    if not isinstance(value, list):
-        raise ValueError(
-            f"{key} = {_shown(value)} must be a list of pulses and gaps, such as [[100, 50]]"
-        )
-    return tuple((on / 1e3, gap / 1e3) for on, gap in (_pair(key, pulse) for pulse in value))
-
-
-def _inner(cls: type, keys: dict[str, SceneKey]) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """How a table within [tacton] is read as a record, and written."""
+def _record(
+    section: str, name: str, make: Callable[..., Any], keys: Keys, required: int = 0
+) -> SceneKey:
+    """A table within a section, of a record, of whose keys so many, from the first, are required;
+    numbers that are None are not written.
+    """
 
     def read(key: str, value: Any) -> Any:
-        values = checked(f"[tacton.{key}]", as_table(key, value), keys)
-        missing = [k for k in list(keys)[: REQUIRED[key]] if keys[k].name not in values]
-        if missing:
-            raise ValueError(f"[tacton.{key}] lacks {' and '.join(missing)}; give it")
-        return cls(**values)
+        where = f"{section}.{key}"
+        return make(**_checked_all(f"[{where}]", as_table(where, value), keys, required))
 
-    return read, partial(written, keys)
+    return SceneKey(name, read, partial(written, keys))
+
+
+def _records(where: str, make: Callable[..., Any], keys: Keys) -> SceneKey:
+    """Tables under [[where]], of records, all of whose keys are required."""
+
+    def read(key: str, value: Any) -> Any:
+        tables = (as_table(where, t) for t in _list(key, value, f"tables, each under [[{where}]]"))
+        return tuple(make(**_checked_all(f"[[{where}]]", t, keys, len(keys))) for t in tables)
+
+    name = where.rpartition(".")[2]
+    return SceneKey(name, read, lambda records: [written(keys, record) for record in records])
+
+
+def _checked_all(where: str, table: dict[str, Any], keys: Keys, required: int) -> dict[str, Any]:
+    values = checked(where, table, keys)
+    if missing := [k for k in list(keys)[:required] if keys[k].name not in values]:
+        raise ValueError(f"{where} lacks {' and '.join(missing)}; give it")
+    return values
 
 
 def _material(key: str, value: Any) -> str | Material:
     if isinstance(value, str):
         return value
-    table = dict(as_table(key, value))
-    one = {new: table.pop(old) for old, new in MAXWELL_BRANCH.items() if old in table}
-    values = checked(f"[body.{key}]", table, MATERIAL)
-    if one:
-        warnings.warn(
-            f"{' and '.join(MAXWELL_BRANCH)} of [body.{key}] are now modulus_pa and time_s of "
-            f"[[body.{key}.prony]]",
-            FutureWarning,  # which is shown to who writes scenes, not only to who writes Python
-            stacklevel=2,
-        )
-        if _number(key, one.get("modulus_pa", 0)):
-            values["prony"] = (*values.get("prony", ()), *_prony("prony", [{"time_s": 0} | one]))
-    return material_of(
-        values, f"[body.{key}]", {field.name: own for own, field in MATERIAL.items()}
-    )
+    where = f"[body.{key}]"
+    values = checked(where, as_table(key, value), MATERIAL)
+    return material_of(values, where, {field.name: own for own, field in MATERIAL.items()})
 
 
 def write_material(material: str | Material) -> Any:
@@ -166,18 +165,16 @@ def write_material(material: str | Material) -> Any:
 def _table(key: str, value: Any) -> ModulusTable:
     if isinstance(value, str):
         raise ValueError(
-            f"{key} = {_shown(value)} names a file, which is looked for beside a scene file, and "
-            f"this scene is none; give its numbers, {key}.{', '.join(COLUMNS)}"
+            f"{key} = {value!r} names a file, which is looked for beside a scene file, and this "
+            f"scene is none; give its numbers, {key}.{', '.join(COLUMNS)}"
         )
-    columns = {name: SceneKey(name, _numbers, list) for name in COLUMNS}
-    found = checked(f"[body.material.{key}]", as_table(key, value), columns)
-    if missing := [name for name in COLUMNS if name not in found]:
-        raise ValueError(f"[body.material.{key}] lacks {' and '.join(missing)}; give it")
+    where, columns = f"[body.material.{key}]", {n: SceneKey(n, _numbers, list) for n in COLUMNS}
+    found = _checked_all(where, as_table(key, value), columns, len(columns))
     frequencies, storage, loss = (found[name] for name in COLUMNS)
     if not len(frequencies) == len(storage) == len(loss):
         raise ValueError(
-            f"[body.material.{key}] has {len(frequencies)} frequencies, {len(storage)} storage and "
-            f"{len(loss)} loss moduli; give as many of each"
+            f"{where} has {len(frequencies)} frequencies, {len(storage)} storage and {len(loss)} "
+            "loss moduli; give as many of each"
         )
     moduli = tuple(complex(*each) for each in zip(storage, loss, strict=True))
     return ModulusTable(frequencies=frequencies, moduli=moduli)
@@ -201,67 +198,20 @@ def _write_profile(profile: str | FocalSpot) -> str:
     return profile
 
 
-def _prony(key: str, value: Any) -> tuple[PronyTerm, ...]:
-    return tuple(PronyTerm(**values) for values in _tables(f"body.material.{key}", value, PRONY))
-
-
-def _tables(key: str, value: Any, keys: dict[str, SceneKey]) -> list[dict[str, Any]]:
-    """Values of each of the tables under [[key]], all of whose keys are needed."""
-    if not isinstance(value, list):
-        raise ValueError(f"{key} = {_shown(value)} must be tables, each under [[{key}]]")
-    found = [checked(f"[[{key}]]", as_table(key, table), keys) for table in value]
-    for values in found:
-        if missing := [k for k, field in keys.items() if field.name not in values]:
-            raise ValueError(f"[[{key}]] lacks {' and '.join(missing)}; give it")
-    return found
-
-
-def _layers(key: str, value: Any) -> tuple[Layer, ...]:
-    return tuple(Layer(**values) for values in _tables(f"body.{key}", value, LAYER))
-
-
 def _regions(key: str, value: Any) -> tuple[tuple[str, str | Material], ...]:
     table = as_table(f"body.{key}", value)
     return tuple((name, _material(f"{key}.{name}", of)) for name, of in table.items())
 
 
-def _relief(key: str, value: Any) -> Relief:
-    return Relief(**checked(f"[body.{key}]", as_table(f"body.{key}", value), RELIEF))
-
-
-def _write_relief(relief: Relief) -> dict[str, Any]:
-    given = {key: field for key, field in RELIEF.items() if getattr(relief, field.name) is not None}
-    return written(given, relief)
-
-
-def _bone(key: str, value: Any) -> Phalanx:
-    return Phalanx(**checked(f"[body.{key}]", as_table(f"body.{key}", value), BONE))
-
-
-def _mounting(key: str, value: Any) -> Mounting:
-    values = checked(f"[body.{key}]", as_table(f"body.{key}", value), MOUNTING)
-    if values.get("clips"):  # alone, unless edges are named, too
-        values = {"edges": ()} | values
-    return Mounting(**values)
-
-
-def _support_motion(key: str, value: Any) -> SupportMotion:
-    values = checked(f"[load.{key}]", as_table(f"load.{key}", value), SUPPORT_MOTION)
-    missing = [k for k in ("amplitude_um", "frequency_hz") if SUPPORT_MOTION[k].name not in values]
-    if missing:
-        raise ValueError(f"[load.{key}] lacks {' and '.join(missing)}; give it")
-    return SupportMotion(**values)
+def _mounting(**values: Any) -> Mounting:
+    """Clips hold the sheet alone, unless edges are named, too."""
+    return Mounting(**({"edges": ()} if values.get("clips") else {}) | values)
 
 
 def _sides(key: str, value: Any) -> str | Sides:
     if isinstance(value, str):
         return value
-    names = {field.name: as_text for field in fields(Sides)}
-    return Sides(**checked(f"[body.{key}]", as_table(f"body.{key}", value), names))
-
-
-def _write_sides(sides: str | Sides) -> str | dict[str, str]:
-    return sides if isinstance(sides, str) else sides.by_name
+    return _record("body", "sides", Sides, SIDES).read(key, value)
 
 
 def _direction(key: str, value: Any) -> str | tuple[float, ...]:
@@ -272,15 +222,9 @@ def _write_direction(direction: str | tuple[float, ...]) -> str | list[float]:
     return direction if isinstance(direction, str) else list(direction)
 
 
-def _pair_in_mm(key: str, value: Any) -> tuple[float, float]:
-    x, y = _pair(key, value)
-    return x / 1e3, y / 1e3
-
-
 def _contact_in_mm(key: str, value: Any) -> float:
     if not (width := _number(key, value)):
-        raise ValueError(f"{key} = 0 is no contact, a point has no response of its own; give its "
-                         "width, or leave it out for 2 mm")  # fmt: skip
+        raise ValueError(f"{key} = 0 is no contact; give its width, or leave it out for 2 mm")
     return width / 1e3
 
 
@@ -355,15 +299,11 @@ MATERIAL = {
     "exponent": _scaled("exponent"),
     "time_s": _scaled("time"),
     "table": SceneKey("table", _table, written_table),
-    "prony": SceneKey("prony", _prony, lambda terms: [written(PRONY, term) for term in terms]),
+    "prony": _records("body.material.prony", PronyTerm, PRONY),
 }
 INSTEAD = {  # keys of a material of which one is computed from the other
     "young_modulus_pa": "shear_modulus_pa",
     "shear_modulus_pa": "young_modulus_pa",
-}
-MAXWELL_BRANCH = {  # keys of version 0.2, which load for one release
-    "relaxing_modulus_pa": "modulus_pa",
-    "relaxation_time_s": "time_s",
 }
 MOUNTING = {
     "edges": SceneKey("edges", _words, list),
@@ -381,7 +321,8 @@ LAYER = {
     "thickness_mm": _scaled("thickness", 1e3),
     "material": SceneKey("material", _material, write_material),
 }
-PULSES = {"pulses_ms": SceneKey("pulses", _pulses, _write_points), "ramp_ms": _scaled("ramp", 1e3)}
+SIDES = {side.name: _word(side.name) for side in fields(Sides)}
+PULSES = {"pulses_ms": SceneKey("pulses", _points, _write_points), "ramp_ms": _scaled("ramp", 1e3)}
 SIGNAL = {
     "rate_hz": _scaled("rate"),
     "samples": SceneKey("samples", _numbers, list),
@@ -392,7 +333,6 @@ SUPPORT_MOTION = {
     "frequency_hz": _scaled("frequency"),
     "direction": SceneKey("direction", _direction, _write_direction),
 }
-REQUIRED = {"rhythm": 1, "signal": 2}  # how many of the keys, from the first
 PATH = ("shape", "size", "speed", "sweep", "centre", "points", "times", "levels", "hold")
 SECTIONS = {
     "tacton": {
@@ -406,15 +346,15 @@ SECTIONS = {
         "size_mm": _scaled("size", 1e3),
         "speed_m_per_s": _scaled("speed"),
         "sweep": _word("sweep"),
-        "centre_mm": SceneKey("centre", _place, _write_pair),
+        "centre_mm": SceneKey("centre", _pair_in_mm, _write_pair),
         "points_mm": SceneKey("points", _points, _write_points),
         "times_s": SceneKey("times", _numbers, list),
         "levels": SceneKey("levels", _numbers, list),
         "hold": SceneKey("hold", _switch, bool),
         "foci": SceneKey("foci", _numbers, lambda phases: [float(phase) for phase in phases]),
         "sharing": _word("sharing"),
-        "rhythm": SceneKey("rhythm", *_inner(Rhythm, PULSES)),
-        "signal": SceneKey("signal", *_inner(Signal, SIGNAL)),
+        "rhythm": _record("tacton", "rhythm", Rhythm, PULSES, 1),
+        "signal": _record("tacton", "signal", Signal, SIGNAL, 2),
     },
     "focus": {
         "height_mm": _scaled("height", 1e3),
@@ -430,11 +370,11 @@ SECTIONS = {
         "size_y_mm": _scaled("height", 1e3),
         "thickness_mm": _scaled("depth", 1e3),
         "base": _word("base"),
-        "sides": SceneKey("sides", _sides, _write_sides),
+        "sides": SceneKey("sides", _sides, lambda x: x if isinstance(x, str) else x.by_name),
         "base_stiffness_n_per_m3": _scaled("base_stiffness"),
-        "layers": SceneKey("layers", _layers, lambda layers: [written(LAYER, x) for x in layers]),
-        "relief": SceneKey("relief", _relief, _write_relief),
-        "bone": SceneKey("bone", _bone, partial(written, BONE)),
+        "layers": _records("body.layers", Layer, LAYER),
+        "relief": _record("body", "relief", Relief, RELIEF),
+        "bone": _record("body", "bone", Phalanx, BONE),
         "file": _word("file"),
         "unit": _word("unit"),
         "up": _word("up"),
@@ -442,7 +382,7 @@ SECTIONS = {
             "regions", _regions, lambda named: {name: write_material(of) for name, of in named}
         ),
         "air": SceneKey("air", _switch, bool),
-        "mounting": SceneKey("mounting", _mounting, partial(written, MOUNTING)),
+        "mounting": _record("body", "mounting", _mounting, MOUNTING),
         "grammage_g_m2": _scaled("grammage", 1e3),
     },
     "load": {
@@ -451,9 +391,7 @@ SECTIONS = {
         "force_n": _scaled("force"),
         "width_mm": replace(_scaled("width", 1e3), read=_contact_in_mm),
         "gravity_m_per_s2": _scaled("gravity"),
-        "support_motion": SceneKey(
-            "support_motion", _support_motion, partial(written, SUPPORT_MOTION)
-        ),
+        "support_motion": _record("load", "support_motion", SupportMotion, SUPPORT_MOTION, 2),
     },
     "placement": {
         "tilt_x_deg": _scaled("tilt_x", 180 / pi),
@@ -472,28 +410,6 @@ SECTIONS = {
 # Keys that others are computed from, and that no file is written with.
 DERIVED = {"grammage_g_m2"}
 
-# Keys of [body] in version 0.2, which load for one release.
-RENAMED = {"width_mm": "size_x_mm", "height_mm": "size_y_mm", "depth_mm": "thickness_mm"}
-
-
-def renamed(table: dict[str, Any]) -> dict[str, Any]:
-    """A scene's table with today's keys for those of version 0.2, and a warning for each.
-
-    Raises
-    ------
-    ValueError
-        If a length is given by both.
-    """
-    body = table.get("body")
-    if not isinstance(body, dict) or not RENAMED.keys() & body.keys():
-        return table
-    for old in sorted(body.keys() & RENAMED.keys()):
-        new = RENAMED[old]
-        if new in body:
-            raise ValueError(f"[body] has both {old} and {new}, which are one; leave out {old}")
-        warnings.warn(f"[body] {old} is now {new}; rename it", FutureWarning, stacklevel=3)
-    return table | {"body": {RENAMED.get(key, key): value for key, value in body.items()}}
-
 
 def with_key(table: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
     """A table with another value of a key, and without the key that it stands instead of."""
@@ -508,7 +424,7 @@ def checked(where: str, table: dict[str, Any], keys: Mapping[str, Any]) -> dict[
             others = [f"[{name}]" for name, known in SECTIONS.items() if key in known]
             hint = f"; it belongs to {' or '.join(others)}" if others else meant(key, keys)
             hint = hint or f"; it may have {', '.join(keys)}"
-            raise ValueError(f"{where} has the unknown key {_shown(key)}{hint}")
+            raise ValueError(f"{where} has the unknown key {key[:60]!r}{hint}")
         field = keys[key]
         if isinstance(field, SceneKey):
             values[field.name] = field.read(key, value)

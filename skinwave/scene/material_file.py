@@ -1,6 +1,6 @@
 """Materials as scene files have them: values by attribute name, and the laws behind them."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import fields
 from math import inf, isfinite
 from pathlib import Path
@@ -151,27 +151,24 @@ def with_tables(scene: dict[str, Any], folder: Path) -> dict[str, Any]:
     """
     for material in _materials(scene):
         if isinstance(name := material.get("table"), str):
-            material["table"] = written_table(_read(folder / name))
+            text = reading.text(folder / name)
+            try:
+                material["table"] = written_table(modulus_table(text))
+            except ValueError as error:
+                raise ValueError(f"{folder / name}: {error}") from None
     return scene
 
 
-def _materials(scene: dict[str, Any]) -> Iterator[dict[str, Any]]:
+def _materials(scene: dict[str, Any]) -> list[dict[str, Any]]:
+    """Tables of materials, of the body, its layers and its regions."""
     body = scene.get("body")
-    if isinstance(body, dict):
-        layers = body.get("layers")
-        parts = [body, *(layers if isinstance(layers, list) else [])]
-        found = (part.get("material") for part in parts if isinstance(part, dict))
-        yield from (material for material in found if isinstance(material, dict))
-        if isinstance(regions := body.get("regions"), dict):
-            yield from (material for material in regions.values() if isinstance(material, dict))
-
-
-def _read(path: Path) -> ModulusTable:
-    text = reading.text(path)
-    try:
-        return modulus_table(text)
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
+    if not isinstance(body, dict):
+        return []
+    layers, regions = body.get("layers"), body.get("regions")
+    parts = [body, *(layers if isinstance(layers, list) else [])]
+    found = [part.get("material") for part in parts if isinstance(part, dict)]
+    found += regions.values() if isinstance(regions, dict) else ()
+    return [material for material in found if isinstance(material, dict)]
 
 
 def written_table(table: ModulusTable) -> dict[str, list[float]]:

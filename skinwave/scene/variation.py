@@ -14,12 +14,12 @@ import numpy as np
 import tomli_w
 
 from meshes import reading
+from meshes.tetmesh import Floats
 from simple_model.choices import choose, meant
 from simple_model.layers.material import PRESETS
 from skinwave.scene.distributions import Distribution, called, without_spreads
 from skinwave.scene.file import content, dumps, from_table, loads, parsed, read, to_table
-from skinwave.scene.keys import SCALES, SECTIONS, renamed, with_key, write_material
-from skinwave.scene.saltelli import EDGE, saltelli_shares
+from skinwave.scene.keys import SCALES, SECTIONS, with_key, write_material
 from skinwave.scene.scene import BODIES, Scene, solid_of, with_body
 from skinwave.scene.spreads import scaled
 from skinwave.system.plain_text import number_in
@@ -27,6 +27,7 @@ from skinwave.system.plain_text import number_in
 DESIGNS = ("factorial", "zip", "lhs", "sobol")
 SAMPLED = ("lhs", "sobol")  # of which --samples says how many
 MOST_RUNS = 100_000
+EDGE = 1e-9  # of the unit interval, which keeps quantiles finite
 BODY = "body"  # the key of a whole body: the name of a preset, or a file
 
 
@@ -131,10 +132,7 @@ def combinations(
     if twice := [key for key in dict.fromkeys(keys) if keys.count(key) > 1]:
         raise ValueError(f"{twice[0]} is varied twice; give all its values at once")
     if (samples is None) == (design in SAMPLED):
-        raise ValueError(
-            "--samples belongs to --design lhs or sobol, and lhs needs it as sobol does; give both "
-            "or none"
-        )
+        raise ValueError("--samples and --design lhs or sobol need each other; give both or none")
     if design in SAMPLED:
         return _sampled(variations, design, samples or 0, seed)
     for variation in variations:
@@ -194,6 +192,39 @@ def varied(scene: Scene, values: Mapping[str, Any]) -> Scene:
     return from_table(_changed(complete, complete, values))
 
 
+def saltelli_shares(d: int, n: int, seed: int = 0) -> Floats:
+    """Quantiles' shares (n (d + 2), d), above 0 and below 1, for Sobol' indices: matrices A, B and,
+    for each number, A with its column of B, from a Sobol' sequence of 2 d numbers.
+
+    Saltelli et al., Comput Phys Commun 181:259 (2010), section 3.
+
+    Parameters
+    ----------
+    d : how many numbers
+    n : rows of each matrix, a power of two, which balances the sequence
+    seed : of the scrambling (Owen, J Complex 14:466 (1998))
+
+    Returns
+    -------
+    A, B, then A with column k of B for each k, one above the other
+
+    Raises
+    ------
+    ValueError
+        If n is no power of two.
+    """
+    from scipy.stats import qmc
+
+    if n < 2 or n & (n - 1):
+        near = 2 ** max(1, round(np.log2(max(n, 2))))
+        raise ValueError(f"{n} samples of each matrix are no power of two; take {near}")
+    a, b = np.split(qmc.Sobol(2 * d, rng=seed).random(n), 2, axis=1)
+    mixed = np.tile(a, (d, 1, 1))
+    for k in range(d):
+        mixed[k, :, k] = b[:, k]
+    return np.clip(np.vstack([a, b, *mixed]), EDGE, 1 - EDGE)
+
+
 def _sampled(
     variations: Sequence[Variation], design: str, samples: int, seed: int
 ) -> list[dict[str, Any]]:
@@ -221,9 +252,6 @@ def _known(key: str) -> str:
     """The key, if a scene has it; parts of a value, as in body.material.poisson, are checked when
     the scene is read.
     """
-    head, _, name = key.partition(".")
-    if head == BODY:  # by today's name
-        key = ".".join([head, *renamed({BODY: {name: None}})[BODY]]) if name else key
     known = [f"{section}.{name}" for section, keys in SECTIONS.items() for name in keys]
     if key != BODY and ".".join(key.split(".")[:2]) not in known:
         hint = meant(key, known) or "; a key is of the form tacton.size_mm"

@@ -124,9 +124,3 @@ def test_a_mesh_that_its_middle_cuts_has_no_half():
     line = np.linspace(-0.03, 0.03, 4)
     with pytest.raises(meshes.MeshError, match="cross the plane x = 0"):
         meshes.half(meshes.extrude(line, line, [-0.01, 0]), "x")
-
-
-@pytest.mark.parametrize(("old", "new"), meshes._RENAMED.items())
-def test_names_of_the_version_before_warn_of_the_new_ones(old, new):
-    with pytest.warns(DeprecationWarning, match=f"meshes.{old} is now meshes.{new}"):
-        assert getattr(meshes, old) is getattr(meshes, new)

@@ -1,4 +1,4 @@
-"""Palms as mapped structured meshes: their geometry, their elements, and what they fall back on."""
+"""Palms: their level set, their mapped structured meshes, and curved elements."""
 
 from dataclasses import replace
 
@@ -8,10 +8,9 @@ from scipy.integrate import quad
 
 import fem
 import meshes
-from meshes import MeshError, Palm, corner_volumes, mapped_palm
+from meshes import MeshError, Palm, TetMesh, corner_volumes, mapped_palm
 from meshes.shapes import palm as shape
-from meshes.shapes.kuhn import kuhn_tets
-from meshes.surface.triangulation import area, volume
+from meshes.volume.mapped_palm import kuhn_tets
 from skinwave.bodies import palm as body_palm
 from skinwave.bodies.body import Body
 from skinwave.scene.scene import BODIES, Relief
@@ -55,6 +54,55 @@ def rounded_slab(palm):
     return inset(0) * wall + 2 * rim, around(0) * wall + 2 * (curved + inset(e))
 
 
+def test_the_gradient_is_the_slope_of_the_level_set():
+    points = np.random.default_rng(1).uniform(
+        (-0.05, -0.055, -0.03), (0.05, 0.055, 0.01), (5000, 3)
+    )
+    steps = 1e-7 * np.eye(3)
+    slopes = [
+        (shape.level_set(Palm(), points + s) - shape.level_set(Palm(), points - s)) / 2e-7
+        for s in steps
+    ]
+    np.testing.assert_allclose(
+        shape.gradient(Palm(), points), np.transpose(slopes), atol=1e-6, rtol=0
+    )
+
+
+def test_the_level_set_is_nearly_a_distance_near_the_surface():
+    mesh = mapped_palm(Palm(), *grid(Palm(), 5e-3))
+    points = mesh.points[np.unique(mesh.facets["surface"])]
+    steepness = np.linalg.norm(shape.gradient(Palm(), points), axis=1)
+    assert 0.9 < steepness.min() < steepness.max() < 1.1
+    np.testing.assert_allclose(np.ptp(points, axis=0), [0.085, 0.1, 0.028], rtol=0.02)
+    assert abs(shape.level_set(Palm(), [[0, 0, 0]])) < 1e-12
+
+
+def test_without_relief_the_top_is_a_plane():
+    x, y = np.meshgrid(np.linspace(-0.025, 0.025, 11), np.linspace(-0.03, 0.03, 11))
+    top = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    np.testing.assert_allclose(shape.level_set(FLAT, top), 0, atol=1e-16)
+    np.testing.assert_allclose(shape.gradient(FLAT, top), [[0, 0, 1]] * x.size, atol=1e-15)
+    low = replace(FLAT, cup_depth=1e-9, thenar_height=1e-9, hypothenar_height=1e-9, pad_height=1e-9)
+    assert np.abs(shape.level_set(low, top)).max() < 4e-9
+
+
+@pytest.mark.parametrize(
+    ("fields", "said"),
+    [
+        ({"thickness": 0.0}, "thickness = 0 mm"),
+        ({"length": float("nan")}, "length = nan"),
+        ({"breadth": 85.0}, "below 1 m"),
+        ({"cup_depth": -0.001}, "0 or above"),
+        ({"thenar_height": 0.05}, "thenar_height = 50 mm"),
+        ({"edge_radius": 0.02}, "half the thickness, 11 mm"),
+        ({"corner_radius": 0.05}, "half the shorter side, 42.5 mm"),
+    ],
+)
+def test_no_palm_is_refused(fields, said):
+    with pytest.raises(MeshError, match=said):
+        Palm(**fields)
+
+
 def test_no_tetrahedron_of_a_grid_has_two_facets_on_its_boundary():
     cells = (2, 4, 3)
     tets = kuhn_tets(cells)
@@ -77,15 +125,8 @@ def test_volume_and_area_converge_to_those_of_the_geometry():
     assert 3.5 < np.log2(errors[0] / errors[1])[1] < 4.5  # of curved facets
 
 
-def test_a_palm_with_relief_has_the_volume_and_the_area_of_its_level_set():
-    palm = BODIES["palm"].palm
-    contour = shape.surface(palm, 1.5e-3)
-    found = measures(meshes.mapped_palm(palm, *grid(palm, 4e-3)))
-    assert found == pytest.approx((volume(contour), area(contour)), rel=5e-3)
-
-
-@pytest.mark.parametrize("h", [5e-3, 4e-3])
-def test_elements_of_the_palm_are_good_and_the_same_in_every_run(h):
+def test_elements_of_the_palm_are_good_and_the_same_in_every_run():
+    h = 5e-3
     body = BODIES["palm"]
     mesh = body_palm.discretise(body, h).mesh
     assert meshes.dihedral_angles(mesh).min() > 15
@@ -110,20 +151,13 @@ def test_a_sharp_rim_is_kept():
     assert found == pytest.approx(rounded_slab(sharp), rel=1e-2)
 
 
-def test_a_relief_that_a_grid_cannot_follow_is_left_to_the_mesher(monkeypatch):
-    steep = replace(Palm(), thenar_height=0.022, hypothenar_height=0.022, edge_radius=0.001)
-    with pytest.raises(MeshError, match="lower relief or `palm_mesh`"):
-        meshes.mapped_palm(steep, *grid(steep, 5e-3))
+def test_a_relief_that_a_grid_cannot_follow_is_refused():
     relief = Relief(thenar_height=0.022, hypothenar_height=0.022, edge_radius=0.001)
-    asked = []
-
-    def meshed(palm, h, sizing):
-        asked.append((palm, h, sizing(np.zeros((1, 3)))))
-        return meshes.builtin("palm")
-
-    monkeypatch.setattr(body_palm, "palm_mesh", meshed)
-    body_palm.discretise(Body(kind="palm", width=0.085, depth=0.022, relief=relief), 5e-3)
-    assert asked == [(steep, 5e-3, pytest.approx(4e-3))]
+    body = Body(kind="palm", width=0.085, depth=0.022, relief=relief)
+    with pytest.raises(MeshError, match="dihedral angle"):
+        mapped_palm(body.palm, *grid(body.palm, 5e-3))
+    with pytest.raises(MeshError, match="lower thenar_height_mm"):
+        body_palm.discretise(body, 5e-3)
 
 
 @pytest.mark.parametrize(
@@ -144,17 +178,36 @@ def test_the_usual_relief_of_a_palm_is_an_adults():
     assert body.palm == replace(Palm(), thickness=0.015, edge_radius=0.007)
 
 
-def test_a_palm_without_a_mesh_says_which_key_to_change(monkeypatch):
-    """With the value that it names there is a mesh."""
-    relief = Relief(thenar_height=0.022, edge_radius=0.001)
-    body = Body(kind="palm", width=0.085, depth=0.022, relief=relief)
+def test_edges_that_would_fold_an_element_stay_straight():
+    mesh = mapped_palm(FLAT, *grid(FLAT, 5e-3))
 
-    def crosses(palm, h, sizing):
-        raise MeshError("the surface crosses itself")
+    def rough(points):
+        return shape.level_set(FLAT, points) + 0.8e-3 * np.sin(points[:, 0] / 0.4e-3)
 
-    monkeypatch.setattr(body_palm, "palm_mesh", crosses)
-    with pytest.raises(MeshError, match="take thenar_height_mm = ") as refused:
-        body_palm.discretise(body, 8e-3)
-    height = float(str(refused.value).split("= ")[-1]) / 1e3
-    lower = replace(body, relief=replace(relief, thenar_height=height))
-    assert len(body_palm.discretise(lower, 8e-3).mesh.tets)
+    def slope(points):
+        change = shape.gradient(FLAT, points)
+        change[:, 0] += 2 * np.cos(points[:, 0] / 0.4e-3)
+        return change
+
+    found = meshes.curve_boundary(mesh, rough, slope)
+    assert meshes.jacobian_ratios(found.points, found.tets).min() >= 0.3
+    assert meshes.corner_volumes(found.points, found.tets).min() > 0
+    middles = np.unique(mesh.facets["surface"][:, 3:])
+    on_it = np.abs(rough(found.points[middles])) < 1e-6
+    assert 0.05 < on_it.mean() < 0.95
+
+
+def test_four_node_elements_are_not_curved():
+    with pytest.raises(MeshError, match=r"meshes\.quadratic"):
+        meshes.curve_boundary(meshes.block((1, 1, 1), 1, order=1), len, len)
+
+
+def test_what_is_hidden_from_above_is_not_the_top():
+    lines = np.linspace(0, 0.02, 3), np.linspace(0, 0.01, 2), np.linspace(0, 0.03, 4)
+    block = meshes.extrude(*lines, order=1)
+    x, _, z = block.points[block.tets].mean(axis=1).T
+    hook = TetMesh(points=block.points, tets=block.tets[~((x > 0.01) & (abs(z - 0.015) < 0.005))])
+    mesh = meshes.tag_boundary(hook, rest="below", top=meshes.seen_from_above(hook))
+    assert set(mesh.points[mesh.facets["top"]][..., 2].ravel()) == {0.03}
+    assert len(mesh.facets["top"]) == 4
+    assert len(mesh.facets["below"]) == len(mesh.facets["surface"]) - 4

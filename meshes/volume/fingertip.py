@@ -7,13 +7,20 @@ each a surface between that of the bone and the skin. Each eighth of the ball is
 subdivision (edgewise: Edelsbrunner and Grayson, Discrete Comput Geom 24:707 (2000)).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations, product
 
 import numpy as np
 
-from meshes.shapes.structured import extruded
-from meshes.tetmesh import Floats, Ints, MeshError
+from meshes.facets import geometry
+from meshes.shapes.structured import check_size, extruded, round_up
+from meshes.tetmesh import EDGES, Floats, Ints, MeshError, TetMesh, boundary_facets, quadratic
+from meshes.volume.curving import LEAST_RATIO, keep_jacobians
+from meshes.volume.quality import jacobian_ratios
+
+TISSUE, BONE = 0, 1  # regions
+EASINGS, EASED = 6, 0.7
+FEWEST, BONY = 3, 2  # shells, and those of them in the bone
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,13 +77,77 @@ class Fingertip:
         bone = [self.bone_breadth, self.breadth - 2 * self.tip, self.bone_thickness]
         return np.array(bone) / 2, np.array([self.breadth, self.breadth, self.thickness]) / 2
 
-    @property
-    def heights(self) -> tuple[float, float]:
-        """Heights in metre of the axes of bone and skin."""
-        return -self.cover - self.bone_thickness / 2, -self.thickness / 2
+
+def shells_of(shape: Fingertip, h: float) -> int:
+    """Number of shells of cells of a size h in metre at the skin."""
+    return max(FEWEST, round_up(quarter_of(shape) / h))
 
 
-def lattice_of(shells: int, layers: int) -> tuple[Floats, Ints]:
+def quarter_of(shape: Fingertip) -> float:
+    """A quarter of the way around a fingertip in metre."""
+    return float(np.pi / 4 * (shape.breadth + shape.thickness) / 2)
+
+
+def fingertip_mesh(shape: Fingertip, h: float) -> TetMesh:
+    """Ten-node tetrahedra of a fingertip, curved at its skin and its bone.
+
+    Parameters
+    ----------
+    shape : Fingertip
+    h : float, metre, edge length aimed at at the skin
+
+    Returns
+    -------
+    TetMesh with the regions `tissue` (0) and `bone` (1) and the facet sets `top`, which looks
+    upwards, `sides`, where it is cut, and `bottom`, the rest
+
+    Raises
+    ------
+    MeshError
+        If h is not above 0, or there would be too many elements.
+    """
+    if not 0 < h < np.inf:
+        raise MeshError(f"h = {h} m must be finite and above 0")
+    shells = shells_of(shape, h)
+    bone = max(BONY, shells - max(1, round(shape.cover / h)))
+    layers = max(1, round_up((shape.length - shape.breadth / 2) / h))
+    check_size((2 * shells, 2 * shells, layers + shells), order=2)
+    lattice, tets = _lattice_of(shells, layers)
+    points = _placed(shape, lattice, (bone, shells), layers)
+    region = np.where(_shell_of(lattice)[tets].max(axis=1) <= bone, BONE, TISSUE)
+    names = {TISSUE: "tissue", BONE: "bone"}
+    mesh = quadratic(TetMesh(points=points, tets=tets, region=region, region_names=names))
+    edges = np.moveaxis(mesh.tets[:, EDGES], 2, 0)
+    curved = np.array(mesh.points)
+    for shell in (bone, shells):
+        # Seen from above, the outline stays the polygon of facets in which probes are looked for.
+        outline = (lattice[edges, 2] == 0).all(axis=0) & (shell == shells)
+        own = (_shell_of(lattice)[edges] == shell).all(axis=0) & ~outline
+        middles = lattice[edges[:, own]].mean(axis=0)
+        curved[mesh.tets[:, 4:][own]] = _placed(shape, middles, (bone, shells), layers)
+    return _tagged(shape, replace(mesh, points=_eased(mesh, curved)))
+
+
+def _eased(mesh: TetMesh, curved: Floats) -> Floats:
+    """Curved nodes (n, 3), less so where elements would be distorted: the bone has few elements."""
+    share, way = np.ones((len(curved), 1)), curved - mesh.points
+    for _ in range(EASINGS):
+        bad = jacobian_ratios(mesh.points + share * way, mesh.tets) < LEAST_RATIO
+        share[np.unique(mesh.tets[bad, 4:])] *= EASED
+    return keep_jacobians(mesh.tets, mesh.points, mesh.points + share * way)[0]
+
+
+def _tagged(shape: Fingertip, mesh: TetMesh) -> TetMesh:
+    """The mesh with its facet sets, by where and how its facets lie."""
+    facets = boundary_facets(mesh.tets)
+    centroids, normals = geometry(mesh, facets)
+    cut = centroids[:, 1] < -shape.length / 2 * (1 - 1e-9)
+    top = ~cut & (normals[:, 2] > 0)
+    sets = {"top": facets[top], "sides": facets[cut], "bottom": facets[~cut & ~top]}
+    return replace(mesh, facets=sets)
+
+
+def _lattice_of(shells: int, layers: int) -> tuple[Floats, Ints]:
     """Points (n, 3) and tetrahedra (e, 4) of half a ball of so many shells, y >= 0, and below it,
     y < 0, of a cylinder of so many layers on its section.
     """
@@ -112,30 +183,21 @@ def _section(ball: Ints) -> Ints:
     return ball[flat][on_it[flat]].reshape(-1, 3, 3)[..., [0, 2]]
 
 
-def shell_of(lattice: Floats) -> Floats:
+def _shell_of(lattice: Floats) -> Floats:
     """Shell (n,) of points of the lattice."""
     return np.abs(lattice[:, 0]) + np.maximum(lattice[:, 1], 0) + np.abs(lattice[:, 2])
 
 
-def placed(shape: Fingertip, lattice: Floats, ends: tuple[int, int], layers: int) -> Floats:
-    """Points of a fingertip where those of the lattice are.
-
-    Parameters
-    ----------
-    shape : Fingertip
-    lattice : (n, 3) float, between points of the lattice, too
-    ends : shells that are the surfaces of bone and tissue
-    layers : of the cylinder
-
-    Returns
-    -------
-    (n, 3) float, metre
+def _placed(shape: Fingertip, lattice: Floats, ends: tuple[int, int], layers: int) -> Floats:
+    """Points (n, 3) in metre of a fingertip where those of the lattice, or between them, are; with
+    the shells that are the surfaces of bone and tissue, and the layers of the cylinder.
     """
-    shell = shell_of(lattice)[:, None]
+    shell = _shell_of(lattice)[:, None]
     shares = (lattice * [1, 0, 1] + np.maximum(lattice, 0) * [0, 1, 0]) / np.maximum(shell, 1e-300)
     outward = np.sin(np.pi / 2 * shares)  # evener on a sphere than the shares themselves
     outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-300)
-    (bone_axes, skin_axes), (bone_height, height) = shape.semi_axes, shape.heights
+    bone_axes, skin_axes = shape.semi_axes
+    bone_height, height = -shape.cover - shape.bone_thickness / 2, -shape.thickness / 2
     bone = outward * bone_axes + [0, 0, bone_height]
     skin = outward * skin_axes + [0, 0, height]
     inner, outer = ends

@@ -1,0 +1,878 @@
+"""Meshes and surfaces in files: round trips, foreign orders and kinds, and one sound body."""
+
+import contextlib
+import functools
+import io
+import json
+import re
+import struct
+import sys
+from dataclasses import replace
+
+import meshio
+import numpy as np
+import pytest
+import pyvista
+
+import meshes
+from meshes import MeshError, TetMesh, subprocess_call
+from meshes.files import reader_child
+from meshes.files.contents import read_contents
+from meshes.shapes.palm import Palm, level_set
+from meshes.surface.alignment import turns
+from meshes.surface.repair import check
+from meshes.surface.triangulation import volume
+from skinwave.commands.cli import main
+from skinwave.models.prepared import prepare
+from skinwave.scene.scene import Body
+
+
+@pytest.fixture(autouse=True)
+def read_here(monkeypatch):
+    """Files are read in this process, which has imported what reads them."""
+
+    def read(script, path, target, *, folder):
+        said = io.StringIO()
+        monkeypatch.setattr(sys, "argv", [str(script), str(path.resolve()), str(target)])
+        with contextlib.redirect_stderr(said):
+            code = reader_child.main()
+        if code:
+            raise subprocess_call.Refused(said.getvalue().strip().splitlines()[-1])
+
+    monkeypatch.setattr(subprocess_call, "read", read)
+
+
+GMSH_EDGES = [(0, 1), (1, 2), (0, 2), (0, 3), (2, 3), (1, 3)]  # of gmsh's manual, 10-node tets
+
+
+SLAB = meshes.block((0.040, 0.040, 0.012), 0.010, order=1)
+
+
+TETRAHEDRON, HEXAHEDRON, WEDGE, PYRAMID = 10, 12, 13, 14  # in VTK
+
+
+def layered(order):
+    """A block of two regions with the facet sets of its sides, one of them empty."""
+    mesh = meshes.block((0.02, 0.03, 0.01), 0.005, order=order)
+    region = np.where(mesh.points[mesh.tets].mean(axis=1)[:, 2] > -0.005, 3, 0)
+    return replace(mesh, region=region, facets={**mesh.facets, "no one": mesh.facets["top"][:0]})
+
+
+def same(one, other):
+    np.testing.assert_array_equal(one.points, other.points)
+    np.testing.assert_array_equal(one.tets, other.tets)
+    np.testing.assert_array_equal(one.region, other.region)
+    assert one.facets.keys() == other.facets.keys()
+    for name, facets in one.facets.items():
+        np.testing.assert_array_equal(other.facets[name], facets)
+        assert other.facets[name].shape == facets.shape
+
+
+def half(side):
+    """Points and tetrahedra of the slab on one side (-1, 1) of x = 0."""
+    kept = side * SLAB.points[SLAB.tets].mean(axis=1)[:, 0] > 0
+    nodes, tets = np.unique(SLAB.tets[kept], return_inverse=True)
+    return SLAB.points[nodes], tets.reshape(-1, 4)
+
+
+def grid_of(points, cells):
+    """An unstructured grid of cells, by VTK's number of their type."""
+    return pyvista.UnstructuredGrid(
+        {kind: np.array(nodes) for kind, nodes in cells.items()}, points
+    )
+
+
+def boxes(nx, ny, nz, size):
+    """Nodes of a box of bricks below z = 0, and the eight of each brick."""
+    lines = [
+        np.linspace(-0.5, 0.5, n + 1) * side for n, side in zip((nx, ny, nz), size, strict=True)
+    ]
+    x, y, z = np.meshgrid(*lines, indexing="ij")
+    number = np.arange(x.size).reshape(x.shape)
+    a = [number[i : nx + i, j : ny + j, k : nz + k] for k in (0, 1) for i, j in
+         ((0, 0), (1, 0), (1, 1), (0, 1))]  # fmt: skip
+    points = np.column_stack([x.ravel(), y.ravel(), z.ravel() - size[2] / 2])
+    return points, np.stack(a, axis=-1).reshape(-1, 8)
+
+
+def made(file, h=0.008, **options):
+    """The body of a file, and what is said of it."""
+    said = []
+    return meshes.body_from_file(file, h, say=said.append, **options), said
+
+
+def refused(file, **options):
+    """The sentence with which a file is refused."""
+    with pytest.raises(MeshError) as error:
+        meshes.body_from_file(file, 0.008, **options)
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+def volume_of(mesh):
+    return 1e6 * meshes.corner_volumes(mesh.points, mesh.tets).sum()
+
+
+def said_of(said, words):
+    return [sentence for sentence in said if words in sentence]
+
+
+@pytest.mark.parametrize("suffix", [".vtu", ".msh"])
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_mesh_is_read_as_it_was_written(tmp_path, suffix, order):
+    mesh = layered(order)
+    meshes.write(tmp_path / f"body{suffix}", mesh)
+    same(mesh, meshes.read(tmp_path / f"body{suffix}"))
+    assert [path.name for path in tmp_path.iterdir()] == [f"body{suffix}"]
+
+
+def gmsh_file(path, points, tets, *, edges=GMSH_EDGES, triangles=(), names=""):
+    """A mesh of 10-node tetrahedra in version 2.2, written by hand."""
+    place = {tuple(point): i + 1 for i, point in enumerate(points)}
+    rows, elements = [list(p) for p in points], []
+
+    def middle(a, b):
+        at = tuple((np.array(points[a]) + points[b]) / 2)
+        if at not in place:
+            rows.append(at)
+            place[at] = len(rows)
+        return place[at]
+
+    for a, b, c in triangles:
+        nodes = [a + 1, b + 1, c + 1, middle(a, b), middle(b, c), middle(c, a)]
+        elements.append(f"9 2 5 1 {' '.join(map(str, nodes))}")
+    for region, tet in tets:
+        nodes = [n + 1 for n in tet] + [middle(tet[a], tet[b]) for a, b in edges]
+        elements.append(f"11 2 {region} 1 {' '.join(map(str, nodes))}")
+    lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", *names.splitlines(), "$Nodes"]
+    lines += [str(len(rows)), *(f"{i + 1} {x} {y} {z}" for i, (x, y, z) in enumerate(rows))]
+    lines += ["$EndNodes", "$Elements", str(len(elements))]
+    lines += [f"{i + 1} {element}" for i, element in enumerate(elements)]
+    path.write_text("\n".join([*lines, "$EndElements", ""]))
+
+
+CORNERS = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)]
+
+
+TWO = [(7, (0, 1, 2, 3)), (9, (1, 2, 3, 4))]
+
+
+NAMES = '$PhysicalNames\n2\n2 5 "the lid"\n3 7 "skin"\n$EndPhysicalNames'
+
+
+def in_the_middle(mesh):
+    ends = mesh.points[mesh.tets[:, [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]]]]  # VTK
+    np.testing.assert_allclose(mesh.points[mesh.tets[:, 4:]], ends.mean(axis=2), atol=1e-15)
+
+
+def test_nodes_of_gmsh_are_taken_to_our_order(tmp_path):
+    gmsh_file(tmp_path / "a.msh", CORNERS, TWO, triangles=[(0, 1, 2)], names=NAMES)
+    mesh = meshes.read(tmp_path / "a.msh")
+    in_the_middle(mesh)
+    assert sorted(mesh.region) == [7, 9]
+    (lid,) = mesh.facets["the lid"]
+    ends = mesh.points[lid[[[0, 1], [1, 2], [2, 0]]]]
+    np.testing.assert_allclose(mesh.points[lid[3:]], ends.mean(axis=1))
+    a, b, c = mesh.points[lid[:3]]
+    assert np.cross(b - a, c - a)[2] < 0  # seen from below, which is outside
+
+
+def test_what_is_written_for_gmsh_has_its_order(tmp_path):
+    meshes.write(tmp_path / "a.msh", layered(2))
+    content = (tmp_path / "a.msh").read_bytes()
+    assert content.startswith(b"$MeshFormat\n2.2 1 8\n")
+    n = len(layered(2).points)
+    start = content.index(b"$Nodes\n") + len(b"$Nodes\n") + len(f"{n}\n")
+    record = np.dtype([("number", "i4"), ("at", "f8", 3)])
+    points = np.frombuffer(content, record, n, start)["at"]
+    start = content.index(b"$Elements\n")
+    start = content.index(b"\n", start + len(b"$Elements\n")) + 1
+    kind, count, tags = np.frombuffer(content, "i4", 3, start)
+    assert (kind, tags) == (11, 2)
+    tets = np.frombuffer(content, "i4", 13 * count, start + 12).reshape(-1, 13)[:, 3:] - 1
+    for node, (a, b) in enumerate(GMSH_EDGES, start=4):
+        halfway = (points[tets[:, a]] + points[tets[:, b]]) / 2
+        np.testing.assert_allclose(points[tets[:, node]], halfway, atol=1e-15)
+
+
+def test_an_order_that_is_not_its_formats_is_told_by_where_nodes_are(tmp_path):
+    vtk = [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)]
+    for edges in (vtk, [vtk[i] for i in (3, 5, 0, 1, 4, 2)]):
+        gmsh_file(tmp_path / "a.msh", CORNERS, TWO, edges=edges)
+        in_the_middle(meshes.read(tmp_path / "a.msh"))
+
+
+def test_nodes_beside_their_edges_are_refused(tmp_path):
+    gmsh_file(tmp_path / "a.msh", CORNERS, TWO, edges=[(0, 1)] * 3 + GMSH_EDGES[3:])
+    with pytest.raises(MeshError, match=r"2 of 2 tetrahedra with a node further than 25% of an"):
+        meshes.read(tmp_path / "a.msh")
+
+
+def test_version_4_of_another_program_is_read_or_refused_but_never_wrong(tmp_path):
+    mesh = layered(2)
+    raw = meshio.Mesh(mesh.points, [("tetra10", mesh.tets)])
+    meshio.write(tmp_path / "a.msh", raw, file_format="gmsh")
+    read = meshes.read(tmp_path / "a.msh")
+    np.testing.assert_array_equal(read.tets, mesh.tets)
+    meshio.write(tmp_path / "b.msh", raw, file_format="gmsh", binary=False)
+    try:
+        in_the_middle(meshes.read(tmp_path / "b.msh"))
+    except MeshError as error:
+        assert "msh22" in str(error)  # noqa: PT017 - either outcome is right
+
+
+@pytest.mark.parametrize(
+    ("mode", "compressor"), [("Ascii", "none"), ("Binary", "zlib"), ("Appended", "lz4")]
+)
+def test_vtu_of_every_encoding_is_read_with_field_data(tmp_path, mode, compressor):
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+
+    grid = grid_of(SLAB.points, {TETRAHEDRON: SLAB.tets})
+    grid.field_data["TimeValue"] = [0.25]
+    writer = vtkXMLUnstructuredGridWriter()
+    writer.SetFileName(str(tmp_path / "a.vtu"))
+    writer.SetInputData(grid)
+    writer.SetCompressorType(["none", "zlib", "lz4"].index(compressor))
+    getattr(writer, f"SetDataModeTo{mode}")()
+    writer.Write()
+    mesh = meshes.read(tmp_path / "a.vtu")
+    np.testing.assert_allclose(mesh.points, SLAB.points, atol=1e-8)
+    np.testing.assert_array_equal(mesh.tets, SLAB.tets)
+
+
+def pieces_vtu(path):
+    """A file of two pieces, written by hand."""
+    text = []
+    for points, tets in map(half, (-1, 1)):
+        rows = "\n".join(" ".join(map(repr, map(float, p))) for p in points)
+        text.append(
+            f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(tets)}"><Points>'
+            f'<DataArray type="Float64" NumberOfComponents="3" format="ascii">{rows}</DataArray>'
+            '</Points><Cells><DataArray type="Int64" Name="connectivity" format="ascii">'
+            f"{' '.join(map(str, tets.ravel()))}</DataArray>"
+            '<DataArray type="Int64" Name="offsets" format="ascii">'
+            f"{' '.join(str(4 * (i + 1)) for i in range(len(tets)))}</DataArray>"
+            '<DataArray type="UInt8" Name="types" format="ascii">'
+            f"{'10 ' * len(tets)}</DataArray></Cells></Piece>"
+        )
+    path.write_text(
+        '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian">'
+        f"<UnstructuredGrid>{''.join(text)}</UnstructuredGrid></VTKFile>"
+    )
+
+
+def test_pieces_of_a_file_are_one_body_where_they_touch(tmp_path):
+    pieces_vtu(tmp_path / "a.vtu")
+    mesh, said = made(tmp_path / "a.vtu")
+    assert volume_of(mesh) == pytest.approx(19.2, rel=1e-6)
+    assert len(mesh.points) == len(SLAB.points)
+    assert said_of(said, "merged 15 nodes that coincide")
+
+
+def test_blocks_are_regions_by_their_names(tmp_path):
+    grids = {name: grid_of(points, {TETRAHEDRON: tets})
+             for name, (points, tets) in (("skin", half(-1)), ("fat", half(1)))}  # fmt: skip
+    pyvista.MultiBlock(grids).save(tmp_path / "a.vtm")
+    mesh, _ = made(tmp_path / "a.vtm")
+    volumes = meshes.corner_volumes(mesh.points, mesh.tets)
+    for number, name in mesh.region_names.items():
+        assert 1e6 * volumes[mesh.region == number].sum() == pytest.approx(9.6), name
+    assert sorted(mesh.region_names.values()) == ["fat", "skin"]
+
+
+def mixed():
+    """A box of hexahedra, wedges and pyramids, every node turned a little within its cell's face
+    planes, as columns of bricks that are split differently.
+    """
+    points, bricks = boxes(4, 4, 2, (0.040, 0.040, 0.012))
+    where = points[bricks].mean(axis=1)
+    left, middle = where[:, 0] < 0, where[:, 1] < 0
+    cells = {HEXAHEDRON: bricks[left & middle]}
+    prism = bricks[left & ~middle]
+    cells[WEDGE] = np.vstack([prism[:, [0, 1, 2, 4, 5, 6]], prism[:, [0, 2, 3, 4, 6, 7]]])
+    rest = bricks[~left]
+    tips = len(points) + np.arange(len(rest))
+    sides = [(0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)]
+    cells[PYRAMID] = np.vstack([np.column_stack([rest[:, side], tips]) for side in sides])
+    return np.vstack([points, points[rest].mean(axis=1)]), cells
+
+
+def test_hexahedra_wedges_and_pyramids_are_split_conformingly(tmp_path):
+    points, cells = mixed()
+    grid = grid_of(points, cells)
+    grid.save(tmp_path / "a.vtu")
+    mesh, said = made(tmp_path / "a.vtu")
+    by_vtk = 1e6 * grid.compute_cell_sizes()["Volume"].sum()
+    assert volume_of(mesh) == pytest.approx(by_vtk, rel=1e-9)
+    for kind in ("hexahedron", "wedge", "pyramid"):
+        assert said_of(said, f"cells of type {kind} into"), kind
+    # The boundary of conforming tetrahedra is that of the box.
+    middles = mesh.points[meshes.boundary_facets(mesh.tets)].mean(axis=1)
+    off = np.abs(np.abs(middles - [0, 0, -0.006]) - [0.02, 0.02, 0.006]).min(axis=1)
+    assert off.max() < 1e-12
+
+
+def test_facets_of_hexahedra_stay_in_their_sets(tmp_path):
+    points, bricks = boxes(3, 2, 2, (0.030, 0.020, 0.010))
+    top = bricks[np.isclose(points[bricks][:, 4:, 2].mean(axis=1), 0)][:, 4:]
+    raw = meshio.Mesh(
+        points, [("hexahedron", bricks), ("quad", top)],
+        cell_data={"gmsh:physical": [np.full(len(bricks), 1), np.full(len(top), 2)],
+                   "gmsh:geometrical": [np.full(len(bricks), 1), np.full(len(top), 2)]},
+        field_data={"skin": np.array([1, 3]), "top": np.array([2, 2])},
+    )  # fmt: skip
+    meshio.write(tmp_path / "a.msh", raw, file_format="gmsh22")
+    mesh = meshes.read(tmp_path / "a.msh")
+    assert mesh.region_names == {1: "skin"}
+    facets = mesh.points[mesh.facets["top"]]
+    assert np.isclose(facets[..., 2], 0).all()
+    normals = np.cross(facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0])
+    assert normals[:, 2].sum() / 2 == pytest.approx(0.030 * 0.020)
+    assert (normals[:, 2] > 0).all()
+
+
+def test_cells_that_are_not_split_are_named(tmp_path):
+    points, bricks = boxes(1, 1, 1, (0.02, 0.02, 0.01))
+    middles = [(bricks[0, a] + 0, bricks[0, b] + 0) for a, b in
+               ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5),
+                (2, 6), (3, 7))]  # fmt: skip
+    every = np.vstack([points, [(points[a] + points[b]) / 2 for a, b in middles]])
+    nodes = np.append(bricks[0], 8 + np.arange(12))[None]
+    meshio.write(tmp_path / "a.vtu", meshio.Mesh(every, [("hexahedron20", nodes)]))
+    assert "1 of type hexahedron20" in refused(tmp_path / "a.vtu")
+
+
+def test_voxels_are_split_as_hexahedra(tmp_path):
+    points, bricks = boxes(4, 4, 2, (0.040, 0.040, 0.012))
+    grid_of(points, {11: bricks[:, [0, 1, 3, 2, 4, 5, 7, 6]]}).save(tmp_path / "a.vtu")
+    assert volume_of(meshes.read(tmp_path / "a.vtu")) == pytest.approx(19.2, rel=1e-9)
+
+
+def abaqus(parts, instances="", head="*HEADING\n"):
+    """An input file of parts (name, lines after *PART) and instances."""
+    text = head
+    for name, body in parts:
+        text += f"*Part, name={name}\n{body}*End Part\n"
+    return text + f"*Assembly, name=A\n{instances}*End Assembly\n"
+
+
+def nodes_and_elements(points, tets, more="", first=1):
+    rows = [f"{i + first}, {x!r}, {y!r}, {z!r}" for i, (x, y, z) in enumerate(points.tolist())]
+    cells = [
+        f"{i + 1}, " + ", ".join(map(str, tet)) for i, tet in enumerate((tets + first).tolist())
+    ]
+    return "*Node\n" + "\n".join(rows) + f"\n*Element, type=C3D4{more}\n" + "\n".join(cells) + "\n"
+
+
+def test_instances_are_placed_by_translation_and_rotation(tmp_path):
+    part = [("BAR", nodes_and_elements(*half(-1)))]
+    instances = (
+        "*Instance, name=A-1, part=BAR\n*End Instance\n*Instance, name=A-2, part=BAR\n"
+        "0., 0., 0.\n0., 0., 0., 0., 0., 1., 180.\n*End Instance\n"
+    )
+    (tmp_path / "a.inp").write_text(abaqus(part, instances))
+    mesh, said = made(tmp_path / "a.inp")
+    assert volume_of(mesh) == pytest.approx(19.2, rel=1e-9)
+    assert said_of(said, "read 2 parts or instances")
+    away = instances.replace("0., 0., 0.\n", "0., 0.05, 0.\n")
+    (tmp_path / "a.inp").write_text(abaqus(part, away))
+    assert "2 separate bodies (9.6, 9.6 cm3)" in refused(tmp_path / "a.inp")
+    # A translation comes before the rotation, here about an axis away from the origin.
+    moved = "0.1, 0., 0.\n0.1, 0., 0., 0.1, 0., 1., 90."
+    (tmp_path / "a.inp").write_text(
+        abaqus(part, f"*Instance, name=A-1, part=BAR\n{moved}\n*End Instance\n")
+    )
+    x, y, _ = half(-1)[0].T
+    read = meshes.read(tmp_path / "a.inp")
+    np.testing.assert_allclose(np.ptp(read.points[:, :2], axis=0), [np.ptp(y), np.ptp(x)])
+    np.testing.assert_allclose(read.points[:, 1].min(), x.min(), atol=1e-12)
+    np.testing.assert_allclose(read.points[:, 0].mean(), 0.1, atol=1e-12)
+
+
+def test_parts_that_are_numbered_alike_are_two_bodies_or_one_where_they_touch(tmp_path):
+    parts = [(name, nodes_and_elements(*half(side))) for name, side in (("SKIN", -1), ("BONE", 1))]
+    instances = "".join(
+        f"*Instance, name={name}-1, part={name}\n*End Instance\n" for name, _ in parts
+    )
+    (tmp_path / "a.inp").write_text(abaqus(parts, instances))
+    mesh, _ = made(tmp_path / "a.inp")
+    assert volume_of(mesh) == pytest.approx(19.2, rel=1e-9)
+    assert sorted(mesh.region_names.values()) == ["BONE", "SKIN"]
+
+
+def test_instances_may_have_nodes_and_elements_of_their_own(tmp_path):
+    instances = "".join(
+        f"*Instance, name=P-{side}, part=P\n{nodes_and_elements(*half(side))}*End Instance\n"
+        for side in (-1, 1)
+    )
+    (tmp_path / "a.inp").write_text(abaqus([("P", "")], instances))
+    mesh, said = made(tmp_path / "a.inp")
+    assert volume_of(mesh) == pytest.approx(19.2, rel=1e-9)
+    assert said_of(said, "merged 15 nodes")
+
+
+def test_generated_sets_that_have_each_element_once_are_regions(tmp_path):
+    upper = SLAB.points[SLAB.tets].mean(axis=1)[:, 2] > -0.006
+    order = np.concatenate([np.flatnonzero(upper), np.flatnonzero(~upper)])
+    text = nodes_and_elements(SLAB.points, SLAB.tets[order], ", elset=ALL")
+    text += f"*Elset, elset=skin, generate\n1, {upper.sum()}, 1\n"
+    text += f"*Elset, elset=muscle, generate\n{upper.sum() + 1}, {len(order)}\n"
+    (tmp_path / "a.inp").write_text(text)
+    mesh, said = made(tmp_path / "a.inp")
+    names = {mesh.region_names[r]: (mesh.region == r).sum() for r in np.unique(mesh.region)}
+    assert names == {"SKIN": upper.sum(), "MUSCLE": (~upper).sum()}
+    assert said_of(said, "element sets that are not taken as regions: ALL")
+
+
+def test_sets_continued_lines_and_included_nodes(tmp_path):
+    slab = meshes.block((0.04, 0.04, 0.012), 0.012, order=2)
+    upper = slab.points[slab.tets[:, :4]].mean(axis=1)[:, 2] > -0.006
+    (tmp_path / "nodes.inc").write_text(
+        "** in metre\n" + "".join(f"{7 * i + 9}, {x!r}, {y!r}, {z!r}\n"
+                                  for i, (x, y, z) in enumerate(slab.points.tolist()))
+    )  # fmt: skip
+    lines = ["*Heading", "*NODE", "*Include, input=nodes.inc"]
+    for title, own in (("SKIN", upper), ("muscle", ~upper)):
+        lines.append(f"*element, type=c3d10, elset={title}")
+        for i in np.flatnonzero(own):
+            words = [str(7 * n + 9) for n in slab.tets[i]]
+            lines += [f"{i + 1}, {', '.join(words[:6])},", f" {', '.join(words[6:])}"]
+    lines += ["*Elset, elset=PROBE", "1, 2", "*Nset, nset=BASE, generate", "1, 9, 7"]
+    (tmp_path / "a.inp").write_text("\n".join(lines) + "\n")
+    mesh = meshes.read(tmp_path / "a.inp")
+    assert mesh.order == 2
+    assert volume_of(mesh) == pytest.approx(19.2, rel=1e-9)
+    names = {name: (mesh.region == number).sum() for number, name in mesh.region_names.items()}
+    assert names == {"SKIN": upper.sum(), "MUSCLE": (~upper).sum()} or sum(names.values()) == len(
+        mesh.tets
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("*NODE\n1, 0, 0, 0\n*NGEN\n1, 9, 1\n", "NGEN"),
+        ("*INCLUDE, INPUT=gone.inc\n", "gone.inc"),
+        ("*NODE\n1, 0, 0, 0\n*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n", "no node 2"),
+        ("*INSTANCE, NAME=a, PART=b\n*END INSTANCE\n", "part 'b'"),
+        ("*NODE\n1, a, 0, 0\n", r"below \*NODE"),
+    ],
+)
+def test_what_abaqus_makes_by_a_rule_or_lacks_is_refused(tmp_path, text, said):
+    (tmp_path / "a.inp").write_text(text)
+    with pytest.raises(MeshError, match=said):
+        meshes.read(tmp_path / "a.inp")
+
+
+def test_tetrahedra_that_are_listed_twice_are_taken_once(tmp_path):
+    tets = np.vstack([SLAB.tets, SLAB.tets[10:15][:, [1, 2, 0, 3]]])
+    grid_of(SLAB.points, {TETRAHEDRON: tets}).save(tmp_path / "a.vtu")
+    mesh, said = made(tmp_path / "a.vtu")
+    assert volume_of(mesh) == pytest.approx(19.2, rel=1e-9)
+    assert said_of(said, "left out 5 tetrahedra that are listed twice")
+
+
+def test_the_smaller_of_two_groups_is_the_region(tmp_path):
+    upper = SLAB.points[SLAB.tets].mean(axis=1)[:, 2] > -0.006
+    tets = np.vstack([SLAB.tets, SLAB.tets])
+    groups = np.concatenate([np.full(len(SLAB.tets), 1), np.where(upper, 2, 3)])
+    raw = meshio.Mesh(
+        SLAB.points, [("tetra", tets)],
+        cell_data={"gmsh:physical": [groups], "gmsh:geometrical": [groups]},
+        field_data={"all": np.array([1, 3]), "skin": np.array([2, 3]), "fat": np.array([3, 3])},
+    )  # fmt: skip
+    meshio.write(tmp_path / "a.msh", raw, file_format="gmsh22")
+    mesh, said = made(tmp_path / "a.msh")
+    assert set(mesh.region_names.values()) == {"skin", "fat"}
+    assert said_of(said, "the smaller of their groups is taken as their region")
+
+
+def test_damaged_files_are_refused_by_what_is_wrong(tmp_path):
+    points = np.array(SLAB.points)
+    points[3] = np.nan
+    grid_of(points, {TETRAHEDRON: SLAB.tets}).save(tmp_path / "a.vtk")
+    with pytest.raises(MeshError, match="1 nodes whose coordinates are no numbers"):
+        meshes.read(tmp_path / "a.vtk")
+    meshes.write(tmp_path / "b.msh", SLAB)
+    content = (tmp_path / "b.msh").read_bytes()
+    (tmp_path / "b.msh").write_bytes(content[: len(content) * 3 // 4])
+    with pytest.raises(MeshError, match="cut short or no mesh of gmsh"):
+        meshes.read(tmp_path / "b.msh")
+    (tmp_path / "c.stl").write_text("solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0")
+    with pytest.raises(MeshError, match="is damaged or cut short"):
+        read_contents(tmp_path / "c.stl")
+
+
+def test_inverted_tetrahedra_are_turned_and_overlapping_ones_refused(tmp_path):
+    tets = np.array(SLAB.tets)
+    tets[:20] = tets[:20][:, [0, 2, 1, 3]]
+    grid_of(SLAB.points, {TETRAHEDRON: tets}).save(tmp_path / "a.vtu")
+    mesh, said = made(tmp_path / "a.vtu")
+    assert said_of(said, "turned round 20 of 192")
+    assert volume_of(mesh) == pytest.approx(19.2, rel=1e-9)
+    points = np.array(SLAB.points)
+    inner = np.flatnonzero(np.abs(points - [0, 0, -0.006]).max(axis=1) < 1e-9)
+    points[inner] += [0.013, 0.002, 0.001]
+    grid_of(points, {TETRAHEDRON: SLAB.tets}).save(tmp_path / "b.vtu")
+    assert "tetrahedra of the mesh overlap at" in refused(tmp_path / "b.vtu")
+
+
+def test_the_largest_of_several_bodies_is_kept_on_request(tmp_path):
+    loose = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]) * 1e-3 + [0.03, 0, 0]
+    points = np.vstack([SLAB.points, loose])
+    tets = np.vstack([SLAB.tets, len(SLAB.points) + np.arange(4)[None]])
+    grid_of(points, {TETRAHEDRON: tets}).save(tmp_path / "a.vtu")
+    said = refused(tmp_path / "a.vtu")
+    assert "2 separate bodies (19.2, 0.000167 cm3)" in said
+    assert "--keep largest" in said
+    mesh, said = made(tmp_path / "a.vtu", keep_largest=True)
+    assert len(mesh.tets) == len(SLAB.tets)
+    assert said_of(said, "kept the largest of 2 bodies, 100.0 % of the volume")
+
+
+def test_a_mesh_is_turned_and_brought_below_the_device(tmp_path):
+    x, y, z = SLAB.points.T
+    corner = np.column_stack([x + 0.02, z + 0.012, 0.02 - y])  # y up, a corner at the origin
+    meshes.write(tmp_path / "a.msh", replace(SLAB, points=corner, facets={}))
+    mesh, said = made(tmp_path / "a.msh", up="+y")
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    np.testing.assert_allclose(low, [-0.02, -0.02, -0.012], atol=1e-3)
+    np.testing.assert_allclose(high, [0.02, 0.02, 0.0], atol=1e-3)
+    assert high[2] == pytest.approx(0.0, abs=1e-12)
+    assert said_of(said, "its top to the origin")
+    meshes.write(tmp_path / "b.vtu", mesh)
+    again, said = made(tmp_path / "b.vtu")
+    np.testing.assert_array_equal(again.points, mesh.points)  # where it is on its top already
+    assert not said_of(said, "moved by")
+
+
+def test_negative_regions_are_refused_and_not_taken_as_positive(tmp_path):
+    grid = grid_of(SLAB.points, {TETRAHEDRON: SLAB.tets})
+    grid.cell_data["material"] = np.where(np.arange(len(SLAB.tets)) < 96, 1, -1)
+    grid.save(tmp_path / "a.vtu")
+    with pytest.raises(MeshError, match="0 or above"):
+        meshes.read(tmp_path / "a.vtu")
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("a.vtu", b""), ("a.vtu", b"<VTKFile>"), ("a.msh", b"nothing"), ("a.inp", b""),
+        ("a.inp", b"*NODE\n1, a, b\n"), ("a.vtk", b"# vtk DataFile Version 3.0\n"),
+        ("a.stl", b""), ("a.ply", b"ply\nformat ascii 1.0\nend_header\n"), ("a.fbx", b""),
+        ("a.obj", b"v 0 0 0\n"), ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+    ],
+)  # fmt: skip
+def test_what_is_no_mesh_is_refused_in_one_sentence(tmp_path, name, content):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(MeshError, match=name) as error:
+        meshes.read(tmp_path / name)
+    assert "\n" not in str(error.value)
+
+
+def test_nothing_is_left_of_what_cannot_be_written(tmp_path):
+    with pytest.raises(MeshError, match=r"\.vtu"):
+        meshes.write(tmp_path / "a.stl", layered(1))
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_failed_write_leaves_what_was_there(tmp_path, monkeypatch):
+    (tmp_path / "a.vtu").write_text("mine")
+
+    def half_written(path, *arguments, **options):
+        with open(path, "w") as file:
+            file.write("half")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(meshio, "write", half_written)
+    with pytest.raises(OSError, match="No space left"):
+        meshes.write(tmp_path / "a.vtu", layered(1))
+    assert [path.name for path in tmp_path.iterdir()] == ["a.vtu"]
+    assert (tmp_path / "a.vtu").read_text() == "mine"
+
+
+def open_wrist(path, rim=0.0):
+    """A tube along y that is closed at one end only, whose open rim leaves its plane by `rim`."""
+    n, rings = 24, 8
+    angle = 2 * np.pi * np.arange(n) / n
+    y = np.linspace(-0.02, 0.02, rings)
+    x, z = 0.02 * np.cos(angle), 0.008 * np.sin(angle)
+    points = np.vstack([np.column_stack([x, np.full(n, at), z]) for at in y])
+    points[:n, 1] += rim * np.cos(2 * angle)
+    number = np.arange(n * rings).reshape(rings, n)
+    a, b = number[:-1], number[1:]
+    c, d = np.roll(a, -1, axis=1), np.roll(b, -1, axis=1)
+    triangles = [np.stack([a, b, d], -1).reshape(-1, 3), np.stack([a, d, c], -1).reshape(-1, 3)]
+    tip = np.column_stack([np.roll(number[-1], -1), number[-1], np.full(n, n * rings)])
+    points, every = np.vstack([points, [0, 0.02, 0]]), np.vstack([*triangles, tip])
+    pyvista.PolyData(points, faces=np.insert(every, 0, 3, axis=1).ravel()).save(path)
+
+
+def test_an_open_wrist_is_capped_on_request(tmp_path):
+    open_wrist(tmp_path / "a.stl")
+    said = refused(tmp_path / "a.stl")
+    assert "open along 24 of its" in said
+    assert "--cap" in said
+    mesh, said = made(tmp_path / "a.stl", cap=True)
+    area = 24 / 2 * np.sin(2 * np.pi / 24) * 0.02 * 0.008
+    assert volume_of(mesh) == pytest.approx(1e6 * 0.04 * area, rel=0.02)
+    assert said_of(said, "closed a hole of 24 edges, 40 mm wide and 0.0 mm out of a plane")
+    open_wrist(tmp_path / "b.stl", rim=0.005)
+    said = refused(tmp_path / "b.stl", cap=True)
+    assert "10.0 mm out of a plane and cannot be capped" in said
+
+
+def test_a_bone_in_the_file_of_its_skin_is_named_with_both_cures(tmp_path):
+    skin, bone = pyvista.Sphere(radius=0.02), pyvista.Sphere(radius=0.005)
+    (skin + bone).save(tmp_path / "a.stl")
+    said = refused(tmp_path / "a.stl")
+    assert "2 separate pieces" in said
+    assert "--inner" in said
+    surface = read_contents(tmp_path / "a.stl")
+    kept, notes = meshes.repaired(surface.points, surface.triangles, keep_largest=True)
+    assert len(kept.triangles) == skin.n_cells
+    assert notes[-1] == "kept the largest of 2 pieces, 94.1 % of the area"
+
+
+@functools.cache
+def hand():
+    """A low-polygon hand in metre: fingers along -x, palm towards +y, far from the origin."""
+    grid = pyvista.ImageData(
+        dimensions=(28, 45, 14), spacing=(5e-3,) * 3, origin=(-0.0623, -0.0633, -0.0433)
+    )
+    points = np.asarray(grid.points, np.float64)
+    inside = level_set(Palm(), points)
+    fingers = [(x, 0.03, 1.15 * x, 0.05 + y) for x, y in
+               ((-0.033, 0.055), (-0.011, 0.07), (0.011, 0.08), (0.033, 0.07))]  # fmt: skip
+    for x, y, x_tip, y_tip in [*fingers, (0.028, -0.03, 0.052, 0.025)]:
+        root, tip = np.array([x, y, -0.01]), np.array([x_tip, y_tip, -0.008])
+        along = np.clip((points - root) @ (tip - root) / ((tip - root) @ (tip - root)), 0, 1)
+        away = np.linalg.norm(points - root - along[:, None] * (tip - root), axis=1) - 0.009
+        blend = np.maximum(0.006 - np.abs(inside - away), 0)
+        inside = np.minimum(inside, away) - blend**2 / 0.024
+    contour = grid.contour([0.0], scalars=inside, method="flying_edges")
+    x, y, z = np.asarray(contour.points, np.float64).T
+    triangles = np.asarray(contour.faces).reshape(-1, 4)[:, 1:]
+    return np.column_stack([-y + 1.2, z + 0.4, -x - 3.0]), triangles
+
+
+def with_seams(points, triangles):
+    """Each half of the hand with points of its own, as where textures meet."""
+    upper = points[triangles].mean(axis=1)[:, 2] > -3.0
+    return np.vstack([points, points]), triangles + len(points) * upper[:, None]
+
+
+def write_obj(path, points, triangles):
+    rows = ["v {:.9g} {:.9g} {:.9g}".format(*point) for point in points]
+    rows += ["f {} {} {}".format(*(triangle + 1)) for triangle in triangles]
+    path.write_text("\n".join(rows) + "\n")
+
+
+def write_glb(path, points, triangles):
+    """Binary glTF of two primitives below a node that moves them."""
+    half = len(triangles) // 2
+    blobs, views, accessors, primitives = b"", [], [], []
+    for part in (triangles[:half], triangles[half:]):
+        used, numbers = np.unique(part, return_inverse=True)
+        positions = (points[used] - [1, 0, 0]).astype("<f4")
+        arrays = (positions, numbers.astype("<u4").reshape(-1))
+        kinds = ((5126, "VEC3"), (5125, "SCALAR"))
+        for array, (component, kind) in zip(arrays, kinds, strict=True):
+            views.append({"buffer": 0, "byteOffset": len(blobs), "byteLength": array.nbytes})
+            accessor = {"bufferView": len(views) - 1, "componentType": component, "type": kind,
+                        "count": len(array)}  # fmt: skip
+            if kind == "VEC3":
+                low, high = positions.min(axis=0), positions.max(axis=0)
+                accessor |= {"min": low.tolist(), "max": high.tolist()}
+            accessors.append(accessor)
+            blobs += array.tobytes()
+        last = len(accessors)
+        primitives.append({"attributes": {"POSITION": last - 2}, "indices": last - 1})
+    head = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, "translation": [1, 0, 0]}],
+        "meshes": [{"primitives": primitives}],
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{"byteLength": len(blobs)}],
+    }
+    text = json.dumps(head).encode()
+    text += b" " * (-len(text) % 4)
+    total = 12 + 8 + len(text) + 8 + len(blobs)
+    path.write_bytes(
+        struct.pack("<4sII", b"glTF", 2, total)
+        + struct.pack("<I4s", len(text), b"JSON") + text
+        + struct.pack("<I4s", len(blobs), b"BIN\0") + blobs
+    )  # fmt: skip
+
+
+def write_by_vtk(path, points, triangles):
+    faces = np.column_stack([np.full(len(triangles), 3), triangles]).ravel()
+    pyvista.PolyData(points, faces=faces).save(path)
+
+
+WRITERS = {".obj": write_obj, ".glb": write_glb, ".stl": write_by_vtk, ".ply": write_by_vtk,
+           ".vtp": write_by_vtk}  # fmt: skip
+
+
+@pytest.mark.parametrize("suffix", WRITERS)
+def test_a_hand_with_seams_is_the_same_from_every_kind_of_file(tmp_path, suffix):
+    points, triangles = with_seams(*hand())
+    WRITERS[suffix](tmp_path / f"hand{suffix}", points, triangles)
+    raw = read_contents(tmp_path / f"hand{suffix}")
+    surface, _ = meshes.repaired(raw.points @ turns("+y").T, raw.triangles)
+    check(surface)
+    x, y, z = points.T
+    plain, _ = meshes.repaired(np.column_stack([x, -z, y]), triangles)
+    assert volume(surface) == pytest.approx(volume(plain), rel=1e-4)
+    np.testing.assert_allclose(surface.points.max(axis=0), plain.points.max(axis=0), atol=1e-6)
+
+
+def damaged(content, seed):
+    """A file cut short, or with a few bytes changed at its beginning or anywhere."""
+    rng = np.random.default_rng(seed)
+    if seed % 3 == 0:
+        return content[: rng.integers(len(content))]
+    changed = bytearray(content)
+    for place in rng.integers(len(content) if seed % 3 == 1 else min(len(content), 1500), size=4):
+        changed[place] = rng.integers(256)
+    return bytes(changed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("suffix", [".stl", ".glb", ".vtu", ".msh"])
+def test_a_damaged_file_takes_nobody_with_it(tmp_path, suffix):
+    path = tmp_path / f"body{suffix}"
+    if suffix in WRITERS:
+        points, triangles = hand()
+        WRITERS[suffix](path, points, triangles[:400])
+    else:
+        meshes.write(path, layered(2))
+    content = path.read_bytes()
+    for seed in range(3):
+        path.write_bytes(damaged(content, seed))
+        try:
+            read_contents(path)
+        except MeshError as error:
+            assert "\n" not in str(error)  # noqa: PT017 - a damaged coordinate is still a number
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+
+
+def test_a_hand_with_seams_is_meshed_with_unit_and_up_only(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    points, triangles = with_seams(*hand())
+    write_glb(tmp_path / "hand.glb", points, triangles)
+    assert main(["mesh", "hand.glb", "--unit", "m", "--up", "+y", "--h", "16", "--json"]) == 0
+    printed = capsys.readouterr()
+    summary = json.loads(printed.out)
+    assert any("along seams" in sentence for sentence in summary["said"])
+    mesh = meshes.read("hand-mesh.vtu")
+    assert meshes.dihedral_angles(mesh).min() > 5
+    assert {"surface", "top", "bottom"} == set(mesh.facets)
+    assert {name: len(f) for name, f in mesh.facets.items()} == summary["facets"]
+    # The middle of the palm, not that of the whole hand, is the origin.
+    top = mesh.points[np.unique(mesh.facets["top"])]
+    near = top[np.linalg.norm(top[:, :2], axis=1) < 0.012]
+    assert np.abs(near[:, 2]).max() < 0.003
+    true, _ = meshes.repaired(*hand())
+    x_wrist, x_tip = true.points[:, 0].max(), true.points[:, 0].min()
+    assert 0.03 < mesh.points[:, 0].max() < 0.07 < 0.1 < -mesh.points[:, 0].min()
+    assert np.ptp(mesh.points[:, 0]) == pytest.approx(x_wrist - x_tip, abs=0.002)
+    assert {path.name for path in tmp_path.iterdir()} == {"hand.glb", "hand-mesh.vtu"}
+
+
+def test_a_patch_is_cut_with_its_cuts_named(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    points, triangles = hand()
+    write_by_vtk("hand.ply", 1e3 * points, triangles)
+    patch = ["--clip", "-30", "35", "-32", "28"]
+    arguments = ["--unit", "mm", "--up", "+y", "--h", "10", "--out", "patch.vtu"]
+    assert main(["mesh", "hand.ply", *arguments, *patch]) == 0
+    assert "cut at 4 planes" in capsys.readouterr().out
+    mesh = meshes.read("patch.vtu")
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    np.testing.assert_allclose([low[0], high[0], low[1], high[1]], [-0.03, 0.035, -0.032, 0.028],
+                               atol=1e-3)  # fmt: skip
+    centroid, normal = meshes.facets.geometry(mesh, mesh.facets["cut"])
+    assert np.abs(normal[:, :2]).max(axis=1).min() > 0.9
+    assert {"top", "cut", "bottom", "surface"} == set(mesh.facets)
+    assert len(mesh.facets["surface"]) == sum(
+        len(mesh.facets[name]) for name in ("top", "cut", "bottom")
+    )
+    assert (centroid[:, 0] > 0.034).any()
+    assert (centroid[:, 1] < -0.031).any()
+
+
+def test_a_mesh_is_taken_as_it_is(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    meshes.write("slab.msh", layered(2))
+    assert main(["mesh", "slab.msh", "--quiet"]) == 0
+    mesh = meshes.read("slab-mesh.vtu")
+    np.testing.assert_array_equal(mesh.tets, layered(2).tets)
+    np.testing.assert_array_equal(mesh.facets["top"], layered(2).facets["top"])
+    assert "surface" in mesh.facets
+    assert main(["mesh", "slab.msh", "--quiet"]) == 2
+    assert "exists and is kept; pass --overwrite" in capsys.readouterr().err
+    assert main(["mesh", "slab.msh", "--quiet", "--overwrite"]) == 0
+
+
+def test_options_of_the_command_reach_the_reader(tmp_path, capsys):
+    x, y, z = layered(1).points.T
+    points = 1e3 * np.column_stack([x + 0.02, z, -y])  # in mm, y up
+    loose = np.vstack([np.zeros(3), np.eye(3)]) + [60, 0, 0]
+    tets = np.vstack([layered(1).tets, len(points) + np.arange(4)[None]])
+    turned = TetMesh(points=np.vstack([points, loose]), tets=tets)
+    meshes.write(tmp_path / "a.vtu", turned)
+    command = ["mesh", str(tmp_path / "a.vtu"), "-o", str(tmp_path / "b.vtu"), "--json"]
+    assert main([*command, "--unit", "mm", "--up", "+y", "--keep", "largest", "--cap"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert any("kept the largest of 2 bodies" in said for said in summary["said"])
+    mesh = meshes.read(tmp_path / "b.vtu")
+    np.testing.assert_allclose(np.ptp(mesh.points, axis=0), [0.02, 0.03, 0.01], rtol=1e-9)
+    assert main([*command[:-1], "--overwrite", "--quiet"]) == 2
+    assert "which may be mm (--unit mm" in capsys.readouterr().err
+
+
+def test_what_is_prepared_is_kept_for_the_facets_that_a_file_names(tmp_path):
+    block = meshes.block((0.02, 0.02, 0.01), 0.005)
+    body = Body(kind="mesh", file=str(tmp_path / "body.vtu"), sides="clamped")
+    read = []
+    for held, pushed in (("sides", "top"), ("left", "top"), ("left", "part")):
+        part = block.facets["top"][block.points[block.facets["top"]][..., 0].max(axis=1) < 1e-9]
+        facets = {"sides": block.facets[held], "top": {**block.facets, "part": part}[pushed]}
+        meshes.write(body.file, replace(block, facets=facets))
+        read.append(prepare(body, np.array([(-0.004, 0.001)]), h=0.005))
+    stiffness = [np.abs(prepared.body.poles.values[:3]).sum() for prepared in read]
+    assert stiffness[0] != pytest.approx(stiffness[1], rel=1e-3)
+    assert len(read[1].body.points) == 2 * len(read[2].body.points)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["open.stl"], "open along"),
+        (["hand.obj", "--unit", "mm"], "may be m"),
+        (["hand.obj", "--unit", "feet"], "feet"),
+        (["hand.obj", "--up", "up"], "up"),
+        (["hand.obj", "--h", "nan"], "h = nan m"),
+        (["hand.obj", "--clip", "10", "20", "10", "20"], "middle of the palm"),
+        (["hand.obj", "--out", "hand.stl"], "ends in .vtu or .msh"),
+        (["hand.obj", "--out", "no/where.vtu"], "no"),
+        (["hand.obj", "--timeout", "0"], "timeout = 0.0 s"),
+        (["missing.stl"], "missing.stl"),
+        (["hand.step"], "hand.step"),
+    ],
+)
+def test_what_cannot_be_meshed_ends_in_one_line(tmp_path, monkeypatch, capsys, arguments, said):
+    monkeypatch.chdir(tmp_path)
+    points, triangles = hand()
+    write_obj(tmp_path / "hand.obj", points, triangles)
+    write_by_vtk("open.stl", points, triangles[50:])
+    before = sorted(path.name for path in tmp_path.iterdir())
+    assert main(["mesh", *arguments, "--quiet"]) == 2
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1
+    assert re.search(said, line), line
+    assert sorted(path.name for path in tmp_path.iterdir()) == before

@@ -1,0 +1,160 @@
+"""Filling of surfaces by the mesher: sizes, regions, and a mesher that is not trusted."""
+
+import json
+from dataclasses import replace
+
+import meshio
+import numpy as np
+import pytest
+from test_surfaces import BONE, OUTER, SPHERE, box, cube
+
+import fem
+import meshes
+from meshes import MeshError, Surface, TetMesh
+from meshes.surface.triangulation import volume
+from meshes.tetmesh import interface_facets
+from meshes.volume import tetrahedralise as tetra
+from meshes.volume.smoothing import smoothed
+from skinwave.bodies import Body
+from skinwave.bodies.build import build
+from skinwave.commands.cli import main
+
+
+def test_a_cube_is_filled_once_per_machine(tmp_path, monkeypatch):
+    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path / "cache"))
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    mesh = meshes.tetrahedralise(cube(at=(0, 0, 1.0)), 4e-3)
+    assert meshes.dihedral_angles(mesh).min() > 10
+    assert meshes.corner_volumes(mesh.points, mesh.tets).sum() == pytest.approx(8e-6, rel=5e-3)
+    assert 0.7 < np.median(meshes.edge_lengths(mesh)) / 4e-3 < 1.15
+    monkeypatch.setattr(tetra, "_run", None)
+    again = meshes.tetrahedralise(cube(at=(0, 0, 1.0)), 4e-3)
+    np.testing.assert_array_equal(again.points, mesh.points)
+    np.testing.assert_array_equal(again.tets, mesh.tets)
+    with pytest.raises(TypeError):
+        meshes.tetrahedralise(cube(), 4.1e-3)
+    assert not list((tmp_path / "here").iterdir())
+
+
+def inputs(surface, **changed):
+    grid = tetra._size_grid(surface, 4e-3, None)
+    plain = {
+        "points": surface.points, "triangles": surface.triangles,
+        "h": np.array(4e-3), "epsilon": np.array(1e-3),
+    }  # fmt: skip
+    return plain | grid | changed
+
+
+def test_a_mesher_that_crashes_takes_nobody_with_it(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    points = np.array(SPHERE.points)
+    points[7, 1] = np.inf
+    with pytest.raises(MeshError, match="the mesher failed"):
+        tetra._run(inputs(SPHERE, points=points), 600.0)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_mesher_that_does_not_end_is_stopped(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    plain = inputs(SPHERE)
+    infinite = {"h": np.array(1e-4), "grid_sizes": np.full_like(plain["grid_sizes"], 1e-4)}
+    with pytest.raises(MeshError, match="stopped after 3 s"):
+        tetra._run(plain | infinite, 3.0)
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_the_mesher_returns_is_not_trusted():
+    def accepted(mesh, surface):
+        return tetra._accepted(surface, 1e-6, mesh.points, mesh.tets)
+
+    box, whole = meshes.block((0.02, 0.02, 0.02), 5e-3, order=1), cube()
+    accepted(box, whole)
+    none = np.zeros((0, 4), int)
+    with pytest.raises(MeshError, match="returned no tetrahedra"):
+        tetra._accepted(whole, 1e-6, box.points, none)
+    with pytest.raises(MeshError, match="12.50 %"):
+        accepted(box, cube(0.04))
+    flat = TetMesh(points=box.points * [1, 1, 0.01], tets=box.tets)
+    thin = Surface(points=whole.points * [1, 1, 0.01], triangles=whole.triangles)
+    with pytest.raises(MeshError, match="dihedral angles"):
+        accepted(flat, thin)
+    x = np.abs(box.points[box.tets].mean(axis=1)[:, 0])
+    with pytest.raises(MeshError, match="2 pieces"):
+        accepted(TetMesh(points=box.points, tets=box.tets[x > 0.005]), whole)
+
+
+def test_the_mesher_missing_is_said_with_its_cure(monkeypatch):
+    monkeypatch.setattr(tetra, "find_spec", lambda name: None)
+    with pytest.raises(MeshError, match="pytetwild"):
+        tetra._run(inputs(SPHERE), 10.0)
+
+
+def test_elements_follow_the_sizes_asked_for():
+    slab = Surface(points=cube().points * [3, 3, 0.5], triangles=cube().triangles)
+    slab = Surface(points=slab.points - [0, 0, 0.005], triangles=slab.triangles)
+    sizing = meshes.graded(2e-3, meshes.Grading(radius=0.01, growth=1.3, coarsest=6e-3))
+    mesh = meshes.tetrahedralise(slab, 2e-3, sizing=sizing)
+    asked = sizing(mesh.points[mesh.tets].mean(axis=1))
+    ratio = meshes.edge_lengths(mesh).mean(axis=1) / asked
+    assert (np.abs(ratio - 1) < 0.15).mean() > 0.6
+    for low, high in ((2e-3, 2.5e-3), (2.5e-3, 4e-3), (4e-3, 6e-3)):
+        band = (asked >= low) & (asked < high)
+        assert np.median(ratio[band]) == pytest.approx(1, abs=0.2)
+    assert meshes.dihedral_angles(mesh).min() > 10
+
+
+def test_smoothing_evens_out_sizes_and_spoils_no_angle():
+    rough = meshes.block((0.02, 0.02, 0.02), 2.5e-3, order=1)
+    inner = np.ones(len(rough.points), bool)
+    inner[meshes.boundary_facets(rough.tets)] = False
+    shake = np.random.default_rng(0).uniform(-6e-4, 6e-4, rough.points.shape)
+    rough = replace(rough, points=rough.points + shake * inner[:, None])
+    even = smoothed(rough)
+    np.testing.assert_array_equal(even.points[~inner], rough.points[~inner])
+
+    def spread(mesh):
+        return meshes.corner_volumes(mesh.points, mesh.tets).std()
+
+    assert spread(even) < 0.5 * spread(rough)
+    least = [meshes.dihedral_angles(mesh).min(axis=1) for mesh in (rough, even)]
+    assert (least[1] >= np.minimum(least[0], 25) - 1e-9).all()
+
+
+def save(path, surface):
+    meshio.write(path, meshio.Mesh(1e3 * surface.points, [("triangle", surface.triangles)]))
+
+
+def test_a_body_is_meshed_with_its_bone_as_a_region_that_scenes_read(tmp_path, capsys):
+    save(tmp_path / "hand.stl", OUTER)
+    save(tmp_path / "bone.stl", BONE)
+    hand, bone, out = (str(tmp_path / name) for name in ("hand.stl", "bone.stl", "out.vtu"))
+    command = ["mesh", hand, "--inner", bone, "--unit", "mm", "--h", "6", "-o", out]
+    assert main([*command, "--json"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert set(summary["regions"]) == {"tissue", "bone"}
+    mesh = meshes.read(out)
+    assert mesh.region_names == {0: "tissue", 1: "bone"}
+    volumes = meshes.corner_volumes(mesh.points, mesh.tets)
+    assert volumes[mesh.region == 1].sum() == pytest.approx(volume(BONE), rel=0.02)
+    assert volumes.sum() == pytest.approx(volume(OUTER), rel=0.02)
+    between = mesh.points[np.unique(interface_facets(mesh))] - BONE.points.mean(axis=0)
+    half = np.ptp(BONE.points, axis=0) / 2
+    off = np.abs(np.abs(between) / half - 1).min(axis=1)
+    assert off.max() * half.max() < 1e-4  # the envelope
+    made = build(Body(kind="mesh", file=out, regions=(("bone", "bone"),)), 6e-3)
+    stiff = [made.material[r] is fem.PRESETS["bone"] for r in made.mesh.region.tolist()]
+    assert stiff == (mesh.region == 1).tolist()
+    assert main([*command, "--inner", bone, "--overwrite"]) == 2
+    assert "a second region 'bone'" in capsys.readouterr().err
+    assert main(["mesh", out, "--inner", bone, "-o", str(tmp_path / "b.vtu")]) == 2
+    assert "is a mesh already" in capsys.readouterr().err
+
+
+def test_a_bone_that_ends_in_the_cut_of_a_body_is_meshed_up_to_it():
+    bone = box((0.010, 0.006, 0.005), (0.005, 0.0, -0.004))  # up to the side at x = 10 mm
+    mesh = meshes.tetrahedralise(OUTER, 6e-3, inner={"bone": bone})
+    volumes = meshes.corner_volumes(mesh.points, mesh.tets)
+    assert volumes[mesh.region == 1].sum() == pytest.approx(volume(bone), rel=0.02)
+    inside = np.unique(mesh.tets[mesh.region == 1])
+    assert mesh.points[inside, 0].max() == pytest.approx(0.010, abs=1e-4)
