@@ -11,7 +11,6 @@ import random
 import struct
 import subprocess
 import sys
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -83,43 +82,23 @@ def scenes() -> dict[str, Write]:
     """Scenes, some of which are still computed."""
     rng, good = random.Random(SEED), tomli_w.dumps(QUICK)
     texts = {
-        "dotted keys on one line": ".".join(["a"] * 20_000) + " = 1",
-        "dotted keys by the thousand": "\n".join(
-            ".".join(["a"] * 400) + f".k{k} = 1" for k in range(2000)
-        ),
-        "dotted headers": "\n".join("[" + "a . " * 300 + f"k{k}]" for k in range(2000)),
-        "dotted keys within": "x = {" + "a." * 20_000 + "b = 1}",
-        "quoted dotted keys": ".".join(['"a"'] * 20_000) + " = 1",
-        "a key of 15 MB": "k" * 15_000_000 + " = 1",
-        "a quoted key of 15 MB": '"' + "k" * 15_000_000 + '" = 1',
-        "a key of 900 kB": "k" * 900_000 + " = 1",
         "keys by the hundred thousand": "\n".join(f"k{k} = 1" for k in range(120_000)),
-        "headers by the hundred thousand": "[[a]]\n" * 160_000,
         "15 MB of comments": "#\n" * 7_500_000,
-        "3 MB of numbers": "x = [" + "1.5, " * 600_000 + "]",
         "probes that fill memory": "[tacton]\nduration_s = 10\n[probes]\npoints_mm = ["
         + "[0, 0], " * 40_000 + "]\n[body]\nkind = 'none'\n",
-        "integer of 4,301 digits": f"[tacton]\nsize_mm = {'9' * 4301}",
         "name with a terminal's escape": 'name = "\\u001b]0;x\\u0007"\nx = 1',
-        "key with a terminal's escape": '"\\u001b[2J" = 1',
         "surrogate": "name = '\ud800'",
-        "escaped surrogate": 'name = "\\uD800"',
-        "zero byte": "name = 'a\0b'",
-        "UTF-7": "+AFs-tacton+AF0-",
-        "two marks of order": "\ufeff\ufeffname = 'a'",
         "mesh is the scene": "[body]\nkind = 'mesh'\nfile = 'scene.toml'",
-        "mesh is a folder": "[body]\nkind = 'mesh'\nfile = '.'",
         "mesh has a zero byte": '[body]\nkind = "mesh"\nfile = "a\\u0000.stl"',
         "dates": "name = 1979-05-27T07:32:00Z",
-        "inline tables in a list": "[probes]\npoints_mm = [" + "{a = 1}, " * 20_000 + "]",
     }  # fmt: skip
     found = {f"scene, {name}": file("scene.toml", text, *RUN) for name, text in texts.items()}
-    for k in range(50):
+    for k in range(12):
         table = QUICK
-        for _ in range(rng.choice((1, 1, 2, 3))):
+        for _ in range(rng.choice((1, 2, 3))):
             table = changed(table, rng)
         found[f"scene, changed {k}"] = file("scene.toml", _as_toml(table), *RUN)
-    for k in range(15):
+    for k in range(4):
         spoilt = bytearray(good.encode())
         for _ in range(3):
             at = rng.randrange(len(spoilt))
@@ -198,48 +177,32 @@ def patterns() -> dict[str, Write]:
         more = ("--rate", "1000") if suffix == ".csv" else ()
         found[f"pattern, {name}"] = file(f"in{suffix}", content, *arguments, *more)
 
-    for name in ("", "\ud800", "\x1b[2J", "a\nb", "../../x", "n" * 100_000, "=1+1", "\0", None, []):
+    for name in ("", "\x1b[2J", "../../x", "n" * 100_000, None):
         text = json.dumps(_adaptics() | {"name": name})
         add(f"named {str(name)[:8]!a}", ".adaptics", text)
-    for k in range(40):
+    for k in range(12):
         add(f"changed {k}", ".adaptics", json.dumps(changed(_adaptics(), rng)))
     add("JSON nested deeply", ".adaptics", '{"a":' * 100_000)
-    add("JSON of a million lists", ".adaptics", "[" + "[]," * 1_000_000 + "[]]")
-    add("JSON with huge integers", ".adaptics", "[" + "9" * 1_000_000 + "]")
     unhashable = json.dumps(_adaptics()).replace('"circle"', '["circle"]')
     add("a brush that is a list", ".adaptics", unhashable)
     lies = {
         "RIFF of 4 GB": _put(4, "<I", 2**32 - 1),
         "no channels": _put(22, "<H", 0),
-        "65,535 channels": _put(22, "<H", 65535),
         "rate of 0": _put(24, "<I", 0),
-        "rate of 4 GHz": _put(24, "<I", 2**32 - 1),
         "no bits": _put(34, "<H", 0),
-        "65,535 bits": _put(34, "<H", 65535),
-        "block of 0": _put(32, "<H", 0),
         "unknown format": _put(20, "<H", 0x1234),
-        "format chunk of 4 GB": _put(16, "<I", 2**32 - 1),
-        "format chunk of 0": _put(16, "<I", 0),
     }
     for name, lie in lies.items():
         add(f"WAV, {name}", ".wav", _wav(lie))
-    for at in range(36, 60, 4):
-        add(f"WAV, 4 GB at {at}", ".wav", _wav(_put(at, "<I", 2**32 - 8)))
-    for cut in (0, 4, 11, 20, 43, 57, 60):
+    for cut in (0, 20, 57):
         add(f"WAV, cut at {cut}", ".wav", _wav()[:cut])
     rows = "t_s,point,x_m,y_m,z_m,intensity\n0,0,0,0,0.2,1\n0.01,0,0.001,0,0.2,1\n"
     tables = {
         "quotes without end": rows + '"',
         "a cell of 1 MB": rows + "9" * 1_000_000,
-        "zero bytes": rows + "\0,\0\n",
         "point of 1e18": rows.replace("0,0,0,0,0.2", "0,1000000000000000000,0,0,0.2"),
-        "times of 1e308": rows.replace("0.01", "1e308"),
         "UTF-16": rows.encode("utf-16"),
-        "lone surrogate": rows + "\ud800",
         "columns by the thousand": ",".join(["x_m"] * 100_000) + "\n",
-        "digits of another script": rows.replace("0.001", "\u0660\u066b\u0661"),
-        "underscores": rows.replace("0.001", "1_0"),
-        "rows of nothing": "\n" * 1_000_000,
     }
     for name, text in tables.items():
         add(f"CSV, {name}", ".csv", text)
@@ -247,16 +210,11 @@ def patterns() -> dict[str, Write]:
 
 
 def special_files() -> dict[str, Write]:
-    """Special files, which are no regular files, in the place of each kind of file."""
+    """Pipes, folders, devices and sparse files in the place of each kind of file."""
     commands = {
-        "scene": ("x.toml", *RUN), "swept": ("x.toml", "sweep", "FILE", "--vary",
-                                            "tacton.size_mm=1,2"),
-        "AdapTics": ("x.adaptics", "convert", "FILE", "o.toml"),
-        "CSV": ("x.csv", "convert", "FILE", "o.toml", "--rate", "9"),
-        "WAV": ("x.wav", "convert", "FILE", "o.toml"),
+        "scene": ("x.toml", *RUN), "WAV": ("x.wav", "convert", "FILE", "o.toml"),
+        "surface": ("x.stl", "mesh", "FILE", "--quiet"),
     }  # fmt: skip
-    for suffix in ("stl", "ply", "obj", "glb", "vtp", "vtu", "msh", "inp", "vtk"):
-        commands[suffix] = (f"x.{suffix}", "mesh", "FILE", "--quiet")
     kinds = {"pipe": os.mkfifo, "folder": os.mkdir, "device": lambda p: os.symlink("/dev/zero", p)}
     kinds["sparse file of 100 GB"] = _sparse
     found = {}
@@ -278,35 +236,17 @@ def _sparse(path: Path) -> None:
 
 def meshes() -> dict[str, Write]:
     """Meshes and surfaces that ask for more than they hold; each is read by another process."""
-    rng = random.Random(SEED)
-    node = "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT,TYPE=C3D4\n1,1,2,3,4\n"
     texts: dict[str, bytes | str] = {
-        "generate.inp": f"{node}*ELSET,ELSET=a,GENERATE\n1,1000000000000,1\n",
-        "memory.inp": f"{node}*ELSET,ELSET=a,GENERATE\n1,2000000000,1\n",
-        "nset.inp": f"{node}*NSET,NSET=a,GENERATE\n1,1000000000000,1\n",
         "itself.inp": "*INCLUDE,INPUT=itself.inp\n",
-        "device.inp": "*INCLUDE,INPUT=/dev/zero\n",
         "count.msh": "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n1000000000000\n",
-        "count4.msh": "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 1000000000000 1 9\n",
         "faces.stl": b"\0" * 80 + struct.pack("<I", 2**32 - 1) + b"\0" * 100,
         "index.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 999999999999\n",
-        "count.ply": "ply\nformat binary_little_endian 1.0\nelement vertex 2000000000\n"
-        "property float x\nproperty float y\nproperty float z\nend_header\n",
-        "length.glb": b"glTF" + struct.pack("<III", 2, 2**32 - 1, 2**31),
-        "points.vtp": '<VTKFile type="PolyData"><PolyData><Piece NumberOfPoints="1000000000000" '
-        'NumberOfPolys="1"></Piece></PolyData></VTKFile>',
         "points.vtu": '<VTKFile type="UnstructuredGrid" version="1.0"><UnstructuredGrid><Piece '
         'NumberOfPoints="1000000000000" NumberOfCells="1"></Piece></UnstructuredGrid></VTKFile>',
-        "count.vtk": "# vtk DataFile Version 3.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\n"
-        "POINTS 1000000000000 double\n",
         "escape\x1b[2J.stl": "solid \x1b[2J",
+        "junk.ply": random.Random(SEED).randbytes(2000),
     }
-    found = {f"mesh, {n!a}": file(n, text, "mesh", "FILE", "--quiet") for n, text in texts.items()}
-    for suffix in ("stl", "ply", "obj", "vtu", "msh", "inp"):
-        found[f"mesh, junk.{suffix}"] = file(
-            f"junk.{suffix}", rng.randbytes(2000), "mesh", "FILE", "--quiet"
-        )
-    return found
+    return {f"mesh, {n!a}": file(n, text, "mesh", "FILE", "--quiet") for n, text in texts.items()}
 
 
 def _answered(folder: Path) -> Path:
@@ -316,21 +256,6 @@ def _answered(folder: Path) -> Path:
     command = [sys.executable, "-m", "skinwave", *RUN, "--out", "result"]
     subprocess.run([w if w != "FILE" else "scene.toml" for w in command], cwd=folder, check=True)
     return folder / "result"
-
-
-def bomb(path: Path, gigabytes: int) -> None:
-    """An archive of one array that unpacks to so much, of a few megabytes at most."""
-    header = io.BytesIO()
-    count = gigabytes * 125_000_000
-    told = {"descr": "<f8", "fortran_order": False, "shape": (count,)}
-    np.lib.format.write_array_header_1_0(header, told)
-    with (
-        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive,
-        archive.open("t.npy", "w", force_zip64=True) as member,
-    ):
-        member.write(header.getvalue())
-        for _ in range(10):
-            member.write(bytes(1_000_000))
 
 
 def results(made: Path) -> dict[str, Write]:
@@ -366,23 +291,17 @@ def results(made: Path) -> dict[str, Write]:
     npz = {
         "no array": stored(),
         "objects": stored(**(arrays | {"t": np.array([{}], object)})),
-        "text": stored(**(arrays | {"t": np.array(["a"] * len(arrays["t"]))})),
         "nan": stored(**(arrays | {"t": arrays["t"] * np.nan})),
-        "a number": stored(**(arrays | {"t": np.array(1.0)})),
         "no samples": stored(**{n: a[:0] for n, a in arrays.items()}),
-        "one sample": stored(**(arrays | {n: a[:1] for n, a in arrays.items() if n != "probes"})),
-        "complex": stored(**(arrays | {"t": arrays["t"] + 1j})),
         "another model": stored(t=arrays["t"], probes=arrays["probes"], **{"\x1b[2J": arrays["t"]}),
         "cut": files["responses.npz"][:500],
         "empty": b"",
-        "text file": b"x" * 1000,
     }
     for name, content in npz.items():
         add(f"npz, {name}", "responses.npz", content, *both)
-    add("npz of 100 GB", "responses.npz", lambda path: bomb(path, 100), *both)
     add("npz, pipe", "responses.npz", os.mkfifo, *both)
     add("npz, sparse", "responses.npz", _sparse, *both)
-    for k in range(6):
+    for k in range(3):
         spoilt = bytearray(files["responses.npz"])
         for _ in range(20):
             spoilt[rng.randrange(len(spoilt))] = rng.randrange(256)
@@ -393,9 +312,9 @@ def results(made: Path) -> dict[str, Write]:
             "passed": True}  # fmt: skip
     trust = {"command": "skinwave", "model": "fem", "misfit": 0.1, "cases": [case]}
     tables = {
-        "effort.json": (json.loads(files["effort.json"]), ("report",), 8),
-        "plan.json": (plan, ("report",), 8),
-        "trust.json": (trust, ("report",), 8),
+        "effort.json": (json.loads(files["effort.json"]), ("report",), 4),
+        "plan.json": (plan, ("report",), 4),
+        "trust.json": (trust, ("report",), 4),
     }
     for name, (table, commands, count) in tables.items():
         for k in range(count):
@@ -423,16 +342,12 @@ def tables() -> dict[str, Write]:
         "foreign": parquet(a=[1, 2]),
         "key of numbers": parquet(**(good | {"key": [1]})),
         "key is missing": parquet(**(good | {"key": [None]})),
-        "index in words": parquet(**(good | {"index": ["first"]})),
         "no status": parquet(key=["k"], peak_um=[1.0]),
-        "status of numbers": parquet(**(good | {"status": [3.0]})),
-        "nested": parquet(**(good | {"tacton.size_mm": [{"a": [1]}]})),
         "no rows": parquet(key=pa.array([], pa.string())),
         "names that are obeyed": parquet(**(good | {"\x1b[2J.x": [1.0], "$\\frac{$": [2.0]})),
         "many rows": parquet(key=pa.array(["k"]).take(pa.array(np.zeros(3_000_000, int)))),
         "empty": b"",
         "cut": parquet(**good)[:-10],
-        "magic only": b"PAR1PAR1",
         "junk": b"PAR1" + random.Random(SEED).randbytes(300) + struct.pack("<I", 200) + b"PAR1",
         "pipe": os.mkfifo,
         "sparse": _sparse,
@@ -464,16 +379,14 @@ def requests() -> dict[str, Write]:
         ["sweep", "FILE", "--vary", vary]
         for vary in (
             "tacton.size_mm=" + ",".join(["1"] * 200_001), "tacton.size_mm=1:2:1e18",
-            "tacton.size_mm=nan:1:3", "tacton.size_mm=[" * 500, "tacton.size_mm=1e999",
-            "tacton.size_mm.a.b.c=1", "\x1b[2J=1", "body=/dev/zero", "body=\0", "body=.",
-            "tacton=1", "=", "tacton.foci=" + "[" * 5000, "tacton.size_mm=" + "9" * 5000,
+            "tacton.size_mm=[" * 500, "\x1b[2J=1", "body=/dev/zero", "tacton=1", "=",
         )
     ]  # fmt: skip
     asked += [["sweep", "FILE", "--vary", "tacton.size_mm=1,2", *more] for more in (
         ["--design", "\x1b[2J"], ["--samples", "-1"], ["--workers", "-5", "--scheduler", "threads"],
  ["--seed", "-1"], ["--tolerance", "nan"],
     )]  # fmt: skip
-    rates = ("nan", "inf", "1e308", "-1", "0")
+    rates = ("nan", "1e308", "0")
     asked += [
         ["convert", "FILE", f"o{end}", "--rate", x] for end in (".wav", ".csv") for x in rates
     ]

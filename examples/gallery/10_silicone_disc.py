@@ -12,7 +12,7 @@ import numpy as np
 import pyvista as pv
 
 import fem
-from meshes.shapes.disc import disc
+from meshes.shapes.structured import disc
 from simple_model.layers.compliance import slab
 from simple_model.layers.wavenumber_integral import point_response
 

@@ -449,7 +449,7 @@ def test_a_public_hand_goes_from_its_file_to_a_comparison_in_one_command(
     monkeypatch.chdir(tmp_path)
     short = MovingPressure(tacton=replace(STILL.tacton, duration=0.05))
     (tmp_path / "scene.toml").write_text(dumps(replace(SKIN, pressure=short, probes=THREE[:2])))
-    ask = ["compare", "scene.toml", "--body", str(HAND), "--up", "-x", "--h", "16"]
+    ask = ["compare", "scene.toml", "--body", str(HAND), "--up", "-x", "--element-size", "16"]
     assert main([*ask, "--out", "both", "--quiet"]) == 0
     page = (tmp_path / "both/index.html").read_text()
     assert "Body from generic-hand-right.glb, -x towards the device" in page

@@ -39,7 +39,7 @@ kind = "cylinder"
 [probes]
 points_mm = [[0, 0], [10, 0], [25, 0]]
 """
-MESH = ["--h", "8", "--quiet"]
+MESH = ["--element-size", "8", "--quiet"]
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -106,7 +106,7 @@ def test_a_new_kind_runs(disc, capsys):
     assert main(["run", "disc.toml", "--model", "fem", *MESH, "--out", "out"]) == 0
     rows = table("out/lines.csv")
     assert {row["body"] for row in rows} == {"silicone-cylinder"}
-    assert main(["plan", "disc.toml", "--tolerance", "0.5", "--h", "8"]) == 0
+    assert main(["plan", "disc.toml", "--tolerance", "0.5", "--element-size", "8"]) == 0
     assert "a body of kind 'cylinder' has no wavenumber integral" in capsys.readouterr().out
 
 

@@ -764,7 +764,10 @@ def test_a_hand_with_seams_is_meshed_with_unit_and_up_only(tmp_path, monkeypatch
     monkeypatch.chdir(tmp_path)
     points, triangles = with_seams(*hand())
     write_glb(tmp_path / "hand.glb", points, triangles)
-    assert main(["mesh", "hand.glb", "--unit", "m", "--up", "+y", "--h", "16", "--json"]) == 0
+    assert (
+        main(["mesh", "hand.glb", "--unit", "m", "--up", "+y", "--element-size", "16", "--json"])
+        == 0
+    )
     printed = capsys.readouterr()
     summary = json.loads(printed.out)
     assert any("along seams" in sentence for sentence in summary["said"])
@@ -788,7 +791,7 @@ def test_a_patch_is_cut_with_its_cuts_named(tmp_path, monkeypatch, capsys):
     points, triangles = hand()
     write_by_vtk("hand.ply", 1e3 * points, triangles)
     patch = ["--clip", "-30", "35", "-32", "28"]
-    arguments = ["--unit", "mm", "--up", "+y", "--h", "10", "--out", "patch.vtu"]
+    arguments = ["--unit", "mm", "--up", "+y", "--element-size", "10", "--out", "patch.vtu"]
     assert main(["mesh", "hand.ply", *arguments, *patch]) == 0
     assert "cut at 4 planes" in capsys.readouterr().out
     mesh = meshes.read("patch.vtu")
@@ -856,7 +859,7 @@ def test_what_is_prepared_is_kept_for_the_facets_that_a_file_names(tmp_path):
         (["hand.obj", "--unit", "mm"], "may be m"),
         (["hand.obj", "--unit", "feet"], "feet"),
         (["hand.obj", "--up", "up"], "up"),
-        (["hand.obj", "--h", "nan"], "h = nan m"),
+        (["hand.obj", "--element-size", "nan"], "h = nan m"),
         (["hand.obj", "--clip", "10", "20", "10", "20"], "middle of the palm"),
         (["hand.obj", "--out", "hand.stl"], "ends in .vtu or .msh"),
         (["hand.obj", "--out", "no/where.vtu"], "no"),

@@ -129,7 +129,7 @@ def test_a_body_is_meshed_with_its_bone_as_a_region_that_scenes_read(tmp_path, c
     save(tmp_path / "hand.stl", OUTER)
     save(tmp_path / "bone.stl", BONE)
     hand, bone, out = (str(tmp_path / name) for name in ("hand.stl", "bone.stl", "out.vtu"))
-    command = ["mesh", hand, "--inner", bone, "--unit", "mm", "--h", "6", "-o", out]
+    command = ["mesh", hand, "--inner", bone, "--unit", "mm", "--element-size", "6", "-o", out]
     assert main([*command, "--json"]) == 0
     summary = json.loads(capsys.readouterr().out)
     assert set(summary["regions"]) == {"tissue", "bone"}

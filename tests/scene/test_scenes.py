@@ -139,29 +139,6 @@ def test_a_word_in_capitals_is_near():
         loads("[body]\nmaterial = 'PALM'")
 
 
-OLD = """
-[body]
-kind = "slab"
-width_mm = 60
-height_mm = 50
-depth_mm = 12
-"""
-
-
-def test_a_scene_of_0_2_loads_with_a_warning():
-    with pytest.warns(FutureWarning, match="is now") as told:
-        body = loads(OLD).body
-    assert (body.width, body.height, body.depth) == (0.06, 0.05, 0.012)
-    assert sorted(str(each.message) for each in told) == [
-        "[body] depth_mm is now thickness_mm; rename it",
-        "[body] height_mm is now size_y_mm; rename it",
-        "[body] width_mm is now size_x_mm; rename it",
-    ]
-    assert "thickness_mm = 12.0" in dumps(replace(loads("[body]"), body=body))
-    with pytest.raises(ValueError, match="both depth_mm and thickness_mm"):
-        loads("[body]\ndepth_mm = 12\nthickness_mm = 12")
-
-
 def test_a_preset_is_changed_by_other_keys():
     body = loads('[body]\npreset = "palm-layers"\nthickness_mm = 20\n[placement]\nlift_mm = 1').body
     known = BODIES["palm-layers"]
