@@ -162,8 +162,8 @@ def command_lines() -> list[list[str]]:
         for dt in ("0", "nan", "1e300", "1e-12")
     ]
     found += [[*c, "--solver", "nonsense"] for c in (run, compare)]
-    outs = ("kept", "kept/note", "kept/note/below", "good.toml", ".", "", "/", "x\0y", "n" * 300,
-            "loop", "/dev/null/out")  # fmt: skip
+    outs = ("kept", "kept/note", "kept/note/below", "good.toml", ".", "", "/", "x\0y", "loop",
+            "/dev/null/out")  # fmt: skip
     found += [[*run, "--out", out] for out in outs]
     found += [[*run, "--overwrite", "--out", out] for out in ("kept/note", ".", "", "/", "loop")]
     files = ("missing.toml", "kept", "", "x\0y", "n" * 300, "good.toml/x", "/dev/zero")

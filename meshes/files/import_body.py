@@ -13,7 +13,7 @@ from meshes.files.contents import UNITS, Contents, mesh_of, read_contents, scale
 from meshes.reading import PathLike
 from meshes.shapes.structured import Grading
 from meshes.surface.alignment import aligned, clipped, cut_to, off_origin, on_planes, turned, turns
-from meshes.surface.repair import check, repaired
+from meshes.surface.repair import check, in_mm, repaired
 from meshes.surface.triangulation import Surface, compact, volume
 from meshes.surface.winding import check_inside
 from meshes.tetmesh import MeshError, TetMesh, boundary_facets, corner_volumes
@@ -29,10 +29,6 @@ Say = Callable[[str], None]
 Progress = Callable[[str, float], None]
 
 
-def _unsaid(*said: object) -> None:
-    """Progress that nobody follows."""
-
-
 def body_from_file(
     path: PathLike,
     h: float,
@@ -44,8 +40,8 @@ def body_from_file(
     keep_largest: bool = False,
     cap: bool = False,
     timeout: float = 600.0,
-    say: Say = _unsaid,
-    progress: Progress = _unsaid,
+    say: Say = lambda sentence: None,
+    progress: Progress = lambda phase, share: None,
 ) -> TetMesh:
     """Tetrahedra of the body in a file, placed under the device, with its boundary named.
 
@@ -89,8 +85,7 @@ def body_from_file(
     if len(found.tets):
         if clip is not None or inner:
             raise MeshError(
-                f"{path} is a mesh already; only surfaces can be clipped, and filled around inner "
-                "ones: save its surface, as .stl"
+                f"{path} is a mesh already, which is neither clipped nor filled; save its surface"
             )
         say(f"read {len(found.tets):,} tetrahedra of {found.tets.shape[1]} nodes")
         mesh = mesh_of(replace(found, points=found.points @ turns(up).T), scale)
@@ -100,9 +95,7 @@ def body_from_file(
     bones = _inner_surfaces(inner, surface, unit=unit, up=up, say=say)
     surface, shift = aligned(surface)
     bones = {name: replace(bone, points=bone.points + shift) for name, bone in bones.items()}
-    say(
-        "moved by ({:.1f}, {:.1f}, {:.1f}) mm, the palm's middle to the origin".format(*1e3 * shift)
-    )
+    say(f"moved by {in_mm(shift)}, the palm's middle to the origin")
     planes = []
     if clip is not None:
         surface, said = clipped(surface, clip)
@@ -125,8 +118,7 @@ def _inner_surfaces(
     names = [REST, *(Path(path).stem for path in paths)]
     if twice := [str(path) for path in paths if names.count(Path(path).stem) > 1]:
         raise MeshError(
-            f"{twice[-1]} would be a second region '{Path(twice[-1]).stem}'; rename the file, "
-            "whose name is that of its region"
+            f"{twice[-1]} would be a second region '{Path(twice[-1]).stem}'; rename the file"
         )
     found: dict[str, Surface] = {}
     for path in paths:
@@ -179,7 +171,7 @@ def _on_top(mesh: TetMesh, say: Say) -> TetMesh:
     shift = off_origin(boundary)
     if not shift.any():
         return mesh
-    say("moved by ({:.1f}, {:.1f}, {:.1f}) mm, its top to the origin".format(*1e3 * shift))
+    say(f"moved by {in_mm(shift)}, its top to the origin")
     unmoved = None if mesh.unmoved is None else mesh.unmoved + shift
     return replace(mesh, points=mesh.points + shift, unmoved=unmoved)
 

@@ -66,7 +66,7 @@ def check_crossings(surface: Surface) -> None:
     if len(crossing):
         raise MeshError(
             f"the surface crosses itself at {len(crossing)} pairs of triangles, first near "
-            f"{_place(surface.points[surface.triangles[crossing[0, 0]]].mean(axis=0))}; "
+            f"{in_mm(surface.points[surface.triangles[crossing[0, 0]]].mean(axis=0))}; "
             "separate or join the parts in the program that it comes from"
         )
 
@@ -82,8 +82,7 @@ def repaired(
 
     Parameters
     ----------
-    points : (n, 3) float, metre
-    triangles : (k, 3) int
+    points, triangles : (n, 3) float, metre, and (k, 3) int
     keep_largest : keep only the piece with the largest area.
     cap : close holes whose edges lie in a plane, such as an open wrist.
 
@@ -155,7 +154,7 @@ def _capped(surface: Surface, said: list[str]) -> Surface:
         rim = rim - rim.mean(axis=0)
         widths = np.ptp(rim @ np.linalg.svd(rim, full_matrices=False)[2].T, axis=0)
         if widths[2] > MOST_OFF_PLANE * widths[0]:
-            place = _place(surface.points[label == hole][0])
+            place = in_mm(surface.points[label == hole][0])
             raise MeshError(
                 f"a hole of {1e3 * widths[0]:.0f} mm near {place} is {1e3 * widths[2]:.1f} mm out "
                 "of a plane and cannot be capped; close it in the program that it comes from"
@@ -247,7 +246,7 @@ def _check_fans(surface: Surface, pairs: Ints) -> None:
     if (pinched := used[count > 1]).size:
         raise MeshError(
             f"parts of the surface touch at {len(pinched):,} single points, first at "
-            f"{_place(surface.points[pinched[0]])}; separate them there"
+            f"{in_mm(surface.points[pinched[0]])}; separate them there"
         )
 
 
@@ -255,8 +254,9 @@ def _at(surface: Surface, side: int) -> str:
     """Position of a side of a triangle, as text."""
     triangle, corner = divmod(int(side), 3)
     ends = surface.triangles[triangle, [corner, (corner + 1) % 3]]
-    return _place(surface.points[ends].mean(axis=0))
+    return in_mm(surface.points[ends].mean(axis=0))
 
 
-def _place(point: Floats) -> str:
-    return "({:.4g}, {:.4g}, {:.4g}) mm".format(*(1e3 * point))
+def in_mm(place: Floats) -> str:
+    """A place (3,) in metre, as messages have it."""
+    return "({:.4g}, {:.4g}, {:.4g}) mm".format(*(1e3 * place))

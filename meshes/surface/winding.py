@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from meshes.surface.repair import check
+from meshes.surface.repair import check, in_mm
 from meshes.surface.self_intersection import self_intersections
 from meshes.surface.triangulation import Surface
 from meshes.tetmesh import Floats, MeshError
@@ -66,17 +66,14 @@ def check_inside(outer: Surface, inner: Mapping[str, Surface]) -> None:
     pairs = self_intersections(both)
     if len(pairs):
         one, other = (list(every)[owner[k]] for k in pairs[0])
-        place = 1e3 * both.points[both.triangles[pairs[0, 0]]].mean(axis=0)
+        place = in_mm(both.points[both.triangles[pairs[0, 0]]].mean(axis=0))
         raise MeshError(
             f"the surfaces of {one} and {other} cross at {len(pairs)} pairs of triangles, first "
-            "near ({:.4g}, {:.4g}, {:.4g}) mm; ".format(*place)
-            + "make the inner one smaller, or move it inside"
+            f"near {place}; make the inner one smaller, or move it inside"
         )
     for name, surface in inner.items():
         if not winding_number(outer, surface.points[:1])[0] > 0.5:
-            place = 1e3 * surface.points.mean(axis=0)
             raise MeshError(
                 f"{name} is not inside the body: its middle is at "
-                "({:.4g}, {:.4g}, {:.4g}) mm; ".format(*place)
-                + "give both files in one frame and one unit"
+                f"{in_mm(surface.points.mean(axis=0))}; give both files in one frame and one unit"
             )

@@ -113,8 +113,7 @@ def keep_jacobians(tets: Ints, straight: Floats, points: Floats) -> tuple[Floats
 
     Parameters
     ----------
-    tets : (e, 10) int
-    straight, points : (n, 3) float, metre, nodes of straight and of curved elements
+    tets, straight, points : (e, 10) int, and nodes (n, 3) of straight and curved elements in metre
 
     Returns
     -------

@@ -62,8 +62,7 @@ class Fingertip:
             raise MeshError(
                 f"a bone of {1e3 * self.bone_breadth:g} x {1e3 * self.bone_thickness:g} mm under "
                 f"{1e3 * self.cover:g} mm of tissue, {1e3 * self.tip:g} mm from the tip, is not "
-                f"inside a fingertip of {1e3 * self.breadth:g} x {1e3 * self.thickness:g} mm, "
-                "whose round end is half as long as it is broad; make it smaller"
+                f"inside a fingertip of {1e3 * self.breadth:g} x {1e3 * self.thickness:g} mm"
             )
 
     @property

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from meshes.surface.repair import check_crossings, check_manifold
+from meshes.surface.repair import check_crossings, check_manifold, in_mm
 from meshes.surface.triangulation import compact
 from meshes.tetmesh import (
     FACES,
@@ -27,9 +27,7 @@ def one_body(
 
     Parameters
     ----------
-    mesh : TetMesh
-    keep_largest : keep only the largest of several bodies.
-    say : gets a sentence if others are left out.
+    mesh, keep_largest, say : to keep only the largest of several bodies, and say so
 
     Returns
     -------
@@ -46,9 +44,8 @@ def one_body(
     if len(volumes) > 1 and not keep_largest:
         listed = ", ".join(f"{1e6 * volume:.3g}" for volume in np.sort(volumes)[::-1][:5])
         raise MeshError(
-            f"the mesh is {len(volumes)} separate bodies ({listed} cm3); join them in the program "
-            "that it comes from, with common nodes where they touch, or keep the largest: "
-            "skinwave mesh FILE --keep largest"
+            f"the mesh is {len(volumes)} separate bodies ({listed} cm3); join them, or keep the "
+            "largest: skinwave mesh FILE --keep largest"
         )
     if len(volumes) > 1:
         share = volumes.max() / volumes.sum()
@@ -68,10 +65,10 @@ def _check_overlaps(mesh: TetMesh) -> None:
     _, place, count = np.unique(turned, axis=0, return_index=True, return_counts=True)
     twice = place[count > 1]
     if len(twice):
-        middle = 1e3 * mesh.points[faces[twice[0]]].mean(axis=0)
+        middle = in_mm(mesh.points[faces[twice[0]]].mean(axis=0))
         raise MeshError(
             f"tetrahedra of the mesh overlap at {len(twice):,} of their faces, first near "
-            "({:.4g}, {:.4g}, {:.4g}) mm; mesh the body anew".format(*middle)
+            f"{middle}; mesh the body anew"
         )
 
 

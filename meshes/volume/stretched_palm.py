@@ -63,18 +63,13 @@ def stretched_palm(mesh: TetMesh, thinnest: Palm, thickest: Palm) -> Callable[[f
 
 
 def _check(mesh: TetMesh, palm: Palm, on: Ints) -> None:
-    said = f"a mesh stretched to a palm {1e3 * palm.thickness:.3g} mm thick"
     sharpest = float(angles_between_faces(mesh.points, mesh.tets).min())
-    if sharpest < SHARPEST:
-        raise MeshError(
-            f"{said} has a dihedral angle of {sharpest:.2g} degrees, the least that is accepted is "
-            f"{SHARPEST:g}; take a narrower range of thicknesses"
-        )
     off, limit = np.abs(level_set(palm, mesh.points[on])).max(), FOLLOWS * palm.thickness
-    if off > limit:
+    if sharpest < SHARPEST or off > limit:
         raise MeshError(
-            f"{said} misses its surface by {1e3 * off:.2g} mm, the limit is {1e3 * limit:.2g} mm; "
-            "take a narrower range of thicknesses"
+            f"a mesh stretched to a palm {1e3 * palm.thickness:.3g} mm thick has a dihedral angle "
+            f"of {sharpest:.2g} degrees, at least {SHARPEST:g} is needed, and misses its surface "
+            f"by {1e3 * off:.2g} mm, at most {1e3 * limit:.2g}; take a narrower range"
         )
 
 

@@ -101,16 +101,14 @@ class Body:
                 )
             if isfinite(length) and length > LARGEST:
                 raise ValueError(
-                    f"body {name} = {length:g} m is more than {LARGEST:g} m, the limit of a body; "
-                    f"lengths are in metre here and in mm in a scene file, so that "
-                    f"{length:g} mm are {name} = {length / 1e3:g}, or {KEYS[name]} = {length:g}"
+                    f"body {name} = {length:g} m is more than {LARGEST:g} m; lengths are in metre "
+                    f"here: {length:g} mm are {name} = {length / 1e3:g}, or in a scene file "
+                    f"{KEYS[name]} = {length:g}"
                 )
         if kind.discretise and {self.base, *self.conditions} == {"free"}:
             raise ValueError(
-                "a body with free base and free sides is unconstrained and drifts under the mean "
-                "load; clamp one of them"
+                "a body with free base and free sides is unconstrained and drifts; clamp one"
             )
-
         self._check_layers()
         check_regions(self.regions)
         if self.regions and "regions" not in kind.keys:
@@ -120,10 +118,7 @@ class Body:
                 "a body of kind 'mesh' needs a file, no other has one; give it or leave it out"
             )
         if self.air and "air" not in kind.keys:
-            raise ValueError(
-                f"air = true is for a sheet, which weighs little more than the air that it moves, "
-                f"not a {self.kind}; leave it out"
-            )
+            raise ValueError(f"air = true is for a sheet, not a {self.kind}; leave it out")
         self._check_sheet()
         kind.check(self)
 
@@ -131,25 +126,20 @@ class Body:
         """Refuse what only a sheet has, and supports that contradict each other."""
         if self.solid.orthotropy is not None and not self.of_kind.is_plate:
             raise ValueError(
-                f"an orthotropic material is for a sheet, not a {self.kind}; give it a "
-                "shear_modulus and a Poisson's ratio"
+                f"an orthotropic material is for a sheet, not a {self.kind}; take an isotropic one"
             )
         if self.mounting == FRAME:
             return
         if "mounting" not in self.of_kind.keys:
-            raise ValueError(
-                f"a mounting holds and stretches a sheet, not a {self.kind}; leave it out"
-            )
+            raise ValueError(f"a mounting is for a sheet, not a {self.kind}; leave it out")
         if self.sides != "clamped":
             raise ValueError(
-                f"a mounting says how the sides of a sheet are held, and they are {self.sides}; "
-                'take sides = "clamped", or leave it out'
+                f'a mounting needs sides = "clamped", and they are {self.sides}; leave it out'
             )
         shaped = self.mounting.support == "simply" or self.mounting.is_curled
         if shaped and self.placement.is_tilted:
             raise ValueError(
-                "a simple support and a curl are implemented for a sheet that lies across the "
-                "beam, not a tilted one; clamp and flatten it, or leave out its tilt"
+                "a sheet that is tilted has no simple support and no curl; leave out its tilt"
             )
         check_extent(self.mounting, self.width, self.height)
 

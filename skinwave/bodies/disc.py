@@ -11,13 +11,7 @@ from skinwave.bodies.discretised import Discretise, Discretised, in_layers
 
 
 def check(body: Body) -> None:
-    """Refuse what is not round.
-
-    Raises
-    ------
-    ValueError
-        If width and height differ.
-    """
+    """Refuse what is not round; raises a ValueError."""
     if body.width != body.height:
         raise ValueError(
             f"a disc is {1e3 * body.width:g} mm wide along x and {1e3 * body.height:g} mm along y; "

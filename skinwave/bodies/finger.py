@@ -1,13 +1,13 @@
 """Parametric fingertip: soft tissue around a bone, held where it is cut from the finger."""
 
-import fem
-from fem.load_and_probe import facet_normals
-from meshes import Fingertip, TetMesh, boundary_facets, fingertip_mesh
+from dataclasses import replace
+
+from meshes import Fingertip, fingertip_mesh
 from meshes.volume.fingertip import quarter_of, shells_of
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.coat import coarsest_size
 from skinwave.bodies.discretised import Discretised
-from skinwave.bodies.hands import in_its_layers, support
+from skinwave.bodies.hands import in_its_layers
 
 SIZE = 1.5e-3  # m: within 0.2 % of elements of 1.2 mm, those of 3 mm within 2.3 %
 
@@ -32,16 +32,7 @@ def discretise(body: Body, h: float) -> Discretised:
     """
     mesh = fingertip_mesh(shape(body), h)
     facets = {name: mesh.facets[name] for name in ("top", "sides")}
-    mesh = TetMesh(
-        points=mesh.points, tets=mesh.tets, region=mesh.region, facets=facets,
-        region_names=mesh.region_names,
-    )  # fmt: skip
-    return in_its_layers(body, h, mesh, lambda mesh: _support(body, mesh))
-
-
-def _support(body: Body, mesh: TetMesh) -> fem.Support:
-    """Support below, by the normals of the facets."""
-    return support(body, mesh, facet_normals(mesh, boundary_facets(mesh.tets)), [])
+    return in_its_layers(body, h, replace(mesh, facets=facets))
 
 
 FINGER = register(

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 import fem
-from fem.load_and_probe import facet_geometry
+from fem.load_and_probe import facet_geometry, facet_normals
 from meshes import TetMesh, boundary_facets, corner_volumes
 from meshes.tetmesh import Floats
 from skinwave.bodies.body import Body
@@ -29,7 +29,10 @@ def hand_size(body: Body) -> float:
 
 
 def in_its_layers(
-    body: Body, h: float, mesh: TetMesh, rest: Callable[[TetMesh], fem.Support]
+    body: Body,
+    h: float,
+    mesh: TetMesh,
+    rest: Callable[[TetMesh], fem.Support] | None = None,
 ) -> Discretised:
     """Hand in its layers, those that its elements do not resolve as a coat, and its regions.
 
@@ -38,20 +41,21 @@ def in_its_layers(
     body : Body
     h : metre, size of its elements
     mesh : with its facets and regions
-    rest : the support of a mesh
+    rest : the support of a mesh; below, by the normals of its facets, if not given
 
     Returns
     -------
     Discretised
     """
     region = mesh.region
+    rest = rest or (lambda m: support(body, m, facet_normals(m, boundary_facets(m.tets))))
     mesh, materials = in_layers(mesh, meshed_strata(body, h), depths(mesh))
     mesh, materials = in_regions(body, mesh, materials, region, body.file or f"a {body.kind}")
     return Discretised(mesh=mesh, materials=materials, coat=coat(body, h), support=rest)
 
 
 def support(
-    body: Body, mesh: TetMesh, outward: Floats, ends: Sequence[tuple[str, Floats]]
+    body: Body, mesh: TetMesh, outward: Floats, ends: Sequence[tuple[str, Floats]] = ()
 ) -> fem.Support:
     """Elastic and absorbing support of a hand where no facet set is given: bone below, and at the
     ends of a palm the tissue that it is cut from.

@@ -5,14 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-import fem
-from fem.load_and_probe import facet_normals
 from meshes import TetMesh, body_from_file, boundary_facets, quadratic
 from meshes.facets import seen_from_above
 from meshes.tetmesh import Ints
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised
-from skinwave.bodies.hands import hand_size, in_its_layers, support
+from skinwave.bodies.hands import hand_size, in_its_layers
 
 NORMAL_PATCH = 3e-3  # m, standard deviation: two thirds of the focal spot's
 
@@ -22,15 +20,6 @@ def discretise(body: Body, h: float) -> Discretised:
 
     The facet sets are `top`, seen from above, the file's own `bottom`, and `sides` where it was cut
     or has a set of that name. All else that it rests on is its support.
-
-    Parameters
-    ----------
-    body : Body
-    h : metre, size of the elements about the middle
-
-    Returns
-    -------
-    Discretised
 
     Raises
     ------
@@ -43,12 +32,7 @@ def discretise(body: Body, h: float) -> Discretised:
     if not _is_rest(mesh):
         facets["bottom"] = mesh.facets["bottom"]
     mesh = replace(mesh, facets=facets)
-    return in_its_layers(body, h, mesh, lambda mesh: _support(body, mesh))
-
-
-def _support(body: Body, mesh: TetMesh) -> fem.Support:
-    """Support below, by the normals of the facets."""
-    return support(body, mesh, facet_normals(mesh, boundary_facets(mesh.tets)), [])
+    return in_its_layers(body, h, mesh)
 
 
 def _is_rest(mesh: TetMesh) -> bool:

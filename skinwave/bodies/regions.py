@@ -42,7 +42,7 @@ def in_regions(
             "they are of; name those of another material than the rest in [body.regions]"
         )
     now = np.array(mesh.region)
-    numbers = [number_of(name, named, source) for name, _ in body.regions]
+    numbers = [_number_of(name, named, source) for name, _ in body.regions]
     for k, number in enumerate(numbers):
         if number in numbers[:k]:
             raise MeshError(
@@ -58,24 +58,8 @@ def in_regions(
     return replace(mesh, region=now), [*materials, *own]
 
 
-def number_of(name: str, mesh: TetMesh, source: str) -> int:
-    """Number of a region of a mesh.
-
-    Parameters
-    ----------
-    name : its name, or its number
-    mesh : TetMesh
-    source : of the mesh, for the message
-
-    Returns
-    -------
-    int
-
-    Raises
-    ------
-    MeshError
-        If there is none of that name.
-    """
+def _number_of(name: str, mesh: TetMesh, source: str) -> int:
+    """Number of a region of a mesh by its name or number; raises if there is none."""
     numbers = set(np.unique(mesh.region).tolist())
     known = {title: number for number, title in mesh.region_names.items() if number in numbers}
     known = {str(number): number for number in numbers} | known

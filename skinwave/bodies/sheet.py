@@ -107,13 +107,7 @@ def _check_size(body: Body, h: float) -> None:
 
 
 def check_alike(body: Body) -> None:
-    """Refuse a sheet whose waves depend on their direction, as an infinite one.
-
-    Raises
-    ------
-    ValueError
-        If it is orthotropic or curled, or its tensions differ.
-    """
+    """Refuse a sheet whose waves depend on their direction, as an infinite one, by a ValueError."""
     x, y = body.mounting.tension_x, body.mounting.tension_y
     if body.solid.orthotropy is not None or x != y or body.mounting.is_curled:
         what = "orthotropic" if x == y else f"stretched by {x:g} and {y:g} N/m along x and y"
@@ -186,13 +180,7 @@ def open_air(body: Body) -> str:
 
 
 def refuse_open_air(body: Body) -> None:
-    """Refuse a sheet with air that flows around a free edge, which elements do not have.
-
-    Raises
-    ------
-    ValueError
-        If it has no frame.
-    """
+    """Refuse, by a ValueError, air that flows around a free edge, which elements do not have."""
     if how := open_air(body):
         raise ValueError(
             f"elements have air around a sheet in a frame, not around one {how}; leave out its air"
@@ -204,18 +192,11 @@ def air(body: Body, build: Build, free: Ints) -> LinearOperator | None:
 
     Parameters
     ----------
-    body : Body, a sheet
-    build : its mesh
-    free : (n_free,) int, free degrees of freedom
+    body, build, free : the sheet, its mesh, and (n_free,) int, free degrees of freedom
 
     Returns
     -------
     LinearOperator (n_free, n_free), kg; None in vacuum
-
-    Raises
-    ------
-    ValueError
-        If the sheet has no frame: air would flow around a free edge.
     """
     if not body.air:
         return None

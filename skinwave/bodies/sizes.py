@@ -20,15 +20,10 @@ FINEST_HAND = 1e-3  # m: finer elements of a hand exceed the limits of its meshe
 
 
 def check_mesh(body: Body, h: float) -> None:
-    """Refuse, before anything is computed, what cannot be meshed with elements of h in metre.
-
-    Raises
-    ------
-    ValueError
-        If elements are larger than the body, or more than can be solved for.
+    """Refuse, by a ValueError, what cannot be meshed with elements of h in metre: larger than the
+    body, or more than can be solved for.
     """
-    h = checked(body, h)
-    body.of_kind.check_size(body, h)
+    body.of_kind.check_size(body, checked(body, h))
 
 
 def checked(body: Body, h: float, slack: float = 1.0) -> float:

@@ -22,17 +22,8 @@ LEAST_POISSON = -0.999  # below which no solid is; Poisson's ratio is checked wi
 
 
 def material_of(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) -> Material:
-    """The material of the values that a scene file has.
-
-    Parameters
-    ----------
-    values : by attribute name
-    where : the section of the file, for messages
-    keys : attribute name -> key of the file, for messages
-
-    Returns
-    -------
-    Material
+    """The material of values by attribute name; `where`, the section of the file, and `keys` of the
+    file by attribute name are for messages.
 
     Raises
     ------
@@ -72,21 +63,12 @@ def _check_limits(values: Mapping[str, Any], where: str, keys: Mapping[str, str]
 
 
 def _by_shear(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) -> Mapping[str, Any]:
-    """The same values with the shear modulus E / 2 (1 + nu) in place of Young's modulus E.
-
-    Raises
-    ------
-    ValueError
-        If there is no Poisson's ratio, or both moduli contradict each other.
-    """
+    """The same values with the shear modulus E / 2 (1 + nu) in place of Young's modulus E."""
     if "young" not in values:
         return values
     rest = {name: value for name, value in values.items() if name != "young"}
     if "poisson" not in values:
-        raise ValueError(
-            f"{where} has {keys['young']} without {keys['poisson']}, which makes it a shear "
-            f"modulus; give {keys['poisson']}"
-        )
+        raise ValueError(f"{where} has {keys['young']} without {keys['poisson']}; give both")
     if not values["young"] > 0:
         raise ValueError(f"{where} has {keys['young']} = {values['young']:g}; give one above 0")
     shear = values["young"] / (2 * (1 + max(values["poisson"], LEAST_POISSON)))

@@ -126,28 +126,21 @@ class Scene:
             raise ValueError("points_mm is empty; give at least one probe")
         if (values := len(self.probes) * self.tacton.duration * SAMPLE_RATE) > MOST_VALUES:
             raise ValueError(
-                f"{len(self.probes):,} probes for {self.tacton.duration:g} s at "
-                f"{SAMPLE_RATE:g} Hz are {values:,.0f} values, the limit is {MOST_VALUES:,}; "
-                "give fewer probes or a shorter Tacton"
+                f"{len(self.probes):,} probes for {self.tacton.duration:g} s are {values:,.0f} "
+                f"values, the limit is {MOST_VALUES:,}; give fewer probes or a shorter Tacton"
             )
         if isinstance(self.depth, tuple) and len(self.depth) != len(self.probes):
             raise ValueError(
-                f"depth_mm has {len(self.depth)} values for {len(self.probes)} probes; give one, "
-                "or one a probe"
+                f"depth_mm has {len(self.depth)} values for {len(self.probes)} probes; give one a "
+                "probe, or one"
             )
-        for z in self.depths:
-            if not (np.isfinite(z) and z >= 0):
-                raise ValueError(
-                    f"depth_mm = {1e3 * z:g} of a probe must be a finite number, 0 or above"
-                )
+        if not (np.isfinite(self.depths).all() and min(self.depths) >= 0):
+            raise ValueError(f"depth_mm = {1e3 * np.array(self.depth)} must be finite, 0 or above")
 
     def _check_reading(self) -> None:
         asked, body = self.reading.asked, self.body
         if not asked.of_body:
-            raise ValueError(
-                f"quantity '{self.quantity}' is that of the point kernel, which needs none; leave "
-                "it out"
-            )
+            raise ValueError(f"quantity '{self.quantity}' is of no body; leave it out")
         if body.of_kind.is_plate:
             _check_sheet(body, self.reading)
         if (deepest := max(self.depths)) >= body.depth and body.of_kind.is_layer:
@@ -160,16 +153,11 @@ class Scene:
         _ = self.loads  # a path may have no direction
         if self.body.of_kind.is_plate and not self.load.is_normal:
             raise ValueError(
-                f"a {self.body.kind} takes what is normal to it, not {self.load.words}: its "
-                "elements are of another thickness, with another moment about its middle; take a "
-                "slab"
+                f"a {self.body.kind} takes what is normal to it, not {self.load.words}; take a slab"
             )
         held = self.body.is_held and not self.body.is_on_half_space  # which sags without bound
         if self.load.gravity and self.body.of_kind.discretise and not held:
-            raise ValueError(
-                "an unconstrained body falls under gravity; clamp its base or its sides, or leave "
-                "gravity out"
-            )
+            raise ValueError("an unconstrained body falls under gravity; clamp its base")
         if self.load.support_motion:
             _check_moved(self.body, self.load.support_motion.words)
 
@@ -232,14 +220,11 @@ def _check_moved(body: Body, motion: str) -> None:
     if not body.of_kind.discretise or body.of_kind.is_plate:
         raise ValueError(f"{motion} is for a solid, not a body of kind '{body.kind}'; take a slab")
     if not body.is_held:
-        raise ValueError(
-            f"{motion} moves what the body is clamped to, and this one is unconstrained; clamp its "
-            "base, or leave support_motion out"
-        )
+        raise ValueError(f"{motion} moves no body that is unconstrained; clamp its base")
     if "absorbing" in (body.base, *body.conditions):
         raise ValueError(
-            f"{motion} would move the tissue beyond absorbing sides, too, which is taken to be at "
-            'rest; take sides = "free" or "clamped", which move along'
+            f"{motion} has no absorbing sides, beyond which tissue is at rest; take sides = "
+            '"free" or "clamped"'
         )
 
 
@@ -255,23 +240,18 @@ def _check_sheet(body: Body, reading: Reading) -> None:
         return
     if body.mounting.is_curled or body.placement.is_tilted:
         raise ValueError(
-            f"{asked.words} is that of a flat {body.kind} across the beam; lay it flat, or ask for "
-            "displacement, velocity or acceleration"
+            f"{asked.words} is that of a flat {body.kind} across the beam; lay it flat"
         )
     if asked.field == STRAIN and body.solid.orthotropy is not None:
         raise ValueError(
-            f"{asked.words} of an orthotropic {body.kind} needs its moduli across its thickness, "
-            "which it has not; ask for its displacement, or take an isotropic material"
+            f"{asked.words} of an orthotropic {body.kind} needs its moduli across its thickness; "
+            "take an isotropic material"
         )
 
 
 def check_motion(scene: Scene, command: str) -> None:
-    """Refuse a scene for a command that is about the displacement of the surface under a pressure.
-
-    Raises
-    ------
-    ValueError
-        If its probes read something else, or its load is another.
+    """Refuse, by a ValueError, a scene for a command that is about the displacement of the surface
+    under a pressure.
     """
     check_load(scene, command)
     if not scene.reading.is_plain:
@@ -282,13 +262,7 @@ def check_motion(scene: Scene, command: str) -> None:
 
 
 def check_load(scene: Scene, command: str) -> None:
-    """Refuse a scene for a command that is about the pressure of a focus.
-
-    Raises
-    ------
-    ValueError
-        If its load is another, or it has gravity.
-    """
+    """Refuse, by a ValueError, a scene for a command that is about the pressure of a focus."""
     if not scene.load.is_plain:
         raise ValueError(
             f"{command} is about the pressure of a focus, not {scene.load.words}; leave out [load],"

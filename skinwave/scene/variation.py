@@ -138,16 +138,14 @@ def combinations(
     for variation in variations:
         if variation.distribution:
             raise ValueError(
-                f"{variation.key} has a distribution, of which a {design} design takes no values; "
-                "give --design lhs or sobol, and --samples"
+                f"{variation.key} has a distribution; give --design lhs or sobol, and --samples"
             )
         if variation.bounds:
             raise ValueError(f"{variation.key}=start:stop lacks the number of values; add :n")
     lengths = [len(variation.values) for variation in variations]
     if design == "zip" and len(set(lengths)) > 1:
         raise ValueError(
-            f"--design zip pairs lists of one length, not of {', '.join(map(str, lengths))}; "
-            "make them as long or take factorial"
+            f"--design zip pairs lists of one length, not of {lengths}; take factorial"
         )
     count = lengths[0] if design == "zip" else math.prod(lengths)
     _check_count(count)

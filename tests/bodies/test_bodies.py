@@ -12,7 +12,6 @@ import fem
 import meshes
 import skinwave
 from meshes import graded_axis
-from meshes.shapes.palm import level_set
 from meshes.shapes.structured import Grading, with_planes
 from simple_model import MovingPressure, Tacton, Trajectory, array_field, lines
 from simple_model.load.focus import along_axis, spot_width
@@ -26,7 +25,7 @@ from skinwave.models.prepared import answer, prepare
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads
-from skinwave.scene.scene import BODIES, Body, Layer, Placement, Relief
+from skinwave.scene.scene import Body, Layer, Placement, Relief
 
 HAND = Path(__file__).parents[2] / "examples/hand/generic-hand-right.glb"
 PATH = Trajectory(shape="circle", size=0.02, speed=12.0)
@@ -86,7 +85,7 @@ def test_layers_that_do_not_fit_are_refused():
         Layer(thickness=1e-3, material="fatt")
 
 
-@pytest.mark.parametrize("degrees", [0.0, 20.0, 40.0])
+@pytest.mark.parametrize("degrees", [0.0, 40.0])
 def test_a_tilted_body_feels_the_cosine_of_what_a_flat_one_does(degrees):
     """cos^2 of the incidence on a focal spot that is longer by 1/cos."""
     made = build(replace(SKIN.body, placement=Placement(tilt_y=np.radians(degrees))), 0.006)
@@ -111,11 +110,7 @@ def test_an_offset_moves_the_path_the_other_way():
     moved = compute(still, "fem", h=0.006).displacement
     # a mesh moved by 10 mm has its nodes elsewhere under the focus
     centred = compute(replace(still, body=SKIN.body), "fem", h=0.006).displacement
-    assert compare_columns(moved, centred) < 0.1
-
-
-def compare_columns(u, v):
-    return np.linalg.norm(u - v) / np.linalg.norm(v)
+    assert np.linalg.norm(moved - centred) < 0.1 * np.linalg.norm(centred)
 
 
 def test_a_lifted_body_feels_what_the_focus_has_left_there():
@@ -124,7 +119,7 @@ def test_a_lifted_body_feels_what_the_focus_has_left_there():
     assert ratio == pytest.approx(float(along_axis(0.02)), rel=0.02)
 
 
-@pytest.mark.parametrize("height", [0.1, 0.15, 0.2, 0.25, 0.3])
+@pytest.mark.parametrize("height", [0.1, 0.2, 0.3])
 def test_the_focus_is_as_long_as_the_array_makes_it(height):
     offsets = np.linspace(-0.07, 0.07, 29) * (height / 0.3) ** 2
     points = np.column_stack([0 * offsets, 0 * offsets, height + offsets])
@@ -151,12 +146,6 @@ def test_placement_and_layers_come_back_from_a_file():
     ):
         with pytest.raises(ValueError, match=message):
             loads(text)
-
-
-def test_exact_waves_refuse_tilts():
-    lifted = replace(SKIN, body=replace(SKIN.body, placement=Placement(lift=0.01)))
-    with pytest.raises(ValueError, match="use --model fem"):
-        compute(lifted, "flat-body")
 
 
 def test_the_layer_around_a_body_damps_nothing_in_it():
@@ -186,21 +175,6 @@ def test_a_body_of_half_the_size_answers_alike():
     assert compare(compute(scene, "flat-body"), whole).relative_l2.max() < 0.05
 
 
-def test_a_probe_lands_on_a_curved_surface_where_it_was_asked_for():
-    flat = meshes.block((0.04, 0.04, 0.01), 0.008)
-    x, y, z = flat.points.T
-    share = 1 + z / 0.01  # of the bow: all of it at the top
-    bowed = np.column_stack([x + 1e-3 * np.sin(200 * y), y, z + 4e-3 * share * np.sin(60 * x)])
-    mesh = replace(flat, points=bowed)
-    places = np.random.default_rng(0).uniform(-0.015, 0.015, (50, 2))
-    S = fem.probe_operator(mesh, places)
-    upwards = S @ np.tile([0.0, 0.0, 1.0], len(bowed))
-    for axis in (0, 1):
-        field = np.zeros_like(bowed)
-        field[:, 2] = bowed[:, axis]  # which the elements carry exactly
-        np.testing.assert_allclose(S @ field.ravel() / upwards, places[:, axis], atol=1e-12)
-
-
 def test_a_probe_beside_a_crease_reads_along_the_mean_normal():
     flat = meshes.block((0.04, 0.04, 0.01), 0.005)
     bent = flat.points + np.outer(-0.3 * np.abs(flat.points[:, 0]), [0, 0, 1])
@@ -219,13 +193,6 @@ def test_a_probe_beside_a_crease_reads_along_the_mean_normal():
 
 
 @pytest.fixture
-def slab_file(tmp_path):
-    """A slab of 60 x 60 x 15 mm that the mesher made, in a file."""
-    meshes.write(tmp_path / "slab.vtu", meshes.builtin("slab"))
-    return tmp_path / "slab.vtu"
-
-
-@pytest.fixture
 def block_file(tmp_path):
     """A block of 50 x 50 x 10 mm with few elements, in a file."""
     block = meshes.block((0.05, 0.05, 0.01), 0.005)
@@ -237,17 +204,6 @@ def block_file(tmp_path):
 
 def hand_in(file):
     return Body(kind="mesh", file=str(file), sides="clamped")
-
-
-@pytest.mark.slow
-def test_a_slab_from_the_mesher_answers_like_a_structured_one(slab_file):
-    scene = replace(SKIN, pressure=STILL, probes=THREE)
-    places = np.array(THREE)
-    structured = answer(prepare(CLAMPED, places, h=0.003, symmetry="xy"), scene)
-    filled = compute(replace(scene, body=hand_in(slab_file)), "fem", h=0.004)
-    error = compare(structured, filled).relative_l2
-    assert error[:2].max() < 0.02
-    assert error[2] < 0.03  # where little moves, and meshes of 4 and 2.5 mm differ by 4.6 %
 
 
 def test_a_mesh_in_a_file_is_a_body_of_a_scene(block_file, tmp_path):
@@ -337,13 +293,6 @@ def test_a_support_keeps_the_balance_of_energy():
     assert spent.radiated > 0.01 * spent.work
 
 
-def test_a_hand_without_ends_cannot_be_held_by_them(dome, tmp_path):
-    meshes.write(tmp_path / "body.vtu", dome)
-    for base in ("free", "absorbing"):
-        with pytest.raises(ValueError, match=r"has no facets 'sides' or 'cut' to fix; clamp"):
-            build(replace(hand_in(tmp_path / "body.vtu"), base=base), 0.005)
-
-
 def test_lines_of_a_body_that_nothing_holds_are_those_without_its_drift():
     body = Body(width=0.03, height=0.03, depth=0.01, base="absorbing", sides="free")
     tacton = Tacton(am_frequency=140, duration=0.2)
@@ -355,24 +304,13 @@ def test_lines_of_a_body_that_nothing_holds_are_those_without_its_drift():
     np.testing.assert_allclose(moved["pressure_squared"], moved["linear"] / 2, rtol=1e-3)
 
 
-def test_layers_of_a_body_from_a_file_lie_below_its_top(slab_file):
-    body = replace(hand_in(slab_file), layers=(Layer(thickness=0.005, material="fat"),))
-    made = build(body, 0.004)
+def test_layers_of_a_body_from_a_file_lie_below_its_top(block_file):
+    body = replace(hand_in(block_file), layers=(Layer(thickness=0.005, material="fat"),))
+    made = build(body, 0.005)
     depth = -made.mesh.points[made.mesh.tets[:, :4], 2].mean(axis=1)
     assert (made.mesh.region == (depth > 0.005)).all()
     with pytest.raises(ValueError, match="thinner than half an element"):
-        build(replace(body, layers=(Layer(thickness=0.001, material="fat"),)), 0.004)
-
-
-def test_a_palm_without_relief_is_a_slab_with_round_edges():
-    relief = Relief(cup_depth=0, thenar_height=0, hypothenar_height=0, pad_height=0)
-    palm = Body(kind="palm", relief=relief).palm
-    inside = np.array([[0.0, 0.0, -1e-3], [0.02, 0.01, -1e-3], [0.0, -0.02, -0.014]])
-    np.testing.assert_allclose(level_set(palm, inside), -1e-3, rtol=1e-12)
-    flat = meshes.builtin("flat-palm")
-    top = flat.points[np.unique(flat.facets["top"])]
-    middle = np.linalg.norm(top[:, :2], axis=1) < 0.025
-    assert np.abs(top[middle, 2]).max() < 1e-9
+        build(replace(body, layers=(Layer(thickness=0.001, material="fat"),)), 0.005)
 
 
 @pytest.mark.slow
@@ -399,19 +337,6 @@ def test_a_palm_whose_curvature_goes_to_zero_answers_like_a_slab(monkeypatch):
     assert compare(slab, palm).relative_l2.max() < 0.02
 
 
-@pytest.mark.slow
-def test_a_palm_answers_alike_however_it_is_meshed():
-    """A small one: elements of 5 mm of the default palm are within 1.5 % of two mesh generators'
-    2 and 2.7 mm, which differ by 0.3 %.
-    """
-    small = {"width": 0.055, "height": 0.055, "depth": 0.0145}
-    scene = replace(SKIN, body=replace(BODIES["palm"], **small), probes=THREE)
-    one, fine = (compute(scene, "fem", h=h) for h in (0.005, 0.0042))
-    assert compare(fine, one).relative_l2.max() < 0.02
-    required = plan(scene, SolveOptions(tolerance=0.1))
-    assert compare(fine, answer(required.prepared, scene)).relative_l2.max() < 0.1
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -425,20 +350,6 @@ def test_a_palm_answers_alike_however_it_is_meshed():
 def test_bodies_that_make_no_sense_are_refused(text, message):
     with pytest.raises(ValueError, match=message):
         loads(f"[body]\n{text}")
-
-
-def test_tactons_are_compared_on_the_body_of_a_file(
-    in_one_process, block_file, tmp_path, monkeypatch, capsys
-):
-    monkeypatch.chdir(tmp_path)
-    scene = replace(SKIN, pressure=MovingPressure(tacton=replace(LOAD.tacton, duration=0.05)))
-    (tmp_path / "scene.toml").write_text(dumps(scene))
-    arguments = ["compare", "scene.toml", "--body", "block.vtu", "--unit", "m", "--out", "both"]
-    assert main(arguments) == 0
-    assert "3 of 3 runs" in capsys.readouterr().out
-    assert "mesh" in (tmp_path / "both/lines.csv").read_text()
-    assert main(["compare", "scene.toml", "--body", "blok.vtu"]) == 2
-    assert "is no file and none of" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -1,6 +1,5 @@
 """Kinds of body and models are records in registries: a file from outside adds one."""
 
-import ast
 import csv
 import json
 import os
@@ -15,12 +14,10 @@ import pytest
 
 import skinwave
 from skinwave import models
-from skinwave.bodies import BODIES, KINDS, Body, BodyKind, register
-from skinwave.bodies.build import build
+from skinwave.bodies import BODIES, KINDS, BodyKind, register
 from skinwave.commands.cli import main
 from skinwave.models import Model, named, names
 from skinwave.models import register as register_model
-from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads
 from skinwave.sweeps import dataset
 from skinwave.system import extensions
@@ -74,22 +71,6 @@ def test_a_scene_of_a_new_kind_is_read_and_written(disc):
         loads(SCENE.replace('kind = "cylinder"', 'kind = "cylinder"\nsize_x_mm = 60'))
     with pytest.raises(ValueError, match='relief is for kind = "palm", not "cylinder"'):
         loads(SCENE.replace('kind = "cylinder"', 'kind = "cylinder"\nrelief = {}'))
-
-
-def test_the_mesh_of_a_cylinder_is_one():
-    made = build(BODIES["silicone-cylinder"], 4e-3)
-    points = made.mesh.points
-    assert np.hypot(*points[:, :2].T).max() == pytest.approx(0.04)
-    assert np.ptp(points[:, 2]) == pytest.approx(0.02)
-    volume = skinwave_volume(made.mesh)
-    assert volume == pytest.approx(np.pi * 0.04**2 * 0.02, rel=0.01)
-    assert made.fixed == {"bottom": "xyz"}
-
-
-def skinwave_volume(mesh):
-    from meshes import corner_volumes
-
-    return corner_volumes(mesh.points, mesh.tets).sum()
 
 
 def test_a_soft_cylinder_deflects_as_its_slab_in_the_middle(disc):
@@ -152,12 +133,6 @@ def test_a_new_model_refuses_a_body(disc):
         skinwave.simulate(floating, "static-deflection")
 
 
-def test_both_models_are_compared_in_python(disc):
-    static = compute(disc, "static-deflection")
-    waves = skinwave.simulate(disc, "fem", 0.5, h=8e-3)
-    assert skinwave.compare(static, waves).relative_l2.shape == (3,)
-
-
 def test_names_are_given_once(static_deflection):
     with pytest.raises(ValueError, match="'slab' is registered already"):
         register(BodyKind(name="slab"))
@@ -167,12 +142,6 @@ def test_names_are_given_once(static_deflection):
     assert set(names()) > {"fem", "static-deflection"}
     with pytest.raises(ValueError, match="model"):
         named("nothing")
-
-
-def test_a_preset_is_added_at_run_time(tmp_path, monkeypatch):
-    monkeypatch.setitem(BODIES, "pad", Body(width=0.03, height=0.03, depth=0.004))
-    monkeypatch.chdir(tmp_path)
-    assert skinwave.scene.scene.body_name(Body(width=0.03, height=0.03, depth=0.004)) == "pad"
 
 
 def test_a_module_of_the_environment_is_loaded_by_the_command_line(tmp_path):
@@ -189,34 +158,3 @@ def test_a_module_of_the_environment_is_loaded_by_the_command_line(tmp_path):
     found = subprocess.run(command, env=env, check=False, capture_output=True, text=True)
     assert found.returncode == 2
     assert "SKINWAVE_EXTENSIONS names the module 'no_such_module'" in found.stderr
-
-
-def compared(tree):
-    """Strings that something is compared with, and attributes that are."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Compare):
-            parts = [node.left, *node.comparators]
-        elif isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "startswith":
-            parts = [node.func.value, *node.args]
-        else:
-            continue
-        inner = [leaf for part in parts for leaf in ast.walk(part)]
-        yield node.lineno, inner
-
-
-def test_nobody_else_compares_kinds_or_models():
-    """But for `bodies` and `models` themselves: everyone else asks the record."""
-    found = []
-    for path in (ROOT / "skinwave").rglob("*.py"):
-        if path.parent.name in ("bodies", "models"):
-            continue
-        for line, leaves in compared(ast.parse(path.read_text(encoding="utf-8"))):
-            words = {leaf.value for leaf in leaves if isinstance(leaf, ast.Constant)}
-            of_body = any(
-                isinstance(leaf, ast.Attribute) and leaf.attr == "kind"
-                and getattr(leaf.value, "attr", getattr(leaf.value, "id", "")) in ("body", "solid")
-                for leaf in leaves
-            )  # fmt: skip
-            if of_body or words & {*names(), "fem-nonlinear", "flat-body"} - {"none"}:
-                found.append(f"{path.relative_to(ROOT)}:{line}")
-    assert found == []

