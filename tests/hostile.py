@@ -259,14 +259,12 @@ def _answered(folder: Path) -> Path:
 
 
 def results(made: Path) -> dict[str, Write]:
-    """Result folders with something damaged, foreign or of another version in them; `made` is a
-    sound one.
-    """
+    """Reports of result folders in which something is damaged or foreign; `made` is a sound one."""
     rng, found = random.Random(SEED), {}
     files = {path.name: path.read_bytes() for path in made.iterdir() if path.is_file()}
 
-    def add(name: str, damaged: str, content: bytes | Callable[[Path], object], *commands: str):
-        def write(folder: Path, command: str) -> list[str]:
+    def add(name: str, damaged: str, content: bytes | Callable[[Path], object]) -> None:
+        def write(folder: Path) -> list[str]:
             (folder / "a").mkdir()
             for known, sound in files.items():
                 (folder / "a" / known).write_bytes(sound)
@@ -275,55 +273,37 @@ def results(made: Path) -> dict[str, Write]:
                 content(folder / "a" / damaged)
             else:
                 (folder / "a" / damaged).write_bytes(content)
-            return [command, "a", "--out", "o", "--quiet"]
+            return ["report", "a", "--out", "o", "--quiet"]
 
-        for command in commands:
-            found[f"result, {name}, {command}"] = lambda folder, c=command: write(folder, c)
+        found[f"result, {name}"] = write
 
     arrays = dict(np.load(io.BytesIO(files["responses.npz"])))
-    both = ("report",)
 
     def stored(**fields: object) -> bytes:
         stream = io.BytesIO()
         np.savez(stream, **fields)
         return stream.getvalue()
 
-    npz = {
+    spoilt = bytearray(files["responses.npz"])
+    for _ in range(20):
+        spoilt[rng.randrange(len(spoilt))] = rng.randrange(256)
+    npz: dict[str, bytes | Callable[[Path], object]] = {
         "no array": stored(),
         "objects": stored(**(arrays | {"t": np.array([{}], object)})),
         "nan": stored(**(arrays | {"t": arrays["t"] * np.nan})),
         "no samples": stored(**{n: a[:0] for n, a in arrays.items()}),
         "another model": stored(t=arrays["t"], probes=arrays["probes"], **{"\x1b[2J": arrays["t"]}),
-        "cut": files["responses.npz"][:500],
-        "empty": b"",
-    }
+        "cut": files["responses.npz"][:500], "empty": b"", "spoilt": bytes(spoilt),
+        "pipe": os.mkfifo, "sparse": _sparse,
+    }  # fmt: skip
     for name, content in npz.items():
-        add(f"npz, {name}", "responses.npz", content, *both)
-    add("npz, pipe", "responses.npz", os.mkfifo, *both)
-    add("npz, sparse", "responses.npz", _sparse, *both)
-    for k in range(3):
-        spoilt = bytearray(files["responses.npz"])
-        for _ in range(20):
-            spoilt[rng.randrange(len(spoilt))] = rng.randrange(256)
-        add(f"npz, spoilt {k}", "responses.npz", bytes(spoilt), "report")
-    plan = {"rows": [{"what": "a", "value": "b", "reason": "c"}], "tolerance": 0.05,
-            "warnings": ["w"]}  # fmt: skip
-    case = {"title": "t", "source": "s", "value": 1.0, "reference": 1.0, "error": 0.0, "bar": 1.0,
-            "passed": True}  # fmt: skip
-    trust = {"command": "skinwave", "model": "fem", "misfit": 0.1, "cases": [case]}
-    tables = {
-        "effort.json": (json.loads(files["effort.json"]), ("report",), 4),
-        "plan.json": (plan, ("report",), 4),
-        "trust.json": (trust, ("report",), 4),
-    }
-    for name, (table, commands, count) in tables.items():
-        for k in range(count):
-            text = json.dumps(changed(table, rng)).encode()
-            add(f"{name}, changed {k}", name, text, *commands)
-        add(f"{name}, deep", name, b"[" * 100_000, *commands)
-        add(f"{name}, no UTF-8", name, b"\xff\xfe{\0}\0", *commands)
-        add(f"{name}, pipe", name, os.mkfifo, *commands)
-    add("scene, spoilt", "scene.toml", b"[", "report")
+        add(f"npz, {name}", "responses.npz", content)
+    for name in ("effort.json", "plan.json"):
+        table = json.loads(files[name]) if name in files else {"rows": [], "tolerance": 0.05}
+        for k in range(4):
+            add(f"{name}, changed {k}", name, json.dumps(changed(table, rng)).encode())
+        add(f"{name}, deep", name, b"[" * 100_000)
+    add("scene, spoilt", "scene.toml", b"[")
     return found
 
 

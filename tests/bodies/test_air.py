@@ -45,7 +45,7 @@ def test_a_scene_says_it_and_comes_back():
 def test_only_a_sheet_has_air(kind):
     with pytest.raises(ValueError, match=f'air is for kind = "sheet", not "{kind}"'):
         loads(f'[body]\nkind = "{kind}"\nair = true')
-    with pytest.raises(ValueError, match=f"air = true is for a sheet, .* not a {kind}"):
+    with pytest.raises(ValueError, match=f"for a sheet, not a {kind}"):
         Body(kind=kind, air=True)
     with pytest.raises(ValueError, match="must be true or false"):
         loads('[body]\nkind = "sheet"\nair = 1.2')

@@ -140,7 +140,7 @@ def test_placement_and_layers_come_back_from_a_file():
     assert again.body.placement.tilt_x == pytest.approx(placed.tilt_x, rel=1e-15)
     for text, message in (
         ("[[body.layers]]\nthickness_mm = 1", "lacks material"),
-        ("[body]\nlayers = 3", "must be tables"),
+        ("[body]\nlayers = 3", "must be a list of tables"),
         ("[placement]\ntilt_x_deg = 80", "beyond 60"),
         ("[placement]\noffset_mm = [1]", "pair of numbers"),
     ):
