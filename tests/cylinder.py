@@ -35,7 +35,7 @@ def disc(body: Body, h: float) -> TetMesh:
     triangles = triangles[abs(area) > SHORT * body.width**2]
     z = np.linspace(-body.depth, 0.0, max(2, round(body.depth / h)) + 1)
     mesh = meshes.extruded(plane, triangles, z)
-    return meshes.named(
+    return meshes.tag_boundary(
         mesh,
         bottom=lambda centroids, normals: normals[:, 2] < -0.9,
         sides=lambda centroids, normals: abs(normals[:, 2]) < 0.1,

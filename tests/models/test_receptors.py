@@ -77,7 +77,7 @@ def test_keys_of_a_scene_are_read_and_written():
         ("strain_zy", "0", r"quantity 'strain_zy' is unknown, use one of displacement.*strain_"),
         ("pressure", "0", "quantity 'pressure' is that of the point kernel"),
         ("velocity", "[1]", "depth_mm has 1 values for 2 probes"),
-        ("velocity", "-1", "depth_mm = -1 of a probe must be a finite number"),
+        ("velocity", "-1", "depth_mm = -1"),
         ("strain_zz", "6", "depth_mm = 6 of a probe is not within the body, which is 6 mm"),
         ("strain_zz", '"pacinian"', "depth_mm 'pacinian' is unknown.*pacini"),
         ("strain_zz", "true", "depth_mm = True must be a number"),

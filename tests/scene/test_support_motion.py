@@ -150,12 +150,12 @@ def test_scenes_with_it_come_back_from_their_files_and_are_planned():
         ("[load]\nsupport_motion = { amplitude_um = 5 }", "lacks frequency_hz; give it"),
         (SHAKEN.replace("140", "4000"), "above 0 and at most 1000 Hz; give frequency_hz"),
         (SHAKEN.replace("140", "140, direction = [0, 0]"), "three finite numbers, not all 0"),
-        (SHAKEN, 'absorbing sides, too, .* take sides = "free" or "clamped"'),
-        (SHAKEN + '[body]\nbase = "absorbing"\nsides = "clamped"', "beyond absorbing sides, too"),
+        (SHAKEN, "absorbing sides"),
+        (SHAKEN + '[body]\nbase = "absorbing"\nsides = "clamped"', "absorbing sides"),
         (SHAKEN + '[body]\npreset = "paper-sheet"', "is for a solid, not a body of kind 'sheet'"),
         (SHAKEN + '[body]\nkind = "none"', "is for a solid, not a body of kind 'none'"),
         (SHAKEN + '[body]\nbase = "free"\nsides = { left = "free", right = "free", front = "free"'
-         ', back = "absorbing" }', "and this one is unconstrained"),
+         ', back = "absorbing" }', "unconstrained"),
     ],
 )  # fmt: skip
 def test_supports_that_cannot_move_are_refused(text, said):
