@@ -8,9 +8,8 @@ from scipy import stats
 
 from skinwave.scene.distributions import Distribution, called, known_to
 from skinwave.scene.file import read
-from skinwave.scene.saltelli import saltelli_shares
 from skinwave.scene.spreads import Spread
-from skinwave.scene.variation import cases, combinations, parse
+from skinwave.scene.variation import cases, combinations, parse, saltelli_shares
 from skinwave.sweeps.sampling import quantiles, samples, sobol_indices, tornado, tornado_of_fifths
 
 SHARES = np.array([1e-6, 0.05, 0.3, 0.5, 0.77, 0.95, 1 - 1e-6])
