@@ -237,7 +237,8 @@ def called(text: str) -> tuple[float, Distribution] | None:
     shape, measure, example = CALLS[match[1]]
     numbers = [x for x in map(number_in, match[2].split(",")) if x is not None]
     if len(numbers) != example.count(",") + 1 or len(numbers) != match[2].count(",") + 1:
-        raise ValueError(f"{text.strip()} has other numbers than it needs; write {example}")
+        needed = example.count(",") + 1
+        raise ValueError(f"{text.strip()} needs {needed} numbers; write {example}")
     if measure == "bounds":
         low, *mode, high = numbers
         value, width = (mode[0] if mode else (low + high) / 2), [low, high]
