@@ -98,9 +98,8 @@ def test_all_but_the_published_kernel_receive_the_same_load(scene, folder):
     assert set(loads.values()) == {scene.pressure}
 
 
-@pytest.mark.parametrize("drive", ["linear", "pressure_squared"])
-def test_a_body_of_ones_own_is_shown_alone_and_changes_no_load(scene, drive):
-    own = replace(scene.pressure, drive=drive, profile="array")
+def test_a_body_of_ones_own_is_shown_alone_and_changes_no_load(scene):
+    own = replace(scene.pressure, drive="linear", profile="array")
     shown = album.shown_scenes(replace(scene, pressure=own, body=Body(depth=0.02)))
     assert list(shown) == ["point-kernel-published", "point-kernel", "slab"]
     assert shown["point-kernel"].pressure == shown["slab"].pressure == own
@@ -133,15 +132,6 @@ def test_a_point_moves_in_a_view_as_its_probe_does(scene, moved):
     assert view.period == pytest.approx(0.01)
     assert np.ptp(drawn) > 1e-7
     np.testing.assert_allclose(drawn, sampled - response.displacement[-100:, 2].mean(), atol=3e-8)
-
-
-def test_a_constant_pressure_at_rest_makes_still_pictures():
-    still = MovingPressure(tacton=Tacton(duration=0.02))
-    scene = Scene(pressure=still, body=Body(width=0.06, height=0.06))
-    view = views.body_view(scene, "slab", motion.waves(scene, h=0.015), (0.02, 3))
-    assert not view.motion.any()
-    assert view.tone == 0
-    assert len(maps.snapshots_figure([view], style("print"), 2).axes) == 3
 
 
 def test_the_kernels_brightest_place_lies_on_the_path(seen):
@@ -196,17 +186,6 @@ def test_a_sheet_bends_at_the_speed_of_plates():
     assert skin.of_kind.wave_speed(skin, 200.0) == pytest.approx(3.22, abs=0.03)
 
 
-def test_a_mach_angle_is_there_only_behind_a_focus_that_is_faster():
-    assert speeds.mach_angle(4.78, 12.0) == pytest.approx(np.deg2rad(23.5), abs=1e-3)
-    assert speeds.mach_angle(4.78, 4.0) is None
-
-
-def test_a_load_has_the_period_of_all_its_tones():
-    assert speeds.period(circling(am_frequency=100)) == pytest.approx(0.01)
-    assert speeds.period(circling(200.0, am_frequency=140)) == pytest.approx(0.05)
-    assert speeds.period(circling(190.986, am_frequency=140)) is None
-
-
 def test_what_is_played_returns_after_the_slowest_beat():
     """f_d - f_AM = 51 Hz is the slowest line: the load is another one after one period of AM."""
     beating = circling(190.986, am_frequency=140)
@@ -239,18 +218,6 @@ def test_frames_follow_the_fastest_line_that_moves_the_body(scene, moved):
     amplitude = np.abs(np.fft.rfft(view.pushed, axis=0)).max(axis=1)
     strong = np.flatnonzero(amplitude > 0.1 * amplitude.max()) / view.period
     assert strong.max() <= 1.5 * fastest <= 1.5 * 800
-
-
-@draws
-def test_a_signed_field_shows_both_signs(seen):
-    view = seen["skin-slab"]
-    frame = int(np.abs(view.pushed).max(axis=1).argmax())
-    image = render.picture([view], style("report"), frame, camera="top").astype(int)
-    inside = image[80:-60, 60:420]
-    red, _, blue = np.moveaxis(inside, -1, 0)
-    assert (red - blue > 40).sum() > 200  # pushed in
-    assert (blue - red > 15).sum() > 200  # coming out
-    assert np.ptp(image) > 200
 
 
 @draws
@@ -301,23 +268,6 @@ def test_a_film_may_be_an_mp4(seen, tmp_path):
     gc.collect()
 
 
-def test_a_film_that_cannot_be_written_is_refused_at_once(tmp_path, monkeypatch):
-    with pytest.raises(ValueError, match="ends in none of"):
-        films.check_format(tmp_path / "film.avi")
-    monkeypatch.setattr(films, "find_spec", lambda name: None)
-    with pytest.raises(ValueError, match="MP4 needs imageio"):
-        films.check_format(tmp_path / "film.mp4")
-
-
-def test_tables_have_units_and_places_in_their_headers(page):
-    rows = (page / "data/skin-slab_probes.csv").read_text().splitlines()
-    assert rows[0].startswith('t [s],"displacement(0,0) [m]"')
-    values = np.loadtxt(rows[1:], delimiter=",")
-    kept = np.load(page / "data/skin-slab_probes.npz")
-    np.testing.assert_allclose(values[:, 1:], kept["displacement"], rtol=1e-7, atol=1e-18)
-    assert '"pressure(0,0) [Pa]"' in (page / "data/point-kernel_probes.csv").read_text()
-
-
 def test_a_sound_has_the_scale_in_its_name(seen, page):
     (path,) = (page / "data").glob("*.wav")
     scale = float(re.search(r"full_scale_([\d.e-]+)_um", path.name)[1])
@@ -346,7 +296,7 @@ def test_fields_are_opened_again_with_their_times(seen, page):
     assert list(grid.field_data["units"]) == ["displacement_m: m", "strain: 1", "stress_pa: Pa"]
 
 
-FIGURES = ("propagation", "snapshots", "waveforms-0", "sensation-1")
+FIGURES = ("propagation", "snapshots")
 
 
 @pytest.mark.parametrize("name", FIGURES)
@@ -366,7 +316,7 @@ def test_text_of_vector_figures_is_text(page, name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("dressed", ["talk", "print", "narrow"])
+@pytest.mark.parametrize("dressed", ["talk", "narrow"])
 def test_no_text_of_a_figure_is_cut(folder, dressed):
     kept = album.open_album(folder)
     chosen = style("report", 3.5) if dressed == "narrow" else style(dressed)
@@ -388,20 +338,6 @@ def test_no_text_of_a_figure_is_cut(folder, dressed):
         if chosen.columns:
             assert figure.get_figwidth() in chosen.columns
             assert sizes(figure) == {8.0}
-
-
-def test_the_page_says_everything_and_stands_alone(page):
-    text = (page / "index.html").read_text()
-    for heading in ("What was asked", "What was modelled", "What comes out", "Effort",
-                    "How far to trust it", "Do it again"):  # fmt: skip
-        assert f"<h2>{heading}" in text
-    outside = text.split("<iframe")[0] + text.split("</iframe>")[-1]
-    for address in ('src="http', 'href="http', "url(http", "<script"):
-        assert address not in outside
-    assert "as tested" in text
-    assert "differ by" in text  # the energy balance
-    assert len(text) < 8e6
-    assert "@page { size: A4" in text
 
 
 @needs_browser
@@ -477,8 +413,3 @@ def test_the_installation_names_what_there_is_and_what_is_missing(capsys):
     assert bool(found["renderer"]["cure"]) != renderer().found
     assert main(["verify", "--installation"]) == 0
     assert "superlu" in capsys.readouterr().out
-
-
-def test_an_unknown_style_is_refused():
-    with pytest.raises(ValueError, match="did you mean 'report'"):
-        style("reports")

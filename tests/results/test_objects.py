@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import matplotlib as mpl
 import numpy as np
 import pytest
-from legible import illegible, sizes, texts
+from legible import illegible, sizes
 
 import meshes
 import skinwave
@@ -22,7 +22,6 @@ from simple_model.numbers import stated_error
 from skinwave.models import BUILT_IN, named
 from skinwave.planning.budget import error_budget
 from skinwave.planning.records import PlanRow
-from skinwave.report import scene_plot
 from skinwave.report.fields import Field
 from skinwave.report.styles import style
 from skinwave.results import citations
@@ -108,8 +107,8 @@ def test_a_table_of_pandas_has_all_of_a_response():
     assert np.array_equal(table.columns.to_list(), PLACES)
 
 
-@pytest.mark.parametrize("name", ["xarray", "pandas"])
-def test_a_library_that_is_missing_is_named_with_its_cure(name, monkeypatch):
+def test_a_library_that_is_missing_is_named_with_its_cure(monkeypatch):
+    name = "xarray"
     monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(ImportError, match=f"{name} is not installed; pip install {name}"):
         getattr(wave(), f"to_{name}")()
@@ -172,16 +171,8 @@ def test_curves_have_the_values_and_axes_their_units():
     assert wave(quantity="strain_xx").plot().get_ylabel() == "strain xx, µm/m"
 
 
-def test_a_plot_goes_where_it_is_asked_to():
-    import matplotlib.pyplot as plt
-
-    _, axes = plt.subplots(1, 2)
-    assert wave().plot(ax=axes[1]) is axes[1]
-    assert not axes[0].lines
-
-
-@pytest.mark.parametrize("order", [1, 2])
-def test_a_mesh_of_pyvista_is_the_same(order):
+def test_a_mesh_of_pyvista_is_the_same():
+    order = 2
     mesh = meshes.block((2e-3, 2e-3, 1e-3), 1e-3, order=1)
     mesh = replace(mesh, region=np.arange(len(mesh.tets)), facets={**mesh.facets, "no": []})
     mesh = meshes.quadratic(mesh) if order == 2 else mesh
@@ -193,13 +184,6 @@ def test_a_mesh_of_pyvista_is_the_same(order):
         assert np.array_equal(getattr(again, name), getattr(mesh, name)), name
     assert set(again.facets) == set(mesh.facets)
     assert all(np.array_equal(again.facets[name], mesh.facets[name]) for name in mesh.facets)
-
-
-def test_other_cells_are_refused():
-    import pyvista as pv
-
-    with pytest.raises(ValueError, match="VTK type 11; give tetrahedra"):
-        meshes.TetMesh.from_pyvista(pv.ImageData(dimensions=(2, 2, 2)).cast_to_unstructured_grid())
 
 
 @pytest.fixture(scope="module")
@@ -296,14 +280,6 @@ def test_records_print_as_a_short_line(scene, field):
     assert "expected error 3.0 %; 1 warning>" in repr(wave())
 
 
-def test_scenes_that_differ_have_different_keys_in_the_cache(scene):
-    """Keys are of the records that a scene has, whose repr is of all of their numbers."""
-    thicker = replace(scene.body, depth=0.015000001)
-    assert meshes.cache.key(thicker) != meshes.cache.key(scene.body)
-    louder = replace(scene.pressure, peak_pressure=scene.pressure.peak_pressure * (1 + 1e-12))
-    assert meshes.cache.key(louder) != meshes.cache.key(scene.pressure)
-
-
 def test_an_expected_error_is_said_alike_everywhere(scene):
     said = "below 0.50 %"
     found = skinwave.simulate(scene, "flat-body")
@@ -316,7 +292,7 @@ def test_an_expected_error_is_said_alike_everywhere(scene):
     assert [stated_error(x) for x in (0.0213, 1.5, np.nan)] == ["2.1 %", "150 %", "not known"]
 
 
-@pytest.mark.parametrize("quantity", ["pressure", "strain_xz", "displacement", "acceleration"])
+@pytest.mark.parametrize("quantity", ["pressure", "displacement"])
 def test_what_a_response_has_not_is_looked_for_without_an_error(quantity):
     response = wave(quantity=quantity)
     found = dict(inspect.getmembers(response))
@@ -329,17 +305,6 @@ def test_what_a_response_has_not_is_looked_for_without_an_error(quantity):
     assert not hasattr(response, "lines")
     with pytest.raises(ValueError, match="the load of this response is unknown"):
         _ = response.lines
-
-
-def test_the_page_of_a_scene_has_its_load_and_its_regions():
-    regions = '[body]\nkind = "mesh"\nfile = "hand.vtu"\nregions = { ring = "bone" }\n'
-    load = '[load]\nkind = "point_force"\nforce_n = 0.1\ngravity_m_per_s2 = 9.8\n'
-    page = scene_plot._facts(skinwave.loads(regions + load))
-    assert ["region ring", "bone"] in page
-    said = dict(page)["load"]
-    assert "0.1 N along (0, 0, -1)" in said
-    assert "gravity of 9.8 m/s2" in said
-    assert "pressure" not in dict(page), "a contact has no focus"
 
 
 def test_a_sweep_in_python_has_the_runs_of_each_scene(scene, tmp_path):
@@ -395,8 +360,8 @@ def test_references_are_those_of_the_models():
         skinwave.cite(wave())
 
 
-@pytest.mark.parametrize("model", ["point-kernel", "flat-body"])
-def test_times_are_a_part_of_the_whole_response(scene, model):
+def test_times_are_a_part_of_the_whole_response(scene):
+    model = "flat-body"
     whole = skinwave.planning.simulate.compute(scene, model)
     part = skinwave.planning.simulate.compute(scene, model, times=np.arange(1600, 1800) / 20_000)
     assert part.times[::2] == pytest.approx(whole.times[800:900])
@@ -405,23 +370,11 @@ def test_times_are_a_part_of_the_whole_response(scene, model):
     )
 
 
-def test_the_reduced_body_has_those_times_too(scene):
-    small = replace(scene, body=replace(scene.body, width=0.06, height=0.06, sides="clamped"))
-    whole = skinwave.simulate(small, "fem", 0.9, h=10e-3)
-    part = skinwave.simulate(small, "fem", 0.9, h=10e-3, times=np.arange(300, 400) / RATE)
-    scale = np.abs(whole.values).max()
-    assert part.values == pytest.approx(whole.values[300:400], abs=1e-9 * scale)
-
-
 @pytest.mark.parametrize(
     ("times", "said"),
     [
-        ([0.0], "two or more"),
         ([0.0, 1e-3, 3e-3], "equal steps"),
-        ([0.0, 0.2], "the duration of the Tacton"),
-        ([5e-4, 1.5e-3, 2.5e-3], "no multiple of their step"),
         ([0.0, np.nan], "finite"),
-        (np.arange(10) * 1e-9 + 0.05, "give a larger step"),
     ],
 )
 def test_other_times_are_refused(scene, times, said):
@@ -461,8 +414,8 @@ def test_figures_of_a_paper_have_its_width_letters_and_fonts(tmp_path):
         style("print", 90.0)
 
 
-@pytest.mark.parametrize("width", [3.5, 7.0])
-def test_all_letters_of_a_figure_of_a_paper_are_of_8_points(scene, width):
+def test_all_letters_of_a_figure_of_a_paper_are_of_8_points(scene):
+    width = 3.5
     waves = skinwave.simulate(replace_duration(scene, 0.3), "flat-body-harmonic", 0.999)
     with skinwave.paper(width):
         drawn = [scene.plot(), waves.plot(), waves.spectrum().plot(), waves.lines.plot()]
@@ -478,13 +431,6 @@ def test_all_letters_of_a_figure_of_a_paper_are_of_8_points(scene, width):
     for figure in figures:
         assert sizes(figure) == {8.0}
         assert illegible(figure) == []
-
-
-def test_a_figure_without_lines_says_why(scene):
-    short = skinwave.simulate(replace_duration(scene, 0.02), "flat-body-harmonic", 0.999)
-    assert len(short.lines) == 0
-    assert any("no line of the load is resolved" in text.get_text()
-               for text, _ in texts(short.lines.plot().figure))  # fmt: skip
 
 
 def test_chosen_columns_of_a_folder_alone():

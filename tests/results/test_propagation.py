@@ -42,9 +42,7 @@ def circle(am, size, speed):
     ("tacton", "shares", "spreads", "of_kernel"),
     [
         (circle(140, 0, 0), (40, 48, 23), (6, 6, 4), 4),
-        (circle(0, 20, 12), (28, 13, 7), (17, 15, 14), 15),
         (circle(140, 20, 12), (31, 23, 30), (16, 16, 17), 15),
-        (circle(210, 30, 18), (26, 21, 27), (22, 22, 23), 20),
         (circle(80, 10, 6), (28, 46, 28), (12, 12, 9), 9),
     ],
 )
@@ -217,9 +215,8 @@ def test_the_first_screen_says_what_each_difference_changes():
     assert "add no component" in sentences(first)[1]
 
 
-@pytest.mark.parametrize("drive", ["linear", "pressure_squared"])
-def test_a_constant_pressure_at_rest_moves_nothing(drive):
-    still = MovingPressure(tacton=Tacton(duration=0.3), drive=drive)
+def test_a_constant_pressure_at_rest_moves_nothing():
+    still = MovingPressure(tacton=Tacton(duration=0.3))
     run = _run(Scene(pressure=still, body=Body()), "flat-body-harmonic")
     first = shown({"one": beside_kernels(run)}, quick_maps)
     assert sentences(first)[0].startswith("Nothing vibrates")

@@ -30,10 +30,9 @@ def test_motion_is_that_of_the_maps_of_reports():
     assert np.isnan(found.error)
 
 
-@pytest.mark.parametrize("quantity", ["largest_shear_strain", "energy_density"])
-def test_an_invariant_is_alike_all_around_a_circle(quantity):
+def test_an_invariant_is_alike_all_around_a_circle():
     """Neither of two frequencies that have no common period is ahead of the other anywhere."""
-    rms = quantity_map(replace(LAYER, quantity=quantity, depth=0.7e-3), **PLACES).rms
+    rms = quantity_map(replace(LAYER, quantity="energy_density", depth=0.7e-3), **PLACES).rms
     np.testing.assert_allclose(np.rot90(rms), rms, rtol=5e-3)
 
 
@@ -107,11 +106,8 @@ def test_the_command_writes_a_page_and_tables(tmp_path, monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--step", "0"], "choose another step"),
         (["--step", "0.01"], "more than 40,000"),
-        (["--depth", "nose"], "one of surface, meissner"),
         (["--depth", "9"], "is not within the body"),
-        (["--quantity", "speed"], "quantity 'speed' is unknown"),
     ],
 )
 def test_what_cannot_be_mapped_is_refused(words, said, tmp_path, monkeypatch, capsys):

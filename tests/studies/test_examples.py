@@ -15,8 +15,10 @@ from skinwave.scene.file import read
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.toml"))
 MESHED = {"layered-skin", "palm"}  # for which no wavenumber integral stands
 DRAWN = {"palm", "speed-on-forearm"}  # with all pictures of a report, but for films
-SIZE = {path.stem: ["--h", "12"] for path in EXAMPLES}  # numbers of one mesh agree, coarse or not
-SIZE["square-on-silicone"] = ["--h", "20"]  # whose path is long
+SIZE = {
+    path.stem: ["--element-size", "12"] for path in EXAMPLES
+}  # numbers of one mesh agree, coarse or not
+SIZE["square-on-silicone"] = ["--element-size", "20"]  # whose path is long
 SIZE["speed-on-forearm"] = []  # a half-space, which has no mesh
 SIZE["paper-sheet"] = []  # by the modes of a plate
 REDUCED = 0.05  # relative error of the reduced-order model of a whole body

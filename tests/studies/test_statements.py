@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simple_model import MovingPressure, Response, Rhythm, Signal, Tacton, Trajectory
+from simple_model import MovingPressure, Response, Rhythm, Tacton, Trajectory
 from skinwave.report.levels import sensation_levels
 from skinwave.results.claims import evaluate
 from skinwave.results.files import line_rows
 from skinwave.results.run import Run
 from skinwave.scene.scene import BODIES, Body, Layer, Placement, Scene
-from skinwave.studies.description import above, modelled, unresolved
+from skinwave.studies.description import modelled, unresolved
 from skinwave.studies.scene_report import _asked_rows
-from skinwave.studies.study_page import caption, write_single
+from skinwave.studies.study_page import caption
 from skinwave.studies.summary import known_of
 from skinwave.sweeps.measures import measured
 
@@ -33,25 +33,6 @@ def run(body, drive="pressure_squared", **tacton):
 ABOVE = "; on it, from the surface down: 1 mm of dermis"
 
 
-@pytest.mark.parametrize(
-    ("body", "stated", "absent"),
-    [
-        (BODIES["palm"], "Left out: layers.", "sheet"),
-        (BODIES["skin-slab"], "Left out: layers and curvature.", "sheet"),
-        (
-            Body(layers=LAYERS),
-            "; on it, from the surface down: 1 mm of dermis. Left out: curvature.",
-            "layers",
-        ),
-        (BODIES["paper-sheet"], "The mesh is a thicker sheet", "curvature"),
-    ],
-)
-def test_what_is_left_out_is_that_of_the_body(body, stated, absent):
-    sentence = modelled([run(body)])[0]
-    assert stated in sentence
-    assert absent not in sentence
-
-
 def test_a_drive_law_that_was_not_used_is_not_named():
     squared, corrected = (
         " ".join(modelled([run(BODIES["palm"], drive, am_frequency=140)]))
@@ -66,8 +47,6 @@ def test_a_drive_law_that_was_not_used_is_not_named():
     "tones",
     [
         {"am_frequency": 140, "second_am_frequency": 200, "superposition": (0.0, 1.0)},
-        {"second_am_frequency": 200, "superposition": (0.0, 1.0), "trajectory": CIRCLE},
-        {"am_frequency": 140, "superposition": (0.0, 1.0)},
         {"am_frequency": 140, "envelope_frequency": 10},
     ],
 )
@@ -120,47 +99,21 @@ def test_lines_beside_those_that_cannot_be_told_are_not_judged_either():
     assert not {"level_db", "sensation_line"} & row.keys()
 
 
-def test_two_names_of_one_frequency_are_told():
-    half = Trajectory(shape="circle", size=0.02, speed=0.02 * np.pi * 70)
-    one = at_the_focus(0.5, am_frequency=140, trajectory=half)
-    assert one.unresolved == ()
-    assert one.lines["2f_d"][0] == pytest.approx(2e-6, rel=1e-3)
-
-
-def test_a_page_says_how_many_lines_are_left_out(tmp_path):
-    write_single(tmp_path, at_the_focus(0.5, am_frequency=2))
-    assert "5 lines, f_AM, 2f_AM" in (tmp_path / "index.html").read_text()
-
-
 CORNERS = ((-0.01, 0.0), (0.01, 0.0), (0.01, 0.01))
 RECORDED = Trajectory(
     shape="recorded", times=(0, 0.1, 0.25), points=CORNERS, levels=(0.0, 1.0, 0.5)
 )
-POLYLINE = Trajectory(shape="polyline", points=CORNERS, speed=3.0)
-ONE_WAY = Trajectory(shape="line", size=0.02, speed=4.0, sweep="one_way", centre=(0.0, 0.005))
 SECOND = {"second_am_frequency": 200, "superposition": (0.25, 0.75)}
 
 
 @pytest.mark.parametrize(
     ("tacton", "row", "said"),
     [
-        ({}, "focus", "at rest"),
-        ({}, "amplitude modulation", "none"),
-        ({}, "amplitude", "100 % of full drive"),
         ({"am_frequency": 80, **SECOND}, "amplitude modulation",
          "f_AM = 80 Hz, f_AM2 = 200 Hz, weights 0.25 and 0.75"),
-        ({"second_am_frequency": 200, "superposition": (0.0, 1.0)}, "amplitude modulation",
-         "f_AM2 = 200 Hz"),
-        ({"envelope_frequency": 5}, "amplitude modulation", "f_e = 5 Hz"),
         ({"trajectory": RECORDED}, "focus", "a path recorded for 0.25 s with levels of its own"),
-        ({"trajectory": POLYLINE}, "focus", "polyline of 60 mm a period at 3 m/s, f_d = 50.000 Hz"),
-        ({"trajectory": ONE_WAY}, "focus",
-         "line of 20 mm at 4 m/s, one way, f_d = 200.000 Hz about (0, 5) mm"),
-        ({"trajectory": CIRCLE, "foci": (0.0, 0.5)}, "focus",
-         "circle of 20 mm at 12 m/s, f_d = 190.986 Hz, 2 foci simultaneous"),
         ({"amplitude": 0.5, "rhythm": Rhythm(pulses=((0.03, 0.02),), ramp=0.005)}, "amplitude",
          "50 % of full drive, 1 pulse in 50 ms with ramps of 5 ms"),
-        ({"signal": Signal(rate=100, samples=(0.0, 1.0))}, "amplitude", "a sampled modulation"),
     ],
 )  # fmt: skip
 def test_a_page_says_all_that_was_commanded(tacton, row, said):
@@ -177,13 +130,6 @@ def test_a_page_says_how_a_body_lies_and_what_lies_above():
     one = run(body)
     assert dict(_asked_rows(one.scene))["body"].endswith(said)
     assert said in modelled([one])[0]
-
-
-def test_a_page_lists_layers_from_the_surface_down():
-    words = above(BODIES["palm-layers"])
-    assert words == (
-        "; on it, from the surface down: 0.27 mm of epidermis, 1 mm of dermis, 2 mm of fat"
-    )
 
 
 def test_what_is_known_of_a_material_is_that_of_its_preset():
