@@ -1,6 +1,7 @@
 """Figures of dispersion curves: speeds and 1/e lengths over frequency, mode shapes over depth."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -19,17 +20,15 @@ from skinwave.report.styles import Style
 
 FINE = 600  # frequencies of a drawn curve
 PALE = 0.35  # opacity of a curve where its mode is evanescent
-ROWS = 3  # of the names of lines above the panels, two in a narrow figure
+ROWS = 3  # of the names of lines above the panels
 LETTER, GAP, LINE = 0.55, 0.7, 1.45  # width of their letters, between two, and of a row, over size
-HANDLE, WRITTEN = 3.7, 0.52  # widths in the legend, over its size: beside a label, of its letters
 SHARE = 0.68  # of a figure's width for the curves, where the shapes are beside them
-WIDE, TIGHT = 5.6, 2.8  # inch: narrower figures in print have one column, and titles in two rows
-TALL = {True: 6.8, False: 4.9}  # inch, height of such a figure of a body with a depth, without
 MOST_SHAPES = 4
 LABELS = (
-    ("phase speed", "ω / |Re k|, m/s"), ("1/e length", "1 / |Im k|, mm"),
-    ("group speed", "dω / d Re k, m/s"),
-)  # fmt: skip
+    "phase speed ω / |Re k|, m/s",
+    "1/e length 1 / |Im k|, mm",
+    "group speed dω / d Re k, m/s",
+)
 
 
 def colour(number: int) -> str:
@@ -58,49 +57,29 @@ def dispersion_figure(
     -------
     Figure
     """
-    between = "\n" if style.columns else " "  # letters of print are large beside its figures
+    thick = len(curves.depths) > 2 and not style.is_narrow
     with mpl.rc_context(style.rc):
-        figure, left, right, width = _parts(style, thick=len(curves.depths) > 2)
+        size = style.size(11.5 if thick else 8.5, 8.4)
+        figure = Figure(figsize=size, layout="constrained")
+        left: Figure | SubFigure = figure
+        if thick:
+            left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(SHARE, 1 - SHARE))[0]
+            _shapes(right, curves, at)
         axes = left.subplots(3, 1, sharex=True, height_ratios=(1.25, 1, 1))
         _speeds(axes[0], curves, focus_speed)
         _decay(axes[1], curves)
         _group(axes[2], curves)
-        for ax, words in zip(axes, LABELS, strict=True):
+        for ax, label in zip(axes, LABELS, strict=True):
             ax.set_xlim(0, curves.frequencies[-1])
-            ax.set_ylabel(between.join(words))
+            ax.set_ylabel(label)
             for frequency in lines.values():
                 ax.axvline(frequency, color="0.55", lw=0.9, ls=":", zorder=0)
             ax.grid(alpha=0.25)
-        _name_lines(axes[0], lines, width, ROWS - _is_narrow(style))
+        width = 72 * size[0] * (SHARE if thick else 1) - 8 * style.font  # points
+        _name_lines(axes[0], lines, width)
         axes[-1].set_xlabel("frequency, Hz")
-        _legend(figure, curves, focus_speed)
-        if right is not None:
-            _shapes(right, curves, at, style)
+        _legend(figure, curves, focus_speed, 2 if style.is_narrow else 5)
     return figure
-
-
-def _is_narrow(style: Style) -> bool:
-    """Whether the shapes have room below the curves only."""
-    return style.columns is not None and max(style.columns) < WIDE
-
-
-def _parts(
-    style: Style, *, thick: bool
-) -> tuple[Figure, Figure | SubFigure, SubFigure | None, float]:
-    """A figure, its parts for curves and, of a body with a depth, for shapes; and the width in
-    points of the panels of the curves.
-    """
-    size = style.size(11.5 if thick else 8.5, 9.2 if style.columns else 8.4)
-    narrow = _is_narrow(style)
-    figure = Figure(figsize=(size[0], TALL[thick]) if narrow else size, layout="constrained")
-    beside = 8 * style.font  # labels of the axis
-    if not thick:
-        return figure, figure, None, 72 * size[0] - beside
-    if narrow:
-        above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=(2.1, 1))[:, 0]
-        return figure, above, below, 72 * size[0] - beside
-    left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(SHARE, 1 - SHARE))[0]
-    return figure, left, right, 72 * SHARE * size[0] - beside
 
 
 def _fine(mode: Mode) -> tuple[Floats, np.ndarray, np.ndarray]:
@@ -155,9 +134,9 @@ def _group(ax: Axes, curves: DispersionCurves) -> None:
     ax.set_ylim(0, top)
 
 
-def _name_lines(ax: Axes, lines: Mapping[str, float], width: float, rows: int) -> None:
-    """Names of lines above a panel of a width in points, the strongest that have room in rows."""
-    size, taken = small(), [list[tuple[float, float]]() for _ in range(rows)]
+def _name_lines(ax: Axes, lines: Mapping[str, float], width: float) -> None:
+    """Names of lines above a panel of a width in points, the strongest that have room."""
+    size, taken = small(), [list[tuple[float, float]]() for _ in range(ROWS)]
     for name, frequency in lines.items():
         half = size * (LETTER * len(name.replace("_", "")) + GAP) / 2
         middle = width * frequency / ax.get_xlim()[1]
@@ -173,36 +152,23 @@ def _name_lines(ax: Axes, lines: Mapping[str, float], width: float, rows: int) -
         )  # fmt: skip
 
 
-def _legend(figure: Figure, curves: DispersionCurves, focus_speed: float) -> None:
+def _legend(figure: Figure, curves: DispersionCurves, focus_speed: float, columns: int) -> None:
     ink = mpl.rcParams["text.color"]
-    handles = [Line2D([], [], color=colour(n), lw=2.2) for n in range(len(curves.modes))]
-    labels = [mode.name for mode in curves.modes]
-    handles.append(Line2D([], [], color=ink, lw=1, alpha=PALE))
-    labels.append("evanescent")
-    handles.append(Line2D([], [], color="0.55", lw=0.9, ls=":"))
-    labels.append("lines of the load")
+    entries: dict[str, dict[str, Any]] = {
+        mode.name: {"color": colour(n), "lw": 2.2} for n, mode in enumerate(curves.modes)
+    }
+    entries["evanescent"] = {"color": ink, "lw": 1, "alpha": PALE}
+    entries["lines of the load"] = {"color": "0.55", "lw": 0.9, "ls": ":"}
     if focus_speed:
-        handles.append(Line2D([], [], color=ink, lw=1.2, ls="--"))
-        labels.append(f"focus, {focus_speed:g} m/s")
-    figure.legend(handles, labels, loc="outside lower center", fontsize=small(), handlelength=1.5,
-                  columnspacing=1.0, ncols=_columns(labels, figure.get_figwidth()))  # fmt: skip
+        entries[f"focus, {focus_speed:g} m/s"] = {"color": ink, "lw": 1.2, "ls": "--"}
+    handles = [Line2D([], [], **entry) for entry in entries.values()]
+    figure.legend(handles, list(entries), loc="outside lower center", fontsize=small(),
+                  handlelength=1.5, columnspacing=1.0, ncols=columns)  # fmt: skip
 
 
-def _columns(labels: Sequence[str], width: float) -> int:
-    """Columns of a legend of small letters that a figure of a width in inch has room for."""
-
-    def needed(count: int) -> float:
-        longest = (max(map(len, part)) for part in np.array_split(labels, count))
-        return small() / 72 * sum(HANDLE + WRITTEN * letters for letters in longest)
-
-    counts = range(min(len(labels), 5), 1, -1)
-    return next((count for count in counts if needed(count) < width), 1)
-
-
-def _shapes(figure: SubFigure, curves: DispersionCurves, at: float, style: Style) -> None:
+def _shapes(figure: SubFigure, curves: DispersionCurves, at: float) -> None:
     """Displacement over depth of the least evanescent modes, in phase with the surface."""
-    narrow = _is_narrow(style)
-    axes = figure.subplots(*(1, 2) if narrow else (2, 1), sharex=True, sharey=True)
+    axes = figure.subplots(2, 1, sharex=True, sharey=True)
     number = int(np.argmin(np.abs(curves.frequencies - at)))
     known = [n for n, mode in enumerate(curves.modes) if mode.kinds[number]]
     known.sort(key=lambda n: abs(curves.modes[n].wavenumbers[number].imag))
@@ -210,21 +176,13 @@ def _shapes(figure: SubFigure, curves: DispersionCurves, at: float, style: Style
         shape = curves.modes[n].shapes[number]
         turned = shape * np.exp(-1j * np.angle(shape[0, 1])) / np.abs(shape).max()
         pale = 1.0 if curves.modes[n].is_wave[number] else PALE
-        for axis, part in ((0, turned[:, 1].real), (1, turned[:, 0].real)):
-            axes[axis].plot(part, 1e3 * curves.depths, color=colour(n), lw=2, alpha=pale)
-    said = f"shapes at {curves.frequencies[number]:.0f} Hz"
-    between = "\n" if style.columns and (not narrow or max(style.columns) < TIGHT) else " "
-    titles = (f"into{between}the body", f"along{between}the surface")
-    if narrow:
-        figure.suptitle(said)
-        figure.supxlabel(f"displacement over the{between}largest of the mode", fontsize="medium")
-    else:
-        titles = (f"{said}:{between}into the body", "along the surface")
-        axes[-1].set_xlabel(f"displacement over the{between}largest of the mode")
+        for ax, part in zip(axes, (turned[:, 1].real, turned[:, 0].real), strict=True):
+            ax.plot(part, 1e3 * curves.depths, color=colour(n), lw=2, alpha=pale)
+    titles = (f"shapes at {curves.frequencies[number]:.0f} Hz: into the body", "along the surface")
     for ax, title in zip(axes, titles, strict=True):
         ax.set_title(title, fontsize="medium")
         ax.axvline(0, color="0.6", lw=0.8, zorder=0)
         ax.set(xlim=(-1.05, 1.05), xticks=(-1, 0, 1), ylim=(1e3 * curves.depths[-1], 0))
-        ax.grid(alpha=0.25)
-    for ax in axes[:1] if narrow else axes:
         ax.set_ylabel("depth, mm")
+        ax.grid(alpha=0.25)
+    axes[-1].set_xlabel("displacement over the largest of the mode")

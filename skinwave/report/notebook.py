@@ -9,7 +9,6 @@ from simple_model.numbers import counted, percent, stated_error
 from skinwave.report.scene_plot import draw_body
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from meshes.tetmesh import Floats
@@ -71,49 +70,22 @@ def plan_page(plan: "Plan") -> str:
 
 def agreement_page(found: "Agreement") -> str:
     """A comparison: misfit and delay at every probe, and lines in dB."""
-
-    def draw(figure: "Figure") -> None:
-        left, right = figure.subplots(1, 2)
-        _draw_misfits(left, found)
-        _draw_lines(right, found)
-
+    with np.errstate(divide="ignore", invalid="ignore"):
+        levels = 20 * np.log10(found.line_ratios).T
+    columns = zip(
+        found.probes, found.relative_l2, found.shape_misfit, found.delay, levels, strict=True
+    )
     rows = [
-        [drawing.place_name(place), *(f"{100 * x:.3g}" for x in misfits), f"{1e3 * delay:.3g}"]
-        for place, delay, *misfits in zip(
-            found.probes, found.delay, found.relative_l2, found.shape_misfit, strict=True
-        )
+        [drawing.place_name(place), f"{100 * l2:.3g}", f"{100 * shape:.3g}", f"{1e3 * delay:.3g}",
+         *(f"{level:.2f}" for level in lines)]
+        for place, l2, shape, delay, lines in columns
     ]  # fmt: skip
     header = ["probe, mm", "relative L2 misfit, %", "misfit of the shape, %", "delay, ms"]
+    header += [f"{frequency:g} Hz, dB re reference" for frequency in found.frequencies]
     facts = [["scale", f"{found.scale:.4g}"]] + [
         [f"spread to {drop} dB", f"{1e3 * reference:.3g} mm of the reference, "
          f"{1e3 * found.spread_candidate[drop]:.3g} mm of the candidate"]
         for drop, reference in found.spread_reference.items()
     ]  # fmt: skip
     tables = [drawing.table(facts), drawing.table(rows[:MOST_ROWS], header)]
-    return drawing.page("Candidate against reference", drawing.picture(draw, 8, 2.6), tables)
-
-
-def _draw_misfits(ax: "Axes", found: "Agreement") -> None:
-    probes = np.arange(len(found.probes))
-    ax.bar(probes - 0.2, 100 * found.relative_l2, 0.4, label="relative L2", color="#0072B2")
-    ax.bar(probes + 0.2, 100 * found.shape_misfit, 0.4, label="shape", color="#E69F00")
-    ax.set_xlabel("probe")
-    ax.set_ylabel("misfit, %")
-    ax.legend(frameon=False, fontsize=drawing.small())
-
-
-def _draw_lines(ax: "Axes", found: "Agreement") -> None:
-    """Ratio of every line, over the probes."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        levels = 20 * np.log10(found.line_ratios)
-    for frequency, level in zip(found.frequencies, levels, strict=True):
-        ax.plot(np.where(np.isfinite(level), level, np.nan), marker="o", ms=4,
-                label=f"{frequency:g} Hz")  # fmt: skip
-    ax.axhline(0, color="0.6", lw=0.8)
-    ax.set_xlabel("probe")
-    ax.set_xticks(range(len(found.probes)))
-    ax.set_ylabel("line, dB re reference")
-    if len(found.frequencies):
-        ax.legend(frameon=False, fontsize=drawing.small())
-    else:
-        ax.text(0.5, 0.6, "no line was asked for", transform=ax.transAxes, ha="center")
+    return drawing.page("Candidate against reference", b"", tables)
