@@ -15,7 +15,7 @@ from skinwave.measure.comparison import LEVEL, UNKNOWN, MeasuredComparison, Mode
 from skinwave.report.measured import MOST_LINES, lines_figure
 from skinwave.report.palette import label
 from skinwave.results.claims import TEXTS
-from skinwave.system.document import Details, Section
+from skinwave.system.document import Details, Picture, Section
 from skinwave.system.table import Column, Table
 
 SURELY = 0.85  # of the record, or of the Tacton, that is within the other at the true delay
@@ -46,8 +46,8 @@ OF_CLAIMS = (
 )
 
 
-def page_parts(found: MeasuredComparison, picture: Callable[[str, Figure, str], str]) -> list[str]:
-    """Parts of a page: the conclusion, a figure and tables.
+def page_part(found: MeasuredComparison, picture: Callable[[str, Figure, str], Picture]) -> Section:
+    """A part of a page: the conclusion, a figure and tables.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def page_parts(found: MeasuredComparison, picture: Callable[[str, Figure, str], 
         {name: c.model[:, at] for name, c in columns.items()},
         {name: c.differs[:, at] for name, c in columns.items()}, found.measurement.record,
     )  # fmt: skip
-    return [Section("Beside the measurement", [
+    return Section("Beside the measurement", [
         *(conclusion(found, column) for column in found.bodies),
         *remarks(found),
         picture("measured", figure, CAPTION),
@@ -73,7 +73,7 @@ def page_parts(found: MeasuredComparison, picture: Callable[[str, Figure, str], 
         Section("Which of the paper's claims the measurement itself shows",
                 [OF_CLAIMS, claims_table(found)] if found.claims else [NO_CLAIMS], 3),
         Section("The models by themselves", [], 3),
-    ]).html()]  # fmt: skip
+    ])  # fmt: skip
 
 
 def write_tables(folder: Path, found: MeasuredComparison) -> None:

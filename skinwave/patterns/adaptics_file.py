@@ -12,7 +12,7 @@ from operator import add, ge, gt, le, lt, mul, sub, truediv
 from typing import Any
 
 from simple_model.choices import choose
-from skinwave.system.numbers import is_finite_number
+from skinwave.system.json_kinds import is_finite_number
 from skinwave.system.plain_text import as_utf_8
 
 FORMAT = "MidAirHapticsAnimationFileFormat"

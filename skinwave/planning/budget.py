@@ -18,7 +18,7 @@ import numpy as np
 from meshes.tetmesh import Floats
 from simple_model.layers.compliance import layered
 from simple_model.layers.flat_body import steady_lines
-from simple_model.numbers import percent, stated_error
+from simple_model.numbers import percent, significant, stated_error
 from simple_model.typing import Complex
 from skinwave.bodies.analytic import flattened
 from skinwave.models.advice import takes
@@ -28,7 +28,6 @@ from skinwave.planning.records import PlanRow
 from skinwave.planning.refinement import CONTROLLER, element_sizes
 from skinwave.scene.scene import Scene
 from skinwave.scene.spreads import PRESSURE, Spread, spreads_of, with_values
-from skinwave.system.numbers import significant
 
 SIGMA = (0.15865525393145707, 0.8413447460685429)  # quantiles a standard deviation either way
 FAINT = 1e-3  # of the load's strongest line: lines that no budget needs

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from simple_model.numbers import significant
 from skinwave.models import speeds
 from skinwave.report.palette import COLOURS, SPARE
 from skinwave.report.render import Image, stage
 from skinwave.report.styles import Style
 from skinwave.results.views import View
 from skinwave.system.effort import Progress, silent
-from skinwave.system.numbers import significant
 
 LASTS = 4.0  # s that a film lasts on the screen,
 EACH = 0.04  # s that a frame does at least

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from meshes.tetmesh import Floats
+from simple_model.numbers import decibel
 from skinwave.results.named_lines import NamedLines
 from skinwave.results.run import Run
-from skinwave.system.numbers import decibel
 from skinwave.system.plain_text import csv_table
 
 PRESENT = -60.0  # dB re f_AM: a line this weak is still seen above a vibrometer's noise

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 
 from simple_model import Response
@@ -135,7 +135,7 @@ def run_study(
         parts = study_page.page_parts(groups, drawn, first, outcome, progress, figures)
         for comparison in found:
             comparison_page.write_tables(folder, comparison)
-            parts[:0] = comparison_page.page_parts(comparison, partial(study_page.kept, folder))
+            parts.insert(0, comparison_page.page_part(comparison, study_page.picture))
         spent = replace(
             outcome,
             seconds=time.perf_counter() - started,

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -104,7 +105,7 @@ def page_parts(
     begun = not figures["overview"].cancel()
     overview = figures["overview"].result() if begun else overview_png(drawn_runs)
     parts: list[Part] = [
-        *(summary.top(first, _propagation, name) if first else []),
+        *(summary.top(first, partial(picture, "propagation"), name) if first else []),
         warnings_banner(efforts(runs)),
         _introduction(outcome, groups),
         *other_quantity(runs[-1].scene),
@@ -125,10 +126,6 @@ def page_parts(
     images = _images(drawn_runs, figures, progress)
     every = [Picture(images[n], caption(n, group), n) for n, group in groups.items()]
     return [*parts, Section("Every Tacton", every)]
-
-
-def _propagation(figure: Figure, text: str) -> Picture:
-    return Picture(png(figure), text, "propagation")
 
 
 def _changes(groups: Mapping[str, list[Run]]) -> Section:
@@ -189,12 +186,9 @@ def _images(
     return {name: here[name] if name in here else figures[name].result() for name in groups}
 
 
-def kept(folder: Path, name: str, figure: Figure, caption: str) -> str:
-    """A figure as a file in a comparison's folder, and inside the page."""
-    image = png(figure)
-    (folder / FIGURES).mkdir(exist_ok=True)
-    (folder / FIGURES / f"{name}.png").write_bytes(image)
-    return Picture(image, caption, name).html()
+def picture(name: str, figure: Figure, caption: str) -> Picture:
+    """A figure in a comparison's page and folder."""
+    return Picture(png(figure), caption, name)
 
 
 def _introduction(outcome: StudyOutcome, groups: Mapping[str, list[Run]]) -> str:

@@ -16,6 +16,7 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model.choices import choose
+from simple_model.numbers import significant
 from skinwave.models.advice import takes
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
 from skinwave.scene.scene import Scene
@@ -28,7 +29,6 @@ from skinwave.sweeps.sampling import samples as samples_of
 from skinwave.sweeps.sweep import ModelOptions, in_order, model_of, sweep
 from skinwave.sweeps.table_figures import at_probe, value
 from skinwave.system.effort import Progress
-from skinwave.system.numbers import significant
 
 SAMPLES, FEWEST = 199, 39  # of the spreads; those that have a 95 % interval
 ENDS = (2.5, 97.5)  # percentiles between which the interval lies

@@ -98,7 +98,9 @@ class Report:
 
     def html(self) -> str:
         """The page, complete with its policy."""
-        return page(self.title, warnings_banner(self.efforts), *self.verdict, *self.parts)
+        parts = (warnings_banner(self.efforts), *self.verdict, *self.parts)
+        body = Markup("\n").join(map(_html, parts))
+        return render("page.html", title=self.title, body=body, policy=_policy(body))
 
     def write(self, folder: Path) -> None:
         """Write index.html into a folder, and a file of every picture and table with a name."""
@@ -125,23 +127,7 @@ def _html(one: Part) -> Markup:
     """A part as HTML; text is a paragraph."""
     if isinstance(one, Markup):
         return one
-    return paragraph(one) if isinstance(one, str) else one.html()
-
-
-def page(title: str, *parts: Part) -> str:
-    """A complete page with its policy."""
-    body = Markup("\n").join(map(_html, parts))
-    return render("page.html", title=title, body=body, policy=_policy(body))
-
-
-def section(heading: str, *parts: str) -> Markup:
-    """A headed part of the page."""
-    return Section(heading, parts).html()
-
-
-def paragraph(text: str) -> Markup:
-    """A paragraph."""
-    return Markup("<p>{}</p>").format(text)
+    return Markup("<p>{}</p>").format(one) if isinstance(one, str) else one.html()
 
 
 def live_link(file: str) -> Markup:
@@ -162,19 +148,9 @@ def warnings_banner(efforts: Iterable[tuple[str, Effort]]) -> Markup:
     return part("warnings", worst_warnings(efforts))
 
 
-def picture(drawn: bytes, caption: str, name: str = "", kind: str = "png") -> Markup:
-    """A picture inside the page: PNG, or another kind that browsers know."""
-    return Picture(drawn, caption, name, kind).html()
-
-
 def inner_page(page: str, caption: str) -> Markup:
     """A page within the page, on screens only; its scripts reach nothing outside of it."""
     return part("inner_page", str(page), caption)
-
-
-def table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> Markup:
-    """A table; cells that read as numbers are set to the right."""
-    return part("table", header, rows)
 
 
 def worst_warnings(efforts: Iterable[tuple[str, Effort]]) -> list[str]:

@@ -1,10 +1,10 @@
 """Whether what a JSON file of a result holds is of the kinds that are read from it."""
 
 from dataclasses import fields
+from math import isfinite
 from typing import Any
 
 from simple_model import Effort
-from skinwave.system.numbers import is_finite_number
 
 CASE = {
     "title": str, "source": str, "value": float, "reference": float, "error": float, "bar": float,
@@ -44,6 +44,14 @@ def fitting(value: Any, pattern: Any, where: str) -> Any:
     else:
         _of(value, pattern, where)
     return value
+
+
+def is_finite_number(value: Any) -> bool:
+    """Whether a value is a number that a float can hold, and none of the two truth values."""
+    try:
+        return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+    except OverflowError:  # of a whole number
+        return False
 
 
 def effort_of(table: Any, where: str) -> Effort:

@@ -12,10 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from simple_model.numbers import significant
 from skinwave.report.figures import REPORT, png
 from skinwave.system.document import Details, Picture, Report, Section
 from skinwave.system.effort import Progress
-from skinwave.system.numbers import significant
 from skinwave.system.table import Column, Table
 from skinwave.verify import predictions
 from skinwave.verify.predictions import BODIES, FOUND, Curves, Finger, Harmonics

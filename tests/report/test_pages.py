@@ -22,7 +22,8 @@ from skinwave.studies.assumptions import ASSUMPTIONS
 from skinwave.studies.relax import Hierarchy, HierarchyStep
 from skinwave.studies.tradeoff import Candidate, Measured, Study
 from skinwave.system import document
-from skinwave.system.document import Markup
+from skinwave.system.document import Details, Markup, Picture, Report, Section
+from skinwave.system.table import Table
 from skinwave.verify import suite
 from skinwave.verify.case import Case, Check, Result
 
@@ -183,7 +184,8 @@ def test_a_script_in_any_text_is_shown_and_never_runs(browser, tmp_path, write):
 @needs_browser
 def test_the_policy_stops_what_is_not_escaped(browser, tmp_path):
     """The second line of defence, by itself."""
-    page = document.page("t", Markup(f"<p>{HOSTILE}</p>"), document.inner_page("<p>inner", "c"))
+    inner = document.inner_page("<p>inner", "c")
+    page = Report("t", parts=[Markup(f"<p>{HOSTILE}</p>"), inner]).html()
     (tmp_path / "index.html").write_text(page, encoding="utf-8")
     with opened(browser, tmp_path / "index.html") as (tab, said):
         assert not tab.evaluate("window.ran")
@@ -199,7 +201,7 @@ def test_a_page_within_a_page_runs_its_own_scripts_only(browser, tmp_path):
         "<body><script>document.body.append('drawn');\nlet a = '<é>';</script><script>"
         "try { top.ran = 1 } catch { document.body.append(' alone') }</script>"
     )
-    page = document.page("t", document.inner_page(inner, HOSTILE), document.paragraph(HOSTILE))
+    page = Report("t", parts=[document.inner_page(inner, HOSTILE), HOSTILE]).html()
     (tmp_path / "index.html").write_text(page, encoding="utf-8")
     with opened(browser, tmp_path / "index.html") as (tab, said):
         assert said == []
@@ -214,14 +216,13 @@ def test_a_page_within_a_page_runs_its_own_scripts_only(browser, tmp_path):
 
 def test_only_html_made_here_is_taken_as_it_is():
     cells = ["<b>1</b>", Markup("<b>2</b>"), Markup("<i>{}</i>").format("<b>"), "-1e+3"]
-    made = document.table([], [cells])
+    made = Table(["a", "b", "c", "d"], [cells]).html()
     assert "<td>&lt;b&gt;1&lt;/b&gt;</td><td><b>2</b></td><td><i>&lt;b&gt;</i></td>" in made
     assert '<td class="number">-1e+3</td>' in made
-    assert "&lt;p&gt;<b>" in document.page("", "<p>" + Markup("<b>"))
     for made in (
-        document.page("<t>", "<p>"), document.section("<t>", "<p>"), document.paragraph("<p><t>"),
-        document.table(["<t>"], [["<p>", "< -120"]]),
-        document.picture(b"", "<p>\"'", '<t>"'), document.inner_page("<p>", "<t>"),
+        Report("<t>", ["<p>"]).html(), Section("<t>", ["<p>"]).html(),
+        Details("<t>", ["<p>"]).html(), Table(["<t>"], [["<p>"]]).html(),
+        Picture(b"", "<p>\"'", '<t>"').html(), document.inner_page("<p>", "<t>"),
         document.preformatted("<p><t>"),
         document.warnings_banner([("<t>", Effort(warnings=("<p>",)))]),
     ):  # fmt: skip
