@@ -9,8 +9,7 @@ from simple_model.numbers import decibel
 from simple_model.quantities import DISPLACEMENT
 from simple_model.typing import Floats
 from skinwave.measure.lines import MeasuredLines
-from skinwave.results.claims import CLAIMS, NEEDED, PAIRS, is_resolved, is_single
-from skinwave.results.named_lines import NamedLines
+from skinwave.results.claims import CLAIMS, NEEDED, PAIRS, NamedLines, is_resolved, is_single
 from skinwave.scene.scene import Scene
 
 HOLDS, FAILS, UNDECIDED = "holds", "fails", "cannot be decided"

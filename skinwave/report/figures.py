@@ -121,25 +121,22 @@ def overview_figure(columns: dict[str, list[Run]], probe: int = 2) -> Figure:
     return figure
 
 
-def panels(
-    count: int, style: Style, width: float, height: float, below: float = 0.4
-) -> tuple[Figure, list[Axes]]:
+def panels(count: int, style: Style, width: float) -> tuple[Figure, list[Axes]]:
     """Maps in mm side by side, below each other in a narrow figure.
 
     Parameters
     ----------
     count : of maps
     style : Style
-    width, height : inch of each, at letters of 10 points
-    below : inch for a legend below them
+    width : inch of each with its colour bar, at letters of 10 points
 
     Returns
     -------
     Figure, and count axes
     """
-    size = style.size(width * count, height + below)
+    size = style.size(width * count, 0.85 * width + 0.4)
     if style.is_narrow:
-        size = size[0], 0.8 * size[0] * count + 0.2 + below
+        size = size[0], 0.8 * size[0] * count + 0.6
     figure = Figure(figsize=size, layout="compressed")
     shape = (count, 1) if style.is_narrow else (1, count)
     axes = figure.subplots(*shape, sharex=True, sharey=True, squeeze=False).ravel()

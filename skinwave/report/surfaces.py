@@ -69,7 +69,7 @@ def surfaces_figure(
     kernel = next((each for each in surfaces.values() if each.quantity is PRESSURE), None)
     with mpl.rc_context(style.rc):
         alone = len(surfaces) == 1
-        figure, axes = panels(len(surfaces), style, *(2 * (ALONE if alone else SIDE,)))
+        figure, axes = panels(len(surfaces), style, ALONE if alone else SIDE)
         entries: dict[str, Any] = {"path of the focus": {"color": "0.6", "ls": "dotted"}}
         for ax, (column, found) in zip(axes, surfaces.items(), strict=True):
             extent = tuple(1e3 * np.array([*found.x[[0, -1]], *found.y[[0, -1]]]))

@@ -7,13 +7,14 @@ Nothing here knows which model should fulfil which.
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model.numbers import decibel
-from skinwave.results.named_lines import NamedLines
 from skinwave.results.run import Run
+from skinwave.scene.scene import Scene
 from skinwave.system.plain_text import csv_table
 
 PRESENT = -60.0  # dB re f_AM: a line this weak is still seen above a vibrometer's noise
@@ -22,6 +23,50 @@ MUCH_LOWER = -20.0  # dB: a tenth
 NOTHING = -300.0  # dB
 ON_BIN = 1.0  # Hz: one bin of a spectrum of 1 s
 REACH = 6.0  # Hz from a line within which its spectral peak is looked for
+
+
+class NamedLines(Protocol):
+    """Lines by name that claims are assessed by: of a `Run`, or of a measurement."""
+
+    @property
+    def tacton(self) -> str:
+        """Name of the Tacton."""
+
+    @property
+    def scene(self) -> Scene:
+        """The scene, whose load has the lines."""
+
+    @property
+    def places(self) -> Floats:
+        """Places (p, 2) in metre."""
+
+    @property
+    def frequencies(self) -> dict[str, float]:
+        """Frequencies in Hz by name."""
+
+    @property
+    def lines(self) -> dict[str, Floats]:
+        """Amplitudes (p,) by name."""
+
+    @property
+    def unresolved(self) -> tuple[str, ...]:
+        """Names of unresolved lines."""
+
+    @property
+    def spectrum(self) -> tuple[Floats, Floats]:
+        """Frequencies (f,) in Hz and amplitudes (f, p)."""
+
+    @property
+    def is_am(self) -> bool:
+        """Whether the amplitude is modulated."""
+
+    @property
+    def is_stm(self) -> bool:
+        """Whether the focus moves."""
+
+    @property
+    def is_motion(self) -> bool:
+        """Whether they are of displacement."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,14 @@ from skinwave.report.figures import REPORT
 from skinwave.report.palette import label
 from skinwave.report.styles import Style
 from skinwave.report.surfaces import BESIDE, SURFACES, surfaces_figure
-from skinwave.results.propagation import Component, Propagation, Reach, added_lines
+from skinwave.results.propagation import (
+    NEAR,
+    OUTSIDE,
+    Component,
+    Propagation,
+    Reach,
+    added_lines,
+)
 from skinwave.results.run import Run
 from skinwave.scene.keys import LOSSES, MODULI, SCALES
 from skinwave.scene.scene import Scene
@@ -106,38 +113,29 @@ def beside_published(kernel: Run, published: Run) -> Details:
 def _propagated(found: Propagation) -> str:
     if found.strongest is None:
         return NOTHING
-    f, lag = found.strongest.frequency, ""
+    name, said = label(found.column), []
+    if found.share is not None:
+        said = [
+            f"{_percent(found.share)} of the mean-square motion of the {name} lies outside the "
+            f"kernel's {OUTSIDE:g} dB region.",
+            f"It spreads up to {_reach(found.spread)} mm from the path ({NEAR:g} dB); kernel: "
+            f"{_reach(found.kernel_spread)} mm.",
+        ]
     if found.delay is not None:
-        lag = f" by {significant(1e3 * found.delay, 2)} ms at {f:.0f} Hz"
-    if found.share is None:
-        on = label(found.column)
-        return f"On the {on} motion lags the point kernel under the same load{lag}."
-    spread, before = _reach(found.spread), _reach(found.kernel_spread)
-    more = f"; it spreads {spread} mm from the path at -6 dB where the kernel has {before} mm"
-    return (
-        f"Waves carry {_percent(found.share)} of the motion of the {label(found.column)} to where "
-        f"the point kernel, under the same load, predicts next to none{more}"
-        + (f", and lags it{lag}." if lag else ".")
-    )
+        lag, f = significant(1e3 * found.delay, 2), found.strongest.frequency
+        said.append(f"The {name} lags the kernel by {lag} ms at {f:.0f} Hz.")
+    return " ".join(said) or f"The {name} moves at {found.strongest.frequency:.0f} Hz."
 
 
 def _driven(kernel: Run, published: Run) -> str:
-    names = added_lines(kernel, published)
-    drive = kernel.scene.pressure.drive
-    if kernel.scene.pressure == published.scene.pressure:
-        return "The load is the published one, so that nothing else differs from the paper's model."
+    names, pressure = added_lines(kernel, published), kernel.scene.pressure
+    if pressure == published.scene.pressure:
+        return "The load is the published one: only propagation differs from the paper's model."
+    law = f"Drive law and focus ({pressure.drive}, {pressure.profile_name})"
     if not names:
-        return (
-            f"The drive law ({drive}) and the focus, beside the published ones, change strengths "
-            "and add no component."
-        )
+        return f"{law} change strengths of components and add none."
     said = ", ".join(names[:NAMED]) + " and others" * (len(names) > NAMED)
-    return (
-        f"Drive law and focus ({drive}, {kernel.scene.pressure.profile_name}), not propagation, "
-        "add "
-        f"the component{'s' * (len(names) > 1)} {said}: the kernel has "
-        f"{'them' if len(names) > 1 else 'it'} under the same load, and not as published."
-    )
+    return f"{law} add {said}; propagation adds no component."
 
 
 def _above_threshold(found: Propagation) -> str:
@@ -149,17 +147,17 @@ def _above_threshold(found: Propagation) -> str:
             f"The strongest component is {peak.name} at {peak.frequency:.0f} Hz; detection "
             "thresholds are of skin and say nothing of paper."
         )
-    most = f"most at {peak.name} ({peak.frequency:.0f} Hz, {peak.level:+.0f} dB SL)"
+    most = f"{peak.name} ({peak.frequency:.0f} Hz, {peak.level:+.0f} dB SL)"
     if not found.above_threshold:
-        least = f"Below threshold, by least at {most[8:]}."
-        return f"Above threshold, {most}." if peak.level >= 0 else least
+        where = "Above" if peak.level >= 0 else "Below"
+        return f"{where} threshold at the probes; strongest sensation: {most}."
     half, now, twice = found.above_threshold
     if now is None:
-        return f"Below the threshold of detection everywhere, {most}."
-    less = "not at all" if half is None else f"{_reach(half)} mm"
+        return f"Below the threshold of detection everywhere; strongest sensation: {most}."
+    less = "0" if half is None else _reach(half)
     return (
-        f"Above threshold out to {_reach(now)} mm from the path, {most}; with half or twice the "
-        f"pressure, which is known no better, {less} or {_reach(twice)} mm."
+        f"Above threshold up to {_reach(now)} mm from the path; strongest sensation: {most}. The "
+        f"pressure is known only to a factor of 2: {less} to {_reach(twice)} mm."
     )
 
 
@@ -177,7 +175,7 @@ def _sure(shown: Shown) -> str:
     text = f"material: {known}"
     if shown.shares is not None:
         least, most = (significant(100 * share, 2) for share in shown.shares)
-        text += f": with these, moduli and losses in turn, the share is {least} to {most} %"
+        text += f"; with these, the share outside is {least} to {most} %"
     return f"{error}; {text}."
 
 

@@ -106,6 +106,6 @@ def test_the_page_stands_alone(job):
     assert "peak memory" in page
     assert "contradicts M4" in page
     first = page.split("<h2>")[0]
-    assert "Waves carry" in first.split("<img")[0]
+    assert "mean-square motion" in first.split("<img")[0]
     assert "not propagation, add the component" in first.split("<img")[0]
     assert "same load" in first.split("<table")[1]
