@@ -407,8 +407,9 @@ export function spectrum(values, dt) {
 
 /**
  * Levels over a value of the controls, in steps: yields {x, kernel, waves, best} after each of `count`
- * + 1 values from low to high and, last, with the highest of the curve `of` as `best`, {at, level}, to
- * `within` of the range. `levelsAt(value)` returns {kernel, waves} in dB or throws, which skips a value.
+ * + 1 values from low to high and after each refinement and, last, with the highest of the curve `of` as
+ * `best`, {at, level}, to `within` of the range. `levelsAt(value)` returns {kernel, waves} in dB or throws,
+ * which skips a value.
  */
 export function* levelOver(levelsAt, [low, high], { of = "waves", count = 48, within = 1e-3 } = {}) {
   const found = { x: [], kernel: [], waves: [], best: null };
@@ -441,6 +442,7 @@ export function* levelOver(levelsAt, [low, high], { of = "waves", count = 48, wi
       [a, c] = [c.at, d];
       d = measured(a + section * (b - a));
     }
+    yield found;
   }
   found.best = best;
   yield found;

@@ -257,53 +257,25 @@ const keyOfLevels = () => JSON.stringify({ ...values, [view.over]: 0, over: view
 
 /** Levels over a control, refined about the highest, in short turns so that the page stays alive. */
 async function computeLevels() {
-  const key = view.over, [low, high] = OVER[key], of = keyOfLevels(), base = values;
-  const found = levels = { of, x: [], kernel: [], waves: [], best: null };
+  const key = view.over, of = keyOfLevels(), base = values;
   const lead = answer.body.is_skin ? "waves" : "kernel";
+  const levelsAt = (value) => {
+    const own = { ...base, [key]: value };
+    loadOf(own, recordOf(base.body)); // throws for a path that leaves the body
+    const { kernelLevel, level } = respond(own);
+    return { kernel: kernelLevel?.dB ?? NaN, waves: level?.dB ?? NaN };
+  };
+  const asked = levels = { of, x: [], kernel: [], waves: [], best: null };
   let until = performance.now() + TURN;
-  const levelsAt = async (value) => {
-    if (performance.now() > until) {
-      showPane();
-      await new Promise((resolve) => setTimeout(resolve));
-      until = performance.now() + TURN;
-    }
-    if (levels !== found) throw new Error("Another control has moved.");
-    const own = respond({ ...base, [key]: value });
-    return { kernel: own.kernelLevel?.dB ?? NaN, waves: own.level?.dB ?? NaN };
-  };
-  try {
-    for (let k = 0; k <= VALUES; k++) {
-      const value = low + (high - low) * k / VALUES;
-      try {
-        loadOf({ ...base, [key]: value }, recordOf(base.body));
-      } catch { continue; } // a path that leaves the body
-      const own = await levelsAt(value);
-      found.x.push(value);
-      for (const name of ["kernel", "waves"]) found[name].push(own[name]);
-    }
-    found.best = await refine(found.x, found[lead], async (value) => (await levelsAt(value))[lead],
-      REFINED * (high - low));
-  } catch { return; }
-  showPane();
-}
-
-/** The highest level near the best of those that are known, by golden sections: {at, level}. */
-async function refine(x, known, levelAt, within) {
-  const top = known.reduce((best, v, k) => (v > (known[best] ?? -Infinity) ? k : best), 0);
-  if (!Number.isFinite(known[top])) return null;
-  const part = (Math.sqrt(5) - 1) / 2, best = { at: x[top], level: known[top] };
-  const tried = async (at) => {
-    const level = await levelAt(at);
-    if (level > best.level) Object.assign(best, { at, level });
-    return { at, level };
-  };
-  let [a, b] = [x[Math.max(top - 1, 0)], x[Math.min(top + 1, x.length - 1)]];
-  let [c, d] = [await tried(b - part * (b - a)), await tried(a + part * (b - a))];
-  while (b - a > within) {
-    if (c.level > d.level) [b, d, c] = [d.at, c, await tried(d.at - part * (d.at - a))];
-    else [a, c, d] = [c.at, d, await tried(c.at + part * (b - c.at))];
+  for (const found of levelOver(levelsAt, OVER[key], { of: lead, count: VALUES, within: REFINED })) {
+    Object.assign(asked, found);
+    if (performance.now() < until) continue;
+    showPane();
+    await new Promise((resolve) => setTimeout(resolve));
+    if (levels !== asked) return; // another control has moved
+    until = performance.now() + TURN;
   }
-  return best;
+  showPane();
 }
 
 function showBody() {
