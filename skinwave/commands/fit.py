@@ -32,10 +32,6 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--starts", type=int, default=8, metavar="N", help="of the search")
     parser.add_argument("--seed", type=int, default=0, help="of the starts")
     parser.add_argument(
-        "--samples", type=int, default=0, metavar="N",
-        help="sample the posterior, too, by so many steps of each walker",
-    )  # fmt: skip
-    parser.add_argument(
         "--inspect", type=Path, metavar="FILE", help="say what a file holds and lacks, without a "
         "fit: .csv .txt .lvm .tdms .npz .wav .mat .uff .f32",
     )  # fmt: skip
@@ -81,8 +77,7 @@ def run(options: argparse.Namespace) -> int:
         with progress_of(options) as progress:
             found = fit(
                 scene, measured, options.vary, tie=options.tie, kind=options.to or "",
-                model=options.model, starts=options.starts, seed=options.seed,
-                samples=options.samples, progress=progress,
+                model=options.model, starts=options.starts, seed=options.seed, progress=progress,
             )  # fmt: skip
         write(folder, found)
         record.write(folder, record.of_command(options), scene=scene)

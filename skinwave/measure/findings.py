@@ -8,7 +8,7 @@ from simple_model.numbers import counted, percent, significant
 from skinwave.measure.alignment import opposite_sign
 from skinwave.measure.fit import Fit
 from skinwave.measure.inspection import flaws
-from skinwave.measure.intervals import LONG, Direction, Estimate, combined, sharing
+from skinwave.measure.intervals import Direction, Estimate, combined, sharing
 from skinwave.measure.observed import some
 from skinwave.measure.parameters import DELAY
 
@@ -53,7 +53,7 @@ def cautions(found: Fit) -> list[str]:
     said += [_at_limit(found, each) for each in found.estimates if each.at_limit]
     said += [_unresolved(found, each) for each in sharing(found.unresolved)]
     said += _beyond_errors(found) + _coloured(found) + _elsewhere(found)
-    said += _left_out(found) + flaws(found.measured, found.target.scene.pressure) + _short(found)
+    said += _left_out(found) + flaws(found.measured, found.target.scene.pressure)
     named = {key for each in found.unresolved for key in each.keys}
     said += [
         f"the data do not determine {each.key} between its limits; measure more, or leave it out"
@@ -138,17 +138,6 @@ def _factors(found: Fit) -> str:
 def probability(p: float) -> str:
     """A probability with its sign of relation."""
     return f"= {significant(p, 2)}" if p >= LEAST else f"< {LEAST:g}"
-
-
-def _short(found: Fit) -> list[str]:
-    """Sentence on chains of the posterior that are too short for their intervals."""
-    drawn = found.posterior
-    if drawn is None or drawn.is_long:
-        return []
-    return [
-        f"the chains of the posterior are {significant(drawn.lengths, 2)} autocorrelation times "
-        f"long, and below {LONG} their intervals are rough; give more --samples"
-    ]
 
 
 def _left_out(found: Fit) -> list[str]:

@@ -16,13 +16,11 @@ from skinwave.measure.intervals import (
     LEVEL,
     Direction,
     Estimate,
-    Posterior,
     Profile,
     Whiteness,
     correlations,
     estimates,
     half_widths,
-    posterior,
     profiles,
     unresolved,
     whiteness,
@@ -62,7 +60,6 @@ class Fit:
     profiles : of the parameters that are resolved
     whiteness : Whiteness of the residuals
     widenings : (k,) float, factors of the intervals for residuals that are not white
-    posterior : Posterior, if it was sampled
     """
 
     measured: Measurement
@@ -74,7 +71,6 @@ class Fit:
     profiles: tuple[Profile, ...]
     whiteness: Whiteness
     widenings: Floats
-    posterior: Posterior | None = None
 
     @property
     def values(self) -> dict[str, float]:
@@ -108,7 +104,6 @@ def fit(
     model: str = "auto",
     starts: int = STARTS,
     seed: int = 0,
-    samples: int = 0,
     progress: Progress = silent,
 ) -> Fit:
     """Weighted least-squares fit of keys of a scene to a measurement.
@@ -124,8 +119,7 @@ def fit(
         or, of spectra, lines
     model : name of a model, or "auto": the wavenumber integral where the body has one, else "fem"
     starts : how many, between the limits
-    seed : of the starts, and of the samples
-    samples : steps of each walker that samples the posterior; 0 for none
+    seed : of the starts
     progress : called with the name of the phase and the fraction done
 
     Raises
@@ -149,7 +143,6 @@ def fit(
         correlations=correlations(solution), unresolved=unresolved(solution),
         profiles=profiles(solution, progress), whiteness=whiteness(solution.residual),
         widenings=widenings(solution),
-        posterior=posterior(solution, samples, seed, progress) if samples else None,
     )  # fmt: skip
 
 

@@ -126,37 +126,28 @@ def estimate_table(found: Fit) -> Table:
     none = (np.nan, np.nan)
     free = found.solution.problem.parameters.free
     rows = [
-        (each.key, each.value, each.low, each.high, *ends.get(each.key, none),
-         *(found.posterior.intervals[k].tolist() if found.posterior else none), each.is_resolved,
+        (each.key, each.value, each.low, each.high, *ends.get(each.key, none), each.is_resolved,
          each.at_limit, limits.low, limits.high)
-        for k, (each, limits) in enumerate(zip(found.estimates, free, strict=True))
+        for each, limits in zip(found.estimates, free, strict=True)
     ]  # fmt: skip
     return Table((
-        "parameter", "estimate", "low", "high", "profile_low", "profile_high", "posterior_low",
-        "posterior_high", "resolved", "at_limit", "limit_low", "limit_high",
+        "parameter", "estimate", "low", "high", "profile_low", "profile_high", "resolved",
+        "at_limit", "limit_low", "limit_high",
     ), rows, stored=8)  # fmt: skip
 
 
 def _shown_estimates(found: Fit) -> Table:
     """The same for the page: each interval as a range, to two digits of its width."""
     rows = []
-    for key, value, low, high, *others, resolved, at_limit, least, most in estimate_table(
-        found
-    ).rows:
-        ranges = [_range(value, *pair) for pair in (others[:2], others[2:])]
-        digits, *ends = shown(value, low, high) if resolved else (significant(value),)
+    for key, value, low, high, *ends, resolved, at_limit, least, most in estimate_table(found).rows:
+        digits, *limits = shown(value, low, high) if resolved else (significant(value),)
         rows.append((
             key + ", at a limit" * at_limit, digits,
-            " to ".join(ends) if resolved else "not resolved by the data", *ranges,
+            " to ".join(limits) if resolved else "not resolved by the data",
+            "{1} to {2}".format(*shown(value, *ends)) if isfinite(ends[0]) else None,
             f"{least:g} to {most:g}",
         ))  # fmt: skip
-    header = "parameter", "estimate", "95 % interval", "by its profile", "by samples", "limits"
-    table = Table(header, rows)
-    return table if found.posterior else table.only(*header[:4], header[5])
-
-
-def _range(value: float, low: float, high: float) -> str | None:
-    return "{1} to {2}".format(*shown(value, low, high)) if isfinite(low) else None
+    return Table(("parameter", "estimate", "95 % interval", "by its profile", "limits"), rows)
 
 
 def summary(found: Fit) -> dict[str, Any]:
@@ -175,7 +166,6 @@ def summary(found: Fit) -> dict[str, Any]:
         "misfit": found.misfit,
         "whiteness_p": _finite(found.whiteness.p),
         "widened": dict(zip(keys, found.widenings.tolist(), strict=True)),
-        "posterior_autocorrelation_times": found.posterior and found.posterior.lengths,
         "left_out": [
             {"line": line.name, "frequency_hz": line.frequency, "why": line.why,
              "share": _finite(line.share)}
@@ -226,6 +216,4 @@ def _arrays(found: Fit) -> dict[str, Any]:
     }  # fmt: skip
     for each in found.profiles:
         arrays[f"profile {each.key}"] = np.array([each.values, each.excess])
-    if found.posterior is not None:
-        arrays["samples"] = found.posterior.samples
     return arrays

@@ -1,5 +1,5 @@
-"""Intervals of a fit, by the covariance, profiles of the likelihood and samples of the posterior;
-and what the data do not resolve.
+"""Intervals of a fit, by the covariance and by profiles of the likelihood, and what the data do not
+resolve.
 
 At the solution the residual r changes by its slopes J over the unit cube. With s^2 the scale of the
 variances and J / s = U diag(S) V^T, a move by d along a column of V changes the residual by S d of
@@ -39,10 +39,6 @@ SIGNIFICANT = 0.01
 STEPS = 3  # of the other parameters at each value of a profile
 ATTEMPTS = 4  # at the end of the interval of a profile
 ACCURATE = 0.03  # of the excess there, as a root
-WALKERS = 4  # a parameter
-BURNED = 0.3  # of the steps of walkers, which are left out
-WIDEST = 0.2  # of the unit interval, spread of the walkers at their start
-LONG = 50  # autocorrelation times that a chain is to have
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,22 +100,6 @@ class Profile:
     low: float
     high: float
     is_open: bool
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Posterior:
-    """Samples (n, k) in the unit of each key, 95 % intervals (k, 2), and how many steps each walker
-    made over the autocorrelation time.
-    """
-
-    samples: Floats
-    intervals: Floats
-    lengths: float
-
-    @property
-    def is_long(self) -> bool:
-        """Whether the chains are long enough to be relied on."""
-        return self.lengths >= LONG
 
 
 def covariance(solution: Solution) -> Floats:
@@ -348,59 +328,3 @@ def _resolved_steps(solution: Solution, slopes: Floats) -> Floats:
     left, singular, right = np.linalg.svd(slopes, full_matrices=False)
     kept = singular >= 2 * width(solution) * np.sqrt(solution.scale)
     return np.asarray((right[kept].T / singular[kept]) @ left[:, kept].T)
-
-
-def posterior(solution: Solution, steps: int, seed: int, progress: Progress) -> Posterior:
-    """Samples of the posterior, uniform between the limits, by an affine-invariant ensemble of
-    walkers (Foreman-Mackey et al., Publ Astron Soc Pac 125:306 (2013)). The likelihood is that of
-    independent normal errors with the scale that the fit found; where they are not independent, it
-    is flattened by the largest factor of the variances.
-
-    Parameters
-    ----------
-    solution : Solution
-    steps : of each walker
-    seed : of the walkers
-    progress : called with the name of the phase and the fraction done
-
-    Raises
-    ------
-    ValueError
-        If emcee is not installed, or there are too few steps.
-    """
-    try:
-        import emcee
-    except ImportError:
-        raise ValueError('samples need emcee; pip install "skinwave[measure]"') from None
-    if steps < 10:
-        raise ValueError(f"{steps} steps of each walker are too few; give at least 10")
-    problem, k = solution.problem, len(solution.u)
-    scale = solution.scale * float(widenings(solution).max()) ** 2
-
-    def log_posterior(u: Floats) -> float:
-        if not ((u >= 0) & (u <= 1)).all():
-            return -np.inf
-        return -0.5 * float((problem.residual(u) ** 2).sum()) / scale
-
-    sampler = emcee.EnsembleSampler(WALKERS * k + 2, k, log_posterior)
-    rng = np.random.RandomState(seed)  # the generator that emcee takes
-    state = emcee.State(_spread(solution, WALKERS * k + 2, rng), random_state=rng.get_state())
-    for n, _ in enumerate(sampler.sample(state, iterations=steps)):
-        progress("samples of the posterior", n / steps)
-    values = np.array([[p.value(x) for p, x in zip(problem.parameters.free, u, strict=True)]
-                       for u in sampler.get_chain(discard=int(BURNED * steps), flat=True)]
-                      )  # fmt: skip
-    tail = 100 * (1 - LEVEL) / 2
-    time = float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))
-    return Posterior(
-        samples=values, intervals=np.percentile(values, [tail, 100 - tail], axis=0).T,
-        lengths=steps / time if np.isfinite(time) else 0.0,
-    )  # fmt: skip
-
-
-def _spread(solution: Solution, count: int, rng: np.random.RandomState) -> Floats:
-    """Points (count, k) about the solution, as the covariance spreads them, within the limits."""
-    values, v = np.linalg.eigh(covariance(solution))
-    spread = np.minimum(np.sqrt(np.maximum(values, 1e-20)), WIDEST)
-    points = solution.u + (rng.standard_normal((count, len(values))) * spread) @ v.T
-    return np.asarray(np.abs(1 - np.abs(1 - np.mod(points, 2.0))))

@@ -74,15 +74,7 @@ class Table:
         return next((value for name, value in self.notes if key.fullmatch(name) and value), "")
 
 
-def noted(table: Table) -> tuple[str, int, tuple[str, ...]]:
-    """Name, sign (0 if it is not known) and remarks in the notes above a table."""
-    named = [value for key, value in table.notes if key == "name" and value]
-    signs = [DIRECTIONS.get(value, 0) for key, value in table.notes if key == "positive"]
-    remarks = tuple(value for key, value in table.notes if key == "remark" and value)
-    return named[0] if named else "", signs[0] if signs else 0, remarks
-
-
-def with_roles(table: Table, given: Given) -> tuple[Table, tuple[str, ...]]:
+def _with_roles(table: Table, given: Given) -> tuple[Table, tuple[str, ...]]:
     """The table with the roles of columns that their headings do not say, of its chosen columns,
     and remarks.
 
@@ -254,40 +246,6 @@ def _motion(columns: list[Column], given: Given) -> tuple[list[int], list[str]]:
     return [k for k in range(len(columns)) if k not in other], said
 
 
-def axis_of(table: Table, k: int, has_rate: bool) -> tuple[Floats, Floats]:
-    """Times in s and frequencies in Hz of a column; one of them is empty. With a rate that is
-    given, times need no unit.
-    """
-    if k < 0:
-        return np.empty(0), np.empty(0)
-    one = table.columns[k]
-    unit, is_time = one.unit, one.role == TIME
-    values = table.numbers[:, k]
-    if is_time and has_rate and plain(unit) not in TIMES:
-        return values, np.empty(0)
-    if not unit:
-        raise ValueError(
-            f"the column '{one.text or k + 1}' has no unit; write "
-            f"'{'t [s]' if is_time else 'f [Hz]'}'" + ", or give --rate" * is_time
-        )
-    known, what = (TIMES, "time") if is_time else (FREQUENCIES, "frequency")
-    values = in_si(values, scale(unit, known, what))
-    return (values, np.empty(0)) if is_time else (np.empty(0), values)
-
-
-def noted_axis(table: Table) -> tuple[float, float]:
-    """Sampling rate in Hz and first time in s in the notes above a table; nan and 0 without."""
-    start = _noted(table, _START, TIMES)
-    rate, interval = _noted(table, _RATE, FREQUENCIES), _noted(table, _INTERVAL, TIMES)
-    rate = rate if rate > 0 else 1 / interval if interval > 0 else np.nan
-    return rate, 0.0 if np.isnan(start) else start
-
-
-def noted_frequency(table: Table) -> float:
-    """The one frequency in Hz of an exported band; nan if there is none."""
-    return _noted(table, _BAND, FREQUENCIES)
-
-
 def _noted(table: Table, key: re.Pattern[str], units: dict[str, float]) -> float:
     """A number of the notes in SI; nan if it is missing or in another unit."""
     found = re.fullmatch(r"\D*?([-+.\deE,]+)\s*([^\d\s].*)?", table.note(key))
@@ -300,7 +258,7 @@ def _noted(table: Table, key: re.Pattern[str], units: dict[str, float]) -> float
         return float("nan")
 
 
-def agreed(columns: list[Column], given: Given) -> tuple[str, str]:
+def _agreed(columns: list[Column], given: Given) -> tuple[str, str]:
     """The one quantity and unit of columns of motion; "" where none says, or an option replaces."""
     found = []
     for what, replaced in (("role", given.quantity), ("unit", given.unit)):
@@ -315,7 +273,9 @@ def agreed(columns: list[Column], given: Given) -> tuple[str, str]:
     return found[0], found[1]
 
 
-def complex_of(columns: tuple[Column, ...], numbers: Floats, first: int, second: int) -> np.ndarray:
+def _complex_of(
+    columns: tuple[Column, ...], numbers: Floats, first: int, second: int
+) -> np.ndarray:
     """Complex amplitudes of two columns.
 
     Raises
@@ -339,50 +299,84 @@ def complex_of(columns: tuple[Column, ...], numbers: Floats, first: int, second:
 
 
 def recording(table: Table, given: Given) -> Recording:
-    """The recording in a table, of a row for each place and time if it has the columns x and y.
+    """The recording in a table: a column for each place and repetition or, if it has the columns x
+    and y, a row for each time or frequency, place and perhaps repetition.
 
     Raises
     ------
     ValueError
         If its columns do not make a measurement.
     """
-    table, said = with_roles(table, given)
-    is_long = table.of(X) >= 0 or table.of(Y) >= 0
-    found = _long(table, given) if is_long else _wide(table, given)
-    return replace(found, remarks=(*found.remarks, *said))
-
-
-def _wide(table: Table, given: Given) -> Recording:
-    """The recording in columns, one a place and repetition.
-
-    Raises
-    ------
-    ValueError
-        If no column is of time or frequency, or none of motion, or they do not fit together.
-    """
+    table, said = _with_roles(table, given)
     columns, numbers = table.columns, table.numbers
-    at = max(table.of(TIME), table.of(FREQUENCY))
-    if min(table.of(TIME), table.of(FREQUENCY)) >= 0:
-        raise ValueError("columns are of time and of frequency; export one of them")
-    times, frequencies = axis_of(table, at, given.rate is not None)
-    rate, start = noted_axis(table)
-    if at < 0 and given.rate is None and np.isnan(rate):
-        raise ValueError(
-            f"no column is of time or frequency; write a header such as {EXAMPLE}, or give --rate, "
-            "--quantity and --unit"
-        )
-    if at < 0 and not np.isnan(rate):
-        times = start + np.arange(len(numbers)) / rate
+    where, of = (table.of(X), table.of(Y)), (table.of(TIME), table.of(FREQUENCY))
+    at, is_long = max(of), max(where) >= 0
     motion = [k for k, one in enumerate(columns) if one.is_motion]
+    if min(of) >= 0 and not is_long:
+        raise ValueError("columns are of time and of frequency; export one of them")
+    if is_long and (min(where) < 0 or not motion):
+        raise ValueError(f"a table of a row a place needs the columns {LONG}; mend the header")
+    times, frequencies = _axis(table, at, given, is_long)
     if not motion:
         raise ValueError(f"no column is of motion; write a header such as {EXAMPLE}")
     series, quantity, unit = _series(columns, numbers, motion, len(frequencies) > 0, given)
-    values, places = _by_repetition(series)
-    name, sign, remarks = noted(table)
+    drive = _drive(columns, numbers)
+    if is_long:
+        if len(series) > 1:
+            raise ValueError(
+                f"a table of a row a place has {len(series)} columns of motion; leave one"
+            )
+        axis, row = np.unique(times if len(times) else frequencies, return_inverse=True)
+        times, frequencies = (axis, frequencies) if len(times) else (times, axis)
+        places, spot = _distinct(in_metre(columns, numbers, where))
+        again = table.of(REPETITION)
+        run = np.unique(numbers[:, again], return_inverse=True)[1] if again >= 0 else 0 * row
+        values = _filled(series[0][1], (run, row, spot))
+        drive = _filled(drive, (run, row, spot))[0, :, 0] if len(drive) else drive
+    else:
+        values, places = _by_repetition(series)
+    notes = {key: value for key, value in reversed(table.notes) if value}
     return Recording(
         values=values, times=times, frequencies=frequencies, quantity=quantity, unit=unit,
-        places=places, drive=_drive(columns, numbers), sign=sign, name=name, remarks=remarks,
+        places=places, drive=drive, sign=DIRECTIONS.get(notes.get("positive", ""), 0),
+        name=notes.get("name", ""),
+        remarks=(*(value for key, value in table.notes if key == "remark" and value), *said),
     )  # fmt: skip
+
+
+def _axis(table: Table, at: int, given: Given, is_long: bool) -> tuple[Floats, Floats]:
+    """Times in s and frequencies in Hz of the rows, one of them empty, by a column or the notes;
+    both empty where the rate is given. With a rate that is given, times need no unit.
+    """
+    none, count = np.empty(0), len(table.numbers)
+    if at < 0 and is_long:
+        band = _noted(table, _BAND, FREQUENCIES)  # of an exported band
+        if np.isnan(band):
+            raise ValueError(f"a table of a row a place needs the columns {LONG}; mend the header")
+        return none, np.full(count, band)
+    if at < 0:
+        start = _noted(table, _START, TIMES)
+        rate, interval = _noted(table, _RATE, FREQUENCIES), _noted(table, _INTERVAL, TIMES)
+        rate = rate if rate > 0 else 1 / interval if interval > 0 else np.nan
+        if given.rate is None and np.isnan(rate):
+            raise ValueError(
+                f"no column is of time or frequency; write a header such as {EXAMPLE}, or give "
+                "--rate, --quantity and --unit"
+            )
+        start = 0.0 if np.isnan(start) else start
+        return (none if np.isnan(rate) else start + np.arange(count) / rate), none
+    one, values = table.columns[at], table.numbers[:, at]
+    is_time = one.role == TIME
+    if is_time and given.rate is not None and not is_long and plain(one.unit) not in TIMES:
+        return values, none
+    if not one.unit:
+        raise ValueError(
+            f"the column '{one.text or at + 1}' has no unit; write "
+            f"'{'t [s]' if is_time else 'f [Hz]'}'" + ", or give --rate" * is_time
+        )
+    known, what = (TIMES, "time") if is_time else (FREQUENCIES, "frequency")
+    values = in_si(values, scale(one.unit, known, what))
+    return (values, none) if is_time else (none, values)
 
 
 def _series(
@@ -393,15 +387,15 @@ def _series(
         if parts := [columns[k].text for k in motion if columns[k].part]:
             raise ValueError(f"the column '{parts[0]}' is of a spectrum; give the column 'f [Hz]'")
         found = [(columns[k], numbers[:, k]) for k in motion]
-        return found, *agreed([one for one, _ in found], given)
+        return found, *_agreed([one for one, _ in found], given)
     if len(motion) % 2:
         raise ValueError(
             "a spectrum needs two columns a place: 're v(0,0)', 'im v(0,0)', or magnitude and "
             "phase; choose them by --columns"
         )
     pairs = zip(motion[::2], motion[1::2], strict=True)
-    found = [(columns[k], complex_of(columns, numbers, k, other)) for k, other in pairs]
-    return found, *agreed([one for one, _ in found], given)
+    found = [(columns[k], _complex_of(columns, numbers, k, other)) for k, other in pairs]
+    return found, *_agreed([one for one, _ in found], given)
 
 
 def _by_repetition(series: list[tuple[Column, np.ndarray]]) -> tuple[np.ndarray, Floats]:
@@ -419,47 +413,10 @@ def _by_repetition(series: list[tuple[Column, np.ndarray]]) -> tuple[np.ndarray,
 def _drive(columns: tuple[Column, ...], numbers: Floats) -> np.ndarray:
     found = [k for k, one in enumerate(columns) if one.role == DRIVE]
     if len(found) == 2:
-        return complex_of(columns, numbers, *found)
+        return _complex_of(columns, numbers, *found)
     if len(found) > 2:
         raise ValueError(f"{len(found)} columns are of the drive; leave one")
     return numbers[:, found[0]] if found else np.empty(0)
-
-
-def _long(table: Table, given: Given) -> Recording:
-    """The recording in rows of a time or frequency, a place, and perhaps a repetition.
-
-    Raises
-    ------
-    ValueError
-        If a column is missing, or not every place has a value at every time once.
-    """
-    columns, numbers = table.columns, table.numbers
-    at = max(table.of(TIME), table.of(FREQUENCY))
-    where = table.of(X), table.of(Y)
-    motion = [k for k, one in enumerate(columns) if one.is_motion]
-    band = noted_frequency(table)
-    if (at < 0 and np.isnan(band)) or min(where) < 0 or not motion:
-        raise ValueError(f"a table of a row a place needs the columns {LONG}; mend the header")
-    times, frequencies = axis_of(table, at, False)
-    if at < 0:
-        frequencies = np.full(len(numbers), band)
-    series, quantity, unit = _series(columns, numbers, motion, len(frequencies) > 0, given)
-    if len(series) > 1:
-        raise ValueError(f"a table of a row a place has {len(series)} columns of motion; leave one")
-    axis, row = np.unique(times if len(times) else frequencies, return_inverse=True)
-    places, spot = _distinct(in_metre(columns, numbers, where))
-    again, run = table.of(REPETITION), np.zeros(len(row), int)
-    if again >= 0:
-        run = np.unique(numbers[:, again], return_inverse=True)[1]
-    values = _filled(series[0][1], (run, row, spot))
-    name, sign, remarks = noted(table)
-    driven = _drive(columns, numbers)
-    return Recording(
-        values=values, quantity=quantity, unit=unit, places=places, sign=sign, name=name,
-        drive=_filled(driven, (run, row, spot))[0, :, 0] if len(driven) else driven,
-        remarks=remarks, times=axis if len(times) else times,
-        frequencies=frequencies if len(times) else axis,
-    )  # fmt: skip
 
 
 def in_metre(columns: tuple[Column, ...], numbers: Floats, where: tuple[int, int]) -> Floats:
