@@ -9,7 +9,7 @@ import io
 import re
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 
@@ -39,6 +39,7 @@ _CLOCK = re.compile(
     r"(?:(\d{1,2}):(\d\d):(\d\d(?:[.,]\d+)?)\s*([AP]M)?(?:Z|[+-]\d\d:?\d\d)?)?"
 )
 _LEADING_ZERO = re.compile(r",0\d+(?=,|$)")
+Notes = list[tuple[str, str]]
 
 
 def read(path: Path, given: Given) -> Recording:
@@ -73,6 +74,30 @@ def places(path: Path) -> Floats:
     return in_metre(columns, found.numbers, (where[0][0], where[1][0]))
 
 
+@dataclass(frozen=True)
+class _Layout:
+    """How rows of a table are written: what separates cells, whether decimal signs are commas, the
+    columns of numbers, and how many cells a row has.
+    """
+
+    delimiter: str
+    comma: bool
+    kept: tuple[int, ...]
+    width: int
+
+    def cells(self, line: str) -> list[str]:
+        """Cells of a line, with decimal points."""
+        return _cells(line, self.delimiter, self.comma)
+
+    def is_row(self, line: str) -> bool:
+        """Whether a line is a row: values in the columns of numbers, and one number at least."""
+        cells = self.cells(line)
+        if not self.kept[-1] < len(cells) <= self.width:
+            return False
+        found = [_value(cells[k]) for k in self.kept]
+        return None not in found and any(_is_number(cells[k]) for k in self.kept)
+
+
 def table(text: str) -> Table:
     """The table in a text: columns, numbers, and notes above it.
 
@@ -91,21 +116,20 @@ def table(text: str) -> Table:
         word = next((cell for cell in cells if number_in(cell) is None), cells[0])
         wrong = f"line {len(lines)} has '{word[:40]}', which is no number; mend it"
     misfits = []
-    for delimiter, comma in _separations(last):
-        kept, width = _columns(last, delimiter, comma)
-        first = next((k for k, line in enumerate(lines)
-                      if _is_row(_cells(line, delimiter, comma), kept, width)), -1)  # fmt: skip
+    for layout in _layouts(last):
+        first = next((k for k, line in enumerate(lines) if layout.is_row(line)), -1)
         if first < 0:
             continue
         try:
-            names, units, notes = _header(lines[:first], delimiter, kept, width)
+            names, units, notes = _header(lines[:first], layout)
         except ValueError as error:
             misfits.append(str(error))
             continue
-        _check_text(names, units, kept, _cells(lines[first], delimiter, comma), notes)
-        numbers = _numbers(lines, first, delimiter, comma, kept, names, notes)
-        columns = [column(names[k], units[k]) for k in kept]
-        for k, cell in enumerate(_cells(lines[first], delimiter, comma)[c] for c in kept):
+        row = layout.cells(lines[first])
+        _check_text(names, units, layout, row, notes)
+        numbers = _numbers(lines, first, layout, names, notes)
+        columns = [column(names[k], units[k]) for k in layout.kept]
+        for k, cell in enumerate(row[c] for c in layout.kept):
             if _clock(cell) is not None:
                 numbers[:, k] -= numbers[0, k]
                 columns[k] = replace(columns[k], role=TIME, unit="s")
@@ -113,8 +137,8 @@ def table(text: str) -> Table:
     raise ValueError([*misfits, wrong][0])
 
 
-def _separations(rows: list[str]) -> Iterator[tuple[str, bool]]:
-    """Delimiters, and whether decimal signs are commas, by which most rows are alike."""
+def _layouts(rows: list[str]) -> Iterator[_Layout]:
+    """Layouts by which most rows at the end of a file are alike."""
     for delimiter in "\t;, ":
         if delimiter != " " and not any(delimiter in line for line in rows):
             continue
@@ -123,29 +147,17 @@ def _separations(rows: list[str]) -> Iterator[tuple[str, bool]]:
             _with_point(cell) != cell
             for line in bare if "," in line for cell in _cells(line, delimiter)
         )  # fmt: skip
-        if len(_columns(rows, delimiter, comma)[0]):
-            yield delimiter, comma
-
-
-def _columns(rows: list[str], delimiter: str, comma: bool) -> tuple[list[int], int]:
-    """The columns of numbers at the end of a file, and how many cells its rows have."""
-    split = [_cells(line, delimiter, comma) for line in rows]
-    widths = [len(cells) for cells in split[-3:]]
-    width = max(widths, key=widths.count)
-    alike = [cells for cells in split if len(cells) == width]
-    alike = alike[len(alike) // 2 :]  # without the header of a short table
-    full = [k for k in range(width) if any(cells[k] for cells in alike)]
-    kept = [k for k in full if 2 * sum(_is_value(c[k]) for c in alike) >= len(alike)]
-    is_table = any(_is_number(c[k]) for c in alike for k in kept)
-    return kept if is_table and (delimiter != " " or kept == full) else [], width
-
-
-def _is_row(cells: list[str], kept: list[int], width: int) -> bool:
-    """Whether cells are a row of the table: values in the columns of numbers, and one at least."""
-    if not kept[-1] < len(cells) <= width:
-        return False
-    found = [cells[k] for k in kept]
-    return all(map(_is_value, found)) and any(map(_is_number, found))
+        split = [_cells(line, delimiter, comma) for line in rows]
+        widths = [len(cells) for cells in split[-3:]]
+        width = max(widths, key=widths.count)
+        alike = [cells for cells in split if len(cells) == width]
+        alike = alike[len(alike) // 2 :]  # without the header of a short table
+        full = [k for k in range(width) if any(cells[k] for cells in alike)]
+        values = [sum(_value(cells[k]) is not None for cells in alike) for k in full]
+        kept = [k for k, count in zip(full, values, strict=True) if 2 * count >= len(alike)]
+        is_table = any(_is_number(cells[k]) for cells in alike for k in kept)
+        if is_table and (delimiter != " " or kept == full):
+            yield _Layout(delimiter, comma, tuple(kept), width)
 
 
 def _cells(line: str, delimiter: str, comma: bool = False) -> list[str]:
@@ -182,10 +194,6 @@ def _is_number(cell: str) -> bool:
     return value is not None and bool(np.isfinite(value))
 
 
-def _is_value(cell: str) -> bool:
-    return _value(cell) is not None
-
-
 def _value(cell: str) -> float | None:
     """Number of a cell: nan of one that was not measured, inf beyond the range, s of a clock."""
     number = number_in(cell)
@@ -216,9 +224,7 @@ def _clock(cell: str) -> float | None:
     return seconds
 
 
-def _header(
-    above: list[str], delimiter: str, kept: list[int], width: int
-) -> tuple[list[str], list[str], list[tuple[str, str]]]:
+def _header(above: list[str], layout: _Layout) -> tuple[list[str], list[str], Notes]:
     """Names and units of columns, and notes, of the lines above a table.
 
     Raises
@@ -226,6 +232,7 @@ def _header(
     ValueError
         If the line of names does not fit the columns.
     """
+    delimiter, kept, width = layout.delimiter, layout.kept, layout.width
     at = [k for k, line in enumerate(above) if line.strip()]
     notes = [_note(above[k]) for k in at]
     rows = [_heading(above[k], delimiter) for k in at]
@@ -254,12 +261,11 @@ def _header(
 
 
 def _check_text(
-    names: list[str], units: list[str], kept: list[int], cells: list[str],
-    notes: list[tuple[str, str]],
-) -> None:  # fmt: skip
+    names: list[str], units: list[str], layout: _Layout, cells: list[str], notes: Notes
+) -> None:
     """Note the columns of text that are left out; refuse those whose heading is that of numbers."""
     for k, cell in enumerate(cells[: len(names)]):
-        if k in kept or not (names[k] and cell) or _is_number(cell):
+        if k in layout.kept or not (names[k] and cell) or _is_number(cell):
             continue
         if (one := column(names[k], units[k])).role or quantity_of(one.unit):
             raise ValueError(
@@ -304,41 +310,37 @@ def _note(line: str) -> tuple[str, str]:
 
 
 def _numbers(
-    lines: list[str], first: int, delimiter: str, comma: bool, kept: list[int], names: list[str],
-    notes: list[tuple[str, str]],
-) -> Floats:  # fmt: skip
+    lines: list[str], first: int, layout: _Layout, names: list[str], notes: Notes
+) -> Floats:
     """Numbers (n, c) of the lines from the first on; notes from cells beside them are added."""
-    rows, width = lines[first:], len(names)
+    rows, width, delimiter = lines[first:], len(names), layout.delimiter
     if delimiter == "," and any(_LEADING_ZERO.search(line) for line in rows[:SHOWN]):
         raise ValueError(
             f"line {first + 1} seems to have decimal commas between commas; export columns between "
             "semicolons or tabs"
         )
-    plain_rows = "\n".join(rows)
-    if len(kept) == width > 1 and not (comma and "." in plain_rows):
+    text = "\n".join(rows)
+    if len(layout.kept) == width > 1 and not (layout.comma and "." in text):
         with suppress(ValueError):
             found = np.loadtxt(
-                io.StringIO(plain_rows.replace(",", ".") if comma else plain_rows), ndmin=2,
+                io.StringIO(text.replace(",", ".") if layout.comma else text), ndmin=2,
                 comments=None, delimiter=None if delimiter == " " else delimiter,
             )  # fmt: skip
             if found.shape[1] == width and not np.isinf(found).any():
                 return found
     return np.array([
-        _row(line, k, delimiter, comma, kept, names, notes)
+        _row(line, k, layout, names, notes)
         for k, line in enumerate(rows, first + 1) if line.strip() or width == 1
     ])  # fmt: skip
 
 
-def _row(
-    line: str, number: int, delimiter: str, comma: bool, kept: list[int], names: list[str],
-    notes: list[tuple[str, str]],
-) -> list[float]:  # fmt: skip
+def _row(line: str, number: int, layout: _Layout, names: list[str], notes: Notes) -> list[float]:
     """Numbers of a line; its other cells are notes."""
-    cells = _cells(line, delimiter, comma) or [""]
+    cells, kept, comma = layout.cells(line) or [""], layout.kept, layout.comma
     wrong = next((cell for cell in cells if comma and "." in cell and "," in cell
                   and _clock(cell) is None), "")  # fmt: skip
     if comma and not wrong and "." in line and ":" not in line:
-        wrong = next((cell for cell in _cells(line, delimiter) if "." in cell), "")
+        wrong = next((cell for cell in _cells(line, layout.delimiter) if "." in cell), "")
     cure = "has a dot, and the file has decimal commas; leave out separators of thousands"
     if not wrong and not kept[-1] < len(cells) <= len(names):
         raise ValueError(
@@ -353,10 +355,8 @@ def _row(
     aside = {k: cell for k, cell in enumerate(cells) if cell and k not in kept}
     for k, cell in aside.items():
         if names[k] and _is_number(cell):
-            wrong, cure = (
-                cell,
-                f"is in the column '{names[k][:40]}', which ends early; leave it out",
-            )
+            wrong = cell
+            cure = f"is in the column '{names[k][:40]}', which ends early; leave it out"
     if wrong:
         raise ValueError(f"line {number} has '{wrong[:40]}', which {cure}")
     if aside and not any(names[k] for k in aside):
