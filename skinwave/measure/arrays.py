@@ -22,9 +22,9 @@ from meshes.tetmesh import MeshError
 from simple_model.quantities import QUANTITIES
 from simple_model.typing import Floats
 from skinwave.measure import units
+from skinwave.measure.delays import aligned
 from skinwave.measure.headers import NAMES, TIME, column
 from skinwave.measure.recording import Given, Recording, nowhere
-from skinwave.measure.references import aligned
 from skinwave.measure.table import rises
 from skinwave.models import named, names
 
@@ -136,12 +136,8 @@ def _of_response(found: Arrays) -> str:
 
 
 def recording(arrays: Arrays, given: Given) -> Recording:
-    """The recording that named arrays hold.
-
-    Parameters
-    ----------
-    arrays : arrays of numbers and texts, by name; of a structure as "structure.name"
-    given : Given, whose variable is the array of motion
+    """The recording that arrays of numbers and texts hold by name, of a structure by
+    "structure.name"; the motion is the variable that is given.
 
     Raises
     ------
@@ -202,14 +198,8 @@ def _last(name: str) -> str:
 def _in_order(
     values: np.ndarray, samples: int, places: int, name: str
 ) -> tuple[np.ndarray, list[str]]:
-    """Values (r, n, p), whatever the order of the axes of an array of one to three that are longer
-    than 1, and what was assumed.
-
-    Parameters
-    ----------
-    values : array
-    samples, places : how many times or frequencies and places there are; 0 if not known
-    name : of the array
+    """Values (r, n, p), whatever the order of the one to three axes of an array, by the numbers of
+    times or frequencies and of places, 0 where not known; and what was assumed.
     """
     kept = values if values.ndim <= 3 else values.squeeze()
     if kept.ndim > 3 or kept.ndim == 0:

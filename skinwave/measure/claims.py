@@ -68,15 +68,8 @@ def by_name(
     unresolved: Sequence[str],
     spectrum: tuple[Floats, Floats],
 ) -> LinesByName:
-    """Lines by every name that they have.
-
-    Parameters
-    ----------
-    scene : Scene, whose probes are the places
-    names : names by that of each line, in the order of the lines
-    lines : MeasuredLines
-    unresolved : names of the others
-    spectrum : frequencies (f,) in Hz and amplitudes (f, p)
+    """Lines at the probes of a scene by every name that they have, from the names by the first of
+    each, in the order of the lines; names of the unresolved ones, and a spectrum (f,), (f, p).
     """
     size = np.abs(lines.mean)
     around = lines.radius(1 - (1 - CONFIDENCE) / max(size.size, 1))

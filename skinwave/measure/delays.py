@@ -1,4 +1,6 @@
-"""Delays that bring lines into step: maxima of the correlation of two sums of sinusoids."""
+"""Delays that bring signals into step: places measured one after the other by the reference that
+was recorded with each, and lines by maxima of the correlation of two sums of sinusoids.
+"""
 
 import numpy as np
 from scipy.special import fdtrc
@@ -9,6 +11,13 @@ A_PERIOD = 8  # trial delays in a period of the highest line
 NEWTON = 5  # steps
 MOST_TRIALS = 2**21
 JITTER = 1e-3  # chance below which repetitions are out of step
+LEAST_LEFT = 0.5  # of the samples, after what is not common to all places is cut off
+ALIKE = 0.8  # correlation of references that are of one signal
+WHOLE = 0.01  # samples: smaller fractions of a delay are round-off
+ONE_AFTER_ANOTHER = (
+    "no reference was recorded with each place: they are taken as simultaneous, and phases between "
+    "places are wrong unless one trigger started all"
+)
 
 
 def correlation(
@@ -67,10 +76,7 @@ def in_step(each: np.ndarray, frequencies: Floats) -> tuple[np.ndarray, Floats]:
     ----------
     each : (r, f, p) complex, at least two repetitions
     frequencies : (f,) float, Hz
-
-    Returns
-    -------
-    (r, f, p) complex, and the shifts (r,) in s, of mean zero
+    Shifts (r,) are in s and have the mean zero.
     """
     r = len(each)
     if not frequencies.size:
@@ -117,3 +123,79 @@ def _turned(frequencies: Floats, shifts: Floats) -> np.ndarray:
 def _squares(each: np.ndarray) -> Floats:
     """Sum (f, p) of squared deviations from the mean."""
     return np.asarray((np.abs(each - each.mean(axis=0)) ** 2).sum(axis=0))
+
+
+def aligned(values: Floats, references: Floats) -> tuple[Floats, Floats, str]:
+    """Values from where the reference of each begins, that reference, and a sentence.
+
+    Parameters
+    ----------
+    values, references : (r, t, p) float, of each repetition and place
+    Of references that are not alike there is none, and values are as they were.
+    """
+    lags = _lags(references)
+    count = values.shape[1]
+    begin = lags - lags.min()
+    left = count - int(np.ceil(begin.max()))
+    if left < LEAST_LEFT * count:
+        return values, np.empty(0), (
+            f"places are not aligned in time: their references lie {begin.max():.0f} samples apart"
+        )  # fmt: skip
+    moved, drives = _shifted(values, begin, left), _shifted(references, begin, left)
+    centred = drives - drives.mean(axis=1, keepdims=True)
+    centred /= np.linalg.norm(centred, axis=1, keepdims=True) + np.finfo(float).tiny
+    alike = np.einsum("t,rtp->rp", centred[0, :, 0], centred)
+    if alike.min() < ALIKE:
+        return values, np.empty(0), (
+            f"places are not aligned in time: their references differ, with a correlation of "
+            f"{alike.min():.2g}; phases between places are unknown"
+        )  # fmt: skip
+    said = f"places aligned in time by their references, by up to {np.ptp(lags):.4g} samples"
+    return moved, drives[0, :, 0], said
+
+
+def _lags(references: Floats) -> Floats:
+    """Delay (r, p) in samples of each reference (r, t, p) behind the first.
+
+    Whole samples are where the cross-correlation is largest; the fraction is the slope of the
+    phase over frequency of what overlaps.
+    """
+    from scipy.signal import correlate  # which takes long to import
+
+    centred = references - references.mean(axis=1, keepdims=True)
+    n = centred.shape[1]
+    first = centred[0, :, 0]
+    found = np.zeros((centred.shape[0], centred.shape[2]))
+    for r, p in np.ndindex(*found.shape):
+        one = centred[r, :, p]
+        lag = int(np.argmax(correlate(one, first, method="fft"))) - (n - 1)
+        fraction = _fraction(
+            first[max(-lag, 0) : n - max(lag, 0)], one[max(lag, 0) :][: n - abs(lag)]
+        )
+        found[r, p] = lag + (fraction if WHOLE < abs(fraction) < 1 else 0.0)
+    return found
+
+
+def _fraction(first: Floats, other: Floats) -> float:
+    """Delay in samples of a signal behind another that it nearly overlaps."""
+    window = np.hanning(len(first))
+    cross = np.fft.rfft(window * other) * np.fft.rfft(window * first).conj()
+    omega = 2 * np.pi * np.fft.rfftfreq(len(first))
+    weights = np.abs(cross) * (np.abs(cross) > 1e-3 * np.abs(cross).max(initial=0.0))
+    size = float((weights * omega**2).sum())
+    return -float((weights * omega * np.angle(cross)).sum()) / size if size > 0 else 0.0
+
+
+def _shifted(values: Floats, begin: Floats, left: int) -> Floats:
+    """Values (r, m, p) from `begin` (r, p) on, between samples by cubic splines."""
+    from scipy.interpolate import CubicSpline  # only where it is needed: it takes a while
+
+    found = np.empty((values.shape[0], left, values.shape[2]))
+    for r, p in np.ndindex(*begin.shape):
+        whole = int(begin[r, p])
+        at = begin[r, p] + np.arange(left)
+        found[r, :, p] = (
+            values[r, whole : whole + left, p] if whole == begin[r, p]
+            else CubicSpline(np.arange(values.shape[1]), values[r, :, p])(at)
+        )  # fmt: skip
+    return found

@@ -71,17 +71,8 @@ class Inspection:
 
 
 def inspect(measured: Measurement, *, alarm: float = ALARM) -> Inspection:
-    """Inspection of a measurement.
-
-    Parameters
-    ----------
-    measured : Measurement
-    alarm : probability that noise alone has any line, 0..1
-
-    Raises
-    ------
-    ValueError
-        If the probability is outside 0..1.
+    """Inspection of a measurement, with lines of which noise alone has any with the probability
+    `alarm`; raises a ValueError if that is not between 0 and 1.
     """
     if not 0 < alarm < 1:
         raise ValueError(f"the probability {alarm:g} of a false alarm must be between 0 and 1")
@@ -196,13 +187,9 @@ def hum_of(
     It takes a line at the mains frequency, or at twice and three times it: 200, 400 and 600 Hz are
     multiples of 50 Hz as well, and may be a load's own. A multiple is one of the mains frequency as
     found, not of 50 Hz, within its standard error and a twentieth of 1/duration. One that is
-    stronger than the mains frequency itself may be the load's: "3 x 50 Hz, mains or load".
-
-    Parameters
-    ----------
-    lines : of a record
-    duration : of it, s
-    driven : numbers of lines that are in the recorded drive, whose multiples are none of the mains
+    stronger than the mains frequency itself may be the load's: "3 x 50 Hz, mains or load". Lines
+    whose numbers are `driven` are in the drive of the record, and their multiples are no hum; the
+    duration is in s.
     """
     found: dict[int, str] = {}
     for mains, line, first in _bases(lines, driven):

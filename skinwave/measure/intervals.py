@@ -136,13 +136,8 @@ def _widened(solution: Solution, rows: Floats) -> Floats:
 
 
 def widening(residual: Floats, rows: Floats) -> Floats:
-    """Factors (k,) >= 1 by which intervals of linear combinations of the errors are wider than for
-    independent ones.
-
-    Parameters
-    ----------
-    residual : (n, s) float
-    rows : (k, n, s) float, combinations P of the errors
+    """Factors (k,) >= 1 by which intervals of linear combinations P (k, n, s) of the errors are
+    wider than for independent ones, by the residual (n, s).
     """
     power = np.abs(np.fft.fft(residual, axis=0)) ** 2 / len(residual)
     power[0] = power[1:3].mean(axis=0)  # a fit may have taken the mean out

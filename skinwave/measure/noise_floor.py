@@ -27,10 +27,6 @@ def floor_of(density: Floats, runs: int, kept: Floats | None = None) -> Floats:
     runs : repetitions
     kept : (f,) float, shares of the noise that bins have where lines have been fitted and taken
         out; all of it if not given
-
-    Returns
-    -------
-    (f, p) float
     """
     kept = np.ones(len(density)) if kept is None else kept
     bins = _telling(kept)

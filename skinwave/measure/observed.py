@@ -137,13 +137,8 @@ class Data:
 
 
 def data_of(kind: str, measured: Measurement, aim: Target) -> Data:
-    """Data of a kind, "waveforms", "lines" or "amplitudes", from a measurement.
-
-    Parameters
-    ----------
-    kind : str, one of `KINDS`
-    measured : Measurement
-    aim : Target, whose model predicts them
+    """Data of a kind of `KINDS`, "waveforms", "lines" or "amplitudes", from a measurement, which
+    the model of a target predicts.
 
     Raises
     ------

@@ -116,14 +116,7 @@ class Target:
 
 
 def target(scene: Scene, model: str, quantity: Quantity, places: Floats) -> Target:
-    """Target of a model.
-
-    Parameters
-    ----------
-    scene : Scene
-    model : name of one that has a body
-    quantity : Quantity, of the normal motion
-    places : (p, 2) float, metre
+    """Target of a model by its name, for a quantity of the normal motion at places (p, 2) in metre.
 
     Raises
     ------
@@ -153,12 +146,6 @@ def with_reduction(aim: Target, parameters: Parameters, progress: Progress) -> T
     """Target whose body is reduced once, where the model reduces bodies and of its scene only
     materials, thicknesses and the pressure are varied, within ranges that one reduced-order model
     serves.
-
-    Parameters
-    ----------
-    aim : Target
-    parameters : Parameters of the fit
-    progress : called with the name of the phase and the fraction done
     """
     ranges = {each.key: (each.low, each.high) for each in parameters.free}
     ranges = {key: ranges[key] for key in aim.rest(dict.fromkeys(ranges, 1.0))}
@@ -259,11 +246,8 @@ def _history(aim: Target, values: Values, last: float) -> CubicSpline:
 
 
 def _flat_lines_of(scene: Scene) -> tuple[Floats, Complex]:
-    """Lines of what a scene's probes read: frequencies (f,) in Hz, amplitudes (f, p), SI.
-
-    Parameters
-    ----------
-    scene : Scene, of a quantity of normal motion at the surface
+    """Lines of the normal motion that a scene's probes read: frequencies (f,) in Hz, amplitudes (f,
+    p), SI.
     """
     points = scene.probe_points
     if scene.load.is_plain:
@@ -276,12 +260,8 @@ def _flat_lines_of(scene: Scene) -> tuple[Floats, Complex]:
 
 
 def _flat_history(scene: Scene, times: Floats) -> Floats:
-    """Waveforms (t, p) of what a scene's probes read, SI: from rest until that is the steady state.
-
-    Parameters
-    ----------
-    scene : as for `flat_lines`
-    times : (t,) float, s, equally spaced from 0
+    """Waveforms (t, p), SI, of the same from rest at times (t,) in s, equally spaced from 0; the
+    steady state where the transient has decayed.
     """
     parts, asked, points = _parts(scene), scene.reading.asked, scene.probe_points
 

@@ -3,6 +3,8 @@ and two published sets.
 """
 
 import io
+import json
+import re
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,14 +15,21 @@ from numpy.typing import ArrayLike
 
 from meshes import reading
 from simple_model.typing import Floats
-from skinwave.measure import arrays, labview, skinsource, text, universal
+from skinwave.measure import arrays, labview, text, universal
 from skinwave.measure.headers import Column
 from skinwave.measure.measurement import Measurement
-from skinwave.measure.recording import Given, Recording, completed
+from skinwave.measure.recording import Given, Recording, completed, nowhere
 from skinwave.measure.table import Table, recording
 from skinwave.measure.units import length
 
 LARGEST_WAV = 500_000_000  # bytes
+SAMPLES, SENSORS, AXES, RATE = 522, 72, 3, 1300.0
+SKINSOURCE_BYTES = 4 * SAMPLES * SENSORS * AXES
+NORMAL = 2  # of the axes
+SKINSOURCE = "https://github.com/yonvisell/skinsource (public/data/impulse-responses)"
+HAND_LENGTHS = (0.175, 0.165, 0.185, 0.165)  # m, by model
+DRAWN_HAND = 398.1017  # pixels of the drawing that the sensors' places are of
+_NAME = re.compile(r"model-([1-4])-location-(0[1-9]|1\d|20)\.f32", re.IGNORECASE)
 
 
 def read_wav(path: Path, given: Given) -> Recording:
@@ -54,6 +63,63 @@ def read_wav(path: Path, given: Given) -> Recording:
     )
 
 
+def read_skinsource(path: Path, given: Given) -> Recording:
+    """SkinSource: acceleration normal to the skin of hand and forearm at 72 sensors after a unit
+    impulse of force at one of 20 palmar places.
+
+    Tummala et al., IEEE Haptics Symposium 2024, doi 10.1109/HAPTICS59260.2024.10520852; data of
+    four people by doi 10.5281/zenodo.10547601: float32, column-major (522 times, 72 sensors, 3
+    axes), the third axis normal to the skin.
+
+    Raises
+    ------
+    ValueError
+        If the file is not one of the 80 by name or size.
+    """
+    found = _NAME.fullmatch(path.name)
+    if not found:
+        raise ValueError(
+            "the name is not that of a SkinSource file, model-1-location-01.f32 to "
+            f"model-4-location-20.f32; take these of {SKINSOURCE}"
+        )
+    content = reading.content(path, SKINSOURCE_BYTES + 1)
+    values = np.frombuffer(content[: len(content) // 4 * 4], "<f4")
+    if len(content) != SKINSOURCE_BYTES or not np.isfinite(values).all():
+        raise ValueError(
+            f"it has {len(content):,} bytes where SkinSource has {SKINSOURCE_BYTES:,} of finite "
+            f"numbers; download it anew from {SKINSOURCE}"
+        )
+    places, placed = _sensors(path, int(found[1]))
+    impulse = np.zeros(SAMPLES)
+    impulse[0] = 1.0
+    normal = values.reshape((SAMPLES, SENSORS, AXES), order="F")[None, :, :, NORMAL]
+    return Recording(
+        values=normal.astype(np.float64), rate=RATE, quantity="acceleration",
+        unit="m/s2", places=places, drive=impulse,
+        name=f"SkinSource model {found[1]}, location {int(found[2])}",
+        remarks=(
+            "acceleration after a force of 1 for one sample; the unit is not in the file, m/s2 per "
+            "N is plausible", *placed,
+        ),
+    )  # fmt: skip
+
+
+def _sensors(path: Path, model: int) -> tuple[Floats, list[str]]:
+    """Places (72, 2) in metre of the drawing in the download, two folders above, if it is there."""
+    drawing = path.parent.parent / "visualization.json"
+    if not drawing.is_file():
+        return nowhere(SENSORS), []
+    try:
+        found = json.loads(reading.text(drawing))["outputLocations"]
+        pixels = np.array([[np.nan if v is None else v for v in pair] for pair in found], float)
+        if pixels.shape != (SENSORS, 2):
+            raise ValueError
+    except (ValueError, KeyError, TypeError):
+        raise ValueError(f"{drawing} is not SkinSource's; download it anew or remove it") from None
+    scale = HAND_LENGTHS[model - 1] / DRAWN_HAND
+    return scale * pixels, ["places are those of SkinSource's drawing of the arm, spread flat"]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Reader:
     """A format of files: its `words`, the `suffixes` of its names, what reads it, and which options
@@ -80,7 +146,7 @@ READERS = (
         read=universal.read, choose=("direction",),
     ),
     Reader(
-        words="SkinSource impulse responses", suffixes=(".f32",), read=skinsource.read, choose=()
+        words="SkinSource impulse responses", suffixes=(".f32",), read=read_skinsource, choose=()
     ),
 )  # fmt: skip
 
@@ -146,25 +212,16 @@ def read(
 
 
 def read_alone(path: str | Path) -> Measurement:
-    """Measurement in a file that says all, for commands without options of what it does not say.
-
-    Raises
-    ------
-    ValueError
-        As `read` does, with the command that makes such a file of another.
+    """Measurement in a file that says all, for commands without options of what it does not say;
+    raises what `read` does, with the command that makes such a file of another.
     """
     try:
         return read(path)
     except ValueError as error:
-        raise ValueError(f"{error}; {completing(path)}") from None
-
-
-def completing(path: str | Path) -> str:
-    """Words on the command that adds to a file what it does not say."""
-    return (
-        f"`skinwave fit --inspect {path} --out DIR` takes such options, and writes "
-        "DIR/measurement.npz, which says all"
-    )
+        raise ValueError(
+            f"{error}; `skinwave fit --inspect {path} --out DIR` takes such options, and writes "
+            "DIR/measurement.npz, which says all"
+        ) from None
 
 
 def reader_of(path: Path) -> Reader:

@@ -166,14 +166,7 @@ class Solution:
 
 
 def solve(problem: Problem, starts: int, seed: int, progress: Progress) -> Solution:
-    """Best of several starts, which a Latin hypercube spreads between the limits.
-
-    Parameters
-    ----------
-    problem : Problem
-    starts : how many
-    seed : of the hypercube
-    progress : called with the name of the phase and the fraction done
+    """Best of so many starts, which a Latin hypercube of that seed spreads between the limits.
 
     Raises
     ------
@@ -257,14 +250,7 @@ def _turned(problem: Problem, best: Start, candidates: Floats, progress: Progres
 
 
 def search(problem: Problem, starts: Sequence[Floats], progress: Progress) -> list[Start]:
-    """Solutions of several starts, in their order.
-
-    Parameters
-    ----------
-    problem : Problem
-    starts : candidates (c, k) of each, points of the unit cube
-    progress : called with the name of the phase and the fraction done
-    """
+    """Solutions of several starts in their order, each with candidates (c, k) in the unit cube."""
     found: list[Start] = []
     lowest: list[tuple[Start, Start]] = []  # of each minimum the one that scans lead to
     for n, candidates in enumerate(starts):
@@ -321,14 +307,8 @@ def _minima(problem: Problem, local: Start, k: int) -> list[Floats]:
 def refine(
     problem: Problem, u: Floats, most: int = MOST_EVALUATIONS, tolerance: float = TOLERANCE
 ) -> Start:
-    """Local solution from a point of the unit cube.
-
-    Parameters
-    ----------
-    problem : Problem
-    u : (k,) float
-    most : steps
-    tolerance : relative change of chi squared, below which they end
+    """Local solution from a point (k,) of the unit cube, by at most so many steps, until the
+    relative change of chi squared is below the tolerance.
     """
     inside = np.clip(u, 1e-6, 1 - 1e-6)
     found = least_squares(

@@ -36,16 +36,14 @@ def test_lines_of_a_velocity_are_read_as_displacement():
     np.testing.assert_array_equal(found.places, SCENE.probe_points)
 
 
-@pytest.mark.parametrize(("factor", "end"), [(1.0, "neither"), (2.0, "max")])
-def test_places_have_the_colour_of_the_map_and_none_on_a_pressure(factor, end):
+def test_places_have_the_colour_of_the_map_and_none_on_a_pressure():
     x = np.linspace(-0.01, 0.01, 21)
     r = np.hypot(*np.meshgrid(x, x))
     body = SurfaceField(x=x, y=x, rms=1e-6 * np.exp(-r / 0.005))
     kernel = replace(body, rms=1e7 * body.rms**1.5, quantity=PRESSURE)
-    rms = factor * 1e-6 * np.array([1.0, np.exp(-np.hypot(4, 2) / 5), 0.3])
+    rms = 2e-6 * np.array([1.0, np.exp(-np.hypot(4, 2) / 5), 0.3])
     measured = MeasuredPlaces(places=SCENE.probe_points, rms=rms)
-    surfaces = {"point-kernel": kernel, "skin-slab": body}
-    figure = surfaces_figure(SCENE, surfaces, measured=measured)
+    figure = surfaces_figure(SCENE, {"point-kernel": kernel, "skin-slab": body}, measured=measured)
     bare, marked = (
         next(c for c in ax.collections if hasattr(c, "get_sizes") and len(c.get_offsets()) > 1)
         for ax in figure.axes[:2]
@@ -54,11 +52,6 @@ def test_places_have_the_colour_of_the_map_and_none_on_a_pressure(factor, end):
         assert squares.get_offsets().data == pytest.approx(1e3 * SCENE.probe_points[:2])
     assert bare.get_array() is None
     image = figure.axes[1].images[0]
-    assert image.colorbar.extend == end
+    assert image.colorbar.extend == "max"
     marked.update_scalarmappable()
-    shades = image.cmap(image.norm(1e6 * rms[:2]))
-    np.testing.assert_allclose(marked.get_facecolors(), shades)
-    if factor == 1.0:
-        np.testing.assert_allclose(image.cmap(image.norm(1e6 * body.rms[10, 10])), shades[0])
-    without = surfaces_figure(SCENE, surfaces)
-    assert len(without.axes[1].collections) == len(figure.axes[1].collections) - 1
+    np.testing.assert_allclose(marked.get_facecolors(), image.cmap(image.norm(1e6 * rms[:2])))
