@@ -124,10 +124,10 @@ def differences(before: Path, after: Path) -> Iterator[str]:
         yield from _changed_checks(old[CHECK], new[CHECK])
         return
     changed = sum(a != b for a, b in zip(old_text, new_text, strict=False))
-    if changed:
-        print(f"  {after.name}: {changed} of {len(old_text)} texts differ")
-    if len(old) != len(new) or len(old_text) != len(new_text):
-        yield f"{len(old)} columns and {len(old_text)} texts, now {len(new)} and {len(new_text)}"
+    if changed or len(old_text) != len(new_text):
+        print(f"  {after.name}: {changed} of {len(old_text)} texts differ, now {len(new_text)}")
+    if len(old) != len(new):
+        yield f"{len(old)} columns, now {len(new)}"
         return
     for (name, a), (_, b) in zip(old.items(), new.items(), strict=True):
         if a.shape != b.shape:

@@ -30,13 +30,12 @@ def run(options: argparse.Namespace) -> int:
     from dataclasses import replace
 
     from skinwave.planning.budget import mesh_row
-    from skinwave.planning.costs import rows
     from skinwave.scene.file import read
 
     scene = read(options.scene)
     required = required_plan(options, scene)
     row = mesh_row(replace(scene, body=required.body), required.h, required.error)
-    required = replace(required, rows=(*required.rows, row, *rows(scene, required)))
+    required = replace(required, rows=(*required.rows, row))
     if options.json:
         say(json.dumps(required.table()))
         return 0

@@ -21,7 +21,7 @@ from simple_model.layers.prony import FIT_TOLERANCE
 from skinwave.bodies.build import Build, build, operators
 from skinwave.live.grid import SIDE, STEP, grid_line
 from skinwave.models.laws import relaxing
-from skinwave.models.loads import surface_load, surface_motion
+from skinwave.models.meshed import surface_load, surface_motion
 from skinwave.scene.scene import Body
 from skinwave.system.arrays import packed, quantised
 from skinwave.system.effort import Progress, silent

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-import fem
 from simple_model import MovingPressure
 from simple_model.layers.flat_body import field_lines, steady_lines
 from simple_model.layers.flat_quantities import from_rest, steady, surface_field
@@ -36,9 +35,9 @@ from skinwave.measure.parameters import (
 )
 from skinwave.models import Model, named, parametric
 from skinwave.models.advice import check_taken
-from skinwave.models.affine_scenes import check_scene
+from skinwave.models.covering import covering, tried_together
 from skinwave.models.flat_body import fields_read
-from skinwave.models.free_keys import free_keys
+from skinwave.models.options import SolveOptions
 from skinwave.models.parametric import ParametricBody
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import SAMPLE_RATE, Scene
@@ -48,6 +47,7 @@ from skinwave.system.effort import Progress
 Predict = Callable[[Values], np.ndarray]
 SAME = 1e-3  # of a frequency: lines as near as that are one
 KEPT = 32  # predictions
+RUNS = 200  # of a fit, about
 THRESHOLD = 1e-5  # of the strongest line of the load: weaker ones are left out of a prediction
 SETTLED = 1e-4  # of the largest motion: what is left of the transient where it is left out
 PARTS = (1 / 12, 1 / 4)  # of a record, after which the transient may have decayed
@@ -151,13 +151,9 @@ def with_reduction(aim: Target, parameters: Parameters, progress: Progress) -> T
     ranges = {key: ranges[key] for key in aim.rest(dict.fromkeys(ranges, 1.0))}
     if not aim.record.is_reduced or parameters.ties or not ranges:
         return aim
-    scene = aim.varied({})
-    try:
-        check_scene(scene, free_keys(scene.body, ranges), parametric.TOLERANCE)
-        return replace(aim, reduced=parametric.prepare(scene, ranges, progress=progress))
-    # Of what no affine sum gives, or ranges too wide for one model.
-    except (ValueError, fem.Diverged):
-        return aim
+    together = covering(aim.varied({}), ranges, RUNS)
+    found = tried_together(together, SolveOptions(progress=progress))
+    return replace(aim, reduced=found) if found else aim
 
 
 def predicted_lines(aim: Target, frequencies: Floats) -> Predict:

@@ -89,30 +89,13 @@ def default_model(scene: "Scene") -> str:
 
 
 def check_taken(model: Model, scene: "Scene") -> None:
-    """Refuse a scene that a model does not take.
-
-    Raises
-    ------
-    Refused
-        With the limits of the model, and cures.
-    """
+    """Raise `Refused` with limits and cures for a scene that a model does not take."""
     if found := beyond(model, scene):
         raise refusal(scene, model, found)
 
 
 def refusal(scene: "Scene", model: Model, found: Sequence[Limit]) -> Refused:
-    """Refusal of a scene by a model, for some of its limits, with what helps.
-
-    Parameters
-    ----------
-    scene : Scene
-    model : Model that does not take it
-    found : limits that the scene is beyond
-
-    Returns
-    -------
-    Refused, to be raised
-    """
+    """Refusal of a scene by a model, for the limits that it is beyond, with what helps."""
     others = [name for name in takers(scene) if name != model.name][:MOST_CURES]
     own = _changed(scene, model, found)
     cures = [*own, *(Cure(words="", scene=scene, model=name) for name in others)]

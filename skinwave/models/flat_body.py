@@ -25,16 +25,19 @@ from skinwave.models.laws import has_table
 from skinwave.models.limits import (
     Limit,
     load_limit,
+    of_alike_directions,
     of_body,
     of_material,
     read_at_surface,
     reading_limit,
 )
 from skinwave.models.options import SolveOptions
-from skinwave.models.sheet_limits import of_alike_directions
-from skinwave.models.sources import LAYERS
 from skinwave.scene.scene import Scene
 
+LAYERS = (
+    "E. Kausel, J. M. Roesset: Stiffness matrices for layered soils. Bulletin of the Seismological "
+    "Society of America 71 (1981) 1743-1761"
+)
 STEP = "wavenumber integral"
 
 

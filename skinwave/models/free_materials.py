@@ -31,17 +31,7 @@ class Reference:
 
 
 def reference_of(body: Body, build: Build, keys: Sequence[FreeKey]) -> Reference:
-    """Parts and factors of the materials of a meshed body.
-
-    Parameters
-    ----------
-    body : Body, as it was meshed
-    build : its mesh
-    keys : its free keys
-
-    Returns
-    -------
-    Reference
+    """Parts and factors of the materials of a body as it was meshed, with its free keys.
 
     Raises
     ------

@@ -1,7 +1,6 @@
 """Full-order models: direct time integration, and the steady state line by line."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from functools import lru_cache, partial
 from itertools import islice
 from math import ceil
@@ -10,111 +9,41 @@ import numpy as np
 from scipy import sparse
 
 import fem
-from meshes import cache
 from meshes.tetmesh import Floats
 from simple_model import Effort, Material, Response
 from simple_model.load.sampling import below_half_the_rate, resolving_step
 from simple_model.load.spectrum import load_lines, synthesise
 from simple_model.quantities import Quantity
-from skinwave.bodies.build import Build, operators
-from skinwave.bodies.build import build as build_body
-from skinwave.bodies.discretised import Discretise
+from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
 from skinwave.models.laws import relaxing, series_tolerance
-from skinwave.models.loads import (
+from skinwave.models.meshed import (
+    assembled,
+    energy_balance,
+    even_part,
+    images,
     inertia,
     line_factor,
     load_in_steps,
     load_lines_at,
+    meshed,
+    modelled_axes,
     probe_rows,
     sag,
+    spent,
     surface_load,
     translation,
     with_sag,
 )
 from skinwave.models.options import SolveOptions
-from skinwave.models.symmetry import even_part, images, modelled_axes
-from skinwave.scene.scene import Body, Scene
+from skinwave.scene.scene import Scene
 from skinwave.scene.support_motion import SupportMotion
-from skinwave.system.effort import Clock, Progress, peak_memory, versions
+from skinwave.system.effort import Clock, Progress
 
-MOST_IMBALANCE = 0.01  # relative error of the energy balance, beyond which a response is refused
 CHECKED_EACH = 50  # steps of a transient
 TRANSIENT_RATE = 20_000.0  # Hz of the full time stepping: 0.3 % at 600 Hz
 MOST_LINES = 1000  # of fem-harmonic, each a factorisation
 MOST_STEPS = 1_000_000  # five times the longest Tacton at that rate
-
-
-def meshed(
-    body: Body,
-    h: float | None,
-    clock: Clock,
-    report: Progress,
-    symmetry: str = "",
-    discretise: Discretise | None = None,
-) -> Build:
-    """Mesh of a body with its materials and boundary conditions, timed and reported.
-
-    Parameters
-    ----------
-    body, h, symmetry, discretise : as for `bodies.build.build`, with its errors
-    clock : Clock, which takes the time
-    report : called with the name of the phase and the fraction done
-
-    Returns
-    -------
-    Build
-    """
-    with clock("mesh"):
-        report("mesh", 0.0)
-        return build_body(body, h, symmetry, discretise)
-
-
-def assembled(build: Build, clock: Clock, report: Progress) -> fem.Operators:
-    """Operators of a meshed body, timed and reported.
-
-    Parameters
-    ----------
-    build : Build
-    clock, report : as for `meshed`
-
-    Returns
-    -------
-    fem.Operators
-    """
-    with clock("assemble"):
-        report("assemble", 0.0)
-        return operators(build)
-
-
-def energy_balance(
-    energies: fem.EnergyBalance, stored: float = 0.0, when: str = ""
-) -> tuple[float, float]:
-    """Relative error of the energy balance, if small enough to trust a response.
-
-    Parameters
-    ----------
-    energies : of the response, or powers
-    stored : in the same unit, energy at its end
-    when : where in the response, for the message
-
-    Returns
-    -------
-    relative error, and the share of the losses that was radiated
-
-    Raises
-    ------
-    Diverged
-        If the error is too large.
-    """
-    imbalance = fem.imbalance(energies, stored)
-    if not imbalance <= MOST_IMBALANCE:
-        raise fem.Diverged(
-            f"the energy balance is off by {100 * imbalance:.2g} %{when}, above the limit of "
-            f"{100 * MOST_IMBALANCE:g} %; try another solver, or a finer mesh where it is thin"
-        )
-    radiated = energies.radiated / energies.lost if energies.lost > 0 else 0.0
-    return imbalance, radiated
 
 
 def transient_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
@@ -162,21 +91,9 @@ def in_time(
     *,
     sag: Floats | float = 0.0,
 ) -> Floats:
-    """Waveforms of a scene's quantity from the steps of a time integration: rates are those of the
-    cubic spline that is sampled.
-
-    Parameters
-    ----------
-    stepped : (n, p c) float, its components at rest in steps of dt from 0
-    dt : float, s
-    times : (t,) float, s
-    scene : Scene
-    solids : p materials of the probes, where stress relaxes
-    sag : (p c,) float, components at rest under gravity
-
-    Returns
-    -------
-    (t, p) float, in the unit of the quantity
+    """Waveforms (t, p) of a scene's quantity at times (t,) in s, from its components at rest
+    `stepped` (n, p c) in steps of dt from 0 and under gravity, `sag` (p c,). Rates are those of the
+    cubic spline that is sampled; stress relaxes in the p `solids` of the probes.
     """
     asked = scene.reading.asked
     sampled = sampled_components(stepped, dt, times, asked, solids)
@@ -186,16 +103,7 @@ def in_time(
 def sampled_components(
     stepped: Floats, dt: float, times: Floats, asked: Quantity, solids: tuple[Material, ...] = ()
 ) -> Floats:
-    """Components of a quantity at sample times.
-
-    Parameters
-    ----------
-    stepped, dt, times, asked, solids : as of `in_time`
-
-    Returns
-    -------
-    (t, p c) float
-    """
+    """Components (t, p c) of a quantity at sample times, as of `in_time`."""
     from scipy.interpolate import CubicSpline  # which takes long to import
 
     if asked.relaxes:
@@ -211,19 +119,8 @@ def marched(
     stored: Callable[[fem.State], float],
     report: Progress,
 ) -> tuple[Floats, tuple[float, float]]:
-    """Probe readings of a time integration, its energy balance checked on the way.
-
-    Parameters
-    ----------
-    balanced : states from rest on, each with the energies up to it
-    steps : int, after which it ends
-    read : function of a displacement (3 n,) in metre, to readings (p,)
-    stored : function of a state, to the energy in J that it has
-    report : called with "march" and the fraction done
-
-    Returns
-    -------
-    readings (steps + 1, p), and the last `energy_balance`
+    """Readings (steps + 1, p) of displacements (3 n,) in metre in a time integration, and its last
+    `energy_balance`, by what each state has `stored` in J.
 
     Raises
     ------
@@ -338,41 +235,10 @@ def moved_line(
     solve: fem.LineSolver,
     motion: SupportMotion,
 ) -> tuple[fem.Complex, fem.EnergyBalance]:
-    """Steady state on a support that moves.
-
-    Parameters
-    ----------
-    build : Build
-    ops : operators of its mesh
-    S : (p c, 3 n) sparse, what the probes read
-    solve : fem.LineSolver of the operators
-    motion : SupportMotion
-
-    Returns
-    -------
-    components (p c,) complex at its frequency, and the mean power balance about the support
+    """Components (p c,) complex of the steady state on a support that moves, at its frequency, and
+    the mean power balance about the support; S (p c, 3 n) is what the probes read.
     """
     force = sparse.csr_array(-inertia(build, motion.unit)[:, None])
     acceleration = np.array([motion.acceleration])
     seen, power = _line(ops, force, S, solve, motion.frequency, acceleration)
     return seen + S @ translation(build, motion.unit) * motion.line, power
-
-
-def spent(effort: Effort, clock: Clock, build: Build, h: float) -> Effort:
-    """Cost of a response with its time, memory and mesh.
-
-    Parameters
-    ----------
-    effort : Effort, so far
-    clock : its times
-    build : Build
-    h : metre, element size
-
-    Returns
-    -------
-    Effort
-    """
-    return replace(
-        effort, seconds=clock.seconds, peak_memory=peak_memory(), h=h, versions=versions(),
-        mesh=cache.digest(build.mesh.points, build.mesh.tets),
-    )  # fmt: skip

@@ -17,13 +17,28 @@ from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.models import Model, register
 from skinwave.models.full import harmonic_answer, transient_answer
 from skinwave.models.laws import has_own_law
-from skinwave.models.limits import Limit, of_body
+from skinwave.models.limits import Limit, of_air_in_a_frame, of_body, of_vacuum
 from skinwave.models.options import SolveOptions
 from skinwave.models.prepared import answer, prepare, reduction_tolerance
-from skinwave.models.sheet_limits import of_air_in_a_frame, of_vacuum
-from skinwave.models.sources import ALPHA, ARNOLDI, MACROELEMENTS, REDUCTION
 from skinwave.scene.scene import Scene
 
+REDUCTION = (
+    "Z. Bai, Y. Su: Dimension reduction of large-scale second-order dynamical systems via a "
+    "second-order Arnoldi method. SIAM Journal on Scientific Computing 26 (2005) 1692-1709"
+)
+ARNOLDI = (
+    "D. Lu, Y. Su, Z. Bai: Stability analysis of the two-level orthogonal Arnoldi procedure. SIAM "
+    "Journal on Matrix Analysis and Applications 37 (2016) 195-214"
+)
+ALPHA = (
+    "J. Chung, G. M. Hulbert: A time integration algorithm for structural dynamics with improved "
+    "numerical dissipation: the generalized-alpha method. Journal of Applied Mechanics 60 (1993) "
+    "371-375. doi 10.1115/1.2900803"
+)
+MACROELEMENTS = (
+    "R. Stenberg: Analysis of mixed finite element methods for the Stokes problem: a unified "
+    "approach. Mathematics of Computation 42 (1984) 9-23"
+)
 MOST_SLENDER = 10  # sides of a sheet, of which its default elements make a mesh
 FINITE = 15e-3  # m: a finite depth in place of a half-space, or below its layers and probes
 THICKER = 1.25  # from one thickness that is tried to the next

@@ -20,7 +20,7 @@ import numpy as np
 from scipy import sparse
 
 import fem
-from fem.affine import Solids, weights
+from fem.affine import KINDS, Solids, weights
 from fem.affine_model import AffineModel, operators_at, steady, steady_lines
 from fem.boundary import fixed_dofs
 from fem.greedy import Geometry, Variant, line_bases, reduce_affine
@@ -30,9 +30,9 @@ from simple_model import Effort, Response
 from simple_model.layers.prony import FIT_TOLERANCE
 from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
-from skinwave.models.affine_scenes import check_scene
 from skinwave.models.free_keys import (
     FreeKey,
+    check_scene,
     free_keys,
     meshing_shares,
     training_shares,
@@ -40,14 +40,21 @@ from skinwave.models.free_keys import (
     with_values,
 )
 from skinwave.models.free_materials import Reference, affine_operators, reference_of, solids_of
-from skinwave.models.full import spent
 from skinwave.models.laws import relaxing
-from skinwave.models.loads import line_factor, load_lines_at, probe_rows, spread, surface_load
-from skinwave.models.parametric_cache import packed, unpacked
+from skinwave.models.meshed import (
+    even_part,
+    images,
+    line_factor,
+    load_lines_at,
+    modelled_axes,
+    probe_rows,
+    spent,
+    spread,
+    surface_load,
+)
 from skinwave.models.prepared import Prepared, entry_name, typical_spots
 from skinwave.models.prepared import answer as answer_of
 from skinwave.models.reduction import BAND, reduced_variant
-from skinwave.models.symmetry import even_part, images, modelled_axes
 from skinwave.models.thicknesses import (
     Range,
     build_at,
@@ -64,6 +71,8 @@ FAINTEST = 1e-3  # of the strongest line that moves the probes: weaker ones are 
 FAINTEST_LOAD = 1e-6  # of the strongest line of the load
 FORMAT = "parametric 4"  # of what is cached
 ARRAYS = ("load", "points", "frequencies")
+OF_ALL = ("parts", "forces", "outputs")
+OF_A_LINE = (*OF_ALL, "basis")
 BETWEEN = 0.3  # of each range: a body of no known geometry
 KEPT = 5  # full bodies at a time: more of them are assembled anew, for a third of the memory
 INSIDE = 128  # materials inside the ranges, for the lines' bases
@@ -119,10 +128,6 @@ def prepare(
     h : float, metre, element size; the default of the body if not given
     solver : a backend of `fem.linear_solver`
 
-    Returns
-    -------
-    ParametricBody
-
     Raises
     ------
     ValueError
@@ -153,7 +158,7 @@ def prepare(
         )  # fmt: skip
         entry = _reduced(stage, clock, report, build, h or default_size(body))
         cache.store(name, **entry)
-    model, bases = unpacked(entry)
+    model, bases = _unpacked(entry)
     effort = Effort(**{**entry["meta"], "seconds": clock.seconds, "peak_memory": peak_memory()})
     return ParametricBody(
         scene=scene, keys=keys, bodies=bodies, reference=reference, model=model,
@@ -226,7 +231,7 @@ def _reduced(
     load, points = (np.stack(each) for each in zip(*surface, strict=True))
     return {
         "meta": asdict(spent(effort, clock, build, h)), "load": load, "points": points,
-        "frequencies": kept, **packed(model, bases),
+        "frequencies": kept, **_packed(model, bases),
     }  # fmt: skip
 
 
@@ -257,12 +262,8 @@ def _reduced_surface(scene: Scene, build: Build, model: AffineModel) -> tuple[Fl
 
 
 def lines(prepared: ParametricBody, values: Mapping[str, float]) -> tuple[Floats, fem.Complex]:
-    """Steady state of a body of the range at the strong lines of the scene's load.
-
-    Returns
-    -------
-    frequencies : (f,) float, Hz
-    amplitudes : (f, p c) complex, of the components that the probes read, in the quantity's unit
+    """Steady state of a body of the range at the strong lines of the scene's load: frequencies (f,)
+    in Hz, and amplitudes (f, p c) of the components that the probes read, in the quantity's unit.
     """
     return lines_of(prepared, _body(prepared, values))
 
@@ -363,3 +364,33 @@ def _bases(
         SHARE * stage.tolerance, partial(report, "lines"),
     )  # fmt: skip
     return frequencies[kept], found, error
+
+
+def _packed(model: AffineModel, bases: Sequence[AffineModel]) -> dict[str, np.ndarray]:
+    """Arrays of a model without its basis, and of those of lines in it, end to end."""
+    return {
+        "terms": np.array([(KINDS.index(kind), r) for kind, r in model.terms]),
+        **{name: getattr(model, name) for name in OF_ALL},
+        "sizes": np.array([line.basis.shape[1] for line in bases]),
+        **{f"line_{name}": np.concatenate([getattr(line, name).ravel() for line in bases])
+           for name in OF_A_LINE},
+    }  # fmt: skip
+
+
+def _unpacked(entry: Mapping[str, Any]) -> tuple[AffineModel, tuple[AffineModel, ...]]:
+    """Model of an entry, its basis without rows, and those of lines in it."""
+    terms = tuple((KINDS[kind], r) for kind, r in entry["terms"].tolist())
+    (g, q, r, _), p = entry["parts"].shape, entry["outputs"].shape[1]
+    model = AffineModel(
+        terms=terms, basis=np.zeros((0, r)), **{name: entry[name] for name in OF_ALL}
+    )
+    starts, lines = dict.fromkeys(OF_A_LINE, 0), []
+    for m in entry["sizes"].tolist():
+        shapes = {"parts": (g, q, m, m), "forces": (g, 1, m), "outputs": (g, p, m), "basis": (r, m)}
+        arrays = {}
+        for name, shape in shapes.items():
+            start = starts[name]
+            starts[name] += int(np.prod(shape))
+            arrays[name] = entry[f"line_{name}"][start : starts[name]].reshape(shape)
+        lines.append(AffineModel(terms=terms, **arrays))
+    return model, tuple(lines)

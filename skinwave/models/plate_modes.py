@@ -31,13 +31,12 @@ from skinwave.bodies.body import Body
 from skinwave.bodies.mounting import EDGES
 from skinwave.models import Model, register
 from skinwave.models.laws import has_own_law
-from skinwave.models.limits import Limit, of_body, surface_motion
+from skinwave.models.limits import Limit, of_body, of_held_sheet, surface_motion
 from skinwave.models.options import SolveOptions, sample_times
-from skinwave.models.sheet_limits import of_held_sheet
-from skinwave.models.sources import PLATES
 from skinwave.scene.scene import Scene
 from skinwave.system.effort import peak_memory
 
+PLATES = "A. W. Leissa: Vibration of Plates. NASA SP-160, 1969"
 ERROR = 0.01  # relative, of a steady waveform beside finite elements of a frame, vacuum and air
 
 

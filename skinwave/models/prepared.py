@@ -17,13 +17,18 @@ from simple_model.quantities import Quantity
 from skinwave.bodies.build import Build
 from skinwave.bodies.discretised import Discretise
 from skinwave.bodies.sizes import default_size
-from skinwave.models.full import assembled, meshed, spent
 from skinwave.models.laws import relaxing
-from skinwave.models.loads import (
+from skinwave.models.meshed import (
+    assembled,
+    even_part,
+    images,
     inertia,
     line_factor,
+    meshed,
+    modelled_axes,
     probe_rows,
     sag,
+    spent,
     spread,
     surface_load,
     translation,
@@ -40,17 +45,15 @@ from skinwave.models.reduction import (
     respond,
     select_lines,
 )
-from skinwave.models.symmetry import even_part, images, modelled_axes
 from skinwave.scene.load import PRESSURE, Load
 from skinwave.scene.scene import SURFACE, Body, Reading, Scene
 from skinwave.system.effort import Clock, Progress, one_thread, peak_memory, silent, versions
 
 REDUCTION_TOLERANCE = 1e-3
 SERIES_ERROR = 5  # times that of the reduction: with `reduction_tolerance` the `series_tolerance`
-FORMAT = 6  # of what is cached of a body
+FORMAT = 7  # of what is cached of a body
 POLES = ("values", "inputs", "outputs")
 ARRAYS = ("damping", "radiation", "load", "points", "inertia")
-OTHERS = ("relaxing", "relaxation_times", "read", "sag", "carried")
 NEGLIGIBLE_LINE = 1e-7  # of the strongest line at the probes
 
 
@@ -99,7 +102,7 @@ def prepare(
     cache, once per machine.
 
     Of a body that is its own mirror image only the part on one side is modelled where all probes
-    lie on the plane: they see no more of it (`skinwave.models.symmetry`).
+    lie on the plane: they see no more of it (`skinwave.models.meshed`).
 
     Parameters
     ----------
@@ -126,13 +129,14 @@ def prepare(
     with clock("read from cache"):
         entry = cache.load(name)
     size = h or default_size(body)
-    report = progress or silent
-    found = _from_cache(entry, size, probes, outputs.shape[0], clock) if entry else None
-    if not found:
+    if entry:
+        found = _from_cache(entry, size, probes, clock)
+    else:
         with one_thread():  # a second one gains a tenth of the time, and rounds otherwise
             found = _prepared_anew(
-                body, build, size, probes, outputs, clock, report, solver, tolerance, name, load
-            )
+                body, build, size, probes, outputs, clock, progress or silent, solver, tolerance,
+                name, load,
+            )  # fmt: skip
     shaken = replace(found.body, support_motion=load.support_motion)
     return replace(found, reading=reading, solids=solids, load=load, body=shaken)
 
@@ -147,19 +151,8 @@ def entry_name(
     outputs: sparse.csr_array | None,
     load: Load = PRESSURE,
 ) -> str:
-    """Cache key of everything that a reduced body depends on.
-
-    Parameters
-    ----------
-    body : Body
-    build : its mesh
-    probes, solver, tolerance : as of `prepare`
-    outputs : (p c, 3 n) sparse, what the probes read; None if that is normal motion at the surface
-    load : as of `prepare`
-
-    Returns
-    -------
-    str
+    """Cache key of everything that a reduced body depends on, with the `outputs` (p c, 3 n) of its
+    probes, None if these are normal motion at the surface.
     """
     mesh = build.mesh
     # A file may call other facets of the same mesh its top, or fix others.
@@ -170,44 +163,23 @@ def entry_name(
     way = load.support_motion.unit if load.support_motion else ()
     read = () if outputs is None else (outputs.data, outputs.indices, outputs.indptr)
     return cache.key(
-        FORMAT, body, mesh.points, mesh.tets, mesh.region, *named, build.material, build.symmetry,
+        FORMAT, *Effort.__dataclass_fields__, body, mesh.points, mesh.tets, mesh.region, *named,
+        build.material, build.symmetry,
         build.fixed, build.absorbing, build.coat, build.drag, build.held, build.tension,
         *rests, probes, BAND, tolerance, used,
         versions(), *read, replace(load, support_motion=None), way,
     )  # fmt: skip
 
 
-def _from_cache(
-    entry: dict[str, Any], h: float, probes: Floats, outputs: int, clock: Clock
-) -> Prepared | None:
-    """The reduced body of an entry; None if its arrays do not fit each other."""
-    if not {*POLES, *ARRAYS, *OTHERS} <= set(entry):
-        return None
-    modes, unknowns = len(entry["values"]), entry["read"].shape[-1]
-    surface, terms = len(entry["points"]), len(entry["relaxation_times"])
-    square = (unknowns, unknowns)
-    expected = {
-        "values": (modes,), "inputs": (modes, unknowns), "outputs": (unknowns, modes),
-        "damping": square, "radiation": square, "relaxing": (terms, *square),
-        "relaxation_times": (terms,),
-        "read": (outputs, unknowns), "points": (surface, 3), "sag": (outputs,),
-        "carried": (outputs,), "inertia": (unknowns,),
-        "load": (len(entry["load"]) // max(surface, 1) * surface, unknowns),
-    }  # fmt: skip
-    if any(entry[field].shape != shape for field, shape in expected.items()):
-        return None
-    try:
-        # `h` is that of today: other sizes may make the same mesh.
-        effort = Effort(**{**entry["meta"], "h": h})
-    except TypeError:  # that of another version
-        return None
+def _from_cache(entry: dict[str, Any], h: float, probes: Floats, clock: Clock) -> Prepared:
+    """The reduced body of an entry, with the size h of today: others may make the same mesh."""
+    effort = replace(Effort(**entry["meta"]), h=h, seconds=clock.seconds, peak_memory=peak_memory())
     branches = zip(entry["relaxing"], entry["relaxation_times"].tolist(), strict=True)
     reduced = ReducedBody(
-        poles=fem.Poles(**{name: entry[name] for name in POLES}),
-        effort=replace(effort, seconds=clock.seconds, peak_memory=peak_memory()),
+        poles=fem.Poles(**{name: entry[name] for name in POLES}), effort=effort,
         branches=tuple(fem.MaxwellBranch(K=K, time=time) for K, time in branches),
         **{name: entry[name] for name in ARRAYS},
-    )
+    )  # fmt: skip
     return Prepared(
         probes=probes, read=entry["read"], sag=entry["sag"], carried=entry["carried"], body=reduced
     )
@@ -312,16 +284,8 @@ def answer(
 
 
 def steady_waveforms(prepared: Prepared, scene: Scene, times: Floats) -> Floats:
-    """Waveforms (t, p) of a reduced body in the steady state, as fem-harmonic has them.
-
-    Parameters
-    ----------
-    prepared, scene : as for `answer`
-    times : (t,) float, s, equally spaced from 0
-
-    Returns
-    -------
-    (t, p) float, in the unit of the quantity
+    """Waveforms (t, p) of a reduced body in the steady state, as of fem-harmonic, at times (t,) in
+    s.
     """
     motion, asked = components(prepared, *scene.loads), prepared.reading.asked
     # Under its mean an unconstrained body has no steady state.
@@ -334,17 +298,8 @@ def steady_waveforms(prepared: Prepared, scene: Scene, times: Floats) -> Floats:
 def components(
     prepared: Prepared, *pressures: MovingPressure, highest: float = np.inf
 ) -> ReducedResponse:
-    """Response of the components that the probes read, with rates and the relaxation of stress.
-
-    Parameters
-    ----------
-    prepared : Prepared
-    *pressures : MovingPressure, the components of the load
-    highest : float, Hz, up to which lines are kept
-
-    Returns
-    -------
-    ReducedResponse
+    """Response of the components that the probes read, with rates and the relaxation of stress, to
+    the components of a load up to the `highest` line in Hz.
     """
     motion = read_at(respond(prepared.body, *pressures, highest=highest), prepared.read)
     if moved := prepared.load.support_motion:
@@ -358,17 +313,8 @@ def components(
 def in_motion(
     rest: ReducedResponse, asked: Quantity, solids: tuple[Material, ...]
 ) -> ReducedResponse:
-    """Components of a quantity with its rates and the relaxation of stress.
-
-    Parameters
-    ----------
-    rest : ReducedResponse, of the components (p c) at rest
-    asked : Quantity
-    solids : p materials of the probes, or none
-
-    Returns
-    -------
-    ReducedResponse
+    """Components of a quantity with its rates and the relaxation of stress, of those at rest and
+    the materials of the probes, if any.
     """
     if not (asked.rate or asked.relaxes):
         return rest

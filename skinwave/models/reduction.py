@@ -24,7 +24,7 @@ from simple_model import Effort, MovingPressure
 from simple_model.load.spectrum import merge_lines, reduced_lines
 from skinwave.bodies.build import Build
 from skinwave.bodies.sheet import air
-from skinwave.models.full import energy_balance
+from skinwave.models.meshed import energy_balance
 from skinwave.scene.scene import Body
 from skinwave.scene.support_motion import SupportMotion
 from skinwave.system.effort import Progress, silent
@@ -84,23 +84,15 @@ def reduce_body(
     solver: str = "auto",
     report: Progress = silent,
 ) -> tuple[ReducedBody, fem.ReducedModel]:
-    """Reduced body, and its model with the basis (offline stage).
+    """Reduced body, and its fem.ReducedModel with the basis (offline stage).
 
     Parameters
     ----------
-    body : Body
-    build : its mesh
-    operators : those of the mesh
-    outputs : (p, 3 n) sparse, as `fem.reduce` takes them
-    tolerance : relative error of the reduction
-    surface : load operator (3 n, c k) and points (k, 3), of `bodies.surface_load` or a part of them
-    loads : (3 n, j), as `fem.reduce` takes them
+    body, build, operators : Body, its mesh, and the operators of that
+    outputs, loads, tolerance, solver : as of `fem.reduce`
+    surface : load operator (3 n, c k) and points (k, 3), of `surface_load` or a part of them
     inertia : (3 n,), nodal forces per acceleration of a support that moves
-    solver, report : as for `simulate`, `report` its progress
-
-    Returns
-    -------
-    ReducedBody, and the fem.ReducedModel of it
+    report : called with the name of the phase and the fraction done
     """
     P, points = surface
     if inertia is not None and loads is not None:  # which counts as much as all others
@@ -126,18 +118,8 @@ def reduce_body(
 def reduced_variant(
     operators: fem.Operators, load: Floats, points: Floats, effort: Effort
 ) -> ReducedBody:
-    """Reduced body of projected operators, in coordinates of any mass matrix.
-
-    Parameters
-    ----------
-    operators : fem.Operators, of matrices (r, r)
-    load : (k, r) float, reduced forces of unit pressure at each point
-    points : (k, 3) float, metre
-    effort : of the offline stage
-
-    Returns
-    -------
-    ReducedBody
+    """Reduced body of projected operators (r, r), in coordinates of any mass matrix, with reduced
+    forces `load` (k, r) of unit pressure at points (k, 3) in metre.
     """
     return ReducedBody(**_own(operators), load=load, points=points, effort=effort)
 
@@ -169,17 +151,8 @@ def reduced_forces(reduced: ReducedBody, *pressures: MovingPressure) -> tuple[Fl
 def respond(
     reduced: ReducedBody, *pressures: MovingPressure, highest: float = np.inf
 ) -> ReducedResponse:
-    """Response of a reduced body to a moving load, in its coordinates (online stage).
-
-    Parameters
-    ----------
-    reduced : ReducedBody
-    *pressures : MovingPressure, the components of the load
-    highest : float, Hz, up to which lines are kept
-
-    Returns
-    -------
-    ReducedResponse
+    """Response of a reduced body to the components of a moving load, of lines below the `highest`
+    in Hz, in its coordinates (online stage).
 
     Raises
     ------

@@ -35,18 +35,8 @@ Reader = Callable[[Floats], Floats]  # displacement or coordinates -> components
 def sheet_rows(
     body: Body, build: Build, probes: Floats, reading: Reading
 ) -> tuple[sparse.csr_array, tuple[Material, ...]]:
-    """Rows of `probe_rows` for a sheet that bends, but for its normal motion.
-
-    Parameters
-    ----------
-    body : Body, a flat sheet
-    build : its mesh
-    probes : (p, 2) float, metre
-    reading : Reading
-
-    Returns
-    -------
-    (p c, 3 n) sparse, and the material at each probe
+    """Rows (p c, 3 n) of `probe_rows` for a flat sheet that bends, but for its normal motion, and
+    the material at each probe.
     """
     seen, asked = _seen(body, build, probes), reading.asked
     below = np.broadcast_to(reading.depths or 0.0, len(probes))
@@ -59,15 +49,8 @@ def sheet_rows(
 
 
 def full_reader(body: Body, build: Build, probes: Floats, reading: Reading) -> Reader:
-    """Function of the displacement (3 n,) of all nodes of a sheet that bends and stretches.
-
-    Parameters
-    ----------
-    body, build, probes, reading : as of `sheet_rows`
-
-    Returns
-    -------
-    function to components (p c,)
+    """Function of the displacement (3 n,) of all nodes of a sheet that bends and stretches, to
+    components (p c,).
     """
     if reading.asked.is_normal:
         normal = fem.probe_operator(build.mesh, probes)
@@ -95,18 +78,8 @@ def modal_reader(
     reading: Reading,
     solver: str,
 ) -> Reader:
-    """Function of the coordinates (r,) of bending modes, with the in-plane motion that follows.
-
-    Parameters
-    ----------
-    body, build, probes, reading : as of `sheet_rows`
-    modes : StretchingModes, of the sheet
-    operators : those of the sheet, whose constraints in its plane are taken
-    solver : of `fem.factorise`
-
-    Returns
-    -------
-    function to components (p c,)
+    """Function of the coordinates (r,) of bending modes, with the in-plane motion that follows
+    under the constraints of the operators, to components (p c,).
     """
     asked = reading.asked
     if asked.is_normal:

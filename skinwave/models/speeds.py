@@ -45,18 +45,8 @@ def shown_part(
 
     It is the period of the whole pattern, or the time after which that nearly repeats. A pattern
     that takes more than `most` frames is shown in part, as long as these last, with the smallest
-    jump where it repeats.
-
-    Parameters
-    ----------
-    pressure : MovingPressure
-    fastest : Hz, the fastest line that counts
-    frames : so many of the same time instead
-    most : frames of a pattern that is shown in full
-
-    Returns
-    -------
-    duration in s, and number of frames
+    jump where it repeats. Returns the duration in s and the number of frames, by the `fastest` line
+    in Hz that counts; with `frames`, so many of the same time.
     """
     span, tacton = pattern_period(pressure.tacton), pressure.tacton
     needed = ceil(EACH * fastest * span * (1 - SAME))

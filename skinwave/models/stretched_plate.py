@@ -24,12 +24,16 @@ from skinwave.models import Model, register
 from skinwave.models.laws import has_own_law, slowest_and_fastest
 from skinwave.models.options import SolveOptions, sample_times
 from skinwave.models.plate_modes import ERROR as PLATE_ERROR
-from skinwave.models.plate_modes import FROM_REST, limits, modes_of, plate_of
-from skinwave.models.sources import KARMAN, PLATES
+from skinwave.models.plate_modes import FROM_REST, PLATES, limits, modes_of, plate_of
 from skinwave.models.stretching import relative
 from skinwave.scene.scene import Scene
 from skinwave.system.effort import peak_memory
 
+KARMAN = (
+    "S. Bilbao, O. Thomas, C. Touze, M. Ducceschi: Conservative numerical methods for the full von "
+    "Karman plate equations. Numerical Methods for Partial Differential Equations 31 (2015) "
+    "1948-1970. doi 10.1002/num.21974"
+)
 LONGEST, SHORTEST = 1e-4, 2.5e-5  # s, of time steps
 COUNTS = 42, 60, 86, 120  # modes that stretch a sheet, each number judged beside the one before
 CHECKED = 0.2  # s of an answer at the least, of which errors are measured
@@ -69,17 +73,8 @@ def first_part(pressure: MovingPressure, times: Floats) -> Floats:
 
 
 def linear_error(scene: Scene, times: Floats, linear: Floats) -> float:
-    """Relative error of linear bending: what stretching adds to it.
-
-    Parameters
-    ----------
-    scene : Scene, which this model takes
-    times : (t,) s
-    linear : (t, p) the linear response from rest
-
-    Returns
-    -------
-    float, of the probe where it is largest
+    """Largest relative error of linear bending: what stretching adds to the linear response (t, p)
+    from rest at times (t,) in s.
     """
     modes: PlateModes = modes_of(plate_of(scene.body))
     parts = ceil(step(times) / LONGEST - 1e-9)
@@ -88,16 +83,8 @@ def linear_error(scene: Scene, times: Floats, linear: Floats) -> float:
 
 
 def settled(scene: Scene, tolerance: float) -> tuple[Floats, Floats, PlateModes]:
-    """Motion of a whole sheet about its mean, in the later half of a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-    tolerance : relative error that may be made
-
-    Returns
-    -------
-    times (t,) in s, coordinates (t, m) in kg^1/2 m of all modes, and the modes
+    """Motion of a whole sheet about its mean, in the later half of a scene: times (t,) in s,
+    coordinates (t, m) in kg^1/2 m of all modes, and the modes.
     """
     times = sample_times(scene)
     options = SolveOptions(tolerance=tolerance)

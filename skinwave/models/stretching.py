@@ -31,16 +31,13 @@ from simple_model.load.spectrum import load_lines
 from simple_model.quantities import ACCELERATION, DISPLACEMENT, VELOCITY, Quantity
 from skinwave.bodies.build import Build, build
 from skinwave.bodies.sheet import air, bending_wavenumber, discretise
+from skinwave.models import Model, register
 from skinwave.models.advice import beyond
-from skinwave.models.full import (
-    TRANSIENT_RATE,
-    in_time,
-    marched,
-    sampled_components,
-    spent,
-    step_count,
-)
-from skinwave.models.loads import load_in_steps, surface_load
+from skinwave.models.full import TRANSIENT_RATE, in_time, marched, sampled_components, step_count
+from skinwave.models.laws import has_own_law
+from skinwave.models.limits import Limit, load_limit, of_air_in_a_frame, of_held_sheet, of_vacuum
+from skinwave.models.linear_elements import ALPHA, of_mesh
+from skinwave.models.meshed import load_in_steps, spent, surface_load
 from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import ERROR as PLATE_ERROR
 from skinwave.models.plate_modes import FROM_REST
@@ -59,6 +56,11 @@ from skinwave.models.sheet_probes import full_reader, modal_reader
 from skinwave.scene.scene import Body, Scene
 from skinwave.system.effort import Clock
 
+NEWTON = (
+    "T. Belytschko, W. K. Liu, B. Moran: Nonlinear Finite Elements for Continua and Structures. "
+    "Wiley, 2000"
+)
+METHOD = "large deflection, step by step from rest"
 # Thickness of the mesh over an element's side: the shear of so thick a sheet lowers frequencies by
 # as much as elements of this side raise them. At 7 elements a wavelength 0.3 % are left of 5 %.
 STOCKY, STOUTEST = 0.48, 0.05
@@ -88,18 +90,7 @@ def meshed_sheet(body: Body, h: float) -> Build:
 
 
 def membrane(body: Body, made: Build, share: float | None = None) -> fem.Membrane:
-    """Membrane with the stiffness that a meshed sheet lacks.
-
-    Parameters
-    ----------
-    body : Body, a sheet
-    made : its mesh
-    share : of the sheet's whole stiffness, instead of what is lacking
-
-    Returns
-    -------
-    fem.Membrane
-    """
+    """Membrane with the stiffness that a meshed sheet lacks, or a share of its whole stiffness."""
     ratio = body.depth / float(np.ptp(made.mesh.points[:, 2]))
     share = 1 - ratio**2 if share is None else share
     triangles = middle_plane(made.mesh)
@@ -330,3 +321,55 @@ def _response(
         model=model, times=times, probes=scene.probe_points, quantity=scene.quantity,
         values=values, expected_error=error, effort=spent(effort, clock, made, h),
     )  # fmt: skip
+
+
+def _error(scene: Scene, h: float | None) -> float:
+    assert h
+    return expected_error(scene.body, h)
+
+
+def _limits(
+    of_air: Callable[[Body], Iterator[Limit]], size: Callable[[Body], float], scene: Scene
+) -> Iterator[Limit]:
+    body = scene.body
+    if not body.of_kind.is_plate:
+        yield Limit(why=f"takes a sheet, not a {body.kind}")
+        return
+    yield from of_held_sheet(body)
+    yield from of_air(body)
+    yield from of_mesh(body, size(body))
+    if not scene.load.is_plain:
+        yield load_limit(scene)
+
+
+REDUCED_SIZE, FULL_SIZE = (partial(stretching_size, reduced=which) for which in (True, False))
+
+
+REDUCED = register(
+    Model(
+        name="fem-nonlinear",
+        method=METHOD,
+        words="a sheet that stretches as it bends, in its modes, from rest",
+        solve=reduced_answer,
+        limits=partial(_limits, of_air_in_a_frame, REDUCED_SIZE),
+        error=_error,
+        default_size=REDUCED_SIZE,
+        sources=(ALPHA, NEWTON),
+        is_nonlinear=True,
+        takes_series=has_own_law,
+    )
+)
+FULL = register(
+    Model(
+        name="fem-nonlinear-transient",
+        method=METHOD,
+        words="a sheet that stretches as it bends, on 10-node tetrahedra, step by step",
+        solve=full_answer,
+        limits=partial(_limits, of_vacuum, FULL_SIZE),
+        error=_error,
+        default_size=FULL_SIZE,
+        sources=(ALPHA, NEWTON),
+        is_nonlinear=True,
+        takes_series=has_own_law,
+    )
+)

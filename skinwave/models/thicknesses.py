@@ -57,23 +57,9 @@ def range_of(
     thicknesses: Sequence[bool],
     h: float | None,
 ) -> Range:
-    """Range of bodies, with the geometries that its matrices are interpolated between.
-
-    Parameters
-    ----------
-    body : body at shares (k,) of the range
-    meshed : (k,) shares of the body that the mesh is of
-    thicknesses : (k,) whether each share is that of a thickness
-    h : metre, element size; the default of the body that is meshed if not given
-
-    Returns
-    -------
-    Range
-
-    Raises
-    ------
-    ValueError
-        If no mesh can be moved over the range.
+    """Range of bodies, with the geometries that its matrices are interpolated between: of a body at
+    shares (k,) of which some are of `thicknesses` (k,), on a mesh of that at the shares `meshed`.
+    Raises a ValueError if no mesh can be moved over the range.
     """
     reference, free = body(meshed), np.array(thicknesses)
     kind, moved, count, functions = reference.of_kind, None, CANDIDATES, _terms
@@ -115,18 +101,8 @@ def nearest_geometry(bodies: Range, at: Sequence[float]) -> tuple[float, ...]:
 
 
 def build_at(bodies: Range, at: Sequence[float], symmetry: str = "") -> Build:
-    """Mesh that all have, moved to the thicknesses of a body; of the materials that it was
-    meshed with.
-
-    Parameters
-    ----------
-    bodies : Range
-    at : (k,) shares of the range
-    symmetry : as of `bodies.build.build`
-
-    Returns
-    -------
-    Build
+    """Mesh that all have, moved to the thicknesses of the body at shares (k,) of the range; of the
+    materials that it was meshed with.
     """
     reference = bodies.body(bodies.meshed)
     free = np.ptp(np.array(bodies.geometries), axis=0) > 0

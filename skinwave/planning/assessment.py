@@ -17,7 +17,8 @@ from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.models import named
 from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
-from skinwave.planning.boundaries import absorbing_error
+from skinwave.planning.extent import absorbing_error
+from skinwave.planning.left_out import series_error, stretching_left_out
 from skinwave.planning.plan import plan
 from skinwave.planning.refinement import (
     about_its_rest,
@@ -26,8 +27,6 @@ from skinwave.planning.refinement import (
     convergence,
     quantity_of_interest,
 )
-from skinwave.planning.series import series_error
-from skinwave.planning.stretching import stretching_left_out
 from skinwave.planning.warnings import of_elements, of_ends_and_band, of_stretching
 from skinwave.scene.scene import Body, Load, Reading, Scene
 
@@ -55,10 +54,6 @@ def assessed(
     options : SolveOptions; h is the default of the body if not given
     compared : element size in metre to compare with, and the body with it; chosen if not given
     meshed : body whose mesh both sizes are of, if its nodes were moved to those of the scene's
-
-    Returns
-    -------
-    Response
     """
     fine = quantity_of_interest(prepared, scene, response)
     return told(scene, response, fine, options, compared=compared, meshed=meshed)
@@ -73,17 +68,8 @@ def told(
     compared: Coarser | None = None,
     meshed: Body | None = None,
 ) -> Response:
-    """Response of any linear finite-element model, with its expected error and all warnings.
-
-    Parameters
-    ----------
-    scene, response, options, compared, meshed : as for `assessed`
-    fine : quantity of interest of the response: waveforms (t, p), or the lines (f, p) of an
-        unconstrained body
-
-    Returns
-    -------
-    Response
+    """The same of any linear finite-element model, by its quantity of interest `fine`: waveforms
+    (t, p), or the lines (f, p) of an unconstrained body.
     """
     body, tolerance = scene.body, options.tolerance
     size = options.h or default_size(body)
@@ -106,21 +92,12 @@ def told(
 
 
 def coarser_body(scene: Scene, options: SolveOptions = DEFAULT) -> Coarser:
-    """Coarser mesh that `assessed` compares with.
-
-    Parameters
-    ----------
-    scene, options : as for `assessed`
-
-    Returns
-    -------
-    element size in metre, and the body reduced with it
-    """
+    """Element size in metre of the mesh that `assessed` compares with, and the body on it."""
     body, h = scene.body, options.h
     other = compared_with(body, h) if h else _coarser(body, default_size(body))
     reduction = reduction_tolerance(options.tolerance)
-    asked = (body, scene.probes, other, options.solver, reduction)
-    return other, _prepared(*asked, reading=scene.reading, load=scene.load)
+    solid = body, scene.probes, scene.reading, scene.load
+    return other, _prepared(*solid, other, options.solver, reduction)
 
 
 def sentences(
@@ -131,19 +108,8 @@ def sentences(
     h: float | None = None,
     error: float = 0.0,
 ) -> tuple[str, ...]:
-    """Warnings of a response, all of them, by whichever interface it is returned; computes no mesh.
-
-    Parameters
-    ----------
-    scene : Scene
-    response : Response
-    tolerance : relative error that is asked for
-    h : float, metre, size of the elements of a linear model
-    error : float, relative, expected of these elements; nan if it is not known
-
-    Returns
-    -------
-    sentences
+    """All warnings of a response, without computing a mesh: of a linear model with elements of h in
+    metre, with the relative error that is expected of these, or nan.
     """
     if named(response.model).default_size and h:
         known = of_elements(scene, h, error, tolerance)
@@ -164,15 +130,9 @@ def _coarser(body: Body, h: float) -> float:
 
 @lru_cache(maxsize=4)  # of Tactons on the same bodies
 def _prepared(
-    body: Body,
-    probes: tuple[tuple[float, float], ...],
-    h: float,
-    solver: str,
-    tolerance: float,
-    *,
-    reading: Reading,
-    load: Load,
-) -> Prepared:
+    body: Body, probes: tuple[tuple[float, float], ...], reading: Reading, load: Load,
+    h: float, solver: str, tolerance: float,
+) -> Prepared:  # fmt: skip
     return prepare(
         body, np.array(probes), h=h, solver=solver, tolerance=tolerance, reading=reading, load=load
     )

@@ -80,17 +80,7 @@ def _percent(value: float) -> str:
 
 
 def error_budget(scene: Scene, numerical: float = nan) -> ErrorBudget:
-    """Error budget of the displacement at a scene's probes.
-
-    Parameters
-    ----------
-    scene : Scene
-    numerical : expected relative error of its response
-
-    Returns
-    -------
-    ErrorBudget
-    """
+    """Error budget at a scene's probes, of a response with a `numerical` relative error."""
     spreads = spreads_of(scene)
     of_body = tuple(s for s in spreads if s.part == "material")
     others = tuple(s for s in spreads if s.part != "material")
@@ -160,17 +150,8 @@ def _of_plate(scene: Scene) -> tuple[Floats, Complex]:
 
 
 def mesh_row(scene: Scene, h: float | None, error: float) -> PlanRow:
-    """Row of a plan: the error budget, and from which mesh or tolerance on nothing is gained.
-
-    Parameters
-    ----------
-    scene : Scene
-    h : metre, element size; None without a mesh
-    error : relative, expected of the response
-
-    Returns
-    -------
-    PlanRow
+    """Row of a plan: the error budget of a response with a relative error, and from which mesh on
+    nothing is gained beside elements of h in metre, if it has any.
     """
     found = error_budget(scene, error)
     name, largest = found.largest

@@ -61,17 +61,8 @@ def _lines_of_load(scene: Scene, tolerance: float) -> tuple[Floats, Complex]:
 
 
 def cutoff_frequency(frequencies: Floats, shares: Floats, tolerance: float) -> float:
-    """Cutoff frequency above which the motion of every probe is negligible.
-
-    Parameters
-    ----------
-    frequencies : (f,) float, Hz, ascending
-    shares : (f, p) float, of the power of each probe's motion
-    tolerance : relative error that is asked for, of which a third is negligible
-
-    Returns
-    -------
-    float, Hz
+    """Frequency in Hz above which the motion of every probe is less than a third of the tolerance,
+    by a `response_spectrum`.
     """
     above = np.cumsum(shares[::-1], axis=0)[::-1].max(axis=1)
     return float(frequencies[np.flatnonzero(np.sqrt(above) > tolerance / 3).max(initial=0)])
@@ -136,20 +127,11 @@ def _loss_at_cut_off(body: Body) -> float:
 
 
 def absorbed_returned(scene: Scene, half: Floats, highest: float) -> float:
-    """Reflection of absorbing sides, over the probes' own steady motion.
+    """Reflection of absorbing sides `half` (2,) in metre from the middle, over the probes' own
+    steady motion; 1, for unknown, of a body with too little loss for that.
 
     By mirror images of the focus in the four sides and the wavenumber integral of the infinite
-    body, for the lines of the load.
-
-    Parameters
-    ----------
-    scene : Scene
-    half : (2,) float, metre, distances of the sides along x and y from the middle
-    highest : Hz, of the lines that count
-
-    Returns
-    -------
-    float, 0..1; 1, for unknown, of a body with too little loss for that
+    body, for the lines of the load up to the `highest` in Hz.
     """
     body = scene.body
     width = spot_scale(scene.pressure)

@@ -1,24 +1,36 @@
-"""Extent of a body that a scene requires, its symmetry, its coat, and physics that is neglected."""
+"""Extent of a body that a scene requires: its symmetry, and how far its absorbing ends are.
+
+On a coarse mesh the absorbing layer is made twice as wide. The change of the waveforms is most of
+what the usual layer returns, because the wider one damps waves more, and near fields end further
+out.
+"""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from fem.coat import Coat
-from simple_model.load.focus import spot_width
+import fem
+from meshes.tetmesh import Floats
+from skinwave.bodies.absorbing_layer import has_layer, layer_of
 from skinwave.bodies.analytic import is_flat_layer
-from skinwave.bodies.coat import AT, layer_name, thicknesses
-from skinwave.bodies.coat import coat as coat_of
-from skinwave.bodies.mounting import FRAME
-from skinwave.bodies.sheet import air_mass
-from skinwave.models.plate_modes import middle_compliance, relative_modulus
-from skinwave.models.symmetry import mirrored_axes
-from skinwave.planning.estimates import FAR, absorbed_returned, mean_gain, spot_scale
+from skinwave.bodies.mounting import EDGES
+from skinwave.bodies.sizes import check_mesh, default_size
+from skinwave.bodies.slab import discretise
+from skinwave.models.meshed import mirrored_axes
+from skinwave.models.options import DEFAULT, SolveOptions
+from skinwave.models.prepared import answer, prepare, reduction_tolerance
+from skinwave.planning.estimates import FAR, absorbed_returned, spot_scale
 from skinwave.planning.records import PlanRow
+from skinwave.planning.refinement import about_its_rest, element_sizes, relative_change
 from skinwave.scene.scene import Body, Scene
 
-STIFF = 30.0  # times the modulus below, from where the error of a coat is stated
-LOWEST = 20.0  # Hz at which air is estimated where no line is higher
+WIDER = 2.0  # times the width of the layer
+# Of the change: slabs on springs, free ones and half-spaces had 1.0 to 1.3 times it in error.
+MARGIN = 1.5
+COARSE = 0.01  # relative error of reduced bodies that cannot be reduced to less
+SHARE = 0.25  # of the tolerance: what absorbing ends may leave before the body is extended
+MOST_EXTENSIONS = 2
 
 
 def symmetry(scene: Scene) -> str:
@@ -34,22 +46,66 @@ def symmetry(scene: Scene) -> str:
     )
 
 
-def within_reflections(
+def absorbing_error(scene: Scene, body: Body, options: SolveOptions = DEFAULT) -> float:
+    """Relative error of the worst probe's waveform that the absorbing base and sides of the meshed
+    body leave, the scene's or an extended one; 0 without an absorbing layer.
+    """
+    if not has_layer(body):
+        return 0.0
+    size = min(float(element_sizes(body)[0]), 2 * spot_scale(scene.pressure))
+    axes = symmetry(scene)
+
+    def answered(wider: float, reduction: float) -> Floats:
+        prepared = prepare(
+            body, scene.probe_points, options.progress, h=size, symmetry=axes,
+            solver=options.solver, tolerance=reduction, reading=scene.reading, load=scene.load,
+            discretise=partial(discretise, wider=wider),
+        )  # fmt: skip
+        return about_its_rest(scene, answer(prepared, scene).values)
+
+    def change(reduction: float) -> float:
+        return relative_change(answered(1.0, reduction), answered(WIDER, reduction))
+
+    try:
+        return MARGIN * change(reduction_tolerance(options.tolerance))
+    except fem.NotReduced:  # a free body has hundreds of modes in a wide layer
+        return MARGIN * change(COARSE)
+
+
+def extent(
+    scene: Scene, options: SolveOptions, highest: float
+) -> tuple[Body, list[PlanRow], float]:
+    """Body without what reflects too little to matter, or extended at its absorbing ends until
+    these leave a small share of the tolerance; a row if it is not all of the scene's, and the error
+    that its absorbing ends leave. Lines up to the `highest` in Hz count.
+    """
+    body, rows = _within_reflections(scene, options.tolerance, highest)
+    found, left = body, absorbing_error(scene, body, options)
+    for _ in range(MOST_EXTENSIONS):
+        larger = _larger(found)
+        if left <= SHARE * options.tolerance or larger == found:
+            break
+        try:
+            check_mesh(larger, default_size(larger))
+        except ValueError:  # too large
+            break
+        found, left = larger, absorbing_error(scene, larger, options)
+    if found == body:
+        return body, rows, left
+    size = f"{1e3 * found.width:.0f} x {1e3 * found.height:.0f} x {1e3 * found.depth:.0f} mm"
+    row = PlanRow(
+        what="extent", value=size,
+        reason=f"absorbing ends further away; they leave an error of {100 * left:.2g} %",
+    )  # fmt: skip
+    return found, [row], left
+
+
+def _within_reflections(
     scene: Scene, tolerance: float, highest: float
 ) -> tuple[Body, list[PlanRow]]:
-    """Extent of the body out to where reflections are negligible.
-
-    Only absorbing sides are moved inwards: reflections from others belong to the response.
-
-    Parameters
-    ----------
-    scene : Scene
-    tolerance : relative error that is asked for
-    highest : Hz, of the lines that count
-
-    Returns
-    -------
-    Body, and the reason if it is not all of the scene's
+    """Extent of the body out to where reflections of lines up to the `highest` in Hz are
+    negligible, and the reason if it is not all of the scene's. Only absorbing sides are moved
+    inwards: reflections from others belong to the response.
     """
     body = scene.body
     if not is_flat_layer(body) or (body.base, body.sides) != ("clamped", "absorbing"):
@@ -75,106 +131,13 @@ def within_reflections(
     return replace(body, width=width, height=height), [row]
 
 
-def coat_rows(body: Body, h: float) -> list[PlanRow]:
-    """Top layers that are a coat, those that have elements, and why."""
-    coat = coat_of(body, h)
-    if coat is None:
-        return _volume_rows(body, h, 0)
-    return [
-        PlanRow(
-            what="coat",
-            value=" and ".join(
-                f"{layer_name(body, solid)} of {1e3 * thickness:g} mm"
-                for solid, thickness in zip(coat.materials, coat.thicknesses, strict=True)
-            ),
-            reason=f"a Kirchhoff shell on the surface: thinner than half an element of "
-            f"{1e3 * h:.3g} mm, and than a tenth of a shear wavelength at {AT:g} Hz"
-            + _of_stiffness(body, coat),
-        ),
-        *_volume_rows(body, h, len(coat.materials)),
-    ]
-
-
-def _volume_rows(body: Body, h: float, coated: int) -> list[PlanRow]:
-    """Layers below a coat of so many, which have elements, and why."""
-    layers = list(zip(body.strata, thicknesses(body.strata), strict=True))[coated:-1]
-    if not layers:
-        return []
-    why = "those of a slab are as flat as its layers are thin"
-    return [
-        PlanRow(
-            what="layers",
-            value=" and ".join(f"{layer_name(body, m)} of {1e3 * t:g} mm" for (_, m), t in layers),
-            reason="elements of their own: "
-            + (why if body.of_kind.conforming else f"half an element of {1e3 * h:.3g} mm or more"),
-        )
-    ]
-
-
-def _of_stiffness(body: Body, coat: Coat) -> str:
-    """Accuracy of a coat that is far stiffer than what it covers."""
-    below = body.strata[len(coat.materials)][1].shear_modulus
-    ratio = max(solid.shear_modulus for solid in coat.materials) / below
-    if ratio < STIFF:
-        return ""
-    return (
-        f"; it is {ratio:.0f} times as stiff as what it covers, and of 100 times the error is at "
-        f"most 3 to 15 % up to {AT:g} Hz, the more the thicker (0.1 to 1 mm)"
+def _larger(body: Body) -> Body:
+    """The body with its absorbing ends further out by the width of their layer; ends of an axis
+    whose sides differ stay.
+    """
+    ends = [{body.side(name) for name, (k, _) in EDGES.items() if k == axis} for axis in (0, 1)]
+    by = np.array([*(each == {"absorbing"} for each in ends), body.base == "absorbing"])
+    width, height, depth = layer_of(body).width * by * (2, 2, 1)
+    return replace(
+        body, width=body.width + width, height=body.height + height, depth=body.depth + depth
     )
-
-
-def left_out(scene: Scene, highest: float) -> list[PlanRow]:
-    """Neglected physics of a sheet with an estimate of each: air, if it is in vacuum, and
-    stretching; with air, its added mass.
-    """
-    body = scene.body
-    if not body.of_kind.is_plate:
-        return []
-    middle = max(highest / 2, LOWEST)
-    air = air_mass(body, middle) / body.mass_per_area
-    sag = mean_sag(scene) / body.depth
-    shift = 100 * (1 - 1 / np.sqrt(1 + air))
-    lowered = f"resonances lower by {shift:.1f} %, by 2 rho_air/k at {middle:.0f} Hz"
-    return [
-        PlanRow(
-            what="air" if body.air else "left out: air",
-            value=f"+{100 * air:.0f} % mass",
-            reason=f"{lowered}; each wavenumber has its own, as air = true asks"
-            if body.air
-            else f"{lowered}: take the response as that of a sheet in vacuum, or set air = true in "
-            "[body]",
-        ),
-        PlanRow(
-            what="left out: stretching",
-            value=f"sag {sag:.1f} thicknesses",
-            reason="a linear sheet; a real one stiffens beyond about half a thickness"
-            if sag > 0.5
-            else "the mean deflection is small",
-        ),
-    ]
-
-
-def _mean_force(scene: Scene) -> float:
-    """Mean force in N that presses on the middle of a flat body."""
-    if scene.load.moving.is_plain:
-        return float(2 * np.pi * spot_width(scene.pressure.height) ** 2 * mean_gain(scene))
-    downwards = -scene.load.tractions(np.array([[0.0, 0.0, 1.0]]))[:, 0, 2]
-    forces = [2 * np.pi * spot_scale(each) ** 2 * mean_gain(replace(scene, pressure=each))
-              for each in scene.loads]  # fmt: skip
-    return float(downwards @ forces)
-
-
-def mean_sag(scene: Scene) -> float:
-    """Linear deflection in metre of a held sheet's middle under its mean load, if applied there.
-
-    0.0056 F a^2 / D of a clamped square (Timoshenko and Woinowsky-Krieger 1959, table 37); of other
-    supports, and of orthotropic or stretched sheets, by the modes of the plate.
-    """
-    body = scene.body
-    force = _mean_force(scene)
-    if body.mounting == FRAME and body.solid.orthotropy is None:
-        at_rest = relative_modulus(body, 0.0).real * body.bending_stiffness
-        sag = 0.0056 * min(body.width, body.height) ** 2 / at_rest
-    else:
-        sag = middle_compliance(body)
-    return float(force * sag)

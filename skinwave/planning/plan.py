@@ -17,15 +17,14 @@ from skinwave.models import Model, named
 from skinwave.models.advice import beyond, check_taken, default_model, refusal, takers, takes
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
 from skinwave.models.full import TRANSIENT_RATE, step_count
-from skinwave.models.laws import check_laws
+from skinwave.models.laws import check_laws, own_laws, series_tolerance
 from skinwave.models.limits import Limit
 from skinwave.models.linear_elements import FEM
 from skinwave.models.options import DEFAULT, SolveOptions, sample_grid, sample_times
-from skinwave.models.plate_modes import FROM_REST
+from skinwave.models.plate_modes import ERROR, FROM_REST
 from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.prepared import answer
 from skinwave.models.stretched_plate import STRETCHED
-from skinwave.planning.boundaries import absorbing_error, extent
 from skinwave.planning.estimates import (
     NO_BOUND,
     cutoff_frequency,
@@ -33,15 +32,19 @@ from skinwave.planning.estimates import (
     response_spectrum,
     side_reflections,
 )
-from skinwave.planning.extent import left_out, symmetry
-from skinwave.planning.mesh_rows import element_rows
+from skinwave.planning.extent import absorbing_error, extent, symmetry
+from skinwave.planning.left_out import (
+    beyond_linear,
+    deflection,
+    sensitivity,
+    series_error,
+    start_left_out,
+    stretching_left_out,
+    sudden_left_out,
+)
 from skinwave.planning.records import Plan, PlanRow
 from skinwave.planning.refinement import above_band, refined
-from skinwave.planning.sensitivity import sensitivity
-from skinwave.planning.series import with_series
-from skinwave.planning.sheets import why_modes
-from skinwave.planning.start import start_left_out, sudden_left_out
-from skinwave.planning.stretching import beyond_linear, deflection, stretching_left_out
+from skinwave.planning.rows import element_rows, left_out
 from skinwave.planning.warnings import (
     error_not_estimated,
     of_elements,
@@ -100,7 +103,7 @@ def _planned(scene: Scene, options: SolveOptions, grid: Grid) -> Plan:
     highest, row = _highest_line(scene, options.tolerance)
     if chosen.is_infinite:
         found = _without_mesh(scene, options, chosen, highest, row, grid)
-        return with_series(found, scene, options.tolerance)
+        return _with_series(found, scene, options.tolerance)
     if chosen is FROM_REST:
         return _by_modes(scene, options.tolerance, highest, row)
     if asked is None and chosen is not FEM:
@@ -176,7 +179,7 @@ def _by_elements(
         ),
         prepared=mesh.prepared,
     )  # fmt: skip
-    return with_series(found, scene, tolerance)
+    return _with_series(found, scene, tolerance)
 
 
 def chosen_model(scene: Scene, tolerance: float = 0.05, grid: Grid | None = None) -> str:
@@ -209,6 +212,16 @@ def chosen_model(scene: Scene, tolerance: float = 0.05, grid: Grid | None = None
         steady = np.hypot(_returned(scene), start) <= tolerance
         return HARMONIC.name if steady else FLAT_BODY.name
     return FROM_REST.name if why_modes(scene, tolerance) else default_model(scene)
+
+
+def why_modes(scene: Scene, tolerance: float) -> str:
+    """Reason for the modes of a scene's sheet instead of elements; none if elements do."""
+    body = scene.body
+    if not takes(FROM_REST, scene) or tolerance < ERROR:
+        return ""
+    if body.air and not body.mounting.is_frame:
+        return f"elements have air around a sheet in a frame, not one {body.mounting.words}"
+    return "a flat sheet that is held: modes of a thin plate need no mesh"
 
 
 @lru_cache(maxsize=64)
@@ -312,6 +325,32 @@ def _without(start: float) -> str:
 def _section(body: Body) -> str:
     layers = len(body.strata)
     return "a homogeneous flat slab" if layers == 1 else f"a flat slab of {layers} layers"
+
+
+def _with_series(found: Plan, scene: Scene, tolerance: float) -> Plan:
+    """Plan whose error counts the Prony series that its model takes for modulus laws."""
+    solids = own_laws(scene.body)
+    if not solids or not named(found.model).takes_series(scene.body):
+        return found
+    allowed = series_tolerance(tolerance)
+    error = series_error(scene, found.model, tolerance, found.prepared)
+    rows = tuple(
+        PlanRow(
+            what="modulus law",
+            value=solid.series(allowed).words,
+            reason=f"{found.model} takes it for the law; the motion of the probes is "
+            f"{100 * error:.2g} % off by it",
+        )
+        for solid in solids
+    )
+    said = over_tolerance(
+        f"the {rows[0].value},", error, tolerance,
+        "flat-body-harmonic or fem-harmonic, which take the law itself, are",
+    )  # fmt: skip
+    return replace(
+        found, error=found.error + error, rows=(*found.rows, *rows),
+        warnings=(*found.warnings, *said),
+    )  # fmt: skip
 
 
 def _march_error(scene: Scene, dt: float) -> float:

@@ -119,7 +119,7 @@ def refined(
     symmetry: str = "",
 ) -> Refined:
     """Coarsest mesh of a sequence that is accurate to a tolerance, or that of a given h, with its
-    expected error.
+    expected error; the finest of the sequence if that is not accurate either.
 
     Parameters
     ----------
@@ -127,10 +127,6 @@ def refined(
     body : Body that is meshed, the scene's or a part of it
     options : SolveOptions
     symmetry : as in `bodies.build.build`
-
-    Returns
-    -------
-    Refined; the finest of the sequence, with its error, if that is not accurate either
 
     Raises
     ------
@@ -220,17 +216,8 @@ def _layered(body: Body, layers: int, near: float) -> float:
 
 
 def coarser_by(body: Body, other: float, h: float) -> float:
-    """Refinement ratio of two meshes, coarser over finer: that of their sizes, or of their cells on
-    average of all axes, where these differ less, because short sides have few cells.
-
-    Parameters
-    ----------
-    body : Body
-    other, h : metre, element sizes, coarser and finer
-
-    Returns
-    -------
-    float
+    """Refinement ratio of two meshes, coarser over finer: that of their sizes in metre, or of their
+    cells on average of all axes, where these differ less, because short sides have few cells.
     """
     if actual := body.of_kind.actual_size:
         return actual(body, other) / actual(body, h)
@@ -250,18 +237,9 @@ def about_its_rest(scene: Scene, waveforms: NDArray[Any]) -> NDArray[Any]:
 
 
 def quantity_of_interest(prepared: Prepared, scene: Scene, found: Response) -> NDArray[Any]:
-    """Quantity of interest of a response.
-
-    Parameters
-    ----------
-    prepared : Prepared
-    scene : Scene
-    found : Response, of the reduced body
-
-    Returns
-    -------
-    waveforms (t, p) in its unit; of an unconstrained body the lines (f, p c) of its components
-    without the mean, because rigid-body drift would hide the rest
+    """Quantity of interest of the response of a reduced body: its waveforms (t, p); of an
+    unconstrained body the lines (f, p c) of its components without the mean, because rigid-body
+    drift would hide the rest.
     """
     if scene.body.is_held:
         return about_its_rest(scene, found.values)
@@ -276,14 +254,8 @@ def above_band(waveforms: Floats, step: float) -> float:
     body's own is as large as the true one and has no relation to it. A series of cosines continues
     the record without a jump at its ends.
 
-    Parameters
-    ----------
-    waveforms : (t, p) float
-    step : float, s, between their samples
-
-    Returns
-    -------
-    float, relative, of the worst probe: the root of twice the share of the energy
+    Of waveforms (t, p) with a step in s between samples, relative, of the worst probe: the root of
+    twice the share of the energy.
     """
     energy = fft.dct(waveforms, axis=0, norm="ortho") ** 2
     frequencies = np.arange(len(energy)) / (2 * step * len(energy))
@@ -300,19 +272,9 @@ def convergence(
     *,
     same: bool,
 ) -> tuple[Convergence, float]:
-    """Convergence of two element sizes: outcome and relative error of the second.
-
-    Parameters
-    ----------
-    body : Body
-    sizes : metre, both element sizes
-    found : (k, p), the quantities of interest that were found with them
-    tolerance : relative error that is asked for
-    same : whether both make one mesh
-
-    Returns
-    -------
-    Convergence, and the error; 1 or nan where it cannot be estimated, see `UNESTIMATED`
+    """Outcome and relative error of the second of two element sizes in metre, by the quantities of
+    interest (k, p) that were found with them; whether both make the `same` mesh. The error is as of
+    `UNESTIMATED` where there is none to extrapolate.
     """
     if same:
         outcome = Convergence.SINGLE_MESH if body.file else Convergence.SAME_MESH
@@ -322,18 +284,6 @@ def convergence(
 
 
 def enough(body: Body, h: float, error: float, tolerance: float) -> float:
-    """Element size that meets a tolerance, by the error with another.
-
-    Parameters
-    ----------
-    body : Body; a slab's cells are at most as high as its depth
-    h : metre, the other element size
-    error : relative, with it
-    tolerance : relative error that is asked for
-
-    Returns
-    -------
-    float, metre
-    """
+    """Element size in metre that meets a tolerance, by the relative error with another, h."""
     size = min(h, body.depth if body.of_kind.is_layer else h)
     return CONTROLLER.size(size, max(CONTROLLER.safety * tolerance, error), tolerance)

@@ -9,8 +9,8 @@ from skinwave.models import Model, named
 from skinwave.models.advice import cures_for, in_words
 from skinwave.models.reduction import BAND
 from skinwave.planning.estimates import mean_gain, spot_scale
+from skinwave.planning.left_out import LINEAR, bent, stretching_left_out
 from skinwave.planning.refinement import enough
-from skinwave.planning.stretching import LINEAR, bent, stretching_left_out
 from skinwave.scene.scene import Scene
 
 NONLINEAR = "plate-modes-nonlinear", "fem-nonlinear"  # the cheaper first
@@ -21,17 +21,8 @@ LEFT_OUT = 0.05  # of the strongest line of a load: weaker ones are left out wit
 def of_ends_and_band(
     scene: Scene, at_ends: float, sudden: float, tolerance: float
 ) -> tuple[str, ...]:
-    """Warnings of what a reduced body leaves out beside the error of its elements.
-
-    Parameters
-    ----------
-    scene : Scene
-    at_ends, sudden : relative errors of its absorbing ends, and of the motion above `BAND`
-    tolerance : relative error that is asked for
-
-    Returns
-    -------
-    sentences
+    """Warnings of what a reduced body leaves out beside the error of its elements: at its absorbing
+    ends, and of sudden motion above `BAND`.
     """
     return (
         *over_tolerance("the absorbing layer", at_ends, tolerance, "a larger body is"),
@@ -42,18 +33,7 @@ def of_ends_and_band(
 def sudden_over_tolerance(
     scene: Scene, band: float, sudden: float, tolerance: float
 ) -> tuple[str, ...]:
-    """Warning of motion above the band of a response, which it leaves out.
-
-    Parameters
-    ----------
-    scene : Scene
-    band : float, Hz, its highest frequency
-    sudden, tolerance : relative error by what is left out, and the one that is asked for
-
-    Returns
-    -------
-    one sentence, or none
-    """
+    """Warning of motion above the band in Hz of a response, which it leaves out."""
     smooth = "a load that begins smoothly"
     cure = f"the displacement, or {smooth}," if scene.reading.asked.rate else smooth
     what = f"the {scene.quantity} above {band:g} Hz"
@@ -61,19 +41,7 @@ def sudden_over_tolerance(
 
 
 def of_elements(scene: Scene, h: float, error: float, tolerance: float) -> tuple[str, ...]:
-    """Warnings of linear elements of one size.
-
-    Parameters
-    ----------
-    scene : Scene
-    h : metre, element size
-    error : relative, expected of it, or nan
-    tolerance : relative error that is asked for
-
-    Returns
-    -------
-    sentences
-    """
+    """Warnings of linear elements of h in metre, with their expected relative error or nan."""
     size = 1e3 * enough(scene.body, h, error, tolerance)
     return (
         *error_unknown(error),
@@ -88,16 +56,6 @@ def of_elements(scene: Scene, h: float, error: float, tolerance: float) -> tuple
 def of_stretching(scene: Scene, response: Response, tolerance: float) -> tuple[str, ...]:
     """Warning of a linear model of a sheet that deflects by more than `LINEAR` thicknesses, or
     whose stretching changes its motion by more than the tolerance.
-
-    Parameters
-    ----------
-    scene : Scene
-    response : Response
-    tolerance : relative error that is asked for
-
-    Returns
-    -------
-    one sentence, or none
     """
     model = named(response.model)
     if model.is_nonlinear or not response.record.of_body:
@@ -176,18 +134,8 @@ def rigid_body_drift(scene: Scene) -> tuple[str, ...]:
 
 
 def over_tolerance(what: str, error: float, tolerance: float, cure: str) -> tuple[str, ...]:
-    """Warning of an expected error above the tolerance.
-
-    Parameters
-    ----------
-    what : that has the error, a sentence's subject
-    error : relative
-    tolerance : relative error that is asked for
-    cure : a sentence's end before "enough"
-
-    Returns
-    -------
-    one sentence, or none
+    """Warning of an expected error above the tolerance, of `what` has it; the cure is a sentence's
+    end before "enough".
     """
     if not error > tolerance:
         return ()
@@ -201,19 +149,7 @@ def over_tolerance(what: str, error: float, tolerance: float, cure: str) -> tupl
 def beyond_prediction(
     scene: Scene, response: Response, predicted: float, tolerance: float
 ) -> tuple[str, ...]:
-    """Warning of an error above the tolerance that the model measured and the plan did not predict.
-
-    Parameters
-    ----------
-    scene : Scene
-    response : Response, with the error that its model measured, or nan
-    predicted : relative error of the plan
-    tolerance : relative error that is asked for
-
-    Returns
-    -------
-    one sentence, or none
-    """
+    """Warning of an error above the tolerance that the model measured, and no plan predicted."""
     error = response.expected_error
     if not error > np.fmax(predicted, tolerance):
         return ()
@@ -225,21 +161,8 @@ def beyond_prediction(
     )
 
 
-def start_over_tolerance(model: Model | None, start: float, tolerance: float) -> tuple[str, ...]:
-    """Warning of a steady-state model that leaves out a start above the tolerance.
-
-    Parameters
-    ----------
-    model : Model or None
-    start : float, relative error that leaving the start out makes
-    tolerance : float, relative error that is asked for
-
-    Returns
-    -------
-    one sentence, or none
-    """
-    if model is None:
-        return ()
+def start_over_tolerance(model: Model, start: float, tolerance: float) -> tuple[str, ...]:
+    """Warning of a steady-state model that leaves out a start above the tolerance."""
     what = f"{model.name}, which leaves out the initial transient,"
     return over_tolerance(what, start, tolerance, f"{model.from_rest} is")
 

@@ -14,9 +14,8 @@ from simple_model.load.path_cells import path_samples
 from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
 from skinwave.models import reduction
-from skinwave.models.full import assembled, meshed, spent
 from skinwave.models.laws import relaxing, series_tolerance
-from skinwave.models.loads import probe_rows, spread, surface_load
+from skinwave.models.meshed import assembled, meshed, probe_rows, spent, spread, surface_load
 from skinwave.models.options import SolveOptions, sample_times
 from skinwave.models.prepared import in_motion
 from skinwave.scene.scene import Scene

@@ -18,7 +18,7 @@ from simple_model.layers.tensors import hooke
 from simple_model.load.spectrum import synthesise
 from simple_model.quantities import NORMAL, STRAIN, VECTOR, Quantity
 from skinwave.models import reduction
-from skinwave.models.loads import check_coat
+from skinwave.models.meshed import check_coat
 from skinwave.results.motion import BodyMotion, check_values
 from skinwave.scene.scene import Reading, Scene
 

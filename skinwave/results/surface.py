@@ -23,13 +23,13 @@ from skinwave.bodies.analytic import compliance, has_exact_waves, is_laterally_i
 from skinwave.bodies.sizes import default_size
 from skinwave.models.advice import takes
 from skinwave.models.flat_body import field_read
-from skinwave.models.loads import line_factor, probe_rows, surface_motion
+from skinwave.models.meshed import line_factor, probe_rows, surface_motion
 from skinwave.models.plate_modes import ERROR as PLATE_ERROR
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.plate_modes import steady_lines as plate_lines
 from skinwave.models.reduction import read_at
 from skinwave.models.stretched_plate import settled
-from skinwave.planning.stretching import beyond_linear
+from skinwave.planning.left_out import beyond_linear
 from skinwave.results.motion import TOLERANCE, BodyMotion, driven, line_amplitudes
 from skinwave.scene.scene import Reading, Scene
 from skinwave.system.effort import Progress

@@ -21,7 +21,7 @@ from simple_model.layers.flat_body import steady_lines
 from simple_model.load.spectrum import pressure_lines, synthesise
 from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity, quantity
 from skinwave.bodies.analytic import compliance
-from skinwave.models.loads import surface_motion
+from skinwave.models.meshed import surface_motion
 from skinwave.models.plate_modes import steady_lines as plate_lines
 from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.reduction import oscillating, read_at

@@ -25,7 +25,6 @@ from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.models.speeds import repeated, shown_part
-from skinwave.planning.costs import LARGER
 from skinwave.planning.plan import plan
 from skinwave.planning.records import Plan
 from skinwave.planning.simulate import compute, solve
@@ -61,6 +60,7 @@ from skinwave.system.effort import Progress
 from skinwave.system.json_kinds import EFFORT, PLAN, TRUST, effort_of, fitting
 
 KERNEL_REACH = np.array([BODIES["skin-slab"].width, BODIES["skin-slab"].height]) / 2
+LARGER = 1.5  # times the default size: elements of pictures, for a fifth of the time
 PLANNED = 0.05  # tolerance of the plan that stands on the page
 
 

@@ -23,8 +23,8 @@ from skinwave.models.plate_modes import MODES as PLATES
 from skinwave.models.prepared import REDUCTION_TOLERANCE, answer, prepare
 from skinwave.models.stretched_plate import STRETCHED
 from skinwave.planning.estimates import has_wavenumber_solution
+from skinwave.planning.left_out import beyond_linear
 from skinwave.planning.simulate import compute
-from skinwave.planning.stretching import beyond_linear
 from skinwave.report.figures import png
 from skinwave.results.comparison import compare
 from skinwave.scene.scene import Scene, check_load

@@ -12,7 +12,6 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-import fem
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, named_lines, phasors, sensation_level
 from simple_model.layers.flat_body import PathOperator, path_operator, steady_lines
@@ -23,11 +22,10 @@ from simple_model.typing import Complex
 from skinwave.bodies.analytic import compliance
 from skinwave.bodies.sizes import default_size
 from skinwave.models import named
-from skinwave.models.affine_scenes import check_scene
+from skinwave.models.covering import Covering, covering, kept_together, tried_together
 from skinwave.models.flat_body import HARMONIC
-from skinwave.models.free_keys import free_keys
 from skinwave.models.linear_elements import FEM
-from skinwave.models.options import sample_times
+from skinwave.models.options import SolveOptions, sample_times
 from skinwave.models.parametric import lines_of
 from skinwave.models.prepared import components, prepare, reduction_tolerance
 from skinwave.planning.simulate import compute
@@ -36,7 +34,6 @@ from skinwave.results.surface import REACH, SILENT, grid, has_wavenumber_integra
 from skinwave.scene.scene import Scene
 from skinwave.scene.spreads import PRESSURE, Spread, spreads_of, with_values
 from skinwave.sweeps import engine
-from skinwave.sweeps.families import Family, reduced, reduced_anew
 from skinwave.sweeps.sampling import one_at_a_time, samples
 from skinwave.system.effort import Progress, one_thread, silent
 
@@ -50,9 +47,6 @@ KEPT = 4  # solutions that may differ by the pressure alone
 # Quantiles of each number between which bodies are reduced together: a palm takes 785 vectors for
 # those of a hundred samples, and more than one model has for the farthest of 256.
 SHARED = (0.01, 0.99)
-# Samples for each number that is free: a palm known to a factor of 2 in its moduli and 3 in its
-# losses takes the time of some 45 samples of their own.
-LEAST = 24
 HIGHEST_LEVEL = "highest sensation level at a probe, dB"  # an output
 NO_MAP = np.zeros((0, 0))
 
@@ -72,7 +66,7 @@ class Method:
     tolerance: float = 0.05
     mapped: bool = False
     same_load: bool = False
-    family: Family | None = None
+    family: Covering | None = None
     steady: bool = False
 
     @property
@@ -200,8 +194,8 @@ def shared_body(
     values: Floats,
     method: Method,
     progress: Progress | None = None,
-) -> Family | None:
-    """Family of the bodies of nearly all samples, reduced and cached on disk.
+) -> Covering | None:
+    """Bodies of nearly all samples, reduced together and cached on disk.
 
     Parameters
     ----------
@@ -213,29 +207,22 @@ def shared_body(
 
     Returns
     -------
-    Family; None if there is none, or so few samples that bodies of their own cost less
+    Covering; None if there is none, or if bodies of their own cost less
     """
     free = {
         spread.key: _range(spread, column)
         for spread, column in zip(spreads, values.T, strict=True)
         if spread.key != PRESSURE
     }
-    few = len(values) < LEAST * max(len(free), 1)
     of_elements = method.model == FEM.name and method.same_load and not method.mapped
-    if few or not (
-        free and of_elements and scene.reading.is_plain and scene.pressure.peak_pressure
-    ):
+    if not (free and of_elements and scene.reading.is_plain and scene.pressure.peak_pressure):
         return None
-    plain = replace(scene, spreads=())
-    ranges = tuple((key, *ends) for key, ends in free.items())
-    family = Family(scene=plain, hardest=plain.body, ranges=ranges, members=len(values))
-    size = method.h or default_size(scene.body)
-    try:
-        check_scene(plain, free_keys(plain.body, free), method.tolerance)
-        reduced_anew(family, size, method.tolerance, method.solver, progress)
-    except (ValueError, fem.Diverged):  # wider than one reduced-order model reaches, say
-        return None
-    return family
+    found = covering(scene, free, len(values), method.tolerance)
+    options = SolveOptions(
+        h=method.h or default_size(scene.body), tolerance=method.tolerance, solver=method.solver,
+        progress=progress or silent,
+    )  # fmt: skip
+    return found if tried_together(found, options) else None
 
 
 def _range(spread: Spread, values: Floats) -> tuple[float, float]:
@@ -410,10 +397,10 @@ def _operator(pressure: MovingPressure, points: tuple[tuple[float, ...], ...]) -
     return path_operator(pressure, points, threshold=FAINT)
 
 
-def _of_family(scene: Scene, method: Method, family: Family, frequencies: Floats) -> Solution:
+def _of_family(scene: Scene, method: Method, family: Covering, frequencies: Floats) -> Solution:
     """Solution by the reduced-order model of all samples' bodies, at the probes."""
     size = method.h or default_size(family.scene.body)
-    shared = reduced(family, size, method.tolerance, method.solver)
+    shared = kept_together(family, size, method.tolerance, method.solver)
     f, a = lines_of(shared, scene.body)
     ratio = scene.pressure.peak_pressure / family.scene.pressure.peak_pressure
     return _of_lines(scene, frequencies, f, ratio * a, NO_MAP.shape)

@@ -6,51 +6,25 @@ meshes, by which the error of each is estimated: some factorisations in place of
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from simple_model import named_lines
-from skinwave.models import parametric
-from skinwave.models.affine_scenes import check_scene
+from skinwave.models.covering import Covering, covering, kept_together
 from skinwave.models.free_keys import FreeKey, free_keys, with_values
 from skinwave.models.options import SolveOptions
-from skinwave.models.parametric import ParametricBody
 from skinwave.planning.refinement import compared_with, refined
 from skinwave.scene.scene import Body, Load, Reading, Scene
 from skinwave.scene.variation import DesignPoint
-from skinwave.system.effort import Progress
 
-# Bodies of a family for each key that is free, and for a thickness that moves the mesh, in
-# proportion or not: fewer cost less alone.
-LEAST, THICKNESS, SMOOTH_THICKNESS = 6, 15, 21
 PER_WORKER = 3  # bodies of a family: of fewer, workers that take one each are done sooner
-SHARE = 1 / 5  # of a tolerance: that of the reduced-order model
 AUDIBLE = 1e-2  # of the strongest line of a load: weaker ones make no scene harder
 ROUND_OFF = 1e-9  # of a length
 
 # A body, its probes, what they read, and what pushes it.
 Solid = tuple[Body, tuple[tuple[float, float], ...], Reading, Load]
 Values = tuple[tuple[str, float], ...]  # of free keys
-Ranges = tuple[tuple[str, float, float], ...]  # key, least and largest value
-
-
-@dataclass(frozen=True, kw_only=True)
-class Family:
-    """Bodies that one reduced-order model serves: a `scene`, on whose body any free factors on all
-    moduli or losses act, the `ranges` of the free keys, the member with the shortest waves, which
-    is the `hardest` body, and how many `members` there are.
-    """
-
-    scene: Scene
-    hardest: Body
-    ranges: Ranges
-    members: int
-
-    def has(self, values: Mapping[str, float]) -> bool:
-        """Whether a body, of values by key, is in all ranges."""
-        return all(low <= values[key] <= high for key, low, high in self.ranges)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +37,7 @@ class Mesh:
     h: float | None = None
     coarser: float | None = None
     error: str = ""
-    family: Family | None = None
+    family: Covering | None = None
     meshed: Body | None = None
     values: Values = ()
 
@@ -75,7 +49,7 @@ def highest(scene: Scene) -> float:
 
 def families(
     hardest: Mapping[Solid, DesignPoint], tolerance: float, workers: int = 1
-) -> list[tuple[Family, dict[Solid, Values]]]:
+) -> list[tuple[Covering, dict[Solid, Values]]]:
     """Families of the bodies of a sweep.
 
     Parameters
@@ -96,7 +70,7 @@ def families(
 
 def _families(
     hardest: Mapping[Solid, DesignPoint], tolerance: float, workers: int, *, moving: bool
-) -> list[tuple[Family, dict[Solid, Values]]]:
+) -> list[tuple[Covering, dict[Solid, Values]]]:
     """Families of bodies, of one thickness each unless their mesh may be `moving`."""
     limits = _limits(hardest.values())
     groups: dict[tuple[Any, ...], dict[Solid, DesignPoint]] = {}
@@ -111,7 +85,7 @@ def _families(
     ]
 
 
-def mesh_of(family: Family, tolerance: float, h: float | None, solver: str) -> Mesh:
+def mesh_of(family: Covering, tolerance: float, h: float | None, solver: str) -> Mesh:
     """Mesh of a family: of the size that is asked for, or that its hardest scene requires.
 
     Raises
@@ -122,26 +96,11 @@ def mesh_of(family: Family, tolerance: float, h: float | None, solver: str) -> M
     scene = family.scene
     options = SolveOptions(tolerance=tolerance, solver=solver)
     size = h or refined(scene, family.hardest, options).h
-    bodies = reduced(family, size, tolerance, solver).bodies
+    bodies = kept_together(family, size, tolerance, solver).bodies
     meshed = bodies.body(bodies.meshed)
     coarser = compared_with(meshed, size)
-    reduced(family, coarser, tolerance, solver)
+    kept_together(family, coarser, tolerance, solver)
     return Mesh(h=size, coarser=coarser, family=family, meshed=meshed)
-
-
-@lru_cache(maxsize=4)
-def reduced(family: Family, h: float, tolerance: float, solver: str) -> ParametricBody:
-    """Reduced-order model of a family, with elements of h in metre; cached on disk."""
-    return reduced_anew(family, h, tolerance, solver)
-
-
-def reduced_anew(
-    family: Family, h: float, tolerance: float, solver: str, progress: Progress | None = None
-) -> ParametricBody:
-    """The same, of which this process keeps none."""
-    free = {key: (low, high) for key, low, high in family.ranges}
-    within = min(parametric.TOLERANCE, SHARE * tolerance)
-    return parametric.prepare(family.scene, free, within, progress, h=h, solver=solver)
 
 
 def _limits(cases: Iterable[DesignPoint]) -> dict[str, tuple[float, float]]:
@@ -190,27 +149,21 @@ def _accepted(body: Body, free: Mapping[str, tuple[float, float]]) -> tuple[Free
 
 def _family(
     members: Mapping[Solid, DesignPoint], keys: Iterable[FreeKey], tolerance: float
-) -> tuple[Family, dict[Solid, Values]] | None:
+) -> tuple[Covering, dict[Solid, Values]] | None:
     """Family of bodies that differ in keys; None if they cannot be reduced together."""
     limits = _limits(members.values())
     fixed = [key.key for key in keys if key.is_scale and key.key not in limits]
     keys = [key for key in keys if key.key in limits]
     scenes = [(each, each.scene) for each in members.values() if each.scene]
     case, hardest = max(scenes, key=lambda each: _per_length(each[1]))
-    in_proportion = hardest.body.of_kind.moves_in_proportion
-    moves = THICKNESS if in_proportion else SMOOTH_THICKNESS
     # A factor that all share is not free, and a scene before factors lacks it.
     scene = None if any(case.varied[key] != 1 for key in fixed) else case.before
-    if not scene or len(members) < sum(moves if key.moves else LEAST for key in keys):
+    if not scene:
         return None
     free = {key.key: limits[key.key] for key in keys}
-    try:
-        check_scene(scene, free_keys(scene.body, free), tolerance)
-    except ValueError:
-        return None
-    ranges = tuple((key, *limit) for key, limit in free.items())
-    family = Family(scene=scene, hardest=hardest.body, ranges=ranges, members=len(members))
-    return family, {solid: _values(case, keys) for solid, case in members.items()}
+    family = covering(scene, free, len(members), tolerance, hardest.body)
+    each = {solid: _values(case, keys) for solid, case in members.items()}
+    return (family, each) if family else None
 
 
 def _per_length(scene: Scene) -> float:

@@ -16,6 +16,7 @@ from simple_model.choices import choose
 from skinwave.bodies.analytic import is_flat_layer, is_laterally_infinite
 from skinwave.models import named, names, parametric
 from skinwave.models.advice import default_model, takes
+from skinwave.models.covering import Covering, kept_together
 from skinwave.models.flat_body import FLAT_BODY
 from skinwave.models.options import SolveOptions
 from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
@@ -27,14 +28,12 @@ from skinwave.scene.scene import Scene
 from skinwave.scene.variation import DesignPoint
 from skinwave.sweeps import dataset, engine
 from skinwave.sweeps.families import (
-    Family,
     Mesh,
     Solid,
     Values,
     families,
     highest,
     mesh_of,
-    reduced,
 )
 from skinwave.sweeps.measures import columns, commanded, measured
 from skinwave.system.effort import Progress, silent
@@ -270,7 +269,7 @@ def _hardest(runs: dict[str, DesignPoint], model_options: ModelOptions) -> dict[
     return {solid: case for solid, (_, case) in found.items()}
 
 
-def _mesh_of_family(model_options: ModelOptions, family: Family) -> Mesh:
+def _mesh_of_family(model_options: ModelOptions, family: Covering) -> Mesh:
     """Mesh of a family, or the error why its bodies are reduced one by one; cached on disk."""
     asked = model_options.tolerance, model_options.h, model_options.solver
     try:
@@ -298,12 +297,12 @@ def _prepared(
     solid: Solid,
     h: float,
     model_options: ModelOptions,
-    family: Family | None,
+    family: Covering | None,
     values: Values,
 ) -> Prepared:
     tolerance, solver = model_options.tolerance, model_options.solver
     if family:
-        return parametric.at(reduced(family, h, tolerance, solver), dict(values))
+        return parametric.at(kept_together(family, h, tolerance, solver), dict(values))
     body, probes, reading, load = solid
     return prepare(
         body, np.array(probes), h=h, solver=solver, tolerance=reduction_tolerance(tolerance),

@@ -21,7 +21,7 @@ from skinwave.bodies import BODIES as PRESETS
 from skinwave.bodies import Body
 from skinwave.bodies.analytic import compliance, dispersion
 from skinwave.bodies.build import build, operators
-from skinwave.models.loads import surface_load, surface_motion
+from skinwave.models.meshed import surface_load, surface_motion
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import Scene
 from skinwave.system.effort import Progress

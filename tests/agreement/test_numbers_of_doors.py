@@ -56,7 +56,7 @@ def test_a_body_with_a_free_modulus_is_that_of_its_own_value():
 def test_commands_write_what_python_returns(simulated, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("scene.toml").write_text(SCENE)
-    size = ["--h", "2", "--quiet"]
+    size = ["--element-size", "2", "--quiet"]
     assert main(["run", "scene.toml", "--model", "fem", *size, "--out", "run"]) == 0
     with np.load("run/responses.npz") as arrays:
         largest = np.abs(simulated.values).max()

@@ -14,7 +14,7 @@ from simple_model.layers.compliance import thin_sheet
 from simple_model.layers.wavenumber_integral import point_response
 from skinwave.bodies.build import build, operators
 from skinwave.bodies.sheet import air, air_mass, bending_wavenumber
-from skinwave.models.loads import surface_load
+from skinwave.models.meshed import surface_load
 from skinwave.models.options import SolveOptions
 from skinwave.models.prepared import answer, prepare, typical_spots
 from skinwave.models.stretching import membrane, reduced_answer

@@ -19,7 +19,7 @@ from skinwave import compare
 from skinwave.bodies.absorbing_layer import has_layer
 from skinwave.bodies.build import build, operators
 from skinwave.commands.cli import main
-from skinwave.models.loads import surface_load
+from skinwave.models.meshed import surface_load
 from skinwave.models.options import SolveOptions
 from skinwave.models.prepared import answer, prepare
 from skinwave.planning.plan import plan

@@ -16,8 +16,7 @@ from simple_model import MovingPressure, Tacton, Trajectory
 from skinwave.bodies import BODIES, Body, Layer, Phalanx
 from skinwave.bodies.build import build, operators
 from skinwave.models import parametric
-from skinwave.models.affine_scenes import has_affine_operators
-from skinwave.models.free_keys import values_at
+from skinwave.models.free_keys import has_affine_operators, values_at
 from skinwave.models.free_keys import with_values as with_free_values
 from skinwave.models.laws import check_laws, has_own_law, relaxing
 from skinwave.models.prepared import components, prepare

@@ -22,7 +22,8 @@ from skinwave.models.advice import beyond
 from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import middle_compliance, plate_of
 from skinwave.models.prepared import prepare
-from skinwave.planning.extent import mean_sag, symmetry
+from skinwave.planning.extent import symmetry
+from skinwave.planning.left_out import mean_sag
 from skinwave.scene.scene import BODIES, Body, Scene
 from skinwave.studies.assumptions import droppable
 

@@ -23,12 +23,11 @@ from skinwave.bodies.analytic import stack
 from skinwave.bodies.build import build, operators
 from skinwave.bodies.hands import support
 from skinwave.models.free_keys import FreeKey, with_values
-from skinwave.models.loads import surface_load
+from skinwave.models.meshed import surface_load
 from skinwave.models.options import SolveOptions
 from skinwave.models.prepared import answer, prepare
-from skinwave.planning.boundaries import absorbing_error
 from skinwave.planning.estimates import side_reflections
-from skinwave.planning.extent import symmetry
+from skinwave.planning.extent import absorbing_error, symmetry
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import Load

@@ -19,8 +19,8 @@ from skinwave.bodies import BODIES, Body, Layer, Relief
 from skinwave.bodies.build import build, operators
 from skinwave.bodies.coat import coarsest_size, coat, coat_count, meshed_strata
 from skinwave.bodies.sizes import check_mesh, default_size
-from skinwave.models.loads import surface_load
-from skinwave.planning.extent import coat_rows
+from skinwave.models.meshed import surface_load
+from skinwave.planning.rows import coat_rows
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads
 

@@ -24,7 +24,7 @@ from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.load.spectrum import reduced_lines
 from skinwave.bodies.build import build as build_body
 from skinwave.bodies.build import operators
-from skinwave.models.full import energy_balance
+from skinwave.models.meshed import energy_balance
 from skinwave.models.prepared import prepare
 from skinwave.planning.simulate import compute
 from skinwave.report.fields import field

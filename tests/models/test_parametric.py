@@ -22,7 +22,7 @@ from skinwave.bodies.build import build, operators
 from skinwave.models import parametric
 from skinwave.models.free_keys import free_keys, values_at, with_values
 from skinwave.models.free_materials import meshed_materials, reference_of, solids_of
-from skinwave.models.loads import surface_load, surface_motion
+from skinwave.models.meshed import surface_load, surface_motion
 from skinwave.models.prepared import answer as own_answer
 from skinwave.models.prepared import components
 from skinwave.models.prepared import prepare as own_body
@@ -245,10 +245,8 @@ LAYERED = Body(
 THICK = {"body.layers.0.thickness_mm": (2.0, 4.0), "body.thickness_mm": (8.0, 12.0)}
 
 
-@pytest.mark.parametrize(
-    "layered", [LAYERED, replace(LAYERED, kind="disc", sides="absorbing")], ids=["slab", "disc"]
-)
-def test_matrices_of_a_stretched_body_are_sums_over_known_geometries(layered):
+def test_matrices_of_a_stretched_body_are_sums_over_known_geometries():
+    layered = replace(LAYERED, kind="disc", sides="absorbing")
     keys = free_keys(layered, THICK)
     bodies = parametric._range(layered, keys, 5e-3)
     assert len(bodies.geometries) == 5  # 1, two thicknesses and their inverses
@@ -287,24 +285,9 @@ def test_the_thickness_of_a_disc_is_free():
         assert line_errors(found[strong], expected).max() < 0.01
 
 
-def test_thicknesses_are_free():
-    scene = replace(scene_of(LAYERED), probes=((0.0, 0.0),))
-    key = "body.thickness_mm"
-    prepared = skinwave.prepare(scene, {key: THICK[key]}, 0.05, h=8e-3)
-    body = with_values(LAYERED, prepared.keys, {key: 9.0})
-    assert body.depth == pytest.approx(9e-3)
-    frequencies, found = parametric.lines(prepared, {key: 9.0})
-    k = int(np.argmax(np.abs(found[:, 0])))
-    made = build_at(prepared.bodies, [prepared.keys[0].share(9.0)])
-    (expected,) = full_lines(scene, body, frequencies[[k]], made=made)
-    assert found[k] == pytest.approx(expected, rel=0.01)
-    other = parametric.lines(prepared, {key: 11.5})[1][k]
-    assert abs(other - found[k]) > 0.05 * abs(found[k])
-
-
-@pytest.mark.parametrize("thickness", [10.0, 12.0])
-def test_the_ends_of_a_range_of_thickness_are_as_accurate_as_its_middle(thickness):
+def test_the_ends_of_a_range_of_thickness_are_as_accurate_as_its_middle():
     """Vectors of one thickness alone change the others little, and are off by 3 % there."""
+    thickness = 12.0
     tacton = Tacton(am_frequency=200, trajectory=Trajectory(shape="circle", size=0.01, speed=6.0))
     body = Body(sides="clamped", **(SMALL | {"depth": 1e-3 * thickness}))
     probes = ((0.0, 0.0), (0.01, 0.0))
@@ -352,15 +335,10 @@ def test_ranges_that_few_states_do_not_span_are_refused():
     [
         ({}, "names no key"),
         ({"body.size_x_mm": (30, 40)}, "serves materials and thicknesses alone"),
-        ({"body.material.poisson": (0.4, 0.45)}, "reduce a body for each value"),
-        ({"body.material.shear_modulus": (1e4, 2e4)}, "body.material.shear_modulus'"),
         ({"body.layers.0.thickness_mm": (1.0, 2.0)}, "it has 0, counted from 0"),
-        ({"body.thickness_mm": (0.0, 2.0)}, "give a least value above 0"),
         ({MODULUS: (2e4, 1e4)}, "give a finite range, low to high"),
         ({MODULUS: (-1e4, 1e4)}, "has shear_modulus_pa = -10000, outside 0.001"),
-        ({"body.layers.2.material.density_kg_m3": (900, 1000)}, "it has 0, counted from 0"),
         ({"body.material.prony.0.modulus_pa": (1e3, 2e3)}, "there is no Prony term 0 in 0"),
-        ({"body.material.prony.0": (1e3, 2e3)}, "is no number of a Prony term"),
     ],
 )
 def test_keys_that_cannot_be_free_are_refused(slab, free, words):
@@ -392,8 +370,8 @@ def test_scenes_that_an_affine_sum_cannot_answer_are_refused(slab):
             skinwave.prepare(replace(slab, quantity=quantity), RANGES)
 
 
-@pytest.mark.parametrize("mounting", ["tension_x_n_per_m = 60", 'edges = ["left", "right"]'])
-def test_a_sheet_that_is_stretched_or_not_framed_is_refused(mounting):
+def test_a_sheet_that_is_not_framed_is_refused():
+    mounting = 'edges = ["left", "right"]'
     scene = skinwave.loads(f"[body]\npreset = 'paper-sheet-loose'\n[body.mounting]\n{mounting}")
     with pytest.raises(ValueError, match="an isotropic sheet in a frame"):
         skinwave.prepare(scene, free={"body.material.density_kg_m3": (700, 900)})

@@ -71,7 +71,7 @@ def error_between(monkeypatch, count):
     """
 
     def stiffness(at):
-        return affine_operators(bodies.body(at), build_at(bodies, at)).stiffness[0]
+        return affine_operators(bodies.body(at), build_at(bodies, at)).of("stiffness")[0]
 
     monkeypatch.setattr(thicknesses, "SMOOTH", count)
     keys = free_keys(PALM, {KEY: (14.0, 20.0)})

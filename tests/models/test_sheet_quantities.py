@@ -22,7 +22,7 @@ from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.quantities import QUANTITIES
 from skinwave.models import named
 from skinwave.models.advice import check_taken
-from skinwave.models.loads import probe_rows, surface_load
+from skinwave.models.meshed import probe_rows, surface_load
 from skinwave.models.sheet_probes import full_reader, modal_reader
 from skinwave.models.stretching import meshed_sheet, stretching_body
 from skinwave.planning.simulate import compute
@@ -31,7 +31,7 @@ from skinwave.scene.scene import BODIES, Reading, Scene
 
 PAPER = BODIES["paper-sheet-loose"].solid
 PEAK = 30.0  # Pa
-STRETCHED = ("strain_xx", "stress_yy")
+STRETCHED = ("stress_yy",)
 SCENE = Scene(
     pressure=MovingPressure(
         tacton=Tacton(trajectory=Trajectory(shape="circle", size=0.01, speed=4.0), duration=0.01)
@@ -115,7 +115,7 @@ def test_a_strip_that_is_bent_to_a_cylinder_stretches_evenly():
     np.testing.assert_allclose(displaced[:, 0] / 2, exact, rtol=1e-2)
 
 
-@pytest.mark.parametrize("quantity", ["displacement_x", "strain_xx", "strain_xy", "stress_yy"])
+@pytest.mark.parametrize("quantity", ["displacement_x", "stress_yy"])
 def test_modes_and_all_dofs_read_the_same_of_a_stretched_sheet(quantity, preloaded):
     """At rest under a pressure that bends paper by its thickness: at its upper face."""
     body, made, u, modes, operators, z = preloaded

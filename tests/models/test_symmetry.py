@@ -8,8 +8,8 @@ from simple_model import MovingPressure, Tacton, Trajectory
 from skinwave.bodies import Body
 from skinwave.bodies.build import build, operators
 from skinwave.bodies.supports import Sides
-from skinwave.models import prepared, symmetry
-from skinwave.models.symmetry import axes_of_probes, mirrored_axes
+from skinwave.models import meshed, prepared
+from skinwave.models.meshed import axes_of_probes, mirrored_axes
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import SURFACE, Scene
 
@@ -28,7 +28,7 @@ def motions(monkeypatch, body, probes, h):
     """Responses by the part that the probes see, and by all of the body."""
     scene, found = Scene(pressure=MovingPressure(tacton=CIRCLE), body=body, probes=probes), []
     for axes in (axes_of_probes, lambda probes, among: ""):
-        monkeypatch.setattr(symmetry, "axes_of_probes", axes)
+        monkeypatch.setattr(meshed, "axes_of_probes", axes)
         reduced = prepared.prepare(body, scene.probe_points, h=h, tolerance=1e-6)
         found.append(prepared.answer(reduced, scene))
     return found
@@ -45,7 +45,7 @@ def test_probes_on_the_plane_see_the_even_part_alone(monkeypatch, body, h):
 def test_lines_are_solved_on_the_part_that_the_probes_see(monkeypatch):
     scene, found = Scene(pressure=MovingPressure(tacton=CIRCLE), body=SLAB, probes=ON_X), []
     for axes in (axes_of_probes, lambda probes, among: ""):
-        monkeypatch.setattr(symmetry, "axes_of_probes", axes)
+        monkeypatch.setattr(meshed, "axes_of_probes", axes)
         found.append(compute(scene, "fem-harmonic", h=0.01))
     part, whole = found
     assert part.effort.dofs < 0.6 * whole.effort.dofs

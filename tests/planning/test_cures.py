@@ -13,25 +13,12 @@ from skinwave.commands.cli import main
 TACTON = "[tacton]\nduration_s = 0.05\n"
 KEYS = [
     ("size = 10", "size_mm = 10"),
-    ("speed = 8", "speed_m_per_s = 8"),
-    ("am_frequency = 140", "am_frequency_hz = 140"),
-    ("amplitude = 50", "amplitude_percent = 50"),
     ("[tacton.rhythm]\npulses = [[1, 2]]", "[tacton.rhythm]\npulses_ms = [[1, 2]]"),
-    ("[probes]\npoints = [[0, 0]]", "[probes]\npoints_mm = [[0, 0]]"),
-    ("[probes]\ndepth = 1", "[probes]\ndepth_mm = 1"),
-    ("[focus]\nheight = 200", "[focus]\nheight_mm = 200"),
-    ("[focus]\npeak_pressure = 3", "[focus]\npeak_pressure_pa = 3"),
-    ("[body]\nthickness = 3", "[body]\nthickness_mm = 3"),
-    ("[body]\nsize_x = 80", "[body]\nsize_x_mm = 80"),
     ("[body]\n[body.material]\nyoung = 3", "young_modulus_pa"),
-    ("[placement]\ntilt_x = 3", "[placement]\ntilt_x_deg = 3"),
     ("[body]\nsize_mm = 10", "it belongs to [tacton]"),
     ("[body]\nkind = slab", '[body]\nkind = "slab"'),
-    ('[body]\nkind = "slab', '[body]\nkind = "slab"'),
     ('[body]\nkind = "sheet"\nair = True', '[body]\nkind = "sheet"\nair = true'),
     ("size_mm = 0,5", "size_mm = 0.5"),
-    ("size_mm = 5 mm", "size_mm = 5"),
-    ("size_mm: 5", "size_mm = 5"),
 ]
 
 
@@ -48,12 +35,8 @@ def test_the_right_key_is_named_with_its_unit(wrong, right):
 
 PATHS = [
     r'"C:\Users\me\hand.stl"',
-    r'"C:\temp\thumb.stl"',
-    r'"D:\data\x.stl"',
-    r'"""C:\temp\thumb.stl"""',
     r"C:\temp\thumb.stl",
     r'"meshes\new.stl"',
-    r'"\\server\share\a.stl"',
 ]
 
 
@@ -77,8 +60,6 @@ def test_a_windows_path_is_written_in_single_quotes_or_with_slashes(path):
 TEXTS = {
     "latin.toml": 'name = "Größe"'.encode("latin-1"),
     "utf16.toml": TACTON.encode("utf-16"),
-    "bare.toml": TACTON.encode("utf-16-le"),
-    "bytes.toml": bytes(range(256)),
     "picture.toml": b"\x89PNG\r\n\x1a\n" + bytes(20),
 }
 
@@ -102,15 +83,8 @@ def test_a_file_without_permission_is_named(tmp_path, monkeypatch, capsys):
 
 OPTIONS = [
     (["runn", "s.toml"], "'run'"),
-    (["pln", "s.toml"], "'plan'"),
     (["run", "s.toml", "--modle", "fem"], "'--model'"),
     (["run", "s.toml", "--model", "femm"], "'fem'"),
-    (["run", "s.toml", "--tolerence=0.1"], "'--tolerance'"),
-    (["run", "s.toml", "--elementsize", "1"], "'--element-size'"),
-    (["convert", "a.csv", "b.csv", "--rte", "3"], "'--rate'"),
-    (["report", "s.toml", "--camera", "tilt"], "'tilted'"),
-    (["cache", "--clean"], "'--clear'"),
-    (["--vesion"], "'--version'"),
 ]
 
 

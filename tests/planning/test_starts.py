@@ -55,7 +55,7 @@ def stated(scene, steady, rest, **given):
     return found.expected_error, left.max(), found.effort.warnings
 
 
-@pytest.mark.parametrize("quantity", ["displacement", "velocity", "acceleration"])
+@pytest.mark.parametrize("quantity", ["displacement", "acceleration"])
 def test_modes_of_a_plate_state_the_start(quantity):
     scene = loads(f'{CANTILEVER}quantity = "{quantity}"')
     error, left, said = stated(scene, "plate-modes", "plate-modes-transient")
@@ -65,7 +65,7 @@ def test_modes_of_a_plate_state_the_start(quantity):
     assert plan(scene, SolveOptions(model="plate-modes-transient")).warnings == ()
 
 
-@pytest.mark.parametrize("quantity", ["displacement", "acceleration", "strain_zz"])
+@pytest.mark.parametrize("quantity", ["acceleration", "strain_zz"])
 def test_wavenumber_integrals_state_the_start_of_the_quantity(quantity):
     depth = "depth_mm = 2" if quantity == "strain_zz" else ""
     scene = loads(f'{LAYER}quantity = "{quantity}"\n{depth}')

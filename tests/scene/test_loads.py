@@ -23,7 +23,7 @@ from skinwave.measure import Measurement
 from skinwave.measure.fit import fit
 from skinwave.measure.predicted import predicted_lines, predicted_waveforms, target
 from skinwave.models import parametric
-from skinwave.models.loads import load_in_steps, surface_load
+from skinwave.models.meshed import load_in_steps, surface_load
 from skinwave.models.options import SolveOptions
 from skinwave.models.prepared import answer, components, prepare
 from skinwave.patterns.conversion import write_pattern

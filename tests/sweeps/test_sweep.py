@@ -10,6 +10,7 @@ import fem.affine
 import fem.krylov
 from simple_model import MovingPressure, Tacton
 from skinwave.commands.cli import main
+from skinwave.models import covering
 from skinwave.models.free_keys import free_keys, with_values
 from skinwave.scene.file import read, to_table
 from skinwave.scene.scene import BODIES, Body, Layer, Scene
@@ -86,7 +87,7 @@ def counted(monkeypatch, folder):
     """Factorisations from here on, with a cache of their own."""
     monkeypatch.setenv("SKINWAVE_CACHE", str(folder))
     sweeping._prepared.cache_clear()
-    families.reduced.cache_clear()
+    covering.kept_together.cache_clear()
     made = []
     for module, name in ((fem.krylov, "factorise"), (fem.affine, "factoriser")):
         inner = getattr(module, name)
@@ -115,7 +116,7 @@ def test_bodies_of_many_materials_are_reduced_together(scene, monkeypatch, tmp_p
     assert together(rows) == {("done", 8)}
     assert all(0 < row["reduction_error"] < row["expected_error"] for row in rows)
     made.clear()
-    monkeypatch.setattr(families, "LEAST", 9)
+    monkeypatch.setattr(covering, "LEAST", 9)
     alone = swept(MODULI, *ON_SMALL, out="alone")
     assert len(made) == 16
     assert together(alone) == {("done", 1)}
@@ -131,8 +132,8 @@ def test_bodies_of_many_materials_are_reduced_together(scene, monkeypatch, tmp_p
 def test_factors_and_thicknesses_share_a_reduction(scene, monkeypatch, vary, kept):
     """The thickest body has the mesh of its own."""
     with monkeypatch.context() as patch:
-        patch.setattr(families, "LEAST", 3)
-        patch.setattr(families, "THICKNESS", 3)
+        patch.setattr(covering, "LEAST", 3)
+        patch.setattr(covering, "THICKNESS", 3)
         rows = swept(vary, *ON_SMALL)
     assert together(rows) == {("done", 3)}
     alone = swept(vary, *ON_SMALL, out="alone")
@@ -174,14 +175,14 @@ def test_families_differ_in_what_can_be_free_alone_and_are_not_small():
 
 
 def test_what_cannot_be_reduced_together_or_has_a_coarse_mesh_is_reduced_alone(scene, monkeypatch):
-    monkeypatch.setattr(families, "LEAST", 2)
+    monkeypatch.setattr(covering, "LEAST", 2)
     moduli = "body.material.shear_modulus_pa=20e3,30e3"
 
     def refusing(*given, **options):
         raise ValueError("the tolerance is out of reach")
 
     with monkeypatch.context() as patch:
-        patch.setattr(families.parametric, "prepare", refusing)
+        patch.setattr(covering.parametric, "prepare", refusing)
         assert together(swept(moduli, *ON_SMALL)) == {("done", 1)}
     inner = families.refined
     coarse = lambda *given, **options: replace(inner(*given, **options), h=8e-3)  # noqa: E731

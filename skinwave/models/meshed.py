@@ -1,4 +1,9 @@
-"""Load and probes of a meshed body under a moving pressure."""
+"""Meshed body of a model: its operators, its load and probes, and its mirror symmetry.
+
+Across a plane of symmetry of a body every load is the sum of an even and an odd part, and so is the
+motion. Normal motion on the plane is that of the even part alone: that of the part of the body on
+one side, with symmetry conditions on the plane, under the mean of the load and its mirror image.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -17,20 +22,79 @@ from fem.load_and_probe import (
     traction_operator,
 )
 from fem.stress import materials_at, strain_operator
+from meshes import cache
 from meshes.tetmesh import Floats
-from simple_model import Material, MovingPressure
+from simple_model import Effort, Material, MovingPressure
 from simple_model.load.path_cells import jump_times
 from simple_model.load.sampling import below_half_the_rate, is_folded
 from simple_model.load.spectrum import merge_lines, pressure_lines
 from simple_model.quantities import STRAIN, Quantity
 from skinwave.bodies.body import Body
 from skinwave.bodies.build import Build
+from skinwave.bodies.build import build as build_body
 from skinwave.bodies.build import operators as operators_of
+from skinwave.bodies.discretised import Discretise
+from skinwave.bodies.parts import FLAT
 from skinwave.models.sheet_probes import sheet_rows
 from skinwave.scene.load import PRESSURE, Load
 from skinwave.scene.scene import Reading
+from skinwave.system.effort import Clock, Progress, peak_memory, versions
 
+MOST_IMBALANCE = 0.01  # relative error of the energy balance, beyond which a response is refused
+ON_PLANE = 1e-9  # m: nearer to a plane a probe is on it
 FAINTEST = 1e-6  # of the strongest line of a load
+
+
+def meshed(
+    body: Body,
+    h: float | None,
+    clock: Clock,
+    report: Progress,
+    symmetry: str = "",
+    discretise: Discretise | None = None,
+) -> Build:
+    """Mesh of a body with its materials and boundary conditions, as of `bodies.build.build`, timed
+    and reported.
+    """
+    with clock("mesh"):
+        report("mesh", 0.0)
+        return build_body(body, h, symmetry, discretise)
+
+
+def assembled(build: Build, clock: Clock, report: Progress) -> fem.Operators:
+    """Operators of a meshed body, timed and reported."""
+    with clock("assemble"):
+        report("assemble", 0.0)
+        return operators_of(build)
+
+
+def energy_balance(
+    energies: fem.EnergyBalance, stored: float = 0.0, when: str = ""
+) -> tuple[float, float]:
+    """Relative error of the energy balance, if small enough to trust a response, and the share of
+    the losses that was radiated: of energies or powers, with the energy `stored` at the end.
+
+    Raises
+    ------
+    Diverged
+        If the error is too large.
+    """
+    imbalance = fem.imbalance(energies, stored)
+    if not imbalance <= MOST_IMBALANCE:
+        raise fem.Diverged(
+            f"the energy balance is off by {100 * imbalance:.2g} %{when}, above the limit of "
+            f"{100 * MOST_IMBALANCE:g} %; try another solver, or a finer mesh where it is thin"
+        )
+    radiated = energies.radiated / energies.lost if energies.lost > 0 else 0.0
+    return imbalance, radiated
+
+
+def spent(effort: Effort, clock: Clock, build: Build, h: float) -> Effort:
+    """Cost of a response with its time, memory and mesh of elements of h in metre."""
+    return replace(
+        effort, seconds=clock.seconds, peak_memory=peak_memory(), h=h, versions=versions(),
+        mesh=cache.digest(build.mesh.points, build.mesh.tets),
+    )  # fmt: skip
 
 
 def surface_load(build: Build, load: Load = PRESSURE) -> tuple[sparse.csr_array, Floats]:
@@ -54,18 +118,9 @@ def spread(P: sparse.csr_array, values: Floats) -> Floats:
 def load_in_steps(
     pressures: Sequence[MovingPressure], points: Floats, times: Floats, dt: float
 ) -> Callable[[float], Floats]:
-    """Load for time steps of a response, without its lines above half the rate of the response.
-
-    Parameters
-    ----------
-    pressures : (c,) MovingPressure
-    points : (k, 3) float, metre
-    times : (t,) float, s, of the response
-    dt : s, of the steps
-
-    Returns
-    -------
-    function of a time in s, to the components (c k,) in Pa as `surface_load` has them
+    """Load at points (k, 3) for time steps of a response at times (t,), without its lines above
+    half the rate of these: a function of a time in s, to components (c k,) in Pa as of
+    `surface_load`.
     """
     folded = [is_folded(pressure, times) for pressure in pressures]
     if not any(folded):
@@ -77,18 +132,8 @@ def load_in_steps(
 
 
 def about(pressure: MovingPressure, points: Floats, t: float, over: float) -> Floats:
-    """Pressure about a time: its mean over a step in which it jumps, else its value.
-
-    Parameters
-    ----------
-    pressure : MovingPressure
-    points : (k, 3) float, metre
-    t : float, s
-    over : float, s, of the step about t; the mean is taken from the start on
-
-    Returns
-    -------
-    (k,) float, Pa
+    """Pressure (k,) in Pa about a time: its mean over a step in which it jumps, from the start on,
+    else its value.
     """
     start, end = max(t - over / 2, 0.0), t + over / 2
     jumps = jump_times(pressure, start, end) if isinstance(pressure, MovingPressure) else []
@@ -102,17 +147,8 @@ def about(pressure: MovingPressure, points: Floats, t: float, over: float) -> Fl
 def load_lines_at(
     pressures: Sequence[MovingPressure], points: Floats, threshold: float
 ) -> tuple[Floats, fem.Complex]:
-    """Lines of the components of a load.
-
-    Parameters
-    ----------
-    pressures : (c,) MovingPressure
-    points : (k, 3) float, metre
-    threshold : as of `load_lines`
-
-    Returns
-    -------
-    distinct frequencies (f,) in Hz and amplitudes (f, c k) in Pa
+    """Lines of the c components of a load at points (k, 3): distinct frequencies (f,) in Hz and
+    amplitudes (f, c k) in Pa; the threshold is as of `load_lines`.
     """
     each = [pressure_lines(pressure, points, threshold) for pressure in pressures]
     k, found = len(points), np.concatenate([f for f, _ in each])
@@ -123,19 +159,8 @@ def load_lines_at(
 def sag(
     build: Build, operators: fem.Operators, outputs: sparse.csr_array, load: Load, solver: str
 ) -> Floats:
-    """Static response to gravity, in equilibrium before the load begins.
-
-    Parameters
-    ----------
-    build : Build, constrained
-    operators : those of its mesh
-    outputs : (p c, 3 n) sparse, what the probes read
-    load : Load, with its gravity
-    solver : of `fem.linear_solver`
-
-    Returns
-    -------
-    (p c,) float, in the unit of the outputs
+    """Static response (p c,) of `outputs` (p c, 3 n) to gravity, in equilibrium before the load
+    begins.
     """
     if not load.gravity:
         return np.zeros(outputs.shape[0])
@@ -157,36 +182,15 @@ def inertia(build: Build, direction: Sequence[float]) -> Floats:
 
 
 def with_sag(components: Floats, sag: Floats | float, asked: Quantity) -> Floats:
-    """Components with those under gravity, of which rates have none.
-
-    Parameters
-    ----------
-    components : (t, p c) float
-    sag : (p c,) float, under gravity
-    asked : Quantity, that they are of
-
-    Returns
-    -------
-    (t, p c) float
-    """
+    """Components (t, p c) of a quantity with those under gravity, of which rates have none."""
     return components if asked.rate else components + sag
 
 
 def surface_motion(body: Body, build: Build, probes: Floats) -> sparse.csr_array:
-    """Probe operator S: displacement into a meshed body.
+    """Probe operator S (p, 3 n): displacement into a meshed body at probes (p, 2) in metre.
 
     The surface in a file is made of flat triangles, at whose edges its own normals jump: there the
     direction into the body is that of the mean normal about a probe.
-
-    Parameters
-    ----------
-    body : Body
-    build : its mesh
-    probes : (p, 2) float, metre
-
-    Returns
-    -------
-    (p, 3 n) sparse, without unit
     """
     return probe_operator(build.mesh, probes, patch=body.of_kind.normal_patch)
 
@@ -233,12 +237,8 @@ def probe_rows(
 
 
 def check_coat(build: Build, reading: Reading) -> None:
-    """Refuse strain and stress in a coat, where elements are of the material below it.
-
-    Raises
-    ------
-    ValueError
-        If it is so.
+    """Refuse strain and stress in a coat, where elements are of the material below it, by a
+    ValueError.
     """
     thickness = sum(build.coat.thicknesses) if build.coat else 0.0
     least = min(reading.depths, default=0.0)
@@ -251,18 +251,8 @@ def check_coat(build: Build, reading: Reading) -> None:
 
 
 def line_factor(asked: Quantity, s: Any, solids: tuple[Material, ...], outputs: int) -> fem.Complex:
-    """Factor (f, p c) of the components of a quantity at complex frequencies s (f,) in rad/s.
-
-    Parameters
-    ----------
-    asked : Quantity
-    s : (f,) complex, rad/s
-    solids : p materials of the probes, or none
-    outputs : p c, components in all
-
-    Returns
-    -------
-    (f, p c) complex
+    """Factor (f, p c) of the components of a quantity at complex frequencies s (f,) in rad/s, of
+    all p c `outputs`, with the p materials of the probes or none.
     """
     if not asked.relaxes:
         return np.broadcast_to(np.asarray(asked.factor(s))[:, None], (len(s), outputs))
@@ -270,3 +260,49 @@ def line_factor(asked: Quantity, s: Any, solids: tuple[Material, ...], outputs: 
     return np.stack([each[solid] for solid in solids], axis=1).repeat(
         outputs // len(solids), axis=1
     )
+
+
+def mirrored_axes(body: Body, reading: Reading, load: Load) -> str:
+    """Axes, of "xy", across whose middle planes a body is its own mirror image, and what its probes
+    read keeps its sign.
+    """
+    if not body.of_kind.is_symmetric or body.placement != FLAT:
+        return ""
+    if not reading.asked.is_normal:  # others change sign, or are recovered across the plane
+        return ""
+    if load.moving != PRESSURE:  # which may have a direction
+        return ""
+    return body.symmetry
+
+
+def axes_of_probes(probes: Floats, among: str) -> str:
+    """Axes, of some of "xy", on whose middle planes all probes (p, 2) in metre lie."""
+    return "".join(axis for axis in among if np.abs(probes[:, "xy".index(axis)]).max() < ON_PLANE)
+
+
+def modelled_axes(body: Body, probes: Floats, symmetry: str, reading: Reading, load: Load) -> str:
+    """Axes, of "xy", across whose middle planes only one side of a body is modelled: across those
+    of `symmetry` the load is its own mirror image at all times, on others all probes lie.
+    """
+    seen = axes_of_probes(probes, mirrored_axes(body, reading, load))
+    return "".join(axis for axis in "xy" if axis in symmetry or axis in seen)
+
+
+def images(probes: Floats, axes: str) -> Floats:
+    """Mirror images (p, 2) of probes in the part of a body with positive coordinates."""
+    found = probes.copy()
+    for axis in ("xy".index(a) for a in axes):
+        found[:, axis] = np.abs(found[:, axis])
+    return found
+
+
+def even_part(P: sparse.csr_array, points: Floats, axes: str) -> tuple[sparse.csr_array, Floats]:
+    """Load operator (3 n, j k) of the even part of a load, on the part of a body with positive
+    coordinates across some axes: it takes the load at the points (k, 3) of an operator P (3 n, k)
+    and at their mirror images (j k, 3), in metre.
+    """
+    for axis in axes:
+        image = points.copy()
+        image[:, "xyz".index(axis)] *= -1
+        P, points = sparse.hstack([P / 2, P / 2], format="csr"), np.vstack([points, image])
+    return P, points

@@ -1,0 +1,117 @@
+"""Reduced bodies in the cache: the same again, and never those of another body."""
+
+import numpy as np
+import pytest
+
+import fem
+from meshes import cache
+from skinwave.models.options import SolveOptions
+from skinwave.models.prepared import answer, prepare
+from skinwave.planning.plan import plan
+from skinwave.planning.simulate import solve
+from skinwave.scene.file import loads
+
+SHORT = """
+name = "short"
+[tacton]
+am_frequency_hz = 140
+duration_s = 0.05
+[body]
+size_x_mm = 60
+size_y_mm = 60
+[probes]
+points_mm = [[0, 0], [5, 0]]
+"""
+FREE = """
+[tacton]
+am_frequency_hz = 226
+duration_s = 0.09
+[body]
+size_x_mm = 29.3
+size_y_mm = 20
+thickness_mm = 9.9
+base = "free"
+sides = "clamped"
+material = {density_kg_m3 = 1000, shear_modulus_pa = 30100, poisson = 0.4999, viscosity_pa_s = 4.3}
+[probes]
+points_mm = [[-5.3, 8.7], [-0.5, -1.1], [-7.7, -1.3]]
+"""
+
+
+def test_a_prepared_body_comes_from_the_cache_unchanged(tmp_path, monkeypatch):
+    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
+    scene = loads(SHORT)
+    phases = []
+    arguments = (scene.body, scene.probe_points, lambda phase, _: phases.append(phase))
+    first = answer(prepare(*arguments, h=0.012), scene)
+    assert "reduce" in phases
+    phases.clear()
+    again = answer(prepare(*arguments, h=0.012), scene)
+    assert phases == ["mesh"]
+    np.testing.assert_array_equal(first.displacement, again.displacement)
+    prepare(*arguments, h=0.008)
+    assert "reduce" in phases  # another mesh is another entry
+
+
+def test_a_spoilt_cache_entry_is_rebuilt(tmp_path, monkeypatch):
+    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
+    scene = loads(SHORT)
+    first = answer(prepare(scene.body, scene.probe_points, h=0.012), scene)
+    (entry,) = tmp_path.glob("*.npz")
+    for spoilt in (b"", b"not a zip", entry.read_bytes()[: entry.stat().st_size // 2]):
+        entry.write_bytes(spoilt)
+        again = answer(prepare(scene.body, scene.probe_points, h=0.012), scene)
+        np.testing.assert_allclose(again.displacement, first.displacement, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda arrays: arrays.update(read=1000 * arrays["read"]),
+        lambda arrays: arrays.update(damping=arrays["damping"][:-1]),
+        lambda arrays: arrays.pop("read"),
+    ],
+)
+def test_an_altered_cache_entry_is_never_used(spoil, tmp_path, monkeypatch):
+    """A sound file, but not what was stored."""
+    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
+    scene = loads(SHORT)
+    first = answer(prepare(scene.body, scene.probe_points, h=0.01), scene)
+    (entry,) = tmp_path.glob("*.npz")
+    with np.load(entry) as file:
+        arrays = {name: file[name] for name in file.files}
+    spoil(arrays)
+    np.savez(entry, **arrays)
+    again = answer(prepare(scene.body, scene.probe_points, h=0.01), scene)
+    assert "factorise and reduce" in again.effort.seconds
+    np.testing.assert_allclose(again.displacement, first.displacement, rtol=1e-9)
+
+
+def test_the_key_of_a_body_holds_solver_options_and_shapes(tmp_path, monkeypatch):
+    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
+    scene = loads(SHORT)
+
+    def made(**options):
+        before = len(list(tmp_path.glob("*.npz")))
+        prepare(scene.body, scene.probe_points, h=0.01, **options)
+        return len(list(tmp_path.glob("*.npz"))) > before
+
+    assert made()
+    assert not made(solver=fem.available()[0])  # what auto is
+    assert made(solver="superlu") == (fem.available()[0] != "superlu")
+    assert made(tolerance=5e-3)
+    assert made(symmetry="x")
+    assert not made()
+    x = np.arange(6.0)
+    assert len({cache.key(a) for a in (x, x.reshape(2, 3), x.view(np.int64))}) == 3
+
+
+def test_a_plan_is_the_same_again_with_and_without_a_cache(monkeypatch, tmp_path):
+    scene, found = loads(FREE), []
+    for folder in ("one", "one", ""):
+        monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path / folder) if folder else "")
+        found.append(solve(scene, plan(scene, SolveOptions(tolerance=0.2))))
+    for other in found[1:]:
+        assert cache.digest(other.values) == cache.digest(found[0].values)
+        assert other.effort.mesh == found[0].effort.mesh
+        assert other.expected_error == found[0].expected_error

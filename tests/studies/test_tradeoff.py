@@ -1,0 +1,62 @@
+"""The trade-off of models: error beside measured cost."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from skinwave.scene.file import loads
+from skinwave.studies.tradeoff import Candidate, sentences, study, write
+
+SHORT = """
+name = "short"
+[tacton]
+am_frequency_hz = 140
+duration_s = 0.05
+[body]
+size_x_mm = 60
+size_y_mm = 60
+[probes]
+points_mm = [[0, 0], [5, 0]]
+"""
+
+
+@pytest.mark.slow
+def test_a_study_ranks_candidates_by_measured_cost_and_error(tmp_path, monkeypatch):
+    """Here; what a process of its own does is in `test_processes.py`."""
+    alone = []
+    monkeypatch.setenv("SKINWAVE_CACHE", "")
+    monkeypatch.setattr(
+        "skinwave.studies.tradeoff.apart",
+        lambda work, *given: alone.append(given[-1]) or work(*given),
+    )
+    monkeypatch.setattr("skinwave.studies.tradeoff.FINEST", (1.5, 1.25))
+    scene = loads(SHORT)
+    scene = replace(scene, body=replace(scene.body, width=0.03, height=0.03, sides="free"))
+    chosen = [
+        Candidate(model="point-kernel"),
+        Candidate(model="fem", h=0.012),
+        Candidate(model="fem", h=0.006),
+        Candidate(model="fem-transient", h=0.012, dt=2e-3),
+    ]
+    phases = []
+    found = study(scene, lambda phase, fraction: phases.append(phase), chosen)
+    error = {m.candidate.name: m.error for m in found.measured}
+    assert error["fem, h = 6.00 mm"] < error["fem, h = 12.00 mm"] < error["point-kernel"]
+    assert error["fem-transient, h = 12.00 mm, dt = 2 ms"] > error["fem, h = 12.00 mm"]
+    front = [(m.error, m.cold, m.warm) for m in found.front()]
+    for one in ((m.error, m.cold, m.warm) for m in found.measured):
+        beaten = any(all(np.array(other) <= one) for other in front if other != one)
+        assert beaten != (one in front)
+    assert found.cheapest(1e-12) is None
+    assert len(phases) == len(alone) == len(chosen) + 2
+    write(tmp_path, scene, found)
+    assert len(json.loads((tmp_path / "tradeoff.json").read_text())["measured"]) == 4
+    page = (tmp_path / "index.html").read_text()
+    assert all(sentence.split(":")[0] in page for sentence in sentences(found))
+
+
+def test_a_scene_without_a_body_has_nothing_to_trade():
+    with pytest.raises(ValueError, match="give it a sheet or a slab"):
+        study(loads("[body]\nkind = 'none'"), lambda phase, fraction: None)
