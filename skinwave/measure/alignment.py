@@ -108,12 +108,8 @@ def align(
 
 
 def opposite_sign(of: str, has_delay: bool) -> str:
-    """Sentence, without a full stop, where the other sign of a measurement fits as well.
-
-    Parameters
-    ----------
-    of : what it fits
-    has_delay : whether the delay is fitted, too
+    """Sentence, without a full stop, where the other sign of a measurement fits a model as well,
+    perhaps at another delay.
     """
     return (
         f"with its sign turned the measurement fits {of} as well or better"
