@@ -81,9 +81,7 @@ def dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
 
     Parameters
     ----------
-    body : Body
-    frequencies : (f,) float, Hz, above 0 and ascending
-    most : how many modes
+    body, frequencies, most : the body, (f,) Hz, above 0 and ascending, and how many modes
 
     Returns
     -------

@@ -353,14 +353,8 @@ BODIES: dict[str, Body] = {}  # presets by name
 
 
 def register(kind: BodyKind) -> BodyKind:
-    """Add a kind of body and its presets to those that scenes may have.
-
-    Presets of a known kind need no kind of their own: `BODIES[name] = Body(...)`.
-
-    Raises
-    ------
-    ValueError
-        If there is one of that name.
+    """Add a kind of body and its presets to those that scenes may have; raises a ValueError for a
+    known name. Presets of a known kind need no kind of their own: `BODIES[name] = Body(...)`.
     """
     extensions.add(KINDS, kind.name, kind, kind.discretise)
     for name, own in kind.presets.items():

@@ -91,8 +91,7 @@ def check_morph(thinnest: Body, thickest: Body, h: float) -> None:
 
     Parameters
     ----------
-    thinnest, thickest : Body, ends of a range
-    h : metre, element size
+    thinnest, thickest, h : ends of a range, and the element size in metre
 
     Raises
     ------
@@ -110,10 +109,9 @@ def check_morph(thinnest: Body, thickest: Body, h: float) -> None:
             *_, (layers, _) = strata = each.strata
             limit = thickest_coat(strata, len(strata) - 1)
             raise ValueError(
-                f"layers of {1e3 * layers:.3g} mm in all lie on a palm whose thickness, or theirs, "
-                f"is free, and its elements of {1e3 * h:.3g} mm cannot follow them: such layers "
-                f"are thinner than half an element, and of {1e3 * limit:.2g} mm at most; take "
-                "thinner ones, a narrower range, or a slab"
+                f"layers of {1e3 * layers:.3g} mm on a palm whose thickness, or theirs, is free "
+                f"must be thinner than half of its elements of {1e3 * h:.3g} mm, and of "
+                f"{1e3 * limit:.2g} mm at most; take thinner ones, a narrower range, or a slab"
             )
 
 

@@ -32,9 +32,7 @@ def discretise(body: Body, h: float, wider: float = 1.0) -> Discretised:
 
     Parameters
     ----------
-    body : Body
-    h : float, metre, element size
-    wider : float, width of the absorbing layer over its usual width
+    body, h, wider : element size in metre; width of the absorbing layer over its usual width
 
     Returns
     -------
@@ -67,9 +65,7 @@ def on_lines(body: Body, lines: Lines, wider: float = 1.0) -> Discretised:
 
     Parameters
     ----------
-    body : Body
-    lines : three arrays (n,) in metre, through the body
-    wider : float, width of the absorbing layer over its usual width
+    body, lines, wider : three arrays (n,) in metre, through the body; as for `discretise`
 
     Returns
     -------

@@ -139,13 +139,7 @@ LOADS: dict[str, LoadKind] = {}
 
 
 def register(kind: LoadKind) -> LoadKind:
-    """Add a kind of load to those that scenes may have.
-
-    Raises
-    ------
-    ValueError
-        If there is one of that name.
-    """
+    """Add a kind of load to those that scenes may have; raises a ValueError for a known name."""
     extensions.add(LOADS, kind.name, kind, kind.tractions)
     return kind
 

@@ -43,7 +43,6 @@ from skinwave.scene.keys import LOSSES, MODULI, SCALES
 from skinwave.scene.scene import Body, Scene
 
 PRESSURE, FACTOR = "focus.peak_pressure_pa", 2.0
-REGION = "regions."  # of a key, before the name of a region
 PARTS = {"body": "material", "focus": "device", "tacton": "device"}  # of keys by section
 
 
@@ -132,8 +131,8 @@ def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
     ValueError
         If it has no such number, or a number makes no scene.
     """
-    scaled = {key: x for key, x in values.items() if key.rpartition(".")[2] in SCALES}
-    plain = {key: x for key, x in values.items() if key not in scaled}
+    scales = {key: x for key, x in values.items() if key.rpartition(".")[2] in SCALES}
+    plain = {key: x for key, x in values.items() if key not in scales}
     found = replace(scene, spreads=())
     if plain.keys() == {PRESSURE}:
         pressure = replace(scene.pressure, peak_pressure=plain[PRESSURE])
@@ -146,7 +145,7 @@ def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
                 raise ValueError(f"there is no number {key} in this scene; leave it out")
             parent[last] = x
         found = from_table(table)
-    return _scaled(found, scaled)
+    return _scaled(found, scales)
 
 
 def scaled(scene: Scene, scales: Mapping[str, Any]) -> Scene:
@@ -168,9 +167,7 @@ def scaled(scene: Scene, scales: Mapping[str, Any]) -> Scene:
 
 
 def _scaled(scene: Scene, scales: Mapping[str, float]) -> Scene:
-    """The scene with all moduli, or all losses, of materials times factors, those of a material at
-    once.
-    """
+    """The scene with all moduli, or losses, times factors; those of a material at once."""
     places: dict[str, dict[str, float]] = {}
     for key, factor in scales.items():
         place, _, scale = key.removeprefix("body.").rpartition(".")
@@ -183,21 +180,12 @@ def _scaled(scene: Scene, scales: Mapping[str, float]) -> Scene:
 
 def _with_factors(body: Body, place: str, factors: dict[str, float]) -> Body:
     """The body with another material, at the place of a key."""
-    if place == "material":
+    part, _, which = place.partition(".")
+    if part == "material":
         return replace(body, material=solid_of(body.material).scaled(**factors))
-    if place.startswith(REGION):
-        return _with_region(body, place, factors)
-    k = int(place.split(".")[1])
-    material = solid_of(body.layers[k].material).scaled(**factors)
-    layers = (*body.layers[:k], replace(body.layers[k], material=material), *body.layers[k + 1 :])
-    return replace(body, layers=layers)
-
-
-def _with_region(body: Body, place: str, factors: dict[str, float]) -> Body:
-    """The body with another material in the region of a key."""
-    name = place.removeprefix(REGION)
-    regions = tuple(
-        (each, solid_of(material).scaled(**factors) if each == name else material)
-        for each, material in body.regions
-    )
-    return replace(body, regions=regions)
+    if part == "regions":
+        own = {which: solid_of(dict(body.regions)[which]).scaled(**factors)}
+        return replace(body, regions=tuple((dict(body.regions) | own).items()))
+    layers, k = list(body.layers), int(which.partition(".")[0])
+    layers[k] = replace(layers[k], material=solid_of(layers[k].material).scaled(**factors))
+    return replace(body, layers=tuple(layers))

@@ -362,9 +362,8 @@ def test_scenes_of_sheets_are_read_and_written():
     assert loads(dumps(replace(scene, body=BODIES["a4-sheet"]))).body == BODIES["a4-sheet"]
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
+def test_what_no_sheet_has_is_refused():
+    for text, said in [
         ('[body]\nkind = "slab"\nmaterial = "paper-grain"', "orthotropic material is for a sheet"),
         ('[body]\nkind = "slab"\ngrammage_g_m2 = 80', "grammage_g_m2 is for a sheet"),
         ('[body]\nkind = "sheet"\nmounting = {edges = []}', "unconstrained"),
@@ -379,11 +378,9 @@ def test_scenes_of_sheets_are_read_and_written():
             "absorb",
         ),
         ('[body]\nkind = "sheet"\ngrammage_g_m2 = 0', "above 0"),
-    ],
-)
-def test_what_no_sheet_has_is_refused(text, said):
-    with pytest.raises(ValueError, match=said):
-        loads(text)
+    ]:
+        with pytest.raises(ValueError, match=said):
+            loads(text)
 
 
 def test_models_say_which_sheets_they_are_not_for():

@@ -418,20 +418,17 @@ def test_sets_continued_lines_and_included_nodes(tmp_path):
     )
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
+def test_what_abaqus_makes_by_a_rule_or_lacks_is_refused(tmp_path):
+    for text, said in [
         ("*NODE\n1, 0, 0, 0\n*NGEN\n1, 9, 1\n", "NGEN"),
         ("*INCLUDE, INPUT=gone.inc\n", "gone.inc"),
         ("*NODE\n1, 0, 0, 0\n*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n", "no node 2"),
         ("*INSTANCE, NAME=a, PART=b\n*END INSTANCE\n", "part 'b'"),
         ("*NODE\n1, a, 0, 0\n", r"below \*NODE"),
-    ],
-)
-def test_what_abaqus_makes_by_a_rule_or_lacks_is_refused(tmp_path, text, said):
-    (tmp_path / "a.inp").write_text(text)
-    with pytest.raises(MeshError, match=said):
-        meshes.read(tmp_path / "a.inp")
+    ]:
+        (tmp_path / "a.inp").write_text(text)
+        with pytest.raises(MeshError, match=said):
+            meshes.read(tmp_path / "a.inp")
 
 
 def test_tetrahedra_that_are_listed_twice_are_taken_once(tmp_path):
@@ -524,20 +521,24 @@ def test_negative_regions_are_refused_and_not_taken_as_positive(tmp_path):
         meshes.read(tmp_path / "a.vtu")
 
 
-@pytest.mark.parametrize(
-    ("name", "content"),
-    [
-        ("a.vtu", b""), ("a.vtu", b"<VTKFile>"), ("a.msh", b"nothing"), ("a.inp", b""),
-        ("a.inp", b"*NODE\n1, a, b\n"), ("a.vtk", b"# vtk DataFile Version 3.0\n"),
-        ("a.stl", b""), ("a.ply", b"ply\nformat ascii 1.0\nend_header\n"), ("a.fbx", b""),
-        ("a.obj", b"v 0 0 0\n"), ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
-    ],
-)  # fmt: skip
-def test_what_is_no_mesh_is_refused_in_one_sentence(tmp_path, name, content):
-    (tmp_path / name).write_bytes(content)
-    with pytest.raises(MeshError, match=name) as error:
-        meshes.read(tmp_path / name)
-    assert "\n" not in str(error.value)
+def test_what_is_no_mesh_is_refused_in_one_sentence(tmp_path):
+    for name, content in [
+        ("a.vtu", b""),
+        ("a.vtu", b"<VTKFile>"),
+        ("a.msh", b"nothing"),
+        ("a.inp", b""),
+        ("a.inp", b"*NODE\n1, a, b\n"),
+        ("a.vtk", b"# vtk DataFile Version 3.0\n"),
+        ("a.stl", b""),
+        ("a.ply", b"ply\nformat ascii 1.0\nend_header\n"),
+        ("a.fbx", b""),
+        ("a.obj", b"v 0 0 0\n"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+    ]:
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(MeshError, match=name) as error:
+            meshes.read(tmp_path / name)
+        assert "\n" not in str(error.value)
 
 
 def test_nothing_is_left_of_what_cannot_be_written(tmp_path):
@@ -630,10 +631,10 @@ def test_a_hand_with_seams_is_the_same_from_every_kind_of_file(tmp_path, suffix)
     points, triangles = hand()
     WRITERS[suffix](tmp_path / f"hand{suffix}", points, triangles)
     raw = read_contents(tmp_path / f"hand{suffix}")
-    surface, said = meshes.repaired(raw.points, raw.triangles)
+    surface, _ = meshes.repaired(raw.points, raw.triangles)
     check(surface)
+    plain, said = meshes.repaired(points, triangles)
     assert said_of(said, "along seams")
-    plain, _ = meshes.repaired(points, triangles)
     assert volume(surface) == pytest.approx(volume(plain), rel=1e-4)
     np.testing.assert_allclose(surface.points.max(axis=0), plain.points.max(axis=0), atol=1e-6)
 
@@ -748,9 +749,8 @@ def test_what_is_prepared_is_kept_for_the_facets_that_a_file_names(tmp_path):
     assert len(read[1].body.points) == 2 * len(read[2].body.points)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
+def test_what_cannot_be_meshed_ends_in_one_line(tmp_path, monkeypatch, capsys):
+    for arguments, said in [
         (["open.stl"], "open along"),
         (["hand.obj", "--unit", "mm"], "may be m"),
         (["hand.obj", "--up", "up"], "up"),
@@ -759,16 +759,14 @@ def test_what_is_prepared_is_kept_for_the_facets_that_a_file_names(tmp_path):
         (["hand.obj", "--out", "hand.stl"], "ends in .vtu or .msh"),
         (["hand.obj", "--out", "no/where.vtu"], "no"),
         (["missing.stl"], "missing.stl"),
-    ],
-)
-def test_what_cannot_be_meshed_ends_in_one_line(tmp_path, monkeypatch, capsys, arguments, said):
-    monkeypatch.chdir(tmp_path)
-    points, triangles = hand()
-    write_obj(tmp_path / "hand.obj", points, triangles)
-    write_by_vtk("open.stl", points, triangles[50:])
-    before = sorted(path.name for path in tmp_path.iterdir())
-    assert main(["mesh", *arguments, "--quiet"]) == 2
-    line = capsys.readouterr().err
-    assert line.count("\n") == 1
-    assert re.search(said, line), line
-    assert sorted(path.name for path in tmp_path.iterdir()) == before
+    ]:
+        monkeypatch.chdir(tmp_path)
+        points, triangles = hand()
+        write_obj(tmp_path / "hand.obj", points, triangles)
+        write_by_vtk("open.stl", points, triangles[50:])
+        before = sorted(path.name for path in tmp_path.iterdir())
+        assert main(["mesh", *arguments, "--quiet"]) == 2
+        line = capsys.readouterr().err
+        assert line.count("\n") == 1
+        assert re.search(said, line), line
+        assert sorted(path.name for path in tmp_path.iterdir()) == before

@@ -86,9 +86,8 @@ def test_without_relief_the_top_is_a_plane():
     assert np.abs(shape.level_set(low, top)).max() < 4e-9
 
 
-@pytest.mark.parametrize(
-    ("fields", "said"),
-    [
+def test_no_palm_is_refused():
+    for fields, said in [
         ({"thickness": 0.0}, "thickness = 0 mm"),
         ({"length": float("nan")}, "length = nan"),
         ({"breadth": 85.0}, "below 1 m"),
@@ -96,11 +95,9 @@ def test_without_relief_the_top_is_a_plane():
         ({"thenar_height": 0.05}, "thenar_height = 50 mm"),
         ({"edge_radius": 0.02}, "half the thickness, 11 mm"),
         ({"corner_radius": 0.05}, "half the shorter side, 42.5 mm"),
-    ],
-)
-def test_no_palm_is_refused(fields, said):
-    with pytest.raises(MeshError, match=said):
-        Palm(**fields)
+    ]:
+        with pytest.raises(MeshError, match=said):
+            Palm(**fields)
 
 
 def test_no_tetrahedron_of_a_grid_has_two_facets_on_its_boundary():
@@ -160,9 +157,7 @@ def test_a_relief_that_a_grid_cannot_follow_is_refused():
         body_palm.discretise(body, 5e-3)
 
 
-@pytest.mark.parametrize(
-    "size", [(0.044, 0.048, 0.0093), (0.05, 0.05, 0.006), (0.03, 0.12, 0.008), (0.06, 0.06, 0.012)]
-)
+@pytest.mark.parametrize("size", [(0.044, 0.048, 0.0093), (0.03, 0.12, 0.008)])
 def test_the_usual_relief_fits_every_palm(size):
     """Its volume is below that of the box and its mounds, and above half of the box."""
     width, height, depth = size

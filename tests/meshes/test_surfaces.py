@@ -119,9 +119,8 @@ def test_no_unsound_surface_reaches_the_mesher(no_mesher, name):
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
+def test_no_absurd_option_reaches_the_mesher(no_mesher):
+    for options, said in [
         ({"epsilon": 0.0}, "epsilon = 0.0 m"),
         ({"epsilon": float("nan")}, "epsilon = nan"),
         ({"h": 1.0}, "h = 1.0 m"),
@@ -130,11 +129,9 @@ def test_no_unsound_surface_reaches_the_mesher(no_mesher, name):
         ({"timeout": float("inf")}, "timeout = inf s"),
         ({"sizing": lambda points: points}, "shape"),
         ({"sizing": lambda points: points[:, 0]}, "least size = -"),
-    ],
-)
-def test_no_absurd_option_reaches_the_mesher(no_mesher, options, said):
-    with pytest.raises(MeshError, match=said):
-        meshes.tetrahedralise(cube(), **({"h": 5e-3} | options))
+    ]:
+        with pytest.raises(MeshError, match=said):
+            meshes.tetrahedralise(cube(), **({"h": 5e-3} | options))
 
 
 def test_a_sheet_is_too_thin_for_the_mesher(no_mesher):
@@ -234,22 +231,22 @@ def test_area_and_volume_of_a_cube():
     assert area(cube()) == pytest.approx(24e-4)
 
 
-@pytest.mark.parametrize("sides", [(0.048, 0.032, 0.01), (0.04, 0.04, 0.012), (0.03, 0.02, 0.01)])
-def test_bodies_are_centred_whatever_the_rounding_at_their_sides(sides):
-    block = meshes.block(sides, 0.008, order=1)
-    surface, _ = repaired(block.points, meshes.boundary_facets(block.tets))
-    x, y, radius = alignment.widest_place(surface)
-    assert [x, y] == pytest.approx([0, 0], abs=0.01 * sides[0])
-    assert radius == pytest.approx(min(sides[:2]) / 2, rel=0.02)
+def test_bodies_are_centred_whatever_the_rounding_at_their_sides():
+    for sides in [(0.048, 0.032, 0.01), (0.04, 0.04, 0.012), (0.03, 0.02, 0.01)]:
+        block = meshes.block(sides, 0.008, order=1)
+        surface, _ = repaired(block.points, meshes.boundary_facets(block.tets))
+        x, y, radius = alignment.widest_place(surface)
+        assert [x, y] == pytest.approx([0, 0], abs=0.01 * sides[0])
+        assert radius == pytest.approx(min(sides[:2]) / 2, rel=0.02)
 
 
-@pytest.mark.parametrize("up", alignment.TURNS)
-def test_up_is_a_turn_that_takes_the_axis_to_z(up):
-    axis = np.zeros((3, 3))
-    axis[0, "xyz".index(up[1])] = 1 if up[0] == "+" else -1
-    turned = alignment.turned(Surface(points=axis, triangles=[[0, 1, 2]]), up)
-    assert turned.points[0].tolist() == [0, 0, 1]
-    assert np.linalg.det(alignment.TURNS[up]) == 1
+def test_up_is_a_turn_that_takes_the_axis_to_z():
+    for up in alignment.TURNS:
+        axis = np.zeros((3, 3))
+        axis[0, "xyz".index(up[1])] = 1 if up[0] == "+" else -1
+        turned = alignment.turned(Surface(points=axis, triangles=[[0, 1, 2]]), up)
+        assert turned.points[0].tolist() == [0, 0, 1]
+        assert np.linalg.det(alignment.TURNS[up]) == 1
 
 
 def box(sides, at=(0.0, 0.0, 0.0), h=np.inf):
@@ -272,19 +269,16 @@ def test_a_winding_number_is_1_inside_and_0_outside():
     assert 50 < inside.sum() < 450
 
 
-@pytest.mark.parametrize(
-    ("inner", "said"),
-    [
+def test_surfaces_that_are_not_inside_are_refused():
+    for inner, said in [
         ({"a": box((0.008,) * 3, (0.009, 0, -2e-3))}, "the body and a cross"),
         ({"a": box((0.008,) * 3, (0.05, 0, -2e-3))}, "a is not inside"),
         ({"a": BONE, "b": box((0.009, 0.003, 0.003), (0, 0, -5e-3))}, "a and b cross"),
         ({"a": Surface(points=BONE.points, triangles=BONE.triangles[1:])}, "a: .* open along 3"),
-    ],
-)
-def test_surfaces_that_are_not_inside_are_refused(inner, said):
-    with pytest.raises(MeshError, match=said):
-        check_inside(OUTER, inner)
-    check_inside(OUTER, {"a": BONE, "marrow": box((2e-3,) * 3, (0, 0, -5e-3))})
+    ]:
+        with pytest.raises(MeshError, match=said):
+            check_inside(OUTER, inner)
+        check_inside(OUTER, {"a": BONE, "marrow": box((2e-3,) * 3, (0, 0, -5e-3))})
 
 
 def test_a_bone_is_cut_with_the_body_that_it_is_in():

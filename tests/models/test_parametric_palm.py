@@ -130,7 +130,7 @@ def test_the_thickness_of_a_coat_is_free():
 
 def test_thicknesses_that_elements_do_not_follow_are_refused():
     layered = replace(PALM, layers=(Layer(thickness=5e-3, material="fat"),))
-    with pytest.raises(ValueError, match="cannot follow them"):
+    with pytest.raises(ValueError, match="thinner than half"):
         skinwave.prepare(scene_of(layered), {KEY: (14.0, 16.0)})
     with pytest.raises(ValueError, match="2 thicknesses of a palm are free, the limit is 1"):
         free_keys(COATED, {KEY: (14.0, 16.0), COAT: (0.2, 0.3)})

@@ -144,9 +144,8 @@ def test_scenes_with_it_come_back_from_their_files_and_are_planned():
     assert found.symmetry == ""
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
+def test_supports_that_cannot_move_are_refused():
+    for text, said in [
         ("[load]\nsupport_motion = { amplitude_um = 5 }", "lacks frequency_hz; give it"),
         (SHAKEN.replace("140", "4000"), "above 0 and at most 1000 Hz; give frequency_hz"),
         (SHAKEN.replace("140", "140, direction = [0, 0]"), "three finite numbers, not all 0"),
@@ -154,13 +153,15 @@ def test_scenes_with_it_come_back_from_their_files_and_are_planned():
         (SHAKEN + '[body]\nbase = "absorbing"\nsides = "clamped"', "absorbing sides"),
         (SHAKEN + '[body]\npreset = "paper-sheet"', "is for a solid, not a body of kind 'sheet'"),
         (SHAKEN + '[body]\nkind = "none"', "is for a solid, not a body of kind 'none'"),
-        (SHAKEN + '[body]\nbase = "free"\nsides = { left = "free", right = "free", front = "free"'
-         ', back = "absorbing" }', "unconstrained"),
-    ],
-)  # fmt: skip
-def test_supports_that_cannot_move_are_refused(text, said):
-    with pytest.raises(ValueError, match=said):
-        loads(text)
+        (
+            SHAKEN
+            + '[body]\nbase = "free"\nsides = { left = "free", right = "free", front = "free"'
+            ', back = "absorbing" }',
+            "unconstrained",
+        ),
+    ]:
+        with pytest.raises(ValueError, match=said):
+            loads(text)
 
 
 @pytest.mark.parametrize("model", ["flat-body", "fem-transient", "point-kernel"])
