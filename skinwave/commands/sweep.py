@@ -124,7 +124,8 @@ def _swept(options: argparse.Namespace, out: Path) -> "tuple[SweepOutcome, Best 
     from skinwave.results import record
     from skinwave.scene.variation import SAMPLED, cases, combinations, parse
     from skinwave.sweeps import best, dataset, uncertainty_page
-    from skinwave.sweeps.sweep import ModelOptions, in_order, sweep
+    from skinwave.sweeps.reductions import ModelOptions
+    from skinwave.sweeps.sweep import Sweep
 
     if options.seed < 0:
         raise ValueError(f"--seed = {options.seed} is below 0; give 0 or a whole number above")
@@ -144,19 +145,20 @@ def _swept(options: argparse.Namespace, out: Path) -> "tuple[SweepOutcome, Best 
     how = ModelOptions(
         model=options.model, tolerance=options.tolerance, h=metre(options.h), solver=options.solver
     )
-    where = {"scheduler": options.scheduler, "workers": options.workers,
-             "command": record.of_command(options)}  # fmt: skip
     optimum, files = None, list[str]()
     with _progress(options, len(wanted)) as progress:
-        found = sweep(wanted, out, how, progress, **where)
+        sweep = Sweep(
+            folder=out, options=how, progress=progress, scheduler=options.scheduler,
+            workers=options.workers, command=record.of_command(options),
+        )  # fmt: skip
+        found = sweep.run(wanted)
         if options.best and not found.missing:
-            runner = best.Runner(folder=out, model_options=how, progress=progress, **where)
             optimum = best.best_value(
-                runner, partial(cases, options.scene), variations[0], options.best,
+                sweep, partial(cases, options.scene), variations[0], options.best,
                 options.samples, options.seed,
             )  # fmt: skip
     if is_sampled and not found.missing:
-        rows = in_order(dataset.read(out), wanted, how, combined)
+        rows = sweep.in_order(wanted, combined)
         sampled = uncertainty_page.Sampled(
             rows=rows, variations=variations, has_indices=options.design == "sobol"
         )

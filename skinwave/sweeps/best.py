@@ -6,11 +6,9 @@ sample of the spreads has a best value of its own, found in the same way; the in
 of them, and is wider by a tenth of a step of the grid at each end, to which they are found.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -22,13 +20,12 @@ from skinwave.models.flat_body import FLAT_BODY, HARMONIC
 from skinwave.scene.scene import Scene
 from skinwave.scene.spreads import PRESSURE, Spread, spreads_of
 from skinwave.scene.variation import DesignPoint, Variation
-from skinwave.sweeps import dataset
 from skinwave.sweeps.ensemble import is_linear
 from skinwave.sweeps.measures import columns
+from skinwave.sweeps.reductions import ModelOptions
 from skinwave.sweeps.sampling import samples as samples_of
-from skinwave.sweeps.sweep import ModelOptions, in_order, model_of, sweep
+from skinwave.sweeps.sweep import Combined, Sweep, model_of
 from skinwave.sweeps.table_figures import at_probe, value
-from skinwave.system.effort import Progress
 
 SAMPLES, FEWEST = 199, 39  # of the spreads; those that have a 95 % interval
 ENDS = (2.5, 97.5)  # percentiles between which the interval lies
@@ -36,7 +33,6 @@ VERTICES = 2  # runs that refine a best value beyond the grid
 RESOLUTION = 0.1  # of a step of the grid, to which a best value is then found
 FOLDER = "samples"  # within that of the sweep: the sweep of the samples
 
-Combined = Sequence[Mapping[str, Any]]  # values by key, of each run
 Evaluate = Callable[[Combined], Floats]  # the column (n,) of runs (n,), nan where there is none
 
 
@@ -78,34 +74,6 @@ class Best:
 
     def __repr__(self) -> str:
         return f"<Best: {self.words}>"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Runner:
-    """What runs cases: the `folder` of the sweep, its `model_options`, `progress`, and the
-    `scheduler`, `workers` and `command` of `sweep`.
-    """
-
-    folder: Path
-    model_options: ModelOptions
-    progress: Progress
-    scheduler: str = "processes"
-    workers: int | None = None
-    command: Mapping[str, Any] | None = None
-
-    def column(self, cases: list[DesignPoint], column: str, combined: Combined) -> Floats:
-        """A column (n,) of the cases of combinations of values, nan where there is none."""
-        found = sweep(
-            cases, self.folder, self.model_options, self.progress, scheduler=self.scheduler,
-            workers=self.workers, command=self.command,
-        )  # fmt: skip
-        if found.interrupted:
-            raise KeyboardInterrupt
-        if found.missing:
-            raise ValueError(f"workers were killed; {found.missing} runs are missing, start again")
-        rows = dataset.read(self.folder, (at_probe(column)[0],))
-        ordered = in_order(rows, cases, self.model_options, combined)
-        return np.array([value(row, column) for row in ordered])
 
 
 def check(
@@ -158,7 +126,7 @@ def check(
 
 
 def best_value(
-    runner: Runner,
+    sweep: Sweep,
     cases: Callable[[Combined], list[DesignPoint]],
     variation: Variation,
     column: str,
@@ -169,7 +137,7 @@ def best_value(
 
     Parameters
     ----------
-    runner : Runner
+    sweep : what runs the cases
     cases : combinations of values -> cases
     variation : of the key
     column : of the table
@@ -181,11 +149,8 @@ def best_value(
         If no run has the column, or too few samples have it.
     """
     n, key, grid = samples or SAMPLES, variation.key, variation.values
-
-    def evaluate(own: Runner, combined: Combined) -> Floats:
-        return own.column(cases(combined), column, combined)
-
-    (best,), (result,) = optima(partial(evaluate, runner), key, grid, [{}])
+    evaluate = partial(_column, cases, column)
+    (best,), (result,) = optima(partial(evaluate, sweep), key, grid, [{}])
     if not np.isfinite(result):
         raise ValueError(f"column '{column}' has no finite number in this sweep; choose another")
     found = Best(
@@ -194,16 +159,15 @@ def best_value(
     )  # fmt: skip
     runs = [case for case in cases([{key: x} for x in grid]) if case.scene]
     scenes = [case.scene for case in runs if case.scene]
-    spreads = _that_move(key, runs[0].before or scenes[0], scenes, runner.model_options.model)
+    spreads = _that_move(key, runs[0].before or scenes[0], scenes, sweep.options.model)
     if not spreads:
         return found
     names = tuple(each.key for each in spreads)
-    drawn = samples_of(spreads, n, seed).tolist()
     own = replace(
-        runner, folder=runner.folder / FOLDER,
-        model_options=_of_samples(runner.model_options, scenes),
-        progress=lambda step, part: runner.progress("samples" if step == "run" else step, part),
+        sweep, folder=sweep.folder / FOLDER, options=_of_samples(sweep.options, scenes),
+        progress=lambda step, part: sweep.progress("samples" if step == "run" else step, part),
     )  # fmt: skip
+    drawn = samples_of(spreads, n, seed).tolist()
     settings = [dict(zip(names, row, strict=True)) for row in drawn]
     values, results = optima(partial(evaluate, own), key, grid, settings)
     values = values[np.isfinite(results)]
@@ -216,6 +180,20 @@ def best_value(
     margin = RESOLUTION * np.diff(np.unique(grid)).max()
     low, high = np.clip((low - margin, high + margin), *found.limits).tolist()
     return replace(found, interval=(low, high), samples=len(values), uncertain=names)
+
+
+def _column(
+    cases: Callable[[Combined], list[DesignPoint]], column: str, sweep: Sweep, combined: Combined
+) -> Floats:
+    """A column (n,) of the runs of combinations of values, nan where there is none."""
+    wanted = cases(combined)
+    found = sweep.run(wanted)
+    if found.interrupted:
+        raise KeyboardInterrupt
+    if found.missing:
+        raise ValueError(f"workers were killed; {found.missing} runs are missing, start again")
+    rows = sweep.in_order(wanted, combined, (at_probe(column)[0],))
+    return np.array([value(row, column) for row in rows])
 
 
 def _that_move(key: str, base: Scene, scenes: Sequence[Scene], model: str) -> list[Spread]:

@@ -144,7 +144,7 @@ def propagate(
     solver: str = "auto",
     seed: int = 0,
     workers: int = 1,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> Ensemble:
     """Ensemble of a scene under a Latin hypercube of its uncertain numbers.
 
@@ -193,21 +193,10 @@ def shared_body(
     spreads: Sequence[Spread],
     values: Floats,
     method: Method,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> Covering | None:
-    """Bodies of nearly all samples, reduced together and cached on disk.
-
-    Parameters
-    ----------
-    scene : Scene, with the central values
-    spreads : (d,) Spread
-    values : (n, d) float, of all samples
-    method : Method
-    progress : called with the name of the phase and the fraction done
-
-    Returns
-    -------
-    Covering; None if there is none, or if bodies of their own cost less
+    """One reduction for the bodies of nearly all samples (n, d), cached on disk; None if bodies of
+    their own cost less, or no reduction serves them.
     """
     free = {
         spread.key: _range(spread, column)
@@ -220,7 +209,7 @@ def shared_body(
     found = covering(scene, free, len(values), method.tolerance)
     options = SolveOptions(
         h=method.h or default_size(scene.body), tolerance=method.tolerance, solver=method.solver,
-        progress=progress or silent,
+        progress=progress,
     )  # fmt: skip
     return found if tried_together(found, options) else None
 
@@ -238,7 +227,7 @@ def ensemble(
     method: Method,
     *,
     workers: int = 1,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> Ensemble:
     """Ensemble of given samples, the same whatever the number of processes.
 
@@ -266,7 +255,7 @@ def ensemble(
 
     def done(k: int, found: list[Solution]) -> None:
         solved[k] = found
-        (progress or silent)("samples", len(solved) / len(batches))
+        progress("samples", len(solved) / len(batches))
 
     work = partial(_batch, scene, keys, method)
     if workers > 1 and len(values) > ALONE:

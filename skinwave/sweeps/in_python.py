@@ -19,7 +19,8 @@ from skinwave.scene.file import dumps
 from skinwave.scene.scene import Scene
 from skinwave.scene.variation import DesignPoint, Variation, cases_of, combinations, parse
 from skinwave.sweeps import best, dataset
-from skinwave.sweeps import sweep as runner
+from skinwave.sweeps.reductions import ModelOptions
+from skinwave.sweeps.sweep import Sweep
 from skinwave.system.effort import Progress
 from skinwave.system.progress_bar import reported
 from skinwave.system.table import shown
@@ -106,14 +107,7 @@ def sweep(
     design: str = "factorial",
     samples: int | None = None,
     seed: int = 0,
-    model: str = "auto",
-    tolerance: float = 0.05,
-    h: float | None = None,
-    solver: str = "auto",
-    folder: str | Path | None = None,
-    scheduler: str = "threads",
-    workers: int | None = None,
-    progress: Progress | bool | None = None,
+    **options: Any,
 ) -> SweepTable:
     """Simulate a scene with other values of keys of its file, each body reduced once.
 
@@ -127,12 +121,11 @@ def sweep(
     design : "factorial", every value with every other; "zip", first with first; "lhs" or "sobol"
     samples : int, runs of "lhs", rows of each matrix of "sobol"
     seed : int, of the samples
-    model, tolerance, h, solver : of every run, as for `skinwave.simulate`
-    folder : where rows are kept and an interrupted sweep is resumed; nowhere if not given
-    scheduler : "threads", "processes" (of a script with a main guard), or the address of a Dask
-        scheduler
-    workers : int, runs at a time on this machine; all cores if not given
-    progress : True for a bar; or called with the name of the phase and the fraction done
+    **options : model, tolerance, h and solver of every run, as for `skinwave.simulate`; the
+        `folder` where rows are kept and an interrupted sweep is resumed; the `scheduler`,
+        "threads", "processes" (of a script with a main guard), or the address of a Dask scheduler;
+        `workers`, how many runs go on at a time on this machine; `progress`, True for a bar, or
+        called with the name of the phase and the fraction done
 
     Returns
     -------
@@ -145,13 +138,11 @@ def sweep(
     """
     variations = [_variation(key, values) for key, values in vary.items()]
     wanted = _cases(scene)(combinations(variations, design, samples, seed))
-    options = runner.ModelOptions(model=model, tolerance=tolerance, h=h, solver=solver)
-    with _kept(folder) as kept, reported(progress) as report:
-        found = runner.sweep(wanted, kept, options, report, scheduler=scheduler, workers=workers)
-        if found.interrupted:
+    with _made(**options) as made:
+        if made.run(wanted).interrupted:
             raise KeyboardInterrupt
-        there = {row[dataset.KEY]: row for row in dataset.read(kept)}
-    rows = tuple(there[name] for name in runner.by_name(wanted, options) if name in there)
+        there = {row[dataset.KEY]: row for row in dataset.read(made.folder)}
+    rows = tuple(there[name] for name in made.by_name(wanted) if name in there)
     return SweepTable(rows=rows, varied=tuple(v.key for v in variations))
 
 
@@ -162,14 +153,7 @@ def best_value(
     *,
     samples: int | None = None,
     seed: int = 0,
-    model: str = "auto",
-    tolerance: float = 0.05,
-    h: float | None = None,
-    solver: str = "auto",
-    folder: str | Path | None = None,
-    scheduler: str = "threads",
-    workers: int | None = None,
-    progress: Progress | bool | None = None,
+    **options: Any,
 ) -> best.Best:
     """Find the value of one key at which a column of the sweep's table is largest.
 
@@ -179,7 +163,8 @@ def best_value(
     vary : one key and three or more of its numbers, as for `sweep`
     column : of the table, such as "level_db[0]"; without an index, the largest over the probes
     samples : int, of the spreads of the scene, for the interval; 199 if not given
-    seed, model, tolerance, h, solver, folder, scheduler, workers, progress : as for `sweep`
+    seed : int, of the samples
+    **options : as for `sweep`
 
     Returns
     -------
@@ -193,13 +178,25 @@ def best_value(
     """
     variations, cases = [_variation(key, values) for key, values in vary.items()], _cases(scene)
     best.check(variations, column, cases(combinations(variations)), samples)
-    options = runner.ModelOptions(model=model, tolerance=tolerance, h=h, solver=solver)
-    with _kept(folder) as kept, reported(progress) as report:
-        sweeps = best.Runner(
-            folder=kept, model_options=options, progress=report, scheduler=scheduler,
-            workers=workers,
+    with _made(**options) as made:
+        return best.best_value(made, cases, variations[0], column, samples, seed)
+
+
+@contextmanager
+def _made(
+    *,
+    folder: str | Path | None = None,
+    scheduler: str = "threads",
+    workers: int | None = None,
+    progress: Progress | bool | None = None,
+    **options: Any,
+) -> Iterator[Sweep]:
+    """The sweep of options, in a folder that is removed if none is given."""
+    with reported(progress) as report, tempfile.TemporaryDirectory() as own:
+        yield Sweep(
+            folder=Path(own) / "sweep" if folder is None else Path(folder),
+            options=ModelOptions(**options), progress=report, scheduler=scheduler, workers=workers,
         )  # fmt: skip
-        return best.best_value(sweeps, cases, variations[0], column, samples, seed)
 
 
 def _cases(scene: Scene) -> Callable[[Sequence[Mapping[str, Any]]], list[DesignPoint]]:
@@ -214,15 +211,6 @@ def _variation(key: str, values: Values) -> Variation:
     # Numbers of numpy as a file has them.
     plain = (value.item() if hasattr(value, "item") else value for value in values)
     return Variation(key=checked.key, values=tuple(plain))
-
-
-@contextmanager
-def _kept(folder: str | Path | None) -> Iterator[Path]:
-    if folder is not None:
-        yield Path(folder)
-        return
-    with tempfile.TemporaryDirectory() as own:
-        yield Path(own) / "sweep"
 
 
 def _cell(value: Any) -> Any:

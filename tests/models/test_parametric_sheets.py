@@ -25,7 +25,7 @@ from skinwave.models.prepared import components
 from skinwave.models.prepared import prepare as own_body
 from skinwave.scene.scene import BODIES, Placement, Scene
 from skinwave.scene.variation import DesignPoint
-from skinwave.sweeps import families
+from skinwave.sweeps import reductions
 from skinwave.system.effort import silent
 
 MODULUS, LOSS = "body.material.shear_modulus_pa", "body.material.loss_factor"
@@ -167,7 +167,7 @@ def test_thicknesses_of_a_sheet_in_air_share_a_reduction_in_a_sweep():
         varied = {THICKNESS: thickness}
         point = DesignPoint(varied=varied, keys={}, text="", scene=scene, before=scene)
         cases[scene.body, scene.probes, scene.reading, scene.load] = point
-    ((family, members),) = families.families(cases, 0.05)
+    ((family, members),) = reductions.families(cases, 0.05)
     assert family.members == len(members) == 6, "as many as for a modulus: there is one mesh"
     assert family.scene.body.depth == pytest.approx(8e-5), "the shortest waves"
 

@@ -15,8 +15,7 @@ from skinwave.models.free_keys import free_keys, with_values
 from skinwave.scene.file import read, to_table
 from skinwave.scene.scene import BODIES, Body, Layer, Scene
 from skinwave.scene.variation import cases_of, combinations, parse
-from skinwave.sweeps import dataset, families
-from skinwave.sweeps import sweep as sweeping
+from skinwave.sweeps import dataset, reductions
 
 SMALL = ["body.size_x_mm=40", "body.size_y_mm=40", "body.sides=clamped"]
 ON_SMALL = [*SMALL, "tacton.duration_s=0.3", "--model", "fem", "--element-size", 7, "--workers", 1]
@@ -73,10 +72,10 @@ def test_the_forearm_gives_way_most_near_the_rayleigh_speed(tmp_path, monkeypatc
 
 
 def test_bodies_are_prepared_once(scene, monkeypatch):
-    prepared, inner = [], sweeping.prepare
+    prepared, inner = [], reductions.prepare
     counting = lambda *a, **k: prepared.append((a, k)) or inner(*a, **k)  # noqa: E731
-    monkeypatch.setattr(sweeping, "prepare", counting)
-    sweeping._prepared.cache_clear()
+    monkeypatch.setattr(reductions, "prepare", counting)
+    reductions.prepared.cache_clear()
     rows = swept("tacton.speed_m_per_s=2:8:3", "body.thickness_mm=12,13", *ON_SMALL)
     assert {row["status"] for row in rows} == {"done"}
     assert len(prepared) == len({(a[0], k["h"]) for a, k in prepared}) == 4  # two meshes each
@@ -86,7 +85,7 @@ def test_bodies_are_prepared_once(scene, monkeypatch):
 def counted(monkeypatch, folder):
     """Factorisations from here on, with a cache of their own."""
     monkeypatch.setenv("SKINWAVE_CACHE", str(folder))
-    sweeping._prepared.cache_clear()
+    reductions.prepared.cache_clear()
     covering.kept_together.cache_clear()
     made = []
     for module, name in ((fem.krylov, "factorise"), (fem.affine, "factoriser")):
@@ -145,15 +144,15 @@ def families_of(body, *varied, design="factorial"):
     """How many bodies of a sweep share a model, each of which has its own materials."""
     table = to_table(Scene(pressure=MovingPressure(tacton=Tacton(am_frequency=140)), body=body))
     points = cases_of(table, table, combinations([parse(each) for each in varied], design))
-    hardest = {sweeping._key(point.scene): point for point in points}
-    found = families.families(hardest, 0.05)
+    hardest = {reductions.solid_of(point.scene): point for point in points}
+    found = reductions.families(hardest, 0.05)
     for family, members in found:
         keys = free_keys(family.scene.body, {k: (a, b) for k, a, b in family.ranges})
         for (body, *_), values in members.items():
             own = with_values(family.scene.body, keys, dict(values))
             assert own.solids == body.solids
             assert own.depth == pytest.approx(body.depth, rel=1e-9)
-    assert not families.families(hardest, 0.05, workers=len(points))
+    assert not reductions.families(hardest, 0.05, workers=len(points))
     return sorted(len(members) for _, members in found)
 
 
@@ -184,9 +183,9 @@ def test_what_cannot_be_reduced_together_or_has_a_coarse_mesh_is_reduced_alone(s
     with monkeypatch.context() as patch:
         patch.setattr(covering.parametric, "prepare", refusing)
         assert together(swept(moduli, *ON_SMALL)) == {("done", 1)}
-    inner = families.refined
+    inner = reductions.refined
     coarse = lambda *given, **options: replace(inner(*given, **options), h=8e-3)  # noqa: E731
-    monkeypatch.setattr(families, "refined", coarse)
+    monkeypatch.setattr(reductions, "refined", coarse)
     within = ["--model", "fem", "--tolerance", 0.1, "--workers", 1]
     rows = swept(moduli, *SMALL, "body.thickness_mm=8", *within, out="finer")
     assert together(rows) == {("done", 1)}

@@ -1,30 +1,55 @@
-"""Families of bodies that differ in materials and thicknesses alone, each family reduced together.
+"""Reductions that runs of a sweep share: each body once, and families of bodies together.
 
-One parametric reduced-order model (`models.parametric`) serves all bodies of a family, on two
-meshes, by which the error of each is estimated: some factorisations in place of two a body.
+Bodies that differ in materials and thicknesses alone are a family, which one reduced-order model
+serves (`models.covering`). Each reduction is on two meshes, by which the error of a run is
+estimated.
 """
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from simple_model import named_lines
+from skinwave.models import parametric
 from skinwave.models.covering import Covering, covering, kept_together
 from skinwave.models.free_keys import FreeKey, free_keys, with_values
 from skinwave.models.options import SolveOptions
+from skinwave.models.prepared import Prepared, prepare, reduction_tolerance
 from skinwave.planning.refinement import compared_with, refined
 from skinwave.scene.scene import Body, Load, Reading, Scene
 from skinwave.scene.variation import DesignPoint
 
 PER_WORKER = 3  # bodies of a family: of fewer, workers that take one each are done sooner
+KEPT = 4  # bodies that a worker caches in memory, on two meshes each
 AUDIBLE = 1e-2  # of the strongest line of a load: weaker ones make no scene harder
 ROUND_OFF = 1e-9  # of a length
 
 # A body, its probes, what they read, and what pushes it.
 Solid = tuple[Body, tuple[tuple[float, float], ...], Reading, Load]
 Values = tuple[tuple[str, float], ...]  # of free keys
+Families = list[tuple[Covering, dict[Solid, Values]]]  # each with the values of its bodies
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelOptions:
+    """Model, tolerance, element size h in metre and solver of every run, and whether the error of
+    runs without a mesh is estimated.
+    """
+
+    model: str = "auto"
+    tolerance: float = 0.05
+    h: float | None = None
+    solver: str = "auto"
+    is_assessed: bool = True
+
+    def solving(self, model: str = "auto", h: float | None = None) -> SolveOptions:
+        """Options of one solution; raises a ValueError if a number is out of range."""
+        return SolveOptions(
+            model=model, h=h or self.h, tolerance=self.tolerance, solver=self.solver
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,12 +59,17 @@ class Mesh:
     together, the body that is `meshed`, and the `values` of the one that runs are on.
     """
 
-    h: float | None = None
-    coarser: float | None = None
+    h: float = 0.0
+    coarser: float = 0.0
     error: str = ""
     family: Covering | None = None
     meshed: Body | None = None
     values: Values = ()
+
+
+def solid_of(scene: Scene) -> Solid:
+    """What a reduction is of."""
+    return scene.body, scene.probes, scene.reading, scene.load
 
 
 def highest(scene: Scene) -> float:
@@ -47,10 +77,48 @@ def highest(scene: Scene) -> float:
     return max(named_lines(scene.pressure, AUDIBLE).values(), default=0.0)
 
 
-def families(
-    hardest: Mapping[Solid, DesignPoint], tolerance: float, workers: int = 1
-) -> list[tuple[Covering, dict[Solid, Values]]]:
-    """Families of the bodies of a sweep.
+def mesh_of_body(options: ModelOptions, scene: Scene) -> Mesh:
+    """The mesh that the hardest scene of a body requires; cached on disk for all workers."""
+    if not options.h:
+        found = refined(scene, scene.body, options.solving())
+        return Mesh(h=found.h, coarser=found.compared)
+    mesh = Mesh(h=options.h, coarser=compared_with(scene.body, options.h))
+    for h in (mesh.h, mesh.coarser):
+        prepared(solid_of(scene), h, options, mesh)
+    return mesh
+
+
+def mesh_of_family(options: ModelOptions, family: Covering) -> Mesh:
+    """Mesh of a family: of the size that is asked for, or that its hardest scene requires.
+
+    Raises
+    ------
+    ValueError
+        If its bodies cannot be reduced together.
+    """
+    size = options.h or refined(family.scene, family.hardest, options.solving()).h
+    bodies = kept_together(family, size, options.tolerance, options.solver).bodies
+    meshed = bodies.body(bodies.meshed)
+    coarser = compared_with(meshed, size)
+    kept_together(family, coarser, options.tolerance, options.solver)
+    return Mesh(h=size, coarser=coarser, family=family, meshed=meshed)
+
+
+@lru_cache(maxsize=2 * KEPT)  # a worker meets the same bodies again and again
+def prepared(solid: Solid, h: float, options: ModelOptions, mesh: Mesh) -> Prepared:
+    """Reduced body of runs, with elements of h in metre."""
+    if mesh.family:
+        shared = kept_together(mesh.family, h, options.tolerance, options.solver)
+        return parametric.at(shared, dict(mesh.values))
+    body, probes, reading, load = solid
+    return prepare(
+        body, np.array(probes), h=h, solver=options.solver,
+        tolerance=reduction_tolerance(options.tolerance), reading=reading, load=load,
+    )  # fmt: skip
+
+
+def families(hardest: Mapping[Solid, DesignPoint], tolerance: float, workers: int = 1) -> Families:
+    """Families of the bodies of a sweep: of many thicknesses where these pay, else of one each.
 
     Parameters
     ----------
@@ -70,7 +138,7 @@ def families(
 
 def _families(
     hardest: Mapping[Solid, DesignPoint], tolerance: float, workers: int, *, moving: bool
-) -> list[tuple[Covering, dict[Solid, Values]]]:
+) -> Families:
     """Families of bodies, of one thickness each unless their mesh may be `moving`."""
     limits = _limits(hardest.values())
     groups: dict[tuple[Any, ...], dict[Solid, DesignPoint]] = {}
@@ -85,36 +153,15 @@ def _families(
     ]
 
 
-def mesh_of(family: Covering, tolerance: float, h: float | None, solver: str) -> Mesh:
-    """Mesh of a family: of the size that is asked for, or that its hardest scene requires.
-
-    Raises
-    ------
-    ValueError
-        If its bodies cannot be reduced together.
-    """
-    scene = family.scene
-    options = SolveOptions(tolerance=tolerance, solver=solver)
-    size = h or refined(scene, family.hardest, options).h
-    bodies = kept_together(family, size, tolerance, solver).bodies
-    meshed = bodies.body(bodies.meshed)
-    coarser = compared_with(meshed, size)
-    kept_together(family, coarser, tolerance, solver)
-    return Mesh(h=size, coarser=coarser, family=family, meshed=meshed)
-
-
 def _limits(cases: Iterable[DesignPoint]) -> dict[str, tuple[float, float]]:
     """Least and largest values of numbers of a body that are varied."""
     found: dict[str, set[float]] = {}
     for case in cases:
         for key, value in case.varied.items():
-            if key.startswith("body.") and _is_number(value):
+            is_number = isinstance(value, int | float) and not isinstance(value, bool)
+            if key.startswith("body.") and is_number:
                 found.setdefault(key, set()).add(float(value))
     return {key: (min(each), max(each)) for key, each in found.items() if len(each) > 1}
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _free(
@@ -158,12 +205,11 @@ def _family(
     case, hardest = max(scenes, key=lambda each: _per_length(each[1]))
     # A factor that all share is not free, and a scene before factors lacks it.
     scene = None if any(case.varied[key] != 1 for key in fixed) else case.before
-    if not scene:
-        return None
     free = {key.key: limits[key.key] for key in keys}
-    family = covering(scene, free, len(members), tolerance, hardest.body)
-    each = {solid: _values(case, keys) for solid, case in members.items()}
-    return (family, each) if family else None
+    family = scene and covering(scene, free, len(members), tolerance, hardest.body)
+    if not family:
+        return None
+    return family, {solid: _values(case, keys) for solid, case in members.items()}
 
 
 def _per_length(scene: Scene) -> float:
