@@ -82,10 +82,10 @@ def mesh_of_body(options: ModelOptions, scene: Scene) -> Mesh:
     if not options.h:
         found = refined(scene, scene.body, options.solving())
         return Mesh(h=found.h, coarser=found.compared)
-    mesh = Mesh(h=options.h, coarser=compared_with(scene.body, options.h))
-    for h in (mesh.h, mesh.coarser):
-        prepared(solid_of(scene), h, options, mesh)
-    return mesh
+    prepared(solid_of(scene), options.h, options)
+    coarser = compared_with(scene.body, options.h)
+    prepared(solid_of(scene), coarser, options)
+    return Mesh(h=options.h, coarser=coarser)
 
 
 def mesh_of_family(options: ModelOptions, family: Covering) -> Mesh:
@@ -105,11 +105,17 @@ def mesh_of_family(options: ModelOptions, family: Covering) -> Mesh:
 
 
 @lru_cache(maxsize=2 * KEPT)  # a worker meets the same bodies again and again
-def prepared(solid: Solid, h: float, options: ModelOptions, mesh: Mesh) -> Prepared:
-    """Reduced body of runs, with elements of h in metre."""
-    if mesh.family:
-        shared = kept_together(mesh.family, h, options.tolerance, options.solver)
-        return parametric.at(shared, dict(mesh.values))
+def prepared(
+    solid: Solid,
+    h: float,
+    options: ModelOptions,
+    family: Covering | None = None,
+    values: Values = (),
+) -> Prepared:
+    """Reduced body of runs, with elements of h in metre; of a family the one with these values."""
+    if family:
+        shared = kept_together(family, h, options.tolerance, options.solver)
+        return parametric.at(shared, dict(values))
     body, probes, reading, load = solid
     return prepare(
         body, np.array(probes), h=h, solver=options.solver,

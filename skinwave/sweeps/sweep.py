@@ -285,7 +285,10 @@ def _on_mesh(scene: Scene, options: ModelOptions, mesh: Mesh) -> tuple[Response,
     """
     if mesh.error:
         raise ValueError(mesh.error)
-    fine, coarse = (prepared(solid_of(scene), h, options, mesh) for h in (mesh.h, mesh.coarser))
+    fine, coarse = (
+        prepared(solid_of(scene), h, options, mesh.family, mesh.values)
+        for h in (mesh.h, mesh.coarser)
+    )
     response = assessed(
         scene, answer(fine, scene), fine, options.solving(h=mesh.h),
         compared=(mesh.coarser, coarse), meshed=mesh.meshed,

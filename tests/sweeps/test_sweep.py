@@ -15,7 +15,7 @@ from skinwave.models.free_keys import free_keys, with_values
 from skinwave.scene.file import read, to_table
 from skinwave.scene.scene import BODIES, Body, Layer, Scene
 from skinwave.scene.variation import cases_of, combinations, parse
-from skinwave.sweeps import dataset, reductions
+from skinwave.sweeps import dataset, reductions, sweep
 
 SMALL = ["body.size_x_mm=40", "body.size_y_mm=40", "body.sides=clamped"]
 ON_SMALL = [*SMALL, "tacton.duration_s=0.3", "--model", "fem", "--element-size", 7, "--workers", 1]
@@ -183,9 +183,9 @@ def test_what_cannot_be_reduced_together_or_has_a_coarse_mesh_is_reduced_alone(s
     with monkeypatch.context() as patch:
         patch.setattr(covering.parametric, "prepare", refusing)
         assert together(swept(moduli, *ON_SMALL)) == {("done", 1)}
-    inner = reductions.refined
-    coarse = lambda *given, **options: replace(inner(*given, **options), h=8e-3)  # noqa: E731
-    monkeypatch.setattr(reductions, "refined", coarse)
+    inner = sweep.mesh_of_family
+    coarse = lambda options, family: inner(replace(options, h=8e-3), family)  # noqa: E731
+    monkeypatch.setattr(sweep, "mesh_of_family", coarse)
     within = ["--model", "fem", "--tolerance", 0.1, "--workers", 1]
     rows = swept(moduli, *SMALL, "body.thickness_mm=8", *within, out="finer")
     assert together(rows) == {("done", 1)}
