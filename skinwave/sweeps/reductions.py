@@ -82,9 +82,9 @@ def mesh_of_body(options: ModelOptions, scene: Scene) -> Mesh:
     if not options.h:
         found = refined(scene, scene.body, options.solving())
         return Mesh(h=found.h, coarser=found.compared)
-    prepared(solid_of(scene), options.h, options)
+    prepared(solid_of(scene), options.h, options, None, ())
     coarser = compared_with(scene.body, options.h)
-    prepared(solid_of(scene), coarser, options)
+    prepared(solid_of(scene), coarser, options, None, ())
     return Mesh(h=options.h, coarser=coarser)
 
 
@@ -109,8 +109,8 @@ def prepared(
     solid: Solid,
     h: float,
     options: ModelOptions,
-    family: Covering | None = None,
-    values: Values = (),
+    family: Covering | None,
+    values: Values,
 ) -> Prepared:
     """Reduced body of runs, with elements of h in metre; of a family the one with these values."""
     if family:

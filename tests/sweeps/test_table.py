@@ -75,7 +75,7 @@ def test_wrong_keys_and_values_are_one_sentence(scene, capsys):
         ("add :n", "tacton.size_mm=1:2"),
         ("no combination makes a scene", "tacton.size_mm=70,80"),
         ("runs are outside", "tacton.size_mm=1:2:1000", "body.thickness_mm=1:2:1000"),
-        ("lhs needs it", "tacton.size_mm=1:2", "--design", "lhs"),
+        ("need each other", "tacton.size_mm=1:2", "--design", "lhs"),
         ("design 'latin' is unknown", "tacton.size_mm=1,2", "--design", "latin"),
         ("below 1", "tacton.size_mm=1,2", "--workers", "0"),
         ("is none of processes, threads", "tacton.size_mm=1,2", "--scheduler", "cloud"),
