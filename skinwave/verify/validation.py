@@ -205,7 +205,7 @@ def verdict(found: Validation) -> list[str]:
             for outcome in (BELOW, ABOVE)
             if (group := [row for row in of if row.outcome == outcome])
         ]
-        sentences.append(f"{words} are {' and '.join(parts) or 'all within'}.")
+        sentences.append(f"{words} are {', and '.join(parts) or 'all within'}.")
     for quantity in (SPEED, LENGTH):
         band = all_sources(quantity)
         apart = max(high / low for low, high in zip(band.lows, band.highs, strict=True))
