@@ -229,20 +229,7 @@ def ensemble(
     workers: int = 1,
     progress: Progress = silent,
 ) -> Ensemble:
-    """Ensemble of given samples, the same whatever the number of processes.
-
-    Parameters
-    ----------
-    scene : Scene, with the central values
-    spreads : (d,) Spread
-    values : (n, d) float
-    method : Method
-    workers : processes; with several, a script needs `if __name__ == "__main__"`
-    progress : called with the name of the phase and the fraction done
-
-    Returns
-    -------
-    Ensemble
+    """Ensemble of given samples (n, d) of a scene, the same whatever the number of processes.
 
     Raises
     ------

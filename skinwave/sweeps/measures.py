@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from simple_model import Response, named_lines, point_kernel, sensation_level
+from simple_model import Effort, Response, named_lines, point_kernel, sensation_level
 from simple_model.quantities import DISPLACEMENT
 from skinwave.models.options import sample_times
-from skinwave.results.comparison import Agreement, compare, moving_rms
+from skinwave.results.comparison import compare, moving_rms
 from skinwave.results.run import ASSESSED, SUPPORT, Run
 from skinwave.scene.scene import Scene
 from skinwave.scene.variation import DesignPoint
@@ -105,36 +105,25 @@ def measured(scene: Scene, response: Response) -> dict[str, Any]:
             row[f"{name}_kernel_pa"] = published[name]
             with np.errstate(divide="ignore", invalid="ignore"):
                 row[f"{name}_ratio"] = abs(agreement.scale) * found[name] / published[name]
-    row |= _kernel(kernel, agreement) | _effort(response)
-    if response.record.of_body:
-        unit = "um" if response.record is DISPLACEMENT else response.record.column
-        row |= _motion(response, agreement, unit)
-        row |= {f"{n}_{unit}": response.record.per_unit * a for n, a in found.items()}
-        row |= _above_threshold(run) if run.is_skin else {}
-    return {name: value.tolist() if isinstance(value, np.ndarray) else value
-            for name, value in row.items()}  # fmt: skip
-
-
-def _kernel(kernel: Response, agreement: Agreement) -> dict[str, Any]:
-    return {
-        "kernel_peak_pa": _peak(kernel),
-        "kernel_rms_pa": moving_rms(kernel),
-        "kernel_misfit": agreement.relative_l2,
-        "kernel_shape_misfit": agreement.shape_misfit,
+    row |= {
+        "kernel_peak_pa": _peak(kernel), "kernel_rms_pa": moving_rms(kernel),
+        "kernel_misfit": agreement.relative_l2, "kernel_shape_misfit": agreement.shape_misfit,
         "kernel_delay_ms": 1e3 * agreement.delay,
         "kernel_spread_6db_mm": 1e3 * agreement.spread_reference[-6],
         "kernel_spread_20db_mm": 1e3 * agreement.spread_reference[-20],
-    }
-
-
-def _motion(response: Response, agreement: Agreement, unit: str) -> dict[str, Any]:
-    per = response.record.per_unit
-    return {
-        f"peak_{unit}": per * _peak(response),
-        f"rms_{unit}": per * moving_rms(response),
-        "spread_6db_mm": 1e3 * agreement.spread_candidate[-6],
-        "spread_20db_mm": 1e3 * agreement.spread_candidate[-20],
-    }
+    } | _effort(response.effort)  # fmt: skip
+    if response.record.of_body:
+        unit = "um" if response.record is DISPLACEMENT else response.record.column
+        per = response.record.per_unit
+        row |= {
+            f"peak_{unit}": per * _peak(response), f"rms_{unit}": per * moving_rms(response),
+            "spread_6db_mm": 1e3 * agreement.spread_candidate[-6],
+            "spread_20db_mm": 1e3 * agreement.spread_candidate[-20],
+            **{f"{name}_{unit}": per * amplitudes for name, amplitudes in found.items()},
+        }  # fmt: skip
+        row |= _above_threshold(run) if run.is_skin else {}
+    return {name: value.tolist() if isinstance(value, np.ndarray) else value
+            for name, value in row.items()}  # fmt: skip
 
 
 def _above_threshold(run: Run) -> dict[str, Any]:
@@ -147,16 +136,10 @@ def _above_threshold(run: Run) -> dict[str, Any]:
     return row
 
 
-def _effort(response: Response) -> dict[str, Any]:
-    effort = response.effort
-    return {
-        "dofs": effort.dofs,
-        "reduced_dofs": effort.reduced_dofs,
-        "steps": effort.steps,
-        "solver": effort.solver,
+def _effort(effort: Effort) -> dict[str, Any]:
+    same = ("dofs", "reduced_dofs", "steps", "solver", "energy_imbalance", "radiated")
+    return {name: getattr(effort, name) for name in same} | {
         "reduction_error": effort.estimate,
-        "energy_imbalance": effort.energy_imbalance,
-        "radiated": effort.radiated,
         "peak_memory_gib": effort.peak_memory / 2**30,
         "warnings": "; ".join(effort.warnings),
     }
