@@ -87,6 +87,10 @@ def line_table(
     candidates : names of lines that are listed whether or not the load has them
     beside : names and frequencies in Hz of what moves the body beside the pressure; those that
         coincide with a line of the pressure are listed as this
+
+    Returns
+    -------
+    LineTable, Hz and the unit of the response
     """
     nyquist = 0.5 / step(response.times)
     found = line_names(pressure, FITTED, candidates=candidates)
@@ -111,9 +115,17 @@ def resolved_lines(
     highest: float = np.inf,
     settle: float = SETTLE,
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Frequencies in Hz by name of the lines of a load above -60 dB that a response resolves, and
-    of those that it is too short to resolve, with the candidates of `line_table`, below `highest`
-    Hz, and a fraction `settle` of the response left out at its start.
+    """Resolved and unresolved lines of a load, so that `lines` can be asked for the resolved ones.
+
+    Parameters
+    ----------
+    pressure : MovingPressure, whose lines above -60 dB are taken
+    response : Response, which is long enough to resolve a line or not
+    candidates, highest, settle : as for `line_table`
+
+    Returns
+    -------
+    frequencies in Hz by name, of the resolved lines and of the unresolved ones
     """
     highest = min(highest, 0.5 / step(response.times))
     found = _below(line_names(pressure, candidates=candidates), highest)

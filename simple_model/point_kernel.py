@@ -29,7 +29,16 @@ def published(pressure: MovingPressure) -> MovingPressure:
 
 
 def point_kernel_published(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> Response:
-    """`point_kernel` under the published load, whatever drive law and focus are given."""
+    """Stimulation under the published load, whatever drive law and focus are given.
+
+    Parameters
+    ----------
+    pressure, probes, times : as for `point_kernel`
+
+    Returns
+    -------
+    Response, stimulation (t, p) in Pa
+    """
     response = point_kernel(published(pressure), probes, times)
     return replace(response, model="point-kernel-published")
 
@@ -49,6 +58,11 @@ def point_kernel(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> 
     Returns
     -------
     Response, stimulation (t, p) in Pa
+
+    Raises
+    ------
+    ValueError
+        If probes do not have two coordinates.
     """
     probes = np.array(probes, np.float64)
     if probes.ndim != 2 or probes.shape[1] != 2:

@@ -321,7 +321,16 @@ def spectrum(response: Response, window: str = "hann") -> tuple[Floats, Floats]:
 
 
 def lines(response: Response, frequencies: ArrayLike, *, settle: float = SETTLE) -> Floats:
-    """Line amplitudes (f, p) in the unit of the response: the moduli of `phasors`."""
+    """Line amplitudes: the moduli of `phasors`.
+
+    Parameters
+    ----------
+    response, frequencies, settle : as for `phasors`
+
+    Returns
+    -------
+    (f, p) float, in the unit of the response
+    """
     return np.abs(phasors(response, frequencies, settle=settle))
 
 
@@ -358,12 +367,22 @@ def are_resolved(
     settle: float = SETTLE,
     strengths: ArrayLike | None = None,
 ) -> Mask:
-    """Mask (f,) of frequencies (f,) in Hz that `lines` resolves from 0 Hz and from the others.
+    """Mask of frequencies that `lines` resolves from 0 Hz and from the others.
 
     Frequencies that differ by at most `ALIKE` of the resolution are one line and need not be
-    resolved; nor does a line from others that have, by their strengths (f,) of any unit, all the
-    same if not given, at most 5 % of it together. Unresolved lines, which are not fitted, must not
-    leak more than 5 % into it.
+    resolved; nor does a line from others that have, by their strengths, at most 5 % of it together.
+    Unresolved lines, which are not fitted, must not leak more than 5 % into it.
+
+    Parameters
+    ----------
+    response : Response
+    frequencies : (f,) float, Hz
+    strengths : (f,) float, of any unit; all the same if not given
+    settle : fraction of the response that is left out at its start
+
+    Returns
+    -------
+    (f,) bool
     """
     frequencies = np.atleast_1d(np.asarray(frequencies, np.float64))
     strengths = np.ones_like(frequencies) if strengths is None else np.asarray(strengths)
@@ -377,8 +396,17 @@ def are_resolved(
 
 
 def unmixed(frequencies: Floats, strengths: Floats, least: float) -> Mask:
-    """Mask (f,) of lines at frequencies in Hz of which neither lines nearer than `least` Hz, nor
-    the mean, have 5 %, by strengths (f,) of any unit.
+    """Mask of lines of which no near line, nor rest, has 5 %.
+
+    Parameters
+    ----------
+    frequencies : (f,) float, Hz
+    strengths : (f,) float, of any unit
+    least : Hz, below which lines are near each other
+
+    Returns
+    -------
+    (f,) bool
     """
     away = np.abs(frequencies[:, None] - frequencies)
     near, alike = away < least, away <= ALIKE * least
@@ -395,8 +423,21 @@ def hidden(
     *,
     settle: float = SETTLE,
 ) -> Mask:
-    """Mask (f,) of lines of which more than 5 %, or of a fiftieth of the strongest if that is more,
-    are likely to be side lobes of those that are not fitted, whose amplitudes are `rest` (f,).
+    """Mask of lines of which more than 5 %, or of a fiftieth of the strongest if that is more, are
+    likely to be side lobes of those that are not fitted.
+
+    Parameters
+    ----------
+    response : Response
+    frequencies : (f,) float, Hz
+    strengths : (f,) float, amplitudes of the lines
+    rest : (f,) float, in the same unit, amplitudes that are not fitted
+    fitted : (f,) bool
+    settle : fraction of the response that is left out at its start
+
+    Returns
+    -------
+    (f,) bool
     """
     least = resolution(response, settle=settle)
     distinct, _ = _distinct(frequencies[fitted], least)
@@ -415,8 +456,21 @@ def _kaiser_transform(x: Floats, beta: float) -> Floats:
 def fit_lines(
     response: Response, frequencies: ArrayLike, *, settle: float = SETTLE
 ) -> tuple[Complex, Floats]:
-    """Phasors (f, p), as `phasors` has them, and the remainder (t, p) of the whole response without
-    these lines and the mean.
+    """Phasors and remainder of a response.
+
+    Parameters
+    ----------
+    response, frequencies, settle : as for `phasors`
+
+    Returns
+    -------
+    complex amplitudes (f, p), and the remainder (t, p) of the whole response without these lines
+    and the mean, in its unit
+
+    Raises
+    ------
+    ValueError
+        If a frequency is not below half the sampling rate, or the samples are too few.
     """
     t, x = response.times, response.values
     basis, weighted, inverse, which = _weighted_waves(t, frequencies, settle)
@@ -430,6 +484,11 @@ def line_rows(
     times: Floats, frequencies: ArrayLike, *, settle: float = SETTLE
 ) -> tuple[Floats, Floats, NDArray[np.intp]]:
     """Rows of the least squares of `fit_lines`, from which the errors of lines follow.
+
+    Parameters
+    ----------
+    times : (t,) float, s, equally spaced
+    frequencies, settle : as for `phasors`
 
     Returns
     -------

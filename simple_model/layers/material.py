@@ -308,8 +308,23 @@ def orthotropic(
     *, density: float, young_x: float, young_y: float, poisson_xy: float,
     shear_xy: float | None = None, **losses: Any,
 ) -> Material:  # fmt: skip
-    """Material of a sheet by its density in kg/m3 and the moduli of `Orthotropy`, whose isotropic
-    mean it has; its losses, as of `Material`, are the same in all directions.
+    """Material of a sheet by its moduli along x and y; its losses, `viscosity`, `loss_factor` and
+    `prony` as of `Material`, are the same in all directions.
+
+    Parameters
+    ----------
+    density : float, kg/m3
+    young_x, young_y, poisson_xy, shear_xy : as of `Orthotropy`
+
+    Returns
+    -------
+    Material
+        Whose shear modulus and Poisson's ratio are those of the isotropic mean.
+
+    Raises
+    ------
+    ValueError
+        As `Orthotropy` and `Material` do.
     """
     along = Orthotropy(young_x=young_x, young_y=young_y, poisson_xy=poisson_xy, shear_xy=shear_xy)
     return Material(
@@ -319,8 +334,23 @@ def orthotropic(
 
 
 def of_law(*, density: float, poisson: float, law: Any) -> Material:
-    """Material by a modulus law, one of `MODULUS_LAWS` or a `ModulusTable`, whose modulus at rest
-    it has.
+    """Material by a modulus law.
+
+    Parameters
+    ----------
+    density : float, kg/m3
+    poisson : float
+    law : `FractionalKelvinVoigt`, `FractionalZener` or `ModulusTable`
+
+    Returns
+    -------
+    Material
+        Whose modulus at rest is that of the law.
+
+    Raises
+    ------
+    ValueError
+        As `Material` does.
     """
     return Material(density=density, shear_modulus=law.shear_modulus, poisson=poisson, law=law)
 
@@ -328,8 +358,24 @@ def of_law(*, density: float, poisson: float, law: Any) -> Material:
 def tabulated(
     *, density: float, poisson: float, frequencies: ArrayLike, moduli: ArrayLike
 ) -> Material:
-    """Material by measured complex shear moduli (k,) in Pa at frequencies (k,) in Hz, as of
-    `ModulusTable`; the modulus at rest is that at 0 Hz or, without one, of the table's series.
+    """Material by measured complex shear moduli.
+
+    Parameters
+    ----------
+    density : float, kg/m3
+    poisson : float
+    frequencies : (k,) float, Hz, ascending; the first may be 0
+    moduli : (k,) complex, Pa, at each frequency
+
+    Returns
+    -------
+    Material
+        Whose modulus at rest is that at 0 Hz or, without one, that of the table's Prony series.
+
+    Raises
+    ------
+    ValueError
+        As `ModulusTable` does.
     """
     f, mu = np.asarray(frequencies, np.float64), np.asarray(moduli, np.complex128)
     table = ModulusTable(frequencies=tuple(f.tolist()), moduli=tuple(mu.tolist()))

@@ -64,7 +64,16 @@ def named_lines(
     most: int = MOST,
     candidates: Iterable[str] = (),
 ) -> dict[str, float]:
-    """Frequencies in Hz by name of the lines of a load, as `line_names` has them."""
+    """Names and frequencies of the lines of a load.
+
+    Parameters
+    ----------
+    pressure, threshold, most, candidates : as for `line_names`
+
+    Returns
+    -------
+    frequencies in Hz by name
+    """
     found = line_names(pressure, threshold, most=most, candidates=candidates)
     return dict(zip(found.names, found.frequencies.tolist(), strict=True))
 
