@@ -76,12 +76,7 @@ def _meant_for(scene: "Scene") -> list[Model]:
 
 def default_model(scene: "Scene") -> str:
     """The model of a scene that is computed unless another is cheaper: `fem`, or the first that
-    takes the scene.
-
-    Raises
-    ------
-    Refused
-        If no model takes it.
+    takes the scene. Raises `Refused` if none does.
     """
     if found := takers(scene):
         return found[0]

@@ -131,11 +131,7 @@ def _with_loss(scene: Scene) -> Scene:
 
 def field_read(scene: Scene, depth: float) -> Field:
     """Field of the quantity that a scene reads, at a depth in metre of its laterally infinite body.
-
-    Raises
-    ------
-    ValueError
-        If the body has no wavenumber integral, or no such depth.
+    Raises a ValueError if that has no wavenumber integral, or no such depth.
     """
     body, asked = scene.body, scene.reading.asked
     if body.of_kind.is_layer:

@@ -114,10 +114,6 @@ def prepare(
     reading : what the probes read; with symmetry, of normal motion alone
     load : what pushes, with its gravity; with symmetry, a pressure
     discretise : as in `bodies.build.build`
-
-    Returns
-    -------
-    `Prepared`
     """
     clock, body = Clock(), relaxing(body, SERIES_ERROR * tolerance)
     symmetry = modelled_axes(body, probes, symmetry, reading, load)
@@ -241,10 +237,6 @@ def answer(
     scene : Scene
     progress : called with the name of the phase and the fraction done
     times : (t,) float, s, equally spaced from 0; `sample_times` if not given
-
-    Returns
-    -------
-    Response, of what the reduced body's probes read
 
     Raises
     ------

@@ -183,22 +183,8 @@ def _by_elements(
 
 
 def chosen_model(scene: Scene, tolerance: float = 0.05, grid: Grid | None = None) -> str:
-    """Name of the model that a plan takes: the cheapest within the tolerance.
-
-    Parameters
-    ----------
-    scene : Scene
-    tolerance : float, relative error that may be made
-    grid : as of `sample_grid`, that of the scene if not given
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    ValueError
-        If no model takes the scene.
+    """Name of the model that a plan takes: the cheapest within the tolerance, for times as of
+    `sample_grid`, those of the scene if not given. Raises a ValueError if no model takes the scene.
     """
     if not scene.body.of_kind.discretise:
         return SAME_LOAD.name
