@@ -53,7 +53,7 @@ def test_nodes_of_a_stretched_palm_are_on_the_surface_of_each_thickness():
 
 def test_a_palm_is_not_stretched_to_what_it_does_not_reach():
     mesh = mapped_palm(FLAT, *grid(FLAT, 5e-3))
-    with pytest.raises(MeshError, match="take a narrower range of thicknesses"):
+    with pytest.raises(MeshError, match="narrower range"):
         stretched_palm(mesh, FLAT, replace(FLAT, thickness=0.4))
     thin = replace(PALM, relief=replace(PALM.relief, edge_radius=1e-3))
     with pytest.raises(ValueError, match="give all lengths of .body.relief."):
@@ -61,7 +61,7 @@ def test_a_palm_is_not_stretched_to_what_it_does_not_reach():
     given = {name: value for name, value in vars(thin.palm).items() if name in vars(thin.relief)}
     thin = replace(thin, relief=Relief(**given))
     free = free_keys(thin, {KEY: (5.0, 60.0)})
-    with pytest.raises(ValueError, match="narrow the range of its thickness"):
+    with pytest.raises(ValueError, match="narrow"):
         parametric._range(thin, free, 5e-3)
 
 
