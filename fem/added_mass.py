@@ -96,18 +96,12 @@ def near_field(
     spacing: tuple[float, float],
     mirrored: Sequence[bool] = (False, False),
 ) -> Callable[[Floats], Floats]:
-    """Near-field integral int w(y) / |x - y| dA of fields at the nodes of a grid.
+    """Near-field integral int w(y) / |x - y| dA of fields (k, ny, nx) at the nodes of a grid: a
+    function of them, to the same shape in metre times their unit.
 
-    Parameters
-    ----------
-    shape : numbers (ny, nx) of nodes
-    spacing : metre, along y and x
-    mirrored : whether the images in the first line of nodes along y and along x count as well; what
-        lies on that line counts with its image
-
-    Returns
-    -------
-    function of fields (k, ny, nx), to (k, ny, nx) in metre times their unit
+    `shape` is (ny, nx) and `spacing` in metre along y and x. `mirrored` tells whether the images in
+    the first line of nodes along y and along x count as well; what lies on that line counts with
+    its image.
     """
     whole = [2 * n - 1 if image else n for n, image in zip(shape, mirrored, strict=True)]
     padded = [fft.next_fast_len(2 * n - 1, real=True) for n in whole]
@@ -128,17 +122,9 @@ def near_field(
 
 
 def inverse_distance(x: Floats, y: Floats, size: tuple[float, float]) -> Floats:
-    """Integral of 1/r over rectangles, x asinh(y/x) + y asinh(x/y) between their corners: the
-    potential of a charged plate (Durand, Electrostatique, vol. 1 (1964)).
-
-    Parameters
-    ----------
-    x, y : (...) float, metre, middles of the rectangles
-    size : metre, along x and y
-
-    Returns
-    -------
-    (...) float, metre
+    """Integral (...) in metre of 1/r over rectangles of one size (x, y) about their middles x, y
+    (...), x asinh(y/x) + y asinh(x/y) between their corners: the potential of a charged plate
+    (Durand, Electrostatique, vol. 1 (1964)).
     """
 
     def corner(x: Floats, y: Floats) -> Floats:

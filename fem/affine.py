@@ -197,17 +197,8 @@ def weights(terms: Terms, solids: Solids, frequencies: ArrayLike) -> Complex:
 
 
 def project(affine: AffineOperators, basis: Floats, before: Floats) -> Floats:
-    """Matrices (q, m, m) of Galerkin's method in a basis.
-
-    Parameters
-    ----------
-    affine : AffineOperators, of q matrices
-    basis : (n_free, m) float
-    before : (q, k, k) float, those of its first k vectors
-
-    Returns
-    -------
-    (q, m, m) float
+    """Matrices (q, m, m) of Galerkin's method in a basis (n_free, m), of which those (q, k, k) of
+    the first k vectors are known.
     """
     k, m = before.shape[1], basis.shape[1]
     found = np.empty((len(affine.parts), m, m))

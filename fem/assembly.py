@@ -282,18 +282,9 @@ def elements_of(mesh: TetMesh, chosen: Bools | Ints) -> TetMesh:
 
 
 def element_stiffness(mesh: TetMesh, mu: Floats, lam: Floats) -> Iterator[tuple[slice, Floats]]:
-    """Element stiffness blocks, some elements at a time.
-
-    Parameters
-    ----------
-    mesh : TetMesh, of e elements
-    mu, lam : (e,) float, Pa, Lame's parameters
-
-    Yields
-    ------
-    slice of the elements
-    blocks : (6, e, a, b) float, N/m, for the components (i, j) in UPPER; those below the diagonal
-        are these, transposed
+    """Element stiffness blocks (6, e, a, b) in N/m for the components (i, j) in UPPER, of Lame's
+    parameters mu and lam (e,) in Pa, some elements at a time, with their slice. Those below the
+    diagonal are these, transposed.
     """
 
     def elastic(slab: slice, G: Floats) -> Floats:

@@ -68,19 +68,9 @@ def dashpots(
     region: Ints,
     share: Floats | None = None,
 ) -> sparse.csr_array:
-    """Lysmer-Kuhlemeyer damping matrix of absorbing facets.
-
-    Parameters
-    ----------
-    mesh : TetMesh
-    nodes : (e, a) int, of the facets
-    materials : list of Material
-    region : (elements,) int, index of each element's material
-    share : (e q,) float, fraction of the damping at each quadrature point; 1 if not given
-
-    Returns
-    -------
-    (3 n, 3 n) sparse, N s/m
+    """Lysmer-Kuhlemeyer damping (3 n, 3 n) in N s/m of absorbing facets (e, a), by the materials
+    and the index of each element's; `share` (e q,) is the fraction of it at each quadrature
+    point.
     """
     if share is not None:
         nodes, share = _where(nodes, share)

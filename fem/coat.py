@@ -11,24 +11,18 @@ facet, its stiffness is
     A + B T + (B T)^T + T^T D T,    A, B, D = int (1, z, z^2) K(z) dz,
 
 the laminate stiffnesses of classical theory (Reddy, Mechanics of Laminated Composite Plates and
-Shells (2004), chapter 3). The volume is meshed up to the surface with its own material. Of that the
-moduli and the density are subtracted in K(z): what is left of it carries the normal stress and
-thins as the coat does, which is an effective boundary condition of first order in the thickness
-(Bovik, J Appl Mech 61:162 (1994)), with part of the second. Only the shear of the material replaced
-is too much, and that matters where a coat is a hundred times as stiff. Bending pays: without T a
-palm slab under 1 mm of 300 kPa has errors of 2.4 to 8.6 %, and under 0.5 mm of 4 MPa on 40 kPa of
-6 to 12 %, of which it leaves a third to a half (wavenumber integrals, 0 to 400 Hz).
+Shells (2004), chapter 3). The volume is meshed up to the surface with its own material, whose
+moduli and density are subtracted in K(z). The rest of it carries the normal stress: an effective
+boundary condition of first order in the thickness (Bovik, J Appl Mech 61:162 (1994)).
 
-Displacement is continuous between facets and its slope is not. The turn [d] of one facet against
-the next, about their edge, is bound by the interior penalty method (Engel et al., Comput Methods
-Appl Mech Eng 191:3669 (2002); Brenner and Sung, J Sci Comput 22:83 (2005)),
+The slope is not continuous between facets. The turn [d] of one facet against the next, about their
+edge, is bound by the interior penalty method (Engel et al., Comput Methods Appl Mech Eng 191:3669
+(2002); Brenner and Sung, J Sci Comput 22:83 (2005)),
 
     - int {m} [d] ds - (int {m} [d] ds)^T + int a [d] [d] ds,    m = n . int z s dz . n,
 
 of the bending moment m across the edge, with its normal n in the surface, the mean {} of both
-sides, and a penalty a. It couples facets that have an edge in common: averages of the slopes around
-nodes, which are as accurate, couple two to three rings of facets, and the factor of a palm has
-44 to 50 % more entries than without a coat instead of 20 %. Rotary inertia is left out.
+sides, and a penalty a. Rotary inertia is left out.
 """
 
 from __future__ import annotations
@@ -131,23 +125,9 @@ class Edges:
 
 
 def surface_of(mesh: TetMesh, coat: Coat, fixed: Bools) -> Surface:
-    """Surface of a coat, whose normals do not turn at a border that is fixed in the direction
-    across it.
-
-    Parameters
-    ----------
-    mesh : TetMesh, with 10 nodes to an element
-    coat : Coat
-    fixed : (3 n,) bool, dofs of the mesh
-
-    Returns
-    -------
-    Surface
-
-    Raises
-    ------
-    ValueError
-        If elements are linear: their facets are flat and stay so.
+    """Surface of a coat on ten-node tetrahedra, whose normals do not turn at a border that is fixed
+    in the direction across it, by the fixed dofs (3 n,) of the mesh. Linear facets, which stay
+    flat, raise a ValueError.
     """
     of_mesh = facet_set(mesh, coat.facets)
     if of_mesh.shape[1] != QUADRATIC:
@@ -214,19 +194,9 @@ def _edges(facets: Ints, points: Floats, held: Bools) -> Edges:
 
 
 def coat_stiffness(surface: Surface, coat: Coat, mu: Floats, lam: Floats) -> sparse.csr_array:
-    """Stiffness (3 n, 3 n) in N/m of a coat, A + B T + (B T)^T + T^T D T of each facet and what
-    binds facets at their edges.
-
-    Parameters
-    ----------
-    surface : Surface of n nodes
-    coat : Coat
-    mu, lam : (layers, e) float, Pa, Lame's parameters of each layer in each facet, of plane stress,
-        less those of the material that it replaces
-
-    Returns
-    -------
-    sparse
+    """Stiffness (3 n, 3 n) in N/m of a coat on a surface of n nodes, of each facet and of its
+    edges, by Lame's parameters (layers, e) in Pa, of plane stress, less those of the material
+    that it replaces.
     """
     T, local = surface.turn, np.zeros_like(surface.turn)
     for z, weight, layer in zip(*coat.stations, strict=True):
@@ -290,20 +260,13 @@ def _moments(surface: Surface, coat: Coat, mu: Floats, lam: Floats) -> tuple[Flo
 
 
 def membrane_stiffness(points: Floats, mu: Floats, lam: Floats) -> Floats:
-    """Stiffness of curved membranes per thickness, against strain in their tangent planes.
+    """Stiffness (e, 3 a, 3 a) in Pa, N/m per thickness, of curved membranes with nodes at points
+    (e, a, 3) in metre, against strain in their tangent planes; Lame's parameters (e,) in Pa of
+    plane stress.
 
-    K_ai,bj = int lam A_ai A_bj + mu (A_aj A_bi + G_ka G_kb F_ki F_kj) dA,  A_ai = G_ka F_ki,
-    with an orthonormal tangent frame F and the slopes G along it: the tangent of
-    `finite_strain` at rest.
+        K_ai,bj = int lam A_ai A_bj + mu (A_aj A_bi + G_ka G_kb F_ki F_kj) dA,  A_ai = G_ka F_ki
 
-    Parameters
-    ----------
-    points : (e, a, 3) float, metre, of the nodes of each facet
-    mu, lam : (e,) float, Pa, Lame's parameters, of plane stress
-
-    Returns
-    -------
-    (e, 3 a, 3 a) float, Pa: N/m per metre of thickness
+    with an orthonormal tangent frame F and the slopes G along it.
     """
     barycentric, weights = triangle_rule()
     derivatives = shape_derivatives(barycentric, points.shape[1])
@@ -322,18 +285,8 @@ def membrane_stiffness(points: Floats, mu: Floats, lam: Floats) -> Floats:
 
 
 def coat_mass(surface: Surface, coat: Coat, density: Floats) -> sparse.csr_array:
-    """Mass (3 n, 3 n) in kg of a coat: int rho N_a N_b dA dz.
-
-    Parameters
-    ----------
-    surface : Surface of n nodes
-    coat : Coat
-    density : (layers, e) float, kg/m3, of each layer in each facet, less that of the material that
-        it replaces
-
-    Returns
-    -------
-    sparse
+    """Mass (3 n, 3 n) in kg of a coat, int rho N_a N_b dA dz, by the density (layers, e) of each
+    layer in each facet, less that of the material that it replaces.
     """
     facets = surface.facets
     N = shape_functions(triangle_rule()[0], facets.shape[1])
@@ -352,19 +305,8 @@ def coat_operators(
     region: Ints,
     fixed: Bools,
 ) -> Matrices:
-    """Contribution of a coat to K, C, M and the branches of a body, on all dofs of its mesh.
-
-    Parameters
-    ----------
-    mesh : TetMesh
-    coat : Coat
-    materials : of the mesh
-    region : (m,) int, index of each element's material
-    fixed : (3 n,) bool, dofs of the mesh
-
-    Returns
-    -------
-    K in N/m, C in N s/m, M in kg, and branches
+    """Contribution of a coat to K, C, M and the branches of a body of materials, by the index (m,)
+    of each element's, on all dofs of its mesh, of which some (3 n,) are fixed.
     """
     surface, layers = surface_of(mesh, coat, fixed), len(coat.materials)
     behind = region[owners(mesh, facet_set(mesh, coat.facets))]

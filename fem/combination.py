@@ -61,17 +61,8 @@ class Laws:
         self, factors: Sequence[float], acted_on: Sequence[Floats], z: Floats
     ) -> tuple[Floats, Floats, list[Floats]]:
         """Forces C y + sum_j K_j s_j + M z as A x + M m + sum_j rest_j r_j, which takes no product
-        with K.
-
-        Parameters
-        ----------
-        factors : as of `dynamic_stiffness`
-        acted_on : y and each s_j (r, k), vectors or their coordinates
-        z : (r, k)
-
-        Returns
-        -------
-        x, m and the r_j, (r, k) each
+        with K: x, m and the r_j, by the factors of `dynamic_stiffness`, y and each s_j, and z,
+        of one shape.
         """
         each = zip(self.parts, acted_on, strict=True)
         x = sum((part.stiffness * v for part, v in each), np.zeros_like(z))
@@ -111,17 +102,8 @@ def laws_of(K: Any, C: Any, branches: Sequence[Branch], known: Laws | None) -> L
 def with_added(
     laws: Laws, added: tuple[Any, Any, Sequence[Any]], matrices: tuple[Any, ...]
 ) -> Laws:
-    """Laws of a body to which few entries are added, such as those of a coat.
-
-    Parameters
-    ----------
-    laws : Laws of the body
-    added : sparse, what is added to K, to C and to each branch; beyond the body's own, new ones
-    matrices : K, C and K_j with them
-
-    Returns
-    -------
-    Laws
+    """Laws of a body with few entries added to K, to C and to each branch, such as those of a coat;
+    beyond the body's own branches, new ones. `matrices` are K, C and K_j with them.
     """
     K, C, further = added
     own = (*laws.parts, *(Combination() for _ in further[len(laws.branches) :]))
@@ -143,18 +125,9 @@ def with_added(
 def proportional(
     m: Material, K: Any, springs: Any, absorbing: Any
 ) -> tuple[Any, tuple[Branch, ...], Laws | None]:
-    """C and the branches of a body of one material, by their laws.
-
-    Parameters
-    ----------
-    m : Material, without a modulus law of its own or a loss factor
-    K : (n, n) sparse, stiffness
-    springs, absorbing : (n, n) sparse, what K has beside the stiffness of the material, and C
-        beside its damping
-
-    Returns
-    -------
-    C, branches and laws
+    """C, branches and laws of a body of one material, without a modulus law of its own or a loss
+    factor, by its K (n, n); `springs` are what K has beside the stiffness of the material, and
+    `absorbing` what C has beside its damping.
     """
     shares: dict[float, float] = {}
     for term in m.prony:

@@ -91,19 +91,8 @@ def with_losses(
     free: Ints,
     lost: Callable[[State, State], EnergyBalance],
 ) -> Iterator[tuple[State, EnergyBalance]]:
-    """States of any body, each with the energy balance since the first.
-
-    Parameters
-    ----------
-    states : of any time integration
-    force : time in s -> nodal forces (3 n,) in N, the ones that drive the states
-    free : (n_free,) int, free degrees of freedom
-    lost : two successive states -> the losses between them, J
-
-    Yields
-    ------
-    state : State
-    balance : EnergyBalance, J
+    """States of any body, each with the energy balance in J since the first, under nodal forces (3
+    n,) of a time; `lost` are the losses between two successive states.
     """
     before, spent = next(states), EnergyBalance()
     f = force(before.time)[free]

@@ -249,12 +249,8 @@ def _with_orthotropy(part: Part, materials: list[Material], region: Ints) -> Par
 
 
 def membrane_part(mesh: TetMesh, membrane: Membrane) -> Part:
-    """A membrane's triangles; lam in plane stress is 2 lam mu / (lam + 2 mu).
-
-    Raises
-    ------
-    MeshError
-        If its triangles do not lie in one horizontal plane, seen anticlockwise from above.
+    """A membrane's triangles, which must lie in one horizontal plane, seen anticlockwise from
+    above, or raise a MeshError; lam in plane stress is 2 lam mu / (lam + 2 mu).
     """
     nodes, m = membrane.triangles, membrane.material.without_loss_factor()
     corners = mesh.points[nodes[:, :3]]
@@ -282,32 +278,15 @@ def internal_force(part: Part, u: Floats) -> Floats:
 
 
 def stress_force(part: Part, u: Floats, strain: Floats) -> Floats:
-    """Nodal forces of the stress of a strain.
-
-    Parameters
-    ----------
-    part : Part
-    u : (n, 3) float, metre, displacement
-    strain : (e, q, k, l) float
-
-    Returns
-    -------
-    (n, 3) float, N
+    """Nodal forces (n, 3) in N of the stress of a strain (e, q, k, l), at a displacement u (n, 3)
+    in metre.
     """
     return spread_stress(part, stress(part, strain) @ deformation(part, u)[0])
 
 
 def rate_force(part: Part, u: Floats, v: Floats) -> Floats:
-    """Rate of nodal forces: those of the stress of the rate of E.
-
-    Parameters
-    ----------
-    part : Part, elements of one kind
-    u, v : (n, 3) float, metre and m/s, displacement and velocity
-
-    Returns
-    -------
-    (n, 3) float, N/s
+    """Rate (n, 3) in N/s of nodal forces, those of the stress of the rate of E, at a displacement u
+    and a velocity v (n, 3).
     """
     F = deformation(part, u)[0]
     rate = F @ (part.D @ v).reshape(F.shape).swapaxes(2, 3)
@@ -377,17 +356,8 @@ def tangent(part: Part, u: Floats) -> sparse.bsr_array:
 
 
 def tangent_blocks(part: Part, slab: slice, F: Floats, S: Floats) -> Floats:
-    """Element blocks of the tangent.
-
-    Parameters
-    ----------
-    part : Part
-    slab : its elements
-    F, S : (e, q, k, i) and (e, q, k, l) float, their deformation gradient, and stress in Pa
-
-    Returns
-    -------
-    (6, e, a, b) float, N/m
+    """Element blocks (6, e, a, b) in N/m of the tangent of a slab of elements, by their deformation
+    gradient F (e, q, k, i) and stress S (e, q, k, l).
     """
     V, G = part.volume[slab, :, None, None], part.G[slab]
     G_transposed = G.swapaxes(2, 3)

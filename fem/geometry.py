@@ -28,24 +28,9 @@ def shape_nodes(mesh: TetMesh) -> Floats:
 
 
 def gradients(nodes: Floats, n_nodes: int, degree: int, first: int) -> tuple[Floats, Floats]:
-    """Shape gradients and quadrature volumes of tetrahedra.
-
-    Parameters
-    ----------
-    nodes : (e, a, i) float, metre, that give the elements their shape
-    n_nodes : number of shape functions, 4 or 10
-    degree : of the quadrature
-    first : number of the first element, for messages
-
-    Returns
-    -------
-    gradients : (e, q, i, a) float, 1/m
-    volumes : (e, q) float, m3
-
-    Raises
-    ------
-    MeshError
-        If an element is inverted.
+    """Shape gradients (e, q, i, a) in 1/m and quadrature volumes (e, q) in m3 of tetrahedra with
+    nodes (e, a, i), by the number of shape functions and the degree of the quadrature. `first`
+    numbers the first element in the MeshError of an inverted one.
     """
     derivatives = shape_derivatives(tetrahedron_rule(degree)[0], n_nodes)
     cofactors, determinants, volumes = jacobians(nodes, degree, first)
@@ -56,22 +41,13 @@ def gradients(nodes: Floats, n_nodes: int, degree: int, first: int) -> tuple[Flo
 def gradient_integrals(
     mesh: TetMesh, coefficients: Callable[[slice, Floats], Floats]
 ) -> Iterator[tuple[slice, Floats]]:
-    """Element matrices int c_kl N_a,k N_b,l dV, some elements at a time.
+    """Element matrices (m, e, a, b) of int c_kl N_a,k N_b,l dV, some elements at a time, with their
+    slice.
 
-    Products of derivatives along the edges of the reference element are integrated once, so that
-    what is left for each element is a product with the map to it.
-
-    Parameters
-    ----------
-    mesh : TetMesh, of e elements
-    coefficients : slice of the elements, and G (k, l, e, x) -> c_kl G_kl (m, e, x) for each of m
-        matrices. x numbers what is the same in all elements: two edges, at each quadrature point
-        of curved elements.
-
-    Yields
-    ------
-    slice of the elements
-    matrices : (m, e, a, b)
+    Products of derivatives along the edges of the reference element are integrated once.
+    `coefficients` are a function of the slice and of G (k, l, e, x) to c_kl G_kl (m, e, x) for each
+    of m matrices; x numbers what is the same in all elements: two edges, at each quadrature point
+    of curved elements.
     """
     n_nodes, shapes = mesh.tets.shape[1], shape_nodes(mesh)
     barycentric, weights = tetrahedron_rule(2)
@@ -91,26 +67,10 @@ def gradient_integrals(
 
 
 def jacobians(nodes: Floats, degree: int, first: int) -> tuple[Floats, Floats, Floats]:
-    """Cofactors and determinants of the map from the reference element.
-
-    Parameters
-    ----------
-    nodes : (e, a, i) float, metre; four nodes span a straight element
-    degree : of the quadrature
-    first : number of the first element, for messages
-
-    Returns
-    -------
-    cofactors : (e, q, d, i) float, m2
-    determinants : (e, q) float, m3
-    volumes : (e, q) float, m3, of the quadrature points
-
-    q is 1 for the first two if elements are straight.
-
-    Raises
-    ------
-    MeshError
-        If an element is inverted.
+    """Cofactors (e, q, d, i) in m2 and determinants (e, q) in m3 of the map from the reference
+    element to those with nodes (e, a, i), and volumes (e, q) of the quadrature points. q is 1
+    for the first two if elements are straight, with four nodes. `first` numbers the first
+    element in the MeshError of an inverted one.
     """
     barycentric, weights = tetrahedron_rule(degree)
     at = barycentric[:1] if nodes.shape[1] == 4 else barycentric

@@ -19,22 +19,8 @@ from fem.typing import Complex, Floats
 
 
 def dynamic_stiffness(K: Any, C: Any, M: Any, branches: Sequence[Branch], s: Any) -> Any:
-    """Dynamic stiffness K + s C + s^2 M and that of Maxwell branches.
-
-    Parameters
-    ----------
-    K, C, M : (n, n), sparse or dense, N/m, N s/m, kg
-    branches : of (n, n) each
-    s : complex frequency in rad/s; of a shape (f, 1, 1) for dense matrices
-
-    Returns
-    -------
-    (n, n) or (f, n, n), N/m
-
-    Raises
-    ------
-    ValueError
-        If the matrices are of different sizes.
+    """Dynamic stiffness K + s C + s^2 M in N/m and that of Maxwell branches, at a complex frequency
+    s in rad/s; of a shape (f, 1, 1) for dense matrices, of (f, n, n).
     """
     return K + s * C + s**2 * M + relaxing_stiffness(branches, s)
 

@@ -71,22 +71,12 @@ def factorise(A: sparse.csr_array, *, backend: str = "auto") -> Factor:
 def factoriser(
     indices: Index, indptr: Index, *, backend: str = "auto"
 ) -> Callable[[Array], Factor]:
-    """Factorise complex symmetric matrices of one sparsity pattern, which PARDISO analyses once.
+    """Function that factorises complex symmetric matrices of one sparsity pattern, which PARDISO
+    analyses once, by the values (nnz,) of their upper triangles, which it may scale. A factor
+    can be solved with until the next one is made.
 
-    Parameters
-    ----------
-    indices, indptr : columns, in rising order, and starts of the rows of upper triangles
-    backend : as for `factorise`
-
-    Returns
-    -------
-    function of the values (nnz,) of an upper triangle, which it may scale: the factor of the
-    matrix, that can be solved with until the next one is made
-
-    Raises
-    ------
-    ValueError
-        As `factorise` does.
+    `indices` are columns, in rising order, and `indptr` starts of the rows of upper triangles.
+    Raises as `factorise` does.
     """
     if backend in ("auto", "pardiso") and mkl() is not None:
         return _Lines(indices, indptr)
@@ -144,9 +134,9 @@ def _factorised(matrix: Pardiso, values: Array) -> None:
 class _Lines:
     """Factors of complex symmetric matrices of one pattern, by PARDISO.
 
-    They are in single precision, refined in double: of a slab of 34,000 dofs a factor with one
-    solution takes 1.0 s instead of 1.6 and half of the memory. Where that does not converge, as it
-    does not for thin sheets, the matrix and all later ones are factorised in double precision.
+    They are in single precision, refined in double, which takes half of the memory and two thirds
+    of the time. Where that does not converge, as it does not for thin sheets, the matrix and all
+    later ones are factorised in double precision.
     """
 
     def __init__(self, indices: Index, indptr: Index) -> None:
@@ -194,11 +184,7 @@ def _refined(upper: sparse.csr_array, solve: Callable[[Array], Array], b: Array)
 
 
 def _superlu(A: sparse.csr_array) -> Callable[[Array], Array]:
-    """SuperLU without pivoting, ordered by METIS, or by minimum degree where pymetis is missing.
-
-    The factor by minimum degree has, over that by METIS, 0.93 times the entries for a sheet of
-    93,000 dofs, 1.07 for a palm of 31,000, 1.26 and 1.54 for slabs of 40,000 and 78,000.
-    """
+    """SuperLU without pivoting, ordered by METIS, or by minimum degree where pymetis is missing."""
     metis = find_spec("pymetis") is not None
     order = dissect(A) if metis else np.arange(A.shape[0])
     permuted = sparse.csc_array(A[order][:, order])

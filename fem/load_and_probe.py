@@ -36,17 +36,7 @@ def traction_operator(
     mesh: TetMesh, tractions: Floats, facets: str | Ints = "top"
 ) -> sparse.csr_array:
     """Load operator (3 n, k q) of tractions: nodal forces int N_a t dA in N per value at each of
-    the `facet_points`.
-
-    Parameters
-    ----------
-    mesh : TetMesh
-    tractions : (k q, 3) float, traction vector of a unit value at each point
-    facets : a facet set's name or nodes (k, a)
-
-    Returns
-    -------
-    (3 n, k q) sparse
+    the `facet_points`, of the traction vector (k q, 3) of a unit value there.
     """
     nodes = facet_set(mesh, facets)
     N, normals = facet_geometry(mesh, nodes)
@@ -180,15 +170,8 @@ def _inwards(mesh: TetMesh, nodes: Ints, N: Floats, normals: Floats) -> sparse.c
 def surface_frame(
     mesh: TetMesh, points: ArrayLike, facets: str | Ints = "top", *, patch: float = 0.0
 ) -> tuple[Floats, Floats]:
-    """Places (p, 3) in metre on a surface and unit normals (p, 3) out of the body there.
-
-    Parameters
-    ----------
-    mesh, points, facets, patch : as for `probe_operator`, with its errors
-
-    Returns
-    -------
-    places, normals
+    """Places (p, 3) in metre on a surface and unit normals (p, 3) out of the body there, with
+    parameters and errors of `probe_operator`.
     """
     nodes, N, normals = _surface_frame(mesh, points, facets, patch)
     return np.einsum("pa,pai->pi", N, mesh.points[nodes]), normals
@@ -253,17 +236,8 @@ def facet_areas(places: Floats) -> tuple[Floats, Floats]:
 
 
 def on_curved(elements: Floats, barycentric: Floats, points: Floats) -> Floats:
-    """Barycentric coordinates of points in curved tetrahedra, by Newton's method.
-
-    Parameters
-    ----------
-    elements : (p, a, 3) float, metre, nodes of the tetrahedron of each point
-    barycentric : (p, 4) float, to start from
-    points : (p, 3) float, metre
-
-    Returns
-    -------
-    (p, 4) float
+    """Barycentric coordinates (p, 4) of points (p, 3) in curved tetrahedra with nodes (p, a, 3), by
+    Newton's method from others.
     """
     for _ in range(4):
         miss, tangents = _missed(elements, barycentric, points)
@@ -273,18 +247,7 @@ def on_curved(elements: Floats, barycentric: Floats, points: Floats) -> Floats:
 
 
 def on_surface(mesh: TetMesh, points: Floats, facets: str | Ints = "top") -> Bools:
-    """Points at which `probe_operator` can read.
-
-    Parameters
-    ----------
-    mesh : TetMesh
-    points : (p, 2) float, metre
-    facets : a facet set's name or nodes (e, a)
-
-    Returns
-    -------
-    (p,) bool
-    """
+    """Mask (p,) of the points (p, 2) in metre at which `probe_operator` can read."""
     return _seen(mesh.points[facet_set(mesh, facets)], points)[0] >= 0
 
 

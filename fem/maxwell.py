@@ -69,13 +69,7 @@ Matrices = tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array, tuple[Bra
 
 
 def with_internal(branches: Sequence[Branch]) -> tuple[MaxwellBranch, ...]:
-    """Branches that each have an internal variable.
-
-    Raises
-    ------
-    ValueError
-        If one has none.
-    """
+    """The branches, which must each have an internal variable, or raise a ValueError."""
     found = tuple(branch for branch in branches if isinstance(branch, MaxwellBranch))
     if len(found) < len(branches):
         raise ValueError(NO_INTERNAL)

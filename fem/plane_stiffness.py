@@ -50,18 +50,8 @@ def directional_parts(materials: Sequence[Material]) -> dict[int, Floats]:
 def orthotropic_stiffness(
     mesh: TetMesh, pattern: SparsityPattern, added: Floats, axes: Floats
 ) -> sparse.bsr_array:
-    """Stiffness matrix of in-plane strains.
-
-    Parameters
-    ----------
-    mesh : TetMesh
-    pattern : SparsityPattern, of the elements
-    added : (3, 3) float, Pa, for the strains xx, yy and 2 xy
-    axes : (2, 3) float, unit vectors along x and y of the sheet
-
-    Returns
-    -------
-    (3 n, 3 n) sparse, N/m
+    """Stiffness (3 n, 3 n) in N/m of elements of a pattern against in-plane strain, by the
+    stiffness (3, 3) in Pa for the strains xx, yy and 2 xy along the axes (2, 3) of the sheet.
     """
     x, y = axes
     # 2 u_(x,y) = y . grad u . x + x . grad u . y
@@ -78,18 +68,8 @@ def orthotropic_stiffness(
 def tension_stiffness(
     mesh: TetMesh, pattern: SparsityPattern, tension: Tension, axes: Floats
 ) -> sparse.bsr_array:
-    """Geometric stiffness of a uniform in-plane tension on the normal displacement of a sheet.
-
-    Parameters
-    ----------
-    mesh : TetMesh, of one thickness
-    pattern : SparsityPattern, of the elements
-    tension : Tension
-    axes : (2, 3) float, unit vectors along x and y
-
-    Returns
-    -------
-    (3 n, 3 n) sparse, N/m
+    """Geometric stiffness (3 n, 3 n) in N/m of a uniform in-plane tension on the normal
+    displacement of a sheet of one thickness, with unit vectors (2, 3) along its sides.
     """
     normal = np.cross(*axes)
     stress = axes.T @ np.diag([tension.x, tension.y]) @ axes / np.ptp(mesh.points @ normal)

@@ -70,17 +70,9 @@ def _coefficients(mesh: TetMesh, cluster: Ints, q: Floats) -> sparse.bsr_array:
 
 
 def linear_functions(mesh: TetMesh, cluster: Ints, sloping: Bools) -> Floats:
-    """Orthonormal linear pressure functions over each macroelement.
-
-    Parameters
-    ----------
-    mesh : TetMesh
-    cluster : (e,) int, macroelement of each element
-    sloping : (c,) bool, where functions may slope: elsewhere the constant alone, and else 0
-
-    Returns
-    -------
-    (e, q, 4) float, m^-3/2, at the quadrature points for degree 2
+    """Orthonormal linear pressure functions (e, q, 4) in m^-3/2 over the macroelement (e,) of each
+    element, at the quadrature points for degree 2; the constant alone where those of a
+    macroelement (c,) may not slope, and else 0.
     """
     nodes = shape_nodes(mesh)
     volumes = jacobians(nodes, 2, 0)[2]

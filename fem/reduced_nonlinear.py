@@ -143,18 +143,9 @@ def _projected(A: Any, shapes: Floats) -> Floats:
 
 
 def modal_elastic(modal: Operators, H: Floats, material: Material) -> Elastic:
-    """Strain energy of a sheet in its modal coordinates z, and its derivatives.
-
-    Parameters
-    ----------
-    modal : Operators, diagonal K in 1/s2, of r modes
-    H : (k, r, r) float, geometric stiffness of each state of stress
-    material : Material, of the sheet as it stretches
-
-    Returns
-    -------
-    Elastic
-        In coordinates (r,).
+    """Strain energy of a sheet in its modal coordinates z (r,), and its derivatives, by `Operators`
+    of diagonal K in 1/s2, the geometric stiffness H (k, r, r) of each state of stress, and the
+    material of the sheet as it stretches.
     """
     squares, n = modal.K.diagonal(), len(modal.free)
     stacked, lag = H.reshape(-1, n), stress_lag(material)

@@ -104,16 +104,8 @@ def restricted(A: Any, free: Ints) -> sparse.csr_array:
 
 
 def selected(A: Any, rows: Ints, columns: Ints) -> Any:
-    """Some rows and columns of a sparse matrix.
-
-    Parameters
-    ----------
-    A : CSR matrix, or BSR matrix of which blocks are counted
-    rows, columns : (r,) and (c,) int, in rising order
-
-    Returns
-    -------
-    matrix (r, c) of the kind of A; A itself if that is all of it
+    """Some rows (r,) and columns (c,), in rising order, of a CSR matrix, or of a BSR matrix of
+    which blocks are counted; the matrix itself if that is all of it.
     """
     shape = np.array(A.shape) // getattr(A, "blocksize", 1)
     if (len(rows), len(columns)) == tuple(shape):

@@ -205,17 +205,12 @@ def _fit(mesh: TetMesh, patches: list[Ints], used: Ints, points: Floats) -> spar
 
 
 def fitted_polynomial(x: Floats, root: Floats) -> tuple[Floats, int]:
-    """Polynomial that fits samples best, of the highest of `DEGREES` that they determine.
+    """Polynomial that fits samples best, of the highest of `DEGREES` that they determine: its
+    coefficients (n, s) of the `polynomials` by the values of the samples, the first of which is
+    the value at the point; and the degree.
 
-    Parameters
-    ----------
-    x : (s, 2 or 3) float, places of the samples about the point, in elements
-    root : (s,) float, roots of their weights in the fit
-
-    Returns
-    -------
-    coefficients (n, s) of the `polynomials`, the first of which is the value at the point, by the
-    values of the samples; and the degree
+    `x` (s, 2 or 3) are places of the samples about the point, in elements, and `root` (s,) roots of
+    their weights in the fit.
     """
     for degree in DEGREES:
         fitted = root[:, None] * polynomials(x, degree)
