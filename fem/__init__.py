@@ -46,7 +46,6 @@ from fem.load_and_probe import (
     surface_frame,
 )
 from fem.maxwell import DispersiveBranch, MaxwellBranch
-from fem.nodal_strain import SolidPart, nodal_strain, solid_parts
 from fem.plane_stiffness import Tension
 from fem.reduced import (
     Poles,
@@ -60,9 +59,12 @@ from fem.reduced import (
 from fem.reduced_nonlinear import StretchingModes, stretching_modes
 from fem.static import modes, static
 from fem.stress import (
+    SolidPart,
     materials_at,
+    nodal_strain,
     relaxation,
     relaxed,
+    solid_parts,
     strain_operator,
     stress_operator,
 )

@@ -1,24 +1,19 @@
 """Dense added-mass operator of the fluid that a flat sheet in a baffle moves with it.
 
-To bending waves much slower than sound the fluid is incompressible; it flows from where the sheet
-pushes to where the sheet recedes. In a baffle the acceleration w'' of the sheet meets, on both
-sides together, Rayleigh's integral without its delay, which is the added mass 2 rho / k of each
-wavenumber k written in space (Junger and Feit, Sound, Structures, and Their Interaction (1986),
-sections 4.6 and 5.11):
+To bending waves much slower than sound the fluid is incompressible. In a baffle the acceleration
+w'' of the sheet meets, on both sides together, Rayleigh's integral without its delay: the added
+mass 2 rho / k of each wavenumber k written in space (Junger and Feit, Sound, Structures, and Their
+Interaction (1986), sections 4.6 and 5.11),
 
     p(x) = rho/pi int w''(y) / |x - y| dA,   M_ab = rho/pi iint N_a(x) N_b(y) / |x - y| dA dA
 
 M is dense, symmetric and positive, and never formed: on a regular grid of nodes it is a convolution
-with int 1/r dA over a cell at each distance, a closed form that is finite within the cell, by an
-FFT padded with zeros. With nodes s apart its relative error is -(k s)^2 / 24.
+with int 1/r dA over a cell at each distance, by an FFT padded with zeros. With nodes s apart its
+relative error is -(k s)^2 / 24.
 
-Left out are the flow around an edge without a baffle, and radiation of sound. At wavelengths of
-sound long beside the sheet, radiation would take as much energy as a loss factor of
-
-    (rho w / pi c) (int u dA)^2 / int m u^2 dA
-
-of a mode u with a net volume displacement: 0.006 to 0.007 for such
-modes of a clamped sheet of office paper, 100 mm wide, below 300 Hz, where paper's own is 0.03.
+Left out are the flow around an edge without a baffle, and radiation of sound, which would take as
+much energy as a loss factor of 0.006 to 0.007 from modes with a net volume displacement of a
+clamped sheet of office paper, 100 mm wide, below 300 Hz.
 """
 
 from collections.abc import Callable, Sequence

@@ -3,11 +3,9 @@
     work = kinetic + elastic + dissipated + radiated
     dissipated + radiated = int v^T C v dt + sum_j int d_j^T K_j d_j dt / tau_j
 
-C contains the loss in the material as well as R, the damping of absorbing boundaries; the springs
-of generalised Maxwell branches, stretched by d_j, store elastic energy that their dashpots
-dissipate. Average acceleration satisfies this balance to round-off (Hughes, The Finite Element
-Method, 1987, chapter 9), whatever the time step, so that an imbalance is an error of the solution
-and not of the step.
+C contains the loss in the material and R, the damping of absorbing boundaries. Average acceleration
+satisfies this balance to round-off, whatever the time step (Hughes, The Finite Element Method,
+1987, chapter 9), so that an imbalance is an error of the solution and not of the step.
 """
 
 from __future__ import annotations
@@ -54,19 +52,8 @@ class EnergyBalance:
 def with_energy_balance(
     operators: Operators, states: Iterator[State], force: Callable[[float], Floats]
 ) -> Iterator[tuple[State, EnergyBalance]]:
-    """States from rest, each with the energy balance so far, at the cost of a product with C, R and
-    each Maxwell branch a step.
-
-    Parameters
-    ----------
-    operators : Operators, that the states were stepped with
-    states : of `transient`
-    force : time in s -> nodal forces (3 n,) in N, the ones that drive the states
-
-    Yields
-    ------
-    state : State
-    balance : EnergyBalance, J
+    """States of `transient` from rest, each with the energy balance so far in J, under the nodal
+    forces (3 n,) in N of a time that drive them.
     """
     C, R, free = operators.C, operators.R, operators.free
 
@@ -114,10 +101,8 @@ def stored(operators: Operators, state: State) -> float:
 
 
 def imbalance(spent: EnergyBalance, stored: float = 0.0) -> float:
-    """Relative error of the energy balance; `stored` in J since its start.
-
-    Where nothing is lost, round-off of the reactive power is no imbalance, nor is that of numbers
-    too small for their digits.
+    """Relative error of the energy balance, of which `stored` in J since its start. Round-off of
+    the reactive power is no imbalance, nor is that of numbers too small for their digits.
     """
     size = max(abs(spent.work), abs(stored) + spent.lost, ROUND_OFF * spent.exchanged)
     return abs(spent.work - stored - spent.lost) / size if size > TINY else 0.0

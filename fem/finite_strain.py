@@ -5,10 +5,9 @@
 
 The material is St. Venant-Kirchhoff: Bonet and Wood, Nonlinear Continuum Mechanics for Finite
 Element Analysis (1997), chapters 5 and 7. Rows k, l of F are directions at rest, of which a solid
-has three and a horizontal membrane two, T being the first rows of the unit matrix; the same code
-serves both. G contains shape gradients at four points of a tetrahedron and three of a triangle, as
-in the linear `assembly`, whose K is the tangent at rest. Orthotropic sheets add (Q - Q_iso) to the
-in-plane stress, and tension its forces on the normal displacement, as in `plane_stiffness`.
+has three and a horizontal membrane two; T are the first rows of the unit matrix. Gradients are at
+four points of a tetrahedron and three of a triangle. Orthotropic sheets add (Q - Q_iso) to the in-
+plane stress, and tension its forces on the normal displacement, as in `plane_stiffness`.
 """
 
 from __future__ import annotations
@@ -39,9 +38,8 @@ class Relaxing:
     """Maxwell branches at large displacement, of j relaxation `times` in s.
 
     Their springs are stretched by d (j, ...), d' = e' - d / times, of a strain e (...) =
-    `strain(u)` of any kind. `force(u, d)` (n_free,) in N is theirs together, `tangent(u, shares)`
-    (n_free, n_free) in N/m the derivative of that if d is shares (j,) of e, about, and `energy(d)`
-    (j,) what each stores, in J.
+    `strain(u)`. `force(u, d)` (n_free,) in N is theirs together, `tangent(u, shares)` in N/m its
+    derivative about d = shares (j,) of e, and `energy(d)` (j,) in J what each stores.
     """
 
     times: Floats

@@ -28,8 +28,7 @@ def dynamic_stiffness(K: Any, C: Any, M: Any, branches: Sequence[Branch], s: Any
 class LineSolver:
     """Steady state of a body at one frequency after the other, by a factorisation for each.
 
-    The dynamic stiffness at all frequencies has one sparsity pattern: it is summed as values of
-    its upper triangle, and analysed once.
+    The dynamic stiffness at all frequencies has one sparsity pattern, which is analysed once.
     """
 
     def __init__(self, operators: Operators, solver: str = "auto") -> None:

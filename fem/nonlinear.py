@@ -5,12 +5,10 @@ generalized-alpha method of `transient` with the internal force weighted between
 
     M [(1 - a_m) a' + a_m a] + (1 - a_f) [f_int(u', v') - f'] + a_f [f_int(u, v) - f] = 0
 
-with the stretches d of Maxwell branches, which follow by the trapezoidal rule, at their ends
-(Chung and Hulbert, J Appl Mech 60:371 (1993); Newton in time: Belytschko, Liu and Moran, Nonlinear
-Finite Elements for Continua and Structures (2000), chapter 6). One factorisation serves as many
-steps as Newton's method converges with it (modified Newton). Average acceleration conserves energy
-to second order in the step, not to round-off as in the linear case. Momentum is conserved to the
-tolerance that the balance of forces is solved to.
+with the stretches d of Maxwell branches at their ends, by the trapezoidal rule (Belytschko, Liu and
+Moran, Nonlinear Finite Elements for Continua and Structures (2000), chapter 6). One factorisation
+serves as many steps as Newton's method converges with it (modified Newton). Average acceleration
+conserves energy to second order in the step.
 """
 
 from collections.abc import Callable, Iterator
@@ -327,19 +325,8 @@ def total_energy(body: Elastic, state: State) -> float:
 def with_energy_balance(
     body: Elastic, states: Iterator[State], force: Callable[[float], Floats]
 ) -> Iterator[tuple[State, EnergyBalance]]:
-    """States, each with the energy balance since the first, as `fem.with_energy_balance` of a
-    linear body.
-
-    Parameters
-    ----------
-    body : Elastic
-    states : of `dynamic`
-    force : time in s -> nodal forces (3 n,) in N, the ones that drive the states
-
-    Yields
-    ------
-    state : State
-    balance : EnergyBalance, J
+    """States of `dynamic`, each with the energy balance in J since the first, under the nodal
+    forces (3 n,) in N of a time that drive them.
     """
     free = body.operators.free
 

@@ -4,11 +4,9 @@
     K_ab,ij += n_i n_j int (T_k / h) N_a,k N_b,k dV       k along the sides x and y of the sheet
 
 Plane stress relaxes the stress across the sheet with D_zz and D_z,kl alone, which are those of the
-isotropic mean: so that Q is the plane stress stiffness of the sum whatever that mean is, and the
-sum is positive where Q is. Bending stiffnesses are int Q z^2 dz, for all directions alike. The
-tension acts on the slopes of the normal displacement alone: a thicker sheet of the same bending
-stiffness is so much softer in its plane that the tension would bend it otherwise. (Reddy, Mechanics
-of Laminated Composite Plates and Shells (2004), chapters 1 and 3.)
+isotropic mean, so that Q is the plane stress stiffness of the sum. The tension acts on the slopes
+of the normal displacement alone: the meshed, thicker sheet is too soft in its plane. (Reddy,
+Mechanics of Laminated Composite Plates and Shells (2004), chapters 1 and 3.)
 """
 
 from __future__ import annotations

@@ -45,8 +45,8 @@ def dilatation_operator(mesh: TetMesh, elements: Ints) -> sparse.csr_array:
 
 
 def projected_dilatation(mesh: TetMesh, u: Floats) -> Floats:
-    """Projected dilatation (e, q, m) of displacements u (3 n, m) in metre, at the quadrature points
-    for degree 2, as `dilatation_operator` reads it.
+    """Projected dilatation (e, q, m) of displacements u (3 n, m) in metre, as `dilatation_operator`
+    reads it.
     """
     cluster, sloping = macroelements(mesh)
     q = linear_functions(mesh, cluster, sloping)

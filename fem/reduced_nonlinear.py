@@ -3,13 +3,11 @@
     w = shapes z,  M = 1,  energy = z^T K z / 2 + sum_k y_k^2 / 2,  y_k = z^T H_k z / 2
 
 The in-plane motion follows the stretching of bending, e(w, w) = grad w grad w^T / 2, quasi-
-statically, because in-plane waves are some hundred times faster. The strain that is left is
-compatible with no in-plane motion; it is expanded in self-equilibrated states of stress s_k that
-are orthonormal in energy, and H_k is the geometric stiffness that the stress s_k adds to bending.
-They are found from the finite elements: pairs of modes are enforced, the in-plane problem is
-solved, and the incompatible strains are decomposed, the most energetic states first (implicit
-condensation: Hollkamp and Gordon, J Sound Vib 318:1139 (2008); the equations are von Karman's with
-Airy's function, Thomas and Bilbao, J Sound Vib 315:569 (2008)).
+statically. The strain that is left is expanded in self-equilibrated states of stress s_k that are
+orthonormal in energy, and H_k is the geometric stiffness that s_k adds to bending. For pairs of
+modes the in-plane problem is solved, and the incompatible strains are decomposed, the most
+energetic states first (implicit condensation: Hollkamp and Gordon, J Sound Vib 318:1139 (2008); the
+equations are von Karman's with Airy's function, Thomas and Bilbao, J Sound Vib 315:569 (2008)).
 """
 
 from __future__ import annotations
@@ -194,22 +192,15 @@ def in_plane_matrices(
     *,
     solver: str = "auto",
 ) -> Floats:
-    """In-plane motion that follows bending modes z quasi-statically, as quadratic forms of z.
+    """In-plane motion that follows bending modes z quasi-statically: symmetric Q (c, m, m) of
+    outputs z^T Q z / 2.
 
     A linear output s v of the in-plane displacement v is -g f(z), with g = K^-1 s and the forces
     f(z) of the stretching e(w, w): -z^T H z / 2, with H of the states of stress that g has.
 
-    Parameters
-    ----------
-    reading : SheetReading, of the sheet with its whole membrane stiffness
-    basis : (3 n, m) float, of bending modes
-    rows : (c, 3 n) sparse, of the in-plane displacement of the middle plane
-    operators : those of the sheet, for its constraints
-    solver : of `linear_solver.factorise`
-
-    Returns
-    -------
-    (c, m, m) float, symmetric Q of the outputs z^T Q z / 2
+    `reading` is of the sheet with its whole membrane stiffness, `basis` (3 n, m) of bending modes,
+    `rows` (c, 3 n) of the in-plane displacement of the middle plane; `operators` have its
+    constraints.
     """
     part = reading.part
     fixed = np.ones(operators.n_dofs, bool)

@@ -1,14 +1,13 @@
 """Displacement and strain at points of a thin sheet, from the middle plane of its mesh.
 
-A sheet is meshed by a thicker one of the same bending stiffness, so that only its middle plane has
-the sheet's motion. By Kirchhoff's kinematics, at a height z above that plane,
+Only the middle plane of the thicker mesh of the same bending stiffness has the sheet's motion. By
+Kirchhoff's kinematics, at a height z above that plane,
 
     u_a(z) = u_a - z w,a,   E_ab(z) = (u_a,b + u_b,a + u_i,a u_i,b) / 2 - z w,ab,
 
 and E_zz = -nu / (1 - nu) (E_xx + E_yy) in plane stress, without transverse shear. E is the strain
-of Green and Lagrange. Linear bending has no in-plane motion of the middle plane: what the thicker
-mesh has of it is far too much, as its membrane is too soft. Slopes and curvatures are those
-of polynomials that fit the derivatives at the quadrature points about a point, as in `stress`.
+of Green and Lagrange. Slopes and curvatures are those of polynomials that fit the derivatives at
+the quadrature points about a point, as in `stress`.
 """
 
 from dataclasses import dataclass
@@ -19,7 +18,7 @@ from scipy import sparse
 
 from fem.elements import shape_functions, triangle_rule
 from fem.finite_strain import Membrane, Part, membrane_part
-from fem.stress import LOCAL, fitted_polynomial
+from fem.stress import fitted_polynomial
 from fem.typing import Floats, Ints
 from meshes import TetMesh
 
@@ -43,22 +42,8 @@ class SheetReading:
 
 
 def sheet_reading(mesh: TetMesh, membrane: Membrane, points: ArrayLike) -> SheetReading:
-    """Operators that read a sheet's middle plane.
-
-    Parameters
-    ----------
-    mesh : TetMesh, of the sheet
-    membrane : Membrane, in its middle plane
-    points : (p, 2) float, metre
-
-    Returns
-    -------
-    SheetReading
-
-    Raises
-    ------
-    ValueError
-        If a point is off the sheet.
+    """Operators that read the middle plane, a `Membrane`, of a meshed sheet at points (p, 2) in
+    metre. A point off the sheet raises a ValueError.
     """
     points = np.atleast_2d(np.asarray(points, np.float64))
     part = membrane_part(mesh, membrane)
@@ -87,17 +72,8 @@ def displacement_rows(reading: SheetReading, heights: Floats) -> sparse.csr_arra
 
 
 def strain_rows(reading: SheetReading, heights: Floats, poisson: float) -> sparse.csr_array:
-    """Strain operator (6 p, 3 n) in 1/m of bending.
-
-    Parameters
-    ----------
-    reading : SheetReading
-    heights : (p,) float, metre, above the middle plane
-    poisson : of the sheet
-
-    Returns
-    -------
-    (6 p, 3 n) sparse; components xx, yy, zz, xy, xz, yz fastest
+    """Strain operator (6 p, 3 n) in 1/m of bending, at heights (p,) in metre above the middle plane
+    of a sheet of some Poisson's ratio; components xx, yy, zz, xy, xz, yz fastest.
     """
     z, nothing = sparse.diags_array(heights), sparse.csr_array(reading.value.shape)
     bent = _by_point([[nothing, nothing, -(z @ part)] for part in reading.curvatures])
@@ -201,7 +177,7 @@ def _fits(
         patch = np.flatnonzero(np.isin(corners, corners[core]).any(axis=1))
         size = np.ptp(places[corners[patch]], axis=1).mean()
         away = ((samples[patch] - point) / size).reshape(-1, 2)
-        fit, _ = fitted_polynomial(away, np.exp(-LOCAL / 2 * (away**2).sum(axis=1)))
+        fit, _ = fitted_polynomial(away)
         found.append(fit[:3] / np.array([[1.0], [size], [size]]))
         columns.append((many * patch[:, None] + np.arange(many)).ravel())
         rows.append(np.full(len(columns[-1]), p))

@@ -10,11 +10,16 @@ Where a solid is nearly incompressible, div u itself oscillates from element to 
 what the stiffness acts on: the dilatation is taken from the macroelement projection and what is
 left beside it (`pressure_projection`), in the proportions that they have in K. Stress by Hooke's
 law, lam tr(e) I + 2 mu e, then has the pressure of the discrete equations.
+
+`nodal_strain` is of all nodes: polynomials about each corner node, of which a node of an edge has
+the mean of those of its two ends. Each material has its own nodes, so that those between two of
+them are doubled.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from itertools import combinations_with_replacement
 from typing import Any
 
@@ -27,15 +32,17 @@ from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradients, shape_nodes
 from fem.interior import locate
 from fem.maxwell import NO_INTERNAL
-from fem.pressure_projection import dilatation_operator
+from fem.pressure_projection import dilatation_operator, projected_dilatation
 from fem.typing import Floats, Ints
 from meshes import TetMesh
+from meshes.tetmesh import EDGES
 from simple_model.layers.material import Material
 from simple_model.layers.tensors import DIAGONAL, MEAN, TENSOR, hooke
 
 TOUCHING = 1e-6  # barycentric: an element touches a point that is so little outside it
 POINTS = 4  # quadrature points of an element, of the rule for degree 2
 LOCAL = 1.0  # weight exp(-LOCAL d^2) of a sample at d elements from the point: best of 0.7 to 5
+AT_ONCE = 100  # corner nodes, whose elements are looked at together
 DEGREES = (3, 2, 1, 0)  # of polynomials: the highest that the samples determine, twice over
 INDEPENDENT = 1e-8  # of the largest singular value
 # Symmetric gradient: e_c = sum_ij SYMMETRIC[c, i, j] u_j,i
@@ -188,30 +195,38 @@ def _fit(mesh: TetMesh, patches: list[Ints], used: Ints, points: Floats) -> spar
     """Weights (p, 4 k) of the samples in the used elements (k,): the value at each point of the
     polynomial that fits the samples in its patch best.
     """
-    nodes = mesh.points[mesh.tets[used]]
-    N = shape_functions(tetrahedron_rule(2)[0], nodes.shape[1])
-    places = np.einsum("qa,eai->eqi", N, nodes)
+    places = _sample_places(mesh, used)
     values, columns = [], []
     for patch, point in zip(patches, points, strict=True):
         chosen = np.searchsorted(used, patch)
-        size = np.ptp(mesh.points[mesh.tets[patch, :4]], axis=1).mean(axis=0)
-        away = (places[chosen] - point).reshape(-1, 3) / size
-        root = np.exp(-LOCAL / 2 * (away**2).sum(axis=1))  # of the weight
-        values.append(fitted_polynomial(away, root)[0][0])
+        away = (places[chosen] - point).reshape(-1, 3) / _size(mesh, patch)
+        values.append(fitted_polynomial(away)[0][0])
         columns.append((POINTS * chosen[:, None] + np.arange(POINTS)).ravel())
     starts = np.cumsum([0, *map(len, values)])
     shape = (len(points), POINTS * len(used))
     return sparse.csr_array((np.concatenate(values), np.concatenate(columns), starts), shape=shape)
 
 
-def fitted_polynomial(x: Floats, root: Floats) -> tuple[Floats, int]:
+def _sample_places(mesh: TetMesh, used: Ints) -> Floats:
+    """Quadrature points (k, q, 3) of some elements (k,) in metre."""
+    nodes = mesh.points[mesh.tets[used]]
+    N = shape_functions(tetrahedron_rule(2)[0], nodes.shape[1])
+    return np.asarray(np.einsum("qa,eai->eqi", N, nodes))
+
+
+def _size(mesh: TetMesh, patch: Ints) -> Floats:
+    """Mean extent (3,) of elements in metre."""
+    return np.asarray(np.ptp(mesh.points[mesh.tets[patch, :4]], axis=1).mean(axis=0))
+
+
+def fitted_polynomial(x: Floats) -> tuple[Floats, int]:
     """Polynomial that fits samples best, of the highest of `DEGREES` that they determine: its
     coefficients (n, s) of the `polynomials` by the values of the samples, the first of which is
     the value at the point; and the degree.
 
-    `x` (s, 2 or 3) are places of the samples about the point, in elements, and `root` (s,) roots of
-    their weights in the fit.
+    `x` (s, 2 or 3) are places of the samples about the point, in elements.
     """
+    root = np.exp(-LOCAL / 2 * (x**2).sum(axis=1))  # of the weights
     for degree in DEGREES:
         fitted = root[:, None] * polynomials(x, degree)
         left, sizes, right = np.linalg.svd(fitted, full_matrices=False)
@@ -228,10 +243,8 @@ def polynomials(x: Floats, degree: int) -> Floats:
     return np.column_stack([np.prod(x[:, list(power)], axis=1) for power in powers])
 
 
-def _sampled_strain(mesh: TetMesh, used: Ints, material: Material) -> sparse.csr_array:
-    """Strain (24 k, 3 n) at the quadrature points of some elements (k,) of one material, with the
-    dilatation that its stiffness acts on.
-    """
+def _strain_rows(mesh: TetMesh, used: Ints) -> sparse.csr_array:
+    """Strain (24 k, 3 n) at the quadrature points of some elements (k,), by shape functions."""
     part = elements_of(mesh, used)
     slopes, _ = gradients(shape_nodes(part), part.tets.shape[1], 2, 0)
     values = np.einsum("cij,eqia->eqcaj", SYMMETRIC, slopes)
@@ -239,12 +252,124 @@ def _sampled_strain(mesh: TetMesh, used: Ints, material: Material) -> sparse.csr
     rows = np.arange(values[..., 0, 0].size).reshape(*values.shape[:3], 1, 1)
     places = np.broadcast_to(rows, values.shape), np.broadcast_to(columns, values.shape)
     shape = (values[..., 0, 0].size, mesh.n_dofs)
-    strain = sparse.csr_array((values.ravel(), tuple(x.ravel() for x in places)), shape=shape)
+    return sparse.csr_array((values.ravel(), tuple(x.ravel() for x in places)), shape=shape)
+
+
+def _projected_share(material: Material) -> float:
+    """Share of lam that acts on the projected dilatation."""
     lam, mu = np.array(material.first_lame), np.array(material.shear_modulus)
-    if not (direct := direct_part(lam, mu)) < lam:
+    return float(1 - direct_part(lam, mu) / lam) if direct_part(lam, mu) < lam else 0.0
+
+
+def _sampled_strain(mesh: TetMesh, used: Ints, material: Material) -> sparse.csr_array:
+    """Strain (24 k, 3 n) at the quadrature points of some elements (k,) of one material, with the
+    dilatation that its stiffness acts on.
+    """
+    strain, share = _strain_rows(mesh, used), _projected_share(material)
+    if not share:
         return strain
-    share = float(1 - direct / lam)
     samples = sparse.eye_array(POINTS * len(used))
     whole = sparse.kron(samples, np.eye(6) - share * MEAN, format="csr") @ strain
     projected = dilatation_operator(mesh, used)
     return whole + sparse.kron(samples, share / 3 * DIAGONAL[:, None], format="csr") @ projected
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SolidPart:
+    """Elements of one material: `mesh` has them alone, among all its nodes; `nodes` (q,) of these
+    are theirs, and `tets` (m, 10) number them among these.
+    """
+
+    mesh: TetMesh
+    material: Material
+    nodes: Ints
+    tets: Ints
+
+
+def solid_parts(mesh: TetMesh, material: Material | Mapping[int, Material]) -> list[SolidPart]:
+    """The parts of a mesh of ten-node tetrahedra, one for each material.
+
+    Raises
+    ------
+    ValueError
+        If elements have four nodes, whose strain is constant.
+    """
+    if mesh.order == 1:
+        raise ValueError("strain is recovered from ten-node tetrahedra; mesh with order 2")
+    materials, region = by_region(mesh, material)
+    parts = []
+    for r in np.unique(region):
+        own = elements_of(mesh, region == r)
+        nodes, tets = np.unique(own.tets, return_inverse=True)
+        tets = tets.reshape(own.tets.shape)
+        parts.append(SolidPart(mesh=own, material=materials[r], nodes=nodes, tets=tets))
+    return parts
+
+
+def nodal_strain(part: SolidPart, u: Floats, wanted: Ints | None = None) -> Floats:
+    """Strain at nodes of a part of a body.
+
+    Parameters
+    ----------
+    part : SolidPart
+    u : (3 n, m) float, metre, m displacements of all nodes
+    wanted : (w,) int, which of `part.nodes`; all of them if not given
+
+    Returns
+    -------
+    (w, 6, m) float; components xx, yy, zz, xy, xz, yz of the tensor
+    """
+    nodes = part.nodes if wanted is None else part.nodes[wanted]
+    number = np.full(len(part.mesh.points), -1)
+    number[nodes] = np.arange(len(nodes))
+    at_corner, mesh, share = (
+        _read_at_corners(part.mesh, number), part.mesh, _projected_share(part.material)
+    )  # fmt: skip
+    dilatation = projected_dilatation(mesh, u) if share else None
+    found = np.zeros((len(nodes), 6, u.shape[1]))
+    corners = np.array(sorted(at_corner), np.int64)
+    for some in np.array_split(corners, -(-len(corners) // AT_ONCE)):
+        patches = _patches(mesh, some)
+        used = np.unique(np.concatenate(patches))
+        samples = (_strain_rows(mesh, used) @ u).reshape(len(used), POINTS, 6, -1)
+        if dilatation is not None:
+            trace = samples[:, :, :3].sum(axis=2)
+            samples[:, :, :3] += share / 3 * (dilatation[used] - trace)[:, :, None]
+        places = _sample_places(mesh, used)
+        for corner, patch in zip(some, patches, strict=True):
+            own, size = np.searchsorted(used, patch), _size(mesh, patch)
+            read, shares = at_corner[corner]
+            fit, degree = fitted_polynomial(
+                ((places[own] - mesh.points[corner]) / size).reshape(-1, 3)
+            )
+            values = fit @ samples[own].reshape(fit.shape[1], -1)
+            at = polynomials((mesh.points[read] - mesh.points[corner]) / size, degree)
+            found[number[read]] += (shares[:, None] * (at @ values)).reshape(-1, *found.shape[1:])
+    return found
+
+
+def _read_at_corners(mesh: TetMesh, number: Ints) -> dict[int, tuple[Ints, Floats]]:
+    """By corner node, the nodes that are wanted of its polynomial, and its share in each."""
+    middles, first = np.unique(mesh.tets[:, 4:], return_index=True)
+    ends = mesh.tets[:, EDGES].reshape(-1, 2)[first]
+    corners = np.unique(mesh.tets[:, :4])
+    owner = np.concatenate([corners, ends[:, 0], ends[:, 1]])
+    read = np.concatenate([corners, middles, middles])
+    share = np.concatenate([np.ones(len(corners)), np.full(2 * len(middles), 0.5)])
+    kept = number[read] >= 0
+    order = np.argsort(owner[kept], kind="stable")
+    owner, read, share = (array[kept][order] for array in (owner, read, share))
+    names, starts = np.unique(owner, return_index=True)
+    each = zip(np.split(read, starts[1:]), np.split(share, starts[1:]), strict=True)
+    return dict(zip(names.tolist(), each, strict=True))
+
+
+def _patches(mesh: TetMesh, corners: Ints) -> list[Ints]:
+    """Elements (k,) around each corner node, and those that share a corner with one of them."""
+    tets = mesh.tets[:, :4]
+    rows = np.repeat(np.arange(len(tets)), 4)
+    shape = len(tets), len(mesh.points)
+    incidence = sparse.csr_array((np.ones(tets.size), (rows, tets.ravel())), shape=shape)
+    around = sparse.csc_array(incidence @ (incidence.T @ incidence.tocsc()[:, corners]))
+    around.sort_indices()
+    return np.split(around.indices, around.indptr[1:-1])

@@ -1,11 +1,9 @@
-"""Generalized-alpha time integration from rest of M u'' + C u' + K u + sum_j K_j d_j = f(t),
-d_j' = u' - d_j / tau_j.
+"""Generalized-alpha time integration from rest of M u'' + C u' + K u + sum_j K_j d_j = f(t), d_j' =
+u' - d_j / tau_j.
 
-Chung and Hulbert, J Appl Mech 60:371 (1993), doi 10.1115/1.2900803. Spectral radius 1 is
-average acceleration (Newmark 1/4, 1/2), which conserves energy; 0 annihilates what the time
-step cannot resolve. Second order and unconditionally stable throughout. The internal variables d_j
-of generalised Maxwell branches are integrated by the trapezoidal rule: with average acceleration
-their dissipation is exact to round-off.
+Chung and Hulbert, J Appl Mech 60:371 (1993), doi 10.1115/1.2900803. Spectral radius 1 is average
+acceleration (Newmark 1/4, 1/2), which conserves energy; 0 annihilates what the time step cannot
+resolve. The internal variables d_j of Maxwell branches are integrated by the trapezoidal rule.
 """
 
 from __future__ import annotations

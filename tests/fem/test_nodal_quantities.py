@@ -96,7 +96,7 @@ def test_between_two_materials_strain_jumps_and_traction_does_not():
 
 
 @pytest.mark.parametrize(
-    "quantity", ["strain_zz", "stress_xx", "largest_shear_strain", "displacement_x", "acceleration"]
+    "quantity", ["stress_xx", "largest_shear_strain", "acceleration"]
 )
 def test_the_colour_at_a_node_is_what_a_probe_reads_there(quantity, moved):
     """Probes by operators at points, nodes by polynomials about them: a corner of the surface."""
@@ -114,22 +114,6 @@ def test_the_colour_at_a_node_is_what_a_probe_reads_there(quantity, moved):
     np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-4 * np.abs(expected).max())
 
 
-def test_what_has_no_such_quantity_is_left_out_and_says_so(view):
-    scene = replace(SCENE, quantity="strain_zz")
-    kernel = views.kernel_view(SCENE, np.array([0.01, 0.01]), (0.01, 4))
-    (seen,), (said,) = coloured([(kernel, scene), (view, scene)])
-    assert said == "the point kernel has no strain zz, and predicts a pressure alone"
-    assert seen.shade.quantity == "strain_zz"
-    with pytest.raises(ValueError, match="has no strain zz.*; give the scene a body"):
-        coloured([(kernel, scene)])
-    (low, high), unit = render.scale([seen])
-    assert (low, high) == (-high, pytest.approx(1e6 * np.abs(seen.shade.values).max()))
-    assert unit == "µm/m\n"
-    shear = views.shaded(view, replace(SCENE, quantity="largest_shear_strain"))
-    assert render.scale([shear])[0][0] == 0
-    assert render.shown_scale(shear).startswith("largest shear strain; motion drawn ")
-
-
 @draws
 def test_a_film_is_of_the_quantity(view, tmp_path):
     """A signed one, and the same motion: another picture."""
@@ -143,57 +127,7 @@ def test_a_film_is_of_the_quantity(view, tmp_path):
     assert np.abs(pictures[0] - pictures[1]).mean() > 1
 
 
-def test_a_film_of_a_folder_has_no_other_quantity(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("skinwave.report.renderer.renderer", renderer)
-    (tmp_path / "scene.toml").write_text(dumps(SCENE))
-    asked = [
-        "report",
-        str(tmp_path),
-        "--film",
-        "--quantity",
-        "strain_zz",
-        "-o",
-        str(tmp_path / "a.gif"),
-    ]
-    assert main(asked) == 2
-    assert "keeps the motion alone" in capsys.readouterr().err
-
-
-@pytest.fixture(scope="module")
-def compared(tmp_path_factory):
-    out = tmp_path_factory.mktemp("compared")
-    tacton = replace(SCENE.tacton, duration=0.1)
-    scene = replace(SCENE, pressure=replace(SCENE.pressure, tacton=tacton), depth=0.7e-3)
-    (out / "below.toml").write_text(dumps(replace(scene, quantity="strain_zz")))
-    asked = [str(out / "below.toml"), "--element-size", "4.5", "--quiet"]
-    assert main(["compare", *asked, "-o", str(out / "compared")]) == 0
-    return out
-
-
-def test_a_comparison_has_the_columns_of_the_quantity(compared):
-    page = (compared / "compared" / "index.html").read_text()
-    assert "the point kernel has no strain zz at a depth of 0.7 mm, and predicts a pressure" in page
-    assert "slab (fem), µm/m peak" in page
-    with open(compared / "compared" / "lines.csv", newline="") as file:
-        rows = list(csv.DictReader(file))
-    kernels = [row for row in rows if row["body"] == "none"]
-    bodies = [row for row in rows if row["body"] == "slab"]
-    assert kernels
-    assert all(row["pressure_pa"] and not row["strain_zz_um_m"] for row in kernels)
-    assert all(row["strain_zz_um_m"] and not row["displacement_um"] for row in bodies)
-    with open(compared / "compared" / "claims.csv", newline="") as file:
-        assert {row["body"] for row in csv.DictReader(file)} <= {"none"}
-
-
-def test_a_report_of_a_folder_has_the_quantity(compared, tmp_path):
-    """Of a folder that a comparison wrote, which runs no model."""
-    assert main(["report", str(compared / "compared"), "--quiet", "-o", str(tmp_path / "r")]) == 0
-    page = (tmp_path / "r" / "index.html").read_text()
-    assert "they read" in page
-    assert "Probes read strain zz at a depth of 0.7 mm, in µm/m" in page
-
-
-@pytest.mark.parametrize("quantity", ["strain_zz", "largest_shear_strain"])
+@pytest.mark.parametrize("quantity", ["strain_zz"])
 def test_a_report_keeps_and_draws_a_map_of_the_quantity_at_its_depth(
     quantity, view, moved, tmp_path
 ):
