@@ -41,7 +41,6 @@ from fem.load_and_probe import (
     load_operator,
     node_operator,
     on_surface,
-    pressure_force,
     probe_operator,
     surface_frame,
 )
@@ -66,7 +65,6 @@ from fem.stress import (
     relaxed,
     solid_parts,
     strain_operator,
-    stress_operator,
 )
 from fem.transient import Diverged, State, at_rest, transient
 from fem.typing import Complex
@@ -81,8 +79,8 @@ __all__ = [
     "exponential_sum", "facet_normals", "facet_points", "factorise", "finite_strain", "from_young",
     "harmonic", "imbalance", "impulse_response", "is_inside", "line_response", "load_operator",
     "load_subspace", "locate", "materials_at", "mean_power", "modes", "nodal_strain",
-    "node_operator", "nonlinear", "of_law", "on_surface", "poles", "pressure_force",
+    "node_operator", "nonlinear", "of_law", "on_surface", "poles",
     "probe_operator", "reduce", "relaxation", "relaxed", "shell_stiffness", "solid_parts", "static",
-    "stored", "strain_operator", "stress_operator", "stretching_modes", "surface_frame",
+    "stored", "strain_operator", "stretching_modes", "surface_frame",
     "tabulated", "transfer", "transient", "with_energy_balance",
 ]  # fmt: skip

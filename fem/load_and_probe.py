@@ -5,8 +5,6 @@ nodal forces = P q at the facets' quadrature points,  displacement into the body
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
@@ -47,46 +45,6 @@ def traction_operator(
     columns = np.broadcast_to(np.arange(k * q).reshape(k, 1, 1, q), rows.shape)
     shape = (mesh.n_dofs, k * q)
     return sparse.csr_array((forces.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
-
-
-def pressure_force(
-    mesh: TetMesh, facets: str | Ints = "top", *, kind: str = "dead"
-) -> Callable[[Floats, Floats], Floats]:
-    """Dead or follower load of a pressure.
-
-    A "dead" pressure has the direction and the area of the body at rest, as `load_operator`; a
-    "follower" acts on the displaced surface: f_ai = -int N_a q (x_,1 x x_,2)_i (Belytschko, Liu and
-    Moran, Nonlinear Finite Elements for Continua and Structures (2000), chapter 6).
-
-    Parameters
-    ----------
-    mesh : TetMesh
-    facets : a facet set's name or nodes (e, a)
-    kind : "dead" or "follower"
-
-    Returns
-    -------
-    function of pressures (e q,) in Pa and a displacement (3 n,) in metre, to forces (3 n,) in N
-
-    Raises
-    ------
-    ValueError
-        If the kind is neither.
-    """
-    P, nodes = load_operator(mesh, facets), facet_set(mesh, facets)
-    if kind == "dead":
-        return lambda pressure, u: P @ pressure
-    if kind != "follower":
-        raise ValueError(f"pressure kind '{kind}' is unknown; use dead or follower")
-    dofs = 3 * nodes[:, :, None] + np.arange(3)
-
-    def follow(pressure: Floats, u: Floats) -> Floats:
-        N, normals = facet_areas(mesh.points[nodes] + u[dofs])
-        forces = -np.einsum("qa,eqi,eq->eai", N, normals, pressure.reshape(normals.shape[:2]))
-        total: Floats = np.bincount(dofs.ravel(), forces.ravel(), mesh.n_dofs).astype(np.float64)
-        return total
-
-    return follow
 
 
 def facet_points(mesh: TetMesh, facets: str | Ints = "top") -> Floats:

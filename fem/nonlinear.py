@@ -36,7 +36,7 @@ class _Stuck(ArithmeticError):
 
 def static(
     body: Elastic,
-    force: Floats | Callable[[Floats], Floats],
+    force: Floats,
     *,
     start: Floats | None = None,
     tolerance: float = 1e-8,
@@ -47,7 +47,7 @@ def static(
     Parameters
     ----------
     body : Elastic
-    force : (3 n,) in N; or displacement (3 n,) -> such forces, for those that follow the body
+    force : (3 n,) in N
     start : (3 n,) in metre, initial guess; undeformed if not given
     tolerance : residual relative to the force; or, of a residual below `ROUND_OFF`, the
         correction that it calls for, relative to the displacement
@@ -64,14 +64,13 @@ def static(
     """
     operators = body.operators
     free = operators.free
-    follow = force if callable(force) else lambda u: force
     u = np.zeros(len(free)) if start is None else start[free]
     reached, part = 0.0, 1.0
     while reached < 1:
         target = min(1.0, reached + part)
 
         def unbalanced(u: Floats, share: float = target) -> tuple[Floats, float]:
-            f = share * follow(operators.expand(u))[free]
+            f = share * force[free]
             return f - body.internal(u), float(np.linalg.norm(f))
 
         try:
@@ -151,7 +150,7 @@ class _Now:
 
 def dynamic(
     body: Elastic,
-    force: Callable[[float, Floats], Floats],
+    force: Callable[[float], Floats],
     dt: float,
     *,
     spectral_radius: float = 1.0,
@@ -166,7 +165,7 @@ def dynamic(
     Parameters
     ----------
     body : Elastic
-    force : time in s and displacement (3 n,) in metre -> nodal forces (3 n,) in N
+    force : time in s -> nodal forces (3 n,) in N
     dt : float, s
     spectral_radius : 0 to 1, factor per step on the amplitude of motion far above 1/dt
     initial : displacement and velocity to start from; at rest at time 0 if not given
@@ -188,7 +187,7 @@ def dynamic(
     scheme = weights(dt, spectral_radius)
     free, start = body.operators.free, initial or at_rest(body.operators.n_dofs)
     u, v = start.displacement[free], start.velocity[free]
-    f, internal = force(start.time, start.displacement)[free], body.internal(u)
+    f, internal = force(start.time)[free], body.internal(u)
     strain = tuple(part.strain(u) for part in body.relaxing)
     stretch = start.stretch or tuple(
         np.zeros((len(part.times), *e.shape)) for part, e in zip(body.relaxing, strain, strict=True)
@@ -217,7 +216,7 @@ class _March:
     """Body, load, scheme, tolerance and solver of a time integration, the same in every step."""
 
     body: Elastic
-    force: Callable[[float, Floats], Floats]
+    force: Callable[[float], Floats]
     scheme: tuple[float, float, float, float]
     tolerance: float
     solver: str
@@ -247,13 +246,13 @@ def _step(
     dt, a, before, residual = until - now.t, now.a, np.inf, np.inf
     shares = [2 * part.times / (dt + 2 * part.times) for part in body.relaxing]
     predicted = now.u + dt * now.v + dt**2 * (0.5 - beta) * now.a
+    f = march.force(until)[free]
+    load = (1 - a_f) * f + a_f * now.force
     for _ in range(MOST_ITERATIONS):
         u = predicted + dt**2 * beta * a
         v = now.v + dt * ((1 - gamma) * now.a + gamma * a)
-        f = march.force(until, body.operators.expand(u))[free]
         _, stretch = _relaxed(body, now, u, shares)
         internal = body.internal(u) + body.viscous(u, v) + _relaxing_force(body, u, stretch)
-        load = (1 - a_f) * f + a_f * now.force
         r = load - M @ ((1 - a_m) * a + a_m * now.a) - (1 - a_f) * internal - a_f * now.internal
         residual = float(np.linalg.norm(r) / (np.linalg.norm(load) or 1.0))
         if not np.isfinite(residual):

@@ -182,23 +182,17 @@ def _folder(n: int, size: float, limit: float) -> str:
 
 @contextmanager
 def _environment(folder: str | None, limit: float) -> Iterator[None]:
-    """Where PARDISO keeps its files, and how much memory it may use beside them."""
+    """Where PARDISO keeps its files, if any, and how much memory it may use beside them."""
     core = max(LEAST_CORE, round(IN_CORE * limit / 2**20))
     wanted = {"MKL_PARDISO_OOC_PATH": folder, "MKL_PARDISO_OOC_MAX_CORE_SIZE": str(core)}
-    before = {name: os.environ.get(name) for name in wanted}
+    before = {name: os.environ[name] for name in wanted if name in os.environ}
+    os.environ.update({name: value for name, value in wanted.items() if folder and value})
     try:
-        _set(wanted if folder else {})
         yield
     finally:
-        _set(before if folder else {})
-
-
-def _set(variables: dict[str, str | None]) -> None:
-    for name, value in variables.items():
-        if value is None:
-            os.environ.pop(name, None)
-        else:
-            os.environ[name] = value
+        for name in wanted if folder else ():
+            del os.environ[name]
+        os.environ.update(before)
 
 
 def _release(handle: Array, settings: Array, kind: int, n: int, folders: list[str]) -> None:

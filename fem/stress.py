@@ -37,7 +37,7 @@ from fem.typing import Floats, Ints
 from meshes import TetMesh
 from meshes.tetmesh import EDGES
 from simple_model.layers.material import Material
-from simple_model.layers.tensors import DIAGONAL, MEAN, TENSOR, hooke
+from simple_model.layers.tensors import DIAGONAL, MEAN, TENSOR
 
 TOUCHING = 1e-6  # barycentric: an element touches a point that is so little outside it
 POINTS = 4  # quadrature points of an element, of the rule for degree 2
@@ -89,25 +89,6 @@ def strain_operator(
         sampled = _sampled_strain(part, used, materials[r])
         rows = rows + sparse.kron(into @ fit, tensor, format="csr") @ sampled
     return rows
-
-
-def stress_operator(
-    mesh: TetMesh, material: Material | Mapping[int, Material], points: ArrayLike
-) -> sparse.csr_array:
-    """Stress operator: the Cauchy stress of the moduli at rest, tension positive, is this times the
-    displacement. In motion it relaxes as the modulus does: sigma(w) = mu(w) / mu sigma.
-
-    Parameters
-    ----------
-    mesh, material, points : as for `strain_operator`, with its errors
-
-    Returns
-    -------
-    (6 p, 3 n) sparse, Pa/m; components xx, yy, zz, xy, xz, yz, fastest
-    """
-    solids = materials_at(mesh, material, points)
-    moduli = sparse.block_diag([hooke(solid) for solid in solids], format="csr")
-    return moduli @ strain_operator(mesh, material, points)
 
 
 def relaxation(material: Material, s: Any) -> Any:

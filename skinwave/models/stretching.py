@@ -263,7 +263,7 @@ def _march(
     kept, linear = lru_cache(maxsize=2)(force), []
 
     def states() -> Iterator[fem.State]:
-        bent = nonlinear.dynamic(body, lambda t, u: kept(t), dt, solver=solver)
+        bent = nonlinear.dynamic(body, kept, dt, solver=solver)
         straight = fem.transient(body.operators, kept, dt, solver=solver)
         for state, other in zip(islice(bent, steps + 1), straight, strict=False):
             linear.append(rows @ other.displacement)

@@ -34,35 +34,6 @@ def sheet():
     return made, stretching_body(PAPER, made)
 
 
-def test_a_follower_presses_against_the_displaced_surface():
-    mesh = meshes.block((0.02, 0.02, 0.01), 0.01)
-    closed = meshes.boundary_facets(mesh.tets)
-    dead, follower = (fem.pressure_force(mesh, closed, kind=k) for k in ("dead", "follower"))
-    q = np.ones(6 * len(closed))
-    np.testing.assert_allclose(follower(q, np.zeros(mesh.n_dofs)), dead(q, q), atol=1e-18)
-    turn = np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
-    turned = (mesh.points @ turn.T - mesh.points).ravel()
-    expected = dead(q, q).reshape(-1, 3) @ turn.T
-    np.testing.assert_allclose(follower(q, turned).reshape(-1, 3), expected, atol=1e-18)
-    bent = 1e-3 * np.random.default_rng(0).standard_normal(mesh.n_dofs)
-    assert np.abs(follower(q, bent).reshape(-1, 3).sum(axis=0)).max() < 1e-18
-    with pytest.raises(ValueError, match="use dead or follower"):
-        fem.pressure_force(mesh, kind="live")
-
-
-def test_a_sheet_rests_under_a_follower_almost_as_under_a_dead_pressure(sheet):
-    made, body = sheet
-    S = fem.probe_operator(made.mesh, [[0, 0]])
-    q = np.full(6 * len(made.mesh.facets["top"]), 5.0)
-    rest = []
-    for kind in ("dead", "follower"):
-        push = fem.pressure_force(made.mesh, kind=kind)
-        rest.append(S @ nonlinear.static(body, lambda u, push=push: push(q, u)))
-    assert rest[0] > 0.5 * PAPER.depth
-    assert rest[0] == pytest.approx(rest[1], rel=1e-3)
-    assert rest[0] != rest[1]
-
-
 def test_the_membrane_makes_up_for_what_a_thick_equivalent_lacks_of_stretching(sheet):
     made, _ = sheet
     x = made.mesh.points
@@ -111,7 +82,7 @@ def test_a_step_that_fails_is_halved(sheet, monkeypatch):
     P = fem.load_operator(made.mesh)
     push, asked = P @ np.full(P.shape[1], 20.0), set()
 
-    def force(t, u):
+    def force(t):
         asked.add(round(t, 9))
         return push
 
@@ -125,7 +96,7 @@ def test_states_before_a_failure_are_kept(sheet):
     made, body = sheet
     P = fem.load_operator(made.mesh)
     push = P @ np.ones(P.shape[1])
-    states = nonlinear.dynamic(body, lambda t, u: push * (np.nan if t > 2.5e-4 else 1), 1e-4)
+    states = nonlinear.dynamic(body, lambda t: push * (np.nan if t > 2.5e-4 else 1), 1e-4)
     kept = [next(states) for _ in range(3)]
     with pytest.raises(fem.Diverged, match="step 3"):
         next(states)

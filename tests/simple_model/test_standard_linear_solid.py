@@ -166,7 +166,7 @@ def test_small_motion_at_large_displacement_relaxes_as_linear_motion_does(losses
 
     linear = list(islice(fem.transient(body.operators, force, dt), 60))
     found = list(islice(fem.nonlinear.with_energy_balance(
-        body, fem.nonlinear.dynamic(body, lambda t, u: force(t), dt, tolerance=1e-9), force), 60,
+        body, fem.nonlinear.dynamic(body, force, dt, tolerance=1e-9), force), 60,
     ))  # fmt: skip
     moved = np.array([[state.displacement, each.displacement]
                       for each, (state, _) in zip(linear, found, strict=True)])  # fmt: skip
@@ -189,7 +189,7 @@ def test_modes_of_a_sheet_relax_as_the_sheet_does():
     body = modal_elastic(modal, H, solid)
     force, dt = np.array([300.0, 100.0]), 1e-5
     states = islice(fem.nonlinear.with_energy_balance(
-        body, fem.nonlinear.dynamic(body, lambda t, u: force, dt, tolerance=1e-9), lambda t: force,
+        body, fem.nonlinear.dynamic(body, lambda t: force, dt, tolerance=1e-9), lambda t: force,
     ), 400)  # fmt: skip
     # The same equations, by a solver of ordinary differential equations.
     share = 10e3 / 25e3
