@@ -49,7 +49,7 @@ class Laws:
         """Dynamic stiffness A = K + s C + s^2 M + sum_j h_j K_j of factors s in rad/s and h_j."""
         each = zip(factors, self.parts, strict=True)
         rests = [factor * part.rest for factor, part in each if factor and part.rest is not None]
-        rests = [factors[0] ** 2 * M, *rests] if factors[0] else rests
+        rests = [_multiple(factors[0] ** 2, M), *rests] if factors[0] else rests
         rest = sum(rests[1:], start=rests[0]) if rests else None
         return Combination(stiffness=self.multiple(factors), rest=rest).of(K)
 

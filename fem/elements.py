@@ -48,12 +48,11 @@ def tetrahedron_rule(degree: int) -> tuple[Floats, Floats]:
     (Carnegie Mellon University, 2000), all of whose weights are positive.
     """
     if degree <= 2:
-        return _orbits((0.25, _last([(5 - 5**0.5) / 20] * 3)))
-    a, b = 0.04550370412564965, 0.4544962958743504
+        return _orbits((0.25, [(5 - 5**0.5) / 20] * 3))
     return _orbits(
-        (0.11268792571801585, _last([0.3108859192633006] * 3)),
-        (0.07349304311636195, _last([0.0927352503108912] * 3)),
-        (0.042546020777081466, (a, a, b, b)),
+        (0.11268792571801585, [0.3108859192633006] * 3),
+        (0.07349304311636195, [0.0927352503108912] * 3),
+        (0.042546020777081466, [0.04550370412564965] * 2 + [0.4544962958743504]),
     )
 
 
@@ -64,10 +63,10 @@ def triangle_rule(degree: int = 4) -> tuple[Floats, Floats]:
     Three points and six: Dunavant, Int J Numer Methods Eng 21:1129 (1985).
     """
     if degree <= 2:
-        return _orbits((1 / 3, _last([1 / 6, 1 / 6])))
+        return _orbits((1 / 3, [1 / 6, 1 / 6]))
     return _orbits(
-        (0.22338158967801147, _last([0.4459484909159649] * 2)),
-        (0.10995174365532187, _last([0.09157621350977074] * 2)),
+        (0.22338158967801147, [0.4459484909159649] * 2),
+        (0.10995174365532187, [0.09157621350977074] * 2),
     )
 
 
@@ -75,16 +74,17 @@ def _edges(corners: int) -> Ints:
     return EDGES if corners == 4 else TRIANGLE_EDGES
 
 
-def _last(leading: list[float]) -> tuple[float, ...]:
-    """Barycentric coordinates, the last of which makes the sum 1."""
-    return *leading, round(1 - sum(leading), 15)
-
-
-def _orbits(*orbits: tuple[float, tuple[float, ...]]) -> tuple[Floats, Floats]:
-    """Every distinct permutation of each point, with its weight."""
-    each = [(weight, sorted(set(permutations(point)))) for weight, point in orbits]
-    weights = np.concatenate([[weight] * len(orbit) for weight, orbit in each])
-    rule = np.array([point for _, orbit in each for point in orbit]), weights / weights.sum()
+def _orbits(*orbits: tuple[float, list[float]]) -> tuple[Floats, Floats]:
+    """Every distinct permutation of each point; its last coordinate makes the sum 1."""
+    points: list[tuple[float, ...]] = []
+    weights: list[float] = []
+    for weight, leading in orbits:
+        distinct: dict[tuple[float, ...], tuple[float, ...]] = {}
+        for point in sorted(set(permutations([*leading, round(1 - sum(leading), 15)]))):
+            distinct.setdefault(tuple(round(x, 9) for x in point), point)
+        points += distinct.values()
+        weights += [weight] * len(distinct)
+    rule = np.array(points), np.array(weights) / sum(weights)
     for shared in rule:
         shared.setflags(write=False)
     return rule

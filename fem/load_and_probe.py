@@ -27,7 +27,8 @@ def load_operator(mesh: TetMesh, facets: str | Ints = "top") -> sparse.csr_array
 
     Pressure pushes into the body, against the outward normal.
     """
-    return traction_operator(mesh, -facet_normals(mesh, facets), facets)
+    N, normals = facet_geometry(mesh, facet_set(mesh, facets))
+    return _forces(mesh, facets, -np.einsum("qa,eqi->eaiq", N, normals))
 
 
 def traction_operator(
@@ -36,15 +37,19 @@ def traction_operator(
     """Load operator (3 n, k q) of tractions: nodal forces int N_a t dA in N per value at each of
     the `facet_points`, of the traction vector (k q, 3) of a unit value there.
     """
-    nodes = facet_set(mesh, facets)
-    N, normals = facet_geometry(mesh, nodes)
-    k, q = normals.shape[:2]
+    N, normals = facet_geometry(mesh, facet_set(mesh, facets))
     area = np.linalg.norm(normals, axis=2)
-    forces = np.einsum("eq,qa,eqi->eaiq", area, N, tractions.reshape(k, q, 3))
+    at_points = tractions.reshape(*area.shape, 3)
+    return _forces(mesh, facets, np.einsum("eq,qa,eqi->eaiq", area, N, at_points))
+
+
+def _forces(mesh: TetMesh, facets: str | Ints, values: Floats) -> sparse.csr_array:
+    """Load operator (3 n, e q) of nodal forces (e, a, i, q) of unit values."""
+    nodes, (k, _, _, q) = facet_set(mesh, facets), values.shape
     rows = (3 * nodes[:, :, None, None] + np.arange(3)[:, None]).repeat(q, axis=3)
     columns = np.broadcast_to(np.arange(k * q).reshape(k, 1, 1, q), rows.shape)
     shape = (mesh.n_dofs, k * q)
-    return sparse.csr_array((forces.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
+    return sparse.csr_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
 
 
 def facet_points(mesh: TetMesh, facets: str | Ints = "top") -> Floats:

@@ -122,7 +122,7 @@ def free_energy() -> Checks:
     # 6 Pa deflect the coarse sheet by three thicknesses.
     u = nonlinear.static(body, P @ np.full(P.shape[1], 6.2))
     start, steps = replace(fem.at_rest(mesh.n_dofs), displacement=u), 800
-    moved = nonlinear.dynamic(body, lambda t, u: 0 * u, 1e-4, initial=start, tolerance=1e-3)
+    moved = nonlinear.dynamic(body, lambda t: 0 * u, 1e-4, initial=start, tolerance=1e-3)
     energies = [nonlinear.total_energy(body, s) for s in islice(moved, steps + 1)]
     drift = np.array(energies) / energies[0] - 1
     late = np.abs(drift[-steps // 4 :].mean() - drift[: steps // 4].mean())
@@ -141,7 +141,7 @@ def too_much() -> Checks:
     push = P @ (50e3 * np.exp(-(points**2).sum(axis=1) / 2 / 4.35e-3**2))
     attempts: tuple[Callable[[], object], ...] = (
         lambda: nonlinear.static(body, push),
-        lambda: list(islice(nonlinear.dynamic(body, lambda t, u: 100 * push, 5e-4), 3)),
+        lambda: list(islice(nonlinear.dynamic(body, lambda t: 100 * push, 5e-4), 3)),
     )
     for attempt in attempts:
         yield refused(attempt, fem.Diverged, "lower the load")

@@ -1,6 +1,5 @@
 """Quantities of whole bodies: tensors of files for other programs, and what colours films."""
 
-import csv
 from dataclasses import replace
 
 import numpy as np
@@ -11,18 +10,14 @@ import fem
 from simple_model import MovingPressure, Response, Tacton, Trajectory
 from simple_model.layers.tensors import hooke
 from simple_model.load.spectrum import pressure_lines, synthesise
-from skinwave.commands.cli import main
 from skinwave.models.reduction import oscillating, read_at
-from skinwave.report import films, render
-from skinwave.report.renderer import renderer
+from skinwave.report import films
 from skinwave.report.styles import style
 from skinwave.results import exports, motion, surface, views
 from skinwave.results.nodal import shade
 from skinwave.results.run import Run
-from skinwave.scene.file import dumps
 from skinwave.scene.scene import Body, Layer, Scene
 from skinwave.studies import album, scene_report
-from skinwave.studies.album import coloured
 from skinwave.studies.gallery import Gallery
 
 draws = pytest.mark.skipif("not renderer().found", reason="nothing draws in three dimensions here")
@@ -95,9 +90,7 @@ def test_between_two_materials_strain_jumps_and_traction_does_not():
     assert np.abs(one[:, 0] - other[:, 0]).max() > 0.3 * size
 
 
-@pytest.mark.parametrize(
-    "quantity", ["stress_xx", "largest_shear_strain", "acceleration"]
-)
+@pytest.mark.parametrize("quantity", ["stress_xx", "largest_shear_strain", "acceleration"])
 def test_the_colour_at_a_node_is_what_a_probe_reads_there(quantity, moved):
     """Probes by operators at points, nodes by polynomials about them: a corner of the surface."""
     corners = np.unique(moved.mesh.tets[:, :4])
