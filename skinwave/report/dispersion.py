@@ -7,13 +7,12 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter
 
 from meshes.tetmesh import Floats
 from simple_model.drawing import small
 from simple_model.layers.dispersion import DispersionCurves, Mode
-from skinwave.report.figures import REPORT
+from skinwave.report.figures import REPORT, legend
 from skinwave.report.levels import written
 from skinwave.report.palette import SERIES
 from skinwave.report.styles import Style
@@ -161,9 +160,7 @@ def _legend(figure: Figure, curves: DispersionCurves, focus_speed: float, column
     entries["lines of the load"] = {"color": "0.55", "lw": 0.9, "ls": ":"}
     if focus_speed:
         entries[f"focus, {focus_speed:g} m/s"] = {"color": ink, "lw": 1.2, "ls": "--"}
-    handles = [Line2D([], [], **entry) for entry in entries.values()]
-    figure.legend(handles, list(entries), loc="outside lower center", fontsize=small(),
-                  handlelength=1.5, columnspacing=1.0, ncols=columns)  # fmt: skip
+    legend(figure, entries, columns)
 
 
 def _shapes(figure: SubFigure, curves: DispersionCurves, at: float) -> None:

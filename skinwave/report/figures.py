@@ -1,6 +1,7 @@
 """Figures for print and page (matplotlib): waveforms, spectra and spread, models overlaid."""
 
 import warnings
+from collections.abc import Mapping
 from io import BytesIO
 from typing import Any
 
@@ -8,6 +9,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from meshes.tetmesh import Floats
@@ -145,6 +147,16 @@ def panels(count: int, style: Style, width: float) -> tuple[Figure, list[Axes]]:
     for ax in axes if style.is_narrow else axes[:1]:
         ax.set_ylabel("y, mm")
     return figure, list(axes)
+
+
+def legend(figure: Figure, entries: Mapping[str, Mapping[str, Any]], columns: int = 0) -> None:
+    """A legend below a figure, of labels and the properties of their lines; in one row, or below
+    each other in a narrow figure, if no number of columns is given.
+    """
+    handles = [Line2D([], [], **entry) for entry in entries.values()]
+    columns = columns or (1 if figure.get_figwidth() < NARROW else max(len(entries), 1))
+    figure.legend(handles, list(entries), loc="outside lower center", ncols=columns, frameon=False,
+                  fontsize=small(), handlelength=1.5, columnspacing=1.2)  # fmt: skip
 
 
 def answered(run: Run) -> str:

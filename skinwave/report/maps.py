@@ -9,11 +9,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
-from matplotlib.lines import Line2D
 
 from meshes.tetmesh import Floats
 from simple_model.drawing import small
 from skinwave.models.speeds import mach_angle
+from skinwave.report.figures import legend
 from skinwave.report.palette import SIGNED, inked, label
 from skinwave.report.styles import NARROW, Style
 from skinwave.report.surfaces import draw_path
@@ -101,7 +101,7 @@ def snapshots_figure(views: Sequence[View], style: Style, count: int = 4) -> Fig
             ax.set_xlabel("x, mm")
         figure.colorbar(image, ax=axes, label="motion into the body about its mean\n"
                         "over the model's largest", shrink=0.6)  # fmt: skip
-        _legend(figure, _focus_legend(views, style))
+        legend(figure, _focus_legend(views, style))
     return figure
 
 
@@ -157,7 +157,7 @@ def waves_figure(views: Sequence[View], style: Style) -> Figure:
         bar.set_ticks([-1, -0.5, 0, 0.5, 1])
         if narrow:
             lines = {said: {"color": style.ink, "ls": dashes} for said, dashes in LINES.values()}
-            _legend(figure, lines)
+            legend(figure, lines)
     return figure
 
 
@@ -211,10 +211,3 @@ def _draw_world_lines(ax: Axes, view: View, name: str) -> None:
             labels = [f"{LINES[name][0]}, {labels[0]}"]
         ax.legend(handles, labels, loc="upper right", fontsize=small(), framealpha=0.9,
                   labelcolor="black", facecolor="white", handlelength=1.3)  # fmt: skip
-
-
-def _legend(figure: Figure, entries: dict[str, dict[str, Any]]) -> None:
-    handles = [Line2D([], [], **style) for style in entries.values()]
-    narrow = figure.get_figwidth() < NARROW
-    figure.legend(handles, list(entries), loc="outside lower center",
-                  ncols=1 if narrow else len(entries), frameon=False)  # fmt: skip

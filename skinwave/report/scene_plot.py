@@ -8,6 +8,7 @@ from meshes.tetmesh import Floats
 from simple_model import drawing
 from simple_model.load.focus import spot_width
 from simple_model.numbers import counted
+from skinwave.report.description import asked_rows
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -102,33 +103,7 @@ def page(scene: "Scene") -> str:
 
     uncertain = [f"{key} is uncertain; its central value is taken" for key, _ in scene.spreads]
     image = drawing.picture(show, 4.2, 3.8)
-    return drawing.page(f"Scene {scene.name}", image, [drawing.table(_facts(scene))], uncertain)
-
-
-def _facts(scene: "Scene") -> list[list[str]]:
-    tacton, pressure, body = scene.tacton, scene.pressure, scene.body
-    path = tacton.trajectory
-    moved = f"{path.shape} at {path.speed:g} m/s, {path.drawing_frequency:.4g} Hz"
-    rows = [
-        ["focus", "at rest" if path.is_static else moved],
-        ["amplitude modulation", _tones(scene) or "none"],
-        ["duration", f"{tacton.duration:g} s"],
-    ]
-    if not scene.load.force:  # of a contact, which has no focus
-        rows.append(
-            [
-                "pressure",
-                f"{pressure.peak_pressure:g} Pa, {pressure.drive}, {pressure.profile_name}",
-            ]
-        )
-    if not scene.load.is_plain:
-        rows.append(["load", scene.load.words])
-    rows.append(["body", body.of_kind.words(body)])
-    if body.of_kind.discretise:
-        rows.append(["supports", f"base {body.base}, sides {body.sides}"])
-        rows.append(["material", _material(scene)])
-        rows += [[f"region {name}", _named(material)] for name, material in body.regions]
-    return [*rows, ["probes", f"{len(scene.probes)}, {scene.reading.words}"]]
+    return drawing.page(f"Scene {scene.name}", image, [drawing.table(asked_rows(scene))], uncertain)
 
 
 def _tones(scene: "Scene") -> str:

@@ -9,11 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
-from matplotlib.lines import Line2D
 
 from meshes.tetmesh import Floats
 from simple_model.quantities import DISPLACEMENT, PRESSURE
-from skinwave.report.figures import REPORT, panels
+from skinwave.report.figures import REPORT, legend, panels
 from skinwave.report.palette import COLOURS, SEQUENTIAL, label
 from skinwave.report.styles import Style
 from skinwave.results.propagation import NEAR, OUTSIDE
@@ -91,13 +90,11 @@ def surfaces_figure(
             title = f"RMS about the mean,{symbol} {asked.shown}"
             bar = figure.colorbar(image, ax=ax, label=title, extend=beyond)
             bar.ax.ticklabel_format(axis="y", scilimits=(-3, 4))  # labels of a few letters
-        handles = [Line2D([], [], **entry) for entry in entries.values()]
         if measured:
-            handles.append(Line2D([], [], ls="", marker="s", mfc="0.8", mec=MEASURED_EDGE, ms=8))
-            entries["measured, in the map's colours"] = {}
-        columns = 1 if style.is_narrow else len(entries)
-        figure.legend(handles, list(entries), loc="outside lower center", ncols=columns,
-                      frameon=False)  # fmt: skip
+            entries["measured, in the map's colours"] = {
+                "ls": "", "marker": "s", "mfc": "0.8", "mec": MEASURED_EDGE, "ms": 8
+            }  # fmt: skip
+        legend(figure, entries)
     return figure
 
 

@@ -15,7 +15,7 @@ from meshes.tetmesh import Floats
 from simple_model.numbers import decibel
 from skinwave.results.run import Run
 from skinwave.scene.scene import Scene
-from skinwave.system.plain_text import csv_table
+from skinwave.system.table import Table
 
 PRESENT = -60.0  # dB re f_AM: a line this weak is still seen above a vibrometer's noise
 ABSENT = -120.0  # dB
@@ -116,8 +116,8 @@ def claimed(runs: Iterable[Run]) -> list[Run]:
 
 def write_claims(path: Path, assessed_claims: Iterable[AssessedClaim]) -> None:
     """Every assessed claim per body and model."""
-    rows = ((*astuple(v)[:4], f"{v.value:.6g}", v.bar, v.sentence) for v in assessed_claims)
-    path.write_bytes(csv_table([field.name for field in fields(AssessedClaim)], rows))
+    table = Table([field.name for field in fields(AssessedClaim)], map(astuple, assessed_claims))
+    path.write_bytes(table.to_csv())
 
 
 Assessment = tuple[bool, float, float, str]

@@ -28,6 +28,7 @@ from skinwave.models.speeds import repeated, shown_part
 from skinwave.planning.plan import plan
 from skinwave.planning.records import Plan
 from skinwave.planning.simulate import compute, solve
+from skinwave.report import description
 from skinwave.results import record, surface
 from skinwave.results.files import write_lines, write_run
 from skinwave.results.motion import BodyMotion, probe_response, waves
@@ -54,7 +55,6 @@ from skinwave.results.views import (
 from skinwave.scene import paper15
 from skinwave.scene.file import dumps, read
 from skinwave.scene.scene import BODIES, Scene, body_name, check_load, with_body
-from skinwave.studies import description
 from skinwave.system.document import worst_warnings
 from skinwave.system.effort import Progress
 from skinwave.system.json_kinds import EFFORT, PLAN, TRUST, effort_of, fitting

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from simple_model.numbers import percent
+from skinwave.report import description
 from skinwave.report.levels import strongest_probe
 from skinwave.report.palette import label
 from skinwave.report.renderer import renderer
@@ -17,8 +18,7 @@ from skinwave.results.files import distinct_names, folder_name
 from skinwave.results.run import Run
 from skinwave.results.surface import kernel_map
 from skinwave.scene.file import dumps
-from skinwave.scene.scene import Scene
-from skinwave.studies import description, dispersion_page, summary, tables
+from skinwave.studies import dispersion_page, summary, tables
 from skinwave.studies.album import Album, only, open_album
 from skinwave.studies.changes import Drawn, beside_kernels, shown
 from skinwave.studies.driven_modes import driven_modes
@@ -80,7 +80,7 @@ def write_report(
         warnings_banner(_efforts(album.runs)),
         *description.other_quantity(album.scene),
         Section("What was asked", [
-            Table(["", ""], _asked_rows(album.scene)),
+            Table(["", ""], description.asked_rows(album.scene)),
             Details("The scene in full", [preformatted(dumps(album.scene))]),
         ]),
         Section("What was modelled, and what was left out", _modelled(album)),
@@ -153,24 +153,6 @@ def mapped(album: Album, gallery: Gallery) -> list[Part]:
         figure = surfaces_figure(scene, {name: found}, gallery.style)
         parts.append(gallery.figure(f"quantity-{folder_name(name)}", figure, caption))
     return [Section("Where the quantity is largest", parts)] if parts else []
-
-
-def _asked_rows(scene: Scene) -> list[list[str]]:
-    tacton, pressure, body = scene.tacton, scene.pressure, scene.body
-    depth = pressure.depth_of_modulation
-    of_depth = f", depth of modulation {depth:g}" if pressure.law.uses_depth else ""
-    return [
-        ["focus", description.path_of(tacton)],
-        ["amplitude modulation", ", ".join(description.tones_of(tacton)) or "none"],
-        ["amplitude", ", ".join(description.levels_of(tacton)) or "100 % of full drive"],
-        ["drive", f"{pressure.drive}{of_depth}, {description.spot_of(pressure)}, "
-                  f"{pressure.peak_pressure:g} Pa at full drive, "
-                  f"{1e3 * pressure.height:g} mm above the array"],
-        ["body", description.extent(body) + description.above(body)],
-        ["duration", f"{tacton.duration:g} s"],
-        ["probes", ", ".join(f"({1e3 * x:g}, {1e3 * y:g})" for x, y in scene.probes) + " mm"],
-        ["they read", scene.reading.words],
-    ]  # fmt: skip
 
 
 def _modelled(album: Album) -> list[Part]:

@@ -12,6 +12,14 @@ from simple_model import Effort
 from simple_model.numbers import counted, decibel
 from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.prepared import Prepared
+from skinwave.report.description import (
+    levels_of,
+    modelled,
+    other_quantity,
+    path_of,
+    tones_of,
+    unresolved,
+)
 from skinwave.report.figures import overview_figure, png, tacton_figure
 from skinwave.report.palette import label
 from skinwave.results.claims import AssessedClaim
@@ -20,14 +28,6 @@ from skinwave.results.run import Run
 from skinwave.scene.file import dumps
 from skinwave.studies import summary
 from skinwave.studies.changes import Shown, beside_kernels, changes, quick_maps, shown
-from skinwave.studies.description import (
-    levels_of,
-    modelled,
-    other_quantity,
-    path_of,
-    tones_of,
-    unresolved,
-)
 from skinwave.studies.tables import agreement_table, claims_table, effort_table, lines_table
 from skinwave.system.document import (
     Part,

@@ -8,6 +8,7 @@ from meshes.tetmesh import Floats
 from simple_model import Effort
 from simple_model.numbers import FAINTEST, counted, decibel, significant
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
+from skinwave.report import description
 from skinwave.report.figures import answered
 from skinwave.report.levels import sensation_levels, strongest_probe
 from skinwave.report.palette import label
@@ -15,7 +16,6 @@ from skinwave.results.claims import TEXTS, AssessedClaim
 from skinwave.results.comparison import compare, moving_rms
 from skinwave.results.propagation import strongest_component
 from skinwave.results.run import Run
-from skinwave.studies import description
 from skinwave.system.document import Markup, Part, Section
 from skinwave.system.table import Column, Table
 

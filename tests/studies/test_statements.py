@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from simple_model import MovingPressure, Response, Rhythm, Tacton, Trajectory
+from skinwave.report.description import asked_rows, modelled, unresolved
 from skinwave.report.levels import sensation_levels
 from skinwave.results.claims import evaluate
 from skinwave.results.files import line_rows
 from skinwave.results.run import Run
 from skinwave.scene.scene import BODIES, Body, Layer, Placement, Scene
-from skinwave.studies.description import modelled, unresolved
-from skinwave.studies.scene_report import _asked_rows
 from skinwave.studies.study_page import caption
 from skinwave.studies.summary import known_of
 from skinwave.sweeps.measures import measured
@@ -118,7 +117,7 @@ SECOND = {"second_am_frequency": 200, "superposition": (0.25, 0.75)}
 )  # fmt: skip
 def test_a_page_says_all_that_was_commanded(tacton, row, said):
     one = run(BODIES["skin-slab"], **tacton)
-    assert dict(_asked_rows(one.scene))[row] == said
+    assert dict(asked_rows(one.scene))[row] == said
     if tacton:
         assert said in caption("one", [one])
 
@@ -128,7 +127,7 @@ def test_a_page_says_how_a_body_lies_and_what_lies_above():
     body = Body(layers=LAYERS, placement=place)
     said = f"{ABOVE}; tilted by 10 degrees about x and 0 degrees about y; moved by (0, 5, 2) mm"
     one = run(body)
-    assert dict(_asked_rows(one.scene))["body"].endswith(said)
+    assert dict(asked_rows(one.scene))["body"].endswith(said)
     assert said in modelled([one])[0]
 
 

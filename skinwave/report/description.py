@@ -197,6 +197,25 @@ def _sheet(runs: list[Run]) -> str:
     return f"{text}. Neither size nor support of the sheet that was measured is published."
 
 
+def asked_rows(scene: Scene) -> list[list[str]]:
+    """What a scene asks for, in rows of a table."""
+    tacton, pressure, body = scene.tacton, scene.pressure, scene.body
+    depth = pressure.depth_of_modulation
+    of_depth = f", depth of modulation {depth:g}" if pressure.law.uses_depth else ""
+    drive = f"{pressure.drive}{of_depth}, {spot_of(pressure)}, {pressure.peak_pressure:g} Pa at "
+    drive += f"full drive, {1e3 * pressure.height:g} mm above the array"
+    return [
+        ["focus", path_of(tacton)],
+        ["amplitude modulation", ", ".join(tones_of(tacton)) or "none"],
+        ["amplitude", ", ".join(levels_of(tacton)) or "100 % of full drive"],
+        ["load", drive if scene.load.is_plain else scene.load.words],
+        ["body", extent(body) + above(body)],
+        ["duration", f"{tacton.duration:g} s"],
+        ["probes", ", ".join(f"({1e3 * x:g}, {1e3 * y:g})" for x, y in scene.probes) + " mm"],
+        ["they read", scene.reading.words],
+    ]
+
+
 def without_kernel(scene: Scene) -> str:
     """A sentence that the point kernel has no such quantity."""
     return f"the point kernel has no {scene.reading.words}, and predicts a pressure alone"
