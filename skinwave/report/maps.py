@@ -1,4 +1,4 @@
-"""How waves run over a surface: snapshots, and motion over place and time."""
+"""How waves run over a surface: snapshots side by side."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -8,20 +8,16 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.image import AxesImage
 
 from meshes.tetmesh import Floats
-from simple_model.drawing import small
 from skinwave.models.speeds import mach_angle
 from skinwave.report.figures import legend
 from skinwave.report.palette import SIGNED, inked, label
-from skinwave.report.styles import NARROW, Style
+from skinwave.report.styles import Style
 from skinwave.report.surfaces import draw_path
-from skinwave.results.views import Trace, View, starting_time
+from skinwave.results.views import View
 
 PIXELS = 201  # of a map's side
-FAINTEST = 0.1  # of the largest motion, below which that of a place is not brought up
-LINES = {"ray": ("surface wave", "dashed"), "track": ("focus", "solid")}  # of a trace
 MAP = 2.7  # inch, side of a snapshot
 
 
@@ -130,37 +126,6 @@ def _focus_legend(views: Sequence[View], style: Style) -> dict[str, dict[str, An
     return entries
 
 
-def waves_figure(views: Sequence[View], style: Style) -> Figure:
-    """Motion over place and time: outwards from the path after the start, and along the path."""
-    narrow = style.is_narrow
-    traced = [("ray", "distance, mm" if narrow else "distance from the path, mm")]
-    along = [("track", "along path, mm" if narrow else "place along the path, mm")]
-    traced += along if views[0].track else []
-    with mpl.rc_context(style.rc):
-        size = style.size(4.2 * len(views) + 0.6, 4.1 * len(traced) + 0.3)
-        if narrow:
-            size = size[0], 1.7 * len(views) + 0.4
-        figure = Figure(figsize=size, layout="constrained")
-        rows, columns = (views, traced) if narrow else (traced, views)
-        axes = figure.subplots(len(rows), len(columns), squeeze=False)
-        for ax in axes[:, 0]:
-            ax.set_ylabel("time, ms")
-        axes = axes.T if narrow else axes
-        for row, (name, x_label) in zip(axes, traced, strict=True):
-            for ax, view in zip(row, views, strict=True):
-                image = _draw_trace(ax, getattr(view, name), name)
-                ax.set_xlabel(x_label)
-                ax.set_title(label(view.column), color=inked(view.column))
-                _draw_world_lines(ax, view, name)
-        title = "motion about its mean over the largest\n(above: at its place)"
-        bar = figure.colorbar(image, ax=axes, label=title, shrink=0.6)
-        bar.set_ticks([-1, -0.5, 0, 0.5, 1])
-        if narrow:
-            lines = {said: {"color": style.ink, "ls": dashes} for said, dashes in LINES.values()}
-            legend(figure, lines)
-    return figure
-
-
 def _draw_focus(ax: Axes, view: View, time: float) -> None:
     """The focus, and behind it the Mach angle if it outruns the surface wave."""
     path = view.scene.tacton.trajectory
@@ -175,39 +140,3 @@ def _draw_focus(ax: Axes, view: View, time: float) -> None:
     for side in (-1, 1):
         back = heading + np.pi + side * angle
         ax.plot([x, x + 25 * np.cos(back)], [y, y + 25 * np.sin(back)], color="black", lw=1.2)
-
-
-def _draw_trace(ax: Axes, trace: Trace, name: str) -> AxesImage:
-    """Motion over its largest: on a ray, where waves fade, over the largest at each place."""
-    peak = np.abs(trace.motion).max(axis=0)  # nan off the body
-    faintest = FAINTEST if name == "ray" else 1.0
-    peak = np.maximum(peak, faintest * np.nan_to_num(peak).max(initial=1e-300))
-    frame = (0.0, 1e3 * trace.distance[-1], 0.0, 1e3 * trace.times[-1])
-    return ax.imshow(trace.motion / peak, cmap=SIGNED, vmin=-1, vmax=1, extent=frame,
-                     origin="lower", aspect="auto", interpolation="bilinear")  # fmt: skip
-
-
-def _draw_world_lines(ax: Axes, view: View, name: str) -> None:
-    """x = c t of the surface wave, and x = v t of the focus along its path."""
-    path, limits = view.scene.tacton.trajectory, (ax.get_xlim(), ax.get_ylim())
-    if name == "ray" and view.speed:
-        start = starting_time(view.scene, view.ray.places[0])
-        between = 1 / max(view.tone, 20.0)
-        for t in 1e3 * np.arange(start % between - 2 * between, view.ray.times[-1], between):
-            ax.plot([0, view.speed * 100], [t, t + 100], color="black", lw=1.1, ls="dashed")
-        ax.plot([], [], color="black", lw=1.1, ls="dashed", label=f"{view.speed:.2g} m/s")
-    if name == "track" and view.track is not None:
-        length = 1e3 * path.length
-        turns = int(view.track.times[-1] * path.drawing_frequency) + 1
-        for n in range(turns):
-            t = 1e3 * n / path.drawing_frequency
-            ax.plot([0, length], [t, t + length / path.speed], color="black", lw=1.1)
-        ax.plot([], [], color="black", lw=1.1, label=f"{path.speed:g} m/s")
-    ax.set_xlim(limits[0])
-    ax.set_ylim(limits[1])
-    handles, labels = ax.get_legend_handles_labels()
-    if handles:
-        if ax.figure.get_figwidth() >= NARROW:  # type: ignore[union-attr]
-            labels = [f"{LINES[name][0]}, {labels[0]}"]
-        ax.legend(handles, labels, loc="upper right", fontsize=small(), framealpha=0.9,
-                  labelcolor="black", facecolor="white", handlelength=1.3)  # fmt: skip

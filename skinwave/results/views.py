@@ -21,11 +21,10 @@ from simple_model.layers.flat_body import steady_lines
 from simple_model.load.spectrum import pressure_lines, synthesise
 from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity, quantity
 from skinwave.bodies.analytic import compliance
-from skinwave.models.meshed import surface_motion
 from skinwave.models.plate_modes import steady_lines as plate_lines
 from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.reduction import oscillating, read_at
-from skinwave.models.speeds import repeated, shown_part, strongest_tone
+from skinwave.models.speeds import shown_part, strongest_tone
 from skinwave.models.stretched_plate import STRETCHED, settled
 from skinwave.results.motion import BodyMotion, check_values, vibration
 from skinwave.results.nodal import Shade, Tensors, shade, tensors
@@ -36,29 +35,14 @@ from skinwave.scene.scene import Scene
 from skinwave.system.json_kinds import effort_of, fitting
 
 STRONG = 0.1  # of the strongest line: weaker ones need no frames of their own
-SLOWEST = 20.0  # Hz: slower tones are not followed by diagrams of motion over place and time
 GRID, LAYER_GRID = 121, 81  # points along a side of the surface of the point kernel, of a layer
-ALONG, INSTANTS = 161, 241  # places and times of a diagram of motion over place and time
 TYPICAL = 140.0  # Hz, where nothing vibrates
 FIELD_FRAMES = 8  # of those that are shown, written for other programs
 PLATE_TOLERANCE = 0.05  # of the motion of a sheet at large deflection
-ROOM = 5e-3  # m beside the path that waves can be watched in
 
 Singles = NDArray[np.float32]
 LinesAt = Callable[[Floats], Lines]  # places (q, 2) -> frequencies (f,) in Hz, lines (f, q)
 MotionAt = Callable[[Floats, Floats], Floats]  # places (q, 2), times (t,) -> (t, q)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Trace:
-    """Motion (t, q) along a line, in the unit of its view, nan off the body: `places` (q, 2) in
-    metre, `distance` (q,) in metre along it, `times` (t,) in s.
-    """
-
-    places: Floats
-    distance: Floats
-    times: Floats
-    motion: Floats
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,8 +59,6 @@ class View:
         the whole pattern, see `speeds.shown_part`
     motion : (f, n, 3) float32, metre; of the point kernel the pressure in Pa, along the push
     tone : Hz, the line that moves the surface most; speed : m/s, of a surface wave there, or None
-    ray : outwards along x from the path's outermost point; track : along the path, None if the
-        focus rests; both in the steady state, about the mean
     tensors : strain and stress at some of its times, of a solid body that was saved; shade : the
         quantity that colours it, instead of its motion; moved : the motion that it was made of,
         which no file keeps
@@ -95,8 +77,6 @@ class View:
     motion: Singles
     tone: float
     speed: float | None
-    ray: Trace
-    track: Trace | None
     effort: Effort = field(default_factory=Effort)
     tensors: Tensors | None = None
     shade: Shade | None = None
@@ -164,20 +144,12 @@ def body_view(
     seen = read_at(oscillating(moved.motion), inwards @ basis)
     tone = strongest_tone(seen.frequencies, np.abs(seen.lines))
 
-    def motion_at(places: Floats, t: Floats) -> Floats:
-        build, found = moved.build, np.full((len(t), len(places)), np.nan)
-        on = fem.on_surface(build.mesh, places)
-        read = surface_motion(scene.body, build, places[on]) @ moved.basis
-        found[:, on] = vibration(moved, t) @ read.T
-        return found
-
-    reach = np.array([scene.body.width, scene.body.height]) / 2
     return View(
         body=body, model="fem", quantity=DISPLACEMENT, scene=scene, points=mesh.points,
         tets=mesh.tets, surface=surface, triangles=triangles, period=period, times=times,
         motion=motion.reshape(frames, -1, 3).astype(np.float32), tone=tone,
         speed=scene.body.of_kind.wave_speed(scene.body, tone or TYPICAL), effort=moved.effort,
-        moved=moved, ray=_ray(scene, reach, motion_at), track=_track(scene, motion_at),
+        moved=moved,
     )  # fmt: skip
 
 
@@ -220,7 +192,7 @@ def kernel_view(scene: Scene, reach: Floats, part: tuple[float, int] | None = No
         f, lines = pressure_lines(pressure, _grid(reach, GRID)[0])
         part = shown_part(pressure, _fastest(f[f > 0], (np.abs(lines[f > 0]) ** 2).sum(axis=1)))
     found = _flat_view(
-        scene, "none", SAME_LOAD.name, part, _grid(reach, GRID), reach,
+        scene, "none", SAME_LOAD.name, part, _grid(reach, GRID),
         lambda places: pressure_lines(pressure, places), motion_at,
     )  # fmt: skip
     return replace(found, quantity=PRESSURE)
@@ -236,7 +208,7 @@ def layer_view(run: Run, reach: Floats, part: tuple[float, int]) -> View:
         return steady_lines(waves_of, run.scene.pressure, places, threshold=FAINT)
 
     shape = _grid(reach, LAYER_GRID)
-    return _of_run(run, _flat_view(run.scene, run.body, run.model, part, shape, reach, lines_at))
+    return _of_run(run, _flat_view(run.scene, run.body, run.model, part, shape, lines_at))
 
 
 def plate_view(run: Run, part: tuple[float, int]) -> View:
@@ -254,7 +226,7 @@ def plate_view(run: Run, part: tuple[float, int]) -> View:
     if run.model == STRETCHED.name:
         lines_at, motion_at = _stretched(scene, np.array(middle))
     shape = points, triangles
-    found = _flat_view(scene, run.body, run.model, part, shape, reach, lines_at, motion_at)
+    found = _flat_view(scene, run.body, run.model, part, shape, lines_at, motion_at)
     return _of_run(run, found)
 
 
@@ -285,7 +257,7 @@ def _stretched(scene: Scene, middle: Floats) -> tuple[LinesAt, MotionAt]:
 
 def _flat_view(
     scene: Scene, body: str, model: str, part: tuple[float, int], shape: tuple[Floats, Ints],
-    reach: Floats, lines_at: LinesAt, motion_at: MotionAt | None = None,
+    lines_at: LinesAt, motion_at: MotionAt | None = None,
 ) -> View:  # fmt: skip
     """The view of a flat surface of points (p, 3) and triangles, from its lines at any places;
     `motion_at` its motion, if it is not the sum of these lines.
@@ -306,7 +278,7 @@ def _flat_view(
         body=body, model=model, quantity=DISPLACEMENT, scene=scene, points=points,
         tets=np.zeros((0, 10), np.int64), surface=np.arange(len(points)), triangles=triangles,
         period=period, times=times, motion=motion, tone=tone,
-        speed=None, ray=_ray(scene, reach, motion_at), track=_track(scene, motion_at),
+        speed=None,
     )  # fmt: skip
 
 
@@ -316,20 +288,9 @@ def path_points(scene: Scene, count: int = 241) -> Floats:
     return path.at_phase(np.zeros(1) if path.is_static else np.linspace(0, 1, count))
 
 
-def starting_time(scene: Scene, place: Floats) -> float:
-    """When, in s, the focus first comes by a place (2,) on its path."""
-    path = scene.tacton.trajectory
-    phases = np.linspace(0, 1, 720, endpoint=False)
-    nearest = np.argmin(np.linalg.norm(path.at_phase(phases) - place, axis=1))
-    return 0.0 if path.is_static else float(phases[nearest] / path.drawing_frequency)
-
-
 def save(path: Path, view: View) -> None:
     """A view as one npz file."""
     arrays: dict[str, Any] = {n: getattr(view, n) for n in ARRAYS}
-    for name in ("ray", "track"):
-        if (trace := getattr(view, name)) is not None:
-            arrays |= {f"{name}_{key}": value for key, value in asdict(trace).items()}
     if (kept := with_tensors(view).tensors) is not None:
         arrays |= {f"{TENSORS}{key}": value for key, value in vars(kept).items()}
     meta = {n: getattr(view, n) for n in META} | {
@@ -352,7 +313,6 @@ def load(path: Path) -> View:
         fitting(meta, FITTING, "meta")
         meta |= {"scene": loads(meta["scene"]), "effort": effort_of(meta["effort"], "effort")}
         meta |= {"quantity": quantity(meta["quantity"]), "tensors": _tensors(arrays)}
-        meta |= {name: _trace(arrays, name) for name in ("ray", "track")}
         found: dict[str, Any] = {n: arrays[n] for n in ARRAYS} | meta
         return _checked(View(**found))
     except (KeyError, TypeError, ValueError, RecursionError) as error:
@@ -397,13 +357,6 @@ def _check_numbers(numbers: Ints, most: int, name: str) -> None:
         raise ValueError(f"'{TENSORS}{name}' has numbers beyond {most}")
 
 
-def _trace(arrays: Mapping[str, Any], name: str) -> Trace | None:
-    keys = ("places", "distance", "times", "motion")
-    if f"{name}_places" not in arrays:
-        return None
-    return Trace(**{key: arrays[f"{name}_{key}"] for key in keys})
-
-
 def _tensors(arrays: Mapping[str, Any]) -> Tensors | None:
     keys = [key.name for key in fields(Tensors)]
     if f"{TENSORS}{keys[0]}" not in arrays:
@@ -437,30 +390,3 @@ def _grid(reach: Floats, side: int) -> tuple[Floats, Ints]:
     b = a + side
     triangles = np.vstack([np.stack([a, b, b + 1], 1), np.stack([a, b + 1, a + 1], 1)])
     return np.column_stack([X.ravel(), Y.ravel(), np.zeros(X.size)]), triangles
-
-
-def _ray(scene: Scene, reach: Floats, motion_at: MotionAt) -> Trace:
-    path = path_points(scene)
-    origin = path[np.argmax(path[:, 0])]
-    room, way = 0.98 * reach[0] - origin[0], 1.0
-    if room < ROOM:  # the path ends where the body does
-        room, way = 0.98 * reach[0] + origin[0], -1.0
-    distance = np.linspace(0, room, ALONG)
-    places = origin + way * np.column_stack([distance, 0 * distance])
-    return _traced(scene, places, distance, motion_at)
-
-
-def _track(scene: Scene, motion_at: MotionAt) -> Trace | None:
-    path = scene.tacton.trajectory
-    if path.is_static:
-        return None
-    phases = np.linspace(0, 1, ALONG)
-    return _traced(scene, path.at_phase(phases), phases * path.length, motion_at)
-
-
-def _traced(scene: Scene, places: Floats, distance: Floats, motion_at: MotionAt) -> Trace:
-    """Motion through two periods of the slowest tone, or of the path if that is slower."""
-    path = scene.tacton.trajectory.drawing_frequency
-    tones = [f for f in repeated(scene.tacton).values() if f >= SLOWEST] + [path] * bool(path)
-    times = np.arange(INSTANTS) / INSTANTS * 2 / min(tones, default=SLOWEST)
-    return Trace(places=places, distance=distance, times=times, motion=motion_at(places, times))

@@ -1,7 +1,7 @@
 """Every picture of an album, drawn once: parts of a page, with their files."""
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -68,12 +68,10 @@ def pictures(album: Album, gallery: Gallery, progress: Progress) -> list[Part]:
         parts = _spatial(own, frame, views, gallery, progress)
     caption = f"{label(own.column)}, to turn with the mouse, a finger or the arrow keys. {TURNED}"
     parts.append(inner_page(turntable(own, frame), caption))
-    drawings: dict[str, tuple[Callable[[Sequence[View], Style], Figure], str]] = {
-        "snapshots": (maps.snapshots_figure, SNAPSHOTS), "waves": (maps.waves_figure, WAVES),
-    }  # fmt: skip
-    for name, (draw, caption) in drawings.items():
-        progress(f"draw {name}", 0.0)
-        parts.append(gallery.figure(name, draw(views, gallery.style), caption))
+    progress("draw snapshots", 0.0)
+    parts.append(
+        gallery.figure("snapshots", maps.snapshots_figure(views, gallery.style), SNAPSHOTS)
+    )
     return parts
 
 
@@ -188,14 +186,6 @@ SNAPSHOTS = (
     "focus later (of a period of the strongest line, if it rests). Behind a focus that is faster "
     "than the surface wave, the Mach angle asin(c/v); no clean cone forms on a circle smaller than "
     "a wavelength."
-)
-WAVES = (
-    "Motion over place and time in the steady state, two periods of the slowest tone. Above: "
-    "outwards along x from the path's outermost point; the dashed lines are those of a surface "
-    "wave of the strongest line, far from its source, in a half-space or an infinite sheet. Near "
-    "the path and in thin slabs the phase runs ahead of them, in a clamped sheet waves stand, and "
-    "in the point kernel nothing propagates. Below: along the path; the focus runs along the black "
-    "lines."
 )
 LOADS = (
     "The kernel as published has the paper's load, a linear drive in a sinc^2 main lobe; all "

@@ -21,10 +21,7 @@ from legible import illegible, sizes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
-from fem import PRESETS
 from simple_model import MovingPressure, Tacton, Trajectory, pattern_period, published
-from simple_model.layers.flat_body import steady_lines
-from skinwave.bodies.analytic import compliance
 from skinwave.commands.cli import main
 from skinwave.models import speeds
 from skinwave.report import films, maps, render
@@ -144,38 +141,6 @@ def test_the_kernels_brightest_place_lies_on_the_path(seen):
         if frame.max() > 0.2 * view.peak:  # where the modulation is not at its zero
             focus = view.scene.tacton.trajectory.position(float(t))
             assert np.linalg.norm(view.places[frame.argmax()] - focus) < 1.5 * step
-
-
-def apparent_speed(distances, times, motion, frequency):
-    """Apparent phase speed in m/s of a line of motion (t, p) along distances (p,) in metre.
-
-    The phase of its part at `frequency` Hz is fitted by a straight line, weighted by amplitude;
-    the times (t,) in s should span whole periods. Negative where waves come in.
-    """
-    wave = motion.T @ np.exp(-2j * np.pi * frequency * times)
-    phase = np.unwrap(np.angle(wave))
-    slope = np.polyfit(distances, phase, 1, w=np.abs(wave))[0]
-    return float(-2 * np.pi * frequency / slope)
-
-
-@pytest.mark.slow
-def test_the_wake_of_a_fast_focus_runs_at_the_speed_of_surface_waves():
-    """Slope of the x-t diagram outside the path, Rayleigh speed, and wavenumber integral."""
-    soft = replace(PRESETS["palm"], viscosity=2.0)
-    body = Body(width=0.06, height=0.05, material=soft)
-    scene = Scene(pressure=circling(250.0), body=body, probes=((0.0, 0.0),))
-    view = views.body_view(scene, "skin-slab", motion.waves(scene, 0.3, h=0.0045), (0.02, 4))
-    outside = (view.ray.distance > 0.005) & (view.ray.distance < 0.03)
-    distance, times = view.ray.distance[outside], view.ray.times
-    found = apparent_speed(distance, times, view.ray.motion[:, outside], 250.0)
-    frequencies, lines = steady_lines(
-        compliance(body), scene.pressure, view.ray.places[outside]
-    )  # fmt: skip
-    line = lines[np.argmin(np.abs(frequencies - 250))]
-    exact = (np.exp(2j * np.pi * 250 * times)[:, None] * line).real
-    assert found == pytest.approx(body.of_kind.wave_speed(body, 250.0), rel=0.05)
-    assert found == pytest.approx(apparent_speed(distance, times, exact, 250.0), rel=0.05)
-    assert scene.tacton.trajectory.speed > 2 * found  # there is a wake
 
 
 def test_a_sheet_bends_at_the_speed_of_plates():
@@ -321,7 +286,7 @@ def test_no_text_of_a_figure_is_cut(folder, dressed):
     kept = album.open_album(folder)
     chosen = style("report", 3.5) if dressed == "narrow" else style(dressed)
     shown, runs = list(kept.views.values()), gallery.tactons(kept)["small"]
-    figures = [draw(shown, chosen) for draw in (maps.snapshots_figure, maps.waves_figure)]
+    figures = [maps.snapshots_figure(shown, chosen)]
     figures += [surfaces_figure(kept.scene, kept.maps, chosen)]
     figures += [tacton_figure("small", runs, chosen), levels_figure(runs, 0, chosen)]
     for figure in figures:
@@ -377,8 +342,8 @@ def test_a_report_is_rebuilt_without_a_model_and_without_gl(folder, tmp_path, mo
     assert main(["report", str(folder), "--out", str(tmp_path / "flat"), "--quiet"]) == 0
     text = (tmp_path / "flat/index.html").read_text()
     assert "apt install libegl1 libgl1-mesa-dri" in text
-    assert text.count("data:image/") == 6
-    assert (tmp_path / "flat/pictures/waves.png").exists()
+    assert text.count("data:image/") == 5
+    assert (tmp_path / "flat/pictures/snapshots.png").exists()
     assert not (tmp_path / "flat/pictures/film.gif").exists()
 
 
