@@ -182,7 +182,9 @@ class _TakenError(ValueError):
 
 def _refuse_folder(out: Path, overwrite: bool, inputs: Iterable[str | Path]) -> None:
     """Refuse a target that exists, unless it may be replaced and holds nothing of the user's."""
-    if not os.path.lexists(out):
+    try:
+        out.lstat()  # refuses a name that is too long now, not when all is computed
+    except FileNotFoundError:
         return
     if not overwrite:
         raise ValueError(f"{out} exists and is kept; pass --overwrite or another --out")

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from corpus import GOOD, SMALL
 
-from skinwave.commands.cli import main, parser
+from skinwave.commands.cli import main
 from skinwave.commands.common import progress_of
 from skinwave.system.progress_bar import follower
 
@@ -25,7 +25,7 @@ def table(path):
 
 
 def test_run_leaves_a_folder_that_reproduces_it(scene, capsys):
-    fem = ["--model", "fem", "--h", "6"]
+    fem = ["--model", "fem", "--element-size", "6"]
     assert main(["run", str(scene), "--out", "first", *fem, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["model"] == "fem"
     assert main(["run", "first/scene.toml", "--out", "second", *fem, "--quiet"]) == 0
@@ -42,7 +42,17 @@ def test_run_leaves_a_folder_that_reproduces_it(scene, capsys):
 @pytest.mark.parametrize("model", ["point-kernel", "flat-body", "fem-harmonic", "fem-transient"])
 def test_run_with_each_model(scene, model):
     scene.write_text(CLAMPED)
-    arguments = ["run", str(scene), "--model", model, "--h", "15", "--dt", "1e-4", "--quiet"]
+    arguments = [
+        "run",
+        str(scene),
+        "--model",
+        model,
+        "--element-size",
+        "15",
+        "--dt",
+        "1e-4",
+        "--quiet",
+    ]
     assert main(arguments) == 0
     rows = table(scene.parent / "short-out/lines.csv")
     assert {row["model"] for row in rows} == {model}
@@ -55,7 +65,7 @@ def test_compare_a_scene_of_ones_own(scene, capsys):
     scene.write_text(
         CLAMPED.replace("duration_s = 0.05", "duration_s = 0.3")
     )  # to tell lines apart
-    assert main(["compare", str(scene), "--h", "6", "--out", "both"]) == 0
+    assert main(["compare", str(scene), "--element-size", "6", "--out", "both"]) == 0
     assert "3 of 3 runs" in capsys.readouterr().out
     folder = scene.parent / "both"
     rows = table(folder / "lines.csv")
@@ -101,7 +111,7 @@ def refused(capsys, *arguments):
 def test_a_run_without_the_cache_leaves_nothing_in_it(scene, monkeypatch, tmp_path, capsys):
     monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path / "cache"))
     scene.write_text(GOOD)  # soon reduced
-    run = ["run", str(scene), "--model", "fem", "--h", "10", "--quiet", "--overwrite"]
+    run = ["run", str(scene), "--model", "fem", "--element-size", "10", "--quiet", "--overwrite"]
     assert main([*run, "--no-cache"]) == 0
     assert not (tmp_path / "cache").exists()
     assert os.environ["SKINWAVE_CACHE"] == str(tmp_path / "cache")  # as before
@@ -150,9 +160,9 @@ def test_bad_input_is_one_sentence(scene, capsys):
     scene.write_bytes(b"\xff\xfe\x00")
     assert "short.toml" in refused(capsys, "run", scene)
     scene.write_text(SMALL)
-    assert "element size -1 mm must" in refused(capsys, "run", scene, "--h", "-1")
+    assert "element size -1 mm must" in refused(capsys, "run", scene, "--element-size", "-1")
     assert "time step -1 s" in refused(
-        capsys, "run", scene, "--h", "15", "--model", "fem-transient", "--dt", "-1"
+        capsys, "run", scene, "--element-size", "15", "--model", "fem-transient", "--dt", "-1"
     )
     assert not (scene.parent / "short-out").exists()
 
@@ -195,7 +205,7 @@ def test_ctrl_c_leaves_what_is_finished(scene, monkeypatch, capsys):
     """Both kernels are finished before the body is reduced."""
     scene.write_text(CLAMPED)
     monkeypatch.setattr("skinwave.studies.study.prepare", interrupted)
-    assert main(["compare", str(scene), "--h", "8", "--out", "cut", "--quiet"]) == 1
+    assert main(["compare", str(scene), "--element-size", "8", "--out", "cut", "--quiet"]) == 1
     page = (scene.parent / "cut/index.html").read_text()
     assert "Interrupted: 2 of 3 runs" in page
     found = sorted((scene.parent / "cut").glob("*/*/responses.npz"))
@@ -217,7 +227,16 @@ def test_what_a_page_is_warned_of_is_on_it_whoever_planned(tmp_path, capsys, mon
         ("fem", "elements of 15 mm will have a relative error"),
         ("flat-body", "flat-body, which leaves out reflections"),
     ):
-        asked = ["run", "scene.toml", "--model", model, "--h", "15", "--quiet", "--overwrite"]
+        asked = [
+            "run",
+            "scene.toml",
+            "--model",
+            model,
+            "--element-size",
+            "15",
+            "--quiet",
+            "--overwrite",
+        ]
         assert main(asked) == 0
         said = capsys.readouterr().err
         assert said.count(f"warning: {cause}") == 1
@@ -238,11 +257,3 @@ def test_a_body_too_demanding_for_any_mesh_is_said_to_be(tmp_path, capsys, monke
     assert "warning: elements of" in said
     assert "more than the tolerance of 0.1 %" in said
     assert "Take care: elements of" in (tmp_path / "scene-out/index.html").read_text()
-
-
-@pytest.mark.parametrize("command", ["run scene.toml", "relax scene.toml", "mesh hand.stl"])
-def test_the_element_size_has_its_name_of_0_2_too(command):
-    sizes = [
-        parser().parse_args([*command.split(), name, "3"]).h for name in ("--element-size", "--h")
-    ]
-    assert sizes == [3.0, 3.0]

@@ -228,6 +228,10 @@ def test_a_full_disk_is_said_with_place_and_cure(folder, capsys, monkeypatch):
     assert "make room" in said
 
 
+def test_a_name_that_is_too_long_is_refused_before_anything_is_computed(folder, capsys):
+    refused(capsys, *RUN, "--out", "n" * 300)
+
+
 def test_a_file_appears_whole_and_not_over_another(folder):
     with output_path(folder / "o.csv") as aside:
         aside.write_text("later")
