@@ -141,7 +141,12 @@ def best_value(
     cases : combinations of values -> cases
     variation : of the key
     column : of the table
-    samples : of the spreads, `SAMPLES` if not given, with their `seed`
+    samples : of the spreads, `SAMPLES` if not given
+    seed : of the samples
+
+    Returns
+    -------
+    Best
 
     Raises
     ------

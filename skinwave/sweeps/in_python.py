@@ -121,11 +121,12 @@ def sweep(
     design : "factorial", every value with every other; "zip", first with first; "lhs" or "sobol"
     samples : int, runs of "lhs", rows of each matrix of "sobol"
     seed : int, of the samples
-    **options : model, tolerance, h and solver of every run, as for `skinwave.simulate`; the
-        `folder` where rows are kept and an interrupted sweep is resumed; the `scheduler`,
-        "threads", "processes" (of a script with a main guard), or the address of a Dask scheduler;
-        `workers`, how many runs go on at a time on this machine; `progress`, True for a bar, or
-        called with the name of the phase and the fraction done
+    **options
+        Model, tolerance, h and solver of every run, as for `skinwave.simulate`; the `folder` where
+        rows are kept and an interrupted sweep is resumed; the `scheduler`, "threads", "processes"
+        (of a script with a main guard), or the address of a Dask scheduler; `workers`, how many
+        runs go on at a time on this machine; `progress`, True for a bar, or called with the name
+        of the phase and the fraction done.
 
     Returns
     -------
@@ -164,7 +165,8 @@ def best_value(
     column : of the table, such as "level_db[0]"; without an index, the largest over the probes
     samples : int, of the spreads of the scene, for the interval; 199 if not given
     seed : int, of the samples
-    **options : as for `sweep`
+    **options
+        As for `sweep`.
 
     Returns
     -------
