@@ -67,6 +67,10 @@ class Quantity:
     relaxes: bool = False
     invariant: Callable[[Floats], Floats] | None = None
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled by its name, so that other processes have the one that is registered."""
+        return quantity, (self.name,)
+
     @property
     def of_body(self) -> bool:
         """Whether it is of a body; the point kernel's pressure is of none."""
