@@ -333,7 +333,7 @@ def test_a_report_is_rebuilt_without_a_model_and_without_gl(folder, tmp_path, mo
     def run(*arguments, **options):
         raise AssertionError("a model was run")
 
-    for name in ("waves", "plan", "compute", "follow", "required_plan", "kernel_view"):
+    for name in ("waves", "plan", "compute", "solve", "kernel_view"):
         monkeypatch.setattr(album, name, run)
     monkeypatch.setattr(gallery, "renderer", lambda: NO_GL)
     blank = BytesIO()  # what is on the figures is looked at in those of `page`
