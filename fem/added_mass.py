@@ -16,6 +16,8 @@ much energy as a loss factor of 0.006 to 0.007 from modes with a net volume disp
 clamped sheet of office paper, 100 mm wide, below 300 Hz.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -52,8 +52,17 @@ class EnergyBalance:
 def with_energy_balance(
     operators: Operators, states: Iterator[State], force: Callable[[float], Floats]
 ) -> Iterator[tuple[State, EnergyBalance]]:
-    """States of `transient` from rest, each with the energy balance so far in J, under the nodal
-    forces (3 n,) in N of a time that drive them.
+    """Add the energy balance to the states of a transient solution.
+
+    Parameters
+    ----------
+    operators : Operators
+    states : of `transient`, from rest
+    force : nodal forces (3 n,) in N by time in s, which drive them
+
+    Yields
+    ------
+    State, and its energy balance so far in J
     """
     C, R, free = operators.C, operators.R, operators.free
 

@@ -133,8 +133,15 @@ def _inwards(mesh: TetMesh, nodes: Ints, N: Floats, normals: Floats) -> sparse.c
 def surface_frame(
     mesh: TetMesh, points: ArrayLike, facets: str | Ints = "top", *, patch: float = 0.0
 ) -> tuple[Floats, Floats]:
-    """Places (p, 3) in metre on a surface and unit normals (p, 3) out of the body there, with
-    parameters and errors of `probe_operator`.
+    """Find places on a surface, and its normals there.
+
+    Parameters
+    ----------
+    mesh, points, facets, patch : as of `probe_operator`, which raises the same errors
+
+    Returns
+    -------
+    (p, 3) float, metre, and (p, 3) unit normals out of the body
     """
     nodes, N, normals = _surface_frame(mesh, points, facets, patch)
     return np.einsum("pa,pai->pi", N, mesh.points[nodes]), normals
@@ -210,7 +217,18 @@ def on_curved(elements: Floats, barycentric: Floats, points: Floats) -> Floats:
 
 
 def on_surface(mesh: TetMesh, points: Floats, facets: str | Ints = "top") -> Bools:
-    """Mask (p,) of the points (p, 2) in metre at which `probe_operator` can read."""
+    """Find the points at which `probe_operator` can read.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    points : (p, 2) float, metre
+    facets : name of a facet set, or its facets
+
+    Returns
+    -------
+    (p,) bool
+    """
     return _seen(mesh.points[facet_set(mesh, facets)], points)[0] >= 0
 
 

@@ -22,13 +22,18 @@ def geometry(mesh: TetMesh, facets: Ints) -> tuple[Floats, Floats]:
 def tag_boundary(
     mesh: TetMesh, *, rest: str | None = None, **parts: Predicate | np.ndarray
 ) -> TetMesh:
-    """The mesh with its boundary as the facet set `surface`, and parts of it by name.
+    """Return the mesh with its boundary as the facet set `surface`, and parts of it by name.
 
     Parameters
     ----------
+    mesh : TetMesh
     rest : name of the facets that are in no part, if wanted.
     parts : name -> a function of centroids (k, 3) and outward normals (k, 3) that tells which of
         the boundary facets belong to it, or an array (k,) that does. Parts may overlap.
+
+    Returns
+    -------
+    TetMesh
     """
     facets = boundary_facets(mesh.tets)
     centroids, normals = geometry(mesh, facets)

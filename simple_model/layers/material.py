@@ -300,7 +300,18 @@ class Material:
 
 
 def from_young(*, young: float, poisson: float, **rest: Any) -> Material:
-    """Material by its Young's modulus in Pa; the rest as in `Material`."""
+    """Material by its Young's modulus.
+
+    Parameters
+    ----------
+    young : float, Pa
+    poisson : float
+    **rest : as of `Material`
+
+    Returns
+    -------
+    Material
+    """
     return Material(shear_modulus=young / (2 * (1 + poisson)), poisson=poisson, **rest)
 
 

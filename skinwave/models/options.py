@@ -1,5 +1,7 @@
 """Options of a solution, and the times at which it is sampled."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Any

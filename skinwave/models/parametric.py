@@ -128,6 +128,10 @@ def prepare(
     h : float, metre, element size; the default of the body if not given
     solver : a backend of `fem.linear_solver`
 
+    Returns
+    -------
+    ParametricBody
+
     Raises
     ------
     ValueError

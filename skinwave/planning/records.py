@@ -1,5 +1,7 @@
 """Records of a plan: its choices, each with a reason, and what it leaves out."""
 
+from __future__ import annotations
+
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
