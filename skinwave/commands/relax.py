@@ -5,7 +5,6 @@ from pathlib import Path
 
 from skinwave.commands.common import (
     add_output,
-    add_scene,
     add_size,
     metre,
     progress_of,
@@ -13,10 +12,15 @@ from skinwave.commands.common import (
     warn,
 )
 
+BOTH = "paper-vs-skin"
+
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
-    add_scene(parser)
+    parser.add_argument(
+        "scene", metavar="SCENE",
+        help=f"scene file (TOML), or {BOTH}: which mechanism makes which line of the 15 Tactons",
+    )  # fmt: skip
     add_size(parser, help="element size of all steps, mm")
     parser.add_argument(
         "--update-rate", type=float, default=20.0, metavar="KHZ",
@@ -45,8 +49,10 @@ def run(options: argparse.Namespace) -> int:
     SolveOptions(h=h)  # which refuses what is out of range
     rate = 1e3 * options.update_rate
     check_rate(rate)
+    if options.scene == BOTH:
+        return _paper_vs_skin(options)
     scene = read(options.scene)
-    out = options.out or Path(f"{options.scene.stem}-relaxed")
+    out = options.out or Path(f"{Path(options.scene).stem}-relaxed")
     inputs = [options.scene, scene.body.file]
     with output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
         with progress_of(options) as progress:
@@ -59,4 +65,23 @@ def run(options: argparse.Namespace) -> int:
     failed = [f"'{step.name}' failed: {step.error}" for step in found.steps if step.error]
     summary = {"out": str(out), "sentences": sentences, "failed": failed, "warnings": warnings}
     summarise(options, summary, "\n".join([*sentences, *failed, f"open {out}/index.html"]))
+    return 0
+
+
+def _paper_vs_skin(options: argparse.Namespace) -> int:
+    from skinwave.results import record
+    from skinwave.results.outputs import output_folder
+    from skinwave.studies.paper_vs_skin import paper_vs_skin, report, sentences
+
+    if options.points is not None:
+        raise ValueError(f"--points is of a scene's path; leave it out with {BOTH}")
+    out = options.out or Path(BOTH)
+    with output_folder(out, overwrite=options.overwrite) as folder:
+        with progress_of(options) as progress:
+            found = paper_vs_skin(progress, h=metre(options.h))
+        report(found).write(folder)
+        record.write(folder, record.of_command(options))
+    said = [*sentences(found), *found.failed]
+    summarise(options, {"out": str(out), "sentences": said},
+              "\n".join([*said, f"open {out}/index.html"]))  # fmt: skip
     return 0

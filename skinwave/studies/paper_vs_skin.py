@@ -1,0 +1,239 @@
+"""Paper versus skin: which mechanism makes which spectral line of the 15 Tactons.
+
+Lim, Seifi and Park (CHI EA '24) measured lines on paper that their model lacks. Here the same
+Tactons are driven by a linear load, by the square of the sound's amplitude, and on a sheet that
+stretches as it bends; and one Tacton at a quarter, a half and the whole of the amplitude, because a
+line of the load keeps its ratio to f_AM when the drive is turned down, and a line of the sheet does
+not.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from meshes.tetmesh import Floats
+from simple_model import MovingPressure, Response, Tacton, Trajectory, lines, resolved_lines
+from skinwave.models.plate_modes import FROM_REST
+from skinwave.models.prepared import answer, prepare
+from skinwave.models.stretched_plate import STRETCHED
+from skinwave.planning.simulate import compute
+from skinwave.report.figures import png
+from skinwave.report.palette import colour, label, marker
+from skinwave.results.run import ASSESSED
+from skinwave.scene.paper15 import MEASURED_ON, tactons
+from skinwave.scene.scene import BODIES, PROBES, Body, Scene
+from skinwave.system.document import Picture, Report, Section
+from skinwave.system.effort import Progress
+from skinwave.system.table import Column, Table
+
+DURATION = 0.5  # s of each Tacton, of which the later half is read
+AMPLITUDES = (0.25, 0.5, 1.0)
+AM = 140.0  # Hz of the Tacton whose amplitude is varied
+NEGLIGIBLE_CHANGE = 1e-3  # relative, of a ratio over the amplitudes
+NEGLIGIBLE_RATIO = 1e-5  # of 2 f_AM to f_AM
+WEAKEST = -100.0  # dB re the strongest line of a run: weaker ones are round-off
+HIGHEST = 700.0  # Hz
+# Loads over one period of the modulation m = sin, relative to the largest: each has its own ratios
+# 2f/f, 3f/f and 4f/f, before the response of the body changes them.
+LOADS: Mapping[str, Callable[[Floats], Floats]] = {
+    "force follows the command, with a mean": lambda m: (1 + m) / 2,
+    "square of the sound's amplitude": lambda m: ((1 + m) / 2) ** 2,
+    "contact on one side only": lambda m: np.maximum(m, 0),
+    "clipped sound, squared": lambda m: np.maximum(m, 0) ** 2,
+    "square root of the command": lambda m: np.sqrt((1 + m) / 2),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Findings:
+    """Lines of every Tacton, ratios of one at several amplitudes, and which runs failed.
+
+    Parameters
+    ----------
+    levels : dB re the strongest line of the run, at the probe where each is strongest, by Tacton,
+        line and mechanism
+    ratios : 2 f_AM over f_AM at `AMPLITUDES`, by mechanism
+    failed : a sentence each
+    """
+
+    levels: Mapping[tuple[str, str], Mapping[str, float]]
+    ratios: Mapping[str, tuple[float, ...]]
+    failed: tuple[str, ...] = ()
+
+
+def paper_vs_skin(
+    progress: Progress,
+    *,
+    h: float | None = None,
+    patterns: Iterable[tuple[str, Tacton]] | None = None,
+    bodies: Mapping[str, Body] | None = None,
+) -> Findings:
+    """Run Tactons through the mechanisms on several bodies.
+
+    Parameters
+    ----------
+    progress : called with the name of the phase and the fraction done
+    h : metre, element size of solids; that of the body if not given
+    patterns : Tactons by name; the paper's 15 if not given
+    bodies : by name; the paper sheet and the skin slab if not given
+
+    Returns
+    -------
+    Findings
+    """
+    on = bodies or {name: BODIES[name] for name in MEASURED_ON}
+    chosen = [(n, replace(t, duration=DURATION)) for n, t in (patterns or tactons())]
+    still = Tacton(am_frequency=AM, duration=DURATION, trajectory=Trajectory())
+    levels: dict[tuple[str, str], dict[str, float]] = {}
+    ratios: dict[str, tuple[float, ...]] = {}
+    failed = []
+    for body_name, body in on.items():
+        for cause, (drive, ask) in _mechanisms(body, h, progress).items():
+            mechanism = f"{label(body_name)}: {cause}"
+            for k, (name, tacton) in enumerate(chosen):
+                progress(mechanism, k / (len(chosen) + 1))
+                scene = _scene(name, tacton, body, drive)
+                try:
+                    found = _levels(scene.pressure, _later_half(ask(scene)))
+                except ArithmeticError as error:
+                    failed.append(f"{name} on {mechanism}: {error}")
+                    continue
+                for line, level in found.items():
+                    levels.setdefault((name, line), {})[mechanism] = level
+            quieter = (replace(still, amplitude=amplitude) for amplitude in AMPLITUDES)
+            scenes = (_scene("amplitude", tacton, body, drive) for tacton in quieter)
+            ratios[mechanism] = tuple(_ratio(_later_half(ask(scene))) for scene in scenes)
+    return Findings(levels=levels, ratios=ratios, failed=tuple(failed))
+
+
+def _mechanisms(
+    body: Body, h: float | None, progress: Progress
+) -> Mapping[str, tuple[str, Callable[[Scene], Response]]]:
+    """Mechanism -> drive law, and the function that computes a scene's response with it."""
+    if not body.of_kind.is_plate:
+        linear = partial(answer, prepare(body, np.array(PROBES), progress, h=h))
+        return {"linear load": ("linear", linear), "squared load": ("pressure_squared", linear)}
+    bending, stretching = (partial(compute, model=each.name) for each in (FROM_REST, STRETCHED))
+    return {
+        "linear load": ("linear", bending),
+        "squared load": ("pressure_squared", bending),
+        "squared load, stretching": ("pressure_squared", stretching),
+    }
+
+
+def _scene(name: str, tacton: Tacton, body: Body, drive: str) -> Scene:
+    return Scene(name=name, pressure=MovingPressure(tacton=tacton, drive=drive), body=body)
+
+
+def _later_half(response: Response) -> Response:
+    """The later half of a response, after the transient."""
+    times, half = response.times, len(response.times) // 2
+    later = response.values[half:]
+    return replace(response, times=times[half:] - times[half], values=later)
+
+
+def _levels(pressure: MovingPressure, later: Response) -> dict[str, float]:
+    """Lines in dB re the strongest, at the probe where each is strongest.
+
+    A stretching sheet has lines that no load has: those that claims are about are looked for.
+    """
+    names, _ = resolved_lines(pressure, later, candidates=ASSESSED, highest=HIGHEST)
+    amplitudes = lines(later, list(names.values())).max(axis=1)
+    with np.errstate(divide="ignore"):
+        levels = 20 * np.log10(amplitudes / amplitudes.max(initial=np.finfo(float).tiny))
+    return {name: float(level) for name, level in zip(names, levels, strict=True)}
+
+
+def _ratio(later: Response) -> float:
+    once, twice = lines(later, [AM, 2 * AM])[:, 0]
+    return float(twice / once)
+
+
+def load_ratios() -> dict[str, tuple[float, ...]]:
+    """Amplitudes at 2f, 3f and 4f over that at f of each of `LOADS`."""
+    m = np.sin(2 * np.pi * (np.arange(4096) + 0.5) / 4096)
+    spectra = {name: np.abs(np.fft.rfft(load(m))) for name, load in LOADS.items()}
+    return {name: tuple((a[2:5] / a[1]).tolist()) for name, a in spectra.items()}
+
+
+def sentences(found: Findings) -> list[str]:
+    """Conclusions: lines explained, lines not explained, and the experiment that would decide."""
+    said = []
+    low = f"{100 * AMPLITUDES[0]:.0f}"
+    for mechanism, ratios in found.ratios.items():
+        if max(ratios) < NEGLIGIBLE_RATIO:
+            said.append(f"{mechanism}: no 2 f_AM at any amplitude.")
+        elif max(ratios) < (1 + NEGLIGIBLE_CHANGE) * min(ratios):
+            said.append(
+                f"{mechanism}: 2 f_AM is {ratios[-1]:.3f} of f_AM at {low} to 100 % of the "
+                "amplitude. It is a line of the load."
+            )
+        else:
+            said.append(
+                f"{mechanism}: 2 f_AM is {ratios[0]:.3g} of f_AM at {low} % of the amplitude and "
+                f"{ratios[-1]:.3g} at 100 %. It is a line of the sheet as well as of the load."
+            )
+    return [
+        *said,
+        "Linear waves add no line to those of the load. Multiples of f_AM and of f_d together need "
+        "a load with a mean. Contact and clipping were not simulated: the table has their pattern.",
+        "One experiment decides: the same Tacton at half and at full amplitude. If 2 f_AM / f_AM "
+        "stays the same, the line comes from the drive; if it grows, from the sheet.",
+    ]
+
+
+def report(found: Findings) -> Report:
+    """The page: conclusions, ratio over amplitude, lines by mechanism, and patterns of loads."""
+    caption = "Ratio of 2 f_AM to f_AM at the focus over the amplitude of the drive."
+    mechanisms = [*found.ratios]
+    by_mechanism = [Column(each, unit="dB", digits=2) for each in mechanisms]
+    levels = Table(
+        ["Tacton", "line", *by_mechanism],
+        [[*key, *map(partial(_shown, own), mechanisms)] for key, own in found.levels.items()],
+        name="lines",
+    )
+    ratios = Table(
+        ["mechanism", *(Column(f"{100 * each:.0f} %") for each in AMPLITUDES)],
+        [[mechanism, *own] for mechanism, own in found.ratios.items()], name="ratios",
+    )  # fmt: skip
+    patterns = Table(
+        ["load", "2f / f", "3f / f", "4f / f"], [[n, *own] for n, own in load_ratios().items()]
+    )
+    return Report(
+        title="Paper and skin: which mechanism makes which line",
+        verdict=[*sentences(found), *(f"Failed: {said}." for said in found.failed)],
+        parts=[
+            Picture(png(figure(found), dpi=130), caption, name="amplitude"),
+            Section("Lines by mechanism", [levels]),
+            Section("2 f_AM over f_AM by amplitude", [ratios]),
+            Section("Patterns of loads", [patterns]),
+        ],
+    )
+
+
+def _shown(levels: Mapping[str, float], mechanism: str) -> float | None:
+    level = levels.get(mechanism, -np.inf)
+    return level if level > WEAKEST else None
+
+
+def figure(found: Findings) -> Figure:
+    """2 f_AM / f_AM over amplitude, a curve for each mechanism that has the line."""
+    drawn = Figure(figsize=(7, 4), layout="constrained")
+    axes = drawn.add_subplot()
+    names = {label(name): name for name in BODIES}
+    curves = {m: own for m, own in found.ratios.items() if max(own) > NEGLIGIBLE_RATIO}
+    for mechanism, own in curves.items():
+        body, _, cause = mechanism.partition(": ")
+        name = names.get(body, body)
+        axes.plot(
+            [100 * each for each in AMPLITUDES], own, marker=marker(name), color=colour(name),
+            linestyle="--" if "stretching" in cause else "-", label=mechanism,
+        )  # fmt: skip
+    axes.set(xlabel="amplitude of the drive, %", ylabel=r"$2 f_{AM}$ / $f_{AM}$", yscale="log")
+    axes.grid(alpha=0.3)
+    if curves:
+        drawn.legend(loc="outside lower center", ncols=2, frameon=False)
+    return drawn
