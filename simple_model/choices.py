@@ -8,22 +8,8 @@ SHORTEST, LONGEST = 3, 60  # letters: of a part of a word that is near, and that
 
 
 def choose(what: str, value: str, known: Iterable[str]) -> str:
-    """Return the value, if it is among those known.
-
-    Parameters
-    ----------
-    what : name of the value in the message
-    value : what was asked for
-    known : all that is allowed
-
-    Returns
-    -------
-    the value
-
-    Raises
-    ------
-    ValueError
-        With all known words, and the nearest of them if it is near.
+    """Return the value, if it is among those known; otherwise raise a ValueError that names `what`,
+    all known words, and the nearest of them if it is near.
     """
     known = list(known)
     if value in known:

@@ -47,16 +47,8 @@ def place_name(place: Floats) -> str:
 
 
 def curves(ax: "Axes", x: Floats, values: Floats, places: Floats, **style: Any) -> None:
-    """Draw a curve for each probe, from dark to bright, and a legend of at most `NAMED` of them.
-
-    Parameters
-    ----------
-    ax : Axes
-    x : (k,) float, along the axis
-    values : (k, p) float
-    places : (p, 2) float, metre, of the probes
-
-    Anything else is a property of matplotlib's lines.
+    """Draw a curve of values (k, p) along x (k,) for each probe, at places (p, 2) in metre, from
+    dark to bright, with a style of matplotlib's lines and a legend of at most `NAMED` of them.
     """
     import matplotlib as mpl
 
@@ -77,17 +69,7 @@ def curves(ax: "Axes", x: Floats, values: Floats, places: Floats, **style: Any) 
 
 
 def picture(draw: Callable[["Figure"], object], width: float, height: float) -> bytes:
-    """Draw a figure, as a PNG file in memory.
-
-    Parameters
-    ----------
-    draw : what is called with the figure
-    width, height : float, inch
-
-    Returns
-    -------
-    bytes
-    """
+    """PNG file of a figure of a width and height in inch, which a function draws."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
@@ -111,18 +93,8 @@ def table(rows: Iterable[Sequence[str]], header: Sequence[str] = ()) -> str:
 
 
 def page(title: str, image: bytes, tables: Iterable[str], warnings: Iterable[str] = ()) -> str:
-    """Small page of a record: figure, tables and warnings.
-
-    Parameters
-    ----------
-    title : of the page, and what the figure is called where it cannot be seen
-    image : PNG file, empty if there is none
-    tables : HTML
-    warnings : sentences
-
-    Returns
-    -------
-    HTML
+    """Small page in HTML of a record: a figure in PNG, if there is one, tables in HTML, and
+    warnings in sentences.
     """
     shown = b64encode(image).decode()
     figure = f'<img alt="{escape(title)}" src="data:image/png;base64,{shown}">' if image else ""

@@ -22,29 +22,19 @@ def significant(value: float, digits: int = 3) -> str:
     return f"{value:,.{max(digits - 1 - floor(log10(abs(value))), 0)}f}"
 
 
-def with_error(value: float, error: float) -> str:
+def with_error(value: float, error: float, digits: int = 3) -> str:
     """A number and its standard error: the error to two digits, the number to as many places.
 
-    Without a known error (not finite, or 0) the number has three significant digits.
+    Without a known error (not finite, or 0) the number has `digits` significant digits.
     """
     if not (isfinite(value) and isfinite(error) and error > 0):
-        return significant(value)
+        return significant(value, digits)
     places = max(1 - floor(log10(error)), 0)
     return f"{value:,.{places}f} ± {error:,.{places}f}"
 
 
 def interval(low: float, high: float, digits: int = 2) -> str:
-    """Range of two numbers with an en dash, or "-5 to 25" if one is negative.
-
-    Parameters
-    ----------
-    low, high : float
-    digits : int, significant ones
-
-    Returns
-    -------
-    str
-    """
+    """A range of numbers with an en dash, or "-5 to 25" if one is negative."""
     between = EN_DASH if min(low, high) >= 0 else " to "
     return between.join(significant(end, digits) for end in (low, high))
 

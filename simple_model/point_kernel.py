@@ -58,11 +58,6 @@ def point_kernel(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> 
     Returns
     -------
     Response, stimulation (t, p) in Pa
-
-    Raises
-    ------
-    ValueError
-        If probes do not have two coordinates.
     """
     probes = np.array(probes, np.float64)
     if probes.ndim != 2 or probes.shape[1] != 2:

@@ -396,17 +396,8 @@ def are_resolved(
 
 
 def unmixed(frequencies: Floats, strengths: Floats, least: float) -> Mask:
-    """Mask of lines of which no near line, nor rest, has 5 %.
-
-    Parameters
-    ----------
-    frequencies : (f,) float, Hz
-    strengths : (f,) float, of any unit
-    least : Hz, below which lines are near each other
-
-    Returns
-    -------
-    (f,) bool
+    """Mask (f,) of lines at frequencies in Hz of which neither lines nearer than `least` Hz, nor
+    the mean, have 5 %, by strengths (f,) of any unit.
     """
     away = np.abs(frequencies[:, None] - frequencies)
     near, alike = away < least, away <= ALIKE * least
@@ -423,21 +414,8 @@ def hidden(
     *,
     settle: float = SETTLE,
 ) -> Mask:
-    """Mask of lines of which more than 5 %, or of a fiftieth of the strongest if that is more, are
-    likely to be side lobes of those that are not fitted.
-
-    Parameters
-    ----------
-    response : Response
-    frequencies : (f,) float, Hz
-    strengths : (f,) float, amplitudes of the lines
-    rest : (f,) float, in the same unit, amplitudes that are not fitted
-    fitted : (f,) bool
-    settle : fraction of the response that is left out at its start
-
-    Returns
-    -------
-    (f,) bool
+    """Mask (f,) of lines of which more than 5 %, or of a fiftieth of the strongest if that is more,
+    are likely to be side lobes of those that are not fitted, whose amplitudes are `rest` (f,).
     """
     least = resolution(response, settle=settle)
     distinct, _ = _distinct(frequencies[fitted], least)
@@ -456,21 +434,8 @@ def _kaiser_transform(x: Floats, beta: float) -> Floats:
 def fit_lines(
     response: Response, frequencies: ArrayLike, *, settle: float = SETTLE
 ) -> tuple[Complex, Floats]:
-    """Phasors and remainder of a response.
-
-    Parameters
-    ----------
-    response, frequencies, settle : as for `phasors`
-
-    Returns
-    -------
-    complex amplitudes (f, p), and the remainder (t, p) of the whole response without these lines
-    and the mean, in its unit
-
-    Raises
-    ------
-    ValueError
-        If a frequency is not below half the sampling rate, or the samples are too few.
+    """Phasors (f, p), as `phasors` has them, and the remainder (t, p) of the whole response without
+    these lines and the mean.
     """
     t, x = response.times, response.values
     basis, weighted, inverse, which = _weighted_waves(t, frequencies, settle)
@@ -484,11 +449,6 @@ def line_rows(
     times: Floats, frequencies: ArrayLike, *, settle: float = SETTLE
 ) -> tuple[Floats, Floats, NDArray[np.intp]]:
     """Rows of the least squares of `fit_lines`, from which the errors of lines follow.
-
-    Parameters
-    ----------
-    times : (t,) float, s, equally spaced
-    frequencies, settle : as for `phasors`
 
     Returns
     -------

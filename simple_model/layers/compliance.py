@@ -74,21 +74,12 @@ def thin_sheet(
     air_density: float = AIR_DENSITY,
     tension: float = 0.0,
 ) -> Compliance:
-    """Infinite thin sheet: G = 1 / [D* k^4 + T k^2 - (m + 2 rho_air/k) w^2].
+    """Infinite thin sheet of a thickness d in metre under a tension T in N/m, with air of a density
+    in kg/m3 (0 for vacuum) on both sides: G = 1 / [D* k^4 + T k^2 - (m + 2 rho_air/k) w^2],
+    m = rho d, D* = mu* d^3 / 6 (1 - nu).
 
-    m = rho d, D* = mu* d^3 / 6 (1 - nu). The deflection of an infinite sheet under a static load
-    has no bound: motion is given about a mean that is left out, G = 0 at w = 0.
-
-    Parameters
-    ----------
-    material : Material
-    thickness : metre
-    air_density : kg/m3; 0 for vacuum
-    tension : N/m, the same in all directions
-
-    Returns
-    -------
-    Compliance, m/Pa
+    The deflection of an infinite sheet under a static load has no bound: motion is given about a
+    mean that is left out, G = 0 at w = 0.
     """
     mass_per_area = material.density * thickness
 

@@ -268,20 +268,10 @@ def curves(
     names: tuple[str, ...] = (),
     bound: Floats | None = None,
 ) -> DispersionCurves:
-    """Curves of tracked modes.
+    """Curves of tracked modes at frequencies (f,) in Hz, with shapes at depths (d,) in metre.
 
-    Parameters
-    ----------
-    frequencies : (f,) float, Hz
-    depths : (d,) float, metre
-    found : Found, of each mode at each frequency
-    names : of the modes, numbers in the order of their cut-on if there are none
-    bound : (f,) float, 1/m, wavenumber of the shear wave of a half-space below, into which waves
-        of smaller wavenumber leak; None without one
-
-    Returns
-    -------
-    DispersionCurves
+    Modes without names have numbers in the order of their cut-on. `bound` (f,) in 1/m is the
+    wavenumber of the shear wave of a half-space below, into which waves of smaller ones leak.
     """
     k = found.wavenumbers
     known = np.isfinite(k)

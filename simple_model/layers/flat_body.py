@@ -90,21 +90,8 @@ def steady_lines(
 def field_lines(
     field: Field, pressure: MovingPressure, probes: ArrayLike, *, threshold: float = 1e-6
 ) -> tuple[Floats, Complex]:
-    """Steady-state lines of all components of a field.
-
-    Parameters
-    ----------
-    field : Field
-    pressure, probes, threshold : as of `steady_lines`
-
-    Returns
-    -------
-    frequencies (f,) in Hz >= 0 and complex amplitudes a (f, p, m) of Re a exp(2 pi i f t)
-
-    Raises
-    ------
-    ValueError
-        As `steady_lines` does.
+    """Steady-state lines of all components of a field: frequencies (f,) in Hz and amplitudes
+    (f, p, m), as of `steady_lines`.
     """
     _check(pressure)
     lines, probes = load_lines(pressure, threshold), np.atleast_2d(np.asarray(probes, np.float64))
@@ -116,7 +103,7 @@ def field_lines(
     amplitudes = np.zeros((len(f), len(probes), len(field.weights(ANYWHERE))), np.complex128)
     count = min(len(probes), max(1, len(probes) * len(table) * len(knots) // AT_ONCE))
     for some in np.array_split(np.arange(len(probes)), count):
-        carried = _carriers(field, splines, probes[some, None] - knots)
+        carried = carriers(field, splines, probes[some, None] - knots)
         h = path_fourier(pressure, carried, orders)
         for line, (k, n) in enumerate(zip(which, order, strict=True)):
             moved = np.einsum("cj,mcjp->pm", g[:, k], h[..., n])
@@ -124,7 +111,7 @@ def field_lines(
     return f, amplitudes
 
 
-def _carriers(field: Field, splines: Splines, away: Floats) -> Floats:
+def carriers(field: Field, splines: Splines, away: Floats) -> Floats:
     """Splines (m, c, j, ..., q) with the weights of a field, at offsets (..., q, 2) in metre of
     probes from positions of a focus: components are these times the integrals (c, j), in sum.
     """
@@ -135,17 +122,7 @@ def _carriers(field: Field, splines: Splines, away: Floats) -> Floats:
 def sampled_lines(
     field: Field, pressure: MovingPressure, probes: ArrayLike, times: Floats
 ) -> tuple[Floats, Complex]:
-    """Lines of `field_lines` that samples at some times can show.
-
-    Parameters
-    ----------
-    field, pressure, probes : as of `field_lines`, with its errors
-    times : (t,) float, s, equally spaced
-
-    Returns
-    -------
-    frequencies (f,) in Hz >= 0 and complex amplitudes a (f, p, m)
-    """
+    """Lines of `field_lines` that samples at equally spaced times (t,) in s can show."""
     f, a = field_lines(field, pressure, probes)
     below = below_half_the_rate(f, times)
     return f[below], a[below]
@@ -192,23 +169,7 @@ class PathOperator:
 def path_operator(
     pressure: MovingPressure, probes: ArrayLike, *, threshold: float = 1e-6
 ) -> PathOperator:
-    """Operator of a load on probes, which may be a whole map.
-
-    Parameters
-    ----------
-    pressure : MovingPressure, with a Gaussian focus
-    probes : (p, 2) float, metre
-    threshold : of the strongest line of the load; only its lines above this are computed
-
-    Returns
-    -------
-    PathOperator
-
-    Raises
-    ------
-    ValueError
-        If the focus is not Gaussian, or its path recorded, or as `pressure.check_lines` does.
-    """
+    """Operator of a load on probes, for many bodies; takes what `steady_lines` takes."""
     _check(pressure)
     load = load_lines(pressure, threshold)
     frequencies, lines = np.unique(np.round(load.frequencies, 9), return_inverse=True)
@@ -216,8 +177,8 @@ def path_operator(
     knots, width = path_samples(pressure), _width(pressure)
     places = np.atleast_2d(np.asarray(probes, np.float64))
     away = np.linalg.norm(places[:, None] - knots, axis=-1)
-    table = _distance_table(away.max(), width)
-    splines = _radial_spline(table, np.eye(len(table)))
+    table = distance_table(away.max(), width)
+    splines = radial_spline(table, np.eye(len(table)))
     blocks = np.array_split(away, max(1, away.size * len(table) // AT_ONCE))
     parts = [path_fourier(pressure, splines(part).swapaxes(1, 2), distinct) for part in blocks]
     return PathOperator(
@@ -290,22 +251,7 @@ def flat_body(
 def field_history(
     field: Field, pressure: MovingPressure, probes: ArrayLike, times: Floats
 ) -> Floats:
-    """All components of a field from rest, as `flat_body` computes them.
-
-    Parameters
-    ----------
-    field : Field
-    pressure, probes, times : as of `flat_body`
-
-    Returns
-    -------
-    (t, p, m) float
-
-    Raises
-    ------
-    ValueError
-        As `flat_body` does.
-    """
+    """All components (t, p, m) of a field from rest, as `flat_body` computes them."""
     _check(pressure)
     probes = np.atleast_2d(np.asarray(probes, np.float64))
     within = max(1, int(np.ceil(step(times) * FINEST - 1e-6)))
@@ -338,7 +284,7 @@ def field_history(
     g = point_integrals(field, table, w, _width(pressure), negligible=NEGLIGIBLE)
     u = np.zeros((len(w), len(probes), len(field.weights(ANYWHERE))), np.complex128)
     for i, probe in enumerate(probes):
-        carried = _carriers(field, splines, probe - knots)
+        carried = carriers(field, splines, probe - knots)
         for m, c in np.argwhere(field.weights(ANYWHERE).any(axis=-1)):
             blocks = min(len(table), len(table) * padded * parts // AT_ONCE + 1)
             for some in np.array_split(np.arange(len(table)), blocks):
@@ -392,7 +338,7 @@ def _timed(
     return Response(model=model, times=times, probes=probes, values=values, effort=effort)
 
 
-def _distance_table(furthest: float, width: float) -> Floats:
+def distance_table(furthest: float, width: float) -> Floats:
     """Distances (j,) in metre up to `furthest` to interpolate between: the response is as smooth as
     the focal spot, of standard deviation `width` in metre.
     """
@@ -400,7 +346,7 @@ def _distance_table(furthest: float, width: float) -> Floats:
     return np.linspace(0, furthest, steps)
 
 
-def _radial_spline(table: Floats, values: Complex | Floats, axis: int = 0) -> CubicSpline:
+def radial_spline(table: Floats, values: Complex | Floats, axis: int = 0) -> CubicSpline:
     """Cubic spline of a distance (...) through values of j along `axis` at distances (j,) in metre
     from 0, where it is flat.
     """
@@ -433,5 +379,5 @@ def _interpolation(probes: Floats, knots: Floats, width: float) -> tuple[Floats,
         unique = np.unique(np.linalg.norm(probes[:, None] - knots, axis=-1))
         return unique, lambda r: (r[..., None] == unique).astype(float)
     furthest = max(np.linalg.norm(probe - knots, axis=1).max() for probe in probes)
-    table = _distance_table(furthest, width)
-    return table, _radial_spline(table, np.eye(len(table)))
+    table = distance_table(furthest, width)
+    return table, radial_spline(table, np.eye(len(table)))

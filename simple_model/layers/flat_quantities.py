@@ -80,22 +80,8 @@ def material_at(stack: Stack, depth: float) -> Material:
 
 
 def quantity_field(asked: Quantity, stack: Stack, depth: float = 0.0) -> Field:
-    """Components of a quantity at a depth of a stack.
-
-    Parameters
-    ----------
-    asked : Quantity
-    stack : Stack
-    depth : metre below the surface
-
-    Returns
-    -------
-    Field, of the components before any `invariant`
-
-    Raises
-    ------
-    ValueError
-        If the depth is outside the stack.
+    """Components of a quantity, before any `invariant`, at a depth in metre of a stack; raises a
+    ValueError if that is outside the stack.
     """
     solid = material_at(stack, depth)
     if asked.field in (NORMAL, VECTOR):
@@ -130,15 +116,7 @@ def traction_field(asked: Quantity, stack: Stack, direction: ArrayLike) -> Field
     By reciprocity the vertical motion at x under a force along x' at 0 is the motion along x' at 0
     under a vertical force at x, which is that of `motion_field`.
 
-    Parameters
-    ----------
-    asked : Quantity, of normal motion
-    stack : Stack
-    direction : (3,) float, unit vector, z upwards
-
-    Returns
-    -------
-    Field
+    The quantity is one of normal motion, the direction (3,) a unit vector, z upwards.
     """
     along = np.asarray(direction, np.float64)
     moved = motion_field(stack)
@@ -153,24 +131,8 @@ def traction_field(asked: Quantity, stack: Stack, direction: ArrayLike) -> Field
 def from_rest(
     field: Field, asked: Quantity, pressure: MovingPressure, probes: ArrayLike, times: Floats
 ) -> Floats:
-    """Waveforms of a quantity from rest.
-
-    Parameters
-    ----------
-    field : Field, of the quantity's components
-    asked : Quantity
-    pressure : MovingPressure, with a Gaussian focus
-    probes : (p, 2) float, metre
-    times : (t,) float, s, equally spaced
-
-    Returns
-    -------
-    (t, p) float, in the unit of the quantity
-
-    Raises
-    ------
-    ValueError
-        As `flat_body` does.
+    """Waveforms (t, p) of a quantity from rest, of whose components the field is; load, probes and
+    times as of `flat_body`.
     """
     found = field_history(field, pressure, probes, times)
     return asked.waveforms(found.reshape(len(found), -1), found.shape[1])
@@ -179,20 +141,6 @@ def from_rest(
 def steady(
     field: Field, asked: Quantity, pressure: MovingPressure, probes: ArrayLike, times: Floats
 ) -> Floats:
-    """Waveforms of a quantity in the steady state.
-
-    Parameters
-    ----------
-    field, asked, pressure, probes, times : as of `from_rest`
-
-    Returns
-    -------
-    (t, p) float, in the unit of the quantity
-
-    Raises
-    ------
-    ValueError
-        As `steady_lines` does.
-    """
+    """Waveforms (t, p) of a quantity in the steady state, otherwise as of `from_rest`."""
     f, a = sampled_lines(field, pressure, probes, times)
     return asked.waveforms(synthesise(f, a.reshape(len(f), -1), times), a.shape[1])

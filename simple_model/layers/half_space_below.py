@@ -60,18 +60,14 @@ def rayleigh_mode(material: Material, omega: Floats) -> tuple[Found, Floats]:
 def modes_above_half_space(
     stack: Stack, omega: Floats, moduli: Complex, slopes: Complex, most: int
 ) -> tuple[Found, Floats]:
-    """Roots of layers on a half-space.
+    """Roots of layers on a half-space, the last layer of the stack, NaN where there are fewer, and
+    the depths (d,) in metre of their shapes.
 
     Parameters
     ----------
-    stack : Stack, whose last thickness is inf
-    omega : (f,) float, rad/s
+    stack, omega : the stack, and (f,) rad/s
     moduli, slopes : (f, l) complex, Pa and Pa s, shear moduli and their derivatives by omega
     most : of each frequency, those of most motion in the layers
-
-    Returns
-    -------
-    Found, NaN where there are fewer, and the depths (d,) in metre of their shapes
     """
     layers = Stack(materials=stack.materials[:-1], thicknesses=stack.thicknesses[:-1], base="free")
     of, change = (pencil(layers, omega, x[:, :-1]) for x in (moduli, slopes))

@@ -62,18 +62,9 @@ class Impedances(NamedTuple):
 
 
 def surface_compliance(stack: Stack, k: Complex, w: Complex) -> Complex:
-    """Displacement of the surface into the stack per pressure; 0 at w = 0 of a free stack, which
-    has no static deflection.
-
-    Parameters
-    ----------
-    stack : Stack
-    k : (k,) complex, 1/m, with a real part above 0
-    w : (f, 1) rad/s, with an imaginary part <= 0
-
-    Returns
-    -------
-    (f, k) complex, m/Pa
+    """Displacement (f, k) of the surface into the stack per pressure, in m/Pa, at wavenumbers k
+    (k,) in 1/m with Re k > 0 and frequencies w (f, 1) in rad/s with Im w <= 0; 0 at w = 0 of a free
+    stack, which has no static deflection.
     """
     a, b, c = _impedances(stack, k, w).surface
     return _about_mean(stack, w, a / (a * c - b * b))
@@ -206,7 +197,7 @@ def _cut(stack: Stack, depths: Sequence[float]) -> tuple[Stack, list[int]]:
 
 def _impedances(stack: Stack, k: Complex, w: Complex) -> Impedances:
     layers = [
-        _layer_stiffness(material, thickness, k, w)
+        layer_stiffness(material, thickness, k, w)
         for material, thickness in zip(stack.materials, stack.thicknesses, strict=True)
     ]
     spring, none = np.full(1, stack.base_stiffness, np.complex128), np.zeros(1, np.complex128)
@@ -252,7 +243,7 @@ def _downwards(known: Impedances) -> list[tuple[Pair, Pair]]:
     return found
 
 
-def _layer_stiffness(material: Material, thickness: float, k: Complex, w: Complex) -> Layer:
+def layer_stiffness(material: Material, thickness: float, k: Complex, w: Complex) -> Layer:
     """Stiffness, of arrays (f, k), of a layer of a thickness in metre or, of inf, a half-space, at
     wavenumbers and frequencies as of `surface_compliance`.
     """

@@ -50,11 +50,7 @@ def tracked(found: Found, omega: Floats, most: int, kept: Ints) -> Found:
     found : Found, in any order at each frequency
     omega : (f,) float, rad/s
     most : how many modes are kept, the least evanescent anywhere, of these the slowest
-    kept : (g,) int, which of the frequencies the modes are wanted at
-
-    Returns
-    -------
-    Found, of at most so many modes at these frequencies
+    kept : (g,) int, the frequencies at which the modes are returned
     """
     from scipy.optimize import linear_sum_assignment  # which takes long to import
 
@@ -95,16 +91,8 @@ def tracked(found: Found, omega: Floats, most: int, kept: Ints) -> Found:
 
 
 def between(found: Found, omega: Floats, waves: NDArray[np.bool_], most: int) -> Floats:
-    """Frequencies in the middle of gaps across which modes are not surely followed.
-
-    Parameters
-    ----------
-    found, omega, most : as of `tracked`
-    waves : (f, m) bool, whether a root is a wave; the slowest have to be followed
-
-    Returns
-    -------
-    (g,) float, rad/s
+    """Frequencies (g,) in rad/s in the middle of gaps across which modes are not surely followed.
+    `waves` (f, m) says whether a root is a wave; the slowest have to be followed.
     """
     from scipy.optimize import linear_sum_assignment  # which takes long to import
 
@@ -129,17 +117,7 @@ def between(found: Found, omega: Floats, waves: NDArray[np.bool_], most: int) ->
 
 
 def merged(found: Found, omega: Floats, other: Found, further: Floats) -> tuple[Found, Floats]:
-    """Roots at two sets of frequencies together.
-
-    Parameters
-    ----------
-    found, other : Found, roots at each set
-    omega, further : (f,) and (g,) float, rad/s, these sets
-
-    Returns
-    -------
-    Found, and frequencies (f + g,) in rad/s, ascending
-    """
+    """Roots at two sets (f,) and (g,) of frequencies in rad/s together, and these, ascending."""
     both = np.concatenate([omega, further])
     order = np.argsort(both)
     pairs = ((each.name, getattr(found, each.name), getattr(other, each.name))

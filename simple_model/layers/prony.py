@@ -137,14 +137,14 @@ def fit_prony(
     f = np.unique([*np.geomspace(*band, count), *(x for x in frequencies if x > 0)])
     w = 2 * np.pi * f
     mu = np.asarray(np.broadcast_to(law(w), w.shape), np.complex128)
-    _check_modulus(f, mu)
+    check_modulus(f, mu)
     found: list[PronySeries] = []
     ends = [(w[0] / slow, w[-1] * fast) for slow in BEYOND for fast in BEYOND]
     # A law may relax far below the band, as fractional ones of small exponents do.
     for further in ([], [FAR_BELOW / w[0]]) if rest else ([],):
         for n in range(MOST_TERMS + 1):
             fits = [
-                _fitted_series(w, mu, np.append(1 / np.geomspace(*end, n), further), rest, band)
+                fitted_series(w, mu, np.append(1 / np.geomspace(*end, n), further), rest, band)
                 for end in ends[: None if n else 1]
             ]
             found.append(min(fits, key=lambda series: series.error))
@@ -154,7 +154,7 @@ def fit_prony(
     return next(series for series in found if series.error <= enough)
 
 
-def _check_modulus(frequencies: Floats, moduli: Complex) -> None:
+def check_modulus(frequencies: Floats, moduli: Complex) -> None:
     """Refuse complex moduli (f,) in Pa at frequencies (f,) in Hz, ascending and above 0, that no
     passive, causal solid has.
 
@@ -165,7 +165,7 @@ def _check_modulus(frequencies: Floats, moduli: Complex) -> None:
     check_passive(frequencies, moduli)
     w = 2 * np.pi * frequencies
     times = 1 / np.geomspace(w[0] / 30, w[-1] * 30, 9 + round(3 * np.log10(w[-1] / w[0])))
-    away = np.abs(_fitted_series(w, moduli, times, None, (0.0, 0.0))(w) - moduli) / np.abs(moduli)
+    away = np.abs(fitted_series(w, moduli, times, None, (0.0, 0.0))(w) - moduli) / np.abs(moduli)
     mean, worst = float(np.sqrt(np.mean(away**2))), int(away.argmax())
     if mean > CAUSAL:
         raise ValueError(
@@ -195,7 +195,7 @@ def check_passive(frequencies: Floats, moduli: Complex) -> None:
             )
 
 
-def _fitted_series(
+def fitted_series(
     w: Floats, mu: Complex, times: Floats, rest: float | None, band: tuple[float, float]
 ) -> PronySeries:
     """Prony series of times (n,) in s by non-negative least squares of the relative deviation from
@@ -246,5 +246,5 @@ def constant_loss(loss_factor: float) -> PronySeries:
     power = 2 / np.pi * np.arctan(loss_factor)
     exact = (1j * w / w_0) ** power / np.cos(np.pi * power / 2)
     times = 1 / (2 * np.pi * np.geomspace(SLOWEST, FASTEST, LOSS_TERMS))
-    series = _fitted_series(w, exact, times, None, LOSS_BAND)
+    series = fitted_series(w, exact, times, None, LOSS_BAND)
     return series.scaled(1 / float(series(w_0).real))

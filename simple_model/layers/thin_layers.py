@@ -105,22 +105,8 @@ def elements(stack: Stack, omega: Floats) -> tuple[list[int], Complex]:
 
 
 def pencil(stack: Stack, omega: Floats, moduli: Complex) -> Pencil:
-    """Pencil of a stack.
-
-    Parameters
-    ----------
-    stack : Stack
-    omega : (f,) float, rad/s, by which elements are sized
-    moduli : (f, l) complex, Pa, shear modulus of each layer
-
-    Returns
-    -------
-    Pencil
-
-    Raises
-    ------
-    ValueError
-        As `elements` does.
+    """Pencil of a stack whose layers have shear moduli (f, l) in Pa at omega (f,) in rad/s, by
+    which elements are sized.
     """
     layers, length = elements(stack, omega)
     nodes, w, D = lobatto()

@@ -84,16 +84,8 @@ def normal_field(compliance: Compliance) -> Field:
 def point_response(
     compliance: Compliance, distances: ArrayLike, frequencies: ArrayLike, width: float
 ) -> Complex:
-    """Response g(r, w) to a Gaussian focal spot of 1 Pa.
-
-    Parameters
-    ----------
-    compliance : Compliance
-    distances, frequencies, width : as of `point_integrals`
-
-    Returns
-    -------
-    (f, r) complex, m/Pa
+    """Response g(r, w) (f, r) in m/Pa to a Gaussian focal spot of 1 Pa; parameters and errors as of
+    `point_integrals`.
     """
     return point_integrals(normal_field(compliance), distances, frequencies, width)[0]
 
@@ -106,7 +98,7 @@ def point_integrals(
     *,
     negligible: float = 0.0,
 ) -> Complex:
-    """Integrals of a field about a Gaussian focal spot of 1 Pa.
+    """Integrals (c, f, r) of a field about a Gaussian focal spot of 1 Pa.
 
     Parameters
     ----------
@@ -117,14 +109,7 @@ def point_integrals(
     negligible : a batch of frequencies in which each integral stays below this fraction of its
         largest value so far is the last one computed; for frequencies that rise
 
-    Returns
-    -------
-    (c, f, r) complex
-
-    Raises
-    ------
-    ArithmeticError
-        If the wavenumber grid cannot be made fine enough.
+    Raises an ArithmeticError if the wavenumber grid cannot be made fine enough.
     """
     r = np.atleast_1d(np.asarray(distances, np.float64))
     w = np.atleast_1d(np.asarray(frequencies, np.complex128))

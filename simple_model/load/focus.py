@@ -221,17 +221,8 @@ def focal_spot(
 
 
 def moved_spot(points: Floats, centres: Floats, height: float, profile: str | FocalSpot) -> Floats:
-    """Focal spot S for many positions of the focus.
-
-    Parameters
-    ----------
-    points : (n, 2) float, metre
-    centres : (..., 2) float, metre, positions of the focus
-    height, profile : as for `focal_spot`
-
-    Returns
-    -------
-    (..., n) float, without unit
+    """Focal spot S (..., n) at points (n, 2) in metre for positions (..., 2) of the focus, as
+    `focal_spot` has it.
     """
     if profile == "array" or not isinstance(profile, str):
         return focal_spot(points - centres[..., None, :], height, profile)

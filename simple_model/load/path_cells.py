@@ -102,23 +102,13 @@ def _ends_as_it_begins(pressure: MovingPressure) -> bool:
 def moved_load(
     pressure: MovingPressure, times: Floats, factors: Floats
 ) -> tuple[Floats, sparse.csr_array]:
-    """Load of all foci at some times.
-
-    Parameters
-    ----------
-    pressure : MovingPressure
-    times : (m,) float, s
-    factors : (m,) float, in Pa, of the foci
-
-    Returns
-    -------
-    positions (q, 2) in metre, and the matrix (m, q) in Pa by which the load at each time is made of
-    foci of unit pressure at these
+    """Load of all foci at times (m,) in s, with factors (m,) in Pa: positions (q, 2) in metre, and
+    the matrix (m, q) in Pa by which the load is made of foci of unit pressure at these.
     """
     tacton = pressure.tacton
     path, detail = tacton.trajectory, spot_detail(pressure.height, pressure.profile)
     each = [np.mod(path.phase(times) + ahead, 1.0) for ahead in tacton.foci]
-    parts = [_along_path(path, phases, detail) for phases in each]
+    parts = [along_path(path, phases, detail) for phases in each]
     mixed = [
         sparse.diags_array(factors * pressure.weight(phases)) @ mixing
         for phases, (_, mixing) in zip(each, parts, strict=True)
@@ -140,17 +130,8 @@ def path_samples(pressure: MovingPressure) -> Floats:
 def path_fourier(
     pressure: MovingPressure, values: Floats | Complex, orders: NDArray[np.int_] | None = None
 ) -> Complex:
-    """Fourier coefficients of what a load does.
-
-    Parameters
-    ----------
-    pressure : MovingPressure
-    values : (..., q), of a focus of unit pressure at each of `path_samples`
-    orders : (n,) int, of the harmonics wanted
-
-    Returns
-    -------
-    (..., n) complex; without orders all, of which -n is harmonic -n
+    """Fourier coefficients (..., n) of what a load does where a focus of unit pressure at each of
+    `path_samples` has values (..., q): of some orders (n,), or of all, of which -n is harmonic -n.
     """
     mixing = path_cells(pressure).cells
     k, shape, rows = mixing.shape[0], values.shape[:-1], values.reshape(-1, values.shape[-1])
@@ -168,17 +149,13 @@ def harmonics(pressure: MovingPressure) -> NDArray[np.int_]:
 
 
 def cells(jumps: Floats, start: float, width: float, count: int) -> tuple[Floats, sparse.csr_array]:
-    """Samples of cells.
+    """Times (m,) in s of samples of cells, and their shares (count, m) in the cells.
 
     Parameters
     ----------
     jumps : (j,) float, s, times between the beginning of the first cell and the end of the last
     start, width : s
     count : of cells, of which the first follows the last
-
-    Returns
-    -------
-    times (m,) in s of the samples, and their shares (count, m) in the cells
     """
     at = np.unique(np.mod(np.round((jumps - start) / width, 9), count))
     bounds = np.union1d(np.arange(count + 1), at)
@@ -212,17 +189,7 @@ def jump_phases(pressure: MovingPressure) -> Floats:
 
 
 def jump_times(pressure: MovingPressure, start: float, end: float) -> Floats:
-    """Times at which the load jumps at some place.
-
-    Parameters
-    ----------
-    pressure : MovingPressure
-    start, end : float, s, between which they are
-
-    Returns
-    -------
-    (j,) float, s
-    """
+    """Times (j,) in s, from start to end, at which the load jumps at some place."""
     tacton, phases = pressure.tacton, jump_phases(pressure)
     f_d = tacton.trajectory.drawing_frequency
     found = [np.empty(0)]
@@ -237,7 +204,7 @@ def jump_times(pressure: MovingPressure, start: float, end: float) -> Floats:
     return times[(times >= start) & (times <= end)]
 
 
-def _along_path(path: Trajectory, phases: Floats, detail: float) -> tuple[Floats, sparse.csr_array]:
+def along_path(path: Trajectory, phases: Floats, detail: float) -> tuple[Floats, sparse.csr_array]:
     """Positions (q, 2) in metre along a path, and the matrix (m, q) that interpolates from them to
     phases (m,), fractions of the period: by cubics along each part of the path that has more phases
     than nodes, for which the detail of the focal spot in metre decides.

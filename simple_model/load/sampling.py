@@ -92,17 +92,10 @@ def fold_parts(pressure: MovingPressure, times: Floats) -> int:
 
 
 def low_passed(load: Callable[[Floats], Floats], times: Floats, parts: int) -> Floats:
-    """Low-pass-filtered load without aliasing, by a windowed sinc.
+    """Load (t, ...) at equally spaced times (t,) in s without aliasing, by a windowed sinc.
 
-    Parameters
-    ----------
-    load : function of times (n,) in s, also before and after those given, to values (n, ...)
-    times : (t,) float, s, equally spaced
-    parts : how many times as finely the load is sampled; 1 for as it is
-
-    Returns
-    -------
-    (t, ...) float, in the unit of the load
+    `load` is a function of times (n,), also before and after those given, to values (n, ...); it is
+    sampled so many times as finely, 1 for as it is.
     """
     if parts == 1:
         return load(times)

@@ -111,18 +111,8 @@ def lines_from_rest(pressure: MovingPressure) -> LoadSpectrum:
 def pressure_lines(
     pressure: MovingPressure, points: Floats, threshold: float = 1e-6
 ) -> tuple[Floats, Complex]:
-    """Load spectrum at points of the surface.
-
-    Parameters
-    ----------
-    pressure : MovingPressure
-    points : (n, 2 or 3) float, metre
-    threshold : as of `load_lines`
-
-    Returns
-    -------
-    frequencies : (f,) float, Hz, of the distinct lines
-    amplitudes : (f, n) complex, Pa
+    """Frequencies (f,) in Hz of the distinct `load_lines`, and their complex amplitudes (f, n) in
+    Pa at points (n, 2 or 3) in metre of the surface.
     """
     lines, knots = load_lines(pressure, threshold), path_samples(pressure)
     points = np.asarray(points, np.float64)
@@ -135,38 +125,15 @@ def pressure_lines(
 
 
 def reduced_lines(pressure: MovingPressure, points: Floats, load: Floats) -> tuple[Floats, Complex]:
-    """Load spectrum in reduced coordinates, of `lines_from_rest`.
-
-    Parameters
-    ----------
-    pressure : MovingPressure
-    points : (k, 2 or 3) float, metre, of the surface
-    load : (k, r) float, reduced forces of unit pressure at each point
-
-    Returns
-    -------
-    frequencies : (f,) float, Hz, of the distinct lines
-    forces : (f, r) complex, reduced forces of the lines
-
-    Raises
-    ------
-    ValueError
-        As `pressure.check_lines` does.
+    """Frequencies (f,) in Hz of the distinct `lines_from_rest`, and their complex forces (f, r) in
+    reduced coordinates, whose forces of unit pressure at points (k, 2 or 3) are `load` (k, r).
     """
     return lines_from_rest(pressure).gather(path_forces(pressure, points, load))
 
 
 def path_forces(pressure: MovingPressure, points: Floats, load: Floats) -> Complex:
-    """Reduced forces of unit pressure on the path, by harmonic of the path.
-
-    Parameters
-    ----------
-    pressure, points, load : as for `reduced_lines`; but for a rhythm or signal the modulation does
-        not matter
-
-    Returns
-    -------
-    (n, r) complex, -n is harmonic -n
+    """Reduced forces (n, r) of unit pressure on the path, by harmonic of the path, as
+    `reduced_lines` has them; but for a rhythm or signal the modulation does not matter.
     """
     knots, reach = path_samples(pressure), spot_reach(pressure.height, pressure.profile)
     forces = []
@@ -206,17 +173,8 @@ def foci_harmonics(pressure: MovingPressure, n: NDArray[np.int_]) -> Complex:
 
 
 def synthesise(frequencies: Floats, amplitudes: Complex, times: Floats) -> Floats:
-    """Fourier synthesis Re sum a exp(2 pi i f t).
-
-    Parameters
-    ----------
-    frequencies : (f,) float, Hz
-    amplitudes : (f, p) complex
-    times : (t,) float, s
-
-    Returns
-    -------
-    (t, p) float, in the unit of the amplitudes
+    """Waveforms (t, p) = Re sum a exp(2 pi i f t) of amplitudes a (f, p) at frequencies (f,) in Hz
+    and times (t,) in s.
     """
     turn = np.exp(2j * np.pi * np.outer(times, frequencies))
     return np.asarray(turn.real @ amplitudes.real - turn.imag @ amplitudes.imag)

@@ -150,17 +150,7 @@ def level(tacton: Tacton, t: ArrayLike) -> Floats | float:
 
 
 def modulation_at_phases(tacton: Tacton, first: Floats, second: Floats, envelope: Floats) -> Floats:
-    """Modulation by the phases of its three sinusoids.
-
-    Parameters
-    ----------
-    tacton : Tacton
-    first, second, envelope : (...) float, rad
-
-    Returns
-    -------
-    (...) float, without unit
-    """
+    """Modulation (...), -1..1, by the phases (...) in rad of its three sinusoids."""
     w1, w2 = tacton.superposition
     m1, m2, e = (
         np.sin(phase) if f > 0 else np.ones_like(phase)

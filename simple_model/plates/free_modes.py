@@ -58,17 +58,11 @@ def free_modes(modes: PlateModes, material: Material) -> FreeModes:
 
 
 def relaxing_stiffness(lossless: Floats, bent: Floats, material: Material) -> tuple[Floats, Floats]:
-    """Stiffness of modes of a material with Maxwell branches.
+    """Stiffness (m, 2 + n) of modes and times (n,) in s, as `free_vibration` takes them, of a
+    material with Maxwell branches.
 
-    Parameters
-    ----------
-    lossless : (m,) 1/s2, the part of the squared frequencies without loss
-    bent : (m,) 1/s2, the part that goes with the material's modulus, at its `shear_modulus`
-    material : Material, without a modulus law of its own
-
-    Returns
-    -------
-    stiffness (m, 2 + n) and times (n,) in s, as `free_vibration` takes them
+    `lossless` (m,) and `bent` (m,) in 1/s2 are the parts of the squared frequencies without loss,
+    and in proportion to the material's modulus, at its `shear_modulus`.
     """
     solid, mu = material.without_loss_factor(), material.shear_modulus
     terms = [term for term in solid.prony if term.modulus]

@@ -65,7 +65,8 @@ def linear_motion(
     chosen: NDArray[np.int_] | None = None,
     highest: float = np.inf,
 ) -> Floats:
-    """Modal coordinates from rest of a plate that does not stretch, without time steps.
+    """Modal coordinates (t, r) in kg^1/2 m from rest of a plate that does not stretch, without time
+    steps.
 
     Parameters
     ----------
@@ -76,10 +77,6 @@ def linear_motion(
     middle : (2,) metre, of the plate in the scene
     chosen : (r,) int, indices of the modes to return; all if not given
     highest : Hz, lines of the load from there on are left out
-
-    Returns
-    -------
-    (t, r) kg^1/2 m
     """
 
     def modulus(omega: Floats) -> Floats:
@@ -105,25 +102,9 @@ def linear_motion(
 def stretched_motion(
     plate: KarmanPlate, linear: Floats, dt: float, material: Material | None = None
 ) -> Motion:
-    """Motion from rest under the load that moves the plate linearly if it does not stretch.
-
-    Parameters
-    ----------
-    plate : KarmanPlate
-    linear : (n, r) kg^1/2 m, linear motion of the chosen modes at 0, dt, ..., (n - 1) dt, as of
-        `linear_motion`
-    dt : s
-    material : Material, the one of the linear motion; no loss if not given
-
-    Returns
-    -------
-    Motion
-        At the n times of the linear motion.
-
-    Raises
-    ------
-    ArithmeticError
-        If a step is not finite.
+    """Motion from rest, at 0, dt, ..., (n - 1) dt in s, under the load that moves the plate by
+    `linear` (n, r) in kg^1/2 m, as of `linear_motion` of the same material and the chosen modes, if
+    it does not stretch.
     """
     forces = _Scheme.of(plate, dt, material).forces(linear)
     return forced_motion(plate, forces, dt, material)
@@ -153,10 +134,7 @@ def forced_motion(
     Motion
         At the n + 1 times 0, dt, ..., n dt.
 
-    Raises
-    ------
-    ArithmeticError
-        If a step is not finite.
+    Raises an ArithmeticError if a step is not finite.
     """
     scheme = _Scheme.of(plate, dt, material)
     M, K, B, rest = scheme.mass, scheme.K, scheme.bending, scheme.rest

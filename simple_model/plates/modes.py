@@ -214,16 +214,7 @@ def modal_motion(
 def modal_motion_apart(
     modes: PlateModes, frequencies: Floats, forces: Complex, modulus: ModulusLaw
 ) -> Complex:
-    """Modal coordinates as of `modal_motion`, without the coupling of the modes.
-
-    Parameters
-    ----------
-    modes, frequencies, forces, modulus : as of `modal_motion`
-
-    Returns
-    -------
-    (f, m) complex
-    """
+    """Modal coordinates (f, m) as of `modal_motion`, without the coupling of the modes."""
     w = 2 * np.pi * np.asarray(frequencies)[:, None]
     bending = modulus(w) * modes.elastic
     found = forces / (modes.squared * (1 - modes.elastic + bending) - w**2)
@@ -381,16 +372,8 @@ def _free_of_clips(plate: Plate, x: LineBasis, y: LineBasis) -> sparse.csr_array
 
 
 def outside_clips(plate: Plate, x: LineBasis, y: LineBasis) -> NDArray[np.bool_]:
-    """Products of functions that are zero on all clips.
-
-    Parameters
-    ----------
-    plate : Plate
-    x, y : LineBasis along both sides, with breaks at the sides of the clips
-
-    Returns
-    -------
-    (x y,) bool, the index of y the faster
+    """Mask (x y,), y the faster, of products of functions that are zero on all clips, at whose
+    sides the lines have breaks.
     """
     found, reach = np.ones((x.size, y.size), bool), plate.clip_radius
     for along, across in plate.clips:

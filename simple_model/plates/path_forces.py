@@ -22,17 +22,8 @@ SPARE = 8  # more of them
 def modal_path_forces(
     modes: PlateModes, pressure: MovingPressure, middle: Sequence[float] = MIDDLE
 ) -> Complex:
-    """Modal forces of unit pressure on the path, for all loads on the same path.
-
-    Parameters
-    ----------
-    modes : PlateModes
-    pressure : MovingPressure, of which path, focal spot, rhythm and signal are taken
-    middle : (2,) metre, of the plate, where the scene's middle is (0, 0)
-
-    Returns
-    -------
-    (n, m) complex, N kg^-1/2 per Pa, by harmonic of the path; -n is harmonic -n
+    """Modal forces (n, m) in N kg^-1/2 of unit pressure on the path, by its harmonic, for all loads
+    with the same path, focal spot, rhythm and signal; `middle` (2,) in metre is the plate's.
     """
     knots, reach = path_samples(pressure), spot_reach(pressure.height, pressure.profile)
     detail = spot_detail(pressure.height, pressure.profile)
@@ -57,21 +48,11 @@ def plate_lines(
     middle: Sequence[float] = MIDDLE,
     path: Complex | None = None,
 ) -> tuple[Floats, Complex]:
-    """Lines of the steady displacement, positive the way the pressure pushes.
+    """Frequencies (f,) in Hz and complex amplitudes (f, p) in metre of the lines of the steady
+    displacement at probes (p, 2) in metre of the scene, positive the way the pressure pushes.
 
-    Parameters
-    ----------
-    modes : PlateModes
-    pressure : MovingPressure
-    probes : (p, 2) metre, in the scene
-    modulus : of bending, as of `modal_motion`
-    middle : (2,) metre, of the plate in the scene
-    path : (n, m) of `modal_path_forces`, if they are known
-
-    Returns
-    -------
-    frequencies : (f,) Hz
-    amplitudes : (f, p) complex, metre
+    The modulus of bending is as of `modal_motion`, `middle` as of `modal_path_forces`, which are
+    `path` (n, m), if they are known.
     """
     path = modal_path_forces(modes, pressure, middle) if path is None else path
     frequencies, forces = load_lines(pressure).gather(path)

@@ -94,18 +94,9 @@ def gauss_points(breaks: Floats, counts: Sequence[int]) -> tuple[Floats, Floats]
 def line_basis(
     length: float, ends: Sequence[str], degree: int, split: bool
 ) -> tuple[LineBasis, ...]:
-    """Orthonormal functions on one piece that meet the supports of both ends.
-
-    Parameters
-    ----------
-    length : metre
-    ends : two of "clamped", "simply", "free"
-    degree : the highest
-    split : whether even and odd functions are apart, where both ends are alike
-
-    Returns
-    -------
-    One basis, or that of even and that of odd functions
+    """Orthonormal functions, up to a degree, on one piece of a length in metre that meet the
+    supports of both ends, "clamped", "simply" or "free": one basis or, where both ends are alike
+    and it is to be split, that of even and that of odd functions.
     """
     n = np.arange(degree + 1)
     breaks = np.array([-length / 2, length / 2])
@@ -125,11 +116,8 @@ def piecewise_basis(
     breaks : (e + 1,) metre, increasing, from the middle, where the ends of the line are as far
     ends : two of "clamped", "simply", "free"
     degrees : (e,) the highest of each piece, 3 or more
-    split : whether even and odd functions are apart, where both ends and all breaks are alike
-
-    Returns
-    -------
-    One basis, or that of even and that of odd functions
+    split : whether even and odd functions are apart, in two bases, where both ends and all breaks
+        are alike
     """
     return _pieces(breaks, ends, degrees, split, "clamped")
 
@@ -137,18 +125,9 @@ def piecewise_basis(
 def continuous_basis(
     breaks: Floats, ends: Sequence[str], degrees: Sequence[int], split: bool
 ) -> tuple[LineBasis, ...]:
-    """Functions that are continuous at the breaks of a line, with kinks there.
-
-    Parameters
-    ----------
-    breaks : (e + 1,) metre, increasing, from the middle, where the ends of the line are as far
-    ends : two of "simply", which holds the value, and "free"
-    degrees : (e,) the highest of each piece, 2 or more
-    split : whether even and odd functions are apart, where both ends and all breaks are alike
-
-    Returns
-    -------
-    One basis, or that of even and that of odd functions; `mixed` has no meaning across kinks
+    """Functions that are continuous at the breaks of a line, with kinks there, across which `mixed`
+    has no meaning; otherwise as `piecewise_basis`, with ends of "simply", which holds the value, or
+    "free".
     """
     if len(breaks) == 2:
         return line_basis(float(np.ptp(breaks)), ends, degrees[0], split)

@@ -30,26 +30,17 @@ def sheet_curves(
     air_density: float = AIR_DENSITY,
     tension: float = 0.0,
 ) -> DispersionCurves:
-    """Dispersion curves of an infinite Kirchhoff plate.
+    """Dispersion curves of the bending wave of an infinite Kirchhoff plate, and of its near field.
+
+    The shapes are at both faces, along x by the rotation of the section, U = k W z from the middle.
 
     Parameters
     ----------
     material : Material
     thickness : metre
-    frequencies : (f,) float, Hz, above 0 and ascending
+    frequencies : (f,) float, Hz, above 0 and ascending, otherwise a ValueError
     air_density : kg/m3; 0 for vacuum
     tension : N/m, the same in all directions
-
-    Returns
-    -------
-    DispersionCurves
-        Of the bending wave and its near field; the shapes are at both faces, along x by the
-        rotation of the section, U = k W z from the middle.
-
-    Raises
-    ------
-    ValueError
-        If frequencies are not above 0 and ascending.
     """
     f = checked_frequencies(frequencies)
     omega = 2 * np.pi * f

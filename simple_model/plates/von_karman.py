@@ -114,14 +114,7 @@ def karman_plate(
         fixes only its component across the edge, "movable" leaves it free. Clips with a radius
         always fix it.
 
-    Returns
-    -------
-    KarmanPlate
-
-    Raises
-    ------
-    ValueError
-        If the thickness or the count is out of range, or `in_plane` is unknown.
+    Raises a ValueError if the thickness or the count is out of range, or `in_plane` is unknown.
     """
     choose("in_plane", in_plane, IN_PLANE)
     if not (np.isfinite(thickness) and thickness > 0):
