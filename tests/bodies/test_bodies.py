@@ -332,7 +332,7 @@ def test_a_palm_whose_curvature_goes_to_zero_answers_like_a_slab(monkeypatch):
         )
         return replace(made, mesh=mesh, absorbing=mesh.facets["ends"])
 
-    monkeypatch.setattr("skinwave.models.full.build_body", with_ends)
+    monkeypatch.setattr("skinwave.models.meshed.build_body", with_ends)
     slab = compute(replace(scene, body=Body(kind="slab", sides="free", **size)), "fem", h=0.003)
     assert compare(slab, palm).relative_l2.max() < 0.02
 

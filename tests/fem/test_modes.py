@@ -26,7 +26,6 @@ def test_modes_of_a_sheet_of_paper_held_at_two_edges():
     np.testing.assert_allclose(found, expected, rtol=1e-3)
     kept = shapes[operators.free]
     np.testing.assert_allclose(kept.T @ (operators.M @ kept), np.eye(6), atol=1e-6)
-    assert len() < 200
 
 
 @pytest.mark.slow
