@@ -107,5 +107,5 @@ def test_the_page_stands_alone(job):
     assert "contradicts M4" in page
     first = page.split("<h2>")[0]
     assert "mean-square motion" in first.split("<img")[0]
-    assert "not propagation, add the component" in first.split("<img")[0]
+    assert "propagation adds no component" in first.split("<img")[0]
     assert "same load" in first.split("<table")[1]
