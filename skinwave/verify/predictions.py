@@ -13,7 +13,6 @@ from simple_model import MovingPressure, Response, Rhythm, Tacton, Trajectory
 from simple_model.layers.dispersion import Mode
 from simple_model.layers.flat_body import steady_state
 from simple_model.layers.wavenumber_integral import point_response
-from simple_model.load.drive import DRIVES
 from simple_model.load.focus import NOMINAL_HEIGHT, lobe_width, spot_width
 from simple_model.response import fit_lines
 from simple_model.typing import Floats
@@ -152,6 +151,7 @@ FOUND = {
     "sine": "a second harmonic and little of a third",
     "square": "almost no second harmonic, but a third",
 }
+LAWS = ("linear", "pressure_squared", "force_corrected")
 AM, DURATION = 140.0, 0.2  # Hz, s; the abstract has no frequency
 ABSENT = 1e-3  # of the fundamental, -60 dB
 
@@ -184,7 +184,7 @@ def harmonics() -> list[Harmonics]:
     }
     found = []
     for wave, tacton in tactons.items():
-        for drive in DRIVES:
+        for drive in LAWS:
             pressure = MovingPressure(tacton=tacton, drive=drive)
             scene = Scene(pressure=pressure, body=BODIES["palm"], probes=((0.0, 0.0),))
             moved = compute(scene, "flat-body-harmonic")

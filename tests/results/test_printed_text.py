@@ -32,11 +32,11 @@ def test_control_characters_are_escapes():
 @pytest.mark.skipif(sys.platform == "win32", reason="no such file names")
 def test_names_words_warnings_and_steps_are_shown(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    name = "a\x1b[2Jb\u202e\x9b.wav"
+    name = "a\x1b[2Jb\u202e\x9b.csv"
     (tmp_path / "s.toml").write_text("[tacton]\nam_frequency_hz = 100\nduration_s = 0.01\n")
     (tmp_path / "bad.toml").write_text('[tacton]\nshape = "\\u001b]0;title\\u0007"')
     assert main(["convert", "s.toml", name, "--rate", "1000"]) == 0
-    assert main(["run", name.replace("wav", "toml")]) == 2
+    assert main(["run", name.replace("csv", "toml")]) == 2
     assert main(["run", "bad.toml"]) == 2
     with pytest.raises(SystemExit):
         main(["run", "s.toml", "\x1b[2J\nmore"])
@@ -45,7 +45,7 @@ def test_names_words_warnings_and_steps_are_shown(tmp_path, monkeypatch, capsys)
         progress("reading \x1b[2J.stl", 0.0)
     printed = capsys.readouterr()
     assert is_plain(printed.out + printed.err)
-    assert "a\\u001b[2Jb\\u202e\\u009b.wav" in printed.out
+    assert "a\\u001b[2Jb\\u202e\\u009b.csv" in printed.out
     assert printed.err.count("\n") == 5
 
 

@@ -20,7 +20,9 @@ from skinwave.scene.scene import Body, Layer, Scene
 from skinwave.studies import album, scene_report
 from skinwave.studies.gallery import Gallery
 
-draws = pytest.mark.skipif("not renderer().found", reason="nothing draws in three dimensions here")
+draws = pytest.mark.skipif(
+    "not renderer.renderer().found", reason="nothing draws in three dimensions here"
+)
 PATH = Trajectory(shape="circle", size=0.008, speed=5.0)
 SCENE = Scene(
     pressure=MovingPressure(tacton=Tacton(trajectory=PATH, duration=0.05, am_frequency=100)),
