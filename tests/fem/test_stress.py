@@ -4,15 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
-from scipy.special import j0, j1
+from half_space import WIDTH, boussinesq
 
 import fem
 import meshes
 from fem.stress import strain_operator
 from simple_model.layers.tensors import hooke
 
-WIDTH = 4.5e-3  # m, standard deviation of the pressure
 POISSON = [0.3, 0.4999]
 
 
@@ -64,31 +62,6 @@ def test_displacement_inside_a_body_is_interpolated():
     np.testing.assert_allclose(found.reshape(-1, 3), expected, rtol=0, atol=1e-15)
     with pytest.raises(ValueError, match="not in the body"):
         fem.locate(mesh, [[0, 0, 1e-3]])
-
-
-def boussinesq(poisson, r, z, width=WIDTH):
-    """Stresses rr, tt, zz and, z upwards, rz at a depth z below exp(-r^2 / 2 width^2) in Pa.
-
-    Johnson, Contact Mechanics (1985), section 3.2, by Love's function under Hankel's transform:
-    sigma_zz = -int q (1 + k z) e^(-k z) J0(k r) k dk and likewise the others.
-    """
-
-    def hankel(kernel):
-        def integrand(k):
-            return width**2 * np.exp(-((k * width) ** 2) / 2 - k * z) * k * kernel(k)
-
-        return quad(integrand, 0, 9 / width, limit=200)[0]
-
-    def ring(k):
-        return j1(k * r) / (k * r) if r else 0.5
-
-    free = 1 - 2 * poisson
-    return (
-        -hankel(lambda k: (1 - k * z) * j0(k * r) - (free - k * z) * ring(k)),
-        -hankel(lambda k: 2 * poisson * j0(k * r) + (free - k * z) * ring(k)),
-        -hankel(lambda k: (1 + k * z) * j0(k * r)),
-        hankel(lambda k: k * z * j1(k * r)),
-    )
 
 
 FOCI = [(a * 5e-3, b * 5e-3) for a in (1, -1) for b in (1, -1)]

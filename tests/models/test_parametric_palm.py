@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_palms import FLAT, grid, measures, rounded_slab
+from flat_palms import FLAT, grid, measures, rounded_slab
 from test_parametric import full_lines, scene_of
 
 import meshes

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_stress import boussinesq
+from half_space import boussinesq
 
 from fem.coat import Coat
 from simple_model import lines
