@@ -11,9 +11,9 @@ from skinwave.scene.scene import BODIES
 
 USED = {
     "files": "adaptics linesCsv pyautd3 readMeasurement sceneToml waveformCsv waveformWav",
-    "kernel": "openKernel", "load": "loadLines spot", "numbers": "amplitudesOf delayOf levelAt "
-    "levelOver lineNames mapAxis mapOf meanLevel phaseDelay pressureThresholdAt reach shareOutside "
-    "spectrum spread thresholdAt unresolvedNames",
+    "kernel": "openKernel", "load": "loadLines spot", "numbers": "amplitudesOf delayOf levelOf "
+    "levelOver lineNames mapOf meanLevel phaseDelay pressureThresholdAt reach shareOutside "
+    "spectrum thresholdAt unresolvedNames",
     "values": "STARTS check fromAddress loadOf toAddress",
 }  # fmt: skip
 MODULE = (

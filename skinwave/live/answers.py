@@ -18,29 +18,32 @@ MOST_VALUES = 2_000_000  # of a measurement that is sent to a page
 
 
 def body_lines(content: bytes, progress: Progress) -> Iterator[dict[str, Any]]:
-    """Yield the record of a changed body, then its dispersion curves.
+    """Yield {"body": record} of a changed body, then {"dispersion": curves}.
 
     Parameters
     ----------
     content : JSON {"toml", "changes", "name", "title"}; the last two are optional
     progress : told of the phases
 
-    Yields
-    ------
-    {"body": record} without dispersion curves, then {"dispersion": curves}
-
     Raises
     ------
     ValueError
         If the content is malformed, or the body cannot be.
     """
-    given = _object(content)
-    body = changed(body_of(_text(given, "toml")), _table(given, "changes"))
+    try:
+        given = json.loads(content)
+    except ValueError:
+        given = None
+    kinds = {"toml": str, "changes": dict, "name": str, "title": str}
+    if not isinstance(given, dict) or not all(
+        isinstance(given.setdefault(key, kind()), kind) for key, kind in kinds.items()
+    ):
+        raise ValueError('The request is malformed. Send JSON {"toml": ..., "changes": {...}}.')
+    body, title = changed(body_of(given["toml"]), given["changes"]), given["title"]
     pack = pack_of(body, progress)
-    name, title = _text(given, "name"), _text(given, "title")
-    if title and given.get("changes"):
+    if title and given["changes"]:
         title = f"{title.partition(',')[0]}, changed"  # whatever size it has named
-    yield {"body": record_of(body, pack, name, title, waves=False)}
+    yield {"body": record_of(body, pack, given["name"], title, waves=False)}
     yield {"dispersion": dispersion_of(body)}
 
 
@@ -101,27 +104,3 @@ def measurement_answer(name: str, content: bytes) -> dict[str, Any]:
         return curves | {"frequencies": found.frequencies.tolist(), "amplitudes": amplitudes}
     times = found.times - found.times[0]
     return curves | {"times": times.tolist(), "values": mean.real.T.tolist()}
-
-
-def _object(content: bytes) -> dict[str, Any]:
-    try:
-        given = json.loads(content)
-    except ValueError:
-        given = None
-    if not isinstance(given, dict):
-        raise ValueError('The request is malformed. Send JSON {"toml": ..., "changes": {...}}.')
-    return given
-
-
-def _text(given: dict[str, Any], key: str) -> str:
-    value = given.get(key, "")
-    if not isinstance(value, str):
-        raise ValueError(f"{key} of the request must be text.")
-    return value
-
-
-def _table(given: dict[str, Any], key: str) -> dict[str, Any]:
-    value = given.get(key, {})
-    if not isinstance(value, dict):
-        raise ValueError(f"{key} of the request must be an object.")
-    return value

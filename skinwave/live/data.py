@@ -26,7 +26,7 @@ def data_of(
     bodies: Sequence[str] = BODIES_SHOWN,
     test: bool = True,
 ) -> dict[str, Any]:
-    """Return the data of a page.
+    """Return the data of a page as a dict for JSON.
 
     Parameters
     ----------
@@ -34,10 +34,6 @@ def data_of(
     progress : told of each body's phases
     bodies : names of preset bodies that a page without scenes has
     test : whether to include the data of the self-test
-
-    Returns
-    -------
-    dict for JSON
 
     Raises
     ------
@@ -47,9 +43,9 @@ def data_of(
     names = named([scene.body for scene in scenes] or [BODIES[name] for name in bodies])
     own = [values.values_of(scene, names[scene.body]) for scene in scenes]
     records, tests = [], []
-    for number, (body, name) in enumerate(names.items()):
-        report = partial(_in_part, progress, title_of(body), number, len(names))
-        pack = pack_of(body, report)
+    for body, name in names.items():
+        before = f"{title_of(body)}: " if len(names) > 1 else ""
+        pack = pack_of(body, partial(_named, progress, before))
         records.append(record_of(body, pack, name))
         if test:
             lowest, error = pack["lowest_height_mm"] / 1e3, pack.get("error", ERROR)
@@ -90,9 +86,8 @@ def _own_presets(scenes: Sequence[Scene], own: Sequence[values.Values]) -> list[
     for scene, each in zip(scenes, own, strict=True):
         tacton = {key: value for key, value in each.items() if key != "body"}
         if scene.name not in dict(tactons()) and tacton not in found.values():
-            found[f"{scene.name} ({len(found) + 1})" if scene.name in found else scene.name] = (
-                tacton
-            )
+            title = f"{scene.name} ({len(found) + 1})" if scene.name in found else scene.name
+            found[title] = tacton
     return [{"name": title, "title": title, "values": each} for title, each in found.items()]
 
 
@@ -110,8 +105,5 @@ def read_scene(path: Path) -> Scene:
     return scene if scene.name != Scene.name else replace(scene, name=path.stem)
 
 
-def _in_part(
-    progress: Progress, title: str, number: int, count: int, phase: str, fraction: float
-) -> None:
-    """Report the progress of one body of several."""
-    progress(f"{title}: {phase}" if count > 1 else phase, fraction)
+def _named(progress: Progress, before: str, phase: str, fraction: float) -> None:
+    progress(f"{before}{phase}", fraction)

@@ -42,23 +42,7 @@ LEFT_OUT = 1e-4  # of the mean-square motion: what the basis need not have
 
 
 def element_pack(body: Body, h: float, progress: Progress = silent) -> dict[str, Any]:
-    """Pack of a body of finite elements.
-
-    Parameters
-    ----------
-    body : Body
-    h : metre, element size
-    progress : is told of phases and shares
-
-    Returns
-    -------
-    dict for JSON
-
-    Raises
-    ------
-    ValueError
-        As `build` does.
-    """
+    """Return the pack of a body of finite elements of size `h` in metre, as a dict for JSON."""
     progress("mesh", 0.0)
     body = relaxing(body, FIT_TOLERANCE)
     made = build(body, h)
@@ -147,21 +131,15 @@ def surface_grid(body: Body, made: Build) -> tuple[Floats, np.ndarray, Floats, F
     """Places (SIDE^2, 2) in metre of the grid, whether they are on the body, and of the surface the
     cosine of its slope (SIDE^2,) and its height (SIDE^2,) in metre.
     """
+    from scipy.interpolate import LinearNDInterpolator  # which takes long to import
+
     x, y = np.meshgrid(grid_line(), grid_line())
     places = np.column_stack([x.ravel(), y.ravel()])
     inside = fem.on_surface(made.mesh, places)
+    points = made.mesh.points[np.unique(made.mesh.facets["top"])]
+    found = LinearNDInterpolator(points[:, :2], points[:, 2])(places[inside])
     heights = np.zeros(len(places))
-    heights[inside] = surface_heights(made, places[inside])
+    heights[inside] = np.nan_to_num(found, nan=float(points[:, 2].max()))
     shown = np.where(inside, heights, np.nan).reshape(SIDE, SIDE)
     steep = np.nan_to_num(np.stack(np.gradient(shown, STEP)))
     return places, inside, (1 + (steep**2).sum(axis=0)).ravel() ** -0.5, heights
-
-
-def surface_heights(made: Build, places: Floats) -> Floats:
-    """Height (p,) in metre of the upper surface at places (p, 2), from its nodes."""
-    from scipy.interpolate import LinearNDInterpolator
-
-    nodes = np.unique(made.mesh.facets["top"])
-    points = made.mesh.points[nodes]
-    found = LinearNDInterpolator(points[:, :2], points[:, 2])(places)
-    return np.nan_to_num(found, nan=float(points[:, 2].max()))

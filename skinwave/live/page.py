@@ -14,17 +14,7 @@ TITLE = "skinwave: waves in skin and paper under mid-air ultrasound haptics"
 
 
 def page(data: Mapping[str, Any], title: str = TITLE) -> str:
-    """Return the live page as HTML.
-
-    Parameters
-    ----------
-    data : bodies, start, presets, examples, selftest and api, as the page reads them
-    title : of the document
-
-    Returns
-    -------
-    str
-    """
+    """Return the live page as HTML, of the data that `skinwave.live.data` makes."""
     static = resources.files("skinwave.live") / "static"
     script = "\n" + bundle(static, ENTRY)
     return render(

@@ -69,7 +69,7 @@ class Editable:
 def record_of(
     body: Body, pack: Mapping[str, Any], name: str = "", title: str = "", *, waves: bool = True
 ) -> dict[str, Any]:
-    """Return the record of a body for the page.
+    """Return the record of a body for the page, a dict for JSON.
 
     Parameters
     ----------
@@ -77,10 +77,6 @@ def record_of(
     pack : from which the page computes its motion
     name, title : by default the body's own
     waves : whether to compute dispersion curves
-
-    Returns
-    -------
-    dict for JSON
     """
     kind = body.of_kind
     infinite = is_laterally_infinite(body) and has_exact_waves(body)
@@ -127,16 +123,7 @@ def body_of(toml: str) -> Body:
 
 
 def changed(body: Body, changes: Mapping[str, Any]) -> Body:
-    """Return a body with other values.
-
-    Parameters
-    ----------
-    body : Body
-    changes : value by key of its `editables`
-
-    Returns
-    -------
-    Body
+    """Return a body with other values by key of its `editables`.
 
     Raises
     ------
@@ -224,7 +211,7 @@ def _of_layer(body: Body, number: int) -> list[Editable]:
         ),
         Editable(
             key=f"{prefix}loss", label=f"{label('Loss factor')} at {LOSS_AT:g} Hz",
-            value=_shown(loss_factor(solid)), range=RANGES["loss"],
+            value=_shown(_loss_factor(solid)), range=RANGES["loss"],
             change=lambda value: with_layer(own, solid.scaled(loss=_loss_scale(solid, value))),
         ),
     ]  # fmt: skip
@@ -246,8 +233,7 @@ def _support(body: Body, name: str) -> Editable:
     )  # fmt: skip
 
 
-def loss_factor(solid: Material) -> float:
-    """Return the loss factor of a material at 200 Hz."""
+def _loss_factor(solid: Material) -> float:
     mu = complex(solid.complex_modulus(2 * pi * LOSS_AT))
     return mu.imag / mu.real
 
@@ -263,9 +249,9 @@ def _loss_scale(solid: Material, loss: float) -> float:
     from scipy.optimize import brentq  # which takes long to import
 
     def off(factor: float) -> float:
-        return loss_factor(solid.scaled(loss=factor)) - loss
+        return _loss_factor(solid.scaled(loss=factor)) - loss
 
-    own = loss_factor(solid)
+    own = _loss_factor(solid)
     for spread in SPREADS if own > 0 else ():
         with suppress(ValueError):  # beyond a material's limits, or no change of sign
             return float(brentq(off, loss / own / spread, loss / own * spread, rtol=SAME / 10))

@@ -31,22 +31,12 @@ PLACES = ((0.0, 0.0), (0.006, -0.002), (-0.011, 0.007), (0.004, 0.016), (0.02, -
 
 Lines = Callable[[Scene], tuple[Floats, Complex]]
 Waveform = Callable[[Scene], Floats]
+Places = tuple[tuple[float, float], ...]
 
 
 def selftest(body: Body, name: str, most: int, lowest: float, error: float) -> list[dict[str, Any]]:
-    """Return random Tactons on a body with their steady lines at a point.
-
-    Parameters
-    ----------
-    body : Body
-    name : of its record
-    most : how many
-    lowest : metre, the least height of the focus
-    error : relative, of a line, that the test allows
-
-    Returns
-    -------
-    records of body, values, lines [{f in Hz, re, im in metre}] and the error that is allowed
+    """Return random Tactons on a body with their steady lines at a point: records of the body's
+    name, values, lines [{f in Hz, re, im in metre}] and the relative error that is allowed.
     """
     rng = np.random.default_rng(SEED)
     found: list[dict[str, Any]] = []
@@ -68,15 +58,8 @@ def selftest(body: Body, name: str, most: int, lowest: float, error: float) -> l
     return found
 
 
-def exact(
-    body: Body, h: float | None = None
-) -> tuple[Lines, Waveform, tuple[tuple[float, float], ...]]:
+def exact(body: Body, h: float | None = None) -> tuple[Lines, Waveform, Places]:
     """Return an exact model of a body, which does not use its pack.
-
-    Parameters
-    ----------
-    body : Body
-    h : metre, size of elements; by default that of packs
 
     Returns
     -------
@@ -112,9 +95,9 @@ def _is_plate(body: Body) -> bool:
 
 
 def _lines_of_layers(scene: Scene) -> tuple[Floats, Complex]:
-    body, places = scene.body, scene.probe_points
-    f, amplitudes = steady_lines(compliance(body), scene.pressure, places, threshold=1e-4)
-    return f, amplitudes[:, 0]
+    answer = compliance(scene.body)
+    f, lines = steady_lines(answer, scene.pressure, scene.probe_points, threshold=1e-4)
+    return f, lines[:, 0]
 
 
 def _lines_of_sheet(scene: Scene) -> tuple[Floats, Complex]:
@@ -123,23 +106,10 @@ def _lines_of_sheet(scene: Scene) -> tuple[Floats, Complex]:
 
 
 def random_scene(
-    body: Body,
-    rng: np.random.Generator,
-    lowest: float = LOWEST,
-    places: tuple[tuple[float, float], ...] = (),
+    body: Body, rng: np.random.Generator, lowest: float = LOWEST, places: Places = ()
 ) -> Scene:
-    """Return a scene of a random Tacton that the page's controls can set.
-
-    Parameters
-    ----------
-    body : Body
-    rng : of the Tacton
-    lowest : metre, the least height of the focus
-    places : (p, 2) metre, of which one is the probe; () for any
-
-    Returns
-    -------
-    Scene of one probe
+    """Return a scene of a random Tacton that the page's controls can set, at a height from `lowest`
+    in metre on, with its probe at one of the places, () for any.
     """
     bounded = body.of_kind.is_bounded
     half = min(0.025, *((body.width / 2, body.height / 2) if bounded else ()))

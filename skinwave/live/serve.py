@@ -14,7 +14,7 @@ from http import HTTPStatus
 from http.cookies import SimpleCookie
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Lock
-from typing import Any
+from typing import Any, TypeVar
 from urllib.parse import parse_qs, unquote, urlsplit
 
 from skinwave.live.answers import body_lines, measurement_answer, scene_answer
@@ -37,6 +37,7 @@ HEADERS = {
     "X-Content-Type-Options": "nosniff", "X-Frame-Options": "DENY",
 }  # fmt: skip
 EXPECTED = (ValueError, ArithmeticError, MemoryError, RecursionError)
+_T = TypeVar("_T")
 
 
 class Superseded(Exception):
@@ -51,7 +52,7 @@ class Server(ThreadingHTTPServer):
     data : of the page, with its `api` left open
     port : 0 for any
     base : path under which a proxy shows the server, begins and ends with "/"
-    token : by default a new one
+    token : a new one by default
 
     Raises
     ------
@@ -84,12 +85,9 @@ class Server(ThreadingHTTPServer):
         """Address that opens the page on this machine."""
         return f"http://127.0.0.1:{self.server_port}{self.base}?token={self.token}"
 
-    def compute(self, work: Callable[[Callable[[], None]], None]) -> None:
-        """Do work as the only one: older work ends at its next report of progress.
-
-        Parameters
-        ----------
-        work : called with a function that raises `Superseded` when newer work has come
+    def compute(self, work: Callable[[Callable[[], None]], _T]) -> _T:
+        """Return what work gives, called with a function that raises `Superseded` when newer
+        work has come. Only one computes at a time.
         """
         with self._counting:
             self._newest += 1
@@ -101,13 +99,13 @@ class Server(ThreadingHTTPServer):
 
         with self._computing:
             check()
-            work(check)
+            return work(check)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Say an error in one line; a connection that was closed is none."""
         error = sys.exc_info()[1]
         if not isinstance(error, ConnectionError | TimeoutError):
-            say_fault(error)
+            _say_fault(error)
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -137,12 +135,12 @@ class _Handler(BaseHTTPRequestHandler):
     def do_POST(self) -> None:
         """Answer a request of the page."""
         name = self._route(urlsplit(self.path).path)
-        kind = (name or "").removeprefix("api/")
+        kind = name.removeprefix("api/")
         if not self._is_local():
             return self._error(HTTPStatus.FORBIDDEN, NOT_HERE)
         if not self._is_token(self.headers.get("X-Token", "")):
             return self._error(HTTPStatus.FORBIDDEN, NO_TOKEN)
-        if name not in {f"api/{kind}" for kind in LARGEST}:
+        if kind == name or kind not in LARGEST:
             return self._error(HTTPStatus.NOT_FOUND, "There is nothing at this address.")
         length = self.headers.get("Content-Length", "")
         if not re.fullmatch(r"\d{1,12}", length) or "Transfer-Encoding" in self.headers:
@@ -157,19 +155,16 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _answer(self, kind: str, content: bytes) -> None:
         name = unquote(self.headers.get("X-Name", ""))
-        found: list[dict[str, Any]] = []
-
-        def work(check: Callable[[], None]) -> None:
-            found.append(scene_answer(name, content, lambda phase, fraction: check()))
-
         try:
             if kind == "body":
                 return self._stream_body(content)
-            if kind == "scene":
-                self.server.compute(work)
+            if kind == "measurement":
+                found = measurement_answer(name, content)
             else:
-                found.append(measurement_answer(name, content))
-            return self._send(HTTPStatus.OK, _json(found[0]), "application/json")
+                found = self.server.compute(
+                    lambda check: scene_answer(name, content, lambda phase, fraction: check())
+                )
+            return self._send(HTTPStatus.OK, _json(found), "application/json")
         except ConnectionError:
             raise
         except Exception as error:
@@ -201,7 +196,7 @@ class _Handler(BaseHTTPRequestHandler):
         except Exception as error:
             send({"error": _explained(error)[1]})
 
-    def _route(self, path: str) -> str | None:
+    def _route(self, path: str) -> str:
         """Path below the base; a proxy may have removed the base from it."""
         base = self.server.base
         if path in (base, base.rstrip("/"), "/", ""):
@@ -250,7 +245,7 @@ class _Handler(BaseHTTPRequestHandler):
         self.end_headers()
 
 
-def say_fault(error: BaseException | None) -> None:
+def _say_fault(error: BaseException | None) -> None:
     """Say a fault of the server in one line of its terminal."""
     text = printable(f"{type(error).__name__}: {error}"[:LONGEST_LINE], keep="")
     say(f"skinwave: a request failed: {text}", sys.stderr)
@@ -267,5 +262,5 @@ def _explained(error: Exception) -> tuple[HTTPStatus, str]:
     if isinstance(error, EXPECTED):
         words = " ".join(str(error).split())
         return HTTPStatus.BAD_REQUEST, words or "There is not enough memory. Use larger elements."
-    say_fault(error)
+    _say_fault(error)
     return HTTPStatus.INTERNAL_SERVER_ERROR, FAULT

@@ -16,7 +16,7 @@ from simple_model.layers.prony import FIT_TOLERANCE
 from simple_model.load.focus import spot_width
 from simple_model.plates.free_modes import free_vibration, relaxing_stiffness
 from simple_model.plates.modes import PlateModes
-from skinwave.live.grid import SIDE, STEP, grid_line, smoothed
+from skinwave.live.grid import SIDE, STEP, grid_line
 from skinwave.models.laws import relaxing
 from skinwave.models.plate_modes import modes_of, plate_of, relative_modulus
 from skinwave.scene.scene import Body
@@ -36,17 +36,7 @@ QUASI_STATIC = (0.0, 600.0, 1000.0)  # Hz at which these combinations are looked
 
 
 def sheet_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
-    """Pack of a flat sheet that is held: modes of a thin plate by Ritz's method.
-
-    Parameters
-    ----------
-    body : Body
-    progress : is told of the phase
-
-    Returns
-    -------
-    dict for JSON
-    """
+    """Return the pack of a flat sheet that is held, as a dict for JSON."""
     progress("modes of the sheet", 0.0)
     modes = modes_of(plate_of(body))
     middle, line = np.asarray(body.placement.offset), grid_line()
@@ -111,3 +101,12 @@ def _bending(modes: PlateModes, turn: Floats) -> Floats:
         own = np.diag(family.squared) if family.bending is None else family.bending
         found += part.T @ own @ part
     return found
+
+
+def smoothed(fields: Floats, width: float) -> Floats:
+    """Forces (m, SIDE^2) of a focal spot of 1 Pa and this width in metre at each place of the grid:
+    sums over the places, which for smooth fields (m, SIDE^2) are the integrals.
+    """
+    away = np.subtract.outer(grid_line(), grid_line())
+    spot = STEP * np.exp(-(away**2) / (2 * width**2))
+    return np.asarray(spot @ fields.reshape(-1, SIDE, SIDE) @ spot).reshape(len(fields), -1)

@@ -59,16 +59,8 @@ def title_of(tacton: Tacton) -> str:
 
 
 def values_of(scene: Scene, body: str) -> Values:
-    """Return the values of the controls that give a scene, probed at its first probe.
-
-    Parameters
-    ----------
-    scene : Scene
-    body : name of its body's record
-
-    Returns
-    -------
-    dict
+    """Return the values of the controls that give a scene, whose body has this name, at its first
+    probe.
 
     Raises
     ------

@@ -21,7 +21,8 @@ from skinwave.scene.scene import BODIES
 pytestmark = needs_browser
 
 ENTRY = """
-import { MAP_LINE, openBody } from "./bodies.js";
+import { openBody } from "./bodies.js";
+import { MAP_LINE } from "./numbers.js";
 import { loadOf } from "./values.js";
 const bodies = new Map();
 window.open_ = (record) => { bodies.set(record.name, openBody(record)); };
@@ -109,13 +110,12 @@ def wave_errors(page, name, made, waveform_of):
 @pytest.mark.parametrize("name", ["palm-layers", "paper-sheet"])
 def test_lines_and_waveforms_of_layers_and_sheets(page, name):
     lines_of, waveform_of, _ = exact(BODIES[name])
-    made = scenes(name, 12)
+    made = scenes(name, 8)
     assert line_errors(page, name, made, lines_of).max() < 0.005
-    assert wave_errors(page, name, made[:4], waveform_of).max() < 0.01
+    assert wave_errors(page, name, made[:3], waveform_of).max() < 0.01
 
 
-@pytest.mark.parametrize("name", ["palm-layers", "paper-sheet"])
-@pytest.mark.parametrize("ramp", [0.0, 0.01])
+@pytest.mark.parametrize(("name", "ramp"), [("palm-layers", 0.01), ("paper-sheet", 0.01)])
 def test_pulses_of_a_rhythm(page, name, ramp):
     waveform_of = exact(BODIES[name])[1]
     rhythm = Rhythm(pulses=((0.06, 0.04), (0.03, 0.05)), ramp=ramp)
@@ -139,6 +139,6 @@ def test_a_body_of_elements(page):
 @pytest.mark.parametrize("name", ["palm-layers", "paper-sheet"])
 def test_maps_are_what_is_read_at_their_places(page, name):
     (scene,) = scenes(name, 1)
-    given = {"name": name, "values": values_of(scene, name), "k": 41 * 17 + 25}
+    given = {"name": name, "values": values_of(scene, name), "k": 45 * 19 + 28}
     pairs = np.array(page.evaluate("given => window.places(given)", given))
     assert np.abs(pairs[:, 0] - pairs[:, 1]).max() < 3e-3 * np.abs(pairs).max()

@@ -80,20 +80,16 @@ def test_measurements_are_read_as_python_reads_them(page, tmp_path, header, mark
         np.testing.assert_allclose(found["places"], wanted.places)
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("time [s],signal [V]\n0,1\n1,2\n2,3", '"signal [V]" has no unit of motion.'),
-        ("0,1\n1,2\n2,3", "the first line has no titles of columns."),
-        ("time [s],u [m]\n0,1\n1,2\n5,3\n6,2", "its times are not equally spaced."),
-        ("time [s],u [m]\n0,1\n1,x\n2,3", "row 2 below the titles has a cell"),
-        ("f [Hz],re v [m/s],im v [m/s]\n1,1,1\n2,2,1\n3,1,1", "its spectrum has real"),
-    ],
-)
-def test_other_files_are_refused_with_the_reason_and_where_to_go(page, text, said):
-    found = page.evaluate("(text) => attempt(() => readMeasurement(text, 'a.csv'))", text)
-    assert said in found["refused"]
-    assert found["refused"].endswith("skinwave web and skinwave compare read other formats.")
+REFUSED = (
+    "time [s],signal [V]\n0,1\n1,2\n2,3", "0,1\n1,2\n2,3", "time [s],u [m]\n0,1\n1,x\n2,3",
+    "time [s],u [m]\n0,1\n1,2\n5,3\n6,2", "f [Hz],re v [m/s],im v [m/s]\n1,1,1\n2,2,1\n3,1,1",
+)  # fmt: skip
+
+
+def test_other_files_are_refused_with_where_to_go(page):
+    read_all = "(texts) => texts.map((text) => attempt(() => readMeasurement(text, 'a.csv')))"
+    for found in page.evaluate(read_all, REFUSED):
+        assert "skinwave web" in found["refused"]
 
 
 def test_patterns_of_devices_mean_the_same_as_those_of_python(page, starts):

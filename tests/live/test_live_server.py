@@ -79,19 +79,11 @@ def test_the_address_brings_the_token_and_a_cookie_keeps_it(client):
     assert client.ask("GET", "/other?token=right")[0].status == 404
 
 
-@pytest.mark.parametrize(
-    "headers",
-    [
-        {"Host": "evil.example"},
-        {"Host": "127.0.0.1.evil.example"},
-        {"Origin": "http://evil.example"},
-    ],
-    ids=str,
-)
-def test_other_sites_are_refused(client, headers):
-    assert client.ask("GET", "/?token=right", **headers)[0].status == 403
-    answer, _ = client.ask("POST", "/api/body", b"{}", X_Token="right", **headers)
-    assert answer.status == 403
+def test_other_sites_are_refused(client):
+    for headers in ({"Host": "evil.example"}, {"Host": "127.0.0.1.evil.example"},
+                    {"Origin": "http://evil.example"}):  # fmt: skip
+        assert client.ask("GET", "/?token=right", **headers)[0].status == 403
+        assert client.ask("POST", "/api/body", b"{}", X_Token="right", **headers)[0].status == 403
 
 
 def test_requests_without_the_token_are_refused(client):
@@ -116,10 +108,10 @@ def test_a_proxy_may_show_it_under_a_prefix():
         client.close()
 
 
-@pytest.mark.parametrize("base", ["//evil.example/", "/a b/", "/a", '/"/', "/a\r\nX: b/"])
-def test_a_prefix_that_is_no_path_is_refused(base):
-    with pytest.raises(ValueError, match="must be a path"):
-        serve.Server(DATA, base=base)
+def test_a_prefix_that_is_no_path_is_refused():
+    for base in ("//evil.example/", "/a b/", "/a", '/"/', "/a\r\nX: b/"):
+        with pytest.raises(ValueError, match="path"):
+            serve.Server(DATA, base=base)
 
 
 def test_a_changed_body_comes_after_its_progress(client):

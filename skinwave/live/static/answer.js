@@ -1,8 +1,9 @@
 // An answer of the page: what the kernel and a body do under the load of the controls.
 
-import { QUANTITIES, amplitudesOf, delayOf, levelOf, mapAxis, mapOf, namesOf, reach, shareOutside,
+import { QUANTITIES, amplitudesOf, delayOf, levelOf, mapOf, namesOf, reach, shareOutside,
   unresolvedNames } from "./numbers.js";
 import { pathSamples, spotWidth } from "./load.js";
+import { largestOf } from "./numeric.js";
 import { loadOf } from "./values.js";
 
 const TOO_FAR = 0.5; // of a sheet's thickness, above which a linear model is not valid
@@ -40,8 +41,8 @@ export const OF_MAPS = ["maps", "share", "kernelShare", "reach", "kernelReach", 
 
 /** Maps of the kernel and the waves, and the numbers that need them. */
 export function mapsOf(answer) {
-  const { kernel, waves, load, body } = answer, axis = mapAxis();
-  const maps = { kernel: mapOf(kernel, load, axis), waves: mapOf(waves, load, axis) };
+  const { kernel, waves, load, body } = answer;
+  const maps = { kernel: mapOf(kernel, load), waves: mapOf(waves, load) };
   return {
     maps, share: shareOutside(maps.kernel.rms, maps.waves.rms),
     kernelShare: shareOutside(maps.kernel.rms, maps.kernel.rms),
@@ -55,8 +56,7 @@ export function mapsOf(answer) {
 function invalidity({ body, waves, x, y }) {
   if (!body.thickness_mm) return "";
   const times = Float64Array.from({ length: SEEN / STEP }, (_, k) => k * STEP);
-  const largest = Math.max(...[[0, 0], [x, y]].map((at) => waves.waveform(...at, times)
-    .reduce((most, u) => Math.max(most, Math.abs(u)), 0)));
+  const largest = Math.max(...[[0, 0], [x, y]].map((at) => largestOf(waves.waveform(...at, times))));
   const ratio = 1e3 * largest / body.thickness_mm;
   return ratio > TOO_FAR ? `linear model, ${ratio.toPrecision(2)} × thickness` : "";
 }

@@ -1,14 +1,12 @@
 // Bodies of the page's data, made ready to answer: steady lines anywhere, and waveforms from rest.
 
 import { ModalBody } from "./modal.js";
+import { MAP_LINE } from "./numbers.js";
 import { opened } from "./pack.js";
 import { PoleBody } from "./poles.js";
 import { RadialBody } from "./radial.js";
 
-const SIDE = 41, HALF = 0.044; // places along a side of a map or shape, and half of it in metre
-
-/** Places in metre of every map, along x and along y. */
-export const MAP_LINE = Float64Array.from({ length: SIDE }, (_, k) => HALF * (2 * k / (SIDE - 1) - 1));
+const SIDE = MAP_LINE.length;
 
 const OPENERS = { radial: RadialBody, modal: ModalBody, poles: PoleBody };
 
@@ -73,7 +71,7 @@ function shapeOf(isInside, heightAt, depth) {
       for (const [from, to] of [[a, b], [b, c], [c, d], [d, a]]) edge(from, to);
     }
   }
-  const low = Math.min(depth || 1, 1e3 * HALF / 2), below = new Map();
+  const low = Math.min(depth || 1, 1e3 * MAP_LINE[SIDE - 1] / 2), below = new Map();
   const lower = (k) => {
     if (!below.has(k)) {
       below.set(k, at.length);

@@ -1,7 +1,8 @@
 // The controls of the page: rows of a slider and a field, choices, rhythm, foci, body and files.
 
+import { rhythmPeriod } from "./load.js";
 import { CHOICES, LABELS, NUMBERS, check, pulsesOf } from "./values.js";
-import { escaped } from "./plots.js";
+import { escaped } from "./text.js";
 
 const WORDS = {
   there_and_back: "there and back", one_way: "one way, then jump", sinusoidal: "sinusoidal",
@@ -148,7 +149,7 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
     const strip = $("strip");
     let pulses = [];
     try { pulses = pulsesOf(values.pulses); } catch { /* what is typed is marked at the field */ }
-    const period = pulses.reduce((sum, [on, gap]) => sum + on + gap, 0);
+    const period = rhythmPeriod({ pulses });
     strip.setAttribute("aria-label", period ? `Pulses, repeated every ${Math.round(1e3 * period)} ms`
       : "No pulses: always on");
     const said = (text) => `<text x="${STRIP}" y="38" text-anchor="middle">${text}</text>`;

@@ -3,6 +3,7 @@
 import { DRIVES, drawingFrequency, gainAt, joinedCorners, levelFactor, outline, pathLength, positionOf,
   rhythmLevel } from "./load.js";
 import { QUANTITIES, lineTable } from "./numbers.js";
+import { largestOf } from "./numeric.js";
 import { loadOf, pulsesOf } from "./values.js";
 
 const NAME = "skinwave live";
@@ -79,10 +80,15 @@ export function linesCsv(answer) {
   ]));
 }
 
-/** WAV (16 bit, mono) of samples about their mean, as loud as the format holds. */
-export function wav(samples, rate) {
+/** Samples about their mean, the largest of size 1. */
+export function asSound(samples) {
   const mean = samples.reduce((sum, value) => sum + value, 0) / samples.length;
-  const largest = samples.reduce((most, value) => Math.max(most, Math.abs(value - mean)), 0) || 1;
+  const about = samples.map((value) => value - mean), largest = largestOf(about) || 1;
+  return about.map((value) => value / largest);
+}
+
+/** WAV (16 bit, mono) of samples about their mean, as loud as the format holds. */
+function wav(samples, rate) {
   const bytes = new DataView(new ArrayBuffer(44 + 2 * samples.length));
   const text = (at, word) => [...word].forEach((letter, k) => bytes.setUint8(at + k, letter.charCodeAt(0)));
   text(0, "RIFF"); text(8, "WAVEfmt "); text(36, "data");
@@ -90,8 +96,7 @@ export function wav(samples, rate) {
   const words = [16, 1 + (1 << 16), rate, 2 * rate, 2 + (16 << 16)];
   words.forEach((word, k) => bytes.setUint32(16 + 4 * k, word, true));
   bytes.setUint32(40, 2 * samples.length, true);
-  samples.forEach((value, k) => (
-    bytes.setInt16(44 + 2 * k, Math.round((value - mean) / largest * FULL_SCALE), true)));
+  asSound(samples).forEach((value, k) => bytes.setInt16(44 + 2 * k, Math.round(value * FULL_SCALE), true));
   return new Uint8Array(bytes.buffer);
 }
 

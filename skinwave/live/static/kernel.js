@@ -7,7 +7,7 @@ const PASSED = 5.7 / (2 * Math.PI); // f s / v, at which the spectrum of a passi
 const PER_PERIOD = 8; // samples of the highest frequency
 const REACH = 128; // samples on either side that the low pass weighs
 const BETA = 10; // of its Kaiser window, 100 dB down
-const NEGLIGIBLE_SPOT = 1e-7;
+const NEGLIGIBLE = 5.7; // widths of a Gaussian spot, beyond which it is below 1e-7
 const DEGREES = { linear: 1, pressure_squared: 2, force_corrected: 1 };
 
 /** The load as published: linear drive law and the main lobe alone (simple_model.published). */
@@ -26,9 +26,8 @@ function respond(given, { published = false } = {}) {
   const orders = [...new Set(parts.flat().map(({ n }) => Math.abs(n)))];
   const index = new Map(orders.map((n, k) => [n, k]));
   const weights = orders.map((n) => pathHarmonic(load, n, samples.x.length));
-  const passagesOn = load.profile === "gaussian" ? gaussianPassages : passagesOf;
   const onGrid = (xs, ys) => {
-    const passages = passagesOn(load, samples, weights, xs, ys);
+    const passages = passagesOf(load, samples, weights, xs, ys);
     const places = xs.length * ys.length;
     const found = { re: new Float32Array(f.length * places), im: new Float32Array(f.length * places) };
     parts.forEach((own, l) => {
@@ -50,50 +49,19 @@ function respond(given, { published = false } = {}) {
   return { f, unit: "Pa", load, at, onGrid, waveform: (x, y, times) => waveform(load, x, y, times) };
 }
 
-const emptyPassages = (weights, places) => weights.map(() => (
-  { re: new Float64Array(places), im: new Float64Array(places) }));
-
 /** Harmonics [{re, im}] of the passing focal spot at places row by row, from the weights of samples. */
-function passagesOf(load, samples, weights, xs, ys) {
-  const found = emptyPassages(weights, xs.length * ys.length), count = samples.x.length;
-  for (let row = 0, p = 0; row < ys.length; row++) {
-    for (let column = 0; column < xs.length; column++, p++) {
-      for (let q = 0; q < count; q++) {
-        const squared = (xs[column] - samples.x[q]) ** 2 + (ys[row] - samples.y[q]) ** 2;
-        const s = spot(squared, load.height, load.profile);
-        for (let k = 0; k < weights.length; k++) {
-          found[k].re[p] += s * weights[k].re[q];
-          found[k].im[p] += s * weights[k].im[q];
-        }
-      }
-    }
-  }
-  return found;
-}
-
-/** The same of a Gaussian spot, which is a product of one along x and one along y. */
-function gaussianPassages(load, samples, weights, xs, ys) {
-  const width = spotWidth(load.height), nx = xs.length, count = samples.x.length;
-  const along = (q, x) => Math.exp(-(((x - samples.x[q]) / width) ** 2) / 2);
-  const found = emptyPassages(weights, nx * ys.length), g = new Float64Array(count * nx);
-  const ends = Array.from({ length: count }, (_, q) => {
-    let first = nx, last = -1;
-    for (let column = 0; column < nx; column++) {
-      g[q * nx + column] = along(q, xs[column]);
-      if (g[q * nx + column] > NEGLIGIBLE_SPOT) [first, last] = [Math.min(first, column), column];
-    }
-    return [first, last];
-  });
-  for (let row = 0; row < ys.length; row++) {
-    for (let q = 0; q < count; q++) {
-      const s = Math.exp(-(((ys[row] - samples.y[q]) / width) ** 2) / 2), [first, last] = ends[q];
-      if (s < NEGLIGIBLE_SPOT || last < 0) continue;
+function passagesOf({ height, profile }, samples, weights, xs, ys) {
+  const places = xs.length * ys.length;
+  const reach = profile === "gaussian" ? NEGLIGIBLE * spotWidth(height) : Infinity;
+  const found = weights.map(() => ({ re: new Float64Array(places), im: new Float64Array(places) }));
+  for (let q = 0; q < samples.x.length; q++) {
+    for (let p = 0; p < places; p++) {
+      const x = xs[p % xs.length] - samples.x[q], y = ys[Math.floor(p / xs.length)] - samples.y[q];
+      if (Math.abs(x) > reach || Math.abs(y) > reach) continue;
+      const s = spot(x * x + y * y, height, profile);
       for (let k = 0; k < weights.length; k++) {
-        const a = s * weights[k].re[q], b = s * weights[k].im[q], { re, im } = found[k], from = q * nx;
-        for (let c = first, p = row * nx + first; c <= last; c++, p++) {
-          re[p] += a * g[from + c];
-          im[p] += b * g[from + c];
-        }
+        found[k].re[p] += s * weights[k].re[q];
+        found[k].im[p] += s * weights[k].im[q];
       }
     }
   }

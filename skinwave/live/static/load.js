@@ -1,6 +1,8 @@
 // The moving load of a Tacton: its path, its modulation, and its spectral lines.
 // The same formulas as simple_model: trajectory, tacton, drive, pressure, load_spectrum.
 
+import { fourier, indexIn } from "./numeric.js";
+
 const TAU = 2 * Math.PI;
 const FEWEST_KNOTS = 132; // positions along a closed path: all harmonics below 66 f_d
 const KNOTS_PER_WIDTH = 8; // of the focal spot
@@ -25,42 +27,21 @@ export const DRIVES = {
   linear: (amplitude, m) => amplitude * m,
 };
 
-const interpolate = (x, xs, ys) => {
-  if (x <= xs[0]) return ys[0];
-  for (let k = 1; k < xs.length; k++) {
-    if (x <= xs[k]) return ys[k - 1] + (ys[k] - ys[k - 1]) * (x - xs[k - 1]) / (xs[k] - xs[k - 1]);
-  }
-  return ys[xs.length - 1];
-};
-
-/** Derivatives of a monotone cubic through (xs, ys): Fritsch and Carlson, as scipy's Pchip. */
-function slopes(xs, ys) {
-  const h = xs.slice(1).map((x, k) => x - xs[k]);
-  const d = h.map((step, k) => (ys[k + 1] - ys[k]) / step);
-  const inner = (k) => {
-    if (d[k - 1] * d[k] <= 0) return 0;
-    const w1 = 2 * h[k] + h[k - 1], w2 = h[k] + 2 * h[k - 1];
-    return (w1 + w2) / (w1 / d[k - 1] + w2 / d[k]);
-  };
-  const end = (h0, h1, d0, d1) => {
-    const slope = ((2 * h0 + h1) * d0 - h0 * d1) / (h0 + h1);
-    if (slope * d0 <= 0) return 0;
-    return d0 * d1 <= 0 && Math.abs(slope) > 3 * Math.abs(d0) ? 3 * d0 : slope;
-  };
-  const n = xs.length;
-  return xs.map((_, k) => {
-    if (k === 0) return end(h[0], h[1], d[0], d[1]);
-    return k === n - 1 ? end(h[n - 2], h[n - 3], d[n - 2], d[n - 3]) : inner(k);
-  });
+/** Value at x of straight lines between (xs, ys), constant beyond. */
+function interpolate(x, xs, ys) {
+  const k = indexIn(xs, x), step = xs[k + 1] - xs[k];
+  return ys[k] + (ys[k + 1] - ys[k]) * (step ? Math.min(Math.max((x - xs[k]) / step, 0), 1) : 1);
 }
-const FORCE_SLOPES = slopes(HEIGHTS, FORCES);
+
+// Slopes of the monotone cubic through them (Fritsch and Carlson).
+const FORCE_SLOPES = [0.008225, 0.00830480734497, 0.00721852431146, 0.00513451476793, 0.00371032385988,
+  0.00298545060529, 0.00216984290623, 0.000979734391169, 0, -0.000302259559676, -0.00137362001564,
+  -0.00211526538281, -0.00224260249554, -0.00197849343265, -0.00145039039039, -0.0009615];
 
 /** Intensity at a height in metre relative to 200 mm. */
 export function relativeIntensity(height) {
   const x = Math.min(Math.max(1e3 * height, HEIGHTS[0]), HEIGHTS[HEIGHTS.length - 1]);
-  let k = 0;
-  while (k < HEIGHTS.length - 2 && x > HEIGHTS[k + 1]) k++;
-  const h = HEIGHTS[k + 1] - HEIGHTS[k], t = (x - HEIGHTS[k]) / h;
+  const k = indexIn(HEIGHTS, x), h = HEIGHTS[k + 1] - HEIGHTS[k], t = (x - HEIGHTS[k]) / h;
   return FORCES[k] * (1 + 2 * t) * (1 - t) ** 2 + FORCE_SLOPES[k] * h * t * (1 - t) ** 2
     + FORCES[k + 1] * t * t * (3 - 2 * t) + FORCE_SLOPES[k + 1] * h * t * t * (t - 1);
 }
@@ -229,10 +210,13 @@ function modulationAt(load, phases) {
   return (load.w1 * m1 + (1 - load.w1) * m2) * e;
 }
 
+/** Period in s of the pulses of a rhythm. */
+export const rhythmPeriod = ({ pulses }) => pulses.reduce((sum, [on, gap]) => sum + on + gap, 0);
+
 /** Level 0..1 of the rhythm at a time in s; 1 without a rhythm. */
 export function rhythmLevel(load, t) {
   if (!load.pulses || !load.pulses.length) return 1;
-  const period = load.pulses.reduce((sum, [on, gap]) => sum + on + gap, 0);
+  const period = rhythmPeriod(load);
   let into = ((t / period + 1e-12) % 1 + 1) % 1 * period;
   for (const [on, gap] of load.pulses) {
     if (into < on) return load.ramp > 0 ? Math.min(1, into / load.ramp, (on - into) / load.ramp) : 1;
@@ -390,31 +374,13 @@ export function harmonicStrengths(load, { x, y }, last) {
       values[q] = spot((x[p] - x[q]) ** 2 + (y[p] - y[q]) ** 2, load.height, load.profile);
     }
     spreadJumps(load.path, values);
-    const { re, im } = realFourier(values, last);
+    const { re, im } = fourier(values);
     for (let n = 0; n <= last; n++) {
       strongest[n] = Math.max(strongest[n], Math.hypot(re[n], im[n]) / count);
       strongest[(count - n) % count] = strongest[n];
     }
   }
   return strongest;
-}
-
-/** Discrete Fourier transform of real values up to an order; tables of sines are kept. */
-function realFourier(values, last) {
-  const count = values.length, { cos, sin } = turnsOf(count);
-  const re = new Float64Array(last + 1), im = new Float64Array(last + 1);
-  for (let n = 0; n <= last; n++) {
-    let a = 0, b = 0;
-    for (let q = 0, turn = 0; q < count; q++) {
-      a += values[q] * cos[turn];
-      b -= values[q] * sin[turn];
-      turn += n;
-      if (turn >= count) turn -= count;
-    }
-    re[n] = a;
-    im[n] = b;
-  }
-  return { re, im };
 }
 
 const kept = new Map();

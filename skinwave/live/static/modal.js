@@ -2,9 +2,8 @@
 //   (diag(squared) + c(w) B - w^2) q = F
 // where c is the modulus of bending over that of the modes, less 1; as skinwave.live.sheets packs it.
 
-import { Grid, byPlace, heard, samplesKey } from "./fields.js";
-import { loadLines, pathSamples, spotWidth } from "./load.js";
-import { divided, oscillation, underRhythm } from "./time.js";
+import { FieldMotion, Grid, PathForces, byPlace, zeros } from "./fields.js";
+import { divided } from "./numeric.js";
 
 const RESIDUAL = 1e-5, MOST_STEPS = 30; // of coupled modes
 
@@ -14,34 +13,46 @@ export class ModalBody {
     Object.assign(this, pack);
     this.modes = this.squared.length;
     this.together = Math.sqrt(this.between?.length ?? 0); // modes that loss couples
+    this.width = this.modes;
     this.grid = new Grid(pack);
-    this.fields = byPlace(this.V, this.modes, this.inside);
-    this.loads = new Map(); // load fields of a height
-    this.paths = new Map(); // forces of unit pressure along a path
+    this.values = byPlace(this.V, this.modes, this.inside);
+    this.pushed = new PathForces(this.grid, this.values, this.modes);
     this.factors = new Map(); // of coupled modes at a frequency
   }
 
-  respond(load) {
-    return new ModalMotion(this, load);
+  respond(load) { return new FieldMotion(this, load); }
+
+  /** Forces on the poles (m j,) {ahead, back} of those on the modes. */
+  onPoles({ re, im }) {
+    const each = (values) => Float64Array.from(this.poles.re, (_, k) => values[Math.floor(k / this.kinds)]);
+    return { ahead: { re: each(re), im: each(im) }, back: { re: each(re), im: each(im.map((v) => -v)) } };
   }
 
-  /** Modal forces (q, m) of 1 Pa at the samples of a path. */
-  pathForces(load, samples) {
-    const key = samplesKey(load, samples);
-    if (!this.paths.has(key)) {
-      if (this.paths.size > 3) this.paths.clear();
-      if (!this.loads.has(load.height)) {
-        if (this.loads.size > 3) this.loads.clear();
-        this.loads.set(load.height, this.grid.smoothed(this.fields, this.modes, spotWidth(load.height)));
+  /** Residues (m j,) times the modes at a place. */
+  outputs(own) {
+    const each = (values) => values.map((value, k) => value * own[Math.floor(k / this.kinds)]);
+    return { re: each(this.residues.re), im: each(this.residues.im) };
+  }
+
+  /** Add the free vibration after a jump of what coupling adds to the steady state, at rest before. */
+  addCoupled({ re, im }, { lines, forces, amplitudes }, start, jump) {
+    if (!this.between) return;
+    const { poles, kinds, modes } = this, place = new Float64Array(modes), speed = new Float64Array(modes);
+    lines.f.forEach((f, l) => {
+      const omega = 2 * Math.PI * f, c = Math.cos(omega * start), s = Math.sin(omega * start);
+      const { re: dr, im: di } = this.stiffness(f), force = forces[l], q = amplitudes[l];
+      for (let m = 0; m < modes; m++) {
+        const [pr, pi] = divided(force.re[m], force.im[m], dr[m], di[m]);
+        const a = q.re[m] - pr, b = q.im[m] - pi;
+        place[m] -= jump * (a * c - b * s);
+        speed[m] += jump * omega * (a * s + b * c);
       }
-      const fields = this.loads.get(load.height), count = samples.x.length;
-      const forces = new Float64Array(count * this.modes);
-      for (let q = 0; q < count; q++) {
-        forces.set(this.grid.at(fields, this.modes, samples.x[q], samples.y[q]), q * this.modes);
-      }
-      this.paths.set(key, forces);
+    });
+    for (let k = 0; k < modes * kinds; k++) {
+      const m = Math.floor(k / kinds);
+      re[k] += 2 * (poles.re[k] * place[m] + speed[m]);
+      im[k] += 2 * poles.im[k] * place[m];
     }
-    return this.paths.get(key);
   }
 
   /** Diagonal (m,) {re, im} of the dynamic stiffness at a frequency, and the factor c there. */
@@ -63,14 +74,14 @@ export class ModalBody {
         to.im[m] = (from.im[m] * dr[m] - from.re[m] * di[m]) / size;
       }
     };
-    const found = { re: new Float64Array(modes), im: new Float64Array(modes) };
+    const found = zeros(modes);
     if (!this.between) {
       divide(found, force, 0);
       return found;
     }
     const block = this.lowBlock(frequency, dr, di, factor), scale = sizeOf(force);
     let left = { re: force.re.slice(), im: force.im.slice() };
-    const change = { re: new Float64Array(modes), im: new Float64Array(modes) };
+    const change = zeros(modes);
     for (let turn = 0; turn < MOST_STEPS && sizeOf(left) > RESIDUAL * scale; turn++) {
       divide(change, left, block.n);
       backSubstitute(block, left, change);
@@ -193,157 +204,3 @@ function backSubstitute({ re, im, n }, from, to) {
     }
   }
 }
-
-/** Motion of a sheet under a load. */
-class ModalMotion {
-  constructor(body, load) {
-    this.body = body;
-    this.load = load;
-    const samples = pathSamples(load);
-    this.lines = loadLines(load, { lowest: 0, most: 120, samples });
-    const forces = body.pathForces(load, samples), { modes } = body, count = samples.x.length;
-    this.forces = this.lines.w.map(({ re: wr, im: wi }) => {
-      const re = new Float64Array(modes), im = new Float64Array(modes);
-      for (let q = 0, k = 0; q < count; q++) {
-        const a = wr[q], b = wi[q];
-        for (let m = 0; m < modes; m++, k++) {
-          re[m] += a * forces[k];
-          im[m] += b * forces[k];
-        }
-      }
-      return { re, im };
-    });
-    this.coordinates = this.forces.map((force, l) => body.solve(this.lines.f[l], force));
-    this.first = this.lines.f.length && this.lines.f[0] === 0 ? 1 : 0; // after the mean
-    this.f = this.lines.f.slice(this.first);
-  }
-
-  /** Complex amplitudes (l,) in metre at a place in metre. */
-  at(x, y) {
-    const own = this.body.grid.at(this.body.fields, this.body.modes, x, y), count = this.f.length;
-    const re = new Float64Array(count), im = new Float64Array(count);
-    for (let l = 0; l < count; l++) [re[l], im[l]] = summed(own, this.coordinates[l + this.first]);
-    return { re, im };
-  }
-
-  /** Complex amplitudes (l, p) in metre of all places of the body's grid. */
-  onOwnGrid() {
-    const { modes, fields, grid: { side } } = this.body, n = side * side;
-    const re = new Float32Array(this.f.length * n), im = new Float32Array(re.length);
-    for (const l of heard(this)) {
-      const { re: qr, im: qi } = this.coordinates[l + this.first];
-      for (let p = 0, k = 0; p < n; p++) {
-        let a = 0, b = 0;
-        for (let m = 0; m < modes; m++, k++) {
-          a += fields[k] * qr[m];
-          b += fields[k] * qi[m];
-        }
-        re[l * n + p] = a;
-        im[l * n + p] = b;
-      }
-    }
-    return { re, im };
-  }
-
-  onGrid(xs, ys) {
-    return this.body.grid.resampled(this.onOwnGrid(), this.f.length, xs, ys);
-  }
-
-  /** Motion (t,) in metre of a place from rest, at equally spaced times (t,) in s from 0. */
-  waveform(x, y, times) {
-    const { body, lines: { f } } = this, own = body.grid.at(body.fields, body.modes, x, y);
-    const steady = oscillation(f, this.coordinates.map((q) => summed(own, q)), times);
-    return underRhythm(this.load, times, steady, () => this.lag(own, times),
-      (start, jump, bend) => ({ poles: body.poles, amplitudes: this.startOf(own, start, jump, bend) }));
-  }
-
-  /**
-   * Lag (t,) of a ramp of 1/s: sum_l D_l exp(i w t), D_l the force times the slope of -compliance, of
-   * modes apart as in `startOf`, so that both cancel at a corner.
-   */
-  lag(own, times) {
-    const { f } = this.lines;
-    const { poles, residues, kinds } = this.body;
-    const amplitudes = this.forces.map((force, l) => {
-      let a = 0, b = 0;
-      const omega = 2 * Math.PI * f[l];
-      for (let m = 0; m < own.length; m++) {
-        for (let j = 0, k = m * kinds; j < kinds; j++, k++) {
-          for (const sign of [1, -1]) { // the pole and its conjugate
-            const [cr, ci] = divided(1, 0, -poles.re[k], omega - sign * poles.im[k]);
-            const [sr, si] = [cr * cr - ci * ci, 2 * cr * ci];
-            const rr = own[m] * residues.re[k], ri = sign * own[m] * residues.im[k];
-            const hr = rr * sr - ri * si, hi = rr * si + ri * sr;
-            a += hr * force.re[m] - hi * force.im[m];
-            b += hr * force.im[m] + hi * force.re[m];
-          }
-        }
-      }
-      return [a, b];
-    });
-    return oscillation(f, amplitudes, times);
-  }
-
-  /**
-   * Complex amplitudes (m j,) of exp(pole t) at a place whose modes are `own` (m,), after a
-   * jump and a bend of the level.
-   */
-  startOf(own, start, jump, bend) {
-    const { poles, residues, kinds, modes } = this.body, count = modes * kinds;
-    const re = new Float64Array(count), im = new Float64Array(count);
-    const coupled = Boolean(this.body.between);
-    const place = new Float64Array(modes), speed = new Float64Array(modes);
-    this.lines.f.forEach((f, l) => {
-      const omega = 2 * Math.PI * f, { re: fr, im: fi } = this.forces[l], q = this.coordinates[l];
-      const turn = omega * start, c = Math.cos(turn), s = Math.sin(turn);
-      const stiffness = coupled ? this.body.stiffness(f) : null;
-      for (let m = 0, k = 0; m < modes; m++) {
-        const ar = fr[m] * c - fi[m] * s, ai = fr[m] * s + fi[m] * c;
-        for (let j = 0; j < kinds; j++, k++) {
-          const [xr, xi] = divided(ar, ai, -poles.re[k], omega - poles.im[k]);
-          const [yr, yi] = divided(ar, -ai, -poles.re[k], -omega - poles.im[k]);
-          let [sr, si] = [-jump * (xr + yr), -jump * (xi + yi)];
-          if (bend) {
-            const [ur, ui] = divided(xr, xi, -poles.re[k], omega - poles.im[k]);
-            const [vr, vi] = divided(yr, yi, -poles.re[k], -omega - poles.im[k]);
-            sr += bend * (ur + vr);
-            si += bend * (ui + vi);
-          }
-          re[k] += sr * residues.re[k] - si * residues.im[k];
-          im[k] += sr * residues.im[k] + si * residues.re[k];
-        }
-        if (coupled) { // what coupling adds to the steady state begins at rest, too
-          const [pr, pi] = divided(fr[m], fi[m], stiffness.re[m], stiffness.im[m]);
-          const br = q.re[m] - pr, bi = q.im[m] - pi;
-          const [tr, ti] = [br * c - bi * s, br * s + bi * c];
-          place[m] -= jump * tr;
-          speed[m] += jump * omega * ti;
-        }
-      }
-    });
-    if (coupled) {
-      for (let m = 0, k = 0; m < modes; m++) {
-        for (let j = 0; j < kinds; j++, k++) {
-          const ar = poles.re[k] * place[m] + speed[m], ai = poles.im[k] * place[m];
-          re[k] += 2 * (residues.re[k] * ar - residues.im[k] * ai);
-          im[k] += 2 * (residues.re[k] * ai + residues.im[k] * ar);
-        }
-      }
-    }
-    for (let k = 0; k < count; k++) {
-      const share = own[Math.floor(k / kinds)];
-      re[k] *= share;
-      im[k] *= share;
-    }
-    return { re, im };
-  }
-}
-
-const summed = (own, { re, im }) => {
-  let a = 0, b = 0;
-  for (let m = 0; m < own.length; m++) {
-    a += own[m] * re[m];
-    b += own[m] * im[m];
-  }
-  return [a, b];
-};

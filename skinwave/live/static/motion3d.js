@@ -3,12 +3,6 @@
 const NEGLIGIBLE = 3e-3; // of the strongest line at its largest: weaker ones are not drawn
 const STEP = 0.4; // mm between dots of a path
 
-/** 1, 1.5, 2, 3, 5 or 7 times a power of ten, at most `value`. */
-export function rounded(value) {
-  const power = 10 ** Math.floor(Math.log10(value));
-  return power * [7, 5, 3, 2, 1.5, 1].find((step) => step * power <= value * (1 + 1e-9));
-}
-
 /** Lines above NEGLIGIBLE, with their largest amplitudes; re, im (l * n). */
 export function strongLines({ f, re, im }) {
   const n = f.length ? re.length / f.length : 0, lines = [];
@@ -42,10 +36,10 @@ export function rmsOf({ n, lines }, { re, im }) {
   return rms.map(Math.sqrt);
 }
 
-/** Points [x, y] in mm along paths in metre, close enough to look like a line. */
-export function dots(path) {
+/** Points [x, y] in mm along paths of points in metre, close enough to look like a line. */
+export function dots(paths) {
   const found = [];
-  for (const line of path.length && typeof path[0][0] === "number" ? [path] : path) {
+  for (const line of paths) {
     for (let k = 1; k < line.length; k++) {
       const [x, y] = line[k - 1].map((v) => 1e3 * v), [u, v] = line[k].map((w) => 1e3 * w);
       const parts = Math.ceil(Math.hypot(u - x, v - y) / STEP) || 1;

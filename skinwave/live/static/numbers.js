@@ -1,15 +1,16 @@
 // Numbers of an answer: thresholds, levels, maps, reach, share, delay, and names of lines.
 
-import { powerOfTwo, transform } from "./fourier.js";
+import { fourier, largestOf } from "./numeric.js";
 import { arrayFactor, drawingFrequency, gainLines, harmonicStrengths, jumps, lastOrder, levelFactor, outline,
-  pathSamples, positionOf, rhythmLevel } from "./load.js";
+  pathSamples, positionOf, rhythmLevel, rhythmPeriod } from "./load.js";
 
 const TAU = 2 * Math.PI;
 const PACINIAN = -13, NON_PACINIAN = 12; // dB re 1 um peak, at 250 Hz for a focal spot and at any
 const LOWEST = 10, HIGHEST = 1000; // Hz, between which the thresholds are known
 const PRESSURE = 2.2, TESTED = 200; // Pa of a component, and its frequency in Hz
+const SIDE = 45, HALF = 0.044; // places along a side of a map, and half of it in metre
 const LEVELS = 4096; // instants of a rhythm
-const OUTSIDE = 0.1, NEAR = 0.5; // of the largest RMS: edge of the kernel's region, and of the spread
+const OUTSIDE = 0.1; // of the largest RMS: edge of the kernel's region
 const ON_PATH = 12; // places of the path at which the delay is looked for
 const HEARD = 0.1; // of its largest on the path: a weaker line has no phase
 const SYMBOLS = ["f_d", "f_AM", "f_AM2", "f_e", "f_r"];
@@ -46,13 +47,11 @@ export function sensationLevel(amplitude, frequency, unit = "m") {
 /** Amplitude of lines with the pauses of the rhythm over that while a pulse is on. */
 export function meanLevel(load) {
   if (!load.pulses) return 1;
-  const period = periodOf(load);
+  const period = rhythmPeriod(load);
   let sum = 0;
   for (let k = 0; k < LEVELS; k++) sum += levelFactor(load, rhythmLevel(load, (k + 0.5) / LEVELS * period));
   return sum / LEVELS;
 }
-
-const periodOf = ({ pulses }) => pulses.reduce((sum, [on, gap]) => sum + on + gap, 0);
 
 /** Amplitudes (l,) of complex lines at a place, as the `rate`-th derivative in time. */
 export function amplitudesOf(f, { re, im }, rate = 0) {
@@ -73,19 +72,15 @@ export function levelOf(load, f, at, unit = "m") {
   return best;
 }
 
-/** The same at a place of a motion. */
-export const levelAt = (motion, load, x, y) => levelOf(load, motion.f, motion.at(x, y), motion.unit);
-
-/** Coordinates (n,) in metre of a map along one axis. */
-export const mapAxis = (side = 45, reach = 0.044) => (
-  Float64Array.from({ length: side }, (_, k) => reach * (2 * k / (side - 1) - 1)));
+/** Coordinates (n,) in metre of every map along either axis. */
+export const MAP_LINE = Float64Array.from({ length: SIDE }, (_, k) => HALF * (2 * k / (SIDE - 1) - 1));
 
 /**
- * Map of a motion: {xs, ys, rms, level}, row y, column x. RMS about the mean while a pulse is on; level
+ * Map of a motion: {rms, level}, row y, column x. RMS about the mean while a pulse is on; level
  * in dB of the highest line, with the pauses of a rhythm. NaN off the body.
  */
-export function mapOf(motion, load, xs = mapAxis(), ys = xs) {
-  const { re, im } = motion.onGrid(xs, ys), places = xs.length * ys.length, mean = meanLevel(load);
+export function mapOf(motion, load) {
+  const { re, im } = motion.onGrid(MAP_LINE, MAP_LINE), places = SIDE * SIDE, mean = meanLevel(load);
   const rms = new Float32Array(places), level = new Float32Array(places), unit = motion.unit || "m";
   motion.f.forEach((f, l) => {
     const least = (unit === "m" ? thresholdAt(f) : pressureThresholdAt(f)) / mean, known = least > 0;
@@ -99,10 +94,8 @@ export function mapOf(motion, load, xs = mapAxis(), ys = xs) {
     level[p] = Number.isNaN(rms[p]) ? NaN : 10 * Math.log10(Math.max(level[p], 1e-20));
     rms[p] = Math.sqrt(rms[p]);
   }
-  return { xs, ys, rms, level };
+  return { rms, level };
 }
-
-const largestOf = (values) => values.reduce((most, value) => (value > most ? value : most), 0);
 
 /** Share 0..1 of squared motion where the kernel is 20 dB below its largest; NaN if nothing moves. */
 export function shareOutside(kernelRms, rms) {
@@ -140,39 +133,27 @@ export function distanceFromPath(load) {
 }
 
 /**
- * Largest distance from the path at which values (ny * nx) of a map are `least` or more, interpolated
- * between places: {metre, beyond}, with `beyond` if they are at the edge of the map; null if nowhere.
+ * Largest distance from the path at which a map is above the threshold of skin, interpolated between
+ * places: {metre, beyond}, with `beyond` if it is at the edge of the map; null if it is nowhere.
  */
-export function reachOf(load, { xs, ys }, values, least) {
-  const distance = distanceFromPath(load), nx = xs.length, ny = ys.length, isIn = (p) => values[p] >= least;
+export function reach(load, { level }) {
+  const distance = distanceFromPath(load), isIn = (p) => level[p] >= 0, at = (k) => MAP_LINE[k];
   let metre = -1, beyond = false;
-  const crossing = (p, other, x, y, x1, y1) => {
-    if (Number.isNaN(values[other]) || isIn(other)) return;
-    const part = (values[p] - least) / (values[p] - values[other]);
-    metre = Math.max(metre, distance(x + part * (x1 - x), y + part * (y1 - y)));
-  };
-  for (let row = 0, p = 0; row < ny; row++) {
-    for (let column = 0; column < nx; column++, p++) {
-      if (!isIn(p)) continue;
-      const x = xs[column], y = ys[row];
-      metre = Math.max(metre, distance(x, y));
-      if (row === 0 || column === 0 || row === ny - 1 || column === nx - 1) beyond = true;
-      if (column > 0) crossing(p, p - 1, x, y, xs[column - 1], y);
-      if (column < nx - 1) crossing(p, p + 1, x, y, xs[column + 1], y);
-      if (row > 0) crossing(p, p - nx, x, y, x, ys[row - 1]);
-      if (row < ny - 1) crossing(p, p + nx, x, y, x, ys[row + 1]);
+  for (let p = 0; p < SIDE * SIDE; p++) {
+    if (!isIn(p)) continue;
+    const row = Math.floor(p / SIDE), column = p % SIDE, x = at(column), y = at(row);
+    metre = Math.max(metre, distance(x, y));
+    for (const [i, j] of [[column - 1, row], [column + 1, row], [column, row - 1], [column, row + 1]]) {
+      if (Math.min(i, j) < 0 || Math.max(i, j) === SIDE) {
+        beyond = true;
+        continue;
+      }
+      const other = j * SIDE + i, part = level[p] / (level[p] - level[other]);
+      if (Number.isNaN(level[other]) || isIn(other)) continue;
+      metre = Math.max(metre, distance(x + part * (at(i) - x), y + part * (at(j) - y)));
     }
   }
   return metre < 0 ? null : { metre, beyond };
-}
-
-/** Reach of a map above the threshold of skin, as reachOf. */
-export const reach = (load, map) => reachOf(load, map, map.level, 0);
-
-/** Reach of a map within 6 dB of its largest RMS, as reachOf; null if nothing moves. */
-export function spread(load, map) {
-  const edge = NEAR * largestOf(map.rms);
-  return edge > 0 ? reachOf(load, map, map.rms, edge) : null;
 }
 
 /** Delay in s of a complex b behind a at a frequency in Hz: a quarter period before to three after. */
@@ -220,7 +201,7 @@ export function delayOf(kernel, motion, load) {
 function symbolsOf(load) {
   const own = load.path.shape === "joined", turns = own ? load.path.drawn : drawingFrequency(load.path);
   const fd = own && turns * load.duration < REPEATED ? 0 : turns;
-  const rhythm = load.pulses ? 1 / periodOf(load) : 0;
+  const rhythm = load.pulses ? 1 / rhythmPeriod(load) : 0;
   return [fd, load.w1 > 0 ? load.am : 0, load.w1 < 1 ? load.am2 : 0, load.envelope,
     rhythm * load.duration >= REPEATED ? rhythm : 0];
 }
@@ -261,11 +242,9 @@ function gainProducts(load, symbols, least) {
   const gain = strongest(gainLines(load).map(({ orders, re, im }) => (
     { orders: [...orders, 0], c: Math.hypot(re, im) })));
   if (!symbols[4]) return gain;
-  const re = new Float64Array(PULSED), im = new Float64Array(PULSED), period = periodOf(load);
-  for (let k = 0; k < PULSED; k++) {
-    re[k] = levelFactor(load, rhythmLevel(load, (k + 0.5) / PULSED * period)) / PULSED;
-  }
-  transform(re, im);
+  const period = rhythmPeriod(load);
+  const { re, im } = fourier(Float64Array.from({ length: PULSED },
+    (_, k) => levelFactor(load, rhythmLevel(load, (k + 0.5) / PULSED * period)) / PULSED));
   const orders = Array.from(re, (value, k) => (
     { v: k > PULSED / 2 ? k - PULSED : k, a: Math.hypot(value, im[k]) }));
   const top = Math.max(...orders.map(({ a }) => a));
@@ -382,27 +361,11 @@ function kaiser(x, beta) {
  * simple_model.spectrum: a sinusoid of amplitude a on a bin shows as a.
  */
 export function spectrum(values, dt) {
-  const n = values.length, size = powerOfTwo(2 * n), count = Math.floor(n / 2) + 1;
-  const chirp = (k) => Math.PI * ((k * k) % (2 * n)) / n; // Bluestein's transform of any length
-  const [ar, ai, br, bi] = Array.from({ length: 4 }, () => new Float64Array(size));
-  let weights = 0;
-  for (let k = 0; k < n; k++) {
-    const w = n < 2 ? 1 : (1 - Math.cos(TAU * k / n)) / 2, turn = chirp(k);
-    weights += w;
-    ar[k] = values[k] * w * Math.cos(turn);
-    ai[k] = -values[k] * w * Math.sin(turn);
-    br[k] = br[(size - k) % size] = Math.cos(turn);
-    bi[k] = bi[(size - k) % size] = Math.sin(turn);
-  }
-  transform(ar, ai);
-  transform(br, bi);
-  for (let k = 0; k < size; k++) {
-    [ar[k], ai[k]] = [ar[k] * br[k] - ai[k] * bi[k], ar[k] * bi[k] + ai[k] * br[k]];
-  }
-  transform(ar, ai, true);
+  const n = values.length, count = Math.floor(n / 2) + 1;
+  const window = Float64Array.from({ length: n }, (_, k) => (n < 2 ? 1 : (1 - Math.cos(TAU * k / n)) / 2));
+  const { re, im } = fourier(window.map((w, k) => w * values[k])), weights = window.reduce((a, b) => a + b);
   const f = Float64Array.from({ length: count }, (_, k) => k / (n * dt));
-  const amplitudes = f.map((_, k) => (k ? 2 : 1) * Math.hypot(ar[k], ai[k]) / size / weights);
-  return { f, amplitudes };
+  return { f, amplitudes: f.map((_, k) => (k ? 2 : 1) * Math.hypot(re[k], im[k]) / weights) };
 }
 
 /**

@@ -6,16 +6,18 @@ import { buildControls } from "./controls.js";
 import { WRITERS, readMeasurement } from "./files.js";
 import { addressOf, createHistory, readAddress } from "./history.js";
 import { openKernel } from "./kernel.js";
-import { drawingFrequency } from "./load.js";
+import { drawingFrequency, rhythmPeriod } from "./load.js";
 import { MAP_LEGEND, drawMap, mapControls } from "./maps.js";
 import { levelOver } from "./numbers.js";
-import { createPlot, escaped, keptScales, rounded } from "./plots.js";
+import { largestOf } from "./numeric.js";
+import { createPlot, keptScales } from "./plots.js";
 import { OVER, commandedPlot, difference, dispersionPlot, factorOf, fociAt, levelPlot, pathsOf, spanOf,
   spectrumPlot, waveformPlot } from "./results.js";
 import { offerSaves, playSound } from "./saving.js";
 import { runSelftest } from "./selftest.js";
 import { requestBody, sendFile } from "./server.js";
 import { comparison, linesTable, tiles } from "./tables.js";
+import { escaped, rounded } from "./text.js";
 import { LABELS, STARTS, check, fitPaths, holdFrequency, loadOf, nameBodies } from "./values.js";
 import { openView } from "./view3d.js";
 
@@ -188,7 +190,7 @@ function drawMaps() {
   const { maps, load, x, y, body } = answer, at = pinned?.maps ? pinned : null;
   const marks = { path: pathsOf(load), point: [x, y], foci: fociAt(load, clock), influenced: maps.kernel.rms,
     decibel: view.mapDecibel };
-  const top = (name, rms) => scale(`map ${name}`, rms.reduce((most, v) => (v > most ? v : most), 0), moving);
+  const top = (name, rms) => scale(`map ${name}`, largestOf(rms), moving);
   let wavesTop = top(`waves ${body.name}`, maps.waves.rms);
   let topOfA = at ? top(`waves ${at.body.name}`, at.maps.waves.rms) : 0;
   if (factorOf(topOfA, wavesTop) === 1) wavesTop = topOfA = Math.max(wavesTop, topOfA);
@@ -290,7 +292,7 @@ function showBody() {
 function period() {
   const { load } = answer, fd = drawingFrequency(load.path);
   if (load.pulses && view.follow) {
-    return { period: load.pulses.reduce((sum, [on, gap]) => sum + on + gap, 0), of: "rhythm" };
+    return { period: rhythmPeriod(load), of: "rhythm" };
   }
   const tone = load.am || load.envelope;
   return fd ? { period: 1 / fd, of: "path" } : { period: tone ? 1 / tone : 0.01, of: "tone" };
@@ -413,7 +415,7 @@ function look(name) {
   choose("look", name, "look");
   const deep = name === "3d";
   $("solid").hidden = !deep;
-  $("kernel-map").hidden = $("wave-map").hidden = deep;
+  for (const id of ["kernel-map", "wave-map"]) $(id).toggleAttribute("hidden", deep);
   $("views").classList.toggle("deep", deep);
   $("map-scale").hidden = deep || name === "difference";
   document.querySelector(".foot").hidden = $("map-legend").hidden = deep;

@@ -23,15 +23,3 @@ function table(text) {
 /** RGBA tables (256 colours each) from the lowest value to the highest. */
 export const SEQUENTIAL = table(CIVIDIS);
 export const SIGNED = table(RED_AND_BLUE);
-
-/** A value in an SI unit with a prefix and three digits: 1.2e-6 m is "1.20 µm". */
-export function withUnit(value, unit) {
-  const size = Math.abs(value);
-  if (!Number.isFinite(value)) return "none";
-  if (unit === "dB") return `${value.toFixed(1).replace("-", "−")} dB`;
-  const [prefix, scale] = unit[0] !== "m" || size === 0 ? ["", 1]
-    : [["n", 1e9, 1e-7], ["µ", 1e6, 1e-3], ["m", 1e3, 1], ["", 1, Infinity]].find((p) => size < p[2]);
-  const shown = Number((scale * value).toPrecision(3));
-  const digits = shown ? Math.max(0, 2 - Math.floor(Math.log10(Math.abs(shown)))) : 0;
-  return `${shown.toFixed(Math.min(digits, 6)).replace("-", "−")} ${prefix}${unit}`;
-}

@@ -1,6 +1,9 @@
 // Plots as SVG: curves, stems and names over two vertical axes that keep their scale; zoom, reading
 // by pointer and keyboard, and figures to save.
 
+import { indexIn } from "./numeric.js";
+import { escaped, rounded } from "./text.js";
+
 const NS = "http://www.w3.org/2000/svg";
 const LEFT = 44, RIGHT = 46, TOP = 20, BOTTOM = 20;
 const NAME_HEIGHT = 12, READ_WITHIN = 14; // px
@@ -26,7 +29,7 @@ export function keptScales() {
 }
 
 /** Round values within [low, high], about `count` of them, and the step between them. */
-export function ticks(low, high, count) {
+function ticks(low, high, count) {
   const raw = (high - low) / Math.max(count, 1), unit = 10 ** Math.floor(Math.log10(raw));
   const step = unit * [1, 2, 5, 10].find((s) => s * unit >= raw * 0.999);
   const values = [];
@@ -35,25 +38,13 @@ export function ticks(low, high, count) {
 }
 
 /** A number with as many decimals as its step needs. */
-export function atStep(value, step) {
+function atStep(value, step) {
   const decimals = Math.max(0, Math.ceil(-Math.log10(step) - 1e-9));
   return (Math.abs(value) < 1e-9 * step ? 0 : value).toFixed(Math.min(decimals, 6)).replace("-", "−");
 }
 
-/** A number to three digits, with a typeset minus. */
-export function rounded(value, digits = 3) {
-  if (!Number.isFinite(value)) return "–";
-  if (value === 0) return "0";
-  const decimals = Math.max(0, Math.min(digits - 1 - Math.floor(Math.log10(Math.abs(value))), 9));
-  return value.toFixed(decimals).replace("-", "−");
-}
-
-/** Text with its special characters escaped for SVG and HTML. */
-export const escaped = (text) => String(text).replace(/[&<>"]/g,
-  (c) => ({ "&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;" })[c]);
-
 /** SVG of a name such as f_d or 2 f_AM − f_d: what follows an underscore is a subscript. */
-export const subscripted = (name) => escaped(name).replace(/_(\w+)/g,
+const subscripted = (name) => escaped(name).replace(/_(\w+)/g,
   '<tspan dy="2.5" font-size="80%">$1</tspan><tspan dy="-2.5">&#8203;</tspan>');
 
 /** Points of a curve, at most two in each pixel column: the least and the largest. */
@@ -334,13 +325,9 @@ export function createPlot(host, { announce = () => {}, onZoom = () => {} } = {}
 
 /** Index of the value nearest x among ascending ones; -1 if there are none. */
 function nearest(values, x) {
-  let low = 0, high = values.length - 1;
-  if (high < 0) return -1;
-  while (high - low > 1) {
-    const middle = (low + high) >> 1;
-    if (values[middle] <= x) low = middle; else high = middle;
-  }
-  return x - values[low] <= values[high] - x ? low : high;
+  if (values.length < 2) return values.length - 1;
+  const low = indexIn(values, x);
+  return x - values[low] <= values[low + 1] - x ? low : low + 1;
 }
 
 const STYLED = ["fill", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin", "opacity",

@@ -3,12 +3,12 @@
 // along a path of complex k, as skinwave.live.radial packs it.
 
 import { samplesKey } from "./fields.js";
-import { powerOfTwo, transform } from "./fourier.js";
+import { indexIn, lagrange, powerOfTwo, transform } from "./numeric.js";
 import { drawingFrequency, gainAt, gainLines, levelFactor, loadLines, pathHarmonic, pathSamples, rhythmLevel,
   spotWidth } from "./load.js";
 
 /** Bessel function J0 of a complex argument with a positive real part: [re, im], to about 1e-7. */
-export function besselJ0(a, b) {
+function besselJ0(a, b) {
   return Math.hypot(a, b) < 18 ? seriesJ0(a, b) : asymptoticJ0(a, b);
 }
 
@@ -62,27 +62,11 @@ function meanLevel(load, t, step) {
   return sum / LEVELS;
 }
 
-/** Fractional index of a value among ascending ones, for cubics between them. */
-const indexIn = (values, x) => {
-  let low = 0, high = values.length - 1;
-  while (high - low > 1) {
-    const middle = (low + high) >> 1;
-    if (values[middle] <= x) low = middle; else high = middle;
-  }
-  return low;
-};
-
-/** Weights of the four neighbours, at indices first .. first + 3, of a cubic through them at x. */
-function lagrange(values, x) {
+/** First of four neighbours of x among ascending values, and their weights in a cubic through them. */
+function neighbours(values, x) {
   const first = Math.min(Math.max(indexIn(values, x) - 1, 0), values.length - 4);
-  const at = [0, 1, 2, 3].map((k) => values[first + k]);
-  return { first, shares: at.map((own, k) => at.reduce(
-    (product, other, j) => (j === k ? product : product * (x - other) / (own - other)), 1)) };
+  return { first, shares: lagrange(values.slice(first, first + 4), x) };
 }
-
-/** Four weights of a cubic through 0, 1, 2, 3 at x. */
-const cubic = (x) => [-(x - 1) * (x - 2) * (x - 3) / 6, x * (x - 2) * (x - 3) / 2,
-  -x * (x - 1) * (x - 3) / 2, x * (x - 1) * (x - 2) / 6];
 
 /** A laterally infinite body of a pack: frequencies (f,) in Hz, k (k,) and G (f, k) {re, im}. */
 export class RadialBody {
@@ -134,7 +118,7 @@ export class RadialBody {
   products(height, frequency) {
     const { re: sr, im: si, used } = this.spotShares(height), n = this.k.re.length;
     const re = new Float64Array(used), im = new Float64Array(used);
-    const { first, shares } = lagrange(this.frequencies, frequency);
+    const { first, shares } = neighbours(this.frequencies, frequency);
     for (let i = 0; i < used; i++) {
       let a = 0, b = 0;
       for (let k = 0, from = first * n + i; k < 4; k++, from += n) {
@@ -168,11 +152,10 @@ export class RadialBody {
 
   /** Bessel functions J0(k r) (used, r) at distances (r,) in metre, by cubics, as {re, im}. */
   besselAt(distances, used) {
-    const m = this.distances.length, step = this.distances[1], count = distances.length;
+    const m = this.distances.length, count = distances.length;
     const re = new Float64Array(used * count), im = new Float64Array(used * count);
     for (let q = 0; q < count; q++) {
-      const x = distances[q] / step, first = Math.min(Math.max(Math.floor(x) - 1, 0), m - 4);
-      const [s0, s1, s2, s3] = cubic(x - first);
+      const { first, shares: [s0, s1, s2, s3] } = neighbours(this.distances, distances[q]);
       for (let i = 0, from = first, to = q; i < used; i++, from += m, to += count) {
         const { re: br, im: bi } = this.bessel;
         re[to] = s0 * br[from] + s1 * br[from + 1] + s2 * br[from + 2] + s3 * br[from + 3];
@@ -197,7 +180,7 @@ class RadialMotion {
     const harmonics = new Map(this.harmonicsAt(x, y)), { parts } = this.lines;
     const re = new Float64Array(this.f.length), im = new Float64Array(this.f.length);
     this.f.forEach((f, l) => {
-      const { first, shares: s } = lagrange(this.body.frequencies, f);
+      const { first, shares: s } = neighbours(this.body.frequencies, f);
       for (const part of parts[l]) {
         const h = harmonics.get(part.n);
         if (!h) continue;
@@ -235,11 +218,11 @@ class RadialMotion {
     }
     const re = new Float32Array(this.f.length * n), im = new Float32Array(this.f.length * n);
     const tr = new Float32Array(fine), ti = new Float32Array(fine);
+    const stencils = Array.from({ length: fine }, (_, j) => neighbours(body.distances, j * step));
     this.f.forEach((f, l) => {
       const g = body.alongDistance(load.height, f), { re: wr, im: wi } = w[l];
       for (let j = 0; j < fine; j++) {
-        const first = Math.min(Math.max(Math.floor(j / FINER) - 1, 0), m - 4);
-        const [s0, s1, s2, s3] = cubic(j / FINER - first);
+        const { first, shares: [s0, s1, s2, s3] } = stencils[j];
         tr[j] = s0 * g.re[first] + s1 * g.re[first + 1] + s2 * g.re[first + 2] + s3 * g.re[first + 3];
         ti[j] = s0 * g.im[first] + s1 * g.im[first + 1] + s2 * g.im[first + 2] + s3 * g.im[first + 3];
       }
@@ -271,7 +254,7 @@ class RadialMotion {
     const gain = Float64Array.from({ length: given },
       (_, k) => gainAt(load, k * step) * meanLevel(load, k * step, step));
     const harmonics = this.harmonicsAt(x, y);
-    const shares = Array.from({ length: bins }, (_, k) => lagrange(body.frequencies, k / (size * step)));
+    const shares = Array.from({ length: bins }, (_, k) => neighbours(body.frequencies, k / (size * step)));
     const ur = new Float64Array(size * coarser), ui = new Float64Array(size * coarser);
     const fd = drawingFrequency(load.path), qr = new Float64Array(size), qi = new Float64Array(size);
     for (const [order, { re, im }] of harmonics) {

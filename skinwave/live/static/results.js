@@ -1,10 +1,11 @@
 // The plots and maps of an answer, as data for what draws them.
 
 import { inQuantity, lineName } from "./answer.js";
-import { drawingFrequency, gainAt, positionOf, relativeIntensity, rhythmLevel } from "./load.js";
+import { drawingFrequency, gainAt, positionOf, relativeIntensity, rhythmLevel, rhythmPeriod } from "./load.js";
 import { QUANTITIES, amplitudesOf, meanLevel, spectrum, thresholdAt } from "./numbers.js";
-import { niceTop, rounded } from "./plots.js";
-import { signed } from "./tables.js";
+import { largestOf } from "./numeric.js";
+import { niceTop } from "./plots.js";
+import { rounded, signed } from "./text.js";
 import { NUMBERS } from "./values.js";
 
 export const OVER = { speed: [0.5, 40], size: [2, 60], am: [10, 400], height: [100, 400] };
@@ -17,12 +18,11 @@ const FAR_APART = 10; // times that A and B differ, from where A is drawn by a f
 const FLOOR = -40; // dB of the largest, which a difference of maps begins at
 const PRESSURE = { per: 1, rate: 0 };
 
-const largestOf = (values) => values.reduce((most, v) => Math.max(most, Math.abs(v)), 0);
 const inMs = (span) => span.map((t) => 1e3 * t);
 
 /** Start and end in s of what a choice shows of a load. */
 export function spanOf(name, load) {
-  const { duration, pulses } = load, period = pulses?.reduce((sum, [on, gap]) => sum + on + gap, 0);
+  const { duration, pulses } = load, period = pulses && rhythmPeriod(load);
   if (name === "last 60 ms") return [Math.max(0, duration - 0.06), duration];
   if (name === "whole Tacton") return [0, duration];
   if (period && (name === "one rhythm" || name === "auto")) return [0, Math.min(period, duration)];
@@ -262,7 +262,7 @@ export function fociAt(load, t) {
 
 /** Where one map has more (positive) or less than another, in dB, each re its largest. */
 export function difference(one, other) {
-  const largest = [one, other].map((values) => values.reduce((most, v) => (v > most ? v : most), 0));
+  const largest = [one, other].map(largestOf);
   const level = (v, k) => Math.max(20 * Math.log10(v / largest[k]), FLOOR);
   return Float32Array.from(one, (v, k) => (Number.isNaN(v) ? NaN : level(v, 0) - level(other[k], 1)));
 }

@@ -1,5 +1,6 @@
 // Menus to save figures, data and device files, and the waveform as sound.
 
+import { asSound } from "./files.js";
 import { figureOf, pngOf } from "./plots.js";
 
 const RATE = 8000; // Hz of the sound
@@ -17,7 +18,7 @@ function download(name, content, type) {
 
 /** The parts of the page that make its figure, as they are shown. */
 const seen = () => [...document.querySelectorAll(
-  "#tiles .tile > span, .pairs canvas, #solid canvas, .plot-card h2, .plot, #pane .plot")];
+  "#tiles .tile > span, .map, #solid canvas, .plot-card h2, .plot, #pane .plot")];
 
 const figure = () => figureOf(seen(), getComputedStyle(document.documentElement).getPropertyValue("--card"));
 
@@ -53,12 +54,10 @@ export function playSound({ waves, x, y, load }, button) {
   if (playing) { playing.close(); end(); return; }
   const context = playing = new AudioContext();
   const count = Math.ceil(RATE * Math.min(load.duration, LONGEST_SOUND));
-  const motion = waves.waveform(x, y, Float64Array.from({ length: count }, (_, k) => k / RATE));
-  const mean = motion.reduce((a, b) => a + b, 0) / count;
-  const largest = motion.reduce((most, v) => Math.max(most, Math.abs(v - mean)), 0) || 1;
+  const sound = asSound(waves.waveform(x, y, Float64Array.from({ length: count }, (_, k) => k / RATE)));
   const buffer = context.createBuffer(1, count, RATE), samples = buffer.getChannelData(0);
   for (let k = 0; k < count; k++) {
-    samples[k] = 0.6 * (motion[k] - mean) / largest * Math.min(1, k / RATE / FADE, (count - k) / RATE / FADE);
+    samples[k] = 0.6 * sound[k] * Math.min(1, k / RATE / FADE, (count - k) / RATE / FADE);
   }
   const source = context.createBufferSource();
   source.buffer = buffer;

@@ -1,6 +1,6 @@
 // The page's test of itself: random Tactons with lines that Python computed by another way.
 
-import { escaped, rounded } from "./plots.js";
+import { escaped, rounded } from "./text.js";
 import { STARTS } from "./values.js";
 
 const NEAR = 1e-3; // Hz between a line of the page and the same of Python

@@ -2,7 +2,7 @@
 
 import { inQuantity, lineName, typeset } from "./answer.js";
 import { QUANTITIES, lineTable, meanLevel } from "./numbers.js";
-import { escaped, rounded } from "./plots.js";
+import { escaped, rounded, signed } from "./text.js";
 import { LABELS, STARTS, shown } from "./values.js";
 
 const NONE = "–", SAME_LINE = 0.5; // Hz between the same line of A and B at most
@@ -13,13 +13,6 @@ const delayed = (seconds) => fixed(1e3 * seconds, 1, "ms");
 const far = (reach) => (reach ? `${reach.beyond ? "> " : ""}${fixed(1e3 * reach.metre, 0, "mm")}`
   : "nowhere");
 const subscript = (name) => escaped(name).replace(/_(\w+)/g, "<sub>$1</sub>");
-
-/** A number of dB with its sign: whole, or with one digit if it is below 1. */
-export function signed(value) {
-  if (!Number.isFinite(value)) return NONE;
-  const text = Math.abs(value).toFixed(Math.abs(value) < 0.95 ? 1 : 0);
-  return Number(text) === 0 ? text : `${value > 0 ? "+" : "−"}${text}`;
-}
 
 /** The four numbers of an answer as text; those of the skin are none on another body. */
 function numbersOf({ body, level, reach, share, delay }) {

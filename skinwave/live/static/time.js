@@ -3,25 +3,14 @@
 import { levelFactor } from "./load.js";
 
 const RAMP = 8; // straight parts of a ramp
-const FAINT = 1e-6; // of the largest free vibration: what is left out
+const FAINT = 1e-6; // of the largest vibration: what is left out
 const AT_ONCE = 64; // instants whose exponentials are made by multiplication
 
-/** Re sum_l amplitudes exp(2 pi i f t) at equally spaced times (t,) in s from 0. */
+/** Re sum_l amplitudes [re, im] exp(2 pi i f t) at equally spaced times (t,) in s from 0. */
 export function oscillation(f, amplitudes, times) {
-  const found = new Float64Array(times.length), dt = times[1] - times[0];
-  f.forEach((frequency, l) => {
-    const omega = 2 * Math.PI * frequency, c = Math.cos(omega * dt), s = Math.sin(omega * dt);
-    for (let t = 0; t < times.length; t += AT_ONCE) {
-      const turn = omega * t * dt, gr = Math.cos(turn), gi = Math.sin(turn), [a, b] = amplitudes[l];
-      let zr = a * gr - b * gi, zi = a * gi + b * gr;
-      for (let i = t, end = Math.min(t + AT_ONCE, times.length); i < end; i++) {
-        found[i] += zr;
-        const next = zr * c - zi * s;
-        zi = zr * s + zi * c;
-        zr = next;
-      }
-    }
-  });
+  const found = new Float64Array(times.length), part = (k) => amplitudes.map((own) => own[k]);
+  addDecay(found, times, 0, { re: new Float64Array(f.length), im: f.map((at) => 2 * Math.PI * at) },
+    { re: part(0), im: part(1) });
   return found;
 }
 
@@ -29,7 +18,7 @@ export function oscillation(f, amplitudes, times) {
  * Pieces {start, end, level, slope} in s and 1/s of the share of the pressure that the rhythm leaves,
  * up to a time; the level is that at their start. Ramps of a law that squares are made of straight ones.
  */
-export function rhythmPieces(load, until) {
+function rhythmPieces(load, until) {
   if (!load.pulses || !load.pulses.length) return [{ start: 0, end: Infinity, level: 1, slope: 0 }];
   const found = [], { ramp = 0 } = load;
   for (let at = 0, k = 0; at <= until; k++) {
@@ -56,7 +45,7 @@ export function rhythmPieces(load, until) {
  * Add Re sum_k amplitudes exp(pole (t - start)) from `start` in s on, without what is negligible.
  * Poles in 1/s and amplitudes are {re, im} (k,).
  */
-export function addDecay(found, times, start, poles, amplitudes) {
+function addDecay(found, times, start, poles, amplitudes) {
   const dt = times[1] - times[0], n = times.length, first = Math.ceil(start / dt - 1e-9);
   let largest = 0;
   for (let k = 0; k < poles.re.length; k++) {
@@ -65,7 +54,7 @@ export function addDecay(found, times, start, poles, amplitudes) {
   for (let k = 0; k < poles.re.length; k++) {
     const size = Math.hypot(amplitudes.re[k], amplitudes.im[k]);
     if (!(size > FAINT * largest)) continue;
-    const lasting = Math.log(size / (FAINT * largest)) / -poles.re[k];
+    const lasting = Math.log(size / (FAINT * largest)) / Math.abs(poles.re[k]);
     const last = Math.min(n, first + Math.ceil(lasting / dt) + 1);
     const decay = Math.exp(poles.re[k] * dt), c = decay * Math.cos(poles.im[k] * dt);
     const s = decay * Math.sin(poles.im[k] * dt);
@@ -111,10 +100,4 @@ export function underRhythm(load, times, steady, lag, free) {
     before = piece;
   }
   return found;
-}
-
-/** Quotient [re, im] of a + i b and c + i d. */
-export function divided(a, b, c, d) {
-  const size = c * c + d * d;
-  return [(a * c + b * d) / size, (b * c - a * d) / size];
 }

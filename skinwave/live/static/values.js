@@ -71,26 +71,27 @@ const toNumber = (text) => (/^[^\s]+$/.test(text.trim()) ? Number(text) : NaN);
 const inUnit = (value, unit) => (unit ? `${value} ${unit}` : `${value}`);
 const short = (text) => (text.length > 40 ? `${text.slice(0, 37)}...` : text);
 
+/** Pairs of numbers [[a, b]] of a text such as "100/50, 40/110"; `what` and `like` describe one. */
+function pairsOf(text, most, what, like) {
+  const found = parts(text).map((part) => {
+    const pair = part.split("/").map(toNumber);
+    if (pair.length === 2 && pair.every(Number.isFinite)) return pair;
+    throw new Error(`"${short(part)}" is not a ${what}. Give ${like}.`);
+  });
+  if (found.length <= most) return found;
+  throw new Error(`${found.length} ${what}s exceed the limit of ${most}. Give fewer.`);
+}
+
 /** Pulses and gaps [[on, gap]] in s of a text such as "100/50, 40/110" in ms; [] if empty. */
 export function pulsesOf(text) {
-  const found = parts(text).map((part) => {
-    const [on, gap, ...more] = part.split("/").map(toNumber);
-    if (more.length || !Number.isFinite(on) || !Number.isFinite(gap)) {
-      throw new Error(`"${short(part)}" is not a pulse. Give on/off times in ms, such as 100/50.`);
-    }
-    if (on <= 0 || gap < 0) {
-      throw new Error(`"${short(part)}": a pulse must last longer than 0 ms, and its gap 0 ms or longer.`);
-    }
-    return [on / 1e3, gap / 1e3];
+  return pairsOf(text, MOST_PULSES, "pulse", "on/off times in ms, such as 100/50").map(([on, gap]) => {
+    if (on > 0 && gap >= 0) return [on / 1e3, gap / 1e3];
+    throw new Error(`"${on}/${gap}": a pulse must last longer than 0 ms, and its gap 0 ms or longer.`);
   });
-  if (found.length > MOST_PULSES) {
-    throw new Error(`${found.length} pulses exceed the limit of ${MOST_PULSES}. Repeat a shorter pattern.`);
-  }
-  return found;
 }
 
 /** Phases 0..1 of a text such as "0, 25, 60" in per cent of a drawing period; [] if empty. */
-export function phasesOf(text) {
+function phasesOf(text) {
   return parts(text).map((part) => {
     const phase = toNumber(part);
     if (!(phase >= 0 && phase < 100)) {
@@ -101,21 +102,12 @@ export function phasesOf(text) {
 }
 
 /** Corners [[x, y]] in metre of a text such as "0/0, 10/0, 10/5" in mm; [] if empty. */
-export function pointsOf(text) {
-  const found = parts(text).map((part) => {
-    const [x, y, ...more] = part.split("/").map(toNumber);
-    if (more.length || !Number.isFinite(x) || !Number.isFinite(y)) {
-      throw new Error(`"${short(part)}" is not a point. Give x/y in mm, such as 10/5.`);
-    }
-    if (Math.max(Math.abs(x), Math.abs(y)) > AREA) {
-      throw new Error(`The point ${part} lies outside the area of ±${AREA} mm. Move it inside.`);
-    }
-    return [x / 1e3, y / 1e3];
+function pointsOf(text) {
+  const found = pairsOf(text, MOST_POINTS, "point", "x/y in mm, such as 10/5").map(([x, y]) => {
+    if (Math.max(Math.abs(x), Math.abs(y)) <= AREA) return [x / 1e3, y / 1e3];
+    throw new Error(`The point ${x}/${y} lies outside the area of ±${AREA} mm. Move it inside.`);
   });
   if (found.length === 1) throw new Error("A path has one point. Give two points or more.");
-  if (found.length > MOST_POINTS) {
-    throw new Error(`${found.length} points exceed the limit of ${MOST_POINTS}. Give fewer.`);
-  }
   return found;
 }
 
@@ -129,7 +121,7 @@ function extentOf(shape, size) {
  * Paths {shape, size, centre} in metre of a text such as "circle/20/-15/0, line/10/15/0": shape, size
  * and centre in mm of each focus; [] if empty.
  */
-export function pathsOf(text) {
+function pathsOf(text) {
   const found = parts(text).map((part, k) => {
     const [shape, ...rest] = part.split("/").map((word) => word.trim());
     const [size, x, y] = rest.map(toNumber), name = `Path ${k + 1}`;
@@ -270,7 +262,7 @@ function pathAndFoci(values) {
 }
 
 /** How far in metre the path of a load extends from the origin along each axis, as [x, y]. */
-export function pathExtent(path) {
+function pathExtent(path) {
   const each = (path.paths || [path]).map(({ shape, size, points, centre: [cx, cy] }) => {
     if (shape === "polyline") return points.map(([x, y]) => [Math.abs(x + cx), Math.abs(y + cy)]);
     const [ex, ey] = extentOf(shape, size);

@@ -1,9 +1,11 @@
 // A body in three dimensions, moving: WebGL 2, in the live page and in reports.
 
 import { locate, prepare, shade } from "./mesh3d.js";
-import { dots, rmsOf, rounded, strongLines, synthesise } from "./motion3d.js";
-import { SEQUENTIAL, SIGNED, TABLE_LENGTH, withUnit } from "./palette.js";
+import { dots, rmsOf, strongLines, synthesise } from "./motion3d.js";
+import { largestOf } from "./numeric.js";
+import { SEQUENTIAL, SIGNED, TABLE_LENGTH } from "./palette.js";
 import { SLOWER, element, gradient, panel } from "./panel3d.js";
+import { withUnit } from "./text.js";
 
 const SURFACE_VERTEX = `#version 300 es
   in vec3 place; in vec2 state; in vec3 normal; // state: lift in mm, place on the scale of colours
@@ -115,7 +117,7 @@ class View {
   /**
    * Show a body and its motion.
    * @param {object} given shape: points in mm and triangles; motion: f (l,) in Hz, re and im (l * n) in
-   *   metre upwards; path: points [x, y] in metre, or several paths; foci: places [x, y] in metre as a
+   *   metre upwards; path: paths of points [x, y] in metre; foci: places [x, y] in metre as a
    *   function of the time in s, or a list of them for equal parts of the period; points: places [x, y]
    *   to mark; period: s, of the loop; unit: "Pa" of a pressure, less of which is upwards
    */
@@ -144,7 +146,7 @@ class View {
   /** What is the same at all times: lines, RMS, the end of the colours, exaggeration, and the loop. */
   measure() {
     const { motion, period } = this.given, strong = strongLines(motion), rms = rmsOf(strong, motion);
-    const most = rms.reduce((a, b) => Math.max(a, b), 0), width = this.mesh.high[0] - this.mesh.low[0];
+    const most = largestOf(rms), width = this.mesh.high[0] - this.mesh.low[0];
     const loudest = strong.lines.reduce((a, b) => (b.largest > a.largest ? b : a), { f: 100, largest: 0 });
     if (!this.slower) {
       const off = (slower) => Math.abs(Math.log(slower * SHOWN_RATE / loudest.f));
@@ -152,12 +154,12 @@ class View {
       this.slow.value = this.slower;
     }
     Object.assign(this, { strong, rms, u: new Float32Array(strong.n), most, largest: CREST * most || 1,
-      factor: most ? rounded(1e-3 * DRAWN * width / (CREST * most)) : 0,
+      factor: most ? 1e-3 * DRAWN * width / (CREST * most) : 0,
       loop: period || Math.max(LOOP, 1 / Math.min(...strong.lines.map(({ f }) => f))) });
     this.time %= this.loop;
   }
 
-  get drawnTimes() { return this.factor ? rounded(this.factor * this.relief) : 0; }
+  get drawnTimes() { return Number((this.factor * this.relief).toPrecision(1)); }
 
   say() {
     const { unit = "m" } = this.given, end = withUnit(this.largest, unit);
