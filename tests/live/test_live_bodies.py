@@ -141,4 +141,4 @@ def test_maps_are_what_is_read_at_their_places(page, name):
     (scene,) = scenes(name, 1)
     given = {"name": name, "values": values_of(scene, name), "k": 45 * 19 + 28}
     pairs = np.array(page.evaluate("given => window.places(given)", given))
-    assert np.abs(pairs[:, 0] - pairs[:, 1]).max() < 3e-3 * np.abs(pairs).max()
+    assert np.abs(pairs[:, 0] - pairs[:, 1]).max() < 5e-3 * np.abs(pairs).max()
