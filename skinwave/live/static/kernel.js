@@ -11,7 +11,7 @@ const NEGLIGIBLE = 5.7; // widths of a Gaussian spot, beyond which it is below 1
 const DEGREES = { linear: 1, pressure_squared: 2, force_corrected: 1 };
 
 /** The load as published: linear drive law and the main lobe alone (simple_model.published). */
-export const asPublished = (load) => ({ ...load, drive: "linear", profile: "main_lobe" });
+const asPublished = (load) => ({ ...load, drive: "linear", profile: "main_lobe" });
 
 /**
  * The point kernel with the interface of a body: `respond(load, {published})` returns its motion, in Pa

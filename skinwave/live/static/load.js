@@ -47,7 +47,7 @@ export function relativeIntensity(height) {
 }
 
 /** Distance in metre from the focus to the first zero of its main lobe, at a height in metre. */
-export function lobeWidth(height) {
+function lobeWidth(height) {
   const above = height - 0.2;
   return 11.6e-3 + 46.5e-3 * above + 25e-3 * above ** 2;
 }

@@ -39,7 +39,7 @@ export function thresholdAt(frequency) {
 export const pressureThresholdAt = (frequency) => PRESSURE * thresholdAt(frequency) / thresholdAt(TESTED);
 
 /** Level in dB of a peak amplitude in metre or Pa above its threshold; -Infinity if there is none. */
-export function sensationLevel(amplitude, frequency, unit = "m") {
+function sensationLevel(amplitude, frequency, unit = "m") {
   const least = unit === "m" ? thresholdAt(frequency) : pressureThresholdAt(frequency);
   return amplitude > 0 && least > 0 ? 20 * Math.log10(amplitude / least) : -Infinity;
 }
@@ -110,7 +110,7 @@ export function shareOutside(kernelRms, rms) {
 }
 
 /** Distance in metre from the path of a load, as a function of x and y in metre. */
-export function distanceFromPath(load) {
+function distanceFromPath(load) {
   const { path } = load, moves = drawingFrequency(path) > 0;
   const pieces = [];
   for (const own of path.paths || [path]) {

@@ -4,7 +4,7 @@
 
 import { samplesKey } from "./fields.js";
 import { indexIn, lagrange, powerOfTwo, transform } from "./numeric.js";
-import { drawingFrequency, gainAt, gainLines, levelFactor, loadLines, pathHarmonic, pathSamples, rhythmLevel,
+import { drawingFrequency, gainAt, gainLines, levelFactor, loadLines, pathHarmonic, rhythmLevel,
   spotWidth } from "./load.js";
 
 /** Bessel function J0 of a complex argument with a positive real part: [re, im], to about 1e-7. */

@@ -51,7 +51,7 @@ const CREST = 2; // times the largest RMS: where colours end
 const LOOP = 0.1; // s that are repeated, or a period of the slowest line
 const SHOWN_RATE = 0.7; // Hz at which the strongest line is seen at first
 const BARS = [1, 2, 5, 10, 20, 50, 100]; // mm
-export const NO_WEBGL = "This browser does not draw in three dimensions: WebGL 2 is off or missing. "
+const NO_WEBGL = "This browser does not draw in three dimensions: WebGL 2 is off or missing. "
   + "The map shows the same motion from above.";
 
 class View {
