@@ -11,7 +11,7 @@ from skinwave.scene.scene import BODIES
 
 USED = {
     "files": "adaptics linesCsv pyautd3 readMeasurement sceneToml waveformCsv waveformWav",
-    "kernel": "openKernel", "load": "loadLines spot", "numbers": "amplitudesOf delayOf levelOf "
+    "kernel": "respond", "load": "loadLines spot", "numbers": "amplitudesOf delayOf levelOf "
     "levelOver lineNames mapOf meanLevel phaseDelay pressureThresholdAt reach shareOutside "
     "spectrum thresholdAt unresolvedNames",
     "values": "STARTS check fromAddress loadOf toAddress",
@@ -26,7 +26,7 @@ MODULE = (
 };
 """
     + f"Object.assign(window, {{ attempt, {', '.join(' '.join(USED.values()).split())} }});\n"
-    + "window.kernel = openKernel();\n"
+    + "window.kernel = { respond };\n"
 )
 BARE = toml_of(BODIES["none"])
 SHAPES = ("point", "line", "circle", "triangle", "square")

@@ -79,7 +79,7 @@ def picture(page, selector):
 
 
 def draw(page, rms, **options):
-    given = f"{{...{json.dumps(options)}, rms: {rms}}}"
+    given = f"{{unit: 'm', ...{json.dumps(options)}, rms: {rms}}}"
     page.evaluate(f"drawMap(document.getElementById('map'), {given})")
     return picture(page, "#map")
 
@@ -113,7 +113,7 @@ def test_a_contour_is_where_values_are_zero(page):
 
 @needs_browser
 def test_keys_and_a_pointer_select_points_of_a_map(page):
-    draw(page, grid(lambda x, y: x), point=[0.01, 0.0], title="Skin slab", unit="Pa")
+    draw(page, grid(lambda x, y: x), point=[0.01, 0.0], title="Slab", unit="Pa", largest=0.1)
     page.evaluate("mapControls(document.getElementById('map'), (...at) => { window.at = at; })")
     page.focus("#map")
     for key, expected in (("ArrowRight", [0.011, 0.0]), ("Shift+ArrowDown", [0.01, -0.005])):
@@ -126,7 +126,7 @@ def test_keys_and_a_pointer_select_points_of_a_map(page):
 
 @needs_browser
 def test_a_map_as_a_file_is_well_formed_and_has_its_words(page):
-    draw(page, grid(lambda x, y: x + REACH), title="A < B", unit="m", point=[0, 0])
+    draw(page, grid(lambda x, y: x + REACH), title="A < B", unit="m", largest=0.088, point=[0, 0])
     inside = page.evaluate("document.getElementById('map').innerHTML")
     text = f'<svg xmlns="http://www.w3.org/2000/svg">{inside}</svg>'
     root = ElementTree.fromstring(text)

@@ -2,6 +2,7 @@
 
 import { QUANTITIES, amplitudesOf, delayOf, levelOf, mapOf, namesOf, reach, shareOutside,
   unresolvedNames } from "./numbers.js";
+import { respond as respondOfKernel } from "./kernel.js";
 import { pathSamples, spotWidth } from "./load.js";
 import { largestOf } from "./numeric.js";
 import { loadOf } from "./values.js";
@@ -13,13 +14,13 @@ const SEEN = 0.06, STEP = 2e-4; // s of motion, and between its times, in which 
  * What a move of a control needs at once. Maps, share, reach and delay are in `mapsOf`. Throws an Error
  * for users if the values contradict each other.
  */
-export function respond(values, body, kernelBody, { published = false } = {}) {
+export function respond(values, body, { published }) {
   const load = loadOf(values, body), x = values.x / 1e3, y = values.y / 1e3;
-  const kernel = kernelBody.respond(load), waves = body.respond(load);
+  const kernel = respondOfKernel(load), waves = body.respond(load);
   const [kernelAt, wavesAt] = [kernel.at(x, y), waves.at(x, y)];
   const answer = { values, body, load, x, y, kernel, waves, kernelAt, wavesAt };
   if (published) {
-    answer.published = kernelBody.respond(load, { published: true });
+    answer.published = respondOfKernel(load, { published: true });
     answer.publishedAt = answer.published.at(x, y);
   }
   answer.level = body.is_skin ? levelOf(load, waves.f, answer.wavesAt, "m") : null;
@@ -37,7 +38,8 @@ export const typeset = (name) => name.replace(/-/g, " − ").replace(/\+/g, " + 
   .replace(/(\d)(?=f)/g, "$1 ").replace(/^ − /, "−");
 
 /** What mapsOf finds. */
-export const OF_MAPS = ["maps", "share", "kernelShare", "reach", "kernelReach", "delay", "invalid", "warnings"];
+export const OF_MAPS = ["maps", "share", "kernelShare", "reach", "kernelReach", "delay", "invalid",
+  "warnings"];
 
 /** Maps of the kernel and the waves, and the numbers that need them. */
 export function mapsOf(answer) {
@@ -70,13 +72,13 @@ function warnings({ load, body }) {
   }
   const { x, y } = pathSamples(load), furthest = 1e3 * Math.max(...x.map((own, q) => Math.hypot(own, y[q])));
   if (furthest > body.reach_mm) {
-    found.push(`The focus goes ${furthest.toFixed(0)} mm from the middle. Beyond ${body.reach_mm} mm this body's motion `
-      + "is less accurate.");
+    found.push(`The focus goes ${furthest.toFixed(0)} mm from the middle. Beyond ${body.reach_mm} mm this `
+      + "body's motion is less accurate.");
   }
   const half = 1e3 * (body.grid?.half ?? Infinity), spot = 3e3 * spotWidth(load.height);
   if (furthest + spot > half && Math.max(...body.extent_mm ?? []) > half) {
-    found.push(`The focal spot reaches beyond ${half.toFixed(0)} mm from the middle, where this file knows no motion. `
-      + "Weak lines are less accurate.");
+    found.push(`The focal spot reaches beyond ${half.toFixed(0)} mm from the middle, where this file knows no `
+      + "motion. Weak lines are less accurate.");
   }
   return found;
 }

@@ -13,15 +13,8 @@ const DEGREES = { linear: 1, pressure_squared: 2, force_corrected: 1 };
 /** The load as published: linear drive law and the main lobe alone (simple_model.published). */
 const asPublished = (load) => ({ ...load, drive: "linear", profile: "main_lobe" });
 
-/**
- * The point kernel with the interface of a body: `respond(load, {published})` returns its motion, in Pa
- * in place of metre.
- */
-export function openKernel() {
-  return { name: "kernel", title: "Point kernel", unit: "Pa", is_skin: true, respond };
-}
-
-function respond(given, { published = false } = {}) {
+/** Motion of the point kernel under a load, with the interface of a body's, in Pa in place of metre. */
+export function respond(given, { published = false } = {}) {
   const load = published ? asPublished(given) : given, { f, parts, samples } = loadLines(load);
   const orders = [...new Set(parts.flat().map(({ n }) => Math.abs(n)))];
   const index = new Map(orders.map((n, k) => [n, k]));

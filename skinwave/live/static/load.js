@@ -307,9 +307,8 @@ export function pathHarmonic(load, n, count) {
  * the pressure at a place is the real part of sum_q w_q S(x - X_q) exp(2 pi i f t). The parts of a line
  * are harmonics n of the path times lines {re, im} of the gain.
  */
-export function loadLines(load, { threshold = 3e-4, lowest = 1e-6, highest = 1000, most = 60,
-  samples = pathSamples(load) } = {}) {
-  const count = samples.x.length, fd = drawingFrequency(load.path), gain = gainLines(load);
+export function loadLines(load, { threshold = 3e-4, lowest = 1e-6, highest = 1000, most = 60 } = {}) {
+  const samples = pathSamples(load), count = samples.x.length, fd = drawingFrequency(load.path), gain = gainLines(load);
   const last = lastOrder(load, count, gain, highest), byFrequency = new Map();
   const shares = harmonicStrengths(load, samples, last);
   for (let n = -last; n <= last; n++) {

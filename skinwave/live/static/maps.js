@@ -81,8 +81,8 @@ function boxIn(width, height) {
   return { side, x: MARGIN.left + Math.max(0, (room - side) / 2), y: MARGIN.top };
 }
 
-const toPixels = (box, reach) => ([x, y]) => [box.x + box.side * (0.5 + x / (2 * reach)),
-  box.y + box.side * (0.5 - y / (2 * reach))];
+const toPixels = (box) => ([x, y]) => [box.x + box.side * (0.5 + x / (2 * REACH)),
+  box.y + box.side * (0.5 - y / (2 * REACH))];
 const mm = (value) => `${Math.round(1e4 * value) / 10 || 0}`.replace("-", "−");
 
 const line = (points, { colour = "currentColor", width = 1, opacity = 1, dash = "" } = {}) => `<path d="${
@@ -100,15 +100,15 @@ const widthOf = (words, size) => 0.55 * size * words.length;
 
 /** What is on the square of a map: its image, contours, paths, foci and point. */
 function inside(options, { box, image: url }) {
-  const { rms, path = [], foci = [], point, hatched, reach } = options, at = toPixels(box, reach), parts = [];
+  const { path = [], foci = [], point, hatched } = options, at = toPixels(box), parts = [];
   const drawZeros = (values, ...looks) => {
-    const n = Math.round(Math.sqrt(values.length)), step = 2 * reach / (n - 1);
+    const n = Math.round(Math.sqrt(values.length)), step = 2 * REACH / (n - 1);
     for (const each of contours(values, n)) {
-      const points = each.map(([i, j]) => at([i * step - reach, j * step - reach]));
+      const points = each.map(([i, j]) => at([i * step - REACH, j * step - REACH]));
       parts.push(...looks.map((look) => line(points, look)));
     }
   };
-  if (rms) parts.push(drawn(url, box.x, box.y, box.side, box.side));
+  parts.push(drawn(url, box.x, box.y, box.side, box.side));
   if (hatched) {
     for (let k = -box.side, odd = false; k < box.side; k += 9, odd = !odd) {
       const ends = [[box.x + k, box.y + box.side], [box.x + k + box.side, box.y]];
@@ -128,7 +128,8 @@ function inside(options, { box, image: url }) {
   }
   for (const [x, y] of foci.map(at)) {
     for (const [colour, width] of [["#fff", 3.4], ["#1673b1", 2]]) {
-      parts.push(`<circle cx="${x}" cy="${y}" r="5" fill="none" stroke="${colour}" stroke-width="${width}"/>`);
+      parts.push(`<circle cx="${x}" cy="${y}" r="5" fill="none" stroke="${colour}"
+        stroke-width="${width}"/>`);
     }
   }
   if (point) {
@@ -143,8 +144,8 @@ function inside(options, { box, image: url }) {
 
 /** A map as markup; `clip` is the name of its clipping path. */
 function markup(options, state, clip) {
-  const { box } = state, { rms, hatched, reach, title = "" } = options, at = toPixels(box, reach);
-  const said = state.hover ? readout(options, state.hover) : options.note || "", parts = [];
+  const { box } = state, { hatched, title = "" } = options, at = toPixels(box);
+  const said = state.hover ? readout(options, state.hover) : "", parts = [];
   const left = box.x, top = box.y, right = left + box.side, bottom = top + box.side;
   if (widthOf(title, 13) + widthOf(said, 11) < box.side || !state.hover) { // or the value alone
     parts.push(text([left, top - 7], title, { size: 12, weight: 600 }));
@@ -163,8 +164,7 @@ function markup(options, state, clip) {
     parts.push(text([x, bottom + 15], tick ? words : "0 mm", { anchor: "middle", size: 10.5 }));
     parts.push(text([left - 6, y + 4], words, { anchor: "end", size: 10.5 }));
   }
-  if (rms) parts.push(barMarkup(options, state));
-  return parts.join("");
+  return parts.join("") + barMarkup(options, state);
 }
 
 function barMarkup({ largest, unit, decibel, signed }, { box, bar: url }) {
@@ -179,29 +179,24 @@ function barMarkup({ largest, unit, decibel, signed }, { box, bar: url }) {
 }
 
 /** Value of a map at a place in metre, bilinear; NaN off the body. */
-function valueAt({ rms, reach = REACH }, [x, y]) {
+function valueAt({ rms }, [x, y]) {
   const n = Math.round(Math.sqrt(rms.length));
-  const [u, v] = [x, y].map((place) => (place / reach + 1) * (n - 1) / 2);
+  const [u, v] = [x, y].map((place) => (place / REACH + 1) * (n - 1) / 2);
   if (!(u >= 0 && v >= 0 && u <= n - 1 && v <= n - 1)) return NaN;
   const i = Math.min(Math.floor(u), n - 2), j = Math.min(Math.floor(v), n - 2);
   return between(rms, j * n + i, n, u - i, v - j);
 }
 
 const readout = (options, place) => {
-  const value = options.rms ? valueAt(options, place) : NaN;
+  const value = valueAt(options, place);
   const words = Number.isNaN(value) ? "no body" : withUnit(value, options.unit);
   return `${mm(place[0])}, ${mm(place[1])} mm: ${words}`;
 };
 
-function completed(options) {
-  const largest = options.largest || largestOf(options.rms || []) || 1;
-  return { reach: REACH, unit: "m", ...options, largest };
-}
-
 function imagesOf(options, before) {
   const keys = ["rms", "largest", "decibel", "signed"];
   const same = before && keys.every((key) => before.options[key] === options[key]);
-  if (same || !options.rms) return { image: before?.image, bar: before?.bar };
+  if (same) return { image: before?.image, bar: before?.bar };
   const n = Math.round(Math.sqrt(options.rms.length));
   return { image: image(options, n), bar: bar(options.signed ? SIGNED : SEQUENTIAL) };
 }
@@ -209,21 +204,21 @@ function imagesOf(options, before) {
 /**
  * Draw a map in an SVG element, which has its size by styles.
  * @param {SVGSVGElement} svg
- * @param {object} options rms: values (n * n) in `unit`, NaN off the body, none yet if not given;
- *   unit: "m", "Pa", "m/s", "dB"; largest: end of the scale, else of the values; decibel: span of a scale in
- *   dB below `largest`, linear if 0; signed: red and blue about 0; level: values (n * n), with a contour at
+ * @param {object} options rms: values (n * n) in `unit`, NaN off the body; unit: "m", "Pa", "m/s", "dB";
+ *   largest: end of the scale; decibel: span of a scale in dB below `largest`, linear if 0; signed: red and blue about 0; level: values (n * n), with a contour at
  *   0; influenced: the kernel's values (n * n), with a dotted border at -20 dB; path: paths of points [x, y]
- *   in metre; foci: places [x, y] in metre; point: [x, y]; title; note: at the top right; hatched: why the
+ *   in metre; foci: places [x, y] in metre; point: [x, y]; title; hatched: why the
  *   values are not valid
  */
 export function drawMap(svg, options) {
-  const before = kept.get(svg), full = completed(options), { width, height } = svg.getBoundingClientRect();
-  const state = { options: full, box: boxIn(width, height), hover: before?.hover, ...imagesOf(full, before) };
+  const before = kept.get(svg), { width, height } = svg.getBoundingClientRect();
+  const state = { options, box: boxIn(width, height), hover: before?.hover, ...imagesOf(options, before) };
   kept.set(svg, state);
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
-  svg.innerHTML = markup(full, state, `clip-${svg.id}`);
-  if (full.point) {
-    const said = `${full.title || "Map"}. Selected point ${readout(full, full.point)}. Arrow keys move it.`;
+  svg.innerHTML = markup(options, state, `clip-${svg.id}`);
+  if (options.point) {
+    const said = `${options.title || "Map"}. Selected point ${readout(options, options.point)}. Arrow keys `
+      + "move it.";
     svg.setAttribute("aria-label", said);
   }
 }
@@ -237,15 +232,15 @@ export function mapControls(svg, onPoint) {
   svg.setAttribute("role", "application");
   svg.style.touchAction = "pan-y"; // a finger that moves up scrolls the page
   const place = (event) => {
-    const { box, options: { reach } } = kept.get(svg), bounds = svg.getBoundingClientRect();
+    const { box } = kept.get(svg), bounds = svg.getBoundingClientRect();
     const parts = [event.clientX - bounds.left - box.x, bounds.top + box.y + box.side - event.clientY];
-    return parts.map((part) => 2 * reach * (part / box.side - 0.5));
+    return parts.map((part) => 2 * REACH * (part / box.side - 0.5));
   };
   const bounded = (at) => at.map((v) => Math.round(1e4 * Math.min(Math.max(v, -REACH), REACH)) / 1e4);
   const hover = (at) => {
     const state = kept.get(svg);
     if (!state) return;
-    const within = at && Math.max(...at.map(Math.abs)) <= state.options.reach;
+    const within = at && Math.max(...at.map(Math.abs)) <= REACH;
     state.hover = within ? at.map((v) => Math.round(1e3 * v) / 1e3) : null;
     drawMap(svg, state.options);
   };

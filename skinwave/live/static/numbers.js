@@ -316,9 +316,9 @@ export function lineTable({ load, values, body, waves, wavesAt, kernel, kernelAt
 }
 
 /** Names of the lines below 1 kHz that the Tacton is too short to resolve from 0 Hz or each other. */
-export function unresolvedNames(load, settle = 0.5) {
+export function unresolvedNames(load) {
   const lines = lineNames(load, { highest: HIGHEST }).filter(({ f }) => f < HIGHEST);
-  const least = 1 / ((1 - settle) * load.duration);
+  const least = 2 / load.duration; // of its second half, when it has settled
   const top = Math.max(...lines.map(({ strength }) => strength), 1e-300);
   const near = (a, b, far) => Math.abs(a - b) < far;
   let known = lines.map(({ f }) => {

@@ -5,7 +5,6 @@ import { openBody } from "./bodies.js";
 import { buildControls } from "./controls.js";
 import { WRITERS, readMeasurement } from "./files.js";
 import { addressOf, createHistory, readAddress } from "./history.js";
-import { openKernel } from "./kernel.js";
 import { drawingFrequency, rhythmPeriod } from "./load.js";
 import { MAP_LEGEND, drawMap, mapControls } from "./maps.js";
 import { levelOver } from "./numbers.js";
@@ -25,17 +24,15 @@ const data = JSON.parse(document.getElementById("data").textContent);
 const $ = (id) => document.getElementById(id);
 const all = (selector) => [...document.querySelectorAll(selector)];
 
-const SPANS = { auto: "automatic", "first 20 ms": "first 20 ms", "first 60 ms": "first 60 ms",
-  "last 60 ms": "last 60 ms", "one rhythm": "one rhythm", "whole Tacton": "all" };
+const SPANS = ["automatic", "first 20 ms", "first 60 ms", "last 60 ms", "one rhythm", "all"];
 const PLAYED = 3.5; // s that a period takes when played
 const TURN = 30; // ms of slow work, between which the page draws
 const VALUES = 48, REFINED = 1e-3; // of a control; of its range, to which the highest level is refined
 const QUIET = 300; // ms without a move, after which slow results are computed
 
 const opened = new Map(); // bodies by name
-const kernelBody = openKernel();
 const starts = { ...STARTS, ...data.start };
-const view = { look: "maps", tab: "lines", span: "auto", decibel: false, highest: 600, over: "speed",
+const view = { look: "maps", tab: "lines", span: "automatic", decibel: false, highest: 600, over: "speed",
   mapDecibel: 0, published: false, held: 0, follow: true };
 const errors = new Map(); // what is typed wrong, by control
 const scale = keptScales();
@@ -52,7 +49,7 @@ function bodyOf(name) {
   return opened.get(record.name);
 }
 
-const respond = (own) => respondTo(own, bodyOf(own.body), kernelBody, { published: view.published });
+const respond = (own) => respondTo(own, bodyOf(own.body), { published: view.published });
 
 function change(key, value, settled) {
   let next = { ...values, [key]: value };
@@ -113,7 +110,8 @@ function showSlot() {
   const wrong = [...errors.values()].find(Boolean) ?? "";
   $("problem").textContent = wrong;
   const { title, error } = answer?.body ?? {};
-  const expected = error && !answer.invalid ? `${title}: lines are within ${rounded(100 * error, 2)} % of the full model` : "";
+  const expected = error && !answer.invalid
+    ? `${title}: lines are within ${rounded(100 * error, 2)} % of the full model` : "";
   $("notice").textContent = wrong ? "" : notice || expected;
   const warned = [...new Set([...(answer?.body.warnings ?? []), ...(answer?.warnings ?? [])])];
   $("warned").hidden = !warned.length;
@@ -497,13 +495,20 @@ function fillMenus() {
   for (const menu of all(".menu")) {
     menu.addEventListener("toggle", ({ newState }) => document.querySelector(`[data-menu="${menu.id}"]`)
       .setAttribute("aria-expanded", String(newState === "open")));
-    menu.addEventListener("keydown", (event) => {
-      const way = { ArrowDown: 1, ArrowUp: -1 }[event.key], items = [...menu.querySelectorAll("button")];
-      if (!way) return;
-      event.preventDefault();
-      items[(items.indexOf(document.activeElement) + way + items.length) % items.length].focus();
-    });
+    moveFocus(menu, "button", { ArrowDown: 1, ArrowUp: -1 });
   }
+}
+
+/** Let keys {name: 1 or -1} move the focus among parts of an element, round and round. */
+function moveFocus(host, selector, ways, act = () => {}) {
+  host.addEventListener("keydown", (event) => {
+    const way = ways[event.key], items = [...host.querySelectorAll(selector)];
+    if (!way) return;
+    event.preventDefault();
+    const next = items[(items.indexOf(document.activeElement) + way + items.length) % items.length];
+    next.focus();
+    act(next);
+  });
 }
 
 function openMenu(button, menu) {
@@ -556,15 +561,7 @@ function listen() {
       if (dataset.look) look(dataset.look);
       if (dataset.tab) tab(dataset.tab);
     });
-    list.addEventListener("keydown", (event) => {
-      const way = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
-      const tabs = [...list.querySelectorAll('[role="tab"]')];
-      if (!way) return;
-      event.preventDefault();
-      const next = tabs[(tabs.indexOf(event.target) + way + tabs.length) % tabs.length];
-      next.focus();
-      next.click();
-    });
+    moveFocus(list, '[role="tab"]', { ArrowRight: 1, ArrowLeft: -1 }, (next) => next.click());
   }
   for (const id of ["kernel-map", "wave-map"]) {
     let resting = 0;
@@ -627,8 +624,7 @@ controls = buildControls($("controls"), {
   published: (on) => { view.published = on; ask(); },
 });
 $("map-legend").innerHTML = MAP_LEGEND;
-$("span").innerHTML = Object.entries(SPANS).map(([value, words]) =>
-  `<option value="${value}">${words}</option>`).join("");
+$("span").innerHTML = SPANS.map((words) => `<option>${words}</option>`).join("");
 $("over").innerHTML = Object.keys(OVER).map((key) =>
   `<option value="${key}" title="${LABELS[key]}">${key === "am" ? "AM" : key}</option>`).join("");
 $("highest").value = view.highest;

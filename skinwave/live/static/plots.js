@@ -71,10 +71,11 @@ function thinned(xs, ys, toX, width) {
 /**
  * A plot inside an element.
  *
- * `draw(spec)` takes { x: {label, range}, y: {label, range, role}, y2, curves, names, notes, kept,
- * hatched, label }. A curve has {role, axis: "y"|"y2", x, y, name, width, dash, fill, stems, offset}; names are [{x, y, axis, text, above}], the most important first. Zoom lasts until `kept` changes.
+ * `draw(spec)` takes { x: {label, range}, y: {label, range, role}, y2, curves, names, kept,
+ * hatched, label }. A curve has {role, axis: "y"|"y2", x, y, name, width, dash, fill, stems, offset};
+ * names are [{x, y, axis, text, above}], the most important first. Zoom lasts until `kept` changes.
  */
-export function createPlot(host, { announce = () => {}, onZoom = () => {} } = {}) {
+export function createPlot(host, { announce }) {
   const svg = document.createElementNS(NS, "svg");
   svg.setAttribute("tabindex", "0");
   svg.setAttribute("role", "img");
@@ -255,7 +256,6 @@ export function createPlot(host, { announce = () => {}, onZoom = () => {} } = {}
       zoom = width >= (high - low) * 0.999 ? null : [start, start + width];
     } else zoom = null;
     read = -1;
-    onZoom(zoom);
     render();
   }
 
@@ -312,14 +312,12 @@ export function createPlot(host, { announce = () => {}, onZoom = () => {} } = {}
   }).observe(host);
 
   return {
-    svg,
     draw(given) {
       if (given.kept !== kept) { zoom = null; kept = given.kept; }
       spec = given;
       render();
     },
     setCursor(x) { cursor = x; if (spec && size[0]) mark(); },
-    get zoom() { return zoom; },
   };
 }
 
@@ -375,13 +373,13 @@ export function figureOf(parts, paper) {
   return { text, width, height };
 }
 
-/** PNG of an SVG text, `scale` times as large; a promise of a blob. */
-export async function pngOf({ text, width, height }, scale = 2) {
+/** PNG of an SVG text, twice as large; a promise of a blob. */
+export async function pngOf({ text, width, height }) {
   const picture = new Image();
   picture.src = URL.createObjectURL(new Blob([text], { type: "image/svg+xml" }));
   await picture.decode();
   const canvas = document.createElement("canvas");
-  [canvas.width, canvas.height] = [Math.round(scale * width), Math.round(scale * height)];
+  [canvas.width, canvas.height] = [Math.round(2 * width), Math.round(2 * height)];
   canvas.getContext("2d").drawImage(picture, 0, 0, canvas.width, canvas.height);
   URL.revokeObjectURL(picture.src);
   return new Promise((resolve) => canvas.toBlob(resolve, "image/png"));

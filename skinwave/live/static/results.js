@@ -24,8 +24,8 @@ const inMs = (span) => span.map((t) => 1e3 * t);
 export function spanOf(name, load) {
   const { duration, pulses } = load, period = pulses && rhythmPeriod(load);
   if (name === "last 60 ms") return [Math.max(0, duration - 0.06), duration];
-  if (name === "whole Tacton") return [0, duration];
-  if (period && (name === "one rhythm" || name === "auto")) return [0, Math.min(period, duration)];
+  if (name === "all") return [0, duration];
+  if (period && (name === "one rhythm" || name === "automatic")) return [0, Math.min(period, duration)];
   return [0, Math.min(name === "first 20 ms" ? 0.02 : 0.06, duration)];
 }
 
