@@ -24,8 +24,14 @@ export class ModalBody {
 
   /** Forces on the poles (m j,) {ahead, back} of those on the modes. */
   onPoles({ re, im }) {
-    const each = (values) => Float64Array.from(this.poles.re, (_, k) => values[Math.floor(k / this.kinds)]);
-    return { ahead: { re: each(re), im: each(im) }, back: { re: each(re), im: each(im.map((v) => -v)) } };
+    const count = this.poles.re.length, ahead = zeros(count), back = zeros(count);
+    for (let k = 0; k < count; k++) {
+      const m = Math.floor(k / this.kinds);
+      ahead.re[k] = back.re[k] = re[m];
+      ahead.im[k] = im[m];
+      back.im[k] = -im[m];
+    }
+    return { ahead, back };
   }
 
   /** Residues (m j,) times the modes at a place. */

@@ -68,6 +68,10 @@ function neighbours(values, x) {
   return { first, shares: lagrange(values.slice(first, first + 4), x) };
 }
 
+/** Values from a place on, weighed by the four shares of neighbours. */
+const weighed = (values, from, s) => s[0] * values[from] + s[1] * values[from + 1] + s[2] * values[from + 2]
+  + s[3] * values[from + 3];
+
 /** A laterally infinite body of a pack: frequencies (f,) in Hz, k (k,) and G (f, k) {re, im}. */
 export class RadialBody {
   constructor(pack) {
@@ -155,11 +159,10 @@ export class RadialBody {
     const m = this.distances.length, count = distances.length;
     const re = new Float64Array(used * count), im = new Float64Array(used * count);
     for (let q = 0; q < count; q++) {
-      const { first, shares: [s0, s1, s2, s3] } = neighbours(this.distances, distances[q]);
+      const { first, shares } = neighbours(this.distances, distances[q]);
       for (let i = 0, from = first, to = q; i < used; i++, from += m, to += count) {
-        const { re: br, im: bi } = this.bessel;
-        re[to] = s0 * br[from] + s1 * br[from + 1] + s2 * br[from + 2] + s3 * br[from + 3];
-        im[to] = s0 * bi[from] + s1 * bi[from + 1] + s2 * bi[from + 2] + s3 * bi[from + 3];
+        re[to] = weighed(this.bessel.re, from, shares);
+        im[to] = weighed(this.bessel.im, from, shares);
       }
     }
     return { re, im };
@@ -180,15 +183,11 @@ class RadialMotion {
     const harmonics = new Map(this.harmonicsAt(x, y)), { parts } = this.lines;
     const re = new Float64Array(this.f.length), im = new Float64Array(this.f.length);
     this.f.forEach((f, l) => {
-      const { first, shares: s } = neighbours(this.body.frequencies, f);
+      const { first, shares } = neighbours(this.body.frequencies, f);
       for (const part of parts[l]) {
         const h = harmonics.get(part.n);
         if (!h) continue;
-        let a = 0, b = 0;
-        for (let k = 0; k < 4; k++) {
-          a += s[k] * h.re[first + k];
-          b += s[k] * h.im[first + k];
-        }
+        const a = weighed(h.re, first, shares), b = weighed(h.im, first, shares);
         re[l] += 2 * (a * part.re - b * part.im);
         im[l] += 2 * (a * part.im + b * part.re);
       }
@@ -222,9 +221,9 @@ class RadialMotion {
     this.f.forEach((f, l) => {
       const g = body.alongDistance(load.height, f), { re: wr, im: wi } = w[l];
       for (let j = 0; j < fine; j++) {
-        const { first, shares: [s0, s1, s2, s3] } = stencils[j];
-        tr[j] = s0 * g.re[first] + s1 * g.re[first + 1] + s2 * g.re[first + 2] + s3 * g.re[first + 3];
-        ti[j] = s0 * g.im[first] + s1 * g.im[first + 1] + s2 * g.im[first + 2] + s3 * g.im[first + 3];
+        const { first, shares } = stencils[j];
+        tr[j] = weighed(g.re, first, shares);
+        ti[j] = weighed(g.im, first, shares);
       }
       for (let p = 0, k = 0, to = l * n; p < n; p++, to++) {
         let a = 0, b = 0;
@@ -254,7 +253,7 @@ class RadialMotion {
     const gain = Float64Array.from({ length: given },
       (_, k) => gainAt(load, k * step) * meanLevel(load, k * step, step));
     const harmonics = this.harmonicsAt(x, y);
-    const shares = Array.from({ length: bins }, (_, k) => neighbours(body.frequencies, k / (size * step)));
+    const stencils = Array.from({ length: bins }, (_, k) => neighbours(body.frequencies, k / (size * step)));
     const ur = new Float64Array(size * coarser), ui = new Float64Array(size * coarser);
     const fd = drawingFrequency(load.path), qr = new Float64Array(size), qi = new Float64Array(size);
     for (const [order, { re, im }] of harmonics) {
@@ -267,9 +266,8 @@ class RadialMotion {
       }
       transform(qr, qi);
       for (let k = 0; k < bins; k++) {
-        const { first, shares: s } = shares[k];
-        const a = s[0] * re[first] + s[1] * re[first + 1] + s[2] * re[first + 2] + s[3] * re[first + 3];
-        const b = s[0] * im[first] + s[1] * im[first + 1] + s[2] * im[first + 2] + s[3] * im[first + 3];
+        const { first, shares } = stencils[k];
+        const a = weighed(re, first, shares), b = weighed(im, first, shares);
         ur[k] += a * qr[k] - b * qi[k];
         ui[k] += a * qi[k] + b * qr[k];
       }
