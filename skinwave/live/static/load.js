@@ -308,7 +308,8 @@ export function pathHarmonic(load, n, count) {
  * are harmonics n of the path times lines {re, im} of the gain.
  */
 export function loadLines(load, { threshold = 3e-4, lowest = 1e-6, highest = 1000, most = 60 } = {}) {
-  const samples = pathSamples(load), count = samples.x.length, fd = drawingFrequency(load.path), gain = gainLines(load);
+  const samples = pathSamples(load), count = samples.x.length, gain = gainLines(load);
+  const fd = drawingFrequency(load.path);
   const last = lastOrder(load, count, gain, highest), byFrequency = new Map();
   const shares = harmonicStrengths(load, samples, last);
   for (let n = -last; n <= last; n++) {

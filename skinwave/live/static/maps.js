@@ -205,10 +205,10 @@ function imagesOf(options, before) {
  * Draw a map in an SVG element, which has its size by styles.
  * @param {SVGSVGElement} svg
  * @param {object} options rms: values (n * n) in `unit`, NaN off the body; unit: "m", "Pa", "m/s", "dB";
- *   largest: end of the scale; decibel: span of a scale in dB below `largest`, linear if 0; signed: red and blue about 0; level: values (n * n), with a contour at
- *   0; influenced: the kernel's values (n * n), with a dotted border at -20 dB; path: paths of points [x, y]
- *   in metre; foci: places [x, y] in metre; point: [x, y]; title; hatched: why the
- *   values are not valid
+ *   largest: end of the scale; decibel: span of a scale in dB below `largest`, linear if 0; signed: red and
+ *   blue about 0; level: values (n * n), with a contour at 0; influenced: the kernel's values (n * n), with a
+ *   dotted border at -20 dB; path: paths of points [x, y] in metre; foci: places [x, y] in metre;
+ *   point: [x, y]; title; hatched: why the values are not valid
  */
 export function drawMap(svg, options) {
   const before = kept.get(svg), { width, height } = svg.getBoundingClientRect();
