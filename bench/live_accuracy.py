@@ -46,7 +46,7 @@ def answers(record: dict, cases: list[dict]) -> list[dict]:
     """What the page's modules answer in Chromium."""
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
         static = Path(folder, "static")
-        copytree(str(resources.files("skinwave.live") / "static"), static)
+        copytree(str(resources.files("skinwave") / "static"), static)
         (static / "entry.js").write_text(ENTRY)
         file = Path(folder, "page.html")
         script = bundle(static, "entry.js")

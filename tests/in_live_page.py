@@ -34,7 +34,7 @@ SHAPES = ("point", "line", "circle", "triangle", "square")
 
 def modules(browser, folder):
     """A page whose window has the functions of modules, and `attempt` for what they refuse."""
-    shutil.copytree(str(resources.files("skinwave.live") / "static"), folder)
+    shutil.copytree(str(resources.files("skinwave") / "static"), folder)
     (folder / "entry.js").write_text(MODULE, encoding="utf-8")
     text = f"<!doctype html><meta charset=utf-8><script type=module>{bundle(folder, 'entry.js')}"
     (folder / "page.html").write_text(f"{text}</script>", encoding="utf-8")

@@ -15,7 +15,7 @@ TITLE = "skinwave: waves in skin and paper under mid-air ultrasound haptics"
 
 def page(data: Mapping[str, Any], title: str = TITLE) -> str:
     """Return the live page as HTML, of the data that `skinwave.live.data` makes."""
-    static = resources.files("skinwave.live") / "static"
+    static = resources.files("skinwave") / "static"
     script = "\n" + bundle(static, ENTRY)
     return render(
         "live.html", title=title, script=script,

@@ -33,7 +33,7 @@ def turntable(view: View, frame: int) -> str:
         "triangles": _binary(triangles, "<u4"), "path": paths.tolist(), "foci": foci.tolist(),
         "probes": view.scene.probe_points[:, :2].tolist(),
     }  # fmt: skip
-    static = resources.files("skinwave.live") / "static"
+    static = resources.files("skinwave") / "static"
     return render(
         "turntable.html", title=data["title"], data=encoded(data),
         script="\n" + bundle(static, "turntable.js"),

@@ -48,7 +48,7 @@ H = 0.012  # m: elements of the palm, few for the test
 def page(browser, tmp_path_factory):
     """A page with the modules that answer, and bodies."""
     folder = tmp_path_factory.mktemp("live") / "static"
-    shutil.copytree(str(resources.files("skinwave.live") / "static"), folder)
+    shutil.copytree(str(resources.files("skinwave") / "static"), folder)
     (folder / "entry.js").write_text(ENTRY)
     file = folder / "page.html"
     script = bundle(folder, "entry.js")

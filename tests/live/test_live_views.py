@@ -55,7 +55,7 @@ LOAD = MovingPressure(
 @pytest.fixture
 def page(browser, tmp_path):
     folder = tmp_path / "static"
-    shutil.copytree(str(resources.files("skinwave.live") / "static"), folder)
+    shutil.copytree(str(resources.files("skinwave") / "static"), folder)
     (folder / "entry.js").write_text(MODULE)
     text = f"{PAGE}{bundle(folder, 'entry.js')}</script>"
     (tmp_path / "page.html").write_text(text, encoding="utf-8")
