@@ -12,6 +12,7 @@ from simple_model.layers.tensors import hooke
 from simple_model.load.spectrum import pressure_lines, synthesise
 from skinwave.models.reduction import oscillating, read_at
 from skinwave.report import films
+from skinwave.report.renderer import renderer  # noqa: F401, in the condition below
 from skinwave.report.styles import style
 from skinwave.results import exports, motion, surface, views
 from skinwave.results.nodal import shade
@@ -20,9 +21,7 @@ from skinwave.scene.scene import Body, Layer, Scene
 from skinwave.studies import album, scene_report
 from skinwave.studies.gallery import Gallery
 
-draws = pytest.mark.skipif(
-    "not renderer.renderer().found", reason="nothing draws in three dimensions here"
-)
+draws = pytest.mark.skipif("not renderer().found", reason="nothing draws in three dimensions here")
 PATH = Trajectory(shape="circle", size=0.008, speed=5.0)
 SCENE = Scene(
     pressure=MovingPressure(tacton=Tacton(trajectory=PATH, duration=0.05, am_frequency=100)),
