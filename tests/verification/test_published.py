@@ -148,12 +148,10 @@ def test_a_finger_is_compared_at_its_own_frequencies():
 
 def test_a_hand_loses_more_along_its_finger_at_a_higher_frequency(monkeypatch):
     """Coarse: by 6.5 mm the lengths are 23, 14 and 9.8 mm at 200, 300 and 400 Hz."""
-    monkeypatch.setattr(predictions, "HAND_SIZE", 0.014)
+    monkeypatch.setattr(predictions, "HAND_SIZE", 0.009)
     found = predictions.along_finger(HAND, silent, (200.0, 300.0))
     assert found.dofs > 10_000
-    # The mesher places its nodes anew each time.
-    assert found.lengths == pytest.approx([0.023, 0.014], rel=0.35)
-    assert found.lengths[0] > 1.2 * found.lengths[1]
+    assert found.lengths == pytest.approx([0.023, 0.014], rel=0.2)
     assert compare_finger(found)[1].outcome == BELOW
 
 
