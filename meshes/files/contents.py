@@ -1,30 +1,23 @@
 """What a mesh or surface file holds: the one door for all formats.
 
 `read_contents` reads a file in a process of its own, because readers crash on damaged files, print,
-and take whatever time and memory a file asks for. VTK reads its own formats and those of surfaces,
-meshio those of mesh generators.
+and take whatever time and memory a file asks for.
 """
 
 import os
-import pickle
-import tempfile
 from pathlib import Path
 
 from meshes import subprocess_call
 from meshes.files.cells import Contents
+from meshes.files.readers import BY_MESHIO, read_file
 from meshes.tetmesh import MeshError, TetMesh
 
 BY_VTK = (
     ".vtu", ".pvtu", ".vtk", ".vtm", ".vtkhdf", ".xdmf", ".xmf", ".exo", ".e", ".vtp", ".stl",
     ".ply", ".obj", ".glb", ".gltf",
 )  # fmt: skip
-BY_MESHIO = {
-    ".msh": "gmsh", ".mesh": "medit", ".bdf": "nastran", ".nas": "nastran", ".fem": "nastran",
-    ".med": "med", ".ele": "tetgen", ".node": "tetgen", ".off": "off",
-}  # fmt: skip
 FORMATS = (*BY_VTK, *BY_MESHIO, ".inp")
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 25.4e-3}
-CHILD = Path(__file__).with_name("reader_child.py")
 
 
 def read_contents(path: str | os.PathLike[str]) -> Contents:
@@ -41,18 +34,12 @@ def read_contents(path: str | os.PathLike[str]) -> Contents:
         raise MeshError(f"{path} is of no kind that is read here; give one of {', '.join(FORMATS)}")
     if not path.is_file():
         raise MeshError(f"{path} is no file that is there; check its name")
-    with tempfile.TemporaryDirectory(prefix="skinwave-") as folder:
-        target = Path(folder, "contents")
-        try:
-            subprocess_call.read(CHILD, path, target, folder=folder)
-        except subprocess_call.Refused as error:
-            raise MeshError(str(error).replace(str(path.resolve()), str(path))) from None
-        except subprocess_call.Crashed:
-            raise MeshError(f"{path} is damaged or cut short; save it again") from None
-        except MeshError as error:
-            raise MeshError(f"{path} cannot be read: {error}") from None
-        found: Contents = pickle.loads(target.read_bytes())
-        return found
+    try:
+        return subprocess_call.call_reader(read_file, path)
+    except subprocess_call.Crashed:
+        raise MeshError(f"{path} is damaged or cut short; save it again") from None
+    except MeshError as error:
+        raise MeshError(str(error).replace(str(path.resolve()), str(path))) from None
 
 
 def scale_of(unit: str) -> float:

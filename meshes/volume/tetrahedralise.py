@@ -10,11 +10,9 @@ is meshed once per machine.
 from __future__ import annotations
 
 import logging
-import tempfile
 from collections.abc import Mapping
 from dataclasses import replace
 from importlib.util import find_spec
-from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
@@ -30,8 +28,6 @@ from meshes.volume.quality import dihedral_angles
 from meshes.volume.smoothing import Sizing, smoothed
 
 log = logging.getLogger(__name__)
-
-MESHER = Path(__file__).with_name("tetwild_child.py")
 
 EPSILON = 0.05  # of h: how far the mesh may lie from the surface
 SMALLEST_EPSILON = 1e-4  # of the diagonal: below, the mesher takes minutes to hours
@@ -185,25 +181,37 @@ def _size_grid(surface: Surface, h: float, sizing: Sizing | None) -> dict[str, n
 
 
 def _run(inputs: dict[str, np.ndarray], timeout: float) -> tuple[Floats, np.ndarray]:
-    """Run the mesher on its input, in a process and a folder of its own."""
+    """Run the mesher in a process of its own."""
     if find_spec("pytetwild") is None:
         raise MeshError(
             "tetrahedra need the package pytetwild, which has no wheel for Intel Macs; install it, "
             "or give a file that has a mesh"
         )
-    with tempfile.TemporaryDirectory(prefix="skinwave-") as folder:
-        source, target = Path(folder, "input.npz"), Path(folder, "output.npz")
-        np.savez(source, **inputs)  # type: ignore[arg-type]
-        try:
-            subprocess_call.run(MESHER, source, target, folder=folder, timeout=timeout)
-        except TimeoutError:
-            raise MeshError(
-                f"the mesher was stopped after {timeout:g} s; take larger elements or more time"
-            ) from None
-        except MeshError as error:
-            raise MeshError(f"the mesher failed: {error}; simplify or smooth the surface") from None
-        with np.load(target) as result:
-            return result["points"], result["tets"].astype(np.int64)
+    try:
+        return subprocess_call.call(mesh_by_tetwild, inputs, timeout=timeout)
+    except TimeoutError:
+        raise MeshError(
+            f"the mesher was stopped after {timeout:g} s; take larger elements or more time"
+        ) from None
+    except Exception as error:
+        raise MeshError(f"the mesher failed: {error}; simplify or smooth the surface") from None
+
+
+def mesh_by_tetwild(inputs: Mapping[str, np.ndarray]) -> tuple[Floats, np.ndarray]:
+    """Points and tetrahedra of the mesher, which may crash or never end, and writes files."""
+    from pytetwild import tetrahedralize
+
+    points, tets = tetrahedralize(
+        inputs["points"],
+        inputs["triangles"].astype(np.int32),
+        edge_length_abs=float(inputs["h"]),
+        epsilon=float(inputs["epsilon"]),
+        vtk_ordering=True,
+        bg_vertices=inputs["grid_points"],
+        bg_tets=inputs["grid_tets"].astype(np.int32),
+        bg_values=inputs["grid_sizes"],
+    )
+    return points, tets.astype(np.int64)
 
 
 def _with_regions(mesh: TetMesh, inner: Mapping[str, Surface]) -> TetMesh:

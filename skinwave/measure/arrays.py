@@ -10,7 +10,6 @@ zigzag along the hand. Its y (N, M, 2) is the velocity along the laser in m/s at
 2 repetitions; places are measured one after the other, and the reference r tells when each began.
 """
 
-import tempfile
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -24,13 +23,13 @@ from simple_model.typing import Floats
 from skinwave.measure import units
 from skinwave.measure.delays import aligned
 from skinwave.measure.headers import NAMES, TIME, column
+from skinwave.measure.matlab import read_arrays
 from skinwave.measure.recording import Given, Recording, nowhere
 from skinwave.measure.table import rises
 from skinwave.models import named, names
 
 FORMAT = "skinwave measurement 1"
 LARGEST = 2_000_000_000  # bytes of a MATLAB file
-CHILD = Path(__file__).with_name("matlab_child.py")
 TIMES = ("t", "time", "times", "t_s", "time_s")
 FREQUENCIES = ("f", "freq", "frequency", "frequencies", "frequency_hz", "f_hz")
 RATES = (
@@ -82,18 +81,10 @@ def read_mat(path: Path, given: Given) -> Recording:
     with reading.opened(path, LARGEST) as file:
         if not file.read(1):
             raise ValueError("the file is empty; download or export it anew")
-    with tempfile.TemporaryDirectory() as folder:
-        target = Path(folder) / "arrays.npz"
-        try:
-            subprocess_call.read(CHILD, path, target, folder=folder)
-        except subprocess_call.Refused as error:
-            raise ValueError(str(error)) from None
-        except MeshError as error:
-            raise ValueError(
-                "the file is damaged or no MATLAB file; save it anew with -v7"
-            ) from error
-        with np.load(target, allow_pickle=False) as kept:
-            found = {str(name): kept[f"array{k}"] for k, name in enumerate(kept["names"])}
+    try:
+        found = subprocess_call.call_reader(read_arrays, path)
+    except MeshError as error:
+        raise ValueError("the file is damaged or no MATLAB file; save it anew with -v7") from error
     if not found:
         raise ValueError("the file has no arrays of numbers; save the signals as such")
     return recording(found, given)

@@ -5,12 +5,9 @@ Without GL libraries VTK ends the process that makes its first window, and no ex
 
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from meshes import subprocess_call
 
-PROBE = Path(__file__).with_name("renderer_child.py")
 PACKAGES = "libegl1 libgl1-mesa-dri"
 PATIENCE = 60.0  # s
 
@@ -27,17 +24,24 @@ class Renderer:
 def renderer() -> Renderer:
     """Renderer of this environment, probed once a process."""
     try:
-        with TemporaryDirectory() as folder:
-            said = subprocess_call.run(PROBE, folder=folder, timeout=PATIENCE).split()
+        return Renderer(found=True, said=subprocess_call.call(draw_a_ball, timeout=PATIENCE))
     except TimeoutError:
         return Renderer(found=False, said=f"a window is not made within {PATIENCE:g} s")
-    except ValueError as error:
-        if "No module named" in str(error):
-            missing = str(error).split("No module named")[-1].strip()
-            cure = f"the Python package {missing} is missing; install it"
-            return Renderer(found=False, said=cure)
-        said = []
-    if said:
-        return Renderer(found=True, said=said[-1])
-    missing = "no picture in three dimensions can be drawn here: the GL libraries are missing"
-    return Renderer(found=False, said=f"{missing}; on Debian, apt install {PACKAGES}")
+    except ModuleNotFoundError as error:
+        cure = f"the Python package {error.name} is missing; install it"
+        return Renderer(found=False, said=cure)
+    except Exception:
+        missing = "no picture in three dimensions can be drawn here: the GL libraries are missing"
+        return Renderer(found=False, said=f"{missing}; on Debian, apt install {PACKAGES}")
+
+
+def draw_a_ball() -> str:
+    """Draw in a small window, and return the name of its class."""
+    import pyvista as pv
+
+    plotter = pv.Plotter(off_screen=True, window_size=(32, 32))
+    plotter.add_mesh(pv.Sphere())
+    plotter.screenshot(None, return_img=True)
+    name = type(plotter.render_window).__name__
+    plotter.close()
+    return name

@@ -1,11 +1,8 @@
 """Meshes and surfaces in files: round trips, foreign orders and kinds, and one sound body."""
 
-import contextlib
 import functools
-import io
 import json
 import re
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +14,6 @@ import pyvista
 import fem
 import meshes
 from meshes import MeshError, TetMesh, subprocess_call
-from meshes.files import reader_child
 from meshes.files.contents import read_contents
 from meshes.surface.repair import check
 from meshes.surface.triangulation import volume
@@ -30,15 +26,7 @@ from skinwave.scene.scene import Body
 def read_here(monkeypatch):
     """Files are read in this process, which has imported what reads them."""
 
-    def read(script, path, target, *, folder):
-        said = io.StringIO()
-        monkeypatch.setattr(sys, "argv", [str(script), str(path.resolve()), str(target)])
-        with contextlib.redirect_stderr(said):
-            code = reader_child.main()
-        if code:
-            raise subprocess_call.Refused(said.getvalue().strip().splitlines()[-1])
-
-    monkeypatch.setattr(subprocess_call, "read", read)
+    monkeypatch.setattr(subprocess_call, "call_reader", lambda read, path: read(path))
 
 
 HAND = Path(__file__).parents[2] / "examples/hand/generic-hand-right.glb"

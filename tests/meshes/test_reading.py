@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -70,20 +71,18 @@ def test_a_reader_gets_time_and_memory_by_the_size_of_its_file(tmp_path, monkeyp
         meshes.read(path)
 
 
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="no such limit")
-def test_the_limit_of_memory_holds(tmp_path):
-    (tmp_path / "hungry.py").write_text("x = bytearray(2_000_000_000)\n")
-    with pytest.raises(MeshError, match="MemoryError"):
-        subprocess_call.run(
-            tmp_path / "hungry.py", folder=tmp_path, timeout=600, memory=500_000_000
-        )
-
-
-def test_a_program_finds_these_packages_and_nothing_in_its_folder(tmp_path):
-    (tmp_path / "numpy.py").write_text("raise SystemExit(1)\n")
-    (tmp_path / "said.py").write_text("import sys, numpy, meshes\nprint(*sys.argv[1:])\n")
-    said = subprocess_call.run(tmp_path / "said.py", "a", 2, folder=tmp_path, timeout=600)
-    assert said == "a 2\n"
+def test_a_function_runs_in_a_process_of_its_own_and_its_end_is_told():
+    assert subprocess_call.call(divmod, 7, 2, timeout=600) == (3, 1)
+    assert subprocess_call.call(os.getpid, timeout=600) != os.getpid()
+    with pytest.raises(ZeroDivisionError):
+        subprocess_call.call(divmod, 1, 0, timeout=600)
+    with pytest.raises(subprocess_call.Crashed, match="code 7"):
+        subprocess_call.call(os._exit, 7, timeout=600)
+    with pytest.raises(TimeoutError):
+        subprocess_call.call(time.sleep, 600, timeout=0.1)
+    if sys.platform.startswith("linux"):
+        with pytest.raises(MemoryError):
+            subprocess_call.call(bytearray, 2_000_000_000, timeout=600, memory=500_000_000)
 
 
 # The cache

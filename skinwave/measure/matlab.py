@@ -1,19 +1,12 @@
-"""Run by `matlab` in a process of its own: scipy's and h5py's readers of MATLAB files.
-
-    python matlab_child.py FILE OUTPUT.npz
-
-They crash on some damaged files. The arrays in FILE are written to OUTPUT.npz under their numbers,
-with their names as `names`; what is wrong with the file is the last line of standard error.
+"""Arrays in MATLAB files, by scipy's and h5py's readers, which crash on some damaged files:
+`read_mat` calls them in a process of its own.
 """
 
-import sys
 import warnings
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from meshes.subprocess_call import REFUSED
 
 LARGEST = 2_000_000_000  # bytes of the arrays in a file
 DEEPEST = 4  # structures within each other
@@ -24,29 +17,22 @@ MISSING = (
 )
 
 
-def main() -> int:
-    """Write the arrays in FILE to OUTPUT.npz."""
-    source, target = sys.argv[1:]
+def read_arrays(path: Path) -> dict[str, np.ndarray]:
+    """The arrays in a file by name; raises a ValueError that says what is wrong with it."""
     warnings.simplefilter("ignore")  # of names that occur twice, and the like
-    with open(source, "rb") as file:
+    with path.open("rb") as file:
         head = file.read(EARLIEST + len(HDF5))
     try:
-        found = hdf5(Path(source)) if HDF5 in head else mat(Path(source))
+        return hdf5(path) if HDF5 in head else mat(path)
     except ImportError:
-        print(MISSING, file=sys.stderr)
-        return REFUSED
-    except Unreadable as error:
-        print(error, file=sys.stderr)
-        return REFUSED
+        raise ValueError(MISSING) from None
+    except Unreadable:
+        raise
     except Exception:  # whatever is made of spoilt bytes
-        print("the file is damaged or no MATLAB file; save it anew with -v7", file=sys.stderr)
-        return REFUSED
-    arrays: dict[str, Any] = {f"array{k}": array for k, array in enumerate(found.values())}
-    np.savez(target, names=np.array(list(found), np.str_), **arrays)
-    return 0
+        raise ValueError("the file is damaged or no MATLAB file; save it anew with -v7") from None
 
 
-class Unreadable(Exception):
+class Unreadable(ValueError):
     """The arrays of a file are too large, or of a kind that only MATLAB reads."""
 
 
@@ -155,7 +141,3 @@ def as_in_matlab(node: Any) -> np.ndarray:
     if array.dtype.names == ("real", "imag"):
         return np.asarray((array["real"] + 1j * array["imag"]).T)
     return array.T
-
-
-if __name__ == "__main__":
-    sys.exit(main())

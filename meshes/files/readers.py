@@ -1,14 +1,9 @@
-"""Run by `read_contents` in a process of its own: reads FILE and writes its contents.
-
-    python reader_child.py FILE OUTPUT
-
-What is wrong with the file is the last line of standard error.
+"""Readers of mesh files: VTK for its own formats and those of surfaces, meshio for those of mesh
+generators. They crash on damaged files and print: `read_contents` calls them in a process.
 """
 
 import contextlib
 import io
-import pickle
-import sys
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,12 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from meshes import subprocess_call
 from meshes.files.abaqus import AGAIN, read_abaqus
-from meshes.files.cells import contents
-from meshes.files.contents import BY_MESHIO
+from meshes.files.cells import Contents, contents
 from meshes.tetmesh import MeshError
 
+BY_MESHIO = {
+    ".msh": "gmsh", ".mesh": "medit", ".bdf": "nastran", ".nas": "nastran", ".fem": "nastran",
+    ".med": "med", ".ele": "tetgen", ".node": "tetgen", ".off": "off",
+}  # fmt: skip
 VTK_CELLS = {
     1: "vertex", 3: "line", 5: "triangle", 9: "quad", 10: "tetra", 11: "hexahedron",
     12: "hexahedron", 13: "wedge", 14: "pyramid", 21: "line3", 22: "triangle6", 23: "quad8",
@@ -31,34 +28,28 @@ SOLID = 3  # dimension
 VOXEL, BRICK = 11, [0, 1, 3, 2, 4, 5, 7, 6]  # its corners in the order of a hexahedron's
 
 
-def main() -> int:
-    """Write the contents of FILE to OUTPUT."""
-    path, target = map(Path, sys.argv[1:])
+def read_file(path: Path) -> Contents:
+    """The contents of a file; raises a MeshError that says what is wrong with it."""
     try:
         with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings(record=True) as met:
             warnings.simplefilter("always")
             raw = _read(path)
             if any("error while reading" in str(one.message) for one in met):
                 raise MeshError(f"{path} is damaged or cut short; {AGAIN}")
-            found = contents(path, raw)
-    except MeshError as error:
-        return _refuse(error)
+            return contents(path, raw)
+    except MeshError:
+        raise
     except ImportError as error:  # MED files are read by h5py
-        return _refuse(f'{path} is read with {error.name}, which is not installed; pip install '
-                       '"skinwave[measure]", or save it as .vtu')  # fmt: skip
+        raise MeshError(
+            f"{path} is read with {error.name}, which is not installed; pip install "
+            '"skinwave[measure]", or save it as .vtu'
+        ) from None
     except (Exception, SystemExit) as error:
         why = "is damaged, or holds what its reader does not know"
         if isinstance(error, MemoryError):
             why = "asks for more memory than a mesh of its size needs"
         cure = "save it as version 2.2 (gmsh -format msh22)" if path.suffix == ".msh" else AGAIN
-        return _refuse(f"{path} cannot be read: it {why}; {cure}")
-    target.write_bytes(pickle.dumps(found))
-    return 0
-
-
-def _refuse(why: object) -> int:
-    print(why, file=sys.stderr)
-    return subprocess_call.REFUSED
+        raise MeshError(f"{path} cannot be read: it {why}; {cure}") from None
 
 
 def _read(path: Path) -> Any:
@@ -184,7 +175,3 @@ def _check_unread(path: Path, kind: str) -> None:
                     f"{path} gives nodes in coordinate system {system.strip()}; save it with all "
                     "nodes in the basic one"
                 )
-
-
-if __name__ == "__main__":
-    sys.exit(main())
