@@ -2,10 +2,10 @@
 What propagation changes
 ========================
 
-A focus draws a circle of 20 mm on skin at 12 m/s, modulated at 140 Hz. The point kernel, which
-has no propagation, predicts stimulation where the focus is. Under the same load waves carry
-motion beyond it. Propagation moves energy in space, not in frequency: a linear body vibrates at
-the lines of its load and at no others.
+A focus draws a circle of 20 mm on skin at 12 m/s, modulated at 140 Hz. In the point kernel nothing
+propagates, so stimulation stays at the path. Under the same load, waves carry motion beyond it.
+Propagation moves energy in space, not in frequency: a linear body vibrates only at the spectral
+lines of its load.
 """
 
 import matplotlib.pyplot as plt
@@ -20,7 +20,7 @@ load = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.5, trajectory=c
 scene = Scene(pressure=load, body=Body(kind="slab", material="palm"), probes=((0.0, 0.0),))
 
 # %%
-# RMS motion over the surface, each model relative to its own largest.
+# RMS motion over the surface, each model relative to its largest value.
 x, y = grid(scene, 0.04, 1e-3)
 maps = {"point kernel": kernel_map(load, x, y), "waves in skin": body_map(scene, x, y)}
 figure, axes = plt.subplots(1, 2, figsize=(8, 3.8), layout="constrained", sharey=True)
@@ -33,14 +33,14 @@ axes[0].set_ylabel("y, mm")
 figure.colorbar(image, ax=axes, label="RMS motion, dB re largest")
 
 # %%
-# From rest, after a transient that dies out: multiples of 140 and 200 Hz fill bins of 20 Hz, and
-# the rest of the spectrum is empty.
+# After the transient, only multiples and sums of 140 and 200 Hz remain. All other bins of the
+# spectrum, 20 Hz wide, are empty.
 waves = simulate(scene, "flat-body", 0.2, times=np.arange(0, 0.3, 1e-4))
 amplitude = np.abs(np.fft.rfft(waves.values[-500:, 0]))
 hertz = np.fft.rfftfreq(500, 1e-4).round().astype(int)
 of_load = {abs(200 * n + 140 * m) for n in range(-25, 26) for m in range(-2, 3)}
 others = np.array([f not in of_load for f in hertz])
 share = amplitude[others].max() / amplitude.max()
-print(f"strongest line beside those of the load: {share:.1e} of the largest")
+print(f"strongest other line: {share:.1e} of the largest")
 assert others.sum() > 20
 assert share < 1e-3

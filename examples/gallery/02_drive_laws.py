@@ -1,11 +1,11 @@
 r"""
-What the drive law does to AM
-=============================
+The drive law under AM
+======================
 
-A device modulates the amplitude of sound; skin receives its radiation pressure, which goes with
-the square. Full amplitude modulation :math:`(1 + \cos \omega t)/2`, squared, is :math:`3/8 +
-\cos(\omega t)/2 + \cos(2 \omega t)/8`: the component at twice the frequency is a quarter of
-that at the frequency itself.
+A device modulates the amplitude of sound. The radiation pressure on the skin is proportional to its
+square. The square of full amplitude modulation :math:`(1 + \cos \omega t)/2` is :math:`3/8 +
+\cos(\omega t)/2 + \cos(2 \omega t)/8`. The line at twice the frequency therefore has a quarter of
+the amplitude.
 """
 
 import matplotlib.pyplot as plt

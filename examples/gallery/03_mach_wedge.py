@@ -2,9 +2,9 @@ r"""
 A focus faster than its waves
 =============================
 
-A focus that runs over a soft half-space faster than the Rayleigh wave leaves a wedge behind it,
-as a boat does, at the angle :math:`\arcsin(c_R / v)` to its path. Here the solid is nearly
-without loss, so that all waves run at one speed.
+A focus that moves faster than the Rayleigh wave leaves a wedge behind it, like a boat. The angle
+between wedge and path is :math:`\arcsin(c_R / v)`. This half-space has almost no loss, so all
+waves have the same speed.
 """
 
 import matplotlib.pyplot as plt
@@ -21,7 +21,7 @@ path = Trajectory(shape="line", size=0.060, speed=speed, sweep="one_way")
 load = MovingPressure(tacton=Tacton(trajectory=path), height=0.1)
 
 # %%
-# Motion on one side of the path when the focus has run to 24 mm.
+# Motion on one side of the path when the focus is at 24 mm.
 x, y = 1e-3 * np.arange(-30.0, 31.0), 1e-3 * np.arange(0.0, 30.5, 1.0)
 places = np.stack(np.meshgrid(x, y), axis=-1)
 compliance = half_space(gel)
@@ -44,7 +44,7 @@ ax.legend(loc="upper left")
 figure.colorbar(image, ax=ax, label="displacement into the body, µm", shrink=0.8)
 
 # %%
-# The front is where the body is pushed in most, at each distance from the path.
+# At each distance from the path, the front is the place of the largest inward motion.
 rows = (y > 0.006) & (y < 0.014)
 fine = np.linspace(-0.012, 0.022, 2000)
 front = [fine[np.argmax(np.interp(fine, x, row))] for row in u[rows]]

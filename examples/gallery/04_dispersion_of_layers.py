@@ -2,9 +2,9 @@
 Dispersion of layered tissue
 ============================
 
-Soft tissue on stiffer one makes surface waves dispersive. Long waves reach below the layer and
-run as Rayleigh waves of what is there; short ones stay within it and run as its own. In between
-the group speed is below both: energy is slower there than any wave front.
+Surface waves on a soft layer over stiffer tissue are dispersive. Long waves reach below the layer
+and travel as Rayleigh waves of the lower tissue. Short waves stay in the layer and travel as
+Rayleigh waves of the layer. In between, the group speed is below both.
 """
 
 import matplotlib.pyplot as plt

@@ -1,11 +1,10 @@
 r"""
-What receptors meet at their depth
-==================================
+Strain at the depth of receptors
+================================
 
-Under a slow focus an incompressible half-space has no vertical strain at its surface; it has
-most of it about as deep as the focus is wide. From the compliance of the half-space at the
-wavenumber :math:`k`, :math:`(1 + kz) e^{-kz} / 2 \mu k`, the strain below the middle of a
-Gaussian pressure is
+Under a slow focus, the vertical strain of an incompressible half-space is zero at the surface. It is
+largest at a depth of about the width of the focus. At wavenumber :math:`k` the compliance is
+:math:`(1 + kz) e^{-kz} / 2 \mu k`. The strain below the middle of a Gaussian pressure is therefore
 
 .. math:: \varepsilon_{zz}(z) = -\frac{p \sigma^2 z}{2 \mu}
           \int_0^\infty k^2 e^{-kz - k^2 \sigma^2 / 2} \, dk
@@ -30,7 +29,7 @@ times = np.arange(0, 10, 0.05)
 strain = lines(simulate(scene, "flat-body-harmonic", 0.2, times=times), [1.0])[0]
 
 # %%
-# At 1 Hz the squared drive has half of the peak pressure.
+# At 1 Hz the line of the squared drive has half of the peak pressure.
 width, mu = gaussian_width(load.height, load.profile), body.solid.shear_modulus
 
 

@@ -2,9 +2,9 @@ r"""
 Which lines are above the detection threshold
 =============================================
 
-Skin at the focus under AM of 100 Hz. The drive law gives the line at 200 Hz a quarter of the
-pressure of that at 100 Hz. The threshold of the Pacinian channel falls by 12 dB an octave, which
-is as much: the second line is as far above the threshold as the compliance of skin lets it.
+The motion of skin at the focus under AM at 100 Hz. The drive law gives the line at 200 Hz a quarter
+of the pressure of the line at 100 Hz, or -12 dB. The threshold of the Pacinian channel also falls
+by 12 dB per octave. The compliance of skin decides which line is higher above the threshold.
 """
 
 import matplotlib.pyplot as plt
@@ -31,7 +31,7 @@ ax.set(xlim=(15, 400), ylim=(1e-3, 30), xlabel="frequency, Hz", ylabel="amplitud
 ax.legend()
 
 # %%
-# The line at 200 Hz beside the integral of the slab's compliance over wavenumber, times the
+# Check of the line at 200 Hz: the integral over wavenumber of the slab's compliance times the
 # transform of the focal spot, as a sum.
 layer, width = scene.body.solid, gaussian_width(load.height, load.profile)
 k = np.linspace(1.0, 1500.0, 6000)[None, :]  # rad/m

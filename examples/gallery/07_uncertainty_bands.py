@@ -1,10 +1,10 @@
 """
-Bands of what is not known
-==========================
+Uncertainty bands
+=================
 
-The pressure of a device is known to a factor of 2, moduli of skin to another. Waves are linear
-in the load: if the pressure alone is uncertain, nine samples in ten lie between half and twice
-the central motion, whatever the body is.
+The pressure of a device is known to a factor of 2, and so are the moduli of skin. Waves are linear
+in the load. If only the pressure is uncertain, 90 % of the samples lie between half and twice the
+median motion, on any body.
 """
 
 from dataclasses import replace

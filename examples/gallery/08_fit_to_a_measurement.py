@@ -1,10 +1,9 @@
 """
-A modulus from a measurement
-============================
+Fit a modulus to a measurement
+==============================
 
-A vibrometer's record, here made from waves in skin of 25 kPa with noise of 5 % added, and an
-unknown gain. The modulus follows from how phase and amplitude change along a line, with its
-interval.
+The recording is simulated: waves in skin of 25 kPa, 5 % noise, and an unknown gain. The fit finds the
+modulus and its interval from the phase and amplitude along a line.
 """
 
 from dataclasses import replace

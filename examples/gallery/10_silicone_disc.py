@@ -2,10 +2,9 @@
 A silicone disc in three dimensions
 ===================================
 
-A disc of silicone, 80 mm wide and 20 mm high, on a rigid base, as one looks at with a
-vibrometer, under a focus of 1 Pa at 200 Hz. Its side is free, but some wavelengths away for
-waves as damped as these: where the focus is, it yields as a layer of the same thickness without
-sides does, of which there is a closed solution at each wavenumber.
+A disc of silicone, 80 mm wide and 20 mm high, stands on a rigid base under a focus of 1 Pa at 200 Hz.
+Its side is free, but several wavelengths away. At the focus, the disc therefore moves like a layer
+without sides, which has a closed solution at each wavenumber.
 """
 
 import numpy as np
@@ -24,7 +23,7 @@ P, points = fem.load_operator(mesh), fem.facet_points(mesh)
 force = P @ np.exp(-(points[:, :2] ** 2).sum(axis=1) / 2 / width**2)  # N, of 1 Pa
 
 # %%
-# The steady state, seen at the instant when the middle is pushed in most.
+# The steady state at the instant of the largest inward motion.
 u = fem.harmonic(operators, force, 200.0)[0]
 middle = (fem.probe_operator(mesh, [[0.0, 0.0]]) @ u)[0]
 instant = (u * abs(middle) / middle).real.reshape(-1, 3)

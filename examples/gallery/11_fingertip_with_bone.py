@@ -2,9 +2,9 @@
 A fingertip with its bone
 =========================
 
-Soft tissue around a bone, on coarse elements, cut open. What one place moves under a force at
-another is what the other moves under the force at the first (Maxwell and Betti), whatever the
-body is made of.
+Soft tissue around a bone, on coarse elements, cut open. The example checks reciprocity (Maxwell and
+Betti): the motion at point A under a force at B equals the motion at B under the same force at A,
+for any materials.
 """
 
 import numpy as np
@@ -27,7 +27,7 @@ materials = {0: fem.PRESETS["palm"], 1: fem.PRESETS["bone"]}
 operators = fem.assemble(mesh, materials, fixed="sides")
 
 # %%
-# A focus of 50 Pa on the pad, at rest, and another one 4 mm towards the tip.
+# A focus of 50 Pa at rest on the pad, and a second one 4 mm towards the tip.
 P, points = fem.load_operator(mesh), fem.facet_points(mesh)
 
 

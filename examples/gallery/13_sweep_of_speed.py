@@ -1,10 +1,10 @@
 """
-Which speed of the focus moves skin most
-========================================
+Which focus speed moves skin most
+=================================
 
-A steady focus circles on the forearm. Where it runs as fast as the Rayleigh wave it stays with
-the wave that it makes, and motion is largest; the losses of skin make the peak broad, and
-stiffen skin a little, which moves the peak upwards.
+A focus of constant pressure circles on the forearm. At the speed of the Rayleigh wave it travels with
+the wave that it excites, and the motion is largest. The loss of skin makes this peak broad. It also
+stiffens the skin slightly, which moves the peak to a higher speed.
 """
 
 import matplotlib.pyplot as plt

@@ -1,10 +1,9 @@
 """
-A measurement beside a model
-============================
+Compare a measurement with a model
+==================================
 
-A CSV file as an analyser exports it, here written by the script itself: velocity in mm/s at
-three places, with noise, 1.2 ms behind the model and in units of another gain. Delay and gain
-follow from the lines of the load, with standard errors.
+The script writes a CSV file as an analyser exports it: velocity in mm/s at three places, with noise, a
+delay of 1.2 ms and another gain. The lines of the load give delay and gain with standard errors.
 """
 
 import tempfile
@@ -28,7 +27,7 @@ scene = Scene(
 model = simulate(scene, "flat-body-harmonic", 0.2, times=np.arange(0, 0.3, 2e-4))
 
 # %%
-# The file: a column of times in s, and one for each place.
+# The file has a column of times in s and one column for each place.
 lines, late, gain = model.lines, 1.2e-3, 1.8
 turned = np.exp(2j * np.pi * np.outer(model.times - late, lines.frequencies))
 record = 1e3 * gain * (turned @ lines.amplitudes).real  # mm/s
@@ -38,7 +37,7 @@ head = "time (s)," + ",".join(f"velocity {1e3 * x:g} mm (mm/s)" for x, _ in plac
 np.savetxt(file, np.column_stack([model.times, record]), delimiter=",", header=head, comments="")
 
 # %%
-# Read, and aligned by the lines of the load above 0 Hz.
+# Read the file, and align it by the lines of the load above 0 Hz.
 measured = read(file, sign=1, places=places)
 moving = lines.frequencies > 0
 hertz, amplitudes = lines.frequencies[moving], lines.amplitudes[moving]

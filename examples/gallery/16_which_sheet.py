@@ -3,10 +3,10 @@ Which sheet was measured?
 =========================
 
 Lim, Seifi and Park publish five claims about lines that they measured on a sheet of paper (M1 to
-M5 in the results), but not the sheet: its size, support, tension, grammage and moduli, where the
-five points lay, what the vibrometer read, and by which drive law the device made its pressure.
-`examples/which_sheet.py` draws all of these from a Latin hypercube and counts the candidates that
-show each claim. This page computes a few; the full design has 2,000 and takes half an hour.
+M5). They do not publish the sheet (size, support, tension, grammage, moduli), the five points, the
+quantity of the vibrometer, or the drive law of the device. `examples/which_sheet.py` samples all of
+these with a Latin hypercube and counts the candidates that show each claim. This page computes a few;
+the full design has 2,000 candidates and takes half an hour.
 
 Findings of the full design
 ---------------------------
@@ -53,7 +53,7 @@ print(findings(rows))
 draw(rows, plt.figure(figsize=(7, 4), layout="constrained"))
 
 # %%
-# A line at f_d needs a pressure with a mean, which all drive laws but the linear one have.
+# A line at f_d needs a pressure with a mean. All drive laws except the linear one have it.
 has_mean = np.array([row["drive"] != "linear" for row in rows])
 assert (holds(rows, "M3") == has_mean).all()
 assert not holds(rows, "M5").any()
