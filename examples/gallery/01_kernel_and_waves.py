@@ -2,10 +2,10 @@
 What propagation changes
 ========================
 
-A focus draws a circle of 20 mm on skin at 12 m/s, modulated at 140 Hz. In the point kernel nothing
-propagates, so stimulation stays at the path. Under the same load, waves carry motion beyond it.
-Propagation moves energy in space, not in frequency: a linear body vibrates only at the spectral
-lines of its load.
+A focus draws a circle of 20 mm on skin at 12 m/s, modulated at 140 Hz. In the point kernel
+nothing propagates, so stimulation stays at the path. Under the same load, waves carry motion
+beyond it. Propagation moves energy in space, not in frequency: a linear body vibrates only at the
+spectral lines of its load.
 """
 
 import matplotlib.pyplot as plt

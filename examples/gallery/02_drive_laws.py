@@ -2,8 +2,8 @@ r"""
 The drive law under AM
 ======================
 
-A device modulates the amplitude of sound. The radiation pressure on the skin is proportional to its
-square. The square of full amplitude modulation :math:`(1 + \cos \omega t)/2` is :math:`3/8 +
+A device modulates the amplitude of sound. The radiation pressure on the skin is proportional to
+its square. The square of full amplitude modulation :math:`(1 + \cos \omega t)/2` is :math:`3/8 +
 \cos(\omega t)/2 + \cos(2 \omega t)/8`. The line at twice the frequency therefore has a quarter of
 the amplitude.
 """

@@ -2,9 +2,10 @@ r"""
 Strain at the depth of receptors
 ================================
 
-Under a slow focus, the vertical strain of an incompressible half-space is zero at the surface. It is
-largest at a depth of about the width of the focus. At wavenumber :math:`k` the compliance is
-:math:`(1 + kz) e^{-kz} / 2 \mu k`. The strain below the middle of a Gaussian pressure is therefore
+Under a slow focus, the vertical strain of an incompressible half-space is zero at the surface. It
+is largest at a depth of about the width of the focus. At wavenumber :math:`k` the compliance is
+:math:`(1 + kz) e^{-kz} / 2 \mu k`. The strain below the middle of a Gaussian pressure is
+therefore
 
 .. math:: \varepsilon_{zz}(z) = -\frac{p \sigma^2 z}{2 \mu}
           \int_0^\infty k^2 e^{-kz - k^2 \sigma^2 / 2} \, dk

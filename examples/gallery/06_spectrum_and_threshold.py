@@ -2,9 +2,10 @@ r"""
 Which lines are above the detection threshold
 =============================================
 
-The motion of skin at the focus under AM at 100 Hz. The drive law gives the line at 200 Hz a quarter
-of the pressure of the line at 100 Hz, or -12 dB. The threshold of the Pacinian channel also falls
-by 12 dB per octave. The compliance of skin decides which line is higher above the threshold.
+The motion of skin at the focus under AM at 100 Hz. The drive law gives the line at 200 Hz a
+quarter of the pressure of the line at 100 Hz, or -12 dB. The threshold of the Pacinian channel
+also falls by 12 dB per octave. The compliance of skin decides which line is higher above the
+threshold.
 """
 
 import matplotlib.pyplot as plt

@@ -2,9 +2,9 @@
 Uncertainty bands
 =================
 
-The pressure of a device is known to a factor of 2, and so are the moduli of skin. Waves are linear
-in the load. If only the pressure is uncertain, 90 % of the samples lie between half and twice the
-median motion, on any body.
+The pressure of a device is known to a factor of 2, and so are the moduli of skin. Waves are
+linear in the load. If only the pressure is uncertain, 90 % of the samples lie between half and
+twice the median motion, on any body.
 """
 
 from dataclasses import replace

@@ -2,8 +2,8 @@
 Fit a modulus to a measurement
 ==============================
 
-The recording is simulated: waves in skin of 25 kPa, 5 % noise, and an unknown gain. The fit finds the
-modulus and its interval from the phase and amplitude along a line.
+The recording is simulated: waves in skin of 25 kPa, 5 % noise, and an unknown gain. The fit finds
+the modulus and its interval from the phase and amplitude along a line.
 """
 
 from dataclasses import replace

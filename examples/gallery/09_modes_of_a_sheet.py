@@ -2,9 +2,9 @@ r"""
 Modes of a clamped sheet
 ========================
 
-Office paper in a square frame. In vacuum, the lowest natural frequency of a clamped square plate is
-:math:`35.985 / 2 \pi a^2 \cdot \sqrt{D / m}` (Leissa, *Vibration of Plates*, 1969, table 4.22). The
-mass of the air around the sheet lowers it.
+Office paper in a square frame. In vacuum, the lowest natural frequency of a clamped square plate
+is :math:`35.985 / 2 \pi a^2 \cdot \sqrt{D / m}` (Leissa, *Vibration of Plates*, 1969, table
+4.22). The mass of the air around the sheet lowers it.
 """
 
 import matplotlib.pyplot as plt

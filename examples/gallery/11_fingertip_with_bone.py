@@ -2,9 +2,9 @@
 A fingertip with its bone
 =========================
 
-Soft tissue around a bone, on coarse elements, cut open. The example checks reciprocity (Maxwell and
-Betti): the motion at point A under a force at B equals the motion at B under the same force at A,
-for any materials.
+Soft tissue around a bone, on coarse elements, cut open. The example checks reciprocity (Maxwell
+and Betti): the motion at point A under a force at B equals the motion at B under the same force
+at A, for any materials.
 """
 
 import numpy as np

@@ -2,9 +2,9 @@ r"""
 A modulus law of your own
 =========================
 
-A material can have any passive and causal complex modulus, as a function of angular frequency. In the
-steady state, a line depends only on the modulus at its own frequency. A Kelvin-Voigt solid with the
-same modulus at 140 Hz gives the same motion at 140 Hz, and a different one at 280 Hz.
+A material can have any passive and causal complex modulus, as a function of angular frequency. In
+the steady state, a line depends only on the modulus at its own frequency. A Kelvin-Voigt solid
+with the same modulus at 140 Hz gives the same motion at 140 Hz, and a different one at 280 Hz.
 """
 
 import matplotlib.pyplot as plt

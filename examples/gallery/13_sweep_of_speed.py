@@ -2,9 +2,9 @@
 Which focus speed moves skin most
 =================================
 
-A focus of constant pressure circles on the forearm. At the speed of the Rayleigh wave it travels with
-the wave that it excites, and the motion is largest. The loss of skin makes this peak broad. It also
-stiffens the skin slightly, which moves the peak to a higher speed.
+A focus of constant pressure circles on the forearm. At the speed of the Rayleigh wave it travels
+with the wave that it excites, and the motion is largest. The loss of skin makes this peak broad.
+It also stiffens the skin slightly, which moves the peak to a higher speed.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,9 @@
 Compare a measurement with a model
 ==================================
 
-The script writes a CSV file as an analyser exports it: velocity in mm/s at three places, with noise, a
-delay of 1.2 ms and another gain. The lines of the load give delay and gain with standard errors.
+The script writes a CSV file as an analyser exports it: velocity in mm/s at three places, with
+noise, a delay of 1.2 ms and another gain. The lines of the load give delay and gain with standard
+errors.
 """
 
 import tempfile

@@ -2,10 +2,10 @@ r"""
 Convergence of quadratic elements
 =================================
 
-A column without lateral contraction under a pressure at 80 Hz has the closed form :math:`u(0) =
-p \tan(k L) / E k` with :math:`k = \omega \sqrt{\rho / E}`. Elements of half the size reduce the error
-at its end by a factor of 16 for ten-node tetrahedra (order 2p = 4, as for energies), and by a factor
-of 4 for four-node tetrahedra (order 2).
+A column without lateral contraction under a pressure at 80 Hz has the closed form :math:`u(0) = p
+\tan(k L) / E k` with :math:`k = \omega \sqrt{\rho / E}`. Elements of half the size reduce the
+error at its end by a factor of 16 for ten-node tetrahedra (order 2p = 4, as for energies), and by
+a factor of 4 for four-node tetrahedra (order 2).
 """
 
 import matplotlib.pyplot as plt

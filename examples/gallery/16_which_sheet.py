@@ -3,10 +3,10 @@ Which sheet was measured?
 =========================
 
 Lim, Seifi and Park publish five claims about lines that they measured on a sheet of paper (M1 to
-M5). They do not publish the sheet (size, support, tension, grammage, moduli), the five points, the
-quantity of the vibrometer, or the drive law of the device. `examples/which_sheet.py` samples all of
-these with a Latin hypercube and counts the candidates that show each claim. This page computes a few;
-the full design has 2,000 candidates and takes half an hour.
+M5). They do not publish the sheet (size, support, tension, grammage, moduli), the five points,
+the quantity of the vibrometer, or the drive law of the device. `examples/which_sheet.py` samples
+all of these with a Latin hypercube and counts the candidates that show each claim. This page
+computes a few; the full design has 2,000 candidates and takes half an hour.
 
 Findings of the full design
 ---------------------------
@@ -21,17 +21,17 @@ M4     1.5 % (1.0 to 2.1%) 5.6 % (2.4 to 11 %)               no parameter (drive
 M5     none (below 0.18 %) none (below 2.5 %)                never holds
 ====== =================== ================================= =============================
 
-**No sheet shows all five claims.** M1 asks for a third harmonic, which only a clipped or compressed
-drive has. M3 asks for a mean pressure, which the linear law does not have. The strongest rival of
-f_AM is f_d - f_AM in 35 % of the candidates and lies on the path of 30 mm in 82 %; its median level
-is +20.4 dB, its least -9.0 dB. The multiples of f_AM and f_d, of which M5 asks -20 dB, are at
--10.7 dB at the least. With 10 dB for "much lower" one candidate would show all five, with 6 dB
-three. To know the drive law would tell most about which claims hold; everything else, size and
-support included, tells 0.01 bits or less by itself.
+**No sheet shows all five claims.** M1 needs a third harmonic, which only a clipped or compressed
+drive has. M3 needs a mean pressure, which the linear law lacks. The strongest line besides f_AM
+is f_d - f_AM in 35 % of the candidates, and belongs to the path of 30 mm in 82 %. Its level
+relative to f_AM is +20.4 dB in the median and at least -9.0 dB. M5 requires the multiples of f_AM
+and f_d below -20 dB; the lowest value is -10.7 dB. If "much lower" means 10 dB, one candidate
+shows all five claims; if it means 6 dB, three do. The drive law is the most informative unknown.
+Every other parameter alone, size and support included, gives at most 0.01 bits.
 
 The nearest sheets show M1 to M4: A3 of 109 g/m² in a frame, A6 of 107 g/m² in a frame, and A3 of
-106 g/m² clamped at its short edges. Computed at large deflection by `fem-nonlinear`, the first two
-lose M4: the vibration stiffens them, which moves their modes away from f_AM.
+106 g/m² clamped at its short edges. At large deflection (`fem-nonlinear`) the first two lose M4,
+because the vibration stiffens them and moves their modes away from f_AM.
 """
 
 import sys
