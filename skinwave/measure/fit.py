@@ -9,23 +9,9 @@ import numpy as np
 from scipy.special import ndtri
 
 from simple_model.choices import choose
-from simple_model.numbers import significant
 from simple_model.typing import Floats
 from skinwave.bodies.parts import solid_of
-from skinwave.measure.intervals import (
-    LEVEL,
-    Direction,
-    Estimate,
-    Profile,
-    Whiteness,
-    correlations,
-    estimates,
-    half_widths,
-    profiles,
-    unresolved,
-    whiteness,
-    widenings,
-)
+from skinwave.measure.intervals import LEVEL, Estimate, Intervals, intervals
 from skinwave.measure.measurement import Measurement
 from skinwave.measure.observed import KINDS, data_of
 from skinwave.measure.parameters import Parameter, check, of_scene, parse
@@ -42,7 +28,6 @@ from skinwave.scene.variation import varied
 from skinwave.system.effort import Progress, silent
 
 STARTS = 8
-CORRELATED = 0.1  # from which it is said that a correlation is dropped
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -54,23 +39,18 @@ class Fit:
     measured : Measurement
     target : Target, the scene whose parameters were varied, and the model
     solution : Solution
-    estimates : one a parameter, with intervals by the covariance
-    correlations : (k, k) float, of the estimates
-    unresolved : directions that the data do not resolve
-    profiles : of the parameters that are resolved
-    whiteness : Whiteness of the residuals
-    widenings : (k,) float, factors of the intervals for residuals that are not white
+    intervals : Intervals
     """
 
     measured: Measurement
     target: Target
     solution: Solution
-    estimates: tuple[Estimate, ...]
-    correlations: Floats
-    unresolved: tuple[Direction, ...]
-    profiles: tuple[Profile, ...]
-    whiteness: Whiteness
-    widenings: Floats
+    intervals: Intervals
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Estimates with their intervals, one a parameter."""
+        return self.intervals.estimates
 
     @property
     def values(self) -> dict[str, float]:
@@ -79,8 +59,21 @@ class Fit:
 
     @property
     def scene(self) -> Scene:
-        """The scene with the estimates, each with its spread."""
-        return _fitted_scene(self)
+        """The scene with the estimates. A number has the standard error of its interval, normal or,
+        if it was varied by its logarithm, lognormal; one without an interval, or at a limit, is
+        uniform between its limits. Numbers of a preset that were not fitted keep what is known of
+        the preset.
+        """
+        scene, parameters = self.target.scene, self.solution.problem.parameters
+        changed = varied(scene, of_scene(self.values))
+        given = dict(changed.spreads) | _of_presets(scene, changed)
+        given = {key: x for key, x in given.items() if key not in parameters.ties}
+        each = zip(parameters.free, self.estimates, self.intervals.half.tolist(), strict=True)
+        spreads = {limits.key: _distribution(limits, one, half) for limits, one, half in each}
+        for key in of_scene(dict.fromkeys(spreads, 0.0)):
+            if _has_place(changed, key):
+                given[key] = spreads[key]
+        return with_distributions(changed, given)
 
     @property
     def predicted(self) -> Floats:
@@ -138,29 +131,7 @@ def fit(
         parameters=parameters, data=data_of(kind, measured, aim), linear=aim.linear
     )  # fmt: skip
     solution = solve(problem, starts, seed, progress)
-    return Fit(
-        measured=measured, target=aim, solution=solution, estimates=estimates(solution),
-        correlations=correlations(solution), unresolved=unresolved(solution),
-        profiles=profiles(solution, progress), whiteness=whiteness(solution.residual),
-        widenings=widenings(solution),
-    )  # fmt: skip
-
-
-def _fitted_scene(found: Fit) -> Scene:
-    """The scene with the estimates. A number has the standard error of its interval, normal or, if
-    it was varied by its logarithm, lognormal; one without an interval, or at a limit, is uniform
-    between its limits. Numbers of a preset that were not fitted keep what is known of the preset.
-    """
-    scene, parameters = found.target.scene, found.solution.problem.parameters
-    changed = varied(scene, of_scene(found.values))
-    given = dict(changed.spreads) | _of_presets(scene, changed)
-    given = {key: x for key, x in given.items() if key not in parameters.ties}
-    each = zip(parameters.free, found.estimates, half_widths(found.solution), strict=True)
-    spreads = {limits.key: _distribution(limits, one, float(half)) for limits, one, half in each}
-    for key in of_scene(dict.fromkeys(spreads, 0.0)):
-        if _has_place(changed, key):
-            given[key] = spreads[key]
-    return with_distributions(changed, given)
+    return Fit(measured=measured, target=aim, solution=solution, intervals=intervals(solution))
 
 
 def _distribution(limits: Parameter, found: Estimate, half: float) -> Distribution:
@@ -212,32 +183,3 @@ def _changed(one: Any, other: Any, path: str) -> Iterator[str]:
             yield from _changed(inner, other[key], f"{path}.{key}")
     elif one != other:
         yield path
-
-
-def notes(found: Fit) -> list[str]:
-    """Sentences, without a full stop, on what a scene with the estimates does not hold."""
-    parameters = found.solution.problem.parameters
-    said = [
-        f"{key} = {value:.6g} of the measurement, which is no part of the scene"
-        for key, value in found.values.items() if "." not in key
-    ]  # fmt: skip
-    for each in found.estimates:
-        if not each.is_resolved and "." in each.key:
-            said.append(f"{each.key} is not resolved by the measurement: its spread is that "
-                        "between its limits")  # fmt: skip
-        elif each.is_resolved and each.at_limit:
-            said.append(f"{each.key} is at a limit of its range, and its spread is that range")
-    said += [
-        f"{key} was tied to others, and has no spread" for key in parameters.ties if "." in key
-    ]
-    keys = parameters.keys
-    is_part = np.array(["." in key for key in keys])
-    table = np.where(np.outer(is_part, is_part), np.nan_to_num(found.correlations), 0.0)
-    np.fill_diagonal(table, 0.0)
-    first, second = divmod(int(np.argmax(np.abs(table))), len(keys))
-    if abs(largest := float(table[first, second])) >= CORRELATED:
-        said.append(
-            "spreads are independent of each other: correlations of the estimates are dropped, as "
-            f"{significant(largest, 2)} between {keys[first]} and {keys[second]}"
-        )
-    return said

@@ -11,7 +11,7 @@ from math import pi
 
 import numpy as np
 
-from simple_model import MovingPressure, resolved_lines
+from simple_model import resolved_lines
 from simple_model.load.line_names import line_names
 from simple_model.numbers import counted
 from simple_model.response import SETTLE, fit_lines
@@ -19,8 +19,8 @@ from simple_model.typing import Complex, Floats
 from skinwave.measure.lines import MeasuredLines, as_response, holm, lines_of, measurable
 from skinwave.measure.measurement import Measurement
 from skinwave.measure.predicted import SAME, Target, predicted_lines, predicted_waveforms
-from skinwave.models.parametric import FAINTEST
 
+KINDS = ("waveforms", "lines", "amplitudes")
 STEADY = 1.5  # times the remainder of the rest: that of the start of a steady record, at most
 FAINT = 1e-3  # of the largest motion: weaker transients are ignored
 SINGULAR = 1e-3  # of the largest variance: the least that a combination of lines is given
@@ -29,31 +29,25 @@ FOURTH = 70.0  # sum of squares of the coefficients of a fourth difference
 WEAK = 0.05  # of the load's strongest line: unresolved ones below it are left out
 NAMED = 3  # of lines in a sentence
 SURE = 0.01  # probability of as strong a line in noise alone, below which it is more than noise
-NOT_PREDICTED = (
-    f"in the reduced body weaker than {FAINTEST:g} of the strongest line, for every material of "
-    "the ranges"
-)
-TOO_CLOSE = "weak in the load, and the record is too short to resolve it from other lines"
 
 
 @dataclass(frozen=True, kw_only=True)
 class LeftOut:
-    """Line of the load that is not fitted: its name, frequency in Hz, and why. Its `share` is that
-    of the measured power of all lines, less what noise has; nan if the record does not resolve it,
-    and 0 if it is no stronger than noise.
+    """Line of the load that is not fitted, since a reduced body leaves it out, or since it is weak
+    and not resolved: its name, its frequency in Hz, and its `share` of the measured power of all
+    lines less that of noise; nan if it is not resolved, and 0 if it is no stronger than noise.
     """
 
     name: str
     frequency: float
-    why: str
     share: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LoadLines:
-    """Measured lines of a load that a model predicts: their `names` (f,) and what was `found` of
-    them; `lost` are strong lines of the load that the record is too short to resolve, which leak
-    into others; other lines of the load are `left_out`.
+    """Lines of a load in a measurement that a model predicts: their `names` (f,) and what was
+    `found` of them; `lost` are strong lines of the load that the record is too short to resolve,
+    which leak into others; other lines of the load are `left_out`.
     """
 
     names: tuple[str, ...]
@@ -80,14 +74,6 @@ class LoadLines:
         n, p = self.found.mean.shape
         return f"{counted(n, 'line')} at {counted(p, 'place')}"
 
-    @property
-    def noise(self) -> str:
-        """How errors are known."""
-        if not self.is_known:
-            return "errors the same for all, as there is one repetition"
-        runs = len(self.found.each)
-        return f"errors from {runs} repetitions" if runs > 1 else "errors from the noise floor"
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Data:
@@ -95,26 +81,22 @@ class Data:
 
     Parameters
     ----------
-    kind, words : str, its name; what is fitted, with how the errors are known
-    axis, unit : (n,) float of time in s or frequency in Hz, and which
-    labels : names (s,) of the series
+    kind, words : str, one of `KINDS`; what is fitted, with how the errors are known
+    axis : (n,) float, time in s or frequency in Hz
     values : (n, s) float, SI, what was measured; complex ones as real and imaginary parts
     error : (n, s) float, their standard errors
-    whitening : (1 or p, m, m) float, by which the values of a place over their errors, of m = n s/p
-        and the s/p series of it one after the other, become independent; None if they are
     is_known : bool, whether the errors are known; else up to a common factor
     predict : values of the parameters -> (n, s)
+    whitening : (1 or p, m, m) float, by which the values of a place over their errors, of m = n s/p
+        and the s/p series of it one after the other, become independent; None if they are
     lines : names (f,) of the lines that are fitted, if it is to lines
     left_out : lines of the load that are not, if it is to lines
-    has_sign : bool, whether a measurement with its sign turned has other values
     rough : data of the same record that cost less, for the search; None if there are none
     """
 
     kind: str
     words: str
     axis: Floats
-    unit: str
-    labels: tuple[str, ...]
     values: Floats
     error: Floats
     is_known: bool
@@ -122,8 +104,17 @@ class Data:
     whitening: Floats | None = None
     lines: tuple[str, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
-    has_sign: bool = True
     rough: "Data | None" = None
+
+    @property
+    def is_in_time(self) -> bool:
+        """Whether it is of waveforms."""
+        return self.kind == "waveforms"
+
+    @property
+    def has_sign(self) -> bool:
+        """Whether a measurement with its sign turned has other values."""
+        return self.kind != "amplitudes"
 
     def weighted(self, values: Floats) -> Floats:
         """Values (n, s) in units of their errors, made independent."""
@@ -137,48 +128,36 @@ class Data:
 
 
 def data_of(kind: str, measured: Measurement, aim: Target) -> Data:
-    """Data of a kind of `KINDS`, "waveforms", "lines" or "amplitudes", from a measurement, which
-    the model of a target predicts.
-
-    Raises
-    ------
-    ValueError
-        If the measurement has no such data, or the load no line that it resolves.
+    """Data of a kind of `KINDS` from a measurement, which the model of a target predicts; raises a
+    ValueError if there are none.
     """
-    return KINDS[kind](measured, aim)
+    return _waveforms(measured, aim) if kind == "waveforms" else _of_lines(kind, measured, aim)
 
 
 def load_lines(measured: Measurement, aim: Target) -> LoadLines:
     """Lines of a load in a measurement, as far as they are predicted; none if there are none."""
-    pressure = aim.scene.pressure
-    kept, lost = _resolved(measured, pressure)
-    found = lines_of(measured, np.array(list(kept.values())))
+    load = line_names(aim.scene.pressure)
+    if measured.is_spectrum:
+        away = np.abs(measured.frequencies[:, None] - load.frequencies).min(axis=0)
+        near = (away <= SAME * load.frequencies) & measurable(measured, load.frequencies)
+        kept = {load.names[k]: float(load.frequencies[k]) for k in np.flatnonzero(near)}
+        lost: Mapping[str, float] = {}
+    else:
+        kept, lost = resolved_lines(aim.scene.pressure, as_response(measured))
+    found, names = lines_of(measured, np.array(list(kept.values()))), np.array(list(kept))
     predicted = aim.predicts(found.frequencies)
-    load = line_names(pressure)
     strengths = dict(zip(load.names, load.strengths.tolist(), strict=True))
     least = WEAK * float(load.strengths.max(initial=0.0))
     strong = tuple(name for name in lost if strengths.get(name, 0.0) > least)
-    close = (LeftOut(name=name, frequency=f, why=TOO_CLOSE, share=np.nan)
+    close = (LeftOut(name=name, frequency=f, share=np.nan)
              for name, f in lost.items() if name not in strong)  # fmt: skip
     return LoadLines(
-        names=tuple(np.array(list(kept))[predicted].tolist()), found=found.taken(predicted),
-        lost=strong, left_out=(*_not_predicted(list(kept), found, ~predicted), *close),
+        names=tuple(names[predicted].tolist()), found=found.taken(predicted), lost=strong,
+        left_out=(*_not_predicted(names, found, ~predicted), *close),
     )  # fmt: skip
 
 
-def _resolved(
-    measured: Measurement, pressure: MovingPressure
-) -> tuple[Mapping[str, float], Mapping[str, float]]:
-    """Names and frequencies in Hz of the lines of a load that a record resolves, and the others."""
-    if not measured.is_spectrum:
-        return resolved_lines(pressure, as_response(measured))
-    load = line_names(pressure)
-    away = np.abs(measured.frequencies[:, None] - load.frequencies).min(axis=0)
-    near = (away <= SAME * load.frequencies) & measurable(measured, load.frequencies)
-    return {load.names[k]: float(load.frequencies[k]) for k in np.flatnonzero(near)}, {}
-
-
-def _not_predicted(names: list[str], found: MeasuredLines, faint: np.ndarray) -> list[LeftOut]:
+def _not_predicted(names: np.ndarray, found: MeasuredLines, faint: np.ndarray) -> list[LeftOut]:
     """Those of measured lines that a reduced body does not predict, the strongest first."""
     more = np.abs(found.mean) ** 2 - np.nan_to_num(found.variance)
     whole = max(float(np.maximum(more, 0.0).sum()), 1e-300)
@@ -187,8 +166,7 @@ def _not_predicted(names: list[str], found: MeasuredLines, faint: np.ndarray) ->
     for k in np.flatnonzero(faint).tolist():
         is_noise = holm(chance[k]).min(initial=1.0) >= SURE  # of unknown noise nan
         share = 0.0 if is_noise else max(float(more[k].sum()), 0.0) / whole
-        each.append(LeftOut(name=names[k], frequency=float(found.frequencies[k]),
-                            why=NOT_PREDICTED, share=share))  # fmt: skip
+        each.append(LeftOut(name=str(names[k]), frequency=float(found.frequencies[k]), share=share))
     return sorted(each, key=lambda line: -line.share)
 
 
@@ -201,38 +179,37 @@ def _of_lines(kind: str, measured: Measurement, aim: Target) -> Data:
     """Complex amplitudes as real and imaginary parts, or moduli with that of noise: the mean of
     Rice's distribution for weak noise.
     """
-    found = load_lines(measured, aim)
-    if found.lost:
+    lines = load_lines(measured, aim)
+    if lines.lost:
         raise ValueError(
             f"the record of {1e3 * float(np.ptp(measured.times)):.4g} ms is too short to resolve "
-            f"{some(found.lost)} from other lines of the load; fit waveforms from rest, or a "
+            f"{some(lines.lost)} from other lines of the load; fit waveforms from rest, or a "
             "longer record"
         )
-    if not found.names:
+    if not lines.names:
         raise ValueError(
             "the measurement resolves no line of the scene's load; give the scene's Tacton the "
             "frequencies and the path that were measured, or fit waveforms"
         )
-    a, places = found.found.mean, _place_names(measured)
-    predict, both = predicted_lines(aim, found.found.frequencies), found.found.correlation
+    a, f, both = lines.found.mean, lines.found.frequencies, lines.found.correlation
+    predict, runs = predicted_lines(aim, f), len(lines.found.each)
+    noise = f"errors from {runs} repetitions" if runs > 1 else "errors from the noise floor"
+    if not lines.is_known:
+        noise = "errors the same for all, as there is one repetition"
+    data = Data(
+        kind=kind, words=f"complex amplitudes of {lines.words}, {noise}", axis=f,
+        values=_parts(a), error=np.tile(lines.error, 2), is_known=lines.is_known,
+        predict=lambda values: _parts(predict(values)), lines=lines.names, left_out=lines.left_out,
+        whitening=None if both is None else _whitening(both[None]),
+    )  # fmt: skip
     if kind == "lines":
-        data = Data(
-            kind=kind, words=f"complex amplitudes of {found.words}, {found.noise}", unit="Hz",
-            axis=found.found.frequencies, values=_parts(a), error=np.tile(found.error, 2),
-            labels=tuple(f"{name}, {part}" for part in ("real", "imaginary") for name in places),
-            is_known=found.is_known, predict=lambda values: _parts(predict(values)),
-            whitening=None if both is None else _whitening(both[None]),
-        )  # fmt: skip
-    else:
-        noise = found.error**2 if found.is_known else 0.0
-        data = Data(
-            kind=kind, words=f"amplitudes of {found.words}, {found.noise}", unit="Hz",
-            axis=found.found.frequencies, values=np.abs(a), error=found.error, labels=places,
-            is_known=found.is_known, has_sign=False,
-            predict=lambda values: np.sqrt(np.abs(predict(values)) ** 2 + noise),
-            whitening=None if both is None else _whitening(_along(both, a)),
-        )  # fmt: skip
-    return replace(data, lines=found.names, left_out=found.left_out)
+        return data
+    floor = lines.error**2 if lines.is_known else 0.0
+    return replace(
+        data, words=f"amplitudes of {lines.words}, {noise}", values=np.abs(a), error=lines.error,
+        predict=lambda values: np.sqrt(np.abs(predict(values)) ** 2 + floor),
+        whitening=None if both is None else _whitening(_along(both, a)),
+    )  # fmt: skip
 
 
 def _along(correlation: Floats, a: Complex) -> Floats:
@@ -251,6 +228,7 @@ def _whitening(correlation: Floats) -> Floats:
 
 
 def _waveforms(measured: Measurement, aim: Target) -> Data:
+    """Steady waveforms about their mean as the sum of lines, or waveforms from rest."""
     if measured.is_spectrum:
         raise ValueError("the measurement is of spectra; fit lines or amplitudes")
     count = measured.times.size * len(measured.places)
@@ -259,10 +237,15 @@ def _waveforms(measured: Measurement, aim: Target) -> Data:
             f"the waveforms are {count:,} values, the limit is {MOST:,}; select places or times, "
             "or fit lines"
         )
-    lines = load_lines(measured, aim)
+    lines, mean = load_lines(measured, aim), measured.mean
     rough = _of_lines("lines", measured, aim) if lines.names and not lines.lost else None
     if rough and is_steady(measured, lines.found.frequencies):
-        return _steady(measured, aim, lines, rough)
+        rest = fit_lines(as_response(measured), lines.found.frequencies)[1]
+        data = _of_time(
+            measured, mean - mean.mean(axis=0), _synthesised(measured, aim, lines),
+            rest.std(axis=0), f"steady waveforms about their mean, as {lines.words}", rough,
+        )  # fmt: skip
+        return replace(data, lines=lines.names, left_out=lines.left_out)
     if aim.record.is_steady:
         why = f"are too short to resolve {some(lines.lost)}" if lines.lost else "have a transient"
         cure = " or a longer record" if lines.lost else ", or fit lines"
@@ -270,9 +253,9 @@ def _waveforms(measured: Measurement, aim: Target) -> Data:
             f"the waveforms {why}, and {aim.model} has the steady state alone; take another model"
             + cure
         )
-    differences = np.diff(measured.mean, 4, axis=0)  # which leave little of smooth motion
+    differences = np.diff(mean, 4, axis=0)  # which leave little of smooth motion
     return _of_time(
-        measured, measured.mean, predicted_waveforms(aim, measured.times),
+        measured, mean, predicted_waveforms(aim, measured.times),
         np.sqrt((differences**2).mean(axis=0) / FOURTH), "waveforms from rest at t = 0", rough,
     )  # fmt: skip
 
@@ -285,8 +268,10 @@ def is_steady(measured: Measurement, frequencies: Floats) -> bool:
     return bool(start <= max(STEADY * later, FAINT * np.abs(measured.mean).max()))
 
 
-def _steady(measured: Measurement, aim: Target, lines: LoadLines, rough: Data) -> Data:
-    """Waveforms about their mean as the sum of lines."""
+def _synthesised(
+    measured: Measurement, aim: Target, lines: LoadLines
+) -> Callable[[Mapping[str, float]], Floats]:
+    """Prediction of steady waveforms (t, p) about their mean."""
     predict = predicted_lines(aim, lines.found.frequencies)
     waves = np.exp(2j * pi * measured.times[:, None] * lines.found.frequencies)
 
@@ -294,12 +279,7 @@ def _steady(measured: Measurement, aim: Target, lines: LoadLines, rough: Data) -
         x = (waves @ predict(values)).real
         return np.asarray(x - x.mean(axis=0))
 
-    rest = fit_lines(as_response(measured), lines.found.frequencies)[1]
-    data = _of_time(
-        measured, measured.mean - measured.mean.mean(axis=0), synthesised, rest.std(axis=0),
-        f"steady waveforms about their mean, as {lines.words}", rough,
-    )  # fmt: skip
-    return replace(data, lines=lines.names, left_out=lines.left_out)
+    return synthesised
 
 
 def _of_time(
@@ -320,9 +300,8 @@ def _of_time(
         noise = f"errors from {r} repetitions"
     each = np.broadcast_to(_above_none(error, measured.values), values.shape)
     return Data(
-        kind="waveforms", words=f"{words}, {noise}", axis=measured.times, unit="s",
-        labels=_place_names(measured), values=values, error=each, is_known=r > 1,
-        predict=predict, rough=rough,
+        kind="waveforms", words=f"{words}, {noise}", axis=measured.times, values=values,
+        error=each, is_known=r > 1, predict=predict, rough=rough,
     )  # fmt: skip
 
 
@@ -334,14 +313,3 @@ def _above_none(error: Floats, values: np.ndarray) -> Floats:
 
 def _parts(a: Complex) -> Floats:
     return np.hstack([a.real, a.imag])
-
-
-def _place_names(measured: Measurement) -> tuple[str, ...]:
-    return tuple(map(measured.place_name, range(len(measured.places))))
-
-
-KINDS: dict[str, Callable[[Measurement, Target], Data]] = {
-    "waveforms": _waveforms,
-    "lines": lambda measured, aim: _of_lines("lines", measured, aim),
-    "amplitudes": lambda measured, aim: _of_lines("amplitudes", measured, aim),
-}

@@ -34,13 +34,7 @@ FUNCTIONS: dict[str, Callable[[float], float]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter:
-    """Parameter of a fit by its key, in the unit of the key between the limits `low` and `high`.
-
-    Raises
-    ------
-    ValueError
-        If the limits are not finite, or not in order.
-    """
+    """Parameter of a fit by its key, in the unit of the key between the limits `low` and `high`."""
 
     key: str
     low: float
@@ -98,18 +92,10 @@ class Parameters:
         found = {each.key: each.value(float(x)) for each, x in zip(self.free, u, strict=True)}
         return found | _tied(found, self.ties) if self.ties else found
 
-    def place(self, values: Values) -> Floats:
-        """Point (k,) of the unit cube of values by key."""
-        return np.array([each.place(values[each.key]) for each in self.free])
-
 
 def parse(vary: Sequence[str], tie: Sequence[str] = ()) -> Parameters:
-    """Parameters of `KEY=low:high` and ties of `KEY=expression`.
-
-    Raises
-    ------
-    ValueError
-        If a key is none of a scene and no nuisance parameter, or its limits are no limits.
+    """Parameters of `KEY=low:high` and ties of `KEY=expression`; raises a ValueError if a key or a
+    limit is none.
     """
     ties = dict(_tie(text) for text in tie)
     return Parameters(free=tuple(map(_parameter, vary)), ties=ties)
@@ -138,7 +124,7 @@ def _key(text: str) -> str:
 
 
 def _tied(values: Values, ties: Mapping[str, str]) -> dict[str, float]:
-    """Values of expressions of the others, each of those before it, too."""
+    """Values of expressions of other keys, also of ties before them."""
     known, found = dict(values), {}
     for key, text in ties.items():
         names = {each: f"key_{n}" for n, each in enumerate(known)}
@@ -176,18 +162,12 @@ def _evaluated(node: ast.AST, numbers: Values) -> float:
 
 
 def of_scene(values: Values) -> dict[str, float]:
-    """Those that are keys of a scene."""
+    """Return the values of keys of a scene."""
     return {key: value for key, value in values.items() if key not in NUISANCES}
 
 
 def check(scene: Scene, parameters: Parameters) -> None:
-    """Refuse parameters whose limits make no scene, before any work.
-
-    Raises
-    ------
-    ValueError
-        If it is so.
-    """
+    """Raise a ValueError if a limit makes no scene, before any work."""
     middle = np.full(len(parameters.free), 0.5)
     for k, each in enumerate(parameters.free):
         for end, limit in ((0.0, each.low), (1.0, each.high)):

@@ -13,10 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from simple_model import MovingPressure
 from simple_model.layers.flat_body import field_lines, steady_lines
-from simple_model.layers.flat_quantities import from_rest, steady, surface_field
-from simple_model.layers.wavenumber_integral import Field
 from simple_model.load.spectrum import merge_lines
 from simple_model.quantities import Quantity
 from simple_model.response import fit_lines
@@ -37,7 +34,7 @@ from skinwave.models import Model, named, parametric
 from skinwave.models.advice import check_taken
 from skinwave.models.covering import covering, tried_together
 from skinwave.models.flat_body import fields_read
-from skinwave.models.options import SolveOptions
+from skinwave.models.options import SolveOptions, sample_times
 from skinwave.models.parametric import ParametricBody
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import SAMPLE_RATE, Scene
@@ -49,9 +46,6 @@ SAME = 1e-3  # of a frequency: lines as near as that are one
 KEPT = 32  # predictions
 RUNS = 200  # of a fit, about
 THRESHOLD = 1e-5  # of the strongest line of the load: weaker ones are left out of a prediction
-SETTLED = 1e-4  # of the largest motion: what is left of the transient where it is left out
-PARTS = (1 / 12, 1 / 4)  # of a record, after which the transient may have decayed
-BEFORE_END = 0.9  # of such a part: its last samples see it end
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,11 +112,8 @@ class Target:
 def target(scene: Scene, model: str, quantity: Quantity, places: Floats) -> Target:
     """Target of a model by its name, for a quantity of the normal motion at places (p, 2) in metre.
 
-    Raises
-    ------
-    ValueError
-        If the model or the quantity is not one of motion normal to a body, a place is not known or
-        off the body, or the model refuses the scene or its load.
+    Raises a ValueError if the model or the quantity is not one of motion normal to a body, a place
+    is not known or off the body, or the model refuses the scene or its load.
     """
     if not quantity.is_normal:
         raise ValueError(
@@ -137,8 +128,7 @@ def target(scene: Scene, model: str, quantity: Quantity, places: Floats) -> Targ
     if not record.needs_body:
         raise ValueError(f"{model} has no body whose motion could be fitted; take another model")
     found = Target(scene=scene, model=model, quantity=quantity, places=places)
-    moved = found.varied({})
-    check_taken(record, moved)
+    check_taken(record, found.varied({}))
     return found
 
 
@@ -158,12 +148,7 @@ def with_reduction(aim: Target, parameters: Parameters, progress: Progress) -> T
 
 def predicted_lines(aim: Target, frequencies: Floats) -> Predict:
     """Prediction of the complex amplitudes (f, p), SI, of Re a exp(2 pi i f t) at frequencies (f,)
-    in Hz.
-
-    Raises
-    ------
-    ValueError
-        On evaluation, if the load has no line at one of them.
+    in Hz; it raises a ValueError if the load has no line at one of them.
     """
     unscaled = _flat_lines if aim.record.is_infinite else _sampled_lines
     unscaled = _reduced_lines if aim.reduced else unscaled
@@ -177,13 +162,22 @@ def predicted_lines(aim: Target, frequencies: Floats) -> Predict:
 
 
 def predicted_waveforms(aim: Target, times: Floats) -> Predict:
-    """Prediction of waveforms (t, p) from rest at t = 0, SI, at times (t,) in s."""
-    base = _kept(lambda values: _history(aim, values, float(times[-1])))
+    """Prediction of waveforms (t, p) from rest at t = 0, SI, at times (t,) in s; raises a
+    ValueError if the Tacton is shorter.
+    """
+    last, duration = float(times[-1]), aim.scene.tacton.duration
+    if last > duration + 1 / SAMPLE_RATE:
+        raise ValueError(
+            f"the record ends at {1e3 * last:.4g} ms, and the scene's Tacton after "
+            f"{1e3 * duration:.4g} ms; make the Tacton as long, or cut the record off"
+        )
+    base = _kept(lambda values: _history(aim, values, last))
 
     def predict(values: Values) -> Floats:
         t = times - values.get(DELAY, 0.0) / 1e3
-        begun = (t >= 0)[:, None]
-        return aim.factor(values) * np.where(begun, base(aim.rest(values))(t), 0.0)
+        history = base(aim.rest(values))
+        begun, at = (t >= 0)[:, None], np.minimum(t, history.x[-1])
+        return aim.factor(values) * np.where(begun, history(at), 0.0)
 
     return predict
 
@@ -202,7 +196,13 @@ def _flat_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
     """Lines by wavenumber integrals."""
     f, a = _flat_lines_of(aim.varied(values))
     at = np.abs(f[:, None] - frequencies).argmin(axis=0)
-    _check_lines(f[at], frequencies, values)
+    apart = np.abs(f[at] - frequencies) > SAME * frequencies
+    if apart.any():
+        raise ValueError(
+            f"the load has no line at {frequencies[apart][0]:.1f} Hz, which was measured, with "
+            f"{', '.join(f'{key} = {value:g}' for key, value in values.items())}; do not vary what "
+            "moves the lines, or fit waveforms from rest"
+        )
     return np.asarray(a[at])
 
 
@@ -213,32 +213,23 @@ def _reduced_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
     return np.asarray(a[np.abs(f[:, None] - frequencies).argmin(axis=0)])
 
 
-def _check_lines(found: Floats, wanted: Floats, values: Values) -> None:
-    apart = np.abs(found - wanted) > SAME * wanted
-    if apart.any():
-        raise ValueError(
-            f"the load has no line at {wanted[apart][0]:.1f} Hz, which was measured, with "
-            f"{', '.join(f'{key} = {value:g}' for key, value in values.items())}; do not vary what "
-            "moves the lines, or fit waveforms from rest"
-        )
-
-
 def _sampled_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
     """Lines of any model's waveforms."""
     return np.asarray(fit_lines(compute(aim.varied(values), aim.model), frequencies)[0])
 
 
 def _history(aim: Target, values: Values, last: float) -> CubicSpline:
-    """Interpolated waveforms (t, p) from rest up to `last` in s."""
+    """Interpolated waveforms (t, p) from rest up to `last` in s, or twice that if the Tacton lasts
+    as long.
+    """
     if aim.reduced:
         found = parametric.answer(aim.reduced, values)
-        return CubicSpline(found.times, found.values)
-    scene = aim.varied(values)
-    if not aim.record.is_infinite:
-        found = compute(scene, aim.model)
-        return CubicSpline(found.times, found.values)
-    times = np.asarray(np.arange(int(np.ceil(last * SAMPLE_RATE)) + 2) / SAMPLE_RATE, np.float64)
-    return CubicSpline(times, _flat_history(scene, times))
+    else:
+        scene = aim.varied(values)
+        times = sample_times(scene)
+        count = int(np.ceil(2 * last * SAMPLE_RATE)) + 2
+        found = compute(scene, aim.model, times=times[:count])
+    return CubicSpline(found.times, found.values)
 
 
 def _flat_lines_of(scene: Scene) -> tuple[Floats, Complex]:
@@ -250,36 +241,7 @@ def _flat_lines_of(scene: Scene) -> tuple[Floats, Complex]:
         body = compliance(scene.body)
         f, a = steady_lines(body, scene.pressure, points, threshold=THRESHOLD)
         return f, a * scene.reading.asked.factor(2j * np.pi * f)[:, None]
-    each = [field_lines(*part, points, threshold=THRESHOLD) for part in _parts(scene)]
+    parts = zip(fields_read(scene, 0.0), scene.loads, strict=True)
+    each = [field_lines(*part, points, threshold=THRESHOLD) for part in parts]
     frequencies, amplitudes = zip(*each, strict=True)
     return merge_lines(np.concatenate(frequencies), np.vstack(amplitudes)[..., 0])
-
-
-def _flat_history(scene: Scene, times: Floats) -> Floats:
-    """Waveforms (t, p), SI, of the same from rest at times (t,) in s, equally spaced from 0; the
-    steady state where the transient has decayed.
-    """
-    parts, asked, points = _parts(scene), scene.reading.asked, scene.probe_points
-
-    def begun(until: Floats) -> Floats:
-        each = (from_rest(field, asked, load, points, until) for field, load in parts)
-        return np.asarray(sum(each), np.float64)
-
-    if scene.tacton.trajectory.shape == "recorded":
-        return begun(times)
-    later = np.asarray(sum(steady(field, asked, load, points, times) for field, load in parts))
-    for part in PARTS:
-        n = int(part * len(times))
-        first = begun(times[:n])[: int(BEFORE_END * n)]
-        left = np.abs(first - later[: len(first)])[2 * n // 3 :].max()
-        if left <= SETTLED * np.abs(later).max():
-            return np.concatenate([first, later[len(first) :]])
-    return begun(times)
-
-
-def _parts(scene: Scene) -> list[tuple[Field, MovingPressure]]:
-    """Field of each component of the load, and that."""
-    if scene.load.is_plain:
-        body = compliance(scene.body)
-        return [(surface_field(scene.reading.asked, body), scene.pressure)]
-    return list(zip(fields_read(scene, 0.0), scene.loads, strict=True))

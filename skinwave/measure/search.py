@@ -1,16 +1,16 @@
 """Weighted least squares within limits, from several starts.
 
-At each of some points the parameters that cost no run of the model are placed first: the delay by a
-scan of its range, the gain or the peak pressure as linear least squares at each delay (variable
-projection; Golub and Pereyra, SIAM J Numer Anal 10:413 (1973)). From the best one a trust-region
-method takes over. It may end in another minimum: of a softer body, whose waves are a period later
-at the places. Each other parameter is therefore scanned through its range, delay and gain projected
-out, and from the minima of that scan the search goes on, until none leads lower. Starts that end in
-one minimum share its scans. They search on data that cost less, if there are any; the best one goes
-on with the data themselves. The measurement with its sign turned is searched, too, from one start.
+At each start the parameters that cost no run of the model are placed first: the delay by a scan of
+its range, the gain or the peak pressure as linear least squares at each delay (variable projection;
+Golub and Pereyra, SIAM J Numer Anal 10:413 (1973)). A trust-region method goes on from there. It
+may end in another minimum: of a softer body, whose waves are a period later at the places.
+Therefore each other parameter is scanned through its range, with the best delay and gain at each
+place, and the search goes on from the minima of that scan until none leads lower. Starts that end
+in one minimum share its scans. They search on rough data, if there are any; the best one goes on
+with the data themselves.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,28 +25,22 @@ from skinwave.system.effort import Progress
 
 FORWARD, CENTRAL = 1e-5, 1e-3  # steps of differences, of the unit interval
 MOST_EVALUATIONS = 40  # steps of one local search
-TOLERANCE = 1e-5  # of chi squared, where a search ends
+TOLERANCE, FINE = 1e-5, 1e-8  # of chi squared, where a search ends: on rough data, and on all
 CANDIDATES = 4  # points of the hypercube, of which the best one is a start
-DELAYS = 4  # of a scan, to a period of the highest frequency
-MOST_DELAYS = 400
+DELAYS, MOST_DELAYS = 4, 400  # of a scan: to a period of the highest frequency, and in all
 FACTOR = 1.25  # from a place of a scan to the next, of parameters by their logarithm
 LEAST_PLACES, MOST_PLACES = 12, 40
 FEW = 8  # steps from a minimum of a scan, after which it leads lower, or does not
 MOST_HOPS = 5  # from one minimum to a lower one
 SAME_PLACE = 1e-3  # of the unit interval: minima as near are one
-LOWER = 1e-4  # of chi squared: what is less may be a search that has not quite ended
-ROUND_OFF = 1e-8  # of chi squared
-POLISHED = 6  # steps, which get closer by a digit each
-CLOSE = 0.01  # of a standard error: a step that no longer matters
-AT_LIMIT = 1e-3  # of the unit interval
-CLOSE_FIT = 0.1  # of the power of the data: a fit that leaves less is close
+LOWER = 1e-4  # of chi squared: a smaller gain may be a search that has not quite ended
 SAME_COST = 1.0  # of twice the log-likelihood: starts as near to the best reached it
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Problem:
-    """Problem of a fit: weighted residuals over the unit cube of its parameters, by its data, and
-    the keys that the model is in proportion to.
+    """Weighted residuals over the unit cube of the parameters, by the data, and the `linear` keys
+    that the model is in proportion to.
     """
 
     parameters: Parameters
@@ -61,26 +55,21 @@ class Problem:
         """Prediction (n, s)."""
         return self.data.predict(self.parameters.values(u))
 
-    def slopes(self, u: Floats, step: float = CENTRAL) -> Floats:
+    def slopes(self, u: Floats) -> Floats:
         """Derivatives (n s, k) of the residual, by central differences within the limits."""
         columns = []
         for k in range(len(u)):
-            ends = np.clip([u[k] - step, u[k] + step], 0, 1)
+            ends = np.clip([u[k] - CENTRAL, u[k] + CENTRAL], 0, 1)
             low, high = (_with(u, k, end) for end in ends)
             columns.append((self.residual(high) - self.residual(low)) / (ends[1] - ends[0]))
         return np.array(columns).T
 
     def forward(self, u: Floats) -> Floats:
-        """Derivatives (n s, k) of the residual, by differences towards the middle."""
+        """The same by differences towards the middle, which cost half."""
         at = self.residual(u)
         steps = np.where(u < 0.5, FORWARD, -FORWARD)
         each = (self.residual(u + moved) for moved in np.diag(steps))
         return np.array([(moved - at) / step for moved, step in zip(each, steps, strict=True)]).T
-
-    @property
-    def turned(self) -> "Problem":
-        """The problem of a measurement with its sign turned."""
-        return replace(self, data=replace(self.data, values=-self.data.values))
 
     @property
     def rough(self) -> "Problem":
@@ -111,10 +100,8 @@ class Solution:
     residual : (n, s) float, weighted
     slopes : (n s, k) float, derivatives of the residual
     starts : of the search, the best first
-    turned : of the measurement with its sign turned, if that makes a difference and no linear
-        factor may be negative
+    may_be_turned : bool, whether the measurement with its sign turned fits as well
     converged : bool
-    runs : int, of the model: predictions that differ by more than a delay or a linear factor
     """
 
     problem: Problem
@@ -122,9 +109,8 @@ class Solution:
     residual: Floats
     slopes: Floats
     starts: tuple[Start, ...]
-    turned: Start | None
+    may_be_turned: bool
     converged: bool
-    runs: int
 
     @property
     def cost(self) -> float:
@@ -150,28 +136,10 @@ class Solution:
         best = self.starts[0].cost
         return sum(start.cost - best <= SAME_COST * self.scale for start in self.starts)
 
-    @property
-    def may_be_turned(self) -> bool:
-        """Whether the measurement with its sign turned fits as well, at a lesser delay or better;
-        or a linear factor is negative.
-        """
-        parameters, best = self.problem.parameters, self.starts[0]
-        values, other = (parameters.values(u) for u in (self.u, (self.turned or best).ended))
-        if self.turned is None:
-            return any(values.get(key, 1.0) < 0 for key in self.problem.linear)
-        scale = best.cost / max(self.problem.rough.data.values.size - len(self.u), 1)
-        more = self.turned.cost - best.cost
-        nearer = abs(other.get(DELAY, 0.0)) < abs(values.get(DELAY, 0.0))
-        return more < AS_GOOD * scale and (nearer or more < 0)
-
 
 def solve(problem: Problem, starts: int, seed: int, progress: Progress) -> Solution:
-    """Best of so many starts, which a Latin hypercube of that seed spreads between the limits.
-
-    Raises
-    ------
-    ValueError
-        If there are fewer data than parameters, or no start.
+    """Best of so many starts, which a Latin hypercube of that seed spreads between the limits;
+    raises a ValueError if there are fewer data than parameters, or no start.
     """
     k = len(problem.parameters.free)
     if starts < 1:
@@ -181,72 +149,34 @@ def solve(problem: Problem, starts: int, seed: int, progress: Progress) -> Solut
             f"{problem.data.values.size} values cannot determine {k} parameters; measure more, or "
             "vary fewer keys"
         )
-    problem, seen = _counted(problem)
-    rough, hypercube = problem.rough, qmc.LatinHypercube(k, rng=seed)
+    hypercube = qmc.LatinHypercube(k, rng=seed)
     points = [hypercube.random(CANDIDATES) for _ in range(starts)]
-    found = sorted(search(rough, points, progress), key=lambda start: start.cost)
-    turned = _turned(rough, found[0], points[0], progress)
+    found = sorted(search(problem.rough, points, progress), key=lambda start: start.cost)
     progress("fit to all data", 0.0)
-    best = _polished(problem, found[0].ended)
+    best = refine(problem, found[0].ended, tolerance=FINE)
     progress("derivatives", 0.0)
     return Solution(
         problem=problem, u=best.ended,
         residual=problem.residual(best.ended).reshape(problem.data.values.shape),
-        slopes=problem.slopes(best.ended), starts=tuple(found), turned=turned,
-        converged=best.converged, runs=len(seen),
+        slopes=problem.slopes(best.ended), starts=tuple(found),
+        may_be_turned=_may_be_turned(problem.rough, found[0], points[0]), converged=best.converged,
     )  # fmt: skip
 
 
-def _counted(problem: Problem) -> tuple[Problem, set[tuple[tuple[str, float], ...]]]:
-    """The problem, and a set that grows with each prediction that is not of one run of the model
-    with another delay or linear factor.
+def _may_be_turned(problem: Problem, best: Start, candidates: Floats) -> bool:
+    """Whether a linear factor is negative or, if none may be, the measurement with its sign turned
+    fits better, or as well at a lesser delay.
     """
-    seen: set[tuple[tuple[str, float], ...]] = set()
-    free_of_cost = {DELAY, *problem.linear}
-
-    def counting(data: Data) -> Data:
-        predict: Callable[..., Floats] = data.predict
-
-        def counted(values: Mapping[str, float]) -> Floats:
-            seen.add(tuple((key, x) for key, x in values.items() if key not in free_of_cost))
-            return predict(values)
-
-        rough = counting(data.rough) if data.rough else None
-        return replace(data, predict=counted, rough=rough)
-
-    return replace(problem, data=counting(problem.data)), seen
-
-
-def _polished(problem: Problem, u: Floats) -> Start:
-    """Local solution from a point next to it: Gauss-Newton steps with the slopes there, a run of
-    the model each; by `refine` if they do not get closer.
-    """
-    slopes = problem.slopes(u)
-    inverse = np.linalg.pinv(slopes, rcond=1e-7)
-    ended, cost = u, np.inf
-    for _ in range(POLISHED):
-        residual = problem.residual(ended)
-        if not (residual**2).sum() <= cost * (1 + ROUND_OFF):
-            break
-        cost = float((residual**2).sum())
-        move = inverse @ residual
-        if np.linalg.norm(slopes @ move) <= CLOSE * np.sqrt(cost / residual.size):
-            return Start(begun=u, ended=ended, cost=cost, converged=True)
-        ended = np.clip(ended - move, 0, 1)
-    return refine(problem, u, tolerance=ROUND_OFF)
-
-
-def _turned(problem: Problem, best: Start, candidates: Floats, progress: Progress) -> Start | None:
-    """Solution for the measurement with its sign turned, if no linear factor may turn it: where the
-    best one is close, next to it.
-    """
-    linear = (each for each in problem.parameters.free if each.key in problem.linear)
-    if not problem.data.has_sign or any(each.low < 0 for each in linear):
-        return None
-    power = float((problem.data.weighted(problem.data.values) ** 2).sum())
-    if best.cost <= CLOSE_FIT * power:
-        return refine(problem.turned, best_placed(problem.turned, best.ended[None]))
-    return search(problem.turned, [candidates], progress)[0]
+    data, parameters = problem.data, problem.parameters
+    linear = [each for each in parameters.free if each.key in problem.linear]
+    values = parameters.values(best.ended)
+    if not data.has_sign or any(each.low < 0 for each in linear):
+        return any(values[each.key] < 0 for each in linear)
+    turned = replace(problem, data=replace(data, values=-data.values))
+    other = refine(turned, best_placed(turned, np.vstack([candidates, best.ended])))
+    more, scale = other.cost - best.cost, best.cost / max(data.values.size - len(best.ended), 1)
+    late = abs(parameters.values(other.ended).get(DELAY, 0.0))
+    return more < AS_GOOD * scale and (late < abs(values.get(DELAY, 0.0)) or more < 0)
 
 
 def search(problem: Problem, starts: Sequence[Floats], progress: Progress) -> list[Start]:
@@ -277,9 +207,8 @@ def descended(problem: Problem, found: Start) -> Start:
 
 def _lower(problem: Problem, found: Start) -> Start | None:
     """A lower minimum that begins at one of a scan, if there is any."""
-    free_of_cost = (DELAY, *problem.linear)
     for k, key in enumerate(problem.parameters.keys):
-        if key in free_of_cost:
+        if key in (DELAY, *problem.linear):
             continue
         for u in _minima(problem, found, k):
             tried = refine(problem, u, FEW)
@@ -310,16 +239,15 @@ def refine(
     """Local solution from a point (k,) of the unit cube, by at most so many steps, until the
     relative change of chi squared is below the tolerance.
     """
-    inside = np.clip(u, 1e-6, 1 - 1e-6)
     found = least_squares(
-        problem.residual, inside, problem.forward, bounds=(0, 1), x_scale="jac", xtol=1e-8,
-        ftol=tolerance, gtol=1e-8, max_nfev=most,
+        problem.residual, np.clip(u, 1e-6, 1 - 1e-6), problem.forward, bounds=(0, 1),
+        x_scale="jac", xtol=1e-8, ftol=tolerance, gtol=1e-8, max_nfev=most,
     )  # fmt: skip
     return Start(begun=u, ended=found.x, cost=2 * float(found.cost), converged=found.status > 0)
 
 
 def best_placed(problem: Problem, candidates: Floats) -> Floats:
-    """The best of candidates (c, k), of each the parameters that cost no run placed."""
+    """The best of candidates (c, k), each with the parameters placed that cost no run."""
     return min((_placed(problem, u) for u in candidates), key=lambda trial: trial[0])[1]
 
 
@@ -336,9 +264,8 @@ def _placed(problem: Problem, u: Floats) -> tuple[float, Floats]:
 
 def _delays(problem: Problem, at: int) -> list[float]:
     """Places of delays that resolve the periods of the data."""
-    delay = problem.parameters.free[at]
-    axis = problem.data.axis
-    highest = axis.max() if problem.data.unit == "Hz" else 0.1 / np.diff(axis).min()
+    delay, data = problem.parameters.free[at], problem.data
+    highest = 0.1 / np.diff(data.axis).min() if data.is_in_time else data.axis.max()
     count = int(np.ceil(DELAYS * highest * (delay.high - delay.low) / 1e3)) + 2
     return [delay.place(x) for x in np.linspace(delay.low, delay.high, min(count, MOST_DELAYS))]
 
