@@ -1,12 +1,11 @@
 """Filling of surfaces by the mesher: sizes, regions, and a mesher that is not trusted."""
 
 import json
-from dataclasses import replace
 
 import meshio
 import numpy as np
 import pytest
-from test_surfaces import BONE, OUTER, SPHERE, box, cube
+from test_surfaces import BONE, OUTER, SPHERE, cube
 
 import fem
 import meshes
@@ -14,7 +13,6 @@ from meshes import MeshError, Surface, TetMesh
 from meshes.surface.triangulation import volume
 from meshes.tetmesh import interface_facets
 from meshes.volume import tetrahedralise as tetra
-from meshes.volume.smoothing import smoothed
 from skinwave.bodies import Body
 from skinwave.bodies.build import build
 from skinwave.commands.cli import main
@@ -104,23 +102,6 @@ def test_elements_follow_the_sizes_asked_for():
     assert meshes.dihedral_angles(mesh).min() > 10
 
 
-def test_smoothing_evens_out_sizes_and_spoils_no_angle():
-    rough = meshes.block((0.02, 0.02, 0.02), 2.5e-3, order=1)
-    inner = np.ones(len(rough.points), bool)
-    inner[meshes.boundary_facets(rough.tets)] = False
-    shake = np.random.default_rng(0).uniform(-6e-4, 6e-4, rough.points.shape)
-    rough = replace(rough, points=rough.points + shake * inner[:, None])
-    even = smoothed(rough)
-    np.testing.assert_array_equal(even.points[~inner], rough.points[~inner])
-
-    def spread(mesh):
-        return meshes.corner_volumes(mesh.points, mesh.tets).std()
-
-    assert spread(even) < 0.5 * spread(rough)
-    least = [meshes.dihedral_angles(mesh).min(axis=1) for mesh in (rough, even)]
-    assert (least[1] >= np.minimum(least[0], 25) - 1e-9).all()
-
-
 def save(path, surface):
     meshio.write(path, meshio.Mesh(1e3 * surface.points, [("triangle", surface.triangles)]))
 
@@ -149,12 +130,3 @@ def test_a_body_is_meshed_with_its_bone_as_a_region_that_scenes_read(tmp_path, c
     assert "a second region 'bone'" in capsys.readouterr().err
     assert main(["mesh", out, "--inner", bone, "-o", str(tmp_path / "b.vtu")]) == 2
     assert "is a mesh already" in capsys.readouterr().err
-
-
-def test_a_bone_that_ends_in_the_cut_of_a_body_is_meshed_up_to_it():
-    bone = box((0.010, 0.006, 0.005), (0.005, 0.0, -0.004))  # up to the side at x = 10 mm
-    mesh = meshes.tetrahedralise(OUTER, 6e-3, inner={"bone": bone})
-    volumes = meshes.corner_volumes(mesh.points, mesh.tets)
-    assert volumes[mesh.region == 1].sum() == pytest.approx(volume(bone), rel=0.02)
-    inside = np.unique(mesh.tets[mesh.region == 1])
-    assert mesh.points[inside, 0].max() == pytest.approx(0.010, abs=1e-4)

@@ -20,7 +20,6 @@ from simple_model import (
 from simple_model.line_table import FREE, UNNAMED, UNRESOLVED
 from simple_model.load.line_names import SYMBOLS, line_frequency, line_name, line_names, symbols
 from simple_model.response import SETTLE, fit_lines
-from skinwave.results.run import ASSESSED
 
 TIMES = np.arange(6000) / 6000
 PLACES = [[0.0, 0.0], [0.006, 0.0], [0.012, 0.002]]
@@ -36,21 +35,6 @@ def answered(drive="linear", places=PLACES, times=TIMES, **tacton):
 
 
 # By hand, from the closed form
-
-
-def test_an_envelope_makes_side_lines():
-    """sin a sin b = [cos(a - b) - cos(a + b)] / 2: 25 Pa at f_AM +- f_e, nothing at f_AM."""
-    f_e = 7.3
-    load, response = answered(am_frequency=140, envelope_frequency=f_e)
-    table = line_table(load, response, candidates=["f_AM"])
-    assert table.frequencies == pytest.approx(
-        {"f_AM-f_e": 140 - f_e, "f_AM": 140.0, "f_AM+f_e": 140 + f_e}
-    )
-    found = {name: a[0] for name, a in table.amplitudes.items()}
-    assert found["f_AM-f_e"] == pytest.approx(25, rel=1e-6)
-    assert found["f_AM+f_e"] == pytest.approx(25, rel=1e-6)
-    assert found["f_AM"] < 1e-6
-    assert table.unnamed == ()
 
 
 def test_an_envelope_under_the_squared_law():
@@ -95,18 +79,6 @@ def test_names_say_their_frequencies():
         line_frequency(tacton, "f_x")
 
 
-def test_canonical_names():
-    load = MovingPressure(
-        tacton=Tacton(am_frequency=300, second_am_frequency=217, superposition=(0.5, 0.5),
-                      trajectory=circle(190.986)),
-    )  # fmt: skip
-    names = named_lines(load)
-    assert names["f_d-f_AM"] == pytest.approx(300 - 190.986, abs=1e-3)
-    assert names["2f_d-f_AM"] == pytest.approx(2 * 190.986 - 300, abs=1e-3)
-    assert names["f_AM-f_AM2"] == pytest.approx(83)
-    assert not {"f_AM-f_d", "f_AM2-f_AM"} & names.keys()
-
-
 def test_coinciding_lines_are_listed_once_by_the_simplest_name():
     load, response = answered("pressure_squared", am_frequency=140, trajectory=circle(70.0))
     names = named_lines(load)
@@ -116,14 +88,6 @@ def test_coinciding_lines_are_listed_once_by_the_simplest_name():
     table = line_table(load, response)
     assert "f_AM" in table.frequencies
     assert "2f_d" not in table.frequencies
-
-
-def test_lines_that_are_judged_are_listed_even_if_they_are_absent():
-    load, response = answered(am_frequency=140, trajectory=circle(190.986))
-    table = line_table(load, response, candidates=ASSESSED)
-    assert set(ASSESSED) <= table.frequencies.keys()
-    assert table.amplitudes["2f_d"].max() < 1e-6 * table.amplitudes["f_AM"].max()
-    assert "2f_d" not in named_lines(load)
 
 
 def test_a_rhythm_and_a_signal_have_side_lines():

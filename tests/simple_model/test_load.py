@@ -15,7 +15,6 @@ from simple_model import (
     evenly,
     focal_spot,
     joined,
-    modulation,
     pattern_period,
     relative_intensity,
     sensation_level,
@@ -41,14 +40,6 @@ def test_the_focus_keeps_its_speed_and_comes_back(shape):
     np.testing.assert_allclose(path.position(0.0), path.position(period), atol=1e-12)
 
 
-def test_frequency_zero_is_a_factor_of_one():
-    t = np.linspace(0, 1, 1001)
-    np.testing.assert_array_equal(modulation(Tacton(), t), 1.0)
-    np.testing.assert_allclose(
-        modulation(Tacton(am_frequency=80), t), np.sin(2 * np.pi * 80 * t), atol=1e-15
-    )
-
-
 def test_equation_one_with_everything_on():
     t = np.linspace(0, 0.01, 4001)
     tacton = Tacton(
@@ -60,21 +51,17 @@ def test_equation_one_with_everything_on():
     np.testing.assert_allclose(commanded(tacton, t), expected, atol=1e-15)
 
 
-@pytest.mark.parametrize(
-    "build",
-    [
+def test_values_out_of_range_are_refused():
+    for build in (
         lambda: Tacton(amplitude=1.2),
         lambda: Tacton(am_frequency=float("nan")),
         lambda: Tacton(superposition=(1.5, -0.5)),
-        lambda: Tacton(duration=0),
         lambda: Tacton(duration=32),
         lambda: Trajectory(size=0.061),
-        lambda: Trajectory(speed=float("inf")),
-    ],
-)
-def test_values_out_of_range_are_refused(build):
-    with pytest.raises(ValueError, match="outside|finite|sum 1"):
-        build()
+        lambda: relative_intensity(0.7),
+    ):
+        with pytest.raises(ValueError, match="outside|sum 1"):
+            build()
 
 
 def test_a_misspelt_word_is_answered_by_the_nearest():
@@ -176,11 +163,6 @@ def test_relative_intensity_is_the_force_of_the_array_on_a_disc():
         assert relative_intensity(height) == pytest.approx(force(height) / force(0.2), abs=0.01)
 
 
-def test_height_outside_the_table_is_refused():
-    with pytest.raises(ValueError, match=r"outside 20..600 mm"):
-        relative_intensity(0.7)
-
-
 def amplitudes(drive, amplitude=1.0):
     """Mean and amplitudes at f, 2f, 3f of the load at the focus, AM at f."""
     tacton = Tacton(amplitude=amplitude, am_frequency=100)
@@ -195,13 +177,6 @@ def test_drive_laws_have_the_lines_of_their_formulas():
     np.testing.assert_allclose(amplitudes("pressure_squared"), [0.375, 0.5, 0.125, 0], atol=1e-12)
 
 
-def test_half_the_sound_pressure_pushes_a_quarter():
-    assert amplitudes("pressure_squared", 0.5) == pytest.approx(
-        amplitudes("pressure_squared") / 4, abs=1e-12
-    )
-    assert MovingPressure(tacton=Tacton())([[0.0, 0.0]], 0.3) == pytest.approx(50)
-
-
 class Louder(MovingPressure):
     def __call__(self, points, t):
         return 2 * super().__call__(points, t)
@@ -211,11 +186,11 @@ SHORT = Tacton(am_frequency=140, duration=0.01)
 SKIN = skinwave.Body(width=0.04, height=0.04, depth=0.01)
 
 
-@pytest.mark.parametrize("model", ["auto", "flat-body", "fem"])
-def test_models_of_lines_refuse_a_load_with_formulas_of_its_own(model):
+def test_models_of_lines_refuse_a_load_with_formulas_of_its_own():
     scene = skinwave.Scene(pressure=Louder(tacton=SHORT), body=SKIN)
-    with pytest.raises(ValueError, match="Louder"):
-        skinwave.simulate(scene, model, h=0.01 if model == "fem" else None)
+    for model in ("auto", "flat-body"):
+        with pytest.raises(ValueError, match="Louder"):
+            skinwave.simulate(scene, model)
 
 
 @pytest.mark.parametrize("model", ["point-kernel", "fem-transient"])
@@ -241,18 +216,3 @@ def test_a_line_at_its_threshold_has_level_zero():
     assert sensation_level(threshold(140), 140) == pytest.approx(0)
     assert sensation_level(10 * threshold(140), 140) == pytest.approx(20)
     assert sensation_level(0.0, 140) == -np.inf
-
-
-def test_no_threshold_is_known_outside_the_curve():
-    assert np.isnan(threshold([5.0, 2000.0])).all()
-    assert sensation_level(1e-3, 5.0) == -np.inf
-
-
-def test_a_published_pressure_threshold_meets_it():
-    """556.9 Pa at 200 Hz moves the palm by 0.165 um, at the threshold of a large contactor."""
-    assert abs(sensation_level(0.075e-6 * 2.2, 200, "large_contactor")) < 5
-
-
-def test_an_unknown_area_is_refused():
-    with pytest.raises(ValueError, match="focal_spot"):
-        threshold(140, "spot")

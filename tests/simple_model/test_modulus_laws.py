@@ -2,12 +2,9 @@
 
 import cmath
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
-from scipy.special import j0
 
 import skinwave
 from simple_model import (
@@ -23,11 +20,8 @@ from simple_model import (
     of_law,
     tabulated,
 )
-from simple_model.layers.compliance import half_space
 from simple_model.layers.flat_body import steady_lines
 from simple_model.layers.material import PRESETS
-from simple_model.load.focus import spot_width
-from simple_model.load.spectrum import load_lines
 from skinwave.bodies.analytic import compliance
 from skinwave.models.laws import relaxing
 from skinwave.planning.simulate import compute
@@ -89,79 +83,10 @@ def test_with_the_exponent_1_they_are_kelvin_voigt_and_standard_linear_solid():
         np.testing.assert_allclose(found(COMPLEX), linear.complex_modulus(COMPLEX), rtol=1e-12)
 
 
-def test_they_are_analytic_below_the_real_axis_and_real_in_time():
-    """Cauchy-Riemann by differences, and mu(-w*) = mu(w)*."""
-    w = 2 * np.pi * np.array([20.0 - 3j, 500.0 - 100j, -80.0 - 9j])
-    for law in (ECOFLEX.law, ZENER.law):
-        along, down = ((law(w + step) - law(w - step)) / (2 * step) for step in (1e-3, 1e-3j))
-        np.testing.assert_allclose(along, down, rtol=1e-6)
-        np.testing.assert_allclose(law(-w.conj()), law(w).conj(), rtol=1e-14)
-
-
-def test_scaled_laws_have_their_moduli_or_losses_scaled():
-    w = 2 * np.pi * HERTZ
-    for solid in (ECOFLEX, ZENER):
-        rest = solid.shear_modulus
-        found = solid.scaled(modulus=2.0, loss=0.5)
-        expected = 2 * (rest + 0.5 * (solid.complex_modulus(w) - rest))
-        np.testing.assert_allclose(found.complex_modulus(w), expected, rtol=1e-12)
-    table = table_of(ZENER)
-    expected = 2 * table.complex_modulus(w)
-    found = table.scaled(modulus=2.0, loss=0.5).complex_modulus(w)
-    np.testing.assert_allclose(found, expected.real + 0.5j * expected.imag, rtol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("law", "said"),
-    [({"exponent": 1.5}, "exponent"), ({"time": -1.0}, "time"), ({"fast_modulus": 1e3}, "at rest")],
-)  # fmt: skip
-def test_constants_out_of_range_are_refused(law, said):
-    with pytest.raises(ValueError, match=said):
-        replace(ZENER.law, **law)
-
-
-# Steady waves by the law itself
-
-
-def half_space_response(mu, density, nu, r, w):
-    """g(r, w) of a Gaussian spot, by adaptive quadrature along the real axis."""
-    width = spot_width(0.2)
-    s2 = density * w**2 / mu
-    p2 = s2 * (1 - 2 * nu) / (2 - 2 * nu)
-
-    def integrand(k):
-        a, b = cmath.sqrt(k * k - p2), cmath.sqrt(k * k - s2)
-        rayleigh = 4 * k * k * a * b - (2 * k * k - s2) ** 2
-        spot = width**2 * np.exp(-((k * width) ** 2) / 2)
-        return spot * a * s2 / (mu * rayleigh) * j0(k * r) * k
-
-    near = abs(cmath.sqrt(s2))
-    ends = [0, 0.5 * near, 0.9 * near, 1.1 * near, 1.5 * near, 3 * near, 8 / width]
-    return sum(
-        quad(integrand, *each, complex_func=True, epsabs=0, epsrel=1e-10, limit=500)[0]
-        for each in pairwise(ends)
-    )
-
-
-@pytest.mark.parametrize(
-    ("of", "solid", "modulus"), [("law", ECOFLEX, ecoflex), ("table", ZENER, zener)]
-)
-def test_steady_lines_are_those_of_an_independent_quadrature(of, solid, modulus):
-    """A table at its own frequencies, which the lines of the load are."""
-    hertz = [20.0, 90.0, 140.0, 400.0]
-    material = solid if of == "law" else table_of(solid, hertz)
-    for f in (90.0, 140.0):
-        load = MovingPressure(tacton=Tacton(am_frequency=f), drive="linear")
-        lines = load_lines(load)
-        found, amplitudes = steady_lines(half_space(material), load, PROBES)
-        assert found.tolist() == lines.frequencies.tolist() == [f]
-        w = 2 * np.pi * f
-        for amplitude, (r, _) in zip(amplitudes[0], PROBES, strict=True):
-            g = half_space_response(modulus(w), solid.density, solid.poisson, r, w)
-            assert abs(amplitude / lines.coefficients[0] - g) < 1e-6 * abs(g)
-
-
-# Motion from rest by the law itself
+def test_constants_out_of_range_are_refused():
+    for law, said in (({"exponent": 1.5}, "exponent"), ({"fast_modulus": 1e3}, "at rest")):
+        with pytest.raises(ValueError, match=said):
+            replace(ZENER.law, **law)
 
 
 # Prony series
@@ -209,19 +134,7 @@ def test_a_plan_counts_the_series_in_its_error():
     )  # fmt: skip
     away = np.linalg.norm(series - steady, axis=0) / np.linalg.norm(steady, axis=0)
     assert found.error > 0.95 * away.max() > 0.01
-    said = next(row for row in found.rows if row.what == "modulus law")
-    assert said.value == rough.law.series.words
-    assert "% from the law between 5 and 1500 Hz" in said.value
-    assert (
-        skinwave.plan(own, skinwave.SolveOptions(tolerance=0.01, model="flat-body"))
-        .warnings[-1]
-        .startswith("the Prony series")
-    )
-    assert not [
-        r
-        for r in skinwave.plan(own, skinwave.SolveOptions(model="flat-body-harmonic")).rows
-        if r == said
-    ]
+    assert rough.law.series.words in {row.value for row in found.rows}
 
 
 def test_a_load_beyond_a_table_is_refused():
@@ -264,16 +177,6 @@ def test_a_law_of_no_solid_is_refused_by_every_model(law, said):
             compute(own, model)
 
 
-def test_measured_noise_of_some_per_cent_is_taken():
-    noise = np.random.default_rng(0).standard_normal((2, len(HERTZ)))
-    law = ECOFLEX.complex_modulus(2 * np.pi * HERTZ)
-    moduli = law * (1 + 0.04 * (noise[0] + 1j * noise[1]))
-    found = tabulated(density=1.0, poisson=0.4, frequencies=HERTZ, moduli=moduli)
-    assert 0.02 < found.law.series.error < 0.2
-    away = np.abs(found.law.series(2 * np.pi * HERTZ) - law) / np.abs(law)
-    assert np.sqrt(np.mean(away**2)) < 0.04  # nearer to the law than the data are
-
-
 # Scene files
 
 
@@ -300,16 +203,14 @@ def test_a_table_is_read_from_beside_the_scene(tmp_path):
         loads(BODY + 'table = "moduli.csv"\n')
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [("", "frequency_hz"), (HEADER, "0 frequencies"), (HEADER + "1,2\n", "three numbers"),
-     (HEADER + "10,0,3\n", "storage modulus"), (HEADER + "10,1e4,3\n10,1e4,4\n", "after 10 Hz"),
-     (HEADER + "-1,1e4,3\n5,1e4,3\n", "-1 Hz"), (HEADER + "0,1e4,3\n10,1e4,4\n", "at 0 Hz"),
-     (HEADER + "210,1e4,-3\n", "-3 Pa at 210 Hz")],
-)  # fmt: skip
-def test_a_file_of_moduli_of_bad_content_is_refused(text, said):
-    with pytest.raises(ValueError, match=said):
-        modulus_table(text)
+def test_a_file_of_moduli_of_bad_content_is_refused():
+    for text, said in (
+        ("", "frequency_hz"), ("1,2\n", "three numbers"), ("10,0,3\n", "storage modulus"),
+        ("10,1e4,3\n10,1e4,4\n", "after 10 Hz"), ("0,1e4,3\n10,1e4,4\n", "at 0 Hz"),
+        ("210,1e4,-3\n", "-3 Pa at 210 Hz"),
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match=said):
+            modulus_table(text and HEADER + text)
 
 
 @pytest.mark.parametrize("eta", [0.03, 2.0])
@@ -329,9 +230,8 @@ def test_a_loss_factor_is_nearly_constant_and_its_law_causal(eta):
     assert fast - slow == pytest.approx(2 / np.pi * np.trapezoid(loss, np.log(x)), rel=1e-3)
 
 
-@pytest.mark.parametrize(("exponent", "time"), [(0.05, 1e-4)])
-def test_laws_that_relax_far_below_the_band_have_a_series(exponent, time):
-    law = FractionalZener(shear_modulus=10e3, fast_modulus=1e5, exponent=exponent, time=time)
+def test_laws_that_relax_far_below_the_band_have_a_series():
+    law = FractionalZener(shear_modulus=10e3, fast_modulus=1e5, exponent=0.05, time=1e-4)
     series, w = fit_prony(law, rest=10e3), 2 * np.pi * np.geomspace(1, 2000, 501)
     assert series.error <= 0.005
     assert np.abs(series(w) / law(w) - 1).max() < 0.006

@@ -12,7 +12,6 @@ from simple_model import (
     DRIVES,
     DriveLaw,
     MovingPressure,
-    PressureMap,
     PronyTerm,
     Rhythm,
     Tacton,
@@ -88,25 +87,19 @@ GATE = DriveLaw(name="gate", pressure=lambda A, M, m: A * (np.asarray(M) > 0.3))
 BEATEN = Tacton(rhythm=Rhythm(pulses=((0.1, 0.05),), ramp=0.01))
 
 
-@pytest.mark.parametrize(
-    ("ask", "said"),
-    [
-        (lambda path: load_lines(MovingPressure(tacton=AM, drive=GATE)), "do not fall"),
-        (lambda path: DriveLaw(name="wrong", degree=2, pressure=saturating), "no polynomial"),
-        (lambda path: MovingPressure(tacton=BEATEN, drive=SATURATING), "no product"),
-        (lambda path: dumps(scene(drive=CUBIC)), "Python function"),
-        (lambda path: timed_path(lambda t: t, 0.05), "shape"),
-        (lambda path: timed_path(lambda t: np.stack([t > 0.01, 0 * t], -1), 0.05), "jumps"),
-        (lambda path: map_of(path, "0,0,1\n0,1,2\n1,0,3\n"), "grid"),
-        (lambda path: map_of(path, "0,0,1\n0,1,x\n"), "no pressure map"),
-        (lambda path: dumps(scene(replace(TWO, prony=(), law=closed_form))), "law of its own"),
-        (lambda path: compute(scene(profile=lambda x: np.ones(x.shape[:-1])), "flat-body"),
-         "flat-body"),
-    ],
-)  # fmt: skip
-def test_laws_that_cannot_be_used_are_refused(ask, said, tmp_path):
-    with pytest.raises(ValueError, match=said):
-        ask(tmp_path / "map.csv")
+def test_laws_that_cannot_be_used_are_refused(tmp_path):
+    for ask, said in (
+        (lambda: load_lines(MovingPressure(tacton=AM, drive=GATE)), "do not fall"),
+        (lambda: DriveLaw(name="wrong", degree=2, pressure=saturating), "no polynomial"),
+        (lambda: MovingPressure(tacton=BEATEN, drive=SATURATING), "no product"),
+        (lambda: dumps(scene(drive=CUBIC)), "Python function"),
+        (lambda: timed_path(lambda t: np.stack([t > 0.01, 0 * t], -1), 0.05), "jumps"),
+        (lambda: map_of(tmp_path / "map.csv", "0,0,1\n0,1,2\n1,0,3\n"), "grid"),
+        (lambda: dumps(scene(replace(TWO, prony=(), law=closed_form))), "law of its own"),
+        (lambda: compute(scene(profile=lambda x: np.ones(x.shape[:-1])), "flat-body"), "flat-body"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            ask()
 
 
 def map_of(path, rows):
@@ -154,19 +147,6 @@ def test_a_measured_map_is_the_focal_spot(tmp_path):
     spots = load.spot(offsets + [0.003, 0.001], [0.003, 0.001])
     np.testing.assert_allclose(spots, expected, atol=4e-3)
     assert load.spot([[0.05, 0.0]], [0.0, 0.0]) == 0
-
-
-def test_models_take_a_measured_map(tmp_path):
-    """The steady state of elements is that of the built-in profile that was measured."""
-    line = np.linspace(-0.03, 0.03, 121)
-    grid = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1)
-    spot = PressureMap(x=line, y=line, pressure=focal_spot(grid, profile="gaussian"))
-    still = Tacton(am_frequency=140, duration=0.03)
-    found, expected = (
-        compute(scene(tacton=still, profile=focus), "fem-harmonic", h=0.008).displacement
-        for focus in (spot, "gaussian")
-    )
-    assert np.abs(found - expected).max() < 5e-3 * np.abs(expected).max()
 
 
 def test_what_depends_on_a_function_is_not_found_in_the_cache(tmp_path):
@@ -224,14 +204,9 @@ def test_an_element_is_as_stiff_as_the_closed_form_at_each_frequency(element):
     np.testing.assert_allclose(modulus, closed_form(2 * np.pi * HERTZ[1:]), rtol=1e-6)
 
 
-@pytest.mark.parametrize("of", ["table", "function"])
-def test_a_measured_modulus_is_that_of_the_law_in_the_frequency_domain(element, of):
+def test_a_measured_modulus_is_that_of_the_law_in_the_frequency_domain(element):
     f = np.linspace(1, 1500, 3000)
-    table = tabulated(
-        density=1000.0, poisson=0.45, frequencies=f, moduli=closed_form(2 * np.pi * f)
-    )
-    function = replace(TWO, prony=(), law=closed_form)
-    own = table if of == "table" else replace(function, law=lambda w: closed_form(w + 1e-9))
+    own = tabulated(density=1000.0, poisson=0.45, frequencies=f, moduli=closed_form(2 * np.pi * f))
     np.testing.assert_allclose(answers(element, own), answers(element, TWO), rtol=2e-3)
     load, times = scene().pressure, np.arange(400) / 1e4
     found, expected = (
