@@ -36,8 +36,7 @@ FREE, UNRESOLVED, UNNAMED = "free vibration", "unresolved", "unnamed"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Unnamed:
-    """A peak of a response's spectrum that is no single line of its load: its `frequency` in Hz,
-    `amplitudes` (p,) in the unit of the response, and `kind`:
+    """A peak that is no single line of the load: `frequency` in Hz, `amplitudes` (p,), and `kind`:
 
     "free vibration"  of a body after its start: it decays, and is no line of the load
     "unresolved"      lines of the load too close to each other for so short a response
@@ -95,12 +94,14 @@ def line_table(
     nyquist = 0.5 / step(response.times)
     found = line_names(pressure, FITTED, candidates=candidates)
     same = SAME / pressure.tacton.duration
-    found = _below(_merged(found, _apart(beside or {}, found, same)), nyquist)
+    found = found.with_more(_apart(beside or {}, found, same))
+    found = found.some(found.frequencies < nyquist)
     fit = _fit(found, response)
     peaks = _peaks(response, fit)
     steady = [peak.frequency for peak in peaks if peak.kind != FREE]
     if steady:  # lines that are weak in the load may be strong in a response
-        weak = _below(line_names(pressure, FAINTEST, most=10**6), nyquist)
+        weak = line_names(pressure, FAINTEST, most=10**6)
+        weak = weak.some(weak.frequencies < nyquist)
         found = _with_weak(found, weak, steady, resolution(response))
         fit = _fit(found, response)
         peaks = _peaks(response, fit)
@@ -115,7 +116,7 @@ def resolved_lines(
     highest: float = np.inf,
     settle: float = SETTLE,
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Resolved and unresolved lines of a load, so that `lines` can be asked for the resolved ones.
+    """Resolved and unresolved lines of a load.
 
     Parameters
     ----------
@@ -128,7 +129,8 @@ def resolved_lines(
     frequencies in Hz by name, of the resolved lines and of the unresolved ones
     """
     highest = min(highest, 0.5 / step(response.times))
-    found = _below(line_names(pressure, candidates=candidates), highest)
+    found = line_names(pressure, candidates=candidates)
+    found = found.some(found.frequencies < highest)
     f, least = found.frequencies, resolution(response, settle=settle)
     known = are_resolved(response, f, settle=settle, strengths=_floored(found))
     lost = ~known & ~_near(f, f[known], least)
@@ -231,7 +233,7 @@ def _with_weak(
         near = np.flatnonzero(np.abs(weak.frequencies - f) < least)
         more += [near[np.argmax(weak.strengths[near])]] if len(near) else []
     more = [k for k in dict.fromkeys(more) if weak.names[k] not in found.names]
-    return _merged(found, _some(weak, more))
+    return found.with_more(weak.some(np.array(more, int)))
 
 
 def _apart(beside: Mapping[str, float], found: LineNames, same: float) -> LineNames:
@@ -240,22 +242,7 @@ def _apart(beside: Mapping[str, float], found: LineNames, same: float) -> LineNa
     strongest = found.strengths.max(initial=0.0) or 1.0
     strengths = np.full(len(f), strongest)
     lines = LineNames(names=tuple(beside), frequencies=f, strengths=strengths)
-    return _some(lines, np.flatnonzero(~_near(f, found.frequencies, same)).tolist())
-
-
-def _merged(found: LineNames, more: LineNames) -> LineNames:
-    """Lines of both, in ascending order."""
-    f = np.concatenate([found.frequencies, more.frequencies])
-    strengths = np.concatenate([found.strengths, more.strengths])
-    both = LineNames(names=(*found.names, *more.names), frequencies=f, strengths=strengths)
-    return _some(both, np.argsort(f, kind="stable").tolist())
-
-
-def _some(found: LineNames, chosen: list[int]) -> LineNames:
-    return LineNames(
-        names=tuple(found.names[k] for k in chosen), frequencies=found.frequencies[chosen],
-        strengths=found.strengths[chosen],
-    )  # fmt: skip
+    return lines.some(~_near(f, found.frequencies, same))
 
 
 def _table(found: LineNames, fit: _Fit, peaks: list[Unnamed], response: Response) -> LineTable:
@@ -292,10 +279,6 @@ def _mixed(response: Response, frequencies: Floats) -> list[Unnamed]:
                 amplitudes=amplitude[max(int(at) - 1, 0) : int(at) + 3].max(axis=0))
         for f, at in zip(frequencies, bins, strict=True)
     ]  # fmt: skip
-
-
-def _below(found: LineNames, highest: float) -> LineNames:
-    return _some(found, np.flatnonzero(found.frequencies < highest).tolist())
 
 
 def _near(f: Floats, others: Floats, least: float) -> Mask:

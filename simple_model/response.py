@@ -30,7 +30,6 @@ from simple_model.windows import cosines, kaiser
 
 if TYPE_CHECKING:
     import pandas as pd
-    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -49,11 +48,10 @@ UNEVEN = 1e-6  # of a sampling interval
 class Effort:
     """Cost of a response, and how it was computed.
 
-    `seconds` by phase; `dofs` solved for, at so many `steps` or lines; `peak_memory` of the process
-    in bytes; element size `h` in metre and time step `dt` in s, 0 without; SHA-256 of the `mesh`;
-    `solver`, with so many `factorisations` where these are counted; `estimate` of the relative
-    error of the reduction; `energy_imbalance`, relative error of the energy balance, and the share
-    of the losses that was `radiated` through absorbing boundaries; `versions` of the software;
+    `seconds` by phase; `dofs` solved for, at so many `steps` or lines; `peak_memory` in bytes;
+    element size `h` in metre and time step `dt` in s, 0 without; SHA-256 of the `mesh`; `solver`;
+    `estimate` of the relative error of the reduction; `energy_imbalance`, relative; the share of
+    the losses that was `radiated` through absorbing boundaries; `versions` of the software;
     `warnings`, sentences on where it falls short of the request.
     """
 
@@ -87,15 +85,13 @@ class Response:
     times : (t,) float, s, equally spaced
     probes : (p, 2) float, metre
     values : (t, p) float, in the unit of the quantity
-    quantity : name of one of `quantities.QUANTITIES`: of bodies the displacement normal to the
-        surface, positive the way a pressure pushes, unless a scene asks for another; of the point
-        kernel, which has no body, the pressure that it predicts
+    quantity : name of one of `quantities.QUANTITIES`; normal motion is positive into the body
     effort : Effort
     expected_error : float, relative to the waveforms, as estimated beforehand; nan if unknown
     load : MovingPressure whose `lines` it has; None if unknown
 
-    The arrays are copied and read-only. Shapes that do not fit, numbers that are not finite, times
-    that are not equally spaced and an unknown quantity are a ValueError.
+    The arrays are copied and read-only. Raises a ValueError if shapes do not fit, a number is not
+    finite, times are not equally spaced or the quantity is unknown.
     """
 
     model: str
@@ -129,8 +125,8 @@ class Response:
 
     @property
     def displacement(self) -> Floats:
-        """The values (t, p) of a normal displacement or, of the point kernel, of its pressure; a
-        ValueError, which is an AttributeError, too, of another quantity.
+        """The values (t, p) of a normal displacement or of the point kernel's pressure; a
+        ValueError for other quantities.
         """
         if self.record not in (DISPLACEMENT, PRESSURE):
             raise NotOfThis(f"this response is of {self.quantity}; take its `values`")
@@ -139,15 +135,14 @@ class Response:
     @property
     def velocity(self) -> Floats:
         """Velocity (t, p) in m/s into the body, of a displacement or velocity; a ValueError of
-        anything else. A displacement is differentiated as its spline of degree 9, with an error of
-        1e-8 of lines below a tenth of the sampling rate and 1e-4 below a quarter; within 20
-        samples of its ends of 1e-3 and more.
+        anything else. The error of a displacement's spline of degree 9 is 1e-8 for lines below a
+        tenth of the sampling rate, 1e-4 below a quarter, and 1e-3 within 20 samples of its ends.
         """
         return self._derivative(VELOCITY)
 
     @property
     def acceleration(self) -> Floats:
-        """Acceleration (t, p) in m/s2 into the body, likewise; of a velocity, too."""
+        """Acceleration (t, p) in m/s2 into the body, as `velocity`."""
         return self._derivative(ACCELERATION)
 
     def _derivative(self, wanted: Quantity) -> Floats:
@@ -170,9 +165,7 @@ class Response:
 
     @property
     def lines(self) -> Lines:
-        """Resolved lines of its load by name, with complex amplitudes (f, p); a ValueError, and an
-        AttributeError, too, if its load is unknown.
-        """
+        """Resolved lines of its load by name; a ValueError if the load is unknown."""
         if self.load is None:
             raise NotOfThis(
                 "the load of this response is unknown, and so are its lines; take "
@@ -207,23 +200,9 @@ class Response:
         ax.set_ylabel(f"{self.record.words}, {self.record.shown}")
         return ax
 
-    def to_xarray(self) -> xr.DataArray:
-        """The values as an array with dimensions time and probe, times in s and x, y in metre of
-        the probes as coordinates, units as attributes.
-        """
-        places = {
-            axis: ("probe", x.copy(), {"units": "m"})
-            for axis, x in zip("xyz", self.probes.T, strict=False)
-        }
-        return library("xarray").DataArray(
-            self.values.copy(), dims=("time", "probe"), name=self.quantity,
-            coords={"time": ("time", self.times.copy(), {"units": "s"}), **places},
-            attrs=self._attributes(),
-        )  # fmt: skip
-
     def to_pandas(self) -> pd.DataFrame:
-        """The values as a table, rows by time_s and columns by x_m and y_m of the probes, the unit
-        in its `attrs`.
+        """The values as a table: rows by time_s, columns by x_m and y_m of the probes, and in its
+        `attrs` unit, quantity, model, error and warnings.
         """
         pandas = library("pandas")
         names = [f"{axis}_m" for axis in "xyz"[: self.probes.shape[1]]]
@@ -232,19 +211,11 @@ class Response:
             index=pandas.Index(self.times.copy(), name="time_s"),
             columns=pandas.MultiIndex.from_arrays(self.probes.T.copy(), names=names),
         )
-        frame.attrs = self._attributes()
+        frame.attrs = {
+            "units": self.unit, "quantity": self.quantity, "model": self.model,
+            "expected_error": float(self.expected_error), "warnings": self.effort.warnings,
+        }  # fmt: skip
         return frame
-
-    def _attributes(self) -> dict[str, Any]:
-        """Quantity, unit, model, error and warnings, of types that netCDF takes."""
-        return {
-            "units": self.unit,
-            "long_name": self.record.words,
-            "quantity": self.quantity,
-            "model": self.model,
-            "expected_error": float(self.expected_error),
-            "warnings": "\n".join(self.effort.warnings),
-        }
 
     def __repr__(self) -> str:
         record, times = self.record, self.times
@@ -337,10 +308,9 @@ def lines(response: Response, frequencies: ArrayLike, *, settle: float = SETTLE)
 def phasors(response: Response, frequencies: ArrayLike, *, settle: float = SETTLE) -> Complex:
     """Phasors: complex amplitudes a of Re a exp(2 pi i f t), by weighted least squares.
 
-    All lines and the mean are fitted together under a Kaiser window, so that neither the position
-    of a line between two bins nor a line left out nor a dying transient leaks into another; a lower
-    window, as far as needed, where lines lie closer than 2.5 over the fitted time. Lines closer
-    than one over the fitted time are unresolved and share one amplitude: see `are_resolved`.
+    All lines and the mean are fitted together under a Kaiser window, so that neither lines between
+    bins, lines left out nor a dying transient leak into others. Lines closer than one over the
+    fitted time are unresolved and share one amplitude: see `are_resolved`.
 
     Parameters
     ----------
@@ -369,9 +339,8 @@ def are_resolved(
 ) -> Mask:
     """Mask of frequencies that `lines` resolves from 0 Hz and from the others.
 
-    Frequencies that differ by at most `ALIKE` of the resolution are one line and need not be
-    resolved; nor does a line from others that have, by their strengths, at most 5 % of it together.
-    Unresolved lines, which are not fitted, must not leak more than 5 % into it.
+    Frequencies that differ by at most `ALIKE` of the resolution are one line. Other lines that are
+    nearer than the resolution, and leakage of unresolved lines, may have 5 % of its strength.
 
     Parameters
     ----------
@@ -414,8 +383,8 @@ def hidden(
     *,
     settle: float = SETTLE,
 ) -> Mask:
-    """Mask (f,) of lines of which more than 5 %, or of a fiftieth of the strongest if that is more,
-    are likely to be side lobes of those that are not fitted, whose amplitudes are `rest` (f,).
+    """Mask (f,) of lines of which more than 5 % (or 5 % of `FAINT` of the strongest) may be side
+    lobes of lines that are not fitted, of amplitudes `rest` (f,).
     """
     least = resolution(response, settle=settle)
     distinct, _ = _distinct(frequencies[fitted], least)
@@ -485,8 +454,7 @@ def _weighted_waves(
 
 def _waves(frequencies: Floats, times: Floats) -> Floats:
     """1, cosines and sines (2 f - 1, t) of frequencies (f,) in Hz, the first of which is 0, at
-    equally spaced times (t,) in s: turns over many steps times turns over few, for products take a
-    tenth of the time of sines.
+    equally spaced times (t,) in s: turns over many steps times turns over few, which is faster.
     """
     few, dt = int(np.ceil(np.sqrt(len(times)))), step(times)
     turn = 2j * np.pi * frequencies[1:, None]

@@ -2,14 +2,12 @@
 
 Every line of a load lies at |n f_d + p f_AM + q f_AM2 + r f_e + u f_s + v f_r|, whole multiples of
 the path's drawing frequency, of the three sinusoids, and of one over the periods of a signal and a
-rhythm. The strength of each line follows from products of Fourier coefficients: a drive law is a
-polynomial of the modulation, whose degree p, q and r do not exceed, or taken as one that fits it,
-and a factor of the level.
+rhythm. Strengths follow from products of Fourier coefficients, with the drive law as a polynomial
+of the modulation and a factor of the level.
 
-Names are the sums themselves, such as "2f_AM", "f_d+f_AM-f_e", without the bars. In one with f_d
-this comes first and positive: "2f_d-f_AM" is |2 f_d - f_AM|. In others the positive terms come
-first and the whole is positive: "f_AM2-f_AM". Lines that coincide have the name of the least sum of
-orders, sinusoids before the path: "f_AM" where f_AM = 2 f_d.
+Names are the sums without the bars, such as "2f_AM" or "f_d+f_AM-f_e". f_d comes first and is
+positive: "2f_d-f_AM" is |2 f_d - f_AM|; without f_d the whole is positive: "f_AM2-f_AM". Lines that
+coincide have the name of the least sum of orders, sinusoids before the path.
 """
 
 import re
@@ -18,7 +16,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from simple_model.load.path_cells import is_cut_short, unsampled
 from simple_model.load.pressure import MovingPressure
@@ -48,13 +46,28 @@ DEGREES = (4, 8, 16, 32)  # of polynomials that are fitted to a drive law that i
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LineNames:
-    """Names (f,), frequencies (f,) in Hz > 0, ascending, no two the same, and largest amplitudes on
-    the path (f,) in Pa, 0 of candidates that are not in the load.
+    """Names (f,), distinct ascending frequencies (f,) in Hz > 0, and largest amplitudes on the path
+    (f,) in Pa, 0 of candidates that are not in the load.
     """
 
     names: tuple[str, ...]
     frequencies: Floats
     strengths: Floats
+
+    def some(self, chosen: ArrayLike) -> "LineNames":
+        """The lines of a mask or of indices."""
+        which = np.arange(len(self.names))[np.asarray(chosen)]
+        return LineNames(
+            names=tuple(self.names[k] for k in which), frequencies=self.frequencies[which],
+            strengths=self.strengths[which],
+        )  # fmt: skip
+
+    def with_more(self, more: "LineNames") -> "LineNames":
+        """These lines and more, in ascending order."""
+        f = np.concatenate([self.frequencies, more.frequencies])
+        strengths = np.concatenate([self.strengths, more.strengths])
+        both = LineNames(names=(*self.names, *more.names), frequencies=f, strengths=strengths)
+        return both.some(np.argsort(f, kind="stable"))
 
 
 def named_lines(
