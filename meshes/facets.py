@@ -22,14 +22,14 @@ def geometry(mesh: TetMesh, facets: Ints) -> tuple[Floats, Floats]:
 def tag_boundary(
     mesh: TetMesh, *, rest: str | None = None, **parts: Predicate | np.ndarray
 ) -> TetMesh:
-    """Return the mesh with its boundary as the facet set `surface`, and parts of it by name.
+    """The mesh with its boundary as the facet set `surface`, and parts of it by name.
 
     Parameters
     ----------
     mesh : TetMesh
-    rest : name of the facets that are in no part, if wanted.
-    parts : name -> a function of centroids (k, 3) and outward normals (k, 3) that tells which of
-        the boundary facets belong to it, or an array (k,) that does. Parts may overlap.
+    rest : name of the facets that are in no part, if wanted
+    parts : name -> a function of centroids (k, 3) and outward normals (k, 3) to a mask (k,) of
+        boundary facets, or the mask. Parts may overlap.
 
     Returns
     -------
@@ -48,9 +48,8 @@ def tag_boundary(
 
 
 def seen_from_above(mesh: TetMesh) -> np.ndarray:
-    """Mask (k,) of the boundary facets that face upwards and have nothing of the body above them.
-
-    In the order of `boundary_facets`; each facet is tested at its centroid.
+    """Mask (k,) of the boundary facets, in the order of `boundary_facets`, that face upwards and
+    have nothing of the body above their centroid.
     """
     from scipy.spatial import cKDTree
 

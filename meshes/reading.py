@@ -24,12 +24,8 @@ PathLike = str | os.PathLike[str]
 
 @contextmanager
 def opened(path: PathLike, limit: float = np.inf) -> Iterator[BinaryIO]:
-    """Open a regular file of at most `limit` bytes for reading.
-
-    Raises
-    ------
-    ValueError
-        If it cannot be opened, is a pipe, a device or a folder, or is larger.
+    """Open a regular file of at most `limit` bytes for reading; a ValueError if it cannot be
+    opened, is a pipe, a device or a folder, or is larger.
     """
     try:  # a pipe without a writer would be waited for
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | _BINARY)
@@ -66,12 +62,8 @@ def text(path: PathLike, limit: int = LARGEST_TEXT) -> str:
 
 
 def exported_text(path: PathLike, limit: int = LARGEST_TEXT) -> str:
-    """Return the text of a file as programs export it: UTF-8, UTF-16, or Windows' Latin-1.
-
-    Raises
-    ------
-    ValueError
-        If it is no text, or as `opened` does.
+    """Return the text of a file as programs export it: UTF-8, UTF-16, or Windows' Latin-1; raises a
+    ValueError if it is no text, or as `opened` does.
     """
     found = content(path, limit)
     encodings = ["utf-8-sig", "cp1252", "latin-1"]
@@ -91,12 +83,8 @@ def exported_text(path: PathLike, limit: int = LARGEST_TEXT) -> str:
 
 
 def arrays(path: PathLike) -> dict[str, NDArray[Any]]:
-    """Return the arrays of an .npz file, by name.
-
-    Raises
-    ------
-    ValueError
-        If it is none, or unpacks to more than `UNPACKED` bytes and `GROWTH` times its size.
+    """Return the arrays of an .npz file, by name; a ValueError if it is none, or unpacks to more
+    than `UNPACKED` bytes and `GROWTH` times its size.
     """
     with opened(path) as file:
         try:
@@ -117,13 +105,7 @@ def arrays(path: PathLike) -> dict[str, NDArray[Any]]:
 
 
 def parsed(path: PathLike) -> Any:
-    """Return the parsed content of a JSON file.
-
-    Raises
-    ------
-    ValueError
-        If it is no JSON.
-    """
+    """Return the parsed content of a JSON file; a ValueError if it is no JSON."""
     found = text(path)
     try:
         return json.loads(found)

@@ -45,19 +45,18 @@ class TetMesh:
     Parameters
     ----------
     points : (n, 3) float, metre
-    tets : (m, 4) or (m, 10) int, node numbers in VTK order. Tetrahedra with negative
-        volume are turned round; how many is logged.
-    region : (m,) int, number of the material of each tetrahedron; all 0 if not given.
-    region_names : region number -> name, of those that have one.
-    facets : name -> (k, 3) or (k, 6) int, boundary facets seen from outside.
+    tets : (m, 4) or (m, 10) int, node numbers in VTK order; negative volumes are turned round
+    region : (m,) int, number of the material of each tetrahedron; all 0 if not given
+    region_names : region number -> name, of those that have one
+    facets : name -> (k, 3) or (k, 6) int, boundary facets seen from outside
     unmoved : (n, 3) float, metre, of a mesh whose nodes were moved: the points before, by whose
-        edges elements are grouped; the points themselves if not given.
+        edges elements are grouped
 
     Raises
     ------
     MeshError
-        If shapes or node numbers do not fit, a point is not finite or further than
-        `FURTHEST` away, or a tetrahedron is flat.
+        If shapes or node numbers do not fit, a point is not finite or further than `FURTHEST` away,
+        or a tetrahedron is flat.
     """
 
     points: Floats
@@ -109,8 +108,8 @@ class TetMesh:
         return 3 * len(self.points)
 
     def to_pyvista(self) -> pv.UnstructuredGrid:
-        """The mesh as a grid of pyvista, in metre: linear or quadratic tetrahedra, `region` as cell
-        data, and each facet set that is not empty as field data, such as "facets:top".
+        """The mesh as a grid of pyvista, in metre: `region` as cell data, and each facet set that
+        is not empty as field data, such as "facets:top".
         """
         import pyvista as pv
 
@@ -123,30 +122,6 @@ class TetMesh:
             if len(facets):  # no array of VTK is empty
                 grid.field_data[VTK_SETS + name] = facets.copy()
         return grid
-
-    @classmethod
-    def from_pyvista(cls, grid: pv.UnstructuredGrid) -> TetMesh:
-        """The mesh of a grid of tetrahedra of 4 nodes, or of 10, in metre.
-
-        Raises
-        ------
-        MeshError
-            If it has other cells, or no element can be built on them.
-        """
-        cells = {int(kind): nodes for kind, nodes in grid.cells_dict.items()}
-        if len(cells) != 1 or not cells.keys() <= set(VTK_KINDS.values()):
-            raise MeshError(
-                f"the grid has cells of VTK types {sorted(cells)}; give tetrahedra of 4 nodes (10) "
-                "or of 10 (24)"
-            )
-        (tets,) = cells.values()
-        sets = [name for name in grid.field_data if name.startswith(VTK_SETS)]
-        return cls(
-            points=np.array(grid.points),
-            tets=tets,
-            region=np.array(grid.cell_data.get("region", [])),
-            facets={name.removeprefix(VTK_SETS): np.array(grid.field_data[name]) for name in sets},
-        )
 
 
 def corner_volumes(points: Floats, tets: Ints) -> Floats:
@@ -182,12 +157,8 @@ def interface_facets(mesh: TetMesh) -> Ints:
 
 
 def facet_set(mesh: TetMesh, facets: str | Ints) -> Ints:
-    """Facets (k, 3 or 6) of a named set, or the given ones.
-
-    Raises
-    ------
-    MeshError
-        If the mesh has no set of that name, or the given ones are no facets of its kind.
+    """Facets (k, 3 or 6) of a named set, or the given ones; a MeshError if there is no such set, or
+    the given ones do not fit.
     """
     if not isinstance(facets, str):
         return _facets("given", facets, mesh.points, mesh.tets)
@@ -222,12 +193,8 @@ def quadratic(mesh: TetMesh) -> TetMesh:
 
 
 def half(mesh: TetMesh, axis: str) -> TetMesh:
-    """The part of a mesh where x (or y, z) is positive; its cut is the facet set `mirror_x`.
-
-    Raises
-    ------
-    MeshError
-        If the axis is unknown, tetrahedra cross the plane, or none lies beyond it.
+    """The part of a mesh where x (or y, z) is positive; its cut is the facet set `mirror_x`. A
+    MeshError if tetrahedra cross the plane, or none lies beyond it.
     """
     if axis not in ("x", "y", "z"):
         raise MeshError(f"axis '{axis}' is unknown; use x, y or z")

@@ -48,7 +48,7 @@ def place_name(place: Floats) -> str:
 
 def curves(ax: "Axes", x: Floats, values: Floats, places: Floats, **style: Any) -> None:
     """Draw a curve of values (k, p) along x (k,) for each probe, at places (p, 2) in metre, from
-    dark to bright, with a style of matplotlib's lines and a legend of at most `NAMED` of them.
+    dark to bright, with a legend of at most `NAMED` of them.
     """
     import matplotlib as mpl
 
@@ -93,9 +93,7 @@ def table(rows: Iterable[Sequence[str]], header: Sequence[str] = ()) -> str:
 
 
 def page(title: str, image: bytes, tables: Iterable[str], warnings: Iterable[str] = ()) -> str:
-    """Small page in HTML of a record: a figure in PNG, if there is one, tables in HTML, and
-    warnings in sentences.
-    """
+    """Small page in HTML of a record: a figure in PNG, if any, tables in HTML, and warnings."""
     shown = b64encode(image).decode()
     figure = f'<img alt="{escape(title)}" src="data:image/png;base64,{shown}">' if image else ""
     said = "".join(f"<li>{escape(sentence)}</li>" for sentence in warnings)

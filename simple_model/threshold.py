@@ -49,11 +49,10 @@ def threshold(frequency: ArrayLike, area: str = "focal_spot") -> Floats:
 
 def pressure_threshold(frequency: ArrayLike) -> Floats:
     """Detection threshold (...) in Pa of a vibrating component of the pressure at a focus on skin,
-    at frequencies (...) in Hz.
+    at frequencies (...) in Hz; not a number below 10 and above 1000 Hz.
 
-    `PRESSURE` was measured with AM at 200 Hz, whose component there is half of it: 2.2 Pa. At other
+    `PRESSURE` was measured with AM at 200 Hz, whose component there is half of it. At other
     frequencies it follows the displacement threshold, as if compliance did not depend on them.
-    Not a number below 10 and above 1000 Hz.
     """
     return np.asarray(PRESSURE / 2 * threshold(frequency) / threshold(TESTED))
 

@@ -45,11 +45,6 @@ class _Part:
 def read_abaqus(path: Path) -> Any:
     """All instances of the parts in a file, or what it holds outside of parts: a meshio.Mesh whose
     `info` has `notes`, and `names` of regions, which are element sets or parts.
-
-    Raises
-    ------
-    MeshError
-        If a line cannot be read, or a keyword generates nodes or elements.
     """
     loose = current = _Part("")
     parts: dict[str, _Part] = {}
@@ -215,10 +210,9 @@ def _solid_nodes(kind: str) -> int:
 
 
 def _regions(part: _Part, names: dict[str, int], notes: list[str]) -> dict[int, int]:
-    """The number of the region of each element, from 1; `names` has those of all parts.
-
-    Regions are the sets of sections; else sets of *ELSET, or of lines of *ELEMENT, that have each
-    element once; else those of lines of *ELEMENT, or the part.
+    """The number of the region of each element, from 1; `names` has those of all parts. Regions are
+    the sets of sections; else sets of *ELSET, or of lines of *ELEMENT, that have each element once;
+    else those of lines of *ELEMENT, or the part.
     """
     known = {title: of for title, of in part.sets.items() if title and of}
     apart = [title for title in known if title not in part.blocks]
@@ -242,8 +236,8 @@ def _is_partition(part: _Part, sets: dict[str, set[int]], titles: list[str]) -> 
 
 
 def _moved(path: Path, points: Floats, rows: Rows) -> Floats:
-    """Points after the translation and the rotation of an instance: a vector, then two points of
-    an axis and an angle in degrees.
+    """Points after the translation and the rotation of an instance: a vector, then two points of an
+    axis and an angle in degrees.
     """
     from scipy.spatial.transform import Rotation
 

@@ -55,13 +55,9 @@ class Contents:
 
 
 def contents(path: Path, raw: Any) -> Contents:
-    """The contents of a mesh as meshio has it, whose `info` has `notes` and `names` of regions.
-
-    Raises
-    ------
-    MeshError
-        If it holds neither solid elements nor triangles, some of a kind that is not read, or nodes
-        that it does not have.
+    """The contents of a mesh as meshio has it, whose `info` has `notes` and `names` of regions; a
+    MeshError if it holds neither solid elements nor triangles, some of a kind that is not read, or
+    nodes that it does not have.
     """
     held: dict[str, int] = {}
     for block in raw.cells:
@@ -164,9 +160,8 @@ def _split(path: Path, points: Floats, nodes: Ints, kind: str) -> tuple[Ints, In
     """Tetrahedra (m, 4) of solid cells, and the cell (m,) of each.
 
     They join the lowest of a cell's node numbers with the triangles of the faces that do not have
-    it, each of which is split from its own lowest. So neighbours split a common face alike:
-    Dompierre et al, How to subdivide pyramids, prisms and hexahedra into tetrahedra, 8th
-    International Meshing Roundtable (1999). Cells with tetrahedra that are inside out are refused.
+    it, each split from its own lowest, so that neighbours split a common face alike (Dompierre et
+    al, 8th International Meshing Roundtable (1999)). Warped cells are refused.
     """
     least, tets, cells = nodes.min(axis=1), [], []
     for face in SPLIT[kind]:
@@ -204,8 +199,8 @@ def _values(raw: Any, name: str, kind: str) -> np.ndarray:
 
 
 def _regions(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
-    """Region (e,) of each element: an array called so, physical groups, or element sets; and the
-    names of those that have one.
+    """Region (e,) of each element: an array called so, physical groups, or element sets; and their
+    names.
     """
     for name in NUMBERED:
         if name in raw.cell_data:
@@ -254,14 +249,8 @@ def _element_sets(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
 
 def _facet_sets(raw: Any, new: Ints, tets: Ints, notes: list[str]) -> dict[str, Ints]:
     """Facets (k, 3) or (k, 6) of sets by name, of arrays `facets:<name>` or physical groups, seen
-    from outside. Plane cells that are no faces of tetrahedra are left out.
-
-    Parameters
-    ----------
-    raw : mesh as meshio reads it
-    new : (n,) number of each of its nodes among those of the tetrahedra, or -1
-    tets : (m, 4) or (m, 10)
-    notes : gets a sentence if some are left out
+    from outside; `new` (n,) are the numbers of nodes among those of the tetrahedra (m, 4 or 10), or
+    -1. Plane cells that are no faces of tetrahedra are left out, and noted.
     """
     titles = {name.removeprefix(FACETS): name for name in raw.cell_data if name.startswith(FACETS)}
     groups = {title: tag for title, (tag, d) in raw.field_data.items() if d == 2}
@@ -286,9 +275,8 @@ def _facet_sets(raw: Any, new: Ints, tets: Ints, notes: list[str]) -> dict[str, 
 
 
 def _faces_of(nodes: Ints, corners: int, tets: Ints, width: int) -> tuple[Ints, np.ndarray, Ints]:
-    """Plane cells as faces (k, width) of tetrahedra, whether they are some, and the cell of each.
-
-    One that a tetrahedron of the boundary has the other way round is exchanged.
+    """Plane cells as faces (k, width) of tetrahedra, seen from outside, whether they are some, and
+    the cell of each.
     """
     triangles, cell = _fan(nodes, corners)
     n = int(tets.max()) + 1
@@ -304,8 +292,8 @@ def _faces_of(nodes: Ints, corners: int, tets: Ints, width: int) -> tuple[Ints, 
 
 
 def _node_order(path: Path, points: Floats, tets: Ints) -> list[int]:
-    """The column of ten-node tetrahedra (e, 10) for each of the ten nodes, in VTK's order; mid-side
-    nodes are identified by their positions.
+    """The column of ten-node tetrahedra (e, 10) for each of the ten nodes, in VTK's order, by the
+    positions of mid-side nodes.
     """
     nodes = points[tets]
     middles = nodes[:, EDGES].mean(axis=2)

@@ -23,11 +23,8 @@ UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 25.4e-3}
 def read_contents(path: str | os.PathLike[str]) -> Contents:
     """Everything in a file that a body can be made of, by its suffix.
 
-    Raises
-    ------
-    MeshError
-        If the file does not exist, is of an unknown kind or damaged, or holds neither triangles nor
-        solid elements, or solid elements that cannot be split into tetrahedra.
+    Raises a MeshError if the file does not exist, is of an unknown kind or damaged, or holds
+    neither triangles nor solid elements that can be split into tetrahedra.
     """
     path = Path(path)
     if path.suffix.lower() not in FORMATS:
@@ -43,13 +40,7 @@ def read_contents(path: str | os.PathLike[str]) -> Contents:
 
 
 def scale_of(unit: str) -> float:
-    """Size in metre of a unit, by its name.
-
-    Raises
-    ------
-    MeshError
-        If it is unknown.
-    """
+    """Size in metre of a unit, by its name; a MeshError if it is unknown."""
     if unit not in UNITS:
         raise MeshError(f"unit '{unit}' is unknown; use one of {', '.join(UNITS)}")
     return UNITS[unit]
@@ -59,19 +50,20 @@ def read(path: str | os.PathLike[str], *, unit: str = "m") -> TetMesh:
     """The tetrahedra of a mesh file, with regions and facet sets.
 
     Regions are the cell array `region` or `material`, medit's references, physical groups, the
-    element sets of Abaqus's sections, or blocks. Groups and sets have names, and so has a region
-    whose elements have 1 in a cell array `region:<name>`. Hexahedra, prisms and pyramids are split
-    into tetrahedra, coinciding nodes are merged, and elements that are listed twice are taken once;
-    `body_from_file` says so.
+    element sets of Abaqus's sections, or blocks. Hexahedra, prisms and pyramids are split into
+    tetrahedra, coinciding nodes are merged, and elements that are listed twice are taken once.
 
     Parameters
     ----------
-    unit : of the coordinates in the file: m, cm, mm, um or in.
+    path : file of one of `FORMATS`
+    unit : of the coordinates in the file: m, cm, mm, um or in
 
-    Raises
-    ------
-    MeshError
-        If the file cannot be read, holds no solid elements, or numbers nodes in an unknown order.
+    Returns
+    -------
+    TetMesh
+
+    Raises a MeshError if the file cannot be read, holds no solid elements, or numbers nodes in an
+    unknown order.
     """
     scale, found = scale_of(unit), read_contents(path)
     if not len(found.tets):

@@ -53,29 +53,25 @@ def body_from_file(
     Parameters
     ----------
     path : file of a surface or mesh, of one of `FORMATS`
-    h : float, metre, edge length aimed at in the middle of the palm.
-    unit : of the coordinates in the file: m, cm, mm, um or in.
-    up : axis of the file that points to the device: +x, -x, ... -z.
-    inner : files of closed surfaces inside that of a surface file, in its frame and unit, such as
-        those of bones, each of which becomes a region by the name of its file
-    clip : least and greatest x, least and greatest y, metre from the middle of the palm.
-    keep_largest : keep only the largest of several separate pieces.
-    cap : close holes of a surface whose edges lie in a plane, such as an open wrist.
-    timeout : float, second, of the mesher.
-    say : gets a sentence on each thing that was found or done.
-    progress : gets the phase, and 0.
+    h : float, metre, edge length aimed at in the middle of the palm
+    unit : of the coordinates in the file: m, cm, mm, um or in
+    up : axis of the file that points to the device: +x, -x, ... -z
+    inner : files of closed surfaces inside it, such as bones, each of which becomes a region by the
+        name of its file
+    clip : least and greatest x, least and greatest y, metre from the middle of the palm
+    keep_largest : keep only the largest of several separate pieces
+    cap : close holes of a surface whose edges lie in a plane, such as an open wrist
+    timeout : float, second, of the mesher
+    say, progress : get a sentence on each thing that was found or done; the phase, and 0
 
     Returns
     -------
     TetMesh with the facet sets `surface`, `top` (seen from above), `cut` (the planes of the clip)
-    and `bottom`, the rest; a mesh that has one of these names keeps its own. Its regions are those
-    of a mesh, or `tissue` and one for each inner surface
+        and `bottom`, or those of the file; and its regions, or `tissue` and one for each inner
+        surface
 
-    Raises
-    ------
-    MeshError
-        If the file cannot be read, is of a size that no hand has, what is wrong with it cannot be
-        repaired, or the mesher takes longer.
+    Raises a MeshError if the file cannot be read or repaired, is of a size that no hand has, or the
+    mesher fails.
     """
     progress(f"reading {Path(path).name}", 0.0)
     scale, found = scale_of(unit), read_contents(path)

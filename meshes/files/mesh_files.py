@@ -22,14 +22,8 @@ WRITTEN = {".vtu": "vtu", ".msh": "gmsh22"}  # version 4.1 of meshio is refused 
 
 
 def write(path: str | os.PathLike[str], mesh: TetMesh) -> None:
-    """Write a mesh with its regions and facet sets to `.vtu`, or `.msh` 2.2 for gmsh.
-
-    It is written aside and renamed, so that no half of it can be found.
-
-    Raises
-    ------
-    MeshError
-        If the kind of file is unknown.
+    """Write a mesh with its regions and facet sets to `.vtu`, or `.msh` 2.2 for gmsh, aside and
+    renamed; a MeshError if the kind of file is unknown.
     """
     import meshio
 
@@ -62,7 +56,7 @@ def write(path: str | os.PathLike[str], mesh: TetMesh) -> None:
 
 
 def _vtu_tags(mesh: TetMesh, names: list[str]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Cell arrays by block: regions, 1 for the elements of each that has a name, and 1 for the
+    """Cell arrays by block: regions, 1 for the elements of each region with a name, and 1 for the
     facets of each set; no groups.
     """
     sizes = [len(mesh.facets[name]) for name in names]

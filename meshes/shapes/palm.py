@@ -30,17 +30,14 @@ class Palm:
 
     Parameters
     ----------
-    breadth, length : across the four fingers (x) and from wrist to finger roots (y).
-    thickness : at its middle, from the palm to the back of the hand.
-    cup_depth : how far the middles of the sides, bent up, lie above the middle of the palm.
-    thenar_height, hypothenar_height : of the mounds at the thumb and opposite, above the palm.
-    pad_height : of the four pads below the fingers.
-    corner_radius, edge_radius : of the outline seen from above, and of its cross-section.
+    breadth, length : across the four fingers (x) and from wrist to finger roots (y)
+    thickness : at its middle, from the palm to the back of the hand
+    cup_depth : how far the middles of the sides, bent up, lie above the middle of the palm
+    thenar_height, hypothenar_height : of the mounds at the thumb and opposite, above the palm
+    pad_height : of the four pads below the fingers
+    corner_radius, edge_radius : of the outline seen from above, and of its cross-section
 
-    Raises
-    ------
-    MeshError
-        If a length is not finite, a size is not above 0, or a radius does not fit.
+    Raises a MeshError if a value is out of range, or a radius does not fit.
     """
 
     breadth: float = 0.085

@@ -41,14 +41,11 @@ class Grading:
 
     Parameters
     ----------
-    radius : float, metre, half width of the square of fine cells.
-    growth : float, ratio of one cell to its neighbour outside the square and downwards.
-    coarsest : float, metre, largest cell.
+    radius : float, metre, half width of the square of fine cells
+    growth : float, ratio of one cell to its neighbour outside the square and downwards
+    coarsest : float, metre, largest cell
 
-    Raises
-    ------
-    MeshError
-        If a value is not a number or out of range.
+    Raises a MeshError if a value is out of range.
     """
 
     radius: float
@@ -125,14 +122,8 @@ def block(
 
 
 def middle_plane(mesh: TetMesh) -> Ints:
-    """Triangles (k, 6) half way through an extruded sheet, one below each facet of its top.
-
-    Ten-node tetrahedra have mid-side nodes there, below each node of the top.
-
-    Raises
-    ------
-    MeshError
-        If there are no such nodes.
+    """Triangles (k, 6) half way through an extruded sheet of ten-node tetrahedra, one below each
+    facet of its top; a MeshError if there are no such nodes.
     """
     top = facet_set(mesh, "top")
     low, high = mesh.points[:, 2].min(), mesh.points[:, 2].max()
@@ -148,7 +139,8 @@ def middle_plane(mesh: TetMesh) -> Ints:
 
 def disc(diameter: float, thickness: float, h: float, planes: Iterable[float] = ()) -> TetMesh:
     """Ten-node tetrahedra of a cylinder below the plane z = 0, about the z axis: a prism on a
-    polygon of 8 sides for each ring of elements.
+    polygon of 8 sides for each ring of elements. It has the facet sets `top`, `bottom`, `sides` and
+    `surface`.
 
     Parameters
     ----------
@@ -156,14 +148,7 @@ def disc(diameter: float, thickness: float, h: float, planes: Iterable[float] = 
     h : float, metre, largest edge along a radius and downwards
     planes : depths in metre that elements do not cross
 
-    Returns
-    -------
-    TetMesh with the facet sets `top`, `bottom`, `sides` and `surface`
-
-    Raises
-    ------
-    MeshError
-        If a length is not above 0, or there would be too many elements.
+    Raises a MeshError if a length is not above 0, or there would be too many elements.
     """
     for name, length in (("diameter", diameter), ("thickness", thickness), ("h", h)):
         if not 0 < length < np.inf:
@@ -200,20 +185,8 @@ def _rings(rings: int) -> tuple[Floats, Ints]:
 
 
 def graded_axis(length: float, h: float, grading: Grading) -> Floats:
-    """Graded grid lines from 0: cells of equal size up to the radius, then growing.
-
-    Parameters
-    ----------
-    length, h, grading : in metre the end, and the size of the first cells
-
-    Returns
-    -------
-    (n,) float, metre
-
-    Raises
-    ------
-    MeshError
-        If a length is not above 0, or there would be too many cells.
+    """Graded grid lines (n,) in metre from 0 to `length`: cells of size h up to the radius, then
+    growing. A MeshError if a length is not above 0, or there would be too many cells.
     """
     _check_lengths(length, h)
     fine = min(grading.radius, length)
@@ -244,10 +217,8 @@ def with_planes(line: Floats, planes: Iterable[float]) -> Floats:
 
 
 def extrude(x: ArrayLike, y: ArrayLike, z: ArrayLike, *, order: int = 2) -> TetMesh:
-    """Tetrahedra on grid lines.
-
-    Diagonals alternate between cells, so that a grid with an even number of cells and mirrored
-    lines has the mirror symmetries of the rectangle.
+    """Tetrahedra on grid lines, with diagonals that alternate between cells, so that a grid with an
+    even number of cells and mirrored lines has the mirror symmetries of the rectangle.
 
     Parameters
     ----------
@@ -257,12 +228,10 @@ def extrude(x: ArrayLike, y: ArrayLike, z: ArrayLike, *, order: int = 2) -> TetM
     Returns
     -------
     TetMesh with the facet sets `top`, `bottom`, `sides` and the four sides `left` (least x),
-    `right`, `front` (least y) and `back`
+        `right`, `front` (least y) and `back`
 
-    Raises
-    ------
-    MeshError
-        If grid lines do not increase, the order is not 1 or 2, or there are too many cells.
+    Raises a MeshError if grid lines do not increase, the order is unknown, or there are too many
+    cells.
     """
     lines = [np.asarray(line, np.float64) for line in (x, y, z)]
     for name, line in zip("xyz", lines, strict=True):
@@ -350,7 +319,7 @@ def _sides(points: Floats, facets: Ints) -> dict[str, Ints]:
 
 
 def _with_roles(mesh: TetMesh, **roles: str) -> TetMesh:
-    """The mesh with some of its facet sets known by what is done to them, too."""
+    """The mesh with some of its facet sets under further names."""
     named = {role: mesh.facets[name] for role, name in roles.items()}
     return replace(mesh, facets={**mesh.facets, **named})
 
@@ -363,13 +332,7 @@ def _even(length: float, h: float, *, least: int = 2) -> Floats:
 
 
 def check_size(cells: Iterable[float], order: int = 2) -> None:
-    """Refuse so many cells along three axes before anything is made of them.
-
-    Raises
-    ------
-    MeshError
-        If they have more than `MOST_UNKNOWNS`.
-    """
+    """Refuse so many cells along three axes if they have more than `MOST_UNKNOWNS`."""
     unknowns = 3.0 * prod(order * n + 1 for n in cells)
     if not unknowns <= MOST_UNKNOWNS:
         raise MeshError(

@@ -23,13 +23,7 @@ OUTLINE_CELLS = 200  # along the longer side of the raster in which the outline 
 
 
 def turns(up: str) -> Floats:
-    """The turn (3, 3) that takes an axis (+x, -x, ... -z) to +z.
-
-    Raises
-    ------
-    MeshError
-        If there is no such axis.
-    """
+    """The turn (3, 3) that takes an axis (+x, -x, ... -z) to +z; a MeshError if there is none."""
     if up not in TURNS:
         raise MeshError(f"up = '{up}' is no axis; use one of {', '.join(TURNS)}")
     return np.array(TURNS[up], np.float64)
@@ -41,10 +35,9 @@ def turned(surface: Surface, up: str) -> Surface:
 
 
 def aligned(surface: Surface) -> tuple[Surface, Floats]:
-    """The surface moved so that its palm's middle is the origin, and by how much (3,), metre.
-
-    The middle is that of the widest circle within the outline seen from above: in a hand, the
-    palm. The highest point of the surface there comes to z = 0.
+    """The surface moved so that its palm's middle is the origin, and by how much (3,), metre. The
+    middle is that of the widest circle within the outline seen from above; the top there comes to z
+    = 0.
     """
     x, y, _ = widest_place(surface)
     shift = -np.array([x, y, height_at(surface, x, y)])
@@ -52,10 +45,9 @@ def aligned(surface: Surface) -> tuple[Surface, Floats]:
 
 
 def off_origin(surface: Surface) -> Floats:
-    """By how much (3,), metre, a surface has to move for its top to be at the origin.
-
-    It stays where it is if the origin is on its top, at least 3 mm inside its outline, or half the
-    radius of the widest circle within it. Otherwise it moves as `aligned` does.
+    """By how much (3,), metre, a surface has to move for its top to be at the origin: not, if the
+    origin is on its top, at least 3 mm inside its outline, or half the radius of the widest circle
+    within it; otherwise as `aligned` moves it.
     """
     x, y, radius = widest_place(surface)
     low, cell, depth = _outline(surface)
@@ -102,21 +94,7 @@ def _outline(surface: Surface) -> tuple[Floats, float, Floats]:
 
 
 def height_at(surface: Surface, x: float, y: float) -> float:
-    """Greatest z in metre of the surface above a point of the plane.
-
-    Parameters
-    ----------
-    surface, x, y : the surface, and the point in metre
-
-    Returns
-    -------
-    float, metre
-
-    Raises
-    ------
-    MeshError
-        If there is no surface there.
-    """
+    """Greatest z in metre of the surface above a point of the plane, or a MeshError."""
     highest = heights_over(surface.points[surface.triangles], np.array([x, y])).max()
     if highest == -np.inf:
         place = f"({1e3 * x:.4g}, {1e3 * y:.4g}) mm"
@@ -125,18 +103,10 @@ def height_at(surface: Surface, x: float, y: float) -> float:
 
 
 def clipped(surface: Surface, box: Sequence[float]) -> tuple[Surface, list[str]]:
-    """The closed part of a closed surface within a box, and sentences on what was cut.
-
-    Of several pieces the one with the origin below its top is returned.
-
-    Parameters
-    ----------
-    box : least and greatest x, least and greatest y, metre.
-
-    Raises
-    ------
-    MeshError
-        If the box is empty or does not contain the origin, or the cut cannot be closed.
+    """The closed part of a closed surface within a box, and sentences on what was cut; of several
+    pieces the one with the origin below its top. `box` is the least and greatest x, least and
+    greatest y, metre. A MeshError if the box does not contain the origin, or the cut cannot be
+    closed.
     """
     left, right, front, back = box
     if not (left < 0 < right and front < 0 < back):
@@ -156,8 +126,8 @@ def clipped(surface: Surface, box: Sequence[float]) -> tuple[Surface, list[str]]
 
 
 def cut_to(surface: Surface, box: Sequence[float]) -> tuple[Surface | None, int]:
-    """Closed part of a closed surface within a box (metre, as for `clipped`), all of its pieces,
-    and how many sides of the box cut it; None if nothing is inside.
+    """Closed part of a closed surface within a box (metre, as for `clipped`), and how many sides of
+    the box cut it; None if nothing is inside.
     """
     import pyvista
 

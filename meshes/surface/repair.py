@@ -25,12 +25,8 @@ SAME_POINT = 1e-6  # of the diagonal: points nearer than this are one
 
 
 def check(surface: Surface) -> None:
-    """Check that a surface is one closed manifold, seen from outside, without self-intersection.
-
-    Raises
-    ------
-    MeshError
-        If it is not: how many edges, points or triangles are wrong, and where.
+    """Check that a surface is one closed manifold, seen from outside, without self-intersection; a
+    MeshError says how many edges, points or triangles are wrong, and where.
     """
     check_manifold(surface)
     if (n := n_pieces(surface)) > 1:
@@ -48,7 +44,7 @@ def check(surface: Surface) -> None:
 
 def check_manifold(surface: Surface) -> None:
     """Check that two triangles meet at each edge and look the same way, and that those around each
-    point are one fan; raises what `check` does.
+    point are one fan.
     """
     pairs = _paired_edges(surface)
     against = pairs[_starts(surface)[pairs[:, 0]] == _starts(surface)[pairs[:, 1]]]
@@ -61,7 +57,7 @@ def check_manifold(surface: Surface) -> None:
 
 
 def check_crossings(surface: Surface) -> None:
-    """Check that no triangles cross or overlap; raises what `check` does."""
+    """Check that no triangles cross or overlap."""
     crossing = self_intersections(surface)
     if len(crossing):
         raise MeshError(
@@ -76,25 +72,21 @@ def repaired(
 ) -> tuple[Surface, list[str]]:
     """Repair seams, doubles and wrong orientation of a surface.
 
-    Points that coincide become one, triangles without area for want of three corners and second
-    copies of triangles go, neighbours are made to look the same way and outwards. Other repairs
-    are made on request only.
+    Points that coincide become one, triangles without three corners and second copies of triangles
+    go, neighbours are made to look the same way and outwards.
 
     Parameters
     ----------
     points, triangles : (n, 3) float, metre, and (k, 3) int
-    keep_largest : keep only the piece with the largest area.
-    cap : close holes whose edges lie in a plane, such as an open wrist.
+    keep_largest : keep only the piece with the largest area
+    cap : close holes whose edges lie in a plane, such as an open wrist
 
     Returns
     -------
     Surface, and sentences on what was done
 
-    Raises
-    ------
-    MeshError
-        If it is open, has edges of more than two triangles, or has only one side; or a hole to be
-        capped is not in a plane.
+    Raises a MeshError if it is open, has edges of more than two triangles, or has only one side; or
+    a hole to be capped is not in a plane.
     """
     raw, said = Surface(points=points, triangles=triangles), []  # type: ignore[arg-type]
     number = first_of_same(raw.points)

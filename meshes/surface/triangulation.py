@@ -19,10 +19,8 @@ class Surface:
     points : (n, 3) float, metre
     triangles : (k, 3) int, point numbers from 0
 
-    Raises
-    ------
-    MeshError
-        If shapes or point numbers do not fit, there is no triangle, or a point is not finite.
+    Raises a MeshError if shapes or point numbers do not fit, there is no triangle, or a point is
+    not finite.
     """
 
     points: Floats

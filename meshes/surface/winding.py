@@ -13,10 +13,9 @@ CHUNK = 2_000_000  # pairs of points and triangles at once
 
 
 def winding_number(surface: Surface, points: Floats) -> Floats:
-    """Winding number (n,) of a closed surface about points (n, 3): 1 inside, 0 outside.
-
-    Solid angles of its triangles (van Oosterom and Strackee, IEEE Trans Biomed Eng 30:125 (1983))
-    over 4 pi, as Jacobson, Kavan and Sorkine-Hornung, ACM Trans Graph 32:33 (2013) add them up.
+    """Winding number (n,) of a closed surface about points (n, 3), 1 inside, 0 outside: solid
+    angles of its triangles (van Oosterom and Strackee, IEEE Trans Biomed Eng 30:125 (1983)) over 4
+    pi.
     """
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     near = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
@@ -48,13 +47,7 @@ def joined(surfaces: list[Surface]) -> Surface:
 
 
 def check_inside(outer: Surface, inner: Mapping[str, Surface]) -> None:
-    """Check that closed surfaces are inside another, and that none cross.
-
-    Raises
-    ------
-    MeshError
-        If one is not closed, not inside, or crosses the outer or another.
-    """
+    """Refuse surfaces that are not closed, not inside another, or cross it or each other."""
     for name, surface in inner.items():
         try:
             check(surface)

@@ -30,25 +30,20 @@ Function = Callable[[Floats], Floats]
 def curve_boundary(
     mesh: TetMesh, level_set: Function, gradient: Function, facets: Ints | None = None
 ) -> TetMesh:
-    """Mesh with the nodes of boundary facets moved onto a level set.
-
-    Corners move first, with the middles of the edges between them, then mid-side nodes. Where
-    an element would lose more than 70 % of its Jacobian somewhere, or its volume, its nodes stay.
+    """Mesh with the nodes of boundary facets moved onto a level set: corners first, then mid-side
+    nodes. Where an element would lose more than 70 % of its Jacobian, or of its volume, nodes stay.
 
     Parameters
     ----------
     mesh : TetMesh of ten-node tetrahedra
-    level_set, gradient : functions of points (n, 3) in metre: values (n,), slopes (n, 3).
-    facets : (k, 6) int, the boundary facets that lie on it; all of the boundary if not given.
+    level_set, gradient : functions of points (n, 3) in metre: values (n,), slopes (n, 3)
+    facets : (k, 6) int, the boundary facets that lie on it; all if not given
 
     Returns
     -------
     TetMesh
 
-    Raises
-    ------
-    MeshError
-        If the elements have four nodes.
+    Raises a MeshError if the elements have four nodes.
     """
     if mesh.order != 2:
         raise MeshError("elements of 4 nodes have no curved edges; make them `meshes.quadratic`")
@@ -109,15 +104,8 @@ def _keep_volumes(mesh: TetMesh, points: Floats, corners: Ints) -> Floats:
 
 
 def keep_jacobians(tets: Ints, straight: Floats, points: Floats) -> tuple[Floats, int]:
-    """Curved edges go back where an element would be distorted.
-
-    Parameters
-    ----------
-    tets, straight, points : (e, 10) int, and nodes (n, 3) of straight and curved elements in metre
-
-    Returns
-    -------
-    points (n, 3), and how many of them went back
+    """Curved points (n, 3), those of straight elements (e, 10) where they would be distorted, and
+    how many went back.
     """
     went_back = 0
     while True:

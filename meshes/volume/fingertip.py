@@ -31,13 +31,9 @@ class Fingertip:
     ----------
     breadth, length, thickness : float, metre, along x, y and z
     bone_breadth, bone_thickness : float, metre
-    cover : float, metre, of soft tissue between the pad and the bone
-    tip : float, metre, of soft tissue between the tip and the bone
+    cover, tip : float, metre, of soft tissue between the pad, or the tip, and the bone
 
-    Raises
-    ------
-    MeshError
-        If a length is not finite and above 0, or the bone is not within the tissue.
+    Raises a MeshError if a length is not finite and above 0, or the bone is not within the tissue.
     """
 
     breadth: float
@@ -98,12 +94,9 @@ def fingertip_mesh(shape: Fingertip, h: float) -> TetMesh:
     Returns
     -------
     TetMesh with the regions `tissue` (0) and `bone` (1) and the facet sets `top`, which looks
-    upwards, `sides`, where it is cut, and `bottom`, the rest
+        upwards, `sides`, where it is cut, and `bottom`, the rest
 
-    Raises
-    ------
-    MeshError
-        If h is not above 0, or there would be too many elements.
+    Raises a MeshError if h is not above 0, or there would be too many elements.
     """
     if not 0 < h < np.inf:
         raise MeshError(f"h = {h} m must be finite and above 0")
@@ -147,8 +140,8 @@ def _tagged(shape: Fingertip, mesh: TetMesh) -> TetMesh:
 
 
 def _lattice_of(shells: int, layers: int) -> tuple[Floats, Ints]:
-    """Points (n, 3) and tetrahedra (e, 4) of half a ball of so many shells, y >= 0, and below it,
-    y < 0, of a cylinder of so many layers on its section.
+    """Points (n, 3) and tetrahedra (e, 4) of half a ball of so many shells, y >= 0, and of a
+    cylinder of so many layers, y < 0.
     """
     eighth = _simplex(shells)
     signs = np.array(list(product((-1, 1), (1,), (-1, 1))))
@@ -162,8 +155,8 @@ def _lattice_of(shells: int, layers: int) -> tuple[Floats, Ints]:
 
 
 def _simplex(n: int) -> Ints:
-    """Corners (n^3, 4, 3) of the tetrahedra that x, y, z >= 0, x + y + z <= n is cut into: where
-    a <= b <= c, cubes along their diagonals, of a = x, b = x + y and c = x + y + z.
+    """Corners (n^3, 4, 3) of the tetrahedra of x, y, z >= 0, x + y + z <= n: where a <= b <= c,
+    cubes along their diagonals, of a = x, b = x + y and c = x + y + z.
     """
     cubes = np.array(list(product(range(n), repeat=3)))
     steps = np.cumsum(
@@ -188,8 +181,8 @@ def _shell_of(lattice: Floats) -> Floats:
 
 
 def _placed(shape: Fingertip, lattice: Floats, ends: tuple[int, int], layers: int) -> Floats:
-    """Points (n, 3) in metre of a fingertip where those of the lattice, or between them, are; with
-    the shells that are the surfaces of bone and tissue, and the layers of the cylinder.
+    """Points (n, 3) in metre of a fingertip where those of the lattice are; `ends` are the shells
+    of the surfaces of bone and tissue.
     """
     shell = _shell_of(lattice)[:, None]
     shares = (lattice * [1, 0, 1] + np.maximum(lattice, 0) * [0, 1, 0]) / np.maximum(shell, 1e-300)

@@ -41,13 +41,10 @@ def mapped_palm(palm: Palm, x: Floats, y: Floats, z: Floats) -> TetMesh:
 
     Returns
     -------
-    TetMesh with the facet sets `surface` (all of it), `top` (what the device sees), `wrist` and
-    `fingers` (the ends, which look along the hand) and `back`, the rest
+    TetMesh with the facet sets `surface`, `top` (what the device sees), `wrist` and `fingers` (the
+        ends) and `back`, the rest
 
-    Raises
-    ------
-    MeshError
-        If there are too many cells, or a relief that is too steep for them.
+    Raises a MeshError if there are too many cells, or a relief is too steep for them.
     """
     cells = (len(x) - 1, len(y) - 1, len(z) - 1)
     tets = kuhn_tets(cells)
@@ -73,12 +70,10 @@ def mapped_palm(palm: Palm, x: Floats, y: Floats, z: Floats) -> TetMesh:
 
 
 def kuhn_tets(cells: tuple[int, int, int]) -> Ints:
-    """Tetrahedra (6 n, 4), with positive volume, of a grid of so many cells along three axes, whose
-    nodes are numbered with the last axis fastest.
-
-    The diagonals of the boxes run outwards from the middle of the grid (Kuhn, or Freudenthal,
-    triangulation of each octant), so that no tetrahedron has two facets on its boundary: a smooth
-    surface may be wrapped around edges and corners without a flat element.
+    """Tetrahedra (6 n, 4), with positive volume, of a grid of so many cells, whose nodes are
+    numbered with the last axis fastest. The diagonals of the boxes run outwards from the middle of
+    the grid (Kuhn triangulation of each octant), so that no tetrahedron has two facets on its
+    boundary.
     """
     check_size(cells)
     places = np.stack(np.meshgrid(*map(np.arange, cells), indexing="ij"), axis=-1).reshape(-1, 3)
@@ -139,9 +134,7 @@ def _rounded(
 
 
 def _onto_level_set(palm: Palm, grid: Floats) -> Floats:
-    """Grid (i, j, k, 3) with the nodes of its boundary on the level set, and the others after
-    them.
-    """
+    """Grid (i, j, k, 3) with the nodes of its boundary on the level set; the others follow."""
     outer = _on_boundary(tuple(n - 1 for n in grid.shape[:3]))
     moved = np.zeros_like(grid)
     # Along the normals of the mounds nodes would gather in the dips between them.
@@ -156,18 +149,7 @@ def without_mounds(palm: Palm) -> Palm:
 
 
 def along_normals(palm: Palm, points: Floats, normals: Floats) -> Floats:
-    """Points moved onto the surface of a palm.
-
-    Parameters
-    ----------
-    palm : Palm
-    points : (n, 3) float, metre, near its surface
-    normals : (n, 3) float, unit vectors out of it, along which they move
-
-    Returns
-    -------
-    (n, 3) float, metre
-    """
+    """Points (n, 3) near the surface of a palm moved onto it along unit vectors (n, 3)."""
     for _ in range(STEPS):
         steepness = np.einsum("ni,ni->n", gradient(palm, points), normals)
         points = (
@@ -183,9 +165,7 @@ def _on_boundary(cells: tuple[int, ...]) -> NDArray[np.bool_]:
 
 
 def _transfinite(values: Floats) -> Floats:
-    """Transfinite interpolation of values (i, j, k, ...) from the six sides of a grid: the Boolean
-    sum of the linear interpolations along each axis.
-    """
+    """Transfinite interpolation of values (i, j, k, ...) from the six sides of a grid."""
     total = np.zeros_like(values)
     for count in (1, 2, 3):
         for axes in combinations(range(3), count):

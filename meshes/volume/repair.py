@@ -23,21 +23,8 @@ from meshes.tetmesh import (
 def one_body(
     mesh: TetMesh, *, keep_largest: bool = False, say: Callable[[str], None] = print
 ) -> TetMesh:
-    """Check that tetrahedra are one body, and that no two of them fill the same space.
-
-    Parameters
-    ----------
-    mesh, keep_largest, say : to keep only the largest of several bodies, and say so
-
-    Returns
-    -------
-    TetMesh
-
-    Raises
-    ------
-    MeshError
-        If tetrahedra overlap, they are several bodies, or their boundary is not closed, touches
-        itself at single edges or points, or crosses itself.
+    """The mesh, or the largest of its bodies on request; a MeshError if tetrahedra overlap, they
+    are several bodies, or their boundary is not closed, touches or crosses itself.
     """
     _check_overlaps(mesh)
     body, volumes = _bodies(mesh)
@@ -73,9 +60,7 @@ def _check_overlaps(mesh: TetMesh) -> None:
 
 
 def _bodies(mesh: TetMesh) -> tuple[Ints, np.ndarray]:
-    """The body (m,) of each tetrahedron, which it shares with its neighbours, and the volume of
-    each in cubic metre.
-    """
+    """The body (m,) of each tetrahedron, and the volume of each body in cubic metre."""
     from scipy import sparse
 
     beyond, m = neighbours(mesh.tets), len(mesh.tets)

@@ -23,17 +23,9 @@ GOOD = 25.0  # degrees: smaller angles may not shrink, larger ones not below it
 
 
 def smoothed(mesh: TetMesh, sizing: Sizing | None = None) -> TetMesh:
-    """Smoothed four-node mesh: its inner nodes moved so that no least angle below 25 degrees gets
-    less, and those that there are get larger where one node's move can do it.
-
-    Parameters
-    ----------
-    mesh : TetMesh of four-node tetrahedra; nodes of its boundary and between its regions stay
-    sizing : function of points (n, 3) in metre to edge lengths (n,) asked for; None if equal.
-
-    Returns
-    -------
-    TetMesh
+    """Smoothed four-node mesh: its inner nodes are moved so that no least angle below 25 degrees
+    gets less; nodes of its boundary and between its regions stay. `sizing` is a function of points
+    (n, 3) in metre to edge lengths (n,) asked for; None if equal.
     """
     points, tets = np.array(mesh.points), mesh.tets
     outer = np.zeros(len(points), bool)

@@ -39,10 +39,7 @@ def stretched_palm(mesh: TetMesh, thinnest: Palm, thickest: Palm) -> Callable[[f
     -------
     Function of a thickness in metre, within the range, that returns a TetMesh with its nodes moved
 
-    Raises
-    ------
-    MeshError
-        If the nodes do not follow the palm's surface, or elements get too flat.
+    Raises a MeshError if the nodes do not follow the palm's surface, or elements get too flat.
     """
     from scipy.interpolate import BarycentricInterpolator  # which takes long to import
 
@@ -74,7 +71,7 @@ def _check(mesh: TetMesh, palm: Palm, on: Ints) -> None:
 
 
 def _on_surface(mesh: TetMesh, palm: Palm) -> Ints:
-    """Nodes (k,) of the boundary that lie on a palm's surface; others of it have straight edges."""
+    """Nodes (k,) of the boundary that lie on a palm's surface."""
     outer = np.unique(boundary_facets(mesh.tets))
     return outer[np.abs(level_set(palm, mesh.points[outer])) < LIES_ON * palm.thickness]
 

@@ -55,26 +55,22 @@ def tetrahedralise(
     Parameters
     ----------
     surface : Surface
-    h : float, metre, edge length that is aimed at.
+    h : float, metre, edge length that is aimed at
     inner : name of a region and the closed surface around it, inside the other one or cut off with
-        it at one plane, as `check_inside` has it before
+        it at one plane
     sizing : function of points (n, 3) in metre to edge lengths (n,) in metre that are aimed at;
-        `graded` makes one. None for h everywhere.
-    timeout : float, second, after which the mesher is stopped.
+        None for h everywhere
+    timeout : float, second, after which the mesher is stopped
     epsilon : float, metre, how far the mesh may lie from the surface; a twentieth of h if not
         given. Where a surface curves, elements get as small as it needs: less is slower.
 
     Returns
     -------
     TetMesh with its facets in the set `surface`, and with inner surfaces its regions: 0 outside of
-    them, the others from 1, with their names
+        them, the others from 1, with their names
 
-    Raises
-    ------
-    MeshError
-        If the surface is not closed, crosses itself or is not sound otherwise; h, a size or
-        epsilon is out of range; the mesher fails or takes longer than `timeout`, or what it returns
-        is not what was asked for.
+    Raises a MeshError if the surface is not sound; h, a size or epsilon is out of range; or the
+    mesher fails, takes too long, or returns a bad mesh.
     """
     check(surface)
     check_size(surface, "h", h)
@@ -106,10 +102,7 @@ def tetrahedralise(
 
 
 def graded(h: float, grading: Grading) -> Sizing:
-    """Edge lengths: h within the grading's radius of the origin, growing beyond, up to `coarsest`.
-
-    A growth of g from cell to cell is a slope of ln g of the size along the way.
-    """
+    """Edge lengths: h within the grading's radius of the origin, growing up to `coarsest`."""
     slope = float(np.log(grading.growth))
 
     def sizes(points: Floats) -> Floats:
@@ -136,17 +129,7 @@ def _checked_epsilon(surface: Surface, h: float, epsilon: float | None) -> float
 
 
 def check_size(surface: Surface, name: str, length: float) -> None:
-    """Refuse a length in metre that is longer than the body, or shorter than a thousandth of it.
-
-    Parameters
-    ----------
-    surface, name, length : the body, and the length with its name in the message
-
-    Raises
-    ------
-    MeshError
-        If it is so.
-    """
+    """Refuse a length in metre that is longer than the body, or shorter than a thousandth of it."""
     longest = float(np.ptp(surface.points, axis=0).max())
     if not 1e-3 * longest <= length <= longest:
         raise MeshError(
@@ -215,9 +198,8 @@ def mesh_by_tetwild(inputs: Mapping[str, np.ndarray]) -> tuple[Floats, np.ndarra
 
 
 def _with_regions(mesh: TetMesh, inner: Mapping[str, Surface]) -> TetMesh:
-    """Mesh with a region for each inner surface, from 1, and 0 for the rest.
-
-    A tetrahedron is in the smallest surface whose winding number about its middle is above 1/2.
+    """Mesh with a region for each inner surface, from 1, and 0 for the rest: a tetrahedron is in
+    the smallest surface whose winding number about its middle is above 1/2.
     """
     if not inner:
         return mesh

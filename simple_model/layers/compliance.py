@@ -18,11 +18,8 @@ from simple_model.typing import Complex
 
 @dataclass(frozen=True)
 class Compliance:
-    """Compliance G: (k, w) -> displacement into the body per pressure, m/Pa; k (k,) in 1/m, w
-    (f, 1) in rad/s.
-
-    At frequencies w (f,) no pole (wave) lies between the real axis of k and `clearance`, 1/m,
-    above it.
+    """Compliance G: (k, w) -> displacement into the body per pressure, m/Pa; k (k,) in 1/m, w (f,
+    1) in rad/s. At frequencies w (f,) no pole lies between the real axis of k and `clearance`, 1/m.
     """
 
     answer: Callable[[Complex, Complex], Complex]
@@ -49,10 +46,9 @@ def slab(material: Material, depth: float) -> Compliance:
 
 
 def half_space(material: Material, *, poisson: float | None = None) -> Compliance:
-    """Half-space: G = -b_p k_s^2 / (mu R), R = (2 k^2 - k_s^2)^2 - 4 k^2 b_p b_s, where k_s^2 is
-    divided out of both, so that it holds at rest, too; kappa = k_p^2 / k_s^2.
-
-    `poisson` stands in for the material's: here it may be 0.5, incompressible.
+    """Half-space: G = -b_p k_s^2 / (mu R), R = (2 k^2 - k_s^2)^2 - 4 k^2 b_p b_s, with k_s^2
+    divided out, so that it holds at rest; kappa = k_p^2 / k_s^2. `poisson` replaces the material's
+    and may be 0.5.
     """
     nu = material.poisson if poisson is None else poisson
     kappa = (0.5 - nu) / (1 - nu)
@@ -75,11 +71,8 @@ def thin_sheet(
     tension: float = 0.0,
 ) -> Compliance:
     """Infinite thin sheet of a thickness d in metre under a tension T in N/m, with air of a density
-    in kg/m3 (0 for vacuum) on both sides: G = 1 / [D* k^4 + T k^2 - (m + 2 rho_air/k) w^2],
-    m = rho d, D* = mu* d^3 / 6 (1 - nu).
-
-    The deflection of an infinite sheet under a static load has no bound: motion is given about a
-    mean that is left out, G = 0 at w = 0.
+    in kg/m3 on both sides: G = 1 / [D* k^4 + T k^2 - (m + 2 rho_air/k) w^2], m = rho d, D* = mu*
+    d^3 / 6 (1 - nu). Its static deflection has no bound: G = 0 at w = 0.
     """
     mass_per_area = material.density * thickness
 
@@ -91,10 +84,6 @@ def thin_sheet(
         return np.where(w == 0, 0, 1 / (bending(w) * k**4 + tension * k**2 - inertia))
 
     def clearance(w: Complex) -> float:
-        """Height above the real axis of the evanescent pole: D* k^5 + T k^3 - m w^2 k
-        - 2 rho_air w^2 = 0 in the first quadrant, at 90 degrees for a real w, but without tension
-        at 45 in vacuum and 36 in air for a w that is purely imaginary.
-        """
         companion = np.zeros((len(w), 5, 5), np.complex128)
         companion[:, range(1, 5), range(4)] = 1
         companion[:, 0, 1] = -tension / bending(w)

@@ -59,9 +59,7 @@ class Mode:
 
     @property
     def group_speed(self) -> Floats:
-        """Group speed 1 / Re dk/dw (f,) in m/s; NaN where the imaginary part of dk/dw is larger:
-        a packet changes its shape there before it moves on.
-        """
+        """Group speed 1 / Re dk/dw (f,) in m/s; NaN where the imaginary part of dk/dw is larger."""
         real, imaginary = self.slowness.real, self.slowness.imag
         return np.where(np.abs(imaginary) > np.abs(real), np.nan, 1 / real)
 
@@ -78,8 +76,8 @@ class Mode:
 
     @cached_property
     def cut_on(self) -> float:
-        """Lowest frequency in Hz at which it carries energy: where k^2 crosses the imaginary axis,
-        by its cubic Hermite interpolant between the frequencies on either side; inf if nowhere.
+        """Lowest frequency in Hz at which it carries energy, where k^2 crosses the imaginary axis;
+        inf if nowhere.
         """
         if not self.is_wave.any():
             return np.inf
@@ -96,8 +94,8 @@ class Mode:
         return float(np.interp(0.0, squared[k : k + 2], fine[k : k + 2]))
 
     def squared_at(self, frequencies: ArrayLike) -> Complex:
-        """Squared wavenumber (g,) in 1/m2 between the frequencies, in Hz, by cubic Hermite
-        interpolation: unlike k it is smooth at a cut-off.
+        """Squared wavenumber (g,) in 1/m2 at frequencies in Hz, by cubic Hermite interpolation:
+        unlike k it is smooth at a cut-off.
         """
         f = np.asarray(frequencies, np.float64)
         known = np.isfinite(self.wavenumbers)
@@ -115,8 +113,7 @@ class Mode:
 
     def amplitude(self, width: float, distance: float) -> Complex:
         """Motion (f,) of the surface in m/Pa by this mode, at a distance in metre from the middle
-        of a Gaussian spot of standard deviation `width`: its part of
-        `wavenumber_integral.point_response` beyond the spot.
+        of a Gaussian spot of standard deviation `width`.
         """
         # A backward wave goes outwards by its energy, and so is of the Hankel function at its k.
         k = self.wavenumbers
@@ -127,9 +124,7 @@ class Mode:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DispersionCurves:
-    """Modes of a body at frequencies (f,) in Hz, those first that carry energy at the lowest; their
-    shapes are at `depths` (d,) in metre below the surface.
-    """
+    """Modes of a body at frequencies (f,) in Hz; their shapes are at `depths` (d,) in metre."""
 
     frequencies: Floats
     depths: Floats
@@ -141,9 +136,9 @@ def dispersion_curves(
 ) -> DispersionCurves:
     """Dispersion curves of a stack of layers.
 
-    Finite stacks by the thin-layer method; of layers on a half-space its roots with a perfectly
-    matched layer, refined on the exact stiffness of the half-space, by which those of the radiating
-    continuum are left out; of a half-space alone the Rayleigh wave, a closed form.
+    Finite stacks by the thin-layer method; layers on a half-space by its roots with a perfectly
+    matched layer, refined on the exact stiffness of the half-space; a half-space alone by the
+    Rayleigh wave.
 
     Parameters
     ----------
@@ -268,10 +263,9 @@ def curves(
     names: tuple[str, ...] = (),
     bound: Floats | None = None,
 ) -> DispersionCurves:
-    """Curves of tracked modes at frequencies (f,) in Hz, with shapes at depths (d,) in metre.
-
-    Modes without names have numbers in the order of their cut-on. `bound` (f,) in 1/m is the
-    wavenumber of the shear wave of a half-space below, into which waves of smaller ones leak.
+    """Curves of tracked modes at frequencies (f,) in Hz, with shapes at depths (d,) in metre; modes
+    without names are numbered by cut-on. `bound` (f,) in 1/m is the wavenumber of the shear wave of
+    a half-space below, into which waves of smaller ones leak.
     """
     k = found.wavenumbers
     known = np.isfinite(k)

@@ -74,14 +74,12 @@ def steady_lines(
     ----------
     compliance : Compliance
     pressure : MovingPressure, with a Gaussian focus
-    probes : (p, 2) float, metre; may be a whole map
-    threshold : of the strongest line of the load; only its lines above this are computed
+    probes : (p, 2) float, metre
+    threshold : of the strongest line of the load; weaker lines are left out
 
     Returns
     -------
-    frequencies (f,) in Hz >= 0 and complex amplitudes a (f, p) in metre of Re a exp(2 pi i f t)
-
-    Raises a ValueError if the focus is not Gaussian, or as `pressure.check_lines` does.
+    frequencies (f,) in Hz >= 0 and amplitudes a (f, p) in metre of Re a exp(2 pi i f t)
     """
     f, amplitudes = field_lines(normal_field(compliance), pressure, probes, threshold=threshold)
     return f, amplitudes[..., 0]
@@ -90,8 +88,8 @@ def steady_lines(
 def field_lines(
     field: Field, pressure: MovingPressure, probes: ArrayLike, *, threshold: float = 1e-6
 ) -> tuple[Floats, Complex]:
-    """Steady-state lines of all components of a field: frequencies (f,) in Hz and amplitudes
-    (f, p, m), as of `steady_lines`.
+    """Frequencies (f,) in Hz and amplitudes (f, p, m) of all components of a field, as
+    `steady_lines`.
     """
     _check(pressure)
     lines, probes = load_lines(pressure, threshold), np.atleast_2d(np.asarray(probes, np.float64))
@@ -112,8 +110,8 @@ def field_lines(
 
 
 def carriers(field: Field, splines: Splines, away: Floats) -> Floats:
-    """Splines (m, c, j, ..., q) with the weights of a field, at offsets (..., q, 2) in metre of
-    probes from positions of a focus: components are these times the integrals (c, j), in sum.
+    """Splines (m, c, j, ..., q) times the weights of a field, at offsets (..., q, 2) in metre of
+    probes from positions of a focus: components are their sum over integrals (c, j).
     """
     of_distance = np.moveaxis(splines(np.linalg.norm(away, axis=-1)), -1, 0)
     return np.asarray(field.weights(away)[:, :, None] * of_distance)
@@ -130,8 +128,8 @@ def sampled_lines(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PathOperator:
-    """Load of a path on some probes, as a linear operator on the response of a body to a focus at
-    rest: with g_j(w) = g(r_j, w) the line at f = f_m + n f_d is, at a probe x_p,
+    """Load of a path on some probes, as a linear operator on the response g_j(w) = g(r_j, w) of any
+    body: the line at f = f_m + n f_d is, at a probe x_p,
 
         u(f) = c sum_j g_j(f) h_nj(x_p),   h_nj = int_0^1 B_j(|x_p - X(a)|) exp(-2 pi i n a) da
 
@@ -140,8 +138,7 @@ class PathOperator:
     width : metre, standard deviation of the focal spot
     distances : (j,) float, metre
     frequencies : (f,) float, Hz, distinct
-    lines : (l,) int, the frequency of each line
-    orders : (l,) int, the harmonic of each line, an index of `harmonics`
+    lines, orders : (l,) int, index of the frequency and of the harmonic of each line
     coefficients : (l,) complex, Pa
     harmonics : (n, p, j) complex, h of the distinct orders
     """
@@ -193,23 +190,13 @@ def steady_state(
 ) -> Response:
     """Steady state, as if the load had always been there: its lines below half the sampling rate.
 
-    That is `flat_body` without its initial transient, for a twentieth of the time.
-
     Parameters
     ----------
-    compliance : Compliance
-    pressure : MovingPressure, with a Gaussian focus
-    probes : (p, 2) float, metre
-    times : (t,) float, s, equally spaced
+    compliance, pressure, probes, times : as for `flat_body`
 
     Returns
     -------
     Response, displacement (t, p) in metre
-
-    Raises
-    ------
-    ValueError
-        As `steady_lines` does.
     """
     started = time.perf_counter()
     probes = np.atleast_2d(np.array(probes, np.float64))
@@ -225,9 +212,8 @@ def flat_body(
     """Motion of probes from rest.
 
     By FFT over twice the duration with exponential damping, which reduces the wrap-around to 1e-5.
-    The load goes on after the record and ends smoothly. Its lines above half the sampling rate are
-    left out. The rest position is that before the load: the deflection of an infinite sheet under a
-    load with non-zero mean grows without bound.
+    Lines of the load above half the sampling rate are left out. Displacement is about the rest
+    position before the load.
 
     Parameters
     ----------
@@ -300,8 +286,8 @@ def _as_it_is(
     pressure: MovingPressure, jumps: Floats, padded: int, dt: float, parts: int,
     lasting: Callable[[Floats], Floats],
 ) -> tuple[Floats, Callable[[Floats], Floats]]:  # fmt: skip
-    """Positions (q, 2) in metre of the foci, and the function from what a focus of unit pressure
-    does there (q, j) to what the load does (t, j), in samples of dt / parts from 0.
+    """Positions (q, 2) in metre of the foci, and the function from responses to unit pressure there
+    (q, j) to responses to the load (t, j), in samples of dt / parts from 0.
     """
     fine = dt / parts
     at, shares = cells(np.append(jumps, 0.0), -fine / 2, fine, padded * parts)
@@ -314,7 +300,7 @@ def _low_passed(
     pressure: MovingPressure, highest: float, padded: int, dt: float,
     lasting: Callable[[Floats], Floats],
 ) -> tuple[Floats, Callable[[Floats], Floats]]:  # fmt: skip
-    """The same in samples of dt, of the load's lines below a frequency in Hz alone."""
+    """The same in samples of dt, of the load's lines below a frequency in Hz."""
     lines = load_lines(pressure)
     below = lines.frequencies < highest
     f, orders = lines.frequencies[below], lines.harmonics[below]
@@ -339,8 +325,8 @@ def _timed(
 
 
 def distance_table(furthest: float, width: float) -> Floats:
-    """Distances (j,) in metre up to `furthest` to interpolate between: the response is as smooth as
-    the focal spot, of standard deviation `width` in metre.
+    """Distances (j,) in metre up to `furthest` to interpolate between, for a focal spot of standard
+    deviation `width` in metre.
     """
     steps = max(FEWEST_STEPS, int(np.ceil(furthest / width * STEPS_PER_WIDTH)))
     return np.linspace(0, furthest, steps)
@@ -373,7 +359,7 @@ def _width(pressure: MovingPressure) -> float:
 
 def _interpolation(probes: Floats, knots: Floats, width: float) -> tuple[Floats, Splines]:
     """Distances (j,) in metre to integrate at, and the function of distances (...) to the shares
-    (..., j) that interpolate between them: of few distances each one, between many splines.
+    (..., j) that interpolate between them; few distances are taken as they are.
     """
     if len(knots) * len(probes) <= FEW_DISTANCES:
         unique = np.unique(np.linalg.norm(probes[:, None] - knots, axis=-1))

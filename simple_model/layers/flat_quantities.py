@@ -80,9 +80,7 @@ def material_at(stack: Stack, depth: float) -> Material:
 
 
 def quantity_field(asked: Quantity, stack: Stack, depth: float = 0.0) -> Field:
-    """Components of a quantity, before any `invariant`, at a depth in metre of a stack; raises a
-    ValueError if that is outside the stack.
-    """
+    """Components of a quantity, before any `invariant`, at a depth in metre of a stack."""
     solid = material_at(stack, depth)
     if asked.field in (NORMAL, VECTOR):
         field = motion_field(stack, depth)
@@ -114,9 +112,8 @@ def traction_field(asked: Quantity, stack: Stack, direction: ArrayLike) -> Field
     """Normal motion of the surface under tractions of the focal spot's profile in one direction.
 
     By reciprocity the vertical motion at x under a force along x' at 0 is the motion along x' at 0
-    under a vertical force at x, which is that of `motion_field`.
-
-    The quantity is one of normal motion, the direction (3,) a unit vector, z upwards.
+    under a vertical force at x: that of `motion_field`. The direction (3,) is a unit vector, z
+    upwards.
     """
     along = np.asarray(direction, np.float64)
     moved = motion_field(stack)
@@ -131,9 +128,7 @@ def traction_field(asked: Quantity, stack: Stack, direction: ArrayLike) -> Field
 def from_rest(
     field: Field, asked: Quantity, pressure: MovingPressure, probes: ArrayLike, times: Floats
 ) -> Floats:
-    """Waveforms (t, p) of a quantity from rest, of whose components the field is; load, probes and
-    times as of `flat_body`.
-    """
+    """Waveforms (t, p) of a quantity from rest, of whose components the field is."""
     found = field_history(field, pressure, probes, times)
     return asked.waveforms(found.reshape(len(found), -1), found.shape[1])
 
@@ -141,6 +136,6 @@ def from_rest(
 def steady(
     field: Field, asked: Quantity, pressure: MovingPressure, probes: ArrayLike, times: Floats
 ) -> Floats:
-    """Waveforms (t, p) of a quantity in the steady state, otherwise as of `from_rest`."""
+    """Waveforms (t, p) of a quantity in the steady state."""
     f, a = sampled_lines(field, pressure, probes, times)
     return asked.waveforms(synthesise(f, a.reshape(len(f), -1), times), a.shape[1])

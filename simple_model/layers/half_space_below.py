@@ -35,8 +35,6 @@ SHOWN = 40  # depths in a half-space
 def rayleigh_mode(material: Material, omega: Floats) -> tuple[Found, Floats]:
     """The Rayleigh wave of a half-space at (f,) rad/s, and depths of its shape, down to a shear
     wavelength in the middle of the band.
-
-    k = w / (c_R / c_s) sqrt(rho / mu), and the residue of `compliance.half_space` there.
     """
     rest = material.shear_speed / material.rayleigh_speed
     at = omega[:, None] * (1 + np.array([0, -NEARLY, NEARLY]))
@@ -61,13 +59,8 @@ def modes_above_half_space(
     stack: Stack, omega: Floats, moduli: Complex, slopes: Complex, most: int
 ) -> tuple[Found, Floats]:
     """Roots of layers on a half-space, the last layer of the stack, NaN where there are fewer, and
-    the depths (d,) in metre of their shapes.
-
-    Parameters
-    ----------
-    stack, omega : the stack, and (f,) rad/s
-    moduli, slopes : (f, l) complex, Pa and Pa s, shear moduli and their derivatives by omega
-    most : of each frequency, those of most motion in the layers
+    the depths (d,) in metre of their shapes. `moduli` and `slopes` (f, l) are shear moduli and
+    their derivatives by omega; `most` roots of each frequency have most motion in the layers.
     """
     layers = Stack(materials=stack.materials[:-1], thicknesses=stack.thicknesses[:-1], base="free")
     of, change = (pencil(layers, omega, x[:, :-1]) for x in (moduli, slopes))
@@ -117,8 +110,7 @@ def _candidates(
     whole: Pencil, of: Pencil, omega: Floats, ks: Complex, most: int
 ) -> tuple[Complex, Complex]:
     """Roots (f, m) of layers on a matched layer, and their motion (f, m, 2 n) in the layers: those
-    slower than the shear wave (f, 1) below, which cannot be of the continuum, and those of most
-    motion in the layers.
+    slower than the shear wave (f, 1) below, and those of most motion in the layers.
     """
     squared, V, W = eigenpairs(whole, omega)
     k = np.sqrt(squared)
@@ -144,8 +136,8 @@ def _candidates(
 def _refined(
     of: Pencil, omega: Floats, start: Complex, x: Complex, resisting: Callable[[Complex], Complex]
 ) -> tuple[Complex, Complex, Floats]:
-    """Roots (f, m) of the layers on the half-space itself, from those of a matched layer, by
-    inverse iteration; their motion (f, m, 2 n), and the relative change in the last step.
+    """Roots (f, m) of the layers on the half-space itself, by inverse iteration, their motion (f,
+    m, 2 n), and the relative change in the last step.
     """
     ends = np.ix_(_ends(of), _ends(of))
     k, last = start, np.ones(start.shape)

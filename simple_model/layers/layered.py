@@ -42,9 +42,9 @@ Symmetric = tuple[Any, Any, Any]  # of complex arrays, a, b, c of [[a, b], [b, c
 
 
 class Layer(NamedTuple):
-    """Stiffness of a layer in Pa/m: `top`, [[a, b], [b, c]], of forces on its top by motion there,
-    K11; `across`, [[d, -e], [e, g]], of forces on its bottom by motion of the top, K21. By
-    symmetry K22 is [[a, -b], [-b, c]].
+    """Stiffness of a layer in Pa/m: `top` K11 = [[a, b], [b, c]], forces on its top by motion
+    there; `across` K21 = [[d, -e], [e, g]], forces on its bottom by motion of the top. K22 is [[a,
+    -b], [-b, c]].
     """
 
     top: Symmetric
@@ -52,8 +52,8 @@ class Layer(NamedTuple):
 
 
 class Impedances(NamedTuple):
-    """Impedance Z in Pa/m of a whole stack; its layers from the top, and the impedance of all that
-    is below each of these: None below a half-space and of a rigid base.
+    """Impedance Z in Pa/m of a stack, its layers from the top, and the impedance below each: None
+    below a half-space and on a rigid base.
     """
 
     surface: Symmetric
@@ -64,20 +64,15 @@ class Impedances(NamedTuple):
 def surface_compliance(stack: Stack, k: Complex, w: Complex) -> Complex:
     """Displacement (f, k) of the surface into the stack per pressure, in m/Pa, at wavenumbers k
     (k,) in 1/m with Re k > 0 and frequencies w (f, 1) in rad/s with Im w <= 0; 0 at w = 0 of a free
-    stack, which has no static deflection.
+    stack.
     """
     a, b, c = _impedances(stack, k, w).surface
     return _about_mean(stack, w, a / (a * c - b * b))
 
 
 def transfer(stack: Stack, depths: Sequence[float]) -> Transfer:
-    """Motion and stress at depths (d,) in metre for a unit surface pressure.
-
-    Returns
-    -------
-    Function of k (k,) in 1/m and w (f, 1) in rad/s to (4, d, f, k): U and W in m/Pa, N and T in
-    Pa/Pa, of the field of a surface pressure J0(kr) exp(i w t); of a free stack 0 as in
-    `surface_compliance`.
+    """Motion and stress at depths (d,) in metre for a unit surface pressure: a function of k (k,)
+    in 1/m and w (f, 1) in rad/s to (4, d, f, k), U and W in m/Pa, N and T in Pa/Pa.
 
     Raises a ValueError if a depth is outside the stack.
     """
@@ -103,14 +98,11 @@ def transfer(stack: Stack, depths: Sequence[float]) -> Transfer:
 def clearance(stack: Stack, w: Complex) -> float:
     """Height in 1/m above the real axis of k below which there is no pole at frequencies w (f,).
 
-    Backward waves occur from somewhat below the second resonance. As their energy travels no faster
-    than shear waves, they decay no more slowly than the least of these (Tolstoy and Usdin, J Acoust
-    Soc Am 29:37 (1957), of one layer; of several a mode's loss and speed are both means over its
-    energy). Evanescent waves have their poles above 1 / thickness, but for the bending of a free
-    stack, where the two poles k^4 = m w^2 / D that only decay go to 0 with w. For several layers
-    these are estimates: integrals along the real axis, of 370 random stacks of one to four layers
-    of 2 kPa to 3 MPa at four frequencies each, show no pole below; nor do those of 240 on an
-    elastic base of 1e5 to 1e9 N/m3, at rest and near its resonance, too.
+    Backward waves occur from somewhat below the second resonance and decay no more slowly than the
+    least of the shear waves (Tolstoy and Usdin, J Acoust Soc Am 29:37 (1957)). Evanescent waves
+    have their poles above 1 / thickness, but for the bending of a free stack, where the two poles
+    k^4 = m w^2 / D go to 0 with w. For several layers these are estimates, compared with integrals
+    along the real axis of 370 random stacks, and of 240 on an elastic base.
 
     The sum of all 1 / w_n^2 is the compliance down to the base of each part times its mass; of one
     layer that is H^2 / 2 c^2, and (2 H / pi c)^2 of it are the first resonance's.
@@ -132,11 +124,9 @@ def _about_mean(stack: Stack, w: Complex, values: Complex) -> Complex:
 
 
 def _bending(stack: Stack, w: Complex) -> float:
-    """Height in 1/m of the least pole of bending that only decays, of a stack that is free or on
-    an elastic base of stiffness c: B k^4 = m w^2 - c.
-
-    By classical lamination theory, about the neutral plane (Jones, Mechanics of Composite Materials
-    (1999), chapter 4).
+    """Height in 1/m of the least pole of bending that only decays, of a stack that is free or on an
+    elastic base of stiffness c: B k^4 = m w^2 - c, by classical lamination theory about the neutral
+    plane (Jones, Mechanics of Composite Materials (1999), chapter 4).
     """
     h = np.array(stack.thicknesses)
     stiff = np.array([2 * _shear(m, w) / (1 - m.poisson) for m in stack.materials]) * h[:, None]
@@ -174,7 +164,7 @@ def _resonance(
 
 def _decay(stack: Stack, w: Complex) -> Floats:
     """Least decay (f,) in 1/m of shear waves in a stack; where a layer has none, `WEAKEST` of the
-    mean over its thickness.
+    mean.
     """
     waves = [np.sqrt(m.density * w**2 / _shear(m, w)) for m in stack.materials]
     decay = np.abs(np.imag(waves))
@@ -244,9 +234,7 @@ def _downwards(known: Impedances) -> list[tuple[Pair, Pair]]:
 
 
 def layer_stiffness(material: Material, thickness: float, k: Complex, w: Complex) -> Layer:
-    """Stiffness, of arrays (f, k), of a layer of a thickness in metre or, of inf, a half-space, at
-    wavenumbers and frequencies as of `surface_compliance`.
-    """
+    """Stiffness, of arrays (f, k), of a layer of a thickness in metre, inf for a half-space."""
     mu, kappa = _shear(material, w), (0.5 - material.poisson) / (1 - material.poisson)
     k2, ks2, over_k = k * k, material.density * w**2 / mu, 1 / k
     p, s = np.sqrt(k2 - kappa * ks2), np.sqrt(k2 - ks2)

@@ -39,10 +39,9 @@ from simple_model.typing import Floats
 class Orthotropy:
     """Moduli of a sheet along its sides x and y: paper is twice as stiff along its grain as across.
 
-    Q11 = E_x / (1 - nu_xy nu_yx),  Q22 = E_y / (1 - nu_xy nu_yx),  Q12 = nu_yx Q11,  Q66 = G_xy,
-    nu_yx = nu_xy E_y / E_x (Reddy, Mechanics of Laminated Composite Plates and Shells (2004),
-    chapter 1). The isotropic mean has E = sqrt(E_x E_y) and nu = sqrt(nu_xy nu_yx), and its shear
-    modulus is the estimate of G_xy where none was measured.
+    Q11 = E_x / (1 - nu_xy nu_yx), Q22 = E_y / (1 - nu_xy nu_yx), Q12 = nu_yx Q11, Q66 = G_xy, nu_yx
+    = nu_xy E_y / E_x (Reddy, Mechanics of Laminated Composite Plates and Shells (2004), chapter 1).
+    The isotropic mean has E = sqrt(E_x E_y) and nu = sqrt(nu_xy nu_yx).
 
     Parameters
     ----------
@@ -50,7 +49,7 @@ class Orthotropy:
     poisson_xy : float, contraction along y under a stress along x, 0 or above
     shear_xy : float, Pa, or None for sqrt(E_x E_y) / 2 (1 + sqrt(nu_xy nu_yx))
 
-    Raises a ValueError if a modulus is not finite and above 0, or the contraction is out of range.
+    Raises a ValueError if a value is out of range.
     """
 
     young_x: float
@@ -104,27 +103,26 @@ class Orthotropy:
 
 @dataclass(frozen=True, kw_only=True)
 class Material:
-    """An isotropic solid; give `shear_modulus`, or build it with `from_young`, `of_law` or
-    `tabulated`, or that of a sheet with `orthotropic`.
+    """An isotropic solid; give `shear_modulus`, or use `from_young`, `of_law`, `tabulated` or
+    `orthotropic`.
 
     Parameters
     ----------
     density : float, kg/m3
-    shear_modulus : float, Pa, at equilibrium: fully relaxed; with a loss factor, the storage
-        modulus at 150 Hz without viscosity and Prony terms
+    shear_modulus : float, Pa, fully relaxed; with a loss factor, the storage modulus at 150 Hz
+        without viscosity and Prony terms
     poisson : float, -1 < poisson < 0.5
-    viscosity : float, Pa s, Kelvin-Voigt: shear stress per shear rate
-    loss_factor : float, loss over storage modulus, nearly constant from 10 Hz to 2 kHz, as of
-        `constant_loss`
-    prony : Prony terms, each with the modulus that it adds in fast motion, and its time
+    viscosity : float, Pa s, Kelvin-Voigt
+    loss_factor : float, loss over storage modulus, nearly constant from 10 Hz to 2 kHz
+        (`constant_loss`)
+    prony : Prony terms
     law : angular frequencies (...) in rad/s -> complex shear moduli (...) in Pa, in place of all
-        other terms, or None: a record of `modulus_laws`, or any function that is analytic at
-        frequencies with imaginary part <= 0; `shear_modulus` is its value at rest
-    orthotropy : in-plane moduli of a sheet, whose isotropic mean has `shear_modulus` and `poisson`,
-        or None
+        other terms: a record of `modulus_laws`, or any function that is analytic at frequencies
+        with imaginary part <= 0; `shear_modulus` is its value at rest
+    orthotropy : in-plane moduli of a sheet, whose isotropic mean has `shear_modulus` and `poisson`
 
-    Raises a ValueError if a value is not finite or outside these limits, or a law is given beside
-    other losses or an orthotropy.
+    Raises a ValueError if a value is out of range, or a law is given beside other losses or an
+    orthotropy.
     """
 
     density: float
@@ -191,9 +189,7 @@ class Material:
 
     @property
     def fast_modulus(self) -> float:
-        """Sum of the moduli of all Prony terms, those of a law's series too, in Pa: what fast
-        motion meets beside the modulus.
-        """
+        """Sum of the moduli of all Prony terms, those of a law's series too, in Pa."""
         terms = self.prony if self.law is None else self.series().terms
         return sum((term.modulus for term in terms), 0.0)
 
@@ -208,8 +204,8 @@ class Material:
         return 2 * self.shear_modulus * self.poisson / (1 - 2 * self.poisson)
 
     def complex_modulus(self, omega: ArrayLike) -> Any:
-        """Complex shear modulus (...) in Pa of motion exp(+i w t), at w (...) in rad/s, which may
-        be complex.
+        """Complex shear modulus (...) in Pa of motion exp(+i w t) at w (...) in rad/s, which may be
+        complex.
         """
         omega = np.asarray(omega)
         if self.law is not None:
@@ -223,8 +219,8 @@ class Material:
         return sum((term(omega) for term in self.prony), np.zeros((), np.complex128))
 
     def series(self, tolerance: float = FIT_TOLERANCE) -> PronySeries:
-        """Prony series of its modulus law, that of a table over the table; raises a ValueError if
-        the law is not passive or not causal.
+        """Prony series of its modulus law; raises a ValueError if that is not passive or not
+        causal.
         """
         assert self.law is not None
         if isinstance(self.law, ModulusTable):
@@ -232,9 +228,7 @@ class Material:
         return fit_prony(self.law, rest=self.shear_modulus, tolerance=tolerance)
 
     def relaxing(self, tolerance: float = FIT_TOLERANCE) -> Material:
-        """The material with internal variables alone: Prony series in place of its law or its loss
-        factor.
-        """
+        """The material with a Prony series in place of its law or its loss factor."""
         if self.law is None:
             return self.without_loss_factor()
         series = self.series(tolerance)
@@ -290,8 +284,8 @@ class Material:
 
     @property
     def rayleigh_speed(self) -> float:
-        """Speed of surface waves without loss, m/s: of the squares of speeds over that of shear
-        waves, the root below 1 of Rayleigh's equation s^3 - 8 s^2 + (24 - 16 r) s - 16 (1 - r) = 0.
+        """Speed of surface waves without loss, m/s: the root below 1 of s^3 - 8 s^2 + (24 - 16 r) s
+        - 16 (1 - r) = 0, s the squared speed over that of shear waves.
         """
         ratio = self.shear_modulus / (self.first_lame + 2 * self.shear_modulus)
         roots = np.roots([1.0, -8.0, 24 - 16 * ratio, 16 * (ratio - 1)])
@@ -305,8 +299,7 @@ def from_young(*, young: float, poisson: float, **rest: Any) -> Material:
     Parameters
     ----------
     young : float, Pa
-    poisson : float
-    **rest : as of `Material`
+    poisson, **rest : as of `Material`
 
     Returns
     -------
@@ -319,23 +312,17 @@ def orthotropic(
     *, density: float, young_x: float, young_y: float, poisson_xy: float,
     shear_xy: float | None = None, **losses: Any,
 ) -> Material:  # fmt: skip
-    """Material of a sheet by its moduli along x and y; its losses, `viscosity`, `loss_factor` and
-    `prony` as of `Material`, are the same in all directions.
+    """Material of a sheet by its moduli along x and y; its losses are the same in all directions.
 
     Parameters
     ----------
     density : float, kg/m3
     young_x, young_y, poisson_xy, shear_xy : as of `Orthotropy`
+    **losses : `viscosity`, `loss_factor` and `prony` as of `Material`
 
     Returns
     -------
-    Material
-        Whose shear modulus and Poisson's ratio are those of the isotropic mean.
-
-    Raises
-    ------
-    ValueError
-        As `Orthotropy` and `Material` do.
+    Material, with shear modulus and Poisson's ratio of the isotropic mean
     """
     along = Orthotropy(young_x=young_x, young_y=young_y, poisson_xy=poisson_xy, shear_xy=shear_xy)
     return Material(
@@ -345,7 +332,7 @@ def orthotropic(
 
 
 def of_law(*, density: float, poisson: float, law: Any) -> Material:
-    """Material by a modulus law.
+    """Material by a modulus law, whose modulus at rest it has.
 
     Parameters
     ----------
@@ -356,12 +343,6 @@ def of_law(*, density: float, poisson: float, law: Any) -> Material:
     Returns
     -------
     Material
-        Whose modulus at rest is that of the law.
-
-    Raises
-    ------
-    ValueError
-        As `Material` does.
     """
     return Material(density=density, shear_modulus=law.shear_modulus, poisson=poisson, law=law)
 
@@ -380,13 +361,9 @@ def tabulated(
 
     Returns
     -------
-    Material
-        Whose modulus at rest is that at 0 Hz or, without one, that of the table's Prony series.
+    Material, whose modulus at rest is that at 0 Hz or that of the table's Prony series
 
-    Raises
-    ------
-    ValueError
-        As `ModulusTable` does.
+    Raises a ValueError as `ModulusTable` does.
     """
     f, mu = np.asarray(frequencies, np.float64), np.asarray(moduli, np.complex128)
     table = ModulusTable(frequencies=tuple(f.tolist()), moduli=tuple(mu.tolist()))

@@ -41,9 +41,8 @@ class Found:
 def tracked(found: Found, omega: Floats, most: int, kept: Ints) -> Found:
     """Roots with one mode in each column, NaN where it is not found.
 
-    The square of a wavenumber is smooth in frequency, at a cut-off too, and its derivative is
-    known: a root continues another if the trapezoidal rule leads from it to the other, and if their
-    shapes are alike.
+    A root continues another if the trapezoidal rule of k^2, whose derivative is known, leads from
+    it to the other, and if their shapes are alike.
 
     Parameters
     ----------
@@ -91,8 +90,8 @@ def tracked(found: Found, omega: Floats, most: int, kept: Ints) -> Found:
 
 
 def between(found: Found, omega: Floats, waves: NDArray[np.bool_], most: int) -> Floats:
-    """Frequencies (g,) in rad/s in the middle of gaps across which modes are not surely followed.
-    `waves` (f, m) says whether a root is a wave; the slowest have to be followed.
+    """Frequencies (g,) in rad/s in the middle of gaps across which modes are not surely followed;
+    `waves` (f, m) says whether a root is a wave.
     """
     from scipy.optimize import linear_sum_assignment  # which takes long to import
 

@@ -129,15 +129,14 @@ def _check(law: FractionalKelvinVoigt | FractionalZener) -> None:
 class ModulusTable:
     """Measured complex shear moduli, linear between their frequencies; a modulus law.
 
-    Beyond them, and at complex frequencies, the modulus is that of the table's Prony series, which
-    is causal; its `error` says how far it is from the table.
+    Beyond them, and at complex frequencies, the modulus is that of the table's causal Prony series.
 
     Parameters
     ----------
     frequencies : (k,) Hz, ascending and above 0; the first may be 0, with a loss modulus of 0
     moduli : (k,) complex, Pa, with real parts above 0 and imaginary parts of 0 or above
 
-    Raises a ValueError if these are none, or not those of a passive, causal solid.
+    Raises a ValueError if these are not those of a passive, causal solid.
     """
 
     frequencies: tuple[float, ...]
@@ -250,8 +249,8 @@ MODULUS_LAWS: Mapping[str, type[FractionalKelvinVoigt] | type[FractionalZener]] 
 
 
 def modulus_table(text: str) -> ModulusTable:
-    """Table of complex shear moduli from CSV with the columns frequency_hz, storage_pa and loss_pa
-    in any order; lines that begin with # are left out, rows may be in any order.
+    """Table of complex shear moduli from CSV with the columns frequency_hz, storage_pa and loss_pa,
+    columns and rows in any order; lines that begin with # are left out.
 
     Raises a ValueError if a column is missing, an entry is no number, or as `ModulusTable` does.
     """

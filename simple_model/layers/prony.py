@@ -51,8 +51,8 @@ LOSS_FREQUENCIES = 93  # at which the series is fitted
 
 @dataclass(frozen=True, kw_only=True)
 class PronyTerm:
-    """Prony term, a Maxwell branch in parallel with the rest: fast motion meets its `modulus` in
-    Pa, 0 or above; in the `time` in s, above 0, its stress falls to 1/e. Others are a ValueError.
+    """Prony term, a Maxwell branch in parallel with the rest: `modulus` in Pa, 0 or above, and
+    relaxation `time` in s, above 0; otherwise a ValueError.
     """
 
     modulus: float
@@ -77,8 +77,8 @@ class PronyTerm:
 
 @dataclass(frozen=True, kw_only=True)
 class PronySeries:
-    """Prony series fitted to a modulus law: `shear_modulus` at rest in Pa, `viscosity` in Pa s,
-    `terms`, and the largest relative `error` over its `band` in Hz.
+    """Prony series of a modulus law: `shear_modulus` at rest in Pa, `viscosity` in Pa s, `terms`,
+    and the largest relative `error` over its `band` in Hz.
     """
 
     shear_modulus: float
@@ -122,14 +122,13 @@ def fit_prony(
     ----------
     law : angular frequencies (...) in rad/s -> complex shear moduli (...) in Pa
     band : lowest and highest frequency in Hz
-    rest : float, Pa, the modulus at rest, which the series has too; fitted if not given
+    rest : float, Pa, the modulus at rest; fitted if not given
     frequencies : Hz, within the band, that are looked at beside log-spaced ones
     tolerance : float, largest relative deviation |series - law| / |law|
 
     Returns
     -------
-    PronySeries
-        With its deviation; of a noisy law the shortest that is about as near as any.
+    PronySeries; of a noisy law the shortest that is about as near as any
 
     Raises a ValueError if the law is not passive or not causal in the band.
     """
@@ -156,11 +155,7 @@ def fit_prony(
 
 def check_modulus(frequencies: Floats, moduli: Complex) -> None:
     """Refuse complex moduli (f,) in Pa at frequencies (f,) in Hz, ascending and above 0, that no
-    passive, causal solid has.
-
-    Causal: near some series of non-negative terms (`CAUSAL`), with times well beyond the band for
-    what it does not show. That needs no derivatives or integrals of the data, as the Kramers-Kronig
-    relations do.
+    passive, causal solid has. Causal: near some series of non-negative terms (`CAUSAL`).
     """
     check_passive(frequencies, moduli)
     w = 2 * np.pi * frequencies
@@ -177,9 +172,7 @@ def check_modulus(frequencies: Floats, moduli: Complex) -> None:
 
 
 def check_passive(frequencies: Floats, moduli: Complex) -> None:
-    """Refuse complex moduli (f,) in Pa at frequencies (f,) in Hz that are not those of a passive
-    solid, with a ValueError that names the frequency.
-    """
+    """Refuse complex moduli (f,) in Pa at frequencies (f,) in Hz that no passive solid has."""
     limits = (
         (~np.isfinite(moduli), "modulus", np.real, "must be finite"),
         (moduli.real <= 0, "storage modulus", np.real, "must be above 0"),
@@ -199,7 +192,7 @@ def fitted_series(
     w: Floats, mu: Complex, times: Floats, rest: float | None, band: tuple[float, float]
 ) -> PronySeries:
     """Prony series of times (n,) in s by non-negative least squares of the relative deviation from
-    moduli (f,) in Pa at w (f,) in rad/s; the modulus at rest in Pa is found if it is None.
+    moduli (f,) in Pa at w (f,) in rad/s; the modulus at rest in Pa is fitted if it is None.
     """
     from scipy.optimize import nnls  # which takes long to import
 
@@ -227,20 +220,17 @@ def fitted_series(
 def constant_loss(loss_factor: float) -> PronySeries:
     """Modulus of a nearly constant loss factor above 0, over the storage modulus at `REFERENCE`.
 
-    A modulus mu (1 + i eta) with one eta at all frequencies is not causal: loss comes with a
-    storage modulus that rises with frequency (Kramers and Kronig). The solid whose loss factor is
-    eta at all frequencies has the modulus
+    A modulus mu (1 + i eta) with one eta at all frequencies is not causal. The solid of constant
+    loss factor eta has the modulus
 
         mu(w) = mu (i w / w_0)^a / cos(pi a / 2),   a = (2 / pi) atan(eta)
 
     (Kjartansson, J Geophys Res 84:4737 (1979), doi 10.1029/JB084iB09p04737), which is 0 at rest. A
     few Maxwell branches with log-spaced times have the same modulus over a band, and a modulus at
-    rest (Liu, Anderson and Kanamori, Geophys J R Astron Soc 47:41 (1976), doi
-    10.1111/j.1365-246X.1976.tb01261.x; Emmerich and Korn, Geophysics 52:1252 (1987), doi
-    10.1190/1.1442386). They are the definition of a loss factor here, in every model alike: it is
-    eta within 2.5 % over `LOSS_BAND` up to eta = 2, within 10 % beyond; half of it at 3 Hz, and 0
-    at rest, where the modulus is 0.92, 0.76 and 0.35 mu for eta = 0.03, 0.1 and 0.4. A load from
-    rest reaches it in some tens of ms.
+    rest (Emmerich and Korn, Geophysics 52:1252 (1987), doi 10.1190/1.1442386). They define a loss
+    factor here, in every model: it is eta within 2.5 % over `LOSS_BAND` up to eta = 2, within 10 %
+    beyond, half of it at 3 Hz, and 0 at rest, where the modulus is 0.92, 0.76 and 0.35 mu for eta =
+    0.03, 0.1 and 0.4.
     """
     w, w_0 = 2 * np.pi * np.geomspace(*LOSS_BAND, LOSS_FREQUENCIES), 2 * np.pi * REFERENCE
     power = 2 / np.pi * np.arctan(loss_factor)

@@ -17,12 +17,11 @@ class Stack:
     ----------
     materials : of each layer
     thicknesses : metre, of each layer, above 0; the last may be inf, a half-space
-    base : what is below the last layer unless it is a half-space: "clamped", a rigid base,
-        "free", nothing, or "elastic", a Winkler foundation
+    base : below the last layer unless it is a half-space: "clamped", "free" or "elastic", a Winkler
+        foundation
     base_stiffness : N/m3, traction per displacement of an elastic base, in every direction
 
-    Raises a ValueError if there is no layer, their numbers differ, a thickness is out of range, the
-    base is another, or an elastic one has no stiffness.
+    Raises a ValueError if there is no layer, or a value is out of range.
     """
 
     materials: tuple[Material, ...]
@@ -64,5 +63,5 @@ class Stack:
 
     @property
     def is_fixed(self) -> bool:
-        """Whether it is constrained, and does not drift: it ends on one of these or is elastic."""
+        """Whether it is constrained, and does not drift."""
         return self.is_rigid or self.base == "elastic"

@@ -35,11 +35,9 @@ MATCHED = np.exp(-0.6j) * np.array([0.75, 1.5, 3.0, 6.0, 12.0])  # element lengt
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Pencil:
-    """Matrices of the pencil at frequencies (f,): those of U `Auu`, `Guu` and of W `Gww`, and `Buw`
-    (f, n, n); `Aww`, `Mww` (f, n), which are diagonal. M is the same of U and of W. `traction` (f,
-    n, n) is the part of Buw by which U does work on the normal stress of a section x = const.
-
-    `depths` (d,) in metre are of the nodes outside a matched layer; the first is the surface.
+    """Matrices of the pencil at frequencies (f,): (f, n, n), or (f, n) if diagonal; M is the same
+    of U and of W. `traction` is the part of Buw by which U does work on the normal stress of a
+    section x = const. `depths` (d,) in metre are of the nodes outside a matched layer.
     """
 
     Auu: Complex
@@ -55,7 +53,7 @@ class Pencil:
 @cache
 def lobatto() -> tuple[Floats, Floats, Floats]:
     """Nodes (9,) and weights (9,) of Gauss-Lobatto quadrature on 0..1, and the derivatives (q, a)
-    of the shape function of node a at node q.
+    of shape functions there.
     """
     top = legendre.Legendre.basis(ORDER)
     x = np.concatenate([[-1.0], np.sort(top.deriv().roots().real), [1.0]])
@@ -80,8 +78,8 @@ def gauss() -> tuple[Floats, Floats, Floats]:
 
 
 def elements(stack: Stack, omega: Floats) -> tuple[list[int], Complex]:
-    """Layer of each element, and the lengths (f, e) of elements in metre at frequencies (f,);
-    raises a ValueError if there are too many.
+    """Layer of each element, and the lengths (f, e) of elements in metre; a ValueError if there are
+    too many.
     """
     layers, lengths = [], []
     finite = sum(thickness for thickness in stack.thicknesses if np.isfinite(thickness))
@@ -105,9 +103,7 @@ def elements(stack: Stack, omega: Floats) -> tuple[list[int], Complex]:
 
 
 def pencil(stack: Stack, omega: Floats, moduli: Complex) -> Pencil:
-    """Pencil of a stack whose layers have shear moduli (f, l) in Pa at omega (f,) in rad/s, by
-    which elements are sized.
-    """
+    """Pencil of a stack whose layers have shear moduli (f, l) in Pa at omega (f,) in rad/s."""
     layers, length = elements(stack, omega)
     nodes, w, D = lobatto()
     g, N, dN = gauss()
@@ -161,9 +157,8 @@ def eigenpairs(of: Pencil, omega: Floats) -> tuple[Complex, Complex, Complex]:
 
 
 def outgoing(squared: Complex, slope: Complex) -> Complex:
-    """Wavenumbers of squares, of the sign that decays or, without loss, carries energy outwards.
-
-    `slope` is the derivative of the squares by the angular frequency.
+    """Wavenumbers of squares, of the sign that decays or, without loss, carries energy outwards;
+    `slope` is the derivative of the squares by omega.
     """
     k = np.sqrt(squared)
     k = np.where(k == 0, 1e-300, k)

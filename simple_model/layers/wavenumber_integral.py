@@ -63,8 +63,8 @@ class Field:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Grid:
-    """Nodes `k` (n,) of the path of integration, and what values there are multiplied by for the
-    integrals of each order at all distances, (n, r).
+    """Nodes `k` (n,) of the path of integration, and kernels (n, r) by which values there are
+    multiplied for the integrals of each order at all distances.
     """
 
     k: Complex
@@ -84,9 +84,7 @@ def normal_field(compliance: Compliance) -> Field:
 def point_response(
     compliance: Compliance, distances: ArrayLike, frequencies: ArrayLike, width: float
 ) -> Complex:
-    """Response g(r, w) (f, r) in m/Pa to a Gaussian focal spot of 1 Pa; parameters and errors as of
-    `point_integrals`.
-    """
+    """Response g(r, w) (f, r) in m/Pa to a Gaussian focal spot of 1 Pa, as `point_integrals`."""
     return point_integrals(normal_field(compliance), distances, frequencies, width)[0]
 
 
@@ -106,8 +104,8 @@ def point_integrals(
     distances : (r,) float, metre
     frequencies : (f,) float or complex, rad/s, with imaginary part <= 0
     width : metre, standard deviation of the spot
-    negligible : a batch of frequencies in which each integral stays below this fraction of its
-        largest value so far is the last one computed; for frequencies that rise
+    negligible : for frequencies that rise: integration ends with the batch in which each integral
+        stays below this fraction of its largest value
 
     Raises an ArithmeticError if the wavenumber grid cannot be made fine enough.
     """
@@ -154,9 +152,7 @@ def _lift(field: Field, r: Floats, w: Complex, width: float) -> float:
 def _resolved(
     field: Field, w: Complex, grid: Callable[[int], _Grid], n: int
 ) -> tuple[int, Complex]:
-    """The fewest wavenumbers, from n, that twice as many do not improve on; the integrals with
-    these.
-    """
+    """The fewest wavenumbers, from n, that twice as many do not improve on, and the integrals."""
     some = w[:: -(-len(w) // COMPARED)] if _is_damped(w) else w
     coarse = _integrated(field, some, grid(n))
     while n < MOST_NODES:
@@ -211,9 +207,7 @@ def _chebyshev(n: int) -> Floats:
 
 
 def _through(values: Complex, x: Floats) -> Complex:
-    """Polynomials through values (c, j, r) at Chebyshev points, at x (f,): (c, f, r), by the
-    barycentric formula.
-    """
+    """Barycentric interpolation (c, f, r) at x (f,) of values (c, j, r) at Chebyshev points."""
     n = values.shape[1] - 1
     away = x[:, None] - _chebyshev(n)
     weights = (-1.0) ** np.arange(n + 1)

@@ -25,10 +25,8 @@ class DriveLaw:
     ----------
     name : str, of messages, pages and, if it is registered in `DRIVES`, scene files
     pressure : amplitude (...), modulation (...), depth -> pressure (...) over that at full drive
-    degree : int, of a polynomial in the modulation; None if it is no polynomial, whose harmonics
-        are followed down to `load_spectrum.ALIASED`
-    words : str, a few more for a choice on a page
-    note : str, a sentence for pages about the lines that it makes of AM
+    degree : int, of a polynomial in the modulation; None if it is no polynomial
+    words, note : str, a few words for a choice on a page, and a sentence about its lines of AM
 
     Raises a ValueError if it is no polynomial of its degree in the modulation.
     """

@@ -49,7 +49,7 @@ _FORCES = np.array(
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class PressureMap:
     """Measured focal spot: pressures on a grid, relative to the largest, linear between its points
-    and 0 beyond them. It is the same at all heights of the focus.
+    and 0 beyond them; the same at all heights of the focus.
 
     Parameters
     ----------
@@ -101,13 +101,8 @@ class PressureMap:
 
 @dataclass(frozen=True, kw_only=True)
 class ContactSpot:
-    """Gaussian traction of a small contact, relative to its largest; the same at all heights.
-
-    Parameters
-    ----------
-    width : float, metre, standard deviation
-
-    Raises a ValueError if the width is outside `CONTACTS`.
+    """Gaussian traction of a small contact of standard deviation `width` in metre, the same at all
+    heights; a ValueError if the width is outside `CONTACTS`.
     """
 
     width: float
@@ -253,17 +248,13 @@ def spot_width(height: float) -> float:
 
 
 def spot_detail(height: float, profile: str | FocalSpot) -> float:
-    """Length in metre that samples of a focal spot along its path must resolve: the standard
-    deviation of the Gaussian, or the spacing of a map that is finer.
-    """
+    """Length in metre that samples of a focal spot along its path must resolve."""
     return min(spot_width(height), getattr(profile, "spacing", np.inf))
 
 
 def along_axis(offset: ArrayLike, height: float = NOMINAL_HEIGHT) -> Floats:
-    """Relative intensity (...) on the axis at an offset (...) in metre above or below the focus.
-
-    A Gaussian whose half width goes with the square of the focal spot's, as by diffraction: within
-    4 % of that of `array_field` from 100 to 300 mm, whose maximum is up to 8 % of the height lower.
+    """Relative intensity (...) on the axis at an offset (...) in metre above or below the focus: a
+    Gaussian whose half width goes with the square of the focal spot's, within 4 % of `array_field`.
     """
     half_width = HALF_DEPTH * (lobe_width(height) / lobe_width(NOMINAL_HEIGHT)) ** 2
     return np.exp(-np.log(2) * (np.asarray(offset, np.float64) / half_width) ** 2)

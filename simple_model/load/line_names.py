@@ -77,11 +77,14 @@ def named_lines(
     most: int = MOST,
     candidates: Iterable[str] = (),
 ) -> dict[str, float]:
-    """Names and frequencies of the lines of a load.
+    """Names and frequencies of the lines of a load, as `line_names`.
 
     Parameters
     ----------
-    pressure, threshold, most, candidates : as for `line_names`
+    pressure : MovingPressure
+    threshold : of the strongest line, 0..1
+    most : how many of them are listed, the strongest
+    candidates : names of lines that are listed in any case
 
     Returns
     -------
@@ -98,22 +101,11 @@ def line_names(
     most: int = MOST,
     candidates: Iterable[str] = (),
 ) -> LineNames:
-    """Lines above a fraction of the strongest on the path, the mean left out.
+    """Lines above a fraction of the strongest on the path, the mean left out, and candidates, as
+    far as the Tacton has their tones and they do not coincide with one that is listed.
 
     A path that is recorded and run through once has no f_d, and a rhythm or signal that is not
     repeated no f_r or f_s: their lines have no names.
-
-    Parameters
-    ----------
-    pressure : MovingPressure
-    threshold : of the strongest line, 0..1
-    most : how many of them are listed, the strongest
-    candidates : names of lines that are listed whether or not they are in the load, as far as the
-        Tacton has their tones and they do not coincide with one that is
-
-    Returns
-    -------
-    LineNames, Hz and Pa
     """
     orders, strengths = _load_orders(pressure, threshold)
     of_tacton = symbols(pressure.tacton)
@@ -228,7 +220,7 @@ def _gain_products(pressure: MovingPressure, threshold: float) -> tuple[Orders, 
 
 def _in_powers(pressure: MovingPressure) -> tuple[Orders, NDArray]:
     """Orders (m, 3) and coefficients (k, m) of the gain with powers 0 to k - 1 of a factor of the
-    modulation: through Chebyshev's points, and checked between them.
+    modulation, through Chebyshev's points and checked between them.
     """
     law, plain = pressure.law, unsampled(pressure)
     for degree in DEGREES if law.degree is None else (max(1, law.degree),):

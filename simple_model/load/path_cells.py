@@ -43,9 +43,9 @@ class PathCells:
     """One repetition of a load in equal cells, `frequency` times a second.
 
     What the load does in each of k cells is `cells` (k, q) times what a focus of unit pressure does
-    at `positions` (q, 2) in metre. That is one focus of unit pressure that runs once along the
-    path; or all `of_tacton` in Pa, where that is modulated by a rhythm or signal, or too short for
-    a path that jumps.
+    at `positions` (q, 2) in metre: of one focus of unit pressure that runs once along the path, or
+    of the whole load in Pa (`of_tacton`), where it is modulated by a rhythm or signal, or too short
+    for a path that jumps.
     """
 
     positions: Floats
@@ -84,9 +84,7 @@ def path_cells(pressure: MovingPressure) -> PathCells:
 
 
 def _ends_as_it_begins(pressure: MovingPressure) -> bool:
-    """Whether the load at the end of the Tacton is that of its beginning, so that it is repeated
-    without a jump.
-    """
+    """Whether the load is repeated without a jump after the Tacton."""
     tacton = pressure.tacton
     ends = tacton.duration * np.array([SAME, 1 - SAME])
     begins, stops = pressure.gain(ends)
@@ -103,7 +101,7 @@ def moved_load(
     pressure: MovingPressure, times: Floats, factors: Floats
 ) -> tuple[Floats, sparse.csr_array]:
     """Load of all foci at times (m,) in s, with factors (m,) in Pa: positions (q, 2) in metre, and
-    the matrix (m, q) in Pa by which the load is made of foci of unit pressure at these.
+    the matrix (m, q) in Pa by which the load is made of foci of unit pressure there.
     """
     tacton = pressure.tacton
     path, detail = tacton.trajectory, spot_detail(pressure.height, pressure.profile)
@@ -131,7 +129,7 @@ def path_fourier(
     pressure: MovingPressure, values: Floats | Complex, orders: NDArray[np.int_] | None = None
 ) -> Complex:
     """Fourier coefficients (..., n) of what a load does where a focus of unit pressure at each of
-    `path_samples` has values (..., q): of some orders (n,), or of all, of which -n is harmonic -n.
+    `path_samples` does `values` (..., q): of some orders (n,), or of all, -n being harmonic -n.
     """
     mixing = path_cells(pressure).cells
     k, shape, rows = mixing.shape[0], values.shape[:-1], values.reshape(-1, values.shape[-1])
@@ -174,8 +172,8 @@ def cells(jumps: Floats, start: float, width: float, count: int) -> tuple[Floats
 
 
 def jump_phases(pressure: MovingPressure) -> Floats:
-    """Fractions (j,) of the period at which a focus jumps, in position or in level or, of a load
-    along the path, in direction; and at which moves begin and end that last no longer than a cell.
+    """Fractions (j,) of the period at which a focus jumps in position or level or, of a load along
+    the path, in direction; and at which moves begin and end that last no longer than a cell.
     """
     path = pressure.tacton.trajectory
     bounds, lengths = path.parts
@@ -206,8 +204,7 @@ def jump_times(pressure: MovingPressure, start: float, end: float) -> Floats:
 
 def along_path(path: Trajectory, phases: Floats, detail: float) -> tuple[Floats, sparse.csr_array]:
     """Positions (q, 2) in metre along a path, and the matrix (m, q) that interpolates from them to
-    phases (m,), fractions of the period: by cubics along each part of the path that has more phases
-    than nodes, for which the detail of the focal spot in metre decides.
+    phases (m,): by cubics along each part of the path that has more phases than nodes.
     """
     bounds, lengths = path.parts
     part = np.clip(np.searchsorted(bounds, phases, side="right") - 1, 0, len(lengths) - 1)
@@ -237,10 +234,8 @@ def along_path(path: Trajectory, phases: Floats, detail: float) -> tuple[Floats,
 
 
 def is_abrupt(pressure: MovingPressure) -> bool:
-    """Whether a load jumps at some place as its foci move, or has levels, which may change as fast,
-    so that its lines fall off slowly.
-
-    Of foci on paths of their own, which are joined, none jumps where all paths are closed.
+    """Whether a load jumps at some place as its foci move, or has levels, so that its lines fall
+    off slowly. Joined paths that are closed do not jump.
     """
     tacton, jumps = pressure.tacton, jump_phases(pressure)
     n, path = tacton.n_paths, tacton.trajectory
@@ -267,8 +262,8 @@ def unsampled(pressure: MovingPressure) -> MovingPressure:
 
 
 def highest_passing(pressure: MovingPressure) -> float:
-    """Highest line in Hz, above 1e-7 of all, that the moving focus makes at a place; of a
-    recording, whose fastest moves are jumps, at most `HIGHEST`.
+    """Highest line in Hz, above 1e-7 of all, that the moving focus makes at a place; at most
+    `HIGHEST` of a recording.
     """
     found = PASSED * _speed(pressure.tacton) / spot_detail(pressure.height, pressure.profile)
     return min(found, HIGHEST) if pressure.tacton.trajectory.shape == "recorded" else found
@@ -296,7 +291,7 @@ def _count(pressure: MovingPressure) -> int:
 
 
 def _rate(pressure: MovingPressure) -> float:
-    """Samples a second of a Tacton with a rhythm or signal, none of whose lines folds back below
+    """Samples a second of a Tacton with a rhythm or signal, so that no line folds back below
     `HIGHEST`.
     """
     tacton, degree = pressure.tacton, pressure.law.degree

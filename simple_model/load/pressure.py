@@ -38,7 +38,7 @@ class MovingPressure:
     """Pressure of a Tacton on a surface near the plane z = 0 that its focus moves in.
 
     Points may have a height: above or below the plane the focus is weaker. The effect of a slope on
-    the pressure (`cos^2` of the incidence) belongs to the surface and is not part of it.
+    the pressure belongs to the surface.
 
     Parameters
     ----------
@@ -47,8 +47,8 @@ class MovingPressure:
         function of offsets (..., 2) in metre, with details no finer than the Gaussian's
     drive : "linear", "pressure_squared", "force_corrected", or a DriveLaw
     depth_of_modulation : float, 0..1; the linear law has none
-    peak_pressure : float, Pa, at the focus at full drive and 200 mm. 50 Pa, uncertain by a
-        factor of 2, is the radiation pressure of a 160 dB focus on a wall that reflects fully.
+    peak_pressure : float, Pa, at the focus at full drive and 200 mm. 50 Pa, uncertain by a factor
+        of 2, is the radiation pressure of a 160 dB focus on a wall that reflects fully.
     height : float, metre, of the focus above the array
     heading : "x" or "y", the component of the path's unit tangent that multiplies it, as of a
         traction along the path; or "", none
@@ -126,8 +126,8 @@ class MovingPressure:
         return pressure.reshape(*t.shape, len(points))
 
     def weight(self, phase: ArrayLike) -> Floats:
-        """Factor (...) of the path's level on the pressure at fractions (...) of the period, and of
-        the heading.
+        """Factor (...) of the path's level and of the heading on the pressure at fractions (...) of
+        the period.
         """
         path = self.tacton.trajectory
         factor = self.law.level_factor(path.level_at_phase(phase), self.depth_of_modulation)
@@ -136,10 +136,8 @@ class MovingPressure:
         return factor
 
     def gain(self, t: ArrayLike, over: float = 0.0) -> Floats:
-        """Pressure (...) in Pa at each focus at times (...) in s, but for the path's level.
-
-        A rhythm or a signal is averaged over the time `over` in s about each, as far as it is not
-        before the start: for steps in time, between which the edges of pulses fall.
+        """Pressure (...) in Pa at each focus at times (...) in s, but for the path's level; a
+        rhythm or a signal is averaged over the time `over` in s about each, from the start on.
         """
         if over and self.tacton.is_sampled:
             parts = ((np.arange(FINER) + 0.5) / FINER - 0.5) * over
@@ -167,8 +165,8 @@ class MovingPressure:
 
 
 def check_lines(pressure: MovingPressure) -> None:
-    """Refuse a load of another class, for models of lines use the formulas of `MovingPressure`
-    without calling it; raises a ValueError.
+    """Refuse a load of another class: models of lines use the formulas of `MovingPressure` without
+    calling it.
     """
     if type(pressure) is not MovingPressure:
         raise ValueError(

@@ -92,10 +92,9 @@ class Signal:
     ----------
     rate : float, Hz, samples per second
     samples : (k,) of the modulation, -1..1, or of the amplitude, 0..1
-    role : "modulation" multiplies the AM sinusoids, within the drive law; "envelope" multiplies
-        the amplitude, as a rhythm does
+    role : "modulation" multiplies the AM sinusoids; "envelope" the amplitude, as a rhythm does
 
-    Raises a ValueError if there are no samples, or a value is unknown, not finite or out of range.
+    Raises a ValueError if a value is unknown, not finite or out of range.
     """
 
     rate: float

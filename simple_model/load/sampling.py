@@ -30,9 +30,8 @@ def step(times: Floats) -> float:
 
 
 def highest(pressure: MovingPressure, passing: float) -> float:
-    """Highest line in Hz of a load whose focus, by moving, makes lines up to `passing` Hz.
-
-    Pulses have no highest line; they are averaged over a sample. A signal has half its own rate.
+    """Highest line in Hz of a load whose moving focus makes lines up to `passing` Hz. Pulses,
+    averaged over a sample, have none; a signal has half its own rate.
     """
     tacton = pressure.tacton
     first, second, envelope = tones(tacton)
@@ -68,9 +67,7 @@ def below_half_the_rate(frequencies: Floats, times: Floats) -> NDArray[np.bool_]
 
 
 def is_folded(pressure: MovingPressure, times: Floats) -> bool:
-    """Whether a load may have lines above half the rate of times (t,) in s that count: of jumps and
-    pulses those above half of 10 kHz do not.
-    """
+    """Whether a load may have lines above half the rate of times (t,) in s that count."""
     if not isinstance(pressure, MovingPressure):
         return False
     dt = step(times)
@@ -92,10 +89,8 @@ def fold_parts(pressure: MovingPressure, times: Floats) -> int:
 
 
 def low_passed(load: Callable[[Floats], Floats], times: Floats, parts: int) -> Floats:
-    """Load (t, ...) at equally spaced times (t,) in s without aliasing, by a windowed sinc.
-
-    `load` is a function of times (n,), also before and after those given, to values (n, ...); it is
-    sampled so many times as finely, 1 for as it is.
+    """Load (t, ...) at equally spaced times (t,) in s without aliasing, by a windowed sinc: `load`
+    is a function of times (n,), also before and after those given, sampled `parts` times as finely.
     """
     if parts == 1:
         return load(times)

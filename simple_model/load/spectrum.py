@@ -43,11 +43,9 @@ LINES_AT_ONCE = 2**24  # lines at places, some hundred megabytes
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LoadSpectrum:
-    """Spectral lines of a load at `frequencies` (f,) in Hz >= 0, several of which may coincide.
-
-    Re (`coefficients` (f,) in Pa times harmonic `harmonics` (f,) of the focal spot along the path
-    times exp(2 pi i f t)) is the pressure of a line; `strengths` (f,) in Pa is its largest
-    amplitude on the path.
+    """Spectral lines of a load at `frequencies` (f,) in Hz >= 0, several of which may coincide: the
+    pressure of a line is Re (`coefficients` (f,) in Pa times harmonic `harmonics` (f,) of the focal
+    spot along the path times exp(2 pi i f t)), and `strengths` (f,) in Pa its largest amplitude.
     """
 
     frequencies: Floats
@@ -67,8 +65,8 @@ class LoadSpectrum:
 
 
 def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadSpectrum:
-    """Lines whose pressure, at the path, exceeds a fraction of the strongest line's; of a load
-    that is zero, the mean alone.
+    """Lines whose pressure, at the path, exceeds a fraction of the strongest line's; of a load that
+    is zero, the mean alone.
     """
     check_lines(pressure)
     tacton, (n, of_spot) = pressure.tacton, path_strengths(pressure, threshold)
@@ -94,11 +92,9 @@ def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadSpectru
 
 
 def lines_from_rest(pressure: MovingPressure) -> LoadSpectrum:
-    """`load_lines` that give a body the impulse of the load after its start.
-
-    The lines of a jump d that end at a frequency F lack an impulse of d / (2 pi^2 F) after it, as
-    if it came 5 us late. With factors of 1 + (n - 1) (f / F)^n, whose integral over 1/f^2 is that
-    of the lines beyond F, many lines have it.
+    """`load_lines` that give a body the impulse of the load after its start: the lines of a jump d
+    that end at a frequency F lack an impulse of d / (2 pi^2 F). With factors of 1 + (n - 1) (f /
+    F)^n, whose integral over 1/f^2 is that of the lines beyond F, many lines have it.
     """
     lines, whole = load_lines(pressure), path_cells(pressure)
     few = whole.frequency * MANY > HIGHEST
@@ -126,15 +122,13 @@ def pressure_lines(
 
 def reduced_lines(pressure: MovingPressure, points: Floats, load: Floats) -> tuple[Floats, Complex]:
     """Frequencies (f,) in Hz of the distinct `lines_from_rest`, and their complex forces (f, r) in
-    reduced coordinates, whose forces of unit pressure at points (k, 2 or 3) are `load` (k, r).
+    reduced coordinates; `load` (k, r) are the forces of unit pressure at points (k, 2 or 3).
     """
     return lines_from_rest(pressure).gather(path_forces(pressure, points, load))
 
 
 def path_forces(pressure: MovingPressure, points: Floats, load: Floats) -> Complex:
-    """Reduced forces (n, r) of unit pressure on the path, by harmonic of the path, as
-    `reduced_lines` has them; but for a rhythm or signal the modulation does not matter.
-    """
+    """Reduced forces (n, r) of unit pressure on the path, by harmonic of the path."""
     knots, reach = path_samples(pressure), spot_reach(pressure.height, pressure.profile)
     forces = []
     for part in np.array_split(knots, len(knots) // 64 + 1):
@@ -164,8 +158,8 @@ def _largest_harmonics(pressure: MovingPressure) -> Floats:
 
 
 def foci_harmonics(pressure: MovingPressure, n: NDArray[np.int_]) -> Complex:
-    """Array factor (k,) of all foci on harmonics n (k,) of one; 1 for a single focus, and where the
-    harmonics are those of the Tacton.
+    """Array factor (k,) of all foci on harmonics n (k,) of one; 1 where the harmonics are those of
+    the Tacton.
     """
     if path_cells(pressure).of_tacton:
         return np.ones(len(n), np.complex128)
@@ -192,11 +186,9 @@ def gain_orders(
     pressure: MovingPressure, factors: Sequence[float] = (1.0,)
 ) -> tuple[NDArray[np.int_], Complex]:
     """Orders (m, 3) of f_AM, f_AM2 and f_e in the gain, of either sign, and its coefficients (k, m)
-    in Pa where the modulation is multiplied by factors (k,). All of a polynomial drive law; of
-    another the phases are doubled until harmonics in the upper half of the orders are below
-    `ALIASED`.
-
-    Raises a ValueError if `MOST_PHASES` are not enough for that.
+    in Pa where the modulation is multiplied by factors (k,). Phases are doubled until the harmonics
+    of a drive law that is no polynomial fall below `ALIASED`; a ValueError if `MOST_PHASES` are not
+    enough.
     """
     law, n_tones = pressure.law, np.count_nonzero(tones(pressure.tacton))
     count = PHASES if law.degree is None else max(PHASES, 2 * law.degree + 2)

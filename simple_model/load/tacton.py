@@ -43,13 +43,11 @@ class Tacton:
     envelope_frequency : float, Hz, 0 = constant
     duration : float, s, above 0 and at most 30
     trajectory : Trajectory
-    foci : (n,) phases, 0..1 of the drawing period, by which one to eight foci run ahead on the
-        same path; for paths of their own see `simple_model.joined`
-    sharing : how the array makes several foci, each of which has 1/n of the pressure that
-        one alone would have, so that the total force stays the same. "simultaneous": all at once,
-        each at 1/sqrt(n) of the sound pressure, which conserves the acoustic power; that the
-        sound of one interferes with another's is left out. "time_multiplexed": in turn, each at
-        full pressure for 1/n of the time, faster than a body can follow. The load is the same.
+    foci : (n,) phases, 0..1 of the drawing period, by which one to eight foci run ahead on the same
+        path; for paths of their own see `simple_model.joined`
+    sharing : how the array makes several foci, each with 1/n of the pressure of one alone:
+        "simultaneous", each at 1/sqrt(n) of the sound pressure, without interference; or
+        "time_multiplexed", in turn, faster than a body can follow. The load is the same.
     rhythm : Rhythm or None
     signal : Signal or None
 
@@ -174,9 +172,7 @@ def commanded(tacton: Tacton, t: ArrayLike) -> Floats:
 
 
 def repeated(tacton: Tacton) -> dict[str, float]:
-    """Frequencies in Hz by name of all that a Tacton repeats: f_AM, f_AM2, f_e, f_d of the foci
-    together (n f_d of n evenly spaced ones), f_r of the rhythm and f_s of a signal.
-    """
+    """Frequencies in Hz by name of all that a Tacton repeats; f_d is that of the foci together."""
     w1, w2 = tacton.superposition
     signal = tacton.signal
     found = {
@@ -191,13 +187,12 @@ def repeated(tacton: Tacton) -> dict[str, float]:
 
 
 def pattern_period(tacton: Tacton) -> float:
-    """Period in s of the whole pattern: the shortest time, at most the duration, after which both
-    AM sinusoids, the envelope, all foci, the rhythm and the signal repeat together.
+    """Period in s of the whole pattern: the shortest time, at most the duration, after which AM,
+    envelope, foci, rhythm and signal repeat together.
 
-    Incommensurate frequencies (f_d = 190.986 Hz with f_AM = 140 Hz) have no such time. Their period
-    is the shortest time, no shorter than the slowest beat between them, after which every phase is
-    back within 1 % of a turn (here 11 periods of AM and 15 of the path, 78.5 ms), or comes nearest
-    to that. If nothing repeats within the duration, the period is the duration.
+    Of incommensurate frequencies it is the shortest time, no shorter than the slowest beat between
+    them, after which every phase is back within 1 % of a turn, or comes nearest to that: of f_d =
+    190.986 Hz with f_AM = 140 Hz, 78.5 ms. It is the duration if nothing repeats within it.
     """
     found = repeated(tacton)
     f = np.array(list(found.values()))
@@ -222,9 +217,7 @@ def _symmetry(foci: tuple[float, ...]) -> int:
 
 
 def _slowest_beat(found: dict[str, float], duration: float) -> float:
-    """Period in s, at most the duration, of the slowest difference of low multiples that turns
-    within the duration at all.
-    """
+    """Period in s, at most the duration, of the slowest difference of low multiples."""
     orders = {name: PATH_ORDERS if name in ("f_d", "f_r", "f_s") else TONE_ORDERS for name in found}
     multiples = [f * np.arange(1, orders[name] + 1) for name, f in found.items()]
     beats = [np.abs(a[:, None] - b).ravel() for k, a in enumerate(multiples) for b in multiples[:k]]

@@ -44,20 +44,20 @@ class Trajectory:
     Parameters
     ----------
     shape : one of `SHAPES` or `BY_POINTS`
-    size : float, metre, 0..0.06: length of the line, diameter of the circle, side of the others;
-        0 for "polyline" and "recorded", whose points say it
-    speed : float, m/s, along the path; 0 for "recorded", whose times say it
+    size : float, metre, 0..0.06: length of the line, diameter of the circle, side of the others; 0
+        for "polyline" and "recorded"
+    speed : float, m/s, along the path; 0 for "recorded"
     sweep : how a line or an open polyline is repeated: "there_and_back" (f_d = speed / 2 length),
         "one_way" (f_d = speed / length, then a jump back) or "sinusoidal" (there and back as a
-        cosine of time, with `speed` on average); devices differ
+        cosine of time, with `speed` on average)
     centre : (x, y), metre, what all positions are moved by
-    points : (k, 2), metre, corners of a polyline, which runs round without end if its last is its
-        first; or the positions of a recording
-    times : (k,), s, from 0, never falling: when a recording is at its points. It ends with the
-        last and begins anew, so that its period is times[-1]; equal times are a jump
+    points : (k, 2), metre, corners of a polyline, which is closed if its last is its first; or the
+        positions of a recording
+    times : (k,), s, from 0, never falling: when a recording is at its points. Its period is
+        times[-1]; equal times are a jump
     levels : (k,), 0..1, of the amplitude, at those times; 1 throughout if empty
-    hold : bool, whether a recording stays at a point until the next (zero-order hold, what
-        devices do), rather than going there in a straight line
+    hold : bool, whether a recording stays at a point until the next, as devices do, rather than
+        going there in a straight line
 
     Raises a ValueError if a value is unknown, not finite or out of range.
     """
@@ -201,7 +201,7 @@ class Trajectory:
 
     @property
     def _nearby(self) -> float:
-        """Fraction of the period that nothing moves in, but that tells a time from the next."""
+        """Fraction of the period in which nothing moves, but that tells a time from the next."""
         return 2 * JUST_AFTER / max(1, len(self.points) - 1)
 
     def _about_origin(self, phase: Floats) -> Floats:
@@ -275,9 +275,7 @@ def differ(before: Floats, after: Floats) -> NDArray[np.bool_]:
 
 def timed_path(position: Callable[[Floats], Floats], period: float) -> Trajectory:
     """Recorded path whose positions (k, 2) in metre are a function of times (k,) in s, from 0 to
-    `period`, within `STRAIGHT`.
-
-    Raises a ValueError if the function jumps, or returns no positions.
+    `period`, within `STRAIGHT`; a ValueError if the function jumps, or returns no positions.
     """
     count = 64
     while count < MOST_POINTS:
@@ -301,14 +299,17 @@ def joined(paths: Sequence[Trajectory], frequency: float) -> Trajectory:
     """Several foci on paths of their own, as one recorded path that they share.
 
     One period of each path follows the other: n paths, each drawn in T, make a recording of period
-    n T. Give it `evenly(n)` as foci, which are then at every time one on each path. Straight sides
-    are exact; a circle of diameter d is a polygon within d/2 (1 - cos(pi / 132)): 0.009 mm of one
-    of 60 mm.
+    n T. Give it `evenly(n)` as foci, which are then at every time one on each path. A circle of
+    diameter d is a polygon within d/2 (1 - cos(pi / 132)).
 
     Parameters
     ----------
     paths : named shapes; each is drawn `frequency` times a second, whatever its own speed
     frequency : float, Hz, above 0
+
+    Returns
+    -------
+    Trajectory
 
     Raises a ValueError if there is no path, one has points of its own, or the frequency is not
     above 0.

@@ -26,8 +26,8 @@ DECAYED = 6.0  # exp(-36) is nothing
 
 
 def air_mass(x: LineBasis, y: LineBasis, density: float) -> Floats:
-    """Added mass (x y, x y) in kg/m2, y the faster, of each pair of products of functions along
-    both sides; the density of the air is in kg/m3.
+    """Added mass (x y, x y) in kg/m2, y the faster, of each pair of products of functions; density
+    in kg/m3.
     """
     highest = max(2 * line.legendre[..., 0].size / line.length for line in (x, y))
     nearest, farthest = NEAREST / highest, FARTHEST * max(x.length, y.length)

@@ -25,8 +25,8 @@ STIFFER = 1.0001
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FreeModes:
-    """Poles (m, j) in 1/s of m modes and `residues` (m, j) in s of their compliances. Of conjugate
-    poles one has all, the other none, and real ones have half: twice the real part counts all.
+    """Poles (m, j) in 1/s of m modes and `residues` (m, j) in s of their compliances; of conjugate
+    poles one has all, the other none, and real ones have half.
     """
 
     poles: Complex
@@ -34,9 +34,8 @@ class FreeModes:
 
     def start(self, frequencies: Floats, forces: Complex) -> Complex:
         """Amplitudes (m, j) of exp(pole t) that end the rest of all modes before t = 0, under modal
-        forces Re sum F exp(2 pi i f t), with F (f, m) at frequencies (f,) in Hz.
-
-        A line makes F residue [exp(2 pi i f t) - exp(pole t)] / (2 pi i f - pole).
+        forces Re sum F exp(2 pi i f t), with F (f, m) at frequencies (f,) in Hz: a line makes F
+        residue [exp(2 pi i f t) - exp(pole t)] / (2 pi i f - pole).
         """
         found = np.zeros(self.poles.shape, np.complex128)
         for s, force in zip(2j * np.pi * frequencies, forces, strict=True):
@@ -44,8 +43,8 @@ class FreeModes:
         return found * self.residues
 
     def impulse(self, place: Floats, speed: Floats) -> Complex:
-        """Amplitudes (m, j) of exp(pole t) after modes have been set to a place (m,) and a speed
-        (m,), metre kg^1/2 and per s.
+        """Amplitudes (m, j) of exp(pole t) after modes have been set to a place (m,) in metre
+        kg^1/2 and a speed (m,).
         """
         return 2 * self.residues * (self.poles * place[:, None] + speed[:, None])
 
@@ -58,11 +57,9 @@ def free_modes(modes: PlateModes, material: Material) -> FreeModes:
 
 
 def relaxing_stiffness(lossless: Floats, bent: Floats, material: Material) -> tuple[Floats, Floats]:
-    """Stiffness (m, 2 + n) of modes and times (n,) in s, as `free_vibration` takes them, of a
-    material with Maxwell branches.
-
-    `lossless` (m,) and `bent` (m,) in 1/s2 are the parts of the squared frequencies without loss,
-    and in proportion to the material's modulus, at its `shear_modulus`.
+    """Stiffness (m, 2 + n) of modes and times (n,) in s, for `free_vibration`, of a material with
+    Maxwell branches; `lossless` (m,) and `bent` (m,) in 1/s2 are the parts of the squared
+    frequencies without loss, and in proportion to the material's modulus.
     """
     solid, mu = material.without_loss_factor(), material.shear_modulus
     terms = [term for term in solid.prony if term.modulus]
@@ -92,9 +89,7 @@ def free_vibration(stiffness: Floats, times: Floats) -> FreeModes:
 
 
 def _poles(stiffness: Floats, times: Floats) -> Complex:
-    """Poles (m, 2 + n) of modes with `stiffness` (m, 2 + n) in 1/s2, the viscous part in 1/s, and
-    relaxation times (n,) in s.
-    """
+    """Poles (m, 2 + n) of modes."""
     n = 2 + len(times)
     speed = np.sqrt(stiffness[:, 0])  # so that u' / speed is as large as u
     companion = np.zeros((len(stiffness), n, n))

@@ -29,10 +29,9 @@ GATHERS = "xi,yj,pxy->ijp"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Grid:
-    """Gauss points of a plate and the polynomials on it.
-
-    Along x and along y: `breaks` (e + 1,) in metre, whether functions are `split` in even and odd
-    ones, the `degrees` (e,) of polynomials on each piece, and the `points` and `weights` in metre.
+    """Gauss points of a plate and the polynomials on it. Along x and along y: `breaks` (e + 1,) in
+    metre, whether functions are `split` in even and odd ones, the `degrees` (e,) on each piece, and
+    the `points` and `weights` in metre.
     """
 
     breaks: tuple[Floats, Floats]
@@ -124,8 +123,8 @@ class InPlane:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Line:
-    """Functions along x or y with their values and slopes (points, i) on the grid, and the weights
-    (points,) of the grid.
+    """Functions along x or y with their values and slopes (points, i) on the grid, and its weights
+    (points,).
     """
 
     basis: LineBasis

@@ -70,8 +70,7 @@ def linear_motion(
 
     Parameters
     ----------
-    modes : PlateModes
-    pressure : MovingPressure
+    modes, pressure : PlateModes and MovingPressure
     material : Material, with the `shear_modulus` of the modes and no modulus law of its own
     times : (t,) s, 0 or above
     middle : (2,) metre, of the plate in the scene
@@ -103,8 +102,7 @@ def stretched_motion(
     plate: KarmanPlate, linear: Floats, dt: float, material: Material | None = None
 ) -> Motion:
     """Motion from rest, at 0, dt, ..., (n - 1) dt in s, under the load that moves the plate by
-    `linear` (n, r) in kg^1/2 m, as of `linear_motion` of the same material and the chosen modes, if
-    it does not stretch.
+    `linear` (n, r) in kg^1/2 m, as of `linear_motion` of the chosen modes, if it does not stretch.
     """
     forces = _Scheme.of(plate, dt, material).forces(linear)
     return forced_motion(plate, forces, dt, material)
@@ -118,23 +116,9 @@ def forced_motion(
     *,
     start: Floats | None = None,
 ) -> Motion:
-    """Motion under forces that are known at the steps.
-
-    Parameters
-    ----------
-    plate : KarmanPlate
-    forces : (n, r) N kg^-1/2, on the chosen modes at 0, dt, ..., (n - 1) dt
-    dt : s
-    material : Material; no loss if not given
-    start : (2, r), coordinates in kg^1/2 m and their rates in kg^1/2 m/s at time 0, with relaxed
-        branches; at rest if not given
-
-    Returns
-    -------
-    Motion
-        At the n + 1 times 0, dt, ..., n dt.
-
-    Raises an ArithmeticError if a step is not finite.
+    """Motion at the n + 1 times 0, dt, ..., n dt under forces (n, r) in N kg^-1/2 on the chosen
+    modes, without loss if no material is given; from `start` (2, r), coordinates in kg^1/2 m and
+    their rates, or from rest. Raises an ArithmeticError if a step is not finite.
     """
     scheme = _Scheme.of(plate, dt, material)
     M, K, B, rest = scheme.mass, scheme.K, scheme.bending, scheme.rest
@@ -199,11 +183,9 @@ class _Loss:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Scheme:
-    """Coefficients of steps of dt in s.
-
-    `mass` (r,) of modes, stiffness `K` (r, r) at rest and `bending` (r, r), and the modulus: at
-    `rest`, viscous `lag` in s, and `shares` (j,) of Maxwell branches. The stretch d of a branch
-    follows the strain: over a step it becomes `keep` (j,) d + `follow` (j,) times the change.
+    """Coefficients of steps of dt in s: `mass` (r,) of modes, stiffness `K` (r, r) at rest,
+    `bending` (r, r), and the modulus: at `rest`, viscous `lag` in s, and `shares` (j,) of Maxwell
+    branches, whose stretch d becomes `keep` (j,) d + `follow` (j,) times the change of the strain.
     """
 
     dt: float
@@ -241,9 +223,7 @@ class _Scheme:
         return self.lag / self.dt + float(self.pull.sum()) / 2
 
     def forces(self, motion: Floats) -> Floats:
-        """Forces (n - 1, r) under which the steps without stretching are a motion (n, r) from
-        rest.
-        """
+        """Forces (n - 1, r) under which the steps without stretching are a motion (n, r)."""
         from scipy.signal import lfilter  # which takes long to import
 
         z, dt = motion, self.dt

@@ -55,13 +55,12 @@ class Plate:
     d11, d22, d12, d66 : N m, bending stiffnesses; of an isotropic plate D, D, nu D, (1 - nu) D / 2
     mass_per_area : kg/m2
     tension_x, tension_y : N/m, uniform
-    left, right, front, back : "clamped", "simply" or "free", the edges of least and greatest x, of
-        least and greatest y
+    left, right, front, back : "clamped", "simply" or "free", the edges of least and greatest x, y
     clips : ((x, y), ...) metre, where the plate is fixed
     clip_radius : metre, half a side of the square that is; 0 fixes the deflection of a point alone
     air_density : kg/m3, 0 in vacuum
 
-    Raises a ValueError if a value is not finite or out of range, or a clip is off the plate.
+    Raises a ValueError if a value is out of range, or a clip is off the plate.
     """
 
     size_x: float
@@ -106,9 +105,9 @@ class Plate:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Family:
-    """Modes of one symmetry: `squared` (m,) angular frequencies in rad2/s2, ascending; stiffness
-    of `bending` (m, m) between them in rad2/s2, None without tension, where it is `squared` alone;
-    and coefficients `shapes` (i, j, m) on `x`, `y`.
+    """Modes of one symmetry: `squared` (m,) angular frequencies in rad2/s2, ascending; stiffness of
+    `bending` (m, m) between them, None without tension; and coefficients `shapes` (i, j, m) on `x`,
+    `y`.
     """
 
     x: LineBasis
@@ -166,10 +165,8 @@ class PlateModes:
 
 
 def plate_modes(plate: Plate, finest: float | Sequence[float] = FINEST) -> PlateModes:
-    """All modes of a plate that polynomials up to a wavenumber make.
-
-    The lowest are accurate; those near `finest` in rad/m, the greatest wavenumber that is resolved,
-    or that along x and along y, only stand in for the static deflection that they share in. More
+    """All modes of a plate that polynomials up to the wavenumber `finest` in rad/m, or one along
+    each side, make. The lowest are accurate, the highest only complete the static deflection. More
     than `MOST_DOFS` degrees of freedom are a ValueError.
     """
     resolved, mirrored = np.broadcast_to(finest, 2), _symmetries(plate)
@@ -185,8 +182,8 @@ def plate_modes(plate: Plate, finest: float | Sequence[float] = FINEST) -> Plate
 def modal_motion(
     modes: PlateModes, frequencies: Floats, forces: Complex, modulus: ModulusLaw
 ) -> Complex:
-    """Steady modal coordinates q of (diag(w_m^2) + (h - 1) B - w^2) q = force, B the stiffness of
-    bending between the modes and h its relative modulus.
+    """Steady modal coordinates q (f, m) in metre kg^1/2 of (diag(w_m^2) + (h - 1) B - w^2) q =
+    force, B the stiffness of bending between the modes and h its relative modulus.
 
     Parameters
     ----------
@@ -195,9 +192,7 @@ def modal_motion(
     forces : (f, m) modal forces in N kg^-1/2
     modulus : angular frequencies (...) in rad/s -> complex modulus (...) over that of the modes
 
-    Returns
-    -------
-    (f, m) complex, metre kg^1/2; an ArithmeticError if coupled modes are not solved to `RESIDUAL`
+    Raises an ArithmeticError if coupled modes are not solved to `RESIDUAL`.
     """
     w = 2 * np.pi * np.asarray(frequencies)
     added = np.broadcast_to(modulus(w) - 1, w.shape)
@@ -222,8 +217,8 @@ def modal_motion_apart(
 
 
 def _coupled(family: Family, w: Floats, added: Complex, forces: Complex) -> Complex:
-    """Modal coordinates (f, m) of a stretched plate, by GMRES: the low modes are solved together
-    before, the high ones are almost what they are apart.
+    """Modal coordinates (f, m) of a stretched plate, by GMRES, preconditioned by the low modes
+    together and the high ones apart.
     """
     assert family.bending is not None
     found, B = np.empty(forces.shape, np.complex128), family.bending
@@ -331,10 +326,9 @@ def _family(plate: Plate, x: LineBasis, y: LineBasis) -> Family:
 
 
 def _modes(K: Floats, M: Floats) -> tuple[Floats, Floats]:
-    """Squared angular frequencies (m,) in rad2/s2 and shapes (n, m) of unit modal mass, ascending.
-
-    Of M x = K x / w^2, as the error of eigenvalues goes with the largest: narrow pieces have
-    frequencies that are 1e7 of the lowest. A rigid plate's, 0, are shifted.
+    """Squared angular frequencies (m,) in rad2/s2 and shapes (n, m) of unit modal mass, ascending:
+    of M x = K x / w^2, as the error goes with the largest eigenvalue. A rigid plate's, 0, are
+    shifted.
     """
     shift = SHIFT * np.trace(K) / np.trace(M)
     inverse, shapes = linalg.eigh(M, K + shift * M, check_finite=False, overwrite_b=True)
@@ -372,9 +366,7 @@ def _free_of_clips(plate: Plate, x: LineBasis, y: LineBasis) -> sparse.csr_array
 
 
 def outside_clips(plate: Plate, x: LineBasis, y: LineBasis) -> NDArray[np.bool_]:
-    """Mask (x y,), y the faster, of products of functions that are zero on all clips, at whose
-    sides the lines have breaks.
-    """
+    """Mask (x y,), y the faster, of products of functions that are zero on all clips."""
     found, reach = np.ones((x.size, y.size), bool), plate.clip_radius
     for along, across in plate.clips:
         moved = (

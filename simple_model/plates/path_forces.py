@@ -22,8 +22,8 @@ SPARE = 8  # more of them
 def modal_path_forces(
     modes: PlateModes, pressure: MovingPressure, middle: Sequence[float] = MIDDLE
 ) -> Complex:
-    """Modal forces (n, m) in N kg^-1/2 of unit pressure on the path, by its harmonic, for all loads
-    with the same path, focal spot, rhythm and signal; `middle` (2,) in metre is the plate's.
+    """Modal forces (n, m) in N kg^-1/2 of unit pressure on the path, by its harmonic; `middle` (2,)
+    in metre is the plate's.
     """
     knots, reach = path_samples(pressure), spot_reach(pressure.height, pressure.profile)
     detail = spot_detail(pressure.height, pressure.profile)

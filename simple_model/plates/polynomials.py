@@ -25,9 +25,8 @@ class LineBasis:
     """Functions u_i on the pieces of a line, of one symmetry or of none.
 
     `breaks` (e + 1,) in metre from the middle: the ends of its pieces. `legendre` (e, n, i):
-    coefficients of each function in the orthonormal Legendre polynomials of each piece. Integrals
-    (i, i): `mass` of u_i u_k, `slope` of u_i' u_k', `curvature` of u_i'' u_k'', `mixed` of u_i''
-    u_k.
+    coefficients in the orthonormal Legendre polynomials of each piece. Integrals (i, i): `mass` of
+    u_i u_k, `slope` of u_i' u_k', `curvature` of u_i'' u_k'', `mixed` of u_i'' u_k.
     """
 
     breaks: Floats
@@ -95,8 +94,7 @@ def line_basis(
     length: float, ends: Sequence[str], degree: int, split: bool
 ) -> tuple[LineBasis, ...]:
     """Orthonormal functions, up to a degree, on one piece of a length in metre that meet the
-    supports of both ends, "clamped", "simply" or "free": one basis or, where both ends are alike
-    and it is to be split, that of even and that of odd functions.
+    supports of both ends: one basis or, `split`, that of even and that of odd functions.
     """
     n = np.arange(degree + 1)
     breaks = np.array([-length / 2, length / 2])
@@ -109,15 +107,9 @@ def line_basis(
 def piecewise_basis(
     breaks: Floats, ends: Sequence[str], degrees: Sequence[int], split: bool
 ) -> tuple[LineBasis, ...]:
-    """Functions that are continuous with their slope at the breaks of a line.
-
-    Parameters
-    ----------
-    breaks : (e + 1,) metre, increasing, from the middle, where the ends of the line are as far
-    ends : two of "clamped", "simply", "free"
-    degrees : (e,) the highest of each piece, 3 or more
-    split : whether even and odd functions are apart, in two bases, where both ends and all breaks
-        are alike
+    """Functions that are continuous with their slope at the breaks (e + 1,) of a line, in metre
+    from the middle, up to `degrees` (e,) of 3 or more on each piece; `split`, even and odd
+    functions in two bases.
     """
     return _pieces(breaks, ends, degrees, split, "clamped")
 
@@ -125,9 +117,8 @@ def piecewise_basis(
 def continuous_basis(
     breaks: Floats, ends: Sequence[str], degrees: Sequence[int], split: bool
 ) -> tuple[LineBasis, ...]:
-    """Functions that are continuous at the breaks of a line, with kinks there, across which `mixed`
-    has no meaning; otherwise as `piecewise_basis`, with ends of "simply", which holds the value, or
-    "free".
+    """Functions that are continuous at the breaks of a line, with kinks there; otherwise as
+    `piecewise_basis`, with ends of "simply", which holds the value, or "free".
     """
     if len(breaks) == 2:
         return line_basis(float(np.ptp(breaks)), ends, degrees[0], split)
@@ -197,8 +188,8 @@ def _end_functions(degree: int, size: float, derivatives: Sequence[int]) -> Floa
 
 
 def _inner(degrees: Sequence[int], ends: Sequence[str]) -> Iterator[Floats]:
-    """Coefficients (e, n) of the bubbles of each piece: those that meet the supports of its ends,
-    orthonormal, each even or odd about its middle.
+    """Coefficients (e, n) of the bubbles of each piece: orthonormal, each even or odd about its
+    middle.
     """
     for piece, degree in enumerate(degrees):
         n = np.arange(degree + 1)
@@ -210,8 +201,8 @@ def _inner(degrees: Sequence[int], ends: Sequence[str]) -> Iterator[Floats]:
 
 
 def _symmetric(functions: Floats) -> tuple[Floats, Floats]:
-    """Even and odd combinations (e, n, i) of functions (e, n, k), each of whose mirror images is
-    one of them or its negative.
+    """Even and odd combinations (e, n, i) of functions (e, n, k), whose mirror images are among
+    them.
     """
     sign = np.where(np.arange(functions.shape[1]) % 2, -1.0, 1.0)
     mirrored = functions[::-1] * sign[:, None]
@@ -224,8 +215,8 @@ def _symmetric(functions: Floats) -> tuple[Floats, Floats]:
 
 
 def _bubbles(degree: int, orders: NDArray[np.int_], ends: Sequence[str]) -> Floats:
-    """Coefficients (n, i) up to a degree of orthonormal polynomials of some orders that meet the
-    supports of both ends.
+    """Coefficients (n, i) of orthonormal polynomials of some orders that meet the supports of both
+    ends.
     """
     rows = [
         _unit(_at_end(orders, derivative, side))

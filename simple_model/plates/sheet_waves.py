@@ -36,8 +36,7 @@ def sheet_curves(
 
     Parameters
     ----------
-    material : Material
-    thickness : metre
+    material, thickness : Material, and metre
     frequencies : (f,) float, Hz, above 0 and ascending, otherwise a ValueError
     air_density : kg/m3; 0 for vacuum
     tension : N/m, the same in all directions
@@ -64,7 +63,7 @@ def sheet_curves(
 
 def _roots(bending: Complex, tension: float, inertia: Floats, air: Floats) -> Complex:
     """The propagating and the evanescent root (f, 2) of D k^5 + T k^3 - a k - b = 0, by Newton's
-    method from those without air.
+    method.
     """
     D, a, b = bending[:, None], inertia[:, None], air[:, None]
     half = tension / 2 / D

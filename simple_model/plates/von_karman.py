@@ -68,8 +68,8 @@ class KarmanPlate:
 
     @cached_property
     def _parts(self) -> list[tuple[slice, Floats, NDArray[np.int_]]]:
-        """For the modes of each symmetry: which they are, what of H is not zero in their columns,
-        as a matrix (p, columns), and where its product (p,) belongs in (k r,).
+        """For the modes of each symmetry: which they are, the nonzero columns of H as a matrix (p,
+        columns), and where its product (p,) belongs in (k r,).
         """
         of_modes, of_states = self.symmetries
         found = []
@@ -98,12 +98,10 @@ class KarmanPlate:
 def karman_plate(
     modes: PlateModes, thickness: float, count: int = 60, *, in_plane: str = "held"
 ) -> KarmanPlate:
-    """Stiffness of a homogeneous plate at large deflection. It depends on no load, so that one
-    record serves many.
+    """Stiffness of a homogeneous plate at large deflection, for any load.
 
     Of a square plate under a uniform pressure, 60 modes give the deflection within 0.1 % up to 4
-    times its thickness, 30 to 50 modes within 1 %. Motion needs the modes up to about twice the
-    highest frequency of the load.
+    times its thickness. Motion needs the modes up to about twice the highest frequency of the load.
 
     Parameters
     ----------
@@ -114,7 +112,7 @@ def karman_plate(
         fixes only its component across the edge, "movable" leaves it free. Clips with a radius
         always fix it.
 
-    Raises a ValueError if the thickness or the count is out of range, or `in_plane` is unknown.
+    Raises a ValueError if a value is out of range or unknown.
     """
     choose("in_plane", in_plane, IN_PLANE)
     if not (np.isfinite(thickness) and thickness > 0):
@@ -221,9 +219,7 @@ class _Slopes:
 def _degrees(
     families: Sequence[tuple[Family, Floats]], breaks: Sequence[Floats]
 ) -> list[list[int]]:
-    """Degrees of polynomials, on each piece along x and y, that resolve products of two modes: of
-    twice the largest root-mean-square wavenumber of a mode.
-    """
+    """Degrees of polynomials, on each piece along x and y, that resolve products of two modes."""
     largest = np.zeros(2)
     for f, shapes in families:
         forms = (f.x.mass, f.y.mass), (f.x.slope, f.y.mass), (f.x.mass, f.y.slope)
