@@ -267,7 +267,7 @@ def test_an_expected_error_is_said_alike_everywhere(scene):
     said = "below 0.50 %"
     found = skinwave.simulate(scene, "flat-body")
     assert stated_error(found.expected_error) == said
-    assert 0 < found.to_xarray().attrs["expected_error"] == found.expected_error
+    assert 0 < found.to_pandas().attrs["expected_error"] == found.expected_error
     assert error_budget(scene, found.expected_error).words.count(f"numerical {said}") == 1
     for record in (found, skinwave.plan(scene, skinwave.SolveOptions(model="flat-body"))):
         assert said in record._repr_html_()
