@@ -14,8 +14,8 @@ from skinwave.scene.scene import Scene
 
 HOLDS, FAILS, UNDECIDED = "holds", "fails", "cannot be decided"
 CONFIDENCE = 0.95  # that all true amplitudes are within their bounds
-OF_SEVERAL = {"M2": 2}  # Tactons that a claim is about, at least
-OF_PLACES = ("S2", "S5", "M2")  # claims about the frequencies of peaks
+OF_SEVERAL = "M2"  # the claim about several paths
+OF_PLACES = ("S2", "S5")  # claims about the frequencies of peaks
 SOUGHT = {  # lines that a claim says are there, where the others are to be weak
     "S3": PAIRS, "M1": ("2f_AM", "3f_AM"), "M3": ("f_d", "2f_AM"),
 }  # fmt: skip
@@ -68,9 +68,7 @@ def by_name(
     unresolved: Sequence[str],
     spectrum: tuple[Floats, Floats],
 ) -> LinesByName:
-    """Lines at the probes of a scene by every name that they have, from the names by the first of
-    each, in the order of the lines; names of the unresolved ones, and a spectrum (f,), (f, p).
-    """
+    """Lines at the probes of a scene by every name of each, which `names` has by the first."""
     size = np.abs(lines.mean)
     around = lines.radius(1 - (1 - CONFIDENCE) / max(size.size, 1))
     every = [(name, k) for k, own in enumerate(names.values()) for name in own]
@@ -126,48 +124,30 @@ def _assessed(
 
 def _undecidable(measured: LinesByName, claim: str) -> str:
     """Why a claim cannot be assessed; nothing if it can."""
-    if claim in OF_SEVERAL:
-        return f"it is about {OF_SEVERAL[claim]} paths or more, and this is a record of one"
+    if claim == OF_SEVERAL:
+        return "it is about several paths, and this is a record of one"
     if not is_resolved(measured, claim):
         lost = ", ".join(measured.unresolved) or "lines that it is about"
         return f"the record is too short, or sampled too slowly, to resolve {lost}"
-    about = _lines_of(measured, claim)
-    if unknown := [name for name in about if np.isnan(measured.radius[name]).any()]:
-        of = f"the noise of {', '.join(unknown)}" if len(unknown) < len(about) else "its noise"
-        return f"{of} is unknown: there are no repetitions, and no bins beside the lines"
-    if claim in OF_PLACES:
-        return _no_peaks(measured, claim)
-    if not (measured.lines["f_AM"] > measured.radius["f_AM"]).any():
-        return "f_AM is not above the noise at any place"
-    return ""
-
-
-def _lines_of(measured: LinesByName, claim: str) -> list[str]:
-    """Names of the lines that a claim is about; all, unless it names some."""
-    for names in NEEDED.get(claim, ()):
-        if measured.frequencies.keys() >= set(names):
-            return list(names)
-    return list(measured.radius)
-
-
-def _no_peaks(measured: LinesByName, claim: str) -> str:
-    """Why peaks cannot be placed: there is no spectrum between the lines, or they are in noise."""
-    if not len(measured.spectrum[0]):
+    known = measured.frequencies.keys()
+    about = next((n for n in NEEDED.get(claim, ()) if known >= set(n)), tuple(known))
+    if any(np.isnan(measured.radius[name]).any() for name in about):
+        return "the noise is unknown: there are no repetitions, and no bins beside the lines"
+    of_places = claim in OF_PLACES
+    if of_places and not len(measured.spectrum[0]):
         return "the record is of single lines, without the spectrum between them"
-    asked = NEEDED["M2"][0] if claim != "S5" else ("f_AM",) if measured.is_am else ("f_d",)
-    faint = [n for n in asked if not (measured.lines[n] > measured.radius[n]).any()]
+    needed = about if of_places else ("f_AM",)
+    faint = [n for n in needed if not (measured.lines[n] > measured.radius[n]).any()]
     return f"{', '.join(faint)} not above the noise at any place" if faint else ""
 
 
 def _where_heard(measured: LinesByName) -> LinesByName:
     """The places alone where f_AM is above the noise."""
     at = measured.lines["f_AM"] > measured.radius["f_AM"]
-    f, amplitude = measured.spectrum
     return replace(
         measured, places=measured.places[at],
         lines={name: a[at] for name, a in measured.lines.items()},
         radius={name: r[at] for name, r in measured.radius.items()},
-        spectrum=(f, amplitude[:, at] if len(f) else amplitude),
     )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from simple_model import Response, resolved_lines, spectrum
 from simple_model.load.sampling import step
 from simple_model.quantities import DISPLACEMENT, QUANTITIES
-from simple_model.response import SETTLE, fit_lines
+from simple_model.response import SETTLE
 from simple_model.typing import Floats
 from skinwave.measure.alignment import AS_GOOD, Alignment, align
 from skinwave.measure.claims import MeasuredClaim, assess_measured, by_name
@@ -39,8 +39,7 @@ AGREES, DIFFERS, NUMERICAL, SILENT, UNKNOWN = (
 )  # fmt: skip
 MEASURED = "measured"  # body and model of what is drawn beside the models
 MOST_DRAWN = 8  # places
-MOST_SEGMENTS = 8  # of a record
-RESOLVED = 2.5  # bins, which lines of a segment are apart at least
+RESOLVED = 2.5  # bins, which lines of half a record are apart at least
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -94,9 +93,8 @@ class MeasuredComparison:
     lines : MeasuredLines, of these
     present : (f, p) float, significance of each line, adjusted for their number; nan if unknown
     unresolved : names of lines of the load that the record cannot resolve
-    extremes : (2, f, p) float, least and largest amplitude of each line in a segment of the record,
-        mean over repetitions: the same if the motion is steady
-    segments : their number
+    halves : (2, f, p) float, amplitudes in both halves of what is fitted of the record; the same
+        if the motion is steady, or if half of it does not resolve the lines
     columns : of the models
     claims : what the measurement alone says of the paper's claims
     """
@@ -107,8 +105,7 @@ class MeasuredComparison:
     lines: MeasuredLines
     present: Floats
     unresolved: tuple[str, ...]
-    extremes: Floats
-    segments: int
+    halves: Floats
     columns: tuple[ModelColumn, ...]
     claims: tuple[MeasuredClaim, ...]
 
@@ -162,17 +159,8 @@ class MeasuredComparison:
 
 
 def compare_measured(asked: Measured, runs: Sequence[Run]) -> MeasuredComparison:
-    """Models beside a measurement, line by line.
-
-    Parameters
-    ----------
-    asked : Measured
-    runs : of one Tacton, at the places of the measurement and, of bodies, in its quantity
-
-    Raises
-    ------
-    ValueError
-        If the record resolves no line of the load.
+    """Models beside a measurement, by runs of one Tacton at its places and, of bodies, in its
+    quantity; raises a ValueError if the record resolves no line of the load.
     """
     measurement = asked.measurement
     bodies = [run for run in runs if run.response.record.of_body]
@@ -180,11 +168,10 @@ def compare_measured(asked: Measured, runs: Sequence[Run]) -> MeasuredComparison
     names, frequencies, unresolved = lines_to_compare(measurement, scene)
     lines = lines_of(measurement, frequencies)
     named = by_name(scene, names, lines, unresolved, _spectrum_of(measurement))
-    segments = _segments(measurement, lines)
     return MeasuredComparison(
         measurement=measurement, scene=scene, names=names, lines=lines,
         present=holm(lines.significances(lines.mean)), unresolved=unresolved,
-        extremes=np.array([segments.min(axis=0), segments.max(axis=0)]), segments=len(segments),
+        halves=_halves(measurement, lines),
         columns=tuple(_column(asked, run, lines) for run in runs),
         claims=tuple(assess_measured(named)),
     )  # fmt: skip
@@ -193,16 +180,9 @@ def compare_measured(asked: Measured, runs: Sequence[Run]) -> MeasuredComparison
 def lines_to_compare(
     measurement: Measurement, scene: Scene
 ) -> tuple[dict[str, tuple[str, ...]], Floats, tuple[str, ...]]:
-    """Lines of the load that both the record and a response of the scene resolve, and the others.
-
-    Returns
-    -------
-    names by the first of each, frequencies (f,) in Hz, and the names of those left out
-
-    Raises
-    ------
-    ValueError
-        If the record resolves none.
+    """Lines of the load that both the record and a response of the scene resolve: names by the
+    first of each, frequencies (f,) in Hz, and the names of those left out. Raises a ValueError if
+    there are none.
     """
     candidates = ASSESSED if len(scene.tacton.foci) == 1 else ()
     clocks = [*_clock(measurement), _silence(sample_times(scene))]
@@ -288,37 +268,28 @@ def overlap(measurement: Measurement, run: Run, delay: float) -> float:
     return min(float(measurement.times[-1]), end) - max(float(measurement.times[0]), begin)
 
 
-def _segments(measurement: Measurement, lines: MeasuredLines) -> Floats:
-    """Amplitudes (k, f, p), mean over repetitions, in as many segments of a record as resolve the
-    lines; of spectra the one that there is.
-    """
-    if measurement.is_spectrum:
-        return np.abs(lines.mean)[None]
-    r, t, p = measurement.values.shape
-    first = int(np.ceil(SETTLE * t))
+def _halves(measurement: Measurement, lines: MeasuredLines) -> Floats:
+    """Amplitudes (2, f, p) in both halves of a record without its start."""
+    whole, count = np.abs(lines.mean), len(measurement.times)
+    half = int((1 - SETTLE) * count) // 2
     apart = np.diff(np.concatenate([[0.0], np.sort(lines.frequencies)])).min()
-    count = int(np.clip((t - first) / measurement.rate * apart / RESOLVED, 1, MOST_SEGMENTS))
-    length = (t - first) // count
-    whole = as_response(measurement, measurement.values.transpose(1, 0, 2).reshape(t, r * p))
-    turned = np.exp(2j * np.pi * np.multiply.outer(lines.frequencies, lines.shifts))
-    found = []
-    for k in range(count):
-        cut = slice(first + k * length, first + (k + 1) * length)
-        part = replace(whole, times=whole.times[cut], values=whole.values[cut])
-        z = fit_lines(part, lines.frequencies, settle=0.0)[0].reshape(-1, r, p)
-        found.append(np.abs((z * turned[:, :, None]).mean(axis=1)))
-    return np.array(found)
+    if not half or half / measurement.rate * apart < RESOLVED:
+        return np.array([whole, whole])
+    parts = (slice(count - 2 * half, count - half), slice(count - half, count))
+    each = (
+        replace(measurement, times=measurement.times[part], values=measurement.values[:, part],
+                drive=np.empty(0))
+        for part in parts
+    )  # fmt: skip
+    return np.array([np.abs(lines_of(m, lines.frequencies, settle=0.0).mean) for m in each])
 
 
 def at_measured(scene: Scene, measurement: Measurement) -> Scene:
     """The scene with probes where was measured or, where that is unknown, with as many; they read
     displacement, as every comparison, and are read in the measured quantity beside it.
 
-    Raises
-    ------
-    ValueError
-        If the quantity is not of normal motion, places are unknown and not as many as probes, or
-        the record resolves no line of the load.
+    Raises a ValueError if the quantity is not of normal motion, places are unknown and not as many
+    as probes, or the record resolves no line of the load.
     """
     if not measurement.record.is_normal:
         known = ", ".join(name for name, q in QUANTITIES.items() if q.is_normal and q.of_body)

@@ -12,6 +12,7 @@ from simple_model.numbers import counted, percent, significant, stated_error, wi
 from skinwave.measure.alignment import opposite_sign
 from skinwave.measure.claims import FAILS, HOLDS
 from skinwave.measure.comparison import LEVEL, UNKNOWN, MeasuredComparison, ModelColumn, overlap
+from skinwave.measure.inspection import flaws
 from skinwave.report.measured import MOST_LINES, lines_figure
 from skinwave.report.palette import label
 from skinwave.results.claims import TEXTS
@@ -24,17 +25,16 @@ STEADY, CLEARLY = 0.8, 6.0  # least over largest amplitude; standard errors betw
 MOST_NAMED = 3  # lines that a sentence names
 MOST_ROWS = 30  # of differences on the page; all are in measured.csv
 CAPTION = (
-    f"At most {MOST_LINES} lines, the strongest. Models are drawn with the delay and the gain "
-    "that fit each best, or that were given. Filled where the difference, amplitude and phase "
-    "together, is beyond the noise."
+    f"The strongest lines, at most {MOST_LINES}. Models are drawn with the delay and the gain that "
+    "fit each best, or that were given. Filled where the difference, amplitude and phase together, "
+    "is beyond the noise."
 )
 METHOD = (
-    "Lines are fitted to each repetition by least squares; gain and delay of each model follow "
-    "from all lines and places, weighed by their noise, and their errors are those of the noise "
-    "alone. A difference is beyond the noise where the chance of one so large, if there were only "
-    f"noise, is below {100 * LEVEL:g} % for all lines and places together (Holm's correction); the "
-    "noise is taken as circular (Victor & Mast 1991). The point kernels are pressures, and their "
-    "gain has that unit."
+    "Lines are fitted to each repetition by least squares. Gain and delay of each model follow "
+    "from all lines and places, weighted by their noise; their errors are those of the noise "
+    "alone. A difference is beyond the noise where the chance of one so large by noise alone is "
+    f"below {100 * LEVEL:g} % for all lines and places together (Holm's correction; Victor & Mast "
+    "1991). The point kernels are pressures, and their gain has that unit."
 )
 NO_CLAIMS = (
     "The claims are about one focus that is modulated by one tone at most, moves along a closed "
@@ -47,12 +47,8 @@ OF_CLAIMS = (
 
 
 def page_part(found: MeasuredComparison, picture: Callable[[str, Figure, str], Picture]) -> Section:
-    """A part of a page: the conclusion, a figure and tables.
-
-    Parameters
-    ----------
-    found : MeasuredComparison
-    picture : makes a part of the page of a name, a figure and its caption
+    """A part of a page: the conclusion, a figure and tables; `picture` makes a part of a name, a
+    figure and its caption.
     """
     main, at = found.main, found.drawn_places
     columns = {c.run.column: c for c in found.columns}
@@ -62,6 +58,13 @@ def page_part(found: MeasuredComparison, picture: Callable[[str, Figure, str], P
         {name: c.model[:, at] for name, c in columns.items()},
         {name: c.differs[:, at] for name, c in columns.items()}, found.measurement.record,
     )  # fmt: skip
+    largest = np.argsort(-np.abs(found.lines.mean - main.model), axis=None, kind="stable")
+    rows, unit = list(_rows(found, main)), found.measurement.record.column
+    differences = Table(_columns(found), [rows[k] for k in largest]).only(
+        "line", "frequency_hz", "x_mm", "y_mm", f"measured_{unit}", f"measured_{unit}_error",
+        f"model_{unit}", f"difference_{unit}", "phase_off_deg", "p_adjusted", "finding",
+        most=MOST_ROWS,
+    )  # fmt: skip
     return Section("Beside the measurement", [
         *(conclusion(found, column) for column in found.bodies),
         *remarks(found),
@@ -69,7 +72,7 @@ def page_part(found: MeasuredComparison, picture: Callable[[str, Figure, str], P
         columns_table(found),
         METHOD,
         Details(f"Largest differences of the {label(main.run.column)}, line by line",
-                [differences_table(found, main)]),
+                [differences]),
         Section("Which of the paper's claims the measurement itself shows",
                 [OF_CLAIMS, claims_table(found)] if found.claims else [NO_CLAIMS], 3),
         Section("The models by themselves", [], 3),
@@ -77,7 +80,7 @@ def page_part(found: MeasuredComparison, picture: Callable[[str, Figure, str], P
 
 
 def write_tables(folder: Path, found: MeasuredComparison) -> None:
-    """measured.csv, a row for each line, place and model, and measured-claims.csv."""
+    """Write measured.csv, a row for each line, place and model, and measured-claims.csv."""
     table = Table(_columns(found), (row for c in found.columns for row in _rows(found, c)))
     (folder / "measured.csv").write_bytes(table.to_csv())
     claims = ((c.claim, c.finding, c.sentence) for c in found.claims)
@@ -87,13 +90,20 @@ def write_tables(folder: Path, found: MeasuredComparison) -> None:
 
 def columns_table(found: MeasuredComparison) -> Table:
     """Misfit, gain and delay of each model."""
-    rows = []
+    rows, asked = [], found.measurement.record
     for column in found.columns:
-        a, known = column.alignment, np.isfinite(column.significance)
-        beyond = f"{column.differs.sum()} of {known.sum()}" if known.any() else UNKNOWN
+        a, known, own = (
+            column.alignment,
+            np.isfinite(column.significance),
+            column.run.response.record,
+        )
+        per = 1.0 if own == asked else asked.per_unit
+        unit = "" if own == asked else f" {asked.shown} per {own.shown}"
         rows.append((
-            label(column.run.column), 100 * column.misfit, 100 * found.noise, beyond,
-            _gain(found, column), _fitted(1e3 * a.delay, 1e3 * a.delay_error), 1e3 * a.repeats,
+            label(column.run.column), 100 * column.misfit, 100 * found.noise,
+            f"{column.differs.sum()} of {known.sum()}" if known.any() else UNKNOWN,
+            _fitted(per * a.gain, per * a.gain_error) + unit,
+            _fitted(1e3 * a.delay, 1e3 * a.delay_error), 1e3 * a.repeats,
         ))  # fmt: skip
     return Table((
         "model", Column("misfit", unit="%"), Column("of noise alone", unit="%", digits=2),
@@ -102,28 +112,8 @@ def columns_table(found: MeasuredComparison) -> Table:
     ), rows)  # fmt: skip
 
 
-def _gain(found: MeasuredComparison, column: ModelColumn) -> str:
-    a, asked, own = column.alignment, found.measurement.record, column.run.response.record
-    if own == asked:
-        return _fitted(a.gain, a.gain_error)
-    said = _fitted(asked.per_unit * a.gain, asked.per_unit * a.gain_error)
-    return f"{said} {asked.shown} per {own.shown}"
-
-
 def _fitted(value: float, error: float) -> str:
     return with_error(value, error) if error else f"{significant(value, 4)} (given)"
-
-
-def differences_table(found: MeasuredComparison, column: ModelColumn) -> Table:
-    """The largest differences of a model, of amplitude and phase together."""
-    largest = np.argsort(-np.abs(found.lines.mean - column.model), axis=None, kind="stable")
-    rows = list(_rows(found, column))
-    unit = found.measurement.record.column
-    return Table(_columns(found), [rows[k] for k in largest]).only(
-        "line", "frequency_hz", "x_mm", "y_mm", f"measured_{unit}", f"measured_{unit}_error",
-        f"model_{unit}", f"difference_{unit}", "phase_off_deg", "p_adjusted", "finding",
-        most=MOST_ROWS,
-    )  # fmt: skip
 
 
 def _columns(found: MeasuredComparison) -> list[Column]:
@@ -149,15 +139,15 @@ def _rows(found: MeasuredComparison, column: ModelColumn) -> Iterator[tuple[Any,
     for k, name in enumerate(found.names):
         for p, (x, y) in enumerate(found.scene.probe_points):
             z, m = lines.mean[k, p], column.model[k, p]
-            turn = float(np.degrees(np.angle(m * z.conj())))
-            numbers = (
+            measured = (
                 unit * abs(z), unit * lines.amplitude_error[k, p], np.angle(z),
                 lines.phase_error[k, p],
             )  # fmt: skip
-            of_model = unit * abs(m), np.angle(m), turn, unit * abs(z - m)
+            turn = np.degrees(np.angle(m * z.conj()))
             yield (
                 name, float(lines.frequencies[k]), p + 1, float(1e3 * x), float(1e3 * y),
-                *map(float, numbers), column.run.column, *map(float, of_model),
+                *map(float, measured), column.run.column,
+                *map(float, (unit * abs(m), np.angle(m), turn, unit * abs(z - m))),
                 float(column.significance[k, p]), str(findings[k, p]),
             )  # fmt: skip
 
@@ -186,53 +176,40 @@ def conclusion(found: MeasuredComparison, column: ModelColumn) -> str:
         )
     left += f", where noise alone leaves {percent(found.noise)}"
     if not differs.any():
+        around = found.lines.radius(1 - LEVEL / found.lines.variance.size)
+        least = float(np.nanmedian(around) / np.abs(found.lines.mean).max())
         return (
-            f"The {name} agrees with the data within the noise: of {known} differences of "
-            f"lines at places none is beyond it; {left}. Differences below "
-            f"{percent(_detectable(found))} of the strongest line would not be seen."
+            f"The {name} agrees with the data within the noise in all {known} lines at places; "
+            f"{left}. Differences below {percent(least)} of the strongest line would not be seen."
         )
-    few = int((differs & found.is_numerical(column)).sum())
+    few, many = int((differs & found.is_numerical(column)).sum()), int(differs.sum())
     error = stated_error(column.run.response.expected_error)
     numerical = f" ({few} of them within the model's numerical error of {error})" if few else ""
-    if few == differs.sum():
-        return (
-            f"The {name} agrees with the data within the noise and its own numerical error: of "
-            f"{known} differences of lines at places {few} are beyond the noise{numerical}; {left}."
-        )
-    return (
-        f"The {name} does not agree with the data everywhere: {differs.sum()} of {known} "
-        f"differences of lines at places are beyond the noise{numerical}: "
-        f"{_where(found, column)}. {_sentence(left)}"
-    )
+    beyond = f"{many} of {known} differences of lines at places are beyond the noise{numerical}"
+    if few == many:
+        said = f"The {name} agrees with the data within the noise and its own numerical error"
+        return f"{said}: {beyond}; {left}."
+    said = f"The {name} does not agree with the data everywhere"
+    return f"{said}: {beyond}: {_where(found, column)}. {_sentence(left)}"
 
 
 def _sentence(text: str) -> str:
     return f"{text[0].upper()}{text[1:]}."
 
 
-def _detectable(found: MeasuredComparison) -> float:
-    """Median radius of the confidence circles, over the strongest line."""
-    around = found.lines.radius(1 - LEVEL / found.lines.variance.size)
-    return float(np.nanmedian(around) / np.abs(found.lines.mean).max())
-
-
 def _where(found: MeasuredComparison, column: ModelColumn) -> str:
     """The lines and places where differences are beyond the noise, the largest first."""
     shown = column.differs & ~found.is_numerical(column)
     away = np.where(shown, np.abs(found.lines.mean - column.model), 0)
-    order = np.argsort(-away.max(axis=1), kind="stable")
-    lines = [k for k in order if shown[k].any()]
+    lines = [k for k in np.argsort(-away.max(axis=1), kind="stable") if shown[k].any()]
     names, asked, said = list(found.names), found.measurement.record, []
     for k in lines[:MOST_NAMED]:
         p = int(np.argmax(away[k]))
         x, y = 1e3 * found.scene.probe_points[p]
-        a, b = found.lines.mean[k, p], column.model[k, p]
-        turn = np.degrees(np.angle(b * np.conj(a)))
-        off = f", {turn:+.0f} degrees off" if abs(b) > 0.1 * abs(a) and abs(turn) >= 1 else ""
+        a, b = (float(abs(z[k, p])) for z in (found.lines.mean, column.model))
         said.append(
-            f"{names[k]} at {shown[k].sum()} of {away.shape[1]} places (most at "
-            f"{x:.3g}, {y:.3g} mm: measured {asked.text(float(abs(a)))}, model "
-            f"{asked.text(float(abs(b)))}{off})"
+            f"{names[k]} at {shown[k].sum()} of {away.shape[1]} places (most at {x:.3g}, {y:.3g} "
+            f"mm: measured {asked.text(a)}, model {asked.text(b)})"
         )
     more = len(lines) - len(said)
     return ", ".join(said) + (f" and {counted(more, 'more line')}" if more else "")
@@ -240,8 +217,6 @@ def _where(found: MeasuredComparison, column: ModelColumn) -> str:
 
 def remarks(found: MeasuredComparison) -> list[str]:
     """Sentences on the record: repetitions, what is unresolved, and what was assumed."""
-    from skinwave.measure.inspection import flaws  # which loads statistics
-
     measurement, main = found.measurement, found.main
     said = f"{measurement.name or 'The measurement'}: {measurement.record.words} at "
     said += f"{counted(len(measurement.places), 'place')}, {_repetitions(found)}"
@@ -261,12 +236,10 @@ def remarks(found: MeasuredComparison) -> list[str]:
 def _repetitions(found: MeasuredComparison) -> str:
     """How often the motion was measured, and where the noise is from."""
     shifts, lines = found.lines.shifts, found.lines
-    r = len(shifts)
-    if r > 1:
+    if (r := len(shifts)) > 1:
         step = f"; they are out of step by up to {1e3 * np.ptp(shifts):.3g} ms, and were shifted"
-        said = f"{r} repetitions, whose spread is the noise"
-        said += (step if shifts.any() else ", in step within it") + "."
-        return said + " More of them would tell smaller differences." * (r < FEW)
+        said = f"{r} repetitions, whose spread is in the noise{step if shifts.any() else ''}."
+        return said + " More of them would show smaller differences." * (r < FEW)
     unknown = int(np.isnan(lines.variance).any(axis=1).sum())
     if unknown == len(lines.frequencies):
         return "one repetition, whose noise is unknown."
@@ -276,10 +249,10 @@ def _repetitions(found: MeasuredComparison) -> str:
 
 def _outside(found: MeasuredComparison, column: ModelColumn) -> list[str]:
     """A sentence where much of the record lies outside the Tacton at its delay."""
-    times, delay = found.measurement.times, column.alignment.delay
     if found.measurement.is_spectrum:
         return []
-    inside, most = overlap(found.measurement, column.run, delay), float(np.ptp(times))
+    delay, most = column.alignment.delay, float(np.ptp(found.measurement.times))
+    inside = overlap(found.measurement, column.run, delay)
     if inside > SURELY * min(most, float(np.ptp(column.run.response.times))):
         return []
     return [
@@ -293,12 +266,13 @@ def _changes(found: MeasuredComparison) -> list[str]:
     """A sentence on a strongest line that is not steady, as of a record that begins too early."""
     size = np.abs(found.lines.mean)
     k, p = np.unravel_index(int(np.argmax(size)), size.shape)
-    low, high = found.extremes[:, k, p]
-    noise = np.sqrt(np.nan_to_num(found.lines.variance[k, p]) * found.segments / 2)
+    low, high = np.sort(found.halves[:, k, p])
+    noise = np.sqrt(np.nan_to_num(found.lines.variance[k, p]))  # of half a record
     if low > STEADY * high or high - low < CLEARLY * noise:
         return []
     asked, name = found.measurement.record, list(found.names)[k]
     return [
-        f"The motion is not steady: over the record {name} changes from {asked.text(low)} to "
-        f"{asked.text(high)} at one place; cut off what lies before and after the Tacton."
+        f"The motion is not steady: {name} is {asked.text(low)} in one half of the record and "
+        f"{asked.text(high)} in the other at one place; cut off what lies before and after the "
+        "Tacton."
     ]

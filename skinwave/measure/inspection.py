@@ -1,15 +1,15 @@
-"""Inspection of a measurement: duration, places, lines, noise floor, mains hum, clipping, and what
-is missing.
-"""
+"""Inspection of a measurement: lines, noise floor, mains hum, clipping, and what is missing."""
 
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from simple_model import MovingPressure
 from simple_model.load.line_names import line_names
+from simple_model.response import SETTLE
 from simple_model.typing import Floats
+from skinwave.measure.lines import bin_width
 from skinwave.measure.measurement import Measurement
 from skinwave.measure.noise_floor import floor_of
 from skinwave.measure.spectral_lines import (
@@ -22,16 +22,15 @@ from skinwave.measure.spectral_lines import (
     spectral_lines,
 )
 
-MOST_VALUES = 3_000_000  # that lines are looked for in
-MOST_SAMPLES = 500_000  # of a waveform
+MOST_VALUES = 2_000_000  # that lines are looked for in
+MOST_SAMPLES = 100_000  # of a waveform
 FEWEST_BINS = 64  # equally spaced frequencies of a spectrum that has a noise floor
 SAME = 4.0  # standard errors between two lines that may be one
 
 MAINS = (50.0, 60.0)  # Hz
 WANDER = 0.004  # of its frequency: how far the mains of any grid are from it
-HIGHEST = 20  # multiple of the mains frequency
+HIGHEST, FALSIFYING = 20, 7  # multiple of the mains frequency: of hum, and of a line of the load
 STRONG = 1e-2  # of the strongest line of the load: what hum may be mistaken for
-MULTIPLES = 7  # of the mains frequency that may falsify a line of the load
 
 RUN, RUNS = 3, 2  # clipped are so many samples in a row at an extreme, so many times,
 LONG = 20  # or one run as long
@@ -49,7 +48,6 @@ class Inspection:
     spectrum : LineSpectrum of the `kept` places and samples; None where there are too few
     origins : of its lines: "mains 50 Hz", "drive" or ""
     kept : numbers of the places whose lines were looked for
-    noise : (p,), of the kept places, unit/sqrt(Hz); of spectra, the unit
     clipped : (r, p) int, samples that are cut off
     constant : numbers of the places where nothing varies
     missing : sentences
@@ -59,7 +57,6 @@ class Inspection:
     spectrum: LineSpectrum | None
     origins: tuple[str, ...]
     kept: np.ndarray
-    noise: Floats
     clipped: np.ndarray
     constant: np.ndarray
     missing: tuple[str, ...]
@@ -69,6 +66,15 @@ class Inspection:
         """The lines found, by frequency."""
         return self.spectrum.lines if self.spectrum else ()
 
+    @property
+    def noise(self) -> Floats:
+        """Noise floor (p,) of the kept places, the median over frequency, unit/sqrt(Hz); of
+        spectra, the unit; nan if it is unknown.
+        """
+        if self.spectrum is None:
+            return np.full(len(self.kept), np.nan)
+        return np.sqrt(np.median(self.spectrum.floor[LOWEST:-1], axis=0))
+
 
 def inspect(measured: Measurement, *, alarm: float = ALARM) -> Inspection:
     """Inspection of a measurement, with lines of which noise alone has any with the probability
@@ -76,53 +82,48 @@ def inspect(measured: Measurement, *, alarm: float = ALARM) -> Inspection:
     """
     if not 0 < alarm < 1:
         raise ValueError(f"the probability {alarm:g} of a false alarm must be between 0 and 1")
-    kept, samples, said = _kept(measured)
-    spectrum = _spectrum(measured, kept, samples, alarm)
-    noise = np.full(len(kept), np.nan)
-    if spectrum is not None:
-        noise = np.sqrt(np.median(spectrum.floor[LOWEST:-1], axis=0))
-        if spectrum.begun:
-            said.append(
-                f"the first {spectrum.begun:.3g} s are not steady and left out of the lines"
-            )
+    missing = list(measured.remarks)
+    if np.isnan(measured.places).any() and not any("place" in said for said in missing):
+        missing.append("places are not known; give --places")
+    if not len(measured.drive):
+        missing.append("no drive is recorded: delays against it are unknown")
+    if len(measured.values) == 1:
+        missing.append("one repetition: how far it repeats is unknown")
+    constant = np.flatnonzero(np.ptp(measured.values, axis=1).max(axis=0) == 0)
+    varying = np.setdiff1d(np.arange(len(measured.places)), constant)
+    part = _looked_at(measured)
+    most = max(1, MOST_VALUES // ((part.stop - part.start) * len(measured.values)))
+    kept = varying
+    if len(varying) > most:
+        kept = varying[np.linspace(0, len(varying) - 1, most).astype(int)]
+        missing.append(f"lines were looked for at {len(kept)} of {len(varying)} places")
+    if not measured.is_spectrum and part.stop < len(measured.times):
+        missing.append(f"lines were looked for in the first {part.stop / measured.rate:g} s")
+    spectrum = _spectrum(measured, kept, part, alarm)
     return Inspection(
-        measured=measured, spectrum=spectrum, origins=_origins(measured, spectrum, samples),
-        kept=kept, noise=noise, clipped=_clipped_samples(measured), constant=_constant(measured),
-        missing=(*_missing(measured), *said),
+        measured=measured, spectrum=spectrum, origins=_origins(measured, spectrum, part), kept=kept,
+        clipped=_clipped_samples(measured), constant=constant, missing=tuple(missing),
     )  # fmt: skip
 
 
-def _constant(measured: Measurement) -> np.ndarray:
-    """Numbers of the places where nothing varies."""
-    return np.flatnonzero(np.ptp(measured.values, axis=1).max(axis=0) == 0)
-
-
-def _kept(measured: Measurement) -> tuple[np.ndarray, int, list[str]]:
-    """Numbers of places and of samples that lines are looked for in, and why not in all."""
-    varying = np.setdiff1d(np.arange(measured.values.shape[2]), _constant(measured))
-    count, runs = len(measured.axis), len(measured.values)
-    samples = count if measured.is_spectrum else min(count, MOST_SAMPLES)
-    most = max(1, MOST_VALUES // (samples * runs))
-    chosen = varying[np.unique(np.linspace(0, len(varying) - 1, most).astype(int))] if len(
-        varying) > most else varying  # fmt: skip
-    said = []
-    if samples < count:
-        said.append(f"lines were looked for in the first {samples / measured.rate:g} s")
-    if len(chosen) < len(varying):
-        said.append(f"lines were looked for at {len(chosen)} of {len(varying)} places")
-    return chosen, samples, said
+def _looked_at(measured: Measurement) -> slice:
+    """Samples that lines are looked for in: as in a comparison without the first quarter, where a
+    motion may begin; all of spectra.
+    """
+    count = min(len(measured.axis), MOST_SAMPLES)
+    return slice(0 if measured.is_spectrum else int(SETTLE * count), count)
 
 
 def _spectrum(
-    measured: Measurement, kept: np.ndarray, samples: int, alarm: float
+    measured: Measurement, kept: np.ndarray, part: slice, alarm: float
 ) -> LineSpectrum | None:
     if not len(kept):
         return None
     if measured.is_spectrum:
         return _of_amplitudes(measured, kept, alarm)
-    if samples < FEWEST:
+    if part.stop - part.start < FEWEST:
         return None
-    return spectral_lines(measured.values[:, :samples, kept], measured.rate, alarm=alarm)
+    return spectral_lines(measured.values[:, part, kept], measured.rate, alarm=alarm)
 
 
 def _of_amplitudes(measured: Measurement, kept: np.ndarray, alarm: float) -> LineSpectrum | None:
@@ -130,53 +131,42 @@ def _of_amplitudes(measured: Measurement, kept: np.ndarray, alarm: float) -> Lin
 
     The frequency of one is within half a step, whose uniform distribution has the standard error.
     """
-    steps = np.diff(measured.frequencies)
-    if len(steps) < FEWEST_BINS - 1 or np.ptp(steps) > 1e-3 * steps.mean():
+    width, runs = bin_width(measured), len(measured.values)
+    if not width or len(measured.frequencies) < FEWEST_BINS:
         return None
-    runs, error = len(measured.values), float(steps.mean()) / np.sqrt(12)
     density = np.mean(np.abs(measured.values[:, :, kept]) ** 2, axis=0)
     floor = floor_of(density, runs)
-    bins, chance = peaks(density, floor, runs, alarm, np.empty(0))
+    found, chance = peaks(density, floor, runs, alarm, np.empty(0))
+    bins = np.round(found).astype(int)
     lines = tuple(
-        SpectralLine(frequency=float(measured.frequencies[int(bins[k])]), error=error,
-                     amplitudes=np.sqrt(density[int(bins[k])]), false_alarm=float(chance[k]))
+        SpectralLine(frequency=float(measured.frequencies[bins[k]]), error=width / np.sqrt(12),
+                     amplitudes=np.sqrt(density[bins[k]]), false_alarm=float(chance[k]))
         for k in np.argsort(bins)
     )  # fmt: skip
     return LineSpectrum(lines=lines, frequencies=measured.frequencies, density=density, floor=floor)
 
 
-def _origins(measured: Measurement, spectrum: LineSpectrum | None, samples: int) -> tuple[str, ...]:
+def _origins(measured: Measurement, spectrum: LineSpectrum | None, part: slice) -> tuple[str, ...]:
     """Origins of the lines: the drive, or else mains hum."""
     if spectrum is None:
         return ()
-    driven: tuple[SpectralLine, ...] = ()
-    duration = samples / measured.rate - spectrum.begun if not measured.is_spectrum else np.inf
-    if len(measured.drive) >= samples and not measured.is_spectrum and np.ptp(measured.drive) > 0:
-        driven = spectral_lines(measured.drive[None, :samples, None], measured.rate).lines
-    of_drive = {
-        k for k, line in enumerate(spectrum.lines) if any(
-            abs(line.frequency - one.frequency) <= _tolerance(line.error, one.error, duration)
-            for one in driven)
-    }  # fmt: skip
-    hum = hum_of(spectrum.lines, duration, of_drive)
-    return tuple("drive" if k in of_drive else hum.get(k, "") for k in range(len(spectrum.lines)))
+    duration, driven = np.inf, set()
+    if not measured.is_spectrum:
+        duration = (part.stop - part.start) / measured.rate
+        if len(measured.drive) and np.ptp(measured.drive) > 0:
+            of_drive = spectral_lines(measured.drive[None, part, None], measured.rate).lines
+            driven = {
+                k for k, line in enumerate(spectrum.lines)
+                if any(_may_be_one(line, other, 1, duration) for other in of_drive)
+            }  # fmt: skip
+    hum = hum_of(spectrum.lines, duration, driven)
+    return tuple("drive" if k in driven else hum.get(k, "") for k in range(len(spectrum.lines)))
 
 
-def _tolerance(error: float, other: float, duration: float) -> float:
-    """How far in Hz two lines of such standard errors may be apart if they are one."""
-    return SAME * float(np.hypot(error, other)) + 0.05 / duration
-
-
-def _missing(measured: Measurement) -> list[str]:
-    """Sentences on what a comparison with a model would need and the file has not."""
-    found = list(measured.remarks)
-    if np.isnan(measured.places).any() and not any("place" in said for said in found):
-        found.append("places are not known; give --places")
-    if not len(measured.drive):
-        found.append("no drive is recorded: delays against it are unknown")
-    if len(measured.values) == 1:
-        found.append("one repetition: how far it repeats is unknown")
-    return found
+def _may_be_one(line: SpectralLine, other: SpectralLine, n: int, duration: float) -> bool:
+    """Whether a line is the n-th multiple of another within their errors."""
+    within = SAME * float(np.hypot(line.error, n * other.error)) + 0.05 / duration
+    return abs(line.frequency - n * other.frequency) <= within
 
 
 def hum_of(
@@ -184,44 +174,29 @@ def hum_of(
 ) -> dict[int, str]:
     """Names of lines that may be mains hum by their number in `lines`, such as "mains 3 x 50 Hz".
 
-    It takes a line at the mains frequency, or at twice and three times it: 200, 400 and 600 Hz are
-    multiples of 50 Hz as well, and may be a load's own. A multiple is one of the mains frequency as
-    found, not of 50 Hz, within its standard error and a twentieth of 1/duration. One that is
-    stronger than the mains frequency itself may be the load's: "3 x 50 Hz, mains or load". Lines
-    whose numbers are `driven` are in the drive of the record, and their multiples are no hum; the
-    duration is in s.
+    It takes a line at the mains frequency: 200, 400 and 600 Hz may be a load's own. A multiple is
+    one of the mains frequency as found, not of 50 Hz. Lines whose numbers are `driven` are in the
+    drive of the record, and their multiples are no hum; the duration is in s.
     """
     found: dict[int, str] = {}
-    for mains, line, first in _bases(lines, driven):
-        base, spread = line.frequency / first, line.error / first
-        for k, other in enumerate(lines):
-            n = round(other.frequency / base)
-            apart = abs(other.frequency - n * base)
-            if 1 <= n <= HIGHEST and apart <= _tolerance(other.error, n * spread, duration):
-                name = f"{n} x {mains:g} Hz" if n > 1 else f"{mains:g} Hz"
-                loud = n > 1 and (other.amplitudes > line.amplitudes).any()
-                found.setdefault(k, f"{name}, mains or load" if loud else f"mains {name}")
+    for mains, base in _mains(lines, driven):
+        for k, line in enumerate(lines):
+            n = round(line.frequency / base.frequency)
+            if 1 <= n <= HIGHEST and _may_be_one(line, base, n, duration):
+                found.setdefault(k, f"mains {f'{n} x ' * (n > 1)}{mains:g} Hz")
     return found
 
 
-def _bases(
+def _mains(
     lines: Sequence[SpectralLine], driven: Container[int]
-) -> Iterator[tuple[float, SpectralLine, int]]:
-    """Mains frequencies that lines have, the line that tells of each, and which multiple it is."""
+) -> list[tuple[float, SpectralLine]]:
+    """Mains frequencies that lines have, and the line nearest to each."""
+    found = []
     for mains in MAINS:
-        at = {n: _nearest(lines, n * mains, n * mains * WANDER) for n in (1, 2, 3)}
-        if at[1] is None and (at[2] is None or at[3] is None):
-            continue
-        first = next(n for n in (1, 2) if at[n] is not None)
-        k = at[first]
-        if k is not None and k not in driven:
-            yield mains, lines[k], first
-
-
-def _nearest(lines: Sequence[SpectralLine], frequency: float, within: float) -> int | None:
-    """Number of the line nearest to a frequency, if it is within so many Hz."""
-    apart = np.array([abs(line.frequency - frequency) for line in lines])
-    return int(apart.argmin()) if apart.min(initial=np.inf) <= within else None
+        near = [line for k, line in enumerate(lines)
+                if k not in driven and abs(line.frequency - mains) <= WANDER * mains]  # fmt: skip
+        found += [(mains, min(near, key=lambda line: abs(line.frequency - mains)))] if near else []
+    return found
 
 
 def clipped(waveform: Floats) -> int:
@@ -230,15 +205,13 @@ def clipped(waveform: Floats) -> int:
     A peak that rounding makes flat has as many samples in the next step below it; one that is cut
     off has not.
     """
-    if np.ptp(waveform) == 0:
-        return 0
-    return _cut_off(waveform) + _cut_off(-waveform)
+    return _cut_off(waveform) + _cut_off(-waveform) if np.ptp(waveform) > 0 else 0
 
 
 def _clipped_samples(measured: Measurement) -> np.ndarray:
     """Samples (r, p) that are cut off, by repetition and place; none of spectra."""
     if measured.is_spectrum:
-        return np.zeros((len(measured.values), measured.values.shape[2]), int)
+        return np.zeros((len(measured.values), len(measured.places)), int)
     return np.array([[clipped(waveform) for waveform in run.T] for run in measured.values])
 
 
@@ -250,8 +223,7 @@ def _cut_off(x: Floats) -> int:
     if (lengths >= RUN).sum() < RUNS and lengths.max() < LONG:
         return 0
     band = min(top - BELOW * np.ptp(x) / 2, x[x < top].max())
-    below = int(((x < top) & (x >= band)).sum())
-    count = int(at_top.sum())
+    count, below = int(at_top.sum()), int(((x < top) & (x >= band)).sum())
     return count if count > EXCESS * below else 0
 
 
@@ -279,21 +251,21 @@ def _hum(measured: Measurement, pressure: MovingPressure) -> list[str]:
     strong = load.strengths >= STRONG * load.strengths.max(initial=0.0)
     f, names = load.frequencies[strong], np.array(load.names)[strong]
     apart = 1 / float(np.ptp(measured.times))
-    multiples = np.multiply.outer(np.arange(1, MULTIPLES + 1), MAINS).ravel()
-    if not (np.abs(f[:, None] - multiples) <= apart + WANDER * multiples).any():
-        return []
-    kept, samples, _ = _kept(measured)
-    spectrum = _spectrum(measured, kept, samples, ALARM)
-    lines, said = spectrum.lines if spectrum else (), []
+
+    def on(mains: float, within: float) -> np.ndarray:
+        n = np.clip(np.round(f / mains), 1, FALSIFYING)
+        return np.asarray(np.abs(f - n * mains) <= apart + within * n * mains)
+
+    if not any(on(mains, WANDER).any() for mains in MAINS):
+        return []  # and no search for lines, which takes long
+    lines = inspect(measured).lines
     driven = [k for k, x in enumerate(lines) if (np.abs(f - x.frequency) <= apart).any()]
-    for _, line, first in _bases(lines, driven):
-        base = line.frequency / first
-        n = np.round(f / base)
-        on = (n >= 1) & (n <= MULTIPLES) & (np.abs(f - n * base) <= apart)
-        if on.any():
+    said = []
+    for _, line in _mains(lines, driven):
+        if (near := on(line.frequency, 0.0)).any():
             said.append(
-                f"there is mains hum of {base:.4g} Hz, and {', '.join(names[on])} of the load "
-                f"{'is' if on.sum() == 1 else 'are'} no further from a multiple of it than the "
-                "record resolves: what is measured there may be hum"
+                f"there is mains hum of {line.frequency:.4g} Hz, and {', '.join(names[near])} of "
+                "the load cannot be resolved from a multiple of it: what is measured there may be "
+                "hum"
             )
     return said

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from simple_model.numbers import counted, significant
+from simple_model.response import SETTLE
 from skinwave.measure import writing
 from skinwave.measure.inspection import Inspection
 from skinwave.measure.spectral_lines import LOWEST
@@ -30,38 +31,29 @@ COLUMNS = (
     Column("false_alarm", "false alarm", digits=1), "what",
 )  # fmt: skip
 CAPTION = (
-    "Waveforms where they are largest, each above the last, mean of the repetitions. Spectra of "
-    "these, in the same colours: one-sided density of amplitude with a Hann window; dashed: their "
-    "noise floor without the lines; triangles: lines found, grey ones mains hum. Map: root mean "
-    "square about the mean."
-)
-SPECTRA = (
-    "Magnitudes at the places where they are largest; dashed: running median; triangles: lines "
-    "found. Map: root mean square over frequency."
+    "The places where the motion is largest. Spectra: one-sided density of amplitude with a Hann "
+    "window, or magnitudes; dashed: the noise floor without the lines; triangles: lines found, "
+    "grey ones mains hum. Map: root mean square about the mean."
 )
 NONE = "No line rises above the noise floor."
 EXPLAINED = (
-    "The false alarm is the probability that noise alone has any line as high in the whole file: "
-    "that of the F distribution of a periodogram over its running median, times bins and places. "
-    "The standard error of a frequency is the Cramér-Rao bound in the noise found beside it. Of "
-    "several lines within 1.5 over the duration one is named. What is called mains is a multiple "
-    "of one frequency near 50 or 60 Hz that is itself there; what is called drive is a line of the "
-    "recorded drive."
+    "The false alarm is the probability that noise alone has any line as high in the whole file. "
+    "The standard error of a frequency is the Cramér-Rao bound in the noise beside it. A line that "
+    "is mains is 50 or 60 Hz or a multiple of it; one that is drive is in the recorded drive."
 )
 
 
 def write(folder: Path, found: Inspection) -> None:
-    """index.html, measured.png, found-lines.csv, measurement.npz and, unless large, .csv."""
+    """Write index.html, measured.png, found-lines.csv, measurement.npz and, unless large, .csv."""
     measured = found.measured
     (folder / "measurement.npz").write_bytes(writing.npz(measured))
     if measured.values.size <= MOST_CELLS:
         (folder / "measurement.csv").write_bytes(writing.table(measured))
     (folder / "found-lines.csv").write_bytes(line_table(found).to_csv())
-    caption = SPECTRA if measured.is_spectrum else CAPTION
     Report(
         f"{measured.name}: what was measured", verdict=[" ".join(sentences(found))],
         parts=[
-            Picture(png(figure(found)), caption, "measured"),
+            Picture(png(figure(found)), CAPTION, "measured"),
             Section("Lines", [strongest(found), EXPLAINED] if found.lines else [NONE]),
             Section("Missing or assumed", found.missing or ["Nothing."]),
         ],
@@ -90,14 +82,16 @@ def strongest(found: Inspection) -> Table:
 def sentences(found: Inspection) -> list[str]:
     """Sentences on what was measured, on noise, clipping and places where nothing varies."""
     measured, where = found.measured, np.flatnonzero(found.clipped.sum(axis=0))
-    said = [_content(found), _noise(found)]
-    if measured.is_spectrum:
-        said.append("Clipping cannot be seen in spectra.")
-    elif len(where):
+    record, noise = measured.record, found.noise[np.isfinite(found.noise)]
+    said = [_content(found), "Too short or too sparse for a noise floor and for lines."]
+    if len(noise):
+        low, high = (significant(record.per_unit * x) for x in (noise.min(), noise.max()))
+        unit = record.shown + "/√Hz" * (not measured.is_spectrum)
+        level = low if low == high else f"{low} to {high}"
+        said[1] = f"Noise floor {level} {unit}, the median over frequency without the lines."
+    if len(where):
         said.append(f"Clipped: {int(found.clipped.sum()):,} samples in runs at the same extreme, "
                     f"at {measured.place_names(where)}.")  # fmt: skip
-    else:
-        said.append("No clipping: no runs of samples at the same extreme.")
     if len(found.constant) and len(measured.axis) > 1:
         said.append(f"Nothing varies at {len(found.constant)} of the places: "
                     f"{measured.place_names(found.constant)}.")  # fmt: skip
@@ -109,26 +103,13 @@ def _content(found: Inspection) -> str:
     said = f"{measured.record.name.capitalize()} at {counted(len(measured.places), 'place')}, "
     said += counted(len(measured.values), "repetition")
     if measured.is_spectrum:
-        step = np.diff(axis)
-        even = len(step) and np.ptp(step) < 1e-3 * step.mean()
-        apart = f" in steps of {significant(step.mean())} Hz" if even else ""
-        return f"{said}: {len(axis)} complex amplitudes, {axis[0]:g} to {axis[-1]:g} Hz{apart}."
+        return f"{said}: {len(axis)} complex amplitudes, {axis[0]:g} to {axis[-1]:g} Hz."
     lasts = len(axis) / measured.rate if len(axis) > 1 else 0.0
+    resolved = significant(1 / (1 - SETTLE) / lasts) if lasts else "-"
     return (
-        f"{said}: {len(axis):,} samples at {measured.rate:,.6g} Hz, "
-        f"{significant(lasts)} s, so that lines {significant(1 / lasts) if lasts else '-'} Hz "
-        "apart are resolved."
+        f"{said}: {len(axis):,} samples at {measured.rate:,.6g} Hz, {significant(lasts)} s, so "
+        f"that lines {resolved} Hz apart are resolved."
     )
-
-
-def _noise(found: Inspection) -> str:
-    record, noise = found.measured.record, found.noise[np.isfinite(found.noise)]
-    if not len(noise):
-        return "Too short or too sparse for a noise floor and for lines."
-    low, high = (significant(record.per_unit * x) for x in (noise.min(), noise.max()))
-    unit = record.shown + "/√Hz" * (not found.measured.is_spectrum)
-    level = low if low == high else f"{low} to {high}"
-    return f"Noise floor {level} {unit}, the median over frequency without the lines."
 
 
 def text(found: Inspection) -> str:
@@ -177,39 +158,43 @@ def _known(values: Any) -> list[float | None]:
 
 def figure(found: Inspection, style: Style = REPORT) -> Figure:
     """Waveforms, spectra with the lines and the noise floor, and a map of where it moves."""
-    places = found.measured.places
-    known = np.isfinite(places).all() and len(places) >= MAP
-    in_time = not found.measured.is_spectrum
+    measured = found.measured
+    moving = measured.values - (
+        0 if measured.is_spectrum else measured.values.mean(axis=1)[:, None]
+    )
+    rms = measured.record.per_unit * np.sqrt(np.mean(np.abs(moving) ** 2, axis=(0, 1)))
+    known = np.isfinite(measured.places).all() and len(measured.places) >= MAP
+    in_time = not measured.is_spectrum
     panels = in_time + known
     with mpl.rc_context(style.rc):
         drawn = Figure(figsize=style.size(11.0, 7.4 if panels else 4.2), layout="constrained")
         grid = drawn.add_gridspec(2 if panels else 1, 2 if panels == 2 else 1)
-        at = np.argsort(-_rms(found)[found.kept])[:SHOWN]  # of `kept`
+        at = np.argsort(-rms[found.kept])[:SHOWN]  # of `kept`
         if in_time:
             _waveforms(drawn.add_subplot(grid[0, 0]), found, at)
         if known:
-            _map(drawn, drawn.add_subplot(grid[0, -1]), found)
+            ax = drawn.add_subplot(grid[0, -1])
+            x, y = 1e3 * measured.places.T
+            dots = ax.scatter(x, y, c=rms, s=36, cmap="viridis", edgecolors="#00000055",
+                              linewidths=0.4)  # fmt: skip
+            name = f"RMS {measured.record.name}, {measured.record.shown}"
+            drawn.colorbar(dots, ax=ax, label=name)
+            ax.set_aspect("equal", adjustable="datalim")
+            ax.set_xlabel("x, mm")
+            ax.set_ylabel("y, mm")
         _spectra(drawn.add_subplot(grid[-1, :]), found, at)
     return drawn
 
 
-def _rms(found: Inspection) -> np.ndarray:
-    """Root mean square (p,) about the mean, over repetitions; of spectra of the magnitudes."""
-    values = found.measured.values
-    if found.measured.is_spectrum:
-        return np.asarray(np.sqrt(np.mean(np.abs(values) ** 2, axis=(0, 1))))
-    return np.asarray(np.sqrt(np.mean(np.var(values, axis=1), axis=0)))
-
-
 def _waveforms(ax: Axes, found: Inspection, at: np.ndarray) -> None:
-    measured = found.measured
+    """Waveforms where they are largest, each above the last, mean of the repetitions."""
+    measured, places = found.measured, found.kept[at]
     record, mean = measured.record, measured.mean - measured.mean.mean(axis=0)
-    places = found.kept[at]
-    size = np.abs(mean[:, places]).max(axis=1) if len(places) else mean[:, 0]
+    size = np.abs(mean[:, places]).max(axis=1, initial=0.0)
     wide = int(np.searchsorted(measured.times - measured.times[0], WINDOW))
     begin = int(np.clip(int(np.argmax(size)) - wide // 2, 0, max(len(size) - wide, 0)))
     part = slice(begin, begin + wide)
-    step = 2.2 * float(np.abs(mean[part][:, places]).max(initial=0.0)) * record.per_unit or 1.0
+    step = 2.2 * float(size[part].max(initial=0.0)) * record.per_unit or 1.0
     for k, p in enumerate(places):
         offset = (len(places) - 1 - k) * step
         ax.plot(1e3 * measured.times[part], offset + record.per_unit * mean[part, p],
@@ -217,7 +202,6 @@ def _waveforms(ax: Axes, found: Inspection, at: np.ndarray) -> None:
     ax.set_xlabel("time, ms")
     apart = f", {step:.2g} apart" if len(places) > 1 else ""
     ax.set_ylabel(f"{record.words}, {record.shown}{apart}")
-    ax.set_title("waveforms about their mean", fontsize="medium")
     ax.grid(alpha=0.25)
 
 
@@ -229,20 +213,19 @@ def _spectra(ax: Axes, found: Inspection, at: np.ndarray) -> None:
         return
     if spectrum is None:
         f, style = measured.frequencies, "o-"
-        size = np.abs(measured.values[:, :, found.kept[at]]).mean(axis=0)
+        size = record.per_unit * np.abs(measured.values[:, :, found.kept[at]]).mean(axis=0)
     else:
         inner = slice(0 if measured.is_spectrum else LOWEST // 2, -1)
         f, style = spectrum.frequencies[inner], "-"
-        size = np.sqrt(spectrum.density[inner][:, at])
+        size = record.per_unit * np.sqrt(spectrum.density[inner][:, at])
         floor = record.per_unit * np.sqrt(np.median(spectrum.floor[inner][:, at], axis=1))
         ax.plot(f, floor, color=mpl.rcParams["text.color"], lw=1.4, ls="--", label="noise floor")
         highest = max([line.frequency for line in found.lines], default=float(f[-1]))
         ax.set_xlim(float(f[0]), min(2.0 * highest, float(f[-1])))
     for k, p in enumerate(found.kept[at]):
-        ax.plot(f, record.per_unit * size[:, k], style, color=SERIES[k], lw=0.8,
-                label=measured.place_name(int(p)))  # fmt: skip
+        ax.plot(f, size[:, k], style, color=SERIES[k], lw=0.8, label=measured.place_name(int(p)))
     ax.set_yscale("log")
-    _mark(ax, found, f, record.per_unit * size.max(axis=1))
+    _mark(ax, found, f, size.max(axis=1))
     ax.set_xlabel("frequency, Hz")
     ax.set_ylabel(f"{record.name}, {record.shown}" + "/√Hz" * (not measured.is_spectrum))
     ax.legend(fontsize="small", loc="upper right")
@@ -265,15 +248,3 @@ def _mark(ax: Axes, found: Inspection, f: np.ndarray, level: np.ndarray) -> None
             )  # fmt: skip
     low, high = ax.get_ylim()
     ax.set_ylim(low, max(high, 20 * tops.max(initial=0.0)))
-
-
-def _map(drawn: Figure, ax: Axes, found: Inspection) -> None:
-    measured = found.measured
-    x, y = 1e3 * measured.places.T
-    dots = ax.scatter(x, y, c=measured.record.per_unit * _rms(found), s=36, cmap="viridis",
-                      edgecolors="#00000055", linewidths=0.4)  # fmt: skip
-    drawn.colorbar(dots, ax=ax, label=f"RMS {measured.record.name}, {measured.record.shown}")
-    ax.set_aspect("equal", adjustable="datalim")
-    ax.set_xlabel("x, mm")
-    ax.set_ylabel("y, mm")
-    ax.set_title(f"{len(x)} places", fontsize="medium")
