@@ -26,6 +26,7 @@ LOWEST = 4  # bins: slower motion is drift; as near to half the rate lines are n
 FEWEST = 32  # samples
 MOST = 40  # lines
 PASSES = 12
+RANGE = 1e-2  # of the power of the strongest: weaker lines are found once it is fitted
 NEAR = 4.0  # bins from a known line: what the fit leaves there may be of unknown lines
 LEAK = 4.0  # times the bound of the Hann window's side lobes
 ROUND_OFF = 1e-9  # of the largest value: weaker lines are round-off
@@ -161,6 +162,8 @@ def peaks(
     top = np.r_[False, (inner >= height[:-2]) & (inner > height[2:]), False]
     top[:LOWEST] = top[-LOWEST:] = False
     bins = np.flatnonzero(top & (least < alarm))
+    size = density.max(axis=1)
+    bins = bins[size[bins] >= RANGE * size[bins].max(initial=0.0)]
     taken: list[int] = []
     for k in sorted(bins.tolist(), key=lambda k: -height[k]):
         if np.abs(np.append(known, taken) - k).min(initial=np.inf) < RESOLVED:

@@ -105,6 +105,9 @@ def test_round_off_has_no_lines():
     (line,) = spectral_lines(rounded[None, :, None], 1e4).lines
     assert line.frequency == pytest.approx(130, abs=1e-3)
     assert 0 < line.error < 0.1
+    coarse = np.array([float(f"{value:.6g}") for value in 2e-3 * x])  # many lines, 120 dB weaker
+    found = max(spectral_lines(coarse[None, :, None], 1e4).lines, key=lambda line: line.amplitudes)
+    assert found.frequency == pytest.approx(130, abs=1e-4)
     still = 1e-6 + 1e-22 * np.random.default_rng(0).integers(-2, 3, 1000)
     still += 1e-21 * np.cos(2 * np.pi * 111 * t)
     assert not spectral_lines(still[None, :, None], 1e4).lines
