@@ -32,10 +32,8 @@ _NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 @dataclass(frozen=True)
 class Picture:
-    """An image with a caption; with a `name`, its files are written beside the page.
-
-    `kind` is its format, "png" or another one that browsers know; `files` those to be written, by
-    their endings, if not the image itself.
+    """An image of a `kind`, with a caption; with a `name`, `files` by ending (the image itself if
+    none are given) are written beside the page.
     """
 
     image: bytes
@@ -45,7 +43,7 @@ class Picture:
     files: Mapping[str, bytes] = field(default_factory=dict)
 
     def html(self) -> Markup:
-        """The image inside the page, with its caption."""
+        """The image inside the page."""
         return part("picture", b64encode(self.image).decode(), self.caption, self.name, self.kind)
 
 
@@ -79,15 +77,8 @@ Part = str | Table | Picture | Section | Details
 
 @dataclass(frozen=True)
 class Report:
-    """A page: its title, its verdict in a few sentences, and its parts in order.
-
-    Parameters
-    ----------
-    title : text
-    verdict : paragraphs at the top of the page
-    parts : text (a paragraph each), `Table`, `Picture`, `Section`, `Details` or `Markup`
-    efforts : names and `Effort` of responses, whose warnings stand above all else
-    pictures : folder beside the page for files of pictures, if not the page's own
+    """A page: title, paragraphs of its verdict, and parts. The warnings of named `efforts` stand
+    above all else; files of pictures are written into the folder `pictures` beside the page.
     """
 
     title: str
@@ -116,7 +107,6 @@ class Report:
 
 
 def _flat(parts: Iterable[Part]) -> Iterator[Part]:
-    """All parts, also those within others."""
     for each in parts:
         yield each
         if isinstance(each, Section | Details):
@@ -124,7 +114,6 @@ def _flat(parts: Iterable[Part]) -> Iterator[Part]:
 
 
 def _html(one: Part) -> Markup:
-    """A part as HTML; text is a paragraph."""
     if isinstance(one, Markup):
         return one
     return Markup("<p>{}</p>").format(one) if isinstance(one, str) else one.html()

@@ -6,7 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from functools import lru_cache
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from threading import Lock
 
@@ -43,55 +43,39 @@ def peak_memory() -> int:
     return int(peak if sys.platform == "darwin" else 1024 * peak)
 
 
-class _SharedLimit:
-    """Limit of the whole process: who enters first sets it, and who leaves last lifts it. Each with
-    one of its own would set again what another had found limited.
-    """
-
-    def __init__(self) -> None:
-        self._lock, self._within, self._limit = Lock(), 0, ExitStack()
-
-    def enter(self) -> None:
-        from threadpoolctl import ThreadpoolController
-
-        with self._lock:
-            self._within += 1
-            if self._within == 1:
-                limit = ThreadpoolController().limit(limits=1, user_api="blas")
-                self._limit.enter_context(limit)
-
-    def leave(self) -> None:
-        with self._lock:
-            self._within -= 1
-            if not self._within:
-                self._limit.close()
-
-
-_ONE_THREAD = _SharedLimit()
+_LOCK, _LIMIT, _WITHIN = Lock(), ExitStack(), [0]
 
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Linear algebra on one thread: in small products several wait for each other."""
-    _ONE_THREAD.enter()
+    """Linear algebra on one thread: in small products several wait for each other.
+
+    The limit is that of the process. The first that enters sets it and the last lifts it, as each
+    would otherwise restore what it found limited by another.
+    """
+    from threadpoolctl import threadpool_limits
+
+    with _LOCK:
+        _WITHIN[0] += 1
+        if _WITHIN[0] == 1:
+            _LIMIT.enter_context(threadpool_limits(limits=1, user_api="blas"))
     try:
         yield
     finally:
-        _ONE_THREAD.leave()
+        with _LOCK:
+            _WITHIN[0] -= 1
+            if not _WITHIN[0]:
+                _LIMIT.close()
 
 
+@cache
 def versions() -> dict[str, str]:
     """Versions of Python, skinwave, what it computes with, and the operating system."""
-    return dict(_versions())
-
-
-@lru_cache(maxsize=1)
-def _versions() -> tuple[tuple[str, str], ...]:
     found = {"python": sys.version.split()[0]}
     for name in ("skinwave", "numpy", "scipy", *SOLVERS):
         with suppress(PackageNotFoundError):
             found[name] = version(name)
-    return (*found.items(), ("os", platform.platform()))
+    return found | {"os": platform.platform()}
 
 
 def usable_cores() -> int:

@@ -1,8 +1,8 @@
 """Modules that add body kinds and models from outside: here, and in the processes that this starts.
 
 A module registers when it is imported. Its name is kept in the environment, where processes that
-are started later find it; set `SKINWAVE_EXTENSIONS` to names with commas between them, and the
-command line takes what they add.
+are started later find it. The command line takes what the modules add that `SKINWAVE_EXTENSIONS`
+names, with commas between them.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""Whether what a JSON file of a result holds is of the kinds that are read from it."""
+"""Whether a JSON file of a result holds the kinds of values that are read from it."""
 
 from dataclasses import fields
 from math import isfinite
@@ -12,42 +12,29 @@ CASE = {
 }  # fmt: skip
 TRUST = {"command?": str, "model?": str, "misfit?": float, "cases?": [CASE]}
 PLAN = {"rows": [{"what": str, "value": str, "reason": str}], "tolerance": float, "warnings": [str]}
+_TABLES = {"seconds": {str: float}, "versions": {str: str}, "warnings": [str]}
 EFFORT = {
-    f"{field.name}?": {"seconds": {str: float}, "versions": {str: str}, "warnings": [str]}.get(
-        field.name, str if isinstance(field.default, str) else float
-    )
-    for field in fields(Effort)
+    f"{one.name}?": _TABLES.get(one.name, str if isinstance(one.default, str) else float)
+    for one in fields(Effort)
 }
 
 
 def fitting(value: Any, pattern: Any, where: str) -> Any:
-    """The value, if it fits.
-
-    Parameters
-    ----------
-    pattern : a type, float for any finite number; [pattern] for a list of these; {str: pattern} for
-        a table of these, or a table of patterns by key, which must be there but for "key?"
+    """The value, if it fits a pattern: a type, float for any finite number; [pattern] for a list;
+    {str: pattern} for a table, or a table of patterns by key, of which "key?" may be missing.
 
     Raises
     ------
     ValueError
-        If it does not.
+        If it does not fit.
     """
-    if isinstance(pattern, dict):
-        _fit_table(value, pattern, where)
-    elif isinstance(pattern, list):
-        for k, item in enumerate(_of(value, list, where)):
-            fitting(item, pattern[0], f"{where}[{k}]")
-    elif pattern is float:
-        if not is_finite_number(value):
-            raise ValueError(f"{where} is no finite number; make the result anew")
-    else:
-        _of(value, pattern, where)
+    if not _fits(value, pattern):
+        raise ValueError(f"{where} has other contents than skinwave writes; make the result anew")
     return value
 
 
 def is_finite_number(value: Any) -> bool:
-    """Whether a value is a number that a float can hold, and none of the two truth values."""
+    """Whether a value is a number that a float can hold, and no truth value."""
     try:
         return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
     except OverflowError:  # of a whole number
@@ -62,27 +49,24 @@ def effort_of(table: Any, where: str) -> Effort:
     ValueError
         If it is none.
     """
-    known = {field.name for field in fields(Effort)}
-    if strange := set(_of(table, dict, where)) - known:
+    fitting(table, EFFORT, where)
+    if strange := table.keys() - {one.name for one in fields(Effort)}:
         raise ValueError(f"{where} has the unknown key {min(strange)[:40]!r}; make it anew")
-    return Effort(**fitting(table, EFFORT, where))
+    return Effort(**table)
 
 
-def _fit_table(value: Any, pattern: dict[Any, Any], where: str) -> None:
-    table = _of(value, dict, where)
+def _fits(value: Any, pattern: Any) -> bool:
+    if isinstance(pattern, list):
+        return isinstance(value, list) and all(_fits(item, pattern[0]) for item in value)
+    if pattern is float:
+        return is_finite_number(value)
+    if not isinstance(pattern, dict):
+        return isinstance(value, pattern)
+    if not isinstance(value, dict):
+        return False
     if str in pattern:
-        for key, item in table.items():
-            fitting(item, pattern[str], f"{where}.{key[:40]}")
-        return
-    for key, of in pattern.items():
-        name = key.removesuffix("?")
-        if name in table:
-            fitting(table[name], of, f"{where}.{name}")
-        elif name == key:
-            raise ValueError(f"{where} lacks '{name}'; make the result anew")
-
-
-def _of(value: Any, kind: type, where: str) -> Any:
-    if not isinstance(value, kind):
-        raise ValueError(f"{where} is no {kind.__name__}; make the result anew")
-    return value
+        return all(_fits(item, pattern[str]) for item in value.values())
+    return all(
+        _fits(value[name], of) if (name := key.removesuffix("?")) in value else name != key
+        for key, of in pattern.items()
+    )

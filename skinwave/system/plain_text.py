@@ -1,7 +1,4 @@
-"""Text of a user's file or name where a terminal or spreadsheet could obey it, not show it.
-
-Of pages, `skinwave.system.document` takes care.
-"""
+"""Text of a user's file or name where a terminal or spreadsheet could obey it, not show it."""
 
 import csv
 import io
@@ -13,8 +10,9 @@ FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what a spreadsheet takes for the s
 
 
 def printable(text: str, keep: str = "\n") -> str:
-    """The text with control, bidirectional and other invisible characters as escapes."""
-    return "".join(c if c.isprintable() or c in keep else _escape(c) for c in text)
+    """The text with control, bidirectional and other invisible characters as escapes of JSON."""
+    codes = {ord(c) for c in text if not (c.isprintable() or c in keep)}
+    return text.translate({n: f"\\u{n:04x}" if n < 0x10000 else f"\\U{n:08x}" for n in codes})
 
 
 def say(text: str, file: TextIO | None = None) -> None:
@@ -40,11 +38,6 @@ def csv_table(
     writer.writerow(map(cell, header))
     writer.writerows(map(cell, row) for row in rows)
     return text.getvalue().encode()
-
-
-def _escape(letter: str) -> str:
-    n = ord(letter)  # as JSON has it, so that what was JSON still is
-    return f"\\u{n:04x}" if n < 0x10000 else f"\\U{n:08x}"
 
 
 def as_utf_8(content: bytes) -> str:

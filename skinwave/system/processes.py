@@ -1,6 +1,6 @@
 """Python functions in processes of their own, which end with the process that started them.
 
-Only what Python has loaded anyway is imported here, because the command line begins with it.
+Only light modules are imported here, because the command line begins with it.
 """
 
 import os
@@ -36,12 +36,8 @@ def environment(values: Mapping[str, str]) -> Iterator[None]:
 
 @contextmanager
 def pool(count: int, threads: int | None = 1) -> "Iterator[Executor]":
-    """Start processes; what they have not done when this ends is given up.
-
-    Parameters
-    ----------
-    count : of processes
-    threads : of linear algebra in each, unless the environment has it; None for as many as here
+    """Start so many processes, each with `threads` of linear algebra unless the environment says
+    otherwise; None for as many as here. What they have not done when this ends is given up.
     """
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
@@ -72,18 +68,9 @@ def side_by_side(
     begun: Callable[[int], None],
     most: int = 2,
 ) -> "Iterator[tuple[int, Future[T]]]":
-    """Call functions, some at once, each in a new process on one thread.
-
-    Parameters
-    ----------
-    calls : functions, in the order in which they are begun if they may
-    may_begin : whether call `k` may run beside those `running`; any may run alone
-    begun : called with the number of each as it begins
-    most : how many at once
-
-    Yields
-    ------
-    Number and future of each, as it ends.
+    """Call functions, at most so many at once, each in a new process on one thread; yield the
+    number and future of each as it ends. `may_begin(k, running)` says whether call k may run beside
+    others, and `begun(k)` is called as it begins.
     """
     from concurrent.futures import FIRST_COMPLETED, wait
 

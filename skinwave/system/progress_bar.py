@@ -1,70 +1,45 @@
-"""Progress: steps of a body's offline stage, the time left, and a bar that shows them."""
+"""Progress: steps of a body's preparation, the time left, and a bar that shows them."""
 
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 from skinwave.system.effort import Progress, silent
 from skinwave.system.plain_text import printable, say
 
 # Steps in their order, each with its share of the time: between those of a sheet and of a palm.
-PREPARING = {"mesh": 0.05, "assemble": 0.05, "factorise": 0.20, "reduce": 0.70}
-SAME = {"march": "reduce"}  # what another model does at that step
+STEPS = {"mesh": 0.05, "assemble": 0.05, "factorise": 0.20, "reduce": 0.70}
 LEAST = 0.2  # of all, after which the time that is left is shown: a sheet is meshed at once
 
 
-@dataclass(frozen=True, kw_only=True)
-class Step:
-    """A `phase` as step `number` of `of`, both 0 of what is no step; the share `done` of all steps
-    or of the phase, and the seconds `left`, None where that is not known yet.
-    """
-
-    phase: str
-    number: int = 0
-    of: int = 0
-    done: float = 0.0
-    left: float | None = None
-
-    @property
-    def name(self) -> str:
-        """The phase with its number, such as "assemble (step 2 of 4)"."""
-        return f"{self.phase} (step {self.number} of {self.of})" if self.number else self.phase
-
-    @property
-    def time_left(self) -> str:
-        """The seconds left in words; nothing where they are not known."""
-        if self.left is None:
-            return ""
-        to = 1 if self.left < 10 else 5
-        return f"about {max(to, to * round(self.left / to))} s left"
-
-
 def follower(
-    steps: Mapping[str, float] = PREPARING, clock: Callable[[], float] = time.monotonic
-) -> Callable[[str, float], Step]:
-    """Function that makes a `Step` of each report of progress (phase, fraction of it done).
-
-    The time left goes by what was done since these steps began, perhaps not with the first of them.
+    clock: Callable[[], float] = time.monotonic,
+) -> Callable[[str, float], tuple[str, float, str]]:
+    """Function of a phase and the fraction of it done: the phase with the number of its step, the
+    share done of all steps or of the phase, and the time left in words, if it is known.
     """
-    names, last = list(steps), Step(phase="")
+    names, last = list(STEPS), 0.0
     group, since, before = "", 0.0, 0.0  # what is followed, since when, and what was done then
 
-    def follow(phase: str, fraction: float) -> Step:
+    def follow(phase: str, fraction: float) -> tuple[str, float, str]:
         nonlocal last, group, since, before
         of, _, own = phase.rpartition(": ")
-        own, share = SAME.get(own, own), min(max(fraction, 0.0), 1.0)
-        number = names.index(own) + 1 if own in steps else 0
-        done = sum(steps[name] for name in names[: number - 1]) if number else 0.0
-        done += share * steps.get(own, 1.0)
-        now, followed = clock(), f"{of}: steps" if number else phase
-        if followed != group or done < last.done:
+        own = "reduce" if own == "march" else own
+        name, followed, done = phase, phase, min(max(fraction, 0.0), 1.0)
+        if own in STEPS:
+            number = names.index(own)
+            done = sum(STEPS[step] for step in names[:number]) + done * STEPS[own]
+            name, followed = f"{phase} (step {number + 1} of {len(names)})", f"{of}: steps"
+        now = clock()
+        if followed != group or done < last:
             group, since, before = followed, now, done
-        gained = done - before
-        left = (now - since) * (1 - done) / gained if gained > LEAST else None
-        last = Step(phase=phase, number=number, of=len(names) * bool(number), done=done, left=left)
-        return last
+        last, gained = done, done - before
+        if gained <= LEAST:
+            return name, done, ""
+        left = (now - since) * (1 - done) / gained
+        to = 1 if left < 10 else 5
+        return name, done, f"about {max(to, to * round(left / to))} s left"
 
     return follow
 
@@ -82,14 +57,14 @@ def reported(progress: Progress | bool | None) -> Iterator[Progress]:
 @contextmanager
 def bar() -> Iterator[Progress]:
     """A bar where standard error is a terminal, and lines elsewhere, as in a notebook."""
-    follow = follower()
+    follow, last = follower(), ""
     if not sys.stderr.isatty():
-        phases: list[str] = []
 
         def log(phase: str, fraction: float) -> None:
-            name = follow(phase, fraction).name
-            if name not in phases[-1:]:
-                phases.append(name)
+            nonlocal last
+            name = follow(phase, fraction)[0]
+            if name != last:
+                last = name
                 say(name, sys.stderr)
 
         yield log
@@ -97,16 +72,14 @@ def bar() -> Iterator[Progress]:
     from rich import progress as rich
     from rich.console import Console
 
-    columns = (rich.TextColumn("{task.description:<36}", markup=False),
-               rich.BarColumn(), rich.TimeElapsedColumn())  # fmt: skip
-    left = rich.TextColumn("{task.fields[left]}", markup=False)
-    with rich.Progress(*columns, left, console=Console(stderr=True)) as shown:
+    name, left = (rich.TextColumn(f"{{task.{of}}}", markup=False)
+                  for of in ("description:<36", "fields[left]"))  # fmt: skip
+    columns = name, rich.BarColumn(), rich.TimeElapsedColumn(), left
+    with rich.Progress(*columns, console=Console(stderr=True)) as shown:
         task = shown.add_task("", total=1.0, left="")
 
         def show(phase: str, fraction: float) -> None:
-            step = follow(phase, fraction)
-            shown.update(
-                task, description=printable(step.name, ""), completed=step.done, left=step.time_left
-            )
+            step, done, in_words = follow(phase, fraction)
+            shown.update(task, description=printable(step, ""), completed=done, left=in_words)
 
         yield show

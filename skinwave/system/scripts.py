@@ -15,13 +15,13 @@ _IMPORT = re.compile(r'^import\s*\{([^}]*)\}\s*from\s*"\./([\w-]+\.js)";[ \t]*$'
 _EXPORT = re.compile(
     r"^export\s+((?:async\s+)?function\s*\*?\s*|class\s+|const\s+)([\w$]+)", re.MULTILINE
 )
+_NAME = re.compile(r"([\w$]+)(?:\s+as\s+([\w$]+))?")
+# Imports and exports of other forms, and what would end the script of the page.
 _REFUSED = re.compile(
     r'^(?:import\s*(?:[{*"\']|[\w$]+\s*(?:,|from\b))|export\b).*|\bimport\s*\(\s*["\'`].*'
-    r"|\bimport\.meta\b.*",
+    r"|\bimport\.meta\b.*|(?i:</script)|<!--",
     re.MULTILINE,
 )
-_PAIR = re.compile(r"([\w$]+)(?:\s+as\s+([\w$]+))?")
-_CLOSING = re.compile(r"</script|<!--", re.IGNORECASE)
 
 
 def encoded(data: Mapping[str, Any]) -> str:
@@ -37,16 +37,7 @@ def encoded(data: Mapping[str, Any]) -> str:
 
 
 def bundle(folder: Traversable, entry: str) -> str:
-    """Join a module and all that it imports into the text of one module script.
-
-    Parameters
-    ----------
-    folder : with the modules
-    entry : name of the module that begins the page
-
-    Returns
-    -------
-    str
+    """Join the module that begins a page, and all in its folder that it imports, into one script.
 
     Raises
     ------
@@ -54,60 +45,45 @@ def bundle(folder: Traversable, entry: str) -> str:
         If a module is missing, imports what another does not export, takes part in a circle, or
         has an import or export of a form that is not known here.
     """
-    parts: dict[str, _Module] = {}
-    waiting = [entry]
-    while waiting:
-        name = waiting.pop()
-        if name in parts:
-            continue
-        file = folder / name
-        if not file.is_file():
+    texts: dict[str, str] = {}
+    needed: dict[str, dict[str, set[str]]] = {entry: {}}  # names by module that each imports
+    exported: dict[str, set[str]] = {}
+    while missing := needed.keys() - texts.keys():
+        name = min(missing)
+        if not (folder / name).is_file():
             raise ValueError(f"there is no module {name}; correct the import")
-        parts[name] = _Module(name, file.read_text(encoding="utf-8"))
-        waiting += parts[name].imports
-    for part in parts.values():
-        for source, names in part.imports.items():
-            if missing := names - parts[source].exports:
-                raise ValueError(f"{source} does not export {', '.join(sorted(missing))}, which "
-                                 f"{part.name} imports")  # fmt: skip
-    order = TopologicalSorter({name: part.imports.keys() for name, part in parts.items()})
+        source = (folder / name).read_text(encoding="utf-8")
+        for names, module in _IMPORT.findall(source):
+            found = {part[0] for part in _NAME.findall(names)}
+            needed[name][module] = needed[name].get(module, set()) | found
+            needed.setdefault(module, {})
+        exported[name] = {part[1] for part in _EXPORT.findall(source)}
+        texts[name] = _as_function(name, source, exported[name])
+    for name, imports in needed.items():
+        for module, names in imports.items():
+            if unknown := names - exported[module]:
+                raise ValueError(f"{name} imports {min(unknown)}, which {module} does not export")
     try:
-        return "\n".join(parts[name].text for name in order.static_order())
+        return "\n".join(texts[name] for name in TopologicalSorter(needed).static_order())
     except CycleError as error:
         raise ValueError(f"modules import each other: {' -> '.join(error.args[1])}") from None
 
 
-class _Module:
-    """A module as a function: `imports` (names by module), `exports` (names) and its `text`."""
+def _as_function(name: str, source: str, exports: set[str]) -> str:
+    """A module as a constant: the result of a function that returns its exports."""
 
-    def __init__(self, name: str, source: str) -> None:
-        self.name = name
-        self.imports: dict[str, set[str]] = {}
-        self.exports: set[str] = set()
-        body = _EXPORT.sub(self._exported, _IMPORT.sub(self._imported, source))
-        if found := _REFUSED.search(body):
-            raise ValueError(f"{name}: '{found[0].strip()}' is not understood; write import "
-                             '{ a } from "./b.js"; or export function, class or const')  # fmt: skip
-        if found := _CLOSING.search(body):
-            raise ValueError(f"{name}: '{found[0]}' would end the script of the page; split it")
-        shown = ", ".join(sorted(self.exports))
-        self.text = f"const {_variable(name)} = (() => {{\n{body}\nreturn {{ {shown} }};\n}})();"
-
-    def _imported(self, found: re.Match[str]) -> str:
-        pairs = []
-        for part in filter(None, (part.strip() for part in found[1].split(","))):
-            pair = _PAIR.fullmatch(part)
-            if pair is None:
-                raise ValueError(f"{self.name}: import of '{part}' is not understood")
-            self.imports.setdefault(found[2], set()).add(pair[1])
-            pairs.append(f"{pair[1]}: {pair[2]}" if pair[2] else pair[1])
+    def unpacked(found: re.Match[str]) -> str:
+        pairs = (f"{own}: {other}" if other else own for own, other in _NAME.findall(found[1]))
         return f"const {{ {', '.join(pairs)} }} = {_variable(found[2])};"
 
-    def _exported(self, found: re.Match[str]) -> str:
-        if found[2] in self.exports:
-            raise ValueError(f"{self.name} exports {found[2]} twice")
-        self.exports.add(found[2])
-        return f"{found[1]}{found[2]}"
+    body = _EXPORT.sub(r"\1\2", _IMPORT.sub(unpacked, source))
+    if found := _REFUSED.search(body):
+        raise ValueError(
+            f"{name}: '{found[0].strip()}' is refused; import and export by name at the beginning "
+            "of a line, and split texts that end a script"
+        )
+    shown = ", ".join(sorted(exports))
+    return f"const {_variable(name)} = (() => {{\n{body}\nreturn {{ {shown} }};\n}})();"
 
 
 def _variable(name: str) -> str:

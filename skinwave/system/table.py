@@ -1,7 +1,7 @@
 """A table of a result: one definition for pages, CSV files and JSON."""
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from typing import Any
@@ -17,14 +17,8 @@ STORED = 6  # significant digits of numbers in CSV files
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table.
-
-    Parameters
-    ----------
-    name : heading in CSV files and key in JSON, with its unit, such as "frequency_hz"
-    heading : heading on pages, the name if not given
-    unit : follows the heading on pages
-    digits : significant digits on pages
+    """A column: its `name`, such as "frequency_hz", in CSV and JSON; on pages its `heading` (or the
+    name), unit and significant digits.
     """
 
     name: str
@@ -40,14 +34,9 @@ class Column:
 
 @dataclass(frozen=True, init=False)
 class Table:
-    """Columns and rows. Cells are text, `Markup`, numbers, or None where there is no value.
-
-    Parameters
-    ----------
-    columns : `Column` or, where name and heading are the same, text
-    rows : one value per column
-    name : of the CSV file beside a page; a table without a name is on the page only
-    stored : significant digits of numbers in CSV files
+    """Columns (text where name and heading are the same) and rows of text, `Markup`, numbers, or
+    None where there is no value. A table with a `name` is also a CSV file beside the page, whose
+    numbers have `stored` significant digits.
 
     >>> table = Table([Column("f_hz", "frequency", "Hz"), "line"], [(127.38, "f_d"), (None, "-")])
     >>> table.to_csv()
@@ -78,13 +67,13 @@ class Table:
 
     def to_csv(self) -> bytes:
         """Return a CSV file in UTF-8; a cell without a value is empty."""
-        header = (column.name for column in self.columns)
-        return csv_table(header, self._converted(lambda value: _stored(value, self.stored)))
+        rows = ([_stored(value, self.stored) for value in row] for row in self.rows)
+        return csv_table((column.name for column in self.columns), rows)
 
     def to_json(self) -> str:
         """Return a list of objects, one a row, as JSON; null where there is no value."""
         names = [column.name for column in self.columns]
-        rows = self._converted(lambda value: value if _is_known(value) else None)
+        rows = ([value if _is_known(value) else None for value in row] for row in self.rows)
         return json.dumps([dict(zip(names, row, strict=True)) for row in rows])
 
     def html(self) -> Markup:
@@ -92,9 +81,6 @@ class Table:
         digits = [column.digits for column in self.columns]
         rows = ([shown(v, n) for v, n in zip(row, digits, strict=True)] for row in self.rows)
         return part("table", [column.title for column in self.columns], rows)
-
-    def _converted(self, convert: Callable[[Any], Any]) -> Iterable[list[Any]]:
-        return ([convert(value) for value in row] for row in self.rows)
 
 
 def shown(value: Any, digits: int = 3) -> str:

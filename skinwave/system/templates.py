@@ -1,7 +1,4 @@
-"""Templates of pages: those of Jinja in `skinwave/templates`, which escape text.
-
-Only `Markup` enters a page as it is.
-"""
+"""Templates of pages: those of Jinja in `skinwave/templates`, which escape all but `Markup`."""
 
 import re
 from functools import cache
@@ -30,9 +27,5 @@ def _templates() -> Any:
         loader=jinja2.PackageLoader("skinwave"), autoescape=True, trim_blocks=True,
         lstrip_blocks=True, undefined=jinja2.StrictUndefined,
     )  # fmt: skip
-    found.tests["a_number"] = _is_number
+    found.tests["a_number"] = lambda cell: re.sub("[,+.e-]", "", cell).isdigit()
     return found
-
-
-def _is_number(cell: str) -> bool:
-    return re.sub("[,+.e-]", "", cell).isdigit()
