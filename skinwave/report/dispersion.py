@@ -12,8 +12,7 @@ from matplotlib.ticker import FuncFormatter
 from meshes.tetmesh import Floats
 from simple_model.drawing import small
 from simple_model.layers.dispersion import DispersionCurves, Mode
-from skinwave.report.figures import REPORT, legend
-from skinwave.report.levels import written
+from skinwave.report.figures import REPORT, legend, written
 from skinwave.report.palette import SERIES
 from skinwave.report.styles import Style
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from meshes import TetMesh
-from meshes.tetmesh import Floats, Ints, facet_set
-from simple_model import Effort, Response
+from meshes.tetmesh import Floats, facet_set
+from simple_model import Effort
 from simple_model.drawing import new_axes
 from simple_model.numbers import counted, significant, stated_error
 from simple_model.quantities import DISPLACEMENT
@@ -21,7 +21,7 @@ from skinwave.planning.assessment import told
 from skinwave.report.palette import SIGNED
 from skinwave.results.exports import collection
 from skinwave.results.files import folder_name
-from skinwave.results.motion import BodyMotion, check_values, probe_lines, probe_response, waves
+from skinwave.results.motion import check_values, probe_lines, probe_response, waves
 from skinwave.results.outputs import output_file
 from skinwave.results.views import split
 from skinwave.scene.scene import Scene
@@ -31,7 +31,6 @@ from skinwave.system.progress_bar import reported
 if TYPE_CHECKING:
     import pyvista as pv
     from matplotlib.axes import Axes
-
 
 NEAR = 0.5  # of a sampling interval: how far outside a time may be
 
@@ -59,20 +58,20 @@ class Field:
         ]
         return f"<Field: {'; '.join(said)}>"
 
-    @property
-    def strongest(self) -> float:
-        """The one of its times, s, when a node is displaced most."""
-        return float(self.times[np.argmax((self.displacement**2).sum(axis=2).max(axis=1))])
-
     def frame(self, time: float | None = None) -> int:
-        """Number of the time that is nearest to one in s, the `strongest` if none is given.
-
-        Raises
-        ------
-        ValueError
-            If it is before the first or after the last.
+        """Number of the time that is nearest to one in s or, without one, when a node is displaced
+        most; a ValueError of a time outside those of the field.
         """
-        return nearest_frame(self.times, self.strongest if time is None else time)
+        times = self.times
+        if time is None:
+            return int(np.argmax((self.displacement**2).sum(axis=2).max(axis=1)))
+        slack = NEAR * float(times[1] - times[0]) if len(times) > 1 else 0.0
+        if not times[0] - slack <= time <= times[-1] + slack:
+            raise ValueError(
+                f"time = {time:g} s is outside the field's, {times[0]:g} to {times[-1]:g} s; give "
+                "one of these"
+            )
+        return int(np.argmin(np.abs(times - time)))
 
     def to_pyvista(self, time: float | None = None) -> pv.UnstructuredGrid:
         """The mesh at rest as a grid of pyvista, in metre, with its `displacement` (n, 3) in metre
@@ -87,7 +86,24 @@ class Field:
         """Draw the displacement into the body of the upper surface, seen from above, at the time
         nearest to one in s, or when it is largest; colours are those of all times.
         """
-        return _draw(self, self.frame(time), ax)
+        from matplotlib.tri import Triangulation
+
+        k, ax = self.frame(time), new_axes(ax)
+        facets = facet_set(self.mesh, "top")
+        surface, local = np.unique(facets, return_inverse=True)
+        local = local.reshape(facets.shape)
+        triangles = split(local) if facets.shape[1] == 6 else local
+        pushed = -DISPLACEMENT.per_unit * self.displacement[:, surface, 2]
+        limit = float(np.abs(pushed).max()) or 1.0
+        x, y = 1e3 * self.mesh.points[surface, :2].T
+        image = ax.tripcolor(
+            Triangulation(x, y, triangles), pushed[k],
+            shading="gouraud", cmap=SIGNED, vmin=-limit, vmax=limit,
+        )  # fmt: skip
+        ax.set(aspect="equal", xlabel="x, mm", ylabel="y, mm")
+        ax.set_title(f"t = {1e3 * self.times[k]:.2f} ms", fontsize="medium")
+        ax.figure.colorbar(image, ax=ax, label=f"{DISPLACEMENT.words}, {DISPLACEMENT.shown}")
+        return ax
 
     def save(self, path: str | Path, frames: int | None = None, *, overwrite: bool = False) -> Path:
         """Write a ParaView collection, `path` ending in .pvd, and a .vtu file beside it of each of
@@ -98,7 +114,22 @@ class Field:
         ValueError
             If it ends otherwise, or there is such a file, which is not to be overwritten.
         """
-        return _save(self, Path(path), frames, overwrite=overwrite)
+        path, count = Path(path), len(self.times)
+        if path.suffix != ".pvd":
+            raise ValueError(f"'{path.name}' ends in {path.suffix or 'nothing'}; name it .pvd")
+        if frames is not None and frames < 1:
+            raise ValueError(f"frames = {frames} is below 1; give one at least")
+        chosen = np.unique(np.linspace(0, count - 1, min(frames or count, count)).round())
+        times = self.times[chosen.astype(int)].tolist()
+        names = [f"{folder_name(path.stem)}_{k:04d}.vtu" for k in range(len(times))]
+        taken = [name for name in (path.name, *names) if (path.parent / name).exists()]
+        if taken and not overwrite:
+            raise ValueError(f"{path.parent / taken[0]} exists; choose another, or overwrite=True")
+        for name, time in zip(names, times, strict=True):
+            self.to_pyvista(time).save(path.parent / name)
+        with output_file(path, overwrite=overwrite) as file:
+            file.write(collection(names, times).encode())
+        return path
 
 
 def field(
@@ -137,99 +168,14 @@ def field(
     check_values(len(times), len(moved.mesh.points))
     displacement = (from_rest(moved.motion, times) @ moved.own_basis.T).reshape(len(times), -1, 3)
     surface = replace(scene, depth=0.0, quantity=DISPLACEMENT.name)  # what is assessed is motion
-    at_probes = assessed_probes(surface, moved, h, tolerance, solver)
-    for sentence in at_probes.effort.warnings:
+    response = probe_response(surface, moved)
+    options = SolveOptions(h=h, tolerance=tolerance, solver=solver)
+    held = scene.body.is_held  # of a free body, whose mean has no bound, the lines are compared
+    compared = response.values if held else oscillating(probe_lines(surface, moved)).lines
+    assessed = told(surface, response, compared, options)
+    for sentence in assessed.effort.warnings:
         warnings.warn(sentence, SkinwaveWarning, stacklevel=2)
     return Field(
-        mesh=moved.mesh, times=times, displacement=displacement, effort=at_probes.effort,
-        expected_error=at_probes.expected_error,
+        mesh=moved.mesh, times=times, displacement=displacement, effort=assessed.effort,
+        expected_error=assessed.expected_error,
     )  # fmt: skip
-
-
-def assessed_probes(
-    scene: Scene, moved: BodyMotion, h: float | None, tolerance: float, solver: str
-) -> Response:
-    """Response of the probes with its expected error, from a coarser mesh, and all warnings.
-
-    Parameters
-    ----------
-    scene : Scene
-    moved : BodyMotion, of the scene
-    h, tolerance, solver : as for `simulate`
-
-    Returns
-    -------
-    Response, (t, p) of the scene's quantity
-    """
-    found = probe_response(scene, moved)
-    options = SolveOptions(h=h, tolerance=tolerance, solver=solver)
-    if scene.body.is_held:
-        return told(scene, found, found.values, options)
-    lines = oscillating(probe_lines(scene, moved)).lines
-    return told(scene, found, lines, options)
-
-
-def nearest_frame(times: Floats, time: float) -> int:
-    """Number of the nearest of some times (t,) in s.
-
-    Raises
-    ------
-    ValueError
-        If the time is outside them.
-    """
-    slack = NEAR * float(times[1] - times[0]) if len(times) > 1 else 0.0
-    if not times[0] - slack <= time <= times[-1] + slack:
-        raise ValueError(
-            f"time = {time:g} s is outside the field's, {times[0]:g} to {times[-1]:g} s; give one "
-            "of these"
-        )
-    return int(np.argmin(np.abs(times - time)))
-
-
-def _upper(field: Field) -> tuple[Ints, Ints]:
-    """Nodes (s,) of the upper surface, and the flat triangles (k, 3) of these."""
-    surface, local = np.unique(facet_set(field.mesh, "top"), return_inverse=True)
-    local = local.reshape(-1, field.mesh.facets["top"].shape[1])
-    return surface, split(local) if local.shape[1] == 6 else local
-
-
-def _draw(field: Field, k: int, ax: Axes | None) -> Axes:
-    """A map of one frame, with its colour bar."""
-    from matplotlib.tri import Triangulation
-
-    ax, (surface, triangles) = new_axes(ax), _upper(field)
-    x, y = 1e3 * field.mesh.points[surface, :2].T
-    pushed = -DISPLACEMENT.per_unit * field.displacement[:, surface, 2]
-    limit = float(np.abs(pushed).max()) or 1.0
-    image = ax.tripcolor(
-        Triangulation(x, y, triangles), pushed[k], shading="gouraud", cmap=SIGNED, vmin=-limit,
-        vmax=limit,
-    )  # fmt: skip
-    ax.set_aspect("equal")
-    ax.set(xlabel="x, mm", ylabel="y, mm")
-    ax.set_title(f"t = {1e3 * field.times[k]:.2f} ms", fontsize="medium")
-    ax.figure.colorbar(image, ax=ax, label=f"{DISPLACEMENT.words}, {DISPLACEMENT.shown}")
-    return ax
-
-
-def _save(field: Field, path: Path, frames: int | None, *, overwrite: bool) -> Path:
-    """A collection and the files that it names, which are written first."""
-    if path.suffix != ".pvd":
-        raise ValueError(f"'{path.name}' ends in {path.suffix or 'nothing'}; name it .pvd")
-    stem, chosen = folder_name(path.stem), _spread(len(field.times), frames or len(field.times))
-    names = [f"{stem}_{k:04d}.vtu" for k in range(len(chosen))]
-    taken = [name for name in (path.name, *names) if (path.parent / name).exists()]
-    if taken and not overwrite:
-        raise ValueError(f"{path.parent / taken[0]} exists; choose another, or overwrite=True")
-    for name, k in zip(names, chosen, strict=True):
-        field.to_pyvista(float(field.times[k])).save(path.parent / name)
-    with output_file(path, overwrite=overwrite) as file:
-        file.write(collection(names, field.times[chosen].tolist()).encode())
-    return path
-
-
-def _spread(count: int, frames: int) -> Ints:
-    """Numbers of so many frames of all, evenly spaced."""
-    if frames < 1:
-        raise ValueError(f"frames = {frames} is below 1; give one at least")
-    return np.unique(np.linspace(0, count - 1, min(frames, count)).round().astype(int))

@@ -1,9 +1,11 @@
 """Figures for print and page (matplotlib): waveforms, spectra and spread, models overlaid."""
 
+import re
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import wraps
 from io import BytesIO
-from typing import Any
+from typing import Any, ParamSpec
 
 import matplotlib as mpl
 import numpy as np
@@ -15,11 +17,12 @@ from matplotlib.ticker import MaxNLocator
 from meshes.tetmesh import Floats
 from simple_model import spectrum
 from simple_model.drawing import small
-from skinwave.report.palette import colour, inked, label, marker
+from skinwave.report.palette import colour, drawn_as, inked, label
 from skinwave.report.styles import NARROW, SHOWN, STYLES, TEXT, Style
 from skinwave.results.comparison import moving_rms
 from skinwave.results.run import Run
 
+P = ParamSpec("P")
 REPORT = STYLES["report"]
 # Titles of the columns of a Tacton's figure.
 WHOLE = (
@@ -27,7 +30,7 @@ WHOLE = (
     "spectrum, dB re the model's largest line",
 )
 WRAPPED = ("waveform about its mean,\nover the largest", "spectrum, dB re\nlargest line")
-LETTER, GAP = 0.45, 0.3  # of a line's name, and between two, over the size of its letters
+NAME, GAP = 0.45, 0.3  # of a letter of a line's name, and between two names, over their size
 LAID_OUT = 1.2  # width of a panel with the margins of a figure, over that before
 IN_A_ROW = 3  # entries of a legend, at most
 LETTER, HANDLE = 0.07, 0.5  # inch: of a letter of a legend, and of a handle with its space
@@ -48,27 +51,30 @@ def drawn(figure: Figure, kind: str, dpi: int = 110) -> bytes:
     with warnings.catch_warnings(), mpl.rc_context(TEXT):
         # A name in letters that the font lacks is shown as boxes.
         warnings.filterwarnings("ignore", "Glyph")
-        _lay_out(figure)
+        if engine := figure.get_layout_engine():  # once, and not anew for each kind of file
+            engine.execute(figure)
+            figure.set_layout_engine(None)
         figure.savefig(buffer, format=kind, dpi=dpi)
     return buffer.getvalue()
 
 
-def _lay_out(figure: Figure) -> None:
-    """Margins as its layout has them, for files of all kinds: `savefig` computes them for each, and
-    draws the figure once more to do so.
+def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
+    """A function that draws a figure by the settings of the `Style` among its arguments, or of
+    those of a report.
     """
-    if engine := figure.get_layout_engine():
-        engine.execute(figure)
-        figure.set_layout_engine(None)
+
+    @wraps(draw)
+    def drawing(*args: P.args, **kwargs: P.kwargs) -> Figure:
+        given = [each for each in (*args, *kwargs.values()) if isinstance(each, Style)]
+        with mpl.rc_context([*given, REPORT][0].rc):
+            return draw(*args, **kwargs)
+
+    return drawing
 
 
+@styled
 def tacton_figure(title: str, runs: list[Run], style: Style = REPORT) -> Figure:
     """Waveform and spectrum at each probe, all models overlaid."""
-    with mpl.rc_context(style.rc):
-        return _tacton_figure(title, runs, style)
-
-
-def _tacton_figure(title: str, runs: list[Run], style: Style) -> Figure:
     probes, narrow = runs[0].response.probes, style.is_narrow
     size = style.size(10.5, 1.6 * len(probes) + 1.3)
     figure = Figure(figsize=(size[0], 0.75 * len(probes) + 1.6) if narrow else size)
@@ -85,14 +91,12 @@ def _tacton_figure(title: str, runs: list[Run], style: Style) -> Figure:
     rows = _legend(figure, runs, scales=True)
     # Fixed margins: a computed layout takes twice as long.
     inch = style.zoom / figure.get_figheight()
+    left, right, between, top = (0.2, 0.97, 0.32, 0.75) if narrow else (0.08, 0.99, 0.14, 0.6)
+    figure.subplots_adjust(
+        left, 0.55 * inch, right, 1 - (top + 0.2 * rows) * inch, wspace=between, hspace=0.13
+    )
     if narrow:
-        for ax in axes[:, 1]:
-            ax.set_yticks(np.arange(FLOOR, 1, 40))
-        top = 0.75 + 0.2 * rows
-        figure.subplots_adjust(0.2, 0.55 * inch, 0.97, 1 - top * inch, wspace=0.32, hspace=0.13)
-        return figure
-    top = 0.6 + 0.2 * rows
-    figure.subplots_adjust(0.08, 0.55 * inch, 0.99, 1 - top * inch, wspace=0.14, hspace=0.13)
+        axes[0, 1].set_yticks(np.arange(FLOOR, 1, 40))
     return figure
 
 
@@ -124,17 +128,8 @@ def overview_figure(columns: dict[str, list[Run]], probe: int = 2) -> Figure:
 
 
 def panels(count: int, style: Style, width: float) -> tuple[Figure, list[Axes]]:
-    """Maps in mm side by side, below each other in a narrow figure.
-
-    Parameters
-    ----------
-    count : of maps
-    style : Style
-    width : inch of each with its colour bar, at letters of 10 points
-
-    Returns
-    -------
-    Figure, and count axes
+    """A figure and axes of so many maps in mm side by side, below each other in a narrow figure;
+    `width` inch of each with its colour bar, at letters of 10 points.
     """
     size = style.size(width * count, 0.85 * width + 0.4)
     if style.is_narrow:
@@ -149,14 +144,20 @@ def panels(count: int, style: Style, width: float) -> tuple[Figure, list[Axes]]:
     return figure, list(axes)
 
 
-def legend(figure: Figure, entries: Mapping[str, Mapping[str, Any]], columns: int = 0) -> None:
-    """A legend below a figure, of labels and the properties of their lines; in one row, or below
-    each other in a narrow figure, if no number of columns is given.
+def legend(
+    figure: Figure, entries: Mapping[str, Mapping[str, Any]], columns: int = 0, **placed: Any
+) -> int:
+    """A legend below a figure, or where it is `placed`, of labels and the properties of their
+    lines; in one row, or below each other in a narrow figure, if no number of columns is given. The
+    number of its rows.
     """
     handles = [Line2D([], [], **entry) for entry in entries.values()]
     columns = columns or (1 if figure.get_figwidth() < NARROW else max(len(entries), 1))
-    figure.legend(handles, list(entries), loc="outside lower center", ncols=columns, frameon=False,
-                  fontsize=small(), handlelength=1.5, columnspacing=1.2)  # fmt: skip
+    usual: dict[str, Any] = {"loc": "outside lower center", "fontsize": small(), "frameon": False}
+    if "loc" not in placed:
+        usual |= {"handlelength": 1.5, "columnspacing": 1.2}
+    figure.legend(handles, list(entries), ncols=columns, **(usual | placed))
+    return -(-len(entries) // columns)
 
 
 def answered(run: Run) -> str:
@@ -166,26 +167,21 @@ def answered(run: Run) -> str:
 
 
 def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> int:
-    """One entry a model, with what 1 on the waveform axis stands for if that is one number; the
-    number of rows.
+    """One entry a model above the figure, with what 1 on the waveform axis stands for if `scales`;
+    the number of rows.
     """
-    handles, labels = [], []
+    entries: dict[str, dict[str, Any]] = {}
     for run in runs:
-        style: dict[str, Any] = {"color": inked(run.column), "marker": marker(run.column), "lw": 2}
-        handles.append(figure.axes[0].plot([], [], **style)[0])
         scale = run.response.record.text(_largest(run, runs))
-        labels.append(answered(run) + f", 1 = {scale}" * scales)
-    kinds = dict.fromkeys(peak.kind for run in runs for peak in run.unnamed)
-    if kinds:
-        style = {"color": "0.3", "marker": "^", "mfc": "none", "ls": ""}
-        handles.append(figure.axes[0].plot([], [], **style)[0])
-        labels.append(f"open: {', '.join(kinds)}")
-    where: Any = "outside upper center" if figure.get_layout_engine() else "upper center"
-    ncols = len(labels) if len(labels) <= IN_A_ROW else -(-len(labels) // 2)
-    room = figure.get_figwidth() / (LETTER * max(map(len, labels)) + HANDLE)
-    ncols = 1 if figure.get_figwidth() < NARROW else max(1, min(ncols, int(room)))
-    figure.legend(handles, labels, loc=where, ncols=ncols, frameon=False)
-    return -(-len(labels) // ncols)
+        entries[answered(run) + f", 1 = {scale}" * scales] = {**drawn_as(run.column), "lw": 2}
+    if kinds := dict.fromkeys(peak.kind for run in runs for peak in run.unnamed):
+        entries[f"open: {', '.join(kinds)}"] = {
+            "color": "0.3", "marker": "^", "mfc": "none", "ls": ""
+        }  # fmt: skip
+    columns = len(entries) if len(entries) <= IN_A_ROW else -(-len(entries) // 2)
+    room = int(figure.get_figwidth() / (LETTER * max(map(len, entries)) + HANDLE))
+    columns = 1 if figure.get_figwidth() < NARROW else max(1, min(columns, room))
+    return legend(figure, entries, columns, loc="upper center", fontsize=None)
 
 
 def _shown(run: Run, runs: list[Run]) -> slice:
@@ -226,34 +222,42 @@ def _spectra(ax: Axes, runs: list[Run], p: int, *, named: bool) -> None:
         moving = f > 8.0  # the mean and its leakage are no vibration
         top = max(float(amplitude[moving].max()), np.finfo(float).tiny)
         level = 20 * np.log10(np.maximum(amplitude[moving, p] / top, 1e-12))
-        style: dict[str, Any] = {"color": inked(run.column), "zorder": _depth(run)}
-        ax.plot(f[moving], level, lw=_width(run) - 0.3, alpha=0.6, **style)
+        style = {**drawn_as(run.column), "zorder": _depth(run)}
+        ax.plot(f[moving], level, lw=_width(run) - 0.3, alpha=0.6, **(style | {"marker": ""}))
         lines = [(f, run.table.amplitudes[name][p]) for name, f in run.listed.items()]
         peaks = [(peak.frequency, peak.amplitudes[p]) for peak in run.unnamed]
         for found, mfc in ((lines, colour(run.column)), (peaks, "none")):
             at, size = np.array(found).reshape(-1, 2).T  # a constant pressure has none
             height = 20 * np.log10(np.maximum(size / top, 1e-12))
             seen = height > FLOOR
-            style |= {"ls": "", "marker": marker(run.column), "ms": 4, "mfc": mfc}
-            ax.plot(at[seen], height[seen], **style)
+            ax.plot(at[seen], height[seen], ls="", ms=4, mfc=mfc, **style)
     ax.set_xlim(0, HIGHEST)
     ax.set_ylim(FLOOR, 14)
     ax.set_yticks(np.arange(FLOOR, 1, 20))
     ax.grid(alpha=0.25)
     if named:
-        points, marked = small(), list[tuple[float, float]]()  # places and half widths, Hz
-        share = LAID_OUT * ax.get_position().width
-        panel = 72 * share * ax.figure.get_figwidth()  # type: ignore[union-attr]
-        for name, frequency in runs[0].frequencies.items():
-            if name in ("f_AM", "2f_AM", "f_d", "2f_d", "3f_d") and frequency < HIGHEST:
-                half = (LETTER * len(name) + GAP) * points / panel * HIGHEST / 2
-                if any(abs(frequency - other) < half + width for other, width in marked):
-                    continue
-                marked.append((frequency, half))
-                text = name.replace("f_AM", "$f_{AM}$").replace("f_d", "$f_d$")
-                ax.axvline(frequency, color="0.6", lw=0.8, ls=":", zorder=0)
-                box = {"fc": mpl.rcParams["axes.facecolor"], "ec": "none", "pad": 0.5}
-                ax.text(frequency, 12, text, ha="center", va="top", fontsize=points, bbox=box)
+        _name_lines(ax, runs[0].frequencies)
+
+
+def _name_lines(ax: Axes, frequencies: Mapping[str, float]) -> None:
+    """Names of the lines that claims are about, as far as they have room."""
+    points, marked = small(), list[tuple[float, float]]()  # places and half widths, Hz
+    share = LAID_OUT * ax.get_position().width
+    panel = 72 * share * ax.figure.get_figwidth()  # type: ignore[union-attr]
+    for name in ("f_AM", "2f_AM", "f_d", "2f_d", "3f_d"):
+        frequency = frequencies.get(name, HIGHEST)
+        half = (NAME * len(name) + GAP) * points / panel * HIGHEST / 2
+        if frequency < HIGHEST and not any(abs(frequency - f) < half + w for f, w in marked):
+            marked.append((frequency, half))
+            ax.axvline(frequency, color="0.6", lw=0.8, ls=":", zorder=0)
+            box = {"fc": mpl.rcParams["axes.facecolor"], "ec": "none", "pad": 0.5}
+            ax.text(frequency, 12, written(name), ha="center", va="top", fontsize=points, bbox=box)
+
+
+def written(name: str) -> str:
+    """A line's name as it is written in formulas."""
+    name = re.sub(r"f_([A-Za-z0-9]+)", r"f_{\1}", name)
+    return f"${name}$"
 
 
 def _spread(ax: Axes, runs: list[Run]) -> None:
@@ -261,8 +265,7 @@ def _spread(ax: Axes, runs: list[Run]) -> None:
         level = moving_rms(run.response)
         radius = 1e3 * np.hypot(*run.response.probes.T)
         decibel = 20 * np.log10(np.maximum(level / max(level.max(), 1e-300), 1e-12))
-        style: dict[str, Any] = {"color": inked(run.column), "marker": marker(run.column), "ms": 5}
-        ax.plot(radius, decibel, lw=_width(run), **style)
+        ax.plot(radius, decibel, lw=_width(run), ms=5, **drawn_as(run.column))
     for drop in (-6, -20):
         ax.axhline(drop, color="0.6", lw=0.8, ls="--", zorder=0)
     path = 1e3 * runs[0].scene.tacton.trajectory.size / 2

@@ -3,6 +3,8 @@
 Colours are Okabe and Ito's, distinguishable with every kind of colour vision.
 """
 
+from typing import Any
+
 import matplotlib as mpl
 
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
@@ -40,6 +42,11 @@ def inked(column: str) -> str:
 def marker(column: str) -> str:
     """The marker of a `Run.column`."""
     return MARKERS.get(column, "^")
+
+
+def drawn_as(column: str) -> dict[str, Any]:
+    """Colour and marker of a `Run.column`, as properties of its lines."""
+    return {"color": inked(column), "marker": marker(column)}
 
 
 def label(column: str) -> str:

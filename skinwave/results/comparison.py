@@ -1,7 +1,5 @@
 """Comparison of two responses: waveforms, lines, phase delay and spread."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +11,7 @@ from simple_model.load.sampling import step
 from simple_model.response import SETTLE
 from skinwave.system.drawn import drawn
 
-ROUND_OFF = 1e-6  # of the largest RMS motion: a line as weak as that is none
+ROUND_OFF = 1e-6  # of the largest RMS motion: weaker lines are round-off
 AUDIBLE = -20.0  # dB re a line's largest probe: below it a phase says nothing
 
 
@@ -92,32 +90,18 @@ def compare(
         ratios = abs(scale) * np.abs(b) / np.abs(a)
     return Agreement(
         relative_l2=np.linalg.norm(scale * y - x, axis=0) / np.where(norm > 0, norm, 1),
-        scale=scale,
-        shape_misfit=shape_misfit,
-        delay=delay,
-        line_ratios=ratios,
+        scale=scale, shape_misfit=shape_misfit, delay=delay, line_ratios=ratios,
         phase_delay=phase_delays(a, b, np.array(frequencies), reference.probes),
-        spread_reference=spread(reference),
-        spread_candidate=spread(candidate),
-        frequencies=np.array(frequencies, np.float64),
-        probes=reference.probes,
-    )
+        spread_reference=spread(reference), spread_candidate=spread(candidate),
+        frequencies=np.array(frequencies, np.float64), probes=reference.probes,
+    )  # fmt: skip
 
 
 def phase_delays(
     reference: np.ndarray, candidate: np.ndarray, frequencies: Floats, probes: Floats
 ) -> Floats:
-    """Delays of lines, as `Agreement.phase_delay` has them.
-
-    Parameters
-    ----------
-    reference, candidate : (f, p) complex, amplitudes, each of its own unit
-    frequencies : (f,) float, Hz
-    probes : (p, 2) float, metre
-
-    Returns
-    -------
-    (f, p) float, s; not a number where there is none
+    """Delays (f, p) in s of lines, as of `Agreement.phase_delay`, from their complex amplitudes
+    (f, p), each of its own unit, at frequencies (f,) in Hz and probes (p, 2) in metre.
     """
     found = np.full(reference.shape, np.nan)
     for k, (a, b, f) in enumerate(zip(reference, candidate, frequencies, strict=True)):
@@ -127,8 +111,7 @@ def phase_delays(
         start = int(np.argmax(np.where(heard, np.abs(a), 0)))
         outwards = np.argsort(np.linalg.norm(probes - probes[start], axis=1), kind="stable")
         outwards = outwards[heard[outwards]]
-        turns = -np.angle(b[outwards] / a[outwards]) / (2 * np.pi)
-        turns = np.unwrap(turns, period=1.0)
+        turns = np.unwrap(-np.angle(b[outwards] / a[outwards]) / (2 * np.pi), period=1.0)
         found[k, outwards] = (turns - np.floor(turns[0] + 0.25)) / f
     return found
 
@@ -181,9 +164,9 @@ def _vertex(y: Floats) -> tuple[float, float]:
     return k + ahead, float(y[k] + slope * ahead + bend * ahead**2 / 2)
 
 
-def _moving(response: Response, settle: float = SETTLE) -> Floats:
+def _moving(response: Response) -> Floats:
     """The response (t, p) about its mean, after the transient in its first part."""
-    kept = response.values[int(settle * len(response.times)) :]
+    kept = response.values[int(SETTLE * len(response.times)) :]
     return np.asarray(kept - kept.mean(axis=0))
 
 

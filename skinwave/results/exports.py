@@ -1,18 +1,16 @@
 """Results for other programs: tables, sound, and fields that ParaView opens."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from meshes.tetmesh import Floats
 from simple_model import Response
 from simple_model.load.sampling import step
 from skinwave.results.files import folder_name
 from skinwave.results.views import View, field_frames
-from skinwave.system.plain_text import csv_table
+from skinwave.system.table import Table
 
 PARAVIEW = [0, 1, 2, 3, 5, 4]  # its order of the components of a tensor
 UNITS = {"displacement_m": "m", "strain": "1", "stress_pa": "Pa"}
@@ -28,23 +26,10 @@ def write_probes(stem: Path, response: Response) -> None:
     kind = response.quantity
     places = [f"({1e3 * x:g},{1e3 * y:g})" for x, y in response.probes]
     header = ["t [s]", *(f"{kind}{place} [{response.unit}]" for place in places)]
-    table = waveform_table(header, [response.times, *response.values.T])
-    stem.with_suffix(".csv").write_bytes(table)
+    table = Table(header, np.column_stack([response.times, response.values]).tolist(), stored=9)
+    stem.with_suffix(".csv").write_bytes(table.to_csv())
     arrays = {"t": response.times, "probes": response.probes, kind: response.values}
     np.savez(stem.with_suffix(".npz"), **arrays)  # type: ignore[arg-type]
-
-
-def waveform_table(header: Iterable[str], columns: Sequence[Floats]) -> bytes:
-    """Columns (t,) as CSV to nine digits, below their names."""
-    rows = zip(*columns, strict=True)
-    return csv_table(header, ([f"{value:.9g}" for value in row] for row in rows))
-
-
-def sampled(response: Response, probe: int) -> tuple[NDArray[np.int16], float]:
-    """A probe's waveform about its mean in 16 bit, and what of it is the largest that they hold."""
-    motion = response.values[:, probe] - response.values[:, probe].mean()
-    largest = float(np.abs(motion).max())
-    return np.round(motion / (largest or 1.0) * FULL_SCALE).astype(np.int16), largest
 
 
 def write_sound(folder: Path, response: Response, probe: int) -> Path:
@@ -54,11 +39,13 @@ def write_sound(folder: Path, response: Response, probe: int) -> Path:
     """
     from scipy.io import wavfile
 
-    samples, largest = sampled(response, probe)
-    per = response.record.per_unit
+    motion = response.values[:, probe] - response.values[:, probe].mean()
+    largest = float(np.abs(motion).max())
+    samples = np.round(motion / (largest or 1.0) * FULL_SCALE).astype(np.int16)
     unit = response.record.shown.translate(IN_NAMES)
     x, y = 1e3 * response.probes[probe]
-    path = folder / f"probe_{x:g}_{y:g}_mm_full_scale_{per * largest:.4g}_{unit}.wav"
+    scale = f"{response.record.per_unit * largest:.4g}_{unit}"
+    path = folder / f"probe_{x:g}_{y:g}_mm_full_scale_{scale}.wav"
     wavfile.write(path, round(1 / step(response.times)), samples)
     return path
 
@@ -74,11 +61,10 @@ def write_field(folder: Path, view: View) -> Path:
     frames = field_frames(len(view.times)) if view.tensors is None else view.tensors.frames
     names, stem = [], folder_name(view.column)  # which was read from a file
     for k, frame in enumerate(frames.tolist()):
-        ending = "vtu" if len(view.tets) else "vtp"
-        names.append(f"{stem}_{k:03d}.{ending}")
+        names.append(f"{stem}_{k:03d}.{'vtu' if len(view.tets) else 'vtp'}")
         _grid(view, frame, k).save(folder / names[-1])
     path = folder / f"{stem}.pvd"
-    path.write_text(collection(names, [float(view.times[f]) for f in frames]), encoding="utf-8")
+    path.write_text(collection(names, view.times[frames].tolist()), encoding="utf-8")
     return path
 
 
@@ -90,19 +76,17 @@ def _grid(view: View, frame: int, number: int) -> Any:
         surface = pv.PolyData.from_regular_faces(view.points, view.triangles)
         surface["pressure_pa"] = view.pushed[frame]
         return surface
-    kept = view.tensors
-    nodes, tets = (np.arange(len(view.points)), view.tets) if kept is None else (
-        kept.nodes, kept.tets
-    )  # fmt: skip
-    kinds = {4: pv.CellType.TETRA, 10: pv.CellType.QUADRATIC_TETRA}
-    cells = np.insert(tets, 0, tets.shape[1], axis=1).ravel()
-    grid = pv.UnstructuredGrid(cells, np.full(len(tets), kinds[tets.shape[1]]), view.points[nodes])
+    kept, nodes, tets = view.tensors, np.arange(len(view.points)), view.tets
+    if kept is not None:
+        nodes, tets = kept.nodes, kept.tets
+    cells = np.insert(tets, 0, 10, axis=1).ravel()
+    kinds = np.full(len(tets), pv.CellType.QUADRATIC_TETRA)
+    grid = pv.UnstructuredGrid(cells, kinds, view.points[nodes])
     grid["displacement_m"] = view.motion[frame][nodes]
     if kept is not None:
         grid["strain"] = kept.strain[number][:, PARAVIEW]
         grid["stress_pa"] = kept.stress[number][:, PARAVIEW]
-    units = {name: UNITS[name] for name in grid.point_data}
-    grid.field_data["units"] = [f"{name}: {unit}" for name, unit in units.items()]
+    grid.field_data["units"] = [f"{name}: {UNITS[name]}" for name in grid.point_data]
     return grid
 
 

@@ -4,25 +4,23 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from simple_model import Effort
 from simple_model.quantities import DISPLACEMENT, VELOCITY
 from skinwave.results import outputs, record
 from skinwave.results.run import Run
 from skinwave.scene.file import dumps
-from skinwave.system.plain_text import csv_table
+from skinwave.system.table import Table
 
-LINE_COLUMNS = (
-    "tacton", "body", "model", "probe_x_mm", "probe_y_mm", "line",
-    "frequency_hz", "displacement_um", "velocity_mm_s", "pressure_pa",
-)  # fmt: skip
-DEPTH = "probe_depth_mm"
+# Columns of lines.csv, beside which stand those of other quantities that are there.
+WHERE = ("tacton", "body", "model", "probe_x_mm", "probe_y_mm")
+DEPTH = "probe_depth_mm"  # of probes below the surface, if there are any
+AMPLITUDES = ("line", "frequency_hz", "displacement_um", "velocity_mm_s", "pressure_pa")
 RESERVED = ("figures", "overview", "propagation")  # what a study names itself
 DEVICES = re.compile(r"con|prn|aux|nul|(com|lpt)[\d¹²³]", re.IGNORECASE)  # of Windows
 LONGEST, MOST_BYTES = 80, 200  # of a name, which gets an ending and is limited to 255 bytes
@@ -70,7 +68,8 @@ def fill(folder: Path, run: Run) -> None:
     name = run.response.quantity if run.response.record.of_body else DISPLACEMENT.name
     write_responses(folder / record.RESPONSES, {name: run, run.model: run})
     write_lines(folder / "lines.csv", [run])
-    write_effort(folder / "effort.json", run.response.effort)
+    effort = json.dumps(asdict(run.response.effort), indent=1)
+    (folder / "effort.json").write_text(effort, encoding="utf-8")
     (folder / "scene.toml").write_text(dumps(run.scene), encoding="utf-8")
     options = {"tacton": run.tacton, "body": run.body, "model": run.model}
     command = {"typed": "", "name": "simulate", "options": options}
@@ -87,51 +86,33 @@ def write_responses(path: Path, runs: Mapping[str, Run]) -> None:
 
 
 def write_lines(path: Path, runs: Iterable[Run]) -> None:
-    """Every line's amplitude per Tacton, body, model and probe."""
+    """Every line's amplitude per Tacton, body, model and probe, as CSV."""
     runs = list(runs)
-    columns = line_columns(runs)
-    rows = (row for run in runs for row in line_rows(run, columns))
-    path.write_bytes(csv_table(columns, rows))
-
-
-def line_columns(runs: Iterable[Run]) -> tuple[str, ...]:
-    """Columns of lines.csv: `LINE_COLUMNS`, with the depth of probes below the surface and those of
-    other quantities than displacement, velocity and pressure where there are any.
-    """
-    runs = list(runs)
-    more = dict.fromkeys(run.response.record.column for run in runs)
     deep = [DEPTH] * any(not run.scene.reading.is_on_surface for run in runs)
-    where, amplitudes = LINE_COLUMNS[:5], LINE_COLUMNS[5:]
-    return (*where, *deep, *amplitudes, *(name for name in more if name not in amplitudes))
+    more = dict.fromkeys(run.response.record.column for run in runs)
+    columns = dict.fromkeys([*WHERE, *deep, *AMPLITUDES, *more])
+    rows = ([row.get(name) for name in columns] for run in runs for row in line_rows(run))
+    path.write_bytes(Table(columns, rows).to_csv())
 
 
-def line_rows(run: Run, columns: Sequence[str] = LINE_COLUMNS) -> Iterator[tuple[object, ...]]:
-    """Rows of lines.csv; the point kernel has a pressure where bodies have a displacement. Peaks
-    that are no single line of the load have their kind for a name, such as "free vibration".
+def line_rows(run: Run) -> Iterator[dict[str, Any]]:
+    """Rows of lines.csv by column; the point kernel has a pressure where bodies have a
+    displacement. Peaks that are no single line of the load have their kind for a name, such as
+    "free vibration".
     """
     asked = run.response.record
     found = [(name, f, run.table.amplitudes[name]) for name, f in run.listed.items()]
     found += [(peak.kind, peak.frequency, peak.amplitudes) for peak in run.unnamed]
+    # The point kernel's pressure is that on the surface, whatever is asked of bodies.
+    depths = run.scene.depths if asked.of_body else [0.0] * len(run.scene.depths)
     for name, frequency, amplitudes in found:
-        # The point kernel's pressure is that on the surface, whatever is asked of bodies.
-        depths = run.scene.depths if asked.of_body else [0.0] * len(run.scene.depths)
         for (x, y), z, amplitude in zip(run.response.probes, depths, amplitudes, strict=True):
-            row: dict[str, object] = {
+            row = {
                 "tacton": run.tacton, "body": run.body, "model": run.model, "line": name,
-                "probe_x_mm": _short(1e3 * x), "probe_y_mm": _short(1e3 * y),
-                DEPTH: _short(1e3 * z), "frequency_hz": _short(frequency),
-                asked.column: _short(asked.per_unit * amplitude),
+                "probe_x_mm": 1e3 * x, "probe_y_mm": 1e3 * y, DEPTH: 1e3 * z,
+                "frequency_hz": frequency, asked.column: asked.per_unit * amplitude,
             }  # fmt: skip
             if asked is DISPLACEMENT:
-                velocity = VELOCITY.per_unit * 2 * np.pi * frequency * amplitude
-                row[VELOCITY.column] = _short(velocity)
-            yield tuple(row.get(column, "") for column in columns)
-
-
-def write_effort(path: Path, effort: Effort) -> None:
-    """Cost of a response, as JSON."""
-    path.write_text(json.dumps(asdict(effort), indent=1), encoding="utf-8")
-
-
-def _short(value: float) -> str:
-    return f"{value:.6g}"
+                rate = VELOCITY.per_unit * 2 * np.pi * frequency
+                row[VELOCITY.column] = rate * amplitude
+            yield row

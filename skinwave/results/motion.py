@@ -1,5 +1,11 @@
-"""Motion of a whole body, for pictures."""
+"""Steady motion of a whole meshed body, line by line, for maps, films and files of other programs.
 
+What is linear in the motion is about its mean, as the motion of pictures is. An invariant, such as
+the largest shear strain, is that of the whole tensor, its mean included, as probes read it; of an
+unconstrained body, whose mean has no bound, that of the rest.
+"""
+
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -9,37 +15,44 @@ from scipy import sparse
 import fem
 from meshes import TetMesh, part
 from meshes.tetmesh import Floats, Ints
-from simple_model import Effort, Response
+from simple_model import Effort, Material, Response
+from simple_model.layers.tensors import hooke
 from simple_model.load.path_cells import path_samples
+from simple_model.load.spectrum import synthesise
+from simple_model.quantities import NORMAL, STRAIN, VECTOR, Quantity
 from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
 from skinwave.models import reduction
 from skinwave.models.laws import relaxing, series_tolerance
-from skinwave.models.meshed import assembled, meshed, probe_rows, spent, spread, surface_load
+from skinwave.models.meshed import (
+    assembled,
+    check_coat,
+    meshed,
+    probe_rows,
+    spent,
+    spread,
+    surface_load,
+)
 from skinwave.models.options import SolveOptions, sample_times
 from skinwave.models.prepared import in_motion
-from skinwave.scene.scene import Scene
+from skinwave.models.reduction import ReducedResponse, oscillating
+from skinwave.scene.scene import Reading, Scene
 from skinwave.system.effort import Clock, Progress, silent
 
 TOLERANCE = 0.01  # of the reduction; with it stress at the surface meets the load within 3 %
 MOST_VALUES = 500_000_000  # of the motion of a whole body, 4 GB
+INWARDS = np.array([[0.0, 0.0, -1.0]])  # what is drawn of normal motion
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BodyMotion:
-    """Motion of a meshed body under a load, line by line.
-
-    Parameters
-    ----------
-    build : Build, with the mesh
-    basis : (3 n, r) float, of all nodes of that mesh
-    motion : ReducedResponse, in reduced coordinates (r,)
-    effort : Effort
+    """Motion of a meshed body under a load: `motion` in reduced coordinates (r,), and their
+    `basis` (3 n, r) at all nodes of the mesh of `build`.
     """
 
     build: Build
     basis: Floats
-    motion: reduction.ReducedResponse
+    motion: ReducedResponse
     effort: Effort
 
     @cached_property
@@ -66,60 +79,51 @@ class BodyMotion:
         return each[self.nodes].reshape(3 * len(self.nodes), -1)
 
 
-def probe_lines(scene: Scene, moved: BodyMotion) -> reduction.ReducedResponse:
-    """Components of the quantity that the probes of a scene read, from its body's motion."""
-    rows, solids = probe_rows(scene.body, moved.build, scene.probe_points, scene.reading)
-    seen = reduction.read_at(moved.motion, rows @ moved.basis)
-    return in_motion(seen, scene.reading.asked, solids)
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tensors:
+    """Strain and stress (t, q, 6) in Pa of a body about their means at some `frames` (t,) of its
+    view: at `nodes` (q,) of its mesh, those between two materials once for each, by which `tets`
+    (m, 10) are numbered. Components are xx, yy, zz, xy, xz, yz.
+    """
+
+    frames: Ints
+    nodes: Ints
+    tets: Ints
+    strain: Floats
+    stress: Floats
 
 
-def probe_response(scene: Scene, moved: BodyMotion) -> Response:
-    """Quantity that the probes of a scene read, from its body's motion."""
-    times, points, asked = sample_times(scene), scene.probe_points, scene.reading.asked
-    components = reduction.from_rest(probe_lines(scene, moved), times)
-    return Response(
-        model="fem", times=times, probes=points, quantity=asked.name,
-        values=asked.waveforms(components, len(points)), effort=moved.effort,
-    )  # fmt: skip
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Shade:
+    """Colour of a view: values (t, q) of a quantity, by its name, at `nodes` (q,) of its mesh, at
+    each of its times.
+    """
+
+    quantity: str
+    nodes: Ints
+    values: Floats
 
 
 def waves(
-    scene: Scene,
-    tolerance: float = TOLERANCE,
-    progress: Progress | None = None,
-    *,
-    h: float | None = None,
-    solver: str = "auto",
-) -> BodyMotion:
+    scene: Scene, tolerance: float = TOLERANCE, progress: Progress | None = None, *,
+    h: float | None = None, solver: str = "auto",
+) -> BodyMotion:  # fmt: skip
     """Motion of a whole body at any times, as `skinwave.field` reads it; raises what that does."""
-    if scene.load.gravity:
+    given = {"gravity": scene.load.gravity, "support_motion": scene.load.support_motion}
+    if left_out := [key for key, value in given.items() if value]:
         raise ValueError(
-            "the motion of a whole body is that about its rest under gravity; leave gravity out"
-        )
-    if scene.load.support_motion:
-        raise ValueError(
-            "the motion of a whole body is that on a support at rest; leave support_motion out"
+            "the motion of a whole body is about its rest without gravity, on a support at rest; "
+            f"leave {left_out[0]} out"
         )
     return driven(scene, tolerance, progress, h=h, solver=solver)
 
 
 def driven(
-    scene: Scene,
-    tolerance: float,
-    progress: Progress | None = None,
-    *,
-    h: float | None = None,
+    scene: Scene, tolerance: float, progress: Progress | None = None, *, h: float | None = None,
     solver: str = "auto",
-) -> BodyMotion:
-    """A meshed body under a load, reduced to the subspace of its path.
-
-    Parameters
-    ----------
-    scene, tolerance, progress, h, solver : as for `waves`, with its errors
-
-    Returns
-    -------
-    BodyMotion
+) -> BodyMotion:  # fmt: skip
+    """A meshed body under a load, reduced to the subspace of its path; options and errors as of
+    `simulate`.
     """
     SolveOptions(solver=solver, h=h, tolerance=tolerance)  # which refuses what is out of range
     clock, report = Clock(), progress or silent
@@ -146,14 +150,25 @@ def driven(
     return BodyMotion(build=build, basis=basis, motion=motion, effort=effort)
 
 
-def check_values(frames: int, nodes: int) -> None:
-    """Refuse the motion of a whole body at more times than memory has room for.
+def probe_lines(scene: Scene, moved: BodyMotion) -> ReducedResponse:
+    """Components of the quantity that the probes of a scene read, from its body's motion."""
+    rows, solids = probe_rows(scene.body, moved.build, scene.probe_points, scene.reading)
+    seen = reduction.read_at(moved.motion, rows @ moved.basis)
+    return in_motion(seen, scene.reading.asked, solids)
 
-    Raises
-    ------
-    ValueError
-        If it is so.
-    """
+
+def probe_response(scene: Scene, moved: BodyMotion) -> Response:
+    """Quantity that the probes of a scene read, from its body's motion."""
+    times, points, asked = sample_times(scene), scene.probe_points, scene.reading.asked
+    components = reduction.from_rest(probe_lines(scene, moved), times)
+    return Response(
+        model="fem", times=times, probes=points, quantity=asked.name,
+        values=asked.waveforms(components, len(points)), effort=moved.effort,
+    )  # fmt: skip
+
+
+def check_values(frames: int, nodes: int) -> None:
+    """Refuse motion at more times than memory has room for, by a ValueError."""
     if (values := 3 * frames * nodes) > MOST_VALUES:
         raise ValueError(
             f"{frames:,} times of {nodes:,} nodes are {values:,} values, the limit is "
@@ -162,17 +177,103 @@ def check_values(frames: int, nodes: int) -> None:
 
 
 def vibration(moved: BodyMotion, times: Floats) -> Floats:
-    """Reduced coordinates (t, r) of the steady state about its mean at times as in `from_rest`."""
-    moving = reduction.oscillating(moved.motion)
-    if not len(moving.frequencies):
-        return np.zeros((len(times), moving.lines.shape[1]))
-    rates = np.asarray(2j * np.pi * moving.frequencies, np.complex128)
-    return fem.exponential_sum(rates, moving.lines, times)
-
-
-def line_amplitudes(moved: BodyMotion, read: sparse.csr_array) -> tuple[Floats, Floats]:
-    """Frequencies (f,) in Hz above 0 and amplitudes (f, p) in metre that an operator (p, 3 n)
-    reads.
+    """Displacement (t, m, 3) in metre of the body's own nodes about their mean, in the steady
+    state.
     """
-    seen = reduction.read_at(reduction.oscillating(moved.motion), read @ moved.basis)
-    return seen.frequencies, np.abs(seen.lines)
+    check_values(len(times), len(moved.mesh.points))
+    z = _coordinates(oscillating(moved.motion), times)
+    return (z @ moved.own_basis.T).reshape(len(times), -1, 3)
+
+
+def tensors(moved: BodyMotion, times: Floats, frames: Ints) -> Tensors:
+    """Strain and stress of a solid body at some frames (t,) of all times (f,) in s."""
+    lines, offset = oscillating(moved.motion), 0
+    nodes, tets, strains, stresses = [], [], [], []
+    z = _coordinates(lines, times[frames])
+    for each, own in _parts(moved):
+        relaxed = _coordinates(lines, times[frames], each.material)
+        u = moved.basis @ np.vstack([z, relaxed]).T
+        found = fem.nodal_strain(each, u, own).astype(np.float32)
+        still, moving = np.split(np.moveaxis(found, -1, 0), 2)
+        nodes.append(np.searchsorted(moved.nodes, each.nodes[own]))
+        number = np.full(len(each.nodes), -1)
+        number[own] = offset + np.arange(len(own))
+        inside = (number[each.tets] >= 0).all(axis=1)
+        tets.append(number[each.tets[inside]])
+        strains.append(still)
+        stresses.append(moving @ hooke(each.material).T.astype(np.float32))
+        offset += len(own)
+    return Tensors(
+        frames=frames, nodes=np.concatenate(nodes), tets=np.vstack(tets),
+        strain=np.concatenate(strains, axis=1), stress=np.concatenate(stresses, axis=1),
+    )  # fmt: skip
+
+
+def shade(scene: Scene, moved: BodyMotion, times: Floats, nodes: Ints) -> Shade:
+    """Quantity that a scene's probes read, at nodes (q,) of `moved.mesh` and times (t,) in s.
+
+    Raises
+    ------
+    ValueError
+        If it is of a sheet and not of its normal motion, is strain or stress in a coat, or has
+        too many values.
+    """
+    asked = scene.reading.asked
+    if scene.body.of_kind.is_plate and not asked.is_normal:
+        raise ValueError(
+            f"{asked.words} of a sheet is not drawn, because its mesh is thicker than it; ask for "
+            "displacement, velocity or acceleration, or for its probes by skinwave run"
+        )
+    check_values(len(times), len(nodes))
+    whole = asked.invariant is not None and scene.body.is_held
+    lines = moved.motion if whole else oscillating(moved.motion)
+    if asked.field == STRAIN:
+        check_coat(moved.build, Reading(quantity=asked.name))
+        values = _of_strain(asked, lines, moved, times, nodes)
+    else:
+        rows = {NORMAL: INWARDS, VECTOR: asked.rows(scene.body.solid)}[asked.field]
+        basis = moved.own_basis.reshape(len(moved.mesh.points), 3, -1)[nodes]
+        z = _coordinates(lines, times, None, asked)
+        values = z @ np.einsum("ci,nim->nm", rows, basis).T
+    return Shade(quantity=asked.name, nodes=nodes, values=values.astype(np.float32))
+
+
+def _of_strain(
+    asked: Quantity, lines: ReducedResponse, moved: BodyMotion, times: Floats, nodes: Ints
+) -> Floats:
+    """Values (t, q) of a quantity of strain; between materials the mean of those on both sides."""
+    total, count = np.zeros((len(times), len(nodes))), np.zeros(len(nodes))
+    for each, own in _parts(moved):
+        here = np.searchsorted(moved.nodes, each.nodes[own])
+        seen = np.isin(here, nodes)
+        z = _coordinates(lines, times, each.material, asked)
+        strain = fem.nodal_strain(each, moved.basis @ z.T, own[seen])
+        found = np.einsum("vc,qct->tqv", asked.rows(each.material), strain, optimize=True)
+        at = np.searchsorted(nodes, here[seen])
+        total[:, at] += asked.waveforms(found.reshape(len(times), -1), int(seen.sum()))
+        count[at] += 1
+    return total / count
+
+
+def _parts(moved: BodyMotion) -> Iterator[tuple[fem.SolidPart, Ints]]:
+    """Parts of a driven mesh, of one material each, and which of their nodes are the body's."""
+    for each in fem.solid_parts(moved.build.mesh, moved.build.material):
+        own = np.flatnonzero(np.isin(each.nodes, moved.nodes))
+        if len(own):
+            yield each, own
+
+
+def _coordinates(
+    lines: ReducedResponse, times: Floats, material: Material | None = None,
+    asked: Quantity | None = None,
+) -> Floats:  # fmt: skip
+    """Reduced coordinates (t, r) of lines with the rates of a quantity and, of a material, with the
+    relaxation of its stress.
+    """
+    f = lines.frequencies
+    if not len(f):
+        return np.zeros((len(times), lines.lines.shape[1]))
+    s = 2j * np.pi * f
+    modulus = 1.0 if material is None else fem.relaxation(material, s)
+    factor = np.asarray(modulus if asked is None else asked.factor(s, modulus))
+    return synthesise(f, lines.lines * np.broadcast_to(factor, f.shape)[:, None], times)

@@ -31,24 +31,12 @@ def output_folder(
     inputs: Iterable[str | Path] = (),
     report: Sequence[str] = (),
 ) -> Iterator[Path]:
-    """Yield a folder to write in, which becomes `out` when all is written.
+    """Yield a folder to write in, which becomes `out` when all is written; a ValueError if that
+    exists and may not be replaced. `inputs`, which the command reads, are never replaced.
 
     Until then its name is `<out>.partial-` and eight digits. An error removes it and leaves `out`
-    untouched. An interrupt keeps it if it holds finished runs.
-
-    Parameters
-    ----------
-    out : folder to make
-    overwrite : whether a folder that this program wrote may be replaced
-    inputs : what the command reads, which is never replaced
-    report : options of the command that makes a page of finished runs
-
-    Raises
-    ------
-    ValueError
-        If `out` exists and may not be replaced.
-    KeyboardInterrupt
-        With a sentence that names what is kept, if there is anything.
+    untouched. An interrupt keeps it if it holds finished runs, and says so, with the options
+    `report` of the command that makes a page of them.
     """
     out = Path(os.path.realpath(out))  # a link remains one, and points to what is written
     _refuse_folder(out, overwrite, inputs)
@@ -78,12 +66,8 @@ def output_folder(
 def output_path(
     out: Path, *, overwrite: bool = False, inputs: Iterable[str | Path] = ()
 ) -> Iterator[Path]:
-    """Yield a path of the same suffix; what is written there becomes `out`, or leaves no trace.
-
-    Raises
-    ------
-    ValueError
-        If `out` exists and may not be overwritten, or is one of the `inputs` of the command.
+    """Yield a path of the same suffix; what is written there becomes `out`, or leaves no trace. A
+    ValueError if `out` exists and may not be overwritten, or is one of the command's `inputs`.
     """
     out = Path(os.path.realpath(out))
     if out.is_dir():
@@ -115,13 +99,7 @@ def beside(out: Path, what: str) -> Path:
 
 
 def seal(folder: Path) -> None:
-    """Enter every file below a folder in its record.json, once all is written.
-
-    Raises
-    ------
-    ValueError
-        If the folder has no record.
-    """
+    """Enter every file below a folder in its record.json, once all is written."""
     listed = {
         path.relative_to(folder).as_posix(): digest(path)
         for path in sorted(folder.rglob("*"))
@@ -157,23 +135,17 @@ def foreign_file(folder: Path) -> Path | None:
     records = [folder / record.FILE, *[folder / REPORT / record.FILE] * bool(own)]
     for path in sorted(folder.rglob("*")):
         is_folder = path.is_dir() and not path.is_symlink()
-        if not is_folder and path.name not in OF_SYSTEM and path not in records:
-            name = path.relative_to(folder).as_posix()
-            if not is_as_listed(path, listed.get(name)):
-                return path
+        known = listed.get(path.relative_to(folder).as_posix())
+        if not (is_folder or path.name in OF_SYSTEM or path in records) and not is_as_listed(
+            path, known
+        ):
+            return path
     return None
 
 
 def is_as_listed(path: Path, entry: object) -> bool:
     """Whether a path is a regular file, no link, with the content that its entry in a list has."""
     return path.is_file() and not path.is_symlink() and digest(path) == entry
-
-
-def within(path: str | Path, folder: Path) -> bool:
-    """Whether something that exists is a folder or lies below it, whatever either is called."""
-    real = Path(os.path.realpath(path))
-    both = real.exists() and folder.exists()
-    return both and any(p.samefile(folder) for p in (real, *real.parents))
 
 
 class _TakenError(ValueError):
@@ -191,7 +163,8 @@ def _refuse_folder(out: Path, overwrite: bool, inputs: Iterable[str | Path]) -> 
     if not out.is_dir():
         raise ValueError(f"{out} is a file; choose a folder with --out")
     for used in (Path.cwd(), *(path for path in inputs if path)):
-        if within(used, out):
+        real = Path(os.path.realpath(used))
+        if real.exists() and any(parent.samefile(out) for parent in (real, *real.parents)):
             raise ValueError(f"{out} holds {used}, which is in use; choose another --out")
     if any(out.iterdir()) and listed_files(out) is None:
         raise ValueError(

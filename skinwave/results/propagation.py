@@ -7,7 +7,7 @@ difference of phase between motion and the kernel's pressure at the same probe o
 the steady vibration, about the mean.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -79,17 +79,8 @@ def propagation(
     surface: SurfaceField | None = None,
     kernel_surface: SurfaceField | None = None,
 ) -> Propagation:
-    """Difference of a body's response from the point kernel's under the same load.
-
-    Parameters
-    ----------
-    run, kernel : of one Tacton at the same probes
-    surface, kernel_surface : of the same, on one grid
-
-    Raises
-    ------
-    ValueError
-        If the two have different loads, so that more than propagation differs.
+    """Difference of a body's response from the point kernel's at the same probes and, if given, of
+    their maps on one grid; a ValueError if their loads differ, and so more than propagation does.
     """
     if run.scene.pressure != kernel.scene.pressure:
         raise ValueError(
@@ -106,20 +97,18 @@ def propagation(
     if surface is None or kernel_surface is None or not surface.rms.any():
         return found
     away = distance_from_path(run.scene, surface.places)
-    return Propagation(
-        **vars(found)
-        | {
-            "share": share_outside(kernel_surface.rms, surface.rms),
-            "spread": reach_of(surface.rms >= _level(surface.rms, NEAR), away),
-            "kernel_spread": reach_of(kernel_surface.rms >= _level(kernel_surface.rms, NEAR), away),
-            "above_threshold": _above_threshold(surface, away) if run.scene.body.is_skin else (),
-        }
-    )
+    own, of_kernel = surface.rms, kernel_surface.rms
+    return replace(
+        found, share=share_outside(of_kernel, own),
+        spread=reach_of(own >= _level(own, NEAR), away),
+        kernel_spread=reach_of(of_kernel >= _level(of_kernel, NEAR), away),
+        above_threshold=_above_threshold(surface, away) if run.scene.body.is_skin else (),
+    )  # fmt: skip
 
 
 def share_outside(kernel: Floats, rms: Floats) -> float:
-    """Share 0..1 of squared motion (ny, nx) where the kernel's (ny, nx) is 20 dB below its largest,
-    both on a `surface.grid`; places that are no number are off the body.
+    """Share 0..1 of squared motion (ny, nx) where the kernel's (ny, nx) is 20 dB below its largest;
+    places that are no number are off the body.
     """
     outside = kernel < _level(kernel, OUTSIDE)
     return float(np.nansum(rms[outside] ** 2) / np.nansum(rms**2))
@@ -142,8 +131,6 @@ def strongest_component(run: Run, *, by_sensation: bool = False) -> Component | 
     of none.
     """
     names = [name for name, f in run.frequencies.items() if f > 0]
-    if not names:
-        return None
     amplitudes = np.array([run.lines[name] for name in names])
     if not amplitudes.any():
         return None

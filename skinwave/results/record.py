@@ -41,14 +41,8 @@ def write(
     scene: Scene | None = None,
     response: Response | None = None,
 ) -> None:
-    """Write record.json of a folder.
-
-    Parameters
-    ----------
-    folder : of the result
-    command : as `of_command` returns it
-    scene : that was computed, if there is one
-    response : by one model, if there is one
+    """Write record.json of a folder: a command as of `of_command`, and the scene and response of
+    one model, if there are any.
     """
     content: dict[str, Any] = {
         "command": command, "scene": dumps(scene) if scene else None,
@@ -65,13 +59,7 @@ def write(
 
 
 def read(folder: Path) -> dict[str, Any]:
-    """Read the record of a result folder.
-
-    Raises
-    ------
-    ValueError
-        If there is none, or it cannot be read.
-    """
+    """Read the record of a result folder; a ValueError if there is none, or it is spoilt."""
     path = folder / FILE
     if not path.exists():
         raise ValueError(f"{folder} has no {FILE}; name a folder that skinwave wrote")

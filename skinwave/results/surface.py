@@ -6,10 +6,11 @@ reduced-order model of finite elements.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import fem
 from fem.load_and_probe import surface_frame
@@ -23,14 +24,14 @@ from skinwave.bodies.analytic import compliance, has_exact_waves, is_laterally_i
 from skinwave.bodies.sizes import default_size
 from skinwave.models.advice import takes
 from skinwave.models.flat_body import field_read
-from skinwave.models.meshed import line_factor, probe_rows, surface_motion
+from skinwave.models.meshed import line_factor, probe_rows
 from skinwave.models.plate_modes import ERROR as PLATE_ERROR
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.plate_modes import steady_lines as plate_lines
 from skinwave.models.reduction import read_at
 from skinwave.models.stretched_plate import settled
 from skinwave.planning.left_out import beyond_linear
-from skinwave.results.motion import TOLERANCE, BodyMotion, driven, line_amplitudes
+from skinwave.results.motion import TOLERANCE, BodyMotion, driven
 from skinwave.scene.scene import Reading, Scene
 from skinwave.system.effort import Progress
 
@@ -98,76 +99,6 @@ def grid(scene: Scene, reach: float = REACH, step: float = STEP) -> tuple[Floats
     return x, y
 
 
-def kernel_map(pressure: MovingPressure, x: Floats, y: Floats) -> SurfaceField:
-    """The point kernel's pressure at places x (nx,) and y (ny,) in metre."""
-    amplitudes = _amplitudes(pressure, lambda at: pressure_lines(pressure, at, FAINT), x, y)
-    return _field(x, y, _rms_and_level(amplitudes)[0], quantity=PRESSURE)
-
-
-def body_map(
-    scene: Scene,
-    x: Floats,
-    y: Floats,
-    progress: Progress | None = None,
-    *,
-    h: float | None = None,
-    solver: str = "auto",
-) -> SurfaceField:
-    """Displacement of a body's surface, with sensation levels.
-
-    Parameters
-    ----------
-    scene : Scene
-    x, y : (nx,), (ny,) float, metre
-    progress, solver : as for `simulate`
-    h : metre, of finite elements; they are coarser than by default
-
-    Returns
-    -------
-    SurfaceField
-
-    Raises
-    ------
-    ValueError
-        If there is no body, or none that can be meshed.
-    """
-    if h is None and takes(FROM_REST, scene):
-        return _plate_map(scene, x, y)
-    if not has_wavenumber_integral(scene):
-        size = max(h or 0.0, COARSER[scene.body.of_kind.is_plate] * default_size(scene.body))
-        moved = driven(scene, REDUCED, progress, h=size, solver=solver)
-        return replace(element_map(scene, moved, x, y), note=f"elements of {1e3 * size:.2g} mm")
-    waves_of = compliance(scene.body)
-
-    def lines_at(places: Floats) -> Lines:
-        return steady_lines(waves_of, scene.pressure, places, threshold=FAINT)
-
-    rms, level = _rms_and_level(_amplitudes(scene.pressure, lines_at, x, y))
-    return _field(x, y, rms, level if scene.body.is_skin else None, note="laterally infinite layer")
-
-
-def element_map(scene: Scene, moved: BodyMotion, x: Floats, y: Floats) -> SurfaceField:
-    """Displacement of a meshed body's surface, which is read as probes read it."""
-    places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    seen = fem.on_surface(moved.build.mesh, places)
-    lines = line_amplitudes(moved, surface_motion(scene.body, moved.build, places[seen]))
-    found = np.full((2, len(places)), np.nan)
-    found[:, seen] = _rms_and_level(lines)
-    return _field(x, y, found[0], found[1] if scene.body.is_skin else None)
-
-
-def _plate_map(scene: Scene, x: Floats, y: Floats) -> SurfaceField:
-    """Map of a thin plate in its modes."""
-    places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    if beyond_linear(scene, REDUCED):
-        _, z, modes = settled(scene, REDUCED)
-        shapes, spread = modes.at(places - scene.body.placement.offset), np.cov(z, rowvar=False)
-        rms = np.sqrt(np.einsum("pi,ij,pj->p", shapes, spread, shapes, optimize=True))
-        return _field(x, y, rms, note="stretching plate")
-    lines, amplitudes = plate_lines(scene, places)
-    return _field(x, y, _rms_and_level((lines, np.abs(amplitudes)))[0], note="thin plate")
-
-
 def has_wavenumber_integral(scene: Scene) -> bool:
     """Whether a wavenumber integral stands for the scene, whose sides then reflect nothing."""
     plain = scene.pressure.profile == "gaussian" and scene.tacton.trajectory.shape != "recorded"
@@ -175,27 +106,56 @@ def has_wavenumber_integral(scene: Scene) -> bool:
     return plain and is_laterally_infinite(scene.body) and has_exact_waves(scene.body)
 
 
+def kernel_map(pressure: MovingPressure, x: Floats, y: Floats) -> SurfaceField:
+    """The point kernel's pressure at places x (nx,) and y (ny,) in metre."""
+    lines = _round_lines(pressure, partial(pressure_lines, pressure, threshold=FAINT), x, y)
+    rms = _rms(PRESSURE, lines, len(x) * len(y)).reshape(len(y), len(x))
+    return SurfaceField(x=x, y=y, rms=rms, quantity=PRESSURE)
+
+
+def body_map(
+    scene: Scene, x: Floats, y: Floats, progress: Progress | None = None, *,
+    h: float | None = None, solver: str = "auto",
+) -> SurfaceField:  # fmt: skip
+    """Displacement of a body's surface at places x (nx,) and y (ny,) in metre, with sensation
+    levels.
+
+    Elements are coarser than those of `simulate`, unless their size h in metre is given and larger;
+    a ValueError if there is no body, or none that can be meshed.
+    """
+    if h is None and takes(FROM_REST, scene):
+        return _plate_map(scene, x, y)
+    if not has_wavenumber_integral(scene):
+        size = max(h or 0.0, COARSER[scene.body.of_kind.is_plate] * default_size(scene.body))
+        moved = driven(scene, REDUCED, progress, h=size, solver=solver)
+        return replace(element_map(scene, moved, x, y), note=f"elements of {1e3 * size:.2g} mm")
+    lines_at = partial(steady_lines, compliance(scene.body), scene.pressure, threshold=FAINT)
+    lines = _round_lines(scene.pressure, lines_at, x, y)
+    return _of_lines(scene, x, y, lines, "laterally infinite layer")
+
+
+def _plate_map(scene: Scene, x: Floats, y: Floats) -> SurfaceField:
+    """Map of a thin plate in its modes."""
+    places = _places(x, y)
+    if not beyond_linear(scene, REDUCED):
+        return _of_lines(scene, x, y, plate_lines(scene, places), "thin plate")
+    _, z, modes = settled(scene, REDUCED)
+    shapes, spread = modes.at(places - scene.body.placement.offset), np.cov(z, rowvar=False)
+    rms = np.sqrt(np.einsum("pi,ij,pj->p", shapes, spread, shapes, optimize=True))
+    return SurfaceField(x=x, y=y, rms=rms.reshape(len(y), len(x)), note="stretching plate")
+
+
 def quantity_map(
-    scene: Scene,
-    progress: Progress | None = None,
-    *,
-    reach: float,
-    step: float,
-    h: float | None = None,
-    solver: str = "auto",
-) -> SurfaceField:
+    scene: Scene, progress: Progress | None = None, *, reach: float, step: float,
+    h: float | None = None, solver: str = "auto",
+) -> SurfaceField:  # fmt: skip
     """Map of the quantity that a scene's probes read, at the depth of the first of them.
 
     Parameters
     ----------
     scene : Scene
     progress, h, solver : as for `simulate`
-    reach : metre either way from the middle, at most to the edges of the body
-    step : metre between places
-
-    Returns
-    -------
-    SurfaceField
+    reach, step : metre either way from the middle, at most to the edges, and between places
 
     Raises
     ------
@@ -209,23 +169,22 @@ def quantity_map(
             f"a map of {1e3 * reach:g} mm either way in steps of {1e3 * step:g} mm has no places "
             f"or more than {MOST_PLACES:,}; choose another step"
         )
-    asked, (x, y) = scene.reading.asked, grid(scene, reach, step)
+    x, y = grid(scene, reach, step)
     if has_wavenumber_integral(scene):
-        places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-        lines = field_lines(field_read(scene, scene.depths[0]), scene.pressure, places,
-                            threshold=FAINT)  # fmt: skip
+        field = field_read(scene, scene.depths[0])
+        lines = field_lines(field, scene.pressure, _places(x, y), threshold=FAINT)
         note = "wavenumber integral of the laterally infinite body"
-        return _of_probes(scene, x, y, _rms(asked, lines, len(places)), note)
+        return _of_lines(scene, x, y, lines, note)
     if h is None and scene.reading.is_plain and takes(FROM_REST, scene):
-        return replace(body_map(scene, x, y), error=PLATE_ERROR)
-    if scene.load.support_motion or (scene.load.gravity and asked.invariant):
+        return replace(_plate_map(scene, x, y), error=PLATE_ERROR)
+    if scene.load.support_motion or (scene.load.gravity and scene.reading.asked.invariant):
         raise ValueError(
             "a map is of motion about the rest without gravity, on a support at rest; leave "
             "gravity and support_motion out"
         )
     size = h or default_size(scene.body)
     fine, coarse = (
-        map_of_motion(scene, driven(scene, TOLERANCE, progress, h=each, solver=solver), x, y)
+        element_map(scene, driven(scene, TOLERANCE, progress, h=each, solver=solver), x, y)
         for each in (size, SECOND * size)
     )
     away = np.nanmax(np.abs(coarse.rms - fine.rms)) / (SECOND**ORDER - 1)
@@ -233,20 +192,21 @@ def quantity_map(
     return replace(fine, note=note, error=float(away / np.nanmax(fine.rms)))
 
 
-def map_of_motion(scene: Scene, moved: BodyMotion, x: Floats, y: Floats) -> SurfaceField:
+def element_map(scene: Scene, moved: BodyMotion, x: Floats, y: Floats) -> SurfaceField:
     """Map of the quantity that probes read, of a meshed body whose motion is known."""
-    asked, depth = scene.reading.asked, scene.depths[0]
-    places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    seen = fem.on_surface(moved.build.mesh, places)
-    seen[seen] = _is_above(scene, moved, places[seen], depth)
-    count = int(seen.sum())
-    there = Reading(quantity=asked.name, depths=(depth,) * count if depth else ())
+    asked, depth, mesh = scene.reading.asked, scene.depths[0], moved.build.mesh
+    places = _places(x, y)
+    seen = fem.on_surface(mesh, places)
+    if depth:  # where the body is as deep along its normal
+        patch = scene.body.of_kind.normal_patch
+        points, normals = surface_frame(mesh, places[seen], patch=patch)
+        seen[seen] = fem.is_inside(mesh, points - depth * normals)
+    there = Reading(quantity=asked.name, depths=(depth,) * int(seen.sum()) if depth else ())
     rows, solids = probe_rows(scene.body, moved.build, places[seen], there)
     motion = read_at(moved.motion, rows @ moved.basis)
     factor = line_factor(asked, 2j * np.pi * motion.frequencies, solids, rows.shape[0])
-    rms = np.full(len(places), np.nan)
-    rms[seen] = _rms(asked, (motion.frequencies, motion.lines * factor), count)
-    return _of_probes(scene, x, y, rms, "finite elements")
+    lines = motion.frequencies, motion.lines * factor
+    return _of_lines(scene, x, y, lines, "finite elements", seen)
 
 
 def save(path: Path, found: SurfaceField) -> None:
@@ -268,50 +228,61 @@ def load(path: Path, scene: Scene) -> SurfaceField:
     """
     try:
         arrays = reading.arrays(path)
-        x, y, rms = (np.asarray(arrays[name], np.float64) for name in ("x", "y", "rms"))
-        level = np.asarray(arrays["level"], np.float64) if "level" in arrays else None
-        depth, note = float(arrays["depth"]), str(arrays["note"])
-        if x.ndim != 1 or rms.shape != (*y.shape, *x.shape) or not np.isfinite(rms).any():
+        names = [name for name in ("x", "y", "rms", "level") if name in arrays]
+        values: dict[str, Any] = {n: np.asarray(arrays[n], np.float64) for n in names}
+        x, y, rms = (values[name] for name in ("x", "y", "rms"))
+        shapes = {values.get("level", rms).shape, rms.shape}
+        if x.ndim != 1 or shapes != {(*y.shape, *x.shape)} or not np.isfinite(rms).any():
             raise ValueError(f"'rms' is of shape {rms.shape}, or nowhere a number")
-        if level is not None and level.shape != rms.shape:
-            raise ValueError(f"'level' is of shape {level.shape}")
+        depth, note = float(arrays["depth"]), str(arrays["note"])
     except (KeyError, TypeError, ValueError) as error:
         raise ValueError(f"{path} is no map ({error}); make it anew from its scene") from None
-    found = SurfaceField(x=x, y=y, rms=rms, level=level, depth=depth, note=note)
-    return found if scene.reading.is_plain else replace(found, quantity=scene.reading.asked)
+    return SurfaceField(**values, depth=depth, note=note, quantity=scene.reading.asked)
 
 
-def _field(
-    x: Floats, y: Floats, rms: Floats, level: Floats | None = None, *, note: str = "",
-    quantity: Quantity = DISPLACEMENT,
+def _places(x: Floats, y: Floats) -> Floats:
+    """Places (ny nx, 2) of a grid."""
+    return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+
+
+def _of_lines(
+    scene: Scene, x: Floats, y: Floats, lines: Lines, note: str,
+    seen: np.ndarray | None = None,
 ) -> SurfaceField:  # fmt: skip
-    """A map of values (ny nx,)."""
-    shape = len(y), len(x)
+    """Map from lines (f,), (f, p c) of the components of the quantity that probes read, at all
+    places or at those `seen` (ny nx,).
+    """
+    asked, where = scene.reading.asked, np.ones(len(x) * len(y), bool) if seen is None else seen
+    found = np.full((2, len(where)), np.nan)
+    found[0, where] = _rms(asked, lines, int(where.sum()))
+    felt = scene.reading.is_plain and scene.body.is_skin
+    if felt:
+        moving = lines[0] > STILL
+        amplitudes = np.abs(lines[1][moving]).reshape(int(moving.sum()), -1)
+        levels = sensation_level(amplitudes, lines[0][moving, None])
+        found[1, where] = np.maximum(levels.max(axis=0, initial=-np.inf), SILENT)
+    rms, level = found.reshape(2, len(y), len(x))
     return SurfaceField(
-        x=x, y=y, rms=rms.reshape(shape), quantity=quantity, note=note,
-        level=None if level is None else level.reshape(shape),
+        x=x, y=y, rms=rms, level=level if felt else None, quantity=asked, depth=scene.depths[0],
+        note=note,
     )  # fmt: skip
 
 
-def _of_probes(scene: Scene, x: Floats, y: Floats, rms: Floats, note: str) -> SurfaceField:
-    found = _field(x, y, rms, note=note, quantity=scene.reading.asked)
-    return replace(found, depth=scene.depths[0])
-
-
-def _amplitudes(
+def _round_lines(
     pressure: MovingPressure, lines_at: Callable[[Floats], Lines], x: Floats, y: Floats
-) -> tuple[Floats, Floats]:
-    """Frequencies (f,) and amplitudes (f, ny nx) on a grid, from a function of places (p, 2)."""
-    X, Y = np.meshgrid(x, y)
+) -> Lines:
+    """Lines on a grid, from a function of places (p, 2); of a load that is round those of a radius,
+    of which only the amplitudes are right.
+    """
+    places = _places(x, y)
     if not _is_round(pressure):
-        frequencies, found = lines_at(np.column_stack([X.ravel(), Y.ravel()]))
-        return frequencies, np.abs(found)
+        return lines_at(places)
     from scipy.interpolate import CubicSpline  # which takes long to import
 
-    radius = np.hypot(X, Y).ravel()
+    radius = np.hypot(*places.T)
     radii = np.arange(0, radius.max() + 2 * RADIAL, RADIAL)
     frequencies, along = lines_at(np.column_stack([radii, 0 * radii]))
-    return frequencies, np.abs(CubicSpline(radii, np.abs(along), axis=1)(radius))
+    return frequencies, CubicSpline(radii, np.abs(along), axis=1)(radius)
 
 
 def _is_round(pressure: MovingPressure) -> bool:
@@ -324,26 +295,6 @@ def _is_round(pressure: MovingPressure) -> bool:
     lines = load_lines(pressure, FAINT)
     pairs = {(round(f, 6), n) for f, n in zip(lines.frequencies, lines.harmonics, strict=True)}
     return len(pairs) == len({f for f, _ in pairs})
-
-
-def _rms_and_level(lines: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
-    """RMS (p,) about the mean and the highest sensation level (p,) in dB of lines of amplitudes
-    (f, p).
-    """
-    moving = lines[0] > STILL
-    frequencies, amplitudes = (each[moving] for each in lines)
-    rms = np.sqrt((amplitudes**2).sum(axis=0) / 2)
-    levels = sensation_level(amplitudes, frequencies[:, None])
-    return rms, np.maximum(levels.max(axis=0, initial=-np.inf), SILENT)
-
-
-def _is_above(scene: Scene, moved: BodyMotion, places: Floats, depth: float) -> NDArray[np.bool_]:
-    """Mask of places (p, 2) below which the body has a depth in metre along its normal."""
-    if not depth:
-        return np.ones(len(places), bool)
-    patch = scene.body.of_kind.normal_patch
-    points, normals = surface_frame(moved.build.mesh, places, patch=patch)
-    return fem.is_inside(moved.build.mesh, points - depth * normals)
 
 
 def _rms(asked: Quantity, lines: Lines, places: int) -> Floats:

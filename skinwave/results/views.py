@@ -4,7 +4,7 @@ Motion is about its mean: a steady push bends a sheet far more than its vibratio
 """
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -21,13 +21,14 @@ from simple_model.layers.flat_body import steady_lines
 from simple_model.load.spectrum import pressure_lines, synthesise
 from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity, quantity
 from skinwave.bodies.analytic import compliance
+from skinwave.models.advice import takes
+from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.plate_modes import steady_lines as plate_lines
 from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.reduction import oscillating, read_at
 from skinwave.models.speeds import shown_part, strongest_tone
 from skinwave.models.stretched_plate import STRETCHED, settled
-from skinwave.results.motion import BodyMotion, check_values, vibration
-from skinwave.results.nodal import Shade, Tensors, shade, tensors
+from skinwave.results.motion import BodyMotion, Shade, Tensors, shade, tensors, vibration
 from skinwave.results.run import Run
 from skinwave.results.surface import FAINT, Lines
 from skinwave.scene.file import dumps, loads
@@ -39,6 +40,8 @@ GRID, LAYER_GRID = 121, 81  # points along a side of the surface of the point ke
 TYPICAL = 140.0  # Hz, where nothing vibrates
 FIELD_FRAMES = 8  # of those that are shown, written for other programs
 PLATE_TOLERANCE = 0.05  # of the motion of a sheet at large deflection
+ARRAYS = ("points", "tets", "surface", "triangles", "times", "motion")
+META = {"body": str, "model": str, "quantity": str, "period": float, "tone": float, "scene": str}
 
 Singles = NDArray[np.float32]
 LinesAt = Callable[[Floats], Lines]  # places (q, 2) -> frequencies (f,) in Hz, lines (f, q)
@@ -55,8 +58,7 @@ class View:
     quantity : of its motion: a displacement, or the pressure of the point kernel
     points : (n, 3) float, metre; tets : (m, 10) int, none of a surface without elements
     surface : (s,) int, the points of the upper surface; triangles : (k, 3) int, of these
-    times : (f,) float, s, through the part of the steady state that is played, `period`: that of
-        the whole pattern, see `speeds.shown_part`
+    times : (f,) float, s, through the part of the steady state that is played, `period`
     motion : (f, n, 3) float32, metre; of the point kernel the pressure in Pa, along the push
     tone : Hz, the line that moves the surface most; speed : m/s, of a surface wave there, or None
     tensors : strain and stress at some of its times, of a solid body that was saved; shade : the
@@ -117,10 +119,9 @@ class View:
 
 def fastest_line(moved: BodyMotion) -> float:
     """The highest line in Hz that moves a body by `STRONG` of what its strongest one does."""
-    moving, basis = oscillating(moved.motion), moved.own_basis
-    lines = moving.lines
-    power = np.einsum("fm,mn,fn->f", lines.conj(), basis.T @ basis, lines).real
-    return _fastest(moving.frequencies, power)
+    lines, basis = oscillating(moved.motion), moved.own_basis
+    power = np.einsum("fm,mn,fn->f", lines.lines.conj(), basis.T @ basis, lines.lines).real
+    return _fastest(lines.frequencies, power)
 
 
 def _fastest(frequencies: Floats, power: Floats) -> float:
@@ -134,32 +135,24 @@ def body_view(
     """A body's view, from all of its motion; `part` is how long it is played, s, and in how many
     frames, `speeds.shown_part` of its own motion if not given.
     """
-    mesh, basis = moved.mesh, moved.own_basis
+    mesh = moved.mesh
     period, frames = part or shown_part(scene.pressure, fastest_line(moved))
     surface, triangles = _upper(mesh.facets["top"])
     times = np.arange(frames) * period / frames
-    check_values(frames, len(mesh.points))
-    motion = vibration(moved, times) @ basis.T
     _, inwards = fem.node_operator(mesh, patch=scene.body.of_kind.normal_patch)
-    seen = read_at(oscillating(moved.motion), inwards @ basis)
+    seen = read_at(oscillating(moved.motion), inwards @ moved.own_basis)
     tone = strongest_tone(seen.frequencies, np.abs(seen.lines))
-
     return View(
         body=body, model="fem", quantity=DISPLACEMENT, scene=scene, points=mesh.points,
         tets=mesh.tets, surface=surface, triangles=triangles, period=period, times=times,
-        motion=motion.reshape(frames, -1, 3).astype(np.float32), tone=tone,
-        speed=scene.body.of_kind.wave_speed(scene.body, tone or TYPICAL), effort=moved.effort,
-        moved=moved,
+        motion=vibration(moved, times).astype(np.float32), tone=tone, speed=_speed(scene, tone),
+        effort=moved.effort, moved=moved,
     )  # fmt: skip
 
 
 def shaded(view: View, scene: Scene) -> View:
-    """A body's view, coloured by the quantity that a scene's probes read.
-
-    Raises
-    ------
-    ValueError
-        As `nodal.shade` does.
+    """A body's view, coloured by the quantity that a scene's probes read; raises what
+    `motion.shade` does.
     """
     assert view.moved
     nodes = np.unique(boundary_facets(view.tets))
@@ -182,58 +175,43 @@ def kernel_view(scene: Scene, reach: Floats, part: tuple[float, int] | None = No
     """The point kernel's view, on a flat square as far as `reach` (2,) in metre either way; `part`
     as `body_view` takes it.
     """
-    pressure = scene.pressure
+    pressure, shape = scene.pressure, _grid(reach, GRID)
 
     def motion_at(places: Floats, t: Floats) -> Floats:
         f, lines = pressure_lines(pressure, places)
         return pressure(places, t) - lines[f == 0].real.sum(axis=0)
 
     if part is None:
-        f, lines = pressure_lines(pressure, _grid(reach, GRID)[0])
+        f, lines = pressure_lines(pressure, shape[0])
         part = shown_part(pressure, _fastest(f[f > 0], (np.abs(lines[f > 0]) ** 2).sum(axis=1)))
-    found = _flat_view(
-        scene, "none", SAME_LOAD.name, part, _grid(reach, GRID),
-        lambda places: pressure_lines(pressure, places), motion_at,
-    )  # fmt: skip
+    lines_at = partial(pressure_lines, pressure)
+    found = _flat_view(scene, "none", SAME_LOAD.name, part, shape, lines_at, motion_at)
     return replace(found, quantity=PRESSURE)
 
 
-def layer_view(run: Run, reach: Floats, part: tuple[float, int]) -> View:
-    """The view of an infinite layer or a half-space, by its wavenumber integral, on a flat square;
-    `reach` and `part` as `kernel_view` takes them.
+def flat_view(run: Run, reach: Floats, part: tuple[float, int]) -> View:
+    """The view of a sheet by the modes of a thin plate, in the later half of the scene if its
+    deflection is large, or of an infinite layer or a half-space by its wavenumber integral, on a
+    flat square; `reach` and `part` as `kernel_view` takes them.
     """
-    waves_of = compliance(run.scene.body)
-
-    def lines_at(places: Floats) -> Lines:
-        return steady_lines(waves_of, run.scene.pressure, places, threshold=FAINT)
-
-    shape = _grid(reach, LAYER_GRID)
-    return _of_run(run, _flat_view(run.scene, run.body, run.model, part, shape, lines_at))
-
-
-def plate_view(run: Run, part: tuple[float, int]) -> View:
-    """The view of a sheet by the modes of a thin plate; `part` as `kernel_view` takes it.
-
-    A sheet at large deflection is shown as it moves in the later half of the scene.
-    """
-    scene, body = run.scene, run.scene.body
-    middle, reach = body.placement.offset, np.array([body.width, body.height]) / 2
-    points, triangles = _grid(reach, LAYER_GRID)
-    points[:, :2] += middle
-
-    lines_at: LinesAt = partial(plate_lines, scene)
-    motion_at = None
-    if run.model == STRETCHED.name:
-        lines_at, motion_at = _stretched(scene, np.array(middle))
+    scene, body, motion_at = run.scene, run.scene.body, None
+    lines_at: LinesAt
+    if scene.reading.is_plain and takes(FROM_REST, scene):
+        points, triangles = _grid(np.array([body.width, body.height]) / 2, LAYER_GRID)
+        points[:, :2] += body.placement.offset
+        lines_at = partial(plate_lines, scene)
+        if run.model == STRETCHED.name:
+            lines_at, motion_at = _stretched(scene, np.array(body.placement.offset))
+    else:
+        points, triangles = _grid(reach, LAYER_GRID)
+        lines_at = partial(steady_lines, compliance(body), scene.pressure, threshold=FAINT)
     shape = points, triangles
     found = _flat_view(scene, run.body, run.model, part, shape, lines_at, motion_at)
-    return _of_run(run, found)
+    return replace(found, speed=_speed(scene, found.tone), effort=run.response.effort)
 
 
-def _of_run(run: Run, view: View) -> View:
-    """A body's view with the cost of its run and the speed of its waves."""
-    speed = run.scene.body.of_kind.wave_speed(run.scene.body, view.tone or TYPICAL)
-    return replace(view, speed=speed, effort=run.response.effort)
+def _speed(scene: Scene, tone: float) -> float | None:
+    return scene.body.of_kind.wave_speed(scene.body, tone or TYPICAL)
 
 
 def _stretched(scene: Scene, middle: Floats) -> tuple[LinesAt, MotionAt]:
@@ -263,21 +241,15 @@ def _flat_view(
     `motion_at` its motion, if it is not the sum of these lines.
     """
     (points, triangles), (period, frames) = shape, part
-    times = np.arange(frames) * period / frames
-
-    def summed(places: Floats, t: Floats) -> Floats:
-        f, lines = lines_at(places)
-        return synthesise(f[f > 0], lines[f > 0], t)
-
-    motion_at = motion_at or summed
-    f, lines = lines_at(points[:, :2])
-    tone = strongest_tone(f[f > 0], np.abs(lines[f > 0]))
+    times, places = np.arange(frames) * period / frames, points[:, :2]
+    f, lines = lines_at(places)
+    moving, lines = f[f > 0], lines[f > 0]
     motion = np.zeros((frames, len(points), 3), np.float32)
-    motion[:, :, 2] = -motion_at(points[:, :2], times)
+    motion[:, :, 2] = -(motion_at(places, times) if motion_at else synthesise(moving, lines, times))
     return View(
         body=body, model=model, quantity=DISPLACEMENT, scene=scene, points=points,
         tets=np.zeros((0, 10), np.int64), surface=np.arange(len(points)), triangles=triangles,
-        period=period, times=times, motion=motion, tone=tone,
+        period=period, times=times, motion=motion, tone=strongest_tone(moving, np.abs(lines)),
         speed=None,
     )  # fmt: skip
 
@@ -292,8 +264,8 @@ def save(path: Path, view: View) -> None:
     """A view as one npz file."""
     arrays: dict[str, Any] = {n: getattr(view, n) for n in ARRAYS}
     if (kept := with_tensors(view).tensors) is not None:
-        arrays |= {f"{TENSORS}{key}": value for key, value in vars(kept).items()}
-    meta = {n: getattr(view, n) for n in META} | {
+        arrays |= {f"tensor_{key}": value for key, value in vars(kept).items()}
+    meta = {n: getattr(view, n) for n in ("body", "model", "period", "tone", "speed")} | {
         "quantity": view.quantity.name, "scene": dumps(view.scene), "effort": asdict(view.effort)
     }  # fmt: skip
     np.savez_compressed(path, meta=np.array(json.dumps(meta)), **arrays)
@@ -309,66 +281,52 @@ def load(path: Path) -> View:
     """
     try:
         arrays = reading.arrays(path)
-        meta = json.loads(str(arrays["meta"]))
-        fitting(meta, FITTING, "meta")
+        meta: dict[str, Any] = fitting(json.loads(str(arrays["meta"])), META, "meta")
         meta |= {"scene": loads(meta["scene"]), "effort": effort_of(meta["effort"], "effort")}
         meta |= {"quantity": quantity(meta["quantity"]), "tensors": _tensors(arrays)}
-        found: dict[str, Any] = {n: arrays[n] for n in ARRAYS} | meta
-        return _checked(View(**found))
+        n, s, f = (len(arrays[name]) for name in ("points", "surface", "times"))
+        for name, *shape in (("points", n, 3), ("times", f), ("motion", f, n, 3)):
+            _check(arrays, name, shape)
+        for name, most, *shape in (("surface", n, s), ("triangles", s, -1, 3), ("tets", n, -1, 10)):
+            _check(arrays, name, shape, most)
+        if not (n and s and f and meta["period"] > 0):
+            raise ValueError("it is empty, or has no period")
+        meta |= {name: arrays[name] for name in ARRAYS}
+        return View(**meta)
     except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise ValueError(f"{path} is no view ({error}); make it anew from its scene") from None
 
 
-ARRAYS = ("points", "tets", "surface", "triangles", "times", "motion")
-TENSORS = "tensor_"  # what the names of their arrays begin with
-META = ("body", "model", "period", "tone", "speed")
-FITTING = {"body": str, "model": str, "quantity": str, "period": float, "tone": float, "scene": str}
-
-
-def _checked(view: View) -> View:
-    """The view, if its arrays fit each other."""
-    n, s, f = len(view.points), len(view.surface), len(view.times)
-    shapes = {
-        "points": (n, 3), "surface": (s,), "triangles": (len(view.triangles), 3), "times": (f,),
-        "motion": (f, n, 3), "tets": view.tets.shape,
-    }  # fmt: skip
-    for name, shape in shapes.items():
-        array = getattr(view, name)
-        is_index, most = name in ("surface", "triangles", "tets"), s if name == "triangles" else n
-        if array.shape != shape or array.dtype.kind not in ("iu" if is_index else "fiu"):
-            raise ValueError(f"'{name}' is of shape {array.shape} and type {array.dtype}")
-        if is_index and array.size and not 0 <= array.min() <= array.max() < most:
-            raise ValueError(f"'{name}' has indices beyond {most}")
-        if not is_index and not np.isfinite(array).all():
-            raise ValueError(f"'{name}' is not finite")
-    if not (n and s and f and view.period > 0):
-        raise ValueError("it is empty, or has no period")
-    if (kept := view.tensors) is not None:
-        _check_numbers(kept.frames, f, "frames")
-        _check_numbers(kept.nodes, n, "nodes")
-        _check_numbers(kept.tets, len(kept.nodes), "tets")
-    if view.tets.ndim != 2 or (len(view.tets) and view.tets.shape[1] not in (4, 10)):
-        raise ValueError(f"'tets' is of shape {view.tets.shape}")
-    return view
-
-
-def _check_numbers(numbers: Ints, most: int, name: str) -> None:
-    if numbers.dtype.kind not in "iu" or not (0 <= numbers.min() <= numbers.max() < most):
-        raise ValueError(f"'{TENSORS}{name}' has numbers beyond {most}")
-
-
-def _tensors(arrays: Mapping[str, Any]) -> Tensors | None:
-    keys = [key.name for key in fields(Tensors)]
-    if f"{TENSORS}{keys[0]}" not in arrays:
+def _tensors(arrays: dict[str, NDArray[Any]]) -> Tensors | None:
+    """Tensors among the arrays of a view, if there are any."""
+    if "tensor_frames" not in arrays:
         return None
-    found = Tensors(**{key: arrays[f"{TENSORS}{key}"] for key in keys})
-    many, q = len(found.frames), len(found.nodes)
-    shapes = {"strain": (many, q, 6), "stress": (many, q, 6), "tets": (len(found.tets), 10)}
-    for name, shape in shapes.items():
-        array = getattr(found, name)
-        if array.shape != shape or not np.isfinite(array).all():
-            raise ValueError(f"'{TENSORS}{name}' is of shape {array.shape}, or not finite")
-    return found
+    found = {one.name: arrays[f"tensor_{one.name}"] for one in fields(Tensors)}
+    frames, nodes = len(found["frames"]), len(found["nodes"])
+    for name, most, *shape in (
+        ("frames", len(arrays["times"]), frames), ("nodes", len(arrays["points"]), nodes),
+        ("tets", nodes, -1, 10),
+    ):  # fmt: skip
+        _check(found, name, shape, most)
+    for name in ("strain", "stress"):
+        _check(found, name, [frames, nodes, 6])
+    return Tensors(**found)
+
+
+def _check(arrays: dict[str, Any], name: str, shape: list[int], most: int = 0) -> None:
+    """Refuse an array of another shape (-1 for any length) or type, or with numbers that are not
+    finite or, of indices, not below `most`.
+    """
+    array = arrays[name]
+    fits = len(array.shape) == len(shape) and all(
+        b in (a, -1) for a, b in zip(array.shape, shape, strict=True)
+    )
+    if not fits or array.dtype.kind not in ("iu" if most else "fiu"):
+        raise ValueError(f"'{name}' is of shape {array.shape} and type {array.dtype}")
+    if most and array.size and not 0 <= array.min() <= array.max() < most:
+        raise ValueError(f"'{name}' has numbers beyond {most}")
+    if not np.isfinite(array).all():
+        raise ValueError(f"'{name}' is not finite")
 
 
 def _upper(facets: Ints) -> tuple[Ints, Ints]:

@@ -39,16 +39,14 @@ from skinwave.results.surface import (
     element_map,
     grid,
     has_wavenumber_integral,
-    map_of_motion,
 )
 from skinwave.results.views import (
     View,
     body_view,
     fastest_line,
+    flat_view,
     kernel_view,
-    layer_view,
     load,
-    plate_view,
     save,
     shaded,
 )
@@ -161,12 +159,12 @@ def keep_view(view: View, folder: Path) -> None:
     """A view in a file and, of a body, the map of what its probes read."""
     save(folder / "view.npz", view)
     scene, moved, (x, y) = view.scene, view.moved, grid(view.scene)
-    if not scene.reading.is_plain and moved is not None:
-        surface.save(folder / "map.npz", map_of_motion(scene, moved, x, y))
+    if scene.reading.is_plain and has_wavenumber_integral(scene):
+        moved = None
+    if moved is not None:
+        surface.save(folder / "map.npz", element_map(scene, moved, x, y))
     elif scene.reading.is_plain and view.body != "none":
-        moved = None if has_wavenumber_integral(scene) else moved
-        found = element_map(scene, moved, x, y) if moved else body_map(scene, x, y)
-        surface.save(folder / "map.npz", found)
+        surface.save(folder / "map.npz", body_map(scene, x, y))
 
 
 def plans_of(
@@ -216,8 +214,7 @@ def answers(
         if column in moved:
             yield body_view(its, column, moved[column], part), run
         else:
-            seen = plate_view(run, part) if _is_plate(its, h) else None
-            yield seen or layer_view(run, KERNEL_REACH, part), run
+            yield flat_view(run, KERNEL_REACH, part), run
 
 
 def _has_elements(scene: Scene, h: float | None) -> bool:

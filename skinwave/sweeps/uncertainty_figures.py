@@ -12,8 +12,7 @@ from matplotlib.patches import Patch
 from meshes.tetmesh import Floats
 from simple_model import threshold
 from simple_model.load.line_names import line_frequency
-from skinwave.report.figures import HIGHEST
-from skinwave.report.levels import written
+from skinwave.report.figures import HIGHEST, written
 from skinwave.report.palette import SEQUENTIAL, SERIES
 from skinwave.report.styles import STYLES, Style
 from skinwave.results.views import path_points

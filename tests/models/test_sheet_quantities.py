@@ -26,7 +26,7 @@ from skinwave.models.meshed import probe_rows, surface_load
 from skinwave.models.sheet_probes import full_reader, modal_reader
 from skinwave.models.stretching import meshed_sheet, stretching_body
 from skinwave.planning.simulate import compute
-from skinwave.results.nodal import shade
+from skinwave.results.motion import shade
 from skinwave.scene.scene import BODIES, Reading, Scene
 
 PAPER = BODIES["paper-sheet-loose"].solid

@@ -15,7 +15,7 @@ from skinwave.report import films
 from skinwave.report.renderer import renderer  # noqa: F401, in the condition below
 from skinwave.report.styles import style
 from skinwave.results import exports, motion, surface, views
-from skinwave.results.nodal import shade
+from skinwave.results.motion import shade
 from skinwave.results.run import Run
 from skinwave.scene.scene import Body, Layer, Scene
 from skinwave.studies import album, scene_report

@@ -212,7 +212,7 @@ def test_half_a_run_is_none(folder, monkeypatch):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     files.write_run(folder / "out/one", a_run())
-    monkeypatch.setattr("skinwave.results.files.write_effort", fails)
+    monkeypatch.setattr("skinwave.results.files.write_lines", fails)
     with pytest.raises(OSError, match="space"):
         files.write_run(folder / "out/two", a_run())
     assert [run.tacton for run in open_album(folder / "out").runs] == ["small"]
