@@ -26,7 +26,7 @@ from skinwave.measure.measurement import Measurement
 from skinwave.models.options import sample_times
 from skinwave.models.prepared import Prepared, answer
 from skinwave.planning.simulate import compute
-from skinwave.report.surfaces import MeasuredPlaces
+from skinwave.report.maps import MeasuredPlaces
 from skinwave.results.comparison import heard_phasors
 from skinwave.results.run import ASSESSED, Run, own_names
 from skinwave.scene.scene import Scene, check_motion

@@ -1,6 +1,6 @@
 """Description of the models and of what they leave out, in sentences true of the runs at hand."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -23,22 +23,20 @@ UNCERTAIN = (
 )
 
 
-def spot_of(pressure: MovingPressure) -> str:
-    """The focal spot, in words."""
+def _spot(pressure: MovingPressure) -> str:
     return SPOTS.get(pressure.profile_name, "a focal spot of its own")
 
 
-def modelled(runs: Iterable[Run]) -> list[str]:
+def modelled(runs: Sequence[Run]) -> list[str]:
     """A paragraph per body and model, and those true of all."""
     groups: dict[tuple[str, str], list[Run]] = {}
     for run in runs:
         groups.setdefault((run.body, run.model), []).append(run)
-    paragraphs = [_answered(group) for group in groups.values()]
-    on_bodies = [run for group in groups.values() for run in group if run.is_motion]
-    notes = [run.scene.pressure.law.note for run in on_bodies if run.is_am]
-    paragraphs += [note for note in dict.fromkeys(notes) if note]
+    on_bodies = [run for run in runs if run.is_motion]
+    notes = dict.fromkeys(run.scene.pressure.law.note for run in on_bodies if run.is_am)
     by_device = any(run.scene.load.of_kind.is_of_device for run in on_bodies)
-    return [*paragraphs, UNCERTAIN] if by_device else paragraphs
+    said = [_modelled(group) for group in groups.values()]
+    return [*said, *filter(None, notes), *[UNCERTAIN] * by_device]
 
 
 def unresolved(runs: Iterable[Run]) -> list[str]:
@@ -52,18 +50,23 @@ def unresolved(runs: Iterable[Run]) -> list[str]:
     ]
 
 
-def _answered(runs: list[Run]) -> str:
+def _modelled(runs: list[Run]) -> str:
     """One body by one model."""
-    pressure, model = runs[0].scene.pressure, named(runs[0].model)
-    load = f"drive law {pressure.drive}, {spot_of(pressure)}"
-    if not (acting := runs[0].scene.load).is_plain:
+    scene, model, name = runs[0].scene, named(runs[0].model), answered(runs[0])
+    acting, body = scene.load, scene.body
+    load = f"drive law {scene.pressure.drive}, {_spot(scene.pressure)}"
+    if not acting.is_plain:
         load = f"{acting.words}; {load}" if acting.of_kind.is_of_device else acting.words
-    text = f"{_sentence(answered(runs[0]))}: {model.words}; {load}."
-    return text if not runs[0].is_motion else f"{text} {_sentence(_body(runs))}"
-
-
-def _sentence(text: str) -> str:
-    return text[0].upper() + text[1:]
+    text = f"{name[0].upper()}{name[1:]}: {model.words}; {load}."
+    if not runs[0].is_motion:
+        return text
+    of, size = f"of {_material(body.solid)}{above(body)}", extent(body)
+    depth_only = " of which the wavenumber integral takes only the depth," * model.is_infinite
+    text += f" {size[0].upper()}{size[1:]},{depth_only} {of}."
+    if body.of_kind.is_plate:
+        return f"{text} {_sheet(runs)}"
+    left_out = ["layers"] * (len(body.strata) == 1) + ["curvature"] * body.of_kind.is_layer
+    return f"{text} Left out: {' and '.join(left_out)}." if left_out else text
 
 
 def path_of(tacton: Tacton) -> str:
@@ -119,30 +122,14 @@ def extent(body: Body) -> str:
     return f"{size}, base {body.base}, sides {body.sides}" if body.of_kind.discretise else size
 
 
-def _body(runs: list[Run]) -> str:
-    body = runs[0].scene.body
-    depth_only = (
-        " of which the wavenumber integral takes only the depth," * named(runs[0].model).is_infinite
-    )
-    text = f"{extent(body)},{depth_only} of {_material(body.solid)}"
-    text += above(body)
-    if body.of_kind.is_plate:
-        return f"{text}. {_sheet(runs)}"
-    left_out = ["layers"] * (len(body.strata) == 1) + ["curvature"] * body.of_kind.is_layer
-    return f"{text}. Left out: {' and '.join(left_out)}." if left_out else f"{text}."
-
-
 def above(body: Body) -> str:
     """The layers of a body, and how it lies under the device."""
     layers = [
-        f"{1e3 * layer.thickness:g} mm of "
-        + (layer.material if isinstance(layer.material, str) else _material(layer.material))
-        for layer in body.layers
+        f"{1e3 * layer.thickness:g} mm of {_material(layer.material)}" for layer in body.layers
     ]
     text = f"; on it, from the surface down: {', '.join(layers)}" if layers else ""
     for name, material in body.regions:
-        of = material if isinstance(material, str) else _material(material)
-        text += f"; its region {name} of {of}"
+        text += f"; its region {name} of {_material(material)}"
     place = body.placement
     if place.is_tilted:
         x, y = np.degrees([place.tilt_x, place.tilt_y])
@@ -153,7 +140,9 @@ def above(body: Body) -> str:
     return text
 
 
-def _material(solid: Material) -> str:
+def _material(solid: Material | str) -> str:
+    if isinstance(solid, str):
+        return solid
     text = f"density {solid.density:g} kg/m3, "
     if (along := solid.orthotropy) is None:
         text += f"shear modulus {solid.shear_modulus / 1e3:.4g} kPa, "
@@ -202,7 +191,7 @@ def asked_rows(scene: Scene) -> list[list[str]]:
     tacton, pressure, body = scene.tacton, scene.pressure, scene.body
     depth = pressure.depth_of_modulation
     of_depth = f", depth of modulation {depth:g}" if pressure.law.uses_depth else ""
-    drive = f"{pressure.drive}{of_depth}, {spot_of(pressure)}, {pressure.peak_pressure:g} Pa at "
+    drive = f"{pressure.drive}{of_depth}, {_spot(pressure)}, {pressure.peak_pressure:g} Pa at "
     drive += f"full drive, {1e3 * pressure.height:g} mm above the array"
     return [
         ["focus", path_of(tacton)],
@@ -217,7 +206,7 @@ def asked_rows(scene: Scene) -> list[list[str]]:
 
 
 def without_kernel(scene: Scene) -> str:
-    """A sentence that the point kernel has no such quantity."""
+    """That the point kernel has no such quantity."""
     return f"the point kernel has no {scene.reading.words}, and predicts a pressure alone"
 
 

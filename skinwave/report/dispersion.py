@@ -1,6 +1,6 @@
 """Figures of dispersion curves: speeds and 1/e lengths over frequency, mode shapes over depth."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -9,10 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import FuncFormatter
 
-from meshes.tetmesh import Floats
 from simple_model.drawing import small
-from simple_model.layers.dispersion import DispersionCurves, Mode
-from skinwave.report.figures import REPORT, legend, written
+from simple_model.layers.dispersion import DispersionCurves
+from skinwave.report.figures import REPORT, legend, styled, written
 from skinwave.report.palette import SERIES
 from skinwave.report.styles import Style
 
@@ -22,6 +21,7 @@ ROWS = 3  # of the names of lines above the panels
 LETTER, GAP, LINE = 0.55, 0.7, 1.45  # width of their letters, between two, and of a row, over size
 SHARE = 0.68  # of a figure's width for the curves, where the shapes are beside them
 MOST_SHAPES = 4
+OF_LOAD: dict[str, Any] = {"color": "0.55", "lw": 0.9, "ls": ":"}
 LABELS = (
     "phase speed ω / |Re k|, m/s",
     "1/e length 1 / |Im k|, mm",
@@ -34,6 +34,7 @@ def colour(number: int) -> str:
     return SERIES[number % len(SERIES)]
 
 
+@styled
 def dispersion_figure(
     curves: DispersionCurves,
     lines: Mapping[str, float],
@@ -50,86 +51,67 @@ def dispersion_figure(
     focus_speed : m/s, 0 of a focus at rest
     at : Hz, where the shapes are
     style : Style
-
-    Returns
-    -------
-    Figure
     """
     thick = len(curves.depths) > 2 and not style.is_narrow
-    with mpl.rc_context(style.rc):
-        size = style.size(11.5 if thick else 8.5, 8.4)
-        figure = Figure(figsize=size, layout="constrained")
-        left: Figure | SubFigure = figure
-        if thick:
-            left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(SHARE, 1 - SHARE))[0]
-            _shapes(right, curves, at)
-        axes = left.subplots(3, 1, sharex=True, height_ratios=(1.25, 1, 1))
-        _speeds(axes[0], curves, focus_speed)
-        _decay(axes[1], curves)
-        _group(axes[2], curves)
-        for ax, label in zip(axes, LABELS, strict=True):
-            ax.set_xlim(0, curves.frequencies[-1])
-            ax.set_ylabel(label)
-            for frequency in lines.values():
-                ax.axvline(frequency, color="0.55", lw=0.9, ls=":", zorder=0)
-            ax.grid(alpha=0.25)
-        width = 72 * size[0] * (SHARE if thick else 1) - 8 * style.font  # points
-        _name_lines(axes[0], lines, width)
-        axes[-1].set_xlabel("frequency, Hz")
-        _legend(figure, curves, focus_speed, 2 if style.is_narrow else 5)
+    size = style.size(11.5 if thick else 8.5, 8.4)
+    figure = Figure(figsize=size, layout="constrained")
+    left: Figure | SubFigure = figure
+    if thick:
+        left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(SHARE, 1 - SHARE))[0]
+        _shapes(right, curves, at)
+    axes = left.subplots(3, 1, sharex=True, height_ratios=(1.25, 1, 1))
+    _draw_curves(axes, curves, focus_speed)
+    for ax, label in zip(axes, LABELS, strict=True):
+        ax.set_xlim(0, curves.frequencies[-1])
+        ax.set_ylabel(label)
+        for frequency in lines.values():
+            ax.axvline(frequency, **OF_LOAD, zorder=0)
+        ax.grid(alpha=0.25)
+    width = 72 * size[0] * (SHARE if thick else 1) - 8 * style.font  # points
+    _name_lines(axes[0], lines, width)
+    axes[-1].set_xlabel("frequency, Hz")
+    ink = mpl.rcParams["text.color"]
+    entries: dict[str, dict[str, Any]] = {
+        mode.name: {"color": colour(n), "lw": 2.2} for n, mode in enumerate(curves.modes)
+    } | {"evanescent": {"color": ink, "lw": 1, "alpha": PALE}, "lines of the load": OF_LOAD}
+    if focus_speed:
+        entries[f"focus, {focus_speed:g} m/s"] = {"color": ink, "lw": 1.2, "ls": "--"}
+    legend(figure, entries, 2 if style.is_narrow else 5)
     return figure
 
 
-def _fine(mode: Mode) -> tuple[Floats, np.ndarray, np.ndarray]:
-    """Frequencies (g,) in Hz, squared wavenumbers (g,) and whether the mode is a wave there."""
-    fine = np.linspace(mode.frequencies[0], mode.frequencies[-1], FINE)
-    nearest = np.abs(fine[:, None] - mode.frequencies).argmin(axis=1)
-    return fine, mode.squared_at(fine), mode.is_wave[nearest] & (fine >= mode.cut_on)
-
-
-def _drawn(ax: Axes, n: int, x: Floats, y: Floats, wave: np.ndarray) -> None:
-    """A mode's curve, pale where it is evanescent."""
-    ax.plot(x, y, color=colour(n), lw=1, alpha=PALE)
-    ax.plot(x, np.where(wave, y, np.nan), color=colour(n), lw=2.2)
-
-
-def _speeds(ax: Axes, curves: DispersionCurves, focus_speed: float) -> None:
-    typical = [focus_speed]
+def _draw_curves(axes: Sequence[Axes], curves: DispersionCurves, focus_speed: float) -> None:
+    """Speed, length and group speed of each mode, the first two pale where it is evanescent."""
+    speeds, groups, longest = [focus_speed], [1.0], 10.0
+    drawn = []
     for n, mode in enumerate(curves.modes):
-        fine, squared, wave = _fine(mode)
-        with np.errstate(divide="ignore"):
-            speed = 2 * np.pi * fine / np.abs(np.sqrt(squared).real)
-        _drawn(ax, n, fine, speed, wave)
-        typical += [float(np.median(speed[wave]))] if wave.any() else []
-    if focus_speed:
-        ax.axhline(focus_speed, color=mpl.rcParams["text.color"], lw=1.2, ls="--")
-    ax.set_ylim(0, 1.8 * max(typical) or 1.0)
-
-
-def _decay(ax: Axes, curves: DispersionCurves) -> None:
-    largest = 10.0
-    for n, mode in enumerate(curves.modes):
-        fine, squared, wave = _fine(mode)
-        with np.errstate(divide="ignore"):
-            length = 1e3 / np.abs(np.sqrt(squared).imag)
-        _drawn(ax, n, fine, length, wave)
-        largest = max(largest, float(np.nanmax(np.where(wave, length, 0.0))))
-    ax.set(yscale="log", ylim=(1, min(2 * largest, 3e3)))
-    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, place: f"{value:g}"))
-
-
-def _group(ax: Axes, curves: DispersionCurves) -> None:
-    drawn, typical = [], [1.0]
-    for mode in curves.modes:
-        fine, squared, wave = _fine(mode)
-        slowness = np.gradient(np.sqrt(squared).real, 2 * np.pi * fine)
+        fine = np.linspace(mode.frequencies[0], mode.frequencies[-1], FINE)
+        nearest = np.abs(fine[:, None] - mode.frequencies).argmin(axis=1)
+        wave = mode.is_wave[nearest] & (fine >= mode.cut_on)
+        wavenumber = np.sqrt(mode.squared_at(fine))
+        slowness = np.gradient(wavenumber.real, 2 * np.pi * fine)
         with np.errstate(divide="ignore", invalid="ignore"):
-            drawn.append(np.where(wave, np.abs(1 / slowness), np.nan))
-        typical += [float(np.nanmedian(drawn[-1]))] if wave.any() else []
-    top = 1.8 * max(typical)
-    for n, speed in enumerate(drawn):
-        ax.plot(fine, np.where(speed < top, speed, np.nan), color=colour(n), lw=2.2)
-    ax.set_ylim(0, top)
+            speed, length = (
+                2 * np.pi * fine / np.abs(wavenumber.real),
+                1e3 / np.abs(wavenumber.imag),
+            )
+            drawn.append((fine, np.where(wave, np.abs(1 / slowness), np.nan)))
+        for ax, y in zip(axes, (speed, length), strict=False):
+            ax.plot(fine, y, color=colour(n), lw=1, alpha=PALE)
+            ax.plot(fine, np.where(wave, y, np.nan), color=colour(n), lw=2.2)
+        if wave.any():
+            speeds.append(float(np.median(speed[wave])))
+            groups.append(float(np.nanmedian(drawn[-1][1])))
+            longest = max(longest, float(np.nanmax(length[wave])))
+    top = 1.8 * max(groups)
+    for n, (fine, group) in enumerate(drawn):
+        axes[2].plot(fine, np.where(group < top, group, np.nan), color=colour(n), lw=2.2)
+    if focus_speed:
+        axes[0].axhline(focus_speed, color=mpl.rcParams["text.color"], lw=1.2, ls="--")
+    axes[0].set_ylim(0, 1.8 * max(speeds) or 1.0)
+    axes[1].set(yscale="log", ylim=(1, min(2 * longest, 3e3)))
+    axes[1].yaxis.set_major_formatter(FuncFormatter(lambda value, place: f"{value:g}"))
+    axes[2].set_ylim(0, top)
 
 
 def _name_lines(ax: Axes, lines: Mapping[str, float], width: float) -> None:
@@ -148,18 +130,6 @@ def _name_lines(ax: Axes, lines: Mapping[str, float], width: float) -> None:
             xycoords=("data", "axes fraction"), textcoords="offset points", ha="center",
             va="bottom", fontsize=size,
         )  # fmt: skip
-
-
-def _legend(figure: Figure, curves: DispersionCurves, focus_speed: float, columns: int) -> None:
-    ink = mpl.rcParams["text.color"]
-    entries: dict[str, dict[str, Any]] = {
-        mode.name: {"color": colour(n), "lw": 2.2} for n, mode in enumerate(curves.modes)
-    }
-    entries["evanescent"] = {"color": ink, "lw": 1, "alpha": PALE}
-    entries["lines of the load"] = {"color": "0.55", "lw": 0.9, "ls": ":"}
-    if focus_speed:
-        entries[f"focus, {focus_speed:g} m/s"] = {"color": ink, "lw": 1.2, "ls": "--"}
-    legend(figure, entries, columns)
 
 
 def _shapes(figure: SubFigure, curves: DispersionCurves, at: float) -> None:

@@ -24,38 +24,29 @@ SHADES = 240  # colours of a GIF that are found in its frames; the rest are thos
 
 
 def film(
-    path: Path,
-    views: Sequence[View],
-    style: Style,
-    progress: Progress | None = None,
-    *,
-    camera: str = "tilted",
-    panel: tuple[int, int] | None = None,
-) -> None:
+    path: Path, views: Sequence[View], style: Style, progress: Progress | None = None, *,
+    camera: str = "tilted", panel: tuple[int, int] | None = None,
+) -> None:  # fmt: skip
     """Write the views' frames, one period of the whole pattern in the steady state, which repeats
-    without a seam where the load is periodic.
-
-    Raises
-    ------
-    ValueError
-        If the ending is neither .gif nor .mp4, or there is no encoder for the latter.
+    without a seam where the load is periodic; raises what `check_format` does.
     """
     check_format(path)
-    frames = _frames(views, style, progress or silent, camera, panel)
+    count, report = len(views[0].times), progress or silent
+
+    def frames() -> Iterator[Image]:
+        with stage(views, style, camera=camera, panel=panel) as show:
+            for k in range(count):
+                report("film", k / count)
+                yield show(k)
+
     if path.suffix == ".gif":
-        _write_gif(path, list(frames), style)
+        _write_gif(path, list(frames()), style)
     else:
-        _write_mp4(path, frames, len(views[0].times))
+        _write_mp4(path, frames(), count)
 
 
 def check_format(path: Path) -> None:
-    """Refuse a film that cannot be written, before anything is computed for it.
-
-    Raises
-    ------
-    ValueError
-        As `film` does.
-    """
+    """Refuse a film that cannot be written, by a ValueError, before anything is computed."""
     if path.suffix not in FORMATS:
         raise ValueError(f"film '{path.name}' ends in none of {', '.join(FORMATS)}; name it .gif")
     if path.suffix == ".mp4" and not all(map(find_spec, ENCODER)):
@@ -79,16 +70,6 @@ def seam(view: View) -> str:
 def lasts(frames: int) -> float:
     """How long in s a film of so many frames is shown."""
     return max(LASTS, EACH * frames)
-
-
-def _frames(
-    views: Sequence[View], style: Style, report: Progress, camera: str,
-    panel: tuple[int, int] | None,
-) -> Iterator[Image]:  # fmt: skip
-    with stage(views, style, camera=camera, panel=panel) as show:
-        for k in range(len(views[0].times)):
-            report("film", k / len(views[0].times))
-            yield show(k)
 
 
 def _write_gif(path: Path, frames: list[Image], style: Style) -> None:

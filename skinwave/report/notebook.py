@@ -1,35 +1,61 @@
-"""Plans and comparisons in a line, and as small pages for notebooks."""
+"""Scenes, plans and comparisons in a line, and as small pages for notebooks."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from meshes.tetmesh import Floats
 from simple_model import drawing
+from simple_model.load.focus import spot_width
 from simple_model.numbers import counted, percent, stated_error
-from skinwave.report.scene_plot import draw_body
+from skinwave.report.description import asked_rows
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from meshes.tetmesh import Floats
+    from skinwave.bodies import Body
     from skinwave.planning.records import Plan
     from skinwave.results.comparison import Agreement
+    from skinwave.scene.scene import Scene
 
+BODY, PATH, FOCUS, PROBE = "#e8d5c4", "#222222", "#D55E00", "#0072B2"
+REACH = 4.0  # widths of a focal spot that its contour is looked for in
+HALF = 0.5  # of the pressure at a focus: its contour
+NARROW = 0.5  # inch for each point of its letters, below which a legend has one column
+MOST_NUMBERED = 20  # probes
 MOST_ROWS = 12  # probes in a table
+
+
+def _line(kind: str, said: Iterable[str]) -> str:
+    return f"<{kind}: {'; '.join(said)}>"
+
+
+def scene_line(scene: "Scene") -> str:
+    """Name, Tacton, body and probes in a line."""
+    tacton, body, path = scene.tacton, scene.body, scene.tacton.trajectory
+    tones = [f"{f:g} Hz" for f in (tacton.am_frequency, tacton.second_am_frequency) if f]
+    moved = f"{path.shape} of {1e3 * path.size:.4g} mm at {path.speed:g} m/s"
+    driven = [f"AM {', '.join(tones)}"] if tones else []
+    driven += ["focus at rest" if path.is_static else moved, f"{tacton.duration:g} s"]
+    driven += [scene.load.words] * (not scene.load.is_plain)
+    of = body.of_kind.words(body)
+    if body.of_kind.discretise:
+        layers = [f"{1e3 * each.thickness:g} mm of {_named(each.material)}" for each in body.layers]
+        of += f", {'; below it '.join([*layers, _named(body.material)])}"
+    probes = f"{counted(len(scene.probes), 'probe')}, {scene.reading.words}"
+    return _line(f"Scene {scene.name!r}", [", ".join(driven), of, probes])
 
 
 def plan_line(plan: "Plan") -> str:
     """Model, body, expected error, cost and number of warnings."""
-    size = f"elements of {1e3 * plan.h:.3g} mm" if plan.h else "no mesh"
     body = plan.body.of_kind.words(plan.body)
     body += f" halved across {' and '.join(plan.symmetry)}" if plan.symmetry else ""
-    said = [
-        f"{size}, {body}",
-        f"expected error {stated_error(plan.error)}",
-        f"{plan.seconds:.2g} s, {plan.memory / 2**30:.2g} GiB",
-        counted(len(plan.warnings), "warning"),
-    ]
-    return f"<Plan of {plan.model}: {'; '.join(said)}>"
+    size = f"elements of {1e3 * plan.h:.3g} mm" if plan.h else "no mesh"
+    error, warned = stated_error(plan.error), counted(len(plan.warnings), "warning")
+    said = [f"{size}, {body}", f"expected error {error}", _cost(plan), warned]
+    return _line(f"Plan of {plan.model}", said)
 
 
 def agreement_line(found: "Agreement") -> str:
@@ -40,12 +66,30 @@ def agreement_line(found: "Agreement") -> str:
         f"scale {found.scale:.4g}",
         f"{counted(len(found.probes), 'probe')}, {counted(len(found.frequencies), 'line')}",
     ]
-    return f"<Agreement: {'; '.join(said)}>"
+    return _line("Agreement", said)
 
 
-def _range(misfit: "Floats") -> str:
+def _named(material: object) -> str:
+    if isinstance(material, str):
+        return material
+    young, density = getattr(material, "young", np.nan), getattr(material, "density", np.nan)
+    return f"a material of {young:.4g} Pa and {density:g} kg/m3"
+
+
+def _cost(plan: "Plan") -> str:
+    return f"{plan.seconds:.2g} s, {plan.memory / 2**30:.2g} GiB"
+
+
+def _range(misfit: Floats) -> str:
     low, high = (percent(float(end)) for end in (misfit.min(), misfit.max()))
     return low if low == high else f"{low.removesuffix(' %')} to {high}"
+
+
+def scene_page(scene: "Scene") -> str:
+    """A scene from above, and what it asks for."""
+    uncertain = [f"{key} is uncertain; its central value is taken" for key, _ in scene.spreads]
+    image = drawing.picture(lambda figure: draw_scene(scene, figure.subplots()), 4.2, 3.8)
+    return drawing.page(f"Scene {scene.name}", image, [drawing.table(asked_rows(scene))], uncertain)
 
 
 def plan_page(plan: "Plan") -> str:
@@ -53,16 +97,12 @@ def plan_page(plan: "Plan") -> str:
 
     def draw(figure: "Figure") -> None:
         ax = figure.subplots()
-        draw_body(ax, plan.body, plan.symmetry)
-        ax.set_aspect("equal")
-        ax.set_xlabel("x, mm")
-        ax.set_ylabel("y, mm")
-        ax.legend(loc="lower left", bbox_to_anchor=(0, 1), frameon=False, fontsize=drawing.small())
+        _draw_body(ax, plan.body, plan.symmetry)
+        _finish(ax, {})
 
     kind = plan.body.of_kind
     image = drawing.picture(draw, 3.2, 3.0) if kind.discretise and kind.is_bounded else b""
-    cost = f"{plan.seconds:.2g} s, {plan.memory / 2**30:.2g} GiB"
-    facts = [["expected error", stated_error(plan.error)], ["cost", cost]]
+    facts = [["expected error", stated_error(plan.error)], ["cost", _cost(plan)]]
     rows = [[row.what, row.value, row.reason] for row in plan.rows]
     tables = [drawing.table(facts), drawing.table(rows, ["", "", "reason"])]
     return drawing.page(f"Plan: {plan.model}", image, tables, plan.warnings)
@@ -89,3 +129,72 @@ def agreement_page(found: "Agreement") -> str:
     ]  # fmt: skip
     tables = [drawing.table(facts), drawing.table(rows[:MOST_ROWS], header)]
     return drawing.page("Candidate against reference", b"", tables)
+
+
+def draw_scene(scene: "Scene", ax: "Axes | None") -> "Axes":
+    """Draw body, path, foci at the start and probes from above, in mm."""
+    ax, path = drawing.new_axes(ax), scene.tacton.trajectory
+    _draw_body(ax, scene.body)
+    if not path.is_static:
+        x, y = 1e3 * path.at_phase(np.linspace(0, 1, 721)).T
+        ax.plot(x, y, color=PATH, lw=1.2, ls="dotted", label="path")
+    _draw_foci(ax, scene)
+    x, y = 1e3 * scene.probe_points.T
+    ax.plot(x, y, ls="none", marker="o", ms=4, color=PROBE, label="probes")
+    for k in range(min(len(x), MOST_NUMBERED)):
+        ax.annotate(str(k), (x[k], y[k]), xytext=(3, 3), textcoords="offset points", color=PROBE,
+                    fontsize=drawing.small())  # fmt: skip
+    narrow = ax.figure.get_figwidth() < NARROW * drawing.small()  # type: ignore[union-attr]
+    compact = {"borderaxespad": 0.2, "handlelength": 1.5, "columnspacing": 1.0}
+    _finish(ax, {"ncols": 1 if narrow else 2, **compact})
+    return ax
+
+
+def _finish(ax: "Axes", legend: Mapping[str, Any]) -> None:
+    """Axes in mm, and a legend above them."""
+    ax.set(aspect="equal", xlabel="x, mm", ylabel="y, mm")
+    ax.legend(loc="lower left", bbox_to_anchor=(0, 1), frameon=False, fontsize=drawing.small(),
+              **legend)  # fmt: skip
+
+
+def _draw_body(ax: "Axes", body: "Body", symmetry: str = "") -> None:
+    """Draw the outline of a body from above; of one that is halved, shade the part with positive x
+    or y that is modelled. The surface of a file or of none is not known here.
+    """
+    from matplotlib.patches import FancyBboxPatch, Rectangle
+
+    if not (body.of_kind.is_bounded and body.of_kind.discretise):
+        return
+    width, height = 1e3 * body.width, 1e3 * body.height
+    radius = 1e3 * body.palm.corner_radius if "relief" in body.of_kind.keys else 0.0
+    outline = FancyBboxPatch(
+        (-width / 2, -height / 2), width, height,
+        f"round,pad=0,rounding_size={radius}" if radius else "square,pad=0",
+        facecolor="none" if symmetry else BODY, edgecolor="0.4", label=body.of_kind.words(body),
+    )  # fmt: skip
+    ax.add_patch(outline)
+    if symmetry:
+        left, bottom = (0.0 if a in symmetry else -size / 2
+                        for a, size in (("x", width), ("y", height)))  # fmt: skip
+        part = Rectangle((left, bottom), width / 2 - left, height / 2 - bottom, facecolor=BODY)
+        part.set_label("part that is modelled")
+        ax.add_patch(part)
+        part.set_clip_path(outline)
+    ax.update_datalim([(-width / 2 - 2, -height / 2 - 2), (width / 2 + 2, height / 2 + 2)])
+    ax.autoscale_view()
+
+
+def _draw_foci(ax: "Axes", scene: "Scene") -> None:
+    """Contour of half the pressure at every focus at the start."""
+    tacton, width = scene.tacton, spot_width(scene.pressure.height)
+    phases = np.mod(tacton.trajectory.phase(0.0) + np.array(tacton.foci), 1.0)
+    across = REACH * width * np.linspace(-1, 1, 81)
+    grid = np.stack(np.meshgrid(across, across), axis=-1).reshape(-1, 2)
+    shape = len(across), len(across)
+    for centre in tacton.trajectory.at_phase(phases):
+        places = grid + centre
+        spot = scene.pressure.spot(places, centre).reshape(shape)
+        x, y = 1e3 * places.reshape(*shape, 2).transpose(2, 0, 1)
+        ax.contour(x, y, spot, [HALF * spot.max()], colors=FOCUS, linewidths=1.5)
+    several = f"{len(tacton.foci)} foci" if len(tacton.foci) > 1 else "focus"
+    ax.plot([], [], color=FOCUS, lw=1.5, label=f"{several}, half pressure")

@@ -1,7 +1,6 @@
 """Views in three dimensions (pyvista, off screen): bodies side by side, cut open or from above.
 
-Ask `renderer` first whether there is anything to draw with. Lengths are in mm here, and cameras
-without perspective, so that one scale bar is right for the whole picture.
+Lengths are in mm, and cameras without perspective, so that one scale bar is right everywhere.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -18,7 +17,7 @@ from simple_model.quantities import PRESSURE, quantity
 from skinwave.report.maps import carrier
 from skinwave.report.palette import SEQUENTIAL, SIGNED, colour, label
 from skinwave.report.styles import Style
-from skinwave.results.views import Singles, View, path_points, split
+from skinwave.results.views import View, path_points, split
 
 Image = NDArray[np.uint8]
 Carrier = Callable[[Floats], Floats]  # values (s,) of a surface -> values at some places
@@ -36,9 +35,9 @@ ABOVE = 0.4  # mm, by which marks are lifted off the surface
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Panel:
-    """Geometry drawn of one view: points (n, 3) in mm of a skin of triangles, their indices in the
-    view, marks that ride on it, the focus and what is under it at every frame, and the factor by
-    which motion is multiplied.
+    """Geometry drawn of one view: a skin of triangles, the indices of its points (n,) in the view,
+    marks that ride on it, the focus and what is under it at every frame, and the factor by which
+    motion is multiplied.
     """
 
     view: View
@@ -74,12 +73,8 @@ def picture(
     views: Sequence[View], style: Style, frame: int = 0, *, camera: str = "tilted",
     cut: bool = False,
 ) -> Image:  # fmt: skip
-    """Views side by side at one frame, (height, width, 3).
-
-    Parameters
-    ----------
-    camera : "tilted", "front" or "top", the same for all
-    cut : without the half of each body that is nearer to the camera
+    """Views side by side at one frame, (height, width, 3), seen by one of `CAMERAS`; `cut` without
+    the half of each body that is nearer to it.
     """
     with stage(views, style, camera=camera, cut=cut) as show:
         return show(frame)
@@ -87,13 +82,9 @@ def picture(
 
 @contextmanager
 def stage(
-    views: Sequence[View],
-    style: Style,
-    *,
-    camera: str = "tilted",
-    cut: bool = False,
+    views: Sequence[View], style: Style, *, camera: str = "tilted", cut: bool = False,
     panel: tuple[int, int] | None = None,
-) -> Iterator[Callable[[int], Image]]:
+) -> Iterator[Callable[[int], Image]]:  # fmt: skip
     """A scene that is built once, and what shows it at a frame.
 
     One colour scale serves all views: motion into the body over each model's largest or, of a
@@ -118,9 +109,11 @@ def stage(
             plotter.subplot(0, k)
             panels.append(prepared(view, cut))
             actor = _add(plotter, panels[-1], style, limits, small, lit=camera != "top")
-            if not cut:
-                _add_outline(plotter, view)
-            look(plotter, camera, panels)
+            if not cut:  # the rim of the surface at rest
+                low, high = view.places.min(axis=0), view.places.max(axis=0)
+                rim = np.where([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]], high, low)
+                plotter.add_mesh(_line(rim, cut=False), color="#9a9a9a", line_width=1)
+            _look(plotter, camera, panels)
         plotter.subplot(0, len(views))
         plotter.add_scalar_bar(
             title, mapper=actor.mapper, vertical=True, color=style.ink, n_labels=5,
@@ -217,7 +210,13 @@ def _add(
         show_scalar_bar=False,
         ambient=0.3 if lit else 0.0, diffuse=0.8 if lit else 1.0, lighting=lit,
     )  # fmt: skip
-    add_marks(plotter, panel, "black")
+    balls = {"render_points_as_spheres": True}
+    for mark, _ in panel.marks:
+        if mark.n_lines:
+            plotter.add_mesh(mark, color="black", line_width=2)
+        else:
+            plotter.add_mesh(mark, color="#ffd000", point_size=9, **balls)
+    plotter.add_mesh(panel.focus, color="black", point_size=15, **balls)
     own = colour(view.column)
     plotter.add_text(label(view.column), position=(0.04, 0.92), viewport=True,
                      font_size=1.25 * small,
@@ -226,25 +225,6 @@ def _add(
                      font_size=0.9 * small, color=style.ink)  # fmt: skip
     _add_scale_bar(plotter, view, style, small)
     return actor
-
-
-def add_marks(plotter: Any, panel: Panel, ink: str) -> None:
-    """Path, probes and focus, which ride on the surface."""
-    balls = {"render_points_as_spheres": True}
-    for mark, _ in panel.marks:
-        if mark.n_lines:
-            plotter.add_mesh(mark, color=ink, line_width=2)
-        else:
-            plotter.add_mesh(mark, color="#ffd000", point_size=9, **balls)
-    plotter.add_mesh(panel.focus, color=ink, point_size=15, **balls)
-
-
-def _add_outline(plotter: Any, view: View) -> None:
-    """The rim of the surface at rest."""
-    low, high = view.places.min(axis=0), view.places.max(axis=0)
-    x, y = np.array([low, high]).T
-    rim = np.array([[x[i], y[j]] for i, j in ((0, 0), (1, 0), (1, 1), (0, 1), (0, 0))])
-    plotter.add_mesh(_line(rim, cut=False), color="#9a9a9a", line_width=1)
 
 
 def _add_scale_bar(plotter: Any, view: View, style: Style, small: float) -> None:
@@ -261,7 +241,7 @@ def _add_scale_bar(plotter: Any, view: View, style: Style, small: float) -> None
     )  # fmt: skip
 
 
-def look(plotter: Any, camera: str, panels: Sequence[Panel]) -> None:
+def _look(plotter: Any, camera: str, panels: Sequence[Panel]) -> None:
     """The same camera and light for all panels, as far away as the widest body needs."""
     import pyvista as pv
 
@@ -270,32 +250,29 @@ def look(plotter: Any, camera: str, panels: Sequence[Panel]) -> None:
     plotter.camera.focal_point = tuple(widest * np.array(aim))
     plotter.camera.position = tuple(widest * (np.array(aim) + 4 * np.array(way)))
     plotter.camera.up = (0.0, 1.0, 0.0) if camera == "top" else (0.0, 0.0, 1.0)
-    lamp = pv.Light(light_type="headlight", color="white", intensity=0.6)
-    above = pv.Light(position=(-1, -1, 3), light_type="scene light", color="white", intensity=0.5)
-    plotter.add_light(lamp, only_active=True)
-    plotter.add_light(above, only_active=True)
+    for light in (
+        pv.Light(light_type="headlight", color="white", intensity=0.6),
+        pv.Light(position=(-1, -1, 3), light_type="scene light", color="white", intensity=0.5),
+    ):
+        plotter.add_light(light, only_active=True)
     plotter.camera.parallel_projection = True
     plotter.camera.parallel_scale = height * widest
     plotter.renderer.reset_camera_clipping_range()
 
 
-def _colours(panel: Panel, frame: int, limit: float) -> Singles:
-    """Values (n,) on the colour scale, which ends at `limit`."""
-    view = panel.view
-    if view.shade is None:
-        return -np.float32(limit / view.peak) * view.motion[frame, panel.nodes, 2]
-    values = view.shade.values[frame, np.searchsorted(view.shade.nodes, panel.nodes)]
-    return np.float32(quantity(view.shade.quantity).per_unit) * values
-
-
 def place(panels: Sequence[Panel], frame: int, limit: float) -> None:
-    """Every panel at a frame, in place."""
+    """Every panel at a frame, in place, on a colour scale that ends at `limit`."""
     for panel in panels:
         view = panel.view
         motion = np.asarray(view.motion[frame], np.float64)
         drawn = 1e3 * view.points + 1e3 * panel.factor * motion
         panel.skin.points[:] = drawn[panel.nodes]
-        panel.skin["motion"] = _colours(panel, frame, limit)
+        if view.shade is None:
+            values = -np.float32(limit / view.peak) * view.motion[frame, panel.nodes, 2]
+        else:
+            values = view.shade.values[frame, np.searchsorted(view.shade.nodes, panel.nodes)]
+            values = np.float32(quantity(view.shade.quantity).per_unit) * values
+        panel.skin["motion"] = values
         height = 1e3 * panel.factor * motion[view.surface, 2]
         for mark, carried in panel.marks:
             raised = np.array(mark.points)

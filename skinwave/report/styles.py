@@ -17,10 +17,9 @@ ONE_COLUMN = 6.5  # inch of letters of 10 points: wider figures take two columns
 
 @dataclass(frozen=True, kw_only=True)
 class Style:
-    """Colours of `paper` and `ink`; `font` size in points of figures, `dpi`; `columns`, the widths
-    in inch of one column of a printed page and of two, if figures are to have these; for views in
-    three dimensions the `panel` in pixels (width, height) of one model, and how many times finer it
-    is drawn than shown, `oversampling`.
+    """Colours of `paper` and `ink`, `font` size in points, `dpi`; `columns`, the widths in inch of
+    one column of a printed page and of two, if figures are to have these; in three dimensions the
+    `panel` in pixels (width, height) of one model, and how much finer it is drawn, `oversampling`.
     """
 
     paper: str = "#ffffff"
@@ -71,12 +70,7 @@ STYLES = {
 
 def style(name: str, width: float | None = None) -> Style:
     """A style by its name; with a width in inch that of print, all figures of that width, on the
-    paper and with the ink of its name.
-
-    Raises
-    ------
-    ValueError
-        If it is unknown, or no width of a page.
+    paper and with the ink of its name. A ValueError if it is unknown, or no width of a page.
     """
     chosen = STYLES[choose("style", name, STYLES)]
     if width is None:

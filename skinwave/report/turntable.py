@@ -41,17 +41,8 @@ def turntable(view: View, frame: int) -> str:
 
 
 def motion_lines(frames: Any, period: float) -> tuple[Floats, Complex]:
-    """Return the lines of motion that repeats.
-
-    Parameters
-    ----------
-    frames : (t, n) float, at equally spaced times through the period
-    period : s
-
-    Returns
-    -------
-    (l,) Hz, ascending, and (l, n) complex amplitudes in the unit of the frames, of the strongest
-    lines above 0 Hz: the motion is the real part of their sum times exp(2 pi i f t)
+    """Return the strongest lines above 0 Hz of motion (t, n) at equally spaced times through its
+    period in s: (l,) Hz, ascending, and amplitudes (l, n), of which it is Re sum a exp(2 pi i f t).
     """
     count = len(frames)
     lines = 2 / count * np.fft.rfft(np.asarray(frames, np.float64), axis=0)

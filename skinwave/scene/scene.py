@@ -206,13 +206,13 @@ class Scene:
 
     def plot(self, *, ax: Axes | None = None) -> Axes:
         """Draw body, path, foci at the start and probes from above, and return the axes."""
-        return drawn("scene_plot", "draw", self, ax)
+        return drawn("notebook", "draw_scene", self, ax)
 
     def __repr__(self) -> str:
-        return drawn("scene_plot", "line", self)
+        return drawn("notebook", "scene_line", self)
 
     def _repr_html_(self) -> str:
-        return drawn("scene_plot", "page", self)
+        return drawn("notebook", "scene_page", self)
 
 
 def _check_moved(body: Body, motion: str) -> None:

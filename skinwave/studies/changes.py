@@ -31,7 +31,7 @@ from skinwave.scene.spreads import spreads_of, with_values
 from skinwave.system.effort import versions
 
 if TYPE_CHECKING:
-    from skinwave.report.surfaces import MeasuredPlaces
+    from skinwave.report.maps import MeasuredPlaces
 
 OF_MATERIAL, ENDS = "material", (0.05, 0.95)  # part of an uncertainty; its 90 % interval
 Drawn = tuple[SurfaceField, SurfaceField] | tuple[()]  # a body's map and the kernel's

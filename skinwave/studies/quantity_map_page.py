@@ -7,7 +7,7 @@ import numpy as np
 
 from simple_model.numbers import significant, stated_error
 from skinwave.report.figures import png
-from skinwave.report.surfaces import surfaces_figure
+from skinwave.report.maps import surfaces_figure
 from skinwave.results.propagation import NEAR, distance_from_path
 from skinwave.results.surface import SurfaceField, save
 from skinwave.scene.file import dumps

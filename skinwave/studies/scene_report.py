@@ -8,10 +8,10 @@ from typing import Any
 from simple_model.numbers import percent
 from skinwave.report import description
 from skinwave.report.levels import strongest_probe
+from skinwave.report.maps import surfaces_figure
 from skinwave.report.palette import label
 from skinwave.report.renderer import renderer
 from skinwave.report.styles import Style
-from skinwave.report.surfaces import surfaces_figure
 from skinwave.results.claims import claimed, evaluate
 from skinwave.results.exports import write_field, write_probes, write_sound
 from skinwave.results.files import distinct_names, folder_name

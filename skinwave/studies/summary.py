@@ -8,9 +8,9 @@ from matplotlib.figure import Figure
 from simple_model.numbers import decibel, percent, significant, stated_error
 from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity
 from skinwave.report.figures import REPORT
+from skinwave.report.maps import BESIDE, SURFACES, surfaces_figure
 from skinwave.report.palette import label
 from skinwave.report.styles import Style
-from skinwave.report.surfaces import BESIDE, SURFACES, surfaces_figure
 from skinwave.results.propagation import (
     NEAR,
     OUTSIDE,

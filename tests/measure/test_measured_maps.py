@@ -9,7 +9,7 @@ from simple_model import MovingPressure, Tacton
 from simple_model.quantities import PRESSURE, quantity
 from skinwave.measure.comparison import measured_places
 from skinwave.measure.lines import MeasuredLines
-from skinwave.report.surfaces import MeasuredPlaces, surfaces_figure
+from skinwave.report.maps import MeasuredPlaces, surfaces_figure
 from skinwave.results.surface import SurfaceField
 from skinwave.scene.scene import BODIES, Scene
 

@@ -28,9 +28,9 @@ from skinwave.models import speeds
 from skinwave.report import films, maps, render
 from skinwave.report.figures import tacton_figure
 from skinwave.report.levels import levels_figure
+from skinwave.report.maps import surfaces_figure
 from skinwave.report.renderer import Renderer, renderer
 from skinwave.report.styles import style
-from skinwave.report.surfaces import surfaces_figure
 from skinwave.results import exports, motion, views
 from skinwave.scene.file import dumps
 from skinwave.scene.scene import Body, Scene
