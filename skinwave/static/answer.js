@@ -1,7 +1,6 @@
 // An answer of the page: what the kernel and a body do under the load of the controls.
 
-import { QUANTITIES, amplitudesOf, delayOf, levelOf, mapOf, namesOf, reach, shareOutside,
-  unresolvedNames } from "./numbers.js";
+import { QUANTITIES, amplitudesOf, delayOf, levelOf, mapOf, namesOf, reach, shareOutside } from "./numbers.js";
 import { respond as respondOfKernel } from "./kernel.js";
 import { pathSamples, spotWidth } from "./load.js";
 import { largestOf } from "./numeric.js";
@@ -64,12 +63,7 @@ function invalidity({ body, waves, x, y }) {
 }
 
 function warnings({ load, body }) {
-  const lost = unresolvedNames(load).map(typeset), found = [];
-  if (lost.length) {
-    const named = lost.slice(0, 2).join(" and ");
-    const more = lost.length > 2 ? `, and ${lost.length - 2} others` : "";
-    found.push(`The Tacton is too short to resolve the lines ${named}${more}. Make it longer.`);
-  }
+  const found = [];
   const { x, y } = pathSamples(load), furthest = 1e3 * Math.max(...x.map((own, q) => Math.hypot(own, y[q])));
   if (furthest > body.reach_mm) {
     found.push(`The focus goes ${furthest.toFixed(0)} mm from the middle. Beyond ${body.reach_mm} mm this `

@@ -42,7 +42,7 @@ function bodyKeys(body, editable) {
  * (an empty sentence once it is right), `moving(on)` whether a slider is held, `edit(key, text)` a value of
  * the body. Returns functions that show values, bodies and help.
  */
-export function buildControls(host, { bodies, editable, change, refuse, moving, edit, hold, published }) {
+export function buildControls(host, { bodies, editable, change, refuse, moving, edit, published }) {
   const $ = (id) => host.querySelector(`#${id}`), all = (selector) => [...host.querySelectorAll(selector)];
   let values = {}, resting = 0;
 
@@ -85,7 +85,6 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
     else if (body) { clearTimeout(resting); edit(body, target.value); }
     else if (own) takePaths();
     else if (target.name === "own") change("paths", target.value ? startPaths() : "", true);
-    else if (target.id === "hold") hold(target.checked);
     else if (target.id === "published") published(target.checked);
   });
   host.addEventListener("pointerup", ({ target }) => target.type === "range" && moving(false));
@@ -106,18 +105,9 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
   });
   host.addEventListener("click", ({ target }) => {
     const pulses = values.pulses?.split(",").filter(Boolean) ?? [];
-    if (target.classList.contains("help")) explain(target, target.previousElementSibling.title);
-    else if (target.id === "pulse-add") take("pulses", [...pulses, "100/100"].join(","), true);
+    if (target.id === "pulse-add") take("pulses", [...pulses, "100/100"].join(","), true);
     else if (target.id === "pulse-remove") take("pulses", pulses.slice(0, -1).join(","), true);
   });
-
-  function explain(button, text) {
-    const popover = $("popover"), { left, bottom } = button.getBoundingClientRect();
-    popover.textContent = text;
-    popover.style.left = `${Math.min(left, innerWidth - 250)}px`;
-    popover.style.top = `${Math.min(bottom + 4, innerHeight - 90)}px`;
-    popover.showPopover();
-  }
 
   const startPaths = () => {
     const size = values.shape === "point" ? 0 : Math.min(values.size, 30);
@@ -174,8 +164,8 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
   const fieldText = (key, value) => (key in NUMBERS ? String(Number(Number(value).toPrecision(6))) : value);
 
   return {
-    /** Show values; `facts` are { drawing: Hz, held: bool }. */
-    show(given, facts) {
+    /** Show values and a drawing frequency in Hz. */
+    show(given, drawn) {
       values = given;
       for (const input of all("[data-key]")) {
         const value = values[input.dataset.key];
@@ -199,8 +189,7 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
       $("own-paths").hidden = !values.paths;
       if (values.paths) showPaths(values.paths);
       showRhythm();
-      $("drawing").textContent = facts.drawing ? `${facts.drawing.toFixed(1)} Hz` : "does not move";
-      $("hold").checked = facts.held;
+      $("drawing").textContent = drawn ? `${drawn.toFixed(1)} Hz` : "does not move";
       const at = ["x", "y"].map((axis) => fieldText(axis, values[axis]));
       const digest = {
         rhythm: values.pulses || "always on", "foci-more": values.foci > 1 ? `${values.foci} foci`
@@ -226,7 +215,6 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
       const input = host.querySelector(`[data-field="${key}"]`);
       if (wrong) input?.setAttribute("aria-invalid", "true"); else input?.removeAttribute("aria-invalid");
     },
-    explain,
   };
 
   function showBodies(own) {

@@ -2,41 +2,28 @@
 
 import { fromAddress, toAddress } from "./values.js";
 
-const MOST = 200; // steps that are kept
-
-/** Steps of values as text; the last of `done` is what is shown. */
+/** Steps of values: `add` one; `go(-1)` to the one before, `go(1)` to the next, if it `has` one. */
 export function createHistory(values) {
-  const done = [toAddress(values)], undone = [];
-  const restore = () => fromAddress(done[done.length - 1]).values;
+  let steps = [toAddress(values)], at = 0;
+  const has = (way) => at + way in steps;
   return {
-    /** Keep values as a step, unless they are those of the last one. */
     add(own) {
       const text = toAddress(own);
-      if (text === done[done.length - 1]) return;
-      done.push(text);
-      if (done.length > MOST) done.shift();
-      undone.length = 0;
+      if (text !== steps[at]) at = (steps = [...steps.slice(0, at + 1), text]).length - 1;
     },
-    undo() {
-      if (done.length < 2) return null;
-      undone.push(done.pop());
-      return restore();
+    go(way) {
+      if (!has(way)) return null;
+      at += way;
+      return fromAddress(steps[at]).values;
     },
-    redo() {
-      if (!undone.length) return null;
-      done.push(undone.pop());
-      return restore();
-    },
-    get undoable() { return done.length > 1; },
-    get redoable() { return undone.length > 0; },
+    has,
   };
 }
 
 /** Values and view in this page's address: {values, refused, view}. `starts` are those of the page. */
 export function readAddress(starts) {
-  const given = new URLSearchParams(location.search.slice(1)), view = {};
-  for (const [key, value] of new URLSearchParams(location.hash.slice(1))) given.set(key, value);
-  for (const key of ["token", "selftest", "view", "tab"]) {
+  const given = new URLSearchParams(location.hash.slice(1)), view = {};
+  for (const key of ["selftest", "view", "tab"]) {
     if (given.has(key)) view[key] = given.get(key);
     given.delete(key);
   }

@@ -7,7 +7,6 @@ import { escaped, withUnit } from "./text.js";
 
 const REACH = 0.044; // m, of a map either way
 const MARGIN = { left: 32, right: 10, top: 20, bottom: 50 }; // pixels about the map: text, ticks, bar
-const FINE = 4; // pixels of the image from place to place
 const TICKS = [-40, -20, 0, 20, 40]; // mm
 const INFLUENCED = -20; // dB of the kernel's largest: border of its area
 const CLICKED = 1e-3, LEAP = 5e-3; // m: a step by an arrow key, and with shift
@@ -27,44 +26,17 @@ function picture(width, height) {
   return canvas;
 }
 
-/** The values in colours, bilinear between places; transparent where there is no body. */
+/** The values in colours, a pixel for each place; transparent where there is no body. */
 function image(options, n) {
-  const { rms, signed } = options, onScale = placeOnScale(options), side = (n - 1) * FINE;
-  const grid = Float32Array.from(rms, onScale), table = signed ? SIGNED : SEQUENTIAL;
-  const made = picture(side, side), context = made.getContext("2d");
-  const data = context.createImageData(side, side), out = new Uint32Array(data.data.buffer);
-  const colours = new Uint32Array(table.buffer);
-  for (let row = 0; row < side; row++) {
-    const v = (side - row - 0.5) / FINE, j = Math.min(Math.floor(v), n - 2), b = v - j;
-    for (let column = 0; column < side; column++) {
-      const u = (column + 0.5) / FINE, i = Math.min(Math.floor(u), n - 2), a = u - i, k = j * n + i;
-      const value = between(grid, k, n, a, b);
-      if (value !== value) continue;
-      const place = Math.round((TABLE_LENGTH - 1) * Math.min(Math.max(value, 0), 1));
-      out[row * side + column] = colours[place];
-    }
-  }
+  const { rms, signed } = options, onScale = placeOnScale(options), colours = signed ? SIGNED : SEQUENTIAL;
+  const made = picture(n, n), context = made.getContext("2d"), data = context.createImageData(n, n);
+  rms.forEach((value, p) => {
+    if (Number.isNaN(value)) return;
+    const from = 4 * Math.round((TABLE_LENGTH - 1) * Math.min(Math.max(onScale(value), 0), 1));
+    data.data.set(colours.subarray(from, from + 4), 4 * ((n - 1 - Math.floor(p / n)) * n + p % n));
+  });
   context.putImageData(data, 0, 0);
   return made.toDataURL();
-}
-
-/** Value at parts a and b of a cell; at an edge of the body from the corners on it. */
-function between(grid, k, n, a, b) {
-  const low = (1 - a) * grid[k] + a * grid[k + 1], high = (1 - a) * grid[k + n] + a * grid[k + n + 1];
-  const value = (1 - b) * low + b * high;
-  return value === value ? value : besideEdge(grid, k, n, a, b);
-}
-
-/** Mean of those of four corners that are on the body, NaN if they weigh less than a half. */
-function besideEdge(grid, k, n, a, b) {
-  let sum = 0, weights = 0;
-  const parts = [(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b];
-  [k, k + 1, k + n, k + n + 1].forEach((corner, c) => {
-    if (Number.isNaN(grid[corner])) return;
-    sum += parts[c] * grid[corner];
-    weights += parts[c];
-  });
-  return weights < 0.5 ? NaN : sum / weights;
 }
 
 /** The colours of a scale, left to right. */
@@ -85,10 +57,11 @@ const toPixels = (box) => ([x, y]) => [box.x + box.side * (0.5 + x / (2 * REACH)
   box.y + box.side * (0.5 - y / (2 * REACH))];
 const mm = (value) => `${Math.round(1e4 * value) / 10 || 0}`.replace("-", "−");
 
-const line = (points, { colour = "currentColor", width = 1, opacity = 1, dash = "" } = {}) => `<path d="${
-  points.map(([x, y], k) => `${k ? "L" : "M"}${x.toFixed(2)},${y.toFixed(2)}`).join("")}" fill="none"
-  stroke="${colour}" stroke-width="${width}" stroke-linecap="round" stroke-linejoin="round"
-  opacity="${opacity}" stroke-dasharray="${dash || "none"}"/>`;
+/** A line through points, or lines through `apart` of them each. */
+const line = (points, { colour = "currentColor", width = 1, opacity = 1, apart = Infinity } = {}) => (
+  `<path d="${points.map(([x, y], k) => `${k % apart ? "L" : "M"}${x.toFixed(1)},${y.toFixed(1)}`).join("")}"
+  fill="none" stroke="${colour}" stroke-width="${width}" stroke-linecap="round" stroke-linejoin="round"
+  opacity="${opacity}"/>`);
 const text = ([x, y], words, { colour = "currentColor", size = 11, anchor = "start", weight = 400 } = {}) => (
   `<text x="${x}" y="${y}" fill="${colour}" font-size="${size}" text-anchor="${anchor}"
   font-weight="${weight}">${escaped(words)}</text>`);
@@ -101,14 +74,13 @@ const widthOf = (words, size) => 0.55 * size * words.length;
 /** What is on the square of a map: its image, contours, paths, foci and point. */
 function inside(options, { box, image: url }) {
   const { path = [], foci = [], point, hatched } = options, at = toPixels(box), parts = [];
+  const n = Math.round(Math.sqrt(options.rms.length)), cell = box.side / (n - 1);
   const drawZeros = (values, ...looks) => {
-    const n = Math.round(Math.sqrt(values.length)), step = 2 * REACH / (n - 1);
-    for (const each of contours(values, n)) {
-      const points = each.map(([i, j]) => at([i * step - REACH, j * step - REACH]));
-      parts.push(...looks.map((look) => line(points, look)));
-    }
+    const lines = contours(values, n).map((ends) => ends.map(([i, j]) => (
+      [box.x + i * cell, box.y + box.side - j * cell])));
+    parts.push(...looks.map((look) => line(lines.flat(), { ...look, apart: 2 })));
   };
-  parts.push(drawn(url, box.x, box.y, box.side, box.side));
+  parts.push(drawn(url, box.x - cell / 2, box.y - cell / 2, box.side + cell, box.side + cell));
   if (hatched) {
     for (let k = -box.side, odd = false; k < box.side; k += 9, odd = !odd) {
       const ends = [[box.x + k, box.y + box.side], [box.x + k + box.side, box.y]];
@@ -119,8 +91,7 @@ function inside(options, { box, image: url }) {
     const peak = largestOf(options.influenced);
     const above = Float32Array.from(options.influenced,
       (v) => 20 * Math.log10(Math.max(v / peak, 1e-9)) - INFLUENCED);
-    drawZeros(above, { colour: "#000", width: 2.6, opacity: 0.5 },
-      { colour: "#fff", width: 1.8, dash: "0.1 4" });
+    drawZeros(above, { colour: "#000", width: 2.6, opacity: 0.5 }, { colour: "#fff", width: 1.2 });
   }
   if (options.level) drawZeros(options.level, { colour: COLOURS.threshold, width: 1.8 });
   for (const each of path) {
@@ -135,8 +106,8 @@ function inside(options, { box, image: url }) {
   if (point) {
     const [x, y] = at(point);
     for (const [colour, width] of [["#fff", 4], [COLOURS.point, 2.2]]) {
-      parts.push(line([[x - 5, y - 5], [x + 5, y + 5]], { colour, width }));
-      parts.push(line([[x - 5, y + 5], [x + 5, y - 5]], { colour, width }));
+      const ends = [[x - 5, y - 5], [x + 5, y + 5], [x - 5, y + 5], [x + 5, y - 5]];
+      parts.push(line(ends, { colour, width, apart: 2 }));
     }
   }
   return parts.join("");
@@ -160,7 +131,7 @@ function markup(options, state, clip) {
   parts.push(rectangle(left, top, box.side, box.side, 'fill="none" stroke="currentColor"'));
   for (const tick of TICKS) {
     const [x, y] = at([tick / 1e3, tick / 1e3]), words = mm(tick / 1e3);
-    parts.push(line([[x, bottom], [x, bottom + 4]]), line([[left - 4, y], [left, y]]));
+    parts.push(line([[x, bottom], [x, bottom + 4], [left - 4, y], [left, y]], { apart: 2 }));
     parts.push(text([x, bottom + 15], tick ? words : "0 mm", { anchor: "middle", size: 10.5 }));
     parts.push(text([left - 6, y + 4], words, { anchor: "end", size: 10.5 }));
   }
@@ -178,13 +149,11 @@ function barMarkup({ largest, unit, decibel, signed }, { box, bar: url }) {
     { size: 10.5, anchor: ["start", "middle", "end"][k] })).join("");
 }
 
-/** Value of a map at a place in metre, bilinear; NaN off the body. */
-function valueAt({ rms }, [x, y]) {
+/** Value of a map at the place nearest to one in metre; NaN off the body. */
+function valueAt({ rms }, at) {
   const n = Math.round(Math.sqrt(rms.length));
-  const [u, v] = [x, y].map((place) => (place / REACH + 1) * (n - 1) / 2);
-  if (!(u >= 0 && v >= 0 && u <= n - 1 && v <= n - 1)) return NaN;
-  const i = Math.min(Math.floor(u), n - 2), j = Math.min(Math.floor(v), n - 2);
-  return between(rms, j * n + i, n, u - i, v - j);
+  const [i, j] = at.map((place) => Math.round((place / REACH + 1) * (n - 1) / 2));
+  return Math.min(i, j) < 0 || Math.max(i, j) >= n ? NaN : rms[j * n + i];
 }
 
 const readout = (options, place) => {
@@ -273,8 +242,7 @@ export function mapControls(svg, onPoint) {
 /** The marks of a map and what they mean, as markup. */
 export const MAP_LEGEND = [
   ["path of the focus", `stroke="${COLOURS.path}" stroke-width="2"`],
-  ["kernel above −20 dB",
-    'stroke="currentColor" stroke-width="2" stroke-linecap="round" stroke-dasharray="0.1 4"'],
+  ["kernel above −20 dB", 'stroke="currentColor" stroke-width="1.2"'],
   ["detection threshold", `stroke="${COLOURS.threshold}" stroke-width="2"`],
 ].map(([words, look]) => '<span class="mark"><svg width="20" height="8" aria-hidden="true">'
   + `<path d="M1,4H19" fill="none" ${look}/></svg> ${words}</span>`).join(" ");

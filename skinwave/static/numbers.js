@@ -1,8 +1,8 @@
 // Numbers of an answer: thresholds, levels, maps, reach, share, delay, and names of lines.
 
 import { fourier, largestOf } from "./numeric.js";
-import { arrayFactor, drawingFrequency, gainLines, harmonicStrengths, jumps, lastOrder, levelFactor, outline,
-  pathSamples, positionOf, rhythmLevel, rhythmPeriod } from "./load.js";
+import { drawingFrequency, jumps, levelFactor, loadLines, outline, positionOf, rhythmLevel,
+  rhythmPeriod } from "./load.js";
 
 const TAU = 2 * Math.PI;
 const PACINIAN = -13, NON_PACINIAN = 12; // dB re 1 um peak, at 250 Hz for a focal spot and at any
@@ -13,13 +13,11 @@ const LEVELS = 4096; // instants of a rhythm
 const OUTSIDE = 0.1; // of the largest RMS: edge of the kernel's region
 const ON_PATH = 12; // places of the path at which the delay is looked for
 const HEARD = 0.1; // of its largest on the path: a weaker line has no phase
-const SYMBOLS = ["f_d", "f_AM", "f_AM2", "f_e", "f_r"];
-const SAME = 1e-3; // over the duration: lines as near to each other in Hz coincide
+const SYMBOLS = ["f_d", "f_AM", "f_AM2", "f_e"];
 const REPEATED = 1.5; // periods in the Tacton at least, to make lines
-const PULSED = 2 ** 14; // samples of a period of a rhythm
-const MOST_HARMONICS = 400, MOST_PRODUCTS = 4000; // as in simple_model.load.line_names
 const NEGLIGIBLE_LINE = 1e-3; // of the strongest in a table
-const MINOR = 0.05, FAINT = 0.02, ALIKE = 1e-3, WINDOW = 19, BINS = 2.5; // as in simple_model.response
+const FAINT = 1e-5; // of the strongest product of sinusoids: weaker ones give no line a name
+const FINER = 16; // values between two others, among which the highest level is looked for
 
 /** Quantities at the point: `rate` is the order of the derivative, 1 in SI is `per` in `unit`. */
 export const QUANTITIES = {
@@ -198,12 +196,10 @@ export function delayOf(kernel, motion, load) {
 }
 
 /** Frequencies in Hz of SYMBOLS, 0 of those that the Tacton does not repeat. */
-function symbolsOf(load) {
-  const own = load.path.shape === "joined", turns = own ? load.path.drawn : drawingFrequency(load.path);
-  const fd = own && turns * load.duration < REPEATED ? 0 : turns;
-  const rhythm = load.pulses ? 1 / rhythmPeriod(load) : 0;
-  return [fd, load.w1 > 0 ? load.am : 0, load.w1 < 1 ? load.am2 : 0, load.envelope,
-    rhythm * load.duration >= REPEATED ? rhythm : 0];
+function symbolsOf({ path, duration, am, am2, envelope, w1 }) {
+  const own = path.shape === "joined", turns = own ? path.drawn : drawingFrequency(path);
+  const least = own ? REPEATED : jumps(path) ? 1 - 1e-9 : 0;
+  return [turns * duration >= least ? turns : 0, w1 > 0 ? am : 0, w1 < 1 ? am2 : 0, envelope];
 }
 
 /** Name of the line of orders of SYMBOLS, such as "2f_d-f_AM". */
@@ -216,87 +212,20 @@ function nameOf(orders, symbols) {
   return terms.map(([n, symbol]) => `${n < 0 ? "-" : "+"}${times(n)}${symbol}`).join("").replace(/^\+/, "");
 }
 
-/** Harmonics [{n, share}] of the path of a load that make lines up to `highest`, the strongest first. */
-function pathShares(load, symbols, highest) {
-  const samples = pathSamples(load), count = samples.x.length, own = load.path.shape === "joined";
-  const last = lastOrder(load, count, gainLines(load), highest), fd = drawingFrequency(load.path);
-  const strengths = harmonicStrengths(load, samples, last), n = own ? load.path.paths.length : 1;
-  const once = fd > 0 && jumps(load.path) && fd * load.duration < 1 - 1e-9;
-  const found = [];
-  for (let k = -last; k <= last; k++) {
-    found.push({ n: k, share: strengths[(k + count) % count] * Math.hypot(...arrayFactor(load, k)) });
-  }
-  const least = 1e-10 * Math.max(...found.map(({ share }) => share));
-  const named = (k) => (symbols[0] && !once ? k % n === 0 : k === 0);
-  return found.filter(({ n: k, share }) => (share > least || k === 0) && named(k))
-    .map(({ n: k, share }) => ({ n: k / n, share }))
-    .sort((a, b) => b.share - a.share).slice(0, MOST_HARMONICS);
-}
-
-/** Products [{orders of SYMBOLS but f_d, c}] of the sinusoids and the rhythm, c in Pa. */
-function gainProducts(load, symbols, least) {
-  const strongest = (found) => {
-    found.sort((a, b) => b.c - a.c);
-    return found.filter(({ c }, k) => c >= least * found[0].c && k < MOST_PRODUCTS);
-  };
-  const gain = strongest(gainLines(load).map(({ orders, re, im }) => (
-    { orders: [...orders, 0], c: Math.hypot(re, im) })));
-  if (!symbols[4]) return gain;
-  const period = rhythmPeriod(load);
-  const { re, im } = fourier(Float64Array.from({ length: PULSED },
-    (_, k) => levelFactor(load, rhythmLevel(load, (k + 0.5) / PULSED * period)) / PULSED));
-  const orders = Array.from(re, (value, k) => (
-    { v: k > PULSED / 2 ? k - PULSED : k, a: Math.hypot(value, im[k]) }));
-  const top = Math.max(...orders.map(({ a }) => a));
-  const kept = orders.filter(({ a }) => a >= least * top);
-  return strongest(gain.flatMap(({ orders: own, c }) => kept.map(({ v, a }) => (
-    { orders: [...own.slice(0, 3), v], c: c * a }))));
-}
-
-/**
- * Lines of a load above a fraction of the strongest on the path, without the mean: [{name, f in Hz,
- * strength in Pa}], ascending, no two the same (simple_model.load.line_names).
- */
-export function lineNames(load, { threshold = 1e-3, most = 200, highest = Infinity } = {}) {
-  const symbols = symbolsOf(load), same = SAME / load.duration, shares = pathShares(load, symbols, highest);
-  const gain = gainProducts(load, symbols, 1e-3 * threshold);
-  const base = gain.map(({ orders }) => orders.reduce((sum, n, k) => sum + n * symbols[k + 1], 0));
-  const each = (visit) => shares.forEach(({ n, share }) => {
-    for (let g = 0; g < gain.length; g++) {
-      const f = n * symbols[0] + base[g];
-      if (f > same) visit(n, g, f, 2 * share * gain[g].c);
-    }
-  });
-  let top = 0;
-  each((n, g, f, strength) => { top = Math.max(top, strength); });
-  const found = [];
-  each((n, g, f, strength) => {
-    if (strength > 1e-2 * threshold * top) found.push({ n, g, f, strength });
-  });
-  found.sort((a, b) => a.f - b.f);
-  const groups = [];
-  found.forEach((line, k) => {
-    const orders = [line.n, ...gain[line.g].orders], used = orders.filter((n) => n).length;
-    const sum = orders.reduce((total, n) => total + Math.abs(n), 0);
-    const effort = sum + (orders[0] ? 0.1 : 0) + 0.01 * used;
-    if (k === 0 || line.f - found[k - 1].f > same) groups.push({ effort: Infinity, power: 0 });
-    const group = groups[groups.length - 1];
-    group.power += line.strength ** 2;
-    if (effort < group.effort - 1e-9 || (effort < group.effort + 1e-9 && line.strength > group.best)) {
-      Object.assign(group, { effort, best: line.strength, f: line.f, orders });
-    }
-  });
-  const strongest = [...groups].sort((a, b) => b.power - a.power).slice(0, most);
-  return strongest.filter(({ power }) => power > threshold ** 2 * strongest[0].power)
-    .sort((a, b) => a.f - b.f)
-    .map(({ orders, f, power }) => ({ name: nameOf(orders, symbols), f, strength: Math.sqrt(power) }));
-}
-
 /** Names of a load's lines while a pulse is on, as a function of the frequency in Hz; "" if unknown. */
 export function namesOf(load) {
-  const known = lineNames({ ...load, pulses: null }, { threshold: 1e-4, most: 1000, highest: HIGHEST });
-  const same = Math.max(SAME / load.duration, 1e-6);
-  return (f) => known.find((line) => Math.abs(line.f - f) <= same)?.name || "";
+  const symbols = symbolsOf(load), paths = load.path.paths?.length ?? 1;
+  const { f, parts } = loadLines(load, { threshold: 1e-4, most: 1000 });
+  const least = FAINT * Math.max(...parts.flat().map(({ strength }) => strength));
+  const isNamed = ({ n, strength }) => strength > least && (symbols[0] ? n % paths === 0 : n === 0);
+  const effortOf = (orders) => orders.reduce((sum, n) => sum + Math.abs(n) + (n ? 0.01 : 0), orders[0] ? 0.1 : 0);
+  const names = parts.map((own) => {
+    const known = own.filter(isNamed).map(({ n, orders, strength }) => (
+      { orders: [n / paths, ...orders], effort: effortOf([n / paths, ...orders]), strength }));
+    known.sort((a, b) => (Math.abs(a.effort - b.effort) > 1e-9 ? a.effort - b.effort : b.strength - a.strength));
+    return known.length ? nameOf(known[0].orders, symbols) : "";
+  });
+  return (at) => names[f.findIndex((own) => Math.abs(own - at) < 1e-6)] ?? "";
 }
 
 /**
@@ -315,47 +244,6 @@ export function lineTable({ load, values, body, waves, wavesAt, kernel, kernelAt
   }).filter((_, l) => motion[l] > least).sort((a, b) => b.motion - a.motion);
 }
 
-/** Names of the lines below 1 kHz that the Tacton is too short to resolve from 0 Hz or each other. */
-export function unresolvedNames(load) {
-  const lines = lineNames(load, { highest: HIGHEST }).filter(({ f }) => f < HIGHEST);
-  const least = 2 / load.duration; // of its second half, when it has settled
-  const top = Math.max(...lines.map(({ strength }) => strength), 1e-300);
-  const near = (a, b, far) => Math.abs(a - b) < far;
-  let known = lines.map(({ f }) => {
-    const close = lines.filter((other) => near(f, other.f, least));
-    const sum = (some) => some.reduce((total, { strength }) => total + strength, 0);
-    const alike = close.filter((other) => Math.abs(f - other.f) <= ALIKE * least);
-    return f >= least && sum(close) - sum(alike) <= MINOR * sum(alike);
-  });
-  for (let before = -1; before !== known.filter(Boolean).length;) {
-    before = known.filter(Boolean).length;
-    const kept = lines.filter((_, k) => known[k]), lost = lines.filter((_, k) => !known[k]);
-    const gaps = kept.map(({ f }, k) => f - (k ? kept[k - 1].f : 0)).filter((gap) => gap >= least);
-    const beta = betaOf(Math.min(...gaps, Infinity) / least);
-    known = lines.map(({ f, strength }, k) => {
-      const leaks = lost.map((o) => o.strength * kaiser(Math.PI * (f - o.f) / least, beta));
-      const leak = Math.hypot(...leaks);
-      return known[k] && leak <= MINOR * Math.max(strength, FAINT * top);
-    });
-  }
-  const kept = lines.filter((_, k) => known[k]);
-  return lines.filter(({ f }, k) => !known[k] && !kept.some((other) => near(f, other.f, least)))
-    .map(({ name }) => name);
-}
-
-/** Parameter of the Kaiser window for lines so many bins apart. */
-function betaOf(bins) {
-  const lobe = Math.hypot(1, WINDOW / Math.PI) * Math.min(bins / BINS, 1);
-  return Math.PI * Math.sqrt(Math.max(lobe * lobe - 1, 0));
-}
-
-/** Transform of a Kaiser window, relative; x is pi times bins. */
-function kaiser(x, beta) {
-  const root = Math.sqrt(Math.abs(beta * beta - x * x)) + 1e-9;
-  const value = Math.abs(x) < beta ? Math.sinh(root) / root : Math.abs(Math.sin(root) / root);
-  return value * (beta ? beta / Math.sinh(beta) : 1);
-}
-
 /**
  * Amplitude spectrum {f in Hz, amplitudes} of values at equal steps dt in s under a Hann window, as
  * simple_model.spectrum: a sinusoid of amplitude a on a bin shows as a.
@@ -369,44 +257,27 @@ export function spectrum(values, dt) {
 }
 
 /**
- * Levels over a value of the controls, in steps: yields {x, kernel, waves, best} after each of `count`
- * + 1 values from low to high and after each refinement and, last, with the highest of the curve `of` as
- * `best`, {at, level}, to `within` of the range. `levelsAt(value)` returns {kernel, waves} in dB or throws,
- * which skips a value.
+ * Levels over a value of the controls: yields {x, kernel, waves, best} after each of `count` + 1 values
+ * and, last, with the highest of the curve `of` as `best`, {at, level}, between them. `levelsAt(value)`
+ * returns {kernel, waves} in dB or throws, which skips a value.
  */
-export function* levelOver(levelsAt, [low, high], { of = "waves", count = 48, within = 1e-3 } = {}) {
+export function* levelOver(levelsAt, [low, high], { of = "waves", count = 48 } = {}) {
   const found = { x: [], kernel: [], waves: [], best: null };
-  const levelOfValue = (value) => {
-    try { return levelsAt(value); } catch { return null; } // such as a path that leaves the body
-  };
-  for (let k = 0; k <= count; k++) {
-    const value = low + (high - low) * k / count, levels = levelOfValue(value);
-    if (levels) {
-      found.x.push(value);
+  let best = { level: -Infinity }, [a, b] = [low, high];
+  for (const parts of [count, FINER, FINER]) {
+    for (let k = 0; k <= parts; k++) {
+      const at = a + (b - a) * k / parts;
+      let levels;
+      try { levels = levelsAt(at); } catch { continue; } // such as a path that leaves the body
+      if (levels[of] > best.level) best = { at, level: levels[of] };
+      if (b - a < high - low) continue;
+      found.x.push(at);
       found.kernel.push(levels.kernel);
       found.waves.push(levels.waves);
+      yield found;
     }
-    yield found;
+    if (best.level === -Infinity) return;
+    [a, b] = [Math.max(best.at - (b - a) / parts, low), Math.min(best.at + (b - a) / parts, high)];
   }
-  const known = found[of], top = known.reduce((best, level, k) => (
-    Number.isFinite(level) && !(level <= known[best]) ? k : best), -1);
-  if (top < 0) return;
-  const section = (Math.sqrt(5) - 1) / 2; // golden
-  let [a, b] = [found.x[Math.max(top - 1, 0)], found.x[Math.min(top + 1, found.x.length - 1)]];
-  const measured = (at) => ({ at, level: levelOfValue(at)?.[of] ?? -Infinity });
-  let c = measured(b - section * (b - a)), d = measured(a + section * (b - a));
-  let best = { at: found.x[top], level: known[top] };
-  while (b - a > within * (high - low)) {
-    for (const each of [c, d]) if (each.level > best.level) best = each;
-    if (c.level > d.level) {
-      [b, d] = [d.at, c];
-      c = measured(b - section * (b - a));
-    } else {
-      [a, c] = [c.at, d];
-      d = measured(a + section * (b - a));
-    }
-    yield found;
-  }
-  found.best = best;
-  yield found;
+  yield { ...found, best };
 }

@@ -12,34 +12,34 @@ import { largestOf } from "./numeric.js";
 import { createPlot, keptScales } from "./plots.js";
 import { OVER, commandedPlot, difference, dispersionPlot, factorOf, fociAt, levelPlot, pathsOf, spanOf,
   spectrumPlot, waveformPlot } from "./results.js";
-import { offerSaves, playSound } from "./saving.js";
+import { offerSaves } from "./saving.js";
 import { runSelftest } from "./selftest.js";
-import { requestBody, sendFile } from "./server.js";
+import { request, sendFile } from "./server.js";
 import { comparison, linesTable, tiles } from "./tables.js";
 import { escaped, rounded } from "./text.js";
-import { LABELS, STARTS, check, fitPaths, holdFrequency, loadOf, nameBodies } from "./values.js";
+import { LABELS, STARTS, check, fitPaths, loadOf, nameBodies } from "./values.js";
 import { openView } from "./view3d.js";
 
 const data = JSON.parse(document.getElementById("data").textContent);
 const $ = (id) => document.getElementById(id);
 const all = (selector) => [...document.querySelectorAll(selector)];
 
-const SPANS = ["automatic", "first 20 ms", "first 60 ms", "last 60 ms", "one rhythm", "all"];
+const SPANS = ["automatic", "last 60 ms", "all"];
 const PLAYED = 3.5; // s that a period takes when played
 const TURN = 30; // ms of slow work, between which the page draws
-const VALUES = 48, REFINED = 1e-3; // of a control; of its range, to which the highest level is refined
+const STEPS = { undo: -1, redo: 1 };
 const QUIET = 300; // ms without a move, after which slow results are computed
 
 const opened = new Map(); // bodies by name
 const starts = { ...STARTS, ...data.start };
 const view = { look: "maps", tab: "lines", span: "automatic", decibel: false, highest: 600, over: "speed",
-  mapDecibel: 0, published: false, held: 0, follow: true };
+  mapDecibel: 0, published: false };
 const errors = new Map(); // what is typed wrong, by control
 const scale = keptScales();
 let values = starts, answer = null, pinned = null, measured = null, history = null, controls = null;
 let frameDue = 0, mapsDue = 0, slowDue = 0, told = 0, moving = false;
 let levels = null, solid = null, solidOf = null;
-let playing = 0, clock = 0, editing = null, notice = "", seenWarnings = [];
+let playing = 0, clock = 0, editing = null, notice = "";
 
 const recordOf = (name) => data.bodies.find((body) => body.name === name) ?? data.bodies[0];
 
@@ -54,11 +54,6 @@ const respond = (own) => respondTo(own, bodyOf(own.body), { published: view.publ
 function change(key, value, settled) {
   let next = { ...values, [key]: value };
   if (key === "foci" || key === "paths") next = fitPaths(next, key);
-  if (view.held && ["size", "speed", "shape"].includes(key)) {
-    try {
-      next = { ...next, ...holdFrequency(next, key, view.held) };
-    } catch (error) { say(error.message); return; }
-  }
   set(next, settled);
 }
 
@@ -100,8 +95,7 @@ function writeAddress() {
   try {
     window.history.replaceState(null, "", address());
   } catch { /* some hosts forbid it */ }
-  $("undo").disabled = !history.undoable;
-  $("redo").disabled = !history.redoable;
+  for (const [id, way] of Object.entries(STEPS)) $(id).disabled = !history.has(way);
 }
 
 const say = (text) => { notice = text; showSlot(); };
@@ -116,7 +110,7 @@ function showSlot() {
   const warned = [...new Set([...(answer?.body.warnings ?? []), ...(answer?.warnings ?? [])])];
   $("warned").hidden = !warned.length;
   $("warned").textContent = warned.length === 1 ? "1 warning" : `${warned.length} warnings`;
-  seenWarnings = warned;
+  $("warnings").textContent = warned.join(" ");
 }
 
 /** What mapsOf found before, of the same body: it stays until there is a new one, a frame later. */
@@ -136,7 +130,7 @@ function showCurves() {
     errors.set("load", error.message);
     markOld();
     showSlot();
-    controls.show(values, facts());
+    controls.show(values, drawn());
     return;
   }
   const { load } = answer, span = spanOf(view.span, load);
@@ -145,9 +139,8 @@ function showCurves() {
   plots.commanded.draw(commandedPlot(answer, span));
   plots.waveform.draw(waveformPlot(answer, span, given));
   plots.spectrum.draw(spectrumPlot(answer, given));
-  controls.show(values, facts());
+  controls.show(values, drawn());
   $("commanded-said").textContent = `${values.drive.replaceAll("_", " ")}, ${rounded(load.duration)} s`;
-  $("follow-row").hidden = !load.pulses;
   showTiles();
   showPane();
   showSlot();
@@ -159,14 +152,12 @@ function showCurves() {
   if (view.tab === "level" && !levels) slowDue = setTimeout(computeLevels, QUIET);
 }
 
-/** What the controls show that is not a value: the drawing frequency in Hz, and whether it is kept. */
-function facts() {
-  let drawing = 0;
+/** The drawing frequency in Hz, 0 while values contradict each other, which is said elsewhere. */
+function drawn() {
   try {
     const { path } = answer?.values === values ? answer.load : loadOf(values);
-    drawing = path.drawn ?? drawingFrequency(path);
-  } catch { /* values that contradict each other are said elsewhere */ }
-  return { drawing, held: Boolean(view.held) };
+    return path.drawn ?? drawingFrequency(path);
+  } catch { return 0; }
 }
 
 function showMaps() {
@@ -267,7 +258,7 @@ async function computeLevels() {
   };
   const asked = levels = { of, x: [], kernel: [], waves: [], best: null };
   let until = performance.now() + TURN;
-  for (const found of levelOver(levelsAt, OVER[key], { of: lead, count: VALUES, within: REFINED })) {
+  for (const found of levelOver(levelsAt, OVER[key], { of: lead })) {
     Object.assign(asked, found);
     if (performance.now() < until) continue;
     showPane();
@@ -286,21 +277,17 @@ function showBody() {
 
 // ---- time -----------------------------------------------------------------------------------------
 
-/** What is played: {period in s, of}. */
+/** Period in s of what is played. */
 function period() {
   const { load } = answer, fd = drawingFrequency(load.path);
-  if (load.pulses && view.follow) {
-    return { period: rhythmPeriod(load), of: "rhythm" };
-  }
-  const tone = load.am || load.envelope;
-  return fd ? { period: 1 / fd, of: "path" } : { period: tone ? 1 / tone : 0.01, of: "tone" };
+  if (load.pulses) return rhythmPeriod(load);
+  return 1 / (fd || load.am || load.envelope || 100);
 }
 
 function showClock() {
-  const own = period();
-  $("phase").value = (clock / own.period) % 1;
-  const digits = own.period > 0.1 ? 0 : 2;
-  $("phase-said").textContent = `${(1e3 * clock).toFixed(digits)} of ${rounded(1e3 * own.period)} ms`;
+  const whole = period();
+  $("phase").value = (clock / whole) % 1;
+  $("phase-said").textContent = `${(1e3 * clock).toFixed(whole > 0.1 ? 0 : 2)} of ${rounded(1e3 * whole)} ms`;
   for (const plot of [plots.commanded, plots.waveform]) plot.setCursor(1e3 * clock);
   if (view.look !== "3d") drawMaps();
 }
@@ -313,8 +300,8 @@ function play(on) {
   if (!on) return;
   let last = performance.now();
   const next = (now) => {
-    const own = period();
-    clock = (clock + Math.min(now - last, 100) / 1e3 * own.period / PLAYED) % own.period;
+    const whole = period();
+    clock = (clock + Math.min(now - last, 100) / 1e3 * whole / PLAYED) % whole;
     last = now;
     showClock();
     playing = requestAnimationFrame(next);
@@ -337,29 +324,22 @@ async function edit(key, text) {
   if (value === (changes[key] ?? known.value)) return;
   Object.assign(changes, { [key]: value });
   editing?.abort();
-  const own = editing = new AbortController();
+  const own = editing = new AbortController(), { toml, name, title } = record;
   markOld();
   $("busy").hidden = false;
-  const done = () => {
-    editing = null;
-    for (const each of Object.keys(changes)) delete changes[each];
-    markOld();
-    $("busy").hidden = true;
-    showSlot();
-  };
-  const { toml, name, title } = record;
   try {
-    await requestBody(data.api, { toml, name, title, changes }, own.signal, {
-      progress: (fraction, phase) => { $("done").value = fraction; $("busy-said").textContent = phase; },
-      body: (found) => { if (own === editing) { takeBody(found); done(); ask(); } },
-      dispersion: (curves) => { bodyOf(name).dispersion = curves; if (view.tab === "dispersion") ask(); },
-    });
+    takeBody((await request(data.api, "body", JSON.stringify({ toml, name, title, changes }), own)).body);
   } catch (error) {
     if (own !== editing) return;
     errors.set("body", error.name === "AbortError" ? "" : error.message);
     controls.showBody(record);
-    done();
   }
+  editing = null;
+  for (const each of Object.keys(changes)) delete changes[each];
+  $("busy").hidden = true;
+  showSlot();
+  markOld();
+  ask();
 }
 
 /** Take a body's record in place of that of the same name, or as another. */
@@ -376,8 +356,8 @@ function takeBody(record) {
 async function takeScene(file) {
   try {
     const { values: own, body } = await sendFile(data.api, "scene", file);
-    if (body) takeBody(body);
-    set({ ...values, ...own, ...(body ? { body: body.name } : {}) });
+    takeBody(body);
+    set({ ...values, ...own, body: body.name });
     say(`${file.name} is open.`);
   } catch (error) { errors.set("scene", error.message); showSlot(); }
 }
@@ -399,18 +379,16 @@ async function takeMeasurement(file) {
 const plots = Object.fromEntries(["commanded", "waveform", "spectrum", "dispersion", "level"].map((id) => [id,
   createPlot($(id), { announce: (text) => { $("spoken").textContent = text; } })]));
 
-function choose(group, name, own) {
-  for (const tab of all(`[data-${group}]`)) {
-    const on = tab.dataset[group] === name;
-    tab.setAttribute("aria-selected", String(on));
-    tab.tabIndex = on ? 0 : -1;
-    if (on) $(own).setAttribute("aria-labelledby", tab.id);
+/** Mark the pressed button of a group. */
+function choose(group, name) {
+  for (const button of all(`[data-${group}]`)) {
+    button.setAttribute("aria-pressed", String(button.dataset[group] === name));
   }
 }
 
 function look(name) {
   view.look = name;
-  choose("look", name, "look");
+  choose("look", name);
   const deep = name === "3d";
   $("solid").hidden = !deep;
   for (const id of ["kernel-map", "wave-map"]) $(id).toggleAttribute("hidden", deep);
@@ -423,16 +401,10 @@ function look(name) {
 
 function tab(name) {
   view.tab = name;
-  choose("tab", name, "pane");
+  choose("tab", name);
   for (const pane of all("[data-pane]")) pane.hidden = pane.dataset.pane !== name;
   $("level-tools").hidden = name !== "level";
   if (answer) { ask(); writeAddress(); }
-}
-
-function setTheme(dark) {
-  document.documentElement.dataset.theme = dark ? "dark" : "light";
-  $("dark").setAttribute("aria-pressed", String(dark));
-  drawMaps();
 }
 
 function pin() {
@@ -478,10 +450,9 @@ function fillMenus() {
   const take = (own) => set({ ...values, ...Object.fromEntries(Object.entries(own)
     .filter(([key]) => key in STARTS).map(([key, value]) => [key, check(key, value)])) });
   document.addEventListener("click", ({ target }) => {
-    const button = target.closest("[data-menu], [data-preset], [data-example], [data-save]");
+    const button = target.closest("[data-preset], [data-example], [data-save]");
     if (!button) return;
-    const { menu, preset, example } = button.dataset;
-    if (menu) { openMenu(button, $(menu)); return; }
+    const { preset, example } = button.dataset;
     button.closest("[popover]").hidePopover();
     if (preset) { take(data.presets[preset].values); say(data.presets[preset].title); }
     if (example) {
@@ -492,37 +463,11 @@ function fillMenus() {
       say(sentence);
     }
   });
-  for (const menu of all(".menu")) {
-    menu.addEventListener("toggle", ({ newState }) => document.querySelector(`[data-menu="${menu.id}"]`)
-      .setAttribute("aria-expanded", String(newState === "open")));
-    moveFocus(menu, "button", { ArrowDown: 1, ArrowUp: -1 });
-  }
-}
-
-/** Let keys {name: 1 or -1} move the focus among parts of an element, round and round. */
-function moveFocus(host, selector, ways, act = () => {}) {
-  host.addEventListener("keydown", (event) => {
-    const way = ways[event.key], items = [...host.querySelectorAll(selector)];
-    if (!way) return;
-    event.preventDefault();
-    const next = items[(items.indexOf(document.activeElement) + way + items.length) % items.length];
-    next.focus();
-    act(next);
-  });
-}
-
-function openMenu(button, menu) {
-  const { left, bottom } = button.getBoundingClientRect();
-  menu.showPopover();
-  menu.style.left = `${Math.max(4, Math.min(left, innerWidth - menu.offsetWidth - 6))}px`;
-  menu.style.top = `${bottom + 3}px`;
-  menu.querySelector("button")?.focus();
 }
 
 function listen() {
   const on = (id, name, act) => $(id).addEventListener(name, act);
-  on("undo", "click", () => restore(history.undo()));
-  on("redo", "click", () => restore(history.redo()));
+  for (const [id, way] of Object.entries(STEPS)) on(id, "click", () => restore(history.go(way)));
   on("pin", "click", pin);
   on("swap", "click", swap);
   on("link", "click", async () => {
@@ -531,18 +476,14 @@ function listen() {
       say("The link is copied.");
     } catch { prompt("Copy this address:", address()); }
   });
-  on("sound", "click", () => playSound(answer, $("sound")));
-  on("dark", "click", () => setTheme(document.documentElement.dataset.theme !== "dark"));
   on("about-open", "click", () => $("about").showModal());
-  on("warned", "click", () => controls.explain($("warned"), seenWarnings.join(" ")));
   on("cancel", "click", () => editing?.abort());
   on("play", "click", () => play(!playing));
   on("phase", "input", () => {
     play(false);
-    clock = Number($("phase").value) * period().period;
+    clock = Number($("phase").value) * period();
     showClock();
   });
-  on("follow", "change", () => { view.follow = $("follow").checked; clock = 0; showClock(); });
   on("span", "change", () => { view.span = $("span").value; ask(); });
   on("decibel", "change", () => { view.decibel = $("decibel").checked; ask(); });
   on("highest", "change", () => { view.highest = Number($("highest").value); ask(); });
@@ -556,13 +497,8 @@ function listen() {
     $("sheet-toggle").setAttribute("aria-expanded", String($("sheet").classList.toggle("open")));
   });
   on("controls", "submit", (event) => event.preventDefault());
-  for (const list of all('[role="tablist"]')) {
-    list.addEventListener("click", ({ target: { dataset } }) => {
-      if (dataset.look) look(dataset.look);
-      if (dataset.tab) tab(dataset.tab);
-    });
-    moveFocus(list, '[role="tab"]', { ArrowRight: 1, ArrowLeft: -1 }, (next) => next.click());
-  }
+  for (const button of all("[data-look]")) button.onclick = () => look(button.dataset.look);
+  for (const button of all("[data-tab]")) button.onclick = () => tab(button.dataset.tab);
   for (const id of ["kernel-map", "wave-map"]) {
     let resting = 0;
     mapControls($(id), (x, y) => {
@@ -576,9 +512,8 @@ function listen() {
     if (!(event.ctrlKey || event.metaKey) || event.altKey
       || /^(text|)$/.test(event.target.type ?? "-")) return;
     const key = event.key.toLowerCase();
-    if (key === "z" && !event.shiftKey) restore(history.undo());
-    else if (key === "y" || key === "z") restore(history.redo());
-    else return;
+    if (key !== "z" && key !== "y") return;
+    restore(history.go(key === "y" || event.shiftKey ? 1 : -1));
     event.preventDefault();
   });
   $("page").addEventListener("dragover", (event) => event.preventDefault());
@@ -603,8 +538,7 @@ function listen() {
 
 function begin() {
   const { values: own, refused, view: shown } = readAddress(starts);
-  values = own;
-  values = { ...values, body: recordOf(values.body).name };
+  values = { ...own, body: recordOf(own.body).name };
   notice = refused.join(" ");
   showBody();
   look(["maps", "3d", "difference"].includes(shown.view) ? shown.view : "maps");
@@ -620,7 +554,6 @@ controls = buildControls($("controls"), {
   bodies: data.bodies, editable: Boolean(data.api), change, edit,
   refuse: (key, sentence) => { errors.set(key, sentence); controls.mark(key, sentence); showSlot(); },
   moving: (on) => { if (moving && !on) ask(); moving = on; },
-  hold: (on) => { view.held = on ? facts().drawing : 0; ask(); },
   published: (on) => { view.published = on; ask(); },
 });
 $("map-legend").innerHTML = MAP_LEGEND;
@@ -630,6 +563,5 @@ $("over").innerHTML = Object.keys(OVER).map((key) =>
 $("highest").value = view.highest;
 fillMenus();
 offerSaves($("save"), { answer: () => answer, say, writers: WRITERS });
-setTheme(matchMedia("(prefers-color-scheme: dark)").matches);
 listen();
 begin();

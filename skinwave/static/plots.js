@@ -1,5 +1,5 @@
-// Plots as SVG: curves, stems and names over two vertical axes that keep their scale; zoom, reading
-// by pointer and keyboard, and figures to save.
+// Plots as SVG: curves, stems and names over two vertical axes that keep their scale, read by pointer
+// and arrow keys.
 
 import { indexIn } from "./numeric.js";
 import { escaped, rounded } from "./text.js";
@@ -71,9 +71,8 @@ function thinned(xs, ys, toX, width) {
 /**
  * A plot inside an element.
  *
- * `draw(spec)` takes { x: {label, range}, y: {label, range, role}, y2, curves, names, kept,
- * hatched, label }. A curve has {role, axis: "y"|"y2", x, y, name, width, dash, fill, stems, offset};
- * names are [{x, y, axis, text, above}], the most important first. Zoom lasts until `kept` changes.
+ * `draw(spec)` takes { x: {label, range}, y: {label, range, role}, y2, curves, names, hatched, label }. A curve has {role, axis: "y"|"y2", x, y, name, width, dash, fill, stems, offset};
+ * names are [{x, y, axis, text, above}], the most important first.
  */
 export function createPlot(host, { announce }) {
   const svg = document.createElementNS(NS, "svg");
@@ -85,12 +84,11 @@ export function createPlot(host, { announce }) {
   svg.append(picture, over);
   host.append(svg);
   const clip = `clip-${host.id}`;
-  let spec = null, zoom = null, kept = null, size = [0, 0], cursor = null, read = -1;
+  let spec = null, size = [0, 0], cursor = null, read = -1;
 
-  const shown = () => zoom ?? spec.x.range;
   const area = () => [LEFT, TOP, size[0] - (spec.y2 ? RIGHT : 12), size[1] - BOTTOM];
   const toX = (v) => {
-    const [x0, , x1] = area(), [low, high] = shown();
+    const [x0, , x1] = area(), [low, high] = spec.x.range;
     return x0 + (x1 - x0) * (v - low) / (high - low || 1);
   };
   const toY = (v, axis) => {
@@ -116,7 +114,7 @@ export function createPlot(host, { announce }) {
 
   function axes(x0, y0, x1, y1) {
     const parts = [`<path class="axis" d="M${x0},${y0}V${y1}H${x1}${spec.y2 ? `V${y0}` : ""}"/>`];
-    const [low, high] = shown(), label = spec.x.label, room = 6 * label.length + 8;
+    const [low, high] = spec.x.range, label = spec.x.label, room = 6 * label.length + 8;
     const across = ticks(low, high, (x1 - x0) / 64);
     for (const v of across.values) {
       const x = toX(v).toFixed(1);
@@ -195,7 +193,7 @@ export function createPlot(host, { announce }) {
   function names(x0, x1) {
     const boxes = [];
     return (spec.names ?? []).map(({ x, y, axis, text, above }) => {
-      const width = 6.2 * text.replace(/_/g, "").length, [low, high] = shown();
+      const width = 6.2 * text.replace(/_/g, "").length, [low, high] = spec.x.range;
       if (x < low || x > high) return "";
       const at = Math.min(Math.max(toX(x), x0 + width / 2), x1 - width / 2);
       let up = Math.max(Math.min(toY(y, axis), above ? toY(above.y, above.axis) : Infinity) - 6, TOP + 2);
@@ -209,14 +207,12 @@ export function createPlot(host, { announce }) {
     }).join("");
   }
 
-  /** Cursor of the playback, and what is read or selected. */
-  function mark(selection = null) {
+  /** Cursor of the playback, and what is read. */
+  function mark() {
     const [x0, y0, x1, y1] = area(), parts = [];
-    if (cursor !== null && cursor >= shown()[0] && cursor <= shown()[1]) {
+    if (cursor !== null && cursor >= spec.x.range[0] && cursor <= spec.x.range[1]) {
       parts.push(`<path class="cursor" d="M${toX(cursor).toFixed(1)},${y0}V${y1}"/>`);
     }
-    if (selection) parts.push(`<rect class="selection" x="${Math.min(...selection)}" y="${y0}"
-      width="${Math.abs(selection[1] - selection[0])}" height="${y1 - y0}"/>`);
     if (read >= 0 && spec.curves.length) {
       const { x, said } = readings()[read] ?? {};
       if (said) {
@@ -234,7 +230,7 @@ export function createPlot(host, { announce }) {
     const curves = spec.curves.filter((curve) => curve.name && !curve.fill);
     const lead = curves.find((curve) => curve.stems) ?? curves[0];
     if (!lead) return [];
-    const [low, high] = shown(), found = [];
+    const [low, high] = spec.x.range, found = [];
     for (let k = 0; k < lead.x.length; k++) {
       const x = lead.x[k];
       if (x < low || x > high) continue;
@@ -248,63 +244,26 @@ export function createPlot(host, { announce }) {
     return found;
   }
 
-  function setZoom(range) {
-    const [low, high] = spec.x.range;
-    if (range) {
-      const width = Math.min(Math.max(range[1] - range[0], (high - low) / 500), high - low);
-      const start = Math.min(Math.max(range[0], low), high - width);
-      zoom = width >= (high - low) * 0.999 ? null : [start, start + width];
-    } else zoom = null;
-    read = -1;
-    render();
-  }
-
   const place = (event) => event.clientX - svg.getBoundingClientRect().left;
-  const fromX = (px) => {
-    const [x0, , x1] = area(), [low, high] = shown();
-    return low + (high - low) * Math.min(Math.max((px - x0) / (x1 - x0), 0), 1);
-  };
-  let pressed = null;
-  svg.addEventListener("pointerdown", (event) => {
-    if (event.pointerType === "mouse" && spec) {
-      pressed = place(event);
-      svg.setPointerCapture(event.pointerId);
-    }
-  });
   svg.addEventListener("pointermove", (event) => {
     if (!spec) return;
-    if (pressed !== null) mark([pressed, place(event)]);
-    else {
-      const all = readings(), x = fromX(place(event));
-      const found = nearest(all.map((each) => each.x), x);
-      read = found >= 0 && Math.abs(toX(all[found].x) - place(event)) < READ_WITHIN ? found : -1;
-      mark();
-    }
+    const [x0, , x1] = area(), [low, high] = spec.x.range, all = readings();
+    const x = low + (high - low) * (place(event) - x0) / (x1 - x0);
+    const found = nearest(all.map((each) => each.x), x);
+    read = found >= 0 && Math.abs(toX(all[found].x) - place(event)) < READ_WITHIN ? found : -1;
+    mark();
   });
-  svg.addEventListener("pointerup", (event) => {
-    if (pressed === null) return;
-    const ends = [pressed, place(event)].sort((a, b) => a - b);
-    pressed = null;
-    if (ends[1] - ends[0] > 5) setZoom(ends.map(fromX)); else mark();
-  });
-  svg.addEventListener("pointerleave", () => { read = -1; if (spec && pressed === null) mark(); });
-  svg.addEventListener("blur", () => { read = -1; if (spec) mark(); });
-  svg.addEventListener("dblclick", () => spec && setZoom(null));
+  for (const name of ["pointerleave", "blur"]) {
+    svg.addEventListener(name, () => { read = -1; if (spec) mark(); });
+  }
   svg.addEventListener("keydown", (event) => {
-    if (!spec || event.ctrlKey || event.metaKey || event.altKey) return;
-    const [low, high] = shown(), middle = (low + high) / 2, width = high - low;
     const way = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
-    if (event.key === "+" || event.key === "=") setZoom([middle - width / 4, middle + width / 4]);
-    else if (event.key === "-") setZoom([middle - width, middle + width]);
-    else if (event.key === "Home" || event.key === "Escape") setZoom(null);
-    else if (way && event.shiftKey) {
-      const all = readings();
-      read = Math.min(Math.max(read + way * Math.max(1, Math.round(all.length / 100)), 0), all.length - 1);
-      announce(all[read]?.said ?? "nothing to read");
-      mark();
-    } else if (way) setZoom([low + way * width / 8, high + way * width / 8]);
-    else return;
+    if (!spec || !way || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
+    const all = readings();
+    read = Math.min(Math.max(read + way * Math.max(1, Math.round(all.length / 100)), 0), all.length - 1);
+    announce(all[read]?.said ?? "nothing to read");
+    mark();
   });
   new ResizeObserver(() => {
     size = [host.clientWidth, host.clientHeight];
@@ -313,7 +272,6 @@ export function createPlot(host, { announce }) {
 
   return {
     draw(given) {
-      if (given.kept !== kept) { zoom = null; kept = given.kept; }
       spec = given;
       render();
     },
@@ -326,61 +284,4 @@ function nearest(values, x) {
   if (values.length < 2) return values.length - 1;
   const low = indexIn(values, x);
   return x - values[low] <= values[low + 1] - x ? low : low + 1;
-}
-
-const STYLED = ["fill", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin", "opacity",
-  "fill-opacity", "font-size", "font-family", "font-weight", "paint-order"];
-
-/** An SVG element as text that stands alone: styles written into it. */
-function standalone(svg, x, y) {
-  const copy = svg.cloneNode(true), from = [...svg.querySelectorAll("*")];
-  [...copy.querySelectorAll("*")].forEach((element, k) => {
-    const style = getComputedStyle(from[k]);
-    for (const name of STYLED) element.setAttribute(name, style.getPropertyValue(name));
-    element.removeAttribute("class");
-  });
-  const { width, height } = svg.getBoundingClientRect();
-  for (const [name, value] of Object.entries({ x, y, width, height })) copy.setAttribute(name, value);
-  for (const name of ["class", "tabindex", "role", "aria-label", "style"]) copy.removeAttribute(name);
-  return new XMLSerializer().serializeToString(copy);
-}
-
-/**
- * One SVG of plots, canvases and texts where they stand on the page.
- *
- * `parts` are elements: svg, canvas, or ones whose text is copied. Returns {text, width, height}.
- */
-export function figureOf(parts, paper) {
-  const seen = parts.filter((part) => part.getClientRects().length);
-  const boxes = seen.map((part) => part.getBoundingClientRect());
-  const left = Math.min(...boxes.map((b) => b.left)) - 8, top = Math.min(...boxes.map((b) => b.top)) - 8;
-  const width = Math.max(...boxes.map((b) => b.right)) - left + 8;
-  const height = Math.max(...boxes.map((b) => b.bottom)) - top + 8;
-  const inside = seen.map((part, k) => {
-    const x = boxes[k].left - left, y = boxes[k].top - top;
-    if (part instanceof SVGSVGElement) return standalone(part, x, y);
-    if (part.asSvg) {
-      const { color } = getComputedStyle(part);
-      return `<g transform="translate(${x}, ${y})" font-family="sans-serif"
-        color="${color}">${part.asSvg()}</g>`;
-    }
-    const style = getComputedStyle(part);
-    return `<text x="${x}" y="${y + 0.78 * boxes[k].height}" fill="${style.color}" font-family="sans-serif"
-      font-size="${style.fontSize}" font-weight="${style.fontWeight}">${escaped(part.innerText)}</text>`;
-  });
-  const text = `<svg xmlns="${NS}" width="${width}" height="${height}" viewBox="0 0 ${width} ${height}">
-<rect width="100%" height="100%" fill="${paper}"/>${inside.join("\n")}</svg>`;
-  return { text, width, height };
-}
-
-/** PNG of an SVG text, twice as large; a promise of a blob. */
-export async function pngOf({ text, width, height }) {
-  const picture = new Image();
-  picture.src = URL.createObjectURL(new Blob([text], { type: "image/svg+xml" }));
-  await picture.decode();
-  const canvas = document.createElement("canvas");
-  [canvas.width, canvas.height] = [Math.round(2 * width), Math.round(2 * height)];
-  canvas.getContext("2d").drawImage(picture, 0, 0, canvas.width, canvas.height);
-  URL.revokeObjectURL(picture.src);
-  return new Promise((resolve) => canvas.toBlob(resolve, "image/png"));
 }

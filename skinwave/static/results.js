@@ -24,9 +24,7 @@ const inMs = (span) => span.map((t) => 1e3 * t);
 export function spanOf(name, load) {
   const { duration, pulses } = load, period = pulses && rhythmPeriod(load);
   if (name === "last 60 ms") return [Math.max(0, duration - 0.06), duration];
-  if (name === "all") return [0, duration];
-  if (period && (name === "one rhythm" || name === "automatic")) return [0, Math.min(period, duration)];
-  return [0, Math.min(name === "first 20 ms" ? 0.02 : 0.06, duration)];
+  return [0, name === "all" ? duration : Math.min(period || 0.06, duration)];
 }
 
 /** Waveform {x in ms, y} within a span in s, in the unit of a quantity. */
@@ -60,7 +58,7 @@ export function commandedPlot({ load }, [start, end]) {
     y[k] = 100 * (load.drive === "linear" ? driven : Math.sqrt(Math.max(driven, 0)));
   }
   return {
-    label: "Commanded signal over time, in per cent of full drive", kept: `${start} ${end}`,
+    label: "Commanded signal over time, in per cent of full drive",
     x: { label: "time, ms", range: inMs([start, end]) }, y: { label: "%", range: [-108, 108] },
     curves: [y, y.map((v) => -v)].map((half) => ({ role: "drive", axis: "y", x, y: half, fill: true })),
   };
@@ -108,7 +106,7 @@ export function waveformPlot(answer, span, { pinned, measured, scale }) {
   const low = scale("waveform below", below);
   for (const axis of Object.values(axes)) axis.range = [-axis.top * low, axis.top];
   return {
-    label: "Waveform at the point: pressure of the kernel in Pa and motion of the body", kept: `${span}`,
+    label: "Waveform at the point: pressure of the kernel in Pa and motion of the body",
     x: { label: "time, ms", range: inMs(span) }, ...axes, curves, hatched: answer.invalid,
   };
 }
@@ -177,7 +175,7 @@ export function spectrumPlot(answer, { pinned, measured, highest, decibel, scale
   if (decibel) toDecibel(axes, curves, named);
   return {
     label: "Spectrum at the point: lines of the kernel in Pa and of the waves, side by side",
-    kept: `${highest}`, x: { label: "frequency, Hz", range: [0, highest] }, ...axes, curves, names: named,
+    x: { label: "frequency, Hz", range: [0, highest] }, ...axes, curves, names: named,
     hatched: answer.invalid,
   };
 }
@@ -200,7 +198,7 @@ function toDecibel(axes, curves, names) {
 export function dispersionPlot(answer, highest) {
   const { body: { dispersion }, load: { path }, waves } = answer;
   if (!dispersion) {
-    return { label: "No dispersion curves are known for this body", kept: "none",
+    return { label: "No dispersion curves are known for this body",
       x: { label: "frequency, Hz", range: [0, highest] }, y: { label: "m/s", range: [0, 10] }, curves: [],
       names: [{ x: highest / 2, y: 5, axis: "y", text: "No dispersion curves are known for this body." }] };
   }
@@ -218,7 +216,7 @@ export function dispersionPlot(answer, highest) {
   for (const f of strong) curves.push({ role: "now", axis: "y", x: [f, f], y: [0, top], width: 1,
     dash: "2 3" });
   return {
-    label: "Phase speed of the body's waves over frequency, with the lines of the load", kept: "dispersion",
+    label: "Phase speed of the body's waves over frequency, with the lines of the load",
     x: { label: "frequency, Hz", range: across }, y: { label: "m/s", range: [0, top] }, curves,
     names: strong.map((f) => ({ x: f, y: 0.8 * top, axis: "y", text: lineName(answer, f) })),
   };
@@ -232,7 +230,7 @@ export function levelPlot(answer, key, { x, kernel, waves, best }) {
   const low = Math.max(5 * Math.floor(Math.min(...known, -5) / 5), top - DYNAMIC);
   const said = best && `${rounded(best.at)} ${unit}: ${signed(best.level)} dB`;
   return {
-    label: `Sensation level over ${label}`, kept: key, x: { label: `${label}, ${unit}`, range: OVER[key] },
+    label: `Sensation level over ${label}`, x: { label: `${label}, ${unit}`, range: OVER[key] },
     y: { label: "dB above threshold", range: [low, top] },
     curves: [
       { role: "kernel", axis: "y", name: answer.body.is_skin ? "kernel" : "kernel alone: this body is not skin",

@@ -1,12 +1,63 @@
-// Menus to save figures, data and device files, and the waveform as sound.
+// The menu to save figures and data.
 
-import { asSound } from "./files.js";
-import { figureOf, pngOf } from "./plots.js";
+import { escaped } from "./text.js";
 
-const RATE = 8000; // Hz of the sound
-const LONGEST_SOUND = 3; // s
-const FADE = 0.01; // s
-let playing = null;
+const NS = "http://www.w3.org/2000/svg";
+const STYLED = ["fill", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin", "opacity",
+  "fill-opacity", "font-size", "font-family", "font-weight", "paint-order"];
+
+/** An SVG element as text that stands alone: styles written into it. */
+function standalone(svg, x, y) {
+  const copy = svg.cloneNode(true), from = [...svg.querySelectorAll("*")];
+  [...copy.querySelectorAll("*")].forEach((element, k) => {
+    const style = getComputedStyle(from[k]);
+    for (const name of STYLED) element.setAttribute(name, style.getPropertyValue(name));
+    element.removeAttribute("class");
+  });
+  const { width, height } = svg.getBoundingClientRect();
+  for (const [name, value] of Object.entries({ x, y, width, height })) copy.setAttribute(name, value);
+  for (const name of ["class", "tabindex", "role", "aria-label", "style"]) copy.removeAttribute(name);
+  return new XMLSerializer().serializeToString(copy);
+}
+
+/**
+ * SVG {text, width, height} of elements where they stand on the page: svg, canvas with `asSvg`, or ones
+ * whose text is copied.
+ */
+function figureOf(parts, paper) {
+  const seen = parts.filter((part) => part.getClientRects().length);
+  const boxes = seen.map((part) => part.getBoundingClientRect());
+  const left = Math.min(...boxes.map((b) => b.left)) - 8, top = Math.min(...boxes.map((b) => b.top)) - 8;
+  const width = Math.max(...boxes.map((b) => b.right)) - left + 8;
+  const height = Math.max(...boxes.map((b) => b.bottom)) - top + 8;
+  const inside = seen.map((part, k) => {
+    const x = boxes[k].left - left, y = boxes[k].top - top;
+    if (part instanceof SVGSVGElement) return standalone(part, x, y);
+    if (part.asSvg) {
+      const { color } = getComputedStyle(part);
+      return `<g transform="translate(${x}, ${y})" font-family="sans-serif"
+        color="${color}">${part.asSvg()}</g>`;
+    }
+    const style = getComputedStyle(part);
+    return `<text x="${x}" y="${y + 0.78 * boxes[k].height}" fill="${style.color}" font-family="sans-serif"
+      font-size="${style.fontSize}" font-weight="${style.fontWeight}">${escaped(part.innerText)}</text>`;
+  });
+  const text = `<svg xmlns="${NS}" width="${width}" height="${height}" viewBox="0 0 ${width} ${height}">
+<rect width="100%" height="100%" fill="${paper}"/>${inside.join("\n")}</svg>`;
+  return { text, width, height };
+}
+
+/** PNG of an SVG text, twice as large; a promise of a blob. */
+async function pngOf({ text, width, height }) {
+  const picture = new Image();
+  picture.src = URL.createObjectURL(new Blob([text], { type: "image/svg+xml" }));
+  await picture.decode();
+  const canvas = document.createElement("canvas");
+  [canvas.width, canvas.height] = [Math.round(2 * width), Math.round(2 * height)];
+  canvas.getContext("2d").drawImage(picture, 0, 0, canvas.width, canvas.height);
+  URL.revokeObjectURL(picture.src);
+  return new Promise((resolve) => canvas.toBlob(resolve, "image/png"));
+}
 
 function download(name, content, type) {
   const link = document.createElement("a");
@@ -16,53 +67,29 @@ function download(name, content, type) {
   setTimeout(() => URL.revokeObjectURL(link.href), 1e4);
 }
 
-/** The parts of the page that make its figure, as they are shown. */
-const seen = () => [...document.querySelectorAll(
-  "#tiles .tile > span, .map, #solid canvas, .plot-card h2, .plot, #pane .plot")];
-
-const figure = () => figureOf(seen(), getComputedStyle(document.documentElement).getPropertyValue("--card"));
+/** The figure of the page: its tiles, maps and plots as they are shown. */
+const figure = () => figureOf([...document.querySelectorAll(
+  "#tiles .tile > span, .map, #solid canvas, .plot-card h2, .plot, #pane .plot")],
+getComputedStyle(document.documentElement).getPropertyValue("--card"));
 
 /**
- * Fill the menu of saves. `answer()` is what is shown, `writers` texts of files by kind:
- * [[heading, [[title, name, type, (answer) => text or bytes]]]].
+ * Fill the menu of saves. `answer()` is what is shown, `writers` make files: [[title, name, type,
+ * (answer) => text or bytes]].
  */
 export function offerSaves(menu, { answer, say, writers }) {
-  const own = ["Figure", [
+  const items = [
     ["Maps and plots, SVG", "skinwave.svg", "image/svg+xml", () => figure().text],
     ["Maps and plots, PNG", "skinwave.png", "image/png", () => pngOf(figure())],
-    ["Print or PDF", null, null, () => print()],
-  ]];
-  const groups = [own, ...writers], items = groups.flatMap(([, each]) => each);
-  const button = (item) => `<button type="button" data-save="${items.indexOf(item)}">${item[0]}</button>`;
-  menu.innerHTML = groups.map(([heading, each]) => `<h2>${heading}</h2>${each.map(button).join("")}`).join("");
+    ...writers,
+  ];
+  menu.innerHTML = items.map(([title], k) => `<button type="button" data-save="${k}">${title}</button>`).join("");
   menu.addEventListener("click", async ({ target }) => {
-    const item = items[target.dataset?.save];
+    const item = items[target.dataset.save];
     if (!item) return;
     const [title, name, type, write] = item;
     try {
-      const content = await write(answer());
-      if (!name) return;
-      download(name, content, type);
+      download(name, await write(answer()), type);
       say(`${name} is saved.`);
     } catch (error) { say(`${title}: ${error.message}`); }
   });
-}
-
-/** Play the waveform at the point, or stop; `button` shows which. */
-export function playSound({ waves, x, y, load }, button) {
-  const end = () => { playing = null; button.setAttribute("aria-pressed", "false"); };
-  if (playing) { playing.close(); end(); return; }
-  const context = playing = new AudioContext();
-  const count = Math.ceil(RATE * Math.min(load.duration, LONGEST_SOUND));
-  const sound = asSound(waves.waveform(x, y, Float64Array.from({ length: count }, (_, k) => k / RATE)));
-  const buffer = context.createBuffer(1, count, RATE), samples = buffer.getChannelData(0);
-  for (let k = 0; k < count; k++) {
-    samples[k] = 0.6 * sound[k] * Math.min(1, k / RATE / FADE, (count - k) / RATE / FADE);
-  }
-  const source = context.createBufferSource();
-  source.buffer = buffer;
-  source.connect(context.destination);
-  source.onended = () => { if (playing === context) { context.close(); end(); } };
-  source.start();
-  button.setAttribute("aria-pressed", "true");
 }

@@ -4,7 +4,7 @@ import { bytes, unpack } from "./pack.js";
 import { openView } from "./view3d.js";
 
 const data = JSON.parse(document.getElementById("data").textContent);
-const view = openView(document.getElementById("view"), { wheel: "focused" });
+const view = openView(document.getElementById("view"));
 const { re, im } = unpack(data.motion);
 
 view.show({

@@ -223,19 +223,6 @@ export function fitPaths(values, moved) {
   return { ...values, paths: [...kept, ...more].join(", ") };
 }
 
-/**
- * Size or speed, whichever was not moved, that keeps a drawing frequency in Hz: {size} or {speed}; {}
- * if the path has no length. Throws an Error if the control does not reach that far.
- */
-export function holdFrequency(values, moved, frequency) {
-  const sweeps = values.sweep === "one_way" ? 1 : 2;
-  const perSize = { line: sweeps, circle: Math.PI, triangle: 3, square: 4 }[values.shape] / 1e3;
-  if (values.paths || !perSize || !frequency) return {};
-  const round = (value) => Math.round(value * 1e6) / 1e6;
-  if (moved !== "speed") return { speed: check("speed", round(frequency * perSize * values.size)) };
-  return { size: check("size", round(values.speed / (frequency * perSize))) };
-}
-
 const evenly = (n) => Array.from({ length: n }, (_, k) => k / n);
 
 /** The path of a load, and the phases of its foci. */

@@ -1,68 +1,83 @@
 // A body in three dimensions, moving: WebGL 2, in the live page and in reports.
 
-import { locate, prepare, shade } from "./mesh3d.js";
-import { dots, rmsOf, strongLines, synthesise } from "./motion3d.js";
-import { largestOf } from "./numeric.js";
-import { SEQUENTIAL, SIGNED, TABLE_LENGTH } from "./palette.js";
-import { SLOWER, element, gradient, panel } from "./panel3d.js";
+import { bounds, locate, shade } from "./mesh3d.js";
+import { dots, strongLines, synthesise } from "./motion3d.js";
+import { SIGNED, TABLE_LENGTH } from "./palette.js";
 import { withUnit } from "./text.js";
 
 const SURFACE_VERTEX = `#version 300 es
   in vec3 place; in vec2 state; in vec3 normal; // state: lift in mm, place on the scale of colours
   uniform mat3 turn; uniform vec3 middle; uniform vec3 size;
-  out float value, along; out vec3 facing;
+  out float value; out vec3 facing, at;
   void main() {
-    vec3 at = turn * (place + vec3(0.0, 0.0, state.x) - middle);
-    value = state.y; along = place.y; facing = turn * normal;
+    at = turn * (place + vec3(0.0, 0.0, state.x) - middle);
+    value = state.y; facing = turn * normal;
     gl_Position = vec4(at.xy * size.xy, -at.z * size.z, 1.0);
   }`;
 const SURFACE_FRAGMENT = `#version 300 es
   precision highp float;
-  in float value, along; in vec3 facing;
-  uniform sampler2D colours; uniform float cut; uniform bool closed; out vec4 colour;
+  in float value; in vec3 facing, at;
+  uniform sampler2D colours; out vec4 colour;
   void main() {
-    if (along < cut) discard;
-    if (closed && !gl_FrontFacing) { colour = vec4(0.62, 0.55, 0.50, 1.0); return; } // the section
-    vec3 way = normalize(gl_FrontFacing ? facing : -facing);
+    vec3 flat_way = normalize(cross(dFdx(at), dFdy(at)));
+    vec3 way = normalize(dot(facing, flat_way) < 0.0 ? -facing : facing);
+    if (!(dot(way, flat_way) > 0.55)) way = flat_way; // beyond a sharp edge
     float light = 0.36 + 0.72 * max(0.0, dot(way, normalize(vec3(-0.55, 0.5, 0.67))));
     colour = vec4(texture(colours, vec2(clamp(value, 0.002, 0.998), 0.5)).rgb * light, 1.0);
   }`;
 const MARK_VERTEX = `#version 300 es
   in vec3 place; uniform mat3 turn; uniform vec3 middle; uniform vec3 size;
   uniform float width, lead; // lead: mm nearer than the surface, which would hide a half of each mark
-  out float along;
   void main() {
     vec3 at = turn * (place - middle);
-    along = place.y;
     gl_Position = vec4(at.xy * size.xy, -(at.z + lead) * size.z, 1.0);
     gl_PointSize = width;
   }`;
 const MARK_FRAGMENT = `#version 300 es
   precision highp float;
-  in float along; uniform vec3 ink; uniform float cut; uniform float edge; out vec4 colour;
+  uniform vec3 ink; uniform float edge; out vec4 colour;
   void main() {
     float r = 2.0 * length(gl_PointCoord - 0.5);
-    if (r > 1.0 || along < cut) discard;
+    if (r > 1.0) discard;
     colour = vec4(r > edge ? vec3(1.0) : ink, 1.0);
   }`;
-const HOME = { turned: -0.5, tipped: 0.95, near: 1, moved: [0, 0] };
+const HOME = { turned: -0.5, tipped: 0.95, near: 1 };
 const DRAWN = 0.06; // of the width: how far the largest motion is drawn at most
-const CREST = 2; // times the largest RMS: where colours end
 const LOOP = 0.1; // s that are repeated, or a period of the slowest line
-const SHOWN_RATE = 0.7; // Hz at which the strongest line is seen at first
+const SLOWER = [10, 30, 100, 300, 1000], SHOWN_RATE = 0.7; // Hz at which the strongest line is seen at first
 const BARS = [1, 2, 5, 10, 20, 50, 100]; // mm
 const NO_WEBGL = "This browser does not draw in three dimensions: WebGL 2 is off or missing. "
   + "The map shows the same motion from above.";
+const PANEL = `<div class="view3d">
+  <div class="stage"><canvas data-part="canvas" tabindex="0" role="application" aria-label="The body, moving.
+    Arrow keys turn it, plus and minus zoom, Home shows it as at first, the space bar plays and pauses."></canvas>
+    <svg data-part="over" aria-hidden="true"></svg></div>
+  <div class="colours" data-part="colours" aria-hidden="true"></div><div class="ends" data-part="ends"
+    title="≥: rare larger values have the last colour"></div>
+  <div class="row"><button type="button" data-part="play"></button>
+    <input type="range" class="time" max="1000" value="0" data-part="slider" aria-label="Time">
+    <output data-part="now"></output>
+    <select data-part="slow" aria-label="How many times slower than real">${SLOWER.map((times) => (
+    `<option value="${times}">${times} × slower</option>`)).join("")}</select>
+    <button type="button" data-part="above" title="Look from above">Above</button>
+    <button type="button" data-part="home" title="Show the body as at first">Reset</button></div>
+  <div data-part="said"></div></div>`;
+
+/** A table of colours as a gradient of CSS. */
+const gradient = (table) => Array.from({ length: 17 }, (_, k) => {
+  const at = 4 * Math.round(k / 16 * (TABLE_LENGTH - 1));
+  return `rgb(${table[at]},${table[at + 1]},${table[at + 2]})`;
+}).join(",");
 
 class View {
   constructor(container, options) {
     const playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;
-    Object.assign(this, { options, playing, time: 0, slower: 0, hue: "motion", cut: 0, relief: 1 });
-    this.view = { ...HOME, moved: [0, 0] };
-    Object.assign(this, panel(container));
+    Object.assign(this, { options, playing, time: 0, slower: 0, view: { ...HOME } });
+    container.innerHTML = PANEL;
+    for (const part of container.querySelectorAll("[data-part]")) this[part.dataset.part] = part;
     this.gl = this.canvas.getContext("webgl2", { antialias: true });
     if (!this.gl) {
-      container.replaceChildren(element("p", { role: "note" }, NO_WEBGL));
+      container.textContent = NO_WEBGL;
       return;
     }
     this.begin();
@@ -96,23 +111,11 @@ class View {
     for (const [key, value] of Object.entries(looks)) {
       gl.texParameteri(gl.TEXTURE_2D, gl[`TEXTURE_${key}`], value);
     }
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, TABLE_LENGTH, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE,
+      new Uint8Array(SIGNED));
+    this.colours.style.background = `linear-gradient(90deg, ${gradient(SIGNED)})`;
     gl.enable(gl.DEPTH_TEST);
-    this.send();
   }
-
-  /** Send what stays the same from frame to frame. */
-  send() {
-    const { gl, mesh, buffers } = this, table = this.table(), kind = [gl.RGBA, gl.UNSIGNED_BYTE];
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, TABLE_LENGTH, 1, 0, ...kind, new Uint8Array(table));
-    this.colours.style.background = `linear-gradient(90deg, ${gradient(table)})`;
-    if (!mesh) return;
-    gl.bindBuffer(gl.ARRAY_BUFFER, buffers.places);
-    gl.bufferData(gl.ARRAY_BUFFER, mesh.places, gl.STATIC_DRAW);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.triangles);
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, mesh.triangles, gl.STATIC_DRAW);
-  }
-
-  table() { return this.hue === "motion" ? SIGNED : SEQUENTIAL; }
 
   /**
    * Show a body and its motion.
@@ -122,19 +125,21 @@ class View {
    *   to mark; period: s, of the loop; unit: "Pa" of a pressure, less of which is upwards
    */
   show(given) {
-    if (!this.gl) return;
+    const { gl, buffers } = this;
+    if (!gl) return;
     const isNew = given.shape !== this.given?.shape;
     this.given = given;
     if (isNew) {
-      this.mesh = prepare(given.shape);
-      this.moved = Float32Array.from(this.mesh.places);
-      this.state = new Float32Array(5 * this.mesh.source.length);
-    }
-    this.measure();
-    if (isNew) {
-      this.send();
+      this.mesh = { ...given.shape, ...bounds(given.shape) };
+      this.moved = Float32Array.from(given.shape.points);
+      this.state = new Float32Array(5 * this.moved.length / 3);
+      gl.bindBuffer(gl.ARRAY_BUFFER, buffers.places);
+      gl.bufferData(gl.ARRAY_BUFFER, this.mesh.points, gl.STATIC_DRAW);
+      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.triangles);
+      gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, this.mesh.triangles, gl.STATIC_DRAW);
       this.fit();
     }
+    this.measure();
     const here = ([x, y]) => locate(this.mesh, x, y);
     this.riders = { path: dots(given.path || []).map(here).filter(Boolean),
       points: (given.points || []).map(([x, y]) => here([1e3 * x, 1e3 * y])).filter(Boolean) };
@@ -143,34 +148,30 @@ class View {
     this.run();
   }
 
-  /** What is the same at all times: lines, RMS, the end of the colours, exaggeration, and the loop. */
+  /** What is the same at all times: lines, the end of the colours, exaggeration, and the loop. */
   measure() {
-    const { motion, period } = this.given, strong = strongLines(motion), rms = rmsOf(strong, motion);
-    const most = largestOf(rms), width = this.mesh.high[0] - this.mesh.low[0];
+    const { motion, period } = this.given, strong = strongLines(motion);
+    const width = this.mesh.high[0] - this.mesh.low[0];
     const loudest = strong.lines.reduce((a, b) => (b.largest > a.largest ? b : a), { f: 100, largest: 0 });
     if (!this.slower) {
       const off = (slower) => Math.abs(Math.log(slower * SHOWN_RATE / loudest.f));
       this.slower = SLOWER.reduce((a, b) => (off(b) < off(a) ? b : a));
       this.slow.value = this.slower;
     }
-    Object.assign(this, { strong, rms, u: new Float32Array(strong.n), most, largest: CREST * most || 1,
-      factor: most ? 1e-3 * DRAWN * width / (CREST * most) : 0,
+    const { crest } = strong, factor = crest ? Number((1e-3 * DRAWN * width / crest).toPrecision(1)) : 0;
+    Object.assign(this, { strong, factor, largest: crest || 1, u: new Float32Array(strong.n),
       loop: period || Math.max(LOOP, 1 / Math.min(...strong.lines.map(({ f }) => f))) });
     this.time %= this.loop;
   }
 
-  get drawnTimes() { return Number((this.factor * this.relief).toPrecision(1)); }
-
   say() {
     const { unit = "m" } = this.given, end = withUnit(this.largest, unit);
-    const drawn = `Exaggerated ${this.drawnTimes.toLocaleString("en")} times, mean removed.`;
+    const drawn = `Exaggerated ${this.factor.toLocaleString("en")} times, mean removed.`;
     this.said.textContent = unit === "Pa" ? "A relief of the pressure; nothing moves." : drawn;
-    if (!this.most) this.said.textContent = "Nothing moves.";
-    let words = unit === "Pa" ? [`≥ ${end} less`, "mean pressure", `≥ ${end} more`]
+    if (!this.factor) this.said.textContent = "Nothing moves.";
+    const words = unit === "Pa" ? [`≥ ${end} less`, "mean pressure", `≥ ${end} more`]
       : [`≥ ${end} out of the body`, "0", `≥ ${end} into the body`];
-    if (this.hue === "rms") words = ["0", "RMS", withUnit(this.most, unit)];
-    this.ends.title = "≥: rare larger values have the last colour";
-    this.ends.replaceChildren(...words.map((text) => element("span", {}, text)));
+    this.ends.innerHTML = words.map((text) => `<span>${text}</span>`).join("");
   }
 
   /** Scale, in pixels per mm at the first view, so that the body fills the canvas. */
@@ -195,22 +196,20 @@ class View {
 
   /** Move the points to a time, and colour them. */
   place() {
-    const { mesh, state, moved, u, hue, rms, given } = this, { source, places } = mesh, n = u.length;
+    const { mesh, state, moved, u, given, factor } = this;
     synthesise(this.strong, given.motion, this.time, u);
-    const scale = 1e3 * this.drawnTimes;
-    for (let p = 0; p < source.length; p++) {
-      const k = source[p], lift = k < n ? u[k] : 0;
-      state[5 * p] = scale * lift;
-      moved[3 * p + 2] = places[3 * p + 2] + scale * lift;
-      if (hue === "motion") state[5 * p + 1] = 0.5 - lift / (2 * this.largest);
-      else state[5 * p + 1] = k < n ? rms[k] / (this.most || 1) : 0;
+    for (let p = 0; 3 * p < moved.length; p++) {
+      const lift = u[p] || 0;
+      state[5 * p] = 1e3 * factor * lift;
+      moved[3 * p + 2] = mesh.points[3 * p + 2] + state[5 * p];
+      state[5 * p + 1] = 0.5 - lift / (2 * this.largest);
     }
     shade(mesh, moved, state);
   }
 
   draw() {
     const { gl, canvas, mesh } = this, [wide, tall] = [canvas.clientWidth, canvas.clientHeight];
-    if (!mesh || !wide || !tall || gl.isContextLost()) return;
+    if (!mesh || !wide || !tall) return;
     const ratio = window.devicePixelRatio || 1;
     const [width, height] = [wide, tall].map((length) => Math.round(ratio * length));
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
@@ -220,19 +219,13 @@ class View {
     const { view, buffers } = this, turn = this.turn(view), room = 0.88;
     this.scale = room * view.near * Math.min(wide / 2 / this.reach[0], (tall - 24) / 2 / this.reach[1]);
     const size = [2 * this.scale / wide, 2 * this.scale / tall, 0.9 / this.deep];
-    // Moving the view moves what is in its middle.
-    const middle = this.middle.map((v, axis) => v - turn[3 * axis] * view.moved[0]
-      - turn[3 * axis + 1] * view.moved[1]);
-    const cut = mesh.low[1] - 1 + (this.cut && 1 + this.cut * (mesh.high[1] - mesh.low[1]));
     const common = ({ program, at }) => {
       gl.useProgram(program);
       gl.uniformMatrix3fv(at.turn, false, turn);
-      gl.uniform3fv(at.middle, middle);
+      gl.uniform3fv(at.middle, this.middle);
       gl.uniform3fv(at.size, size);
-      gl.uniform1f(at.cut, cut);
     };
     common(this.surface);
-    gl.uniform1i(this.surface.at.closed, mesh.isClosed);
     gl.bindBuffer(gl.ARRAY_BUFFER, buffers.places);
     gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 0, 0);
     gl.bindBuffer(gl.ARRAY_BUFFER, buffers.state);
@@ -322,16 +315,12 @@ class View {
       view.tipped = Math.min(Math.PI, Math.max(0, view.tipped - 0.01 * y));
       this.draw();
     };
-    const moveBy = (x, y) => {
-      view.moved = [view.moved[0] + x / this.scale, view.moved[1] - y / this.scale];
-      this.draw();
-    };
     const nearer = (factor) => {
       view.near = Math.min(12, Math.max(0.4, view.near * factor));
       this.draw();
     };
     const toggle = () => { this.playing = !this.playing; this.run(); };
-    const look = (changes) => { Object.assign(view, HOME, { moved: [0, 0] }, changes); this.draw(); };
+    const look = (changes) => { Object.assign(view, HOME, changes); this.draw(); };
     const apart = () => {
       const [a, b] = [...pointers.values()];
       return Math.hypot(a[0] - b[0], a[1] - b[1]);
@@ -345,24 +334,20 @@ class View {
       if (!before) return;
       const was = pointers.size === 2 && apart(), by = [event.clientX - before[0], event.clientY - before[1]];
       pointers.set(event.pointerId, [event.clientX, event.clientY]);
-      if (was) {
-        nearer(apart() / was);
-        moveBy(by[0] / 2, by[1] / 2);
-      } else if (event.shiftKey) moveBy(...by);
-      else turnBy(...by);
+      if (was) nearer(apart() / was); else turnBy(...by);
     });
     for (const name of ["pointerup", "pointercancel"]) {
       canvas.addEventListener(name, (event) => pointers.delete(event.pointerId));
     }
     canvas.addEventListener("wheel", (event) => {
-      if (this.options.wheel === "focused" && document.activeElement !== canvas && !event.ctrlKey) return;
+      if (document.activeElement !== canvas && !event.ctrlKey) return;
       event.preventDefault();
       nearer(Math.exp(-0.0015 * event.deltaY));
     }, { passive: false });
     const turns = { ArrowLeft: [-15, 0], ArrowRight: [15, 0], ArrowUp: [0, -15], ArrowDown: [0, 15] };
     canvas.addEventListener("keydown", (event) => {
       if (event.ctrlKey || event.metaKey || event.altKey) return;
-      if (turns[event.key]) (event.shiftKey ? moveBy : turnBy)(...turns[event.key]);
+      if (turns[event.key]) turnBy(...turns[event.key]);
       else if (event.key === "+" || event.key === "=") nearer(1.15);
       else if (event.key === "-") nearer(1 / 1.15);
       else if (event.key === " ") toggle();
@@ -370,23 +355,20 @@ class View {
       else return;
       event.preventDefault();
     });
-    const changed = () => { this.send(); this.say(); this.draw(); };
     this.play.onclick = toggle;
     this.home.onclick = () => look({});
     this.above.onclick = () => look({ turned: 0, tipped: 0 });
     this.slow.onchange = () => { this.slower = Number(this.slow.value); };
-    this.hues.onchange = () => { this.hue = this.hues.value; changed(); };
-    this.high.onchange = () => { this.relief = Number(this.high.value); changed(); };
-    this.cutter.oninput = () => { this.cut = this.cutter.value / 100; this.draw(); };
     this.slider.oninput = () => {
       this.playing = false;
       this.seek(this.slider.value / 1000 * this.loop);
       this.run();
     };
-    canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
-    canvas.addEventListener("webglcontextrestored", () => { this.begin(); this.draw(); });
-    canvas.asSvg = () => `<image href="${this.png()}" width="${canvas.clientWidth}" height="${
-      canvas.clientHeight}"/>${this.over.innerHTML}`;
+    canvas.asSvg = () => {
+      this.draw(); // the picture can be read in the same turn only
+      return `<image href="${canvas.toDataURL()}" width="${canvas.clientWidth}" height="${
+        canvas.clientHeight}"/>${this.over.innerHTML}`;
+    };
     new ResizeObserver(() => { this.draw(); this.run(); }).observe(canvas);
   }
 
@@ -397,19 +379,12 @@ class View {
     this.draw();
     this.options.onTime?.(this.time);
   }
-
-  /** The picture as a PNG, a data URL. */
-  png() {
-    this.draw();
-    return this.canvas.toDataURL();
-  }
 }
 
 /**
  * Open a view in an element, which gives it its size; `show` fills it.
  * @param {HTMLElement} container
- * @param {object} options onTime: called with the time in s as it changes; wheel: "focused" if the wheel
- *   zooms only while the view has the focus
+ * @param {object} options onTime: called with the time in s as it changes
  */
 export function openView(container, options = {}) {
   return new View(container, options);
