@@ -1,7 +1,6 @@
 """Answers to the requests of a served page: a changed body, a scene, a measurement."""
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -17,13 +16,9 @@ from skinwave.system.effort import Progress, silent
 MOST_VALUES = 2_000_000  # of a measurement that is sent to a page
 
 
-def body_lines(content: bytes, progress: Progress) -> Iterator[dict[str, Any]]:
-    """Yield {"body": record} of a changed body, then {"dispersion": curves}.
-
-    Parameters
-    ----------
-    content : JSON {"toml", "changes", "name", "title"}; the last two are optional
-    progress : told of the phases
+def body_answer(content: bytes, progress: Progress = silent) -> dict[str, Any]:
+    """Return the record of a changed body, from JSON {"toml", "changes", "name", "title"}; the last
+    two are optional.
 
     Raises
     ------
@@ -40,11 +35,21 @@ def body_lines(content: bytes, progress: Progress) -> Iterator[dict[str, Any]]:
     ):
         raise ValueError('The request is malformed. Send JSON {"toml": ..., "changes": {...}}.')
     body, title = changed(body_of(given["toml"]), given["changes"]), given["title"]
-    pack = pack_of(body, progress)
     if title and given["changes"]:
         title = f"{title.partition(',')[0]}, changed"  # whatever size it has named
-    yield {"body": record_of(body, pack, given["name"], title, waves=False)}
-    yield {"dispersion": dispersion_of(body)}
+    pack = pack_of(body, progress)
+    return {"body": record_of(body, pack, given["name"], title, waves=False)}
+
+
+def dispersion_answer(content: bytes) -> dict[str, Any]:
+    """Return the dispersion curves of the body in a TOML text, which may take a minute.
+
+    Raises
+    ------
+    ValueError
+        If the text describes no body.
+    """
+    return {"dispersion": dispersion_of(body_of(content.decode("utf-8", "replace")))}
 
 
 def scene_answer(name: str, content: bytes, progress: Progress = silent) -> dict[str, Any]:
@@ -64,7 +69,8 @@ def scene_answer(name: str, content: bytes, progress: Progress = silent) -> dict
     known = (name for name, body in BODIES.items() if body == scene.body)
     own = next(known, f"own-{scene.body.kind}")
     values = values_of(scene, own)
-    return {"values": values, "body": record_of(scene.body, pack_of(scene.body, progress), own)}
+    pack = pack_of(scene.body, progress)
+    return {"values": values, "body": record_of(scene.body, pack, own, waves=False)}
 
 
 def measurement_answer(name: str, content: bytes) -> dict[str, Any]:

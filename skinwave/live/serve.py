@@ -10,6 +10,7 @@ import re
 import secrets
 import sys
 from collections.abc import Callable, Mapping
+from functools import partial
 from http import HTTPStatus
 from http.cookies import SimpleCookie
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -17,11 +18,14 @@ from threading import Lock
 from typing import Any, TypeVar
 from urllib.parse import parse_qs, unquote, urlsplit
 
-from skinwave.live.answers import body_lines, measurement_answer, scene_answer
+from skinwave.live.answers import body_answer, dispersion_answer, measurement_answer, scene_answer
 from skinwave.live.page import page
+from skinwave.system.effort import Progress
 from skinwave.system.plain_text import printable, say
 
-LARGEST = {"body": 2**20, "scene": 2**22, "measurement": 20_000_000}  # bytes of a request
+LARGEST = {  # bytes of a request
+    "body": 2**20, "dispersion": 2**20, "scene": 2**22, "measurement": 20_000_000,
+}  # fmt: skip
 PATIENCE = 60.0  # s that a silent connection is kept
 LONGEST_LINE = 300  # characters of a fault in the terminal
 OWN_HOST = re.compile(r"(127\.0\.0\.1|localhost|\[::1\])(:\d{1,5})?")
@@ -85,15 +89,15 @@ class Server(ThreadingHTTPServer):
         """Address that opens the page on this machine."""
         return f"http://127.0.0.1:{self.server_port}{self.base}?token={self.token}"
 
-    def compute(self, work: Callable[[Callable[[], None]], _T]) -> _T:
-        """Return what work gives, called with a function that raises `Superseded` when newer
-        work has come. Only one computes at a time.
+    def compute(self, work: Callable[[Progress], _T]) -> _T:
+        """Return what work gives, called with a progress that raises `Superseded` when newer work
+        has come. Only one computes at a time.
         """
         with self._counting:
             self._newest += 1
             own = self._newest
 
-        def check() -> None:
+        def check(phase: str = "", fraction: float = 0.0) -> None:
             if own != self._newest:
                 raise Superseded
 
@@ -155,46 +159,21 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _answer(self, kind: str, content: bytes) -> None:
         name = unquote(self.headers.get("X-Name", ""))
+        works: dict[str, Callable[[Progress], Any]] = {
+            "body": partial(body_answer, content), "scene": partial(scene_answer, name, content),
+        }  # fmt: skip
         try:
-            if kind == "body":
-                return self._stream_body(content)
-            if kind == "measurement":
-                found = measurement_answer(name, content)
+            if kind in works:
+                found = self.server.compute(works[kind])
+            elif kind == "dispersion":
+                found = dispersion_answer(content)
             else:
-                found = self.server.compute(
-                    lambda check: scene_answer(name, content, lambda phase, fraction: check())
-                )
+                found = measurement_answer(name, content)
             return self._send(HTTPStatus.OK, _json(found), "application/json")
         except ConnectionError:
             raise
         except Exception as error:
             return self._error(*_explained(error))
-
-    def _stream_body(self, content: bytes) -> None:
-        """Send lines of progress, then the body; an error is a line, too."""
-        self._begin(HTTPStatus.OK, "application/x-ndjson", {})
-
-        def send(line: dict[str, Any]) -> None:
-            self.wfile.write(_json(line) + b"\n")
-            self.wfile.flush()
-
-        def work(check: Callable[[], None]) -> None:
-            def tell(phase: str, fraction: float) -> None:
-                check()
-                send({"phase": phase, "fraction": fraction})
-
-            for line in body_lines(content, tell):
-                check()
-                send(line)
-
-        try:
-            self.server.compute(work)
-        except Superseded:
-            send({"superseded": True})
-        except ConnectionError:
-            raise
-        except Exception as error:
-            send({"error": _explained(error)[1]})
 
     def _route(self, path: str) -> str:
         """Path below the base; a proxy may have removed the base from it."""

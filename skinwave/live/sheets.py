@@ -29,7 +29,6 @@ ERROR = (
     0.01  # relative, of lines above -40 dB; several foci on a wide path nearly cancel, and err more
 )
 BAND = 1300.0  # Hz: modes below are kept as they are
-COUPLED = 1.5  # times a line's frequency: modes below are solved together
 COUPLED_BAND = 2600.0  # Hz: loss couples modes below
 LEFT_OUT = 0.005  # of the largest combination of modes above the band
 QUASI_STATIC = (0.0, 600.0, 1000.0)  # Hz at which these combinations are looked at
@@ -59,7 +58,6 @@ def sheet_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
         "step": STEP, "side": SIDE,
         "squared": packed(squared), "diagonal": packed(bent.copy()),
         "between": quantised(bending[:coupled, :coupled]) if stretched else None,
-        "coupled": COUPLED,
         "law": packed(relative.astype(np.complex128)), "law_step": LAW_STEP,
         "V": quantised((turn.T @ fields)[:, inside]),
         "inside": "".join("01"[int(each)] for each in inside),

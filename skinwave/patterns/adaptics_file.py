@@ -5,7 +5,7 @@ and 0.1.0-alpha.3: millisecond, millimetre, Hz.
 """
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import cos, radians, sin
 from operator import add, ge, gt, le, lt, mul, sub, truediv
@@ -81,10 +81,9 @@ def parse(content: bytes, parameters: Mapping[str, float]) -> Animation:
     """The animation in a file at values of its user parameters, instead of their defaults; raises a
     ValueError if it is none, has random intensity, or has no such parameter.
     """
-    text = as_utf_8(content)
     try:
-        table = json.loads(text)
-    except (ValueError, RecursionError) as error:  # of brackets beyond all depth, too
+        table = json.loads(as_utf_8(content))
+    except ValueError as error:
         at = f" at line {error.lineno}" if isinstance(error, json.JSONDecodeError) else ""
         raise ValueError(f"not valid JSON{at}; save it with AdapTics") from None
     if not isinstance(table, dict) or table.get("$DATA_FORMAT") != FORMAT:
@@ -93,11 +92,8 @@ def parse(content: bytes, parameters: Mapping[str, float]) -> Animation:
         raise ValueError(
             f"revision {str(revision)[:40]!r} is unknown; save it as one of {', '.join(REVISIONS)}"
         )
-    numbers = _Numbers(_get(table, "user_parameter_definitions", dict, {}), parameters)
-    try:
-        return _animation(table, numbers)
-    except RecursionError:
-        raise ValueError("a formula is nested beyond all depth; simplify it") from None
+    definitions = _get(table, "user_parameter_definitions", dict, {})
+    return _animation(table, _Numbers(definitions, parameters))
 
 
 class _Numbers:
@@ -111,12 +107,12 @@ class _Numbers:
         if not isinstance(value, dict) or "value" not in value:
             return _finite(value, what)
         kind = value.get("type")
-        if kind == "f64":
-            return _finite(value["value"], what)
-        if kind in ("param", "dynamic"):
-            return self._parameter(value["value"])
         if kind == "formula":
             return _finite(self._formula(value["value"], what), what)
+        if kind in ("param", "dynamic"):
+            return self._parameter(value["value"])
+        if kind == "f64":
+            return _finite(value["value"], what)
         raise ValueError(f"{what} has the type {str(kind)[:40]!r}; use f64, param or formula")
 
     def holds(self, condition: Mapping[str, Any]) -> bool:
@@ -143,7 +139,7 @@ class _Numbers:
             raise ValueError(f"parameter {str(name)[:40]!r} is not defined; define its default")
         what = f"parameter '{name[:40]}'"
         whole = value = _finite(
-            self._given.get(name, _object(definition, what).get("default")), f"default of {what}"
+            self._given.get(name, _of(definition, what).get("default")), f"default of {what}"
         )
         for key, bound in (("min", max), ("max", min)):
             if definition.get(key) is not None:
@@ -182,38 +178,31 @@ def _animation(table: Mapping[str, Any], number: _Numbers) -> Animation:
     if speed <= 0:
         raise ValueError(f"playback_speed = {speed:g} must be above 0")
     frames = sorted(
-        (_finite(_object(f, "a keyframe").get("time"), "time of a keyframe") / 1e3 / speed, k, f)
+        (_finite(_of(f, "a keyframe").get("time"), "time of a keyframe") / 1e3 / speed, k, f)
         for k, f in enumerate(keyframes)
     )
     if frames[0][0] < 0:
         raise ValueError(f"a keyframe is at {1e3 * frames[0][0]:g} ms, before the start; move it")
-    places: list[tuple[float, Any, bool]] = []  # time, value, whether it is a step
-    brushes, intensities = places.copy(), places.copy()
+    # Of each track: time, value, whether it is a step.
+    tracks: dict[str, list[tuple[float, Any, bool]]] = {key: [] for key in SETTINGS}
     jumps: list[tuple[float, float]] = []  # when, and where to
     kinds: dict[float, str] = {}  # of the last keyframe at a time
     for time, _, frame in frames:
         kind = choose("type of a keyframe", str(frame.get("type"))[:40], KEYFRAMES)
         kinds[time] = kind
-        if kind == "standard":
-            at, step = _with_transition(frame, "coords")
-            places.append((time, tuple(_finite(at.get(a), f"coords {a}") for a in "xyz"), step))
-        elif places:
-            places.append((time, *places[-1][1:]))
-        if kind == "stop":
-            for track in (brushes, intensities):
-                track += [(time, *each[1:]) for each in track[-1:]]
-            continue
-        if frame.get("brush") is not None:
-            inner, step = _with_transition(frame, "brush")
-            brushes.append((time, _brush(inner, number), step))
-        if frame.get("intensity") is not None:
-            inner, step = _with_transition(frame, "intensity")
-            intensities.append((time, _intensity(inner, number), step))
-        jumps += [(time, to / speed) for to in _jumps(frame, number)[:1]]
+        for key, track in tracks.items():
+            stays = kind == "stop" or frame.get(key) is None
+            if key == "coords":
+                stays = kind != "standard"
+            if not stays:
+                track.append((time, *_setting(frame, key, number)))
+            elif track and (key == "coords" or kind == "stop"):
+                track.append((time, *track[-1][1:]))
+        if kind != "stop":
+            jumps += [(time, to / speed) for to in _jumps(frame, number)[:1]]
     runs, loop = _runs(kinds, jumps)
+    path = _track(tracks["coords"], (0.0, 0.0, 0.0))
     moved = _get(transform, "geometric_transforms", dict, {})
-    path = _track(places, (0.0, 0.0, 0.0))
-    placed = _transformed(path.values, moved, number)
     factor = number(transform.get("intensity_factor", 1.0), "intensity_factor")
     number.check_used()
     notes = list(number.notes.values())
@@ -221,9 +210,9 @@ def _animation(table: Mapping[str, Any], number: _Numbers) -> Animation:
         notes.append(f"played at {speed:g} times the speed, brushes drawn at their own")
     return Animation(
         name=str(table.get("name", ""))[:80],
-        places=replace(path, values=placed),
-        brushes=_track(brushes, NONE),
-        intensities=_track(intensities, 0.0),
+        places=replace(path, values=_transformed(path.values, moved, number)),
+        brushes=_track(tracks["brush"], NONE),
+        intensities=_track(tracks["intensity"], 0.0),
         factor=factor,
         runs=runs,
         loop=loop,
@@ -241,7 +230,7 @@ def _track(entries: list[tuple[float, Any, bool]], none: Any) -> Track:
 
 def _jumps(frame: Mapping[str, Any], number: _Numbers) -> list[float]:
     """Times in s, at speed 1, that a keyframe's jumps go to whose conditions are met."""
-    jumps = [_object(j, "a conditional jump") for j in _get(frame, "cjumps", list, []) or []]
+    jumps = [_of(j, "a conditional jump") for j in _get(frame, "cjumps", list, []) or []]
     return [
         _finite(jump.get("jump_to"), "jump_to of a jump") / 1e3
         for jump in jumps
@@ -274,12 +263,16 @@ def _runs(
     return tuple(runs), entered[at]
 
 
-def _with_transition(frame: Mapping[str, Any], key: str) -> tuple[Mapping[str, Any], bool]:
-    """Setting of a keyframe, and whether it stays until the next one sets it anew."""
+def _setting(frame: Mapping[str, Any], key: str, number: _Numbers) -> tuple[Any, bool]:
+    """Value that a keyframe sets, and whether it stays until the next one sets it anew."""
     outer = _get(frame, key, dict)
     transition = _get(outer, "transition", dict, {"name": "linear"}).get("name")
     step = choose(f"transition of {key}", str(transition)[:40], ("linear", "step")) == "step"
-    return _get(outer, key, dict), step
+    return SETTINGS[key](_get(outer, key, dict), number), step
+
+
+def _place(place: Mapping[str, Any], number: _Numbers) -> tuple[float, ...]:
+    return tuple(_finite(place.get(axis), f"coords {axis}") for axis in "xyz")
 
 
 def _brush(brush: Mapping[str, Any], number: _Numbers) -> Brush:
@@ -300,6 +293,11 @@ def _intensity(intensity: Mapping[str, Any], number: _Numbers) -> float:
     return number(_get(intensity, "params", dict).get("value"), "value of an intensity")
 
 
+SETTINGS: dict[str, Callable[[Mapping[str, Any], _Numbers], Any]] = {
+    "coords": _place, "brush": _brush, "intensity": _intensity,
+}  # fmt: skip
+
+
 def _transformed(
     values: Iterable[tuple[float, ...]], transform: Mapping[str, Any], number: _Numbers
 ) -> tuple[tuple[float, ...], ...]:
@@ -316,16 +314,13 @@ def _transformed(
 
 
 def _get(table: Mapping[str, Any], key: str, kind: type, default: Any = None) -> Any:
-    value = table.get(key, default)
+    return _of(table.get(key, default), key, kind)
+
+
+def _of(value: Any, what: str, kind: type = dict) -> Any:
     if not isinstance(value, kind):
-        word = {"dict": "an object", "list": "a list"}[kind.__name__]
-        raise ValueError(f"{key} = {json.dumps(value)[:40]} must be {word}")
-    return value
-
-
-def _object(value: Any, what: str) -> Mapping[str, Any]:
-    if not isinstance(value, dict):
-        raise ValueError(f"{what} is {json.dumps(value)[:40]}, which must be an object")
+        word = {dict: "an object", list: "a list"}[kind]
+        raise ValueError(f"{what} = {json.dumps(value)[:40]} must be {word}")
     return value
 
 

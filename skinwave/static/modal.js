@@ -5,7 +5,7 @@
 import { FieldMotion, Grid, PathForces, byPlace, zeros } from "./fields.js";
 import { divided } from "./numeric.js";
 
-const RESIDUAL = 1e-5, MOST_STEPS = 30; // of coupled modes
+const RESIDUAL = 1e-5, MOST_STEPS = 300; // of coupled modes
 
 /** A sheet of a pack. */
 export class ModalBody {
@@ -17,7 +17,6 @@ export class ModalBody {
     this.grid = new Grid(pack);
     this.values = byPlace(this.V, this.modes, this.inside);
     this.pushed = new PathForces(this.grid, this.values, this.modes);
-    this.factors = new Map(); // of coupled modes at a frequency
   }
 
   respond(load) { return new FieldMotion(this, load); }
@@ -61,7 +60,7 @@ export class ModalBody {
     }
   }
 
-  /** Diagonal (m,) {re, im} of the dynamic stiffness at a frequency, and the factor c there. */
+  /** Diagonal (m,) {re, im} of the dynamic stiffness at a frequency in Hz, and the `factor` c there. */
   stiffness(frequency) {
     const omega2 = (2 * Math.PI * frequency) ** 2, { modes } = this;
     const factor = lawAt(this.law_step, this.law, frequency);
@@ -70,75 +69,40 @@ export class ModalBody {
     return { re, im: Float64Array.from(this.diagonal, (own) => factor[1] * own), factor };
   }
 
-  /** Modal coordinates (m,) {re, im} of forces (m,) {re, im} at a frequency in Hz. */
+  /**
+   * Modal coordinates (m,) {re, im} of forces (m,) {re, im} at a frequency in Hz: conjugate gradients of a
+   * complex symmetric matrix, with its diagonal as preconditioner.
+   */
   solve(frequency, force) {
-    const { modes } = this, { re: dr, im: di, factor } = this.stiffness(frequency);
-    const divide = (to, from, first) => {
-      for (let m = first; m < modes; m++) {
-        const size = dr[m] ** 2 + di[m] ** 2;
-        to.re[m] = (from.re[m] * dr[m] + from.im[m] * di[m]) / size;
-        to.im[m] = (from.im[m] * dr[m] - from.re[m] * di[m]) / size;
-      }
-    };
-    const found = zeros(modes);
-    if (!this.between) {
-      divide(found, force, 0);
-      return found;
-    }
-    const block = this.lowBlock(frequency, dr, di, factor), scale = sizeOf(force);
-    let left = { re: force.re.slice(), im: force.im.slice() };
-    const change = zeros(modes);
-    for (let turn = 0; turn < MOST_STEPS && sizeOf(left) > RESIDUAL * scale; turn++) {
-      divide(change, left, block.n);
-      backSubstitute(block, left, change);
-      for (let m = 0; m < modes; m++) {
-        found.re[m] += change.re[m];
-        found.im[m] += change.im[m];
-      }
-      left = this.residual(found, force, dr, di, factor);
+    const diagonal = this.stiffness(frequency), over = (own) => quotients(own, diagonal);
+    if (!this.between) return over(force);
+    const found = zeros(this.modes), left = { re: force.re.slice(), im: force.im.slice() };
+    let way = over(left), before = product(left, way);
+    for (let turn = 0; turn < MOST_STEPS && sizeOf(left) > RESIDUAL * sizeOf(force); turn++) {
+      const pushed = this.push(way, diagonal), step = divided(...before, ...product(way, pushed));
+      addTimes(found, step, way);
+      addTimes(left, step.map((value) => -value), pushed);
+      const next = over(left), now = product(left, next);
+      addTimes(next, divided(...now, ...before), way);
+      [way, before] = [next, now];
     }
     return found;
   }
 
-  /** force - (dynamic stiffness) q. */
-  residual(q, force, dr, di, [c, s]) {
-    const { modes, between, together: n } = this;
-    const re = new Float64Array(modes), im = new Float64Array(modes);
+  /** The dynamic stiffness times modal coordinates (m,). */
+  push(q, { re: dr, im: di, factor: [c, s] }) {
+    const { modes, between, together: n } = this, found = zeros(modes);
     for (let m = 0, k = 0; m < modes; m++) {
       let a = 0, b = 0;
-      if (m < n) {
-        for (let i = 0; i < n; i++, k++) {
-          a += between[k] * q.re[i];
-          b += between[k] * q.im[i];
-        }
-        a -= between[m * n + m] * q.re[m];
-        b -= between[m * n + m] * q.im[m];
+      for (let i = 0; m < n && i < n; i++, k++) {
+        if (i === m) continue; // its own part is in the diagonal
+        a += between[k] * q.re[i];
+        b += between[k] * q.im[i];
       }
-      re[m] = force.re[m] - dr[m] * q.re[m] + di[m] * q.im[m] - c * a + s * b;
-      im[m] = force.im[m] - dr[m] * q.im[m] - di[m] * q.re[m] - c * b - s * a;
+      found.re[m] = dr[m] * q.re[m] - di[m] * q.im[m] + c * a - s * b;
+      found.im[m] = dr[m] * q.im[m] + di[m] * q.re[m] + c * b + s * a;
     }
-    return { re, im };
-  }
-
-  /** Factors L D L^T of the stiffness between the modes below `coupled` times a frequency. */
-  lowBlock(frequency, dr, di, [c, s]) {
-    if (this.factors.has(frequency)) return this.factors.get(frequency);
-    if (this.factors.size > 64) this.factors.clear();
-    const { between, together } = this, limit = (2 * Math.PI * this.coupled * frequency) ** 2;
-    let n = 0;
-    while (n < together && this.squared[n] <= limit) n++;
-    const re = new Float64Array(n * n), im = new Float64Array(n * n);
-    for (let row = 0; row < n; row++) {
-      for (let column = 0; column < row; column++) {
-        re[row * n + column] = c * between[row * together + column];
-        im[row * n + column] = s * between[row * together + column];
-      }
-      re[row * n + row] = dr[row];
-      im[row * n + row] = di[row];
-    }
-    const block = factorise(re, im, n);
-    this.factors.set(frequency, block);
-    return block;
+    return found;
   }
 }
 
@@ -146,67 +110,34 @@ export class ModalBody {
 function lawAt(step, law, frequency) {
   const count = law.re.length, x = Math.min(frequency / step, count - 1);
   const first = Math.min(Math.floor(x), count - 2), part = x - first;
-  return [law.re[first] + part * (law.re[first + 1] - law.re[first]),
-    law.im[first] + part * (law.im[first + 1] - law.im[first])];
+  return [law.re, law.im].map((own) => own[first] + part * (own[first + 1] - own[first]));
 }
 
-const sizeOf = ({ re, im }) => {
-  let sum = 0;
-  for (let k = 0; k < re.length; k++) sum += re[k] ** 2 + im[k] ** 2;
-  return Math.sqrt(sum);
-};
+const sizeOf = ({ re, im }) => Math.sqrt(re.reduce((sum, v, k) => sum + v * v + im[k] * im[k], 0));
 
-/** L D L^T of a complex symmetric matrix, of its lower triangle, in place. */
-function factorise(re, im, n) {
-  const ar = new Float64Array(n), ai = new Float64Array(n);
-  for (let j = 0; j < n; j++) {
-    // column j of L times D up to j
-    let pr = re[j * n + j], pi = im[j * n + j];
-    for (let k = 0; k < j; k++) {
-      const lr = re[j * n + k], li = im[j * n + k], dr = re[k * n + k], di = im[k * n + k];
-      ar[k] = lr * dr - li * di;
-      ai[k] = lr * di + li * dr;
-      pr -= lr * ar[k] - li * ai[k];
-      pi -= lr * ai[k] + li * ar[k];
-    }
-    re[j * n + j] = pr;
-    im[j * n + j] = pi;
-    const size = pr * pr + pi * pi;
-    for (let i = j + 1; i < n; i++) {
-      let sr = re[i * n + j], si = im[i * n + j];
-      for (let k = 0, at = i * n; k < j; k++, at++) {
-        sr -= re[at] * ar[k] - im[at] * ai[k];
-        si -= re[at] * ai[k] + im[at] * ar[k];
-      }
-      re[i * n + j] = (sr * pr + si * pi) / size;
-      im[i * n + j] = (si * pr - sr * pi) / size;
-    }
+/** Quotients (m,) of complex values. */
+function quotients({ re, im }, below) {
+  const found = zeros(re.length);
+  for (let m = 0; m < re.length; m++) {
+    [found.re[m], found.im[m]] = divided(re[m], im[m], below.re[m], below.im[m]);
   }
-  return { re, im, n };
+  return found;
 }
 
-/** Solve for the first n entries of a right side, into `to`. */
-function backSubstitute({ re, im, n }, from, to) {
-  for (let i = 0; i < n; i++) {
-    let a = from.re[i], b = from.im[i];
-    for (let k = 0, at = i * n; k < i; k++, at++) {
-      a -= re[at] * to.re[k] - im[at] * to.im[k];
-      b -= re[at] * to.im[k] + im[at] * to.re[k];
-    }
-    to.re[i] = a;
-    to.im[i] = b;
+/** Sum [re, im] of products of complex values, neither of them conjugated. */
+function product(a, b) {
+  let re = 0, im = 0;
+  for (let m = 0; m < a.re.length; m++) {
+    re += a.re[m] * b.re[m] - a.im[m] * b.im[m];
+    im += a.re[m] * b.im[m] + a.im[m] * b.re[m];
   }
-  for (let i = 0; i < n; i++) {
-    const pr = re[i * n + i], pi = im[i * n + i], size = pr * pr + pi * pi;
-    const a = to.re[i], b = to.im[i];
-    to.re[i] = (a * pr + b * pi) / size;
-    to.im[i] = (b * pr - a * pi) / size;
-  }
-  for (let i = n - 1; i >= 0; i--) {
-    for (let k = i + 1; k < n; k++) {
-      const lr = re[k * n + i], li = im[k * n + i];
-      to.re[i] -= lr * to.re[k] - li * to.im[k];
-      to.im[i] -= lr * to.im[k] + li * to.re[k];
-    }
+  return [re, im];
+}
+
+/** Add a complex factor times values to others. */
+function addTimes({ re, im }, [c, s], from) {
+  for (let m = 0; m < re.length; m++) {
+    re[m] += c * from.re[m] - s * from.im[m];
+    im[m] += c * from.im[m] + s * from.re[m];
   }
 }

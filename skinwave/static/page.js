@@ -232,8 +232,8 @@ function announce() {
 function showPane() {
   if (view.tab === "lines") $("lines").innerHTML = linesTable(answer, pinned);
   else if (view.tab === "dispersion") {
-    const plot = dispersionPlot(answer, view.highest);
-    plots.dispersion.draw(plot);
+    plots.dispersion.draw(dispersionPlot(answer, view.highest));
+    askDispersion(answer.body);
   } else if (view.tab === "level") {
     if (levels) plots.level.draw(levelPlot(answer, view.over, levels));
     $("best").disabled = !levels?.best || !answer.body.is_skin;
@@ -241,6 +241,16 @@ function showPane() {
     $("ab").innerHTML = pinned ? comparison(pinned, answer) : `<p class="note">Press Pin A to keep what is
       shown. Then change the body or a value to compare.</p>`;
   }
+}
+
+/** Ask for the curves of a changed body, once. */
+async function askDispersion(body) {
+  if (!body.made || body.isAsked) return;
+  body.isAsked = true;
+  try {
+    Object.assign(body, await request(data.api, "dispersion", body.toml));
+    ask();
+  } catch (error) { say(error.message); }
 }
 
 const keyOfLevels = () => JSON.stringify({ ...values, [view.over]: 0, over: view.over,
