@@ -92,7 +92,7 @@ def in_one_process(monkeypatch):
     monkeypatch.setattr("skinwave.studies.study.pool", here)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def browser():
     """A browser, as Playwright has it."""
     with chromium() as found:

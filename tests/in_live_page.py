@@ -10,11 +10,11 @@ from skinwave.scene.file import loads
 from skinwave.scene.scene import BODIES
 
 USED = {
-    "files": "adaptics linesCsv pyautd3 readMeasurement sceneToml waveformCsv waveformWav",
-    "kernel": "respond", "load": "loadLines spot", "numbers": "amplitudesOf delayOf levelOf "
-    "levelOver lineNames mapOf meanLevel phaseDelay pressureThresholdAt reach shareOutside "
-    "spectrum thresholdAt unresolvedNames",
-    "values": "STARTS check fromAddress loadOf toAddress",
+    "bodies": "openBody", "contours": "contours", "maps": "drawMap mapControls",
+    "files": "linesCsv readMeasurement sceneToml waveformCsv waveformWav", "kernel": "respond",
+    "load": "loadLines spot", "numbers": "MAP_LINE amplitudesOf levelOf levelOver mapOf meanLevel "
+    "namesOf phaseDelay pressureThresholdAt reach shareOutside spectrum thresholdAt",
+    "values": "STARTS check fromAddress loadOf toAddress", "view3d": "openView",
 }  # fmt: skip
 MODULE = (
     "".join(
@@ -26,19 +26,24 @@ MODULE = (
 };
 """
     + f"Object.assign(window, {{ attempt, {', '.join(' '.join(USED.values()).split())} }});\n"
-    + "window.kernel = { respond };\n"
 )
+PAGE = """<!doctype html><meta charset=utf-8><body style="color: #000; margin: 0">
+<style>.stage { position: relative; height: 380px } .stage > * { position: absolute; width: 500px;
+  height: 380px }</style>
+<svg id=map style="width: 400px; height: 420px"></svg><div id=view></div><script type=module>"""
 BARE = toml_of(BODIES["none"])
 SHAPES = ("point", "line", "circle", "triangle", "square")
 
 
 def modules(browser, folder):
-    """A page whose window has the functions of modules, and `attempt` for what they refuse."""
+    """A page with a map and a view, whose window has the functions of modules, and `attempt` for
+    what they refuse.
+    """
     shutil.copytree(str(resources.files("skinwave") / "static"), folder)
     (folder / "entry.js").write_text(MODULE, encoding="utf-8")
-    text = f"<!doctype html><meta charset=utf-8><script type=module>{bundle(folder, 'entry.js')}"
-    (folder / "page.html").write_text(f"{text}</script>", encoding="utf-8")
-    page = browser.new_page()
+    text = f"{PAGE}{bundle(folder, 'entry.js')}</script>"
+    (folder / "page.html").write_text(text, encoding="utf-8")
+    page = browser.new_page(viewport={"width": 900, "height": 900}, reduced_motion="reduce")
     page.goto((folder / "page.html").as_uri())
     page.wait_for_function("() => window.STARTS")
     return page

@@ -1,4 +1,4 @@
-"""The data of a page: records of its bodies, values to begin with, presets, examples, self-test."""
+"""The data of a page: records of its bodies, values to begin with, presets, self-test."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -52,7 +52,7 @@ def data_of(
             tests += selftest(body, name, -(-20 // len(names)), lowest, error)
     return {
         "bodies": records, "start": own[0] if own else {"body": records[0]["name"]},
-        "presets": _own_presets(scenes, own) + values.presets(), "examples": values.EXAMPLES,
+        "presets": _own_presets(scenes, own) + values.presets(),
         "selftest": tests, "api": None,
     }  # fmt: skip
 
@@ -88,7 +88,7 @@ def _own_presets(scenes: Sequence[Scene], own: Sequence[values.Values]) -> list[
         if scene.name not in dict(tactons()) and tacton not in found.values():
             title = f"{scene.name} ({len(found) + 1})" if scene.name in found else scene.name
             found[title] = tacton
-    return [{"name": title, "title": title, "values": each} for title, each in found.items()]
+    return [{"title": title, "values": each} for title, each in found.items()]
 
 
 def read_scene(path: Path) -> Scene:

@@ -69,14 +69,8 @@ class Editable:
 def record_of(
     body: Body, pack: Mapping[str, Any], name: str = "", title: str = "", *, waves: bool = True
 ) -> dict[str, Any]:
-    """Return the record of a body for the page, a dict for JSON.
-
-    Parameters
-    ----------
-    body : Body
-    pack : from which the page computes its motion
-    name, title : by default the body's own
-    waves : whether to compute dispersion curves
+    """Return the record of a body for the page, a dict for JSON: its pack, from which the page
+    computes motion; name and title, by default its own; `waves`, its dispersion curves, if asked.
     """
     kind = body.of_kind
     infinite = is_laterally_infinite(body) and has_exact_waves(body)
@@ -108,12 +102,8 @@ def toml_of(body: Body) -> str:
 
 
 def body_of(toml: str) -> Body:
-    """Return the body of a text that `toml_of` or a scene file holds.
-
-    Raises
-    ------
-    ValueError
-        If it is not TOML or describes no body.
+    """Return the body of a text that `toml_of` or a scene file holds; a ValueError if there is
+    none.
     """
     table = parsed(toml)
     if "body" not in table:
@@ -123,12 +113,8 @@ def body_of(toml: str) -> Body:
 
 
 def changed(body: Body, changes: Mapping[str, Any]) -> Body:
-    """Return a body with other values by key of its `editables`.
-
-    Raises
-    ------
-    ValueError
-        If a key is unknown or a value is out of range.
+    """Return a body with other values by key of its `editables`; a ValueError if a key is unknown
+    or a value out of range.
     """
     for key, value in changes.items():
         own = {each.key: each for each in editables(body)}
@@ -173,7 +159,7 @@ def _of_layer(body: Body, number: int) -> list[Editable]:
     given = body.material if last else body.layers[number].material
     above = sum(layer.thickness for layer in body.layers)
     own = body.depth - above if last else body.layers[number].thickness
-    solid = solid_of(given)
+    solid, prefix = solid_of(given), f"layers.{number}." if body.layers else ""
     modulus, words, unit, per = (
         (solid.young, "Young's modulus", "GPa", 1e9)
         if plate
@@ -192,35 +178,30 @@ def _of_layer(body: Body, number: int) -> list[Editable]:
             raise ValueError(f"A modulus of {value:g} {unit} is out of range. Give one above 0.")
         return with_layer(own, solid.scaled(modulus=value * per / modulus))
 
-    def label(words: str) -> str:
-        name = given if isinstance(given, str) else f"layer {number + 1}"
-        return f"{name.capitalize()}: {words[:1].lower()}{words[1:]}" if body.layers else words
+    def editable(key: str, label: str, value: float, **more: Any) -> Editable:
+        if body.layers:
+            name = given if isinstance(given, str) else f"layer {number + 1}"
+            label = f"{name.capitalize()}: {label[:1].lower()}{label[1:]}"
+        return Editable(key=f"{prefix}{key}", label=label, value=_shown(value), **more)
 
-    prefix = f"layers.{number}." if body.layers else ""
-    thickness = Editable(
-        key=f"{prefix}thickness", label=label("Thickness"), unit="mm", value=_shown(1e3 * own),
+    thickness = editable(
+        "thickness", "Thickness", 1e3 * own, unit="mm",
         range=RANGES["sheet_thickness" if plate else "thickness"],
         change=lambda value: with_layer(value / 1e3, given),
     )  # fmt: skip
-    found = [thickness] if body.of_kind.is_bounded and isfinite(own) else []
     return [
-        *found,
-        Editable(
-            key=f"{prefix}modulus", label=label(words), unit=unit, value=_shown(modulus / per),
-            range=RANGES["young" if plate else "modulus"], change=with_modulus,
-        ),
-        Editable(
-            key=f"{prefix}loss", label=f"{label('Loss factor')} at {LOSS_AT:g} Hz",
-            value=_shown(_loss_factor(solid)), range=RANGES["loss"],
-            change=lambda value: with_layer(own, solid.scaled(loss=_loss_scale(solid, value))),
-        ),
+        *([thickness] if body.of_kind.is_bounded and isfinite(own) else []),
+        editable("modulus", words, modulus / per, unit=unit,
+                 range=RANGES["young" if plate else "modulus"], change=with_modulus),
+        editable("loss", f"Loss factor at {LOSS_AT:g} Hz", _loss_factor(solid),
+                 range=RANGES["loss"], change=lambda value: with_layer(
+                     own, solid.scaled(loss=_loss_scale(solid, value)))),
     ]  # fmt: skip
 
 
 def _of_mounting(body: Body, name: str, label: str) -> Editable:
-    value = getattr(body.mounting, name)
     return Editable(
-        key=name, label=label, value=value, range=RANGES["tension"],
+        key=name, label=label, value=getattr(body.mounting, name), range=RANGES["tension"],
         unit="" if name == "support" else "N/m", choices=SUPPORTS if name == "support" else (),
         change=lambda new: replace(body, mounting=replace(body.mounting, **{name: new})),
     )  # fmt: skip
@@ -239,13 +220,7 @@ def _loss_factor(solid: Material) -> float:
 
 
 def _loss_scale(solid: Material, loss: float) -> float:
-    """Factor of all losses of a material that gives a loss factor.
-
-    Raises
-    ------
-    ValueError
-        If there is none.
-    """
+    """Factor of all losses of a material that gives a loss factor; a ValueError if none does."""
     from scipy.optimize import brentq  # which takes long to import
 
     def off(factor: float) -> float:
@@ -269,14 +244,12 @@ def dispersion_of(body: Body) -> dict[str, Any] | None:
         curves = dispersion(body, FREQUENCIES, MODES)
     except (ValueError, ArithmeticError):
         return None
-    branches: list[dict[str, Any]] = []
-    for mode in curves.modes:
-        speeds = [
-            _shown(speed) if wave and isfinite(speed) else None
-            for speed, wave in zip(mode.phase_speed.tolist(), mode.is_wave.tolist(), strict=True)
-        ]
-        if any(speed is not None for speed in speeds):
-            branches.append({"name": f"mode {len(branches) + 1}", "c": speeds})
+    speeds = [np.where(mode.is_wave, mode.phase_speed, np.nan).tolist() for mode in curves.modes]
+    shown = [[_shown(c) if isfinite(c) else None for c in each] for each in speeds]
+    branches = [
+        {"name": f"mode {k}", "c": each}
+        for k, each in enumerate((x for x in shown if any(x)), start=1)
+    ]
     return {"f": curves.frequencies.tolist(), "branches": branches} if branches else None
 
 

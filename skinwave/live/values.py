@@ -22,30 +22,25 @@ CLOSE = 1e-8  # m, and share of a period: a recording as close is that of named 
 PLAIN = {"am2": 0, "ratio": "1:0", "envelope": 0, "foci": 1, "pulses": "", "phases": "",
          "paths": "", "polyline": "", "ramp": 0}  # fmt: skip
 
-EXAMPLES = [
-    {"title": title, "sentence": sentence, "tab": tab, "values": PLAIN | changes}
-    for title, sentence, tab, changes in (
-        ("Motion beyond the path", "AM at 200 Hz on a point: the kernel ends at the focus, waves "
-         "carry it on.", "maps", {"shape": "point", "size": 0, "am": 200, "x": 15, "y": 0}),
-        ("Faster than its waves", "A focus that outruns the surface waves of soft skin drags a "
-         "wake behind it.", "3d", {"shape": "circle", "am": 0, "size": 40, "speed": 9, "x": 20,
-                                   "y": 0}),
-        ("The best drawing speed", "On the skin slab waves reach their highest level at a lower "
-         "drawing speed than the kernel: near 12 instead of 16 m/s.", "level",
-         {"shape": "circle", "am": 0, "size": 20, "speed": 12, "x": 10, "y": 0}),
-        ("Two foci, two paths", "Each focus draws a circle of its own; their waves meet between "
-         "them.", "maps",
-         {"am": 140, "foci": 2, "paths": "circle/10/-20/0, circle/10/20/0", "drawn": 100}),
-    )
-]  # fmt: skip
+EXAMPLES = {
+    "Motion beyond the path": {"shape": "point", "size": 0, "am": 200, "x": 15, "y": 0},
+    "Faster than its waves": {
+        "shape": "circle", "am": 0, "size": 40, "speed": 9, "x": 20, "y": 0,
+    },
+    "The best drawing speed": {
+        "shape": "circle", "am": 0, "size": 20, "speed": 12, "x": 10, "y": 0,
+    },
+    "Two foci, two paths": {
+        "am": 140, "foci": 2, "paths": "circle/10/-20/0, circle/10/20/0", "drawn": 100,
+    },
+}  # fmt: skip
 
 
 def presets() -> list[dict[str, Any]]:
-    """Return the paper's 15 Tactons: name, title and the values that each sets."""
-    return [
-        {"name": name, "title": title_of(tacton), "values": _tacton_values(tacton)}
-        for name, tacton in tactons()
-    ]
+    """Return the paper's 15 Tactons and some examples: title and the values that each sets."""
+    paper = {title_of(tacton): _tacton_values(tacton) for _, tacton in tactons()}
+    examples = {title: PLAIN | values for title, values in EXAMPLES.items()}
+    return [{"title": title, "values": own} for title, own in (paper | examples).items()]
 
 
 def title_of(tacton: Tacton) -> str:

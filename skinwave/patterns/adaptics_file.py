@@ -319,7 +319,7 @@ def _get(table: Mapping[str, Any], key: str, kind: type, default: Any = None) ->
 
 def _of(value: Any, what: str, kind: type = dict) -> Any:
     if not isinstance(value, kind):
-        word = {dict: "an object", list: "a list"}[kind]
+        word = "an object" if kind is dict else "a list"
         raise ValueError(f"{what} = {json.dumps(value)[:40]} must be {word}")
     return value
 

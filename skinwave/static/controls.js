@@ -1,7 +1,6 @@
-// The controls of the page: rows of a slider and a field, choices, rhythm, foci, body and files.
+// The controls of the page: rows of a slider and a field, choices, texts and values of the body.
 
-import { rhythmPeriod } from "./load.js";
-import { CHOICES, LABELS, NUMBERS, check, pulsesOf } from "./values.js";
+import { CHOICES, LABELS, NUMBERS, check } from "./values.js";
 import { escaped } from "./text.js";
 
 const WORDS = {
@@ -10,9 +9,7 @@ const WORDS = {
   gaussian: "Gaussian, as the array's", main_lobe: "main lobe, as published",
   simultaneous: "all at once", time_multiplexed: "in turn",
 };
-const NAMED = ["point", "line", "circle", "triangle", "square"]; // shapes of a focus's own path
 const RESTING = 120; // ms that a slider of the body rests before the body is asked for
-const STRIP = 124; // px of a period of the rhythm, of which two are drawn
 
 const options = (values, words, chosen) => values.map((value) => `<option value="${escaped(value)}"${
   value === chosen ? " selected" : ""}>${escaped(words(value))}</option>`).join("");
@@ -79,12 +76,10 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
     }
   });
   host.addEventListener("change", ({ target }) => {
-    const { key, field, body, own } = target.dataset;
+    const { key, field, body } = target.dataset;
     if (key) { moving(false); take(key, target.value, true); }
     else if (field) take(field, target.value, true);
     else if (body) { clearTimeout(resting); edit(body, target.value); }
-    else if (own) takePaths();
-    else if (target.name === "own") change("paths", target.value ? startPaths() : "", true);
     else if (target.id === "published") published(target.checked);
   });
   host.addEventListener("pointerup", ({ target }) => target.type === "range" && moving(false));
@@ -103,64 +98,6 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
     event.target.value = fieldText(key, next);
     take(key, String(next), true);
   });
-  host.addEventListener("click", ({ target }) => {
-    const pulses = values.pulses?.split(",").filter(Boolean) ?? [];
-    if (target.id === "pulse-add") take("pulses", [...pulses, "100/100"].join(","), true);
-    else if (target.id === "pulse-remove") take("pulses", pulses.slice(0, -1).join(","), true);
-  });
-
-  const startPaths = () => {
-    const size = values.shape === "point" ? 0 : Math.min(values.size, 30);
-    const shape = values.shape === "polyline" ? "circle" : values.shape;
-    return values.foci > 1 ? `${shape}/${size}/-20/0, ${shape}/${size}/20/0` : `${shape}/${size}/0/0`;
-  };
-  const takePaths = () => {
-    const texts = all("#own-paths tbody tr").map((row) => [...row.querySelectorAll("select, input")]
-      .map((input) => input.value.trim()).join("/"));
-    take("paths", texts.join(", "), true);
-  };
-
-  function showPaths(text) {
-    const body = host.querySelector("#own-paths tbody");
-    if (body.dataset.text === text) return;
-    body.dataset.text = text;
-    const field = (name, value, k) => `<td><input data-own="1" inputmode="decimal" value="${escaped(value)}"
-      aria-label="${name} of path ${k + 1}, mm"></td>`;
-    body.innerHTML = text.split(",").map((part, k) => {
-      const [shape, size, x, y] = part.trim().split("/");
-      return `<tr><th scope="row">${k + 1}</th><td><select data-own="1" aria-label="Shape of path ${k + 1}">${
-        options(NAMED, (name) => name, shape)}</select></td>${field("Size", size, k)}${field("x", x, k)}${
-        field("y", y, k)}</tr>`;
-    }).join("");
-  }
-
-  /** The pulses over two periods of the rhythm. */
-  function showRhythm() {
-    const strip = $("strip");
-    let pulses = [];
-    try { pulses = pulsesOf(values.pulses); } catch { /* what is typed is marked at the field */ }
-    const period = rhythmPeriod({ pulses });
-    strip.setAttribute("aria-label", period ? `Pulses, repeated every ${Math.round(1e3 * period)} ms`
-      : "No pulses: always on");
-    const said = (text) => `<text x="${STRIP}" y="38" text-anchor="middle">${text}</text>`;
-    if (!period) {
-      strip.innerHTML = `<rect class="block" x="0" y="4" width="${2 * STRIP}"
-        height="22"/>${said("always on")}`;
-      return;
-    }
-    const scale = STRIP / period, parts = [];
-    for (let start = 0, turn = 0; turn < 2; turn++) {
-      for (const [on, gap] of pulses) {
-        const r = scale * Math.min(values.ramp / 1e3, on / 2), a = scale * start, b = scale * (start + on);
-        parts.push(`<polygon class="block${turn ? " again" : ""}" points="${a},26 ${a
-          + r},4 ${b - r},4 ${b},26"/>`);
-        start += on + gap;
-      }
-    }
-    strip.innerHTML = `${parts.join("")}<path class="axis" d="M0,26H${2 * STRIP}M${STRIP},2V30"/>${
-      said(`${Math.round(1e3 * period)} ms, repeated`)}`;
-  }
-
   const fieldText = (key, value) => (key in NUMBERS ? String(Number(Number(value).toPrecision(6))) : value);
 
   return {
@@ -184,11 +121,7 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
       toggle("polyline", values.shape !== "polyline");
       toggle("ramp", !values.pulses);
       toggle("ratio", !values.am2 || !values.am);
-      for (const input of all('[name="own"]')) input.checked = input.value === (values.paths ? "own" : "");
-      $("one-path").hidden = Boolean(values.paths);
-      $("own-paths").hidden = !values.paths;
-      if (values.paths) showPaths(values.paths);
-      showRhythm();
+      toggle("drawn", !values.paths);
       $("drawing").textContent = drawn ? `${drawn.toFixed(1)} Hz` : "does not move";
       const at = ["x", "y"].map((axis) => fieldText(axis, values[axis]));
       const digest = {

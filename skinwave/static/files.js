@@ -100,7 +100,8 @@ export const WRITERS = [
 
 const TIMES = { s: 1, ms: 1e-3, us: 1e-6 }, FREQUENCIES = { Hz: 1, kHz: 1e3 };
 const METRES = { m: 1, cm: 1e-2, mm: 1e-3, um: 1e-6, nm: 1e-9 };
-const MOTION = /^(c?m|mm|um|nm)(|\/s|\/s2)$/, KINDS = { "": "displacement", "/s": "velocity", "/s2": "acceleration" };
+const MOTION = /^(c?m|mm|um|nm)(|\/s|\/s2)$/;
+const KINDS = { "": "displacement", "/s": "velocity", "/s2": "acceleration" };
 const OTHERS = "skinwave web and skinwave compare read other formats.";
 const UNEVEN = 0.25; // of a sampling interval, from where times are not equally spaced
 

@@ -1,7 +1,7 @@
 // Numbers of an answer: thresholds, levels, maps, reach, share, delay, and names of lines.
 
 import { fourier, largestOf } from "./numeric.js";
-import { drawingFrequency, jumps, levelFactor, loadLines, outline, positionOf, rhythmLevel,
+import { drawingFrequency, jumps, levelFactor, loadLines, pathSamples, positionOf, rhythmLevel,
   rhythmPeriod } from "./load.js";
 
 const TAU = 2 * Math.PI;
@@ -107,27 +107,11 @@ export function shareOutside(kernelRms, rms) {
   return outside / all;
 }
 
-/** Distance in metre from the path of a load, as a function of x and y in metre. */
+/** Distance in metre from the samples of the path of a load, as a function of x and y in metre. */
 function distanceFromPath(load) {
-  const { path } = load, moves = drawingFrequency(path) > 0;
-  const pieces = [];
-  for (const own of path.paths || [path]) {
-    const [cx, cy] = own.centre || [0, 0];
-    if (own.shape === "point" || !moves || (own.shape !== "polyline" && !own.size)) {
-      const at = positionOf(own), places = moves ? [0] : load.foci;
-      for (const phase of places) pieces.push({ ends: [at(phase % 1), at(phase % 1)] });
-    } else if (own.shape === "circle") pieces.push({ circle: [cx, cy, own.size / 2] });
-    else {
-      const corners = outline(own).corners.map(([x, y]) => [x + cx, y + cy]);
-      corners.slice(1).forEach((end, k) => pieces.push({ ends: [corners[k], end] }));
-    }
-  }
-  return (x, y) => Math.min(...pieces.map(({ circle, ends }) => {
-    if (circle) return Math.abs(Math.hypot(x - circle[0], y - circle[1]) - circle[2]);
-    const [[ax, ay], [bx, by]] = ends, dx = bx - ax, dy = by - ay, squared = dx * dx + dy * dy;
-    const part = squared ? Math.min(Math.max(((x - ax) * dx + (y - ay) * dy) / squared, 0), 1) : 0;
-    return Math.hypot(x - ax - part * dx, y - ay - part * dy);
-  }));
+  const { x: xs, y: ys } = pathSamples(load);
+  return (x, y) => Math.sqrt(xs.reduce((least, own, q) => Math.min(least, (x - own) ** 2 + (y - ys[q]) ** 2),
+    Infinity));
 }
 
 /**
@@ -218,11 +202,13 @@ export function namesOf(load) {
   const { f, parts } = loadLines(load, { threshold: 1e-4, most: 1000 });
   const least = FAINT * Math.max(...parts.flat().map(({ strength }) => strength));
   const isNamed = ({ n, strength }) => strength > least && (symbols[0] ? n % paths === 0 : n === 0);
-  const effortOf = (orders) => orders.reduce((sum, n) => sum + Math.abs(n) + (n ? 0.01 : 0), orders[0] ? 0.1 : 0);
+  const effortOf = (orders) => orders.reduce((sum, n) => sum + Math.abs(n) + (n ? 0.01 : 0),
+    orders[0] ? 0.1 : 0);
   const names = parts.map((own) => {
     const known = own.filter(isNamed).map(({ n, orders, strength }) => (
       { orders: [n / paths, ...orders], effort: effortOf([n / paths, ...orders]), strength }));
-    known.sort((a, b) => (Math.abs(a.effort - b.effort) > 1e-9 ? a.effort - b.effort : b.strength - a.strength));
+    const isEven = (a, b) => Math.abs(a.effort - b.effort) < 1e-9;
+    known.sort((a, b) => (isEven(a, b) ? b.strength - a.strength : a.effort - b.effort));
     return known.length ? nameOf(known[0].orders, symbols) : "";
   });
   return (at) => names[f.findIndex((own) => Math.abs(own - at) < 1e-6)] ?? "";

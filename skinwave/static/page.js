@@ -32,7 +32,7 @@ const QUIET = 300; // ms without a move, after which slow results are computed
 
 const opened = new Map(); // bodies by name
 const starts = { ...STARTS, ...data.start };
-const view = { look: "maps", tab: "lines", span: "automatic", decibel: false, highest: 600, over: "speed",
+const view = { look: "maps", tab: "lines", span: "automatic", highest: 600, over: "speed",
   mapDecibel: 0, published: false };
 const errors = new Map(); // what is typed wrong, by control
 const scale = keptScales();
@@ -121,7 +121,6 @@ function mapsBefore() {
 
 function showCurves() {
   frameDue = 0;
-  const began = performance.now();
   try {
     answer = { ...mapsBefore(), ...respond(values) };
     errors.delete("load");
@@ -135,7 +134,7 @@ function showCurves() {
   }
   const { load } = answer, span = spanOf(view.span, load);
   const fit = (name, largest) => scale(name, largest, moving);
-  const given = { pinned, measured, scale: fit, highest: view.highest, decibel: view.decibel };
+  const given = { pinned, measured, scale: fit, highest: view.highest };
   plots.commanded.draw(commandedPlot(answer, span));
   plots.waveform.draw(waveformPlot(answer, span, given));
   plots.spectrum.draw(spectrumPlot(answer, given));
@@ -144,8 +143,6 @@ function showCurves() {
   showTiles();
   showPane();
   showSlot();
-  performance.clearMeasures("curves");
-  performance.measure("curves", { start: began });
   mapsDue ||= requestAnimationFrame(showMaps);
   clearTimeout(slowDue);
   levels = levels?.of === keyOfLevels() ? levels : null;
@@ -452,26 +449,16 @@ function restore(found) {
 }
 
 function fillMenus() {
-  const item = (title, detail, k, kind) => `<button type="button" data-${kind}="${k}">${escaped(title)}${
-    detail ? `<small>${escaped(detail)}</small>` : ""}</button>`;
-  $("presets").innerHTML = data.presets.map(({ title }, k) => item(title, "", k, "preset")).join("");
-  const examples = data.examples.map(({ title, sentence }, k) => item(title, sentence, k, "example"));
-  $("examples").innerHTML = examples.join("");
-  const take = (own) => set({ ...values, ...Object.fromEntries(Object.entries(own)
-    .filter(([key]) => key in STARTS).map(([key, value]) => [key, check(key, value)])) });
+  $("presets").innerHTML = data.presets.map(({ title }, k) => (
+    `<button type="button" data-preset="${k}">${escaped(title)}</button>`)).join("");
   document.addEventListener("click", ({ target }) => {
-    const button = target.closest("[data-preset], [data-example], [data-save]");
-    if (!button) return;
-    const { preset, example } = button.dataset;
-    button.closest("[popover]").hidePopover();
-    if (preset) { take(data.presets[preset].values); say(data.presets[preset].title); }
-    if (example) {
-      const { values: own, sentence, tab: shown } = data.examples[example];
-      take(own);
-      look(["maps", "3d", "difference"].includes(shown) ? shown : "maps");
-      if (["lines", "dispersion", "level"].includes(shown)) tab(shown);
-      say(sentence);
-    }
+    const button = target.closest("[data-preset], [data-save]");
+    button?.closest("[popover]").hidePopover();
+    const preset = data.presets[button?.dataset.preset];
+    if (!preset) return;
+    set({ ...values, ...Object.fromEntries(Object.entries(preset.values)
+      .filter(([key]) => key in STARTS).map(([key, value]) => [key, check(key, value)])) });
+    say(preset.title);
   });
 }
 
@@ -495,7 +482,6 @@ function listen() {
     showClock();
   });
   on("span", "change", () => { view.span = $("span").value; ask(); });
-  on("decibel", "change", () => { view.decibel = $("decibel").checked; ask(); });
   on("highest", "change", () => { view.highest = Number($("highest").value); ask(); });
   on("map-decibel", "change", () => { view.mapDecibel = Number($("map-decibel").value); drawMaps(); });
   on("over", "change", () => { view.over = $("over").value; ask(); });

@@ -71,8 +71,9 @@ function thinned(xs, ys, toX, width) {
 /**
  * A plot inside an element.
  *
- * `draw(spec)` takes { x: {label, range}, y: {label, range, role}, y2, curves, names, hatched, label }. A curve has {role, axis: "y"|"y2", x, y, name, width, dash, fill, stems, offset};
- * names are [{x, y, axis, text, above}], the most important first.
+ * `draw(spec)` takes { x: {label, range}, y: {label, range, role}, y2, curves, names, hatched, label }. A
+ * curve has {role, axis: "y"|"y2", x, y, name, width, dash, fill, stems, offset}; names are [{x, y, axis,
+ * text, above}], the most important first.
  */
 export function createPlot(host, { announce }) {
   const svg = document.createElementNS(NS, "svg");
@@ -161,7 +162,7 @@ export function createPlot(host, { announce }) {
   }
 
   function stems(curve) {
-    const low = spec[curve.axis].range[0], base = toY(curve.decibel ? low : Math.max(0, low), curve.axis);
+    const low = spec[curve.axis].range[0], base = toY(Math.max(0, low), curve.axis);
     let d = "", heads = "";
     for (let k = 0; k < curve.x.length; k++) {
       const x = toX(curve.x[k]) + (curve.offset ?? 0), y = toY(curve.y[k], curve.axis);

@@ -11,7 +11,7 @@ import { NUMBERS } from "./values.js";
 export const OVER = { speed: [0.5, 40], size: [2, 60], am: [10, 400], height: [100, 400] };
 const SAMPLES = 700, FINEST = 2.5e-4; // points of a curve at least; s between them at most
 const DENSE = 12, MOST = 6000; // points in a period of the fastest tone, and in all, of the signal
-const DYNAMIC = 60; // dB that a spectrum shows
+const DYNAMIC = 60; // dB that levels over a control show
 const APART = 3.5; // px between stems of the same line
 const NAMED = 7, NAMELESS = 0.02; // lines that have a name; of the tallest, below which they have none
 const FAR_APART = 10; // times that A and B differ, from where A is drawn by a factor
@@ -131,7 +131,7 @@ function measuredSpectrum(measured, answer, per, highest) {
 }
 
 /** Plot of the spectra as stems side by side, with the pauses of a rhythm, and the threshold of skin. */
-export function spectrumPlot(answer, { pinned, measured, highest, decibel, scale }) {
+export function spectrumPlot(answer, { pinned, measured, highest, scale }) {
   const { kernel, published, waves, body, values: { quantity: name } } = answer, { unit, per, rate } =
     QUANTITIES[name];
   const mean = meanLevel(answer.load);
@@ -150,7 +150,7 @@ export function spectrumPlot(answer, { pinned, measured, highest, decibel, scale
   }
   if (pinned) {
     const moves = meanLevel(pinned.load), amplitudes = inQuantity(pinned.waves.f, pinned.wavesAt, name);
-    const factor = decibel ? 1 : factorOf(moves * largestOf(amplitudes), largestOf(own.y));
+    const factor = factorOf(moves * largestOf(amplitudes), largestOf(own.y));
     curves.push(stems("pinned", "y2", nameOfA(factor), pinned.waves.f, amplitudes, 0, factor * moves));
   }
   const axes = { y: { label: "Pa", role: "kernel" }, y2: { label: unit, role: "waves" } };
@@ -172,26 +172,11 @@ export function spectrumPlot(answer, { pinned, measured, highest, decibel, scale
     above: { y: beside(f), axis: "y" } }));
   const least = NAMELESS * largestOf(own.y);
   const named = names.filter(({ text, y }) => text && y > least).sort((a, b) => b.y - a.y).slice(0, NAMED);
-  if (decibel) toDecibel(axes, curves, named);
   return {
     label: "Spectrum at the point: lines of the kernel in Pa and of the waves, side by side",
     x: { label: "frequency, Hz", range: [0, highest] }, ...axes, curves, names: named,
     hatched: answer.invalid,
   };
-}
-
-/** Change axes, curves and names of a plot from units to dB re these units. */
-function toDecibel(axes, curves, names) {
-  for (const [name, axis] of Object.entries(axes)) {
-    const top = 10 * Math.ceil(2 * Math.log10(axis.range[1]) + 0.2), low = top - DYNAMIC;
-    const level = (v) => Math.max(20 * Math.log10(Math.max(Math.abs(v), 1e-30)), low);
-    Object.assign(axis, { label: `dB re 1 ${axis.label}`, range: [low, top] });
-    for (const curve of curves.filter((own) => own.axis === name)) {
-      Object.assign(curve, { y: curve.y.map(level), decibel: true });
-    }
-    for (const each of names.flatMap((own) => [own, own.above])) if (each.axis === name) each.y =
-      level(each.y);
-  }
 }
 
 /** Plot of the phase speeds of a body's waves with the lines of the load. */

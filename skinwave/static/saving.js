@@ -82,7 +82,8 @@ export function offerSaves(menu, { answer, say, writers }) {
     ["Maps and plots, PNG", "skinwave.png", "image/png", () => pngOf(figure())],
     ...writers,
   ];
-  menu.innerHTML = items.map(([title], k) => `<button type="button" data-save="${k}">${title}</button>`).join("");
+  menu.innerHTML = items.map(([title], k) => (
+    `<button type="button" data-save="${k}">${title}</button>`)).join("");
   menu.addEventListener("click", async ({ target }) => {
     const item = items[target.dataset.save];
     if (!item) return;

@@ -8,7 +8,8 @@ const LARGEST_FILE = 20e6; // the most that the server takes of a file
  */
 export async function request({ base, token }, name, body, { signal, fileName = "" } = {}) {
   const headers = { "X-Token": token, "X-Name": encodeURIComponent(fileName) };
-  const answer = await fetch(`${base}api/${name}`, { method: "POST", body, signal, headers }).catch((error) => {
+  const given = { method: "POST", body, signal, headers };
+  const answer = await fetch(`${base}api/${name}`, given).catch((error) => {
     throw error.name === "AbortError" ? error
       : new Error("The server does not answer. Start skinwave web again and open its new address.");
   });

@@ -51,12 +51,9 @@ export const LABELS = {
   pulses: "Rhythm, ms", phases: "Phases, %", paths: "Paths of the foci", polyline: "Points of the path, mm",
 };
 
-const MOST_PULSES = 64;
-const MOST_POINTS = 400;
 const AREA = 50; // mm: half the side of the area that paths stay within
 const LARGEST = 60; // mm, the size of a palm
 const FASTEST = 20000; // Hz, half the carrier
-const MAX_FOCI = NUMBERS.foci.high;
 // mm: where paths of further foci are placed
 const CENTRES = [[-20, 0], [20, 0], [0, 20], [0, -20], [-20, 20], [20, -20], [20, 20], [-20, -20]];
 const ROOT3 = Math.sqrt(3);
@@ -71,83 +68,49 @@ const toNumber = (text) => (/^[^\s]+$/.test(text.trim()) ? Number(text) : NaN);
 const inUnit = (value, unit) => (unit ? `${value} ${unit}` : `${value}`);
 const short = (text) => (text.length > 40 ? `${text.slice(0, 37)}...` : text);
 
-/** Pairs of numbers [[a, b]] of a text such as "100/50, 40/110"; `what` and `like` describe one. */
-function pairsOf(text, most, what, like) {
-  const found = parts(text).map((part) => {
-    const pair = part.split("/").map(toNumber);
-    if (pair.length === 2 && pair.every(Number.isFinite)) return pair;
-    throw new Error(`"${short(part)}" is not a ${what}. Give ${like}.`);
+/**
+ * Texts of rows, each of `count` numbers between slashes, after one of some `words`; at `most` so many.
+ * `like` says what one is.
+ */
+const TEXTS = {
+  pulses: { count: 2, most: 64, like: "on/off times in ms, on longer than 0, such as 100/50",
+    isValid: ([on, gap]) => on > 0 && gap >= 0 },
+  phases: { count: 1, most: NUMBERS.foci.high, like: "0 to below 100 %, such as 0, 25, 60",
+    isValid: ([phase]) => phase >= 0 && phase < 100 },
+  polyline: { count: 2, most: 400, like: `x/y in mm within ±${AREA} mm, such as 10/5`,
+    isValid: (at) => Math.max(...at.map(Math.abs)) <= AREA },
+  paths: { count: 3, words: SHAPES, most: NUMBERS.foci.high, like: "shape/size/x/y in mm, such as "
+    + `circle/20/-15/0, with a shape of ${SHAPES.join(", ")}, up to ${LARGEST} mm and within ±${AREA} mm`,
+  isValid: ([shape, size, ...at]) => size >= 0 && size <= LARGEST && extentOf(shape, size)
+    .every((extent, axis) => Math.abs(at[axis]) + extent <= AREA * (1 + 1e-9)) },
+};
+
+/** Rows [[...]] of the text of a control, in its units; [] if empty. Throws an Error for users. */
+function rowsOf(key, text) {
+  const { count, words, most, like, isValid } = TEXTS[key];
+  const rows = parts(text).map((part) => {
+    const cells = part.split("/"), word = words ? [cells.shift().trim()] : [];
+    const row = [...word, ...cells.map(toNumber)];
+    const isKnown = cells.length === count && row.slice(word.length).every(Number.isFinite);
+    if (isKnown && (!words || words.includes(row[0])) && isValid(row)) return row;
+    throw new Error(`${LABELS[key]}: "${short(part)}" is not understood. Give ${like}.`);
   });
-  if (found.length <= most) return found;
-  throw new Error(`${found.length} ${what}s exceed the limit of ${most}. Give fewer.`);
+  if (rows.length <= most) return rows;
+  throw new Error(`${LABELS[key]}: ${rows.length} exceed the limit of ${most}. Give fewer.`);
 }
 
 /** Pulses and gaps [[on, gap]] in s of a text such as "100/50, 40/110" in ms; [] if empty. */
-export function pulsesOf(text) {
-  return pairsOf(text, MOST_PULSES, "pulse", "on/off times in ms, such as 100/50").map(([on, gap]) => {
-    if (on > 0 && gap >= 0) return [on / 1e3, gap / 1e3];
-    throw new Error(`"${on}/${gap}": a pulse must last longer than 0 ms, and its gap 0 ms or longer.`);
-  });
-}
+export const pulsesOf = (text) => rowsOf("pulses", text).map((pulse) => pulse.map((ms) => ms / 1e3));
 
-/** Phases 0..1 of a text such as "0, 25, 60" in per cent of a drawing period; [] if empty. */
-function phasesOf(text) {
-  return parts(text).map((part) => {
-    const phase = toNumber(part);
-    if (!(phase >= 0 && phase < 100)) {
-      throw new Error(`"${short(part)}" is not a phase. Give 0 to below 100 %, such as 0, 25, 60.`);
-    }
-    return phase / 100;
-  });
-}
-
-/** Corners [[x, y]] in metre of a text such as "0/0, 10/0, 10/5" in mm; [] if empty. */
-function pointsOf(text) {
-  const found = pairsOf(text, MOST_POINTS, "point", "x/y in mm, such as 10/5").map(([x, y]) => {
-    if (Math.max(Math.abs(x), Math.abs(y)) <= AREA) return [x / 1e3, y / 1e3];
-    throw new Error(`The point ${x}/${y} lies outside the area of ±${AREA} mm. Move it inside.`);
-  });
-  if (found.length === 1) throw new Error("A path has one point. Give two points or more.");
-  return found;
-}
-
-/** How far in metre from its centre a named shape extends along each axis, as [x, y]. */
+/** How far from its centre a named shape extends along each axis, as [x, y], in the unit of its size. */
 function extentOf(shape, size) {
   return { point: [0, 0], line: [size / 2, 0], triangle: [size / 2, size / ROOT3] }[shape]
     || [size / 2, size / 2];
 }
 
-/**
- * Paths {shape, size, centre} in metre of a text such as "circle/20/-15/0, line/10/15/0": shape, size
- * and centre in mm of each focus; [] if empty.
- */
-function pathsOf(text) {
-  const found = parts(text).map((part, k) => {
-    const [shape, ...rest] = part.split("/").map((word) => word.trim());
-    const [size, x, y] = rest.map(toNumber), name = `Path ${k + 1}`;
-    if (rest.length !== 3 || ![size, x, y].every(Number.isFinite) || !SHAPES.includes(shape)) {
-      throw new Error(`${name}: "${short(part)}" is not a path. Give shape/size/x/y in mm, such as `
-        + `circle/20/-15/0, with a shape of ${SHAPES.join(", ")}.`);
-    }
-    if (size < 0 || size > LARGEST) {
-      throw new Error(`${name}: the size ${size} mm is outside 0 to ${LARGEST} mm.`);
-    }
-    const path = { shape, size: shape === "point" ? 0 : size / 1e3, centre: [x / 1e3, y / 1e3] };
-    const [ex, ey] = extentOf(shape, path.size);
-    const furthest = 1e3 * Math.max(Math.abs(path.centre[0]) + ex, Math.abs(path.centre[1]) + ey);
-    if (furthest > AREA * (1 + 1e-9)) {
-      throw new Error(`${name} reaches ${Number(furthest.toPrecision(3))} mm, outside the area of `
-        + `±${AREA} mm. Move or shrink it.`);
-    }
-    return path;
-  });
-  if (found.length > MAX_FOCI) {
-    throw new Error(`${found.length} paths exceed the limit of ${MAX_FOCI} foci. Give fewer.`);
-  }
-  return found;
-}
-
-const TEXTS = { pulses: pulsesOf, phases: phasesOf, paths: pathsOf, polyline: pointsOf };
+/** Paths {shape, size, centre} in metre, one for each focus, of a text; [] if empty. */
+const pathsOf = (text) => rowsOf("paths", text).map(([shape, size, x, y]) => (
+  { shape, size: shape === "point" ? 0 : size / 1e3, centre: [x / 1e3, y / 1e3] }));
 
 /**
  * Value of a control from what was typed or chosen. Throws an Error with one sentence for users if it
@@ -157,11 +120,7 @@ export function check(key, text) {
   if (!(key in STARTS)) throw new Error(`"${short(key)}" is not a control of this page.`);
   const given = String(text).trim(), label = LABELS[key];
   if (key in TEXTS) {
-    try {
-      TEXTS[key](given);
-    } catch (error) {
-      throw new Error(`${label}: ${error.message}`);
-    }
+    rowsOf(key, given);
     return given;
   }
   if (key in CHOICES) {
@@ -234,15 +193,15 @@ function pathAndFoci(values) {
     }
     return { path: { shape: "joined", paths: own, drawn: values.drawn }, foci: evenly(n) };
   }
-  const phases = phasesOf(values.phases), { shape, sweep } = values;
+  const phases = rowsOf("phases", values.phases).map(([phase]) => phase / 100), { shape, sweep } = values;
   if (phases.length && phases.length !== n) {
     throw new Error(`Phases: ${phases.length} for ${n} foci. Give one phase for each focus, or none.`);
   }
   const foci = phases.length ? phases : evenly(n);
   if (shape === "point") return { path: { shape, size: 0, speed: 0, sweep, centre: [0, 0] }, foci };
   if (shape === "polyline") {
-    const points = pointsOf(values.polyline);
-    if (!points.length) throw new Error("The path has no points. Give two or more, such as 0/0, 10/0.");
+    const points = rowsOf("polyline", values.polyline).map(([x, y]) => [x / 1e3, y / 1e3]);
+    if (points.length < 2) throw new Error("The path needs two points or more, such as 0/0, 10/0.");
     return { path: { shape, size: 0, speed: values.speed, sweep, points, centre: [0, 0] }, foci };
   }
   return { path: { shape, size: values.size / 1e3, speed: values.speed, sweep, centre: [0, 0] }, foci };

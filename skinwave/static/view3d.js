@@ -50,7 +50,7 @@ const NO_WEBGL = "This browser does not draw in three dimensions: WebGL 2 is off
   + "The map shows the same motion from above.";
 const PANEL = `<div class="view3d">
   <div class="stage"><canvas data-part="canvas" tabindex="0" role="application" aria-label="The body, moving.
-    Arrow keys turn it, plus and minus zoom, Home shows it as at first, the space bar plays and pauses."></canvas>
+    Arrow keys turn it, plus and minus zoom, Home shows it as at first, space plays and pauses."></canvas>
     <svg data-part="over" aria-hidden="true"></svg></div>
   <div class="colours" data-part="colours" aria-hidden="true"></div><div class="ends" data-part="ends"
     title="≥: rare larger values have the last colour"></div>

@@ -1,41 +1,20 @@
-"""Files of the live page, in a browser: tables, sound, patterns of devices and measurements."""
+"""Files of the live page, in a browser: tables, sound and measurements."""
 
-import re
-from ast import literal_eval
-from dataclasses import replace
 from io import BytesIO
 
 import numpy as np
 import pytest
 from in_browser import needs_browser
-from in_live_page import modules, scenes_of, some_values
 from scipy.io import wavfile
 
 from skinwave.measure.reading import read
-from skinwave.patterns import Options, adaptics, adaptics_out, autd3
 
 pytestmark = needs_browser
 
-PLACES = np.array([[0.0, 0.0], [0.01, -0.003], [-0.02, 0.015]])
-PARTS = re.compile(r"PLACES = (\[.*?\n\])\n|MODULATION = (\[.*?\])|SamplingConfig\((\d+)\)", re.S)
 ANSWER = """(own) => { const load = loadOf(own), x = own.x / 1e3, y = own.y / 1e3;
-  const motion = kernel.respond(load), at = motion.at(x, y);
+  const motion = respond(load), at = motion.at(x, y);
   return { values: own, load, x, y, body: { is_skin: true }, kernel: motion, kernelAt: at,
     waves: motion, wavesAt: at }; }"""
-
-
-@pytest.fixture(scope="module")
-def page(browser, tmp_path_factory):
-    """A page with the functions of the modules."""
-    found = modules(browser, tmp_path_factory.mktemp("live") / "static")
-    yield found
-    found.close()
-
-
-@pytest.fixture(scope="module")
-def starts(page):
-    """Values of the controls at the start."""
-    return page.evaluate("() => STARTS")
 
 
 def test_tables_and_sound_are_of_the_waveform_and_the_lines(page, starts, tmp_path):
@@ -90,52 +69,3 @@ def test_other_files_are_refused_with_where_to_go(page):
     read_all = "(texts) => texts.map((text) => attempt(() => readMeasurement(text, 'a.csv')))"
     for found in page.evaluate(read_all, REFUSED):
         assert "skinwave web" in found["refused"]
-
-
-def test_patterns_of_devices_mean_the_same_as_those_of_python(page, starts):
-    many = [own | {"duration": 0.05} for own in some_values(starts, 25, rhythm=True)]
-    plain = {"foci": 1, "phases": "", "paths": "", "pulses": "", "ratio": "1:0", "am2": 0,
-             "envelope": 0, "drive": "pressure_squared", "modulation": 100}  # fmt: skip
-    many += [own | plain for own in many]
-    found = page.evaluate(
-        """(many) => many.map((own) => { const load = loadOf(own); return [
-          attempt(() => adaptics(load)), attempt(() => pyautd3(load, own.sharing))]; })""",
-        many,
-    )
-    scenes = scenes_of(page, many)
-    drawn = [_same_adaptics(scene, own) for scene, (own, _) in zip(scenes, found, strict=True)]
-    played = [_same_script(scene, own) for scene, (_, own) in zip(scenes, found, strict=True)]
-    assert sum(drawn) >= 25
-    assert sum(played) >= 40
-
-
-def _same_adaptics(scene, own):
-    """Whether both write an .adaptics file, which then must mean the same."""
-    try:
-        wanted = adaptics.read(adaptics_out.write(scene, Options())[0], Options())
-    except ValueError:
-        assert "refused" in own
-        return False
-    given, t = adaptics.read(own["made"].encode(), Options()), np.linspace(0, 0.0499, 150)
-    one, other = (
-        replace(scene.pressure, tacton=each.tacton, **each.pressure)(PLACES, t)
-        for each in (given, wanted)
-    )
-    off = np.abs(one - other).max(axis=1) > 5e-3 * scene.pressure.peak_pressure
-    assert off.mean() < 0.01  # times of jumps
-    return True
-
-
-def _same_script(scene, own):
-    """Whether both write a script for AUTD3, which then must play the same."""
-    try:
-        theirs = autd3.write(scene, Options())[0].decode()
-    except ValueError:
-        assert "refused" in own
-        return False
-    compile(own["made"], "tacton.py", "exec")
-    for ours, other in zip(PARTS.findall(own["made"]), PARTS.findall(theirs), strict=True):
-        ours, other = (literal_eval(max(x, key=len)) for x in (ours, other))
-        within = 1.01 if np.ndim(ours) == 1 else 2e-3  # of 255, and mm
-        np.testing.assert_allclose(ours, other, rtol=0, atol=within)
-    return True

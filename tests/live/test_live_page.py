@@ -83,16 +83,10 @@ def test_data_cannot_end_its_script():
 def test_only_a_served_page_may_ask_its_server():
     assert "connect-src 'none'" in policy("")
     assert "connect-src 'self'" in policy("", served=True)
-    data = {"bodies": [], "start": {}, "presets": [], "examples": [], "selftest": [], "api": None}
+    data = {"bodies": [], "start": {}, "presets": [], "selftest": [], "api": None}
     text = page(data, title="a <b>")
     assert "<title>a &lt;b&gt;</title>" in text
     assert not re.search(r'(src|href)="(?!data:)[^"#]', text.partition("<script")[0])
-
-
-def test_presets_are_the_papers_tactons():
-    titles = [each["title"] for each in presets()]
-    assert len(titles) == 15
-    assert {"AM 140 Hz", "Circle 10 mm at 6 m/s", "AM 140 Hz + circle 20 mm at 12 m/s"} <= {*titles}
 
 
 SET = {
@@ -104,6 +98,9 @@ SET = {
 
 
 def test_values_are_those_of_a_scene_that_controls_can_set():
+    titles = [each["title"] for each in presets()]
+    assert len(titles) == 15 + 4
+    assert {"AM 140 Hz", "Circle 10 mm at 6 m/s", "AM 140 Hz + circle 20 mm at 12 m/s"} <= {*titles}
     for tacton, expected in SET.items():
         found = values_of(loads(SCENE.replace("[body]", f"{tacton}\n[body]")), "skin-slab")
         assert expected.items() <= found.items()
@@ -246,7 +243,7 @@ def test_keys_move_a_control_and_undo_it(opened):
 def test_a_preset_is_taken_and_compared_with_what_was_pinned(opened):
     tab = opened()
     tab.click("#pin")
-    tab.click("[data-menu=presets]")
+    tab.click("[popovertarget=presets]")
     tab.get_by_role("button", name="AM 80 Hz", exact=True).click()
     rows = tab.locator("#ab tr", has_text="AM frequency")
     rows.get_by_text("80 Hz").wait_for()
@@ -289,7 +286,7 @@ def test_what_is_shown_can_be_saved(opened):
     tab = opened()
     for title, held in (("Maps and plots, SVG", "<svg"), ("Lines, CSV", "f_d"),
                         ("Scene, TOML", "speed_m_per_s = 12")):  # fmt: skip
-        tab.click("[data-menu=save]")
+        tab.click("[popovertarget=save]")
         with tab.expect_download() as saved:
             tab.get_by_role("button", name=title).click()
         assert held in saved.value.path().read_text(encoding="utf-8")

@@ -1,8 +1,6 @@
 """Maps and views in three dimensions of the live page, drawn in a browser; the page of a report."""
 
 import json
-import shutil
-from importlib import resources
 from io import BytesIO
 from xml.etree import ElementTree
 
@@ -14,21 +12,11 @@ from PIL import Image
 
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.load.spectrum import synthesise
-from skinwave.live.page import bundle
 from skinwave.report.turntable import focus_places, motion_lines, turntable
 from skinwave.results.views import kernel_view
 from skinwave.scene.scene import BODIES, Scene
 
 N, REACH = 45, 0.044  # places of a map either way, and how far they reach, m
-MODULE = """
-import { contours } from "./contours.js";
-import { drawMap, mapControls } from "./maps.js";
-import { openView } from "./view3d.js";
-Object.assign(window, { contours, drawMap, mapControls, openView });
-"""
-PAGE = """<!doctype html><meta charset=utf-8><body style="color: #000; margin: 0">
-<svg id=map style="width: 400px; height: 420px"></svg>
-<div id=view style="width: 500px; height: 420px"></div><script type=module>"""
 BODY = """() => {
   const points = [], re = [], triangles = [];
   for (let j = 0, a = 0; j < 21; j++) for (let i = 0; i < 21; i++, a++) {
@@ -44,28 +32,11 @@ BODY = """() => {
   });
 }"""
 CHANGES = (
-    "view.seek(0.005)", "view.above.click()", "view.cutter.value = 60; view.cutter.oninput()",
-    "view.hues.value = 'rms'; view.hues.onchange()",
+    "view.seek(0.005)", "view.above.click()", "view.home.click()",
 )  # fmt: skip
 LOAD = MovingPressure(
     tacton=Tacton(trajectory=Trajectory(shape="circle", size=0.02, speed=12.0), am_frequency=140.0)
 )
-
-
-@pytest.fixture
-def page(browser, tmp_path):
-    folder = tmp_path / "static"
-    shutil.copytree(str(resources.files("skinwave") / "static"), folder)
-    (folder / "entry.js").write_text(MODULE)
-    text = f"{PAGE}{bundle(folder, 'entry.js')}</script>"
-    (tmp_path / "page.html").write_text(text, encoding="utf-8")
-    found = browser.new_page(viewport={"width": 900, "height": 900})
-    said: list[str] = []
-    found.on("pageerror", lambda error: said.append(str(error)))
-    found.goto((tmp_path / "page.html").as_uri())
-    yield found
-    found.close()
-    assert said == []
 
 
 def grid(of):
@@ -104,11 +75,11 @@ def test_a_map_has_the_colours_of_its_values_and_is_empty_off_the_body(page, kin
 
 @needs_browser
 def test_a_contour_is_where_values_are_zero(page):
-    lines = page.evaluate(f"contours({grid(lambda x, y: np.hypot(x, y) - 0.015)}, {N})")
-    (line,) = np.asarray(lines)
-    assert tuple(line[0]) == tuple(line[-1])
-    away = np.hypot(*(REACH * (2 * line / (N - 1) - 1)).T)
-    np.testing.assert_allclose(away, 0.015, atol=1e-4)
+    ends = page.evaluate(f"contours({grid(lambda x, y: np.hypot(x, y) - 0.015)}, {N})")
+    places = REACH * (2 * np.reshape(ends, (-1, 2)) / (N - 1) - 1)
+    np.testing.assert_allclose(np.hypot(*places.T), 0.015, atol=1e-4)
+    along = np.linalg.norm(np.diff(ends, axis=1), axis=2).sum() * 2 * REACH / (N - 1)
+    assert along == pytest.approx(2 * np.pi * 0.015, rel=0.01)
 
 
 @needs_browser
@@ -137,7 +108,6 @@ def test_a_map_as_a_file_is_well_formed_and_has_its_words(page):
 
 @needs_browser
 def test_a_body_moves_turns_and_says_how_it_is_drawn(page):
-    page.emulate_media(reduced_motion="reduce")
     page.evaluate(BODY)
     settled(page)
     assert "Exaggerated 3,000 times" in page.inner_text("#view")
