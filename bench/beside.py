@@ -24,7 +24,7 @@ import fem
 import meshes
 from bench.codes import CODES, Assembled, Problem
 from skinwave.bodies.build import build
-from skinwave.models.prepared import answer, prepare
+from skinwave.models.reduced import answer, prepare
 from skinwave.scene import paper15
 from skinwave.scene.scene import PROBES, Body
 

@@ -17,7 +17,7 @@ from simple_model import MovingPressure, Response, Tacton, Trajectory
 from simple_model.layers.material import from_young
 from skinwave.bodies.sizes import default_size
 from skinwave.models.options import SolveOptions
-from skinwave.models.prepared import answer
+from skinwave.models.reduced import answer
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import Body, Scene

@@ -15,7 +15,7 @@ import skinwave
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.layers.material import Material
 from skinwave.bodies.parts import Layer, Relief
-from skinwave.models.prepared import answer, prepare
+from skinwave.models.reduced import answer, prepare
 from skinwave.planning.refinement import about_its_rest, relative_change
 from skinwave.scene.scene import Body, Scene
 

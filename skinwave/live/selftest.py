@@ -15,7 +15,7 @@ from skinwave.live.values import values_of
 from skinwave.models.advice import takes
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.plate_modes import steady_lines as plate_lines
-from skinwave.models.prepared import answer, components, prepare
+from skinwave.models.reduced import answer, components, prepare
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import Body, Scene
 

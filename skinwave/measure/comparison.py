@@ -24,7 +24,7 @@ from skinwave.measure.lines import (
 )
 from skinwave.measure.measurement import Measurement
 from skinwave.models.options import sample_times
-from skinwave.models.prepared import Prepared, answer
+from skinwave.models.reduced import ReducedBody, answer
 from skinwave.planning.simulate import compute
 from skinwave.report.maps import MeasuredPlaces
 from skinwave.results.comparison import heard_phasors
@@ -310,7 +310,7 @@ def at_measured(scene: Scene, measurement: Measurement) -> Scene:
     return scene
 
 
-def in_quantity(run: Run, quantity: str, prepared: Mapping[str, Prepared]) -> Run:
+def in_quantity(run: Run, quantity: str, prepared: Mapping[str, ReducedBody]) -> Run:
     """A body's run read in another quantity of normal motion; a kernel's as it is."""
     if not run.response.record.of_body or run.response.quantity == quantity:
         return run

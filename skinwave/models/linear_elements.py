@@ -19,7 +19,7 @@ from skinwave.models.full import harmonic_answer, transient_answer
 from skinwave.models.laws import has_own_law
 from skinwave.models.limits import Limit, of_air_in_a_frame, of_body, of_vacuum
 from skinwave.models.options import SolveOptions
-from skinwave.models.prepared import answer, prepare, reduction_tolerance
+from skinwave.models.reduced import answer, prepare, reduction_tolerance
 from skinwave.scene.scene import Scene
 
 REDUCTION = (

@@ -4,14 +4,13 @@
 Galerkin's equations of each line of the scene's load in a few states. `answer` is the waveform from
 rest, by the poles of the reduced-order model; `at` is that model, for any other Tacton. Poisson's
 ratios and the elements are fixed: with a thickness the nodes of one mesh move, or modulus and
-density of a sheet's stand for it. The absorbing layer of a slab with absorbing sides is as wide as
-the fastest shear waves need.
+density of a sheet stand for it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cache as cached
 from functools import partial
 from typing import Any
@@ -20,7 +19,7 @@ import numpy as np
 from scipy import sparse
 
 import fem
-from fem.affine import KINDS, Solids, weights
+from fem.affine import weights
 from fem.affine_model import AffineModel, operators_at, steady, steady_lines
 from fem.boundary import fixed_dofs
 from fem.greedy import Geometry, Variant, line_bases, reduce_affine
@@ -30,6 +29,17 @@ from simple_model import Effort, Response
 from simple_model.layers.prony import FIT_TOLERANCE
 from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
+from skinwave.models.free_bodies import (
+    Range,
+    Reference,
+    affine_operators,
+    build_at,
+    geometry_shares,
+    nearest_geometry,
+    range_of,
+    reference_of,
+    solids_of,
+)
 from skinwave.models.free_keys import (
     FreeKey,
     check_scene,
@@ -39,7 +49,6 @@ from skinwave.models.free_keys import (
     values_at,
     with_values,
 )
-from skinwave.models.free_materials import Reference, affine_operators, reference_of, solids_of
 from skinwave.models.laws import relaxing
 from skinwave.models.meshed import (
     even_part,
@@ -52,53 +61,55 @@ from skinwave.models.meshed import (
     spread,
     surface_load,
 )
-from skinwave.models.prepared import Prepared, entry_name, typical_spots
-from skinwave.models.prepared import answer as answer_of
-from skinwave.models.reduction import BAND, reduced_variant
-from skinwave.models.thicknesses import (
-    Range,
-    build_at,
-    geometry_shares,
-    nearest_geometry,
-    range_of,
+from skinwave.models.reduced import (
+    BAND,
+    ReducedBody,
+    cached_record,
+    entry_name,
+    reduced_of,
+    store_record,
+    typical_spots,
 )
+from skinwave.models.reduced import answer as answer_of
 from skinwave.scene.scene import Body, Scene
-from skinwave.system.effort import Clock, Progress, one_thread, peak_memory, silent
+from skinwave.system.effort import Clock, Progress, one_thread, silent
 
 TOLERANCE = 0.01  # relative error of a line that is not faint
 SHARE = 0.4  # of the tolerance: of the reduced-order model, and of the lines' bases
 FAINTEST = 1e-3  # of the strongest line that moves the probes: weaker ones are left out
 FAINTEST_LOAD = 1e-6  # of the strongest line of the load
-FORMAT = "parametric 4"  # of what is cached
-ARRAYS = ("load", "points", "frequencies")
-OF_ALL = ("parts", "forces", "outputs")
-OF_A_LINE = (*OF_ALL, "basis")
+FORMAT = "parametric 5"  # of what is cached
 BETWEEN = 0.3  # of each range: a body of no known geometry
 KEPT = 5  # full bodies at a time: more of them are assembled anew, for a third of the memory
 INSIDE = 128  # materials inside the ranges, for the lines' bases
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ParametricBody:
-    """Reduced body of a scene for every material and thickness of a range.
+class _Cached:
+    """What is cached: the reduced `model` of g geometries, whose outputs (g, p c, r) the probes
+    read, with the reduced `forces` (g, c k, r) of unit pressure at the surface `points` (g, k, 3)
+    in metre; models `bases` (f,) in it of the lines at `frequencies` (f,) in Hz; and the `effort`
+    of the offline stage, with the number of its factorisations.
+    """
 
-    The `keys` that are free and the `bodies` of their values; the `reference` that was meshed; of
-    g geometries the reduced `model`, whose outputs (g, p c, r) the probes read, with the reduced
-    forces `load` (g, k, r) of unit pressure at the surface `points` (g, k, 3) in metre; models
-    `bases` (f,) in it of the lines at `frequencies` (f,) in Hz; and the `effort` of the offline
-    stage, with the number of its factorisations.
+    model: AffineModel
+    forces: Floats
+    points: Floats
+    frequencies: Floats
+    bases: tuple[AffineModel, ...]
+    effort: Effort
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ParametricBody(_Cached):
+    """Reduced body of a scene for every material and thickness of a range: the `keys` that are
+    free, the `bodies` of their values, and the `reference` that was meshed.
     """
 
     scene: Scene
     keys: tuple[FreeKey, ...]
     bodies: Range
     reference: Reference
-    model: AffineModel
-    load: Floats
-    points: Floats
-    frequencies: Floats
-    bases: tuple[AffineModel, ...]
-    effort: Effort
 
     def __repr__(self) -> str:
         free = ", ".join(f"{key.key} {key.low:g} to {key.high:g}" for key in self.keys)
@@ -154,20 +165,18 @@ def prepare(
     )  # fmt: skip
     name = cache.key(FORMAT, of_body, scene.pressure, scene.reading, keys)
     with clock("read from cache"):
-        entry = cache.load(name)
-    if not entry:
+        found = cached_record(name)
+    if found is None:
         stage = _Stage(
             scene=scene, bodies=bodies, mesh=mesh, reference=reference, tolerance=tolerance,
             solver=solver,
         )  # fmt: skip
-        entry = _reduced(stage, clock, report, build, h or default_size(body))
-        cache.store(name, **entry)
-    model, bases = _unpacked(entry)
-    effort = Effort(**{**entry["meta"], "seconds": clock.seconds, "peak_memory": peak_memory()})
+        found = _reduced(stage, clock, report, build)
+        store_record(name, found, found["model"].parts, found["forces"])
+    effort = spent(found["effort"], clock, build, h or default_size(body))
     return ParametricBody(
-        scene=scene, keys=keys, bodies=bodies, reference=reference, model=model,
-        bases=bases, effort=effort, **{array: entry[array] for array in ARRAYS},
-    )  # fmt: skip
+        scene=scene, keys=keys, bodies=bodies, reference=reference, **found | {"effort": effort}
+    )
 
 
 def _range(body: Body, keys: tuple[FreeKey, ...], h: float | None) -> Range:
@@ -202,10 +211,8 @@ class _Stage:
         )  # fmt: skip
 
 
-def _reduced(
-    stage: _Stage, clock: Clock, report: Progress, build: Build, h: float
-) -> dict[str, Any]:
-    """Arrays and `meta`, the effort, of what is cached."""
+def _reduced(stage: _Stage, clock: Clock, report: Progress, build: Build) -> dict[str, Any]:
+    """What is cached: fields of a `ParametricBody`."""
     bodies, tolerance, scene = stage.bodies, stage.tolerance, stage.scene
     few_geometries = len(bodies.geometries) <= KEPT
     geometries: dict[Any, Callable[[], Geometry]] = {
@@ -232,10 +239,10 @@ def _reduced(
         solver=fem.available()[0] if stage.solver == "auto" else stage.solver,
         estimate=error + of_lines, factorisations=factorisations,
     )  # fmt: skip
-    load, points = (np.stack(each) for each in zip(*surface, strict=True))
+    forces, points = (np.stack(each) for each in zip(*surface, strict=True))
     return {
-        "meta": asdict(spent(effort, clock, build, h)), "load": load, "points": points,
-        "frequencies": kept, **_packed(model, bases),
+        "model": replace(model, basis=model.basis[:0]), "forces": forces, "points": points,
+        "frequencies": kept, "bases": bases, "effort": effort,
     }  # fmt: skip
 
 
@@ -253,8 +260,10 @@ def _variant(stage: _Stage, at: tuple[float, ...], geometries: Mapping[Any, Any]
     shares = geometry_shares(stage.bodies, body)
     nearest = list(geometries.values())[int(np.argmax(shares))]
     is_known = nearest_geometry(stage.bodies, at) == at
+    solids = solids_of(stage.reference, body)
     return Variant(
-        solids=_relaxed(solids_of(stage.reference, body)), shares=shares,
+        solids=replace(solids, materials=tuple(m.relaxing() for m in solids.materials)),
+        shares=shares,
         geometry=nearest if is_known else partial(stage.geometry, at),
     )  # fmt: skip
 
@@ -290,19 +299,18 @@ def answer(prepared: ParametricBody, values: Mapping[str, float]) -> Response:
     return answer_of(at(prepared, values), prepared.scene)
 
 
-def at(prepared: ParametricBody, values: Mapping[str, float]) -> Prepared:
+def at(prepared: ParametricBody, values: Mapping[str, float]) -> ReducedBody:
     """Reduced body of values of the free keys, for any Tacton."""
     body = relaxing(_body(prepared, values), FIT_TOLERANCE)
-    shares = geometry_shares(prepared.bodies, body)
+    shares, scene = geometry_shares(prepared.bodies, body), prepared.scene
     model = prepared.model
-    outputs, load, points = (
-        np.tensordot(shares, each, 1) for each in (model.outputs, prepared.load, prepared.points)
+    read, forces, points = (
+        np.tensordot(shares, each, 1) for each in (model.outputs, prepared.forces, prepared.points)
     )
     small = operators_at(model, solids_of(prepared.reference, body), shares)
-    return Prepared(
-        probes=prepared.scene.probe_points, read=outputs, reading=prepared.scene.reading,
-        load=prepared.scene.load,
-        body=reduced_variant(small, load, points, prepared.effort),
+    return reduced_of(
+        small, forces, points, prepared.effort,
+        probes=scene.probe_points, read=read, reading=scene.reading, load=scene.load,
     )  # fmt: skip
 
 
@@ -335,11 +343,6 @@ def _body(prepared: ParametricBody, values: Mapping[str, float]) -> Body:
     return with_values(prepared.scene.body, prepared.keys, values)
 
 
-def _relaxed(solids: Solids) -> Solids:
-    """The materials with Prony series for modulus laws of their own."""
-    return replace(solids, materials=tuple(m.relaxing() for m in solids.materials))
-
-
 def _bases(
     stage: _Stage,
     model: AffineModel,
@@ -368,33 +371,3 @@ def _bases(
         SHARE * stage.tolerance, partial(report, "lines"),
     )  # fmt: skip
     return frequencies[kept], found, error
-
-
-def _packed(model: AffineModel, bases: Sequence[AffineModel]) -> dict[str, np.ndarray]:
-    """Arrays of a model without its basis, and of those of lines in it, end to end."""
-    return {
-        "terms": np.array([(KINDS.index(kind), r) for kind, r in model.terms]),
-        **{name: getattr(model, name) for name in OF_ALL},
-        "sizes": np.array([line.basis.shape[1] for line in bases]),
-        **{f"line_{name}": np.concatenate([getattr(line, name).ravel() for line in bases])
-           for name in OF_A_LINE},
-    }  # fmt: skip
-
-
-def _unpacked(entry: Mapping[str, Any]) -> tuple[AffineModel, tuple[AffineModel, ...]]:
-    """Model of an entry, its basis without rows, and those of lines in it."""
-    terms = tuple((KINDS[kind], r) for kind, r in entry["terms"].tolist())
-    (g, q, r, _), p = entry["parts"].shape, entry["outputs"].shape[1]
-    model = AffineModel(
-        terms=terms, basis=np.zeros((0, r)), **{name: entry[name] for name in OF_ALL}
-    )
-    starts, lines = dict.fromkeys(OF_A_LINE, 0), []
-    for m in entry["sizes"].tolist():
-        shapes = {"parts": (g, q, m, m), "forces": (g, 1, m), "outputs": (g, p, m), "basis": (r, m)}
-        arrays = {}
-        for name, shape in shapes.items():
-            start = starts[name]
-            starts[name] += int(np.prod(shape))
-            arrays[name] = entry[f"line_{name}"][start : starts[name]].reshape(shape)
-        lines.append(AffineModel(terms=terms, **arrays))
-    return model, tuple(lines)

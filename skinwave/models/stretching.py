@@ -41,14 +41,14 @@ from skinwave.models.meshed import load_in_steps, spent, surface_load
 from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import ERROR as PLATE_ERROR
 from skinwave.models.plate_modes import FROM_REST
-from skinwave.models.prepared import in_motion
-from skinwave.models.reduction import (
+from skinwave.models.reduced import (
     ReducedBody,
     ReducedResponse,
     from_rest,
+    in_motion,
     read_at,
     reduced_forces,
-    reduced_variant,
+    reduced_of,
     respond,
     select_lines,
 )
@@ -197,7 +197,7 @@ def _modal_force(
     """
     if len(load_lines(scene.pressure).frequencies) > MOST_LINES:
         load = load_in_steps((scene.pressure,), linear.points, times, dt)
-        return lambda t: load(t) @ linear.load
+        return lambda t: load(t) @ linear.forces
     hz, forces = reduced_forces(linear, scene.pressure)
     below = below_half_the_rate(hz, times)
     hz, forces = hz[below], forces[below]
@@ -232,7 +232,7 @@ def _reduced(body: Body, h: float, solver: str) -> _Reduced:
         modal, K=modal.K.toarray(), C=modal.C.toarray(), M=modal.M.toarray(), R=modal.R.toarray(),
         branches=tuple(replace(each, K=each.K.toarray()) for each in modal.branches),
     )  # fmt: skip
-    linear = reduced_variant(dense, P.T @ modes.basis, points, Effort(dofs=len(operators.free)))
+    linear = reduced_of(dense, P.T @ modes.basis, points, Effort(dofs=len(operators.free)))
     return _Reduced(made=made, modes=modes, linear=linear, operators=operators)
 
 

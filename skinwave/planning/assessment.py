@@ -16,7 +16,7 @@ from simple_model import Response
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.models import named
 from skinwave.models.options import DEFAULT, SolveOptions
-from skinwave.models.prepared import Prepared, answer, prepare, reduction_tolerance
+from skinwave.models.reduced import ReducedBody, answer, prepare, reduction_tolerance
 from skinwave.planning.extent import absorbing_error
 from skinwave.planning.left_out import series_error, stretching_left_out
 from skinwave.planning.plan import plan
@@ -30,7 +30,7 @@ from skinwave.planning.refinement import (
 from skinwave.planning.warnings import of_elements, of_ends_and_band, of_stretching
 from skinwave.scene.scene import Body, Load, Reading, Scene
 
-Coarser = tuple[float, Prepared]  # element size in metre, and the body with it
+Coarser = tuple[float, ReducedBody]  # element size in metre, and the body with it
 
 QUICKLY = 2.0  # times as coarse
 
@@ -38,7 +38,7 @@ QUICKLY = 2.0  # times as coarse
 def assessed(
     scene: Scene,
     response: Response,
-    prepared: Prepared,
+    prepared: ReducedBody,
     options: SolveOptions = DEFAULT,
     *,
     compared: Coarser | None = None,
@@ -50,7 +50,7 @@ def assessed(
     ----------
     scene : Scene
     response : Response, of the reduced body
-    prepared : Prepared
+    prepared : ReducedBody
     options : SolveOptions; h is the default of the body if not given
     compared : element size in metre to compare with, and the body with it; chosen if not given
     meshed : body whose mesh both sizes are of, if its nodes were moved to those of the scene's
@@ -132,7 +132,7 @@ def _coarser(body: Body, h: float) -> float:
 def _prepared(
     body: Body, probes: tuple[tuple[float, float], ...], reading: Reading, load: Load,
     h: float, solver: str, tolerance: float,
-) -> Prepared:  # fmt: skip
+) -> ReducedBody:  # fmt: skip
     return prepare(
         body, np.array(probes), h=h, solver=solver, tolerance=tolerance, reading=reading, load=load
     )

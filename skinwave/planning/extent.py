@@ -19,7 +19,7 @@ from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.bodies.slab import discretise
 from skinwave.models.meshed import mirrored_axes
 from skinwave.models.options import DEFAULT, SolveOptions
-from skinwave.models.prepared import answer, prepare, reduction_tolerance
+from skinwave.models.reduced import answer, prepare, reduction_tolerance
 from skinwave.planning.estimates import FAR, absorbed_returned, spot_scale
 from skinwave.planning.records import PlanRow
 from skinwave.planning.refinement import about_its_rest, element_sizes, relative_change

@@ -36,8 +36,7 @@ from skinwave.models.advice import takes
 from skinwave.models.laws import STRONG, own_laws, relaxing, series_tolerance
 from skinwave.models.options import SolveOptions, sample_times
 from skinwave.models.plate_modes import FROM_REST, middle_compliance, relative_modulus
-from skinwave.models.prepared import Prepared, answer, prepare, steady_waveforms
-from skinwave.models.reduction import reduced_forces
+from skinwave.models.reduced import ReducedBody, answer, prepare, reduced_forces, steady_waveforms
 from skinwave.models.stretched_plate import STRETCHED, first_part, linear_error
 from skinwave.planning.estimates import mean_gain, spot_scale
 from skinwave.planning.refinement import relative_change
@@ -60,7 +59,7 @@ FOLLOWED_FOR = 1.0  # s of the responses that are compared
 
 
 def start_left_out(
-    scene: Scene, model: Model, grid: tuple[Floats, int], prepared: Prepared | None = None
+    scene: Scene, model: Model, grid: tuple[Floats, int], prepared: ReducedBody | None = None
 ) -> float:
     """Difference of a steady state from the motion from rest, relative to the latter; 0 of a model
     from rest. `grid` is as of `sample_grid`; of a model of elements its reduced body is given.
@@ -238,20 +237,20 @@ class Sensitivity:
     frequency: float
 
 
-def sensitivity(scene: Scene, prepared: Prepared | None = None) -> Sensitivity:
+def sensitivity(scene: Scene, prepared: ReducedBody | None = None) -> Sensitivity:
     """Sensitivity from two responses of a reduced body: one that is at hand, or that of a coarse
     mesh, seconds once per body.
     """
     h = min(COARSENING * default_size(scene.body), coarsest_size(scene.body))
     coarse = prepared or prepare(scene.body, scene.probe_points, h=h, load=scene.load.moving)
-    values = coarse.body.poles.values * (1 - DETUNING)
-    frequencies, forces = reduced_forces(coarse.body, *scene.loads)
+    values = coarse.poles.values * (1 - DETUNING)
+    frequencies, forces = reduced_forces(coarse, *scene.loads)
     times = np.arange(max(2, round(min(scene.tacton.duration, FOLLOWED_FOR) * RATE))) / RATE
 
     def waveforms(moved: float) -> Floats:
         """Waveforms (t, p) where all natural frequencies are higher by so much."""
         higher = np.asarray(values * (1 + moved), np.complex128)
-        poles = replace(coarse.body.poles, values=higher)
+        poles = replace(coarse.poles, values=higher)
         lines, start = (x @ coarse.read.T for x in fem.line_response(poles, forces, frequencies))
         rates = np.concatenate([2j * np.pi * frequencies, higher])
         return fem.exponential_sum(rates, np.vstack([lines, start]), times)
@@ -266,7 +265,7 @@ def sensitivity(scene: Scene, prepared: Prepared | None = None) -> Sensitivity:
 
 
 def series_error(
-    scene: Scene, model: str, tolerance: float, prepared: Prepared | None = None
+    scene: Scene, model: str, tolerance: float, prepared: ReducedBody | None = None
 ) -> float:
     """Relative error of the probes' motion by Prony series in place of modulus laws; 0 if the model
     takes the laws themselves. A body that is `prepared` on any mesh saves a coarse one.

@@ -23,7 +23,7 @@ from skinwave.models.linear_elements import FEM
 from skinwave.models.options import DEFAULT, SolveOptions, sample_grid, sample_times
 from skinwave.models.plate_modes import ERROR, FROM_REST
 from skinwave.models.point_kernel import SAME_LOAD
-from skinwave.models.prepared import answer
+from skinwave.models.reduced import answer
 from skinwave.models.stretched_plate import STRETCHED
 from skinwave.planning.estimates import (
     NO_BOUND,

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from skinwave.models.options import DEFAULT, SolveOptions
-from skinwave.models.prepared import Prepared
+from skinwave.models.reduced import ReducedBody
 from skinwave.scene.scene import Body
 from skinwave.system.drawn import drawn
 
@@ -41,7 +41,7 @@ class Plan:
     memory: float = 1e8
     rows: tuple[PlanRow, ...] = ()
     warnings: tuple[str, ...] = ()
-    prepared: Prepared | None = field(default=None, repr=False)
+    prepared: ReducedBody | None = field(default=None, repr=False)
     options: SolveOptions = field(default=DEFAULT, repr=False)
 
     def table(self) -> dict[str, Any]:

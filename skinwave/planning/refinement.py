@@ -23,14 +23,15 @@ from skinwave.bodies.hands import FINE_PALM
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.bodies.slab import cell_layers
 from skinwave.models.options import DEFAULT, SolveOptions
-from skinwave.models.prepared import (
-    Prepared,
+from skinwave.models.reduced import (
+    BAND,
+    ReducedBody,
     answer,
     components,
+    oscillating,
     prepare,
     reduction_tolerance,
 )
-from skinwave.models.reduction import BAND, oscillating
 from skinwave.scene.scene import Body, Scene
 
 FIRST, RATIO = 2.6, 1.3  # of the default element size; of two successive sizes
@@ -108,7 +109,7 @@ class Refined:
     convergence: Convergence
     error: float
     compared: float
-    prepared: Prepared
+    prepared: ReducedBody
 
 
 def refined(
@@ -135,7 +136,7 @@ def refined(
     """
     h, tolerance = options.h, options.tolerance
 
-    def answered(size: float) -> tuple[Prepared, NDArray[Any]]:
+    def answered(size: float) -> tuple[ReducedBody, NDArray[Any]]:
         prepared = prepare(
             body, scene.probe_points, options.progress, h=size,
             tolerance=reduction_tolerance(tolerance), symmetry=symmetry, solver=options.solver,
@@ -236,7 +237,7 @@ def about_its_rest(scene: Scene, waveforms: NDArray[Any]) -> NDArray[Any]:
     return waveforms - waveforms.mean(axis=0) if scene.load.gravity else waveforms
 
 
-def quantity_of_interest(prepared: Prepared, scene: Scene, found: Response) -> NDArray[Any]:
+def quantity_of_interest(prepared: ReducedBody, scene: Scene, found: Response) -> NDArray[Any]:
     """Quantity of interest of the response of a reduced body: its waveforms (t, p); of an
     unconstrained body the lines (f, p c) of its components without the mean, because rigid-body
     drift would hide the rest.

@@ -7,8 +7,7 @@ from skinwave.bodies.coat import AT, layer_name, thicknesses
 from skinwave.bodies.coat import coat as coat_of
 from skinwave.bodies.sheet import air_mass
 from skinwave.models.meshed import axes_of_probes, mirrored_axes
-from skinwave.models.prepared import reduction_tolerance
-from skinwave.models.reduction import BAND
+from skinwave.models.reduced import BAND, reduction_tolerance
 from skinwave.planning.left_out import mean_sag
 from skinwave.planning.records import PlanRow
 from skinwave.planning.refinement import Convergence, Refined

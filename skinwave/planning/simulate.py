@@ -18,7 +18,7 @@ from skinwave.models import named
 from skinwave.models.advice import check_taken
 from skinwave.models.laws import check_laws
 from skinwave.models.options import SolveOptions, from_first, sample_grid
-from skinwave.models.prepared import answer
+from skinwave.models.reduced import answer
 from skinwave.planning.plan import plan
 from skinwave.planning.records import Plan
 from skinwave.planning.warnings import (

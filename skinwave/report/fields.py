@@ -16,7 +16,7 @@ from simple_model.drawing import new_axes
 from simple_model.numbers import counted, significant, stated_error
 from simple_model.quantities import DISPLACEMENT
 from skinwave.models.options import SolveOptions
-from skinwave.models.reduction import from_rest, oscillating
+from skinwave.models.reduced import from_rest, oscillating
 from skinwave.planning.assessment import told
 from skinwave.report.palette import SIGNED
 from skinwave.results.exports import collection

@@ -22,7 +22,6 @@ from simple_model.load.spectrum import synthesise
 from simple_model.quantities import NORMAL, STRAIN, VECTOR, Quantity
 from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
-from skinwave.models import reduction
 from skinwave.models.laws import relaxing, series_tolerance
 from skinwave.models.meshed import (
     assembled,
@@ -34,8 +33,15 @@ from skinwave.models.meshed import (
     surface_load,
 )
 from skinwave.models.options import SolveOptions, sample_times
-from skinwave.models.prepared import in_motion
-from skinwave.models.reduction import ReducedResponse, oscillating
+from skinwave.models.reduced import (
+    ReducedResponse,
+    from_rest,
+    in_motion,
+    oscillating,
+    read_at,
+    reduce_body,
+    respond,
+)
 from skinwave.scene.scene import Reading, Scene
 from skinwave.system.effort import Clock, Progress, silent
 
@@ -135,12 +141,12 @@ def driven(
         report("factorise", 0.0)
         spots = scene.pressure.spot(points, path_samples(scene.loads[0]))
         subspace = sparse.csr_array(fem.load_subspace(spread(P, spots.T), tolerance / 10).T)
-        reduced, model = reduction.reduce_body(
+        reduced, model = reduce_body(
             body, build, operators, subspace, tolerance, surface=(P, points), solver=solver,
             report=report,
         )  # fmt: skip
     with clock("lines"):
-        motion = reduction.respond(reduced, *scene.loads)
+        motion = respond(reduced, *scene.loads)
     offline = spent(reduced.effort, clock, build, h or default_size(scene.body))
     effort = replace(
         offline, steps=len(motion.frequencies), energy_imbalance=motion.imbalance,
@@ -153,14 +159,14 @@ def driven(
 def probe_lines(scene: Scene, moved: BodyMotion) -> ReducedResponse:
     """Components of the quantity that the probes of a scene read, from its body's motion."""
     rows, solids = probe_rows(scene.body, moved.build, scene.probe_points, scene.reading)
-    seen = reduction.read_at(moved.motion, rows @ moved.basis)
+    seen = read_at(moved.motion, rows @ moved.basis)
     return in_motion(seen, scene.reading.asked, solids)
 
 
 def probe_response(scene: Scene, moved: BodyMotion) -> Response:
     """Quantity that the probes of a scene read, from its body's motion."""
     times, points, asked = sample_times(scene), scene.probe_points, scene.reading.asked
-    components = reduction.from_rest(probe_lines(scene, moved), times)
+    components = from_rest(probe_lines(scene, moved), times)
     return Response(
         model="fem", times=times, probes=points, quantity=asked.name,
         values=asked.waveforms(components, len(points)), effort=moved.effort,

@@ -28,7 +28,7 @@ from skinwave.models.meshed import line_factor, probe_rows
 from skinwave.models.plate_modes import ERROR as PLATE_ERROR
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.plate_modes import steady_lines as plate_lines
-from skinwave.models.reduction import read_at
+from skinwave.models.reduced import read_at
 from skinwave.models.stretched_plate import settled
 from skinwave.planning.left_out import beyond_linear
 from skinwave.results.motion import TOLERANCE, BodyMotion, driven

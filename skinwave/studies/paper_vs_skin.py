@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Response, Tacton, Trajectory, lines, resolved_lines
 from skinwave.models.plate_modes import FROM_REST
-from skinwave.models.prepared import answer, prepare
+from skinwave.models.reduced import answer, prepare
 from skinwave.models.stretched_plate import STRETCHED
 from skinwave.planning.simulate import compute
 from skinwave.report.figures import png

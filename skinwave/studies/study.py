@@ -23,7 +23,7 @@ from skinwave.models import named
 from skinwave.models.advice import check_taken
 from skinwave.models.linear_elements import FEM
 from skinwave.models.options import SolveOptions
-from skinwave.models.prepared import Prepared, answer, prepare
+from skinwave.models.reduced import ReducedBody, answer, prepare
 from skinwave.planning.assessment import Coarser, assessed, coarser_body
 from skinwave.planning.plan import chosen_model, plan
 from skinwave.planning.simulate import compute, solve
@@ -103,7 +103,7 @@ def run_study(
         drawn: dict[str, list[Run]] = {}
         found: list[MeasuredComparison] = []
 
-        def finished(name: str, group: list[Run], prepared: Mapping[str, Prepared]) -> None:
+        def finished(name: str, group: list[Run], prepared: Mapping[str, ReducedBody]) -> None:
             drawn[name] = group
             if measured:
                 asked = measured.measurement.quantity
@@ -189,7 +189,7 @@ def _completeness(model: str) -> int:
     return COMPLETE.index(model) if model in COMPLETE else -1
 
 
-Bodies = Callable[[Scene], tuple[Prepared, Coarser]]  # reduced, and the one on a coarser mesh
+Bodies = Callable[[Scene], tuple[ReducedBody, Coarser]]  # reduced, and the one on a coarser mesh
 
 
 def _begun_bodies(
@@ -209,7 +209,7 @@ def _begun_bodies(
     }
 
     @lru_cache
-    def here() -> Prepared:
+    def here() -> ReducedBody:
         assert last
         column, scene = solids[last]
 
@@ -218,7 +218,7 @@ def _begun_bodies(
 
         return _prepared(scene, h, solver, named)
 
-    def bodies(scene: Scene) -> tuple[Prepared, Coarser]:
+    def bodies(scene: Scene) -> tuple[ReducedBody, Coarser]:
         mine = here()  # before anything is waited for
         found = begun[scene.body].result() if scene.body in begun else mine
         return found, coarse[scene.body].result()
@@ -228,7 +228,7 @@ def _begun_bodies(
 
 def _prepared(
     scene: Scene, h: float | None, solver: str, progress: Progress | None = None
-) -> Prepared:
+) -> ReducedBody:
     return prepare(
         scene.body, scene.probe_points, progress, h=h, solver=solver, reading=scene.reading
     )
@@ -284,13 +284,13 @@ def _answered(
     begun: Mapping[Scene, Future[Response]],
     progress: Progress,
     how: _How,
-    finished: Callable[[str, list[Run], Mapping[str, Prepared]], None],
-) -> tuple[dict[str, list[Run]], dict[str, Prepared]]:
+    finished: Callable[[str, list[Run], Mapping[str, ReducedBody]], None],
+) -> tuple[dict[str, list[Run]], dict[str, ReducedBody]]:
     """Every run, both kernels of all Tactons first, and the reduced bodies behind them; `finished`
     is called with each Tacton as soon as its runs are there.
     """
     groups: dict[str, list[Run]] = {}
-    prepared: dict[str, Prepared] = {}
+    prepared: dict[str, ReducedBody] = {}
     every = [(name, column, scene) for name, g in scenes.items() for column, scene in g.items()]
     quick = sorted(every, key=lambda each: (how.is_reduced(each[1]), each[2] in begun))
     with suppress(KeyboardInterrupt):

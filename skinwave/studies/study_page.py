@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from simple_model import Effort
 from simple_model.numbers import counted, decibel
 from skinwave.models.point_kernel import SAME_LOAD
-from skinwave.models.prepared import Prepared
+from skinwave.models.reduced import ReducedBody
 from skinwave.report.description import (
     levels_of,
     modelled,
@@ -155,7 +155,7 @@ def efforts(runs: list[Run]) -> list[tuple[str, Effort]]:
 
 
 def effort_section(
-    groups: Mapping[str, list[Run]], prepared: Mapping[str, Prepared], outcome: StudyOutcome
+    groups: Mapping[str, list[Run]], prepared: Mapping[str, ReducedBody], outcome: StudyOutcome
 ) -> Section:
     """Cost of each body and of the whole."""
     runs = [run for group in groups.values() for run in group]

@@ -27,7 +27,7 @@ from skinwave.models.flat_body import HARMONIC
 from skinwave.models.linear_elements import FEM
 from skinwave.models.options import SolveOptions, sample_times
 from skinwave.models.parametric import lines_of
-from skinwave.models.prepared import components, prepare, reduction_tolerance
+from skinwave.models.reduced import components, prepare, reduction_tolerance
 from skinwave.planning.simulate import compute
 from skinwave.report.styles import SHOWN
 from skinwave.results.surface import REACH, SILENT, grid, has_wavenumber_integral

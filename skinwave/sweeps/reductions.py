@@ -17,7 +17,7 @@ from skinwave.models import parametric
 from skinwave.models.covering import Covering, covering, kept_together
 from skinwave.models.free_keys import FreeKey, free_keys, with_values
 from skinwave.models.options import SolveOptions
-from skinwave.models.prepared import Prepared, prepare, reduction_tolerance
+from skinwave.models.reduced import ReducedBody, prepare, reduction_tolerance
 from skinwave.planning.refinement import compared_with, refined
 from skinwave.scene.scene import Body, Load, Reading, Scene
 from skinwave.scene.variation import DesignPoint
@@ -111,7 +111,7 @@ def prepared(
     options: ModelOptions,
     family: Covering | None,
     values: Values,
-) -> Prepared:
+) -> ReducedBody:
     """Reduced body of runs, with elements of h in metre; of a family the one with these values."""
     if family:
         shared = kept_together(family, h, options.tolerance, options.solver)

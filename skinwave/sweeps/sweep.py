@@ -15,7 +15,7 @@ from skinwave.bodies.analytic import is_flat_layer, is_laterally_infinite
 from skinwave.models import named, names
 from skinwave.models.advice import default_model, takes
 from skinwave.models.flat_body import FLAT_BODY
-from skinwave.models.prepared import answer
+from skinwave.models.reduced import answer
 from skinwave.planning.assessment import assessed
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute, solve

@@ -10,7 +10,7 @@ from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Response, Tacton, Trajectory, lines
 from simple_model.load.focus import spot_width
 from skinwave.bodies.build import Build, build, operators
-from skinwave.models.prepared import Prepared, answer, prepare
+from skinwave.models.reduced import ReducedBody, answer, prepare
 from skinwave.scene.scene import Body, Scene
 from skinwave.verify.case import Checks, below, case, relative
 
@@ -104,7 +104,7 @@ def durations() -> Checks:
 
 
 @cache
-def _prepared() -> Prepared:
+def _prepared() -> ReducedBody:
     return prepare(BODY, np.array(PROBES), h=H, tolerance=1e-4)
 
 

@@ -16,7 +16,7 @@ from skinwave.bodies.build import build, operators
 from skinwave.bodies.sheet import air, air_mass, bending_wavenumber
 from skinwave.models.meshed import surface_load
 from skinwave.models.options import SolveOptions
-from skinwave.models.prepared import answer, prepare, typical_spots
+from skinwave.models.reduced import answer, prepare, typical_spots
 from skinwave.models.stretching import membrane, reduced_answer
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads
@@ -111,7 +111,7 @@ def test_a_sheet_without_loss_is_reduced_too():
     solid = replace(SHEET.solid, loss_factor=0.0)
     prepared = prepare(replace(SHEET, material=solid), SCENE.probe_points, h=H)
     lossy = prepare(SHEET, SCENE.probe_points, h=H)
-    vibrate = [p.body.poles.values[p.body.poles.values.imag > 0] for p in (prepared, lossy)]
+    vibrate = [p.poles.values[p.poles.values.imag > 0] for p in (prepared, lossy)]
     lowest = [s[np.abs(s).argmin()] for s in vibrate]
     softer = SHEET.solid.complex_modulus(-1j * lowest[1]) / SHEET.solid.shear_modulus
     assert lowest[0] ** 2 * softer == pytest.approx(lowest[1] ** 2, rel=1e-6)
@@ -155,7 +155,7 @@ def test_a_sheet_that_hardly_stretches_answers_as_the_linear_one():
 def test_the_loss_factor_is_the_material_s_in_air_too():
     """Of one material without tension -s^2 is a real multiple of its modulus at each pole s."""
     prepared = prepare(SHEET, SCENE.probe_points, h=H)
-    poles = prepared.body.poles.values[prepared.body.poles.values.imag > 0]
+    poles = prepared.poles.values[prepared.poles.values.imag > 0]
     assert (abs(poles) < 2 * np.pi * 1500).sum() > 10
     found = -(poles**2) / SHEET.solid.complex_modulus(-1j * poles)
     np.testing.assert_allclose(found.imag, 0.0, atol=1e-6 * found.real.min())

@@ -21,7 +21,7 @@ from skinwave.bodies.build import build, operators
 from skinwave.commands.cli import main
 from skinwave.models.meshed import surface_load
 from skinwave.models.options import SolveOptions
-from skinwave.models.prepared import answer, prepare
+from skinwave.models.reduced import answer, prepare
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads

@@ -19,7 +19,7 @@ from skinwave.models import parametric
 from skinwave.models.free_keys import has_affine_operators, values_at
 from skinwave.models.free_keys import with_values as with_free_values
 from skinwave.models.laws import check_laws, has_own_law, relaxing
-from skinwave.models.prepared import components, prepare
+from skinwave.models.reduced import components, prepare
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads, read
 from skinwave.scene.scene import Scene

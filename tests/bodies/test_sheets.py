@@ -21,7 +21,7 @@ from skinwave.models import named
 from skinwave.models.advice import beyond
 from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import middle_compliance, plate_of
-from skinwave.models.prepared import prepare
+from skinwave.models.reduced import prepare
 from skinwave.planning.extent import symmetry
 from skinwave.planning.left_out import mean_sag
 from skinwave.scene.scene import BODIES, Body, Scene
@@ -423,7 +423,7 @@ def test_elements_damp_each_mode_of_a_stretched_sheet_by_its_loss_factor():
     solid, T = from_young(density=800, young=4e9, poisson=0.3, loss_factor=0.1), 20.0
     held = Mounting(edges=tuple(EDGES), support="simply", tension_x=T, tension_y=T)
     body = replace(SMALL, material=solid, mounting=held)
-    found = prepare(body, np.zeros((1, 2)), h=5e-3).body.poles.values
+    found = prepare(body, np.zeros((1, 2)), h=5e-3).poles.values
     k2, D = (np.pi / 0.06) ** 2 + (np.pi / 0.05) ** 2, body.bending_stiffness
     h = s = 1.0
     for _ in range(20):

@@ -25,7 +25,7 @@ from skinwave.bodies.hands import support
 from skinwave.models.free_keys import FreeKey, with_values
 from skinwave.models.meshed import surface_load
 from skinwave.models.options import SolveOptions
-from skinwave.models.prepared import answer, prepare
+from skinwave.models.reduced import answer, prepare
 from skinwave.planning.estimates import side_reflections
 from skinwave.planning.extent import absorbing_error, symmetry
 from skinwave.planning.plan import plan

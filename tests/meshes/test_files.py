@@ -17,7 +17,7 @@ from meshes.files.contents import read_contents
 from meshes.surface.repair import check
 from meshes.surface.triangulation import volume
 from skinwave.commands.cli import main
-from skinwave.models.prepared import prepare
+from skinwave.models.reduced import prepare
 from skinwave.scene.scene import Body
 
 
@@ -639,9 +639,9 @@ def test_what_is_prepared_is_kept_for_the_facets_that_a_file_names(tmp_path):
         facets = {"sides": block.facets[held], "top": {**block.facets, "part": part}[pushed]}
         meshes.write(body.file, replace(block, facets=facets))
         read.append(prepare(body, np.array([(-0.004, 0.001)]), h=0.005))
-    stiffness = [np.abs(prepared.body.poles.values[:3]).sum() for prepared in read]
+    stiffness = [np.abs(prepared.poles.values[:3]).sum() for prepared in read]
     assert stiffness[0] != pytest.approx(stiffness[1], rel=1e-3)
-    assert len(read[1].body.points) == 2 * len(read[2].body.points)
+    assert len(read[1].points) == 2 * len(read[2].points)
 
 
 def test_what_cannot_be_meshed_ends_in_one_line(tmp_path, monkeypatch, capsys):

@@ -5,7 +5,7 @@ import numpy as np
 import fem
 from meshes import cache
 from skinwave.models.options import SolveOptions
-from skinwave.models.prepared import answer, prepare
+from skinwave.models.reduced import answer, prepare
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import solve
 from skinwave.scene.file import loads

@@ -20,13 +20,18 @@ from skinwave.bodies import hands
 from skinwave.bodies.absorbing_layer import layer_drag, layer_of
 from skinwave.bodies.build import build, operators
 from skinwave.models import parametric
+from skinwave.models.free_bodies import (
+    build_at,
+    geometry_shares,
+    meshed_materials,
+    reference_of,
+    solids_of,
+)
 from skinwave.models.free_keys import free_keys, values_at, with_values
-from skinwave.models.free_materials import meshed_materials, reference_of, solids_of
 from skinwave.models.meshed import surface_load, surface_motion
-from skinwave.models.prepared import answer as own_answer
-from skinwave.models.prepared import components
-from skinwave.models.prepared import prepare as own_body
-from skinwave.models.thicknesses import build_at, geometry_shares
+from skinwave.models.reduced import answer as own_answer
+from skinwave.models.reduced import components
+from skinwave.models.reduced import prepare as own_body
 from skinwave.scene.scene import BODIES, Body, Layer, Scene
 
 MODULUS, VISCOSITY = "body.material.shear_modulus_pa", "body.material.viscosity_pa_s"

@@ -13,12 +13,11 @@ from fem.affine_model import line_errors
 from meshes import MeshError, jacobian_ratios, mapped_palm, stretched_palm
 from meshes.shapes.palm import level_set
 from skinwave.bodies.build import build
-from skinwave.models import parametric, thicknesses
+from skinwave.models import free_bodies, parametric
+from skinwave.models.free_bodies import affine_operators, build_at, geometry_shares
 from skinwave.models.free_keys import free_keys, with_values
-from skinwave.models.free_materials import affine_operators
-from skinwave.models.prepared import answer as own_answer
-from skinwave.models.prepared import prepare as own_body
-from skinwave.models.thicknesses import build_at, geometry_shares
+from skinwave.models.reduced import answer as own_answer
+from skinwave.models.reduced import prepare as own_body
 from skinwave.scene.scene import BODIES, Layer, Relief
 
 PALM, KEY, COAT = BODIES["palm"], "body.thickness_mm", "body.layers.0.thickness_mm"
@@ -73,7 +72,7 @@ def error_between(monkeypatch, count):
     def stiffness(at):
         return affine_operators(bodies.body(at), build_at(bodies, at)).of("stiffness")[0]
 
-    monkeypatch.setattr(thicknesses, "SMOOTH", count)
+    monkeypatch.setattr(free_bodies, "SMOOTH", count)
     keys = free_keys(PALM, {KEY: (14.0, 20.0)})
     bodies = parametric._range(PALM, keys, H)
     assert len(bodies.geometries) == count

@@ -18,11 +18,11 @@ from skinwave.bodies.sheet import air
 from skinwave.measure import predicted
 from skinwave.measure.parameters import parse
 from skinwave.models import parametric
+from skinwave.models.free_bodies import affine_operators, reference_of, solids_of
 from skinwave.models.free_keys import free_keys, values_at, with_values
-from skinwave.models.free_materials import affine_operators, reference_of, solids_of
-from skinwave.models.prepared import answer as own_answer
-from skinwave.models.prepared import components
-from skinwave.models.prepared import prepare as own_body
+from skinwave.models.reduced import answer as own_answer
+from skinwave.models.reduced import components
+from skinwave.models.reduced import prepare as own_body
 from skinwave.scene.scene import BODIES, Placement, Scene
 from skinwave.scene.variation import DesignPoint
 from skinwave.sweeps import reductions
@@ -74,7 +74,7 @@ def test_the_waveform_from_rest_is_that_of_the_sheets_own_body_and_balances_ener
     moving = np.linalg.norm(expected.values - expected.values.mean(axis=0))
     assert np.linalg.norm(found.values - expected.values) < 1e-3 * moving
     assert found.effort.energy_imbalance < 1e-6
-    free = [np.abs(each.body.poles.values).min() for each in (parametric.at(prepared, values), own)]
+    free = [np.abs(each.poles.values).min() for each in (parametric.at(prepared, values), own)]
     assert free[0] == pytest.approx(free[1], rel=1e-4)
 
 

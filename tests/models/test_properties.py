@@ -33,7 +33,7 @@ from skinwave.bodies.supports import CONDITIONS
 from skinwave.models import named
 from skinwave.models.advice import takes
 from skinwave.models.options import SolveOptions
-from skinwave.models.prepared import prepare
+from skinwave.models.reduced import prepare
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute, simulate
 
@@ -320,8 +320,8 @@ def test_a_body_turned_by_half_a_turn_answers_a_circle_the_same(tacton, kind, di
     body = Body(kind=kind, width=0.03, height=0.03, depth=0.006, sides="clamped")
     probes = turned(distance, np.array([angle, angle + np.pi]))
     prepared = prepare(body, probes, h=0.006)
-    hertz, forces = reduced_lines(load, prepared.body.points, prepared.body.load)
-    motion = fem.line_response(prepared.body.poles, forces, hertz)[0]
+    hertz, forces = reduced_lines(load, prepared.points, prepared.forces)
+    motion = fem.line_response(prepared.poles, forces, hertz)[0]
     lines = np.abs(motion @ prepared.read.T)
     np.testing.assert_allclose(lines[:, 0], lines[:, 1], rtol=0, atol=2e-3 * lines.max())
 

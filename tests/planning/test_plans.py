@@ -14,7 +14,7 @@ from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.bodies.slab import cell_layers
 from skinwave.models.full import harmonic_answer
 from skinwave.models.options import SolveOptions
-from skinwave.models.prepared import answer, prepare
+from skinwave.models.reduced import answer, prepare
 from skinwave.planning.estimates import (
     side_reflections,
 )

@@ -10,7 +10,7 @@ import fem
 from simple_model import MovingPressure, Response, Tacton, Trajectory
 from simple_model.layers.tensors import hooke
 from simple_model.load.spectrum import pressure_lines, synthesise
-from skinwave.models.reduction import oscillating, read_at
+from skinwave.models.reduced import oscillating, read_at
 from skinwave.report import films
 from skinwave.report.renderer import renderer  # noqa: F401, in the condition below
 from skinwave.report.styles import style

@@ -25,7 +25,7 @@ from skinwave.measure.predicted import predicted_lines, predicted_waveforms, tar
 from skinwave.models import parametric
 from skinwave.models.meshed import load_in_steps, surface_load
 from skinwave.models.options import SolveOptions
-from skinwave.models.prepared import answer, components, prepare
+from skinwave.models.reduced import answer, components, prepare
 from skinwave.patterns.conversion import write_pattern
 from skinwave.patterns.pattern import Options
 from skinwave.planning.extent import symmetry
