@@ -6,8 +6,8 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import Response
-from skinwave.models import Model, register
-from skinwave.models.limits import Limit, of_body, plain_only
+from skinwave.models import Limit, Model, register
+from skinwave.models.limits import of_body, plain_only
 from skinwave.models.options import SolveOptions
 from skinwave.scene.scene import Body, Scene
 

@@ -180,7 +180,7 @@ def models() -> str:
 
 def _takes(model: Any, body: Any) -> str:
     from simple_model import MovingPressure, Tacton
-    from skinwave.models.advice import takes
+    from skinwave.models.limits import takes
     from skinwave.scene.scene import Scene
 
     scene = Scene(pressure=MovingPressure(tacton=Tacton()), body=body, probes=((0.0, 0.0),))

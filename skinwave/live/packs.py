@@ -13,7 +13,7 @@ from skinwave.bodies.analytic import has_exact_waves, is_laterally_infinite
 from skinwave.live.elements import element_pack
 from skinwave.live.radial import radial_pack
 from skinwave.live.sheets import sheet_pack
-from skinwave.models.advice import takes
+from skinwave.models.limits import takes
 from skinwave.models.plate_modes import MODES
 from skinwave.scene.scene import Body, Scene
 from skinwave.system.effort import Progress, silent, versions

@@ -12,7 +12,7 @@ from simple_model.layers.flat_body import steady_lines
 from skinwave.bodies.analytic import compliance, has_exact_waves, is_laterally_infinite
 from skinwave.live.radial import LOWEST
 from skinwave.live.values import values_of
-from skinwave.models.advice import takes
+from skinwave.models.limits import takes
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.plate_modes import steady_lines as plate_lines
 from skinwave.models.reduced import answer, components, prepare

@@ -17,8 +17,8 @@ from skinwave.measure.observed import KINDS, data_of
 from skinwave.measure.parameters import Parameter, check, of_scene, parse
 from skinwave.measure.predicted import Target, target, with_reduction
 from skinwave.measure.search import Problem, Solution, solve
-from skinwave.models.advice import takes
 from skinwave.models.flat_body import FLAT_BODY
+from skinwave.models.limits import takes
 from skinwave.scene.distributions import Distribution, parent_of
 from skinwave.scene.file import to_table, with_distributions
 from skinwave.scene.keys import DERIVED, LOSSES, SCALES, write_material

@@ -31,9 +31,9 @@ from skinwave.measure.parameters import (
     of_scene,
 )
 from skinwave.models import Model, named, parametric
-from skinwave.models.advice import check_taken
 from skinwave.models.covering import covering, tried_together
 from skinwave.models.flat_body import fields_read
+from skinwave.models.limits import check_taken
 from skinwave.models.options import SolveOptions, sample_times
 from skinwave.models.parametric import ParametricBody
 from skinwave.planning.simulate import compute

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from meshes.tetmesh import Floats
     from simple_model import Response
     from skinwave.bodies import Body
-    from skinwave.models.limits import Limit
     from skinwave.models.options import SolveOptions
     from skinwave.scene.scene import Scene
 
@@ -35,10 +34,21 @@ BUILT_IN = {  # name -> the file that registers it
 }
 
 
-def _plain_only(scene: "Scene") -> "Iterable[Limit]":
-    from skinwave.models.limits import plain_only
+@dataclass(frozen=True, kw_only=True)
+class Limit:
+    """Limit of a model that a scene is beyond.
 
-    return plain_only(scene)
+    Parameters
+    ----------
+    why : str, what the model takes, and not what the scene has: "takes a flat sheet, not a curled
+        one"
+    cure : str, how to change the scene, in the imperative; "" if no change of it would help
+    change : the scene -> the scene so changed
+    """
+
+    why: str
+    cure: str = ""
+    change: "Callable[[Scene], Scene] | None" = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -51,8 +61,8 @@ class Model:
     method : str, in a plan: what is computed, in a few words
     words : str, on pages: what it computes and leaves out, one clause
     solve : response of a scene at times (t,) in s, equally spaced from 0, with some options
-    limits : of a scene with a body, each `Limit` of the model that it is beyond; none if the model
-        takes it; the displacement of the surface under a pressure alone if not given
+    limits : of a scene with a body, each `Limit` of the model that it is beyond; if not given, it
+        takes the displacement of the surface under a pressure alone
     error : expected relative error with elements of a size in metre, nan if it is unknown; None for
         linear waves, whose error a plan estimates by reflections and transient, or mesh refinement
     default_size : element size in metre for a body; None without a mesh
@@ -73,7 +83,7 @@ class Model:
     method: str
     words: str
     solve: "Callable[[Scene, Floats, SolveOptions], Response]"
-    limits: "Callable[[Scene], Iterable[Limit]]" = _plain_only
+    limits: "Callable[[Scene], Iterable[Limit]] | None" = None
     error: "Callable[[Scene, float | None], float] | None" = lambda scene, h: nan
     default_size: "Callable[[Body], float] | None" = None
     seconds: float = 0.1

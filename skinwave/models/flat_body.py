@@ -20,14 +20,13 @@ from simple_model.layers.wavenumber_integral import Field
 from simple_model.load.focus import gaussian_width
 from skinwave.bodies.analytic import compliance, stack
 from skinwave.bodies.parts import FLAT
-from skinwave.models import Model, register
+from skinwave.models import Limit, Model, register
 from skinwave.models.laws import has_table
 from skinwave.models.limits import (
-    Limit,
     load_limit,
     of_alike_directions,
     of_body,
-    of_material,
+    of_part,
     read_at_surface,
     reading_limit,
 )
@@ -126,7 +125,7 @@ def _steady_limits(scene: Scene) -> Iterator[Limit]:
 def _with_loss(scene: Scene) -> Scene:
     """The scene with a loss tangent of a tenth at 100 Hz."""
     viscosity = 0.1 * scene.body.solid.shear_modulus / (2 * np.pi * 100)
-    return of_material(viscosity=viscosity)(scene)
+    return of_part("solid", viscosity=viscosity)(scene)
 
 
 def field_read(scene: Scene, depth: float) -> Field:

@@ -14,10 +14,10 @@ from simple_model.numbers import significant
 from skinwave.bodies.body import Body
 from skinwave.bodies.parts import PHALANX, PLAIN
 from skinwave.bodies.sizes import check_mesh, default_size
-from skinwave.models import Model, register
+from skinwave.models import Limit, Model, register
 from skinwave.models.full import harmonic_answer, transient_answer
 from skinwave.models.laws import has_own_law
-from skinwave.models.limits import Limit, of_air_in_a_frame, of_body, of_vacuum
+from skinwave.models.limits import of_air_in_a_frame, of_body, of_vacuum
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import answer, prepare, reduction_tolerance
 from skinwave.scene.scene import Scene

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from meshes.tetmesh import Floats
 from simple_model import Response, point_kernel, point_kernel_published
 from simple_model.quantities import PRESSURE
-from skinwave.models import Model, register
-from skinwave.models.limits import Limit, load_limit
+from skinwave.models import Limit, Model, register
+from skinwave.models.limits import load_limit
 from skinwave.models.options import SolveOptions
 from skinwave.scene.scene import Scene
 

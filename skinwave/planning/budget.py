@@ -21,7 +21,7 @@ from simple_model.layers.flat_body import steady_lines
 from simple_model.numbers import percent, significant, stated_error
 from simple_model.typing import Complex
 from skinwave.bodies.analytic import flattened
-from skinwave.models.advice import takes
+from skinwave.models.limits import takes
 from skinwave.models.plate_modes import MODES
 from skinwave.models.plate_modes import steady_lines as steady_lines_of_plate
 from skinwave.planning.records import PlanRow

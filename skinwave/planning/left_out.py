@@ -32,8 +32,8 @@ from skinwave.bodies.coat import coarsest_size
 from skinwave.bodies.mounting import FRAME
 from skinwave.bodies.sizes import default_size
 from skinwave.models import Model, named
-from skinwave.models.advice import takes
 from skinwave.models.laws import STRONG, own_laws, relaxing, series_tolerance
+from skinwave.models.limits import takes
 from skinwave.models.options import SolveOptions, sample_times
 from skinwave.models.plate_modes import FROM_REST, middle_compliance, relative_modulus
 from skinwave.models.reduced import ReducedBody, answer, prepare, reduced_forces, steady_waveforms

@@ -15,8 +15,8 @@ import numpy as np
 
 from simple_model import Response
 from skinwave.models import named
-from skinwave.models.advice import check_taken
 from skinwave.models.laws import check_laws
+from skinwave.models.limits import check_taken
 from skinwave.models.options import SolveOptions, from_first, sample_grid
 from skinwave.models.reduced import answer
 from skinwave.planning.plan import plan

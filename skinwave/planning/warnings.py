@@ -6,7 +6,7 @@ from simple_model import Response
 from simple_model.load.line_names import line_names
 from simple_model.load.sampling import step
 from skinwave.models import Model, named
-from skinwave.models.advice import cures_for, in_words
+from skinwave.models.limits import cures_for, in_words
 from skinwave.models.reduced import BAND
 from skinwave.planning.estimates import mean_gain, spot_scale
 from skinwave.planning.left_out import LINEAR, bent, stretching_left_out

@@ -19,8 +19,8 @@ from simple_model.choices import choose
 from simple_model.quantities import DISPLACEMENT, QUANTITIES
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.models import named
-from skinwave.models.advice import takes
 from skinwave.models.flat_body import FLAT_BODY
+from skinwave.models.limits import takes
 from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD

@@ -15,7 +15,7 @@ from meshes import Palm
 from simple_model import Material, MovingPressure, PronyTerm, Trajectory
 from simple_model.layers.material import PRESETS
 from simple_model.load.drive import PUBLISHED, beyond_published
-from skinwave.models.advice import takes
+from skinwave.models.limits import takes
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.stretched_plate import STRETCHED
 from skinwave.planning.estimates import response_spectrum

@@ -20,7 +20,7 @@ from skinwave.measure.comparison import (
     measured_places,
 )
 from skinwave.models import named
-from skinwave.models.advice import check_taken
+from skinwave.models.limits import check_taken
 from skinwave.models.linear_elements import FEM
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import ReducedBody, answer, prepare

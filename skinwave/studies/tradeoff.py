@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 from simple_model import Response, lines, resolved_lines
 from skinwave.bodies.sizes import default_size
 from skinwave.models import named, names
-from skinwave.models.advice import takes
 from skinwave.models.flat_body import FLAT_BODY
+from skinwave.models.limits import takes
 from skinwave.models.linear_elements import FEM
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.plate_modes import MODES as PLATES

@@ -15,8 +15,8 @@ import numpy as np
 from meshes.tetmesh import Floats
 from simple_model.choices import choose
 from simple_model.numbers import significant
-from skinwave.models.advice import takes
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
+from skinwave.models.limits import takes
 from skinwave.scene.scene import Scene
 from skinwave.scene.spreads import PRESSURE, Spread, spreads_of
 from skinwave.scene.variation import DesignPoint, Variation

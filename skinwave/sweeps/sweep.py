@@ -13,8 +13,8 @@ from simple_model import Response
 from simple_model.choices import choose
 from skinwave.bodies.analytic import is_flat_layer, is_laterally_infinite
 from skinwave.models import named, names
-from skinwave.models.advice import default_model, takes
 from skinwave.models.flat_body import FLAT_BODY
+from skinwave.models.limits import default_model, takes
 from skinwave.models.reduced import answer
 from skinwave.planning.assessment import assessed
 from skinwave.planning.plan import plan

@@ -18,7 +18,7 @@ from skinwave.bodies.build import build, operators
 from skinwave.bodies.mounting import EDGES, Mounting
 from skinwave.bodies.sheet import air_mass, bending_equivalent, bending_wavenumber
 from skinwave.models import named
-from skinwave.models.advice import beyond
+from skinwave.models.limits import beyond
 from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import middle_compliance, plate_of
 from skinwave.models.reduced import prepare

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from skinwave.models import named, names
-from skinwave.models.advice import Refused, check_taken, takers, takes
+from skinwave.models.limits import Refused, check_taken, takers, takes
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads

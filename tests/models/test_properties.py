@@ -31,7 +31,7 @@ from simple_model.load.trajectory import SWEEPS
 from skinwave import BODIES, Body, Scene, SkinwaveWarning, dumps, loads
 from skinwave.bodies.supports import CONDITIONS
 from skinwave.models import named
-from skinwave.models.advice import takes
+from skinwave.models.limits import takes
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import prepare
 from skinwave.planning.plan import plan

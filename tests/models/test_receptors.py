@@ -17,7 +17,7 @@ from simple_model.load.focus import spot_width
 from skinwave.bodies.parts import Layer
 from skinwave.commands.cli import main
 from skinwave.models import named
-from skinwave.models.advice import check_taken, takes
+from skinwave.models.limits import check_taken, takes
 from skinwave.models.meshed import probe_rows
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads

@@ -21,7 +21,7 @@ from meshes import middle_plane, sheet
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.quantities import QUANTITIES
 from skinwave.models import named
-from skinwave.models.advice import check_taken
+from skinwave.models.limits import check_taken
 from skinwave.models.meshed import probe_rows, surface_load
 from skinwave.models.sheet_probes import full_reader, modal_reader
 from skinwave.models.stretching import meshed_sheet, stretching_body

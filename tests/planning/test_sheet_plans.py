@@ -10,7 +10,7 @@ from simple_model import MovingPressure, Tacton, Trajectory, from_young
 from skinwave import plan
 from skinwave.bodies.mounting import Mounting
 from skinwave.models import named
-from skinwave.models.advice import cures_for
+from skinwave.models.limits import cures_for
 from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.planning.plan import chosen_model, why_modes
