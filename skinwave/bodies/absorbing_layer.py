@@ -34,7 +34,8 @@ def has_layer(body: Body) -> bool:
 
 
 def layer_of(body: Body, wider: float = 1.0) -> AbsorbingLayer:
-    """Absorbing layer of a slab.
+    """Absorbing layer of a slab, so many times `wider` than usual for estimates of what it
+    reflects.
 
     Dashpots alone reflect a quarter of a shear wave at 30 degrees. Lengths are multiples of the
     depth, at most that whose first mode cuts on at `LOWEST_CUT_ON`. On a rigid base waves are long
@@ -42,15 +43,6 @@ def layer_of(body: Body, wider: float = 1.0) -> AbsorbingLayer:
     the motion at the focus at any line, that of dashpots alone 17 % (`skinwave.verify.waves`). A
     free or elastic base has bending waves at any frequency, which a layer has to damp alone. Above
     an absorbing base waves are spherical, and as long as those of the lowest material.
-
-    Parameters
-    ----------
-    body : Body, a slab
-    wider : how many times as wide the layer is, for estimates of what it reflects
-
-    Returns
-    -------
-    AbsorbingLayer
     """
     speed = body.solid.shear_speed
     longest = speed / (4 * LOWEST_CUT_ON)
@@ -74,18 +66,7 @@ def layer_line(layer: AbsorbingLayer, half: Floats) -> Floats:
 
 
 def layer_drag(body: Body, layer: AbsorbingLayer, mesh: TetMesh) -> Floats:
-    """Damping profile of the absorbing layer: 0 in the body, quadratic beyond it.
-
-    Parameters
-    ----------
-    body : Body
-    layer : AbsorbingLayer
-    mesh : TetMesh, of m elements
-
-    Returns
-    -------
-    (m,) float, 1/s
-    """
+    """Damping (m,) in 1/s of the elements of a mesh: 0 in the body, quadratic beyond it."""
     ends = np.array([body.width / 2, body.height / 2, body.depth])
     middles = np.abs(mesh.points[mesh.tets[:, :4]].mean(axis=1))
     beyond = np.clip(middles - ends, 0.0, None).max(axis=1) / layer.width
@@ -93,7 +74,7 @@ def layer_drag(body: Body, layer: AbsorbingLayer, mesh: TetMesh) -> Floats:
 
 
 def far_springs(body: Body, mesh: TetMesh) -> Support:
-    """Springs at the end of the absorbing layer of a body on a half-space.
+    """Springs at the end of the absorbing layer of a slab on a half-space.
 
     The half-space beyond resists as it does where a force acts at the origin: of incompressible
     tissue the traction is radial, 3 P c / (2 pi r^2) with the cosine c of the angle to the force,
@@ -102,15 +83,6 @@ def far_springs(body: Body, mesh: TetMesh) -> Support:
     normal n is
 
         k = 12 mu c^2 |n r| / (r (1 + 3 c^2))    with the unit vector r from the origin
-
-    Parameters
-    ----------
-    body : Body, a slab
-    mesh : TetMesh, with its absorbing layer
-
-    Returns
-    -------
-    Support
     """
     facets = np.vstack([mesh.facets[name] for name in ("bottom", "sides")])
     points, normals = facet_points(mesh, facets), facet_normals(mesh, facets).reshape(-1, 3)

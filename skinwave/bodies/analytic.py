@@ -34,12 +34,7 @@ def is_laterally_infinite(body: Body) -> bool:
 
 def compliance(body: Body) -> Compliance:
     """Compliance of an infinite body of the same section; where its directions differ, that of
-    their means.
-
-    Raises
-    ------
-    ValueError
-        If there is no body, or it has no wavenumber integral.
+    their means. Raises a ValueError if it has no wavenumber integral.
     """
     if body.of_kind.compliance is None:
         raise ValueError(
@@ -50,13 +45,8 @@ def compliance(body: Body) -> Compliance:
 
 
 def stack(body: Body) -> Stack:
-    """Layers of a slab as infinite ones. An absorbing base radiates as a half-space of the
-    lowest material does, which is there instead.
-
-    Raises
-    ------
-    ValueError
-        If the body is no slab.
+    """Layers of a slab as infinite ones; raises a ValueError of another kind. An absorbing base
+    radiates as a half-space of the lowest material does, which is there instead.
     """
     if not body.of_kind.is_layer:
         raise ValueError(f"a body of kind '{body.kind}' is no stack of flat layers; take a slab")
@@ -77,20 +67,8 @@ def flattened(body: Body) -> Stack:
 
 
 def dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
-    """Dispersion curves of a laterally infinite body of the same section.
-
-    Parameters
-    ----------
-    body, frequencies, most : the body, (f,) Hz, above 0 and ascending, and how many modes
-
-    Returns
-    -------
-    DispersionCurves
-
-    Raises
-    ------
-    ValueError
-        If its kind has none, as there is no body or it has no uniform depth.
+    """Dispersion curves, `most` modes at frequencies (f,) in Hz that ascend, of a laterally
+    infinite body of the same section. Raises a ValueError if its kind has none.
     """
     if body.of_kind.dispersion is None:
         raise ValueError(
@@ -101,14 +79,5 @@ def dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
 
 
 def stack_dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
-    """Dispersion curves of a body's layers.
-
-    Parameters
-    ----------
-    body, frequencies, most : as for `dispersion`
-
-    Returns
-    -------
-    DispersionCurves
-    """
+    """Dispersion curves of a body's layers, as of `dispersion`."""
     return dispersion_curves(flattened(body), frequencies, most=most)

@@ -58,22 +58,10 @@ def build(
 ) -> Build:
     """Mesh of a body with its materials and boundary conditions.
 
-    Parameters
-    ----------
-    body : Body
-    h : metre, element size; the default of the body if not given
-    symmetry : axes, of "xy", across whose middle plane the load is its own mirror image: only the
-        part with positive coordinates is meshed, with symmetry conditions on these planes
-    discretise : instead of that of its kind
-
-    Returns
-    -------
-    Build
-
-    Raises
-    ------
-    ValueError
-        If the body is "none", or would have too many degrees of freedom.
+    `h` is the element size in metre, by default that of the body. Across the axes of `symmetry`, of
+    "xy", the load is its own mirror image: only the part with positive coordinates is meshed, with
+    symmetry conditions. `discretise` replaces that of the kind. Raises a ValueError if the body has
+    no such mesh.
     """
     size = checked(body, h or default_size(body), COMPARED)
     discretise = discretise or body.of_kind.discretise

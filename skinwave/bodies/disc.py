@@ -25,16 +25,8 @@ def discretise(body: Body, h: float) -> Discretised:
 
 
 def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
-    """Mesh of the thickest disc whose layers are stretched to those of another.
-
-    Parameters
-    ----------
-    thinnest, thickest : Body, of one diameter and the same layers, between which others are
-    h : metre, element size of the thickest
-
-    Returns
-    -------
-    Function as `discretise`, of a disc and an element size that it leaves as it is
+    """Mesh of the thickest disc with elements of h in metre, whose layers are stretched to those of
+    another: a function as `discretise`.
     """
     mesh = discretise(thickest, h).mesh
 

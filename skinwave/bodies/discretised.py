@@ -45,17 +45,8 @@ Discretise = Callable[[Any, float], Discretised]  # of a body, with elements of 
 
 
 def in_layers(mesh: TetMesh, strata: Strata, depths: Floats) -> tuple[TetMesh, list[Material]]:
-    """Mesh whose regions are strata.
-
-    Parameters
-    ----------
-    mesh : TetMesh
-    strata : depths in metre where each begins, from 0, and materials
-    depths : (m,) float, metre, of each element
-
-    Returns
-    -------
-    TetMesh, and materials by region
+    """Mesh whose regions are strata, by the depth (m,) in metre of each element; and materials by
+    region.
     """
     starts, materials = zip(*strata, strict=True)
     region = np.searchsorted(starts[1:], depths, side="right")

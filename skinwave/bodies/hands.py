@@ -34,18 +34,9 @@ def in_its_layers(
     mesh: TetMesh,
     rest: Callable[[TetMesh], fem.Support] | None = None,
 ) -> Discretised:
-    """Hand in its layers, those that its elements do not resolve as a coat, and its regions.
-
-    Parameters
-    ----------
-    body : Body
-    h : metre, size of its elements
-    mesh : with its facets and regions
-    rest : the support of a mesh; below, by the normals of its facets, if not given
-
-    Returns
-    -------
-    Discretised
+    """Hand of a mesh with elements of h in metre: in its layers, those that its elements do not
+    resolve as a coat, and its regions. `rest` is the support of a mesh, by default below, by the
+    normals of its facets.
     """
     region = mesh.region
     rest = rest or (lambda m: support(body, m, facet_normals(m, boundary_facets(m.tets))))
@@ -57,25 +48,15 @@ def in_its_layers(
 def support(
     body: Body, mesh: TetMesh, outward: Floats, ends: Sequence[tuple[str, Floats]] = ()
 ) -> fem.Support:
-    """Elastic and absorbing support of a hand where no facet set is given: bone below, and at the
-    ends of a palm the tissue that it is cut from.
+    """Elastic and absorbing support of a hand, over all of its boundary, where no facet set is
+    given: bone below, and at the `ends` of a palm the tissue that it is cut from, each with its
+    condition and the cosine (k q,) of its direction with the `outward` normals (k q, 3).
 
     Of a surface whose normal has a cosine c with either direction, a share s is supported, which
     rises smoothly from 0 at c = 0.2 to 1 at 1. Where that is clamped it rests on soft tissue over
     bone, whose thickness falls from infinite to next to nothing as the share rises: springs of
     mu/d s/(1 - s + 1e-6) per area, with the mean thickness d of the body. Where it is elastic, the
     share has the springs of the base; where it is absorbing, dashpots.
-
-    Parameters
-    ----------
-    body : Body
-    mesh : as it lies before it is placed
-    outward : unit normals (k q, 3) out of the body at the points of its facets
-    ends : of more surfaces than its base, the condition and the cosine (k q,) with their direction
-
-    Returns
-    -------
-    fem.Support, over all of the boundary
     """
     below = [] if "bottom" in mesh.facets else [(body.base, -outward[:, 2])]
     stiffness, absorbed = np.zeros((2, len(outward)))

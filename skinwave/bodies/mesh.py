@@ -20,11 +20,6 @@ def discretise(body: Body, h: float) -> Discretised:
 
     The facet sets are `top`, seen from above, the file's own `bottom`, and `sides` where it was cut
     or has a set of that name. All else that it rests on is its support.
-
-    Raises
-    ------
-    MeshError
-        If the body cannot be meshed, or its regions are not those of its file.
     """
     mesh = quadratic(body_from_file(body.file, h, unit=body.unit, up=body.up))
     cut = [mesh.facets[name] for name in ("cut", "sides") if name in mesh.facets]

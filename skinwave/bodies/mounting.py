@@ -121,18 +121,7 @@ FRAME = Mounting()
 
 
 def check_extent(mounting: Mounting, width: float, height: float) -> None:
-    """Refuse clips beyond a sheet, and a curl that is not shallow.
-
-    Parameters
-    ----------
-    mounting : Mounting
-    width, height : float, metre, of the sheet
-
-    Raises
-    ------
-    ValueError
-        If the middle of a clip is off the sheet, or it rises by more than `STEEPEST` of a side.
-    """
+    """Refuse clips beyond a sheet of a width and height in metre, and a curl that is not shallow."""
     for name, side in (("curl_x", width), ("curl_y", height)):
         if not abs(curl := getattr(mounting, name)) <= STEEPEST * side:
             raise ValueError(
@@ -148,18 +137,8 @@ def check_extent(mounting: Mounting, width: float, height: float) -> None:
 
 
 def clip_lines(mounting: Mounting, axis: int, size: float) -> list[float]:
-    """Places of the sides of clips that are within a sheet, and of lines beside them, as the
-    curvature has no bound at their corners.
-
-    Parameters
-    ----------
-    mounting : Mounting
-    axis : 0 for x, 1 for y
-    size : metre, of the sheet along it
-
-    Returns
-    -------
-    Coordinates in metre, ascending
+    """Places in metre, ascending, along an axis of a sheet of a size: of the sides of its clips,
+    and of lines beside them, as the curvature has no bound at their corners.
     """
     reach = mounting.clip_radius
     sides = [clip[axis] + turn * reach for clip in mounting.clips for turn in (-1, 1) if reach]

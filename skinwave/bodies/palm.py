@@ -40,11 +40,6 @@ CELL = 0.85
 def discretise(body: Body, h: float) -> Discretised:
     """Ten-node tetrahedra of h in metre about the middle of the palm, growing away from it; all
     that it rests on is its support, bone below, and at its ends the tissue that it is cut from.
-
-    Raises
-    ------
-    MeshError
-        If it cannot be meshed.
     """
     try:
         mesh = mapped_palm(body.palm, *body_lines(body, h))
@@ -57,21 +52,8 @@ def discretise(body: Body, h: float) -> Discretised:
 
 
 def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
-    """Mesh of the thinnest palm, as fine as that of the thickest, stretched to another.
-
-    Parameters
-    ----------
-    thinnest, thickest : Body, between which others are; they differ by the thickness, or a coat's
-    h : metre, element size of the thickest
-
-    Returns
-    -------
-    Function as `discretise`, of a palm and an element size that it leaves as it is
-
-    Raises
-    ------
-    ValueError
-        If elements would have to follow layers, or the mesh cannot be stretched so far.
+    """Mesh of the thinnest palm, as fine as that of the thickest with elements of h in metre,
+    stretched to another: a function as `discretise`.
     """
     check_morph(thinnest, thickest, h)
     x, y, z = body_lines(thickest, h)
@@ -87,16 +69,8 @@ def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
 
 
 def check_morph(thinnest: Body, thickest: Body, h: float) -> None:
-    """Refuse layers that elements would have to follow.
-
-    Parameters
-    ----------
-    thinnest, thickest, h : ends of a range, and the element size in metre
-
-    Raises
-    ------
-    ValueError
-        If the layers of a palm are no coat.
+    """Refuse layers of a palm that are no coat, which elements would have to follow, and a relief
+    that changes with the thickness.
     """
     if replace(thinnest.palm, thickness=thickest.depth) != thickest.palm:
         raise ValueError(

@@ -15,25 +15,9 @@ from skinwave.bodies.parts import solid_of
 def in_regions(
     body: Body, mesh: TetMesh, materials: Sequence[Material], region: Ints, source: str
 ) -> tuple[TetMesh, list[Material]]:
-    """Mesh whose regions are those of its materials.
-
-    Parameters
-    ----------
-    body : Body, whose `regions` name regions of the mesh
-    mesh : TetMesh, with the materials where none of these is
-    materials : by region of the mesh
-    region : (m,) int, region of each element in the sense of `body.regions`
-    source : of the mesh, for messages
-
-    Returns
-    -------
-    TetMesh, and materials by region
-
-    Raises
-    ------
-    MeshError
-        If it has several regions and the body names none, or has none of a name; or if
-        `body.material` is nowhere.
+    """Mesh whose regions are those of its materials, and materials by region: those of the mesh,
+    and where the `region` (m,) of an element is named in `body.regions`, its own. Raises a
+    MeshError if names and regions of the `source` do not fit, or `body.material` is nowhere.
     """
     named = replace(mesh, region=region)
     if not body.regions and len(np.unique(region)) > 1:

@@ -35,18 +35,8 @@ AIR_TURNS = 30  # each leaves a quarter of the error, or less
 
 
 def discretise(body: Body, h: float, thickness: float | None = None) -> Discretised:
-    """Mesh of a thicker sheet of the same bending stiffness and mass per area.
-
-    Parameters
-    ----------
-    body : Body, a sheet
-    h : metre, element size
-    thickness : of the equivalent in metre, `SHEET_THICKNESS` of the shorter side and
-        `CLIP_THICKNESS` of a clip at most if not given, and no less than the sheet's own
-
-    Returns
-    -------
-    Discretised
+    """Mesh of a thicker sheet of the same bending stiffness and mass per area, with elements of h
+    in metre; its `thickness` is no less than the sheet's own, and by default that of `equivalent`.
     """
     thickness = max(body.depth, thickness or equivalent(body))
     planes = [clip_lines(body.mounting, *each) for each in enumerate((body.width, body.height))]
@@ -127,18 +117,7 @@ def compliance(body: Body) -> Compliance:
 
 
 def dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
-    """Dispersion curves of an infinite sheet: its bending wave and near field.
-
-    Parameters
-    ----------
-    body : Body, a sheet
-    frequencies : (f,) float, Hz
-    most : not asked, as there are two modes
-
-    Returns
-    -------
-    DispersionCurves
-    """
+    """Dispersion curves of an infinite sheet: its bending wave and near field."""
     check_alike(body)
     return sheet_curves(
         body.solid, body.depth, frequencies, air_density=AIR_DENSITY if body.air else 0.0,
@@ -188,15 +167,8 @@ def refuse_open_air(body: Body) -> None:
 
 
 def air(body: Body, build: Build, free: Ints) -> LinearOperator | None:
-    """Added mass of the air around a meshed sheet, for `fem.reduce`.
-
-    Parameters
-    ----------
-    body, build, free : the sheet, its mesh, and (n_free,) int, free degrees of freedom
-
-    Returns
-    -------
-    LinearOperator (n_free, n_free), kg; None in vacuum
+    """Added mass in kg of the air around a meshed sheet, for its free degrees of freedom; None in
+    vacuum.
     """
     if not body.air:
         return None

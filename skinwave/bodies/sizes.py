@@ -27,22 +27,9 @@ def check_mesh(body: Body, h: float) -> None:
 
 
 def checked(body: Body, h: float, slack: float = 1.0) -> float:
-    """Element size, if a body can be meshed with it.
-
-    Parameters
-    ----------
-    body : Body
-    h : metre
-    slack : how many times as coarse as allowed the elements in a layer may be
-
-    Returns
-    -------
-    h
-
-    Raises
-    ------
-    ValueError
-        If there is nothing to mesh, or elements are larger than the body or its layers allow.
+    """Element size h in metre, if a body can be meshed with it; elements in a layer may be `slack`
+    times as coarse as allowed. Raises a ValueError if there is nothing to mesh, or elements are
+    larger than the body or its layers allow.
     """
     if body.of_kind.discretise is None:
         raise ValueError("body kind 'none' has nothing to mesh; choose a sheet or a slab")

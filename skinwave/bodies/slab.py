@@ -28,30 +28,15 @@ GROWTH, COARSEST = (1.4, 1.25), (3.0, 2.0)
 
 
 def discretise(body: Body, h: float, wider: float = 1.0) -> Discretised:
-    """Structured mesh whose elements follow the layers, with any absorbing layer around and below.
-
-    Parameters
-    ----------
-    body, h, wider : element size in metre; width of the absorbing layer over its usual width
-
-    Returns
-    -------
-    Discretised
+    """Structured mesh whose elements follow the layers, with any absorbing layer around and below,
+    so many times `wider` than usual.
     """
     return on_lines(body, body_lines(body, h), wider)
 
 
 def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
-    """Mesh of the thickest body whose layers are stretched to those of another.
-
-    Parameters
-    ----------
-    thinnest, thickest : Body, of the same layers, between which others are
-    h : metre, element size of the thickest
-
-    Returns
-    -------
-    Function as `discretise`, of a body and an element size that it leaves as it is
+    """Mesh of the thickest slab with elements of h in metre, whose layers are stretched to those of
+    another: a function as `discretise`.
     """
     x, y, z = body_lines(thickest, h)
     before = thickest.interfaces
@@ -59,17 +44,8 @@ def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
 
 
 def on_lines(body: Body, lines: Lines, wider: float = 1.0) -> Discretised:
-    """Structured mesh on grid lines, with any absorbing layer around and below it.
-
-    Planes between layers are met instead of lines that are close to them.
-
-    Parameters
-    ----------
-    body, lines, wider : three arrays (n,) in metre, through the body; as for `discretise`
-
-    Returns
-    -------
-    Discretised
+    """Structured mesh on grid lines along x, y and z through a body, with any absorbing layer
+    around and below it. Planes between layers are met instead of lines that are close to them.
     """
     x, y, z = lines
     planes = [-start for start, _ in body.strata[1:]]

@@ -58,22 +58,8 @@ class Sides:
 
 
 def complete(sides: str | Sides, known: Sequence[str], kind: str) -> str | Sides:
-    """Sides of a body, those that are not given as usual; one word if all are alike.
-
-    Parameters
-    ----------
-    sides : as given
-    known : names of the sides that a kind of body has
-    kind : its name, for messages
-
-    Returns
-    -------
-    str or Sides
-
-    Raises
-    ------
-    ValueError
-        If the condition is unknown, or a side is named that the kind has not.
+    """Sides of a body, those that are not given as usual; one word if all are alike. `known` are
+    the names of the sides that its kind has. Raises a ValueError for others.
     """
     if isinstance(sides, str):
         choose("sides", sides, CONDITIONS)
@@ -92,20 +78,7 @@ def complete(sides: str | Sides, known: Sequence[str], kind: str) -> str | Sides
 
 
 def check_base(base: str, stiffness: float, *, depth: float, is_plate: bool) -> None:
-    """Refuse a base that is unknown, and an elastic one without its stiffness.
-
-    Parameters
-    ----------
-    base : one of `BASES`
-    stiffness : N/m3, of an elastic one
-    depth : metre, of the body
-    is_plate : bool, whether the body is a sheet
-
-    Raises
-    ------
-    ValueError
-        If it is so.
-    """
+    """Refuse a base that is unknown, and an elastic one without its stiffness in N/m3."""
     choose("base", base, BASES)
     if base != "elastic":
         if stiffness:
@@ -127,18 +100,7 @@ def check_base(base: str, stiffness: float, *, depth: float, is_plate: bool) -> 
 
 
 def bed(mesh: TetMesh, facets: Ints, stiffness: float) -> Support:
-    """Winkler foundation: springs in all directions.
-
-    Parameters
-    ----------
-    mesh : TetMesh
-    facets : (k, a) int, boundary facets
-    stiffness : N/m3, traction per displacement
-
-    Returns
-    -------
-    Support
-    """
+    """Winkler foundation: springs in all directions, of a stiffness in N/m3."""
     k = np.full(len(facet_points(mesh, facets)), stiffness)
     return Support(facets=facets, stiffness=k, absorbed=np.zeros_like(k))
 

@@ -46,19 +46,12 @@ def covering(
     tolerance: float = 0.05,
     hardest: Body | None = None,
 ) -> Covering | None:
-    """Bodies of a scene for one reduction, if that costs less than one for each.
+    """Bodies of a scene for one reduction; None if there are too few `members` for it to cost less
+    than one for each, or no affine sum gives them.
 
-    Parameters
-    ----------
-    scene : Scene
-    free : key of its body -> least and largest value, in the file's unit
-    members : how many bodies there are
-    tolerance : relative error that responses may have
-    hardest : the body with the shortest waves, that of the scene if not given
-
-    Returns
-    -------
-    Covering; None if there are too few members, or no affine sum gives them
+    `free` has the least and largest value of each key, in the file's unit; `tolerance` is the
+    relative error that responses may have; `hardest` the body with the shortest waves, by default
+    that of the scene.
     """
     plain = replace(scene, spreads=())
     try:
@@ -80,11 +73,7 @@ def _least(body: Body, key: FreeKey) -> int:
 
 def reduce_together(found: Covering, options: SolveOptions) -> ParametricBody:
     """Reduced-order model of all bodies, with elements of the default size or h; cached on disk.
-
-    Raises
-    ------
-    ValueError, Diverged
-        If the ranges are wider than one model reaches.
+    Raises a ValueError or Diverged if the ranges are wider than one model reaches.
     """
     free = {key: (low, high) for key, low, high in found.ranges}
     within = min(parametric.TOLERANCE, SHARE * options.tolerance)

@@ -71,13 +71,7 @@ class FreeKey:
 
 
 def free_keys(body: Body, free: Mapping[str, tuple[float, float]]) -> tuple[FreeKey, ...]:
-    """Free keys of a body, checked.
-
-    Raises
-    ------
-    ValueError
-        If a key is none that can be free, or its range is none.
-    """
+    """Free keys of a body; raises a ValueError if a key cannot be free, or has no range."""
     if not free:
         raise ValueError("free = {} names no key; give one, such as body.material.shear_modulus_pa")
     found = tuple(_free_key(body, key, bounds) for key, bounds in free.items())
@@ -109,12 +103,8 @@ def _check_morph(body: Body, keys: Sequence[FreeKey]) -> None:
 
 
 def with_values(body: Body, keys: Sequence[FreeKey], values: Mapping[str, float]) -> Body:
-    """Body with values of its free keys, one for each.
-
-    Raises
-    ------
-    ValueError
-        If a value is missing, out of its range, or not of a free key.
+    """Body with values of its free keys, one for each; raises a ValueError if one is missing, out
+    of its range, or not of a free key.
     """
     if strange := sorted(set(values) - {key.key for key in keys}):
         raise ValueError(
@@ -322,13 +312,7 @@ def has_affine_operators(body: Body) -> bool:
 
 
 def check_scene(scene: Scene, keys: Sequence[FreeKey], tolerance: float) -> None:
-    """Refuse what no affine sum gives for free keys, to a relative error of each line.
-
-    Raises
-    ------
-    ValueError
-        If it is so.
-    """
+    """Refuse what no affine sum gives for free keys, to a relative error of each line."""
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
     _check_load(scene)

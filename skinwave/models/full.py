@@ -120,12 +120,8 @@ def marched(
     report: Progress,
 ) -> tuple[Floats, tuple[float, float]]:
     """Readings (steps + 1, p) of displacements (3 n,) in metre in a time integration, and its last
-    `energy_balance`, by what each state has `stored` in J.
-
-    Raises
-    ------
-    Diverged
-        If the energy balance is violated in one of the states that are checked.
+    `energy_balance`, by what each state has `stored` in J. Raises `fem.Diverged` if the balance is
+    violated in one of the states that are checked.
     """
     found = []
     for k, (state, energies) in enumerate(balanced):
@@ -138,12 +134,8 @@ def marched(
 
 
 def step_count(duration: float, dt: float) -> int:
-    """Number of steps of dt that reach a duration in s.
-
-    Raises
-    ------
-    ValueError
-        If one step is longer, or there are more than `MOST_STEPS`.
+    """Number of steps of dt that reach a duration in s; raises a ValueError if one step is longer,
+    or there are more than `MOST_STEPS`.
     """
     if dt > duration:
         raise ValueError(

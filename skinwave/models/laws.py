@@ -37,11 +37,6 @@ def has_table(body: Body) -> bool:
 def check_laws(body: Body, pressure: MovingPressure) -> None:
     """Refuse a body with a modulus law that is not passive or not causal, or with a table that some
     strong line of the load is outside of by more than an octave below; its mean may be.
-
-    Raises
-    ------
-    ValueError
-        If it has one.
     """
     for solid in own_laws(body):
         solid.series()

@@ -253,7 +253,8 @@ def of_alike_directions(body: Body) -> Iterator[Limit]:
         yield Limit(
             why="takes a sheet alike in all directions, not one stretched by "
             f"{held.tension_x:g} and {held.tension_y:g} N/m along x and y",
-            cure="stretch it alike along both", change=of_part("mounting", tension_x=mean, tension_y=mean),
+            cure="stretch it alike along both",
+            change=of_part("mounting", tension_x=mean, tension_y=mean),
         )  # fmt: skip
     yield from of_flat_sheet(body)
 

@@ -71,13 +71,9 @@ def assembled(build: Build, clock: Clock, report: Progress) -> fem.Operators:
 def energy_balance(
     energies: fem.EnergyBalance, stored: float = 0.0, when: str = ""
 ) -> tuple[float, float]:
-    """Relative error of the energy balance, if small enough to trust a response, and the share of
-    the losses that was radiated: of energies or powers, with the energy `stored` at the end.
-
-    Raises
-    ------
-    Diverged
-        If the error is too large.
+    """Relative error of the energy balance, and the share of the losses that was radiated: of
+    energies or powers, with the energy `stored` at the end. Raises `fem.Diverged` if the error is
+    too large to trust a response.
     """
     imbalance = fem.imbalance(energies, stored)
     if not imbalance <= MOST_IMBALANCE:
@@ -198,24 +194,9 @@ def surface_motion(body: Body, build: Build, probes: Floats) -> sparse.csr_array
 def probe_rows(
     body: Body, build: Build, probes: Floats, reading: Reading
 ) -> tuple[sparse.csr_array, tuple[Material, ...]]:
-    """Probe operator S of what probes read at rest, and the material at each probe.
-
-    Parameters
-    ----------
-    body : Body
-    build : its mesh
-    probes : (p, 2) float, metre
-    reading : Reading
-
-    Returns
-    -------
-    (p c, 3 n) sparse, the c components of a probe next to each other; p materials, none where
-    nothing depends on them
-
-    Raises
-    ------
-    ValueError
-        If a probe is not in the body, or its strain in a coat.
+    """Probe operator S (p c, 3 n) of what probes (p, 2) in metre read at rest, the c components of
+    a probe next to each other, and the material at each probe, none where nothing depends on them.
+    Raises a ValueError if a probe is not in the body, or its strain in a coat.
     """
     asked = reading.asked
     check_coat(build, reading)

@@ -75,12 +75,8 @@ def sample_times(scene: Scene, rate: float = SAMPLE_RATE) -> Floats:
 
 def sample_grid(scene: Scene, times: ArrayLike | None = None) -> tuple[Floats, int]:
     """Times (t,) in s from 0, on which models compute, and the number of the first that is asked
-    for; those of the scene if none are given.
-
-    Raises
-    ------
-    ValueError
-        If they are not evenly spaced, not within the duration, or too many.
+    for; those of the scene if none are given. Raises a ValueError if they are not evenly spaced,
+    not within the duration, or too many.
     """
     if times is None:
         return sample_times(scene), 0

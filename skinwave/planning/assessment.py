@@ -46,14 +46,8 @@ def assessed(
 ) -> Response:
     """Response of a reduced body with its expected error and all warnings.
 
-    Parameters
-    ----------
-    scene : Scene
-    response : Response, of the reduced body
-    prepared : ReducedBody
-    options : SolveOptions; h is the default of the body if not given
-    compared : element size in metre to compare with, and the body with it; chosen if not given
-    meshed : body whose mesh both sizes are of, if its nodes were moved to those of the scene's
+    `compared` is an element size in metre to compare with, and the body with it, else chosen here;
+    `meshed` the body whose mesh both sizes are of, if its nodes were moved to those of the scene's.
     """
     fine = quantity_of_interest(prepared, scene, response)
     return told(scene, response, fine, options, compared=compared, meshed=meshed)

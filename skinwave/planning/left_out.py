@@ -63,11 +63,7 @@ def start_left_out(
 ) -> float:
     """Difference of a steady state from the motion from rest, relative to the latter; 0 of a model
     from rest. `grid` is as of `sample_grid`; of a model of elements its reduced body is given.
-
-    Raises
-    ------
-    ValueError, ArithmeticError
-        If the scene has no steady state.
+    Raises a ValueError or ArithmeticError if the scene has no steady state.
     """
     if not model.is_steady:
         return 0.0

@@ -119,20 +119,9 @@ def refined(
     *,
     symmetry: str = "",
 ) -> Refined:
-    """Coarsest mesh of a sequence that is accurate to a tolerance, or that of a given h, with its
-    expected error; the finest of the sequence if that is not accurate either.
-
-    Parameters
-    ----------
-    scene : Scene, with load and probes
-    body : Body that is meshed, the scene's or a part of it
-    options : SolveOptions
-    symmetry : as in `bodies.build.build`
-
-    Raises
-    ------
-    ValueError
-        If the body has no mesh of that size.
+    """Coarsest mesh of a sequence for a scene's `body`, or a part of it, that is accurate to a
+    tolerance, or that of a given h, with its expected error; the finest of the sequence if that is
+    not accurate either. Raises a ValueError if the body has no mesh of that size.
     """
     h, tolerance = options.h, options.tolerance
 

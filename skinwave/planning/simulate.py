@@ -80,23 +80,8 @@ def simulate(
 
 
 def solve(scene: Scene, required: Plan) -> Response:
-    """Response of a plan, with its expected error and all warnings.
-
-    A model that measures its error with the answer states at least that error.
-
-    Parameters
-    ----------
-    scene : Scene
-    required : Plan of it
-
-    Returns
-    -------
-    Response
-
-    Raises
-    ------
-    ValueError, Diverged
-        As `simulate` does.
+    """Response of a plan of the scene, with its expected error and all warnings; raises what
+    `simulate` does. A model that measures its error with the answer states at least that error.
     """
     options = replace(required.options, model=required.model, h=required.h or required.options.h)
     if required.prepared and named(required.model).is_reduced:
@@ -124,23 +109,8 @@ def _checked(scene: Scene, required: Plan, found: Response) -> Response:
 
 
 def compute(scene: Scene, model: str, **options: Any) -> Response:
-    """Response of one model, not planned, without warnings. Its expected error is unknown, unless
-    the model measures it.
-
-    Parameters
-    ----------
-    scene : Scene
-    model : str, as for `simulate`, without "auto"
-    **options : those of `SolveOptions`
-
-    Returns
-    -------
-    Response
-
-    Raises
-    ------
-    ValueError, Diverged
-        As `simulate` does.
+    """Response of one model, not planned, without warnings, with options of `SolveOptions`. Its
+    expected error is unknown, unless the model measures it. Raises what `simulate` does.
     """
     return _computed(scene, SolveOptions(model=model, **options))
 
