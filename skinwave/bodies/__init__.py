@@ -3,11 +3,10 @@
 Importing this room registers the built-in kinds, in this order.
 """
 
-from skinwave.bodies import none, sheet, slab, palm, mesh, finger, disc  # noqa: F401, I001
+from skinwave.bodies import sheet, slab, palm, mesh, finger, disc  # noqa: F401, I001
 from skinwave.bodies.body import BODIES, KINDS, Body, BodyKind, body_name, kind_of, register
-from skinwave.bodies.mounting import Mounting
 from skinwave.bodies.parts import FLAT, Layer, Phalanx, Placement, Relief, solid_of
-from skinwave.bodies.supports import Sides
+from skinwave.bodies.supports import Mounting, Sides
 
 __all__ = [
     "BODIES", "FLAT", "KINDS",

@@ -17,7 +17,6 @@ from simple_model.layers.compliance import Compliance
 from simple_model.layers.dispersion import DispersionCurves
 from simple_model.layers.material import NOT_SKIN, PRESETS, Material
 from skinwave.bodies.discretised import Discretise, Discretised
-from skinwave.bodies.mounting import FRAME, Mounting, check_extent
 from skinwave.bodies.parts import (
     FLAT,
     PHALANX,
@@ -30,7 +29,15 @@ from skinwave.bodies.parts import (
     check_regions,
     solid_of,
 )
-from skinwave.bodies.supports import USUAL, Sides, check_base, complete
+from skinwave.bodies.supports import (
+    FRAME,
+    USUAL,
+    Mounting,
+    Sides,
+    check_base,
+    check_extent,
+    complete,
+)
 from skinwave.system import extensions
 
 KEYS = {"width": "size_x_mm", "height": "size_y_mm", "depth": "thickness_mm"}  # in a scene file
@@ -372,3 +379,19 @@ def kind_of(name: str) -> BodyKind:
 def body_name(body: Body) -> str:
     """The name of a preset body, or else the kind of a body."""
     return next((name for name, known in BODIES.items() if known == body), body.kind)
+
+
+def _no_wave(body: Body, frequency: float) -> float:
+    raise ValueError("body kind 'none' carries no wave; choose a sheet or a slab")
+
+
+NONE = register(  # what the point kernel acts on
+    BodyKind(
+        name="none",
+        presets={"none": {}},
+        words=lambda body: "none",
+        wave_speed=_no_wave,
+        is_bounded=False,
+        may_be_layered=False,
+    )
+)

@@ -21,9 +21,9 @@ from meshes.shapes.palm import gradient
 from meshes.shapes.structured import Lines, mirrored
 from skinwave.bodies.analytic import stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
-from skinwave.bodies.coat import meshed_strata, thickest_coat
 from skinwave.bodies.discretised import Discretise, Discretised
 from skinwave.bodies.hands import HAND_CELL, hand_size, in_its_layers, support
+from skinwave.bodies.sizes import meshed_strata, thickest_coat
 
 COARSEST = 2.0  # elements far from the middle, over those of h
 RIM = 0.7  # elements at the rim of a palm, over the radius of its edge

@@ -22,7 +22,7 @@ from simple_model.plates.sheet_waves import sheet_curves
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.build import Build
 from skinwave.bodies.discretised import Discretised
-from skinwave.bodies.mounting import Mounting, clip_lines, held
+from skinwave.bodies.supports import Mounting, clip_lines, held
 
 SHEET_CELLS = 60  # along the shorter side: f1 within 0.1 %, deflection within 0.6 %
 # A sheet bends like one of this relative thickness with the same bending stiffness and mass per

@@ -19,8 +19,8 @@ from skinwave.bodies.absorbing_layer import (
 from skinwave.bodies.analytic import stack, stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretise, Discretised, in_layers
-from skinwave.bodies.mounting import EDGES
 from skinwave.bodies.parts import Layer
+from skinwave.bodies.supports import EDGES
 
 SLAB_CELL = 3e-3  # m: two thirds of the focal spot's standard deviation
 # From cell to cell along the surface and downwards, and the coarsest cell over the finest.

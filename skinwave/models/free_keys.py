@@ -16,10 +16,10 @@ from simple_model.layers.material import Material
 from simple_model.load.spectrum import load_lines
 from simple_model.quantities import STRAIN
 from skinwave.bodies import Body
-from skinwave.bodies.mounting import FRAME
 from skinwave.bodies.parts import solid_of
 from skinwave.bodies.sheet import refuse_open_air
 from skinwave.bodies.sizes import default_size
+from skinwave.bodies.supports import FRAME
 from skinwave.models.laws import check_laws
 from skinwave.scene.keys import MATERIAL, MODULI, PRONY, SCALES, SECTIONS, with_key, write_material
 from skinwave.scene.scene import Scene

@@ -28,7 +28,7 @@ from simple_model.plates.modes import (
 from simple_model.plates.path_forces import modal_path_forces
 from simple_model.typing import Complex
 from skinwave.bodies.body import Body
-from skinwave.bodies.mounting import EDGES
+from skinwave.bodies.supports import EDGES
 from skinwave.models import Limit, Model, register
 from skinwave.models.laws import has_own_law
 from skinwave.models.limits import of_body, of_held_sheet, surface_motion

@@ -15,7 +15,7 @@ from simple_model.load.trajectory import BY_POINTS
 from simple_model.quantities import DISPLACEMENT
 from simple_model.typing import Complex
 from skinwave.bodies.analytic import compliance, is_flat_layer, is_laterally_infinite, stack
-from skinwave.bodies.mounting import EDGES
+from skinwave.bodies.supports import EDGES
 from skinwave.scene.scene import Body, Scene
 
 REFLECTED = 0.03  # reflection coefficient of an absorbing side and the layer around it

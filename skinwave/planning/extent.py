@@ -14,9 +14,9 @@ import fem
 from meshes.tetmesh import Floats
 from skinwave.bodies.absorbing_layer import has_layer, layer_of
 from skinwave.bodies.analytic import is_flat_layer
-from skinwave.bodies.mounting import EDGES
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.bodies.slab import discretise
+from skinwave.bodies.supports import EDGES
 from skinwave.models.meshed import mirrored_axes
 from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.reduced import answer, prepare, reduction_tolerance

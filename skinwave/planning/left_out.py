@@ -28,9 +28,8 @@ from simple_model.load.focus import spot_width
 from simple_model.load.spectrum import load_lines
 from simple_model.quantities import DISPLACEMENT
 from skinwave.bodies.analytic import compliance
-from skinwave.bodies.coat import coarsest_size
-from skinwave.bodies.mounting import FRAME
-from skinwave.bodies.sizes import default_size
+from skinwave.bodies.sizes import coarsest_size, default_size
+from skinwave.bodies.supports import FRAME
 from skinwave.models import Model, named
 from skinwave.models.laws import STRONG, own_laws, relaxing, series_tolerance
 from skinwave.models.limits import takes

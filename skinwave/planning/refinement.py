@@ -18,9 +18,8 @@ from scipy import fft
 from meshes.tetmesh import Floats
 from simple_model import Response
 from skinwave.bodies.build import COMPARED
-from skinwave.bodies.coat import coarsest_size
 from skinwave.bodies.hands import FINE_PALM
-from skinwave.bodies.sizes import check_mesh, default_size
+from skinwave.bodies.sizes import check_mesh, coarsest_size, default_size
 from skinwave.bodies.slab import cell_layers
 from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.reduced import (

@@ -3,9 +3,9 @@
 import numpy as np
 
 from fem.coat import Coat
-from skinwave.bodies.coat import AT, layer_name, thicknesses
-from skinwave.bodies.coat import coat as coat_of
 from skinwave.bodies.sheet import air_mass
+from skinwave.bodies.sizes import AT, layer_name, thicknesses
+from skinwave.bodies.sizes import coat as coat_of
 from skinwave.models.meshed import axes_of_probes, mirrored_axes
 from skinwave.models.reduced import BAND, reduction_tolerance
 from skinwave.planning.left_out import mean_sag

@@ -6,7 +6,7 @@ import numpy as np
 
 from simple_model import MovingPressure, Tacton
 from simple_model.layers.material import Material
-from skinwave.bodies.mounting import FRAME
+from skinwave.bodies.supports import FRAME
 from skinwave.models import named
 from skinwave.report.figures import answered
 from skinwave.results.run import Run

@@ -15,8 +15,8 @@ from simple_model.plates.modes import plate_modes
 from simple_model.plates.sheet_waves import sheet_curves
 from skinwave import dumps, loads, plan
 from skinwave.bodies.build import build, operators
-from skinwave.bodies.mounting import EDGES, Mounting
 from skinwave.bodies.sheet import air_mass, bending_equivalent, bending_wavenumber
+from skinwave.bodies.supports import EDGES, Mounting
 from skinwave.models import named
 from skinwave.models.limits import beyond
 from skinwave.models.options import SolveOptions

@@ -16,8 +16,14 @@ from simple_model import PronyTerm, Stack
 from simple_model.layers.compliance import layered
 from simple_model.layers.wavenumber_integral import point_response
 from skinwave.bodies import BODIES, Body, Layer
-from skinwave.bodies.coat import coarsest_size, coat, coat_count, meshed_strata
-from skinwave.bodies.sizes import check_mesh, default_size
+from skinwave.bodies.sizes import (
+    check_mesh,
+    coarsest_size,
+    coat,
+    coat_count,
+    default_size,
+    meshed_strata,
+)
 from skinwave.planning.rows import coat_rows
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import loads

@@ -13,7 +13,7 @@ import meshes
 from fem import nonlinear
 from simple_model import MovingPressure, Tacton, Trajectory, from_young
 from simple_model.load.focus import along_axis
-from skinwave.bodies.mounting import Mounting
+from skinwave.bodies.supports import Mounting
 from skinwave.models.stretching import membrane, meshed_sheet, stretching_body
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import BODIES, Body, Placement, Scene

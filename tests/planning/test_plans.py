@@ -9,8 +9,7 @@ from bench.stated_errors import MOST, stated_and_true
 from simple_model import Trajectory
 from skinwave import loads, simulate
 from skinwave.bodies.build import build
-from skinwave.bodies.coat import coarsest_size
-from skinwave.bodies.sizes import check_mesh, default_size
+from skinwave.bodies.sizes import check_mesh, coarsest_size, default_size
 from skinwave.bodies.slab import cell_layers
 from skinwave.models.full import harmonic_answer
 from skinwave.models.options import SolveOptions

@@ -8,7 +8,7 @@ import pytest
 import fem.krylov
 from simple_model import MovingPressure, Tacton, Trajectory, from_young
 from skinwave import plan
-from skinwave.bodies.mounting import Mounting
+from skinwave.bodies.supports import Mounting
 from skinwave.models import named
 from skinwave.models.limits import cures_for
 from skinwave.models.options import SolveOptions
