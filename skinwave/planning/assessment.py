@@ -27,7 +27,7 @@ from skinwave.planning.refinement import (
     convergence,
     quantity_of_interest,
 )
-from skinwave.planning.warnings import of_elements, of_ends_and_band, of_stretching
+from skinwave.planning.rows import of_elements, of_ends_and_band, of_stretching
 from skinwave.scene.scene import Body, Load, Reading, Scene
 
 Coarser = tuple[float, ReducedBody]  # element size in metre, and the body with it

@@ -24,8 +24,8 @@ from skinwave.bodies.analytic import flattened
 from skinwave.models.limits import takes
 from skinwave.models.plate_modes import MODES
 from skinwave.models.plate_modes import steady_lines as steady_lines_of_plate
-from skinwave.planning.records import PlanRow
 from skinwave.planning.refinement import CONTROLLER, element_sizes
+from skinwave.planning.rows import PlanRow
 from skinwave.scene.scene import Scene
 from skinwave.scene.spreads import PRESSURE, Spread, spreads_of, with_values
 

@@ -21,8 +21,8 @@ from skinwave.models.meshed import mirrored_axes
 from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.reduced import answer, prepare, reduction_tolerance
 from skinwave.planning.estimates import FAR, absorbed_returned, spot_scale
-from skinwave.planning.records import PlanRow
 from skinwave.planning.refinement import about_its_rest, element_sizes, relative_change
+from skinwave.planning.rows import PlanRow
 from skinwave.scene.scene import Body, Scene
 
 WIDER = 2.0  # times the width of the layer

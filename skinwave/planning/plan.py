@@ -10,7 +10,6 @@ import numpy as np
 import fem
 from meshes.tetmesh import Floats
 from simple_model.layers.flat_body import FINEST
-from simple_model.load.focus import gaussian_width
 from simple_model.load.sampling import resolving_step
 from skinwave.bodies.sizes import check_mesh
 from skinwave.models import Limit, Model, named
@@ -41,18 +40,20 @@ from skinwave.planning.left_out import (
     stretching_left_out,
     sudden_left_out,
 )
-from skinwave.planning.records import Plan, PlanRow
 from skinwave.planning.refinement import above_band, refined
-from skinwave.planning.rows import element_rows, left_out
-from skinwave.planning.warnings import (
+from skinwave.planning.rows import (
+    Plan,
+    PlanRow,
+    element_rows,
     error_not_estimated,
+    left_out,
     of_elements,
     of_ends_and_band,
     over_tolerance,
     start_over_tolerance,
     sudden_over_tolerance,
 )
-from skinwave.scene.scene import FLAT, Body, Scene
+from skinwave.scene.scene import Scene
 
 INTEGRAL_ERROR = 0.002  # of a wavenumber integral, beside finite elements
 Grid = tuple[Floats, int]  # as of `sample_grid`
@@ -88,10 +89,12 @@ def _planned(scene: Scene, options: SolveOptions, grid: Grid) -> Plan:
     asked = None if options.model == "auto" else named(options.model)
     if options.dt is not None:
         step_count(float(sample_times(scene)[-1]), options.dt)
-    if not scene.body.of_kind.discretise:
-        return _of_no_body(scene, asked)
     if asked:
         check_taken(asked, scene)
+    if not scene.body.of_kind.discretise:
+        kernel = (asked or SAME_LOAD).name
+        row = PlanRow(what="model", value=kernel, reason="there is no body to move")
+        return Plan(model=kernel, body=scene.body, rows=(row,))
     if not asked or asked.needs_body:
         check_laws(scene.body, scene.pressure)
     if asked and asked.error:
@@ -104,26 +107,24 @@ def _planned(scene: Scene, options: SolveOptions, grid: Grid) -> Plan:
         found = _without_mesh(scene, options, chosen, highest, row, grid)
         return _with_series(found, scene, options.tolerance)
     if chosen is FROM_REST:
-        return _by_modes(scene, options.tolerance, highest, row)
+        found = _unplanned(scene, replace(options, h=None), FROM_REST, grid)
+        found = _because(found, why_modes(scene, options.tolerance))
+        return replace(found, highest=highest, rows=(row, *found.rows, *left_out(scene, highest)))
     if asked is None and chosen is not FEM:
         found = _planned(scene, replace(options, model=chosen.name, h=None), grid)
-        why = f"{FEM.name} {beyond(FEM, scene)[0].why}"
-        rows = [replace(row, reason=why) if row.what == "model" else row for row in found.rows]
-        return replace(found, rows=tuple(rows))
+        return _because(found, f"{FEM.name} {beyond(FEM, scene)[0].why}")
     return _by_elements(scene, options, chosen, highest, row, grid)
+
+
+def _because(found: Plan, reason: str) -> Plan:
+    """The plan with another reason for its model."""
+    rows = [replace(row, reason=reason) if row.what == "model" else row for row in found.rows]
+    return replace(found, rows=tuple(rows))
 
 
 def _chosen(scene: Scene, options: SolveOptions, grid: Grid) -> Model:
     meshed = options.h is not None and scene.body.of_kind.is_plate and takes(FEM, scene)
     return FEM if meshed else named(chosen_model(scene, options.tolerance, grid))
-
-
-def _of_no_body(scene: Scene, asked: Model | None) -> Plan:
-    if asked:
-        check_taken(asked, scene)
-    kernel = (asked or SAME_LOAD).name
-    row = PlanRow(what="model", value=kernel, reason="there is no body to move")
-    return Plan(model=kernel, body=scene.body, rows=(row,))
 
 
 def _highest_line(scene: Scene, tolerance: float) -> tuple[float, PlanRow]:
@@ -246,29 +247,12 @@ def _unplanned(scene: Scene, options: SolveOptions, model: Model, grid: Grid) ->
 
 def _stretched(scene: Scene, options: SolveOptions, grid: Grid) -> Plan:
     """Plan of a sheet at large deflection."""
-    found = _unplanned(scene, replace(options, h=None), STRETCHED, grid)
     left = stretching_left_out(scene, FROM_REST, options.tolerance)
-    reason = (
+    return _because(
+        _unplanned(scene, replace(options, h=None), STRETCHED, grid),
         f"a linear sheet would deflect by {deflection(scene):.2g} thicknesses, and stretching "
-        f"changes its motion by {100 * left:.2g} %"
+        f"changes its motion by {100 * left:.2g} %",
     )
-    rows = [replace(row, reason=reason) if row.what == "model" else row for row in found.rows]
-    return replace(found, rows=tuple(rows))
-
-
-def _by_modes(scene: Scene, tolerance: float, highest: float, row: PlanRow) -> Plan:
-    """Plan of a sheet by its modes, from rest."""
-    reason = why_modes(scene, tolerance)
-    rows = [
-        row, PlanRow(what="model", value=FROM_REST.name, reason=reason),
-        *left_out(scene, highest),
-    ]  # fmt: skip
-    error = FROM_REST.error(scene, None) if FROM_REST.error else np.nan
-    return Plan(
-        model=FROM_REST.name, body=scene.body, highest=highest, error=error,
-        seconds=FROM_REST.seconds, memory=FROM_REST.memory, rows=tuple(rows),
-        warnings=over_tolerance(f"the {FROM_REST.method}", error, tolerance, "a larger one is"),
-    )  # fmt: skip
 
 
 def _without_mesh(
@@ -277,7 +261,7 @@ def _without_mesh(
     returned, left = _returned(scene), start_left_out(scene, asked, grid)
     model, tolerance = asked.name, options.tolerance
     sudden = sudden_left_out(scene, asked, grid)
-    reason = f"{_section(scene.body)} without reflecting sides: wavenumber integral, no mesh"
+    reason = "flat layers without reflecting sides: wavenumber integral, no mesh"
     if scene.body.sides != "absorbing":
         reason = f"reflections from the sides are {100 * returned:.2g} %: wavenumber integral"
     reason += _without(left)
@@ -305,11 +289,6 @@ def _without_mesh(
 
 def _without(start: float) -> str:
     return f"; the initial transient, {100 * start:.2g} %, is left out" if start else ""
-
-
-def _section(body: Body) -> str:
-    layers = len(body.strata)
-    return "a homogeneous flat slab" if layers == 1 else f"a flat slab of {layers} layers"
 
 
 def _with_series(found: Plan, scene: Scene, tolerance: float) -> Plan:
@@ -346,22 +325,14 @@ def _march_error(scene: Scene, dt: float) -> float:
 
 
 def _why_elements(scene: Scene) -> str:
+    """Why no wavenumber integral stands for the body of a scene."""
+    if limits := beyond(FLAT_BODY, scene):
+        return f"{FLAT_BODY.name} {limits[0].why}"
     body, returned = scene.body, _returned(scene)
-    if not scene.load.is_plain and not takes(FLAT_BODY, scene):
-        return f"the wavenumber integral has no {scene.reading.words} under {scene.load.words}"
-    if gaussian_width(scene.pressure.height, scene.pressure.profile) is None:
-        return (
-            f"the wavenumber integral needs a Gaussian focus, not '{scene.pressure.profile_name}'"
-        )
-    if not body.of_kind.compliance:
-        return f"a body of kind '{body.kind}' has no wavenumber integral"
-    if body.placement != FLAT:
-        return "the body is tilted or moved; the wavenumber integral is for one across the beam"
-    if body.of_kind.is_plate and body.sides == "absorbing":
-        return "absorbing sides of a sheet reflect in part; the wavenumber integral has no sides"
-    if body.of_kind.is_plate:
-        return f"the {body.sides} sides of this sheet reflect; the wavenumber integral has no sides"
     if body.sides == "absorbing":
-        return "as asked; this body has a wavenumber integral, too"
-    reflected = f"about {100 * returned:.3g} %" if returned < 1 else "as much as the load causes"
-    return f"the {body.sides} sides reflect {reflected}; the wavenumber integral has no sides"
+        of_sheet = "absorbing sides of a sheet reflect in part"
+        return (
+            of_sheet if body.of_kind.is_plate else "as asked; this body has a wavenumber integral"
+        )
+    reflected = f" about {100 * returned:.3g} %" if returned < 1 else ""
+    return f"the {body.sides} sides reflect{reflected}; the wavenumber integral has no sides"

@@ -20,8 +20,8 @@ from skinwave.models.limits import check_taken
 from skinwave.models.options import SolveOptions, from_first, sample_grid
 from skinwave.models.reduced import answer
 from skinwave.planning.plan import plan
-from skinwave.planning.records import Plan
-from skinwave.planning.warnings import (
+from skinwave.planning.rows import (
+    Plan,
     beyond_prediction,
     beyond_sampling,
     implausible,

@@ -26,7 +26,7 @@ from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.models.speeds import repeated, shown_part
 from skinwave.planning.plan import plan
-from skinwave.planning.records import Plan
+from skinwave.planning.rows import Plan
 from skinwave.planning.simulate import compute, solve
 from skinwave.report import description
 from skinwave.results import record, surface

@@ -17,8 +17,8 @@ from skinwave.commands.cli import main
 from skinwave.models.options import SolveOptions
 from skinwave.planning.assessment import sentences
 from skinwave.planning.plan import plan
+from skinwave.planning.rows import implausible, of_stretching
 from skinwave.planning.simulate import compute, solve
-from skinwave.planning.warnings import implausible, of_stretching
 from skinwave.scene.file import loads
 from skinwave.scene.scene import Body, Scene
 from skinwave.system import document

@@ -14,8 +14,8 @@ from skinwave.models.limits import cures_for
 from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.planning.plan import chosen_model, why_modes
+from skinwave.planning.rows import NONLINEAR, of_stretching
 from skinwave.planning.simulate import compute, solve
-from skinwave.planning.warnings import NONLINEAR, of_stretching
 from skinwave.results.comparison import compare
 from skinwave.scene.file import loads
 from skinwave.scene.scene import BODIES, Body, Scene

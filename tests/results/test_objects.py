@@ -21,7 +21,7 @@ from simple_model.load.focus import spot_width
 from simple_model.numbers import stated_error
 from skinwave.models import BUILT_IN, named
 from skinwave.planning.budget import error_budget
-from skinwave.planning.records import PlanRow
+from skinwave.planning.rows import PlanRow
 from skinwave.report.fields import Field
 from skinwave.report.styles import style
 from skinwave.results import citations
