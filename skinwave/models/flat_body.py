@@ -155,19 +155,16 @@ FLAT_BODY = register(
     )
 )
 HARMONIC = register(
-    Model(
+    replace(
+        FLAT_BODY,
         name="flat-body-harmonic",
         method="wavenumber integral, line by line",
         words="the steady state of linear waves of a laterally infinite flat body, by the "
         "wavenumber integral",
         solve=_steady,
         limits=_steady_limits,
-        error=None,
-        seconds=2.0,
-        memory=3e8,
         colour="#E69F00",
-        sources=(LAYERS,),
-        is_infinite=True,
         from_rest="flat-body",
+        takes_series=lambda body: False,
     )
 )

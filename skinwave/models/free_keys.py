@@ -2,6 +2,7 @@
 affine sum of matrices serves for all of these.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -25,6 +26,12 @@ from skinwave.scene.keys import MATERIAL, MODULI, PRONY, SCALES, SECTIONS, with_
 from skinwave.scene.scene import Scene
 
 THICKNESS = ("thickness_mm",)  # path of a key
+KEYS = (
+    re.compile(r"body\.(layers\.(?P<layer>\d+)\.)?thickness_mm"),
+    re.compile(
+        r"body\.(regions\.(?P<region>[^.]+)|(layers\.(?P<layer>\d+)\.)?material)\.(?P<path>(?!thickness_mm).+)"
+    ),
+)
 MOST_THICKNESSES = 2
 FIXED = ("poisson", "law", "table")  # keys of a material that are no number, or change the matrices
 MOST_CORNERS = 16
@@ -76,30 +83,20 @@ def free_keys(body: Body, free: Mapping[str, tuple[float, float]]) -> tuple[Free
         raise ValueError("free = {} names no key; give one, such as body.material.shear_modulus_pa")
     found = tuple(_free_key(body, key, bounds) for key, bounds in free.items())
     _check_thicknesses(body, [key for key in found if key.is_thickness])
-    for layers in (0.0, 1.0):  # what materials and bodies refuse, they refuse here
-        for below in (0.0, 1.0):
-            shares = [below if key.part is None else layers for key in found]
-            _check_values(body, found, values_at(found, shares))
-    _check_morph(body, found)
-    return found
-
-
-def _check_values(body: Body, keys: Sequence[FreeKey], values: Mapping[str, float]) -> None:
-    try:
-        with_values(body, keys, values)
-    except ValueError as error:
-        said = ", ".join(f"{key} = {value:g}" for key, value in values.items())
-        raise ValueError(f"at {said}, ends of free ranges: {error}") from None
-
-
-def _check_morph(body: Body, keys: Sequence[FreeKey]) -> None:
-    """Refuse a thickness that no mesh of the default size follows."""
-    if any(key.moves for key in keys):
+    for layers, below in product((0.0, 1.0), repeat=2):
+        values = values_at(found, [below if key.part is None else layers for key in found])
+        try:  # what materials and bodies refuse, they refuse here
+            with_values(body, found, values)
+        except ValueError as error:
+            said = ", ".join(f"{key} = {value:g}" for key, value in values.items())
+            raise ValueError(f"at {said}, ends of free ranges: {error}") from None
+    if any(key.moves for key in found):
         thinnest, thickest = (
-            with_values(body, keys, values_at(keys, [end if key.moves else 0.5 for key in keys]))
+            with_values(body, found, values_at(found, [end if k.moves else 0.5 for k in found]))
             for end in (0.0, 1.0)
         )
         body.of_kind.check_morph(thinnest, thickest, default_size(thickest))
+    return found
 
 
 def with_values(body: Body, keys: Sequence[FreeKey], values: Mapping[str, float]) -> Body:
@@ -115,7 +112,10 @@ def with_values(body: Body, keys: Sequence[FreeKey], values: Mapping[str, float]
     for part in dict.fromkeys(key.part for key in keys if not key.is_thickness):
         own = [key for key in keys if key.part == part and not key.is_thickness]
         body = _with_material(body, part, _with_numbers(solid_at(body, part), own, values))
-    return _with_thicknesses(body, thick) if thick else body
+    if not thick:
+        return body
+    layers = (replace(o, thickness=thick.get(k, o.thickness)) for k, o in enumerate(body.layers))
+    return replace(body, layers=tuple(layers), depth=thick.get(None, body.depth))
 
 
 def values_at(keys: Sequence[FreeKey], shares: Sequence[float]) -> dict[str, float]:
@@ -168,7 +168,7 @@ def _free_key(body: Body, key: str, bounds: tuple[float, float]) -> FreeKey:
             f"'{key}' cannot be free: only moduli, losses, times and densities change none of a "
             "body's matrices; reduce a body for each value of it"
         )
-    if (*path,) != THICKNESS:
+    if tuple(path) != THICKNESS:
         choose(f"free key '{key}'", path[0], known)
     if path[0] == "prony" and not (len(path) == 3 and path[1].isdecimal() and path[2] in PRONY):
         raise ValueError(f"'{key}' is no number of a Prony term; name one as prony.0.modulus_pa")
@@ -185,34 +185,29 @@ def _free_key(body: Body, key: str, bounds: tuple[float, float]) -> FreeKey:
 
 def _part(body: Body, key: str) -> tuple[Part, list[str]]:
     """The part of a body that a key is of, and the path in it."""
-    parts = key.split(".")
-    if parts[:2] == ["body", "regions"] and len(parts) > 3:
-        if parts[2] not in dict(body.regions):
-            raise ValueError(
-                f"'{key}' is of a region whose material the scene does not give; it gives those of "
-                f"{', '.join(dict(body.regions)) or 'none'}"
-            )
-        return parts[2], parts[3:]
-    is_thickness = parts[0] == "body" and (*parts[-1:],) == THICKNESS
-    if parts[:2] == ["body", "layers"] and (
-        (len(parts) > 4 and parts[3] == "material") or (len(parts) == 4 and is_thickness)
-    ):
-        if not (parts[2].isdecimal() and int(parts[2]) < len(body.layers)):
-            raise ValueError(
-                f"'{key}' is of a layer that the body has not; it has {len(body.layers)}, counted "
-                "from 0"
-            )
-        return int(parts[2]), parts[4:] or parts[3:]
-    if len(parts) == 2 and is_thickness:
-        return None, parts[1:]
-    if parts[:2] != ["body", "material"] or len(parts) < 3:
+    found = next((m.groupdict() for each in KEYS if (m := each.fullmatch(key))), None)
+    if found is None:
         raise ValueError(
             f"'{key}' cannot be free: one reduced body serves materials and thicknesses alone; "
             "free keys of body.material, body.layers.0.material or body.regions.bone, "
             "body.thickness_mm or body.layers.0.thickness_mm, and reduce a body for each value of "
             "others"
         )
-    return None, parts[2:]
+    region, layer = found.get("region"), found["layer"]
+    path = found.get("path", THICKNESS[0]).split(".")
+    if region:
+        if region not in dict(body.regions):
+            raise ValueError(
+                f"'{key}' is of a region whose material the scene does not give; it gives those of "
+                f"{', '.join(dict(body.regions)) or 'none'}"
+            )
+        return region, path
+    if layer and int(layer) >= len(body.layers):
+        raise ValueError(
+            f"'{key}' is of a layer that the body has not; it has {len(body.layers)}, counted "
+            "from 0"
+        )
+    return int(layer) if layer else None, path
 
 
 def _check_thicknesses(body: Body, keys: Sequence[FreeKey]) -> None:
@@ -244,15 +239,6 @@ def _check_thicknesses(body: Body, keys: Sequence[FreeKey]) -> None:
             f"{body.kind}: elements of that thickness stand for all thinner ones, and thicker ones "
             "have a mesh each; narrow the range, or reduce a body for each value"
         )
-
-
-def _with_thicknesses(body: Body, thick: Mapping[Part, float]) -> Body:
-    """Body with other thicknesses in metre of some layers, and of all of it."""
-    layers = tuple(
-        replace(layer, thickness=thick.get(k, layer.thickness))
-        for k, layer in enumerate(body.layers)
-    )
-    return replace(body, layers=layers, depth=thick.get(None, body.depth))
 
 
 def _value(key: FreeKey, values: Mapping[str, float]) -> float:
@@ -315,19 +301,6 @@ def check_scene(scene: Scene, keys: Sequence[FreeKey], tolerance: float) -> None
     """Refuse what no affine sum gives for free keys, to a relative error of each line."""
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
-    _check_load(scene)
-    check_laws(scene.body, scene.pressure)
-    _check_body(scene.body)
-    _check_reading(scene, keys)
-    each = [load_lines(pressure).frequencies for pressure in scene.loads]
-    if (count := len(np.unique(np.concatenate(each)))) > MOST_LINES:
-        raise ValueError(
-            f"the load has {count:,} lines, the limit with free materials is {MOST_LINES}; leave "
-            "out the rhythm or signal"
-        )
-
-
-def _check_load(scene: Scene) -> None:
     if scene.load.gravity:
         raise ValueError(
             "a body with free materials has no gravity: the static deflection is that of each "
@@ -339,39 +312,39 @@ def _check_load(scene: Scene) -> None:
             "inertial force goes with the density; leave support_motion out, or reduce the body of "
             "each material"
         )
-
-
-def _check_body(body: Body) -> None:
-    if not has_affine_operators(body):
+    check_laws(scene.body, scene.pressure)
+    if not has_affine_operators(scene.body):
         raise ValueError(
             "a body with free materials is an isotropic sheet in a frame, or none: tension and "
             "other mountings do not scale with its modulus; reduce the body of each material"
         )
-    refuse_open_air(body)
+    refuse_open_air(scene.body)
+    _check_reading(scene, keys)
+    each = [load_lines(pressure).frequencies for pressure in scene.loads]
+    if (count := len(np.unique(np.concatenate(each)))) > MOST_LINES:
+        raise ValueError(
+            f"the load has {count:,} lines, the limit with free materials is {MOST_LINES}; leave "
+            "out the rhythm or signal"
+        )
 
 
 def _check_reading(scene: Scene, keys: Sequence[FreeKey]) -> None:
+    """Refuse what depends on a free material or thickness beyond the motion of the mesh."""
     asked, solid = scene.reading.asked, scene.body.solid
-    if any(key.is_thickness for key in keys):
-        _check_thick(scene)
+    is_thick = any(key.is_thickness for key in keys)
+    if is_thick and scene.body.of_kind.equivalent and not asked.is_normal:
+        raise ValueError(
+            f"{scene.reading.words} goes with the thickness of a sheet beyond the motion of its "
+            "middle; take the normal displacement, velocity or acceleration"
+        )
+    if is_thick and asked.field == STRAIN:
+        raise ValueError(
+            f"{scene.reading.words} of elements that move with a thickness is not smooth in it; "
+            "take a displacement, velocity or acceleration"
+        )
     rows, doubled = (asked.rows(each) for each in (solid, solid.scaled(modulus=2.0)))
     if asked.relaxes or not np.array_equal(rows, doubled):
         raise ValueError(
             f"{scene.reading.words} depends on the material beyond the motion, which is all that a "
             "body with free materials gives; take a displacement, velocity or strain"
-        )
-
-
-def _check_thick(scene: Scene) -> None:
-    """Refuse what depends on a free thickness beyond the motion of the mesh."""
-    asked = scene.reading.asked
-    if scene.body.of_kind.equivalent and not asked.is_normal:
-        raise ValueError(
-            f"{scene.reading.words} goes with the thickness of a sheet beyond the motion of its "
-            "middle; take the normal displacement, velocity or acceleration"
-        )
-    if asked.field == STRAIN:
-        raise ValueError(
-            f"{scene.reading.words} of elements that move with a thickness is not smooth in it; "
-            "take a displacement, velocity or acceleration"
         )

@@ -143,31 +143,31 @@ FEM = register(
     )
 )
 HARMONIC = register(
-    Model(
+    replace(
+        FEM,
         name="fem-harmonic",
         method="10-node tetrahedra, line by line",
         words="the steady state of linear waves on 10-node tetrahedra",
         solve=harmonic_answer,
         limits=partial(_limits, of_vacuum, True),
-        error=None,
-        default_size=default_size,
         colour="#CC79A7",
         sources=(MACROELEMENTS,),
         from_rest="fem",
+        is_reduced=False,
+        takes_series=lambda body: False,
     )
 )
 TRANSIENT = register(
-    Model(
+    replace(
+        FEM,
         name="fem-transient",
         method="10-node tetrahedra, step by step",
         words="linear waves on 10-node tetrahedra, step by step",
         solve=transient_answer,
         limits=partial(_limits, of_vacuum, False),
-        error=None,
-        default_size=default_size,
         colour="#D55E00",
         sources=(ALPHA, MACROELEMENTS),
+        is_reduced=False,
         is_stepped=True,
-        takes_series=has_own_law,
     )
 )

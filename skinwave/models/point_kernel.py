@@ -1,6 +1,7 @@
 """Point kernel under the scene's own load, and under that of the paper."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from meshes.tetmesh import Floats
 from simple_model import Response, point_kernel, point_kernel_published
@@ -42,17 +43,13 @@ SAME_LOAD = register(
     )
 )
 PUBLISHED = register(
-    Model(
+    replace(
+        SAME_LOAD,
         name="point-kernel-published",
         label="kernel, as published",
-        method="point kernel",
         words="the same under the load of Lim, Seifi and Park: the commanded signal itself, "
         "without a mean",
         solve=_published,
-        error=lambda scene, h: ERROR,
         colour="#999999",
-        limits=_limits,
-        quantity=PRESSURE.name,
-        needs_body=False,
     )
 )

@@ -59,7 +59,6 @@ NEWTON = (
     "T. Belytschko, W. K. Liu, B. Moran: Nonlinear Finite Elements for Continua and Structures. "
     "Wiley, 2000"
 )
-METHOD = "large deflection, step by step from rest"
 # Thickness of the mesh over an element's side: the shear of so thick a sheet lowers frequencies by
 # as much as elements of this side raise them. At 7 elements a wavelength 0.3 % are left of 5 %.
 STOCKY, STOUTEST = 0.48, 0.05
@@ -123,7 +122,7 @@ def full_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
         read=full_reader(scene.body, made, scene.probe_points, scene.reading),
         rows=fem.probe_operator(made.mesh, scene.probe_points),
     )  # fmt: skip
-    values = in_time(march.steps, dt, times, scene, _solids(scene))
+    values = in_time(march.steps, dt, times, scene, (scene.body.solid,) * len(scene.probes))
     plain = _normal(scene)
     linear = in_time(march.linear, dt, times, plain)
     return _response(
@@ -161,7 +160,7 @@ def reduced_answer(scene: Scene, times: Floats, options: SolveOptions) -> Respon
     force = _modal_force(scene, sheet.linear, times, dt)
     march = _march(sheet.modes.elastic, force, dt, times, options, clock, read=read, rows=rows)
     with clock("linear part"):
-        solids, plain = _solids(scene), _normal(scene)
+        solids, plain = (scene.body.solid,) * len(scene.probes), _normal(scene)
         highest = highest_driving(scene.pressure, times)
         motion = respond(sheet.linear, scene.pressure, highest=highest)
         linear = _from_rest(motion, rows, times, asked, solids)
@@ -280,10 +279,6 @@ def _march(
     return _March(steps=stepped, linear=np.array(linear), effort=effort)
 
 
-def _solids(scene: Scene) -> tuple[Material, ...]:
-    return (scene.body.solid,) * len(scene.probes)
-
-
 def _normal(scene: Scene) -> Scene:
     """The scene with the normal motion whose relative error is no smaller than that of its own
     quantity: slopes and strains grow with frequency by up to one order more.
@@ -322,11 +317,6 @@ def _response(
     )  # fmt: skip
 
 
-def _error(scene: Scene, h: float | None) -> float:
-    assert h
-    return expected_error(scene.body, h)
-
-
 def _limits(
     of_air: Callable[[Body], Iterator[Limit]], size: Callable[[Body], float], scene: Scene
 ) -> Iterator[Limit]:
@@ -342,16 +332,14 @@ def _limits(
 
 
 REDUCED_SIZE, FULL_SIZE = (partial(stretching_size, reduced=which) for which in (True, False))
-
-
 REDUCED = register(
     Model(
         name="fem-nonlinear",
-        method=METHOD,
+        method="large deflection, step by step from rest",
         words="a sheet that stretches as it bends, in its modes, from rest",
         solve=reduced_answer,
         limits=partial(_limits, of_air_in_a_frame, REDUCED_SIZE),
-        error=_error,
+        error=lambda scene, h: expected_error(scene.body, h or 0.0),
         default_size=REDUCED_SIZE,
         sources=(ALPHA, NEWTON),
         is_nonlinear=True,
@@ -359,16 +347,12 @@ REDUCED = register(
     )
 )
 FULL = register(
-    Model(
+    replace(
+        REDUCED,
         name="fem-nonlinear-transient",
-        method=METHOD,
         words="a sheet that stretches as it bends, on 10-node tetrahedra, step by step",
         solve=full_answer,
         limits=partial(_limits, of_vacuum, FULL_SIZE),
-        error=_error,
         default_size=FULL_SIZE,
-        sources=(ALPHA, NEWTON),
-        is_nonlinear=True,
-        takes_series=has_own_law,
     )
 )

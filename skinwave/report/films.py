@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from simple_model.numbers import significant
-from skinwave.models import speeds
 from skinwave.report.palette import COLOURS, SPARE
 from skinwave.report.render import Image, stage
 from skinwave.report.styles import Style
+from skinwave.results import speeds
 from skinwave.results.views import View
 from skinwave.system.effort import Progress, silent
 

@@ -26,10 +26,10 @@ from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.plate_modes import steady_lines as plate_lines
 from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.reduced import oscillating, read_at
-from skinwave.models.speeds import shown_part, strongest_tone
 from skinwave.models.stretched_plate import STRETCHED, settled
 from skinwave.results.motion import BodyMotion, Shade, Tensors, shade, tensors, vibration
 from skinwave.results.run import Run
+from skinwave.results.speeds import shown_part, strongest_tone
 from skinwave.results.surface import FAINT, Lines
 from skinwave.scene.file import dumps, loads
 from skinwave.scene.scene import Scene

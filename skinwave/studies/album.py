@@ -24,7 +24,6 @@ from skinwave.models.limits import takes
 from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
-from skinwave.models.speeds import repeated, shown_part
 from skinwave.planning.plan import plan
 from skinwave.planning.rows import Plan
 from skinwave.planning.simulate import compute, solve
@@ -33,6 +32,7 @@ from skinwave.results import record, surface
 from skinwave.results.files import write_lines, write_run
 from skinwave.results.motion import BodyMotion, probe_response, waves
 from skinwave.results.run import Run
+from skinwave.results.speeds import repeated, shown_part
 from skinwave.results.surface import (
     SurfaceField,
     body_map,
