@@ -31,7 +31,6 @@ from meshes.volume.curving import curve_boundary
 from meshes.volume.fingertip import Fingertip, fingertip_mesh
 from meshes.volume.mapped_palm import mapped_palm
 from meshes.volume.quality import dihedral_angles, edge_lengths, jacobian_ratios
-from meshes.volume.stretched_palm import stretched_palm
 from meshes.volume.tetrahedralise import graded, tetrahedralise
 
 __all__ = [
@@ -65,7 +64,6 @@ __all__ = [
     "repaired",
     "seen_from_above",
     "sheet",
-    "stretched_palm",
     "tag_boundary",
     "tetrahedralise",
     "write",

@@ -281,10 +281,8 @@ class BodyKind:
     words : kind and size of a body in a few words
     discretise : mesh of a body, with elements of a size in metre; None without anything to mesh
     morph : called with the thinnest and the thickest body of a range and an element size in metre,
-        a function as `discretise` whose meshes have the same nodes, moved; None without any
-    check_morph : called likewise, raises a ValueError where there is none
-    moves_in_proportion : bool, whether these move in proportion to the thicknesses of the body's
-        layers, so that its matrices are sums over few geometries, which are else interpolated
+        a function as `discretise` whose meshes have the same nodes, moved in proportion to the
+        thicknesses of the body's layers, so that its matrices are sums over few; None without any
     equivalent : thickness in metre of the mesh of all bodies that are thinner, whose modulus and
         density stand for it (`sheet.bending_equivalent`); None where each has its own mesh
     grid_lines : lines (n,) in metre along x, y and z of the grid of its mesh, with elements of a
@@ -317,8 +315,6 @@ class BodyKind:
     words: Callable[[Body], str] = lambda body: _size(body)
     discretise: Callable[[Body, float], Discretised] | None = None
     morph: Callable[[Body, Body, float], Discretise] | None = None
-    check_morph: Callable[[Body, Body, float], None] = lambda thinnest, thickest, h: None
-    moves_in_proportion: bool = True
     equivalent: Callable[[Body], float] | None = None
     grid_lines: Callable[[Body, float], Lines] | None = None
     check_size: Callable[[Body, float], None] = lambda body, h: None

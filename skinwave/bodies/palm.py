@@ -14,16 +14,14 @@ from meshes import (
     boundary_facets,
     graded_axis,
     mapped_palm,
-    stretched_palm,
 )
 from meshes.files.import_body import GROWTH
 from meshes.shapes.palm import gradient
 from meshes.shapes.structured import Lines, mirrored
 from skinwave.bodies.analytic import stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
-from skinwave.bodies.discretised import Discretise, Discretised
+from skinwave.bodies.discretised import Discretised
 from skinwave.bodies.hands import HAND_CELL, hand_size, in_its_layers, support
-from skinwave.bodies.sizes import meshed_strata, thickest_coat
 
 COARSEST = 2.0  # elements far from the middle, over those of h
 RIM = 0.7  # elements at the rim of a palm, over the radius of its edge
@@ -48,48 +46,6 @@ def discretise(body: Body, h: float) -> Discretised:
             "this palm has no mesh: its relief is too steep; lower thenar_height_mm, "
             "hypothenar_height_mm, pad_height_mm or cup_depth_mm, or take a mesh from a file"
         ) from error
-    return _supported(body, h, mesh)
-
-
-def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
-    """Mesh of the thinnest palm, as fine as that of the thickest with elements of h in metre,
-    stretched to another: a function as `discretise`.
-    """
-    check_morph(thinnest, thickest, h)
-    x, y, z = body_lines(thickest, h)
-    try:
-        mesh = mapped_palm(thinnest.palm, x, y, z * (thinnest.depth / thickest.depth))
-        stretched = stretched_palm(mesh, thinnest.palm, thickest.palm)
-    except MeshError as error:
-        raise MeshError(
-            f"no mesh of this palm can be stretched from {1e3 * thinnest.depth:g} to "
-            f"{1e3 * thickest.depth:g} mm; narrow the range of its thickness or lower its relief"
-        ) from error
-    return lambda body, h: _supported(body, h, stretched(body.depth))
-
-
-def check_morph(thinnest: Body, thickest: Body, h: float) -> None:
-    """Refuse layers of a palm that are no coat, which elements would have to follow, and a relief
-    that changes with the thickness.
-    """
-    if replace(thinnest.palm, thickness=thickest.depth) != thickest.palm:
-        raise ValueError(
-            f"the relief of a palm that is {1e3 * thinnest.depth:g} mm thick is lower than that of "
-            f"one of {1e3 * thickest.depth:g} mm unless it is given; give all lengths of "
-            "[body.relief], such as edge_radius_mm"
-        )
-    for each in (thinnest, thickest):
-        if len(meshed_strata(each, h)) > 1:
-            *_, (layers, _) = strata = each.strata
-            limit = thickest_coat(strata, len(strata) - 1)
-            raise ValueError(
-                f"layers of {1e3 * layers:.3g} mm on a palm whose thickness, or theirs, is free "
-                f"must be thinner than half of its elements of {1e3 * h:.3g} mm, and of "
-                f"{1e3 * limit:.2g} mm at most; take thinner ones, a narrower range, or a slab"
-            )
-
-
-def _supported(body: Body, h: float, mesh: TetMesh) -> Discretised:
     mesh = replace(mesh, facets={"top": mesh.facets["top"]})
     return in_its_layers(body, h, mesh, partial(_support, body))
 
@@ -132,9 +88,6 @@ PALM = register(
         presets={"palm": {"width": 0.085}},  # of the effective homogeneous soft tissue of a palm
         check=lambda body: body.palm,
         discretise=discretise,
-        morph=morph,
-        check_morph=check_morph,
-        moves_in_proportion=False,
         grid_lines=body_lines,
         default_size=lambda body: min(body.depth / 2, hand_size(body)),
         interactive_size=5e-3,

@@ -11,14 +11,13 @@ from functools import lru_cache
 
 import fem
 from skinwave.models import parametric
-from skinwave.models.free_keys import FreeKey, check_scene, free_keys
+from skinwave.models.free_keys import check_scene, free_keys
 from skinwave.models.options import SolveOptions
 from skinwave.models.parametric import ParametricBody
 from skinwave.scene.scene import Body, Scene
 
-# Bodies for each key that is free, and for a thickness that moves the mesh, in proportion or not:
-# fewer cost less alone.
-LEAST, THICKNESS, SMOOTH_THICKNESS = 6, 15, 21
+# Bodies for each key that is free, and for a thickness that moves the mesh: fewer cost less alone.
+LEAST, THICKNESS = 6, 15
 SHARE = 1 / 5  # of a tolerance: that of the reduced-order model
 
 
@@ -59,16 +58,10 @@ def covering(
         check_scene(plain, keys, tolerance)
     except ValueError:
         return None
-    if members < sum(_least(plain.body, key) for key in keys):
+    if members < sum(THICKNESS if key.moves else LEAST for key in keys):
         return None
     ranges = tuple((key, *ends) for key, ends in free.items())
     return Covering(scene=plain, ranges=ranges, members=members, hardest=hardest or plain.body)
-
-
-def _least(body: Body, key: FreeKey) -> int:
-    if not key.moves:
-        return LEAST
-    return THICKNESS if body.of_kind.moves_in_proportion else SMOOTH_THICKNESS
 
 
 def reduce_together(found: Covering, options: SolveOptions) -> ParametricBody:

@@ -19,7 +19,6 @@ from simple_model.quantities import STRAIN
 from skinwave.bodies import Body
 from skinwave.bodies.parts import solid_of
 from skinwave.bodies.sheet import refuse_open_air
-from skinwave.bodies.sizes import default_size
 from skinwave.bodies.supports import FRAME
 from skinwave.models.laws import check_laws
 from skinwave.scene.keys import MATERIAL, MODULI, PRONY, SCALES, SECTIONS, with_key, write_material
@@ -90,12 +89,6 @@ def free_keys(body: Body, free: Mapping[str, tuple[float, float]]) -> tuple[Free
         except ValueError as error:
             said = ", ".join(f"{key} = {value:g}" for key, value in values.items())
             raise ValueError(f"at {said}, ends of free ranges: {error}") from None
-    if any(key.moves for key in found):
-        thinnest, thickest = (
-            with_values(body, found, values_at(found, [end if k.moves else 0.5 for k in found]))
-            for end in (0.0, 1.0)
-        )
-        body.of_kind.check_morph(thinnest, thickest, default_size(thickest))
     return found
 
 
@@ -218,17 +211,12 @@ def _check_thicknesses(body: Body, keys: Sequence[FreeKey]) -> None:
     if kind.morph is None and kind.equivalent is None:
         raise ValueError(
             f"'{keys[0].key}' cannot be free: no mesh of a {body.kind} follows its thickness; free "
-            "that of a slab, disc, palm or sheet, or reduce a body for each value"
+            "that of a slab, disc or sheet, or reduce a body for each value"
         )
     if len(keys) > MOST_THICKNESSES:
         raise ValueError(
             f"{len(keys)} thicknesses are free, the limit is {MOST_THICKNESSES}; each multiplies "
             "the meshes that a body is interpolated between"
-        )
-    if len(keys) > 1 and not kind.moves_in_proportion:
-        raise ValueError(
-            f"{len(keys)} thicknesses of a {body.kind} are free, the limit is 1; reduce a body for "
-            "each value of the others"
         )
     if low := [key.key for key in keys if not key.low > 0]:
         raise ValueError(f"{low[0]} is free from 0 or below; give a least value above 0")
