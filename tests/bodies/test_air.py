@@ -17,10 +17,10 @@ from skinwave.bodies.sheet import air, air_mass, bending_wavenumber
 from skinwave.models.meshed import surface_load
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import answer, prepare, typical_spots
-from skinwave.models.stretching import membrane, reduced_answer
+from skinwave.models.stretching import reduced_answer
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads
-from skinwave.scene.scene import BODIES, Body, Placement, Scene
+from skinwave.scene.scene import BODIES, Placement, Scene
 from skinwave.verify import references
 from skinwave.verify.plates import PAPER
 
@@ -39,16 +39,6 @@ def test_a_scene_says_it_and_comes_back():
     assert not loads('[body]\nkind = "sheet"').body.air
     assert "air = false" in dumps(loads('[body]\nkind = "sheet"'))
     assert "air" not in dumps(loads(""))
-
-
-@pytest.mark.parametrize("kind", ["slab", "none"])
-def test_only_a_sheet_has_air(kind):
-    with pytest.raises(ValueError, match=f'air is for kind = "sheet", not "{kind}"'):
-        loads(f'[body]\nkind = "{kind}"\nair = true')
-    with pytest.raises(ValueError, match=f"for a sheet, not a {kind}"):
-        Body(kind=kind, air=True)
-    with pytest.raises(ValueError, match="must be true or false"):
-        loads('[body]\nkind = "sheet"\nair = 1.2')
 
 
 @pytest.mark.parametrize("model", ["fem-transient", "fem-nonlinear-transient"])
@@ -107,16 +97,6 @@ def test_moments_at_rest_are_enough_and_their_error_estimate_holds():
     np.testing.assert_allclose(mass, np.eye(len(mass)), atol=1e-9)
 
 
-def test_a_sheet_without_loss_is_reduced_too():
-    solid = replace(SHEET.solid, loss_factor=0.0)
-    prepared = prepare(replace(SHEET, material=solid), SCENE.probe_points, h=H)
-    lossy = prepare(SHEET, SCENE.probe_points, h=H)
-    vibrate = [p.poles.values[p.poles.values.imag > 0] for p in (prepared, lossy)]
-    lowest = [s[np.abs(s).argmin()] for s in vibrate]
-    softer = SHEET.solid.complex_modulus(-1j * lowest[1]) / SHEET.solid.shear_modulus
-    assert lowest[0] ** 2 * softer == pytest.approx(lowest[1] ** 2, rel=1e-6)
-
-
 def test_a_quarter_in_air_answers_as_the_whole():
     still = replace(LOAD, tacton=replace(LOAD.tacton, trajectory=Trajectory()))
     scene = replace(SCENE, pressure=still)
@@ -125,18 +105,6 @@ def test_a_quarter_in_air_answers_as_the_whole():
         for axes in ("", "xy")
     )
     assert np.linalg.norm(part - whole) < 2e-3 * np.linalg.norm(whole)
-
-
-def test_air_and_vacuum_are_two_entries_of_the_cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
-    bodies = (SHEET, replace(SHEET, air=False))
-    first = [answer(prepare(body, SCENE.probe_points, h=H), SCENE) for body in bodies]
-    assert len(list(tmp_path.glob("*.npz"))) == 2
-    again = [answer(prepare(body, SCENE.probe_points, h=H), SCENE) for body in bodies]
-    for a, b in zip(first, again, strict=True):
-        np.testing.assert_array_equal(a.displacement, b.displacement)
-    difference = first[0].displacement - first[1].displacement
-    assert np.linalg.norm(difference) > 0.1 * np.linalg.norm(first[1].displacement)
 
 
 @pytest.mark.slow
@@ -150,25 +118,6 @@ def test_a_sheet_that_hardly_stretches_answers_as_the_linear_one():
     settled = slice(3000, None)
     a, b = (u[settled] - u[settled].mean(axis=0) for u in (linear, modes))
     assert np.linalg.norm(a - b) < 0.08 * np.linalg.norm(a)
-
-
-def test_the_loss_factor_is_the_material_s_in_air_too():
-    """Of one material without tension -s^2 is a real multiple of its modulus at each pole s."""
-    prepared = prepare(SHEET, SCENE.probe_points, h=H)
-    poles = prepared.poles.values[prepared.poles.values.imag > 0]
-    assert (abs(poles) < 2 * np.pi * 1500).sum() > 10
-    found = -(poles**2) / SHEET.solid.complex_modulus(-1j * poles)
-    np.testing.assert_allclose(found.imag, 0.0, atol=1e-6 * found.real.min())
-    made = build(SHEET, H)
-    ops = operators(made)
-    modes = fem.stretching_modes(
-        made.mesh, ops, membrane(SHEET, made, 1.0), 12, added=air(SHEET, made, ops.free)
-    )
-    solid = SHEET.solid.without_loss_factor()
-    terms = sorted(solid.prony, key=lambda term: term.time)
-    for branch, term in zip(modes.elastic.operators.branches, terms, strict=True):
-        expected = np.diag(term.modulus / solid.shear_modulus * (2 * np.pi * modes.hz) ** 2)
-        np.testing.assert_allclose(branch.K.toarray(), expected, atol=1e-6 * expected.max())
 
 
 def test_exact_waves_keep_below_what_only_decays():

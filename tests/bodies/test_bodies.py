@@ -11,13 +11,10 @@ import pytest
 import fem
 import meshes
 import skinwave
-from meshes import graded_axis
-from meshes.shapes.structured import Grading, with_planes
-from simple_model import MovingPressure, Tacton, Trajectory, array_field, lines
+from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.load.focus import along_axis, spot_width
 from skinwave import compare
-from skinwave.bodies.absorbing_layer import has_layer
-from skinwave.bodies.build import build, operators
+from skinwave.bodies.build import build
 from skinwave.commands.cli import main
 from skinwave.models.meshed import surface_load
 from skinwave.models.options import SolveOptions
@@ -67,14 +64,6 @@ def test_a_layer_ends_on_a_plane_of_the_mesh_and_changes_the_answer():
     assert 1.03 < np.ptp(soft[:, 1]) / np.ptp(plain[:, 1]) < 1.3
 
 
-def test_planes_take_the_place_of_grid_lines_that_are_close():
-    line = graded_axis(0.015, 0.003, Grading(radius=0.0, growth=1.25))
-    with_one = with_planes(line, [0.0031, 0.0001])
-    assert {0.0, 0.0001, 0.0031, 0.015} <= set(with_one)
-    assert 0.003 not in with_one
-    assert np.diff(with_one).min() == pytest.approx(0.0001)
-
-
 def test_layers_that_do_not_fit_are_refused():
     for layers, message in (((0.0, "fat"),), "above 0"), (((0.02, "fat"),), "20 mm thick in all"):
         with pytest.raises(ValueError, match=message):
@@ -117,47 +106,6 @@ def test_a_lifted_body_feels_what_the_focus_has_left_there():
     raised = replace(CLAMPED, placement=Placement(lift=0.02))
     ratio = np.abs(answered(raised)).max() / np.abs(answered(CLAMPED)).max()
     assert ratio == pytest.approx(float(along_axis(0.02)), rel=0.02)
-
-
-def test_the_focus_is_as_long_as_the_array_makes_it():
-    for height in [0.1, 0.2, 0.3]:
-        offsets = np.linspace(-0.07, 0.07, 29) * (height / 0.3) ** 2
-        points = np.column_stack([0 * offsets, 0 * offsets, height + offsets])
-        intensity = np.abs(array_field(points, (0, 0, height))) ** 2
-        intensity /= intensity[14]
-        # upper and lower half together: the maximum lies below the focus
-        both = (intensity + intensity[::-1]) / 2
-        np.testing.assert_allclose(along_axis(offsets, height), both, atol=0.05)
-
-
-def test_placement_and_layers_come_back_from_a_file():
-    placed = Placement(tilt_x=np.radians(5), offset=(1e-3, -2e-3), lift=3e-3)
-    layers = (Layer(thickness=1e-3, material="dermis"), Layer(thickness=2e-3, material="fat"))
-    scene = replace(SKIN, body=replace(SKIN.body, layers=layers, placement=placed))
-    again = loads(dumps(scene))
-    assert again.body.layers == layers
-    assert again.body.placement.offset == placed.offset
-    assert again.body.placement.tilt_x == pytest.approx(placed.tilt_x, rel=1e-15)
-    for text, message in (
-        ("[[body.layers]]\nthickness_mm = 1", "lacks material"),
-        ("[body]\nlayers = 3", "must be a list of tables"),
-        ("[placement]\ntilt_x_deg = 80", "beyond 60"),
-        ("[placement]\noffset_mm = [1]", "pair of numbers"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            loads(text)
-
-
-def test_the_layer_around_a_body_damps_nothing_in_it():
-    made = build(SKIN.body, 0.006)
-    inside = np.abs(made.mesh.points[made.mesh.tets[:, :4], :2].mean(axis=1)).max(axis=1) < 0.03
-    assert has_layer(SKIN.body)
-    assert (made.drag[inside] == 0).all()
-    assert (made.drag[~inside] > 0).all()
-    assert not has_layer(replace(SKIN.body, sides="clamped"))
-    ops = operators(made)
-    lost = ops.C - ops.R
-    assert abs(lost - 5.0 / 25e3 * ops.K).max() < 1e-12 * abs(ops.C).max()
 
 
 def test_a_body_of_half_the_size_answers_alike():
@@ -245,22 +193,6 @@ def test_a_mesh_in_a_file_keeps_its_own_bottom(dome, tmp_path):
         assert len(built(tmp_path, mesh).facets["bottom"]) == count
 
 
-def test_a_mesh_without_a_bottom_of_its_own_rests_on_what_looks_downwards(dome, tmp_path):
-    top = meshes.tag_boundary(dome, top=lambda at, normals: (normals[:, 2] > 0.9) & (at[:, 0] > 0))
-    # What is read and written again has the bottom that reading gave it.
-    meshes.write(tmp_path / "first.vtu", dome)
-    again = meshes.body_from_file(tmp_path / "first.vtu", 0.005)
-    assert len(again.facets["bottom"])
-    for mesh in (dome, top, again):
-        meshes.write(tmp_path / "body.vtu", mesh)
-        made = build(hand_in(tmp_path / "body.vtu"), 0.005)
-        assert "bottom" not in made.mesh.facets
-        downwards = -fem.facet_normals(made.mesh, made.support.facets)[:, 2]
-        assert ((made.support.stiffness > 0) == (downwards > 0.2)).all()
-        assert not made.support.absorbed.any()
-        assert (downwards > 0.9).sum() > 100
-
-
 def test_springs_and_dashpots_of_a_support_carry_what_they_should():
     block = meshes.block((0.02, 0.03, 0.01), 0.005)
     facets, soft = block.facets["clamped"], replace(fem.PRESETS["palm"], viscosity=0.0)
@@ -291,17 +223,6 @@ def test_a_support_keeps_the_balance_of_energy():
     *_, (state, spent) = fem.with_energy_balance(ops, states, force)
     assert fem.imbalance(spent, fem.stored(ops, state)) < 1e-9
     assert spent.radiated > 0.01 * spent.work
-
-
-def test_lines_of_a_body_that_nothing_holds_are_those_without_its_drift():
-    body = Body(width=0.03, height=0.03, depth=0.01, base="absorbing", sides="free")
-    tacton = Tacton(am_frequency=140, duration=0.2)
-    moved = {}
-    for drive in ("linear", "pressure_squared"):  # the second has a mean, and half the line
-        pressure = MovingPressure(tacton=tacton, drive=drive)
-        scene = skinwave.Scene(pressure=pressure, body=body, probes=((0.0, 0.0), (0.005, 0.0)))
-        moved[drive] = lines(compute(scene, "fem", h=0.005), [140.0])
-    np.testing.assert_allclose(moved["pressure_squared"], moved["linear"] / 2, rtol=1e-3)
 
 
 def test_layers_of_a_body_from_a_file_lie_below_its_top(block_file):
@@ -370,17 +291,3 @@ def test_a_public_hand_goes_from_its_file_to_a_comparison_in_one_command(
     ]
     assert 0.1 < max(moved) < 10
     assert {path.name for path in tmp_path.iterdir()} == {"scene.toml", "both"}
-
-
-def test_what_is_seen_of_a_body_is_not_the_layer_around_it():
-    times = np.arange(20) / 1000
-    small = replace(SKIN, body=Body(width=0.03, height=0.03), probes=THREE[:2])
-    with pytest.warns(skinwave.SkinwaveWarning, match="elements of 10 mm"):
-        seen = skinwave.field(small, times, 0.2, h=0.01)
-    assert np.abs(seen.mesh.points[:, :2]).max() == pytest.approx(0.015)
-    assert seen.displacement.shape == (20, len(seen.mesh.points), 3)
-    top = seen.mesh.facets["top"]
-    corners = seen.mesh.points[top[:, :3], :2]
-    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    area = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() / 2
-    assert area == pytest.approx(0.03**2)

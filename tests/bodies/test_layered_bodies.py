@@ -6,13 +6,13 @@ from math import inf
 import numpy as np
 import pytest
 
-from simple_model import flat_body, steady_state
-from simple_model.layers.compliance import half_space, layered
-from skinwave.bodies.analytic import compliance, has_exact_waves, stack
+from simple_model import flat_body
+from simple_model.layers.compliance import layered
+from skinwave.bodies.analytic import has_exact_waves, stack
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import loads
-from skinwave.scene.scene import Body, Layer, Placement, solid_of
+from skinwave.scene.scene import Layer, Placement, solid_of
 
 SKIN = loads("""
 [tacton]
@@ -58,14 +58,6 @@ def test_a_slab_is_the_stack_of_its_layers(body, base, last):
     assert found.base == base or last == inf
 
 
-def test_layers_of_one_material_are_one():
-    palm = Layer(thickness=1e-3, material="palm")
-    assert stack(Body(layers=(palm, palm))).thicknesses == pytest.approx((15e-3,))
-    k, w = np.array([100 + 1j]), np.array([[500.0 + 0j]])
-    found = compliance(Body(layers=(palm,), depth=inf))(k, w)
-    np.testing.assert_allclose(found, half_space(solid_of("palm"))(k, w), rtol=1e-12)
-
-
 def test_layers_that_lose_nothing_need_one_that_does():
     still = replace(solid_of("fat"), viscosity=0.0)
     assert has_exact_waves(changed(layers=(Layer(thickness=1e-3, material=still),)).body)
@@ -82,10 +74,4 @@ def test_a_plan_takes_the_wavenumber_integral_of_layers(body):
     assert "a flat slab of 3 layers without reflecting sides" in row.reason
     found = compute(scene, "flat-body").displacement
     own = flat_body(layered(stack(scene.body)), scene.pressure, scene.probe_points, TIMES)
-    np.testing.assert_array_equal(found, own.displacement)
-
-
-def test_layers_have_a_steady_state():
-    found = compute(SKIN, "flat-body-harmonic").displacement
-    own = steady_state(layered(stack(SKIN.body)), SKIN.pressure, SKIN.probe_points, TIMES)
     np.testing.assert_array_equal(found, own.displacement)

@@ -11,19 +11,16 @@ import meshes
 import skinwave
 from fem.affine_model import line_errors
 from fem.geometry import jacobians, shape_nodes
-from meshes.tetmesh import FACES, interface_facets
 from simple_model import MovingPressure, Tacton, Trajectory
 from skinwave.bodies import BODIES, Body, Layer, Phalanx
 from skinwave.bodies.build import build, operators
 from skinwave.models import parametric
 from skinwave.models.free_keys import has_affine_operators, values_at
 from skinwave.models.free_keys import with_values as with_free_values
-from skinwave.models.laws import check_laws, has_own_law, relaxing
 from skinwave.models.reduced import components, prepare
 from skinwave.planning.simulate import compute
-from skinwave.scene.file import dumps, loads, read
+from skinwave.scene.file import dumps, loads
 from skinwave.scene.scene import Scene
-from skinwave.scene.spreads import spreads_of, with_values
 
 FINGER = BODIES["fingertip"]
 SHAPE = meshes.Fingertip(
@@ -117,23 +114,6 @@ def test_a_scene_has_regions_by_name_with_presets_or_tables():
         replace(scene.body, regions=(("a", "paper-grain"),))
 
 
-def test_materials_of_regions_have_tables_and_spreads_like_any_other(tmp_path):
-    (tmp_path / "gel.csv").write_text(
-        "frequency_hz,storage_pa,loss_pa\n" + "".join(f"{f},3e4,3e3\n" for f in (10, 100, 1000))
-    )
-    text = SCENE + "[body.regions.gel]\ndensity_kg_m3 = 1000\npoisson = 0.49\n"
-    (tmp_path / "a.toml").write_text(text + 'table = "gel.csv"\n')
-    scene = read(tmp_path / "a.toml")
-    assert has_own_law(scene.body)
-    check_laws(scene.body, scene.pressure)
-    assert not has_own_law(relaxing(scene.body, 1e-2))
-    scene = loads(SCENE + '[body.regions]\nfat = "fat"\nbone = "bone"\n')
-    assert {s.key for s in spreads_of(scene)} >= {"body.regions.fat.modulus_scale"}
-    stiffer = with_values(scene, {"body.regions.fat.modulus_scale": 2.0})
-    assert dict(stiffer.body.regions)["fat"] == fem.PRESETS["fat"].scaled(modulus=2.0)
-    assert dict(stiffer.body.regions)["bone"] == "bone"
-
-
 # Meshed bodies.
 
 
@@ -159,16 +139,6 @@ def test_regions_that_a_file_has_not_are_named_with_those_that_it_has(body, fing
     with pytest.raises(ValueError, match="material"):
         build(replace(body, regions=both), 4e-3)
     build(replace(body, regions=both, material="fat"), 4e-3)
-
-
-def test_a_bone_does_not_pass_for_what_waves_run_in(body):
-    speed = body.of_kind.wave_speed(body, 140.0)
-    soft = replace(body, regions=())
-    assert speed == soft.of_kind.wave_speed(soft, 140.0)
-    around = replace(body, material="bone", regions=(("tissue", "palm"),))
-    assert around.of_kind.wave_speed(around, 140.0) == speed
-    resting = [build(replace(b, base="clamped"), 4e-3).support for b in (body, around)]
-    np.testing.assert_array_equal(resting[0].stiffness, resting[1].stiffness)
 
 
 TISSUE, IN_BONE = "body.material.shear_modulus_pa", "body.regions.bone.shear_modulus_pa"
@@ -211,29 +181,6 @@ def test_a_fingertip_has_the_volumes_of_its_ellipsoids():
     np.testing.assert_allclose(np.abs(mesh.points).max(axis=0), [8e-3, 12.5e-3, 13e-3])
 
 
-def test_elements_of_tissue_and_bone_share_the_facets_between_them(finger):
-    shared = {tuple(sorted(facet)) for facet in interface_facets(finger).tolist()}
-    faces = np.sort(finger.tets[:, FACES], axis=2)
-    of = [{tuple(f) for f in faces[finger.region == r].reshape(-1, 6).tolist()} for r in (0, 1)]
-    assert shared == of[0] & of[1]
-    cut = finger.points[:, 1] < -0.0125 + 1e-9
-    bone = np.unique(finger.tets[finger.region == 1])
-    tissue = np.unique(finger.tets[finger.region == 0])
-    assert set(np.intersect1d(bone, tissue)) == {node for facet in shared for node in facet}
-    assert cut[bone].any()
-    assert len(finger.facets["top"]) == len(finger.facets["bottom"])
-
-
-def test_a_disc_is_a_prism_whose_quarters_are_meshed_alone():
-    disc = BODIES["silicone-disc"]
-    made = build(disc, 1e-2, "xy")
-    volume = meshes.corner_volumes(made.mesh.points, made.mesh.tets).sum()
-    assert 4 * volume == pytest.approx(16 * np.sin(np.pi / 16) * 0.04**2 * 0.02)
-    assert made.fixed == {"bottom": "xyz", "mirror_x": "x", "mirror_y": "y"}
-    with pytest.raises(ValueError, match="give it one diameter"):
-        replace(disc, width=0.05)
-
-
 def test_a_bone_outside_a_finger_is_refused():
     for changes, message in [
         ({"depth": 0.009}, "is not inside a fingertip of 16 x 9 mm"),
@@ -242,18 +189,6 @@ def test_a_bone_outside_a_finger_is_refused():
     ]:
         with pytest.raises(ValueError, match=message):
             replace(FINGER, **changes)
-
-
-def test_a_fingertip_of_the_scene_is_that_of_a_file(body):
-    text = '[tacton]\nduration_s = 0.05\n[body]\nkind = "finger"\n'
-    scene = loads(text + "[body.bone]\ncover_mm = 5\n[probes]\npoints_mm = [[0, 0]]\n")
-    assert scene.body == replace(FINGER, bone=Phalanx(cover=0.005))
-    assert loads(dumps(scene)) == scene
-    own, file = (operators(build(each, 4e-3)) for each in (FINGER, body))
-    assert own.K.shape == file.K.shape
-    for name in ("K", "C", "M"):
-        one, other = getattr(own, name), getattr(file, name)
-        assert abs(one - other).max() < 1e-12 * abs(one).max()
 
 
 def test_every_linear_model_takes_a_bone_and_they_agree():

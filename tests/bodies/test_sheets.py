@@ -10,27 +10,22 @@ import fem
 import meshes
 from fem import nonlinear
 from simple_model import MovingPressure, Tacton, from_young, orthotropic
-from simple_model.layers.compliance import thin_sheet
 from simple_model.plates.modes import plate_modes
-from simple_model.plates.sheet_waves import sheet_curves
 from skinwave import dumps, loads, plan
 from skinwave.bodies.build import build, operators
-from skinwave.bodies.sheet import air_mass, bending_equivalent, bending_wavenumber
+from skinwave.bodies.sheet import bending_equivalent
 from skinwave.bodies.supports import EDGES, Mounting
 from skinwave.models import named
 from skinwave.models.limits import beyond
 from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import middle_compliance, plate_of
 from skinwave.models.reduced import prepare
-from skinwave.planning.extent import symmetry
 from skinwave.planning.left_out import mean_sag
 from skinwave.scene.scene import BODIES, Body, Scene
-from skinwave.studies.assumptions import droppable
 
 PAPER = orthotropic(density=800, young_x=5.5e9, young_y=2.5e9, poisson_xy=0.35)
 WIDE, HIGH, DEEP = 0.12, 0.09, 1e-4
 TENSION = (3.0, 1.0)  # N/m, as much as bending in the lowest mode
-SIMPLY = {"left": "yz", "right": "yz", "front": "xz", "back": "xz"}
 SMALL = Body(
     kind="sheet", width=0.06, height=0.05, depth=DEEP, material=PAPER, base="free", sides="clamped"
 )
@@ -132,33 +127,6 @@ def test_stiffness_turns_with_the_axes_of_the_sheet():
     assert abs(third.K - ops.K).max() < 1e-9 * abs(ops.K).max()
 
 
-def test_strips_held_at_two_opposite_edges_are_beams():
-    # Clamped beams, w l^2 sqrt(m / D) = 22.373, 61.673, 120.90 (Blevins 1979, table 8-1), nu = 0.
-    material = orthotropic(density=800, young_x=5.5e9, young_y=2.5e9, poisson_xy=0.0)
-    edges = Mounting(edges=("left", "right"))
-    body = replace(SMALL, width=0.1, height=0.02, material=material, mounting=edges)
-    beam = np.array([22.373, 61.673, 120.90]) * np.sqrt(5.5e9 * DEEP**3 / 12 / 0.08)
-    hz = fem.modes(operators(build(body, 0.1 / 40, symmetry="y")), 3)[0]  # without twist
-    np.testing.assert_allclose(hz, beam / (2 * np.pi * 0.1**2), rtol=5e-3)
-    modes = plate_modes(plate_of(body))
-    at_middle = abs(modes.at([[0.011, 0.0]])[0])
-    bending = np.sqrt(modes.squared[at_middle > 1e-6 * at_middle.max()]) / (2 * np.pi)
-    np.testing.assert_allclose(np.sort(bending)[:3], beam / (2 * np.pi * 0.1**2), rtol=1e-3)
-
-
-def test_a_stretched_sheet_without_stiffness_is_a_membrane():
-    thickness, T = 1e-3, 50.0
-    mesh = meshes.sheet(0.06, 0.05, thickness, 0.05 / 14)
-    soft = from_young(density=0.08 / thickness, young=1e2, poisson=0.3)
-    fixed = np.ones(mesh.points.shape, bool)
-    fixed[:, 2] = False  # in its plane it is as soft
-    fixed[np.unique(mesh.facets["sides"]), 2] = True
-    ops = fem.assemble(mesh, soft, fixed=fixed, tension=fem.Tension(x=T, y=T))
-    hz = fem.modes(ops, 3)[0]
-    waves = np.hypot(np.array([1, 2, 1]) / 0.06, np.array([1, 1, 2]) / 0.05)
-    np.testing.assert_allclose(hz, np.sqrt(T / 0.08) / 2 * waves, rtol=5e-3)
-
-
 @pytest.mark.parametrize("rise", [2e-3])
 def test_frequencies_of_a_curled_sheet_are_those_of_a_shallow_shell(rise):
     # m w^2 = D k^4 + E h kappa^2 b^4 / k^4, k^2 = a^2 + b^2: Donnell's equations on shear
@@ -206,21 +174,6 @@ def test_modes_of_a_sheet_in_clips_are_those_of_ritzs_plate():
     np.testing.assert_allclose(found, np.sqrt(even) / 2 / np.pi, rtol=4e-3)
 
 
-@pytest.mark.parametrize("mounting", [TWO, replace(CLIPPED, edges=("front", "back"))])
-def test_half_a_sheet_and_its_mirror_images_are_the_whole(mounting):
-    both = tuple((x, y) for x in (-0.02, 0.02) for y in (-0.02, 0.02)) * bool(mounting.clips)
-    body = replace(SMALL, mounting=replace(mounting, clips=both))
-    scene = Scene(pressure=MovingPressure(tacton=Tacton(am_frequency=140)), body=body)
-    assert symmetry(scene) == "xy"
-    whole, part = (build(body, 0.05 / 8, symmetry=axes) for axes in ("", "xy"))
-    found = []
-    for made in (whole, part):
-        P = fem.load_operator(made.mesh)
-        u = fem.static(operators(made), P @ np.ones(P.shape[1]))
-        found.append(fem.probe_operator(made.mesh, [[0.01, 0.007]]) @ u)
-    assert found[1] == pytest.approx(found[0], rel=1e-8)
-
-
 def test_steady_motion_by_plate_modes_is_that_of_elements():
     lossy = replace(PAPER, loss_factor=0.03)
     body = replace(SMALL, material=lossy, mounting=replace(TWO, edges=tuple(EDGES),
@@ -234,22 +187,6 @@ def test_steady_motion_by_plate_modes_is_that_of_elements():
     wave = np.exp(-2j * np.pi * 140 * np.arange(1000) / 1e4)
     ritz, elements = (abs(wave @ values) for values in found)
     np.testing.assert_allclose(ritz, elements, rtol=0.01)
-
-
-def test_waves_of_an_infinite_stretched_sheet():
-    solid, T, w = from_young(density=800, young=4e9, poisson=0.3, loss_factor=0.03), 20.0, 880.0
-    curves = sheet_curves(solid, DEEP, [w / 2 / np.pi], tension=T)
-    D = solid.complex_modulus(w) * DEEP**3 / 6 / 0.7
-    for mode in curves.modes:
-        k = complex(mode.wavenumbers[0])
-        assert D * k**5 + T * k**3 == pytest.approx((0.08 * k + 2.4) * w**2, rel=1e-9)
-    k = np.array([100.0 + 0j])
-    G = thin_sheet(solid, DEEP, tension=T)(k, np.array([[w + 0j]]))
-    assert 1 / G[0, 0] == pytest.approx(D * k[0] ** 4 + T * k[0] ** 2 - (0.08 + 0.024) * w**2)
-    body = replace(SMALL, material=solid, air=True, mounting=Mounting(tension_x=30, tension_y=10))
-    k = bending_wavenumber(body, 140.0)
-    total = body.bending_stiffness * k**4 + T * k**2
-    assert total == pytest.approx((0.08 + air_mass(body, 140.0)) * (280 * np.pi) ** 2, rel=1e-9)
 
 
 def strip(cells, material, tension, length=0.1):
@@ -287,31 +224,6 @@ def test_large_cylindrical_bending_of_a_stretched_orthotropic_strip(tension):
     u = nonlinear.static(body, P @ np.full(P.shape[1], q))
     assert exact > 4 * DEEP
     assert (fem.probe_operator(mesh, [[0, 0]]) @ u)[0] == pytest.approx(exact, rel=7e-3)
-
-
-def test_the_tangent_is_the_derivative_of_the_force_and_that_of_the_energy():
-    _, body = strip(6, PAPER, 20.0)
-    rng, n, e = np.random.default_rng(0), len(body.operators.free), 1e-4
-    u, v = 1e-4 * rng.normal(size=(2, n))
-    rate = (body.internal(u + e * v) - body.internal(u - e * v)) / 2 / e
-    np.testing.assert_allclose(body.tangent(u) @ v, rate, atol=1e-6 * abs(rate).max())
-    work = (body.energy(u + e * v) - body.energy(u - e * v)) / 2 / e
-    assert body.internal(u) @ v == pytest.approx(work, rel=1e-6)
-    rest = body.tangent(np.zeros(n)) - body.operators.K
-    assert abs(rest).max() < 1e-9 * abs(body.operators.K).max()
-
-
-def test_stretched_sheets_at_large_deflection_begin_as_linear_ones():
-    body = replace(SMALL, material=replace(PAPER, loss_factor=0.1), mounting=TWO)
-    tacton = Tacton(am_frequency=140, duration=0.02, amplitude=0.05)
-    scene = Scene(pressure=MovingPressure(tacton=tacton), body=body, probes=((0.0, 0.0),))
-    times = np.arange(200) / 1e4
-    nonlinear_, plate = (
-        named(m).solve(scene, times, SolveOptions(h=0.05 / 16 if m == "fem-nonlinear" else None))
-        for m in ("fem-nonlinear", "plate-modes-transient")
-    )
-    apart = np.linalg.norm(nonlinear_.values - plate.values)
-    assert apart < 0.05 * np.linalg.norm(plate.values)
 
 
 def test_the_sag_of_any_support():
@@ -405,17 +317,6 @@ def test_models_say_which_sheets_they_are_not_for():
     scene = Scene(pressure=MovingPressure(tacton=Tacton(am_frequency=140)), body=two)
     required = plan(scene, SolveOptions(model="plate-modes"))
     assert (required.model, required.h) == ("plate-modes", None)
-
-
-def test_assumptions_that_a_sheet_keeps_by_its_mounting():
-    scene = Scene(
-        pressure=MovingPressure(tacton=Tacton(am_frequency=140)),
-        body=replace(SMALL, material="paper", mounting=replace(TWO, tension_y=30.0)),
-    )
-    framed = replace(scene, body=replace(scene.body, mounting=Mounting()))
-    assert set(droppable(framed)) - set(droppable(scene)) == {"vacuum"}  # without a frame, no air
-    grained = set(droppable(replace(scene, body=SMALL)))
-    assert grained - set(droppable(scene)) >= {"alike in all directions"}
 
 
 def test_elements_damp_each_mode_of_a_stretched_sheet_by_its_loss_factor():

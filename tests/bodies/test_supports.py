@@ -1,7 +1,6 @@
 """Supports of a body: Young's modulus, sides one by one, and an elastic base."""
 
 from dataclasses import replace
-from math import inf
 
 import numpy as np
 import pytest
@@ -22,16 +21,11 @@ from skinwave.bodies import Sides
 from skinwave.bodies.analytic import stack
 from skinwave.bodies.build import build, operators
 from skinwave.bodies.hands import support
-from skinwave.models.free_keys import FreeKey, with_values
 from skinwave.models.meshed import surface_load
-from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import answer, prepare
-from skinwave.planning.estimates import side_reflections
-from skinwave.planning.extent import absorbing_error, symmetry
-from skinwave.planning.plan import plan
+from skinwave.planning.extent import symmetry
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import Load
-from skinwave.scene.variation import varied
 
 SOLID = Material(density=1000, shear_modulus=2e4, poisson=0.3, viscosity=6.0)
 SOFT = Material(density=1000, shear_modulus=6e3, poisson=0.49, viscosity=2.0)
@@ -58,27 +52,6 @@ def test_contradictory_moduli_are_refused():
     ]:
         with pytest.raises(ValueError, match=said):
             loads(text)
-
-
-def test_youngs_modulus_is_varied_and_free_like_the_shear_modulus():
-    scene = loads("[body]")
-    young = "body.material.young_modulus_pa"
-    assert varied(scene, {young: 60e3}).body.solid.young == pytest.approx(60e3)
-    key = FreeKey(key=young, part=None, path=("young_modulus_pa",), low=1e4, high=1e5)
-    assert with_values(scene.body, [key], {young: 60e3}).solid.young == pytest.approx(60e3)
-
-
-@pytest.mark.parametrize(
-    ("given", "width"),
-    [("spread = 0.3", (0.3,)), ("low = 50e3, high = 100e3", (20e3, 40e3))],
-)  # fmt: skip
-def test_a_spread_of_youngs_modulus_is_one_of_the_shear_modulus(given, width):
-    """E / 2 (1 + nu), 0.4 of it."""
-    scene = loads(YOUNG.replace("75e3", f"{{ value = 75e3, {given} }}"))
-    ((key, found),) = scene.spreads
-    assert key == "body.material.shear_modulus_pa"
-    np.testing.assert_allclose(found.width, width)
-    assert loads(dumps(scene)) == scene
 
 
 def test_sides_are_named_one_by_one_and_alike_they_are_one_word():
@@ -168,32 +141,6 @@ def test_an_absorbing_base_stands_for_a_half_space():
         replace(scene, load=Load(gravity=9.81))
 
 
-def test_reflections_of_sides_above_springs_are_in_the_stated_error():
-    scene = loads(
-        "[tacton]\nam_frequency_hz = 212\nduration_s = 0.05\nsuperposition = [1.0, 0.0]\n"
-        "[body]\nsize_x_mm = 24\nsize_y_mm = 24\nthickness_mm = 2.6\nbase = 'elastic'\n"
-        "base_stiffness_n_per_m3 = 1.83e6\nmaterial = {density_kg_m3 = 1000, "
-        "shear_modulus_pa = 9290, poisson = 0.45, viscosity_pa_s = 0.84}\n"
-        "[probes]\npoints_mm = [[9, 0], [0, 6]]"
-    )
-    found = plan(scene, SolveOptions(tolerance=0.1, model="fem", h=2.6e-3))
-    true = errors_beside_the_wavenumber_integral(scene, answer(found.prepared, scene).values)
-    assert true.max() < 0.1
-    assert true.max() < 1.1 * found.error
-    assert absorbing_error(scene, scene.body) > 0.003
-    assert absorbing_error(scene, replace(scene.body, sides="clamped")) == 0
-
-
-def test_only_sides_that_reflect_count_as_reflecting():
-    text = "[tacton]\nam_frequency_hz = 200\nduration_s = 0.03\n[probes]\npoints_mm = [[15, 0]]\n"
-    text += "[body]\nsize_x_mm = 50\nsize_y_mm = 50\nthickness_mm = 8\n"
-    all_free, near, far = (
-        side_reflections(loads(text + sides))
-        for sides in ('sides = "free"', 'sides = {right = "free"}', 'sides = {left = "free"}')
-    )
-    assert far < 0.3 * near < near < all_free
-
-
 def elastic(*thicknesses, stiffness=BED, solids=(SOFT, SOLID)):
     return Stack(
         materials=solids[: len(thicknesses)], thicknesses=thicknesses, base="elastic",
@@ -260,9 +207,3 @@ def test_a_hand_rests_on_springs_where_it_looks_down():
     forces = springs(mesh, found) @ np.ones(mesh.n_dofs)
     np.testing.assert_allclose(forces.reshape(-1, 3).sum(axis=0), BED * 0.02 * 0.03)
     assert not found.absorbed.any()
-
-
-def test_a_stack_has_a_stiffness_where_its_base_is_elastic():
-    for given in ({"base": "elastic"}, {"base_stiffness": 1e6}):
-        with pytest.raises(ValueError, match="give an elastic one a finite stiffness"):
-            Stack(materials=(SOLID,), thicknesses=(inf,), **given)

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import least_squares
 
 import fem
 import skinwave
@@ -134,56 +133,6 @@ def test_the_offline_stage_is_cached(slab, tmp_path, monkeypatch):
         skinwave.prepare(few, {VISCOSITY: (9.0, 11.0)}, 0.05, h=9e-3)
 
 
-def test_modulus_and_viscosity_are_fitted_without_a_further_factorisation(slab, prepared):
-    hidden = {MODULUS: 21e3, VISCOSITY: 6.5}
-    frequencies, _ = parametric.lines(prepared, hidden)
-    strong = [280.0, *frequencies[1:3]]
-    measured = full_lines(slab, with_values(slab.body, prepared.keys, hidden), strong)
-    chosen = [np.argmin(np.abs(frequencies - f)) for f in strong]
-    evaluated = 0
-
-    def misfit(shares):
-        nonlocal evaluated
-        evaluated += 1
-        found = parametric.lines(prepared, values_at(prepared.keys, shares))[1][chosen]
-        apart = (found - measured).ravel() / np.abs(measured).max()
-        return np.concatenate([apart.real, apart.imag])
-
-    starts = np.random.default_rng(0).random((6, 2))
-    fits = [least_squares(misfit, start, bounds=(0, 1), x_scale=0.1) for start in starts]
-    best = min(fits, key=lambda fit: fit.cost)
-    fitted = values_at(prepared.keys, best.x)
-    assert fitted[MODULUS] == pytest.approx(21e3, rel=0.01)
-    assert fitted[VISCOSITY] == pytest.approx(6.5, rel=0.01)
-    assert evaluated >= 20 * prepared.effort.factorisations
-
-
-def test_layers_prony_terms_and_density_are_free_on_an_absorbing_base():
-    soft = fem.Material(
-        density=1000, shear_modulus=20e3, poisson=0.45, viscosity=5.0,
-        prony=(PronyTerm(modulus=10e3, time=1e-3),),
-    )  # fmt: skip
-    top = Layer(thickness=0.003, material=replace(soft, viscosity=8.0))
-    body = Body(
-        material=soft, layers=(top,), width=0.024, height=0.024, depth=0.006, base="absorbing",
-        sides="clamped",
-    )  # fmt: skip
-    scene = scene_of(body)
-    free = {
-        "body.layers.0.material.shear_modulus_pa": (30e3, 60e3),
-        "body.material.prony.0.modulus_pa": (5e3, 20e3),
-        "body.material.density_kg_m3": (900.0, 1100.0),
-    }
-    prepared = skinwave.prepare(scene, free, 0.02, h=6e-3)
-    (values,) = random_values(prepared.keys, 1)
-    frequencies, found = parametric.lines(prepared, values)
-    changed = with_values(body, prepared.keys, values)
-    assert changed.layers[0].material.shear_modulus == min(values.values(), key=lambda x: -x)
-    expected = full_lines(scene, changed, frequencies[1:3], h=6e-3)
-    errors = np.linalg.norm(found[1:3] - expected, axis=1) / np.linalg.norm(expected, axis=1)
-    assert errors.max() < 0.02
-
-
 def test_springs_and_absorbing_layers_go_with_the_material():
     soft = fem.Material(
         density=1000, shear_modulus=30e3, poisson=0.45,
@@ -264,30 +213,6 @@ def test_matrices_of_a_stretched_body_are_sums_over_known_geometries():
         A = getattr(wanted, one)
         found = sum(s * getattr(each, one) for s, each in zip(shares, known, strict=True))
         assert abs(found - A).max() < 1e-9 * abs(A).max()
-
-
-def test_elements_of_a_disc_do_not_cross_its_layers():
-    made = build(replace(LAYERED, kind="disc"), 5e-3).mesh
-    depths = -made.points[made.tets[:, :4], 2]
-    upper = made.region == 0
-    assert depths[upper].max() == pytest.approx(3e-3)
-    assert depths[~upper].min() == pytest.approx(3e-3)
-
-
-def test_the_thickness_of_a_disc_is_free():
-    disc = replace(BODIES["silicone-disc"], width=0.03, height=0.03, depth=0.01)
-    tacton = Tacton(trajectory=Trajectory(shape="circle", size=0.01, speed=3.0))
-    pressure = MovingPressure(tacton=tacton)
-    scene = Scene(pressure=pressure, body=disc, probes=((0.0, 0.0), (4e-3, 3e-3)))
-    key = "body.thickness_mm"
-    prepared = skinwave.prepare(scene, {key: (8.0, 11.0)}, 0.02, h=5e-3)
-    for thickness in (8.0, 9.7):
-        frequencies, found = parametric.lines(prepared, {key: thickness})
-        made = build_at(prepared.bodies, [prepared.keys[0].share(thickness)])
-        assert made.mesh.points[:, 2].min() == pytest.approx(-1e-3 * thickness)
-        strong = np.argsort(-np.linalg.norm(found, axis=1))[:2]
-        expected = full_lines(scene, disc, frequencies[strong], made=made)
-        assert line_errors(found[strong], expected).max() < 0.01
 
 
 def test_the_ends_of_a_range_of_thickness_are_as_accurate_as_its_middle():

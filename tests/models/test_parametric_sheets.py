@@ -24,8 +24,6 @@ from skinwave.models.reduced import answer as own_answer
 from skinwave.models.reduced import components
 from skinwave.models.reduced import prepare as own_body
 from skinwave.scene.scene import BODIES, Placement, Scene
-from skinwave.scene.variation import DesignPoint
-from skinwave.sweeps import reductions
 from skinwave.system.effort import silent
 
 MODULUS, LOSS = "body.material.shear_modulus_pa", "body.material.loss_factor"
@@ -78,31 +76,6 @@ def test_the_waveform_from_rest_is_that_of_the_sheets_own_body_and_balances_ener
     assert free[0] == pytest.approx(free[1], rel=1e-4)
 
 
-def test_a_thickness_is_free_without_air_too():
-    scene = replace(SCENE, body=replace(SHEET, air=False), probes=((0.0, 0.0),))
-    free = skinwave.prepare(scene, {THICKNESS: (0.08, 0.14)}, h=H)
-    assert len(free.model.parts) == 1, "one mesh"
-    whole = operators(build(scene.body, H))
-    assert free.effort.dofs < 0.3 * len(whole.free), "a quarter"
-    for thickness in (0.08, 0.1, 0.14):
-        frequencies, found = parametric.lines(free, {THICKNESS: thickness})
-        body = replace(scene.body, depth=1e-3 * thickness)
-        assert line_errors(found, own_lines(scene, body, frequencies)).max() < 0.003
-
-
-def test_a_quarter_in_air_has_the_lines_of_the_whole():
-    scene = replace(SCENE, probes=((0.0, 0.0),))
-    free = {DENSITY: (700.0, 900.0)}
-    quarter = skinwave.prepare(scene, free, h=H)
-    whole = skinwave.prepare(replace(scene, probes=((0.0, 0.0), (1e-3, 2e-3))), free, h=H)
-    assert quarter.effort.dofs < 0.3 * whole.effort.dofs
-    values = {DENSITY: 730.0}
-    (f, one), (g, other) = (parametric.lines(each, values) for each in (quarter, whole))
-    strong = np.argsort(-np.abs(one[:, 0]))[:4]
-    same = [np.argmin(np.abs(g - each)) for each in f[strong]]
-    assert np.abs(one[strong, 0] - other[same, 0]).max() < 2e-3 * np.abs(one).max()
-
-
 @pytest.fixture(scope="module")
 def small():
     """Matrices of a tilted sheet in few elements, and of its operators in vacuum."""
@@ -146,32 +119,6 @@ def test_a_line_of_the_full_body_in_air_is_that_of_dense_matrices(small, fluid_s
         line_solution(affine, of_line, force.sum(axis=0), fluid_share=fluid_share)
 
 
-def test_air_and_vacuum_are_two_entries_of_the_cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
-    free, value = {DENSITY: (790.0, 800.0)}, {DENSITY: 794.0}
-    both = [replace(SCENE, body=replace(SHEET, air=air), probes=((0, 0),)) for air in (True, False)]
-    first = [parametric.lines(skinwave.prepare(each, free, h=0.015), value) for each in both]
-    assert len(list(tmp_path.glob("*.npz"))) == 2
-    monkeypatch.setattr(parametric, "reduce_affine", None)  # of no use from here on
-    again = [parametric.lines(skinwave.prepare(each, free, h=0.015), value) for each in both]
-    for (_, one), (_, other) in zip(first, again, strict=True):
-        assert np.array_equal(one, other)
-    assert not np.array_equal(first[0][1], first[1][1])
-
-
-def test_thicknesses_of_a_sheet_in_air_share_a_reduction_in_a_sweep():
-    keys = free_keys(SHEET, {THICKNESS: (0.08, 0.13)})
-    cases = {}
-    for thickness in np.linspace(0.08, 0.13, 6).tolist():
-        scene = replace(SCENE, body=with_values(SHEET, keys, {THICKNESS: thickness}))
-        varied = {THICKNESS: thickness}
-        point = DesignPoint(varied=varied, keys={}, text="", scene=scene, before=scene)
-        cases[scene.body, scene.probes, scene.reading, scene.load] = point
-    ((family, members),) = reductions.families(cases, 0.05)
-    assert family.members == len(members) == 6, "as many as for a modulus: there is one mesh"
-    assert family.scene.body.depth == pytest.approx(8e-5), "the shortest waves"
-
-
 def test_a_fit_reduces_a_sheet_in_air_once(monkeypatch):
     whole = parametric.prepare
     coarse = lambda *given, **how: whole(*given, **how | {"h": 0.015})  # noqa: E731
@@ -181,15 +128,6 @@ def test_a_fit_reduces_a_sheet_in_air_once(monkeypatch):
     found = predicted.with_reduction(aim, parameters, silent).reduced
     assert found
     assert {key.key for key in found.keys} == {MODULUS, THICKNESS}
-
-
-def test_ranges_too_wide_for_one_model_leave_each_sheet_its_own(monkeypatch):
-    def refusing(*given, **options):
-        raise fem.NotReduced("200 moments are not enough")
-
-    monkeypatch.setattr(parametric, "prepare", refusing)
-    aim = predicted.target(SCENE, "fem", SCENE.reading.asked, SCENE.probe_points)
-    assert predicted.with_reduction(aim, parse([f"{MODULUS}=1e8:1e10"], []), silent) is aim
 
 
 def test_ranges_that_reach_elements_as_thick_as_the_sheet_are_refused():

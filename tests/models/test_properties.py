@@ -21,11 +21,8 @@ from simple_model import (
     flat_body,
 )
 from simple_model.layers.compliance import half_space, slab
-from simple_model.layers.flat_body import steady_lines
 from simple_model.load.focus import FOCI
-from simple_model.load.path_cells import path_fourier, path_samples
 from simple_model.load.rhythm import ROLES
-from simple_model.load.spectrum import load_lines, reduced_lines
 from simple_model.load.tacton import SHARINGS
 from simple_model.load.trajectory import SWEEPS
 from skinwave import BODIES, Body, Scene, SkinwaveWarning, dumps, loads
@@ -33,7 +30,6 @@ from skinwave.bodies.supports import CONDITIONS
 from skinwave.models import named
 from skinwave.models.limits import takes
 from skinwave.models.options import SolveOptions
-from skinwave.models.reduced import prepare
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute, simulate
 
@@ -271,59 +267,6 @@ def test_what_the_load_does_later_changes_nothing_before(model, tacton):
     )
     bound = 2e-3 if model == "flat-body" else 1e-9  # a transform over another period
     assert np.abs(long[: len(short)] - short).max() <= bound * np.abs(long).max()
-
-
-@pytest.mark.parametrize("model", ["point-kernel", "fem"])
-@settings(max_examples=10)
-@given(every_tacton, numbers(0.01, 100))
-def test_pulses_and_recordings_are_linear_in_the_pressure_too(model, tacton, factor):
-    once, many = (
-        compute(small_scene(tacton, peak_pressure=p), model, tolerance=0.3, h=0.01).displacement
-        for p in (10.0, 10.0 * factor)
-    )
-    np.testing.assert_allclose(many, factor * once, atol=1e-9 * np.abs(many).max())
-
-
-circles = st.builds(
-    Tacton,
-    am_frequency=frequencies,
-    trajectory=st.builds(
-        Trajectory, shape=st.just("circle"), size=numbers(0.005, 0.03), speed=numbers(1, 12)
-    ),
-)
-
-
-def turned(distance, angles):
-    return distance * np.column_stack([np.cos(angles), np.sin(angles)])
-
-
-@settings(max_examples=8)
-@given(circles, numbers(0.001, 0.03), numbers(0, 6.2))
-def test_probes_around_a_circle_see_the_same_lines(tacton, distance, angle):
-    load = MovingPressure(tacton=replace(tacton, am_frequency=0.0))
-    probes = turned(distance, np.array([0.0, angle]))
-    _, waves = steady_lines(half_space(fem.Material(**SLOW)), load, probes)
-    spots = path_fourier(load, load.spot(probes, path_samples(load)).T)  # the point kernel's
-    lines = load_lines(load)
-    kernel = lines.coefficients * spots[:, lines.harmonics]
-    for amplitudes in (np.abs(waves.T), np.abs(kernel)):
-        np.testing.assert_allclose(
-            amplitudes[0], amplitudes[1], rtol=0, atol=1e-5 * amplitudes.max()
-        )
-
-
-@settings(max_examples=6)
-@given(circles, st.sampled_from(("sheet", "slab")), numbers(0, 0.014), numbers(0, 6.2))
-def test_a_body_turned_by_half_a_turn_answers_a_circle_the_same(tacton, kind, distance, angle):
-    path = replace(tacton.trajectory, size=min(tacton.trajectory.size, 0.02))
-    load = MovingPressure(tacton=replace(tacton, am_frequency=0.0, trajectory=path))
-    body = Body(kind=kind, width=0.03, height=0.03, depth=0.006, sides="clamped")
-    probes = turned(distance, np.array([angle, angle + np.pi]))
-    prepared = prepare(body, probes, h=0.006)
-    hertz, forces = reduced_lines(load, prepared.points, prepared.forces)
-    motion = fem.line_response(prepared.poles, forces, hertz)[0]
-    lines = np.abs(motion @ prepared.read.T)
-    np.testing.assert_allclose(lines[:, 0], lines[:, 1], rtol=0, atol=2e-3 * lines.max())
 
 
 @st.composite

@@ -22,9 +22,7 @@ from skinwave.models.meshed import probe_rows
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads
 from skinwave.scene.scene import BODIES, Body
-from skinwave.scene.variation import DesignPoint
 from skinwave.studies.album import open_album
-from skinwave.sweeps.measures import columns, measured
 
 SCENE = """
 name = "below"
@@ -44,7 +42,6 @@ prony = [{ modulus_pa = 10e3, time_s = 0.5e-3 }]
 [probes]
 points_mm = [[0, 0], [4, 1]]
 """
-H = 5e-3
 MODELS = ("fem", "fem-harmonic")
 
 
@@ -81,14 +78,6 @@ def test_keys_of_a_scene_are_read_and_written():
 def test_what_cannot_be_read_is_refused_in_a_sentence(quantity, depth, sentence):
     with pytest.raises(ValueError, match=sentence):
         scene(quantity, depth)
-
-
-def test_a_sheet_has_quantities_within_its_thickness():
-    words = '[body]\nkind = "sheet"\nmaterial = "paper"\n[probes]\npoints_mm = [[0, 0]]\n'
-    assert loads(f'{words}quantity = "acceleration"').reading.asked.unit == "m/s2"
-    assert loads(f'{words}quantity = "strain_xx"\ndepth_mm = 0.02').depths == (2e-5,)
-    with pytest.raises(ValueError, match="is not within the sheet, which is 0.1 mm thick"):
-        loads(words + "depth_mm = 0.2")
 
 
 def test_a_model_without_the_quantity_refuses_it():
@@ -171,17 +160,6 @@ def test_rates_are_frequency_times_displacement():
     np.testing.assert_allclose(acceleration, w**2 * position, rtol=5e-3)
 
 
-def test_normal_displacement_is_minus_z_and_decays_with_depth():
-    down = compute(scene("displacement", "[2, 2]"), "flat-body").values
-    up = compute(scene("displacement_z", "[2, 2]"), "flat-body").values
-    np.testing.assert_allclose(up, -down, rtol=1e-12)
-    by_elements = compute(scene("displacement", "[2, 2]"), "fem-harmonic", h=H).values
-    other = compute(scene("displacement_z", "[2, 2]"), "fem-harmonic", h=H).values
-    np.testing.assert_allclose(other, -by_elements, rtol=1e-9, atol=1e-15)
-    surface = compute(scene(), "flat-body").values
-    assert np.abs(down[:, 0]).max() < np.abs(surface[:, 0]).max()
-
-
 def test_quantities_that_are_not_linear_are_computed_in_time():
     """From the six strains at each time, not from lines; energy at the moduli at rest."""
     e, solid = strain("[0.7, 2]", "flat-body-harmonic"), scene().body.solid
@@ -251,16 +229,6 @@ def test_a_run_is_written_and_read_again(tmp_path, monkeypatch):
     assert "µm/m peak" in page
     assert "dB re threshold" not in page
     assert main(["relax", "below.toml", "--quiet", "--out", "other"]) == 2
-
-
-def test_sweeps_have_columns_of_the_quantity():
-    asked = scene("von_mises_stress", "[0.7, 2]")
-    case = DesignPoint(varied={}, keys={}, text="", scene=asked)
-    row = measured(asked, compute(asked, "flat-body-harmonic"))
-    assert set(row) - {"status", "error"} <= set(columns([case]))
-    assert min(row["peak_von_mises_stress_pa"]) > 0
-    assert "peak_um" not in row
-    assert "level_db" not in row
 
 
 def test_strain_in_a_coat_is_refused():

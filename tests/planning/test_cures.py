@@ -1,7 +1,6 @@
 """What messages advise works: the input as they say is accepted."""
 
 import os
-import re
 import sys
 from pathlib import Path
 
@@ -79,35 +78,3 @@ def test_a_file_without_permission_is_named(tmp_path, monkeypatch, capsys):
     Path("x.toml").chmod(0)
     assert main(["plan", "x.toml"]) == 2
     assert "x.toml: cannot be read (Permission denied)" in capsys.readouterr().err
-
-
-OPTIONS = [
-    (["runn", "s.toml"], "'run'"),
-    (["run", "s.toml", "--modle", "fem"], "'--model'"),
-    (["run", "s.toml", "--model", "femm"], "'fem'"),
-]
-
-
-@pytest.mark.parametrize(("arguments", "near"), OPTIONS, ids=lambda a: " ".join(a))
-def test_the_nearest_option_command_or_value_is_suggested(capsys, arguments, near):
-    with pytest.raises(SystemExit) as stop:
-        main(arguments)
-    assert stop.value.code == 2
-    printed = capsys.readouterr().err
-    assert f"did you mean {near}; see skinwave" in printed
-    assert printed.count("\n") == 1
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "limits"),
-    [
-        ("density_kg_m3", "1e-200", "1e-09 to 1e+06"),
-        ("shear_modulus_pa", "1e300", "0.001 to 1e+13"),
-        ("viscosity_pa_s", "1e200", "0 to 1e+07"),
-    ],
-)
-def test_a_material_that_no_solid_is_names_its_limits(key, value, limits):
-    given = {"density_kg_m3": "1000", "shear_modulus_pa": "1e4", "poisson": "0.49", key: value}
-    text = "".join(f"{name} = {number}\n" for name, number in given.items())
-    with pytest.raises(ValueError, match=rf"{key} = .*{re.escape(limits)}, .*; check its unit"):
-        loads(f"[body.material]\n{text}")

@@ -12,16 +12,14 @@ import numpy as np
 import pytest
 
 import skinwave
-from simple_model import Effort, MovingPressure, Response, Tacton
+from simple_model import MovingPressure, Response, Tacton
 from skinwave.commands.cli import main
 from skinwave.models.options import SolveOptions
-from skinwave.planning.assessment import sentences
 from skinwave.planning.plan import plan
 from skinwave.planning.rows import implausible, of_stretching
 from skinwave.planning.simulate import compute, solve
 from skinwave.scene.file import loads
 from skinwave.scene.scene import Body, Scene
-from skinwave.system import document
 
 POINT = '[tacton]\nshape = "circle"\nsize_mm = 6\nspeed_m_per_s = 3\nduration_s = 0.05\n'
 AM = POINT + "am_frequency_hz = 140\n"
@@ -191,27 +189,3 @@ def test_a_sheet_is_linear_up_to_half_its_thickness():
     assert of_stretching(free, deflected(1.2e-3, free), 0.05) == ()  # all of it moves alike
     slab = loads(SLAB)
     assert of_stretching(slab, deflected(1.0, slab), 0.05) == ()
-
-
-def test_one_function_gives_the_sentences_of_any_response():
-    for model, h in (("fem", 0.008), ("point-kernel", None)):
-        scene = loads(SLAB)
-        found = solve(scene, plan(scene, SolveOptions(model=model, h=h)))
-        again = sentences(scene, found, h=h, error=found.expected_error)
-        about = [
-            [each.split(" will have")[0] for each in some]
-            for some in (again, found.effort.warnings)
-        ]
-        assert about[0] == about[1] != []
-
-
-def test_a_banner_shows_the_worst_of_sentences_that_differ_by_numbers():
-    efforts = [
-        (f"run {k}", Effort(warnings=(f"relative error of {x} %, more than 5 %", *more)))
-        for k, (x, more) in enumerate([(8, ()), (12.5, ("<not> held",)), (9, ())])
-    ]
-    banner = document.warnings_banner(efforts)
-    assert "Take care: relative error of 12.5 %, more than 5 % (run 1, and 2 more)." in banner
-    assert "Take care: &lt;not&gt; held (run 1)." in banner
-    assert banner.count("<p>") == 2
-    assert document.warnings_banner([("a", Effort())]) == ""

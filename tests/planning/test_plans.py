@@ -10,22 +10,17 @@ from simple_model import Trajectory
 from skinwave import loads, simulate
 from skinwave.bodies.build import build
 from skinwave.bodies.sizes import check_mesh, coarsest_size, default_size
-from skinwave.bodies.slab import cell_layers
-from skinwave.models.full import harmonic_answer
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import answer, prepare
 from skinwave.planning.estimates import (
     side_reflections,
 )
-from skinwave.planning.left_out import sensitivity
 from skinwave.planning.plan import plan
 from skinwave.planning.refinement import (
     Convergence,
     SizeController,
-    coarser_by,
     compared_with,
     convergence,
-    element_sizes,
     refined,
 )
 from skinwave.planning.simulate import compute
@@ -64,14 +59,6 @@ def test_a_slab_that_loses_nothing_is_planned():
         assert required.error < 0.05
         assert required.warnings == ()
     assert np.isfinite(simulate(scene).displacement).all()
-
-
-def test_elements_of_a_body_that_loses_nothing_balance_their_energy():
-    text = SHORT.replace("[body]", f"[body]\nsides = 'clamped'\n{LOSSLESS}")
-    scene = loads(text.replace("VISCOUS", "0"))
-    times = np.arange(500) / 1e4
-    found = harmonic_answer(scene, times, SolveOptions(h=0.01))
-    assert found.effort.energy_imbalance < 0.01
 
 
 @pytest.mark.parametrize(
@@ -157,21 +144,6 @@ material = {{density_kg_m3=1000, shear_modulus_pa={modulus}, poisson={poisson},
     assert returned < 6 * found.max()
 
 
-@pytest.mark.parametrize("depth", [1, 15, 300])
-def test_slabs_are_refined_along_all_axes_alike(depth):
-    body = loads(f"[body]\nthickness_mm = {depth}").body
-    sizes = element_sizes(body)
-    layers = np.array([cell_layers(body, h) for h in sizes])
-    assert (np.diff(sizes) < 0).all()
-    assert (np.diff(layers) > 0).all()
-    assert (layers * sizes < 1.001 * body.depth).all()  # no cell is much flatter than it is wide
-    for h in np.geomspace(0.2, 1.0, 9) * body.depth:
-        other = compared_with(body, h)
-        ratio = coarser_by(body, other, h)
-        assert 1.03 < max(ratio, 1 / ratio) < 2.3
-        assert (other > h) == (ratio > 1) == (cell_layers(body, h) > 1)
-
-
 def test_refinement_ends_at_the_finest_mesh_with_its_error(monkeypatch):
     """Also if the step to it is a short one."""
     monkeypatch.setattr("skinwave.planning.refinement.FINEST", 2.1)
@@ -250,25 +222,6 @@ def test_a_body_that_nothing_holds_is_warned_of():
     assert np.abs(steady).max() < 1e-4  # and no mean, which would have no bound
 
 
-def test_a_drift_does_not_hide_the_error_of_what_moves_beside_it():
-    """However long the body has been pushed."""
-    text = SHORT.replace("size_x_mm = 60", ADRIFT).replace("size_y_mm = 60", "size_y_mm = 30")
-    scenes = [loads(text.replace("0.05", seconds)) for seconds in ("0.1", "1")]
-    found = [
-        refined(scene, scene.body, SolveOptions(tolerance=0.05, h=0.0075)).error for scene in scenes
-    ]
-    assert found[0] == pytest.approx(found[1], rel=0.02)
-    assert found[0] > 0.02
-
-
-def test_exact_waves_are_not_planned_for_what_has_none():
-    tilted = SHORT + "[placement]\ntilt_x_deg = 5"
-    planned = lambda scene, model: plan(scene, SolveOptions(model=model))  # noqa: E731
-    for do in (planned, simulate):
-        with pytest.raises(ValueError, match="lies flat"):
-            do(loads(tilted), model="flat-body")
-
-
 def test_meshes_of_a_palm_tell_its_layers_apart():
     fat = Layer(thickness=3e-3, material="fat")  # what is below it is no coat
     thin = Body(kind="palm", layers=(fat, Layer(thickness=1e-3, material="dermis")))
@@ -288,15 +241,6 @@ def test_a_layer_that_no_mesh_of_a_palm_resolves_is_refused():
     for do in (check_mesh, build):
         with pytest.raises(ValueError, match="take thicker layers, or a slab"):
             do(thin, 0.6e-3)
-
-
-def test_sides_that_reflect_are_where_they_are():
-    soft = "material = {density_kg_m3=1000, shear_modulus_pa=25e3, poisson=0.499, viscosity_pa_s=2}"
-    text = f"{SHORT}\n[body]\nsides = 'free'\nsize_x_mm = 100\nsize_y_mm = 100\n{soft}"
-    body = loads(text.replace("[body]\nsize_x_mm = 60\nsize_y_mm = 60\n", "", 1)).body
-    required = plan(replace(loads(SHORT), body=body), SolveOptions(tolerance=0.05, h=0.015))
-    assert required.model == "fem"
-    assert required.body == body
 
 
 def test_only_as_much_of_a_body_is_meshed_as_waves_come_back_from():
@@ -353,12 +297,6 @@ def test_meshes_are_refined_until_they_are_good_enough():
         assert required.error / 5 < misfit < 2 * required.error
 
 
-def test_a_mesh_coarser_than_the_body_is_not_taken_for_converged():
-    required = plan(loads(SHORT), SolveOptions(tolerance=0.1, model="fem", h=0.05))
-    assert 0.5 < required.error <= 1.0
-    assert required.warnings
-
-
 def test_what_breaks_the_tolerance_is_said_with_its_number():
     text = "[tacton]\nam_frequency_hz = 80\nduration_s = 0.05\n[body]\nkind = 'sheet'\n"
     small = "size_x_mm = 60\nsize_y_mm = 60\n[probes]\npoints_mm = [[0, 0], [5, 0]]"
@@ -378,26 +316,6 @@ def test_what_breaks_the_tolerance_is_said_with_its_number():
         warnings = plan(scene, SolveOptions(tolerance=0.1, **arguments)).warnings
         assert any(sentence in warning for warning in warnings), sentence
         assert any(" %" in warning for warning in warnings), sentence
-
-
-def test_a_sheet_near_a_resonance_is_more_sensitive():
-    text = "[tacton]\nam_frequency_hz = {}\n[body]\nkind = 'sheet'"
-    off, on = (sensitivity(loads(text.format(f))) for f in (80, 140))
-    assert on.value > 2 * off.value > 2
-    assert 50 < off.frequency < 200  # a mean, lines at 80 and 160 Hz
-
-
-def test_how_sensitive_a_hand_is_can_be_told(monkeypatch):
-    """A small slab stands for the hand, as its reduction takes a second."""
-    small = Body(width=0.03, height=0.03)
-    monkeypatch.setattr(
-        "skinwave.planning.left_out.prepare",
-        lambda body, probes, h, load: prepare(small, probes, h=h, load=load),
-    )
-    text = "[tacton]\nam_frequency_hz = 140\n[body]\nkind = 'palm'\n[probes]\npoints_mm = [[0, 0]]"
-    found = sensitivity(loads(text))
-    assert np.isfinite(found.value)
-    assert found.value > 0
 
 
 FREE = """
