@@ -30,7 +30,7 @@ BUILT_IN = {  # name -> the file that registers it
     "fem-nonlinear-transient": "stretching",
     "plate-modes": "plate_modes",
     "plate-modes-transient": "plate_modes",
-    "plate-modes-nonlinear": "stretched_plate",
+    "plate-modes-nonlinear": "plate_modes",
 }
 
 

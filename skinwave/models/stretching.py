@@ -39,7 +39,7 @@ from skinwave.models.linear_elements import ALPHA, of_mesh
 from skinwave.models.meshed import load_in_steps, spent, surface_load
 from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import ERROR as PLATE_ERROR
-from skinwave.models.plate_modes import FROM_REST
+from skinwave.models.plate_modes import FROM_REST, relative
 from skinwave.models.reduced import (
     ReducedBody,
     ReducedResponse,
@@ -67,7 +67,6 @@ COARSE_ERROR, ERROR_ORDER = 0.05, 3.0  # of a waveform with FULL_CELLS; measured
 HIGHEST_MODE = 1500.0  # Hz, of the modes in the basis
 FEWEST_MODES, MOST_MODES = 40, 160
 RATES = DISPLACEMENT, VELOCITY, ACCELERATION
-STANDSTILL = 1e-9  # of the motion of the probe that moves most
 MOST_LINES = 500  # of a load that are summed in each step
 
 
@@ -297,14 +296,6 @@ def _plate_error(
     plate = FROM_REST.solve(plain, times, options).values
     error = float(relative(linear - plate, plate).max())
     return error + PLATE_ERROR
-
-
-def relative(change: Floats, values: Floats) -> Floats:
-    """Relative changes (p,) of waveforms (t, p); 0 where nothing moves."""
-    sizes = np.linalg.norm(values, axis=0)
-    moves = sizes > STANDSTILL * sizes.max()
-    found = np.linalg.norm(change, axis=0) / np.where(moves, sizes, 1)
-    return np.asarray(np.where(moves, found, 0.0))
 
 
 def _response(

@@ -34,9 +34,15 @@ from skinwave.models import Model, named
 from skinwave.models.laws import STRONG, own_laws, relaxing, series_tolerance
 from skinwave.models.limits import takes
 from skinwave.models.options import SolveOptions, sample_times
-from skinwave.models.plate_modes import FROM_REST, middle_compliance, relative_modulus
+from skinwave.models.plate_modes import (
+    FROM_REST,
+    STRETCHED,
+    first_part,
+    linear_error,
+    middle_compliance,
+    relative_modulus,
+)
 from skinwave.models.reduced import ReducedBody, answer, prepare, reduced_forces, steady_waveforms
-from skinwave.models.stretched_plate import STRETCHED, first_part, linear_error
 from skinwave.planning.estimates import mean_gain, spot_scale
 from skinwave.planning.refinement import relative_change
 from skinwave.scene.scene import SAMPLE_RATE as RATE

@@ -19,10 +19,9 @@ from skinwave.models.laws import check_laws, own_laws, series_tolerance
 from skinwave.models.limits import beyond, check_taken, default_model, refusal, takers, takes
 from skinwave.models.linear_elements import FEM
 from skinwave.models.options import DEFAULT, SolveOptions, sample_grid, sample_times
-from skinwave.models.plate_modes import ERROR, FROM_REST
+from skinwave.models.plate_modes import ERROR, FROM_REST, STRETCHED
 from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.reduced import answer
-from skinwave.models.stretched_plate import STRETCHED
 from skinwave.planning.estimates import (
     NO_BOUND,
     cutoff_frequency,

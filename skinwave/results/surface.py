@@ -26,10 +26,9 @@ from skinwave.models.advice import takes
 from skinwave.models.flat_body import field_read
 from skinwave.models.meshed import line_factor, probe_rows
 from skinwave.models.plate_modes import ERROR as PLATE_ERROR
-from skinwave.models.plate_modes import FROM_REST
+from skinwave.models.plate_modes import FROM_REST, settled
 from skinwave.models.plate_modes import steady_lines as plate_lines
 from skinwave.models.reduced import read_at
-from skinwave.models.stretched_plate import settled
 from skinwave.planning.left_out import beyond_linear
 from skinwave.results.motion import TOLERANCE, BodyMotion, driven
 from skinwave.scene.scene import Reading, Scene

@@ -16,8 +16,7 @@ from simple_model import Material, MovingPressure, PronyTerm, Trajectory
 from simple_model.layers.material import PRESETS
 from simple_model.load.drive import PUBLISHED, beyond_published
 from skinwave.models.limits import takes
-from skinwave.models.plate_modes import FROM_REST
-from skinwave.models.stretched_plate import STRETCHED
+from skinwave.models.plate_modes import FROM_REST, STRETCHED
 from skinwave.planning.estimates import response_spectrum
 from skinwave.scene.scene import BODIES, FLAT, Body, Layer, Scene, solid_of
 

@@ -16,9 +16,8 @@ from matplotlib.figure import Figure
 
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Response, Tacton, Trajectory, lines, resolved_lines
-from skinwave.models.plate_modes import FROM_REST
+from skinwave.models.plate_modes import FROM_REST, STRETCHED
 from skinwave.models.reduced import answer, prepare
-from skinwave.models.stretched_plate import STRETCHED
 from skinwave.planning.simulate import compute
 from skinwave.report.figures import png
 from skinwave.report.palette import colour, label, marker

@@ -18,10 +18,9 @@ from skinwave.models import named, names
 from skinwave.models.flat_body import FLAT_BODY
 from skinwave.models.limits import takes
 from skinwave.models.linear_elements import FEM
-from skinwave.models.plate_modes import FROM_REST
+from skinwave.models.plate_modes import FROM_REST, STRETCHED
 from skinwave.models.plate_modes import MODES as PLATES
 from skinwave.models.reduced import REDUCTION_TOLERANCE, answer, prepare
-from skinwave.models.stretched_plate import STRETCHED
 from skinwave.planning.estimates import has_wavenumber_solution
 from skinwave.planning.left_out import beyond_linear
 from skinwave.planning.simulate import compute
