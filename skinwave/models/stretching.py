@@ -32,10 +32,17 @@ from simple_model.quantities import ACCELERATION, DISPLACEMENT, VELOCITY, Quanti
 from skinwave.bodies.build import Build, build
 from skinwave.bodies.sheet import air, bending_wavenumber, discretise
 from skinwave.models import Limit, Model, register
-from skinwave.models.full import TRANSIENT_RATE, in_time, marched, sampled_components, step_count
 from skinwave.models.laws import has_own_law
 from skinwave.models.limits import beyond, load_limit, of_air_in_a_frame, of_held_sheet, of_vacuum
-from skinwave.models.linear_elements import ALPHA, of_mesh
+from skinwave.models.linear_elements import (
+    ALPHA,
+    TRANSIENT_RATE,
+    in_time,
+    marched,
+    of_mesh,
+    sampled_components,
+    step_count,
+)
 from skinwave.models.meshed import load_in_steps, spent, surface_load
 from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import ERROR as PLATE_ERROR

@@ -14,10 +14,9 @@ from simple_model.load.sampling import resolving_step
 from skinwave.bodies.sizes import check_mesh
 from skinwave.models import Limit, Model, named
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
-from skinwave.models.full import TRANSIENT_RATE, step_count
 from skinwave.models.laws import check_laws, own_laws, series_tolerance
 from skinwave.models.limits import beyond, check_taken, default_model, refusal, takers, takes
-from skinwave.models.linear_elements import FEM
+from skinwave.models.linear_elements import FEM, TRANSIENT_RATE, step_count
 from skinwave.models.options import DEFAULT, SolveOptions, sample_grid, sample_times
 from skinwave.models.plate_modes import ERROR, FROM_REST, STRETCHED
 from skinwave.models.point_kernel import SAME_LOAD

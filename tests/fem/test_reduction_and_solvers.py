@@ -408,7 +408,7 @@ def test_a_march_that_blows_up_stops_within_a_few_steps(monkeypatch):
             steps.append(k)
             yield replace(state, displacement=state.displacement * 2.0 ** max(0, k - 60))
 
-    monkeypatch.setattr("skinwave.models.full.fem.transient", exploding)
+    monkeypatch.setattr("skinwave.models.linear_elements.fem.transient", exploding)
     with pytest.raises(fem.Diverged, match="step 100"):
         compute(scene, "fem-transient", h=0.008)
     assert steps[-1] < 102
