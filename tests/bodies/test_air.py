@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 import fem
-import meshes
-from fem.added_mass import added_mass
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.layers.compliance import thin_sheet
 from simple_model.layers.wavenumber_integral import point_response
@@ -19,7 +17,6 @@ from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import answer, prepare, typical_spots
 from skinwave.models.stretching import reduced_answer
 from skinwave.planning.simulate import compute
-from skinwave.scene.file import dumps, loads
 from skinwave.scene.scene import BODIES, Placement, Scene
 from skinwave.verify import references
 from skinwave.verify.plates import PAPER
@@ -29,16 +26,6 @@ PATH = Trajectory(shape="circle", size=0.01, speed=4.0)
 LOAD = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.1, trajectory=PATH))
 SCENE = Scene(pressure=LOAD, body=SHEET, probes=((0.01, 0.0), (0.0, 0.012)))
 H = 5e-3
-
-
-def test_a_scene_says_it_and_comes_back():
-    scene = loads('[body]\nkind = "sheet"\nair = true')
-    assert scene.body == replace(BODIES["paper-sheet-loose"], air=True)
-    assert loads(dumps(scene)) == scene
-    assert "air = true" in dumps(scene)
-    assert not loads('[body]\nkind = "sheet"').body.air
-    assert "air = false" in dumps(loads('[body]\nkind = "sheet"'))
-    assert "air" not in dumps(loads(""))
 
 
 @pytest.mark.parametrize("model", ["fem-transient", "fem-nonlinear-transient"])
@@ -64,18 +51,6 @@ def test_the_operator_is_symmetric_positive_and_that_of_any_position():
         return full.ravel()[ops.free]
 
     assert placed(x) @ (A @ placed(y)) == pytest.approx(x @ (M @ y), rel=1e-9)
-
-
-def test_a_sheet_of_other_cells_is_refused():
-    lines = np.linspace(-0.03, 0.03, 9)
-    uneven = np.sign(lines) * np.abs(lines) ** 1.5 / 0.03**0.5
-    mesh = meshes.extrude(uneven, lines, [-1e-3, 0])
-    with pytest.raises(meshes.MeshError, match="must be on a regular grid"):
-        added_mass(mesh, fem.assemble(mesh, fem.PRESETS["paper"], fixed="sides").free, 1.2)
-    disc = meshes.sheet(0.06, 0.06, 1e-3, 0.01)
-    part = disc.facets["top"][:7]
-    with pytest.raises(meshes.MeshError, match="equal cells"):
-        added_mass(disc, fem.assemble(disc, fem.PRESETS["paper"]).free, 1.2, facets=part)
 
 
 def test_moments_at_rest_are_enough_and_their_error_estimate_holds():

@@ -4,11 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
 import fem
 import meshes
-from fem import nonlinear
 from simple_model import MovingPressure, Tacton, from_young, orthotropic
 from simple_model.plates.modes import plate_modes
 from skinwave import dumps, loads, plan
@@ -19,7 +17,6 @@ from skinwave.models import named
 from skinwave.models.limits import beyond
 from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import middle_compliance, plate_of
-from skinwave.models.reduced import prepare
 from skinwave.planning.left_out import mean_sag
 from skinwave.scene.scene import BODIES, Body, Scene
 
@@ -189,43 +186,6 @@ def test_steady_motion_by_plate_modes_is_that_of_elements():
     np.testing.assert_allclose(ritz, elements, rtol=0.01)
 
 
-def strip(cells, material, tension, length=0.1):
-    """Strip across which nothing changes, at large deflection."""
-    h = length / cells
-    thickness = 0.48 * h
-    mesh = meshes.sheet(length, 2 * h, thickness, h)
-    missing = (1 - (DEEP / thickness) ** 2) * DEEP
-    layer = fem.Membrane(triangles=meshes.middle_plane(mesh), thickness=missing, material=material)
-    fixed = {"left": "xyz", "right": "xyz", "front": "y", "back": "y"}
-    solid = equivalent(thickness, material)
-    return mesh, fem.finite_strain(
-        mesh, solid, fixed=fixed, membrane=layer, tension=fem.Tension(x=tension, y=0.0)
-    )
-
-
-@pytest.mark.parametrize("tension", [20.0])
-def test_large_cylindrical_bending_of_a_stretched_orthotropic_strip(tension):
-    # Timoshenko and Woinowsky-Krieger (1959), section 3: immovable clamped edges.
-    length, q, Q = 0.1, 20.0, PAPER.plane_stress[0, 0]
-    x = np.linspace(-length / 2, length / 2, 2001)
-
-    def deflection(N):
-        k, half = np.sqrt(N / (Q * DEEP**3 / 12)), length / 2
-        bent = half * (np.cosh(k * x) - np.cosh(k * half)) / (k * np.sinh(k * half))
-        return q / N * (bent + (half**2 - x**2) / 2)
-
-    def lacking(S):
-        slope = np.gradient(deflection(tension + S), x)
-        return S - Q * DEEP / 2 / length * np.trapezoid(slope**2, x)
-
-    exact = deflection(tension + brentq(lacking, 1e-3, 1e4)).max()
-    mesh, body = strip(20, PAPER, tension)
-    P = fem.load_operator(mesh)
-    u = nonlinear.static(body, P @ np.full(P.shape[1], q))
-    assert exact > 4 * DEEP
-    assert (fem.probe_operator(mesh, [[0, 0]]) @ u)[0] == pytest.approx(exact, rel=7e-3)
-
-
 def test_the_sag_of_any_support():
     scene = Scene(pressure=MovingPressure(tacton=Tacton(am_frequency=140)), body=SMALL)
     elastic = replace(fem.PRESETS["paper"], loss_factor=0.0)
@@ -317,22 +277,6 @@ def test_models_say_which_sheets_they_are_not_for():
     scene = Scene(pressure=MovingPressure(tacton=Tacton(am_frequency=140)), body=two)
     required = plan(scene, SolveOptions(model="plate-modes"))
     assert (required.model, required.h) == ("plate-modes", None)
-
-
-def test_elements_damp_each_mode_of_a_stretched_sheet_by_its_loss_factor():
-    """Navier's modes: m s^2 + D h(s) k^4 + T k^2 = 0, h the relative modulus of bending."""
-    solid, T = from_young(density=800, young=4e9, poisson=0.3, loss_factor=0.1), 20.0
-    held = Mounting(edges=tuple(EDGES), support="simply", tension_x=T, tension_y=T)
-    body = replace(SMALL, material=solid, mounting=held)
-    found = prepare(body, np.zeros((1, 2)), h=5e-3).poles.values
-    k2, D = (np.pi / 0.06) ** 2 + (np.pi / 0.05) ** 2, body.bending_stiffness
-    h = s = 1.0
-    for _ in range(20):
-        s = 1j * np.sqrt((D * h * k2**2 + T * k2) / 0.08)
-        h = solid.complex_modulus(-1j * s) / solid.shear_modulus
-    nearest = found[np.abs(found - s).argmin()]
-    assert nearest.imag == pytest.approx(s.imag, rel=0.01)
-    assert nearest.real == pytest.approx(s.real, rel=0.03)
 
 
 @pytest.mark.parametrize("losses", [{"viscosity": 5e4}, {"loss_factor": 0.3}])

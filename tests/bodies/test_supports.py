@@ -10,8 +10,6 @@ from fem.boundary import springs
 from fem.load_and_probe import facet_normals
 from meshes import block, boundary_facets
 from simple_model import Material, Stack, from_young
-from simple_model.layers.compliance import layered
-from simple_model.layers.dispersion import dispersion_curves
 from simple_model.layers.flat_quantities import quantity_field
 from simple_model.layers.layered import surface_compliance
 from simple_model.layers.wavenumber_integral import point_integrals
@@ -105,24 +103,6 @@ def test_a_block_that_one_side_holds_is_a_cantilever(side, axis, end):
     assert found == pytest.approx(bent + sheared, rel=0.02)
 
 
-def test_a_side_that_absorbs_stands_for_more_of_the_body():
-    """A slab clamped at its left: moving the absorbing right side away changes nothing."""
-    sides = Sides(left="clamped", right="absorbing", front="absorbing", back="absorbing")
-    base = {"material": SOLID, "height": 0.03, "depth": 0.006, "sides": sides}
-    near = Body(width=0.03, **base)
-    beyond = Body(width=0.05, **base)
-    found = []
-    for body, shift in ((near, 0.0), (beyond, 0.010)):
-        made = build(body, 3e-3)
-        probes = np.array([[-0.005, 0.0], [0.0, 0.003], [0.005, 0.0]]) - [shift, 0]
-        P, points = surface_load(made)
-        spot = np.exp(-((points[:, :2] + [shift, 0]) ** 2).sum(axis=1) / 2 / 4.35e-3**2)
-        u = fem.harmonic(operators(made), P @ spot, [200.0])[0]
-        found.append(fem.probe_operator(made.mesh, probes) @ u)
-        assert made.fixed == {"bottom": "xyz", "left": "xyz"}
-    assert np.abs(found[0] - found[1]).max() < 0.01 * np.abs(found[1]).max()
-
-
 def errors_beside_the_wavenumber_integral(scene, found):
     exact = compute(scene, "flat-body").values
     return np.linalg.norm(found - exact, axis=0) / np.linalg.norm(exact, axis=0)
@@ -159,27 +139,6 @@ def test_a_column_on_springs_yields_by_both():
     w = np.array([[0.9 * np.sqrt(BED / 5.0)]], complex)
     rigid = surface_compliance(hard, np.array([1e-3 + 0j]), w)[0, 0]
     assert rigid.real == pytest.approx(1 / (BED * (1 - 0.81)), rel=1e-3)
-
-
-@pytest.mark.parametrize(("stiffness", "base"), [(1e14, "clamped"), (1e-3, "free")])
-def test_a_hard_bed_is_rigid_and_a_soft_one_none(stiffness, base):
-    stack = elastic(4e-3, 6e-3, stiffness=stiffness)
-    limit = replace(stack, base=base, base_stiffness=0.0)
-    k, w = np.geomspace(5, 900, 9) + 3j, 2 * np.pi * np.array([[30.0], [200], [600]]) + 0j
-    np.testing.assert_allclose(layered(stack)(k, w), layered(limit)(k, w), rtol=1e-6)
-
-
-def test_dispersion_on_springs_has_the_poles_of_the_wavenumber_integral():
-    layers = elastic(4e-3, 6e-3)
-    f = np.linspace(150.0, 155.0, 6)
-    mode = dispersion_curves(layers, f, most=1).modes[0]
-    along = np.gradient(mode.wavenumbers.real, 2 * np.pi * f)[1:-1]
-    np.testing.assert_allclose(mode.group_speed[1:-1], 1 / along, rtol=1e-3)
-    for hz, k in zip(f, mode.wavenumbers, strict=True):
-        w, beside = np.array([[2 * np.pi * hz]], complex), np.array([1e-6, 2e-6, 0.5])
-        near, twice, far = surface_compliance(layers, k * (1 + beside), w)[0]
-        assert near / twice == pytest.approx(2, rel=1e-3)
-        assert abs(near) > 100 * abs(far)
 
 
 def test_elements_on_springs_meet_the_wavenumber_integral():

@@ -8,7 +8,7 @@ import pytest
 import fem
 import skinwave
 from fem.affine import Solids, assemble_affine, operators_of, weights
-from fem.affine_model import AffineModel, line_errors, steady_lines
+from fem.affine_model import AffineModel, line_errors
 from fem.greedy import line_bases
 from fem.harmonic import dynamic_stiffness
 from fem.load_and_probe import facet_normals
@@ -29,7 +29,6 @@ from skinwave.models.free_bodies import (
 from skinwave.models.free_keys import free_keys, values_at, with_values
 from skinwave.models.meshed import surface_load, surface_motion
 from skinwave.models.reduced import answer as own_answer
-from skinwave.models.reduced import components
 from skinwave.models.reduced import prepare as own_body
 from skinwave.scene.scene import BODIES, Body, Layer, Scene
 
@@ -76,16 +75,6 @@ def full_lines(scene, body, frequencies, h=H, made=None):
         force = P @ pressures[np.argmin(np.abs(every - f))]
         found.append(S @ fem.harmonic(operators(made), force, f)[0])
     return np.array(found)
-
-
-def test_lines_are_those_of_each_materials_own_reduction(slab, prepared):
-    for values in random_values(prepared.keys, 3):
-        frequencies, found = parametric.lines(prepared, values)
-        body = with_values(slab.body, prepared.keys, values)
-        own = components(own_body(body, slab.probe_points, h=H), slab.pressure)
-        expected = own.lines[[np.argmin(np.abs(own.frequencies - f)) for f in frequencies]]
-        assert line_errors(found, expected).max() < 0.01
-        assert np.linalg.norm(expected) > 0.999 * np.linalg.norm(own.lines)  # those left out
 
 
 def test_lines_are_those_of_the_full_body_at_least_loss(slab, prepared):
@@ -239,17 +228,6 @@ def of_one_line(parts, outputs):
         terms=(("stiffness", 0),) * q, parts=parts[None], outputs=outputs[None], basis=np.eye(r),
         forces=np.ones((1, 1, r), complex),
     )  # fmt: skip
-
-
-def test_a_line_takes_no_more_states_than_its_manifold_has():
-    # (1 + w) x = f: one direction, whatever the weight.
-    model = of_one_line(np.stack([np.eye(6), np.eye(6)]), np.eye(2, 6))
-    at = np.stack([np.ones(20), 1j * np.linspace(0, 3, 20)], axis=1)[:, None]
-    (line,), error = line_bases(model, at, np.ones((20, 1)), 1e-3, lambda x: None)
-    assert line.basis.shape == (6, 1)
-    assert error < 1e-12
-    found = steady_lines((line,), np.array([[1.0, 0.7j]]), np.ones(1))
-    assert found == pytest.approx(np.full((1, 2), 1 / (1 + 0.7j)))
 
 
 def test_ranges_that_few_states_do_not_span_are_refused():

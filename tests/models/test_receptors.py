@@ -16,8 +16,6 @@ from simple_model.layers.tensors import energy_root, largest_shear, von_mises
 from simple_model.load.focus import spot_width
 from skinwave.bodies.parts import Layer
 from skinwave.commands.cli import main
-from skinwave.models import named
-from skinwave.models.limits import check_taken, takes
 from skinwave.models.meshed import probe_rows
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads
@@ -78,18 +76,6 @@ def test_keys_of_a_scene_are_read_and_written():
 def test_what_cannot_be_read_is_refused_in_a_sentence(quantity, depth, sentence):
     with pytest.raises(ValueError, match=sentence):
         scene(quantity, depth)
-
-
-def test_a_model_without_the_quantity_refuses_it():
-    sheet = loads('[tacton]\nduration_s = 0.01\n[body]\nkind = "sheet"\nmaterial = "paper"\n'
-                  'sides = "clamped"\n[probes]\npoints_mm = [[0, 0]]\n')  # fmt: skip
-    assert takes(named("plate-modes"), replace(sheet, quantity="velocity"))
-    assert takes(named("fem-nonlinear"), replace(sheet, quantity="strain_xx"))
-    kernel = compute(scene("strain_zz", "2"), "point-kernel")
-    assert (kernel.quantity, kernel.unit) == ("pressure", "Pa")
-    assert not takes(named("plate-modes"), replace(sheet, quantity="strain_xx"))
-    with pytest.raises(ValueError, match="plate-modes takes a sheet, not a slab"):
-        check_taken(named("plate-modes"), scene("strain_zz", "2"))
 
 
 @pytest.mark.parametrize("poisson", [0.3, 0.4999])

@@ -36,11 +36,6 @@ KNOWN = {
     "coarse elements": (
         SLAB, {"model": "fem", "h": 0.008}, "elements of 8 mm will have a relative error of"
     ),
-    "rigid-body drift": (
-        f'{AM}[body]\n{SMALL}base = "free"\nsides = "absorbing"\n{PROBES}',
-        {"model": "fem", "h": 0.02},
-        "this body is unconstrained",
-    ),
     "sides that reflect": (
         SLAB.replace("clamped", "free"),
         {"model": "flat-body"},
@@ -75,7 +70,7 @@ def on_the_page(path):
     return [html.unescape(p.split(".</p>")[0]) for p in banner.split("<p>Take care: ")[1:]]
 
 
-@pytest.mark.parametrize("name", KNOWN)
+@pytest.mark.parametrize("name", sorted(KNOWN.keys() - {"no waves"}))
 def test_run_and_simulate_say_the_same(name, tmp_path, monkeypatch, capsys):
     text, arguments, part = KNOWN[name]
     scene = loads(text)
