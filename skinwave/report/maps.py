@@ -11,11 +11,11 @@ from matplotlib.image import AxesImage
 
 from meshes.tetmesh import Floats
 from simple_model.quantities import DISPLACEMENT, PRESSURE
-from skinwave.models.speeds import mach_angle
 from skinwave.report.figures import REPORT, legend, panels, styled
 from skinwave.report.palette import COLOURS, SEQUENTIAL, SIGNED, inked, label
 from skinwave.report.styles import Style
 from skinwave.results.propagation import NEAR, OUTSIDE
+from skinwave.results.speeds import mach_angle
 from skinwave.results.surface import SurfaceField
 from skinwave.results.views import View, path_points
 from skinwave.scene.scene import Scene

@@ -22,8 +22,8 @@ from simple_model.load.spectrum import load_lines, pressure_lines, synthesise
 from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity
 from skinwave.bodies.analytic import compliance, has_exact_waves, is_laterally_infinite
 from skinwave.bodies.sizes import default_size
-from skinwave.models.advice import takes
 from skinwave.models.flat_body import field_read
+from skinwave.models.limits import takes
 from skinwave.models.meshed import line_factor, probe_rows
 from skinwave.models.plate_modes import ERROR as PLATE_ERROR
 from skinwave.models.plate_modes import FROM_REST, settled

@@ -21,12 +21,11 @@ from simple_model.layers.flat_body import steady_lines
 from simple_model.load.spectrum import pressure_lines, synthesise
 from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity, quantity
 from skinwave.bodies.analytic import compliance
-from skinwave.models.advice import takes
-from skinwave.models.plate_modes import FROM_REST
+from skinwave.models.limits import takes
+from skinwave.models.plate_modes import FROM_REST, STRETCHED, settled
 from skinwave.models.plate_modes import steady_lines as plate_lines
 from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.reduced import oscillating, read_at
-from skinwave.models.stretched_plate import STRETCHED, settled
 from skinwave.results.motion import BodyMotion, Shade, Tensors, shade, tensors, vibration
 from skinwave.results.run import Run
 from skinwave.results.speeds import shown_part, strongest_tone

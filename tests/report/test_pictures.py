@@ -24,14 +24,13 @@ from PIL import Image
 
 from simple_model import MovingPressure, Tacton, Trajectory, pattern_period, published
 from skinwave.commands.cli import main
-from skinwave.models import speeds
 from skinwave.report import films, maps, render
 from skinwave.report.figures import tacton_figure
 from skinwave.report.levels import levels_figure
 from skinwave.report.maps import surfaces_figure
 from skinwave.report.renderer import Renderer, renderer
 from skinwave.report.styles import style
-from skinwave.results import exports, motion, views
+from skinwave.results import exports, motion, speeds, views
 from skinwave.scene.file import dumps
 from skinwave.scene.scene import Body, Scene
 from skinwave.studies import album, gallery
