@@ -50,7 +50,7 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--positive", choices=tuple(SIGNS), help="into the body or out of it")
     parser.add_argument("--rate", type=float, metavar="HZ", help="samples a second")
     parser.add_argument("--direction", choices=("x", "y", "z"),
-                        help="of the motion in a file of several")  # fmt: skip
+                        help="of the motion in a Universal File")  # fmt: skip
     add_output(parser)
 
 

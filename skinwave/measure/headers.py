@@ -23,41 +23,35 @@ from skinwave.measure.units import (
 
 TIME, FREQUENCY, X, Y, Z = "time", "frequency", "x", "y", "z"
 REPETITION, DRIVE, INDEX = "repetition", "drive", "index"
+AROUND = (TIME, FREQUENCY, X, Y, Z, REPETITION, DRIVE, INDEX)  # what is no motion
+SEQUENCE = "Sequence"  # the unit of a count
 NAMES = {
     TIME: (
-        "t", "time", "times", "zeit", "temps", "tempo", "tiempo", "tid", "tijd", "czas", "время",
-        "時間", "时间", "時刻", "시간", "x_value", "timestamp", "time stamp", "elapsed time",
-        "uhrzeit", "datum", "date", "clock", "datetime", "x-axis", "x axis",
+        "t", "time", "times", "zeit", "temps", "tempo", "tiempo", "x_value", "timestamp",
+        "time stamp", "elapsed time", "uhrzeit", "clock", "datetime", "x-axis", "x axis",
     ),
-    FREQUENCY: (
-        "f", "freq", "frequency", "frequencies", "frequenz", "fréquence", "frequence", "frecuencia",
-        "frequenza", "częstotliwość", "частота", "周波数", "频率", "주파수",
-    ),
+    FREQUENCY: ("f", "freq", "frequency", "frequencies", "frequenz", "fréquence"),
     X: ("x", "probe_x"),
     Y: ("y", "probe_y"),
     Z: ("z", "probe_z"),
     REPETITION: ("rep", "repetition", "run", "trial", "repeat"),
     DRIVE: ("drive", "ref", "ref1", "reference", "referenz", "référence", "trigger", "trig"),
-    INDEX: (
-        "index", "idx", "no", "no.", "nr", "nr.", "n", "#", "sample", "samples", "sample number",
-        "sequence", "row", "line", "point", "point index", "punktindex", "番号",
-    ),
+    INDEX: ("index", "no", "no.", "nr", "nr.", "n", "#", "sample", "samples", "point index"),
     "displacement": ("u", "d", "disp", "displacement"),
     "velocity": ("v", "vel", "velocity"),
     "acceleration": ("a", "acc", "accel", "acceleration"),
 }  # fmt: skip
-AROUND = (TIME, FREQUENCY, X, Y, Z, REPETITION, DRIVE, INDEX)  # what is no motion
+ROLE = {name: role for role, names in NAMES.items() for name in names} | {
+    name: name for name, record in QUANTITIES.items() if record.of_body
+}
 PARTS = {
     word: part
     for part, words in {
-        "re": "re real realteil réel reel", "im": "im imag imaginary imaginärteil imaginaire",
+        "re": "re real realteil réel", "im": "im imag imaginary imaginärteil imaginaire",
         "abs": "abs", "phase": "phase phasenwinkel",
     }.items()
     for word in words.split()
 }  # fmt: skip
-ROLE = {name: role for role, names in NAMES.items() for name in names} | {
-    name: name for name, record in QUANTITIES.items() if record.of_body
-}
 _PART = "|".join(PARTS)
 _COLUMN = re.compile(
     r"(?P<name>[^()\[\]#]*?)\s*"
@@ -70,7 +64,7 @@ _SUFFIXES = {
     for unit in units
 }
 UNITS = {plain(unit) for unit in _SUFFIXES.values()} | {
-    "V", "mV", "uV", "N", "mN", "Pa", "kPa", "A", "mA", "%", "EU", "a.u.", "Sequence", "dB", "",
+    "V", "mV", "uV", "N", "mN", "Pa", "kPa", "A", "mA", "%", "EU", "a.u.", SEQUENCE, "dB", "",
 }  # fmt: skip
 
 
@@ -100,12 +94,8 @@ class Column:
 
 
 def column(text: str, unit: str = "") -> Column:
-    """The column that a heading describes, with the unit below it.
-
-    Raises
-    ------
-    ValueError
-        If its place is no pair of numbers.
+    """The column that a heading describes, with the unit below it; raises a ValueError if its place
+    is no pair of numbers.
     """
     said = " ".join(unicodedata.normalize("NFKC", text).split())
     apart = re.fullmatch(r"(.+?)(?:\s+/\s*|\s*/\s+|,\s+|\s+in\s+)(\S+)", said)
@@ -117,9 +107,9 @@ def column(text: str, unit: str = "") -> Column:
         unit = (unit or (last[1] if last else "")).strip("[]() ")
         return Column(text=said, role=_role("", unit), unit=unit)
     words = found["name"].strip().lower()
-    unit = unit or found["unit"] or found["round"] or ""
+    unit = (unit or found["unit"] or found["round"] or "").strip("[]() ")
     if words not in ROLE and not unit:
-        words, unit = _suffixed(found["name"].strip())
+        words, unit = _suffixed(words)
     parted = re.fullmatch(rf"(?:({_PART})(?:[ _.]+|$))?(.*?)(?:[ _.]+({_PART}))?", words)
     name, part = (parted[2], PARTS.get(parted[1] or parted[3] or "", "")) if parted else (words, "")
     return Column(
@@ -128,7 +118,7 @@ def column(text: str, unit: str = "") -> Column:
         part=part or ("phase" if plain(unit) in ANGLES else ""),
         place=_place(found["place"]) if found["place"] else Column.place,
         repetition=int(found["rep"] or 1),
-        unit=unit.strip("[]() "),
+        unit=unit,
     )
 
 
@@ -139,7 +129,9 @@ def _role(name: str, unit: str) -> str:
         role = TIME
     if of in TIMES or of in FREQUENCIES:
         return TIME if of in TIMES else FREQUENCY
-    if role in (FREQUENCY, INDEX) and of in UNITS - {"", "Sequence"}:
+    if of == SEQUENCE:
+        return INDEX
+    if role in (FREQUENCY, INDEX) and of in UNITS - {""}:
         return ""
     if role in (X, Y, Z) and quantity_of(unit) and of not in LENGTHS:
         return ""
@@ -151,10 +143,9 @@ def _suffixed(name: str) -> tuple[str, str]:
     parts = name.split("_")
     for k in range(1, len(parts)):
         end = "_".join(parts[k:])
-        unit = next((u for s, u in _SUFFIXES.items() if s.lower() == end.lower()), "")
-        if unit:
-            return "_".join(parts[:k]).lower(), unit
-    return name.lower(), ""
+        if unit := next((u for s, u in _SUFFIXES.items() if s.lower() == end), ""):
+            return "_".join(parts[:k]), unit
+    return name, ""
 
 
 def _place(text: str) -> tuple[float, float]:

@@ -129,7 +129,7 @@ class Reader:
     words: str
     suffixes: tuple[str, ...]
     read: Callable[[Path, Given], Recording]
-    choose: tuple[str, ...] = ("columns", "direction")
+    choose: tuple[str, ...] = ("columns",)
 
 
 READERS = (

@@ -85,71 +85,37 @@ def nowhere(count: int) -> Floats:
 
 
 def completed(found: Recording, given: Given, path: Path) -> Measurement:
-    """The measurement in SI, positive into the body.
-
-    Parameters
-    ----------
-    found : Recording
-    given : Given
-    path : of the file
-
-    Raises
-    ------
-    ValueError
-        If neither the file nor the user say what is needed, with the option that says it.
+    """The measurement in SI, positive into the body; raises a ValueError with the option that says
+    what neither the file nor the user do.
     """
+    said = list(found.remarks)
     quantity, unit = _quantity(found, given)
-    sign, directed = _sign(found, given)
-    places, placed = _places(found, given)
-    found, said = _measured(replace(found, places=places))
-    axis, found, filled = _sampled(found, given)
-    values = sign * units.in_si(found.values, units.per_unit(unit, quantity))
+    if given.sign not in (None, 1, -1):
+        raise ValueError(f"sign = {given.sign} must be 1, into the body, or -1, out of it")
+    found = _measured(replace(found, places=_places(found, given)), said)
+    times, found = _sampled(found, given, said)
+    values = (given.sign or found.sign or 1) * units.in_si(
+        found.values, units.per_unit(unit, quantity)
+    )
     if values.size and not np.abs(values).max() < LARGEST:
         raise ValueError(
             f"values reach {np.abs(values).max():g} in SI; leave out nan and inf, and check --unit"
         )
-    said = [*found.remarks, *said, *filled, *placed, *_constant(values), *directed]
+    if lost := int(np.isnan(found.places).any(axis=1).sum()):
+        said.append(f"of {lost} of {len(found.places)} places the position is not in the file; "
+                    "give --places")  # fmt: skip
+    still = np.flatnonzero((values == values[:, :1]).all(axis=(0, 1)))
+    if len(still) and values.shape[1] > 1:
+        said.append(f"place {', '.join(str(k + 1) for k in still[:8])} has the same value "
+                    "throughout, as without a signal; choose others by --columns")  # fmt: skip
+    if not (given.sign or found.sign):
+        said.append("its direction is not in the file and taken as positive into the body; "
+                    "--positive out turns it")  # fmt: skip
     return Measurement(
-        quantity=quantity, places=found.places, times=axis, frequencies=found.frequencies,
+        quantity=quantity, places=found.places, times=times, frequencies=found.frequencies,
         values=values, drive=found.drive, name=found.name or path.stem, source=path.name,
         remarks=tuple(dict.fromkeys(said)),
     )  # fmt: skip
-
-
-def _constant(values: np.ndarray) -> list[str]:
-    """Sentence on places (r, n, p) at which nothing varies."""
-    still = np.flatnonzero((values == values[:, :1]).all(axis=(0, 1)))
-    if not len(still) or values.shape[1] < 2:
-        return []
-    listed = ", ".join(str(k + 1) for k in still[:8])
-    return [
-        f"place {listed} has the same value throughout, as without a signal; choose others by "
-        "--columns"
-    ]
-
-
-def _measured(found: Recording) -> tuple[Recording, list[str]]:
-    """The recording without places and frequencies of which nothing was measured, and sentences."""
-    gone = np.isnan(found.values)
-    if not gone.any():
-        return found, []
-    place, said = ~gone.all(axis=(0, 1)), []
-    if not place.any():
-        raise ValueError("no place has a value; export the measured values")
-    if not place.all():
-        said.append(f"{(~place).sum()} of {len(place)} places have no value and are left out")
-    found = replace(found, values=found.values[:, :, place], places=found.places[place])
-    if len(found.frequencies):
-        at = ~np.isnan(found.values).any(axis=(0, 2))
-        if 2 * at.sum() < len(at):
-            raise ValueError(f"only {at.sum()} of {len(at)} frequencies have values of all places")
-        if not at.all():
-            said.append(f"{(~at).sum()} frequencies without values are left out")
-        drive = found.drive[at] if len(found.drive) else found.drive
-        found = replace(
-            found, values=found.values[:, at], frequencies=found.frequencies[at], drive=drive
-        )
-    return found, said
 
 
 def _quantity(found: Recording, given: Given) -> tuple[str, str]:
@@ -173,67 +139,80 @@ def _quantity(found: Recording, given: Given) -> tuple[str, str]:
     return choose("quantity", quantity, [name for name, q in QUANTITIES.items() if q.of_body]), unit
 
 
-def _sign(found: Recording, given: Given) -> tuple[int, list[str]]:
-    if given.sign is not None:
-        if given.sign not in (1, -1):
-            raise ValueError(f"sign = {given.sign} must be 1, into the body, or -1, out of it")
-        return given.sign, []
-    if found.sign:
-        return found.sign, []
-    return 1, ["its direction is not in the file and taken as positive into the body; "
-               "--positive out turns it"]  # fmt: skip
-
-
-def _places(found: Recording, given: Given) -> tuple[Floats, list[str]]:
+def _places(found: Recording, given: Given) -> Floats:
     count = found.values.shape[2]
-    if given.places is None:
-        lost = int(np.isnan(found.places).any(axis=1).sum())
-        said = f"of {lost} of {count} places the position is not in the file; give --places"
-        return found.places, [said] * bool(lost)
-    places = np.atleast_2d(np.asarray(given.places, np.float64))
+    places = found.places if given.places is None else np.atleast_2d(given.places).astype(float)
     if places.shape != (count, 2):
         raise ValueError(
             f"--places has {len(places)} places, and the file has {count}; give one for each, as "
             '--places "0,0 5,0" in mm'
         )
-    return places, []
+    return places
 
 
-def _sampled(found: Recording, given: Given) -> tuple[Floats, Recording, list[str]]:
-    """Even times, the recording at each of them, and sentences on what was filled or replaced."""
+def _measured(found: Recording, said: list[str]) -> Recording:
+    """The recording without places and frequencies of which nothing was measured."""
+    gone = np.isnan(found.values)
+    place = ~gone.all(axis=(0, 1))
+    if not place.any():
+        raise ValueError("no place has a value; export the measured values")
+    if not place.all():
+        said.append(f"{(~place).sum()} of {len(place)} places have no value and are left out")
+        found = replace(found, values=found.values[:, :, place], places=found.places[place])
+    at = ~gone[:, :, place].any(axis=(0, 2))
+    if not len(found.frequencies) or at.all():
+        return found
+    if 2 * at.sum() < len(at):
+        raise ValueError(f"only {at.sum()} of {len(at)} frequencies have values of all places")
+    said.append(f"{(~at).sum()} frequencies without values are left out")
+    drive = found.drive[at] if len(found.drive) else found.drive
+    return replace(
+        found, values=found.values[:, at], frequencies=found.frequencies[at], drive=drive
+    )
+
+
+def _sampled(found: Recording, given: Given, said: list[str]) -> tuple[Floats, Recording]:
+    """Even times, and the recording at each of them; samples at the start and the end at which a
+    place has no value are cut off, and others that are missing interpolated.
+    """
     if len(found.frequencies):
         if found.frequencies.min() < 0:
             raise ValueError("frequencies fall below 0 Hz; export the one-sided spectrum")
-        return np.empty(0), found, []
-    times, index, said = _times(found, given)
-    together, count = found.values, found.values.shape[2]
-    if len(found.drive) == together.shape[1]:
-        drive = np.broadcast_to(found.drive[:, None], (len(together), len(found.drive), 1))
-        together = np.concatenate([together, drive], axis=2)
-    full, part, more = _complete(np.moveaxis(together, 1, 2), index, len(times))
-    full, times = np.moveaxis(full, 2, 1), times[part]
-    drive = full[0, :, count] if full.shape[2] > count else found.drive
-    said += more
+        return np.empty(0), found
+    times, index = _times(found, given, said)
+    runs, samples, count = found.values.shape
+    has_drive = len(found.drive) == samples
+    full = np.full((runs, len(times), count + has_drive), np.nan)
+    full[:, index, :count] = found.values
+    if has_drive:
+        full[:, index, count] = found.drive
+    if np.isnan(full).any():
+        part = _known_part(full)
+        if cut := len(times) - (part.stop - part.start):
+            said.append(f"{cut} samples at the start or the end without a value are left out")
+        times, full = times[part], full[:, part]
+        _interpolate(full, said)
     if len(times) > 1 and (rate := 1 / (times[1] - times[0])) < SLOWEST:
         said.append(f"samples at {rate:.3g} Hz show no vibration that is felt; check the times, or "
                     "give --rate")  # fmt: skip
-    return times, replace(found, values=full[..., :count], drive=drive), said
+    drive = full[0, :, count] if has_drive else found.drive
+    return times, replace(found, values=full[..., :count], drive=drive)
 
 
-def _times(found: Recording, given: Given) -> tuple[Floats, np.ndarray, list[str]]:
-    """Times of samples, the number of each sample of the file, and sentences. A rate that is given
-    replaces steps; the first sample stays as many steps from zero.
+def _times(found: Recording, given: Given, said: list[str]) -> tuple[Floats, np.ndarray]:
+    """Times of samples, and the number of each sample of the file. A rate that is given replaces
+    steps; the first sample stays as many steps from zero.
     """
     count = found.values.shape[1]
     rate = found.rate if given.rate is None else given.rate
     if given.rate is None and len(found.times):
-        return *_even(found.times), []
+        return _even(found.times)
     if np.isnan(rate):
         raise ValueError("the sampling rate is not in the file; give --rate in Hz")
     if not 0 < rate < np.inf:
         raise ValueError(f"the rate of {rate:g} Hz must be above 0 and finite; give --rate in Hz")
     if len(found.times) < 2:
-        return np.arange(count) / rate, np.arange(count), []
+        return np.arange(count) / rate, np.arange(count)
     try:
         times, index = _even(found.times)
     except ValueError:
@@ -241,12 +220,11 @@ def _times(found: Recording, given: Given) -> tuple[Floats, np.ndarray, list[str
         if not span > 0 or steps.max() > max(3 * steps.mean(), 1.5 * np.median(steps[steps > 0])):
             raise
         times, index = found.times[0] + span * np.linspace(0, 1, count), np.arange(count)
-    step = float(times[-1] - times[0]) / (len(times) - 1)
-    start, said = float(times[0]), []
+    step, start = float(times[-1] - times[0]) / (len(times) - 1), float(times[0])
     if not np.isclose(step * rate, 1, rtol=UNEVEN):
         start /= step * rate
         said.append(f"the file's steps of {step:g} are replaced by 1/{rate:g} s")
-    return start + np.arange(len(times)) / rate, index, said
+    return start + np.arange(len(times)) / rate, index
 
 
 def _even(times: Floats) -> tuple[Floats, np.ndarray]:
@@ -290,40 +268,32 @@ def _even(times: Floats) -> tuple[Floats, np.ndarray]:
     return full, index
 
 
-def _complete(values: Floats, index: np.ndarray, count: int) -> tuple[Floats, slice, list[str]]:
-    """Values (..., t), nan where nothing was measured, at every sample of a count; those that are
-    missing are interpolated by cubic splines.
-
-    Returns
-    -------
-    values (..., m), the samples that these are, and sentences: samples at the start and the end at
-    which a row has no value are cut off
-    """
-    full = np.full((*values.shape[:-1], count), np.nan)
-    full[..., index] = values
-    if np.isfinite(full).all():
-        return full, slice(0, count), []
-    rows = full.reshape(-1, count)
-    known = ~np.isnan(rows)
-    inside = np.maximum.accumulate(known, axis=1) & np.maximum.accumulate(
-        known[:, ::-1], axis=1)[:, ::-1]  # fmt: skip
-    kept = np.flatnonzero(inside.all(axis=0))
-    if len(kept) < (1 - LARGEST_GAPS) * count:
+def _known_part(values: Floats) -> slice:
+    """Samples between the first and the last value of every place of values (r, n, p)."""
+    known, count = ~np.isnan(values), values.shape[1]
+    if not known.any(axis=1).all():
+        raise ValueError("a repetition of a place has no value; choose others by --columns")
+    part = slice(int(known.argmax(axis=1).max()), count - int(known[:, ::-1].argmax(axis=1).max()))
+    if part.stop - part.start < (1 - LARGEST_GAPS) * count:
         raise ValueError(
-            f"of {count} samples only {len(kept)} lie between the first and the last value of "
-            "every place; give the part, or the --columns, with values"
+            f"of {count} samples only {max(part.stop - part.start, 0)} lie between the first and "
+            "the last value of every place; give the part, or the --columns, with values"
         )
-    part = slice(int(kept[0]), int(kept[-1]) + 1)
-    rows, gaps, said = rows[:, part], ~known[:, part], []
-    if cut := count - rows.shape[1]:
-        said.append(f"{cut} samples at the start or the end without a value are left out")
-    if gaps.any():
-        worst = max(_fill(row, gap) for row, gap in zip(rows, gaps, strict=True) if gap.any())
-        said.append(
-            f"{int(gaps.any(axis=0).sum())} samples are missing and interpolated, with an error of "
-            f"about {100 * worst:.2g} % of the RMS"
-        )
-    return rows.reshape(*values.shape[:-1], -1), part, said
+    return part
+
+
+def _interpolate(values: Floats, said: list[str]) -> None:
+    """Fill the gaps of values (r, n, p) by cubic splines, and say how wrong these are."""
+    gaps = np.isnan(values)
+    if not gaps.any():
+        return
+    worst = max(
+        _fill(values[r, :, p], gaps[r, :, p]) for r, p in np.argwhere(gaps.any(axis=1)).tolist()
+    )
+    said.append(
+        f"{int(gaps.any(axis=(0, 2)).sum())} samples are missing and interpolated, with an error "
+        f"of about {100 * worst:.2g} % of the RMS"
+    )
 
 
 def _fill(row: Floats, gap: np.ndarray) -> float:
@@ -331,8 +301,7 @@ def _fill(row: Floats, gap: np.ndarray) -> float:
     from scipy.interpolate import CubicSpline  # only where it is needed: it takes a while
 
     known = np.flatnonzero(~gap)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], gap, [False]]).astype(int)))
-    longest = int((edges[1::2] - edges[::2]).max())
+    longest = int(np.diff(known).max()) - 1
     width = longest + 2 * BESIDE
     free = np.flatnonzero(np.convolve(gap, np.ones(width), "valid") == 0)
     size, error = float(row[known].std()), np.inf

@@ -15,9 +15,9 @@ Cramer-Rao bound, of one sinusoid of amplitude A over a time T in noise of the o
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal.windows import hann
 
 from simple_model.typing import Floats
+from simple_model.windows import cosines
 from skinwave.measure.noise_floor import floor_of, tail
 
 ALARM = 0.01  # probability that a file of noise has any line
@@ -136,7 +136,7 @@ def _densities(x: Floats, runs: int, rate: float, *, bare: bool = False) -> Floa
     """One-sided densities (f, p) of waveforms (t, r p), the mean of repetitions, with a Hann window
     or a bare one.
     """
-    window = np.ones(len(x)) if bare else hann(len(x), sym=False)
+    window = np.ones(len(x)) if bare else cosines("hann", len(x))
     spectra = np.abs(np.fft.rfft(x * window[:, None], axis=0)) ** 2
     density = 2 * spectra / (rate * np.sum(window**2))
     return density.reshape(len(density), runs, -1).mean(axis=1)

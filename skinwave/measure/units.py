@@ -30,13 +30,12 @@ _SAME = str.maketrans({"µ": "u", "μ": "u", "²": "2", "¹": "1", "⁻": "-", "
 _WORDS = {
     word: unit
     for unit, words in {
-        "s": "s sec secs second seconds sekunde sekunden seconde secondes segundo "
-             "segundos secondi 秒",
-        "ms": "msec millisecond milliseconds millisekunden millisecondes milisegundos",
-        "us": "usec microsecond microseconds mikrosekunden", "ns": "nsec nanosecond nanoseconds",
-        "Hz": "hz hertz", "kHz": "khz kilohertz", "deg": "deg degree degrees grad degdeg",
-        "rad": "rad radian radians", "um": "micron microns micrometer micrometre",
-        "V": "v volt volts", "N": "newton newtons", "g": "gn",
+        "s": "s sec secs second seconds sekunde sekunden seconde secondes 秒",
+        "ms": "msec millisecond milliseconds", "us": "usec microsecond microseconds",
+        "ns": "nsec nanosecond nanoseconds", "Hz": "hz hertz", "kHz": "khz kilohertz",
+        "deg": "deg degree degrees grad degdeg", "rad": "rad radian radians",
+        "um": "micron microns micrometer micrometre", "V": "v volt volts", "N": "newton newtons",
+        "g": "gn",
     }.items()
     for word in words.split()
 }  # fmt: skip
@@ -71,12 +70,8 @@ def quantity_of(unit: str) -> str:
 
 
 def per_unit(unit: str, kind: str) -> float:
-    """Divisor of a unit of a quantity: values over it are in SI; of "20 mm/s" it is 50.
-
-    Raises
-    ------
-    ValueError
-        If the unit is unknown, a level in dB, or one of another quantity.
+    """Divisor of a unit of a quantity: values over it are in SI; of "20 mm/s" it is 50. Raises a
+    ValueError if the unit is unknown, a level in dB, or one of another quantity.
     """
     factor, name = _split(unit)
     if _LEVELS.fullmatch(name):
@@ -99,13 +94,7 @@ def in_si(values: np.ndarray, per: float) -> np.ndarray:
 
 
 def scale(unit: str, units: dict[str, float], what: str) -> float:
-    """Divisor of a unit of times, frequencies or lengths.
-
-    Raises
-    ------
-    ValueError
-        If it is none of these.
-    """
+    """Divisor of a unit of times, frequencies or lengths; raises a ValueError if it is none."""
     if (name := plain(unit)) not in units:
         raise ValueError(
             f"'{unit[:40]}' is no unit of {what}; use one of {', '.join(units)} in the header"
@@ -114,12 +103,8 @@ def scale(unit: str, units: dict[str, float], what: str) -> float:
 
 
 def length(text: str, unit: str) -> float:
-    """Metre of a number in a unit of length, exact as decimal numbers are.
-
-    Raises
-    ------
-    ValueError
-        If it is none.
+    """Metre of a number in a unit of length, exact as decimal numbers are; raises a ValueError if
+    it is none.
     """
     try:
         return float(Decimal(text.strip()) / Decimal(scale(unit, LENGTHS, "length")))

@@ -97,8 +97,6 @@ TABLES = {
         rows(T + 3e-5 * np.sin(np.arange(COUNT) ** 2.0), TONE, digits="%.9g"),
         MM_S | {"rate": RATE}, 1,
     ),
-    "direction chosen": ("Time (s),Velocity x (mm/s),Velocity z (mm/s)\n" + rows(T, OTHER, TONE),
-                         {"direction": "z"}, 1),
     "quantity chosen": (
         "t [s],u [um],v [mm/s]\n" + rows(T, OTHER, TONE), {"quantity": "velocity"}, 1
     ),
