@@ -38,14 +38,6 @@ def long_tsv(path: Path) -> None:
                     writer.writerow([1e3 * t, x, y, MM_S[r, k, p], r + 1])
 
 
-def german_csv(path: Path) -> None:
-    """Semicolons and decimal commas."""
-    rows = ["time [s];v(0,0) [mm/s];v(5,0) [mm/s];v(10.5,-2.25) [mm/s]"]
-    rows += [";".join(repr(float(x)).replace(".", ",") for x in (t, *MM_S[0, k]))
-             for k, t in enumerate(T)]  # fmt: skip
-    path.write_text("\n".join(rows))
-
-
 def spectrum_csv(path: Path) -> None:
     heads = [f"{part} u({x},{y}) [um]" for x, y in PLACES_MM for part in ("re", "im")]
     with path.open("w", newline="") as file:

@@ -1,8 +1,7 @@
 """Recordings of named arrays: NumPy archives, skinwave's own and others, and MATLAB files.
 
 Times, places, the drive and words are found by their names; the motion by --variable, by its name,
-or as the only other array that fits. MATLAB files are read in a process of their own, up to version
-7 by scipy, 7.3 by h5py.
+or as the only other array that fits.
 
 One published set has a form of its own: Reardon et al., Sci. Adv. 9, eadf2037 (2023), doi
 10.1126/sciadv.adf2037, record 10.5281/zenodo.7686560, skin velocity under a focus that draws a
@@ -40,7 +39,6 @@ INTERVALS = ("dt", "sampling_interval")
 PLACES = ("places", "points", "probes", "xy", "xyz", "positions", "coordinates", "locations")
 MILLIMETRES = tuple(f"{name}_mm" for name in PLACES)
 FARTHEST = 5.0  # m, of a place: beyond it the unit is another one
-LARGEST_HAND = 3.0  # of the spread of places of the zigzag: beyond it these are in mm, not in m
 DRIVES = ("drive", "ref", "reference", "r", "trigger")
 MOTION = {name: kind for kind in units.MOTION for name in NAMES[kind]} | dict.fromkeys(
     ("values", "y", "data", "signal", "signals"), ""
@@ -51,12 +49,8 @@ Arrays = Mapping[str, np.ndarray]
 
 
 def read_npz(path: Path, given: Given) -> Recording:
-    """The recording in an .npz file; of skinwave's own everything is in SI.
-
-    Raises
-    ------
-    ValueError
-        If it is none, or its arrays do not make a measurement.
+    """The recording in an .npz file; of skinwave's own everything is in SI. Raises a ValueError if
+    it is none, or its arrays do not make a measurement.
     """
     with reading.opened(path):
         pass
@@ -94,10 +88,7 @@ def _own(found: Arrays) -> Recording:
     if missing := {"quantity", "unit", "values", "places", "times", "frequencies"} - found.keys():
         raise ValueError(f"the array '{min(missing)}' is missing; write the measurement anew")
     if found["values"].ndim != 3 or found["values"].dtype.kind not in "fc":
-        raise ValueError(
-            f"values have the shape {found['values'].shape} and are of {found['values'].dtype}; "
-            "write the measurement anew"
-        )
+        raise ValueError(f"values have the shape {found['values'].shape}; write them anew")
     return Recording(
         quantity=str(found["quantity"]), unit=str(found["unit"]), places=found["places"],
         times=found["times"], frequencies=found["frequencies"], values=found["values"],
@@ -107,13 +98,7 @@ def _own(found: Arrays) -> Recording:
 
 
 def _of_response(found: Arrays) -> str:
-    """Quantity of the responses that a file of skinwave's holds; "" if it is none.
-
-    Raises
-    ------
-    ValueError
-        If they are of a point kernel, which has no motion.
-    """
+    """Quantity of the responses that a file of skinwave's holds; "" if it is none."""
     own = [name for name in found if name in QUANTITIES]
     models = found.keys() - {"t", "probes", *own}
     if not {"t", "probes"} <= found.keys() or len(own) != 1 or not models <= set(names()):
@@ -130,10 +115,7 @@ def recording(arrays: Arrays, given: Given) -> Recording:
     """The recording that arrays of numbers and texts hold by name, of a structure by
     "structure.name"; the motion is the variable that is given.
 
-    Raises
-    ------
-    ValueError
-        If no array, or more than one, can be the motion, or the shapes do not fit.
+    Raises a ValueError if no array, or more than one, can be the motion, or shapes do not fit.
     """
     short = {_last(name): array for name, array in arrays.items()}
     times, frequencies = _times(short), _vector(short, FREQUENCIES)
@@ -143,41 +125,43 @@ def recording(arrays: Arrays, given: Given) -> Recording:
     values = np.asarray(arrays[name])
     if values.dtype.kind not in "fiuc" or not values.size:
         raise ValueError(f"the array '{name[:40]}' holds no numbers; give another --variable")
-    is_zigzag = values.ndim == 3 and values.shape[2] == 2 and _last(name) == "y" and "r" in short
     if len(times) and len(frequencies):
         times, frequencies = (
             (np.empty(0), frequencies) if values.dtype.kind == "c" else (times, np.empty(0))
         )
     axis = times if len(times) else frequencies
-    places = given.places if given.places is not None else _places(
-        short, len(values) if is_zigzag else 0)  # fmt: skip
-    ordered, said = (np.transpose(values, (2, 1, 0)), []) if is_zigzag else _in_order(
-        values, len(axis), len(places), name)  # fmt: skip
-    start, rate = _scalar(short, STARTS), _rate(short)
-    if not np.isnan(start + rate) and not len(axis):
-        times = axis = start + np.arange(ordered.shape[1]) / rate
-    if not len(axis) and not is_zigzag:
-        times, ordered, found = _times_within(ordered, name, given)
-        said += found
-    drive = _vector(short, DRIVES)
+    places = given.places if given.places is not None else _places(short)
     each = next((short[key] for key in DRIVES if key in short), np.empty(0))
+    is_zigzag = values.ndim == 3 and values.shape[2] == 2 and _last(name) == "y" and "r" in short
     if is_zigzag and each.shape == values.shape[:2]:
         each = np.repeat(each[..., None], 2, axis=2)
-    if each.shape == values.shape and not len(frequencies):
-        every = np.transpose(each, (2, 1, 0)) if is_zigzag else _in_order(
-            each, len(axis), len(places), name)[0]  # fmt: skip
-        ordered, drive, more = aligned(_real(ordered, name), _real(every, name))
-        times, said = times[: ordered.shape[1]], [*said, more]
+    said: list[str] = []
+
+    def ordered(array: np.ndarray) -> np.ndarray:
+        if is_zigzag:
+            return np.transpose(array, (2, 1, 0))
+        return _in_order(array, len(axis), len(places), name, said)
+
+    moved, rate, start = ordered(values), _rate(short), _scalar(short, STARTS)
+    if not (len(axis) or np.isnan(start + rate)):
+        times = start + np.arange(moved.shape[1]) / rate
+    elif not (len(axis) or is_zigzag):
+        times, moved = _times_within(moved, name, given, said)
+    drive = _vector(short, DRIVES)
+    if not len(frequencies):
+        moved = _real(moved, name)
+        if each.shape == values.shape:
+            moved, drive, more = aligned(moved, _real(ordered(each), name))
+            times, said = times[: moved.shape[1]], [*said, more]
     if is_zigzag:
-        said += ["velocity along the laser, taken as normal to the skin"]
+        said.append("velocity along the laser, taken as normal to the skin")
     word = {key: _word(short, key) for key in ("quantity", "unit", "name")}
     return Recording(
-        values=ordered if len(frequencies) else _real(ordered, name),
-        times=times, frequencies=frequencies, rate=rate,
+        values=moved, times=times, frequencies=frequencies, rate=rate,
         quantity=word["quantity"] or ("velocity" if is_zigzag else MOTION.get(_last(name), "")),
         unit=word["unit"] or "m/s" * is_zigzag, name=word["name"],
-        places=places if len(places) == ordered.shape[2] else nowhere(ordered.shape[2]),
-        drive=drive if len(drive) == ordered.shape[1] else np.empty(0), remarks=tuple(said),
+        places=places if len(places) == moved.shape[2] else nowhere(moved.shape[2]),
+        drive=drive if len(drive) == moved.shape[1] else np.empty(0), remarks=tuple(said),
     )  # fmt: skip
 
 
@@ -187,32 +171,33 @@ def _last(name: str) -> str:
 
 
 def _in_order(
-    values: np.ndarray, samples: int, places: int, name: str
-) -> tuple[np.ndarray, list[str]]:
+    values: np.ndarray, samples: int, places: int, name: str, said: list[str]
+) -> np.ndarray:
     """Values (r, n, p), whatever the order of the one to three axes of an array, by the numbers of
-    times or frequencies and of places, 0 where not known; and what was assumed.
+    times or frequencies and of places, 0 where not known; what is assumed is said.
     """
     kept = values if values.ndim <= 3 else values.squeeze()
     if kept.ndim > 3 or kept.ndim == 0:
         raise ValueError(f"'{name[:40]}' has the shape {values.shape}; give samples and places")
     sizes = list(kept.shape)
-    free = [k for k, size in enumerate(sizes) if size != places or sizes.count(places) > 1]
-    along = [k for k, size in enumerate(sizes) if size == samples] if samples else [
-        max(free or range(kept.ndim), key=lambda k: sizes[k])]  # fmt: skip
-    if not along:
+    along = [k for k, size in enumerate(sizes) if size == samples]
+    if samples and not along:
         raise ValueError(
             f"'{name[:40]}' has the shape {kept.shape}, and there are {samples} times or "
             "frequencies; give an array with as many"
         )
-    said = [] if samples or kept.ndim == 1 else [
-        f"the axis of {sizes[along[0]]} of '{name[:40]}' is taken as time"]  # fmt: skip
+    if not samples:
+        free = [k for k, size in enumerate(sizes) if size != places or sizes.count(places) > 1]
+        along = [max(free or range(kept.ndim), key=lambda k: sizes[k])]
+        if kept.ndim > 1:
+            said.append(f"the axis of {sizes[along[0]]} of '{name[:40]}' is taken as time")
     time = 1 if kept.ndim == 3 and 1 in along else along[0]
     rest = [k for k in range(kept.ndim) if k != time]
-    across = [k for k in rest if sizes[k] == places] if places else []
-    spot = across[0] if across else max(rest, key=lambda k: sizes[k], default=-1)
-    moved = np.transpose(kept, [*(k for k in rest if k != spot), time, *[spot] * (spot >= 0)])
-    moved = moved if spot >= 0 else moved[..., None]
-    return moved if moved.ndim == 3 else moved[None], said
+    spot = max(rest, key=lambda k: (sizes[k] == places, sizes[k], -k), default=None)
+    if spot is None:
+        return kept[None, :, None]
+    moved = np.transpose(kept, [*(k for k in rest if k != spot), time, spot])
+    return moved if moved.ndim == 3 else moved[None]
 
 
 def _motion(arrays: Arrays) -> str:
@@ -235,13 +220,7 @@ def _list(names: Iterable[str]) -> str:
 
 
 def _vector(arrays: Arrays, names: tuple[str, ...]) -> np.ndarray:
-    """The first array of one axis by these names, or of copies of one; empty if there is none.
-
-    Raises
-    ------
-    ValueError
-        If places have times of their own.
-    """
+    """The first array of one axis by these names, or of copies of one; empty if there is none."""
     for name in names:
         array = arrays.get(name, np.empty(0))
         if array.dtype.kind not in "fiuc" or array.size < 2:
@@ -271,20 +250,20 @@ def _times(arrays: Arrays) -> np.ndarray:
 
 
 def _times_within(
-    values: np.ndarray, name: str, given: Given
-) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Times of a column of a matrix that rises evenly, the other columns, and a sentence."""
+    values: np.ndarray, name: str, given: Given, said: list[str]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Times of a column of a matrix that rises evenly, and the other columns."""
     count = values.shape[2]
     rising = [p for p in range(count) if np.isrealobj(values) and rises(values[0, :, p])]
     if not rising or count < 2:
-        return np.empty(0), values, []
+        return np.empty(0), values
     if given.rate is None:
         raise ValueError(
             f"column {rising[0] + 1} of '{name[:40]}' rises evenly as times do; give --rate in Hz, "
             "or save the times as an array 't' in s"
         )
-    said = f"column {rising[0] + 1} of '{name[:40]}' rises evenly and is taken as time"
-    return values[0, :, rising[0]].astype(float), np.delete(values, rising[0], axis=2), [said]
+    said.append(f"column {rising[0] + 1} of '{name[:40]}' rises evenly and is taken as time")
+    return values[0, :, rising[0]].astype(float), np.delete(values, rising[0], axis=2)
 
 
 def _scalar(arrays: Arrays, names: tuple[str, ...]) -> float:
@@ -300,35 +279,21 @@ def _rate(arrays: Arrays) -> float:
     return rate if rate > 0 else 1 / interval if interval > 0 else np.nan
 
 
-def _places(arrays: Arrays, count: int) -> Floats:
-    """Places (p, 2) in metre, of the first two coordinates; (0, 2) if there are none. Of the
-    zigzag, of so many places, the only array of fractions that may be a map is one, too.
-    """
-    named = {name: arrays[name] for name in (*PLACES, *MILLIMETRES) if name in arrays}
-    maps = {name: one for name, one in named.items() if _may_be_places(one, 0)}
-    if count and not maps:
-        maps = {name: one for name, one in arrays.items()
-                if one.dtype.kind == "f" and _may_be_places(one, count)}  # fmt: skip
-        if len(maps) > 1:
-            raise ValueError(f"the places may be {' or '.join(maps)}; give --places, in mm")
-    if not maps:
-        return np.empty((0, 2))
-    name, found = next(iter(maps.items()))
-    points = (found if found.shape[1] in (2, 3) else found.T)[:, :2].astype(np.float64)
-    is_wide = bool(count) and np.nanmax(np.ptp(points, axis=0), initial=0.0) > LARGEST_HAND
-    points = points / 1e3 if name in MILLIMETRES or is_wide else points
-    if (largest := np.nanmax(np.abs(points), initial=0.0)) > FARTHEST:
-        raise ValueError(
-            f"'{name}' reaches {largest:g} m; name an array in millimetre 'places_mm', or give "
-            "--places"
-        )
-    return points
-
-
-def _may_be_places(array: np.ndarray, count: int) -> bool:
-    """Whether an array has two or three real coordinates of each place."""
-    fits = array.dtype.kind in "fiu" and array.ndim == 2 and {2, 3} & set(array.shape)
-    return bool(fits and (not count or count in array.shape))
+def _places(arrays: Arrays) -> Floats:
+    """Places (p, 2) in metre, of the first two coordinates; (0, 2) if there are none."""
+    for name in (*PLACES, *MILLIMETRES):
+        found = arrays.get(name, np.empty(0))
+        if found.dtype.kind not in "fiu" or found.ndim != 2 or not {2, 3} & set(found.shape):
+            continue
+        points = (found if found.shape[1] in (2, 3) else found.T)[:, :2].astype(np.float64)
+        points = points / 1e3 if name in MILLIMETRES else points
+        if (largest := np.nanmax(np.abs(points), initial=0.0)) > FARTHEST:
+            raise ValueError(
+                f"'{name}' reaches {largest:g} m; name an array in millimetre 'places_mm', or give "
+                "--places"
+            )
+        return points
+    return np.empty((0, 2))
 
 
 def _word(arrays: Arrays, name: str) -> str:

@@ -19,12 +19,7 @@ MISSING = 'TDMS files need npTDMS; pip install "skinwave[measure]", or export .l
 
 def read_lvm(path: Path, given: Given) -> Recording:
     """The recording in a LabVIEW measurement file, of one segment or of several that follow each
-    other in time.
-
-    Raises
-    ------
-    ValueError
-        If it is none, or its segments do not fit together.
+    other in time; raises a ValueError if they do not.
     """
     return recording(lvm_table(exported_text(path, LARGEST)), given)
 
@@ -87,12 +82,8 @@ def _of_segment(one: dict[str, Any], x_columns: str) -> Table:
 
 
 def read_tdms(path: Path, given: Given) -> Recording:
-    """The recording in a TDMS file, whose waveforms tell their start and step.
-
-    Raises
-    ------
-    ValueError
-        If it is none, or its channels have other starts, steps or lengths.
+    """The recording in a TDMS file, whose waveforms tell their start and step; raises a ValueError
+    if channels have other ones, or other lengths.
     """
     try:
         from nptdms import TdmsFile

@@ -3,7 +3,6 @@ and two published sets.
 """
 
 import io
-import json
 import re
 import warnings
 from collections.abc import Callable, Sequence
@@ -27,19 +26,12 @@ SAMPLES, SENSORS, AXES, RATE = 522, 72, 3, 1300.0
 SKINSOURCE_BYTES = 4 * SAMPLES * SENSORS * AXES
 NORMAL = 2  # of the axes
 SKINSOURCE = "https://github.com/yonvisell/skinsource (public/data/impulse-responses)"
-HAND_LENGTHS = (0.175, 0.165, 0.185, 0.165)  # m, by model
-DRAWN_HAND = 398.1017  # pixels of the drawing that the sensors' places are of
 _NAME = re.compile(r"model-([1-4])-location-(0[1-9]|1\d|20)\.f32", re.IGNORECASE)
 
 
 def read_wav(path: Path, given: Given) -> Recording:
     """The channels of a WAV, a place each; samples that are whole numbers are fractions of full
-    scale.
-
-    Raises
-    ------
-    ValueError
-        If it is none, or has fewer than two samples.
+    scale. Raises a ValueError if it is none, or has fewer than two samples.
     """
     from scipy.io import wavfile
 
@@ -69,12 +61,8 @@ def read_skinsource(path: Path, given: Given) -> Recording:
 
     Tummala et al., IEEE Haptics Symposium 2024, doi 10.1109/HAPTICS59260.2024.10520852; data of
     four people by doi 10.5281/zenodo.10547601: float32, column-major (522 times, 72 sensors, 3
-    axes), the third axis normal to the skin.
-
-    Raises
-    ------
-    ValueError
-        If the file is not one of the 80 by name or size.
+    axes), the third axis normal to the skin. Raises a ValueError if the file is not one of the 80
+    by name or size.
     """
     found = _NAME.fullmatch(path.name)
     if not found:
@@ -89,35 +77,18 @@ def read_skinsource(path: Path, given: Given) -> Recording:
             f"it has {len(content):,} bytes where SkinSource has {SKINSOURCE_BYTES:,} of finite "
             f"numbers; download it anew from {SKINSOURCE}"
         )
-    places, placed = _sensors(path, int(found[1]))
     impulse = np.zeros(SAMPLES)
     impulse[0] = 1.0
     normal = values.reshape((SAMPLES, SENSORS, AXES), order="F")[None, :, :, NORMAL]
     return Recording(
         values=normal.astype(np.float64), rate=RATE, quantity="acceleration",
-        unit="m/s2", places=places, drive=impulse,
+        unit="m/s2", places=nowhere(SENSORS), drive=impulse,
         name=f"SkinSource model {found[1]}, location {int(found[2])}",
         remarks=(
             "acceleration after a force of 1 for one sample; the unit is not in the file, m/s2 per "
-            "N is plausible", *placed,
+            "N is plausible",
         ),
     )  # fmt: skip
-
-
-def _sensors(path: Path, model: int) -> tuple[Floats, list[str]]:
-    """Places (72, 2) in metre of the drawing in the download, two folders above, if it is there."""
-    drawing = path.parent.parent / "visualization.json"
-    if not drawing.is_file():
-        return nowhere(SENSORS), []
-    try:
-        found = json.loads(reading.text(drawing))["outputLocations"]
-        pixels = np.array([[np.nan if v is None else v for v in pair] for pair in found], float)
-        if pixels.shape != (SENSORS, 2):
-            raise ValueError
-    except (ValueError, KeyError, TypeError):
-        raise ValueError(f"{drawing} is not SkinSource's; download it anew or remove it") from None
-    scale = HAND_LENGTHS[model - 1] / DRAWN_HAND
-    return scale * pixels, ["places are those of SkinSource's drawing of the arm, spread flat"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -235,12 +206,7 @@ def reader_of(path: Path) -> Reader:
 
 def places_of(words: str) -> Floats:
     """Places (p, 2) in metre of words such as "0,0 5,0" in mm, or of a text file with the columns
-    x and y.
-
-    Raises
-    ------
-    ValueError
-        If a word is no pair of finite numbers, or the file has none.
+    x and y; raises a ValueError if there are none.
     """
     if Path(words).is_file():
         return text.places(Path(words))

@@ -33,15 +33,15 @@ REFERENCE = re.compile(r"ref(erence)?\d*\b", re.IGNORECASE)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Function:
-    """A set 58: its type, its `quantity` of motion ("" if it is of none) and `unit`, what it is
-    called, its node, that of its reference, its signed direction, and values `y` over `x`.
+    """A set 58: its type, its `quantity` of motion ("" if it is of none) and `unit`, names of its
+    response and itself, its node, that of its reference, its signed direction, and values `y` over
+    `x`.
     """
 
     type: int
     quantity: str
     unit: str
     per_reference: bool
-    title: str
     names: tuple[str, str]
     node: int
     ref_node: int
@@ -53,14 +53,9 @@ class Function:
 
 
 def read(path: Path, given: Given) -> Recording:
-    """The recording in a file of Universal File Format.
-
-    Sets of a reference for each place bring the places into step; a single one is the drive.
-
-    Raises
-    ------
-    ValueError
-        If it is none, has no set 58 of motion along the direction, or its sets do not fit together.
+    """The recording in a file of Universal File Format. Sets of a reference for each place bring the
+    places into step; a single one is the drive. Raises a ValueError if there is no motion along the
+    direction, or sets do not fit together.
     """
     functions, at, per_metre = _sets(path)
     motion, others = _motion(functions, given)
@@ -89,7 +84,7 @@ def read(path: Path, given: Given) -> Recording:
         values=values, times=first.x[: values.shape[1]] if first.is_in_time else np.empty(0),
         frequencies=np.empty(0) if first.is_in_time else first.x, quantity=first.quantity,
         unit=unit, places=np.asarray(places) / per_metre, sign=sign, drive=drive,
-        name=first.title, remarks=tuple(said),
+        name=first.names[1], remarks=tuple(said),
     )  # fmt: skip
 
 
@@ -151,7 +146,7 @@ def _function(one: dict[str, Any]) -> Function:
     axis = text("abscissa_axis_units_lab")
     per = units.scale(axis, known, what) if axis else 1.0
     return Function(
-        type=kind, unit=unit, per_reference=per_reference, title=text("id1"),
+        type=kind, unit=unit, per_reference=per_reference,
         quantity=KINDS.get(number("ordinate_spec_data_type"), "") or units.quantity_of(unit),
         names=(text("rsp_ent_name"), text("id1")), node=number("rsp_node"),
         ref_node=number("ref_node"), direction=number("rsp_dir"), is_in_time=is_in_time,
@@ -175,6 +170,11 @@ def _motion(functions: list[Function], given: Given) -> tuple[list[Function], li
         others += [one for one in motion if not one.quantity]
         wanted = {given.quantity} if given.quantity in of else of
         motion = [one for one in motion if one.quantity in wanted]
+    if not motion:
+        raise ValueError(
+            f"none of its {len(functions)} functions is of displacement, velocity or acceleration; "
+            'give --unit, such as "20 mm/s", if they are motion'
+        )
     along = AXES[given.direction or "z"]
     at = [one for one in motion if abs(one.direction) in (0, along)]
     nodes = sorted({one.ref_node for one in at})
@@ -183,22 +183,14 @@ def _motion(functions: list[Function], given: Given) -> tuple[list[Function], li
             f"its frequency responses have {len(nodes)} references, the nodes "
             f"{', '.join(map(str, nodes))}; export those of one"
         )
-    if at:
-        return at, others
-    if not motion:
-        kinds = sorted({one.unit for one in with_phase} - {""})
+    if not at:
+        names = {number: name for name, number in AXES.items()}
+        known = sorted({names.get(abs(one.direction), "rotation") for one in motion})
         raise ValueError(
-            f"none of its {len(functions)} functions is of displacement, velocity or acceleration"
-            f"{', but in ' + ', '.join(kinds)[:60] if kinds else ''}; give --unit, such as "
-            '"20 mm/s", if they are motion'
+            f"none of its {len(motion)} functions of motion is along {given.direction or 'z'}; "
+            f"their directions are {', '.join(known)}; give --direction"
         )
-    names = {number: name for name, number in AXES.items()}
-    directions = {abs(one.direction) for one in motion}
-    known = sorted(names.get(k, f"rotation {k}") for k in directions)
-    raise ValueError(
-        f"none of its {len(motion)} functions of motion is along {given.direction or 'z'}; their "
-        f"directions are {', '.join(known)[:60]}; give --direction"
-    )
+    return at, others
 
 
 def _check_alike(motion: list[Function]) -> None:

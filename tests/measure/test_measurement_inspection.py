@@ -27,13 +27,13 @@ def coloured(rng, shape, power):
 
 
 def test_noise_alone_has_lines_as_rarely_as_told():
-    """Told 20 %: in 75 files 15, and at most 25 by the binomial distribution at 0.3 %."""
+    """Told 20 %: in 50 files 10, and at most 19 by the binomial distribution at 0.3 %."""
     rng = np.random.default_rng(2)
     alarms = sum(
         len(spectral_lines(coloured(rng, (2, 512, 2), 2), RATE, alarm=0.2).lines) > 0
-        for _ in range(75)
+        for _ in range(50)
     )
-    assert 1 <= alarms <= 25
+    assert 1 <= alarms <= 19
 
 
 def test_lines_are_found_with_the_errors_that_are_told():
@@ -190,13 +190,13 @@ def test_lines_of_spectra():
     ).lines == ()  # fmt: skip
 
 
-@pytest.mark.parametrize(("count", "scale"), [(1, 1e150), (2, 1.0), (33, 0.0), (64, 1e-150)])
-def test_short_and_extreme_measurements_are_inspected(count, scale):
-    values = scale * np.random.default_rng(1).normal(size=(1, count, 2))
-    measured = Measurement(
-        quantity="velocity", times=T[:count], places=np.full((2, 2), np.nan), values=values
-    )
-    assert "velocity" in text(inspect(measured)).lower()
+def test_short_and_extreme_measurements_are_inspected():
+    for count, scale in ((1, 1e150), (2, 1.0), (33, 0.0), (64, 1e-150)):
+        values = scale * np.random.default_rng(1).normal(size=(1, count, 2))
+        measured = Measurement(
+            quantity="velocity", times=T[:count], places=np.full((2, 2), np.nan), values=values
+        )
+        assert "velocity" in text(inspect(measured)).lower()
 
 
 def test_the_command_prints_and_writes(tmp_path, capsys):
