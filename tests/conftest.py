@@ -77,19 +77,24 @@ class Here:
 
     def submit(self, function, *given, **options):
         done = Future()
-        done.set_result(function(*given, **options))
+        try:
+            done.set_result(function(*given, **options))
+        except (ValueError, ArithmeticError) as error:
+            done.set_exception(error)
         return done
 
 
 @pytest.fixture
 def in_one_process(monkeypatch):
-    """Comparisons without a process beside this one, where that is not what is tested."""
+    """Studies without processes beside this one, where these are not what is tested."""
 
     @contextmanager
-    def here(count):
+    def here(count, **options):
         yield Here()
 
-    monkeypatch.setattr("skinwave.studies.study.pool", here)
+    monkeypatch.setenv("SKINWAVE_CACHE", os.environ["SKINWAVE_CACHE"])  # which a study may change
+    for study in ("study", "relax", "tradeoff"):
+        monkeypatch.setattr(f"skinwave.studies.{study}.pool", here)
 
 
 @pytest.fixture(scope="session")

@@ -22,8 +22,7 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.results.outputs import output_folder
     from skinwave.scene.file import read
     from skinwave.scene.scene import check_load
-    from skinwave.studies.dispersion_page import sentences, taken_as, write
-    from skinwave.studies.driven_modes import driven_modes
+    from skinwave.studies.dispersion import driven_modes, sentences, write
 
     if not 1 <= options.modes <= 12:
         raise ValueError(f"--modes {options.modes} is outside 1..12; give one of these")
@@ -35,7 +34,7 @@ def run(options: argparse.Namespace) -> int:
     with output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
         write(folder, found)
         record.write(folder, record.of_command(options), scene=scene)
-    said = [" ".join(sentences(found)), *taken_as(scene)]
+    said = sentences(found)
     summary = {"out": str(out), "sentences": said}
     summarise(options, summary, "\n".join([*said, f"open {out}/index.html"]))
     return 0

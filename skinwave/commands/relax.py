@@ -41,8 +41,7 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.results.outputs import output_folder
     from skinwave.scene.file import read
     from skinwave.studies.assumptions import check_rate
-    from skinwave.studies.relax import hierarchy_of
-    from skinwave.studies.relax_page import efforts, sentence, write
+    from skinwave.studies.relax import hierarchy_of, sentence, write
     from skinwave.system import document
 
     h = metre(options.h)
@@ -59,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
             found = hierarchy_of(scene, progress, h=h, update_rate=rate, points=options.points)
         write(folder, found)
         record.write(folder, record.of_command(options), scene=scene)
-    warnings = document.worst_warnings(efforts(found))
+    warnings = document.worst_warnings(found.efforts)
     warn(warnings)
     sentences = [sentence(effect) for effect in found.effects()]
     failed = [f"'{step.name}' failed: {step.error}" for step in found.steps if step.error]

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from skinwave.results.views import View
     from skinwave.system.effort import Progress
 
-STYLES, FORMATS = ("report", "talk", "print"), ("png", "svg", "pdf")
+STYLES, FORMATS = ("report", "talk", "print"), ("svg", "pdf")
 FILM_OPTIONS = ("camera", "frames")
 MAP_OPTIONS = ("reach", "step", "depth")
 
@@ -41,7 +41,7 @@ def options(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--style", choices=STYLES, default="report")
     parser.add_argument(
-        "--format", choices=FORMATS, action="append", default=["png"],
+        "--format", choices=FORMATS, action="append", default=[],
         help="of figures, beside PNG; may be given twice",
     )  # fmt: skip
     parser.add_argument(
@@ -86,7 +86,7 @@ def _page(options: argparse.Namespace) -> int:
     from skinwave.results import record
     from skinwave.results.outputs import output_folder
     from skinwave.scene.file import read
-    from skinwave.studies.scene_report import write_report
+    from skinwave.studies.report import write_report
 
     chosen = style(options.style, options.width)
     source, made = options.source, options.source.is_dir()
@@ -103,16 +103,15 @@ def _page(options: argparse.Namespace) -> int:
     ):
         if scene is not None:
             from skinwave.studies.album import make
-            from skinwave.verify.suite import quick_results
 
             said = make(
                 folder, scene, progress, h=metre(options.h), solver=options.solver,
-                beside=options.beside, command=_again(options), cases=quick_results(progress),
+                beside=options.beside,
             )  # fmt: skip
             warn(said)
         write_report(
             folder if scene is not None else source, folder, chosen, progress,
-            formats=options.format, columns=options.only,
+            formats=options.format, columns=options.only, command=_again(options) * (not made),
         )  # fmt: skip
         record.write(folder, record.of_command(options), scene=scene)
         size = (folder / "index.html").stat().st_size
@@ -126,7 +125,7 @@ def _drawn(options: argparse.Namespace) -> list[str]:
     words = [] if options.style == "report" else ["--style", options.style]
     words += ["--width", f"{options.width:g}"] if options.width else []
     words += ["--only", ",".join(options.only)] if options.only else []
-    return words + [word for kind in options.format if kind != "png" for word in ("--format", kind)]
+    return words + [word for kind in options.format for word in ("--format", kind)]
 
 
 def _again(options: argparse.Namespace) -> str:
@@ -142,7 +141,7 @@ def _map(options: argparse.Namespace) -> int:
     from skinwave.results.surface import quantity_map
     from skinwave.scene.file import read
     from skinwave.scene.keys import depth_of
-    from skinwave.studies.quantity_map_page import sentences, write
+    from skinwave.studies.report import map_sentences, write_map
 
     if options.source.is_dir():
         raise ValueError(f"{options.source} is a folder; give the scene file of the map")
@@ -162,9 +161,9 @@ def _map(options: argparse.Namespace) -> int:
                 scene, progress, reach=reach / 1e3, step=step / 1e3, h=metre(options.h),
                 solver=options.solver,
             )  # fmt: skip
-        write(folder, scene, found)
+        write_map(folder, scene, found)
         record.write(folder, record.of_command(options), scene=scene)
-    said = sentences(scene, found)
+    said = map_sentences(scene, found)
     summary = {"out": str(out), "sentences": said}
     summarise(options, summary, "\n".join([*said, f"open {out}/index.html"]))
     return 0

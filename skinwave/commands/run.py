@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.scene.file import read
     from skinwave.scene.scene import body_name
     from skinwave.scene.spreads import spreads_of
-    from skinwave.studies.study_page import write_single
+    from skinwave.studies.pages import write_run_page
     from skinwave.sweeps.sampling import check
 
     scene = read(options.scene)
@@ -64,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
         warn(w for w in response.effort.warnings if w not in required.warnings)
         run = Run(tacton=scene.name, body=body_name(scene.body), scene=scene, response=response)
         more = _uncertainty(options, run, required.h, folder) if options.samples else []
-        write_single(folder, run, more)
+        write_run_page(folder, run, more)
         record.write(folder, record.of_command(options), scene=scene, response=response)
     summary = {
         "out": str(out),

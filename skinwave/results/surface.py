@@ -257,7 +257,7 @@ def _of_lines(
     felt = scene.reading.is_plain and scene.body.is_skin
     if felt:
         moving = lines[0] > STILL
-        amplitudes = np.abs(lines[1][moving]).reshape(int(moving.sum()), -1)
+        amplitudes = np.abs(lines[1][moving]).reshape(int(moving.sum()), int(where.sum()))
         levels = sensation_level(amplitudes, lines[0][moving, None])
         found[1, where] = np.maximum(levels.max(axis=0, initial=-np.inf), SILENT)
     rms, level = found.reshape(2, len(y), len(x))

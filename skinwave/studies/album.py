@@ -1,6 +1,6 @@
 """A scene's responses by all models that pictures show side by side, in a folder.
 
-scene.toml  plan.json  trust.json  lines.csv
+scene.toml  plan.json  lines.csv
 COLUMN/scene.toml  responses.npz  lines.csv  effort.json  record.json  view.npz  map.npz
 """
 
@@ -55,7 +55,7 @@ from skinwave.scene.file import dumps, read
 from skinwave.scene.scene import BODIES, Scene, body_name, check_load, with_body
 from skinwave.system.document import worst_warnings
 from skinwave.system.effort import Progress
-from skinwave.system.json_kinds import EFFORT, PLAN, TRUST, effort_of, fitting
+from skinwave.system.json_kinds import EFFORT, PLAN, effort_of, fitting
 
 KERNEL_REACH = np.array([BODIES["skin-slab"].width, BODIES["skin-slab"].height]) / 2
 LARGER = 1.5  # times the default size: elements of pictures, for a fifth of the time
@@ -64,18 +64,24 @@ PLANNED = 0.05  # tolerance of the plan that stands on the page
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Album:
-    """Contents of a folder: runs; views by body, where there are any; the plan, how far its
-    response agrees with the pictures, and the command that made it, where these were saved; `maps`
-    of the quantity that the probes of each body read.
+    """Contents of a folder: runs, views by body and the plan, where these were saved, and `maps` of
+    the quantity that the probes of each body read.
     """
 
     title: str
     scene: Scene
     runs: Sequence[Run]
     views: Mapping[str, View]
-    planned: Mapping[str, Any] | None
-    trust: Mapping[str, Any] | None
+    planned: Mapping[str, Any] | None = None
     maps: Mapping[str, SurfaceField] = field(default_factory=dict)
+
+    @property
+    def groups(self) -> dict[str, list[Run]]:
+        """Runs by Tacton."""
+        groups: dict[str, list[Run]] = {}
+        for run in self.runs:
+            groups.setdefault(run.tacton, []).append(run)
+        return groups
 
 
 def shown_scenes(scene: Scene, beside: Sequence[str] = ()) -> dict[str, Scene]:
@@ -123,35 +129,33 @@ def make(
     solver: str = "auto",
     frames: int | None = None,
     beside: Sequence[str] = (),
-    command: str = "",
-    cases: Sequence[Mapping[str, Any]] = (),
 ) -> list[str]:
     """Compute a scene's response by every model and fill a folder with it; the warnings of all.
 
     Parameters
     ----------
     beside : names of preset bodies that are shown, too
-    cases : results of verification cases on this installation, as `verify.suite.quick_results`
-        returns them
 
     Raises
     ------
     ValueError
         If a model refuses the scene.
     """
-    shown = shown_scenes(scene, beside)
     (folder / "scene.toml").write_text(dumps(scene), encoding="utf-8")
-    plans = plans_of(shown, progress, h=h, solver=solver)
-    runs, misfit = [], np.nan
-    for view, run in answers(scene, shown, plans, progress, h=h, solver=solver, frames=frames):
+    runs, own, misfit = [], None, {}
+    for view, run, planned in answers(
+        scene, progress, h=h, solver=solver, frames=frames, beside=beside
+    ):
         also = None if view is None else partial(keep_view, view)
         write_run(folder / run.column, run, also=also)
         runs.append(run)
-        if run.scene == scene and view and view.moved:
-            misfit = _misfit(run, view.moved)
+        if run.scene == scene and planned:
+            own = planned
+            misfit = {"misfit": _misfit(run, view.moved)} if view and view.moved else {}
     write_lines(folder / "lines.csv", runs)
-    own = next((plans[column] for column in plans if shown[column] == scene), None)
-    _plan(folder, own or plan(scene, SolveOptions(tolerance=PLANNED)), misfit, cases, command)
+    own = own or plan(scene, SolveOptions(tolerance=PLANNED))
+    table = own.table() | {"tolerance": PLANNED} | misfit
+    (folder / "plan.json").write_text(json.dumps(table, indent=1), encoding="utf-8")
     return worst_warnings((run.body, run.response.effort) for run in runs)
 
 
@@ -167,33 +171,27 @@ def keep_view(view: View, folder: Path) -> None:
         surface.save(folder / "map.npz", body_map(scene, x, y))
 
 
-def plans_of(
-    shown: Mapping[str, Scene], progress: Progress, *, h: float | None, solver: str
-) -> dict[str, Plan]:
-    """Plan of each scene with a body, by column."""
-    options = SolveOptions(tolerance=PLANNED, h=h, solver=solver, progress=progress)
-    return {
-        column: plan(its, options)
-        for column, its in shown.items() if its.body.of_kind.discretise
-    }  # fmt: skip
-
-
 def answers(
     scene: Scene,
-    shown: Mapping[str, Scene],
-    plans: Mapping[str, Plan],
     progress: Progress,
     *,
     h: float | None = None,
     solver: str = "auto",
     frames: int | None = None,
-) -> Iterator[tuple[View | None, Run]]:
-    """The runs of `shown_scenes` by `plans_of` them, one at a time, each with its view; there is
-    none of the published kernel, whose load is another one. Raises what `make` does.
+    beside: Sequence[str] = (),
+) -> Iterator[tuple[View | None, Run, Plan | None]]:
+    """The runs of `shown_scenes`, one at a time, each with its view and its plan; there is no view
+    of the published kernel, whose load is another one. Raises what `make` does.
 
     Views of bodies are by finite elements that are larger than those of responses, or by the modes
     of a plate.
     """
+    shown = shown_scenes(scene, beside)
+    options = SolveOptions(tolerance=PLANNED, h=h, solver=solver, progress=progress)
+    plans = {
+        column: plan(its, options)
+        for column, its in shown.items() if its.body.of_kind.discretise
+    }  # fmt: skip
     moved = {
         body: _moved(its, body, progress, h, solver)
         for body, its in shown.items()
@@ -206,15 +204,17 @@ def answers(
         progress(f"response of {column}", 0.0)
         if column not in plans:
             run = Run(tacton=scene.name, body="none", scene=its, response=compute(its, column))
-            yield kernel_view(its, KERNEL_REACH, part) if column == SAME_LOAD.name else None, run
+            is_shown = column == SAME_LOAD.name
+            yield kernel_view(its, KERNEL_REACH, part) if is_shown else None, run, None
             continue
         response = solve(its, plans[column])
         run = Run(tacton=scene.name, body=column, scene=its, response=response)
         progress(f"pictures of {column}", 0.0)
         if column in moved:
-            yield body_view(its, column, moved[column], part), run
+            view = body_view(its, column, moved[column], part)
         else:
-            yield flat_view(run, KERNEL_REACH, part), run
+            view = flat_view(run, KERNEL_REACH, part)
+        yield view, run, plans[column]
 
 
 def _has_elements(scene: Scene, h: float | None) -> bool:
@@ -243,36 +243,24 @@ def _is_plate(scene: Scene, h: float | None) -> bool:
     return h is None and scene.reading.is_plain and takes(FROM_REST, scene)
 
 
-def shown_views(
-    scene: Scene, progress: Progress, *, h: float | None = None, solver: str = "auto",
-    frames: int | None = None, beside: Sequence[str] = (),
-) -> tuple[list[View], list[str]]:  # fmt: skip
-    """Views of a scene on all that it is shown on, `coloured`, and warnings; options and errors as
-    of `make`.
-    """
-    shown = shown_scenes(scene, beside)
-    plans = plans_of(shown, progress, h=h, solver=solver)
-    found = list(answers(scene, shown, plans, progress, h=h, solver=solver, frames=frames))
-    views, said = coloured([(view, run.scene) for view, run in found if view])
-    return views, worst_warnings((run.body, run.response.effort) for _, run in found) + said
-
-
-def coloured(found: Sequence[tuple[View, Scene]]) -> tuple[list[View], list[str]]:
-    """Views by the quantity that their scenes' probes read, and what is left out: of another one
-    than the displacement of the surface the point kernel, which has none.
+def shown_views(scene: Scene, progress: Progress, **options: Any) -> tuple[list[View], list[str]]:
+    """Views of a scene on all that it is shown on, by the quantity that its probes read, and
+    warnings. The point kernel is left out of other quantities than displacement, because it has
+    none. Options are those of `make`.
 
     Raises
     ------
     ValueError
-        If there is no body whose quantity could be shown.
+        As `make`, or if no body has the quantity.
     """
-    if all(scene.reading.asked is DISPLACEMENT for _, scene in found):
-        return [view for view, _ in found], []
-    bodies = [(view, scene) for view, scene in found if len(view.tets)]
-    if not bodies:
-        raise ValueError(f"{description.without_kernel(found[0][1])}; give the scene a body")
-    said = [description.without_kernel(scene) for view, scene in found if not len(view.tets)]
-    return [shaded(view, scene) for view, scene in bodies], said
+    found = [(view, run) for view, run, _ in answers(scene, progress, **options) if view]
+    said = worst_warnings((run.body, run.response.effort) for _, run in found)
+    if scene.reading.asked is DISPLACEMENT:
+        return [view for view, _ in found], said
+    if not any(len(view.tets) for view, _ in found):
+        raise ValueError(f"{description.without_kernel(scene)}; give the scene a body")
+    said += [description.without_kernel(scene)]
+    return [shaded(view, run.scene) for view, run in found if len(view.tets)], said
 
 
 def _moved(scene: Scene, body: str, progress: Progress, h: float | None, solver: str) -> BodyMotion:
@@ -288,19 +276,6 @@ def _misfit(run: Run, moved: BodyMotion) -> float:
     values = run.response.values
     away = probe_response(run.scene, moved).values - values
     return float(np.linalg.norm(away)) / (float(np.linalg.norm(values)) or 1.0)
-
-
-def _plan(
-    folder: Path, required: Plan, misfit: float, cases: Sequence[Mapping[str, Any]], command: str
-) -> None:
-    """Requirements of the scene, and how far the motion in pictures is from the response."""
-    table = required.table() | {"tolerance": PLANNED}
-    (folder / "plan.json").write_text(json.dumps(table, indent=1), encoding="utf-8")
-    trust: dict[str, Any] = {"command": command, "model": required.model}
-    if np.isfinite(misfit):
-        trust["misfit"] = misfit
-    trust["cases"] = list(cases)
-    (folder / "trust.json").write_text(json.dumps(trust, indent=1), encoding="utf-8")
 
 
 def open_album(folder: Path) -> Album:
@@ -324,7 +299,6 @@ def open_album(folder: Path) -> Album:
     return Album(
         title=scene.name if own.exists() else folder.resolve().name, scene=scene, runs=runs,
         views={view.column: view for view in views}, planned=_json(folder / "plan.json", PLAN),
-        trust=_json(folder / "trust.json", TRUST),
         maps={n: surface.load(path, scenes_of[n]) for n, path in kept.items() if n in scenes_of},
     )  # fmt: skip
 

@@ -53,12 +53,8 @@ LAYERS = (
 
 
 def droppable(scene: Scene) -> tuple[str, ...]:
-    """Assumptions that can be dropped for a scene, in the order of the model hierarchy.
-
-    Raises
-    ------
-    ValueError
-        If the scene has no body.
+    """Assumptions that can be dropped for a scene, in the order of the model hierarchy; a
+    ValueError without a body.
     """
     body, path = scene.body, scene.tacton.trajectory
     if not body.of_kind.discretise:
@@ -82,10 +78,8 @@ def droppable(scene: Scene) -> tuple[str, ...]:
 
 def side_step(scene: Scene) -> tuple[str, ...]:
     """Assumptions dropped in a side step of the hierarchy, with a second damping law; () without
-    viscosity.
-
-    Fast waves lose little in a standard linear solid, and finite elements take many times as long;
-    where the scene does not have it, it is tried on the wavenumber integral only.
+    viscosity. Finite elements take many times as long with it, because fast waves lose little:
+    where the scene does not have that law, it is tried on the wavenumber integral only.
     """
     names = droppable(scene)
     if "viscous loss" in names or not scene.body.of_kind.is_layer or not scene.body.solid.viscosity:
@@ -116,13 +110,9 @@ def relaxed(
     update_rate: float = DEVICE_RATES[0],
     points: int | None = None,
 ) -> tuple[Scene, str]:
-    """Scene without the dropped assumptions, and the model that computes it.
-
-    What is assumed of the load is the same with and without propagation.
-
-    Parameters
-    ----------
-    update_rate, points : of the device that draws the path, as `held` takes them
+    """Scene without the dropped assumptions, and the model that computes it; update rate and points
+    are of the device, as `held` takes them. What is assumed of the load is the same with and
+    without propagation.
     """
     spot = "gaussian" if "sinc^2 profile" in dropped else "main_lobe"
     own = beyond_published(scene.pressure.drive, MovingPressure.drive)
@@ -152,17 +142,9 @@ def relaxed(
 def held(
     path: Trajectory, update_rate: float = DEVICE_RATES[0], points: int | None = None
 ) -> Trajectory:
-    """Path as a device draws it: points equally spaced along it, the focus at rest on each.
-
-    Parameters
-    ----------
-    update_rate : float, Hz, at which the device moves its focus, one of `DEVICE_RATES`
-    points : how many there are; the most that the device can set, rate / f_d, if not given
-
-    Raises
-    ------
-    ValueError
-        If no device has this rate, or the points are fewer than 2 or too many for it.
+    """Path as a device draws it that moves its focus at an update rate in Hz, one of
+    `DEVICE_RATES`: points equally spaced along it, the focus at rest on each, as many as the device
+    can set, rate / f_d, if not given. A ValueError if no device has the rate or so many points.
     """
     check_rate(update_rate)
     period = 1 / path.drawing_frequency
@@ -182,13 +164,7 @@ def held(
 
 
 def check_rate(update_rate: float) -> None:
-    """Refuse a rate that no device has.
-
-    Raises
-    ------
-    ValueError
-        If it is none of `DEVICE_RATES`.
-    """
+    """Refuse a rate in Hz that no device has."""
     if update_rate not in DEVICE_RATES:
         raise ValueError(
             f"update_rate = {update_rate / 1e3:g} kHz is no device's; take "
@@ -272,10 +248,9 @@ def with_little_loss(solid: Material, w: float) -> Material:
 
 
 def as_relaxing(solid: Material, w: float) -> Material:
-    """Standard linear solid with the complex modulus at w in rad/s of a Kelvin-Voigt solid.
-
-    One complex number leaves the relaxation time open: it is that of the preset, or shorter where
-    the long-term modulus would otherwise fall below half of the static one.
+    """Standard linear solid with the complex modulus at w in rad/s of a Kelvin-Voigt solid. Its
+    relaxation time is that of the preset, or shorter where the long-term modulus would otherwise
+    fall below half of the static one.
     """
     loss = w * solid.viscosity
     if not loss or solid.fast_modulus:  # nothing to fit, or fitted already
@@ -304,10 +279,7 @@ def as_viscous(solid: Material, w: float) -> Material:
 
 
 def strongest_line(scene: Scene) -> float:
-    """Line in Hz that moves the probes most, 0 if none does.
-
-    Damping laws differ from line to line; they are matched at this one.
-    """
+    """Line in Hz that moves the probes most, at which damping laws are matched; 0 if none does."""
     frequencies, shares = response_spectrum(scene, 0.05)
     moving = frequencies > 0
     if not moving.any():

@@ -24,7 +24,7 @@ from skinwave.report.palette import colour, label, marker
 from skinwave.results.run import ASSESSED
 from skinwave.scene.paper15 import MEASURED_ON, tactons
 from skinwave.scene.scene import BODIES, PROBES, Body, Scene
-from skinwave.system.document import Picture, Report, Section
+from skinwave.system.document import Details, Picture, Report
 from skinwave.system.effort import Progress
 from skinwave.system.table import Column, Table
 
@@ -48,14 +48,9 @@ LOADS: Mapping[str, Callable[[Floats], Floats]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Findings:
-    """Lines of every Tacton, ratios of one at several amplitudes, and which runs failed.
-
-    Parameters
-    ----------
-    levels : dB re the strongest line of the run, at the probe where each is strongest, by Tacton,
-        line and mechanism
-    ratios : 2 f_AM over f_AM at `AMPLITUDES`, by mechanism
-    failed : a sentence each
+    """`levels` of lines by Tacton, line and mechanism, dB re the strongest line of the run, at the
+    probe where each is strongest; `ratios` of 2 f_AM to f_AM at `AMPLITUDES` by mechanism; and
+    which runs `failed`, a sentence each.
     """
 
     levels: Mapping[tuple[str, str], Mapping[str, float]]
@@ -70,18 +65,8 @@ def paper_vs_skin(
     patterns: Iterable[tuple[str, Tacton]] | None = None,
     bodies: Mapping[str, Body] | None = None,
 ) -> Findings:
-    """Run Tactons through the mechanisms on several bodies.
-
-    Parameters
-    ----------
-    progress : called with the name of the phase and the fraction done
-    h : metre, element size of solids; that of the body if not given
-    patterns : Tactons by name; the paper's 15 if not given
-    bodies : by name; the paper sheet and the skin slab if not given
-
-    Returns
-    -------
-    Findings
+    """Run Tactons, the paper's 15 if not given, through the mechanisms on several bodies, the paper
+    sheet and the skin slab if not given, with solid elements of h in metre.
     """
     on = bodies or {name: BODIES[name] for name in MEASURED_ON}
     chosen = [(n, replace(t, duration=DURATION)) for n, t in (patterns or tactons())]
@@ -90,48 +75,54 @@ def paper_vs_skin(
     ratios: dict[str, tuple[float, ...]] = {}
     failed = []
     for body_name, body in on.items():
-        for cause, (drive, ask) in _mechanisms(body, h, progress).items():
+        for cause, settled in _mechanisms(body, h, progress).items():
             mechanism = f"{label(body_name)}: {cause}"
             for k, (name, tacton) in enumerate(chosen):
                 progress(mechanism, k / (len(chosen) + 1))
-                scene = _scene(name, tacton, body, drive)
                 try:
-                    found = _levels(scene.pressure, _later_half(ask(scene)))
+                    found = _levels(*settled(tacton))
                 except ArithmeticError as error:
                     failed.append(f"{name} on {mechanism}: {error}")
                     continue
                 for line, level in found.items():
                     levels.setdefault((name, line), {})[mechanism] = level
             quieter = (replace(still, amplitude=amplitude) for amplitude in AMPLITUDES)
-            scenes = (_scene("amplitude", tacton, body, drive) for tacton in quieter)
-            ratios[mechanism] = tuple(_ratio(_later_half(ask(scene))) for scene in scenes)
+            ratios[mechanism] = tuple(_ratio(settled(tacton)[1]) for tacton in quieter)
     return Findings(levels=levels, ratios=ratios, failed=tuple(failed))
 
 
-def _mechanisms(
-    body: Body, h: float | None, progress: Progress
-) -> Mapping[str, tuple[str, Callable[[Scene], Response]]]:
-    """Mechanism -> drive law, and the function that computes a scene's response with it."""
+Settled = Callable[[Tacton], tuple[MovingPressure, Response]]
+
+
+def _mechanisms(body: Body, h: float | None, progress: Progress) -> Mapping[str, Settled]:
+    """By mechanism the function that computes a Tacton's settled response with it."""
+
+    def by(solve: Callable[[Scene], Response], drive: str) -> Settled:
+        return partial(_settled, solve, body, drive)
+
     if not body.of_kind.is_plate:
         linear = partial(answer, prepare(body, np.array(PROBES), progress, h=h))
-        return {"linear load": ("linear", linear), "squared load": ("pressure_squared", linear)}
+        return {
+            "linear load": by(linear, "linear"),
+            "squared load": by(linear, "pressure_squared"),
+        }
     bending, stretching = (partial(compute, model=each.name) for each in (FROM_REST, STRETCHED))
     return {
-        "linear load": ("linear", bending),
-        "squared load": ("pressure_squared", bending),
-        "squared load, stretching": ("pressure_squared", stretching),
+        "linear load": by(bending, "linear"),
+        "squared load": by(bending, "pressure_squared"),
+        "squared load, stretching": by(stretching, "pressure_squared"),
     }
 
 
-def _scene(name: str, tacton: Tacton, body: Body, drive: str) -> Scene:
-    return Scene(name=name, pressure=MovingPressure(tacton=tacton, drive=drive), body=body)
-
-
-def _later_half(response: Response) -> Response:
-    """The later half of a response, after the transient."""
-    times, half = response.times, len(response.times) // 2
-    later = response.values[half:]
-    return replace(response, times=times[half:] - times[half], values=later)
+def _settled(
+    solve: Callable[[Scene], Response], body: Body, drive: str, tacton: Tacton
+) -> tuple[MovingPressure, Response]:
+    """The load of a Tacton, and the later half of the response, after the transient."""
+    pressure = MovingPressure(tacton=tacton, drive=drive)
+    response = solve(Scene(pressure=pressure, body=body))
+    half = len(response.times) // 2
+    times = response.times[half:] - response.times[half]
+    return pressure, replace(response, times=times, values=response.values[half:])
 
 
 def _levels(pressure: MovingPressure, later: Response) -> dict[str, float]:
@@ -160,8 +151,7 @@ def load_ratios() -> dict[str, tuple[float, ...]]:
 
 def sentences(found: Findings) -> list[str]:
     """Conclusions: lines explained, lines not explained, and the experiment that would decide."""
-    said = []
-    low = f"{100 * AMPLITUDES[0]:.0f}"
+    said, low = [], f"{100 * AMPLITUDES[0]:.0f}"
     for mechanism, ratios in found.ratios.items():
         if max(ratios) < NEGLIGIBLE_RATIO:
             said.append(f"{mechanism}: no 2 f_AM at any amplitude.")
@@ -187,30 +177,34 @@ def sentences(found: Findings) -> list[str]:
 def report(found: Findings) -> Report:
     """The page: conclusions, ratio over amplitude, lines by mechanism, and patterns of loads."""
     caption = "Ratio of 2 f_AM to f_AM at the focus over the amplitude of the drive."
-    mechanisms = [*found.ratios]
-    by_mechanism = [Column(each, unit="dB", digits=2) for each in mechanisms]
+    by_mechanism = [Column(each, unit="dB", digits=2) for each in found.ratios]
     levels = Table(
         ["Tacton", "line", *by_mechanism],
-        [[*key, *map(partial(_shown, own), mechanisms)] for key, own in found.levels.items()],
+        [
+            [*key, *(_shown(own, each) for each in found.ratios)]
+            for key, own in found.levels.items()
+        ],
         name="lines",
     )
     ratios = Table(
-        ["mechanism", *(Column(f"{100 * each:.0f} %") for each in AMPLITUDES)],
+        ["mechanism", *(f"{100 * each:.0f} %" for each in AMPLITUDES)],
         [[mechanism, *own] for mechanism, own in found.ratios.items()], name="ratios",
     )  # fmt: skip
     patterns = Table(
         ["load", "2f / f", "3f / f", "4f / f"], [[n, *own] for n, own in load_ratios().items()]
     )
+    said = sentences(found)
     return Report(
         title="Paper and skin: which mechanism makes which line",
-        verdict=[*sentences(found), *(f"Failed: {said}." for said in found.failed)],
+        verdict=said[-2:],
         parts=[
+            *said[:-2], *(f"Failed: {each}." for each in found.failed),
             Picture(png(figure(found), dpi=130), caption, name="amplitude"),
-            Section("Lines by mechanism", [levels]),
-            Section("2 f_AM over f_AM by amplitude", [ratios]),
-            Section("Patterns of loads", [patterns]),
+            Details("2 f_AM over f_AM by amplitude", [ratios]),
+            Details("Lines by mechanism", [levels]),
+            Details("Patterns of loads", [patterns]),
         ],
-    )
+    )  # fmt: skip
 
 
 def _shown(levels: Mapping[str, float], mechanism: str) -> float | None:

@@ -1,11 +1,10 @@
 """The main job: Tactons on several bodies, compared, in one folder."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 
 from simple_model import Response
@@ -13,7 +12,6 @@ from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.measure import comparison_page
 from skinwave.measure.comparison import (
     Measured,
-    MeasuredComparison,
     beside,
     compare_measured,
     in_quantity,
@@ -24,18 +22,17 @@ from skinwave.models.limits import check_taken
 from skinwave.models.linear_elements import FEM
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import ReducedBody, answer, prepare
-from skinwave.planning.assessment import Coarser, assessed, coarser_body
+from skinwave.planning.assessment import assessed, coarser_body
 from skinwave.planning.plan import chosen_model, plan
 from skinwave.planning.simulate import compute, solve
-from skinwave.results.claims import claimed, evaluate, write_claims
+from skinwave.results.claims import AssessedClaim, claimed, evaluate, write_claims
 from skinwave.results.files import write_lines, write_responses, write_run
 from skinwave.results.run import Run
 from skinwave.results.surface import has_wavenumber_integral
 from skinwave.scene import paper15
 from skinwave.scene.scene import BODIES, Body, Scene, body_name, check_load, with_body
-from skinwave.studies import study_page
-from skinwave.studies.changes import Drawn, Maps, first_of, quick_maps, shown, slow_maps
-from skinwave.studies.study_page import StudyOutcome
+from skinwave.studies.changes import Drawn, first_of, quick_maps, shown, slow_maps
+from skinwave.studies.pages import Gallery, efforts_of, page_of
 from skinwave.system import document
 from skinwave.system.effort import Progress, one_thread, peak_memory
 from skinwave.system.processes import pool
@@ -44,7 +41,24 @@ from skinwave.system.processes import pool
 COMPLETE = (
     "flat-body-harmonic", "flat-body", "plate-modes-transient", "fem", "plate-modes-nonlinear",
 )  # fmt: skip
-SLOW = 3.0  # s of a model: from there on responses are computed in two processes
+ABOUT = (
+    "The point-kernel model of Lim, Seifi and Park (CHI EA '24, doi 10.1145/3613905.3650981), as "
+    "published and under the load that the bodies receive, beside the motion of these bodies. "
+    "Amplitudes of all lines are in lines.csv, waveforms in responses.npz; each run's folder has "
+    "its scene."
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyOutcome:
+    """Outcome of a comparison: assessed claims, warnings, cost, and how much of it was done."""
+
+    assessed_claims: list[AssessedClaim]
+    warnings: list[str]
+    runs: int
+    planned: int
+    seconds: float
+    peak_memory: int
 
 
 def paper_scenes(bodies: Mapping[str, Body] | None = None) -> dict[str, dict[str, Scene]]:
@@ -84,83 +98,65 @@ def run_study(
     more: Sequence[document.Part] = (),
 ) -> StudyOutcome:
     """Run every scene, writing each run as it is finished, then the tables and the page; with a
-    measurement beside the models, if there is one of that Tacton. The page has `more` parts before
-    its effort.
+    measurement beside the models, if there is one of that Tacton. The page has `more` parts.
 
     Each body has one model: the given one, or of those that plans take for its scenes the one that
     leaves out least; elements if their size h in metre is given. An interrupt ends the runs early;
     those that are finished are still compared and written.
     """
-    SolveOptions(solver=solver, h=h)  # which refuses what is out of range
+    options = SolveOptions(solver=solver, h=h)
     models = _models(scenes, FEM.name if h and model == "auto" else model, h)
-    started = time.perf_counter()
-    with pool(1) as aside, one_thread():
-        how = _How(models=models, h=h, solver=solver)
-        bodies = _begun_bodies(scenes, aside, progress, how)
-        begun = _begun_responses(scenes, aside, how)
-        maps = _begun_maps(scenes, aside, progress, how)
-        figures: dict[str, Future[bytes]] = {}
-        drawn: dict[str, list[Run]] = {}
-        found: list[MeasuredComparison] = []
-
-        def finished(name: str, group: list[Run], prepared: Mapping[str, ReducedBody]) -> None:
-            drawn[name] = group
-            if measured:
-                asked = measured.measurement.quantity
-                runs = [in_quantity(run, asked, prepared) for run in group]
-                found.append(compare_measured(measured, runs))
-                drawn[name] = beside(found[-1], runs)
-            figures[name] = aside.submit(study_page.tacton_png, name, drawn[name])
-
-        groups, prepared = _answered(scenes, folder, bodies, begun, progress, how, finished)
-        drawn = {**groups, **drawn}
-        figures["overview"] = aside.submit(study_page.overview_png, drawn)
+    started, planned = time.perf_counter(), sum(map(len, scenes.values()))
+    groups: dict[str, list[Run]] = {}
+    prepared: dict[str, ReducedBody] = {}
+    with one_thread(), pool(2) as workers:
+        maps = {
+            scene.body: workers.submit(slow_maps, scene, h, solver)
+            for scene in scenes[first_of(scenes)].values()
+            if scene.body.of_kind.discretise and scene.reading.is_plain
+            and not has_wavenumber_integral(scene)
+        }  # fmt: skip
+        with suppress(KeyboardInterrupt):
+            for run in _runs(scenes, models, options, prepared, progress, workers):
+                write_run(folder / run.tacton / run.column, run)
+                groups.setdefault(run.tacton, []).append(run)
+        if not groups:
+            raise KeyboardInterrupt
         runs = [run for group in groups.values() for run in group]
-        outcome = StudyOutcome(
-            assessed_claims=evaluate(claimed(runs)),
-            warnings=document.worst_warnings(study_page.efforts(runs)),
-            runs=len(runs),
-            planned=sum(map(len, scenes.values())),
-        )
         progress("write tables", 0.0)
-        write_claims(folder / "claims.csv", outcome.assessed_claims)
+        assessed_claims = evaluate(claimed(runs))
+        write_claims(folder / "claims.csv", assessed_claims)
         write_lines(folder / "lines.csv", runs)
         by_name = {f"{r.tacton}/{r.body}/{r.model}": r for r in runs}
         write_responses(folder / "responses.npz", by_name)
         first = None
         with suppress(KeyboardInterrupt):
-            first = shown(groups, maps) if outcome.runs == outcome.planned else None
-            if first and found:
-                first = replace(first, measured=measured_places(found[-1]))
-        parts = study_page.page_parts(groups, drawn, first, outcome, progress, figures)
-        for comparison in found:
-            comparison_page.write_tables(folder, comparison)
-            parts.insert(0, comparison_page.page_part(comparison, study_page.picture))
-        spent = replace(
-            outcome,
-            seconds=time.perf_counter() - started,
-            peak_memory=peak_memory() + aside.submit(peak_memory).result(),
+            if len(runs) == planned:
+                first = shown(groups, lambda run: _maps(run, maps, progress))
+    parts: list[document.Part] = []
+    figures: dict[str, Sequence[Run]] = dict(groups)
+    for name, group in groups.items() if measured else ():
+        assert measured
+        asked = measured.measurement.quantity
+        comparison = compare_measured(
+            measured, [in_quantity(run, asked, prepared) for run in group]
         )
-        parts += [
-            *more,
-            study_page.effort_section(groups, prepared, spent),
-            study_page.again(command),
-        ]
-    document.Report(title, parts=parts, pictures=study_page.FIGURES).write(folder)
-    return spent
-
-
-@dataclass(frozen=True, kw_only=True)
-class _How:
-    """By column the model, and the element size in metre and solver that are asked for."""
-
-    models: Mapping[str, str]
-    h: float | None
-    solver: str
-
-    def is_reduced(self, column: str) -> bool:
-        """Whether a column is of bodies that are reduced once for all Tactons."""
-        return named(self.models[column]).is_reduced
+        comparison_page.write_tables(folder, comparison)
+        parts.append(comparison_page.page_part(comparison, Gallery().figure))
+        figures[name] = beside(comparison, [column.run for column in comparison.columns])
+        first = replace(first, measured=measured_places(comparison)) if first else None
+    page_of(
+        title, groups, first, Gallery(), figures=figures, progress=progress,
+        seen=[*more, *parts] if len(runs) == planned else
+        [f"Interrupted: {len(runs)} of {planned} runs are finished and shown.", *more, *parts],
+        modelled=[ABOUT], seconds=time.perf_counter() - started,
+        again=[f"{command}; or, for one run, skinwave run TACTON/BODY/scene.toml in this folder."],
+    ).write(folder)  # fmt: skip
+    return StudyOutcome(
+        assessed_claims=assessed_claims, warnings=document.worst_warnings(efforts_of(runs)),
+        runs=len(runs), planned=planned, seconds=time.perf_counter() - started,
+        peak_memory=max(peak_memory(), *(run.response.effort.peak_memory for run in runs)),
+    )  # fmt: skip
 
 
 def _models(
@@ -189,133 +185,51 @@ def _completeness(model: str) -> int:
     return COMPLETE.index(model) if model in COMPLETE else -1
 
 
-Bodies = Callable[[Scene], tuple[ReducedBody, Coarser]]  # reduced, and the one on a coarser mesh
-
-
-def _begun_bodies(
-    scenes: Mapping[str, Mapping[str, Scene]], aside: Executor, progress: Progress, how: _How
-) -> Bodies:
-    """Reduced bodies: the last is reduced here when it is first asked for; meanwhile the others and
-    the coarser ones that responses are assessed by, are reduced in other processes.
+def _runs(
+    scenes: Mapping[str, Mapping[str, Scene]], models: Mapping[str, str], options: SolveOptions,
+    prepared: dict[str, ReducedBody], progress: Progress, workers: Executor,
+) -> Iterator[Run]:  # fmt: skip
+    """Every run, in order. Bodies are reduced here, into `prepared`, once for all Tactons; the
+    coarser ones that give their errors, and all other responses, are computed by the workers.
     """
-    h, solver = how.h, how.solver
-    every = [each for group in scenes.values() for each in group.items()]
-    solids = {s.body: (column, s) for column, s in every if how.is_reduced(column)}
-    others, last = list(solids)[:-1], next(reversed(solids), None)
-    begun = {body: aside.submit(_prepared, solids[body][1], h, solver) for body in others}
-    coarse = {
-        body: aside.submit(coarser_body, scene, SolveOptions(h=h, solver=solver))
-        for body, (_, scene) in solids.items()
+    every = [(name, column, s) for name, group in scenes.items() for column, s in group.items()]
+    reduced = {column for column, model in models.items() if named(model).is_reduced}
+    coarse = {s.body: s for _, column, s in every if column in reduced}
+    begun = {body: workers.submit(coarser_body, s, options) for body, s in coarse.items()}
+    others = {
+        (name, column): workers.submit(_response, scene, replace(options, model=models[column]))
+        for name, column, scene in every
+        if column not in reduced
     }
-
-    @lru_cache
-    def here() -> ReducedBody:
-        assert last
-        column, scene = solids[last]
-
-        def named(phase: str, fraction: float) -> None:
-            progress(f"{column}: {phase}", fraction)
-
-        return _prepared(scene, h, solver, named)
-
-    def bodies(scene: Scene) -> tuple[ReducedBody, Coarser]:
-        mine = here()  # before anything is waited for
-        found = begun[scene.body].result() if scene.body in begun else mine
-        return found, coarse[scene.body].result()
-
-    return bodies
+    for k, (name, column, scene) in enumerate(every):
+        if column in reduced:
+            body = prepared.get(column) or _prepared(scene, column, options, progress)
+            prepared[column] = body
+            found, coarser = answer(body, scene), begun[scene.body].result()
+            response = assessed(scene, found, body, options, compared=coarser)
+        else:
+            response = others[name, column].result()
+        progress(f"response of {name} by {column}", (k + 1) / len(every))
+        body_of = column if scene.body.of_kind.discretise else "none"
+        yield Run(tacton=name, body=body_of, scene=scene, response=response)
 
 
-def _prepared(
-    scene: Scene, h: float | None, solver: str, progress: Progress | None = None
-) -> ReducedBody:
+def _prepared(scene: Scene, column: str, options: SolveOptions, progress: Progress) -> ReducedBody:
     return prepare(
-        scene.body, scene.probe_points, progress, h=h, solver=solver, reading=scene.reading
-    )
+        scene.body, scene.probe_points,
+        lambda phase, fraction: progress(f"{column}: {phase}", fraction),
+        h=options.h, solver=options.solver, reading=scene.reading,
+    )  # fmt: skip
 
 
-def _begun_responses(
-    scenes: Mapping[str, Mapping[str, Scene]], aside: Executor, how: _How
-) -> dict[Scene, Future[Response]]:
-    """Responses of slow models without a reduced body. The last are begun first, aside, while the
-    first are computed here.
-    """
-    slow = [
-        (scene, how.models[column])
-        for group in scenes.values() for column, scene in group.items()
-        if not how.is_reduced(column) and named(how.models[column]).seconds > SLOW
-    ]  # fmt: skip
-    return {
-        scene: aside.submit(_response, scene, model, how.h, how.solver)
-        for scene, model in reversed(slow)
-    }
-
-
-def _response(scene: Scene, model: str, h: float | None, solver: str) -> Response:
+def _response(scene: Scene, options: SolveOptions) -> Response:
     if not scene.body.of_kind.discretise:
-        return compute(scene, model)
-    return solve(scene, plan(scene, SolveOptions(model=model, h=h, solver=solver)))
+        return compute(scene, options.model)
+    return solve(scene, plan(scene, options))
 
 
-def _begun_maps(
-    scenes: Mapping[str, Mapping[str, Scene]], aside: Executor, progress: Progress, how: _How
-) -> Maps:
-    """Maps of the Tacton that is shown first; slow ones are begun at once, aside."""
-    begun = {
-        scene.body: aside.submit(slow_maps, scene, how.h, how.solver)
-        for scene in scenes[first_of(scenes)].values()
-        if scene.body.of_kind.discretise and scene.reading.is_plain
-        and not has_wavenumber_integral(scene)
-    }  # fmt: skip
-
-    def maps(run: Run) -> Drawn:
-        if run.scene.body not in begun:
-            return quick_maps(run)
-        progress(f"map of {run.column}", 0.0)
-        return begun[run.scene.body].result()
-
-    return maps
-
-
-def _answered(
-    scenes: Mapping[str, Mapping[str, Scene]],
-    folder: Path,
-    bodies: Bodies,
-    begun: Mapping[Scene, Future[Response]],
-    progress: Progress,
-    how: _How,
-    finished: Callable[[str, list[Run], Mapping[str, ReducedBody]], None],
-) -> tuple[dict[str, list[Run]], dict[str, ReducedBody]]:
-    """Every run, both kernels of all Tactons first, and the reduced bodies behind them; `finished`
-    is called with each Tacton as soon as its runs are there.
-    """
-    groups: dict[str, list[Run]] = {}
-    prepared: dict[str, ReducedBody] = {}
-    every = [(name, column, scene) for name, g in scenes.items() for column, scene in g.items()]
-    quick = sorted(every, key=lambda each: (how.is_reduced(each[1]), each[2] in begun))
-    with suppress(KeyboardInterrupt):
-        for k, (name, column, scene) in enumerate(quick):
-            if how.is_reduced(column):
-                prepared[column], coarser = bodies(scene)
-                found = answer(prepared[column], scene)
-                response = assessed(
-                    scene,
-                    found,
-                    prepared[column],
-                    SolveOptions(h=how.h, solver=how.solver),
-                    compared=coarser,
-                )
-            elif scene in begun and not begun[scene].cancel():
-                response = begun[scene].result()
-            else:
-                response = _response(scene, how.models[column], how.h, how.solver)
-            body = column if scene.body.of_kind.discretise else "none"
-            run = Run(tacton=name, body=body, scene=scene, response=response)
-            write_run(folder / name / column, run)
-            groups.setdefault(name, []).append(run)
-            if len(groups[name]) == len(scenes[name]):
-                finished(name, groups[name], prepared)
-            progress(f"response of {name} by {column}", (k + 1) / len(every))
-    if not groups:
-        raise KeyboardInterrupt
-    return groups, prepared
+def _maps(run: Run, begun: Mapping[Body, Future[Drawn]], progress: Progress) -> Drawn:
+    if run.scene.body not in begun:
+        return quick_maps(run)
+    progress(f"map of {run.column}", 0.0)
+    return begun[run.scene.body].result()

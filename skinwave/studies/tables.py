@@ -1,4 +1,4 @@
-"""Tables of runs for pages: lines, claims, agreement, cost."""
+"""Tables of runs for pages: lines, claims, agreement, effort."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
@@ -6,9 +6,8 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import Effort
-from simple_model.numbers import FAINTEST, counted, decibel, significant
+from simple_model.numbers import FAINTEST, counted, decibel, interval, percent, significant
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
-from skinwave.report import description
 from skinwave.report.figures import answered
 from skinwave.report.levels import sensation_levels, strongest_probe
 from skinwave.report.palette import label
@@ -16,23 +15,37 @@ from skinwave.results.claims import TEXTS, AssessedClaim
 from skinwave.results.comparison import compare, moving_rms
 from skinwave.results.propagation import strongest_component
 from skinwave.results.run import Run
-from skinwave.system.document import Markup, Part, Section
+from skinwave.system.document import Details, Markup, Part, Section
 from skinwave.system.table import Column, Table
 
 SILENT = 0.01  # of the strongest probe: where the reference moves less, no misfit is given
 ROUND_OFF = 1e-3  # of a millisecond, or of a misfit
 TABLED = 12  # lines in the table
 NEGLIGIBLE_LINE = 1e-9  # of the strongest line
+LEVELS = (
+    "Levels are relative to f_AM at the same probe, and those of the probe where that is largest, "
+    "which may be one where f_AM is weak."
+)
+AGREEMENT = (
+    "Tacton", "what changes", "from, to", "waveform misfit at the best scale",
+    "misfit at the best gain and delay", "delay over the probes, ms",
+    "phase delay of the strongest component, ms", "spread over the probes at -6 / -20 dB, mm",
+)  # fmt: skip
+EFFORT = (
+    "body", "dofs", "reduced to", Column("estimated reduction error", digits=2),
+    Column("relative energy imbalance", digits=1), "share of loss radiated", "solver",
+    "time by phase", "peak memory so far, GiB",
+)  # fmt: skip
 
 
 def lines_table(runs: Sequence[Run]) -> list[Part]:
     """Lines of each model at the probe that moves most, the strongest of any first, each model's in
     the unit of its quantity.
     """
-    probe, said = strongest_probe(runs), description.unresolved(runs)
+    probe = strongest_probe(runs)
     known = [name for name in runs[0].listed if all(name in run.listed for run in runs)]
     if not known and not any(run.unnamed for run in runs):
-        return [*(said or ["A constant pressure on a focus at rest has no line."])]
+        return ["No line of the load is resolved: see above, or the pressure is constant."]
     share = {name: max(_share(run, name, probe) for run in runs) for name in known}
     names = sorted(share, key=lambda name: -share[name])[:TABLED]
     sensation = [sensation_levels(run, probe) for run in runs]
@@ -47,8 +60,8 @@ def lines_table(runs: Sequence[Run]) -> list[Part]:
         columns += [f"{answered(run)}, {run.response.record.shown} peak"]
         columns += ["dB re threshold"] if run.is_skin else []
     x, y = 1e3 * runs[0].response.probes[probe]
-    table = Table(columns, [*rows, *_unnamed_rows(runs, probe)])
-    return [Section(f"Lines at ({x:g}, {y:g}) mm", [table, *said], level=3)]
+    title = f"{runs[0].tacton}: lines at ({x:g}, {y:g}) mm"
+    return [Section(title, [Table(columns, [*rows, *_unnamed_rows(runs, probe)])], level=3)]
 
 
 def _share(run: Run, name: str, probe: int) -> float:
@@ -74,31 +87,65 @@ def _unnamed_rows(runs: Sequence[Run], probe: int) -> Iterator[list[object]]:
     for kind, frequency in sorted(found):
         row: list[object] = [kind, f"{frequency:.1f}"]
         for run in runs:
-            sizes: list[object] = [run.response.record.per_unit * float(peak.amplitudes[probe])
-                     for peak in run.unnamed[:TABLED]
-                     if (peak.kind, round(peak.frequency, 1)) == (kind, frequency)]  # fmt: skip
+            sizes: list[object] = [
+                run.response.record.per_unit * float(peak.amplitudes[probe])
+                for peak in run.unnamed[:TABLED]
+                if (peak.kind, round(peak.frequency, 1)) == (kind, frequency)
+            ]
             row += [*(sizes[:1] or [""]), *([""] if run.is_skin else [])]
         yield row
 
 
-def claims_table(assessed_claims: Sequence[AssessedClaim]) -> Table:
-    """Claims down, kernels and bodies across: holds or fails, and the number that decides."""
+def claims_parts(assessed_claims: Sequence[AssessedClaim]) -> list[Part]:
+    """Which of the paper's claims hold where: a grid of marks, and the numbers that decide."""
+    if not assessed_claims:
+        return []
     columns = list(dict.fromkeys(v.column for v in assessed_claims))
     found = {(v.claim, v.column): v for v in assessed_claims}
-    rows = [
-        [f"{claim}: {TEXTS[claim]}", *(_assessed(found.get((claim, c))) for c in columns)]
-        for claim in TEXTS
-        if any(claim == assessed.claim for assessed in assessed_claims)
-    ]
-    return Table(["claim", *map(label, columns)], rows)
+    claims = [claim for claim in TEXTS if any(claim == v.claim for v in assessed_claims)]
+    marks, numbers = [], []
+    for claim in claims:
+        own = [found.get((claim, column)) for column in columns]
+        marks.append([f"{claim}: {TEXTS[claim]}", *map(_mark, own)])
+        numbers.append([claim, *(v.sentence if v else None for v in own)])
+    names = list(map(label, columns))
+    decide = [LEVELS, Table(["claim", *names], numbers), *_disagreements(assessed_claims)]
+    return [
+        Section("Claims of the paper", [
+            Table(["claim (Lim, Seifi and Park, CHI EA '24)", *names], marks),
+            Details("Numbers that decide", decide),
+        ])
+    ]  # fmt: skip
 
 
-def _assessed(assessed: AssessedClaim | None) -> str:
+def _mark(assessed: AssessedClaim | None) -> Markup | None:
     if assessed is None:
-        return "not assessed"
-    kind, word = ("yes", "holds") if assessed.holds else ("no", "fails")
-    template = Markup('<span class="{}">{}</span><br><small>{}</small>')
-    return template.format(kind, word, assessed.sentence)
+        return None
+    kind, mark = ("yes", "✓ holds") if assessed.holds else ("no", "✗ fails")
+    return Markup('<span class="{}" title="{}">{}</span>').format(kind, assessed.sentence, mark)
+
+
+def _disagreements(assessed_claims: Sequence[AssessedClaim]) -> list[Part]:
+    """Claims measured on paper that a body contradicts, and whether propagation is the cause."""
+    of_kernel = {v.claim: v for v in assessed_claims if v.model == SAME_LOAD.name}
+    texts: list[Part] = []
+    for assessed in assessed_claims:
+        if assessed.body == "none" or not assessed.claim.startswith("M") or assessed.holds:
+            continue
+        text = (
+            f"The {label(assessed.body)} contradicts {assessed.claim}, which was measured on "
+            f"paper: {assessed.sentence}."
+        )
+        kernel = of_kernel.get(assessed.claim)
+        if kernel is not None and assessed.claim != "M2":  # which is about places, in Hz
+            same = "holds" if kernel.holds else "fails, too"
+            text += (
+                f" In the point kernel under the same load it {same}: "
+                f"{decibel(kernel.value)} dB there, {decibel(assessed.value)} dB here. The "
+                "difference is due to propagation."
+            )
+        texts.append(text)
+    return texts
 
 
 def agreement_table(runs: Mapping[str, Sequence[Run]]) -> Table:
@@ -108,23 +155,19 @@ def agreement_table(runs: Mapping[str, Sequence[Run]]) -> Table:
     rows = [
         [name, changed, f"{label(a.column)} to {label(b.column)}", *_agreement(a, b)]
         for name, group in runs.items()
-        for changed, a, b in pairs(group)
+        for changed, a, b in _pairs(group)
     ]
-    columns = ["Tacton", "what changes", "from, to", "waveform misfit at the best scale"]
-    columns += ["misfit at the best gain and delay", "delay over the probes, ms"]
-    columns += ["phase delay of the strongest component, ms"]
-    return Table([*columns, "spread over the probes at -6 / -20 dB, mm"], rows)
+    return Table(AGREEMENT, rows)
 
 
-def pairs(group: Iterable[Run]) -> list[tuple[str, Run, Run]]:
+def _pairs(group: Iterable[Run]) -> list[tuple[str, Run, Run]]:
     """Name of the change, and the two runs between which it is made."""
     found = {run.column: run for run in group}
     kernel, published = found.get(SAME_LOAD.name), found.get(PUBLISHED.name)
     if kernel is None:
         return []
-    bodies = [run for run in found.values() if run.is_motion]
     first = [("drive law and focus", published, kernel)] if published else []
-    return first + [("propagation", kernel, run) for run in bodies]
+    return first + [("propagation", kernel, run) for run in found.values() if run.is_motion]
 
 
 def _agreement(a: Run, b: Run) -> list[str]:
@@ -132,13 +175,14 @@ def _agreement(a: Run, b: Run) -> list[str]:
     found = compare(a.response, b.response, (strongest.frequency,) if strongest else ())
     delays = found.phase_delay[0] if strongest else np.array([np.nan])
     level = moving_rms(a.response)
-    heard = level > SILENT * level.max()  # a misfit relative to nothing is none
+    moves = level > SILENT * level.max()  # a misfit relative to nothing is none
+    spreads = (found.spread_reference, found.spread_candidate)
     return [
-        _between(found.relative_l2[heard]),
-        _between(found.shape_misfit[heard]),
-        _between(1e3 * found.delay[heard]),
+        _between(found.relative_l2[moves]),
+        _between(found.shape_misfit[moves]),
+        _between(1e3 * found.delay[moves]),
         _between(1e3 * delays[np.isfinite(delays)]),
-        f"{_spread(found.spread_reference)} to {_spread(found.spread_candidate)}",
+        " to ".join(f"{1e3 * each[-6]:g} / {1e3 * each[-20]:g}" for each in spreads),
     ]
 
 
@@ -146,29 +190,19 @@ def _between(values: Floats) -> str:
     """The least and the largest."""
     if not len(values):
         return "-"
-    values = np.where(np.abs(values) < ROUND_OFF, 0.0, values)
-    low, high = (significant(float(v) + 0.0, 2) for v in (values.min(), values.max()))
-    return low if low == high else f"{low} to {high}"
-
-
-def _spread(spread: dict[int, float]) -> str:
-    return f"{1e3 * spread[-6]:g} / {1e3 * spread[-20]:g}"
-
-
-EFFORT_COLUMNS = (
-    "body", "dofs", "reduced to", Column("estimated reduction error", digits=2),
-    Column("relative energy imbalance", digits=1), "share of loss radiated", "solver",
-    "time by phase", "peak memory so far, GiB",
-)  # fmt: skip
+    values = np.where(np.abs(values) < ROUND_OFF, 0.0, values) + 0.0
+    low, high = float(values.min()), float(values.max())
+    alike = significant(low, 2) == significant(high, 2)
+    return significant(low, 2) if alike else interval(low, high)
 
 
 def effort_table(
     efforts: Mapping[str, Effort], tactons: int, total: float | None = None
 ) -> list[Part]:
-    """Seconds by phase, size and memory of each reduced body, and of the whole."""
+    """Seconds by phase, size and memory of each body, and of the whole."""
     rows = [
         [label(name), effort.dofs, effort.reduced_dofs, effort.estimate, effort.energy_imbalance,
-         f"{100 * effort.radiated:.0f} %", effort.solver,
+         percent(effort.radiated), effort.solver,
          ", ".join(f"{phase} {seconds:.1f} s" for phase, seconds in effort.seconds.items()),
          effort.peak_memory / 2**30]
         for name, effort in efforts.items()
@@ -178,4 +212,4 @@ def effort_table(
     peak = max((effort.peak_memory for effort in efforts.values()), default=0) / 2**30
     spent = sum(s for e in efforts.values() for s in e.seconds.values()) if total is None else total
     took = f"{counted(tactons, 'Tacton')} took {spent:.0f} s in all"
-    return [Table(EFFORT_COLUMNS, rows), f"{took}, at most {peak:.2f} GiB in a process. {named}"]
+    return [Table(EFFORT, rows), f"{took}, at most {peak:.2f} GiB in a process. {named}"]

@@ -1,8 +1,8 @@
 """Pages: a `Report` is a title, a verdict and parts, written as one HTML file.
 
-Parts are text (a paragraph each), `Table`, `Picture`, `Section`, `Details` or `Markup`. Templates
-are those of Jinja in `templates/`, which escape text wherever it enters a page; only `Markup` is
-taken as it is. It is made of templates and literals alone: see its `format` and `join`.
+Parts are text (a paragraph each), `Table`, `Picture`, `Section`, `Details`, `Choice` or `Markup`.
+Templates are those of Jinja in `templates/`, which escape text wherever it enters a page; only
+`Markup` is taken as it is. It is made of templates and literals alone: see its `format` and `join`.
 """
 
 import hashlib
@@ -57,7 +57,8 @@ class Section:
 
     def html(self) -> Markup:
         """Heading and parts."""
-        return part("section", self.heading, self.level, list(map(_html, self.parts)))
+        parts = list(map(_html, self.parts))
+        return part("section", self.heading, self.level, parts, _anchor(self.heading))
 
 
 @dataclass(frozen=True)
@@ -69,10 +70,28 @@ class Details:
 
     def html(self) -> Markup:
         """Summary and parts."""
-        return part("details", self.summary, list(map(_html, self.parts)))
+        return part("details", self.summary, list(map(_html, self.parts)), _anchor(self.summary))
 
 
-Part = str | Table | Picture | Section | Details
+@dataclass(frozen=True)
+class Choice:
+    """Parts by name, of which a reader sees one at a time; `name` is that of the choice."""
+
+    name: str
+    options: "Mapping[str, Part]"
+
+    @property
+    def parts(self) -> "Sequence[Part]":
+        """All parts."""
+        return list(self.options.values())
+
+    def html(self) -> Markup:
+        """A button for each part, and the part that is chosen."""
+        shown = [(name, _html(each)) for name, each in self.options.items()]
+        return part("choice", self.name, shown) if len(shown) > 1 else shown[0][1]
+
+
+Part = str | Table | Picture | Section | Details | Choice
 
 
 @dataclass(frozen=True)
@@ -89,7 +108,8 @@ class Report:
 
     def html(self) -> str:
         """The page, complete with its policy."""
-        parts = (warnings_banner(self.efforts), *self.verdict, *self.parts)
+        verdict = (Markup('<p class="verdict">{}</p>').format(said) for said in self.verdict)
+        parts = (warnings_banner(self.efforts), *verdict, *self.parts)
         body = Markup("\n").join(map(_html, parts))
         return render("page.html", title=self.title, body=body, policy=_policy(body))
 
@@ -109,7 +129,7 @@ class Report:
 def _flat(parts: Iterable[Part]) -> Iterator[Part]:
     for each in parts:
         yield each
-        if isinstance(each, Section | Details):
+        if isinstance(each, Section | Details | Choice):
             yield from _flat(each.parts)
 
 
@@ -117,6 +137,21 @@ def _html(one: Part) -> Markup:
     if isinstance(one, Markup):
         return one
     return Markup("<p>{}</p>").format(one) if isinstance(one, str) else one.html()
+
+
+def contents(parts: Iterable[Part]) -> Markup:
+    """Links to the sections and folded parts of a page."""
+    headings = [
+        each.heading if isinstance(each, Section) else each.summary
+        for each in parts
+        if isinstance(each, Section | Details)
+    ]
+    return part("contents", [(_anchor(heading), heading) for heading in headings])
+
+
+def _anchor(heading: str) -> str:
+    """The name of a heading in links."""
+    return re.sub(r"\W+", "-", heading.lower()).strip("-")
 
 
 def live_link(file: str) -> Markup:

@@ -6,12 +6,10 @@ from typing import Any
 
 from simple_model import Effort
 
-CASE = {
-    "title": str, "source": str, "value": float, "reference": float, "error": float, "bar": float,
-    "passed": bool,
+PLAN = {
+    "rows": [{"what": str, "value": str, "reason": str}], "tolerance": float, "warnings": [str],
+    "model": str, "misfit?": float,
 }  # fmt: skip
-TRUST = {"command?": str, "model?": str, "misfit?": float, "cases?": [CASE]}
-PLAN = {"rows": [{"what": str, "value": str, "reason": str}], "tolerance": float, "warnings": [str]}
 _TABLES = {"seconds": {str: float}, "versions": {str: str}, "warnings": [str]}
 EFFORT = {
     f"{one.name}?": _TABLES.get(one.name, str if isinstance(one.default, str) else float)

@@ -26,7 +26,6 @@ TOPICS: Mapping[str, tuple[Case, ...]] = {
     for topic, module in MODULES.items()
 }
 CASES = {found.name: found for cases in TOPICS.values() for found in cases}
-QUICK = ("patch", "in-plane-shear", "moving-force", "thin-sheets")  # a second or two in all
 SCOPE = (
     "Verification asks whether the equations are solved right. Most references are closed forms, "
     "series or integrals from the literature, computed without this program's solvers. Other cases "
@@ -36,16 +35,6 @@ SCOPE = (
     "within its tolerance; the first table shows the check nearest to its tolerance."
 )
 VALUES = ("value", "reference", "error", "tolerance", "")
-
-
-def quick_results(progress: Progress) -> list[dict[str, Any]]:
-    """Run a few quick cases: title, source, verdict and worst check of each, as a report keeps."""
-    progress("verify", 0.0)
-    results = [CASES[name].run() for name in QUICK]
-    return [
-        {"title": r.case.title, "source": r.case.source, "passed": r.passed, **asdict(r.worst)}
-        for r in results
-    ]
 
 
 def run_suite(

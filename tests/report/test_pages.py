@@ -17,7 +17,7 @@ import skinwave
 from simple_model import Effort, Response
 from skinwave.commands.cli import main
 from skinwave.scene.file import loads
-from skinwave.studies import relax_page, tradeoff
+from skinwave.studies import relax, tradeoff
 from skinwave.studies.assumptions import ASSUMPTIONS
 from skinwave.studies.relax import Hierarchy, HierarchyStep
 from skinwave.studies.tradeoff import Candidate, Measured, Study
@@ -65,13 +65,12 @@ def relaxed(folder):
     failed = HierarchyStep(name="f", dropped=(), model="m", error=HOSTILE)
     scene = loads(table())
     found = Hierarchy(scene=scene, steps=(*steps, failed), side_steps=(), leave_one_out=())
-    relax_page.write(folder, found)
+    relax.write(folder, found)
 
 
 def traded(folder):
     measured = Measured(
-        candidate=Candidate(model=HOSTILE), errors=(0.1,), line_errors={HOSTILE: 0.1}, delay=0.0,
-        cold=1.0, warm=0.1, memory=1, dofs=1,
+        candidate=Candidate(model=HOSTILE), error=0.1, cold=1.0, warm=0.1, memory=1, dofs=1,
     )  # fmt: skip
     known = replace(measured, candidate=Candidate(model="fem"))
     found = Study(
@@ -101,13 +100,11 @@ def reported(folder):
     ran(folder)
     result = folder / "out"
     row = {"what": HOSTILE, "value": HOSTILE, "reason": HOSTILE}
-    plan = {"rows": [row], "tolerance": 0.05, "warnings": [HOSTILE]}
-    check = {"title": HOSTILE, "value": 1.0, "reference": 1.0, "error": 0.0, "bar": 1.0}
-    trust = {"command": HOSTILE, "model": HOSTILE, "misfit": 0.1}
-    trust["cases"] = [check | {"passed": True, "source": HOSTILE}]
+    plan = {"rows": [row], "tolerance": 0.05, "warnings": [HOSTILE], "model": HOSTILE}
+    plan["misfit"] = 0.1
     effort = json.loads((result / "effort.json").read_text())
     effort |= {"warnings": [HOSTILE], "solver": HOSTILE, "versions": {HOSTILE: HOSTILE}}
-    for name, content in (("plan", plan), ("trust", trust), ("effort", effort)):
+    for name, content in (("plan", plan), ("effort", effort)):
         (result / f"{name}.json").write_text(json.dumps(content))
     out = ["--out", str(folder / "report"), "--quiet"]
     assert main(["report", str(result), *out]) == 0

@@ -33,7 +33,7 @@ from skinwave.report.styles import style
 from skinwave.results import exports, motion, speeds, views
 from skinwave.scene.file import dumps
 from skinwave.scene.scene import Body, Scene
-from skinwave.studies import album, gallery
+from skinwave.studies import album, pages, report
 
 ONLY = "point-kernel-published,point-kernel,skin-slab"
 ARTEFACTS = Path(__file__).parents[2] / ".ci" / "artefacts"
@@ -61,7 +61,7 @@ def moved(scene):
 def folder(scene, tmp_path_factory):
     """Folder that the report of a scene is built from, on coarse meshes."""
     out = tmp_path_factory.mktemp("album")
-    asked = {"h": 0.015, "frames": 12, "beside": ["paper-sheet-loose"], "command": "as tested"}
+    asked = {"h": 0.015, "frames": 12, "beside": ["paper-sheet-loose"]}
     album.make(out, scene, lambda phase, done: None, **asked)
     return out
 
@@ -285,7 +285,7 @@ def test_text_of_vector_figures_is_text(page, name):
 def test_no_text_of_a_figure_is_cut(folder, dressed):
     kept = album.open_album(folder)
     chosen = style("report", 3.5) if dressed == "narrow" else style(dressed)
-    shown, runs = list(kept.views.values()), gallery.tactons(kept)["small"]
+    shown, runs = list(kept.views.values()), kept.groups["small"]
     figures = [maps.snapshots_figure(shown, chosen)]
     figures += [surfaces_figure(kept.scene, kept.maps, chosen)]
     figures += [tacton_figure("small", runs, chosen), levels_figure(runs, 0, chosen)]
@@ -335,10 +335,10 @@ def test_a_report_is_rebuilt_without_a_model_and_without_gl(folder, tmp_path, mo
 
     for name in ("waves", "plan", "compute", "solve", "kernel_view"):
         monkeypatch.setattr(album, name, run)
-    monkeypatch.setattr(gallery, "renderer", lambda: NO_GL)
+    monkeypatch.setattr(report, "renderer", lambda: NO_GL)
     blank = BytesIO()  # what is on the figures is looked at in those of `page`
     Image.new("RGB", (8, 8)).save(blank, "PNG")
-    monkeypatch.setattr(gallery, "drawn", lambda *figure: blank.getvalue())
+    monkeypatch.setattr(pages, "drawn", lambda *figure: blank.getvalue())
     assert main(["report", str(folder), "--out", str(tmp_path / "flat"), "--quiet"]) == 0
     text = (tmp_path / "flat/index.html").read_text()
     assert "apt install libegl1 libgl1-mesa-dri" in text

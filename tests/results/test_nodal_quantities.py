@@ -18,8 +18,8 @@ from skinwave.results import exports, motion, surface, views
 from skinwave.results.motion import shade
 from skinwave.results.run import Run
 from skinwave.scene.scene import Body, Layer, Scene
-from skinwave.studies import album, scene_report
-from skinwave.studies.gallery import Gallery
+from skinwave.studies import album, report
+from skinwave.studies.pages import Gallery
 
 draws = pytest.mark.skipif("not renderer().found", reason="nothing draws in three dimensions here")
 PATH = Trajectory(shape="circle", size=0.008, speed=5.0)
@@ -142,11 +142,8 @@ def test_a_report_keeps_and_draws_a_map_of_the_quantity_at_its_depth(
             values=np.zeros((2, 3)),
         ),
     )  # fmt: skip
-    kept = album.Album(
-        title="", scene=scene, runs=[run], views={}, planned=None, trust=None, maps={"slab": found}
-    )
-    gallery = Gallery(folder=tmp_path, style=style("report"))
-    (section,) = scene_report.mapped(kept, gallery)
+    kept = album.Album(title="", scene=scene, runs=[run], views={}, maps={"slab": found})
+    (section,) = report.mapped(kept, Gallery())
     (picture,) = section.parts
     assert f"The RMS of the {scene.reading.words} is largest at" in picture.caption
     assert len(picture.files["png"]) > 10_000

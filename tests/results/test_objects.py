@@ -418,8 +418,7 @@ def test_all_letters_of_a_figure_of_a_paper_are_of_8_points(scene):
 
 def test_chosen_columns_of_a_folder_alone():
     runs = [SimpleNamespace(column=name) for name in ("point-kernel", "skin-slab", "paper-sheet")]
-    found = Album(title="", scene=None, runs=runs, views={"skin-slab": 1, "paper-sheet": 2},
-                  planned=None, trust=None)  # fmt: skip
+    found = Album(title="", scene=None, runs=runs, views={"skin-slab": 1, "paper-sheet": 2})
     assert only(found, []).runs == runs
     chosen = only(found, ["point-kernel", "skin-slab"])
     assert [run.column for run in chosen.runs] == ["point-kernel", "skin-slab"]

@@ -183,7 +183,7 @@ def test_an_interrupted_report_keeps_finished_runs_and_says_how_to_go_on(
 
     with monkeypatch.context() as patch:
         patch.setattr("skinwave.studies.album.make", lambda *given, **options: [])
-        patch.setattr("skinwave.studies.scene_report.write_report", interrupted)
+        patch.setattr("skinwave.studies.report.write_report", interrupted)
         asked = ["report", "none.toml", "--style", "talk", "--quiet", "--out", "a report"]
         assert main(asked) == 1
     said = capsys.readouterr().err
@@ -271,7 +271,7 @@ def test_a_record_names_command_scene_model_and_files(folder):
 
 @pytest.mark.parametrize(
     "name",
-    ["CON", "Nul", "COM1", " CON ", "trailing.", "a/b", "..", "", "a:b*?<>|", "Figures",
+    ["CON", "Nul", "COM1", " CON ", "trailing.", "a/b", "..", "", "a:b*?<>|", "Pictures",
      "𠀀" * 80, "n" * 300, "\x1b[31m", "name\u202e"],
 )  # fmt: skip
 def test_any_name_is_a_safe_one_on_any_system(name):
@@ -280,7 +280,7 @@ def test_any_name_is_a_safe_one_on_any_system(name):
     assert plain.isprintable()
     assert 0 < len(plain.encode()) <= 210
     assert not {*plain} & {*'<>:"/\\|?*.'}
-    assert plain.casefold() not in ("con", "nul", "com1", "figures")
+    assert plain.casefold() not in ("con", "nul", "com1", "pictures")
 
 
 def test_names_that_differ_in_capitals_only_are_distinct():

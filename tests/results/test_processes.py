@@ -4,15 +4,13 @@ import os
 import signal
 import subprocess
 import sys
-from concurrent.futures.process import BrokenProcessPool
-from functools import partial
 from pathlib import Path
 
 import pytest
 from threadpoolctl import ThreadpoolController, threadpool_info
 
 from skinwave.system.effort import one_thread
-from skinwave.system.processes import environment, pool, side_by_side
+from skinwave.system.processes import environment, pool
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="signals differ")
 
@@ -48,22 +46,10 @@ def test_processes_end_with_the_one_that_started_them(tmp_path):
     assert not child.exists() or child.read_text().split()[2] in "ZX"
 
 
-def test_calls_side_by_side_wait_for_what_they_must():
-    calls = [partial(divmod, 1, 0), os.getpid, os.getpid, partial(os._exit, 1), os.getpid]
-    events: list[str] = []
-    for k, future in side_by_side(
-        calls, lambda k, running: k != 1 or 0 not in running, lambda k: events.append(f"begins {k}")
-    ):
-        events.append(f"ends {k}")
-        if k in (0, 3):
-            with pytest.raises((ZeroDivisionError, BrokenProcessPool)):
-                future.result()
-        else:
-            assert future.result() != os.getpid()
-    # Two at once, but the second not beside the first.
-    assert events[:2] == ["begins 0", "begins 2"]
-    assert events.index("ends 0") < events.index("begins 1")
-    assert sorted(events) == [f"{what} {k}" for what in ("begins", "ends") for k in range(5)]
+def test_each_call_of_a_renewed_pool_has_a_process_of_its_own():
+    with pool(1, renewed=True) as other:
+        calls = [other.submit(os.getpid) for _ in range(3)]
+        assert len({call.result() for call in calls} | {os.getpid()}) == 4
 
 
 def test_a_pool_gives_up_what_is_not_done_and_restores_the_environment(monkeypatch):

@@ -12,7 +12,7 @@ from simple_model.layers.dispersion import dispersion_curves
 from simple_model.layers.material import PRESETS
 from simple_model.layers.wavenumber_integral import point_response
 from simple_model.plates.sheet_waves import sheet_curves
-from skinwave.studies.driven_modes import driven_modes
+from skinwave.studies.dispersion import driven_modes
 
 WIDTH = 4.35e-3  # m, of the focal spot
 SOFT = Material(density=1000, shear_modulus=8e3, poisson=0.45, viscosity=1.0)

@@ -1,8 +1,7 @@
 """The published model's assumptions, dropped one by one."""
 
 import csv
-import json
-from concurrent.futures import Future
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -224,6 +223,7 @@ def test_the_law_of_loss_is_one_rung():
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("in_one_process")
 def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     scene = replace(SKIN, body=Body(width=0.032, height=0.032, depth=0.004))  # too thin for layers
@@ -231,38 +231,38 @@ def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, caps
         "skinwave.studies.relax.droppable",
         lambda scene: tuple(n for n in droppable(scene) if n not in ("flat", "one material")),
     )
-    # Here; each in a process of its own in `test_a_rung_that_fails_leaves_the_others`.
-    monkeypatch.setattr("skinwave.studies.relax.side_by_side", in_turn)
     (tmp_path / "scene.toml").write_text(dumps(scene))
     assert main(["relax", "scene.toml", "--element-size", "9", "--quiet"]) == 0
     coarse = "elements of 9 mm are wider than twice the standard deviation of the focal spot"
     assert coarse in capsys.readouterr().err
-    record = json.loads((tmp_path / "scene-relaxed/relax.json").read_text())
-    effects = {effect["name"]: effect for effect in record["effects"]}
-    assert [e["waveform"] for e in record["effects"]] == sorted(
-        (e["waveform"] for e in record["effects"]), reverse=True
-    )
+    out = tmp_path / "scene-relaxed"
+    effects = {row["assumption"]: row for row in rows_of(out / "effects.csv")}
+    sizes = [float(row["waveform_percent"]) for row in effects.values()]
+    assert sizes == sorted(sizes, reverse=True)
     assert set(effects) == {
         "linear drive", "sinc^2 profile", "no propagation", "little loss", "viscous loss",
         "laterally-infinite", "main lobe only", "continuous path",
     }  # fmt: skip
     # with a mean in the load its lines at multiples of f_d come from nothing
-    assert effects["linear drive"]["decibel"]["f_d"] > 40
-    assert effects["continuous path"]["waveform"] < 0.1 < effects["no propagation"]["waveform"]
+    drawn = re.search(r"(?<![2-9])f_d ([+-][\d.]+)", effects["linear drive"]["lines_db"])
+    assert float(drawn[1]) > 40
+    size = {name: float(row["waveform_percent"]) for name, row in effects.items()}
+    assert size["continuous path"] < 10 < size["no propagation"]
     # One is a side step, absorbing sides stand for an infinite body anyway, and the array's field
     # has no profile of its own.
-    told = {name for name, e in effects.items() if e["alone"] is not None}
+    told = {name for name, row in effects.items() if row["alone_percent"]}
     assert told == set(effects) - {"viscous loss", "laterally-infinite", "sinc^2 profile"}
-    assert all(step["seconds"] > 0 for step in record["steps"])
+    assert all(float(row["seconds"]) > 0 for row in rows_of(out / "steps.csv"))
     with np.load(tmp_path / "scene-relaxed/responses.npz") as kept:
         assert {"t", "probes", "as published", "laterally-infinite"} <= set(kept.files)
-    with open(tmp_path / "scene-relaxed/relax.csv", newline="") as file:
-        rows = list(csv.DictReader(file))
     # In so short a Tacton 2 f_AM is not resolved from 3 f_d - 2 f_AM.
-    assert {row["line"] for row in rows} >= {"f_AM", "2f_d", "f_d"}
-    page = (tmp_path / "scene-relaxed/index.html").read_text()
-    assert "What each assumption changes" in page
-    assert coarse in page
+    assert {row["line"] for row in rows_of(out / "relax.csv")} >= {"f_AM", "2f_d", "f_d"}
+    assert coarse in (out / "index.html").read_text()
+
+
+def rows_of(path):
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
 
 
 def test_what_follows_a_failed_rung_is_not_told_as_one_assumption():
@@ -295,20 +295,8 @@ def test_a_rung_that_fails_leaves_the_others(monkeypatch):
     assert found.effects() == []
 
 
-def in_turn(calls, may_begin, begun):
-    """What `side_by_side` yields, computed here."""
-    for k, call in enumerate(calls):
-        begun(k)
-        future = Future()
-        try:
-            future.set_result(call())
-        except (ValueError, ArithmeticError) as error:
-            future.set_exception(error)
-        yield k, future
-
-
-def test_a_body_that_steps_share_is_reduced_once_and_counts_in_each(monkeypatch, tmp_path):
-    monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
+@pytest.mark.usefixtures("in_one_process")
+def test_a_body_that_steps_share_is_reduced_once_and_counts_in_each(monkeypatch):
     small = Body(width=0.03, height=0.03, depth=0.004)
     monkeypatch.setattr(
         "skinwave.studies.relax.droppable", lambda scene: ("linear drive", "sinc^2 profile")
@@ -317,7 +305,6 @@ def test_a_body_that_steps_share_is_reduced_once_and_counts_in_each(monkeypatch,
         "skinwave.studies.relax.relaxed",
         lambda scene, dropped, **device: (replace(scene, body=small), "fem"),
     )
-    monkeypatch.setattr("skinwave.studies.relax.side_by_side", in_turn)
     monkeypatch.setattr("skinwave.studies.relax.sentences", lambda *scene, h: ())
     found = hierarchy_of(SKIN, lambda phase, done: None, h=4e-3).steps
     first, *others = [step.response.effort.seconds for step in found]
@@ -329,6 +316,7 @@ def test_a_body_that_steps_share_is_reduced_once_and_counts_in_each(monkeypatch,
         assert (step.response.values == found[0].response.values).all()
 
 
+@pytest.mark.usefixtures("in_one_process")
 def test_a_body_that_cannot_be_reduced_is_refused_on_a_coarse_mesh(monkeypatch):
     asked = []
 
@@ -340,7 +328,6 @@ def test_a_body_that_cannot_be_reduced_is_refused_on_a_coarse_mesh(monkeypatch):
 
     monkeypatch.setattr("skinwave.studies.relax.compute", not_reduced)
     monkeypatch.setattr("skinwave.studies.relax.sentences", lambda *scene, h: ())
-    monkeypatch.setattr("skinwave.studies.relax.side_by_side", in_turn)
     monkeypatch.setattr(
         "skinwave.studies.relax.droppable", lambda scene: ("linear drive", "little loss", "flat")
     )

@@ -12,8 +12,6 @@ from skinwave.results.claims import evaluate
 from skinwave.results.files import line_rows
 from skinwave.results.run import Run
 from skinwave.scene.scene import BODIES, Body, Layer, Placement, Scene
-from skinwave.studies.study_page import caption
-from skinwave.studies.summary import known_of
 from skinwave.sweeps.measures import measured
 
 LAYERS = (Layer(thickness=1e-3, material="dermis"),)
@@ -118,8 +116,6 @@ SECOND = {"second_am_frequency": 200, "superposition": (0.25, 0.75)}
 def test_a_page_says_all_that_was_commanded(tacton, row, said):
     one = run(BODIES["skin-slab"], **tacton)
     assert dict(asked_rows(one.scene))[row] == said
-    if tacton:
-        assert said in caption("one", [one])
 
 
 def test_a_page_says_how_a_body_lies_and_what_lies_above():
@@ -129,15 +125,3 @@ def test_a_page_says_how_a_body_lies_and_what_lies_above():
     one = run(body)
     assert dict(asked_rows(one.scene))["body"].endswith(said)
     assert said in modelled([one])[0]
-
-
-def test_what_is_known_of_a_material_is_that_of_its_preset():
-    """The page has the same numbers as `spreads_of`; of one's own material none is known."""
-
-    def known(body):
-        return known_of(Scene(pressure=MovingPressure(tacton=Tacton()), body=body))
-
-    words = "moduli known to a factor of 2 (90 %), losses known to a factor of 3 (90 %)"
-    assert known(BODIES["skin-slab"]) == words
-    assert "23.7 %" in known(Body(material="forearm"))
-    assert known(Body(material=Body().solid)) == ""
