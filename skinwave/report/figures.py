@@ -19,7 +19,6 @@ from simple_model import spectrum
 from simple_model.drawing import small
 from skinwave.report.palette import colour, drawn_as, inked, label
 from skinwave.report.styles import NARROW, SHOWN, STYLES, TEXT, Style
-from skinwave.results.comparison import moving_rms
 from skinwave.results.run import Run
 
 P = ParamSpec("P")
@@ -88,7 +87,7 @@ def tacton_figure(title: str, runs: list[Run], style: Style = REPORT) -> Figure:
     axes[0, 1].set_title(said[1], fontsize="medium")
     axes[-1, 0].set_xlabel("time, ms")
     axes[-1, 1].set_xlabel("frequency, Hz")
-    rows = _legend(figure, runs, scales=True)
+    rows = _legend(figure, runs)
     # Fixed margins: a computed layout takes twice as long.
     inch = style.zoom / figure.get_figheight()
     left, right, between, top = (0.2, 0.97, 0.32, 0.75) if narrow else (0.08, 0.99, 0.14, 0.6)
@@ -97,33 +96,6 @@ def tacton_figure(title: str, runs: list[Run], style: Style = REPORT) -> Figure:
     )
     if narrow:
         axes[0, 1].set_yticks(np.arange(FLOOR, 1, 40))
-    return figure
-
-
-def overview_figure(columns: dict[str, list[Run]], probe: int = 2) -> Figure:
-    """A few Tactons side by side: waveform, spectrum at one probe, and spread over all."""
-    width, height = max(7.0, 4.0 * len(columns) + 0.5), 8.2
-    figure = Figure(figsize=(width, height))
-    axes = figure.subplots(3, len(columns), sharey="row", squeeze=False)
-    for k, (title, runs) in enumerate(columns.items()):
-        where = 1e3 * np.hypot(*runs[0].response.probes[probe])
-        axes[0, k].set_title(title, parse_math=False)
-        _waveforms(axes[0, k], runs, probe)
-        _spectra(axes[1, k], runs, probe, named=True)
-        _spread(axes[2, k], runs)
-        axes[0, k].set_xlabel("time, ms")
-        axes[1, k].set_xlabel("frequency, Hz")
-        axes[2, k].set_xlabel("distance from the centre of the path, mm")
-    axes[0, 0].set_ylabel(f"motion at {where:g} mm\n/ largest of the model")
-    axes[1, 0].set_ylabel(f"spectrum at {where:g} mm,\ndB re largest line of the model")
-    axes[2, 0].set_ylabel("RMS motion,\ndB re strongest probe")
-    rows = _legend(figure, next(iter(columns.values())), scales=False)
-    # Fixed margins here, too, in inches.
-    above = 0.1 + 0.25 * rows
-    figure.subplots_adjust(
-        0.85 / width, 0.55 / height, 1 - 0.1 / width, 1 - (above + 0.3) / height,
-        wspace=0.06, hspace=0.24,
-    )  # fmt: skip
     return figure
 
 
@@ -166,14 +138,14 @@ def answered(run: Run) -> str:
     return label(run.column) if alone else f"{label(run.body)} ({run.model})"
 
 
-def _legend(figure: Figure, runs: list[Run], *, scales: bool) -> int:
-    """One entry a model above the figure, with what 1 on the waveform axis stands for if `scales`;
-    the number of rows.
+def _legend(figure: Figure, runs: list[Run]) -> int:
+    """One entry a model above the figure, with what 1 on the waveform axis stands for; the number
+    of rows.
     """
     entries: dict[str, dict[str, Any]] = {}
     for run in runs:
         scale = run.response.record.text(_largest(run, runs))
-        entries[answered(run) + f", 1 = {scale}" * scales] = {**drawn_as(run.column), "lw": 2}
+        entries[f"{answered(run)}, 1 = {scale}"] = {**drawn_as(run.column), "lw": 2}
     if kinds := dict.fromkeys(peak.kind for run in runs for peak in run.unnamed):
         entries[f"open: {', '.join(kinds)}"] = {
             "color": "0.3", "marker": "^", "mfc": "none", "ls": ""
@@ -258,22 +230,6 @@ def written(name: str) -> str:
     """A line's name as it is written in formulas."""
     name = re.sub(r"f_([A-Za-z0-9]+)", r"f_{\1}", name)
     return f"${name}$"
-
-
-def _spread(ax: Axes, runs: list[Run]) -> None:
-    for run in runs:
-        level = moving_rms(run.response)
-        radius = 1e3 * np.hypot(*run.response.probes.T)
-        decibel = 20 * np.log10(np.maximum(level / max(level.max(), 1e-300), 1e-12))
-        ax.plot(radius, decibel, lw=_width(run), ms=5, **drawn_as(run.column))
-    for drop in (-6, -20):
-        ax.axhline(drop, color="0.6", lw=0.8, ls="--", zorder=0)
-    path = 1e3 * runs[0].scene.tacton.trajectory.size / 2
-    if path:
-        ax.axvspan(path - 0.15, path + 0.15, color="0.85", zorder=0)
-        ax.text(path, -58, " focus path", fontsize=small(), color="0.4", va="bottom")
-    ax.set_ylim(-60, 4)
-    ax.grid(alpha=0.25)
 
 
 def _width(run: Run) -> float:

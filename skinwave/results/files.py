@@ -21,7 +21,7 @@ from skinwave.system.table import Table
 WHERE = ("tacton", "body", "model", "probe_x_mm", "probe_y_mm")
 DEPTH = "probe_depth_mm"  # of probes below the surface, if there are any
 AMPLITUDES = ("line", "frequency_hz", "displacement_um", "velocity_mm_s", "pressure_pa")
-RESERVED = ("pictures", "overview", "propagation", "sensation")  # what pages name themselves
+RESERVED = ("pictures", "propagation", "sensation")  # what pages name themselves
 DEVICES = re.compile(r"con|prn|aux|nul|(com|lpt)[\d¹²³]", re.IGNORECASE)  # of Windows
 LONGEST, MOST_BYTES = 80, 200  # of a name, which gets an ending and is limited to 255 bytes
 

@@ -6,6 +6,7 @@ COLUMN/scene.toml  responses.npz  lines.csv  effort.json  record.json  view.npz 
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -86,17 +87,9 @@ class Album:
 
 def shown_scenes(scene: Scene, beside: Sequence[str] = ()) -> dict[str, Scene]:
     """The scene by `Run.column`: by both point kernels and on its own body or, without one, on
-    those of the paper sheet and the skin slab that its path and probes fit on. All but the
-    published kernel receive the same load.
-
-    Parameters
-    ----------
-    beside : names of preset bodies that it is put on, too
-
-    Raises
-    ------
-    ValueError
-        If a body beside it is unknown, or the path or probes do not fit on it.
+    those of the paper sheet and the skin slab that its path and probes fit on; and on preset bodies
+    `beside` it, a ValueError if one is unknown or too small. All but the published kernel receive
+    the same load.
     """
     check_load(scene, "a film or report")
     bodies: dict[str, Scene] = {}
@@ -107,17 +100,10 @@ def shown_scenes(scene: Scene, beside: Sequence[str] = ()) -> dict[str, Scene]:
         other = with_body(scene, BODIES[name])
         if bodies.setdefault(name, other) != other:
             raise ValueError(f"the scene's own body is shown as '{name}'; leave it out of --beside")
-    if not bodies:
-        bodies = {n: on for n in paper15.MEASURED_ON if (on := _fitting(scene, n))}
+    for name in paper15.MEASURED_ON if not bodies else ():
+        with suppress(ValueError):  # a path or probes that do not fit on it
+            bodies[name] = with_body(scene, BODIES[name])
     return paper15.beside_kernels(scene) | bodies
-
-
-def _fitting(scene: Scene, name: str) -> Scene | None:
-    """The scene on a preset body; None if its path or probes do not fit on that."""
-    try:
-        return with_body(scene, BODIES[name])
-    except ValueError:
-        return None
 
 
 def make(
@@ -130,16 +116,8 @@ def make(
     frames: int | None = None,
     beside: Sequence[str] = (),
 ) -> list[str]:
-    """Compute a scene's response by every model and fill a folder with it; the warnings of all.
-
-    Parameters
-    ----------
-    beside : names of preset bodies that are shown, too
-
-    Raises
-    ------
-    ValueError
-        If a model refuses the scene.
+    """Compute a scene's response by every model and fill a folder with it; the warnings of all. A
+    ValueError if a model refuses the scene.
     """
     (folder / "scene.toml").write_text(dumps(scene), encoding="utf-8")
     runs, own, misfit = [], None, {}
@@ -193,7 +171,7 @@ def answers(
         for column, its in shown.items() if its.body.of_kind.discretise
     }  # fmt: skip
     moved = {
-        body: _moved(its, body, progress, h, solver)
+        body: waves(its, progress=progress, h=h or LARGER * default_size(its.body), solver=solver)
         for body, its in shown.items()
         if _has_elements(its, h) and not _is_plate(its, h)
     }
@@ -218,12 +196,8 @@ def answers(
 
 
 def _has_elements(scene: Scene, h: float | None) -> bool:
-    """Whether pictures are by elements: the body can be meshed, or has no model without a mesh.
-
-    Raises
-    ------
-    ValueError
-        If only elements are a model of the body, or their size is given, and it cannot be meshed.
+    """Whether pictures are by elements: the body can be meshed, or has no model without a mesh. A
+    ValueError if it must be meshed and cannot be.
     """
     if not scene.body.of_kind.discretise:
         return False
@@ -246,12 +220,7 @@ def _is_plate(scene: Scene, h: float | None) -> bool:
 def shown_views(scene: Scene, progress: Progress, **options: Any) -> tuple[list[View], list[str]]:
     """Views of a scene on all that it is shown on, by the quantity that its probes read, and
     warnings. The point kernel is left out of other quantities than displacement, because it has
-    none. Options are those of `make`.
-
-    Raises
-    ------
-    ValueError
-        As `make`, or if no body has the quantity.
+    none. Options and errors are those of `make`.
     """
     found = [(view, run) for view, run, _ in answers(scene, progress, **options) if view]
     said = worst_warnings((run.body, run.response.effort) for _, run in found)
@@ -263,14 +232,6 @@ def shown_views(scene: Scene, progress: Progress, **options: Any) -> tuple[list[
     return [shaded(view, run.scene) for view, run in found if len(view.tets)], said
 
 
-def _moved(scene: Scene, body: str, progress: Progress, h: float | None, solver: str) -> BodyMotion:
-    def named(phase: str, fraction: float) -> None:
-        progress(f"{body}: {phase}", fraction)
-
-    size = h or LARGER * default_size(scene.body)
-    return waves(scene, progress=named, h=size, solver=solver)
-
-
 def _misfit(run: Run, moved: BodyMotion) -> float:
     """How far the motion in pictures is from the response, over all probes, relative."""
     values = run.response.values
@@ -279,12 +240,8 @@ def _misfit(run: Run, moved: BodyMotion) -> float:
 
 
 def open_album(folder: Path) -> Album:
-    """Results in a folder that `run`, `compare` or `report` wrote; no model is run.
-
-    Raises
-    ------
-    ValueError
-        If there is no result in it.
+    """Results in a folder that `run`, `compare` or `report` wrote; a ValueError if there are none.
+    No model is run.
     """
     scenes = (path.parent for path in folder.rglob("scene.toml"))
     found = [scene / record.RESPONSES for scene in scenes if (scene / record.RESPONSES).is_file()]
@@ -342,12 +299,7 @@ def _json(path: Path, pattern: dict[str, Any]) -> dict[str, Any] | None:
 
 def only(album: Album, columns: Sequence[str]) -> Album:
     """An album with these columns alone, such as "point-kernel" and "skin-slab"; all of them if
-    none is named.
-
-    Raises
-    ------
-    ValueError
-        If it has no such column.
+    none is named. A ValueError if it has no such column.
     """
     known = list(dict.fromkeys(run.column for run in album.runs))
     for name in columns:

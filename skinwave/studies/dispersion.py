@@ -134,18 +134,9 @@ class DrivenModes:
 def driven_modes(
     scene: Scene, *, highest: float = HIGHEST, spacing: int = SPACING, most: int = MODES
 ) -> DrivenModes:
-    """Dispersion curves of a scene's body with the lines of its load.
-
-    Parameters
-    ----------
-    highest : Hz, up to which curves are computed
-    spacing : how many frequencies, beside those of the lines
-    most : how many modes
-
-    Raises
-    ------
-    ValueError
-        If the body has no dispersion curves, or `highest` is not above 20 Hz and finite.
+    """Curves of so many modes of a scene's body up to the `highest` frequency in Hz, at so many
+    frequencies beside those of the lines of its load. A ValueError if the body has no such curves,
+    or `highest` is not above 20 Hz and finite.
     """
     if not (isfinite(highest) and highest > 2 * LOWEST):
         raise ValueError(

@@ -19,7 +19,7 @@ from simple_model.numbers import interval, percent, significant
 from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.report import description
-from skinwave.report.figures import REPORT, drawn, overview_figure, tacton_figure
+from skinwave.report.figures import REPORT, drawn, tacton_figure
 from skinwave.report.levels import levels_figure, strongest_probe
 from skinwave.report.maps import BESIDE, SURFACES, surfaces_figure
 from skinwave.report.palette import label
@@ -30,7 +30,7 @@ from skinwave.results.propagation import NEAR, OUTSIDE, Component, Propagation, 
 from skinwave.results.run import Run
 from skinwave.scene.file import dumps
 from skinwave.studies import tables
-from skinwave.studies.changes import Shown, beside_kernels, changes, quick_maps, shown
+from skinwave.studies.changes import Shown, beside_kernels, changes, first_of, quick_maps, shown
 from skinwave.system.document import (
     Choice,
     Details,
@@ -46,7 +46,6 @@ from skinwave.system.table import Table
 
 PICTURES = "pictures"  # folder of a page's figures
 QUALITY = 88  # of pictures inside a page
-EXAMPLES = ("am140", "stm20", "am140-stm20")  # what the paper's comparison figure shows
 NAMED = 3  # lines that a sentence names
 NOTHING = "Nothing vibrates: a constant pressure on a focus at rest leaves no wave."
 ABOUT_MAPS = (
@@ -54,11 +53,6 @@ ABOUT_MAPS = (
     "layer; of other bodies the first Tacton alone has a map. Strongest is the largest amplitude "
     "at any probe. A phase delay is known up to whole periods and includes the phase of a body "
     "that is driven off resonance."
-)
-OVERVIEW = (
-    "Top: motion about its mean at one probe, relative to each model's largest motion at any "
-    "probe. Middle: its spectrum; filled markers are lines of the load, open ones free vibrations "
-    "excited by the start of the Tacton. Bottom: how far the motion spreads."
 )
 WAVEFORMS = "Waveforms and spectra. Rows are probes."
 LOADS = (
@@ -186,19 +180,13 @@ def _waveforms(
 ) -> list[Part]:
     """A figure of each Tacton, of which one is seen at a time."""
     options: dict[str, Part] = {}
-    if len(groups) > 1:
-        few = {n: list(groups[n]) for n in EXAMPLES if n in groups}
-        few = few or {n: list(group) for n, group in list(groups.items())[:3]}
-        probes = next(iter(few.values()))[0].scene.probes
-        figure = overview_figure(few, min(2, len(probes) - 1))
-        options["overview"] = gallery.figure("overview", figure, OVERVIEW)
-    files = distinct_names(groups)
-    for k, (name, group) in enumerate(groups.items()):
+    files = dict(zip(groups, distinct_names(groups), strict=True))
+    for k, name in enumerate(sorted(groups, key=lambda each: each != first_of(groups))):
         progress(f"draw {name}", k / len(groups))
-        runs = list(group)
-        figure = tacton_figure(name, runs, gallery.style)
+        runs = list(groups[name])
         seen = name if len(groups) > 1 else "waveforms and spectra"
-        options[seen] = gallery.figure(files[k], figure, _caption(name, runs))
+        figure = tacton_figure(name, runs, gallery.style)
+        options[seen] = gallery.figure(files[name], figure, _caption(name, runs))
         if len(groups) == 1 and any(run.response.record.of_body for run in runs):
             figure = levels_figure(runs, strongest_probe(runs), gallery.style)
             options["sensation levels"] = gallery.figure("sensation", figure, SENSATION)

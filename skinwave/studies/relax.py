@@ -168,19 +168,10 @@ def hierarchy_of(
     update_rate: float = DEVICE_RATES[0],
     points: int | None = None,
 ) -> Hierarchy:
-    """Compute a scene at every step of the model hierarchy.
-
-    Parameters
-    ----------
-    h : float, metre, element size of all steps; `LARGER` times the default of the scene's body if
-        not given
-    update_rate, points : float, Hz, and how many on the path: of the device, as `held` takes them
-
-    Raises
-    ------
-    ValueError
-        If the scene has no body, its probes read something else than the displacement of the
-        surface, or the device cannot be.
+    """Compute a scene at every step of the model hierarchy, with elements of h in metre (`LARGER`
+    times the default of the body if not given) and the update rate and points of a device as `held`
+    takes them. A ValueError if the scene has no body, its probes read something else than the
+    displacement of the surface, or the device cannot be.
     """
     check_motion(scene, "relax")
     names = droppable(scene)

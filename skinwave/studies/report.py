@@ -79,12 +79,8 @@ def write_report(
     command: str = "",
 ) -> None:
     """index.html, pictures/ and, for other programs, data/ in `out` from the results in a folder,
-    or from some columns of them, which a command made. No model of a body is run.
-
-    Raises
-    ------
-    ValueError
-        If the folder holds no result, or no such column.
+    or from some columns of them, which a command made. No model of a body is run. A ValueError if
+    the folder holds no result, or no such column.
     """
     album = only(open_album(results), columns)
     gallery = Gallery(style=style, formats=formats)

@@ -69,12 +69,8 @@ def paper_scenes(bodies: Mapping[str, Body] | None = None) -> dict[str, dict[str
 
 
 def own_scenes(scene: Scene, name: str) -> dict[str, dict[str, Scene]]:
-    """The same for one scene: on its own body or, if it has none, on paper and skin.
-
-    Raises
-    ------
-    ValueError
-        If its load is another than the pressure of a focus, or it has gravity.
+    """The same for one scene: on its own body or, if it has none, on paper and skin. A ValueError
+    if its load is another than the pressure of a focus, or it has gravity.
     """
     check_load(scene, "a comparison with the point kernel")
     if scene.body.of_kind.discretise:

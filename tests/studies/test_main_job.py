@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 PUBLISHED = "point-kernel-published"
 # Of the paper's 15 one or two of each kind: claims compare paths, and tones with paths.
 CHOSEN = ("stm10", "stm20", "am140", "am80-stm10", "am140-stm20")
-FIGURES = len(CHOSEN) + 2  # with the overview and the maps
+FIGURES = len(CHOSEN) + 1  # with the maps
 
 
 @pytest.fixture(scope="module")
@@ -125,9 +125,9 @@ def test_the_page_folds_what_is_beyond_four_screens(job, browser):
     tab.goto(f"file://{job[0] / 'index.html'}")
     assert tab.evaluate("document.documentElement.scrollHeight") <= 4 * 900
     chosen = tab.locator(".choice > div:visible")
-    assert "am140" not in chosen.inner_text()
+    assert chosen.inner_text().startswith("am140-stm20")
     tab.click("label:text-is('am140')")
-    assert "f_AM = 140 Hz" in chosen.inner_text()
+    assert chosen.inner_text().startswith("am140:")
     tab.click("nav >> text=Effort")
     assert tab.locator("#effort table").is_visible()
     tab.close()
