@@ -9,7 +9,6 @@ from pathlib import Path
 
 from simple_model import Response
 from skinwave.bodies.sizes import check_mesh, default_size
-from skinwave.measure import comparison_page
 from skinwave.measure.comparison import (
     Measured,
     beside,
@@ -132,6 +131,8 @@ def run_study(
     parts: list[document.Part] = []
     figures: dict[str, Sequence[Run]] = dict(groups)
     for name, group in groups.items() if measured else ():
+        from skinwave.measure import comparison_page  # which takes a second
+
         assert measured
         asked = measured.measurement.quantity
         comparison = compare_measured(
