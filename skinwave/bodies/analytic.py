@@ -21,9 +21,7 @@ def has_exact_waves(body: Body) -> bool:
 
 
 def is_flat_layer(body: Body) -> bool:
-    """Whether a body is a half-space or a slab, layered or not, that lies flat across the beam:
-    without loss it has a wavenumber integral from rest, but no steady state.
-    """
+    """Whether a body is a half-space or a slab that lies flat across the beam."""
     return body.of_kind.is_layer and body.placement == FLAT
 
 
@@ -33,9 +31,7 @@ def is_laterally_infinite(body: Body) -> bool:
 
 
 def compliance(body: Body) -> Compliance:
-    """Compliance of an infinite body of the same section; where its directions differ, that of
-    their means. Raises a ValueError if it has no wavenumber integral.
-    """
+    """Compliance of an infinite body of the same section, with the means of its directions."""
     if body.of_kind.compliance is None:
         raise ValueError(
             f"a wavenumber integral is of a sheet or a slab, not of a body of kind '{body.kind}'; "
@@ -45,9 +41,7 @@ def compliance(body: Body) -> Compliance:
 
 
 def stack(body: Body) -> Stack:
-    """Layers of a slab as infinite ones; raises a ValueError of another kind. An absorbing base
-    radiates as a half-space of the lowest material does, which is there instead.
-    """
+    """Layers of a slab; a half-space of the lowest material stands for an absorbing base."""
     if not body.of_kind.is_layer:
         raise ValueError(f"a body of kind '{body.kind}' is no stack of flat layers; take a slab")
     return flattened(body)
@@ -67,9 +61,7 @@ def flattened(body: Body) -> Stack:
 
 
 def dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
-    """Dispersion curves, `most` modes at frequencies (f,) in Hz that ascend, of a laterally
-    infinite body of the same section. Raises a ValueError if its kind has none.
-    """
+    """Dispersion curves, `most` modes at frequencies (f,) in Hz, of an infinite body."""
     if body.of_kind.dispersion is None:
         raise ValueError(
             f"dispersion curves are of a sheet, a slab or a palm, not of a body of kind "

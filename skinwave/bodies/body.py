@@ -247,9 +247,7 @@ class Body:
 
     @property
     def is_on_half_space(self) -> bool:
-        """Whether it is a slab whose base and sides all absorb: part of a half-space, which resists
-        a force at rest.
-        """
+        """Whether it is a slab whose base and sides all absorb, as part of a half-space."""
         return self.of_kind.is_layer and {self.base, *self.conditions} == {"absorbing"}
 
     @property

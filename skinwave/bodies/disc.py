@@ -25,9 +25,7 @@ def discretise(body: Body, h: float) -> Discretised:
 
 
 def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
-    """Mesh of the thickest disc with elements of h in metre, whose layers are stretched to those of
-    another: a function as `discretise`.
-    """
+    """Mesh of the thickest disc, whose layers are stretched to those of another."""
     mesh = discretise(thickest, h).mesh
 
     def moved(body: Body, h: float) -> Discretised:

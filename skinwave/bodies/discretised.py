@@ -45,9 +45,7 @@ Discretise = Callable[[Any, float], Discretised]  # of a body, with elements of 
 
 
 def in_layers(mesh: TetMesh, strata: Strata, depths: Floats) -> tuple[TetMesh, list[Material]]:
-    """Mesh whose regions are strata, by the depth (m,) in metre of each element; and materials by
-    region.
-    """
+    """Mesh whose regions are strata, by the depth (m,) of its elements, and the materials."""
     starts, materials = zip(*strata, strict=True)
     region = np.searchsorted(starts[1:], depths, side="right")
     return replace(mesh, region=region), list(materials)

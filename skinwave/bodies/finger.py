@@ -27,9 +27,7 @@ def actual_size(body: Body, h: float) -> float:
 
 
 def discretise(body: Body, h: float) -> Discretised:
-    """Ten-node tetrahedra of h in metre at the skin, with the region `bone`. Held or absorbing at
-    its cut, the sides, and where it looks downwards, the base.
-    """
+    """Ten-node tetrahedra of h in metre at the skin, with the region `bone`."""
     mesh = fingertip_mesh(shape(body), h)
     facets = {name: mesh.facets[name] for name in ("top", "sides")}
     return in_its_layers(body, h, replace(mesh, facets=facets))

@@ -51,16 +51,12 @@ def discretise(body: Body, h: float) -> Discretised:
 
 
 def _coarsest(body: Body, h: float) -> float:
-    """Largest element: larger ones do not follow the rim, where waves reflect and the base's
-    support ends.
-    """
+    """Largest element: larger ones do not follow the rim, where waves reflect."""
     return max(SURFACE * h, min(COARSEST * h, RIM * body.palm.edge_radius))
 
 
 def body_lines(body: Body, h: float) -> Lines:
-    """Grid lines in metre along x, y and z of the box around a palm, for cells that grow away from
-    its middle, and from its surface.
-    """
+    """Grid lines in metre of the box around a palm; cells grow away from its middle."""
     side = CELL * max(1.0, HAND_CELL / h) ** (1 / 3)
     finest, coarsest = side * SURFACE * h, side * _coarsest(body, h)
     along = Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=coarsest)

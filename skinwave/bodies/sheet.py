@@ -50,17 +50,13 @@ def discretise(body: Body, h: float, thickness: float | None = None) -> Discreti
 
 
 def _held(body: Body, mesh: TetMesh) -> NDArray[np.bool_]:
-    """Components (n, 3) that are held; all of a tilted sheet's, whose own directions are none of
-    the components.
-    """
+    """Components (n, 3) that are held: all of a node, if the sheet is tilted."""
     found = held(body.mounting, mesh)
     return found | (found.any(axis=1, keepdims=True) & body.placement.is_tilted)
 
 
 def equivalent(body: Body) -> float:
-    """Thickness in metre of elements that is small beside the sheet and its clips, whatever its
-    own: up to it one mesh stands for sheets of all thicknesses.
-    """
+    """Thickness in metre of elements, small beside the sheet and its clips."""
     least = SHEET_THICKNESS * min(body.width, body.height)
     reach = body.mounting.clip_radius if body.mounting.clips else 0.0
     return min(least, CLIP_THICKNESS * reach) if reach else least
@@ -150,9 +146,7 @@ def air_mass(body: Body, frequency: float) -> float:
 
 
 def open_air(body: Body) -> str:
-    """How a sheet is held around whose free edges air flows, which elements do not have; empty if
-    there is none.
-    """
+    """How a sheet is held around whose free edges air flows; "" if there is none."""
     if not body.air or (body.sides == "clamped" and body.mounting.is_frame):
         return ""
     return body.mounting.words if body.sides == "clamped" else f"with {body.sides} sides"
@@ -167,9 +161,7 @@ def refuse_open_air(body: Body) -> None:
 
 
 def air(body: Body, build: Build, free: Ints) -> LinearOperator | None:
-    """Added mass in kg of the air around a meshed sheet, for its free degrees of freedom; None in
-    vacuum.
-    """
+    """Added mass in kg of the air around a meshed sheet; None in vacuum."""
     if not body.air:
         return None
     refuse_open_air(body)

@@ -22,9 +22,7 @@ THICKEST, AT = 0.1, 400.0  # of a shear wavelength; Hz, of the highest lines tha
 
 
 def check_mesh(body: Body, h: float) -> None:
-    """Refuse, by a ValueError, what cannot be meshed with elements of h in metre: larger than the
-    body, or more than can be solved for.
-    """
+    """Refuse elements of h in metre that are larger than the body, or too many."""
     body.of_kind.check_size(body, checked(body, h))
 
 
@@ -115,18 +113,14 @@ def resolving_size(strata: Strata) -> float:
 
 
 def coarsest_size(body: Body) -> float:
-    """Coarsest element size in metre that resolves a body's layers below its largest coat; those of
-    a conforming mesh follow all layers.
-    """
+    """Coarsest element size in metre that resolves a body's layers below its coat."""
     if body.of_kind.conforming:
         return inf
     return resolving_size(without_coat(body.strata, largest_coat(body)))
 
 
 def coat_count(body: Body, h: float) -> int:
-    """Number of strata in the coat of a body meshed with elements of h in metre: as few as leave
-    layers that these resolve.
-    """
+    """Number of strata in the coat: as few as leave layers that elements of h resolve."""
     most = largest_coat(body)
     fits = (k for k in range(most) if resolving_size(without_coat(body.strata, k)) >= h)
     return next(fits, most)

@@ -28,25 +28,19 @@ GROWTH, COARSEST = (1.4, 1.25), (3.0, 2.0)
 
 
 def discretise(body: Body, h: float, wider: float = 1.0) -> Discretised:
-    """Structured mesh whose elements follow the layers, with any absorbing layer around and below,
-    so many times `wider` than usual.
-    """
+    """Structured mesh in layers, with an absorbing layer so many times `wider`."""
     return on_lines(body, body_lines(body, h), wider)
 
 
 def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
-    """Mesh of the thickest slab with elements of h in metre, whose layers are stretched to those of
-    another: a function as `discretise`.
-    """
+    """Mesh of the thickest slab, whose layers are stretched to those of another."""
     x, y, z = body_lines(thickest, h)
     before = thickest.interfaces
     return lambda body, h: on_lines(body, (x, y, -np.interp(-z, before, body.interfaces)))
 
 
 def on_lines(body: Body, lines: Lines, wider: float = 1.0) -> Discretised:
-    """Structured mesh on grid lines along x, y and z through a body, with any absorbing layer
-    around and below it. Planes between layers are met instead of lines that are close to them.
-    """
+    """Structured mesh on grid lines, which planes between layers replace where close."""
     x, y, z = lines
     planes = [-start for start, _ in body.strata[1:]]
     mesh = extrude(*_extended(body, (x, y, with_planes(z, planes)), wider))

@@ -65,9 +65,7 @@ def covering(
 
 
 def reduce_together(found: Covering, options: SolveOptions) -> ParametricBody:
-    """Reduced-order model of all bodies, with elements of the default size or h; cached on disk.
-    Raises a ValueError or Diverged if the ranges are wider than one model reaches.
-    """
+    """Reduced-order model of all bodies; raises if the ranges are too wide for one."""
     free = {key: (low, high) for key, low, high in found.ranges}
     within = min(parametric.TOLERANCE, SHARE * options.tolerance)
     return parametric.prepare(

@@ -129,9 +129,7 @@ def _with_loss(scene: Scene) -> Scene:
 
 
 def field_read(scene: Scene, depth: float) -> Field:
-    """Field of the quantity that a scene reads, at a depth in metre of its laterally infinite body.
-    Raises a ValueError if that has no wavenumber integral, or no such depth.
-    """
+    """Field of the quantity that a scene reads, at a depth in metre of its infinite body."""
     body, asked = scene.body, scene.reading.asked
     if body.of_kind.is_layer:
         return quantity_field(asked, stack(body), depth)

@@ -100,9 +100,7 @@ def nearest_geometry(bodies: Range, at: Sequence[float]) -> tuple[float, ...]:
 
 
 def build_at(bodies: Range, at: Sequence[float], symmetry: str = "") -> Build:
-    """Mesh that all have, moved to the thicknesses of the body at shares (k,) of the range; of the
-    materials that it was meshed with.
-    """
+    """Mesh of the range, moved to the thicknesses of the body at shares (k,)."""
     reference = bodies.body(bodies.meshed)
     free = np.ptp(np.array(bodies.geometries), axis=0) > 0
     body = bodies.body(np.where(free, at, bodies.meshed).tolist())
@@ -169,9 +167,7 @@ def meshed_materials(build: Build) -> tuple[Material, ...]:
 
 
 def affine_operators(body: Body, build: Build) -> AffineOperators:
-    """Matrices of a meshed body, of each of its materials, and the added mass of the air around
-    it.
-    """
+    """Matrices of each material of a meshed body, and of the air around it."""
     affine = assemble_affine(
         build.mesh, meshed_materials(build), fixed=build.constraints, absorbing=build.absorbing,
         drag=build.drag, support=build.support, coat=build.coat,
@@ -181,9 +177,7 @@ def affine_operators(body: Body, build: Build) -> AffineOperators:
 
 
 def solids_of(reference: Reference, body: Body) -> Solids:
-    """Materials of a body that differs from the one that was meshed by its materials alone, or by
-    a thickness that they stand for.
-    """
+    """Materials of a body of the range, as the mesh of the reference has them."""
     own = [solid_at(body, part) for part in reference.parts]
     bodies = (reference.body, body)
     springs = [_spring_modulus(each) for each in bodies] if reference.is_sprung else [1.0, 1.0]

@@ -93,9 +93,7 @@ def free_keys(body: Body, free: Mapping[str, tuple[float, float]]) -> tuple[Free
 
 
 def with_values(body: Body, keys: Sequence[FreeKey], values: Mapping[str, float]) -> Body:
-    """Body with values of its free keys, one for each; raises a ValueError if one is missing, out
-    of its range, or not of a free key.
-    """
+    """Body with values of its free keys; raises a ValueError unless each is in its range."""
     if strange := sorted(set(values) - {key.key for key in keys}):
         raise ValueError(
             f"'{strange[0]}' is not free; free it as well, or leave it out: free are "
@@ -117,9 +115,7 @@ def values_at(keys: Sequence[FreeKey], shares: Sequence[float]) -> dict[str, flo
 
 
 def training_shares(count: int, inside: int) -> Floats:
-    """Corners (at most `MOST_CORNERS`), the middle, and so many further points inside of a unit
-    cube of `count` dimensions: shares (t, count), the same each time.
-    """
+    """Corners, the middle, and points `inside` of a unit cube: shares (t, count)."""
     corners = np.array(list(product((0.0, 1.0), repeat=count)))
     if len(corners) > MOST_CORNERS:
         corners = np.random.default_rng(0).choice(corners, MOST_CORNERS, replace=False)
@@ -279,9 +275,7 @@ def _with_material(body: Body, part: Part, solid: Material) -> Body:
 
 
 def has_affine_operators(body: Body) -> bool:
-    """Whether the operators of a body are sums over its materials: those of a sheet that is
-    stretched, not held by all of its edges, or orthotropic have other terms.
-    """
+    """Whether the operators of a body are sums over its materials, as of a plain sheet."""
     return body.mounting == FRAME and body.solid.orthotropy is None
 
 

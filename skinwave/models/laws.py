@@ -64,9 +64,7 @@ def series_tolerance(tolerance: float) -> float:
 
 
 def relaxing(body: Body, tolerance: float) -> Body:
-    """The body with internal variables: Prony series for modulus laws of its own, within a relative
-    error where their data allow it.
-    """
+    """The body with Prony series for its modulus laws, within a relative error."""
     if not has_own_law(body):
         return body
 

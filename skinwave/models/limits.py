@@ -58,9 +58,7 @@ def takes(model: Model, scene: Scene) -> bool:
 
 
 def takers(scene: Scene) -> list[str]:
-    """Names of the models that take a scene and compute what its probes read, the preferred
-    first.
-    """
+    """Names of the models that take a scene, the preferred first."""
     return [model.name for model in _meant_for(scene) if takes(model, scene)]
 
 
@@ -76,9 +74,7 @@ def _meant_for(scene: Scene) -> list[Model]:
 
 
 def default_model(scene: Scene) -> str:
-    """The model of a scene that is computed unless another is cheaper: `fem`, or the first that
-    takes the scene. Raises `Refused` if none does.
-    """
+    """The first model that takes a scene; raises `Refused` if none does."""
     if found := takers(scene):
         return found[0]
     raise no_model(scene)

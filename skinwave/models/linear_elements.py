@@ -113,9 +113,7 @@ def _cause(error: ValueError) -> str:
 
 
 def _coarser(body: Body) -> tuple[str, Callable[[Scene], Scene] | None]:
-    """The change to a body whose default elements are large enough to be few: one that is thicker,
-    or a sheet that is less long.
-    """
+    """The change to a thicker body or a shorter sheet, whose default elements are few."""
     if body.of_kind.is_plate:
         longest = MOST_SLENDER * min(body.width, body.height)
         values = {"width": min(body.width, longest), "height": min(body.height, longest)}
@@ -245,9 +243,7 @@ def marched(
 
 
 def step_count(duration: float, dt: float) -> int:
-    """Number of steps of dt that reach a duration in s; raises a ValueError if one step is longer,
-    or there are more than `MOST_STEPS`.
-    """
+    """Number of steps of dt that reach a duration in s, at most `MOST_STEPS`."""
     if dt > duration:
         raise ValueError(
             f"dt = {dt:g} s is longer than the response, {duration:g} s; take a shorter step"
@@ -338,9 +334,7 @@ def moved_line(
     solve: fem.LineSolver,
     motion: SupportMotion,
 ) -> tuple[fem.Complex, fem.EnergyBalance]:
-    """Components (p c,) complex of the steady state on a support that moves, at its frequency, and
-    the mean power balance about the support; S (p c, 3 n) is what the probes read.
-    """
+    """Components (p c,) on a support that moves, and the mean power balance about it."""
     force = sparse.csr_array(-inertia(build, motion.unit)[:, None])
     acceleration = np.array([motion.acceleration])
     seen, power = _line(ops, force, S, solve, motion.frequency, acceleration)

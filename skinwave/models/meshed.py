@@ -53,9 +53,7 @@ def meshed(
     symmetry: str = "",
     discretise: Discretise | None = None,
 ) -> Build:
-    """Mesh of a body with its materials and boundary conditions, as of `bodies.build.build`, timed
-    and reported.
-    """
+    """Mesh of a body, as of `bodies.build.build`, timed and reported."""
     with clock("mesh"):
         report("mesh", 0.0)
         return build_body(body, h, symmetry, discretise)
@@ -104,9 +102,7 @@ def surface_load(build: Build, load: Load = PRESSURE) -> tuple[sparse.csr_array,
 
 
 def spread(P: sparse.csr_array, values: Floats) -> Floats:
-    """Nodal forces (3 n, c m) of patterns (k, m) over the points of each component of a load
-    operator (3 n, c k).
-    """
+    """Nodal forces (3 n, c m) of patterns (k, m) of each component of a load."""
     count = P.shape[1] // len(values)
     return np.hstack([P[:, k * len(values) :][:, : len(values)] @ values for k in range(count)])
 
@@ -128,9 +124,7 @@ def load_in_steps(
 
 
 def about(pressure: MovingPressure, points: Floats, t: float, over: float) -> Floats:
-    """Pressure (k,) in Pa about a time: its mean over a step in which it jumps, from the start on,
-    else its value.
-    """
+    """Pressure (k,) in Pa at a time: its mean over a step in which it jumps."""
     start, end = max(t - over / 2, 0.0), t + over / 2
     jumps = jump_times(pressure, start, end) if isinstance(pressure, MovingPressure) else []
     if not len(jumps):
@@ -155,9 +149,7 @@ def load_lines_at(
 def sag(
     build: Build, operators: fem.Operators, outputs: sparse.csr_array, load: Load, solver: str
 ) -> Floats:
-    """Static response (p c,) of `outputs` (p c, 3 n) to gravity, in equilibrium before the load
-    begins.
-    """
+    """Static response (p c,) of `outputs` (p c, 3 n) to gravity."""
     if not load.gravity:
         return np.zeros(outputs.shape[0])
     weight = load.gravity * inertia(build, (0.0, 0.0, -1.0))
@@ -170,9 +162,7 @@ def translation(build: Build, direction: Sequence[float]) -> Floats:
 
 
 def inertia(build: Build, direction: Sequence[float]) -> Floats:
-    """Nodal forces M r (3 n,) in N per m/s2 of a body along a unit vector: its weight at 1 m/s2, or
-    against the acceleration of its support.
-    """
+    """Nodal forces M r (3 n,) in N per m/s2 of a body along a unit vector r."""
     whole = operators_of(replace(build, fixed={}, held=None))  # fixed nodes have a share of a mass
     return whole.expand(whole.M @ translation(build, direction)[whole.free])
 
@@ -218,9 +208,7 @@ def probe_rows(
 
 
 def check_coat(build: Build, reading: Reading) -> None:
-    """Refuse strain and stress in a coat, where elements are of the material below it, by a
-    ValueError.
-    """
+    """Refuse strain and stress in a coat, where elements are of the material below."""
     thickness = sum(build.coat.thicknesses) if build.coat else 0.0
     least = min(reading.depths, default=0.0)
     if reading.asked.field == STRAIN and least < thickness:
@@ -244,9 +232,7 @@ def line_factor(asked: Quantity, s: Any, solids: tuple[Material, ...], outputs: 
 
 
 def mirrored_axes(body: Body, reading: Reading, load: Load) -> str:
-    """Axes, of "xy", across whose middle planes a body is its own mirror image, and what its probes
-    read keeps its sign.
-    """
+    """Axes across which a body is its mirror image, and what probes read keeps its sign."""
     if not body.of_kind.is_symmetric or body.placement != FLAT:
         return ""
     if not reading.asked.is_normal:  # others change sign, or are recovered across the plane

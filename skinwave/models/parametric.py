@@ -293,9 +293,7 @@ def lines_of(prepared: ParametricBody, body: Body) -> tuple[Floats, fem.Complex]
 
 
 def answer(prepared: ParametricBody, values: Mapping[str, float]) -> Response:
-    """Response of a body of the range from rest to the scene's Tacton, all lines and the free
-    vibration.
-    """
+    """Response of a body of the range from rest to the scene's Tacton."""
     return answer_of(at(prepared, values), prepared.scene)
 
 

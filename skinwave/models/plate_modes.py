@@ -86,9 +86,7 @@ def middle_compliance(body: Body) -> float:
 
 
 def relative_modulus(body: Body, omega: ArrayLike) -> Any:
-    """Complex modulus of bending (...) at angular frequencies (...) in rad/s, over the one that
-    modes have.
-    """
+    """Complex modulus of bending at frequencies in rad/s, over that of the modes."""
     return body.solid.complex_modulus(omega) / body.solid.shear_modulus
 
 
@@ -267,17 +265,13 @@ def stretched_answer(scene: Scene, times: Floats, options: SolveOptions) -> Resp
 
 
 def first_part(pressure: MovingPressure, times: Floats) -> Floats:
-    """Times (s,) in s of the part of a response in which errors are measured: a period of the
-    slowest strong line, and `CHECKED` at the least.
-    """
+    """Times (s,) in s in which errors are measured: a period of the slowest strong line."""
     slowest, _ = slowest_and_fastest(pressure)
     return times[: max(2, round(max(CHECKED, 1 / slowest) / step(times)) + 1)]
 
 
 def linear_error(scene: Scene, times: Floats, linear: Floats) -> float:
-    """Largest relative error of linear bending: what stretching adds to the linear response (t, p)
-    from rest at times (t,) in s.
-    """
+    """Largest relative error of the linear response (t, p) of a scene from rest."""
     modes: PlateModes = modes_of(plate_of(scene.body))
     parts = ceil(step(times) / LONGEST - 1e-9)
     added = _added(scene, times, modes, min(COUNTS[0], len(modes.squared)), parts)

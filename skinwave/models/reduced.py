@@ -383,9 +383,7 @@ def steady_waveforms(reduced: ReducedBody, scene: Scene, times: Floats) -> Float
 def components(
     reduced: ReducedBody, *pressures: MovingPressure, highest: float = np.inf
 ) -> ReducedResponse:
-    """Response of the components that the probes read, with rates and the relaxation of stress, to
-    the components of a load up to the `highest` line in Hz.
-    """
+    """Response of the quantity's components that the probes read, up to a `highest` line."""
     motion = read_at(respond(reduced, *pressures, highest=highest), reduced.read)
     if moved := reduced.load.support_motion:
         frequencies = np.append(motion.frequencies, moved.frequency)
@@ -398,9 +396,7 @@ def components(
 def in_motion(
     rest: ReducedResponse, asked: Quantity, solids: tuple[Material, ...]
 ) -> ReducedResponse:
-    """Components of a quantity with its rates and the relaxation of stress, of those at rest and
-    the materials of the probes, if any.
-    """
+    """Components of a quantity with rates and relaxing stress, of those at rest."""
     if not (asked.rate or asked.relaxes):
         return rest
     s, outputs = 2j * np.pi * rest.frequencies, rest.lines.shape[1]
@@ -427,8 +423,6 @@ def oscillating(motion: ReducedResponse) -> ReducedResponse:
 
 
 def from_rest(motion: ReducedResponse, times: Floats) -> Floats:
-    """Displacement or coordinates (t, q) after a start from rest at equally spaced times (t,) in s
-    from 0.
-    """
+    """Displacement or coordinates (t, q) after a start from rest at times (t,) in s."""
     rates = np.concatenate([2j * np.pi * motion.frequencies, motion.poles])
     return fem.exponential_sum(rates, np.vstack([motion.lines, motion.start]), times)

@@ -35,9 +35,7 @@ Reader = Callable[[Floats], Floats]  # displacement or coordinates -> components
 def sheet_rows(
     body: Body, build: Build, probes: Floats, reading: Reading
 ) -> tuple[sparse.csr_array, tuple[Material, ...]]:
-    """Rows (p c, 3 n) of `probe_rows` for a flat sheet that bends, but for its normal motion, and
-    the material at each probe.
-    """
+    """Rows (p c, 3 n) of `probe_rows` for a sheet, but for its normal motion."""
     seen, asked = _seen(body, build, probes), reading.asked
     below = np.broadcast_to(reading.depths or 0.0, len(probes))
     heights, solid = body.depth / 2 - below, body.solid.without_loss_factor()
@@ -49,9 +47,7 @@ def sheet_rows(
 
 
 def full_reader(body: Body, build: Build, probes: Floats, reading: Reading) -> Reader:
-    """Function of the displacement (3 n,) of all nodes of a sheet that bends and stretches, to
-    components (p c,).
-    """
+    """Function of the displacement (3 n,) of a sheet to components (p c,)."""
     if reading.asked.is_normal:
         normal = fem.probe_operator(build.mesh, probes)
         return lambda u: normal @ u
@@ -78,9 +74,7 @@ def modal_reader(
     reading: Reading,
     solver: str,
 ) -> Reader:
-    """Function of the coordinates (r,) of bending modes, with the in-plane motion that follows
-    under the constraints of the operators, to components (p c,).
-    """
+    """Function of the coordinates (r,) of bending modes to components (p c,)."""
     asked = reading.asked
     if asked.is_normal:
         normal = fem.probe_operator(build.mesh, probes) @ modes.basis

@@ -196,9 +196,7 @@ def reduced_answer(scene: Scene, times: Floats, options: SolveOptions) -> Respon
 def _modal_force(
     scene: Scene, linear: ReducedBody, times: Floats, dt: float
 ) -> Callable[[float], Floats]:
-    """Modal forces (r,) of a load at a time in s: the sum of its lines or, of many, the load
-    itself.
-    """
+    """Modal forces (r,) at a time in s, by lines or, of many, by the load itself."""
     if len(load_lines(scene.pressure).frequencies) > MOST_LINES:
         load = load_in_steps((scene.pressure,), linear.points, times, dt)
         return lambda t: load(t) @ linear.forces
@@ -286,9 +284,7 @@ def _march(
 
 
 def _normal(scene: Scene) -> Scene:
-    """The scene with the normal motion whose relative error is no smaller than that of its own
-    quantity: slopes and strains grow with frequency by up to one order more.
-    """
+    """The scene with a normal motion whose error is no smaller than its quantity's."""
     asked = scene.reading.asked
     rate = min(asked.rate + (not asked.is_normal), len(RATES) - 1)
     return replace(scene, quantity=RATES[rate].name, depth=0.0)

@@ -104,9 +104,7 @@ def _part(scene: Scene, spreads: Sequence[Spread]) -> float:
 
 
 def _change(scene: Scene, key: str, ends: tuple[float, float]) -> Floats | None:
-    """Half the difference (p,) of the motion at both ends of a number over that at its middle; None
-    without a closed form, or if the lines are at other frequencies.
-    """
+    """Half the relative difference (p,) of the motion at both ends of a number, or None."""
     lines_of = _closed_form(scene)
     if lines_of is None or (lines_of is _lines and key.startswith(LEFT_OUT)):
         return None
@@ -122,9 +120,7 @@ def _change(scene: Scene, key: str, ends: tuple[float, float]) -> Floats | None:
 
 
 def _closed_form(scene: Scene) -> Callable[[Scene], tuple[Floats, Complex]] | None:
-    """The steady lines of a scene and of those near it, by flat layers or by the modes of a plate;
-    None if neither stands for its body, or its load has no lines.
-    """
+    """The function of a scene to its steady lines, by flat layers or modes; or None."""
     body = scene.body
     lossy = any(solid.has_loss for _, solid in body.strata)
     if not lossy or scene.tacton.trajectory.shape == "recorded":
@@ -150,9 +146,7 @@ def _of_plate(scene: Scene) -> tuple[Floats, Complex]:
 
 
 def mesh_row(scene: Scene, h: float | None, error: float) -> PlanRow:
-    """Row of a plan: the error budget of a response with a relative error, and from which mesh on
-    nothing is gained beside elements of h in metre, if it has any.
-    """
+    """Row of the error budget of a response, and from which mesh on nothing is gained."""
     found = error_budget(scene, error)
     name, largest = found.largest
     if not largest:

@@ -61,9 +61,7 @@ def _lines_of_load(scene: Scene, tolerance: float) -> tuple[Floats, Complex]:
 
 
 def cutoff_frequency(frequencies: Floats, shares: Floats, tolerance: float) -> float:
-    """Frequency in Hz above which the motion of every probe is less than a third of the tolerance,
-    by a `response_spectrum`.
-    """
+    """Frequency in Hz above which every probe moves by less than a third of the tolerance."""
     above = np.cumsum(shares[::-1], axis=0)[::-1].max(axis=1)
     return float(frequencies[np.flatnonzero(np.sqrt(above) > tolerance / 3).max(initial=0)])
 
@@ -116,9 +114,7 @@ def side_reflections(scene: Scene) -> float:
 
 
 def _loss_at_cut_off(body: Body) -> float:
-    """Largest loss tangent of its materials at the lowest cut-off of shear waves across the depth,
-    w = pi / 2 over their travel time.
-    """
+    """Largest loss tangent at the lowest cut-off of shear waves across the depth."""
     layers = stack(body)
     pairs = zip(layers.materials, layers.thicknesses, strict=True)
     w = np.pi / 2 / sum(thickness / material.shear_speed for material, thickness in pairs)

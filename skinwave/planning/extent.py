@@ -132,9 +132,7 @@ def _within_reflections(
 
 
 def _larger(body: Body) -> Body:
-    """The body with its absorbing ends further out by the width of their layer; ends of an axis
-    whose sides differ stay.
-    """
+    """The body with its absorbing ends further out by the width of their layer."""
     ends = [{body.side(name) for name, (k, _) in EDGES.items() if k == axis} for axis in (0, 1)]
     by = np.array([*(each == {"absorbing"} for each in ends), body.base == "absorbing"])
     width, height, depth = layer_of(body).width * by * (2, 2, 1)

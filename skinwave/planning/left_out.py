@@ -180,9 +180,7 @@ def stretching_left_out(scene: Scene, model: Model, tolerance: float) -> float:
 
 
 def beyond_linear(scene: Scene, tolerance: float) -> bool:
-    """Whether a sheet is for `plate-modes-nonlinear`: it stretches by more than half the tolerance,
-    or deflects by more than `LINEAR` thicknesses.
-    """
+    """Whether a sheet stretches or deflects too much for linear models."""
     if not takes(STRETCHED, scene):
         return False
     share = stretching_left_out(scene, FROM_REST, tolerance)
@@ -239,9 +237,7 @@ class Sensitivity:
 
 
 def sensitivity(scene: Scene, prepared: ReducedBody | None = None) -> Sensitivity:
-    """Sensitivity from two responses of a reduced body: one that is at hand, or that of a coarse
-    mesh, seconds once per body.
-    """
+    """Sensitivity from two responses of a reduced body, or of a coarse mesh."""
     h = min(COARSENING * default_size(scene.body), coarsest_size(scene.body))
     coarse = prepared or prepare(scene.body, scene.probe_points, h=h, load=scene.load.moving)
     values = coarse.poles.values * (1 - DETUNING)

@@ -173,9 +173,7 @@ def element_sizes(body: Body) -> Floats:
 
 
 def finer_sizes(sizes: Floats, size: float) -> Floats:
-    """Sizes of a sequence that are finer than one, in metre, by `RATIO` or more; the last if none
-    is.
-    """
+    """Sizes of a sequence finer than one by `RATIO` or more; or the last."""
     coarser = np.count_nonzero(sizes > size / RATIO * (1 + 1e-9))
     return sizes[min(coarser, len(sizes) - 1) :]
 
@@ -219,9 +217,7 @@ def coarser_by(body: Body, other: float, h: float) -> float:
 
 
 def about_its_rest(scene: Scene, waveforms: NDArray[Any]) -> NDArray[Any]:
-    """Waveforms (t, p) without the mean under gravity, which a coarse mesh has as well and which
-    would hide the error of the motion.
-    """
+    """Waveforms (t, p) without the mean under gravity, which would hide errors."""
     return waveforms - waveforms.mean(axis=0) if scene.load.gravity else waveforms
 
 

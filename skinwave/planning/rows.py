@@ -193,9 +193,7 @@ def _of_stiffness(body: Body, coat: Coat) -> str:
 
 
 def left_out(scene: Scene, highest: float) -> list[PlanRow]:
-    """Neglected physics of a sheet with an estimate of each: air, if it is in vacuum, and
-    stretching; with air, its added mass.
-    """
+    """Neglected physics of a sheet: stretching, and air; with air, its added mass."""
     body = scene.body
     if not body.of_kind.is_plate:
         return []
@@ -226,9 +224,7 @@ def left_out(scene: Scene, highest: float) -> list[PlanRow]:
 def of_ends_and_band(
     scene: Scene, at_ends: float, sudden: float, tolerance: float
 ) -> tuple[str, ...]:
-    """Warnings of what a reduced body leaves out beside the error of its elements: at its absorbing
-    ends, and of sudden motion above `BAND`.
-    """
+    """Warnings of absorbing ends of a reduced body, and of motion above `BAND`."""
     return (
         *over_tolerance("the absorbing layer", at_ends, tolerance, "a larger body is"),
         *sudden_over_tolerance(scene, BAND, sudden, tolerance),
@@ -259,9 +255,7 @@ def of_elements(scene: Scene, h: float, error: float, tolerance: float) -> tuple
 
 
 def of_stretching(scene: Scene, response: Response, tolerance: float) -> tuple[str, ...]:
-    """Warning of a linear model of a sheet that deflects by more than `LINEAR` thicknesses, or
-    whose stretching changes its motion by more than the tolerance.
-    """
+    """Warning of a linear model of a sheet that deflects or stretches too much."""
     model = named(response.model)
     if model.is_nonlinear or not response.record.of_body:
         return ()
@@ -339,9 +333,7 @@ def rigid_body_drift(scene: Scene) -> tuple[str, ...]:
 
 
 def over_tolerance(what: str, error: float, tolerance: float, cure: str) -> tuple[str, ...]:
-    """Warning of an expected error above the tolerance, of `what` has it; the cure is a sentence's
-    end before "enough".
-    """
+    """Warning of an error above the tolerance; the cure ends before "enough"."""
     if not error > tolerance:
         return ()
     percent = f"{100 * error:.0f}" if error > 0.1 else f"{100 * error:.2g}"

@@ -93,9 +93,7 @@ def solve(scene: Scene, required: Plan) -> Response:
 
 
 def _checked(scene: Scene, required: Plan, found: Response) -> Response:
-    """The response with the error of its plan, or the larger one that its model measured, and all
-    warnings.
-    """
+    """The response with all warnings, and the larger of planned and measured errors."""
     tolerance = required.options.tolerance
     said = (
         *required.warnings, *beyond_prediction(scene, found, required.error, tolerance),
