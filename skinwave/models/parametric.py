@@ -80,36 +80,30 @@ FAINTEST = 1e-3  # of the strongest line that moves the probes: weaker ones are 
 FAINTEST_LOAD = 1e-6  # of the strongest line of the load
 FORMAT = "parametric 5"  # of what is cached
 BETWEEN = 0.3  # of each range: a body of no known geometry
-KEPT = 5  # full bodies at a time: more of them are assembled anew, for a third of the memory
 INSIDE = 128  # materials inside the ranges, for the lines' bases
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Cached:
-    """What is cached: the reduced `model` of g geometries, whose outputs (g, p c, r) the probes
-    read, with the reduced `forces` (g, c k, r) of unit pressure at the surface `points` (g, k, 3)
-    in metre; models `bases` (f,) in it of the lines at `frequencies` (f,) in Hz; and the `effort`
-    of the offline stage, with the number of its factorisations.
-    """
+class ParametricBody:
+    """Reduced body of a scene for every material and thickness of a range.
 
-    model: AffineModel
-    forces: Floats
-    points: Floats
-    frequencies: Floats
-    bases: tuple[AffineModel, ...]
-    effort: Effort
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ParametricBody(_Cached):
-    """Reduced body of a scene for every material and thickness of a range: the `keys` that are
-    free, the `bodies` of their values, and the `reference` that was meshed.
+    The `keys` that are free and the `bodies` of their values; the `reference` that was meshed; of
+    g geometries the reduced `model`, whose outputs (g, p c, r) the probes read, with the reduced
+    `forces` (g, c k, r) of unit pressure at the surface `points` (g, k, 3) in metre; models
+    `bases` (f,) in it of the lines at `frequencies` (f,) in Hz; and the `effort` of the offline
+    stage, with the number of its factorisations.
     """
 
     scene: Scene
     keys: tuple[FreeKey, ...]
     bodies: Range
     reference: Reference
+    model: AffineModel
+    forces: Floats
+    points: Floats
+    frequencies: Floats
+    bases: tuple[AffineModel, ...]
+    effort: Effort
 
     def __repr__(self) -> str:
         free = ", ".join(f"{key.key} {key.low:g} to {key.high:g}" for key in self.keys)
@@ -156,7 +150,9 @@ def prepare(
         report("mesh", 0.0)
         bodies = _range(scene.body, keys, h)
         body = bodies.body(bodies.meshed)
-        mesh = cached(partial(build_at, bodies, symmetry=_symmetry(scene)))
+        # One side gives all that probes on a plane of symmetry read.
+        axes = modelled_axes(scene.body, scene.probe_points, "", scene.reading, scene.load)
+        mesh = cached(partial(build_at, bodies, symmetry=axes))
         build = mesh(bodies.meshed)
     reference = reference_of(body, build, keys)
     of_body = entry_name(
@@ -214,16 +210,13 @@ class _Stage:
 def _reduced(stage: _Stage, clock: Clock, report: Progress, build: Build) -> dict[str, Any]:
     """What is cached: fields of a `ParametricBody`."""
     bodies, tolerance, scene = stage.bodies, stage.tolerance, stage.scene
-    few_geometries = len(bodies.geometries) <= KEPT
     geometries: dict[Any, Callable[[], Geometry]] = {
-        at: partial(stage.geometry, at) for at in bodies.geometries
+        at: cached(partial(stage.geometry, at)) for at in bodies.geometries
     }
-    if few_geometries:
-        geometries = {at: cached(made) for at, made in geometries.items()}
     with clock("assemble"):
         report("assemble", 0.0)
         frequencies, _ = _moving(scene, *_surface(scene, build))
-        for geometry in geometries.values() if few_geometries else ():
+        for geometry in geometries.values():
             geometry()
     few = [_variant(stage, at, geometries) for at in _training(stage)]
     with clock("factorise and reduce"), one_thread():
@@ -231,7 +224,10 @@ def _reduced(stage: _Stage, clock: Clock, report: Progress, build: Build) -> dic
             list(geometries.values()), few, frequencies, band=BAND, tolerance=SHARE * tolerance,
             solver=stage.solver, progress=partial(report, "reduce"),
         )  # fmt: skip
-    surface = [_reduced_surface(scene, stage.mesh(at), model) for at in geometries]
+    surface = []
+    for mesh in map(stage.mesh, geometries):
+        P, points = _surface(scene, mesh)
+        surface.append((P[~fixed_dofs(mesh.mesh, mesh.constraints)].T @ model.basis, points))
     with clock("lines"), one_thread():
         kept, bases, of_lines = _bases(stage, model, frequencies, few, report)
     effort = Effort(
@@ -239,9 +235,9 @@ def _reduced(stage: _Stage, clock: Clock, report: Progress, build: Build) -> dic
         solver=fem.available()[0] if stage.solver == "auto" else stage.solver,
         estimate=error + of_lines, factorisations=factorisations,
     )  # fmt: skip
-    forces, points = (np.stack(each) for each in zip(*surface, strict=True))
+    forces, places = (np.stack(each) for each in zip(*surface, strict=True))
     return {
-        "model": replace(model, basis=model.basis[:0]), "forces": forces, "points": points,
+        "model": replace(model, basis=model.basis[:0]), "forces": forces, "points": places,
         "frequencies": kept, "bases": bases, "effort": effort,
     }  # fmt: skip
 
@@ -268,17 +264,11 @@ def _variant(stage: _Stage, at: tuple[float, ...], geometries: Mapping[Any, Any]
     )  # fmt: skip
 
 
-def _reduced_surface(scene: Scene, build: Build, model: AffineModel) -> tuple[Floats, Floats]:
-    """Reduced forces (c k, r) of a unit load, and the points (k, 3) where it is."""
-    P, points = _surface(scene, build)
-    return P[~fixed_dofs(build.mesh, build.constraints)].T @ model.basis, points
-
-
 def lines(prepared: ParametricBody, values: Mapping[str, float]) -> tuple[Floats, fem.Complex]:
     """Steady state of a body of the range at the strong lines of the scene's load: frequencies (f,)
     in Hz, and amplitudes (f, p c) of the components that the probes read, in the quantity's unit.
     """
-    return lines_of(prepared, _body(prepared, values))
+    return lines_of(prepared, with_values(prepared.scene.body, prepared.keys, values))
 
 
 def lines_of(prepared: ParametricBody, body: Body) -> tuple[Floats, fem.Complex]:
@@ -299,7 +289,7 @@ def answer(prepared: ParametricBody, values: Mapping[str, float]) -> Response:
 
 def at(prepared: ParametricBody, values: Mapping[str, float]) -> ReducedBody:
     """Reduced body of values of the free keys, for any Tacton."""
-    body = relaxing(_body(prepared, values), FIT_TOLERANCE)
+    body = relaxing(with_values(prepared.scene.body, prepared.keys, values), FIT_TOLERANCE)
     shares, scene = geometry_shares(prepared.bodies, body), prepared.scene
     model = prepared.model
     read, forces, points = (
@@ -310,11 +300,6 @@ def at(prepared: ParametricBody, values: Mapping[str, float]) -> ReducedBody:
         small, forces, points, prepared.effort,
         probes=scene.probe_points, read=read, reading=scene.reading, load=scene.load,
     )  # fmt: skip
-
-
-def _symmetry(scene: Scene) -> str:
-    """Axes, of "xy", across which the part of the body on one side gives what the probes read."""
-    return modelled_axes(scene.body, scene.probe_points, "", scene.reading, scene.load)
 
 
 def _probes(scene: Scene, body: Body, build: Build) -> sparse.csr_array:
@@ -335,10 +320,6 @@ def _moving(scene: Scene, P: sparse.csr_array, points: Floats) -> tuple[Floats, 
     frequencies, pressures = load_lines_at(scene.loads, points, FAINTEST_LOAD)
     kept = (frequencies > 0) | scene.body.is_held
     return frequencies[kept], (P @ pressures[kept].T).T
-
-
-def _body(prepared: ParametricBody, values: Mapping[str, float]) -> Body:
-    return with_values(prepared.scene.body, prepared.keys, values)
 
 
 def _bases(
