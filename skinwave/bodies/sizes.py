@@ -50,32 +50,17 @@ def checked(body: Body, h: float, slack: float = 1.0) -> float:
 
 def _check_layers(body: Body, h: float, slack: float) -> None:
     """Refuse layers that elements which do not follow them cannot resolve, and that are no coat."""
-    coarsest, slab = coarsest_size(body), "or a slab, whose elements follow its layers"
-    if coarsest < FINEST_HAND * (1 - 1e-9):
-        thin, why = _unresolved(body)
-        raise ValueError(
-            f"a layer of {thin:g} mm of a {body.kind} is thinner than half of its finest elements, "
-            f"{1e3 * THINNEST * FINEST_HAND:g} mm{why}; take thicker layers, {slab}"
-        )
-    if h > slack * coarsest * (1 + 1e-9):
-        thin, why = _unresolved(body)
-        raise ValueError(
-            f"a layer of {thin:g} mm is thinner than half an element of {1e3 * h:g} mm{why}; "
-            f"take elements of {1e3 * coarsest:g} mm, thicker layers, {slab}"
-        )
-
-
-def _unresolved(body: Body) -> tuple[float, str]:
-    """Thickness in mm of the layer that needs the finest elements, and why it is no coat."""
-    count = largest_coat(body)
-    which = count + int(np.argmin(thicknesses(without_coat(body.strata, count))))
-    thin = 1e3 * thicknesses(body.strata)[which]
-    if not body.of_kind.may_be_coated:
-        return thin, ""
-    return thin, (
-        f", and with all above it, {1e3 * body.strata[which + 1][0]:g} mm, too thick for a coat, "
-        f"at most {1e3 * thickest_coat(body.strata, which + 1):.2g} mm, a tenth of a shear "
-        f"wavelength at {AT:g} Hz"
+    coarsest = coarsest_size(body)
+    is_hopeless = coarsest < FINEST_HAND * (1 - 1e-9)
+    if not is_hopeless and h <= slack * coarsest * (1 + 1e-9):
+        return
+    size = FINEST_HAND if is_hopeless else h
+    why = ", and too thick for a coat" if body.of_kind.may_be_coated else ""
+    smaller = "" if is_hopeless else f"elements of {1e3 * coarsest:g} mm, "
+    raise ValueError(
+        f"a layer of {1e3 * THINNEST * coarsest:g} mm of a {body.kind} is thinner than half an "
+        f"element of {1e3 * size:g} mm{why}; take {smaller}thicker layers, or a slab, whose "
+        "elements follow its layers"
     )
 
 

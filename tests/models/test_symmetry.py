@@ -29,8 +29,8 @@ def motions(monkeypatch, body, probes, h):
     scene, found = Scene(pressure=MovingPressure(tacton=CIRCLE), body=body, probes=probes), []
     for axes in (axes_of_probes, lambda probes, among: ""):
         monkeypatch.setattr(meshed, "axes_of_probes", axes)
-        body = reduced.prepare(body, scene.probe_points, h=h, tolerance=1e-6)
-        found.append(reduced.answer(body, scene))
+        made = reduced.prepare(body, scene.probe_points, h=h, tolerance=1e-6)
+        found.append(reduced.answer(made, scene))
     return found
 
 
