@@ -6,13 +6,16 @@ from math import inf
 import numpy as np
 import pytest
 
+from bench.layered_skin import RANGES, values_of
 from simple_model import flat_body
 from simple_model.layers.compliance import layered
+from skinwave.bodies import BODIES
 from skinwave.bodies.analytic import has_exact_waves, stack
 from skinwave.planning.plan import plan
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import loads
 from skinwave.scene.scene import Layer, Placement, solid_of
+from skinwave.verify.predictions import leading_wave
 
 SKIN = loads("""
 [tacton]
@@ -75,3 +78,21 @@ def test_a_plan_takes_the_wavenumber_integral_of_layers(body):
     found = compute(scene, "flat-body").displacement
     own = flat_body(layered(stack(scene.body)), scene.pressure, scene.probe_points, TIMES)
     np.testing.assert_array_equal(found, own.displacement)
+
+
+@pytest.mark.parametrize(
+    ("preset", "speeds", "lengths"),
+    [("palm-layers", (8.5, 5.1), (40, 30)), ("forearm-layers", (3.5, 3.2), (21, 7.8))],
+)
+def test_waves_of_layers_are_as_fast_as_the_manual_says(preset, speeds, lengths):
+    wave = leading_wave(BODIES[preset], [100.0, 200.0])
+    assert wave.speed == pytest.approx(speeds, rel=0.03)
+    assert 1e3 * wave.length == pytest.approx(lengths, rel=0.03)
+
+
+@pytest.mark.parametrize("preset", RANGES)
+def test_each_fitted_number_is_within_its_range(preset):
+    found = values_of(BODIES[preset], RANGES[preset])
+    for name, each in RANGES[preset].items():
+        assert each.low <= found[name] <= each.high or found[name] == pytest.approx(each.low)
+        assert each.source
