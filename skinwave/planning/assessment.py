@@ -38,38 +38,26 @@ QUICKLY = 2.0  # times as coarse
 def assessed(
     scene: Scene,
     response: Response,
-    prepared: ReducedBody,
+    moved: ReducedBody | NDArray[Any],
     options: SolveOptions = DEFAULT,
     *,
     compared: Coarser | None = None,
     meshed: Body | None = None,
 ) -> Response:
-    """Response of a reduced body with its expected error and all warnings.
+    """Response of linear elements with its expected error and all warnings.
 
-    `compared` is an element size in metre to compare with, and the body with it, else chosen here;
-    `meshed` the body whose mesh both sizes are of, if its nodes were moved to those of the scene's.
+    It is of the reduced body `moved`, or of another model with the quantity of interest `moved`:
+    waveforms (t, p), or the lines (f, p) of an unconstrained body. `compared` is an element size in
+    metre to compare with, and the body with it, else chosen here; `meshed` the body whose mesh both
+    sizes are of, if its nodes were moved to those of the scene's.
     """
-    fine = quantity_of_interest(prepared, scene, response)
-    return told(scene, response, fine, options, compared=compared, meshed=meshed)
-
-
-def told(
-    scene: Scene,
-    response: Response,
-    fine: NDArray[Any],
-    options: SolveOptions = DEFAULT,
-    *,
-    compared: Coarser | None = None,
-    meshed: Body | None = None,
-) -> Response:
-    """The same of any linear finite-element model, by its quantity of interest `fine`: waveforms
-    (t, p), or the lines (f, p) of an unconstrained body.
-    """
+    if isinstance(moved, ReducedBody):
+        moved = quantity_of_interest(moved, scene, response)
     body, tolerance = scene.body, options.tolerance
     size = options.h or default_size(body)
     other, coarse = compared or coarser_body(scene, options)
     same = coarse.effort.dofs == response.effort.dofs
-    fine = about_its_rest(scene, fine)
+    fine = about_its_rest(scene, moved)
     found = fine if same else quantity_of_interest(coarse, scene, answer(coarse, scene))
     _, error = convergence(meshed or body, (other, size), (found, fine), tolerance, same=same)
     series = series_error(scene, response.model, tolerance, coarse)

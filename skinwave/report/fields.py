@@ -17,7 +17,7 @@ from simple_model.numbers import counted, significant, stated_error
 from simple_model.quantities import DISPLACEMENT
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import from_rest, oscillating
-from skinwave.planning.assessment import told
+from skinwave.planning.assessment import assessed
 from skinwave.report.palette import SIGNED
 from skinwave.results.exports import collection
 from skinwave.results.files import folder_name
@@ -172,10 +172,10 @@ def field(
     options = SolveOptions(h=h, tolerance=tolerance, solver=solver)
     held = scene.body.is_held  # of a free body, whose mean has no bound, the lines are compared
     compared = response.values if held else oscillating(probe_lines(surface, moved)).lines
-    assessed = told(surface, response, compared, options)
-    for sentence in assessed.effort.warnings:
+    stated = assessed(surface, response, compared, options)
+    for sentence in stated.effort.warnings:
         warnings.warn(sentence, SkinwaveWarning, stacklevel=2)
     return Field(
-        mesh=moved.mesh, times=times, displacement=displacement, effort=assessed.effort,
-        expected_error=assessed.expected_error,
+        mesh=moved.mesh, times=times, displacement=displacement, effort=stated.effort,
+        expected_error=stated.expected_error,
     )  # fmt: skip
