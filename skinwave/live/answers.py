@@ -17,14 +17,7 @@ MOST_VALUES = 2_000_000  # of a measurement that is sent to a page
 
 
 def body_answer(content: bytes, progress: Progress = silent) -> dict[str, Any]:
-    """Return the record of a changed body, from JSON {"toml", "changes", "name", "title"}; the last
-    two are optional.
-
-    Raises
-    ------
-    ValueError
-        If the content is malformed, or the body cannot be.
-    """
+    """Return the record of a changed body, from JSON {"toml", "changes", "name", "title"}."""
     try:
         given = json.loads(content)
     except ValueError:
@@ -42,24 +35,12 @@ def body_answer(content: bytes, progress: Progress = silent) -> dict[str, Any]:
 
 
 def dispersion_answer(content: bytes) -> dict[str, Any]:
-    """Return the dispersion curves of the body in a TOML text, which may take a minute.
-
-    Raises
-    ------
-    ValueError
-        If the text describes no body.
-    """
+    """Return the dispersion curves of the body in a TOML text, which may take a minute."""
     return {"dispersion": dispersion_of(body_of(content.decode("utf-8", "replace")))}
 
 
 def scene_answer(name: str, content: bytes, progress: Progress = silent) -> dict[str, Any]:
-    """Return the values of a scene file and the record of its body.
-
-    Raises
-    ------
-    ValueError
-        If the file is no scene, or the page cannot show it.
-    """
+    """Return the values of a scene file and the record of its body."""
     from skinwave.scene.file import loads
 
     try:
@@ -74,17 +55,9 @@ def scene_answer(name: str, content: bytes, progress: Progress = silent) -> dict
 
 
 def measurement_answer(name: str, content: bytes) -> dict[str, Any]:
-    """Return the curves of a measurement by place, the mean of all repetitions.
-
-    Returns
-    -------
-    {"name", "quantity", "remarks", "places": [[x, y] in metre or null], "times": [s] and "values":
-    [[SI by time] by place], or "frequencies": [Hz] and "amplitudes": [[SI by frequency] by place]}
-
-    Raises
-    ------
-    ValueError
-        If the file is of no known kind or malformed.
+    """Return the curves of a measurement by place, the mean of all repetitions: name, quantity,
+    remarks, `places` [[x, y] in metre or null], and `times` in s with `values` [[SI by time] by
+    place], or `frequencies` in Hz with `amplitudes`.
     """
     from skinwave.measure.reading import read
 

@@ -26,19 +26,8 @@ def data_of(
     bodies: Sequence[str] = BODIES_SHOWN,
     test: bool = True,
 ) -> dict[str, Any]:
-    """Return the data of a page as a dict for JSON.
-
-    Parameters
-    ----------
-    scenes : whose bodies and Tactons the page has
-    progress : told of each body's phases
-    bodies : names of preset bodies that a page without scenes has
-    test : whether to include the data of the self-test
-
-    Raises
-    ------
-    ValueError
-        If a scene has what no control of the page sets, or a body has no pack.
+    """Return the data of a page of scenes, or of preset bodies, as a dict for JSON; `test` includes
+    the data of the self-test. A ValueError if a scene has what no control sets.
     """
     names = named([scene.body for scene in scenes] or [BODIES[name] for name in bodies])
     own = [values.values_of(scene, names[scene.body]) for scene in scenes]
@@ -58,8 +47,8 @@ def data_of(
 
 
 def comparison_page(scenes: Iterable[Scene]) -> str | None:
-    """Return the page of those scenes whose body has a pack within seconds; None if there are none
-    or the page has no controls for them.
+    """Return the page of those scenes whose body has a pack within seconds; None if it cannot show
+    them.
     """
     quick = [scene for scene in scenes if has_exact_lines(scene)]
     try:
@@ -71,12 +60,9 @@ def comparison_page(scenes: Iterable[Scene]) -> str | None:
 def named(bodies: Sequence[Body]) -> dict[Body, str]:
     """Return each of the bodies once, with a name of its own."""
     found: dict[Body, str] = {}
-    for body in bodies:
-        if body in found:
-            continue
-        name, taken = body_name(body), set(found.values())
-        numbers = range(2, len(bodies) + 2)
-        found[body] = next(n for n in (name, *(f"{name}-{k}" for k in numbers)) if n not in taken)
+    for body in dict.fromkeys(bodies):
+        name = body_name(body)
+        found[body] = f"{name}-{len(found) + 1}" if name in found.values() else name
     return found
 
 
@@ -92,13 +78,7 @@ def _own_presets(scenes: Sequence[Scene], own: Sequence[values.Values]) -> list[
 
 
 def read_scene(path: Path) -> Scene:
-    """Read a scene for the page, which is named after its file if it has no name.
-
-    Raises
-    ------
-    ValueError
-        If the file is no scene.
-    """
+    """Read a scene for the page, which is named after its file if it has no name."""
     from skinwave.scene.file import read
 
     scene = read(path)

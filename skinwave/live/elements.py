@@ -19,7 +19,7 @@ from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Tacton
 from simple_model.layers.prony import FIT_TOLERANCE
 from skinwave.bodies.build import Build, build, operators
-from skinwave.live.grid import SIDE, STEP, grid_line
+from skinwave.live.sheets import SIDE, STEP, grid_line
 from skinwave.models.laws import relaxing
 from skinwave.models.meshed import surface_load, surface_motion
 from skinwave.scene.scene import Body

@@ -22,12 +22,8 @@ FORMAT = "live pack 4"  # of cached entries
 
 
 def pack_of(body: Body, progress: Progress = silent) -> dict[str, Any]:
-    """Return the pack of a body: of wavenumber integrals, of a sheet's modes, or of elements.
-
-    Raises
-    ------
-    ValueError
-        If the body has none.
+    """Return the pack of a body: of wavenumber integrals, of a sheet's modes, or of elements; a
+    ValueError if it has none.
     """
     if not body.of_kind.discretise:
         raise ValueError(f"A body of kind '{body.kind}' does not move. Choose another body.")

@@ -41,15 +41,9 @@ LOOKED = 16  # every so many frequencies and distances the grid is checked at
 
 
 def radial_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
-    """Return the pack of a laterally infinite body, as a dict for JSON.
-
-    `frequencies` (f,) in Hz, complex `k` (k,) in 1/m and `weights` of the path of integration, and
-    the compliance `G` (f, k) in m/Pa, of 16 bits relative to the largest of a frequency.
-
-    Raises
-    ------
-    ArithmeticError
-        If no grid of wavenumbers is fine enough.
+    """Return the pack of a laterally infinite body: `frequencies` (f,) in Hz, complex `k` (k,) in
+    1/m and `weights` of the path of integration, and the compliance `G` (f, k) in m/Pa. An
+    ArithmeticError if no grid of wavenumbers is fine enough.
     """
     progress("wavenumber integral", 0.0)
     answer, frequencies = compliance(body), _frequencies(body)

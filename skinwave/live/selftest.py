@@ -59,13 +59,9 @@ def selftest(body: Body, name: str, most: int, lowest: float, error: float) -> l
 
 
 def exact(body: Body, h: float | None = None) -> tuple[Lines, Waveform, Places]:
-    """Return an exact model of a body, which does not use its pack.
-
-    Returns
-    -------
-    lines : function of a scene of one probe to frequencies (f,) in Hz and amplitudes (f,) in metre
-    waveform : function of a scene to the motion (t,) in metre of its probe from rest
-    places : (p, 2) in metre, the only ones where it can be read; () if anywhere
+    """Return an exact model of a body, which does not use its pack: functions of a scene of one
+    probe to its lines, frequencies (f,) in Hz and amplitudes (f,) in metre, and to its motion (t,)
+    from rest; and the only places (p, 2) in metre where it can be read, () if anywhere.
     """
     if is_laterally_infinite(body) and has_exact_waves(body):
         return (_lines_of_layers, lambda scene: compute(scene, "flat-body").values[:, 0], ())

@@ -1,8 +1,8 @@
 """Serve the live page from this machine, and give it new bodies when it asks for them.
 
 Only this machine reaches the server, and only a browser with the token gets an answer: the address
-brings it once, a cookie keeps it for the page, and requests of the page send it in `X-Token`, which
-no other site can. The server keeps no state of a page.
+of the page has it, and requests of the page send it in `X-Token`, which no other site can. The
+server keeps no state of a page.
 """
 
 import json
@@ -12,8 +12,8 @@ import sys
 from collections.abc import Callable, Mapping
 from functools import partial
 from http import HTTPStatus
-from http.cookies import SimpleCookie
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from itertools import count
 from threading import Lock
 from typing import Any, TypeVar
 from urllib.parse import parse_qs, unquote, urlsplit
@@ -37,7 +37,7 @@ NO_TOKEN = (
 NOT_HERE = "Open this page as http://127.0.0.1 or http://localhost, or start it with --base-url."
 FAULT = "The server failed at this request; its terminal says why."
 HEADERS = {
-    "Cache-Control": "no-store", "Referrer-Policy": "no-referrer", "X-Accel-Buffering": "no",
+    "Cache-Control": "no-store", "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff", "X-Frame-Options": "DENY",
 }  # fmt: skip
 EXPECTED = (ValueError, ArithmeticError, MemoryError, RecursionError)
@@ -49,19 +49,8 @@ class Superseded(Exception):
 
 
 class Server(ThreadingHTTPServer):
-    """Server of a page.
-
-    Parameters
-    ----------
-    data : of the page, with its `api` left open
-    port : 0 for any
-    base : path under which a proxy shows the server, begins and ends with "/"
-    token : a new one by default
-
-    Raises
-    ------
-    ValueError
-        If `base` is not a path, or the port cannot be used.
+    """Server of a page, under a `base` path that a proxy shows, "/" by default, which begins and
+    ends with "/"; port 0 is any. A ValueError if the path or the port cannot be used.
     """
 
     daemon_threads = True
@@ -82,7 +71,7 @@ class Server(ThreadingHTTPServer):
             ) from None
         api = {"base": base, "token": self.token}
         self.page = page({**data, "api": api}).encode()
-        self._newest, self._counting, self._computing = 0, Lock(), Lock()
+        self._newest, self._numbers, self._computing = 0, count(1), Lock()
 
     @property
     def address(self) -> str:
@@ -93,9 +82,7 @@ class Server(ThreadingHTTPServer):
         """Return what work gives, called with a progress that raises `Superseded` when newer work
         has come. Only one computes at a time.
         """
-        with self._counting:
-            self._newest += 1
-            own = self._newest
+        own = self._newest = next(self._numbers)
 
         def check(phase: str = "", fraction: float = 0.0) -> None:
             if own != self._newest:
@@ -121,18 +108,13 @@ class _Handler(BaseHTTPRequestHandler):
         """Keep the terminal free of requests."""
 
     def do_GET(self) -> None:
-        """Send the page; an address with the token first leads to the same one without it."""
+        """Send the page."""
         split = urlsplit(self.path)
         if not self._is_local():
             return self._text(HTTPStatus.FORBIDDEN, NOT_HERE)
         if self._route(split.path) != "":
             return self._text(HTTPStatus.NOT_FOUND, "There is nothing at this address.")
-        given = parse_qs(split.query).get("token", [""])[0]
-        if given and self._is_token(given):
-            cookie = f"{self._cookie}={given}; Path={self.server.base}; HttpOnly; SameSite=Lax"
-            return self._send(HTTPStatus.SEE_OTHER, b"", "text/plain",
-                              {"Location": self.server.base, "Set-Cookie": cookie})  # fmt: skip
-        if not self._is_token(self._kept_token()):
+        if not self._is_token(parse_qs(split.query).get("token", [""])[0]):
             return self._text(HTTPStatus.FORBIDDEN, NO_TOKEN)
         return self._send(HTTPStatus.OK, self.server.page, "text/html")
 
@@ -190,18 +172,6 @@ class _Handler(BaseHTTPRequestHandler):
         same = not origin or origin.partition("://")[2] == host
         return OWN_HOST.fullmatch(host) is not None and same
 
-    @property
-    def _cookie(self) -> str:
-        return f"skinwave-{self.server.server_port}"
-
-    def _kept_token(self) -> str:
-        cookies: SimpleCookie = SimpleCookie()
-        try:
-            cookies.load(self.headers.get("Cookie", ""))
-        except Exception:  # a cookie of another program that is malformed
-            return ""
-        return cookies[self._cookie].value if self._cookie in cookies else ""
-
     def _is_token(self, given: str) -> bool:
         return secrets.compare_digest(given.encode("utf-8", "replace"), self.server.token.encode())
 
@@ -211,17 +181,13 @@ class _Handler(BaseHTTPRequestHandler):
     def _text(self, status: HTTPStatus, sentence: str) -> None:
         self._send(status, sentence.encode(), "text/plain")
 
-    def _send(
-        self, status: HTTPStatus, content: bytes, kind: str, more: Mapping[str, str] | None = None
-    ) -> None:
-        self._begin(status, kind, {"Content-Length": str(len(content)), **(more or {})})
-        self.wfile.write(content)
-
-    def _begin(self, status: HTTPStatus, kind: str, more: Mapping[str, str]) -> None:
+    def _send(self, status: HTTPStatus, content: bytes, kind: str) -> None:
         self.send_response(status)
-        for name, value in {"Content-Type": f"{kind}; charset=utf-8", **HEADERS, **more}.items():
+        own = {"Content-Type": f"{kind}; charset=utf-8", "Content-Length": str(len(content))}
+        for name, value in {**own, **HEADERS}.items():
             self.send_header(name, value)
         self.end_headers()
+        self.wfile.write(content)
 
 
 def _say_fault(error: BaseException | None) -> None:

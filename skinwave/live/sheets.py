@@ -16,22 +16,25 @@ from simple_model.layers.prony import FIT_TOLERANCE
 from simple_model.load.focus import spot_width
 from simple_model.plates.free_modes import free_vibration, relaxing_stiffness
 from simple_model.plates.modes import PlateModes
-from skinwave.live.grid import SIDE, STEP, grid_line
 from skinwave.models.laws import relaxing
 from skinwave.models.plate_modes import modes_of, plate_of, relative_modulus
 from skinwave.scene.scene import Body
 from skinwave.system.arrays import packed, quantised
 from skinwave.system.effort import Progress, silent
 
+STEP, SIDE = 3e-3, 37  # m between places of the square grid of fields, and places along a side
 LAW_STEP, HIGHEST = 2.5, 1000.0  # Hz between values of the modulus, and of the last
 LOWEST = 0.1  # m: least height of the focus
-ERROR = (
-    0.01  # relative, of lines above -40 dB; several foci on a wide path nearly cancel, and err more
-)
+ERROR = 0.01  # relative, of lines above -40 dB; several foci on a wide path err more
 BAND = 1300.0  # Hz: modes below are kept as they are
 COUPLED_BAND = 2600.0  # Hz: loss couples modes below
 LEFT_OUT = 0.005  # of the largest combination of modes above the band
 QUASI_STATIC = (0.0, 600.0, 1000.0)  # Hz at which these combinations are looked at
+
+
+def grid_line() -> Floats:
+    """Coordinates (SIDE,) in metre of the grid of fields along each side."""
+    return np.asarray(STEP * (np.arange(SIDE) - (SIDE - 1) / 2))
 
 
 def sheet_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
@@ -67,13 +70,9 @@ def sheet_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
 
 
 def combined(modes: PlateModes, fields: Floats) -> tuple[Floats, Floats, Floats]:
-    """Modes below `BAND`, and the combinations of higher ones that focal spots move.
-
-    Returns
-    -------
-    squared : (r,) rad2/s2, ascending
-    bending : (r, r) 1/s2, stiffness of bending between them
-    turn : (m, r) orthonormal combinations of the modes
+    """Modes below `BAND`, and the combinations of higher ones that focal spots move: squared
+    frequencies (r,) in rad2/s2, ascending, the stiffness of bending (r, r) in 1/s2 between them,
+    and these orthonormal combinations (m, r) of the modes.
     """
     squared = modes.squared
     low = squared < (2 * np.pi * BAND) ** 2

@@ -55,12 +55,7 @@ def title_of(tacton: Tacton) -> str:
 
 def values_of(scene: Scene, body: str) -> Values:
     """Return the values of the controls that give a scene, whose body has this name, at its first
-    probe.
-
-    Raises
-    ------
-    ValueError
-        If the scene has what no control sets.
+    probe; a ValueError if it has what no control sets.
     """
     check_load(scene, "the live page")
     tacton, path, pressure = scene.tacton, scene.tacton.trajectory, scene.pressure
@@ -133,13 +128,10 @@ def _own_paths(tacton: Tacton) -> tuple[Trajectory, ...]:
     path, n = tacton.trajectory, tacton.n_paths
     if path.shape != "recorded" or path.levels or path.hold or n != len(tacton.foci):
         return ()
-    parts = parted(path, n)
-    if any(len(part) not in CORNERS for part in parts):
-        return ()
     try:
-        paths = tuple(map(_shape_of, parts))
+        paths = tuple(map(_shape_of, parted(path, n)))
         same = joined(paths, tacton.drawing_frequency)
-    except ValueError:
+    except (KeyError, ValueError):  # of another number of corners, or no shape
         return ()
     near = len(same.times) == len(path.times) and (
         np.allclose(same.outline, path.outline, rtol=0, atol=CLOSE)

@@ -28,11 +28,7 @@ UNBOUNDED = 1.0  # s that stand for a pattern that nothing ends
 
 
 def read(content: bytes, options: Options) -> Pattern:
-    """The pattern in an .adaptics file.
-
-    A pattern that jumps back for ever is its loop: what comes before is left out. One that lasts
-    too long is a ValueError.
-    """
+    """The pattern in an .adaptics file; of one that jumps back for ever its loop alone."""
     animation = parse(content, options.parameters)
     notes = list(animation.notes)
     runs = np.array(animation.runs[animation.loop or 0 :])
@@ -118,11 +114,10 @@ def _recorded(t: Floats, places: Floats, levels: Floats) -> Tacton:
     """A Tacton of a focus at places (t, 2) in metre with levels (t,), its end included."""
     kept = thinned(t, places, levels)
     path = Trajectory(
-        shape="recorded",
+        shape="recorded", times=tuple(np.round(t[kept], 9).tolist()),
         points=tuple(map(tuple, np.round(places[kept], 9).tolist())),
-        times=tuple(np.round(t[kept], 9).tolist()),
         levels=tuple(np.round(levels[kept], 6).tolist()),
-    )
+    )  # fmt: skip
     return Tacton(duration=min(path.times[-1], LONGEST), trajectory=path)
 
 
@@ -144,19 +139,14 @@ def _is_simple(brush: Brush) -> bool:
 def _drawn(brush: Brush, place: Floats, notes: list[str]) -> Tacton:
     """The Tacton of a simple brush at a place in millimetre."""
     (x, y), size, f_d = place[:2] / 1e3, brush.numbers[0] / 1e3, brush.drawing_frequency
-    if size == 0:
-        path = Trajectory(centre=(x, y))
-    elif brush.name == "circle":
+    path = Trajectory(centre=(x, y))
+    if size and brush.name == "circle":
         path = Trajectory(shape="circle", size=2 * size, speed=2 * pi * size * f_d, centre=(x, y))
-    else:
+    elif size:
         turn = radians(brush.numbers[1])
         dx, dy = size * cos(turn), size * sin(turn)
-        path = Trajectory(
-            shape="polyline",
-            sweep="sinusoidal",
-            points=((x + dx, y + dy), (x - dx, y - dy)),
-            speed=4 * size * f_d,
-        )
+        ends = ((x + dx, y + dy), (x - dx, y - dy))
+        path = Trajectory(shape="polyline", sweep="sinusoidal", points=ends, speed=4 * size * f_d)
         notes.append("the line is swept as a cosine, over twice what the file calls its length")
     return Tacton(am_frequency=brush.am_frequency, trajectory=path)
 

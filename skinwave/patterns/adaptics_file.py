@@ -1,12 +1,11 @@
-"""An .adaptics file as it stands: keyframes, numbers with their parameters, what it may contain.
-
-The format of the AdapTics designer and engine (CHI '24), revisions 0.0.10-alpha.1, 0.1.0-alpha.2
-and 0.1.0-alpha.3: millisecond, millimetre, Hz.
+"""An .adaptics file of the AdapTics designer and engine (CHI '24): keyframes, numbers with their
+parameters, brushes. Millisecond, millimetre, Hz.
 """
 
 import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from itertools import islice
 from math import cos, radians, sin
 from operator import add, ge, gt, le, lt, mul, sub, truediv
 from typing import Any
@@ -30,9 +29,7 @@ OPERATORS = {"lt": lt, "lt_eq": le, "gt": gt, "gt_eq": ge}
 
 @dataclass(frozen=True, kw_only=True)
 class Brush:
-    """Figure drawn about the place of the path: its `name`, `numbers` in millimetre and as they
-    stand, frequencies in Hz.
-    """
+    """Figure drawn about a place: its name, numbers as `BRUSHES` names them, frequencies in Hz."""
 
     name: str
     numbers: tuple[float, ...]
@@ -45,9 +42,7 @@ NONE = Brush(name="circle", numbers=(0.0,), am_frequency=0.0, drawing_frequency=
 
 @dataclass(frozen=True, kw_only=True)
 class Track:
-    """One quantity that keyframes set: `times` in s, the first at most 0, `values`, and whether
-    each stays until the next (`steps`) or goes there linearly.
-    """
+    """What keyframes set: times in s, values, and whether each stays until the next (`steps`)."""
 
     times: tuple[float, ...]
     values: tuple[Any, ...]
@@ -58,13 +53,9 @@ class Track:
 class Animation:
     """A file at some values of its parameters.
 
-    Parameters
-    ----------
-    places, brushes, intensities : Track, of (x, y, z) in millimetre above the array, of brushes,
-        and of numbers that the `factor` multiplies
-    runs : ((start, end), ...) in s, parts of the tracks in the order in which they are played
-    loop : index of the run that follows the last one for ever, or None if the pattern ends
-    notes : sentences on values and jumps
+    Tracks are of (x, y, z) in millimetre above the array, of brushes, and of intensities, which a
+    `factor` multiplies. `runs` are parts (start, end) of them in s in the order in which they are
+    played, `loop` is the index of the run that follows the last one for ever, None if none does.
     """
 
     name: str
@@ -78,9 +69,7 @@ class Animation:
 
 
 def parse(content: bytes, parameters: Mapping[str, float]) -> Animation:
-    """The animation in a file at values of its user parameters, instead of their defaults; raises a
-    ValueError if it is none, has random intensity, or has no such parameter.
-    """
+    """The animation in a file at values of its parameters, by default its own."""
     try:
         table = json.loads(as_utf_8(content))
     except ValueError as error:
@@ -138,17 +127,14 @@ class _Numbers:
         if not definition and name not in self._given:
             raise ValueError(f"parameter {str(name)[:40]!r} is not defined; define its default")
         what = f"parameter '{name[:40]}'"
-        whole = value = _finite(
-            self._given.get(name, _of(definition, what).get("default")), f"default of {what}"
-        )
+        default = _of(definition, what).get("default")
+        given = value = _finite(self._given.get(name, default), f"default of {what}")
         for key, bound in (("min", max), ("max", min)):
             if definition.get(key) is not None:
                 value = bound(value, _finite(definition[key], f"{key} of {what}"))
-        source = ", the nearest that the file allows" if value != whole else ""
-        self.notes[name] = (
-            f"{what} = {value:g}{source}" if name in self._given
-            else f"{what} at its default, {value:g}"
-        )  # fmt: skip
+        said = " =" if name in self._given else " at its default,"
+        cut = ", the nearest that the file allows" if value != given and name in self._given else ""
+        self.notes[name] = f"{what}{said} {value:g}{cut}"
         return value
 
     def _formula(self, formula: Any, what: str) -> float:
@@ -199,7 +185,7 @@ def _animation(table: Mapping[str, Any], number: _Numbers) -> Animation:
             elif track and (key == "coords" or kind == "stop"):
                 track.append((time, *track[-1][1:]))
         if kind != "stop":
-            jumps += [(time, to / speed) for to in _jumps(frame, number)[:1]]
+            jumps += [(time, to / speed) for to in _jump(frame, number)]
     runs, loop = _runs(kinds, jumps)
     path = _track(tracks["coords"], (0.0, 0.0, 0.0))
     moved = _get(transform, "geometric_transforms", dict, {})
@@ -209,15 +195,11 @@ def _animation(table: Mapping[str, Any], number: _Numbers) -> Animation:
     if speed != 1:
         notes.append(f"played at {speed:g} times the speed, brushes drawn at their own")
     return Animation(
-        name=str(table.get("name", ""))[:80],
+        name=str(table.get("name", ""))[:80], brushes=_track(tracks["brush"], NONE),
         places=replace(path, values=_transformed(path.values, moved, number)),
-        brushes=_track(tracks["brush"], NONE),
-        intensities=_track(tracks["intensity"], 0.0),
-        factor=factor,
-        runs=runs,
-        loop=loop,
+        intensities=_track(tracks["intensity"], 0.0), factor=factor, runs=runs, loop=loop,
         notes=tuple(notes),
-    )
+    )  # fmt: skip
 
 
 def _track(entries: list[tuple[float, Any, bool]], none: Any) -> Track:
@@ -228,14 +210,11 @@ def _track(entries: list[tuple[float, Any, bool]], none: Any) -> Track:
     return Track(times=times, values=values, steps=steps)
 
 
-def _jumps(frame: Mapping[str, Any], number: _Numbers) -> list[float]:
-    """Times in s, at speed 1, that a keyframe's jumps go to whose conditions are met."""
-    jumps = [_of(j, "a conditional jump") for j in _get(frame, "cjumps", list, []) or []]
-    return [
-        _finite(jump.get("jump_to"), "jump_to of a jump") / 1e3
-        for jump in jumps
-        if number.holds(_get(jump, "condition", dict, {}))
-    ]
+def _jump(frame: Mapping[str, Any], number: _Numbers) -> list[float]:
+    """Time in s, at speed 1, that the first jump of a keyframe goes to whose condition is met."""
+    jumps = (_of(each, "a conditional jump") for each in _get(frame, "cjumps", list, []) or [])
+    met = (each for each in jumps if number.holds(_get(each, "condition", dict, {})))
+    return [_finite(each.get("jump_to"), "jump_to of a jump") / 1e3 for each in islice(met, 1)]
 
 
 def _runs(
@@ -249,18 +228,16 @@ def _runs(
     runs: list[tuple[float, float]] = []
     entered: dict[float, int] = {}
     stops = [time for time, kind in kinds.items() if kind == "stop"]
-    at = 0.0
-    while at not in entered:
+    at: float | None = 0.0
+    while at is not None and at not in entered:
         entered[at] = len(runs)
         if runs and max((time for time in kinds if time <= at), default=None) in stops:
             return tuple(runs), None
         stop = min((time for time in stops if time > at), default=max(at, *kinds))
         end, to = next(((t, to) for t, to in jumps if at < t <= stop), (stop, None))
         runs.append((at, end))
-        if to is None:
-            return tuple(runs), None
         at = to
-    return tuple(runs), entered[at]
+    return tuple(runs), None if at is None else entered[at]
 
 
 def _setting(frame: Mapping[str, Any], key: str, number: _Numbers) -> tuple[Any, bool]:

@@ -16,9 +16,7 @@ ASIDE = 1e-9  # of a period: just before and just after a corner, so that jumps 
 
 
 def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
-    """The .adaptics file of a scene's Tacton, in the newest revision, and notes; raises a
-    ValueError if the format has no words for a part of it.
-    """
+    """The .adaptics file of a scene's Tacton, in the newest revision, and notes."""
     tacton, notes = scene.tacton, []
     _refuse(tacton)
     if tacton.am_frequency:
@@ -32,9 +30,9 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
             )
         notes.append("AM begins at its crest there, at its mean here")
     path, end = tacton.trajectory, tacton.duration
-    amplitude = float(loudness(scene.pressure, np.zeros(1))[0])
-    if tacton.am_frequency:
-        amplitude = tacton.amplitude
+    amplitude = tacton.amplitude
+    if not tacton.am_frequency:
+        amplitude = float(loudness(scene.pressure, np.zeros(1))[0])
     brush, place = _brush(tacton)
     if brush is None:
         brush = _named("circle", {"radius": 0.0}, tacton, 0.0)
@@ -60,22 +58,18 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
         for t, xy, level in zip(times, places, levels, strict=True)
     ]
     keyframes.append({"type": "stop", "time": 1e3 * end})
+    transforms = {
+        "translate": {"x": _f64(0), "y": _f64(0), "z": _f64(1e3 * scene.pressure.height)},
+        "rotation": _f64(0), "scale": dict.fromkeys("xyz", _f64(1)),
+    }  # fmt: skip
     table = {
-        "$DATA_FORMAT": FORMAT,
-        "$REVISION": REVISIONS[-1],
-        "name": scene.name,
-        "keyframes": keyframes,
+        "$DATA_FORMAT": FORMAT, "$REVISION": REVISIONS[-1], "name": scene.name,
+        "keyframes": keyframes, "user_parameter_definitions": {},
         "pattern_transform": {
-            "geometric_transforms": {
-                "translate": {"x": _f64(0), "y": _f64(0), "z": _f64(1e3 * scene.pressure.height)},
-                "rotation": _f64(0),
-                "scale": dict.fromkeys("xyz", _f64(1)),
-            },
-            "intensity_factor": _f64(1),
+            "geometric_transforms": transforms, "intensity_factor": _f64(1),
             "playback_speed": _f64(1),
         },
-        "user_parameter_definitions": {},
-    }
+    }  # fmt: skip
     return json.dumps(table, indent=1).encode(), tuple(notes)
 
 
@@ -116,17 +110,13 @@ def _brush(tacton: Tacton) -> tuple[dict[str, Any] | None, tuple[float, float]]:
 def _keyframe(t: float, place: Any, level: float, brush: dict[str, Any]) -> dict[str, Any]:
     transition: dict[str, Any] = {"name": "linear", "params": {}}
     x, y = (1e3 * float(each) for each in place)
+    constant = {"name": "constant", "params": {"value": _f64(level)}}
     return {
-        "type": "standard",
-        "time": 1e3 * float(t),
+        "type": "standard", "time": 1e3 * float(t), "cjumps": [],
         "brush": {"brush": brush, "transition": transition},
-        "intensity": {
-            "intensity": {"name": "constant", "params": {"value": _f64(level)}},
-            "transition": transition,
-        },
+        "intensity": {"intensity": constant, "transition": transition},
         "coords": {"coords": {"x": x, "y": y, "z": 0.0}, "transition": transition},
-        "cjumps": [],
-    }
+    }  # fmt: skip
 
 
 def _named(name: str, numbers: dict[str, float], tacton: Tacton, f_d: float) -> dict[str, Any]:

@@ -21,11 +21,18 @@ def convert(
 
     Parameters
     ----------
-    base : Scene, which the pattern is put on: its body, probes, drive; a slab of palm by default.
-        Only a scene has a body: from one pattern file to another its size does not matter.
+    source, target : Path, of `READERS` and `WRITERS`
+    options : Options
+    base : Scene, which the pattern is put on: its body, probes, drive; a slab of palm by default
 
-    Raises a ValueError if a file is of no known kind or malformed, or the pattern cannot be
-    expressed.
+    Returns
+    -------
+    bytes, and tuple of str
+
+    Raises
+    ------
+    ValueError
+        If a file is of no known kind or malformed, or the pattern cannot be expressed.
     """
     if (suffix := target.suffix.lower()) not in WRITERS:
         raise ValueError(f"{target}: '{suffix}' cannot be written, use {', '.join(WRITERS)}")

@@ -34,18 +34,16 @@ def read(content: bytes, options: Options) -> Pattern:
     """The pattern in a focal-point CSV; raises a ValueError with the line and the cure."""
     rows = _rows(content)
     tidy = number_in(rows[0][1][0]) is None
-    table = _tidy(rows) if tidy else _bare(rows, options.rate)
+    table = _table(rows[1:], _columns(rows[0][1])) if tidy else _bare(rows, options.rate)
     notes: list[str] = []
     points, counts = np.unique(table["point"], return_counts=True)
     if len(points) > MOST_FOCI or (points != np.arange(len(points))).any():
         shown = ", ".join(f"{p:g}" for p in points[:10])
         raise ValueError(f"points are numbered {shown}; number them from 0 to {MOST_FOCI - 1}")
-    if np.ptp(counts):
-        raise ValueError("points have different numbers of samples; give each the same times")
-    order = np.lexsort((np.arange(len(table)), table["point"]))
-    table = table[order].reshape(len(points), -1)  # (point, time)
+    ordered = table[np.argsort(table["point"], kind="stable")]
+    table = ordered.reshape(len(points), -1) if not np.ptp(counts) else ordered[None]
     times = table["t_s"] - table["t_s"][0, 0]
-    if np.ptp(times, axis=0).max() > 1e-9:
+    if np.ptp(counts) or np.ptp(times, axis=0).max() > 1e-9:
         raise ValueError("points have different times; give each the same")
     if (falling := np.diff(times[0]) < 0).any():
         raise ValueError(f"times fall after t_s = {table['t_s'][0][falling.argmax()]:g}; sort them")
@@ -138,16 +136,15 @@ def _rows(content: bytes) -> list[tuple[int, list[str]]]:
     return [(k, [x.strip().replace(",", ".") for x in row]) for k, row in fields]
 
 
-def _tidy(rows: list[tuple[int, list[str]]]) -> np.ndarray:
-    if len(rows) < 2:
-        raise ValueError("a header without focal points; give a line each")
-    columns = [_column(word) for word in rows[0][1]]
+def _columns(words: list[str]) -> list[tuple[str, float]]:
+    """Names of columns by the words of a header, and their units in s or m."""
+    columns = [_column(word) for word in words]
     names = [name for name, _ in columns]
     if len(set(names)) < len(names):
         raise ValueError(f"a column is there twice in {','.join(names)[:80]}; leave one out")
     if missing := [name for name in NEEDED if name not in names]:
         raise ValueError(f"column {missing[0]} is missing; columns are {','.join(COLUMNS)}")
-    return _table(rows[1:], columns)
+    return columns
 
 
 def _column(word: str) -> tuple[str, float]:
@@ -176,6 +173,8 @@ def _bare(rows: list[tuple[int, list[str]]], rate: float | None) -> np.ndarray:
 
 
 def _table(rows: list[tuple[int, list[str]]], columns: list[tuple[str, float]]) -> np.ndarray:
+    if not rows:
+        raise ValueError("a header without focal points; give a line each")
     table = np.zeros(len(rows), [(name, float) for name in COLUMNS])
     table["intensity"] = 1.0
     values = np.array([_numbers(line, cells, len(columns)) for line, cells in rows])
@@ -187,11 +186,7 @@ def _table(rows: list[tuple[int, list[str]]], columns: list[tuple[str, float]]) 
 def _numbers(line: int, cells: list[str], count: int) -> list[float]:
     if len(cells) != count:
         raise ValueError(f"line {line} has {len(cells)} columns, the first has {count}")
-    try:
-        values = [float(cell) for cell in cells]
-    except ValueError:
-        wrong = next(cell for cell in cells if number_in(cell) is None)
-        raise ValueError(f"line {line} has '{wrong[:40]}' where a number belongs") from None
-    if not all(map(isfinite, values)):
-        raise ValueError(f"line {line} has a number that is not finite; leave the line out")
+    values = [x for cell in cells if (x := number_in(cell)) is not None and isfinite(x)]
+    if len(values) < count:
+        raise ValueError(f"line {line} has what is no finite number in '{','.join(cells)[:60]}'")
     return values

@@ -20,8 +20,8 @@ MARGIN = 0.010  # m between a path and the edge of a body that is made for it
 
 @dataclass(frozen=True, kw_only=True)
 class Pattern:
-    """A Tacton from a file, the `pressure` keys that the file decides (height, drive), a `name` if
-    it has one, and `notes`: sentences on what the file leaves open or what was changed.
+    """A Tacton from a file, the `pressure` keys that the file decides (height, drive), its name,
+    and `notes` on what the file leaves open or what was changed.
     """
 
     tacton: Tacton
@@ -36,14 +36,14 @@ class Options:
 
     Parameters
     ----------
-    rate : float, Hz, of samples: of a CSV without times when read; of a CSV when written
-    height : float, metre, of the focus, in place of the file's
-    hold : bool, whether a focal point stays until the next sample, rather than going there straight
+    rate : Hz, of the samples of a CSV, read without times or written
+    height : metre, of the focus, in place of the file's
+    hold : whether a focal point stays until the next sample, rather than going there straight
     role : "modulation" or "envelope", what a WAV is
-    scale : "full", "peak" or "rms", how a WAV's samples are scaled: as they are, full scale 1; the
-        highest to 1; or the root mean square to that of a full sine, 0.707
+    scale : "full", "peak" or "rms": the samples of a WAV as they are, or their highest is 1, or
+        their root mean square that of a full sine
     parameters : values of an AdapTics file's parameters, instead of their defaults
-    resize : float, factor of all positions of the path, about the origin
+    resize : factor of all positions of the path, about the origin
     """
 
     rate: float | None = None
@@ -67,11 +67,12 @@ def resized(tacton: Tacton, factor: float) -> Tacton:
     if not (isfinite(factor) and factor > 0):
         raise ValueError(f"resize = {factor:g} must be a finite number above 0")
     path = tacton.trajectory
-    moved = {name: factor * getattr(path, name) for name in ("size", "speed")}
-    x, y = path.centre
-    points = tuple((factor * x, factor * y) for x, y in path.points)
-    centre = (factor * x, factor * y)
-    return replace(tacton, trajectory=replace(path, **moved, centre=centre, points=points))
+    points = tuple(map(tuple, (factor * np.reshape(path.points, (-1, 2))).tolist()))
+    moved = replace(
+        path, size=factor * path.size, speed=factor * path.speed, points=points,
+        centre=(factor * path.centre[0], factor * path.centre[1]),
+    )  # fmt: skip
+    return replace(tacton, trajectory=moved)
 
 
 def wide_enough(base: Scene, tacton: Tacton, notes: list[str]) -> Scene:

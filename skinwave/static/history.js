@@ -34,5 +34,5 @@ export function readAddress(starts) {
 export function addressOf(values, starts, view) {
   const shown = Object.entries(view).filter(([, value]) => value).map(([key, value]) => `${key}=${value}`);
   const text = [toAddress(values, starts), ...shown].filter(Boolean).join("&");
-  return `${location.href.split(/[?#]/)[0]}${text ? `#${text}` : ""}`;
+  return `${location.href.split("#")[0]}${text ? `#${text}` : ""}`;
 }

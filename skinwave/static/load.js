@@ -21,7 +21,7 @@ const HEIGHTS = [20, 40, 60, 80, 100, 120, 150, 180, 200, 220, 250, 300, 350, 40
 const FORCES = [0.2395, 0.4048, 0.5717, 0.6989, 0.785, 0.8502, 0.9319, 0.986, 1, 0.9963, 0.9634,
   0.8655, 0.7505, 0.6411, 0.4644, 0.3414];
 
-export const DRIVES = {
+const DRIVES = {
   pressure_squared: (amplitude, m, depth) => (amplitude * (1 + depth * m) / (1 + depth)) ** 2,
   force_corrected: (amplitude, m, depth) => amplitude * (1 + depth * m) / (1 + depth),
   linear: (amplitude, m) => amplitude * m,
@@ -66,7 +66,7 @@ const isClosed = (points) => points.length > 2
   && points[0][0] === points[points.length - 1][0] && points[0][1] === points[points.length - 1][1];
 
 /** Corners of a path in metre, and whether a period is one run along them. */
-export function outline(path) {
+function outline(path) {
   if (path.shape === "polyline") {
     return { corners: path.points, runsOn: path.sweep === "one_way" || isClosed(path.points) };
   }
@@ -103,7 +103,7 @@ export function joinedCorners({ paths, drawn }) {
 }
 
 /** Length in metre of one period of a path. */
-export function pathLength(path) {
+function pathLength(path) {
   if (path.shape === "point") return 0;
   if (path.shape === "joined") return arc(joinedCorners(path).points).pop();
   if (path.shape === "circle") return Math.PI * path.size;
@@ -273,7 +273,7 @@ function transformed(re, im, count, stride) {
 }
 
 /** Array factor [re, im] of all foci on harmonic n of the path. */
-export function arrayFactor(load, n) {
+function arrayFactor(load, n) {
   let re = 0, im = 0;
   for (const ahead of load.foci) {
     re += Math.cos(TAU * n * ahead);
@@ -358,13 +358,13 @@ function spreadJumps(path, cells) {
 }
 
 /** Highest order of the path's harmonics that make lines up to a frequency in Hz with lines of the gain. */
-export function lastOrder(load, count, gain, highest) {
+function lastOrder(load, count, gain, highest) {
   const fd = drawingFrequency(load.path), top = highest + Math.max(...gain.map(({ f }) => f));
   return fd > 0 ? Math.min(Math.floor((count - 1) / 2), Math.ceil(top / fd)) : 0;
 }
 
 /** Largest amplitude at about nine points of the path of each harmonic of the focal spot up to `last`. */
-export function harmonicStrengths(load, { x, y }, last) {
+function harmonicStrengths(load, { x, y }, last) {
   const count = x.length, even = Math.max(1, Math.floor(count / 8));
   const step = load.path.shape === "joined" ? even + 1 : even; // not the same places of each path
   const strongest = new Float64Array(count);

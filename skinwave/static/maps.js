@@ -67,8 +67,8 @@ const text = ([x, y], words, { colour = "currentColor", size = 11, anchor = "sta
   font-weight="${weight}">${escaped(words)}</text>`);
 const rectangle = (x, y, width, height, look = "") => (
   `<rect x="${x}" y="${y}" width="${width}" height="${height}" ${look}/>`);
-const drawn = (url, x, y, width, height, opacity = 1) => `<image href="${url}" x="${x}" y="${y}"
-  width="${width}" height="${height}" preserveAspectRatio="none" opacity="${opacity}"/>`;
+const drawn = (url, x, y, width, height) => `<image href="${url}" x="${x}" y="${y}" width="${width}"
+  height="${height}" preserveAspectRatio="none"/>`;
 const widthOf = (words, size) => 0.55 * size * words.length;
 
 /** What is on the square of a map: its image, contours, paths, foci and point. */
@@ -216,19 +216,14 @@ export function mapControls(svg, onPoint) {
   const select = (event) => {
     if (kept.has(svg)) onPoint(...bounded(place(event).map((v) => Math.round(1e3 * v) / 1e3)));
   };
-  let pressed = false;
   svg.addEventListener("pointerdown", (event) => {
-    pressed = true;
     svg.setPointerCapture(event.pointerId);
     select(event);
   });
   svg.addEventListener("pointermove", (event) => {
-    if (pressed) select(event);
+    if (event.buttons) select(event);
     if (kept.has(svg)) hover(place(event));
   });
-  for (const name of ["pointerup", "pointercancel"]) {
-    svg.addEventListener(name, () => { pressed = false; });
-  }
   svg.addEventListener("pointerleave", () => hover(null));
   const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
   svg.addEventListener("keydown", (event) => {

@@ -1,7 +1,6 @@
 // Surfaces for drawing: their ends, their shading, and where a place is on them.
 
 const STEEP = 0.3; // cosine of the slope from where a surface is shaded flat
-const CELLS = 32; // along a side of what finds triangles
 
 /** Ends {low, high} of x, y, z of points (3 n). */
 export function bounds({ points }) {
@@ -34,38 +33,17 @@ export function shade({ triangles }, places, out) {
   }
 }
 
-/** Triangles that reach into each of CELLS * CELLS equal cells of the area from above. */
-function cellsOf({ points, triangles, low, high }) {
-  const cells = Array.from({ length: CELLS ** 2 }, () => []);
-  const cell = (value, axis) => cellOf(value, low[axis], high[axis]);
-  for (let k = 0; k < triangles.length; k += 3) {
-    const corners = [0, 1, 2].map((c) => 3 * triangles[k + c]);
-    const [xs, ys] = [0, 1].map((axis) => corners.map((c) => points[c + axis]));
-    for (let j = cell(Math.min(...ys), 1); j <= cell(Math.max(...ys), 1); j++) {
-      for (let i = cell(Math.min(...xs), 0); i <= cell(Math.max(...xs), 0); i++) cells[j * CELLS + i].push(k);
-    }
-  }
-  return cells;
-}
-
-const cellOf = (value, low, high) => {
-  const cell = Math.floor(CELLS * (value - low) / (high - low));
-  return Math.min(Math.max(cell, 0), CELLS - 1);
-};
-
 /** Where [x, y] in mm is on the upper side: corners of a triangle and their weights; null off the body. */
-export function locate(mesh, x, y) {
-  const { points, triangles, low, high } = mesh;
+export function locate({ points, triangles }, x, y) {
   let found = null;
-  mesh.cells ||= cellsOf(mesh);
-  for (const k of mesh.cells[cellOf(y, low[1], high[1]) * CELLS + cellOf(x, low[0], high[0])]) {
+  for (let k = 0; k < triangles.length; k += 3) {
     const a = triangles[k], b = triangles[k + 1], c = triangles[k + 2];
     const ax = points[3 * a] - x, ay = points[3 * a + 1] - y, bx = points[3 * b] - x;
     const by = points[3 * b + 1] - y, cx = points[3 * c] - x, cy = points[3 * c + 1] - y;
     const wa = bx * cy - by * cx, wb = cx * ay - cy * ax, wc = ax * by - ay * bx, area = wa + wb + wc;
     if (!area || Math.min(wa / area, wb / area, wc / area) < -1e-6) continue;
     const weights = [wa / area, wb / area, wc / area];
-    const z = [a, b, c].reduce((sum, corner, k) => sum + weights[k] * points[3 * corner + 2], 0);
+    const z = [a, b, c].reduce((sum, corner, j) => sum + weights[j] * points[3 * corner + 2], 0);
     if (!found || z > found.z) found = { corners: [a, b, c], weights, x, y, z };
   }
   return found;

@@ -2,7 +2,7 @@
 
 const NEGLIGIBLE = 3e-3; // of the strongest line at its largest: weaker ones are not drawn
 const CREST = 2; // times the largest RMS: where colours end
-const STEP = 0.4; // mm between dots of a path
+const STEP = 0.5; // mm between dots of a path
 
 /**
  * {n, lines, crest}: lines above NEGLIGIBLE, with their largest amplitudes, and CREST times the largest

@@ -21,9 +21,9 @@ const FINER = 16; // values between two others, among which the highest level is
 
 /** Quantities at the point: `rate` is the order of the derivative, 1 in SI is `per` in `unit`. */
 export const QUANTITIES = {
-  displacement: { words: "displacement into the body", unit: "µm", per: 1e6, rate: 0 },
-  velocity: { words: "velocity into the body", unit: "mm/s", per: 1e3, rate: 1 },
-  acceleration: { words: "acceleration into the body", unit: "m/s²", per: 1, rate: 2 },
+  displacement: { unit: "µm", per: 1e6, rate: 0 },
+  velocity: { unit: "mm/s", per: 1e3, rate: 1 },
+  acceleration: { unit: "m/s²", per: 1, rate: 2 },
 };
 
 /** Detection threshold of displacement in metre, peak, at a frequency in Hz; NaN if not known. */

@@ -335,7 +335,9 @@ async function edit(key, text) {
   markOld();
   $("busy").hidden = false;
   try {
-    takeBody((await request(data.api, "body", JSON.stringify({ toml, name, title, changes }), own)).body);
+    const found = await request(data.api, "body", JSON.stringify({ toml, name, title, changes }), own);
+    if (own !== editing) return;
+    takeBody(found.body);
   } catch (error) {
     if (own !== editing) return;
     errors.set("body", error.name === "AbortError" ? "" : error.message);
@@ -398,10 +400,8 @@ function look(name) {
   choose("look", name);
   const deep = name === "3d";
   $("solid").hidden = !deep;
-  for (const id of ["kernel-map", "wave-map"]) $(id).toggleAttribute("hidden", deep);
-  $("views").classList.toggle("deep", deep);
+  for (const part of all(".map, .foot, #map-legend")) part.toggleAttribute("hidden", deep);
   $("map-scale").hidden = deep || name === "difference";
-  document.querySelector(".foot").hidden = $("map-legend").hidden = deep;
   if (deep) play(false);
   if (answer) { if (deep) showSolid(); else drawMaps(); writeAddress(); }
 }

@@ -47,27 +47,6 @@ function atStep(value, step) {
 const subscripted = (name) => escaped(name).replace(/_(\w+)/g,
   '<tspan dy="2.5" font-size="80%">$1</tspan><tspan dy="-2.5">&#8203;</tspan>');
 
-/** Points of a curve, at most two in each pixel column: the least and the largest. */
-function thinned(xs, ys, toX, width) {
-  if (xs.length < 3 * width) return [xs, ys];
-  const outX = [], outY = [];
-  let column = -1, low = 0, high = 0;
-  const flush = () => {
-    for (const k of low < high ? [low, high] : [high, low]) { outX.push(xs[k]); outY.push(ys[k]); }
-  };
-  for (let k = 0; k < xs.length; k++) {
-    const own = Math.floor(toX(xs[k]));
-    if (own !== column) {
-      if (column !== -1) flush();
-      column = own;
-      low = high = k;
-    } else if (ys[k] < ys[low]) low = k;
-    else if (ys[k] > ys[high]) high = k;
-  }
-  flush();
-  return [outX, outY];
-}
-
 /**
  * A plot inside an element.
  *
@@ -141,9 +120,7 @@ export function createPlot(host, { announce }) {
   }
 
   function line(curve) {
-    const [, , x1] = area();
-    const [xs, ys] = thinned(curve.x, curve.y, toX, x1 - LEFT);
-    const [low, high] = spec[curve.axis].range, reach = 2 * (high - low);
+    const { x: xs, y: ys } = curve, [low, high] = spec[curve.axis].range, reach = 2 * (high - low);
     let d = "", on = false;
     for (let k = 0; k < xs.length; k++) {
       const y = ys[k];

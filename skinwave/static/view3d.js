@@ -309,7 +309,7 @@ class View {
   }
 
   listen() {
-    const { canvas, view } = this, pointers = new Map();
+    const { canvas, view } = this;
     const turnBy = (x, y) => {
       view.turned += 0.01 * x;
       view.tipped = Math.min(Math.PI, Math.max(0, view.tipped - 0.01 * y));
@@ -321,24 +321,10 @@ class View {
     };
     const toggle = () => { this.playing = !this.playing; this.run(); };
     const look = (changes) => { Object.assign(view, HOME, changes); this.draw(); };
-    const apart = () => {
-      const [a, b] = [...pointers.values()];
-      return Math.hypot(a[0] - b[0], a[1] - b[1]);
-    };
-    canvas.addEventListener("pointerdown", (event) => {
-      canvas.setPointerCapture(event.pointerId);
-      pointers.set(event.pointerId, [event.clientX, event.clientY]);
+    canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
+    canvas.addEventListener("pointermove", ({ buttons, movementX, movementY }) => {
+      if (buttons) turnBy(movementX, movementY);
     });
-    canvas.addEventListener("pointermove", (event) => {
-      const before = pointers.get(event.pointerId);
-      if (!before) return;
-      const was = pointers.size === 2 && apart(), by = [event.clientX - before[0], event.clientY - before[1]];
-      pointers.set(event.pointerId, [event.clientX, event.clientY]);
-      if (was) nearer(apart() / was); else turnBy(...by);
-    });
-    for (const name of ["pointerup", "pointercancel"]) {
-      canvas.addEventListener(name, (event) => pointers.delete(event.pointerId));
-    }
     canvas.addEventListener("wheel", (event) => {
       if (document.activeElement !== canvas && !event.ctrlKey) return;
       event.preventDefault();

@@ -3,6 +3,8 @@
 import json
 import re
 import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
 from http.client import HTTPConnection
 from urllib.parse import urlsplit
 
@@ -57,20 +59,14 @@ def client():
     found.close()
 
 
-def test_the_address_brings_the_token_and_a_cookie_keeps_it(client):
+def test_only_the_address_with_the_token_opens_the_page(client):
     assert client.server.server_address[0] == "127.0.0.1"
-    assert client.ask("GET", "/")[0].status == 403
-    assert client.ask("GET", "/?token=wrong")[0].status == 403
-    answer, _ = client.ask("GET", "/?token=right")
-    assert (answer.status, answer.headers["Location"]) == (303, "/")
-    cookie = answer.headers["Set-Cookie"]
-    assert "HttpOnly" in cookie
-    answer, content = client.ask("GET", "/", Cookie=f"a=b; {cookie.split(';')[0]}")
+    for path, status in (("/", 403), ("/?token=wrong", 403), ("/other?token=right", 404)):
+        assert client.ask("GET", path)[0].status == status
+    answer, content = client.ask("GET", "/?token=right")
     assert answer.status == 200
     assert b'"token":"right"' in content
     assert answer.headers["Referrer-Policy"] == "no-referrer"
-    assert client.ask("GET", "/", Cookie="malformed;;=")[0].status == 403
-    assert client.ask("GET", "/other?token=right")[0].status == 404
 
 
 def test_other_sites_and_requests_without_the_token_are_refused(client):
@@ -90,8 +86,7 @@ def test_a_proxy_may_show_it_under_a_prefix():
     try:
         for path in (base, "/", base[:-1]):
             answer, _ = client.ask("GET", f"{path}?token=right", Host="hub.example")
-            assert answer.headers["Location"] == base
-            assert f"Path={base}" in answer.headers["Set-Cookie"]
+            assert answer.status == 200
         for wrong in ("//evil.example/", "/a b/", "/a", '/"/', "/a\r\nX: b/"):
             with pytest.raises(ValueError, match="path"):
                 serve.Server(DATA, base=wrong)
@@ -138,45 +133,37 @@ def test_what_is_too_large_or_unknown_is_refused(client):
         connection.close()
 
 
-def test_a_scene_gives_values_and_a_body(client):
+def test_a_scene_and_a_measurement_are_read(client):
     status, found = client.post("/api/scene", SCENE, X_Name="s.toml")
     assert status == 200
     assert (found["values"]["am"], found["values"]["body"]) == (90, found["body"]["name"])
-
-
-def test_a_measurement_gives_curves_by_place(client):
     sent = b"time_s,displacement_um\n0.1,0\n0.101,1\n0.102,0.5\n"
     status, found = client.post("/api/measurement", sent, X_Name="m%C3%A4.csv")
-    assert (status, found["name"], found["quantity"]) == (200, "mä.csv", "displacement")
+    assert (status, found["name"], found["quantity"]) == (200, "m\u00e4.csv", "displacement")
     assert found["values"] == [pytest.approx([0, 1e-6, 5e-7])]
     assert found["times"] == pytest.approx([0, 1e-3, 2e-3])
     assert found["places"] == [None]
 
 
 def test_newer_work_ends_older_work(client):
-    began, counted, said = threading.Event(), threading.Event(), []
+    began, counted = threading.Event(), threading.Event()
 
     def older(progress):
         began.set()
         assert counted.wait(60)
-        with pytest.raises(serve.Superseded):
-            progress("solve", 0.5)
-        said.append("older")
+        progress("solve", 0.5)
 
-    newer = [lambda progress: said.append("newer")]
-    threads = [
-        threading.Thread(target=client.server.compute, args=each) for each in ([older], newer)
-    ]
-    threads[0].start()
-    assert began.wait(60)
-    newest = client.server._newest
-    threads[1].start()
-    while client.server._newest == newest:  # until the newer one is counted
-        threads[1].join(0.01)
-    counted.set()
-    for each in threads:
-        each.join(60)
-    assert said == ["older", "newer"]
+    with ThreadPoolExecutor() as pool:
+        first = pool.submit(client.server.compute, older)
+        assert began.wait(60)
+        newest = client.server._newest
+        second = pool.submit(client.server.compute, lambda progress: "newer")
+        while client.server._newest == newest:
+            time.sleep(0.01)
+        counted.set()
+        with pytest.raises(serve.Superseded):
+            first.result(60)
+        assert second.result(60) == "newer"
 
 
 def test_a_fault_is_said_here_and_not_there(client, monkeypatch, capsys):
@@ -212,7 +199,6 @@ def test_a_page_changes_its_body(browser, address):
     tab.on("request", lambda request: asked.append(request.url))
     tab.on("pageerror", lambda error: asked.append(str(error)))
     tab.goto(address)
-    assert "token" not in tab.url
     tab.locator(".tile").first.wait_for()
     before = tab.inner_text("#tiles")
     tab.locator("summary", has_text="Layers").click()
