@@ -13,15 +13,11 @@ const SEEN = 0.06, STEP = 2e-4; // s of motion, and between its times, in which 
  * What a move of a control needs at once. Maps, share, reach and delay are in `mapsOf`. Throws an Error
  * for users if the values contradict each other.
  */
-export function respond(values, body, { published }) {
+export function respond(values, body) {
   const load = loadOf(values, body), x = values.x / 1e3, y = values.y / 1e3;
   const kernel = respondOfKernel(load), waves = body.respond(load);
   const [kernelAt, wavesAt] = [kernel.at(x, y), waves.at(x, y)];
   const answer = { values, body, load, x, y, kernel, waves, kernelAt, wavesAt };
-  if (published) {
-    answer.published = respondOfKernel(load, { published: true });
-    answer.publishedAt = answer.published.at(x, y);
-  }
   answer.level = body.is_skin ? levelOf(load, waves.f, answer.wavesAt, "m") : null;
   answer.kernelLevel = levelOf(load, kernel.f, answer.kernelAt, "Pa");
   return answer;

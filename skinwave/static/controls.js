@@ -39,7 +39,7 @@ function bodyKeys(body, editable) {
  * (an empty sentence once it is right), `moving(on)` whether a slider is held, `edit(key, text)` a value of
  * the body. Returns functions that show values, bodies and help.
  */
-export function buildControls(host, { bodies, editable, change, refuse, moving, edit, published }) {
+export function buildControls(host, { bodies, editable, change, refuse, moving, edit }) {
   const $ = (id) => host.querySelector(`#${id}`), all = (selector) => [...host.querySelectorAll(selector)];
   let values = {}, resting = 0;
 
@@ -80,7 +80,6 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
     if (key) { moving(false); take(key, target.value, true); }
     else if (field) take(field, target.value, true);
     else if (body) { clearTimeout(resting); edit(body, target.value); }
-    else if (target.id === "published") published(target.checked);
   });
   host.addEventListener("pointerup", ({ target }) => target.type === "range" && moving(false));
   host.addEventListener("focusout", ({ target }) => {

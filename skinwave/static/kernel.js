@@ -5,12 +5,9 @@ import { drawingFrequency, gainAt, levelFactor, loadLines, pathHarmonic, positio
 
 const NEGLIGIBLE = 5.7; // widths of a Gaussian spot, beyond which it is below 1e-7
 
-/** The load as published: linear drive law and the main lobe alone (simple_model.published). */
-const asPublished = (load) => ({ ...load, drive: "linear", profile: "main_lobe" });
-
 /** Motion of the point kernel under a load, with the interface of a body's, in Pa in place of metre. */
-export function respond(given, { published = false } = {}) {
-  const load = published ? asPublished(given) : given, { f, parts, samples } = loadLines(load);
+export function respond(load) {
+  const { f, parts, samples } = loadLines(load);
   const orders = [...new Set(parts.flat().map(({ n }) => Math.abs(n)))];
   const index = new Map(orders.map((n, k) => [n, k]));
   const weights = orders.map((n) => pathHarmonic(load, n, samples.x.length));

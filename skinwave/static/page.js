@@ -33,7 +33,7 @@ const QUIET = 300; // ms without a move, after which slow results are computed
 const opened = new Map(); // bodies by name
 const starts = { ...STARTS, ...data.start };
 const view = { look: "maps", tab: "lines", span: "automatic", highest: 600, over: "speed",
-  mapDecibel: 0, published: false };
+  mapDecibel: 0 };
 const errors = new Map(); // what is typed wrong, by control
 const scale = keptScales();
 let values = starts, answer = null, pinned = null, measured = null, history = null, controls = null;
@@ -49,7 +49,7 @@ function bodyOf(name) {
   return opened.get(record.name);
 }
 
-const respond = (own) => respondTo(own, bodyOf(own.body), { published: view.published });
+const respond = (own) => respondTo(own, bodyOf(own.body));
 
 function change(key, value, settled) {
   let next = { ...values, [key]: value };
@@ -468,10 +468,11 @@ function listen() {
   on("pin", "click", pin);
   on("swap", "click", swap);
   on("link", "click", async () => {
+    const link = address().replace(location.search, ""); // without the token of a server
     try {
-      await navigator.clipboard.writeText(address());
+      await navigator.clipboard.writeText(link);
       say("The link is copied.");
-    } catch { prompt("Copy this address:", address()); }
+    } catch { prompt("Copy this address:", link); }
   });
   on("about-open", "click", () => $("about").showModal());
   on("cancel", "click", () => editing?.abort());
@@ -550,7 +551,6 @@ controls = buildControls($("controls"), {
   bodies: data.bodies, editable: Boolean(data.api), change, edit,
   refuse: (key, sentence) => { errors.set(key, sentence); controls.mark(key, sentence); showSlot(); },
   moving: (on) => { if (moving && !on) ask(); moving = on; },
-  published: (on) => { view.published = on; ask(); },
 });
 $("map-legend").innerHTML = MAP_LEGEND;
 $("span").innerHTML = SPANS.map((words) => `<option>${words}</option>`).join("");

@@ -78,12 +78,8 @@ function nameOfA(factor) {
 
 /** Plot of the waveforms; `scale(name, largest)` gives the top of an axis. */
 export function waveformPlot(answer, span, { pinned, measured, scale }) {
-  const { kernel, published, waves, values, x, y } = answer, quantity = QUANTITIES[values.quantity];
+  const { kernel, waves, values, x, y } = answer, quantity = QUANTITIES[values.quantity];
   const curves = [{ role: "kernel", axis: "y", name: "kernel", ...waveform(kernel, [x, y], span, PRESSURE) }];
-  if (published) {
-    curves.push({ role: "published", axis: "y", name: "as published", dash: "4 3",
-      ...waveform(published, [x, y], span, PRESSURE) });
-  }
   const own = waveform(waves, [x, y], span, quantity);
   if (pinned) {
     const other = waveform(pinned.waves, [pinned.x, pinned.y], span, quantity);
@@ -132,8 +128,7 @@ function measuredSpectrum(measured, answer, per, highest) {
 
 /** Plot of the spectra as stems side by side, with the pauses of a rhythm, and the threshold of skin. */
 export function spectrumPlot(answer, { pinned, measured, highest, scale }) {
-  const { kernel, published, waves, body, values: { quantity: name } } = answer, { unit, per, rate } =
-    QUANTITIES[name];
+  const { kernel, waves, body, values: { quantity: name } } = answer, { unit, per, rate } = QUANTITIES[name];
   const mean = meanLevel(answer.load);
   const stems = (role, axis, title, f, amplitudes, offset, factor = mean) => {
     const kept = Array.from(f.keys()).filter((k) => f[k] <= highest);
@@ -144,10 +139,6 @@ export function spectrumPlot(answer, { pinned, measured, highest, scale }) {
   const own = stems("waves", "y2", pinned ? "B" : "waves", waves.f, moved, wide / 2);
   const given = stems("kernel", "y", "kernel", kernel.f, amplitudesOf(kernel.f, answer.kernelAt), -wide / 2);
   const curves = [given, own];
-  if (published) {
-    const amplitudes = amplitudesOf(published.f, answer.publishedAt);
-    curves.push(stems("published", "y", "as published", published.f, amplitudes, -1.5 * wide));
-  }
   if (pinned) {
     const moves = meanLevel(pinned.load), amplitudes = inQuantity(pinned.waves.f, pinned.wavesAt, name);
     const factor = factorOf(moves * largestOf(amplitudes), largestOf(own.y));

@@ -88,7 +88,7 @@ def wave_errors(page, name, made, waveform_of):
 @pytest.mark.parametrize("name", ["palm-layers", "paper-sheet"])
 def test_lines_waveforms_and_maps_of_layers_and_sheets(bodies, name):
     lines_of, waveform_of, _ = exact(BODIES[name])
-    made = scenes(name, 5)
+    made = scenes(name, 4)
     assert line_errors(bodies, name, made, lines_of).max() < 0.005
     assert wave_errors(bodies, name, made[:2], waveform_of).max() < 0.01
     rhythm = Rhythm(pulses=((0.03, 0.02), (0.02, 0.01)), ramp=0.01)

@@ -102,7 +102,7 @@ def test_the_kernel_is_that_of_python_in_time_and_on_a_map(page, starts):
     found = page.evaluate(
         """([many, times]) => many.map((own) => {
           const known = loadOf(own), motion = respond(known);
-          const paper = respond(known, { published: true });
+          const paper = respond({ ...known, drive: "linear", profile: "main_lobe" });
           const [map, other] = [motion, paper].map((each) => mapOf(each, known));
           return { f: [...motion.f], map: [...map.rms], other: [...other.rms],
             levels: [...map.level],

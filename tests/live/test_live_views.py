@@ -82,7 +82,7 @@ def test_a_contour_is_where_values_are_zero(page):
 @needs_browser
 def test_keys_and_a_pointer_select_points_of_a_map(page):
     draw(page, grid(lambda x, y: x), point=[0.01, 0.0], title="A < B", unit="Pa", largest=0.1)
-    assert {"A < B", "0.100 Pa", "0 mm"} <= {*page.locator("#map text").all_inner_texts()}
+    assert {"A < B", "0.100 Pa", "0 mm"} <= {*page.locator("#map text").all_text_contents()}
     page.evaluate("mapControls(document.getElementById('map'), (...at) => { window.at = at; })")
     page.focus("#map")
     for key, expected in (("ArrowRight", [0.011, 0.0]), ("Shift+ArrowDown", [0.01, -0.005])):
