@@ -83,28 +83,29 @@ def align(
     for name, given in (("delay", delay), ("gain", gain)):
         if given is not None and not np.isfinite(given):
             raise ValueError(f"{name} = {given} must be a finite number; leave it out to fit it")
-    omega = 2 * np.pi * lines.frequencies[:, None]
-    weights = _weights(lines)
+    f, weights = lines.frequencies, _weights(lines)
     size = float((weights * np.abs(model) ** 2).sum())
     if not size > 0:
         raise ValueError("the model has none of the measured lines; compare one that moves")
     products = (weights * model.conj() * lines.mean).sum(axis=1)
-    sign = -1.0 if gain is not None and gain < 0 else 1.0
     found, repeats = (float(delay), np.inf) if delay is not None else _delay(
-        lines, sign * products, size, abs(gain or 0.0), window, centre)  # fmt: skip
-    height = float(correlation(lines.frequencies, products, np.array([found]))[0])
+        lines, products * np.sign(gain or 1.0), size, abs(gain or 0.0), window, centre)  # fmt: skip
+    height, bend = (float(correlation(f, products, np.array([found]), n)[0]) for n in (0, 2))
     fitted = height / size if gain is None else float(gain)
-    bend = float(-correlation(lines.frequencies, products, np.array([found]), 2)[0]) * fitted
-    turned = weights * (model * np.exp(-1j * omega * found)).conj()
-    scale = abs(fitted) / bend if bend > 0 else np.inf
-    of_delay = np.hypot(_error(1j * omega * turned, lines) * scale, lines.shift_error)
+    turned = weights * (model * np.exp(-2j * np.pi * f * found)[:, None]).conj()
+    scale = -1 / bend * np.sign(fitted) if -bend * fitted > 0 else np.inf
+    of_delay = _error(2j * np.pi * f[:, None] * turned, lines) * scale
     result = Alignment(
-        delay=found, delay_error=float(of_delay) if delay is None else 0.0, gain=fitted,
-        gain_error=_error(turned, lines) / size if gain is None else 0.0, repeats=repeats,
+        delay=found, gain=fitted, repeats=repeats,
+        delay_error=0.0 if delay is not None else float(np.hypot(of_delay, lines.shift_error)),
+        gain_error=_error(turned, lines) / size if gain is None else 0.0,
     )  # fmt: skip
-    away = lines.mean - result.applied(lines.frequencies, model)
-    free = (delay is None) + (gain is None)
-    return replace(result, chi_square=_chi_square(away, lines, free))
+    away = lines.mean - result.applied(f, model)
+    freedom = 2 * away.size - (delay is None) - (gain is None)
+    if freedom <= 0 or not (lines.variance > 0).any():
+        return result
+    chi_square = float(2 * (weights * np.abs(away) ** 2).sum() / freedom)
+    return replace(result, chi_square=chi_square)
 
 
 def opposite_sign(of: str, has_delay: bool) -> str:
@@ -150,22 +151,16 @@ def _delay(
     shifted = products * np.exp(2j * np.pi * lines.frequencies * centre)
     delays, heights = maxima(lines.frequencies, shifted, window)
     delays = delays + centre
-    left = _left(lines, heights, size, gain)
-    scale = max(float(left.min()) / max(2 * lines.variance.size - 2, 1), 1.0)
-    if not np.isfinite(lines.variance).any():  # whose noise is unknown
-        scale = float(left.min()) / max(2 * lines.variance.size - 2, 1)
+    whole = float((_weights(lines) * np.abs(lines.mean) ** 2).sum())
+    left = 2 * (whole - (2 * gain * heights - gain**2 * size if gain else heights**2 / size))
+    scale = float(left.min()) / max(2 * lines.variance.size - 2, 1)
+    if np.isfinite(lines.variance).any():  # whose noise is known
+        scale = max(scale, 1.0)
     most = left.min() + AS_GOOD * scale + 1e-9 * np.abs(left).max()
     alike = delays[left <= max(most, NEARLY * left.min() * (scale > MISFITS))]
     chosen = float(alike[np.argmin(np.abs(alike))])
     away = np.abs(alike - chosen)
     return chosen, float(away[away > 1e-9 * window].min(initial=np.inf))
-
-
-def _left(lines: MeasuredLines, heights: Floats, size: float, gain: float) -> Floats:
-    """Chi-square (k,) of fits by correlations (k,)."""
-    whole = float((_weights(lines) * np.abs(lines.mean) ** 2).sum())
-    fitted = 2 * gain * heights - gain**2 * size if gain else heights**2 / size
-    return np.asarray(2 * (whole - fitted))
 
 
 def _error(factors: np.ndarray, lines: MeasuredLines) -> float:
@@ -179,11 +174,3 @@ def _error(factors: np.ndarray, lines: MeasuredLines) -> float:
         return 0.0
     known = float(terms.sum()) ** 2 / squares
     return float(np.sqrt(lines.variance_of(factors)) * stdtrit(known, 0.975) / 1.96)
-
-
-def _chi_square(away: np.ndarray, lines: MeasuredLines, fitted: int) -> float:
-    """Squares of deviations (f, p) over those of the noise and the degrees of freedom."""
-    freedom = 2 * away.size - fitted
-    if freedom <= 0 or not (lines.variance > 0).any():
-        return np.nan
-    return float(2 * (_weights(lines) * np.abs(away) ** 2).sum() / freedom)

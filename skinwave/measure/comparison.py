@@ -338,37 +338,27 @@ def beside(comparison: MeasuredComparison, group: Sequence[Run]) -> list[Run]:
 
 
 def _measured_run(comparison: MeasuredComparison) -> Run:
-    """The mean over the repetitions as a run to draw, on the clock of a model's response; of
-    spectra the sum of the lines, since their waveform is not there.
+    """The mean over the repetitions, each shifted as its lines were, as a run to draw on the clock
+    of a model's response; of spectra the sum of the lines, since their waveform is not there.
     """
     measurement, like = comparison.measurement, comparison.main.run
-    delay = comparison.main.alignment.delay
+    delay, shifts = comparison.main.alignment.delay, comparison.lines.shifts
     if measurement.is_spectrum:
         times = like.response.times
         turned = np.exp(2j * np.pi * np.multiply.outer(times + delay, comparison.lines.frequencies))
         values = (turned @ comparison.lines.mean).real
     else:
-        times, values = evenly(measurement) - delay, _mean_in_step(comparison)
+        from scipy.interpolate import CubicSpline  # which takes long to import
+
+        at = evenly(measurement)
+        each = (CubicSpline(at, x)(np.clip(at + shift, at[0], at[-1]))
+                for x, shift in zip(measurement.values, shifts, strict=True))  # fmt: skip
+        times, values = at - delay, np.mean([*each], axis=0) if shifts.any() else measurement.mean
     response = Response(
         model=MEASURED, times=times, probes=comparison.scene.probe_points, values=values,
         quantity=measurement.quantity,
     )  # fmt: skip
     return Run(tacton=like.tacton, body=MEASURED, scene=comparison.scene, response=response)
-
-
-def _mean_in_step(comparison: MeasuredComparison) -> Floats:
-    """Mean (t, p) of repetitions, each shifted as its lines were."""
-    measurement, shifts = comparison.measurement, comparison.lines.shifts
-    if not shifts.any():
-        return measurement.mean
-    from scipy.interpolate import CubicSpline  # which takes long to import
-
-    times = evenly(measurement)
-    shifted = [
-        CubicSpline(times, values)(np.clip(times + shift, times[0], times[-1]))
-        for values, shift in zip(measurement.values, shifts, strict=True)
-    ]
-    return np.asarray(np.mean(shifted, axis=0))
 
 
 def _at_places(run: Run, chosen: np.ndarray) -> Run:

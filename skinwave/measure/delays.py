@@ -6,6 +6,7 @@ import numpy as np
 from scipy.special import fdtrc
 
 from simple_model.typing import Floats
+from simple_model.windows import cosines
 
 A_PERIOD = 8  # trial delays in a period of the highest line
 NEWTON = 5  # steps
@@ -23,15 +24,8 @@ ONE_AFTER_ANOTHER = (
 def correlation(
     frequencies: Floats, products: np.ndarray, delays: Floats, order: int = 0
 ) -> Floats:
-    """Correlation (d,) of lines at trial delays, Re sum (2 pi i f)^n s exp(2 pi i f d), or its
-    derivative with respect to the delay.
-
-    Parameters
-    ----------
-    frequencies : (f,) float, Hz
-    products : (f,) complex s, sums of conj(model) times measured
-    delays : (d,) float, s
-    order : n, of the derivative
+    """Correlation (d,) of lines at frequencies (f,) at trial delays (d,), or its n-th derivative,
+    Re sum (2 pi i f)^n s exp(2 pi i f d); s (f,) are sums of conj(model) times measured.
     """
     s = 2j * np.pi * frequencies
     turned = np.exp(np.multiply.outer(np.atleast_1d(delays), s))
@@ -52,31 +46,28 @@ def maxima(frequencies: Floats, products: np.ndarray, window: float) -> tuple[Fl
     height = np.concatenate([correlation(frequencies, products, part)
                              for part in np.array_split(trial, 1 + n // 4096)])  # fmt: skip
     top = 1 + np.flatnonzero((height[1:-1] >= height[:-2]) & (height[1:-1] > height[2:]))
-    top = top[height[top] > 0]
-    if not len(top):
-        top = np.array([int(np.argmax(height))])
-    top = top[np.argsort(-height[top], kind="stable")[:1000]]
-    delays = np.asarray(trial[top], np.float64)
-    for _ in range(NEWTON):
-        slope = correlation(frequencies, products, delays, 1)
-        bend = correlation(frequencies, products, delays, 2)
-        move = np.where(bend < 0, -slope / np.where(bend < 0, bend, -1.0), 0.0)
-        delays = delays + np.clip(move, -step, step)
+    top = top[height[top] > 0] if (height[top] > 0).any() else np.array([int(np.argmax(height))])
+    chosen = top[np.argsort(-height[top], kind="stable")[:1000]]
+    delays = _by_newton(frequencies, products, np.asarray(trial[chosen], np.float64), step)
     return delays, correlation(frequencies, products, delays)
 
 
+def _by_newton(frequencies: Floats, products: np.ndarray, delays: Floats, step: float) -> Floats:
+    """Maxima of the correlation next to delays (k,)."""
+    for _ in range(NEWTON):
+        slope, bend = (correlation(frequencies, products, delays, n) for n in (1, 2))
+        move = np.where(bend < 0, -slope / np.where(bend < 0, bend, -1.0), 0.0)
+        delays = delays + np.clip(move, -step, step)
+    return delays
+
+
 def in_step(each: np.ndarray, frequencies: Floats) -> tuple[np.ndarray, Floats]:
-    """Repetitions (r, f, p) shifted onto their mean where they are out of step, and by how much.
+    """Two or more repetitions (r, f, p) shifted onto their mean where they are out of step, and by
+    how much (r,) in s, of the mean zero.
 
     Delays are those of least squares over all lines and places, within a period of the lowest line.
     They are taken where an F test of what they leave against what there was is significant for as
     many independent delays as there were to choose from.
-
-    Parameters
-    ----------
-    each : (r, f, p) complex, at least two repetitions
-    frequencies : (f,) float, Hz
-    Shifts (r,) are in s and have the mean zero.
     """
     r = len(each)
     if not frequencies.size:
@@ -126,12 +117,8 @@ def _squares(each: np.ndarray) -> Floats:
 
 
 def aligned(values: Floats, references: Floats) -> tuple[Floats, Floats, str]:
-    """Values from where the reference of each begins, that reference, and a sentence.
-
-    Parameters
-    ----------
-    values, references : (r, t, p) float, of each repetition and place
-    Of references that are not alike there is none, and values are as they were.
+    """Values (r, t, p) from where the reference (r, t, p) of each begins, that reference, and a
+    sentence. Of references that are not alike there is none, and values are as they were.
     """
     lags = _lags(references)
     count = values.shape[1]
@@ -155,10 +142,8 @@ def aligned(values: Floats, references: Floats) -> tuple[Floats, Floats, str]:
 
 
 def _lags(references: Floats) -> Floats:
-    """Delay (r, p) in samples of each reference (r, t, p) behind the first.
-
-    Whole samples are where the cross-correlation is largest; the fraction is the slope of the
-    phase over frequency of what overlaps.
+    """Delay (r, p) in samples of each reference (r, t, p) behind the first: where the
+    cross-correlation is largest, and a fraction of a sample by what then overlaps.
     """
     from scipy.signal import correlate  # which takes long to import
 
@@ -178,12 +163,10 @@ def _lags(references: Floats) -> Floats:
 
 def _fraction(first: Floats, other: Floats) -> float:
     """Delay in samples of a signal behind another that it nearly overlaps."""
-    window = np.hanning(len(first))
+    window = cosines("hann", len(first))
     cross = np.fft.rfft(window * other) * np.fft.rfft(window * first).conj()
-    omega = 2 * np.pi * np.fft.rfftfreq(len(first))
-    weights = np.abs(cross) * (np.abs(cross) > 1e-3 * np.abs(cross).max(initial=0.0))
-    size = float((weights * omega**2).sum())
-    return -float((weights * omega * np.angle(cross)).sum()) / size if size > 0 else 0.0
+    cycles = np.asarray(np.fft.rfftfreq(len(first)), np.float64)
+    return float(_by_newton(cycles, cross, np.zeros(1), 1.0)[0])
 
 
 def _shifted(values: Floats, begin: Floats, left: int) -> Floats:

@@ -145,24 +145,15 @@ def bin_width(measurement: Measurement) -> float:
 def lines_of(
     measurement: Measurement, frequencies: Floats, *, settle: float = SETTLE
 ) -> MeasuredLines:
-    """Lines of a measurement by weighted least squares, as `simple_model.response.fit_lines`.
+    """Lines of a measurement at frequencies (f,) in Hz by weighted least squares, as
+    `simple_model.response.fit_lines`, without a fraction `settle` at the start of waveforms.
 
     Their noise is that of the floor under them. Where repetitions vary, it is drawn to the variance
     of their mean, by the degrees of freedom of both; of a line whose repetitions vary by other than
     the floor (F test at 0.1 %), as of a gain that changes, it is this variance alone. Repetitions
     that are out of step (F test at 0.1 %), as of a trigger that jitters, are shifted by the delay
-    that fits each best.
-
-    Parameters
-    ----------
-    measurement : Measurement
-    frequencies : (f,) float, Hz, lines that the measurement resolves; see `measurable`
-    settle : fraction of waveforms that is left out at their start
-
-    Raises
-    ------
-    ValueError
-        If a frequency is beyond a waveform's sampling, or not in a spectrum.
+    that fits each best. Raises a ValueError if a frequency is beyond a waveform's sampling, or not
+    in a spectrum.
     """
     frequencies = np.asarray(frequencies, np.float64)
     lost = frequencies[~measurable(measurement, frequencies)]

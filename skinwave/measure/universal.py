@@ -53,9 +53,9 @@ class Function:
 
 
 def read(path: Path, given: Given) -> Recording:
-    """The recording in a file of Universal File Format. Sets of a reference for each place bring the
-    places into step; a single one is the drive. Raises a ValueError if there is no motion along the
-    direction, or sets do not fit together.
+    """The recording in a Universal File. Sets of a reference for each place bring the places into
+    step; a single one is the drive. Raises a ValueError if there is no motion along the direction,
+    or sets do not fit together.
     """
     functions, at, per_metre = _sets(path)
     motion, others = _motion(functions, given)

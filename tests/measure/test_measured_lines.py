@@ -136,14 +136,14 @@ def test_significances_are_uniform_where_there_is_noise_alone():
 def test_the_chance_of_any_false_difference_is_as_stated():
     rng = np.random.default_rng(7)
     single, any_at_all = [], []
-    for _ in range(60):
+    for _ in range(40):
         lines = lines_of(measured(rng, 5, 0.2), LINES)
         away = lines.mean - align(lines, MODEL, window=0.05).applied(LINES, MODEL)
         p = lines.significances(away)
         single.append(np.mean(p < 0.05))
         any_at_all.append(holm(p).min() < 0.05)
     assert 0.03 < np.mean(single) < 0.06
-    assert np.mean(any_at_all) < 0.05 + 2.6 * np.sqrt(0.05 * 0.95 / 60)
+    assert np.mean(any_at_all) < 0.05 + 2.6 * np.sqrt(0.05 * 0.95 / 40)
 
 
 def test_holms_correction_is_its_definition():
@@ -218,8 +218,9 @@ def test_spectra_have_lines_in_their_bins_and_noise_beside_them():
     assert np.sqrt(np.median(found.variance)) == pytest.approx(0.02, rel=0.3)
     record = spectra(1, 0.02, axis, amplitudes)
     assert measurable(record, np.array([140.4, 499.6, 700.0])).tolist() == [True, True, False]
-    with pytest.raises(ValueError, match="no line at 700 Hz: it reaches 500 Hz"):
-        lines_of(record, np.array([700.0]))
+    for one, beyond in ((record, 700.0), (measured(RNG, 2, 0.1), 2500.0)):
+        with pytest.raises(ValueError, match="no line at"):
+            lines_of(one, np.array([beyond]))
 
 
 def test_single_lines_once_have_no_known_noise():
@@ -228,8 +229,3 @@ def test_single_lines_once_have_no_known_noise():
     assert np.isnan(found.significances(found.mean)).all()
     a = align(found, MODEL)
     assert (a.delay, a.gain) == (pytest.approx(0, abs=1e-12), pytest.approx(1))
-
-
-def test_lines_beyond_the_sampling_are_refused():
-    with pytest.raises(ValueError, match="1000 Hz, half its sampling rate; leave that line out"):
-        lines_of(measured(RNG, 2, 0.1), np.array([2500.0]))
