@@ -22,7 +22,7 @@ from simple_model.typing import Floats
 from skinwave.measure import units
 from skinwave.measure.delays import aligned
 from skinwave.measure.headers import NAMES, TIME, column
-from skinwave.measure.matlab import read_arrays
+from skinwave.measure.matlab import DAMAGED, read_arrays
 from skinwave.measure.recording import Given, Recording, nowhere
 from skinwave.measure.table import rises
 from skinwave.models import named, names
@@ -58,8 +58,7 @@ def read_npz(path: Path, given: Given) -> Recording:
         found = reading.arrays(path)
     except ValueError:
         raise ValueError(
-            "the file cannot be read: it is damaged, too large, holds objects, or is no .npz; save "
-            "arrays of numbers by numpy.savez"
+            "the file cannot be read as .npz; save arrays of numbers by numpy.savez"
         ) from None
     if str(found.get("format", "")) == FORMAT:
         return _own(found)
@@ -78,7 +77,7 @@ def read_mat(path: Path, given: Given) -> Recording:
     try:
         found = subprocess_call.call_reader(read_arrays, path)
     except MeshError as error:
-        raise ValueError("the file is damaged or no MATLAB file; save it anew with -v7") from error
+        raise ValueError(DAMAGED) from error
     if not found:
         raise ValueError("the file has no arrays of numbers; save the signals as such")
     return recording(found, given)
@@ -105,8 +104,7 @@ def _of_response(found: Arrays) -> str:
         return ""
     if not QUANTITIES[own[0]].of_body or not all(named(name).needs_body for name in models):
         raise ValueError(
-            "the file holds the pressure of a point kernel, which is no motion; give the "
-            "response of a body"
+            "the file holds a pressure, which is no motion; give the response of a body"
         )
     return own[0]
 
@@ -183,8 +181,7 @@ def _in_order(
     along = [k for k, size in enumerate(sizes) if size == samples]
     if samples and not along:
         raise ValueError(
-            f"'{name[:40]}' has the shape {kept.shape}, and there are {samples} times or "
-            "frequencies; give an array with as many"
+            f"'{name[:40]}' has the shape {kept.shape}; give an array of {samples} times or values"
         )
     if not samples:
         free = [k for k, size in enumerate(sizes) if size != places or sizes.count(places) > 1]
@@ -232,8 +229,7 @@ def _vector(arrays: Arrays, names: tuple[str, ...]) -> np.ndarray:
             first = rows[np.argmax(np.isfinite(rows).sum(axis=1))]
             if not (np.isnan(rows) | np.isclose(rows, first, rtol=1e-9, atol=0)).all():
                 raise ValueError(
-                    f"the times '{name}' differ from place to place; save signals of the same "
-                    "times, or a reference of each"
+                    f"times '{name}' differ from place to place; save signals of the same times"
                 )
             return first
     return np.empty(0)
@@ -289,8 +285,7 @@ def _places(arrays: Arrays) -> Floats:
         points = points / 1e3 if name in MILLIMETRES else points
         if (largest := np.nanmax(np.abs(points), initial=0.0)) > FARTHEST:
             raise ValueError(
-                f"'{name}' reaches {largest:g} m; name an array in millimetre 'places_mm', or give "
-                "--places"
+                f"'{name}' reaches {largest:g} m; call an array in mm 'places_mm', or give --places"
             )
         return points
     return np.empty((0, 2))
@@ -303,8 +298,5 @@ def _word(arrays: Arrays, name: str) -> str:
 
 def _real(values: np.ndarray, name: str) -> np.ndarray:
     if np.iscomplexobj(values):
-        raise ValueError(
-            f"'{name[:40]}' is complex and there are no frequencies; add an array 'frequencies' "
-            "in Hz"
-        )
+        raise ValueError(f"'{name[:40]}' is complex; add an array 'frequencies' in Hz")
     return values.astype(np.float64)

@@ -32,14 +32,8 @@ STARTS = 8
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fit:
-    """Fit of a scene to a measurement.
-
-    Parameters
-    ----------
-    measured : Measurement
-    target : Target, the scene whose parameters were varied, and the model
-    solution : Solution
-    intervals : Intervals
+    """Fit of a scene to a measurement: the target has the scene whose parameters were varied, and
+    the model.
     """
 
     measured: Measurement

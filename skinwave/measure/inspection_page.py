@@ -138,11 +138,9 @@ def summary(found: Inspection) -> dict[str, Any]:
         "samples": len(measured.axis), "is_spectrum": measured.is_spectrum,
         "rate_hz": _known([measured.rate])[0], "has_drive": len(measured.drive) > 0,
         "lines": [
-            {
-                "frequency_hz": line.frequency, "frequency_error_hz": line.error,
-                "false_alarm": line.false_alarm, "what": origin,
-                "amplitudes": line.amplitudes.tolist(),
-            }
+            {"frequency_hz": line.frequency, "frequency_error_hz": line.error,
+             "false_alarm": line.false_alarm, "what": origin,
+             "amplitudes": line.amplitudes.tolist()}
             for line, origin in zip(found.lines, found.origins, strict=True)
         ],
         "looked_at": (found.kept + 1).tolist(), "noise_floor": _known(found.noise),

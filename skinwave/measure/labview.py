@@ -18,9 +18,7 @@ MISSING = 'TDMS files need npTDMS; pip install "skinwave[measure]", or export .l
 
 
 def read_lvm(path: Path, given: Given) -> Recording:
-    """The recording in a LabVIEW measurement file, of one segment or of several that follow each
-    other in time; raises a ValueError if they do not.
-    """
+    """The recording in a LabVIEW measurement file of one segment."""
     return recording(lvm_table(exported_text(path, LARGEST)), given)
 
 
@@ -32,23 +30,11 @@ def lvm_table(text: str) -> Table:
         found = lvm_read.read_str(text.replace("\r\n", "\n"))
     except Exception:  # whatever is made of spoilt text
         raise ValueError(
-            "the file is damaged or no LabVIEW measurement file; export it anew, or as text in "
-            "columns"
+            "the file is damaged or no LabVIEW measurement file; export it anew"
         ) from None
-    tables = [_of_segment(found[k], found.get("X_Columns", "One"))
-              for k in range(found["Segments"])]  # fmt: skip
-    first = tables[0]
-    if len(tables) == 1:
-        return first
-    names = {tuple(one.text for one in table.columns) for table in tables}
-    starts = [table.numbers[0, 0] for table in tables]
-    ends = [table.numbers[-1, 0] for table in tables]
-    if len(names) > 1 or first.notes or not (np.array(starts[1:]) > ends[:-1]).all():
-        raise ValueError(
-            f"the file has {len(tables)} segments, which do not follow each other in time; export "
-            "one of them"
-        )
-    return Table(columns=first.columns, numbers=np.concatenate([one.numbers for one in tables]))
+    if found["Segments"] > 1:
+        raise ValueError(f"the file has {found['Segments']} segments; export one of them")
+    return _of_segment(found[0], found.get("X_Columns", "One"))
 
 
 def _of_segment(one: dict[str, Any], x_columns: str) -> Table:
@@ -116,8 +102,7 @@ def read_tdms(path: Path, given: Given) -> Recording:
             notes.add((step, float(said.get("wf_start_offset", 0)), said.get("wf_start_time")))
     if len(notes) > 1:
         raise ValueError(
-            "channels of the TDMS file differ in step or start, so that they are not simultaneous; "
-            "export those of one task"
+            "channels differ in step or start and are not simultaneous; export those of one task"
         )
     axis = [(("dt", repr(step)), ("x0", repr(start))) for step, start, _ in notes]
     return recording(

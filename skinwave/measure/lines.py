@@ -161,8 +161,7 @@ def lines_of(
         reach = f"{measurement.axis[-1]:g} Hz" if measurement.is_spectrum else (
             f"{measurement.rate / 2:g} Hz, half its sampling rate")  # fmt: skip
         raise ValueError(
-            f"the measurement has no line at {lost[0]:g} Hz: it reaches {reach}; leave that line "
-            "out"
+            f"the measurement has no line at {lost[0]:g} Hz: it reaches {reach}; leave that out"
         )
     read = _of_spectra if measurement.is_spectrum else _of_waveforms
     each, floor, freedom, correlation = read(measurement, frequencies, settle)

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-LARGEST = 2_000_000_000  # bytes of the arrays in a file
 DEEPEST = 4  # structures within each other
 HDF5 = b"\x89HDF\r\n\x1a\n"
 EARLIEST = 512  # bytes before which HDF5 begins in a file of version 7.3
+DAMAGED = "the file is damaged, too large or no MATLAB file; save fewer arrays anew with -v7"
 MISSING = (
     'MATLAB files of version 7.3 need h5py; pip install "skinwave[measure]", or save it with -v7'
 )
@@ -29,27 +29,17 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
     except Unreadable:
         raise
     except Exception:  # whatever is made of spoilt bytes
-        raise ValueError("the file is damaged or no MATLAB file; save it anew with -v7") from None
+        raise ValueError(DAMAGED) from None
 
 
 class Unreadable(ValueError):
-    """The arrays of a file are too large, or of a kind that only MATLAB reads."""
-
-
-def check(size: float) -> None:
-    """Refuse arrays of more bytes than the limit."""
-    if size > LARGEST:
-        raise Unreadable(
-            f"the file holds {size / 1e6:,.0f} MB, and the limit is {LARGEST / 1e6:,.0f} MB; save "
-            "fewer variables"
-        )
+    """The arrays of a file are of a kind that only MATLAB reads."""
 
 
 def mat(path: Path) -> dict[str, np.ndarray]:
     """Arrays by name of a file of version 4 to 7."""
-    from scipy.io import loadmat, whosmat
+    from scipy.io import loadmat
 
-    check(sum(8 * int(np.prod(shape, dtype=object)) for _, shape, _ in whosmat(path)))
     arrays: dict[str, np.ndarray] = {}
     for name, value in loadmat(path).items():
         if not name.startswith("__"):
@@ -70,14 +60,10 @@ def hdf5(path: Path) -> dict[str, np.ndarray]:
     import h5py
 
     arrays: dict[str, np.ndarray] = {}
-    total = 0
 
     def read(node: Any) -> Any:
-        nonlocal total
         if isinstance(node, h5py.Group):
             return {name: read(one) for name, one in node.items()}
-        total += int(node.nbytes)
-        check(total)
         if node.dtype == h5py.ref_dtype:
             return [read(file[one]) for one in node[()].T.flat]
         return as_in_matlab(node)

@@ -66,10 +66,7 @@ class Measurement:
 
     def _check(self) -> None:
         if bool(len(self.times)) == bool(len(self.frequencies)):
-            raise ValueError(
-                "a measurement has either times or frequencies, and this one has "
-                f"{len(self.times)} and {len(self.frequencies)}; give one of them"
-            )
+            raise ValueError("a measurement has either times or frequencies; give one of them")
         if self.places.ndim != 2 or self.places.shape[1] != 2:
             raise ValueError(
                 f"places of a measurement have shape {self.places.shape}; give (p, 2) in metre"
@@ -82,8 +79,7 @@ class Measurement:
             )
         if len(self.drive) not in (0, len(self.axis)):
             raise ValueError(
-                f"the drive of a measurement has {len(self.drive)} values; give {len(self.axis)}, "
-                "or none"
+                f"the drive of a measurement has {len(self.drive)} values; give {len(self.axis)}"
             )
         steps = np.diff(self.axis)
         if len(steps) and not steps.min() > 0:

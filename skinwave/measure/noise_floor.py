@@ -16,17 +16,11 @@ CORRELATED = 1 + 2 * (0.28 + 0.016)  # bins of a Hann window that stand for one 
 
 
 def floor_of(density: Floats, runs: int, kept: Floats | None = None) -> Floats:
-    """Noise floor (f, p) of densities (f, p) that are means of so many repetitions.
+    """Noise floor (f, p) of densities (f, p) that are means of so many repetitions, of which bins
+    have kept a share (f,) where lines were fitted and taken out.
 
     A parabola through medians of half octaves in logarithms is taken out before, so that noise that
     falls with frequency has no bias at the ends.
-
-    Parameters
-    ----------
-    density : (f, p) float
-    runs : repetitions
-    kept : (f,) float, shares of the noise that bins have where lines have been fitted and taken
-        out; all of it if not given
     """
     kept = np.ones(len(density)) if kept is None else kept
     bins = _telling(kept)

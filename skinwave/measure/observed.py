@@ -188,8 +188,7 @@ def _of_lines(kind: str, measured: Measurement, aim: Target) -> Data:
         )
     if not lines.names:
         raise ValueError(
-            "the measurement resolves no line of the scene's load; give the scene's Tacton the "
-            "frequencies and the path that were measured, or fit waveforms"
+            "the measurement resolves no line of the scene's load; give the measured Tacton"
         )
     a, f, both = lines.found.mean, lines.found.frequencies, lines.found.correlation
     predict, runs = predicted_lines(aim, f), len(lines.found.each)
@@ -234,8 +233,7 @@ def _waveforms(measured: Measurement, aim: Target) -> Data:
     count = measured.times.size * len(measured.places)
     if count > MOST:
         raise ValueError(
-            f"the waveforms are {count:,} values, the limit is {MOST:,}; select places or times, "
-            "or fit lines"
+            f"the waveforms are {count:,} values, the limit is {MOST:,}; fit lines, or less of them"
         )
     lines, mean = load_lines(measured, aim), measured.mean
     rough = _of_lines("lines", measured, aim) if lines.names and not lines.lost else None

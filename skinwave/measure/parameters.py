@@ -136,8 +136,7 @@ def _tied(values: Values, ties: Mapping[str, str]) -> dict[str, float]:
             value = float(_evaluated(ast.parse(text.strip(), mode="eval").body, numbers))
         except (ArithmeticError, LookupError, SyntaxError, TypeError, ValueError):
             raise ValueError(
-                f"--tie {key}={ties[key]} cannot be evaluated; write an expression of numbers and "
-                "of keys that are varied"
+                f"--tie {key}={ties[key]} cannot be evaluated; use numbers and keys that are varied"
             ) from None
         if not math.isfinite(value):
             raise ValueError(f"--tie {key}={ties[key]} is {value}; write one that is finite")

@@ -117,8 +117,7 @@ def target(scene: Scene, model: str, quantity: Quantity, places: Floats) -> Targ
     """
     if not quantity.is_normal:
         raise ValueError(
-            "a fit is to displacement, velocity or acceleration into the body, not "
-            f"{quantity.words}"
+            f"a fit is to motion normal to the body, not to {quantity.words}; measure such"
         )
     if not np.isfinite(places).all():
         raise ValueError(

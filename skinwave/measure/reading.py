@@ -177,8 +177,7 @@ def read(
         raise ValueError(said if said.startswith(str(path)) else f"{path}: {said}") from None
     except (ArithmeticError, AttributeError, LookupError, TypeError) as error:
         raise ValueError(
-            f"{path}: the content does not fit the format, {reader.words}; export it anew, or as "
-            "text in columns"
+            f"{path}: the content does not fit the format, {reader.words}; export it anew"
         ) from error
 
 

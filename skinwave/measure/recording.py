@@ -27,17 +27,8 @@ BESIDE = 8  # samples on both sides of each
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Given:
-    """Options of a user: each replaces what the file says, None or "" leaves it.
-
-    Parameters
-    ----------
-    quantity, unit : str
-    places : (p, 2) float, metre, or None
-    sign : 1 if positive values are into the body, -1 if out of it, None if not given
-    rate : Hz, or None
-    variable : str, the array of a file of several
-    columns : headings or numbers from 1 of the columns or channels of motion; all if empty
-    direction : "x", "y" or "z", of the motion in a file of several; "z" if ""
+    """Options of a user, as `reading.read` has them: each replaces what the file says, None or ""
+    leaves it.
     """
 
     quantity: str = ""
@@ -144,8 +135,7 @@ def _places(found: Recording, given: Given) -> Floats:
     places = found.places if given.places is None else np.atleast_2d(given.places).astype(float)
     if places.shape != (count, 2):
         raise ValueError(
-            f"--places has {len(places)} places, and the file has {count}; give one for each, as "
-            '--places "0,0 5,0" in mm'
+            f"--places has {len(places)} places, and the file has {count}; give one for each"
         )
     return places
 
@@ -241,10 +231,7 @@ def _even(times: Floats) -> tuple[Floats, np.ndarray]:
     if len(times) < 2:
         return times, index
     if not steps.min() > 0:
-        raise ValueError(
-            "times must rise, and some repeat or fall; sort them, or give --rate if they are "
-            "rounded"
-        )
+        raise ValueError("times must rise; sort them, or give --rate if they are rounded")
     if np.abs(steps - steps.mean()).max() <= UNEVEN * steps.mean():
         return times, index
     step = float(np.median(steps))
@@ -259,8 +246,7 @@ def _even(times: Floats) -> tuple[Floats, np.ndarray]:
         )
     if (missing := index[-1] + 1 - len(index)) > LARGEST_GAPS * len(index):
         raise ValueError(
-            f"{missing} rows are missing between {len(index)} in equal steps of {step:g} s; "
-            "measure again, or give the part without gaps"
+            f"{missing} rows are missing between {len(index)}; give the part without gaps"
         )
     full = start + step * np.arange(index[-1] + 1)
     if away <= UNEVEN * step:

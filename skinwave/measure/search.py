@@ -146,8 +146,7 @@ def solve(problem: Problem, starts: int, seed: int, progress: Progress) -> Solut
         raise ValueError(f"{starts} starts are too few; give at least 1")
     if problem.data.values.size < k:
         raise ValueError(
-            f"{problem.data.values.size} values cannot determine {k} parameters; measure more, or "
-            "vary fewer keys"
+            f"{problem.data.values.size} values cannot determine {k} parameters; vary fewer keys"
         )
     hypercube = qmc.LatinHypercube(k, rng=seed)
     points = [hypercube.random(CANDIDATES) for _ in range(starts)]

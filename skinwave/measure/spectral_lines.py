@@ -77,18 +77,8 @@ class _Fit:
 
 
 def spectral_lines(values: Floats, rate: float, *, alarm: float = ALARM) -> LineSpectrum:
-    """Lines and noise floor of waveforms.
-
-    Parameters
-    ----------
-    values : (r, t, p) float, repetitions of waveforms at places
-    rate : Hz
-    alarm : probability that noise alone has any line
-
-    Raises
-    ------
-    ValueError
-        If there are fewer than 32 samples.
+    """Lines and noise floor of repetitions of waveforms (r, t, p) at a rate in Hz; noise alone has
+    any line with the probability `alarm`. Raises a ValueError of fewer than 32 samples.
     """
     runs, count, places = values.shape
     if count < FEWEST:
@@ -145,15 +135,9 @@ def _densities(x: Floats, runs: int, rate: float, *, bare: bool = False) -> Floa
 def peaks(
     density: Floats, floor: Floats, runs: int, alarm: float, known: Floats
 ) -> tuple[Floats, Floats]:
-    """Positions (n,) in bins of new lines, strongest first, and their probabilities (n,) of a false
-    alarm.
-
-    Parameters
-    ----------
-    density, floor : (f, p), of the same unit, means of repetitions
-    runs : repetitions
-    alarm : probability that noise alone has any line
-    known : (l,) positions of lines that are known
+    """Positions (n,) in bins of new lines beside known ones (l,), strongest first, and their
+    probabilities (n,) of a false alarm, of densities and floors (f, p) that are means of so many
+    repetitions.
     """
     tests = density[LOWEST:-1].size
     chance = np.minimum(1.0, tests * tail(density / floor, runs, len(density)))

@@ -200,8 +200,7 @@ def _one_time(columns: list[Column], numbers: Floats) -> list[Column]:
     for k in kept[1:]:
         if not np.array_equal(numbers[:, k], numbers[:, kept[0]]):
             raise ValueError(
-                f"the times '{columns[kept[0]].text}' and '{columns[k].text}' differ; export "
-                "channels with the same times, or one file for each"
+                f"times '{columns[kept[0]].text}' and '{columns[k].text}' differ; export one"
             )
     return [replace(one, role=INDEX) if k in found and k != kept[0] else one
             for k, one in enumerate(columns)]  # fmt: skip
@@ -229,8 +228,7 @@ def _check_directions(columns: list[Column], chosen: list[int], has_places: bool
     axes = {one[1] for one in found if one}
     if len(axes) > 1 and not (chosen or has_places):
         raise ValueError(
-            f"columns are of the directions {', '.join(sorted(axes))}; choose that normal to the "
-            "body by --columns"
+            f"columns are along {', '.join(sorted(axes))}; choose the normal one by --columns"
         )
 
 
@@ -311,8 +309,7 @@ def _series(
         return [(columns[k], numbers[:, k]) for k in motion]
     if len(motion) % 2:
         raise ValueError(
-            "a spectrum needs two columns a place: 're v(0,0)', 'im v(0,0)', or magnitude and "
-            "phase; choose them by --columns"
+            "a spectrum needs two columns a place, re and im or magnitude and phase; choose these"
         )
     pairs = zip(motion[::2], motion[1::2], strict=True)
     return [(columns[k], _complex_of(columns, numbers, k, other)) for k, other in pairs]
@@ -332,8 +329,8 @@ def _complex_of(
             raise ValueError(f"the phase '{other.text}' needs a unit; give [deg] or [rad]")
         return np.asarray(a * np.exp(1j * (np.deg2rad(b) if unit == "deg" else b)))
     raise ValueError(
-        f"'{one.text}' and '{other.text}' are no complex amplitude; name them 're v(0,0) [mm/s]', "
-        "'im v(0,0) [mm/s]', or 'abs' and 'phase'"
+        f"'{one.text}' and '{other.text}' are no complex amplitude; name them 're v', 'im v', or "
+        "'abs v', 'phase v'"
     )
 
 
@@ -400,7 +397,6 @@ def _filled(values: np.ndarray, at: tuple[np.ndarray, ...]) -> np.ndarray:
         raise ValueError(f"row {twice + 1} has a time and place that another row has; leave one")
     if total != len(values):
         raise ValueError(
-            f"{len(values)} rows are not one for each of {shape[0]} repetitions, {shape[1]} times "
-            f"or frequencies and {shape[2]} places, {total}; complete them"
+            f"{len(values)} rows are not {total}, one a repetition, time and place; complete them"
         )
     return np.asarray(values[row].reshape(shape))

@@ -240,8 +240,7 @@ def _columns(
             continue
         if (one := column(names[k], units[k])).role or quantity_of(one.unit):
             raise ValueError(
-                f"the column '{names[k][:40]}' holds text such as '{cell[:40]}'; export it as "
-                "numbers, times in s or as hours:minutes:seconds"
+                f"the column '{names[k][:40]}' holds text such as '{cell[:40]}'; export numbers"
             )
         notes.append(("remark", f"the column '{names[k][:40]}' holds text and is left out"))
     return [column(names[k], units[k]) for k in layout.kept]
@@ -288,8 +287,7 @@ def _numbers(
     rows, width, delimiter = lines[first:], len(names), layout.delimiter
     if delimiter == "," and any(_LEADING_ZERO.search(line) for line in rows[:SHOWN]):
         raise ValueError(
-            f"line {first + 1} seems to have decimal commas between commas; export columns between "
-            "semicolons or tabs"
+            f"line {first + 1} has decimal commas between commas; export semicolons or tabs"
         )
     text = "\n".join(rows)
     if len(layout.kept) == width > 1 and not (layout.comma and "." in text):  # 10 times faster
@@ -314,8 +312,7 @@ def _row(line: str, number: int, layout: _Layout, names: list[str], notes: Notes
         wrong = next((c for c in _cells(line, layout.delimiter) if "." in c), "")
     elif not kept[-1] < len(cells) <= len(names):
         raise ValueError(
-            f"line {number} has {len(cells)} cells and the rows above {len(names)}; complete or "
-            "delete it"
+            f"line {number} has {len(cells)} cells and rows above {len(names)}; complete it"
         )
     values = [] if wrong else [_value(cells[k]) for k in kept]
     for k, value in zip(kept, values, strict=False):

@@ -111,8 +111,7 @@ def _sets(path: Path) -> tuple[list[Function], dict[int, tuple[float, float]], f
     if FUNCTION not in kinds:
         held = ", ".join(map(str, sorted(set(kinds))))
         raise ValueError(
-            f"the file has no set 58 of functions{f', but {held}' if held else ''}; export "
-            "functions of time or frequency"
+            f"the file has no set 58 of functions{f', but {held}' if held else ''}; export these"
         )
     at: dict[int, tuple[float, float]] = {}
     for one in found:
@@ -160,8 +159,7 @@ def _motion(functions: list[Function], given: Given) -> tuple[list[Function], li
     with_phase = [f for f in functions if f.type in (GENERAL, IN_TIME, RESPONSE, SPECTRUM)]
     if not with_phase:
         raise ValueError(
-            f"its functions are of type {functions[0].type}, which has no phase; "
-            "export time responses (1), frequency responses (4) or spectra (12)"
+            f"its functions are of type {functions[0].type}, which has no phase; export spectra"
         )
     others = [one for one in with_phase if one.is_reference]
     motion = [one for one in with_phase if not one.is_reference]
@@ -180,8 +178,7 @@ def _motion(functions: list[Function], given: Given) -> tuple[list[Function], li
     nodes = sorted({one.ref_node for one in at})
     if len(nodes) > 1 and all(one.type == RESPONSE for one in at):
         raise ValueError(
-            f"its frequency responses have {len(nodes)} references, the nodes "
-            f"{', '.join(map(str, nodes))}; export those of one"
+            f"its responses have the references {', '.join(map(str, nodes))}; export those of one"
         )
     if not at:
         names = {number: name for name, number in AXES.items()}
@@ -200,15 +197,13 @@ def _check_alike(motion: list[Function]) -> None:
         step = 1e-3 * abs(first.x[1] - first.x[0])
         if len(one.y) != len(first.y) or not np.allclose(one.x, first.x, rtol=1e-6, atol=step):
             raise ValueError(
-                f"sets 58 have {len(first.y)} and {len(one.y)} times or frequencies, or other "
-                "ones; export them with the same"
+                "sets 58 differ in their times or frequencies; export them with the same"
             )
         for key in ("quantity", "unit", "type"):
             here, there = getattr(first, key), getattr(one, key)
             if here != there:
                 raise ValueError(
-                    f"sets 58 differ in {key}: {str(here)[:20]}, {str(there)[:20]}; export one "
-                    "quantity, or choose it by --quantity"
+                    f"sets 58 differ in {key}: {here}, {there}; choose by --quantity, or export one"
                 )
 
 

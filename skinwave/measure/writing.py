@@ -57,18 +57,8 @@ WRITERS = {".npz": npz, ".csv": table}
 
 
 def write(measured: Measurement, path: str | Path, *, overwrite: bool = False) -> None:
-    """Write a measurement as .npz or .csv.
-
-    Parameters
-    ----------
-    measured : Measurement
-    path : whose suffix is one of these
-    overwrite : whether a file that is there may be replaced
-
-    Raises
-    ------
-    ValueError
-        If the suffix is another one, or the file is there or cannot be written.
+    """Write a measurement as .npz or .csv; raises a ValueError if the suffix is another one, or the
+    file is there and may not be replaced.
     """
     path = Path(path)
     writer = WRITERS[choose("kind of file", path.suffix.lower(), WRITERS)]
