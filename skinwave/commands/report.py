@@ -98,7 +98,7 @@ def _page(options: argparse.Namespace) -> int:
     if made and options.out is None and out.is_symlink():
         raise ValueError(f"{out} is a link; remove it or name the folder to write with --out")
     with (
-        output_folder(out, overwrite=anew, inputs=inputs, report=_drawn(options)) as folder,
+        output_folder(out, overwrite=anew, inputs=inputs) as folder,
         progress_of(options) as progress,
     ):
         if scene is not None:
@@ -118,14 +118,6 @@ def _page(options: argparse.Namespace) -> int:
     summary = {"out": str(out), "megabytes": round(size / 1e6, 2)}
     summarise(options, summary, f"{size / 1e6:.1f} MB; open {out}/index.html")
     return 0
-
-
-def _drawn(options: argparse.Namespace) -> list[str]:
-    """The options by which it is drawn, where they are not the defaults."""
-    words = [] if options.style == "report" else ["--style", options.style]
-    words += ["--width", f"{options.width:g}"] if options.width else []
-    words += ["--only", ",".join(options.only)] if options.only else []
-    return words + [word for kind in options.format for word in ("--format", kind)]
 
 
 def _again(options: argparse.Namespace) -> str:

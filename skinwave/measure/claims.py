@@ -6,10 +6,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from simple_model.numbers import decibel
-from simple_model.quantities import DISPLACEMENT
 from simple_model.typing import Floats
 from skinwave.measure.lines import MeasuredLines
-from skinwave.results.claims import CLAIMS, NEEDED, PAIRS, NamedLines, is_resolved, is_single
+from skinwave.results.claims import (
+    CLAIMS,
+    NEEDED,
+    PAIRS,
+    LinesByName,
+    NamedLines,
+    is_resolved,
+    is_single,
+)
 from skinwave.scene.scene import Scene
 
 HOLDS, FAILS, UNDECIDED = "holds", "fails", "cannot be decided"
@@ -19,37 +26,6 @@ OF_PLACES = ("S2", "S5")  # claims about the frequencies of peaks
 SOUGHT = {  # lines that a claim says are there, where the others are to be weak
     "S3": PAIRS, "M1": ("2f_AM", "3f_AM"), "M3": ("f_d", "2f_AM"),
 }  # fmt: skip
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class LinesByName:
-    """Measured lines by name, as `NamedLines`, with the `radius` (p,) of the confidence
-    circle of each amplitude; `spectrum` is empty where there are only lines.
-    """
-
-    tacton: str
-    scene: Scene
-    places: Floats
-    frequencies: dict[str, float]
-    lines: dict[str, Floats]
-    radius: dict[str, Floats]
-    unresolved: tuple[str, ...]
-    spectrum: tuple[Floats, Floats]
-
-    @property
-    def is_am(self) -> bool:
-        """Whether the amplitude is modulated."""
-        return self.scene.tacton.am_frequency > 0
-
-    @property
-    def is_stm(self) -> bool:
-        """Whether the focus moves."""
-        return self.scene.tacton.trajectory.drawing_frequency > 0
-
-    @property
-    def is_motion(self) -> bool:
-        """Whether they are of displacement."""
-        return self.scene.reading.asked is DISPLACEMENT
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from simple_model import Response
+from simple_model import Response, drawing
 from skinwave.models import named
 from skinwave.system.effort import versions
 
@@ -24,9 +24,7 @@ SOLVERS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Citations:
-    """References in the order in which they are to be cited, and a sentence for a methods section;
-    printed, one a line.
-    """
+    """A sentence for a methods section, and the references to cite; printed, one a line."""
 
     sentence: str
     references: tuple[str, ...]
@@ -36,16 +34,12 @@ class Citations:
         return "\n".join([self.sentence, *listed])
 
     def _repr_html_(self) -> str:
-        from simple_model.drawing import page, table
-
         rows = [[f"[{k}]", text] for k, text in enumerate(self.references, 1)]
-        return page(self.sentence, b"", [table(rows)])
+        return drawing.page(self.sentence, b"", [drawing.table(rows)])
 
 
 def cite(*responses: Response) -> Citations:
     """References for some responses: the program, what each model is computed by, and solvers.
-
-    What a model rests on is its own to say, also of one from outside.
 
     Raises
     ------
@@ -56,16 +50,15 @@ def cite(*responses: Response) -> Citations:
         raise ValueError("there is no response to cite for; give one or more")
     models = list(dict.fromkeys(response.model for response in responses))
     methods = ", ".join(f"{name} ({named(name).method})" for name in models)
-    made = {**versions(), **responses[0].effort.versions}
-    release = made.get("skinwave", "of unknown version")
+    release = {**versions(), **responses[0].effort.versions}.get("skinwave", "of unknown version")
     year = f", {RELEASED}" if release == VERSION else ""
     program = (
         "The skinwave authors: skinwave: waves in skin and paper under mid-air ultrasound haptics. "
         f"Version {release}{year}. Software"
     )
     sources = [source for name in models for source in named(name).sources]
-    solvers = [text for name, text in SOLVERS.items()
-               if any(name in response.effort.solver for response in responses)]  # fmt: skip
+    used = {response.effort.solver for response in responses}
+    solvers = [text for name, text in SOLVERS.items() if any(name in each for each in used)]
     return Citations(
         sentence=f"Responses were computed with skinwave {release} by {methods}.",
         references=tuple(dict.fromkeys([program, TACTONS, *sources, *solvers])),

@@ -7,12 +7,12 @@ Nothing here knows which model should fulfil which.
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model.numbers import decibel
+from simple_model.quantities import DISPLACEMENT
 from skinwave.results.run import Run
 from skinwave.scene.scene import Scene
 from skinwave.system.table import Table
@@ -25,48 +25,39 @@ ON_BIN = 1.0  # Hz: one bin of a spectrum of 1 s
 REACH = 6.0  # Hz from a line within which its spectral peak is looked for
 
 
-class NamedLines(Protocol):
-    """Lines by name that claims are assessed by: of a `Run`, or of a measurement."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LinesByName:
+    """Measured lines by name, with the attributes of a `Run` that claims are assessed by, and the
+    `radius` (p,) of the confidence circle of each amplitude; `spectrum` is empty where there are
+    only lines.
+    """
 
-    @property
-    def tacton(self) -> str:
-        """Name of the Tacton."""
-
-    @property
-    def scene(self) -> Scene:
-        """The scene, whose load has the lines."""
-
-    @property
-    def places(self) -> Floats:
-        """Places (p, 2) in metre."""
-
-    @property
-    def frequencies(self) -> dict[str, float]:
-        """Frequencies in Hz by name."""
-
-    @property
-    def lines(self) -> dict[str, Floats]:
-        """Amplitudes (p,) by name."""
-
-    @property
-    def unresolved(self) -> tuple[str, ...]:
-        """Names of unresolved lines."""
-
-    @property
-    def spectrum(self) -> tuple[Floats, Floats]:
-        """Frequencies (f,) in Hz and amplitudes (f, p)."""
+    tacton: str
+    scene: Scene
+    places: Floats
+    frequencies: dict[str, float]
+    lines: dict[str, Floats]
+    radius: dict[str, Floats]
+    unresolved: tuple[str, ...]
+    spectrum: tuple[Floats, Floats]
 
     @property
     def is_am(self) -> bool:
         """Whether the amplitude is modulated."""
+        return self.scene.tacton.am_frequency > 0
 
     @property
     def is_stm(self) -> bool:
         """Whether the focus moves."""
+        return self.scene.tacton.trajectory.drawing_frequency > 0
 
     @property
     def is_motion(self) -> bool:
         """Whether they are of displacement."""
+        return self.scene.reading.asked is DISPLACEMENT
+
+
+NamedLines = Run | LinesByName
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,5 +1,7 @@
 """Comparison of two responses: waveforms, lines, phase delay and spread."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

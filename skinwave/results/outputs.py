@@ -10,7 +10,7 @@ import os
 import secrets
 import shlex
 import shutil
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
@@ -25,41 +25,35 @@ LONGEST = 50  # characters of a name that a temporary one begins with
 
 @contextmanager
 def output_folder(
-    out: Path,
-    *,
-    overwrite: bool = False,
-    inputs: Iterable[str | Path] = (),
-    report: Sequence[str] = (),
+    out: Path, *, overwrite: bool = False, inputs: Iterable[str | Path] = ()
 ) -> Iterator[Path]:
     """Yield a folder to write in, which becomes `out` when all is written; a ValueError if that
     exists and may not be replaced. `inputs`, which the command reads, are never replaced.
 
     Until then its name is `<out>.partial-` and eight digits. An error removes it and leaves `out`
-    untouched. An interrupt keeps it if it holds finished runs, and says so, with the options
-    `report` of the command that makes a page of them.
+    untouched. An interrupt keeps it if it holds finished runs, and says so.
     """
     out = Path(os.path.realpath(out))  # a link remains one, and points to what is written
     _refuse_folder(out, overwrite, inputs)
     out.parent.mkdir(parents=True, exist_ok=True)
-    aside = beside(out, "partial")
+    aside, kept = beside(out, "partial"), False
     aside.mkdir()
     try:
         yield aside
         seal(aside)
+        kept = True  # a whole result is not lost, whatever happened to the target meanwhile
         _put_in_place(aside, out, overwrite)
     except KeyboardInterrupt:
-        if not any(aside.rglob(record.FILE)):
-            shutil.rmtree(aside, ignore_errors=True)
+        kept = any(aside.rglob(record.FILE))
+        if not kept:
             raise
-        command = shlex.join(["skinwave", "report", str(aside), *report])
+        command = shlex.join(["skinwave", "report", str(aside)])
         raise KeyboardInterrupt(
             f"the runs that were finished are kept in {aside}; {command} makes a page of them"
         ) from None
-    except _TakenError:
-        raise
-    except BaseException:
-        shutil.rmtree(aside, ignore_errors=True)
-        raise
+    finally:
+        if not kept:
+            shutil.rmtree(aside, ignore_errors=True)
 
 
 @contextmanager
@@ -129,16 +123,14 @@ def foreign_file(folder: Path) -> Path | None:
 
     A report within it has a list of its own.
     """
-    listed = listed_files(folder) or {}
-    own = listed_files(folder / REPORT) or {}
-    listed |= {f"{REPORT}/{name}": known for name, known in own.items()}
-    records = [folder / record.FILE, *[folder / REPORT / record.FILE] * bool(own)]
+    records, listed = set[Path](), dict[Path, str]()
+    for home in (folder, folder / REPORT):
+        if (known := listed_files(home)) is not None:
+            records.add(home / record.FILE)
+            listed |= {home / name: found for name, found in known.items()}
     for path in sorted(folder.rglob("*")):
-        is_folder = path.is_dir() and not path.is_symlink()
-        known = listed.get(path.relative_to(folder).as_posix())
-        if not (is_folder or path.name in OF_SYSTEM or path in records) and not is_as_listed(
-            path, known
-        ):
+        ours = path.name in OF_SYSTEM or path in records or is_as_listed(path, listed.get(path))
+        if not ours and (path.is_symlink() or not path.is_dir()):
             return path
     return None
 
@@ -146,10 +138,6 @@ def foreign_file(folder: Path) -> Path | None:
 def is_as_listed(path: Path, entry: object) -> bool:
     """Whether a path is a regular file, no link, with the content that its entry in a list has."""
     return path.is_file() and not path.is_symlink() and digest(path) == entry
-
-
-class _TakenError(ValueError):
-    """The target was written by another program meanwhile; the result is kept beside it."""
 
 
 def _refuse_folder(out: Path, overwrite: bool, inputs: Iterable[str | Path]) -> None:
@@ -189,7 +177,7 @@ def _put_in_place(aside: Path, out: Path, overwrite: bool) -> None:
     except (OSError, ValueError) as error:
         if old.exists() and not os.path.lexists(out):
             old.rename(out)
-        raise _TakenError(
+        raise ValueError(
             f"{out} cannot be replaced ({error}); this result is {aside}, rename it as you like"
         ) from None
     shutil.rmtree(old, ignore_errors=True)

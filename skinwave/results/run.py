@@ -20,9 +20,7 @@ SUPPORT = "f_support"  # the line of a support that moves
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Run:
-    """One Tacton on one body by one model; the lines of its response are those of the load of its
-    scene.
-    """
+    """One Tacton on one body by one model; the lines of its response are those of its load."""
 
     tacton: str
     body: str
@@ -78,12 +76,11 @@ class Run:
 
     @property
     def unresolved(self) -> tuple[str, ...]:
-        """Unresolved lines: too close to 0 Hz or to each other for the length of the response."""
+        """Names of lines too close to 0 Hz or to each other for the length of the response."""
         return tuple(self.table.unresolved)
 
     @cached_property
     def _own(self) -> dict[str, str]:
-        """The listed name of each name."""
         return own_names(self.scene, self.listed)
 
     @property
@@ -93,9 +90,7 @@ class Run:
 
     @property
     def is_skin(self) -> bool:
-        """Whether it is the surface of skin that moves, of which alone thresholds of detection are
-        known.
-        """
+        """Whether it is the motion of skin, of which alone thresholds of detection are known."""
         return self.is_motion and self.scene.body.is_skin
 
     @property

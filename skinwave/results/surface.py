@@ -298,7 +298,8 @@ def _is_round(pressure: MovingPressure) -> bool:
 
 def _rms(asked: Quantity, lines: Lines, places: int) -> Floats:
     """RMS (p,) about the mean of lines (f,), (f, p c) of the components of a quantity."""
-    f, a = lines[0], lines[1].reshape(len(lines[0]), places, -1)
+    f, components = lines[0], int(np.prod(lines[1].shape[1:])) // max(places, 1)
+    a = lines[1].reshape(len(f), places, components)
     if asked.invariant is None:
         return np.asarray(np.sqrt((np.abs(a[f > STILL, :, 0]) ** 2).sum(axis=0) / 2))
     return np.concatenate([*_parts(asked, f, a)])  # of the whole tensor, its mean included

@@ -13,27 +13,28 @@ from skinwave.commands import cli
 
 ROOT = Path(__file__).parents[2]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
+OTHERS = [page for page in PAGES if page.stem not in WRITTEN]
 
 
 def shown(language, pages=PAGES):
-    """Code blocks of a language, each with its page."""
+    """Code blocks of a language, by page."""
     pattern = re.compile(rf"```{language}\n(.*?)```", re.DOTALL)
-    return [
-        pytest.param(text, id=f"{page.stem} {k}")
-        for page in pages
-        for k, text in enumerate(pattern.findall(page.read_text("utf-8")))
-    ]
+    found = {page: pattern.findall(page.read_text("utf-8")) for page in pages}
+    return {page: texts for page, texts in found.items() if texts}
 
 
 def test_the_readme_is_short():
     assert len((ROOT / "README.md").read_text("utf-8").splitlines()) <= 90
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_what_a_page_links_to_is_there(page):
-    links = re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text("utf-8"))
-    local = [link for link in links if "://" not in link]
-    assert [link for link in local if not (page.parent / link).exists()] == []
+def test_what_pages_link_to_is_there():
+    links = [
+        page.parent / link
+        for page in PAGES
+        for link in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text("utf-8"))
+        if "://" not in link
+    ]
+    assert [link for link in links if not link.exists()] == []
 
 
 def test_pictures_of_the_gallery_are_of_scripts_that_there_are():
@@ -47,26 +48,29 @@ def test_pictures_of_the_gallery_are_of_scripts_that_there_are():
     assert [x for x in named if not (ROOT / f"examples/gallery/{x[1]}.py").exists()] == []
 
 
-@pytest.mark.parametrize("text", shown("toml"))
-def test_every_scene_that_the_documentation_shows_is_one(text):
-    scene = loads(text)
-    assert loads(dumps(scene)) == scene
+def test_every_scene_that_the_documentation_shows_is_one():
+    for page, texts in shown("toml").items():
+        for text in texts:
+            scene = loads(text)
+            assert loads(dumps(scene)) == scene, page
 
 
-@pytest.mark.parametrize("text", shown("sh"))
-def test_commands_are_understood(text):
-    lines = [line for line in text.splitlines() if line.startswith("skinwave ")]
-    for line in lines:
-        words = shlex.split(line, comments=True)[1:]
-        assert cli.parser().parse_args(cli._joined(words)).command
-    assert lines or "python3 -m venv" in text
+def test_commands_are_understood():
+    for page, texts in shown("sh").items():
+        for text in texts:
+            lines = [line for line in text.splitlines() if line.startswith("skinwave ")]
+            for line in lines:
+                words = shlex.split(line, comments=True)[1:]
+                assert cli.parser().parse_args(cli._joined(words)).command, page
+            assert lines or "python3 -m venv" in text, page
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("text", shown("python", [p for p in PAGES if p.stem not in WRITTEN]))
-def test_python_runs(text, monkeypatch, capsys):
+@pytest.mark.parametrize("page", shown("python", OTHERS), ids=lambda page: page.stem)
+def test_python_runs(page, monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SkinwaveWarning)  # the point kernel has no propagation
-        exec(compile(text, "documentation", "exec"), {})
-    assert capsys.readouterr().out
+    for text in shown("python", OTHERS)[page]:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SkinwaveWarning)  # the point kernel has no propagation
+            exec(compile(text, str(page), "exec"), {})
+        assert capsys.readouterr().out

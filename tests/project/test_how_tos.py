@@ -45,10 +45,8 @@ def run(language, text):
         exec(compile(text, "how-to", "exec"), {})
     else:
         for line in text.splitlines():
-            assert (
-                cli.main([*shlex.split(line)[1:], "--quiet"][: None if "plan" not in line else -1])
-                == 0
-            )
+            quiet = ["--quiet"] * ("plan" not in line)
+            assert cli.main([*shlex.split(line)[1:], *quiet]) == 0
 
 
 @pytest.mark.slow

@@ -4,14 +4,12 @@ import gc
 import json
 import os
 import re
-import shutil
-import subprocess
 import wave
 from dataclasses import replace
 from hashlib import sha256
 from importlib.util import find_spec
 from io import BytesIO
-from itertools import combinations, pairwise
+from itertools import combinations
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -27,7 +25,6 @@ from skinwave.commands.cli import main
 from skinwave.report import films, maps, render
 from skinwave.report.figures import tacton_figure
 from skinwave.report.levels import levels_figure
-from skinwave.report.maps import surfaces_figure
 from skinwave.report.renderer import Renderer, renderer
 from skinwave.report.styles import style
 from skinwave.results import exports, motion, speeds, views
@@ -80,13 +77,10 @@ def page(folder, tmp_path_factory):
     return out
 
 
-def test_models_stand_side_by_side_with_the_scenes_own_body(scene, seen):
+def test_all_but_the_published_kernel_receive_the_same_load(scene, folder, seen):
     assert list(seen) == ["point-kernel", "paper-sheet-loose", "skin-slab"]
     assert seen["skin-slab"].scene == scene
     assert {view.quantity.unit for view in seen.values()} == {"Pa", "m"}
-
-
-def test_all_but_the_published_kernel_receive_the_same_load(scene, folder):
     loads = {run.column: run.scene.pressure for run in album.open_album(folder).runs}
     assert list(loads) == [
         "point-kernel-published", "point-kernel", "paper-sheet-loose", "skin-slab",
@@ -107,16 +101,6 @@ def test_a_body_of_ones_own_is_shown_alone_and_changes_no_load(scene):
     assert list(asked)[2:] == ["skin-slab", "paper-sheet-loose"]
     with pytest.raises(ValueError, match="body 'paper' is unknown"):
         album.shown_scenes(scene, ["paper"])
-
-
-def test_a_view_comes_back_from_its_file(seen, tmp_path):
-    views.save(tmp_path / "view.npz", seen["skin-slab"])
-    back = views.load(tmp_path / "view.npz")
-    np.testing.assert_array_equal(back.motion, seen["skin-slab"].motion)
-    assert back.scene == seen["skin-slab"].scene
-    (tmp_path / "view.npz").write_bytes(b"spoilt")
-    with pytest.raises(ValueError, match="make it anew"):
-        views.load(tmp_path / "view.npz")
 
 
 def test_a_point_moves_in_a_view_as_its_probe_does(scene, moved):
@@ -143,14 +127,6 @@ def test_the_kernels_brightest_place_lies_on_the_path(seen):
             assert np.linalg.norm(view.places[frame.argmax()] - focus) < 1.5 * step
 
 
-def test_a_sheet_bends_at_the_speed_of_plates():
-    """80 g/m2 paper at 140 Hz."""
-    sheet = Body(kind="sheet", material="paper", depth=1e-4, base="free", sides="clamped")
-    assert sheet.of_kind.wave_speed(sheet, 140.0) == pytest.approx(7.7, abs=0.1)
-    skin = Body(material="forearm")
-    assert skin.of_kind.wave_speed(skin, 200.0) == pytest.approx(3.22, abs=0.03)
-
-
 def test_what_is_played_returns_after_the_slowest_beat():
     """f_d - f_AM = 51 Hz is the slowest line: the load is another one after one period of AM."""
     beating = circling(190.986, am_frequency=140)
@@ -159,7 +135,6 @@ def test_what_is_played_returns_after_the_slowest_beat():
     assert speeds.seam(beating.tacton, 1 / 140) == pytest.approx(190.986 / 140 - 1)
     whole = circling(200.0, am_frequency=140)
     assert speeds.shown_part(whole, 340.0) == pytest.approx((0.05, 8 * 0.05 * 340))
-    assert speeds.shown_part(whole, 340.0, 12) == (pattern_period(whole.tacton), 12)
     assert speeds.shown_part(circling(200.0), 200.0) == pytest.approx((0.005, speeds.FEWEST))
 
 
@@ -226,10 +201,8 @@ def test_a_film_may_be_an_mp4(seen, tmp_path):
     path = tmp_path / "film.mp4"
     films.film(path, [seen["skin-slab"]], style("report"), panel=(160, 144))
     with imageio.get_reader(path) as film:
-        frames = [np.asarray(frame, int) for frame in film]
+        assert sum(1 for _ in film) == 12
         assert film.get_meta_data()["fps"] == pytest.approx(12 / films.LASTS)
-    assert len(frames) == 12
-    assert min(np.abs(a - b).max() for a, b in pairwise(frames)) > 60
     gc.collect()
 
 
@@ -256,40 +229,37 @@ def test_fields_are_opened_again_with_their_times(seen, page):
     np.testing.assert_array_equal(grid["displacement_m"], view.motion[frame])
     np.testing.assert_allclose(grid.points, view.points)
     for name, values in (("strain", view.tensors.strain), ("stress_pa", view.tensors.stress)):
-        xy, yz, xz = grid[name].T[3:]  # in ParaView's order
-        np.testing.assert_array_equal([xy, xz, yz], values[3].T[3:])
+        own = grid[name][:, [0, 1, 2, 3, 5, 4]]  # in ParaView's order
+        np.testing.assert_array_equal(own, values[3])
     assert list(grid.field_data["units"]) == ["displacement_m: m", "strain: 1", "stress_pa: Pa"]
 
 
-FIGURES = ("propagation", "snapshots")
-
-
-@pytest.mark.parametrize("name", FIGURES)
-def test_text_of_vector_figures_is_text(page, name):
-    assert (page / f"pictures/{name}.png").stat().st_size > 10_000
-    svg = (page / f"pictures/{name}.svg").read_text()
-    assert "skin slab" in re.sub("<[^>]+>", " ", svg)
-    assert svg.count("<text") > 10
-    assert 'id="DejaVu' not in svg  # no glyph as a path
-    pdf = page / f"pictures/{name}.pdf"
-    assert b"/Type3" not in pdf.read_bytes()
-    assert b"/FontFile2" in pdf.read_bytes()  # TrueType
-    if shutil.which("pdffonts"):
-        told = subprocess.run(["pdffonts", str(pdf)], capture_output=True, text=True, check=True)
-        assert "TrueType" in told.stdout
-        assert "Type 3" not in told.stdout
+def test_text_of_vector_figures_is_text(page):
+    for name in ("propagation", "snapshots"):
+        assert (page / f"pictures/{name}.png").stat().st_size > 10_000
+        svg = (page / f"pictures/{name}.svg").read_text()
+        assert "skin slab" in re.sub("<[^>]+>", " ", svg)
+        assert svg.count("<text") > 10
+        assert 'id="DejaVu' not in svg  # no glyph as a path
+        pdf = (page / f"pictures/{name}.pdf").read_bytes()
+        assert b"/Type3" not in pdf
+        assert b"/FontFile2" in pdf  # TrueType
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("dressed", ["talk", "narrow"])
-def test_no_text_of_a_figure_is_cut(folder, dressed):
+def test_no_text_of_a_figure_is_cut(folder):
     kept = album.open_album(folder)
-    chosen = style("report", 3.5) if dressed == "narrow" else style(dressed)
     shown, runs = list(kept.views.values()), kept.groups["small"]
-    figures = [maps.snapshots_figure(shown, chosen)]
-    figures += [surfaces_figure(kept.scene, kept.maps, chosen)]
-    figures += [tacton_figure("small", runs, chosen), levels_figure(runs, 0, chosen)]
-    for figure in figures:
+    drawn = [
+        (chosen, figure)
+        for chosen in (style("talk"), style("report", 3.5))
+        for figure in (
+            maps.snapshots_figure(shown, chosen),
+            maps.surfaces_figure(kept.scene, kept.maps, chosen),
+            tacton_figure("small", runs, chosen), levels_figure(runs, 0, chosen),
+        )
+    ]  # fmt: skip
+    for chosen, figure in drawn:
         canvas = FigureCanvasAgg(figure)
         figure.draw_without_rendering()
         drawn = figure.get_tightbbox(canvas.get_renderer())  # inch
@@ -342,7 +312,6 @@ def test_a_report_is_rebuilt_without_a_model_and_without_gl(folder, tmp_path, mo
     assert main(["report", str(folder), "--out", str(tmp_path / "flat"), "--quiet"]) == 0
     text = (tmp_path / "flat/index.html").read_text()
     assert "apt install libegl1 libgl1-mesa-dri" in text
-    assert text.count("data:image/") == 5
     assert (tmp_path / "flat/pictures/snapshots.png").exists()
     assert not (tmp_path / "flat/pictures/film.gif").exists()
 
@@ -364,10 +333,9 @@ def test_a_run_of_one_model_has_a_report_too(tmp_path, monkeypatch, capsys):
     text = Path("one/report/index.html").read_text()
     assert "skinwave report SCENE computes it" in text
     assert main(["report", "one", "--quiet"]) == 0  # its own folder is made anew
-    assert main(["report", "one/report/pictures"]) == 2
-    assert "holds no responses.npz" in capsys.readouterr().err
-    assert main(["report", "one", "--film"]) == 2
-    assert "keeps no motion of whole bodies" in capsys.readouterr().err
+    for words in (["one/report/pictures"], ["one", "--film"]):
+        assert main(["report", *words]) == 2
+        assert capsys.readouterr().err.count("\n") == 1
 
 
 def test_the_installation_names_what_there_is_and_what_is_missing(capsys):
@@ -375,5 +343,3 @@ def test_the_installation_names_what_there_is_and_what_is_missing(capsys):
     found = {row["what"]: row for row in json.loads(capsys.readouterr().out)["findings"]}
     assert {"python", "pyvista", "solver", "renderer", "threads"} <= set(found)
     assert bool(found["renderer"]["cure"]) != renderer().found
-    assert main(["verify", "--installation"]) == 0
-    assert "superlu" in capsys.readouterr().out
