@@ -48,14 +48,9 @@ class ErrorBudget:
     @property
     def words(self) -> str:
         """The three in one sentence."""
-        return f"Error of the worst probe's waveform: {self.parts}"
-
-    @property
-    def parts(self) -> str:
-        """The three, without what they are of."""
         return (
-            f"numerical {stated_error(self.numerical)}; one standard deviation of the "
-            f"{self.spreads}"
+            f"Error of the worst probe's waveform: numerical {stated_error(self.numerical)}; one "
+            f"standard deviation of the {self.spreads}"
         )
 
     @property

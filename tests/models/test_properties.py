@@ -294,27 +294,6 @@ def test_an_answer_moves_and_turns_with_its_body(mesh, material, rng):
     np.testing.assert_allclose(turned, expected, rtol=0, atol=1e-8 * np.abs(u).max())
 
 
-@given(bodies(), materials, seeds)
-def test_the_order_of_nodes_and_elements_does_not_matter(mesh, material, rng):
-    n = len(mesh.points)
-    new = rng.permutation(n)  # the new number of each node
-    points = np.empty_like(mesh.points)
-    points[new] = mesh.points
-    shuffled = TetMesh(
-        points=points,
-        tets=new[mesh.tets][rng.permutation(len(mesh.tets))],
-        facets={name: new[f][rng.permutation(len(f))] for name, f in mesh.facets.items()},
-    )
-    place = [rng.uniform(-0.4, 0.4, 2) * [0.03, 0.02]]
-    answers = []
-    for each in (mesh, shuffled):
-        operators = fem.assemble(each, material, absorbing="sides")
-        spots = np.exp(-(fem.facet_points(each)[:, :2] ** 2).sum(axis=1) / 2 / 0.00435**2)
-        u = fem.harmonic(operators, fem.load_operator(each) @ spots, 120.0)[0]
-        answers.append((fem.probe_operator(each, place) @ u)[0])
-    assert abs(answers[1] - answers[0]) < 1e-9 * abs(answers[0])
-
-
 @settings(max_examples=100)
 @given(scenes(), st.none() | every_tacton)
 def test_a_scene_comes_back_from_its_file(scene, tacton):

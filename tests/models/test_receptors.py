@@ -10,7 +10,6 @@ import pytest
 from half_space import boussinesq
 
 from fem.coat import Coat
-from simple_model import lines
 from simple_model.layers.material import PRESETS
 from simple_model.layers.tensors import energy_root, largest_shear, von_mises
 from simple_model.load.focus import spot_width
@@ -134,16 +133,6 @@ def test_reduced_harmonic_and_transient_models_read_the_same():
     stepped = compute(short, "fem-transient", tolerance=0.02, h=6e-3, dt=5e-5).values
     first = reduced[: len(stepped)]
     assert np.linalg.norm(stepped - first) < 0.02 * np.linalg.norm(first)
-
-
-def test_rates_are_frequency_times_displacement():
-    position, velocity, acceleration = (
-        lines(compute(scene(q, "[0.7, 2]"), "flat-body"), [140.0, 280.0])
-        for q in ("displacement", "velocity", "acceleration")
-    )
-    w = 2 * np.pi * np.array([[140.0], [280.0]])
-    np.testing.assert_allclose(velocity, w * position, rtol=2e-3)
-    np.testing.assert_allclose(acceleration, w**2 * position, rtol=5e-3)
 
 
 def test_quantities_that_are_not_linear_are_computed_in_time():
