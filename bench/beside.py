@@ -1,9 +1,12 @@
-"""Cost of other codes over ours: `python -m bench.beside [assembly | waves]`.
+"""Other codes beside ours: `python -m bench.beside [assembly | waves | fingertip]`.
 
-Both tables use one mesh, material and load, and a process for each code. The skin slab has free
-sides, because not every code has absorbing ones, and Poisson's ratio 0.45, up to which plain
+The tables of cost use one mesh, material and load, and a process for each code. The skin slab has
+free sides, because not every code has absorbing ones, and Poisson's ratio 0.45, up to which plain
 quadratic tetrahedra do not lock. Nodal forces are computed by skinwave beforehand. A code that is
 not installed is a row that says so.
+
+`fingertip` solves the fingertip of the verification by scikit-fem on the same mesh: the largest
+difference of any node's motion, and the values that `skinwave/verify/statics.py` compares with.
 """
 
 import contextlib
@@ -17,8 +20,8 @@ from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.linalg import LinearOperator, cg
+from scipy.sparse import csc_matrix, csr_array
+from scipy.sparse.linalg import LinearOperator, cg, splu
 
 import fem
 import meshes
@@ -27,6 +30,7 @@ from skinwave.bodies.build import build
 from skinwave.models.reduced import answer, prepare
 from skinwave.scene import paper15
 from skinwave.scene.scene import PROBES, Body
+from skinwave.verify import statics
 
 SKIN = replace(fem.PRESETS["palm"], poisson=0.45)
 BODY = Body(material=SKIN, sides="free")
@@ -79,6 +83,33 @@ def waves() -> None:
               f"{1e3 * found['step']:8.2f}{once + second:9.1f}s{(once + second) / one:7.1f}"
               f"{once + 15 * second:8.0f}s{(once + 15 * second) / fifteen:7.0f}{apart:9.1e}",
               flush=True)  # fmt: skip
+
+
+def fingertip() -> None:
+    """Motion of the fingertip with and without bone, by scikit-fem."""
+    mesh = statics.fingertip()
+    for name, materials in statics.FINGERTIPS.items():
+        solids = [materials[r] for r in mesh.region.tolist()]
+        mu, nu, rho, viscosity = (
+            np.array([getattr(m, key) for m in solids])[:, None]
+            for key in ("shear_modulus", "poisson", "density", "viscosity")
+        )
+        of = replace(problem(mesh), mu=mu, nu=nu, rho=rho)
+        body, C = CODES["scikit-fem"][0](of), CODES["scikit-fem"][0](replace(of, mu=viscosity)).K
+        held = np.repeat(np.isin(np.arange(len(mesh.points)), mesh.facets["sides"]), 3)
+        free = np.flatnonzero(abs(body.to_nodes[np.flatnonzero(held)]).sum(axis=0) == 0)
+        force, w = body.to_nodes.T @ statics.fingertip_push(mesh), 2 * np.pi * statics.FREQUENCY
+        motions = zip(statics.fingertip_motion(mesh, materials),
+                      (body.K, body.K + 1j * w * C - w**2 * body.M), strict=True)  # fmt: skip
+        for own, A in motions:
+            found = np.zeros(len(force), A.dtype)
+            factor = splu(csc_matrix(A)[free][:, free])
+            found[free] = factor.solve(force[free].astype(A.dtype))
+            other = body.to_nodes @ found
+            print(
+                f"{name}: largest difference {np.abs(own - other).max() / np.abs(other).max():.1e}"
+            )
+            print(statics.fingertip_summary(mesh, other).tolist())
 
 
 def assembled(name: str, small: Problem, large: Problem) -> dict[str, Any]:
@@ -157,6 +188,6 @@ def each_code(run: Callable[..., dict], *given: Any) -> Iterator[tuple[str, dict
 
 
 if __name__ == "__main__":
-    tables = {"assembly": assembly, "waves": waves}
+    tables = {"assembly": assembly, "waves": waves, "fingertip": fingertip}
     for table in sys.argv[1:] or tables:
         tables[table]()

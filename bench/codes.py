@@ -22,15 +22,15 @@ class Problem:
     """A body of straight 10-node tetrahedra.
 
     `nodes` (n, 3) in metre, corners first; `cells` (m, 10) in VTK's order; `surface` (k, 3) the
-    boundary's corners; `mu` in Pa, `nu`, `rho` in kg/m3.
+    boundary's corners; `mu` in Pa, `nu`, `rho` in kg/m3, for scikit-fem also (m, 1) of each cell.
     """
 
     nodes: np.ndarray
     cells: np.ndarray
     surface: np.ndarray
-    mu: float
-    nu: float
-    rho: float
+    mu: Any
+    nu: Any
+    rho: Any
 
     @property
     def tets(self) -> np.ndarray:
@@ -42,7 +42,7 @@ class Problem:
         return self.nodes[: self.tets.max() + 1]
 
     @property
-    def lam(self) -> float:
+    def lam(self) -> Any:
         return 2 * self.mu * self.nu / (1 - 2 * self.nu)
 
 

@@ -38,8 +38,8 @@ def parts() -> dict[str, tuple[tuple[str, ...], tuple[str, ...]]]:
 
 
 def write_scenes(folder: Path) -> None:
-    """The examples, and the random scenes of `bench.planned`, as files."""
-    from bench.planned import scene
+    """The examples, and the random scenes of `bench.plans`, as files."""
+    from bench.plans import scene
     from skinwave.scene.file import dumps
 
     folder.mkdir(parents=True)

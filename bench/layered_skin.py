@@ -17,7 +17,7 @@ from simple_model.typing import Floats
 from skinwave.bodies import BODIES, Body
 from skinwave.bodies.parts import solid_of
 from skinwave.verify.predictions import Curves, decay_exponents, leading_wave
-from skinwave.verify.published import EXPONENT, Published, wave_sets
+from skinwave.verify.published import EXPONENT, WAVES, Published
 
 GRID = np.arange(100.0, 701.0, 100.0)  # Hz
 NO_WAVE, FURTHEST = np.log(3.0), 2.0  # of a factor: without a wave, and the largest that counts
@@ -144,7 +144,7 @@ def fit(preset: str, sets: Sequence[Published]) -> dict[str, float]:
 def main(*arguments: str) -> None:
     """Print the numbers of both presets and their fits, and the median factor of each set."""
     for preset, ranges in RANGES.items():
-        sets = [each for each in wave_sets() if preset in each.bodies]
+        sets = [each for each in WAVES if preset in each.bodies]
         numbers = {"preset": values_of(BODIES[preset], ranges)}
         if "--presets" not in arguments:
             numbers["fit"] = fit(preset, [each for each in sets if preset in each.built])

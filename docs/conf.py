@@ -32,8 +32,7 @@ extensions = [
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
     "mathml",  # formulas without a script
-    "elsewhere",  # links to files of the repository beside docs/
-    "generated",  # pages from the code
+    "generated",  # pages from the code, and links to files beside docs/
     "docstrings",  # as numpydoc has them
     "live_page",  # the page that computes
 ]

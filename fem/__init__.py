@@ -29,58 +29,36 @@ from fem.added_mass import added_mass
 from fem.assembly import Operators, assemble
 from fem.boundary import Support
 from fem.coat import Coat
-from fem.energy import EnergyBalance, imbalance, mean_power, stored, with_energy_balance
-from fem.finite_strain import Elastic, Membrane, finite_strain, shell_stiffness
+from fem.energy import Elastic, EnergyBalance, imbalance, stored, with_energy_balance
+from fem.finite_strain import Membrane, finite_strain
 from fem.harmonic import LineSolver, harmonic
-from fem.interior import displacement_operator, is_inside, locate
-from fem.krylov import NotReduced, load_subspace, reduce
+from fem.krylov import NotReduced, reduce
 from fem.linear_solver import Factor, available, factorise
 from fem.load_and_probe import (
+    displacement_operator,
     facet_normals,
     facet_points,
+    is_inside,
     load_operator,
-    node_operator,
-    on_surface,
+    locate,
     probe_operator,
-    surface_frame,
 )
-from fem.maxwell import DispersiveBranch, MaxwellBranch
+from fem.maxwell import MaxwellBranch
 from fem.plane_stiffness import Tension
-from fem.reduced import (
-    Poles,
-    ReducedModel,
-    exponential_sum,
-    impulse_response,
-    line_response,
-    poles,
-    transfer,
-)
-from fem.reduced_nonlinear import StretchingModes, stretching_modes
+from fem.reduced import Poles, ReducedModel, poles, transfer
 from fem.static import modes, static
-from fem.stress import (
-    SolidPart,
-    materials_at,
-    nodal_strain,
-    relaxation,
-    relaxed,
-    solid_parts,
-    strain_operator,
-)
+from fem.stress import relaxation, strain_operator
 from fem.transient import Diverged, State, at_rest, transient
 from fem.typing import Complex
 from simple_model import Material, PronyTerm, from_young, of_law, tabulated
 from simple_model.layers.material import PRESETS
 
 __all__ = [
-    "PRESETS", "Coat", "Complex", "DispersiveBranch", "Diverged", "Elastic", "EnergyBalance",
-    "Factor", "LineSolver", "Material", "MaxwellBranch", "Membrane", "NotReduced", "Operators",
-    "Poles", "PronyTerm", "ReducedModel", "SolidPart", "State", "StretchingModes", "Support",
-    "Tension", "added_mass", "assemble", "at_rest", "available", "displacement_operator",
-    "exponential_sum", "facet_normals", "facet_points", "factorise", "finite_strain", "from_young",
-    "harmonic", "imbalance", "impulse_response", "is_inside", "line_response", "load_operator",
-    "load_subspace", "locate", "materials_at", "mean_power", "modes", "nodal_strain",
-    "node_operator", "nonlinear", "of_law", "on_surface", "poles",
-    "probe_operator", "reduce", "relaxation", "relaxed", "shell_stiffness", "solid_parts", "static",
-    "stored", "strain_operator", "stretching_modes", "surface_frame",
-    "tabulated", "transfer", "transient", "with_energy_balance",
+    "PRESETS", "Coat", "Complex", "Diverged", "Elastic", "EnergyBalance", "Factor", "LineSolver",
+    "Material", "MaxwellBranch", "Membrane", "NotReduced", "Operators", "Poles", "PronyTerm",
+    "ReducedModel", "State", "Support", "Tension", "added_mass", "assemble", "at_rest", "available",
+    "displacement_operator", "facet_normals", "facet_points", "factorise", "finite_strain",
+    "from_young", "harmonic", "imbalance", "is_inside", "load_operator", "locate", "modes",
+    "nonlinear", "of_law", "poles", "probe_operator", "reduce", "relaxation", "static",
+    "stored", "strain_operator", "tabulated", "transfer", "transient", "with_energy_balance",
 ]  # fmt: skip

@@ -1,19 +1,15 @@
 """Dense added-mass operator of the fluid that a flat sheet in a baffle moves with it.
 
-To bending waves much slower than sound the fluid is incompressible. In a baffle the acceleration
-w'' of the sheet meets, on both sides together, Rayleigh's integral without its delay: the added
-mass 2 rho / k of each wavenumber k written in space (Junger and Feit, Sound, Structures, and Their
-Interaction (1986), sections 4.6 and 5.11),
+To bending waves much slower than sound the fluid is incompressible: the added mass 2 rho / k of
+each wavenumber k on both sides together, written in space, is Rayleigh's integral without delay
+(Junger and Feit, Sound, Structures, and Their Interaction (1986), sections 4.6 and 5.11),
 
     p(x) = rho/pi int w''(y) / |x - y| dA,   M_ab = rho/pi iint N_a(x) N_b(y) / |x - y| dA dA
 
 M is dense, symmetric and positive, and never formed: on a regular grid of nodes it is a convolution
-with int 1/r dA over a cell at each distance, by an FFT padded with zeros. With nodes s apart its
-relative error is -(k s)^2 / 24.
-
-Left out are the flow around an edge without a baffle, and radiation of sound, which would take as
-much energy as a loss factor of 0.006 to 0.007 from modes with a net volume displacement of a
-clamped sheet of office paper, 100 mm wide, below 300 Hz.
+with int 1/r dA over a cell, by an FFT padded with zeros. Its relative error is -(k s)^2 / 24 with
+nodes s apart. The flow around an edge without a baffle is left out, and so is radiation of sound,
+a loss factor of 0.006 to 0.007 of a clamped sheet of office paper, 100 mm wide, below 300 Hz.
 """
 
 from __future__ import annotations
@@ -93,12 +89,9 @@ def near_field(
     spacing: tuple[float, float],
     mirrored: Sequence[bool] = (False, False),
 ) -> Callable[[Floats], Floats]:
-    """Near-field integral int w(y) / |x - y| dA of fields (k, ny, nx) at the nodes of a grid: a
-    function of them, to the same shape in metre times their unit.
-
-    `shape` is (ny, nx) and `spacing` in metre along y and x. `mirrored` tells whether the images in
-    the first line of nodes along y and along x count as well; what lies on that line counts with
-    its image.
+    """Near-field integral int w(y) / |x - y| dA of fields (k, ny, nx) at the nodes of a grid of a
+    shape (ny, nx) and a spacing in metre along y and x: a function of them, to the same shape.
+    `mirrored` tells whether images in the first line of nodes along y and x count as well.
     """
     whole = [2 * n - 1 if image else n for n, image in zip(shape, mirrored, strict=True)]
     padded = [fft.next_fast_len(2 * n - 1, real=True) for n in whole]
@@ -120,8 +113,8 @@ def near_field(
 
 def inverse_distance(x: Floats, y: Floats, size: tuple[float, float]) -> Floats:
     """Integral (...) in metre of 1/r over rectangles of one size (x, y) about their middles x, y
-    (...), x asinh(y/x) + y asinh(x/y) between their corners: the potential of a charged plate
-    (Durand, Electrostatique, vol. 1 (1964)).
+    (...): x asinh(y/x) + y asinh(x/y) between their corners (Durand, Electrostatique, vol. 1
+    (1964)).
     """
 
     def corner(x: Floats, y: Floats) -> Floats:

@@ -28,10 +28,8 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from fem.assembly import Operators, assemble
 from fem.boundary import Support, springs
 from fem.coat import Coat
-from fem.linear_solver import factoriser
+from fem.linear_solver import SumFactoriser
 from fem.maxwell import MaxwellBranch
-from fem.pardiso import product
-from fem.sparsity import on_one_pattern
 from fem.transient import Diverged
 from fem.typing import Complex, Floats, Ints
 from meshes import TetMesh
@@ -48,7 +46,7 @@ Terms = tuple[tuple[str, int], ...]
 @dataclass(frozen=True, kw_only=True)
 class Solids:
     """Materials (r,) of a body, of its coat first and then of its regions; factors of its `springs`
-    and of the `drag` of its absorbing layer, over those that it was assembled with.
+    and of the `drag` of its absorbing layer.
     """
 
     materials: tuple[Material, ...]
@@ -98,18 +96,8 @@ def assemble_affine(
     support: Support | None = None,
     coat: Coat | None = None,
 ) -> AffineOperators:
-    """Assemble the matrices of a body's operators, once for all its materials.
-
-    Parameters
-    ----------
-    mesh : TetMesh
-    materials : (r,), of the coat's layers and then of the regions 0, 1, ...: their Poisson's ratios
-    fixed, absorbing, drag, support : as for `assemble`
-    coat : thin layers at a surface, whose materials are the first of those given
-
-    Returns
-    -------
-    AffineOperators
+    """Matrices of a body's operators, once for all materials (r,) of the given Poisson's ratios: of
+    the layers of its coat and then of the regions 0, 1, ... Conditions as for `assemble`.
     """
     dashpots_only = support and replace(support, stiffness=np.zeros_like(support.stiffness))
     alone = [_alone(materials, r) for r in range(len(materials))]
@@ -204,7 +192,7 @@ def project(affine: AffineOperators, basis: Floats, before: Floats) -> Floats:
     found = np.empty((len(affine.parts), m, m))
     found[:, :k, :k] = before
     for matrix, small in zip(affine.parts, found, strict=True):
-        columns = basis.T @ product(matrix)(basis[:, k:])
+        columns = basis.T @ (matrix @ basis[:, k:])
         small[:, k:], small[k:, :k] = columns, columns[:k].T
         small[k:, k:] = (columns[k:] + columns[k:].T) / 2
     return found
@@ -218,35 +206,19 @@ def line_solution(
     solver: str = "auto",
     fluid_share: float = 0.0,
 ) -> Complex:
-    """Steady state of a full body at one line.
+    """Steady state (n_free,) in metre of a full body at one line, by the `weights` (q,) of its
+    matrices there and the force (n_free,) in N.
 
     The added mass F of a fluid can only be applied: P = A - w F + E is factorised, with the
-    equivalent added mass E of the line's bending waves as so much more of the body's own mass.
-    Waves of other wavenumbers have another added mass, but do not resonate at the line:
-    P^-1 (P + w F - E) is near the identity, and GMRES takes some iterations with it.
-
-    Parameters
-    ----------
-    affine : AffineOperators, sparse, of q matrices
-    weights : (q,) complex, of the matrices at the line
-    force : (n_free,) complex, N
-    solver : a backend of `linear_solver`
-    fluid_share : equivalent added mass of the fluid at the line over the body's own mass
-
-    Returns
-    -------
-    (n_free,) complex, metre
-
-    Raises
-    ------
-    Diverged
-        If the equations with the added mass of a fluid are not solved to a residual of `RESIDUAL`.
+    equivalent added mass E of the line's bending waves, `fluid_share` of the body's own mass. Waves
+    of other wavenumbers do not resonate at the line: P^-1 (P + w F - E) is near the identity, and
+    GMRES takes some iterations with it, or raises Diverged.
     """
     dry = affine.in_vacuum()
-    values, *pattern = on_one_pattern([sparse.csr_array(part) for part in dry.parts])
     is_mass = np.array([kind == "mass" for kind, _ in dry.terms])
     own = weights[: len(is_mass)]
-    factor = factoriser(*pattern, backend=solver)((own * (1 + fluid_share * is_mass)) @ values)
+    factorise = SumFactoriser([sparse.csr_array(part) for part in dry.parts], backend=solver)
+    factor = factorise(own * (1 + fluid_share * is_mass))
     force = force.astype(np.complex128)
     if affine.fluid is None:
         return factor.solve(force)

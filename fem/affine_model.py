@@ -35,19 +35,9 @@ class AffineModel:
 def states(
     model: AffineModel, weights: Complex, shares: Floats, lines: Iterable[int], size: int = 0
 ) -> Complex:
-    """Steady state (k, m) in the basis.
-
-    Parameters
-    ----------
-    model : AffineModel
-    weights : (k, q) complex, of the terms at each line
-    shares : (g,) float, of the geometries, with sum 1
-    lines : (k,) int, of those that the model has forces of
-    size : of the first vectors of the basis alone; all if 0
-
-    Returns
-    -------
-    (k, m or size) complex
+    """Steady state (k, m) in the basis, or in its first vectors, `size`: by the weights (k, q) of
+    the terms at each of the `lines` (k,) that the model has forces of, and the shares (g,) of the
+    geometries, with sum 1.
     """
     n = size or model.basis.shape[1]
     parts = np.tensordot(shares, model.parts[..., :n, :n], 1)

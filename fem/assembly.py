@@ -31,13 +31,11 @@ from scipy import sparse
 
 from fem.boundary import Support, dashpots, fixed_dofs, springs
 from fem.coat import Coat, coat_operators
-from fem.combination import Laws, proportional, with_added
+from fem.combination import Laws, proportional
 from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradient_integrals, jacobians, shape_nodes
 from fem.maxwell import (
     Branch,
-    Matrices,
-    MaxwellBranch,
     on_free,
     property_of,
     together,
@@ -179,7 +177,7 @@ def assemble(
     MemoryError
         If there is no memory for the matrices.
     """
-    given, region = _by_region(mesh, material)
+    given, region = by_region(mesh, material)
     materials = [m.without_loss_factor() for m in given]
     free = np.flatnonzero(~fixed_dofs(mesh, fixed))
     if not len(free):
@@ -212,28 +210,13 @@ def assemble(
         del volume
         K, C = (A + B if B.nnz else A for A, B in ((K, beside), (C, R)))
         laws = None
-    found = Operators(
+    if coat is not None:
+        of_coat = coat_operators(mesh, coat, materials, region, fixed_dofs(mesh, fixed))
+        thin = *(restricted(A, free) for A in of_coat[:3]), on_free(of_coat[3], free)
+        (K, C, M, branches), laws = together((K, C, M, branches), thin), None
+    return Operators(
         K=K, C=C, M=M, R=R, free=free, n_dofs=mesh.n_dofs, branches=branches, laws=laws
     )
-    if coat is None:
-        return found
-    return _coated(found, coat_operators(mesh, coat, materials, region, fixed_dofs(mesh, fixed)))
-
-
-def _coated(body: Operators, coat: Matrices) -> Operators:
-    """Operators of a body with what its coat adds on all dofs of the mesh."""
-    K, C, M = (restricted(A, body.free) for A in coat[:3])
-    relaxing = on_free(coat[3], body.free)
-    whole = together((body.K, body.C, body.M, body.branches), (K, C, M, relaxing))
-    laws = None
-    if body.laws:
-        of_time = {
-            branch.time: branch.K for branch in relaxing if isinstance(branch, MaxwellBranch)
-        }
-        each = [of_time[b.time] if isinstance(b, MaxwellBranch) else b.K for b in whole[3]]
-        matrices = whole[0], whole[1], *(b.K for b in whole[3])
-        laws = with_added(body.laws, (K, C, each), matrices)
-    return replace(body, K=whole[0], C=whole[1], M=whole[2], branches=whole[3], laws=laws)
 
 
 def _volume(
@@ -318,19 +301,8 @@ def _drag(mesh: TetMesh, nodes: MovingNodes, rate: Floats) -> sparse.csr_array:
     return nodes.on_free(R)
 
 
-def by_region(
-    mesh: TetMesh, material: Material | Mapping[int, Material]
-) -> tuple[list[Material], Ints]:
-    """The materials of a mesh, their loss factors as Prony terms, and the index (e,) of each
-    element's.
-    """
-    materials, region = _by_region(mesh, material)
-    return [m.without_loss_factor() for m in materials], region
-
-
-def _by_region(
-    mesh: TetMesh, material: Material | Mapping[int, Material]
-) -> tuple[list[Material], Ints]:
+def by_region(mesh: TetMesh, material: Materials) -> tuple[list[Material], Ints]:
+    """The materials of a mesh, and the index (e,) of each element's."""
     if isinstance(material, Material):
         return [material], np.zeros(len(mesh.tets), np.int64)
     if not isinstance(material, Mapping):

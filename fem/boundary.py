@@ -20,16 +20,10 @@ ABSORBED_RATIO = 11.0  # (c_p / c_s)**2 at nu = 0.45; a stiffer dashpot would pi
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Support:
-    """Elastic and absorbing support of a surface: springs and dashpots as functions of position.
-
-    Where whole facets are fixed, the edge of the constrained area follows the mesh; that of a
-    stiffness smooth in position does not.
-
-    Parameters
-    ----------
-    facets : (k, a) int, boundary facets
-    stiffness : (k q,) N/m3, traction per displacement at the points of `facet_points`
-    absorbed : (k q,) 0 to 1, share of the surface at these points that has dashpots
+    """Elastic and absorbing support of boundary facets (k, a): springs of a `stiffness` (k q,) in
+    N/m3 and the share `absorbed` (k q,) of the surface with dashpots, at the points of
+    `facet_points`. Where whole facets are fixed the edge of the constrained area follows the mesh;
+    that of a smooth stiffness does not.
     """
 
     facets: Ints
@@ -69,8 +63,7 @@ def dashpots(
     share: Floats | None = None,
 ) -> sparse.csr_array:
     """Lysmer-Kuhlemeyer damping (3 n, 3 n) in N s/m of absorbing facets (e, a), by the materials
-    and the index of each element's; `share` (e q,) is the fraction of it at each quadrature
-    point.
+    and the index of each element's; `share` (e q,) is the fraction of it at each quadrature point.
     """
     if share is not None:
         nodes, share = _where(nodes, share)

@@ -5,19 +5,17 @@ A layer thinner than elements resolve keeps its normals straight, normal and of 
     u(z) = u + z d,   d = -t^k (n . u,k),   -thickness <= z <= 0 along the outward normal n,
 
 and carries plane stress, with lam* = 2 lam mu / (lam + 2 mu). With the stiffness K(z) of a membrane
-per thickness at z, and the operator T that gives the change d = T u of the normal at each node of a
-facet, its stiffness is
+per thickness at z and the change d = T u of the normal at each node of a facet, its stiffness is
 
-    A + B T + (B T)^T + T^T D T,    A, B, D = int (1, z, z^2) K(z) dz,
+    A + B T + (B T)^T + T^T D T,    A, B, D = int (1, z, z^2) K(z) dz
 
-the laminate stiffnesses of classical theory (Reddy, Mechanics of Laminated Composite Plates and
-Shells (2004), chapter 3). The volume is meshed up to the surface with its own material, whose
-moduli and density are subtracted in K(z). The rest of it carries the normal stress: an effective
-boundary condition of first order in the thickness (Bovik, J Appl Mech 61:162 (1994)).
+(Reddy, Mechanics of Laminated Composite Plates and Shells (2004), chapter 3). The volume is meshed
+up to the surface with its own material, which is subtracted in K(z) and carries the normal stress:
+an effective boundary condition of first order in the thickness (Bovik, J Appl Mech 61:162 (1994)).
 
-The slope is not continuous between facets. The turn [d] of one facet against the next, about their
-edge, is bound by the interior penalty method (Engel et al., Comput Methods Appl Mech Eng 191:3669
-(2002); Brenner and Sung, J Sci Comput 22:83 (2005)),
+The slope is not continuous between facets. The turn [d] of one facet against the next is bound by
+the interior penalty method (Engel et al., Comput Methods Appl Mech Eng 191:3669 (2002); Brenner and
+Sung, J Sci Comput 22:83 (2005)),
 
     - int {m} [d] ds - (int {m} [d] ds)^T + int a [d] [d] ds,    m = n . int z s dz . n,
 
@@ -51,18 +49,10 @@ PENALTY = 3 / 4
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Coat:
-    """Coat of thin layers just below the surface of a mesh, in place of the material there.
-
-    Parameters
-    ----------
-    materials : of each layer, from the surface downwards
-    thicknesses : metre, of each layer, above 0
-    facets : a facet set's name or nodes (e, a)
-
-    Raises
-    ------
-    ValueError
-        If there is no layer, their numbers differ, or a thickness is not finite and above 0.
+    """Coat of thin layers just below the surface of a mesh, in place of the material there:
+    materials and thicknesses in metre from the surface downwards, on facets, a set's name or nodes
+    (e, a). Layers that do not match or thicknesses that are not finite and above 0 raise a
+    ValueError.
     """
 
     materials: tuple[Material, ...]
@@ -111,8 +101,8 @@ class Edges:
     """Edges across which a coat bends, from each side h: the `facet` (h,) and the number of the
     `edge` (h,); at points q of it, the same from both sides, the `slopes` (h, q, a, d) of the shape
     functions, unit `conormals` (h, q, i) out of the facet, `lengths` (h, q) in metre and the turn
-    `outwards` (h, q, 3 a) of the facet's normal; `sides` (h,) is 2 where the facet's mirror image
-    is the other side, else 1.
+    `outwards` (h, q, 3 a) of the facet's normal; `sides` (h,) is 2 where a mirror image is the
+    other side, else 1.
     """
 
     facet: Ints
@@ -126,8 +116,7 @@ class Edges:
 
 def surface_of(mesh: TetMesh, coat: Coat, fixed: Bools) -> Surface:
     """Surface of a coat on ten-node tetrahedra, whose normals do not turn at a border that is fixed
-    in the direction across it, by the fixed dofs (3 n,) of the mesh. Linear facets, which stay
-    flat, raise a ValueError.
+    in the direction across it, by the fixed dofs (3 n,). Linear facets raise a ValueError.
     """
     of_mesh = facet_set(mesh, coat.facets)
     if of_mesh.shape[1] != QUADRATIC:
@@ -194,9 +183,8 @@ def _edges(facets: Ints, points: Floats, held: Bools) -> Edges:
 
 
 def coat_stiffness(surface: Surface, coat: Coat, mu: Floats, lam: Floats) -> sparse.csr_array:
-    """Stiffness (3 n, 3 n) in N/m of a coat on a surface of n nodes, of each facet and of its
-    edges, by Lame's parameters (layers, e) in Pa, of plane stress, less those of the material
-    that it replaces.
+    """Stiffness (3 n, 3 n) in N/m of a coat on a surface of n nodes, by Lame's parameters (layers,
+    e) in Pa, of plane stress, less those of the material that it replaces.
     """
     T, local = surface.turn, np.zeros_like(surface.turn)
     for z, weight, layer in zip(*coat.stations, strict=True):
@@ -261,8 +249,7 @@ def _moments(surface: Surface, coat: Coat, mu: Floats, lam: Floats) -> tuple[Flo
 
 def membrane_stiffness(points: Floats, mu: Floats, lam: Floats) -> Floats:
     """Stiffness (e, 3 a, 3 a) in Pa, N/m per thickness, of curved membranes with nodes at points
-    (e, a, 3) in metre, against strain in their tangent planes; Lame's parameters (e,) in Pa of
-    plane stress.
+    (e, a, 3), by Lame's parameters (e,) of plane stress.
 
         K_ai,bj = int lam A_ai A_bj + mu (A_aj A_bi + G_ka G_kb F_ki F_kj) dA,  A_ai = G_ka F_ki
 
@@ -285,8 +272,8 @@ def membrane_stiffness(points: Floats, mu: Floats, lam: Floats) -> Floats:
 
 
 def coat_mass(surface: Surface, coat: Coat, density: Floats) -> sparse.csr_array:
-    """Mass (3 n, 3 n) in kg of a coat, int rho N_a N_b dA dz, by the density (layers, e) of each
-    layer in each facet, less that of the material that it replaces.
+    """Mass (3 n, 3 n) in kg of a coat, int rho N_a N_b dA dz, by the density (layers, e), less that
+    of the material that it replaces.
     """
     facets = surface.facets
     N = shape_functions(triangle_rule()[0], facets.shape[1])

@@ -5,7 +5,7 @@ are its Maxwell branches but for the springs that it rests on.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -61,8 +61,8 @@ class Laws:
         self, factors: Sequence[float], acted_on: Sequence[Floats], z: Floats
     ) -> tuple[Floats, Floats, list[Floats]]:
         """Forces C y + sum_j K_j s_j + M z as A x + M m + sum_j rest_j r_j, which takes no product
-        with K: x, m and the r_j, by the factors of `dynamic_stiffness`, y and each s_j, and z,
-        of one shape.
+        with K: x, m and the r_j, by the factors of `dynamic_stiffness`, y and each s_j, and z, of
+        one shape.
         """
         each = zip(self.parts, acted_on, strict=True)
         x = sum((part.stiffness * v for part, v in each), np.zeros_like(z))
@@ -99,35 +99,12 @@ def laws_of(K: Any, C: Any, branches: Sequence[Branch], known: Laws | None) -> L
     )  # fmt: skip
 
 
-def with_added(
-    laws: Laws, added: tuple[Any, Any, Sequence[Any]], matrices: tuple[Any, ...]
-) -> Laws:
-    """Laws of a body with few entries added to K, to C and to each branch, such as those of a coat;
-    beyond the body's own branches, new ones. `matrices` are K, C and K_j with them.
-    """
-    K, C, further = added
-    own = (*laws.parts, *(Combination() for _ in further[len(laws.branches) :]))
-
-    def rest(part: Combination, more: Any) -> Any:
-        """`rest`, and what of `more` is no multiple of K."""
-        apart = more - part.stiffness * K
-        apart.eliminate_zeros()
-        if not apart.nnz:
-            return part.rest
-        return apart if part.rest is None else part.rest + apart
-
-    damping, *branches = (
-        replace(part, rest=rest(part, more)) for part, more in zip(own, (C, *further), strict=True)
-    )
-    return Laws(damping=damping, branches=tuple(branches), matrices=matrices)
-
-
 def proportional(
     m: Material, K: Any, springs: Any, absorbing: Any
 ) -> tuple[Any, tuple[Branch, ...], Laws | None]:
     """C, branches and laws of a body of one material, without a modulus law of its own or a loss
-    factor, by its K (n, n); `springs` are what K has beside the stiffness of the material, and
-    `absorbing` what C has beside its damping.
+    factor, by its K (n, n), what K has beside the material's stiffness, `springs`, and what C has
+    beside its damping, `absorbing`.
     """
     shares: dict[float, float] = {}
     for term in m.prony:

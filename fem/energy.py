@@ -3,7 +3,7 @@
     work = kinetic + elastic + dissipated + radiated
     dissipated + radiated = int v^T C v dt + sum_j int d_j^T K_j d_j dt / tau_j
 
-C contains the loss in the material and R, the damping of absorbing boundaries. Average acceleration
+for a linear body, where C contains R, the damping of absorbing boundaries. Average acceleration
 satisfies this balance to round-off, whatever the time step (Hughes, The Finite Element Method,
 1987, chapter 9), so that an imbalance is an error of the solution and not of the step.
 """
@@ -12,16 +12,75 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 from fem.assembly import Operators
-from fem.maxwell import Branch, with_internal
+from fem.maxwell import Branch, MaxwellBranch, with_internal
 from fem.transient import State
-from fem.typing import Complex, Floats, Ints
+from fem.typing import Complex, Floats
 
 ROUND_OFF = 1e-6  # of the reactive power
 TINY = np.finfo(np.float64).tiny / np.finfo(np.float64).eps  # numbers below it lose digits
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Relaxing:
+    """Maxwell branches of j relaxation `times` in s, whose springs are stretched by d (j, ...),
+    d' = e' - d / times, of a strain e (...) = `strain(u)`. `force(u, d)` (n_free,) in N is theirs
+    together, `tangent(u, shares)` in N/m its derivative about d = shares (j,) of e, and
+    `energy(d)` (j,) in J what each stores.
+    """
+
+    times: Floats
+    strain: Callable[[Floats], Floats]
+    force: Callable[[Floats, Floats], Floats]
+    tangent: Callable[[Floats, Floats], Any]
+    energy: Callable[[Floats], Floats]
+
+    @staticmethod
+    def linear(branches: Sequence[MaxwellBranch]) -> Relaxing:
+        """Branches whose strain is the displacement."""
+        each = [branch.K for branch in branches]
+
+        def force(u: Floats, d: Floats) -> Floats:
+            return np.asarray(sum(K @ x for K, x in zip(each, d, strict=True)))
+
+        return Relaxing(
+            times=np.array([branch.time for branch in branches]), strain=lambda u: u, force=force,
+            tangent=lambda u, shares: sum(x * K for x, K in zip(shares, each, strict=True)),
+            energy=lambda d: np.array([x @ (K @ x) / 2 for x, K in zip(d, each, strict=True)]),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Elastic:
+    """Elastic body: its forces at a displacement u (n_free,) in metre of its free dofs.
+
+    `internal(u)` (n_free,) in N at equilibrium, its `tangent(u)` (n_free, n_free) in N/m,
+    `viscous(u, v)` (n_free,) in N at a velocity v (n_free,) in m/s, and the stored `energy(u)` in
+    J; `relaxing` branches beside it; `operators` is the linearisation at rest.
+    """
+
+    operators: Operators
+    internal: Callable[[Floats], Floats]
+    tangent: Callable[[Floats], sparse.csr_array]
+    viscous: Callable[[Floats, Floats], Floats]
+    energy: Callable[[Floats], float]
+    relaxing: tuple[Relaxing, ...] = ()
+
+    @staticmethod
+    def linear(operators: Operators) -> Elastic:
+        """A body at small displacement."""
+        K, C = operators.K, operators.C
+        branches = with_internal(operators.branches)
+        return Elastic(
+            operators=operators, internal=lambda u: K @ u, tangent=lambda u: K,
+            viscous=lambda u, v: C @ v, energy=lambda u: float(u @ (K @ u)) / 2,
+            relaxing=(Relaxing.linear(branches),) if branches else (),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,63 +109,47 @@ class EnergyBalance:
 
 
 def with_energy_balance(
-    operators: Operators, states: Iterator[State], force: Callable[[float], Floats]
+    body: Elastic | Operators, states: Iterator[State], force: Callable[[float], Floats]
 ) -> Iterator[tuple[State, EnergyBalance]]:
-    """Add the energy balance to the states of a transient solution.
+    """Add the energy balance to the states of a time integration by average acceleration.
 
     Parameters
     ----------
-    operators : Operators
-    states : of `transient`, from rest
+    body : Elastic, or Operators of a linear body
+    states : of `transient` or `nonlinear.dynamic`
     force : nodal forces (3 n,) in N by time in s, which drive them
 
     Yields
     ------
-    State, and its energy balance so far in J
+    State, and its energy balance since the first in J
     """
-    C, R, free = operators.C, operators.R, operators.free
-
-    def lost(before: State, state: State) -> EnergyBalance:
-        velocity = (state.velocity + before.velocity)[free] / 2
-        dt = state.time - before.time
-        out = dt * float(velocity @ (R @ velocity))
-        viscous = dt * float(velocity @ (C @ velocity)) - out
-        relaxed = 0.0
-        both = zip(before.stretch, state.stretch, strict=True)
-        for branch, (old, new) in zip(with_internal(operators.branches), both, strict=True):
-            mean = (old + new)[free] / 2
-            relaxed += dt / branch.time * float(mean @ (branch.K @ mean))
-        return EnergyBalance(dissipated=viscous + relaxed, radiated=out)
-
-    return with_losses(states, force, free, lost)
-
-
-def with_losses(
-    states: Iterator[State],
-    force: Callable[[float], Floats],
-    free: Ints,
-    lost: Callable[[State, State], EnergyBalance],
-) -> Iterator[tuple[State, EnergyBalance]]:
-    """States of any body, each with the energy balance in J since the first, under nodal forces (3
-    n,) of a time; `lost` are the losses between two successive states.
-    """
+    body = body if isinstance(body, Elastic) else Elastic.linear(body)
+    R, free = body.operators.R, body.operators.free
     before, spent = next(states), EnergyBalance()
     f = force(before.time)[free]
     yield before, spent
     for state in states:
-        f_next = force(state.time)[free]
+        f_next, dt = force(state.time)[free], state.time - before.time
         moved = (state.displacement - before.displacement)[free]
-        spent += EnergyBalance(work=float(moved @ (f + f_next)) / 2) + lost(before, state)
+        middle = (state.displacement + before.displacement)[free] / 2
+        radiated = float(moved @ (R @ moved)) / dt
+        dissipated = float(moved @ body.viscous(middle, moved)) / dt - radiated
+        for part, old, new in zip(body.relaxing, before.stretch, state.stretch, strict=True):
+            dissipated += dt * float((2 / part.times) @ part.energy((old + new) / 2))
+        work = float(moved @ (f + f_next)) / 2
+        spent += EnergyBalance(work=work, dissipated=dissipated, radiated=radiated)
         yield state, spent
         before, f = state, f_next
 
 
-def stored(operators: Operators, state: State) -> float:
+def stored(body: Elastic | Operators, state: State) -> float:
     """Elastic and kinetic energy of a state in J."""
-    u, v = state.displacement[operators.free], state.velocity[operators.free]
-    stretched = zip(operators.branches, state.stretch, strict=bool(state.stretch))
-    springs = sum(d[operators.free] @ (b.K @ d[operators.free]) for b, d in stretched)
-    return float(u @ (operators.K @ u) + v @ (operators.M @ v) + springs) / 2
+    body = body if isinstance(body, Elastic) else Elastic.linear(body)
+    ops = body.operators
+    u, v = state.displacement[ops.free], state.velocity[ops.free]
+    stretched = zip(body.relaxing, state.stretch, strict=bool(state.stretch))
+    springs = sum(float(part.energy(d).sum()) for part, d in stretched)
+    return float(v @ (ops.M @ v)) / 2 + body.energy(u) + springs
 
 
 def imbalance(spent: EnergyBalance, stored: float = 0.0) -> float:
@@ -125,19 +168,9 @@ def mean_power(
     frequencies: Floats,
     branches: Sequence[Branch] = (),
 ) -> EnergyBalance:
-    """Mean power balance of a load's spectral lines.
-
-    Parameters
-    ----------
-    C, R : (n, n) damping, and the part of it in absorbing boundaries, dense or sparse
-    forces, motion : (f, n) complex amplitudes of the load in N and of the displacement in metre
-    frequencies : (f,) float, Hz
-    branches : generalised Maxwell branches, of (n, n) each
-
-    Returns
-    -------
-    EnergyBalance
-        Of all lines together, W.
+    """Mean power balance in W of all spectral lines of a load together, by the damping C and R (n,
+    n) and Maxwell branches, and complex amplitudes (f, n) of forces in N and motion in metre at
+    frequencies (f,) in Hz.
     """
     w = 2 * np.pi * frequencies
     apparent = w * (forces * motion.conj()).sum(axis=1) / 2

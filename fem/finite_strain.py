@@ -12,18 +12,18 @@ plane stress, and tension its forces on the normal displacement, as in `plane_st
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from fem.assembly import Operators, assemble, by_region
+from fem.assembly import assemble, by_region
 from fem.elements import shape_derivatives, triangle_rule
+from fem.energy import Elastic, Relaxing
 from fem.geometry import gradients, shape_nodes
-from fem.maxwell import MaxwellBranch, with_internal
+from fem.maxwell import MaxwellBranch
 from fem.plane_stiffness import SIDES, Tension, directional_parts, tension_stiffness
 from fem.sparsity import UPPER, SparsityPattern, restricted, slabs
 from fem.typing import Floats, Ints
@@ -34,60 +34,9 @@ LARGEST_POISSON = 0.45  # beyond it the linear code projects the dilatation, whi
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Relaxing:
-    """Maxwell branches at large displacement, of j relaxation `times` in s.
-
-    Their springs are stretched by d (j, ...), d' = e' - d / times, of a strain e (...) =
-    `strain(u)`. `force(u, d)` (n_free,) in N is theirs together, `tangent(u, shares)` in N/m its
-    derivative about d = shares (j,) of e, and `energy(d)` (j,) in J what each stores.
-    """
-
-    times: Floats
-    strain: Callable[[Floats], Floats]
-    force: Callable[[Floats, Floats], Floats]
-    tangent: Callable[[Floats, Floats], Any]
-    energy: Callable[[Floats], Floats]
-
-    @staticmethod
-    def linear(branches: Sequence[MaxwellBranch]) -> Relaxing:
-        """Branches whose strain is the displacement."""
-        each = [branch.K for branch in branches]
-
-        def force(u: Floats, d: Floats) -> Floats:
-            return np.asarray(sum(K @ x for K, x in zip(each, d, strict=True)))
-
-        return Relaxing(
-            times=np.array([branch.time for branch in branches]), strain=lambda u: u, force=force,
-            tangent=lambda u, shares: sum(x * K for x, K in zip(shares, each, strict=True)),
-            energy=lambda d: np.array([x @ (K @ x) / 2 for x, K in zip(d, each, strict=True)]),
-        )  # fmt: skip
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Elastic:
-    """Hyperelastic body: its forces at a large displacement u (n_free,) in metre of its free dofs.
-
-    `internal(u)` (n_free,) in N at equilibrium, its `tangent(u)` (n_free, n_free) in N/m,
-    `viscous(u, v)` (n_free,) in N at a velocity v (n_free,) in m/s, and the stored `energy(u)` in
-    J; `relaxing` branches beside it; `operators` is the linearisation at rest.
-    """
-
-    operators: Operators
-    internal: Callable[[Floats], Floats]
-    tangent: Callable[[Floats], sparse.csr_array]
-    viscous: Callable[[Floats, Floats], Floats]
-    energy: Callable[[Floats], float]
-    relaxing: tuple[Relaxing, ...] = ()
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
 class Membrane:
-    """A horizontal membrane without bending stiffness and without mass.
-
-    Parameters
-    ----------
-    triangles : (k, 3 or 6) int, nodes of the tetrahedral mesh, corners first
-    thickness : float, metre
+    """A horizontal membrane without bending stiffness and without mass: triangles (k, 3 or 6) of
+    nodes of the tetrahedral mesh, corners first, of a thickness in metre.
     """
 
     triangles: Ints
@@ -158,7 +107,7 @@ def finite_strain(
     n = len(mesh.points)
     solid = solid_part(mesh, material)
     operators = assemble(mesh, material, fixed=fixed, tension=tension)
-    branches, free = with_internal(operators.branches), operators.free
+    free = operators.free
 
     def spread(u: Floats) -> Floats:
         return operators.expand(u).reshape(n, 3)
@@ -166,22 +115,19 @@ def finite_strain(
     T = sparse.csr_array((len(free), len(free)))
     if tension is not None:
         T = restricted(tension_stiffness(mesh, solid.pattern, tension, SIDES), free)
-    body = Elastic(
-        operators=operators,
+    body = replace(
+        Elastic.linear(operators),
         internal=lambda u: internal_force(solid, spread(u)).ravel()[free] + T @ u,
         tangent=lambda u: restricted(tangent(solid, spread(u)), free) + T,
-        viscous=lambda u, v: operators.C @ v,
         energy=lambda u: stored_energy(solid, spread(u)) + float(u @ (T @ u)) / 2,
-        relaxing=(Relaxing.linear(branches),) if branches else (),
     )
     if membrane is None:
         return body
-    part, lag = membrane_part(mesh, membrane), stress_lag(membrane.material)
-    shares, times = relaxing_shares(membrane.material)
+    part, (lag, shares, times) = membrane_part(mesh, membrane), losses(membrane.material)
     K = restricted(tangent(part, np.zeros((n, 3))), free)
     at_rest = replace(
         operators, K=operators.K + K, C=operators.C + lag * K, laws=None,
-        branches=(*branches, *(
+        branches=(*operators.branches, *(
             MaxwellBranch(K=x * K, time=time)
             for x, time in zip(shares.tolist(), times.tolist(), strict=True)
         )),
@@ -205,26 +151,20 @@ def finite_strain(
     )
 
 
-def stress_lag(material: Material) -> float:
-    """Viscous over elastic stress at rest in s, at a rate of strain equal to the strain per
-    second.
+def losses(material: Material) -> tuple[float, Floats, Floats]:
+    """Viscosity in s and moduli (j,) of Maxwell branches over the modulus at rest; times (j,) in s
+    of the branches.
     """
     solid = material.without_loss_factor()
-    return solid.viscosity / solid.shear_modulus
-
-
-def relaxing_shares(material: Material) -> tuple[Floats, Floats]:
-    """Moduli (j,) of the Maxwell branches of a material over that at rest, and their times (j,) in
-    s.
-    """
-    solid = material.without_loss_factor()
-    shares = np.array([term.modulus / solid.shear_modulus for term in solid.prony])
-    return shares, np.array([term.time for term in solid.prony])
+    mu = solid.shear_modulus
+    shares = np.array([term.modulus / mu for term in solid.prony])
+    return solid.viscosity / mu, shares, np.array([term.time for term in solid.prony])
 
 
 def solid_part(mesh: TetMesh, material: Material | Mapping[int, Material]) -> Part:
     """The tetrahedra of a mesh."""
-    materials, region = by_region(mesh, material)
+    given, region = by_region(mesh, material)
+    materials = [m.without_loss_factor() for m in given]
     for m in materials:
         if m.poisson > LARGEST_POISSON:
             raise ValueError(
@@ -247,8 +187,8 @@ def _with_orthotropy(part: Part, materials: list[Material], region: Ints) -> Par
 
 
 def membrane_part(mesh: TetMesh, membrane: Membrane) -> Part:
-    """A membrane's triangles, which must lie in one horizontal plane, seen anticlockwise from
-    above, or raise a MeshError; lam in plane stress is 2 lam mu / (lam + 2 mu).
+    """Triangles of a membrane in plane stress, lam = 2 lam mu / (lam + 2 mu), which must lie in one
+    horizontal plane, seen anticlockwise from above, or raise a MeshError.
     """
     nodes, m = membrane.triangles, membrane.material.without_loss_factor()
     corners = mesh.points[nodes[:, :3]]
@@ -276,15 +216,13 @@ def internal_force(part: Part, u: Floats) -> Floats:
 
 
 def stress_force(part: Part, u: Floats, strain: Floats) -> Floats:
-    """Nodal forces (n, 3) in N of the stress of a strain (e, q, k, l), at a displacement u (n, 3)
-    in metre.
-    """
+    """Nodal forces (n, 3) in N of the stress of a strain (e, q, k, l), at displacements (n, 3)."""
     return spread_stress(part, stress(part, strain) @ deformation(part, u)[0])
 
 
 def rate_force(part: Part, u: Floats, v: Floats) -> Floats:
-    """Rate (n, 3) in N/s of nodal forces, those of the stress of the rate of E, at a displacement u
-    and a velocity v (n, 3).
+    """Rate (n, 3) in N/s of nodal forces, of the stress of the rate of E, at a displacement and a
+    velocity (n, 3).
     """
     F = deformation(part, u)[0]
     rate = F @ (part.D @ v).reshape(F.shape).swapaxes(2, 3)
@@ -302,8 +240,8 @@ def strain_energy(part: Part, E: Floats) -> float:
 
 
 def deformation(part: Part, u: Floats) -> tuple[Floats, Floats]:
-    """Deformation gradient F (e, q, k, i) and Green-Lagrange strain E (e, q, k, l), without
-    cancellation at small u.
+    """Deformation gradient F (e, q, k, i) and Green-Lagrange strain E (e, q, k, l), exact at small
+    u.
     """
     H = (part.D @ u).reshape(*part.G.shape[:3], 3)
     k = H.shape[2]
@@ -393,26 +331,17 @@ def shell_stiffness(
     *,
     meshed: float = 0.0,
 ) -> sparse.bsr_array:
-    """Membrane stiffness of a sheet that is a little curved at rest, as a shallow shell.
+    """Membrane stiffness (3 n, 3 n) in N/m of a sheet that is a little curved at rest, a shallow
+    shell.
 
-    Of a middle surface that rises by z0(x, y) above its plane, with slopes well below 1, the
-    membrane strains are (Marguerre, Proc 5th Int Congr Appl Mech (1938))
+    Of a middle surface that rises by z0(x, y) above its plane, the membrane strains are (Marguerre,
+    Proc 5th Int Congr Appl Mech (1938))
 
         e_kl = (u_k,l + u_l,k + z0_,k w_,l + z0_,l w_,k) / 2
 
-    so that bending stretches it: those of a membrane whose deformation gradient at rest has the
-    slopes of z0. The mesh stays flat, and its own membrane stiffness is taken away.
-
-    Parameters
-    ----------
-    mesh : TetMesh, horizontal
-    membrane : Membrane in its middle plane, of the whole membrane stiffness
-    slopes : points (..., 2) in metre -> slopes (..., 2) of the middle surface along x and y
-    meshed : the part of this stiffness that the elements have as a flat sheet
-
-    Returns
-    -------
-    (3 n, 3 n) sparse, N/m
+    those of a membrane whose deformation gradient at rest has the slopes of z0: `slopes` of points
+    (..., 2) along x and y, well below 1. The mesh stays flat; of its membrane, of the whole
+    stiffness, `meshed` is the part that the elements have, which is taken away.
     """
     part = membrane_part(mesh, membrane)
     corners = mesh.points[membrane.triangles[:, :3], :2]

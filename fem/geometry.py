@@ -29,8 +29,7 @@ def shape_nodes(mesh: TetMesh) -> Floats:
 
 def gradients(nodes: Floats, n_nodes: int, degree: int, first: int) -> tuple[Floats, Floats]:
     """Shape gradients (e, q, i, a) in 1/m and quadrature volumes (e, q) in m3 of tetrahedra with
-    nodes (e, a, i), by the number of shape functions and the degree of the quadrature. `first`
-    numbers the first element in the MeshError of an inverted one.
+    nodes (e, a, i), by the number of shape functions and the degree of the quadrature.
     """
     derivatives = shape_derivatives(tetrahedron_rule(degree)[0], n_nodes)
     cofactors, determinants, volumes = jacobians(nodes, degree, first)
@@ -42,12 +41,10 @@ def gradient_integrals(
     mesh: TetMesh, coefficients: Callable[[slice, Floats], Floats]
 ) -> Iterator[tuple[slice, Floats]]:
     """Element matrices (m, e, a, b) of int c_kl N_a,k N_b,l dV, some elements at a time, with their
-    slice.
-
-    Products of derivatives along the edges of the reference element are integrated once.
-    `coefficients` are a function of the slice and of G (k, l, e, x) to c_kl G_kl (m, e, x) for each
-    of m matrices; x numbers what is the same in all elements: two edges, at each quadrature point
-    of curved elements.
+    slice, by integrals of products of derivatives along the edges of the reference element.
+    `coefficients` are a function of the slice and of G (k, l, e, x) to c_kl G_kl (m, e, x); x
+    numbers what is the same in all elements: two edges, at each quadrature point of curved
+    elements.
     """
     n_nodes, shapes = mesh.tets.shape[1], shape_nodes(mesh)
     barycentric, weights = tetrahedron_rule(2)
@@ -68,9 +65,9 @@ def gradient_integrals(
 
 def jacobians(nodes: Floats, degree: int, first: int) -> tuple[Floats, Floats, Floats]:
     """Cofactors (e, q, d, i) in m2 and determinants (e, q) in m3 of the map from the reference
-    element to those with nodes (e, a, i), and volumes (e, q) of the quadrature points. q is 1
-    for the first two if elements are straight, with four nodes. `first` numbers the first
-    element in the MeshError of an inverted one.
+    element to those with nodes (e, a, i), q being 1 if they are straight, with four nodes; and
+    volumes (e, q) of the quadrature points. `first` numbers the first element in the MeshError of
+    an inverted one.
     """
     barycentric, weights = tetrahedron_rule(degree)
     at = barycentric[:1] if nodes.shape[1] == 4 else barycentric

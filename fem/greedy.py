@@ -4,16 +4,15 @@ Rozza, Huynh and Patera, Arch Comput Methods Eng 15:229 (2008).
 
 `reduce_affine`: one basis of Krylov moments serves all materials and geometries if it holds those
 of the least loss, whose motion has most detail. It begins with the reduced-order model of that
-material (`krylov`), and is assessed over a training set: by how much its last quarter changes the
+material (`krylov`). Over a training set it is assessed by how much its last quarter changes the
 response of each material and line and, at the largest such changes, by solutions of the full body.
-Where one of these is off by more than the tolerance, the moments of that material are added. The
-nodes of all geometries are those of one mesh, moved. Variants between the geometries are solved on
-the full body each time.
+Where one of these is off by more than the tolerance, the moments of that material are added.
+Geometries are those of one mesh whose nodes are moved; variants between them are solved on the
+full body each time.
 
 `line_bases`: at one line the states of such a model are on a smooth manifold, which a few of them
 span. The next state is that of the material at which the last one changed the response most. The
-prediction there is compared with the state before it is added; the search ends when several such
-comparisons in a row are within the tolerance.
+search ends when several predictions of it in a row are within the tolerance.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -84,27 +83,11 @@ def reduce_affine(
     solver: str,
     progress: Callable[[float], None],
 ) -> tuple[AffineModel, float, int]:
-    """Reduced-order model for all variants of a range.
-
-    Parameters
-    ----------
-    geometries : (g,) between which others are interpolated
-    training : variants without modulus laws of their own, over the range
-    frequencies : (f,) float, Hz, of the lines that errors are assessed at
-    band, solver : as for `reduce`
-    tolerance : float, relative error of a line
-    progress : called with the fraction done
-
-    Returns
-    -------
-    model : AffineModel, of the free degrees of freedom
-    error : float, the largest relative error found at a line of the full body
-    factorisations : int, that it took
-
-    Raises
-    ------
-    ValueError
-        If `MOST_BASES` variants are not enough, or as `reduce` does.
+    """Model for all variants of a range, the largest relative error found at a line of the full
+    body, and the number of factorisations: of geometries (g,) between which others are
+    interpolated, and a training set without modulus laws of its own; by errors at lines of
+    frequencies (f,) in Hz. `band` and `solver` are as for `reduce`. If `MOST_BASES` variants are
+    not enough it raises a ValueError.
     """
     t = min(range(len(training)), key=lambda each: _loss(training[each].solids))
     first = training[t].geometry()
@@ -168,8 +151,8 @@ def _suspects(
     frequencies: Floats,
     smaller: int,
 ) -> Iterator[tuple[int, int, Complex, float]]:
-    """Variants that the last vectors changed most, all between the geometries, and of each other
-    geometry one, each with the line where they changed it most, the response (p,) there, and what
+    """Variants that the last vectors changed most, all between the geometries, and one of each
+    other geometry, each with the line where they changed it most, the response (p,) there, and what
     its error is relative to at least.
     """
     if not others:
@@ -256,25 +239,10 @@ def line_bases(
     tolerance: float,
     progress: Callable[[float], None],
 ) -> tuple[tuple[AffineModel, ...], float]:
-    """Bases of lines for every material that is like those of a training set.
-
-    Parameters
-    ----------
-    model : AffineModel, with the forces of f lines
-    weights : (t, f, q) complex, of its terms for each material of the training set, at each line
-    shares : (t, g) float, of its geometries for each of them
-    tolerance : float, relative error of each line that is not faint
-    progress : called with the fraction done
-
-    Returns
-    -------
-    bases : (f,) AffineModel, each of one line, in coordinates of the model
-    error : float, the largest of the last comparisons
-
-    Raises
-    ------
-    ValueError
-        If `MOST_STATES` are not enough.
+    """Bases (f,) of the lines of a model for every material like those of a training set, each a
+    model of one line in coordinates of the given one, and the largest error of the last
+    comparisons. `weights` (t, f, q) are of the terms for each material at each line, `shares` (t,
+    g) of its geometries. If `MOST_STATES` are not enough it raises a ValueError.
     """
     lines = range(model.forces.shape[1])
     nothing = np.zeros((model.parts.shape[-1], 0))

@@ -15,9 +15,8 @@ The basis is mass-orthonormal. Added mass of a fluid is dense and can only be ap
 expansion point is 0, where no mass is factorised.
 
 The error estimate is the difference from the response of the model with some more moments, which by
-Galerkin orthogonality solves the residual equation in the larger space. Those further moments are
-then dropped: the error of the larger model would be unknown, because convergence may become steep
-or stall at any moment.
+Galerkin orthogonality solves the residual equation in the larger space. Those moments are then
+dropped: convergence may become steep or stall at any moment.
 """
 
 from __future__ import annotations
@@ -35,7 +34,6 @@ from fem.combination import Laws, factors_at, laws_of
 from fem.harmonic import dynamic_stiffness
 from fem.linear_solver import Factor, factorise
 from fem.maxwell import Branch, MaxwellBranch, with_internal
-from fem.pardiso import product
 from fem.reduced import ReducedModel
 from fem.typing import Complex, Floats
 
@@ -135,9 +133,8 @@ def reduce(
 
 
 def load_subspace(loads: Floats, tolerance: float = 1e-3) -> Floats:
-    """Proper orthogonal basis (3 n, s) of loads (3 n, k), to a relative error in the 2-norm.
-
-    A circling focus needs about twenty at 1e-3, however many positions it is given at.
+    """Proper orthogonal basis (3 n, s) of loads (3 n, k), to a relative error in the 2-norm. A
+    circling focus needs about twenty at 1e-3.
     """
     squares, vectors = np.linalg.eigh(loads.T @ loads)
     left_out = np.sqrt(np.cumsum(np.maximum(squares, 0)) / squares.sum())
@@ -148,22 +145,21 @@ def load_subspace(loads: Floats, tolerance: float = 1e-3) -> Floats:
 class KrylovBasis:
     """Mass-orthonormal basis that grows, and what is projected onto it.
 
-    Only the vectors are kept: their products with sparse matrices are formed where they are needed,
-    in less time than it takes to read them from memory. Memory is touched only as far as used, and
-    new vectors are orthonormalised in place: memory touched anew costs as much as the arithmetic.
+    Products with sparse matrices are formed where they are needed, in less time than it takes to
+    read them from memory. Memory is touched only as far as used, and new vectors are
+    orthonormalised in place.
     """
 
     def __init__(self, operators: Operators, laws: Laws, most: int) -> None:
         self._branches, self._laws = operators.branches, laws
-        self._M, self._K = product(operators.M), product(operators.K)
-        rests = (part.rest for part in laws.parts)
-        self._rests = [None if rest is None else product(rest) for rest in rests]
+        self._M, self._K = operators.M, operators.K
+        self._rests = [part.rest for part in laws.parts]
         self._free, n_dofs = operators.free, operators.n_dofs
         self._all_dofs = np.empty((n_dofs, most), order="F")  # for `expanded`
         self._columns = self._all_dofs[: len(operators.free)]
         # Projected K and rests (size, size), and what is seen of a response (size, k).
         self._small_K = np.empty((0, 0))
-        self._small_rests = [None if times is None else self._small_K for times in self._rests]
+        self._small_rests: list[Any] = [None if r is None else self._small_K for r in self._rests]
         self._seen = np.empty((0, 0))
         self.size = 0
 
@@ -199,7 +195,7 @@ class KrylovBasis:
         if R is self._laws.damping.rest:
             return np.array(self._small_rests[0])[:size, :size]
         basis = self.basis[:, :size]
-        return _products(product(R), basis, basis)
+        return _products(R, basis, basis)
 
     def forces(self, of_mass: Floats, of_rests: Sequence[Floats]) -> Floats:
         """Nodal forces M z + sum_j rest_j r_j (n, k) of coordinates z and r_j (size, k)."""
@@ -207,22 +203,19 @@ class KrylovBasis:
         acting += [(A, r) for A, r in zip(self._rests, of_rests, strict=True) if A is not None]
         fields = _combined(self.basis, np.hstack([r for _, r in acting]))  # reads the basis once
         each = np.split(fields, len(acting), axis=1)
-        forces = acting[0][0](each[0])
-        for (A, _), field in zip(acting[1:], each[1:], strict=True):
-            forces += A(field)
-        return forces
+        return sum(A @ field for (A, _), field in zip(acting, each, strict=True))
 
     def extend(self, block: Floats) -> Floats:
         """Add the linearly independent directions of a block (n, k), by block Gram-Schmidt and a
         decomposition of its Gram matrix; its coordinates (size, k).
         """
         M, Q = self._M, self.basis
-        moved = M(block)
+        moved = M @ block
         scale = _norms(block, moved)
         first = _inner(Q, moved)
         block = block - _combined(Q, first)
         # Twice is enough, and once is not: after 90 moments vectors were orthogonal to 1e-3.
-        moved = M(block)
+        moved = M @ block
         second = _inner(Q, moved)
         gram = block.T @ moved - second.T @ second
         block -= _combined(Q, second)
@@ -244,9 +237,9 @@ class KrylovBasis:
         round-off is no longer small, also that of what is in the basis.
         """
         new = block @ upright
-        block -= _combined(self.basis, self.basis.T @ self._M(new)) @ np.linalg.pinv(upright)
+        block -= _combined(self.basis, self.basis.T @ (self._M @ new)) @ np.linalg.pinv(upright)
         new = block @ upright
-        return upright @ np.linalg.inv(np.linalg.cholesky(new.T @ self._M(new))).T
+        return upright @ np.linalg.inv(np.linalg.cholesky(new.T @ (self._M @ new))).T
 
     def project(self, seen: Floats, size: int) -> None:
         """Project the matrices, and what is seen (n, k), onto those of the first vectors that are
@@ -255,9 +248,10 @@ class KrylovBasis:
         Q, new = self._columns[:, :size], self._columns[:, len(self._small_K) : size]
         self._seen = np.vstack([self._seen.reshape(-1, seen.shape[1]), new.T @ seen])
         self._small_K = _bordered(self._small_K, _products(self._K, Q, new))
-        for j, (times, small) in enumerate(zip(self._rests, self._small_rests, strict=True)):
-            if times is not None and small is not None:
-                self._small_rests[j] = _bordered(small, _products(times, Q, new))
+        self._small_rests = [
+            None if rest is None else _bordered(small, _products(rest, Q, new))
+            for rest, small in zip(self._rests, self._small_rests, strict=True)
+        ]
 
 
 def _converged(
@@ -372,9 +366,8 @@ def _inner(basis: Floats, block: Floats) -> Floats:
 
 
 def _norms(block: Floats, product: Floats) -> Floats:
-    """Mass norms (m,) of columns with their product with M.
-
-    At rest every second moment of a body without loss is 0, which is no direction.
+    """Mass norms (m,) of columns with their product with M: 0 at rest for every second moment of a
+    body without loss.
     """
     return np.maximum(np.sqrt(np.einsum("nm,nm->m", block, product)), SMALLEST)
 
@@ -396,10 +389,10 @@ def _orthonormalised(earlier: Floats, latest: Floats) -> tuple[Floats, Floats]:
     return np.hstack([W, X]).reshape(parts, size, -1), X.reshape(parts, size, width)
 
 
-def _products(times: Callable[[Floats], Floats], basis: Floats, vectors: Floats) -> Floats:
+def _products(A: Any, basis: Floats, vectors: Floats) -> Floats:
     """Matrix basis^T A vectors (size, k) of a symmetric A, some vectors at a time."""
     starts = range(0, vectors.shape[1], AT_ONCE)
-    columns = [_inner(basis, times(vectors[:, k : k + AT_ONCE])) for k in starts]
+    columns = [_inner(basis, A @ vectors[:, k : k + AT_ONCE]) for k in starts]
     return np.hstack(columns) if columns else np.empty((basis.shape[1], 0))
 
 

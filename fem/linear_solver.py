@@ -6,18 +6,19 @@ SuperLU needs nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from fem.pardiso import Pardiso, PardisoError, mkl
-from fem.sparsity import upper_triangle
-from fem.typing import Array, Index, Ints
+from fem.sparsity import on_one_pattern, upper_triangle
+from fem.typing import Array, Ints
 
 REFINED, SLOWEST = 1e-10, 0.2  # residual over the right-hand side, and over that of a step before
 BACKENDS = ("pardiso", "superlu")
@@ -68,27 +69,6 @@ def factorise(A: sparse.csr_array, *, backend: str = "auto") -> Factor:
     return Factor(solve=solve if complex_valued else _by_parts(solve), backend=backend)
 
 
-def factoriser(
-    indices: Index, indptr: Index, *, backend: str = "auto"
-) -> Callable[[Array], Factor]:
-    """Function that factorises complex symmetric matrices of one sparsity pattern, which PARDISO
-    analyses once, by the values (nnz,) of their upper triangles, which it may scale. A factor
-    can be solved with until the next one is made.
-
-    `indices` are columns, in rising order, and `indptr` starts of the rows of upper triangles.
-    Raises as `factorise` does.
-    """
-    if backend in ("auto", "pardiso") and mkl() is not None:
-        return _Lines(indices, indptr)
-
-    def anew(values: Array) -> Factor:
-        n = len(indptr) - 1
-        upper = sparse.csr_array((values, indices, indptr), shape=(n, n))
-        return factorise(upper + sparse.triu(upper, 1, format="csr").T, backend=backend)
-
-    return anew
-
-
 def _check_finite(values: Array) -> None:
     if not np.isfinite(values).all():
         raise ValueError("the matrix has entries that are not finite; check the material")
@@ -131,39 +111,54 @@ def _factorised(matrix: Pardiso, values: Array) -> None:
         raise _singular(error) from None
 
 
-class _Lines:
-    """Factors of complex symmetric matrices of one pattern, by PARDISO.
+class SumFactoriser:
+    """Factorises weighted sums of real symmetric matrices (n, n), sparse, with complex weights, in
+    the union of their patterns, which PARDISO analyses once.
 
-    They are in single precision, refined in double, which takes half of the memory and two thirds
-    of the time. Where that does not converge, as it does not for thin sheets, the matrix and all
-    later ones are factorised in double precision.
+    Its factors are in single precision, refined in double, which takes half of the memory and two
+    thirds of the time. Where that does not converge, as it does not for thin sheets, the matrix and
+    all later ones are factorised in double precision.
     """
 
-    def __init__(self, indices: Index, indptr: Index) -> None:
-        self._indices, self._indptr = indices, indptr
-        self._matrix = self._analysed(single=True)
-        self._is_single = True
+    def __init__(self, matrices: Sequence[sparse.csr_array], *, backend: str = "auto") -> None:
+        self._values, self._indices, self._indptr = on_one_pattern(matrices)
+        self._backend, self._is_single = backend, True
+        self._matrix: Pardiso | None = None
 
-    def __call__(self, values: Array) -> Factor:
-        """The factor of a matrix, by the values (nnz,) of its upper triangle."""
+    def __getstate__(self) -> dict[str, Any]:
+        """State for other processes, without what PARDISO has analysed."""
+        return {**vars(self), "_matrix": None}
+
+    def __call__(self, weights: Array) -> Factor:
+        """Factor of a sum, valid until the next one is made. Raises as `factorise` does."""
+        values = np.empty(self._values.shape[1], np.complex128)
+        values.real, values.imag = weights.real @ self._values, weights.imag @ self._values
+        if self._backend not in ("auto", "pardiso") or mkl() is None:
+            upper = self._upper(values)
+            whole = upper + sparse.triu(upper, 1, format="csr").T
+            return factorise(whole, backend=self._backend)
         _check_finite(values)
+        self._matrix = self._matrix or self._analysed()
         _factorised(self._matrix, values.astype(np.complex64) if self._is_single else values)
-        return Factor(solve=partial(self._solve, values), backend="pardiso")
+        return Factor(solve=partial(self._solve, self._matrix, values), backend="pardiso")
 
-    def _solve(self, values: Array, b: Array) -> Array:
+    def _solve(self, matrix: Pardiso, values: Array, b: Array) -> Array:
         if self._is_single:
-            n = len(self._indptr) - 1
-            upper = sparse.csr_array((values, self._indices, self._indptr), shape=(n, n))
-            x = _refined(upper, lambda r: self._matrix.solve(r.astype(np.complex64)), b)
+            x = _refined(self._upper(values), lambda r: matrix.solve(r.astype(np.complex64)), b)
             if x is not None:
                 return x
-            self._matrix, self._is_single = self._analysed(single=False), False
+            self._is_single = False
+            self._matrix = self._analysed()
             _factorised(self._matrix, values)
-        return self._matrix.solve(b)
+        return (self._matrix or matrix).solve(b)
 
-    def _analysed(self, *, single: bool) -> Pardiso:
+    def _upper(self, values: Array) -> sparse.csr_array:
+        n = len(self._indptr) - 1
+        return sparse.csr_array((values, self._indices, self._indptr), shape=(n, n))
+
+    def _analysed(self) -> Pardiso:
         one = np.int32(1)
-        return Pardiso(self._indices + one, self._indptr + one, 6, single=single)
+        return Pardiso(self._indices + one, self._indptr + one, 6, single=self._is_single)
 
 
 def _refined(upper: sparse.csr_array, solve: Callable[[Array], Array], b: Array) -> Array | None:

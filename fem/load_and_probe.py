@@ -1,4 +1,4 @@
-"""Load and probe operators on the surface of a body.
+"""Load and probe operators on the surface of a body, and points inside it.
 
 nodal forces = P q at the facets' quadrature points,  displacement into the body = S u
 """
@@ -19,6 +19,9 @@ MOST_STEPS, FURTHEST = 12, 3.0  # of Newton's method, and how far outside a face
 EDGE_ON = 1e-9  # of a facet's squared size: the area of one that is seen edge-on
 SAME_HEIGHT = 1e-6  # of the surface's extent: neighbours meet at one height
 AT_ONCE = 2_000_000  # pairs of points and facets
+OUTSIDE = 1e-6  # barycentric: how far outside all elements a point still counts as in the body
+BOWED = 0.3  # of an element's size: the same where the straight element stands for a curved one
+REACH = 0.05  # of an element's size, by which a curved element may reach beyond its corners
 NODES = np.vstack([np.eye(3), [[0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]]])  # of a facet
 
 
@@ -34,8 +37,8 @@ def load_operator(mesh: TetMesh, facets: str | Ints = "top") -> sparse.csr_array
 def traction_operator(
     mesh: TetMesh, tractions: Floats, facets: str | Ints = "top"
 ) -> sparse.csr_array:
-    """Load operator (3 n, k q) of tractions: nodal forces int N_a t dA in N per value at each of
-    the `facet_points`, of the traction vector (k q, 3) of a unit value there.
+    """Load operator (3 n, k q) of tractions: nodal forces int N_a t dA in N of the traction vectors
+    (k q, 3) of unit values at the `facet_points`.
     """
     N, normals = facet_geometry(mesh, facet_set(mesh, facets))
     area = np.linalg.norm(normals, axis=2)
@@ -70,17 +73,16 @@ def probe_operator(
 ) -> sparse.csr_array:
     """Probe operator S: displacement into the body at surface points.
 
-    A point is projected along z onto the facets, of several onto the highest; positive is the
-    direction of a pressure, against the normal of the facet; or, with a patch, against the mean
-    normal of the surface. Next to a crease the facet itself depends on the mesh.
+    A point is projected along z onto the highest of the facets. Positive is the direction of a
+    pressure, against the normal of the facet or, next to a crease, where that depends on the mesh,
+    against the mean normal of a patch.
 
     Parameters
     ----------
     mesh : TetMesh
     points : (p, 2 or 3) float, metre
     facets : a facet set's name or nodes (e, a)
-    patch : metre, standard deviation of the Gaussian that weights the normals about a point; 0: the
-        facet's own normal
+    patch : metre, standard deviation of the Gaussian that weights the normals about a point, or 0
 
     Returns
     -------
@@ -97,16 +99,9 @@ def probe_operator(
 def node_operator(
     mesh: TetMesh, facets: str | Ints = "top", *, patch: float = 0.0
 ) -> tuple[Ints, sparse.csr_array]:
-    """Displacement into the body at the nodes of a surface, against the mean normal of the facets
-    at each.
-
-    Parameters
-    ----------
-    mesh, facets, patch : as for `probe_operator`
-
-    Returns
-    -------
-    nodes (s,) in ascending order, and the operator (s, 3 n), sparse and without unit
+    """Nodes (s,) of a surface in ascending order, and the operator (s, 3 n) of their displacement
+    into the body, against the mean normal of the facets at each, or of a patch as for
+    `probe_operator`.
     """
     nodes = facet_set(mesh, facets)
     surface, local = np.unique(nodes, return_inverse=True)
@@ -133,15 +128,8 @@ def _inwards(mesh: TetMesh, nodes: Ints, N: Floats, normals: Floats) -> sparse.c
 def surface_frame(
     mesh: TetMesh, points: ArrayLike, facets: str | Ints = "top", *, patch: float = 0.0
 ) -> tuple[Floats, Floats]:
-    """Find places on a surface, and its normals there.
-
-    Parameters
-    ----------
-    mesh, points, facets, patch : as of `probe_operator`, which raises the same errors
-
-    Returns
-    -------
-    (p, 3) float, metre, and (p, 3) unit normals out of the body
+    """Places (p, 3) in metre on a surface, and unit normals (p, 3) out of the body there; arguments
+    and errors are those of `probe_operator`.
     """
     nodes, N, normals = _surface_frame(mesh, points, facets, patch)
     return np.einsum("pa,pai->pi", N, mesh.points[nodes]), normals
@@ -217,27 +205,15 @@ def on_curved(elements: Floats, barycentric: Floats, points: Floats) -> Floats:
 
 
 def on_surface(mesh: TetMesh, points: Floats, facets: str | Ints = "top") -> Bools:
-    """Find the points at which `probe_operator` can read.
-
-    Parameters
-    ----------
-    mesh : TetMesh
-    points : (p, 2) float, metre
-    facets : name of a facet set, or its facets
-
-    Returns
-    -------
-    (p,) bool
-    """
+    """Mask (p,) of the points (p, 2) in metre at which `probe_operator` can read."""
     return _seen(mesh.points[facet_set(mesh, facets)], points)[0] >= 0
 
 
 def _seen(facets: Floats, points: Floats) -> tuple[Ints, Floats]:
     """Highest of the facets (k, a, 3) at each of the points (p, 2), seen along z, -1 where there is
-    none; and the barycentric coordinates (p, 3) there.
-
-    A point is on a facet only if Newton's method ends inside of it. Outside, shape functions
-    extrapolate, and without bound on a facet that is seen edge-on.
+    none, and the barycentric coordinates (p, 3) there: a point is on a facet only if Newton's
+    method ends inside of it, as shape functions extrapolate without bound on a facet that is seen
+    edge-on.
     """
     who, which = _near(facets[:, :, :2], points)
     barycentric, found = _within(facets[which, :, :2], points[who])
@@ -309,3 +285,66 @@ def _missed(elements: Floats, barycentric: Floats, points: Floats) -> tuple[Floa
     derivatives = shape_derivatives(barycentric, elements.shape[1])
     miss = points - np.einsum("pa,pai->pi", N, elements)
     return miss, np.einsum("pad,pai->pid", derivatives, elements)
+
+
+def locate(mesh: TetMesh, points: ArrayLike) -> tuple[Ints, Floats]:
+    """Element (p,) that each point (p, 3) in metre lies in, and its barycentric coordinates (p, 4).
+    A point outside the body raises a ValueError.
+    """
+    points = np.atleast_2d(np.asarray(points, np.float64))
+    owner, barycentric, inside = _located(mesh, points)
+    if not inside.all():
+        x, y, z = 1e3 * points[~inside][0]
+        raise ValueError(f"point ({x:.4g}, {y:.4g}, {z:.4g}) mm is not in the body; move it inside")
+    return owner, barycentric
+
+
+def is_inside(mesh: TetMesh, points: ArrayLike) -> Bools:
+    """Mask (p,) of the points (p, 3) in metre that are in the body."""
+    return _located(mesh, np.atleast_2d(np.asarray(points, np.float64)))[2]
+
+
+def _located(mesh: TetMesh, points: Floats) -> tuple[Ints, Floats, Bools]:
+    """Element (p,) of each point (p, 3), its coordinates (p, 4), and whether it is inside of it."""
+    corners = mesh.points[mesh.tets[:, :4]]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    slack = REACH * (high - low).max(axis=1, keepdims=True)
+    low, high = low - slack, high + slack
+    found = [_containing(corners, low, high, point) for point in points]
+    owner = np.array([element for element, _ in found])
+    barycentric = np.array([coordinates for _, coordinates in found])
+    inside = np.isfinite(barycentric).all(axis=1)
+    if mesh.order == 2:
+        nodes = mesh.points[mesh.tets[owner[inside]]]
+        barycentric[inside] = on_curved(nodes, barycentric[inside], points[inside])
+    inside[inside] = barycentric[inside].min(axis=1) >= -BOWED * REACH - OUTSIDE
+    return owner, barycentric, inside
+
+
+def _containing(corners: Floats, low: Floats, high: Floats, point: Floats) -> tuple[int, Floats]:
+    """The straight element that a point (3,) is in, or the least outside of those near it, and its
+    coordinates, which are nan if none is near.
+    """
+    near = np.flatnonzero(((low <= point) & (point <= high)).all(axis=1))
+    if not len(near):
+        return 0, np.full(4, np.nan)
+    first = corners[near, 0]
+    edges = (corners[near, 1:] - first[:, None]).swapaxes(1, 2)
+    inner = np.linalg.solve(edges, (point - first)[:, :, None])[:, :, 0]
+    coordinates = np.column_stack([1 - inner.sum(axis=1), inner])
+    best = int(coordinates.min(axis=1).argmax())
+    return int(near[best]), coordinates[best]
+
+
+def displacement_operator(mesh: TetMesh, points: ArrayLike) -> sparse.csr_array:
+    """Displacement operator (3 p, 3 n), component fastest, at points (p, 3) in metre inside a body.
+    A point outside raises a ValueError.
+    """
+    owner, barycentric = locate(mesh, points)
+    nodes = mesh.tets[owner]
+    N = shape_functions(barycentric, nodes.shape[1])
+    rows, component = np.arange(len(owner))[:, None, None], np.arange(3)
+    columns = 3 * nodes[:, :, None] + component
+    values = np.broadcast_to(N[:, :, None], columns.shape).ravel()
+    places = np.broadcast_to(3 * rows + component, columns.shape).ravel(), columns.ravel()
+    return sparse.csr_array((values, places), shape=(3 * len(owner), mesh.n_dofs))

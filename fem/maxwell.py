@@ -105,8 +105,8 @@ def viscoelastic(
     stiffness: Callable[[Floats], sparse.csr_array],
     mass: Callable[[Floats], sparse.csr_array],
 ) -> Matrices:
-    """K, C, M and the branches of r materials without loss factors, by the `stiffness` of a share
-    of each material's moduli (r,) and the `mass` of densities (r,) in kg/m3, both linear.
+    """K, C, M and branches of r materials without loss factors, by the `stiffness` of a share of
+    each material's moduli (r,) and the `mass` of densities (r,) in kg/m3, both linear.
     """
     rho, mu = (property_of(materials, name) for name in ("density", "shear_modulus"))
     K, M = stiffness(np.ones(len(materials))), mass(rho)

@@ -10,12 +10,8 @@ CGROUP = Path("/sys/fs/cgroup")
 
 
 def check_memory(dofs: int) -> None:
-    """Refuse, before anything is assembled, a body for whose matrices there is no memory.
-
-    Raises
-    ------
-    MemoryError
-        If so many degrees of freedom take more than is free, even with their factor in files.
+    """Refuse, by a MemoryError and before anything is assembled, a body whose matrices take more
+    memory than is free, even with their factor in files.
     """
     needed, free = BYTES_PER_DOF * dofs, free_memory()
     if needed > free:

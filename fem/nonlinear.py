@@ -1,14 +1,14 @@
 """Nonlinear statics and dynamics at large displacement: M u'' + f_int(u, u', d) = f(t, u).
 
-Statics by Newton's method with a line search, in load steps if need be. Dynamics by the
-generalized-alpha method of `transient` with the internal force weighted between the ends of a step,
+Statics by Newton's method with a line search, in load steps if need be. Dynamics by the average
+acceleration of `transient`, with forces balanced in the mean of the ends of a step,
 
-    M [(1 - a_m) a' + a_m a] + (1 - a_f) [f_int(u', v') - f'] + a_f [f_int(u, v) - f] = 0
+    M (a' + a) + f_int(u', v') - f' + f_int(u, v) - f = 0
 
-with the stretches d of Maxwell branches at their ends, by the trapezoidal rule (Belytschko, Liu and
+and the stretches d of Maxwell branches at these ends, by the trapezoidal rule (Belytschko, Liu and
 Moran, Nonlinear Finite Elements for Continua and Structures (2000), chapter 6). One factorisation
-serves as many steps as Newton's method converges with it (modified Newton). Average acceleration
-conserves energy to second order in the step.
+serves as many steps as Newton's method converges with it (modified Newton). Energy is conserved to
+second order in the step.
 """
 
 from collections.abc import Callable, Iterator
@@ -17,10 +17,9 @@ from itertools import count
 
 import numpy as np
 
-from fem.energy import EnergyBalance, with_losses
-from fem.finite_strain import Elastic
+from fem.energy import Elastic
 from fem.linear_solver import Factor, factorise
-from fem.transient import Diverged, State, acceleration, at_rest, weights
+from fem.transient import Diverged, State, acceleration, at_rest, check_step
 from fem.typing import Floats
 
 MOST_ITERATIONS = 25
@@ -42,25 +41,12 @@ def static(
     tolerance: float = 1e-8,
     solver: str = "auto",
 ) -> Floats:
-    """Static displacement under a force applied in as few load steps as converge.
+    """Static displacement (3 n,) in metre under a force (3 n,) in N, applied in as few load steps
+    as converge, from an initial guess or undeformed.
 
-    Parameters
-    ----------
-    body : Elastic
-    force : (3 n,) in N
-    start : (3 n,) in metre, initial guess; undeformed if not given
-    tolerance : residual relative to the force; or, of a residual below `ROUND_OFF`, the
-        correction that it calls for, relative to the displacement
-    solver : of `linear_solver.factorise`
-
-    Returns
-    -------
-    (3 n,) float, metre
-
-    Raises
-    ------
-    Diverged
-        If Newton's method does not converge even in steps of 1/64 of the load.
+    The `tolerance` is of the residual relative to the force or, below `ROUND_OFF`, of the
+    correction that it calls for, relative to the displacement. If Newton's method does not converge
+    even in steps of 1/64 of the load, it raises Diverged.
     """
     operators = body.operators
     free = operators.free
@@ -153,38 +139,19 @@ def dynamic(
     force: Callable[[float], Floats],
     dt: float,
     *,
-    spectral_radius: float = 1.0,
     initial: State | None = None,
     tolerance: float = 1e-3,
     solver: str = "auto",
 ) -> Iterator[State]:
-    """Time integration by generalized-alpha and Newton's method, without end.
+    """Time integration by average acceleration and Newton's method, without end: states at 0, dt, 2
+    dt, ..., from rest or an initial displacement and velocity, under nodal forces (3 n,) in N of a
+    time in s.
 
-    A step for which Newton's method does not converge is made of two halves, and so on.
-
-    Parameters
-    ----------
-    body : Elastic
-    force : time in s -> nodal forces (3 n,) in N
-    dt : float, s
-    spectral_radius : 0 to 1, factor per step on the amplitude of motion far above 1/dt
-    initial : displacement and velocity to start from; at rest at time 0 if not given
-    tolerance : the last correction of a step's displacement, relative to that displacement
-    solver : of `linear_solver.factorise`
-
-    Yields
-    ------
-    State
-        At 0, dt, 2 dt, ..., with the stretches (j, ...) of each of `body.relaxing`.
-
-    Raises
-    ------
-    ValueError
-        If dt or the spectral radius is out of range.
-    Diverged
-        If Newton's method does not converge even in 64 parts of a step.
+    Arguments are those of `transient`; the `tolerance` is of the last correction of a step's
+    displacement, relative to it. A step for which Newton's method does not converge is made of two
+    halves, and so on; if even 64 parts do not, it raises Diverged.
     """
-    scheme = weights(dt, spectral_radius)
+    check_step(dt)
     free, start = body.operators.free, initial or at_rest(body.operators.n_dofs)
     u, v = start.displacement[free], start.velocity[free]
     f, internal = force(start.time)[free], body.internal(u)
@@ -196,7 +163,7 @@ def dynamic(
     a = acceleration(body.operators, f - internal)
     now = _Now(t=start.time, u=u, v=v, a=a, force=f, internal=internal,
                strain=strain, stretch=stretch)  # fmt: skip
-    march = _March(body=body, force=force, scheme=scheme, tolerance=tolerance, solver=solver)
+    march = _March(body=body, force=force, tolerance=tolerance, solver=solver)
     factors: dict[float, Factor] = {}
     for step in count(1):
         yield _state(body, now)
@@ -213,11 +180,10 @@ def dynamic(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _March:
-    """Body, load, scheme, tolerance and solver of a time integration, the same in every step."""
+    """Body, load, tolerance and solver of a time integration, the same in every step."""
 
     body: Elastic
     force: Callable[[float], Floats]
-    scheme: tuple[float, float, float, float]
     tolerance: float
     solver: str
 
@@ -241,19 +207,19 @@ def _step(
     """One step by Newton's method, with the factorisation cached by `halvings` while it
     converges.
     """
-    body, (a_m, a_f, beta, gamma) = march.body, march.scheme
+    body = march.body
     C, M, free = body.operators.C, body.operators.M, body.operators.free
     dt, a, before, residual = until - now.t, now.a, np.inf, np.inf
     shares = [2 * part.times / (dt + 2 * part.times) for part in body.relaxing]
-    predicted = now.u + dt * now.v + dt**2 * (0.5 - beta) * now.a
+    predicted = now.u + dt * now.v + dt**2 / 4 * now.a
     f = march.force(until)[free]
-    load = (1 - a_f) * f + a_f * now.force
+    load = f + now.force
     for _ in range(MOST_ITERATIONS):
-        u = predicted + dt**2 * beta * a
-        v = now.v + dt * ((1 - gamma) * now.a + gamma * a)
+        u = predicted + dt**2 / 4 * a
+        v = now.v + dt / 2 * (now.a + a)
         _, stretch = _relaxed(body, now, u, shares)
         internal = body.internal(u) + body.viscous(u, v) + _relaxing_force(body, u, stretch)
-        r = load - M @ ((1 - a_m) * a + a_m * now.a) - (1 - a_f) * internal - a_f * now.internal
+        r = load - M @ (a + now.a) - internal - now.internal
         residual = float(np.linalg.norm(r) / (np.linalg.norm(load) or 1.0))
         if not np.isfinite(residual):
             break
@@ -261,22 +227,22 @@ def _step(
             K = body.tangent(u)
             for part, share in zip(body.relaxing, shares, strict=True):
                 K = K + part.tangent(u, share)
-            system = (1 - a_m) * M + (1 - a_f) * dt * (gamma * C + beta * dt * K)
+            system = M + dt * (C / 2 + dt / 4 * K)
             try:
                 factors[halvings] = factorise(system, backend=march.solver)
             except ValueError:
                 break
         change = factors[halvings].solve(r)
         a = a + change
-        sizes = (u - now.u, dt**2 * beta * a, STANDSTILL * u)
+        sizes = (u - now.u, dt**2 / 4 * a, STANDSTILL * u)
         step = max(float(np.linalg.norm(size)) for size in sizes)
-        left = dt**2 * beta * float(np.linalg.norm(change)) / (step or 1.0)
+        left = dt**2 / 4 * float(np.linalg.norm(change)) / (step or 1.0)
         shrinks = left <= max(SLOW * before, march.tolerance / 100)
         if left <= march.tolerance and (shrinks or before <= march.tolerance):
             # One more residual would only confirm what this correction leaves: its square or, with
             # an old tangent, a small part of it. The balance of forces stands for it.
-            u, v = u + dt**2 * beta * change, v + dt * gamma * change
-            internal = (load - M @ ((1 - a_m) * a + a_m * now.a) - a_f * now.internal) / (1 - a_f)
+            u, v = u + dt**2 / 4 * change, v + dt / 2 * change
+            internal = load - M @ (a + now.a) - now.internal
             strain, stretch = _relaxed(body, now, u, shares)
             return _Now(t=until, u=u, v=v, a=a, force=f, internal=internal,
                         strain=strain, stretch=stretch)  # fmt: skip
@@ -309,34 +275,3 @@ def _state(body: Elastic, now: _Now) -> State:
         time=now.t, displacement=expand(now.u), velocity=expand(now.v), acceleration=expand(now.a),
         stretch=now.stretch,
     )  # fmt: skip
-
-
-def total_energy(body: Elastic, state: State) -> float:
-    """Kinetic and stored energy of a state in J."""
-    free = body.operators.free
-    v = state.velocity[free]
-    stretched = zip(body.relaxing, state.stretch, strict=bool(state.stretch))
-    springs = sum(float(part.energy(d).sum()) for part, d in stretched)
-    moving = float(v @ (body.operators.M @ v)) / 2
-    return moving + body.energy(state.displacement[free]) + springs
-
-
-def with_energy_balance(
-    body: Elastic, states: Iterator[State], force: Callable[[float], Floats]
-) -> Iterator[tuple[State, EnergyBalance]]:
-    """States of `dynamic`, each with the energy balance in J since the first, under the nodal
-    forces (3 n,) in N of a time that drive them.
-    """
-    free = body.operators.free
-
-    def lost(before: State, state: State) -> EnergyBalance:
-        moved = (state.displacement - before.displacement)[free]
-        middle = (state.displacement + before.displacement)[free] / 2
-        dt = state.time - before.time
-        dissipated = float(moved @ body.viscous(middle, moved)) / dt
-        both = zip(body.relaxing, before.stretch, state.stretch, strict=True)
-        for part, old, new in both:
-            dissipated += dt * float((2 / part.times) @ part.energy((old + new) / 2))
-        return EnergyBalance(dissipated=dissipated)
-
-    return with_losses(states, force, free, lost)

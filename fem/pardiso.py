@@ -1,5 +1,5 @@
-"""MKL, where it is installed: PARDISO on the upper triangle of symmetric matrices, Cholesky if real
-and LDL^T if complex; and products of sparse matrices with blocks of vectors.
+"""MKL's PARDISO, where it is installed, on the upper triangle of symmetric matrices: Cholesky if
+real, LDL^T if complex.
 
 PARDISO orders blocks of rows with similar patterns, as those of a node's components: 0.7 s instead
 of 2.8 for a slab of 128,000 dofs, and a third of the memory. A factor that is larger than the
@@ -14,17 +14,16 @@ import shutil
 import sys
 import tempfile
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy import sparse
 
 from fem.memory import free_memory
-from fem.typing import Array, Floats, Index
+from fem.typing import Array, Index
 
 log = logging.getLogger(__name__)
 
@@ -33,7 +32,6 @@ BLOCKS = 80  # %: how much alike the patterns of rows are that PARDISO takes as 
 TWO_LEVELS, SINGLE, BY_BLOCKS, OUT_OF_CORE = 23, 27, 36, 59  # of its settings; 2 for files
 IN_CORE = 0.8  # of the memory that is free, at most, for a factor; vectors need the rest
 LEAST_CORE = 500  # MB that it may use beside the files: with less it fails
-NOT_TRANSPOSED, GENERAL, UPPER, NON_UNIT, ROW_MAJOR = 10, 20, 41, 50, 101  # of mkl_spblas.h
 PHASES = {"analyse": 11, "factorise": 22, "solve": 33, "release": -1}
 
 
@@ -56,14 +54,7 @@ def mkl() -> ctypes.CDLL | None:
 class Pardiso:
     """PARDISO on upper triangles of one pattern, which it analyses once."""
 
-    def __init__(
-        self,
-        indices: Index,
-        indptr: Index,
-        kind: int,
-        *,
-        single: bool = False,
-    ) -> None:
+    def __init__(self, indices: Index, indptr: Index, kind: int, *, single: bool = False) -> None:
         """Columns and starts of rows, numbered from 1, which it keeps; kind 2 for real matrices, 6
         for complex.
         """
@@ -81,15 +72,7 @@ class Pardiso:
         weakref.finalize(self, _release, *known, self._folders)
 
     def factorise(self, values: Array) -> None:
-        """Factorise a matrix, whose values (nnz,) are scaled in place.
-
-        Raises
-        ------
-        MemoryError
-            If the factor fits neither in memory nor on the disk.
-        PardisoError
-            If a pivot is not positive, or another step fails.
-        """
+        """Factorise a matrix, whose values (nnz,) are scaled in place."""
         # PARDISO perturbs pivots below an absolute bound: entries of about 1 make it relative.
         self._scale = 2.0 ** np.round(np.log2(np.abs(values).max(initial=1e-300)))
         values /= self._scale
@@ -203,50 +186,3 @@ def _release(handle: Array, settings: Array, kind: int, n: int, folders: list[st
 
 def _integers(*values: int) -> list[Any]:
     return [ctypes.byref(ctypes.c_int32(value)) for value in values]
-
-
-class _Descriptor(ctypes.Structure):
-    _fields_ = (("type", ctypes.c_int), ("mode", ctypes.c_int), ("diagonal", ctypes.c_int))
-
-
-def product(A: sparse.csr_array) -> Callable[[Floats], Floats]:
-    """Product of a matrix A (n, n), sparse or a LinearOperator, with blocks (n, k), as a function.
-
-    SciPy multiplies one entry at a time with a row of the block. MKL takes 22 ms instead of 59 for
-    K of 86,000 dofs times 5 columns. Single vectors, and matrices that can only be applied, are
-    left to SciPy. A's entries must not change as long as the function is used.
-    """
-    library = mkl()
-    if library is None or not isinstance(A, sparse.csr_array) or A.dtype != np.float64:
-        return lambda block: A @ block
-    handle, n = ctypes.c_void_p(), A.shape[0]
-    arrays = [np.ascontiguousarray(a, np.int32) for a in (A.indptr[:-1], A.indptr[1:], A.indices)]
-    arrays.append(np.ascontiguousarray(A.data))
-    status = library.mkl_sparse_d_create_csr(
-        ctypes.byref(handle), 0, n, A.shape[1], *map(_pointer, arrays)
-    )
-    if status:
-        return lambda block: A @ block
-    general = _Descriptor(GENERAL, UPPER, NON_UNIT)
-
-    def times(block: Floats) -> Floats:
-        if block.ndim == 1 or block.shape[1] == 1:
-            return np.asarray(A @ block)
-        block = np.ascontiguousarray(block, np.float64)
-        found, k = np.empty((n, block.shape[1])), block.shape[1]
-        library.mkl_sparse_d_mm(
-            NOT_TRANSPOSED, ctypes.c_double(1.0), handle, general, ROW_MAJOR,
-            _pointer(block), k, k, ctypes.c_double(0.0), _pointer(found), k,
-        )  # fmt: skip
-        return found
-
-    weakref.finalize(times, _destroy, library, handle, arrays)  # which must last as long
-    return times
-
-
-def _destroy(library: ctypes.CDLL, handle: ctypes.c_void_p, _: list[np.ndarray]) -> None:
-    library.mkl_sparse_destroy(handle)
-
-
-def _pointer(array: np.ndarray) -> ctypes.c_void_p:
-    return array.ctypes.data_as(ctypes.c_void_p)

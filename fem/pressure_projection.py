@@ -44,17 +44,6 @@ def dilatation_operator(mesh: TetMesh, elements: Ints) -> sparse.csr_array:
     return (Q @ D).tocsr()
 
 
-def projected_dilatation(mesh: TetMesh, u: Floats) -> Floats:
-    """Projected dilatation (e, q, m) of displacements u (3 n, m) in metre, as `dilatation_operator`
-    reads it.
-    """
-    cluster, sloping = macroelements(mesh)
-    q = linear_functions(mesh, cluster, sloping)
-    D = _coefficients(mesh, cluster, q)
-    values = (D @ u).reshape(-1, 4, u.shape[1])[cluster]
-    return np.asarray(np.einsum("eqv,evm->eqm", q, values, optimize=True))
-
-
 def _coefficients(mesh: TetMesh, cluster: Ints, q: Floats) -> sparse.bsr_array:
     """Matrix D of `projected_divergence`, by macroelements (e,) and functions (e, q, v)."""
     slopes, volumes = gradients(shape_nodes(mesh), 10, 2, 0)
@@ -71,8 +60,8 @@ def _coefficients(mesh: TetMesh, cluster: Ints, q: Floats) -> sparse.bsr_array:
 
 def linear_functions(mesh: TetMesh, cluster: Ints, sloping: Bools) -> Floats:
     """Orthonormal linear pressure functions (e, q, 4) in m^-3/2 over the macroelement (e,) of each
-    element, at the quadrature points for degree 2; the constant alone where those of a
-    macroelement (c,) may not slope, and else 0.
+    element, at the quadrature points for degree 2; the constant alone where a macroelement (c,) may
+    not slope.
     """
     nodes = shape_nodes(mesh)
     volumes = jacobians(nodes, 2, 0)[2]
@@ -92,10 +81,8 @@ def linear_functions(mesh: TetMesh, cluster: Ints, sloping: Bools) -> Floats:
 
 def macroelements(mesh: TetMesh) -> tuple[Ints, Bools]:
     """Macroelements: the one (e,) that each element is in, and whether each (c,) has an inner edge.
-
-    A macroelement is all elements around an inner edge, the longest edges first: in a box that is
-    split along a diagonal, the box. An element left between joins a neighbour's or, without one,
-    stays alone.
+    It is all elements around an inner edge, the longest edges first: in a box that is split along a
+    diagonal, the box. An element left between joins a neighbour's or stays alone.
     """
     points = mesh.points if mesh.unmoved is None else mesh.unmoved
     middles, ends = mesh.tets[:, 4:], points[mesh.tets[:, EDGES]]

@@ -82,16 +82,9 @@ class Poles:
 
 
 def poles(operators: Operators, outputs: Floats | None = None) -> Poles:
-    """Diagonalise projected operators in first-order form, once; one of each conjugate pair is
-    returned.
-
-    Internal variables of Maxwell branches are part of that form:
-    z_j' = (L_j^T u - z_j) / tau_j, K_j = L_j L_j^T.
-
-    Parameters
-    ----------
-    operators : Operators, dense, in any coordinates (r,)
-    outputs : (p, r), what is read of these; the coordinates themselves if not given
+    """Diagonalise projected `Operators`, dense, in any coordinates (r,), in first-order form, and
+    read outputs (p, r) of these, or all; one of each conjugate pair is returned. Internal variables
+    of Maxwell branches are part of that form: z_j' = (L_j^T u - z_j) / tau_j, K_j = L_j L_j^T.
     """
     r, branches = len(operators.K), with_internal(operators.branches)
     upright = np.linalg.inv(np.linalg.cholesky(operators.M)).T  # coordinates of unit mass
@@ -117,10 +110,9 @@ def poles(operators: Operators, outputs: Floats | None = None) -> Poles:
 
 
 def factor(K: Floats) -> Floats:
-    """Low-rank factor L (n, k) of a positive semidefinite K = L L^T, as many columns as its rank.
-
-    With z = L^T (u - d) a Maxwell branch is z' = (L^T u - z) / tau with the force L (L^T u - z): it
-    has an internal variable only where it has a spring.
+    """Low-rank factor L (n, k) of a positive semidefinite K = L L^T, as many columns as its rank:
+    with z = L^T (u - d) a branch z' = (L^T u - z) / tau has an internal variable only where it has
+    a spring.
     """
     squares, vectors = np.linalg.eigh(K)
     kept = squares > 1e-12 * squares.max()
@@ -128,18 +120,9 @@ def factor(K: Floats) -> Floats:
 
 
 def line_response(poles: Poles, forces: Complex, frequencies: Floats) -> tuple[Complex, Complex]:
-    """Steady state and free vibration under a load Re sum_f forces exp(2 pi i f t) from t = 0 on.
-
-    Parameters
-    ----------
-    poles : Poles, of p outputs
-    forces : (f, r) reduced forces of the lines, N kg^-1/2
-    frequencies : (f,) float, Hz
-
-    Returns
-    -------
-    lines : (f, p) complex amplitudes in metre of the steady state
-    start : (m, p) complex amplitudes of exp(pole t), the free vibration from rest at t = 0
+    """Steady state (f, p) and free vibration (m, p) from rest at t = 0, complex amplitudes in metre
+    of exp(2 pi i f t) and exp(pole t), under a load Re sum_f forces exp(2 pi i f t) of reduced
+    forces (f, r) in N kg^-1/2 at frequencies (f,) in Hz.
     """
     iw, values = 2j * np.pi * frequencies[:, None], poles.values
     forwards = (forces @ poles.inputs.T) / (iw - values)  # (f, m)
@@ -156,19 +139,9 @@ def impulse_response(poles: Poles, impulse: Floats) -> Complex:
 
 
 def exponential_sum(rates: Complex, amplitudes: Complex, times: Floats) -> Floats:
-    """Exponential sum Re sum_j amplitudes exp(rates t).
-
-    Exponentials are computed within one chunk of times and at the start of each, and multiplied.
-
-    Parameters
-    ----------
-    rates : (j,) complex, 1/s
-    amplitudes : (j, p) complex
-    times : (t,) float, s, equally spaced from 0
-
-    Returns
-    -------
-    (t, p) float, in the unit of the amplitudes
+    """Exponential sum Re sum_j amplitudes exp(rates t) (t, p) of complex rates (j,) in 1/s and
+    amplitudes (j, p), at equally spaced times from 0. Exponentials are computed within one chunk of
+    times and at the start of each, and multiplied.
     """
     j, p = amplitudes.shape
     if j > MOST_RATES:

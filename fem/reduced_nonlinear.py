@@ -22,16 +22,14 @@ from scipy import linalg, sparse
 from scipy.sparse.linalg import LinearOperator
 
 from fem.assembly import Operators
+from fem.energy import Elastic, Relaxing
 from fem.finite_strain import (
-    Elastic,
     Membrane,
     Part,
-    Relaxing,
+    losses,
     membrane_part,
-    relaxing_shares,
     spread_stress,
     stress,
-    stress_lag,
     tangent,
 )
 from fem.linear_solver import factorise
@@ -74,28 +72,9 @@ def stretching_modes(
     solver: str = "auto",
     progress: Callable[[float], None] | None = None,
 ) -> StretchingModes:
-    """Reduce a sheet to its n lowest bending modes.
-
-    Parameters
-    ----------
-    mesh : TetMesh, of the sheet
-    operators : the sheet's linear operators, from `assemble`
-    membrane : the whole membrane stiffness, among the nodes of the mesh
-    n : number of modes
-    added : added mass of a fluid, as `added_mass` gives it; the modes with it are combinations of
-        the n lowest without
-    solver : of `linear_solver.factorise`
-    progress : called with the fraction done
-
-    Returns
-    -------
-    StretchingModes
-        In coordinates (n,) in kg^1/2 m.
-
-    Raises
-    ------
-    Diverged
-        If the modes do not converge.
+    """Reduce a sheet, its linear operators and its whole membrane stiffness, to its n lowest
+    bending modes; with the added mass of a fluid to combinations of these. Modes that do not
+    converge raise Diverged.
     """
     hz, shapes = modes(operators, n, solver=solver)
     if added is not None:
@@ -146,8 +125,7 @@ def modal_elastic(modal: Operators, H: Floats, material: Material) -> Elastic:
     material of the sheet as it stretches.
     """
     squares, n = modal.K.diagonal(), len(modal.free)
-    stacked, lag = H.reshape(-1, n), stress_lag(material)
-    shares, times = relaxing_shares(material)
+    stacked, (lag, shares, times) = H.reshape(-1, n), losses(material)
     branches = with_internal(modal.branches)
 
     @lru_cache(maxsize=2)
@@ -192,15 +170,12 @@ def in_plane_matrices(
     *,
     solver: str = "auto",
 ) -> Floats:
-    """In-plane motion that follows bending modes z quasi-statically: symmetric Q (c, m, m) of
-    outputs z^T Q z / 2.
+    """In-plane motion that follows bending modes z of a basis (3 n, m) quasi-statically: symmetric
+    Q (c, m, m) of outputs z^T Q z / 2, of `rows` (c, 3 n) of the in-plane displacement of the
+    middle plane.
 
     A linear output s v of the in-plane displacement v is -g f(z), with g = K^-1 s and the forces
     f(z) of the stretching e(w, w): -z^T H z / 2, with H of the states of stress that g has.
-
-    `reading` is of the sheet with its whole membrane stiffness, `basis` (3 n, m) of bending modes,
-    `rows` (c, 3 n) of the in-plane displacement of the middle plane; `operators` have its
-    constraints.
     """
     part = reading.part
     fixed = np.ones(operators.n_dofs, bool)

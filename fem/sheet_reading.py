@@ -28,10 +28,9 @@ ON_EDGE = 1e-9  # barycentric: how far outside all triangles a point still count
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SheetReading:
-    """Operators of p points of a sheet on the n nodes of its mesh.
-
-    `value` (p, n) of a nodal field, its `slopes` (2, p, n) and `curvatures` (p, n) xx, yy and xy;
-    and `fit` (p, e q), the values at the points by those at the quadrature points of the `part`.
+    """Operators of p points of a sheet on the n nodes of its mesh: `value` (p, n) of a nodal field,
+    its `slopes` (2, p, n) and `curvatures` (p, n) xx, yy and xy; and `fit` (p, e q), the values at
+    the points by those at the quadrature points of the `part`.
     """
 
     part: Part

@@ -105,7 +105,7 @@ def restricted(A: Any, free: Ints) -> sparse.csr_array:
 
 def selected(A: Any, rows: Ints, columns: Ints) -> Any:
     """Some rows (r,) and columns (c,), in rising order, of a CSR matrix, or of a BSR matrix of
-    which blocks are counted; the matrix itself if that is all of it.
+    which blocks are counted.
     """
     shape = np.array(A.shape) // getattr(A, "blocksize", 1)
     if (len(rows), len(columns)) == tuple(shape):

@@ -3,17 +3,15 @@
 Strain is recovered by least squares from the quadrature points of the elements about a point, where
 the gradient of a quadratic displacement is most accurate: the superconvergent patch recovery of
 Zienkiewicz and Zhu, Int J Numer Methods Eng 33:1331 (1992), with a patch for each point instead of
-each node. Polynomials of third degree are fitted there, within one material, across which strain
-may jump.
+each node. Polynomials of third degree are fitted within one material, across which strain may jump.
 
-Where a solid is nearly incompressible, div u itself oscillates from element to element and is not
-what the stiffness acts on: the dilatation is taken from the macroelement projection and what is
-left beside it (`pressure_projection`), in the proportions that they have in K. Stress by Hooke's
-law, lam tr(e) I + 2 mu e, then has the pressure of the discrete equations.
+Where a solid is nearly incompressible, div u oscillates from element to element: the dilatation is
+taken from the macroelement projection and what is left beside it (`pressure_projection`), in the
+proportions that they have in K. Stress by Hooke's law then has the pressure of the discrete
+equations.
 
 `nodal_strain` is of all nodes: polynomials about each corner node, of which a node of an edge has
-the mean of those of its two ends. Each material has its own nodes, so that those between two of
-them are doubled.
+the mean of those of its two ends. Nodes between two materials are doubled.
 """
 
 from __future__ import annotations
@@ -30,9 +28,9 @@ from scipy import sparse
 from fem.assembly import by_region, direct_part, elements_of
 from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradients, shape_nodes
-from fem.interior import locate
+from fem.load_and_probe import locate
 from fem.maxwell import NO_INTERNAL
-from fem.pressure_projection import dilatation_operator, projected_dilatation
+from fem.pressure_projection import dilatation_operator
 from fem.typing import Floats, Ints
 from meshes import TetMesh
 from meshes.tetmesh import EDGES
@@ -73,7 +71,8 @@ def strain_operator(
     if mesh.order == 1:
         raise ValueError("strain is recovered from ten-node tetrahedra; mesh with order 2")
     points = np.atleast_2d(np.asarray(points, np.float64))
-    materials, region = by_region(mesh, material)
+    given, region = by_region(mesh, material)
+    materials = [m.without_loss_factor() for m in given]
     owner, _ = locate(mesh, points)
     rows = sparse.csr_array((6 * len(points), mesh.n_dofs))
     for r in np.unique(region[owner]):
@@ -106,23 +105,9 @@ def relaxation(material: Material, s: Any) -> Any:
 
 
 def relaxed(stress: Floats, dt: float, material: Material) -> Floats:
-    """Stress from rest by the `relaxation` in time, with rates by a cubic spline and branches that
-    are exact where stress is linear between samples.
-
-    Parameters
-    ----------
-    stress : (t, ...) float, Pa, by the `shear_modulus` of the material
-    dt : float, s, between samples, the first of which is at rest
-    material : Material
-
-    Returns
-    -------
-    (t, ...) float, Pa
-
-    Raises
-    ------
-    ValueError
-        If the material has a modulus law of its own.
+    """Stress (t, ...) in Pa from rest by the `relaxation` in time, of one by the `shear_modulus` of
+    a material without a modulus law of its own, in steps of dt: with rates by a cubic spline and
+    branches that are exact where stress is linear between samples.
     """
     from scipy.interpolate import CubicSpline  # which take long to import
     from scipy.signal import lfilter
@@ -145,17 +130,9 @@ def relaxed(stress: Floats, dt: float, material: Material) -> Floats:
 def materials_at(
     mesh: TetMesh, material: Material | Mapping[int, Material], points: ArrayLike
 ) -> tuple[Material, ...]:
-    """Material at each of some points.
-
-    Parameters
-    ----------
-    mesh, material, points : as for `strain_operator`; raises what `locate` does
-
-    Returns
-    -------
-    p materials, their loss factors as Prony terms
-    """
-    materials, region = by_region(mesh, material)
+    """Material at each of points (p, 3) in a body, loss factors as Prony terms."""
+    given, region = by_region(mesh, material)
+    materials = [m.without_loss_factor() for m in given]
     return tuple(materials[r] for r in region[locate(mesh, points)[0]])
 
 
@@ -201,11 +178,10 @@ def _size(mesh: TetMesh, patch: Ints) -> Floats:
 
 
 def fitted_polynomial(x: Floats) -> tuple[Floats, int]:
-    """Polynomial that fits samples best, of the highest of `DEGREES` that they determine: its
-    coefficients (n, s) of the `polynomials` by the values of the samples, the first of which is
-    the value at the point; and the degree.
-
-    `x` (s, 2 or 3) are places of the samples about the point, in elements.
+    """Polynomial that fits samples at places x (s, 2 or 3) about a point, in elements, best, of the
+    highest of `DEGREES` that they determine twice over: its coefficients (n, s) of the
+    `polynomials` by the values of the samples, the first of which is the value at the point; and
+    the degree.
     """
     root = np.exp(-LOCAL / 2 * (x**2).sum(axis=1))  # of the weights
     for degree in DEGREES:
@@ -257,8 +233,8 @@ def _sampled_strain(mesh: TetMesh, used: Ints, material: Material) -> sparse.csr
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SolidPart:
-    """Elements of one material: `mesh` has them alone, among all its nodes; `nodes` (q,) of these
-    are theirs, and `tets` (m, 10) number them among these.
+    """Elements of one material: `mesh` has them alone, among all its nodes; `nodes` (q,) are
+    theirs, by which `tets` (m, 10) are numbered.
     """
 
     mesh: TetMesh
@@ -268,16 +244,13 @@ class SolidPart:
 
 
 def solid_parts(mesh: TetMesh, material: Material | Mapping[int, Material]) -> list[SolidPart]:
-    """The parts of a mesh of ten-node tetrahedra, one for each material.
-
-    Raises
-    ------
-    ValueError
-        If elements have four nodes, whose strain is constant.
+    """Parts of a mesh, one for each material. Four-node elements, whose strain is constant, raise a
+    ValueError.
     """
     if mesh.order == 1:
         raise ValueError("strain is recovered from ten-node tetrahedra; mesh with order 2")
-    materials, region = by_region(mesh, material)
+    given, region = by_region(mesh, material)
+    materials = [m.without_loss_factor() for m in given]
     parts = []
     for r in np.unique(region):
         own = elements_of(mesh, region == r)
@@ -288,17 +261,8 @@ def solid_parts(mesh: TetMesh, material: Material | Mapping[int, Material]) -> l
 
 
 def nodal_strain(part: SolidPart, u: Floats, wanted: Ints | None = None) -> Floats:
-    """Strain at nodes of a part of a body.
-
-    Parameters
-    ----------
-    part : SolidPart
-    u : (3 n, m) float, metre, m displacements of all nodes
-    wanted : (w,) int, which of `part.nodes`; all of them if not given
-
-    Returns
-    -------
-    (w, 6, m) float; components xx, yy, zz, xy, xz, yz of the tensor
+    """Strain (w, 6, m), components xx, yy, zz, xy, xz, yz, at nodes of a part, those wanted (w,) or
+    all, of displacements u (3 n, m) in metre of all nodes.
     """
     nodes = part.nodes if wanted is None else part.nodes[wanted]
     number = np.full(len(part.mesh.points), -1)
@@ -306,7 +270,10 @@ def nodal_strain(part: SolidPart, u: Floats, wanted: Ints | None = None) -> Floa
     at_corner, mesh, share = (
         _read_at_corners(part.mesh, number), part.mesh, _projected_share(part.material)
     )  # fmt: skip
-    dilatation = projected_dilatation(mesh, u) if share else None
+    dilatation = None
+    if share:
+        each = np.arange(len(mesh.tets))
+        dilatation = (dilatation_operator(mesh, each) @ u).reshape(len(each), POINTS, -1)
     found = np.zeros((len(nodes), 6, u.shape[1]))
     corners = np.array(sorted(at_corner), np.int64)
     for some in np.array_split(corners, -(-len(corners) // AT_ONCE)):

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parents[2]
 MARK = re.compile(r"<!-- generated: ([\w-]+) -->")
-RELATIVE = re.compile(r"\]\(([^)\s]+)")
 HERTZ = 200.0  # at which a table of materials states losses and speeds
 PARAMETER = re.compile(r"^(\w+(?:, \w+)*) : (.*(?:\n    .*)*)", re.MULTILINE)
 
@@ -260,66 +259,59 @@ def drives() -> str:
 
 
 def verification() -> str:
-    """Cases of the verification suite: what each compares with, its bars and its errors.
-
-    Errors are those that `skinwave verify` wrote into the folder that the environment variable
-    SKINWAVE_VERIFIED names; cases that it lacks are listed without.
-    """
+    """Cases of the verification suite, with their references and meshes."""
     from skinwave.verify.suite import CASES, TOPICS
 
-    done: dict[str, Any] = {}
     parts = [f"`skinwave verify` has {len(CASES)} cases."]
-    if folder := os.environ.get("SKINWAVE_VERIFIED"):
-        record = json.loads(Path(folder, "verify.json").read_text("utf-8"))
-        done = {case["name"]: case for case in record["cases"]}
-        parts[0] += (
-            f" The errors below are of {len(done)} of them, run by {_versions(record)}: "
-            f"{record['passed']} passed, {record['failed']} failed.\n"
-        )
     for topic, cases in TOPICS.items():
-        rows = [row for each in cases for row in _case(each.name, done.get(each.name))]
-        head = ["case", "compared", "error", "at most", "with"]
-        parts.append(f"## {topic}\n\n{table(head, rows)}")
+        rows = [[f"`{c.name}`", _plain(c.title), _plain(c.source), _plain(c.mesh)] for c in cases]
+        parts.append(f"## {topic}\n\n{table(['case', '', 'reference', 'mesh'], rows)}")
     return "\n".join(parts)
 
 
-def _versions(record: dict[str, Any]) -> str:
-    return ", ".join(
-        f"{k} {v}" for k, v in record["versions"].items() if k in ("skinwave", "numpy", "scipy")
-    )
-
-
-def _case(name: str, case: dict[str, Any] | None) -> list[list[str]]:
-    if case is None:
-        return [[f"`{name}`", "", "", "", "`skinwave verify` runs it"]]
-    nearest = sorted(case["checks"], key=lambda c: -(c["error"] or 0) / (c["bar"] or 1))[:3]
-    first = [f"`{name}`", "", "", "", case["source"]]
-    rows = [["", _plain(c["what"]), _number(c["error"]), _number(c["bar"]), ""] for c in nearest]
-    return [[*first[:1], *rows[0][1:4], first[4]], *rows[1:]] if rows else [first]
-
-
 def _plain(text: str) -> str:
-    return text.replace("*", "\\*").replace("_", "\\_").replace("<", "&lt;").replace("|", "\\|")
-
-
-def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:.2g}".replace("-", "\N{NON-BREAKING HYPHEN}")
+    return re.sub(r"([*_<^])", r"\\\1", text)
 
 
 # Pages that stand beside docs/
 
 
+SITE = {  # of the repository -> of the site
+    "bench": "reference/benchmarks",
+    "bench/README.md": "reference/benchmarks",
+    "examples": "reference/scenes-shipped",
+    "CONTRIBUTING.md": "contributing",
+    "CHANGELOG.md": "changelog",
+    "README.md": "index",
+    "examples/gallery": "gallery/index",
+}
+GALLERY = Path("examples/gallery")  # whose scripts are pages
+LINK = re.compile(r"\[([^\]\[]*)\]\(([^)#\s]+)((?:#[^)]*)?)\)")
+
+
+def mended(text: str, source: Path, page: Path) -> str:
+    """Text of a folder `source` on a page of the folder `page`, with links that the site has."""
+
+    def one(match: re.Match[str]) -> str:
+        """A link, to a page of the site, or its text alone of a folder."""
+        label, target, anchor = match.groups()
+        place = (source / target).resolve()
+        if "://" in target or not place.is_relative_to(ROOT):
+            return match.group()
+        own = place.relative_to(ROOT)
+        found = SITE.get(str(own), f"gallery/{own.stem}" if own.parent == GALLERY else "")
+        if not found and place.is_dir():
+            return label
+        to = ROOT / "docs" / found if found else place
+        return f"[{label}]({os.path.relpath(to, page)}{anchor})"
+
+    return LINK.sub(one, text)
+
+
 def _page(name: str, folder: str) -> str:
     """A Markdown page of the repository without its title, with links as from a folder."""
     path = ROOT / name
-
-    def turned(match: re.Match[str]) -> str:
-        target = match.group(1)
-        if "://" in target or target.startswith("#"):
-            return match.group()
-        return f"]({os.path.relpath(path.parent / target, ROOT / folder)}"
-
-    return RELATIVE.sub(turned, path.read_text("utf-8").split("\n", 1)[1])
+    return mended(path.read_text("utf-8").split("\n", 1)[1], path.parent, ROOT / folder)
 
 
 PAGES: Mapping[str, Callable[[], str]] = {
@@ -339,8 +331,11 @@ PAGES: Mapping[str, Callable[[], str]] = {
 
 
 def read(app: "Sphinx", page: str, source: list[str]) -> None:
-    """Put what is generated into the source of a page when Sphinx has read it."""
+    """Put what is generated into the source of a page, and mend the links of a Markdown page."""
     source[0] = MARK.sub(lambda match: PAGES[match.group(1)](), source[0])
+    if app.env.doc2path(page).suffix == ".md":
+        folder = (ROOT / "docs" / page).parent
+        source[0] = mended(source[0], folder, folder)
 
 
 def outdated(app: "Sphinx", env: Any, *changes: set[str]) -> list[str]:

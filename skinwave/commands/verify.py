@@ -76,10 +76,10 @@ def _published(options: argparse.Namespace) -> int:
     inputs = [options.hand] if options.hand else []
     with output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
         with progress_of(options) as progress:
-            found = validate(progress, hand=options.hand)
-        report(found).write(folder)
+            curves, rows = validate(progress, hand=options.hand)
+        report(curves, rows).write(folder)
         record.write(folder, record.of_command(options))
-    sentences = verdict(found)
+    sentences = verdict(rows)
     summary = {"out": str(out), "sentences": sentences}
     summarise(options, summary, "\n".join([*sentences, f"open {out}/index.html"]))
     return 0

@@ -15,6 +15,7 @@ import numpy as np
 
 import fem
 from fem.harmonic import LineSolver
+from fem.load_and_probe import on_surface
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Tacton
 from simple_model.layers.prony import FIT_TOLERANCE
@@ -135,7 +136,7 @@ def surface_grid(body: Body, made: Build) -> tuple[Floats, np.ndarray, Floats, F
 
     x, y = np.meshgrid(grid_line(), grid_line())
     places = np.column_stack([x.ravel(), y.ravel()])
-    inside = fem.on_surface(made.mesh, places)
+    inside = on_surface(made.mesh, places)
     points = made.mesh.points[np.unique(made.mesh.facets["top"])]
     found = LinearNDInterpolator(points[:, :2], points[:, 2])(places[inside])
     heights = np.zeros(len(places))

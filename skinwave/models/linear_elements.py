@@ -10,6 +10,8 @@ import numpy as np
 from scipy import sparse
 
 import fem
+from fem.energy import mean_power
+from fem.stress import relaxed
 from meshes import MeshError
 from meshes.tetmesh import Floats
 from simple_model import Effort, Material, Response
@@ -56,10 +58,9 @@ ARNOLDI = (
     "D. Lu, Y. Su, Z. Bai: Stability analysis of the two-level orthogonal Arnoldi procedure. SIAM "
     "Journal on Matrix Analysis and Applications 37 (2016) 195-214"
 )
-ALPHA = (
-    "J. Chung, G. M. Hulbert: A time integration algorithm for structural dynamics with improved "
-    "numerical dissipation: the generalized-alpha method. Journal of Applied Mechanics 60 (1993) "
-    "371-375. doi 10.1115/1.2900803"
+NEWMARK = (
+    "N. M. Newmark: A method of computation for structural dynamics. Journal of the Engineering "
+    "Mechanics Division 85 (1959) 67-94"
 )
 MACROELEMENTS = (
     "R. Stenberg: Analysis of mixed finite element methods for the Stokes problem: a unified "
@@ -217,7 +218,7 @@ def sampled_components(
 
     if asked.relaxes:
         each = np.split(stepped, len(solids), axis=1)
-        stepped = np.hstack([fem.relaxed(x, dt, m) for x, m in zip(each, solids, strict=True)])
+        stepped = np.hstack([relaxed(x, dt, m) for x, m in zip(each, solids, strict=True)])
     return np.asarray(CubicSpline(np.arange(len(stepped)) * dt, stepped)(times, asked.rate))
 
 
@@ -324,7 +325,7 @@ def _line(
     force, free = P @ pressure, ops.free
     u = solve(frequency, force)
     line = force[None, free], u[None, free], np.array([frequency])
-    return S @ u, fem.mean_power(ops.C, ops.R, *line, ops.branches)
+    return S @ u, mean_power(ops.C, ops.R, *line, ops.branches)
 
 
 def moved_line(
@@ -380,7 +381,7 @@ TRANSIENT = register(
         solve=transient_answer,
         limits=partial(_limits, of_vacuum, False),
         colour="#D55E00",
-        sources=(ALPHA, MACROELEMENTS),
+        sources=(NEWMARK, MACROELEMENTS),
         is_reduced=False,
         is_stepped=True,
     )

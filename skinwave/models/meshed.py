@@ -13,8 +13,8 @@ import numpy as np
 from scipy import sparse
 
 import fem
-from fem.interior import displacement_operator
 from fem.load_and_probe import (
+    displacement_operator,
     facet_normals,
     facet_points,
     probe_operator,

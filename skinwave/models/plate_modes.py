@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-import fem
+from fem.reduced import exponential_sum
 from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response
 from simple_model.layers.compliance import AIR_DENSITY
@@ -187,7 +187,7 @@ def _transient(scene: Scene, driven: Driven, motion: Complex, times: Floats) -> 
     vibrates = free.residues != 0
     outputs = np.broadcast_to(driven.outputs.T[:, None], (*vibrates.shape, len(driven.outputs)))
     amplitudes = start[vibrates][:, None] * outputs[vibrates]
-    return fem.exponential_sum(free.poles[vibrates], amplitudes, times)
+    return exponential_sum(free.poles[vibrates], amplitudes, times)
 
 
 def limits(scene: Scene) -> Iterator[Limit]:

@@ -21,7 +21,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 import fem
+from fem.energy import mean_power
 from fem.maxwell import with_internal
+from fem.reduced import exponential_sum, impulse_response, line_response
 from meshes import cache
 from meshes.tetmesh import Floats
 from simple_model import Effort, Material, MovingPressure, Response
@@ -313,11 +315,11 @@ def respond(
     """
     frequencies, forces = reduced_forces(reduced, *pressures)
     frequencies, forces = frequencies[frequencies < highest], forces[frequencies < highest]
-    lines, start = fem.line_response(reduced.poles, forces, frequencies)
+    lines, start = line_response(reduced.poles, forces, frequencies)
     if motion := reduced.load.support_motion:  # which the body at rest is struck by
-        start += fem.impulse_response(reduced.poles, -motion.speed * np.asarray(reduced.inertia))
+        start += impulse_response(reduced.poles, -motion.speed * np.asarray(reduced.inertia))
     damping = reduced.damping, reduced.radiation
-    power = fem.mean_power(*damping, forces, lines, frequencies, reduced.branches)
+    power = mean_power(*damping, forces, lines, frequencies, reduced.branches)
     imbalance, radiated = energy_balance(power)
     return ReducedResponse(
         frequencies=frequencies, lines=lines, poles=reduced.poles.values, start=start,
@@ -425,4 +427,4 @@ def oscillating(motion: ReducedResponse) -> ReducedResponse:
 def from_rest(motion: ReducedResponse, times: Floats) -> Floats:
     """Displacement or coordinates (t, q) after a start from rest at times (t,) in s."""
     rates = np.concatenate([2j * np.pi * motion.frequencies, motion.poles])
-    return fem.exponential_sum(rates, np.vstack([motion.lines, motion.start]), times)
+    return exponential_sum(rates, np.vstack([motion.lines, motion.start]), times)

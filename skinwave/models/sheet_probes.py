@@ -10,7 +10,7 @@ import numpy as np
 from scipy import sparse
 
 import fem
-from fem.reduced_nonlinear import in_plane_matrices
+from fem.reduced_nonlinear import StretchingModes, in_plane_matrices
 from fem.sheet_reading import (
     SheetReading,
     displacement_rows,
@@ -68,7 +68,7 @@ def full_reader(body: Body, build: Build, probes: Floats, reading: Reading) -> R
 def modal_reader(
     body: Body,
     build: Build,
-    modes: fem.StretchingModes,
+    modes: StretchingModes,
     operators: fem.Operators,
     probes: Floats,
     reading: Reading,

@@ -23,6 +23,7 @@ import numpy as np
 
 import fem
 from fem import nonlinear
+from fem.reduced_nonlinear import StretchingModes, stretching_modes
 from meshes import middle_plane
 from meshes.tetmesh import Floats
 from simple_model import Effort, Material, Response
@@ -35,7 +36,7 @@ from skinwave.models import Limit, Model, register
 from skinwave.models.laws import has_own_law
 from skinwave.models.limits import beyond, load_limit, of_air_in_a_frame, of_held_sheet, of_vacuum
 from skinwave.models.linear_elements import (
-    ALPHA,
+    NEWMARK,
     TRANSIENT_RATE,
     in_time,
     marched,
@@ -143,7 +144,7 @@ class _Reduced:
     """Sheet reduced to its bending modes, and the same without stretching, with its load."""
 
     made: Build
-    modes: fem.StretchingModes
+    modes: StretchingModes
     linear: ReducedBody
     operators: fem.Operators
 
@@ -224,7 +225,7 @@ def _reduced(body: Body, h: float, solver: str) -> _Reduced:
     """Reduce the sheet to its modes, cached for many Tactons in a row."""
     made = meshed_sheet(body, h)
     operators = stretching_body(body, made).operators
-    modes = fem.stretching_modes(
+    modes = stretching_modes(
         made.mesh, operators, membrane(body, made, 1.0), mode_count(body),
         added=air(body, made, operators.free), solver=solver,
     )  # fmt: skip
@@ -273,8 +274,8 @@ def _march(
 
     with clock("march"):
         stepped, (imbalance, _) = marched(
-            nonlinear.with_energy_balance(body, states(), kept), steps, read,
-            lambda state: nonlinear.total_energy(body, state), options.progress,
+            fem.with_energy_balance(body, states(), kept), steps, read,
+            lambda state: fem.stored(body, state), options.progress,
         )  # fmt: skip
     effort = Effort(
         steps=steps, solver=fem.available()[0] if solver == "auto" else solver,
@@ -335,7 +336,7 @@ REDUCED = register(
         limits=partial(_limits, of_air_in_a_frame, REDUCED_SIZE),
         error=lambda scene, h: expected_error(scene.body, h or 0.0),
         default_size=REDUCED_SIZE,
-        sources=(ALPHA, NEWTON),
+        sources=(NEWMARK, NEWTON),
         is_nonlinear=True,
         takes_series=has_own_law,
     )

@@ -19,7 +19,7 @@ from math import ceil
 
 import numpy as np
 
-import fem
+from fem.reduced import exponential_sum, line_response
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Response
 from simple_model.layers.flat_body import FINEST, steady_lines
@@ -248,9 +248,9 @@ def sensitivity(scene: Scene, prepared: ReducedBody | None = None) -> Sensitivit
         """Waveforms (t, p) where all natural frequencies are higher by so much."""
         higher = np.asarray(values * (1 + moved), np.complex128)
         poles = replace(coarse.poles, values=higher)
-        lines, start = (x @ coarse.read.T for x in fem.line_response(poles, forces, frequencies))
+        lines, start = (x @ coarse.read.T for x in line_response(poles, forces, frequencies))
         rates = np.concatenate([2j * np.pi * frequencies, higher])
-        return fem.exponential_sum(rates, np.vstack([lines, start]), times)
+        return exponential_sum(rates, np.vstack([lines, start]), times)
 
     whole = waveforms(0.0)
     moving = whole - whole.mean(axis=0)

@@ -13,6 +13,8 @@ import numpy as np
 from scipy import sparse
 
 import fem
+from fem.krylov import load_subspace
+from fem.stress import SolidPart, nodal_strain, solid_parts
 from meshes import TetMesh, part
 from meshes.tetmesh import Floats, Ints
 from simple_model import Effort, Material, Response
@@ -140,7 +142,7 @@ def driven(
     with clock("factorise and reduce"):
         report("factorise", 0.0)
         spots = scene.pressure.spot(points, path_samples(scene.loads[0]))
-        subspace = sparse.csr_array(fem.load_subspace(spread(P, spots.T), tolerance / 10).T)
+        subspace = sparse.csr_array(load_subspace(spread(P, spots.T), tolerance / 10).T)
         reduced, model = reduce_body(
             body, build, operators, subspace, tolerance, surface=(P, points), solver=solver,
             report=report,
@@ -199,7 +201,7 @@ def tensors(moved: BodyMotion, times: Floats, frames: Ints) -> Tensors:
     for each, own in _parts(moved):
         relaxed = _coordinates(lines, times[frames], each.material)
         u = moved.basis @ np.vstack([z, relaxed]).T
-        found = fem.nodal_strain(each, u, own).astype(np.float32)
+        found = nodal_strain(each, u, own).astype(np.float32)
         still, moving = np.split(np.moveaxis(found, -1, 0), 2)
         nodes.append(np.searchsorted(moved.nodes, each.nodes[own]))
         number = np.full(len(each.nodes), -1)
@@ -253,7 +255,7 @@ def _of_strain(
         here = np.searchsorted(moved.nodes, each.nodes[own])
         seen = np.isin(here, nodes)
         z = _coordinates(lines, times, each.material, asked)
-        strain = fem.nodal_strain(each, moved.basis @ z.T, own[seen])
+        strain = nodal_strain(each, moved.basis @ z.T, own[seen])
         found = np.einsum("vc,qct->tqv", asked.rows(each.material), strain, optimize=True)
         at = np.searchsorted(nodes, here[seen])
         total[:, at] += asked.waveforms(found.reshape(len(times), -1), int(seen.sum()))
@@ -261,9 +263,9 @@ def _of_strain(
     return total / count
 
 
-def _parts(moved: BodyMotion) -> Iterator[tuple[fem.SolidPart, Ints]]:
+def _parts(moved: BodyMotion) -> Iterator[tuple[SolidPart, Ints]]:
     """Parts of a driven mesh, of one material each, and which of their nodes are the body's."""
-    for each in fem.solid_parts(moved.build.mesh, moved.build.material):
+    for each in solid_parts(moved.build.mesh, moved.build.material):
         own = np.flatnonzero(np.isin(each.nodes, moved.nodes))
         if len(own):
             yield each, own

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 import fem
-from fem.load_and_probe import surface_frame
+from fem.load_and_probe import on_surface, surface_frame
 from meshes import reading
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, sensation_level
@@ -195,7 +195,7 @@ def element_map(scene: Scene, moved: BodyMotion, x: Floats, y: Floats) -> Surfac
     """Map of the quantity that probes read, of a meshed body whose motion is known."""
     asked, depth, mesh = scene.reading.asked, scene.depths[0], moved.build.mesh
     places = _places(x, y)
-    seen = fem.on_surface(mesh, places)
+    seen = on_surface(mesh, places)
     if depth:  # where the body is as deep along its normal
         patch = scene.body.of_kind.normal_patch
         points, normals = surface_frame(mesh, places[seen], patch=patch)

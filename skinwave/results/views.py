@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import fem
+from fem.load_and_probe import node_operator
 from meshes import reading
 from meshes.tetmesh import Floats, Ints, boundary_facets
 from simple_model import Effort
@@ -138,7 +138,7 @@ def body_view(
     period, frames = part or shown_part(scene.pressure, fastest_line(moved))
     surface, triangles = _upper(mesh.facets["top"])
     times = np.arange(frames) * period / frames
-    _, inwards = fem.node_operator(mesh, patch=scene.body.of_kind.normal_patch)
+    _, inwards = node_operator(mesh, patch=scene.body.of_kind.normal_patch)
     seen = read_at(oscillating(moved.motion), inwards @ moved.own_basis)
     tone = strongest_tone(seen.frequencies, np.abs(seen.lines))
     return View(

@@ -71,7 +71,7 @@ class Result:
     @property
     def worst(self) -> Check:
         """The check that is nearest to its tolerance, or farthest beyond."""
-        nothing = [yes("it has a check", False)]
+        nothing = [below("there is no check", np.nan, 0.0)]
         return max(
             self.checks or nothing, key=lambda c: np.inf if not c.passed else c.error / (c.bar or 1)
         )
@@ -80,9 +80,8 @@ class Result:
 def case(
     source: str, *, mesh: str = "none", note: str = "", slow: bool = False
 ) -> Callable[[Callable[[], Iterable[Check]]], Case]:
-    """Make a case of a function that yields checks: its title is the docstring.
-
-    `source` is of the reference; a slow case is left out of the quick suite.
+    """Make a case of a function that yields checks, its docstring the title, with the `source` of
+    its reference. The quick suite leaves out a slow case.
     """
 
     def made(checks: Callable[[], Iterable[Check]]) -> Case:
@@ -128,25 +127,10 @@ def absolute(what: str, found: complex, expected: complex, bar: float) -> Check:
     return _check(f"{what} (absolute)", abs(found), abs(expected), abs(found - expected), bar)
 
 
-def yes(what: str, is_so: bool) -> Check:
-    """A check that something is so."""
-    return _check(what, float(is_so), 1.0, 1.0 - is_so, 0.0)
-
-
 def order(what: str, sizes: ArrayLike, errors: ArrayLike, expected: float, band: float) -> Check:
     """Slope of log error against log size, by least squares; its error is absolute."""
     slope = float(np.polyfit(np.log(sizes), np.log(errors), 1)[0])
     return absolute(what, slope, expected, band)
-
-
-def refused(act: Callable[[], object], kind: type[Exception], words: str) -> Check:
-    """A check that invalid input is refused with a message that has these words."""
-    try:
-        act()
-        message = "nothing: it was accepted"
-    except kind as error:
-        message = str(error)
-    return yes(f"refused with: {message}", words in message)
 
 
 def _check(

@@ -154,38 +154,6 @@ def moving_force() -> Checks:
 
 
 @case(
-    "Navier's modal sum: Leissa, Vibration of Plates (1969), chapter 4",
-    mesh="24 by 24 by 1 cells, thickness / side = 0.01; 80 steps a turn",
-)
-def circling_on_plate() -> Checks:
-    """Push circling on a simply supported plate, from rest."""
-    side, thickness, width, circle = 0.1, 1e-3, 0.006, 0.02
-    lag, hz, probe = 5e-5, 25.0, [0.02, 0.0]
-    elastic = fem.from_young(density=1000, young=4e6, poisson=0.3)
-    solid = replace(elastic, viscosity=lag * elastic.shear_modulus)
-    mesh = meshes.sheet(side, side, thickness, side / 24)
-    ops = fem.assemble(mesh, solid, fixed=SLIDING)
-    P, points = fem.load_operator(mesh), fem.facet_points(mesh)[:, :2]
-
-    def force(t: float) -> Floats:
-        angle = 2 * np.pi * hz * t
-        centre = circle * np.array([np.cos(angle), np.sin(angle)])
-        return P @ np.exp(-((points - centre) ** 2).sum(axis=1) / 2 / width**2)
-
-    dt, steps = 1 / hz / 80, 160
-    S = fem.probe_operator(mesh, [probe])
-    states = islice(fem.transient(ops, force, dt), steps + 1)
-    found = np.array([(S @ s.displacement)[0] for s in states])
-    exact = references.circling_force_on_plate(
-        np.arange(6 * steps + 1) * dt / 6, (side / 2 + probe[0], side / 2), side=side,
-        circle=circle, hz=hz, width=width, density=1000, thickness=thickness, modulus=4e6,
-        poisson=0.3, lag=lag,
-    )[::6]  # fmt: skip
-    yield misfit("deflection on the path, two turns, relative L2", found, exact, 0.02, "um")
-    yield relative("largest deflection", found.max(), exact.max(), 0.01, "um")
-
-
-@case(
     f"{LAMB}: 0.669 of (1 - r^2/a^2)^2; a Gaussian by Parseval's theorem and the transform "
     "2 pi / k of 1/r: iint w w / r = 2 pi^(5/2) s^3",
     mesh="grids of 49 to 385 nodes a side across 12 standard deviations; 161 across the disc",
@@ -200,33 +168,6 @@ def air_operator() -> Checks:
     yield order("order in the spacing, Gaussian", sizes, errors, 2, 0.1)
     yield relative("Gaussian, 32 nodes a standard deviation", 1 - errors[-1], 1.0, 5e-5)
     yield relative("Lamb's factor of the added mass, one side", factor, LAMBS_FACTOR, 1e-3)
-
-
-@case(
-    f"{LAMB}: f / f_vacuum = 1 / sqrt(1 + beta), beta = 0.669 rho_f a / rho_p h on each side, by "
-    "an assumed shape of the mode",
-    mesh="a quarter of a square, 24 cells a side, fixed outside the disc",
-)
-def disc_in_air() -> Checks:
-    """Clamped disc with air on both sides: its lowest mode."""
-    a, thickness, mass = 0.05, 1e-3, PAPER["mass_per_area"]
-    material = fem.from_young(density=mass / thickness, young=4e6, poisson=0.3)
-    mesh = _quarter(1.1 * a, thickness, 1.1 * a / 24)
-    fixed = np.zeros(mesh.points.shape, bool)
-    fixed[np.hypot(*mesh.points[:, :2].T) > a * (1 - 1e-9)] = True
-    for axis in (0, 1):
-        fixed[np.abs(mesh.points[:, axis]) < 1e-9, axis] = True
-    ops = fem.assemble(mesh, material, fixed=fixed)
-    centre = fem.probe_operator(mesh, [[1e-9, 1e-9]])
-    models = (
-        fem.reduce(ops, centre, 300.0, added=added)
-        for added in (None, fem.added_mass(mesh, ops.free, AIR_DENSITY, mirrored="xy"))
-    )
-    vacuum, air = (
-        np.sqrt(np.linalg.eigvalsh(model.operators.K)[0]) / (2 * np.pi) for model in models
-    )
-    beta = 2 * LAMBS_FACTOR * AIR_DENSITY * a / mass
-    yield relative("frequency in air / in vacuum", air / vacuum, 1 / np.sqrt(1 + beta), 0.01)
 
 
 @case(

@@ -9,20 +9,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import fem
-from simple_model import MovingPressure, Response, Rhythm, Tacton, Trajectory
+from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.layers.dispersion import Mode
 from simple_model.layers.flat_body import steady_state
 from simple_model.layers.wavenumber_integral import point_response
 from simple_model.load.focus import NOMINAL_HEIGHT, lobe_width, spot_width
-from simple_model.response import fit_lines
 from simple_model.typing import Floats
 from skinwave.bodies import BODIES as PRESETS
 from skinwave.bodies import Body
 from skinwave.bodies.analytic import compliance, dispersion
 from skinwave.bodies.build import build, operators
 from skinwave.models.meshed import surface_load, surface_motion
-from skinwave.planning.simulate import compute
-from skinwave.scene.scene import Scene
 from skinwave.system.effort import Progress
 from skinwave.verify.published import SPEED, Quantity
 
@@ -58,16 +55,9 @@ class Curves:
 
 
 def leading_wave(body: Body, grid: ArrayLike | None = None) -> Curves:
-    """Wave that moves the surface most at the edge of the focal spot's main lobe.
-
-    Parameters
-    ----------
-    body : Body, a slab or half-space
-    grid : (f,) float, Hz, frequencies above 0 and ascending; `GRID` if None
-
-    Returns
-    -------
-    Curves, from rest if it is a half-space: a layer on bone has no wave there
+    """Wave of a slab or half-space that moves the surface most at the edge of the focal spot's main
+    lobe, at ascending frequencies (f,) in Hz, `GRID` if None, and at rest: a layer on bone has none
+    there.
     """
     at_rest = [AT_REST] if body.depth == inf else []
     f = np.array([*at_rest, *np.asarray(GRID if grid is None else grid)])
@@ -105,25 +95,10 @@ PERIMETERS = (0.100, 0.060)  # m: whether it is a speed or a frequency that matt
 SAMPLES = 256  # of a turn
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Sweep:
-    """Deflection on the path (v,) in m/Pa at speeds of the focus (v,) in m/s, largest and peak to
-    peak (all that a vibrometer sees), for a perimeter in m.
+def focus_speeds(body: Body, perimeter: float) -> tuple[Floats, Floats]:
+    """Steady deflection (v,) in m/Pa of a circle of a perimeter in m, at each of `SPEEDS` of the
+    focus on it: the largest, and peak to peak, which is all that a vibrometer sees.
     """
-
-    perimeter: float
-    speeds: Floats
-    largest: Floats
-    peak_to_peak: Floats
-
-    def optima(self) -> dict[str, float]:
-        """Speeds in m/s of the largest deflection and of that peak to peak; nan at an end."""
-        found = {"largest": self.largest, "peak to peak": self.peak_to_peak}
-        return {name: top(self.speeds, values) for name, values in found.items()}
-
-
-def focus_speeds(body: Body, perimeter: float) -> Sweep:
-    """Steady deflection of the path under a focus that runs a circle at each of `SPEEDS`."""
     waves, probe = compliance(body), [[perimeter / (2 * np.pi), 0.0]]
     found = []
     for speed in SPEEDS:
@@ -132,8 +107,7 @@ def focus_speeds(body: Body, perimeter: float) -> Sweep:
         times = np.arange(SAMPLES) / circle.drawing_frequency / SAMPLES
         found.append(steady_state(waves, pressure, probe, times).values[:, 0])
     moved = np.array(found)
-    return Sweep(perimeter=perimeter, speeds=SPEEDS, largest=moved.max(axis=1),
-                 peak_to_peak=np.ptp(moved, axis=1))  # fmt: skip
+    return moved.max(axis=1), np.ptp(moved, axis=1)
 
 
 def top(x: Floats, y: Floats) -> float:
@@ -144,58 +118,6 @@ def top(x: Floats, y: Floats) -> float:
     before, here, after = y[k - 1 : k + 2]
     step = (x[k + 1] - x[k - 1]) / 2
     return float(x[k] + step * (before - after) / (before - 2 * here + after) / 2)
-
-
-PHANTOM = "arXiv 1608.08389, radiation force of modulated ultrasound in a phantom"
-FOUND = {
-    "sine": "a second harmonic and little of a third",
-    "square": "almost no second harmonic, but a third",
-}
-LAWS = ("linear", "pressure_squared", "force_corrected")
-AM, DURATION = 140.0, 0.2  # Hz, s; the abstract has no frequency
-ABSENT = 1e-3  # of the fundamental, -60 dB
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Harmonics:
-    """Amplitudes (3,) of the lines at f, 2f and 3f over that at f, of load and displacement, by a
-    drive law under a sine or square modulation.
-    """
-
-    wave: str
-    drive: str
-    load: Floats
-    motion: Floats
-
-    @property
-    def agrees(self) -> bool:
-        """Whether the harmonic that was found is there in the motion, and the larger one."""
-        second, third = self.motion[1:]
-        larger, smaller = (second, third) if self.wave == "sine" else (third, second)
-        return bool(larger > ABSENT and larger > smaller)
-
-
-def harmonics() -> list[Harmonics]:
-    """Harmonics of AM by each drive law on the half-space `palm`: the phantom is not known."""
-    half = 1 / AM / 2
-    tactons = {
-        "sine": Tacton(am_frequency=AM, duration=DURATION),
-        "square": Tacton(rhythm=Rhythm(pulses=((half, half),)), duration=DURATION),
-    }
-    found = []
-    for wave, tacton in tactons.items():
-        for drive in LAWS:
-            pressure = MovingPressure(tacton=tacton, drive=drive)
-            scene = Scene(pressure=pressure, body=BODIES["palm"], probes=((0.0, 0.0),))
-            moved = compute(scene, "flat-body-harmonic")
-            load = Response(
-                model="load", times=moved.times, probes=moved.probes, effort=moved.effort,
-                values=pressure([[0.0, 0.0]], moved.times), quantity="pressure",
-            )  # fmt: skip
-            lines = (fit_lines(each, AM * np.array([1, 2, 3]))[0][:, 0] for each in (load, moved))
-            of_load, of_motion = (np.abs(a / a[0]) for a in lines)
-            found.append(Harmonics(wave=wave, drive=drive, load=of_load, motion=of_motion))
-    return found
 
 
 HAND_UP = "-x"  # of a hand's file, its palm
@@ -217,18 +139,8 @@ class Finger:
 def along_finger(
     file: Path, report: Progress, frequencies: tuple[float, ...] = HAND_FREQUENCIES
 ) -> Finger:
-    """Decay on the palmar side of the finger that reaches furthest, by finite elements.
-
-    Parameters
-    ----------
-    file : of a hand, its palm in the direction `HAND_UP`
-    report : called with the name of the phase and the fraction done
-    frequencies : Hz
-
-    Raises
-    ------
-    ValueError
-        If there is no such file, or it is no body.
+    """Decay on the palmar side of the finger that reaches furthest, by finite elements of a hand in
+    a `file`, its palm towards `HAND_UP`. A file that is not there or no body raises a ValueError.
     """
     if not file.is_file():
         raise ValueError(f"--hand {file}: there is no such file; name a file of a hand")

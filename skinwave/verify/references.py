@@ -15,31 +15,16 @@ Complex = NDArray[Any]  # complex128
 
 
 def gaussian_at_rest(r: Floats, *, width: float, shear_modulus: float, poisson: float) -> Floats:
-    """Deflection of a half-space under exp(-r^2 / 2 s^2) Pa.
-
-    Boussinesq's kernel (1 - nu) / (mu k) and Gradshteyn and Ryzhik, 6.618.1.
-    """
+    """Deflection of a half-space under exp(-r^2 / 2 s^2) Pa: kernel (1 - nu) / (mu k)."""
     x = (r / width) ** 2 / 4
     return (1 - poisson) * width * np.sqrt(np.pi / 2) / shear_modulus * ive(0, x)
-
-
-def gaussian_mean_pressure(r: Floats, depth: Floats, *, width: float, poisson: float) -> Floats:
-    """Minus a third of the trace of stress below the same push; harmonic, 2 (1 + nu) / 3 at top.
-
-    Johnson (1985), section 3.2: the trace under a point force is -(1 + nu) F z / (pi R^3).
-    """
-    k = np.linspace(0, 8 / width, 801)
-    kernel = np.exp(-((k * width) ** 2) / 2 - depth[:, None] * k) * jv(0, r[:, None] * k) * k
-    return 2 * (1 + poisson) / 3 * width**2 * simpson(kernel, x=k, axis=1)
 
 
 def gaussian_on_bonded_layer(
     r: Floats, *, width: float, shear_modulus: float, poisson: float, depth: float
 ) -> Floats:
-    """The same push on a layer bonded to a rigid base.
-
-    Vorovich, Aleksandrov and Babeshko, Nonclassical Mixed Problems (1974): the half-space's
-    kernel times L(u) = (2 c sinh 2u - 4u) / (2 c cosh 2u + 4 u^2 + 1 + c^2), c = 3 - 4 nu.
+    """The same on a layer bonded to a rigid base: that kernel times
+    (2 c sinh 2u - 4u) / (2 c cosh 2u + 4 u^2 + 1 + c^2), u = k depth, c = 3 - 4 nu.
     """
     k = np.linspace(1e-9, 8, 4001) / width
     u, c = k * depth, 3 - 4 * poisson
@@ -52,9 +37,8 @@ def gaussian_on_bonded_layer(
 def half_space_kernel(
     k: Floats, w: float, *, density: float, mu: complex, poisson: float
 ) -> Complex:
-    """Deflection per pressure of wavenumber k: Lamb, Phil Trans R Soc A 203:1 (1904).
-
-    -b_p k_s^2 / (mu R), R = (2 k^2 - k_s^2)^2 - 4 k^2 b_p b_s, with a complex modulus.
+    """Deflection per pressure of wavenumber k, with a complex modulus: -b_p k_s^2 / (mu R),
+    R = (2 k^2 - k_s^2)^2 - 4 k^2 b_p b_s.
     """
     ks2 = density * w**2 / mu
     bp, bs = np.sqrt(k**2 - ks2 * (1 - 2 * poisson) / (2 - 2 * poisson)), np.sqrt(k**2 - ks2 + 0j)
@@ -62,7 +46,7 @@ def half_space_kernel(
 
 
 def plate_kernel(k: Floats, w: float, *, stiffness: complex, mass: float, air: float) -> Complex:
-    """1 / [D k^4 - (m + 2 air / k) w^2]: Cremer, Heckl, Petersson, Structure-Borne Sound (2005)."""
+    """1 / [D k^4 - (m + 2 air / k) w^2]."""
     return 1 / (stiffness * k**4 - (mass + 2 * air / k) * w**2)
 
 
@@ -74,11 +58,8 @@ def gaussian_response(
     circle: float = 0.0,
     harmonic: int = 0,
 ) -> Complex:
-    """Hankel's integral of a kernel along the real axis, for a Gaussian push of 1 Pa.
-
-    On a circle of radius R, harmonic n of the turning push moves radius r by
-    int s^2 exp(-k^2 s^2 / 2) G(k) J_n(k R) J_n(k r) k dk (Graf's addition theorem,
-    Abramowitz and Stegun 9.1.79). Sneddon, Fourier Transforms (1951).
+    """Hankel's integral of a kernel for a Gaussian push of 1 Pa. On a circle of radius R, harmonic
+    n of the turning push moves radius r by int s^2 exp(-k^2 s^2 / 2) G(k) J_n(k R) J_n(k r) k dk.
     """
     k = np.geomspace(1e-6, 8, 25_001) / width  # as 200_001 of them to 1e-14
     common = width**2 * np.exp(-((k * width) ** 2) / 2) * kernel(k) * jv(harmonic, k * circle) * k
@@ -86,10 +67,8 @@ def gaussian_response(
 
 
 def strip_under_sine(k: float, *, thickness: float, shear_modulus: float, poisson: float) -> float:
-    """Deflection of the loaded face of a free strip, plane strain, under 1 Pa times sin(k x).
-
-    Filon, Phil Trans R Soc A 201:63 (1903); Timoshenko and Goodier, Theory of Elasticity
-    (1970), chapter 3.
+    """Deflection of the loaded face of a free strip, plane strain, under 1 Pa times sin(k x):
+    Timoshenko and Goodier, Theory of Elasticity (1970), chapter 3.
     """
     x = k * thickness
     bending = (np.cosh(x) + 1) / (np.sinh(x) - x) if x > 1e-2 else 12 / x**3 * (1 + x**2 / 5)
@@ -98,11 +77,7 @@ def strip_under_sine(k: float, *, thickness: float, shear_modulus: float, poisso
 
 
 def rayleigh_ratio(poisson: float) -> float:
-    """c_R / c_s: x^6 - 8 x^4 + (24 - 16 g) x^2 - 16 (1 - g) = 0, g = (c_s / c_p)^2.
-
-    Rayleigh, Proc London Math Soc 17:4 (1885); Achenbach, Wave Propagation in Elastic
-    Solids (1973), chapter 5.
-    """
+    """c_R / c_s: x^6 - 8 x^4 + (24 - 16 g) x^2 - 16 (1 - g) = 0, g = (c_s / c_p)^2."""
     g = (1 - 2 * poisson) / (2 - 2 * poisson)
     roots = np.roots([1, -8, 24 - 16 * g, -16 * (1 - g)])
     squares = roots[np.abs(roots.imag) < 1e-9].real
@@ -110,10 +85,7 @@ def rayleigh_ratio(poisson: float) -> float:
 
 
 def rayleigh_lamb(k: float, *, thickness: float, poisson: float, symmetric: bool = False) -> float:
-    """w / c_s in 1/m of the lowest wave of a free plate, bending (A0) or stretching (S0).
-
-    Rayleigh (1888), Lamb, Proc R Soc A 93:114 (1917); Achenbach (1973), chapter 6.
-    """
+    """w / c_s in 1/m of the lowest wave of a free plate, bending (A0) or stretching (S0)."""
     half, g = thickness / 2, (1 - 2 * poisson) / (2 - 2 * poisson)
 
     def balance(w: float) -> float:
@@ -131,10 +103,8 @@ def rayleigh_lamb(k: float, *, thickness: float, poisson: float, symmetric: bool
 
 
 def clamped_plate() -> tuple[Floats, float]:
-    """w a^2 sqrt(m / D) (ascending) and central deflection D w / q a^4 of a clamped square plate.
-
-    Ritz's method with the polynomials (1 - x^2)^2 x^n; Young, J Appl Mech 17:448 (1950) has
-    35.99 and 73.41 with beam functions, Timoshenko (1959), table 35, 0.00126.
+    """w a^2 sqrt(m / D) (ascending) and central deflection D w / q a^4 of a clamped square plate,
+    by the polynomials (1 - x^2)^2 x^n. Young has 35.99 and 73.41, Timoshenko 0.00126.
     """
     x, weight = np.polynomial.legendre.leggauss(40)
     shapes = [np.polynomial.Legendre.basis(n) for n in range(14)]
@@ -151,10 +121,8 @@ def clamped_plate() -> tuple[Floats, float]:
 
 
 def moving_force_on_beam(t: Floats, *, speed: float, critical: float, period: float) -> Floats:
-    """Mid-span deflection over F L^3 / 48 E I while a force crosses a simply supported beam.
-
-    Fryba, Vibration of Solids and Structures under Moving Loads (1972), 1.3.2: a sum over
-    modes n; `speed` over `critical` is alpha, `period` that of the first mode.
+    """Mid-span deflection over F L^3 / 48 E I while a force crosses a simply supported beam, by a
+    sum over modes n; `period` is that of the first.
     """
     w1, alpha, total = 2 * np.pi / period, speed / critical, np.zeros_like(t)
     for n in range(1, 60, 2):
@@ -164,42 +132,11 @@ def moving_force_on_beam(t: Floats, *, speed: float, critical: float, period: fl
     return total * 96 / np.pi**4
 
 
-def circling_force_on_plate(
-    t: Floats, probe: tuple[float, float], *, side: float, circle: float, hz: float, width: float,
-    density: float, thickness: float, modulus: float, poisson: float, lag: float,
-) -> Floats:  # fmt: skip
-    """Deflection of a simply supported square plate under a Gaussian push of 1 Pa, from rest.
-
-    Navier's modal sum (Leissa, Vibration of Plates (1969), chapter 4), each mode's Duhamel
-    integral exact for a load that is linear between the times t (equally spaced from 0); modal
-    damping w^2 lag / 2. The push circles the centre of the plate, beginning on the x axis.
-    """
-    n = np.arange(1, 24)
-    kx, ky = (a.ravel() for a in np.meshgrid(n * np.pi / side, n * np.pi / side))
-    mass, D = density * thickness, modulus * thickness**3 / 12 / (1 - poisson**2)
-    w = (kx**2 + ky**2) * np.sqrt(D / mass)
-    rate = -(w**2) * lag / 2 + 1j * np.sqrt(w**2 - (w**2 * lag / 2) ** 2 + 0j)
-    angle = 2 * np.pi * hz * t[:, None]
-    x, y = side / 2 + circle * np.cos(angle), side / 2 + circle * np.sin(angle)
-    spot = 2 * np.pi * width**2 * np.exp(-(kx**2 + ky**2) * width**2 / 2)
-    load = spot * np.sin(kx * x) * np.sin(ky * y) * 4 / mass / side**2
-    step = rate * (t[1] - t[0])
-    grown = np.exp(step)
-    whole, ramp = (grown - 1) / rate, (grown - 1 - step) / step / rate
-    z, total = np.zeros(len(w), np.complex128), np.zeros(len(t))
-    for i in range(1, len(t)):
-        z = grown * z + (whole - ramp) * load[i - 1] + ramp * load[i]
-        total[i] = z.imag / rate.imag @ (np.sin(kx * probe[0]) * np.sin(ky * probe[1]))
-    return total
-
-
 def layered_column(
     w: Floats, lengths: list[float], densities: list[float], moduli: list[Complex]
 ) -> Complex:
-    """Top displacement per top stress of a column of layers, from the fixed base.
-
-    Meirovitch, Principles and Techniques of Vibrations (1997), chapter 7: tan(k L) / (k M) of
-    one layer, joined by the addition theorem of the tangent; M complex with loss.
+    """Top displacement per top stress of a column of layers, from the fixed base: tan(k L) / (k M)
+    of one layer, joined by the addition theorem of the tangent; M complex with loss.
     """
     below = np.zeros_like(w, np.complex128)
     for length, density, modulus in zip(lengths, densities, moduli, strict=True):
@@ -212,10 +149,8 @@ def layered_column(
 def lamb_pulse(
     t: Floats, r: float, *, mu: float, shear_speed: float, delay: float, width: float
 ) -> Floats:
-    """Vertical surface motion at r under a point force exp(-(t - delay)^2 / 2 width^2) N, nu 1/4.
-
-    Pekeris, Proc Natl Acad Sci 41:469 (1955); the step response as Mooney, Bull Seismol Soc Am
-    64:473 (1974) writes it, convolved with the derivative of the force.
+    """Vertical surface motion at r under a point force exp(-(t - delay)^2 / 2 width^2) N, nu 1/4:
+    the step response as Mooney writes it, convolved with the derivative of the force.
     """
     s, g = np.sqrt(3), np.sqrt(3 + np.sqrt(3)) / 2
     x, weight = np.polynomial.legendre.leggauss(400)
@@ -240,20 +175,10 @@ def lamb_pulse(
     return (convolved(early, 1 / s, 1) + convolved(late, 1, g) + after) / (np.pi * mu * r)
 
 
-def horizontal_shear_reflection(angle: Floats) -> Floats:
-    """(cos a - 1) / (cos a + 1): a viscous boundary under SH waves.
-
-    Lysmer and Kuhlemeyer, J Eng Mech Div ASCE 95:859 (1969), for plane waves.
-    """
-    return (np.cos(angle) - 1) / (np.cos(angle) + 1)
-
-
 def in_plane_reflection(k: float, ks: float, *, poisson: float) -> tuple[Complex, Complex]:
-    """Reflected (P, SV) displacement amplitudes of a viscous boundary, a row for each of P, SV in.
-
-    Lysmer and Kuhlemeyer (1969): stress = -density c_p, c_s times velocity, for plane waves of
-    wavenumber k along the boundary; ks is that of shear waves. Also the waves: rows P in, SV in,
-    P out, SV out; motion along and towards the boundary, wavenumber towards it.
+    """Reflected (P, SV) displacement amplitudes of a viscous boundary, a row for each of P, SV in,
+    for plane waves of wavenumber k along it; ks is that of shear waves. Also the waves: rows P in,
+    SV in, P out, SV out; motion along and towards the boundary, wavenumber towards it.
     """
     ratio = np.sqrt((1 - 2 * poisson) / (2 - 2 * poisson))
     kp = ks * ratio
@@ -269,48 +194,24 @@ def in_plane_reflection(k: float, ks: float, *, poisson: float) -> tuple[Complex
     return -np.linalg.solve(boundary[:, 2:], boundary[:, :2]).T, waves
 
 
-def generalized_alpha_step(wdt: float, radius: float) -> Floats:
-    """Map (3, 3) of (u, dt v, dt^2 a) over one step of the undamped oscillator.
-
-    Chung and Hulbert, J Appl Mech 60:371 (1993).
+def driven_oscillator(
+    t: float, *, drive: float, damping: float = 0.0, modulus: float = 0.0, time: float = 1.0
+) -> float:
+    """u'' + damping u' + u + modulus d = sin(drive t) from rest, d' = u' - d / time: by partial
+    fractions of the transform.
     """
-    am, af = (2 * radius - 1) / (radius + 1), radius / (radius + 1)
-    gamma, beta = 0.5 - am + af, (1 - am + af) ** 2 / 4
-    after = [[1, 0, -beta], [0, 1, -gamma], [(1 - af) * wdt**2, 0, 1 - am]]
-    before = [[1, 1, 0.5 - beta], [0, 1, 1 - gamma], [-af * wdt**2, 0, -am]]
-    return np.linalg.solve(np.array(after), np.array(before))
-
-
-def driven_oscillator(t: float, *, damping: float, drive: float) -> float:
-    """u'' + damping u' + u = sin(drive t) from rest: particular and free solution.
-
-    Meirovitch (1997), sections 3.1 and 3.2.
-    """
-    s, G = np.roots([1, damping, 1]), 1 / (1 - drive**2 + 1j * damping * drive)
-    start = [-G.imag, -(1j * drive * G).imag]
-    free = np.linalg.solve(np.array([np.ones(2), s]), np.array(start)) @ np.exp(t * s)
-    return float((G * np.exp(1j * drive * t)).imag + free.real)
-
-
-def relaxing_oscillator(t: float, *, modulus: float, time: float, drive: float) -> float:
-    """u'' + u + modulus d = sin(drive t) from rest, d' = u' - d / time: by partial fractions.
-
-    The transform is drive (1 + s time) / (s^2 + drive^2) over the cubic of a standard linear solid:
-    Flugge, Viscoelasticity (1975), chapter 3.
-    """
-    cubic = np.array([time, 1.0, time * (1 + modulus), 1.0])
-    s = np.append(np.roots(cubic), [1j * drive, -1j * drive])
+    lagging = [time, 1.0]
+    cubic = np.polyadd(np.polymul([1.0, damping, 1.0], lagging), [modulus * time, 0.0])
     bottom = np.polymul(cubic, [1.0, 0.0, drive**2])
-    residues = drive * (1 + s * time) / np.polyval(np.polyder(bottom), s)
+    s = np.append(np.roots(cubic), [1j * drive, -1j * drive])
+    residues = drive * np.polyval(lagging, s) / np.polyval(np.polyder(bottom), s)
     return float((residues * np.exp(s * t)).sum().real)
 
 
 def elastica(load: float) -> tuple[float, float]:
-    """Deflection and shortening of a cantilever's tip over its length, at load = P L^2 / E I.
-
-    theta'' = -load cos(theta), theta(0) = 0, theta'(1) = 0, integrated from the end with the slope
-    that makes it clamped: Bisshopp and Drucker, Q Appl Math 3:272 (1945). Mattiasson, Int J Numer
-    Methods Eng 17:145 (1981), has 0.30172 and 0.05643 at 1.
+    """Deflection and shortening of a cantilever's tip over its length, at load = P L^2 / E I, by
+    theta'' = -load cos(theta) from the end, with the slope that makes it clamped. Mattiasson has
+    0.30172 and 0.05643 at 1.
     """
 
     def bent(tip: float) -> Floats:
@@ -324,11 +225,9 @@ def elastica(load: float) -> tuple[float, float]:
 
 
 def karman_disc(load: float, poisson: float) -> float:
-    """Central w / h of a clamped disc with an immovable edge, at q a^4 / 64 D h = load.
-
-    Slope r g and force N a^2 / D of the radius r / a, deflection in thicknesses:
-    g'' + 3 g' / r = N g + 32 load, N'' + 3 N' / r = -6 (1 - nu^2) g^2.
-    Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells (1959), chapter 13.
+    """Central w / h of a clamped disc with an immovable edge, at q a^4 / 64 D h = load. Slope r g
+    and force N a^2 / D of the radius r / a, deflection in thicknesses: g'' + 3 g' / r = N g + 32
+    load, N'' + 3 N' / r = -6 (1 - nu^2) g^2.
     """
 
     def slopes(r: Floats, y: Floats) -> Floats:

@@ -2,27 +2,26 @@
 
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from markupsafe import Markup
 
-from skinwave.system.document import Report, Section
+from skinwave.system.document import Details, Report, Section
 from skinwave.system.effort import Progress, versions
 from skinwave.system.table import Table
 from skinwave.verify import elements, exact, extremes, nonlinear, plates, statics, stepping, waves
 from skinwave.verify.case import Case, Check, Result
 
-MODULES: Mapping[str, ModuleType] = {
+MODULES = {
     "Elements": elements, "At rest": statics, "Plates and beams": plates, "Waves": waves,
     "Wavenumber integrals": exact, "Time, damping, units": stepping,
     "The load at its extremes": extremes, "Large deflection": nonlinear,
 }  # fmt: skip
-TOPICS: Mapping[str, tuple[Case, ...]] = {
-    topic: tuple(found for found in vars(module).values() if isinstance(found, Case))
+TOPICS = {
+    topic: [found for found in vars(module).values() if isinstance(found, Case)]
     for topic, module in MODULES.items()
 }
 CASES = {found.name: found for cases in TOPICS.values() for found in cases}
@@ -60,13 +59,13 @@ def run_suite(
 def page(results: list[Result], planned: int) -> Report:
     """A summary of all cases, then each with its source, mesh and checks."""
     left_out = len(CASES) - planned
-    verdict = [
-        f"Interrupted: {len(results)} of {planned} cases are finished." * (len(results) < planned),
-        f"{counted(results)}.",
-        f"{left_out} slower cases are left out (skinwave verify without --quick)." * (left_out > 0),
-        f"{sum(r.seconds for r in results):.0f} s with "
-        + ", ".join(f"{name} {version}" for name, version in versions().items()) + ".",
-    ]  # fmt: skip
+    verdict = [f"{counted(results)}."]
+    if len(results) < planned:
+        verdict.insert(0, f"Interrupted: {len(results)} of {planned} cases are finished.")
+    if left_out > 0:
+        verdict.append(f"{left_out} slower cases are left out (skinwave verify without --quick).")
+    used = ", ".join(f"{name} {version}" for name, version in versions().items())
+    verdict.append(f"{sum(r.seconds for r in results):.0f} s with {used}.")
     summary = Table(
         ["case", "check nearest to the tolerance", *VALUES, "s"],
         [[r.case.title, *_row(r.worst), r.seconds] for r in results],
@@ -76,7 +75,7 @@ def page(results: list[Result], planned: int) -> Report:
         for topic, cases in TOPICS.items()
         if any(r.case in cases for r in results)
     ]
-    return Report("Verification", [" ".join(filter(None, verdict))], [SCOPE, summary, *topics])
+    return Report("Verification", [" ".join(verdict)], [SCOPE, summary, *topics])
 
 
 def summary(results: list[Result]) -> str:
@@ -97,22 +96,20 @@ def counted(results: list[Result]) -> str:
     return f"{len(results) - failed} passed, {failed} failed"
 
 
-def _shown(result: Result) -> Section:
-    """One case on the page."""
+def _shown(result: Result) -> Details:
+    """One case on the page, which unfolds."""
     found = result.case
     words = [found.note, f"It ended early: {result.error}" if result.error else ""]
     table = Table(["quantity", *VALUES], map(_row, result.checks))
     source = f"Source: {found.source}. Mesh: {found.mesh}."
-    return Section(found.title, [source, table, *filter(None, words)], level=3)
+    return Details(found.title, [source, table, *filter(None, words)])
 
 
 def _row(check: Check) -> list[Any]:
-    """Cells of a check; a yes-or-no check has no tolerance."""
+    """Cells of a check."""
     what = f"{check.what}, {check.unit}" if check.unit else check.what
     word = "passed" if check.passed else "FAILED"
     verdict = Markup('<span class="{}">{}</span>').format("yes" if check.passed else "no", word)
-    if check.bar == 0 and check.reference == 1:
-        return [what, "yes" if check.passed else "no", "yes", None, None, verdict]
     return [what, f"{check.value:.5g}", f"{check.reference:.5g}", f"{check.error:.2g}",
             f"{check.bar:.2g}", verdict]  # fmt: skip
 
@@ -120,13 +117,10 @@ def _row(check: Check) -> list[Any]:
 def _write_json(path: Path, results: list[Result], planned: int) -> None:
     passed = sum(r.passed for r in results)
     record = {
-        "passed": passed,
-        "failed": len(results) - passed,
-        "planned": planned,
-        "seconds": round(sum(r.seconds for r in results), 1),
-        "versions": versions(),
+        "passed": passed, "failed": len(results) - passed, "planned": planned,
+        "seconds": round(sum(r.seconds for r in results), 1), "versions": versions(),
         "cases": [_record(r) for r in results],
-    }
+    }  # fmt: skip
     path.write_text(json.dumps(record, indent=1), encoding="utf-8")
 
 
@@ -136,8 +130,8 @@ def _record(result: Result) -> dict[str, Any]:
         {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in row.items()}
         for row in ({**asdict(c), "passed": c.passed} for c in result.checks)
     ]
-    about = {
-        name: getattr(result.case, name) for name in ("name", "title", "source", "mesh", "note")
-    }
-    return about | {"passed": result.passed, "seconds": round(result.seconds, 2),
-                    "error": result.error, "checks": checks}  # fmt: skip
+    about = ("name", "title", "source", "mesh", "note")
+    return {name: getattr(result.case, name) for name in about} | {
+        "passed": result.passed, "seconds": round(result.seconds, 2), "error": result.error,
+        "checks": checks,
+    }  # fmt: skip

@@ -18,7 +18,7 @@ from skinwave.system.document import Details, Picture, Report, Section
 from skinwave.system.effort import Progress
 from skinwave.system.table import Column, Table
 from skinwave.verify import predictions
-from skinwave.verify.predictions import BODIES, FOUND, Curves, Finger, Harmonics
+from skinwave.verify.predictions import BODIES, Curves, Finger
 from skinwave.verify.published import (
     ALL,
     EXPONENT,
@@ -27,10 +27,10 @@ from skinwave.verify.published import (
     OPTIMUM,
     SKINSOURCE,
     SPEED,
+    WAVES,
     Published,
     Quantity,
     all_sources,
-    wave_sets,
 )
 
 NONE, WITHIN, ABOVE, BELOW = "no wave", "within", "above", "below"
@@ -53,18 +53,12 @@ FACTORS = (
     "Hollow: the preset was fitted to that source; filled: it predicts it. "
     f"Factors beyond {FURTHEST:g} are drawn there."
 )
-WAVES = (
+SPEEDS = (
     "Points: sources, with the spread between people, or a standard deviation, where one is "
     "published. Grey: from the lowest to the highest source at each frequency. Lines: the wave of "
     "each preset that moves the surface most at the edge of the focal spot (half-spaces solid, "
     "layers on bone dashed); a line breaks where another mode takes the lead, and is missing where "
     "none propagates. Lengths are those of plane waves, without geometric spreading."
-)
-HARMONICS = (
-    f"{predictions.PHANTOM} (abstract): sine AM gives {FOUND['sine']}, square AM "
-    f"{FOUND['square']}. Ours is on the half-space palm at {predictions.AM:g} Hz. The abstract has "
-    "neither frequency nor amplitudes, so that only the larger harmonic is compared. Ratios are "
-    "amplitudes over that at f."
 )
 
 
@@ -120,27 +114,11 @@ def compared(published: Published, body: str, ours: Iterable[float]) -> list[Com
     ]  # fmt: skip
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Validation:
-    """Waves by body, rows of all sets, and harmonics."""
-
-    curves: Mapping[str, Curves]
-    rows: tuple[Compared, ...]
-    harmonics: tuple[Harmonics, ...]
-
-
-def validate(report: Progress, *, hand: Path | None = None) -> Validation:
-    """Published measurements beside the models.
-
-    Parameters
-    ----------
-    report : called with the name of the phase and the fraction done
-    hand : file of a hand, for the decay along its finger by finite elements; left out if None
-
-    Raises
-    ------
-    ValueError
-        If the file of the hand is not there or is no body.
+def validate(
+    report: Progress, *, hand: Path | None = None
+) -> tuple[Mapping[str, Curves], list[Compared]]:
+    """Waves by body, and rows of all published sets: with the file of a `hand` also of the decay
+    along its finger, by finite elements.
     """
     of_hand = compare_finger(predictions.along_finger(hand, report)) if hand else []
     report("waves", 0.02)
@@ -148,9 +126,7 @@ def validate(report: Progress, *, hand: Path | None = None) -> Validation:
     rows = compare_waves(curves)
     report("speed of the focus", 0.15)
     rows += [row for name in OPTIMUM.bodies for row in compare_optima(name)]
-    report("harmonics", 0.4)
-    harmonics = tuple(predictions.harmonics())
-    return Validation(curves=curves, rows=(*rows, *of_hand), harmonics=harmonics)
+    return curves, rows + of_hand
 
 
 def compare_waves(curves: Mapping[str, Curves]) -> list[Compared]:
@@ -161,7 +137,7 @@ def compare_waves(curves: Mapping[str, Curves]) -> list[Compared]:
             return predictions.decay_exponents(BODIES[name], published.frequencies)
         return curves[name].at(published.quantity, published.frequencies)
 
-    sets = (*wave_sets(), all_sources(SPEED), all_sources(LENGTH))
+    sets = (*WAVES, all_sources(SPEED), all_sources(LENGTH))
     return [row for each in sets for name in each.bodies
             for row in compared(each, name, ours(each, name))]  # fmt: skip
 
@@ -170,14 +146,16 @@ def compare_optima(body: str) -> list[Compared]:
     """Rows of the speed of the focus at which a body deflects most, on circles of two sizes."""
     rows = []
     for perimeter in predictions.PERIMETERS:
-        for what, speed in predictions.focus_speeds(BODIES[body], perimeter).optima().items():
+        deflections = predictions.focus_speeds(BODIES[body], perimeter)
+        for what, deflection in zip(("largest", "peak to peak"), deflections, strict=True):
             name = f"{OPTIMUM.name}, {what}, {1e3 * perimeter:g} mm around"
+            speed = predictions.top(predictions.SPEEDS, deflection)
             rows += compared(replace(OPTIMUM, name=name), body, [speed])
     return rows
 
 
 def compare_finger(finger: Finger) -> list[Compared]:
-    """Rows of a finger beside the people of SkinSource, at the frequencies of the finger."""
+    """Rows of a finger beside the people of SkinSource, at its own frequencies."""
     at = [SKINSOURCE.frequencies.index(f) for f in finger.frequencies]
     own = replace(
         SKINSOURCE, frequencies=tuple(finger.frequencies), values=(nan,) * len(at),
@@ -186,9 +164,9 @@ def compare_finger(finger: Finger) -> list[Compared]:
     return compared(own, HAND, finger.lengths)
 
 
-def verdict(found: Validation) -> list[str]:
+def verdict(rows: Sequence[Compared]) -> list[str]:
     """What the comparisons come to, in sentences."""
-    single = [row for row in found.rows if not row.published.name.startswith(ALL)]
+    single = [row for row in rows if not row.published.name.startswith(ALL)]
     own = [row for row in single if not row.is_built]
     within, missed = _count(own, WITHIN), [row for row in own if row.outcome in (ABOVE, BELOW)]
     sentences = [
@@ -217,37 +195,26 @@ def verdict(found: Validation) -> list[str]:
         f"Predicted speeds of the focus at the largest deflection are {', '.join(optima)} m/s; "
         f"{OPTIMUM.lows[0]:g} to {OPTIMUM.highs[0]:g} m/s is published."
     )
-    for wave, words in FOUND.items():
-        right = [h.drive for h in found.harmonics if h.wave == wave and h.agrees]
-        sentences.append(f"As in the phantom, {wave} AM has {words} with {' and '.join(right)}.")
-    if lengths := [significant(1e3 * row.ours, 2) for row in found.rows if row.body == HAND]:
+    if lengths := [significant(1e3 * row.ours, 2) for row in rows if row.body == HAND]:
         sentences.append(f"Along a finger motion falls to 1/e in {', '.join(lengths)} mm.")
     return sentences
 
 
-def report(found: Validation) -> Report:
+def report(curves: Mapping[str, Curves], rows: Sequence[Compared]) -> Report:
     """The page, with its figures and validation.csv."""
-    rows = found.rows
     sources = {row.published.name: row.published for row in rows}
-    harmonics = Table(
-        ["modulation", "drive law", "load, 2f", "load, 3f", "displacement, 2f", "displacement, 3f",
-         Column("as_published", "as published")],
-        [(h.wave, h.drive, *(_ratio(x) for x in (*h.load[1:], *h.motion[1:])), h.agrees)
-         for h in found.harmonics], name="harmonics",
-    )  # fmt: skip
-    return Report("Models beside published measurements", [" ".join(verdict(found))], [
+    return Report("Models beside published measurements", [" ".join(verdict(rows))], [
         _picture("factors", _factors, (10.5, 0.3 * len(sources) + 1.6), FACTORS, rows),
         SCOPE,
         _summary(rows),
         Details("Every value", [_table(rows)]),
         Section("Speed and decay of waves",
-                [_picture("waves", _waves, (11.5, 5.6), WAVES, found.curves)]),
-        Section("Harmonics of amplitude-modulated radiation force", [HARMONICS, harmonics]),
-        Section("Sources", [Table(
+                [_picture("waves", _waves, (11.5, 5.6), SPEEDS, curves)]),
+        Details("Sources", [Table(
             ["set", "site", "conditions", "source", "how sure", "contradictions and assumptions"],
             [(s.name, s.site, s.conditions, s.source, s.how, s.remark) for s in sources.values()],
         )]),
-        Section("Published, and not compared",
+        Details("Published, and not compared",
                 [Table(["source", "what", "why not"], NOT_COMPARED)]),
     ])  # fmt: skip
 
@@ -259,11 +226,6 @@ def _count(rows: Iterable[Compared], outcome: str) -> int:
 def _median(rows: Iterable[Compared]) -> str:
     """Median factor of rows that miss."""
     return significant(float(np.median([row.miss for row in rows] or [1.0])), 2)
-
-
-def _ratio(x: float) -> float:
-    """A ratio of harmonics, 0 of what is round-off."""
-    return float(x) if x > predictions.ABSENT else 0.0
 
 
 def _summary(rows: Sequence[Compared]) -> Table:
@@ -360,7 +322,7 @@ def _sources(ax: Axes, quantity: Quantity) -> None:
     size, whole = quantity.size, all_sources(quantity)
     low, high = (np.array(x) / size for x in (whole.lows, whole.highs))
     ax.fill_between(whole.frequencies, low, high, color=BAND, lw=0, zorder=0)
-    sets = [each for each in wave_sets() if each.quantity is quantity]
+    sets = [each for each in WAVES if each.quantity is quantity]
     for marker, each in zip(MARKERS, sets, strict=False):
         low, high = np.array([each.between(k) for k in range(len(each.values))]).T / size
         middle = np.where(np.isnan(each.values), (low + high) / 2, np.array(each.values) / size)

@@ -7,6 +7,7 @@ import pytest
 
 import fem
 import meshes
+from fem.finite_strain import shell_stiffness
 from simple_model import MovingPressure, Tacton, from_young, orthotropic
 from simple_model.plates.modes import plate_modes
 from skinwave import dumps, loads, plan
@@ -119,7 +120,7 @@ def test_frequencies_of_a_curled_sheet_are_those_of_a_shallow_shell(rise):
     exact = np.sort(np.sqrt((bent + shell) / 0.08), axis=None)[:2] / (2 * np.pi)
     mesh, fixed = quarter(thickness, 15, "even", "even")
     middle = fem.Membrane(triangles=meshes.middle_plane(mesh), thickness=DEEP, material=solid)
-    stiffener = fem.shell_stiffness(
+    stiffener = shell_stiffness(
         mesh, middle, lambda at: at * [-8 * rise / WIDE**2, 0], meshed=(DEEP / thickness) ** 2
     )
     ops = fem.assemble(mesh, equivalent(thickness, solid), fixed=fixed, stiffener=stiffener)

@@ -195,28 +195,6 @@ def test_moduli_of_a_coat_depend_on_frequency_as_those_of_a_body_do():
     assert abs(difference).max() < 1e-12 * abs(expected).max()
 
 
-@pytest.mark.parametrize(("below", "skin"), [("palm", "epidermis"), ("palm-zener", "ecoflex")])
-def test_a_coated_body_has_its_damping_and_branches_as_those_of_the_body_but_at_its_surface(
-    below, skin
-):
-    """Of losses like the body's, and of other losses."""
-    mesh = block()
-    coat = fem.Coat(materials=(fem.PRESETS[skin],), thicknesses=(0.4e-3,))
-    body, coated = (
-        fem.assemble(mesh, fem.PRESETS[below], fixed="bottom", absorbing="right", coat=each)
-        for each in (None, coat)
-    )
-    stiffness = coated.C, *(branch.K for branch in coated.branches)
-    for A, part in zip(stiffness, coated.laws.parts, strict=True):
-        assert abs(part.of(coated.K) - A).max() < 1e-12 * abs(A).max()
-    for own, part in zip(body.laws.parts, coated.laws.parts, strict=False):
-        assert part.stiffness == own.stiffness
-    if skin == "epidermis":  # one ratio of viscosity, or of the branch, to the modulus
-        damping, *branches = coated.laws.parts
-        assert damping.rest is coated.R
-        assert [part.rest for part in branches] == [None] * len(body.branches)
-
-
 def test_a_body_and_its_coat_share_branches_of_one_time():
     term = (PronyTerm(modulus=1e3, time=1e-3),)
     mesh, below = block(), fem.Material(density=1000, shear_modulus=2e4, poisson=0.3, prony=term)
@@ -250,10 +228,9 @@ def test_half_of_a_symmetric_body_moves_as_all_of_it():
     np.testing.assert_allclose(found["xy"], found[""], rtol=1e-7)
 
 
-@pytest.mark.parametrize("ratio", [1e-3, 1e3])
-def test_a_coat_of_half_an_element_leaves_the_stiffness_positive(ratio):
+def test_a_coat_of_half_an_element_leaves_the_stiffness_positive():
     soft = fem.Material(density=1000, shear_modulus=2e4, poisson=0.4999)
-    thick = fem.Coat(materials=(soft.scaled(modulus=ratio),), thicknesses=(1.5e-3,))
+    thick = fem.Coat(materials=(soft.scaled(modulus=1e3),), thicknesses=(1.5e-3,))
     operators = fem.assemble(block(), soft, fixed="bottom", coat=thick)
     lowest = eigsh(operators.K, 1, M=operators.M, sigma=0, return_eigenvectors=False)
     assert lowest[0] > 0

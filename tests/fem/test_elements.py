@@ -172,3 +172,16 @@ def test_probes_read_the_displacement_along_the_push(distorted_cube):
     u[:, 2] = -(1 + distorted_cube.points[:, 0] ** 2)
     S = fem.probe_operator(distorted_cube, [[0.3, 0.4], [0.71, 0.2]])
     np.testing.assert_allclose(S @ u.ravel(), [1.09, 1.5041], rtol=1e-12)
+
+
+def test_inverted_elements_and_incompressible_solids_are_refused():
+    mesh = meshes.block((1.0, 1.0, 1.0), 1.0)
+    points = mesh.points.copy()
+    points[mesh.tets[3, 4]] += 2.0
+    bent = replace(mesh, points=points)
+    touched = np.flatnonzero((mesh.tets == mesh.tets[3, 4]).any(axis=1))
+    with pytest.raises(meshes.MeshError) as refused:
+        next(element_stiffness(bent, *np.ones((2, len(mesh.tets)))))
+    assert any(f"element {e} " in str(refused.value) for e in touched)
+    with pytest.raises(ValueError, match="poisson"):
+        fem.Material(density=1, shear_modulus=1, poisson=0.5)

@@ -8,7 +8,7 @@ from half_space import WIDTH, boussinesq
 
 import fem
 import meshes
-from fem.stress import strain_operator
+from fem.stress import materials_at, nodal_strain, solid_parts, strain_operator
 from simple_model.layers.tensors import hooke
 
 POISSON = [0.3, 0.4999]
@@ -21,7 +21,7 @@ def solid(poisson):
 def stress_at(mesh, materials, points, u):
     """Stress (p, 6) at points, by Hooke's law of the material of each."""
     strain = (strain_operator(mesh, materials, points) @ u).reshape(-1, 6)
-    solids = fem.materials_at(mesh, materials, points)
+    solids = materials_at(mesh, materials, points)
     return np.array([hooke(m) @ e for m, e in zip(solids, strain, strict=True)])
 
 
@@ -159,17 +159,17 @@ def test_strain_at_nodes_is_that_of_points_and_jumps_between_materials():
     materials = {0: solid(0.3), 1: solid(0.4999)}
     x = 50 * mesh.points
     u = np.stack([np.sin(x[:, 0]), x[:, 2] ** 2, np.cos(x[:, 1]) * x[:, 2]], axis=1).ravel()
-    above, below = fem.solid_parts(mesh, materials)
+    above, below = solid_parts(mesh, materials)
     both = np.intersect1d(above.nodes, below.nodes)
     np.testing.assert_allclose(mesh.points[both, 2], -6e-3, atol=1e-12)
-    found = fem.nodal_strain(below, np.stack([u, -2 * u], axis=1))
+    found = nodal_strain(below, np.stack([u, -2 * u], axis=1))
     corners = np.isin(below.nodes, mesh.tets[:, :4]) & (mesh.points[below.nodes, 2] < -7e-3)
     inside = mesh.points[below.nodes[corners]]
     exact = (strain_operator(mesh, materials, inside) @ u).reshape(-1, 6)
     np.testing.assert_allclose(found[corners, :, 0], exact, atol=1e-9 * np.abs(exact).max())
     np.testing.assert_allclose(found[..., 1], -2 * found[..., 0], rtol=1e-9, atol=1e-12)
     some = np.arange(3, len(below.nodes), 7)
-    part_of_it = fem.nodal_strain(below, u[:, None], some)[..., 0]
+    part_of_it = nodal_strain(below, u[:, None], some)[..., 0]
     np.testing.assert_allclose(part_of_it, found[some, :, 0], rtol=0, atol=1e-9)
 
 

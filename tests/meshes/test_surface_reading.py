@@ -7,6 +7,7 @@ import pytest
 
 import fem
 import meshes
+from fem.load_and_probe import node_operator, on_surface
 from simple_model import MovingPressure, Tacton, Trajectory, phasors
 from skinwave import Body, Scene
 from skinwave.bodies import BODIES
@@ -27,7 +28,7 @@ def mesh(request):
 
 
 def test_a_surface_is_read_at_its_own_nodes(mesh):
-    nodes, read = fem.node_operator(mesh)
+    nodes, read = node_operator(mesh)
     np.testing.assert_array_equal(nodes, np.unique(mesh.facets["top"]))
     units = [np.tile(unit, len(mesh.points)) for unit in np.eye(3)]
     inwards = np.stack([read @ unit for unit in units], axis=1)
@@ -42,7 +43,7 @@ def test_places_up_to_the_silhouette_are_read_where_they_are_or_refused(mesh):
     corners = mesh.points[mesh.facets["top"][:, :3], :2]
     low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
     places = np.random.default_rng(0).uniform(1.05 * low, 1.05 * high, (2000, 2))
-    on = fem.on_surface(mesh, places)
+    on = on_surface(mesh, places)
     read = fem.probe_operator(mesh, places[on])
     weights = abs(read).sum(axis=1)  # of shape functions within [-1/8, 1], and a unit normal
     assert weights.max() < 3

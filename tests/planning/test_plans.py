@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.stated_errors import MOST, stated_and_true
+from bench.plans import MOST, stated_and_true
 from simple_model import Trajectory
 from skinwave import loads, simulate
 from skinwave.bodies.build import build

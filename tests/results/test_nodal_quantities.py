@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import fem
+from fem.load_and_probe import node_operator
 from simple_model import MovingPressure, Response, Tacton, Trajectory
 from simple_model.layers.tensors import hooke
 from simple_model.load.spectrum import pressure_lines, synthesise
@@ -146,7 +146,7 @@ def test_a_report_of_motion_keeps_the_map_of_its_surface(view, moved, tmp_path):
     album.keep_view(view, tmp_path)
     found = surface.load(tmp_path / "map.npz", SCENE)
     at = np.unravel_index(np.nanargmax(found.rms), found.rms.shape)
-    _, inwards = fem.node_operator(moved.mesh, patch=SCENE.body.of_kind.normal_patch)
+    _, inwards = node_operator(moved.mesh, patch=SCENE.body.of_kind.normal_patch)
     lines = np.abs(read_at(oscillating(moved.motion), inwards @ moved.basis).lines)
     rms = np.sqrt((lines**2).sum(axis=0) / 2).max()
     assert found.rms[at] == pytest.approx(rms, rel=0.05)  # at places, and at nodes

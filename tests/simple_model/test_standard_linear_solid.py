@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 import fem
 import meshes
 import skinwave
+from fem.reduced import exponential_sum, line_response
 from fem.reduced_nonlinear import modal_elastic
 from simple_model import MovingPressure, PronyTerm, Tacton, Trajectory
 from simple_model.load.spectrum import reduced_lines
@@ -83,7 +84,7 @@ def test_layers_relax_each_in_its_own_time():
     poles = fem.poles(model.operators, model.outputs)
     assert len(poles.values) < 4 * len(model.operators.K)
     assert (poles.values.real < 0).all()
-    lines, _ = fem.line_response(poles, push[None], np.array([140.0]))
+    lines, _ = line_response(poles, push[None], np.array([140.0]))
     np.testing.assert_allclose(lines[0], small, rtol=1e-8)
 
 
@@ -102,9 +103,9 @@ def test_reduced_motion_from_rest_is_that_of_the_transient():
     full = np.array([S @ state.displacement for state in states])
     poles = fem.poles(model.operators, model.outputs)
     frequencies, forces = reduced_lines(load, points, P.T @ model.basis)
-    lines, start = fem.line_response(poles, forces, frequencies)
+    lines, start = line_response(poles, forces, frequencies)
     rates = np.concatenate([2j * np.pi * frequencies, poles.values])
-    reduced = fem.exponential_sum(rates, np.vstack([lines, start]), np.arange(500) * dt)
+    reduced = exponential_sum(rates, np.vstack([lines, start]), np.arange(500) * dt)
     misfit = np.linalg.norm(reduced - full, axis=0) / np.linalg.norm(full, axis=0)
     assert misfit.max() <= 1e-3
 
@@ -130,14 +131,14 @@ def test_small_motion_at_large_displacement_relaxes_as_linear_motion_does(losses
         return np.sin(2 * np.pi * 200 * t) * shape
 
     linear = list(islice(fem.transient(body.operators, force, dt), 60))
-    found = list(islice(fem.nonlinear.with_energy_balance(
+    found = list(islice(fem.with_energy_balance(
         body, fem.nonlinear.dynamic(body, force, dt, tolerance=1e-9), force), 60,
     ))  # fmt: skip
     moved = np.array([[state.displacement, each.displacement]
                       for each, (state, _) in zip(linear, found, strict=True)])  # fmt: skip
     assert np.linalg.norm(moved[:, 0] - moved[:, 1]) < 1e-6 * np.linalg.norm(moved[:, 1])
     state, spent = found[-1]
-    stored = fem.nonlinear.total_energy(body, state)
+    stored = fem.stored(body, state)
     assert spent.dissipated > 0.05 * spent.work
     assert abs(spent.work - stored - spent.lost) < 1e-6 * spent.work
 
@@ -153,7 +154,7 @@ def test_modes_of_a_sheet_relax_as_the_sheet_does():
     H = np.array([[[3e5, 1e5], [1e5, 2e5]]])
     body = modal_elastic(modal, H, solid)
     force, dt = np.array([300.0, 100.0]), 1e-5
-    states = islice(fem.nonlinear.with_energy_balance(
+    states = islice(fem.with_energy_balance(
         body, fem.nonlinear.dynamic(body, lambda t: force, dt, tolerance=1e-9), lambda t: force,
     ), 400)  # fmt: skip
     # The same equations, by a solver of ordinary differential equations.
@@ -171,5 +172,5 @@ def test_modes_of_a_sheet_relax_as_the_sheet_does():
     moved = np.array([state.displacement for state, _ in found])
     assert np.linalg.norm(moved - exact) < 2e-3 * np.linalg.norm(exact)
     state, spent = found[-1]
-    stored = fem.nonlinear.total_energy(body, state)
+    stored = fem.stored(body, state)
     assert abs(spent.work - stored - spent.lost) < 2e-3 * spent.work

@@ -17,10 +17,10 @@ from skinwave.verify.stepping import oscillator
 # A case of each topic and of each kind of reference, in some ten seconds of CPU time. The hosted
 # workflow runs `skinwave verify`, which is every case.
 GATE = (
-    "patch", "patch-quadratic", "slivers", "inverted", "incompressible", "manufactured",
+    "patch", "patch-quadratic", "slivers", "manufactured",
     "stiffness-contrast", "fingertip-with-bone", "thin-sheets", "in-plane-shear", "moving-force",
-    "air-operator", "rayleigh", "oblique-sh", "exact-half-space", "exact-slab", "exact-sheet",
-    "numerical-damping", "columns", "degenerate-paths", "durations", "elastica", "tangent",
+    "air-operator", "rayleigh", "oblique-p-sv", "exact-half-space", "exact-slab", "exact-sheet",
+    "order-in-time", "columns", "durations", "elastica", "tangent",
 )  # fmt: skip
 
 
@@ -102,8 +102,6 @@ def test_the_command_counts_and_fails_if_a_case_does(tmp_path, capsys, monkeypat
 def test_time_stepping_refuses_nonsense():
     with pytest.raises(ValueError, match="dt = 0"):
         next(fem.transient(oscillator(), lambda t: np.zeros(1), 0.0))
-    with pytest.raises(ValueError, match="outside 0..1"):
-        next(fem.transient(oscillator(), lambda t: np.zeros(1), 0.1, spectral_radius=1.2))
     states = fem.transient(oscillator(), lambda t: np.array([np.nan if t else 0.0]), 0.1)
     with pytest.raises(fem.Diverged, match="step 1"):
         list(islice(states, 3))
