@@ -246,7 +246,7 @@ def _even(times: Floats) -> tuple[Floats, np.ndarray]:
         )
     if (missing := index[-1] + 1 - len(index)) > LARGEST_GAPS * len(index):
         raise ValueError(
-            f"{missing} rows are missing between {len(index)} in equal steps; give a part without gaps"
+            f"{missing} rows are missing between {len(index)} in equal steps; give a complete part"
         )
     full = start + step * np.arange(index[-1] + 1)
     if away <= UNEVEN * step:
