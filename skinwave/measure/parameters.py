@@ -20,16 +20,13 @@ from skinwave.scene.variation import varied
 from skinwave.system.plain_text import number_in
 
 GAIN, DELAY, OFFSET_X, OFFSET_Y = "gain", "delay_ms", "offset_x_mm", "offset_y_mm"
-NUISANCES = {GAIN: 1.0, DELAY: 0.0, OFFSET_X: 0.0, OFFSET_Y: 0.0}  # and where they are not fitted
+NUISANCES = (GAIN, DELAY, OFFSET_X, OFFSET_Y)  # of a measurement, no keys of a scene
 PRESSURE, FORCE = "focus.peak_pressure_pa", "load.force_n"  # which linear waves go with
 Values = Mapping[str, float]
 OPERATORS: dict[type, Callable[[float, float], float]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
     ast.Pow: math.pow,
 }  # fmt: skip
-FUNCTIONS: dict[str, Callable[[float], float]] = {
-    name: getattr(math, name) for name in ("sqrt", "exp", "log", "log10", "sin", "cos", "tan")
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,7 +142,7 @@ def _tied(values: Values, ties: Mapping[str, str]) -> dict[str, float]:
 
 
 def _evaluated(node: ast.AST, numbers: Values) -> float:
-    """Value of an expression of numbers, names, + - * / **, and functions of `FUNCTIONS`."""
+    """Value of an expression of numbers, names, + - * / and **."""
     match node:
         case ast.Constant(value=int() | float() as value):
             return value
@@ -155,8 +152,6 @@ def _evaluated(node: ast.AST, numbers: Values) -> float:
             return OPERATORS[type(op)](_evaluated(left, numbers), _evaluated(right, numbers))
         case ast.UnaryOp(op=ast.USub(), operand=operand):
             return -_evaluated(operand, numbers)
-        case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]):
-            return FUNCTIONS[name](_evaluated(argument, numbers))
     raise ValueError
 
 

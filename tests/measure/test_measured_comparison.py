@@ -317,7 +317,7 @@ def test_the_command_puts_the_measurement_beside_the_models(compared, capsys):
     assert 0 <= float(of_am[0]["p_adjusted"]) <= 1
     page = (out / "index.html").read_text("utf-8")
     assert page.index("Beside the measurement") < page.index("What propagation changes")
-    assert (out / "figures" / "measured.png").stat().st_size > 10_000
+    assert (out / "pictures" / "measured.png").stat().st_size > 10_000
     assert "M1," in (out / "measured-claims.csv").read_text("utf-8")
     kept = json.loads((out / "record.json").read_text("utf-8"))
     assert kept["command"]["options"]["measured"] == str((folder / "record.npz").resolve())
