@@ -30,7 +30,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import binomtest
 
@@ -38,18 +37,18 @@ from simple_model import DRIVES, DriveLaw, Response
 from simple_model.load.spectrum import load_lines, synthesise
 from simple_model.plates.modes import PlateModes, modal_motion, plate_modes
 from simple_model.plates.path_forces import modal_path_forces
-from simple_model.quantities import quantity
 from skinwave.models.plate_modes import plate_of, relative_modulus
 from skinwave.results.claims import BOTH, CLAIMS, MUCH_LOWER, NEEDED, rival_levels, strongest_rival
 from skinwave.results.run import Run
+from skinwave.scene.distributions import uniform
 from skinwave.scene.file import dumps, from_table
 from skinwave.scene.paper15 import tactons
 from skinwave.scene.scene import Scene
-from skinwave.scene.variation import Variation, combinations
+from skinwave.scene.variation import Choice, combinations
+from skinwave.system.plain_text import number_in
 
 Floats = NDArray[np.float64]
-Candidate = Mapping[str, Any]
-Row = Mapping[str, Any]
+Row = Mapping[str, Any]  # of a candidate: its parameters, and what was found
 
 COMPRESSION = 0.25  # of the pressure at small drive over that at full drive, less 1
 SIDES = {"A3": (420, 297), "A4": (297, 210), "A5": (210, 148), "A6": (148, 105)}  # mm
@@ -76,7 +75,6 @@ PARAMETERS: dict[str, tuple[Any, ...]] = {
 DENSITY, POISSON = 780.0, 0.3  # kg/m3 of office paper; nu_xy
 CLIP_RADIUS = 0.005  # m
 KEPT_CLEAR = 0.030  # m between the middle of the path and an edge
-
 CLAIMED = ("M1", "M2", "M3", "M4", "M5")
 # M4 of a paper sheet adds velocity to displacement; S4 asks the same of the quantity that is read.
 ASSESSED_AS = {"M4": "S4"}
@@ -85,11 +83,9 @@ RESOLVED = 430.0  # Hz: 2 f_AM, 2 f_d and their neighbours are below it
 COARSEST = 170.0  # rad/m: of the focal spot
 TIMES = np.arange(2500) / 2500.0  # s: lines up to 1250 Hz, for 1 s
 ACROSS = 41  # places along each side where the sag is evaluated
-
 PLAUSIBLE = 10.0  # thicknesses, about 1 mm, by which a sheet that was measured may sag
 SHEETS = 3  # scene files of the nearest ones
 BINS, SHUFFLES = 5, 40  # of a number; of the information that few rows show by chance
-TABLE = "candidates.csv"
 
 
 def clipped(amplitude: Floats | float, modulation: Floats, depth: float) -> Floats:
@@ -111,10 +107,10 @@ for law in (clipped, compressed):
     DRIVES.setdefault(law.__name__, DriveLaw(name=law.__name__, pressure=law))
 
 
-def hypercube(samples: int, seed: int = 0) -> list[Candidate]:
+def hypercube(samples: int, seed: int = 0) -> list[Row]:
     """Candidates of a Latin hypercube, the same for the same seed."""
     varied = [
-        Variation(key=key, values=of) if _is_words(key) else Variation(key=key, bounds=of)
+        Choice(key=key, values=of) if _is_words(key) else uniform(key, *of)
         for key, of in PARAMETERS.items()
     ]
     return list(combinations(varied, "lhs", samples, seed))
@@ -124,7 +120,7 @@ def _is_words(key: str) -> bool:
     return isinstance(PARAMETERS[key][0], str)
 
 
-def scene_of(candidate: Candidate) -> Scene:
+def scene_of(candidate: Row) -> Scene:
     """Scene of a candidate under AM of 140 Hz on the circle of 20 mm."""
     x, y = SIDES.get(candidate["size"], (candidate["side_mm"],) * 2)
     thickness = candidate["grammage_g_m2"] / DENSITY  # mm
@@ -155,7 +151,7 @@ def scene_of(candidate: Candidate) -> Scene:
     return from_table(table)
 
 
-def _mounting(candidate: Candidate, x: float, y: float) -> dict[str, Any]:
+def _mounting(candidate: Row, x: float, y: float) -> dict[str, Any]:
     """Edges, tension and clips of a sheet with sides in mm."""
     support = candidate["support"]
     along = ["left", "right"] if support in ("clamped", "simply", "two_edges") else []
@@ -173,7 +169,7 @@ def _mounting(candidate: Candidate, x: float, y: float) -> dict[str, Any]:
     return found | {"clips_mm": corners, "clip_radius_mm": radius}
 
 
-def assess(candidate: Candidate) -> dict[str, Any]:
+def assess(candidate: Row) -> dict[str, Any]:
     """Row of a candidate: its values, its first mode and sag, and whether and by which number each
     claim holds.
     """
@@ -182,12 +178,11 @@ def assess(candidate: Candidate) -> dict[str, Any]:
     inertia = plate.mass_per_area * (2 * np.pi * RESOLVED) ** 2
     finest = [max(FINEST * (inertia / d) ** 0.25, COARSEST) for d in (plate.d11, plate.d22)]
     modes = plate_modes(plate, finest)
-    forces = {name: each for name, *each in _forces(scene, modes)}
-    runs = [_run(scene, modes, name, *each) for name, each in forces.items()]
-    means = np.array([own[f == 0].sum(axis=0).real for f, own in forces.values()])
+    runs, means = zip(*_runs(scene, modes), strict=True)
     row = dict(candidate)
-    row["first_mode_hz"] = float(modes.frequencies[0])
-    row["sag_over_thickness"] = _sag(modes, means) / scene.body.depth
+    x, y = (np.linspace(-side / 2, side / 2, ACROSS) for side in (plate.size_x, plate.size_y))
+    sag = modes.on_grid(x, y) @ (np.array(means) / modes.squared).T
+    row["sag_over_thickness"] = float(np.abs(sag).max()) / scene.body.depth
     for claim in CLAIMED:
         row[f"{claim}_holds"], row[f"{claim}_value"] = claim_of(claim, runs)
     both = [run for run in runs if (run.is_am, run.is_stm) == BOTH]
@@ -195,29 +190,27 @@ def assess(candidate: Candidate) -> dict[str, Any]:
     return row
 
 
-def _forces(scene: Scene, modes: PlateModes) -> Iterator[tuple[str, Floats, NDArray[Any]]]:
-    """Name, frequencies (f,) in Hz and modal forces (f, m) of each Tacton."""
+def _runs(scene: Scene, modes: PlateModes) -> Iterator[tuple[Run, Floats]]:
+    """Steady state of each Tacton, of the quantity that the vibrometer reads, and the modal forces
+    (m,) of its mean.
+    """
+    asked, offset = scene.reading.asked, scene.body.placement.offset
+    shapes = modes.at(scene.probe_points - offset)
     paths: dict[Any, NDArray[Any]] = {}  # Tactons on one path share its forces
     for name, tacton in tactons():
-        load, path = replace(scene.pressure, tacton=tacton), tacton.trajectory
+        own = replace(scene, pressure=replace(scene.pressure, tacton=tacton))
+        path = tacton.trajectory
         if path not in paths:
-            paths[path] = modal_path_forces(modes, load, scene.body.placement.offset)
-        f, forces = load_lines(load).gather(paths[path])
-        below = f < 0.5 / TIMES[1]
-        yield name, f[below], forces[below]
-
-
-def _run(scene: Scene, modes: PlateModes, name: str, f: Floats, forces: NDArray[Any]) -> Run:
-    """Steady state of a Tacton, of the quantity that the vibrometer reads."""
-    shapes = modes.at(scene.probe_points - scene.body.placement.offset)
-    u = modal_motion(modes, f, forces, partial(relative_modulus, scene.body)) @ shapes.T
-    read = scene.reading.asked.name
-    values = synthesise(f, quantity(read).factor(2j * np.pi * f)[:, None] * u, TIMES)
-    own = replace(scene, pressure=replace(scene.pressure, tacton=dict(tactons())[name]))
-    response = Response(
-        model="plate-modes", times=TIMES, probes=scene.probe_points, values=values, quantity=read
-    )
-    return Run(tacton=name, body="sheet", scene=own, response=response)
+            paths[path] = modal_path_forces(modes, own.pressure, offset)
+        f, forces = load_lines(own.pressure).gather(paths[path])
+        f, forces = f[f < 0.5 / TIMES[1]], forces[f < 0.5 / TIMES[1]]
+        u = modal_motion(modes, f, forces, partial(relative_modulus, scene.body)) @ shapes.T
+        response = Response(
+            model="plate-modes", times=TIMES, probes=scene.probe_points, quantity=asked.name,
+            values=synthesise(f, asked.factor(2j * np.pi * f)[:, None] * u, TIMES),
+        )  # fmt: skip
+        mean = forces[f == 0].sum(axis=0).real
+        yield Run(tacton=name, body="sheet", scene=own, response=response), mean
 
 
 def claim_of(claim: str, runs: Sequence[Run]) -> tuple[int, float | None]:
@@ -234,14 +227,7 @@ def claim_of(claim: str, runs: Sequence[Run]) -> tuple[int, float | None]:
     return int(holds), float(value) if isfinite(value) else None
 
 
-def _sag(modes: PlateModes, means: Floats) -> float:
-    """Largest static deflection in metre, anywhere on the sheet, of modal forces (t, m)."""
-    x, y = (np.linspace(-side / 2, side / 2, ACROSS)
-            for side in (modes.plate.size_x, modes.plate.size_y))  # fmt: skip
-    return float(np.abs(modes.on_grid(x, y) @ (means / modes.squared).T).max())
-
-
-def fill(path: Path, candidates: Sequence[Candidate], workers: int = 1) -> list[Row]:
+def fill(path: Path, candidates: Sequence[Row], workers: int = 1) -> list[Row]:
     """Rows of all candidates; those that the table has are read, the others appended to it.
 
     Raises a ValueError if the table is of other candidates.
@@ -250,8 +236,10 @@ def fill(path: Path, candidates: Sequence[Candidate], workers: int = 1) -> list[
     pairs = zip(there, candidates, strict=False)
     if not all(row[key] == own[key] for row, own in pairs for key in PARAMETERS):
         raise ValueError(f"{path} has other --samples or --seed; choose another -o")
-    with path.open("a", newline="", encoding="utf-8") as file:
-        for k, row in enumerate(_assessed(candidates[len(there) :], workers), len(there)):
+    os.environ |= {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}  # of each process
+    with path.open("a", newline="", encoding="utf-8") as file, ProcessPoolExecutor(workers) as pool:
+        compute = pool.map if workers > 1 else map
+        for k, row in enumerate(compute(assess, candidates[len(there) :]), len(there)):
             writer = csv.DictWriter(file, row)
             if k == 0:
                 writer.writeheader()
@@ -260,26 +248,15 @@ def fill(path: Path, candidates: Sequence[Candidate], workers: int = 1) -> list[
     return read_rows(path)
 
 
-def _assessed(candidates: Sequence[Candidate], workers: int) -> Iterator[dict[str, Any]]:
-    if workers == 1:
-        yield from map(assess, candidates)
-        return
-    os.environ |= {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}  # of each process
-    with ProcessPoolExecutor(workers) as pool:
-        yield from pool.map(assess, candidates)
-
-
 def read_rows(path: Path) -> list[Row]:
     """Rows of a table, numbers as numbers and nan where there is none."""
     with path.open(newline="", encoding="utf-8") as file:
-        return [{key: _cell(key, text) for key, text in row.items()}
-                for row in csv.DictReader(file)]  # fmt: skip
+        return [{key: _cell(text) for key, text in row.items()} for row in csv.DictReader(file)]
 
 
-def _cell(key: str, text: str) -> Any:
-    if key == "rival_line" or (key in PARAMETERS and _is_words(key)):
-        return text
-    return float(text) if text else float("nan")
+def _cell(text: str) -> Any:
+    number = number_in(text or "nan")
+    return text if number is None else number
 
 
 def holds(rows: Sequence[Row], *claims: str) -> NDArray[np.bool_]:
@@ -299,23 +276,19 @@ def information(rows: Sequence[Row], mask: NDArray[np.bool_]) -> dict[str, float
     """Part of the entropy of a mask (r,) that each parameter takes away, less what chance does,
     largest first.
     """
-    rng, entropy = np.random.default_rng(0), _entropy(mask)
+    rng, entropy, found = np.random.default_rng(0), _entropy(mask), {}
     shuffled = [rng.permutation(mask) for _ in range(SHUFFLES)]
-    found = {}
-    for key in PARAMETERS:
-        bins = _binned(rows, key)
+    for key, of in PARAMETERS.items():
+        values = [row[key] for row in rows]
+        if _is_words(key):
+            bins = np.array([of.index(value) for value in values])
+        else:
+            share = (np.array(values) - of[0]) / (of[1] - of[0])
+            bins = np.clip((BINS * share).astype(int), 0, BINS - 1)
         gain, *by_chance = (entropy - _entropy(each, bins) for each in (mask, *shuffled))
         told = gain - float(np.mean(by_chance)) if gain > max(by_chance) else 0.0
         found[key] = told / entropy if entropy else 0.0
     return dict(sorted(found.items(), key=lambda each: -each[1]))
-
-
-def _binned(rows: Sequence[Row], key: str) -> NDArray[np.int_]:
-    values = [row[key] for row in rows]
-    if _is_words(key):
-        return np.array([PARAMETERS[key].index(value) for value in values])
-    low, high = PARAMETERS[key]
-    return np.clip((BINS * (np.array(values) - low) / (high - low)).astype(int), 0, BINS - 1)
 
 
 def _entropy(mask: NDArray[np.bool_], bins: NDArray[np.int_] | None = None) -> float:
@@ -331,13 +304,10 @@ def nearest(rows: Sequence[Row]) -> list[Row]:
     """Plausible sheets, those first that show the most of M1 to M3, and of these those that come
     nearest to what M4 and M5 ask.
     """
-
-    def shortfall(row: Row) -> tuple[float, float]:
-        beyond = max(row["M4_value"], row["M5_value"] - MUCH_LOWER)
-        return -sum(row[f"{claim}_holds"] for claim in CLAIMED[:3]), beyond
-
-    plausible = [row for row in rows if row["sag_over_thickness"] < PLAUSIBLE]
-    return sorted((r for r in plausible if isfinite(r["M5_value"])), key=shortfall)
+    plausible = [r for r in rows if r["sag_over_thickness"] < PLAUSIBLE and isfinite(r["M5_value"])]
+    shown = [-sum(row[f"{claim}_holds"] for claim in CLAIMED[:3]) for row in plausible]
+    beyond = [max(row["M4_value"], row["M5_value"] - MUCH_LOWER) for row in plausible]
+    return [plausible[k] for k in np.lexsort((beyond, shown))]
 
 
 def findings(rows: Sequence[Row]) -> str:
@@ -360,20 +330,6 @@ def findings(rows: Sequence[Row]) -> str:
     return "\n".join(lines)
 
 
-def draw(rows: Sequence[Row], figure: Figure) -> None:
-    """Distribution of the levels that M4 and M5 are about."""
-    ax = figure.subplots()
-    part = 100 * np.arange(1, len(rows) + 1) / len(rows)
-    for column, words, bar, colour in (
-        ("M4_value", "strongest rival of f_AM", 0.0, "#0072B2"),
-        ("M5_value", "strongest multiple of f_AM or f_d", MUCH_LOWER, "#D55E00"),
-    ):
-        ax.step(np.sort([row[column] for row in rows]), part, where="post", label=words, c=colour)
-        ax.axvline(bar, color=colour, ls=":", label=f"{column[:2]} holds below {bar:g} dB")
-    ax.set(xlabel="level, dB re f_AM", ylabel="candidates below it, %", xlim=(-30, 60))
-    ax.legend(frameon=False)
-
-
 def main() -> None:
     """Compute the candidates that are missing, and say what the table shows."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -384,13 +340,10 @@ def main() -> None:
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     candidates = hypercube(options.samples, options.seed)
-    rows = fill(options.out / TABLE, candidates, options.workers)
+    rows = fill(options.out / "candidates.csv", candidates, options.workers)
     print(findings(rows))
     for k, row in enumerate(nearest(rows)[:SHEETS], 1):
         (options.out / f"sheet-{k}.toml").write_text(dumps(scene_of(row)), encoding="utf-8")
-    figure = Figure(figsize=(7, 4), layout="constrained")
-    draw(rows, figure)
-    figure.savefig(options.out / "levels.png", dpi=150)
 
 
 if __name__ == "__main__":

@@ -20,8 +20,8 @@ if TYPE_CHECKING:  # what readers of types and editors see of the names below
     from skinwave.results.citations import cite
     from skinwave.results.comparison import Agreement, compare
     from skinwave.scene.file import dumps, loads, read
+    from skinwave.scene.load import SupportMotion
     from skinwave.scene.scene import BODIES, Body, Load, Scene, Sides
-    from skinwave.scene.support_motion import SupportMotion
     from skinwave.sweeps.best import Best
     from skinwave.sweeps.in_python import SweepTable, best_value, sweep
     from skinwave.system.effort import SkinwaveWarning
@@ -37,7 +37,7 @@ _HOMES = {
     "dumps": "scene.file",
     "simulate": "planning.simulate",
     "SkinwaveWarning": "system.effort",
-    "SupportMotion": "scene.support_motion",
+    "SupportMotion": "scene.load",
     "Plan": "planning.rows",
     "Field": "report.fields",
     "field": "report.fields",

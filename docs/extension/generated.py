@@ -101,7 +101,7 @@ def scene_keys() -> str:
     from skinwave import Body, Load, Scene
     from skinwave.bodies import Layer, Mounting, Phalanx, Placement, Relief
     from skinwave.scene import keys as scene_keys
-    from skinwave.scene.support_motion import SupportMotion
+    from skinwave.scene.load import SupportMotion
 
     sections = scene_keys.SECTIONS
     records: dict[str, list[type]] = {

@@ -15,7 +15,7 @@ from simple_model import MovingPressure, Tacton
 from skinwave import Body, Scene, simulate
 from skinwave.measure import Measurement
 from skinwave.measure.fit import fit
-from skinwave.scene.variation import varied
+from skinwave.scene.variation import with_values
 
 places = tuple((1e-3 * x, 0.0) for x in (0, 4, 8, 12, 16))  # m
 load = MovingPressure(tacton=Tacton(am_frequency=120, duration=0.2))
@@ -31,7 +31,7 @@ measured = Measurement(
 
 # %%
 key = "body.material.shear_modulus_pa"
-start = varied(scene, {key: 40e3})
+start = with_values(scene, {key: 40e3})
 found = fit(start, measured, [f"{key}=10e3:60e3", "gain=0.1:10"], kind="lines",
             model="flat-body-harmonic", starts=3)  # fmt: skip
 

@@ -1,8 +1,7 @@
-"""Options, progress and closing line that commands share."""
+"""Options, progress, result folder and closing line that commands share."""
 
 import argparse
 import json
-import re
 import sys
 import warnings
 from collections.abc import Iterable, Iterator
@@ -20,21 +19,19 @@ if TYPE_CHECKING:
     from skinwave.scene.scene import Scene
     from skinwave.system.effort import Progress
 
-TOLERANCE = "relative error of waveforms"
 
-
-def add_output(parser: argparse.ArgumentParser) -> None:
+def add_output(
+    parser: argparse.ArgumentParser, metavar: str = "DIR", what: str = "folder to write"
+) -> None:
     """Options of output: where and how results are written."""
-    parser.add_argument("-o", "--out", type=Path, metavar="DIR", help="folder to write")
-    parser.add_argument(
-        "--overwrite", action="store_true", help="replace a folder that skinwave wrote"
-    )
-    parser.add_argument("--quiet", action="store_true", help="no progress, no summary")
+    parser.add_argument("-o", "--out", type=Path, metavar=metavar, help=what)
+    parser.add_argument("--overwrite", action="store_true", help="replace what skinwave wrote")
     add_reporting(parser)
 
 
 def add_reporting(parser: argparse.ArgumentParser) -> None:
     """Options of reporting."""
+    parser.add_argument("--quiet", action="store_true", help="no progress, no summary")
     parser.add_argument("--json", action="store_true", help="summary as JSON")
     parser.add_argument("--debug", action="store_true", help="traceback of an error")
 
@@ -42,6 +39,15 @@ def add_reporting(parser: argparse.ArgumentParser) -> None:
 def add_scene(parser: argparse.ArgumentParser) -> None:
     """The scene file."""
     parser.add_argument("scene", type=Path, metavar="SCENE", help="scene file (TOML)")
+
+
+def add_scenes(parser: argparse.ArgumentParser, without: str) -> None:
+    """Scene files of a live page; without any it has other bodies."""
+    parser.add_argument(
+        "scenes", nargs="*", type=Path, metavar="SCENE",
+        help="scene files (TOML) whose bodies and Tactons the page has; without any, the bodies "
+        f"{without}",
+    )  # fmt: skip
 
 
 def add_width(parser: argparse.ArgumentParser) -> None:
@@ -64,11 +70,14 @@ def add_size(parser: argparse.ArgumentParser, **how: Any) -> None:
     parser.add_argument("--element-size", dest="h", type=float, metavar="MM", **how)
 
 
-def add_model(parser: argparse.ArgumentParser) -> None:
+def add_model(parser: argparse.ArgumentParser, *, has_steps: bool = True) -> None:
     """Options of the model: its name, its tolerance and its time step."""
     parser.add_argument("--model", choices=("auto", *names()), default="auto")
-    parser.add_argument("--tolerance", type=float, default=0.05, help=TOLERANCE)
-    parser.add_argument("--dt", type=float, metavar="S", help="time step of transient models, s")
+    help_ = "relative error of waveforms"
+    parser.add_argument("--tolerance", type=float, default=0.05, help=help_)
+    if has_steps:
+        help_ = "time step of transient models, s"
+        parser.add_argument("--dt", type=float, metavar="S", help=help_)
 
 
 def required_plan(options: argparse.Namespace, scene: "Scene", **more: Any) -> "Plan":
@@ -102,9 +111,6 @@ def told(response: "Response") -> dict[str, Any]:
     }
 
 
-SPREAD = re.compile(r"value\s*=")  # without which a scene file has none
-
-
 def note_central_values(options: argparse.Namespace) -> None:
     """Say once that a command takes the central values of a scene's uncertain numbers, if it does.
 
@@ -116,14 +122,42 @@ def note_central_values(options: argparse.Namespace) -> None:
         return
     if getattr(options, "quiet", False):
         return
-    from skinwave.scene.file import content, read
+    from skinwave.scene.file import read
 
     with warnings.catch_warnings(), suppress(ValueError):
         warnings.simplefilter("ignore")
-        if SPREAD.search(content(path)) and (spreads := read(path).spreads):
+        if spreads := read(path).spreads:
             keys = ", ".join(key for key, _ in spreads)
             say(f"skinwave: central values are taken of {keys}; skinwave run --samples takes their "
                 "spread", sys.stderr)  # fmt: skip
+
+
+@contextmanager
+def result_folder(
+    options: argparse.Namespace,
+    default: str,
+    inputs: Iterable[str | Path] = (),
+    scene: "Scene | None" = None,
+) -> "Iterator[tuple[Path, Progress]]":
+    """Folder of a result, and where progress goes: that of --out or else the default, with its
+    record, put in place when all is written.
+    """
+    from skinwave.results import record
+    from skinwave.results.outputs import output_folder
+
+    options.out = options.out or Path(default)
+    with (
+        output_folder(options.out, overwrite=options.overwrite, inputs=inputs) as folder,
+        progress_of(options) as progress,
+    ):
+        yield folder, progress
+        record.write(folder, record.of_command(options), scene=scene)
+
+
+def closing(options: argparse.Namespace, sentences: list[str], **summary: Any) -> None:
+    """The closing lines of a result folder: its sentences, and the page to open."""
+    summary = {"out": str(options.out), "sentences": sentences} | summary
+    summarise(options, summary, "\n".join([*sentences, f"open {options.out}/index.html"]))
 
 
 def summarise(options: argparse.Namespace, summary: dict[str, Any], sentence: str) -> None:
@@ -144,10 +178,7 @@ def progress_of(options: argparse.Namespace) -> "Iterator[Progress]":
     """A bar with the step named and the time left; on a pipe a line per step; nothing if not
     wanted.
     """
-    if options.quiet or options.json:
-        yield lambda phase, fraction: None
-        return
-    from skinwave.system.progress_bar import bar
+    from skinwave.system.progress_bar import reported
 
-    with bar() as shown:
+    with reported(not (options.quiet or options.json)) as shown:
         yield shown

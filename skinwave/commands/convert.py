@@ -24,7 +24,6 @@ def options(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--resize", type=float, default=1.0, metavar="FACTOR", help="of the path")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
-    parser.add_argument("--quiet", action="store_true", help="no summary")
     add_reporting(parser)
 
 

@@ -3,27 +3,19 @@
 import argparse
 from pathlib import Path
 
-from skinwave.commands.common import add_reporting, progress_of, summarise
+from skinwave.commands.common import add_output, add_scenes, progress_of, summarise
 
 OUT = Path("live.html")
 
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
-    parser.add_argument(
-        "scenes", nargs="*", type=Path, metavar="SCENE",
-        help="scene files (TOML) whose bodies and Tactons the page has; without any, the bodies "
-        "skin-slab, paper-sheet and palm",
-    )  # fmt: skip
-    parser.add_argument(
-        "-o", "--out", type=Path, default=OUT, metavar="FILE", help=f"(default: {OUT})"
-    )
-    parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
+    add_scenes(parser, "skin-slab, paper-sheet and palm")
     parser.add_argument(
         "--no-selftest", action="store_true", help="leave out the data of live.html#selftest"
     )
-    parser.add_argument("--quiet", action="store_true", help="no progress, no summary")
-    add_reporting(parser)
+    add_output(parser, "FILE", f"(default: {OUT})")
+    parser.set_defaults(out=OUT)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from skinwave.commands.common import add_reporting, add_size, progress_of, summarise
+from skinwave.commands.common import add_output, add_size, progress_of, summarise
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -32,10 +32,7 @@ def options(parser: argparse.ArgumentParser) -> None:
     )
     add_size(parser, default=4.0, help="element size, mm (4)")
     parser.add_argument("--timeout", type=float, default=600.0, metavar="S", help="of the mesher")
-    parser.add_argument("-o", "--out", type=Path, metavar="FILE.vtu", help="file to write")
-    parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
-    parser.add_argument("--quiet", action="store_true", help="no progress, no summary")
-    add_reporting(parser)
+    add_output(parser, "FILE.vtu", "file to write")
 
 
 def run(options: argparse.Namespace) -> int:

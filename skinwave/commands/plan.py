@@ -1,8 +1,6 @@
 """Model and discretisation that a scene requires, and why."""
 
 import argparse
-import json
-from typing import TYPE_CHECKING
 
 from skinwave.commands.common import (
     add_mesh,
@@ -10,11 +8,8 @@ from skinwave.commands.common import (
     add_reporting,
     add_scene,
     required_plan,
+    summarise,
 )
-from skinwave.system.plain_text import say
-
-if TYPE_CHECKING:
-    pass
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -36,10 +31,7 @@ def run(options: argparse.Namespace) -> int:
     required = required_plan(options, scene)
     row = mesh_row(replace(scene, body=required.body), required.h, required.error)
     required = replace(required, rows=(*required.rows, row))
-    if options.json:
-        say(json.dumps(required.table()))
-        return 0
     width = [max(len(getattr(row, f)) for row in required.rows) for f in ("what", "value")]
-    for row in required.rows:
-        say(f"{row.what:<{width[0]}}  {row.value:<{width[1]}}  {row.reason}")
+    lines = (f"{r.what:<{width[0]}}  {r.value:<{width[1]}}  {r.reason}" for r in required.rows)
+    summarise(options, required.table(), "\n".join(lines))
     return 0

@@ -1,9 +1,8 @@
 """One scene, one model."""
 
 import argparse
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from skinwave.commands.common import (
     add_mesh,
@@ -28,9 +27,6 @@ def options(parser: argparse.ArgumentParser) -> None:
     add_scene(parser)
     add_model(parser)
     add_mesh(parser)
-    parser.add_argument(
-        "--scheduler", metavar="ADDRESS", help="of Dask workers that share fem-harmonic's lines"
-    )
     parser.add_argument(
         "--samples", type=int, metavar="N",
         help="samples of the scene's uncertain numbers, for bands and percentiles",
@@ -58,8 +54,8 @@ def run(options: argparse.Namespace) -> int:
     with output_folder(
         out, overwrite=options.overwrite, inputs=[options.scene, scene.body.file]
     ) as folder:
-        with progress_of(options) as progress, _mapped(options.scheduler) as mapped:
-            required = required_plan(options, scene, progress=progress, mapped=mapped)
+        with progress_of(options) as progress:
+            required = required_plan(options, scene, progress=progress)
             response = solve(scene, required)
         warn(w for w in response.effort.warnings if w not in required.warnings)
         run = Run(tacton=scene.name, body=body_name(scene.body), scene=scene, response=response)
@@ -87,17 +83,7 @@ def _uncertainty(
 
     with progress_of(options) as progress:
         return write_ensemble(
-            folder, run.scene, options.samples, run.model, progress,
+            folder, run.scene, options.samples, model=run.model, progress=progress,
             h=h or metre(options.h), solver=options.solver, seed=options.seed,
             workers=usable_cores(),
         )  # fmt: skip
-
-
-def _mapped(scheduler: str | None) -> AbstractContextManager[Any]:
-    """Map of a function over lines: here, or on the workers of a scheduler."""
-    if scheduler is None:
-        return nullcontext(map)
-    from skinwave.sweeps import engine
-
-    engine.check(scheduler)
-    return engine.mapped_on(scheduler)

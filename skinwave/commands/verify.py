@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from skinwave.commands.common import add_output, progress_of, summarise
+from skinwave.commands.common import add_output, closing, result_folder, summarise
 
 HAND = Path("examples/hand/generic-hand-right.glb")
 
@@ -43,64 +43,44 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _cases(options: argparse.Namespace) -> int:
-    from skinwave.results import record
-    from skinwave.results.outputs import output_folder
     from skinwave.verify import suite
 
     cases = [each for each in suite.CASES.values() if not (options.quick and each.slow)]
-    out = options.out or Path("verification")
-    with (
-        output_folder(out, overwrite=options.overwrite) as folder,
-        progress_of(options) as progress,
-    ):
+    with result_folder(options, "verification") as (folder, progress):
         results = suite.run_suite(cases, folder, progress, debug=options.debug)
-        record.write(folder, record.of_command(options))
     failed = [result.case.name for result in results if not result.passed]
-    summary = {
-        "out": str(out), "passed": len(results) - len(failed), "failed": len(failed),
-        "planned": len(cases), "failures": failed,
-        "seconds": round(sum(result.seconds for result in results), 1),
-    }  # fmt: skip
     broken = len(results) < len(cases)
-    state = f"interrupted after {len(results)} of {len(cases)} cases; " if broken else ""
-    summarise(options, summary, f"{state}open {out}/index.html\n{suite.summary(results)}")
+    said = [suite.summary(results)]
+    if broken:
+        said.append(f"interrupted after {len(results)} of {len(cases)} cases")
+    closing(
+        options, said, passed=len(results) - len(failed), failed=len(failed), planned=len(cases),
+        failures=failed, seconds=round(sum(result.seconds for result in results), 1),
+    )  # fmt: skip
     return 1 if failed or broken else 0
 
 
 def _published(options: argparse.Namespace) -> int:
-    from skinwave.results import record
-    from skinwave.results.outputs import output_folder
     from skinwave.verify.validation import report, validate, verdict
 
-    out = options.out or Path("validation")
     inputs = [options.hand] if options.hand else []
-    with output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
-        with progress_of(options) as progress:
-            curves, rows = validate(progress, hand=options.hand)
+    with result_folder(options, "validation", inputs) as (folder, progress):
+        curves, rows = validate(progress, hand=options.hand)
         report(curves, rows).write(folder)
-        record.write(folder, record.of_command(options))
-    sentences = verdict(rows)
-    summary = {"out": str(out), "sentences": sentences}
-    summarise(options, summary, "\n".join([*sentences, f"open {out}/index.html"]))
+    closing(options, verdict(rows))
     return 0
 
 
 def _tradeoff(options: argparse.Namespace) -> int:
-    from skinwave.results import record
-    from skinwave.results.outputs import output_folder
     from skinwave.scene.file import read
     from skinwave.studies.tradeoff import sentences, study, write
 
-    scene = read(options.scene)
-    out = options.out or Path(f"{options.scene.stem}-tradeoff")
+    scene, name = read(options.scene), f"{options.scene.stem}-tradeoff"
     inputs = [options.scene, scene.body.file]
-    with output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
-        with progress_of(options) as progress:
-            found = study(scene, progress)
+    with result_folder(options, name, inputs, scene) as (folder, progress):
+        found = study(scene, progress)
         write(folder, scene, found)
-        record.write(folder, record.of_command(options), scene=scene)
-    summary = {"out": str(out), "accepted": found.accepted, "sentences": sentences(found)}
-    summarise(options, summary, "\n".join([*sentences(found), f"open {out}/index.html"]))
+    closing(options, sentences(found), accepted=found.accepted)
     return 0
 
 
@@ -108,6 +88,5 @@ def _installation(options: argparse.Namespace) -> int:
     from skinwave.commands.installation import examine, text
 
     found = examine()
-    rows = [{"what": f.what, "value": f.value, "cure": f.cure} for f in found]
-    summarise(options, {"findings": rows}, text(found))
+    summarise(options, {"findings": found}, text(found))
     return 0

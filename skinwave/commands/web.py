@@ -4,29 +4,26 @@ import argparse
 import os
 import sys
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 
-from skinwave.commands.common import progress_of
+from skinwave.commands.common import add_reporting, add_scenes, progress_of
 from skinwave.system.plain_text import say
 
+DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
 QUICK = ("skin-slab", "paper-sheet")  # bodies whose packs take seconds
 
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
-    parser.add_argument(
-        "scenes", nargs="*", type=Path, metavar="SCENE",
-        help="scene files (TOML) whose bodies and Tactons the page has; without any, the bodies "
-        f"{' and '.join(QUICK)}",
-    )  # fmt: skip
+    add_scenes(parser, " and ".join(QUICK))
     parser.add_argument("--port", type=int, default=8080, help="0 is any (default: 8080)")
     parser.add_argument(
         "--base-url", default="/", metavar="PATH",
         help="path under which a proxy shows the page, such as /user/name/proxy/8080/",
     )  # fmt: skip
     parser.add_argument("--no-browser", action="store_true", help="only print the address")
-    parser.add_argument("--quiet", action="store_true", help="no progress")
-    parser.add_argument("--debug", action="store_true", help="traceback of an error")
+    add_reporting(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -36,29 +33,20 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.live.data import data_of, read_scene
     from skinwave.live.serve import Server
 
-    options.json = False
     base = f"/{options.base_url.strip('/')}/" if options.base_url.strip("/") else "/"
     scenes = [read_scene(path) for path in options.scenes]
     with progress_of(options) as progress:
         data = data_of(scenes, progress, bodies=QUICK, test=False)
     with Server(data, options.port, base) as server, tempfile.TemporaryDirectory() as private:
         say(f"skinwave: {server.address} (Ctrl-C ends it)", sys.stderr)
+        has_display = sys.platform in ("win32", "darwin") or any(map(os.environ.get, DISPLAYS))
         if base != "/":
             say(f"skinwave: behind the proxy, open {base}?token={server.token}", sys.stderr)
-        elif not options.no_browser and has_display():
+        elif has_display and not options.no_browser:
             open_unseen(server.address, Path(private))
-        try:
+        with suppress(KeyboardInterrupt):
             server.serve_forever()
-        except KeyboardInterrupt:
-            return 0
     return 0
-
-
-def has_display() -> bool:
-    """Whether a browser with windows can be opened here."""
-    if sys.platform in ("win32", "darwin"):
-        return True
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def open_unseen(address: str, folder: Path) -> None:

@@ -19,12 +19,12 @@ from skinwave.measure.predicted import Target, target, with_reduction
 from skinwave.measure.search import Problem, Solution, solve
 from skinwave.models.flat_body import FLAT_BODY
 from skinwave.models.limits import takes
-from skinwave.scene.distributions import Distribution, parent_of
+from skinwave.scene.distributions import Distribution
 from skinwave.scene.file import to_table, with_distributions
-from skinwave.scene.keys import DERIVED, LOSSES, SCALES, write_material
+from skinwave.scene.keys import DERIVED, LOSSES, SCALES, value_at, write_material
 from skinwave.scene.scene import Scene
 from skinwave.scene.spreads import spreads_of
-from skinwave.scene.variation import varied
+from skinwave.scene.variation import with_values
 from skinwave.system.effort import Progress, silent
 
 STARTS = 8
@@ -59,7 +59,7 @@ class Fit:
         the preset.
         """
         scene, parameters = self.target.scene, self.solution.problem.parameters
-        changed = varied(scene, of_scene(self.values))
+        changed = with_values(scene, of_scene(self.values))
         given = dict(changed.spreads) | _of_presets(scene, changed)
         given = {key: x for key, x in given.items() if key not in parameters.ties}
         each = zip(parameters.free, self.estimates, self.intervals.half.tolist(), strict=True)
@@ -145,8 +145,8 @@ def _has_place(scene: Scene, key: str) -> bool:
     if key.partition(".")[2] in DERIVED:
         return False
     path, _, name = key.rpartition(".")
-    at = parent_of(to_table(scene), f"{path}.shear_modulus_pa" if "young_modulus" in name else key)
-    return isinstance(at[0], dict)
+    key = f"{path}.shear_modulus_pa" if "young_modulus" in name else key
+    return not name.isdecimal() and value_at(to_table(scene), key) is not None
 
 
 def _of_presets(scene: Scene, changed: Scene) -> dict[str, Distribution]:
@@ -163,8 +163,7 @@ def _of_presets(scene: Scene, changed: Scene) -> dict[str, Distribution]:
 
 def _scaled_keys(table: Mapping[str, Any], place: str, scale: str) -> Iterator[str]:
     """Dotted keys of the numbers of a preset that are moduli, or that are losses."""
-    parent, last = parent_of(table, place)
-    plain = solid_of(parent[last])
+    plain = solid_of(value_at(table, place))
     with_loss = set(_changed(write_material(plain), write_material(plain.scaled(loss=2.0)), place))
     stiff = _changed(write_material(plain), write_material(plain.scaled(modulus=2.0)), place)
     yield from with_loss if scale == LOSSES else (key for key in stiff if key not in with_loss)

@@ -16,7 +16,7 @@ import numpy as np
 from simple_model.typing import Floats
 from skinwave.scene import variation
 from skinwave.scene.scene import Scene
-from skinwave.scene.variation import varied
+from skinwave.scene.variation import with_values
 from skinwave.system.plain_text import number_in
 
 GAIN, DELAY, OFFSET_X, OFFSET_Y = "gain", "delay_ms", "offset_x_mm", "offset_y_mm"
@@ -167,6 +167,6 @@ def check(scene: Scene, parameters: Parameters) -> None:
         for end, limit in ((0.0, each.low), (1.0, each.high)):
             at = np.where(np.arange(len(middle)) == k, end, middle)
             try:
-                varied(scene, of_scene(parameters.values(at)))
+                with_values(scene, of_scene(parameters.values(at)))
             except ValueError as error:
                 raise ValueError(f"--vary {each.key} at {limit:g}: {error}") from None

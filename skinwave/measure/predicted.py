@@ -38,7 +38,7 @@ from skinwave.models.options import SolveOptions, sample_times
 from skinwave.models.parametric import ParametricBody
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import SAMPLE_RATE, Scene
-from skinwave.scene.variation import varied
+from skinwave.scene.variation import with_values
 from skinwave.system.effort import Progress
 
 Predict = Callable[[Values], np.ndarray]
@@ -84,7 +84,7 @@ class Target:
 
     def varied(self, values: Values) -> Scene:
         """The scene at values of its keys, its probes at the places with their offset."""
-        changed = varied(self.scene, of_scene(values)) if of_scene(values) else self.scene
+        changed = with_values(self.scene, of_scene(values)) if of_scene(values) else self.scene
         offset = np.array([values.get(OFFSET_X, 0.0), values.get(OFFSET_Y, 0.0)]) / 1e3
         places = [(float(x), float(y)) for x, y in self.places + offset]
         return replace(changed, probes=tuple(places), depth=0.0, quantity=self.quantity.name)

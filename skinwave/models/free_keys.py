@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from math import inf, isfinite, log
-from typing import Any
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from skinwave.bodies.parts import solid_of
 from skinwave.bodies.sheet import refuse_open_air
 from skinwave.bodies.supports import FRAME
 from skinwave.models.laws import check_laws
-from skinwave.scene.keys import MATERIAL, MODULI, PRONY, SCALES, SECTIONS, with_key, write_material
+from skinwave.scene.keys import MATERIAL, MODULI, PRONY, SCALES, SECTIONS, changed, write_material
 from skinwave.scene.scene import Scene
 
 THICKNESS = ("thickness_mm",)  # path of a key
@@ -244,24 +243,11 @@ def _with_numbers(
     table = write_material(solid)
     for key in keys:
         if not key.is_scale:
-            table = _changed(table, key.path, _value(key, values))
+            table = changed(table, key.path, _value(key, values))
     if not all(key.is_scale for key in keys):
         solid = SECTIONS["body"]["material"].read("material", table)
     factors = {SCALES[key.path[0]]: _value(key, values) for key in keys if key.is_scale}
     return solid.scaled(**factors) if factors else solid
-
-
-def _changed(table: Any, path: Sequence[str], value: float) -> Any:
-    """A copy of a table, or list, with another number where a path leads to."""
-    if not path:
-        return value
-    head, rest = path[0], path[1:]
-    if isinstance(table, list):
-        if not int(head) < len(table):
-            raise ValueError(f"there is no Prony term {head} in {len(table)}; count from 0")
-        k = int(head)
-        return [*table[:k], _changed(table[k], rest, value), *table[k + 1 :]]
-    return with_key(table, head, _changed(table.get(head, []), rest, value))
 
 
 def _with_material(body: Body, part: Part, solid: Material) -> Body:

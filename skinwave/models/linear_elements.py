@@ -46,8 +46,8 @@ from skinwave.models.meshed import (
 )
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import answer, prepare, reduction_tolerance
+from skinwave.scene.load import SupportMotion
 from skinwave.scene.scene import Scene
-from skinwave.scene.support_motion import SupportMotion
 from skinwave.system.effort import Clock, Progress
 
 REDUCTION = (

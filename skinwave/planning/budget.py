@@ -26,8 +26,10 @@ from skinwave.models.plate_modes import MODES
 from skinwave.models.plate_modes import steady_lines as steady_lines_of_plate
 from skinwave.planning.refinement import CONTROLLER, element_sizes
 from skinwave.planning.rows import PlanRow
+from skinwave.scene.distributions import Spread
 from skinwave.scene.scene import Scene
-from skinwave.scene.spreads import PRESSURE, Spread, spreads_of, with_values
+from skinwave.scene.spreads import PRESSURE, spreads_of
+from skinwave.scene.variation import with_values
 
 SIGMA = (0.15865525393145707, 0.8413447460685429)  # quantiles a standard deviation either way
 FAINT = 1e-3  # of the load's strongest line: lines that no budget needs

@@ -16,8 +16,22 @@ from simple_model.choices import choose
 from simple_model.load.trajectory import BY_POINTS
 from skinwave.bodies import BodyKind
 from skinwave.bodies.parts import check_material
-from skinwave.scene.distributions import Distribution, parent_of, with_spreads, without_spreads
-from skinwave.scene.keys import DERIVED, PATH, SECTIONS, as_table, as_text, checked
+from skinwave.scene.distributions import (
+    VALUE,
+    Distribution,
+    read_distribution,
+    written_distribution,
+)
+from skinwave.scene.keys import (
+    DERIVED,
+    PATH,
+    SECTIONS,
+    as_table,
+    as_text,
+    changed,
+    checked,
+    value_at,
+)
 from skinwave.scene.load import Load
 from skinwave.scene.material_file import with_tables
 from skinwave.scene.scene import BODIES, KINDS, Body, Placement, Scene, kind_of, solid_of
@@ -25,6 +39,7 @@ from skinwave.system.plain_text import as_utf_8
 
 LARGEST = 16_000_000  # bytes of a file: some seconds of a path recorded at 40 kHz
 PAIRS = re.compile(r"\[\s+(-?\d[\d.e+-]*),\s+(-?\d[\d.e+-]*),\s+\]")  # on lines of their own
+CURE = "write key = value, each key once, with texts in closed quotes and numbers as 0.5"
 PATHS = "write a Windows path in single quotes, 'C:\\hand.stl', or with /, \"C:/hand.stl\""
 
 
@@ -64,11 +79,6 @@ def loads(text: str) -> Scene:
 def parsed(text: str, folder: Path | None = None) -> dict[str, Any]:
     """The table of a scene's TOML text; with a folder, with the numbers of tables of moduli that
     are named from there.
-
-    Raises
-    ------
-    ValueError
-        If it is not valid TOML, or a table cannot be read.
     """
     try:
         table = tomllib.loads(text)
@@ -88,16 +98,7 @@ def _not_toml(text: str, error: str) -> str:
     if "Illegal character '\\n'" in error and k > 1:  # found where the next line begins
         k -= not lines[k - 1].count('"') % 2
     line = lines[k - 1].strip()
-    if "\\" in line:
-        cure = PATHS
-    elif "twice" in error or "Cannot" in error:
-        cure = "its section or key is there already; leave out one"
-    elif line.count('"') % 2 or line.count("'") % 2:
-        cure = "close the quotes"
-    else:
-        cure = (
-            "write key = value, a text in quotes, a number as 0.5 without its unit, true or false"
-        )
+    cure = PATHS if "\\" in line else CURE
     return f"not valid TOML: line {k} is {line[:60]}; {cure}"
 
 
@@ -136,17 +137,11 @@ def from_table(table: dict[str, Any]) -> Scene:
 
 
 def with_distributions(scene: Scene, spreads: Mapping[str, Distribution]) -> Scene:
-    """The scene with these distributions of its numbers, by dotted key, and no others.
-
-    Raises
-    ------
-    ValueError
-        If it has no such number.
-    """
+    """The scene with these distributions of its numbers, by dotted key, and no others."""
     complete = to_table(scene)
     found = dict(_of_shear(complete, *each) for each in spreads.items())
     for key in found:
-        if parent_of(complete, key)[0] is None:
+        if value_at(complete, key) is None:
             raise ValueError(f"{key} has a spread, but this scene has no such number; leave it out")
     return replace(scene, spreads=tuple(sorted(found.items())))
 
@@ -155,10 +150,29 @@ def _of_shear(complete: dict[str, Any], key: str, given: Distribution) -> tuple[
     """The distribution of a shear modulus for that of a Young's modulus, at its Poisson's ratio."""
     path, _, name = key.rpartition(".")
     shear = f"{path}.shear_modulus_pa"
-    if name != "young_modulus_pa" or (table := parent_of(complete, shear)[0]) is None:
+    if name != "young_modulus_pa" or value_at(complete, shear) is None:
         return key, given
-    share = 1.0 if given.is_relative else 1 / (2 * (1 + table["poisson"]))
+    share = 1.0
+    if not given.is_relative:
+        share = 1 / (2 * (1 + value_at(complete, f"{path}.poisson")))
     return shear, replace(given, width=tuple(share * x for x in given.width))
+
+
+def without_spreads(node: Any, path: str = "") -> tuple[Any, dict[str, Distribution]]:
+    """A scene's table with the central value for each that has a spread, and the distributions by
+    dotted key, as `body.layers.0.thickness_mm`.
+    """
+    if isinstance(node, dict) and VALUE in node and path:
+        return node[VALUE], {path: read_distribution(path, node)}
+    is_list = isinstance(node, list) and any(isinstance(inner, dict) for inner in node)
+    if not (isinstance(node, dict) or is_list):
+        return node, {}
+    found: dict[str, Distribution] = {}
+    plain = {}
+    for key, inner in node.items() if isinstance(node, dict) else enumerate(node):
+        plain[key], own = without_spreads(inner, f"{path}.{key}" if path else str(key))
+        found |= own
+    return list(plain.values()) if is_list else plain, found
 
 
 def dumps(scene: Scene) -> str:
@@ -194,7 +208,10 @@ def to_table(scene: Scene) -> dict[str, Any]:
         del table["placement"]
     for key in _keys_of_kinds() - set(body.of_kind.keys):
         table["body"].pop(key, None)
-    return with_spreads(table, scene.spreads)
+    for key, given in scene.spreads:
+        if (value := value_at(table, key)) is not None:
+            table = changed(table, key.split("."), written_distribution(value, given))
+    return table
 
 
 def _without_meaning(scene: Scene) -> set[str]:

@@ -1,6 +1,8 @@
-"""The keys of a scene file: each with its unit, what it may hold, and the attribute behind it."""
+"""The keys of a scene file: each with its unit, what it may hold, and the attribute behind it; and
+how a dotted key of a scene's table is read and changed.
+"""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from math import inf, isfinite, nextafter, pi
@@ -8,12 +10,13 @@ from typing import Any
 
 from simple_model import DRIVES, DriveLaw, Material, ModulusTable, PronyTerm, Rhythm, Signal
 from simple_model.choices import choose, meant
+from simple_model.layers.material import PRESETS
 from simple_model.layers.modulus_laws import COLUMNS
 from simple_model.load.focus import FOCI, FocalSpot
 from simple_model.load.trajectory import Points
+from skinwave.scene.load import SupportMotion
 from skinwave.scene.material_file import material_of, values_of, written_table
-from skinwave.scene.scene import Layer, Mounting, Phalanx, Relief, Sides
-from skinwave.scene.support_motion import SupportMotion
+from skinwave.scene.scene import Layer, Mounting, Phalanx, Relief, Sides, solid_of
 from skinwave.system.plain_text import number_in
 
 # Typical depths of receptors in the glabrous skin of a hand in metre, rounded: Merkel's cells at
@@ -45,6 +48,12 @@ def _wrong(key: str, value: Any, must: str) -> ValueError:
     return ValueError(f"{key} = {text if len(text) <= 60 else f'{text[:57]}...'} must be {must}")
 
 
+def _of_type(key: str, value: Any, kind: type, must: str) -> Any:
+    if not isinstance(value, kind):
+        raise _wrong(key, value, must)
+    return value
+
+
 def _number(key: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise _wrong(key, value, "a number")
@@ -56,36 +65,27 @@ def _number(key: str, value: Any) -> float:
 
 def as_text(key: str, value: Any) -> str:
     """The text itself; an error for anything else."""
-    if not isinstance(value, str):
-        raise _wrong(key, value, "a text in quotes")
-    return value
+    text: str = _of_type(key, value, str, "a text in quotes")
+    return text
 
 
 def as_table(key: str, value: Any) -> dict[str, Any]:
     """The table itself; an error for anything else."""
-    if not isinstance(value, dict):
-        raise _wrong(key, value, f"a table, [{key}]")
-    return value
-
-
-def _list(key: str, value: Any, of: str) -> list[Any]:
-    if not isinstance(value, list):
-        raise _wrong(key, value, f"a list of {of}")
-    return value
+    table: dict[str, Any] = _of_type(key, value, dict, f"a table, [{key}]")
+    return table
 
 
 def _switch(key: str, value: Any) -> bool:
-    if not isinstance(value, bool):
-        raise _wrong(key, value, "true or false")
-    return value
+    return bool(_of_type(key, value, bool, "true or false"))
 
 
 def _numbers(key: str, value: Any) -> tuple[float, ...]:
-    return tuple(_number(key, x) for x in _list(key, value, "numbers"))
+    return tuple(_number(key, x) for x in _of_type(key, value, list, "a list of numbers"))
 
 
 def _words(key: str, value: Any) -> tuple[str, ...]:
-    return tuple(as_text(key, word) for word in _list(key, value, 'words, such as ["left"]'))
+    must = 'a list of words, such as ["left"]'
+    return tuple(as_text(key, word) for word in _of_type(key, value, list, must))
 
 
 def _pair(key: str, value: Any) -> tuple[float, float]:
@@ -102,7 +102,7 @@ def _pair_in_mm(key: str, value: Any) -> tuple[float, float]:
 
 
 def _points(key: str, value: Any) -> Points:
-    pairs = _list(key, value, "pairs, such as [[0, 0], [5, 0]]")
+    pairs = _of_type(key, value, list, "a list of pairs, such as [[0, 0], [5, 0]]")
     return tuple(_pair_in_mm(key, pair) for pair in pairs)
 
 
@@ -117,9 +117,7 @@ def _write_points(points: Points) -> list[list[float]]:
 def _record(
     section: str, name: str, make: Callable[..., Any], keys: Keys, required: int = 0
 ) -> SceneKey:
-    """A table within a section, of a record, of whose keys so many, from the first, are required;
-    numbers that are None are not written.
-    """
+    """A table of a record in a section, of whose first keys so many are required."""
 
     def read(key: str, value: Any) -> Any:
         where = f"{section}.{key}"
@@ -132,8 +130,9 @@ def _records(where: str, make: Callable[..., Any], keys: Keys) -> SceneKey:
     """Tables under [[where]], of records, all of whose keys are required."""
 
     def read(key: str, value: Any) -> Any:
-        tables = (as_table(where, t) for t in _list(key, value, f"tables, each under [[{where}]]"))
-        return tuple(make(**_checked_all(f"[[{where}]]", t, keys, len(keys))) for t in tables)
+        tables = _of_type(key, value, list, f"a list of tables, each under [[{where}]]")
+        found = (_checked_all(f"[[{where}]]", as_table(where, t), keys, len(keys)) for t in tables)
+        return tuple(make(**each) for each in found)
 
     name = where.rpartition(".")[2]
     return SceneKey(name, read, lambda records: [written(keys, record) for record in records])
@@ -218,8 +217,9 @@ def _direction(key: str, value: Any) -> str | tuple[float, ...]:
     return value if isinstance(value, str) else _numbers(key, value)
 
 
-def _write_direction(direction: str | tuple[float, ...]) -> str | list[float]:
-    return direction if isinstance(direction, str) else list(direction)
+def _or_word(value: Any) -> Any:
+    """A word as it is, numbers as a list."""
+    return value if isinstance(value, str) else list(value)
 
 
 def _contact_in_mm(key: str, value: Any) -> float:
@@ -246,10 +246,6 @@ def _in_units(value: float, per_unit: float) -> float:
     return next((x for x in nearest if x / per_unit == value), near)
 
 
-def _word(name: str) -> SceneKey:
-    return SceneKey(name, as_text, str)
-
-
 def _depth(key: str, value: Any) -> float | tuple[float, ...]:
     if isinstance(value, list):
         return tuple(_one_depth(key, each) for each in value)
@@ -263,13 +259,7 @@ def _one_depth(key: str, value: Any) -> float:
 
 
 def depth_of(word: str) -> float:
-    """Depth in metre of a word on the command line: a number in mm, or a receptor.
-
-    Raises
-    ------
-    ValueError
-        If it is neither.
-    """
+    """Depth in metre of a word on the command line: a number in mm, or a receptor."""
     number = number_in(word)
     return _one_depth("--depth", word if number is None else number)
 
@@ -280,140 +270,128 @@ def _write_depth(depth: float | tuple[float, ...]) -> float | list[float]:
     return _in_units(depth, 1e3)
 
 
-PRONY = {"modulus_pa": _scaled("modulus"), "time_s": _scaled("time")}
+def _numbers_of(**keys: str) -> dict[str, SceneKey]:
+    """Numbers by their keys, whose ends are their units, each with the name of its attribute."""
+    units = {key: next((x for end, x in PER_SI.items() if key.endswith(end)), 1.0) for key in keys}
+    return {key: _scaled(name, units[key]) for key, name in keys.items()}
+
+
+def _words_of(*names: str) -> dict[str, SceneKey]:
+    """Words whose keys are the names of their attributes."""
+    return {name: SceneKey(name, as_text, str) for name in names}
+
+
+PER_SI = {
+    "_mm": 1e3, "_ms": 1e3, "_um": 1e6, "_percent": 100.0, "_deg": 180 / pi, "_g_m2": 1e3,
+}  # fmt: skip
+PRONY = _numbers_of(modulus_pa="modulus", time_s="time")
 MODULI, LOSSES = "modulus_scale", "loss_scale"  # of a material, beside its keys; 1 is as it is
 SCALES = {MODULI: "modulus", LOSSES: "loss"}  # arguments of `Material.scaled`
 MATERIAL = {
-    "density_kg_m3": _scaled("density"),
-    "shear_modulus_pa": _scaled("shear_modulus"),
-    "young_modulus_pa": _scaled("young"),
-    "poisson": _scaled("poisson"),
-    "young_x_pa": _scaled("young_x"),
-    "young_y_pa": _scaled("young_y"),
-    "poisson_xy": _scaled("poisson_xy"),
-    "shear_xy_pa": _scaled("shear_xy"),
-    "viscosity_pa_s": _scaled("viscosity"),
-    "loss_factor": _scaled("loss_factor"),
-    "law": _word("law"),
-    "fast_modulus_pa": _scaled("fast_modulus"),
-    "exponent": _scaled("exponent"),
-    "time_s": _scaled("time"),
+    **_numbers_of(
+        density_kg_m3="density", shear_modulus_pa="shear_modulus", young_modulus_pa="young",
+        poisson="poisson", young_x_pa="young_x", young_y_pa="young_y", poisson_xy="poisson_xy",
+        shear_xy_pa="shear_xy", viscosity_pa_s="viscosity", loss_factor="loss_factor",
+    ),
+    **_words_of("law"),
+    **_numbers_of(fast_modulus_pa="fast_modulus", exponent="exponent", time_s="time"),
     "table": SceneKey("table", _table, written_table),
     "prony": _records("body.material.prony", PronyTerm, PRONY),
-}
+}  # fmt: skip
 INSTEAD = {  # keys of a material of which one is computed from the other
     "young_modulus_pa": "shear_modulus_pa",
     "shear_modulus_pa": "young_modulus_pa",
 }
 MOUNTING = {
     "edges": SceneKey("edges", _words, list),
-    "support": _word("support"),
+    **_words_of("support"),
     "clips_mm": SceneKey("clips", _points, _write_points),
-    "clip_radius_mm": _scaled("clip_radius", 1e3),
-    "tension_x_n_per_m": _scaled("tension_x"),
-    "tension_y_n_per_m": _scaled("tension_y"),
-    "curl_x_mm": _scaled("curl_x", 1e3),
-    "curl_y_mm": _scaled("curl_y", 1e3),
-}
-BONE = {f"{length.name}_mm": _scaled(length.name, 1e3) for length in fields(Phalanx)}
-RELIEF = {f"{height.name}_mm": _scaled(height.name, 1e3) for height in fields(Relief)}
-LAYER = {
-    "thickness_mm": _scaled("thickness", 1e3),
-    "material": SceneKey("material", _material, write_material),
-}
-SIDES = {side.name: _word(side.name) for side in fields(Sides)}
-PULSES = {"pulses_ms": SceneKey("pulses", _points, _write_points), "ramp_ms": _scaled("ramp", 1e3)}
-SIGNAL = {
-    "rate_hz": _scaled("rate"),
-    "samples": SceneKey("samples", _numbers, list),
-    "role": _word("role"),
-}
-SUPPORT_MOTION = {
-    "amplitude_um": _scaled("amplitude", 1e6),
-    "frequency_hz": _scaled("frequency"),
-    "direction": SceneKey("direction", _direction, _write_direction),
-}
+    **_numbers_of(
+        clip_radius_mm="clip_radius", tension_x_n_per_m="tension_x", tension_y_n_per_m="tension_y",
+        curl_x_mm="curl_x", curl_y_mm="curl_y",
+    ),
+}  # fmt: skip
+BONE, RELIEF = (
+    _numbers_of(**{f"{each.name}_mm": each.name for each in fields(record)})
+    for record in (Phalanx, Relief)
+)
+MADE_OF = {"material": SceneKey("material", _material, write_material)}
+LAYER = {**_numbers_of(thickness_mm="thickness"), **MADE_OF}
+SIDES = _words_of(*(side.name for side in fields(Sides)))
+PULSES = {"pulses_ms": SceneKey("pulses", _points, _write_points), **_numbers_of(ramp_ms="ramp")}
+SAMPLES = SceneKey("samples", _numbers, list)
+SIGNAL = {**_numbers_of(rate_hz="rate"), "samples": SAMPLES, **_words_of("role")}
+DIRECTION = {"direction": SceneKey("direction", _direction, _or_word)}
+SUPPORT_MOTION = {**_numbers_of(amplitude_um="amplitude", frequency_hz="frequency"), **DIRECTION}
 PATH = ("shape", "size", "speed", "sweep", "centre", "points", "times", "levels", "hold")
 SECTIONS = {
     "tacton": {
-        "amplitude_percent": _scaled("amplitude", 100),
-        "am_frequency_hz": _scaled("am_frequency"),
-        "second_am_frequency_hz": _scaled("second_am_frequency"),
+        **_numbers_of(
+            amplitude_percent="amplitude", am_frequency_hz="am_frequency",
+            second_am_frequency_hz="second_am_frequency",
+        ),
         "superposition": SceneKey("superposition", _pair, list),
-        "envelope_frequency_hz": _scaled("envelope_frequency"),
-        "duration_s": _scaled("duration"),
-        "shape": _word("shape"),
-        "size_mm": _scaled("size", 1e3),
-        "speed_m_per_s": _scaled("speed"),
-        "sweep": _word("sweep"),
+        **_numbers_of(envelope_frequency_hz="envelope_frequency", duration_s="duration"),
+        **_words_of("shape"),
+        **_numbers_of(size_mm="size", speed_m_per_s="speed"),
+        **_words_of("sweep"),
         "centre_mm": SceneKey("centre", _pair_in_mm, _write_pair),
         "points_mm": SceneKey("points", _points, _write_points),
         "times_s": SceneKey("times", _numbers, list),
         "levels": SceneKey("levels", _numbers, list),
         "hold": SceneKey("hold", _switch, bool),
-        "foci": SceneKey("foci", _numbers, lambda phases: [float(phase) for phase in phases]),
-        "sharing": _word("sharing"),
+        "foci": SceneKey("foci", _numbers, lambda phases: list(map(float, phases))),
+        **_words_of("sharing"),
         "rhythm": _record("tacton", "rhythm", Rhythm, PULSES, 1),
         "signal": _record("tacton", "signal", Signal, SIGNAL, 2),
     },
     "focus": {
-        "height_mm": _scaled("height", 1e3),
+        **_numbers_of(height_mm="height"),
         "drive": SceneKey("drive", as_text, _write_drive),
-        "depth_of_modulation": _scaled("depth_of_modulation"),
-        "peak_pressure_pa": _scaled("peak_pressure"),
+        **_numbers_of(
+            depth_of_modulation="depth_of_modulation", peak_pressure_pa="peak_pressure",
+        ),
         "profile": SceneKey("profile", as_text, _write_profile),
     },
     "body": {
-        "kind": _word("kind"),
-        "material": SceneKey("material", _material, write_material),
-        "size_x_mm": _scaled("width", 1e3),
-        "size_y_mm": _scaled("height", 1e3),
-        "thickness_mm": _scaled("depth", 1e3),
-        "base": _word("base"),
+        **_words_of("kind"), **MADE_OF,
+        **_numbers_of(size_x_mm="width", size_y_mm="height", thickness_mm="depth"),
+        **_words_of("base"),
         "sides": SceneKey("sides", _sides, lambda x: x if isinstance(x, str) else x.by_name),
-        "base_stiffness_n_per_m3": _scaled("base_stiffness"),
+        **_numbers_of(base_stiffness_n_per_m3="base_stiffness"),
         "layers": _records("body.layers", Layer, LAYER),
         "relief": _record("body", "relief", Relief, RELIEF),
         "bone": _record("body", "bone", Phalanx, BONE),
-        "file": _word("file"),
-        "unit": _word("unit"),
-        "up": _word("up"),
+        **_words_of("file", "unit", "up"),
         "regions": SceneKey(
             "regions", _regions, lambda named: {name: write_material(of) for name, of in named}
         ),
         "air": SceneKey("air", _switch, bool),
         "mounting": _record("body", "mounting", _mounting, MOUNTING),
-        "grammage_g_m2": _scaled("grammage", 1e3),
+        **_numbers_of(grammage_g_m2="grammage"),
     },
     "load": {
-        "kind": _word("kind"),
-        "direction": SceneKey("direction", _direction, _write_direction),
-        "force_n": _scaled("force"),
+        **_words_of("kind"), **DIRECTION,
+        **_numbers_of(force_n="force"),
         "width_mm": replace(_scaled("width", 1e3), read=_contact_in_mm),
-        "gravity_m_per_s2": _scaled("gravity"),
+        **_numbers_of(gravity_m_per_s2="gravity"),
         "support_motion": _record("load", "support_motion", SupportMotion, SUPPORT_MOTION, 2),
     },
     "placement": {
-        "tilt_x_deg": _scaled("tilt_x", 180 / pi),
-        "tilt_y_deg": _scaled("tilt_y", 180 / pi),
+        **_numbers_of(tilt_x_deg="tilt_x", tilt_y_deg="tilt_y"),
         "offset_mm": SceneKey("offset", _pair_in_mm, _write_pair),
-        "lift_mm": _scaled("lift", 1e3),
+        **_numbers_of(lift_mm="lift"),
     },
     "probes": {
         "points_mm": SceneKey("probes", _points, _write_points),
         "depth_mm": SceneKey("depth", _depth, _write_depth),
-        "quantity": _word("quantity"),
+        **_words_of("quantity"),
     },
-}
+}  # fmt: skip
 
 
 # Keys that others are computed from, and that no file is written with.
 DERIVED = {"grammage_g_m2"}
-
-
-def with_key(table: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
-    """A table with another value of a key, and without the key that it stands instead of."""
-    return {name: x for name, x in table.items() if name != INSTEAD.get(key)} | {key: value}
 
 
 def checked(where: str, table: dict[str, Any], keys: Mapping[str, Any]) -> dict[str, Any]:
@@ -431,3 +409,38 @@ def checked(where: str, table: dict[str, Any], keys: Mapping[str, Any]) -> dict[
         else:
             values[key] = field(key, value)
     return values
+
+
+def value_at(node: Any, key: str) -> Any:
+    """Value of a dotted key in a scene's table, such as "body.layers.0.thickness_mm"; None if there
+    is none.
+    """
+    for name in key.split("."):
+        if isinstance(node, list):
+            node = node[int(name)] if name.isdecimal() and int(name) < len(node) else None
+        else:
+            node = node.get(name) if isinstance(node, dict) else None
+    return node
+
+
+def changed(node: Any, path: Sequence[str], value: Any, complete: Any = None) -> Any:
+    """A copy of a table with another value where a path leads to.
+
+    What the table leaves out on the way has the values of the `complete` table. A preset's name
+    stands for its table. A key that the new one is instead of is left out.
+    """
+    if not path:
+        return value
+    head, rest = path[0], path[1:]
+    if isinstance(node, list):
+        if not (head.isdecimal() and int(head) < len(node)):
+            raise ValueError(f"there is no '{head}' in a list of {len(node)}; count from 0")
+        k = int(head)
+        return [*node[:k], changed(node[k], rest, value), *node[k + 1 :]]
+    if isinstance(node, str):
+        node = write_material(solid_of(choose("material", node, PRESETS)))
+    if not isinstance(node, dict):
+        raise ValueError(f"there is no '{head}' in {node!r}; vary the whole value")
+    before = complete.get(head) if isinstance(complete, dict) else None
+    inner = changed(node.get(head, before or {}), rest, value, before)
+    return {name: x for name, x in node.items() if name != INSTEAD.get(head)} | {head: inner}

@@ -2,7 +2,12 @@
 
 A Tacton says where and when, by q(x, t) at the surface; a kind of load says what q is, and in which
 direction it acts on a surface of normal n. Beside it there may be gravity, which is static, and a
-support that moves.
+support that moves: all that a body is clamped to, or rests on springs on, has one translation
+
+    u_c(t) = direction amplitude sin(2 pi f t),   t >= 0
+
+With u = w + u_c everywhere, w is the motion seen from the support. A rigid translation strains
+nothing, so that A(s) w = -s^2 M u_c, the load of an inertial force.
 """
 
 from __future__ import annotations
@@ -18,11 +23,73 @@ from meshes.tetmesh import Floats
 from simple_model import MovingPressure
 from simple_model.choices import choose
 from simple_model.load.focus import NOMINAL_HEIGHT, ContactSpot
-from skinwave.scene.support_motion import SupportMotion
-from skinwave.system import extensions
 
 ALONG_PATH = "path"
 STRONGEST = 30.0  # m/s2 of gravity: three times that of the earth
+LARGEST = 0.01  # m, amplitude of a support: strains are small
+HIGHEST = 1000.0  # Hz of a support, up to which reduced bodies meet their tolerance
+
+
+@dataclass(frozen=True, kw_only=True)
+class SupportMotion:
+    """Harmonic translation of a support, a sine from rest.
+
+    Parameters
+    ----------
+    amplitude : float, metre, at most 0.01
+    frequency : float, Hz, at most 1000
+    direction : (x, y, z) of any length, z upwards
+
+    Raises
+    ------
+    ValueError
+        If a value is not finite or out of range.
+    """
+
+    amplitude: float
+    frequency: float
+    direction: tuple[float, float, float] = (0.0, 0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        if not 0 < self.amplitude <= LARGEST:
+            raise ValueError(
+                f"amplitude = {1e6 * self.amplitude:g} um of a support must be above 0 and at most "
+                f"{1e6 * LARGEST:g} um; give amplitude_um"
+            )
+        if not 0 < self.frequency <= HIGHEST:
+            raise ValueError(
+                f"frequency = {self.frequency:g} Hz of a support must be above 0 and at most "
+                f"{HIGHEST:g} Hz; give frequency_hz"
+            )
+        _check_direction(self.direction, 3, "a support")
+
+    @property
+    def unit(self) -> tuple[float, ...]:
+        """Unit vector of the direction."""
+        return tuple(x / hypot(*self.direction) for x in self.direction)
+
+    @property
+    def line(self) -> complex:
+        """Amplitude a in metre of the motion Re a exp(2 pi i f t)."""
+        return -1j * self.amplitude
+
+    @property
+    def speed(self) -> float:
+        """Speed in m/s that it starts with."""
+        return 2 * pi * self.frequency * self.amplitude
+
+    @property
+    def acceleration(self) -> complex:
+        """Amplitude of the acceleration, m/s2."""
+        return -((2 * pi * self.frequency) ** 2) * self.line
+
+    @property
+    def words(self) -> str:
+        """The motion in a few words."""
+        return (
+            f"a support that moves by {1e6 * self.amplitude:g} um at {self.frequency:g} Hz along "
+            f"{_shown(self.direction)}"
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +125,7 @@ class Load:
             if not getattr(self, name) and name in kind.defaults:
                 object.__setattr__(self, name, kind.defaults[name])
             elif getattr(self, name) and name not in kind.defaults:
-                raise ValueError(f"a load of kind '{kind.name}' has no {name}; leave it out")
+                raise ValueError(f"a load of kind '{self.kind}' has no {name}; leave it out")
         if not abs(self.gravity) <= STRONGEST:
             raise ValueError(
                 f"gravity = {self.gravity} m/s2 must be a number within {STRONGEST:g} of 0"
@@ -67,9 +134,7 @@ class Load:
 
     @property
     def of_kind(self) -> LoadKind:
-        """The registered record of its kind."""
-        if self.kind not in LOADS:
-            extensions.load()
+        """The record of its kind."""
         return LOADS[choose("load kind", self.kind, LOADS)]
 
     @property
@@ -107,19 +172,11 @@ class Load:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LoadKind:
-    """Kind of load.
-
-    Parameters
-    ----------
-    name : str, in a scene
-    words : a load in a few words, in sentences
-    defaults : attributes of `Load` that it has beside gravity, and their values if not given
-    check : raises a ValueError, with the reason, for a load that it is not
-    acting : the Tacton's pressure -> the scalar load that moves
-    pressures, tractions : as of `Load`
+    """Kind of load: a load in `words`; the attributes of `Load` that it has beside gravity, with
+    their `defaults`; what it may not be, `check`; and the Tacton's pressure as the scalar load that
+    is `acting`, with the `pressures` and `tractions` of `Load`.
     """
 
-    name: str
     words: Callable[[Load], str]
     defaults: dict[str, Any]
     tractions: Callable[[Load, Floats], Floats]
@@ -133,15 +190,6 @@ class LoadKind:
     def is_of_device(self) -> bool:
         """Whether the device makes it, so that a scene has the focus of one."""
         return "force" not in self.defaults
-
-
-LOADS: dict[str, LoadKind] = {}
-
-
-def register(kind: LoadKind) -> LoadKind:
-    """Add a kind of load to those that scenes may have; raises a ValueError for a known name."""
-    extensions.add(LOADS, kind.name, kind, kind.tractions)
-    return kind
 
 
 def _facing(normals: Floats) -> Floats:
@@ -163,10 +211,6 @@ def _dragging(load: Load, normals: Floats) -> Floats:
     return (along[:, None] - normal) * _facing(normals)
 
 
-def _of_contact(load: Load, normals: Floats) -> Floats:
-    return (_unit(load.direction) * _facing(normals))[None]
-
-
 def _unit(direction: Any) -> Floats:
     way = np.array(direction, np.float64)
     return np.asarray(way / np.linalg.norm(way), np.float64)
@@ -186,18 +230,16 @@ def _contact(load: Load, pressure: MovingPressure) -> MovingPressure:
     )  # fmt: skip
 
 
-def _check_direction(load: Load, axes: int) -> None:
-    way = load.direction
+def _check_direction(way: Any, axes: int, what: str, instead: str = "") -> None:
     if isinstance(way, str) or len(way) != axes or not (isfinite(sum(way)) and hypot(*way) > 0):
         raise ValueError(
-            f"direction = {way!r} of a load of kind '{load.kind}' must be {axes} finite numbers, "
-            f"not all 0{', or path' if axes == 2 else ''}"
+            f"direction = {way!r} of {what} must be {axes} finite numbers, not all 0{instead}"
         )
 
 
 def _check_shear(load: Load) -> None:
     if load.direction != ALONG_PATH:
-        _check_direction(load, 2)
+        _check_direction(load.direction, 2, "a load of kind 'shear'", ", or path")
 
 
 def _check_contact(load: Load) -> None:
@@ -207,12 +249,7 @@ def _check_contact(load: Load) -> None:
             "0; give force_n"
         )
     ContactSpot(width=load.width)
-    _check_direction(load, 3)
-
-
-def _shear_in_words(load: Load) -> str:
-    way = "the path" if load.direction == ALONG_PATH else _shown(load.direction)
-    return f"a shear traction along {way}"
+    _check_direction(load.direction, 3, "a load of kind 'point_force'")
 
 
 def _contact_in_words(load: Load) -> str:
@@ -223,21 +260,23 @@ def _contact_in_words(load: Load) -> str:
 
 
 def _shown(direction: Any) -> str:
+    if direction == ALONG_PATH:
+        return "the path"
     return f"({', '.join(f'{x:g}' for x in direction)})"
 
 
-register(LoadKind(name="pressure", words=lambda load: "pressure", defaults={}, tractions=_pushing))
-register(
-    LoadKind(
-        name="shear", words=_shear_in_words, defaults={"direction": (1.0, 0.0)},
-        tractions=_dragging, check=_check_shear, pressures=_along,
-    )
-)  # fmt: skip
-register(
-    LoadKind(
-        name="point_force", words=_contact_in_words,
+LOADS = {
+    "pressure": LoadKind(words=lambda load: "pressure", defaults={}, tractions=_pushing),
+    "shear": LoadKind(
+        words=lambda load: f"a shear traction along {_shown(load.direction)}",
+        defaults={"direction": (1.0, 0.0)}, tractions=_dragging, check=_check_shear,
+        pressures=_along,
+    ),
+    "point_force": LoadKind(
+        words=_contact_in_words,
         defaults={"direction": (0.0, 0.0, -1.0), "force": 0.0, "width": 2e-3},
-        tractions=_of_contact, check=_check_contact, acting=_contact,
-    )
-)  # fmt: skip
+        tractions=lambda load, normals: (_unit(load.direction) * _facing(normals))[None],
+        check=_check_contact, acting=_contact,
+    ),
+}  # fmt: skip
 PRESSURE = Load()

@@ -24,11 +24,6 @@ LEAST_POISSON = -0.999  # below which no solid is; Poisson's ratio is checked wi
 def material_of(values: Mapping[str, Any], where: str, keys: Mapping[str, str]) -> Material:
     """The material of values by attribute name; `where`, the section of the file, and `keys` of the
     file by attribute name are for messages.
-
-    Raises
-    ------
-    ValueError
-        If a value is missing, not of this kind of material, or out of range.
     """
     values = _by_shear(values, where, keys)
     _check_limits(values, where, keys)
@@ -95,13 +90,7 @@ def _kind(values: Mapping[str, Any]) -> tuple[str, tuple[str, ...], tuple[str, .
 
 
 def values_of(material: Material) -> dict[str, Any]:
-    """The values of a material that a scene file holds, by attribute name.
-
-    Raises
-    ------
-    ValueError
-        If its modulus law is a Python function.
-    """
+    """The values of a material that a scene file holds, by attribute name."""
     law = material.law
     if law is None:
         along = material.orthotropy
@@ -125,11 +114,6 @@ def values_of(material: Material) -> dict[str, Any]:
 def with_tables(scene: dict[str, Any], folder: Path) -> dict[str, Any]:
     """The table of a scene with the numbers of files of moduli, named from a folder, in place of
     their names.
-
-    Raises
-    ------
-    ValueError
-        If a file cannot be read or is no such table, with its path.
     """
     for material in _materials(scene):
         if isinstance(name := material.get("table"), str):

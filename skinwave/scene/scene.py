@@ -117,7 +117,7 @@ class Scene:
         object.__setattr__(self, "pressure", acting)
         self._check_probes()
         self._check_load()
-        self._check_reading()
+        _check_reading(self.body, self.reading)
         if self.body.of_kind.is_bounded:
             self._check_extent()
 
@@ -137,29 +137,29 @@ class Scene:
         if not (np.isfinite(self.depths).all() and min(self.depths) >= 0):
             raise ValueError(f"depth_mm = {1e3 * np.array(self.depth)} must be finite, 0 or above")
 
-    def _check_reading(self) -> None:
-        asked, body = self.reading.asked, self.body
-        if not asked.of_body:
-            raise ValueError(f"quantity '{self.quantity}' is of no body; leave it out")
-        if body.of_kind.is_plate:
-            _check_sheet(body, self.reading)
-        if (deepest := max(self.depths)) >= body.depth and body.of_kind.is_layer:
-            raise ValueError(
-                f"depth_mm = {1e3 * deepest:g} of a probe is not within the body, which is "
-                f"{1e3 * body.depth:g} mm thick; give less than that"
-            )
-
     def _check_load(self) -> None:
         _ = self.loads  # a path may have no direction
-        if self.body.of_kind.is_plate and not self.load.is_normal:
+        body, load = self.body, self.load
+        if body.of_kind.is_plate and not load.is_normal:
             raise ValueError(
-                f"a {self.body.kind} takes what is normal to it, not {self.load.words}; take a slab"
+                f"a {body.kind} takes what is normal to it, not {load.words}; take a slab"
             )
-        held = self.body.is_held and not self.body.is_on_half_space  # which sags without bound
-        if self.load.gravity and self.body.of_kind.discretise and not held:
+        held = body.is_held and not body.is_on_half_space  # which sags without bound
+        if load.gravity and body.of_kind.discretise and not held:
             raise ValueError("an unconstrained body falls under gravity; clamp its base")
-        if self.load.support_motion:
-            _check_moved(self.body, self.load.support_motion.words)
+        if (motion := load.support_motion) is None:
+            return
+        if not body.of_kind.discretise or body.of_kind.is_plate:
+            raise ValueError(
+                f"{motion.words} is for a solid, not a body of kind '{body.kind}'; take a slab"
+            )
+        if not body.is_held:
+            raise ValueError(f"{motion.words} moves no body that is unconstrained; clamp its base")
+        if "absorbing" in (body.base, *body.conditions):
+            raise ValueError(
+                f"{motion.words} has no absorbing sides, beyond which tissue is at rest; take "
+                'sides = "free" or "clamped"'
+            )
 
     def _check_extent(self) -> None:
         half = np.array([self.body.width, self.body.height]) / 2
@@ -215,28 +215,19 @@ class Scene:
         return drawn("notebook", "scene_page", self)
 
 
-def _check_moved(body: Body, motion: str) -> None:
-    """Refuse the motion of a support that a body has not, or that sides at rest contradict."""
-    if not body.of_kind.discretise or body.of_kind.is_plate:
-        raise ValueError(f"{motion} is for a solid, not a body of kind '{body.kind}'; take a slab")
-    if not body.is_held:
-        raise ValueError(f"{motion} moves no body that is unconstrained; clamp its base")
-    if "absorbing" in (body.base, *body.conditions):
+def _check_reading(body: Body, reading: Reading) -> None:
+    """Refuse a quantity or a depth that a body has not."""
+    asked, is_plate = reading.asked, body.of_kind.is_plate
+    deepest = max(reading.depths, default=0.0)
+    if not asked.of_body:
+        raise ValueError(f"quantity '{asked.name}' is of no body; leave it out")
+    is_outside = deepest > body.depth if is_plate else deepest >= body.depth
+    if is_outside and (is_plate or body.of_kind.is_layer):
         raise ValueError(
-            f"{motion} has no absorbing sides, beyond which tissue is at rest; take sides = "
-            '"free" or "clamped"'
+            f"depth_mm = {1e3 * deepest:g} of a probe is not within the body, which is "
+            f"{1e3 * body.depth:g} mm thick; give less than that"
         )
-
-
-def _check_sheet(body: Body, reading: Reading) -> None:
-    """Refuse what a sheet has not."""
-    asked = reading.asked
-    if (deepest := max(reading.depths, default=0.0)) > body.depth:
-        raise ValueError(
-            f"depth_mm = {1e3 * deepest:g} of a probe is not within the {body.kind}, which is "
-            f"{1e3 * body.depth:g} mm thick; give that or less"
-        )
-    if asked.is_normal:
+    if asked.is_normal or not is_plate:
         return
     if body.mounting.is_curled or body.placement.is_tilted:
         raise ValueError(

@@ -34,16 +34,13 @@ give 59 to 87 Pa (Liebler et al., J Acoust Soc Am 148:1713 (2020); HandyBeam; Ac
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
-from skinwave.bodies.parts import solid_of
-from skinwave.scene.distributions import Distribution, known_to, parent_of
-from skinwave.scene.file import from_table, to_table
-from skinwave.scene.keys import LOSSES, MODULI, SCALES
-from skinwave.scene.scene import Body, Scene
+from skinwave.scene.distributions import Distribution, Spread, known_to
+from skinwave.scene.file import to_table
+from skinwave.scene.keys import LOSSES, MODULI, value_at
+from skinwave.scene.scene import Scene
 
 PRESSURE, FACTOR = "focus.peak_pressure_pa", 2.0
-PARTS = {"body": "material", "focus": "device", "tacton": "device"}  # of keys by section
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,38 +66,16 @@ OF_PRESETS: Mapping[str, MaterialSpread] = {
 }
 
 
-@dataclass(frozen=True, kw_only=True)
-class Spread:
-    """An uncertain number of a scene: its dotted `key`, the `value` about which it is distributed,
-    in the unit of the key, and whether the scene's file says so or a preset `implied` it.
-    """
-
-    key: str
-    value: float
-    distribution: Distribution
-    implied: bool = False
-
-    @property
-    def part(self) -> str:
-        """The part of an uncertainty that it belongs to: material, device, or placement."""
-        return PARTS.get(self.key.partition(".")[0], "placement")
-
-    @property
-    def words(self) -> str:
-        """Its key and its distribution."""
-        return f"{self.key} = {self.value:g}, {self.distribution.words}"
-
-
 def spreads_of(scene: Scene) -> tuple[Spread, ...]:
     """Uncertain numbers of a scene: those of its file, of its presets, and the device's pressure;
     none that is known exactly.
     """
     table = to_table(replace(scene, spreads=())) if scene.spreads else {}
-    found = []
-    for key, given in scene.spreads:
-        parent, last = parent_of(table, key)
-        if parent is not None:
-            found.append(Spread(key=key, value=float(parent[last]), distribution=given))
+    found = [
+        Spread(key=key, value=float(value), distribution=given)
+        for key, given in scene.spreads
+        if (value := value_at(table, key)) is not None
+    ]
     device = scene.load.of_kind.is_of_device
     if device and PRESSURE not in dict(scene.spreads) and scene.pressure.peak_pressure > 0:
         found.append(
@@ -121,71 +96,3 @@ def _of_materials(scene: Scene) -> Iterator[Spread]:
         if isinstance(material, str) and (known := OF_PRESETS.get(material)):
             for scale, given in ((MODULI, known.moduli), (LOSSES, known.losses)):
                 yield Spread(key=f"{key}.{scale}", value=1.0, distribution=given, implied=True)
-
-
-def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
-    """The scene with other numbers, by the dotted keys of `spreads_of`, and no spread.
-
-    Raises
-    ------
-    ValueError
-        If it has no such number, or a number makes no scene.
-    """
-    scales = {key: x for key, x in values.items() if key.rpartition(".")[2] in SCALES}
-    plain = {key: x for key, x in values.items() if key not in scales}
-    found = replace(scene, spreads=())
-    if plain.keys() == {PRESSURE}:
-        pressure = replace(scene.pressure, peak_pressure=plain[PRESSURE])
-        found = replace(found, pressure=pressure)
-    elif plain:
-        table = to_table(found)
-        for key, x in plain.items():
-            parent, last = parent_of(table, key)
-            if parent is None:
-                raise ValueError(f"there is no number {key} in this scene; leave it out")
-            parent[last] = x
-        found = from_table(table)
-    return _scaled(found, scales)
-
-
-def scaled(scene: Scene, scales: Mapping[str, Any]) -> Scene:
-    """The scene with factors on all moduli or all losses of materials, by keys such as
-    "body.material.modulus_scale".
-
-    Raises
-    ------
-    ValueError
-        If the scene has no such material, or the factor is no number above 0.
-    """
-    for key, factor in scales.items():
-        parent, last = parent_of(to_table(scene), key.rpartition(".")[0])
-        if parent is None or not isinstance(parent[last], str | dict):
-            raise ValueError(f"there is no material for {key} in this scene; leave it out")
-        if isinstance(factor, bool) or not isinstance(factor, int | float) or not factor > 0:
-            raise ValueError(f"{key} = {factor!r} must be a number above 0")
-    return _scaled(scene, scales)
-
-
-def _scaled(scene: Scene, scales: Mapping[str, float]) -> Scene:
-    """The scene with all moduli, or losses, times factors; those of a material at once."""
-    places: dict[str, dict[str, float]] = {}
-    for key, factor in scales.items():
-        place, _, scale = key.removeprefix("body.").rpartition(".")
-        places.setdefault(place, {})[SCALES[scale]] = float(factor)
-    body = scene.body
-    for place, factors in places.items():
-        body = _with_factors(body, place, factors)
-    return replace(scene, body=body)
-
-
-def _with_factors(body: Body, place: str, factors: dict[str, float]) -> Body:
-    """The body with another material, at the place of a key."""
-    part, _, which = place.partition(".")
-    if part == "material":
-        return replace(body, material=solid_of(body.material).scaled(**factors))
-    if part == "regions":
-        own = {which: solid_of(dict(body.regions)[which]).scaled(**factors)}
-        return replace(body, regions=tuple((dict(body.regions) | own).items()))
-    layers, k = list(body.layers), int(which.partition(".")[0])
-    layers[k] = replace(layers[k], material=solid_of(layers[k].material).scaled(**factors))
-    return replace(body, layers=tuple(layers))

@@ -6,7 +6,7 @@ import json
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,42 +16,42 @@ import tomli_w
 from meshes import reading
 from meshes.tetmesh import Floats
 from simple_model.choices import choose, meant
-from simple_model.layers.material import PRESETS
-from skinwave.scene.distributions import Distribution, called, without_spreads
-from skinwave.scene.file import content, dumps, from_table, loads, parsed, read, to_table
-from skinwave.scene.keys import SCALES, SECTIONS, with_key, write_material
-from skinwave.scene.scene import BODIES, Scene, solid_of, with_body
-from skinwave.scene.spreads import scaled
+from skinwave.scene.distributions import Spread, called, uniform
+from skinwave.scene.file import (
+    content,
+    dumps,
+    from_table,
+    loads,
+    parsed,
+    read,
+    to_table,
+    without_spreads,
+)
+from skinwave.scene.keys import SCALES, SECTIONS, changed
+from skinwave.scene.scene import BODIES, Body, Scene, solid_of, with_body
+from skinwave.scene.spreads import PRESSURE
 from skinwave.system.plain_text import number_in
 
 DESIGNS = ("factorial", "zip", "lhs", "sobol")
 SAMPLED = ("lhs", "sobol")  # of which --samples says how many
 MOST_RUNS = 100_000
-EDGE = 1e-9  # of the unit interval, which keeps quantiles finite
 BODY = "body"  # the key of a whole body: the name of a preset, or a file
 
 
 @dataclass(frozen=True, kw_only=True)
-class Variation:
-    """A key of a scene file, and its `values` or, for designs of samples, the `bounds` of them or
-    their `distribution` about a `centre`.
-    """
+class Choice:
+    """A key of a scene file and its `values`."""
 
     key: str
-    values: tuple[Any, ...] = ()
-    bounds: tuple[float, float] | None = None
-    distribution: Distribution | None = None
-    centre: float = 0.0
+    values: tuple[Any, ...]
 
-    def placed(self, share: float) -> Any:
-        """Value at a share 0..1 of all: the quantile of a distribution."""
-        if self.distribution:
-            inner = min(max(share, EDGE), 1 - EDGE)
-            return float(self.distribution.quantile(self.centre, inner))
-        if self.bounds:
-            low, high = self.bounds
-            return low + share * (high - low)
-        return self.values[min(int(share * len(self.values)), len(self.values) - 1)]
+    def at(self, shares: Floats) -> list[Any]:
+        """Values at shares (n,) of 0 to 1 of all."""
+        last = len(self.values) - 1
+        return [self.values[min(int(share * len(self.values)), last)] for share in shares]
+
+
+Variation = Choice | Spread
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,38 +72,34 @@ class DesignPoint:
         """A hash of the complete scene, of the file of its body, and of the solver options."""
         digest = hashlib.sha256(repr((self.text, *model_options)).encode())
         if self.scene and self.scene.body.file:
-            digest.update(_content(self.scene.body.file))
+            with reading.opened(self.scene.body.file) as file:
+                digest.update(hashlib.file_digest(file, "sha256").digest())  # type: ignore[arg-type]
         return digest.hexdigest()[:24]
 
 
 def parse(text: str) -> Variation:
-    """Variation of `key=v1,v2`, `key=start:stop:n` or, within bounds, `key=start:stop`; or by a
+    """Variation of `key=v1,v2`, `key=start:stop:n` or, uniform between, `key=start:stop`; or by a
     distribution, as `key=normal(25e3,0.3)`.
-
-    Raises
-    ------
-    ValueError
-        If the key is none of a scene, there is no value, or no such distribution.
     """
     key, equals, right = text.partition("=")
     key = _known(key.strip())
     if not equals or not right.strip():
         raise ValueError(f"--vary {text} lacks values; write {key}=v1,v2 or {key}=start:stop:n")
-    if found := called(right):
-        return Variation(key=key, centre=found[0], distribution=found[1])
+    if found := called(key, right):
+        return found
     numbers = [number_in(part) for part in right.split(":")]
     if len(numbers) == 1 or None in numbers:
-        return Variation(key=key, values=tuple(map(_value, _split(right))))
+        return Choice(key=key, values=tuple(_values(right)))
     if len(numbers) > 3 or not all(math.isfinite(x) for x in numbers if x is not None):
         raise ValueError(f"--vary {text} is no finite start:stop:n; write three finite numbers")
     start, stop, *count = (x for x in numbers if x is not None)
     if not count:
-        return Variation(key=key, bounds=(start, stop))
+        return uniform(key, start, stop)
     if not (count[0] == int(count[0]) and 1 <= count[0] <= MOST_RUNS):
         raise ValueError(
             f"--vary {text} asks for {count[0]:g} values; give a whole number, 1..{MOST_RUNS:,}"
         )
-    return Variation(key=key, values=tuple(np.linspace(start, stop, int(count[0])).tolist()))
+    return Choice(key=key, values=tuple(np.linspace(start, stop, int(count[0])).tolist()))
 
 
 def combinations(
@@ -114,16 +110,10 @@ def combinations(
 ) -> list[dict[str, Any]]:
     """The values that meet in each run, by key.
 
-    Parameters
-    ----------
-    design : "factorial", every value with every other; "zip", first with first; "lhs", a Latin
-        hypercube of so many `samples` within bounds, over lists and by distributions, the same for
-        the same `seed`; or "sobol", for Sobol' indices, with so many samples of each matrix
-
-    Raises
-    ------
-    ValueError
-        If keys are varied twice or not in the way that the design takes.
+    The design is "factorial", every value with every other; "zip", first with first; "lhs", a Latin
+    hypercube of so many samples of lists and distributions, the same for the same seed (McKay et
+    al., Technometrics 21:239 (1979)); or "sobol", for Sobol' indices, with so many samples of each
+    matrix.
     """
     choose("design", design, DESIGNS)
     keys = [variation.key for variation in variations]
@@ -134,82 +124,42 @@ def combinations(
     if (samples is None) == (design in SAMPLED):
         raise ValueError("--samples and --design lhs or sobol need each other; give both or none")
     if design in SAMPLED:
-        return _sampled(variations, design, samples or 0, seed)
-    for variation in variations:
-        if variation.distribution:
-            raise ValueError(
-                f"{variation.key} has a distribution; give --design lhs or sobol, and --samples"
-            )
-        if variation.bounds:
-            raise ValueError(f"{variation.key}=start:stop lacks the number of values; add :n")
-    lengths = [len(variation.values) for variation in variations]
+        shares = _shares(len(keys), design, samples or 0, seed)
+        drawn = [each.at(column) for each, column in zip(variations, shares.T, strict=True)]
+        return [dict(zip(keys, met, strict=True)) for met in zip(*drawn, strict=True)]
+    values = [each.values for each in variations if isinstance(each, Choice)]
+    if spread := [each.key for each in variations if isinstance(each, Spread)]:
+        raise ValueError(
+            f"{spread[0]} has a distribution; give --design lhs or sobol, and --samples, or "
+            "values: of start:stop add :n"
+        )
+    lengths = [len(each) for each in values]
     if design == "zip" and len(set(lengths)) > 1:
         raise ValueError(
             f"--design zip pairs lists of one length, not of {lengths}; take factorial"
         )
-    count = lengths[0] if design == "zip" else math.prod(lengths)
-    _check_count(count)
-    values = [variation.values for variation in variations]
-    met = zip(*values, strict=True) if design == "zip" else itertools.product(*values)
-    return [dict(zip(keys, each, strict=True)) for each in met]
+    _check_count(lengths[0] if design == "zip" else math.prod(lengths))
+    every = zip(*values, strict=True) if design == "zip" else itertools.product(*values)
+    return [dict(zip(keys, each, strict=True)) for each in every]
 
 
-def cases(path: Path, combined: Sequence[Mapping[str, Any]]) -> list[DesignPoint]:
-    """The scenes that a scene file and each combination of values make, each once.
+def _shares(d: int, design: str, samples: int, seed: int) -> Floats:
+    """Shares (n, d) of all values of d keys in the runs of samples."""
+    from scipy.stats import qmc
 
-    A combination that makes no scene is a case with its error.
-
-    Raises
-    ------
-    ValueError
-        If the file is no scene, no combination makes one, or a word is refused by each it is in.
-    """
-    base = read(path)
-    table = parsed(content(path), path.parent)
-    if base.body.file:
-        table["body"]["file"] = base.body.file
-    return cases_of(table, tomllib.loads(dumps(base)), combined)
-
-
-def cases_of(table: Any, complete: Any, combined: Sequence[Mapping[str, Any]]) -> list[DesignPoint]:
-    """The same for the table of a scene file, and that with all keys that it leaves out."""
-    found = {case.text: case for case in (_case(table, complete, each) for each in combined)}
-    _refuse_words(list(found.values()))
-    return list(found.values())
-
-
-def varied(scene: Scene, values: Mapping[str, Any]) -> Scene:
-    """A scene with other values of keys of its file.
-
-    Raises
-    ------
-    ValueError
-        If that is no scene.
-    """
-    complete = to_table(scene)
-    return from_table(_changed(complete, complete, values))
+    if design == "lhs":
+        _check_count(samples)
+        return np.asarray(qmc.LatinHypercube(d, rng=seed).random(samples))
+    _check_count(samples * (d + 2))
+    return saltelli_shares(d, samples, seed)
 
 
 def saltelli_shares(d: int, n: int, seed: int = 0) -> Floats:
-    """Quantiles' shares (n (d + 2), d), above 0 and below 1, for Sobol' indices: matrices A, B and,
-    for each number, A with its column of B, from a Sobol' sequence of 2 d numbers.
+    """Shares (n (d + 2), d) of 0 to 1 of d numbers, for Sobol' indices: matrices A and B of n rows,
+    a power of two, then A with column k of B for each k, of a scrambled Sobol' sequence (Owen,
+    J Complex 14:466 (1998)) in 2 d dimensions.
 
     Saltelli et al., Comput Phys Commun 181:259 (2010), section 3.
-
-    Parameters
-    ----------
-    d : how many numbers
-    n : rows of each matrix, a power of two, which balances the sequence
-    seed : of the scrambling (Owen, J Complex 14:466 (1998))
-
-    Returns
-    -------
-    A, B, then A with column k of B for each k, one above the other
-
-    Raises
-    ------
-    ValueError
-        If n is no power of two.
     """
     from scipy.stats import qmc
 
@@ -220,25 +170,78 @@ def saltelli_shares(d: int, n: int, seed: int = 0) -> Floats:
     mixed = np.tile(a, (d, 1, 1))
     for k in range(d):
         mixed[k, :, k] = b[:, k]
-    return np.clip(np.vstack([a, b, *mixed]), EDGE, 1 - EDGE)
+    return np.vstack([a, b, *mixed])
 
 
-def _sampled(
-    variations: Sequence[Variation], design: str, samples: int, seed: int
-) -> list[dict[str, Any]]:
-    from scipy.stats import qmc
+def cases(path: Path, combined: Sequence[Mapping[str, Any]]) -> list[DesignPoint]:
+    """The scenes that a scene file and each combination of values make.
 
-    d = len(variations)
-    if design == "lhs":
-        _check_count(samples)
-        points = qmc.LatinHypercube(d, rng=seed).random(samples)
-    else:
-        _check_count(samples * (d + 2))
-        points = saltelli_shares(d, samples, seed)
-    return [
-        {v.key: v.placed(float(x)) for v, x in zip(variations, point, strict=True)}
-        for point in points
-    ]
+    A combination that makes no scene is a case with its error.
+    """
+    base = read(path)
+    table = parsed(content(path), path.parent)
+    if base.body.file:
+        table["body"]["file"] = base.body.file
+    return cases_of(table, tomllib.loads(dumps(base)), combined)
+
+
+def cases_of(table: Any, complete: Any, combined: Sequence[Mapping[str, Any]]) -> list[DesignPoint]:
+    """The same for the table of a scene file, and that with all keys that it leaves out."""
+    found = [_case(table, complete, each) for each in combined]
+    _refuse_words(found)
+    return found
+
+
+def with_values(scene: Scene, values: Mapping[str, Any]) -> Scene:
+    """A scene with other values of keys of its file, or factors on all moduli or losses of a
+    material, such as "body.material.modulus_scale"; these keys have no spread.
+    """
+    plain, scales = _parted(values)
+    if plain.keys() == {PRESSURE}:  # of any scene, also one that no file holds
+        pressure = replace(scene.pressure, peak_pressure=plain[PRESSURE])
+        left = tuple(each for each in scene.spreads if each[0] != PRESSURE)
+        scene = replace(scene, pressure=pressure, spreads=left)
+    elif plain:
+        complete = to_table(scene)
+        scene = from_table(_changed(complete, complete, plain))
+    return _scaled(scene, scales)
+
+
+def _parted(values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Values of keys of a file, and factors on moduli and losses."""
+    scales = {key: x for key, x in values.items() if key.rpartition(".")[2] in SCALES}
+    return {key: x for key, x in values.items() if key not in scales}, scales
+
+
+def _scaled(scene: Scene, scales: Mapping[str, Any]) -> Scene:
+    """The scene with factors on all moduli, or losses; those of a material at once."""
+    places: dict[str, dict[str, float]] = {}
+    for key, factor in scales.items():
+        if isinstance(factor, bool) or not isinstance(factor, int | float) or not factor > 0:
+            raise ValueError(f"{key} = {factor!r} must be a number above 0")
+        place, _, scale = key.rpartition(".")
+        places.setdefault(place, {})[SCALES[scale]] = float(factor)
+    body = scene.body
+    for place, factors in places.items():
+        body = _with_factors(body, place, factors)
+    return replace(scene, body=body)
+
+
+def _with_factors(body: Body, place: str, factors: dict[str, float]) -> Body:
+    """The body with factors on the material at a dotted key."""
+    layers, regions = list(body.layers), dict(body.regions)
+    match place.split("."):
+        case ["body", "material"] if body.of_kind.discretise:
+            return replace(body, material=solid_of(body.material).scaled(**factors))
+        case ["body", "regions", *names] if (name := ".".join(names)) in regions:
+            regions[name] = solid_of(regions[name]).scaled(**factors)
+            return replace(body, regions=tuple(regions.items()))
+        case ["body", "layers", k, "material"] if k.isdecimal() and int(k) < len(layers):
+            layer = layers[int(k)]
+            layers[int(k)] = replace(layer, material=solid_of(layer.material).scaled(**factors))
+            return replace(body, layers=tuple(layers))
+    scale = f"{place}.{'modulus' if 'modulus' in factors else 'loss'}_scale"
+    raise ValueError(f"there is no material for {scale} in this scene; leave it out")
 
 
 def _check_count(count: int) -> None:
@@ -257,39 +260,24 @@ def _known(key: str) -> str:
     return key
 
 
-def _value(text: str) -> Any:
-    """A value as the scene file would have it; a word needs no quotes."""
+def _values(text: str) -> list[Any]:
+    """Values between commas as a scene file would have them, or words, which need no quotes."""
     try:
-        return tomllib.loads(f"value = {text}")["value"]
+        return list(tomllib.loads(f"values = [{text}]")["values"])
     except (tomllib.TOMLDecodeError, RecursionError):
-        number = number_in(text)
-        return text.strip() if number is None else number
-
-
-def _split(text: str) -> list[str]:
-    """Parts between commas that are not within brackets or quotes."""
-    parts, depth, quote = [""], 0, ""
-    for letter in text:
-        if quote or letter in "\"'":
-            quote = "" if letter == quote else quote or letter
-        else:
-            depth += (letter in "[{") - (letter in "]}")
-        if letter == "," and not depth and not quote:
-            parts.append("")
-        else:
-            parts[-1] += letter
-    return parts
+        parts = [part.strip() for part in text.split(",")]
+        numbers = list(map(number_in, parts))
+        return [part if x is None else x for part, x in zip(parts, numbers, strict=True)]
 
 
 def _case(table: Any, complete: Any, varied: Mapping[str, Any]) -> DesignPoint:
     scene, before, error = None, None, ""
-    scales = {key: x for key, x in varied.items() if key.rpartition(".")[2] in SCALES}
-    plain = {key: x for key, x in varied.items() if key not in scales}
-    changed = _changed(table, complete, plain)
+    plain, scales = _parted(varied)
+    made = _changed(table, complete, plain)
     try:
-        text = tomli_w.dumps(changed)
+        text = tomli_w.dumps(made)
         before = loads(text)
-        scene = scaled(before, scales)
+        scene = _scaled(before, scales)
         text = dumps(scene)
     except ValueError as refused:
         error = str(refused)
@@ -307,40 +295,19 @@ def _changed(table: Any, complete: Any, varied: Mapping[str, Any]) -> Any:
         if key == BODY:
             table = table | {BODY: _body(varied[key])}
         else:
-            table = _with(table, complete, key.split("."), varied[key])
+            table = changed(table, key.split("."), varied[key], complete)
     return table
 
 
 def _body(name: Any) -> Any:
     """The table of a preset, or of a file."""
     if name in BODIES:
-        scene = with_body(loads(""), BODIES[name])
-        return tomllib.loads(dumps(scene))[BODY]
+        return to_table(with_body(loads(""), BODIES[name]))[BODY]
     if not Path(str(name)).is_file():
         raise ValueError(
             f"body '{name}' is no file and none of {', '.join(BODIES)}; name one of these or a file"
         )
     return {"kind": "mesh", "file": str(Path(name).resolve())}
-
-
-def _with(node: Any, complete: Any, path: Sequence[str], value: Any) -> Any:
-    """A copy of a table in which what a path leads to has another value."""
-    if not path:
-        return value
-    head, rest = path[0], path[1:]
-    if isinstance(node, list):
-        if not (head.isdecimal() and int(head) < len(node)):
-            raise ValueError(f"there is no '{head}' in a list of {len(node)}; count from 0")
-        k = int(head)
-        return [*node[:k], _with(node[k], None, rest, value), *node[k + 1 :]]
-    if isinstance(node, str):  # a preset's name stands for its table
-        choose("material", node, list(PRESETS))
-        node = write_material(solid_of(node))
-    if not isinstance(node, dict):
-        raise ValueError(f"there is no '{head}' in {node!r}; vary the whole value")
-    before = complete.get(head) if isinstance(complete, dict) else None
-    inner = node.get(head, before if rest and before is not None else {})
-    return with_key(node, head, _with(inner, before, rest, value))
 
 
 def _flat(table: Mapping[str, Any]) -> dict[str, float | str]:
@@ -367,8 +334,3 @@ def _refuse_words(found: Sequence[DesignPoint]) -> None:
         for key, value in case.varied.items():
             if not isinstance(value, int | float) and (key, str(value)) not in accepted:
                 raise ValueError(f"{key} = {value}: {case.error}")
-
-
-def _content(file: str) -> bytes:
-    with reading.opened(file) as opened:
-        return hashlib.file_digest(opened, "sha256").digest()  # type: ignore[arg-type]

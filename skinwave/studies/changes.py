@@ -21,7 +21,8 @@ from skinwave.results.surface import (
 from skinwave.scene import paper15
 from skinwave.scene.keys import SCALES
 from skinwave.scene.scene import Scene
-from skinwave.scene.spreads import spreads_of, with_values
+from skinwave.scene.spreads import spreads_of
+from skinwave.scene.variation import with_values
 
 if TYPE_CHECKING:
     from skinwave.report.maps import MeasuredPlaces

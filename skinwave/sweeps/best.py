@@ -8,7 +8,6 @@ of them, and is wider by a tenth of a step of the grid at each end, to which the
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -17,14 +16,11 @@ from simple_model.choices import choose
 from simple_model.numbers import significant
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
 from skinwave.models.limits import takes
-from skinwave.scene.scene import Scene
 from skinwave.scene.spreads import PRESSURE, Spread, spreads_of
-from skinwave.scene.variation import DesignPoint, Variation
+from skinwave.scene.variation import Choice, Variation, combinations
 from skinwave.sweeps.ensemble import is_linear
-from skinwave.sweeps.measures import columns
-from skinwave.sweeps.reductions import ModelOptions
-from skinwave.sweeps.sampling import samples as samples_of
-from skinwave.sweeps.sweep import Combined, Sweep, model_of
+from skinwave.sweeps.reductions import model_of
+from skinwave.sweeps.sweep import Combined, Sweep
 from skinwave.sweeps.table_figures import at_probe, value
 
 SAMPLES, FEWEST = 199, 39  # of the spreads; those that have a 95 % interval
@@ -32,8 +28,6 @@ ENDS = (2.5, 97.5)  # percentiles between which the interval lies
 VERTICES = 2  # runs that refine a best value beyond the grid
 RESOLUTION = 0.1  # of a step of the grid, to which a best value is then found
 FOLDER = "samples"  # within that of the sweep: the sweep of the samples
-
-Evaluate = Callable[[Combined], Floats]  # the column (n,) of runs (n,), nan where there is none
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,27 +70,8 @@ class Best:
         return f"<Best: {self.words}>"
 
 
-def check(
-    variations: Sequence[Variation],
-    column: str,
-    wanted: Sequence[DesignPoint],
-    samples: int | None = None,
-) -> None:
-    """Refuse, before any work, what has no best value.
-
-    Parameters
-    ----------
-    variations : of the sweep
-    column : of its table, such as "level_db[0]"
-    wanted : runs of its grid
-    samples : of the spreads, `SAMPLES` if not given
-
-    Raises
-    ------
-    ValueError
-        If several keys vary, their values are not three numbers or more, there is no such column
-        of numbers, or there are too few samples for an interval.
-    """
+def check(variations: Sequence[Variation], samples: int | None = None) -> Choice:
+    """The one key whose best value is asked for; refuses, before any work, what has none."""
     if samples is not None and samples < FEWEST:
         raise ValueError(
             f"{samples} samples are too few for a 95 % interval; give {FEWEST} or more"
@@ -106,75 +81,56 @@ def check(
             f"a best value is of one key, and {len(variations)} are varied; vary one and set the "
             "others in the scene"
         )
-    key, values = variations[0].key, set(variations[0].values)
+    (found,) = variations
+    values = set(found.values) if isinstance(found, Choice) else set()
     numbers = [x for x in values if isinstance(x, int | float) and not isinstance(x, bool)]
-    if len(numbers) < max(3, len(values)):
+    if not isinstance(found, Choice) or len(numbers) < max(3, len(values)):
         raise ValueError(
-            f"a best value of {key} needs at least three values, all numbers; give "
-            f"{key}=start:stop:n"
+            f"a best value of {found.key} needs at least three values, all numbers; give "
+            f"{found.key}=start:stop:n"
         )
-    types, (name, probe) = columns(wanted), at_probe(column)
-    choose("column", name, list(types))
-    if types[name] == "text":
-        raise ValueError(f"column '{name}' holds words; choose one of numbers, such as level_db[0]")
-    probes = max(len(case.scene.probes) for case in wanted if case.scene)
-    if probe is not None and probe >= probes:
-        raise ValueError(
-            f"column '{column}' is of a probe that the scene does not have; take one of "
-            f"{name}[0] to {name}[{probes - 1}]"
-        )
+    return found
 
 
 def best_value(
-    sweep: Sweep,
-    cases: Callable[[Combined], list[DesignPoint]],
-    variation: Variation,
-    column: str,
-    samples: int | None = None,
-    seed: int = 0,
+    sweep: Sweep, variation: Choice, column: str, samples: int | None = None, seed: int = 0
 ) -> Best:
-    """Best value of a key that `check` accepts; resumes an interrupted one.
-
-    Parameters
-    ----------
-    sweep : what runs the cases
-    cases : combinations of values -> cases
-    variation : of the key
-    column : of the table
-    samples : of the spreads, `SAMPLES` if not given
-    seed : of the samples
-
-    Returns
-    -------
-    Best
+    """Best value of a key that `check` accepts, of a column such as "level_db[0]"; resumes an
+    interrupted one. There are `SAMPLES` samples of the spreads if not said otherwise.
 
     Raises
     ------
     ValueError
-        If no run has the column, or too few samples have it.
+        If no run has such a column of numbers, or too few samples have it.
     """
     n, key, grid = samples or SAMPLES, variation.key, variation.values
-    evaluate = partial(_column, cases, column)
-    (best,), (result,) = optima(partial(evaluate, sweep), key, grid, [{}])
+    (best,), (result,) = optima(lambda runs: _column(sweep, column, runs), key, grid, [{}])
     if not np.isfinite(result):
         raise ValueError(f"column '{column}' has no finite number in this sweep; choose another")
     found = Best(
         key=key, column=column, value=float(best), result=float(result),
         limits=(float(min(grid)), float(max(grid))),
     )  # fmt: skip
-    runs = [case for case in cases([{key: x} for x in grid]) if case.scene]
-    scenes = [case.scene for case in runs if case.scene]
-    spreads = _that_move(key, runs[0].before or scenes[0], scenes, sweep.options.model)
+    points = [point for point in sweep.points([{key: x} for x in grid]) if point.scene]
+    scenes = [point.scene for point in points if point.scene]
+    models = [model_of(scene, sweep.options.model) for scene in scenes]
+    # The pressure moves no best value of what is in proportion to it.
+    linear = all(map(is_linear, scenes, models))
+    fixed = {key, PRESSURE} if linear else {key}
+    spreads: list[Spread] = [
+        each for each in spreads_of(points[0].before or scenes[0]) if each.key not in fixed
+    ]
     if not spreads:
         return found
-    names = tuple(each.key for each in spreads)
+    # Samples are of the steady state where the wavenumber integral from rest is asked for.
+    steady = {*models} == {FLAT_BODY.name} and all(takes(HARMONIC, scene) for scene in scenes)
     own = replace(
-        sweep, folder=sweep.folder / FOLDER, options=_of_samples(sweep.options, scenes),
+        sweep, folder=sweep.folder / FOLDER, assessed=False,
+        options=replace(sweep.options, model=HARMONIC.name) if steady else sweep.options,
         progress=lambda step, part: sweep.progress("samples" if step == "run" else step, part),
     )  # fmt: skip
-    drawn = samples_of(spreads, n, seed).tolist()
-    settings = [dict(zip(names, row, strict=True)) for row in drawn]
-    values, results = optima(partial(evaluate, own), key, grid, settings)
+    settings = combinations(spreads, "lhs", n, seed)
+    values, results = optima(lambda runs: _column(own, column, runs), key, grid, settings)
     values = values[np.isfinite(results)]
     if len(values) < FEWEST:
         raise ValueError(
@@ -184,94 +140,61 @@ def best_value(
     low, high = np.percentile(values, ENDS, method="weibull")
     margin = RESOLUTION * np.diff(np.unique(grid)).max()
     low, high = np.clip((low - margin, high + margin), *found.limits).tolist()
+    names = tuple(each.key for each in spreads)
     return replace(found, interval=(low, high), samples=len(values), uncertain=names)
 
 
-def _column(
-    cases: Callable[[Combined], list[DesignPoint]], column: str, sweep: Sweep, combined: Combined
-) -> Floats:
+def _column(sweep: Sweep, column: str, combined: Combined) -> Floats:
     """A column (n,) of the runs of combinations of values, nan where there is none."""
-    wanted = cases(combined)
-    found = sweep.run(wanted)
+    points = sweep.points(combined)
+    found = sweep.run(points)
     if found.interrupted:
         raise KeyboardInterrupt
     if found.missing:
         raise ValueError(f"workers were killed; {found.missing} runs are missing, start again")
-    rows = sweep.in_order(wanted, combined, (at_probe(column)[0],))
+    rows = sweep.rows(points)
+    choose("column", at_probe(column)[0], dict.fromkeys(name for row in rows for name in row))
     return np.array([value(row, column) for row in rows])
 
 
-def _that_move(key: str, base: Scene, scenes: Sequence[Scene], model: str) -> list[Spread]:
-    """Uncertain numbers of a scene that move the best value of a key: not the pressure of what is
-    in proportion to it.
-    """
-    in_proportion = all(is_linear(scene, model_of(scene, model)) for scene in scenes)
-    fixed = {key, PRESSURE} if in_proportion else {key}
-    return [each for each in spreads_of(base) if each.key not in fixed]
-
-
 def optima(
-    evaluate: Evaluate, key: str, grid: Sequence[float], settings: Combined
+    evaluate: Callable[[Combined], Floats], key: str, grid: Sequence[float], settings: Combined
 ) -> tuple[Floats, Floats]:
-    """Best value of a key for each setting of other keys, refined beyond a grid.
-
-    Parameters
-    ----------
-    evaluate : values by key, of each run (m,) -> the column (m,), nan where there is none
-    key : the one that varies
-    grid : (g,) its values, three or more
-    settings : (n,) values of the other keys
-
-    Returns
-    -------
-    values (n,) of the key, and the column there (n,), -inf of a setting that has none
+    """Best values (n,) of a key for settings (n,) of other keys, refined beyond a grid (g,), and
+    the column there, -inf of a setting that has none; `evaluate` gives the column (m,) of runs
+    (m,), nan where there is none.
     """
+
+    def tried(values: Floats) -> Floats:
+        """The column (n, g) at values (n, g) of the key."""
+        # Runs of one value follow each other: they share the load, whose lines are cached.
+        runs = [
+            {**own, key: x} for at in values.T.tolist() for own, x in zip(settings, at, strict=True)
+        ]
+        found = evaluate(runs).reshape(values.T.shape).T
+        return np.where(np.isfinite(found), found, -np.inf)
+
     x = np.tile(np.unique(grid), (len(settings), 1))
-    y = _tried(evaluate, key, x, settings)
+    y = tried(x)
     for _ in range(VERTICES):
         vertices = np.array([[_vertex(*each)] for each in zip(x, y, strict=True)])
-        x = np.hstack([x, vertices])
-        y = np.hstack([y, _tried(evaluate, key, vertices, settings)])
-    y = np.where(np.isfinite(y), y, -np.inf)
+        x, y = np.hstack([x, vertices]), np.hstack([y, tried(vertices)])
     best = y.argmax(axis=1)[:, None]
     return np.take_along_axis(x, best, 1)[:, 0], np.take_along_axis(y, best, 1)[:, 0]
-
-
-def _tried(evaluate: Evaluate, key: str, values: Floats, settings: Combined) -> Floats:
-    """The column (n, g) at values (n, g) of the key, under n settings."""
-    # Runs of one value follow each other: they share the load, whose lines are cached.
-    runs = [
-        {**own, key: x} for at in values.T.tolist() for own, x in zip(settings, at, strict=True)
-    ]
-    return evaluate(runs).reshape(values.T.shape).T
 
 
 def _vertex(x: Floats, y: Floats) -> float:
     """Vertex of the parabola through the best of some points and its neighbours; the best point if
     there is none among them.
     """
-    known = np.isfinite(y)
-    if not known.any():
-        return float(x[0])
-    x, first = np.unique(x[known], return_index=True)
-    y = y[known][first]
-    best = int(y.argmax())
-    k = min(max(best, 1), len(x) - 2)
-    if k < 1:  # fewer than three points
-        return float(x[best])
+    best = float(x[y.argmax()])
+    x, first = np.unique(x[np.isfinite(y)], return_index=True)
+    y = y[np.isfinite(y)][first]
+    if len(x) < 3:
+        return best
+    k = min(max(int(y.argmax()), 1), len(x) - 2)
     (a, b, c), slopes = x[k - 1 : k + 2], np.diff(y[k - 1 : k + 2]) / np.diff(x[k - 1 : k + 2])
     if not slopes[1] < slopes[0]:
-        return float(x[best])
+        return best
     vertex = (a + b) / 2 + (c - a) / 2 * slopes[0] / (slopes[0] - slopes[1])
     return float(np.clip(vertex, a, c))
-
-
-def _of_samples(asked: ModelOptions, scenes: Sequence[Scene]) -> ModelOptions:
-    """Options of the samples: the steady state where the wavenumber integral from rest is asked
-    for, without an estimate of its error.
-    """
-    has_steady = all(
-        model_of(scene, asked.model) == FLAT_BODY.name and takes(HARMONIC, scene)
-        for scene in scenes
-    )
-    return replace(asked, model=HARMONIC.name if has_steady else asked.model, is_assessed=False)

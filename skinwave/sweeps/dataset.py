@@ -29,12 +29,8 @@ Row = Mapping[str, Any]
 
 
 def open_folder(out: Path, command: Mapping[str, Any] | None = None) -> Path:
-    """The folder of a sweep, made if it is new, with a record of the `command`.
-
-    Raises
-    ------
-    ValueError
-        If it is something else.
+    """The folder of a sweep, made if it is new, with a record of the `command`; a ValueError if it
+    is something else.
     """
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         check_folder(out)
@@ -56,12 +52,8 @@ def check_folder(out: Path) -> None:
 
 @contextmanager
 def locked(out: Path) -> Iterator[None]:
-    """Hold the rows of a folder; the system releases them however the process ends.
-
-    Raises
-    ------
-    ValueError
-        If another sweep holds them.
+    """Hold the rows of a folder; the system releases them however the process ends. Raises a
+    ValueError if another sweep holds them.
     """
     with open(out / ROWS / LOCK, "ab") as file:
         try:
@@ -84,23 +76,13 @@ def _lock(descriptor: int) -> None:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
-def append(out: Path, rows: Sequence[Row], columns: Mapping[str, str]) -> None:
-    """Add rows as a file of their own, all or none.
-
-    `columns` by name are "text", "whole", "number" or, one at each probe, "numbers"; cells may be
-    missing.
-    """
+def append(out: Path, rows: Sequence[Row]) -> None:
+    """Add rows as a file of their own, all or none; cells may be missing."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    types = {
-        "text": pa.string(),
-        "whole": pa.int64(),
-        "number": pa.float64(),
-        "numbers": pa.list_(pa.float64()),
-    }
-    schema = pa.schema([(name, types[kind]) for name, kind in columns.items()])
-    table = pa.Table.from_pylist([dict(row) for row in rows], schema=schema)
+    names = dict.fromkeys(name for row in rows for name in row)
+    table = pa.table({name: [row.get(name) for row in rows] for name in names})
     sink = pa.BufferOutputStream()
     pq.write_table(table, sink)
     # Another sweep into the same folder may hold other rows after the same first one.
@@ -108,17 +90,15 @@ def append(out: Path, rows: Sequence[Row], columns: Mapping[str, str]) -> None:
         file.write(sink.getvalue())
 
 
-def read(out: Path, columns: Sequence[str] = ()) -> list[dict[str, Any]]:
-    """All rows, each once, in the order of the design, with the columns of all of them, or only
-    those given.
+def read(out: Path) -> list[dict[str, Any]]:
+    """All rows, each once, in the order of the design, with the columns of all of them.
 
     Raises
     ------
     ValueError
         If there are none, or they cannot be read.
     """
-    wanted = [KEY, INDEX, *columns] if columns else None
-    rows = list({row[KEY]: row for row in _table(out, wanted).to_pylist()}.values())
+    rows = list({row[KEY]: row for row in _table(out).to_pylist()}.values())
     if not rows:
         raise ValueError(f"{out} holds no rows of a sweep; name the folder of one")
     return sorted(rows, key=lambda row: row[INDEX])
@@ -126,13 +106,11 @@ def read(out: Path, columns: Sequence[str] = ()) -> list[dict[str, Any]]:
 
 def names(out: Path) -> dict[str, int]:
     """The names of the rows that are there, and the index of each."""
-    if not any((out / ROWS).glob("part-*.parquet")):
-        return {}
-    table = _table(out, [KEY, INDEX])
+    table = _table(out).select([KEY, INDEX])
     return dict(zip(table[KEY].to_pylist(), table[INDEX].to_pylist(), strict=True))
 
 
-def numbered(wanted: Sequence[str], there: Mapping[str, int]) -> dict[str, int]:
+def numbered(wanted: Iterable[str], there: Mapping[str, int]) -> dict[str, int]:
     """The index of each wanted row, its place in the design; what is added to the rows of another
     design comes after these.
     """
@@ -140,49 +118,34 @@ def numbered(wanted: Sequence[str], there: Mapping[str, int]) -> dict[str, int]:
     if all(places.get(name) == index for name, index in there.items()):
         return places
     first = 1 + max(there.values())
-    return {name: first + k for k, name in enumerate(n for n in wanted if n not in there)}
+    return {name: first + k for k, name in enumerate(n for n in places if n not in there)}
 
 
-def _table(out: Path, columns: list[str] | None) -> Any:
-    """The columns of all files; a ValueError if they are no table of a sweep."""
+def _table(out: Path) -> Any:
+    """The rows of all files; a ValueError if they are no table of a sweep."""
     import pyarrow as pa
 
-    parts = sorted((out / ROWS).glob("part-*.parquet"))
+    empty = pa.table({KEY: pa.array([], pa.string()), INDEX: pa.array([], pa.int64())})
     try:
-        tables = [_part(part, columns) for part in parts]
-        return pa.concat_tables(tables, promote_options="permissive") if tables else pa.table({})
+        parts = [_part(part) for part in sorted((out / ROWS).glob("part-*.parquet"))]
+        return pa.concat_tables([empty, *parts], promote_options="permissive")
     except (OSError, KeyError, ValueError, pa.ArrowException) as error:
         said = " ".join(str(error).split())[:200]
         raise ValueError(f"{out} cannot be read ({said}); choose the folder of a sweep") from None
 
 
-def _part(path: Path, columns: list[str] | None) -> Any:
-    """The columns of one file that it has."""
+def _part(path: Path) -> Any:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     file = pq.ParquetFile(pa.BufferReader(reading.content(path, LARGEST)))
     if file.metadata.num_rows > MOST_ROWS:
         raise ValueError(f"{path.name} has {file.metadata.num_rows:,} rows, as no sweep writes")
-    wanted = {KEY: pa.types.is_string, INDEX: pa.types.is_integer}
-    for field in file.schema_arrow:
-        if not wanted.get(field.name, _is_cell)(field.type):
-            raise ValueError(f"'{field.name[:40]}' is of a type that no sweep has")
-    known = file.schema_arrow.names
-    table = file.read([name for name in columns or known if name in known])
-    if table[KEY].null_count or table[INDEX].null_count:
+    table = file.read()
+    is_named = pa.types.is_string(table[KEY].type) and pa.types.is_integer(table[INDEX].type)
+    if not is_named or table[KEY].null_count or table[INDEX].null_count:
         raise ValueError(f"a row has no {KEY} or no {INDEX}")
     return table
-
-
-def _is_cell(kind: Any) -> bool:
-    """Whether a column is of a type that `append` writes."""
-    from pyarrow import types
-
-    if types.is_list(kind):
-        return bool(types.is_floating(kind.value_type))
-    plain = (types.is_string, types.is_integer, types.is_floating, types.is_null)
-    return any(fits(kind) for fits in plain)
 
 
 def csv_of(rows: Iterable[Row]) -> bytes:

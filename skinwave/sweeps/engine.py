@@ -3,8 +3,7 @@
 Nothing that loads numpy is imported here: a worker process sets its threads before that.
 """
 
-import operator
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
@@ -20,13 +19,7 @@ CONNECTED = 10  # s that a scheduler may take to respond
 
 
 def check(scheduler: str) -> None:
-    """Refuse, before any work, what is not installed.
-
-    Raises
-    ------
-    ValueError
-        If pyarrow or, for an address, distributed is missing.
-    """
+    """Refuse, before any work, what is not installed."""
     extra, needed = "sweep", ["pyarrow"]
     if scheduler not in LOCAL:
         extra, needed = "cluster", [*needed, "distributed"]
@@ -41,13 +34,7 @@ def check(scheduler: str) -> None:
 
 
 def workers(scheduler: str, asked: int | None = None) -> int:
-    """How many runs go on at a time.
-
-    Raises
-    ------
-    ValueError
-        If fewer than one is asked for, or a scheduler does not respond.
-    """
+    """How many runs go on at a time."""
     if asked is not None and asked < 1:
         raise ValueError(f"--workers = {asked} is below 1; give one at least")
     if scheduler in LOCAL:
@@ -81,21 +68,6 @@ def run_all(
                 del left[futures[future]]
         if not left:
             return
-
-
-@contextmanager
-def mapped_on(address: str) -> Iterator[Callable[..., Iterable[Any]]]:
-    """A function like the built-in `map` whose calls are spread over the workers of a scheduler."""
-    with _client(address) as client:
-
-        def mapped(work: Callable[..., Any], *items: Iterable[Any]) -> Iterator[Any]:
-            # What the function holds, such as a body's matrices, goes to each worker once.
-            sent = client.scatter(work, broadcast=True)
-            calls = zip(*items, strict=True)
-            futures = [client.submit(operator.call, sent, *each, pure=False) for each in calls]
-            return (future.result() for future in futures)
-
-        yield mapped
 
 
 @contextmanager

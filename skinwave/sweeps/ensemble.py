@@ -7,8 +7,9 @@ samples that differ by that alone are solved once.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,9 +32,12 @@ from skinwave.models.reduced import components, prepare, reduction_tolerance
 from skinwave.planning.simulate import compute
 from skinwave.report.styles import SHOWN
 from skinwave.results.surface import REACH, SILENT, grid, has_wavenumber_integral
+from skinwave.scene.distributions import Spread
 from skinwave.scene.scene import Scene
-from skinwave.scene.spreads import PRESSURE, Spread, spreads_of, with_values
+from skinwave.scene.spreads import PRESSURE, spreads_of
+from skinwave.scene.variation import with_values
 from skinwave.sweeps import engine
+from skinwave.sweeps.measures import plain, unit_of
 from skinwave.sweeps.sampling import one_at_a_time, samples
 from skinwave.system.effort import Progress, one_thread, silent
 
@@ -43,31 +47,24 @@ ALONE = 2 * BATCH  # samples up to which no other process is worth its start
 STEP = 0.004  # m between places of a map
 FAINT = 1e-3  # of the load's strongest line: lines that no sample has
 ROUND_OFF = 1e-12  # of the largest line
-KEPT = 4  # solutions that may differ by the pressure alone
 # Quantiles of each number between which bodies are reduced together: a palm takes 785 vectors for
 # those of a hundred samples, and more than one model has for the farthest of 256.
 SHARED = (0.01, 0.99)
-HIGHEST_LEVEL = "highest sensation level at a probe, dB"  # an output
-NO_MAP = np.zeros((0, 0))
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Method:
-    """How samples are solved: names of the `lines` that are looked at, the `model` with its element
-    size `h` in metre, its `solver` and its `tolerance`; whether it is `mapped`, by the wavenumber
-    integral; whether all samples have one load, `same_load`, but for its pressure; the `family` of
-    their bodies, if these are reduced together; and whether all are `steady`, as those then are.
+    """How samples are solved: names of the `lines` that are looked at, and the `options` where it
+    is not `mapped`, by the wavenumber integral; whether all samples have one load, `same_load`,
+    but for its pressure; and the `family` of their bodies, if these are reduced together, for the
+    steady state.
     """
 
     lines: tuple[str, ...]
-    model: str
-    h: float | None = None
-    solver: str = "auto"
-    tolerance: float = 0.05
+    options: SolveOptions
     mapped: bool = False
     same_load: bool = False
     family: Covering | None = None
-    steady: bool = False
 
     @property
     def words(self) -> str:
@@ -75,22 +72,11 @@ class Method:
         if self.mapped:
             return "by the wavenumber integral, in the steady state"
         together = ", nearly all of one reduced-order model, in the steady state"
-        return f"by {self.model}{together if self.family else ''}"
+        return f"by {self.options.model}{together if self.family else ''}"
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Solution:
-    """Vibration about the mean of one sample.
-
-    Parameters
-    ----------
-    waveform : (t, p) float, the last `SHOWN` of a Tacton
-    lines : (f, p) float, amplitudes of the named lines
-    rms : (p,) float, all in the unit of the response
-    level : (p,) float, dB, the highest sensation level of its lines, were it skin; `SILENT` and
-        less where nothing vibrates
-    map_rms, map_level : (ny, nx) float, the same on a map; of no size without one
-    """
+class Solution(NamedTuple):
+    """Vibration of one sample about its mean, as of `Ensemble`."""
 
     waveform: Floats
     lines: Floats
@@ -101,8 +87,8 @@ class Solution:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Ensemble(Solution):
-    """Solutions of n samples of a scene, whose arrays have n for their first axis.
+class Ensemble:
+    """Vibration of n samples of a scene about their means, in the unit of the response.
 
     Parameters
     ----------
@@ -110,12 +96,24 @@ class Ensemble(Solution):
     method : Method
     spreads : (d,) Spread, the uncertain numbers
     values : (n, d) float, in the units of their keys
+    waveform : (n, t, p) float, the last `SHOWN` of a Tacton
+    lines : (n, f, p) float, amplitudes of the named lines
+    rms : (n, p) float
+    level : (n, p) float, dB, the highest sensation level of its lines, were it skin; `SILENT` and
+        less where nothing vibrates
+    map_rms, map_level : (n, ny, nx) float, the same on a map; of no size without one
     """
 
     scene: Scene
     method: Method
     spreads: tuple[Spread, ...]
     values: Floats
+    waveform: Floats
+    lines: Floats
+    rms: Floats
+    level: Floats
+    map_rms: Floats
+    map_level: Floats
 
     @property
     def has_map(self) -> bool:
@@ -128,11 +126,9 @@ class Ensemble(Solution):
         return self.scene.reading.is_plain and self.scene.body.is_skin
 
     @property
-    def area(self) -> Floats:
-        """Area (n,) in m2 of the map that is above the threshold of detection."""
-        x, y = map_axes(self.scene)
-        place = (x[1] - x[0]) * (y[1] - y[0])
-        return np.asarray((self.map_level >= 0).sum(axis=(1, 2)) * place)
+    def strongest(self) -> int:
+        """The probe of largest median RMS."""
+        return int(np.argmax(np.median(self.rms, axis=0)))
 
 
 def propagate(
@@ -140,52 +136,32 @@ def propagate(
     n: int,
     *,
     model: str = HARMONIC.name,
-    h: float | None = None,
-    solver: str = "auto",
     seed: int = 0,
     workers: int = 1,
     progress: Progress = silent,
+    **options: Any,
 ) -> Ensemble:
-    """Ensemble of a scene under a Latin hypercube of its uncertain numbers.
+    """Ensemble of a scene under a Latin hypercube of n samples of its uncertain numbers.
 
-    Parameters
-    ----------
-    scene : Scene
-    n : samples
-    model : of the response where the wavenumber integral is not exact
-    h : metre, its element size
-    solver : a backend of `fem.linear_solver`
-    seed : of the samples
-    workers : processes; with several, a script needs `if __name__ == "__main__"`
-    progress : called with the name of the phase and the fraction done
-
-    Returns
-    -------
-    Ensemble
-
-    Raises
-    ------
-    ValueError
-        If nothing is uncertain, or a sample makes no scene or is refused by the model.
+    The model and the `options`, h and solver, are those of `SolveOptions`, where the wavenumber
+    integral is not exact. With several `workers`, processes, a script needs
+    `if __name__ == "__main__"`. Raises a ValueError if nothing is uncertain, or a sample makes no
+    scene or is refused by the model.
     """
     spreads = spreads_of(scene)
     values = samples(spreads, n, seed)
-    method = method_of(scene, model, h=h, solver=solver)
-    family = shared_body(
-        scene, spreads, np.vstack([values, one_at_a_time(spreads)]), method, progress
-    )
-    method = replace(method, family=family, steady=family is not None)
+    method = method_of(scene, SolveOptions(model=model, **options))
+    every = np.vstack([values, one_at_a_time(spreads)])
+    method = replace(method, family=shared_body(scene, spreads, every, method, progress))
     return ensemble(scene, spreads, values, method, workers=workers, progress=progress)
 
 
-def method_of(scene: Scene, model: str, *, h: float | None = None, solver: str = "auto") -> Method:
-    """Method that samples of a scene are solved by; `model`, `h` and `solver` where the wavenumber
-    integral is not exact.
-    """
+def method_of(scene: Scene, options: SolveOptions) -> Method:
+    """Method that samples of a scene are solved by, each with a body of its own."""
     lines = tuple(named_lines(scene.pressure, WEAKEST, most=MOST))
     same = all(s.part == "material" or s.key == PRESSURE for s in spreads_of(scene))
     mapped = has_wavenumber_integral(scene) and scene.reading.is_plain
-    return Method(lines=lines, model=model, h=h, solver=solver, mapped=mapped, same_load=same)
+    return Method(lines=lines, options=options, mapped=mapped, same_load=same)
 
 
 def shared_body(
@@ -198,26 +174,18 @@ def shared_body(
     """One reduction for the bodies of nearly all samples (n, d), cached on disk; None if bodies of
     their own cost less, or no reduction serves them.
     """
-    free = {
-        spread.key: _range(spread, column)
-        for spread, column in zip(spreads, values.T, strict=True)
-        if spread.key != PRESSURE
-    }
-    of_elements = method.model == FEM.name and method.same_load and not method.mapped
+    free = {}
+    for spread, column in zip(spreads, values.T, strict=True):
+        if spread.key != PRESSURE:
+            low, high = spread.at(SHARED)
+            free[spread.key] = max(low, float(column.min())), min(high, float(column.max()))
+    of_elements = method.options.model == FEM.name and method.same_load and not method.mapped
     if not (free and of_elements and scene.reading.is_plain and scene.pressure.peak_pressure):
         return None
-    found = covering(scene, free, len(values), method.tolerance)
-    options = SolveOptions(
-        h=method.h or default_size(scene.body), tolerance=method.tolerance, solver=method.solver,
-        progress=progress,
-    )  # fmt: skip
-    return found if tried_together(found, options) else None
-
-
-def _range(spread: Spread, values: Floats) -> tuple[float, float]:
-    """Range of values (n,) of a number without its ends, which few of them are in."""
-    low, high = spread.distribution.quantile(spread.value, np.array(SHARED)).tolist()
-    return max(low, float(values.min())), min(high, float(values.max()))
+    found = covering(scene, free, len(values), method.options.tolerance)
+    size = method.options.h or default_size(scene.body)
+    asked = replace(method.options, h=size, progress=progress)
+    return found if tried_together(found, asked) else None
 
 
 def ensemble(
@@ -229,15 +197,15 @@ def ensemble(
     workers: int = 1,
     progress: Progress = silent,
 ) -> Ensemble:
-    """Ensemble of given samples (n, d) of a scene, the same whatever the number of processes.
-
-    Raises
-    ------
-    ValueError
-        If a sample makes no scene, or is refused by the model.
-    """
+    """Ensemble of given samples (n, d) of a scene, the same whatever the number of processes."""
     keys = tuple(spread.key for spread in spreads)
-    batches = np.split(values, range(BATCH, len(values), BATCH))
+    alike, peaks = values.copy(), np.ones(len(values))
+    if PRESSURE in keys and _goes_with_pressure(scene, method):
+        k = keys.index(PRESSURE)
+        if (values[:, k] > 0).all():
+            peaks, alike[:, k] = values[:, k], 1.0
+    alike, place = np.unique(alike, axis=0, return_inverse=True)
+    batches = np.split(alike, range(BATCH, len(alike), BATCH))
     solved: dict[int, list[Solution]] = {}
 
     def done(k: int, found: list[Solution]) -> None:
@@ -245,7 +213,7 @@ def ensemble(
         progress("samples", len(solved) / len(batches))
 
     work = partial(_batch, scene, keys, method)
-    if workers > 1 and len(values) > ALONE:
+    if workers > 1 and len(alike) > ALONE:
         engine.run_all(work, batches, "processes", workers, done)
     else:
         with one_thread():
@@ -254,20 +222,44 @@ def ensemble(
     if len(solved) < len(batches):
         raise ValueError("workers were killed; give them more memory, or take fewer of them")
     every = [solution for k in range(len(batches)) for solution in solved[k]]
-    arrays = {f.name: np.stack([getattr(s, f.name) for s in every]) for f in fields(Solution)}
-    return Ensemble(scene=scene, method=method, spreads=tuple(spreads), values=values, **arrays)
+    found = Solution(*(np.stack(each)[place.ravel()] for each in zip(*every, strict=True)))
+    return Ensemble(
+        scene=scene, method=method, spreads=tuple(spreads), values=values,
+        **_raised(found, peaks)._asdict(),
+    )  # fmt: skip
+
+
+def _goes_with_pressure(scene: Scene, method: Method) -> bool:
+    return isinstance(scene.pressure.profile, str) and (
+        method.mapped or is_linear(scene, method.options.model)
+    )
+
+
+def is_linear(scene: Scene, name: str) -> bool:
+    """Whether the vibration by a model is in proportion to the pressure."""
+    model = named(name)
+    linear = (model.is_reduced or model.is_infinite or model.is_steady) and not model.is_nonlinear
+    alone = not (scene.load.gravity or scene.load.support_motion)
+    return scene.reading.is_plain and linear and alone
+
+
+def _raised(found: Solution, factors: Floats) -> Solution:
+    """Solutions of n samples whose pressure is times factors (n,)."""
+    raised = 20 * np.log10(factors)
+    return Solution(*(
+        (each.T + raised).T if "level" in name else (each.T * factors).T
+        for name, each in found._asdict().items()
+    ))  # fmt: skip
 
 
 def _batch(scene: Scene, keys: tuple[str, ...], method: Method, values: Floats) -> list[Solution]:
     """Solutions of some samples (b, d), on a worker."""
     found = []
-    for row in values:
-        changed = dict(zip(keys, map(float, row), strict=True))
-        own = method
-        if method.family and not method.family.has(changed):
-            own = replace(method, family=None)
+    for row in values.tolist():
+        changed = dict(zip(keys, row, strict=True))
+        together = method.family is not None and method.family.has(changed)
         try:
-            found.append(solve(with_values(scene, changed), own))
+            found.append(solve(with_values(scene, changed), method, together=together))
         except ValueError as error:
             said = ", ".join(f"{key} = {x:.4g}" for key, x in changed.items())
             raise ValueError(
@@ -277,19 +269,27 @@ def _batch(scene: Scene, keys: tuple[str, ...], method: Method, values: Floats) 
     return found
 
 
-def outputs(found: Ensemble) -> dict[str, Floats]:
-    """Scalar outputs (n,) of an ensemble by name, with the unit of each."""
-    asked = found.scene.reading.asked
-    per = asked.per_unit
-    named = {
-        f"RMS at ({1e3 * x:g}, {1e3 * y:g}) mm, {asked.shown}": per * found.rms[:, p]
-        for p, (x, y) in enumerate(found.scene.probes)
-    }
+def rows_of(found: Ensemble) -> list[dict[str, Any]]:
+    """The samples as rows of a sweep: their numbers, and columns at the probes."""
+    scene, record = found.scene, found.scene.reading.asked
+    unit, per, names = unit_of(record), record.per_unit, found.method.lines
+    columns: dict[str, Floats] = {f"rms_{unit}": per * found.rms}
     if found.is_skin:
-        named[HIGHEST_LEVEL] = found.level.max(axis=1)
+        columns["level_db"] = found.level
         if found.has_map:
-            named["area above threshold, cm²"] = 1e4 * found.area
-    return named
+            x, y = map_axes(scene)
+            place = 1e4 * (x[1] - x[0]) * (y[1] - y[0])
+            columns["above_threshold_cm2"] = place * (found.map_level >= 0).sum(axis=(1, 2))
+    columns |= {f"{name}_{unit}": per * found.lines[:, k] for k, name in enumerate(names)}
+    same: dict[str, Any] = {
+        f"{name}_hz": line_frequency(scene.tacton, name) or 0.0 for name in names
+    }
+    same |= {f"probe_{axis}_mm": 1e3 * scene.probe_points[:, k] for k, axis in enumerate("xy")}
+    keys = [spread.key for spread in found.spreads]
+    return [
+        dict(zip(keys, row, strict=True)) | plain(same | {n: x[i] for n, x in columns.items()})
+        for i, row in enumerate(found.values.tolist())
+    ]
 
 
 def shown_times(scene: Scene) -> Floats:
@@ -303,69 +303,47 @@ def map_axes(scene: Scene) -> tuple[Floats, Floats]:
     return grid(scene, REACH, STEP)
 
 
-def solve(scene: Scene, method: Method) -> Solution:
-    """Solution of one sample; raises a ValueError if the model refuses the scene."""
-    peak = scene.pressure.peak_pressure
-    in_proportion = method.mapped or is_linear(scene, method.model)
-    if not (peak and isinstance(scene.pressure.profile, str) and in_proportion):
-        return _solved(scene, method)
-    unit = replace(scene, pressure=replace(scene.pressure, peak_pressure=1.0), spreads=())
-    found, raised = _of_unit_pressure(unit, method), 20 * np.log10(peak)
+def solve(scene: Scene, method: Method, *, together: bool = True) -> Solution:
+    """Solution of one sample, of the reduced-order model of all if its body is one of those
+    `together`; raises a ValueError if the model refuses the scene.
+    """
+    of_map: tuple[int, ...] = (0, 0)
+    how = method.options
+    if method.mapped:
+        of_map, (f, a) = _mapped(scene, method)
+    elif method.family and together:
+        size = how.h or default_size(method.family.scene.body)
+        shared = kept_together(method.family, size, how.tolerance, how.solver)
+        f, a = lines_of(shared, scene.body)
+        a = a * (scene.pressure.peak_pressure / method.family.scene.pressure.peak_pressure)
+    elif method.family:
+        own = prepare(
+            scene.body, scene.probe_points, h=how.h, solver=how.solver,
+            tolerance=reduction_tolerance(how.tolerance), reading=scene.reading, load=scene.load,
+        )  # fmt: skip
+        motion = components(own, *scene.loads)
+        f, a = motion.frequencies, motion.lines
+    else:
+        return _computed(scene, method)
+    f, a = f[f > 0], a[f > 0]
+    p = len(scene.probes)
+    rms, levels = np.sqrt((np.abs(a) ** 2).sum(axis=0) / 2), _highest(f, np.abs(a))
     return Solution(
-        waveform=peak * found.waveform, lines=peak * found.lines, rms=peak * found.rms,
-        level=found.level + raised, map_rms=peak * found.map_rms,
-        map_level=found.map_level + raised,
+        waveform=synthesise(f, a[:, :p], shown_times(scene)),
+        lines=_at(_frequencies(scene, method), f, np.abs(a[:, :p])), rms=rms[:p], level=levels[:p],
+        map_rms=rms[p:].reshape(of_map), map_level=levels[p:].reshape(of_map),
     )  # fmt: skip
 
 
-def is_linear(scene: Scene, name: str) -> bool:
-    """Whether the vibration by a model is in proportion to the pressure."""
-    model = named(name)
-    linear = (model.is_reduced or model.is_infinite or model.is_steady) and not model.is_nonlinear
-    alone = not (scene.load.gravity or scene.load.support_motion)
-    return scene.reading.is_plain and linear and alone
-
-
-@lru_cache(maxsize=KEPT)
-def _of_unit_pressure(scene: Scene, method: Method) -> Solution:
-    return _solved(scene, method)
-
-
-def _solved(scene: Scene, method: Method) -> Solution:
-    wanted = [line_frequency(scene.tacton, name) for name in method.lines]
-    frequencies = np.array([f or 0.0 for f in wanted])
-    if method.family:
-        return _of_family(scene, method, method.family, frequencies)
-    if method.steady:
-        return _alone(scene, method, frequencies)
-    return (_mapped if method.mapped else _computed)(scene, method, frequencies)
-
-
-def _computed(scene: Scene, method: Method, frequencies: Floats) -> Solution:
-    """Solution by a model, at the probes."""
-    response = compute(
-        scene, method.model, tolerance=method.tolerance, h=method.h, solver=method.solver
-    )
-    settled = response.values[int(SETTLE * len(response.times)) :]
-    motion = response.values[-len(shown_times(scene)) :] - settled.mean(axis=0)
-    lines = np.abs(phasors(response, frequencies)) * (frequencies > 0)[:, None]
-    return Solution(
-        waveform=motion, lines=lines, rms=settled.std(axis=0),
-        level=_highest(frequencies, lines), map_rms=NO_MAP, map_level=NO_MAP,
-    )  # fmt: skip
-
-
-def _mapped(scene: Scene, method: Method, frequencies: Floats) -> Solution:
-    """Solution by the wavenumber integral, at the probes and on the map."""
+def _mapped(scene: Scene, method: Method) -> tuple[tuple[int, int], tuple[Floats, Complex]]:
+    """Shape of the map; lines by the wavenumber integral, at the probes and then on the map."""
     x, y = map_axes(scene)
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     points, waves = np.vstack([scene.probe_points, places]), compliance(scene.body)
     if method.same_load:
         operator = _operator(scene.pressure, tuple(map(tuple, points.tolist())))
-        f, a = operator.steady_lines(waves)
-    else:
-        f, a = steady_lines(waves, scene.pressure, points, threshold=FAINT)
-    return _of_lines(scene, frequencies, f, a, (len(y), len(x)))
+        return (len(y), len(x)), operator.steady_lines(waves)
+    return (len(y), len(x)), steady_lines(waves, scene.pressure, points, threshold=FAINT)
 
 
 @lru_cache(maxsize=2)
@@ -373,48 +351,29 @@ def _operator(pressure: MovingPressure, points: tuple[tuple[float, ...], ...]) -
     return path_operator(pressure, points, threshold=FAINT)
 
 
-def _of_family(scene: Scene, method: Method, family: Covering, frequencies: Floats) -> Solution:
-    """Solution by the reduced-order model of all samples' bodies, at the probes."""
-    size = method.h or default_size(family.scene.body)
-    shared = kept_together(family, size, method.tolerance, method.solver)
-    f, a = lines_of(shared, scene.body)
-    ratio = scene.pressure.peak_pressure / family.scene.pressure.peak_pressure
-    return _of_lines(scene, frequencies, f, ratio * a, NO_MAP.shape)
-
-
-def _alone(scene: Scene, method: Method, frequencies: Floats) -> Solution:
-    """Solution in the steady state by a reduced-order model of one sample's body, at the probes."""
-    prepared = prepare(
-        scene.body, scene.probe_points, h=method.h, solver=method.solver,
-        tolerance=reduction_tolerance(method.tolerance), reading=scene.reading, load=scene.load,
-    )  # fmt: skip
-    motion = components(prepared, *scene.loads)
-    return _of_lines(scene, frequencies, motion.frequencies, motion.lines, NO_MAP.shape)
-
-
-def _of_lines(
-    scene: Scene, frequencies: Floats, f: Floats, a: Complex, of_map: tuple[int, ...]
-) -> Solution:
-    """Solution in the steady state, of lines (f, p + ny nx) at the probes and then on a map."""
-    f, a = f[f > 0], a[f > 0]
-    p = len(scene.probes)
-    rms = np.sqrt((np.abs(a) ** 2).sum(axis=0) / 2)
+def _computed(scene: Scene, method: Method) -> Solution:
+    """Solution by a model, at the probes."""
+    how = method.options
+    response = compute(scene, how.model, tolerance=how.tolerance, h=how.h, solver=how.solver)
+    settled = response.values[int(SETTLE * len(response.times)) :]
+    motion = response.values[-len(shown_times(scene)) :] - settled.mean(axis=0)
+    frequencies, no_map = _frequencies(scene, method), np.zeros((0, 0))
+    lines = np.abs(phasors(response, frequencies)) * (frequencies > 0)[:, None]
     return Solution(
-        waveform=synthesise(f, a[:, :p], shown_times(scene)),
-        lines=_at(frequencies, f, np.abs(a[:, :p])),
-        rms=rms[:p],
-        level=_highest(f, np.abs(a[:, :p])),
-        map_rms=rms[p:].reshape(of_map),
-        map_level=_highest(f, np.abs(a[:, p:])).reshape(of_map),
-    )
+        waveform=motion, lines=lines, rms=settled.std(axis=0), level=_highest(frequencies, lines),
+        map_rms=no_map, map_level=no_map,
+    )  # fmt: skip
+
+
+def _frequencies(scene: Scene, method: Method) -> Floats:
+    """Frequencies (f,) in Hz of the named lines, 0 of one that a sample has not."""
+    return np.array([line_frequency(scene.tacton, name) or 0.0 for name in method.lines])
 
 
 def _at(frequencies: Floats, f: Floats, amplitudes: Floats) -> Floats:
     """Amplitudes (g, p) at frequencies (g,) of lines at f (f,), which are 0 where there is none."""
-    found = np.zeros((len(frequencies), amplitudes.shape[1]))
-    for row, frequency in zip(found, frequencies, strict=True):
-        near = np.abs(f - frequency) < 1e-6 * max(frequency, 1.0)
-        row[:] = amplitudes[near].sum(axis=0)
+    near = np.abs(f - frequencies[:, None]) < 1e-6 * np.maximum(frequencies, 1.0)[:, None]
+    found = near @ amplitudes
     return np.where(found > ROUND_OFF * found.max(initial=0.0), found, 0.0)
 
 

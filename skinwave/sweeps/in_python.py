@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -15,12 +15,13 @@ from simple_model import drawing
 from simple_model.choices import choose
 from simple_model.numbers import counted
 from simple_model.response import library
+from skinwave.models.options import SolveOptions
 from skinwave.scene.file import dumps
 from skinwave.scene.scene import Scene
-from skinwave.scene.variation import DesignPoint, Variation, cases_of, combinations, parse
-from skinwave.sweeps import best, dataset
-from skinwave.sweeps.reductions import ModelOptions
+from skinwave.scene.variation import Choice, Variation, cases_of, combinations, parse
+from skinwave.sweeps import best
 from skinwave.sweeps.sweep import Sweep
+from skinwave.sweeps.table_figures import axis_label, curves, finished, value
 from skinwave.system.effort import Progress
 from skinwave.system.progress_bar import reported
 from skinwave.system.table import shown
@@ -73,8 +74,6 @@ class SweepTable:
         """Draw a column over a key, with a curve for each value of another; those that were varied
         if they are not given. Of what is told at every probe the largest, or that of "peak_um[2]".
         """
-        from skinwave.sweeps.table_figures import axis_label, curves, finished
-
         choose("column", column.partition("[")[0], self.columns)
         x = x or self.varied[0]
         others = [key for key in self.varied if key != x]
@@ -90,7 +89,10 @@ class SweepTable:
 
     def _repr_html_(self) -> str:
         names = [*self.varied, *(name for name in RESULTS if name in self.columns)]
-        rows = [[shown(_cell(row.get(name))) for name in names] for row in self.rows[:SHOWN]]
+        rows = [
+            [shown(row.get(name) if name in self.varied else value(row, name)) for name in names]
+            for row in self.rows[:SHOWN]
+        ]
         image = b""
         if len(self.failed) < len(self):
             image = drawing.picture(lambda figure: self.plot(ax=figure.subplots()), 4.5, 3.0)
@@ -138,12 +140,12 @@ def sweep(
         If a key or a value is none of a scene, or the extra "sweep" is not installed.
     """
     variations = [_variation(key, values) for key, values in vary.items()]
-    wanted = _cases(scene)(combinations(variations, design, samples, seed))
-    with _made(**options) as made:
-        if made.run(wanted).interrupted:
+    combined = combinations(variations, design, samples, seed)
+    with _made(scene, **options) as made:
+        points = made.points(combined)
+        if made.run(points).interrupted:
             raise KeyboardInterrupt
-        there = {row[dataset.KEY]: row for row in dataset.read(made.folder)}
-    rows = tuple(there[name] for name in made.by_name(wanted) if name in there)
+        rows = tuple(made.rows(points))
     return SweepTable(rows=rows, varied=tuple(v.key for v in variations))
 
 
@@ -178,32 +180,33 @@ def best_value(
         If several keys vary, their values are not numbers, there is no such column of numbers, or
         as `sweep` does.
     """
-    variations, cases = [_variation(key, values) for key, values in vary.items()], _cases(scene)
-    best.check(variations, column, cases(combinations(variations)), samples)
-    with _made(**options) as made:
-        return best.best_value(made, cases, variations[0], column, samples, seed)
+    varied = best.check([_variation(key, values) for key, values in vary.items()], samples)
+    with _made(scene, **options) as made:
+        return best.best_value(made, varied, column, samples, seed)
 
 
 @contextmanager
 def _made(
+    scene: Scene,
     *,
+    model: str = "auto",
+    tolerance: float = 0.05,
+    h: float | None = None,
+    solver: str = "auto",
     folder: str | Path | None = None,
     scheduler: str = "threads",
     workers: int | None = None,
     progress: Progress | bool | None = None,
-    **options: Any,
 ) -> Iterator[Sweep]:
     """The sweep of options, in a folder that is removed if none is given."""
+    table = tomllib.loads(dumps(scene))
+    options = SolveOptions(model=model, tolerance=tolerance, h=h, solver=solver)
     with reported(progress) as report, tempfile.TemporaryDirectory() as own:
         yield Sweep(
             folder=Path(own) / "sweep" if folder is None else Path(folder),
-            options=ModelOptions(**options), progress=report, scheduler=scheduler, workers=workers,
+            points=partial(cases_of, table, table), options=options, progress=report,
+            scheduler=scheduler, workers=workers,
         )  # fmt: skip
-
-
-def _cases(scene: Scene) -> Callable[[Sequence[Mapping[str, Any]]], list[DesignPoint]]:
-    table = tomllib.loads(dumps(scene))
-    return partial(cases_of, table, table)
 
 
 def _variation(key: str, values: Values) -> Variation:
@@ -212,11 +215,4 @@ def _variation(key: str, values: Values) -> Variation:
     checked = parse(f"{key}=0")  # which refuses an unknown key
     # Numbers of numpy as a file has them.
     plain = (value.item() if hasattr(value, "item") else value for value in values)
-    return Variation(key=checked.key, values=tuple(plain))
-
-
-def _cell(value: Any) -> Any:
-    """The largest entry of a list over the probes."""
-    if isinstance(value, list):
-        return max((x for x in value if x is not None), default=None)
-    return value
+    return Choice(key=checked.key, values=tuple(plain))

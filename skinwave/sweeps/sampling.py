@@ -6,18 +6,17 @@ if all others do (Saltelli et al., Comput Phys Commun 181:259 (2010), eq. 1 and 
 evaluations estimate them, with standard errors of about 1 / sqrt(n).
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from meshes.tetmesh import Floats
-from skinwave.scene.spreads import Spread
+from skinwave.scene.distributions import Spread
+from skinwave.scene.variation import MOST_RUNS, combinations
 
-EDGE = 1e-9  # of the unit interval, which keeps quantiles finite
-MOST = 100_000  # samples
 ENDS = (0.05, 0.95)  # quantiles that a number is moved to
-FIFTH = 0.2  # of the runs, at each end of a number
 RESAMPLES = 200  # of the standard errors, by bootstrap
 TAIL = 1.96  # standard errors of a 95 % interval
 PERCENTILES = (5, 25, 50, 75, 95)
@@ -29,27 +28,9 @@ def percentiles(values: Floats) -> Floats:
 
 
 def samples(spreads: Sequence[Spread], n: int, seed: int = 0) -> Floats:
-    """Latin hypercube of independent numbers (McKay et al., Technometrics 21:239 (1979)).
-
-    Parameters
-    ----------
-    spreads : (d,) Spread
-    n : how many
-    seed : the same samples for the same seed
-
-    Returns
-    -------
-    (n, d) float, each in the unit of its key
-
-    Raises
-    ------
-    ValueError
-        If nothing is uncertain, or there are too few or too many samples.
-    """
-    from scipy.stats import qmc
-
+    """Latin hypercube (n, d) of independent numbers (d,), each in the unit of its key."""
     check(spreads, n, seed)
-    return quantiles(spreads, qmc.LatinHypercube(len(spreads), rng=seed).random(n))
+    return np.array([list(each.values()) for each in combinations(spreads, "lhs", n, seed)])
 
 
 def check(spreads: Sequence[Spread], n: int, seed: int) -> None:
@@ -59,17 +40,10 @@ def check(spreads: Sequence[Spread], n: int, seed: int) -> None:
             "nothing in this scene is uncertain; give a number a spread, such as "
             "thickness_mm = { value = 15, spread = 0.2 }"
         )
-    if not 2 <= n <= MOST:
-        raise ValueError(f"{n:,} samples are outside 2..{MOST:,}; give another --samples")
+    if not 2 <= n <= MOST_RUNS:
+        raise ValueError(f"{n:,} samples are outside 2..{MOST_RUNS:,}; give another --samples")
     if seed < 0:
         raise ValueError(f"--seed = {seed} is below 0; give 0 or a whole number above")
-
-
-def quantiles(spreads: Sequence[Spread], shares: Floats) -> Floats:
-    """Quantiles (n, d) of numbers (d,), at shares (n, d) of 0 to 1."""
-    clipped = np.clip(shares, EDGE, 1 - EDGE)
-    columns = [s.distribution.quantile(s.value, u) for s, u in zip(spreads, clipped.T, strict=True)]
-    return np.stack(columns, axis=1)
 
 
 def one_at_a_time(spreads: Sequence[Spread]) -> Floats:
@@ -77,9 +51,8 @@ def one_at_a_time(spreads: Sequence[Spread]) -> Floats:
     others at their central values.
     """
     found = np.tile([s.value for s in spreads], (1 + 2 * len(spreads), 1))
-    ends = quantiles(spreads, np.tile(np.array(ENDS)[:, None], len(spreads)))
-    for k in range(len(spreads)):
-        found[1 + 2 * k : 3 + 2 * k, k] = ends[:, k]
+    for k, spread in enumerate(spreads):
+        found[1 + 2 * k : 3 + 2 * k, k] = spread.at(ENDS)
     return found
 
 
@@ -97,27 +70,11 @@ class Tornado:
         return [int(k) for k in np.argsort(-np.abs(self.high - self.low), kind="stable")]
 
 
-def tornado(
-    evaluate: Callable[[Floats], Mapping[str, Floats]], spreads: Sequence[Spread]
-) -> dict[str, Tornado]:
-    """Outputs by name of a function of numbers (m, d), with one number at a time at its ends."""
-    found = evaluate(one_at_a_time(spreads))
+def tornado(outputs: Mapping[str, Floats]) -> dict[str, Tornado]:
+    """Chart of each output (1 + 2 d,) by name, of the samples of `one_at_a_time`."""
     return {
-        name: Tornado(centre=float(y[0]), low=y[1::2], high=y[2::2]) for name, y in found.items()
+        name: Tornado(centre=float(y[0]), low=y[1::2], high=y[2::2]) for name, y in outputs.items()
     }
-
-
-def tornado_of_fifths(numbers: Floats, output: Floats) -> Tornado:
-    """Mean output (n,) over the fifths of runs in which each of the numbers (n, d) is least and
-    largest.
-    """
-    part = max(1, round(FIFTH * len(output)))
-    order = np.argsort(numbers, axis=0, kind="stable")
-    return Tornado(
-        centre=float(output.mean()),
-        low=output[order[:part]].mean(axis=0),
-        high=output[order[-part:]].mean(axis=0),
-    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -134,52 +91,33 @@ class SobolIndices:
 
 
 def sobol_indices(values: Floats, d: int, seed: int = 0) -> SobolIndices:
-    """Sobol' indices of one output, with their intervals by bootstrap.
-
-    Parameters
-    ----------
-    values : (n (d + 2),) float, at the samples of `saltelli_shares`
-    d : how many numbers
-    seed : of the bootstrap
-
-    Returns
-    -------
-    SobolIndices; all 0 of an output that does not vary
-
-    Raises
-    ------
-    ValueError
-        If there are not so many values, or one is not finite.
+    """Sobol' indices of one output (n (d + 2),) at the samples of `saltelli_shares` of d numbers,
+    all 0 if it does not vary, with their intervals by bootstrap.
     """
-    from scipy import stats
-
     n, rest = divmod(len(values), d + 2)
     if rest or not np.isfinite(values).all():
         raise ValueError(
             f"{len(values)} values are not those of {d} + 2 matrices, all finite; take a design of "
             "its own, and an output that has a value in each run"
         )
-    a, b, *mixed = np.split(values, d + 2)
     if np.ptp(values) <= 1e-12 * np.abs(values).max(initial=0.0):
         none = np.zeros(d)
         return SobolIndices(first=none, total=none, first_error=none, total_error=none, n=n)
-    mean = np.concatenate([a, b]).mean()  # the estimators lose digits to a large mean
-    parts = {"f_A": a - mean, "f_B": b - mean, "f_AB": np.stack(mixed)[:, None] - mean}
-    found = stats.sobol_indices(func={k: np.atleast_2d(v) for k, v in parts.items()}, n=n, rng=seed)
-    errors = _bootstrap(parts, seed)
-    return SobolIndices(
-        first=np.atleast_1d(found.first_order), total=np.atleast_1d(found.total_order),
-        first_error=TAIL * errors[0], total_error=TAIL * errors[1], n=n,
-    )  # fmt: skip
+    matrices = values.reshape(d + 2, n)
+    matrices = matrices - matrices[:2].mean()  # the estimators lose digits to a large mean
+    first, total = _estimates(matrices, np.arange(n)[None])[..., 0]
+    drawn = np.random.default_rng(seed).integers(n, size=(RESAMPLES, n))
+    errors = TAIL * _estimates(matrices, drawn).std(axis=2, ddof=1)
+    return SobolIndices(first=first, total=total, first_error=errors[0], total_error=errors[1], n=n)
 
 
-def _bootstrap(parts: Mapping[str, Floats], seed: int) -> Floats:
-    """Standard errors (2, d) of both indices, of samples drawn again; estimators of Saltelli et al.
-    (2010), table 2 b and f.
+def _estimates(matrices: Floats, drawn: NDArray[np.int_]) -> Floats:
+    """Both indices (2, d, r) of rows (r, n) of matrices (d + 2, n): A, B, and A with columns of B.
+
+    Saltelli et al. (2010), table 2 b and f.
     """
-    a, b, mixed = parts["f_A"], parts["f_B"], parts["f_AB"][:, 0]
-    drawn = np.random.default_rng(seed).integers(len(a), size=(RESAMPLES, len(a)))
-    variance = np.concatenate([a[drawn], b[drawn]], axis=1).var(axis=1)
-    first = (b[drawn] * (mixed[:, drawn] - a[drawn])).mean(axis=2) / variance
-    total = ((a[drawn] - mixed[:, drawn]) ** 2).mean(axis=2) / (2 * variance)
-    return np.stack([first.std(axis=1, ddof=1), total.std(axis=1, ddof=1)])
+    a, b, *mixed = matrices[:, drawn]
+    variance = np.concatenate([a, b], axis=1).var(axis=1)
+    first = [(b * (each - a)).mean(axis=1) / variance for each in mixed]
+    total = [((a - each) ** 2).mean(axis=1) / (2 * variance) for each in mixed]
+    return np.array([first, total])

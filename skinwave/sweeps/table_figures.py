@@ -20,10 +20,11 @@ from skinwave.sweeps.dataset import Row
 SPEED = "tacton.speed_m_per_s"
 MARKERS = "osD^vP*X"
 MOST_NAMED = len(MARKERS)  # curves that a legend names; of more numbers a colour bar does
+MOST_TICKS = 12
 FILLED = 0.5  # of the cells of a grid, which have a run at least
 UNITS = {  # by the end of a column's name
     "_m_per_s": "m/s", "_um": "µm", "_mm": "mm", "_db": "dB", "_hz": "Hz",
-    "_pa": "Pa", "_ms": "ms", "_s": "s", "_percent": "%", "_deg": "°", "_gib": "GiB",
+    "_pa": "Pa", "_ms": "ms", "_s": "s", "_percent": "%", "_deg": "°", "_gib": "GiB", "_cm2": "cm²",
     "_kg_m3": "kg/m³", "_pa_s": "Pa s", "seconds": "s", "_ratio": "µm/Pa, scaled",
 }  # fmt: skip
 NAMES = {
@@ -33,7 +34,7 @@ NAMES = {
     "body.thickness_mm": "depth of the body", "spread_6db_mm": "spread to -6 dB",
     "spread_20db_mm": "spread to -20 dB", "kernel_misfit": "misfit to the point kernel",
     "kernel_delay_ms": "delay behind the point kernel",
-    "expected_error": "expected error of the mesh",
+    "expected_error": "expected error of the mesh", "above_threshold_cm2": "area above threshold",
 }  # fmt: skip
 
 
@@ -49,13 +50,7 @@ def varied(rows: Sequence[Row]) -> list[str]:
 
 
 def finished(rows: Sequence[Row]) -> list[Row]:
-    """The rows that have a response.
-
-    Raises
-    ------
-    ValueError
-        If none has.
-    """
+    """The rows that have a response; a ValueError if none has."""
     found = [row for row in rows if row.get("status") == "done"]
     if not found:
         raise ValueError(f"none of {len(rows)} runs has a response: {rows[0].get('error')}")
@@ -65,12 +60,13 @@ def finished(rows: Sequence[Row]) -> list[Row]:
 def value(row: Row, column: str) -> float:
     """An entry as a number: the largest of a list over the probes, `name[2]` that of one probe."""
     name, probe = at_probe(column)
-    cell = row.get(name)
-    if isinstance(cell, list):
-        if probe is not None:
-            return _number(cell[probe]) if probe < len(cell) else np.nan
-        return float(np.max([_number(x) for x in cell])) if cell else np.nan
-    return _number(cell)
+    cells = row.get(name)
+    if not isinstance(cells, list):
+        cells = [cells]
+    elif probe is not None:
+        cells = cells[probe : probe + 1]
+    numbers = [float(x) if isinstance(x, int | float) else np.nan for x in cells]
+    return float(np.max(numbers)) if numbers else np.nan
 
 
 def line_figure(rows: Sequence[Row], column: str, x: str, by: str | None, style: Style) -> Figure:
@@ -97,21 +93,17 @@ def line_figure(rows: Sequence[Row], column: str, x: str, by: str | None, style:
 
 
 def heat_figure(rows: Sequence[Row], column: str, x: str, y: str, style: Style) -> Figure:
-    """A column over two keys, of what they share the mean; cells without a run stay empty.
-
-    Raises
-    ------
-    ValueError
-        If there is no such column, or the runs lie on no grid.
+    """A column over two keys, of what they share the mean; cells without a run stay empty. Raises a
+    ValueError if there is no such column, or the runs lie on no grid.
     """
     _check(rows, (column, x, y))
     across, up = _levels(rows, x), _levels(rows, y)
-    if len({(row.get(x), row.get(y)) for row in rows}) < FILLED * len(across) * len(up):
-        raise ValueError(f"the runs lie on no grid of {x} and {y}; leave out --heat")
     cells: dict[tuple[int, int], list[float]] = {}
     for row in rows:
         where = up.index(_plain(row.get(y))), across.index(_plain(row.get(x)))
         cells.setdefault(where, []).append(value(row, column))
+    if len(cells) < FILLED * len(across) * len(up):
+        raise ValueError(f"the runs lie on no grid of {x} and {y}; leave out --heat")
     table = np.full((len(up), len(across)), np.nan)
     for where, values in cells.items():
         table[where] = np.mean(values)
@@ -120,7 +112,10 @@ def heat_figure(rows: Sequence[Row], column: str, x: str, y: str, style: Style) 
         ax = figure.subplots()
         drawn = np.where(np.isfinite(table), table, np.nan)
         image = ax.pcolormesh(drawn, cmap="viridis", edgecolors="face", linewidth=0.3)
-        _ticks(ax, across, up)
+        for axis, levels in ((ax.xaxis, across), (ax.yaxis, up)):
+            step = -(-len(levels) // MOST_TICKS)  # names in the middle of cells
+            names = [f"{x:g}" if isinstance(x, float) else str(x) for x in levels[::step]]
+            axis.set_ticks(np.arange(0, len(levels), step) + 0.5, names)
         ax.set(xlabel=axis_label(x), ylabel=axis_label(y))
         figure.colorbar(image, ax=ax, label=axis_label(column))
     return figure
@@ -137,19 +132,20 @@ def curves(ax: Axes, rows: Sequence[Row], column: str, x: str, by: str | None) -
     colours = (
         scale.to_rgba(np.array(groups)) if many else scale.cmap(np.linspace(0, 0.88, len(groups)))
     )
-    dashes = "solid" if _joined(rows, x, by) else "none"
+    # Neighbours along a curve are joined if they differ by nothing else, or by its mean.
+    pairs = {(_plain(row.get(x)), _plain(row.get(by)) if by else None) for row in rows}
+    joined = len(pairs) < len(rows) or not set(varied(rows)) - {x, by}
     for k, group in enumerate(groups):
         mine = [row for row in rows if by is None or _plain(row.get(by)) == group]
         at = _levels(mine, x)
         found = [[value(r, column) for r in mine if _plain(r.get(x)) == level] for level in at]
         places = np.arange(len(at)) if words else np.array(at)
-        mean = np.array([np.mean(values) for values in found])
+        mean, low, high = (np.array([f(v) for v in found]) for f in (np.mean, np.min, np.max))
         label = None if by is None or many else _with_unit(by, group)
         ax.plot(places, np.where(np.isfinite(mean), mean, np.nan), color=colours[k],
-                marker="o" if many else MARKERS[k % len(MARKERS)], ms=4, lw=1.5, ls=dashes,
-                label=label)  # fmt: skip
+                marker="o" if many else MARKERS[k % len(MARKERS)], ms=4, lw=1.5,
+                ls="solid" if joined else "none", label=label)  # fmt: skip
         if max(map(len, found)) > 1:
-            low, high = (np.array([f(v) for v in found]) for f in (np.min, np.max))
             ax.fill_between(places, low, high, color=colours[k], alpha=0.15, lw=0)
     if words:
         ax.set_xticks(range(len(at)), [str(level) for level in at])
@@ -158,12 +154,6 @@ def curves(ax: Axes, rows: Sequence[Row], column: str, x: str, by: str | None) -
     if ax.get_legend_handles_labels()[1]:
         ax.legend(fontsize=small(), frameon=False)
     ax.grid(alpha=0.25)
-
-
-def _joined(rows: Sequence[Row], x: str, by: str | None) -> bool:
-    """Whether neighbours along a curve differ by nothing else, or by its mean over all else."""
-    pairs = {(_plain(row.get(x)), _plain(row.get(by)) if by else None) for row in rows}
-    return len(pairs) < len(rows) or not set(varied(rows)) - {x, by}
 
 
 def axis_label(column: str) -> str:
@@ -178,8 +168,7 @@ def axis_label(column: str) -> str:
         words = words.replace("f_d", "$f_d$").replace("_", " ") if "$" not in words else words
         words = re.sub(r"(?<![_$])f_d", "$f_d$", words)
     where = "" if probe is None else f" at probe {probe}"
-    unit = _unit(name)
-    return f"{words}{where}, {unit}" if unit else f"{words}{where}"
+    return ", ".join(filter(None, (f"{words}{where}", _unit(name))))
 
 
 def _unit(name: str) -> str:
@@ -200,12 +189,10 @@ def at_probe(column: str) -> tuple[str, int | None]:
 
 
 def _check(rows: Sequence[Row], columns: Sequence[str]) -> None:
-    known = list(dict.fromkeys(name for row in rows for name in row))
     for column in columns:
-        choose("column", at_probe(column)[0], known)
-    shown = columns[0]
-    if not any(np.isfinite(value(row, shown)) for row in rows):
-        raise ValueError(f"column '{shown}' has no finite number to draw; choose another")
+        choose("column", at_probe(column)[0], dict.fromkeys(name for row in rows for name in row))
+    if not any(np.isfinite(value(row, columns[0])) for row in rows):
+        raise ValueError(f"column '{columns[0]}' has no finite number to draw; choose another")
 
 
 def _levels(rows: Sequence[Row], key: str | None) -> list[Any]:
@@ -215,16 +202,3 @@ def _levels(rows: Sequence[Row], key: str | None) -> list[Any]:
 
 def _plain(cell: Any) -> Any:
     return "none" if cell is None else cell
-
-
-def _number(cell: Any) -> float:
-    return float(cell) if isinstance(cell, int | float) else np.nan
-
-
-def _ticks(ax: Axes, across: Sequence[Any], up: Sequence[Any]) -> None:
-    """Names in the middle of cells, as many as there is room for."""
-    for axis, levels, most in ((ax.xaxis, across, 10), (ax.yaxis, up, 14)):
-        step = -(-len(levels) // most)
-        shown = np.arange(0, len(levels), step) + 0.5
-        names = [f"{x:g}" if isinstance(x, float) else str(x) for x in levels[::step]]
-        axis.set_ticks(shown, names)

@@ -23,7 +23,7 @@ from skinwave.measure.writing import write
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import loads
 from skinwave.scene.spreads import OF_PRESETS, spreads_of
-from skinwave.scene.variation import varied
+from skinwave.scene.variation import with_values
 
 MODULUS, VISCOSITY = "body.material.shear_modulus_pa", "body.material.viscosity_pa_s"
 PRESSURE = "focus.peak_pressure_pa"
@@ -53,7 +53,7 @@ def scene():
 @pytest.fixture(scope="module")
 def lines(scene):
     """Frequencies (f,) in Hz > 0 and velocities (f, p) in m/s of the true material."""
-    moved = varied(scene, TRUE)
+    moved = with_values(scene, TRUE)
     f, a = steady_lines(compliance(moved.body), moved.pressure, moved.probe_points)
     return f[1:], (a * (2j * np.pi * f)[:, None])[1:]
 
@@ -176,7 +176,7 @@ def test_steady_waveforms_are_fitted_as_lines(scene, lines):
 
 
 def test_waveforms_from_rest_are_fitted_with_their_transient(scene, lines):
-    moved = varied(scene, TRUE)
+    moved = with_values(scene, TRUE)
     t = np.arange(0, 0.06, 1 / 4000)
     x = flat_body(compliance(moved.body), moved.pressure, moved.probe_points, t).values
     measured = waveforms(scene, 1.5 * x, t, repetitions=1)
@@ -196,7 +196,7 @@ def test_a_record_too_short_for_its_lines_is_not_fitted_to_them():
     """Lines 13 Hz apart, in 50 ms."""
     moving = 'shape = "circle"\nsize_mm = 20\nspeed_m_per_s = 8'
     scene = loads(TEXT.replace('shape = "point"', moving))
-    moved = compute(varied(scene, TRUE), "flat-body-harmonic")
+    moved = compute(with_values(scene, TRUE), "flat-body-harmonic")
     early = moved.times < 0.05
     short = Measurement(
         quantity="displacement", places=moved.probes, times=moved.times[early],
@@ -213,7 +213,7 @@ def test_elements_are_factorised_once_for_many_predictions():
         TEXT.replace("thickness_mm = 15", 'size_x_mm = 30\nsize_y_mm = 30\nthickness_mm = 10\n'
                      'sides = "clamped"').replace(", [18, 0]", "")
     )  # fmt: skip
-    found = compute(varied(small, TRUE), "fem", h=5e-3)
+    found = compute(with_values(small, TRUE), "fem", h=5e-3)
     measured = waveforms(small, found.values, found.times)
     fitted = fit(small, measured, vary(MODULUS, VISCOSITY, "gain"), kind="lines", model="fem",
                  starts=1)  # fmt: skip

@@ -246,7 +246,7 @@ def test_ranges_that_few_states_do_not_span_are_refused():
         ({"body.layers.0.thickness_mm": (1.0, 2.0)}, "it has 0, counted from 0"),
         ({MODULUS: (2e4, 1e4)}, "give a finite range, low to high"),
         ({MODULUS: (-1e4, 1e4)}, "has shear_modulus_pa = -10000, outside 0.001"),
-        ({"body.material.prony.0.modulus_pa": (1e3, 2e3)}, "there is no Prony term 0 in 0"),
+        ({"body.material.prony.0.modulus_pa": (1e3, 2e3)}, "must be a list of tables"),
     ],
 )
 def test_keys_that_cannot_be_free_are_refused(slab, free, words):

@@ -109,17 +109,7 @@ def test_a_process_of_its_own_says_the_same(folder):
     assert corpus.contents(folder) == before
 
 
-@pytest.mark.usefixtures("in_one_process")
-def test_a_scene_of_a_hostile_name_is_compared_within_its_folder(folder):
-    text = corpus.GOOD.replace('"small"', '"../../beside$\\\\frac{$"').replace("0.02", "0.005")
-    (folder / "named.toml").write_text(text, encoding="utf-8")
-    before = corpus.contents(folder)
-    assert main(["compare", "named.toml", "--element-size", "6", "--out", "out", "--quiet"]) == 0
-    assert {p: c for p, c in corpus.contents(folder).items() if "out" not in p.parts} == before
-    assert len(list((folder / "out").glob("*/*/responses.npz"))) == 3
-
-
-@pytest.mark.parametrize("name", ["", "..", "/tmp/absolute", "zero \\u0000 byte", "n" * 300, "掌"])
+@pytest.mark.parametrize("name", ["..", "zero \\u0000 byte", "n" * 300])
 def test_a_scene_of_any_name_is_answered_within_its_folder(folder, name):
     text = corpus.GOOD.replace('"small"', f'"{name}"').replace("0.02", "0.005")
     (folder / "named.toml").write_text(text, encoding="utf-8")

@@ -82,12 +82,15 @@ def test_what_has_no_best_value_is_refused_before_any_run(scene, capsys):
         ("vary one", "tacton.speed_m_per_s=4:8:3", "tacton.size_mm=5:9:3"),
         ("give body.material=start:stop:n", "body.material=palm,forearm,bone"),
         ("at least three values", "tacton.size_mm=5,9"),
-        ("did you mean 'level_db'", "tacton.size_mm=5:9:3", "--best", "levl_db"),
-        ("holds words", "tacton.size_mm=5:9:3", "--best", "model"),
-        ("take one of peak_um[0]", "tacton.size_mm=5:9:3", "--best", "peak_um[9]"),
         ("give 39 or more", "tacton.size_mm=5:9:3", "--samples", "9"),
         ("leave it out", "tacton.size_mm=5:9", "--design", "lhs", "--samples", "99"),
     ):
         assert main(["sweep", str(scene), "--best", "level_db[0]", "--vary", *words]) == 2
         assert cure in capsys.readouterr().err
     assert not Path("short-sweep").exists()
+    asked = ["sweep", str(scene), "--model", "point-kernel", "--vary", "tacton.size_mm=5:9:3"]
+    for cure, column in (("did you mean", "kernel_peak"), ("no finite number", "model"),
+                         ("no finite number", "kernel_peak_pa[9]")):  # fmt: skip
+        assert main([*asked, "--best", column, "--scheduler", "threads", "--quiet"]) == 2
+        assert cure in capsys.readouterr().err
+    assert len(dataset.read(Path("short-sweep"))) == 3  # which are kept

@@ -12,10 +12,11 @@ from simple_model import MovingPressure, Tacton
 from skinwave.commands.cli import main
 from skinwave.models import covering
 from skinwave.models.free_keys import free_keys, with_values
+from skinwave.models.options import SolveOptions
 from skinwave.scene.file import read, to_table
 from skinwave.scene.scene import BODIES, Body, Layer, Scene
 from skinwave.scene.variation import cases_of, combinations, parse
-from skinwave.sweeps import dataset, reductions, sweep
+from skinwave.sweeps import dataset, reductions
 
 SMALL = ["body.size_x_mm=40", "body.size_y_mm=40", "body.sides=clamped"]
 ON_SMALL = [*SMALL, "tacton.duration_s=0.3", "--model", "fem", "--element-size", 7, "--workers", 1]
@@ -183,9 +184,9 @@ def test_what_cannot_be_reduced_together_or_has_a_coarse_mesh_is_reduced_alone(s
     with monkeypatch.context() as patch:
         patch.setattr(covering.parametric, "prepare", refusing)
         assert together(swept(moduli, *ON_SMALL)) == {("done", 1)}
-    inner = sweep.mesh_of_family
-    coarse = lambda options, family: inner(replace(options, h=8e-3), family)  # noqa: E731
-    monkeypatch.setattr(sweep, "mesh_of_family", coarse)
+    inner = reductions.mesh_of_family
+    coarse = lambda options, family: inner(SolveOptions(h=8e-3, tolerance=0.1), family)  # noqa: E731
+    monkeypatch.setattr(reductions, "mesh_of_family", coarse)
     within = ["--model", "fem", "--tolerance", 0.1, "--workers", 1]
     rows = swept(moduli, *SMALL, "body.thickness_mm=8", *within, out="finer")
     assert together(rows) == {("done", 1)}

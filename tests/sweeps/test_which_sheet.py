@@ -18,7 +18,7 @@ def made(candidate):
     shown = dict.fromkeys(values, 1)
     shown |= {"M1": int(candidate["drive"] in ("clipped", "compressed")), "M4": int(level < 0)}
     return {
-        **candidate, "first_mode_hz": 30.0, "sag_over_thickness": candidate["off_middle"] * 40,
+        **candidate, "sag_over_thickness": candidate["off_middle"] * 40,
         **{f"{claim}_{what}": of[claim] for claim in values
            for what, of in (("holds", shown), ("value", values))},
         "rival_line": "f_d",
