@@ -110,34 +110,36 @@ class _Handler(BaseHTTPRequestHandler):
     def do_GET(self) -> None:
         """Send the page."""
         split = urlsplit(self.path)
-        if not self._is_local():
-            return self._text(HTTPStatus.FORBIDDEN, NOT_HERE)
-        if self._route(split.path) != "":
-            return self._text(HTTPStatus.NOT_FOUND, "There is nothing at this address.")
-        if not self._is_token(parse_qs(split.query).get("token", [""])[0]):
-            return self._text(HTTPStatus.FORBIDDEN, NO_TOKEN)
+        token = parse_qs(split.query).get("token", [""])[0]
+        if refused := self._refusal(token, known=self._route(split.path) == ""):
+            return self._refuse(*refused)
         return self._send(HTTPStatus.OK, self.server.page, "text/html")
 
     def do_POST(self) -> None:
         """Answer a request of the page."""
         name = self._route(urlsplit(self.path).path)
         kind = name.removeprefix("api/")
-        if not self._is_local():
-            return self._error(HTTPStatus.FORBIDDEN, NOT_HERE)
-        if not self._is_token(self.headers.get("X-Token", "")):
-            return self._error(HTTPStatus.FORBIDDEN, NO_TOKEN)
-        if kind == name or kind not in LARGEST:
-            return self._error(HTTPStatus.NOT_FOUND, "There is nothing at this address.")
+        known = kind != name and kind in LARGEST
+        if refused := self._refusal(self.headers.get("X-Token", ""), known=known):
+            return self._refuse(*refused)
         length = self.headers.get("Content-Length", "")
         if not re.fullmatch(r"\d{1,12}", length) or "Transfer-Encoding" in self.headers:
-            return self._error(HTTPStatus.LENGTH_REQUIRED, "Send a Content-Length.")
+            return self._refuse(HTTPStatus.LENGTH_REQUIRED, "Send a Content-Length.")
         if int(length) > LARGEST[kind]:
-            return self._error(
+            return self._refuse(
                 HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
                 f"{int(length) / 1e6:.3g} MB exceed {LARGEST[kind] / 1e6:.3g} MB, the most that "
                 "the page may send. Use the command line.",
             )
         return self._answer(kind, self.rfile.read(int(length)))
+
+    def _refusal(self, token: str, *, known: bool) -> tuple[HTTPStatus, str] | None:
+        """Why a request for a known address or another gets no answer; None if it does."""
+        if not self._is_local():
+            return HTTPStatus.FORBIDDEN, NOT_HERE
+        if not secrets.compare_digest(token.encode("utf-8", "replace"), self.server.token.encode()):
+            return HTTPStatus.FORBIDDEN, NO_TOKEN
+        return None if known else (HTTPStatus.NOT_FOUND, "There is nothing at this address.")
 
     def _answer(self, kind: str, content: bytes) -> None:
         name = unquote(self.headers.get("X-Name", ""))
@@ -155,7 +157,7 @@ class _Handler(BaseHTTPRequestHandler):
         except ConnectionError:
             raise
         except Exception as error:
-            return self._error(*_explained(error))
+            return self._refuse(*_explained(error))
 
     def _route(self, path: str) -> str:
         """Path below the base; a proxy may have removed the base from it."""
@@ -172,13 +174,7 @@ class _Handler(BaseHTTPRequestHandler):
         same = not origin or origin.partition("://")[2] == host
         return OWN_HOST.fullmatch(host) is not None and same
 
-    def _is_token(self, given: str) -> bool:
-        return secrets.compare_digest(given.encode("utf-8", "replace"), self.server.token.encode())
-
-    def _error(self, status: HTTPStatus, sentence: str) -> None:
-        self._send(status, _json({"error": sentence}), "application/json")
-
-    def _text(self, status: HTTPStatus, sentence: str) -> None:
+    def _refuse(self, status: HTTPStatus, sentence: str) -> None:
         self._send(status, sentence.encode(), "text/plain")
 
     def _send(self, status: HTTPStatus, content: bytes, kind: str) -> None:

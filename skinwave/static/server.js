@@ -13,9 +13,8 @@ export async function request({ base, token }, name, body, { signal, fileName = 
     throw error.name === "AbortError" ? error
       : new Error("The server does not answer. Start skinwave web again and open its new address.");
   });
-  const found = await answer.json().catch(() => ({}));
-  if (answer.ok) return found;
-  throw new Error(found.error ?? `The server answered ${answer.status}.`);
+  if (answer.ok) return answer.json();
+  throw new Error(await answer.text() || `The server answered ${answer.status}.`);
 }
 
 /** What the server makes of a file. */

@@ -40,7 +40,7 @@ class Client:
 
     def post(self, name, body, **headers):
         answer, content = self.ask("POST", name, body, X_Token="right", **headers)
-        return answer.status, json.loads(content)
+        return answer.status, json.loads(content) if answer.status == 200 else content.decode()
 
     def change(self, body=SLAB, **changes):
         asked = {"toml": toml_of(body), "name": "own", "title": "Own", "changes": changes}
@@ -75,9 +75,7 @@ def test_other_sites_and_requests_without_the_token_are_refused(client):
         assert client.ask("GET", "/?token=right", **headers)[0].status == 403
         assert client.ask("POST", "/api/body", b"{}", X_Token="right", **headers)[0].status == 403
     for headers in ({}, {"X_Token": "wrong"}, {"X_Token": "\u00fc"}, {"Cookie": "skinwave=right"}):
-        answer, content = client.ask("POST", "/api/body", b"{}", **headers)
-        assert answer.status == 403
-        assert set(json.loads(content)) == {"error"}
+        assert client.ask("POST", "/api/body", b"{}", **headers)[0].status == 403
 
 
 def test_a_proxy_may_show_it_under_a_prefix():
@@ -111,14 +109,14 @@ def test_a_body_is_changed(client):
 
 
 def test_errors_are_sentences(client):
-    assert "'glued' is unknown" in client.change(base="glued")[1]["error"]
+    assert "'glued' is unknown" in client.change(base="glued")[1]
     sent = [("body", each) for each in (b"", b"[]", b"\xff", b'{"toml": 3}', b"[" * 9999)]
     sent += [("scene", b"\xff"), ("scene", b"a ="), ("measurement", b"t,u\n")]
     for name, content in sent:
         status, found = client.post(f"/api/{name}", content, X_Name="a.csv")
         assert status == 400
-        assert set(found) == {"error"}
-        assert "\n" not in found["error"]
+        assert found
+        assert "\n" not in found
 
 
 def test_what_is_too_large_or_unknown_is_refused(client):
@@ -172,7 +170,7 @@ def test_a_fault_is_said_here_and_not_there(client, monkeypatch, capsys):
 
     monkeypatch.setattr(serve, "scene_answer", fails)
     status, found = client.post("/api/scene", b"")
-    assert (status, found["error"]) == (500, serve.FAULT)
+    assert (status, found) == (500, serve.FAULT)
     assert capsys.readouterr().err == "skinwave: a request failed: KeyError: 'private'\n"
 
 
