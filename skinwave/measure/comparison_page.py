@@ -198,19 +198,12 @@ def _sentence(text: str) -> str:
 
 
 def _where(found: MeasuredComparison, column: ModelColumn) -> str:
-    """The lines and places where differences are beyond the noise, the largest first."""
+    """The lines whose differences are beyond the noise, the largest first."""
     shown = column.differs & ~found.is_numerical(column)
-    away = np.where(shown, np.abs(found.lines.mean - column.model), 0)
-    lines = [k for k in np.argsort(-away.max(axis=1), kind="stable") if shown[k].any()]
-    names, asked, said = list(found.names), found.measurement.record, []
-    for k in lines[:MOST_NAMED]:
-        p = int(np.argmax(away[k]))
-        x, y = 1e3 * found.scene.probe_points[p]
-        a, b = (float(abs(z[k, p])) for z in (found.lines.mean, column.model))
-        said.append(
-            f"{names[k]} at {shown[k].sum()} of {away.shape[1]} places (most at {x:.3g}, {y:.3g} "
-            f"mm: measured {asked.text(a)}, model {asked.text(b)})"
-        )
+    away = np.where(shown, np.abs(found.lines.mean - column.model), 0).max(axis=1)
+    lines = [k for k in np.argsort(-away, kind="stable") if shown[k].any()]
+    names, places = list(found.names), shown.shape[1]
+    said = [f"{names[k]} at {shown[k].sum()} of {places} places" for k in lines[:MOST_NAMED]]
     more = len(lines) - len(said)
     return ", ".join(said) + (f" and {counted(more, 'more line')}" if more else "")
 

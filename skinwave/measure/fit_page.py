@@ -88,16 +88,9 @@ def _whiteness(found: Fit) -> str:
     test = found.intervals.whiteness
     if not isfinite(test.p):
         return "There are too few data along an axis for a test of whiteness."
-    said = "nothing speaks against white residuals."
-    if not test.is_white:
-        said = (
-            "they are not white, and intervals are those of a sandwich covariance, with the "
-            "residuals' spectrum in place of independent errors (White 1980)."
-        )
-    return (
-        f"By the test of Ljung and Box over {len(test.correlations)} lags, p "
-        f"{probability(test.p)}: {said}"
-    )
+    said = "nothing speaks against white residuals" if test.is_white else (
+        "they are not white, and a sandwich covariance widens the intervals (White 1980)")  # fmt: skip
+    return f"By the test of Ljung and Box, p {probability(test.p)}: {said}."
 
 
 def estimate_table(found: Fit) -> Table:
