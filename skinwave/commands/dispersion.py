@@ -1,9 +1,8 @@
 """Dispersion curves of a scene's body: speeds and decay of its waves, and which a Tacton drives."""
 
 import argparse
-from pathlib import Path
 
-from skinwave.commands.common import add_output, add_scene, summarise
+from skinwave.commands.common import add_output, add_scene, closing, result_folder
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -18,8 +17,6 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
-    from skinwave.results import record
-    from skinwave.results.outputs import output_folder
     from skinwave.scene.file import read
     from skinwave.scene.scene import check_load
     from skinwave.studies.dispersion import driven_modes, sentences, write
@@ -29,12 +26,8 @@ def run(options: argparse.Namespace) -> int:
     scene = read(options.scene)
     check_load(scene, "dispersion")
     found = driven_modes(scene, highest=options.highest, most=options.modes)
-    out = options.out or Path(f"{options.scene.stem}-dispersion")
-    inputs = [options.scene, scene.body.file]
-    with output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
+    name, inputs = f"{options.scene.stem}-dispersion", [options.scene, scene.body.file]
+    with result_folder(options, name, inputs, scene) as (folder, _):
         write(folder, found)
-        record.write(folder, record.of_command(options), scene=scene)
-    said = sentences(found)
-    summary = {"out": str(out), "sentences": said}
-    summarise(options, summary, "\n".join([*said, f"open {out}/index.html"]))
+    closing(options, sentences(found))
     return 0

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from skinwave.commands.common import add_output, progress_of, summarise, warn
+from skinwave.commands.common import add_output, closing, result_folder, summarise, warn
 from skinwave.models import names
 
 if TYPE_CHECKING:
@@ -60,31 +60,25 @@ def run(options: argparse.Namespace) -> int:
         return _inspect(options)
     if not (options.scene and options.measured):
         raise ValueError("give a scene and --measured FILE, or --inspect FILE")
-    from skinwave.measure.findings import cautions, sentences
+    from skinwave.measure.findings import cautions
     from skinwave.measure.fit import fit
     from skinwave.measure.fit_page import summary, write
-    from skinwave.results import record
-    from skinwave.results.outputs import output_folder
     from skinwave.scene.file import read
 
     if options.seed < 0:
         raise ValueError(f"--seed = {options.seed} is below 0; give 0 or a whole number above")
     scene = read(options.scene)
     measured = _measured(options.measured, options)
-    out = options.out or Path(f"{options.scene.stem}-fit")
-    inputs = [options.scene, options.measured, scene.body.file]
-    with output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
-        with progress_of(options) as progress:
-            found = fit(
-                scene, measured, options.vary, tie=options.tie, kind=options.to or "",
-                model=options.model, starts=options.starts, seed=options.seed, progress=progress,
-            )  # fmt: skip
+    name, inputs = f"{options.scene.stem}-fit", [options.scene, options.measured, scene.body.file]
+    with result_folder(options, name, inputs, scene) as (folder, progress):
+        found = fit(
+            scene, measured, options.vary, tie=options.tie, kind=options.to or "",
+            model=options.model, starts=options.starts, seed=options.seed, progress=progress,
+        )  # fmt: skip
         write(folder, found)
-        record.write(folder, record.of_command(options), scene=scene)
     if not options.json and not options.quiet:
         warn(cautions(found))
-    said = "\n".join([*sentences(found), f"open {out}/index.html"])
-    summarise(options, {"out": str(out), **summary(found)}, said)
+    closing(options, **summary(found))
     return 0 if found.solution.converged else 1
 
 
@@ -92,20 +86,16 @@ def _inspect(options: argparse.Namespace) -> int:
     """Say what a file holds and, if a folder is given, write it."""
     from skinwave.measure.inspection import inspect
     from skinwave.measure.inspection_page import summary, text, write
-    from skinwave.results import record
-    from skinwave.results.outputs import output_folder
 
     if options.scene or options.measured or options.vary:
         raise ValueError("--inspect fits nothing; leave out the scene, --measured and --vary")
-    out, inputs = options.out, [options.inspect]
     found = inspect(_measured(options.inspect, options), alarm=options.false_alarm)
     told, said = summary(found), text(found)
-    if out:
-        with output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
+    if options.out:
+        with result_folder(options, "", [options.inspect]) as (folder, _):
             write(folder, found)
-            record.write(folder, record.of_command(options))
-        told["out"] = str(out)
-        said += f"\nopen {out}/index.html"
+        told["out"] = str(options.out)
+        said += f"\nopen {options.out}/index.html"
     summarise(options, told, said)
     return 0
 

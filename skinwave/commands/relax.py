@@ -3,14 +3,7 @@
 import argparse
 from pathlib import Path
 
-from skinwave.commands.common import (
-    add_output,
-    add_size,
-    metre,
-    progress_of,
-    summarise,
-    warn,
-)
+from skinwave.commands.common import add_output, add_size, closing, metre, result_folder, warn
 
 BOTH = "paper-vs-skin"
 
@@ -37,8 +30,6 @@ def options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command; the exit code."""
     from skinwave.models.options import SolveOptions
-    from skinwave.results import record
-    from skinwave.results.outputs import output_folder
     from skinwave.scene.file import read
     from skinwave.studies.assumptions import check_rate
     from skinwave.studies.relax import hierarchy_of, sentence, write
@@ -51,36 +42,25 @@ def run(options: argparse.Namespace) -> int:
     if options.scene == BOTH:
         return _paper_vs_skin(options)
     scene = read(options.scene)
-    out = options.out or Path(f"{Path(options.scene).stem}-relaxed")
-    inputs = [options.scene, scene.body.file]
-    with output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
-        with progress_of(options) as progress:
-            found = hierarchy_of(scene, progress, h=h, update_rate=rate, points=options.points)
+    name, inputs = f"{Path(options.scene).stem}-relaxed", [options.scene, scene.body.file]
+    with result_folder(options, name, inputs, scene) as (folder, progress):
+        found = hierarchy_of(scene, progress, h=h, update_rate=rate, points=options.points)
         write(folder, found)
-        record.write(folder, record.of_command(options), scene=scene)
     warnings = document.worst_warnings(found.efforts)
     warn(warnings)
     sentences = [sentence(effect) for effect in found.effects()]
     failed = [f"'{step.name}' failed: {step.error}" for step in found.steps if step.error]
-    summary = {"out": str(out), "sentences": sentences, "failed": failed, "warnings": warnings}
-    summarise(options, summary, "\n".join([*sentences, *failed, f"open {out}/index.html"]))
+    closing(options, [*sentences, *failed], failed=failed, warnings=warnings)
     return 0
 
 
 def _paper_vs_skin(options: argparse.Namespace) -> int:
-    from skinwave.results import record
-    from skinwave.results.outputs import output_folder
     from skinwave.studies.paper_vs_skin import paper_vs_skin, report, sentences
 
     if options.points is not None:
         raise ValueError(f"--points is of a scene's path; leave it out with {BOTH}")
-    out = options.out or Path(BOTH)
-    with output_folder(out, overwrite=options.overwrite) as folder:
-        with progress_of(options) as progress:
-            found = paper_vs_skin(progress, h=metre(options.h))
+    with result_folder(options, BOTH) as (folder, progress):
+        found = paper_vs_skin(progress, h=metre(options.h))
         report(found).write(folder)
-        record.write(folder, record.of_command(options))
-    said = [*sentences(found), *found.failed]
-    summarise(options, {"out": str(out), "sentences": said},
-              "\n".join([*said, f"open {out}/index.html"]))  # fmt: skip
+    closing(options, [*sentences(found), *found.failed])
     return 0
