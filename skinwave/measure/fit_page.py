@@ -88,8 +88,9 @@ def _whiteness(found: Fit) -> str:
     test = found.intervals.whiteness
     if not isfinite(test.p):
         return "There are too few data along an axis for a test of whiteness."
-    said = "nothing speaks against white residuals" if test.is_white else (
-        "they are not white, and a sandwich covariance widens the intervals (White 1980)")  # fmt: skip
+    said = "nothing speaks against white residuals"
+    if not test.is_white:
+        said = "they are not white, and a sandwich covariance widens the intervals (White 1980)"
     return f"By the test of Ljung and Box, p {probability(test.p)}: {said}."
 
 
