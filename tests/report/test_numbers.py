@@ -40,7 +40,7 @@ def test_a_report_writes_its_page_pictures_and_tables(tmp_path):
     parts = [Section("A", [Details("B", [TABLE, Picture(b"p", "caption", "map")])]), "<text>"]
     Report("title", ["verdict"], parts).write(tmp_path)
     page = (tmp_path / "index.html").read_text()
-    assert page.index("<h1>title") < page.index(">verdict") < page.index("<h2>A")
+    assert page.index("<h1>title") < page.index(">verdict") < page.index(">A</h2>")
     assert "<p>&lt;text&gt;</p>" in page
     assert (tmp_path / "map.png").read_bytes() == b"p"
     assert (tmp_path / "lines.csv").read_bytes() == TABLE.to_csv()
