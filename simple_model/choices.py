@@ -1,7 +1,8 @@
-"""Error message for an unknown name, with the nearest known one."""
+"""Checks of names and numbers, with error messages that say the cure."""
 
 import difflib
 from collections.abc import Iterable
+from math import isfinite
 
 NEAR = 0.6  # of difflib's ratio: 2 x letters in common over all letters
 SHORTEST, LONGEST = 3, 60  # letters: of a part of a word that is near, and that are compared
@@ -33,3 +34,16 @@ def meant(value: object, known: Iterable[str]) -> str:
     if not near and len(said) >= SHORTEST:
         near = [word for word in words if said in word]
     return f"; did you mean '{words[near[0]]}'?" if near else ""
+
+
+def check_numbers(what: str, record: object, *names: str, least: str = "above 0") -> None:
+    """Refuse fields of a record that are not finite and "above 0" or, as `least`, "0 or above";
+    None is left out.
+    """
+    for name in names:
+        value = getattr(record, name)
+        if value is None or (
+            isfinite(value) and (value > 0 or (value == 0 and least != "above 0"))
+        ):
+            continue
+        raise ValueError(f"{name} = {value} of {what} must be a finite number, {least}")

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from simple_model.load.drive import PUBLISHED
 from simple_model.load.pressure import MovingPressure
-from simple_model.load.sampling import fold_parts, low_passed
+from simple_model.load.sampling import finer, low_passed, reached, step
 from simple_model.quantities import PRESSURE
 from simple_model.response import Effort, Response
 from simple_model.typing import Floats
@@ -63,7 +63,8 @@ def point_kernel(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> 
     if probes.ndim != 2 or probes.shape[1] != 2:
         raise ValueError(f"probes have shape {probes.shape}; give (p, 2) positions in metre")
     started = time.perf_counter()
-    stimulation = low_passed(partial(pressure, probes), times, fold_parts(pressure, times))
+    parts = finer(reached(pressure), step(times))
+    stimulation = low_passed(partial(pressure, probes), times, parts)
     effort = Effort(seconds={"evaluate": time.perf_counter() - started}, steps=len(times))
     return Response(
         model="point-kernel", times=np.array(times), probes=probes, values=stimulation,

@@ -101,15 +101,11 @@ class Mode:
         known = np.isfinite(self.wavenumbers)
         if known.sum() < 2:
             return np.full(f.shape, np.nan + 0j)
+        from scipy.interpolate import CubicHermiteSpline  # which takes long to import
+
         x, k = self.frequencies[known], self.wavenumbers[known]
         slope = 4 * np.pi * k * self.slowness[known]
-        at = np.clip(np.searchsorted(x, f) - 1, 0, len(x) - 2)
-        h = x[at + 1] - x[at]
-        s = (f - x[at]) / h
-        low, high = k[at] ** 2, k[at + 1] ** 2
-        found = low * (1 + 2 * s) * (1 - s) ** 2 + high * (3 - 2 * s) * s**2
-        found = found + h * (slope[at] * s * (1 - s) ** 2 - slope[at + 1] * s**2 * (1 - s))
-        return np.asarray(np.where((f < x[0]) | (f > x[-1]), np.nan, found))
+        return np.asarray(CubicHermiteSpline(x, k**2, slope, extrapolate=False)(f))
 
     def amplitude(self, width: float, distance: float) -> Complex:
         """Motion (f,) of the surface in m/Pa by this mode, at a distance in metre from the middle

@@ -16,12 +16,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import isfinite, sqrt
+from math import sqrt
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from simple_model.choices import check_numbers
 from simple_model.layers.modulus_laws import FractionalKelvinVoigt, ModulusTable, ScaledLaw
 from simple_model.layers.prony import (
     FIT_TOLERANCE,
@@ -58,10 +59,7 @@ class Orthotropy:
     shear_xy: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("young_x", "young_y", "shear_xy"):
-            value = getattr(self, name)
-            if value is not None and not (isfinite(value) and value > 0):
-                raise ValueError(f"{name} = {value} Pa must be a finite number above 0")
+        check_numbers("a sheet", self, "young_x", "young_y", "shear_xy")
         if not (self.poisson_xy >= 0 and self.poisson < 0.5):
             raise ValueError(
                 f"poisson_xy = {self.poisson_xy} is outside 0 <= poisson_xy < "
@@ -135,14 +133,8 @@ class Material:
     orthotropy: Orthotropy | None = None
 
     def __post_init__(self) -> None:
-        for name in ("density", "shear_modulus"):
-            value = getattr(self, name)
-            if not (isfinite(value) and value > 0):
-                raise ValueError(f"{name} = {value} must be a finite number above 0")
-        for name in ("viscosity", "loss_factor"):
-            value = getattr(self, name)
-            if not (isfinite(value) and value >= 0):
-                raise ValueError(f"{name} = {value} must be a finite number, 0 or above")
+        check_numbers("a material", self, "density", "shear_modulus")
+        check_numbers("a material", self, "viscosity", "loss_factor", least="0 or above")
         if self.loss_factor > LARGEST_LOSS_FACTOR:
             raise ValueError(
                 f"loss_factor = {self.loss_factor:g} is above {LARGEST_LOSS_FACTOR:g}, which is "

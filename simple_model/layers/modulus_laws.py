@@ -17,6 +17,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from simple_model.choices import check_numbers
 from simple_model.layers.prony import ModulusLaw, PronySeries, check_passive, fit_prony
 from simple_model.typing import Complex, Floats
 
@@ -115,14 +116,12 @@ def _power(omega: ArrayLike, time: float, exponent: float) -> Any:
 
 
 def _check(law: FractionalKelvinVoigt | FractionalZener) -> None:
-    if not (isfinite(law.shear_modulus) and law.shear_modulus > 0):
-        raise ValueError(f"shear_modulus = {law.shear_modulus} must be a finite number above 0")
+    check_numbers("a modulus law", law, "shear_modulus")
+    check_numbers("a modulus law", law, "time", least="0 or above")
     if not 0 < law.exponent <= 1:
         raise ValueError(
             f"exponent = {law.exponent} is outside 0 < exponent <= 1, from a spring to a dashpot"
         )
-    if not (isfinite(law.time) and law.time >= 0):
-        raise ValueError(f"time = {law.time} s must be a finite number, 0 or above")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -201,16 +200,14 @@ class ModulusTable:
 
 
 def _check_frequencies(f: Floats) -> None:
-    for k, x in enumerate(f):
-        if not (LOWEST <= x <= HIGHEST or (x == 0 and k == 0)):
+    outside = ((f < LOWEST) | (f > HIGHEST)) & ~((f == 0) & (np.arange(len(f)) == 0))
+    for wrong, said in (
+        (outside, f"which is outside {LOWEST:g}..{HIGHEST:g} Hz; only the first may be 0"),
+        (np.diff(f, prepend=-1.0) <= 0, "which does not rise; give each frequency once, rising"),
+    ):
+        if wrong.any():
             raise ValueError(
-                f"a table of complex moduli has the frequency {x:g} Hz, which is outside "
-                f"{LOWEST:g}..{HIGHEST:g} Hz; only the first may be 0"
-            )
-        if k and x <= f[k - 1]:
-            raise ValueError(
-                f"a table of complex moduli has {x:g} Hz after {f[k - 1]:g} Hz; give each "
-                "frequency once, rising"
+                f"a table of complex moduli has the frequency {f[wrong.argmax()]:g} Hz, {said}"
             )
 
 

@@ -15,12 +15,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import isfinite
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from simple_model.choices import check_numbers
 from simple_model.numbers import counted
 from simple_model.typing import Complex, Floats
 
@@ -59,15 +59,8 @@ class PronyTerm:
     time: float
 
     def __post_init__(self) -> None:
-        if not (isfinite(self.modulus) and self.modulus >= 0):
-            raise ValueError(
-                f"modulus of a Prony term = {self.modulus} Pa must be a finite number, 0 or above"
-            )
-        if not (isfinite(self.time) and self.time > 0):
-            raise ValueError(
-                f"relaxation time of a Prony term = {self.time} s must be a finite number above 0; "
-                "give the time, or leave out the term"
-            )
+        check_numbers("a Prony term", self, "modulus", least="0 or above")
+        check_numbers("a Prony term", self, "time")
 
     def __call__(self, omega: ArrayLike) -> Any:
         """Complex modulus (...) in Pa at angular frequencies (...) in rad/s."""

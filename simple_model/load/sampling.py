@@ -83,11 +83,6 @@ def highest_driving(pressure: MovingPressure, times: Floats) -> float:
     return 0.5 / step(times) if is_folded(pressure, times) else np.inf
 
 
-def fold_parts(pressure: MovingPressure, times: Floats) -> int:
-    """Oversampling factor of a load at times (t,) in s, so that nothing aliases."""
-    return finer(reached(pressure), step(times))
-
-
 def low_passed(load: Callable[[Floats], Floats], times: Floats, parts: int) -> Floats:
     """Load (t, ...) at equally spaced times (t,) in s without aliasing, by a windowed sinc: `load`
     is a function of times (n,), also before and after those given, sampled `parts` times as finely.

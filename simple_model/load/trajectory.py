@@ -29,12 +29,14 @@ STRAIGHT_ON = 1e-3  # of a unit tangent, below which it does not turn
 STILL = 1e-7, 1e-6  # m and of the level, below which nothing jumps
 ROUND = 132  # corners for a circle, 0.01 mm from the largest; and for a line swept as a cosine
 SAME = 1e-9  # of a period
-CORNERS = {"point": 1, "line": 2, "triangle": 3, "square": 4}
 JUST_AFTER = 1e-9  # of the mean step of a recording, so that a sample holds at its own time
 
-_TRIANGLE = np.array([[0, 1 / sqrt(3)], [-0.5, -0.5 / sqrt(3)], [0.5, -0.5 / sqrt(3)]])
-_SQUARE = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])
-_LINE = np.array([[-0.5, 0.0], [0.5, 0.0]])
+_TOP, _LEFT, _RIGHT = (0.0, 1 / sqrt(3)), (-0.5, -0.5 / sqrt(3)), (0.5, -0.5 / sqrt(3))
+UNIT = {  # corners of shapes of size 1
+    "line": ((-0.5, 0.0), (0.5, 0.0)),
+    "triangle": (_TOP, _LEFT, _RIGHT, _TOP),
+    "square": ((0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5), (0.5, 0.5)),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,12 +92,10 @@ class Trajectory:
     @property
     def length(self) -> float:
         """Path length of one period, metre."""
-        if self.shape in BY_POINTS:
-            steps = float(self._arc[-1])
-            return steps if self._runs_on else 2 * steps
-        sides = {"point": 0.0, "line": 2.0, "circle": pi, "triangle": 3.0, "square": 4.0}
-        one_way = self.shape == "line" and self.sweep == "one_way"
-        return self.size * (1.0 if one_way else sides[self.shape])
+        if self.shape in ("point", "circle"):
+            return pi * self.size * (self.shape == "circle")
+        steps = float(self._arc[-1])
+        return steps if self._runs_on else 2 * steps
 
     @property
     def drawing_frequency(self) -> float:
@@ -112,15 +112,15 @@ class Trajectory:
     @property
     def is_eased(self) -> bool:
         """Whether the speed goes as a sine, and is pi/2 times the mean at its greatest."""
-        open_ended = self.shape == "line" or (self.shape == "polyline" and not self._runs_on)
-        return self.sweep == "sinusoidal" and open_ended
+        can_be = self.shape in ("line", "polyline") and not self._runs_on
+        return self.sweep == "sinusoidal" and can_be
 
     @property
     def outline(self) -> Floats:
         """Positions (k, 2) in metre whose convex hull contains the path."""
-        if self.shape in BY_POINTS:
-            return self._corners + self.centre
-        return self.at_phase(np.linspace(0, 1, 721))
+        if self.shape == "circle":
+            return self.at_phase(np.linspace(0, 1, 721))
+        return self._corners + self.centre
 
     def phase(self, t: ArrayLike) -> Floats:
         """Fraction 0..1 of the period at times t in s, same shape as t."""
@@ -162,15 +162,12 @@ class Trajectory:
             bounds = np.unique(clock) / clock[-1]
             steps = np.linalg.norm(np.diff(self._corners, axis=0), axis=1)[np.diff(clock) > 0]
             return bounds, np.zeros_like(steps) if self.hold else steps
-        if self.shape == "polyline" and self.length > 0:
+        bounds = np.array([0.0, 1.0])
+        if self.shape != "circle" and self.length > 0:
             bounds = np.unique(self._arc) / self._arc[-1]
             if not self._runs_on:
                 way = np.arccos(1 - 2 * bounds) / pi if self.is_eased else bounds
                 bounds = np.concatenate([way, 2 - way[-2::-1]]) / 2
-        else:
-            sides = {"triangle": 3, "square": 4, "line": 2}.get(self.shape, 1)
-            whole = self.is_eased or self.sweep == "one_way"
-            bounds = np.linspace(0, 1, (1 if self.shape == "line" and whole else sides) + 1)
         share = pi / 2 if self.is_eased else 1.0  # at its fastest
         return bounds, share * self.length * np.diff(bounds)
 
@@ -214,35 +211,25 @@ class Trajectory:
             before, part = self._between(phase)
             start = self._corners[before]
             return np.asarray(start + part[..., None] * (self._corners[before + 1] - start))
-        if self.shape == "polyline":
-            return self._along(self._corners, self._arc, phase)
-        if self.shape == "line" and self.sweep == "sinusoidal":
-            return self.size * self._along(_LINE, np.array([0.0, 1.0]), phase)
-        corners = {"line": _LINE, "triangle": _TRIANGLE, "square": _SQUARE}[self.shape]
-        if not (self.shape == "line" and self.sweep == "one_way"):
-            corners = np.vstack([corners, corners[:1]])
-        knots = np.linspace(0, 1, len(corners))
-        unit = [np.interp(phase, knots, corners[:, axis]) for axis in range(2)]
-        return self.size * np.stack(unit, axis=-1)
-
-    def _along(self, corners: Floats, arc: Floats, phase: Floats) -> Floats:
-        """Position where the sweep has got to on the line through corners at arc lengths."""
-        if self.sweep == "sinusoidal" and not self._runs_on:
+        if self.is_eased:
             phase = (1 - np.cos(2 * pi * phase)) / 2
         elif not self._runs_on:
             phase = 1 - np.abs(1 - 2 * phase)
-        at = phase * arc[-1]
-        return np.stack([np.interp(at, arc, corners[:, axis]) for axis in range(2)], axis=-1)
+        at = phase * self._arc[-1]
+        return np.stack([np.interp(at, self._arc, x) for x in self._corners.T], axis=-1)
 
     @property
     def _runs_on(self) -> bool:
-        """Whether a period is one run along the points."""
-        closed = len(self.points) > 2 and self.points[0] == self.points[-1]
-        return self.shape == "recorded" or self.sweep == "one_way" or closed
+        """Whether a period is one run along the corners."""
+        corners = self._corners
+        closed = len(corners) > 2 and (corners[0] == corners[-1]).all()
+        return bool(self.shape == "recorded" or self.sweep == "one_way" or closed)
 
     @cached_property
     def _corners(self) -> Floats:
-        return np.array(self.points, np.float64)
+        if self.shape in BY_POINTS:
+            return np.array(self.points, np.float64)
+        return self.size * np.array(UNIT.get(self.shape, ((0.0, 0.0),)))
 
     @cached_property
     def _arc(self) -> Floats:
@@ -320,7 +307,10 @@ def joined(paths: Sequence[Trajectory], frequency: float) -> Trajectory:
         raise ValueError(f"frequency = {frequency} Hz must be finite and above 0 to draw paths")
     points, times = list[tuple[float, float]](), list[float]()
     for before, path in enumerate(paths):
-        phases = _corners(path)
+        if path.shape not in SHAPES:
+            raise ValueError(f"a {path.shape} path has points of its own; join named shapes")
+        is_round = path.shape == "circle" or path.is_eased
+        phases = np.linspace(0, 1, ROUND + 1) if is_round else path.parts[0]
         points += map(tuple, path.at_phase(phases).tolist())
         times += ((before + phases) / frequency).tolist()
     return Trajectory(shape="recorded", points=tuple(points), times=tuple(times))
@@ -338,16 +328,6 @@ def parted(path: Trajectory, n: int) -> tuple[Floats, ...]:
     first = np.searchsorted(clock, np.arange(n) + SAME, side="right") - 1
     last = np.searchsorted(clock, np.arange(1, n + 1) - SAME)
     return tuple(path.outline[a : b + 1] for a, b in zip(first, last, strict=True))
-
-
-def _corners(path: Trajectory) -> Floats:
-    """Fractions (k,) of the period, from 0 to 1, between which a named shape is straight."""
-    if path.shape not in SHAPES:
-        raise ValueError(f"a {path.shape} path has points of its own; join named shapes")
-    if path.shape == "circle" or path.sweep == "sinusoidal":
-        return np.linspace(0, 1, ROUND + 1)
-    sides = 1 if path.sweep == "one_way" and path.shape == "line" else CORNERS[path.shape]
-    return np.linspace(0, 1, sides + 1)
 
 
 def _check_points(path: Trajectory) -> None:

@@ -49,6 +49,37 @@ class FreeModes:
         return 2 * self.residues * (self.poles * place[:, None] + speed[:, None])
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Loss:
+    """Modulus of a material over that of the modes: at `rest`, viscous `lag` in s, and `shares`
+    (j,) of Maxwell branches with relaxation `times` (j,) in s.
+    """
+
+    rest: float
+    lag: float
+    shares: Floats
+    times: Floats
+
+    @staticmethod
+    def of(material: Material) -> "Loss":
+        """That of a material."""
+        solid, mu = material.relaxing(), material.shear_modulus
+        terms = [term for term in solid.prony if term.modulus]
+        return Loss(
+            rest=solid.shear_modulus / mu, lag=solid.viscosity / mu,
+            shares=np.array([term.modulus / mu for term in terms]),
+            times=np.array([term.time for term in terms]),
+        )  # fmt: skip
+
+    def storage(self, omega: Floats) -> Floats:
+        """Relative storage modulus (...) at angular frequencies (...) in rad/s."""
+        squared = np.multiply.outer(omega, self.times) ** 2
+        return np.asarray(self.rest + (self.shares * squared / (1 + squared)).sum(axis=-1))
+
+
+WITHOUT_LOSS = Loss(rest=1.0, lag=0.0, shares=np.zeros(0), times=np.ones(0))
+
+
 def free_modes(modes: PlateModes, material: Material) -> FreeModes:
     """Poles and residues of the modes of a plate of a material without a modulus law of its own."""
     squared = np.maximum(modes.squared, np.finfo(float).tiny)
@@ -61,17 +92,9 @@ def relaxing_stiffness(lossless: Floats, bent: Floats, material: Material) -> tu
     Maxwell branches; `lossless` (m,) and `bent` (m,) in 1/s2 are the parts of the squared
     frequencies without loss, and in proportion to the material's modulus.
     """
-    solid, mu = material.without_loss_factor(), material.shear_modulus
-    terms = [term for term in solid.prony if term.modulus]
-    relaxing, times = (
-        np.array([getattr(term, name) for term in terms]) for name in ("modulus", "time")
-    )
-    stiffness = np.column_stack([
-        lossless + bent * solid.shear_modulus / mu,
-        bent * solid.viscosity / mu,
-        bent[:, None] * relaxing / mu,
-    ])  # fmt: skip
-    return stiffness, times
+    loss = Loss.of(material)
+    parts = lossless + bent * loss.rest, bent * loss.lag, bent[:, None] * loss.shares
+    return np.column_stack(parts), loss.times
 
 
 def free_vibration(stiffness: Floats, times: Floats) -> FreeModes:

@@ -38,7 +38,7 @@ from scipy.linalg.lapack import dposv
 from simple_model.layers.material import Material
 from simple_model.load.pressure import MovingPressure
 from simple_model.load.spectrum import lines_from_rest, synthesise
-from simple_model.plates.free_modes import FreeModes, free_modes
+from simple_model.plates.free_modes import WITHOUT_LOSS, FreeModes, Loss, free_modes
 from simple_model.plates.modes import PlateModes, modal_motion, modal_motion_apart
 from simple_model.plates.path_forces import MIDDLE, modal_path_forces
 from simple_model.plates.von_karman import KarmanPlate
@@ -153,35 +153,6 @@ def forced_motion(
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Loss:
-    """Modulus of a material over that of the modes: at `rest`, viscous `lag` in s, and `shares`
-    (j,) of Maxwell branches with relaxation `times` (j,) in s.
-    """
-
-    rest: float
-    lag: float
-    shares: Floats
-    times: Floats
-
-    @staticmethod
-    def of(material: Material | None) -> _Loss:
-        if material is None:
-            return _Loss(rest=1.0, lag=0.0, shares=np.zeros(0), times=np.ones(0))
-        solid, mu = material.relaxing(), material.shear_modulus
-        terms = [term for term in solid.prony if term.modulus]
-        return _Loss(
-            rest=solid.shear_modulus / mu, lag=solid.viscosity / mu,
-            shares=np.array([term.modulus / mu for term in terms]),
-            times=np.array([term.time for term in terms]),
-        )  # fmt: skip
-
-    def storage(self, omega: Floats) -> Floats:
-        """Relative storage modulus (...) at angular frequencies (...) in rad/s."""
-        squared = np.multiply.outer(omega, self.times) ** 2
-        return np.asarray(self.rest + (self.shares * squared / (1 + squared)).sum(axis=-1))
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
 class _Scheme:
     """Coefficients of steps of dt in s: `mass` (r,) of modes, stiffness `K` (r, r) at rest,
     `bending` (r, r), and the modulus: at `rest`, viscous `lag` in s, and `shares` (j,) of Maxwell
@@ -200,7 +171,8 @@ class _Scheme:
 
     @staticmethod
     def of(plate: KarmanPlate, dt: float, material: Material | None) -> _Scheme:
-        loss, squared = _Loss.of(material), np.maximum(plate.squared, 0.0)
+        loss = Loss.of(material) if material else WITHOUT_LOSS
+        squared = np.maximum(plate.squared, 0.0)
         bending = np.diagonal(plate.bending) * (loss.storage(np.sqrt(squared)) - 1)
         half = np.sqrt(np.maximum(squared + bending, 0.0)) * dt / 2
         mass = 1 / np.sinc(np.minimum(half, HIGHEST_PHASE) / np.pi) ** 2

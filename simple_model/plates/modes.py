@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import linalg, sparse
 from scipy.sparse.linalg import LinearOperator, gmres
 
+from simple_model.choices import check_numbers, choose
 from simple_model.layers.compliance import AIR_DENSITY
 from simple_model.layers.material import ModulusLaw
 from simple_model.plates.air import air_mass
@@ -81,20 +82,16 @@ class Plate:
     air_density: float = AIR_DENSITY
 
     def __post_init__(self) -> None:
-        for name in ("size_x", "size_y", "d11", "d22", "d66", "mass_per_area"):
-            if not (np.isfinite(value := getattr(self, name)) and value > 0):
-                raise ValueError(f"{name} = {value} of a plate must be finite and above 0")
-        for name in ("tension_x", "tension_y", "clip_radius", "air_density"):
-            if not (np.isfinite(value := getattr(self, name)) and value >= 0):
-                raise ValueError(f"{name} = {value} of a plate must be finite, 0 or above")
+        check_numbers("a plate", self, "size_x", "size_y", "d11", "d22", "d66", "mass_per_area")
+        more = ("tension_x", "tension_y", "clip_radius", "air_density")
+        check_numbers("a plate", self, *more, least="0 or above")
         if not self.d12**2 < self.d11 * self.d22:
             raise ValueError(
                 f"d12 = {self.d12} of a plate is not below sqrt(d11 d22) = "
                 f"{(self.d11 * self.d22) ** 0.5:.4g}, so that it would bend by itself; lower it"
             )
         for name in ("left", "right", "front", "back"):
-            if (said := getattr(self, name)) not in SUPPORTS:
-                raise ValueError(f"{name} = '{said}' is none of {', '.join(SUPPORTS)}")
+            choose(name, getattr(self, name), SUPPORTS)
         for x, y in self.clips:
             if not (abs(x) <= self.size_x / 2 and abs(y) <= self.size_y / 2):
                 raise ValueError(
