@@ -1,9 +1,8 @@
 """Tetrahedral meshes of bodies: structured, from files, and of a parametric palm."""
 
 from meshes.facets import seen_from_above, tag_boundary
-from meshes.files.contents import read
 from meshes.files.import_body import body_from_file
-from meshes.files.mesh_files import write
+from meshes.files.mesh_files import read, write
 from meshes.shapes.palm import Palm
 from meshes.shapes.structured import (
     Grading,

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from meshes.facets import geometry, seen_from_above, tag_boundary
-from meshes.files.contents import UNITS, Contents, mesh_of, read_contents, scale_of
+from meshes.files.mesh_files import UNITS, Contents, mesh_of, read_contents, scale_of
 from meshes.reading import PathLike
 from meshes.shapes.structured import Grading
 from meshes.surface.alignment import aligned, clipped, cut_to, off_origin, on_planes, turned, turns
@@ -17,8 +17,7 @@ from meshes.surface.repair import check, in_mm, repaired
 from meshes.surface.triangulation import Surface, compact, volume
 from meshes.surface.winding import check_inside
 from meshes.tetmesh import MeshError, TetMesh, boundary_facets, corner_volumes
-from meshes.volume.quality import dihedral_angles, edge_lengths
-from meshes.volume.repair import one_body
+from meshes.volume.quality import dihedral_angles, edge_lengths, one_body
 from meshes.volume.tetrahedralise import EPSILON, REST, check_size, graded, tetrahedralise
 
 FINE_RADIUS, GROWTH, COARSEST = 30e-3, 1.25, 2.0  # m about the palm's middle; elements; of h

@@ -162,12 +162,7 @@ def on_planes(box: Sequence[float], tolerance: float) -> Predicate:
 
 
 def _under_origin(surface: Surface) -> Surface:
+    """The piece with the highest triangle over the origin."""
+    heights = heights_over(surface.points[surface.triangles], np.zeros(2))
     piece = pieces(surface)
-    parts = [compact(surface.points, surface.triangles[piece == i]) for i in range(piece.max() + 1)]
-    heights = []
-    for part in parts:
-        try:
-            heights.append(height_at(part, 0.0, 0.0))
-        except MeshError:
-            heights.append(-np.inf)
-    return parts[int(np.argmax(heights))]
+    return compact(surface.points, surface.triangles[piece == piece[heights.argmax()]])

@@ -17,7 +17,7 @@ from meshes.tetmesh import (
     boundary_facets,
     corner_volumes,
 )
-from meshes.volume.quality import edge_lengths, jacobian_ratios
+from meshes.volume.quality import edge_lengths, jacobian_ratios, moved_back
 
 log = logging.getLogger(__name__)
 
@@ -60,7 +60,10 @@ def curve_boundary(
 
     points = np.array(mesh.points)
     points[corners] = target(points, corners)
-    points = _keep_volumes(mesh, points, corners)
+    least = LEAST_RATIO * corner_volumes(mesh.points, mesh.tets)
+    points, _ = moved_back(
+        mesh.points, points, mesh.tets[:, :4], lambda at: corner_volumes(at, mesh.tets) < least
+    )
     ends = points[mesh.tets[:, EDGES]]
     points[mesh.tets[:, 4:]] = ends.mean(axis=2)
     straight = points.copy()
@@ -89,30 +92,8 @@ def _mean_edge(mesh: TetMesh) -> Floats:
     return total / np.maximum(count, 1)
 
 
-def _keep_volumes(mesh: TetMesh, points: Floats, corners: Ints) -> Floats:
-    """Moved corners go back where an element would lose much of its volume."""
-    before = corner_volumes(mesh.points, mesh.tets)
-    moved = np.zeros(len(points), bool)
-    moved[corners] = True
-    while True:
-        lost = corner_volumes(points, mesh.tets) < LEAST_RATIO * before
-        back = np.unique(mesh.tets[lost, :4])
-        back = back[moved[back]]
-        if not len(back):
-            return points
-        points[back], moved[back] = mesh.points[back], False
-
-
 def keep_jacobians(tets: Ints, straight: Floats, points: Floats) -> tuple[Floats, int]:
-    """Curved points (n, 3), those of straight elements (e, 10) where they would be distorted, and
-    how many went back.
-    """
-    went_back = 0
-    while True:
-        bad = jacobian_ratios(points, tets) < LEAST_RATIO
-        nodes = np.unique(tets[bad, 4:])
-        nodes = nodes[(points[nodes] != straight[nodes]).any(axis=1)]
-        if not len(nodes):
-            return points, went_back
-        points[nodes] = straight[nodes]
-        went_back += len(nodes)
+    """Curved points (n, 3), straight ones where elements would be distorted, and their number."""
+    return moved_back(
+        straight, points, tets[:, 4:], lambda at: jacobian_ratios(at, tets) < LEAST_RATIO
+    )

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from meshes.tetmesh import Floats, Ints, TetMesh, boundary_facets, corner_volumes, interface_facets
-from meshes.volume.quality import angles_between_faces
+from meshes.volume.quality import angles_between_faces, moved_back
 
 Sizing = Callable[[Floats], Floats]
 
@@ -75,11 +75,8 @@ def _means(points: Floats, tets: Ints, sizing: Sizing | None) -> Floats:
 def _no_worse(tets: Ints, points: Floats, moved: Floats) -> Floats:
     """Moved nodes go back at elements that lose by it."""
     floor = np.minimum(_least_angles(points, tets), GOOD)
-    while True:
-        worse = _least_angles(moved, tets) < floor
-        worse |= corner_volumes(moved, tets) <= 0
-        nodes = np.unique(tets[worse])
-        nodes = nodes[(moved[nodes] != points[nodes]).any(axis=1)]
-        if not len(nodes):
-            return moved
-        moved[nodes] = points[nodes]
+
+    def lose(at: Floats) -> np.ndarray:
+        return np.asarray((_least_angles(at, tets) < floor) | (corner_volumes(at, tets) <= 0))
+
+    return moved_back(points, moved, tets, lose)[0]

@@ -13,7 +13,7 @@ import pyvista
 
 import meshes
 from meshes import MeshError, TetMesh, subprocess_call
-from meshes.files.contents import read_contents
+from meshes.files.mesh_files import read_contents
 from meshes.surface.repair import check
 from meshes.surface.triangulation import volume
 from skinwave.commands.cli import main
