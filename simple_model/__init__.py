@@ -21,17 +21,15 @@ from simple_model.layers.stack import Stack
 from simple_model.line_table import LineTable, Unnamed, line_table, resolved_lines
 from simple_model.load.drive import DRIVES, DriveLaw
 from simple_model.load.focus import (
-    PressureMap,
     array_field,
     focal_spot,
-    read_pressure_map,
     relative_intensity,
 )
 from simple_model.load.line_names import named_lines
 from simple_model.load.pressure import MovingPressure
 from simple_model.load.rhythm import Rhythm, Signal
 from simple_model.load.tacton import SUPERPOSITIONS, Tacton, commanded, modulation, pattern_period
-from simple_model.load.trajectory import SHAPES, Trajectory, evenly, joined, timed_path
+from simple_model.load.trajectory import SHAPES, Trajectory, evenly, joined
 from simple_model.point_kernel import point_kernel, point_kernel_published, published
 from simple_model.response import Effort, Response, are_resolved, lines, phasors, spectrum
 from simple_model.threshold import sensation_level, threshold
@@ -50,7 +48,6 @@ __all__ = [
     "ModulusTable",
     "MovingPressure",
     "Orthotropy",
-    "PressureMap",
     "PronySeries",
     "PronyTerm",
     "Response",
@@ -81,7 +78,6 @@ __all__ = [
     "point_kernel",
     "point_kernel_published",
     "published",
-    "read_pressure_map",
     "relative_intensity",
     "resolved_lines",
     "sensation_level",
@@ -89,5 +85,4 @@ __all__ = [
     "steady_state",
     "tabulated",
     "threshold",
-    "timed_path",
 ]

@@ -34,7 +34,7 @@ Rows = Callable[[Material], Floats]
 
 
 class NotOfThis(ValueError, AttributeError):
-    """Refusal of a quantity that a response has not; `hasattr` takes it for a missing attribute."""
+    """Refusal of what a response has not; `hasattr` takes it for a missing attribute."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -15,15 +15,7 @@ from simple_model.load.line_names import line_names
 from simple_model.load.pressure import MovingPressure
 from simple_model.load.sampling import step
 from simple_model.numbers import counted, significant, stated_error
-from simple_model.quantities import (
-    ACCELERATION,
-    DISPLACEMENT,
-    PRESSURE,
-    VELOCITY,
-    NotOfThis,
-    Quantity,
-    quantity,
-)
+from simple_model.quantities import DISPLACEMENT, PRESSURE, NotOfThis, Quantity, quantity
 from simple_model.spectra import Lines, Spectrum
 from simple_model.typing import Complex, Floats, Mask
 from simple_model.windows import cosines, kaiser
@@ -33,7 +25,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-DEGREE = 9  # of the splines that are differentiated
 SHOWN = 0.030  # s of waveforms on a page, at their end
 # Side lobes of the Kaiser window below -140 dB resolve lines as weak as that from strong ones.
 LINE_BETA, LINE_BINS = 19.0, 2.5  # it resolves lines that are so many bins apart
@@ -131,37 +122,6 @@ class Response:
         if self.record not in (DISPLACEMENT, PRESSURE):
             raise NotOfThis(f"this response is of {self.quantity}; take its `values`")
         return self.values
-
-    @property
-    def velocity(self) -> Floats:
-        """Velocity (t, p) in m/s into the body, of a displacement or velocity; a ValueError of
-        anything else. The error of a displacement's spline of degree 9 is 1e-8 for lines below a
-        tenth of the sampling rate, 1e-4 below a quarter, and 1e-3 within 20 samples of its ends.
-        """
-        return self._derivative(VELOCITY)
-
-    @property
-    def acceleration(self) -> Floats:
-        """Acceleration (t, p) in m/s2 into the body, as `velocity`."""
-        return self._derivative(ACCELERATION)
-
-    def _derivative(self, wanted: Quantity) -> Floats:
-        own, order = self.record, wanted.rate - self.record.rate
-        if not own.is_normal or order < 0:
-            raise NotOfThis(
-                f"this response is of {own.words}, from which no {wanted.words} follows; simulate "
-                f'the scene with quantity = "{wanted.name}"'
-            )
-        if not order:
-            return self.values
-        if len(self.times) <= DEGREE:
-            raise NotOfThis(
-                f"{len(self.times)} times are too few to differentiate, which takes {DEGREE + 1}; "
-                "sample it longer"
-            )
-        from scipy.interpolate import make_interp_spline  # which takes long to import
-
-        return np.asarray(make_interp_spline(self.times, self.values, DEGREE)(self.times, order))
 
     @property
     def lines(self) -> Lines:

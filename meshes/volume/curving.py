@@ -27,17 +27,14 @@ FURTHEST = 0.5  # of the edges around: what lies further from the level set is n
 Function = Callable[[Floats], Floats]
 
 
-def curve_boundary(
-    mesh: TetMesh, level_set: Function, gradient: Function, facets: Ints | None = None
-) -> TetMesh:
-    """Mesh with the nodes of boundary facets moved onto a level set: corners first, then mid-side
+def curve_boundary(mesh: TetMesh, level_set: Function, gradient: Function) -> TetMesh:
+    """Mesh with the nodes of its boundary moved onto a level set: corners first, then mid-side
     nodes. Where an element would lose more than 70 % of its Jacobian, or of its volume, nodes stay.
 
     Parameters
     ----------
     mesh : TetMesh of ten-node tetrahedra
     level_set, gradient : functions of points (n, 3) in metre: values (n,), slopes (n, 3)
-    facets : (k, 6) int, the boundary facets that lie on it; all if not given
 
     Returns
     -------
@@ -47,7 +44,7 @@ def curve_boundary(
     """
     if mesh.order != 2:
         raise MeshError("elements of 4 nodes have no curved edges; make them `meshes.quadratic`")
-    chosen = boundary_facets(mesh.tets) if facets is None else facets
+    chosen = boundary_facets(mesh.tets)
     corners, middles = np.unique(chosen[:, :3]), np.unique(chosen[:, 3:])
     reach = FURTHEST * _mean_edge(mesh)
 

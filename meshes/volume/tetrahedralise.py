@@ -48,7 +48,6 @@ def tetrahedralise(
     inner: Mapping[str, Surface] = MappingProxyType({}),
     sizing: Sizing | None = None,
     timeout: float = 600.0,
-    epsilon: float | None = None,
 ) -> TetMesh:
     """Four-node tetrahedra that fill a closed surface, with facets in the surfaces inside it.
 
@@ -61,20 +60,18 @@ def tetrahedralise(
     sizing : function of points (n, 3) in metre to edge lengths (n,) in metre that are aimed at;
         None for h everywhere
     timeout : float, second, after which the mesher is stopped
-    epsilon : float, metre, how far the mesh may lie from the surface; a twentieth of h if not
-        given. Where a surface curves, elements get as small as it needs: less is slower.
 
     Returns
     -------
     TetMesh with its facets in the set `surface`, and with inner surfaces its regions: 0 outside of
         them, the others from 1, with their names
 
-    Raises a MeshError if the surface is not sound; h, a size or epsilon is out of range; or the
+    Raises a MeshError if the surface is not sound; h or a size is out of range; or the
     mesher fails, takes too long, or returns a bad mesh.
     """
     check(surface)
     check_size(surface, "h", h)
-    epsilon = _checked_epsilon(surface, h, epsilon)
+    epsilon = _envelope(surface, h)
     if inner:
         epsilon = max(
             min(epsilon, *(MOST_OF_INNER * thinnest(s) for s in inner.values())),
@@ -112,7 +109,8 @@ def graded(h: float, grading: Grading) -> Sizing:
     return sizes
 
 
-def _checked_epsilon(surface: Surface, h: float, epsilon: float | None) -> float:
+def _envelope(surface: Surface, h: float) -> float:
+    """How far in metre a mesh may lie from a surface: less is slower where it curves."""
     thickness, diagonal = thinnest(surface), surface.diagonal
     most, least = MOST_OF_THICKNESS * thickness, SMALLEST_EPSILON * diagonal
     if most < least:
@@ -121,11 +119,7 @@ def _checked_epsilon(surface: Surface, h: float, epsilon: float | None) -> float
             f"is too thin for the mesher, whose limit is 1:{MOST_OF_THICKNESS / SMALLEST_EPSILON:g}"
             "; use `meshes.sheet` or `meshes.block`"
         )
-    if epsilon is None:
-        return min(max(EPSILON * h, least), most)
-    if not least <= epsilon <= most:
-        raise MeshError(f"epsilon = {epsilon} m must be from {least:.2g} to {most:.2g} m")
-    return epsilon
+    return min(max(EPSILON * h, least), most)
 
 
 def check_size(surface: Surface, name: str, length: float) -> None:

@@ -150,28 +150,10 @@ class Material:
                 "a material with a modulus law of its own has all losses in it; leave out "
                 "viscosity, loss_factor and prony"
             )
-        at_rest = getattr(self.law, "shear_modulus", self.shear_modulus)
-        if abs(at_rest - self.shear_modulus) > 1e-6 * self.shear_modulus:
-            raise ValueError(
-                f"shear_modulus = {self.shear_modulus:g} Pa is not that of the material's modulus "
-                f"law at rest, {at_rest:g} Pa; build the material with of_law"
-            )
-        if self.orthotropy is not None:
-            self._check_orthotropy(self.orthotropy)
-
-    def _check_orthotropy(self, along: Orthotropy) -> None:
-        if self.law is not None:
+        if self.law is not None and self.orthotropy is not None:
             raise ValueError(
                 "a modulus law is one of an isotropic material, and this one is orthotropic; give "
                 "it a viscosity, a loss_factor or Prony terms"
-            )
-        if not np.allclose(
-            (self.shear_modulus, self.poisson), (along.shear, along.poisson), rtol=1e-6
-        ):
-            raise ValueError(
-                f"shear_modulus = {self.shear_modulus:g} Pa and poisson = {self.poisson:g} are not "
-                f"those of the material's isotropic mean, {along.shear:g} Pa and "
-                f"{along.poisson:g}; build the material with orthotropic"
             )
 
     @property

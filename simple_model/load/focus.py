@@ -9,11 +9,9 @@ Its intensity |p|^2 near the focus is close to sinc^2(D/D0) with D0 growing with
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache
-from pathlib import Path
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -46,59 +44,6 @@ _FORCES = np.array(
 )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class PressureMap:
-    """Measured focal spot: pressures on a grid, relative to the largest, linear between its points
-    and 0 beyond them; the same at all heights of the focus.
-
-    Parameters
-    ----------
-    x, y : (i,) and (j,) metre from the focus, ascending
-    pressure : (i, j) of any unit, its largest above 0
-
-    Raises a ValueError if they are no such grid.
-    """
-
-    x: Floats
-    y: Floats
-    pressure: Floats
-
-    def __post_init__(self) -> None:
-        for name in ("x", "y", "pressure"):
-            values = np.array(getattr(self, name), np.float64)
-            values.setflags(write=False)
-            object.__setattr__(self, name, values)
-        lines = [line.ndim == 1 and len(line) > 1 and (np.diff(line) > 0).all()
-                 and np.isfinite(line).all() for line in (self.x, self.y)]  # fmt: skip
-        if not all(lines) or self.pressure.shape != (len(self.x), len(self.y)):
-            raise ValueError(
-                f"a pressure map of shape {self.pressure.shape} on {self.x.size} by {self.y.size} "
-                "lines is no grid; give rising x (i,) and y (j,) in metre and pressures (i, j)"
-            )
-        if not (np.isfinite(self.pressure).all() and self.pressure.max() > 0):
-            raise ValueError("a pressure map must be finite, and above 0 somewhere; check its data")
-
-    def __repr__(self) -> str:  # all of it, for a cache
-        parts = b"".join(each.tobytes() for each in (self.x, self.y, self.pressure))
-        return f"PressureMap({self.pressure.shape}, {hashlib.sha256(parts).hexdigest()})"
-
-    @property
-    def spacing(self) -> float:
-        """The least distance in metre between lines of the grid."""
-        return float(min(np.diff(self.x).min(), np.diff(self.y).min()))
-
-    def __call__(self, offsets: Floats) -> Floats:
-        """Pressure (...) relative to the largest at offsets (..., 2) in metre from the focus."""
-        return np.asarray(self._interpolated(offsets))
-
-    @cached_property
-    def _interpolated(self) -> RegularGridInterpolator:
-        from scipy.interpolate import RegularGridInterpolator
-
-        relative = self.pressure / self.pressure.max()
-        return RegularGridInterpolator((self.x, self.y), relative, bounds_error=False, fill_value=0)
-
-
 @dataclass(frozen=True, kw_only=True)
 class ContactSpot:
     """Gaussian traction of a small contact of standard deviation `width` in metre, the same at all
@@ -123,29 +68,6 @@ class ContactSpot:
     def __call__(self, offsets: Floats) -> Floats:
         """Traction (...) relative to the largest at offsets (..., 2) in metre from the middle."""
         return np.asarray(np.exp(-(offsets**2).sum(axis=-1) / (2 * self.width**2)))
-
-
-def read_pressure_map(path: str | Path) -> PressureMap:
-    """Pressure map from a CSV file with a header and columns x and y in mm, pressure in any unit;
-    one row for each point of a grid, in any order.
-
-    Raises a ValueError if the file cannot be read, or its points are no grid.
-    """
-    try:
-        table = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
-        (x, i), (y, j) = (np.unique(table[:, k] / 1e3, return_inverse=True) for k in (0, 1))
-        pressure = np.full((len(x), len(y)), np.nan)
-        pressure[i, j] = table[:, 2]
-    except (OSError, ValueError, IndexError) as error:
-        raise ValueError(
-            f"{path} is no pressure map ({error}); give columns x_mm, y_mm and pressure"
-        ) from None
-    if len(table) != pressure.size or np.isnan(pressure).any():
-        raise ValueError(
-            f"{path} has {len(table)} points, which are no grid of {len(x)} by {len(y)}; give each "
-            "x with each y once"
-        )
-    return PressureMap(x=x, y=y, pressure=pressure)
 
 
 def array_field(points: ArrayLike, focus: ArrayLike) -> NDArray[np.complex128]:

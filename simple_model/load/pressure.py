@@ -43,7 +43,7 @@ class MovingPressure:
     Parameters
     ----------
     tacton : Tacton
-    profile : "gaussian", "main_lobe" or "array", the shape of the focal spot; a PressureMap; or any
+    profile : "gaussian", "main_lobe" or "array", the shape of the focal spot; or any
         function of offsets (..., 2) in metre, with details no finer than the Gaussian's
     drive : "linear", "pressure_squared", "force_corrected", or a DriveLaw
     depth_of_modulation : float, 0..1; the linear law has none

@@ -6,7 +6,7 @@ of the drawing period, never by adding steps, and so are as exact at 10 s as at 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite, pi, sqrt
@@ -23,7 +23,6 @@ SWEEPS = ("there_and_back", "one_way", "sinusoidal")
 LARGEST = 0.060  # m, the size of a palm
 FURTHEST = 0.300  # m of a point's coordinates, which devices steer to
 MOST_POINTS = 1_000_000
-STRAIGHT = 1e-5  # m between a path that is a function and the points that stand for it
 NEARBY = 1e-6  # of a period, over which a tangent is taken; and of its part between two points
 STRAIGHT_ON = 1e-3  # of a unit tangent, below which it does not turn
 STILL = 1e-7, 1e-6  # m and of the level, below which nothing jumps
@@ -258,28 +257,6 @@ def differ(before: Floats, after: Floats) -> NDArray[np.bool_]:
     place, level = STILL
     apart = np.abs(after - before)
     return (apart[:, :2] > place).any(axis=1) | (apart[:, 2] > level)
-
-
-def timed_path(position: Callable[[Floats], Floats], period: float) -> Trajectory:
-    """Recorded path whose positions (k, 2) in metre are a function of times (k,) in s, from 0 to
-    `period`, within `STRAIGHT`; a ValueError if the function jumps, or returns no positions.
-    """
-    count = 64
-    while count < MOST_POINTS:
-        t = np.linspace(0, period, count + 1)
-        x, between = (np.asarray(position(each), np.float64) for each in (t, t[1:] - t[1] / 2))
-        if x.shape != (count + 1, 2) or not np.isfinite(x).all():
-            raise ValueError(
-                f"the path's function gives shape {x.shape} for {count + 1} times; return "
-                "finite positions (k, 2) in metre"
-            )
-        if np.linalg.norm(between - (x[1:] + x[:-1]) / 2, axis=1).max() <= STRAIGHT:
-            points = tuple(map(tuple, x.tolist()))
-            return Trajectory(shape="recorded", points=points, times=tuple(t.tolist()))
-        count *= 2
-    raise ValueError(
-        "the path's function jumps; give its points and times as a recorded Trajectory"
-    )
 
 
 def joined(paths: Sequence[Trajectory], frequency: float) -> Trajectory:

@@ -120,8 +120,6 @@ def test_no_unsound_surface_reaches_the_mesher(no_mesher):
 
 def test_no_absurd_option_reaches_the_mesher(no_mesher):
     for options, said in [
-        ({"epsilon": 0.0}, "epsilon = 0.0 m"),
-        ({"epsilon": float("nan")}, "epsilon = nan"),
         ({"h": 1.0}, "h = 1.0 m"),
         ({"h": float("nan")}, "h = nan m"),
         ({"h": 1.2e-4}, "1,000,000"),

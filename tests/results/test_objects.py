@@ -83,26 +83,9 @@ def test_a_table_of_pandas_has_all_of_a_response(monkeypatch):
         wave().to_pandas()
 
 
-def test_rates_of_a_sinusoid_are_those_of_the_closed_form():
-    f, inner = 900.0, slice(20, -20)
-    found, turn = wave(f), 2 * np.pi * f
-    velocity = turn * 3e-6 * np.cos(turn * found.times)
-    error = np.abs(found.velocity[:, 0] - velocity)
-    assert error[inner].max() < 1e-8 * velocity.max()
-    assert error.max() < 1e-3 * velocity.max()
-    acceleration = -turn * 3e-6 * turn * np.sin(turn * found.times)
-    error = np.abs(found.acceleration[:, 0] - acceleration)[inner].max()
-    assert error < 1e-7 * acceleration.max()
-    again = wave(f, "velocity")
-    assert np.array_equal(again.velocity, again.values)
-
-
-def test_what_does_not_follow_from_a_response_is_refused():
-    for response, name in (
-        (wave(quantity="acceleration"), "velocity"), (wave(quantity="pressure"), "acceleration"),
-        (wave(n=9), "velocity"), (wave(), "lines"),
-    ):  # fmt: skip
-        with pytest.raises(ValueError, match="follows|acceleration|few|unknown"):
+def test_what_a_response_has_not_is_refused():
+    for response, name in ((wave(quantity="acceleration"), "displacement"), (wave(), "lines")):
+        with pytest.raises(ValueError, match="values|unknown"):
             getattr(response, name)
         assert not hasattr(response, name)
 

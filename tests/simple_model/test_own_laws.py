@@ -17,13 +17,10 @@ from simple_model import (
     Tacton,
     Trajectory,
     flat_body,
-    focal_spot,
     named_lines,
     point_kernel,
-    read_pressure_map,
     steady_state,
     tabulated,
-    timed_path,
 )
 from simple_model.layers.compliance import slab
 from simple_model.load.sampling import highest
@@ -87,24 +84,17 @@ GATE = DriveLaw(name="gate", pressure=lambda A, M, m: A * (np.asarray(M) > 0.3))
 BEATEN = Tacton(rhythm=Rhythm(pulses=((0.1, 0.05),), ramp=0.01))
 
 
-def test_laws_that_cannot_be_used_are_refused(tmp_path):
+def test_laws_that_cannot_be_used_are_refused():
     for ask, said in (
         (lambda: load_lines(MovingPressure(tacton=AM, drive=GATE)), "do not fall"),
         (lambda: DriveLaw(name="wrong", degree=2, pressure=saturating), "no polynomial"),
         (lambda: MovingPressure(tacton=BEATEN, drive=SATURATING), "no product"),
         (lambda: dumps(scene(drive=CUBIC)), "Python function"),
-        (lambda: timed_path(lambda t: np.stack([t > 0.01, 0 * t], -1), 0.05), "jumps"),
-        (lambda: map_of(tmp_path / "map.csv", "0,0,1\n0,1,2\n1,0,3\n"), "grid"),
         (lambda: dumps(scene(replace(TWO, prony=(), law=closed_form))), "law of its own"),
         (lambda: compute(scene(profile=lambda x: np.ones(x.shape[:-1])), "flat-body"), "flat-body"),
     ):
         with pytest.raises(ValueError, match=said):
             ask()
-
-
-def map_of(path, rows):
-    path.write_text(f"x,y,p\n{rows}")
-    return read_pressure_map(path)
 
 
 def test_a_registered_law_is_one_of_all(monkeypatch):
@@ -126,52 +116,8 @@ def test_a_registered_law_is_one_of_all(monkeypatch):
     np.testing.assert_allclose(kernel, gain * own.pressure.spot(PROBES, CIRCLE.position(times)))
 
 
-# A focus profile
-
-
-def measured(path, spacing=1.0):
-    """A file of the main lobe on a grid, stronger on one side."""
-    line = np.arange(-15.0, 15.0 + spacing / 2, spacing)
-    x, y = (each.ravel() for each in np.meshgrid(line, line))
-    relative = focal_spot(np.column_stack([x, y]) / 1e3) * (1 + 0.01 * x)
-    table = np.column_stack([x, y, 7.0 * relative])
-    np.savetxt(path, np.random.default_rng(0).permutation(table), delimiter=",", header="x,y,p")
-    return read_pressure_map(path)
-
-
-def test_a_measured_map_is_the_focal_spot(tmp_path):
-    found = measured(tmp_path / "map.csv", 0.5)
-    load = MovingPressure(tacton=Tacton(trajectory=CIRCLE), profile=found)
-    offsets = np.random.default_rng(1).uniform(-12e-3, 12e-3, (200, 2))
-    expected = focal_spot(offsets) * (1 + 10 * offsets[:, 0])
-    spots = load.spot(offsets + [0.003, 0.001], [0.003, 0.001])
-    np.testing.assert_allclose(spots, expected, atol=4e-3)
-    assert load.spot([[0.05, 0.0]], [0.0, 0.0]) == 0
-
-
-def test_what_depends_on_a_function_is_not_found_in_the_cache(tmp_path):
-    one, other = (measured(tmp_path / "map.csv", spacing) for spacing in (1.0, 0.5))
-    again = measured(tmp_path / "map.csv", 1.0)
-    assert cache.key(one) == cache.key(again) != cache.key(other)
+def test_what_depends_on_a_function_is_not_found_in_the_cache():
     assert cache.key(scene(drive=CUBIC).pressure) != cache.key(scene(drive=CUBIC).pressure)
-
-
-# A path
-
-
-def lissajous(t):
-    turn = 2 * np.pi * np.asarray(t) / 0.05
-    return 0.01 * np.stack([np.cos(turn), np.sin(2 * turn)], axis=-1)
-
-
-def test_a_function_of_time_is_a_path_that_a_scene_file_holds():
-    path = timed_path(lissajous, 0.05)
-    t = np.random.default_rng(0).uniform(0, 0.2, 500)
-    assert np.linalg.norm(path.position(t) - lissajous(t), axis=1).max() < 2e-5
-    own = scene(tacton=Tacton(trajectory=path, duration=0.05))
-    np.testing.assert_allclose(
-        loads(dumps(own)).tacton.trajectory.position(t), path.position(t), atol=1e-12
-    )
 
 
 # A material
