@@ -47,3 +47,11 @@ def check_numbers(what: str, record: object, *names: str, least: str = "above 0"
         ):
             continue
         raise ValueError(f"{name} = {value} of {what} must be a finite number, {least}")
+
+
+def check_range(
+    what: str, value: float, low: float, high: float, unit: str = "", cure: str = ""
+) -> None:
+    """Refuse a number outside low..high, in a unit, with a cure."""
+    if not low <= value <= high:
+        raise ValueError(f"{what} = {value:g}{unit} is outside {low:g}..{high:g}{unit}{cure}")

@@ -132,13 +132,11 @@ class Response:
                 "simple_model.phasors(response, frequencies)"
             )
         found = line_names(self.load)
-        f = found.frequencies
-        kept = f < 0.5 / step(self.times)
-        kept[kept] = are_resolved(self, f[kept], strengths=found.strengths[kept])
-        names = tuple(name for name, keep in zip(found.names, kept, strict=True) if keep)
+        found = found.some(found.frequencies < 0.5 / step(self.times))
+        found = found.some(are_resolved(self, found.frequencies, strengths=found.strengths))
         return Lines(
-            names=names, frequencies=f[kept], amplitudes=phasors(self, f[kept]),
-            probes=self.probes, quantity=self.quantity,
+            names=found.names, frequencies=found.frequencies, probes=self.probes,
+            amplitudes=phasors(self, found.frequencies), quantity=self.quantity,
         )  # fmt: skip
 
     def spectrum(self, window: str = "hann") -> Spectrum:
@@ -219,15 +217,9 @@ def _check(times: Floats, probes: Floats, values: Floats) -> None:
     if times.ndim != 1 or not len(times):
         raise ValueError(f"times of a response have shape {times.shape}; give (t,) in s")
     if probes.ndim != 2 or probes.shape[1] not in (2, 3):
-        raise ValueError(
-            f"probes of a response have shape {probes.shape}; give (p, 2) or (p, 3) in metre"
-        )
-    expected = len(times), len(probes)
-    if values.shape != expected:
-        raise ValueError(
-            f"values of a response have shape {values.shape}, and its times and probes are "
-            f"{expected}; give (t, p)"
-        )
+        raise ValueError(f"probes of a response have shape {probes.shape}; give (p, 2) or (p, 3)")
+    if values.shape != (expected := (len(times), len(probes))):
+        raise ValueError(f"values of a response have shape {values.shape}; give {expected}")
     steps = np.diff(times)
     mean = steps.mean() if len(steps) else 1.0
     if not (mean > 0 and np.abs(steps - mean).max(initial=0.0) <= UNEVEN * mean):

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import j1
 
+from simple_model.choices import check_range
 from simple_model.typing import Floats
 
 if TYPE_CHECKING:
@@ -54,11 +55,8 @@ class ContactSpot:
 
     def __post_init__(self) -> None:
         low, high = CONTACTS
-        if not low <= self.width <= high:
-            raise ValueError(
-                f"width = {1e3 * self.width:g} mm of a contact is outside {1e3 * low:g}.."
-                f"{1e3 * high:g} mm; a point has no response of its own, give the contact's size"
-            )
+        cure = "; a point has no response of its own, give the contact's size"
+        check_range("width of a contact", 1e3 * self.width, 1e3 * low, 1e3 * high, " mm", cure)
 
     @property
     def spacing(self) -> float:
@@ -93,11 +91,8 @@ def relative_intensity(height: float) -> float:
 
     Raises a ValueError if the height is outside 20..600 mm.
     """
-    low, high = _HEIGHTS[[0, -1]]
-    if not low <= 1e3 * height <= high:
-        raise ValueError(
-            f"height = {1e3 * height:g} mm is outside {low}..{high} mm, where the array focuses"
-        )
+    low, high = _HEIGHTS[[0, -1]].tolist()
+    check_range("height", 1e3 * height, low, high, " mm", ", where the array focuses")
     if height == NOMINAL_HEIGHT:
         return 1.0
     from scipy.interpolate import PchipInterpolator  # which takes long to import

@@ -9,12 +9,11 @@ it, which multiplies the amplitude.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from simple_model.choices import choose
+from simple_model.choices import check_numbers, check_range, choose
 from simple_model.load.drive import DRIVES, DriveLaw
 from simple_model.load.focus import (
     FOCI,
@@ -70,12 +69,8 @@ class MovingPressure:
             choose("profile", self.profile, FOCI)
         if not isinstance(self.drive, DriveLaw):
             choose("drive", self.drive, DRIVES)
-        if not 0 <= self.depth_of_modulation <= 1:
-            raise ValueError(f"depth_of_modulation = {self.depth_of_modulation} is outside 0..1")
-        if not (isfinite(self.peak_pressure) and self.peak_pressure >= 0):
-            raise ValueError(
-                f"peak_pressure = {self.peak_pressure} Pa must be a finite number, 0 or above"
-            )
+        check_range("depth_of_modulation", self.depth_of_modulation, 0, 1)
+        check_numbers("a load", self, "peak_pressure", least="0 or above")
         relative_intensity(self.height)
         choose("heading", self.heading, HEADINGS)
         path = self.tacton.trajectory

@@ -9,7 +9,7 @@ from math import isfinite
 import numpy as np
 from numpy.typing import ArrayLike
 
-from simple_model.choices import choose
+from simple_model.choices import check_numbers, check_range, choose
 from simple_model.typing import Floats
 
 ROLES = ("modulation", "envelope")
@@ -40,12 +40,8 @@ class Rhythm:
                     f"a pulse of {1e3 * on:g} ms with a gap of {1e3 * gap:g} ms must last longer "
                     "than 0 and its gap 0 or longer"
                 )
-        shortest = min(on for on, _ in self.pulses)
-        if not (isfinite(self.ramp) and 0 <= self.ramp <= shortest / 2):
-            raise ValueError(
-                f"ramp = {1e3 * self.ramp:g} ms is outside 0..{1e3 * shortest / 2:g} ms, half the "
-                "shortest pulse; shorten it"
-            )
+        longest = 1e3 * min(on for on, _ in self.pulses) / 2
+        check_range("ramp", 1e3 * self.ramp, 0, longest, " ms", ", half the shortest pulse")
 
     @property
     def period(self) -> float:
@@ -103,12 +99,8 @@ class Signal:
 
     def __post_init__(self) -> None:
         choose("signal role", self.role, ROLES)
-        if not (isfinite(self.rate) and self.rate > 0):
-            raise ValueError(f"signal rate = {self.rate} Hz must be a finite number above 0")
-        if not 1 < len(self.samples) <= MOST_SAMPLES:
-            raise ValueError(
-                f"a signal of {len(self.samples)} samples is outside 2..{MOST_SAMPLES:,}"
-            )
+        check_numbers("a signal", self, "rate")
+        check_range("number of samples", len(self.samples), 2, MOST_SAMPLES, "", " of a signal")
         low = -1 if self.role == "modulation" else 0
         if not ((self._values >= low) & (self._values <= 1)).all():
             raise ValueError(f"samples of a signal must lie in {low}..1; scale them to full drive")

@@ -10,12 +10,11 @@ an envelope, are further factors of A; a signal that is a modulation is one of {
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import isfinite
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from simple_model.choices import choose
+from simple_model.choices import check_numbers, check_range, choose
 from simple_model.load.rhythm import Rhythm, Signal
 from simple_model.load.trajectory import Trajectory
 from simple_model.typing import Floats
@@ -68,28 +67,14 @@ class Tacton:
     signal: Signal | None = None
 
     def __post_init__(self) -> None:
-        if not (isfinite(self.amplitude) and 0 <= self.amplitude <= 1):
-            raise ValueError(
-                f"amplitude = {100 * self.amplitude:g} % is outside 0..100 %; 100 % is full drive"
-            )
+        half = ", half the carrier"
+        check_range("amplitude", 100 * self.amplitude, 0, 100, " %", "; 100 % is full drive")
         for name in ("am_frequency", "second_am_frequency", "envelope_frequency"):
-            value = getattr(self, name)
-            if not (isfinite(value) and 0 <= value <= CARRIER / 2):
-                raise ValueError(
-                    f"{name} = {value} Hz is outside 0..{CARRIER / 2:g} Hz, half the carrier; "
-                    "0 switches it off"
-                )
-        if not (isfinite(self.duration) and 0 < self.duration <= LONGEST):
-            cure = "shorten it" if self.duration > LONGEST else "give one above 0"
-            raise ValueError(
-                f"duration = {self.duration} s is outside 0 < duration <= {LONGEST:g} s, "
-                f"the longest Tacton; {cure}"
-            )
-        if not (drawn := self.trajectory.drawing_frequency) <= CARRIER / 2:
-            raise ValueError(
-                f"the path is drawn {drawn:.3g} times a second, more than {CARRIER / 2:g} Hz, "
-                "half the carrier; make it longer or slower"
-            )
+            check_range(name, getattr(self, name), 0, CARRIER / 2, " Hz", f"{half}; 0 is off")
+        check_numbers("a Tacton", self, "duration")
+        check_range("duration", self.duration, 0, LONGEST, " s", ", the longest Tacton; shorten it")
+        drawn = self.trajectory.drawing_frequency
+        check_range("drawing frequency", drawn, 0, CARRIER / 2, " Hz", f"{half}; lower the speed")
         w1, w2 = self.superposition
         if not (w1 >= 0 and w2 >= 0 and abs(w1 + w2 - 1) <= 1e-9):
             raise ValueError(
@@ -97,11 +82,9 @@ class Tacton:
                 "such as [0.75, 0.25]"
             )
         choose("sharing", self.sharing, SHARINGS)
-        if not 1 <= len(self.foci) <= MOST_FOCI:
-            raise ValueError(f"{len(self.foci)} foci are outside 1..{MOST_FOCI}, what devices make")
+        check_range("number of foci", len(self.foci), 1, MOST_FOCI, "", ", what devices make")
         for phase in self.foci:
-            if not 0 <= phase <= 1:
-                raise ValueError(f"focus phase {phase} is outside 0..1 of the drawing period")
+            check_range("focus phase", phase, 0, 1, "", " of the drawing period")
         if self.is_sampled and self.trajectory.levels:
             raise ValueError(
                 "a recorded path has levels of its own; put the rhythm or signal into them, or "

@@ -14,7 +14,7 @@ from math import isfinite, pi, sqrt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simple_model.choices import choose
+from simple_model.choices import check_numbers, check_range, choose
 from simple_model.typing import Floats, Points
 
 SHAPES = ("point", "line", "circle", "triangle", "square")  # defined by a size alone
@@ -76,14 +76,8 @@ class Trajectory:
     def __post_init__(self) -> None:
         choose("shape", self.shape, (*SHAPES, *BY_POINTS))
         choose("sweep", self.sweep, SWEEPS)
-        if not (isfinite(self.size) and 0 <= self.size <= LARGEST):
-            cure = "make the path smaller" if self.size > LARGEST else "give a size of 0 or above"
-            raise ValueError(
-                f"size = {1e3 * self.size:g} mm is outside 0..{1e3 * LARGEST:g} mm, "
-                f"the size of a palm; {cure}"
-            )
-        if not (isfinite(self.speed) and self.speed >= 0):
-            raise ValueError(f"speed = {self.speed} m/s must be a finite number, 0 or above")
+        check_range("size", 1e3 * self.size, 0, 1e3 * LARGEST, " mm", ", the size of a palm")
+        check_numbers("a path", self, "speed", least="0 or above")
         _check_points(self)
         if self.shape == "recorded":
             _check_recording(self)
