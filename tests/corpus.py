@@ -48,7 +48,7 @@ NUMBERS = {
     "body": ("size_x_mm", "size_y_mm", "thickness_mm"),
     "body.material": ("density_kg_m3", "shear_modulus_pa", "poisson", "viscosity_pa_s"),
 }  # fmt: skip
-NO_NUMBERS = ("'7'", "true", "[1.0]", "-inf", "-1", "1" + "0" * 400)
+NO_NUMBERS = ("'7'", "true", "-inf", "1" + "0" * 400)
 WORDS = {
     "tacton": ("shape", "sweep"),
     "focus": ("drive", "profile"),
@@ -61,12 +61,9 @@ MATERIAL = "density_kg_m3 = 1000\nshear_modulus_pa = 1e4\npoisson = 0.45\n"
 WHOLE_FILES = {
     "empty table header": "[]",
     "table left open": "[tacton",
-    "value left out": "[tacton]\nsize_mm =",
     "key twice": "name = 'a'\nname = 'b'",
     "no TOML": "Dear Sir or Madam,",
     "table is a number": "tacton = 3",
-    "list of tables": "[[probes]]\npoints_mm = [[0, 0]]",
-    "name is a number": "name = 3",
     "brackets without end": "x = " + "[" * 50_000,
     "digits without end": "[tacton]\nsize_mm = " + "9" * 10_000,
     "material lacks poisson": "[body.material]\ndensity_kg_m3 = 1000\nshear_modulus_pa = 1e4",
@@ -76,22 +73,15 @@ WHOLE_FILES = {
     "infinite sheet": "[body]\nkind = 'sheet'\nthickness_mm = inf",
     "path off the body": "[tacton]\nshape = 'square'\nsize_mm = 60\n[body]\nsize_x_mm = 59",
     "polyline without points": "[tacton]\nshape = 'polyline'",
-    "points of a circle": "[tacton]\nshape = 'circle'\npoints_mm = [[0, 0], [1, 1]]",
-    "recorded without times": "[tacton]\nshape = 'recorded'\npoints_mm = [[0, 0], [1, 1]]",
     "times that fall": "[tacton]\nshape = 'recorded'\npoints_mm = [[0, 0], [1, 1]]\n"
     "times_s = [0, -1]",
     "levels of four": "[tacton]\nshape = 'recorded'\npoints_mm = [[0, 0], [1, 1]]\n"
     "times_s = [0, 1]\nlevels = [1, 4]",
-    "hold is a word": "[tacton]\nhold = 'yes'",
-    "centre is a number": "[tacton]\ncentre_mm = 5",
     "nine foci": "[tacton]\nfoci = [0, 0, 0, 0, 0, 0, 0, 0, 0]",
     "sharing unfairly": "[tacton]\nsharing = 'unfair'",
-    "rhythm is a number": "[tacton]\nrhythm = 3",
     "pulse without gap": "[tacton.rhythm]\npulses_ms = [[10]]",
     "ramp beyond its pulse": "[tacton.rhythm]\npulses_ms = [[10, 10]]\nramp_ms = 6",
-    "signal without samples": "[tacton.signal]\nrate_hz = 100",
     "signal too loud": "[tacton.signal]\nrate_hz = 100\nsamples = [0, 2]",
-    "signal of no role": "[tacton.signal]\nrate_hz = 100\nsamples = [0, 1]\nrole = 'lead'",
     "carrier as modulation": "[tacton]\nam_frequency_hz = 40000",
     "above the array": "[focus]\nheight_mm = 601",
 }
@@ -162,8 +152,7 @@ def command_lines() -> list[list[str]]:
         for dt in ("0", "nan", "1e300", "1e-12")
     ]
     found += [[*c, "--solver", "nonsense"] for c in (run, compare)]
-    outs = ("kept", "kept/note", "kept/note/below", "good.toml", ".", "", "/", "x\0y", "loop",
-            "/dev/null/out")  # fmt: skip
+    outs = ("kept", "kept/note/below", "good.toml", ".", "", "x\0y", "loop")
     found += [[*run, "--out", out] for out in outs]
     found += [[*run, "--overwrite", "--out", out] for out in ("kept/note", ".", "", "/", "loop")]
     files = ("missing.toml", "kept", "", "x\0y", "n" * 300, "good.toml/x", "/dev/zero")
@@ -185,44 +174,32 @@ CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]]
 
 def broken_meshes() -> dict[str, Callable[[], object]]:
     """Calls that result in no mesh, operator or response."""
-    inf, nan, grading = np.inf, np.nan, meshes.Grading
+    nan, grading = np.nan, meshes.Grading
 
     def tet(**fields: object) -> Callable[[], object]:
         return lambda: TetMesh(**({"points": CORNERS, "tets": [[0, 1, 2, 3]]} | fields))  # type: ignore[arg-type]
 
     fields: dict[str, tuple[object, ...]] = {
-        "points": (None, "xyz", [], CORNERS[0], [[0, 0]] * 4, CORNERS[:3], [["a", "b", "c"]] * 4,
-                   [[0, 0, 0], [1, 0]], np.array(CORNERS, object) * 1j, np.zeros((4, 3)),
-                   [*CORNERS[:3], [0, 0, nan]], [*CORNERS[:3], [0, -inf, 0]],
-                   [*CORNERS[:3], [1, 1, 0.0]], [*CORNERS[:3], [0, 0, 1e300]],
-                   [*CORNERS[:3], [0, 0, 1e-12]]),
-        "tets": (None, "0123", [], [0, 1, 2, 3], [[0, 1, 2]], [[0, 1, 2, 4]], [[-1, 1, 2, 3]],
-                 [[0, 1, 2, 2]], [[0.5, 1, 2, 3]], [[0, 1, 2, 3], [0, 1, 2]], [list(range(10))],
-                 [[0, 1, 2, 2**70]], [[0, 1, 2, None]]),
-        "region": ([0, 1], [-1], [0.5], ["skin"], [None]),
-        "facets": tuple({"top": f} for f in ([[0, 1, 9]], [[-1, 0, 1]], [[0, 1]], [[0.5, 1, 2]],
-                                             "top", [[0, 1, 2], [0, 1]])),
+        "points": (None, [], CORNERS[0], CORNERS[:3], np.zeros((4, 3)), [*CORNERS[:3], [0, 0, nan]],
+                   [*CORNERS[:3], [1, 1, 0.0]], [*CORNERS[:3], [0, 0, 1e300]]),
+        "tets": (None, [], [[0, 1, 2]], [[0, 1, 2, 4]], [[-1, 1, 2, 3]], [[0, 1, 2, 2]],
+                 [[0.5, 1, 2, 3]], [list(range(10))]),
+        "region": ([0, 1], [-1], [0.5]),
+        "facets": tuple({"top": f} for f in ([[0, 1, 9]], [[0, 1]], [[0.5, 1, 2]])),
     }  # fmt: skip
     found = {f"{n} {k}": tet(**{n: v}) for n, of in fields.items() for k, v in enumerate(of)}
     cube = meshes.block((1, 1, 1), 0.5)
     skin, top = fem.PRESETS["palm"], cube.facets["top"]
     everything = np.ones(cube.points.shape, bool)
     calls: dict[str, tuple[Callable[..., object], tuple[object, ...]]] = {
-        "block": (lambda a: meshes.block(*a), (
-            ((0, 1, 1), 0.5), ((nan, 1, 1), 0.5), ((1, 1, 1), 0), ((1, 1, 1), 1e-300))),
-        "grading": (lambda g: grading(**g), (
-            {"radius": -1}, {"radius": nan}, {"radius": 0, "growth": 0.5},
-            {"radius": 0, "coarsest": nan})),
-        "sheet": (lambda a: meshes.sheet(1, 1, *a[:2], **a[2]), (
-            (0, 0.5, {}), (nan, 0.5, {}), (1, 0.5, {"layers": 0}), (1, 0.5, {"order": 3}))),
-        "grid": (lambda x: meshes.extrude(x, [0, 1], [0, 1]), ([0], [1, 0], [0, nan], [[0, 1]])),
+        "block": (lambda a: meshes.block(*a), (((nan, 1, 1), 0.5), ((1, 1, 1), 1e-300))),
+        "grading": (lambda g: grading(**g), ({"radius": nan}, {"radius": 0, "growth": 0.5})),
+        "grid": (lambda x: meshes.extrude(x, [0, 1], [0, 1]), ([1, 0], [0, nan])),
         "half": (lambda axis: meshes.half(cube, axis), ("w", "z")),
-        "load": (lambda f: fem.load_operator(cube, f), ("lid", top[:, :3], top + 10**6, top * 0.5)),
-        "probe": (lambda p: fem.probe_operator(cube, p), ([[2, 0]], [[nan, 0]], [[0]], [[[0, 0]]])),
+        "load": (lambda f: fem.load_operator(cube, f), ("lid", top + 10**6)),
+        "probe": (lambda p: fem.probe_operator(cube, p), ([[2, 0]], [[nan, 0]], [[0]])),
         "assembly": (lambda a: fem.assemble(cube, **({"material": skin} | a)), (
-            {"material": "palm"}, {"material": {1: skin}}, {"fixed": "lid"},
-            {"fixed": {"top": "w"}}, {"fixed": everything}, {"absorbing": "lid"},
-            {"absorbing": top * 0})),
+            {"material": "palm"}, {"fixed": {"top": "w"}}, {"fixed": everything})),
     }  # fmt: skip
     for name, (call, of) in calls.items():
         found |= {f"{name} {k}": lambda call=call, v=v: call(v) for k, v in enumerate(of)}

@@ -93,12 +93,12 @@ def scenes() -> dict[str, Write]:
         "dates": "name = 1979-05-27T07:32:00Z",
     }  # fmt: skip
     found = {f"scene, {name}": file("scene.toml", text, *RUN) for name, text in texts.items()}
-    for k in range(12):
+    for k in range(5):
         table = QUICK
         for _ in range(rng.choice((1, 2, 3))):
             table = changed(table, rng)
         found[f"scene, changed {k}"] = file("scene.toml", _as_toml(table), *RUN)
-    for k in range(4):
+    for k in range(2):
         spoilt = bytearray(good.encode())
         for _ in range(3):
             at = rng.randrange(len(spoilt))
@@ -177,10 +177,10 @@ def patterns() -> dict[str, Write]:
         more = ("--rate", "1000") if suffix == ".csv" else ()
         found[f"pattern, {name}"] = file(f"in{suffix}", content, *arguments, *more)
 
-    for name in ("", "\x1b[2J", "../../x", "n" * 100_000, None):
+    for name in ("\x1b[2J", "../../x", None):
         text = json.dumps(_adaptics() | {"name": name})
         add(f"named {str(name)[:8]!a}", ".adaptics", text)
-    for k in range(12):
+    for k in range(5):
         add(f"changed {k}", ".adaptics", json.dumps(changed(_adaptics(), rng)))
     add("JSON nested deeply", ".adaptics", '{"a":' * 100_000)
     unhashable = json.dumps(_adaptics()).replace('"circle"', '["circle"]')
@@ -188,17 +188,14 @@ def patterns() -> dict[str, Write]:
     lies = {
         "RIFF of 4 GB": _put(4, "<I", 2**32 - 1),
         "no channels": _put(22, "<H", 0),
-        "rate of 0": _put(24, "<I", 0),
-        "no bits": _put(34, "<H", 0),
         "unknown format": _put(20, "<H", 0x1234),
     }
     for name, lie in lies.items():
         add(f"WAV, {name}", ".wav", _wav(lie))
-    for cut in (0, 20, 57):
+    for cut in (0, 57):
         add(f"WAV, cut at {cut}", ".wav", _wav()[:cut])
     rows = "t_s,point,x_m,y_m,z_m,intensity\n0,0,0,0,0.2,1\n0.01,0,0.001,0,0.2,1\n"
     tables = {
-        "quotes without end": rows + '"',
         "a cell of 1 MB": rows + "9" * 1_000_000,
         "point of 1e18": rows.replace("0,0,0,0,0.2", "0,1000000000000000000,0,0,0.2"),
         "UTF-16": rows.encode("utf-16"),
@@ -288,10 +285,8 @@ def results(made: Path) -> dict[str, Write]:
     for _ in range(20):
         spoilt[rng.randrange(len(spoilt))] = rng.randrange(256)
     npz: dict[str, bytes | Callable[[Path], object]] = {
-        "no array": stored(),
         "objects": stored(**(arrays | {"t": np.array([{}], object)})),
         "nan": stored(**(arrays | {"t": arrays["t"] * np.nan})),
-        "no samples": stored(**{n: a[:0] for n, a in arrays.items()}),
         "another model": stored(t=arrays["t"], probes=arrays["probes"], **{"\x1b[2J": arrays["t"]}),
         "cut": files["responses.npz"][:500], "empty": b"", "spoilt": bytes(spoilt),
         "pipe": os.mkfifo, "sparse": _sparse,
@@ -300,7 +295,7 @@ def results(made: Path) -> dict[str, Write]:
         add(f"npz, {name}", "responses.npz", content)
     for name in ("effort.json", "plan.json"):
         table = json.loads(files[name]) if name in files else {"rows": [], "tolerance": 0.05}
-        for k in range(4):
+        for k in range(2):
             add(f"{name}, changed {k}", name, json.dumps(changed(table, rng)).encode())
         add(f"{name}, deep", name, b"[" * 100_000)
     add("scene, spoilt", "scene.toml", b"[")
@@ -321,16 +316,11 @@ def tables() -> dict[str, Write]:
     contents: dict[str, bytes | Callable[[Path], object]] = {
         "foreign": parquet(a=[1, 2]),
         "key of numbers": parquet(**(good | {"key": [1]})),
-        "key is missing": parquet(**(good | {"key": [None]})),
-        "no status": parquet(key=["k"], peak_um=[1.0]),
         "no rows": parquet(key=pa.array([], pa.string())),
         "names that are obeyed": parquet(**(good | {"\x1b[2J.x": [1.0], "$\\frac{$": [2.0]})),
         "many rows": parquet(key=pa.array(["k"]).take(pa.array(np.zeros(3_000_000, int)))),
-        "empty": b"",
         "cut": parquet(**good)[:-10],
-        "junk": b"PAR1" + random.Random(SEED).randbytes(300) + struct.pack("<I", 200) + b"PAR1",
         "pipe": os.mkfifo,
-        "sparse": _sparse,
     }
     found = {}
     for name, content in contents.items():

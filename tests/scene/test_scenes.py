@@ -80,7 +80,7 @@ WRONG = {
     "[focus]\npeak_pressure_pa = inf": "peak_pressure = inf of a load must be a finite number",
     "[tacton]\nsuperposition = [0.5, 0.6]": "with sum 1",
     "[tacton]\nsuperposition = [1]": "must be a pair of numbers",
-    "[tacton]\nduration_s = 0": "duration = 0.0 of a Tacton must be a finite number, above 0",
+    "[tacton]\nduration_s = 0": "of a Tacton must be a finite number, above 0",
     "[tacton]\nduration_s = 32": "longest Tacton; shorten it",
     "[tacton]\nsize_mm = 'big'": "size_mm = 'big' must be a number",
     "[tacton]\nsize_mm = true": "size_mm = True must be a number",
