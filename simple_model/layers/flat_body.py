@@ -22,7 +22,7 @@ integrals times weights that depend on x_p - x.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -36,7 +36,6 @@ from simple_model.layers.wavenumber_integral import (
     Field,
     normal_field,
     point_integrals,
-    point_response,
 )
 from simple_model.load.focus import gaussian_width
 from simple_model.load.path_cells import cells, jump_times, moved_load, path_fourier, path_samples
@@ -63,6 +62,7 @@ ANYWHERE = np.array([[1.0, 0.3], [0.2, 1.0], [-0.7, 0.4]])  # of no symmetry
 NEGLIGIBLE = 1e-4  # of the largest response, where a transient stops looking at frequencies
 
 Splines = Callable[[Floats], Floats]
+NORMAL = normal_field(Compliance(lambda k, w: 0 * k))  # whose weights are those of any body
 
 
 def steady_lines(
@@ -91,22 +91,9 @@ def field_lines(
     """Frequencies (f,) in Hz and amplitudes (f, p, m) of all components of a field, as
     `steady_lines`.
     """
-    _check(pressure)
-    lines, probes = load_lines(pressure, threshold), np.atleast_2d(np.asarray(probes, np.float64))
-    f, which = np.unique(np.round(lines.frequencies, 9), return_inverse=True)
-    orders, order = np.unique(lines.harmonics, return_inverse=True)
-    knots, width = path_samples(pressure), _width(pressure)
-    table, splines = _interpolation(probes, knots, width)
-    g = point_integrals(field, table, 2 * np.pi * f, width)
-    amplitudes = np.zeros((len(f), len(probes), len(field.weights(ANYWHERE))), np.complex128)
-    count = min(len(probes), max(1, len(probes) * len(table) * len(knots) // AT_ONCE))
-    for some in np.array_split(np.arange(len(probes)), count):
-        carried = carriers(field, splines, probes[some, None] - knots)
-        h = path_fourier(pressure, carried, orders)
-        for line, (k, n) in enumerate(zip(which, order, strict=True)):
-            moved = np.einsum("cj,mcjp->pm", g[:, k], h[..., n])
-            amplitudes[k, some] += lines.coefficients[line] * moved
-    return f, amplitudes
+    path, blocks = _path(field, pressure, probes, threshold)
+    g = point_integrals(field, path.distances, 2 * np.pi * path.frequencies, path.width)
+    return path.frequencies, np.concatenate([path.combined(g, h) for h in blocks], axis=1)
 
 
 def carriers(field: Field, splines: Splines, away: Floats) -> Floats:
@@ -127,20 +114,10 @@ def sampled_lines(
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PathOperator:
-    """Load of a path on some probes, as a linear operator on the response g_j(w) = g(r_j, w) of any
-    body: the line at f = f_m + n f_d is, at a probe x_p,
-
-        u(f) = c sum_j g_j(f) h_nj(x_p),   h_nj = int_0^1 B_j(|x_p - X(a)|) exp(-2 pi i n a) da
-
-    Parameters
-    ----------
-    width : metre, standard deviation of the focal spot
-    distances : (j,) float, metre
-    frequencies : (f,) float, Hz, distinct
-    lines, orders : (l,) int, index of the frequency and of the harmonic of each line
-    coefficients : (l,) complex, Pa
-    harmonics : (n, p, j) complex, h of the distinct orders
+class _Path:
+    """Lines of a load at distinct `frequencies` (f,) in Hz: the frequency `lines` (l,) and the
+    harmonic `orders` (l,) of each, as indices, and `coefficients` (l,) in Pa; with the standard
+    deviation `width` of the focal spot and the `distances` (j,) to integrate at, metre.
     """
 
     width: float
@@ -149,40 +126,57 @@ class PathOperator:
     lines: NDArray[np.int_]
     orders: NDArray[np.int_]
     coefficients: Complex
-    harmonics: Complex
 
-    def steady_lines(self, compliance: Compliance) -> tuple[Floats, Complex]:
-        """Frequencies (f,) in Hz and amplitudes (f, p) in metre on a body, as of `steady_lines`."""
-        omega = 2 * np.pi * self.frequencies
-        g = point_response(compliance, self.distances, omega, self.width)
-        found = np.zeros((len(g), self.harmonics.shape[1]), np.complex128)
-        for order, harmonic in enumerate(self.harmonics):
+    def combined(self, g: Complex, harmonics: Complex) -> Complex:
+        """Amplitudes (f, p, m): c sum_cj g_cj(f) h_nmcj(x_p) of the integrals g (c, f, j) and the
+        harmonics h (n, m, c, j, p).
+        """
+        found = np.zeros((g.shape[1], harmonics.shape[-1], harmonics.shape[1]), np.complex128)
+        for order, harmonic in enumerate(harmonics):
             own = self.orders == order
-            moved = self.coefficients[own, None] * (g[self.lines[own]] @ harmonic.T)
+            moved = np.tensordot(g[:, self.lines[own]], harmonic, axes=([0, 2], [1, 2]))
+            moved = self.coefficients[own, None, None] * moved.swapaxes(1, 2)
             np.add.at(found, self.lines[own], moved)
-        return self.frequencies, found
+        return found
+
+
+def _path(
+    field: Field, pressure: MovingPressure, probes: ArrayLike, threshold: float
+) -> tuple[_Path, Iterator[Complex]]:
+    """Lines of a load, and the harmonics (n, m, c, j, p) of what a field does at some probes at a
+    time, h_nmcj = int_0^1 W_mc B_j(|x_p - X(a)|) exp(-2 pi i n a) da with its weights W.
+    """
+    _check(pressure)
+    load, places = load_lines(pressure, threshold), np.atleast_2d(np.asarray(probes, np.float64))
+    frequencies, lines = np.unique(np.round(load.frequencies, 9), return_inverse=True)
+    distinct, orders = np.unique(load.harmonics, return_inverse=True)
+    knots, width = path_samples(pressure), _width(pressure)
+    table, splines = _interpolation(places, knots, width)
+    path = _Path(
+        width=width, distances=table, frequencies=frequencies, lines=lines, orders=orders,
+        coefficients=load.coefficients,
+    )  # fmt: skip
+    count = min(len(places), max(1, len(places) * len(table) * len(knots) // AT_ONCE))
+    blocks = (
+        np.moveaxis(path_fourier(pressure, carriers(field, splines, away), distinct), -1, 0)
+        for away in (some[:, None] - knots for some in np.array_split(places, count))
+    )
+    return path, blocks
 
 
 def path_operator(
     pressure: MovingPressure, probes: ArrayLike, *, threshold: float = 1e-6
-) -> PathOperator:
-    """Operator of a load on probes, for many bodies; takes what `steady_lines` takes."""
-    _check(pressure)
-    load = load_lines(pressure, threshold)
-    frequencies, lines = np.unique(np.round(load.frequencies, 9), return_inverse=True)
-    distinct, orders = np.unique(load.harmonics, return_inverse=True)
-    knots, width = path_samples(pressure), _width(pressure)
-    places = np.atleast_2d(np.asarray(probes, np.float64))
-    away = np.linalg.norm(places[:, None] - knots, axis=-1)
-    table = distance_table(away.max(), width)
-    splines = radial_spline(table, np.eye(len(table)))
-    blocks = np.array_split(away, max(1, away.size * len(table) // AT_ONCE))
-    parts = [path_fourier(pressure, splines(part).swapaxes(1, 2), distinct) for part in blocks]
-    return PathOperator(
-        width=width, distances=table, frequencies=frequencies, lines=lines, orders=orders,
-        coefficients=load.coefficients,
-        harmonics=np.ascontiguousarray(np.moveaxis(np.concatenate(parts), -1, 0)),
-    )  # fmt: skip
+) -> Callable[[Compliance], tuple[Floats, Complex]]:
+    """The function from a body's compliance to its `steady_lines`, for many bodies under a load."""
+    path, blocks = _path(NORMAL, pressure, probes, threshold)
+    harmonics = np.ascontiguousarray(np.concatenate(list(blocks), axis=-1))
+
+    def lines_of(compliance: Compliance) -> tuple[Floats, Complex]:
+        field, omega = normal_field(compliance), 2 * np.pi * path.frequencies
+        g = point_integrals(field, path.distances, omega, path.width)
+        return path.frequencies, path.combined(g, harmonics)[..., 0]
+
+    return lines_of
 
 
 def steady_state(

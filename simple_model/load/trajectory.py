@@ -302,22 +302,18 @@ def parted(path: Trajectory, n: int) -> tuple[Floats, ...]:
 
 
 def _check_points(path: Trajectory) -> None:
-    given = path.shape in BY_POINTS
-    if given and (path.size != 0 or len(path.points) < 2):
+    count = len(path.points)
+    if (path.shape in BY_POINTS) != (count >= 2) or (count and path.size):
         raise ValueError(
-            f"a {path.shape} path has {len(path.points)} points and size {1e3 * path.size:g} mm; "
-            "give it two points or more and no size"
+            f"a {path.shape} path has {count} points and size {1e3 * path.size:g} mm; give a "
+            "polyline or recorded path two points or more and no size, others a size and no points"
         )
-    if not given and path.points:
-        raise ValueError(f"a {path.shape} has no points; leave them out or take shape 'polyline'")
-    if len(path.points) > MOST_POINTS:
-        raise ValueError(f"{len(path.points):,} points exceed the limit of {MOST_POINTS:,}")
+    check_range("number of points", count, 0, MOST_POINTS)
     try:
         places = np.array([path.centre, *path.points], np.float64)
-        outside = not (np.abs(places) <= FURTHEST).all()  # and where it is no number
     except (TypeError, ValueError):
         raise ValueError("points and centre must be pairs of numbers, such as (0.01, 0)") from None
-    if places.shape[1:] != (2,) or outside:
+    if places.shape[1:] != (2,) or not (np.abs(places) <= FURTHEST).all():
         raise ValueError(
             f"points and centre must be pairs within {1e3 * FURTHEST:g} mm of the origin, "
             "where devices steer to; move or shrink the path"
@@ -326,12 +322,11 @@ def _check_points(path: Trajectory) -> None:
 
 def _check_recording(path: Trajectory) -> None:
     times, levels = np.array(path.times, np.float64), np.array(path.levels, np.float64)
-    if path.speed != 0:
-        raise ValueError("a recorded path has its own timing; leave speed out")
-    if len(times) != len(path.points) or len(levels) not in (0, len(times)):
+    n = len(path.points)
+    if path.speed != 0 or len(times) != n or len(levels) not in (0, n):
         raise ValueError(
-            f"a recorded path has {len(path.points)} points, {len(times)} times and {len(levels)} "
-            "levels; give as many of each, or no levels"
+            f"a recorded path has {n} points, {len(times)} times, {len(levels)} levels and speed "
+            f"{path.speed:g} m/s; give as many of each, or no levels, and no speed"
         )
     if not (np.isfinite(times).all() and times[0] == 0 < times[-1] and (np.diff(times) >= 0).all()):
         raise ValueError("times of a recorded path must be finite, begin with 0 and never fall")

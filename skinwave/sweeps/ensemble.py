@@ -6,7 +6,7 @@ that the scene requires does. Motion of a linear body is in proportion to the pr
 samples that differ by that alone are solved once.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from typing import Any, NamedTuple
@@ -15,7 +15,8 @@ import numpy as np
 
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, named_lines, phasors, sensation_level
-from simple_model.layers.flat_body import PathOperator, path_operator, steady_lines
+from simple_model.layers.compliance import Compliance
+from simple_model.layers.flat_body import path_operator, steady_lines
 from simple_model.load.line_names import line_frequency
 from simple_model.load.spectrum import synthesise
 from simple_model.response import SETTLE
@@ -342,12 +343,14 @@ def _mapped(scene: Scene, method: Method) -> tuple[tuple[int, int], tuple[Floats
     points, waves = np.vstack([scene.probe_points, places]), compliance(scene.body)
     if method.same_load:
         operator = _operator(scene.pressure, tuple(map(tuple, points.tolist())))
-        return (len(y), len(x)), operator.steady_lines(waves)
+        return (len(y), len(x)), operator(waves)
     return (len(y), len(x)), steady_lines(waves, scene.pressure, points, threshold=FAINT)
 
 
 @lru_cache(maxsize=2)
-def _operator(pressure: MovingPressure, points: tuple[tuple[float, ...], ...]) -> PathOperator:
+def _operator(
+    pressure: MovingPressure, points: tuple[tuple[float, ...], ...]
+) -> Callable[[Compliance], tuple[Floats, Complex]]:
     return path_operator(pressure, points, threshold=FAINT)
 
 
