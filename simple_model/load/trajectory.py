@@ -303,7 +303,7 @@ def parted(path: Trajectory, n: int) -> tuple[Floats, ...]:
 
 def _check_points(path: Trajectory) -> None:
     count = len(path.points)
-    if (path.shape in BY_POINTS) != (count >= 2) or (count and path.size):
+    if (count < 2 or path.size != 0) if path.shape in BY_POINTS else count > 0:
         raise ValueError(
             f"a {path.shape} path has {count} points and size {1e3 * path.size:g} mm; give a "
             "polyline or recorded path two points or more and no size, others a size and no points"
