@@ -101,7 +101,7 @@ def by_elements(stack, k, w, order=16):
     return u.reshape(2, n)[:, ::order].astype(complex)
 
 
-@pytest.mark.parametrize(("poisson", "depth"), [(0.3, 60e-3), (0.49, 5e-3), (0.4999, 0.3e-3)])
+@pytest.mark.parametrize(("poisson", "depth"), [(0.3, 60e-3), (0.4999, 0.3e-3)])
 def test_one_layer_and_equal_ones_are_a_slab(poisson, depth):
     solid = replace(PALM, poisson=poisson)
     k, w = K + 2j, angular(HERTZ[1:])
@@ -174,33 +174,26 @@ def test_stresses_at_depth_are_those_of_the_motion():
     )
 
 
-@pytest.mark.parametrize(("loss", "damping", "smooth"), [(2e-4, 6.0, True), (1e-5, 0.3, False)])
-def test_frequencies_of_a_transient_are_interpolated_where_they_are_smooth(loss, damping, smooth):
-    """Near the poles of a body with little loss they are not: most are integrated."""
-    integrated = []
-    skin = replace(SKIN, materials=tuple(replace(m, viscosity=loss * m.shear_modulus)
-                                         for m in SKIN.materials))  # fmt: skip
-    whole = layered(skin)
+def test_frequencies_of_a_transient_are_interpolated_where_they_are_smooth():
+    integrated, whole = [], layered(SKIN)
 
     def answer(k, w):
         integrated.append(w.ravel())
         return whole(k, w)
 
     body = Compliance(answer, whole.clearance)
-    w = 2 * np.pi * np.arange(80.0, 208.0 if smooth else 104.0, 0.5) - 1j * damping
+    w = 2 * np.pi * np.arange(80.0, 208.0, 0.5) - 6j
     found = point_response(body, RADII, w, WIDTH)
     # Without its neighbours a frequency is integrated by itself.
     one_by_one = point_response(whole, RADII, w[::5], WIDTH)
     assert np.abs(found[::5] - one_by_one).max() < 1e-8 * np.abs(found).max()
-    share = np.isin(w, np.concatenate(integrated)).mean()
-    assert share < 0.25 if smooth else share > 0.5, share
+    assert np.isin(w, np.concatenate(integrated)).mean() < 0.25
 
 
 @pytest.mark.parametrize(
     ("stack", "hertz"),
     [
         (SKIN, 400.0),
-        (replace(ON_STIFF, materials=(replace(SOFT, viscosity=0.0), STIFF)), 700.0),
         (Stack(materials=(SOFT, STIFF), thicknesses=(5e-3, inf)), 300.0),
         (equal(replace(PALM, viscosity=0.5, poisson=0.35), 5e-3, 10e-3), 165.0),  # runs backwards
     ],
@@ -267,12 +260,11 @@ def test_a_depth_outside_the_stack_is_refused():
             transfer(SKIN, [depth])
 
 
-@pytest.mark.parametrize("hertz", [0.1, 0.49])
-def test_a_free_stack_follows_slow_lines_as_a_thin_plate(hertz):
+def test_a_free_stack_follows_slow_lines_as_a_thin_plate():
     """q / 4 pi D b [e^-x E1(-x) - e^x E1(x)] / 2, b^2 = m w^2 / D, x = b width^2 / 2, by partial
     fractions of int S(k) k dk / (D k^4 - m w^2).
     """
-    solid, depth, w = replace(PALM, viscosity=0.0, loss_factor=1e-3), 1e-3, 2 * np.pi * hertz
+    solid, depth, w = replace(PALM, viscosity=0.0, loss_factor=1e-3), 1e-3, 2 * np.pi * 0.49
     free = Stack(materials=(solid,), thicknesses=(depth,), base="free")
     bending = solid.complex_modulus(w) * depth**3 / (6 * (1 - solid.poisson))
     b = np.sqrt(solid.density * depth * w**2 / bending)

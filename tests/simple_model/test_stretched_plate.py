@@ -1,7 +1,6 @@
 """Sheets at large deflection by von Karman's plate in its modes, as a model of scenes."""
 
 import numpy as np
-import pytest
 
 from skinwave.planning.simulate import compute
 from skinwave.results.comparison import compare
@@ -39,9 +38,8 @@ def scene(pressure, quantity="displacement", air=True):
     )
 
 
-@pytest.mark.parametrize("quantity", ["displacement", "acceleration"])
-def test_a_sheet_that_hardly_bends_moves_linearly(quantity):
-    weak = scene(0.01, quantity)
+def test_a_sheet_that_hardly_bends_moves_linearly():
+    weak = scene(0.01, "acceleration")
     found, linear = (compute(weak, name).values for name in (NAME, "plate-modes-transient"))
     assert np.abs(found - linear).max() < 1e-5 * np.abs(linear).max()
 
