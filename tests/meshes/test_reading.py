@@ -71,7 +71,6 @@ def test_a_reader_gets_time_and_memory_by_the_size_of_its_file(tmp_path, monkeyp
 
 
 def test_a_function_runs_in_a_process_of_its_own_and_its_end_is_told():
-    assert subprocess_call.call(divmod, 7, 2, timeout=600) == (3, 1)
     assert subprocess_call.call(os.getpid, timeout=600) != os.getpid()
     with pytest.raises(ZeroDivisionError):
         subprocess_call.call(divmod, 1, 0, timeout=600)
