@@ -50,7 +50,8 @@ def mapped_palm(palm: Palm, x: Floats, y: Floats, z: Floats) -> TetMesh:
     tets = kuhn_tets(cells)
     box = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1)
     points = _onto_level_set(palm, _wrapped(palm, box)).reshape(-1, 3)
-    sharpest = _sharpest(points, tets)
+    inverted = corner_volumes(points, tets).min() <= 0
+    sharpest = 0.0 if inverted else float(angles_between_faces(points, tets).min())
     off = np.abs(level_set(palm, points[_on_boundary(cells).ravel()])).max()
     if sharpest < SHARPEST or off > OFF * palm.thickness:
         raise MeshError(
@@ -87,13 +88,6 @@ def kuhn_tets(cells: tuple[int, int, int]) -> Ints:
         turned = outwards.prod(axis=1) * np.linalg.det(np.eye(3)[list(order)]) < 0
         tets.append(np.column_stack([inner, b, np.where(turned, d, c), np.where(turned, c, d)]))
     return np.vstack(tets)
-
-
-def _sharpest(points: Floats, tets: NDArray[np.int_]) -> float:
-    """Least dihedral angle in degrees; 0 if a tetrahedron is inverted."""
-    if corner_volumes(points, tets).min() <= 0:
-        return 0.0
-    return float(angles_between_faces(points, tets).min())
 
 
 def _wrapped(palm: Palm, box: Floats) -> Floats:

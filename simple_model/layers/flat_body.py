@@ -24,7 +24,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -44,9 +43,6 @@ from simple_model.load.sampling import below_half_the_rate, finer, is_folded, re
 from simple_model.load.spectrum import load_lines, synthesise
 from simple_model.response import Effort, Response
 from simple_model.typing import Complex, Floats
-
-if TYPE_CHECKING:
-    from scipy.interpolate import CubicSpline
 
 PADDING = 2, 256  # the transform's samples for each of the record, and more: what wraps round is
 WRAPPED = 1e-5  # damped by this
@@ -146,11 +142,11 @@ def _path(
     """Lines of a load, and the harmonics (n, m, c, j, p) of what a field does at some probes at a
     time, h_nmcj = int_0^1 W_mc B_j(|x_p - X(a)|) exp(-2 pi i n a) da with its weights W.
     """
-    _check(pressure)
+    width = _width(pressure)
     load, places = load_lines(pressure, threshold), np.atleast_2d(np.asarray(probes, np.float64))
     frequencies, lines = np.unique(np.round(load.frequencies, 9), return_inverse=True)
     distinct, orders = np.unique(load.harmonics, return_inverse=True)
-    knots, width = path_samples(pressure), _width(pressure)
+    knots = path_samples(pressure)
     table, splines = _interpolation(places, knots, width)
     path = _Path(
         width=width, distances=table, frequencies=frequencies, lines=lines, orders=orders,
@@ -232,7 +228,7 @@ def field_history(
     field: Field, pressure: MovingPressure, probes: ArrayLike, times: Floats
 ) -> Floats:
     """All components (t, p, m) of a field from rest, as `flat_body` computes them."""
-    _check(pressure)
+    width = _width(pressure)
     probes = np.atleast_2d(np.asarray(probes, np.float64))
     within = max(1, int(np.ceil(step(times) * FINEST - 1e-6)))
     dt, n = step(times) / within, (len(times) - 1) * within + 1
@@ -260,8 +256,8 @@ def field_history(
         turns = len(pressure.tacton.trajectory.parts[1]) > 1
         parts = max(parts, ABRUPT if len(jumps) or turns else 1)
         knots, of_load = _as_it_is(pressure, jumps, padded, dt, parts, lasting)
-    table, splines = _interpolation(probes, knots, _width(pressure))
-    g = point_integrals(field, table, w, _width(pressure), negligible=NEGLIGIBLE)
+    table, splines = _interpolation(probes, knots, width)
+    g = point_integrals(field, table, w, width, negligible=NEGLIGIBLE)
     u = np.zeros((len(w), len(probes), len(field.weights(ANYWHERE))), np.complex128)
     for i, probe in enumerate(probes):
         carried = carriers(field, splines, probe - knots)
@@ -318,46 +314,29 @@ def _timed(
     return Response(model=model, times=times, probes=probes, values=values, effort=effort)
 
 
-def distance_table(furthest: float, width: float) -> Floats:
-    """Distances (j,) in metre up to `furthest` to interpolate between, for a focal spot of standard
-    deviation `width` in metre.
-    """
-    steps = max(FEWEST_STEPS, int(np.ceil(furthest / width * STEPS_PER_WIDTH)))
-    return np.linspace(0, furthest, steps)
-
-
-def radial_spline(table: Floats, values: Complex | Floats, axis: int = 0) -> CubicSpline:
-    """Cubic spline of a distance (...) through values of j along `axis` at distances (j,) in metre
-    from 0, where it is flat.
-    """
-    from scipy.interpolate import CubicSpline  # which takes long to import
-
-    flat = (1, np.zeros(np.delete(values.shape, axis), values.dtype))
-    return CubicSpline(table, values, axis=axis, bc_type=(flat, "not-a-knot"))
-
-
-def _check(pressure: MovingPressure) -> None:
+def _width(pressure: MovingPressure) -> float:
+    """Standard deviation in metre of a Gaussian focal spot; a ValueError for any other load."""
     check_lines(pressure)
-    if gaussian_width(pressure.height, pressure.profile) is None:
+    width = gaussian_width(pressure.height, pressure.profile)
+    if width is None:
         raise ValueError(
             f"focus '{pressure.profile_name}' has no flat-body solution; use 'gaussian'"
         )
-
-
-def _width(pressure: MovingPressure) -> float:
-    """Standard deviation in metre of the focal spot, which `_check` has found to be Gaussian."""
-    width = gaussian_width(pressure.height, pressure.profile)
-    assert width is not None
     return width
 
 
 def _interpolation(probes: Floats, knots: Floats, width: float) -> tuple[Floats, Splines]:
     """Distances (j,) in metre to integrate at, and the function of distances (...) to the shares
-    (..., j) that interpolate between them; few distances are taken as they are.
+    (..., j) that interpolate between them: cubic splines, flat at 0; few distances are taken as
+    they are.
     """
     if len(knots) * len(probes) <= FEW_DISTANCES:
         unique = np.unique(np.linalg.norm(probes[:, None] - knots, axis=-1))
         return unique, lambda r: (r[..., None] == unique).astype(float)
+    from scipy.interpolate import CubicSpline  # which takes long to import
+
     furthest = max(np.linalg.norm(probe - knots, axis=1).max() for probe in probes)
-    table = distance_table(furthest, width)
-    return table, radial_spline(table, np.eye(len(table)))
+    steps = max(FEWEST_STEPS, int(np.ceil(furthest / width * STEPS_PER_WIDTH)))
+    table = np.linspace(0, furthest, steps)
+    flat = (1, np.zeros(steps))
+    return table, CubicSpline(table, np.eye(steps), bc_type=(flat, "not-a-knot"))

@@ -179,7 +179,8 @@ class _Scheme:
         mass *= np.maximum(half / HIGHEST_PHASE, 1) ** 2
         share = dt / 2 / loss.times
         return _Scheme(
-            dt=dt, mass=mass, K=plate.slow_stiffness(loss.rest), bending=plate.bending,
+            dt=dt, mass=mass, bending=plate.bending,
+            K=np.diag(plate.squared) + (loss.rest - 1) * plate.bending,
             rest=loss.rest, lag=loss.lag, shares=loss.shares,
             keep=(1 - share) / (1 + share), follow=1 / (1 + share),
         )  # fmt: skip

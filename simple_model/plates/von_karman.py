@@ -90,10 +90,6 @@ class KarmanPlate:
             found[places] = part @ z[columns]
         return found.reshape(self.H.shape[:2])
 
-    def slow_stiffness(self, modulus: float) -> Floats:
-        """Stiffness K (r, r) in rad2/s2 with a real modulus of bending over that of the modes."""
-        return np.asarray(np.diag(self.squared) + (modulus - 1) * self.bending)
-
 
 def karman_plate(
     modes: PlateModes, thickness: float, count: int = 60, *, in_plane: str = "held"
