@@ -88,7 +88,7 @@ def test_a_new_kind_runs(disc, capsys):
     rows = table("out/lines.csv")
     assert {row["body"] for row in rows} == {"silicone-cylinder"}
     assert main(["plan", "disc.toml", "--tolerance", "0.5", "--element-size", "8"]) == 0
-    assert "a body of kind 'cylinder' has no wavenumber integral" in capsys.readouterr().out
+    assert "flat-body takes a slab or a sheet, not a cylinder" in capsys.readouterr().out
 
 
 @pytest.mark.slow
