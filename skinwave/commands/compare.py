@@ -1,7 +1,6 @@
 """The point kernel beside bodies whose waves propagate: the main job."""
 
 import argparse
-import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -91,7 +90,7 @@ def run(options: argparse.Namespace) -> int:
         outcome = run_study(
             scenes, folder, progress,
             title=TITLE.format(against) if scene is None else scene.name,
-            command=_again(options),
+            command=record.of_command(options)["typed"],
             model=options.model, h=metre(options.h), solver=options.solver, measured=measured,
             more=[document.live_link(LIVE)] if live else [],
         )  # fmt: skip
@@ -116,20 +115,6 @@ def run(options: argparse.Namespace) -> int:
         f"hold; open {out}/index.html",
     )
     return 0 if outcome.runs == outcome.planned else 1
-
-
-def _again(options: argparse.Namespace) -> str:
-    """The command that makes the same comparison."""
-    words = ["--body", options.body] if options.body else []
-    if options.body and Path(options.body).is_file():
-        words += ["--unit", options.unit, "--up", options.up]
-    words += ["--model", options.model] if options.model != "auto" else []
-    for name in ("measured", "delay", "gain"):
-        if (given := getattr(options, name)) is not None:
-            words += [f"--{name}={given}"]
-    if options.h:
-        words += ["--element-size", f"{options.h:g}"]
-    return shlex.join(["skinwave", "compare", options.scene, *words])
 
 
 def _measured(options: argparse.Namespace) -> "Measured | None":

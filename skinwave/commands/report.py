@@ -1,7 +1,6 @@
 """One page of a scene or of a result folder: what was asked, modelled, found and trusted."""
 
 import argparse
-import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -88,7 +87,7 @@ def _page(options: argparse.Namespace) -> int:
     from skinwave.scene.file import read
     from skinwave.studies.report import write_report
 
-    chosen = style(options.style, options.width)
+    chosen, command = style(options.style, options.width), record.of_command(options)
     source, made = options.source, options.source.is_dir()
     scene = None if made else read(source)
     out = options.out or (source / "report" if made else Path(f"{source.stem}-report"))
@@ -111,20 +110,13 @@ def _page(options: argparse.Namespace) -> int:
             warn(said)
         write_report(
             folder if scene is not None else source, folder, chosen, progress,
-            formats=options.format, columns=options.only, command=_again(options) * (not made),
+            formats=options.format, columns=options.only, command="" if made else command["typed"],
         )  # fmt: skip
-        record.write(folder, record.of_command(options), scene=scene)
+        record.write(folder, command, scene=scene)
         size = (folder / "index.html").stat().st_size
     summary = {"out": str(out), "megabytes": round(size / 1e6, 2)}
     summarise(options, summary, f"{size / 1e6:.1f} MB; open {out}/index.html")
     return 0
-
-
-def _again(options: argparse.Namespace) -> str:
-    """The command that makes the same report."""
-    words = ["--beside", ",".join(options.beside)] if options.beside else []
-    words += ["--element-size", f"{options.h:g}"] if options.h else []
-    return shlex.join(["skinwave", "report", options.source.name, *words])
 
 
 def _map(options: argparse.Namespace) -> int:

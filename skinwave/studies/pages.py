@@ -124,7 +124,10 @@ def page_of(
     top: list[Part] = [*_first_screen(first, gallery)] if first else []
     below: list[Part] = [*seen, *_waveforms(figures or groups, gallery, progress), *more]
     below += tables.claims_parts(evaluate(claimed(runs)))
-    if effects := changes(groups):
+    effects: Mapping[str, Mapping[str, Propagation]] = changes(groups)
+    if not effects and first:
+        effects = {first.kernel.tacton: first.changes}
+    if effects:
         below.append(Details("What propagation changes", _per_tacton(effects)))
     if of_one or not effects:
         lines = [part for group in groups.values() for part in tables.lines_table(group)]

@@ -4,6 +4,7 @@ folder; and the page of a map alone.
 
 import io
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import partial
 from math import isfinite
 from pathlib import Path
@@ -231,10 +232,10 @@ def _guided(album: Album, gallery: Gallery) -> list[Part]:
 
 def _command(results: Path) -> str:
     """The command that made a folder, if its record says so."""
-    try:
-        return str(record.read(results)["command"]["typed"])
-    except (ValueError, KeyError):
-        return "skinwave report scene.toml"
+    typed = ""
+    with suppress(ValueError, KeyError):
+        typed = str(record.read(results)["command"]["typed"])
+    return typed or "skinwave report scene.toml"
 
 
 def map_sentences(scene: Scene, found: SurfaceField) -> list[str]:

@@ -40,6 +40,7 @@ from skinwave.system.processes import pool
 COMPLETE = (
     "flat-body-harmonic", "flat-body", "plate-modes-transient", "fem", "plate-modes-nonlinear",
 )  # fmt: skip
+SLOW = 3.0  # s of a model: its responses come last
 ABOUT = (
     "The point-kernel model of Lim, Seifi and Park (CHI EA '24, doi 10.1145/3613905.3650981), as "
     "published and under the load that the bodies receive, beside the motion of these bodies. "
@@ -186,11 +187,13 @@ def _runs(
     scenes: Mapping[str, Mapping[str, Scene]], models: Mapping[str, str], options: SolveOptions,
     prepared: dict[str, ReducedBody], progress: Progress, workers: Executor,
 ) -> Iterator[Run]:  # fmt: skip
-    """Every run, in order. Bodies are reduced here, into `prepared`, once for all Tactons; the
-    coarser ones that give their errors, and all other responses, are computed by the workers.
+    """Every run, those of fast models first. Bodies are reduced here, into `prepared`, once for all
+    Tactons; the coarser ones that give their errors, and all other responses, are computed by the
+    workers.
     """
     every = [(name, column, s) for name, group in scenes.items() for column, s in group.items()]
     reduced = {column for column, model in models.items() if named(model).is_reduced}
+    every.sort(key=lambda each: (each[1] in reduced, named(models[each[1]]).seconds > SLOW))
     coarse = {s.body: s for _, column, s in every if column in reduced}
     begun = {body: workers.submit(coarser_body, s, options) for body, s in coarse.items()}
     others = {
