@@ -22,7 +22,7 @@ def geometry(mesh: TetMesh, facets: Ints) -> tuple[Floats, Floats]:
 def tag_boundary(
     mesh: TetMesh, *, rest: str | None = None, **parts: Predicate | np.ndarray
 ) -> TetMesh:
-    """The mesh with its boundary as the facet set `surface`, and parts of it by name.
+    """Name the boundary of a mesh as the facet set `surface`, and parts of it.
 
     Parameters
     ----------

@@ -185,8 +185,17 @@ def _rings(rings: int) -> tuple[Floats, Ints]:
 
 
 def graded_axis(length: float, h: float, grading: Grading) -> Floats:
-    """Graded grid lines (n,) in metre from 0 to `length`: cells of size h up to the radius, then
-    growing. A MeshError if a length is not above 0, or there would be too many cells.
+    """Graded grid lines from 0: cells of equal size up to the radius, then growing.
+
+    Parameters
+    ----------
+    length, h, grading : in metre the end, and the size of the first cells
+
+    Returns
+    -------
+    (n,) float, metre
+
+    Raises a MeshError if a length is not above 0, or there would be too many cells.
     """
     _check_lengths(length, h)
     fine = min(grading.radius, length)
