@@ -102,6 +102,19 @@ def test_elements_follow_the_sizes_asked_for():
     assert meshes.dihedral_angles(mesh).min() > 10
 
 
+def test_the_mesher_follows_a_surface_inside_another():
+    mesh = meshes.tetrahedralise(OUTER, 6e-3, inner={"bone": BONE})
+    assert mesh.region_names == {0: "tissue", 1: "bone"}
+    volumes = meshes.corner_volumes(mesh.points, mesh.tets)
+    assert volumes[mesh.region == 1].sum() == pytest.approx(volume(BONE), rel=0.02)
+    assert volumes.sum() == pytest.approx(volume(OUTER), rel=0.02)
+    middle, half = BONE.points.mean(axis=0), np.ptp(BONE.points, axis=0) / 2
+    outside = (np.abs(mesh.points - middle) - half).max(axis=1)[mesh.tets]  # metre beyond a side
+    envelope = 1e-4
+    assert outside[mesh.region == 1].max() < envelope
+    assert outside[mesh.region == 0].min() > -envelope
+
+
 def save(path, surface):
     meshio.write(path, meshio.Mesh(1e3 * surface.points, [("triangle", surface.triangles)]))
 
