@@ -178,9 +178,11 @@ def inner_page(page: str, caption: str) -> Markup:
 
 
 def worst_warnings(efforts: Iterable[tuple[str, Effort]]) -> list[str]:
-    """Warnings of some responses with their names; of those that differ by numbers only, the one
-    with the largest, and how many more there are.
+    """Warnings of some responses, with their names unless all have the same; of those that differ
+    by numbers only, the one with the largest, and how many more there are.
     """
+    efforts = list(efforts)
+    differ = len({tuple(effort.warnings) for _, effort in efforts}) > 1
     alike: dict[str, list[tuple[str, str]]] = {}
     for name, effort in efforts:
         for sentence in effort.warnings:
@@ -189,7 +191,7 @@ def worst_warnings(efforts: Iterable[tuple[str, Effort]]) -> list[str]:
     for group in alike.values():
         name, sentence = max(group, key=lambda one: [float(x) for x in _NUMBER.findall(one[1])])
         of = f"{name}, and {len(group) - 1} more" if len(group) > 1 else name
-        found.append(f"{sentence} ({of})" if name else sentence)
+        found.append(f"{sentence} ({of})" if name and differ else sentence)
     return found
 
 
