@@ -582,6 +582,28 @@ def test_a_hand_with_seams_is_the_same_from_every_kind_of_file(tmp_path, suffix)
     np.testing.assert_allclose(surface.points.max(axis=0), plain.points.max(axis=0), atol=1e-6)
 
 
+@pytest.mark.parametrize("suffix", [".stl", ".glb", ".vtu", ".msh"])
+def test_a_file_that_is_cut_short_or_garbled_is_refused(tmp_path, monkeypatch, suffix):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / f"body{suffix}"
+    if suffix == ".glb":
+        path.write_bytes(HAND.read_bytes())
+    elif suffix == ".stl":
+        write_by_vtk(path, *hand())
+    else:
+        meshes.write(path, layered(2))
+    content = path.read_bytes()
+    third = len(content) // 3
+    for spoilt in (
+        content[: 2 * third],
+        content[:third] + b"\xff" * third + content[2 * third :],
+        content[::-1],
+    ):
+        path.write_bytes(spoilt)
+        assert path.name in refused(path)
+        assert [each.name for each in tmp_path.iterdir()] == [path.name]
+
+
 def test_a_patch_is_cut_with_its_cuts_named(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     points, triangles = hand()
