@@ -1,5 +1,6 @@
 """The load at its extremes: speed, frequency, width, place, duration, sampling."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -8,6 +9,7 @@ import numpy as np
 import fem
 from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Response, Tacton, Trajectory, lines
+from simple_model.load.focus import spot_width
 from skinwave.bodies.build import Build, build, operators
 from skinwave.models.reduced import ReducedBody, answer, prepare
 from skinwave.scene.scene import Body, Scene
@@ -54,6 +56,36 @@ def modulation_frequencies() -> Checks:
 
 
 @case(
+    "the integral of a Gaussian; quadrature: Dunavant, Int J Numer Methods Eng 21:1129 (1985)",
+    mesh="10-node tetrahedra, 60 x 60 x 15 mm",
+    note="The displacement under such a focus is less accurate: the plan warns of elements wider "
+    "than twice the standard deviation of the focal spot.",
+)
+def narrow_focus() -> Checks:
+    """A focus down to a third of the size of an element keeps its force."""
+    fine = np.linspace(-0.03, 0.03, 1201)
+    grid = np.column_stack([axis.ravel() for axis in np.meshgrid(fine, fine)])
+    for height, h in ((0.2, 2.9e-3), (0.02, 2.9e-3), (0.02, 5e-3)):
+        load = replace(POINT, height=height)
+        exact = load(grid, 0.0).sum() * (fine[1] - fine[0]) ** 2
+        places = [(x, x / 2) for x in (0.0, 0.6e-3, 1.2e-3, 1.8e-3, 2.4e-3)]
+        worst = np.abs(_forces(load, h, places) / exact - 1).max()
+        width = f"focal spot of {1e3 * spot_width(height):.1f} mm, elements of {1e3 * h:g} mm"
+        yield below(f"{width}: force, worst of 5 places", worst, 0.01)
+
+
+@case("the integral of half a Gaussian", mesh=MESH)
+def degenerate_paths() -> Checks:
+    """A path of no size is a focus at rest, and a focus on the rim has half of its force."""
+    rest = _moved(0.1, am=140.0).displacement
+    none = _moved(0.1, am=140.0, speed=5.0, size=0.0).displacement
+    apart = np.abs(none - rest).max() / np.abs(rest).max()
+    yield below("circle of 0 mm beside a point: difference", apart, 1e-12)
+    middle, rim = _forces(POINT, 2.9e-3, [(0.0, 0.0), (0.03, 0.0)])
+    yield relative("force on the rim over force in the middle", rim / middle, 0.5, 0.01)
+
+
+@case(
     "conservation of energy: Hughes, The Finite Element Method (1987), chapter 9", mesh=MESH
 )  # fmt: skip
 def durations() -> Checks:
@@ -93,9 +125,17 @@ def _at_rest(pressure: MovingPressure, ring: int) -> Floats:
     return fem.probe_operator(made.mesh, PROBES) @ u
 
 
-def _moved(duration: float, *, am: float = 0.0, speed: float = 0.0) -> Response:
+def _moved(duration: float, *, am: float = 0.0, speed: float = 0.0, size: float = 0.02) -> Response:
     """Under a focus at rest, or on a circle."""
-    path = Trajectory(shape="circle", size=0.02, speed=speed) if speed else Trajectory()
+    path = Trajectory(shape="circle", size=size, speed=speed) if speed else Trajectory()
     tacton = Tacton(am_frequency=am, duration=duration, trajectory=path)
     pressure = MovingPressure(tacton=tacton, drive="linear")
     return answer(_prepared(), Scene(pressure=pressure, body=BODY, probes=PROBES))
+
+
+def _forces(load: MovingPressure, h: float, places: Sequence[tuple[float, float]]) -> Floats:
+    """Downward forces (n,) in N with the focus at places of a body that ends at its rim."""
+    mesh = build(replace(BODY, sides="free"), h).mesh
+    P, points = fem.load_operator(mesh), fem.facet_points(mesh)[:, :2]
+    pressure = load.spot(points, np.array(places)) * float(load.gain(np.zeros(1))[0])
+    return -np.asarray((P @ pressure.T).reshape(-1, 3, len(places))[:, 2].sum(axis=0))

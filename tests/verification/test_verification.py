@@ -20,7 +20,8 @@ GATE = (
     "patch", "patch-quadratic", "slivers", "manufactured",
     "stiffness-contrast", "fingertip-with-bone", "thin-sheets", "in-plane-shear", "moving-force",
     "air-operator", "rayleigh", "oblique-p-sv", "exact-half-space", "exact-slab", "exact-sheet",
-    "order-in-time", "columns", "durations", "elastica", "tangent",
+    "order-in-time", "columns", "narrow-focus", "degenerate-paths", "durations",
+    "elastica", "tangent",
 )  # fmt: skip
 
 
