@@ -15,11 +15,12 @@ from simple_model.layers.flat_quantities import traction_field
 from simple_model.layers.wavenumber_integral import point_integrals
 from simple_model.load.spectrum import pressure_lines, synthesise
 from simple_model.quantities import DISPLACEMENT
+from simple_model.response import fit_lines
 from skinwave import Body, dumps, loads
 from skinwave.bodies.build import build, operators
 from skinwave.measure import Measurement
 from skinwave.measure.fit import fit
-from skinwave.measure.predicted import target
+from skinwave.measure.predicted import predicted_lines, predicted_waveforms, target
 from skinwave.models import parametric
 from skinwave.models.meshed import load_in_steps, surface_load
 from skinwave.models.options import SolveOptions
@@ -50,6 +51,7 @@ points_mm = [[5, 2], [9, 0], [-6, 3]]
 """
 TONE = '[tacton]\nam_frequency_hz = 200\nduration_s = 0.03\n[focus]\ndrive = "linear"\n'
 AROUND = TONE.replace("[focus]", 'shape = "circle"\nsize_mm = 10\nspeed_m_per_s = 2\n[focus]')
+SHEAR = '[load]\nkind = "shear"\ndirection = [1, 1]\n'
 FORCE = '[load]\nkind = "point_force"\nforce_n = 0.02\nwidth_mm = 5\n'
 IMPULSE = "[tacton]\nduration_s = 0.03\nrhythm = { pulses_ms = [[2, 28]], ramp_ms = 1 }\n"
 CIRCLE = Trajectory(shape="circle", size=0.01, speed=2.0)
@@ -181,6 +183,12 @@ def test_models_agree_on_loads_beside_pressure(text):
     np.testing.assert_allclose(np.hypot(x, y), abs(scene.pressure(points, 0.0123)))
 
 
+def test_steady_states_agree_on_a_shear_traction():
+    scene = loads(TONE + SHEAR + SMALL)
+    flat = compute(scene, "flat-body-harmonic").values
+    assert far(compute(scene, "fem-harmonic", h=H).values, flat).max() < 0.05
+
+
 def column(base, stiffness=0.0):
     """A column without Poisson's effect, as free sides leave it."""
     solid = replace(SOLID, poisson=0.0)
@@ -209,6 +217,15 @@ def test_a_column_sags_under_its_own_weight(body, model, soft):
     fast = [replace(each, quantity="velocity") for each in (heavy, still)]
     both = [compute(each, model, h=6e-3).values for each in fast]
     np.testing.assert_allclose(*both, atol=1e-12)
+
+
+def test_probes_read_the_stress_of_weight():
+    """sigma_zz = -rho g d at a depth d, beside that of the load."""
+    scene = loads('[probes]\npoints_mm = [[0, 0]]\ndepth_mm = 6\nquantity = "stress_zz"\n[focus]\n'
+                  "peak_pressure_pa = 0\n[tacton]\nduration_s = 0.01")  # fmt: skip
+    heavy = replace(scene, body=column("clamped"), load=Load(gravity=9.81))
+    found = compute(heavy, "fem", h=3e-3).values
+    np.testing.assert_allclose(found, -1000 * 9.81 * 6e-3, rtol=0.03)
 
 
 @pytest.mark.parametrize("load", ['kind = "shear"\ndirection = [1, 2]', 'direction = "path"\n'
@@ -332,3 +349,16 @@ def test_a_fit_recovers_the_modulus_and_the_force_of_a_contact():
     assert fitted.target.reduced is not None, "no factorisation for each modulus"
     assert fitted.values[MODULUS] == pytest.approx(2.4e4, rel=0.01)
     assert fitted.values["load.force_n"] == pytest.approx(0.03, rel=0.01)
+
+
+def test_predictions_of_layers_under_tractions_are_those_of_the_model():
+    text = AROUND.replace("0.03", "0.2") + SMALL.replace("poisson = 0.0", "poisson = 0.49") + SHEAR
+    scene = loads(text)
+    aim = target(scene, "flat-body", DISPLACEMENT, scene.probe_points)
+    expected, _ = fit_lines(compute(scene, "flat-body-harmonic"), np.array([200.0]))
+    np.testing.assert_allclose(
+        predicted_lines(aim, np.array([200.0]))({}), expected, rtol=0.02,
+        atol=1e-3 * np.abs(expected).max(),
+    )  # fmt: skip
+    rest = compute(scene, "flat-body")
+    assert far(predicted_waveforms(aim, rest.times)({}), rest.values).max() < 1e-3

@@ -188,6 +188,15 @@ def test_the_operator_of_a_path_gives_the_lines_of_the_wavenumber_integral():
     assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
 
 
+def test_a_model_without_an_exact_map_gives_probes_alone():
+    scene = loads(SLAB.replace('kind = "slab"', 'kind = "none"').split("[body.material]")[0])
+    method = method_of(scene, SolveOptions(model="point-kernel"))
+    found = ensemble(scene, spreads_of(scene), np.array([[50.0], [100.0]]), method)
+    assert not found.has_map
+    assert found.rms[1] == pytest.approx(2 * found.rms[0])
+    assert found.lines[0, :, 0].max() == pytest.approx(25, rel=1e-3)  # half of 50 Pa, at f_AM
+
+
 def test_samples_of_a_body_that_is_reduced_once_are_those_of_bodies_of_their_own():
     scene = loads(SMALL)
     found = propagate(scene, 72, model="fem", h=0.01)
@@ -256,6 +265,13 @@ def test_the_budget_of_a_sheet_is_what_samples_of_its_modes_show():
     curled = loads('[body]\nkind = "sheet"\n[body.mounting]\ncurl_x_mm = 1')
     assert isnan(error_budget(curled).material)
     assert "not computed" in mesh_row(curled, None, 0.1).value
+
+
+def test_a_finer_mesh_than_a_tenth_of_the_material_gains_nothing():
+    palm = loads(SLAB.split("[body]")[0] + '[body]\nmaterial = "palm"')
+    row = mesh_row(palm, 3e-3, 0.02)
+    assert 0.3 < error_budget(palm).material < 3
+    assert 3 < float(row.reason.rpartition("finer than ")[2].split()[0]) <= 15
 
 
 # Pages and tables
