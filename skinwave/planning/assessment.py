@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from simple_model import Response
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.models import named
+from skinwave.models.laws import own_laws, series_tolerance
 from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.reduced import ReducedBody, answer, prepare, reduction_tolerance
 from skinwave.planning.extent import absorbing_error
@@ -27,7 +28,12 @@ from skinwave.planning.refinement import (
     convergence,
     quantity_of_interest,
 )
-from skinwave.planning.rows import of_elements, of_ends_and_band, of_stretching
+from skinwave.planning.rows import (
+    of_elements,
+    of_ends_and_band,
+    response_warnings,
+    series_over_tolerance,
+)
 from skinwave.scene.scene import Body, Load, Reading, Scene
 
 Coarser = tuple[float, ReducedBody]  # element size in metre, and the body with it
@@ -63,9 +69,12 @@ def assessed(
     series = series_error(scene, response.model, tolerance, coarse)
     at_ends = absorbing_error(scene, body, options)
     sudden = above_band(response.values, response.times[1] - response.times[0])
+    solids = own_laws(body)
+    words = solids[0].series(series_tolerance(tolerance)).words if solids else ""
     warnings = (
         *sentences(scene, response, tolerance, h=size, error=error),
         *of_ends_and_band(scene, at_ends, sudden, tolerance),
+        *series_over_tolerance(words, series, tolerance),
     )
     error += response.effort.estimate + series + at_ends + sudden
     error += stretching_left_out(scene, named(response.model), tolerance)
@@ -94,11 +103,12 @@ def sentences(
     metre, with the relative error that is expected of these, or nan.
     """
     if named(response.model).default_size and h:
-        known = of_elements(scene, h, error, tolerance)
+        known, predicted = of_elements(scene, h, error, tolerance), error
     else:
-        asked = SolveOptions(tolerance=tolerance, model=response.model, times=response.times)
-        known = plan(scene, asked).warnings
-    return (*known, *of_stretching(scene, response, tolerance))
+        options = SolveOptions(tolerance=tolerance, model=response.model, times=response.times)
+        planned = plan(scene, options)
+        known, predicted = planned.warnings, planned.error
+    return (*known, *response_warnings(scene, response, predicted, tolerance))
 
 
 def _coarser(body: Body, h: float) -> float:

@@ -48,6 +48,7 @@ from skinwave.planning.rows import (
     of_elements,
     of_ends_and_band,
     over_tolerance,
+    series_over_tolerance,
     start_over_tolerance,
     sudden_over_tolerance,
 )
@@ -305,13 +306,10 @@ def _with_series(found: Plan, scene: Scene, tolerance: float) -> Plan:
         )
         for solid in solids
     )
-    said = over_tolerance(
-        f"the {rows[0].value},", error, tolerance,
-        "flat-body-harmonic or fem-harmonic, which take the law itself, are",
-    )  # fmt: skip
+    warned = series_over_tolerance(rows[0].value, error, tolerance)
     return replace(
         found, error=found.error + error, rows=(*found.rows, *rows),
-        warnings=(*found.warnings, *said),
+        warnings=(*found.warnings, *warned),
     )  # fmt: skip
 
 

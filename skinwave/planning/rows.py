@@ -272,6 +272,20 @@ def of_stretching(scene: Scene, response: Response, tolerance: float) -> tuple[s
     )
 
 
+def response_warnings(
+    scene: Scene, response: Response, predicted: float, tolerance: float
+) -> tuple[str, ...]:
+    """Warnings that every response has beside those of its plan, whatever computed it: of the
+    relative error that was `predicted`, of stretching, of its sampling, and of the scene.
+    """
+    return (
+        *beyond_prediction(scene, response, predicted, tolerance),
+        *of_stretching(scene, response, tolerance),
+        *beyond_sampling(scene, response),
+        *implausible(scene),
+    )
+
+
 def implausible(scene: Scene) -> tuple[str, ...]:
     """Warnings of a density that no solid has, and of a probe that is given twice."""
     lightest, heaviest = DENSITIES
@@ -356,6 +370,12 @@ def beyond_prediction(
         "plate with the same linear motion differs by that; take the displacement, or smaller "
         "elements and shorter time steps",
     )
+
+
+def series_over_tolerance(words: str, error: float, tolerance: float) -> tuple[str, ...]:
+    """Warning of a Prony series, described by `words`, that a model takes for a modulus law."""
+    cure = "flat-body-harmonic or fem-harmonic, which take the law itself, are"
+    return over_tolerance(f"the {words},", error, tolerance, cure)
 
 
 def start_over_tolerance(model: Model, start: float, tolerance: float) -> tuple[str, ...]:

@@ -20,13 +20,7 @@ from skinwave.models.limits import check_taken
 from skinwave.models.options import SolveOptions, from_first, sample_grid
 from skinwave.models.reduced import answer
 from skinwave.planning.plan import plan
-from skinwave.planning.rows import (
-    Plan,
-    beyond_prediction,
-    beyond_sampling,
-    implausible,
-    of_stretching,
-)
+from skinwave.planning.rows import Plan, response_warnings
 from skinwave.scene.scene import Scene
 from skinwave.system.effort import Progress, SkinwaveWarning, versions
 from skinwave.system.progress_bar import reported
@@ -95,13 +89,10 @@ def solve(scene: Scene, required: Plan) -> Response:
 def _checked(scene: Scene, required: Plan, found: Response) -> Response:
     """The response with all warnings, and the larger of planned and measured errors."""
     tolerance = required.options.tolerance
-    said = (
-        *required.warnings, *beyond_prediction(scene, found, required.error, tolerance),
-        *of_stretching(scene, found, tolerance), *beyond_sampling(scene, found),
-        *implausible(scene),
-    )  # fmt: skip
+    more = response_warnings(scene, found, required.error, tolerance)
     return replace(
-        found, load=scene.pressure, effort=replace(found.effort, warnings=said),
+        found, load=scene.pressure,
+        effort=replace(found.effort, warnings=(*required.warnings, *more)),
         expected_error=float(np.fmax(required.error, found.expected_error)),
     )  # fmt: skip
 
