@@ -17,7 +17,7 @@ WRITTEN = {
     "labelled-data": ("tactons.csv",),
     "fit-a-vibrometer": (
         "palm.csv",
-        "seen/index.html",
+        "inspected/index.html",
         "fitted/scene.toml",
         "fitted/estimates.csv",
     ),
