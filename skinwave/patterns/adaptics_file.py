@@ -72,7 +72,7 @@ def parse(content: bytes, parameters: Mapping[str, float]) -> Animation:
     """The animation in a file at values of its parameters, by default its own."""
     try:
         table = json.loads(as_utf_8(content))
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         at = f" at line {error.lineno}" if isinstance(error, json.JSONDecodeError) else ""
         raise ValueError(f"not valid JSON{at}; save it with AdapTics") from None
     if not isinstance(table, dict) or table.get("$DATA_FORMAT") != FORMAT:
