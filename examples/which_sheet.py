@@ -170,9 +170,7 @@ def _mounting(candidate: Row, x: float, y: float) -> dict[str, Any]:
 
 
 def assess(candidate: Row) -> dict[str, Any]:
-    """Row of a candidate: its values, its first mode and sag, and whether and by which number each
-    claim holds.
-    """
+    """Row of a candidate: its values, its sag, and whether and by which number each claim holds."""
     scene = scene_of(candidate)
     plate = plate_of(scene.body)
     inertia = plate.mass_per_area * (2 * np.pi * RESOLVED) ** 2

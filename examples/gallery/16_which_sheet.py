@@ -43,14 +43,24 @@ import numpy as np
 import skinwave
 
 sys.path.append(str(Path(skinwave.__file__).parents[1] / "examples"))
-from which_sheet import assess, draw, findings, holds, hypercube
+from which_sheet import MUCH_LOWER, assess, findings, holds, hypercube
 
 small = [each for each in hypercube(200) if each["size"] == "A6"]
 rows = [assess(each) for each in small[:6]]
 print(findings(rows))
 
 # %%
-draw(rows, plt.figure(figsize=(7, 4), layout="constrained"))
+# The levels that M4 and M5 are about.
+figure, ax = plt.subplots(figsize=(7, 4), layout="constrained")
+part = 100 * np.arange(1, len(rows) + 1) / len(rows)
+for column, words, bar, colour in (
+    ("M4_value", "strongest rival of f_AM", 0.0, "#0072B2"),
+    ("M5_value", "strongest multiple of f_AM or f_d", MUCH_LOWER, "#D55E00"),
+):
+    ax.step(np.sort([row[column] for row in rows]), part, where="post", label=words, c=colour)
+    ax.axvline(bar, color=colour, ls=":", label=f"{column[:2]} holds below {bar:g} dB")
+ax.set(xlabel="level, dB re f_AM", ylabel="candidates below it, %", xlim=(-30, 60))
+ax.legend(frameon=False)
 
 # %%
 # A line at f_d needs a pressure with a mean. All drive laws except the linear one have it.
