@@ -183,7 +183,7 @@ def test_the_operator_of_a_path_gives_the_lines_of_the_wavenumber_integral():
     places = np.random.default_rng(1).uniform(-0.03, 0.03, (60, 2))
     body = slab(scene.body.solid, 0.015)
     f, expected = steady_lines(body, pressure, places, threshold=1e-3)
-    g, found = path_operator(pressure, places, threshold=1e-3).steady_lines(body)
+    g, found = path_operator(pressure, places, threshold=1e-3)(body)
     assert g == pytest.approx(f)
     assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
 
