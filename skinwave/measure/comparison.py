@@ -17,6 +17,7 @@ from skinwave.measure.lines import (
     MeasuredLines,
     as_response,
     bin_width,
+    departures,
     evenly,
     holm,
     lines_of,
@@ -39,7 +40,6 @@ AGREES, DIFFERS, NUMERICAL, SILENT, UNKNOWN = (
 )  # fmt: skip
 MEASURED = "measured"  # body and model of what is drawn beside the models
 MOST_DRAWN = 8  # places
-RESOLVED = 2.5  # bins, which lines of half a record are apart at least
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -93,8 +93,8 @@ class MeasuredComparison:
     lines : MeasuredLines, of these
     present : (f, p) float, significance of each line, adjusted for their number; nan if unknown
     unresolved : names of lines of the load that the record cannot resolve
-    halves : (2, f, p) float, amplitudes in both halves of what is fitted of the record; the same
-        if the motion is steady, or if half of it does not resolve the lines
+    halves : (2, f, p) float, amplitudes in both halves of what is fitted of the record, which
+        are the same if the motion is steady
     columns : of the models
     claims : what the measurement alone says of the paper's claims
     """
@@ -168,10 +168,11 @@ def compare_measured(asked: Measured, runs: Sequence[Run]) -> MeasuredComparison
     names, frequencies, unresolved = lines_to_compare(measurement, scene)
     lines = lines_of(measurement, frequencies)
     named = by_name(scene, names, lines, unresolved, _spectrum_of(measurement))
+    left = [half.mean for half in departures(measurement, frequencies)] or [0 * lines.mean] * 2
     return MeasuredComparison(
         measurement=measurement, scene=scene, names=names, lines=lines,
         present=holm(lines.significances(lines.mean)), unresolved=unresolved,
-        halves=_halves(measurement, lines),
+        halves=np.abs(lines.mean + np.array(left)),
         columns=tuple(_column(asked, run, lines) for run in runs),
         claims=tuple(assess_measured(named)),
     )  # fmt: skip
@@ -266,22 +267,6 @@ def overlap(measurement: Measurement, run: Run, delay: float) -> float:
     """Time in s of a record that lies within the Tacton, at a delay of the record."""
     begin, end = (float(t) + delay for t in run.response.times[[0, -1]])
     return min(float(measurement.times[-1]), end) - max(float(measurement.times[0]), begin)
-
-
-def _halves(measurement: Measurement, lines: MeasuredLines) -> Floats:
-    """Amplitudes (2, f, p) in both halves of a record without its start."""
-    whole, count = np.abs(lines.mean), len(measurement.times)
-    half = int((1 - SETTLE) * count) // 2
-    apart = np.diff(np.concatenate([[0.0], np.sort(lines.frequencies)])).min()
-    if not half or half / measurement.rate * apart < RESOLVED:
-        return np.array([whole, whole])
-    parts = (slice(count - 2 * half, count - half), slice(count - half, count))
-    each = (
-        replace(measurement, times=measurement.times[part], values=measurement.values[:, part],
-                drive=np.empty(0))
-        for part in parts
-    )  # fmt: skip
-    return np.array([np.abs(lines_of(m, lines.frequencies, settle=0.0).mean) for m in each])
 
 
 def at_measured(scene: Scene, measurement: Measurement) -> Scene:

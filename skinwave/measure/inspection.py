@@ -1,15 +1,16 @@
 """Inspection of a measurement: lines, noise floor, mains hum, clipping, and what is missing."""
 
 from collections.abc import Container, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from simple_model import MovingPressure
 from simple_model.load.line_names import line_names
+from simple_model.numbers import significant
 from simple_model.response import SETTLE
 from simple_model.typing import Floats
-from skinwave.measure.lines import bin_width
+from skinwave.measure.lines import bin_width, departures, holm
 from skinwave.measure.measurement import Measurement
 from skinwave.measure.noise_floor import floor_of
 from skinwave.measure.spectral_lines import (
@@ -25,6 +26,8 @@ from skinwave.measure.spectral_lines import (
 MOST_VALUES = 2_000_000  # that lines are looked for in
 MOST_SAMPLES = 100_000  # of a waveform
 FEWEST_BINS = 64  # equally spaced frequencies of a spectrum that has a noise floor
+CHANCE = 0.01  # of a note that a steady motion is not steady
+TURNS = 2.0  # standard errors of a frequency, whose turn of phase is ignored
 SAME = 4.0  # standard errors between two lines that may be one
 
 MAINS = (50.0, 60.0)  # Hz
@@ -100,6 +103,12 @@ def inspect(measured: Measurement, *, alarm: float = ALARM) -> Inspection:
     if not measured.is_spectrum and part.stop < len(measured.times):
         missing.append(f"lines were looked for in the first {part.stop / measured.rate:g} s")
     spectrum = _spectrum(measured, kept, part, alarm)
+    if not measured.is_spectrum and spectrum and spectrum.lines:
+        looked_at = replace(
+            measured, times=measured.times[: part.stop], drive=np.empty(0),
+            values=measured.values[:, : part.stop, kept], places=measured.places[kept],
+        )  # fmt: skip
+        missing += _unsteady(looked_at, spectrum.lines)
     return Inspection(
         measured=measured, spectrum=spectrum, origins=_origins(measured, spectrum, part), kept=kept,
         clipped=_clipped_samples(measured), constant=constant, missing=tuple(missing),
@@ -124,6 +133,29 @@ def _spectrum(
     if part.stop - part.start < FEWEST:
         return None
     return spectral_lines(measured.values[:, part, kept], measured.rate, alarm=alarm)
+
+
+def _unsteady(measured: Measurement, lines: Sequence[SpectralLine]) -> list[str]:
+    """A sentence if a line differs between the halves of a record by more than its errors: beyond
+    the noise, and by more than its phase turns if its frequency is `TURNS` errors away.
+    """
+    first, second = departures(measured, np.array([line.frequency for line in lines]))
+    change = second.mean - first.mean
+    both = replace(first, variance=first.variance + second.variance)
+    size = np.array([np.sqrt((line.amplitudes**2).sum()) for line in lines])
+    share = np.sqrt((np.abs(change) ** 2).sum(axis=1)) / size
+    half = (1 - SETTLE) / 2 * len(measured.times) / measured.rate
+    turn = 2 * np.pi * half * np.array([line.error for line in lines])
+    sure = (holm(both.significances(change)) < CHANCE).any(axis=1)
+    beyond = np.flatnonzero(sure & (share > TURNS * turn))
+    if not len(beyond):
+        return []
+    k = beyond[(share * size)[beyond].argmax()]
+    return [
+        f"the line at {lines[k].frequency:.4g} Hz changes by {significant(100 * share[k])} % "
+        "between the halves of the record, so the errors of frequencies do not hold: the motion "
+        "is not steady, or lines are too close; cut off what is not steady, or record longer"
+    ]
 
 
 def _of_amplitudes(measured: Measurement, kept: np.ndarray, alarm: float) -> LineSpectrum | None:

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import fdtrc
 
 from simple_model import Response
-from simple_model.response import SETTLE, line_rows
+from simple_model.response import SETTLE, fit_lines, line_rows
 from simple_model.typing import Floats
 from simple_model.windows import cosines
 from skinwave.measure.delays import in_step
@@ -213,6 +213,25 @@ def as_response(measurement: Measurement, values: Floats | None = None) -> Respo
         model="measured", times=evenly(measurement), probes=np.zeros((values.shape[1], 2)),
         values=values, quantity=measurement.quantity,
     )  # fmt: skip
+
+
+def departures(measurement: Measurement, frequencies: Floats) -> list[MeasuredLines]:
+    """Departures of lines at frequencies (f,) in Hz from a steady motion: lines of each half of the
+    residuals of `fit_lines`, of the mean of the repetitions. Lines that half the record does not
+    resolve have one departure. The list is empty for spectra and for records of few samples.
+    """
+    count = len(measurement.times)
+    half = int((1 - SETTLE) * count) // 2
+    if half < 2:
+        return []
+    rest = fit_lines(as_response(measurement), frequencies)[1]
+    parts = (slice(count - 2 * half, count - half), slice(count - half, count))
+    each = (
+        replace(measurement, times=measurement.times[part], values=rest[None, part],
+                drive=np.empty(0))
+        for part in parts
+    )  # fmt: skip
+    return [lines_of(m, frequencies, settle=0.0) for m in each]
 
 
 def _of_waveforms(
