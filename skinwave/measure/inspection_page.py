@@ -38,9 +38,9 @@ CAPTION = (
 NONE = "No line rises above the noise floor."
 EXPLAINED = (
     "The false alarm is the probability that noise alone has any line as high in the whole file. "
-    "The standard error of a frequency is the Cramér-Rao bound in the noise beside it, for a steady "
-    "motion. A line that is mains is 50 or 60 Hz or a multiple of it; one that is drive is in the "
-    "recorded drive."
+    "The standard error of a frequency is the Cramér-Rao bound in the noise beside it, for a "
+    "steady motion. A line that is mains is 50 or 60 Hz or a multiple of it; one that is drive is "
+    "in the recorded drive."
 )
 
 
