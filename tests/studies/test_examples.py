@@ -62,7 +62,7 @@ def body_response(folder):
     files = (file for file in Path(folder).rglob("responses.npz") if "kernel" not in str(file))
     for file in files:
         with np.load(file) as arrays:
-            if {*arrays} - {"t", "probes", "displacement"} and "probes" in arrays:
+            if {*arrays} - {"t", "probes", "displacement"} and not any("/" in n for n in arrays):
                 model = next(n for n in arrays if n not in ("t", "probes", "displacement"))
                 return Response(model=model, times=arrays["t"], probes=arrays["probes"],
                                 values=arrays[model])  # fmt: skip
