@@ -22,6 +22,11 @@ def significant(value: float, digits: int = 3) -> str:
     return f"{value:,.{max(digits - 1 - floor(log10(abs(value))), 0)}f}"
 
 
+def as_sentence(text: str) -> str:
+    """A clause with a capital and a full stop."""
+    return f"{text[0].upper()}{text[1:]}."
+
+
 def with_error(value: float, error: float, digits: int = 3) -> str:
     """A number and its standard error: the error to two digits, the number to as many places.
 

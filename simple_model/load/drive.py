@@ -90,8 +90,8 @@ DRIVES = {
             name="pressure_squared", degree=2,
             pressure=lambda A, M, m: (A * (1 + m * M) / (1 + m)) ** 2, words="usual AM",
             note="Lines at 2 f_AM and, in AM+STM, at n f_d come from the drive law, not from "
-            "propagation: pressure_squared, because a device that modulates its sound pressure "
-            "pushes with the square of it. The point kernel under the same load has them, too.",
+            "propagation: a device that modulates its sound pressure pushes with the square of "
+            "that pressure. The point kernel under the same load has them, too.",
         ),
         # The device takes the square root first, so that pressure follows M.
         DriveLaw(

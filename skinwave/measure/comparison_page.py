@@ -8,7 +8,14 @@ import numpy as np
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from simple_model.numbers import counted, percent, significant, stated_error, with_error
+from simple_model.numbers import (
+    as_sentence,
+    counted,
+    percent,
+    significant,
+    stated_error,
+    with_error,
+)
 from skinwave.measure.alignment import opposite_sign
 from skinwave.measure.claims import FAILS, HOLDS
 from skinwave.measure.comparison import LEVEL, UNKNOWN, MeasuredComparison, ModelColumn, overlap
@@ -75,7 +82,6 @@ def page_part(found: MeasuredComparison, picture: Callable[[str, Figure, str], P
                 [differences]),
         Section("Which of the paper's claims the measurement itself shows",
                 [OF_CLAIMS, claims_table(found)] if found.claims else [NO_CLAIMS], 3),
-        Section("The models by themselves", [], 3),
     ])  # fmt: skip
 
 
@@ -106,9 +112,9 @@ def columns_table(found: MeasuredComparison) -> Table:
             _fitted(1e3 * a.delay, 1e3 * a.delay_error), 1e3 * a.repeats,
         ))  # fmt: skip
     return Table((
-        "model", Column("misfit", unit="%"), Column("of noise alone", unit="%", digits=2),
+        "model", Column("misfit", unit="%"), Column("misfit of noise alone", unit="%", digits=2),
         "differences beyond the noise", "gain", Column("delay of the record", unit="ms"),
-        Column("delays so far off fit as well", unit="ms"),
+        Column("delay is known up to multiples of", unit="ms"),
     ), rows)  # fmt: skip
 
 
@@ -161,7 +167,7 @@ def claims_table(found: MeasuredComparison) -> Table:
          one.sentence)
         for one in found.claims
     ]  # fmt: skip
-    return Table(("claim", "in the data it", "by"), rows)
+    return Table(("claim", "in the data", "reason"), rows)
 
 
 def conclusion(found: MeasuredComparison, column: ModelColumn) -> str:
@@ -190,11 +196,7 @@ def conclusion(found: MeasuredComparison, column: ModelColumn) -> str:
         said = f"The {name} agrees with the data within the noise and its own numerical error"
         return f"{said}: {beyond}; {left}."
     said = f"The {name} does not agree with the data everywhere"
-    return f"{said}: {beyond}: {_where(found, column)}. {_sentence(left)}"
-
-
-def _sentence(text: str) -> str:
-    return f"{text[0].upper()}{text[1:]}."
+    return f"{said}: {beyond}: {_where(found, column)}. {as_sentence(left)}"
 
 
 def _where(found: MeasuredComparison, column: ModelColumn) -> str:
@@ -216,13 +218,13 @@ def remarks(found: MeasuredComparison) -> list[str]:
     turned = opposite_sign(f"the {label(main.run.column)}", has_delay=True)
     return [
         said,
-        *[_sentence(turned)] * main.may_be_turned,
+        *[as_sentence(turned)] * main.may_be_turned,
         *_outside(found, main),
         *["Not compared, since record or model cannot resolve them: "
           f"{', '.join(found.unresolved)}."] * bool(found.unresolved),
         *_changes(found),
-        *map(_sentence, flaws(measurement, found.scene.pressure)),
-        *measurement.remarks,
+        *map(as_sentence, flaws(measurement, found.scene.pressure)),
+        *map(as_sentence, measurement.remarks),
     ]  # fmt: skip
 
 

@@ -19,7 +19,7 @@ from skinwave.report.measured import lines_figure
 from skinwave.report.palette import BLUE, ORANGE
 from skinwave.report.styles import Style
 from skinwave.scene.file import dumps
-from skinwave.system.document import Part, Picture, Report, Section, preformatted
+from skinwave.system.document import Details, Part, Picture, Report, Section, preformatted
 from skinwave.system.table import Column, Table
 
 INK, OF_FIT, LEFT = "#222222", BLUE, ORANGE
@@ -36,9 +36,10 @@ OF_LINES = (
     "Filled where they differ by more than 95 % of the noise."
 )
 RESIDUALS = (
-    "Left: the residuals over their standard error; 95 of 100 lie between the dashed lines if the "
-    "errors are normal. Right: their autocorrelation, in the shaded band if they are white."
+    "The residuals over their standard error; 95 of 100 lie between the dashed lines if the errors "
+    "are normal."
 )
+OF_LAGS = " Right: their autocorrelation, in the shaded band if they are white."
 CORRELATIONS = "Correlations of the estimates: near 1 or -1, one can make up for the other."
 
 
@@ -62,18 +63,20 @@ def write(folder: Path, found: Fit) -> None:
                                             strict=True))  # fmt: skip
     correlations = Table(("", *(Column(key, digits=2) for key in keys)), rows)
     caption = OF_WAVEFORMS if data.is_in_time else OF_LINES
+    about = RESIDUALS + OF_LAGS * bool(len(found.intervals.whiteness.correlations))
+    method, estimates = sentences(found)[:2], sentences(found)[2:]
     parts: list[Part] = [
         _shown_estimates(found), EXPLAINED,
         Picture(png(fitted_figure(found)), caption, "fitted"),
         Section("Residuals", [
-            _whiteness(found), Picture(png(residual_figure(found)), RESIDUALS, "residuals"),
+            _whiteness(found), Picture(png(residual_figure(found)), about, "residuals"),
         ]),
         *[Section("Correlations", [CORRELATIONS, correlations])] * (len(keys) > 1),
-        Section("The scene with the estimates", [preformatted(text)]),
+        Details("The scene with the estimates", [preformatted(text)]),
     ]  # fmt: skip
     Report(
         f"{found.target.scene.name}: fitted to {found.measured.name or 'a measurement'}",
-        verdict=sentences(found)[:2], parts=parts,
+        verdict=[" ".join(said) for said in (estimates, method) if said], parts=parts,
         efforts=[("", Effort(warnings=tuple(cautions(found))))],
     ).write(folder)  # fmt: skip
 
@@ -117,7 +120,7 @@ def _shown_estimates(found: Fit) -> Table:
             value, low, high = shown(each)
             interval = f"{low} to {high}"
         rows.append((each.key + ", at a limit" * each.at_limit, value, interval,
-                     f"{limits.low:g} to {limits.high:g}"))  # fmt: skip
+                     f"{significant(limits.low)} to {significant(limits.high)}"))  # fmt: skip
     return Table(("parameter", "estimate", "95 % interval", "limits"), rows)
 
 
@@ -207,14 +210,15 @@ def _strongest(values: np.ndarray) -> list[int]:
 
 
 def residual_figure(found: Fit, style: Style = REPORT) -> Figure:
-    """Weighted residuals along their axis, and their autocorrelation."""
+    """Weighted residuals along their axis, and their autocorrelation if it is known."""
     data, solution = found.solution.problem.data, found.solution
     residual = solution.residual / np.sqrt(solution.scale)
     scale, label = (1e3, "time, ms") if data.is_in_time else (1.0, "frequency, Hz")
     each, band = found.intervals.whiteness.correlations, 2 / np.sqrt(residual.size)
     with mpl.rc_context(style.rc):
         figure = Figure(figsize=style.size(10.5, 3.2), layout="constrained")
-        left, right = figure.subplots(1, 2, width_ratios=(2, 1))
+        widths = (2, 1)[: 1 + bool(len(each))]
+        left, *others = figure.subplots(1, len(widths), width_ratios=widths, squeeze=False)[0]
         thin = slice(None, None, max(1, len(residual) // 2000))
         left.plot(scale * data.axis[thin], residual[thin], ".", ms=2 if data.is_in_time else 5,
                   color=INK, alpha=0.4)  # fmt: skip
@@ -222,8 +226,9 @@ def residual_figure(found: Fit, style: Style = REPORT) -> Figure:
             left.axhline(y, color=LEFT, lw=0.8, ls="--")
         left.set_xlabel(label)
         left.set_ylabel("residual, standard errors")
-        right.bar(np.arange(1, len(each) + 1), each, color=INK, alpha=0.6)
-        right.axhspan(-band, band, color=OF_FIT, alpha=0.2)
-        right.set_xlabel("lag, samples" if data.is_in_time else "lag, lines")
-        right.set_ylabel("autocorrelation")
+        for right in others:
+            right.bar(np.arange(1, len(each) + 1), each, color=INK, alpha=0.6)
+            right.axhspan(-band, band, color=OF_FIT, alpha=0.2)
+            right.set_xlabel("lag, samples" if data.is_in_time else "lag, lines")
+            right.set_ylabel("autocorrelation")
     return figure

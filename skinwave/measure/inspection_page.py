@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from simple_model.numbers import counted, significant
+from simple_model.numbers import as_sentence, counted, significant
 from simple_model.response import SETTLE
 from skinwave.measure import writing
 from skinwave.measure.inspection import Inspection
@@ -26,9 +26,9 @@ MAP = 3  # known places, at least, of a map
 MOST_NAMED = 12  # lines in the figure
 COLUMNS = (
     Column("frequency_hz", "line", "Hz", digits=7),
-    Column("frequency_error_hz", "standard error", "Hz", digits=2), "place", Column("x_mm"),
-    Column("y_mm"), Column("amplitude", "largest amplitude"), "unit",
-    Column("false_alarm", "false alarm", digits=1), "what",
+    Column("frequency_error_hz", "standard error", "Hz", digits=2), "place",
+    Column("x_mm", "x", "mm"), Column("y_mm", "y", "mm"), Column("amplitude", "largest amplitude"),
+    "unit", Column("false_alarm", "false alarm", digits=1), Column("what", "origin"),
 )  # fmt: skip
 CAPTION = (
     "The places where the motion is largest. Spectra: one-sided density of amplitude with a Hann "
@@ -39,8 +39,9 @@ NONE = "No line rises above the noise floor."
 EXPLAINED = (
     "The false alarm is the probability that noise alone has any line as high in the whole file. "
     "The standard error of a frequency is the Cramér-Rao bound in the noise beside it, for a "
-    "steady motion. A line that is mains is 50 or 60 Hz or a multiple of it; one that is drive is "
-    "in the recorded drive."
+    "The standard error of a frequency is the Cramér-Rao bound in the noise beside it, for a "
+    "steady motion. The origin of a line is mains at 50 or 60 Hz and their multiples, and drive if "
+    "the recorded drive has it."
 )
 
 
@@ -56,7 +57,7 @@ def write(folder: Path, found: Inspection) -> None:
         parts=[
             Picture(png(figure(found)), CAPTION, "measured"),
             Section("Lines", [strongest(found), EXPLAINED] if found.lines else [NONE]),
-            Section("Missing or assumed", found.missing or ["Nothing."]),
+            Section("Missing or assumed", [*map(as_sentence, found.missing)] or ["Nothing."]),
         ],
     ).write(folder)  # fmt: skip
 

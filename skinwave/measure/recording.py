@@ -100,8 +100,8 @@ def completed(found: Recording, given: Given, path: Path) -> Measurement:
         said.append(f"place {', '.join(str(k + 1) for k in still[:8])} has the same value "
                     "throughout, as without a signal; choose others by --columns")  # fmt: skip
     if not (given.sign or found.sign):
-        said.append("its direction is not in the file and taken as positive into the body; "
-                    "--positive out turns it")  # fmt: skip
+        said.append("the file gives no sign: positive is taken as into the body; use "
+                    "--positive out to flip it")  # fmt: skip
     return Measurement(
         quantity=quantity, places=found.places, times=times, frequencies=found.frequencies,
         values=values, drive=found.drive, name=found.name or path.stem, source=path.name,

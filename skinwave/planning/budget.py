@@ -60,7 +60,7 @@ class ErrorBudget:
         """The material's and the device's in a few words."""
         known = {"material": self.material, "device": self.device}
         return ", ".join(
-            f"{name} {_percent(value) if value else 'of no known spread'}"
+            f"{name} {_percent(value) if value else '(spread unknown)'}"
             for name, value in known.items()
         )
 

@@ -15,7 +15,7 @@ from skinwave.scene.scene import Body, Scene
 NAMED = 4  # lines that a sentence names
 SPOTS = {
     "gaussian": "a Gaussian focus",
-    "main_lobe": "a focus S = sinc^2(D/D0)",
+    "main_lobe": "a focus S = sinc²(D/D₀)",
     "array": "the array's whole field",
 }
 UNCERTAIN = (
@@ -54,7 +54,8 @@ def _modelled(runs: list[Run]) -> str:
     """One body by one model."""
     scene, model, name = runs[0].scene, named(runs[0].model), answered(runs[0])
     acting, body = scene.load, scene.body
-    load = f"drive law {scene.pressure.drive}, {_spot(scene.pressure)}"
+    drive = scene.pressure.law.name.replace("_", " ")
+    load = f"drive law {drive}, {_spot(scene.pressure)}"
     if not acting.is_plain:
         load = f"{acting.words}; {load}" if acting.of_kind.is_of_device else acting.words
     text = f"{name[0].upper()}{name[1:]}: {model.words}; {load}."
@@ -133,7 +134,7 @@ def above(body: Body) -> str:
     place = body.placement
     if place.is_tilted:
         x, y = np.degrees([place.tilt_x, place.tilt_y])
-        text += f"; tilted by {x:g} degrees about x and {y:g} degrees about y"
+        text += f"; tilted by {x:g}° about x and {y:g}° about y"
     if any(place.offset) or place.lift:
         moved = ", ".join(f"{1e3 * x:g}" for x in (*place.offset, place.lift))
         text += f"; moved by ({moved}) mm"
@@ -143,7 +144,7 @@ def above(body: Body) -> str:
 def _material(solid: Material | str) -> str:
     if isinstance(solid, str):
         return solid
-    text = f"density {solid.density:g} kg/m3, "
+    text = f"density {solid.density:g} kg/m³, "
     if (along := solid.orthotropy) is None:
         text += f"shear modulus {solid.shear_modulus / 1e3:.4g} kPa, "
         text += f"Poisson's ratio {solid.poisson:g}, "

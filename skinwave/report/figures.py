@@ -75,7 +75,7 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
 def tacton_figure(title: str, runs: list[Run], style: Style = REPORT) -> Figure:
     """Waveform and spectrum at each probe, all models overlaid."""
     probes, narrow = runs[0].response.probes, style.is_narrow
-    size = style.size(10.5, 1.6 * len(probes) + 1.3)
+    size = style.size(10.5, 1.25 * len(probes) + 1.3)
     figure = Figure(figsize=(size[0], 0.75 * len(probes) + 1.6) if narrow else size)
     axes = figure.subplots(len(probes), 2, sharex="col", sharey="col", squeeze=False)
     for p, (x, y) in enumerate(probes):
@@ -103,7 +103,7 @@ def panels(count: int, style: Style, width: float) -> tuple[Figure, list[Axes]]:
     """A figure and axes of so many maps in mm side by side, below each other in a narrow figure;
     `width` inch of each with its colour bar, at letters of 10 points.
     """
-    size = style.size(width * count, 0.85 * width + 0.4)
+    size = style.size(width * count, 0.85 * width + 0.4 + 0.1 * count)
     if style.is_narrow:
         size = size[0], 0.8 * size[0] * count + 0.6
     figure = Figure(figsize=size, layout="compressed")

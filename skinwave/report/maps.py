@@ -26,9 +26,8 @@ KERNEL, THRESHOLD = "#ff9e4a", "#ff2fd0"  # borders: the kernel's -20 dB, the de
 MEASURED_EDGE = COLOURS["measured"]
 SURFACES = (
     "RMS of the steady vibration about its mean. Beyond the dashed line the point kernel predicts "
-    "less than a tenth of its largest; motion of the body there is due to propagation, with the "
-    "waves that its edges reflect. Within the pink line the strongest component of skin is above "
-    "the threshold of detection for a focal spot."
+    "less than a tenth of its largest value: the body moves there because waves propagate. Within "
+    "the pink line the strongest component is above the detection threshold of skin."
 )
 BESIDE = (
     "Squares: where was measured, in the colours of the map, by the RMS of the measured lines of "

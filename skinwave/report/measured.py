@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from meshes.tetmesh import Floats
 from simple_model.quantities import Quantity
-from skinwave.report.figures import REPORT, legend, styled
+from skinwave.report.figures import REPORT, legend, styled, written
 from skinwave.report.palette import inked, label, marker
 from skinwave.report.styles import Style
 
@@ -65,7 +65,7 @@ def lines_figure(
                 right.plot(at[mask], phase[mask], mfc=face, **style_of)
         left.set_ylim(bottom=0)
         name = list(lines)[k]
-        left.set_ylabel(f"{name}\n{lines[name]:.1f} Hz", fontweight="bold", parse_math=False)
+        left.set_ylabel(f"{written(name)}\n{lines[name]:.1f} Hz", fontweight="bold")
     axes[0, 0].set_title(f"amplitude, {quantity.shown}", fontsize="medium")
     axes[0, 1].set_title("phase of the model less the measured one, degrees", fontsize="medium")
     for ax in axes[-1]:

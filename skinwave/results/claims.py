@@ -176,7 +176,7 @@ def _pairs_only(runs: Sequence[NamedLines]) -> Assessment:
     weakest = min(min(_strongest(run, [name], "f_AM") for name in PAIRS) for run in runs)
     sentence = (
         f"the strongest line at n f_d is at {decibel(drawn)} dB re f_AM, the weakest of the pairs "
-        f"n f_d +- f_AM (n = 1, 2) at {decibel(weakest)} dB"
+        f"n f_d ± f_AM (n = 1, 2) at {decibel(weakest)} dB"
     )
     return drawn < ABSENT and weakest > PRESENT, drawn, ABSENT, sentence
 
@@ -267,7 +267,7 @@ NEEDED: dict[str, tuple[tuple[str, ...], ...]] = {
 TEXTS = {
     "S1": "Simulated, AM alone: a single line at f_AM.",
     "S2": "Simulated, STM alone: lines at multiples of f_d.",
-    "S3": "Simulated, AM+STM: f_AM and the pairs n f_d +- f_AM, no line at n f_d.",
+    "S3": "Simulated, AM+STM: f_AM and the pairs n f_d ± f_AM, no line at n f_d.",
     "S4": "Simulated, AM+STM: f_AM is the highest line, whatever the path.",
     "S5": "Both: lines exactly at the commanded f_AM and f_d.",
     "M1": "Measured, AM alone: lines at multiples of f_AM.",

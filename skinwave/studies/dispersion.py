@@ -218,7 +218,7 @@ def _driven(line: DrivenLine) -> str:
     said += f" The focus, at {significant(line.focus_speed)} m/s, is {ratio} times as fast"
     if line.mach_angle is None:
         return f"{said}."
-    return f"{said}: a Mach angle of {line.mach_angle:.0f} degrees on a straight path."
+    return f"{said}: a Mach angle of {line.mach_angle:.0f}° on a straight path."
 
 
 def page_parts(found: DrivenModes, gallery: Gallery) -> list[Part]:

@@ -49,10 +49,10 @@ QUALITY = 88  # of pictures inside a page
 NAMED = 3  # lines that a sentence names
 NOTHING = "Nothing vibrates: a constant pressure on a focus at rest leaves no wave."
 ABOUT_MAPS = (
-    "Shares and spreads are of maps of 44 mm either way. A slab's is that of a laterally infinite "
-    "layer; of other bodies the first Tacton alone has a map. Strongest is the largest amplitude "
-    "at any probe. A phase delay is known up to whole periods and includes the phase of a body "
-    "that is driven off resonance."
+    "Maps give shares and spreads; they reach 44 mm either way. The map of a slab is that of a "
+    "laterally infinite layer. For other bodies only the first Tacton has a map. The strongest "
+    "component has the largest amplitude at any probe. Its phase delay is known up to whole "
+    "periods and includes the phase of a body that is driven off resonance."
 )
 WAVEFORMS = "Waveforms and spectra. Rows are probes."
 LOADS = (
@@ -143,7 +143,8 @@ def page_of(
     verdict = sentences(first) if first else []
     if first and not of_one:
         verdict[0] = f"{first.kernel.tacton}, one of the Tactons below: {verdict[0]}"
-    parts = [*top, contents(below), *notes, *below]
+    numbers = [four_numbers(first)] if first else []
+    parts = [*numbers, contents(below), *top, *notes, *below]
     return Report(title, verdict, parts, efforts_of(runs), PICTURES)
 
 
@@ -205,15 +206,15 @@ def _caption(name: str, runs: Sequence[Run]) -> str:
 
 
 def _first_screen(shown: Shown, gallery: Gallery) -> list[Part]:
-    """Four numbers, how sure they are, and the maps."""
-    parts: list[Part] = [four_numbers(shown), _sure(shown)]
+    """The maps, and how sure the numbers are."""
+    parts: list[Part] = []
     if shown.surfaces and shown.changes[shown.body.column].strongest:
         figure = surfaces_figure(
             shown.kernel.scene, shown.surfaces, gallery.style, measured=shown.measured
         )
         caption = f"{SURFACES} {BESIDE}" if shown.measured else SURFACES
         parts.append(gallery.figure("propagation", figure, caption))
-    return parts
+    return [*parts, _sure(shown)]
 
 
 def sentences(shown: Shown) -> list[str]:
@@ -228,11 +229,12 @@ def four_numbers(shown: Shown) -> Table:
     rows = [
         ["highest sensation level at the probes", "-"]
         + [_highest_sensation(c.highest_sensation) for c in found],
-        ["above threshold up to this distance from the path, mm", "-"]
+        ["above threshold up to this distance from the path", "-"]
         + [_above_threshold(c) for c in found],
         [f"share of motion outside the kernel's {OUTSIDE:g} dB region"]
         + ["-" if found[0].share is None else "0 %", *(_percent(c.share) for c in found)],
-        ["delay of the strongest component, ms", "0", *map(_delay, found)],
+        ["delay of the strongest component", "0 ms"]
+        + [f"{_delay(c)} ms" if c.delay is not None else "-" for c in found],
     ]
     name = f"{shown.kernel.tacton}: same load"
     return Table([name, "point kernel", *(label(c.column) for c in found)], rows)
@@ -255,7 +257,8 @@ def _driven(kernel: Run, published: Run) -> str:
     names, pressure = added_lines(kernel, published), kernel.scene.pressure
     if pressure == published.scene.pressure:
         return "The load is the published one: only propagation differs from the paper's model."
-    law = f"Drive law and focus ({pressure.drive}, {pressure.profile_name})"
+    names_of = f"{pressure.drive}, {pressure.profile_name}".replace("_", " ")
+    law = f"Drive law and focus ({names_of})"
     if not names:
         return f"{law} change strengths of components and add none."
     said = ", ".join(names[:NAMED]) + " and others" * (len(names) > NAMED)
@@ -272,13 +275,14 @@ def _sure(shown: Shown) -> str:
         )
     if shown.body.scene.body.of_kind.is_plate:
         said.append(
-            "Grammage, stiffness and support of the sheet that was measured are not published; "
-            "detection thresholds are of skin and say nothing of paper."
+            "Grammage, stiffness and support of the measured sheet are not published. Detection "
+            "thresholds are those of skin, so a sheet has no level and no reach."
         )
-    said.append(
-        "The pressure is known to a factor of 2: distances in brackets are with half and twice "
-        "the pressure."
-    )
+    if any(c.above_threshold for c in shown.changes.values()):
+        said.append(
+            "The pressure is known to a factor of 2: distances in brackets are for half and twice "
+            "the pressure."
+        )
     return " ".join(said)
 
 
@@ -287,7 +291,7 @@ def _above_threshold(found: Propagation) -> str:
     if not found.above_threshold:
         return "-"
     half, now, twice = (_reach(each) if each else "none" for each in found.above_threshold)
-    return f"{now} ({half} to {twice})" if half != twice else now
+    return f"{now} mm ({half} to {twice})" if half != twice else f"{now} mm"
 
 
 def _component(found: Component | None, quantity: Quantity = DISPLACEMENT) -> str:

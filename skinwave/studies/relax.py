@@ -364,7 +364,7 @@ def _figure(effects: list[Effect]) -> Figure:
     drawn = Figure(figsize=(7, 1 + 0.32 * len(effects)), layout="constrained")
     axes = drawn.add_subplot()
     changes = [100 * e.waveform for e in effects]
-    bars = axes.barh([e.name for e in effects], changes, color=BLUE, height=0.7)
+    bars = axes.barh([e.name.replace("^2", "²") for e in effects], changes, color=BLUE, height=0.7)
     texts = [
         f"{significant(change)} %"
         + ("" if e.level is None else f",  {decibel(e.level, signed=True)} dB SL")

@@ -201,15 +201,17 @@ def effort_table(
 ) -> list[Part]:
     """Seconds by phase, size and memory of each body, and of the whole."""
     rows = [
-        [label(name), effort.dofs, effort.reduced_dofs, effort.estimate, effort.energy_imbalance,
-         percent(effort.radiated), effort.solver,
+        [label(name), effort.dofs, effort.reduced_dofs or None, effort.estimate or None,
+         effort.energy_imbalance or None,
+         percent(effort.radiated) if effort.radiated else None, effort.solver,
          ", ".join(f"{phase} {seconds:.1f} s" for phase, seconds in effort.seconds.items()),
-         effort.peak_memory / 2**30]
+         effort.peak_memory / 2**30 or None]
         for name, effort in efforts.items()
     ]  # fmt: skip
     versions = next(iter(efforts.values())).versions if efforts else {}
     named = ", ".join(f"{name} {version}" for name, version in versions.items())
     peak = max((effort.peak_memory for effort in efforts.values()), default=0) / 2**30
     spent = sum(s for e in efforts.values() for s in e.seconds.values()) if total is None else total
-    took = f"{counted(tactons, 'Tacton')} took {spent:.0f} s in all"
-    return [Table(EFFORT, rows), f"{took}, at most {peak:.2f} GiB in a process. {named}"]
+    took = f"{counted(tactons, 'Tacton')} took {significant(spent, 2)} s in all"
+    took += f", at most {peak:.2f} GiB in a process" * bool(peak)
+    return [Table(EFFORT, rows), f"{took}. {named}"]

@@ -164,9 +164,9 @@ def axis_label(column: str) -> str:
         words = name.split(".", 1)[-1] if re.match(r"[a-z]+\.[a-z]", name) else name
         for end in UNITS:
             words = words.removesuffix(end) if words != end else words
-        words = words.replace("_kernel", " of the point kernel").replace("f_AM", "$f_{AM}$")
-        words = words.replace("f_d", "$f_d$").replace("_", " ") if "$" not in words else words
-        words = re.sub(r"(?<![_$])f_d", "$f_d$", words)
+        words = words.replace("_kernel", " of the point kernel")
+        words = re.sub(r"(?<![a-z])(\d*f)_(AM2?|[de])(?![A-Za-z])", r"$\1_{\2}$", words)
+        words = re.sub(r"_(?!\{)", " ", words)
     where = "" if probe is None else f" at probe {probe}"
     return ", ".join(filter(None, (f"{words}{where}", _unit(name))))
 

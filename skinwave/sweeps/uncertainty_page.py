@@ -2,6 +2,7 @@
 distributions.
 """
 
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,26 +19,26 @@ from skinwave.sweeps.ensemble import Ensemble, ensemble, propagate, rows_of
 from skinwave.sweeps.sampling import PERCENTILES, one_at_a_time, percentiles, sobol_indices, tornado
 from skinwave.sweeps.table_figures import axis_label, finished, value
 from skinwave.sweeps.uncertainty_figures import bands_figure, maps_figure, tornado_figure
-from skinwave.system.document import Part, Picture, Report, Section
+from skinwave.system.document import Details, Part, Picture, Report, Section
 from skinwave.system.table import Column, Table
 
 BANDS = (
-    "Bands of the samples at each time, and bars of each line: half of the samples within the dark "
-    "part, nine of ten within all of it. Bands are of one time or one line each: no single sample "
-    "follows their edge."
+    "Bands of the samples at each time, and bars of each line: the dark part holds half of the "
+    "samples, the whole nine of ten. Each time and each line has its own band, so no single sample "
+    "follows an edge."
 )
 MAPS = (
     "Percentiles of the RMS motion at each place, and how many samples have a place above the "
     "threshold of detection; dotted: the path of the focus."
 )
 ONE_AT_A_TIME = (
-    "One number at a time at the ends of the 90 % about its median, all others at their central "
-    "values: the widest bar is what is worth measuring first."
+    "One number at a time at its 5 % and 95 % quantiles, all others at their central values. The "
+    "widest bar shows which number to measure first."
 )
 INDICES = (
     "Sobol' indices with half widths of 95 % intervals. First order: the share of the variance "
-    "that goes if a number becomes known; total: what is left if all others do. If both sum to "
-    "more than their intervals allow, there are too few samples."
+    "that vanishes if this number is known. Total: the share that remains if all others are known. "
+    "If the first orders sum to more than 1 beyond their intervals, there are too few samples."
 )
 NAMED = 12  # lines of the table on a page
 AT = [Column("probe_x_mm", "x", "mm"), Column("probe_y_mm", "y", "mm")]
@@ -46,6 +47,7 @@ FREQUENCY = Column("frequency_hz", "frequency", "Hz")
 PERCENTILE_FILE, INDEX_FILE, PAGE = "percentiles.csv", "indices.csv", "uncertainty.html"
 SAMPLED_FILES = (PERCENTILE_FILE, INDEX_FILE, PAGE)
 SCALARS = ("rms_um", "level_db", "spread_6db_mm", "peak_um", "kernel_misfit", "kernel_rms_pa")
+SHARES = ("first_order", "first_order_95", "total", "total_95")
 ABOVE = "above_threshold_cm2"  # a column
 
 
@@ -79,7 +81,13 @@ def _ensemble_parts(found: Ensemble, rows: Sequence[Row]) -> Iterator[Part]:
     yield Picture(png(tornado_figure(named, keys)), ONE_AT_A_TIME, "tornado")
     every, (x, y) = row_percentiles(rows), found.scene.probes[p]
     here = [row for row in every.rows if row[1] is not None and row[2:4] == (1e3 * x, 1e3 * y)]
-    yield Table(every.columns, sorted(here, key=lambda row: -row[6])[:NAMED])
+    yield _in_words(Table(every.columns, sorted(here, key=lambda row: -row[6])[:NAMED]))
+
+
+def _in_words(table: Table) -> Table:
+    """A table whose first column names quantities, with their labels instead."""
+    rows = [(re.sub(r"[${}]", "", axis_label(name)), *row) for name, *row in table.rows]
+    return Table([Column("quantity"), *table.columns[1:]], rows)
 
 
 def sentences(found: Ensemble) -> list[str]:
@@ -114,14 +122,17 @@ def write_sampled(
     said = f"{len(done)} runs of {counted(len(spreads), 'uncertain number')}."
     said += f" {failed} failed and are left out." if failed else ""
     numbers = [(s.key, f"{significant(s.value)}: {s.distribution.words}") for s in spreads]
-    parts: list[Part] = [said, Table(["key", "distribution"], numbers)]
+    parts: list[Part] = [Table(["key", "distribution"], numbers)]
     table = row_percentiles(done)
+    motion = [row for row in table.rows if row[0].startswith("rms_")]
+    verdict = [said, *map(_of_motion, sorted(motion, key=lambda row: -row[6])[:1])]
     files = {PERCENTILE_FILE: table.to_csv()}
     if has_indices and not failed:
         indices = index_table(rows, [s.key for s in spreads])
         files[INDEX_FILE] = indices.to_csv()
-        parts += [INDICES, indices]
-    files[PAGE] = Report(f"Uncertainty of {out.name}", (), [*parts, table]).html().encode()
+        parts += [INDICES, _in_words(indices)]
+    parts.append(Details("Percentiles at every probe", [_in_words(table)]))
+    files[PAGE] = Report(f"Uncertainty of {out.name}", verdict, parts).html().encode()
     dataset.write_beside(out, files)
     return list(files)
 
@@ -137,8 +148,17 @@ def index_table(rows: Sequence[Row], keys: Sequence[str]) -> Table:
             one = sobol_indices(values, len(keys))
             columns = (one.first, one.first_error, one.total, one.total_error)
             found += [(name, key, *each, one.n) for key, *each in zip(keys, *columns, strict=True)]
-    header = ["column", "key", "first_order", "first_order_95", "total", "total_95", "samples"]
-    return Table(header, found, stored=4)
+    shares = [Column(name, name.replace("_", " ").replace("95", "±"), digits=2) for name in SHARES]
+    return Table(["column", "key", *shares, "samples"], found, stored=4)
+
+
+def _of_motion(row: Sequence[Any]) -> str:
+    """The 90 % of the motion at a probe, from a row of percentiles."""
+    name, _, x, y, low, _, median, _, high = row
+    return (
+        f"{axis_label(name)}, at ({x:g}, {y:g}) mm: median {significant(median)}, in nine of ten "
+        f"{interval(low, high, 3)}."
+    )
 
 
 def row_percentiles(rows: Sequence[Row]) -> Table:

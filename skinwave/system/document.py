@@ -17,7 +17,7 @@ from markupsafe import Markup
 
 from simple_model import Effort
 from skinwave.system.table import Table
-from skinwave.system.templates import part, render
+from skinwave.system.templates import part, render, typeset
 
 # What a page may load: pictures inside it and its own styles. No network, form or script but those
 # of a page within it, by their digests: it inherits this policy.
@@ -108,7 +108,9 @@ class Report:
 
     def html(self) -> str:
         """The page, complete with its policy."""
-        verdict = (Markup('<p class="verdict">{}</p>').format(said) for said in self.verdict)
+        verdict = (
+            Markup('<p class="verdict">{}</p>').format(typeset(said)) for said in self.verdict
+        )
         parts = (warnings_banner(self.efforts), *verdict, *self.parts)
         body = Markup("\n").join(map(_html, parts))
         return render("page.html", title=self.title, body=body, policy=_policy(body))
@@ -136,7 +138,7 @@ def _flat(parts: Iterable[Part]) -> Iterator[Part]:
 def _html(one: Part) -> Markup:
     if isinstance(one, Markup):
         return one
-    return Markup("<p>{}</p>").format(one) if isinstance(one, str) else one.html()
+    return Markup("<p>{}</p>").format(typeset(one)) if isinstance(one, str) else one.html()
 
 
 def contents(parts: Iterable[Part]) -> Markup:

@@ -4,7 +4,14 @@ import re
 from functools import cache
 from typing import Any
 
-from markupsafe import Markup
+from markupsafe import Markup, escape
+
+# Text of symbols, and how pages write it.
+_SYMBOLS = (
+    (r"\b(\d*[fc])_(AM2?|[deRps])\b", r"\1<sub>\2</sub>"),
+    (r"(?<=\d) x (?=\d)", " \u00d7 "),
+    (r"\^2\b", "²"),
+)
 
 
 def render(template: str, **values: object) -> str:
@@ -19,6 +26,16 @@ def part(name: str, *values: object) -> Markup:
     return made
 
 
+def typeset(text: str) -> Markup:
+    """Escape text and write its symbols with subscripts and signs; Markup is taken as it is."""
+    if isinstance(text, Markup):
+        return text
+    made = str(escape(text))
+    for symbol, written in _SYMBOLS:
+        made = re.sub(symbol, written, made)
+    return Markup(made)
+
+
 @cache
 def _templates() -> Any:
     import jinja2
@@ -28,4 +45,5 @@ def _templates() -> Any:
         lstrip_blocks=True, undefined=jinja2.StrictUndefined,
     )  # fmt: skip
     found.tests["a_number"] = lambda cell: re.sub("[,+.e-]", "", cell).isdigit()
+    found.filters["typeset"] = typeset
     return found

@@ -9,7 +9,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from skinwave.system.document import Details, Report, Section
+from skinwave.system.document import Details, Report
 from skinwave.system.effort import Progress, versions
 from skinwave.system.table import Table
 from skinwave.verify import elements, exact, extremes, nonlinear, plates, statics, stepping, waves
@@ -29,9 +29,9 @@ SCOPE = (
     "Verification asks whether the equations are solved right. Most references are closed forms, "
     "series or integrals from the literature, computed without this program's solvers. Other cases "
     "compare two of its models, or one model with its own limits or in other units. Whether these "
-    "are the right equations for a hand is another question: see `skinwave verify --published`. "
+    "are the right equations for a hand is another question: see skinwave verify --published. "
     "Errors are relative unless they are called absolute. A case passes if each of its errors is "
-    "within its tolerance; the first table shows the check nearest to its tolerance."
+    "within its tolerance; the table shows the check nearest to its tolerance."
 )
 VALUES = ("value", "reference", "error", "tolerance", "")
 
@@ -65,17 +65,17 @@ def page(results: list[Result], planned: int) -> Report:
     if left_out > 0:
         verdict.append(f"{left_out} slower cases are left out (skinwave verify without --quick).")
     used = ", ".join(f"{name} {version}" for name, version in versions().items())
-    verdict.append(f"{sum(r.seconds for r in results):.0f} s with {used}.")
+    spent = f"{sum(r.seconds for r in results):.0f} s with {used}."
     summary = Table(
         ["case", "check nearest to the tolerance", *VALUES, "s"],
         [[r.case.title, *_row(r.worst), r.seconds] for r in results],
     )
     topics = [
-        Section(topic, [_shown(r) for r in results if r.case in cases])
+        Details(topic, [_shown(r) for r in results if r.case in cases])
         for topic, cases in TOPICS.items()
         if any(r.case in cases for r in results)
     ]
-    return Report("Verification", [" ".join(verdict)], [SCOPE, summary, *topics])
+    return Report("Verification", [" ".join(verdict)], [summary, *topics, SCOPE, spent])
 
 
 def summary(results: list[Result]) -> str:

@@ -95,7 +95,7 @@ def test_a_new_kind_runs(disc, capsys):
 def test_a_new_kind_is_compared_and_swept_in_other_processes(disc):
     assert main(["compare", "disc.toml", *MESH, "--out", "compared"]) == 0
     assert {row["body"] for row in table("compared/lines.csv")} == {"none", "silicone-cylinder"}
-    assert "Cylinder of 80 x 20 mm" in Path("compared/index.html").read_text()
+    assert "Cylinder of 80 \u00d7 20 mm" in Path("compared/index.html").read_text()
     vary = ["--vary", "tacton.am_frequency_hz=80,120", "--model", "fem", "--out", "swept"]
     assert main(["sweep", "disc.toml", *vary, "--workers", "2", *MESH, "--json"]) == 0
 

@@ -197,7 +197,7 @@ def test_only_html_made_here_is_taken_as_it_is():
         Details("<t>", ["<p>"]).html(), Table(["<t>"], [["<p>"]]).html(),
         Picture(b"", "<p>\"'", '<t>"').html(), document.inner_page("<p>", "<t>"),
         document.preformatted("<p><t>"),
-        document.warnings_banner([("<t>", Effort(warnings=("<p>",)))]),
+        document.warnings_banner([("<t>", Effort(warnings=("<p>",))), ("", Effort())]),
     ):  # fmt: skip
         assert not re.search(r"<[pt]>[^<]*(?!</p>)<[pt]>|<t>|<p>\"", made)
         assert "&lt;p&gt;" in made
