@@ -39,7 +39,6 @@ NONE = "No line rises above the noise floor."
 EXPLAINED = (
     "The false alarm is the probability that noise alone has any line as high in the whole file. "
     "The standard error of a frequency is the Cramér-Rao bound in the noise beside it, for a "
-    "The standard error of a frequency is the Cramér-Rao bound in the noise beside it, for a "
     "steady motion. The origin of a line is mains at 50 or 60 Hz and their multiples, and drive if "
     "the recorded drive has it."
 )

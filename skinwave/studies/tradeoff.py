@@ -192,7 +192,9 @@ def write(folder: Path, scene: Scene, found: Study) -> None:
     )  # fmt: skip
     picture = Picture(png(_figure(found), dpi=130), CAPTION, "tradeoff")
     title = f"Speed against accuracy: {scene.name}"
-    Report(title, [" ".join(sentences(found))], [picture, table]).write(folder)
+    said = sentences(found)
+    verdict = [" ".join(said[-len(BARS) :]), " ".join(said[: -len(BARS)])]
+    Report(title, verdict, [picture, table]).write(folder)
 
 
 def sentences(found: Study) -> list[str]:
