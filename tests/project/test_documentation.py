@@ -37,6 +37,17 @@ def test_what_pages_link_to_is_there():
     assert [link for link in links if not link.exists()] == []
 
 
+def test_files_that_pages_name_exist():
+    top = "fem|simple_model|meshes|skinwave|bench|tests|examples"
+    named = {
+        file
+        for page in (*PAGES, ROOT / "CONTRIBUTING.md")
+        for file in re.findall(rf"`((?:{top})/[\w/.-]+\.\w+)`", page.read_text("utf-8"))
+    }
+    assert len(named) > 30
+    assert [file for file in sorted(named) if not (ROOT / file).exists()] == []
+
+
 def test_pictures_of_the_gallery_are_of_scripts_that_there_are():
     """The site's build draws them: the repository holds none."""
     named = {
