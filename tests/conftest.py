@@ -3,7 +3,6 @@
 import os
 from concurrent.futures import Future
 from contextlib import contextmanager
-from itertools import groupby
 
 if "PYTEST_XDIST_WORKER" in os.environ:  # before anything that reads it: a core each
     os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -12,6 +11,7 @@ import pytest
 from corpus import SMALL
 from hypothesis import HealthCheck, settings
 from in_browser import chromium
+from shares import dealt
 
 import meshes
 from skinwave.verify import elements
@@ -32,21 +32,6 @@ def pytest_collection_modifyitems(config, items):
     workers = getattr(config, "workerinput", {}).get("workercount", 1)
     if workers > 1:
         items[:] = dealt(items, workers)
-
-
-def dealt(items, workers):
-    """Tests in consecutive shares, as pytest-xdist cuts them."""
-    slow = {item.path for item in items if item.get_closest_marker("slow")}
-    modules = [list(own) for _, own in groupby(items, key=lambda item: item.path)]
-    heavy = [own for own in modules if own[0].path in slow]
-    rest = [item for own in modules if own[0].path not in slow for item in own]
-    shares = [[item for own in heavy[k::workers] for item in own] for k in range(workers)]
-    for k, share in enumerate(shares):
-        left = sum(map(len, shares[k:])) + len(rest)
-        lacks = max(0, left // (workers - k) - len(share))
-        share += rest[:lacks]
-        del rest[:lacks]
-    return [item for share in (*shares, rest) for item in share]
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -22,6 +22,7 @@ ABSENT = -120.0  # dB
 MUCH_LOWER = -20.0  # dB: a tenth
 NOTHING = -300.0  # dB
 ON_BIN = 1.0  # Hz: one bin of a spectrum of 1 s
+NO_PEAK = "a line at 1, 2 or 3 f_d has no spectral peak next to it"
 REACH = 6.0  # Hz from a line within which its spectral peak is looked for
 
 
@@ -156,12 +157,14 @@ def _drawn_lines(runs: Sequence[NamedLines]) -> Assessment:
         for n in (1, 2, 3)
     )
     sentence = f"the peaks next to 1, 2 and 3 f_d are at most {offset:.2f} Hz away from them"
-    return offset <= ON_BIN, offset, ON_BIN, sentence
+    return offset <= ON_BIN, offset, ON_BIN, sentence if np.isfinite(offset) else NO_PEAK
 
 
 def _same_places(runs: Sequence[NamedLines]) -> Assessment:
     names = ("f_d", "2f_d", "3f_d")
     places = np.array([[_peak(run, name) for name in names] for run in runs])
+    if not np.isfinite(places).all():
+        return False, np.inf, ON_BIN, NO_PEAK
     drift = float(np.ptp(places, axis=0).max())
     first = 20 * np.log10([run.lines["f_d"].max() for run in runs])
     sentence = (

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from conftest import dealt
+from shares import dealt
 
 
 @dataclass(frozen=True)
