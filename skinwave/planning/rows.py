@@ -275,8 +275,8 @@ def of_stretching(scene: Scene, response: Response, tolerance: float) -> tuple[s
 def response_warnings(
     scene: Scene, response: Response, predicted: float, tolerance: float
 ) -> tuple[str, ...]:
-    """Warnings that every response has beside those of its plan, whatever computed it: of the
-    relative error that was `predicted`, of stretching, of its sampling, and of the scene.
+    """Warnings of any response in addition to those of its plan. `predicted` is the relative error
+    that the plan or the mesh gave.
     """
     return (
         *beyond_prediction(scene, response, predicted, tolerance),
