@@ -1,6 +1,5 @@
 """Kinds of body and models are records in registries: a file from outside adds one."""
 
-import csv
 import json
 import os
 import subprocess
@@ -11,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import read_results
 
 import skinwave
 from skinwave import models
@@ -57,11 +57,6 @@ def disc(tmp_path, monkeypatch):
     return loads(SCENE)
 
 
-def table(path):
-    with Path(path).open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
-
-
 def test_a_scene_of_a_new_kind_is_read_and_written(disc):
     assert disc.body == BODIES["silicone-cylinder"]
     assert disc.body.width == 0.08
@@ -85,7 +80,7 @@ def test_a_soft_cylinder_deflects_as_its_slab_in_the_middle(disc):
 
 def test_a_new_kind_runs(disc, capsys):
     assert main(["run", "disc.toml", "--model", "fem", *MESH, "--out", "out"]) == 0
-    rows = table("out/lines.csv")
+    rows = read_results.rows("out/lines.csv")
     assert {row["body"] for row in rows} == {"silicone-cylinder"}
     assert main(["plan", "disc.toml", "--tolerance", "0.5", "--element-size", "8"]) == 0
     assert "flat-body takes a slab or a sheet, not a cylinder" in capsys.readouterr().out
@@ -94,7 +89,10 @@ def test_a_new_kind_runs(disc, capsys):
 @pytest.mark.slow
 def test_a_new_kind_is_compared_and_swept_in_other_processes(disc):
     assert main(["compare", "disc.toml", *MESH, "--out", "compared"]) == 0
-    assert {row["body"] for row in table("compared/lines.csv")} == {"none", "silicone-cylinder"}
+    assert {row["body"] for row in read_results.rows("compared/lines.csv")} == {
+        "none",
+        "silicone-cylinder",
+    }
     assert "Cylinder of 80 \u00d7 20 mm" in Path("compared/index.html").read_text()
     vary = ["--vary", "tacton.am_frequency_hz=80,120", "--model", "fem", "--out", "swept"]
     assert main(["sweep", "disc.toml", *vary, "--workers", "2", *MESH, "--json"]) == 0
@@ -112,7 +110,7 @@ def test_a_new_model_runs(disc, capsys, static_deflection):
     assert np.isnan(found.expected_error)
     words = ["run", "disc.toml", "--model", "static-deflection", "--out", "out", "--quiet"]
     assert main(words) == 0
-    assert {row["model"] for row in table("out/lines.csv")} == {"static-deflection"}
+    assert {row["model"] for row in read_results.rows("out/lines.csv")} == {"static-deflection"}
     assert said in capsys.readouterr().err
     assert said in Path("out/index.html").read_text()
     assert main(["plan", "disc.toml", "--model", "static-deflection"]) == 0

@@ -1,6 +1,5 @@
 """The command line as its users meet it: results, refusals, interruption."""
 
-import csv
 import json
 import os
 import re
@@ -11,6 +10,7 @@ from itertools import count
 
 import numpy as np
 import pytest
+import read_results
 from corpus import GOOD, SMALL
 
 from skinwave.commands.cli import main
@@ -20,16 +20,14 @@ from skinwave.system.progress_bar import follower
 CLAMPED = SMALL.replace("[body]", '[body]\nthickness_mm = 8\nsides = "clamped"')
 
 
-def table(path):
-    return list(csv.DictReader(path.read_text().splitlines()))
-
-
 def test_run_leaves_a_folder_that_reproduces_it(scene, capsys):
     fem = ["--model", "fem", "--element-size", "6"]
     assert main(["run", str(scene), "--out", "first", *fem, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["model"] == "fem"
     assert main(["run", "first/scene.toml", "--out", "second", *fem, "--quiet"]) == 0
-    first, second = (np.load(f"{folder}/responses.npz") for folder in ("first", "second"))
+    first, second = (
+        read_results.arrays(f"{folder}/responses.npz") for folder in ("first", "second")
+    )
     assert first["displacement"].shape == (500, 2)
     np.testing.assert_array_equal(first["fem"], first["displacement"])
     np.testing.assert_allclose(first["displacement"], second["displacement"], rtol=1e-9)
@@ -54,7 +52,7 @@ def test_run_with_each_model(scene, model):
         "--quiet",
     ]
     assert main(arguments) == 0
-    rows = table(scene.parent / "short-out/lines.csv")
+    rows = read_results.rows(scene.parent / "short-out/lines.csv")
     assert {row["model"] for row in rows} == {model}
     empty, filled = ("displacement_um", "pressure_pa")[:: 1 if model == "point-kernel" else -1]
     assert all(row[empty] == "" and float(row[filled]) >= 0 for row in rows)
@@ -68,7 +66,7 @@ def test_compare_a_scene_of_ones_own(scene, capsys):
     assert main(["compare", str(scene), "--element-size", "6", "--out", "both"]) == 0
     assert "3 of 3 runs" in capsys.readouterr().out
     folder = scene.parent / "both"
-    rows = table(folder / "lines.csv")
+    rows = read_results.rows(folder / "lines.csv")
     assert ",".join(rows[0]) == (
         "tacton,body,model,probe_x_mm,probe_y_mm,line,frequency_hz,"
         "displacement_um,velocity_mm_s,pressure_pa"
@@ -79,7 +77,7 @@ def test_compare_a_scene_of_ones_own(scene, capsys):
     row = next(r for r in rows if r["body"] == "slab" and r["line"] == "f_AM")
     velocity = 2 * np.pi * 200 * float(row["displacement_um"]) / 1e3
     assert float(row["velocity_mm_s"]) == pytest.approx(velocity, rel=1e-4)
-    claims = table(folder / "claims.csv")
+    claims = read_results.rows(folder / "claims.csv")
     assert list(claims[0]) == ["claim", "body", "model", "holds", "value", "bar", "sentence"]
     assert (folder / "short/slab/scene.toml").exists()
     assert (folder / "short/point-kernel/responses.npz").exists()

@@ -15,6 +15,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import read_results
 from in_browser import needs_browser, settled
 from legible import illegible, sizes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -212,7 +213,7 @@ def test_a_sound_has_the_scale_in_its_name(seen, page):
     with wave.open(str(path)) as sound:
         assert sound.getframerate() == 10_000
         samples = np.frombuffer(sound.readframes(sound.getnframes()), np.int16)
-    motion = np.load(page / "data/skin-slab_probes.npz")["displacement"]
+    motion = read_results.arrays(page / "data/skin-slab_probes.npz")["displacement"]
     probe = np.abs(motion - motion.mean(axis=0)).max(axis=0).argmax()
     expected = 1e6 * (motion[:, probe] - motion[:, probe].mean())
     np.testing.assert_allclose(samples / exports.FULL_SCALE * scale, expected, atol=1e-3 * scale)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import read_results
 
 from simple_model import MovingPressure, Tacton, Trajectory, phasors
 from simple_model.load.spectrum import load_lines
@@ -86,7 +87,7 @@ def test_the_command_writes_a_page_and_tables(tmp_path, monkeypatch, capsys):
     said = capsys.readouterr().out
     assert "velocity into the body at a depth of 0.7 mm is largest at" in said
     table = np.genfromtxt("layer-map/map.csv", delimiter=",", names=True)
-    kept = np.load("layer-map/map.npz")
+    kept = read_results.arrays("layer-map/map.npz")
     np.testing.assert_allclose(table["rms_velocity_mm_s"], 1e3 * kept["rms"].ravel(), rtol=1e-6)
     assert {"index.html", "map.png", "record.json", "scene.toml"} <= {
         path.name for path in (tmp_path / "layer-map").iterdir()

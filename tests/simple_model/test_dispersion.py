@@ -5,6 +5,7 @@ from math import inf, pi
 
 import numpy as np
 import pytest
+import read_results
 
 from simple_model import Material, Stack
 from simple_model.layers.compliance import half_space, layered, slab, thin_sheet
@@ -268,7 +269,7 @@ def test_command_writes_a_page_a_table_and_arrays(tmp_path, capsys):
     assert header.split(",")[:4] == ["mode", "kind", "frequency_hz", "re_k_rad_per_m"]
     assert first.split(",")[2] == "10"
     assert "<table" in (out / "index.html").read_text()
-    arrays = np.load(out / "dispersion.npz")
+    arrays = read_results.arrays(out / "dispersion.npz")
     assert arrays["wavenumber_per_m"].shape == (3, len(arrays["frequency_hz"]))
     assert arrays["frequency_hz"].max() == 300
 

@@ -1,11 +1,11 @@
 """The published model's assumptions, dropped one by one."""
 
-import csv
 import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import read_results
 
 import fem
 import skinwave
@@ -213,7 +213,7 @@ def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, caps
     coarse = "elements of 9 mm are wider than twice the standard deviation of the focal spot"
     assert coarse in capsys.readouterr().err
     out = tmp_path / "scene-relaxed"
-    effects = {row["assumption"]: row for row in rows_of(out / "effects.csv")}
+    effects = {row["assumption"]: row for row in read_results.rows(out / "effects.csv")}
     sizes = [float(row["waveform_percent"]) for row in effects.values()]
     assert sizes == sorted(sizes, reverse=True)
     assert set(effects) == {
@@ -229,17 +229,12 @@ def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, caps
     # has no profile of its own.
     told = {name for name, row in effects.items() if row["alone_percent"]}
     assert told == set(effects) - {"viscous loss", "laterally-infinite", "sinc^2 profile"}
-    assert all(float(row["seconds"]) > 0 for row in rows_of(out / "steps.csv"))
+    assert all(float(row["seconds"]) > 0 for row in read_results.rows(out / "steps.csv"))
     with np.load(tmp_path / "scene-relaxed/responses.npz") as kept:
         assert {"t", "probes", "as published", "laterally-infinite"} <= set(kept.files)
     # In so short a Tacton 2 f_AM is not resolved from 3 f_d - 2 f_AM.
-    assert {row["line"] for row in rows_of(out / "relax.csv")} >= {"f_AM", "2f_d", "f_d"}
+    assert {row["line"] for row in read_results.rows(out / "relax.csv")} >= {"f_AM", "2f_d", "f_d"}
     assert coarse in (out / "index.html").read_text()
-
-
-def rows_of(path):
-    with open(path, newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def test_what_follows_a_failed_rung_is_not_told_as_one_assumption():

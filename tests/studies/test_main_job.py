@@ -7,6 +7,7 @@ from io import StringIO
 
 import numpy as np
 import pytest
+import read_results
 from in_browser import needs_browser
 
 from skinwave.commands.cli import main
@@ -44,7 +45,7 @@ def test_all_runs_are_there(job):
     assert summary["runs"] == summary["planned"] == 4 * len(CHOSEN)
     assert len(list(folder.glob("*/*/scene.toml"))) == 4 * len(CHOSEN)
     assert len(list((folder / "pictures").glob("*.png"))) == FIGURES
-    responses = np.load(folder / "responses.npz")
+    responses = read_results.arrays(folder / "responses.npz")
     assert responses["am140/skin-slab/flat-body"].shape == (10_000, 5)
     assert responses["am140/paper-sheet/plate-modes-nonlinear"].shape == (10_000, 5)
 
@@ -92,7 +93,7 @@ def test_second_harmonic_is_the_loads_times_the_bodys(job):
 
 
 def test_waves_spread_further_than_the_point_kernel(job):
-    responses = np.load(job[0] / "responses.npz")
+    responses = read_results.arrays(job[0] / "responses.npz")
 
     def level(body, model):
         motion = responses[f"am140/{body}/{model}"][2500:].std(axis=0)

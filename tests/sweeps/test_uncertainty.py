@@ -1,6 +1,5 @@
 """Uncertain numbers of a scene: bands by closed forms, error budgets, pages and tables."""
 
-import csv
 from argparse import Namespace
 from dataclasses import replace
 from math import isnan, log, sinh, sqrt
@@ -8,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import read_results
 from scipy import stats
 
 from simple_model import Trajectory
@@ -277,11 +277,6 @@ def test_a_finer_mesh_than_a_tenth_of_the_material_gains_nothing():
 # Pages and tables
 
 
-def table(path):
-    with Path(path).open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
-
-
 def test_a_sweep_by_distributions_has_percentiles_and_indices(tmp_path, monkeypatch):
     """The kernel's RMS is in proportion to the pressure, and the same at all whole frequencies."""
     monkeypatch.chdir(tmp_path)
@@ -290,7 +285,9 @@ def test_a_sweep_by_distributions_has_percentiles_and_indices(tmp_path, monkeypa
     words = ["sweep", "kernel.toml", "--design", "sobol", "--samples", "8", "--quiet"]
     words += ["--vary", *vary, "--scheduler", "threads", "--out", "swept"]
     assert main(words) == 0
-    found = [row for row in table("swept/indices.csv") if row["column"] == "kernel_rms_pa"]
+    found = [
+        row for row in read_results.rows("swept/indices.csv") if row["column"] == "kernel_rms_pa"
+    ]
     rows = {row["key"]: float(row["total"]) for row in found}
     met = combinations([parse(text) for text in vary], "sobol", 8)
     pressures = np.array([run["focus.peak_pressure_pa"] for run in met])
@@ -307,10 +304,10 @@ def test_a_run_with_samples_writes_bands(tmp_path, monkeypatch, capsys):
     Path("slab.toml").write_text(SLAB)
     words = ["run", "slab.toml", "--model", "flat-body-harmonic", "--out", "out", "--quiet"]
     assert main([*words, "--samples", "16"]) == 0
-    rms = [row for row in table("out/percentiles.csv") if row["column"] == "rms_um"]
+    rms = [row for row in read_results.rows("out/percentiles.csv") if row["column"] == "rms_um"]
     assert len(rms) == 2
     assert float(rms[0]["p5"]) < float(rms[0]["p50"]) < float(rms[0]["p95"])
-    found = table("out/samples.csv")
+    found = read_results.rows("out/samples.csv")
     ratios = [float(r["rms_um[0]"]) / float(r[PRESSURE]) for r in found]
     assert len(found) == 16
     assert max(ratios) == pytest.approx(min(ratios), rel=1e-6)
