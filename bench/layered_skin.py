@@ -13,9 +13,9 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from simple_model import Material
-from simple_model.typing import Floats
 from skinwave.bodies import BODIES, Body
 from skinwave.bodies.parts import solid_of
+from skinwave.typing import Floats
 from skinwave.verify.predictions import Curves, decay_exponents, leading_wave
 from skinwave.verify.published import EXPONENT, WAVES, Published
 

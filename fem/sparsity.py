@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from fem.typing import Bools, Floats, Ints
+from fem.typing import Array, Bools, Floats, Index, Ints
 from meshes import MeshError
 
-Index = NDArray[np.int32]
 SLAB = 256  # elements at a time: their temporaries stay near the processor
 UPPER = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]  # components on and above the diagonal
 
@@ -122,7 +121,7 @@ def selected(A: Any, rows: Ints, columns: Ints) -> Any:
     return type(A)((A.data[kept], places[kept], indptr), shape=tuple(size))
 
 
-def upper_triangle(A: sparse.csr_array) -> tuple[NDArray[Any], Index, Index]:
+def upper_triangle(A: sparse.csr_array) -> tuple[Array, Index, Index]:
     """Values, float64 or complex128, columns and starts of rows of the upper triangle of a matrix
     with sorted indices.
     """

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from meshes.tetmesh import Floats, Ints, TetMesh, boundary_facets
+from meshes.tetmesh import TetMesh, boundary_facets
+from meshes.typing import Floats, Ints
 
 Predicate = Callable[[Floats, Floats], np.ndarray]
 

@@ -11,7 +11,8 @@ from contextlib import contextmanager
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
+
+from meshes.typing import Array
 
 LARGEST_TEXT = 16_000_000  # bytes
 UNPACKED, GROWTH = 500_000_000, 8  # bytes that an archive may unpack to, or times its own size
@@ -82,7 +83,7 @@ def exported_text(path: PathLike, limit: int = LARGEST_TEXT) -> str:
     raise ValueError(f"{path}: no text; export it as text in UTF-8, or name it by its format")
 
 
-def arrays(path: PathLike) -> dict[str, NDArray[Any]]:
+def arrays(path: PathLike) -> dict[str, Array]:
     """Return the arrays of an .npz file, by name; a ValueError if it is none, or unpacks to more
     than `UNPACKED` bytes and `GROWTH` times its size.
     """

@@ -14,13 +14,13 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from meshes.typing import Bools, Floats, Ints
 
 if TYPE_CHECKING:
     import pyvista as pv
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int_]
 
 log = logging.getLogger(__name__)
 
@@ -209,7 +209,7 @@ def half(mesh: TetMesh, axis: str) -> TetMesh:
     return replace(kept, facets={**kept.facets, f"mirror_{axis}": cut})
 
 
-def part(mesh: TetMesh, inside: NDArray[np.bool_]) -> tuple[TetMesh, Ints]:
+def part(mesh: TetMesh, inside: Bools) -> tuple[TetMesh, Ints]:
     """The tetrahedra (m,) that are inside, with their share of the facet sets, and the numbers (k,)
     that their nodes had.
     """

@@ -20,7 +20,7 @@ from simple_model.response import (
     resolution,
     unmixed,
 )
-from simple_model.typing import Floats, Mask
+from simple_model.typing import Bools, Floats
 from simple_model.windows import cosines
 
 FITTED = 1e-4  # of the strongest line of the load: weaker ones are not fitted
@@ -137,7 +137,7 @@ def resolved_lines(
     return _named(found, known), _named(found, lost)
 
 
-def _named(found: LineNames, kept: Mask) -> dict[str, float]:
+def _named(found: LineNames, kept: Bools) -> dict[str, float]:
     return {found.names[k]: float(found.frequencies[k]) for k in np.flatnonzero(kept)}
 
 
@@ -152,8 +152,8 @@ class _Fit:
     the unresolved; their amplitudes (f, p), and the rest (t, p) of the response.
     """
 
-    resolved: Mask
-    fitted: Mask
+    resolved: Bools
+    fitted: Bools
     amplitudes: Floats
     rest: Floats
 
@@ -281,6 +281,6 @@ def _mixed(response: Response, frequencies: Floats) -> list[Unnamed]:
     ]  # fmt: skip
 
 
-def _near(f: Floats, others: Floats, least: float) -> Mask:
+def _near(f: Floats, others: Floats, least: float) -> Bools:
     """Whether each of the frequencies (f,) is within a resolution of any of the others (k,)."""
     return np.asarray((np.abs(f[:, None] - others) < least).any(axis=1))

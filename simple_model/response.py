@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from simple_model import drawing
 from simple_model.load.line_names import line_names
@@ -17,7 +17,7 @@ from simple_model.load.sampling import step
 from simple_model.numbers import counted, significant, stated_error
 from simple_model.quantities import DISPLACEMENT, PRESSURE, NotOfThis, Quantity, quantity
 from simple_model.spectra import Lines, Spectrum
-from simple_model.typing import Complex, Floats, Mask
+from simple_model.typing import Bools, Complex, Floats, Ints
 from simple_model.windows import cosines, kaiser
 
 if TYPE_CHECKING:
@@ -288,8 +288,8 @@ def are_resolved(
     *,
     settle: float = SETTLE,
     strengths: ArrayLike | None = None,
-) -> Mask:
-    """Mask of frequencies that `lines` resolves from 0 Hz and from the others.
+) -> Bools:
+    """Bools of frequencies that `lines` resolves from 0 Hz and from the others.
 
     Frequencies that differ by at most `ALIKE` of the resolution are one line. Other lines that are
     nearer than the resolution, and leakage of unresolved lines, may have 5 % of its strength.
@@ -316,8 +316,8 @@ def are_resolved(
         told = clear
 
 
-def unmixed(frequencies: Floats, strengths: Floats, least: float) -> Mask:
-    """Mask (f,) of lines at frequencies in Hz of which neither lines nearer than `least` Hz, nor
+def unmixed(frequencies: Floats, strengths: Floats, least: float) -> Bools:
+    """Bools (f,) of lines at frequencies in Hz of which neither lines nearer than `least` Hz, nor
     the mean, have 5 %, by strengths (f,) of any unit.
     """
     away = np.abs(frequencies[:, None] - frequencies)
@@ -331,11 +331,11 @@ def hidden(
     frequencies: Floats,
     strengths: Floats,
     rest: Floats,
-    fitted: Mask,
+    fitted: Bools,
     *,
     settle: float = SETTLE,
-) -> Mask:
-    """Mask (f,) of lines of which more than 5 % (or 5 % of `FAINT` of the strongest) may be side
+) -> Bools:
+    """Bools (f,) of lines of which more than 5 % (or 5 % of `FAINT` of the strongest) may be side
     lobes of lines that are not fitted, of amplitudes `rest` (f,).
     """
     least = resolution(response, settle=settle)
@@ -368,7 +368,7 @@ def fit_lines(
 
 def line_rows(
     times: Floats, frequencies: ArrayLike, *, settle: float = SETTLE
-) -> tuple[Floats, Floats, NDArray[np.intp]]:
+) -> tuple[Floats, Floats, Ints]:
     """Rows of the least squares of `fit_lines`, from which the errors of lines follow.
 
     Returns
@@ -384,7 +384,7 @@ def line_rows(
 
 def _weighted_waves(
     times: Floats, frequencies: ArrayLike, settle: float
-) -> tuple[Floats, Floats, Floats, NDArray[np.intp]]:
+) -> tuple[Floats, Floats, Floats, Ints]:
     """Waves (m, t), the same under the window (m, k) at the last k samples, which are fitted, the
     inverse (m, m) of their products, and the index (f,) of each line's wave.
     """

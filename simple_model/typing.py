@@ -1,9 +1,13 @@
-"""Types that modules share."""
+"""Types of arrays."""
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+Array = NDArray[Any]
+Bools = NDArray[np.bool_]
 Complex = NDArray[np.complex128]
-Mask = NDArray[np.bool_]
-Points = tuple[tuple[float, float], ...]
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int_]
+Points = tuple[tuple[float, float], ...]  # metre

@@ -4,12 +4,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from meshes.tetmesh import Floats
 from simple_model import Response
 from skinwave.models import Limit, Model, register
 from skinwave.models.limits import of_body, plain_only
 from skinwave.models.options import SolveOptions
 from skinwave.scene.scene import Body, Scene
+from skinwave.typing import Floats
 
 
 def per_pressure(body: Body) -> float:

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from meshes.reading import exported_text
-from meshes.tetmesh import Floats, MeshError
+from meshes.tetmesh import MeshError
+from meshes.typing import Floats
 
 SOLIDS = {
     4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10", 15: "wedge15",

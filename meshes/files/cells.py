@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from meshes.surface.repair import first_of_same
-from meshes.tetmesh import EDGES, FACES, Floats, Ints, MeshError, corner_volumes, facet_keys
+from meshes.tetmesh import EDGES, FACES, MeshError, corner_volumes, facet_keys
+from meshes.typing import Floats, Ints
 
 FACETS, REGION, NAMED = "facets:", "region ", "region:"
 # Cell arrays that number regions: of this package, of others, and of meshio's readers.

@@ -18,7 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from meshes.tetmesh import Floats, MeshError
+from meshes.tetmesh import MeshError
+from meshes.typing import Floats
 
 LevelSet = tuple[Floats, Floats]  # values (n,) and gradients (n, 3)
 PADS = (-0.33, -0.11, 0.11, 0.33)  # of the breadth: where the fingers begin

@@ -7,7 +7,8 @@ import numpy as np
 from meshes.facets import Predicate, heights_over
 from meshes.surface.repair import repaired
 from meshes.surface.triangulation import Surface, compact, n_pieces, pieces
-from meshes.tetmesh import Floats, MeshError
+from meshes.tetmesh import MeshError
+from meshes.typing import Floats
 
 # The rows are the new x, y and z. Each is a turn about one axis.
 TURNS = {

@@ -18,7 +18,8 @@ from meshes.surface.triangulation import (
     pieces,
     volume,
 )
-from meshes.tetmesh import Floats, Ints, MeshError
+from meshes.tetmesh import MeshError
+from meshes.typing import Floats, Ints
 
 MOST_OFF_PLANE = 0.1  # of its width: how far the edge of a hole that is capped may leave a plane
 SAME_POINT = 1e-6  # of the diagonal: points nearer than this are one

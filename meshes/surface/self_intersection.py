@@ -7,7 +7,7 @@ Candidates are triangles whose bounding boxes share a cell of a grid.
 import numpy as np
 
 from meshes.surface.triangulation import Surface
-from meshes.tetmesh import Floats, Ints
+from meshes.typing import Floats, Ints
 
 ROUND_OFF = 1e-9  # of the size of both triangles: nearer to a plane is on it
 MOST_CELLS = 400_000  # of the grid that one triangle may be listed in before cells grow

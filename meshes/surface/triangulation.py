@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from meshes.tetmesh import FURTHEST, Floats, Ints, MeshError
+from meshes.tetmesh import FURTHEST, MeshError
+from meshes.typing import Floats, Ints
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

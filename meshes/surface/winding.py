@@ -7,7 +7,8 @@ import numpy as np
 from meshes.surface.repair import check, in_mm
 from meshes.surface.self_intersection import self_intersections
 from meshes.surface.triangulation import Surface
-from meshes.tetmesh import Floats, MeshError
+from meshes.tetmesh import MeshError
+from meshes.typing import Floats
 
 CHUNK = 2_000_000  # pairs of points and triangles at once
 

@@ -14,7 +14,8 @@ import numpy as np
 
 from meshes.facets import geometry
 from meshes.shapes.structured import check_size, extruded, round_up
-from meshes.tetmesh import EDGES, Floats, Ints, MeshError, TetMesh, boundary_facets, quadratic
+from meshes.tetmesh import EDGES, MeshError, TetMesh, boundary_facets, quadratic
+from meshes.typing import Floats, Ints
 from meshes.volume.curving import LEAST_RATIO, keep_jacobians
 from meshes.volume.quality import jacobian_ratios
 

@@ -13,12 +13,12 @@ from dataclasses import replace
 from itertools import combinations, permutations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from meshes.facets import seen_from_above, tag_boundary
 from meshes.shapes.palm import Palm, gradient, level_set, rise
 from meshes.shapes.structured import check_size
-from meshes.tetmesh import Floats, Ints, MeshError, TetMesh, corner_volumes, quadratic
+from meshes.tetmesh import MeshError, TetMesh, corner_volumes, quadratic
+from meshes.typing import Bools, Floats, Ints
 from meshes.volume.curving import curve_boundary
 from meshes.volume.quality import angles_between_faces
 from meshes.volume.tetrahedralise import SHARPEST
@@ -152,7 +152,7 @@ def along_normals(palm: Palm, points: Floats, normals: Floats) -> Floats:
     return points
 
 
-def _on_boundary(cells: tuple[int, ...]) -> NDArray[np.bool_]:
+def _on_boundary(cells: tuple[int, ...]) -> Bools:
     outer = np.ones([n + 1 for n in cells], bool)
     outer[1:-1, 1:-1, 1:-1] = False
     return outer

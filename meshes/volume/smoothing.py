@@ -10,7 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from meshes.tetmesh import Floats, Ints, TetMesh, boundary_facets, corner_volumes, interface_facets
+from meshes.tetmesh import TetMesh, boundary_facets, corner_volumes, interface_facets
+from meshes.typing import Floats, Ints
 from meshes.volume.quality import angles_between_faces, moved_back
 
 Sizing = Callable[[Floats], Floats]

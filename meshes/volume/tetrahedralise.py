@@ -23,7 +23,8 @@ from meshes.shapes.structured import Grading, extrude
 from meshes.surface.repair import check, repaired
 from meshes.surface.triangulation import Surface, area, n_pieces, thinnest, volume
 from meshes.surface.winding import joined, winding_number
-from meshes.tetmesh import Floats, MeshError, TetMesh, boundary_facets, corner_volumes
+from meshes.tetmesh import MeshError, TetMesh, boundary_facets, corner_volumes
+from meshes.typing import Floats
 from meshes.volume.quality import dihedral_angles
 from meshes.volume.smoothing import Sizing, smoothed
 

@@ -17,7 +17,7 @@ from simple_model.layers.half_space_below import modes_above_half_space, rayleig
 from simple_model.layers.mode_tracking import Found, between, merged, tracked
 from simple_model.layers.stack import Stack
 from simple_model.layers.thin_layers import eigenpairs, outgoing, pencil
-from simple_model.typing import Complex, Floats
+from simple_model.typing import Bools, Complex, Floats
 
 KINDS = ("propagating", "backward", "leaky", "evanescent")
 MOST = 6  # modes
@@ -70,7 +70,7 @@ class Mode:
             return np.asarray(1 / np.abs(self.wavenumbers.imag))
 
     @property
-    def is_wave(self) -> NDArray[np.bool_]:
+    def is_wave(self) -> Bools:
         """Whether it carries energy at each frequency (f,)."""
         return np.asarray((self.kinds != "evanescent") & (self.kinds != ""))
 
@@ -185,7 +185,7 @@ def _roots(stack: Stack, omega: Floats, most: int) -> tuple[Found, Floats]:
     return solve(stack, omega, moduli, slopes, most)
 
 
-def _is_evanescent(wavenumbers: Complex) -> NDArray[np.bool_]:
+def _is_evanescent(wavenumbers: Complex) -> Bools:
     return np.asarray(np.abs(wavenumbers.imag) > FASTEST_DECAY * np.abs(wavenumbers.real))
 
 

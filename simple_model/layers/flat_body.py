@@ -26,7 +26,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.fft import next_fast_len, rfft
 from scipy.special import erfc
 
@@ -42,7 +42,7 @@ from simple_model.load.pressure import MovingPressure, check_lines
 from simple_model.load.sampling import below_half_the_rate, finer, is_folded, reached, step
 from simple_model.load.spectrum import load_lines, synthesise
 from simple_model.response import Effort, Response
-from simple_model.typing import Complex, Floats
+from simple_model.typing import Complex, Floats, Ints
 
 PADDING = 2, 256  # the transform's samples for each of the record, and more: what wraps round is
 WRAPPED = 1e-5  # damped by this
@@ -119,8 +119,8 @@ class _Path:
     width: float
     distances: Floats
     frequencies: Floats
-    lines: NDArray[np.int_]
-    orders: NDArray[np.int_]
+    lines: Ints
+    orders: Ints
     coefficients: Complex
 
     def combined(self, g: Complex, harmonics: Complex) -> Complex:

@@ -3,9 +3,8 @@
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
-from simple_model.typing import Complex, Floats
+from simple_model.typing import Bools, Complex, Floats, Ints
 
 LONGEST_GAP = 3  # frequencies at which a mode is not found: about where it begins to leak
 UNLIKE = 0.3  # misfit of two roots that are not of one mode
@@ -13,7 +12,6 @@ SURE, RIVAL = 0.06, 0.15  # misfit of two roots that are surely of one; of other
 NARROW = 1.05  # ratio of two frequencies between which no mode is lost
 ROUND_OFF = 1e-9  # of a wavenumber: a smaller imaginary part of it is none
 SHAPE_WEIGHT = 0.1  # of unlike shapes in the misfit
-Ints = NDArray[np.int_]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,7 +87,7 @@ def tracked(found: Found, omega: Floats, most: int, kept: Ints) -> Found:
     return Found(**picked)
 
 
-def between(found: Found, omega: Floats, waves: NDArray[np.bool_], most: int) -> Floats:
+def between(found: Found, omega: Floats, waves: Bools, most: int) -> Floats:
     """Frequencies (g,) in rad/s in the middle of gaps across which modes are not surely followed;
     `waves` (f, m) says whether a root is a wave.
     """

@@ -15,11 +15,11 @@ from functools import cache, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import j1
 
 from simple_model.choices import check_range
-from simple_model.typing import Floats
+from simple_model.typing import Complex, Floats
 
 if TYPE_CHECKING:
     from scipy.interpolate import RegularGridInterpolator
@@ -68,7 +68,7 @@ class ContactSpot:
         return np.asarray(np.exp(-(offsets**2).sum(axis=-1) / (2 * self.width**2)))
 
 
-def array_field(points: ArrayLike, focus: ArrayLike) -> NDArray[np.complex128]:
+def array_field(points: ArrayLike, focus: ArrayLike) -> Complex:
     """Complex sound pressure amplitude (n,) in Pa at points (n, 3) for a focus (3,), metre.
 
     The array lies in the plane z = 0 with its centre at the origin and radiates upwards.

@@ -28,9 +28,7 @@ from simple_model.load.spectrum import (
     path_strengths,
 )
 from simple_model.load.tacton import Tacton, tones
-from simple_model.typing import Floats
-
-Orders = NDArray[np.int_]
+from simple_model.typing import Complex, Floats, Ints
 
 SYMBOLS = ("f_d", "f_AM", "f_AM2", "f_e", "f_s", "f_r")
 WEAKEST = 1e-3  # of the strongest line: -60 dB
@@ -148,8 +146,8 @@ def line_name(orders: Sequence[int], of_tacton: Floats) -> str:
     return said.removeprefix("+")
 
 
-def _orders(name: str) -> Orders:
-    """Orders (6,) of `SYMBOLS` in a name; raises a ValueError if it is no sum of them."""
+def _orders(name: str) -> Ints:
+    """Ints (6,) of `SYMBOLS` in a name; raises a ValueError if it is no sum of them."""
     found = np.zeros(len(SYMBOLS), int)
     terms = re.findall(r"([+-]?)(\d*)(f_[A-Za-z0-9]+)", name)
     if "".join(map("".join, terms)) != name or any(term[2] not in SYMBOLS for term in terms):
@@ -160,8 +158,8 @@ def _orders(name: str) -> Orders:
 
 
 @lru_cache(maxsize=16)  # several models take each load; of one with a rhythm up to some MB
-def _load_orders(pressure: MovingPressure, threshold: float) -> tuple[Orders, Floats]:
-    """Orders (f, 6) of the lines and their amplitudes on the path (f,) in Pa."""
+def _load_orders(pressure: MovingPressure, threshold: float) -> tuple[Ints, Floats]:
+    """Ints (f, 6) of the lines and their amplitudes on the path (f,) in Pa."""
     tacton = pressure.tacton
     path = unsampled(pressure)
     if once := is_cut_short(path):  # whose cells are of all of the load
@@ -191,8 +189,8 @@ def _load_orders(pressure: MovingPressure, threshold: float) -> tuple[Orders, Fl
     return orders[kept], strengths[kept]
 
 
-def _gain_products(pressure: MovingPressure, threshold: float) -> tuple[Orders, Floats]:
-    """Orders (m, 5) of f_AM, f_AM2, f_e, f_s and f_r in the gain, and amplitudes (m,) in Pa."""
+def _gain_products(pressure: MovingPressure, threshold: float) -> tuple[Ints, Floats]:
+    """Ints (m, 5) of f_AM, f_AM2, f_e, f_s and f_r in the gain, and amplitudes (m,) in Pa."""
     tacton, of_tacton = pressure.tacton, symbols(pressure.tacton)
     factor = pressure.law.level_factor
     of_signal, powers = np.ones((1, 1), np.complex128), np.ones(1, np.complex128)
@@ -218,8 +216,8 @@ def _gain_products(pressure: MovingPressure, threshold: float) -> tuple[Orders, 
     return np.column_stack([orders[m[k]], *signed]), c
 
 
-def _in_powers(pressure: MovingPressure) -> tuple[Orders, NDArray]:
-    """Orders (m, 3) and coefficients (k, m) of the gain with powers 0 to k - 1 of a factor of the
+def _in_powers(pressure: MovingPressure) -> tuple[Ints, NDArray]:
+    """Ints (m, 3) and coefficients (k, m) of the gain with powers 0 to k - 1 of a factor of the
     modulation, through Chebyshev's points and checked between them.
     """
     law, plain = pressure.law, unsampled(pressure)
@@ -233,11 +231,11 @@ def _in_powers(pressure: MovingPressure) -> tuple[Orders, NDArray]:
     raise harmonics_unbounded(law)
 
 
-def _fourier(values: Floats) -> NDArray[np.complex128]:
+def _fourier(values: Floats) -> Complex:
     return np.asarray(np.fft.fft(values) / len(values))
 
 
-def _strongest(c: Floats, threshold: float) -> tuple[tuple[Orders, Orders], Floats]:
+def _strongest(c: Floats, threshold: float) -> tuple[tuple[Ints, Ints], Floats]:
     """Places of, and values (k,) of a table above a fraction of its largest, not too many."""
     least = threshold * c.max(initial=0.0)
     if c.size > MOST_PRODUCTS:
@@ -247,7 +245,7 @@ def _strongest(c: Floats, threshold: float) -> tuple[tuple[Orders, Orders], Floa
 
 
 def _distinct(
-    orders: Orders, of_tacton: Floats, strengths: Floats, same: float, threshold: float, most: int
+    orders: Ints, of_tacton: Floats, strengths: Floats, same: float, threshold: float, most: int
 ) -> LineNames:
     """One line for all that coincide within `same` Hz, by its simplest name."""
     f = np.abs(orders @ of_tacton)

@@ -17,14 +17,13 @@ from functools import lru_cache
 from math import lcm
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft, sparse
 
 from simple_model.load.focus import spot_detail
 from simple_model.load.pressure import MovingPressure
 from simple_model.load.tacton import Tacton, tones
 from simple_model.load.trajectory import STILL, Trajectory, differ
-from simple_model.typing import Complex, Floats
+from simple_model.typing import Complex, Floats, Ints
 
 FEWEST_KNOTS = 132  # positions along a closed path: all harmonics below 66 f_d
 KNOTS_PER_WIDTH = 8  # of the focal spot, which makes corners accurate to 1e-4
@@ -126,7 +125,7 @@ def path_samples(pressure: MovingPressure) -> Floats:
 
 
 def path_fourier(
-    pressure: MovingPressure, values: Floats | Complex, orders: NDArray[np.int_] | None = None
+    pressure: MovingPressure, values: Floats | Complex, orders: Ints | None = None
 ) -> Complex:
     """Fourier coefficients (..., n) of what a load does where a focus of unit pressure at each of
     `path_samples` does `values` (..., q): of some orders (n,), or of all, -n being harmonic -n.
@@ -140,7 +139,7 @@ def path_fourier(
     return np.asarray(np.concatenate(found).reshape(*shape, len(wanted)))
 
 
-def harmonics(pressure: MovingPressure) -> NDArray[np.int_]:
+def harmonics(pressure: MovingPressure) -> Ints:
     """Orders of the harmonics of `path_fourier` that its cells resolve, ascending."""
     k = path_cells(pressure).cells.shape[0]
     return np.arange(-((k - 1) // 2), (k + 1) // 2)

@@ -10,13 +10,12 @@ from functools import lru_cache
 from math import ceil
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simple_model.load.path_cells import highest_passing, is_abrupt
 from simple_model.load.pressure import MovingPressure
 from simple_model.load.spectrum import ALIASED, gain_orders
 from simple_model.load.tacton import tones
-from simple_model.typing import Floats
+from simple_model.typing import Bools, Floats
 
 SLOWEST = 10_000.0  # Hz of samples that show all of a body's motion
 PER_PERIOD = 8  # samples of the highest frequency, so that its start is accurate, too
@@ -61,8 +60,8 @@ def finer(highest: float, dt: float) -> int:
     return 1 if highest < 0.5 / dt else ceil(PER_PERIOD * highest * dt)
 
 
-def below_half_the_rate(frequencies: Floats, times: Floats) -> NDArray[np.bool_]:
-    """Mask (f,) of frequencies (f,) in Hz that equally spaced times (t,) in s show as they are."""
+def below_half_the_rate(frequencies: Floats, times: Floats) -> Bools:
+    """Bools (f,) of frequencies (f,) in Hz that equally spaced times (t,) in s show as they are."""
     return np.asarray(frequencies < 0.5 / step(times))
 
 

@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from simple_model.load.drive import DriveLaw
@@ -32,7 +31,7 @@ from simple_model.load.path_cells import (
 )
 from simple_model.load.pressure import MovingPressure, check_lines
 from simple_model.load.tacton import modulation_at_phases, tones
-from simple_model.typing import Complex, Floats
+from simple_model.typing import Complex, Floats, Ints
 
 PHASES = 8  # of each sinusoid at least; more than twice the degree of a drive law
 MOST_PHASES = 2**10, 2**20  # of one sinusoid, and of all, for a drive law that is no polynomial
@@ -49,7 +48,7 @@ class LoadSpectrum:
     """
 
     frequencies: Floats
-    harmonics: NDArray[np.int_]
+    harmonics: Ints
     coefficients: Complex
     strengths: Floats
 
@@ -138,7 +137,7 @@ def path_forces(pressure: MovingPressure, points: Floats, load: Floats) -> Compl
     return path_fourier(pressure, np.vstack(forces).T).T
 
 
-def path_strengths(pressure: MovingPressure, threshold: float) -> tuple[NDArray[np.int_], Floats]:
+def path_strengths(pressure: MovingPressure, threshold: float) -> tuple[Ints, Floats]:
     """Orders (n,) of the harmonics of `path_cells` that, with all foci, exceed a fraction of the
     strongest, and 0; and their largest amplitude (n,) at about eight points of the path.
     """
@@ -157,7 +156,7 @@ def _largest_harmonics(pressure: MovingPressure) -> Floats:
     return found
 
 
-def foci_harmonics(pressure: MovingPressure, n: NDArray[np.int_]) -> Complex:
+def foci_harmonics(pressure: MovingPressure, n: Ints) -> Complex:
     """Array factor (k,) of all foci on harmonics n (k,) of one; 1 where the harmonics are those of
     the Tacton.
     """
@@ -184,7 +183,7 @@ def merge_lines(frequencies: Floats, amplitudes: Complex) -> tuple[Floats, Compl
 
 def gain_orders(
     pressure: MovingPressure, factors: Sequence[float] = (1.0,)
-) -> tuple[NDArray[np.int_], Complex]:
+) -> tuple[Ints, Complex]:
     """Orders (m, 3) of f_AM, f_AM2 and f_e in the gain, of either sign, and its coefficients (k, m)
     in Pa where the modulation is multiplied by factors (k,). Phases are doubled until the harmonics
     of a drive law that is no polynomial fall below `ALIASED`; a ValueError if `MOST_PHASES` are not
@@ -213,7 +212,7 @@ def harmonics_unbounded(law: DriveLaw) -> ValueError:
 
 def _at_phases(
     pressure: MovingPressure, factors: Sequence[float], count: int
-) -> tuple[NDArray[np.int_], Complex]:
+) -> tuple[Ints, Complex]:
     """Orders (m, 3) and coefficients (k, m) from so many phases of each sinusoid."""
     tacton = pressure.tacton
     counts = [count if f else 1 for f in tones(tacton)]

@@ -12,10 +12,10 @@ from functools import cached_property
 from math import isfinite, pi, sqrt
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from simple_model.choices import check_numbers, check_range, choose
-from simple_model.typing import Floats, Points
+from simple_model.typing import Bools, Floats, Ints, Points
 
 SHAPES = ("point", "line", "circle", "triangle", "square")  # defined by a size alone
 BY_POINTS = ("polyline", "recorded")
@@ -234,7 +234,7 @@ class Trajectory:
     def _clock(self) -> Floats:
         return np.array(self.times, np.float64)
 
-    def _between(self, phase: Floats) -> tuple[NDArray[np.int_], Floats]:
+    def _between(self, phase: Floats) -> tuple[Ints, Floats]:
         """Index of the last point of a recording, and the fraction of the way to the next."""
         clock = self._clock
         t = phase * clock[-1]
@@ -246,8 +246,8 @@ class Trajectory:
         return before, np.clip((t - clock[before]) / step, 0.0, 1.0)
 
 
-def differ(before: Floats, after: Floats) -> NDArray[np.bool_]:
-    """Mask (k,) of positions and levels (k, 3) that are not the same."""
+def differ(before: Floats, after: Floats) -> Bools:
+    """Bools (k,) of positions and levels (k, 3) that are not the same."""
     place, level = STILL
     apart = np.abs(after - before)
     return (apart[:, :2] > place).any(axis=1) | (apart[:, 2] > level)

@@ -13,12 +13,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 
 from simple_model.plates.modes import Plate, outside_clips
 from simple_model.plates.polynomials import LineBasis, continuous_basis, gauss_points
-from simple_model.typing import Floats
+from simple_model.typing import Bools, Floats, Ints
 
 # Whether a supported edge holds the in-plane displacement across it, and along it.
 IN_PLANE = {"held": (True, True), "sliding": (True, False), "movable": (False, False)}
@@ -75,7 +74,7 @@ class InPlane:
     grid: Grid
     u: tuple[_Line, _Line]
     v: tuple[_Line, _Line]
-    free: NDArray[np.int_]
+    free: Ints
     factor: Any
 
     @staticmethod
@@ -152,7 +151,7 @@ def _functions(
     return lines[odd ^ (axis == component)] if len(lines) == 2 else lines[0]
 
 
-def _free_of_clips(plate: Plate, x: _Line, y: _Line) -> NDArray[np.bool_]:
+def _free_of_clips(plate: Plate, x: _Line, y: _Line) -> Bools:
     """Products (n,) that no clip holds; a clip without a radius holds none."""
     if not (plate.clips and plate.clip_radius):
         return np.ones(x.basis.size * y.basis.size, bool)

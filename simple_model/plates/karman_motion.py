@@ -32,7 +32,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.lapack import dposv
 
 from simple_model.layers.material import Material
@@ -42,7 +41,7 @@ from simple_model.plates.free_modes import WITHOUT_LOSS, FreeModes, Loss, free_m
 from simple_model.plates.modes import PlateModes, modal_motion, modal_motion_apart
 from simple_model.plates.path_forces import MIDDLE, modal_path_forces
 from simple_model.plates.von_karman import KarmanPlate
-from simple_model.typing import Floats
+from simple_model.typing import Floats, Ints
 
 HIGHEST_PHASE = 1.2  # rad per half step; faster modes are slowed to it
 
@@ -62,7 +61,7 @@ def linear_motion(
     times: Floats,
     *,
     middle: Sequence[float] = MIDDLE,
-    chosen: NDArray[np.int_] | None = None,
+    chosen: Ints | None = None,
     highest: float = np.inf,
 ) -> Floats:
     """Modal coordinates (t, r) in kg^1/2 m from rest of a plate that does not stretch, without time

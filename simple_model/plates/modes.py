@@ -23,7 +23,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import linalg, sparse
 from scipy.sparse.linalg import LinearOperator, gmres
 
@@ -32,7 +32,7 @@ from simple_model.layers.compliance import AIR_DENSITY
 from simple_model.layers.material import ModulusLaw
 from simple_model.plates.air import air_mass
 from simple_model.plates.polynomials import LineBasis, line_basis, piecewise_basis
-from simple_model.typing import Complex, Floats
+from simple_model.typing import Bools, Complex, Floats
 
 SUPPORTS = ("clamped", "simply", "free")
 FINEST = 350.0  # rad/m: beyond it a focal spot of 4.35 mm has a third of its force
@@ -362,8 +362,8 @@ def _free_of_clips(plate: Plate, x: LineBasis, y: LineBasis) -> sparse.csr_array
     return np.asarray(everything[:, len(independent) :])
 
 
-def outside_clips(plate: Plate, x: LineBasis, y: LineBasis) -> NDArray[np.bool_]:
-    """Mask (x y,), y the faster, of products of functions that are zero on all clips."""
+def outside_clips(plate: Plate, x: LineBasis, y: LineBasis) -> Bools:
+    """Bools (x y,), y the faster, of products of functions that are zero on all clips."""
     found, reach = np.ones((x.size, y.size), bool), plate.clip_radius
     for along, across in plate.clips:
         moved = (

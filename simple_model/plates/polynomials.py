@@ -12,9 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
-from simple_model.typing import Floats
+from simple_model.typing import Bools, Floats, Ints
 
 # Derivatives that are zero at an end.
 FIXED: Mapping[str, tuple[int, ...]] = {"clamped": (0, 1), "simply": (0,), "free": ()}
@@ -73,7 +72,7 @@ class LineBasis:
             values[piece == e] = polynomials[piece == e] @ coefficients
         return values
 
-    def moved_within(self, low: float, high: float) -> NDArray[np.bool_]:
+    def moved_within(self, low: float, high: float) -> Bools:
         """Functions (i,) that are not zero everywhere between two breaks, in metre."""
         middles = (self.breaks[1:] + self.breaks[:-1]) / 2
         within = (low < middles) & (middles < high)
@@ -214,7 +213,7 @@ def _symmetric(functions: Floats) -> tuple[Floats, Floats]:
     return even, odd
 
 
-def _bubbles(degree: int, orders: NDArray[np.int_], ends: Sequence[str]) -> Floats:
+def _bubbles(degree: int, orders: Ints, ends: Sequence[str]) -> Floats:
     """Coefficients (n, i) of orthonormal polynomials of some orders that meet the supports of both
     ends.
     """
@@ -228,7 +227,7 @@ def _bubbles(degree: int, orders: NDArray[np.int_], ends: Sequence[str]) -> Floa
     return np.asarray(coefficients @ _null_space(np.array(rows).reshape(-1, len(orders))))
 
 
-def _at_end(orders: NDArray[np.int_], derivative: int, side: int) -> Floats:
+def _at_end(orders: Ints, derivative: int, side: int) -> Floats:
     """sqrt(2 n + 1) P_n or P_n' at -1 or 1."""
     n = orders.astype(float)
     value = np.sqrt(2 * n + 1) * float(side) ** (orders + derivative)

@@ -26,13 +26,13 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import linalg
 
 from simple_model.choices import choose
 from simple_model.plates.in_plane import IN_PLANE, Grid, InPlane
 from simple_model.plates.modes import Family, Plate, PlateModes
-from simple_model.typing import Floats
+from simple_model.typing import Floats, Ints
 
 MARGIN = 8  # polynomials beyond those that products of two modes require
 BESIDE = 4  # the same on a piece between the sides of clips
@@ -59,15 +59,15 @@ class KarmanPlate:
     """
 
     modes: PlateModes
-    chosen: NDArray[np.int_]
+    chosen: Ints
     squared: Floats
     bending: Floats
     H: Floats
-    symmetries: tuple[NDArray[np.int_], NDArray[np.int_]]
+    symmetries: tuple[Ints, Ints]
     left_out: float
 
     @cached_property
-    def _parts(self) -> list[tuple[slice, Floats, NDArray[np.int_]]]:
+    def _parts(self) -> list[tuple[slice, Floats, Ints]]:
         """For the modes of each symmetry: which they are, the nonzero columns of H as a matrix (p,
         columns), and where its product (p,) belongs in (k r,).
         """
@@ -147,7 +147,7 @@ def area_forces(modes: PlateModes) -> Floats:
     ])  # fmt: skip
 
 
-def _bending(modes: PlateModes, chosen: NDArray[np.int_]) -> Floats:
+def _bending(modes: PlateModes, chosen: Ints) -> Floats:
     blocks = [np.diag(f.squared) if f.bending is None else f.bending for f in modes.families]
     return np.asarray(linalg.block_diag(*blocks)[np.ix_(chosen, chosen)])
 
@@ -161,10 +161,10 @@ class _Slopes:
     grid: Grid
     along: Floats
     across: Floats
-    symmetries: NDArray[np.int_]
+    symmetries: Ints
 
     @staticmethod
-    def of(modes: PlateModes, chosen: NDArray[np.int_]) -> _Slopes:
+    def of(modes: PlateModes, chosen: Ints) -> _Slopes:
         families, first = [], 0
         for f in modes.families:
             own = chosen[(chosen >= first) & (chosen < first + len(f.squared))] - first
@@ -189,12 +189,12 @@ class _Slopes:
         ]  # fmt: skip
         return _Slopes(grid=grid, along=along, across=across, symmetries=np.array(symmetries))
 
-    def pairs(self, turn: int) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+    def pairs(self, turn: int) -> tuple[Ints, Ints]:
         """Pairs of modes i <= j whose products have a symmetry."""
         i, j = np.nonzero(np.triu(self.symmetries[:, None] ^ self.symmetries == turn))
         return i, j
 
-    def stretching(self, i: NDArray[np.int_], j: NDArray[np.int_]) -> Floats:
+    def stretching(self, i: Ints, j: Ints) -> Floats:
         """Strains e (3, p, x, y) in 1/kg of pairs of modes (p,): xx, yy and 2 xy."""
         a, b = self.along, self.across
         return np.stack([a[i] * a[j] / 2, b[i] * b[j] / 2, (a[i] * b[j] + b[i] * a[j]) / 2])

@@ -9,8 +9,8 @@ import numpy as np
 from fem.boundary import Support
 from fem.load_and_probe import facet_normals, facet_points
 from meshes import Grading, TetMesh, graded_axis
-from meshes.tetmesh import Floats
 from skinwave.bodies.body import Body
+from skinwave.typing import Floats
 
 LOWEST_CUT_ON = 80.0  # Hz: what deeper slabs carry below it is still near field at their sides
 

@@ -2,13 +2,13 @@
 
 from math import inf, isfinite
 
-from meshes.tetmesh import Floats
 from simple_model import Stack
 from simple_model.layers.compliance import Compliance
 from simple_model.layers.dispersion import DispersionCurves, dispersion_curves
 from simple_model.layers.stack import BASES
 from skinwave.bodies.body import Body
 from skinwave.bodies.parts import FLAT
+from skinwave.typing import Floats
 
 
 def has_exact_waves(body: Body) -> bool:

@@ -11,7 +11,6 @@ import numpy as np
 
 from meshes import Palm
 from meshes.shapes.structured import Lines
-from meshes.tetmesh import Floats
 from simple_model.choices import choose
 from simple_model.layers.compliance import Compliance
 from simple_model.layers.dispersion import DispersionCurves
@@ -39,6 +38,7 @@ from skinwave.bodies.supports import (
     complete,
 )
 from skinwave.system import extensions
+from skinwave.typing import Floats
 
 KEYS = {"width": "size_x_mm", "height": "size_y_mm", "depth": "thickness_mm"}  # in a scene file
 LARGEST = 2.0  # m: a body of more was meant in mm

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from fem.assembly import Operators, assemble
@@ -11,12 +10,12 @@ from fem.boundary import Support, fixed_dofs
 from fem.coat import Coat
 from fem.plane_stiffness import SIDES, Tension
 from meshes import TetMesh, half
-from meshes.tetmesh import Floats, Ints
 from simple_model.layers.material import Material
 from skinwave.bodies.body import Body
 from skinwave.bodies.discretised import Discretise
 from skinwave.bodies.sizes import checked, default_size
 from skinwave.bodies.supports import bed, together
+from skinwave.typing import Bools, Floats, Ints
 
 # Of a size that is asked for: a mesh that it is compared with may be so much coarser.
 COMPARED = 4 / 3
@@ -37,13 +36,13 @@ class Build:
     drag: Floats | None = None
     support: Support | None = None
     symmetry: str = ""
-    held: NDArray[np.bool_] | None = None
+    held: Bools | None = None
     tension: Tension | None = None
     stiffener: sparse.csr_array | None = None
     axes: Floats = field(default_factory=lambda: SIDES)
 
     @property
-    def constraints(self) -> dict[str, str] | NDArray[np.bool_]:
+    def constraints(self) -> dict[str, str] | Bools:
         """All components that are fixed."""
         if self.held is None:
             return self.fixed

@@ -5,15 +5,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from fem.boundary import Support
 from fem.coat import Coat
 from fem.plane_stiffness import Tension
 from meshes import TetMesh
-from meshes.tetmesh import Floats
 from simple_model.layers.material import Material
+from skinwave.typing import Bools, Floats
 
 THINNEST = 0.5  # of an element that does not follow layers: the thinnest of them that it resolves
 Strata = Sequence[tuple[float, Material]]  # depth in metre where each begins, and its material
@@ -36,7 +35,7 @@ class Discretised:
     coat: Coat | None = None
     drag: Callable[[TetMesh], Floats] | None = None
     support: Callable[[TetMesh], Support] | None = None
-    held: Callable[[TetMesh], NDArray[np.bool_]] | None = None
+    held: Callable[[TetMesh], Bools] | None = None
     tension: Tension | None = None
     stiffener: Callable[[TetMesh], sparse.csr_array] | None = None
 

@@ -10,12 +10,12 @@ import numpy as np
 import fem
 from fem.load_and_probe import facet_geometry, facet_normals
 from meshes import MeshError, TetMesh, boundary_facets, corner_volumes
-from meshes.tetmesh import Floats, Ints
 from simple_model.layers.material import Material
 from skinwave.bodies.body import Body
 from skinwave.bodies.discretised import Discretised, in_layers
 from skinwave.bodies.parts import solid_of
 from skinwave.bodies.sizes import coarsest_size, coat, meshed_strata
+from skinwave.typing import Floats, Ints
 
 HAND_CELL = 5e-3  # m: within 1.2 % of elements of 3 mm at every probe, at a third of the cost
 FINE_PALM = 2e-3  # m: elements of a palm with thin layers, 300,000 dofs; finer ones on request only

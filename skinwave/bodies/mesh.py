@@ -7,10 +7,10 @@ import numpy as np
 
 from meshes import TetMesh, body_from_file, boundary_facets, quadratic
 from meshes.facets import seen_from_above
-from meshes.tetmesh import Ints
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised
 from skinwave.bodies.hands import hand_size, in_its_layers
+from skinwave.typing import Ints
 
 NORMAL_PATCH = 3e-3  # m, standard deviation: two thirds of the focal spot's
 

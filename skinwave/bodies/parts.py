@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
 from meshes import Palm
 from simple_model.choices import choose
 from simple_model.layers.material import PRESETS, Material
+from skinwave.typing import Floats
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,14 +133,14 @@ class Placement:
         return bool(self.tilt_x or self.tilt_y)
 
     @property
-    def rotation(self) -> NDArray[np.float64]:
+    def rotation(self) -> Floats:
         """The matrix (3, 3) that turns the body."""
         (cx, cy), (sx, sy) = np.cos([self.tilt_x, self.tilt_y]), np.sin([self.tilt_x, self.tilt_y])
         about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
         about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
         return about_y @ about_x
 
-    def __call__(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def __call__(self, points: Floats) -> Floats:
         """Points (n, 3) of the body where they lie under the device."""
         if self == FLAT:
             return points

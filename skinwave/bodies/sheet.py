@@ -5,7 +5,6 @@ from functools import partial
 from math import pi, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator
 
@@ -14,7 +13,6 @@ from fem.finite_strain import Membrane, shell_stiffness
 from fem.plane_stiffness import Tension
 from meshes import TetMesh, middle_plane, sheet
 from meshes.shapes.structured import check_size, round_up
-from meshes.tetmesh import Floats, Ints
 from simple_model.layers.compliance import AIR_DENSITY, Compliance, thin_sheet
 from simple_model.layers.dispersion import DispersionCurves
 from simple_model.layers.material import Material
@@ -23,6 +21,7 @@ from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.build import Build
 from skinwave.bodies.discretised import Discretised
 from skinwave.bodies.supports import Mounting, clip_lines, held
+from skinwave.typing import Bools, Floats, Ints
 
 SHEET_CELLS = 60  # along the shorter side: f1 within 0.1 %, deflection within 0.6 %
 # A sheet bends like one of this relative thickness with the same bending stiffness and mass per
@@ -49,7 +48,7 @@ def discretise(body: Body, h: float, thickness: float | None = None) -> Discreti
     )
 
 
-def _held(body: Body, mesh: TetMesh) -> NDArray[np.bool_]:
+def _held(body: Body, mesh: TetMesh) -> Bools:
     """Components (n, 3) that are held: all of a node, if the sheet is tilted."""
     found = held(body.mounting, mesh)
     return found | (found.any(axis=1, keepdims=True) & body.placement.is_tilted)

@@ -7,7 +7,6 @@ import numpy as np
 from meshes import Grading, extrude, graded_axis
 from meshes.files.import_body import FINE_RADIUS
 from meshes.shapes.structured import Lines, check_size, mirrored, with_planes
-from meshes.tetmesh import Floats
 from simple_model.layers.compliance import layered
 from skinwave.bodies.absorbing_layer import (
     far_springs,
@@ -21,6 +20,7 @@ from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretise, Discretised, in_layers
 from skinwave.bodies.parts import Layer
 from skinwave.bodies.supports import EDGES
+from skinwave.typing import Floats
 
 SLAB_CELL = 3e-3  # m: two thirds of the focal spot's standard deviation
 # From cell to cell along the surface and downwards, and the coarsest cell over the finest.

@@ -7,13 +7,12 @@ from dataclasses import dataclass, fields, replace
 from math import isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem.boundary import Support
 from fem.load_and_probe import facet_points
 from meshes import TetMesh
-from meshes.tetmesh import Ints
 from simple_model.choices import choose
+from skinwave.typing import Bools, Ints
 
 EDGES = {"left": (0, -1), "right": (0, 1), "front": (1, -1), "back": (1, 1)}  # axis, and its end
 SUPPORTS = ("clamped", "simply")
@@ -261,7 +260,7 @@ def clip_lines(mounting: Mounting, axis: int, size: float) -> list[float]:
     return sorted(found)
 
 
-def held(mounting: Mounting, mesh: TetMesh) -> NDArray[np.bool_]:
+def held(mounting: Mounting, mesh: TetMesh) -> Bools:
     """Components (n, 3) of the nodes that supports hold, of a flat sheet or the part of it that
     symmetry leaves.
 
@@ -294,7 +293,7 @@ def held(mounting: Mounting, mesh: TetMesh) -> NDArray[np.bool_]:
     return found
 
 
-def _clipped(mesh: TetMesh, clip: Sequence[float], radius: float) -> NDArray[np.bool_]:
+def _clipped(mesh: TetMesh, clip: Sequence[float], radius: float) -> Bools:
     """Nodes (n,) in a clip: in its square, and in the `FEWEST` nearest columns."""
     away = np.abs(mesh.points[:, :2] - clip).max(axis=1)
     top = np.unique(mesh.facets["top"])

@@ -16,7 +16,6 @@ import numpy as np
 import fem
 from fem.harmonic import LineSolver
 from fem.load_and_probe import on_surface
-from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Tacton
 from simple_model.layers.prony import FIT_TOLERANCE
 from skinwave.bodies.build import Build, build, operators
@@ -26,6 +25,7 @@ from skinwave.models.meshed import surface_load, surface_motion
 from skinwave.scene.scene import Body
 from skinwave.system.arrays import packed, quantised
 from skinwave.system.effort import Progress, silent
+from skinwave.typing import Floats
 
 LOWEST = 0.15  # m: least height of the focus, whose spot elements of some mm resolve
 REACH, SPACING = 0.031, 0.0058  # m from the middle to which foci are, and between training spots

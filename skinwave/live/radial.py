@@ -13,7 +13,6 @@ import numpy as np
 from scipy.special import jv
 
 import fem
-from meshes.tetmesh import Floats
 from simple_model.layers.compliance import Compliance
 from simple_model.layers.wavenumber_integral import (
     AT_ONCE,
@@ -26,6 +25,7 @@ from skinwave.bodies.analytic import compliance
 from skinwave.scene.scene import Body
 from skinwave.system.arrays import packed, quantised
 from skinwave.system.effort import Progress, silent
+from skinwave.typing import Floats
 
 LOWEST = 0.1  # m: height of the focus from which a pack serves every height
 ERROR = 2e-3  # relative, of lines above -40 dB: twice the largest of 200 Tactons

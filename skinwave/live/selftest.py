@@ -5,8 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from fem import Complex
-from meshes.tetmesh import Floats
 from simple_model import SUPERPOSITIONS, MovingPressure, Tacton, Trajectory, evenly
 from simple_model.layers.flat_body import steady_lines
 from skinwave.bodies.analytic import compliance, has_exact_waves, is_laterally_infinite
@@ -18,6 +16,7 @@ from skinwave.models.plate_modes import steady_lines as plate_lines
 from skinwave.models.reduced import answer, components, prepare
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import Body, Scene
+from skinwave.typing import Complex, Floats
 
 SEED = 15
 # Lines that are compared: of the strongest of a point, and up to a frequency in Hz; then those of

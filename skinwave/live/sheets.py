@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from meshes.tetmesh import Floats
 from simple_model.layers.prony import FIT_TOLERANCE
 from simple_model.load.focus import spot_width
 from simple_model.plates.free_modes import free_vibration, relaxing_stiffness
@@ -21,6 +20,7 @@ from skinwave.models.plate_modes import modes_of, plate_of, relative_modulus
 from skinwave.scene.scene import Body
 from skinwave.system.arrays import packed, quantised
 from skinwave.system.effort import Progress, silent
+from skinwave.typing import Floats
 
 STEP, SIDE = 3e-3, 37  # m between places of the square grid of fields, and places along a side
 LAW_STEP, HIGHEST = 2.5, 1000.0  # Hz between values of the modulus, and of the last

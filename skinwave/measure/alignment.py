@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import stdtrit
 
-from simple_model.typing import Floats
 from skinwave.measure.delays import correlation, maxima
 from skinwave.measure.lines import MeasuredLines
+from skinwave.typing import Floats
 
 AS_GOOD = 10.83  # of chi-square: 99.9 % of one degree of freedom
 SHARED = 20.0  # degrees of freedom

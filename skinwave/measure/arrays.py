@@ -18,7 +18,6 @@ import numpy as np
 from meshes import reading, subprocess_call
 from meshes.tetmesh import MeshError
 from simple_model.quantities import QUANTITIES
-from simple_model.typing import Floats
 from skinwave.measure import units
 from skinwave.measure.delays import aligned
 from skinwave.measure.headers import NAMES, TIME, column
@@ -26,6 +25,7 @@ from skinwave.measure.matlab import DAMAGED, read_arrays
 from skinwave.measure.recording import Given, Recording, nowhere
 from skinwave.measure.table import rises
 from skinwave.models import named, names
+from skinwave.typing import Floats
 
 FORMAT = "skinwave measurement 1"
 LARGEST = 2_000_000_000  # bytes of a MATLAB file

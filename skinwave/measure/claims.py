@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from simple_model.numbers import decibel
-from simple_model.typing import Floats
 from skinwave.measure.lines import MeasuredLines
 from skinwave.results.claims import (
     CLAIMS,
@@ -18,6 +17,7 @@ from skinwave.results.claims import (
     is_single,
 )
 from skinwave.scene.scene import Scene
+from skinwave.typing import Floats
 
 HOLDS, FAILS, UNDECIDED = "holds", "fails", "cannot be decided"
 CONFIDENCE = 0.95  # that all true amplitudes are within their bounds

@@ -10,7 +10,6 @@ from simple_model import Response, resolved_lines, spectrum
 from simple_model.load.sampling import step
 from simple_model.quantities import DISPLACEMENT, QUANTITIES
 from simple_model.response import SETTLE
-from simple_model.typing import Floats
 from skinwave.measure.alignment import AS_GOOD, Alignment, align
 from skinwave.measure.claims import MeasuredClaim, assess_measured, by_name
 from skinwave.measure.lines import (
@@ -31,6 +30,7 @@ from skinwave.report.maps import MeasuredPlaces
 from skinwave.results.comparison import heard_phasors
 from skinwave.results.run import ASSESSED, Run, own_names
 from skinwave.scene.scene import Scene, check_motion
+from skinwave.typing import Floats
 
 WITHIN = 0.75  # of a record, or of the Tacton, that is to lie within the other
 LEVEL = 0.05  # chance that any difference at all is declared where there is none

@@ -5,8 +5,8 @@ was recorded with each, and lines by maxima of the correlation of two sums of si
 import numpy as np
 from scipy.special import fdtrc
 
-from simple_model.typing import Floats
 from simple_model.windows import cosines
+from skinwave.typing import Floats
 
 A_PERIOD = 8  # trial delays in a period of the highest line
 NEWTON = 5  # steps

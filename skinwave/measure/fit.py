@@ -9,7 +9,6 @@ import numpy as np
 from scipy.special import ndtri
 
 from simple_model.choices import choose
-from simple_model.typing import Floats
 from skinwave.bodies.parts import solid_of
 from skinwave.measure.intervals import LEVEL, Estimate, Intervals, intervals
 from skinwave.measure.measurement import Measurement
@@ -26,6 +25,7 @@ from skinwave.scene.scene import Scene
 from skinwave.scene.spreads import spreads_of
 from skinwave.scene.variation import with_values
 from skinwave.system.effort import Progress, silent
+from skinwave.typing import Floats
 
 STARTS = 8
 

@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 
 from simple_model import Effort
 from simple_model.numbers import significant
-from simple_model.typing import Floats
 from skinwave.measure.findings import cautions, notes, probability, sentences, shown
 from skinwave.measure.fit import Fit
 from skinwave.report.figures import REPORT, png
@@ -21,6 +20,7 @@ from skinwave.report.styles import Style
 from skinwave.scene.file import dumps
 from skinwave.system.document import Details, Part, Picture, Report, Section, preformatted
 from skinwave.system.table import Column, Table
+from skinwave.typing import Floats
 
 INK, OF_FIT, LEFT = "#222222", BLUE, ORANGE
 MOST_DRAWN = 4  # places that are drawn

@@ -9,7 +9,6 @@ from simple_model import MovingPressure
 from simple_model.load.line_names import line_names
 from simple_model.numbers import significant
 from simple_model.response import SETTLE
-from simple_model.typing import Floats
 from skinwave.measure.lines import bin_width, departures, holm
 from skinwave.measure.measurement import Measurement
 from skinwave.measure.noise_floor import floor_of
@@ -22,6 +21,7 @@ from skinwave.measure.spectral_lines import (
     peaks,
     spectral_lines,
 )
+from skinwave.typing import Floats
 
 MOST_VALUES = 2_000_000  # that lines are looked for in
 MOST_SAMPLES = 100_000  # of a waveform

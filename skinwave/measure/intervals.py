@@ -18,8 +18,8 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 from scipy.stats import chi2, t
 
-from simple_model.typing import Floats
 from skinwave.measure.search import Solution
+from skinwave.typing import Floats
 
 LEVEL = 0.95
 ROUND_OFF = 1e-7  # of the largest singular value: what differences leave of one that is 0

@@ -18,11 +18,11 @@ from scipy.special import fdtrc
 
 from simple_model import Response
 from simple_model.response import SETTLE, fit_lines, line_rows
-from simple_model.typing import Floats
 from simple_model.windows import cosines
 from skinwave.measure.delays import in_step
 from skinwave.measure.measurement import Measurement
 from skinwave.measure.noise_floor import floor_of, freedom
+from skinwave.typing import Floats
 
 DISAGREES = 1e-3  # chance below which repetitions of a line vary by other than the noise floor
 BESIDE = 2  # bins of a spectrum beside a line, which may have some of it

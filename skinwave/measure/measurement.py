@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from simple_model.quantities import Quantity, quantity
-from simple_model.typing import Floats
+from skinwave.typing import Floats
 
 UNEVEN = 1e-3  # of a sampling interval: what rounding in text files may leave
 MOST_NAMED = 5  # places

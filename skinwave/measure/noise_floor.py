@@ -6,7 +6,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 from scipy.special import fdtrc, gammaincinv, gammaln
 
-from simple_model.typing import Floats
+from skinwave.typing import Floats
 
 SHARE = 0.25  # of its frequency: the half-width of the band of the median,
 FEWEST, WIDEST = 10, 400  # bins, at least and at most

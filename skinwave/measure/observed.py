@@ -15,10 +15,10 @@ from simple_model import resolved_lines
 from simple_model.load.line_names import line_names
 from simple_model.numbers import counted
 from simple_model.response import SETTLE, fit_lines
-from simple_model.typing import Complex, Floats
 from skinwave.measure.lines import MeasuredLines, as_response, holm, lines_of, measurable
 from skinwave.measure.measurement import Measurement
 from skinwave.measure.predicted import SAME, Target, predicted_lines, predicted_waveforms
+from skinwave.typing import Complex, Floats
 
 KINDS = ("waveforms", "lines", "amplitudes")
 STEADY = 1.5  # times the remainder of the rest: that of the start of a steady record, at most

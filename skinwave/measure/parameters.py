@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simple_model.typing import Floats
 from skinwave.scene import variation
 from skinwave.scene.scene import Scene
 from skinwave.scene.variation import with_values
 from skinwave.system.plain_text import number_in
+from skinwave.typing import Floats
 
 GAIN, DELAY, OFFSET_X, OFFSET_Y = "gain", "delay_ms", "offset_x_mm", "offset_y_mm"
 NUISANCES = (GAIN, DELAY, OFFSET_X, OFFSET_Y)  # of a measurement, no keys of a scene

@@ -17,7 +17,6 @@ from simple_model.layers.flat_body import field_lines, steady_lines
 from simple_model.load.spectrum import merge_lines
 from simple_model.quantities import Quantity
 from simple_model.response import fit_lines
-from simple_model.typing import Complex, Floats
 from skinwave.bodies.analytic import compliance
 from skinwave.measure.parameters import (
     DELAY,
@@ -40,6 +39,7 @@ from skinwave.planning.simulate import compute
 from skinwave.scene.scene import SAMPLE_RATE, Scene
 from skinwave.scene.variation import with_values
 from skinwave.system.effort import Progress
+from skinwave.typing import Complex, Floats
 
 Predict = Callable[[Values], np.ndarray]
 SAME = 1e-3  # of a frequency: lines as near as that are one

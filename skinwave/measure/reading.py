@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from meshes import reading
-from simple_model.typing import Floats
 from skinwave.measure import arrays, labview, text, universal
 from skinwave.measure.headers import Column
 from skinwave.measure.measurement import Measurement
 from skinwave.measure.recording import Given, Recording, completed, nowhere
 from skinwave.measure.table import Table, recording
 from skinwave.measure.units import length
+from skinwave.typing import Floats
 
 LARGEST_WAV = 500_000_000  # bytes
 SAMPLES, SENSORS, AXES, RATE = 522, 72, 3, 1300.0

@@ -9,9 +9,9 @@ import numpy as np
 
 from simple_model.choices import choose
 from simple_model.quantities import QUANTITIES
-from simple_model.typing import Floats
 from skinwave.measure import units
 from skinwave.measure.measurement import UNEVEN, Measurement
+from skinwave.typing import Floats
 
 LARGEST = 1e100  # of any value in SI: squares of larger ones may overflow
 SLOWEST = 40.0  # Hz of samples: half of it is below all vibrations that are felt

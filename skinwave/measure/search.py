@@ -17,11 +17,11 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import qmc
 
-from simple_model.typing import Floats
 from skinwave.measure.alignment import AS_GOOD
 from skinwave.measure.observed import Data
 from skinwave.measure.parameters import DELAY, Parameters
 from skinwave.system.effort import Progress
+from skinwave.typing import Floats
 
 FORWARD, CENTRAL = 1e-5, 1e-3  # steps of differences, of the unit interval
 MOST_EVALUATIONS = 40  # steps of one local search

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simple_model.typing import Floats
 from simple_model.windows import cosines
 from skinwave.measure.noise_floor import floor_of, tail
+from skinwave.typing import Floats
 
 ALARM = 0.01  # probability that a file of noise has any line
 RESOLVED = 1.5  # bins: lines nearer to each other are one

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from simple_model.typing import Floats
 from skinwave.measure.headers import (
     DRIVE,
     FREQUENCY,
@@ -30,6 +29,7 @@ from skinwave.measure.units import (
     quantity_of,
     scale,
 )
+from skinwave.typing import Floats
 
 EXAMPLE = "t [s], v(0,0) [mm/s], v(5,0) [mm/s]"
 LONG = "t [s], x [mm], y [mm], v [mm/s]"

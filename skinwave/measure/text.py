@@ -16,13 +16,13 @@ from pathlib import Path
 import numpy as np
 
 from meshes.reading import exported_text
-from simple_model.typing import Floats
 from skinwave.measure.headers import TIME, UNITS, Column, X, Y, column
 from skinwave.measure.labview import lvm_table
 from skinwave.measure.recording import Given, Recording
 from skinwave.measure.table import EXAMPLE, Table, in_metre, recording
 from skinwave.measure.units import plain, quantity_of
 from skinwave.system.plain_text import number_in
+from skinwave.typing import Floats
 
 LARGEST = 256_000_000  # bytes
 FIRST_LINE = "LabVIEW Measurement"  # of .lvm files, whatever they are called

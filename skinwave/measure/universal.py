@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from meshes import reading
-from simple_model.typing import Floats
 from skinwave.measure import units
 from skinwave.measure.delays import ONE_AFTER_ANOTHER, aligned
 from skinwave.measure.recording import Given, Recording, nowhere
+from skinwave.typing import Floats
 
 LARGEST = 1_000_000_000  # bytes
 MISSING = 'files of Universal File Format 58 need pyuff; pip install "skinwave[measure]"'

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 from skinwave.system import extensions
 
 if TYPE_CHECKING:
-    from meshes.tetmesh import Floats
     from simple_model import Response
     from skinwave.bodies import Body
     from skinwave.models.options import SolveOptions
     from skinwave.scene.scene import Scene
+    from skinwave.typing import Floats
 
 BUILT_IN = {  # name -> the file that registers it
     "point-kernel": "point_kernel",

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 import simple_model
-from meshes.tetmesh import Floats
 from simple_model import Effort, Response, steady_state
 from simple_model.layers.flat_quantities import (
     from_rest,
@@ -32,6 +31,7 @@ from skinwave.models.limits import (
 )
 from skinwave.models.options import SolveOptions
 from skinwave.scene.scene import Scene
+from skinwave.typing import Floats
 
 LAYERS = (
     "E. Kausel, J. M. Roesset: Stiffness matrices for layered soils. Bulletin of the Seismological "

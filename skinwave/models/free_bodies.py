@@ -18,7 +18,6 @@ import numpy as np
 from scipy.linalg import qr
 
 from fem.affine import AffineOperators, Solids, assemble_affine
-from meshes.tetmesh import Floats
 from simple_model.layers.material import Material
 from skinwave.bodies import Body
 from skinwave.bodies.absorbing_layer import has_layer, layer_of
@@ -27,6 +26,7 @@ from skinwave.bodies.discretised import Discretise
 from skinwave.bodies.sheet import air, bending_equivalent
 from skinwave.bodies.sizes import default_size
 from skinwave.models.free_keys import FreeKey, Part, solid_at
+from skinwave.typing import Floats
 
 AGREES = 1e-9  # of a modulus: materials that differ by less are one
 CANDIDATES = 5  # geometries along each thickness, for sums of d and 1/d

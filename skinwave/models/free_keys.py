@@ -10,7 +10,6 @@ from math import inf, isfinite, log
 
 import numpy as np
 
-from meshes.tetmesh import Floats
 from simple_model.choices import choose
 from simple_model.layers.material import Material
 from simple_model.load.spectrum import load_lines
@@ -22,6 +21,7 @@ from skinwave.bodies.supports import FRAME
 from skinwave.models.laws import check_laws
 from skinwave.scene.keys import MATERIAL, MODULI, PRONY, SCALES, SECTIONS, changed, write_material
 from skinwave.scene.scene import Scene
+from skinwave.typing import Floats
 
 THICKNESS = ("thickness_mm",)  # path of a key
 KEYS = (

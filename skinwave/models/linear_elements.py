@@ -13,7 +13,6 @@ import fem
 from fem.energy import mean_power
 from fem.stress import relaxed
 from meshes import MeshError
-from meshes.tetmesh import Floats
 from simple_model import Effort, Material, Response
 from simple_model.load.sampling import below_half_the_rate, resolving_step
 from simple_model.load.spectrum import load_lines, synthesise
@@ -49,6 +48,7 @@ from skinwave.models.reduced import answer, prepare, reduction_tolerance
 from skinwave.scene.load import SupportMotion
 from skinwave.scene.scene import Scene
 from skinwave.system.effort import Clock, Progress
+from skinwave.typing import Floats
 
 REDUCTION = (
     "Z. Bai, Y. Su: Dimension reduction of large-scale second-order dynamical systems via a "

@@ -23,7 +23,6 @@ from fem.load_and_probe import (
 )
 from fem.stress import materials_at, strain_operator
 from meshes import cache
-from meshes.tetmesh import Floats
 from simple_model import Effort, Material, MovingPressure
 from simple_model.load.path_cells import jump_times
 from simple_model.load.sampling import below_half_the_rate, is_folded
@@ -39,6 +38,7 @@ from skinwave.models.sheet_probes import sheet_rows
 from skinwave.scene.load import PRESSURE, Load
 from skinwave.scene.scene import Reading
 from skinwave.system.effort import Clock, Progress, peak_memory, versions
+from skinwave.typing import Floats
 
 MOST_IMBALANCE = 0.01  # relative error of the energy balance, beyond which a response is refused
 ON_PLANE = 1e-9  # m: nearer to a plane a probe is on it

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import fem
-from meshes.tetmesh import Floats
 from simple_model import Response
 from simple_model.choices import choose
 from simple_model.response import UNEVEN
 from skinwave.scene.scene import MOST_VALUES, SAMPLE_RATE, Scene
 from skinwave.system.effort import Progress, silent
+from skinwave.typing import Floats
 
 MapFunction = Callable[..., Iterable[Any]]  # of the shape of the built-in `map`
 SIZES = {"h": ("element size", 1e3, "mm"), "dt": ("time step", 1.0, "s")}

@@ -24,7 +24,6 @@ from fem.affine_model import AffineModel, operators_at, steady, steady_lines
 from fem.boundary import fixed_dofs
 from fem.greedy import Geometry, Variant, line_bases, reduce_affine
 from meshes import cache
-from meshes.tetmesh import Floats
 from simple_model import Effort, Response
 from simple_model.layers.prony import FIT_TOLERANCE
 from skinwave.bodies.build import Build
@@ -73,6 +72,7 @@ from skinwave.models.reduced import (
 from skinwave.models.reduced import answer as answer_of
 from skinwave.scene.scene import Body, Scene
 from skinwave.system.effort import Clock, Progress, one_thread, silent
+from skinwave.typing import Floats
 
 TOLERANCE = 0.01  # relative error of a line that is not faint
 SHARE = 0.4  # of the tolerance: of the reduced-order model, and of the lines' bases

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fem.reduced import exponential_sum
-from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response
 from simple_model.layers.compliance import AIR_DENSITY
 from simple_model.load.sampling import below_half_the_rate, highest_driving, step
@@ -35,7 +34,6 @@ from simple_model.plates.modes import (
 )
 from simple_model.plates.path_forces import modal_path_forces
 from simple_model.plates.von_karman import KarmanPlate, karman_plate
-from simple_model.typing import Complex
 from skinwave.bodies.body import Body
 from skinwave.bodies.supports import EDGES
 from skinwave.models import Limit, Model, register
@@ -44,6 +42,7 @@ from skinwave.models.limits import of_body, of_held_sheet, surface_motion
 from skinwave.models.options import SolveOptions, sample_times
 from skinwave.scene.scene import Scene
 from skinwave.system.effort import peak_memory
+from skinwave.typing import Complex, Floats
 
 PLATES = "A. W. Leissa: Vibration of Plates. NASA SP-160, 1969"
 ERROR = 0.01  # relative, of a steady waveform beside finite elements of a frame, vacuum and air

@@ -3,13 +3,13 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from meshes.tetmesh import Floats
 from simple_model import Response, point_kernel, point_kernel_published
 from simple_model.quantities import PRESSURE
 from skinwave.models import Limit, Model, register
 from skinwave.models.limits import load_limit
 from skinwave.models.options import SolveOptions
 from skinwave.scene.scene import Scene
+from skinwave.typing import Floats
 
 ERROR = 1.0  # relative error of the point kernel on any body, measured 0.98 to 1.04
 

@@ -17,7 +17,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 import fem
@@ -25,7 +24,6 @@ from fem.energy import mean_power
 from fem.maxwell import with_internal
 from fem.reduced import exponential_sum, impulse_response, line_response
 from meshes import cache
-from meshes.tetmesh import Floats
 from simple_model import Effort, Material, MovingPressure, Response
 from simple_model.load.focus import spot_width
 from simple_model.load.sampling import below_half_the_rate, highest_driving
@@ -57,6 +55,7 @@ from skinwave.models.options import sample_times
 from skinwave.scene.load import PRESSURE, Load
 from skinwave.scene.scene import SURFACE, Body, Reading, Scene
 from skinwave.system.effort import Clock, Progress, one_thread, peak_memory, silent, versions
+from skinwave.typing import Bools, Floats
 
 BAND = 1000.0  # Hz up to which a reduced model must meet its tolerance
 REDUCTION_TOLERANCE = 1e-3
@@ -414,7 +413,7 @@ def read_at(motion: ReducedResponse, outputs: Floats) -> ReducedResponse:
     return replace(motion, lines=motion.lines @ outputs.T, start=motion.start @ outputs.T)
 
 
-def select_lines(motion: ReducedResponse, chosen: NDArray[np.bool_]) -> ReducedResponse:
+def select_lines(motion: ReducedResponse, chosen: Bools) -> ReducedResponse:
     """Response with some of the lines alone, those (f,) that are chosen."""
     return replace(motion, frequencies=motion.frequencies[chosen], lines=motion.lines[chosen])
 

@@ -22,12 +22,12 @@ from fem.sheet_reading import (
     strain_rows,
 )
 from meshes import middle_plane
-from meshes.tetmesh import Floats
 from simple_model import Material
 from simple_model.quantities import STRAIN
 from skinwave.bodies.body import Body
 from skinwave.bodies.build import Build
 from skinwave.scene.scene import Reading
+from skinwave.typing import Floats
 
 Reader = Callable[[Floats], Floats]  # displacement or coordinates -> components (p c,)
 

@@ -25,7 +25,6 @@ import fem
 from fem import nonlinear
 from fem.reduced_nonlinear import StretchingModes, stretching_modes
 from meshes import middle_plane
-from meshes.tetmesh import Floats
 from simple_model import Effort, Material, Response
 from simple_model.load.sampling import below_half_the_rate, highest_driving, resolving_step
 from simple_model.load.spectrum import load_lines
@@ -62,6 +61,7 @@ from skinwave.models.reduced import (
 from skinwave.models.sheet_probes import full_reader, modal_reader
 from skinwave.scene.scene import Body, Scene
 from skinwave.system.effort import Clock
+from skinwave.typing import Floats
 
 NEWTON = (
     "T. Belytschko, W. K. Liu, B. Moran: Nonlinear Finite Elements for Continua and Structures. "

@@ -17,12 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from meshes.tetmesh import Floats
 from simple_model import Tacton, Trajectory
 from simple_model.load.tacton import COMMENSURATE, LONGEST, RETURNED
 from simple_model.load.trajectory import LARGEST
 from skinwave.patterns.adaptics_file import Brush, Track, parse
 from skinwave.patterns.pattern import ENGINE_RATE, STRAIGHT, Options, Pattern, one_height, thinned
+from skinwave.typing import Floats
 
 UNBOUNDED = 1.0  # s that stand for a pattern that nothing ends
 

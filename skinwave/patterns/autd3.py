@@ -8,10 +8,10 @@ from math import ceil
 
 import numpy as np
 
-from meshes.tetmesh import Floats
 from simple_model import MovingPressure
 from skinwave.patterns.pattern import Options, aliased, loudness
 from skinwave.scene.scene import Scene
+from skinwave.typing import Floats
 
 TICK = 40_000.0  # Hz
 MOST_PATTERNS = 8192  # of a FociSTM

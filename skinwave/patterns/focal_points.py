@@ -11,13 +11,13 @@ from math import isfinite
 
 import numpy as np
 
-from meshes.tetmesh import Floats
 from simple_model import Tacton, Trajectory, evenly
 from simple_model.choices import meant
 from simple_model.load.tacton import LONGEST, MOST_FOCI
 from skinwave.patterns.pattern import Options, Pattern, aliased, loudness, one_height
 from skinwave.scene.scene import Scene
 from skinwave.system.plain_text import as_utf_8, csv_table, number_in
+from skinwave.typing import Floats
 
 COLUMNS = ("t_s", "point", "x_m", "y_m", "z_m", "intensity")
 NEEDED = ("t_s", "x_m", "y_m")

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Tacton
 from simple_model.load.tacton import tones
 from skinwave.scene.scene import Scene
+from skinwave.typing import Floats
 
 ENGINE_RATE = 20_000.0  # Hz, of samples in AdapTics
 STRAIGHT = 2e-5, 1e-3  # m and of full drive, within which straight lines stand for samples

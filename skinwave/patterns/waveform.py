@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 from scipy.io import wavfile
 
-from meshes.tetmesh import Floats
 from simple_model import Signal
 from simple_model.choices import choose
 from simple_model.load.rhythm import ROLES
 from simple_model.load.tacton import LONGEST
 from skinwave.patterns.pattern import Options, Pattern
 from skinwave.scene.scene import Scene
+from skinwave.typing import Floats
 
 SCALES = ("full", "peak", "rms")
 CUT = 0.02  # beyond full drive that is cut off: what rounding adds to a sine of 8 bits

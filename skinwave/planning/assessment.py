@@ -7,10 +7,8 @@ costs a tenth of it and overestimates errors by up to a half.
 
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simple_model import Response
 from skinwave.bodies.sizes import check_mesh, default_size
@@ -35,6 +33,7 @@ from skinwave.planning.rows import (
     series_over_tolerance,
 )
 from skinwave.scene.scene import Body, Load, Reading, Scene
+from skinwave.typing import Array
 
 Coarser = tuple[float, ReducedBody]  # element size in metre, and the body with it
 
@@ -44,7 +43,7 @@ QUICKLY = 2.0  # times as coarse
 def assessed(
     scene: Scene,
     response: Response,
-    moved: ReducedBody | NDArray[Any],
+    moved: ReducedBody | Array,
     options: SolveOptions = DEFAULT,
     *,
     compared: Coarser | None = None,

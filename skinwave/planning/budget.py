@@ -15,11 +15,9 @@ from math import isfinite, nan
 
 import numpy as np
 
-from meshes.tetmesh import Floats
 from simple_model.layers.compliance import layered
 from simple_model.layers.flat_body import steady_lines
 from simple_model.numbers import percent, significant, stated_error
-from simple_model.typing import Complex
 from skinwave.bodies.analytic import flattened
 from skinwave.models.limits import takes
 from skinwave.models.plate_modes import MODES
@@ -30,6 +28,7 @@ from skinwave.scene.distributions import Spread
 from skinwave.scene.scene import Scene
 from skinwave.scene.spreads import PRESSURE, spreads_of
 from skinwave.scene.variation import with_values
+from skinwave.typing import Complex, Floats
 
 SIGMA = (0.15865525393145707, 0.8413447460685429)  # quantiles a standard deviation either way
 FAINT = 1e-3  # of the load's strongest line: lines that no budget needs

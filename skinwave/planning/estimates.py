@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Trajectory
 from simple_model.layers.flat_body import steady_lines
 from simple_model.layers.flat_quantities import from_rest, surface_field
@@ -13,10 +12,10 @@ from simple_model.load.focus import gaussian_width, spot_width
 from simple_model.load.spectrum import load_lines, merge_lines
 from simple_model.load.trajectory import BY_POINTS
 from simple_model.quantities import DISPLACEMENT
-from simple_model.typing import Complex
 from skinwave.bodies.analytic import compliance, is_flat_layer, is_laterally_infinite, stack
 from skinwave.bodies.supports import EDGES
 from skinwave.scene.scene import Body, Scene
+from skinwave.typing import Complex, Floats
 
 REFLECTED = 0.03  # reflection coefficient of an absorbing side and the layer around it
 # Reflections of the four sides may be in phase; slabs reflected 0.5 to 0.9 times as much. Where

@@ -11,7 +11,6 @@ from functools import partial
 import numpy as np
 
 import fem
-from meshes.tetmesh import Floats
 from skinwave.bodies.absorbing_layer import has_layer, layer_of
 from skinwave.bodies.analytic import is_flat_layer
 from skinwave.bodies.sizes import check_mesh, default_size
@@ -24,6 +23,7 @@ from skinwave.planning.estimates import FAR, absorbed_returned, spot_scale
 from skinwave.planning.refinement import about_its_rest, element_sizes, relative_change
 from skinwave.planning.rows import PlanRow
 from skinwave.scene.scene import Body, Scene
+from skinwave.typing import Floats
 
 WIDER = 2.0  # times the width of the layer
 # Of the change: slabs on springs, free ones and half-spaces had 1.0 to 1.3 times it in error.

@@ -20,7 +20,6 @@ from math import ceil
 import numpy as np
 
 from fem.reduced import exponential_sum, line_response
-from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Response
 from simple_model.layers.flat_body import FINEST, steady_lines
 from simple_model.layers.material import Material
@@ -47,6 +46,7 @@ from skinwave.planning.estimates import mean_gain, spot_scale
 from skinwave.planning.refinement import relative_change
 from skinwave.scene.scene import SAMPLE_RATE as RATE
 from skinwave.scene.scene import Scene
+from skinwave.typing import Floats
 
 FOLLOWED, LONGER = 1000, 4  # samples that a start is followed for at first; factor on them
 GOES_ON = 0.02  # of its energy, in what may come after the time that it was followed for

@@ -8,7 +8,6 @@ from functools import lru_cache
 import numpy as np
 
 import fem
-from meshes.tetmesh import Floats
 from simple_model.layers.flat_body import FINEST
 from simple_model.load.sampling import resolving_step
 from skinwave.bodies.sizes import check_mesh
@@ -53,6 +52,7 @@ from skinwave.planning.rows import (
     sudden_over_tolerance,
 )
 from skinwave.scene.scene import Scene
+from skinwave.typing import Floats
 
 INTEGRAL_ERROR = 0.002  # of a wavenumber integral, beside finite elements
 Grid = tuple[Floats, int]  # as of `sample_grid`

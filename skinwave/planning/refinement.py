@@ -9,13 +9,10 @@ is between.
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
-from meshes.tetmesh import Floats
 from simple_model import Response
 from skinwave.bodies.build import COMPARED
 from skinwave.bodies.hands import FINE_PALM
@@ -32,6 +29,7 @@ from skinwave.models.reduced import (
     reduction_tolerance,
 )
 from skinwave.scene.scene import Body, Scene
+from skinwave.typing import Array, Floats
 
 FIRST, RATIO = 2.6, 1.3  # of the default element size; of two successive sizes
 FIRST_HAND = 1.6  # of the default element size, for hands
@@ -57,7 +55,7 @@ class SizeController:
     safety: float = 0.6
     largest_factor: float = 1.6
 
-    def error(self, other: NDArray[Any], found: NDArray[Any], ratio: float) -> float:
+    def error(self, other: Array, found: Array, ratio: float) -> float:
         """Relative error of a quantity of interest (k, p) by that of another mesh with elements
         `ratio` times as large.
         """
@@ -77,7 +75,7 @@ CONTROLLER = SizeController()
 NO_MOTION = 1e-9  # of the probe that moves most: what a weaker one reads is round-off
 
 
-def relative_change(other: NDArray[Any], found: NDArray[Any]) -> float:
+def relative_change(other: Array, found: Array) -> float:
     """Change of a quantity of interest (k, p) from another mesh's, relative, of the worst probe."""
     size = np.linalg.norm(found, axis=0)
     size = np.maximum(size, max(NO_MOTION * size.max(), 1e-300))
@@ -124,7 +122,7 @@ def refined(
     """
     h, tolerance = options.h, options.tolerance
 
-    def answered(size: float) -> tuple[ReducedBody, NDArray[Any]]:
+    def answered(size: float) -> tuple[ReducedBody, Array]:
         prepared = prepare(
             body, scene.probe_points, options.progress, h=size,
             tolerance=reduction_tolerance(tolerance), symmetry=symmetry, solver=options.solver,
@@ -216,12 +214,12 @@ def coarser_by(body: Body, other: float, h: float) -> float:
     return min(other / h, mean, key=lambda ratio: abs(np.log(ratio)))
 
 
-def about_its_rest(scene: Scene, waveforms: NDArray[Any]) -> NDArray[Any]:
+def about_its_rest(scene: Scene, waveforms: Array) -> Array:
     """Waveforms (t, p) without the mean under gravity, which would hide errors."""
     return waveforms - waveforms.mean(axis=0) if scene.load.gravity else waveforms
 
 
-def quantity_of_interest(prepared: ReducedBody, scene: Scene, found: Response) -> NDArray[Any]:
+def quantity_of_interest(prepared: ReducedBody, scene: Scene, found: Response) -> Array:
     """Quantity of interest of the response of a reduced body: its waveforms (t, p); of an
     unconstrained body the lines (f, p c) of its components without the mean, because rigid-body
     drift would hide the rest.
@@ -252,7 +250,7 @@ def above_band(waveforms: Floats, step: float) -> float:
 def convergence(
     body: Body,
     sizes: tuple[float, float],
-    found: tuple[NDArray[Any], NDArray[Any]],
+    found: tuple[Array, Array],
     tolerance: float,
     *,
     same: bool,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from meshes import TetMesh
-from meshes.tetmesh import Floats, facet_set
+from meshes.tetmesh import facet_set
 from simple_model import Effort
 from simple_model.drawing import new_axes
 from simple_model.numbers import counted, significant, stated_error
@@ -27,6 +27,7 @@ from skinwave.results.views import split
 from skinwave.scene.scene import Scene
 from skinwave.system.effort import Progress, SkinwaveWarning
 from skinwave.system.progress_bar import reported
+from skinwave.typing import Floats
 
 if TYPE_CHECKING:
     import pyvista as pv

@@ -14,12 +14,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from meshes.tetmesh import Floats
 from simple_model import spectrum
 from simple_model.drawing import small
 from skinwave.report.palette import colour, drawn_as, inked, label
 from skinwave.report.styles import NARROW, SHOWN, STYLES, TEXT, Style
 from skinwave.results.run import Run
+from skinwave.typing import Floats
 
 P = ParamSpec("P")
 REPORT = STYLES["report"]

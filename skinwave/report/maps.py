@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
-from meshes.tetmesh import Floats
 from simple_model.quantities import DISPLACEMENT, PRESSURE
 from skinwave.report.figures import REPORT, legend, panels, styled
 from skinwave.report.palette import COLOURS, SEQUENTIAL, SIGNED, inked, label
@@ -19,6 +18,7 @@ from skinwave.results.speeds import mach_angle
 from skinwave.results.surface import SurfaceField
 from skinwave.results.views import View, path_points
 from skinwave.scene.scene import Scene
+from skinwave.typing import Floats
 
 PIXELS = 201  # of a snapshot's side
 SNAPSHOT, SIDE, ALONE = 2.7, 3.85, 5.0  # inch: of a snapshot, a map with its bar, and one alone

@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from meshes.tetmesh import Floats
 from simple_model.quantities import Quantity
 from skinwave.report.figures import REPORT, legend, styled, written
 from skinwave.report.palette import inked, label, marker
 from skinwave.report.styles import Style
+from skinwave.typing import Floats
 
 MOST_LINES = 6
 NORMAL_95 = 1.96

@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from meshes.tetmesh import Floats
 from simple_model import drawing
 from simple_model.load.focus import spot_width
 from simple_model.numbers import counted, percent, stated_error
 from skinwave.report.description import asked_rows
+from skinwave.typing import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from meshes.tetmesh import Floats, Ints, boundary_facets
+from meshes.tetmesh import boundary_facets
 from simple_model.quantities import PRESSURE, quantity
 from skinwave.report.maps import carrier
 from skinwave.report.palette import SEQUENTIAL, SIGNED, colour, label
 from skinwave.report.styles import Style
 from skinwave.results.views import View, path_points, split
+from skinwave.typing import Floats, Ints
 
 Image = NDArray[np.uint8]
 Carrier = Callable[[Floats], Floats]  # values (s,) of a surface -> values at some places

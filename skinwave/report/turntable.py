@@ -6,15 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from meshes.tetmesh import Floats
 from simple_model import MovingPressure
-from simple_model.typing import Complex
 from skinwave.report.palette import label
 from skinwave.report.render import outer_surface
 from skinwave.results.views import View
 from skinwave.system.arrays import quantised
 from skinwave.system.scripts import bundle, encoded
 from skinwave.system.templates import render
+from skinwave.typing import Complex, Floats
 
 NEGLIGIBLE = 3e-3  # of the strongest line: weaker ones are left out
 MOST_LINES = 32

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from meshes.tetmesh import Floats
 from simple_model.numbers import decibel
 from simple_model.quantities import DISPLACEMENT
 from skinwave.results.run import Run
 from skinwave.scene.scene import Scene
 from skinwave.system.table import Table
+from skinwave.typing import Floats
 
 PRESENT = -60.0  # dB re f_AM: a line this weak is still seen above a vibrometer's noise
 ABSENT = -120.0  # dB

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
-from meshes.tetmesh import Floats
 from simple_model import Response, phasors
 from simple_model.load.sampling import step
 from simple_model.response import SETTLE
 from skinwave.system.drawn import drawn
+from skinwave.typing import Floats
 
 ROUND_OFF = 1e-6  # of the largest RMS motion: weaker lines are round-off
 AUDIBLE = -20.0  # dB re a line's largest probe: below it a phase says nothing

@@ -16,7 +16,6 @@ import fem
 from fem.krylov import load_subspace
 from fem.stress import SolidPart, nodal_strain, solid_parts
 from meshes import TetMesh, part
-from meshes.tetmesh import Floats, Ints
 from simple_model import Effort, Material, Response
 from simple_model.layers.tensors import hooke
 from simple_model.load.path_cells import path_samples
@@ -46,6 +45,7 @@ from skinwave.models.reduced import (
 )
 from skinwave.scene.scene import Reading, Scene
 from skinwave.system.effort import Clock, Progress, silent
+from skinwave.typing import Floats, Ints
 
 TOLERANCE = 0.01  # of the reduction; with it stress at the surface meets the load within 3 %
 MOST_VALUES = 500_000_000  # of the motion of a whole body, 4 GB

@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from meshes.tetmesh import Floats
 from simple_model import sensation_level
 from skinwave.results.comparison import heard_phasors, phase_delays
 from skinwave.results.run import Run
 from skinwave.results.surface import SurfaceField
 from skinwave.results.views import path_points
 from skinwave.scene.scene import Scene
+from skinwave.typing import Floats
 
 OUTSIDE, NEAR = -20.0, -6.0  # dB re the largest RMS: the kernel's region, and the spread
 PRESENT, ABSENT = -40.0, -100.0  # dB re the strongest component of the same response

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from meshes.tetmesh import Floats
 from simple_model import LineTable, Response, Unnamed, line_table, spectrum
 from simple_model.load.line_names import SAME, line_frequency
 from skinwave.scene.scene import Scene
+from skinwave.typing import Floats
 
 # Lines that claims are about, of one focus, whether or not the load has them.
 ASSESSED = (

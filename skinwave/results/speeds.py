@@ -5,9 +5,9 @@ from math import asin, ceil
 
 import numpy as np
 
-from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Tacton, pattern_period
 from simple_model.load.tacton import repeated
+from skinwave.typing import Floats
 
 FEWEST, MOST = 40, 256  # frames of an animation
 EACH = 8  # frames to a period of the fastest line that counts

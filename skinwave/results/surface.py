@@ -15,7 +15,6 @@ import numpy as np
 import fem
 from fem.load_and_probe import on_surface, surface_frame
 from meshes import reading
-from meshes.tetmesh import Floats
 from simple_model import MovingPressure, sensation_level
 from simple_model.layers.flat_body import field_lines, steady_lines
 from simple_model.load.spectrum import load_lines, pressure_lines, synthesise
@@ -33,6 +32,7 @@ from skinwave.planning.left_out import beyond_linear
 from skinwave.results.motion import TOLERANCE, BodyMotion, driven
 from skinwave.scene.scene import Reading, Scene
 from skinwave.system.effort import Progress
+from skinwave.typing import Floats
 
 REACH, STEP = 0.044, 0.001  # m of a map either way from the middle, and between its places
 FAINT = 1e-4  # of the load's strongest line: lines that no map shows

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fem.load_and_probe import node_operator
 from meshes import reading
-from meshes.tetmesh import Floats, Ints, boundary_facets
+from meshes.tetmesh import boundary_facets
 from simple_model import Effort
 from simple_model.layers.flat_body import steady_lines
 from simple_model.load.spectrum import pressure_lines, synthesise
@@ -33,6 +33,7 @@ from skinwave.results.surface import FAINT, Lines
 from skinwave.scene.file import dumps, loads
 from skinwave.scene.scene import Scene
 from skinwave.system.json_kinds import effort_of, fitting
+from skinwave.typing import Array, Floats, Ints
 
 STRONG = 0.1  # of the strongest line: weaker ones need no frames of their own
 GRID, LAYER_GRID = 121, 81  # points along a side of the surface of the point kernel, of a layer
@@ -296,7 +297,7 @@ def load(path: Path) -> View:
         raise ValueError(f"{path} is no view ({error}); make it anew from its scene") from None
 
 
-def _tensors(arrays: dict[str, NDArray[Any]]) -> Tensors | None:
+def _tensors(arrays: dict[str, Array]) -> Tensors | None:
     """Tensors among the arrays of a view, if there are any."""
     if "tensor_frames" not in arrays:
         return None

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
-from meshes.tetmesh import Floats
 from simple_model.choices import choose, meant
 from skinwave.system.plain_text import number_in
+from skinwave.typing import Floats
 
 VALUE, SHAPE = "value", "distribution"  # keys of a table beside its width
 TAIL = 1.6448536269514722  # standard deviations from the median of a normal to its 95th percentile

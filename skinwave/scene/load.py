@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from meshes.tetmesh import Floats
 from simple_model import MovingPressure
 from simple_model.choices import choose
 from simple_model.load.focus import NOMINAL_HEIGHT, ContactSpot
+from skinwave.typing import Floats
 
 ALONG_PATH = "path"
 STRONGEST = 30.0  # m/s2 of gravity: three times that of the earth

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simple_model import MovingPressure, Tacton
 from simple_model.quantities import DISPLACEMENT, STRAIN, Quantity, quantity
@@ -28,6 +27,7 @@ from skinwave.bodies import (
 from skinwave.scene.distributions import Distribution
 from skinwave.scene.load import PRESSURE, Load
 from skinwave.system.drawn import drawn
+from skinwave.typing import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -189,7 +189,7 @@ class Scene:
         return self.load.pressures(self.pressure)
 
     @property
-    def probe_points(self) -> NDArray[np.float64]:
+    def probe_points(self) -> Floats:
         """Probes as an array (p, 2) in metre."""
         return np.array(self.probes)
 

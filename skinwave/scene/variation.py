@@ -14,7 +14,6 @@ import numpy as np
 import tomli_w
 
 from meshes import reading
-from meshes.tetmesh import Floats
 from simple_model.choices import choose, meant
 from skinwave.scene.distributions import Spread, called, uniform
 from skinwave.scene.file import (
@@ -31,6 +30,7 @@ from skinwave.scene.keys import SCALES, SECTIONS, changed
 from skinwave.scene.scene import BODIES, Body, Scene, solid_of, with_body
 from skinwave.scene.spreads import PRESSURE
 from skinwave.system.plain_text import number_in
+from skinwave.typing import Floats
 
 DESIGNS = ("factorial", "zip", "lhs", "sobol")
 SAMPLED = ("lhs", "sobol")  # of which --samples says how many

@@ -14,7 +14,6 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
-from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Response, Tacton, Trajectory, lines, resolved_lines
 from skinwave.models.plate_modes import FROM_REST, STRETCHED
 from skinwave.models.reduced import answer, prepare
@@ -27,6 +26,7 @@ from skinwave.scene.scene import BODIES, PROBES, Body, Scene
 from skinwave.system.document import Details, Picture, Report
 from skinwave.system.effort import Progress
 from skinwave.system.table import Column, Table
+from skinwave.typing import Floats
 
 DURATION = 0.5  # s of each Tacton, of which the later half is read
 AMPLITUDES = (0.25, 0.5, 1.0)

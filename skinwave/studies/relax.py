@@ -21,7 +21,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from fem import NotReduced
-from meshes.tetmesh import Floats
 from simple_model import Effort, MovingPressure, Response, lines, resolved_lines, sensation_level
 from simple_model.load.drive import beyond_published
 from simple_model.numbers import decibel, significant
@@ -48,6 +47,7 @@ from skinwave.system.document import Details, Part, Picture, Report
 from skinwave.system.effort import Progress, peak_memory
 from skinwave.system.processes import pool
 from skinwave.system.table import Column, Table
+from skinwave.typing import Floats
 
 HIGHEST, FAINTEST = 600.0, 0.01  # Hz of the lines that are followed; of the strongest at a probe
 TINY = np.finfo(float).tiny

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from meshes.tetmesh import Floats
 from simple_model import Effort
 from simple_model.numbers import FAINTEST, counted, decibel, interval, percent, significant
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
@@ -17,6 +16,7 @@ from skinwave.results.propagation import strongest_component
 from skinwave.results.run import Run
 from skinwave.system.document import Details, Markup, Part, Section
 from skinwave.system.table import Column, Table
+from skinwave.typing import Floats
 
 SILENT = 0.01  # of the strongest probe: where the reference moves less, no misfit is given
 ROUND_OFF = 1e-3  # of a millisecond, or of a misfit

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from meshes.tetmesh import Floats
 from simple_model.choices import choose
 from simple_model.numbers import significant
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
@@ -22,6 +21,7 @@ from skinwave.sweeps.ensemble import is_linear
 from skinwave.sweeps.reductions import model_of
 from skinwave.sweeps.sweep import Combined, Sweep
 from skinwave.sweeps.table_figures import at_probe, value
+from skinwave.typing import Floats
 
 SAMPLES, FEWEST = 199, 39  # of the spreads; those that have a 95 % interval
 ENDS = (2.5, 97.5)  # percentiles between which the interval lies

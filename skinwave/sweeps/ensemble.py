@@ -13,14 +13,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from meshes.tetmesh import Floats
 from simple_model import MovingPressure, named_lines, phasors, sensation_level
 from simple_model.layers.compliance import Compliance
 from simple_model.layers.flat_body import path_operator, steady_lines
 from simple_model.load.line_names import line_frequency
 from simple_model.load.spectrum import synthesise
 from simple_model.response import SETTLE
-from simple_model.typing import Complex
 from skinwave.bodies.analytic import compliance
 from skinwave.bodies.sizes import default_size
 from skinwave.models import named
@@ -41,6 +39,7 @@ from skinwave.sweeps import engine
 from skinwave.sweeps.measures import plain, unit_of
 from skinwave.sweeps.sampling import one_at_a_time, samples
 from skinwave.system.effort import Progress, one_thread, silent
+from skinwave.typing import Complex, Floats
 
 WEAKEST, MOST = 1e-2, 24  # of the strongest line of the load, and lines, that are looked at
 BATCH = 16  # samples that are handed out together

@@ -10,11 +10,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from meshes.tetmesh import Floats
 from skinwave.scene.distributions import Spread
 from skinwave.scene.variation import MOST_RUNS, combinations
+from skinwave.typing import Floats, Ints
 
 ENDS = (0.05, 0.95)  # quantiles that a number is moved to
 RESAMPLES = 200  # of the standard errors, by bootstrap
@@ -111,7 +110,7 @@ def sobol_indices(values: Floats, d: int, seed: int = 0) -> SobolIndices:
     return SobolIndices(first=first, total=total, first_error=errors[0], total_error=errors[1], n=n)
 
 
-def _estimates(matrices: Floats, drawn: NDArray[np.int_]) -> Floats:
+def _estimates(matrices: Floats, drawn: Ints) -> Floats:
     """Both indices (2, d, r) of rows (r, n) of matrices (d + 2, n): A, B, and A with columns of B.
 
     Saltelli et al. (2010), table 2 b and f.

@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from meshes.tetmesh import Floats
 from simple_model import threshold
 from simple_model.load.line_names import line_frequency
 from skinwave.report.figures import HIGHEST, written
@@ -18,6 +17,7 @@ from skinwave.report.styles import STYLES
 from skinwave.results.views import path_points
 from skinwave.sweeps.ensemble import STEP, Ensemble, map_axes, shown_times
 from skinwave.sweeps.sampling import ENDS, PERCENTILES, Tornado, percentiles
+from skinwave.typing import Floats
 
 REPORT = STYLES["report"]
 BAND, CENTRE = SERIES[:2]

@@ -12,8 +12,8 @@ import meshes
 from fem.boundary import fixed_dofs
 from fem.elements import shape_derivatives, shape_functions, tetrahedron_rule
 from meshes import TetMesh
+from skinwave.typing import Floats
 from skinwave.verify.case import Check, Checks, below, case, order
-from skinwave.verify.references import Floats
 
 ZIENKIEWICZ = "Zienkiewicz and Taylor, The Finite Element Method, volume 1 (2000)"
 PATCH = f"Irons and Razzaque (1972); {ZIENKIEWICZ}, chapter 10"

@@ -15,14 +15,14 @@ from simple_model.layers.flat_body import steady_lines
 from simple_model.layers.wavenumber_integral import point_response
 from simple_model.load.path_cells import path_fourier, path_samples
 from simple_model.load.spectrum import load_lines
+from skinwave.typing import Array
 from skinwave.verify import references
 from skinwave.verify.case import Checks, below, case, largest, misfit, relative
 from skinwave.verify.plates import PAPER, THICKNESS
-from skinwave.verify.references import Complex, Floats
 from skinwave.verify.statics import WIDTH
 from skinwave.verify.waves import FOREARM
 
-Kernel = Callable[[Floats], Complex]
+Kernel = Callable[[Array], Array]
 RADII = np.array([0, 5, 10, 15, 20, 30]) * 1e-3
 FREQUENCIES = np.array([20.0, 80.0, 140.0, 191.0, 210.0])  # Hz
 SKIN = fem.Material(**FOREARM, poisson=0.49)
@@ -187,8 +187,8 @@ def _beside_exact_waves(
 
 def _line(
     mesh: TetMesh, quarter: Callable[[bool], fem.Operators], load: MovingPressure, hz: float,
-    probes: Floats,
-) -> Complex:  # fmt: skip
+    probes: Array,
+) -> Array:  # fmt: skip
     """One line's complex amplitude (p,) in metre from a quarter of the body, odd or even in x.
 
     Harmonic n of the circling focal spot is f(r) exp(-i n angle); a probe on the x axis responds
@@ -203,7 +203,7 @@ def _line(
     return fem.probe_operator(mesh, probes) @ fem.harmonic(ops, force, hz)[0]
 
 
-def _on_half_space(hz: Floats, moduli: Complex | None = None) -> Complex:
+def _on_half_space(hz: Array, moduli: Array | None = None) -> Array:
     """Response (f, r) of an incompressible half-space, of `SKIN` or of other complex moduli."""
     kernels = [_space(f, None if moduli is None else moduli[k]) for k, f in enumerate(hz)]
     return np.array([references.gaussian_response(k, RADII, width=WIDTH) for k in kernels])

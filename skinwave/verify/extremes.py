@@ -7,12 +7,12 @@ from functools import cache
 import numpy as np
 
 import fem
-from meshes.tetmesh import Floats
 from simple_model import MovingPressure, Response, Tacton, Trajectory, lines
 from simple_model.load.focus import spot_width
 from skinwave.bodies.build import Build, build, operators
 from skinwave.models.reduced import ReducedBody, answer, prepare
 from skinwave.scene.scene import Body, Scene
+from skinwave.typing import Floats
 from skinwave.verify.case import Checks, below, case, relative
 
 BODY = Body(width=0.06, height=0.06, depth=0.015, sides="clamped")

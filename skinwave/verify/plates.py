@@ -12,9 +12,9 @@ import meshes
 from fem.added_mass import near_field
 from simple_model.layers.compliance import AIR_DENSITY, thin_sheet
 from simple_model.layers.wavenumber_integral import point_response
+from skinwave.typing import Floats
 from skinwave.verify import references
 from skinwave.verify.case import Checks, below, case, misfit, order, relative
-from skinwave.verify.references import Floats
 from skinwave.verify.statics import WIDTH
 
 SLIDING = {"left": "yz", "right": "yz", "front": "xz", "back": "xz"}

@@ -6,7 +6,7 @@ from math import inf
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 import fem
 from simple_model import MovingPressure, Tacton, Trajectory
@@ -14,13 +14,13 @@ from simple_model.layers.dispersion import Mode
 from simple_model.layers.flat_body import steady_state
 from simple_model.layers.wavenumber_integral import point_response
 from simple_model.load.focus import NOMINAL_HEIGHT, lobe_width, spot_width
-from simple_model.typing import Floats
 from skinwave.bodies import BODIES as PRESETS
 from skinwave.bodies import Body
 from skinwave.bodies.analytic import compliance, dispersion
 from skinwave.bodies.build import build, operators
 from skinwave.models.meshed import surface_load, surface_motion
 from skinwave.system.effort import Progress
+from skinwave.typing import Floats, Ints
 from skinwave.verify.published import SPEED, Quantity
 
 # Half-spaces of one material, and slabs on bone; skin-slab is the default scene's, of 15 mm.
@@ -41,7 +41,7 @@ class Curves:
     """
 
     frequencies: Floats
-    mode: NDArray[np.int_]
+    mode: Ints
     speed: Floats
     length: Floats
 

@@ -1,28 +1,25 @@
 """Closed forms and series from the literature. Time is exp(+i w t); SI units throughout."""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import simpson, solve_bvp, solve_ivp
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 from scipy.special import ive, jv
 
-Floats = NDArray[Any]  # float64
-Complex = NDArray[Any]  # complex128
+from skinwave.typing import Array
 
 
-def gaussian_at_rest(r: Floats, *, width: float, shear_modulus: float, poisson: float) -> Floats:
+def gaussian_at_rest(r: Array, *, width: float, shear_modulus: float, poisson: float) -> Array:
     """Deflection of a half-space under exp(-r^2 / 2 s^2) Pa: kernel (1 - nu) / (mu k)."""
     x = (r / width) ** 2 / 4
     return (1 - poisson) * width * np.sqrt(np.pi / 2) / shear_modulus * ive(0, x)
 
 
 def gaussian_on_bonded_layer(
-    r: Floats, *, width: float, shear_modulus: float, poisson: float, depth: float
-) -> Floats:
+    r: Array, *, width: float, shear_modulus: float, poisson: float, depth: float
+) -> Array:
     """The same on a layer bonded to a rigid base: that kernel times
     (2 c sinh 2u - 4u) / (2 c cosh 2u + 4 u^2 + 1 + c^2), u = k depth, c = 3 - 4 nu.
     """
@@ -34,9 +31,7 @@ def gaussian_on_bonded_layer(
     return simpson(spot * jv(0, r[:, None] * k), x=k, axis=1)
 
 
-def half_space_kernel(
-    k: Floats, w: float, *, density: float, mu: complex, poisson: float
-) -> Complex:
+def half_space_kernel(k: Array, w: float, *, density: float, mu: complex, poisson: float) -> Array:
     """Deflection per pressure of wavenumber k, with a complex modulus: -b_p k_s^2 / (mu R),
     R = (2 k^2 - k_s^2)^2 - 4 k^2 b_p b_s.
     """
@@ -45,19 +40,19 @@ def half_space_kernel(
     return -bp * ks2 / mu / ((2 * k**2 - ks2) ** 2 - 4 * k**2 * bp * bs)
 
 
-def plate_kernel(k: Floats, w: float, *, stiffness: complex, mass: float, air: float) -> Complex:
+def plate_kernel(k: Array, w: float, *, stiffness: complex, mass: float, air: float) -> Array:
     """1 / [D k^4 - (m + 2 air / k) w^2]."""
     return 1 / (stiffness * k**4 - (mass + 2 * air / k) * w**2)
 
 
 def gaussian_response(
-    kernel: Callable[[Floats], Complex],
-    r: Floats,
+    kernel: Callable[[Array], Array],
+    r: Array,
     *,
     width: float,
     circle: float = 0.0,
     harmonic: int = 0,
-) -> Complex:
+) -> Array:
     """Hankel's integral of a kernel for a Gaussian push of 1 Pa. On a circle of radius R, harmonic
     n of the turning push moves radius r by int s^2 exp(-k^2 s^2 / 2) G(k) J_n(k R) J_n(k r) k dk.
     """
@@ -102,7 +97,7 @@ def rayleigh_lamb(k: float, *, thickness: float, poisson: float, symmetric: bool
     return brentq(balance, w[first], w[first + 1], xtol=1e-13 * k)
 
 
-def clamped_plate() -> tuple[Floats, float]:
+def clamped_plate() -> tuple[Array, float]:
     """w a^2 sqrt(m / D) (ascending) and central deflection D w / q a^4 of a clamped square plate,
     by the polynomials (1 - x^2)^2 x^n. Young has 35.99 and 73.41, Timoshenko 0.00126.
     """
@@ -120,7 +115,7 @@ def clamped_plate() -> tuple[Floats, float]:
     return parameters, float(np.kron(centre, centre) @ np.linalg.solve(K, np.kron(load, load)) / 16)
 
 
-def moving_force_on_beam(t: Floats, *, speed: float, critical: float, period: float) -> Floats:
+def moving_force_on_beam(t: Array, *, speed: float, critical: float, period: float) -> Array:
     """Mid-span deflection over F L^3 / 48 E I while a force crosses a simply supported beam, by a
     sum over modes n; `period` is that of the first.
     """
@@ -133,8 +128,8 @@ def moving_force_on_beam(t: Floats, *, speed: float, critical: float, period: fl
 
 
 def layered_column(
-    w: Floats, lengths: list[float], densities: list[float], moduli: list[Complex]
-) -> Complex:
+    w: Array, lengths: list[float], densities: list[float], moduli: list[Array]
+) -> Array:
     """Top displacement per top stress of a column of layers, from the fixed base: tan(k L) / (k M)
     of one layer, joined by the addition theorem of the tangent; M complex with loss.
     """
@@ -147,22 +142,22 @@ def layered_column(
 
 
 def lamb_pulse(
-    t: Floats, r: float, *, mu: float, shear_speed: float, delay: float, width: float
-) -> Floats:
+    t: Array, r: float, *, mu: float, shear_speed: float, delay: float, width: float
+) -> Array:
     """Vertical surface motion at r under a point force exp(-(t - delay)^2 / 2 width^2) N, nu 1/4:
     the step response as Mooney writes it, convolved with the derivative of the force.
     """
     s, g = np.sqrt(3), np.sqrt(3 + np.sqrt(3)) / 2
     x, weight = np.polynomial.legendre.leggauss(400)
 
-    def early(tau: Floats) -> Floats:
+    def early(tau: Array) -> Array:
         rest = np.sqrt(3 * s - 5) / np.sqrt(tau**2 - (3 - s) / 4) - s / np.sqrt(tau**2 - 0.25)
         return (6 - np.sqrt(3 * s + 5) / np.sqrt(g**2 - tau**2) + rest) / 32
 
-    def late(tau: Floats) -> Floats:
+    def late(tau: Array) -> Array:
         return (6 - np.sqrt(3 * s + 5) / np.sqrt(g**2 - tau**2)) / 16
 
-    def convolved(step: Callable[[Floats], Floats], low: float, high: float) -> Floats:
+    def convolved(step: Callable[[Array], Array], low: float, high: float) -> Array:
         """tau = g sin(angle) takes the root at the Rayleigh arrival away."""
         low, high = np.arcsin(low / g), np.arcsin(high / g)
         angle = (low + high) / 2 + (high - low) / 2 * x
@@ -175,7 +170,7 @@ def lamb_pulse(
     return (convolved(early, 1 / s, 1) + convolved(late, 1, g) + after) / (np.pi * mu * r)
 
 
-def in_plane_reflection(k: float, ks: float, *, poisson: float) -> tuple[Complex, Complex]:
+def in_plane_reflection(k: float, ks: float, *, poisson: float) -> tuple[Array, Array]:
     """Reflected (P, SV) displacement amplitudes of a viscous boundary, a row for each of P, SV in,
     for plane waves of wavenumber k along it; ks is that of shear waves. Also the waves: rows P in,
     SV in, P out, SV out; motion along and towards the boundary, wavenumber towards it.
@@ -214,8 +209,8 @@ def elastica(load: float) -> tuple[float, float]:
     0.30172 and 0.05643 at 1.
     """
 
-    def bent(tip: float) -> Floats:
-        def slope(s: float, y: Floats) -> list[float]:
+    def bent(tip: float) -> Array:
+        def slope(s: float, y: Array) -> list[float]:
             return [y[1], -load * np.cos(y[0]), np.sin(y[0]), np.cos(y[0])]
 
         return solve_ivp(slope, (1, 0), [tip, 0, 0, 0], rtol=1e-11, atol=1e-12).y[:, -1]
@@ -230,11 +225,11 @@ def karman_disc(load: float, poisson: float) -> float:
     load, N'' + 3 N' / r = -6 (1 - nu^2) g^2.
     """
 
-    def slopes(r: Floats, y: Floats) -> Floats:
+    def slopes(r: Array, y: Array) -> Array:
         g, dg, N, dN, _ = y
         return np.vstack([dg, N * g + 32 * load, dN, -6 * (1 - poisson**2) * g**2, r * g])
 
-    def ends(a: Floats, b: Floats) -> Floats:
+    def ends(a: Array, b: Array) -> Array:
         return np.array([a[1], a[3], b[0], b[3] + (1 - poisson) * b[2], b[4]])
 
     r = np.linspace(0, 1, 101)

@@ -8,9 +8,9 @@ from scipy import sparse
 import fem
 import meshes
 from meshes import TetMesh
+from skinwave.typing import Array
 from skinwave.verify import references
 from skinwave.verify.case import Checks, case, largest, relative
-from skinwave.verify.references import Complex, Floats
 
 WIDTH = 4.35e-3  # m, standard deviation of the Gaussian focus
 RADII = np.array([0, 5, 10, 15, 20]) * 1e-3
@@ -25,13 +25,13 @@ def quarter_space(length: float, growth: float, radius: float, h: float = 0.0025
     return meshes.extrude(across, across, -down[::-1])
 
 
-def focus_force(mesh: TetMesh) -> Floats:
+def focus_force(mesh: TetMesh) -> Array:
     """Nodal forces (3 n,) in N of a Gaussian focus of 1 Pa at the origin."""
     points = fem.facet_points(mesh)
     return fem.load_operator(mesh) @ np.exp(-(points[:, :2] ** 2).sum(axis=1) / 2 / WIDTH**2)
 
 
-def on_axis(mesh: TetMesh, radii: Floats) -> sparse.csr_array:
+def on_axis(mesh: TetMesh, radii: Array) -> sparse.csr_array:
     """Probes (p, 3 n) along the x axis."""
     return fem.probe_operator(mesh, np.column_stack([radii, 0 * radii]))
 
@@ -96,7 +96,7 @@ def stiffness_contrast() -> Checks:
 
 def column(
     lengths: list[float], cells: int, solids: dict[int, fem.Material]
-) -> tuple[fem.Operators, Floats, Floats]:
+) -> tuple[fem.Operators, Array, Array]:
     """Operators of a column of layers, from the base upwards, one cell across with sliding sides;
     the force of 1 Pa and the mean of its top as (3 n,).
     """
@@ -162,7 +162,7 @@ def fingertip() -> TetMesh:
     return _straight_sided(meshes.fingertip_mesh(SHAPE, 4e-3))
 
 
-def fingertip_push(mesh: TetMesh) -> Floats:
+def fingertip_push(mesh: TetMesh) -> Array:
     """Nodal forces (3 n,) in N, downwards on the nodes of the top about the origin."""
     top = np.unique(mesh.facets["top"])
     force = np.zeros(mesh.points.shape)
@@ -170,13 +170,13 @@ def fingertip_push(mesh: TetMesh) -> Floats:
     return force.ravel()
 
 
-def fingertip_motion(mesh: TetMesh, materials: dict[int, fem.Material]) -> tuple[Floats, Complex]:
+def fingertip_motion(mesh: TetMesh, materials: dict[int, fem.Material]) -> tuple[Array, Array]:
     """Motion (3 n,) in metre at rest and at `FREQUENCY`, of a fingertip held at its cut."""
     ops, force = fem.assemble(mesh, materials, fixed="sides"), fingertip_push(mesh)
     return fem.static(ops, force), fem.harmonic(ops, force, FREQUENCY)[0]
 
 
-def fingertip_summary(mesh: TetMesh, u: Complex) -> Complex:
+def fingertip_summary(mesh: TetMesh, u: Array) -> Array:
     """Work of the push in J, the root of the summed squares of u (3 n,), and the height of the tip
     and of the end of the bone, in metre.
     """

@@ -9,10 +9,10 @@ from scipy import sparse
 
 import fem
 import meshes
+from skinwave.typing import Complex, Floats
 from skinwave.verify import references
 from skinwave.verify.case import Check, Checks, below, case, largest, order
 from skinwave.verify.exact import ZENER
-from skinwave.verify.references import Complex, Floats
 from skinwave.verify.statics import column
 
 HUGHES = "Hughes, The Finite Element Method (1987), chapter 9"

@@ -13,9 +13,9 @@ from meshes import TetMesh
 from skinwave.bodies.absorbing_layer import layer_drag, layer_of
 from skinwave.bodies.slab import slab_lines
 from skinwave.scene.scene import Body
+from skinwave.typing import Array
 from skinwave.verify import references
 from skinwave.verify.case import Checks, absolute, below, case, largest, misfit, relative
-from skinwave.verify.references import Floats
 from skinwave.verify.statics import QUARTER, RADII, WIDTH, focus_force, on_axis, quarter_space
 
 FOREARM: dict[str, Any] = {"density": 1000.0, "shear_modulus": 7.86e3, "viscosity": 5.03}
@@ -157,7 +157,7 @@ def absorbing_layer() -> Checks:
     yield below("at 20 and 51 Hz", errors[:2].max(), 0.001)
 
 
-def _plane_slab(body: Body, hertz: Floats, h: float = 2.5e-3) -> Floats:
+def _plane_slab(body: Body, hertz: Array, h: float = 2.5e-3) -> Array:
     """Displacement (f, p) in metre under a line focus, in the half x > 0 of a plane slab."""
     x, _, z = slab_lines(body, h)
     mesh = meshes.half(meshes.extrude(x, [0, h], z), "x")
@@ -170,7 +170,7 @@ def _plane_slab(body: Body, hertz: Floats, h: float = 2.5e-3) -> Floats:
     return np.array([S @ fem.harmonic(ops, force, f)[0] for f in hertz])
 
 
-def _strip_modes(k: float) -> Floats:
+def _strip_modes(k: float) -> Array:
     """Angular frequencies of half a wavelength of a plate between sliding ends."""
     x = np.linspace(0, np.pi / k, max(8, int(np.ceil(2 * np.pi / k))) + 1)
     mesh = meshes.extrude(x, [0, 0.25], np.linspace(-1, 0, 5))
@@ -188,7 +188,7 @@ def _sector(length: float, h: float) -> TetMesh:
     return TetMesh(points=points, tets=box.tets, facets=box.facets)
 
 
-def _crest(t: Floats, u: Floats) -> Floats:
+def _crest(t: Array, u: Array) -> Array:
     """Times of the largest value of each column, by a parabola through three samples."""
     k, columns = np.argmax(u, axis=0), np.arange(u.shape[1])
     a, b, c = u[k - 1, columns], u[k, columns], u[k + 1, columns]
@@ -203,7 +203,7 @@ def _strip(k: float, length: float) -> TetMesh:
     return meshes.extrude(np.linspace(0, width, int(np.ceil(width / h)) + 1), [0, h], z)
 
 
-def _reflected_in_plane(k: float, waves: Floats) -> Floats:
+def _reflected_in_plane(k: float, waves: Array) -> Array:
     """Reflection (P and SV in, P and SV out) at the base, from two ways to push the top."""
     mesh, length = _strip(k, 3.0), 3.0
     x, _, z = mesh.points.T
