@@ -192,7 +192,7 @@ def _runs(scene: Scene, modes: PlateModes) -> Iterator[tuple[Run, Floats]]:
     """Steady state of each Tacton, of the quantity that the vibrometer reads, and the modal forces
     (m,) of its mean.
     """
-    asked, offset = scene.reading.asked, scene.body.placement.offset
+    asked, offset = scene.reading.record, scene.body.placement.offset
     shapes = modes.at(scene.probe_points - offset)
     paths: dict[Any, NDArray[Any]] = {}  # Tactons on one path share its forces
     for name, tacton in tactons():

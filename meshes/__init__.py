@@ -1,6 +1,6 @@
 """Tetrahedral meshes of bodies: structured, from files, and of a parametric palm."""
 
-from meshes.facets import seen_from_above, tag_boundary
+from meshes.facets import tag_boundary, visible_from_above
 from meshes.files.import_body import body_from_file
 from meshes.files.mesh_files import read, write
 from meshes.shapes.palm import Palm
@@ -61,9 +61,9 @@ __all__ = [
     "quadratic",
     "read",
     "repaired",
-    "seen_from_above",
     "sheet",
     "tag_boundary",
     "tetrahedralise",
+    "visible_from_above",
     "write",
 ]

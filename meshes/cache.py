@@ -66,7 +66,7 @@ def load(name: str) -> dict[str, Any] | None:
         return None
     path = home / f"{name}.npz"
     try:
-        with reading.opened(path) as file, np.load(file) as entry:
+        with reading.open_regular(path) as file, np.load(file) as entry:
             arrays: dict[str, Any] = {field: entry[field] for field in entry.files}
         meta = json.loads(str(arrays.pop("meta")))["meta"]
     except Exception:  # whatever zip files, array headers or JSON make of spoilt bytes

@@ -48,7 +48,7 @@ def tag_boundary(
     return replace(mesh, facets={**mesh.facets, "surface": facets, **sets})
 
 
-def seen_from_above(mesh: TetMesh) -> np.ndarray:
+def visible_from_above(mesh: TetMesh) -> np.ndarray:
     """Mask (k,) of the boundary facets, in the order of `boundary_facets`, that face upwards and
     have nothing of the body above their centroid.
     """

@@ -24,7 +24,7 @@ PathLike = str | os.PathLike[str]
 
 
 @contextmanager
-def opened(path: PathLike, limit: float = np.inf) -> Iterator[BinaryIO]:
+def open_regular(path: PathLike, limit: float = np.inf) -> Iterator[BinaryIO]:
     """Open a regular file of at most `limit` bytes for reading; a ValueError if it cannot be
     opened, is a pipe, a device or a folder, or is larger.
     """
@@ -45,28 +45,28 @@ def opened(path: PathLike, limit: float = np.inf) -> Iterator[BinaryIO]:
         yield file
 
 
-def content(path: PathLike, limit: int) -> bytes:
-    """Return all bytes of a regular file of at most `limit`; raises what `opened` does."""
-    with opened(path, limit) as file:
+def read_bytes(path: PathLike, limit: int) -> bytes:
+    """Return all bytes of a regular file of at most `limit`; raises what `open_regular` does."""
+    with open_regular(path, limit) as file:
         try:
             return file.read(limit + 1)
         except OSError as error:
             raise ValueError(f"{path}: cannot be read ({_reason(error)}); check it") from None
 
 
-def text(path: PathLike, limit: int = LARGEST_TEXT) -> str:
-    """Return the UTF-8 text of a file of at most `limit` bytes; raises what `opened` does."""
+def read_text(path: PathLike, limit: int = LARGEST_TEXT) -> str:
+    """Return the UTF-8 text of a file of at most `limit` bytes; raises what `open_regular` does."""
     try:
-        return content(path, limit).decode("utf-8-sig")
+        return read_bytes(path, limit).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise ValueError(f"{path}: no UTF-8 text ({error.reason}); save it as such") from None
 
 
-def exported_text(path: PathLike, limit: int = LARGEST_TEXT) -> str:
+def read_exported_text(path: PathLike, limit: int = LARGEST_TEXT) -> str:
     """Return the text of a file as programs export it: UTF-8, UTF-16, or Windows' Latin-1; raises a
-    ValueError if it is no text, or as `opened` does.
+    ValueError if it is no text, or as `open_regular` does.
     """
-    found = content(path, limit)
+    found = read_bytes(path, limit)
     encodings = ["utf-8-sig", "cp1252", "latin-1"]
     if found.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         encodings = ["utf-16"]
@@ -83,11 +83,11 @@ def exported_text(path: PathLike, limit: int = LARGEST_TEXT) -> str:
     raise ValueError(f"{path}: no text; export it as text in UTF-8, or name it by its format")
 
 
-def arrays(path: PathLike) -> dict[str, Array]:
+def load_arrays(path: PathLike) -> dict[str, Array]:
     """Return the arrays of an .npz file, by name; a ValueError if it is none, or unpacks to more
     than `UNPACKED` bytes and `GROWTH` times its size.
     """
-    with opened(path) as file:
+    with open_regular(path) as file:
         try:
             limit = max(UNPACKED, GROWTH * os.fstat(file.fileno()).st_size)
             with zipfile.ZipFile(file) as archive:
@@ -105,9 +105,9 @@ def arrays(path: PathLike) -> dict[str, Array]:
             ) from None
 
 
-def parsed(path: PathLike) -> Any:
+def load_json(path: PathLike) -> Any:
     """Return the parsed content of a JSON file; a ValueError if it is no JSON."""
-    found = text(path)
+    found = read_text(path)
     try:
         return json.loads(found)
     except (ValueError, RecursionError) as error:

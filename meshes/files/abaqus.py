@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from meshes.reading import exported_text
+from meshes.reading import read_exported_text
 from meshes.tetmesh import MeshError
 from meshes.typing import Floats
 
@@ -82,7 +82,7 @@ def read_abaqus(path: Path) -> Any:
 def _lines(path: Path, level: int = 0) -> Iterator[str]:
     """Lines that are neither empty nor comments, with those of included files in their places."""
     try:
-        content = exported_text(path, LARGEST).splitlines()
+        content = read_exported_text(path, LARGEST).splitlines()
     except ValueError as error:
         raise MeshError(str(error)) from None
     head = ""

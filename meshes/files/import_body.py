@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from meshes.facets import geometry, seen_from_above, tag_boundary
+from meshes.facets import geometry, tag_boundary, visible_from_above
 from meshes.files.mesh_files import UNITS, Contents, mesh_of, read_contents, scale_of
 from meshes.reading import PathLike
 from meshes.shapes.structured import Grading
@@ -173,7 +173,7 @@ def _on_top(mesh: TetMesh, say: Say) -> TetMesh:
 
 def _with_sides(mesh: TetMesh, planes: Sequence[float] = (), tolerance: float = 0.0) -> TetMesh:
     """The mesh with `surface`, `top`, `cut` and `bottom`, of which it keeps what it has."""
-    seen = seen_from_above(mesh)
+    seen = visible_from_above(mesh)
     sides = {"top": seen}
     if planes:
         is_cut = on_planes(planes, tolerance)(*geometry(mesh, boundary_facets(mesh.tets)))

@@ -14,7 +14,7 @@ from itertools import combinations, permutations
 
 import numpy as np
 
-from meshes.facets import seen_from_above, tag_boundary
+from meshes.facets import tag_boundary, visible_from_above
 from meshes.shapes.palm import Palm, gradient, level_set, rise
 from meshes.shapes.structured import check_size
 from meshes.tetmesh import MeshError, TetMesh, corner_volumes, quadratic
@@ -64,7 +64,7 @@ def mapped_palm(palm: Palm, x: Floats, y: Floats, z: Floats) -> TetMesh:
     return tag_boundary(
         mesh,
         rest="back",
-        top=seen_from_above(mesh),
+        top=visible_from_above(mesh),
         wrist=lambda centroids, normals: normals[:, 1] < -(0.5**0.5),
         fingers=lambda centroids, normals: normals[:, 1] > 0.5**0.5,
     )

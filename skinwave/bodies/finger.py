@@ -6,8 +6,8 @@ from meshes import Fingertip, fingertip_mesh
 from meshes.volume.fingertip import quarter_of, shells_of
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised
-from skinwave.bodies.hands import in_its_layers
 from skinwave.bodies.sizes import coarsest_size
+from skinwave.bodies.tissue import in_its_layers
 
 SIZE = 1.5e-3  # m: within 0.2 % of elements of 1.2 mm, those of 3 mm within 2.3 %
 

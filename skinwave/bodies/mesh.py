@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from meshes import TetMesh, body_from_file, boundary_facets, quadratic
-from meshes.facets import seen_from_above
+from meshes.facets import visible_from_above
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised
-from skinwave.bodies.hands import hand_size, in_its_layers
+from skinwave.bodies.tissue import hand_size, in_its_layers
 from skinwave.typing import Ints
 
 NORMAL_PATCH = 3e-3  # m, standard deviation: two thirds of the focal spot's
@@ -32,7 +32,7 @@ def discretise(body: Body, h: float) -> Discretised:
 
 def _is_rest(mesh: TetMesh) -> bool:
     """Whether `bottom` is all of the boundary that is not seen from above, but for the cut."""
-    unseen = boundary_facets(mesh.tets)[~seen_from_above(mesh)]
+    unseen = boundary_facets(mesh.tets)[~visible_from_above(mesh)]
     cut = _corners(mesh.facets["cut"]) if "cut" in mesh.facets else set()
     return _corners(mesh.facets["bottom"]) | cut == _corners(unseen) | cut
 

@@ -21,7 +21,7 @@ from meshes.shapes.structured import Lines, mirrored
 from skinwave.bodies.analytic import stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised
-from skinwave.bodies.hands import HAND_CELL, hand_size, in_its_layers, support
+from skinwave.bodies.tissue import HAND_CELL, hand_size, in_its_layers, support
 
 COARSEST = 2.0  # elements far from the middle, over those of h
 RIM = 0.7  # elements at the rim of a palm, over the radius of its edge

@@ -15,7 +15,7 @@ from simple_model import MovingPressure, Tacton
 from simple_model.layers.material import Material
 from skinwave.bodies.analytic import dispersion, has_exact_waves, is_laterally_infinite
 from skinwave.live.radial import LOWEST
-from skinwave.scene.file import from_table, parsed, to_table
+from skinwave.scene.file import from_table, parse_toml, to_table
 from skinwave.scene.scene import BODIES, Body, Layer, Scene, body_name, solid_of
 
 SECTIONS = ("body", "placement")  # of a scene file
@@ -105,7 +105,7 @@ def body_of(toml: str) -> Body:
     """Return the body of a text that `toml_of` or a scene file holds; a ValueError if there is
     none.
     """
-    table = parsed(toml)
+    table = parse_toml(toml)
     if "body" not in table:
         raise ValueError("The text has no [body]. Send the toml of a body's record.")
     own = {section: table[section] for section in SECTIONS if section in table}

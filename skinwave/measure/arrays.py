@@ -52,10 +52,10 @@ def read_npz(path: Path, given: Given) -> Recording:
     """The recording in an .npz file; of skinwave's own everything is in SI. Raises a ValueError if
     it is none, or its arrays do not make a measurement.
     """
-    with reading.opened(path):
+    with reading.open_regular(path):
         pass
     try:
-        found = reading.arrays(path)
+        found = reading.load_arrays(path)
     except ValueError:
         raise ValueError(
             "the file cannot be read as .npz; save arrays of numbers by numpy.savez"
@@ -71,7 +71,7 @@ def read_npz(path: Path, given: Given) -> Recording:
 
 def read_mat(path: Path, given: Given) -> Recording:
     """The recording in a MATLAB file; raises what `read_npz` does."""
-    with reading.opened(path, LARGEST) as file:
+    with reading.open_regular(path, LARGEST) as file:
         if not file.read(1):
             raise ValueError("the file is empty; download or export it anew")
     try:

@@ -281,7 +281,7 @@ def at_measured(scene: Scene, measurement: Measurement) -> Scene:
         raise ValueError(
             f"a measured {measurement.record.words} cannot be compared; give one of {known}"
         )
-    if scene.reading.is_on_surface and scene.reading.asked.is_normal:
+    if scene.reading.is_on_surface and scene.reading.record.is_normal:
         scene = replace(scene, quantity=DISPLACEMENT.name)
     check_motion(scene, "a comparison with a measurement")
     if np.isfinite(measurement.places).all():

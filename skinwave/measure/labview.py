@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from meshes import reading
-from meshes.reading import exported_text
+from meshes.reading import read_exported_text
 from skinwave.measure.headers import column
 from skinwave.measure.recording import Given, Recording
 from skinwave.measure.table import Table, recording
@@ -19,7 +19,7 @@ MISSING = 'TDMS files need npTDMS; pip install "skinwave[measure]", or export .l
 
 def read_lvm(path: Path, given: Given) -> Recording:
     """The recording in a LabVIEW measurement file of one segment."""
-    return recording(lvm_table(exported_text(path, LARGEST)), given)
+    return recording(lvm_table(read_exported_text(path, LARGEST)), given)
 
 
 def lvm_table(text: str) -> Table:
@@ -75,7 +75,7 @@ def read_tdms(path: Path, given: Given) -> Recording:
         from nptdms import TdmsFile
     except ImportError:
         raise ValueError(MISSING) from None
-    with reading.opened(path, LARGEST):
+    with reading.open_regular(path, LARGEST):
         pass
     try:
         with warnings.catch_warnings():

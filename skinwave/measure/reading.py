@@ -35,7 +35,7 @@ def read_wav(path: Path, given: Given) -> Recording:
     """
     from scipy.io import wavfile
 
-    content = reading.content(path, LARGEST_WAV)
+    content = reading.read_bytes(path, LARGEST_WAV)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", wavfile.WavFileWarning)  # of chunks beside the samples
@@ -70,7 +70,7 @@ def read_skinsource(path: Path, given: Given) -> Recording:
             "the name is not that of a SkinSource file, model-1-location-01.f32 to "
             f"model-4-location-20.f32; take these of {SKINSOURCE}"
         )
-    content = reading.content(path, SKINSOURCE_BYTES + 1)
+    content = reading.read_bytes(path, SKINSOURCE_BYTES + 1)
     values = np.frombuffer(content[: len(content) // 4 * 4], "<f4")
     if len(content) != SKINSOURCE_BYTES or not np.isfinite(values).all():
         raise ValueError(

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from meshes.reading import exported_text
+from meshes.reading import read_exported_text
 from skinwave.measure.headers import TIME, UNITS, Column, X, Y, column
 from skinwave.measure.labview import lvm_table
 from skinwave.measure.recording import Given, Recording
@@ -41,7 +41,7 @@ def read(path: Path, given: Given) -> Recording:
     """The recording in a text file; raises a ValueError if it is no table of numbers, or its
     columns do not make a measurement.
     """
-    text = exported_text(path, LARGEST)
+    text = read_exported_text(path, LARGEST)
     return recording(lvm_table(text) if text.startswith(FIRST_LINE) else table(text), given)
 
 
@@ -49,7 +49,7 @@ def places(path: Path) -> Floats:
     """Places (p, 2) in metre of a text file with the columns x and y, or of two columns in mm;
     raises a ValueError if it has none.
     """
-    found = table(exported_text(path, LARGEST))
+    found = table(read_exported_text(path, LARGEST))
     columns = found.columns
     if len(columns) == 2 and not any(one.text for one in columns):
         columns = (column("x [mm]"), column("y [mm]"))

@@ -94,7 +94,7 @@ def _sets(path: Path) -> tuple[list[Function], dict[int, tuple[float, float]], f
         import pyuff
     except ImportError:
         raise ValueError(MISSING) from None
-    with reading.opened(path, LARGEST) as content:
+    with reading.open_regular(path, LARGEST) as content:
         if len(TAG.findall(content.read())) % 2:
             raise ValueError("the file ends within a set, so that data are missing; export it anew")
     try:

@@ -57,7 +57,7 @@ def _steady(scene: Scene, times: Floats, options: SolveOptions) -> Response:
 def _read(model: str, waveforms: Callable[..., Floats], scene: Scene, times: Floats) -> Response:
     """Response of a quantity, the probes of one depth together."""
     started = time.perf_counter()
-    asked, depths = scene.reading.asked, np.array(scene.depths)
+    asked, depths = scene.reading.record, np.array(scene.depths)
     values = np.empty((len(times), len(depths)))
     for depth in np.unique(depths).tolist():
         here = depths == depth
@@ -77,7 +77,7 @@ def fields_read(scene: Scene, depth: float) -> tuple[Field, ...]:
     if scene.load.is_plain:
         return (field_read(scene, depth),)
     upright = scene.load.tractions(np.array([[0.0, 0.0, 1.0]]))[:, 0]
-    asked, layers = scene.reading.asked, stack(scene.body)
+    asked, layers = scene.reading.record, stack(scene.body)
     return tuple(traction_field(asked, layers, direction) for direction in upright)
 
 
@@ -101,7 +101,7 @@ def _limits(scene: Scene) -> Iterator[Limit]:
                 scene, pressure=replace(scene.pressure, profile="gaussian")
             ),
         )
-    of_surface = reading.asked.is_normal and reading.is_on_surface
+    of_surface = reading.record.is_normal and reading.is_on_surface
     if body.of_kind.is_plate and not of_surface:
         yield reading_limit(scene)
     if not load.is_plain and (body.of_kind.is_plate or load.gravity or load.support_motion):
@@ -130,7 +130,7 @@ def _with_loss(scene: Scene) -> Scene:
 
 def field_read(scene: Scene, depth: float) -> Field:
     """Field of the quantity that a scene reads, at a depth in metre of its infinite body."""
-    body, asked = scene.body, scene.reading.asked
+    body, asked = scene.body, scene.reading.record
     if body.of_kind.is_layer:
         return quantity_field(asked, stack(body), depth)
     return surface_field(asked, compliance(body))

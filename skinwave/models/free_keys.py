@@ -19,7 +19,15 @@ from skinwave.bodies.parts import solid_of
 from skinwave.bodies.sheet import refuse_open_air
 from skinwave.bodies.supports import FRAME
 from skinwave.models.laws import check_laws
-from skinwave.scene.keys import MATERIAL, MODULI, PRONY, SCALES, SECTIONS, changed, write_material
+from skinwave.scene.keys import (
+    MATERIAL,
+    MODULI,
+    PRONY,
+    SCALES,
+    SECTIONS,
+    with_value,
+    write_material,
+)
 from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
 
@@ -243,7 +251,7 @@ def _with_numbers(
     table = write_material(solid)
     for key in keys:
         if not key.is_scale:
-            table = changed(table, key.path, _value(key, values))
+            table = with_value(table, key.path, _value(key, values))
     if not all(key.is_scale for key in keys):
         solid = SECTIONS["body"]["material"].read("material", table)
     factors = {SCALES[key.path[0]]: _value(key, values) for key in keys if key.is_scale}
@@ -298,7 +306,7 @@ def check_scene(scene: Scene, keys: Sequence[FreeKey], tolerance: float) -> None
 
 def _check_reading(scene: Scene, keys: Sequence[FreeKey]) -> None:
     """Refuse what depends on a free material or thickness beyond the motion of the mesh."""
-    asked, solid = scene.reading.asked, scene.body.solid
+    asked, solid = scene.reading.record, scene.body.solid
     is_thick = any(key.is_thickness for key in keys)
     if is_thick and scene.body.of_kind.equivalent and not asked.is_normal:
         raise ValueError(

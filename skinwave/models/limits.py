@@ -206,7 +206,7 @@ def plain_only(scene: Scene) -> Iterator[Limit]:
 
 def surface_motion(scene: Scene) -> Iterator[Limit]:
     """The same of a model that has the rates of that displacement, too."""
-    if not (scene.reading.asked.is_normal and scene.reading.is_on_surface):
+    if not (scene.reading.record.is_normal and scene.reading.is_on_surface):
         yield reading_limit(scene)
     if not scene.load.is_plain:
         yield load_limit(scene)

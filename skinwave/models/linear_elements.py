@@ -205,7 +205,7 @@ def in_time(
     `stepped` (n, p c) in steps of dt from 0 and under gravity, `sag` (p c,). Rates are those of the
     cubic spline that is sampled; stress relaxes in the p `solids` of the probes.
     """
-    asked = scene.reading.asked
+    asked = scene.reading.record
     sampled = sampled_components(stepped, dt, times, asked, solids)
     return asked.waveforms(with_sag(sampled, sag, asked), len(scene.probes))
 
@@ -271,7 +271,7 @@ def harmonic_answer(scene: Scene, times: Floats, options: SolveOptions) -> Respo
     ops = assembled(build, clock, report)
     P, points = even_part(*surface_load(build, scene.load), axes)
     S, solids = probe_rows(scene.body, build, images(probes, axes), reading)
-    asked = reading.asked
+    asked = reading.record
     solve = fem.LineSolver(ops, solver)
     with clock("lines"):
         lines = load_lines(scene.loads[0], threshold)

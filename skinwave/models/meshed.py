@@ -188,7 +188,7 @@ def probe_rows(
     a probe next to each other, and the material at each probe, none where nothing depends on them.
     Raises a ValueError if a probe is not in the body, or its strain in a coat.
     """
-    asked = reading.asked
+    asked = reading.record
     check_coat(build, reading)
     if asked.is_normal and (reading.is_on_surface or body.of_kind.is_plate):
         return surface_motion(body, build, probes), ()
@@ -211,9 +211,9 @@ def check_coat(build: Build, reading: Reading) -> None:
     """Refuse strain and stress in a coat, where elements are of the material below."""
     thickness = sum(build.coat.thicknesses) if build.coat else 0.0
     least = min(reading.depths, default=0.0)
-    if reading.asked.field == STRAIN and least < thickness:
+    if reading.record.field == STRAIN and least < thickness:
         raise ValueError(
-            f"{reading.asked.words} at a depth of {1e3 * least:g} mm is in layers of "
+            f"{reading.record.words} at a depth of {1e3 * least:g} mm is in layers of "
             f"{1e3 * thickness:g} mm that are a coat, without elements of their own; take smaller "
             "elements, or a greater depth"
         )
@@ -235,7 +235,7 @@ def mirrored_axes(body: Body, reading: Reading, load: Load) -> str:
     """Axes across which a body is its mirror image, and what probes read keeps its sign."""
     if not body.of_kind.is_symmetric or body.placement != FLAT:
         return ""
-    if not reading.asked.is_normal:  # others change sign, or are recovered across the plane
+    if not reading.record.is_normal:  # others change sign, or are recovered across the plane
         return ""
     if load.moving != PRESSURE:  # which may have a direction
         return ""

@@ -278,7 +278,7 @@ def lines_of(prepared: ParametricBody, body: Body) -> tuple[Floats, fem.Complex]
     found = steady_lines(prepared.bases, of_parts, geometry_shares(prepared.bodies, body))
     s = 2j * np.pi * prepared.frequencies
     return prepared.frequencies, found * line_factor(
-        prepared.scene.reading.asked, s, (), found.shape[1]
+        prepared.scene.reading.record, s, (), found.shape[1]
     )
 
 

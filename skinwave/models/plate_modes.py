@@ -146,7 +146,7 @@ def _response(
 ) -> Response:
     return Response(
         model=model, times=times, probes=scene.probe_points,
-        quantity=scene.reading.asked.name, values=values,
+        quantity=scene.reading.record.name, values=values,
         effort=Effort(
             seconds={"evaluate": time.perf_counter() - started}, dofs=len(driven.modes.squared),
             steps=len(driven.frequencies), peak_memory=peak_memory(),
@@ -169,7 +169,7 @@ def _steady(scene: Scene, driven: Driven, motion: Complex, times: Floats) -> Flo
 
 def _amplitudes(scene: Scene, driven: Driven, motion: Complex) -> Complex:
     """Lines (f, p) of the quantity that is asked for."""
-    rates = scene.reading.asked.factor(2j * np.pi * driven.frequencies)[:, None]
+    rates = scene.reading.record.factor(2j * np.pi * driven.frequencies)[:, None]
     return np.asarray(motion @ driven.outputs.T * rates)
 
 
@@ -182,7 +182,7 @@ def _transient(scene: Scene, driven: Driven, motion: Complex, times: Floats) -> 
     beside = motion - modal_motion_apart(modes, f, forces, partial(relative_modulus, scene.body))
     speed = (2j * np.pi * f @ beside).real
     start = free.start(f, forces) - free.impulse(beside.real.sum(axis=0), speed)
-    start *= scene.reading.asked.factor(free.poles)
+    start *= scene.reading.record.factor(free.poles)
     vibrates = free.residues != 0
     outputs = np.broadcast_to(driven.outputs.T[:, None], (*vibrates.shape, len(driven.outputs)))
     amplitudes = start[vibrates][:, None] * outputs[vibrates]
@@ -258,7 +258,7 @@ def stretched_answer(scene: Scene, times: Floats, options: SolveOptions) -> Resp
     seconds = {"evaluate": time.perf_counter() - started}
     return Response(
         model=STRETCHED.name, times=times, probes=scene.probe_points, values=values,
-        quantity=scene.reading.asked.name, expected_error=ERROR + error,
+        quantity=scene.reading.record.name, expected_error=ERROR + error,
         effort=replace(effort, seconds=seconds),
     )  # fmt: skip
 
@@ -331,7 +331,7 @@ def _added(scene: Scene, times: Floats, modes: PlateModes, count: int, parts: in
     """Part (t, p) of the scene's quantity that stretching adds, by steps of a part of a sample."""
     plate, moved = _moved(scene, times, modes, count, parts)
     read = moved @ plate.shapes(scene.probe_points - scene.body.placement.offset).T
-    if rate := scene.reading.asked.rate:
+    if rate := scene.reading.record.rate:
         from scipy.interpolate import make_interp_spline  # which takes long to import
 
         steps = step(times) / parts * np.arange(len(moved))

@@ -344,7 +344,7 @@ def answer(
             f"the body is reduced for {reduced.load.words}, not {scene.load.words}; reduce it for"
             " the load of the scene"
         )
-    clock, asked = Clock(), reduced.reading.asked
+    clock, asked = Clock(), reduced.reading.record
     times = sample_times(scene) if times is None else times
     if progress:
         progress("lines", 0.0)
@@ -373,7 +373,7 @@ def answer(
 
 def steady_waveforms(reduced: ReducedBody, scene: Scene, times: Floats) -> Floats:
     """Waveforms (t, p) in the steady state, as of fem-harmonic, at times (t,) in s."""
-    motion, asked = components(reduced, *scene.loads), reduced.reading.asked
+    motion, asked = components(reduced, *scene.loads), reduced.reading.record
     # Under its mean an unconstrained body has no steady state.
     heard = below_half_the_rate(motion.frequencies, times)
     heard &= scene.body.is_held | (motion.frequencies > 0)
@@ -391,7 +391,7 @@ def components(
         lines = np.vstack([motion.lines, moved.line * np.asarray(reduced.carried)])
         frequencies, lines = merge_lines(frequencies, lines)
         motion = replace(motion, frequencies=frequencies, lines=lines)
-    return in_motion(motion, reduced.reading.asked, reduced.solids)
+    return in_motion(motion, reduced.reading.record, reduced.solids)
 
 
 def in_motion(

@@ -36,7 +36,7 @@ def sheet_rows(
     body: Body, build: Build, probes: Floats, reading: Reading
 ) -> tuple[sparse.csr_array, tuple[Material, ...]]:
     """Rows (p c, 3 n) of `probe_rows` for a sheet, but for its normal motion."""
-    seen, asked = _seen(body, build, probes), reading.asked
+    seen, asked = _seen(body, build, probes), reading.record
     below = np.broadcast_to(reading.depths or 0.0, len(probes))
     heights, solid = body.depth / 2 - below, body.solid.without_loss_factor()
     linear = displacement_rows(seen, heights)
@@ -48,13 +48,13 @@ def sheet_rows(
 
 def full_reader(body: Body, build: Build, probes: Floats, reading: Reading) -> Reader:
     """Function of the displacement (3 n,) of a sheet to components (p c,)."""
-    if reading.asked.is_normal:
+    if reading.record.is_normal:
         normal = fem.probe_operator(build.mesh, probes)
         return lambda u: normal @ u
     (rows, _), seen = sheet_rows(body, build, probes, reading), _seen(body, build, probes)
     moved, strained = in_plane_rows(seen)
-    own = reading.asked.rows(body.solid)
-    if reading.asked.field != STRAIN:
+    own = reading.record.rows(body.solid)
+    if reading.record.field != STRAIN:
         return lambda u: rows @ u + ((moved @ u).reshape(-1, 2) @ own[:, :2].T).ravel()
     plane = own @ from_plane(body.solid.poisson)
 
@@ -75,7 +75,7 @@ def modal_reader(
     solver: str,
 ) -> Reader:
     """Function of the coordinates (r,) of bending modes to components (p c,)."""
-    asked = reading.asked
+    asked = reading.record
     if asked.is_normal:
         normal = fem.probe_operator(build.mesh, probes) @ modes.basis
         return lambda z: normal @ z

@@ -152,7 +152,7 @@ class _Reduced:
 def reduced_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     """Time integration of the sheet's bending modes, from rest, with an exact linear part."""
     clock, size = Clock(), options.h or stretching_size(scene.body, reduced=True)
-    asked, probes = scene.reading.asked, scene.probe_points
+    asked, probes = scene.reading.record, scene.probe_points
     with clock("reduce"):
         options.progress("reduce", 0.0)
         sheet = _reduced(scene.body, size, options.solver)
@@ -180,7 +180,7 @@ def reduced_answer(scene: Scene, times: Floats, options: SolveOptions) -> Respon
         )
         shapes = fem.probe_operator(sheet.made.mesh, probes) @ sheet.modes.basis
         elements = _plate_error(
-            plain, times, options, _from_rest(motion, shapes, times, plain.reading.asked, ()), size
+            plain, times, options, _from_rest(motion, shapes, times, plain.reading.record, ()), size
         )
     # Steps of the linear part are corrected: what they do to the rest is as small as it is.
     share = np.minimum(relative(values - exact, values), 1)
@@ -286,7 +286,7 @@ def _march(
 
 def _normal(scene: Scene) -> Scene:
     """The scene with a normal motion whose error is no smaller than its quantity's."""
-    asked = scene.reading.asked
+    asked = scene.reading.record
     rate = min(asked.rate + (not asked.is_normal), len(RATES) - 1)
     return replace(scene, quantity=RATES[rate].name, depth=0.0)
 

@@ -56,7 +56,7 @@ def read_pattern(
         tacton = resized(scene.tacton, options.resize)
         return replace(scene, pressure=replace(scene.pressure, tacton=tacton)), ()
     given = base or scene_file.loads("")
-    content = reading.content(path, LARGEST[suffix])
+    content = reading.read_bytes(path, LARGEST[suffix])
     try:
         pattern = (
             waveform.read(content, options, given) if suffix == ".wav"

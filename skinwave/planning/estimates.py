@@ -49,7 +49,7 @@ def response_spectrum(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
             )
         except ArithmeticError:  # next to no loss
             f, a = _lines_of_load(scene, tolerance)
-    a = a * scene.reading.asked.factor(2j * np.pi * f)[:, None]
+    a = a * scene.reading.record.factor(2j * np.pi * f)[:, None]
     power = np.abs(a) ** 2 * np.where(f > 0, 0.5, 1.0)[:, None]
     return f, power / np.maximum(power.sum(axis=0), 1e-300)
 
@@ -100,7 +100,7 @@ def side_reflections(scene: Scene) -> float:
     times = np.arange(max(2, round(duration * FOLLOWED_AT))) / FOLLOWED_AT
     seen = np.vstack([probes, *images])
     # Below the surface, and of components, about as of the displacement at the surface.
-    asked = scene.reading.asked if scene.reading.asked.is_normal else DISPLACEMENT
+    asked = scene.reading.record if scene.reading.record.is_normal else DISPLACEMENT
     u = from_rest(surface_field(asked, compliance(body)), asked, scene.pressure, seen, times)
     own, *returned = (u**2).mean(axis=0).reshape(-1, len(probes))
     share = float(np.sqrt((sum(returned) / np.maximum(own, 1e-300)).max()))

@@ -92,7 +92,7 @@ def sudden_left_out(scene: Scene, model: Model, grid: tuple[Floats, int]) -> flo
     velocity halves, and is twice the change. The first sample of an acceleration may have no limit:
     three times the change is its error beside sixteen times the band.
     """
-    if model.is_steady or not scene.reading.asked.rate:
+    if model.is_steady or not scene.reading.record.rate:
         return 0.0
     times, first = grid
     parts = max(2, ceil(2 * FINEST * times[1]))  # of a step, with twice the band
@@ -101,7 +101,7 @@ def sudden_left_out(scene: Scene, model: Model, grid: tuple[Floats, int]) -> flo
         model.solve(scene, t, SolveOptions(tolerance=EXACT)).values for t in (times, fine)
     )
     change = relative_change(usual[first:], wide[::parts][first:])
-    return (1 + scene.reading.asked.rate) * change
+    return (1 + scene.reading.record.rate) * change
 
 
 def _share(steady: Floats, from_rest: Callable[[int], Floats], first: int) -> float:

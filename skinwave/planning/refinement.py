@@ -15,9 +15,9 @@ from scipy import fft
 
 from simple_model import Response
 from skinwave.bodies.build import COMPARED
-from skinwave.bodies.hands import FINE_PALM
 from skinwave.bodies.sizes import check_mesh, coarsest_size, default_size
 from skinwave.bodies.slab import cell_layers
+from skinwave.bodies.tissue import FINE_PALM
 from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.reduced import (
     BAND,

@@ -236,7 +236,7 @@ def sudden_over_tolerance(
 ) -> tuple[str, ...]:
     """Warning of motion above the band in Hz of a response, which it leaves out."""
     smooth = "a load that begins smoothly"
-    cure = f"the displacement, or {smooth}," if scene.reading.asked.rate else smooth
+    cure = f"the displacement, or {smooth}," if scene.reading.record.rate else smooth
     what = f"the {scene.quantity} above {band:g} Hz"
     return over_tolerance(what, sudden, tolerance, f"{cure} is")
 
@@ -366,7 +366,7 @@ def beyond_prediction(
         return ()
     return (
         f"{response.model} has a relative error of about {100 * error:.2g} % in this "
-        f"{scene.reading.asked.words}, more than the tolerance of {100 * tolerance:g} %: a thin "
+        f"{scene.reading.record.words}, more than the tolerance of {100 * tolerance:g} %: a thin "
         "plate with the same linear motion differs by that; take the displacement, or smaller "
         "elements and shorter time steps",
     )

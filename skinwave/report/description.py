@@ -218,7 +218,7 @@ def other_quantity(scene: Scene) -> list[str]:
     if scene.reading.is_plain:
         return []
     return [
-        f"Probes read {scene.reading.words}, in {scene.reading.asked.shown}; "
+        f"Probes read {scene.reading.words}, in {scene.reading.record.shown}; "
         f"{without_kernel(scene)}: its columns are in Pa, and that of the quantity in lines.csv is "
         "empty. Pictures of the surface but for maps of the quantity show its motion; claims and "
         "sensation levels, which are of displacement, are left out of bodies."

@@ -55,7 +55,7 @@ class LinesByName:
     @property
     def is_motion(self) -> bool:
         """Whether they are of displacement."""
-        return self.scene.reading.asked is DISPLACEMENT
+        return self.scene.reading.record is DISPLACEMENT
 
 
 NamedLines = Run | LinesByName

@@ -162,12 +162,12 @@ def probe_lines(scene: Scene, moved: BodyMotion) -> ReducedResponse:
     """Components of the quantity that the probes of a scene read, from its body's motion."""
     rows, solids = probe_rows(scene.body, moved.build, scene.probe_points, scene.reading)
     seen = read_at(moved.motion, rows @ moved.basis)
-    return in_motion(seen, scene.reading.asked, solids)
+    return in_motion(seen, scene.reading.record, solids)
 
 
 def probe_response(scene: Scene, moved: BodyMotion) -> Response:
     """Quantity that the probes of a scene read, from its body's motion."""
-    times, points, asked = sample_times(scene), scene.probe_points, scene.reading.asked
+    times, points, asked = sample_times(scene), scene.probe_points, scene.reading.record
     components = from_rest(probe_lines(scene, moved), times)
     return Response(
         model="fem", times=times, probes=points, quantity=asked.name,
@@ -226,7 +226,7 @@ def shade(scene: Scene, moved: BodyMotion, times: Floats, nodes: Ints) -> Shade:
         If it is of a sheet and not of its normal motion, is strain or stress in a coat, or has
         too many values.
     """
-    asked = scene.reading.asked
+    asked = scene.reading.record
     if scene.body.of_kind.is_plate and not asked.is_normal:
         raise ValueError(
             f"{asked.words} of a sheet is not drawn, because its mesh is thicker than it; ask for "

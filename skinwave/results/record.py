@@ -63,7 +63,7 @@ def read(folder: Path) -> dict[str, Any]:
     path = folder / FILE
     if not path.exists():
         raise ValueError(f"{folder} has no {FILE}; name a folder that skinwave wrote")
-    content = reading.parsed(path)
+    content = reading.load_json(path)
     if not isinstance(content, dict) or not isinstance(content.get("command"), dict):
         raise ValueError(f"{path} is no record of a result; make the result anew")
     return content

@@ -176,7 +176,7 @@ def quantity_map(
         return _of_lines(scene, x, y, lines, note)
     if h is None and scene.reading.is_plain and takes(FROM_REST, scene):
         return replace(_plate_map(scene, x, y), error=PLATE_ERROR)
-    if scene.load.support_motion or (scene.load.gravity and scene.reading.asked.invariant):
+    if scene.load.support_motion or (scene.load.gravity and scene.reading.record.invariant):
         raise ValueError(
             "a map is of motion about the rest without gravity, on a support at rest; leave "
             "gravity and support_motion out"
@@ -193,7 +193,7 @@ def quantity_map(
 
 def element_map(scene: Scene, moved: BodyMotion, x: Floats, y: Floats) -> SurfaceField:
     """Map of the quantity that probes read, of a meshed body whose motion is known."""
-    asked, depth, mesh = scene.reading.asked, scene.depths[0], moved.build.mesh
+    asked, depth, mesh = scene.reading.record, scene.depths[0], moved.build.mesh
     places = _places(x, y)
     seen = on_surface(mesh, places)
     if depth:  # where the body is as deep along its normal
@@ -226,7 +226,7 @@ def load(path: Path, scene: Scene) -> SurfaceField:
         If the file is none of these.
     """
     try:
-        arrays = reading.arrays(path)
+        arrays = reading.load_arrays(path)
         names = [name for name in ("x", "y", "rms", "level") if name in arrays]
         values: dict[str, Any] = {n: np.asarray(arrays[n], np.float64) for n in names}
         x, y, rms = (values[name] for name in ("x", "y", "rms"))
@@ -236,7 +236,7 @@ def load(path: Path, scene: Scene) -> SurfaceField:
         depth, note = float(arrays["depth"]), str(arrays["note"])
     except (KeyError, TypeError, ValueError) as error:
         raise ValueError(f"{path} is no map ({error}); make it anew from its scene") from None
-    return SurfaceField(**values, depth=depth, note=note, quantity=scene.reading.asked)
+    return SurfaceField(**values, depth=depth, note=note, quantity=scene.reading.record)
 
 
 def _places(x: Floats, y: Floats) -> Floats:
@@ -251,7 +251,7 @@ def _of_lines(
     """Map from lines (f,), (f, p c) of the components of the quantity that probes read, at all
     places or at those `seen` (ny nx,).
     """
-    asked, where = scene.reading.asked, np.ones(len(x) * len(y), bool) if seen is None else seen
+    asked, where = scene.reading.record, np.ones(len(x) * len(y), bool) if seen is None else seen
     found = np.full((2, len(where)), np.nan)
     found[0, where] = _rms(asked, lines, int(where.sum()))
     felt = scene.reading.is_plain and scene.body.is_skin

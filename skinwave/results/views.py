@@ -280,7 +280,7 @@ def load(path: Path) -> View:
         If the file is none of these.
     """
     try:
-        arrays = reading.arrays(path)
+        arrays = reading.load_arrays(path)
         meta: dict[str, Any] = fitting(json.loads(str(arrays["meta"])), META, "meta")
         meta |= {"scene": loads(meta["scene"]), "effort": effort_of(meta["effort"], "effort")}
         meta |= {"quantity": quantity(meta["quantity"]), "tensors": _tensors(arrays)}

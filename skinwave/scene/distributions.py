@@ -148,7 +148,7 @@ class Spread:
         return found
 
 
-def known_to(factor: float) -> Distribution:
+def within_factor(factor: float) -> Distribution:
     """Lognormal distribution with 90 % between the value over and times a factor."""
     return Distribution(measure="factor", width=(factor,))
 
@@ -207,7 +207,7 @@ CALLS = {
 CALLED = re.compile(rf"\s*({'|'.join(CALLS)})\s*\(([^()]*)\)\s*")
 
 
-def called(key: str, text: str) -> Spread | None:
+def parse_distribution(key: str, text: str) -> Spread | None:
     """Spread of a key by a text as in `CALLS`, with the central value first, or between limits;
     None of any other text.
     """

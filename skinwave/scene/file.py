@@ -28,9 +28,9 @@ from skinwave.scene.keys import (
     SECTIONS,
     as_table,
     as_text,
-    changed,
     checked,
     value_at,
+    with_value,
 )
 from skinwave.scene.load import Load
 from skinwave.scene.material_file import with_tables
@@ -53,7 +53,7 @@ def read(path: str | Path) -> Scene:
     """
     text = content(path)
     try:
-        scene = from_table(parsed(text, Path(path).parent))
+        scene = from_table(parse_toml(text, Path(path).parent))
         if scene.body.file:  # is named from where the scene is
             place = str((Path(path).parent / scene.body.file).resolve())
             scene = replace(scene, body=replace(scene.body, file=place))
@@ -64,7 +64,7 @@ def read(path: str | Path) -> Scene:
 
 def content(path: str | Path) -> str:
     """The text of a scene file; raises a ValueError if it cannot be read or is no UTF-8."""
-    found = reading.content(path, LARGEST)
+    found = reading.read_bytes(path, LARGEST)
     try:
         return as_utf_8(found)
     except ValueError as error:
@@ -73,10 +73,10 @@ def content(path: str | Path) -> str:
 
 def loads(text: str) -> Scene:
     """The scene in a TOML text; missing keys take the preset's value."""
-    return from_table(parsed(text))
+    return from_table(parse_toml(text))
 
 
-def parsed(text: str, folder: Path | None = None) -> dict[str, Any]:
+def parse_toml(text: str, folder: Path | None = None) -> dict[str, Any]:
     """The table of a scene's TOML text; with a folder, with the numbers of tables of moduli that
     are named from there.
     """
@@ -210,7 +210,7 @@ def to_table(scene: Scene) -> dict[str, Any]:
         table["body"].pop(key, None)
     for key, given in scene.spreads:
         if (value := value_at(table, key)) is not None:
-            table = changed(table, key.split("."), written_distribution(value, given))
+            table = with_value(table, key.split("."), written_distribution(value, given))
     return table
 
 

@@ -1,5 +1,5 @@
 """The keys of a scene file: each with its unit, what it may hold, and the attribute behind it; and
-how a dotted key of a scene's table is read and changed.
+how a dotted key of a scene's table is read and with_value.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -423,7 +423,7 @@ def value_at(node: Any, key: str) -> Any:
     return node
 
 
-def changed(node: Any, path: Sequence[str], value: Any, complete: Any = None) -> Any:
+def with_value(node: Any, path: Sequence[str], value: Any, complete: Any = None) -> Any:
     """A copy of a table with another value where a path leads to.
 
     What the table leaves out on the way has the values of the `complete` table. A preset's name
@@ -436,11 +436,11 @@ def changed(node: Any, path: Sequence[str], value: Any, complete: Any = None) ->
         if not (head.isdecimal() and int(head) < len(node)):
             raise ValueError(f"there is no '{head}' in a list of {len(node)}; count from 0")
         k = int(head)
-        return [*node[:k], changed(node[k], rest, value), *node[k + 1 :]]
+        return [*node[:k], with_value(node[k], rest, value), *node[k + 1 :]]
     if isinstance(node, str):
         node = write_material(solid_of(choose("material", node, PRESETS)))
     if not isinstance(node, dict):
         raise ValueError(f"there is no '{head}' in {node!r}; vary the whole value")
     before = complete.get(head) if isinstance(complete, dict) else None
-    inner = changed(node.get(head, before or {}), rest, value, before)
+    inner = with_value(node.get(head, before or {}), rest, value, before)
     return {name: x for name, x in node.items() if name != INSTEAD.get(head)} | {head: inner}

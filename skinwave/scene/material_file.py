@@ -117,7 +117,7 @@ def with_tables(scene: dict[str, Any], folder: Path) -> dict[str, Any]:
     """
     for material in _materials(scene):
         if isinstance(name := material.get("table"), str):
-            text = reading.text(folder / name)
+            text = reading.read_text(folder / name)
             try:
                 material["table"] = written_table(modulus_table(text))
             except ValueError as error:

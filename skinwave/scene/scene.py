@@ -54,7 +54,7 @@ class Reading:
     depths: tuple[float, ...] = ()
 
     @property
-    def asked(self) -> Quantity:
+    def record(self) -> Quantity:
         """The record of the quantity."""
         return quantity(self.quantity)
 
@@ -66,15 +66,15 @@ class Reading:
     @property
     def is_plain(self) -> bool:
         """Whether the probes read the normal displacement at the surface."""
-        return self.asked is DISPLACEMENT and self.is_on_surface
+        return self.record is DISPLACEMENT and self.is_on_surface
 
     @property
     def words(self) -> str:
         """Quantity and depth in a few words."""
         if self.is_on_surface:
-            return self.asked.words
+            return self.record.words
         shown = sorted({f"{1e3 * z:g}" for z in self.depths}, key=float)
-        return f"{self.asked.words} at a depth of {', '.join(shown)} mm"
+        return f"{self.record.words} at a depth of {', '.join(shown)} mm"
 
 
 SURFACE = Reading()
@@ -217,7 +217,7 @@ class Scene:
 
 def _check_reading(body: Body, reading: Reading) -> None:
     """Refuse a quantity or a depth that a body has not."""
-    asked, is_plate = reading.asked, body.of_kind.is_plate
+    asked, is_plate = reading.record, body.of_kind.is_plate
     deepest = max(reading.depths, default=0.0)
     if not asked.of_body:
         raise ValueError(f"quantity '{asked.name}' is of no body; leave it out")

@@ -35,7 +35,7 @@ give 59 to 87 Pa (Liebler et al., J Acoust Soc Am 148:1713 (2020); HandyBeam; Ac
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from skinwave.scene.distributions import Distribution, Spread, known_to
+from skinwave.scene.distributions import Distribution, Spread, within_factor
 from skinwave.scene.file import to_table
 from skinwave.scene.keys import LOSSES, MODULI, value_at
 from skinwave.scene.scene import Scene
@@ -51,8 +51,8 @@ class MaterialSpread:
     losses: Distribution
 
 
-_PALM = MaterialSpread(moduli=known_to(2.0), losses=known_to(3.0))
-_LAYER = MaterialSpread(moduli=known_to(3.2), losses=known_to(3.0))
+_PALM = MaterialSpread(moduli=within_factor(2.0), losses=within_factor(3.0))
+_LAYER = MaterialSpread(moduli=within_factor(3.2), losses=within_factor(3.0))
 _FOREARM = ("forearm-epidermis", "forearm-dermis", "forearm-hypodermis", "forearm-muscle")
 OF_PRESETS: Mapping[str, MaterialSpread] = {
     **dict.fromkeys(("palm", "palm-stiff", "palm-zener"), _PALM),
@@ -61,8 +61,8 @@ OF_PRESETS: Mapping[str, MaterialSpread] = {
     ),
     **dict.fromkeys(("epidermis", "dermis", "fat", "muscle"), _LAYER),
     **dict.fromkeys(_FOREARM, _LAYER),
-    "paper": MaterialSpread(moduli=known_to(2.0), losses=known_to(1.6)),
-    "paper-grain": MaterialSpread(moduli=known_to(1.6), losses=known_to(1.6)),
+    "paper": MaterialSpread(moduli=within_factor(2.0), losses=within_factor(1.6)),
+    "paper-grain": MaterialSpread(moduli=within_factor(1.6), losses=within_factor(1.6)),
 }
 
 
@@ -80,7 +80,7 @@ def spreads_of(scene: Scene) -> tuple[Spread, ...]:
     if device and PRESSURE not in dict(scene.spreads) and scene.pressure.peak_pressure > 0:
         found.append(
             Spread(key=PRESSURE, value=scene.pressure.peak_pressure,
-                   distribution=known_to(FACTOR), implied=True)
+                   distribution=within_factor(FACTOR), implied=True)
         )  # fmt: skip
     if scene.body.of_kind.discretise:
         found += _of_materials(scene)

@@ -15,18 +15,18 @@ import tomli_w
 
 from meshes import reading
 from simple_model.choices import choose, meant
-from skinwave.scene.distributions import Spread, called, uniform
+from skinwave.scene.distributions import Spread, parse_distribution, uniform
 from skinwave.scene.file import (
     content,
     dumps,
     from_table,
     loads,
-    parsed,
+    parse_toml,
     read,
     to_table,
     without_spreads,
 )
-from skinwave.scene.keys import SCALES, SECTIONS, changed
+from skinwave.scene.keys import SCALES, SECTIONS, with_value
 from skinwave.scene.scene import BODIES, Body, Scene, solid_of, with_body
 from skinwave.scene.spreads import PRESSURE
 from skinwave.system.plain_text import number_in
@@ -72,7 +72,7 @@ class DesignPoint:
         """A hash of the complete scene, of the file of its body, and of the solver options."""
         digest = hashlib.sha256(repr((self.text, *model_options)).encode())
         if self.scene and self.scene.body.file:
-            with reading.opened(self.scene.body.file) as file:
+            with reading.open_regular(self.scene.body.file) as file:
                 digest.update(hashlib.file_digest(file, "sha256").digest())  # type: ignore[arg-type]
         return digest.hexdigest()[:24]
 
@@ -85,7 +85,7 @@ def parse(text: str) -> Variation:
     key = _known(key.strip())
     if not equals or not right.strip():
         raise ValueError(f"--vary {text} lacks values; write {key}=v1,v2 or {key}=start:stop:n")
-    if found := called(key, right):
+    if found := parse_distribution(key, right):
         return found
     numbers = [number_in(part) for part in right.split(":")]
     if len(numbers) == 1 or None in numbers:
@@ -179,7 +179,7 @@ def cases(path: Path, combined: Sequence[Mapping[str, Any]]) -> list[DesignPoint
     A combination that makes no scene is a case with its error.
     """
     base = read(path)
-    table = parsed(content(path), path.parent)
+    table = parse_toml(content(path), path.parent)
     if base.body.file:
         table["body"]["file"] = base.body.file
     return cases_of(table, tomllib.loads(dumps(base)), combined)
@@ -295,7 +295,7 @@ def _changed(table: Any, complete: Any, varied: Mapping[str, Any]) -> Any:
         if key == BODY:
             table = table | {BODY: _body(varied[key])}
         else:
-            table = changed(table, key.split("."), varied[key], complete)
+            table = with_value(table, key.split("."), varied[key], complete)
     return table
 
 

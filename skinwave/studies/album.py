@@ -224,7 +224,7 @@ def shown_views(scene: Scene, progress: Progress, **options: Any) -> tuple[list[
     """
     found = [(view, run) for view, run, _ in answers(scene, progress, **options) if view]
     said = worst_warnings((run.body, run.response.effort) for _, run in found)
-    if scene.reading.asked is DISPLACEMENT:
+    if scene.reading.record is DISPLACEMENT:
         return [view for view, _ in found], said
     if not any(len(view.tets) for view, _ in found):
         raise ValueError(f"{description.without_kernel(scene)}; give the scene a body")
@@ -269,7 +269,7 @@ def _order(path: Path) -> tuple[str, int, str]:
 
 def _run(path: Path) -> Run:
     scene = read(path.parent / "scene.toml")
-    arrays = reading.arrays(path)
+    arrays = reading.load_arrays(path)
     effort = _json(path.parent / "effort.json", EFFORT) or {}
     expected = (_json(path.parent / record.FILE, {}) or {}).get("expected_error")
     try:
@@ -293,7 +293,7 @@ def _json(path: Path, pattern: dict[str, Any]) -> dict[str, Any] | None:
     """Contents of a file, if there is one, as `fitting` takes it."""
     if not path.exists():
         return None
-    found: dict[str, Any] = fitting(reading.parsed(path), pattern, str(path))
+    found: dict[str, Any] = fitting(reading.load_json(path), pattern, str(path))
     return found
 
 

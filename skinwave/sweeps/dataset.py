@@ -138,7 +138,7 @@ def _part(path: Path) -> Any:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    file = pq.ParquetFile(pa.BufferReader(reading.content(path, LARGEST)))
+    file = pq.ParquetFile(pa.BufferReader(reading.read_bytes(path, LARGEST)))
     if file.metadata.num_rows > MOST_ROWS:
         raise ValueError(f"{path.name} has {file.metadata.num_rows:,} rows, as no sweep writes")
     table = file.read()

@@ -271,7 +271,7 @@ def _batch(scene: Scene, keys: tuple[str, ...], method: Method, values: Floats) 
 
 def rows_of(found: Ensemble) -> list[dict[str, Any]]:
     """The samples as rows of a sweep: their numbers, and columns at the probes."""
-    scene, record = found.scene, found.scene.reading.asked
+    scene, record = found.scene, found.scene.reading.record
     unit, per, names = unit_of(record), record.per_unit, found.method.lines
     columns: dict[str, Floats] = {f"rms_{unit}": per * found.rms}
     if found.is_skin:

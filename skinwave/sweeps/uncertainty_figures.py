@@ -31,7 +31,7 @@ def bands_figure(found: Ensemble, centre: Floats) -> Figure:
     """Waveforms and lines at each probe: median, bands of 50 and 90 % of the samples, and the
     waveform (t, p) of the central values.
     """
-    asked, probes = found.scene.reading.asked, found.scene.probes
+    asked, probes = found.scene.reading.record, found.scene.probes
     times = 1e3 * shown_times(found.scene)
     waveforms, lines = (asked.per_unit * percentiles(x) for x in (found.waveform, found.lines))
     with mpl.rc_context(REPORT.rc):

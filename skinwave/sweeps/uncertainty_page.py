@@ -93,7 +93,7 @@ def _in_words(table: Table) -> Table:
 def sentences(found: Ensemble) -> list[str]:
     """Number of samples and method, and the 90 % of the motion and of its level."""
     n, d = found.values.shape
-    p, asked = found.strongest, found.scene.reading.asked
+    p, asked = found.strongest, found.scene.reading.record
     x, y = (1e3 * z for z in found.scene.probes[p])
     low, _, median, _, high = asked.per_unit * percentiles(found.rms)[:, p]
     said = [

@@ -18,7 +18,7 @@ from skinwave import Body, dumps, loads
 from skinwave.bodies import Sides
 from skinwave.bodies.analytic import stack
 from skinwave.bodies.build import build, operators
-from skinwave.bodies.hands import support
+from skinwave.bodies.tissue import support
 from skinwave.models.meshed import surface_load
 from skinwave.models.reduced import answer, prepare
 from skinwave.planning.extent import symmetry

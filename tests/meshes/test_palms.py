@@ -136,7 +136,7 @@ def test_what_is_hidden_from_above_is_not_the_top():
     block = meshes.extrude(*lines, order=1)
     x, _, z = block.points[block.tets].mean(axis=1).T
     hook = TetMesh(points=block.points, tets=block.tets[~((x > 0.01) & (abs(z - 0.015) < 0.005))])
-    mesh = meshes.tag_boundary(hook, rest="below", top=meshes.seen_from_above(hook))
+    mesh = meshes.tag_boundary(hook, rest="below", top=meshes.visible_from_above(hook))
     assert set(mesh.points[mesh.facets["top"]][..., 2].ravel()) == {0.03}
     assert len(mesh.facets["top"]) == 4
     assert len(mesh.facets["below"]) == len(mesh.facets["surface"]) - 4

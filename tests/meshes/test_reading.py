@@ -18,38 +18,38 @@ NAMES = [f"{k:032x}" for k in range(9)]
 def test_only_regular_files_are_opened(tmp_path):
     for name, make in (("pipe", os.mkfifo), ("folder", os.mkdir)):
         make(tmp_path / name)
-        for read in (reading.text, reading.arrays):
+        for read in (reading.read_text, reading.load_arrays):
             with pytest.raises(ValueError, match="cannot be read"):
                 read(tmp_path / name)
 
 
 def test_a_file_is_as_large_as_the_limit_at_most(tmp_path):
     (tmp_path / "x").write_bytes(b"12345")
-    assert reading.content(tmp_path / "x", 5) == b"12345"
+    assert reading.read_bytes(tmp_path / "x", 5) == b"12345"
     with pytest.raises(ValueError, match="limit"):
-        reading.content(tmp_path / "x", 4)
+        reading.read_bytes(tmp_path / "x", 4)
 
 
 def test_text_is_read_in_the_encodings_of_programs_and_junk_refused(tmp_path):
     for encoding in ("utf-8", "utf-8-sig", "utf-16", "utf-16-le", "cp1252"):
         (tmp_path / "x").write_bytes("t [s]; ° 1,5\n".encode(encoding))
-        assert reading.exported_text(tmp_path / "x") == "t [s]; ° 1,5\n", encoding
+        assert reading.read_exported_text(tmp_path / "x") == "t [s]; ° 1,5\n", encoding
     (tmp_path / "x").write_bytes(b"ab\x01\xffc")
-    for read in (reading.text, reading.exported_text):
+    for read in (reading.read_text, reading.read_exported_text):
         with pytest.raises(ValueError, match="text"):
             read(tmp_path / "x")
 
 
 def test_arrays_come_back_and_do_not_unpack_to_more_than_a_limit(tmp_path, monkeypatch):
     np.savez_compressed(tmp_path / "a.npz", x=np.zeros(100_000), y=np.array("text"))
-    found = reading.arrays(tmp_path / "a.npz")
+    found = reading.load_arrays(tmp_path / "a.npz")
     assert found["x"].shape == (100_000,)
     assert str(found["y"]) == "text"
     monkeypatch.setattr(reading, "UNPACKED", 100_000)
     with pytest.raises(ValueError, match="unpacks to 1 MB"):
-        reading.arrays(tmp_path / "a.npz")
+        reading.load_arrays(tmp_path / "a.npz")
     np.savez(tmp_path / "b.npz", x=np.random.default_rng(0).random(100_000))
-    reading.arrays(tmp_path / "b.npz")  # takes as much on the disk
+    reading.load_arrays(tmp_path / "b.npz")  # takes as much on the disk
 
 
 def test_a_reader_gets_time_and_memory_by_the_size_of_its_file(tmp_path, monkeypatch):

@@ -101,7 +101,7 @@ def test_the_colour_at_a_node_is_what_a_probe_reads_there(quantity, moved):
     place = tuple(moved.mesh.points[node[0], :2].tolist())
     scene = replace(SCENE, quantity=quantity, probes=(place,))
     times = np.arange(5) * 2e-3
-    asked, lines = scene.reading.asked, motion.probe_lines(scene, moved)
+    asked, lines = scene.reading.record, motion.probe_lines(scene, moved)
     lines = lines if asked.invariant else oscillating(lines)
     expected = asked.waveforms(synthesise(lines.frequencies, lines.lines, times), 1)
     found = shade(scene, moved, times, node).values

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from skinwave.scene.distributions import Distribution, Spread, called, known_to, uniform
+from skinwave.scene.distributions import (
+    Distribution,
+    Spread,
+    parse_distribution,
+    uniform,
+    within_factor,
+)
 from skinwave.scene.file import read
 from skinwave.scene.variation import cases, combinations, parse, saltelli_shares
 from skinwave.sweeps.sampling import one_at_a_time, samples, sobol_indices, tornado
@@ -84,13 +90,13 @@ def test_the_spreads_of_presets_can_be_varied(scene):
 def test_distributions_of_a_sweep():
     for text, value, given in (
         ("normal(25e3, 0.3)", 25e3, Distribution(shape="normal", width=(0.3,))),
-        ("factor(50,2)", 50, known_to(2)),
+        ("factor(50,2)", 50, within_factor(2)),
         ("triangular(10,12,20)", 12, bounds("triangular", 10, 20)),
     ):
-        assert called("x", text) == Spread(key="x", value=value, distribution=given)
-    assert called("x", "palm") is None
+        assert parse_distribution("x", text) == Spread(key="x", value=value, distribution=given)
+    assert parse_distribution("x", "palm") is None
     with pytest.raises(ValueError, match="2 numbers"):
-        called("x", "uniform(1)")
+        parse_distribution("x", "uniform(1)")
     asked = varied("focus.peak_pressure_pa=factor(50,2)", "tacton.size_mm=10:20")
     met = combinations(asked, "sobol", 4)
     sizes = [run["tacton.size_mm"] for run in met]
@@ -106,7 +112,7 @@ def test_distributions_of_a_sweep():
     ("given", "value", "frozen"),
     [
         (Distribution(width=(0.3,)), 7.0, stats.lognorm(sqrt(log(1.09)), scale=7)),
-        (known_to(2.0), 50.0, stats.lognorm(log(2) / stats.norm.ppf(0.95), scale=50)),
+        (within_factor(2.0), 50.0, stats.lognorm(log(2) / stats.norm.ppf(0.95), scale=50)),
         (Distribution(shape="normal", width=(0.3,)), -4.0, stats.norm(-4, 1.2)),
         (Distribution(shape="normal", measure="standard_error", width=(2.0,)), 0.0,
          stats.norm(0, 2)),

@@ -18,7 +18,7 @@ from skinwave.commands.common import note_central_values
 from skinwave.models.options import SolveOptions
 from skinwave.planning.budget import error_budget, mesh_row
 from skinwave.planning.simulate import compute
-from skinwave.scene.distributions import Distribution, known_to
+from skinwave.scene.distributions import Distribution, within_factor
 from skinwave.scene.file import dumps, loads
 from skinwave.scene.spreads import PRESSURE, spreads_of
 from skinwave.scene.variation import combinations, parse, with_values
@@ -110,9 +110,9 @@ def test_a_wrong_spread_is_refused_with_its_cure(table, said):
 def test_presets_and_the_device_carry_the_spread_of_their_sources():
     found = {s.key: s for s in spreads_of(loads('[body]\nmaterial = "palm"'))}
     assert {s.part for s in found.values()} == {"material", "device"}
-    assert found[PRESSURE].distribution == known_to(2.0)
+    assert found[PRESSURE].distribution == within_factor(2.0)
     assert found["body.material.modulus_scale"].implied
-    assert found["body.material.loss_scale"].distribution == known_to(3.0)
+    assert found["body.material.loss_scale"].distribution == within_factor(3.0)
     measured = loads(f'[body]\nmaterial = "ecoflex"\n[focus]\npeak_pressure_pa = {KNOWN}')
     assert spreads_of(measured) == ()
     with pytest.raises(ValueError, match="uncertain"):
