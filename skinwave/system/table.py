@@ -38,9 +38,9 @@ class Table:
     None where there is no value. A table with a `name` is also a CSV file beside the page, whose
     numbers have `stored` significant digits.
 
-    >>> table = Table([Column("f_hz", "frequency", "Hz"), "line"], [(127.38, "f_d"), (None, "2 f_d")])
+    >>> table = Table([Column("f_hz", "frequency", "Hz"), "line"], [(127.38, "f_d"), (None, "2 f")])
     >>> table.to_csv()
-    b'f_hz,line\\r\\n127.38,f_d\\r\\n,2 f_d\\r\\n'
+    b'f_hz,line\\r\\n127.38,f_d\\r\\n,2 f\\r\\n'
     """
 
     columns: tuple[Column, ...]

@@ -1,5 +1,6 @@
 """The README and the pages of docs/: what they show works, and what they link to is there."""
 
+import ast
 import re
 import shlex
 import warnings
@@ -85,3 +86,15 @@ def test_python_runs(page, monkeypatch, capsys):
             warnings.simplefilter("ignore", SkinwaveWarning)  # the point kernel has no propagation
             exec(compile(text, str(page), "exec"), {})
         assert capsys.readouterr().out
+
+
+def test_scripts_of_the_gallery_are_short_and_assert_a_number():
+    """The build of the site runs them."""
+    scripts = sorted((ROOT / "examples/gallery").glob("*.py"))
+    assert len(scripts) >= 12
+    for path in scripts:
+        text = path.read_text("utf-8")
+        tree = ast.parse(text)
+        lines = text.count("\n") - (ast.get_docstring(tree) or "").count("\n")
+        assert 20 <= lines <= 70, path
+        assert any(isinstance(node, ast.Assert) for node in tree.body), path

@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from simple_model import Response, phasors
+from simple_model import Response
 from skinwave.commands.cli import main
 from skinwave.report.renderer import Renderer
 from skinwave.results.motion import waves
-from skinwave.scene.file import read
 
 EXAMPLES = {path.stem: path for path in (Path(__file__).parents[2] / "examples").glob("*.toml")}
 # Numbers of one mesh agree, coarse or not. A half-space has no mesh; a sheet has modes.
 SIZE = {"speed-on-forearm": [], "paper-sheet": [], "square-on-silicone": ["--element-size", "20"]}
+REPORTED = ("palm", "speed-on-forearm")  # one with a mesh, one without
 REDUCED = 0.05  # relative error of the reduced-order model of a whole body
 
 
@@ -39,22 +39,14 @@ def result(tmp_path_factory, monkeypatch):
 
 @pytest.mark.parametrize("name", sorted(EXAMPLES))
 def test_every_example_is_compared(name, result):
-    out = result("compare", name)
-    found = body_response(out)
-    assert np.ptp(found.values, axis=0).max() > 0
-    assert (out / "pictures/propagation.png").stat().st_size > 10_000
-    if name == "layered-skin":
-        run = body_response(result("run", name, "--model", "fem"))
-        scene = read(EXAMPLES[name])
-        np.testing.assert_allclose(tones(run, scene), tones(found, scene), rtol=1e-6)
-        check_map(result("report", name, "--map", "--step", "5"), run)
-
-
-@pytest.mark.parametrize("name", ["palm", "speed-on-forearm"])
-def test_a_report_of_an_example_has_maps_that_agree_with_its_probes(name, result):
-    out = result("report", name)
-    check_map(next(out.glob("*/map.npz")).parent, body_response(out))
-    assert (out / "pictures/snapshots.png").exists()
+    compared = result("compare", name)
+    response = body_response(compared)
+    assert np.ptp(response.values, axis=0).max() > 0
+    assert (compared / "pictures/propagation.png").stat().st_size > 10_000
+    if name in REPORTED:
+        reported = result("report", name)
+        check_map(next(reported.glob("*/map.npz")).parent, response)
+        assert (reported / "pictures/snapshots.png").exists()
 
 
 def body_response(folder):
@@ -67,13 +59,6 @@ def body_response(folder):
                 return Response(model=model, times=arrays["t"], probes=arrays["probes"],
                                 values=arrays[model])  # fmt: skip
     raise AssertionError(f"no response in {folder}")
-
-
-def tones(response, scene):
-    """Amplitudes (f, p) at the tones of a load, their sum and their difference."""
-    am, drawn = scene.tacton.am_frequency, scene.tacton.trajectory.drawing_frequency
-    frequencies = {am, drawn, abs(drawn - am), drawn + am} - {0.0}
-    return np.abs(phasors(response, tuple(sorted(frequencies))))
 
 
 def check_map(folder, response):
