@@ -15,7 +15,7 @@ from fem.load_and_probe import facet_normals
 from meshes import boundary_facets
 from simple_model import MovingPressure, PronyTerm, Tacton, Trajectory
 from simple_model.load.spectrum import pressure_lines
-from skinwave.bodies import hands
+from skinwave.bodies import tissue
 from skinwave.bodies.absorbing_layer import layer_drag, layer_of
 from skinwave.bodies.build import build, operators
 from skinwave.models import parametric
@@ -132,9 +132,9 @@ def test_springs_and_absorbing_layers_go_with_the_material():
     made = build(before, 1e-2)
     mesh = made.mesh
     outward = facet_normals(mesh, boundary_facets(mesh.tets))
-    rests = [hands.support(body, mesh, outward, []).stiffness for body in (before, after)]
+    rests = [tissue.support(body, mesh, outward, []).stiffness for body in (before, after)]
     keys = free_keys(before, {MODULUS: (20e3, 40e3)})
-    on_springs = replace(made, support=hands.support(before, mesh, outward, []))
+    on_springs = replace(made, support=tissue.support(before, mesh, outward, []))
     solids = solids_of(reference_of(before, on_springs, keys), after)
     assert solids.materials == (other,)
     assert rests[1] == pytest.approx(solids.springs * rests[0])
