@@ -1,6 +1,6 @@
-"""Subcommands of `skinwave`: a module each, with `options(parser)` and `run(options)`.
+"""Subcommands of `skinwave`: each is a module with `options(parser)` and `run(options)`.
 
-The one line of a module is its help. Slow imports are made in `run`.
+The docstring of a module is the help of its command. Slow imports are made in `run`.
 """
 
 from skinwave.commands import (

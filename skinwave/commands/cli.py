@@ -19,15 +19,14 @@ from skinwave.system.plain_text import printable, say
 from skinwave.system.processes import SAFE_PATH, environment
 
 CACHE = "SKINWAVE_CACHE"
-NO_CACHE = f"neither read nor write cached meshes and reduced bodies; {CACHE} names their folder"
-# Commands that compute nothing, or always anew.
-UNCACHED = ("convert",)
-READER_GONE = 141  # 128 + SIGPIPE, as a shell has it of `yes | head -1`
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+NO_CACHE = f"do not read or write the cache of meshes and bodies, whose folder {CACHE} sets"
+UNCACHED = ("convert",)  # commands that do not use the cache
+READER_GONE = 141  # 128 + SIGPIPE, the exit code of `yes` in `yes | head -1`
+DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command; 0 if it succeeded, 1 if interrupted or refuted, 2 if its input was wrong."""
+    """Run a command; return 0 on success, 1 if interrupted or if a check failed, 2 on bad input."""
     typed = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in typed
     try:
@@ -35,26 +34,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return code
     except KeyboardInterrupt as interrupt:
-        said, code = f"interrupted; {interrupt or 'nothing was finished'}", 1
-    except BrokenPipeError:  # nobody reads what is written
+        message, code = f"interrupted; {interrupt or 'no result was written'}", 1
+    except BrokenPipeError:  # the reader of standard output has ended
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return READER_GONE
     except (ValueError, ArithmeticError, MemoryError, OSError) as error:
         if debug:
             raise
-        said, code = _explained(error), 2
-    say(f"skinwave: {' '.join(said.split())}", sys.stderr)
+        message, code = _message(error), 2
+    say(f"skinwave: {' '.join(message.split())}", sys.stderr)
     return code
 
 
 def _command(typed: list[str]) -> int:
-    if typed[:1] == ["--version"]:  # looked up here, because help need not wait for it
+    if typed[:1] == ["--version"]:  # imports are slow, and help needs none
         print(f"skinwave {skinwave.__version__}")
         return 0
     extensions.load()
     options = parser().parse_args(_joined(typed))
     if options.command_name is None:
-        parser().error(f"no command is given; use one of {', '.join(COMMANDS)}")
+        parser().error(f"no command given; use one of {', '.join(COMMANDS)}")
     options.typed = typed
     no_cache = {CACHE: ""} if getattr(options, "no_cache", False) else {}
     with environment({**SAFE_PATH, **no_cache}):
@@ -62,30 +61,30 @@ def _command(typed: list[str]) -> int:
         return int(options.command(options))
 
 
-def _explained(error: Exception) -> str:
-    """The sentence of an error; those of the system and of memory lack a cure of their own."""
+def _message(error: Exception) -> str:
+    """Return the message of an error; add a cure to those of the system and of memory."""
     if isinstance(error, MemoryError):
-        return str(error) or "not enough memory; take larger elements"
+        return str(error) or "not enough memory; use larger elements"
     if not isinstance(error, OSError) or not error.strerror:
         return str(error)
     place = "a file" if error.filename is None else error.filename
-    cure = "make room there" if error.errno in FULL else "check its name, place and permissions"
+    cure = "free space there" if error.errno in DISK_FULL else "check its name and permissions"
     return f"{place} cannot be read or written ({error.strerror}); {cure}"
 
 
 def _joined(arguments: Sequence[str]) -> list[str]:
-    """The arguments with `--up -z` as one, which argparse takes for two options."""
-    found: list[str] = []
+    """Join `--up -z`, which argparse would read as two options, to `--up=-z`."""
+    joined: list[str] = []
     for argument in arguments:
-        if found[-1:] == ["--up"] and argument in ("-x", "-y", "-z"):
-            found[-1] = f"--up={argument}"
+        if joined[-1:] == ["--up"] and argument in ("-x", "-y", "-z"):
+            joined[-1] = f"--up={argument}"
         else:
-            found.append(argument)
-    return found
+            joined.append(argument)
+    return joined
 
 
 class _Parser(argparse.ArgumentParser):
-    """Argument parser, of the commands too, whose errors are a sentence with the nearest word."""
+    """Argument parser whose errors are one sentence and suggest the nearest known word."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
@@ -118,21 +117,21 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _number(text: str, kind: type = float) -> Any:
-    """The number of an option."""
+    """Parse the number of an option."""
     try:
         return kind(text)
     except ValueError:
         words = "a whole number" if kind is int else "a number, such as 0.5"
-        raise argparse.ArgumentTypeError(f"'{text}' must be {words}") from None
+        raise argparse.ArgumentTypeError(f"'{text}' is not {words}") from None
 
 
 def parser() -> argparse.ArgumentParser:
-    """The parser of all commands; its results have `command`, which does it, and its name."""
+    """Return the parser of all commands; `command` of its results is the function to call."""
     parser = _Parser(
         prog="skinwave",
-        description="Waves in skin and paper under mid-air ultrasound haptics.",
-        epilog=f"{CACHE}: folder where meshes and reduced bodies are cached, 5 GiB at most, those "
-        "used longest ago leave first; empty for none.",
+        description="Simulate waves in skin and paper under mid-air ultrasound haptics.",
+        epilog=f"The environment variable {CACHE} names the folder of cached meshes and reduced "
+        "bodies (at most 5 GiB; an empty value turns the cache off).",
     )
     parser.add_argument("--version", action="store_true", help="print the version and exit")
     commands = parser.add_subparsers(dest="command_name", metavar="COMMAND")

@@ -21,89 +21,110 @@ if TYPE_CHECKING:
 
 
 def add_output(
-    parser: argparse.ArgumentParser, metavar: str = "DIR", what: str = "folder to write"
+    parser: argparse.ArgumentParser, metavar: str = "DIR", what: str = "result folder"
 ) -> None:
-    """Options of output: where and how results are written."""
+    """Add options for where and how results are written."""
     parser.add_argument("-o", "--out", type=Path, metavar=metavar, help=what)
-    parser.add_argument("--overwrite", action="store_true", help="replace what skinwave wrote")
+    parser.add_argument(
+        "--overwrite", action="store_true", help="replace an earlier result at this place"
+    )
     add_reporting(parser)
 
 
 def add_reporting(parser: argparse.ArgumentParser) -> None:
-    """Options of reporting."""
-    parser.add_argument("--quiet", action="store_true", help="no progress, no summary")
-    parser.add_argument("--json", action="store_true", help="summary as JSON")
-    parser.add_argument("--debug", action="store_true", help="traceback of an error")
+    """Add options for what is printed."""
+    parser.add_argument("--quiet", action="store_true", help="print no progress and no summary")
+    parser.add_argument("--json", action="store_true", help="print the summary as JSON")
+    parser.add_argument("--debug", action="store_true", help="print the traceback of an error")
 
 
 def add_scene(parser: argparse.ArgumentParser) -> None:
-    """The scene file."""
+    """Add the scene file."""
     parser.add_argument("scene", type=Path, metavar="SCENE", help="scene file (TOML)")
 
 
-def add_scenes(parser: argparse.ArgumentParser, without: str) -> None:
-    """Scene files of a live page; without any it has other bodies."""
+def add_scenes(parser: argparse.ArgumentParser, default: str) -> None:
+    """Add the scene files of a live page, and name the bodies of a page without any."""
     parser.add_argument(
         "scenes", nargs="*", type=Path, metavar="SCENE",
-        help="scene files (TOML) whose bodies and Tactons the page has; without any, the bodies "
-        f"{without}",
+        help=f"scene files (TOML) whose bodies and Tactons the page offers (default: {default})",
+    )  # fmt: skip
+
+
+def add_file_frame(parser: argparse.ArgumentParser) -> None:
+    """Add unit and orientation of the file of a body."""
+    parser.add_argument(
+        "--unit", default="m", help="unit of the body's file: m (default), cm, mm, um or in"
+    )
+    parser.add_argument(
+        "--up", default="+z", metavar="AXIS",
+        help="axis of that file that points to the device: +z (default), -z, +x, -x, +y or -y",
     )  # fmt: skip
 
 
 def add_width(parser: argparse.ArgumentParser) -> None:
-    """The width of figures."""
+    """Add the width of figures."""
     parser.add_argument(
         "--width", type=float, metavar="INCH",
-        help="of every figure, for print, with letters of 8 points (subscripts 5.6): 3.5 or 7 for "
-        "a journal",
+        help="width of every figure for print, such as 3.5 or 7 for a journal; letters are 8 "
+        "points, subscripts 5.6 points",
     )  # fmt: skip
 
 
 def add_mesh(parser: argparse.ArgumentParser) -> None:
-    """Solver options: element size and direct solver."""
-    add_size(parser, help="element size, mm (default: planned)")
-    parser.add_argument("--solver", default="auto", help="auto, pardiso or superlu")
+    """Add the options of finite elements: element size and direct solver."""
+    add_size(parser, help="element size in mm (default: by the plan)")
+    parser.add_argument("--solver", default="auto", help="auto (default), pardiso or superlu")
 
 
 def add_size(parser: argparse.ArgumentParser, **how: Any) -> None:
-    """The element size in mm."""
+    """Add the element size in mm."""
     parser.add_argument("--element-size", dest="h", type=float, metavar="MM", **how)
 
 
+def add_model_name(parser: argparse.ArgumentParser) -> None:
+    """Add the name of the model."""
+    parser.add_argument(
+        "--model", choices=("auto", *names()), default="auto", metavar="MODEL",
+        help=f"auto (default: the plan selects a model), {', '.join(names())}",
+    )  # fmt: skip
+
+
 def add_model(parser: argparse.ArgumentParser, *, has_steps: bool = True) -> None:
-    """Options of the model: its name, its tolerance and its time step."""
-    parser.add_argument("--model", choices=("auto", *names()), default="auto")
-    help_ = "relative error of waveforms"
-    parser.add_argument("--tolerance", type=float, default=0.05, help=help_)
+    """Add the options of the model: its name, its tolerance and its time step."""
+    add_model_name(parser)
+    parser.add_argument(
+        "--tolerance", type=float, default=0.05, metavar="ERROR",
+        help="relative error that waveforms may have (default: 0.05)",
+    )  # fmt: skip
     if has_steps:
-        help_ = "time step of transient models, s"
-        parser.add_argument("--dt", type=float, metavar="S", help=help_)
+        parser.add_argument(
+            "--dt", type=float, metavar="S", help="time step of transient models in s"
+        )
 
 
-def required_plan(options: argparse.Namespace, scene: "Scene", **more: Any) -> "Plan":
-    """Plan with the user's choices, and more options; a warning for each that exceeds the
-    tolerance.
-    """
+def planned(options: argparse.Namespace, scene: "Scene", **more: Any) -> "Plan":
+    """Plan a scene by the options of a command, and print the warnings of the plan."""
     from skinwave.models.options import SolveOptions
     from skinwave.planning.plan import plan
 
-    asked = SolveOptions(
+    solving = SolveOptions(
         model=options.model, tolerance=options.tolerance, h=metre(options.h), dt=options.dt,
         solver=options.solver, **more,
     )  # fmt: skip
-    required = plan(scene, asked)
-    warn(required.warnings)
-    return required
+    found = plan(scene, solving)
+    warn(found.warnings)
+    return found
 
 
 def warn(sentences: Iterable[str]) -> None:
-    """Print warnings of what falls short of the request."""
+    """Print warnings."""
     for sentence in sentences:
         say(f"skinwave: warning: {' '.join(sentence.split())}", sys.stderr)
 
 
-def told(response: "Response") -> dict[str, Any]:
-    """Accuracy of a response, as a summary in JSON has it."""
+def accuracy(response: "Response") -> dict[str, Any]:
+    """Return the expected error and the warnings of a response for a summary in JSON."""
     error = response.expected_error
     return {
         "expected_error": error if isfinite(error) else None,
@@ -111,10 +132,16 @@ def told(response: "Response") -> dict[str, Any]:
     }
 
 
-def note_central_values(options: argparse.Namespace) -> None:
-    """Say once that a command takes the central values of a scene's uncertain numbers, if it does.
+def check_seed(seed: int) -> None:
+    """Raise a ValueError if the seed of random samples is negative."""
+    if seed < 0:
+        raise ValueError(f"--seed is {seed}; give 0 or a positive whole number")
 
-    A file that cannot be read is the command's to refuse.
+
+def note_central_values(options: argparse.Namespace) -> None:
+    """Print a note if the command ignores the spreads of a scene.
+
+    The command itself refuses a file that cannot be read.
     """
     path, name = getattr(options, "scene", None), options.command_name
     samples = (name == "run" and options.samples is not None) or getattr(options, "best", None)
@@ -128,57 +155,55 @@ def note_central_values(options: argparse.Namespace) -> None:
         warnings.simplefilter("ignore")
         if spreads := read(path).spreads:
             keys = ", ".join(key for key, _ in spreads)
-            say(f"skinwave: central values are taken of {keys}; skinwave run --samples takes their "
-                "spread", sys.stderr)  # fmt: skip
+            say(f"skinwave: uses the central values of {keys}; skinwave run --samples N samples "
+                "their distributions", sys.stderr)  # fmt: skip
 
 
 @contextmanager
 def result_folder(
     options: argparse.Namespace,
-    default: str,
+    default: str | Path,
     inputs: Iterable[str | Path] = (),
     scene: "Scene | None" = None,
 ) -> "Iterator[tuple[Path, Progress]]":
-    """Folder of a result, and where progress goes: that of --out or else the default, with its
-    record, put in place when all is written.
+    """Yield the folder of a result, that of --out or else the default, and a progress callback.
+
+    The folder gets its record at the end, unless it has one already, and is then put in place.
     """
     from skinwave.results import record
     from skinwave.results.outputs import output_folder
 
     options.out = options.out or Path(default)
-    with (
-        output_folder(options.out, overwrite=options.overwrite, inputs=inputs) as folder,
-        progress_of(options) as progress,
-    ):
-        yield folder, progress
-        record.write(folder, record.of_command(options), scene=scene)
+    with output_folder(options.out, overwrite=options.overwrite, inputs=inputs) as folder:
+        with progress_of(options) as progress:
+            yield folder, progress
+        if not (folder / record.FILE).exists():
+            record.write(folder, record.of_command(options), scene=scene)
 
 
 def closing(options: argparse.Namespace, sentences: list[str], **summary: Any) -> None:
-    """The closing lines of a result folder: its sentences, and the page to open."""
+    """Print the sentences of a result and its page, or all of them as JSON."""
     summary = {"out": str(options.out), "sentences": sentences} | summary
     summarise(options, summary, "\n".join([*sentences, f"open {options.out}/index.html"]))
 
 
-def summarise(options: argparse.Namespace, summary: dict[str, Any], sentence: str) -> None:
-    """The closing line, or all that it sums up as JSON."""
+def summarise(options: argparse.Namespace, summary: dict[str, Any], text: str) -> None:
+    """Print a text, or the summary as JSON."""
     if options.json:
         say(json.dumps(summary))
     elif not options.quiet:
-        say(sentence)
+        say(text)
 
 
 def metre(millimetre: float | None) -> float | None:
-    """Metre of what is given in millimetre, if it is."""
+    """Convert millimetre to metre; None stays None."""
     return None if millimetre is None else millimetre / 1e3
 
 
 @contextmanager
 def progress_of(options: argparse.Namespace) -> "Iterator[Progress]":
-    """A bar with the step named and the time left; on a pipe a line per step; nothing if not
-    wanted.
-    """
+    """Yield a progress callback: a bar on a terminal, lines on a pipe, nothing if quiet."""
     from skinwave.system.progress_bar import reported
 
-    with reported(not (options.quiet or options.json)) as shown:
-        yield shown
+    with reported(not (options.quiet or options.json)) as progress:
+        yield progress

@@ -1,4 +1,4 @@
-"""A pattern from one kind of file to another: scene, AdapTics, CSV, WAV, pyautd3."""
+"""Convert a pattern between file formats: scene, AdapTics, CSV, WAV, pyautd3."""
 
 import argparse
 from math import isfinite
@@ -10,53 +10,69 @@ from skinwave.system.plain_text import number_in
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
-    parser.add_argument("source", type=Path, metavar="IN", help=".toml .adaptics .csv .wav")
-    parser.add_argument("target", type=Path, metavar="OUT", help=".toml .adaptics .csv .py")
-    parser.add_argument("--scene", type=Path, metavar="SCENE", help="what to put the pattern on")
-    parser.add_argument("--rate", type=float, metavar="HZ", help="samples a second of CSV or WAV")
-    parser.add_argument("--height", type=float, metavar="MM", help="focus above the array, mm")
-    parser.add_argument("--hold", action="store_true", help="a focal point stays until the next")
-    parser.add_argument("--role", default="modulation", help="what a WAV is: modulation, envelope")
-    parser.add_argument("--scale", default="full", help="of a WAV's samples: full, peak or rms")
+    parser.add_argument(
+        "source", type=Path, metavar="IN", help="file to read: .toml, .adaptics, .csv or .wav"
+    )
+    parser.add_argument(
+        "target", type=Path, metavar="OUT", help="file to write: .toml, .adaptics, .csv or .py"
+    )
+    parser.add_argument(
+        "--scene", type=Path, metavar="SCENE", help="scene file that receives the pattern"
+    )
+    parser.add_argument(
+        "--rate", type=float, metavar="HZ", help="samples per second of a CSV file, read or written"
+    )
+    parser.add_argument(
+        "--height", type=float, metavar="MM", help="height of the focus above the array in mm"
+    )
+    parser.add_argument(
+        "--hold", action="store_true", help="a focal point stays until the next sample"
+    )
+    parser.add_argument(
+        "--role", default="modulation", help="meaning of a WAV: modulation (default) or envelope"
+    )
+    parser.add_argument(
+        "--scale", default="full", help="scale of the samples of a WAV: full (default), peak or rms"
+    )
     parser.add_argument(
         "--parameter", action="append", default=[], metavar="NAME=VALUE",
-        help="of an AdapTics file, instead of its default; may be repeated",
+        help="value of a parameter of an AdapTics file; may be repeated",
     )  # fmt: skip
-    parser.add_argument("--resize", type=float, default=1.0, metavar="FACTOR", help="of the path")
+    parser.add_argument(
+        "--resize", type=float, default=1.0, metavar="FACTOR", help="multiply the path by a factor"
+    )
     parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
     add_reporting(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; the exit code."""
+    """Run the command and return its exit code."""
     from skinwave.patterns import Options, convert
     from skinwave.results.outputs import output_file
     from skinwave.scene.file import read
 
-    asked = Options(
-        rate=options.rate,
-        height=metre(options.height),
-        hold=options.hold,
-        role=options.role,
-        scale=options.scale,
-        parameters=dict(map(_parameter, options.parameter)),
+    choices = Options(
+        rate=options.rate, height=metre(options.height), hold=options.hold, role=options.role,
+        scale=options.scale, parameters=dict(map(_parameter, options.parameter)),
         resize=options.resize,
-    )
+    )  # fmt: skip
     base = read(options.scene) if options.scene else None
     inputs = [options.source, *([options.scene] if options.scene else [])]
     with output_file(options.target, overwrite=options.overwrite, inputs=inputs) as file:
-        content, notes = convert(options.source, options.target, asked, base)
+        content, notes = convert(options.source, options.target, choices, base)
         file.write(content)
     summary = {"out": str(options.target), "bytes": len(content), "notes": notes}
-    said = "".join(f"\n  {note}" for note in notes)
-    summarise(options, summary, f"wrote {options.target}{said}")
+    summarise(options, summary, "\n  ".join([f"wrote {options.target}", *notes]))
     return 0
 
 
 def _parameter(text: str) -> tuple[str, float]:
-    """Name and value of NAME=VALUE."""
+    """Return name and value of NAME=VALUE."""
     name, _, value = text.rpartition("=")
     number = number_in(value)
     if not name or number is None or not isfinite(number):
-        raise ValueError(f"--parameter {text} is not NAME=VALUE, such as proximity=0.5")
+        raise ValueError(
+            f"--parameter {text} does not have the form NAME=VALUE; write, for example, "
+            "proximity=0.5"
+        )
     return name.strip(), number

@@ -1,28 +1,34 @@
-"""Dispersion curves of a scene's body: speeds and decay of its waves, and which a Tacton drives."""
+"""Compute dispersion curves of a body: speed and decay of its waves, and which a Tacton excites."""
 
 import argparse
 
 from skinwave.commands.common import add_output, add_scene, closing, result_folder
+
+MOST_MODES = 12
 
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
     add_scene(parser)
     parser.add_argument(
-        "--highest", type=float, default=650.0, metavar="HZ", help="up to which frequency"
-    )
-    parser.add_argument("--modes", type=int, default=6, metavar="N", help="how many modes, 1 to 12")
+        "--highest", type=float, default=650.0, metavar="HZ",
+        help="highest frequency in Hz (default: 650)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--modes", type=int, default=6, metavar="N",
+        help=f"number of modes, 1 to {MOST_MODES} (default: 6)",
+    )  # fmt: skip
     add_output(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; the exit code."""
+    """Run the command and return its exit code."""
     from skinwave.scene.file import read
     from skinwave.scene.scene import check_load
     from skinwave.studies.dispersion import driven_modes, sentences, write
 
-    if not 1 <= options.modes <= 12:
-        raise ValueError(f"--modes {options.modes} is outside 1..12; give one of these")
+    if not 1 <= options.modes <= MOST_MODES:
+        raise ValueError(f"--modes is {options.modes}; give a number from 1 to {MOST_MODES}")
     scene = read(options.scene)
     check_load(scene, "dispersion")
     found = driven_modes(scene, highest=options.highest, most=options.modes)

@@ -1,72 +1,88 @@
-"""A scene's material, or any of its numbers, fitted to a measurement; or what a file holds."""
+"""Fit numbers of a scene to a measurement, or inspect a file of measurements."""
 
 import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from skinwave.commands.common import add_output, closing, result_folder, summarise, warn
-from skinwave.models import names
+from skinwave.commands.common import (
+    add_model_name,
+    add_output,
+    check_seed,
+    closing,
+    result_folder,
+    summarise,
+    warn,
+)
 
 if TYPE_CHECKING:
     from skinwave.measure import Measurement
 
 KINDS = ("waveforms", "lines", "amplitudes")
 SIGNS = {"in": 1, "out": -1}
+TEXTS = (  # options about a file, each a text
+    ("quantity", "NAME", "quantity in the file: displacement, velocity or acceleration"),
+    ("unit", "UNIT", 'unit in the file: mm/s, um, g; "20 mm/s" is a scale per unit in the file'),
+    ("places", "XY", 'places of the channels in mm, such as "0,0 5,0", or a file of places'),
+    ("variable", "NAME", "name of the array in a file of several arrays"),
+    ("columns", "NAMES", 'columns of motion: names such as "CH1,CH3", or numbers from 1'),
+)
 
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
-    parser.add_argument("scene", type=Path, nargs="?", metavar="SCENE.toml", help="what was moved")
-    parser.add_argument("--measured", type=Path, metavar="FILE", help="what was measured")
+    parser.add_argument(
+        "scene", type=Path, nargs="?", metavar="SCENE", help="scene file (TOML) of the measurement"
+    )
+    parser.add_argument("--measured", type=Path, metavar="FILE", help="file of the measurement")
     parser.add_argument(
         "--vary", action="extend", nargs="+", metavar="KEY=LOW:HIGH", default=[],
-        help="what is fitted: body.material.shear_modulus_pa=5000:50000; gain, delay_ms, "
-        "offset_x_mm and offset_y_mm of the measurement",
+        help="numbers to fit, such as body.material.shear_modulus_pa=5000:50000; also gain, "
+        "delay_ms, offset_x_mm and offset_y_mm of the measurement",
     )  # fmt: skip
     parser.add_argument(
         "--tie", action="extend", nargs="+", default=[], metavar="KEY=EXPRESSION",
-        help="a key that follows from those that are varied",
+        help="compute a key from the varied keys",
     )  # fmt: skip
-    parser.add_argument("--to", choices=KINDS, help="waveforms (default), or lines of these")
-    parser.add_argument("--model", choices=("auto", *names()), default="auto")
-    parser.add_argument("--starts", type=int, default=8, metavar="N", help="of the search")
-    parser.add_argument("--seed", type=int, default=0, help="of the starts")
     parser.add_argument(
-        "--inspect", type=Path, metavar="FILE", help="say what a file holds and lacks, without a "
-        "fit: .csv .txt .lvm .tdms .npz .wav .mat .uff .f32",
+        "--to", choices=KINDS, help="data to fit: waveforms (default), complex lines, or amplitudes"
+    )
+    add_model_name(parser)
+    parser.add_argument(
+        "--starts", type=int, default=8, metavar="N", help="starts of the search (default: 8)"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="seed of the starts (default: 0)")
+    parser.add_argument(
+        "--inspect", type=Path, metavar="FILE", help="report what a file contains, without a fit: "
+        ".csv .txt .lvm .tdms .npz .wav .mat .uff .f32",
     )  # fmt: skip
     parser.add_argument(
         "--false-alarm", type=float, default=0.01, metavar="P",
-        help="of --inspect: probability that noise alone has any line (default: 0.01)",
+        help="with --inspect: probability that noise alone shows any line (default: 0.01)",
     )  # fmt: skip
-    for name, metavar, words in (
-        ("quantity", "NAME", "displacement, velocity or acceleration"),
-        ("unit", "UNIT", 'mm/s, um, g, or "20 mm/s" of 1'),
-        ("places", "XY", 'places in mm, "0,0 5,0", or a file'),
-        ("variable", "NAME", "array of a file of several"),
-        ("columns", "NAMES", 'columns of motion, "CH1,CH3" or numbers from 1'),
-    ):
+    for name, metavar, words in TEXTS:
         parser.add_argument(f"--{name}", default="", metavar=metavar, help=words)
-    parser.add_argument("--positive", choices=tuple(SIGNS), help="into the body or out of it")
-    parser.add_argument("--rate", type=float, metavar="HZ", help="samples a second")
-    parser.add_argument("--direction", choices=("x", "y", "z"),
-                        help="of the motion in a Universal File")  # fmt: skip
+    parser.add_argument(
+        "--positive", choices=tuple(SIGNS), help="positive motion is into the body or out of it"
+    )
+    parser.add_argument("--rate", type=float, metavar="HZ", help="samples per second")
+    parser.add_argument(
+        "--direction", choices=("x", "y", "z"), help="direction of motion in a Universal File"
+    )
     add_output(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; the exit code."""
+    """Run the command and return its exit code."""
     if options.inspect:
         return _inspect(options)
     if not (options.scene and options.measured):
-        raise ValueError("give a scene and --measured FILE, or --inspect FILE")
+        raise ValueError("no data to fit; give SCENE and --measured FILE, or --inspect FILE")
     from skinwave.measure.findings import cautions
     from skinwave.measure.fit import fit
     from skinwave.measure.fit_page import summary, write
     from skinwave.scene.file import read
 
-    if options.seed < 0:
-        raise ValueError(f"--seed = {options.seed} is below 0; give 0 or a whole number above")
+    check_seed(options.seed)
     scene = read(options.scene)
     measured = _measured(options.measured, options)
     name, inputs = f"{options.scene.stem}-fit", [options.scene, options.measured, scene.body.file]
@@ -83,25 +99,25 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _inspect(options: argparse.Namespace) -> int:
-    """Say what a file holds and, if a folder is given, write it."""
+    """Print what a file contains, and write its page if a folder is given."""
     from skinwave.measure.inspection import inspect
     from skinwave.measure.inspection_page import summary, text, write
 
     if options.scene or options.measured or options.vary:
-        raise ValueError("--inspect fits nothing; leave out the scene, --measured and --vary")
+        raise ValueError("--inspect does not fit; remove SCENE, --measured and --vary")
     found = inspect(_measured(options.inspect, options), alarm=options.false_alarm)
-    told, said = summary(found), text(found)
+    contents, lines = summary(found), text(found)
     if options.out:
         with result_folder(options, "", [options.inspect]) as (folder, _):
             write(folder, found)
-        told["out"] = str(options.out)
-        said += f"\nopen {options.out}/index.html"
-    summarise(options, told, said)
+        contents["out"] = str(options.out)
+        lines += f"\nopen {options.out}/index.html"
+    summarise(options, contents, lines)
     return 0
 
 
 def _measured(file: Path, options: argparse.Namespace) -> "Measurement":
-    """The measurement in a file, by the options of what it does not say."""
+    """Read a measurement; options give what the file does not state."""
     from skinwave.measure.reading import places_of, read
 
     return read(

@@ -1,4 +1,4 @@
-"""Installation check: what this machine has for this program, and how to add what it lacks."""
+"""Check of the installation: what this machine has, and how to install missing packages."""
 
 import os
 import platform
@@ -11,33 +11,36 @@ from skinwave.report.renderer import renderer
 from skinwave.system.effort import THREADS, usable_cores, versions
 
 DRAWING = ("matplotlib", "pyvista", "vtk", "pillow")
-# module, distribution, what is missing without it
-OPTIONAL = (
-    ("mkl", "mkl", "the fastest solver: pip install mkl (x86-64)"),
+OPTIONAL = (  # module, distribution, what it adds and how to install it
+    ("mkl", "mkl", "fastest solver on x86-64: pip install mkl"),
     ("imageio_ffmpeg", "imageio-ffmpeg", "MP4 films: pip install imageio imageio-ffmpeg"),
 )
 MISSING = "not installed"
 
 
 def examine() -> list[dict[str, str]]:
-    """Findings: what, its value, and the cure if it can be better; of versions, solver, renderer,
-    threads, cache and optional packages.
+    """Return findings about versions, solver, renderer, threads, cache and optional packages: what,
+    its value, and a cure if it can be improved.
     """
-    drawn, solvers, home = renderer(), fem.available(), cache.folder()
+    drawing, solvers, home = renderer(), fem.available(), cache.folder()
     limits = ", ".join(f"{name}={os.environ[name]}" for name in THREADS if name in os.environ)
     found = [
         *versions().items(),
         *((name, _version(name)) for name in DRAWING),
         ("machine", f"{platform.system()} {platform.machine()}"),
         ("solver", f"{solvers[0]} (of {', '.join(solvers)})"),
-        ("renderer", drawn.said if drawn.found else "none", "" if drawn.found else drawn.said),
+        (
+            "renderer",
+            drawing.said if drawing.found else "none",
+            "" if drawing.found else drawing.said,
+        ),
         ("threads", f"{usable_cores()} processors" + (f", limited by {limits}" if limits else "")),
         ("cache", str(home) if home else "off, by SKINWAVE_CACHE"),
     ]
-    for module, name, lost in OPTIONAL:
-        installed = _version(name)  # of MKL, a library without a module, only this tells
-        missing = installed == MISSING and find_spec(module) is None
-        found.append((name, installed, lost if missing else ""))
+    for module, name, cure in OPTIONAL:
+        installed = _version(name)  # MKL is a library without a module
+        is_missing = installed == MISSING and find_spec(module) is None
+        found.append((name, installed, cure if is_missing else ""))
     return [dict(zip(("what", "value", "cure"), (*each, ""), strict=False)) for each in found]
 
 
@@ -49,12 +52,12 @@ def _version(name: str) -> str:
 
 
 def text(found: list[dict[str, str]]) -> str:
-    """Findings as lines, each cure below what it is for, and how many there are."""
+    """Return findings as lines, each with its cure below it, and a line with their number."""
     width = max(len(each["what"]) for each in found)
     rows = []
     for each in found:
         rows.append(f"{each['what']:<{width}}  {each['value']}")
         rows += [f"{'':<{width}}  -> {each['cure']}"] if each["cure"] else []
-    missing = sum(bool(each["cure"]) for each in found)
-    total = f"{missing} of {len(found)} could be better" if missing else "nothing is missing"
+    count = sum(bool(each["cure"]) for each in found)
+    total = f"{count} of {len(found)} can be improved" if count else "nothing is missing"
     return "\n".join([*rows, total])

@@ -1,4 +1,4 @@
-"""One HTML file that computes in the browser how bodies move under Tactons."""
+"""Write one HTML file that computes in the browser how bodies move under Tactons."""
 
 import argparse
 from pathlib import Path
@@ -14,12 +14,12 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-selftest", action="store_true", help="leave out the data of live.html#selftest"
     )
-    add_output(parser, "FILE", f"(default: {OUT})")
+    add_output(parser, "FILE", f"file to write (default: {OUT})")
     parser.set_defaults(out=OUT)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; the exit code."""
+    """Run the command and return its exit code."""
     from skinwave.live.data import data_of, read_scene
     from skinwave.live.page import page
     from skinwave.results.outputs import output_file
@@ -34,5 +34,5 @@ def run(options: argparse.Namespace) -> int:
         size = file.write(page(data).encode())
     bodies = [record["title"] for record in data["bodies"]]
     summary = {"out": str(options.out), "bytes": size, "bodies": bodies}
-    summarise(options, summary, f"{', '.join(bodies)}; wrote {options.out} ({size / 1e6:.1f} MB)")
+    summarise(options, summary, f"wrote {options.out} ({size / 1e6:.1f} MB): {', '.join(bodies)}")
     return 0

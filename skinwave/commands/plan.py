@@ -1,4 +1,4 @@
-"""Model and discretisation that a scene requires, and why."""
+"""Print the model, the mesh and the expected error for a scene, with reasons."""
 
 import argparse
 
@@ -7,7 +7,7 @@ from skinwave.commands.common import (
     add_model,
     add_reporting,
     add_scene,
-    required_plan,
+    planned,
     summarise,
 )
 
@@ -21,17 +21,17 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; the exit code."""
+    """Run the command and return its exit code."""
     from dataclasses import replace
 
     from skinwave.planning.budget import mesh_row
     from skinwave.scene.file import read
 
     scene = read(options.scene)
-    required = required_plan(options, scene)
-    row = mesh_row(replace(scene, body=required.body), required.h, required.error)
-    required = replace(required, rows=(*required.rows, row))
-    width = [max(len(getattr(row, f)) for row in required.rows) for f in ("what", "value")]
-    lines = (f"{r.what:<{width[0]}}  {r.value:<{width[1]}}  {r.reason}" for r in required.rows)
-    summarise(options, required.table(), "\n".join(lines))
+    found = planned(options, scene)
+    row = mesh_row(replace(scene, body=found.body), found.h, found.error)
+    found = replace(found, rows=(*found.rows, row))
+    width = [max(len(getattr(row, name)) for row in found.rows) for name in ("what", "value")]
+    lines = (f"{r.what:<{width[0]}}  {r.value:<{width[1]}}  {r.reason}" for r in found.rows)
+    summarise(options, found.table(), "\n".join(lines))
     return 0

@@ -1,4 +1,4 @@
-"""Model hierarchy: effect and cost of dropping each assumption of the published model."""
+"""Relax the assumptions of the published model one by one: effect and cost of each."""
 
 import argparse
 from pathlib import Path
@@ -11,33 +11,32 @@ BOTH = "paper-vs-skin"
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
     parser.add_argument(
-        "scene", metavar="SCENE",
-        help=f"scene file (TOML), or {BOTH}: which mechanism makes which line of the 15 Tactons",
+        "scene", metavar="SCENE", help=f"scene file (TOML), or {BOTH}: which mechanism produces "
+        "which line of the 15 Tactons",
     )  # fmt: skip
-    add_size(parser, help="element size of all steps, mm")
+    add_size(parser, help="element size of all steps in mm")
     parser.add_argument(
         "--update-rate", type=float, default=20.0, metavar="KHZ",
-        help="how often the device moves its focus: 20 or 40 kHz",
+        help="update rate of the device's focus: 20 (default) or 40 kHz",
     )  # fmt: skip
     parser.add_argument(
         "--points", type=int, metavar="N",
-        help="how many points on the path the focus rests on, one after another; as many as the "
-        "update rate allows",
+        help="number of points on the path at which the focus rests (default: as many as the "
+        "update rate allows)",
     )  # fmt: skip
     add_output(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; the exit code."""
+    """Run the command and return its exit code."""
     from skinwave.models.options import SolveOptions
     from skinwave.scene.file import read
     from skinwave.studies.assumptions import check_rate
     from skinwave.studies.relax import hierarchy_of, sentence, write
     from skinwave.system import document
 
-    h = metre(options.h)
-    SolveOptions(h=h)  # which refuses what is out of range
-    rate = 1e3 * options.update_rate
+    h, rate = metre(options.h), 1e3 * options.update_rate
+    SolveOptions(h=h)  # raises if it is out of range
     check_rate(rate)
     if options.scene == BOTH:
         return _paper_vs_skin(options)
@@ -58,7 +57,7 @@ def _paper_vs_skin(options: argparse.Namespace) -> int:
     from skinwave.studies.paper_vs_skin import paper_vs_skin, report, sentences
 
     if options.points is not None:
-        raise ValueError(f"--points is of a scene's path; leave it out with {BOTH}")
+        raise ValueError(f"--points applies to the path of one scene; remove it for {BOTH}")
     with result_folder(options, BOTH) as (folder, progress):
         found = paper_vs_skin(progress, h=metre(options.h))
         report(found).write(folder)

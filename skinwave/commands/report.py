@@ -1,4 +1,4 @@
-"""One page of a scene or of a result folder: what was asked, modelled, found and trusted."""
+"""Write one page about a scene or a result folder; or only a film or a map."""
 
 import argparse
 from dataclasses import replace
@@ -9,147 +9,142 @@ from skinwave.commands.common import (
     add_mesh,
     add_output,
     add_width,
+    closing,
     metre,
     progress_of,
+    result_folder,
     summarise,
     warn,
 )
 
 if TYPE_CHECKING:
     from skinwave.results.views import View
+    from skinwave.scene.scene import Scene
     from skinwave.system.effort import Progress
 
 STYLES, FORMATS = ("report", "talk", "print"), ("svg", "pdf")
-FILM_OPTIONS = ("camera", "frames")
-MAP_OPTIONS = ("reach", "step", "depth")
+ONLY_WITH = {  # an option -> what it applies to
+    "camera": ("film",), "frames": ("film",), "reach": ("map",), "step": ("map",),
+    "depth": ("map",), "quantity": ("film", "map"),
+}  # fmt: skip
+REACH, STEP = 30.0, 1.0  # mm, of a map
 
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
     parser.add_argument(
         "source", type=Path, metavar="SCENE|DIR",
-        help="scene file, or a folder that run, compare or report wrote: then no model is run",
+        help="scene file, or a folder that run, compare or report wrote; no model is run for a "
+        "folder",
     )  # fmt: skip
     what = parser.add_mutually_exclusive_group()
     what.add_argument(
-        "--film", action="store_true", help="a film alone, models side by side: .gif or .mp4 (-o)"
+        "--film", action="store_true", help="write only a film of all models, .gif or .mp4"
     )
     what.add_argument(
         "--map", action="store_true",
-        help="a map alone: RMS of the quantity that the probes read, over the body at their depth",
+        help="write only a map: RMS of the quantity of the probes over the body, at their depth",
     )  # fmt: skip
     parser.add_argument("--style", choices=STYLES, default="report")
     parser.add_argument(
         "--format", choices=FORMATS, action="append", default=[],
-        help="of figures, beside PNG; may be given twice",
+        help="format of figures besides PNG; may be repeated",
     )  # fmt: skip
     parser.add_argument(
         "--beside", type=lambda text: text.split(","), default=[], metavar="BODIES",
-        help="on these bodies, too: paper-sheet, skin-slab or palm, with commas between",
+        help="add these bodies: paper-sheet, skin-slab or palm, separated by commas",
     )  # fmt: skip
     add_width(parser)
     parser.add_argument(
         "--only", type=lambda text: text.split(","), default=[], metavar="COLUMNS",
-        help="only these, as point-kernel,skin-slab",
+        help="show only these models, such as point-kernel,skin-slab",
     )  # fmt: skip
     parser.add_argument(
-        "--quantity", metavar="NAME", help="of a film or map, instead of the scene's"
+        "--quantity", metavar="NAME", help="quantity of a film or map (default: that of the scene)"
     )
-    parser.add_argument("--camera", choices=("tilted", "front", "top"), help="of a film")
+    parser.add_argument(
+        "--camera", choices=("tilted", "front", "top"), help="camera of a film (default: tilted)"
+    )
     parser.add_argument(
         "--frames", type=int, metavar="N",
-        help="of a film; by default as many as its fastest strong component needs",
+        help="frames of a film (default: as many as its fastest strong line needs)",
     )  # fmt: skip
-    parser.add_argument("--reach", type=float, metavar="MM", help="of a map either way: 30")
-    parser.add_argument("--step", type=float, metavar="MM", help="between places of a map: 1")
     parser.add_argument(
-        "--depth", metavar="MM", help="of a map, instead of the scene's, or a receptor"
+        "--reach", type=float, metavar="MM", help=f"half width of a map (default: {REACH:g} mm)"
     )
+    parser.add_argument(
+        "--step", type=float, metavar="MM", help=f"grid step of a map (default: {STEP:g} mm)"
+    )
+    parser.add_argument(
+        "--depth", metavar="MM",
+        help="depth of a map in mm, or a receptor (default: that of the scene)",
+    )  # fmt: skip
     add_mesh(parser)
     add_output(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; the exit code."""
-    for kind, names in (("film", FILM_OPTIONS), ("map", MAP_OPTIONS)):
-        given = [name for name in names if getattr(options, name) is not None]
-        if given and not getattr(options, kind):
-            raise ValueError(f"--{given[0]} is of a {kind}; give --{kind}, too")
-    if options.quantity is not None and not (options.film or options.map):
-        raise ValueError("--quantity is of a film or map; give --film or --map, too")
+    """Run the command and return its exit code."""
+    for name, kinds in ONLY_WITH.items():
+        if getattr(options, name) is not None and not any(getattr(options, k) for k in kinds):
+            raise ValueError(
+                f"--{name} applies only to a {' or '.join(kinds)}; add --{' or --'.join(kinds)}, "
+                f"or remove --{name}"
+            )
     return _film(options) if options.film else _map(options) if options.map else _page(options)
 
 
 def _page(options: argparse.Namespace) -> int:
     from skinwave.report.styles import style
     from skinwave.results import record
-    from skinwave.results.outputs import output_folder
-    from skinwave.scene.file import read
+    from skinwave.studies.album import make
     from skinwave.studies.report import write_report
 
     chosen, command = style(options.style, options.width), record.of_command(options)
-    source, made = options.source, options.source.is_dir()
-    scene = None if made else read(source)
-    out = options.out or (source / "report" if made else Path(f"{source.stem}-report"))
+    source, has_results = options.source, options.source.is_dir()
+    scene = None if has_results else _scene(options)
+    if has_results and options.out is None:
+        # The report inside a result folder is made by this command alone, and replaced.
+        options.out, options.overwrite = source / "report", True
+        if options.out.is_symlink():
+            raise ValueError(f"{options.out} is a link; remove it, or name a folder with --out")
     inputs = [source, scene.body.file if scene else ""]
-    # The report inside a result folder is this command's own, and made anew.
-    anew = options.overwrite or (made and options.out is None)
-    if made and options.out is None and out.is_symlink():
-        raise ValueError(f"{out} is a link; remove it or name the folder to write with --out")
-    with (
-        output_folder(out, overwrite=anew, inputs=inputs) as folder,
-        progress_of(options) as progress,
-    ):
+    with result_folder(options, f"{source.stem}-report", inputs, scene) as (folder, progress):
         if scene is not None:
-            from skinwave.studies.album import make
-
-            said = make(
+            warnings = make(
                 folder, scene, progress, h=metre(options.h), solver=options.solver,
                 beside=options.beside,
             )  # fmt: skip
-            warn(said)
+            warn(warnings)
         write_report(
-            folder if scene is not None else source, folder, chosen, progress,
-            formats=options.format, columns=options.only, command="" if made else command["typed"],
+            folder if scene else source, folder, chosen, progress, formats=options.format,
+            columns=options.only, command=command["typed"] if scene else "",
         )  # fmt: skip
-        record.write(folder, command, scene=scene)
-        size = (folder / "index.html").stat().st_size
-    summary = {"out": str(out), "megabytes": round(size / 1e6, 2)}
-    summarise(options, summary, f"{size / 1e6:.1f} MB; open {out}/index.html")
+        size = (folder / "index.html").stat().st_size / 1e6
+    closing(options, [f"page of {size:.1f} MB"], megabytes=round(size, 2))
     return 0
 
 
 def _map(options: argparse.Namespace) -> int:
-    from skinwave.results import record
-    from skinwave.results.outputs import output_folder
     from skinwave.results.surface import quantity_map
-    from skinwave.scene.file import read
     from skinwave.scene.keys import depth_of
     from skinwave.studies.report import map_sentences, write_map
 
     if options.source.is_dir():
-        raise ValueError(f"{options.source} is a folder; give the scene file of the map")
-    scene = read(options.source)
-    if options.quantity is not None:
-        scene = replace(scene, quantity=options.quantity)
-    scene = replace(
-        scene, depth=scene.depths[0] if options.depth is None else depth_of(options.depth)
-    )
-    reach, step = (30.0 if options.reach is None else options.reach,
-                   1.0 if options.step is None else options.step)  # fmt: skip
-    out = options.out or Path(f"{options.source.stem}-map")
-    inputs = [options.source, scene.body.file]
-    with output_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
-        with progress_of(options) as progress:
-            found = quantity_map(
-                scene, progress, reach=reach / 1e3, step=step / 1e3, h=metre(options.h),
-                solver=options.solver,
-            )  # fmt: skip
+        raise ValueError(f"{options.source} is a folder; name the scene file for the map")
+    scene = _scene(options)
+    depth = scene.depths[0] if options.depth is None else depth_of(options.depth)
+    scene = replace(scene, depth=depth)
+    reach = REACH if options.reach is None else options.reach
+    step = STEP if options.step is None else options.step
+    name, inputs = f"{options.source.stem}-map", [options.source, scene.body.file]
+    with result_folder(options, name, inputs, scene) as (folder, progress):
+        found = quantity_map(
+            scene, progress, reach=reach / 1e3, step=step / 1e3, h=metre(options.h),
+            solver=options.solver,
+        )  # fmt: skip
         write_map(folder, scene, found)
-        record.write(folder, record.of_command(options), scene=scene)
-    said = map_sentences(scene, found)
-    summary = {"out": str(out), "sentences": said}
-    summarise(options, summary, "\n".join([*said, f"open {out}/index.html"]))
+    closing(options, map_sentences(scene, found))
     return 0
 
 
@@ -163,9 +158,9 @@ def _film(options: argparse.Namespace) -> int:
     out = options.out or Path(f"{source.resolve().stem}.gif")
     check_format(out)
     if options.frames is not None and not 2 <= options.frames <= 1000:
-        raise ValueError(f"frames = {options.frames} is outside 2..1000; a film needs a few")
+        raise ValueError(f"--frames is {options.frames}; give a number from 2 to 1000")
     if not renderer().found:
-        raise ValueError(f"there is nothing to draw a film with: {renderer().said}")
+        raise ValueError(f"this machine cannot draw a film: {renderer().said}")
     with (
         output_path(out, overwrite=options.overwrite, inputs=[source]) as aside,
         progress_of(options) as progress,
@@ -173,34 +168,40 @@ def _film(options: argparse.Namespace) -> int:
         views = _views(options, progress)
         camera = options.camera or "tilted"
         film(aside, views, style(options.style), progress, camera=camera)
-    summary = {"out": str(out), "frames": len(views[0].times), "period_ms": 1e3 * views[0].period}
-    summarise(options, summary, f"{len(views[0].times)} frames of {seam(views[0])}; wrote {out}")
+    frames = len(views[0].times)
+    summary = {"out": str(out), "frames": frames, "period_ms": 1e3 * views[0].period}
+    summarise(options, summary, f"{frames} frames of {seam(views[0])}; wrote {out}")
     return 0
 
 
-def _views(options: argparse.Namespace, progress: "Progress") -> "list[View]":
-    """Motion to show: of a folder what it keeps, of a scene every model's response."""
+def _scene(options: argparse.Namespace) -> "Scene":
+    """Read the scene file, with the quantity of a film or map."""
     from skinwave.scene.file import read
+
+    scene = read(options.source)
+    return scene if options.quantity is None else replace(scene, quantity=options.quantity)
+
+
+def _views(options: argparse.Namespace, progress: "Progress") -> "list[View]":
+    """Return the saved motion of a result folder, or compute that of every model of a scene."""
     from skinwave.studies.album import open_album, shown_views
 
     if not options.source.is_dir():
-        scene = read(options.source)
-        if options.quantity is not None:
-            scene = replace(scene, quantity=options.quantity)
-        views, said = shown_views(
-            replace(scene, depth=0.0),  # what is seen is the surface
+        views, warnings = shown_views(
+            replace(_scene(options), depth=0.0),  # a film shows the surface
             progress, h=metre(options.h), solver=options.solver, frames=options.frames,
             beside=options.beside,
         )  # fmt: skip
-        warn(said)
+        warn(warnings)
         return views
     if options.quantity is not None:
         raise ValueError(
-            f"{options.source} keeps the motion alone, not {options.quantity}; give its scene.toml"
+            f"{options.source} contains displacements only, not {options.quantity}; name its "
+            "scene.toml instead"
         )
     if views := list(open_album(options.source).views.values()):
         return views
     raise ValueError(
-        f"{options.source} keeps no motion of whole bodies; give its scene.toml, or a folder "
+        f"{options.source} contains no motion of whole bodies; name its scene.toml, or a folder "
         "that skinwave report wrote"
     )

@@ -1,4 +1,4 @@
-"""Many scenes in one table, on all cores or a cluster, and its figures; resumes."""
+"""Simulate many scenes on all cores or a cluster, and write one table."""
 
 import argparse
 import sys
@@ -12,6 +12,7 @@ from skinwave.commands.common import (
     add_model,
     add_reporting,
     add_width,
+    check_seed,
     metre,
     progress_of,
     summarise,
@@ -24,80 +25,91 @@ FORMATS = ("png", "svg", "pdf")
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
     parser.add_argument(
-        "scene", type=Path, metavar="FILE", help="scene (TOML); or the folder of a sweep, for "
-        "--plot and --csv",
+        "scene", type=Path, metavar="SCENE|DIR",
+        help="scene file (TOML), or the folder of a sweep for --plot and --csv",
     )  # fmt: skip
     parser.add_argument(
         "--vary", action="extend", nargs="+", metavar="KEY=VALUES", default=[],
-        help="tacton.speed_m_per_s=1:12:12, body.thickness_mm=10,15, body=skin-slab,palm; "
-        "start:stop or normal(25e3,0.3), lognormal, factor, uniform, triangular of lhs and sobol",
+        help="keys to vary: tacton.speed_m_per_s=1:12:12, body.thickness_mm=10,15, "
+        "body=skin-slab,palm; for lhs and sobol start:stop, normal(25e3,0.3), lognormal, factor, "
+        "uniform or triangular",
     )  # fmt: skip
     parser.add_argument(
         "--design", default="factorial", help="factorial (default), zip, lhs or sobol"
     )
     parser.add_argument(
         "--samples", type=int, metavar="N",
-        help="runs of lhs; rows of each matrix of sobol; samples of spreads of --best (199)",
+        help="runs of lhs, rows of each matrix of sobol, or samples for the interval of --best "
+        "(default: 199)",
     )  # fmt: skip
-    parser.add_argument("--seed", type=int, default=0, help="of samples")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the samples (default: 0)")
     parser.add_argument(
         "--best", metavar="COLUMN",
-        help="the value of the varied key at which a column such as level_db[0] is largest, and "
-        "its 95 %% interval under the spreads of the scene",
+        help="find the value of the varied key at which a column such as level_db[0] is largest, "
+        "and its 95 %% interval under the distributions of the scene",
     )  # fmt: skip
     parser.add_argument("-o", "--out", type=Path, metavar="DIR", help="folder of the table")
     parser.add_argument(
         "--scheduler", default="processes", metavar="WHERE",
         help="processes (default), threads, or the address of a Dask scheduler",
     )  # fmt: skip
-    parser.add_argument("--workers", type=int, metavar="N", help="runs at a time on this machine")
+    parser.add_argument(
+        "--workers", type=int, metavar="N",
+        help="number of runs at a time on this machine (default: all cores)",
+    )  # fmt: skip
     add_model(parser, has_steps=False)
     add_mesh(parser)
-    parser.add_argument("--csv", action="store_true", help="write rows.csv, too")
+    parser.add_argument("--csv", action="store_true", help="also write rows.csv")
     parser.add_argument(
         "--plot", nargs="*", metavar="COLUMN",
-        help="draw columns of the table, such as peak_um (default), level_db, f_AM_um[2] at one "
-        "probe, into its folder figures",
+        help="draw columns of the table into the folder figures: peak_um (default), level_db, "
+        "f_AM_um[2] for one probe",
     )  # fmt: skip
-    parser.add_argument("--x", metavar="KEY", help="along the axis (default: most values)")
-    parser.add_argument("--by", metavar="KEY", help="a curve for each value (default: the next)")
-    parser.add_argument("--heat", action="store_true", help="a map over --x and --by instead")
-    parser.add_argument("--format", choices=FORMATS, default="png")
-    parser.add_argument("--style", default="report", help="report, talk or print")
+    parser.add_argument(
+        "--x", metavar="KEY", help="key of the horizontal axis (default: the one with most values)"
+    )
+    parser.add_argument(
+        "--by", metavar="KEY", help="key with a curve for each value (default: the next one)"
+    )
+    parser.add_argument("--heat", action="store_true", help="draw a map over --x and --by")
+    parser.add_argument(
+        "--format", choices=FORMATS, default="png", help="format of figures (default: png)"
+    )
+    parser.add_argument("--style", default="report", help="report (default), talk or print")
     add_width(parser)
     add_reporting(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; the exit code."""
+    """Run the command and return its exit code."""
     from skinwave.sweeps import dataset, engine
 
     engine.check(options.scheduler)
     summary: dict[str, Any] = {}
-    said: list[str] = []
+    lines: list[str] = []
     out, missing = options.scene, 0
     if options.scene.is_dir():
         if options.vary or not (options.csv or options.plot is not None):
             raise ValueError(
-                f"{out} is a folder; give --plot or --csv without --vary, or a scene with --vary"
+                f"{out} is a folder; add --plot or --csv and remove --vary, or name a scene file"
             )
         dataset.check_folder(out)
     else:
         out = options.out or Path(f"{options.scene.stem}-sweep")
-        summary, said = _swept(options, out)
+        summary, lines = _sweep(options, out)
         missing = summary["missing"]
     if missing < summary.get("planned", 1):
         if options.csv:
             dataset.write_beside(out, {dataset.CSV: dataset.csv_of(dataset.read(out))})
         if options.plot is not None:
-            summary["figures"] = _drawn(options, out)
-            said += [f"wrote {path}" for path in summary["figures"]]
-    summarise(options, summary, "\n".join(said))
+            summary["figures"] = _draw(options, out)
+            lines += [f"wrote {path}" for path in summary["figures"]]
+    summarise(options, summary, "\n".join(lines))
     return 1 if missing else 0
 
 
-def _swept(options: argparse.Namespace, out: Path) -> tuple[dict[str, Any], list[str]]:
-    """Run what is missing; its summary, and sentences on it."""
+def _sweep(options: argparse.Namespace, out: Path) -> tuple[dict[str, Any], list[str]]:
+    """Run the missing points of the design; return a summary and sentences."""
     from skinwave.models.options import SolveOptions
     from skinwave.results import record
     from skinwave.scene.distributions import Spread
@@ -105,21 +117,19 @@ def _swept(options: argparse.Namespace, out: Path) -> tuple[dict[str, Any], list
     from skinwave.sweeps import best, dataset, uncertainty_page
     from skinwave.sweeps.sweep import Sweep
 
-    if options.seed < 0:
-        raise ValueError(f"--seed = {options.seed} is below 0; give 0 or a whole number above")
+    check_seed(options.seed)
     is_sampled = options.design in SAMPLED
     if options.best and is_sampled:
-        raise ValueError(
-            f"--best takes a grid of values, not --design {options.design}; leave it out"
-        )
+        raise ValueError(f"--best needs a grid of values; remove --design {options.design}")
     variations = [parse(text) for text in options.vary]
-    varied = best.check(variations, options.samples) if options.best else None
-    samples = None if options.best else options.samples
-    combined = combinations(variations, options.design, samples, options.seed)
+    grid = best.check(variations, options.samples) if options.best else None
+    combined = combinations(
+        variations, options.design, None if grid else options.samples, options.seed
+    )
     spreads = [each for each in variations if is_sampled and isinstance(each, Spread)]
     has_page = len(spreads) == len(variations)
     tables = uncertainty_page.SAMPLED_FILES if has_page else ()
-    dataset.refuse_changed(out, [*tables, *[dataset.CSV] * options.csv])  # before all is computed
+    dataset.refuse_changed(out, [*tables, *[dataset.CSV] * options.csv])  # before any run
     solving = SolveOptions(
         model=options.model, tolerance=options.tolerance, h=metre(options.h), solver=options.solver
     )
@@ -131,35 +141,35 @@ def _swept(options: argparse.Namespace, out: Path) -> tuple[dict[str, Any], list
             scheduler=options.scheduler, workers=options.workers,
             command=record.of_command(options),
         )  # fmt: skip
-        found = sweep.run(points)
-        if varied and not found.missing:
-            optimum = best.best_value(sweep, varied, options.best, options.samples, options.seed)
-    if has_page and not found.missing:
+        outcome = sweep.run(points)
+        if grid and not outcome.missing:
+            optimum = best.find_best(sweep, grid, options.best, options.samples, options.seed)
+    if has_page and not outcome.missing:
         files = uncertainty_page.write_sampled(
             out, sweep.rows(points), spreads, has_indices=options.design == "sobol"
         )
-    if found.missing:
-        why = "interrupted" if found.interrupted else "workers were killed"
-        say(f"skinwave: {why}; {found.missing} runs are missing, the same command goes on with "
-            "them", sys.stderr)  # fmt: skip
+    if outcome.missing:
+        cause = "interrupted" if outcome.interrupted else "workers were killed"
+        say(f"skinwave: {cause}; {outcome.missing} runs are missing; repeat the command to resume",
+            sys.stderr)  # fmt: skip
     summary = {
-        "out": str(out), "planned": found.planned, "there_before": found.found,
-        "done": found.done, "failed": found.failed, "missing": found.missing,
-        "seconds": round(found.seconds, 1), "files": files,
+        "out": str(out), "planned": outcome.planned, "there_before": outcome.earlier,
+        "done": outcome.done, "failed": outcome.failed, "missing": outcome.missing,
+        "seconds": round(outcome.seconds, 1), "files": files,
     }  # fmt: skip
-    said = [
-        f"{found.done} of {found.planned} runs done in {found.seconds:.0f} s, {found.failed} "
-        f"failed, {found.found} were there; {out}/{dataset.ROWS} is the table"
-        + (f", {out}/{files[-1]} its percentiles" if files else "")
+    lines = [
+        f"{outcome.done} of {outcome.planned} runs done in {outcome.seconds:.0f} s, "
+        f"{outcome.failed} failed, {outcome.earlier} done earlier; table in {out}/{dataset.ROWS}"
+        + (f", percentiles in {out}/{files[-1]}" if files else "")
     ]
     if optimum:
         summary["best"] = asdict(optimum) | {"is_at_end": optimum.is_at_end}
-        said.insert(0, optimum.words)
-    return summary, said
+        lines.insert(0, optimum.words)
+    return summary, lines
 
 
-def _drawn(options: argparse.Namespace, out: Path) -> list[str]:
-    """Draw columns of a sweep's table; the paths of the figures."""
+def _draw(options: argparse.Namespace, out: Path) -> list[str]:
+    """Draw columns of a sweep's table; return the paths of the figures."""
     from skinwave.report.figures import drawn
     from skinwave.report.styles import style
     from skinwave.results.files import distinct_names
@@ -171,17 +181,17 @@ def _drawn(options: argparse.Namespace, out: Path) -> list[str]:
     keys = varied(rows)
     x = options.x or next(iter(keys), None)
     if x is None:
-        raise ValueError(f"{out} varies no key; name a column with --x")
+        raise ValueError(f"no key varies in {out}; name a column for the axis with --x")
     by = options.by or next((key for key in keys if key != x), None)
+    if options.heat and not by:
+        raise ValueError(f"only {x} varies in {out}, but a map needs two keys; remove --heat")
     figures = {}
     for column in options.plot or ["peak_um"]:
         name = f"{column} over {x}" + (f" and {by}" if by else "")
-        if not options.heat:
-            figures[name] = line_figure(rows, column, x, by, chosen)
-        elif by:
+        if options.heat and by:
             figures[f"{name} map"] = heat_figure(rows, column, x, by, chosen)
         else:
-            raise ValueError("a map needs two varied keys; leave out --heat or give --by")
+            figures[name] = line_figure(rows, column, x, by, chosen)
     stems = distinct_names(name.replace(" ", "-") for name in figures)
     files = {
         f"figures/{stem}.{options.format}": drawn(figure, options.format, chosen.dpi)

@@ -1,4 +1,4 @@
-"""Verification: closed forms, published measurements, cost of accuracy, or this installation."""
+"""Verify against closed forms or published measurements, or check this installation."""
 
 import argparse
 from pathlib import Path
@@ -11,9 +11,11 @@ HAND = Path("examples/hand/generic-hand-right.glb")
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
     subject = parser.add_mutually_exclusive_group()
-    subject.add_argument("--quick", action="store_true", help="only cases of a few seconds each")
     subject.add_argument(
-        "--published", action="store_true", help="models beside published measurements"
+        "--quick", action="store_true", help="run only cases that take a few seconds"
+    )
+    subject.add_argument(
+        "--published", action="store_true", help="compare models with published measurements"
     )
     subject.add_argument(
         "--tradeoff", type=Path, metavar="SCENE", dest="scene",
@@ -21,20 +23,20 @@ def options(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     subject.add_argument(
         "--installation", action="store_true",
-        help="what this machine has, and how to add what it lacks",
+        help="list the software of this machine, and how to install missing packages",
     )  # fmt: skip
     parser.add_argument(
         "--hand", type=Path, metavar="FILE",
-        help="with --published, also the decay along a finger of this hand, its palm towards -x, "
-        f"by finite elements, which takes minutes ({HAND} of the repository)",
+        help="with --published: also compute the decay along a finger of this hand by finite "
+        f"elements, in minutes; the palm faces -x, as in {HAND} of the repository",
     )  # fmt: skip
     add_output(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; the exit code."""
+    """Run the command and return its exit code."""
     if options.hand and not options.published:
-        raise ValueError("--hand is for --published; give both or neither")
+        raise ValueError("--hand needs --published; add it, or remove --hand")
     if options.installation:
         return _installation(options)
     if options.published:
@@ -49,15 +51,16 @@ def _cases(options: argparse.Namespace) -> int:
     with result_folder(options, "verification") as (folder, progress):
         results = suite.run_suite(cases, folder, progress, debug=options.debug)
     failed = [result.case.name for result in results if not result.passed]
-    broken = len(results) < len(cases)
-    said = [suite.summary(results)]
-    if broken:
-        said.append(f"interrupted after {len(results)} of {len(cases)} cases")
+    is_incomplete = len(results) < len(cases)
+    sentences = [suite.summary(results)]
+    if is_incomplete:
+        sentences.append(f"interrupted after {len(results)} of {len(cases)} cases")
     closing(
-        options, said, passed=len(results) - len(failed), failed=len(failed), planned=len(cases),
-        failures=failed, seconds=round(sum(result.seconds for result in results), 1),
+        options, sentences, passed=len(results) - len(failed), failed=len(failed),
+        planned=len(cases), failures=failed,
+        seconds=round(sum(result.seconds for result in results), 1),
     )  # fmt: skip
-    return 1 if failed or broken else 0
+    return 1 if failed or is_incomplete else 0
 
 
 def _published(options: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""The live page in a browser, served from this machine, so that its bodies can be changed."""
+"""Open the live page in a browser, served from this machine, with bodies that can be edited."""
 
 import argparse
 import os
@@ -11,25 +11,27 @@ from skinwave.commands.common import add_reporting, add_scenes, progress_of
 from skinwave.system.plain_text import say
 
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
-QUICK = ("skin-slab", "paper-sheet")  # bodies whose packs take seconds
+QUICK = ("skin-slab", "paper-sheet")  # bodies that are ready in seconds
 
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
     add_scenes(parser, " and ".join(QUICK))
-    parser.add_argument("--port", type=int, default=8080, help="0 is any (default: 8080)")
+    parser.add_argument(
+        "--port", type=int, default=8080, help="port (default: 8080; 0 for any free port)"
+    )
     parser.add_argument(
         "--base-url", default="/", metavar="PATH",
-        help="path under which a proxy shows the page, such as /user/name/proxy/8080/",
+        help="path of the page behind a proxy, such as /user/name/proxy/8080/",
     )  # fmt: skip
     parser.add_argument("--no-browser", action="store_true", help="only print the address")
     add_reporting(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; the exit code."""
+    """Run the command and return its exit code."""
     if not 0 <= options.port <= 65535:
-        raise ValueError(f"port = {options.port} is outside 0..65535; leave it out for 8080")
+        raise ValueError(f"--port is {options.port}; give a number from 0 to 65535")
     from skinwave.live.data import data_of, read_scene
     from skinwave.live.serve import Server
 
@@ -38,24 +40,24 @@ def run(options: argparse.Namespace) -> int:
     with progress_of(options) as progress:
         data = data_of(scenes, progress, bodies=QUICK, test=False)
     with Server(data, options.port, base) as server, tempfile.TemporaryDirectory() as private:
-        say(f"skinwave: {server.address} (Ctrl-C ends it)", sys.stderr)
+        say(f"skinwave: {server.address} (press Ctrl-C to stop)", sys.stderr)
         has_display = sys.platform in ("win32", "darwin") or any(map(os.environ.get, DISPLAYS))
         if base != "/":
             say(f"skinwave: behind the proxy, open {base}?token={server.token}", sys.stderr)
         elif has_display and not options.no_browser:
-            open_unseen(server.address, Path(private))
+            open_privately(server.address, Path(private))
         with suppress(KeyboardInterrupt):
             server.serve_forever()
     return 0
 
 
-def open_unseen(address: str, folder: Path) -> None:
-    """Open an address by a file in a private folder that leads there.
+def open_privately(address: str, folder: Path) -> None:
+    """Open an address in the browser by a file in a private folder that redirects to it.
 
-    Other users of the machine may read a browser's command line, which would have the token.
+    Other users of the machine can read a browser's command line, which must not hold the token.
     """
     import webbrowser
 
-    leading = folder / "open.html"
-    leading.write_text(f'<meta http-equiv="refresh" content="0; url={address}">')
-    webbrowser.open(leading.as_uri())
+    redirect = folder / "open.html"
+    redirect.write_text(f'<meta http-equiv="refresh" content="0; url={address}">')
+    webbrowser.open(redirect.as_uri())

@@ -1,4 +1,4 @@
-"""Patterns that other programs read and write: AdapTics, focal-point CSV, WAV, AUTD3."""
+"""Pattern files of other programs: AdapTics, focal-point CSV, WAV, AUTD3."""
 
 from skinwave.patterns.conversion import READERS, WRITERS, convert, read_pattern, write_pattern
 from skinwave.patterns.pattern import Options, Pattern, onto

@@ -1,14 +1,14 @@
-"""AdapTics patterns as Tactons, and back.
+"""AdapTics patterns as Tactons.
 
 The engine draws a brush about a place that moves from keyframe to keyframe: with u = 2 pi f_d t
 
     circle     x = r cos u,           y = r sin u
-    line       x = L cos u,           y = 0, turned; L is half the span, the speed no constant
-    lissajous  x = X sin(a u + d),    y = Y sin(b u), turned; u begins anew at 2 pi
+    line       x = L cos u,           y = 0, rotated; L is half the span
+    lissajous  x = X sin(a u + d),    y = Y sin(b u), rotated; u restarts at 2 pi
 
-and lets the sound pressure follow intensity (1 + cos(2 pi f_AM t))/2. A brush that stays the same
-at one place becomes a circle, or a line that is swept as a cosine; anything else a path recorded
-at the engine's 20 kHz.
+and the sound pressure follows intensity (1 + cos(2 pi f_AM t))/2. A constant brush at one place
+becomes a circle, or a line with a sinusoidal sweep. Anything else becomes a path recorded at the
+engine's 20 kHz.
 """
 
 from dataclasses import replace
@@ -24,28 +24,28 @@ from skinwave.patterns.adaptics_file import Brush, Track, parse
 from skinwave.patterns.pattern import ENGINE_RATE, STRAIGHT, Options, Pattern, one_height, thinned
 from skinwave.typing import Floats
 
-UNBOUNDED = 1.0  # s that stand for a pattern that nothing ends
+ENDLESS = 1.0  # s, duration of a pattern without an end
 
 
 def read(content: bytes, options: Options) -> Pattern:
-    """The pattern in an .adaptics file; of one that jumps back for ever its loop alone."""
+    """Read the pattern of an .adaptics file; if it jumps back for ever, only its loop."""
     animation = parse(content, options.parameters)
     notes = list(animation.notes)
     runs = np.array(animation.runs[animation.loop or 0 :])
     before = float(np.diff(animation.runs[: animation.loop or 0]).sum())  # s until the loop
     duration = float(np.diff(runs).sum())
     if duration == 0:
-        runs, duration = runs[-1:] + [[0.0, UNBOUNDED]], UNBOUNDED
-        notes.append(f"the pattern has no end: {UNBOUNDED:g} s of it")
+        runs, duration = runs[-1:] + [[0.0, ENDLESS]], ENDLESS
+        notes.append(f"the pattern has no end; it is cut at {ENDLESS:g} s")
     if not 2 / ENGINE_RATE <= duration <= LONGEST:
         raise ValueError(
-            f"the pattern lasts {duration:g} s, outside {2 / ENGINE_RATE:g}..{LONGEST:g} s; "
-            "move its keyframes or its jump"
+            f"the pattern lasts {duration:g} s; move its keyframes or its jump so that it lasts "
+            f"{2 / ENGINE_RATE:g} to {LONGEST:g} s"
         )
     if animation.loop is not None:
         jumps = ", ".join(f"{1e3 * end:g}" for _, end in runs)
         notes.append(
-            f"it jumps back at {jumps} ms for ever, a loop of {1e3 * duration:g} ms"
+            f"the pattern jumps back at {jumps} ms for ever, in a loop of {1e3 * duration:g} ms"
             + (f"; the first {1e3 * before:g} ms are left out" if before else "")
         )
     t, p = _playhead(runs, 1)
@@ -57,50 +57,50 @@ def read(content: bytes, options: Options) -> Pattern:
     place = _at(animation.places, p)
     level = animation.factor * _at(animation.intensities, p)[:, 0]
     if not level.any():
-        notes.append("its intensity is 0 throughout; other values of its parameters may differ")
+        notes.append("the intensity is always 0; it may depend on parameters")
     height = one_height(place[:, 2] / 1e3, options, notes)
     if "height" not in height and options.height is None:
-        height = {"height": 0.0}  # on the array itself, which is refused with the limits
+        height = {"height": 0.0}  # on the array, which the scene refuses
     pressure: dict[str, Any] = {"drive": "pressure_squared", **height}
     steady = np.ptp(place[:, :2], axis=0).max() == np.ptp(level) == 0 and len(brushes) == 1
     if steady and _is_simple(brushes[0]):
-        tacton = _drawn(brushes[0], place[0], notes)
+        tacton = _constant(brushes[0], place[0], notes)
         tacton = replace(tacton, amplitude=_within(level[:1], notes)[0], duration=duration)
         if brushes[0].am_frequency:
             pressure["depth_of_modulation"] = 1.0
-            notes.append("AM begins at its mean, a quarter of its period behind the engine's")
+            notes.append("AM starts at its mean, a quarter of a period later than in the engine")
     else:
-        offset, am_turns = _brush_at(animation.brushes, p, before + t)
-        level = _within(level * (1 + np.cos(2 * pi * am_turns)) / 2, notes)
+        offset, am_cycles = _brush_at(animation.brushes, p, before + t)
+        level = _within(level * (1 + np.cos(2 * pi * am_cycles)) / 2, notes)
         if any(b.name == "lissajous" and b.numbers[5] for b in brushes):
-            notes.append("rotation of a lissajous is taken in radians, as the engine does")
+            notes.append("the rotation of a lissajous is in radians, as in the engine")
         notes.append(
-            f"played at {ENGINE_RATE:g} Hz, as the engine does; straight lines between points that "
-            f"are within {1e3 * STRAIGHT[0]:g} mm of it"
+            f"sampled at {ENGINE_RATE:g} Hz like the engine, and reduced to straight lines within "
+            f"{1e3 * STRAIGHT[0]:g} mm"
         )
         tacton = _recorded(t, (place[:, :2] + offset) / 1e3, level)
     return Pattern(tacton=tacton, pressure=pressure, name=animation.name, notes=tuple(notes))
 
 
 def _loops(brushes: list[Brush], period: float, notes: list[str]) -> int:
-    """How many loops of a period in s bring the phases of brushes and AM back."""
-    turns = period * np.array(
+    """Return the number of loops of a period in s until the phases of brushes and AM repeat."""
+    cycles = period * np.array(
         [f for b in brushes for f in (b.am_frequency, b.drawing_frequency * any(b.numbers[:2]))]
     )
-    many = np.outer(np.arange(1, int(LONGEST / period) + 1), turns)
+    many = np.outer(np.arange(1, int(LONGEST / period) + 1), cycles)
     jump = np.abs(many - np.round(many)).max(axis=1)
     count = int(np.argmax(jump <= RETURNED) if (jump <= RETURNED).any() else np.argmin(jump))
     if jump[count] > COMMENSURATE:
         notes.append(
-            f"where the recording begins again (loops: {count + 1}), the brush jumps by "
-            f"{100 * jump[count]:.2g} % of its turn"
+            f"the path repeats after {count + 1} loops, where the brush jumps by "
+            f"{100 * jump[count]:.2g} % of its cycle"
         )
     return count + 1
 
 
 def _playhead(runs: Floats, count: int) -> tuple[Floats, Floats]:
-    """Times (t,) in s at the engine's rate, both ends included, and where the tracks are then (t,)
-    in s, if runs (k, 2) are played so many times.
+    """Return times (t,) in s at the engine's rate, with both ends, and the times (t,) in s of the
+    tracks if runs (k, 2) are played `count` times.
     """
     ends = np.cumsum(np.diff(runs))
     t = np.linspace(0.0, count * ends[-1], round(count * ends[-1] * ENGINE_RATE) + 1)
@@ -111,7 +111,7 @@ def _playhead(runs: Floats, count: int) -> tuple[Floats, Floats]:
 
 
 def _recorded(t: Floats, places: Floats, levels: Floats) -> Tacton:
-    """A Tacton of a focus at places (t, 2) in metre with levels (t,), its end included."""
+    """Return a Tacton of a focus at places (t, 2) in metre with levels (t,)."""
     kept = thinned(t, places, levels)
     path = Trajectory(
         shape="recorded", times=tuple(np.round(t[kept], 9).tolist()),
@@ -124,35 +124,35 @@ def _recorded(t: Floats, places: Floats, levels: Floats) -> Tacton:
 def _within(level: Floats, notes: list[str]) -> Floats:
     if level.min() < 0 or level.max() > 1:
         notes.append(
-            f"intensity from {level.min():.3g} to {level.max():.3g} is cut to 0..1, what a device "
-            "gives"
+            f"the intensity of {level.min():.3g} to {level.max():.3g} is limited to the range of "
+            "devices, 0 to 1"
         )
     return np.clip(level, 0.0, 1.0)
 
 
 def _is_simple(brush: Brush) -> bool:
-    """Whether a Tacton of a point, a circle or a line is what a brush draws at one place."""
+    """Whether a brush at one place draws a point, a circle or a line of a Tacton."""
     size, f_d = 2e-3 * brush.numbers[0], brush.drawing_frequency
     return brush.name != "lissajous" and 0 <= size <= LARGEST and f_d >= 0
 
 
-def _drawn(brush: Brush, place: Floats, notes: list[str]) -> Tacton:
-    """The Tacton of a simple brush at a place in millimetre."""
+def _constant(brush: Brush, place: Floats, notes: list[str]) -> Tacton:
+    """Return the Tacton of a simple brush at a place in millimetre."""
     (x, y), size, f_d = place[:2] / 1e3, brush.numbers[0] / 1e3, brush.drawing_frequency
     path = Trajectory(centre=(x, y))
     if size and brush.name == "circle":
         path = Trajectory(shape="circle", size=2 * size, speed=2 * pi * size * f_d, centre=(x, y))
     elif size:
-        turn = radians(brush.numbers[1])
-        dx, dy = size * cos(turn), size * sin(turn)
+        angle = radians(brush.numbers[1])
+        dx, dy = size * cos(angle), size * sin(angle)
         ends = ((x + dx, y + dy), (x - dx, y - dy))
         path = Trajectory(shape="polyline", sweep="sinusoidal", points=ends, speed=4 * size * f_d)
-        notes.append("the line is swept as a cosine, over twice what the file calls its length")
+        notes.append("the line has a sinusoidal sweep over twice the length in the file")
     return Tacton(am_frequency=brush.am_frequency, trajectory=path)
 
 
 def _at(track: Track, t: Floats) -> Floats:
-    """Values (t, k) of a track of numbers or of k each."""
+    """Return values (t, k) of a track of numbers, or of k numbers each."""
     values = np.array(track.values).reshape(len(track.values), -1)
     before, part = _between(track, t)
     after = np.minimum(before + 1, len(values) - 1)
@@ -160,7 +160,7 @@ def _at(track: Track, t: Floats) -> Floats:
 
 
 def _between(track: Track, t: Floats) -> tuple[np.ndarray, Floats]:
-    """Index of the last keyframe, and the fraction of the way to the next."""
+    """Return the index of the last keyframe, and the fraction of the way to the next."""
     times = np.array(track.times)
     before = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 1)
     after = np.minimum(before + 1, len(times) - 1)
@@ -170,36 +170,36 @@ def _between(track: Track, t: Floats) -> tuple[np.ndarray, Floats]:
 
 
 def _brush_at(track: Track, p: Floats, t: Floats) -> tuple[Floats, Floats]:
-    """Offsets (t, 2) in millimetre that brushes draw, and turns (t,) of their AM, at times (t,) in
-    s of the track and of the clock.
+    """Return offsets (t, 2) in millimetre of the focus, and cycles (t,) of the AM, at times p (t,)
+    of the track and t (t,) of the clock in s.
 
-    Brushes of one kind turn into each other; of two kinds the earlier one stays, and so does what
-    a lissajous draws but for its rotation.
+    Numbers of brushes of one kind are interpolated, of a lissajous only its rotation. A brush stays
+    constant until one of another kind.
     """
     before, part = _between(track, p)
-    offset, turns = np.zeros((len(t), 2)), np.zeros(len(t))
+    offset, cycles = np.zeros((len(t), 2)), np.zeros(len(t))
     for k in np.unique(before):
         mine, brush = before == k, track.values[k]
         start = np.array([brush.am_frequency, *brush.numbers])
         end = start.copy()
         if k + 1 < len(track.values) and (after := track.values[k + 1]).name == brush.name:
-            turned = slice(-1, None) if brush.name == "lissajous" else slice(None)
-            end[0], end[1:][turned] = after.am_frequency, after.numbers[turned]
+            part_of = slice(-1, None) if brush.name == "lissajous" else slice(None)
+            end[0], end[1:][part_of] = after.am_frequency, after.numbers[part_of]
         am, *numbers = start[:, None] + part[mine] * (end - start)[:, None]
-        turns[mine] = am * t[mine]
+        cycles[mine] = am * t[mine]
         offset[mine] = _offset(brush.name, brush.drawing_frequency * t[mine], numbers)
-    return offset, turns
+    return offset, cycles
 
 
-def _offset(name: str, turns: Floats, numbers: list[Floats]) -> Floats:
-    """Offsets (t, 2) in millimetre that a brush draws after so many turns (t,)."""
-    u = 2 * pi * np.mod(turns, 1.0)
+def _offset(name: str, cycles: Floats, numbers: list[Floats]) -> Floats:
+    """Return the offsets (t, 2) in millimetre of a brush after cycles (t,)."""
+    u = 2 * pi * np.mod(cycles, 1.0)
     if name == "circle":
         return numbers[0][:, None] * np.stack([np.cos(u), np.sin(u)], axis=-1)
     if name == "line":
-        x, y, turn = numbers[0] * np.cos(u), np.zeros_like(u), np.radians(numbers[1])
+        x, y, angle = numbers[0] * np.cos(u), np.zeros_like(u), np.radians(numbers[1])
     else:
-        x_scale, y_scale, a, b, d, turn = numbers
+        x_scale, y_scale, a, b, d, angle = numbers
         x, y = x_scale * np.sin(a * u + d), y_scale * np.sin(b * u)
-    c, s = np.cos(turn), np.sin(turn)
+    c, s = np.cos(angle), np.sin(angle)
     return np.stack([c * x - s * y, s * x + c * y], axis=-1)

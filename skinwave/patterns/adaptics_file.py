@@ -1,11 +1,10 @@
-"""An .adaptics file of the AdapTics designer and engine (CHI '24): keyframes, numbers with their
-parameters, brushes. Millisecond, millimetre, Hz.
+"""Reader of .adaptics files of the AdapTics designer and engine (CHI '24): keyframes, numbers with
+parameters, brushes. Units are millisecond, millimetre and Hz.
 """
 
 import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from itertools import islice
 from math import cos, radians, sin
 from operator import add, ge, gt, le, lt, mul, sub, truediv
 from typing import Any
@@ -16,20 +15,24 @@ from skinwave.system.plain_text import as_utf_8
 
 FORMAT = "MidAirHapticsAnimationFileFormat"
 REVISIONS = ("0.0.10-alpha.1", "0.1.0-alpha.2", "0.1.0-alpha.3")
-DRAWN = 100.0  # Hz of a brush that does not say
+DRAWING_FREQUENCY = 100.0  # Hz, of a brush without one
 KEYFRAMES = ("standard", "pause", "stop")
 BRUSHES = {
     "circle": ("radius",),
     "line": ("length", "rotation"),
     "lissajous": ("x_scale", "y_scale", "a", "b", "d", "rotation"),
 }
-SUMS = {"add": add, "subtract": sub, "multiply": mul, "divide": truediv}
+ARITHMETIC = {"add": add, "subtract": sub, "multiply": mul, "divide": truediv}
 OPERATORS = {"lt": lt, "lt_eq": le, "gt": gt, "gt_eq": ge}
+Table = Mapping[str, Any]  # a JSON object
+Entry = tuple[float, Any, bool]  # of a track: time in s, value, whether it stays until the next
 
 
 @dataclass(frozen=True, kw_only=True)
 class Brush:
-    """Figure drawn about a place: its name, numbers as `BRUSHES` names them, frequencies in Hz."""
+    """Figure drawn about a place: its name, its numbers in the order of `BRUSHES`, and frequencies
+    in Hz.
+    """
 
     name: str
     numbers: tuple[float, ...]
@@ -37,12 +40,12 @@ class Brush:
     drawing_frequency: float
 
 
-NONE = Brush(name="circle", numbers=(0.0,), am_frequency=0.0, drawing_frequency=0.0)
+POINT = Brush(name="circle", numbers=(0.0,), am_frequency=0.0, drawing_frequency=0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Track:
-    """What keyframes set: times in s, values, and whether each stays until the next (`steps`)."""
+    """Keyframes of one quantity: times in s, values, and whether each stays until the next."""
 
     times: tuple[float, ...]
     values: tuple[Any, ...]
@@ -51,11 +54,11 @@ class Track:
 
 @dataclass(frozen=True, kw_only=True)
 class Animation:
-    """A file at some values of its parameters.
+    """Contents of a file for given values of its parameters.
 
-    Tracks are of (x, y, z) in millimetre above the array, of brushes, and of intensities, which a
-    `factor` multiplies. `runs` are parts (start, end) of them in s in the order in which they are
-    played, `loop` is the index of the run that follows the last one for ever, None if none does.
+    The tracks have places (x, y, z) in millimetre above the array, brushes, and intensities, which
+    a `factor` multiplies. `runs` are intervals (start, end) in s in the order of playback; `loop`
+    is the index of the run that follows the last one for ever, or None.
     """
 
     name: str
@@ -69,239 +72,252 @@ class Animation:
 
 
 def parse(content: bytes, parameters: Mapping[str, float]) -> Animation:
-    """The animation in a file at values of its parameters, by default its own."""
+    """Parse a file; `parameters` replace the default values of its parameters."""
     try:
         table = json.loads(as_utf_8(content))
     except (ValueError, RecursionError) as error:
-        at = f" at line {error.lineno}" if isinstance(error, json.JSONDecodeError) else ""
-        raise ValueError(f"not valid JSON{at}; save it with AdapTics") from None
+        place = f" at line {error.lineno}" if isinstance(error, json.JSONDecodeError) else ""
+        raise ValueError(f"the file is not valid JSON{place}; save it with AdapTics") from None
     if not isinstance(table, dict) or table.get("$DATA_FORMAT") != FORMAT:
-        raise ValueError(f"not an .adaptics file: $DATA_FORMAT is not '{FORMAT}'")
+        raise ValueError(f"the file is not an AdapTics pattern: $DATA_FORMAT must be '{FORMAT}'")
     if (revision := table.get("$REVISION")) not in REVISIONS:
         raise ValueError(
             f"revision {str(revision)[:40]!r} is unknown; save it as one of {', '.join(REVISIONS)}"
         )
-    definitions = _get(table, "user_parameter_definitions", dict, {})
+    definitions = _child(table, "user_parameter_definitions", dict, {})
     return _animation(table, _Numbers(definitions, parameters))
 
 
 class _Numbers:
-    """Numbers of a file at the values of its user parameters, with a note for each one used."""
+    """Numbers of a file for given values of its parameters, with a note for each parameter used."""
 
-    def __init__(self, definitions: Mapping[str, Any], given: Mapping[str, float]) -> None:
+    def __init__(self, definitions: Table, given: Mapping[str, float]) -> None:
         self._definitions, self._given = definitions, given
         self.notes: dict[str, str] = {}
 
-    def __call__(self, value: Any, what: str) -> float:
+    def __call__(self, value: Any, name: str) -> float:
+        """Return the number that a value states: plain, of a parameter, or by a formula."""
         if not isinstance(value, dict) or "value" not in value:
-            return _finite(value, what)
+            return _finite(value, name)
         kind = value.get("type")
         if kind == "formula":
-            return _finite(self._formula(value["value"], what), what)
+            return _finite(self._formula(value["value"], name), name)
         if kind in ("param", "dynamic"):
             return self._parameter(value["value"])
         if kind == "f64":
-            return _finite(value["value"], what)
-        raise ValueError(f"{what} has the type {str(kind)[:40]!r}; use f64, param or formula")
+            return _finite(value["value"], name)
+        raise ValueError(f"{name} has the type {str(kind)[:40]!r}; use f64, param or formula")
 
-    def holds(self, condition: Mapping[str, Any]) -> bool:
-        """Whether the condition of a jump is met; never by a parameter without a value."""
-        operator, name = condition.get("operator"), condition.get("parameter")
+    def is_met(self, condition: Table) -> bool:
+        """Whether the condition of a jump is met; a parameter without a value never meets it."""
+        operator, parameter = condition.get("operator"), condition.get("parameter")
         word = operator.get("name") if isinstance(operator, dict) else operator
-        meets = OPERATORS[choose("operator of a jump", str(word)[:40], OPERATORS)]
+        compare = OPERATORS[choose("operator of a jump", str(word)[:40], OPERATORS)]
         limit = _finite(condition.get("value"), "value of a jump's condition")
-        if not isinstance(name, str) or name not in {**self._definitions, **self._given}:
+        if not isinstance(parameter, str) or parameter not in {**self._definitions, **self._given}:
             return False
-        return bool(meets(self._parameter(name), limit))
+        return bool(compare(self._parameter(parameter), limit))
 
-    def check_used(self) -> None:
-        """Refuse values of parameters that the file does not have."""
+    def check_given(self) -> None:
+        """Raise a ValueError if a value is given for a parameter that the file does not have."""
         known = list({**self._definitions, **self.notes})
         if self._given and not known:
-            raise ValueError("the file has no parameters; leave out --parameter")
+            raise ValueError("the file has no parameters; remove --parameter")
         for name in self._given:
             choose("parameter", name, known)
 
     def _parameter(self, name: Any) -> float:
         definition = self._definitions.get(name, {}) if isinstance(name, str) else {}
-        if not definition and name not in self._given:
-            raise ValueError(f"parameter {str(name)[:40]!r} is not defined; define its default")
-        what = f"parameter '{name[:40]}'"
-        default = _of(definition, what).get("default")
-        given = value = _finite(self._given.get(name, default), f"default of {what}")
+        is_given = name in self._given
+        if not definition and not is_given:
+            raise ValueError(f"parameter {str(name)[:40]!r} has no definition; define its default")
+        title = f"parameter '{name[:40]}'"
+        default = _checked(definition, title).get("default")
+        given = value = _finite(self._given.get(name, default), f"default of {title}")
         for key, bound in (("min", max), ("max", min)):
             if definition.get(key) is not None:
-                value = bound(value, _finite(definition[key], f"{key} of {what}"))
-        said = " =" if name in self._given else " at its default,"
-        cut = ", the nearest that the file allows" if value != given and name in self._given else ""
-        self.notes[name] = f"{what}{said} {value:g}{cut}"
+                value = bound(value, _finite(definition[key], f"{key} of {title}"))
+        source = " =" if is_given else " at its default,"
+        limit = ", the nearest value in its range" if value != given and is_given else ""
+        self.notes[name] = f"{title}{source} {value:g}{limit}"
         return value
 
-    def _formula(self, formula: Any, what: str) -> float:
+    def _formula(self, formula: Any, name: str) -> float:
         if not isinstance(formula, dict) or "value" not in formula:
-            raise ValueError(f"{what} has a formula without type and value")
+            raise ValueError(f"the formula of {name} has no type and value")
         kind, value = str(formula.get("type")).lower(), formula["value"]
         if kind == "constant":
-            return _finite(value, what)
+            return _finite(value, name)
         if kind == "parameter":
             return self._parameter(value)
         if kind == "negate":
-            return -self._formula(value, what)
-        if kind not in SUMS or not isinstance(value, list) or len(value) != 2:
-            raise ValueError(f"{what} has a formula of type '{kind[:40]}', which is unknown")
+            return -self._formula(value, name)
+        if kind not in ARITHMETIC or not isinstance(value, list) or len(value) != 2:
+            raise ValueError(f"the formula of {name} has the unknown type '{kind[:40]}'")
         try:
-            return float(SUMS[kind](*(self._formula(part, what) for part in value)))
+            return float(ARITHMETIC[kind](*(self._formula(part, name) for part in value)))
         except ZeroDivisionError:
-            raise ValueError(f"{what} divides by 0; give the parameter another default") from None
+            raise ValueError(f"{name} divides by 0; change the value of the parameter") from None
 
 
-def _animation(table: Mapping[str, Any], number: _Numbers) -> Animation:
-    keyframes = _get(table, "keyframes", list)
-    if not keyframes:
-        raise ValueError("the file has no keyframes; give at least one")
-    transform = _get(table, "pattern_transform", dict, {})
+def _animation(table: Table, number: _Numbers) -> Animation:
+    transform = _child(table, "pattern_transform", dict, {})
     speed = number(transform.get("playback_speed", 1.0), "playback_speed")
     if speed <= 0:
-        raise ValueError(f"playback_speed = {speed:g} must be above 0")
-    frames = sorted(
-        (_finite(_of(f, "a keyframe").get("time"), "time of a keyframe") / 1e3 / speed, k, f)
-        for k, f in enumerate(keyframes)
-    )
-    if frames[0][0] < 0:
-        raise ValueError(f"a keyframe is at {1e3 * frames[0][0]:g} ms, before the start; move it")
-    # Of each track: time, value, whether it is a step.
-    tracks: dict[str, list[tuple[float, Any, bool]]] = {key: [] for key in SETTINGS}
-    jumps: list[tuple[float, float]] = []  # when, and where to
+        raise ValueError(f"playback_speed is {speed:g}; give a number above 0")
+    tracks: dict[str, list[Entry]] = {key: [] for key in SETTINGS}
+    jumps: list[tuple[float, float]] = []  # time of a jump, and its target
     kinds: dict[float, str] = {}  # of the last keyframe at a time
-    for time, _, frame in frames:
+    for time, frame in _keyframes(table, speed):
         kind = choose("type of a keyframe", str(frame.get("type"))[:40], KEYFRAMES)
         kinds[time] = kind
         for key, track in tracks.items():
-            stays = kind == "stop" or frame.get(key) is None
+            is_set = kind != "stop" and frame.get(key) is not None
             if key == "coords":
-                stays = kind != "standard"
-            if not stays:
+                is_set = kind == "standard"
+            if is_set:
                 track.append((time, *_setting(frame, key, number)))
             elif track and (key == "coords" or kind == "stop"):
                 track.append((time, *track[-1][1:]))
-        if kind != "stop":
-            jumps += [(time, to / speed) for to in _jump(frame, number)]
+        if kind != "stop" and (target := _jump(frame, number)) is not None:
+            jumps.append((time, target / speed))
     runs, loop = _runs(kinds, jumps)
-    path = _track(tracks["coords"], (0.0, 0.0, 0.0))
-    moved = _get(transform, "geometric_transforms", dict, {})
+    places = _track(tracks["coords"], (0.0, 0.0, 0.0))
+    geometry = _child(transform, "geometric_transforms", dict, {})
     factor = number(transform.get("intensity_factor", 1.0), "intensity_factor")
-    number.check_used()
+    number.check_given()
     notes = list(number.notes.values())
     if speed != 1:
-        notes.append(f"played at {speed:g} times the speed, brushes drawn at their own")
+        notes.append(f"playback at {speed:g} times the speed; drawing frequencies do not change")
     return Animation(
-        name=str(table.get("name", ""))[:80], brushes=_track(tracks["brush"], NONE),
-        places=replace(path, values=_transformed(path.values, moved, number)),
+        name=str(table.get("name", ""))[:80], brushes=_track(tracks["brush"], POINT),
+        places=replace(places, values=_transformed(places.values, geometry, number)),
         intensities=_track(tracks["intensity"], 0.0), factor=factor, runs=runs, loop=loop,
         notes=tuple(notes),
     )  # fmt: skip
 
 
-def _track(entries: list[tuple[float, Any, bool]], none: Any) -> Track:
-    """A track; until its first keyframe it has the value `none`, as the engine plays it."""
+def _keyframes(table: Table, speed: float) -> list[tuple[float, Table]]:
+    """Return times in s and keyframes in the order of time."""
+    keyframes = _child(table, "keyframes", list)
+    if not keyframes:
+        raise ValueError("the file has no keyframes; add at least one")
+    found = [
+        (
+            _finite(_checked(each, "a keyframe").get("time"), "time of a keyframe") / 1e3 / speed,
+            each,
+        )
+        for each in keyframes
+    ]
+    found.sort(key=lambda pair: pair[0])
+    if found[0][0] < 0:
+        raise ValueError(f"a keyframe is at {1e3 * found[0][0]:g} ms; move it to 0 ms or later")
+    return found
+
+
+def _track(entries: list[Entry], first: Any) -> Track:
+    """Return a track; like in the engine, it has the value `first` until its first keyframe."""
     if not entries or entries[0][0] > 0:
-        entries = [(0.0, none, True), *entries]
+        entries = [(0.0, first, True), *entries]
     times, values, steps = zip(*entries, strict=True)
     return Track(times=times, values=values, steps=steps)
 
 
-def _jump(frame: Mapping[str, Any], number: _Numbers) -> list[float]:
-    """Time in s, at speed 1, that the first jump of a keyframe goes to whose condition is met."""
-    jumps = (_of(each, "a conditional jump") for each in _get(frame, "cjumps", list, []) or [])
-    met = (each for each in jumps if number.holds(_get(each, "condition", dict, {})))
-    return [_finite(each.get("jump_to"), "jump_to of a jump") / 1e3 for each in islice(met, 1)]
+def _jump(frame: Table, number: _Numbers) -> float | None:
+    """Return the target in s, at speed 1, of the first jump whose condition is met."""
+    for each in _child(frame, "cjumps", list, []) or []:
+        jump = _checked(each, "a conditional jump")
+        if number.is_met(_child(jump, "condition", dict, {})):
+            return _finite(jump.get("jump_to"), "jump_to of a jump") / 1e3
+    return None
 
 
 def _runs(
     kinds: dict[float, str], jumps: list[tuple[float, float]]
 ) -> tuple[tuple[tuple[float, float], ...], int | None]:
-    """Runs and loop of an `Animation` by the kind of keyframe at a time, and jumps: when, whereto.
+    """Return runs and loop of an `Animation`, given the kind of keyframe at each time and jumps.
 
-    A jump or a stop is met when the time passes its keyframe, a jump first; where playback begins
-    neither is. After a jump to where a stop is in force the pattern ends.
+    Playback jumps or stops when it passes the time of a keyframe, not where it begins; a jump comes
+    before a stop. The pattern ends after a jump into a part that is stopped.
     """
     runs: list[tuple[float, float]] = []
     entered: dict[float, int] = {}
     stops = [time for time, kind in kinds.items() if kind == "stop"]
-    at: float | None = 0.0
-    while at is not None and at not in entered:
-        entered[at] = len(runs)
-        if runs and max((time for time in kinds if time <= at), default=None) in stops:
+    start: float | None = 0.0
+    while start is not None and start not in entered:
+        entered[start] = len(runs)
+        if runs and max((time for time in kinds if time <= start), default=None) in stops:
             return tuple(runs), None
-        stop = min((time for time in stops if time > at), default=max(at, *kinds))
-        end, to = next(((t, to) for t, to in jumps if at < t <= stop), (stop, None))
-        runs.append((at, end))
-        at = to
-    return tuple(runs), None if at is None else entered[at]
+        stop = min((time for time in stops if time > start), default=max(start, *kinds))
+        end, target = next(((t, to) for t, to in jumps if start < t <= stop), (stop, None))
+        runs.append((start, end))
+        start = target
+    return tuple(runs), None if start is None else entered[start]
 
 
-def _setting(frame: Mapping[str, Any], key: str, number: _Numbers) -> tuple[Any, bool]:
-    """Value that a keyframe sets, and whether it stays until the next one sets it anew."""
-    outer = _get(frame, key, dict)
-    transition = _get(outer, "transition", dict, {"name": "linear"}).get("name")
+def _setting(frame: Table, key: str, number: _Numbers) -> tuple[Any, bool]:
+    """Return the value that a keyframe sets, and whether it stays until the next one."""
+    outer = _child(frame, key, dict)
+    transition = _child(outer, "transition", dict, {"name": "linear"}).get("name")
     step = choose(f"transition of {key}", str(transition)[:40], ("linear", "step")) == "step"
-    return SETTINGS[key](_get(outer, key, dict), number), step
+    return SETTINGS[key](_child(outer, key, dict), number), step
 
 
-def _place(place: Mapping[str, Any], number: _Numbers) -> tuple[float, ...]:
+def _place(place: Table, number: _Numbers) -> tuple[float, ...]:
     return tuple(_finite(place.get(axis), f"coords {axis}") for axis in "xyz")
 
 
-def _brush(brush: Mapping[str, Any], number: _Numbers) -> Brush:
+def _brush(brush: Table, number: _Numbers) -> Brush:
     name = choose("brush", str(brush.get("name"))[:40], BRUSHES)
-    params = _get(brush, "params", dict)
+    params = _child(brush, "params", dict)
+    am, drawing = params.get("am_freq", 0.0), params.get("stm_freq", DRAWING_FREQUENCY)
     return Brush(
         name=name,
         numbers=tuple(number(params.get(key), f"{key} of a {name}") for key in BRUSHES[name]),
-        am_frequency=number(params.get("am_freq", 0.0), f"am_freq of a {name}"),
-        drawing_frequency=number(params.get("stm_freq", DRAWN), f"stm_freq of a {name}"),
+        am_frequency=number(am, f"am_freq of a {name}"),
+        drawing_frequency=number(drawing, f"stm_freq of a {name}"),
     )
 
 
-def _intensity(intensity: Mapping[str, Any], number: _Numbers) -> float:
+def _intensity(intensity: Table, number: _Numbers) -> float:
     if (name := intensity.get("name")) != "constant":
-        why = "another one each time" if name == "random" else "unknown"
-        raise ValueError(f"intensity {str(name)[:40]!r} is {why}; make it constant")
-    return number(_get(intensity, "params", dict).get("value"), "value of an intensity")
+        cause = "different at each playback" if name == "random" else "unknown"
+        raise ValueError(f"intensity {str(name)[:40]!r} is {cause}; make it constant")
+    return number(_child(intensity, "params", dict).get("value"), "value of an intensity")
 
 
-SETTINGS: dict[str, Callable[[Mapping[str, Any], _Numbers], Any]] = {
+SETTINGS: dict[str, Callable[[Table, _Numbers], Any]] = {
     "coords": _place, "brush": _brush, "intensity": _intensity,
 }  # fmt: skip
 
 
 def _transformed(
-    values: Iterable[tuple[float, ...]], transform: Mapping[str, Any], number: _Numbers
+    places: Iterable[tuple[float, ...]], transform: Table, number: _Numbers
 ) -> tuple[tuple[float, ...], ...]:
-    """Places scaled, turned and moved, in that order; brushes are not."""
-    scale, move = (_get(transform, key, dict, {}) for key in ("scale", "translate"))
+    """Scale, rotate and move places, in this order; brushes stay the same."""
+    scale, move = (_child(transform, key, dict, {}) for key in ("scale", "translate"))
     sx, sy, sz = (number(scale.get(a, 1.0), f"scale {a}") for a in "xyz")
     dx, dy, dz = (number(move.get(a, 200.0 * (a == "z")), f"translate {a}") for a in "xyz")
-    turn = radians(number(transform.get("rotation", 0.0), "rotation"))
-    c, s = cos(turn), sin(turn)
+    angle = radians(number(transform.get("rotation", 0.0), "rotation"))
+    c, s = cos(angle), sin(angle)
     return tuple(
         (c * sx * x - s * sy * y + dx, s * sx * x + c * sy * y + dy, sz * z + dz)
-        for x, y, z in values
+        for x, y, z in places
     )
 
 
-def _get(table: Mapping[str, Any], key: str, kind: type, default: Any = None) -> Any:
-    return _of(table.get(key, default), key, kind)
+def _child(table: Table, key: str, kind: type, default: Any = None) -> Any:
+    return _checked(table.get(key, default), key, kind)
 
 
-def _of(value: Any, what: str, kind: type = dict) -> Any:
+def _checked(value: Any, name: str, kind: type = dict) -> Any:
     if not isinstance(value, kind):
         word = "an object" if kind is dict else "a list"
-        raise ValueError(f"{what} = {json.dumps(value)[:40]} must be {word}")
+        raise ValueError(f"{name} is {json.dumps(value)[:40]}; it must be {word}")
     return value
 
 
-def _finite(value: Any, what: str) -> float:
+def _finite(value: Any, name: str) -> float:
     if not is_finite_number(value):
-        raise ValueError(f"{what} = {json.dumps(value)[:40]} must be a finite number")
+        raise ValueError(f"{name} is {json.dumps(value)[:40]}; it must be a finite number")
     return float(value)

@@ -1,4 +1,4 @@
-"""Tactons as AdapTics patterns: circles and cosine lines as brushes, other paths as keyframes."""
+"""Writer of AdapTics patterns: circles and cosine lines as brushes, other paths as keyframes."""
 
 import json
 from math import atan2, degrees, hypot
@@ -7,57 +7,38 @@ from typing import Any
 import numpy as np
 
 from simple_model import Tacton
-from skinwave.patterns.adaptics_file import FORMAT, REVISIONS
+from skinwave.patterns.adaptics_file import DRAWING_FREQUENCY, FORMAT, REVISIONS
 from skinwave.patterns.pattern import ENGINE_RATE, STRAIGHT, Options, loudness, thinned
 from skinwave.scene.scene import Scene
+from skinwave.typing import Floats
 
 MOST_KEYFRAMES = 20_000
-ASIDE = 1e-9  # of a period: just before and just after a corner, so that jumps stay jumps
+ASIDE = 1e-9  # of a period: keyframes on both sides of a corner keep jumps sharp
+LINEAR = {"name": "linear", "params": {}}
 
 
 def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
-    """The .adaptics file of a scene's Tacton, in the newest revision, and notes."""
+    """Return the .adaptics file of a scene's Tacton, in the newest revision, and notes."""
     tacton, notes = scene.tacton, []
-    _refuse(tacton)
-    if tacton.am_frequency:
-        M = np.linspace(-1, 1, 9)  # the sound's amplitude goes from 0 to 1 there
-        sound = scene.pressure.law(1.0, M, scene.pressure.depth_of_modulation)
-        if not np.allclose(sound, ((1 + M) / 2) ** 2):
-            raise ValueError(
-                f"the engine modulates sound pressure fully, not by drive "
-                f"'{scene.pressure.drive}' with depth {scene.pressure.depth_of_modulation:g}; take "
-                "'pressure_squared' with depth 1"
-            )
-        notes.append("AM begins at its crest there, at its mean here")
-    path, end = tacton.trajectory, tacton.duration
+    _check(scene)
     amplitude = tacton.amplitude
-    if not tacton.am_frequency:
+    if tacton.am_frequency:
+        notes.append("AM starts at its maximum in AdapTics, and at its mean here")
+    else:
         amplitude = float(loudness(scene.pressure, np.zeros(1))[0])
     brush, place = _brush(tacton)
     if brush is None:
         brush = _named("circle", {"radius": 0.0}, tacton, 0.0)
-        f_d, ahead = path.drawing_frequency, tacton.foci[0]
-        corners = np.add.outer(np.arange(int(end * f_d) + 3) - 1, path.parts[0]).ravel() - ahead
-        sides = np.concatenate([corners - ASIDE, corners + ASIDE]) / f_d
-        times = np.union1d(np.linspace(0.0, end, round(end * ENGINE_RATE) + 1), sides)
-        times = times[(times >= 0) & (times <= end)]
-        phases = np.mod(f_d * times + ahead, 1.0)
-        places, levels = path.at_phase(phases), np.sqrt(scene.pressure.weight(phases))
-        kept = thinned(times, places, levels)
-        if len(kept) > MOST_KEYFRAMES:
-            raise ValueError(
-                f"the path takes {len(kept):,} keyframes in {end:g} s, the limit is "
-                f"{MOST_KEYFRAMES:,}; shorten the Tacton, or write .csv"
-            )
-        times, places, levels = times[kept], places[kept], levels[kept]
+        times, places, levels = _path(scene)
         notes.append(f"{len(times)} keyframes, within {1e3 * STRAIGHT[0]:g} mm of the path")
     else:
-        times, places, levels = np.array([0.0, end]), np.array([place, place]), np.ones(2)
+        times, places = np.array([0.0, tacton.duration]), np.array([place, place])
+        levels = np.ones(2)
     keyframes = [
         _keyframe(t, xy, amplitude * level, brush)
         for t, xy, level in zip(times, places, levels, strict=True)
     ]
-    keyframes.append({"type": "stop", "time": 1e3 * end})
+    keyframes.append({"type": "stop", "time": 1e3 * tacton.duration})
     transforms = {
         "translate": {"x": _f64(0), "y": _f64(0), "z": _f64(1e3 * scene.pressure.height)},
         "rotation": _f64(0), "scale": dict.fromkeys("xyz", _f64(1)),
@@ -73,32 +54,60 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
     return json.dumps(table, indent=1).encode(), tuple(notes)
 
 
-def _refuse(tacton: Tacton) -> None:
-    """Refuse a Tacton that the format has no words for."""
-    parts = {
+def _check(scene: Scene) -> None:
+    """Raise a ValueError for a scene that the format cannot express."""
+    tacton, pressure = scene.tacton, scene.pressure
+    unsupported = {
         "several foci": len(tacton.foci) > 1,
         "a second AM frequency": tacton.superposition[1] > 0 and tacton.second_am_frequency > 0,
-        "a part of the AM": tacton.superposition[1] > 0 and tacton.am_frequency > 0,
+        "a superposition of AM": tacton.superposition[1] > 0 and tacton.am_frequency > 0,
         "an envelope frequency": tacton.envelope_frequency > 0,
         "a rhythm": tacton.rhythm is not None,
         "a sampled signal": tacton.signal is not None,
     }
-    for part, there in parts.items():
-        if there:
-            raise ValueError(f".adaptics has no words for {part}; write .csv, or leave it out")
+    for part, is_there in unsupported.items():
+        if is_there:
+            raise ValueError(f".adaptics cannot express {part}; write .csv, or remove it")
+    if tacton.am_frequency:
+        M = np.linspace(-1, 1, 9)  # the engine's sound pressure is (1 + M) / 2
+        load = pressure.law(1.0, M, pressure.depth_of_modulation)
+        if not np.allclose(load, ((1 + M) / 2) ** 2):
+            raise ValueError(
+                f"AdapTics modulates the sound pressure fully, but the drive '{pressure.drive}' "
+                f"with depth {pressure.depth_of_modulation:g} does not; use 'pressure_squared' "
+                "with depth 1"
+            )
+
+
+def _path(scene: Scene) -> tuple[Floats, Floats, Floats]:
+    """Return times (k,) in s, places (k, 2) in metre and levels (k,) of the keyframes of a path."""
+    path, end = scene.tacton.trajectory, scene.tacton.duration
+    f_d, ahead = path.drawing_frequency, scene.tacton.foci[0]
+    corners = np.add.outer(np.arange(int(end * f_d) + 3) - 1, path.parts[0]).ravel() - ahead
+    sides = np.concatenate([corners - ASIDE, corners + ASIDE]) / f_d
+    times = np.union1d(np.linspace(0.0, end, round(end * ENGINE_RATE) + 1), sides)
+    times = times[(times >= 0) & (times <= end)]
+    phases = np.mod(f_d * times + ahead, 1.0)
+    places, levels = path.at_phase(phases), np.sqrt(scene.pressure.weight(phases))
+    kept = thinned(times, places, levels)
+    if len(kept) > MOST_KEYFRAMES:
+        raise ValueError(
+            f"the path of {end:g} s needs {len(kept):,} keyframes, more than {MOST_KEYFRAMES:,}; "
+            "shorten the Tacton, or write .csv"
+        )
+    return times[kept], places[kept], levels[kept]
 
 
 def _brush(tacton: Tacton) -> tuple[dict[str, Any] | None, tuple[float, float]]:
-    """The brush that draws a path by itself, if one does, and its place in metre."""
+    """Return the brush that draws a path, or None, and its place in metre."""
     path = tacton.trajectory
     if path.shape == "circle" and tacton.foci[0] == 0:
         radius = {"radius": 1e3 * path.size / 2}
         return _named("circle", radius, tacton, path.drawing_frequency), path.centre
     if path.shape == "point" or (path.is_static and path.shape != "recorded"):
         x, y = path.position(0.0).tolist()
-        return _named("circle", {"radius": 0.0}, tacton, 100.0), (x, y)
-    ends = path.outline
-    straight = path.shape == "line" or (path.shape == "polyline" and len(ends) == 2)
+        return _named("circle", {"radius": 0.0}, tacton, DRAWING_FREQUENCY), (x, y)
+    straight = path.shape == "line" or (path.shape == "polyline" and len(path.outline) == 2)
     if not straight or path.sweep != "sinusoidal" or tacton.foci[0] != 0:
         return None, path.centre
     first, last = path.at_phase([0.0, 0.5])
@@ -108,14 +117,13 @@ def _brush(tacton: Tacton) -> tuple[dict[str, Any] | None, tuple[float, float]]:
 
 
 def _keyframe(t: float, place: Any, level: float, brush: dict[str, Any]) -> dict[str, Any]:
-    transition: dict[str, Any] = {"name": "linear", "params": {}}
     x, y = (1e3 * float(each) for each in place)
     constant = {"name": "constant", "params": {"value": _f64(level)}}
     return {
         "type": "standard", "time": 1e3 * float(t), "cjumps": [],
-        "brush": {"brush": brush, "transition": transition},
-        "intensity": {"intensity": constant, "transition": transition},
-        "coords": {"coords": {"x": x, "y": y, "z": 0.0}, "transition": transition},
+        "brush": {"brush": brush, "transition": LINEAR},
+        "intensity": {"intensity": constant, "transition": LINEAR},
+        "coords": {"coords": {"x": x, "y": y, "z": 0.0}, "transition": LINEAR},
     }  # fmt: skip
 
 

@@ -1,7 +1,7 @@
-"""A Python script that plays a Tacton on AUTD3 devices by pyautd3's FociSTM.
+"""Writer of a Python script that plays a Tacton on AUTD3 devices with FociSTM of pyautd3.
 
-The device steps through a list of foci at 40 kHz / N and begins anew at its end, so that it draws
-at 40 kHz / (N points); the nearest such frequency is taken, and stated.
+The device steps through a list of foci at 40 kHz / N and repeats it, so that its drawing frequency
+is 40 kHz / (N points). The script has the nearest such frequency.
 """
 
 from math import ceil
@@ -17,37 +17,39 @@ TICK = 40_000.0  # Hz
 MOST_PATTERNS = 8192  # of a FociSTM
 MOST_SAMPLES = 32_768  # of a modulation
 MOST_DIVISION = 65_535
+SLOWEST = MOST_PATTERNS * MOST_DIVISION  # ticks of a period
 MODULATION = 10  # ticks a sample: 4 kHz
-RESOLUTION = 0.025  # mm, to which devices round
+RESOLUTION = 0.025  # mm, of positions in devices
 
 
 def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
-    """The script, and notes on what it can only come near to; raises a ValueError if the path is
-    too slow or the load one that no sound makes.
+    """Return the script, and notes on its approximations; raise a ValueError if the path is too
+    slow, or no sound makes the load.
     """
     pressure, path = scene.pressure, scene.tacton.trajectory
-    foci, turns = len(scene.tacton.foci), scene.tacton.sharing == "time_multiplexed"
-    count, division = steps(path.drawing_frequency, foci if turns else 1)
-    places = _places(pressure, count, turns=turns and foci > 1)
+    foci, in_turn = len(scene.tacton.foci), scene.tacton.sharing == "time_multiplexed"
+    count, division = steps(path.drawing_frequency, foci if in_turn else 1)
+    places = _places(pressure, count, in_turn=in_turn and foci > 1)
     samples, ticks = _modulation(pressure, path.drawing_frequency)
     drawn = TICK / division / count if not path.is_static else 0.0
     notes = [
-        f"{count} patterns of {places.shape[1]} foci, one each {division} ticks of 40 kHz",
-        f"draws {drawn:.6g} Hz where {path.drawing_frequency:.6g} Hz was asked for",
-        f"positions rounded to {RESOLUTION:g} mm by the device",
+        f"{count} patterns of {places.shape[1]} foci, one every {division} ticks of 40 kHz",
+        f"drawing frequency {drawn:.6g} Hz in place of {path.drawing_frequency:.6g} Hz",
+        f"the device rounds positions to {RESOLUTION:g} mm",
     ]
     if foci > 1:
-        notes.append(f"{foci} foci {'in turn' if turns else 'at the same time'}")
+        notes.append(f"{foci} foci {'in turn' if in_turn else 'at the same time'}")
     if len(samples) > 1:
-        notes.append(f"modulation: {len(samples)} samples at {TICK / ticks:g} Hz in 255 steps")
+        notes.append(f"modulation: {len(samples)} samples at {TICK / ticks:g} Hz with 8 bits")
     notes += aliased(scene.tacton, TICK / ticks)
     return _script(scene, places, division, samples, ticks, notes).encode(), tuple(notes)
 
 
 def steps(frequency: float, multiple: int = 1) -> tuple[int, int]:
-    """How many points to a period, a multiple, and ticks to a point come nearest to a drawing
-    frequency in Hz; two points, the least that a FociSTM takes, for a focus that rests. No list is
-    long enough for very slow ones: a ValueError.
+    """Return points per period, a multiple of `multiple`, and ticks per point that are nearest to a
+    drawing frequency in Hz; two points, the least of a FociSTM, for a focus at rest.
+
+    Raises a ValueError if the frequency is too low for a device.
     """
     if frequency == 0:
         return 2 * multiple, 1
@@ -55,22 +57,25 @@ def steps(frequency: float, multiple: int = 1) -> tuple[int, int]:
     most = MOST_PATTERNS // multiple * multiple
     division = max(1, ceil(ticks / most - 1e-9))
     if division > MOST_DIVISION:
-        raise ValueError(f"{frequency:g} Hz is slower than a device's {TICK / 5.4e8:.2g} Hz; wait")
+        raise ValueError(
+            f"the drawing frequency of {frequency:g} Hz is below the {TICK / SLOWEST:.2g} Hz of a "
+            "device; raise the speed"
+        )
     count = max(multiple, round(ticks / division / multiple) * multiple)
     return min(count, most), division
 
 
-def _places(pressure: MovingPressure, count: int, *, turns: bool) -> Floats:
-    """Positions (patterns, foci, 2) in mm along one period."""
+def _places(pressure: MovingPressure, count: int, *, in_turn: bool) -> Floats:
+    """Return positions (patterns, foci, 2) in mm along one period."""
     path, ahead = pressure.tacton.trajectory, np.array(pressure.tacton.foci)
     phase = np.arange(count)[:, None] / count * (not path.is_static) + ahead
-    if turns:
+    if in_turn:
         phase = phase[np.arange(count), np.arange(count) % len(ahead)][:, None]
     return 1e3 * path.at_phase(np.mod(phase, 1.0))
 
 
 def _modulation(pressure: MovingPressure, f_d: float) -> tuple[np.ndarray, int]:
-    """Sound pressure as bytes (k,), and ticks to a sample; one byte if it stays the same."""
+    """Return the sound pressure as bytes (k,), one if it is constant, and ticks per sample."""
     tacton, path = pressure.tacton, pressure.tacton.trajectory
     ticks = max(MODULATION, ceil(tacton.duration * TICK / MOST_SAMPLES))
     t = np.arange(max(2, int(tacton.duration * TICK / ticks))) * (ticks / TICK)
@@ -78,9 +83,11 @@ def _modulation(pressure: MovingPressure, f_d: float) -> tuple[np.ndarray, int]:
     if path.levels:
         loud = loud * np.sqrt(pressure.weight(path.phase(t)))
         if len(tacton.foci) > 1 and len(set(path.levels)) > 1:
-            raise ValueError("foci with levels of their own share one modulation there; write .csv")
-    found = np.round(255 * loud).astype(int)
-    return (found[:1] if np.ptp(loud) < 1e-12 else found), ticks
+            raise ValueError(
+                "AUTD3 has one modulation for all foci, but these have different levels; write .csv"
+            )
+    samples = np.round(255 * loud).astype(int)
+    return (samples[:1] if np.ptp(loud) < 1e-12 else samples), ticks
 
 
 def _script(
@@ -90,10 +97,10 @@ def _script(
         "    [" + ", ".join(f"[{x:.3f}, {y:.3f}]" for x, y in pattern) + "]" for pattern in places
     )
     name = scene.name.encode("unicode_escape").decode().replace('"', "'")
-    said = "\n".join(f"# {note}." for note in notes)
+    comments = "\n".join(f"# {note}." for note in notes)
     return f'''"""{name}: {scene.tacton.duration:g} s on AUTD3 devices, by pyautd3 38."""
-{said}
-# Open the link of your own devices in place of Nop.
+{comments}
+# Replace Nop by the link of your devices.
 
 import time
 

@@ -1,4 +1,4 @@
-"""From one pattern file to another, by what their names end with."""
+"""Conversion between pattern files, by the suffixes of their names."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -17,25 +17,25 @@ LARGEST = {".adaptics": 16_000_000, ".csv": 128_000_000, ".wav": 32_000_000}  # 
 def convert(
     source: Path, target: Path, options: Options, base: Scene | None = None
 ) -> tuple[bytes, tuple[str, ...]]:
-    """Contents of the target file, and notes on what was decided, left out or approximated.
+    """Convert a pattern file to the format of another.
 
     Parameters
     ----------
-    source, target : Path, of `READERS` and `WRITERS`
+    source, target : Path, with a suffix of `READERS` and of `WRITERS`
     options : Options
-    base : Scene, which the pattern is put on: its body, probes, drive; a slab of palm by default
+    base : Scene that receives the pattern: its body, probes and drive; a slab of palm by default
 
     Returns
     -------
-    bytes, and tuple of str
+    bytes, the content of the target, and a tuple of str, notes on assumptions and approximations
 
     Raises
     ------
     ValueError
-        If a file is of no known kind or malformed, or the pattern cannot be expressed.
+        If a file has an unknown suffix or is malformed, or the format cannot express the pattern.
     """
     if (suffix := target.suffix.lower()) not in WRITERS:
-        raise ValueError(f"{target}: '{suffix}' cannot be written, use {', '.join(WRITERS)}")
+        raise ValueError(f"{target}: cannot write '{suffix}'; use {', '.join(WRITERS)}")
     if suffix != ".toml":
         base = replace(base or scene_file.loads(""), body=Body(kind="none"))
     scene, notes = read_pattern(source, options, base)
@@ -46,32 +46,35 @@ def convert(
 def read_pattern(
     path: Path, options: Options, base: Scene | None = None
 ) -> tuple[Scene, tuple[str, ...]]:
-    """The scene of a pattern file on a base, by default a slab that the path lies on, and notes;
-    errors as of `convert`.
+    """Read a pattern file onto a base scene, and return the scene and notes.
+
+    Without a base, the body is a slab that contains the path. Raises a ValueError as `convert`.
     """
     if (suffix := path.suffix.lower()) not in READERS:
-        raise ValueError(f"{path}: '{suffix}' is no known kind of file, use {', '.join(READERS)}")
+        raise ValueError(f"{path}: cannot read '{suffix}'; use {', '.join(READERS)}")
     if suffix == ".toml":
         scene = scene_file.read(path)
         tacton = resized(scene.tacton, options.resize)
         return replace(scene, pressure=replace(scene.pressure, tacton=tacton)), ()
-    given = base or scene_file.loads("")
+    receiver = base or scene_file.loads("")
     content = reading.read_bytes(path, LARGEST[suffix])
     try:
-        pattern = (
-            waveform.read(content, options, given) if suffix == ".wav"
-            else {".adaptics": adaptics, ".csv": focal_points}[suffix].read(content, options)
-        )  # fmt: skip
+        if suffix == ".wav":
+            pattern = waveform.read(content, options, receiver)
+        else:
+            pattern = {".adaptics": adaptics, ".csv": focal_points}[suffix].read(content, options)
         tacton = resized(pattern.tacton, options.resize)
         notes = list(pattern.notes)
-        given = base or wide_enough(given, tacton, notes)
-        return onto(given, replace(pattern, tacton=tacton), path.stem), tuple(notes)
+        receiver = base or wide_enough(receiver, tacton, notes)
+        return onto(receiver, replace(pattern, tacton=tacton), path.stem), tuple(notes)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
 
 
 def write_pattern(scene: Scene, suffix: str, options: Options) -> tuple[bytes, tuple[str, ...]]:
-    """A scene in the format of a suffix, and notes; a ValueError if it has no words for it."""
+    """Return a scene in the format of a suffix, and notes; raise a ValueError if the format cannot
+    express it.
+    """
     if suffix == ".toml":
         return scene_file.dumps(scene).encode(), ()
     check_load(scene, "a pattern of a device")

@@ -1,9 +1,10 @@
-"""Focal points as CSV: tidy, `t_s,point,x_m,y_m,z_m,intensity`, or bare `x,y[,z[,intensity]]` at a
-rate. Other programs' words for a column are known (`time`, `X (mm)`); without a unit it is s or m.
+"""Focal points as CSV: tidy, `t_s,point,x_m,y_m,z_m,intensity`, or without a header,
+`x,y[,z[,intensity]]` at a rate. Column names of other programs are known (`time`, `X (mm)`); the
+default units are s and m.
 
-Intensity is the sound pressure of a point over that at full drive, 0..1; the radiation pressure is
-its square. Several points are foci on paths of their own: their paths one after the other are a
-path, on which each focus runs one part ahead of the one before.
+Intensity, 0 to 1, is the sound pressure of a point relative to full drive; the radiation pressure
+is its square. Several points become one path: the paths of all points in sequence, on which each
+focus is one part ahead of the one before.
 """
 
 import re
@@ -31,34 +32,42 @@ MOST_ROWS = 1_000_000
 
 
 def read(content: bytes, options: Options) -> Pattern:
-    """The pattern in a focal-point CSV; raises a ValueError with the line and the cure."""
+    """Read the pattern of a focal-point CSV."""
     rows = _rows(content)
-    tidy = number_in(rows[0][1][0]) is None
-    table = _table(rows[1:], _columns(rows[0][1])) if tidy else _bare(rows, options.rate)
+    has_header = number_in(rows[0][1][0]) is None
+    columns = _columns(rows[0][1]) if has_header else _columns_of_width(rows, options.rate)
+    table = _table(rows[has_header:], columns)
+    if not has_header and options.rate:
+        table["t_s"] = np.arange(len(rows)) / options.rate
     notes: list[str] = []
     points, counts = np.unique(table["point"], return_counts=True)
     if len(points) > MOST_FOCI or (points != np.arange(len(points))).any():
-        shown = ", ".join(f"{p:g}" for p in points[:10])
-        raise ValueError(f"points are numbered {shown}; number them from 0 to {MOST_FOCI - 1}")
+        numbers = ", ".join(f"{p:g}" for p in points[:10])
+        raise ValueError(
+            f"points have the numbers {numbers}; number at most {MOST_FOCI} points from 0"
+        )
     ordered = table[np.argsort(table["point"], kind="stable")]
     table = ordered.reshape(len(points), -1) if not np.ptp(counts) else ordered[None]
     times = table["t_s"] - table["t_s"][0, 0]
     if np.ptp(counts) or np.ptp(times, axis=0).max() > 1e-9:
-        raise ValueError("points have different times; give each the same")
+        raise ValueError("the times of the points differ; give all points the same times")
     if (falling := np.diff(times[0]) < 0).any():
-        raise ValueError(f"times fall after t_s = {table['t_s'][0][falling.argmax()]:g}; sort them")
+        raise ValueError(
+            f"times decrease after t_s = {table['t_s'][0][falling.argmax()]:g}; sort them"
+        )
     if not ((table["intensity"] >= 0) & (table["intensity"] <= 1)).all():
-        raise ValueError("intensity must lie in 0..1, the sound pressure over that at full drive")
+        raise ValueError(
+            "intensity is the sound pressure relative to full drive; give values from 0 to 1"
+        )
     if len(points) > 1:
         notes.append(
-            f"{len(points)} points at a time: each has 1/{len(points)} of the pressure of one alone"
+            f"{len(points)} points at a time, each with 1/{len(points)} of the full pressure"
         )
-    if not tidy:
+    if not has_header:
         notes.append(f"samples at {options.rate:g} Hz")
     elif options.rate is not None:
-        notes.append("the times of the file stay; --rate is that of a file to be written")
-    way = "stays at a sample until the next" if options.hold else "goes straight between samples"
-    notes.append(f"the focus {way}")
+        notes.append("the file has times, so that --rate applies only to a file that is written")
+    notes.append(f"the focus {'stays until the next sample' if options.hold else 'moves straight'}")
     height = one_height(table["z_m"].ravel(), options, notes)
     tacton = recorded(times[0], np.stack([table["x_m"], table["y_m"]], -1), table["intensity"],
                       hold=options.hold)  # fmt: skip
@@ -68,7 +77,7 @@ def read(content: bytes, options: Options) -> Pattern:
 
 
 def recorded(times: Floats, places: Floats, levels: Floats, *, hold: bool = False) -> Tacton:
-    """A Tacton of foci at places (n, t, 2) in metre with levels (n, t) at times (t,) in s from 0.
+    """Return a Tacton of foci at places (n, t, 2) in metre with levels (n, t) at times (t,) in s.
 
     The last sample lasts as long as the one before it.
     """
@@ -100,10 +109,10 @@ def recorded(times: Floats, places: Floats, levels: Floats, *, hold: bool = Fals
 
 
 def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
-    """Tidy CSV of a scene's foci at a rate, and notes."""
+    """Return a tidy CSV of a scene's foci at a rate, and notes."""
     rate = options.rate or DEVICE_RATE
     if not (isfinite(rate) and 1 <= rate <= DEVICE_RATE):
-        raise ValueError(f"rate = {rate:g} Hz is outside 1..{DEVICE_RATE:g} Hz of devices")
+        raise ValueError(f"--rate is {rate:g} Hz; devices take 1 to {DEVICE_RATE:g} Hz")
     tacton, path = scene.tacton, scene.tacton.trajectory
     t = np.arange(max(2, round(tacton.duration * rate))) / rate
     amplitude = loudness(scene.pressure, t)
@@ -117,64 +126,65 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
     )
     notes = (
         f"{len(t):,} samples of {len(tacton.foci)} focal points at {rate:g} Hz",
-        "intensity is the sound pressure over that at full drive: the root of the load",
+        "intensity is the sound pressure relative to full drive, the root of the load",
         *aliased(tacton, rate),
     )
     return csv_table(COLUMNS, rows, "\n"), notes
 
 
 def _rows(content: bytes) -> list[tuple[int, list[str]]]:
-    """Line numbers and fields of the lines that are neither empty nor comments."""
+    """Return line numbers and fields of the lines that are neither empty nor comments."""
     lines = as_utf_8(content).splitlines()
     if len(lines) > MOST_ROWS:
-        raise ValueError(f"more than {MOST_ROWS:,} lines; cut the pattern")
+        raise ValueError(f"the file has more than {MOST_ROWS:,} lines; shorten the pattern")
     kept = [(k, x) for k, x in enumerate(lines, 1) if x.strip(" ,;\t") and not x.startswith("#")]
     if not kept:
-        raise ValueError("no focal points; give a line each")
+        raise ValueError("the file has no focal points; write one per line")
     delimiter = max(",;\t", key=kept[0][1].count)
     fields = ((k, line.replace('"', "").split(delimiter)) for k, line in kept)
     return [(k, [x.strip().replace(",", ".") for x in row]) for k, row in fields]
 
 
 def _columns(words: list[str]) -> list[tuple[str, float]]:
-    """Names of columns by the words of a header, and their units in s or m."""
+    """Return name and unit, in s or m, of each column of a header."""
     columns = [_column(word) for word in words]
     names = [name for name, _ in columns]
     if len(set(names)) < len(names):
-        raise ValueError(f"a column is there twice in {','.join(names)[:80]}; leave one out")
+        raise ValueError(f"a column is repeated in {','.join(names)[:80]}; remove one")
     if missing := [name for name in NEEDED if name not in names]:
-        raise ValueError(f"column {missing[0]} is missing; columns are {','.join(COLUMNS)}")
+        raise ValueError(f"column {missing[0]} is missing; the columns are {','.join(COLUMNS)}")
     return columns
 
 
 def _column(word: str) -> tuple[str, float]:
-    """Name of a column by a word of a header, and its unit in s or m."""
+    """Return the name of a column and its unit in s or m, given a word of a header."""
     plain = re.sub(r"[\s_()\[\]]+", " ", word).strip().lower()
     for name, words in WORDS.items():
         units = UNITS.get(name, UNITS["lengths"] if name.endswith("_m") else {})
-        if found := re.fullmatch(rf"({words})(?: ({'|'.join(units)}))?", plain):
-            return name, units.get(found[2], 1.0)
-    hint = meant(word, COLUMNS) or f"; columns are {','.join(COLUMNS)}"
+        if match := re.fullmatch(rf"({words})(?: ({'|'.join(units)}))?", plain):
+            return name, units.get(match[2], 1.0)
+    hint = meant(word, COLUMNS) or f"; the columns are {','.join(COLUMNS)}"
     raise ValueError(f"column '{word[:40]}' is unknown{hint}")
 
 
-def _bare(rows: list[tuple[int, list[str]]], rate: float | None) -> np.ndarray:
+def _columns_of_width(
+    rows: list[tuple[int, list[str]]], rate: float | None
+) -> list[tuple[str, float]]:
+    """Return the columns of a file without a header."""
     width = len(rows[0][1])
     if rate is None or not 2 <= width <= 4:
         raise ValueError(
-            f"the file has no header; begin it with {','.join(COLUMNS)} or those that it has, or "
-            "give x,y[,z[,intensity]] alone, and how many samples a second with --rate HZ"
+            f"the file has no header; begin it with columns of {','.join(COLUMNS)}, or write only "
+            "x,y[,z[,intensity]] and give the samples per second with --rate HZ"
         )
     if not (isfinite(rate) and rate > 0):
-        raise ValueError(f"rate = {rate} Hz must be a finite number above 0")
-    table = _table(rows, [(name, 1.0) for name in ("x_m", "y_m", "z_m", "intensity")[:width]])
-    table["t_s"] = np.arange(len(rows)) / rate
-    return table
+        raise ValueError(f"--rate is {rate} Hz; give a finite number above 0")
+    return [(name, 1.0) for name in ("x_m", "y_m", "z_m", "intensity")[:width]]
 
 
 def _table(rows: list[tuple[int, list[str]]], columns: list[tuple[str, float]]) -> np.ndarray:
     if not rows:
-        raise ValueError("a header without focal points; give a line each")
+        raise ValueError("the file has a header, but no focal points; write one per line")
     table = np.zeros(len(rows), [(name, float) for name in COLUMNS])
     table["intensity"] = 1.0
     values = np.array([_numbers(line, cells, len(columns)) for line, cells in rows])
@@ -185,8 +195,10 @@ def _table(rows: list[tuple[int, list[str]]], columns: list[tuple[str, float]]) 
 
 def _numbers(line: int, cells: list[str], count: int) -> list[float]:
     if len(cells) != count:
-        raise ValueError(f"line {line} has {len(cells)} columns, the first has {count}")
+        raise ValueError(
+            f"line {line} has {len(cells)} columns, but the first has {count}; correct it"
+        )
     values = [x for cell in cells if (x := number_in(cell)) is not None and isfinite(x)]
     if len(values) < count:
-        raise ValueError(f"line {line} has what is no finite number in '{','.join(cells)[:60]}'")
+        raise ValueError(f"line {line}, '{','.join(cells)[:60]}', must contain only finite numbers")
     return values

@@ -1,9 +1,9 @@
 """Best value of a varied key: where a column of the sweep's table is largest, with the interval
-that the spreads of the scene leave.
+under the spreads of the scene.
 
-The best point of the grid and its neighbours give a parabola, and its vertex a further run. Each
-sample of the spreads has a best value of its own, found in the same way; the interval holds 95 %
-of them, and is wider by a tenth of a step of the grid at each end, to which they are found.
+The best point of a grid and its neighbours define a parabola, and a run at its vertex refines the
+best value. Each sample of the spreads has its own best value, found in the same way. The interval
+contains 95 % of them, and is wider at each end by a tenth of a grid step, their accuracy.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,22 +19,34 @@ from skinwave.scene.spreads import PRESSURE, Spread, spreads_of
 from skinwave.scene.variation import Choice, Variation, combinations
 from skinwave.sweeps.ensemble import is_linear
 from skinwave.sweeps.reductions import model_of
-from skinwave.sweeps.sweep import Combined, Sweep
+from skinwave.sweeps.sweep import Combinations, Sweep
 from skinwave.sweeps.table_figures import at_probe, value
 from skinwave.typing import Floats
 
-SAMPLES, FEWEST = 199, 39  # of the spreads; those that have a 95 % interval
-ENDS = (2.5, 97.5)  # percentiles between which the interval lies
-VERTICES = 2  # runs that refine a best value beyond the grid
-RESOLUTION = 0.1  # of a step of the grid, to which a best value is then found
-FOLDER = "samples"  # within that of the sweep: the sweep of the samples
+SAMPLES, FEWEST_SAMPLES = 199, 39  # by default; for a 95 % interval
+ENDS = (2.5, 97.5)  # percentiles at the ends of the interval
+REFINEMENTS = 2  # runs at vertices
+ACCURACY = 0.1  # of a best value, in steps of the grid
+FOLDER = "samples"  # of the sweep of the samples, in that of the sweep
 
 
 @dataclass(frozen=True, kw_only=True)
 class Best:
-    """The `value` of a `key` at which a `column` is largest, and the column there, `result`; the
-    `limits` of the values that were tried; and the 95 % `interval` of the best values of `samples`
-    of the numbers that are `uncertain`, None if none is.
+    """Best value of a key.
+
+    Parameters
+    ----------
+    key, column : str, the varied key, and the column of the table that is largest
+    value, result : float, the best value, and the column there
+    limits : least and largest value of the grid
+    interval : 95 % interval of the best values of the samples; None if no uncertain number of the
+        scene affects the column
+    samples : int, number of samples
+    uncertain : keys of the sampled numbers
+
+    >>> best = Best(key="tacton.size_mm", column="rms_um[0]", value=14, result=3.2, limits=(5, 20))
+    >>> best.is_at_end
+    False
     """
 
     key: str
@@ -48,81 +60,76 @@ class Best:
 
     @property
     def is_at_end(self) -> bool:
-        """Whether the best value is an end of the range, beyond which a better one may lie."""
+        """Whether the best value is an end of the range; a better one may lie beyond."""
         return self.value in self.limits
 
     @property
     def words(self) -> str:
         """The best value and its interval in one or two sentences."""
         end = ", an end of the range," if self.is_at_end else ""
-        said = f"{self.key} = {significant(self.value)}{end} gives the largest {self.column}, "
-        said += significant(self.result)
+        text = f"{self.key} = {significant(self.value)}{end} gives the largest {self.column}, "
+        text += significant(self.result)
         if self.interval is None:
-            return f"{said}; no interval, because no uncertain number of the scene moves it"
+            return f"{text}; no interval, because no uncertain number of the scene affects it"
         low, high = map(significant, self.interval)
-        said += f"; 95 % interval {low} to {high}, from {self.samples} samples of "
-        said += ", ".join(self.uncertain)
+        text += f"; 95 % interval {low} to {high}, from {self.samples} samples of "
+        text += ", ".join(self.uncertain)
         if set(self.interval) & set(self.limits):
-            said += ". The interval reaches an end of the range: widen the range"
-        return said
+            text += ". The interval reaches an end of the range: widen the range"
+        return text
 
     def __repr__(self) -> str:
         return f"<Best: {self.words}>"
 
 
 def check(variations: Sequence[Variation], samples: int | None = None) -> Choice:
-    """The one key whose best value is asked for; refuses, before any work, what has none."""
-    if samples is not None and samples < FEWEST:
+    """Return the one varied key and its grid; raise a ValueError if there is none."""
+    if samples is not None and samples < FEWEST_SAMPLES:
         raise ValueError(
-            f"{samples} samples are too few for a 95 % interval; give {FEWEST} or more"
+            f"{samples} samples are too few for a 95 % interval; give {FEWEST_SAMPLES} or more"
         )
     if len(variations) != 1:
         raise ValueError(
-            f"a best value is of one key, and {len(variations)} are varied; vary one and set the "
+            f"a best value needs one varied key, not {len(variations)}; vary one and set the "
             "others in the scene"
         )
-    (found,) = variations
-    values = set(found.values) if isinstance(found, Choice) else set()
+    (grid,) = variations
+    values = set(grid.values) if isinstance(grid, Choice) else set()
     numbers = [x for x in values if isinstance(x, int | float) and not isinstance(x, bool)]
-    if not isinstance(found, Choice) or len(numbers) < max(3, len(values)):
+    if not isinstance(grid, Choice) or len(numbers) < max(3, len(values)):
         raise ValueError(
-            f"a best value of {found.key} needs at least three values, all numbers; give "
-            f"{found.key}=start:stop:n"
+            f"a best value of {grid.key} needs at least three values, all numbers; give "
+            f"{grid.key}=start:stop:n"
         )
-    return found
+    return grid
 
 
-def best_value(
-    sweep: Sweep, variation: Choice, column: str, samples: int | None = None, seed: int = 0
+def find_best(
+    sweep: Sweep, grid: Choice, column: str, samples: int | None = None, seed: int = 0
 ) -> Best:
-    """Best value of a key that `check` accepts, of a column such as "level_db[0]"; resumes an
-    interrupted one. There are `SAMPLES` samples of the spreads if not said otherwise.
+    """Find the best value of a key on a grid that `check` accepts; an interrupted search resumes.
 
-    Raises
-    ------
-    ValueError
-        If no run has such a column of numbers, or too few samples have it.
+    Raises a ValueError if no run has a number in the column, or too few samples have one.
     """
-    n, key, grid = samples or SAMPLES, variation.key, variation.values
-    (best,), (result,) = optima(lambda runs: _column(sweep, column, runs), key, grid, [{}])
+    n, key, values = samples or SAMPLES, grid.key, grid.values
+    (best,), (result,) = optima(lambda runs: _column(sweep, column, runs), key, values, [{}])
     if not np.isfinite(result):
         raise ValueError(f"column '{column}' has no finite number in this sweep; choose another")
     found = Best(
         key=key, column=column, value=float(best), result=float(result),
-        limits=(float(min(grid)), float(max(grid))),
+        limits=(float(min(values)), float(max(values))),
     )  # fmt: skip
-    points = [point for point in sweep.points([{key: x} for x in grid]) if point.scene]
+    points = [point for point in sweep.points([{key: x} for x in values]) if point.scene]
     scenes = [point.scene for point in points if point.scene]
     models = [model_of(scene, sweep.options.model) for scene in scenes]
-    # The pressure moves no best value of what is in proportion to it.
-    linear = all(map(is_linear, scenes, models))
-    fixed = {key, PRESSURE} if linear else {key}
+    # If the motion is proportional to the pressure, this does not change the best value.
+    fixed = {key, PRESSURE} if all(map(is_linear, scenes, models)) else {key}
     spreads: list[Spread] = [
         each for each in spreads_of(points[0].before or scenes[0]) if each.key not in fixed
     ]
     if not spreads:
         return found
-    # Samples are of the steady state where the wavenumber integral from rest is asked for.
+    # Samples use the steady state in place of the wavenumber integral from rest.
     steady = {*models} == {FLAT_BODY.name} and all(takes(HARMONIC, scene) for scene in scenes)
     own = replace(
         sweep, folder=sweep.folder / FOLDER, assessed=False,
@@ -130,62 +137,68 @@ def best_value(
         progress=lambda step, part: sweep.progress("samples" if step == "run" else step, part),
     )  # fmt: skip
     settings = combinations(spreads, "lhs", n, seed)
-    values, results = optima(lambda runs: _column(own, column, runs), key, grid, settings)
-    values = values[np.isfinite(results)]
-    if len(values) < FEWEST:
+    bests, results = optima(lambda runs: _column(own, column, runs), key, values, settings)
+    bests = bests[np.isfinite(results)]
+    if len(bests) < FEWEST_SAMPLES:
         raise ValueError(
-            f"only {len(values)} of {n} samples have a number in column '{column}'; narrow "
-            "their distributions or choose another column"
+            f"only {len(bests)} of {n} samples have a number in column '{column}'; narrow their "
+            "distributions or choose another column"
         )
-    low, high = np.percentile(values, ENDS, method="weibull")
-    margin = RESOLUTION * np.diff(np.unique(grid)).max()
+    low, high = np.percentile(bests, ENDS, method="weibull")
+    margin = ACCURACY * np.diff(np.unique(values)).max()
     low, high = np.clip((low - margin, high + margin), *found.limits).tolist()
-    names = tuple(each.key for each in spreads)
-    return replace(found, interval=(low, high), samples=len(values), uncertain=names)
+    uncertain = tuple(each.key for each in spreads)
+    return replace(found, interval=(low, high), samples=len(bests), uncertain=uncertain)
 
 
-def _column(sweep: Sweep, column: str, combined: Combined) -> Floats:
-    """A column (n,) of the runs of combinations of values, nan where there is none."""
+def _column(sweep: Sweep, column: str, combined: Combinations) -> Floats:
+    """Run combinations of values, and return a column (n,) of them, nan without a number."""
     points = sweep.points(combined)
-    found = sweep.run(points)
-    if found.interrupted:
+    outcome = sweep.run(points)
+    if outcome.interrupted:
         raise KeyboardInterrupt
-    if found.missing:
-        raise ValueError(f"workers were killed; {found.missing} runs are missing, start again")
+    if outcome.missing:
+        raise ValueError(
+            f"workers were killed, and {outcome.missing} runs are missing; repeat the command"
+        )
     rows = sweep.rows(points)
     choose("column", at_probe(column)[0], dict.fromkeys(name for row in rows for name in row))
     return np.array([value(row, column) for row in rows])
 
 
 def optima(
-    evaluate: Callable[[Combined], Floats], key: str, grid: Sequence[float], settings: Combined
+    evaluate: Callable[[Combinations], Floats],
+    key: str,
+    grid: Sequence[float],
+    settings: Combinations,
 ) -> tuple[Floats, Floats]:
-    """Best values (n,) of a key for settings (n,) of other keys, refined beyond a grid (g,), and
-    the column there, -inf of a setting that has none; `evaluate` gives the column (m,) of runs
-    (m,), nan where there is none.
+    """Return the best values (n,) of a key for settings (n,) of other keys, refined beyond a grid
+    (g,), and the column there, -inf if a setting has none.
+
+    `evaluate` returns the column (m,) of runs (m,), nan without a number.
     """
 
-    def tried(values: Floats) -> Floats:
-        """The column (n, g) at values (n, g) of the key."""
-        # Runs of one value follow each other: they share the load, whose lines are cached.
+    def column_at(values: Floats) -> Floats:
+        """Return the column (n, g) at values (n, g) of the key."""
+        # Runs at one value follow each other, because they share the cached lines of the load.
         runs = [
             {**own, key: x} for at in values.T.tolist() for own, x in zip(settings, at, strict=True)
         ]
-        found = evaluate(runs).reshape(values.T.shape).T
-        return np.where(np.isfinite(found), found, -np.inf)
+        column = evaluate(runs).reshape(values.T.shape).T
+        return np.where(np.isfinite(column), column, -np.inf)
 
     x = np.tile(np.unique(grid), (len(settings), 1))
-    y = tried(x)
-    for _ in range(VERTICES):
+    y = column_at(x)
+    for _ in range(REFINEMENTS):
         vertices = np.array([[_vertex(*each)] for each in zip(x, y, strict=True)])
-        x, y = np.hstack([x, vertices]), np.hstack([y, tried(vertices)])
+        x, y = np.hstack([x, vertices]), np.hstack([y, column_at(vertices)])
     best = y.argmax(axis=1)[:, None]
     return np.take_along_axis(x, best, 1)[:, 0], np.take_along_axis(y, best, 1)[:, 0]
 
 
 def _vertex(x: Floats, y: Floats) -> float:
-    """Vertex of the parabola through the best of some points and its neighbours; the best point if
-    there is none among them.
+    """Return the vertex of the parabola through the best point and its neighbours, or else the best
+    point.
     """
     best = float(x[y.argmax()])
     x, first = np.unique(x[np.isfinite(y)], return_index=True)

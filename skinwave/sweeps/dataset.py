@@ -1,7 +1,7 @@
 """Rows of a sweep on disk: small Parquet files in one folder, read as one table.
 
-Each file is written aside and renamed, so that what is there is whole, and none is ever rewritten.
-One sweep at a time writes into a folder.
+Each file is written under another name and then renamed, so that it is complete; no file is
+rewritten. One sweep at a time writes into a folder.
 """
 
 import json
@@ -18,10 +18,10 @@ from skinwave.results import outputs, record
 from skinwave.results.outputs import output_file
 from skinwave.system.plain_text import csv_table
 
-ROWS, CSV = "rows", "rows.csv"  # the folder of the files within that of a sweep; its table
-LOCK = ".lock"  # among the rows, of the sweep that writes them
-FROM_PYTHON = {"typed": "", "name": "sweep", "options": {}}  # the command of a sweep without one
-LARGEST = 500_000_000  # bytes of one file
+ROWS, CSV = "rows", "rows.csv"  # folder of the files, and the table as CSV, in that of a sweep
+LOCK = ".lock"  # file in the folder of rows
+FROM_PYTHON = {"typed": "", "name": "sweep", "options": {}}  # command of a sweep in Python
+LARGEST_FILE = 500_000_000  # bytes
 MOST_ROWS = 1_000_000  # of one file
 KEY, INDEX = "key", "index"  # columns: a row's name, and its place in the design
 
@@ -29,8 +29,9 @@ Row = Mapping[str, Any]
 
 
 def open_folder(out: Path, command: Mapping[str, Any] | None = None) -> Path:
-    """The folder of a sweep, made if it is new, with a record of the `command`; a ValueError if it
-    is something else.
+    """Return the folder of a sweep; make it, with a record of the `command`, if it is new.
+
+    Raises a ValueError if the folder exists and contains something else.
     """
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         check_folder(out)
@@ -41,26 +42,27 @@ def open_folder(out: Path, command: Mapping[str, Any] | None = None) -> Path:
 
 
 def check_folder(out: Path) -> None:
-    """Refuse a folder that is not that of a sweep; raises a ValueError."""
+    """Raise a ValueError if a folder is not that of a sweep."""
     try:
         name = record.read(out)["command"]["name"]
     except (ValueError, KeyError):
         name = ""
     if name != "sweep" or not (out / ROWS).is_dir():
-        raise ValueError(f"{out} exists and holds no sweep; choose another folder")
+        raise ValueError(f"{out} exists, but contains no sweep; choose another folder")
 
 
 @contextmanager
 def locked(out: Path) -> Iterator[None]:
-    """Hold the rows of a folder; the system releases them however the process ends. Raises a
-    ValueError if another sweep holds them.
+    """Lock the rows of a folder; raise a ValueError if another sweep has locked them.
+
+    The operating system releases the lock however the process ends.
     """
     with open(out / ROWS / LOCK, "ab") as file:
         try:
             _lock(file.fileno())
         except OSError:
             raise ValueError(
-                f"another sweep writes into {out}; wait for its end, or choose another --out"
+                f"another sweep writes into {out}; wait until it ends, or choose another --out"
             ) from None
         yield
 
@@ -77,7 +79,7 @@ def _lock(descriptor: int) -> None:
 
 
 def append(out: Path, rows: Sequence[Row]) -> None:
-    """Add rows as a file of their own, all or none; cells may be missing."""
+    """Add rows in one new file; cells may be missing."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -85,44 +87,38 @@ def append(out: Path, rows: Sequence[Row]) -> None:
     table = pa.table({name: [row.get(name) for row in rows] for name in names})
     sink = pa.BufferOutputStream()
     pq.write_table(table, sink)
-    # Another sweep into the same folder may hold other rows after the same first one.
+    # Another sweep into the same folder may write other rows after the same first one.
     with output_file(out / ROWS / f"part-{rows[0][KEY]}-{secrets.token_hex(4)}.parquet") as file:
         file.write(sink.getvalue())
 
 
 def read(out: Path) -> list[dict[str, Any]]:
-    """All rows, each once, in the order of the design, with the columns of all of them.
-
-    Raises
-    ------
-    ValueError
-        If there are none, or they cannot be read.
-    """
+    """Return all rows, each once, in the order of the design; raise a ValueError without rows."""
     rows = list({row[KEY]: row for row in _table(out).to_pylist()}.values())
     if not rows:
-        raise ValueError(f"{out} holds no rows of a sweep; name the folder of one")
+        raise ValueError(f"{out} contains no rows of a sweep; name the folder of a sweep")
     return sorted(rows, key=lambda row: row[INDEX])
 
 
 def names(out: Path) -> dict[str, int]:
-    """The names of the rows that are there, and the index of each."""
+    """Return the index of each row by its name."""
     table = _table(out).select([KEY, INDEX])
     return dict(zip(table[KEY].to_pylist(), table[INDEX].to_pylist(), strict=True))
 
 
-def numbered(wanted: Iterable[str], there: Mapping[str, int]) -> dict[str, int]:
-    """The index of each wanted row, its place in the design; what is added to the rows of another
-    design comes after these.
+def numbered(wanted: Iterable[str], earlier: Mapping[str, int]) -> dict[str, int]:
+    """Return the index of each wanted row: its place in the design, after the rows of another
+    design.
     """
     places = {name: k for k, name in enumerate(wanted)}
-    if all(places.get(name) == index for name, index in there.items()):
+    if all(places.get(name) == index for name, index in earlier.items()):
         return places
-    first = 1 + max(there.values())
-    return {name: first + k for k, name in enumerate(n for n in places if n not in there)}
+    first = 1 + max(earlier.values())
+    return {name: first + k for k, name in enumerate(n for n in places if n not in earlier)}
 
 
 def _table(out: Path) -> Any:
-    """The rows of all files; a ValueError if they are no table of a sweep."""
+    """Return the rows of all files; raise a ValueError if they are not rows of a sweep."""
     import pyarrow as pa
 
     empty = pa.table({KEY: pa.array([], pa.string()), INDEX: pa.array([], pa.int64())})
@@ -130,26 +126,28 @@ def _table(out: Path) -> Any:
         parts = [_part(part) for part in sorted((out / ROWS).glob("part-*.parquet"))]
         return pa.concat_tables([empty, *parts], promote_options="permissive")
     except (OSError, KeyError, ValueError, pa.ArrowException) as error:
-        said = " ".join(str(error).split())[:200]
-        raise ValueError(f"{out} cannot be read ({said}); choose the folder of a sweep") from None
+        cause = " ".join(str(error).split())[:200]
+        raise ValueError(f"{out} cannot be read ({cause}); name the folder of a sweep") from None
 
 
 def _part(path: Path) -> Any:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    file = pq.ParquetFile(pa.BufferReader(reading.read_bytes(path, LARGEST)))
+    file = pq.ParquetFile(pa.BufferReader(reading.read_bytes(path, LARGEST_FILE)))
     if file.metadata.num_rows > MOST_ROWS:
-        raise ValueError(f"{path.name} has {file.metadata.num_rows:,} rows, as no sweep writes")
+        raise ValueError(
+            f"{path.name} has {file.metadata.num_rows:,} rows; a sweep writes at most {MOST_ROWS:,}"
+        )
     table = file.read()
     is_named = pa.types.is_string(table[KEY].type) and pa.types.is_integer(table[INDEX].type)
     if not is_named or table[KEY].null_count or table[INDEX].null_count:
-        raise ValueError(f"a row has no {KEY} or no {INDEX}")
+        raise ValueError(f"a row of {path.name} has no {KEY} or no {INDEX}")
     return table
 
 
 def csv_of(rows: Iterable[Row]) -> bytes:
-    """Rows as CSV: as read, but one column for each probe of what is told at all of them."""
+    """Return rows as CSV, with one column for each probe of a list."""
     flat = [dict(each for name, value in row.items() for each in _cells(name, value))
             for row in rows]  # fmt: skip
     columns = list(dict.fromkeys(name for row in flat for name in row))
@@ -163,7 +161,7 @@ def _cells(name: str, value: Any) -> Iterable[tuple[str, Any]]:
 
 
 def write_beside(out: Path, files: Mapping[str, bytes]) -> None:
-    """Write files beside the rows, and list them in the folder's record; raises a ValueError as
+    """Write files into the folder of a sweep, and list them in its record; raise a ValueError as
     `refuse_changed` does.
     """
     refuse_changed(out, files)
@@ -178,12 +176,12 @@ def write_beside(out: Path, files: Mapping[str, bytes]) -> None:
 
 
 def refuse_changed(out: Path, names: Iterable[str]) -> None:
-    """Refuse to replace files that are not as this program wrote them; raises a ValueError."""
+    """Raise a ValueError if a file to replace was not written by this program."""
     known = outputs.listed_files(out) or {}
     for name in names:
         path = out / name
         if os.path.lexists(path) and not outputs.is_as_listed(path, known.get(name)):
             raise ValueError(
-                f"{path} was added or changed since skinwave wrote it and is kept; move it "
+                f"{path} was added or changed since skinwave wrote it and is not replaced; move it "
                 "elsewhere"
             )

@@ -1,6 +1,6 @@
 """Many runs at once: in threads, in processes, or on the workers of a Dask scheduler.
 
-Nothing that loads numpy is imported here: a worker process sets its threads before that.
+This module imports nothing that loads numpy, because a worker process sets its threads first.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -14,31 +14,31 @@ from skinwave.system.effort import usable_cores
 from skinwave.system.processes import pool
 
 LOCAL = ("processes", "threads")
-ATTEMPTS = 4  # to finish what was lost with a killed worker
-CONNECTED = 10  # s that a scheduler may take to respond
+ATTEMPTS = 4  # to finish items whose worker was killed
+CONNECTION_TIMEOUT = 10  # s
 
 
 def check(scheduler: str) -> None:
-    """Refuse, before any work, what is not installed."""
-    extra, needed = "sweep", ["pyarrow"]
+    """Raise a ValueError for an unknown scheduler or a missing package."""
+    extra, packages = "sweep", ["pyarrow"]
     if scheduler not in LOCAL:
-        extra, needed = "cluster", [*needed, "distributed"]
+        extra, packages = "cluster", [*packages, "distributed"]
         if ":" not in scheduler:
             raise ValueError(
-                f"scheduler '{scheduler}' is none of {', '.join(LOCAL)} and no address; "
-                "write one such as tcp://host:8786"
+                f"scheduler '{scheduler}' is unknown; give {' or '.join(LOCAL)}, or the address "
+                "of a Dask scheduler such as tcp://host:8786"
             )
-    for name in needed:
+    for name in packages:
         if find_spec(name) is None:
-            raise ValueError(f"{name} is not installed; pip install 'skinwave[{extra}]'")
+            raise ValueError(f"{name} is not installed; run pip install 'skinwave[{extra}]'")
 
 
-def workers(scheduler: str, asked: int | None = None) -> int:
-    """How many runs go on at a time."""
-    if asked is not None and asked < 1:
-        raise ValueError(f"--workers = {asked} is below 1; give one at least")
+def worker_count(scheduler: str, workers: int | None = None) -> int:
+    """Return the number of runs at a time: `workers`, or all cores or threads of the scheduler."""
+    if workers is not None and workers < 1:
+        raise ValueError(f"--workers is {workers}; give 1 or more")
     if scheduler in LOCAL:
-        return asked or usable_cores()
+        return workers or usable_cores()
     with _client(scheduler) as client:
         return max(1, sum(client.nthreads().values()))
 
@@ -50,39 +50,39 @@ def run_all(
     count: int,
     done: Callable[[int, Any], None],
 ) -> None:
-    """Call `done` here with the index and the result of each item as soon as its work is finished.
+    """Call `done` here with the index and the result of each item as soon as it is computed.
 
-    If a worker is killed, others repeat what it was at; what kills every worker is left out.
+    If a worker is killed, others repeat its item. Items that kill every worker are left out.
     """
     if not items:
         return
     if scheduler not in LOCAL:
         _run_on_cluster(work, items, scheduler, done)
         return
-    left = dict(enumerate(items))
+    missing = dict(enumerate(items))
     for _ in range(ATTEMPTS):
         with suppress(BrokenProcessPool), _executor(scheduler, count) as executor:
-            futures = {executor.submit(work, item): k for k, item in left.items()}
+            futures = {executor.submit(work, item): k for k, item in missing.items()}
             for future in as_completed(futures):
                 done(futures[future], future.result())
-                del left[futures[future]]
-        if not left:
+                del missing[futures[future]]
+        if not missing:
             return
 
 
 @contextmanager
 def _executor(scheduler: str, count: int) -> Iterator[Executor]:
-    """Workers of this machine; what they have not done at the end of this is given up."""
+    """Yield workers of this machine; unfinished work is cancelled at the end."""
     if scheduler == "processes":
         threads = max(1, usable_cores() // count)  # of linear algebra in each process
         with pool(count, threads) as executor:
             yield executor
         return
-    several = ThreadPoolExecutor(count)
+    threads_here = ThreadPoolExecutor(count)
     try:
-        yield several
+        yield threads_here
     finally:
-        several.shutdown(wait=False, cancel_futures=True)
+        threads_here.shutdown(wait=False, cancel_futures=True)
 
 
 def _run_on_cluster(
@@ -104,11 +104,11 @@ def _client(address: str) -> Iterator[Any]:
     from distributed import Client
 
     try:
-        client = Client(address, timeout=CONNECTED, set_as_default=False)
+        client = Client(address, timeout=CONNECTION_TIMEOUT, set_as_default=False)
     except (OSError, ValueError) as error:
-        said = " ".join(str(error).split()) or type(error).__name__
+        cause = " ".join(str(error).split()) or type(error).__name__
         raise ValueError(
-            f"no scheduler responds at {address} ({said}); start one with dask scheduler"
+            f"no Dask scheduler responds at {address} ({cause}); start one with dask scheduler"
         ) from None
     with client:
         yield client

@@ -1,15 +1,15 @@
-"""Uncertain numbers of a scene carried to its vibration: an ensemble of solutions.
+"""Vibration of many samples of a scene's uncertain numbers.
 
-Where the wavenumber integral is exact it gives probes and a map, in the steady state; where the
-bodies of samples share a reduced-order model, that gives the probes, likewise; elsewhere the model
-that the scene requires does. Motion of a linear body is in proportion to the pressure, so that
-samples that differ by that alone are solved once.
+The wavenumber integral gives the probes and a map in the steady state, where it is exact. A
+reduced-order model that the bodies of samples share gives the probes in the steady state. Otherwise
+the model of the scene computes each sample. Motion of a linear body is proportional to the
+pressure, so that samples that differ only in pressure are solved once.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache, partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -41,23 +41,25 @@ from skinwave.sweeps.sampling import one_at_a_time, samples
 from skinwave.system.effort import Progress, one_thread, silent
 from skinwave.typing import Complex, Floats
 
-WEAKEST, MOST = 1e-2, 24  # of the strongest line of the load, and lines, that are looked at
+WEAKEST_LINE = 1e-2  # of the strongest line of the load: weaker ones are not evaluated
+MOST_LINES = 24
+NEGLIGIBLE_LINE = 1e-3  # of the load's strongest line: weaker ones are left out of solutions
 BATCH = 16  # samples that are handed out together
-ALONE = 2 * BATCH  # samples up to which no other process is worth its start
-STEP = 0.004  # m between places of a map
-FAINT = 1e-3  # of the load's strongest line: lines that no sample has
+FEW = 2 * BATCH  # samples up to which starting processes costs more than it saves
+STEP = 0.004  # m, of a map
 ROUND_OFF = 1e-12  # of the largest line
-# Quantiles of each number between which bodies are reduced together: a palm takes 785 vectors for
-# those of a hundred samples, and more than one model has for the farthest of 256.
+# Quantiles of each number between which bodies are reduced together: a palm needs 785 vectors for
+# those of a hundred samples, and more than one model can have for the farthest of 256.
 SHARED = (0.01, 0.99)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Method:
-    """How samples are solved: names of the `lines` that are looked at, and the `options` where it
-    is not `mapped`, by the wavenumber integral; whether all samples have one load, `same_load`,
-    but for its pressure; and the `family` of their bodies, if these are reduced together, for the
-    steady state.
+    """How samples are solved.
+
+    `lines` are the names of the lines that are evaluated. Samples are solved with the `options`, or
+    by the wavenumber integral if `mapped`. If `same_load`, the loads of samples differ only in
+    pressure. `family`: bodies that are reduced together, for the steady state.
     """
 
     lines: tuple[str, ...]
@@ -68,15 +70,25 @@ class Method:
 
     @property
     def words(self) -> str:
-        """The method, as a sentence ends with it."""
+        """The method, for the end of a sentence."""
         if self.mapped:
             return "by the wavenumber integral, in the steady state"
-        together = ", nearly all of one reduced-order model, in the steady state"
+        together = ", mostly with one reduced-order model, in the steady state"
         return f"by {self.options.model}{together if self.family else ''}"
 
 
-class Solution(NamedTuple):
-    """Vibration of one sample about its mean, as of `Ensemble`."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Solution:
+    """Vibration of one sample about its mean, in the unit of the response.
+
+    Parameters
+    ----------
+    waveform : (t, p) float, the last `SHOWN` of a Tacton
+    lines : (f, p) float, amplitudes of the named lines
+    rms : (p,) float
+    level : (p,) float, dB, highest sensation level of the lines as if on skin; at least `SILENT`
+    map_rms, map_level : (ny, nx) float, RMS and level on a map; empty without a map
+    """
 
     waveform: Floats
     lines: Floats
@@ -87,8 +99,8 @@ class Solution(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Ensemble:
-    """Vibration of n samples of a scene about their means, in the unit of the response.
+class Ensemble(Solution):
+    """Vibration of n samples of a scene: arrays of `Solution` with a first axis (n,).
 
     Parameters
     ----------
@@ -96,24 +108,12 @@ class Ensemble:
     method : Method
     spreads : (d,) Spread, the uncertain numbers
     values : (n, d) float, in the units of their keys
-    waveform : (n, t, p) float, the last `SHOWN` of a Tacton
-    lines : (n, f, p) float, amplitudes of the named lines
-    rms : (n, p) float
-    level : (n, p) float, dB, the highest sensation level of its lines, were it skin; `SILENT` and
-        less where nothing vibrates
-    map_rms, map_level : (n, ny, nx) float, the same on a map; of no size without one
     """
 
     scene: Scene
     method: Method
     spreads: tuple[Spread, ...]
     values: Floats
-    waveform: Floats
-    lines: Floats
-    rms: Floats
-    level: Floats
-    map_rms: Floats
-    map_level: Floats
 
     @property
     def has_map(self) -> bool:
@@ -122,12 +122,12 @@ class Ensemble:
 
     @property
     def is_skin(self) -> bool:
-        """Whether it is skin whose displacement is read, so that levels have a meaning."""
+        """Whether the probes read the displacement of skin, so that levels are meaningful."""
         return self.scene.reading.is_plain and self.scene.body.is_skin
 
     @property
     def strongest(self) -> int:
-        """The probe of largest median RMS."""
+        """Index of the probe with the largest median RMS."""
         return int(np.argmax(np.median(self.rms, axis=0)))
 
 
@@ -141,51 +141,51 @@ def propagate(
     progress: Progress = silent,
     **options: Any,
 ) -> Ensemble:
-    """Ensemble of a scene under a Latin hypercube of n samples of its uncertain numbers.
+    """Solve a scene at a Latin hypercube of n samples of its uncertain numbers.
 
-    The model and the `options`, h and solver, are those of `SolveOptions`, where the wavenumber
-    integral is not exact. With several `workers`, processes, a script needs
-    `if __name__ == "__main__"`. Raises a ValueError if nothing is uncertain, or a sample makes no
-    scene or is refused by the model.
+    `model` and `options`, h and solver, are those of `SolveOptions`, used where the wavenumber
+    integral is not exact. With several `workers` (processes), a script needs
+    `if __name__ == "__main__"`. Raises a ValueError if no number is uncertain, or the model refuses
+    a sample.
     """
     spreads = spreads_of(scene)
     values = samples(spreads, n, seed)
     method = method_of(scene, SolveOptions(model=model, **options))
-    every = np.vstack([values, one_at_a_time(spreads)])
-    method = replace(method, family=shared_body(scene, spreads, every, method, progress))
+    all_values = np.vstack([values, one_at_a_time(spreads)])
+    method = replace(method, family=shared_family(scene, spreads, all_values, method, progress))
     return ensemble(scene, spreads, values, method, workers=workers, progress=progress)
 
 
 def method_of(scene: Scene, options: SolveOptions) -> Method:
-    """Method that samples of a scene are solved by, each with a body of its own."""
-    lines = tuple(named_lines(scene.pressure, WEAKEST, most=MOST))
+    """Return the method for the samples of a scene, with a body for each."""
+    lines = tuple(named_lines(scene.pressure, WEAKEST_LINE, most=MOST_LINES))
     same = all(s.part == "material" or s.key == PRESSURE for s in spreads_of(scene))
     mapped = has_wavenumber_integral(scene) and scene.reading.is_plain
     return Method(lines=lines, options=options, mapped=mapped, same_load=same)
 
 
-def shared_body(
+def shared_family(
     scene: Scene,
     spreads: Sequence[Spread],
     values: Floats,
     method: Method,
     progress: Progress = silent,
 ) -> Covering | None:
-    """One reduction for the bodies of nearly all samples (n, d), cached on disk; None if bodies of
-    their own cost less, or no reduction serves them.
+    """Reduce the bodies of most samples (n, d) together, cached on disk; return None if separate
+    bodies cost less, or one reduction does not serve them.
     """
     free = {}
     for spread, column in zip(spreads, values.T, strict=True):
         if spread.key != PRESSURE:
             low, high = spread.at(SHARED)
             free[spread.key] = max(low, float(column.min())), min(high, float(column.max()))
-    of_elements = method.options.model == FEM.name and method.same_load and not method.mapped
-    if not (free and of_elements and scene.reading.is_plain and scene.pressure.peak_pressure):
+    by_elements = method.options.model == FEM.name and method.same_load and not method.mapped
+    if not (free and by_elements and scene.reading.is_plain and scene.pressure.peak_pressure):
         return None
-    found = covering(scene, free, len(values), method.options.tolerance)
+    family = covering(scene, free, len(values), method.options.tolerance)
     size = method.options.h or default_size(scene.body)
-    asked = replace(method.options, h=size, progress=progress)
-    return found if tried_together(found, asked) else None
+    options = replace(method.options, h=size, progress=progress)
+    return family if tried_together(family, options) else None
 
 
 def ensemble(
@@ -197,90 +197,91 @@ def ensemble(
     workers: int = 1,
     progress: Progress = silent,
 ) -> Ensemble:
-    """Ensemble of given samples (n, d) of a scene, the same whatever the number of processes."""
+    """Solve a scene at samples (n, d); the result does not depend on the number of processes."""
     keys = tuple(spread.key for spread in spreads)
-    alike, peaks = values.copy(), np.ones(len(values))
-    if PRESSURE in keys and _goes_with_pressure(scene, method):
+    different, factors = values.copy(), np.ones(len(values))
+    if PRESSURE in keys and _is_proportional_to_pressure(scene, method):
         k = keys.index(PRESSURE)
         if (values[:, k] > 0).all():
-            peaks, alike[:, k] = values[:, k], 1.0
-    alike, place = np.unique(alike, axis=0, return_inverse=True)
-    batches = np.split(alike, range(BATCH, len(alike), BATCH))
+            factors, different[:, k] = values[:, k], 1.0
+    different, place = np.unique(different, axis=0, return_inverse=True)
+    batches = np.split(different, range(BATCH, len(different), BATCH))
     solved: dict[int, list[Solution]] = {}
 
-    def done(k: int, found: list[Solution]) -> None:
-        solved[k] = found
+    def done(k: int, solutions: list[Solution]) -> None:
+        solved[k] = solutions
         progress("samples", len(solved) / len(batches))
 
-    work = partial(_batch, scene, keys, method)
-    if workers > 1 and len(alike) > ALONE:
+    work = partial(_solve_batch, scene, keys, method)
+    if workers > 1 and len(different) > FEW:
         engine.run_all(work, batches, "processes", workers, done)
     else:
         with one_thread():
             for k, batch in enumerate(batches):
                 done(k, work(batch))
     if len(solved) < len(batches):
-        raise ValueError("workers were killed; give them more memory, or take fewer of them")
-    every = [solution for k in range(len(batches)) for solution in solved[k]]
-    found = Solution(*(np.stack(each)[place.ravel()] for each in zip(*every, strict=True)))
-    return Ensemble(
-        scene=scene, method=method, spreads=tuple(spreads), values=values,
-        **_raised(found, peaks)._asdict(),
-    )  # fmt: skip
+        raise ValueError("workers were killed; provide more memory, or use fewer workers")
+    solutions = [solution for k in range(len(batches)) for solution in solved[k]]
+    arrays = {
+        name: _scaled(
+            name, np.stack([vars(each)[name] for each in solutions])[place.ravel()], factors
+        )
+        for name in (field.name for field in fields(Solution))
+    }
+    return Ensemble(scene=scene, method=method, spreads=tuple(spreads), values=values, **arrays)
 
 
-def _goes_with_pressure(scene: Scene, method: Method) -> bool:
+def _is_proportional_to_pressure(scene: Scene, method: Method) -> bool:
     return isinstance(scene.pressure.profile, str) and (
         method.mapped or is_linear(scene, method.options.model)
     )
 
 
 def is_linear(scene: Scene, name: str) -> bool:
-    """Whether the vibration by a model is in proportion to the pressure."""
+    """Whether the vibration by a model is proportional to the pressure."""
     model = named(name)
     linear = (model.is_reduced or model.is_infinite or model.is_steady) and not model.is_nonlinear
     alone = not (scene.load.gravity or scene.load.support_motion)
     return scene.reading.is_plain and linear and alone
 
 
-def _raised(found: Solution, factors: Floats) -> Solution:
-    """Solutions of n samples whose pressure is times factors (n,)."""
-    raised = 20 * np.log10(factors)
-    return Solution(*(
-        (each.T + raised).T if "level" in name else (each.T * factors).T
-        for name, each in found._asdict().items()
-    ))  # fmt: skip
+def _scaled(name: str, values: Floats, factors: Floats) -> Floats:
+    """Multiply values (n, ...) of a solution by factors (n,) of the pressure; levels are in dB."""
+    columns = values.T + 20 * np.log10(factors) if "level" in name else values.T * factors
+    return np.asarray(columns.T)
 
 
-def _batch(scene: Scene, keys: tuple[str, ...], method: Method, values: Floats) -> list[Solution]:
-    """Solutions of some samples (b, d), on a worker."""
-    found = []
+def _solve_batch(
+    scene: Scene, keys: tuple[str, ...], method: Method, values: Floats
+) -> list[Solution]:
+    """Solve some samples (b, d) on a worker."""
+    solutions = []
     for row in values.tolist():
         changed = dict(zip(keys, row, strict=True))
         together = method.family is not None and method.family.has(changed)
         try:
-            found.append(solve(with_values(scene, changed), method, together=together))
+            solutions.append(solve_sample(with_values(scene, changed), method, together=together))
         except ValueError as error:
-            said = ", ".join(f"{key} = {x:.4g}" for key, x in changed.items())
+            sample = ", ".join(f"{key} = {x:.4g}" for key, x in changed.items())
             raise ValueError(
-                f"a sample with {said} cannot be computed ({error}); narrow its distribution, or "
-                "give low and high"
+                f"the sample with {sample} cannot be computed ({error}); narrow its distribution, "
+                "or give low and high"
             ) from None
-    return found
+    return solutions
 
 
 def rows_of(found: Ensemble) -> list[dict[str, Any]]:
-    """The samples as rows of a sweep: their numbers, and columns at the probes."""
+    """Return samples as rows of a sweep: their numbers, and columns at the probes."""
     scene, record = found.scene, found.scene.reading.record
-    unit, per, names = unit_of(record), record.per_unit, found.method.lines
-    columns: dict[str, Floats] = {f"rms_{unit}": per * found.rms}
+    unit, scale, names = unit_of(record), record.per_unit, found.method.lines
+    columns: dict[str, Floats] = {f"rms_{unit}": scale * found.rms}
     if found.is_skin:
         columns["level_db"] = found.level
         if found.has_map:
             x, y = map_axes(scene)
-            place = 1e4 * (x[1] - x[0]) * (y[1] - y[0])
-            columns["above_threshold_cm2"] = place * (found.map_level >= 0).sum(axis=(1, 2))
-    columns |= {f"{name}_{unit}": per * found.lines[:, k] for k, name in enumerate(names)}
+            cell = 1e4 * (x[1] - x[0]) * (y[1] - y[0])
+            columns["above_threshold_cm2"] = cell * (found.map_level >= 0).sum(axis=(1, 2))
+    columns |= {f"{name}_{unit}": scale * found.lines[:, k] for k, name in enumerate(names)}
     same: dict[str, Any] = {
         f"{name}_hz": line_frequency(scene.tacton, name) or 0.0 for name in names
     }
@@ -293,30 +294,29 @@ def rows_of(found: Ensemble) -> list[dict[str, Any]]:
 
 
 def shown_times(scene: Scene) -> Floats:
-    """Times (t,) in s of the waveforms that are shown."""
+    """Return the times (t,) in s of the waveforms."""
     times = sample_times(scene)
     return times[times >= times[-1] - SHOWN]
 
 
 def map_axes(scene: Scene) -> tuple[Floats, Floats]:
-    """Coordinates (nx,) and (ny,) in metre of the map."""
+    """Return the coordinates (nx,) and (ny,) in metre of the map."""
     return grid(scene, REACH, STEP)
 
 
-def solve(scene: Scene, method: Method, *, together: bool = True) -> Solution:
-    """Solution of one sample, of the reduced-order model of all if its body is one of those
-    `together`; raises a ValueError if the model refuses the scene.
+def solve_sample(scene: Scene, method: Method, *, together: bool = True) -> Solution:
+    """Solve one sample, with the reduced-order model of the family if the body belongs to it
+    (`together`); raise a ValueError if the model refuses the scene.
     """
-    of_map: tuple[int, ...] = (0, 0)
-    how = method.options
+    shape: tuple[int, ...] = (0, 0)
+    how, family = method.options, method.family
     if method.mapped:
-        of_map, (f, a) = _mapped(scene, method)
-    elif method.family and together:
-        size = how.h or default_size(method.family.scene.body)
-        shared = kept_together(method.family, size, how.tolerance, how.solver)
-        f, a = lines_of(shared, scene.body)
-        a = a * (scene.pressure.peak_pressure / method.family.scene.pressure.peak_pressure)
-    elif method.family:
+        shape, (f, a) = _mapped(scene, method)
+    elif family and together:
+        size = how.h or default_size(family.scene.body)
+        f, a = lines_of(kept_together(family, size, how.tolerance, how.solver), scene.body)
+        a = a * (scene.pressure.peak_pressure / family.scene.pressure.peak_pressure)
+    elif family:
         own = prepare(
             scene.body, scene.probe_points, h=how.h, solver=how.solver,
             tolerance=reduction_tolerance(how.tolerance), reading=scene.reading, load=scene.load,
@@ -327,34 +327,35 @@ def solve(scene: Scene, method: Method, *, together: bool = True) -> Solution:
         return _computed(scene, method)
     f, a = f[f > 0], a[f > 0]
     p = len(scene.probes)
-    rms, levels = np.sqrt((np.abs(a) ** 2).sum(axis=0) / 2), _highest(f, np.abs(a))
+    rms, levels = np.sqrt((np.abs(a) ** 2).sum(axis=0) / 2), _highest_level(f, np.abs(a))
     return Solution(
         waveform=synthesise(f, a[:, :p], shown_times(scene)),
-        lines=_at(_frequencies(scene, method), f, np.abs(a[:, :p])), rms=rms[:p], level=levels[:p],
-        map_rms=rms[p:].reshape(of_map), map_level=levels[p:].reshape(of_map),
+        lines=_amplitudes_at(_frequencies(scene, method), f, np.abs(a[:, :p])),
+        rms=rms[:p], level=levels[:p],
+        map_rms=rms[p:].reshape(shape), map_level=levels[p:].reshape(shape),
     )  # fmt: skip
 
 
 def _mapped(scene: Scene, method: Method) -> tuple[tuple[int, int], tuple[Floats, Complex]]:
-    """Shape of the map; lines by the wavenumber integral, at the probes and then on the map."""
+    """Return the shape of the map, and lines by the wavenumber integral at probes and map."""
     x, y = map_axes(scene)
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     points, waves = np.vstack([scene.probe_points, places]), compliance(scene.body)
     if method.same_load:
         operator = _operator(scene.pressure, tuple(map(tuple, points.tolist())))
         return (len(y), len(x)), operator(waves)
-    return (len(y), len(x)), steady_lines(waves, scene.pressure, points, threshold=FAINT)
+    return (len(y), len(x)), steady_lines(waves, scene.pressure, points, threshold=NEGLIGIBLE_LINE)
 
 
 @lru_cache(maxsize=2)
 def _operator(
     pressure: MovingPressure, points: tuple[tuple[float, ...], ...]
 ) -> Callable[[Compliance], tuple[Floats, Complex]]:
-    return path_operator(pressure, points, threshold=FAINT)
+    return path_operator(pressure, points, threshold=NEGLIGIBLE_LINE)
 
 
 def _computed(scene: Scene, method: Method) -> Solution:
-    """Solution by a model, at the probes."""
+    """Solve one sample by a model, at the probes."""
     how = method.options
     response = compute(scene, how.model, tolerance=how.tolerance, h=how.h, solver=how.solver)
     settled = response.values[int(SETTLE * len(response.times)) :]
@@ -362,24 +363,24 @@ def _computed(scene: Scene, method: Method) -> Solution:
     frequencies, no_map = _frequencies(scene, method), np.zeros((0, 0))
     lines = np.abs(phasors(response, frequencies)) * (frequencies > 0)[:, None]
     return Solution(
-        waveform=motion, lines=lines, rms=settled.std(axis=0), level=_highest(frequencies, lines),
-        map_rms=no_map, map_level=no_map,
+        waveform=motion, lines=lines, rms=settled.std(axis=0),
+        level=_highest_level(frequencies, lines), map_rms=no_map, map_level=no_map,
     )  # fmt: skip
 
 
 def _frequencies(scene: Scene, method: Method) -> Floats:
-    """Frequencies (f,) in Hz of the named lines, 0 of one that a sample has not."""
+    """Return the frequencies (f,) in Hz of the named lines, 0 for a line that a sample has not."""
     return np.array([line_frequency(scene.tacton, name) or 0.0 for name in method.lines])
 
 
-def _at(frequencies: Floats, f: Floats, amplitudes: Floats) -> Floats:
-    """Amplitudes (g, p) at frequencies (g,) of lines at f (f,), which are 0 where there is none."""
+def _amplitudes_at(frequencies: Floats, f: Floats, amplitudes: Floats) -> Floats:
+    """Return amplitudes (g, p) at frequencies (g,), given those of lines at f (f,); 0 elsewhere."""
     near = np.abs(f - frequencies[:, None]) < 1e-6 * np.maximum(frequencies, 1.0)[:, None]
-    found = near @ amplitudes
-    return np.where(found > ROUND_OFF * found.max(initial=0.0), found, 0.0)
+    values = near @ amplitudes
+    return np.where(values > ROUND_OFF * values.max(initial=0.0), values, 0.0)
 
 
-def _highest(frequencies: Floats, amplitudes: Floats) -> Floats:
-    """The highest sensation level (p,) in dB of lines (f, p)."""
+def _highest_level(frequencies: Floats, amplitudes: Floats) -> Floats:
+    """Return the highest sensation level (p,) in dB of lines (f, p)."""
     levels = sensation_level(amplitudes, np.asarray(frequencies)[:, None])
     return np.asarray(np.maximum(levels.max(axis=0, initial=-np.inf), SILENT))

@@ -1,4 +1,4 @@
-"""Sweeps of a scene in Python: the table that the command line writes, as an object."""
+"""Sweeps of a scene in Python: the table of the command line as an object."""
 
 from __future__ import annotations
 
@@ -30,17 +30,28 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-SHOWN = 20  # rows in a small table
-RESULTS = ("peak_um", "rms_um", "level_db", "expected_error")  # shown beside what is varied
+MOST_ROWS = 20  # in a notebook
+RESULTS = ("peak_um", "rms_um", "level_db", "expected_error")  # columns in a notebook
 
 Values = Sequence[float | str] | str
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SweepTable:
-    """Table of a sweep: `rows` in the order of the design, each by the names of its columns, with a
-    list in it for what is told at every probe; the keys that were `varied`; and the error of each
-    run that has none.
+    """Table of a sweep.
+
+    Parameters
+    ----------
+    rows : a mapping by column for each run, in the order of the design; a cell with a value for
+        each probe is a list
+    varied : keys that were varied
+
+    >>> rows = [{"tacton.size_mm": d, "status": "done", "peak_um": [d / 2]} for d in (8, 10)]
+    >>> table = SweepTable(rows=tuple(rows), varied=("tacton.size_mm",))
+    >>> table
+    <SweepTable: 2 runs over tacton.size_mm; 3 columns>
+    >>> table["peak_um"]
+    [[4.0], [5.0]]
     """
 
     rows: tuple[Mapping[str, Any], ...]
@@ -56,23 +67,25 @@ class SweepTable:
 
     @property
     def failed(self) -> tuple[str, ...]:
-        """Error of each run that has no response."""
+        """Error of each failed run."""
         return tuple(row["error"] for row in self.rows if row["status"] != "done")
 
     def __getitem__(self, column: str) -> list[Any]:
-        """The entries of a column, one a run; raises a ValueError if there is none of that name."""
+        """Return the cell of each run in a column; raise a ValueError for an unknown column."""
         choose("column", column, self.columns)
         return [row.get(column) for row in self.rows]
 
     def to_pandas(self) -> pd.DataFrame:
-        """The table with a row for each run; lists are entries, units end the names of columns."""
+        """Return a data frame with a row for each run; column names end with their unit."""
         return library("pandas").DataFrame([dict(row) for row in self.rows])
 
     def plot(
         self, column: str = "peak_um", x: str = "", by: str = "", *, ax: Axes | None = None
     ) -> Axes:
-        """Draw a column over a key, with a curve for each value of another; those that were varied
-        if they are not given. Of what is told at every probe the largest, or that of "peak_um[2]".
+        """Draw a column over key `x`, with a curve for each value of key `by`.
+
+        The keys are the varied ones by default. The column shows its largest value over the probes,
+        or that of one probe, as in "peak_um[2]".
         """
         choose("column", column.partition("[")[0], self.columns)
         x = x or self.varied[0]
@@ -83,15 +96,15 @@ class SweepTable:
         return ax
 
     def __repr__(self) -> str:
-        said = f"{counted(len(self), 'run')} over {', '.join(self.varied)}"
-        said += f"; {len(self.columns)} columns"
-        return f"<SweepTable: {said}{f', {len(self.failed)} failed' * bool(self.failed)}>"
+        text = f"{counted(len(self), 'run')} over {', '.join(self.varied)}"
+        text += f"; {len(self.columns)} columns"
+        return f"<SweepTable: {text}{f', {len(self.failed)} failed' * bool(self.failed)}>"
 
     def _repr_html_(self) -> str:
         names = [*self.varied, *(name for name in RESULTS if name in self.columns)]
         rows = [
             [shown(row.get(name) if name in self.varied else value(row, name)) for name in names]
-            for row in self.rows[:SHOWN]
+            for row in self.rows[:MOST_ROWS]
         ]
         image = b""
         if len(self.failed) < len(self):
@@ -111,24 +124,24 @@ def sweep(
     seed: int = 0,
     **options: Any,
 ) -> SweepTable:
-    """Simulate a scene with other values of keys of its file, each body reduced once.
+    """Simulate a scene with other values of keys of its file; each body is reduced once.
 
     A run that fails is a row with its error.
 
     Parameters
     ----------
     scene : Scene
-    vary : by key, such as "tacton.speed_m_per_s": values, or text as `--vary` of the command takes
-        it, "1:12:12" or "normal(25e3,0.3)"
+    vary : values by key, such as "tacton.speed_m_per_s"; or text as for `--vary` of the command,
+        "1:12:12" or "normal(25e3,0.3)"
     design : "factorial", every value with every other; "zip", first with first; "lhs" or "sobol"
-    samples : int, runs of "lhs", rows of each matrix of "sobol"
+    samples : int, runs of "lhs", or rows of each matrix of "sobol"
     seed : int, of the samples
     **options
-        Model, tolerance, h and solver of every run, as for `skinwave.simulate`; the `folder` where
-        rows are kept and an interrupted sweep is resumed; the `scheduler`, "threads", "processes"
-        (of a script with a main guard), or the address of a Dask scheduler; `workers`, how many
-        runs go on at a time on this machine; `progress`, True for a bar, or called with the name
-        of the phase and the fraction done.
+        model, tolerance, h and solver of every run, as for `skinwave.simulate`; `folder`, which
+        keeps the rows, so that an interrupted sweep resumes; `scheduler`, "threads", "processes"
+        (a script needs a main guard), or the address of a Dask scheduler; `workers`, the number of
+        runs at a time on this machine; `progress`, True for a bar, or a function of the name of the
+        phase and the fraction done.
 
     Returns
     -------
@@ -137,11 +150,19 @@ def sweep(
     Raises
     ------
     ValueError
-        If a key or a value is none of a scene, or the extra "sweep" is not installed.
+        If a key or a value does not belong to a scene, or the extra "sweep" is not installed.
+
+    Examples
+    --------
+    >>> import skinwave
+    >>> scene = skinwave.loads("[body]\\nkind = 'none'\\n[tacton]\\nduration_s = 0.05")
+    >>> table = skinwave.sweep(scene, {"focus.peak_pressure_pa": [20, 50]})
+    >>> [round(p[0], 1) for p in table["kernel_peak_pa"]]
+    [20.0, 50.0]
     """
     variations = [_variation(key, values) for key, values in vary.items()]
     combined = combinations(variations, design, samples, seed)
-    with _made(scene, **options) as made:
+    with _sweep_of(scene, **options) as made:
         points = made.points(combined)
         if made.run(points).interrupted:
             raise KeyboardInterrupt
@@ -165,28 +186,37 @@ def best_value(
     scene : Scene
     vary : one key and three or more of its numbers, as for `sweep`
     column : of the table, such as "level_db[0]"; without an index, the largest over the probes
-    samples : int, of the spreads of the scene, for the interval; 199 if not given
+    samples : int, samples of the spreads of the scene for the interval; 199 by default
     seed : int, of the samples
     **options
         As for `sweep`.
 
     Returns
     -------
-    Best, whose `interval` holds the best values of 95 % of the samples
+    Best, whose `interval` contains the best values of 95 % of the samples
 
     Raises
     ------
     ValueError
-        If several keys vary, their values are not numbers, there is no such column of numbers, or
-        as `sweep` does.
+        If several keys vary, their values are not numbers, the column has no numbers, or as for
+        `sweep`.
+
+    Examples
+    --------
+    >>> import skinwave
+    >>> scene = skinwave.loads("[body]\\nkind = 'none'\\n[tacton]\\nduration_s = 0.05")
+    >>> vary = {"focus.peak_pressure_pa": [20, 35, 50]}
+    >>> best = skinwave.best_value(scene, vary, "kernel_peak_pa")
+    >>> best.value, best.is_at_end
+    (50.0, True)
     """
-    varied = best.check([_variation(key, values) for key, values in vary.items()], samples)
-    with _made(scene, **options) as made:
-        return best.best_value(made, varied, column, samples, seed)
+    grid = best.check([_variation(key, values) for key, values in vary.items()], samples)
+    with _sweep_of(scene, **options) as made:
+        return best.find_best(made, grid, column, samples, seed)
 
 
 @contextmanager
-def _made(
+def _sweep_of(
     scene: Scene,
     *,
     model: str = "auto",
@@ -198,12 +228,12 @@ def _made(
     workers: int | None = None,
     progress: Progress | bool | None = None,
 ) -> Iterator[Sweep]:
-    """The sweep of options, in a folder that is removed if none is given."""
+    """Yield the sweep of some options; without a folder, a temporary one."""
     table = tomllib.loads(dumps(scene))
     options = SolveOptions(model=model, tolerance=tolerance, h=h, solver=solver)
-    with reported(progress) as report, tempfile.TemporaryDirectory() as own:
+    with reported(progress) as report, tempfile.TemporaryDirectory() as temporary:
         yield Sweep(
-            folder=Path(own) / "sweep" if folder is None else Path(folder),
+            folder=Path(temporary) / "sweep" if folder is None else Path(folder),
             points=partial(cases_of, table, table), options=options, progress=report,
             scheduler=scheduler, workers=workers,
         )  # fmt: skip
@@ -212,7 +242,7 @@ def _made(
 def _variation(key: str, values: Values) -> Variation:
     if isinstance(values, str):
         return parse(f"{key}={values}")
-    checked = parse(f"{key}=0")  # which refuses an unknown key
+    checked = parse(f"{key}=0")  # raises for an unknown key
     # Numbers of numpy as a file has them.
     plain = (value.item() if hasattr(value, "item") else value for value in values)
     return Choice(key=checked.key, values=tuple(plain))

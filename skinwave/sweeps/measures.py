@@ -1,4 +1,4 @@
-"""One row of a sweep: what was commanded, what came out of it, and what that cost."""
+"""Columns of one row of a sweep: its inputs, its results and their cost."""
 
 from dataclasses import replace
 from typing import Any
@@ -13,37 +13,41 @@ from skinwave.results.run import ASSESSED, SUPPORT, Run
 from skinwave.scene.scene import Scene
 from skinwave.scene.variation import DesignPoint
 
-WEAKEST, MOST = 1e-2, 40  # of the strongest line of a load, and lines, that have columns
-SETTLE = 0.25  # of a response, before which it is not looked at
+WEAKEST_LINE = 1e-2  # of the strongest line of the load: weaker ones have no columns
+MOST_LINES = 40  # with columns
+SETTLE = 0.25  # part of a response that is left out of its largest value
+COST = ("dofs", "reduced_dofs", "steps", "solver", "energy_imbalance", "radiated")
 
 
-def commanded(case: DesignPoint) -> dict[str, Any]:
-    """The part of a row that is known before the run."""
-    row: dict[str, Any] = {"status": "failed", "error": case.error, "scene": case.text, **case.keys}
-    if case.scene:
-        body = case.scene.body
+def input_columns(point: DesignPoint) -> dict[str, Any]:
+    """Return the columns of a row that are known before its run."""
+    row: dict[str, Any] = {
+        "status": "failed", "error": point.error, "scene": point.text, **point.keys
+    }  # fmt: skip
+    if point.scene:
+        body = point.scene.body
         row |= {
-            "name": case.scene.name,
-            "drawing_frequency_hz": case.scene.tacton.drawing_frequency,
-            "probe_x_mm": [1e3 * x for x, _ in case.scene.probes],
-            "probe_y_mm": [1e3 * y for _, y in case.scene.probes],
+            "name": point.scene.name,
+            "drawing_frequency_hz": point.scene.tacton.drawing_frequency,
+            "probe_x_mm": [1e3 * x for x, _ in point.scene.probes],
+            "probe_y_mm": [1e3 * y for _, y in point.scene.probes],
         }
         if body.is_solid:
             row["rayleigh_speed_m_per_s"] = body.solid.rayleigh_speed
     return row
 
 
-def measured(scene: Scene, response: Response) -> dict[str, Any]:
-    """Columns of a row that a response gives: its amplitudes, comparison with the kernel, cost.
+def result_columns(scene: Scene, response: Response) -> dict[str, Any]:
+    """Return the columns of a response: amplitudes, agreement with the point kernel, and cost.
 
-    Lines with columns are the strongest of the load, those that claims are about, and that of a
-    support that moves.
+    Lines with columns are the strongest of the load, those of the claims, and that of a moving
+    support.
     """
     kernel, of_body = response, response.record.of_body
     if of_body:
         kernel = point_kernel(scene.pressure, scene.probe_points, sample_times(scene))
     run = Run(tacton=scene.name, body=scene.body.kind, scene=scene, response=response)
-    agreement, per = compare(kernel, response), response.record.per_unit
+    agreement, scale = compare(kernel, response), response.record.per_unit
     unit = unit_of(response.record)
     row: dict[str, Any] = {
         "status": "done", "model": response.model,
@@ -52,10 +56,10 @@ def measured(scene: Scene, response: Response) -> dict[str, Any]:
         "kernel_delay_ms": 1e3 * agreement.delay,
         "kernel_spread_6db_mm": 1e3 * agreement.spread_reference[-6],
         "kernel_spread_20db_mm": 1e3 * agreement.spread_reference[-20],
-    } | _effort(response.effort)  # fmt: skip
+    } | _cost(response.effort)  # fmt: skip
     if of_body:
         row |= {
-            f"peak_{unit}": per * _peak(response), f"rms_{unit}": per * moving_rms(response),
+            f"peak_{unit}": scale * _peak(response), f"rms_{unit}": scale * moving_rms(response),
             "spread_6db_mm": 1e3 * agreement.spread_candidate[-6],
             "spread_20db_mm": 1e3 * agreement.spread_candidate[-20],
         }  # fmt: skip
@@ -65,33 +69,32 @@ def measured(scene: Scene, response: Response) -> dict[str, Any]:
     if levels and not run.unresolved:
         row["level_db"] = np.max(list(levels.values()), axis=0)
         row["sensation_line"] = max(levels, key=lambda name: levels[name].max())
-    published = replace(run, response=kernel).lines if of_body else run.lines
-    strong = named_lines(scene.pressure, WEAKEST, most=MOST, candidates=ASSESSED)
+    kernel_lines = replace(run, response=kernel).lines if of_body else run.lines
+    strong = named_lines(scene.pressure, WEAKEST_LINE, most=MOST_LINES, candidates=ASSESSED)
     for name in (name for name in run.lines if name in {*strong, SUPPORT}):
         row[f"{name}_hz"] = run.frequencies[name]
-        if name in published:
-            row[f"{name}_kernel_pa"] = published[name]
+        if name in kernel_lines:
+            pressure = row[f"{name}_kernel_pa"] = kernel_lines[name]
             with np.errstate(divide="ignore", invalid="ignore"):
-                row[f"{name}_ratio"] = abs(agreement.scale) * run.lines[name] / published[name]
-        row |= {f"{name}_{unit}": per * run.lines[name]} if of_body else {}
+                row[f"{name}_ratio"] = abs(agreement.scale) * run.lines[name] / pressure
+        row |= {f"{name}_{unit}": scale * run.lines[name]} if of_body else {}
         row |= {f"{name}_db": levels[name]} if levels else {}
     return plain(row)
 
 
 def plain(row: dict[str, Any]) -> dict[str, Any]:
-    """A row whose arrays are lists, as a table has them."""
+    """Convert the arrays of a row to lists."""
     return {name: x.tolist() if isinstance(x, np.ndarray | np.generic) else x
             for name, x in row.items()}  # fmt: skip
 
 
 def unit_of(record: Quantity) -> str:
-    """The end of columns of a quantity, which is its unit."""
+    """Return the unit at the end of the column names of a quantity."""
     return "um" if record is DISPLACEMENT else record.column
 
 
-def _effort(effort: Effort) -> dict[str, Any]:
-    same = ("dofs", "reduced_dofs", "steps", "solver", "energy_imbalance", "radiated")
-    return {name: getattr(effort, name) for name in same} | {
+def _cost(effort: Effort) -> dict[str, Any]:
+    return {name: getattr(effort, name) for name in COST} | {
         "reduction_error": effort.estimate,
         "peak_memory_gib": effort.peak_memory / 2**30,
         "warnings": "; ".join(effort.warnings),
@@ -99,5 +102,5 @@ def _effort(effort: Effort) -> dict[str, Any]:
 
 
 def _peak(response: Response) -> Any:
-    kept = response.values[int(SETTLE * len(response.times)) :]
-    return np.abs(kept).max(axis=0)
+    settled = response.values[int(SETTLE * len(response.times)) :]
+    return np.abs(settled).max(axis=0)

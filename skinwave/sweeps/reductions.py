@@ -1,8 +1,8 @@
-"""Reductions that runs of a sweep share: each body once, and families of bodies together.
+"""Reductions that runs of a sweep share: one for each body, or one for a family of bodies.
 
-Bodies that differ in materials and thicknesses alone are a family, which one reduced-order model
-serves (`models.covering`). Each reduction is on two meshes, by which the error of a run is
-estimated.
+The bodies of a family differ only in materials and thicknesses, so that one reduced-order model
+serves them (`models.covering`). Each reduction is made on two meshes, which give the error of a
+run.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -27,23 +27,25 @@ from skinwave.scene.scene import Body, Load, Reading, Scene
 from skinwave.scene.variation import DesignPoint
 from skinwave.system.effort import Progress
 
-PER_WORKER = 3  # bodies of a family: of fewer, workers that take one each are done sooner
-KEPT = 4  # bodies that a worker caches in memory, on two meshes each
-AUDIBLE = 1e-2  # of the strongest line of a load: weaker ones make no scene harder
+PER_WORKER = 3  # least bodies of a family: fewer are faster alone, one on each worker
+CACHED = 4  # bodies that a worker caches in memory, on two meshes each
+NEGLIGIBLE_LINE = 1e-2  # of the strongest line of a load: weaker ones need no finer mesh
 ROUND_OFF = 1e-9  # of a length
 
-# A body, its probes, what they read, and what pushes it: what a reduction is of.
+# The subject of a reduction: a body, its probes, their reading, and its load.
 Solid = tuple[Body, tuple[tuple[float, float], ...], Reading, Load]
 Values = tuple[tuple[str, float], ...]  # of free keys
 Families = list[tuple[Covering, dict[Solid, Values]]]  # each with the values of its bodies
-Spread = Callable[[Callable[[Any], Any], Sequence[Any], Callable[[int, Any], None]], None]
+Limits = Mapping[str, tuple[float, float]]  # least and largest value by key
+Distribute = Callable[[Callable[[Any], Any], Sequence[Any], Callable[[int, Any], None]], None]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Mesh:
-    """The element size in metre that runs share, that of the `coarser` mesh by which the error of
-    each is estimated, or the `error` why there is none; and the `family`, if its bodies are reduced
-    together, the body that is `meshed`, and the `values` of the one that runs are on.
+    """Element sizes in metre of the two meshes of a reduction: `h` of its runs, and `coarser` for
+    their error; or the `error` of making them.
+
+    For a body of a `family`, also the body that is `meshed`, and the `values` of its free keys.
     """
 
     h: float = 0.0
@@ -54,17 +56,17 @@ class Mesh:
     values: Values = ()
 
 
-LOST = Mesh(error="its worker was killed each time; give it more memory or larger elements")
+KILLED = Mesh(error="each worker was killed; provide more memory, or use larger elements")
 
 
-def model_of(scene: Scene, asked: str) -> str:
-    """The model of a scene: as asked, or the cheapest that leaves nothing out.
+def model_of(scene: Scene, model: str) -> str:
+    """Return the model of a scene; for "auto" the cheapest that includes all of its physics.
 
     That is the point kernel without a body, the wavenumber integral for a flat body whose sides
-    reflect nothing, and else finite elements.
+    reflect nothing, and otherwise finite elements.
     """
-    if asked != "auto":
-        return asked
+    if model != "auto":
+        return model
     if not scene.body.of_kind.discretise:
         return "point-kernel"
     is_exact = is_flat_layer(scene.body) and is_laterally_infinite(scene.body)
@@ -72,7 +74,7 @@ def model_of(scene: Scene, asked: str) -> str:
 
 
 def solid_of_run(point: DesignPoint, options: SolveOptions) -> Solid | None:
-    """Body and probes by which a run shares a reduced body with others, if it does."""
+    """Return the subject of the reduction of a run; None if its model has none."""
     scene = point.scene
     if (
         scene is None
@@ -84,7 +86,7 @@ def solid_of_run(point: DesignPoint, options: SolveOptions) -> Solid | None:
 
 
 def solid_of(scene: Scene) -> Solid:
-    """What a reduction is of."""
+    """Return the subject of the reduction of a scene."""
     return scene.body, scene.probes, scene.reading, scene.load
 
 
@@ -92,75 +94,79 @@ def shared_meshes(
     runs: Iterable[DesignPoint],
     options: SolveOptions,
     count: int,
-    spread: Spread,
+    distribute: Distribute,
     progress: Progress,
 ) -> dict[Solid, Mesh]:
-    """Mesh of each body that runs share, reduced once; families of bodies together, where they can
-    be. `spread` calls a function of items on `count` workers.
+    """Reduce each body of the runs once, families of bodies together, and return their meshes.
+
+    `distribute` calls a function of items on `count` workers.
     """
     progress("reduce bodies", 0.0)
     hardest: dict[Solid, DesignPoint] = {}
-    for point in sorted(runs, key=_highest, reverse=True):
+    for point in sorted(runs, key=_highest_line, reverse=True):
         if solid := solid_of_run(point, options):
             hardest.setdefault(solid, point)
 
-    def meshes(work: Callable[..., Mesh], items: Sequence[Any]) -> list[Mesh]:
-        found: dict[int, Mesh] = {}
+    def meshes_of(work: Callable[..., Mesh], items: Sequence[Any]) -> list[Mesh]:
+        made: dict[int, Mesh] = {}
 
         def done(k: int, mesh: Mesh) -> None:
-            found[k] = mesh
-            progress("reduce bodies", len(found) / len(items))
+            made[k] = mesh
+            progress("reduce bodies", len(made) / len(items))
 
-        spread(partial(_tried, work, options), items, done)
-        return [found.get(k, LOST) for k in range(len(items))]
+        distribute(partial(_mesh_or_error, work, options), items, done)
+        return [made.get(k, KILLED) for k in range(len(items))]
 
-    shared = families(hardest, options.tolerance, count)
-    found = {
+    together = families(hardest, options.tolerance, count)
+    family_meshes = meshes_of(mesh_of_family, [family for family, _ in together])
+    meshes = {
         solid: replace(mesh, values=values)
-        for (_, members), mesh in zip(
-            shared, meshes(mesh_of_family, [family for family, _ in shared]), strict=True
-        )
+        for (_, members), mesh in zip(together, family_meshes, strict=True)
         for solid, values in members.items()
         if not mesh.error
     }
-    alone = {solid: point.scene for solid, point in hardest.items() if solid not in found}
-    return found | dict(zip(alone, meshes(mesh_of_body, list(alone.values())), strict=True))
+    alone = {solid: point.scene for solid, point in hardest.items() if solid not in meshes}
+    own_meshes = meshes_of(mesh_of_body, list(alone.values()))
+    return meshes | dict(zip(alone, own_meshes, strict=True))
 
 
-def _highest(point: DesignPoint) -> float:
-    """The highest line in Hz of a load that is above -40 dB of its strongest."""
+def _highest_line(point: DesignPoint) -> float:
+    """Return the highest line in Hz of a load that is not negligible."""
     assert point.scene
-    return max(named_lines(point.scene.pressure, AUDIBLE).values(), default=0.0)
+    return max(named_lines(point.scene.pressure, NEGLIGIBLE_LINE).values(), default=0.0)
 
 
-def _tried(work: Callable[[SolveOptions, Any], Mesh], options: SolveOptions, item: Any) -> Mesh:
-    """Mesh of a body or a family, or the error why there is none, which is that of every run."""
+def _mesh_or_error(
+    work: Callable[[SolveOptions, Any], Mesh], options: SolveOptions, item: Any
+) -> Mesh:
+    """Return the mesh of a body or a family, or the error of every run on it."""
     try:
         return work(options, item)
     except Exception as error:
-        return Mesh(error=said(error))
+        return Mesh(error=error_text(error))
 
 
-def said(error: Exception) -> str:
-    """An error as an entry of the table; its kind, too, where it is not a refusal."""
+def error_text(error: Exception) -> str:
+    """Return an error as an entry of the table, with its type unless it is a message to users."""
     text = " ".join(str(error).split())
-    refusal = isinstance(error, ValueError | ArithmeticError) and text
-    return text if refusal else f"{type(error).__name__}: {text}"
+    is_message = isinstance(error, ValueError | ArithmeticError) and text
+    return text if is_message else f"{type(error).__name__}: {text}"
 
 
 def mesh_of_body(options: SolveOptions, scene: Scene) -> Mesh:
-    """The mesh that the hardest scene of a body requires; cached on disk for all workers."""
+    """Reduce a body on the mesh that its hardest scene needs, cached on disk for all workers."""
     if not options.h:
-        found = refined(scene, scene.body, options)
-        return Mesh(h=found.h, coarser=found.compared)
-    _both(solid_of(scene), options, Mesh(h=options.h, coarser=options.h))  # refuses what has none
+        pair = refined(scene, scene.body, options)
+        return Mesh(h=pair.h, coarser=pair.compared)
+    # Raises the error of the given size before that of the coarser mesh.
+    _reduced_twice(solid_of(scene), options, Mesh(h=options.h, coarser=options.h))
     mesh = Mesh(h=options.h, coarser=compared_with(scene.body, options.h))
-    _both(solid_of(scene), options, mesh)
+    _reduced_twice(solid_of(scene), options, mesh)
     return mesh
 
 
 def mesh_of_family(options: SolveOptions, family: Covering) -> Mesh:
-    """Mesh of a family: of the size that is asked for, or that its hardest scene requires; raises a
+    """Reduce a family on the mesh that its hardest scene needs, unless its size is given; raise a
     ValueError if its bodies cannot be reduced together.
     """
     size = options.h or refined(family.scene, family.hardest, options).h
@@ -172,35 +178,36 @@ def mesh_of_family(options: SolveOptions, family: Covering) -> Mesh:
 
 
 def on_mesh(scene: Scene, options: SolveOptions, mesh: Mesh) -> tuple[Response, Mesh]:
-    """Response of a reduced body, with its expected relative error, and the mesh that it is on: the
-    body's own where that of its family is too coarse.
+    """Return the response of a reduced body with its expected error, and the mesh.
+
+    If the mesh of its family is too coarse for a run, the run gets a mesh of its own.
     """
     if mesh.error:
         raise ValueError(mesh.error)
-    fine, coarse = _both(solid_of(scene), options, mesh)
+    fine, coarse = _reduced_twice(solid_of(scene), options, mesh)
     how = SolveOptions(tolerance=options.tolerance, h=mesh.h, solver=options.solver)
     response = assessed(
         scene, answer(fine, scene), fine, how, compared=(mesh.coarser, coarse), meshed=mesh.meshed
     )
     is_shared = mesh.family and not options.h
     if is_shared and response.expected_error > options.tolerance:
-        return on_mesh(scene, options, _tried(mesh_of_body, options, scene))
+        return on_mesh(scene, options, _mesh_or_error(mesh_of_body, options, scene))
     return response, mesh
 
 
-def _both(solid: Solid, options: SolveOptions, mesh: Mesh) -> list[ReducedBody]:
-    """Reduced body of runs on both meshes."""
+def _reduced_twice(solid: Solid, options: SolveOptions, mesh: Mesh) -> list[ReducedBody]:
+    """Return the reduced body on both meshes."""
     return [
         prepared(solid, h, options.tolerance, options.solver, mesh.family, mesh.values)
         for h in (mesh.h, mesh.coarser)
     ]
 
 
-@lru_cache(maxsize=2 * KEPT)  # a worker meets the same bodies again and again
+@lru_cache(maxsize=2 * CACHED)
 def prepared(
     solid: Solid, h: float, tolerance: float, solver: str, family: Covering | None, values: Values
 ) -> ReducedBody:
-    """Reduced body with elements of h in metre; of a family the one with these values."""
+    """Return a reduced body with elements of h in metre; in a family, the one with these values."""
     if family:
         return parametric.at(kept_together(family, h, tolerance, solver), dict(values))
     body, probes, reading, load = solid
@@ -211,17 +218,18 @@ def prepared(
 
 
 def families(hardest: Mapping[Solid, DesignPoint], tolerance: float, workers: int = 1) -> Families:
-    """Families of bodies, each with the run of the highest line, and the values of their bodies: of
-    many thicknesses where these pay, else of one each.
+    """Group bodies into families, given the run with the highest line of each body.
+
+    A family has many thicknesses if this pays, and otherwise one.
     """
     found: Families = []
     for moving in (True, False):
         shared = {solid for _, members in found for solid in members}
+        remaining = {solid: point for solid, point in hardest.items() if solid not in shared}
+        limits = _limits(remaining.values())
         groups: dict[tuple[Any, ...], dict[Solid, DesignPoint]] = {}
-        left = {solid: point for solid, point in hardest.items() if solid not in shared}
-        limits = _limits(left.values())
-        for solid, point in left.items():
-            if keys := _free(solid[0], point, limits, moving=moving):
+        for solid, point in remaining.items():
+            if keys := _free_keys_of(solid[0], point, limits, moving=moving):
                 assert point.before
                 rest = with_values(point.before.body, keys, {key.key: key.low for key in keys})
                 groups.setdefault((keys, rest, *solid[1:]), {})[solid] = point
@@ -231,28 +239,29 @@ def families(hardest: Mapping[Solid, DesignPoint], tolerance: float, workers: in
     return found
 
 
-def _limits(points: Iterable[DesignPoint]) -> dict[str, tuple[float, float]]:
-    """Least and largest values of numbers of a body that are varied."""
-    found: dict[str, set[float]] = {}
+def _limits(points: Iterable[DesignPoint]) -> Limits:
+    """Return the least and the largest value of each varied number of a body."""
+    values: dict[str, set[float]] = {}
     for point in points:
         for key, value in point.varied.items():
             is_number = isinstance(value, int | float) and not isinstance(value, bool)
             if key.startswith("body.") and is_number:
-                found.setdefault(key, set()).add(float(value))
-    return {key: (min(each), max(each)) for key, each in found.items() if len(each) > 1}
+                values.setdefault(key, set()).add(float(value))
+    return {key: (min(each), max(each)) for key, each in values.items() if len(each) > 1}
 
 
-def _free(
-    body: Body, point: DesignPoint, limits: Mapping[str, tuple[float, float]], *, moving: bool
+def _free_keys_of(
+    body: Body, point: DesignPoint, limits: Limits, *, moving: bool
 ) -> tuple[FreeKey, ...]:
-    """Varied keys that can be free of what a body is before factors on its materials, those that
-    move a mesh only if they may; none if the body is not as they say.
+    """Return the varied keys that can be free in a family, with those that move a mesh if `moving`.
+
+    There are none if the keys do not describe the body completely.
     """
     if not point.before:
         return ()
     before = point.before.body
 
-    def accepted(free: Mapping[str, tuple[float, float]]) -> tuple[FreeKey, ...]:
+    def accepted(free: Limits) -> tuple[FreeKey, ...]:
         try:
             return free_keys(before, free)
         except ValueError:
@@ -270,12 +279,12 @@ def _free(
 def _family(
     members: Mapping[Solid, DesignPoint], keys: Sequence[FreeKey], tolerance: float
 ) -> Families:
-    """The family of bodies that differ in keys, if they can be reduced together."""
+    """Return the family of bodies that differ in keys, if they can be reduced together."""
     limits = _limits(members.values())
     fixed = [key.key for key in keys if key.is_scale and key.key not in limits]
     keys = [key for key in keys if key.key in limits]
     hardest = max(members.values(), key=_waves_per_metre)
-    # A factor that all share is not free, and a scene before factors lacks it.
+    # A factor that all bodies share is not free, and the scene before factors does not include it.
     if not (hardest.before and hardest.scene) or any(hardest.varied[key] != 1 for key in fixed):
         return []
     free = {key.key: limits[key.key] for key in keys}
@@ -285,9 +294,9 @@ def _family(
 
 
 def _waves_per_metre(point: DesignPoint) -> float:
-    """Of the highest line that counts, on the body as if it were infinite."""
+    """Return the inverse wavelength of the highest line on the body, without its sides."""
     assert point.scene
-    f, body = _highest(point), point.scene.body
+    f, body = _highest_line(point), point.scene.body
     return f / body.of_kind.wave_speed(body, f) if f else 0.0
 
 

@@ -1,4 +1,4 @@
-"""Parameter sweep: many scenes in one table, each body reduced once, each run once."""
+"""Parameter sweep: many scenes in one table. Each body is reduced once, and each scene run once."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -18,28 +18,28 @@ from skinwave.planning.simulate import compute, solve
 from skinwave.scene.scene import Scene
 from skinwave.scene.variation import DesignPoint
 from skinwave.sweeps import dataset, engine
-from skinwave.sweeps.measures import commanded, measured
+from skinwave.sweeps.measures import input_columns, result_columns
 from skinwave.sweeps.reductions import (
     Mesh,
     Solid,
+    error_text,
     model_of,
     on_mesh,
-    said,
     shared_meshes,
     solid_of_run,
 )
 from skinwave.system.effort import Progress, silent
 
-BATCH = 8  # runs of one body that are handed out together, at most
-Combined = Sequence[Mapping[str, Any]]  # values by key, of each run
+BATCH = 8  # most runs of one body that are handed out together
+Combinations = Sequence[Mapping[str, Any]]  # values by key, for each run
 
 
 @dataclass(frozen=True, kw_only=True)
 class SweepOutcome:
-    """Result of a sweep: rows `planned`, `found` there before, `done` and `failed` now."""
+    """Numbers of runs: `planned`, done `earlier`, and `done` or `failed` now."""
 
     planned: int
-    found: int
+    earlier: int
     done: int
     failed: int
     interrupted: bool
@@ -47,28 +47,28 @@ class SweepOutcome:
 
     @property
     def missing(self) -> int:
-        """Runs that are not in the table yet."""
-        return self.planned - self.found - self.done - self.failed
+        """Number of runs that are not in the table yet."""
+        return self.planned - self.earlier - self.done - self.failed
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sweep:
-    """Where and how combinations of values are run, each a point of a design.
+    """Folder, design and options of a sweep.
 
     Parameters
     ----------
-    folder : a new one, or that of a sweep, which is resumed
-    points : combinations of values -> the point of each
+    folder : a new folder, or that of an earlier sweep, which is resumed
+    points : function of combinations of values that returns the point of each
     options : model, tolerance, h and solver of all runs
     assessed : whether the error of runs without a mesh is estimated
     progress : called with the name of the phase and the fraction done
     scheduler : "processes", "threads", or the address of a Dask scheduler
-    workers : how many runs go on at a time on this machine; all cores if not given
-    command : what a new folder's record.json says of how it was made, as `record.of_command`
+    workers : number of runs at a time on this machine; all cores by default
+    command : entry in the record.json of a new folder, as of `record.of_command`
     """
 
     folder: Path
-    points: Callable[[Combined], list[DesignPoint]]
+    points: Callable[[Combinations], list[DesignPoint]]
     options: SolveOptions
     assessed: bool = True
     progress: Progress = silent
@@ -77,34 +77,34 @@ class Sweep:
     command: Mapping[str, Any] | None = None
 
     def run(self, points: Sequence[DesignPoint]) -> SweepOutcome:
-        """Run every point that the folder has no row of, and append a row for each.
+        """Run every point without a row in the folder, and append its row.
 
-        An interrupt ends it early; the rows that are written stay. An error of a run is its row.
+        Rows that are written survive an interrupt. A run that fails is a row with its error.
         """
         choose("model", self.options.model, ("auto", *names()))
         engine.check(self.scheduler)
-        count = engine.workers(self.scheduler, self.workers)
+        count = engine.worker_count(self.scheduler, self.workers)
         wanted = {self._name(point): point for point in points}
         with dataset.locked(dataset.open_folder(self.folder, self.command)):
-            return self._swept(wanted, count)
+            return self._run_missing(wanted, count)
 
     def rows(self, points: Sequence[DesignPoint]) -> list[dataset.Row]:
-        """The row of each point that has one."""
-        there = {row[dataset.KEY]: row for row in dataset.read(self.folder)}
-        found = (there.get(self._name(point)) for point in points)
-        return [row for row in found if row]
+        """Return the row of each point that has one."""
+        by_name = {row[dataset.KEY]: row for row in dataset.read(self.folder)}
+        rows = (by_name.get(self._name(point)) for point in points)
+        return [row for row in rows if row]
 
     def _name(self, point: DesignPoint) -> str:
-        """The name of a row, the same for the same scene and options."""
+        """Return the name of a row, which depends on the scene and the options."""
         how = self.options
         return point.name(
             version("skinwave"), how.model, how.tolerance, how.h, how.solver, self.assessed
         )
 
-    def _swept(self, wanted: Mapping[str, DesignPoint], count: int) -> SweepOutcome:
-        started, there = time.perf_counter(), dataset.names(self.folder)
-        left = {name: point for name, point in wanted.items() if name not in there}
-        index = dataset.numbered(wanted, there)
+    def _run_missing(self, wanted: Mapping[str, DesignPoint], count: int) -> SweepOutcome:
+        started, earlier = time.perf_counter(), dataset.names(self.folder)
+        missing = {name: point for name, point in wanted.items() if name not in earlier}
+        index = dataset.numbered(wanted, earlier)
         tally = {"done": 0, "failed": 0}
         constant = {
             "version": version("skinwave"), "asked_model": self.options.model,
@@ -112,52 +112,57 @@ class Sweep:
             "asked_h_mm": 1e3 * self.options.h if self.options.h else None,
         }  # fmt: skip
 
-        def written(rows: Sequence[dict[str, Any]]) -> None:
+        def write(rows: Sequence[dict[str, Any]]) -> None:
             if rows:
                 numbered = [{"index": index[row["key"]]} | constant | row for row in rows]
                 dataset.append(self.folder, numbered)
             for row in rows:
                 tally[row["status"]] += 1
-            self.progress("run", (len(wanted) - len(left) + sum(tally.values())) / len(wanted))
+            finished = len(wanted) - len(missing) + sum(tally.values())
+            self.progress("run", finished / len(wanted))
 
-        def spread(work: Callable[[Any], Any], items: Sequence[Any], done: Any) -> None:
+        def distribute(work: Callable[[Any], Any], items: Sequence[Any], done: Any) -> None:
             engine.run_all(work, items, self.scheduler, count, done)
 
         interrupted = False
         try:
-            written([{"key": n} | commanded(point) for n, point in left.items() if not point.scene])
-            runs = {name: point for name, point in left.items() if point.scene}
-            meshes = shared_meshes(runs.values(), self.options, count, spread, self.progress)
+            runs = {name: point for name, point in missing.items() if point.scene}
+            write([
+                {"key": name} | input_columns(point)
+                for name, point in missing.items() if name not in runs
+            ])  # fmt: skip
+            meshes = shared_meshes(runs.values(), self.options, count, distribute, self.progress)
             batches = self._batches(runs, meshes, count)
-            spread(partial(_rows, self.options, self.assessed), batches, lambda _, r: written(r))
+            work = partial(_rows, self.options, self.assessed)
+            distribute(work, batches, lambda _, rows: write(rows))
         except KeyboardInterrupt:
             interrupted = True
         return SweepOutcome(
-            planned=len(wanted), found=len(wanted) - len(left), **tally, interrupted=interrupted,
-            seconds=time.perf_counter() - started,
+            planned=len(wanted), earlier=len(wanted) - len(missing), **tally,
+            interrupted=interrupted, seconds=time.perf_counter() - started,
         )  # fmt: skip
 
     def _batches(
         self, runs: Mapping[str, DesignPoint], meshes: Mapping[Solid, Mesh], count: int
     ) -> list[tuple[dict[str, DesignPoint], Mesh | None]]:
-        """Runs on one body follow each other; others are alone, unless they are short."""
+        """Group runs on one body, and other runs if they are short."""
         groups: dict[Solid | None, list[str]] = {}
         for name, point in runs.items():
             groups.setdefault(solid_of_run(point, self.options), []).append(name)
         # Several batches for each worker, so that none waits long for the last.
         size = max(1, min(BATCH, len(runs) // (4 * count)))
         return [
-            ({n: runs[n] for n in names[k : k + step]}, solid and meshes[solid])
-            for solid, names in groups.items()
+            ({n: runs[n] for n in members[k : k + step]}, solid and meshes[solid])
+            for solid, members in groups.items()
             for step in [size if solid or not self.assessed else 1]
-            for k in range(0, len(names), step)
+            for k in range(0, len(members), step)
         ]
 
 
 def _rows(
     options: SolveOptions, assessed: bool, batch: tuple[dict[str, DesignPoint], Mesh | None]
 ) -> list[dict[str, Any]]:
-    """Run a batch, on a worker."""
+    """Run a batch on a worker."""
     runs, mesh = batch
     return [{"key": name} | _row(point, options, assessed, mesh) for name, point in runs.items()]
 
@@ -165,7 +170,7 @@ def _rows(
 def _row(
     point: DesignPoint, options: SolveOptions, assessed: bool, mesh: Mesh | None
 ) -> dict[str, Any]:
-    row, started = commanded(point), time.perf_counter()
+    row, started = input_columns(point), time.perf_counter()
     assert point.scene
     try:
         if mesh is None:
@@ -176,18 +181,18 @@ def _row(
             row["reduced_together"] = mesh.family.members if mesh.family else 1
         if isfinite(response.expected_error):
             row["expected_error"] = response.expected_error
-        row |= measured(point.scene, response)
-    except Exception as error:  # any: one run's failure is its row, not the end of the others
-        row["error"] = said(error)
+        row |= result_columns(point.scene, response)
+    except Exception as error:  # of any kind: the other runs continue
+        row["error"] = error_text(error)
     return row | {"seconds": time.perf_counter() - started}
 
 
 def _alone(scene: Scene, options: SolveOptions, assessed: bool) -> Response:
-    """Response of a run that shares nothing, with its expected error if that is estimated."""
+    """Return the response of a run that shares no reduction."""
     model = model_of(scene, options.model)
     if assessed or named(model).default_size is not None:
-        asked = SolveOptions(
+        own = SolveOptions(
             model=model, tolerance=options.tolerance, h=options.h, solver=options.solver
         )
-        return solve(scene, plan(scene, asked))
+        return solve(scene, plan(scene, own))
     return compute(scene, model, tolerance=options.tolerance)

@@ -1,4 +1,4 @@
-"""Figures of a sweep: one column over one or two varied keys (matplotlib)."""
+"""Figures of a sweep: a column over one or two varied keys (matplotlib)."""
 
 import re
 from collections.abc import Sequence
@@ -19,9 +19,9 @@ from skinwave.sweeps.dataset import Row
 
 SPEED = "tacton.speed_m_per_s"
 MARKERS = "osD^vP*X"
-MOST_NAMED = len(MARKERS)  # curves that a legend names; of more numbers a colour bar does
+MOST_NAMED = len(MARKERS)  # curves in a legend; more numbers have a colour bar
 MOST_TICKS = 12
-FILLED = 0.5  # of the cells of a grid, which have a run at least
+LEAST_FILLED = 0.5  # share of the cells of a grid that have a run
 UNITS = {  # by the end of a column's name
     "_m_per_s": "m/s", "_um": "µm", "_mm": "mm", "_db": "dB", "_hz": "Hz",
     "_pa": "Pa", "_ms": "ms", "_s": "s", "_percent": "%", "_deg": "°", "_gib": "GiB", "_cm2": "cm²",
@@ -39,26 +39,26 @@ NAMES = {
 
 
 def varied(rows: Sequence[Row]) -> list[str]:
-    """Keys of scenes that differ between rows, those with most values first; of a table and a key
-    in it, the key.
+    """Return the keys that differ between rows, those with most values first; of a table and a key
+    in it, only the key.
     """
     keys = [key for key in dict.fromkeys(k for row in rows for k in row) if "." in key]
     counts = {key: len({row.get(key) for row in rows}) for key in keys}
-    found = [k for k in keys if counts[k] > 1]
-    own = [k for k in found if not any(other.startswith(f"{k}.") for other in found)]
-    return sorted(own, key=lambda k: -counts[k])
+    several = [key for key in keys if counts[key] > 1]
+    own = [key for key in several if not any(other.startswith(f"{key}.") for other in several)]
+    return sorted(own, key=lambda key: -counts[key])
 
 
 def finished(rows: Sequence[Row]) -> list[Row]:
-    """The rows that have a response; a ValueError if none has."""
-    found = [row for row in rows if row.get("status") == "done"]
-    if not found:
-        raise ValueError(f"none of {len(rows)} runs has a response: {rows[0].get('error')}")
-    return found
+    """Return the rows with a response; raise a ValueError if all runs failed."""
+    done = [row for row in rows if row.get("status") == "done"]
+    if not done:
+        raise ValueError(f"all {len(rows)} runs failed; the first one: {rows[0].get('error')}")
+    return done
 
 
 def value(row: Row, column: str) -> float:
-    """An entry as a number: the largest of a list over the probes, `name[2]` that of one probe."""
+    """Return a cell as a number: the largest over the probes, or that of one probe, `name[2]`."""
     name, probe = at_probe(column)
     cells = row.get(name)
     if not isinstance(cells, list):
@@ -70,11 +70,10 @@ def value(row: Row, column: str) -> float:
 
 
 def line_figure(rows: Sequence[Row], column: str, x: str, by: str | None, style: Style) -> Figure:
-    """A column over one key, a curve for each value of another; points where a value of that is
-    met once, as in a Latin hypercube, or where what else is varied would be joined with it.
+    """Draw a column over key x, with a curve for each value of key `by`, as `curves`.
 
-    Beside levels the threshold of detection is drawn, and over drawing speeds that of surface
-    waves. Raises a ValueError if there is no such column of numbers.
+    Levels come with the detection threshold, and drawing speeds with the speed of surface waves.
+    Raises a ValueError if the column has no numbers.
     """
     _check(rows, (column, x, *([by] if by else [])))
     with mpl.rc_context(style.rc):
@@ -85,16 +84,17 @@ def line_figure(rows: Sequence[Row], column: str, x: str, by: str | None, style:
                        label=f"threshold, ±{BAND:g} dB between people")  # fmt: skip
         waves = {value(row, "rayleigh_speed_m_per_s") for row in rows} if x == SPEED else set()
         for k, wave in enumerate(sorted(filter(np.isfinite, waves))):
-            said = "_" if k else "Rayleigh speed $c_R$ without loss"
-            ax.axvline(wave, color="0.4", ls="--", lw=1.2, label=said)
+            label = "_" if k else "Rayleigh speed $c_R$ without loss"
+            ax.axvline(wave, color="0.4", ls="--", lw=1.2, label=label)
         curves(ax, rows, column, x, by)
         ax.set(xlabel=axis_label(x), ylabel=axis_label(column))
     return figure
 
 
 def heat_figure(rows: Sequence[Row], column: str, x: str, y: str, style: Style) -> Figure:
-    """A column over two keys, of what they share the mean; cells without a run stay empty. Raises a
-    ValueError if there is no such column, or the runs lie on no grid.
+    """Draw a map of a column over two keys: the mean of the runs of a cell, or an empty cell.
+
+    Raises a ValueError if the column has no numbers, or the runs do not lie on a grid.
     """
     _check(rows, (column, x, y))
     across, up = _levels(rows, x), _levels(rows, y)
@@ -102,8 +102,8 @@ def heat_figure(rows: Sequence[Row], column: str, x: str, y: str, style: Style) 
     for row in rows:
         where = up.index(_plain(row.get(y))), across.index(_plain(row.get(x)))
         cells.setdefault(where, []).append(value(row, column))
-    if len(cells) < FILLED * len(across) * len(up):
-        raise ValueError(f"the runs lie on no grid of {x} and {y}; leave out --heat")
+    if len(cells) < LEAST_FILLED * len(across) * len(up):
+        raise ValueError(f"the runs do not lie on a grid of {x} and {y}; remove --heat")
     table = np.full((len(up), len(across)), np.nan)
     for where, values in cells.items():
         table[where] = np.mean(values)
@@ -122,8 +122,9 @@ def heat_figure(rows: Sequence[Row], column: str, x: str, y: str, style: Style) 
 
 
 def curves(ax: Axes, rows: Sequence[Row], column: str, x: str, by: str | None) -> None:
-    """A curve for each value of a key; where other keys differ, the mean and the range or, if no
-    two runs share what is drawn, points.
+    """Draw a curve for each value of key `by`: mean and range of the runs at a value of key x.
+
+    If other keys vary and each pair of values occurs once, draw points, as for a Latin hypercube.
     """
     groups = _levels(rows, by) if by else [None]
     words = not isinstance(_levels(rows, x)[0], float)
@@ -138,14 +139,14 @@ def curves(ax: Axes, rows: Sequence[Row], column: str, x: str, by: str | None) -
     for k, group in enumerate(groups):
         mine = [row for row in rows if by is None or _plain(row.get(by)) == group]
         at = _levels(mine, x)
-        found = [[value(r, column) for r in mine if _plain(r.get(x)) == level] for level in at]
+        groups_at = [[value(r, column) for r in mine if _plain(r.get(x)) == level] for level in at]
         places = np.arange(len(at)) if words else np.array(at)
-        mean, low, high = (np.array([f(v) for v in found]) for f in (np.mean, np.min, np.max))
+        mean, low, high = (np.array([f(v) for v in groups_at]) for f in (np.mean, np.min, np.max))
         label = None if by is None or many else _with_unit(by, group)
         ax.plot(places, np.where(np.isfinite(mean), mean, np.nan), color=colours[k],
                 marker="o" if many else MARKERS[k % len(MARKERS)], ms=4, lw=1.5,
                 ls="solid" if joined else "none", label=label)  # fmt: skip
-        if max(map(len, found)) > 1:
+        if max(map(len, groups_at)) > 1:
             ax.fill_between(places, low, high, color=colours[k], alpha=0.15, lw=0)
     if words:
         ax.set_xticks(range(len(at)), [str(level) for level in at])
@@ -157,7 +158,7 @@ def curves(ax: Axes, rows: Sequence[Row], column: str, x: str, by: str | None) -
 
 
 def axis_label(column: str) -> str:
-    """Label of an axis: the quantity of a column and its unit."""
+    """Return the label of an axis: the quantity of a column and its unit."""
     name, probe = at_probe(column)
     words = NAMES.get(name)
     if words is None:
@@ -183,9 +184,9 @@ def _with_unit(key: str, level: Any) -> str:
 
 
 def at_probe(column: str) -> tuple[str, int | None]:
-    """Name of a column and, of one such as "peak_um[2]", the index of the probe."""
-    found = re.fullmatch(r"(.+)\[(\d+)\]", column)
-    return (found[1], int(found[2])) if found else (column, None)
+    """Split a column such as "peak_um[2]" into its name and the index of the probe, or None."""
+    match = re.fullmatch(r"(.+)\[(\d+)\]", column)
+    return (match[1], int(match[2])) if match else (column, None)
 
 
 def _check(rows: Sequence[Row], columns: Sequence[str]) -> None:
@@ -196,8 +197,8 @@ def _check(rows: Sequence[Row], columns: Sequence[str]) -> None:
 
 
 def _levels(rows: Sequence[Row], key: str | None) -> list[Any]:
-    found = {_plain(row.get(key)) for row in rows} if key else set()
-    return sorted(found, key=lambda level: (not isinstance(level, float), level))
+    levels = {_plain(row.get(key)) for row in rows} if key else set()
+    return sorted(levels, key=lambda level: (not isinstance(level, float), level))
 
 
 def _plain(cell: Any) -> Any:

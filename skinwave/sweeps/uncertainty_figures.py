@@ -1,4 +1,4 @@
-"""Figures of an ensemble (matplotlib): bands of waveforms and lines, maps, and tornado charts."""
+"""Figures of an ensemble (matplotlib): bands of waveforms and lines, maps, tornado charts."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -16,24 +16,24 @@ from skinwave.report.palette import SEQUENTIAL, SERIES
 from skinwave.report.styles import STYLES
 from skinwave.results.views import path_points
 from skinwave.sweeps.ensemble import STEP, Ensemble, map_axes, shown_times
-from skinwave.sweeps.sampling import ENDS, PERCENTILES, Tornado, percentiles
+from skinwave.sweeps.sampling import ENDS, PERCENTILES, percentiles
 from skinwave.typing import Floats
 
 REPORT = STYLES["report"]
 BAND, CENTRE = SERIES[:2]
 WIDE, NARROW = 0.22, 0.4  # opacity of the bands of 90 and 50 %
 DEEPEST = -30.0  # dB of a map, below the largest median
-SHARED = 3  # maps of one colour bar, before the last
+SHARED = 3  # maps with one colour bar
 NAMED_LINES = 8
 
 
 def bands_figure(found: Ensemble, centre: Floats) -> Figure:
-    """Waveforms and lines at each probe: median, bands of 50 and 90 % of the samples, and the
-    waveform (t, p) of the central values.
+    """Draw waveforms and lines at each probe: median, bands of 50 and 90 % of the samples, and the
+    waveform `centre` (t, p) of the central values.
     """
-    asked, probes = found.scene.reading.record, found.scene.probes
+    quantity, probes = found.scene.reading.record, found.scene.probes
     times = 1e3 * shown_times(found.scene)
-    waveforms, lines = (asked.per_unit * percentiles(x) for x in (found.waveform, found.lines))
+    waveforms, lines = (quantity.per_unit * percentiles(x) for x in (found.waveform, found.lines))
     with mpl.rc_context(REPORT.rc):
         figure = Figure(figsize=REPORT.size(10.5, 1.7 * len(probes) + 1.3), layout="constrained")
         axes = figure.subplots(len(probes), 2, sharex="col", sharey="col", squeeze=False)
@@ -43,14 +43,16 @@ def bands_figure(found: Ensemble, centre: Floats) -> Figure:
             left.fill_between(times, lower, upper, color=BAND, alpha=NARROW, lw=0,
                               label="50 % of samples")  # fmt: skip
             left.plot(times, median, color=BAND, lw=1.2, label="median")
-            left.plot(times, asked.per_unit * centre[:, p], color=CENTRE, lw=1,
+            left.plot(times, quantity.per_unit * centre[:, p], color=CENTRE, lw=1,
                       label="central values")  # fmt: skip
             left.margins(x=0)
             left.grid(alpha=0.25)
             left.set_ylabel(f"({1e3 * x:g}, {1e3 * y:g}) mm", fontweight="bold")
             _lines(right, found, lines[..., p], named=p == found.strongest)
-        axes[0, 0].set_title(f"{asked.words} about its mean, {asked.shown}", fontsize="medium")
-        axes[0, 1].set_title(f"lines, {asked.shown} peak", fontsize="medium")
+        axes[0, 0].set_title(
+            f"{quantity.words} about its mean, {quantity.shown}", fontsize="medium"
+        )
+        axes[0, 1].set_title(f"lines, {quantity.shown} peak", fontsize="medium")
         axes[-1, 0].set_xlabel("time, ms")
         axes[-1, 1].set_xlabel("frequency, Hz")
         handles = [h for ax in axes[0] for h in ax.get_legend_handles_labels()[0]]
@@ -59,7 +61,7 @@ def bands_figure(found: Ensemble, centre: Floats) -> Figure:
 
 
 def _lines(ax: Axes, found: Ensemble, bands: Floats, *, named: bool) -> None:
-    """Bars (5, f) of lines over their central frequency."""
+    """Draw bars (5, f) of lines over their central frequency."""
     tacton, names = found.scene.tacton, found.method.lines
     f = np.array([line_frequency(tacton, name) or np.nan for name in names])
     low, lower, median, upper, high = np.maximum(bands, 1e-12)
@@ -76,35 +78,38 @@ def _lines(ax: Axes, found: Ensemble, bands: Floats, *, named: bool) -> None:
                 label="detection threshold")  # fmt: skip
     ax.grid(alpha=0.25)
     if named:
-        shown = [k for k in np.argsort(-median) if f[k] < HIGHEST]
-        for k in shown[:NAMED_LINES]:
+        order = [k for k in np.argsort(-median) if f[k] < HIGHEST]
+        for k in order[:NAMED_LINES]:
             ax.annotate(written(names[k]), (f[k], high[k]), xytext=(0, 3), ha="center", rotation=90,
                         textcoords="offset points", va="bottom", fontsize="x-small")  # fmt: skip
 
 
 def maps_figure(found: Ensemble) -> Figure:
-    """RMS motion on the map, percentiles 5, 50 and 95 of the samples at each place, on one colour
-    scale; and the share of samples in which a place is above the threshold of detection.
+    """Draw maps of the RMS motion, percentiles 5, 50 and 95 on one colour scale, and on skin a map
+    of the share of samples above the detection threshold.
     """
     bands = percentiles(found.map_rms)
     top = max(float(bands[2].max()), 1e-300)
     x, y = (1e3 * axis for axis in map_axes(found.scene))
     extent: Any = (x[0] - 1e3 * STEP / 2, x[-1] + 1e3 * STEP / 2,
                    y[0] - 1e3 * STEP / 2, y[-1] + 1e3 * STEP / 2)  # fmt: skip
-    drawn = partial(Axes.imshow, origin="lower", extent=extent, cmap=SEQUENTIAL,
+    show = partial(Axes.imshow, origin="lower", extent=extent, cmap=SEQUENTIAL,
                     interpolation="bilinear")  # fmt: skip
     with mpl.rc_context(REPORT.rc):
         figure = Figure(figsize=REPORT.size(10.5, 3.2), layout="constrained")
         axes = figure.subplots(1, SHARED + found.is_skin, sharey=True)
         for ax, k in zip(axes, (0, 2, 4), strict=False):
             level = 20 * np.log10(np.maximum(bands[k] / top, 1e-12))
-            image = drawn(ax, level, vmin=DEEPEST, vmax=-DEEPEST / 2)
-            ax.set_title("median" if k == 2 else f"{PERCENTILES[k]} % are below", fontsize="medium")
+            image = show(ax, level, vmin=DEEPEST, vmax=-DEEPEST / 2)
+            ax.set_title(
+                "median" if k == 2 else f"{PERCENTILES[k]} % of samples are below",
+                fontsize="medium",
+            )
         figure.colorbar(image, ax=list(axes[:SHARED]), shrink=0.8,
                         label="RMS, dB re largest median")  # fmt: skip
         if found.is_skin:
             share = 100 * (found.map_level >= 0).mean(axis=0)
-            image = drawn(axes[-1], share, vmin=0.0, vmax=100.0)
+            image = show(axes[-1], share, vmin=0.0, vmax=100.0)
             axes[-1].contour(x, y, share, levels=[50.0], colors="white", linewidths=1)
             axes[-1].set_title("above threshold, % of samples", fontsize="medium")
             figure.colorbar(image, ax=axes[-1], shrink=0.8)
@@ -115,17 +120,18 @@ def maps_figure(found: Ensemble) -> Figure:
     return figure
 
 
-def tornado_figure(charts: Mapping[str, Tornado], keys: Sequence[str]) -> Figure:
-    """Tornado charts by name of the output, of numbers (d,) by their keys."""
+def tornado_figure(outputs: Mapping[str, Floats], keys: Sequence[str]) -> Figure:
+    """Draw tornado charts of outputs (1 + 2 d,) at samples of `one_at_a_time` of d keys."""
     with mpl.rc_context(REPORT.rc):
         figure = Figure(figsize=REPORT.size(10.5, 1.2 + 0.35 * len(keys)), layout="constrained")
-        axes = figure.subplots(1, len(charts), squeeze=False)[0]
-        for ax, (name, chart) in zip(axes, charts.items(), strict=True):
-            order, centre = chart.order[::-1], chart.centre
-            for k, ends in enumerate((chart.low, chart.high)):
+        axes = figure.subplots(1, len(outputs), squeeze=False)[0]
+        for ax, (name, values) in zip(axes, outputs.items(), strict=True):
+            centre, low, high = values[0], values[1::2], values[2::2]
+            order = np.argsort(-np.abs(high - low), kind="stable")[::-1]  # the widest on top
+            for k, ends in enumerate((low, high)):
                 ax.barh(range(len(order)), ends[order] - centre, left=centre, height=0.7,
                         color=(BAND, CENTRE)[k],
-                        label=f"number at its {100 * ENDS[k]:g} % quantile")  # fmt: skip
+                        label=f"at its {100 * ENDS[k]:g} % quantile")  # fmt: skip
             ax.axvline(centre, color="0.3", lw=1)
             ax.set_yticks(range(len(order)), [keys[k] for k in order], fontsize="small")
             ax.set_title(name, fontsize="small")

@@ -16,20 +16,20 @@ from skinwave.scene.scene import Scene
 from skinwave.sweeps import dataset
 from skinwave.sweeps.dataset import Row
 from skinwave.sweeps.ensemble import Ensemble, ensemble, propagate, rows_of
-from skinwave.sweeps.sampling import PERCENTILES, one_at_a_time, percentiles, sobol_indices, tornado
+from skinwave.sweeps.sampling import PERCENTILES, one_at_a_time, percentiles, sobol_indices
 from skinwave.sweeps.table_figures import axis_label, finished, value
 from skinwave.sweeps.uncertainty_figures import bands_figure, maps_figure, tornado_figure
 from skinwave.system.document import Details, Part, Picture, Report, Section
 from skinwave.system.table import Column, Table
 
 BANDS = (
-    "Bands of the samples at each time, and bars of each line: the dark part holds half of the "
+    "Bands of the samples at each time, and bars of each line. The dark part contains half of the "
     "samples, the whole nine of ten. Each time and each line has its own band, so no single sample "
     "follows an edge."
 )
 MAPS = (
-    "Percentiles of the RMS motion at each place, and how many samples have a place above the "
-    "threshold of detection; dotted: the path of the focus."
+    "Percentiles of the RMS motion at each place, and the share of samples in which a place is "
+    "above the detection threshold. Dotted: path of the focus."
 )
 ONE_AT_A_TIME = (
     "One number at a time at its 5 % and 95 % quantiles, all others at their central values. The "
@@ -40,10 +40,10 @@ INDICES = (
     "that vanishes if this number is known. Total: the share that remains if all others are known. "
     "If the first orders sum to more than 1 beyond their intervals, there are too few samples."
 )
-NAMED = 12  # lines of the table on a page
-AT = [Column("probe_x_mm", "x", "mm"), Column("probe_y_mm", "y", "mm")]
+MOST_LINES = 12  # in the table of a page
+PROBE = [Column("probe_x_mm", "x", "mm"), Column("probe_y_mm", "y", "mm")]
 P_COLUMNS = [Column(f"p{k}", f"{k} %") for k in PERCENTILES]
-FREQUENCY = Column("frequency_hz", "frequency", "Hz")
+MEDIAN = 6  # place of the median in a row of percentiles
 PERCENTILE_FILE, INDEX_FILE, PAGE = "percentiles.csv", "indices.csv", "uncertainty.html"
 SAMPLED_FILES = (PERCENTILE_FILE, INDEX_FILE, PAGE)
 SCALARS = ("rms_um", "level_db", "spread_6db_mm", "peak_um", "kernel_misfit", "kernel_rms_pa")
@@ -52,7 +52,7 @@ ABOVE = "above_threshold_cm2"  # a column
 
 
 def write_ensemble(folder: Path, scene: Scene, n: int, **options: Any) -> list[Part]:
-    """Write percentiles.csv and samples.csv of an ensemble, by the options of `propagate`; return
+    """Write percentiles.csv and samples.csv of an ensemble, with the options of `propagate`; return
     the parts of its page.
     """
     found = propagate(scene, n, **options)
@@ -66,81 +66,86 @@ def _ensemble_parts(found: Ensemble, rows: Sequence[Row]) -> Iterator[Part]:
     keys, p = [s.key for s in found.spreads], found.strongest
     yield " ".join(sentences(found))
     yield Table(
-        ["uncertain number", "central value", "distribution", "part", "given by"],
-        [(s.key, s.value, s.distribution.words, s.part,
-          "the preset's sources" if s.implied else "the scene") for s in found.spreads],
+        ["uncertain number", "central value", "distribution", "part", "source"],
+        [(s.key, s.value, s.distribution.words, s.part, "preset" if s.implied else "scene")
+         for s in found.spreads],
     )  # fmt: skip
-    moved = ensemble(found.scene, found.spreads, one_at_a_time(found.spreads), found.method)
-    yield Picture(png(bands_figure(found, moved.waveform[0])), BANDS, "bands")
+    varied = ensemble(found.scene, found.spreads, one_at_a_time(found.spreads), found.method)
+    yield Picture(png(bands_figure(found, varied.waveform[0])), BANDS, "bands")
     if found.has_map:
         yield Picture(png(maps_figure(found)), MAPS, "bands-map")
-    (rms, *_), ends = (name for name in rows[0] if name.startswith("rms_")), rows_of(moved)
-    shown = [f"{rms}[{p}]", *(name for name in ("level_db", ABOVE) if name in rows[0])]
-    charts = {name: np.array([value(row, name) for row in ends]) for name in shown}
-    named = {axis_label(name): chart for name, chart in tornado(charts).items()}
-    yield Picture(png(tornado_figure(named, keys)), ONE_AT_A_TIME, "tornado")
-    every, (x, y) = row_percentiles(rows), found.scene.probes[p]
-    here = [row for row in every.rows if row[1] is not None and row[2:4] == (1e3 * x, 1e3 * y)]
-    yield _in_words(Table(every.columns, sorted(here, key=lambda row: -row[6])[:NAMED]))
+    (rms, *_), ends = (name for name in rows[0] if name.startswith("rms_")), rows_of(varied)
+    outputs = [f"{rms}[{p}]", *(name for name in ("level_db", ABOVE) if name in rows[0])]
+    charts = {axis_label(name): np.array([value(row, name) for row in ends]) for name in outputs}
+    yield Picture(png(tornado_figure(charts, keys)), ONE_AT_A_TIME, "tornado")
+    table, (x, y) = row_percentiles(rows), found.scene.probes[p]
+    lines = [row for row in table.rows if row[1] is not None and row[2:4] == (1e3 * x, 1e3 * y)]
+    lines = sorted(lines, key=lambda row: -row[MEDIAN])[:MOST_LINES]
+    yield _with_labels(Table(table.columns, lines))
 
 
-def _in_words(table: Table) -> Table:
-    """A table whose first column names quantities, with their labels instead."""
+def _with_labels(table: Table) -> Table:
+    """Replace the names of quantities in the first column of a table by their labels."""
     rows = [(re.sub(r"[${}]", "", axis_label(name)), *row) for name, *row in table.rows]
     return Table([Column("quantity"), *table.columns[1:]], rows)
 
 
 def sentences(found: Ensemble) -> list[str]:
-    """Number of samples and method, and the 90 % of the motion and of its level."""
+    """State number of samples and method, and the 90 % intervals of the motion and its level."""
     n, d = found.values.shape
-    p, asked = found.strongest, found.scene.reading.record
+    p, quantity = found.strongest, found.scene.reading.record
     x, y = (1e3 * z for z in found.scene.probes[p])
-    low, _, median, _, high = asked.per_unit * percentiles(found.rms)[:, p]
-    said = [
+    low, _, median, _, high = quantity.per_unit * percentiles(found.rms)[:, p]
+    text = [
         f"{n} samples of {counted(d, 'uncertain number')}, {found.method.words}.",
-        f"RMS at ({x:g}, {y:g}) mm: {significant(median)} {asked.shown}, in nine of ten "
-        f"{interval(low, high, 3)}.",
+        f"RMS at ({x:g}, {y:g}) mm: median {significant(median)} {quantity.shown}, in nine of ten "
+        f"samples {interval(low, high, 3)} {quantity.shown}.",
     ]
     if found.is_skin:
         levels = found.level.max(axis=1)
         low, _, median, _, high = percentiles(levels)
-        said.append(
-            f"Highest sensation level at a probe: {median:+.0f} dB, in nine of ten {low:+.0f} to "
-            f"{high:+.0f} dB; above threshold in {percent((levels >= 0).mean())} of the samples."
+        text.append(
+            f"Highest sensation level at a probe: median {median:+.0f} dB, in nine of ten samples "
+            f"{low:+.0f} to {high:+.0f} dB; above threshold in {percent((levels >= 0).mean())} of "
+            "the samples."
         )
-    return said
+    return text
 
 
 def write_sampled(
     out: Path, rows: Sequence[Row], spreads: Sequence[Spread], *, has_indices: bool
 ) -> list[str]:
-    """percentiles.csv, indices.csv and uncertainty.html of a sweep by distributions in its folder,
-    of its rows in the order of the design; their names. Sobol' indices need every run.
+    """Write percentiles.csv, indices.csv and uncertainty.html of a sweep by distributions, given
+    its rows in the order of the design; return their names. Sobol' indices need every run.
     """
     done = finished(rows)
     failed = len(rows) - len(done)
-    said = f"{len(done)} runs of {counted(len(spreads), 'uncertain number')}."
-    said += f" {failed} failed and are left out." if failed else ""
+    text = f"{len(done)} runs of {counted(len(spreads), 'uncertain number')}."
+    text += f" {failed} failed and are left out." if failed else ""
     numbers = [(s.key, f"{significant(s.value)}: {s.distribution.words}") for s in spreads]
     parts: list[Part] = [Table(["key", "distribution"], numbers)]
     table = row_percentiles(done)
     motion = [row for row in table.rows if row[0].startswith("rms_")]
-    verdict = [said, *map(_of_motion, sorted(motion, key=lambda row: -row[6])[:1])]
+    verdict = [text]
+    if motion:
+        name, _, x, y, low, _, median, _, high = max(motion, key=lambda row: row[MEDIAN])
+        verdict.append(
+            f"{axis_label(name)}, at ({x:g}, {y:g}) mm: median {significant(median)}, in nine of "
+            f"ten runs {interval(low, high, 3)}."
+        )
     files = {PERCENTILE_FILE: table.to_csv()}
     if has_indices and not failed:
         indices = index_table(rows, [s.key for s in spreads])
         files[INDEX_FILE] = indices.to_csv()
-        parts += [INDICES, _in_words(indices)]
-    parts.append(Details("Percentiles at every probe", [_in_words(table)]))
+        parts += [INDICES, _with_labels(indices)]
+    parts.append(Details("Percentiles at every probe", [_with_labels(table)]))
     files[PAGE] = Report(f"Uncertainty of {out.name}", verdict, parts).html().encode()
     dataset.write_beside(out, files)
     return list(files)
 
 
 def index_table(rows: Sequence[Row], keys: Sequence[str]) -> Table:
-    """Sobol' indices of the scalar columns of which every row has a number, for each key, with the
-    half widths of their intervals.
-    """
+    """Return Sobol' indices, with half widths of intervals, of scalar columns for each key."""
     found: list[tuple[object, ...]] = []
     for name in SCALARS:
         values = np.array([value(row, name) for row in rows])
@@ -152,17 +157,8 @@ def index_table(rows: Sequence[Row], keys: Sequence[str]) -> Table:
     return Table(["column", "key", *shares, "samples"], found, stored=4)
 
 
-def _of_motion(row: Sequence[Any]) -> str:
-    """The 90 % of the motion at a probe, from a row of percentiles."""
-    name, _, x, y, low, _, median, _, high = row
-    return (
-        f"{axis_label(name)}, at ({x:g}, {y:g}) mm: median {significant(median)}, in nine of ten "
-        f"{interval(low, high, 3)}."
-    )
-
-
 def row_percentiles(rows: Sequence[Row]) -> Table:
-    """Percentiles of what all rows have at all probes: motion, level, and each line."""
+    """Return percentiles at each probe of the columns that all rows have: motion, level, lines."""
     found: list[tuple[object, ...]] = []
     x, y = (rows[0][f"probe_{axis}_mm"] for axis in "xy")
     for column in dict.fromkeys(name for row in rows for name in row):
@@ -173,7 +169,7 @@ def row_percentiles(rows: Sequence[Row]) -> Table:
         values = np.array(cells, np.float64)
         if np.isfinite(values).all():
             lines = [n for n in rows[0] if n.endswith("_hz") and column.startswith(n[:-2])]
-            at = rows[0][lines[0]] if lines else None
+            frequency = rows[0][lines[0]] if lines else None
             for p, band in enumerate(percentiles(values).T.tolist()):
-                found.append((column, at, x[p], y[p], *band))
-    return Table(["column", FREQUENCY, *AT, *P_COLUMNS], found)
+                found.append((column, frequency, x[p], y[p], *band))
+    return Table(["column", Column("frequency_hz", "frequency", "Hz"), *PROBE, *P_COLUMNS], found)

@@ -21,7 +21,7 @@ from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads
 from skinwave.scene.scene import BODIES, Body
 from skinwave.studies.album import open_album
-from skinwave.sweeps.measures import measured
+from skinwave.sweeps.measures import result_columns
 
 SCENE = """
 name = "below"
@@ -210,7 +210,7 @@ def test_a_run_is_written_and_read_again(tmp_path, monkeypatch):
 
 def test_sweeps_have_columns_of_the_quantity():
     asked = scene("von_mises_stress", "[0.7, 2]")
-    row = measured(asked, compute(asked, "flat-body-harmonic"))
+    row = result_columns(asked, compute(asked, "flat-body-harmonic"))
     assert min(row["peak_von_mises_stress_pa"]) > 0
     assert "peak_um" not in row
     assert "level_db" not in row

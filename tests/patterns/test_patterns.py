@@ -158,7 +158,7 @@ def test_a_lissajous_is_recorded_as_the_engine_draws_it(tmp_path):
     u = 2 * np.pi * 80 * t
     expected = np.stack([0.010 * np.sin(2 * u + 0.5), 0.006 * np.sin(3 * u)], -1)
     np.testing.assert_allclose(scene.tacton.trajectory.position(t), expected, atol=2e-5)
-    assert any("played at 20000 Hz" in note for note in notes)
+    assert any("20000 Hz" in note for note in notes)
 
 
 POINT = brush(radius=0.0)
@@ -178,7 +178,7 @@ NEAR = {"near": {"default": 0.0, "min": 0.0, "max": 2.0, "step": 0.1}}
     [
         ({}, "parameter 'near' at its default, 0", 0.5, {0.125: (-5, 0), 0.4: (6, 0)}),
         ({"near": 2.0}, "the first 800 ms are left out", 0.2, {0.1: (10, 20), 0.15: (10, 25)}),
-        ({"near": 9.0}, "= 2, the nearest that the file allows", 0.2, {0.05: (10, 15)}),
+        ({"near": 9.0}, "'near' = 2", 0.2, {0.05: (10, 15)}),
     ],
 )
 def test_jumps_are_taken_at_the_values_of_parameters(tmp_path, near, note, period, expected):
@@ -271,7 +271,7 @@ def test_what_adaptics_has_no_words_for_is_said():
     ):
         with pytest.raises(ValueError, match=said):
             exported(flat(tacton), ".adaptics")
-    with pytest.raises(ValueError, match="take 'pressure_squared'"):
+    with pytest.raises(ValueError, match="pressure_squared"):
         exported(flat(Tacton(am_frequency=80.0), drive="linear"), ".adaptics")
 
 
@@ -308,7 +308,7 @@ def test_tidy_csv_takes_its_columns_in_any_order_and_different_paths(tmp_path):
     foci = [[0.0015, 0.002 * point] for point in range(3)]
     alone = [load.spot(np.array(PROBES), np.array(focus)) for focus in foci]
     np.testing.assert_allclose(load(np.array(PROBES), t)[1], 50 / 3 * sum(alone), rtol=1e-9)
-    assert any("1/3 of the pressure" in note for note in notes)
+    assert any("1/3" in note for note in notes)
 
 
 def test_a_focus_that_rises_needs_a_height(tmp_path):
@@ -353,7 +353,7 @@ def test_the_script_states_its_frequency_and_holds_its_foci():
     for sharing, drawn, foci in (("simultaneous", 191.388, 2), ("time_multiplexed", 190.476, 1)):
         tacton = Tacton(trajectory=CIRCLE, foci=(0.0, 0.5), am_frequency=80, sharing=sharing)
         script, notes = write_pattern(flat(tacton), ".py", Options())
-        assert any(f"draws {drawn:g} Hz where 190.986 Hz" in note for note in notes)
+        assert any(f"{drawn:g} Hz" in note and "190.986 Hz" in note for note in notes)
         assert "FociSTM" in compile(script, "script", "exec").co_names
         radii = np.linalg.norm(eval_list(script, "PLACES"), axis=2)
         np.testing.assert_allclose(radii, 10.0, atol=1e-3)

@@ -12,7 +12,7 @@ from skinwave.results.claims import evaluate
 from skinwave.results.files import line_rows
 from skinwave.results.run import Run
 from skinwave.scene.scene import BODIES, Body, Layer, Placement, Scene
-from skinwave.sweeps.measures import measured
+from skinwave.sweeps.measures import result_columns
 
 LAYERS = (Layer(thickness=1e-3, material="dermis"),)
 CIRCLE = Trajectory(shape="circle", size=0.02, speed=12.0)
@@ -77,7 +77,7 @@ def test_lines_that_cannot_be_resolved_are_not_reported():
     assert unresolved([long]) == []
     assert long.lines["f_AM"][0] == pytest.approx(2e-6, rel=1e-3)
     assert long.lines["2f_AM"][0] == pytest.approx(1e-6, rel=1e-3)
-    row = measured(short.scene, short.response)
+    row = result_columns(short.scene, short.response)
     assert not [name for name in row if name.startswith(("f_AM", "2f_AM"))]
 
 
@@ -91,7 +91,7 @@ def test_lines_beside_those_that_cannot_be_told_are_not_judged_either():
     assert "5f_AM" in one.unresolved
     assert one.frequencies == {}
     assert evaluate([one]) == []
-    row = measured(one.scene, one.response)
+    row = result_columns(one.scene, one.response)
     assert "5f_AM_um" not in row
     assert not {"level_db", "sensation_line"} & row.keys()
 

@@ -15,7 +15,7 @@ from skinwave.scene.distributions import (
 )
 from skinwave.scene.file import read
 from skinwave.scene.variation import cases, combinations, parse, saltelli_shares
-from skinwave.sweeps.sampling import one_at_a_time, samples, sobol_indices, tornado
+from skinwave.sweeps.sampling import one_at_a_time, samples, sobol_indices
 
 SHARES = np.array([1e-6, 0.05, 0.3, 0.5, 0.77, 0.95, 1 - 1e-6])
 
@@ -148,6 +148,18 @@ def test_indices_and_tornadoes_of_a_sum():
     assert sobol_indices(0 * x[:, 0], 3).total == pytest.approx([0, 0, 0])
     with pytest.raises(ValueError, match="matrices"):
         sobol_indices(x[:-1, 0], 3)
-    chart = tornado({"y": one_at_a_time(spreads) @ weights})["y"]
-    assert chart.high - chart.low == pytest.approx(0.9 * weights)
-    assert chart.order == [1, 0, 2]
+    y = one_at_a_time(spreads) @ weights
+    assert y[0] == pytest.approx(1.5)
+    assert y[2::2] - y[1::2] == pytest.approx(0.9 * weights)
+
+
+def test_indices_of_an_output_that_hardly_varies_are_finite():
+    x = quantiles(numbers(2, 0, 1), saltelli_shares(2, 8))
+    for y in (
+        np.full(len(x), 0.1),
+        np.full(len(x), 1e6) + 1e-10 * x[:, 0],
+        np.where(np.arange(len(x)) < 16, 1.0, x[:, 0]),
+    ):  # the last varies in the mixed matrices alone
+        found = sobol_indices(y, 2)
+        for each in (found.first, found.total, found.first_error, found.total_error):
+            np.testing.assert_array_equal(each, 0)

@@ -72,13 +72,13 @@ def test_wrong_keys_and_values_are_one_sentence(scene, capsys):
         ("runs are outside", "tacton.size_mm=1:2:1000", "body.thickness_mm=1:2:1000"),
         ("need each other", "tacton.size_mm=1:2", "--design", "lhs"),
         ("design 'latin' is unknown", "tacton.size_mm=1,2", "--design", "latin"),
-        ("below 1", "tacton.size_mm=1,2", "--workers", "0"),
-        ("is none of processes, threads", "tacton.size_mm=1,2", "--scheduler", "cloud"),
-        ("holds no sweep", "tacton.size_mm=1,2", "--out", "."),
+        ("give 1 or more", "tacton.size_mm=1,2", "--workers", "0"),
+        ("unknown; give processes or threads", "tacton.size_mm=1,2", "--scheduler", "cloud"),
+        ("contains no sweep", "tacton.size_mm=1,2", "--out", "."),
     ):
         assert cure in refused(capsys, "sweep", scene, "--vary", *words)
     assert "nothing is varied" in refused(capsys, "sweep", scene)
-    assert "holds no sweep" in refused(capsys, "sweep", ".", "--plot")
+    assert "contains no sweep" in refused(capsys, "sweep", ".", "--plot")
     assert not OUT.exists()
 
 
@@ -88,7 +88,7 @@ def test_what_is_not_installed_or_not_there_is_one_sentence(scene, capsys, monke
         patch.setattr(engine, "find_spec", lambda name: None)
         assert "skinwave[sweep]" in refused(capsys, "sweep", scene, *vary, "threads")
         assert "skinwave[cluster]" in refused(capsys, "sweep", scene, *vary, "tcp://a:1")
-    monkeypatch.setattr(engine, "CONNECTED", 0.5)
+    monkeypatch.setattr(engine, "CONNECTION_TIMEOUT", 0.5)
     nowhere = "tcp://127.0.0.1:9"
     assert nowhere in refused(capsys, "sweep", scene, *vary, nowhere)
     assert sorted(path.name for path in scene.parent.iterdir()) == ["short.toml"]
@@ -210,7 +210,7 @@ def test_figures_have_units_and_names_in_every_format(scene, capsys):
     for cure, words in (
         ("did you mean 'peak_um'", ["peak"]),
         ("no finite number", ["sensation_line"]),
-        ("give --plot or --csv", ["peak_um", "--vary", f"{SPEED}=1"]),
+        ("--plot or --csv", ["peak_um", "--vary", f"{SPEED}=1"]),
     ):
         assert cure in refused(capsys, "sweep", OUT, "--plot", *words)
 
@@ -230,7 +230,7 @@ def test_a_latin_hypercube_is_drawn_as_points_with_the_other_key_as_colour():
     drawn = sorted((line.get_xdata()[0], line.get_ydata()[0]) for line in ax.lines)
     assert drawn == sorted((row[SPEED], row["peak_um"]) for row in rows)
     assert max(len(line.get_xdata()) for line in ax.lines) == 1  # nothing is joined
-    with pytest.raises(ValueError, match="no grid"):
+    with pytest.raises(ValueError, match="grid"):
         table_figures.heat_figure(rows, "peak_um", SPEED, SIZE, style("report"))
 
 
