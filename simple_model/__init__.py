@@ -28,9 +28,15 @@ from simple_model.load.focus import (
 from simple_model.load.line_names import named_lines
 from simple_model.load.pressure import MovingPressure
 from simple_model.load.rhythm import Rhythm, Signal
-from simple_model.load.tacton import SUPERPOSITIONS, Tacton, commanded, modulation, pattern_period
-from simple_model.load.trajectory import SHAPES, Trajectory, evenly, joined
-from simple_model.point_kernel import point_kernel, point_kernel_published, published
+from simple_model.load.tacton import (
+    SUPERPOSITIONS,
+    Tacton,
+    commanded_signal,
+    modulation,
+    pattern_period,
+)
+from simple_model.load.trajectory import SHAPES, Trajectory, even_phases, joined
+from simple_model.point_kernel import point_kernel, point_kernel_published, published_load
 from simple_model.response import Effort, Response, are_resolved, lines, phasors, spectrum
 from simple_model.threshold import sensation_level, threshold
 
@@ -59,8 +65,8 @@ __all__ = [
     "Unnamed",
     "are_resolved",
     "array_field",
-    "commanded",
-    "evenly",
+    "commanded_signal",
+    "even_phases",
     "fit_prony",
     "flat_body",
     "focal_spot",
@@ -77,7 +83,7 @@ __all__ = [
     "phasors",
     "point_kernel",
     "point_kernel_published",
-    "published",
+    "published_load",
     "relative_intensity",
     "resolved_lines",
     "sensation_level",

@@ -16,11 +16,11 @@ def choose(what: str, value: str, known: Iterable[str]) -> str:
     if value in known:
         return value
     raise ValueError(
-        f"{what} '{value}' is unknown, use one of {', '.join(known)}{meant(value, known)}"
+        f"{what} '{value}' is unknown, use one of {', '.join(known)}{suggestion(value, known)}"
     )
 
 
-def meant(value: object, known: Iterable[str]) -> str:
+def suggestion(value: object, known: Iterable[str]) -> str:
     """Suggestion of the nearest word, to end a sentence; empty if none is near.
 
     What is the beginning of a word, such as a key without its unit, is nearest to that which adds

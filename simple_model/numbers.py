@@ -61,7 +61,7 @@ def percent(share: float) -> str:
     return f"{significant(100 * share, 2)} %"
 
 
-def counted(number: int, thing: str) -> str:
+def plural(number: int, thing: str) -> str:
     """A number of things, in the plural unless it is one."""
     return f"{number:,} {thing}{'s' * (number != 1)}"
 

@@ -17,13 +17,13 @@ from numpy.typing import ArrayLike
 
 from simple_model.load.drive import PUBLISHED
 from simple_model.load.pressure import MovingPressure
-from simple_model.load.sampling import finer, low_passed, reached, step
+from simple_model.load.sampling import highest_line, low_pass, oversampling, step
 from simple_model.quantities import PRESSURE
 from simple_model.response import Effort, Response
 from simple_model.typing import Floats
 
 
-def published(pressure: MovingPressure) -> MovingPressure:
+def published_load(pressure: MovingPressure) -> MovingPressure:
     """The same Tacton and height under the paper's load: linear drive, main lobe, no mean."""
     return replace(pressure, drive=PUBLISHED, profile="main_lobe")
 
@@ -39,7 +39,7 @@ def point_kernel_published(pressure: MovingPressure, probes: ArrayLike, times: F
     -------
     Response, stimulation (t, p) in Pa
     """
-    response = point_kernel(published(pressure), probes, times)
+    response = point_kernel(published_load(pressure), probes, times)
     return replace(response, model="point-kernel-published")
 
 
@@ -63,8 +63,8 @@ def point_kernel(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> 
     if probes.ndim != 2 or probes.shape[1] != 2:
         raise ValueError(f"probes have shape {probes.shape}; give (p, 2) positions in metre")
     started = time.perf_counter()
-    parts = finer(reached(pressure), step(times))
-    stimulation = low_passed(partial(pressure, probes), times, parts)
+    parts = oversampling(highest_line(pressure), step(times))
+    stimulation = low_pass(partial(pressure, probes), times, parts)
     effort = Effort(seconds={"evaluate": time.perf_counter() - started}, steps=len(times))
     return Response(
         model="point-kernel", times=np.array(times), probes=probes, values=stimulation,

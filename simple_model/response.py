@@ -14,7 +14,7 @@ from simple_model import drawing
 from simple_model.load.line_names import line_names
 from simple_model.load.pressure import MovingPressure
 from simple_model.load.sampling import step
-from simple_model.numbers import counted, significant, stated_error
+from simple_model.numbers import plural, significant, stated_error
 from simple_model.quantities import DISPLACEMENT, PRESSURE, NotOfThis, Quantity, quantity
 from simple_model.spectra import Lines, Spectrum
 from simple_model.typing import Bools, Complex, Floats, Ints
@@ -178,12 +178,12 @@ class Response:
     def __repr__(self) -> str:
         record, times = self.record, self.times
         largest = record.per_unit * float(np.abs(self.values).max(initial=0.0))
-        size = f"{counted(len(times), 'time')}, {counted(len(self.probes), 'probe')}"
+        size = f"{plural(len(times), 'time')}, {plural(len(self.probes), 'probe')}"
         said = [
             f"{record.words} ({size}) from {1e3 * times[0]:g} to {1e3 * times[-1]:.5g} ms, at most "
             f"{significant(largest)} {record.shown}",
             f"expected error {stated_error(self.expected_error)}",
-            counted(len(self.effort.warnings), "warning"),
+            plural(len(self.effort.warnings), "warning"),
         ]
         return f"<Response of {self.model}: {'; '.join(said)}>"
 

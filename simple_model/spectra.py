@@ -7,7 +7,7 @@ import numpy as np
 
 from simple_model.choices import choose
 from simple_model.drawing import curves, new_axes, small
-from simple_model.numbers import counted
+from simple_model.numbers import plural
 from simple_model.quantities import Quantity, quantity
 from simple_model.typing import Complex, Floats
 
@@ -38,7 +38,7 @@ class Spectrum:
 
     def __repr__(self) -> str:
         said = f"{len(self.frequencies):,} frequencies to {self.frequencies[-1]:.5g} Hz"
-        return f"<Spectrum of {self.record.words}: {said}, {counted(len(self.probes), 'probe')}>"
+        return f"<Spectrum of {self.record.words}: {said}, {plural(len(self.probes), 'probe')}>"
 
     def plot(self, *, ax: "Axes | None" = None) -> "Axes":
         """Draw the spectrum at every probe, amplitudes to -80 dB of the largest on a logarithmic
@@ -87,7 +87,7 @@ class Lines:
     def __repr__(self) -> str:
         strongest = np.argsort(-np.abs(self.amplitudes).max(axis=1, initial=0.0), kind="stable")
         named = ", ".join(self.names[k] for k in strongest[:LISTED])
-        said = f"{counted(len(self), 'line')}, {counted(len(self.probes), 'probe')}"
+        said = f"{plural(len(self), 'line')}, {plural(len(self.probes), 'probe')}"
         said += f"; the strongest: {named}" if named else ""
         return f"<Lines of {self.record.words}: {said}>"
 

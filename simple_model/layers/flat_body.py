@@ -39,7 +39,13 @@ from simple_model.layers.wavenumber_integral import (
 from simple_model.load.focus import gaussian_width
 from simple_model.load.path_cells import cells, jump_times, moved_load, path_fourier, path_samples
 from simple_model.load.pressure import MovingPressure, check_lines
-from simple_model.load.sampling import below_half_the_rate, finer, is_folded, reached, step
+from simple_model.load.sampling import (
+    below_half_the_rate,
+    highest_line,
+    is_folded,
+    oversampling,
+    step,
+)
 from simple_model.load.spectrum import load_lines, synthesise
 from simple_model.response import Effort, Response
 from simple_model.typing import Complex, Floats, Ints
@@ -236,7 +242,7 @@ def field_history(
     damping = -np.log(WRAPPED) / (padded * dt)
     w = 2 * np.pi * np.fft.rfftfreq(padded, dt) - 1j * damping
     folded = is_folded(pressure, times)
-    if not folded and finer(reached(pressure), step(times)) > 1:
+    if not folded and oversampling(highest_line(pressure), step(times)) > 1:
         passed = below_half_the_rate(w.real / (2 * np.pi), times).astype(float)
     else:  # a spectrum that ended at once would ring after the start of an acceleration
         passed = erfc(BAND_END * (4 * w.real * dt / np.pi - 3)) / 2
@@ -248,7 +254,7 @@ def field_history(
         return np.asarray(np.where(t < 0, 0.0, ended * np.exp(-damping * t)))
 
     jumps = jump_times(pressure, 0.0, padded * dt)
-    parts = finer(reached(pressure), dt)
+    parts = oversampling(highest_line(pressure), dt)
     if folded:
         knots, of_load = _low_passed(pressure, 0.5 / step(times), padded, dt, lasting)
         parts = 1

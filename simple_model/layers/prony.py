@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from simple_model.choices import check_numbers
-from simple_model.numbers import counted
+from simple_model.numbers import plural
 from simple_model.typing import Complex, Floats
 
 ModulusLaw = Callable[[Any], Any]  # complex shear modulus in Pa at angular frequencies in rad/s
@@ -95,7 +95,7 @@ class PronySeries:
     def words(self) -> str:
         """Terms, error and band, as in a plan."""
         return (
-            f"Prony series of {counted(len(self.terms), 'term')}, {100 * self.error:.2g} % from "
+            f"Prony series of {plural(len(self.terms), 'term')}, {100 * self.error:.2g} % from "
             f"the law between {self.band[0]:g} and {self.band[1]:g} Hz"
         )
 

@@ -102,6 +102,6 @@ DRIVES = {
 }  # fmt: skip
 
 
-def beyond_published(drive: str | DriveLaw, usual: str | DriveLaw) -> str | DriveLaw:
+def usual_drive(drive: str | DriveLaw, usual: str | DriveLaw) -> str | DriveLaw:
     """The drive law, or the usual one in place of the published."""
     return usual if drive == PUBLISHED else drive

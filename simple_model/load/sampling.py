@@ -49,13 +49,13 @@ def _highest_order(pressure: MovingPressure) -> int:
     return int(np.abs(orders[np.abs(c) > ALIASED * np.abs(c).max()]).max())
 
 
-def reached(pressure: MovingPressure) -> float:
+def highest_line(pressure: MovingPressure) -> float:
     """Highest line in Hz of a load at any place; 0, for unknown, if it is no `MovingPressure`."""
     known = isinstance(pressure, MovingPressure)
     return highest(pressure, highest_passing(pressure)) if known else 0.0
 
 
-def finer(highest: float, dt: float) -> int:
+def oversampling(highest: float, dt: float) -> int:
     """Samples within dt in s of a load up to `highest` Hz: one if nothing aliases."""
     return 1 if highest < 0.5 / dt else ceil(PER_PERIOD * highest * dt)
 
@@ -72,7 +72,7 @@ def is_folded(pressure: MovingPressure, times: Floats) -> bool:
     dt = step(times)
     if dt * SLOWEST > 1 + 1e-6:
         return True
-    return finer(reached(pressure), dt) > 1 and not (
+    return oversampling(highest_line(pressure), dt) > 1 and not (
         pressure.tacton.is_sampled or is_abrupt(pressure)
     )
 
@@ -82,7 +82,7 @@ def highest_driving(pressure: MovingPressure, times: Floats) -> float:
     return 0.5 / step(times) if is_folded(pressure, times) else np.inf
 
 
-def low_passed(load: Callable[[Floats], Floats], times: Floats, parts: int) -> Floats:
+def low_pass(load: Callable[[Floats], Floats], times: Floats, parts: int) -> Floats:
     """Load (t, ...) at equally spaced times (t,) in s without aliasing, by a windowed sinc: `load`
     is a function of times (n,), also before and after those given, sampled `parts` times as finely.
     """
@@ -99,5 +99,5 @@ def low_passed(load: Callable[[Floats], Floats], times: Floats, parts: int) -> F
 
 def resolving_step(pressure: MovingPressure, longest: float) -> float:
     """Time step in s, at most `longest`, at which nothing of a load aliases."""
-    hz = reached(pressure)
+    hz = highest_line(pressure)
     return longest if hz < 0.5 / longest else 0.5 / hz

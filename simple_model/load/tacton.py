@@ -145,7 +145,7 @@ def tones(tacton: Tacton) -> tuple[float, float, float]:
     return tacton.am_frequency, tacton.second_am_frequency, tacton.envelope_frequency
 
 
-def commanded(tacton: Tacton, t: ArrayLike) -> Floats:
+def commanded_signal(tacton: Tacton, t: ArrayLike) -> Floats:
     """Commanded signal p(t) of equation 1 at times (...) in s, with its carrier, over full drive.
 
     Levels of a recorded path are not in it: each focus has its own.
@@ -154,7 +154,7 @@ def commanded(tacton: Tacton, t: ArrayLike) -> Floats:
     return tacton.amplitude * level(tacton, t) * carrier * modulation(tacton, t)
 
 
-def repeated(tacton: Tacton) -> dict[str, float]:
+def repetition_frequencies(tacton: Tacton) -> dict[str, float]:
     """Frequencies in Hz by name of all that a Tacton repeats; f_d is that of the foci together."""
     w1, w2 = tacton.superposition
     signal = tacton.signal
@@ -177,7 +177,7 @@ def pattern_period(tacton: Tacton) -> float:
     them, after which every phase is back within 1 % of a turn, or comes nearest to that: of f_d =
     190.986 Hz with f_AM = 140 Hz, 78.5 ms. It is the duration if nothing repeats within it.
     """
-    found = repeated(tacton)
+    found = repetition_frequencies(tacton)
     f = np.array(list(found.values()))
     if not len(f) or f.min() * tacton.duration < 1 - COMMENSURATE:
         return tacton.duration

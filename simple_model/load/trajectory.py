@@ -257,7 +257,7 @@ def joined(paths: Sequence[Trajectory], frequency: float) -> Trajectory:
     """Several foci on paths of their own, as one recorded path that they share.
 
     One period of each path follows the other: n paths, each drawn in T, make a recording of period
-    n T. Give it `evenly(n)` as foci, which are then at every time one on each path. A circle of
+    n T. Give it `even_phases(n)` as foci, which are then at every time one on each path. A circle of
     diameter d is a polygon within d/2 (1 - cos(pi / 132)).
 
     Parameters
@@ -287,12 +287,12 @@ def joined(paths: Sequence[Trajectory], frequency: float) -> Trajectory:
     return Trajectory(shape="recorded", points=tuple(points), times=tuple(times))
 
 
-def evenly(n: int) -> tuple[float, ...]:
-    """Phases (n,) of n foci that share a path evenly."""
+def even_phases(n: int) -> tuple[float, ...]:
+    """Phases (n,) of n foci that share a path even_phases."""
     return tuple(j / n for j in range(n))
 
 
-def parted(path: Trajectory, n: int) -> tuple[Floats, ...]:
+def split_recording(path: Trajectory, n: int) -> tuple[Floats, ...]:
     """Corners (k, 2) in metre of each of n parts that take a recording equally long."""
     clock = np.array(path.times) * n / path.times[-1]
     # At a jump from part to part there are two corners: the first ends one, the second begins one.

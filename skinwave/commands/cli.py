@@ -98,12 +98,12 @@ class _Parser(argparse.ArgumentParser):
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         found, unknown = super().parse_known_args(args, namespace)
         if unknown:
-            from simple_model.choices import meant
+            from simple_model.choices import suggestion
 
             known = [word for action in self._actions for word in action.option_strings]
             what = "option" if unknown[0].startswith("-") else "argument"
             name = unknown[0].partition("=")[0]
-            self.error(f"unknown {what} {name}{meant(name, known).rstrip('?')}")
+            self.error(f"unknown {what} {name}{suggestion(name, known).rstrip('?')}")
         return found, unknown
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from simple_model import SUPERPOSITIONS, MovingPressure, Tacton, Trajectory, evenly
+from simple_model import SUPERPOSITIONS, MovingPressure, Tacton, Trajectory, even_phases
 from simple_model.layers.flat_body import steady_lines
 from skinwave.bodies.analytic import compliance, has_exact_waves, is_laterally_infinite
 from skinwave.live.radial import LOWEST
@@ -120,7 +120,7 @@ def random_scene(
         amplitude=float(rng.integers(30, 101)) / 100, am_frequency=am, superposition=ratio,
         second_am_frequency=float(rng.integers(20, 300)) if second else 0.0,
         envelope_frequency=float(rng.integers(1, 20)) if rng.random() < 0.2 else 0.0,
-        trajectory=Trajectory(shape=shape, **moving), foci=evenly(int(rng.integers(1, 4))),
+        trajectory=Trajectory(shape=shape, **moving), foci=even_phases(int(rng.integers(1, 4))),
     )  # fmt: skip
     height = float(rng.integers(round(200 * lowest), 60)) / 200
     pressure = MovingPressure(tacton=tacton, drive=str(rng.choice(DRIVES)), height=height)

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from simple_model import DRIVES, SHAPES, SUPERPOSITIONS, Tacton, Trajectory, evenly, joined
-from simple_model.load.trajectory import ROUND, parted
+from simple_model import DRIVES, SHAPES, SUPERPOSITIONS, Tacton, Trajectory, even_phases, joined
+from simple_model.load.trajectory import ROUND, split_recording
 from skinwave.scene.paper15 import tactons
 from skinwave.scene.scene import Scene, check_load
 
@@ -82,7 +82,7 @@ def values_of(scene: Scene, body: str) -> Values:
 
 def _tacton_values(tacton: Tacton) -> Values:
     path, rhythm = tacton.trajectory, tacton.rhythm
-    even = np.allclose(sorted(tacton.foci), evenly(len(tacton.foci)))
+    even = np.allclose(sorted(tacton.foci), even_phases(len(tacton.foci)))
     phases = "" if even else ", ".join(f"{100 * phase:g}" for phase in tacton.foci)
     pulses = rhythm.pulses if rhythm else ()
     return PLAIN | {
@@ -129,7 +129,7 @@ def _own_paths(tacton: Tacton) -> tuple[Trajectory, ...]:
     if path.shape != "recorded" or path.levels or path.hold or n != len(tacton.foci):
         return ()
     try:
-        paths = tuple(map(_shape_of, parted(path, n)))
+        paths = tuple(map(_shape_of, split_recording(path, n)))
         same = joined(paths, tacton.drawing_frequency)
     except (KeyError, ValueError):  # of another number of corners, or no shape
         return ()

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from simple_model.numbers import (
     as_sentence,
-    counted,
     percent,
+    plural,
     significant,
     stated_error,
     with_error,
@@ -207,14 +207,14 @@ def _where(found: MeasuredComparison, column: ModelColumn) -> str:
     names, places = list(found.names), shown.shape[1]
     said = [f"{names[k]} at {shown[k].sum()} of {places} places" for k in lines[:MOST_NAMED]]
     more = len(lines) - len(said)
-    return ", ".join(said) + (f" and {counted(more, 'more line')}" if more else "")
+    return ", ".join(said) + (f" and {plural(more, 'more line')}" if more else "")
 
 
 def remarks(found: MeasuredComparison) -> list[str]:
     """Sentences on the record: repetitions, what is unresolved, and what was assumed."""
     measurement, main = found.measurement, found.main
     said = f"{measurement.name or 'The measurement'}: {measurement.record.words} at "
-    said += f"{counted(len(measurement.places), 'place')}, {_repetitions(found)}"
+    said += f"{plural(len(measurement.places), 'place')}, {_repetitions(found)}"
     turned = opposite_sign(f"the {label(main.run.column)}", has_delay=True)
     return [
         said,
@@ -238,7 +238,7 @@ def _repetitions(found: MeasuredComparison) -> str:
     unknown = int(np.isnan(lines.variance).any(axis=1).sum())
     if unknown == len(lines.frequencies):
         return "one repetition, whose noise is unknown."
-    others = f", and unknown for {counted(unknown, 'line')}" * (unknown > 0)
+    others = f", and unknown for {plural(unknown, 'line')}" * (unknown > 0)
     return f"one repetition, whose noise is that of the noise floor under each line{others}."
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from simple_model.numbers import counted, percent, significant
+from simple_model.numbers import percent, plural, significant
 from skinwave.measure.alignment import opposite_sign
 from skinwave.measure.fit import Fit
 from skinwave.measure.inspection import flaws
@@ -25,7 +25,7 @@ def sentences(found: Fit) -> list[str]:
     known = f"; chi squared over its degrees of freedom is {ratio}, of errors that are known"
     said = [
         f"{found.target.model} was fitted to {data.words}.",
-        f"{solution.reached} of {counted(len(solution.starts), 'start')} reached the solution, "
+        f"{solution.reached} of {plural(len(solution.starts), 'start')} reached the solution, "
         f"which leaves {percent(found.misfit)} of the measured motion{known * data.is_known}.",
     ]  # fmt: skip
     for each in found.estimates:

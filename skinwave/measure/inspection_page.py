@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from simple_model.numbers import as_sentence, counted, significant
+from simple_model.numbers import as_sentence, plural, significant
 from simple_model.response import SETTLE
 from skinwave.measure import writing
 from skinwave.measure.inspection import Inspection
@@ -101,8 +101,8 @@ def sentences(found: Inspection) -> list[str]:
 
 def _content(found: Inspection) -> str:
     measured, axis = found.measured, found.measured.axis
-    said = f"{measured.record.name.capitalize()} at {counted(len(measured.places), 'place')}, "
-    said += counted(len(measured.values), "repetition")
+    said = f"{measured.record.name.capitalize()} at {plural(len(measured.places), 'place')}, "
+    said += plural(len(measured.values), "repetition")
     if measured.is_spectrum:
         return f"{said}: {len(axis)} complex amplitudes, {axis[0]:g} to {axis[-1]:g} Hz."
     lasts = len(axis) / measured.rate if len(axis) > 1 else 0.0

@@ -13,7 +13,7 @@ import numpy as np
 
 from simple_model import resolved_lines
 from simple_model.load.line_names import line_names
-from simple_model.numbers import counted
+from simple_model.numbers import plural
 from simple_model.response import SETTLE, fit_lines
 from skinwave.measure.lines import MeasuredLines, as_response, holm, lines_of, measurable
 from skinwave.measure.measurement import Measurement
@@ -72,7 +72,7 @@ class LoadLines:
     def words(self) -> str:
         """How many there are at how many places."""
         n, p = self.found.mean.shape
-        return f"{counted(n, 'line')} at {counted(p, 'place')}"
+        return f"{plural(n, 'line')} at {plural(p, 'place')}"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -8,7 +8,7 @@ from decimal import Decimal, InvalidOperation
 
 import numpy as np
 
-from simple_model.choices import meant
+from simple_model.choices import suggestion
 from simple_model.quantities import ACCELERATION, DISPLACEMENT, QUANTITIES, VELOCITY
 
 STANDARD_GRAVITY = 9.80665  # m/s2
@@ -81,7 +81,8 @@ def per_unit(unit: str, kind: str) -> float:
         other = quantity_of(unit)
         why = f"is one of {other}, not of {kind}" if other else f"is no unit of {kind}"
         raise ValueError(
-            f"'{unit[:40]}' {why}; give --unit as one of {', '.join(units)}{meant(name, units)}"
+            f"'{unit[:40]}' {why}; give --unit as one of {', '.join(units)}"
+            f"{suggestion(name, units)}"
         )
     if factor <= 0:
         raise ValueError(f"'{unit[:40]}' must be above 0; use --positive to turn the sign")

@@ -13,7 +13,7 @@ from meshes import TetMesh
 from meshes.tetmesh import facet_set
 from simple_model import Effort
 from simple_model.drawing import new_axes
-from simple_model.numbers import counted, significant, stated_error
+from simple_model.numbers import plural, significant, stated_error
 from simple_model.quantities import DISPLACEMENT
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import from_rest, oscillating
@@ -51,11 +51,11 @@ class Field:
     def __repr__(self) -> str:
         size = 1e6 * float(np.sqrt((self.displacement**2).sum(axis=2).max(initial=0.0)))
         said = [
-            f"{counted(len(self.times), 'time')} from {1e3 * self.times[0]:g} to "
+            f"{plural(len(self.times), 'time')} from {1e3 * self.times[0]:g} to "
             f"{1e3 * self.times[-1]:.5g} ms, displacement at most {significant(size)} µm",
             f"{self.mesh!r}"[1:-1],
             f"expected error {stated_error(self.expected_error)}",
-            counted(len(self.effort.warnings), "warning"),
+            plural(len(self.effort.warnings), "warning"),
         ]
         return f"<Field: {'; '.join(said)}>"
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from simple_model import drawing
 from simple_model.load.focus import spot_width
-from simple_model.numbers import counted, percent, stated_error
+from simple_model.numbers import percent, plural, stated_error
 from skinwave.report.description import asked_rows
 from skinwave.typing import Floats
 
@@ -44,7 +44,7 @@ def scene_line(scene: "Scene") -> str:
     if body.of_kind.discretise:
         layers = [f"{1e3 * each.thickness:g} mm of {_named(each.material)}" for each in body.layers]
         of += f", {'; below it '.join([*layers, _named(body.material)])}"
-    probes = f"{counted(len(scene.probes), 'probe')}, {scene.reading.words}"
+    probes = f"{plural(len(scene.probes), 'probe')}, {scene.reading.words}"
     return _line(f"Scene {scene.name!r}", [", ".join(driven), of, probes])
 
 
@@ -53,7 +53,7 @@ def plan_line(plan: "Plan") -> str:
     body = plan.body.of_kind.words(plan.body)
     body += f" halved across {' and '.join(plan.symmetry)}" if plan.symmetry else ""
     size = f"elements of {1e3 * plan.h:.3g} mm" if plan.h else "no mesh"
-    error, warned = stated_error(plan.error), counted(len(plan.warnings), "warning")
+    error, warned = stated_error(plan.error), plural(len(plan.warnings), "warning")
     said = [f"{size}, {body}", f"expected error {error}", _cost(plan), warned]
     return _line(f"Plan of {plan.model}", said)
 
@@ -64,7 +64,7 @@ def agreement_line(found: "Agreement") -> str:
         f"relative L2 misfit {_range(found.relative_l2)}",
         f"of the shape {_range(found.shape_misfit)}",
         f"scale {found.scale:.4g}",
-        f"{counted(len(found.probes), 'probe')}, {counted(len(found.frequencies), 'line')}",
+        f"{plural(len(found.probes), 'probe')}, {plural(len(found.frequencies), 'line')}",
     ]
     return _line("Agreement", said)
 

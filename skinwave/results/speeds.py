@@ -6,7 +6,7 @@ from math import asin, ceil
 import numpy as np
 
 from simple_model import MovingPressure, Tacton, pattern_period
-from simple_model.load.tacton import repeated
+from simple_model.load.tacton import repetition_frequencies
 from skinwave.typing import Floats
 
 FEWEST, MOST = 40, 256  # frames of an animation
@@ -27,14 +27,14 @@ def seam(tacton: Tacton, span: float) -> float:
     """Phase jump in turns, 0..0.5, of the worst of a Tacton's periodic parts after a time in s:
     that of an animation which repeats this time.
     """
-    turns = span * np.array(list(repeated(tacton).values()))
+    turns = span * np.array(list(repetition_frequencies(tacton).values()))
     return float(np.abs(turns - np.round(turns)).max(initial=0.0))
 
 
 def period(pressure: MovingPressure) -> float | None:
     """Period in s of a load's whole pattern; None if it has none within its duration."""
     whole = pattern_period(pressure.tacton)
-    turns = whole * max(repeated(pressure.tacton).values(), default=0.0)
+    turns = whole * max(repetition_frequencies(pressure.tacton).values(), default=0.0)
     return whole if turns and seam(pressure.tacton, whole) <= SAME * turns else None
 
 

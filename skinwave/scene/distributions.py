@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
-from simple_model.choices import choose, meant
+from simple_model.choices import choose, suggestion
 from skinwave.system.plain_text import number_in
 from skinwave.typing import Floats
 
@@ -164,7 +164,7 @@ def read_distribution(key: str, table: Mapping[str, Any]) -> Distribution:
     known = (VALUE, SHAPE, *(k for keys, _ in MEASURES.values() for k in keys))
     for own in table:
         if own not in known:
-            hint = meant(own, known) or f"; it may have {', '.join(known)}"
+            hint = suggestion(own, known) or f"; it may have {', '.join(known)}"
             raise ValueError(f"{key} has the unknown key '{own}'{hint}")
     given = [name for name, (keys, _) in MEASURES.items() if {*keys} & table.keys()]
     if len(given) != 1 or not {*MEASURES[given[0]][0]} <= table.keys():

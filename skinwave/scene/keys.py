@@ -9,7 +9,7 @@ from math import inf, isfinite, nextafter, pi
 from typing import Any
 
 from simple_model import DRIVES, DriveLaw, Material, ModulusTable, PronyTerm, Rhythm, Signal
-from simple_model.choices import choose, meant
+from simple_model.choices import choose, suggestion
 from simple_model.layers.material import PRESETS
 from simple_model.layers.modulus_laws import COLUMNS
 from simple_model.load.focus import FOCI, FocalSpot
@@ -400,7 +400,7 @@ def checked(where: str, table: dict[str, Any], keys: Mapping[str, Any]) -> dict[
     for key, value in table.items():
         if key not in keys:
             others = [f"[{name}]" for name, known in SECTIONS.items() if key in known]
-            hint = f"; it belongs to {' or '.join(others)}" if others else meant(key, keys)
+            hint = f"; it belongs to {' or '.join(others)}" if others else suggestion(key, keys)
             hint = hint or f"; it may have {', '.join(keys)}"
             raise ValueError(f"{where} has the unknown key {key[:60]!r}{hint}")
         field = keys[key]

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
-from simple_model import MovingPressure, Tacton, Trajectory, published
+from simple_model import MovingPressure, Tacton, Trajectory, published_load
 from skinwave.scene.scene import BODIES, Body, Scene, with_body
 
 AM_FREQUENCIES = (0.0, 80.0, 140.0, 210.0)  # Hz
@@ -34,5 +34,5 @@ def scenes(name: str, tacton: Tacton, bodies: Mapping[str, Body] | None = None) 
 def beside_kernels(scene: Scene) -> dict[str, Scene]:
     """The scene without its body by model: under the published load, and under its own."""
     bare = with_body(scene, BODIES["none"])
-    paper = replace(bare, pressure=published(scene.pressure))
+    paper = replace(bare, pressure=published_load(scene.pressure))
     return {"point-kernel-published": paper, "point-kernel": bare}

@@ -14,7 +14,7 @@ import numpy as np
 import tomli_w
 
 from meshes import reading
-from simple_model.choices import choose, meant
+from simple_model.choices import choose, suggestion
 from skinwave.scene.distributions import Spread, parse_distribution, uniform
 from skinwave.scene.file import (
     content,
@@ -255,7 +255,7 @@ def _known(key: str) -> str:
     """
     known = [f"{section}.{name}" for section, keys in SECTIONS.items() for name in keys]
     if key != BODY and ".".join(key.split(".")[:2]) not in known:
-        hint = meant(key, known) or "; a key is of the form tacton.size_mm"
+        hint = suggestion(key, known) or "; a key is of the form tacton.size_mm"
         raise ValueError(f"'{key}' is no key of a scene{hint}")
     return key
 

@@ -33,7 +33,7 @@ from skinwave.results import record, surface
 from skinwave.results.files import write_lines, write_run
 from skinwave.results.motion import BodyMotion, probe_response, waves
 from skinwave.results.run import Run
-from skinwave.results.speeds import repeated, shown_part
+from skinwave.results.speeds import repetition_frequencies, shown_part
 from skinwave.results.surface import (
     SurfaceField,
     body_map,
@@ -175,7 +175,7 @@ def answers(
         for body, its in shown.items()
         if _has_elements(its, h) and not _is_plate(its, h)
     }
-    tones = max(repeated(scene.tacton).values(), default=0.0)
+    tones = max(repetition_frequencies(scene.tacton).values(), default=0.0)
     fastest = max(map(fastest_line, moved.values()), default=tones)
     part = shown_part(scene.pressure, fastest, frames)  # the same for all, side by side
     for column, its in shown.items():

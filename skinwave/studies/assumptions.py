@@ -14,7 +14,7 @@ import numpy as np
 from meshes import Palm
 from simple_model import Material, MovingPressure, PronyTerm, Trajectory
 from simple_model.layers.material import PRESETS
-from simple_model.load.drive import PUBLISHED, beyond_published
+from simple_model.load.drive import PUBLISHED, usual_drive
 from skinwave.models.limits import takes
 from skinwave.models.plate_modes import FROM_REST, STRETCHED
 from skinwave.planning.estimates import response_spectrum
@@ -115,7 +115,7 @@ def relaxed(
     without propagation.
     """
     spot = "gaussian" if "sinc^2 profile" in dropped else "main_lobe"
-    own = beyond_published(scene.pressure.drive, MovingPressure.drive)
+    own = usual_drive(scene.pressure.drive, MovingPressure.drive)
     profile = "array" if "main lobe only" in dropped else spot
     drive = own if "linear drive" in dropped else PUBLISHED
     pressure = replace(scene.pressure, profile=profile, drive=drive)

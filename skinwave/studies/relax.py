@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 
 from fem import NotReduced
 from simple_model import Effort, MovingPressure, Response, lines, resolved_lines, sensation_level
-from simple_model.load.drive import beyond_published
+from simple_model.load.drive import usual_drive
 from simple_model.numbers import decibel, significant
 from skinwave.bodies.sizes import default_size
 from skinwave.models import named
@@ -303,7 +303,7 @@ def followed_lines(scene: Scene, response: Response) -> dict[str, float]:
     """Names and frequencies in Hz of the lines that are followed, as far as a response resolves
     them: those of a drive that is not linear, which has all that a linear one has.
     """
-    drive = beyond_published(scene.pressure.drive, MovingPressure.drive)
+    drive = usual_drive(scene.pressure.drive, MovingPressure.drive)
     pressure = replace(scene.pressure, drive=drive)
     return resolved_lines(pressure, response, candidates=ASSESSED, highest=HIGHEST)[0]
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import numpy as np
 
 from simple_model import Effort
-from simple_model.numbers import FAINTEST, counted, decibel, interval, percent, significant
+from simple_model.numbers import FAINTEST, decibel, interval, percent, plural, significant
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.report.figures import answered
 from skinwave.report.levels import sensation_levels, strongest_probe
@@ -212,6 +212,6 @@ def effort_table(
     named = ", ".join(f"{name} {version}" for name, version in versions.items())
     peak = max((effort.peak_memory for effort in efforts.values()), default=0) / 2**30
     spent = sum(s for e in efforts.values() for s in e.seconds.values()) if total is None else total
-    took = f"{counted(tactons, 'Tacton')} took {significant(spent, 2)} s in all"
+    took = f"{plural(tactons, 'Tacton')} took {significant(spent, 2)} s in all"
     took += f", at most {peak:.2f} GiB in a process" * bool(peak)
     return [Table(EFFORT, rows), f"{took}. {named}"]

@@ -59,7 +59,7 @@ def run_suite(
 def page(results: list[Result], planned: int) -> Report:
     """A summary of all cases, then each with its source, mesh and checks."""
     left_out = len(CASES) - planned
-    verdict = [f"{counted(results)}."]
+    verdict = [f"{plural(results)}."]
     if len(results) < planned:
         verdict.insert(0, f"Interrupted: {len(results)} of {planned} cases are finished.")
     if left_out > 0:
@@ -87,10 +87,10 @@ def summary(results: list[Result]) -> str:
         f"{'passed' if r.passed else 'FAILED'}" + f"  {r.error}" * bool(r.error)
         for r in results
     ]
-    return "\n".join([*rows, counted(results)])
+    return "\n".join([*rows, plural(results)])
 
 
-def counted(results: list[Result]) -> str:
+def plural(results: list[Result]) -> str:
     """How many cases passed and failed."""
     failed = sum(not r.passed for r in results)
     return f"{len(results) - failed} passed, {failed} failed"

@@ -9,7 +9,7 @@ from in_browser import needs_browser
 from in_live_page import scenes_of, some_values
 
 import simple_model.load.path_cells
-from simple_model import Response, published, sensation_level, spectrum, threshold
+from simple_model import Response, published_load, sensation_level, spectrum, threshold
 from simple_model.load.line_names import line_names
 from simple_model.load.path_cells import is_abrupt
 from simple_model.load.spectrum import pressure_lines
@@ -116,7 +116,7 @@ def test_the_kernel_is_that_of_python_in_time_and_on_a_map(page, starts):
     for scene, own in zip(scenes_of(page, many), found, strict=True):
         pressure = scene.pressure
         top = pressure.peak_pressure
-        for load, given in zip((pressure, published(pressure)), own["waveforms"], strict=True):
+        for load, given in zip((pressure, published_load(pressure)), own["waveforms"], strict=True):
             wanted = load([[0.008, -0.003]], TIMES)[:, 0]
             np.testing.assert_allclose(given, wanted, rtol=0, atol=1e-9 * top)
         f, lines = pressure_lines(steady(pressure), np.array([[0.008, -0.003]]), 1e-9)

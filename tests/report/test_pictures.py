@@ -21,7 +21,7 @@ from legible import illegible, sizes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
-from simple_model import MovingPressure, Tacton, Trajectory, pattern_period, published
+from simple_model import MovingPressure, Tacton, Trajectory, pattern_period, published_load
 from skinwave.commands.cli import main
 from skinwave.report import films, maps, render
 from skinwave.report.figures import tacton_figure
@@ -86,7 +86,7 @@ def test_all_but_the_published_kernel_receive_the_same_load(scene, folder, seen)
     assert list(loads) == [
         "point-kernel-published", "point-kernel", "paper-sheet-loose", "skin-slab",
     ]  # fmt: skip
-    assert loads.pop("point-kernel-published") == published(scene.pressure) != scene.pressure
+    assert loads.pop("point-kernel-published") == published_load(scene.pressure) != scene.pressure
     assert set(loads.values()) == {scene.pressure}
 
 

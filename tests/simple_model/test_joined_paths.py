@@ -10,7 +10,7 @@ from simple_model import (
     Rhythm,
     Tacton,
     Trajectory,
-    evenly,
+    even_phases,
     joined,
     lines,
     named_lines,
@@ -34,7 +34,7 @@ PLACES = np.array([[0.0, 0.0], [-0.015, 0.010], [0.020, 0.001], [0.004, -0.018]]
 def together(paths, **more):
     """The load of all paths at once."""
     path = joined(paths, FREQUENCY)
-    return MovingPressure(tacton=Tacton(trajectory=path, foci=evenly(len(paths)), **more))
+    return MovingPressure(tacton=Tacton(trajectory=path, foci=even_phases(len(paths)), **more))
 
 
 def alone(path, **more):

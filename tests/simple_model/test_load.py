@@ -11,8 +11,8 @@ from simple_model import (
     Tacton,
     Trajectory,
     array_field,
-    commanded,
-    evenly,
+    commanded_signal,
+    even_phases,
     focal_spot,
     joined,
     pattern_period,
@@ -47,7 +47,7 @@ def test_equation_one_with_everything_on():
     )  # fmt: skip
     mixed = 0.25 * np.sin(2 * np.pi * 80 * t) + 0.75 * np.sin(2 * np.pi * 140 * t)
     expected = 0.5 * np.sin(2 * np.pi * 40e3 * t) * mixed * np.sin(2 * np.pi * 3 * t)
-    np.testing.assert_allclose(commanded(tacton, t), expected, atol=1e-15)
+    np.testing.assert_allclose(commanded_signal(tacton, t), expected, atol=1e-15)
 
 
 def test_values_out_of_range_are_refused():
@@ -83,7 +83,7 @@ SHARED = joined([Trajectory(shape="circle", size=0.02), Trajectory(shape="point"
         ({"am_frequency": 140}, 1 / 140),
         ({"am_frequency": 140, "superposition": (0.0, 1.0)}, 1.0),  # not heard: nothing varies
         ({"am_frequency": 140, "trajectory": circle(200)}, 1 / 20),
-        ({"trajectory": SHARED, "foci": evenly(2)}, 1 / 185),
+        ({"trajectory": SHARED, "foci": even_phases(2)}, 1 / 185),
         ({"am_frequency": 140, "rhythm": PULSES}, 0.4),
         ({"am_frequency": 140, "signal": Signal(rate=100, samples=(0.0, 1.0, 0.5))}, 0.15),
         ({}, 1.0),

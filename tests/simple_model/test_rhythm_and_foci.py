@@ -11,7 +11,7 @@ from simple_model import (
     Signal,
     Tacton,
     Trajectory,
-    commanded,
+    commanded_signal,
     line_table,
     lines,
     named_lines,
@@ -51,7 +51,7 @@ def test_there_is_silence_in_the_gaps(drive):
     into = np.mod(TIMES + 1e-9, PULSES.period)
     on = (into < 0.010) | ((into >= 0.016) & (into < 0.020))
     assert not x[~on].any()
-    assert not commanded(tacton, TIMES)[~on].any()
+    assert not commanded_signal(tacton, TIMES)[~on].any()
     plain = replace(tacton, rhythm=None)
     same = point_kernel(MovingPressure(tacton=plain, drive=drive), PLACES, TIMES).displacement
     np.testing.assert_array_equal(x[on], same[on])
