@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simple_model.load.line_names import SAME, WEAKEST, LineNames, line_names
+from simple_model.load.line_names import SAME_LINE, WEAKEST, LineNames, line_names
 from simple_model.load.pressure import MovingPressure
 from simple_model.load.sampling import step
 from simple_model.response import (
@@ -93,7 +93,7 @@ def line_table(
     """
     nyquist = 0.5 / step(response.times)
     found = line_names(pressure, FITTED, candidates=candidates)
-    same = SAME / pressure.tacton.duration
+    same = SAME_LINE / pressure.tacton.duration
     found = found.with_more(_apart(beside or {}, found, same))
     found = found.some(found.frequencies < nyquist)
     fit = _fit(found, response)

@@ -37,7 +37,7 @@ from simple_model.layers.wavenumber_integral import (
     point_integrals,
 )
 from simple_model.load.focus import gaussian_width
-from simple_model.load.path_cells import cells, jump_times, moved_load, path_fourier, path_samples
+from simple_model.load.path_cells import cells, jump_times, path_fourier, path_samples, sampled_load
 from simple_model.load.pressure import MovingPressure, check_lines
 from simple_model.load.sampling import (
     below_half_the_rate,
@@ -288,7 +288,7 @@ def _as_it_is(
     fine = dt / parts
     at, shares = cells(np.append(jumps, 0.0), -fine / 2, fine, padded * parts)
     gain = pressure.gain(np.maximum(at, 0.0)) * lasting(at)
-    knots, mixed = moved_load(pressure, at, gain)
+    knots, mixed = sampled_load(pressure, at, gain)
     return knots, (shares @ mixed).__matmul__
 
 

@@ -1,7 +1,7 @@
 """Drive laws: from a commanded amplitude to the radiation pressure on the surface.
 
-A is the amplitude (0..1), which may vary in time, M the modulation (-1..1), m the depth of
-modulation (0..1). Without modulation M = 1, and every law gives its full value, 1 at A = 1.
+A is the amplitude (0 to 1), which may vary in time, M the modulation (-1 to 1), m the depth of
+modulation (0 to 1). Without modulation M = 1, and every law gives 1 at A = 1.
 """
 
 from __future__ import annotations
@@ -14,21 +14,26 @@ import numpy as np
 from simple_model.typing import Floats
 
 PUBLISHED = "linear"  # of the point kernel of Lim, Seifi and Park
-EXACT = 1e-9  # relative misfit within which a law is what it is said to be
+ROUND_OFF = 1e-9  # largest relative misfit of a law from its polynomial or product
 
 
 @dataclass(frozen=True, kw_only=True)
 class DriveLaw:
-    """Drive law: pressure from amplitude, modulation and depth of modulation.
+    """Drive law: pressure as a function of amplitude, modulation and depth of modulation.
 
     Parameters
     ----------
-    name : str, of messages, pages and, if it is registered in `DRIVES`, scene files
-    pressure : amplitude (...), modulation (...), depth -> pressure (...) over that at full drive
-    degree : int, of a polynomial in the modulation; None if it is no polynomial
-    words, note : str, a few words for a choice on a page, and a sentence about its lines of AM
+    name : str, for messages, pages and, if it is registered in `DRIVES`, scene files
+    pressure : amplitude (...), modulation (...), depth -> pressure (...) relative to full drive
+    degree : int, as a polynomial of the modulation; None if it is not a polynomial
+    words, note : str, a few words for a choice on a page, and a sentence about its lines under AM
 
-    Raises a ValueError if it is no polynomial of its degree in the modulation.
+    Raises a ValueError if the law is not a polynomial of its degree in the modulation.
+
+    >>> import numpy as np
+    >>> law = DriveLaw(name="cubic", degree=3, pressure=lambda A, M, m: (A * (1 + m * M) / 2) ** 3)
+    >>> law(1.0, np.array([-1.0, 0.0, 1.0]), 1.0)
+    array([0.   , 0.125, 1.   ])
     """
 
     name: str
@@ -42,19 +47,19 @@ class DriveLaw:
             return
         for depth in (0.5, 1.0):
             M = np.cos(np.linspace(0, np.pi, 4 * self.degree + 9))
-            found = self(1.0, M, depth)
-            misfit = found - np.polynomial.Polynomial.fit(M, found, self.degree)(M)
-            if np.abs(misfit).max() > EXACT * max(1.0, np.abs(found).max()):
+            pressure = self(1.0, M, depth)
+            misfit = pressure - np.polynomial.Polynomial.fit(M, pressure, self.degree)(M)
+            if np.abs(misfit).max() > ROUND_OFF * max(1.0, np.abs(pressure).max()):
                 raise ValueError(
-                    f"drive law '{self.name}' is no polynomial of degree {self.degree} in the "
-                    "modulation; give it its degree, or None"
+                    f"drive law '{self.name}' is not a polynomial of degree {self.degree} in the "
+                    "modulation; give the right degree, or None"
                 )
 
     def __str__(self) -> str:
         return self.name
 
     def __call__(self, amplitude: Floats | float, modulation: Floats, depth: float) -> Floats:
-        """Pressure (...) over that at full drive."""
+        """Pressure (...) relative to full drive."""
         return np.asarray(self.pressure(amplitude, modulation, depth))
 
     @property
@@ -64,16 +69,16 @@ class DriveLaw:
         return not np.allclose(self(1.0, M, 0.25), self(1.0, M, 1.0))
 
     def level_factor(self, level: Floats, depth: float) -> Floats:
-        """Factor (...) on the pressure of a level (...) of the amplitude."""
+        """Factor (...) by which a level (...) of the amplitude changes the pressure."""
         one = np.ones(1)
         return np.asarray(self(level, one, depth) / self(1.0, one, depth))
 
     def is_product(self, amplitude: float, depth: float) -> bool:
-        """Whether a level of the amplitude is a factor of the pressure, whatever the modulation."""
+        """Whether the level of the amplitude multiplies the pressure, whatever the modulation."""
         level, M = np.meshgrid(np.linspace(0, 1, 9), np.linspace(-1, 1, 9))
         both = self(amplitude * level, M, depth)
         factors = self.level_factor(level, depth) * self(amplitude * np.ones_like(M), M, depth)
-        return bool(np.abs(both - factors).max() <= EXACT * np.abs(both).max())
+        return bool(np.abs(both - factors).max() <= ROUND_OFF * np.abs(both).max())
 
 
 DRIVES = {
@@ -84,16 +89,16 @@ DRIVES = {
             name="linear", degree=1, pressure=lambda A, M, m: A * M,
             words="the signal itself, as published",
         ),
-        # Sound pressure is modulated, and radiation pressure is its square: traditional AM (US
+        # Radiation pressure is the square of the modulated sound pressure: traditional AM (US
         # 11704983 B2), with a line at twice the AM frequency.
         DriveLaw(
             name="pressure_squared", degree=2,
             pressure=lambda A, M, m: (A * (1 + m * M) / (1 + m)) ** 2, words="usual AM",
             note="Lines at 2 f_AM and, in AM+STM, at n f_d come from the drive law, not from "
             "propagation: a device that modulates its sound pressure pushes with the square of "
-            "that pressure. The point kernel under the same load has them, too.",
+            "that pressure. The point kernel under the same load also has these lines.",
         ),
-        # The device takes the square root first, so that pressure follows M.
+        # The device takes the square root first, so the pressure follows M.
         DriveLaw(
             name="force_corrected", degree=1,
             pressure=lambda A, M, m: A * (1 + m * M) / (1 + m), words="square root first",
@@ -103,5 +108,5 @@ DRIVES = {
 
 
 def usual_drive(drive: str | DriveLaw, usual: str | DriveLaw) -> str | DriveLaw:
-    """The drive law, or the usual one in place of the published."""
+    """Return the drive law, but `usual` in place of the published one."""
     return usual if drive == PUBLISHED else drive

@@ -1,10 +1,10 @@
 """Focal spot (pressure profile about the focus), and the phased array that makes it.
 
-A 16 x 16 array of circular pistons (pitch 10.3 mm, 40 kHz, as Ultraleap's STRATOS Explore):
+The array has 16 x 16 circular pistons (pitch 10.3 mm, 40 kHz), as Ultraleap's STRATOS Explore:
 
     p(x) = sum_i P1/r_i 2 J1(k a sin th_i)/(k a sin th_i) exp(j(k r_i - k |x_f - x_i|) - al r_i)
 
-Its intensity |p|^2 near the focus is close to sinc^2(D/D0) with D0 growing with height.
+Its intensity |p|^2 near the focus is close to sinc^2(D/D0). D0 grows with height.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ GAUSSIAN_WIDTH = 4.35e-3  # m at 200 mm: the half width of sinc^2, and the force
 HALF_DEPTH = 37e-3  # m at 200 mm, above and below the focus, to half its intensity
 NOMINAL_HEIGHT = 0.200  # m
 FOCI = ("gaussian", "main_lobe", "array")
-CONTACTS = (0.2e-3, 20e-3)  # m, standard deviations of a `ContactSpot`
+CONTACT_WIDTHS = (0.2e-3, 20e-3)  # m, standard deviations of a `ContactSpot`
 FocalSpot = Callable[[Floats], Floats]  # offsets (..., 2) in metre from the focus -> relative (...)
 
-# Force on a disc of radius 10 mm about the focus by height, relative to 200 mm: `array_field`.
-# A balance measures this force, and it alone has its maximum at 200 mm.
+# Force of `array_field` on a disc of radius 10 mm about the focus, relative to 200 mm. A balance
+# measures this force, and only this force has its maximum at 200 mm.
 _HEIGHTS = np.array([20, 40, 60, 80, 100, 120, 150, 180, 200, 220, 250, 300, 350, 400, 500, 600])
 _FORCES = np.array(
     [0.2395, 0.4048, 0.5717, 0.6989, 0.7850, 0.8502, 0.9319, 0.9860]
@@ -47,15 +47,16 @@ _FORCES = np.array(
 
 @dataclass(frozen=True, kw_only=True)
 class ContactSpot:
-    """Gaussian traction of a small contact of standard deviation `width` in metre, the same at all
-    heights; a ValueError if the width is outside `CONTACTS`.
+    """Gaussian traction of a small contact of standard deviation `width` in metre.
+
+    It is the same at all heights. A width outside `CONTACT_WIDTHS` raises a ValueError.
     """
 
     width: float
 
     def __post_init__(self) -> None:
-        low, high = CONTACTS
-        cure = "; a point has no response of its own, give the contact's size"
+        low, high = CONTACT_WIDTHS
+        cure = "; a point contact has no finite response, give the size of the contact"
         check_range("width of a contact", 1e3 * self.width, 1e3 * low, 1e3 * high, " mm", cure)
 
     @property
@@ -64,14 +65,15 @@ class ContactSpot:
         return self.width
 
     def __call__(self, offsets: Floats) -> Floats:
-        """Traction (...) relative to the largest at offsets (..., 2) in metre from the middle."""
+        """Relative traction (...) at offsets (..., 2) in metre from the middle."""
         return np.asarray(np.exp(-(offsets**2).sum(axis=-1) / (2 * self.width**2)))
 
 
 def array_field(points: ArrayLike, focus: ArrayLike) -> Complex:
-    """Complex sound pressure amplitude (n,) in Pa at points (n, 3) for a focus (3,), metre.
+    """Return the complex sound pressure amplitude (n,) in Pa at points (n, 3) for a focus (3,),
+    metre.
 
-    The array lies in the plane z = 0 with its centre at the origin and radiates upwards.
+    The array is centred at the origin in the plane z = 0 and radiates upwards.
     """
     line = (np.arange(PER_SIDE) - (PER_SIDE - 1) / 2) * PITCH
     elements = np.stack(np.meshgrid(line, line, [0.0]), axis=-1).reshape(-1, 3)
@@ -85,11 +87,11 @@ def array_field(points: ArrayLike, focus: ArrayLike) -> Complex:
     return (PRESSURE_AT_1M / distance * directivity * wave).sum(axis=1)
 
 
-@lru_cache(maxsize=64)  # asked for with every pressure of a load
+@lru_cache(maxsize=64)  # every pressure of a load needs it
 def relative_intensity(height: float) -> float:
-    """Intensity at a height in metre relative to 200 mm, where it is greatest.
+    """Return the intensity at a height in metre relative to 200 mm, where it is greatest.
 
-    Raises a ValueError if the height is outside 20..600 mm.
+    Raises a ValueError if the height is outside 20 to 600 mm.
     """
     low, high = _HEIGHTS[[0, -1]].tolist()
     check_range("height", 1e3 * height, low, high, " mm", ", where the array focuses")
@@ -101,7 +103,7 @@ def relative_intensity(height: float) -> float:
 
 
 def lobe_width(height: float) -> float:
-    """Main-lobe radius D0 in metre, from the focus to the first zero, at a height in metre."""
+    """Radius D0 in metre of the main lobe, to the first zero, at a height in metre."""
     above = height - NOMINAL_HEIGHT
     return 11.6e-3 + 46.5e-3 * above + 25e-3 * above**2
 
@@ -115,13 +117,16 @@ def focal_spot(
     ----------
     offsets : (..., 2) float, metre from the focus
     height : metre, of the focus above the array
-    profile : "main_lobe", sinc^2(D/D0); "gaussian", of the same half width and force; or "array",
-        the field of the array with its side lobes, as far as 60 mm along each axis; or a function
-        of the offsets
+    profile : "main_lobe", sinc^2(D/D0); "gaussian", of the same half width and force; "array", the
+        field of the array with its side lobes, to 60 mm along each axis; or a function of the
+        offsets
 
     Returns
     -------
-    (...) float, without unit
+    (...) float, dimensionless
+
+    >>> focal_spot([[0.0, 0.0], [0.005, 0.0]]).round(3)
+    array([1.  , 0.52])
     """
     offsets = np.asarray(offsets, np.float64)
     if not isinstance(profile, str):
@@ -132,10 +137,10 @@ def focal_spot(
     return _round_spot(np.asarray(scaled[..., 0] + scaled[..., 1]), profile)
 
 
-def moved_spot(points: Floats, centres: Floats, height: float, profile: str | FocalSpot) -> Floats:
-    """Focal spot S (..., n) at points (n, 2) in metre for positions (..., 2) of the focus, as
-    `focal_spot` has it.
-    """
+def spot_of_foci(
+    points: Floats, centres: Floats, height: float, profile: str | FocalSpot
+) -> Floats:
+    """Focal spot (..., n) at points (n, 2) in metre for a focus at positions (..., 2)."""
     if profile == "array" or not isinstance(profile, str):
         return focal_spot(points - centres[..., None, :], height, profile)
     # |x - c|^2 = |x|^2 - 2 x.c + |c|^2 as one matrix product, the fastest way.
@@ -145,12 +150,12 @@ def moved_spot(points: Floats, centres: Floats, height: float, profile: str | Fo
 
 
 def _scale(height: float, profile: str) -> float:
-    """Length in metre in which an axisymmetric focal spot is exp(-D^2) or (sin D / D)^2."""
+    """Length d in metre of an axisymmetric focal spot, exp(-(D/d)^2) or (sin(D/d) / (D/d))^2."""
     return np.sqrt(2) * spot_width(height) if profile == "gaussian" else lobe_width(height) / np.pi
 
 
 def _round_spot(squared: Floats, profile: str) -> Floats:
-    """Axisymmetric focal spot at squared distances (...), which it overwrites."""
+    """Axisymmetric focal spot at squared scaled distances (...), which it overwrites."""
     if profile == "gaussian":
         return np.exp(np.negative(squared, out=squared), out=squared)
     angle = np.sqrt(np.maximum(squared, 1e-18, out=squared), out=squared)  # 1 to the last digit
@@ -170,21 +175,23 @@ def spot_detail(height: float, profile: str | FocalSpot) -> float:
 
 
 def along_axis(offset: ArrayLike, height: float = NOMINAL_HEIGHT) -> Floats:
-    """Relative intensity (...) on the axis at an offset (...) in metre above or below the focus: a
-    Gaussian whose half width goes with the square of the focal spot's, within 4 % of `array_field`.
+    """Relative intensity (...) on the axis, at an offset (...) in metre above or below the focus.
+
+    A Gaussian whose half width is proportional to the square of that of the focal spot, within 4 %
+    of `array_field`.
     """
     half_width = HALF_DEPTH * (lobe_width(height) / lobe_width(NOMINAL_HEIGHT)) ** 2
     return np.exp(-np.log(2) * (np.asarray(offset, np.float64) / half_width) ** 2)
 
 
 def spot_reach(height: float, profile: str | FocalSpot) -> float:
-    """Radius in metre beyond which a focal spot is below 1e-7; infinite unless Gaussian."""
+    """Radius in metre beyond which a Gaussian focal spot is below 1e-7; infinite for others."""
     width = gaussian_width(height, profile)
     return np.inf if width is None else 5.7 * width
 
 
 def gaussian_width(height: float, profile: str | FocalSpot) -> float | None:
-    """Standard deviation in metre of a focal spot; None unless it is Gaussian."""
+    """Standard deviation in metre of a focal spot; None if it is not Gaussian."""
     if isinstance(profile, ContactSpot):
         return profile.width
     return spot_width(height) if profile == "gaussian" else None
@@ -192,7 +199,7 @@ def gaussian_width(height: float, profile: str | FocalSpot) -> float | None:
 
 @cache
 def _array_spot(height: float) -> RegularGridInterpolator:
-    """Intensity |p|^2 relative to the focus in one quadrant, as both axes are of symmetry."""
+    """Relative intensity |p|^2 in one quadrant; the field is symmetric about both axes."""
     from scipy.interpolate import RegularGridInterpolator
 
     line = np.linspace(0, 60e-3, 121)

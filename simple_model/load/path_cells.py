@@ -1,15 +1,15 @@
-"""Samples of a moving load in equal cells of time, exact about its jumps.
+"""Samples of a moving load in equal cells of time, accurate at its jumps.
 
-The transform of a load that is smooth but for jumps is that of its samples v in the middles of
+The transform of a load that is smooth except for jumps follows from its samples v at the middles of
 cells of length h,
 
     int q(t) exp(-i w t) dt = h sum_i v_i exp(-i w t_i)
 
-if samples about a jump d have its moments. At e cells from the middle of cell 0 it makes
+if the samples near a jump d have its moments. A jump at e cells from the middle of cell 0 sets
 
     v_-1 += (p + s) d,   v_0 = (1/2 + e) q_before + (1/2 - e) q_after - 2 s d,   v_1 += (s - p) d
 
-with p = e^2/4 - 1/24 and s = -e^3/6, with an error of (w h)^4/100 of the jump.
+with p = e^2/4 - 1/24 and s = -e^3/6. The error is (w h)^4/100 of the jump.
 """
 
 from dataclasses import dataclass, replace
@@ -22,29 +22,29 @@ from scipy import fft, sparse
 from simple_model.load.focus import spot_detail
 from simple_model.load.pressure import MovingPressure
 from simple_model.load.tacton import Tacton, tones
-from simple_model.load.trajectory import STILL, Trajectory, differ
+from simple_model.load.trajectory import LEAST_JUMP, Trajectory, differ
 from simple_model.typing import Complex, Floats, Ints
 
-FEWEST_KNOTS = 132  # positions along a closed path: all harmonics below 66 f_d
-KNOTS_PER_WIDTH = 8  # of the focal spot, which makes corners accurate to 1e-4
-NODES_PER_WIDTH = 16  # between which values are interpolated along the path, to 1e-6
-HIGHEST = 10_000.0  # Hz of lines of jumps, pulses and recordings: others move bodies by 0.1 %
-PER_HIGHEST = 2.5  # samples in a period of it
-SAMPLED = 40_000.0  # Hz of a rhythm or signal: periods in milliseconds are whole cells
-PASSED = 5.7 / (2 * np.pi)  # f s / v, at which a passing focal spot's spectrum is 1e-7
-BRIEF = 0.01  # of a recording's time, for which it may move faster: a jump has no highest line
-SAME = 1e-9  # of a cell or a period
-AT_ONCE = 2**22  # values that are transformed at a time, some hundred megabytes
+FEWEST_KNOTS = 132  # positions along a closed path: harmonics below 66 f_d
+KNOTS_PER_WIDTH = 8  # of the focal spot: corners are accurate to 1e-4
+NODES_PER_WIDTH = 16  # of interpolation along the path, accurate to 1e-6
+HIGHEST = 10_000.0  # Hz: higher lines of jumps, pulses and recordings move bodies by 0.1 %
+PER_HIGHEST = 2.5  # samples per period of `HIGHEST`
+LEAST_RATE = 40_000.0  # Hz, of a rhythm or signal: periods in milliseconds are whole cells
+PASSING_LIMIT = 5.7 / (2 * np.pi)  # f s / v where the spectrum of a passing spot is 1e-7
+BRIEF = 0.01  # of the time of a recording, in which it may move faster
+ROUND_OFF = 1e-9  # of a cell or a period
+AT_ONCE = 2**22  # values transformed at a time, about 100 MB
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PathCells:
-    """One repetition of a load in equal cells, `frequency` times a second.
+    """One repetition of a load in k equal cells, `frequency` times a second.
 
-    What the load does in each of k cells is `cells` (k, q) times what a focus of unit pressure does
-    at `positions` (q, 2) in metre: of one focus of unit pressure that runs once along the path, or
-    of the whole load in Pa (`of_tacton`), where it is modulated by a rhythm or signal, or too short
-    for a path that jumps.
+    Cell by cell, the load is the matrix `cells` (k, q) times the effect of a focus of unit pressure
+    at `positions` (q, 2) in metre. It is one focus of unit pressure that runs once along the path
+    or, if `of_tacton`, the whole load in Pa: with a rhythm or a signal, or if the Tacton is too
+    short for a path that jumps.
     """
 
     positions: Floats
@@ -55,7 +55,7 @@ class PathCells:
 
 @lru_cache(maxsize=4)
 def path_cells(pressure: MovingPressure) -> PathCells:
-    """Cells of a load's path or of the whole Tacton."""
+    """Return the cells of the path of a load, or of the whole Tacton."""
     tacton = pressure.tacton
     of_tacton = tacton.is_sampled or is_cut_short(pressure)
     if of_tacton:
@@ -77,30 +77,32 @@ def path_cells(pressure: MovingPressure) -> PathCells:
             positions=at, cells=sparse.csr_array(np.full((1, n), 1 / n)), frequency=frequency,
             of_tacton=False,
         )  # fmt: skip
-    positions, mixed = moved_load(whole, times, gain)
+    positions, mixed = sampled_load(whole, times, gain)
     mixed = (shares @ mixed).tocsr()
     return PathCells(positions=positions, cells=mixed, frequency=frequency, of_tacton=of_tacton)
 
 
 def _ends_as_it_begins(pressure: MovingPressure) -> bool:
-    """Whether the load is repeated without a jump after the Tacton."""
+    """Whether the load repeats without a jump after the Tacton."""
     tacton = pressure.tacton
-    ends = tacton.duration * np.array([SAME, 1 - SAME])
+    ends = tacton.duration * np.array([ROUND_OFF, 1 - ROUND_OFF])
     begins, stops = pressure.gain(ends)
     path = tacton.trajectory
     each = [np.mod(path.phase(ends) + ahead, 1.0) for ahead in tacton.foci]
     places = [np.column_stack([path.at_phase(p), path.level_at_phase(p)]) for p in each]
     moved = any(differ(place[:1], place[1:]).any() for place in places)
     return not moved and bool(
-        abs(begins - stops) <= STILL[1] * abs(pressure.driven(np.ones(1))).max()
+        abs(begins - stops) <= LEAST_JUMP[1] * abs(pressure.gain_at(np.ones(1))).max()
     )
 
 
-def moved_load(
+def sampled_load(
     pressure: MovingPressure, times: Floats, factors: Floats
 ) -> tuple[Floats, sparse.csr_array]:
-    """Load of all foci at times (m,) in s, with factors (m,) in Pa: positions (q, 2) in metre, and
-    the matrix (m, q) in Pa by which the load is made of foci of unit pressure there.
+    """Sample the load of all foci at times (m,) in s, with factors (m,) in Pa.
+
+    Returns positions (q, 2) in metre and the matrix (m, q) in Pa that combines foci of unit
+    pressure there.
     """
     tacton = pressure.tacton
     path, detail = tacton.trajectory, spot_detail(pressure.height, pressure.profile)
@@ -120,23 +122,25 @@ def moved_load(
 
 
 def path_samples(pressure: MovingPressure) -> Floats:
-    """Positions (q, 2) in metre that a load is made of; one if the focus is static."""
+    """Positions (q, 2) in metre that make up a load; one if the focus is static."""
     return path_cells(pressure).positions
 
 
 def path_fourier(
     pressure: MovingPressure, values: Floats | Complex, orders: Ints | None = None
 ) -> Complex:
-    """Fourier coefficients (..., n) of what a load does where a focus of unit pressure at each of
-    `path_samples` does `values` (..., q): of some orders (n,), or of all, -n being harmonic -n.
+    """Fourier coefficients (..., n) of the effect of a load, of given orders (n,) or of all.
+
+    `values` (..., q) are the effects of a focus of unit pressure at each of `path_samples`. Index
+    -n is harmonic -n.
     """
     mixing = path_cells(pressure).cells
     k, shape, rows = mixing.shape[0], values.shape[:-1], values.reshape(-1, values.shape[-1])
     wanted = np.arange(k) if orders is None else orders
     shift = np.exp(-1j * np.pi * np.fft.fftfreq(k)[wanted]) / k
     blocks = np.array_split(rows, max(1, len(rows) * k // AT_ONCE))
-    found = [fft.fft((mixing @ block.T).T, axis=-1)[:, wanted] * shift for block in blocks]
-    return np.asarray(np.concatenate(found).reshape(*shape, len(wanted)))
+    transformed = [fft.fft((mixing @ block.T).T, axis=-1)[:, wanted] * shift for block in blocks]
+    return np.asarray(np.concatenate(transformed).reshape(*shape, len(wanted)))
 
 
 def harmonics(pressure: MovingPressure) -> Ints:
@@ -146,13 +150,10 @@ def harmonics(pressure: MovingPressure) -> Ints:
 
 
 def cells(jumps: Floats, start: float, width: float, count: int) -> tuple[Floats, sparse.csr_array]:
-    """Times (m,) in s of samples of cells, and their shares (count, m) in the cells.
+    """Times (m,) in s of the samples of `count` periodic cells, and their shares (count, m) in the
+    cells.
 
-    Parameters
-    ----------
-    jumps : (j,) float, s, times between the beginning of the first cell and the end of the last
-    start, width : s
-    count : of cells, of which the first follows the last
+    The cells begin at `start` and have the length `width`, in s; `jumps` (j,) in s are within them.
     """
     at = np.unique(np.mod(np.round((jumps - start) / width, 9), count))
     bounds = np.union1d(np.arange(count + 1), at)
@@ -171,8 +172,10 @@ def cells(jumps: Floats, start: float, width: float, count: int) -> tuple[Floats
 
 
 def jump_phases(pressure: MovingPressure) -> Floats:
-    """Fractions (j,) of the period at which a focus jumps in position or level or, of a load along
-    the path, in direction; and at which moves begin and end that last no longer than a cell.
+    """Fractions (j,) of the period at which a focus jumps in position or level.
+
+    Moves that are shorter than a cell count as jumps at their ends, and with a heading, so do
+    turns.
     """
     path = pressure.tacton.trajectory
     bounds, lengths = path.parts
@@ -186,24 +189,25 @@ def jump_phases(pressure: MovingPressure) -> Floats:
 
 
 def jump_times(pressure: MovingPressure, start: float, end: float) -> Floats:
-    """Times (j,) in s, from start to end, at which the load jumps at some place."""
+    """Times (j,) in s, from start to end, at which the load jumps somewhere."""
     tacton, phases = pressure.tacton, jump_phases(pressure)
     f_d = tacton.trajectory.drawing_frequency
-    found = [np.empty(0)]
+    parts = [np.empty(0)]
     for ahead in tacton.foci if f_d and len(phases) else ():
         turns = np.arange(np.floor(f_d * start), np.ceil(f_d * end) + 2)
-        found.append((turns[:, None] + phases - ahead).ravel() / f_d)
+        parts.append((turns[:, None] + phases - ahead).ravel() / f_d)
     if tacton.rhythm and len(edges := tacton.rhythm.edges):
         period = tacton.rhythm.period
         turns = np.arange(np.floor(start / period), np.ceil(end / period) + 1)
-        found.append((turns[:, None] * period + edges).ravel())
-    times = np.unique(np.concatenate(found))
+        parts.append((turns[:, None] * period + edges).ravel())
+    times = np.unique(np.concatenate(parts))
     return times[(times >= start) & (times <= end)]
 
 
 def along_path(path: Trajectory, phases: Floats, detail: float) -> tuple[Floats, sparse.csr_array]:
-    """Positions (q, 2) in metre along a path, and the matrix (m, q) that interpolates from them to
-    phases (m,): by cubics along each part of the path that has more phases than nodes.
+    """Positions (q, 2) in metre on a path, and the matrix (m, q) that interpolates to phases (m,).
+
+    Cubics interpolate along each part of the path that has more phases than nodes.
     """
     bounds, lengths = path.parts
     part = np.clip(np.searchsorted(bounds, phases, side="right") - 1, 0, len(lengths) - 1)
@@ -233,39 +237,42 @@ def along_path(path: Trajectory, phases: Floats, detail: float) -> tuple[Floats,
 
 
 def is_abrupt(pressure: MovingPressure) -> bool:
-    """Whether a load jumps at some place as its foci move, or has levels, so that its lines fall
-    off slowly. Joined paths that are closed do not jump.
+    """Whether a load jumps or has levels, so that its lines decay slowly.
+
+    Closed paths that are joined do not jump.
     """
     tacton, jumps = pressure.tacton, jump_phases(pressure)
     n, path = tacton.n_paths, tacton.trajectory
     within = jumps * n - np.round(jumps * n)
     if (
         path.levels
-        or (np.abs(within) > SAME).any()
+        or (np.abs(within) > ROUND_OFF).any()
         or (len(jumps) and (n == 1 or pressure.heading))
     ):
         return True
-    begins, ends = path.beside(np.arange(n) / n)[1], path.beside(np.arange(1, n + 1) / n)[0]
+    begins, ends = path.limits_at(np.arange(n) / n)[1], path.limits_at(np.arange(1, n + 1) / n)[0]
     return bool(len(jumps) and differ(begins, ends).any())
 
 
 def is_cut_short(pressure: MovingPressure) -> bool:
     """Whether a path that jumps takes longer than the Tacton."""
     f_d, duration = pressure.tacton.trajectory.drawing_frequency, pressure.tacton.duration
-    return 0 < f_d * duration < 1 - SAME and is_abrupt(pressure)
+    return 0 < f_d * duration < 1 - ROUND_OFF and is_abrupt(pressure)
 
 
-def unsampled(pressure: MovingPressure) -> MovingPressure:
-    """The same without rhythm and signal."""
+def without_sampled_parts(pressure: MovingPressure) -> MovingPressure:
+    """The load without rhythm and signal."""
     return replace(pressure, tacton=replace(pressure.tacton, rhythm=None, signal=None))
 
 
 def highest_passing(pressure: MovingPressure) -> float:
-    """Highest line in Hz, above 1e-7 of all, that the moving focus makes at a place; at most
-    `HIGHEST` of a recording.
+    """Highest line in Hz, above 1e-7 of all, that the moving focus makes anywhere; at most
+    `HIGHEST` for a recording.
     """
-    found = PASSED * _speed(pressure.tacton) / spot_detail(pressure.height, pressure.profile)
-    return min(found, HIGHEST) if pressure.tacton.trajectory.shape == "recorded" else found
+    highest = (
+        PASSING_LIMIT * _speed(pressure.tacton) / spot_detail(pressure.height, pressure.profile)
+    )
+    return min(highest, HIGHEST) if pressure.tacton.trajectory.shape == "recorded" else highest
 
 
 def _count(pressure: MovingPressure) -> int:
@@ -290,17 +297,15 @@ def _count(pressure: MovingPressure) -> int:
 
 
 def _rate(pressure: MovingPressure) -> float:
-    """Samples a second of a Tacton with a rhythm or signal, so that no line folds back below
-    `HIGHEST`.
-    """
+    """Samples per second for a rhythm or signal, so that no line folds back below `HIGHEST`."""
     tacton, degree = pressure.tacton, pressure.law.degree
     made = highest_passing(pressure) + (degree or KNOTS_PER_WIDTH) * sum(tones(tacton))
     made += tacton.signal.rate if tacton.signal else 0.0
-    return max(SAMPLED, HIGHEST + made)
+    return max(LEAST_RATE, HIGHEST + made)
 
 
 def _speed(tacton: Tacton) -> float:
-    """The greatest speed of a focus in m/s; of a recording but for `BRIEF` moves."""
+    """Largest speed of a focus in m/s; moves shorter than `BRIEF` of a recording do not count."""
     path = tacton.trajectory
     if path.shape != "recorded":
         return path.drawing_frequency * path.length * (np.pi / 2 if path.is_eased else 1.0)

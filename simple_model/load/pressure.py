@@ -1,9 +1,9 @@
 """Moving radiation pressure, the load of every model:
 
-q(x, t) = p0 I(h)/n sum_j drive(A, M(t)) S(x - x_j(t))
+    q(x, t) = p0 I(h)/n sum_j drive(A, M(t)) S(x - x_j(t))
 
-of n foci, which run the same path at phases of their own. A recorded path brings a level L along
-it, which multiplies the amplitude.
+The n foci run along the same path at phases of their own. The level L of a recorded path multiplies
+the amplitude.
 """
 
 from __future__ import annotations
@@ -21,39 +21,45 @@ from simple_model.load.focus import (
     ContactSpot,
     FocalSpot,
     along_axis,
-    moved_spot,
     relative_intensity,
+    spot_of_foci,
 )
 from simple_model.load.tacton import Tacton, level, modulation
 from simple_model.typing import Floats
 
 HEADINGS = ("x", "y", "")
-FINER = 8  # samples of a rhythm or signal in each average
-IN_CACHE = 2**15  # samples worked on at a time
+SAMPLES_PER_AVERAGE = 8  # of a rhythm or signal
+SAMPLES_IN_CACHE = 2**15  # evaluated at a time
 
 
 @dataclass(frozen=True, kw_only=True)
 class MovingPressure:
-    """Pressure of a Tacton on a surface near the plane z = 0 that its focus moves in.
+    """Pressure of a Tacton on a surface near the plane z = 0, in which its focus moves.
 
-    Points may have a height: above or below the plane the focus is weaker. The effect of a slope on
-    the pressure belongs to the surface.
+    Points may have a height: above and below the plane the focus is weaker. The surface accounts
+    for the effect of its slope.
 
     Parameters
     ----------
     tacton : Tacton
-    profile : "gaussian", "main_lobe" or "array", the shape of the focal spot; or any
-        function of offsets (..., 2) in metre, with details no finer than the Gaussian's
+    profile : "gaussian", "main_lobe" or "array", the shape of the focal spot; or a function of
+        offsets (..., 2) in metre, with details no finer than those of the Gaussian
     drive : "linear", "pressure_squared", "force_corrected", or a DriveLaw
-    depth_of_modulation : float, 0..1; the linear law has none
-    peak_pressure : float, Pa, at the focus at full drive and 200 mm. 50 Pa, uncertain by a factor
-        of 2, is the radiation pressure of a 160 dB focus on a wall that reflects fully.
+    depth_of_modulation : float, 0 to 1; the linear law does not use it
+    peak_pressure : float, Pa, at the focus at full drive and 200 mm. The default of 50 Pa,
+        uncertain by a factor of 2, is the radiation pressure of a 160 dB focus on a wall that
+        reflects fully.
     height : float, metre, of the focus above the array
-    heading : "x" or "y", the component of the path's unit tangent that multiplies it, as of a
-        traction along the path; or "", none
+    heading : "x" or "y" multiplies the pressure by that component of the unit tangent of the path,
+        as for a traction along the path; "" does not
 
-    Raises a ValueError if a value is unknown, not finite or out of range, or a path without tangent
-    has a heading.
+    Raises a ValueError if a value is unknown, not finite or out of range, or a path without a
+    tangent has a heading.
+
+    >>> from simple_model import Tacton
+    >>> load = MovingPressure(tacton=Tacton(am_frequency=140.0), drive="linear")
+    >>> load([[0.0, 0.0], [0.005, 0.0]], 1 / 560).round(1)  # Pa, at the peak of the modulation
+    array([50. , 25.8])
     """
 
     tacton: Tacton
@@ -76,8 +82,8 @@ class MovingPressure:
         path = self.tacton.trajectory
         if self.heading and (path.is_static or path.hold):
             raise ValueError(
-                "a focus that rests or jumps from point to point has no direction along its path; "
-                "give a direction, or let it move"
+                "the focus rests or jumps from point to point, so its path has no direction; give "
+                "a fixed direction, or a path along which the focus moves"
             )
         self._check_levels()
 
@@ -88,9 +94,9 @@ class MovingPressure:
             return
         if not self.law.is_product(tacton.amplitude, self.depth_of_modulation):
             raise ValueError(
-                f"drive law '{self.law}' is no product of a factor of the level and one of the "
-                "modulation, so that levels of a path, a rhythm and an envelope have no lines; "
-                "leave them out, or take another law"
+                f"drive law '{self.law}' is not a product of a factor of the level and a factor of "
+                "the modulation, which levels of a path, rhythms and envelopes require; remove "
+                "these, or use another drive law"
             )
 
     @property
@@ -100,7 +106,7 @@ class MovingPressure:
 
     @property
     def profile_name(self) -> str:
-        """Name of the focal spot, "own" if it has none."""
+        """Name of the focal spot; "own" for a function."""
         return self.profile if isinstance(self.profile, str) else "own"
 
     def __call__(self, points: ArrayLike, t: ArrayLike) -> Floats:
@@ -112,7 +118,7 @@ class MovingPressure:
         gains = [gain * self.weight(phase) if weighted else gain for phase in phases]
         foci = [path.at_phase(phase) for phase in phases]
         pressure = np.zeros((t.size, len(points)))
-        block = max(1, IN_CACHE // max(1, len(points)))
+        block = max(1, SAMPLES_IN_CACHE // max(1, len(points)))
         for start in range(0, t.size, block):
             part = slice(start, start + block)
             for each, centres in zip(gains, foci, strict=True):
@@ -121,9 +127,7 @@ class MovingPressure:
         return pressure.reshape(*t.shape, len(points))
 
     def weight(self, phase: ArrayLike) -> Floats:
-        """Factor (...) of the path's level and of the heading on the pressure at fractions (...) of
-        the period.
-        """
+        """Factor (...) of path level and heading at fractions (...) of the period."""
         path = self.tacton.trajectory
         factor = self.law.level_factor(path.level_at_phase(phase), self.depth_of_modulation)
         if self.heading:
@@ -131,28 +135,31 @@ class MovingPressure:
         return factor
 
     def gain(self, t: ArrayLike, over: float = 0.0) -> Floats:
-        """Pressure (...) in Pa at each focus at times (...) in s, but for the path's level; a
-        rhythm or a signal is averaged over the time `over` in s about each, from the start on.
+        """Pressure (...) in Pa at each focus at times (...) in s, without the level of the path.
+
+        Rhythms and signals are averaged over a time `over` in s about each time, from the start on.
         """
         if over and self.tacton.is_sampled:
-            parts = ((np.arange(FINER) + 0.5) / FINER - 0.5) * over
+            parts = ((np.arange(SAMPLES_PER_AVERAGE) + 0.5) / SAMPLES_PER_AVERAGE - 0.5) * over
             fine = np.asarray(t, np.float64)[..., None] + parts
-            begun = fine >= 0
-            gain = self.gain(np.maximum(fine, 0.0)) * begun
-            return np.asarray(gain.sum(axis=-1) / begun.sum(axis=-1))
-        return self.driven(modulation(self.tacton, t), level(self.tacton, t))
+            has_started = fine >= 0
+            gain = self.gain(np.maximum(fine, 0.0)) * has_started
+            return np.asarray(gain.sum(axis=-1) / has_started.sum(axis=-1))
+        return self.gain_at(modulation(self.tacton, t), level(self.tacton, t))
 
-    def driven(self, modulation: Floats, level: Floats | float = 1.0) -> Floats:
-        """Pressure (...) in Pa at each focus where modulation and level (...) have these values."""
+    def gain_at(self, modulation: Floats, level: Floats | float = 1.0) -> Floats:
+        """Pressure (...) in Pa at each focus for given modulation and level (...)."""
         amplitude = self.tacton.amplitude * level
-        driven = self.law(amplitude, modulation, self.depth_of_modulation)
+        relative = self.law(amplitude, modulation, self.depth_of_modulation)
         full = self.peak_pressure * relative_intensity(self.height)
-        return full / len(self.tacton.foci) * driven
+        return full / len(self.tacton.foci) * relative
 
     def spot(self, points: ArrayLike, centre: ArrayLike) -> Floats:
-        """Focal spot (..., n) at points (n, 2 or 3), relative, the focus at centres (..., 2)."""
+        """Relative focal spot (..., n) at points (n, 2 or 3), for a focus at centres (..., 2),
+        metre.
+        """
         points, centre = np.asarray(points, np.float64), np.asarray(centre, np.float64)
-        spot = moved_spot(points[:, :2], centre, self.height, self.profile)
+        spot = spot_of_foci(points[:, :2], centre, self.height, self.profile)
         contact = isinstance(self.profile, ContactSpot)
         if points.shape[1] == 3 and points[:, 2].any() and not contact:
             spot *= along_axis(points[:, 2], self.height)
@@ -160,12 +167,10 @@ class MovingPressure:
 
 
 def check_lines(pressure: MovingPressure) -> None:
-    """Refuse a load of another class: models of lines use the formulas of `MovingPressure` without
-    calling it.
-    """
+    """Refuse subclasses of `MovingPressure`: models of lines use its formulas only."""
     if type(pressure) is not MovingPressure:
         raise ValueError(
-            f"the load {type(pressure).__name__} is no MovingPressure, whose lines plans and "
-            "models but point-kernel and fem-transient use; take one of these two, which evaluate "
-            "it point by point, the latter with an element size h"
+            f"the load {type(pressure).__name__} is a subclass of MovingPressure, and only "
+            "point-kernel and fem-transient evaluate its own formulas; use one of these two, "
+            "fem-transient with an element size h"
         )

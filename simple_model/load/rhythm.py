@@ -1,4 +1,4 @@
-"""Rhythms (pulses) and sampled signals, which modulate a Tacton's amplitude in time."""
+"""Rhythms (pulses) and sampled signals, which modulate the amplitude of a Tacton in time."""
 
 from __future__ import annotations
 
@@ -22,10 +22,14 @@ class Rhythm:
 
     Parameters
     ----------
-    pulses : (n, 2), s: how long each pulse lasts, above 0, and the gap after it, 0 or above
-    ramp : float, s, linear rise at the start of each pulse and fall at its end, both within it
+    pulses : (n, 2), s: duration of each pulse, above 0, and the gap after it, 0 or above
+    ramp : float, s, linear rise at the start and fall at the end of each pulse, within the pulse
 
     Raises a ValueError if there is no pulse, or a value is not finite or out of range.
+
+    >>> rhythm = Rhythm(pulses=((0.05, 0.03),))  # 50 ms on, 30 ms off
+    >>> rhythm.level([0.0, 0.06, 0.09])
+    array([1., 0., 1.])
     """
 
     pulses: tuple[tuple[float, float], ...]
@@ -33,12 +37,12 @@ class Rhythm:
 
     def __post_init__(self) -> None:
         if not self.pulses:
-            raise ValueError("a rhythm has no pulses; give at least one, or leave the rhythm out")
+            raise ValueError("a rhythm needs at least one pulse; add one or leave the rhythm out")
         for on, gap in self.pulses:
             if not (isfinite(on) and isfinite(gap) and on > 0 and gap >= 0):
                 raise ValueError(
-                    f"a pulse of {1e3 * on:g} ms with a gap of {1e3 * gap:g} ms must last longer "
-                    "than 0 and its gap 0 or longer"
+                    f"a pulse of {1e3 * on:g} ms with a gap of {1e3 * gap:g} ms is not allowed; "
+                    "give a pulse above 0 ms and a gap of 0 ms or more"
                 )
         longest = 1e3 * min(on for on, _ in self.pulses) / 2
         check_range("ramp", 1e3 * self.ramp, 0, longest, " ms", ", half the shortest pulse")
@@ -59,7 +63,7 @@ class Rhythm:
         return np.concatenate([starts[np.roll(gaps, 1)], (starts + lengths[:, 0])[gaps]])
 
     def level(self, t: ArrayLike) -> Floats:
-        """Level (...), 0..1, at times (...) in s from the start of the Tacton."""
+        """Level (...), 0 to 1, at times (...) in s from the start of the Tacton."""
         knots, levels = self._knots
         t = np.asarray(t, np.float64)
         # The first sample of a pulse belongs to it, whatever the rounding of its time.
@@ -82,13 +86,14 @@ class Rhythm:
 
 @dataclass(frozen=True, kw_only=True)
 class Signal:
-    """A sampled waveform, straight from sample to sample and repeated to the Tacton's end.
+    """A sampled waveform, linear between samples and repeated to the end of the Tacton.
 
     Parameters
     ----------
     rate : float, Hz, samples per second
-    samples : (k,) of the modulation, -1..1, or of the amplitude, 0..1
-    role : "modulation" multiplies the AM sinusoids; "envelope" the amplitude, as a rhythm does
+    samples : (k,) of the modulation, -1 to 1, or of the amplitude, 0 to 1
+    role : "modulation" multiplies the AM sinusoids; "envelope" multiplies the amplitude, as a
+        rhythm does
 
     Raises a ValueError if a value is unknown, not finite or out of range.
     """
@@ -103,7 +108,9 @@ class Signal:
         check_range("number of samples", len(self.samples), 2, MOST_SAMPLES, "", " of a signal")
         low = -1 if self.role == "modulation" else 0
         if not ((self._values >= low) & (self._values <= 1)).all():
-            raise ValueError(f"samples of a signal must lie in {low}..1; scale them to full drive")
+            raise ValueError(
+                f"samples of a signal must be between {low} and 1; scale them to full drive"
+            )
 
     def at(self, t: ArrayLike) -> Floats:
         """Value (...) at times (...) in s."""

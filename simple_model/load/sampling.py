@@ -1,8 +1,8 @@
-"""Sampling of a load without aliasing: nothing of it may fold back to low frequencies.
+"""Sampling of a load without aliasing.
 
 Samples dt apart show a line at f > 1/(2 dt) at |f - k/dt| instead. A Gaussian focal spot of
-standard deviation s that passes at speed v has the spectrum exp(-(2 pi f s / v)^2 / 2), and so a
-focus that moves further than about s/2 in a sample makes lines above half the sampling rate.
+standard deviation s that passes at speed v has the spectrum exp(-(2 pi f s / v)^2 / 2). A focus
+that moves by more than about s/2 in a sample therefore makes lines above half the sampling rate.
 """
 
 from collections.abc import Callable
@@ -17,9 +17,9 @@ from simple_model.load.spectrum import ALIASED, gain_orders
 from simple_model.load.tacton import tones
 from simple_model.typing import Bools, Floats
 
-SLOWEST = 10_000.0  # Hz of samples that show all of a body's motion
-PER_PERIOD = 8  # samples of the highest frequency, so that its start is accurate, too
-REACH = 128  # samples on either side that a low pass weighs: it ends within 2 % of half the rate
+LEAST_RATE = 10_000.0  # Hz; samples at this rate show all motion of a body
+PER_PERIOD = 8  # samples of the highest frequency, so that its start is accurate
+REACH = 128  # samples of a low pass on either side: it ends within 2 % of half the rate
 STOP_BAND = ("kaiser", 10.0)  # 100 dB down
 
 
@@ -29,8 +29,9 @@ def step(times: Floats) -> float:
 
 
 def highest(pressure: MovingPressure, passing: float) -> float:
-    """Highest line in Hz of a load whose moving focus makes lines up to `passing` Hz. Pulses,
-    averaged over a sample, have none; a signal has half its own rate.
+    """Highest line in Hz of a load whose moving focus makes lines up to `passing` Hz.
+
+    Rhythms are averaged over a sample and do not count; a signal counts with half its rate.
     """
     tacton = pressure.tacton
     first, second, envelope = tones(tacton)
@@ -42,7 +43,7 @@ def highest(pressure: MovingPressure, passing: float) -> float:
 
 @lru_cache(maxsize=32)
 def _highest_order(pressure: MovingPressure) -> int:
-    """Highest order of a sinusoid in the gain: the degree of the law, or as its harmonics fall."""
+    """Highest order of a sinusoid in the gain: the degree of the law, or where harmonics vanish."""
     if pressure.law.degree is not None:
         return pressure.law.degree
     orders, (c,) = gain_orders(pressure)
@@ -50,27 +51,29 @@ def _highest_order(pressure: MovingPressure) -> int:
 
 
 def highest_line(pressure: MovingPressure) -> float:
-    """Highest line in Hz of a load at any place; 0, for unknown, if it is no `MovingPressure`."""
-    known = isinstance(pressure, MovingPressure)
-    return highest(pressure, highest_passing(pressure)) if known else 0.0
+    """Highest line in Hz of a load at any place; 0, for unknown, if it is not a
+    `MovingPressure`.
+    """
+    is_known = isinstance(pressure, MovingPressure)
+    return highest(pressure, highest_passing(pressure)) if is_known else 0.0
 
 
 def oversampling(highest: float, dt: float) -> int:
-    """Samples within dt in s of a load up to `highest` Hz: one if nothing aliases."""
+    """Samples per interval dt in s for lines up to `highest` Hz; 1 if nothing aliases."""
     return 1 if highest < 0.5 / dt else ceil(PER_PERIOD * highest * dt)
 
 
 def below_half_the_rate(frequencies: Floats, times: Floats) -> Bools:
-    """Bools (f,) of frequencies (f,) in Hz that equally spaced times (t,) in s show as they are."""
+    """Whether frequencies (f,) in Hz are below half the rate of equally spaced times (t,) in s."""
     return np.asarray(frequencies < 0.5 / step(times))
 
 
 def is_folded(pressure: MovingPressure, times: Floats) -> bool:
-    """Whether a load may have lines above half the rate of times (t,) in s that count."""
+    """Whether lines above half the rate of times (t,) in s may matter."""
     if not isinstance(pressure, MovingPressure):
         return False
     dt = step(times)
-    if dt * SLOWEST > 1 + 1e-6:
+    if dt * LEAST_RATE > 1 + 1e-6:
         return True
     return oversampling(highest_line(pressure), dt) > 1 and not (
         pressure.tacton.is_sampled or is_abrupt(pressure)
@@ -78,17 +81,21 @@ def is_folded(pressure: MovingPressure, times: Floats) -> bool:
 
 
 def highest_driving(pressure: MovingPressure, times: Floats) -> float:
-    """Frequency in Hz below which lines of a load move a body at all, at times (t,) in s."""
+    """Frequency in Hz up to which lines of a load move a body that is sampled at times
+    (t,) in s.
+    """
     return 0.5 / step(times) if is_folded(pressure, times) else np.inf
 
 
 def low_pass(load: Callable[[Floats], Floats], times: Floats, parts: int) -> Floats:
-    """Load (t, ...) at equally spaced times (t,) in s without aliasing, by a windowed sinc: `load`
-    is a function of times (n,), also before and after those given, sampled `parts` times as finely.
+    """Load (t, ...) at equally spaced times (t,) in s without aliasing, by a windowed sinc.
+
+    `load` is a function of times (n,), also outside the given ones, sampled `parts` times as
+    finely.
     """
     if parts == 1:
         return load(times)
-    from scipy.signal import firwin, upfirdn  # half a second that few commands need
+    from scipy.signal import firwin, upfirdn  # slow to import
 
     dt = step(times)
     taps = firwin(2 * REACH * parts + 1, 1 / parts, window=STOP_BAND)
@@ -98,6 +105,6 @@ def low_pass(load: Callable[[Floats], Floats], times: Floats, parts: int) -> Flo
 
 
 def resolving_step(pressure: MovingPressure, longest: float) -> float:
-    """Time step in s, at most `longest`, at which nothing of a load aliases."""
+    """Largest time step in s, at most `longest`, at which no line of a load aliases."""
     hz = highest_line(pressure)
     return longest if hz < 0.5 / longest else 0.5 / hz

@@ -1,15 +1,15 @@
-"""Line spectrum of a periodic load, exact, before any body responds to it.
+"""Exact line spectrum of a periodic load.
 
     q(x, t) = Q(t) sum_j S(x - X(f_d t + a_j))
     Q = sum_m c_m exp(2 pi i f_m t),  S = sum_n s_n(x) exp(2 pi i n f_d t)
 
-so that a line at f = f_m + n f_d has the pattern c_m s_n(x) sum_j exp(2 pi i n a_j): n foci at even
-phases leave only every n-th harmonic of the path.
+A line at f = f_m + n f_d has the pattern c_m s_n(x) sum_j exp(2 pi i n a_j). Of n foci at even
+phases, only every n-th harmonic of the path remains.
 
-A rhythm or a signal makes Q more than a few sinusoids, and a path that jumps may be longer than the
-Tacton. The lines are then those of the Tacton repeated periodically, at multiples of one over its
-duration, as if it were a path of that period with Q along it. From rest that is the same load
-within that time, by causality.
+With a rhythm or a signal, Q is more than a few sinusoids, and a path that jumps may be longer than
+the Tacton. The lines are then those of the Tacton repeated periodically, at multiples of one over
+its duration, like a path of that period with Q along it. By causality the motion from rest is the
+same within that time.
 """
 
 from collections.abc import Sequence
@@ -33,18 +33,19 @@ from simple_model.load.pressure import MovingPressure, check_lines
 from simple_model.load.tacton import modulation_at_phases, tones
 from simple_model.typing import Complex, Floats, Ints
 
-PHASES = 8  # of each sinusoid at least; more than twice the degree of a drive law
-MOST_PHASES = 2**10, 2**20  # of one sinusoid, and of all, for a drive law that is no polynomial
-ALIASED = 1e-4  # of the strongest: a drive law's harmonics beyond those that are sampled
-MANY, RAISED = 20, 8  # lines of a jump; the power of frequency with which the last are raised
-LINES_AT_ONCE = 2**24  # lines at places, some hundred megabytes
+PHASES = 8  # of each sinusoid, at least
+MOST_PHASES = 2**10, 2**20  # of one sinusoid, and of all
+ALIASED = 1e-4  # of the strongest: largest harmonic of a drive law beyond those sampled
+MANY_LINES, RAISED_POWER = 20, 8  # lines of a jump; power of frequency that raises the last
+LINES_AT_ONCE = 2**24  # times points, some hundred megabytes
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LoadSpectrum:
-    """Spectral lines of a load at `frequencies` (f,) in Hz >= 0, several of which may coincide: the
-    pressure of a line is Re (`coefficients` (f,) in Pa times harmonic `harmonics` (f,) of the focal
-    spot along the path times exp(2 pi i f t)), and `strengths` (f,) in Pa its largest amplitude.
+    """Spectral lines (f,) of a load at `frequencies` in Hz >= 0; several may coincide.
+
+    The pressure of a line is Re(`coefficients` in Pa times harmonic `harmonics` of the focal spot
+    along the path times exp(2 pi i f t)); `strengths` in Pa are their largest amplitudes.
     """
 
     frequencies: Floats
@@ -53,7 +54,7 @@ class LoadSpectrum:
     strengths: Floats
 
     def gather(self, of_path: Complex) -> tuple[Floats, Complex]:
-        """Distinct frequencies (g,) in Hz and the sum (g, ...) of the lines at each, from the
+        """Distinct frequencies (g,) in Hz, and the sum (g, ...) of the lines at each, from the
         harmonics (n, ...) along the path.
         """
         distinct, which = np.unique(np.round(self.frequencies, 9), return_inverse=True)
@@ -64,8 +65,14 @@ class LoadSpectrum:
 
 
 def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadSpectrum:
-    """Lines whose pressure, at the path, exceeds a fraction of the strongest line's; of a load that
-    is zero, the mean alone.
+    """Return the lines that exceed a fraction of the strongest line on the path; the mean for a
+    zero load.
+
+    >>> from simple_model import Tacton
+    >>> load = MovingPressure(tacton=Tacton(am_frequency=140.0), drive="pressure_squared")
+    >>> lines = load_lines(load)
+    >>> lines.frequencies, lines.strengths.round(2)  # Hz, Pa
+    (array([  0., 140., 280.]), array([18.75, 25.  ,  6.25]))
     """
     check_lines(pressure)
     tacton, (n, of_spot) = pressure.tacton, path_strengths(pressure, threshold)
@@ -91,15 +98,16 @@ def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadSpectru
 
 
 def lines_from_rest(pressure: MovingPressure) -> LoadSpectrum:
-    """`load_lines` that give a body the impulse of the load after its start: the lines of a jump d
-    that end at a frequency F lack an impulse of d / (2 pi^2 F). With factors of 1 + (n - 1) (f /
-    F)^n, whose integral over 1/f^2 is that of the lines beyond F, many lines have it.
+    """`load_lines`, adjusted to give a body the impulse of the load after its start.
+
+    The lines of a jump d that end at a frequency F lack an impulse of d / (2 pi^2 F). Factors of 1
+    + (n - 1) (f / F)^n, whose integral over 1/f^2 equals that of the lines beyond F, restore it.
     """
     lines, whole = load_lines(pressure), path_cells(pressure)
-    few = whole.frequency * MANY > HIGHEST
+    few = whole.frequency * MANY_LINES > HIGHEST
     if few or not (whole.of_tacton or is_abrupt(pressure)):
         return lines
-    raised = 1 + (RAISED - 1) * (lines.frequencies / HIGHEST) ** RAISED
+    raised = 1 + (RAISED_POWER - 1) * (lines.frequencies / HIGHEST) ** RAISED_POWER
     return replace(lines, coefficients=lines.coefficients * raised)
 
 
@@ -121,7 +129,9 @@ def pressure_lines(
 
 def reduced_lines(pressure: MovingPressure, points: Floats, load: Floats) -> tuple[Floats, Complex]:
     """Frequencies (f,) in Hz of the distinct `lines_from_rest`, and their complex forces (f, r) in
-    reduced coordinates; `load` (k, r) are the forces of unit pressure at points (k, 2 or 3).
+    reduced coordinates.
+
+    `load` (k, r) are the forces of unit pressure at points (k, 2 or 3).
     """
     return lines_from_rest(pressure).gather(path_forces(pressure, points, load))
 
@@ -138,27 +148,30 @@ def path_forces(pressure: MovingPressure, points: Floats, load: Floats) -> Compl
 
 
 def path_strengths(pressure: MovingPressure, threshold: float) -> tuple[Ints, Floats]:
-    """Orders (n,) of the harmonics of `path_cells` that, with all foci, exceed a fraction of the
-    strongest, and 0; and their largest amplitude (n,) at about eight points of the path.
+    """Orders (n,) of the harmonics of `path_cells` that matter, and their amplitudes (n,) on the
+    path.
+
+    Those that exceed a fraction of the strongest, with all foci, and order 0; amplitudes are the
+    largest at about eight points of the path.
     """
     of_spot, n = _largest_harmonics(pressure), harmonics(pressure)
     share = np.abs(foci_harmonics(pressure, n)) * of_spot[n]
-    heard = (share > threshold * share.max()) | (n == 0)
-    return n[heard], of_spot[n[heard]]
+    chosen = (share > threshold * share.max()) | (n == 0)
+    return n[chosen], of_spot[n[chosen]]
 
 
-@lru_cache(maxsize=8)  # lines, their names and maps are of the same load
+@lru_cache(maxsize=8)  # lines, their names and maps share a load
 def _largest_harmonics(pressure: MovingPressure) -> Floats:
     knots = path_samples(pressure)
     spots = pressure.spot(knots[:: max(1, len(knots) // 8)][:9], knots).T
-    found = np.abs(path_fourier(pressure, spots)).max(axis=0)
-    found.setflags(write=False)
-    return found
+    largest = np.abs(path_fourier(pressure, spots)).max(axis=0)
+    largest.setflags(write=False)
+    return largest
 
 
 def foci_harmonics(pressure: MovingPressure, n: Ints) -> Complex:
-    """Array factor (k,) of all foci on harmonics n (k,) of one; 1 where the harmonics are those of
-    the Tacton.
+    """Array factor (k,) of all foci for harmonics n (k,) of one focus; 1 if the cells are of the
+    Tacton.
     """
     if path_cells(pressure).of_tacton:
         return np.ones(len(n), np.complex128)
@@ -168,13 +181,17 @@ def foci_harmonics(pressure: MovingPressure, n: Ints) -> Complex:
 def synthesise(frequencies: Floats, amplitudes: Complex, times: Floats) -> Floats:
     """Waveforms (t, p) = Re sum a exp(2 pi i f t) of amplitudes a (f, p) at frequencies (f,) in Hz
     and times (t,) in s.
+
+    >>> synthesise(np.array([0.0, 50.0]), np.array([[1.0 + 0j], [2j]]), np.array([0.0, 0.005]))
+    array([[ 1.],
+           [-1.]])
     """
     turn = np.exp(2j * np.pi * np.outer(times, frequencies))
     return np.asarray(turn.real @ amplitudes.real - turn.imag @ amplitudes.imag)
 
 
 def merge_lines(frequencies: Floats, amplitudes: Complex) -> tuple[Floats, Complex]:
-    """Lines merged by frequency: distinct ones (g,) in Hz and the sums (g, ...) of amplitudes."""
+    """Distinct frequencies (g,) in Hz, and the sums (g, ...) of the amplitudes at each."""
     distinct, which = np.unique(np.round(frequencies, 9), return_inverse=True)
     total = np.zeros((len(distinct), *amplitudes.shape[1:]), np.complex128)
     np.add.at(total, which, amplitudes)
@@ -184,10 +201,11 @@ def merge_lines(frequencies: Floats, amplitudes: Complex) -> tuple[Floats, Compl
 def gain_orders(
     pressure: MovingPressure, factors: Sequence[float] = (1.0,)
 ) -> tuple[Ints, Complex]:
-    """Orders (m, 3) of f_AM, f_AM2 and f_e in the gain, of either sign, and its coefficients (k, m)
-    in Pa where the modulation is multiplied by factors (k,). Phases are doubled until the harmonics
-    of a drive law that is no polynomial fall below `ALIASED`; a ValueError if `MOST_PHASES` are not
-    enough.
+    """Fourier orders (m, 3) of f_AM, f_AM2 and f_e in the gain, and coefficients (k, m) in Pa.
+
+    The modulation is multiplied by each of `factors` (k,). For a drive law that is not a
+    polynomial, phases are doubled until its harmonics fall below `ALIASED`; a ValueError if
+    `MOST_PHASES` do not suffice.
     """
     law, n_tones = pressure.law, np.count_nonzero(tones(pressure.tacton))
     count = PHASES if law.degree is None else max(PHASES, 2 * law.degree + 2)
@@ -203,22 +221,22 @@ def gain_orders(
 
 
 def harmonics_unbounded(law: DriveLaw) -> ValueError:
-    """Error of a drive law whose harmonics do not fall off."""
+    """Error for a drive law whose harmonics do not decay."""
     return ValueError(
-        f"the harmonics that drive law '{law}' makes of the modulation do not fall to {ALIASED:g} "
-        "of the strongest; make it smoother, or modulate by fewer tones"
+        f"the harmonics of drive law '{law}' do not fall to {ALIASED:g} of the strongest; use a "
+        "smoother law, or fewer tones"
     )
 
 
 def _at_phases(
     pressure: MovingPressure, factors: Sequence[float], count: int
 ) -> tuple[Ints, Complex]:
-    """Orders (m, 3) and coefficients (k, m) from so many phases of each sinusoid."""
+    """Orders (m, 3) and coefficients (k, m) from `count` phases of each sinusoid."""
     tacton = pressure.tacton
     counts = [count if f else 1 for f in tones(tacton)]
     grid = np.meshgrid(*(2 * np.pi * np.arange(n) / n for n in counts), indexing="ij")
     modulation = modulation_at_phases(tacton, *grid)
     of_each = np.meshgrid(*(np.fft.fftfreq(n, 1 / n) for n in counts), indexing="ij")
     orders = np.stack([np.round(each).astype(int).ravel() for each in of_each], axis=1)
-    driven = (pressure.driven(factor * modulation) for factor in factors)
-    return orders, np.stack([(np.fft.fftn(each) / each.size).ravel() for each in driven])
+    gain_at = (pressure.gain_at(factor * modulation) for factor in factors)
+    return orders, np.stack([(np.fft.fftn(each) / each.size).ravel() for each in gain_at])

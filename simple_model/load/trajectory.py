@@ -1,7 +1,7 @@
-"""Trajectory of the focus: a named shape, a polyline at constant speed, or a path recorded in time.
+"""Trajectory of the focus: a named shape, a polyline at constant speed, or a recorded path.
 
-Named shapes: Lim, Seifi and Park, CHI EA '24, section 2.2. Positions are computed from the phase
-of the drawing period, never by adding steps, and so are as exact at 10 s as at 0.
+The named shapes are those of Lim, Seifi and Park, CHI EA '24, section 2.2. Positions follow from
+the phase of the drawing period, not from summed steps, so they are as exact at 10 s as at 0.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from simple_model.typing import Bools, Floats, Ints, Points
 SHAPES = ("point", "line", "circle", "triangle", "square")  # defined by a size alone
 BY_POINTS = ("polyline", "recorded")
 SWEEPS = ("there_and_back", "one_way", "sinusoidal")
-LARGEST = 0.060  # m, the size of a palm
-FURTHEST = 0.300  # m of a point's coordinates, which devices steer to
+LARGEST_SIZE = 0.060  # m, of a palm
+FARTHEST_POINT = 0.300  # m, largest coordinate that devices steer to
 MOST_POINTS = 1_000_000
-NEARBY = 1e-6  # of a period, over which a tangent is taken; and of its part between two points
-STRAIGHT_ON = 1e-3  # of a unit tangent, below which it does not turn
-STILL = 1e-7, 1e-6  # m and of the level, below which nothing jumps
-ROUND = 132  # corners for a circle, 0.01 mm from the largest; and for a line swept as a cosine
-SAME = 1e-9  # of a period
-JUST_AFTER = 1e-9  # of the mean step of a recording, so that a sample holds at its own time
+TANGENT_STEP = 1e-6  # of a period, or of its part between two points
+LEAST_TURN = 1e-3  # of a unit tangent; a smaller change is no turn
+LEAST_JUMP = 1e-7, 1e-6  # m and of the level; smaller changes are no jump
+CORNERS_OF_CIRCLE = 132  # 0.01 mm from the largest circle; also for a line swept as a cosine
+SAME_PHASE = 1e-9  # of a period
+JUST_AFTER = 1e-9  # of the mean step of a recording: a sample holds at its own time
 
 _TOP, _LEFT, _RIGHT = (0.0, 1 / sqrt(3)), (-0.5, -0.5 / sqrt(3)), (0.5, -0.5 / sqrt(3))
 UNIT = {  # corners of shapes of size 1
@@ -40,27 +40,33 @@ UNIT = {  # corners of shapes of size 1
 
 @dataclass(frozen=True, kw_only=True)
 class Trajectory:
-    """A path in the skin plane; the named shapes are run anticlockwise about the centre.
+    """A path in the skin plane. The named shapes run anticlockwise about the centre.
 
     Parameters
     ----------
     shape : one of `SHAPES` or `BY_POINTS`
-    size : float, metre, 0..0.06: length of the line, diameter of the circle, side of the others; 0
-        for "polyline" and "recorded"
+    size : float, metre, 0 to 0.06: length of the line, diameter of the circle, side of the triangle
+        or square; 0 for "polyline" and "recorded"
     speed : float, m/s, along the path; 0 for "recorded"
-    sweep : how a line or an open polyline is repeated: "there_and_back" (f_d = speed / 2 length),
+    sweep : how a line or an open polyline repeats: "there_and_back" (f_d = speed / 2 length),
         "one_way" (f_d = speed / length, then a jump back) or "sinusoidal" (there and back as a
-        cosine of time, with `speed` on average)
-    centre : (x, y), metre, what all positions are moved by
-    points : (k, 2), metre, corners of a polyline, which is closed if its last is its first; or the
-        positions of a recording
-    times : (k,), s, from 0, never falling: when a recording is at its points. Its period is
-        times[-1]; equal times are a jump
-    levels : (k,), 0..1, of the amplitude, at those times; 1 throughout if empty
-    hold : bool, whether a recording stays at a point until the next, as devices do, rather than
-        going there in a straight line
+        cosine of time, with `speed` as the mean speed)
+    centre : (x, y), metre, added to all positions
+    points : (k, 2), metre, corners of a polyline or positions of a recording. A polyline is closed
+        if its last corner equals its first.
+    times : (k,), s, start at 0 and never fall: when a recording is at its points. Its period is
+        times[-1]. Equal times make a jump.
+    levels : (k,), 0 to 1, factors of the amplitude at those times; 1 throughout if empty
+    hold : bool, whether a recording stays at a point until the next time, as devices do, or moves
+        there in a straight line
 
     Raises a ValueError if a value is unknown, not finite or out of range.
+
+    >>> circle = Trajectory(shape="circle", size=0.02, speed=12.0)
+    >>> round(circle.drawing_frequency, 1)  # Hz
+    191.0
+    >>> circle.position(0.0)
+    array([0.01, 0.  ])
     """
 
     shape: str = "point"
@@ -76,7 +82,7 @@ class Trajectory:
     def __post_init__(self) -> None:
         choose("shape", self.shape, (*SHAPES, *BY_POINTS))
         choose("sweep", self.sweep, SWEEPS)
-        check_range("size", 1e3 * self.size, 0, 1e3 * LARGEST, " mm", ", the size of a palm")
+        check_range("size", 1e3 * self.size, 0, 1e3 * LARGEST_SIZE, " mm", ", the size of a palm")
         check_numbers("a path", self, "speed", least="0 or above")
         _check_points(self)
         if self.shape == "recorded":
@@ -88,11 +94,11 @@ class Trajectory:
         if self.shape in ("point", "circle"):
             return pi * self.size * (self.shape == "circle")
         steps = float(self._arc[-1])
-        return steps if self._runs_on else 2 * steps
+        return steps if self._is_one_run else 2 * steps
 
     @property
     def drawing_frequency(self) -> float:
-        """Periods per second, Hz; 0 where the focus does not move."""
+        """Periods per second, Hz; 0 if the focus does not move."""
         if self.shape == "recorded":
             return 1 / self.times[-1]
         return self.speed / self.length if self.length > 0 else 0.0
@@ -104,8 +110,8 @@ class Trajectory:
 
     @property
     def is_eased(self) -> bool:
-        """Whether the speed goes as a sine, and is pi/2 times the mean at its greatest."""
-        can_be = self.shape in ("line", "polyline") and not self._runs_on
+        """Whether the speed varies as a sine. Its maximum is then pi/2 times its mean."""
+        can_be = self.shape in ("line", "polyline") and not self._is_one_run
         return self.sweep == "sinusoidal" and can_be
 
     @property
@@ -116,7 +122,7 @@ class Trajectory:
         return self._corners + self.centre
 
     def phase(self, t: ArrayLike) -> Floats:
-        """Fraction 0..1 of the period at times t in s, same shape as t."""
+        """Fraction (...) of the period, 0 to 1, at times (...) in s."""
         return np.mod(self.drawing_frequency * np.asarray(t, np.float64), 1.0)
 
     def position(self, t: ArrayLike) -> Floats:
@@ -131,13 +137,13 @@ class Trajectory:
     def tangent_at_phase(self, phase: ArrayLike) -> Floats:
         """Unit tangent (..., 2) of the motion at fractions (...) of the period; 0 at rest."""
         phase = np.asarray(phase, np.float64)
-        step = NEARBY / max(1, len(self.points))
+        step = TANGENT_STEP / max(1, len(self.points))
         way = np.subtract(*(self.at_phase(np.mod(phase + d, 1.0)) for d in (step, -step)))
         length = np.linalg.norm(way, axis=-1, keepdims=True)
         return np.asarray(way / np.where(length > 0, length, 1.0))
 
     def level_at_phase(self, phase: ArrayLike) -> Floats:
-        """Level (...) of the amplitude, 0..1, at fractions (...) of the period."""
+        """Level (...) of the amplitude, 0 to 1, at fractions (...) of the period."""
         phase = np.asarray(phase, np.float64)
         if not self.levels:
             return np.ones_like(phase)
@@ -147,8 +153,8 @@ class Trajectory:
 
     @cached_property
     def parts(self) -> tuple[Floats, Floats]:
-        """Fractions (s + 1,) of the period, from 0 to 1, between which the path is smooth, and the
-        length (s,) of each part in metre.
+        """Bounds (s + 1,) of the smooth parts, as fractions of the period from 0 to 1, and their
+        lengths (s,) in metre.
         """
         if self.shape == "recorded":
             clock = self._clock
@@ -158,7 +164,7 @@ class Trajectory:
         bounds = np.array([0.0, 1.0])
         if self.shape != "circle" and self.length > 0:
             bounds = np.unique(self._arc) / self._arc[-1]
-            if not self._runs_on:
+            if not self._is_one_run:
                 way = np.arccos(1 - 2 * bounds) / pi if self.is_eased else bounds
                 bounds = np.concatenate([way, 2 - way[-2::-1]]) / 2
         share = pi / 2 if self.is_eased else 1.0  # at its fastest
@@ -166,18 +172,18 @@ class Trajectory:
 
     @cached_property
     def jumps(self) -> Floats:
-        """Fractions (j,) of the period, 0 included and 1 not, at which position or level jumps."""
+        """Fractions (j,) of the period, in [0, 1), at which position or level jumps."""
         starts = self.parts[0][:-1]
-        return starts[differ(*self.beside(starts))]
+        return starts[differ(*self.limits_at(starts))]
 
     @cached_property
     def turns(self) -> Floats:
-        """Fractions (j,) of the period, 0 included and 1 not, at which the direction jumps."""
-        starts, aside = self.parts[0][:-1], 2 * NEARBY / max(1, len(self.points))
+        """Fractions (j,) of the period, in [0, 1), at which the direction jumps."""
+        starts, aside = self.parts[0][:-1], 2 * TANGENT_STEP / max(1, len(self.points))
         ways = self.tangent_at_phase(np.mod([starts - aside, starts + aside], 1.0))
-        return starts[np.abs(ways[1] - ways[0]).max(axis=-1) > STRAIGHT_ON]
+        return starts[np.abs(ways[1] - ways[0]).max(axis=-1) > LEAST_TURN]
 
-    def beside(self, phases: Floats) -> tuple[Floats, Floats]:
+    def limits_at(self, phases: Floats) -> tuple[Floats, Floats]:
         """Positions and level (k, 3) just before and just after fractions (k,) of the period."""
         aside = np.mod([phases - self._nearby, phases + self._nearby], 1.0)
         before, after = (np.column_stack([self.at_phase(a), self.level_at_phase(a)]) for a in aside)
@@ -191,7 +197,7 @@ class Trajectory:
 
     @property
     def _nearby(self) -> float:
-        """Fraction of the period in which nothing moves, but that tells a time from the next."""
+        """Fraction of the period that separates two times, but in which nothing moves."""
         return 2 * JUST_AFTER / max(1, len(self.points) - 1)
 
     def _about_origin(self, phase: Floats) -> Floats:
@@ -206,13 +212,13 @@ class Trajectory:
             return np.asarray(start + part[..., None] * (self._corners[before + 1] - start))
         if self.is_eased:
             phase = (1 - np.cos(2 * pi * phase)) / 2
-        elif not self._runs_on:
+        elif not self._is_one_run:
             phase = 1 - np.abs(1 - 2 * phase)
         at = phase * self._arc[-1]
         return np.stack([np.interp(at, self._arc, x) for x in self._corners.T], axis=-1)
 
     @property
-    def _runs_on(self) -> bool:
+    def _is_one_run(self) -> bool:
         """Whether a period is one run along the corners."""
         corners = self._corners
         closed = len(corners) > 2 and (corners[0] == corners[-1]).all()
@@ -247,57 +253,69 @@ class Trajectory:
 
 
 def differ(before: Floats, after: Floats) -> Bools:
-    """Bools (k,) of positions and levels (k, 3) that are not the same."""
-    place, level = STILL
+    """Whether positions and levels (k, 3) differ."""
+    place, level = LEAST_JUMP
     apart = np.abs(after - before)
     return (apart[:, :2] > place).any(axis=1) | (apart[:, 2] > level)
 
 
 def joined(paths: Sequence[Trajectory], frequency: float) -> Trajectory:
-    """Several foci on paths of their own, as one recorded path that they share.
+    """Join the paths of several foci into one recording, which the foci share.
 
-    One period of each path follows the other: n paths, each drawn in T, make a recording of period
-    n T. Give it `even_phases(n)` as foci, which are then at every time one on each path. A circle of
-    diameter d is a polygon within d/2 (1 - cos(pi / 132)).
+    The recording runs the n paths one after the other: with each drawn in a time T, its period is n
+    T. Use `even_phases(n)` as foci. Each path then has one focus at all times. A circle of diameter
+    d becomes a polygon, within d/2 (1 - cos(pi / 132)) of it.
 
     Parameters
     ----------
-    paths : named shapes; each is drawn `frequency` times a second, whatever its own speed
-    frequency : float, Hz, above 0
+    paths : named shapes; their own speed is ignored
+    frequency : float, Hz, above 0, at which each path is drawn
 
     Returns
     -------
     Trajectory
 
-    Raises a ValueError if there is no path, one has points of its own, or the frequency is not
-    above 0.
+    Raises
+    ------
+    ValueError
+        If there are no paths, a path has points of its own, or the frequency is not above 0.
+
+    >>> path = joined([Trajectory(shape="circle", size=0.02), Trajectory(shape="point")], 185.0)
+    >>> path.shape, round(path.drawing_frequency, 1)
+    ('recorded', 92.5)
     """
     if not paths:
-        raise ValueError("no paths to join; give one for each focus")
+        raise ValueError("there are no paths to join; give one for each focus")
     if not (isfinite(frequency) and frequency > 0):
-        raise ValueError(f"frequency = {frequency} Hz must be finite and above 0 to draw paths")
+        raise ValueError(f"frequency = {frequency} Hz of joined paths must be finite and above 0")
     points, times = list[tuple[float, float]](), list[float]()
     for before, path in enumerate(paths):
         if path.shape not in SHAPES:
-            raise ValueError(f"a {path.shape} path has points of its own; join named shapes")
+            raise ValueError(
+                f"a {path.shape} path has points of its own; join {', '.join(SHAPES)} only"
+            )
         is_round = path.shape == "circle" or path.is_eased
-        phases = np.linspace(0, 1, ROUND + 1) if is_round else path.parts[0]
+        phases = np.linspace(0, 1, CORNERS_OF_CIRCLE + 1) if is_round else path.parts[0]
         points += map(tuple, path.at_phase(phases).tolist())
         times += ((before + phases) / frequency).tolist()
     return Trajectory(shape="recorded", points=tuple(points), times=tuple(times))
 
 
 def even_phases(n: int) -> tuple[float, ...]:
-    """Phases (n,) of n foci that share a path even_phases."""
+    """Return the phases (n,) of n foci that share a path evenly.
+
+    >>> even_phases(4)
+    (0.0, 0.25, 0.5, 0.75)
+    """
     return tuple(j / n for j in range(n))
 
 
 def split_recording(path: Trajectory, n: int) -> tuple[Floats, ...]:
-    """Corners (k, 2) in metre of each of n parts that take a recording equally long."""
+    """Split a recording into n parts of equal time. Return the corners (k, 2) in metre of each."""
     clock = np.array(path.times) * n / path.times[-1]
     # At a jump from part to part there are two corners: the first ends one, the second begins one.
-    first = np.searchsorted(clock, np.arange(n) + SAME, side="right") - 1
-    last = np.searchsorted(clock, np.arange(1, n + 1) - SAME)
+    first = np.searchsorted(clock, np.arange(n) + SAME_PHASE, side="right") - 1
+    last = np.searchsorted(clock, np.arange(1, n + 1) - SAME_PHASE)
     return tuple(path.outline[a : b + 1] for a, b in zip(first, last, strict=True))
 
 
@@ -306,17 +324,18 @@ def _check_points(path: Trajectory) -> None:
     if (count < 2 or path.size != 0) if path.shape in BY_POINTS else count > 0:
         raise ValueError(
             f"a {path.shape} path has {count} points and size {1e3 * path.size:g} mm; give a "
-            "polyline or recorded path two points or more and no size, others a size and no points"
+            "polyline or recorded path at least two points and no size, other shapes a size and no "
+            "points"
         )
     check_range("number of points", count, 0, MOST_POINTS)
     try:
         places = np.array([path.centre, *path.points], np.float64)
     except (TypeError, ValueError):
         raise ValueError("points and centre must be pairs of numbers, such as (0.01, 0)") from None
-    if places.shape[1:] != (2,) or not (np.abs(places) <= FURTHEST).all():
+    if places.shape[1:] != (2,) or not (np.abs(places) <= FARTHEST_POINT).all():
         raise ValueError(
-            f"points and centre must be pairs within {1e3 * FURTHEST:g} mm of the origin, "
-            "where devices steer to; move or shrink the path"
+            f"points and centre must be pairs within ±{1e3 * FARTHEST_POINT:g} mm, where devices "
+            "steer to; move or shrink the path"
         )
 
 
@@ -326,9 +345,12 @@ def _check_recording(path: Trajectory) -> None:
     if path.speed != 0 or len(times) != n or len(levels) not in (0, n):
         raise ValueError(
             f"a recorded path has {n} points, {len(times)} times, {len(levels)} levels and speed "
-            f"{path.speed:g} m/s; give as many of each, or no levels, and no speed"
+            f"{path.speed:g} m/s; give one time and one level for each point, or no levels, and no "
+            "speed"
         )
     if not (np.isfinite(times).all() and times[0] == 0 < times[-1] and (np.diff(times) >= 0).all()):
-        raise ValueError("times of a recorded path must be finite, begin with 0 and never fall")
+        raise ValueError("times of a recorded path must be finite, begin at 0 and never fall")
     if not ((levels >= 0) & (levels <= 1)).all():
-        raise ValueError("levels of a recorded path must lie in 0..1; scale them to full drive")
+        raise ValueError(
+            "levels of a recorded path must be between 0 and 1; scale them to full drive"
+        )

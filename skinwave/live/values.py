@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from simple_model import DRIVES, SHAPES, SUPERPOSITIONS, Tacton, Trajectory, even_phases, joined
-from simple_model.load.trajectory import ROUND, split_recording
+from simple_model.load.trajectory import CORNERS_OF_CIRCLE, split_recording
 from skinwave.scene.paper15 import tactons
 from skinwave.scene.scene import Scene, check_load
 
@@ -17,7 +17,7 @@ Values = dict[str, Any]
 RATIOS = {f"{w1:g}:{w2:g}": (w1, w2) for w1, w2 in SUPERPOSITIONS}
 PROFILES = ("gaussian", "main_lobe")
 QUANTITIES = ("displacement", "velocity", "acceleration")
-CORNERS = {2: "point", 3: "line", 4: "triangle", 5: "square", ROUND + 1: "circle"}
+CORNERS = {2: "point", 3: "line", 4: "triangle", 5: "square", CORNERS_OF_CIRCLE + 1: "circle"}
 CLOSE = 1e-8  # m, and share of a period: a recording as close is that of named shapes
 PLAIN = {"am2": 0, "ratio": "1:0", "envelope": 0, "foci": 1, "pulses": "", "phases": "",
          "paths": "", "polyline": "", "ramp": 0}  # fmt: skip

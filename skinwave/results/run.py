@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from simple_model import LineTable, Response, Unnamed, line_table, spectrum
-from simple_model.load.line_names import SAME, line_frequency
+from simple_model.load.line_names import SAME_LINE, line_frequency
 from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
 
@@ -112,7 +112,7 @@ def lines_beside(scene: Scene, response: Response) -> dict[str, float]:
 
 def own_names(scene: Scene, listed: Mapping[str, float]) -> dict[str, str]:
     """Listed names, with frequencies in Hz, by themselves and each name that claims are about."""
-    same = SAME / scene.tacton.duration
+    same = SAME_LINE / scene.tacton.duration
     own = {name: name for name in listed}
     for name in ASSESSED:
         f = line_frequency(scene.tacton, name)
