@@ -1,6 +1,6 @@
-"""Axes, curves and small pages of records that show themselves.
+"""Axes, curves and small HTML pages for records that draw themselves.
 
-matplotlib is imported where something is drawn, not before.
+matplotlib is imported only where something is drawn.
 """
 
 from base64 import b64encode
@@ -17,16 +17,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-NAMED = 8  # curves that a legend names, the outermost among them
-PROBES = "probes at (x, y) in mm"  # title of their legend
-ENTRY = 0.105  # inch for each point of the letters: width of an entry
-DPI = 100  # of a small figure on a page
-SMALLER, SMALLEST = 5 / 6, 8.0  # of letters beside those of axes; points, of any letter
+MOST_NAMED = 8  # curves that a legend names, the outermost among them
+LEGEND_TITLE = "probes at (x, y) in mm"
+ENTRY_WIDTH = 0.105  # inch of a legend entry per point of font size
+DPI = 100  # of a figure on a page
+SMALLER, SMALLEST = 5 / 6, 8.0  # ratio to the font size of axes; points, of any text
 CELL = "padding:0.1em 0.8em 0.1em 0;text-align:left;vertical-align:top"
 
 
 def new_axes(ax: "Axes | None") -> "Axes":
-    """The given axes, or those of a new figure of pyplot's."""
+    """Return the given axes, or those of a new pyplot figure."""
     if ax is not None:
         return ax
     import matplotlib.pyplot as plt
@@ -35,41 +35,41 @@ def new_axes(ax: "Axes | None") -> "Axes":
 
 
 def small() -> float:
-    """Size in points of letters that are smaller than those of axes, as far as these are large."""
+    """Font size in points of text that is smaller than that of axes."""
     import matplotlib as mpl
 
     return max(SMALLER * float(mpl.rcParams["font.size"]), SMALLEST)
 
 
 def place_name(place: Floats) -> str:
-    """A place (2,) or (3,) in metre as text, its numbers in mm."""
+    """Format a place (2,) or (3,) in metre as text, in mm."""
     return f"({', '.join(f'{1e3 * x:.4g}' for x in place)})"
 
 
 def curves(ax: "Axes", x: Floats, values: Floats, places: Floats, **style: Any) -> None:
-    """Draw a curve of values (k, p) along x (k,) for each probe, at places (p, 2) in metre, from
-    dark to bright, with a legend of at most `NAMED` of them.
+    """Draw values (k, p) along x (k,), a curve for each probe at places (p, 2) in metre, from dark
+    to bright. The legend names at most `MOST_NAMED` curves.
     """
     import matplotlib as mpl
 
     count = values.shape[1]
     colours = mpl.colormaps["viridis"](np.linspace(0, 0.88, count))
-    named = set(np.linspace(0, count - 1, min(count, NAMED)).round().astype(int).tolist())
+    named = set(np.linspace(0, count - 1, min(count, MOST_NAMED)).round().astype(int).tolist())
     for k in range(count):
         label = place_name(places[k]) if k in named else None
         ax.plot(x, values[:, k], color=colours[k], label=label, **{"lw": 1.2, **style})
     inch = ax.get_window_extent().width / ax.figure.get_dpi()
-    columns = max(1, min(len(named), int(inch / (ENTRY * mpl.rcParams["font.size"]))))
+    columns = max(1, min(len(named), int(inch / (ENTRY_WIDTH * mpl.rcParams["font.size"]))))
     ax.legend(
         loc="lower left", bbox_to_anchor=(0, 1), ncols=columns, frameon=False,
-        title=PROBES, alignment="left", fontsize=small(), borderaxespad=0.2, columnspacing=1.0,
-        handlelength=1.2,
+        title=LEGEND_TITLE, alignment="left", fontsize=small(), borderaxespad=0.2,
+        columnspacing=1.0, handlelength=1.2,
     )  # fmt: skip
     ax.grid(alpha=0.25)
 
 
 def picture(draw: Callable[["Figure"], object], width: float, height: float) -> bytes:
-    """PNG file of a figure of a width and height in inch, which a function draws."""
+    """Return the PNG file of a figure of a width and height in inch that a function draws."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
@@ -82,7 +82,7 @@ def picture(draw: Callable[["Figure"], object], width: float, height: float) -> 
 
 
 def table(rows: Iterable[Sequence[str]], header: Sequence[str] = ()) -> str:
-    """Rows as a table of HTML, every cell as text."""
+    """Format rows as an HTML table, every cell as text."""
 
     def line(cells: Sequence[str], kind: str) -> str:
         return "".join(f'<{kind} style="{CELL}">{escape(cell)}</{kind}>' for cell in cells)
@@ -93,9 +93,9 @@ def table(rows: Iterable[Sequence[str]], header: Sequence[str] = ()) -> str:
 
 
 def page(title: str, image: bytes, tables: Iterable[str], warnings: Iterable[str] = ()) -> str:
-    """Small page in HTML of a record: a figure in PNG, if any, tables in HTML, and warnings."""
-    shown = b64encode(image).decode()
-    figure = f'<img alt="{escape(title)}" src="data:image/png;base64,{shown}">' if image else ""
-    said = "".join(f"<li>{escape(sentence)}</li>" for sentence in warnings)
-    warned = f"<p><b>Warnings</b></p><ul>{said}</ul>" if said else ""
+    """Format a record as a small HTML page: a figure in PNG, if any, HTML tables, and warnings."""
+    data = b64encode(image).decode()
+    figure = f'<img alt="{escape(title)}" src="data:image/png;base64,{data}">' if image else ""
+    items = "".join(f"<li>{escape(sentence)}</li>" for sentence in warnings)
+    warned = f"<p><b>Warnings</b></p><ul>{items}</ul>" if items else ""
     return f"<div><p><b>{escape(title)}</b></p>{figure}{''.join(tables)}{warned}</div>"

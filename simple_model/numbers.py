@@ -1,19 +1,23 @@
-"""Numbers as pages, tables, captions and records print them: the one formatter of the project.
+"""Numbers in pages, tables, captions and records: the one formatter of the project.
 
-`significant` for a number alone, `with_error` for one whose standard error is known, `interval` for
-a range, `decibel`, `percent`, and `stated_error` for an expected relative error.
+`significant` formats a number, `with_error` one with a standard error, `interval` a range;
+`decibel`, `percent`, and `stated_error` for an expected relative error.
 """
 
 from math import floor, isfinite, log10
 
-LARGEST, SMALLEST = 1e6, 1e-4  # written without an exponent between these
-LEAST = 0.005  # error that is stated: wavenumber integrals and elements agree to 0.002
+LARGEST, SMALLEST = 1e6, 1e-4  # numbers between these have no exponent
+LEAST = 0.005  # smallest stated error: wavenumber integrals and elements agree to 0.002
 EN_DASH = "\u2013"
 FAINTEST = -120.0  # dB: a level below it is round-off
 
 
 def significant(value: float, digits: int = 3) -> str:
-    """A number to so many significant digits; "-" if it is not finite."""
+    """Format a number to `digits` significant digits; "-" if it is not finite.
+
+    >>> significant(1234.5), significant(0.012345, 2), significant(float("nan"))
+    ('1,230', '0.012', '-')
+    """
     if not isfinite(value):
         return "-"
     if not SMALLEST <= abs(value) < LARGEST:
@@ -23,14 +27,18 @@ def significant(value: float, digits: int = 3) -> str:
 
 
 def as_sentence(text: str) -> str:
-    """A clause with a capital and a full stop."""
+    """Add a capital and a full stop to a clause."""
     return f"{text[0].upper()}{text[1:]}."
 
 
 def with_error(value: float, error: float, digits: int = 3) -> str:
-    """A number and its standard error: the error to two digits, the number to as many places.
+    """Format a number with its standard error: the error to two digits, the number to as many
+    places.
 
-    Without a known error (not finite, or 0) the number has `digits` significant digits.
+    If the error is not known (not finite, or 0), the number has `digits` significant digits.
+
+    >>> with_error(12.3456, 0.123)
+    '12.35 ± 0.12'
     """
     if not (isfinite(value) and isfinite(error) and error > 0):
         return significant(value, digits)
@@ -39,14 +47,14 @@ def with_error(value: float, error: float, digits: int = 3) -> str:
 
 
 def interval(low: float, high: float, digits: int = 2) -> str:
-    """A range of numbers with an en dash, or "-5 to 25" if one is negative."""
+    """Format a range with an en dash, or as "-5 to 25" if a number is negative."""
     between = EN_DASH if min(low, high) >= 0 else " to "
     return between.join(significant(end, digits) for end in (low, high))
 
 
 def decibel(value: float, *, signed: bool = False) -> str:
-    """A level or ratio in dB, without the unit, to 0.1 dB; "< -120" below `FAINTEST`, "-" if it is
-    not finite.
+    """Format a level in dB, without unit, to 0.1 dB: "< -120" below `FAINTEST`, "-" if not
+    finite.
     """
     if value < FAINTEST:
         return f"< {FAINTEST:g}"
@@ -57,17 +65,21 @@ def decibel(value: float, *, signed: bool = False) -> str:
 
 
 def percent(share: float) -> str:
-    """A share in percent to two digits."""
+    """Format a share in percent to two digits."""
     return f"{significant(100 * share, 2)} %"
 
 
 def plural(number: int, thing: str) -> str:
-    """A number of things, in the plural unless it is one."""
+    """Format a number of things.
+
+    >>> plural(1, "warning"), plural(1200, "warning")
+    ('1 warning', '1,200 warnings')
+    """
     return f"{number:,} {thing}{'s' * (number != 1)}"
 
 
 def stated_error(error: float) -> str:
-    """An expected relative error in words; none below `LEAST` is stated."""
+    """Format an expected relative error; errors below `LEAST` are not resolved."""
     if not isfinite(error):
         return "not known"
     return f"below {percent(LEAST)}" if error < LEAST else percent(error)

@@ -1,9 +1,9 @@
-"""Point-kernel model of Lim, Seifi and Park (CHI EA '24), equation 2 with U(t) = 1: the pressure
-of the focus, weighted by distance.
+"""Point-kernel model of Lim, Seifi and Park (CHI EA '24), equation 2 with U(t) = 1.
 
-Nothing propagates: the stimulation at a skin point is the moving pressure there at that time. As
-published, the load is the commanded signal itself (drive law "linear") in a focal spot without side
-lobes ("main_lobe"); under any other load it is the same model.
+Nothing propagates: the stimulation at a skin point is the moving pressure there at that time, the
+pressure of the focus weighted by distance. As published, the load is the commanded signal itself
+(drive law "linear") in a focal spot without side lobes ("main_lobe"). Under any other load the
+model is the same.
 """
 
 from __future__ import annotations
@@ -24,30 +24,26 @@ from simple_model.typing import Floats
 
 
 def published_load(pressure: MovingPressure) -> MovingPressure:
-    """The same Tacton and height under the paper's load: linear drive, main lobe, no mean."""
+    """Return the same Tacton and height under the load of the paper: linear drive, main lobe, no
+    mean.
+    """
     return replace(pressure, drive=PUBLISHED, profile="main_lobe")
 
 
 def point_kernel_published(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> Response:
-    """Stimulation under the published load, whatever drive law and focus are given.
+    """Compute the stimulation under the published load, whatever the given drive law and focus.
 
-    Parameters
-    ----------
-    pressure, probes, times : as for `point_kernel`
-
-    Returns
-    -------
-    Response, stimulation (t, p) in Pa
+    Parameters and result are those of `point_kernel`.
     """
     response = point_kernel(published_load(pressure), probes, times)
     return replace(response, model="point-kernel-published")
 
 
 def point_kernel(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> Response:
-    """Stimulation under the load as given.
+    """Compute the stimulation under the given load.
 
-    Where the focus is so fast, or modulated so fast, that samples would show its lines elsewhere,
-    those above half the sampling rate are left out.
+    If the focus or its modulation is too fast for the samples, lines above half the sampling rate
+    are left out.
 
     Parameters
     ----------
@@ -58,10 +54,18 @@ def point_kernel(pressure: MovingPressure, probes: ArrayLike, times: Floats) -> 
     Returns
     -------
     Response, stimulation (t, p) in Pa
+
+    >>> from simple_model import Tacton
+    >>> load = MovingPressure(tacton=Tacton(am_frequency=140.0), drive="linear")
+    >>> response = point_kernel(load, [[0.0, 0.0], [0.01, 0.0]], np.arange(1000) / 1e4)
+    >>> response.values.max(axis=0).round(1)  # Pa
+    array([50. ,  3.6])
     """
     probes = np.array(probes, np.float64)
     if probes.ndim != 2 or probes.shape[1] != 2:
-        raise ValueError(f"probes have shape {probes.shape}; give (p, 2) positions in metre")
+        raise ValueError(
+            f"probes have shape {probes.shape}; give positions of shape (p, 2) in metre"
+        )
     started = time.perf_counter()
     parts = oversampling(highest_line(pressure), step(times))
     stimulation = low_pass(partial(pressure, probes), times, parts)

@@ -1,13 +1,13 @@
-"""Quantities that a response may be of: motion, strain and stress, at the surface or below it.
+"""Quantities of a response: motion, strain and stress, at the surface or below it.
 
-Each is a few linear components of a field of the body, so that every model reads it by one operator
-(rows of the field at each probe), a factor of frequency for rates and relaxing stress and, of
-quantities that are not linear, a function of the components at each time:
+A quantity is a few linear components of a field of the body. Every model reads it by one operator
+(rows of the field at each probe), a factor of frequency for rates and relaxing stress and, if it is
+not linear, a function of the components at each time:
 
     q(t) = invariant(synthesis of s^rate mu(s)/mu rows(material) field(s))
 
-Axes are those of the scene, z upwards, out of the body; the normal displacement is positive into
-it, the way a pressure pushes.
+Axes are those of the scene, z upwards, out of the body. Normal displacement is positive into the
+body, as a pressure pushes.
 """
 
 from collections.abc import Callable
@@ -33,8 +33,8 @@ NORMAL, VECTOR, STRAIN = "normal displacement", "displacement", "strain"  # fiel
 Rows = Callable[[Material], Floats]
 
 
-class NotOfThis(ValueError, AttributeError):
-    """Refusal of what a response has not; `hasattr` takes it for a missing attribute."""
+class NotApplicable(ValueError, AttributeError):
+    """A response does not have an attribute; `hasattr` returns False."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -43,15 +43,15 @@ class Quantity:
 
     Parameters
     ----------
-    name, symbol, words : str, in scenes and files; in formulas, as TeX; in sentences
+    name, symbol, words : str, for scenes and files, for formulas (TeX), and for sentences
     unit : str, SI
-    shown, per_unit : str and float, the unit on axes and in tables, and what 1 in SI is in it
+    shown, per_unit : str and float, unit on axes and in tables, and its number per SI unit
     column : str, of lines.csv
-    field : NORMAL, VECTOR or STRAIN, the field of a body that it is read from; "" of none
-    rows : its components (c, k) of the field (k,) at rest, of a material
-    rate : int, order of the derivative in time
-    relaxes : bool, whether it goes with the complex modulus
-    invariant : components (..., c) -> values (...), of quantities that are not linear
+    field : NORMAL, VECTOR or STRAIN, field of a body that it is read from; "" for none
+    rows : material -> components (c, k) of the field (k,) at rest
+    rate : int, order of the time derivative
+    relaxes : bool, whether it is proportional to the complex modulus
+    invariant : components (..., c) -> values (...), for quantities that are not linear
     """
 
     name: str
@@ -68,32 +68,31 @@ class Quantity:
     invariant: Callable[[Floats], Floats] | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickled by its name, so that other processes have the one that is registered."""
+        """Pickle by name, so that other processes use the registered quantity."""
         return quantity, (self.name,)
 
     @property
     def of_body(self) -> bool:
-        """Whether it is of a body; the point kernel's pressure is of none."""
+        """Whether it is a quantity of a body; the pressure of the point kernel is not."""
         return bool(self.field)
 
     @property
     def is_normal(self) -> bool:
-        """Whether it is of the motion normal to the surface alone."""
+        """Whether it depends only on the motion normal to the surface."""
         return self.field == NORMAL
 
     def factor(self, s: Any, modulus: Any = 1.0) -> Any:
-        """Factor of its components at complex frequencies s in rad/s.
-
-        `modulus` is the complex modulus there over that at rest.
+        """Factor of its components at complex frequencies s in rad/s; `modulus` is relative to
+        rest.
         """
         return np.asarray(s) ** self.rate * (modulus if self.relaxes else 1.0)
 
     def text(self, value: float, digits: int = 3) -> str:
-        """A value in SI as text, with the unit that it is shown in."""
+        """Format an SI value with the unit that is shown."""
         return f"{significant(self.per_unit * value, digits)} {self.shown}"
 
     def waveforms(self, components: Floats, probes: int) -> Floats:
-        """Values (t, p) of components (t, p c), those of a probe next to each other."""
+        """Values (t, p) of components (t, p c), with those of a probe next to each other."""
         each = components.reshape(len(components), probes, -1)
         return self.invariant(each) if self.invariant else each[..., 0]
 
@@ -102,18 +101,15 @@ QUANTITIES: dict[str, Quantity] = {}
 
 
 def register(quantity: Quantity) -> Quantity:
-    """Add a quantity to those that scenes may ask for.
-
-    Raises a ValueError if there is one of that name.
-    """
+    """Add a quantity that scenes may use; raises a ValueError if the name exists."""
     if quantity.name in QUANTITIES:
-        raise ValueError(f"'{quantity.name}' is registered already; choose another name")
+        raise ValueError(f"quantity '{quantity.name}' is already registered; choose another name")
     QUANTITIES[quantity.name] = quantity
     return quantity
 
 
 def quantity(name: str) -> Quantity:
-    """The quantity of a name; raises a ValueError if there is none."""
+    """Return the quantity of a name; raises a ValueError for an unknown name."""
     return QUANTITIES[choose("quantity", name, QUANTITIES)]
 
 
@@ -172,21 +168,21 @@ for _k, _pair in enumerate(COMPONENTS):
             field=STRAIN, rows=_chosen(hooke, _k), relaxes=True,
         )
     )  # fmt: skip
-LARGEST_SHEAR = register(
+register(
     Quantity(
         name="largest_shear_strain", symbol=r"\gamma_{max}", words="largest shear strain", unit="1",
         shown="µm/m", per_unit=1e6, column="largest_shear_strain_um_m", field=STRAIN,
         rows=_identity(6), invariant=largest_shear,
     )
 )  # fmt: skip
-VON_MISES = register(
+register(
     Quantity(
         name="von_mises_stress", symbol=r"\sigma_{vM}", words="von Mises stress",
         unit="Pa", shown="Pa", column="von_mises_stress_pa", field=STRAIN, rows=hooke, relaxes=True,
         invariant=von_mises,
     )
 )  # fmt: skip
-ENERGY_DENSITY = register(
+register(
     Quantity(
         name="energy_density", symbol="W", words="elastic strain energy density at the moduli at "
         "rest", unit="J/m3", shown="mJ/m³", per_unit=1e3, column="energy_density_mj_m3",

@@ -1,4 +1,4 @@
-"""Response of the probes, as every model returns it, and its spectral lines."""
+"""Response at the probes, as every model returns it, and its spectral lines."""
 
 from __future__ import annotations
 
@@ -15,35 +15,35 @@ from simple_model.load.line_names import line_names
 from simple_model.load.pressure import MovingPressure
 from simple_model.load.sampling import step
 from simple_model.numbers import plural, significant, stated_error
-from simple_model.quantities import DISPLACEMENT, PRESSURE, NotOfThis, Quantity, quantity
+from simple_model.quantities import DISPLACEMENT, PRESSURE, NotApplicable, Quantity, quantity
 from simple_model.spectra import Lines, Spectrum
 from simple_model.typing import Bools, Complex, Floats, Ints
-from simple_model.windows import cosines, kaiser
+from simple_model.windows import cosines
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SHOWN = 0.030  # s of waveforms on a page, at their end
-# Side lobes of the Kaiser window below -140 dB resolve lines as weak as that from strong ones.
-LINE_BETA, LINE_BINS = 19.0, 2.5  # it resolves lines that are so many bins apart
-SETTLE = 0.25  # of a response, before which no line is fitted
-ALIKE = 1e-3  # of the frequency resolution: lines as close as that are one, with one amplitude
-MINOR = 0.05  # of a line: most that others that it is not resolved from may have together
-FAINT = 0.02  # of the strongest line: weaker ones may have a larger relative error
-UNEVEN = 1e-6  # of a sampling interval
+PAGE_SECONDS = 0.030  # s of waveforms on a page, at their end
+# The side lobes of this Kaiser window are below -140 dB, so it resolves lines as weak as that.
+LINE_BETA, LINE_BINS = 19.0, 2.5  # for lines at least so many bins apart
+SETTLE = 0.25  # of a response, left out at its start when lines are fitted
+ALIKE = 1e-3  # of the frequency resolution: closer lines are one
+MINOR = 0.05  # of a line: most that unresolved neighbours may have together
+FAINT = 0.02  # of the strongest line: weaker lines may have a larger relative error
+UNEVEN = 1e-6  # of a sampling interval: largest deviation of equal steps
 
 
 @dataclass(frozen=True, kw_only=True)
 class Effort:
     """Cost of a response, and how it was computed.
 
-    `seconds` by phase; `dofs` solved for, at so many `steps` or lines; `peak_memory` in bytes;
-    element size `h` in metre and time step `dt` in s, 0 without; SHA-256 of the `mesh`; `solver`;
-    `estimate` of the relative error of the reduction; `energy_imbalance`, relative; the share of
-    the losses that was `radiated` through absorbing boundaries; `versions` of the software;
-    `warnings`, sentences on where it falls short of the request.
+    `seconds` by phase; `dofs` and number of `steps` or lines that were solved; `peak_memory` in
+    bytes; element size `h` in metre and time step `dt` in s, 0 if there is none; SHA-256 of the
+    `mesh`; `solver`; `estimate` of the relative error of the reduction; relative
+    `energy_imbalance`; share of the losses that was `radiated` through absorbing boundaries;
+    `versions` of the software; `warnings`, sentences on the limits of the result.
     """
 
     seconds: Mapping[str, float] = field(default_factory=dict)
@@ -76,13 +76,21 @@ class Response:
     times : (t,) float, s, equally spaced
     probes : (p, 2) float, metre
     values : (t, p) float, in the unit of the quantity
-    quantity : name of one of `quantities.QUANTITIES`; normal motion is positive into the body
+    quantity : a name in `quantities.QUANTITIES`; normal motion is positive into the body
     effort : Effort
-    expected_error : float, relative to the waveforms, as estimated beforehand; nan if unknown
-    load : MovingPressure whose `lines` it has; None if unknown
+    expected_error : float, estimated before the run, relative to the waveforms; nan if unknown
+    load : MovingPressure that defines its `lines`; None if unknown
 
     The arrays are copied and read-only. Raises a ValueError if shapes do not fit, a number is not
     finite, times are not equally spaced or the quantity is unknown.
+
+    >>> times = np.arange(1000) / 1e4
+    >>> x = 1e-6 * np.sin(2 * np.pi * 140 * times)
+    >>> response = Response(model="made", times=times, probes=[[0.0, 0.0]], values=x[:, None])
+    >>> response
+    <Response of made: displacement into the body (1,000 times, 1 probe) from 0 to 99.9 ms, ...>
+    >>> lines(response, [140.0]).round(9)  # metre
+    array([[1.e-06]])
     """
 
     model: str
@@ -98,10 +106,10 @@ class Response:
         for name in ("times", "probes", "values"):
             array = np.array(getattr(self, name), np.float64)
             if not np.isfinite(array).all():
-                raise ValueError(f"{name} of a response must be finite; leave out nan and inf")
+                raise ValueError(f"{name} of a response must be finite; remove nan and inf")
             array.setflags(write=False)
             object.__setattr__(self, name, array)
-        quantity(self.quantity)  # which refuses an unknown one
+        quantity(self.quantity)  # refuses an unknown one
         _check(self.times, self.probes, self.values)
 
     @property
@@ -111,36 +119,36 @@ class Response:
 
     @property
     def unit(self) -> str:
-        """The unit of its values, SI."""
+        """The SI unit of its values."""
         return self.record.unit
 
     @property
     def displacement(self) -> Floats:
-        """The values (t, p) of a normal displacement or of the point kernel's pressure; a
-        ValueError for other quantities.
+        """Values (t, p) of a normal displacement or of the pressure of the point kernel; otherwise
+        a ValueError.
         """
         if self.record not in (DISPLACEMENT, PRESSURE):
-            raise NotOfThis(f"this response is of {self.quantity}; take its `values`")
+            raise NotApplicable(f"this is a response of {self.quantity}; use its `values`")
         return self.values
 
     @property
     def lines(self) -> Lines:
         """Resolved lines of its load by name; a ValueError if the load is unknown."""
         if self.load is None:
-            raise NotOfThis(
-                "the load of this response is unknown, and so are its lines; take "
+            raise NotApplicable(
+                "the load of this response is unknown, so its lines have no names; use "
                 "simple_model.phasors(response, frequencies)"
             )
-        found = line_names(self.load)
-        found = found.some(found.frequencies < 0.5 / step(self.times))
-        found = found.some(are_resolved(self, found.frequencies, strengths=found.strengths))
+        named = line_names(self.load)
+        named = named.some(named.frequencies < 0.5 / step(self.times))
+        named = named.some(are_resolved(self, named.frequencies, strengths=named.strengths))
         return Lines(
-            names=found.names, frequencies=found.frequencies, probes=self.probes,
-            amplitudes=phasors(self, found.frequencies), quantity=self.quantity,
+            names=named.names, frequencies=named.frequencies, probes=self.probes,
+            amplitudes=phasors(self, named.frequencies), quantity=self.quantity,
         )  # fmt: skip
 
     def spectrum(self, window: str = "hann") -> Spectrum:
-        """Amplitude spectrum at every probe, as the function `spectrum` has it."""
+        """Amplitude spectrum at every probe, see the function `spectrum`."""
         frequencies, amplitudes = spectrum(self, window)
         return Spectrum(
             frequencies=frequencies, amplitudes=amplitudes, probes=self.probes,
@@ -148,7 +156,7 @@ class Response:
         )  # fmt: skip
 
     def plot(self, probes: Sequence[int] | None = None, *, ax: Axes | None = None) -> Axes:
-        """Draw the waveforms of all probes, or of those of some numbers, and return the axes."""
+        """Draw the waveforms of all probes, or of probes by index. Return the axes."""
         chosen = slice(None) if probes is None else list(probes)
         ax = drawing.new_axes(ax)
         values = self.record.per_unit * self.values[:, chosen]
@@ -159,8 +167,8 @@ class Response:
         return ax
 
     def to_pandas(self) -> pd.DataFrame:
-        """The values as a table: rows by time_s, columns by x_m and y_m of the probes, and in its
-        `attrs` unit, quantity, model, error and warnings.
+        """Return the values as a table: rows by time_s, columns by x_m and y_m of the probes. Its
+        `attrs` have unit, quantity, model, error and warnings.
         """
         pandas = library("pandas")
         names = [f"{axis}_m" for axis in "xyz"[: self.probes.shape[1]]]
@@ -179,13 +187,13 @@ class Response:
         record, times = self.record, self.times
         largest = record.per_unit * float(np.abs(self.values).max(initial=0.0))
         size = f"{plural(len(times), 'time')}, {plural(len(self.probes), 'probe')}"
-        said = [
+        parts = [
             f"{record.words} ({size}) from {1e3 * times[0]:g} to {1e3 * times[-1]:.5g} ms, at most "
             f"{significant(largest)} {record.shown}",
             f"expected error {stated_error(self.expected_error)}",
             plural(len(self.effort.warnings), "warning"),
         ]
-        return f"<Response of {self.model}: {'; '.join(said)}>"
+        return f"<Response of {self.model}: {'; '.join(parts)}>"
 
     def _repr_html_(self) -> str:
         """A small page: the last waveforms and the spectrum."""
@@ -193,7 +201,7 @@ class Response:
         def draw(figure: Figure) -> None:
             left, right = figure.subplots(1, 2)
             end = 1e3 * self.times[-1]
-            self.plot(ax=left).set_xlim(max(1e3 * self.times[0], end - 1e3 * SHOWN), end)
+            self.plot(ax=left).set_xlim(max(1e3 * self.times[0], end - 1e3 * PAGE_SECONDS), end)
             self.spectrum().plot(ax=right)
             if legend := right.get_legend():  # the same as that on the left
                 legend.remove()
@@ -203,7 +211,7 @@ class Response:
 
 
 def library(name: str) -> Any:
-    """An optional library; raises an ImportError with its cure if it is not installed."""
+    """Import an optional library; raises an ImportError that says how to install it."""
     try:
         return import_module(name)
     except ModuleNotFoundError as error:
@@ -213,7 +221,7 @@ def library(name: str) -> Any:
 
 
 def _check(times: Floats, probes: Floats, values: Floats) -> None:
-    """Refuse times (t,), probes (p, 2 or 3) and values (t, p) that do not fit or are uneven."""
+    """Refuse times (t,), probes (p, 2 or 3) and values (t, p) of wrong shapes, and uneven times."""
     if times.ndim != 1 or not len(times):
         raise ValueError(f"times of a response have shape {times.shape}; give (t,) in s")
     if probes.ndim != 2 or probes.shape[1] not in (2, 3):
@@ -224,27 +232,30 @@ def _check(times: Floats, probes: Floats, values: Floats) -> None:
     mean = steps.mean() if len(steps) else 1.0
     if not (mean > 0 and np.abs(steps - mean).max(initial=0.0) <= UNEVEN * mean):
         raise ValueError(
-            f"times of a response must rise in equal steps, and theirs are {steps.min():g} to "
-            f"{steps.max():g} s; sample it evenly"
+            f"times of a response must rise in equal steps, but the steps are {steps.min():g} to "
+            f"{steps.max():g} s; give equally spaced times"
         )
 
 
 def spectrum(response: Response, window: str = "hann") -> tuple[Floats, Floats]:
-    """Amplitude spectrum: frequencies (f,) in Hz and amplitudes (f, p) in the response's unit.
+    """Compute the amplitude spectrum: frequencies (f,) in Hz and amplitudes (f, p) in the unit of
+    the response.
 
-    A sinusoid of amplitude a on a bin shows as a, whatever the window, a name of
-    `windows.COSINES`.
+    A sinusoid of amplitude a on a bin shows as a under every window, a name in `windows.COSINES`.
     """
-    n = len(response.times)
-    weights = cosines(window, n)
-    amplitude = np.abs(np.fft.rfft(response.values * weights[:, None], axis=0))
-    amplitude *= 2 / weights.sum()
+    amplitude = windowed_amplitude(response.values, window)
     amplitude[0] /= 2
-    return np.asarray(np.fft.rfftfreq(n, step(response.times))), amplitude
+    return np.asarray(np.fft.rfftfreq(len(response.times), step(response.times))), amplitude
+
+
+def windowed_amplitude(x: Floats, window: str) -> Floats:
+    """Amplitudes (f, p) of the windowed spectrum of signals (t, p), twice the mean at 0 Hz."""
+    weights = cosines(window, len(x))[:, None]
+    return np.asarray(2 * np.abs(np.fft.rfft(x * weights, axis=0)) / weights.sum())
 
 
 def lines(response: Response, frequencies: ArrayLike, *, settle: float = SETTLE) -> Floats:
-    """Line amplitudes: the moduli of `phasors`.
+    """Compute line amplitudes: the moduli of `phasors`.
 
     Parameters
     ----------
@@ -258,11 +269,11 @@ def lines(response: Response, frequencies: ArrayLike, *, settle: float = SETTLE)
 
 
 def phasors(response: Response, frequencies: ArrayLike, *, settle: float = SETTLE) -> Complex:
-    """Phasors: complex amplitudes a of Re a exp(2 pi i f t), by weighted least squares.
+    """Compute phasors: complex amplitudes a of Re a exp(2 pi i f t), by weighted least squares.
 
-    All lines and the mean are fitted together under a Kaiser window, so that neither lines between
-    bins, lines left out nor a dying transient leak into others. Lines closer than one over the
-    fitted time are unresolved and share one amplitude: see `are_resolved`.
+    All lines and the mean are fitted together under a Kaiser window, which suppresses leakage from
+    other lines and from a transient that decays. Lines closer than one over the fitted time are
+    unresolved and share one amplitude: see `are_resolved`.
 
     Parameters
     ----------
@@ -289,16 +300,17 @@ def are_resolved(
     settle: float = SETTLE,
     strengths: ArrayLike | None = None,
 ) -> Bools:
-    """Bools of frequencies that `lines` resolves from 0 Hz and from the others.
+    """Find which lines are resolved, from 0 Hz and from each other.
 
-    Frequencies that differ by at most `ALIKE` of the resolution are one line. Other lines that are
-    nearer than the resolution, and leakage of unresolved lines, may have 5 % of its strength.
+    Frequencies that differ by at most `ALIKE` of the resolution are one line. Other lines nearer
+    than the resolution, and leakage of unresolved lines, may have 5 % of the strength of a resolved
+    line.
 
     Parameters
     ----------
     response : Response
     frequencies : (f,) float, Hz
-    strengths : (f,) float, of any unit; all the same if not given
+    strengths : (f,) float, in any unit; equal if not given
     settle : fraction of the response that is left out at its start
 
     Returns
@@ -307,18 +319,18 @@ def are_resolved(
     """
     frequencies = np.atleast_1d(np.asarray(frequencies, np.float64))
     strengths = np.ones_like(frequencies) if strengths is None else np.asarray(strengths)
-    told = unmixed(frequencies, strengths, resolution(response, settle=settle))
+    resolved = is_separate(frequencies, strengths, resolution(response, settle=settle))
     while True:
-        rest = np.where(told, 0.0, strengths)
-        clear = told & ~hidden(response, frequencies, strengths, rest, told, settle=settle)
-        if (clear == told).all():
-            return told
-        told = clear
+        rest = np.where(resolved, 0.0, strengths)
+        masked = is_masked(response, frequencies, strengths, rest, resolved, settle=settle)
+        if not (resolved & masked).any():
+            return resolved
+        resolved &= ~masked
 
 
-def unmixed(frequencies: Floats, strengths: Floats, least: float) -> Bools:
-    """Bools (f,) of lines at frequencies in Hz of which neither lines nearer than `least` Hz, nor
-    the mean, have 5 %, by strengths (f,) of any unit.
+def is_separate(frequencies: Floats, strengths: Floats, least: float) -> Bools:
+    """Whether lines nearer than `least` Hz, or the mean, have at most 5 % of each line (f,), by
+    frequencies in Hz and strengths (f,).
     """
     away = np.abs(frequencies[:, None] - frequencies)
     near, alike = away < least, away <= ALIKE * least
@@ -326,7 +338,7 @@ def unmixed(frequencies: Floats, strengths: Floats, least: float) -> Bools:
     return ~mixed & ((frequencies < 1e-9) | (frequencies >= least))
 
 
-def hidden(
+def is_masked(
     response: Response,
     frequencies: Floats,
     strengths: Floats,
@@ -335,15 +347,15 @@ def hidden(
     *,
     settle: float = SETTLE,
 ) -> Bools:
-    """Bools (f,) of lines of which more than 5 % (or 5 % of `FAINT` of the strongest) may be side
-    lobes of lines that are not fitted, of amplitudes `rest` (f,).
+    """Whether side lobes of lines that are not fitted, of amplitudes `rest` (f,), may exceed 5 % of
+    each line (f,), or 5 % of `FAINT` of the strongest.
     """
     least = resolution(response, settle=settle)
     distinct, _ = _distinct(frequencies[fitted], least)
     x = np.pi * (frequencies[:, None] - frequencies[rest > 0]) / least
     beta = _beta(_closest(distinct, 1 / least))
-    seen = np.sqrt(_kaiser_transform(x, beta) ** 2 @ rest[rest > 0] ** 2)  # of any phases
-    return np.asarray(seen > MINOR * np.maximum(strengths, FAINT * strengths.max(initial=0.0)))
+    leakage = np.sqrt(_kaiser_transform(x, beta) ** 2 @ rest[rest > 0] ** 2)  # for any phases
+    return np.asarray(leakage > MINOR * np.maximum(strengths, FAINT * strengths.max(initial=0.0)))
 
 
 def _kaiser_transform(x: Floats, beta: float) -> Floats:
@@ -355,8 +367,8 @@ def _kaiser_transform(x: Floats, beta: float) -> Floats:
 def fit_lines(
     response: Response, frequencies: ArrayLike, *, settle: float = SETTLE
 ) -> tuple[Complex, Floats]:
-    """Phasors (f, p), as `phasors` has them, and the remainder (t, p) of the whole response without
-    these lines and the mean.
+    """Phasors (f, p) as of `phasors`, and the whole response (t, p) less these lines and
+    the mean.
     """
     t, x = response.times, response.values
     basis, weighted, inverse, which = _weighted_waves(t, frequencies, settle)
@@ -369,13 +381,10 @@ def fit_lines(
 def line_rows(
     times: Floats, frequencies: ArrayLike, *, settle: float = SETTLE
 ) -> tuple[Floats, Floats, Ints]:
-    """Rows of the least squares of `fit_lines`, from which the errors of lines follow.
+    """Return the rows of the least squares of `fit_lines`, which give the errors of lines.
 
-    Returns
-    -------
-    waves (m, k) and rows (m, k) at the k samples that are fitted, so that coefficients (m,) are
-    rows @ x and the fit is waves.T @ coefficients; and the indices (2, f) of the coefficients of
-    the cosine and the sine of each line
+    Waves (m, k) and rows (m, k) at the k fitted samples: coefficients (m,) are rows @ x, the fit is
+    waves.T @ coefficients. Indices (2, f) give the coefficients of cosine and sine of each line.
     """
     basis, weighted, inverse, which = _weighted_waves(times, frequencies, settle)
     sines = which + np.where(which > 0, (len(basis) - 1) // 2, 0)
@@ -385,28 +394,28 @@ def line_rows(
 def _weighted_waves(
     times: Floats, frequencies: ArrayLike, settle: float
 ) -> tuple[Floats, Floats, Floats, Ints]:
-    """Waves (m, t), the same under the window (m, k) at the last k samples, which are fitted, the
-    inverse (m, m) of their products, and the index (f,) of each line's wave.
+    """Waves (m, t), the same under the window (m, k) at the k fitted samples at the end, the
+    inverse (m, m) of their products, and the index (f,) of the wave of each line.
     """
     frequencies = np.atleast_1d(np.asarray(frequencies, np.float64))
     nyquist = 0.5 / step(times)
     if not ((frequencies >= 0) & (frequencies < nyquist)).all():
-        raise ValueError(f"lines must lie between 0 and {nyquist:g} Hz, half the sampling rate")
+        raise ValueError(f"lines must be between 0 and {nyquist:g} Hz, half the sampling rate")
     first = int(np.argmax(times >= times[0] + settle * np.ptp(times)))
     span = float(np.ptp(times[first:]))
     if not span:
-        raise ValueError(f"{len(times)} samples are too few to fit lines to; record more")
+        raise ValueError(f"{len(times)} samples are too few to fit lines; record more")
     distinct, which = _distinct(frequencies, 1 / span)
     basis = _waves(distinct, times)
     kept = basis[:, first:]
-    weighted = kept * kaiser(kept.shape[1], _beta(_closest(distinct, span)))
+    weighted = kept * np.kaiser(kept.shape[1], _beta(_closest(distinct, span)))
     inverse = np.linalg.pinv(weighted @ kept.T, rcond=1e-13, hermitian=True)
     return basis, weighted, np.asarray(inverse, np.float64), which
 
 
 def _waves(frequencies: Floats, times: Floats) -> Floats:
     """1, cosines and sines (2 f - 1, t) of frequencies (f,) in Hz, the first of which is 0, at
-    equally spaced times (t,) in s: turns over many steps times turns over few, which is faster.
+    equally spaced times (t,) in s; as products of few and many steps, which is faster.
     """
     few, dt = int(np.ceil(np.sqrt(len(times)))), step(times)
     turn = 2j * np.pi * frequencies[1:, None]
@@ -417,18 +426,18 @@ def _waves(frequencies: Floats, times: Floats) -> Floats:
 
 
 def _closest(frequencies: Floats, span: float) -> float:
-    """How many bins of a fitted time in s the closest of ascending frequencies are apart."""
+    """Distance in bins of the closest of ascending frequencies, for a fitted time in s."""
     return float(np.diff(frequencies).min(initial=np.inf) * span)
 
 
 def _beta(bins: float) -> float:
-    """Kaiser beta of the window for lines so many bins apart, its main lobe in proportion."""
+    """Kaiser beta for lines so many bins apart, with a main lobe in proportion."""
     lobe = np.hypot(1.0, LINE_BETA / np.pi) * min(bins / LINE_BINS, 1.0)
     return float(np.pi * np.sqrt(max(lobe**2 - 1, 0.0)))
 
 
-def _distinct(frequencies: Floats, resolution: float) -> tuple[Floats, np.ndarray]:
-    """Resolved frequencies: 0 Hz and those further apart than the resolution; the index of each."""
+def _distinct(frequencies: Floats, resolution: float) -> tuple[Floats, Ints]:
+    """Resolved frequencies, 0 Hz first, and for each frequency the index of its resolved one."""
     distinct, which = [0.0], np.zeros(len(frequencies), int)
     for k in np.argsort(frequencies, kind="stable"):
         if frequencies[k] > 0 and frequencies[k] - distinct[-1] >= resolution:

@@ -14,16 +14,16 @@ from simple_model.typing import Complex, Floats
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-DEEPEST, LOUD = 1e-4, 1e-3  # of the largest amplitude: shown; sets the range of frequencies
-LISTED = 5  # names of lines where they are printed
-NAMES_ABREAST = 28  # names along the axis of frequencies
-NONE_RESOLVED = "no line of the load is resolved;\nin a longer Tacton more are"
+DEEPEST, LOUD = 1e-4, 1e-3  # of the largest amplitude: axis limit; sets the frequency range
+MOST_PRINTED = 5  # names of lines
+NAMES_ABREAST = 28  # that fit along the frequency axis
+NONE_RESOLVED = "no line of the load is resolved;\na longer Tacton resolves more"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Spectrum:
-    """Amplitude spectrum: `frequencies` (f,) in Hz and `amplitudes` (f, p) in the unit of the
-    `quantity` at `probes` (p, 2) in metre.
+    """Amplitude spectrum: `frequencies` (f,) in Hz, `amplitudes` (f, p) in the unit of the
+    `quantity`, and `probes` (p, 2) in metre.
     """
 
     frequencies: Floats
@@ -33,22 +33,22 @@ class Spectrum:
 
     @property
     def record(self) -> Quantity:
-        """The record of its quantity."""
+        """The record of the quantity."""
         return quantity(self.quantity)
 
     def __repr__(self) -> str:
-        said = f"{len(self.frequencies):,} frequencies to {self.frequencies[-1]:.5g} Hz"
-        return f"<Spectrum of {self.record.words}: {said}, {plural(len(self.probes), 'probe')}>"
+        band = f"{len(self.frequencies):,} frequencies to {self.frequencies[-1]:.5g} Hz"
+        return f"<Spectrum of {self.record.words}: {band}, {plural(len(self.probes), 'probe')}>"
 
     def plot(self, *, ax: "Axes | None" = None) -> "Axes":
-        """Draw the spectrum at every probe, amplitudes to -80 dB of the largest on a logarithmic
-        axis, up to the highest frequency that has -60 dB.
+        """Draw the spectrum at every probe on a logarithmic axis, down to -80 dB of the largest
+        amplitude and up to the highest frequency above -60 dB.
         """
         ax = new_axes(ax)
-        shown = self.record.per_unit * self.amplitudes
-        largest = float(shown.max(initial=0.0)) or 1.0
-        curves(ax, self.frequencies, np.maximum(shown, 1e-3 * DEEPEST * largest), self.probes)
-        _scale(ax, self.frequencies, shown, self.record)
+        scaled = self.record.per_unit * self.amplitudes
+        largest = float(scaled.max(initial=0.0)) or 1.0
+        curves(ax, self.frequencies, np.maximum(scaled, 1e-3 * DEEPEST * largest), self.probes)
+        _scale(ax, self.frequencies, scaled, self.record)
         ax.set_ylim(DEEPEST * largest, 3 * largest)
         return ax
 
@@ -74,11 +74,11 @@ class Lines:
 
     @property
     def record(self) -> Quantity:
-        """The record of its quantity."""
+        """The record of the quantity."""
         return quantity(self.quantity)
 
     def __getitem__(self, name: str) -> Complex:
-        """Amplitudes (p,) of the line of a name; raises a ValueError if it is none of them."""
+        """Amplitudes (p,) of a line by its name; raises a ValueError for an unknown name."""
         return np.asarray(self.amplitudes[self.names.index(choose("line", name, self.names))])
 
     def __len__(self) -> int:
@@ -86,15 +86,13 @@ class Lines:
 
     def __repr__(self) -> str:
         strongest = np.argsort(-np.abs(self.amplitudes).max(axis=1, initial=0.0), kind="stable")
-        named = ", ".join(self.names[k] for k in strongest[:LISTED])
-        said = f"{plural(len(self), 'line')}, {plural(len(self.probes), 'probe')}"
-        said += f"; the strongest: {named}" if named else ""
-        return f"<Lines of {self.record.words}: {said}>"
+        named = ", ".join(self.names[k] for k in strongest[:MOST_PRINTED])
+        strong = f"; the strongest: {named}" if named else ""
+        counts = f"{plural(len(self), 'line')}, {plural(len(self.probes), 'probe')}"
+        return f"<Lines of {self.record.words}: {counts}{strong}>"
 
     def plot(self, *, ax: "Axes | None" = None) -> "Axes":
-        """Draw the moduli at every probe, the strong ones with their names, or say that no line is
-        resolved.
-        """
+        """Draw the moduli at every probe, with the names of strong lines."""
         ax = new_axes(ax)
         size = self.record.per_unit * np.abs(self.amplitudes)
         largest = float(size.max(initial=0.0)) or 1.0
@@ -117,11 +115,11 @@ class Lines:
         return ax
 
 
-def _scale(ax: "Axes", frequencies: Floats, shown: Floats, record: Quantity) -> float:
-    """Set scales and labels of the axes of amplitudes (f, p); return the end in Hz of what is seen,
-    above the highest frequency with `LOUD` of the largest amplitude.
+def _scale(ax: "Axes", frequencies: Floats, amplitudes: Floats, record: Quantity) -> float:
+    """Set scales and labels of the axes for amplitudes (f, p). Return the upper limit in Hz, above
+    the highest frequency with `LOUD` of the largest amplitude.
     """
-    loud = frequencies[(shown > LOUD * shown.max(initial=0.0)).any(axis=1)]
+    loud = frequencies[(amplitudes > LOUD * amplitudes.max(initial=0.0)).any(axis=1)]
     end = 1.1 * max(float(loud.max(initial=0.0)), 100.0)
     ax.set_yscale("log")
     ax.set_xlim(0, end)

@@ -1,18 +1,18 @@
 """Vibrotactile detection thresholds of the glabrous hand, and sensation levels above them.
 
-Two channels, in dB re 1 um peak, and the more sensitive one decides (Bolanowski et al., J Acoust
-Soc Am 84:1680, 1988, who have four; the other two need larger motions in this band):
+Two channels, in dB re 1 um peak; the more sensitive one decides (Bolanowski et al., J Acoust Soc Am
+84:1680, 1988, who have four; the other two need larger motions in this band):
 
     Pacinian      T = -20 + 12 log2(250 Hz / f)  below 250 Hz,  -20 + 9 log2(f / 250 Hz)  above
     non-Pacinian  T = +12
 
-Reliability: that the threshold is flat out to 40 Hz, then falls by 12 dB an octave to its least
-near 250 Hz, is Verrillo's (J Acoust Soc Am 35:1962, 1963; thenar, contactor of 2.9 cm2; read in
-abstract only). The two levels, -20 and +12 dB, were not read in a source; they fit that slope to
-0.3 dB. The rise above 250 Hz is that of hairy skin. Above 500 Hz the line is extrapolated. People
-and laboratories differ by `BAND` either way. The threshold of a small contactor is higher in the
-Pacinian channel (spatial summation), by 3 dB for each halving of its area: 7 dB from 2.9 cm2 to the
-0.58 cm2 of a focal spot.
+Reliability: the flat threshold up to 40 Hz and its fall by 12 dB per octave to a minimum near 250
+Hz are Verrillo's (J Acoust Soc Am 35:1962, 1963; thenar, contactor of 2.9 cm2; only the abstract
+was read). The levels -20 and +12 dB were not read in a source; they fit that slope to 0.3 dB. The
+rise above 250 Hz is that of hairy skin. Above 500 Hz the line is extrapolated. People and
+laboratories differ by ± `BAND`. A small contactor has a higher threshold in the Pacinian channel
+(spatial summation), by 3 dB for each halving of its area: 7 dB from 2.9 cm2 to the 0.58 cm2 of a
+focal spot.
 """
 
 from __future__ import annotations
@@ -25,19 +25,23 @@ from simple_model.typing import Floats
 
 BAND = 5.0  # dB, between people and between laboratories
 LOWEST, HIGHEST = 10.0, 1000.0  # Hz
-AREAS = {"focal_spot": 7.0, "large_contactor": 0.0}  # dB added in the Pacinian channel
+AREAS = {"focal_spot": 7.0, "large_contactor": 0.0}  # dB, added in the Pacinian channel
 # Detection threshold in Pa at the focus with AM at 200 Hz: the radiation pressure 2 p^2 / (rho c^2)
 # of 556.9 Pa of sound pressure (Howard et al., IEEE World Haptics 2019, as quoted by Lim, Park and
 # Seifi, CHI 2024, arXiv 2405.02800; whether rms or peak is not stated).
-PRESSURE = 4.4
-TESTED = 200.0  # Hz
+MEASURED_PRESSURE = 4.4
+MEASURED_FREQUENCY = 200.0  # Hz
 
 
 def threshold(frequency: ArrayLike, area: str = "focal_spot") -> Floats:
-    """Detection threshold (...) of displacement in metre, peak, at frequencies (...) in Hz; not a
-    number below 10 and above 1000 Hz, where this curve says nothing.
+    """Return the detection threshold (...) of displacement in metre, peak, at frequencies (...) in
+    Hz.
 
-    The area is "focal_spot", 0.58 cm2, or "large_contactor", 2.9 cm2, with which it was measured.
+    The area is "focal_spot", 0.58 cm2, or "large_contactor", 2.9 cm2, as in the measurements. NaN
+    below 10 and above 1000 Hz, where the curve does not apply.
+
+    >>> 1e6 * threshold([40.0, 200.0]).round(8)  # micrometre
+    array([3.98, 0.35])
     """
     choose("area", area, AREAS)
     f = np.asarray(frequency, np.float64)
@@ -48,33 +52,35 @@ def threshold(frequency: ArrayLike, area: str = "focal_spot") -> Floats:
 
 
 def pressure_threshold(frequency: ArrayLike) -> Floats:
-    """Detection threshold (...) in Pa of a vibrating component of the pressure at a focus on skin,
-    at frequencies (...) in Hz; not a number below 10 and above 1000 Hz.
+    """Return the detection threshold (...) in Pa of a component of the pressure at a focus on skin.
 
-    `PRESSURE` was measured with AM at 200 Hz, whose component there is half of it. At other
-    frequencies it follows the displacement threshold, as if compliance did not depend on them.
+    `MEASURED_PRESSURE` is for AM at 200 Hz, whose component at 200 Hz is half of it. Other
+    frequencies (...) in Hz follow the displacement threshold, as if compliance did not depend on
+    frequency.
     """
-    return np.asarray(PRESSURE / 2 * threshold(frequency) / threshold(TESTED))
+    return np.asarray(MEASURED_PRESSURE / 2 * threshold(frequency) / threshold(MEASURED_FREQUENCY))
 
 
 def sensation_level(
     amplitude: ArrayLike, frequency: ArrayLike, area: str = "focal_spot", *, unit: str = "m"
 ) -> Floats:
-    """Sensation level of lines above the detection threshold.
+    """Return the sensation level of lines: their level above the detection threshold.
 
-    Of several lines the one with the highest level decides: channels do not add up.
+    Of several lines, the one with the highest level decides: channels do not add up.
 
     Parameters
     ----------
-    amplitude : (...) float, peak, of displacement or of the pressure at a place
+    amplitude : (...) float, peak, of displacement or of pressure at a place
     frequency : (...) float, Hz
     area : as for `threshold`
-    unit : of the amplitude, "m", or "Pa", see `pressure_threshold`
+    unit : of the amplitude, "m" or "Pa", see `pressure_threshold`
 
     Returns
     -------
-    (...) float, dB; minus infinity where nothing vibrates, at 0 Hz, or where the threshold is not
-    known
+    (...) float, dB; minus infinity if the amplitude is 0 or the threshold is unknown
+
+    >>> sensation_level([1e-6, 1e-5], 200.0).round(1)
+    array([ 9.1, 29.1])
     """
     choose("unit", unit, ("m", "Pa"))
     least = threshold(frequency, area) if unit == "m" else pressure_threshold(frequency)

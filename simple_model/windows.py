@@ -1,10 +1,9 @@
 """Window functions for spectral lines.
 
-`scipy.signal` has them too, but brings all of `scipy.stats`, and every command would wait for it.
+`scipy.signal` has them too, but it imports `scipy.stats`, and every command would wait for it.
 """
 
 import numpy as np
-from scipy.special import i0
 
 from simple_model.choices import choose
 from simple_model.typing import Floats
@@ -18,7 +17,7 @@ COSINES = {
 
 
 def cosines(name: str, n: int) -> Floats:
-    """A periodic window (n,) of a name of `COSINES`."""
+    """Periodic window (n,) by its name in `COSINES`."""
     choose("window", name, COSINES)
     if n < 2:
         return np.ones(n)
@@ -27,11 +26,3 @@ def cosines(name: str, n: int) -> Floats:
     for k, weight in enumerate(COSINES[name]):
         window += weight * np.cos(k * turn)
     return window
-
-
-def kaiser(n: int, beta: float) -> Floats:
-    """A symmetric Kaiser window (n,) (Kaiser & Schafer 1980, eq. 1)."""
-    if n < 2:
-        return np.ones(n)
-    half = (n - 1) / 2
-    return np.asarray(i0(beta * np.sqrt(1 - ((np.arange(n) - half) / half) ** 2)) / i0(beta))

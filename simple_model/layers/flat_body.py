@@ -1,13 +1,13 @@
-"""Wavenumber-integral solution, without a mesh, for layers, a half-space or a thin sheet, all
-laterally infinite, under a moving focus.
+"""Wavenumber integrals of a flat, laterally infinite body under a moving focus, without a mesh.
 
-Where a focal spot at rest displaces a point by g(x, w) (`wavenumber_integral`; time exp(+i w t)), a
-focus that runs a closed path at f_d = 1/T, x(t) = X(f_d t), moves a probe by
+The body is a stack of layers, a half-space or a thin sheet. A focal spot at rest displaces a point
+by g(x, w) (`wavenumber_integral`; time exp(+i w t)). A focus that runs a closed path at f_d = 1/T,
+x(t) = X(f_d t), moves a probe by
 
     u(w) = sum_n h_n(w) Q(w - 2 pi n f_d),   h_n = int_0^1 g(x_p - X(a), w) exp(-2 pi i n a) da
 
-where Q is the transform of the pressure at the focus. With splines B_j(r) that interpolate g(r, w)
-= sum_j g_j(w) B_j(r), the path and the probes are apart from the body: in the steady state
+where Q is the transform of the pressure at the focus. Splines B_j(r) that interpolate g(r, w) =
+sum_j g_j(w) B_j(r) separate path and probes from the body. In the steady state
 
     h_n = sum_j g_j(w) int_0^1 B_j(|x_p - X(a)|) exp(-2 pi i n a) da
 
@@ -15,8 +15,8 @@ and from rest
 
     u(w) = sum_j g_j(w) int_0^inf q(t) B_j(|x_p - x(t)|) exp(-i w t) dt
 
-Displacement normal to the surface is one component, g(r) itself. A `Field` has m, each a sum of
-integrals times weights that depend on x_p - x.
+Displacement normal to the surface has one component, g(r). A `Field` has m components, each a sum
+of integrals times weights that depend on x_p - x.
 """
 
 from __future__ import annotations
@@ -50,38 +50,31 @@ from simple_model.load.spectrum import load_lines, synthesise
 from simple_model.response import Effort, Response
 from simple_model.typing import Complex, Floats, Ints
 
-PADDING = 2, 256  # the transform's samples for each of the record, and more: what wraps round is
-WRAPPED = 1e-5  # damped by this
-FINEST = 20_000.0  # Hz of its samples
-BAND_END = 3.0  # of the error function that ends its band from half the highest frequency on
-ABRUPT = 2  # samples of a load that jumps, or turns, in each of these
-ENDING = 6.0  # of the error function that ends a load after the record
-FEW_DISTANCES = 40  # are integrated one by one, without a spline
-AT_ONCE = 2**22  # values that are transformed at a time, some hundred megabytes
-STEPS_PER_WIDTH = 6  # distances of a spline in a standard deviation of the focal spot
-FEWEST_STEPS = 8  # of them
-ANYWHERE = np.array([[1.0, 0.3], [0.2, 1.0], [-0.7, 0.4]])  # of no symmetry
-NEGLIGIBLE = 1e-4  # of the largest response, where a transient stops looking at frequencies
+PADDING = 2, 256  # samples of the transform for each sample of the record, and more
+WRAP_AROUND = 1e-5  # factor by which the wrap-around is damped
+LEAST_RATE = 20_000.0  # Hz, of the samples of the transform
+BAND_END = 3.0  # steepness of the error function that ends the band
+ABRUPT_PARTS = 2  # samples of a load that jumps, or turns, per sample of the transform
+LOAD_END = 6.0  # steepness of the error function that ends a load after the record
+FEW_DISTANCES = 40  # up to which no spline interpolates
+AT_ONCE = 2**22  # values transformed at a time, about 100 MB
+STEPS_PER_WIDTH = 6  # distances of a spline per standard deviation of the focal spot
+FEWEST_STEPS = 8  # distances of a spline
+SAMPLE_OFFSETS = np.array([[1.0, 0.3], [0.2, 1.0], [-0.7, 0.4]])  # without symmetry
+NEGLIGIBLE = 1e-4  # of the largest response, where the frequencies of a transient end
 
 Splines = Callable[[Floats], Floats]
-NORMAL = normal_field(Compliance(lambda k, w: 0 * k))  # whose weights are those of any body
+NORMAL = normal_field(Compliance(lambda k, w: 0 * k))  # its weights suit every body
 
 
 def steady_lines(
     compliance: Compliance, pressure: MovingPressure, probes: ArrayLike, *, threshold: float = 1e-6
 ) -> tuple[Floats, Complex]:
-    """Steady-state lines, by wavenumber integrals.
+    """Compute steady-state lines of the normal displacement, by wavenumber integrals.
 
-    Parameters
-    ----------
-    compliance : Compliance
-    pressure : MovingPressure, with a Gaussian focus
-    probes : (p, 2) float, metre
-    threshold : of the strongest line of the load; weaker lines are left out
-
-    Returns
-    -------
-    frequencies (f,) in Hz >= 0 and amplitudes a (f, p) in metre of Re a exp(2 pi i f t)
+    Frequencies (f,) in Hz >= 0 and amplitudes a (f, p) in metre of Re a exp(2 pi i f t) at probes
+    (p, 2) in metre, for a Gaussian focus. Lines below `threshold` of the strongest line of the load
+    are left out.
     """
     f, amplitudes = field_lines(normal_field(compliance), pressure, probes, threshold=threshold)
     return f, amplitudes[..., 0]
@@ -98,28 +91,29 @@ def field_lines(
     return path.frequencies, np.concatenate([path.combined(g, h) for h in blocks], axis=1)
 
 
-def carriers(field: Field, splines: Splines, away: Floats) -> Floats:
-    """Splines (m, c, j, ..., q) times the weights of a field, at offsets (..., q, 2) in metre of
-    probes from positions of a focus: components are their sum over integrals (c, j).
+def weighted_splines(field: Field, splines: Splines, away: Floats) -> Floats:
+    """Splines times weights of a field, (m, c, j, ..., q), at offsets (..., q, 2) in metre of
+    probes from positions of a focus; components are sums over integrals (c, j).
     """
     of_distance = np.moveaxis(splines(np.linalg.norm(away, axis=-1)), -1, 0)
     return np.asarray(field.weights(away)[:, :, None] * of_distance)
 
 
-def sampled_lines(
+def steady_history(
     field: Field, pressure: MovingPressure, probes: ArrayLike, times: Floats
-) -> tuple[Floats, Complex]:
-    """Lines of `field_lines` that samples at equally spaced times (t,) in s can show."""
+) -> Floats:
+    """All components (t, p, m) of a field in the steady state, of lines below half the rate."""
     f, a = field_lines(field, pressure, probes)
     below = below_half_the_rate(f, times)
-    return f[below], a[below]
+    history = synthesise(f[below], a[below].reshape(int(below.sum()), -1), times)
+    return history.reshape(len(times), *a.shape[1:])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Path:
-    """Lines of a load at distinct `frequencies` (f,) in Hz: the frequency `lines` (l,) and the
-    harmonic `orders` (l,) of each, as indices, and `coefficients` (l,) in Pa; with the standard
-    deviation `width` of the focal spot and the `distances` (j,) to integrate at, metre.
+    """Lines of a load at distinct `frequencies` (f,) in Hz: indices of frequency `lines` (l,) and
+    harmonic `orders` (l,), `coefficients` (l,) in Pa; standard deviation `width` of the focal spot
+    and `distances` (j,) of the integrals, metre.
     """
 
     width: float
@@ -130,8 +124,8 @@ class _Path:
     coefficients: Complex
 
     def combined(self, g: Complex, harmonics: Complex) -> Complex:
-        """Amplitudes (f, p, m): c sum_cj g_cj(f) h_nmcj(x_p) of the integrals g (c, f, j) and the
-        harmonics h (n, m, c, j, p).
+        """Amplitudes (f, p, m): c sum_cj g_cj(f) h_nmcj(x_p) of integrals g (c, f, j) and harmonics
+        h (n, m, c, j, p).
         """
         found = np.zeros((g.shape[1], harmonics.shape[-1], harmonics.shape[1]), np.complex128)
         for order, harmonic in enumerate(harmonics):
@@ -145,8 +139,8 @@ class _Path:
 def _path(
     field: Field, pressure: MovingPressure, probes: ArrayLike, threshold: float
 ) -> tuple[_Path, Iterator[Complex]]:
-    """Lines of a load, and the harmonics (n, m, c, j, p) of what a field does at some probes at a
-    time, h_nmcj = int_0^1 W_mc B_j(|x_p - X(a)|) exp(-2 pi i n a) da with its weights W.
+    """Lines of a load, and blocks of probes of the harmonics (n, m, c, j, p) of a field, h_nmcj =
+    int_0^1 W_mc B_j(|x_p - X(a)|) exp(-2 pi i n a) da with its weights W.
     """
     width = _width(pressure)
     load, places = load_lines(pressure, threshold), np.atleast_2d(np.asarray(probes, np.float64))
@@ -160,7 +154,7 @@ def _path(
     )  # fmt: skip
     count = min(len(places), max(1, len(places) * len(table) * len(knots) // AT_ONCE))
     blocks = (
-        np.moveaxis(path_fourier(pressure, carriers(field, splines, away), distinct), -1, 0)
+        np.moveaxis(path_fourier(pressure, weighted_splines(field, splines, away), distinct), -1, 0)
         for away in (some[:, None] - knots for some in np.array_split(places, count))
     )
     return path, blocks
@@ -169,7 +163,9 @@ def _path(
 def path_operator(
     pressure: MovingPressure, probes: ArrayLike, *, threshold: float = 1e-6
 ) -> Callable[[Compliance], tuple[Floats, Complex]]:
-    """The function from a body's compliance to its `steady_lines`, for many bodies under a load."""
+    """Return the function from the compliance of a body to its `steady_lines`, for many bodies
+    under a load.
+    """
     path, blocks = _path(NORMAL, pressure, probes, threshold)
     harmonics = np.ascontiguousarray(np.concatenate(list(blocks), axis=-1))
 
@@ -184,7 +180,7 @@ def path_operator(
 def steady_state(
     compliance: Compliance, pressure: MovingPressure, probes: ArrayLike, times: Floats
 ) -> Response:
-    """Steady state, as if the load had always been there: its lines below half the sampling rate.
+    """Compute the steady state of the normal displacement: the lines below half the sampling rate.
 
     Parameters
     ----------
@@ -197,19 +193,18 @@ def steady_state(
     started = time.perf_counter()
     probes = np.atleast_2d(np.array(probes, np.float64))
     times = np.array(times)
-    f, a = sampled_lines(normal_field(compliance), pressure, probes, times)
-    found = synthesise(f, a[..., 0], times)
-    return _timed("flat-body-harmonic", started, times, probes, found, len(f), len(f))
+    values = steady_history(normal_field(compliance), pressure, probes, times)[..., 0]
+    return _timed("flat-body-harmonic", started, times, probes, values)
 
 
 def flat_body(
     compliance: Compliance, pressure: MovingPressure, probes: ArrayLike, times: Floats
 ) -> Response:
-    """Motion of probes from rest.
+    """Compute the normal displacement of probes from rest.
 
-    By FFT over twice the duration with exponential damping, which reduces the wrap-around to 1e-5.
-    Lines of the load above half the sampling rate are left out. Displacement is about the rest
-    position before the load.
+    The FFT over twice the duration has exponential damping, which reduces the wrap-around to 1e-5.
+    Lines of the load above half the sampling rate are left out. Displacement is relative to the
+    rest position.
 
     Parameters
     ----------
@@ -222,12 +217,24 @@ def flat_body(
     -------
     Response, displacement (t, p) in metre
 
-    Raises a ValueError if the focus is not Gaussian, or as `pressure.check_lines` does.
+    Raises
+    ------
+    ValueError
+        If the focus is not Gaussian, or the load is a subclass of MovingPressure.
+
+    >>> from simple_model import Tacton
+    >>> from simple_model.layers.compliance import slab
+    >>> from simple_model.layers.material import PRESETS
+    >>> load = MovingPressure(tacton=Tacton(am_frequency=140.0, duration=0.05))
+    >>> times = np.arange(500) / 1e4
+    >>> response = flat_body(slab(PRESETS["palm"], 0.015), load, [[0.0, 0.0], [0.01, 0.0]], times)
+    >>> (1e6 * np.abs(response.values).max(axis=0)).round(2)  # micrometre
+    array([4.47, 1.03])
     """
     started = time.perf_counter()
     probes, times = np.atleast_2d(np.array(probes, np.float64)), np.array(times)
-    found = field_history(normal_field(compliance), pressure, probes, times)[..., 0]
-    return _timed("flat-body", started, times, probes, found, len(times), len(times) + 1)
+    values = field_history(normal_field(compliance), pressure, probes, times)[..., 0]
+    return _timed("flat-body", started, times, probes, values)
 
 
 def field_history(
@@ -236,10 +243,10 @@ def field_history(
     """All components (t, p, m) of a field from rest, as `flat_body` computes them."""
     width = _width(pressure)
     probes = np.atleast_2d(np.asarray(probes, np.float64))
-    within = max(1, int(np.ceil(step(times) * FINEST - 1e-6)))
+    within = max(1, int(np.ceil(step(times) * LEAST_RATE - 1e-6)))
     dt, n = step(times) / within, (len(times) - 1) * within + 1
     padded = next_fast_len(PADDING[0] * n + PADDING[1], real=True)
-    damping = -np.log(WRAPPED) / (padded * dt)
+    damping = -np.log(WRAP_AROUND) / (padded * dt)
     w = 2 * np.pi * np.fft.rfftfreq(padded, dt) - 1j * damping
     folded = is_folded(pressure, times)
     if not folded and oversampling(highest_line(pressure), step(times)) > 1:
@@ -250,24 +257,24 @@ def field_history(
     def lasting(t: Floats) -> Floats:
         """Factor of the load at times (t,) in s, with the damping of the transform."""
         after = (t - n * dt) / ((padded - n) * dt)
-        ended = erfc(ENDING * (2 * after - 1)) / 2
+        ended = erfc(LOAD_END * (2 * after - 1)) / 2
         return np.asarray(np.where(t < 0, 0.0, ended * np.exp(-damping * t)))
 
     jumps = jump_times(pressure, 0.0, padded * dt)
     parts = oversampling(highest_line(pressure), dt)
     if folded:
-        knots, of_load = _low_passed(pressure, 0.5 / step(times), padded, dt, lasting)
+        knots, of_load = _low_passed_load(pressure, 0.5 / step(times), padded, dt, lasting)
         parts = 1
     else:
         turns = len(pressure.tacton.trajectory.parts[1]) > 1
-        parts = max(parts, ABRUPT if len(jumps) or turns else 1)
-        knots, of_load = _as_it_is(pressure, jumps, padded, dt, parts, lasting)
+        parts = max(parts, ABRUPT_PARTS if len(jumps) or turns else 1)
+        knots, of_load = _sampled_load(pressure, jumps, padded, dt, parts, lasting)
     table, splines = _interpolation(probes, knots, width)
     g = point_integrals(field, table, w, width, negligible=NEGLIGIBLE)
-    u = np.zeros((len(w), len(probes), len(field.weights(ANYWHERE))), np.complex128)
+    u = np.zeros((len(w), len(probes), len(field.weights(SAMPLE_OFFSETS))), np.complex128)
     for i, probe in enumerate(probes):
-        carried = carriers(field, splines, probe - knots)
-        for m, c in np.argwhere(field.weights(ANYWHERE).any(axis=-1)):
+        carried = weighted_splines(field, splines, probe - knots)
+        for m, c in np.argwhere(field.weights(SAMPLE_OFFSETS).any(axis=-1)):
             blocks = min(len(table), len(table) * padded * parts // AT_ONCE + 1)
             for some in np.array_split(np.arange(len(table)), blocks):
                 x = of_load(carried[m, c, some].T)
@@ -278,7 +285,7 @@ def field_history(
     return np.fft.irfft(u, padded, axis=0)[:n:within] * np.exp(damping * t[:, None, None])
 
 
-def _as_it_is(
+def _sampled_load(
     pressure: MovingPressure, jumps: Floats, padded: int, dt: float, parts: int,
     lasting: Callable[[Floats], Floats],
 ) -> tuple[Floats, Callable[[Floats], Floats]]:  # fmt: skip
@@ -292,11 +299,11 @@ def _as_it_is(
     return knots, (shares @ mixed).__matmul__
 
 
-def _low_passed(
+def _low_passed_load(
     pressure: MovingPressure, highest: float, padded: int, dt: float,
     lasting: Callable[[Floats], Floats],
 ) -> tuple[Floats, Callable[[Floats], Floats]]:  # fmt: skip
-    """The same in samples of dt, of the load's lines below a frequency in Hz."""
+    """The same in samples of dt, for the lines of the load below a frequency in Hz."""
     lines = load_lines(pressure)
     below = lines.frequencies < highest
     f, orders = lines.frequencies[below], lines.harmonics[below]
@@ -311,12 +318,10 @@ def _low_passed(
     return path_samples(pressure), of_load
 
 
-def _timed(
-    model: str, started: float, times: Floats, probes: Floats, values: Floats, steps: int, dofs: int
-) -> Response:
-    """The response, with the seconds since its computation started."""
+def _timed(model: str, started: float, times: Floats, probes: Floats, values: Floats) -> Response:
+    """Make the response, with the seconds since its computation started."""
     seconds = {"evaluate": time.perf_counter() - started}
-    effort = Effort(seconds=seconds, steps=steps, dofs=dofs)
+    effort = Effort(seconds=seconds, steps=len(times))
     return Response(model=model, times=times, probes=probes, values=values, effort=effort)
 
 
@@ -326,15 +331,15 @@ def _width(pressure: MovingPressure) -> float:
     width = gaussian_width(pressure.height, pressure.profile)
     if width is None:
         raise ValueError(
-            f"focus '{pressure.profile_name}' has no flat-body solution; use 'gaussian'"
+            f"flat-body models do not support the focus '{pressure.profile_name}'; use 'gaussian'"
         )
     return width
 
 
 def _interpolation(probes: Floats, knots: Floats, width: float) -> tuple[Floats, Splines]:
-    """Distances (j,) in metre to integrate at, and the function of distances (...) to the shares
-    (..., j) that interpolate between them: cubic splines, flat at 0; few distances are taken as
-    they are.
+    """Distances (j,) in metre of the integrals, and the function from distances (...) to the shares
+    (..., j) that interpolate between them: cubic splines, flat at 0; few distances are used
+    directly.
     """
     if len(knots) * len(probes) <= FEW_DISTANCES:
         unique = np.unique(np.linalg.norm(probes[:, None] - knots, axis=-1))

@@ -1,14 +1,14 @@
 """Quantities of a stack of layers at any depth, by wavenumber integrals.
 
-Of the field of a surface pressure J0(kr) exp(i w t), u_r = U J1(kr), u_z = W J0(kr), sigma_zz =
-N J0(kr) and sigma_rz = T J1(kr), z downwards (`layered.transfer`), the strains are
+A surface pressure J0(kr) exp(i w t) makes u_r = U J1(kr), u_z = W J0(kr), sigma_zz = N J0(kr) and
+sigma_rz = T J1(kr), z downwards (`layered.transfer`). The strains are
 
     (e_rr + e_tt)/2 = kU/2 J0,  (e_rr - e_tt)/2 = -kU/2 J2,  e_rz = T/(2 mu) J1,
     e_zz = (N/mu - l kU)/(l + 2) J0,  l = lam/mu = 2 nu/(1 - 2 nu)
 
-The vertical strain is that of the traction: as a difference of displacements it would lose the
-dilatation of a nearly incompressible solid, and with it the pressure. Components are given along
-the axes of scenes, with z upwards.
+The vertical strain follows from the traction. A difference of displacements would lose the
+dilatation of a nearly incompressible solid, and with it the pressure. Components are along the axes
+of scenes, with z upwards.
 """
 
 from dataclasses import replace
@@ -17,19 +17,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from simple_model.layers.compliance import Compliance
-from simple_model.layers.flat_body import field_history, sampled_lines
 from simple_model.layers.layered import clearance, transfer
 from simple_model.layers.material import Material
 from simple_model.layers.stack import Stack
 from simple_model.layers.wavenumber_integral import Field, normal_field
-from simple_model.load.pressure import MovingPressure
-from simple_model.load.spectrum import synthesise
 from simple_model.quantities import NORMAL, VECTOR, Quantity
 from simple_model.typing import Complex, Floats
 
 
 def motion_field(stack: Stack, depth: float = 0.0) -> Field:
-    """Displacement along x, y and, downwards, z at a depth in metre."""
+    """Displacement along x, y and z, downwards, at a depth in metre."""
     moved = transfer(stack, [depth])
 
     def answer(k: Complex, w: Complex) -> Complex:
@@ -79,63 +76,47 @@ def material_at(stack: Stack, depth: float) -> Material:
     return stack.materials[int(np.searchsorted(bottoms, depth, side="right"))]
 
 
-def quantity_field(asked: Quantity, stack: Stack, depth: float = 0.0) -> Field:
+def quantity_field(quantity: Quantity, stack: Stack, depth: float = 0.0) -> Field:
     """Components of a quantity, before any `invariant`, at a depth in metre of a stack."""
     solid = material_at(stack, depth)
-    if asked.field in (NORMAL, VECTOR):
+    if quantity.field in (NORMAL, VECTOR):
         field = motion_field(stack, depth)
-        rows = np.diag([1.0, 1.0, -1.0]) if asked.field == VECTOR else np.eye(3)[[2]]
+        rows = np.diag([1.0, 1.0, -1.0]) if quantity.field == VECTOR else np.eye(3)[[2]]
     else:
         field, rows = strain_field(stack, depth), np.eye(6)
-    rows = asked.rows(solid) @ rows
+    rows = quantity.rows(solid) @ rows
     own = replace(field, weights=lambda away: np.tensordot(rows, field.weights(away), axes=1))
-    return _in_motion(asked, own, solid)
+    return _in_motion(quantity, own, solid)
 
 
-def _in_motion(asked: Quantity, field: Field, solid: Material | None = None) -> Field:
+def _in_motion(quantity: Quantity, field: Field, solid: Material | None = None) -> Field:
     """A field with the rate of a quantity, and the relaxation of stress in a material."""
 
     def answer(k: Complex, w: Complex) -> Complex:
         modulus = solid.complex_modulus(w) / solid.shear_modulus if solid else 1.0
-        found: Complex = field.answer(k, w) * asked.factor(1j * w, modulus)
-        return found
+        values: Complex = field.answer(k, w) * quantity.factor(1j * w, modulus)
+        return values
 
-    return replace(field, answer=answer) if asked.rate or asked.relaxes else field
-
-
-def surface_field(asked: Quantity, compliance: Compliance) -> Field:
-    """A quantity of the normal motion of any surface that has a compliance."""
-    return _in_motion(asked, normal_field(compliance))
+    return replace(field, answer=answer) if quantity.rate or quantity.relaxes else field
 
 
-def traction_field(asked: Quantity, stack: Stack, direction: ArrayLike) -> Field:
-    """Normal motion of the surface under tractions of the focal spot's profile in one direction.
+def surface_field(quantity: Quantity, compliance: Compliance) -> Field:
+    """A quantity of the normal motion of any surface with a compliance."""
+    return _in_motion(quantity, normal_field(compliance))
+
+
+def traction_field(quantity: Quantity, stack: Stack, direction: ArrayLike) -> Field:
+    """Normal motion of the surface under a traction of the profile of the focal spot.
 
     By reciprocity the vertical motion at x under a force along x' at 0 is the motion along x' at 0
-    under a vertical force at x: that of `motion_field`. The direction (3,) is a unit vector, z
-    upwards.
+    under a vertical force at x, see `motion_field`. The direction (3,) of the traction is a unit
+    vector, z upwards.
     """
     along = np.asarray(direction, np.float64)
     moved = motion_field(stack)
 
     def weights(away: Floats) -> Floats:
-        beside = -(away @ along[:2])
-        return np.stack([beside, np.full_like(beside, -along[2])])[None]
+        horizontal = -(away @ along[:2])
+        return np.stack([horizontal, np.full_like(horizontal, -along[2])])[None]
 
-    return _in_motion(asked, replace(moved, weights=weights))
-
-
-def from_rest(
-    field: Field, asked: Quantity, pressure: MovingPressure, probes: ArrayLike, times: Floats
-) -> Floats:
-    """Waveforms (t, p) of a quantity from rest, of whose components the field is."""
-    found = field_history(field, pressure, probes, times)
-    return asked.waveforms(found.reshape(len(found), -1), found.shape[1])
-
-
-def steady(
-    field: Field, asked: Quantity, pressure: MovingPressure, probes: ArrayLike, times: Floats
-) -> Floats:
-    """Waveforms (t, p) of a quantity in the steady state."""
-    f, a = sampled_lines(field, pressure, probes, times)
-    return asked.waveforms(synthesise(f, a.reshape(len(f), -1), times), a.shape[1])
+    return _in_motion(quantity, replace(moved, weights=weights))

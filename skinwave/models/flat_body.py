@@ -8,13 +8,8 @@ import numpy as np
 
 import simple_model
 from simple_model import Effort, Response, steady_state
-from simple_model.layers.flat_quantities import (
-    from_rest,
-    quantity_field,
-    steady,
-    surface_field,
-    traction_field,
-)
+from simple_model.layers.flat_body import field_history, steady_history
+from simple_model.layers.flat_quantities import quantity_field, surface_field, traction_field
 from simple_model.layers.wavenumber_integral import Field
 from simple_model.load.focus import gaussian_width
 from skinwave.bodies.analytic import compliance, stack
@@ -43,28 +38,29 @@ STEP = "wavenumber integral"
 def _from_rest(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     options.progress(STEP, 0.0)
     if not (scene.reading.is_plain and scene.load.is_plain):
-        return _read("flat-body", from_rest, scene, times)
+        return _read("flat-body", field_history, scene, times)
     return simple_model.flat_body(compliance(scene.body), scene.pressure, scene.probe_points, times)
 
 
 def _steady(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     options.progress(STEP, 0.0)
     if not (scene.reading.is_plain and scene.load.is_plain):
-        return _read("flat-body-harmonic", steady, scene, times)
+        return _read("flat-body-harmonic", steady_history, scene, times)
     return steady_state(compliance(scene.body), scene.pressure, scene.probe_points, times)
 
 
-def _read(model: str, waveforms: Callable[..., Floats], scene: Scene, times: Floats) -> Response:
+def _read(model: str, history: Callable[..., Floats], scene: Scene, times: Floats) -> Response:
     """Response of a quantity, the probes of one depth together."""
     started = time.perf_counter()
     asked, depths = scene.reading.record, np.array(scene.depths)
     values = np.empty((len(times), len(depths)))
     for depth in np.unique(depths).tolist():
         here = depths == depth
-        values[:, here] = sum(
-            waveforms(field, asked, pressure, scene.probe_points[here], times)
+        components = sum(
+            history(field, pressure, scene.probe_points[here], times)
             for field, pressure in zip(fields_read(scene, depth), scene.loads, strict=True)
         )
+        values[:, here] = asked.waveforms(components, int(here.sum()))
     effort = Effort(seconds={"evaluate": time.perf_counter() - started}, steps=len(times))
     return Response(
         model=model, times=times, probes=scene.probe_points, quantity=asked.name, values=values,

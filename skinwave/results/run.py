@@ -42,7 +42,9 @@ class Run:
         """All lines of the response, each once."""
         candidates = ASSESSED if len(self.scene.tacton.foci) == 1 else ()
         beside = lines_beside(self.scene, self.response)
-        return line_table(self.scene.pressure, self.response, candidates=candidates, beside=beside)
+        return line_table(
+            self.scene.pressure, self.response, candidates=candidates, other_lines=beside
+        )
 
     @property
     def listed(self) -> dict[str, float]:

@@ -75,7 +75,7 @@ def test_names_say_their_frequencies():
             assert line_frequency(tacton, name) == pytest.approx(frequency, abs=1e-9)
             assert line_name((-orders).tolist(), symbols(tacton)) == name
     assert line_frequency(Tacton(am_frequency=140), "f_d-f_AM") is None
-    with pytest.raises(ValueError, match="'f_x' is no line; add multiples of f_d, f_AM"):
+    with pytest.raises(ValueError, match="'f_x'"):
         line_frequency(tacton, "f_x")
 
 

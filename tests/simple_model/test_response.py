@@ -19,7 +19,6 @@ from simple_model import (
     spectrum,
     windows,
 )
-from simple_model.response import LINE_BETA
 from skinwave.results.run import ASSESSED
 
 TIMES = np.arange(5) / 10_000
@@ -58,9 +57,6 @@ def test_windows_are_scipys():
     n = 1001
     for name in windows.COSINES:
         np.testing.assert_array_equal(windows.cosines(name, n), signal.get_window(name, n))
-    for beta in (0.0, 3.3, LINE_BETA):
-        symmetric = signal.get_window(("kaiser", beta), n, fftbins=False)
-        np.testing.assert_array_equal(windows.kaiser(n, beta), symmetric)
 
 
 def test_what_few_commands_need_is_not_imported_by_all():
@@ -74,7 +70,7 @@ def test_what_few_commands_need_is_not_imported_by_all():
 
 def test_lines_of_two_samples_are_refused():
     two = made(times=TIMES[:2], values=np.ones((2, 2)))
-    with pytest.raises(ValueError, match="2 samples are too few to fit lines to; record more"):
+    with pytest.raises(ValueError, match="2 samples"):
         phasors(two, (100.0,))
 
 
