@@ -34,21 +34,27 @@ AIR_DENSITY = 1.2  # kg/m3
 
 
 def layered(stack: Stack) -> Compliance:
-    """Stack of layers, by their stiffness matrices; a half-space alone by its closed form."""
+    """Return the compliance of a stack of layers by stiffness matrices, or of a half-space in
+    closed form.
+    """
     if stack.thicknesses == (inf,):
         return half_space(stack.materials[0])
     return Compliance(partial(surface_compliance, stack), partial(clearance, stack))
 
 
 def slab(material: Material, depth: float) -> Compliance:
-    """Laterally infinite layer of `depth` metre bonded to a rigid base."""
+    """Return the compliance of a laterally infinite layer of `depth` metre bonded to a
+    rigid base.
+    """
     return layered(Stack(materials=(material,), thicknesses=(depth,)))
 
 
 def half_space(material: Material, *, poisson: float | None = None) -> Compliance:
-    """Half-space: G = -b_p k_s^2 / (mu R), R = (2 k^2 - k_s^2)^2 - 4 k^2 b_p b_s, with k_s^2
-    divided out, so that it holds at rest; kappa = k_p^2 / k_s^2. `poisson` replaces the material's
-    and may be 0.5.
+    """Return the compliance of a half-space, G = -b_p k_s^2 / (mu R), R = (2 k^2 - k_s^2)^2 - 4 k^2
+    b_p b_s.
+
+    k_s^2 is divided out, so that G holds at rest; kappa = k_p^2 / k_s^2. `poisson` replaces the
+    ratio of the material and may be 0.5.
     """
     nu = material.poisson if poisson is None else poisson
     kappa = (0.5 - nu) / (1 - nu)
@@ -70,9 +76,12 @@ def thin_sheet(
     air_density: float = AIR_DENSITY,
     tension: float = 0.0,
 ) -> Compliance:
-    """Infinite thin sheet of a thickness d in metre under a tension T in N/m, with air of a density
-    in kg/m3 on both sides: G = 1 / [D* k^4 + T k^2 - (m + 2 rho_air/k) w^2], m = rho d, D* = mu*
-    d^3 / 6 (1 - nu). Its static deflection has no bound: G = 0 at w = 0.
+    """Return the compliance of an infinite thin sheet with air on both sides.
+
+        G = 1 / [D* k^4 + T k^2 - (m + 2 rho_air/k) w^2],  m = rho d,  D* = mu* d^3 / 6 (1 - nu)
+
+    for a thickness d in metre, a tension T in N/m and an air density in kg/m3. Its static
+    deflection is unbounded, so G = 0 at w = 0.
     """
     mass_per_area = material.density * thickness
 
@@ -90,7 +99,7 @@ def thin_sheet(
         companion[:, 0, 3] = mass_per_area * w**2 / bending(w)
         companion[:, 0, 4] = 2 * air_density * w**2 / bending(w)
         k = np.linalg.eigvals(companion)
-        still = (k.real > 0) & (k.imag > 0.1 * np.abs(k))
-        return float(k.imag[still].min(initial=inf))
+        decaying = (k.real > 0) & (k.imag > 0.1 * np.abs(k))
+        return float(k.imag[decaying].min(initial=inf))
 
     return Compliance(compliance, clearance)

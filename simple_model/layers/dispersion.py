@@ -1,9 +1,9 @@
 """Dispersion curves of laterally infinite bodies: wavenumbers of their modes at each frequency.
 
-A mode goes as exp(i (w t - k x)), with Im k <= 0: it decays away from its source, at x < 0. Phase
+A mode varies as exp(i (w t - k x)), with Im k <= 0: it decays away from its source, at x < 0. Phase
 speed is w / Re k, group speed 1 / Re(dk/dw), 1/e length 1 / |Im k|. Near a pole the compliance of
-the surface is G = R / (k^2 - k_m^2), so that a pressure of the transform S(k) on a spot moves the
-surface at a distance r from it by -(i/4) R S(k_m) H_0^(2)(k_m r) in this mode.
+the surface is G = R / (k^2 - k_m^2). A pressure of transform S(k) on a spot therefore moves the
+surface at a distance r by -(i/4) R S(k_m) H_0^(2)(k_m r) in this mode.
 """
 
 from dataclasses import dataclass, replace
@@ -13,33 +13,37 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import hankel2e
 
+from simple_model.layers.compliance import AIR_DENSITY
 from simple_model.layers.half_space_below import modes_above_half_space, rayleigh_mode
-from simple_model.layers.mode_tracking import Found, between, merged, tracked
+from simple_model.layers.material import Material
+from simple_model.layers.mode_tracking import Roots, frequencies_between, merge_roots, track_modes
 from simple_model.layers.stack import Stack
 from simple_model.layers.thin_layers import eigenpairs, outgoing, pencil
 from simple_model.typing import Bools, Complex, Floats
 
+SHEET_MODES = ("bending wave", "bending near field")
 KINDS = ("propagating", "backward", "leaky", "evanescent")
 MOST = 6  # modes
-ROUNDS = 4  # of further frequencies between those that are asked for
-CANDIDATES = 3  # roots that are tracked over the modes that are kept
+ROUNDS = 4  # of further frequencies between the given ones
+CANDIDATES = 3  # roots that are track_modes over the modes that are kept
 FASTEST_DECAY = 2 / np.pi  # |Im k| / |Re k| of a wave that falls to 1/e in a quarter of its length
-SLOWEST_FLUX = 0.05  # of the phase speed: energy of a mode that moves no faster stays where it is
-DIFFERENCE = 1e-4  # of a frequency, for the derivative of a modulus
+SLOWEST_FLUX = 0.05  # of the phase speed: energy that moves slower does not leave
+DIFFERENCE = 1e-4  # of a frequency, step of the derivative of a modulus
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mode:
-    """A mode along frequency, NaN where it is not found.
+    """A mode along frequency, NaN where it has no root.
 
     Parameters
     ----------
     name : str
     frequencies : (f,) float, Hz
-    wavenumbers : (f,) complex, 1/m, k of exp(i (w t - k x)), Im k <= 0; Re k < 0 of a backward wave
+    wavenumbers : (f,) complex, 1/m, k of exp(i (w t - k x)), Im k <= 0; Re k < 0 for a backward
+        wave
     slowness : (f,) complex, s/m, dk/dw
-    residues : (f,) complex, 1/Pa/m, of the surface's compliance in k^2
-    kinds : (f,) str, each one of `KINDS`, or "" where it is not found
+    residues : (f,) complex, 1/Pa/m, of the surface compliance in k^2
+    kinds : (f,) str, one of `KINDS`, or "" without a root
     shapes : (f, d, 2) complex, displacement along x over i, and downwards, at the depths of the
         curves, over the largest magnitude
     """
@@ -54,12 +58,12 @@ class Mode:
 
     @property
     def phase_speed(self) -> Floats:
-        """Phase speed (f,) in m/s, of a backward wave too above 0."""
+        """Phase speed (f,) in m/s, positive also for a backward wave."""
         return 2 * np.pi * self.frequencies / np.abs(self.wavenumbers.real)
 
     @property
     def group_speed(self) -> Floats:
-        """Group speed 1 / Re dk/dw (f,) in m/s; NaN where the imaginary part of dk/dw is larger."""
+        """Group speed 1 / Re dk/dw (f,) in m/s; NaN where dk/dw is mostly imaginary."""
         real, imaginary = self.slowness.real, self.slowness.imag
         return np.where(np.abs(imaginary) > np.abs(real), np.nan, 1 / real)
 
@@ -77,7 +81,7 @@ class Mode:
     @cached_property
     def cut_on(self) -> float:
         """Lowest frequency in Hz at which it carries energy, where k^2 crosses the imaginary axis;
-        inf if nowhere.
+        inf if there is none.
         """
         if not self.is_wave.any():
             return np.inf
@@ -101,7 +105,7 @@ class Mode:
         known = np.isfinite(self.wavenumbers)
         if known.sum() < 2:
             return np.full(f.shape, np.nan + 0j)
-        from scipy.interpolate import CubicHermiteSpline  # which takes long to import
+        from scipy.interpolate import CubicHermiteSpline  # slow to import
 
         x, k = self.frequencies[known], self.wavenumbers[known]
         slope = 4 * np.pi * k * self.slowness[known]
@@ -111,7 +115,7 @@ class Mode:
         """Motion (f,) of the surface in m/Pa by this mode, at a distance in metre from the middle
         of a Gaussian spot of standard deviation `width`.
         """
-        # A backward wave goes outwards by its energy, and so is of the Hankel function at its k.
+        # The energy of a backward wave travels outwards, so its k takes the same Hankel function.
         k = self.wavenumbers
         spot = 2 * np.pi * width**2 * np.exp(-((k * width) ** 2) / 2)
         wave = hankel2e(0, k * distance) * np.exp(-1j * k * distance)
@@ -130,24 +134,31 @@ class DispersionCurves:
 def dispersion_curves(
     stack: Stack, frequencies: ArrayLike, *, most: int = MOST
 ) -> DispersionCurves:
-    """Dispersion curves of a stack of layers.
+    """Compute the dispersion curves of a stack of layers.
 
-    Finite stacks by the thin-layer method; layers on a half-space by its roots with a perfectly
-    matched layer, refined on the exact stiffness of the half-space; a half-space alone by the
-    Rayleigh wave.
+    Finite stacks use the thin-layer method. Layers on a half-space use the same with a perfectly
+    matched layer, and refine its roots with the exact stiffness of the half-space. A half-space
+    alone has the Rayleigh wave.
 
     Parameters
     ----------
     stack : Stack
     frequencies : (f,) float, Hz, above 0 and ascending
-    most : how many modes, the least evanescent
+    most : largest number of modes, the least evanescent
 
     Returns
     -------
-    DispersionCurves, with a mode at least
+    DispersionCurves, with at least one mode
 
-    Raises a ValueError if frequencies are not above 0 and ascending, or layers are very many
-    wavelengths thick.
+    Raises
+    ------
+    ValueError
+        If frequencies are not above 0 and ascending, or layers are too many wavelengths thick.
+
+    >>> from simple_model.layers.material import PRESETS
+    >>> slab = Stack(materials=(PRESETS["palm"],), thicknesses=(0.015,))
+    >>> [round(float(mode.phase_speed[0]), 2) for mode in dispersion_curves(slab, [140.0]).modes[:2]]
+    [11.43, 7.39]
     """
     f = checked_frequencies(frequencies)
     omega = 2 * np.pi * f
@@ -159,27 +170,31 @@ def dispersion_curves(
     for _ in range(ROUNDS):
         is_bound = np.abs(found.wavenumbers.real) > _leaking(stack, fine)[:, None]
         is_wave = is_bound & ~_is_evanescent(found.wavenumbers)
-        further = between(found, fine, is_wave, most)
+        further = frequencies_between(found, fine, is_wave, most)
         if not len(further):
             break
-        # Layers are cut, and depths are taken, for the ends of the band.
+        # The ends of the band determine elements and depths.
         other, _ = _roots(stack, np.concatenate([omega[:1], further, omega[-1:]]), most_roots)
-        inner = Found(**{name: values[1:-1] for name, values in vars(other).items()})
-        found, fine = merged(found, fine, inner, further)
-    found = tracked(found, fine, most, np.searchsorted(fine, omega))
+        inner = Roots(**{name: values[1:-1] for name, values in vars(other).items()})
+        found, fine = merge_roots(found, fine, inner, further)
+    found = track_modes(found, fine, most, np.searchsorted(fine, omega))
     return curves(f, depths, found, (), _leaking(stack, omega) if stack.is_half_space else None)
 
 
 def _leaking(stack: Stack, omega: Floats) -> Floats:
-    """Wavenumber (f,) in 1/m below which waves leak into the half-space of a stack; 0 without."""
+    """Wavenumber (f,) in 1/m below which waves leak into the half-space of a stack; 0
+    without one.
+    """
     if not stack.is_half_space:
         return np.zeros(len(omega))
     below = stack.materials[-1]
     return np.asarray((omega * np.sqrt(below.density / below.complex_modulus(omega))).real)
 
 
-def _roots(stack: Stack, omega: Floats, most: int) -> tuple[Found, Floats]:
-    """Roots of a stack at frequencies (f,) in rad/s, so many of each, and depths of shapes."""
+def _roots(stack: Stack, omega: Floats, most: int) -> tuple[Roots, Floats]:
+    """Roots of a stack at frequencies (f,) in rad/s, at most `most` of each, and depths of
+    shapes.
+    """
     moduli, slopes = modulus_and_slope(stack, omega)
     solve = modes_above_half_space if stack.is_half_space else _finite
     return solve(stack, omega, moduli, slopes, most)
@@ -190,7 +205,7 @@ def _is_evanescent(wavenumbers: Complex) -> Bools:
 
 
 def checked_frequencies(frequencies: ArrayLike) -> Floats:
-    """Frequencies (f,) in Hz; a ValueError unless they are finite, above 0 and ascending."""
+    """Return frequencies (f,) in Hz; a ValueError unless they are finite, above 0 and ascending."""
     f = np.atleast_1d(np.asarray(frequencies, np.float64))
     rises = np.isfinite(f).all() and f.ndim == 1 and (np.diff(f, prepend=0) > 0).all()
     if not (len(f) and rises):
@@ -202,7 +217,7 @@ def checked_frequencies(frequencies: ArrayLike) -> Floats:
 
 
 def modulus_and_slope(stack: Stack, omega: Floats) -> tuple[Complex, Complex]:
-    """Shear moduli (f, l) of the layers in Pa, and their derivatives in Pa s at (f,) in rad/s."""
+    """Shear moduli (f, l) of the layers in Pa, and their derivatives in Pa s, at (f,) rad/s."""
     at = omega[:, None] * np.array([1.0, 1 - DIFFERENCE, 1 + DIFFERENCE])
     mu = [np.broadcast_to(m.complex_modulus(at), at.shape) for m in stack.materials]
     values = np.stack(mu, axis=1).astype(np.complex128)
@@ -212,8 +227,8 @@ def modulus_and_slope(stack: Stack, omega: Floats) -> tuple[Complex, Complex]:
 
 def _finite(
     stack: Stack, omega: Floats, moduli: Complex, slopes: Complex, most: int
-) -> tuple[Found, Floats]:
-    """The least evanescent roots of a finite stack, and the depths of their shapes."""
+) -> tuple[Roots, Floats]:
+    """Least evanescent roots of a finite stack, and the depths of their shapes."""
     springless = replace(stack, base="free", base_stiffness=0.0) if stack.base_stiffness else stack
     of, change = pencil(stack, omega, moduli), pencil(springless, omega, slopes)
     squared, V, W = eigenpairs(of, omega)
@@ -245,7 +260,7 @@ def _finite(
     shapes = np.zeros((*k.shape, len(of.depths), 2), np.complex128)
     for axis, x in enumerate((U, W)):
         shapes[:, :, : x.shape[1], axis] = x.swapaxes(1, 2)
-    found = Found(
+    found = Roots(
         squared=squared, slope=slope, wavenumbers=k, residues=squared * W[:, 0] ** 2 / norm,
         energy_speed=np.abs(carried.real / stored.real), shapes=shapes,
     )  # fmt: skip
@@ -255,13 +270,14 @@ def _finite(
 def curves(
     frequencies: Floats,
     depths: Floats,
-    found: Found,
+    found: Roots,
     names: tuple[str, ...] = (),
     bound: Floats | None = None,
 ) -> DispersionCurves:
-    """Curves of tracked modes at frequencies (f,) in Hz, with shapes at depths (d,) in metre; modes
-    without names are numbered by cut-on. `bound` (f,) in 1/m is the wavenumber of the shear wave of
-    a half-space below, into which waves of smaller ones leak.
+    """Curves of tracked modes at frequencies (f,) in Hz, with shapes at depths (d,) in metre.
+
+    Modes without names are numbered by cut-on. `bound` (f,) in 1/m is the wavenumber of the shear
+    wave of a half-space below: waves of smaller wavenumbers leak into it.
     """
     k = found.wavenumbers
     known = np.isfinite(k)
@@ -289,3 +305,52 @@ def curves(
         modes.sort(key=lambda mode: (mode.cut_on, -np.nanmax(mode.wavenumbers.imag)))
         modes = [replace(mode, name=f"mode {n}") for n, mode in enumerate(modes, start=1)]
     return DispersionCurves(frequencies=frequencies, depths=depths, modes=tuple(modes))
+
+
+def sheet_curves(
+    material: Material,
+    thickness: float,
+    frequencies: ArrayLike,
+    *,
+    air_density: float = AIR_DENSITY,
+    tension: float = 0.0,
+) -> DispersionCurves:
+    """Compute the dispersion curves of the bending wave of an infinite thin sheet, and of its near
+    field.
+
+    They are the poles of `compliance.thin_sheet`, D k^5 + T k^3 - m w^2 k - 2 rho_air w^2 = 0 with
+    Re k >= 0. Frequencies (f,) in Hz are above 0 and ascending, otherwise a ValueError; tension in
+    N/m is the same in all directions; an air density of 0 kg/m3 is vacuum. The shapes are at both
+    faces, along x by the rotation of the section, U = k W z from the middle.
+    """
+    f = checked_frequencies(frequencies)
+    omega = 2 * np.pi * f
+    sheet = Stack(materials=(material,), thicknesses=(thickness,), base="free")
+    mu, slope = (x[:, 0] for x in modulus_and_slope(sheet, omega))
+    bending = thickness**3 / (6 * (1 - material.poisson)) * mu
+    mass, air = material.density * thickness, 2 * air_density
+    k = _bending_wavenumbers(bending, tension, mass * omega**2, air * omega**2)
+    D, w = bending[:, None], omega[:, None]
+    by_k = 5 * D * k**4 + 3 * tension * k**2 - mass * w**2
+    by_frequency = (slope / mu)[:, None] * D * k**5 - 2 * w * (mass * k + air)
+    tilt = k * thickness / 2  # of the upper face, z downwards
+    upper, lower = (np.stack([sign * tilt, np.ones_like(k)], axis=-1) for sign in (-1, 1))
+    roots = Roots(
+        squared=k**2, slope=-2 * k * by_frequency / by_k, wavenumbers=k,
+        residues=2 * k**2 / by_k, energy_speed=np.full(k.shape, np.inf),
+        shapes=np.stack([upper, lower], axis=2),
+    )  # fmt: skip
+    return curves(f, np.array([0.0, thickness]), roots, SHEET_MODES)
+
+
+def _bending_wavenumbers(bending: Complex, tension: float, inertia: Floats, air: Floats) -> Complex:
+    """Propagating and evanescent roots (f, 2) of D k^5 + T k^3 - a k - b = 0, by Newton's
+    method.
+    """
+    D, a, b = bending[:, None], inertia[:, None], air[:, None]
+    half = tension / 2 / D
+    mean = np.sqrt(half**2 + a / D + 0j)
+    k = np.sqrt(np.hstack([mean - half, mean + half])) * np.array([1, -1j])
+    for _ in range(50):
+        k = k - (D * k**5 + tension * k**3 - a * k - b) / (5 * D * k**4 + 3 * tension * k**2 - a)
+    return np.asarray(k)

@@ -52,7 +52,7 @@ from simple_model.typing import Complex, Floats, Ints
 
 PADDING = 2, 256  # samples of the transform for each sample of the record, and more
 WRAP_AROUND = 1e-5  # factor by which the wrap-around is damped
-LEAST_RATE = 20_000.0  # Hz, of the samples of the transform
+TRANSFORM_RATE = 20_000.0  # Hz, of the samples of the transform
 BAND_END = 3.0  # steepness of the error function that ends the band
 ABRUPT_PARTS = 2  # samples of a load that jumps, or turns, per sample of the transform
 LOAD_END = 6.0  # steepness of the error function that ends a load after the record
@@ -193,8 +193,11 @@ def steady_state(
     started = time.perf_counter()
     probes = np.atleast_2d(np.array(probes, np.float64))
     times = np.array(times)
-    values = steady_history(normal_field(compliance), pressure, probes, times)[..., 0]
-    return _timed("flat-body-harmonic", started, times, probes, values)
+    f, a = steady_lines(compliance, pressure, probes)
+    below = below_half_the_rate(f, times)
+    values = synthesise(f[below], a[below], times)
+    count = int(below.sum())
+    return _timed("flat-body-harmonic", started, times, probes, values, count, count)
 
 
 def flat_body(
@@ -234,7 +237,7 @@ def flat_body(
     started = time.perf_counter()
     probes, times = np.atleast_2d(np.array(probes, np.float64)), np.array(times)
     values = field_history(normal_field(compliance), pressure, probes, times)[..., 0]
-    return _timed("flat-body", started, times, probes, values)
+    return _timed("flat-body", started, times, probes, values, len(times), len(times) + 1)
 
 
 def field_history(
@@ -243,7 +246,7 @@ def field_history(
     """All components (t, p, m) of a field from rest, as `flat_body` computes them."""
     width = _width(pressure)
     probes = np.atleast_2d(np.asarray(probes, np.float64))
-    within = max(1, int(np.ceil(step(times) * LEAST_RATE - 1e-6)))
+    within = max(1, int(np.ceil(step(times) * TRANSFORM_RATE - 1e-6)))
     dt, n = step(times) / within, (len(times) - 1) * within + 1
     padded = next_fast_len(PADDING[0] * n + PADDING[1], real=True)
     damping = -np.log(WRAP_AROUND) / (padded * dt)
@@ -318,10 +321,12 @@ def _low_passed_load(
     return path_samples(pressure), of_load
 
 
-def _timed(model: str, started: float, times: Floats, probes: Floats, values: Floats) -> Response:
+def _timed(
+    model: str, started: float, times: Floats, probes: Floats, values: Floats, steps: int, dofs: int
+) -> Response:
     """Make the response, with the seconds since its computation started."""
     seconds = {"evaluate": time.perf_counter() - started}
-    effort = Effort(seconds=seconds, steps=len(times))
+    effort = Effort(seconds=seconds, steps=steps, dofs=dofs)
     return Response(model=model, times=times, probes=probes, values=values, effort=effort)
 
 

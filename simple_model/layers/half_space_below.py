@@ -4,10 +4,10 @@ In a half-space a P wave of amplitude a and an SV wave of amplitude b move at a 
 
     (U, W) = a (-k, -p) e^{-p z} + b (s, k) e^{-s z},  p^2 = k^2 - k_p^2,  s^2 = k^2 - k_s^2
 
-and so resist motion of its surface by the dynamic stiffness K(k) = -T D^-1, D of their motion and T
-of their stress there (E. Kausel and J. M. Roesset, Bull Seismol Soc Am 71:1743 (1981)). Of either
-sign of p and s that one is taken whose wave decays in the matched layer: of bound waves the one
-that decays with depth, of leaky waves the one that grows.
+They resist motion of the surface with the dynamic stiffness K(k) = -T D^-1, where D is their motion
+and T their stress at the surface (E. Kausel and J. M. Roesset, Bull Seismol Soc Am 71:1743 (1981)).
+The signs of p and s are those of waves that decay in the matched layer: bound waves decay with
+depth, leaky waves grow.
 """
 
 from collections.abc import Callable
@@ -15,40 +15,40 @@ from collections.abc import Callable
 import numpy as np
 
 from simple_model.layers.material import Material
-from simple_model.layers.mode_tracking import Found
+from simple_model.layers.mode_tracking import Roots
 from simple_model.layers.stack import Stack
 from simple_model.layers.thin_layers import MATCHED, Pencil, eigenpairs, outgoing, pencil
 from simple_model.typing import Complex, Floats
 
 STEPS, CLOSE = 10, 1e-11  # of inverse iteration; relative change at which it ends
-BESIDE = 1 + 1e-9 * (1 + 1j)  # of a root, where the matrix is not singular
-CONVERGED = 1e-6  # last relative change of a root; thin layers near nu = 0.5 round off to 1e-7
-MOVED = 0.05  # of the half-space's shear wavenumber: a root that moves further is none of a mode
-SAME = 1e-6  # of it: roots so near to each other are one
-NEARLY = 1e-5  # relative step of derivatives of the half-space's stiffness
-SLOWER = 0.99  # of its shear wavenumber: from there on waves are bound
-SLOWEST = 1.5  # of the largest shear wavenumber: no guided wave is slower
+BESIDE = 1 + 1e-9 * (1 + 1j)  # factor of a root, where the matrix is not singular
+CONVERGED = 1e-6  # last relative change of a root; round-off near nu = 0.5 is 1e-7
+FARTHEST_MOVE = 0.05  # of the shear wavenumber below: a root that moves further is no mode
+SAME_ROOT = 1e-6  # of the shear wavenumber below: closer roots are one
+EPS = 1e-5  # relative step of derivatives of the stiffness of the half-space
+LEAST_BOUND = 0.99  # of the shear wavenumber below: larger wavenumbers are bound
+LARGEST_BOUND = 1.5  # of the largest shear wavenumber: no guided wave is slower
 MOST_GROWTH = 50.0  # exponent of a wave that grows with depth
-SHOWN = 40  # depths in a half-space
+DEPTHS = 40  # of a shape in a half-space
 
 
-def rayleigh_mode(material: Material, omega: Floats) -> tuple[Found, Floats]:
+def rayleigh_mode(material: Material, omega: Floats) -> tuple[Roots, Floats]:
     """The Rayleigh wave of a half-space at (f,) rad/s, and depths of its shape, down to a shear
-    wavelength in the middle of the band.
+    wavelength at the middle of the band.
     """
     rest = material.shear_speed / material.rayleigh_speed
-    at = omega[:, None] * (1 + np.array([0, -NEARLY, NEARLY]))
+    at = omega[:, None] * (1 + np.array([0, -EPS, EPS]))
     slowness = rest * np.sqrt(material.density / (material.complex_modulus(at) + 0j))
     k = (at * slowness)[:, :1]
-    slope = np.diff((at * slowness)[:, 1:] ** 2) / (2 * NEARLY * omega[:, None])
+    slope = np.diff((at * slowness)[:, 1:] ** 2) / (2 * EPS * omega[:, None])
     mu = material.complex_modulus(omega)[:, None] + 0j
     ks2 = (k / rest) ** 2
     p, s = _decay(k, ks2, material.poisson, 1.0)
     by_square = 4 * (2 * k**2 - ks2) - 4 * p * s - 2 * k**2 * (s / p + p / s)
-    depths = np.linspace(0, 2 * np.pi / np.median(np.abs(k)), SHOWN)
+    depths = np.linspace(0, 2 * np.pi / np.median(np.abs(k)), DEPTHS)
     ratio = 2 * k * p / (s**2 + k**2)  # of the SV wave, for no shear stress at the surface
     waves = np.stack([np.ones_like(ratio), ratio], axis=-1)
-    found = Found(
+    found = Roots(
         squared=k**2, slope=slope, wavenumbers=k, residues=-p * ks2 / (mu * by_square),
         energy_speed=np.full(k.shape, np.inf), shapes=_shape(k, p, s, waves, depths),
     )  # fmt: skip
@@ -57,32 +57,34 @@ def rayleigh_mode(material: Material, omega: Floats) -> tuple[Found, Floats]:
 
 def modes_above_half_space(
     stack: Stack, omega: Floats, moduli: Complex, slopes: Complex, most: int
-) -> tuple[Found, Floats]:
-    """Roots of layers on a half-space, the last layer of the stack, NaN where there are fewer, and
-    the depths (d,) in metre of their shapes. `moduli` and `slopes` (f, l) are shear moduli and
-    their derivatives by omega; `most` roots of each frequency have most motion in the layers.
+) -> tuple[Roots, Floats]:
+    """Roots of layers on a half-space, the last layer of the stack, and depths (d,) in metre of
+    their shapes.
+
+    `moduli` and `slopes` (f, l) are shear moduli and their derivatives by omega. Of each frequency
+    it returns the `most` roots with most motion in the layers, NaN if there are fewer.
     """
     layers = Stack(materials=stack.materials[:-1], thicknesses=stack.thicknesses[:-1], base="free")
     of, change = (pencil(layers, omega, x[:, :-1]) for x in (moduli, slopes))
     w, mu, dmu = omega[:, None], moduli[:, -1:], slopes[:, -1:]
     below = stack.materials[-1]
 
-    def resisting(k: Complex, by: float = 0.0) -> Complex:
+    def impedance(k: Complex, by: float = 0.0) -> Complex:
         modulus, at = mu + by * w * dmu, (1 + by) * w
         return _stiffness(k, below.density * at**2 / modulus, modulus, below.poisson)
 
     ks = np.asarray(w * np.sqrt(below.density / mu), np.complex128)
     start, x = _candidates(pencil(stack, omega, moduli), of, omega, ks, most)
-    # Thin layers have next to none of the motion of a long wave, which is the half-space's own.
+    # Thin layers hardly move in a long wave, which is that of the half-space alone.
     rayleigh = ks * below.shear_speed / below.rayleigh_speed
     start = np.concatenate([rayleigh, start], axis=1)
     x = np.concatenate([np.ones_like(x[:, :1]), x], axis=1)
-    k, x, last = _refined(of, omega, start, x, resisting)
-    genuine = (np.abs(k - start) < MOVED * np.abs(ks)) & (last < CONVERGED)
-    genuine &= ~_repeated(k**2, genuine, SAME * np.abs(ks) ** 2)
-    ends, up, down = _ends(of), 1 + NEARLY, 1 - NEARLY
-    by_k = (resisting(up * k) - resisting(down * k)) / (2 * NEARLY * k)[..., None, None]
-    by_w = (resisting(k, NEARLY) - resisting(k, -NEARLY)) / (2 * NEARLY * w)[..., None, None]
+    k, x, last = _refined(of, omega, start, x, impedance)
+    genuine = (np.abs(k - start) < FARTHEST_MOVE * np.abs(ks)) & (last < CONVERGED)
+    genuine &= ~_repeated(k**2, genuine, SAME_ROOT * np.abs(ks) ** 2)
+    ends, up, down = _ends(of), 1 + EPS, 1 - EPS
+    by_k = (impedance(up * k) - impedance(down * k)) / (2 * EPS * k)[..., None, None]
+    by_w = (impedance(k, EPS) - impedance(k, -EPS)) / (2 * EPS * w)[..., None, None]
     norm = _form(x, _by_wavenumber(of, k)) + _form(x[..., ends], by_k)
     inertia = (np.concatenate([of.M, of.M], axis=1)[:, None] * x**2).sum(axis=-1)
     by_frequency = _form(x, _matrix(change, k)) - 2 * w * inertia + _form(x[..., ends], by_w)
@@ -92,8 +94,8 @@ def modes_above_half_space(
     k, norm = turned * k, turned * norm
     ks2 = np.asarray(ks**2, np.complex128)
     longest = 4 * np.pi / float(ks.real[0, 0] + ks.real[-1, 0])  # in the middle of the band
-    reach = np.linspace(0, max(layers.thickness, longest), SHOWN)
-    found = Found(
+    reach = np.linspace(0, max(layers.thickness, longest), DEPTHS)
+    found = Roots(
         squared=k**2, slope=slope, wavenumbers=k,
         residues=2 * k * x[..., len(of.depths)] ** 2 / norm,
         energy_speed=np.full(k.shape, np.inf),
@@ -103,14 +105,14 @@ def modes_above_half_space(
         name: np.where(genuine.reshape(genuine.shape + (1,) * (v.ndim - 2)), v, np.nan)
         for name, v in vars(found).items()
     }
-    return Found(**kept), np.concatenate([of.depths, layers.thickness + reach[1:]])
+    return Roots(**kept), np.concatenate([of.depths, layers.thickness + reach[1:]])
 
 
 def _candidates(
     whole: Pencil, of: Pencil, omega: Floats, ks: Complex, most: int
 ) -> tuple[Complex, Complex]:
     """Roots (f, m) of layers on a matched layer, and their motion (f, m, 2 n) in the layers: those
-    slower than the shear wave (f, 1) below, and those of most motion in the layers.
+    slower than the shear wave (f, 1) below, and those with most motion in the layers.
     """
     squared, V, W = eigenpairs(whole, omega)
     k = np.sqrt(squared)
@@ -124,8 +126,8 @@ def _candidates(
     shortest = 2 * np.pi / of.depths[-1] + np.abs(k).min(axis=1, keepdims=True)
     share = np.where(np.abs(k.imag) < shortest, share, 0.0)
     slowest = omega * np.sqrt(np.abs(of.M / of.Aww).max(axis=1))
-    is_bound = (np.abs(k.imag) < k.real / 2) & (k.real > SLOWER * ks.real)
-    is_bound &= k.real < SLOWEST * np.maximum(slowest[:, None], np.abs(ks))
+    is_bound = (np.abs(k.imag) < k.real / 2) & (k.real > LEAST_BOUND * ks.real)
+    is_bound &= k.real < LARGEST_BOUND * np.maximum(slowest[:, None], np.abs(ks))
     share = share + is_bound
     order = np.argsort(-share, axis=1, kind="stable")[:, :most]
     x = np.concatenate([x[:, :n], x[:, len(V[0]) : len(V[0]) + n]], axis=1)
@@ -134,23 +136,27 @@ def _candidates(
 
 
 def _refined(
-    of: Pencil, omega: Floats, start: Complex, x: Complex, resisting: Callable[[Complex], Complex]
+    of: Pencil,
+    omega: Floats,
+    start: Complex,
+    x: Complex,
+    impedance: Callable[[Complex], Complex],
 ) -> tuple[Complex, Complex, Floats]:
-    """Roots (f, m) of the layers on the half-space itself, by inverse iteration, their motion (f,
-    m, 2 n), and the relative change in the last step.
+    """Refine roots (f, m) with the exact half-space by inverse iteration. Return them, their motion
+    (f, m, 2 n) and the relative change in the last step.
     """
     ends = np.ix_(_ends(of), _ends(of))
     k, last = start, np.ones(start.shape)
     for _ in range(STEPS):
         at = BESIDE * k  # where the matrix is not singular
         matrix, slope = _matrix(of, at, omega), _by_wavenumber(of, at)
-        matrix[..., ends[0], ends[1]] += resisting(at)
-        change = (resisting((1 + NEARLY) * at) - resisting((1 - NEARLY) * at)) / (2 * NEARLY)
+        matrix[..., ends[0], ends[1]] += impedance(at)
+        change = (impedance((1 + EPS) * at) - impedance((1 - EPS) * at)) / (2 * EPS)
         slope[..., ends[0], ends[1]] += change / at[..., None, None]
         x = x / np.linalg.norm(x, axis=-1, keepdims=True)
         y = np.linalg.solve(matrix, slope @ x[..., None])[..., 0]
         step = 1 / (x.conj() * y).sum(axis=-1)
-        step = step * np.minimum(1, 0.2 * np.abs(at / step))  # no further than a fifth at once
+        step = step * np.minimum(1, 0.2 * np.abs(at / step))  # by at most a fifth
         new = at - step
         lost = ~(np.abs(new - start) < np.abs(start) / 2)
         x = np.where(lost[..., None], x, y)
@@ -179,11 +185,11 @@ def _decay(k: Complex, ks2: Complex, poisson: float, along: complex) -> tuple[Co
 
 
 def _shape(k: Complex, p: Complex, s: Complex, waves: Complex, depths: Floats) -> Complex:
-    """(U, W) (f, m, d, 2) in a half-space of the amplitudes (f, m, 2) of its P and SV wave."""
+    """(U, W) (f, m, d, 2) in a half-space for amplitudes (f, m, 2) of its P and SV waves."""
     z = depths[:, None]
     k, p, s = (x[..., None, None] for x in (k, p, s))
     a, b = (waves[..., None, None, axis] for axis in (0, 1))
-    # A root that is none, or leaks much, grows with depth: no further than a number holds.
+    # A false or leaky root grows with depth; the limit avoids overflow.
     pressure, shear = (
         wave * np.exp(np.minimum(-(rate * z).real, MOST_GROWTH) - 1j * (rate * z).imag)
         for wave, rate in ((a, p), (b, s))
@@ -203,7 +209,7 @@ def _continued(
 
 
 def _matrix(of: Pencil, k: Complex, omega: Floats | None = None) -> Complex:
-    """A k^2 + B k + G (f, m, 2 n, 2 n), less w^2 M at frequencies (f,) if they are given."""
+    """A k^2 + B k + G (f, m, 2 n, 2 n), less w^2 M at frequencies (f,) if given."""
     n = of.M.shape[1]
     found = k[..., None, None] * _by_wavenumber(of, k)
     found[..., :n, :n] -= k[..., None, None] ** 2 * of.Auu[:, None]
@@ -228,7 +234,7 @@ def _by_wavenumber(of: Pencil, k: Complex) -> Complex:
 
 
 def _ends(of: Pencil) -> list[int]:
-    """Places of U and W of the lowest node."""
+    """Indices of U and W of the lowest node."""
     n = of.M.shape[1]
     return [n - 1, 2 * n - 1]
 
@@ -239,7 +245,7 @@ def _form(x: Complex, matrix: Complex) -> Complex:
 
 
 def _repeated(k: Complex, genuine: np.ndarray, least: Floats) -> np.ndarray:
-    """Whether a root (f, m) is within `least` (f, 1) of an earlier one that is genuine."""
+    """Whether a root (f, m) is within `least` (f, 1) of an earlier genuine one."""
     near = np.abs(k[:, :, None] - k[:, None]) < least[..., None]
     earlier = np.tri(k.shape[1], k=-1, dtype=bool)
     return np.asarray((near & earlier & genuine[:, None]).any(axis=2))

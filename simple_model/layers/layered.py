@@ -2,22 +2,21 @@
 
 At a wavenumber k the axisymmetric field is u_r = U J1(kr), u_z = W J0(kr), sigma_zz = N J0(kr),
 sigma_rz = T J1(kr), with z and W downwards and time exp(+i w t). The forces per area on the faces
-of a layer are its stiffness matrix times their displacements (Kausel and Roesset, Bull Seism Soc
-Am 71:1743 (1981)). With p^2 = k^2 - k_p^2, s^2 = k^2 - k_s^2, kappa = k_p^2 / k_s^2, and of the
-thickness H the functions C = cosh p H or s H and S = sinh p H / p or sinh s H / s, all its entries
-have the denominator
+of a layer are its stiffness matrix times their displacements (Kausel and Roesset, Bull Seism Soc Am
+71:1743 (1981)). With p^2 = k^2 - k_p^2, s^2 = k^2 - k_s^2, kappa = k_p^2 / k_s^2, a thickness H,
+and C = cosh p H or cosh s H, S = sinh p H / p or sinh s H / s, all its entries have the denominator
 
     D = 2 (1 - C_p C_s) + (k^2 + p^2 s^2 / k^2) S_p S_s
       = (k^2 - p s)^2 / k^2 S_p S_s - 4 sinh^2 (p - s) H / 2
 
-Towards rest D goes as k_s^4, and the first line loses all digits. The second loses none, because
-(k^2 - p s) / k_s^2 = (k^2 (1 + kappa) - k_p^2) / (k^2 + p s) and (p - s) / k_s^2 =
-(1 - kappa) / (p + s) are no differences of nearly equal terms: k_s^4 is divided out here, and from
-the numerators likewise. All are multiplied by exp(-(p + s) H), so that every exponential decays;
-in a half-space they are 0.
+Towards rest D falls as k_s^4, and the first line loses all digits. The second line loses none,
+because (k^2 - p s) / k_s^2 = (k^2 (1 + kappa) - k_p^2) / (k^2 + p s) and (p - s) / k_s^2 = (1 -
+kappa) / (p + s) are not differences of nearly equal terms. k_s^4 is divided out here, and likewise
+from the numerators. All terms are multiplied by exp(-(p + s) H), so every exponential decays; in a
+half-space they are 0.
 
-What lies below an interface meets a displacement u of it with forces Z u. From the bottom up
-Z = K11 - K12 (K22 + Z)^-1 K21, and from the surface down u <- -(K22 + Z)^-1 K21 u.
+Below an interface the stack resists a displacement u of the interface with forces Z u. From the
+bottom up Z = K11 - K12 (K22 + Z)^-1 K21, and from the surface down u <- -(K22 + Z)^-1 K21 u.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,19 +30,19 @@ from simple_model.layers.material import Material
 from simple_model.layers.stack import Stack
 from simple_model.typing import Complex, Floats
 
-THIN = 0.3  # thickness times wavenumber below which differences of exponentials lose digits
-NEARLY = 0.05  # x below which tanh x / x is summed as a series, exact to 1e-15
-BACKWARD = 0.5  # of a stack's second resonance: where some of its modes become backward waves
-WEAKEST = 0.1  # of the mean decay, that of a mode that is mostly in a layer without loss
-YIELDING = 0.5  # of that estimate: poles above an elastic base, where layers meet springs in series
+THIN = 0.3  # thickness times wavenumber, below which differences of exponentials lose digits
+SERIES_LIMIT = 0.05  # x below which a series gives tanh x / x, exact to 1e-15
+BACKWARD = 0.5  # of the second resonance of a stack: above it some modes are backward waves
+WEAKEST = 0.1  # of the mean decay: decay of a mode that is mostly in a layer without loss
+ELASTIC_BASE = 0.5  # factor of the clearance above an elastic base
 Transfer = Callable[[Complex, Complex], Complex]
 Pair = tuple[Any, Any]  # horizontal and vertical
 Symmetric = tuple[Any, Any, Any]  # of complex arrays, a, b, c of [[a, b], [b, c]]
 
 
 class Layer(NamedTuple):
-    """Stiffness of a layer in Pa/m: `top` K11 = [[a, b], [b, c]], forces on its top by motion
-    there; `across` K21 = [[d, -e], [e, g]], forces on its bottom by motion of the top. K22 is [[a,
+    """Stiffness of a layer in Pa/m: `top` K11 = [[a, b], [b, c]], forces on its top per motion
+    there; `across` K21 = [[d, -e], [e, g]], forces on its bottom per motion of the top. K22 is [[a,
     -b], [-b, c]].
     """
 
@@ -52,8 +51,8 @@ class Layer(NamedTuple):
 
 
 class Impedances(NamedTuple):
-    """Impedance Z in Pa/m of a stack, its layers from the top, and the impedance below each: None
-    below a half-space and on a rigid base.
+    """Impedance Z in Pa/m at the `surface` of a stack, its `layers` from the top, and the impedance
+    `below` each: None below a half-space and on a rigid base.
     """
 
     surface: Symmetric
@@ -63,24 +62,24 @@ class Impedances(NamedTuple):
 
 def surface_compliance(stack: Stack, k: Complex, w: Complex) -> Complex:
     """Displacement (f, k) of the surface into the stack per pressure, in m/Pa, at wavenumbers k
-    (k,) in 1/m with Re k > 0 and frequencies w (f, 1) in rad/s with Im w <= 0; 0 at w = 0 of a free
-    stack.
+    (k,) in 1/m with Re k > 0 and frequencies w (f, 1) in rad/s with Im w <= 0; 0 at w = 0 for a
+    free stack.
     """
     a, b, c = _impedances(stack, k, w).surface
     return _about_mean(stack, w, a / (a * c - b * b))
 
 
 def transfer(stack: Stack, depths: Sequence[float]) -> Transfer:
-    """Motion and stress at depths (d,) in metre for a unit surface pressure: a function of k (k,)
-    in 1/m and w (f, 1) in rad/s to (4, d, f, k), U and W in m/Pa, N and T in Pa/Pa.
+    """Motion and stress at depths (d,) in metre for a unit surface pressure.
 
-    Raises a ValueError if a depth is outside the stack.
+    Returns a function of k (k,) in 1/m and w (f, 1) in rad/s to (4, d, f, k): U and W in m/Pa, N
+    and T in Pa/Pa. Raises a ValueError if a depth is outside the stack.
     """
     for depth in depths:
         if not (0 <= depth <= stack.thickness and isfinite(depth)):
             raise ValueError(
                 f"depth = {1e3 * depth:g} mm is outside a stack of {1e3 * stack.thickness:g} mm; "
-                "ask for one between its surface, 0, and its base"
+                "give a depth between 0, the surface, and the base"
             )
     fine, planes = _cut(stack, depths)
 
@@ -96,16 +95,16 @@ def transfer(stack: Stack, depths: Sequence[float]) -> Transfer:
 
 
 def clearance(stack: Stack, w: Complex) -> float:
-    """Height in 1/m above the real axis of k below which there is no pole at frequencies w (f,).
+    """Height in 1/m above the real axis of k below which there is no pole, at frequencies w (f,).
 
-    Backward waves occur from somewhat below the second resonance and decay no more slowly than the
+    Backward waves occur from slightly below the second resonance and decay at least as fast as the
     least of the shear waves (Tolstoy and Usdin, J Acoust Soc Am 29:37 (1957)). Evanescent waves
-    have their poles above 1 / thickness, but for the bending of a free stack, where the two poles
-    k^4 = m w^2 / D go to 0 with w. For several layers these are estimates, compared with integrals
-    along the real axis of 370 random stacks, and of 240 on an elastic base.
+    have their poles above 1 / thickness, except for the bending of a free stack, where the two
+    poles k^4 = m w^2 / D go to 0 with w. For several layers these are estimates; they were compared
+    with integrals along the real axis of 370 random stacks, and of 240 on an elastic base.
 
-    The sum of all 1 / w_n^2 is the compliance down to the base of each part times its mass; of one
-    layer that is H^2 / 2 c^2, and (2 H / pi c)^2 of it are the first resonance's.
+    The sum of all 1 / w_n^2 is the compliance down to the base of each part times its mass; for one
+    layer it is H^2 / 2 c^2, of which the first resonance contributes (2 H / pi c)^2.
     """
     finite = [pair for pair in zip(stack.materials, stack.thicknesses, strict=True)
               if isfinite(pair[1])]  # fmt: skip
@@ -115,7 +114,7 @@ def clearance(stack: Stack, w: Complex) -> float:
     turns = np.maximum(_resonance(finite, w, _shear) / 9, _resonance(finite, w, _compression))
     decay = _decay(stack, w)[turns > (BACKWARD * np.pi / 2) ** 2 / 2]
     lowest = 1 / total if stack.is_rigid else min(1 / total, _bending(stack, w))
-    lowest *= YIELDING if stack.base_stiffness else 1.0
+    lowest *= ELASTIC_BASE if stack.base_stiffness else 1.0
     return float(decay.min(initial=lowest))
 
 
@@ -124,9 +123,10 @@ def _about_mean(stack: Stack, w: Complex, values: Complex) -> Complex:
 
 
 def _bending(stack: Stack, w: Complex) -> float:
-    """Height in 1/m of the least pole of bending that only decays, of a stack that is free or on an
-    elastic base of stiffness c: B k^4 = m w^2 - c, by classical lamination theory about the neutral
-    plane (Jones, Mechanics of Composite Materials (1999), chapter 4).
+    """Height in 1/m of the lowest pole of bending that only decays, B k^4 = m w^2 - c.
+
+    The stack is free or on an elastic base of stiffness c. B follows from classical lamination
+    theory about the neutral plane (Jones, Mechanics of Composite Materials (1999), chapter 4).
     """
     h = np.array(stack.thicknesses)
     stiff = np.array([2 * _shear(m, w) / (1 - m.poisson) for m in stack.materials]) * h[:, None]
@@ -146,7 +146,7 @@ def _shear(material: Material, w: Complex) -> Complex:
 
 
 def _compression(material: Material, w: Complex) -> Complex:
-    """Modulus lam + 2 mu of compression without strain across it, Pa."""
+    """Modulus lam + 2 mu of compression without lateral strain, Pa."""
     return _shear(material, w) * (2 - 2 * material.poisson) / (1 - 2 * material.poisson)
 
 
@@ -163,8 +163,8 @@ def _resonance(
 
 
 def _decay(stack: Stack, w: Complex) -> Floats:
-    """Least decay (f,) in 1/m of shear waves in a stack; where a layer has none, `WEAKEST` of the
-    mean.
+    """Least decay (f,) in 1/m of shear waves in a stack; `WEAKEST` of the mean if a layer
+    has none.
     """
     waves = [np.sqrt(m.density * w**2 / _shear(m, w)) for m in stack.materials]
     decay = np.abs(np.imag(waves))
@@ -175,7 +175,7 @@ def _decay(stack: Stack, w: Complex) -> Floats:
 
 
 def _cut(stack: Stack, depths: Sequence[float]) -> tuple[Stack, list[int]]:
-    """The stack with an interface at each depth, and which of them each depth is."""
+    """The stack with an interface at each depth, and the index of the interface at each depth."""
     edges = np.concatenate([[0.0], np.cumsum(stack.thicknesses)])
     new = [depth for depth in depths if np.abs(edges - depth).min() > 1e-9 * (1 + depth)]
     planes = np.unique(np.concatenate([edges, new]))
@@ -203,11 +203,11 @@ def _condensed(layer: Layer, below: Symmetric | None) -> Symmetric:
     if below is None:
         return layer.top
     d, e, g = layer.across
-    x, y = _followed(layer, below, (d, e)), _followed(layer, below, (-e, g))
+    x, y = _solve_below(layer, below, (d, e)), _solve_below(layer, below, (-e, g))
     return a - d * x[0] - e * x[1], b + e * x[0] - g * x[1], c + e * y[0] - g * y[1]
 
 
-def _followed(layer: Layer, below: Symmetric, force: Pair) -> Pair:
+def _solve_below(layer: Layer, below: Symmetric, force: Pair) -> Pair:
     """(K22 + Z)^-1 force."""
     (a, b, c), (za, zb, zc) = layer.top, below
     a, b, c = a + za, zb - b, c + zc
@@ -216,7 +216,7 @@ def _followed(layer: Layer, below: Symmetric, force: Pair) -> Pair:
 
 
 def _downwards(known: Impedances) -> list[tuple[Pair, Pair]]:
-    """Displacement in m/Pa of each interface, and forces in Pa/Pa on what is below it."""
+    """Displacement in m/Pa of each interface, and forces in Pa/Pa on the part below it."""
     a, b, c = known.surface
     over = 1 / (a * c - b * b)
     u, f = (-b * over, a * over), (0 * over, 1 + 0 * over)
@@ -227,25 +227,25 @@ def _downwards(known: Impedances) -> list[tuple[Pair, Pair]]:
         if below is None:
             u = (0 * f[0], 0 * f[1])
         else:
-            u, (a, b, c) = _followed(layer, below, f), below
+            u, (a, b, c) = _solve_below(layer, below, f), below
             f = (a * u[0] + b * u[1], b * u[0] + c * u[1])
         found.append((u, f))
     return found
 
 
 def layer_stiffness(material: Material, thickness: float, k: Complex, w: Complex) -> Layer:
-    """Stiffness, of arrays (f, k), of a layer of a thickness in metre, inf for a half-space."""
+    """Stiffness (f, k) of a layer of a thickness in metre, inf for a half-space."""
     mu, kappa = _shear(material, w), (0.5 - material.poisson) / (1 - material.poisson)
     k2, ks2, over_k = k * k, material.density * w**2 / mu, 1 / k
     p, s = np.sqrt(k2 - kappa * ks2), np.sqrt(k2 - ks2)
     over_p, over_s, over_sum = 1 / p, 1 / s, 1 / (p + s)
-    # Of exp(-p H) and exp(-s H), what they lack of 1, which is next to nothing in a thin layer.
-    lp, ls = _lacking(p, thickness), _lacking(s, thickness)
+    # 1 - exp(-p H) and 1 - exp(-s H), which are tiny in a thin layer.
+    lp, ls = _one_minus_exp(p, thickness), _one_minus_exp(s, thickness)
     ep, es = 1 - lp, 1 - ls
     lp2, ls2, lacking = lp * (1 + ep), ls * (1 + es), lp + ls * ep
     mean, slope = (ep + es) / 2, (1 - kappa) * over_sum  # slope = (p - s) / k_s^2
     apart = _difference_quotient(ep, es, mean, slope * ks2, thickness)
-    # Times exp(-(p + s) H) each: S_p S_s, D / k_s^4, (C_p S_s - C_s S_p) / k_s^2, (S_p - S_s) /
+    # Each times exp(-(p + s) H): S_p S_s, D / k_s^4, (C_p S_s - C_s S_p) / k_s^2, (S_p - S_s) /
     # k_s^2 and (C_p - C_s) / k_s^2; S_p and S_s times k^-2.
     sp, ss = lp2 * over_p / 2, ls2 * over_s / 2
     spss, turn, half = sp * ss, slope * apart, (1 - kappa) / 2 * over_p * over_s
@@ -268,27 +268,27 @@ def layer_stiffness(material: Material, thickness: float, k: Complex, w: Complex
     return Layer(top, across)
 
 
-def _lacking(p: Complex, thickness: float) -> Complex:
+def _one_minus_exp(p: Complex, thickness: float) -> Complex:
     """1 - exp(-p H)."""
     if not isfinite(thickness):
         return np.ones_like(p)
     x = -thickness * p
     lacking = 1 - np.exp(x)
     thin = np.abs(x.real) + np.abs(x.imag) < THIN
-    lacking[thin] = -np.expm1(x[thin])  # which takes twice as long
+    lacking[thin] = -np.expm1(x[thin])  # slower than exp
     return np.asarray(lacking)
 
 
 def _difference_quotient(
     ep: Complex, es: Complex, mean: Complex, apart: Complex, thickness: float
 ) -> Complex:
-    """(exp(-s H) - exp(-p H)) / (p - s), where p - s may be 0: mean * H tanh(x) / x with
-    x = (p - s) H / 2.
+    """(exp(-s H) - exp(-p H)) / (p - s), where p - s may be 0: mean * H tanh(x) / x with x = (p -
+    s) H / 2.
     """
     if not isfinite(thickness):
         return np.zeros_like(mean)
     x2 = (apart * (thickness / 2)) ** 2
-    nearly = np.abs(x2.real) + np.abs(x2.imag) < NEARLY**2
+    nearly = np.abs(x2.real) + np.abs(x2.imag) < SERIES_LIMIT**2
     if not nearly.any():
         return np.asarray((es - ep) / apart)
     series = 1 - x2 * (1 / 3 - x2 * (2 / 15 - x2 * (17 / 315 - x2 * (62 / 2835))))

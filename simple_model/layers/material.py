@@ -1,15 +1,15 @@
-"""Linear viscoelastic materials, of every model, and the presets that scenes name.
+"""Linear viscoelastic materials, for every model, and the presets that scenes name.
 
 The complex shear modulus (time exp(+i w t)) is
 
     mu(w) = mu h(w) + i w viscosity + sum_j mu_j i w tau_j / (1 + i w tau_j)
 
-where h is 1, or with a loss factor that of `constant_loss`. With viscosity alone that is the
-Kelvin-Voigt model, with Prony terms a generalised Maxwell solid (Simo and Hughes, Computational
-Inelasticity (1998), chapter 10), with one of them the standard linear solid (C. Zener, Elasticity
-and Anelasticity of Metals, 1948): mu in slow and mu + sum mu_j in fast motion. A `law` replaces all
-of it, and models that need internal variables take its Prony series. Poisson's ratio is constant,
-so that the whole stiffness scales with mu; that of an orthotropic sheet is of its isotropic mean.
+where h is 1, or with a loss factor that of `constant_loss`. Viscosity alone makes the Kelvin-Voigt
+model, Prony terms a generalised Maxwell solid (Simo and Hughes, Computational Inelasticity (1998),
+chapter 10), and one Prony term the standard linear solid (C. Zener, Elasticity and Anelasticity of
+Metals, 1948): mu in slow and mu + sum mu_j in fast motion. A `law` replaces all of it; models that
+need internal variables use its Prony series. Poisson's ratio is constant, so the whole stiffness
+scales with mu, in an orthotropic sheet with that of its isotropic mean.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Orthotropy:
             raise ValueError(
                 f"poisson_xy = {self.poisson_xy} is outside 0 <= poisson_xy < "
                 f"{0.5 * sqrt(self.young_x / self.young_y):.3g}, where the mean of both directions "
-                "is 0.5; paper has 0.2 to 0.4"
+                "is 0.5; use 0.2 to 0.4 for paper"
             )
 
     @property
@@ -93,7 +93,7 @@ class Orthotropy:
         )
 
     def scaled(self, factor: float) -> Orthotropy:
-        """The same ratios with all moduli multiplied by a factor."""
+        """Return the same ratios with all moduli multiplied by a factor."""
         shear = None if self.shear_xy is None else factor * self.shear_xy
         young_x, young_y = factor * self.young_x, factor * self.young_y
         return replace(self, young_x=young_x, young_y=young_y, shear_xy=shear)
@@ -119,8 +119,14 @@ class Material:
         with imaginary part <= 0; `shear_modulus` is its value at rest
     orthotropy : in-plane moduli of a sheet, whose isotropic mean has `shear_modulus` and `poisson`
 
-    Raises a ValueError if a value is out of range, or a law is given beside other losses or an
+    Raises a ValueError if a value is out of range, or a law comes with other losses or an
     orthotropy.
+
+    >>> palm = Material(density=1000.0, shear_modulus=25e3, poisson=0.4999, viscosity=5.0)
+    >>> palm.shear_speed  # m/s
+    5.0
+    >>> round(abs(palm.complex_modulus(2 * np.pi * 140.0)))  # Pa
+    25384
     """
 
     density: float
@@ -137,8 +143,8 @@ class Material:
         check_numbers("a material", self, "viscosity", "loss_factor", least="0 or above")
         if self.loss_factor > LARGEST_LOSS_FACTOR:
             raise ValueError(
-                f"loss_factor = {self.loss_factor:g} is above {LARGEST_LOSS_FACTOR:g}, which is "
-                "more liquid than solid; give a viscosity instead"
+                f"loss_factor = {self.loss_factor:g} is above {LARGEST_LOSS_FACTOR:g}, more liquid "
+                "than solid; give a viscosity instead"
             )
         if not -1 < self.poisson < 0.5:
             raise ValueError(
@@ -147,23 +153,23 @@ class Material:
             )
         if self.law is not None and (self.viscosity or self.loss_factor or self.prony):
             raise ValueError(
-                "a material with a modulus law of its own has all losses in it; leave out "
-                "viscosity, loss_factor and prony"
+                "the modulus law of a material includes all its losses; leave out viscosity, "
+                "loss_factor and prony"
             )
         if self.law is not None and self.orthotropy is not None:
             raise ValueError(
-                "a modulus law is one of an isotropic material, and this one is orthotropic; give "
-                "it a viscosity, a loss_factor or Prony terms"
+                "an orthotropic material takes no modulus law; give it a viscosity, a loss_factor "
+                "or Prony terms"
             )
 
     @property
     def has_loss(self) -> bool:
-        """Whether the material dissipates energy; a law of its own is taken to."""
+        """Whether the material dissipates energy; assumed for a law of its own."""
         return self.law is not None or self.viscosity + self.loss_factor + self.fast_modulus > 0
 
     @property
     def fast_modulus(self) -> float:
-        """Sum of the moduli of all Prony terms, those of a law's series too, in Pa."""
+        """Sum of the moduli of all Prony terms in Pa, including those of the series of a law."""
         terms = self.prony if self.law is None else self.series().terms
         return sum((term.modulus for term in terms), 0.0)
 
@@ -178,7 +184,7 @@ class Material:
         return 2 * self.shear_modulus * self.poisson / (1 - 2 * self.poisson)
 
     def complex_modulus(self, omega: ArrayLike) -> Any:
-        """Complex shear modulus (...) in Pa of motion exp(+i w t) at w (...) in rad/s, which may be
+        """Complex shear modulus (...) in Pa for motion exp(+i w t) at w (...) in rad/s, real or
         complex.
         """
         omega = np.asarray(omega)
@@ -189,11 +195,11 @@ class Material:
         return lasting + solid.relaxing_modulus(omega)
 
     def relaxing_modulus(self, omega: ArrayLike) -> Any:
-        """The part (...) in Pa of the complex modulus that the given Prony terms add."""
+        """Part (...) in Pa of the complex modulus that the given Prony terms add."""
         return sum((term(omega) for term in self.prony), np.zeros((), np.complex128))
 
     def series(self, tolerance: float = FIT_TOLERANCE) -> PronySeries:
-        """Prony series of its modulus law; raises a ValueError if that is not passive or not
+        """Prony series of its modulus law; raises a ValueError if the law is not passive or not
         causal.
         """
         assert self.law is not None
@@ -202,7 +208,7 @@ class Material:
         return fit_prony(self.law, rest=self.shear_modulus, tolerance=tolerance)
 
     def relaxing(self, tolerance: float = FIT_TOLERANCE) -> Material:
-        """The material with a Prony series in place of its law or its loss factor."""
+        """Return the material with a Prony series in place of its law or its loss factor."""
         if self.law is None:
             return self.without_loss_factor()
         series = self.series(tolerance)
@@ -212,7 +218,7 @@ class Material:
         )  # fmt: skip
 
     def without_loss_factor(self) -> Material:
-        """The same material with its loss factor as Prony terms."""
+        """Return the same material with its loss factor as Prony terms."""
         if not self.loss_factor:
             return self
         factor = constant_loss(self.loss_factor)
@@ -224,7 +230,7 @@ class Material:
         )  # fmt: skip
 
     def scaled(self, *, modulus: float = 1.0, loss: float = 1.0) -> Material:
-        """The same law with all its moduli, or all its losses, multiplied by a factor."""
+        """Return the same law with all moduli, or all losses, multiplied by a factor."""
         both, law = modulus * loss, self.law
         if law is not None and hasattr(law, "scaled"):
             law = law.scaled(modulus=modulus, loss=loss)
@@ -239,7 +245,9 @@ class Material:
 
     @property
     def plane_stress(self) -> Floats:
-        """Stiffness Q (3, 3) in Pa at equilibrium in plane stress, for the strains xx, yy, 2 xy."""
+        """Stiffness Q (3, 3) in Pa at equilibrium in plane stress, for the strains xx, yy
+        and 2 xy.
+        """
         if self.orthotropy is not None:
             return self.orthotropy.plane_stress
         inner = self.young / (1 - self.poisson**2)
@@ -259,7 +267,7 @@ class Material:
     @property
     def rayleigh_speed(self) -> float:
         """Speed of surface waves without loss, m/s: the root below 1 of s^3 - 8 s^2 + (24 - 16 r) s
-        - 16 (1 - r) = 0, s the squared speed over that of shear waves.
+        - 16 (1 - r) = 0, with s the squared speed over that of shear waves.
         """
         ratio = self.shear_modulus / (self.first_lame + 2 * self.shear_modulus)
         roots = np.roots([1.0, -8.0, 24 - 16 * ratio, 16 * (ratio - 1)])
@@ -268,16 +276,10 @@ class Material:
 
 
 def from_young(*, young: float, poisson: float, **rest: Any) -> Material:
-    """Material by its Young's modulus.
+    """Return a material by its Young's modulus in Pa; the other values are those of `Material`.
 
-    Parameters
-    ----------
-    young : float, Pa
-    poisson, **rest : as of `Material`
-
-    Returns
-    -------
-    Material
+    >>> round(from_young(density=800, young=4e9, poisson=0.3).shear_modulus)
+    1538461538
     """
     return Material(shear_modulus=young / (2 * (1 + poisson)), poisson=poisson, **rest)
 
@@ -286,7 +288,7 @@ def orthotropic(
     *, density: float, young_x: float, young_y: float, poisson_xy: float,
     shear_xy: float | None = None, **losses: Any,
 ) -> Material:  # fmt: skip
-    """Material of a sheet by its moduli along x and y; its losses are the same in all directions.
+    """Return the material of a sheet by its moduli along x and y; its losses are isotropic.
 
     Parameters
     ----------
@@ -306,17 +308,10 @@ def orthotropic(
 
 
 def of_law(*, density: float, poisson: float, law: Any) -> Material:
-    """Material by a modulus law, whose modulus at rest it has.
+    """Return a material by its density in kg/m3, Poisson's ratio and modulus law.
 
-    Parameters
-    ----------
-    density : float, kg/m3
-    poisson : float
-    law : `FractionalKelvinVoigt`, `FractionalZener` or `ModulusTable`
-
-    Returns
-    -------
-    Material
+    The law is a `FractionalKelvinVoigt`, `FractionalZener` or `ModulusTable`, whose modulus at rest
+    becomes that of the material.
     """
     return Material(density=density, shear_modulus=law.shear_modulus, poisson=poisson, law=law)
 
@@ -324,7 +319,7 @@ def of_law(*, density: float, poisson: float, law: Any) -> Material:
 def tabulated(
     *, density: float, poisson: float, frequencies: ArrayLike, moduli: ArrayLike
 ) -> Material:
-    """Material by measured complex shear moduli.
+    """Return a material by measured complex shear moduli.
 
     Parameters
     ----------
@@ -335,9 +330,12 @@ def tabulated(
 
     Returns
     -------
-    Material, whose modulus at rest is that at 0 Hz or that of the table's Prony series
+    Material, whose modulus at rest is that at 0 Hz or that of the Prony series of the table
 
-    Raises a ValueError as `ModulusTable` does.
+    Raises
+    ------
+    ValueError
+        As `ModulusTable` does.
     """
     f, mu = np.asarray(frequencies, np.float64), np.asarray(moduli, np.complex128)
     table = ModulusTable(frequencies=tuple(f.tolist()), moduli=tuple(mu.tolist()))
@@ -352,8 +350,8 @@ def _tissue(shear: float, loss: float = 2e-4) -> Material:
 FOREARM_LOSS = 5e-4  # s
 
 PRESETS: Mapping[str, Material] = {
-    # Effective homogeneous half-spaces: Zhang et al., Med Eng Phys 33:31 (2011), forearm; the
-    # palms bracket the 5-8 m/s at which a moving focus is perceived as strongest.
+    # Effective homogeneous half-spaces. The forearm is that of Zhang et al., Med Eng Phys 33:31
+    # (2011); the palms bracket the 5-8 m/s at which a moving focus feels strongest.
     "forearm": Material(density=1000, shear_modulus=7.86e3, poisson=0.4999, viscosity=5.03),
     "palm": Material(density=1000, shear_modulus=25e3, poisson=0.4999, viscosity=5.0),
     "palm-stiff": Material(density=1000, shear_modulus=50e3, poisson=0.4999, viscosity=10.0),
@@ -399,5 +397,5 @@ PRESETS: Mapping[str, Material] = {
         density=800, young_x=5.5e9, young_y=2.5e9, poisson_xy=0.35, loss_factor=0.03
     ),
 }  # fmt: skip
-# Those whose motion no skin has: thresholds of detection are not theirs.
+# Detection thresholds do not apply to these materials.
 NOT_SKIN = ("ecoflex", "bone", "paper", "paper-grain")

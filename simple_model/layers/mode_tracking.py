@@ -1,4 +1,4 @@
-"""Modes followed along frequency: which root at a frequency continues which one at the last."""
+"""Modes followed along frequency: matching of roots at neighbouring frequencies."""
 
 from dataclasses import dataclass, fields
 
@@ -6,25 +6,25 @@ import numpy as np
 
 from simple_model.typing import Bools, Complex, Floats, Ints
 
-LONGEST_GAP = 3  # frequencies at which a mode is not found: about where it begins to leak
-UNLIKE = 0.3  # misfit of two roots that are not of one mode
-SURE, RIVAL = 0.06, 0.15  # misfit of two roots that are surely of one; of others with either
+LONGEST_GAP = 3  # frequencies without a root, near which a mode may begin to leak
+UNLIKE = 0.3  # misfit of two roots of different modes
+SURE, RIVAL = 0.06, 0.15  # largest misfit of a safe match; least misfit of its rivals
 NARROW = 1.05  # ratio of two frequencies between which no mode is lost
-ROUND_OFF = 1e-9  # of a wavenumber: a smaller imaginary part of it is none
+ROUND_OFF = 1e-9  # of a wavenumber: smaller imaginary parts are 0
 SHAPE_WEIGHT = 0.1  # of unlike shapes in the misfit
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Found:
-    """Roots of a body at frequencies (f,), m of each.
+class Roots:
+    """Roots of a body, m at each of the frequencies (f,).
 
     Parameters
     ----------
-    squared : (f, m) complex, 1/m2, of the wavenumbers
+    squared : (f, m) complex, 1/m2, squared wavenumbers
     slope : (f, m) complex, s/m2, their derivative by the angular frequency
     wavenumbers : (f, m) complex, 1/m, with Im k <= 0
-    residues : (f, m) complex, 1/Pa/m, of the surface's compliance in k^2
-    energy_speed : (f, m) float, m/s, of the energy of a mode, inf where not known
+    residues : (f, m) complex, 1/Pa/m, of the surface compliance in k^2
+    energy_speed : (f, m) float, m/s, of the energy of a mode, inf if unknown
     shapes : (f, m, d, 2) complex
     """
 
@@ -36,18 +36,12 @@ class Found:
     shapes: Complex
 
 
-def tracked(found: Found, omega: Floats, most: int, kept: Ints) -> Found:
-    """Roots with one mode in each column, NaN where it is not found.
+def track_modes(found: Roots, omega: Floats, most: int, kept: Ints) -> Roots:
+    """Sort roots at (f,) rad/s into modes, one in each column, NaN where a mode has no root.
 
     A root continues another if the trapezoidal rule of k^2, whose derivative is known, leads from
-    it to the other, and if their shapes are alike.
-
-    Parameters
-    ----------
-    found : Found, in any order at each frequency
-    omega : (f,) float, rad/s
-    most : how many modes are kept, the least evanescent anywhere, of these the slowest
-    kept : (g,) int, the frequencies at which the modes are returned
+    one to the other, and if their shapes are alike. Of all modes it returns at most `most`, the
+    least evanescent anywhere, of these the slowest, at the frequencies of indices `kept` (g,).
     """
     from scipy.optimize import linear_sum_assignment  # which takes long to import
 
@@ -58,7 +52,7 @@ def tracked(found: Found, omega: Floats, most: int, kept: Ints) -> Found:
         seen = np.where(index >= 0, np.arange(count)[:, None], -1).max(axis=0, initial=-1)
         alive = np.flatnonzero(f - seen <= 1 + LONGEST_GAP)
         roots = index[seen[alive], alive]
-        # Pairs that are none cost alike, or they would break up others.
+        # Equal costs of unlike pairs keep them from breaking up good ones.
         costs = np.minimum(_misfit(found, omega, (seen[alive], roots), (f, known)), UNLIKE)
         pairs = [(alive[i], known[j]) for i, j in zip(*linear_sum_assignment(costs), strict=True)
                  if costs[i, j] < UNLIKE]  # fmt: skip
@@ -70,7 +64,7 @@ def tracked(found: Found, omega: Floats, most: int, kept: Ints) -> Found:
         index = np.hstack([index, begun])
     index = index[kept]
     index = index[:, (index >= 0).any(axis=0)]
-    found = Found(**{each.name: getattr(found, each.name)[kept] for each in fields(found)})
+    found = Roots(**{each.name: getattr(found, each.name)[kept] for each in fields(found)})
     decay = np.abs(found.wavenumbers.imag)
     decay = np.where(decay > ROUND_OFF * np.abs(found.wavenumbers), decay, 0.0)
     least = np.where(index >= 0, _at(decay, index), np.inf).min(axis=0)
@@ -84,12 +78,12 @@ def tracked(found: Found, omega: Floats, most: int, kept: Ints) -> Found:
         missing = (index < 0).reshape(index.shape + (1,) * (values.ndim - 2))
         none = complex(np.nan, np.nan) if np.iscomplexobj(values) else np.nan
         picked[field.name] = np.where(missing, none, values)
-    return Found(**picked)
+    return Roots(**picked)
 
 
-def between(found: Found, omega: Floats, waves: Bools, most: int) -> Floats:
-    """Frequencies (g,) in rad/s in the middle of gaps across which modes are not surely followed;
-    `waves` (f, m) says whether a root is a wave.
+def frequencies_between(found: Roots, omega: Floats, waves: Bools, most: int) -> Floats:
+    """Frequencies (g,) in rad/s at the middle of gaps across which modes cannot be followed safely;
+    `waves` (f, m) marks roots that are waves.
     """
     from scipy.optimize import linear_sum_assignment  # which takes long to import
 
@@ -113,24 +107,26 @@ def between(found: Found, omega: Floats, waves: Bools, most: int) -> Floats:
     return np.array(further)
 
 
-def merged(found: Found, omega: Floats, other: Found, further: Floats) -> tuple[Found, Floats]:
-    """Roots at two sets (f,) and (g,) of frequencies in rad/s together, and these, ascending."""
+def merge_roots(found: Roots, omega: Floats, other: Roots, further: Floats) -> tuple[Roots, Floats]:
+    """Merge roots at two sets (f,) and (g,) of frequencies in rad/s; return them and the
+    frequencies.
+    """
     both = np.concatenate([omega, further])
     order = np.argsort(both)
     pairs = ((each.name, getattr(found, each.name), getattr(other, each.name))
              for each in fields(found))  # fmt: skip
-    return Found(**{name: np.concatenate(pair)[order] for name, *pair in pairs}), both[order]
+    return Roots(**{name: np.concatenate(pair)[order] for name, *pair in pairs}), both[order]
 
 
 def _at(values: Complex | Floats, index: np.ndarray) -> np.ndarray:
-    """Values (f, n, ...) of the roots (f, m, ...) of these indices (f, n)."""
+    """Values (f, n, ...) of the roots (f, m, ...) at indices (f, n)."""
     return np.asarray(values[np.arange(len(index))[:, None], index])
 
 
 def _misfit(
-    found: Found, omega: Floats, before: tuple[Ints, Ints], after: tuple[int, Ints]
+    found: Roots, omega: Floats, before: tuple[Ints, Ints], after: tuple[int, Ints]
 ) -> Floats:
-    """Misfit (n, m) of the roots at n places (f, m) before with m roots at a later frequency."""
+    """Misfit (n, m) of the roots at n places (f, m) with m roots at a later frequency."""
     (f, m), (g, roots) = before, after
     start, end = found.squared[f, m][:, None], found.squared[g, roots]
     rise, later = found.slope[f, m][:, None], found.slope[g, roots]

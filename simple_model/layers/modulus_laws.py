@@ -1,9 +1,8 @@
-"""Modulus laws: complex shear moduli of solids that are no sum of Maxwell branches.
+"""Modulus laws: complex shear moduli of solids that are not a sum of Maxwell branches.
 
-Each is a function of the angular frequency w in rad/s, in Pa (time exp(+i w t)), with the
-`shear_modulus` that it has at rest; a Prony series stands in for it where internal variables are
-needed. Powers are principal values: at w with imaginary part <= 0, i w has a real part >= 0 and
-crosses no branch cut.
+Each is a function of the angular frequency w in rad/s, in Pa (time exp(+i w t)), with a
+`shear_modulus` at rest. A Prony series replaces it where internal variables are needed. Powers are
+principal values: for Im w <= 0, i w has a real part >= 0 and crosses no branch cut.
 """
 
 from __future__ import annotations
@@ -22,14 +21,14 @@ from simple_model.layers.prony import ModulusLaw, PronySeries, check_passive, fi
 from simple_model.typing import Complex, Floats
 
 COLUMNS = ("frequency_hz", "storage_pa", "loss_pa")
-MOST_ROWS, FITTED_ROWS = 10_000, 300  # of a table, and about how many of them are fitted
+MOST_ROWS, FITTED_ROWS = 10_000, 300  # of a table, and about as many that are fitted
 LOWEST, HIGHEST = 1e-3, 1e6  # Hz, of a table
-TABLE_TOLERANCE = 0.005  # relative deviation of the series of a table, if its noise is less
+TABLE_TOLERANCE = 0.005  # relative deviation of the series of a table without noise
 
 
 @dataclass(frozen=True, kw_only=True)
 class FractionalKelvinVoigt:
-    """Fractional Kelvin-Voigt solid: mu (1 + (i w tau)^n), a spring beside a springpot.
+    """Fractional Kelvin-Voigt solid: mu (1 + (i w tau)^n), a spring in parallel with a springpot.
 
     Bagley and Torvik, J Rheol 27:201 (1983); Mainardi, Fractional Calculus and Waves in Linear
     Viscoelasticity (2010), chapter 3. With n = 1 it is the Kelvin-Voigt solid of viscosity mu tau.
@@ -39,6 +38,10 @@ class FractionalKelvinVoigt:
     shear_modulus : float, Pa, above 0, at rest
     exponent : float, n, above 0 and at most 1
     time : float, tau in s, 0 or above
+
+    >>> law = FractionalKelvinVoigt(shear_modulus=25e3, exponent=0.33, time=0.3e-3)
+    >>> round(abs(law(2 * np.pi * 140.0)))  # Pa
+    39799
     """
 
     shear_modulus: float
@@ -58,7 +61,9 @@ class FractionalKelvinVoigt:
         return f"fractional Kelvin-Voigt of exponent {self.exponent:g}, time {1e3 * self.time:g} ms"
 
     def scaled(self, *, modulus: float = 1.0, loss: float = 1.0) -> FractionalKelvinVoigt:
-        """The law with its modulus multiplied by a factor, and its springpot by another too."""
+        """Return the law with its modulus multiplied by a factor, and its springpot by
+        another too.
+        """
         time = self.time * loss ** (1 / self.exponent)
         return replace(self, shear_modulus=modulus * self.shear_modulus, time=time)
 
@@ -87,13 +92,13 @@ class FractionalZener:
         if not (isfinite(self.fast_modulus) and self.fast_modulus >= self.shear_modulus):
             raise ValueError(
                 f"fast_modulus = {self.fast_modulus} Pa must be finite and at least the "
-                f"shear_modulus at rest, {self.shear_modulus:g} Pa: solids stiffen in fast motion"
+                f"shear_modulus at rest, {self.shear_modulus:g} Pa"
             )
 
     def __call__(self, omega: ArrayLike) -> Any:
         """Complex modulus (...) in Pa at angular frequencies (...) in rad/s."""
-        turned = _power(omega, self.time, self.exponent)
-        return self.shear_modulus + (self.fast_modulus - self.shear_modulus) * turned / (1 + turned)
+        power = _power(omega, self.time, self.exponent)
+        return self.shear_modulus + (self.fast_modulus - self.shear_modulus) * power / (1 + power)
 
     @property
     def words(self) -> str:
@@ -104,15 +109,15 @@ class FractionalZener:
         )
 
     def scaled(self, *, modulus: float = 1.0, loss: float = 1.0) -> FractionalZener:
-        """The law with all its moduli, or what relaxes of them, multiplied by a factor."""
+        """Return the law with all moduli, or their relaxing part, multiplied by a factor."""
         rest, fast = modulus * self.shear_modulus, self.fast_modulus - self.shear_modulus
         return replace(self, shear_modulus=rest, fast_modulus=rest + modulus * loss * fast)
 
 
 def _power(omega: ArrayLike, time: float, exponent: float) -> Any:
     """(i w tau)^n, exactly i w tau if n = 1."""
-    turned = 1j * np.asarray(omega) * time
-    return turned if exponent == 1 else turned**exponent
+    power = 1j * np.asarray(omega) * time
+    return power if exponent == 1 else power**exponent
 
 
 def _check(law: FractionalKelvinVoigt | FractionalZener) -> None:
@@ -120,7 +125,7 @@ def _check(law: FractionalKelvinVoigt | FractionalZener) -> None:
     check_numbers("a modulus law", law, "time", least="0 or above")
     if not 0 < law.exponent <= 1:
         raise ValueError(
-            f"exponent = {law.exponent} is outside 0 < exponent <= 1, from a spring to a dashpot"
+            f"exponent = {law.exponent} must be above 0 (a spring) and at most 1 (a dashpot)"
         )
 
 
@@ -128,14 +133,15 @@ def _check(law: FractionalKelvinVoigt | FractionalZener) -> None:
 class ModulusTable:
     """Measured complex shear moduli, linear between their frequencies; a modulus law.
 
-    Beyond them, and at complex frequencies, the modulus is that of the table's causal Prony series.
+    Outside their band, and at complex frequencies, the modulus is that of a causal Prony series of
+    the table.
 
     Parameters
     ----------
     frequencies : (k,) Hz, ascending and above 0; the first may be 0, with a loss modulus of 0
     moduli : (k,) complex, Pa, with real parts above 0 and imaginary parts of 0 or above
 
-    Raises a ValueError if these are not those of a passive, causal solid.
+    Raises a ValueError if they are not those of a passive, causal solid.
     """
 
     frequencies: tuple[float, ...]
@@ -146,17 +152,17 @@ class ModulusTable:
         f, mu = self._arrays
         if f.shape != mu.shape or f.ndim != 1 or not (f > 0).any() or len(f) > MOST_ROWS:
             raise ValueError(
-                f"a table of complex moduli has {len(f)} frequencies and {len(mu)} moduli; give as "
-                f"many of each, at least one above 0 Hz, and at most {MOST_ROWS}"
+                f"a table of complex moduli has {len(f)} frequencies and {len(mu)} moduli; give "
+                f"one modulus for each frequency, at least one above 0 Hz, at most {MOST_ROWS}"
             )
         _check_frequencies(f)
         check_passive(f, mu)
         if f[0] == 0 and mu[0].imag:
             raise ValueError(
-                f"loss modulus is {mu[0].imag:g} Pa at 0 Hz, at rest, and must be 0 there; leave "
-                "out the row, or its loss"
+                f"loss modulus is {mu[0].imag:g} Pa at 0 Hz and must be 0 there; set it to 0, or "
+                "remove the row"
             )
-        _ = self.series  # refuses what is not causal
+        _ = self.series  # refuses moduli that are not causal
 
     @property
     def _arrays(self) -> tuple[Floats, Complex]:
@@ -164,7 +170,7 @@ class ModulusTable:
 
     @property
     def series(self) -> PronySeries:
-        """Prony series over all of the table."""
+        """Prony series over the whole table."""
         return _series(self)
 
     @property
@@ -175,7 +181,7 @@ class ModulusTable:
 
     @property
     def shear_modulus(self) -> float:
-        """Modulus in Pa at rest: that at 0 Hz or, without one, of the series."""
+        """Modulus in Pa at rest: at 0 Hz or, without this row, that of the series."""
         return self.series.shear_modulus
 
     def between(self, omega: Any) -> Complex:
@@ -194,20 +200,23 @@ class ModulusTable:
         return np.where(measured, self.between(w), self.series(w))
 
     def scaled(self, *, modulus: float = 1.0, loss: float = 1.0) -> ModulusTable:
-        """The table with all its moduli, or its loss moduli, multiplied by a factor."""
+        """Return the table with all moduli, or all loss moduli, multiplied by a factor."""
         moduli = tuple(modulus * complex(mu.real, loss * mu.imag) for mu in self.moduli)
         return replace(self, moduli=moduli)
 
 
 def _check_frequencies(f: Floats) -> None:
     outside = ((f < LOWEST) | (f > HIGHEST)) & ~((f == 0) & (np.arange(len(f)) == 0))
-    for wrong, said in (
-        (outside, f"which is outside {LOWEST:g}..{HIGHEST:g} Hz; only the first may be 0"),
-        (np.diff(f, prepend=-1.0) <= 0, "which does not rise; give each frequency once, rising"),
+    for wrong, problem in (
+        (outside, f"which is outside {LOWEST:g} to {HIGHEST:g} Hz; only the first may be 0"),
+        (
+            np.diff(f, prepend=-1.0) <= 0,
+            "which does not rise; give frequencies in ascending order",
+        ),
     ):
         if wrong.any():
             raise ValueError(
-                f"a table of complex moduli has the frequency {f[wrong.argmax()]:g} Hz, {said}"
+                f"a table of complex moduli has the frequency {f[wrong.argmax()]:g} Hz, {problem}"
             )
 
 
@@ -227,7 +236,7 @@ def _series(table: ModulusTable) -> PronySeries:
 
 @dataclass(frozen=True, kw_only=True)
 class ScaledLaw:
-    """A function's modulus law with its storage and loss moduli multiplied by factors."""
+    """A modulus law given as a function, with storage and loss moduli multiplied by factors."""
 
     law: ModulusLaw
     modulus: float
@@ -246,22 +255,23 @@ MODULUS_LAWS: Mapping[str, type[FractionalKelvinVoigt] | type[FractionalZener]] 
 
 
 def modulus_table(text: str) -> ModulusTable:
-    """Table of complex shear moduli from CSV with the columns frequency_hz, storage_pa and loss_pa,
-    columns and rows in any order; lines that begin with # are left out.
+    """Read a table of complex shear moduli from CSV with the columns frequency_hz, storage_pa and
+    loss_pa.
 
-    Raises a ValueError if a column is missing, an entry is no number, or as `ModulusTable` does.
+    Columns and rows may be in any order; lines that begin with # are comments. Raises a ValueError
+    if a column is missing, an entry is not a number, or as `ModulusTable` does.
     """
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     header, *rows = [[cell.strip() for cell in line.split(",")] for line in lines] or [[]]
     if missing := [name for name in COLUMNS if name not in header]:
         raise ValueError(
-            f"the table of complex moduli lacks the column {missing[0]}; its first line must name "
-            f"{', '.join(COLUMNS)}"
+            f"the table of complex moduli has no column {missing[0]}; name the columns "
+            f"{', '.join(COLUMNS)} in its first line"
         )
     places = [header.index(name) for name in COLUMNS]
-    found = np.array(sorted(_row(row, places) for row in rows)).reshape(-1, 3)
-    moduli = found[:, 1] + 1j * found[:, 2]
-    return ModulusTable(frequencies=tuple(found[:, 0].tolist()), moduli=tuple(moduli.tolist()))
+    values = np.array(sorted(_row(row, places) for row in rows)).reshape(-1, 3)
+    moduli = values[:, 1] + 1j * values[:, 2]
+    return ModulusTable(frequencies=tuple(values[:, 0].tolist()), moduli=tuple(moduli.tolist()))
 
 
 def _row(row: list[str], places: list[int]) -> list[float]:

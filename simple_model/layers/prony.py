@@ -3,11 +3,11 @@
     mu(w) = mu + i w viscosity + sum_j mu_j i w tau_j / (1 + i w tau_j)     (time exp(+i w t))
 
 A generalised Maxwell solid (Simo and Hughes, Computational Inelasticity (1998), chapter 10). With
-all terms 0 or above it is passive and causal whatever they are, and every solid whose relaxation
-modulus is completely monotonic is the limit of such sums (Bernstein's theorem; Gross, Mathematical
-Structure of the Theories of Viscoelasticity (1953)). The fit is linear in the moduli at given,
-log-spaced times: non-negative least squares of the relative deviation (Lawson and Hanson, Solving
-Least Squares Problems (1974), chapter 23).
+all terms 0 or above it is passive and causal. Every solid whose relaxation modulus is completely
+monotonic is the limit of such sums (Bernstein's theorem; Gross, Mathematical Structure of the
+Theories of Viscoelasticity (1953)). The fit is linear in the moduli at given, log-spaced times:
+non-negative least squares of the relative deviation (Lawson and Hanson, Solving Least Squares
+Problems (1974), chapter 23).
 """
 
 from __future__ import annotations
@@ -26,25 +26,24 @@ from simple_model.typing import Complex, Floats
 
 ModulusLaw = Callable[[Any], Any]  # complex shear modulus in Pa at angular frequencies in rad/s
 
-BAND = (1.0, 2000.0)  # Hz: lines of loads, and the modes of bodies that they excite
-FIT_TOLERANCE = 0.005  # relative deviation that a series may have; near resonances motion has more
+BAND = (1.0, 2000.0)  # Hz: lines of loads, and modes that they excite
+FIT_TOLERANCE = 0.005  # relative deviation of a series; motion near resonances deviates more
 MOST_TERMS = 16
-PER_DECADE = 40  # frequencies at which a law is looked at
-BEYOND = (0.5, 1.0, 2.0, 4.0, 8.0)  # times that a series may reach beyond either end of a band
-FAR_BELOW = 1e3  # times the slowest period over 2 pi: the time of a term that is at rest in a band
-NO_BETTER = 1.1  # times the least deviation, with which fewer terms are taken where data are noisy
-LEAST_MODULUS = 1e-3  # at rest, of the first modulus, where a law does not say
+PER_DECADE = 40  # frequencies at which a law is evaluated
+BEYOND = (0.5, 1.0, 2.0, 4.0, 8.0)  # factors by which times extend beyond the ends of a band
+FAR_BELOW = 1e3  # times the slowest period over 2 pi: time of a term below the band
+NO_BETTER = 1.1  # times the least deviation, accepted for fewer terms if data are noisy
+LEAST_MODULUS = 1e-3  # of the first modulus: least modulus at rest of a law without one
 LEAST_LOSS = -1e-9  # of the modulus: round-off of a law without loss
-# Measured moduli are some per cent off, at random in storage and loss alike, and then so far from
-# every causal law (5 % in both parts: 7 %); a hysteretic loss factor of 0.2 is by 10 %, of 0.3 by
-# 15 %. A limit on the root mean square and not on the largest lets single outliers pass, which a
-# warning gives the size of.
+# Measured moduli with random errors of 5 % in both parts are 7 % from every causal law; a
+# hysteretic loss factor of 0.2 is 10 % away, of 0.3 15 %. The limit applies to the root mean
+# square, so single outliers pass; a warning states their size.
 CAUSAL = 0.10
 
 
-REFERENCE = 150.0  # Hz, where the storage modulus is the one that is given
+REFERENCE = 150.0  # Hz, where the storage modulus is the given one
 LOSS_BAND = (10.0, 2000.0)  # Hz, where the loss factor is nearly constant
-SLOWEST, FASTEST, LOSS_TERMS = 8.0, 1600.0, 4  # Hz: 1 / (2 pi time); best for loss factors up to 2
+SLOWEST, FASTEST, LOSS_TERMS = 8.0, 1600.0, 4  # Hz, 1 / (2 pi time): best for losses up to 2
 LARGEST_LOSS_FACTOR = 10.0
 LOSS_FREQUENCIES = 93  # at which the series is fitted
 
@@ -53,6 +52,9 @@ LOSS_FREQUENCIES = 93  # at which the series is fitted
 class PronyTerm:
     """Prony term, a Maxwell branch in parallel with the rest: `modulus` in Pa, 0 or above, and
     relaxation `time` in s, above 0; otherwise a ValueError.
+
+    >>> complex(PronyTerm(modulus=10e3, time=1e-3)(1000.0))  # Pa, at the peak of its loss
+    (5000+5000j)
     """
 
     modulus: float
@@ -64,8 +66,8 @@ class PronyTerm:
 
     def __call__(self, omega: ArrayLike) -> Any:
         """Complex modulus (...) in Pa at angular frequencies (...) in rad/s."""
-        turned = 1j * np.asarray(omega) * self.time
-        return self.modulus * turned / (1 + turned)
+        phase = 1j * np.asarray(omega) * self.time
+        return self.modulus * phase / (1 + phase)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,19 +83,19 @@ class PronySeries:
     band: tuple[float, float]
 
     def __call__(self, omega: ArrayLike) -> Any:
-        """Complex modulus (...) in Pa at angular frequencies (...) in rad/s, complex ones too."""
+        """Complex modulus (...) in Pa at angular frequencies (...) in rad/s, real or complex."""
         lasting = self.shear_modulus + 1j * np.asarray(omega) * self.viscosity
         return sum((term(omega) for term in self.terms), lasting)
 
     def scaled(self, factor: float) -> PronySeries:
-        """The series with all its moduli multiplied by a factor."""
+        """Return the series with all moduli multiplied by a factor."""
         terms = tuple(replace(term, modulus=factor * term.modulus) for term in self.terms)
         shear, viscosity = factor * self.shear_modulus, factor * self.viscosity
         return replace(self, shear_modulus=shear, viscosity=viscosity, terms=terms)
 
     @property
     def words(self) -> str:
-        """Terms, error and band, as in a plan."""
+        """Terms, error and band, as plans show them."""
         return (
             f"Prony series of {plural(len(self.terms), 'term')}, {100 * self.error:.2g} % from "
             f"the law between {self.band[0]:g} and {self.band[1]:g} Hz"
@@ -109,28 +111,32 @@ def fit_prony(
     frequencies: tuple[float, ...] = (),
     tolerance: float = FIT_TOLERANCE,
 ) -> PronySeries:
-    """Prony series of the fewest terms that is within a tolerance of a modulus law over a band.
+    """Fit the Prony series with the fewest terms that is within a tolerance of a modulus law over a
+    band.
 
     Parameters
     ----------
     law : angular frequencies (...) in rad/s -> complex shear moduli (...) in Pa
     band : lowest and highest frequency in Hz
     rest : float, Pa, the modulus at rest; fitted if not given
-    frequencies : Hz, within the band, that are looked at beside log-spaced ones
+    frequencies : Hz, within the band, that are fitted in addition to log-spaced ones
     tolerance : float, largest relative deviation |series - law| / |law|
 
     Returns
     -------
-    PronySeries; of a noisy law the shortest that is about as near as any
+    PronySeries; for a noisy law the shortest that is almost as near as any
 
-    Raises a ValueError if the law is not passive or not causal in the band.
+    Raises
+    ------
+    ValueError
+        If the law is not passive or not causal in the band.
     """
     count = 2 + round(PER_DECADE * np.log10(band[1] / band[0]))
     f = np.unique([*np.geomspace(*band, count), *(x for x in frequencies if x > 0)])
     w = 2 * np.pi * f
     mu = np.asarray(np.broadcast_to(law(w), w.shape), np.complex128)
     check_modulus(f, mu)
-    found: list[PronySeries] = []
+    candidates: list[PronySeries] = []
     ends = [(w[0] / slow, w[-1] * fast) for slow in BEYOND for fast in BEYOND]
     # A law may relax far below the band, as fractional ones of small exponents do.
     for further in ([], [FAR_BELOW / w[0]]) if rest else ([],):
@@ -139,16 +145,16 @@ def fit_prony(
                 fitted_series(w, mu, np.append(1 / np.geomspace(*end, n), further), rest, band)
                 for end in ends[: None if n else 1]
             ]
-            found.append(min(fits, key=lambda series: series.error))
-            if found[-1].error <= tolerance:
-                return found[-1]
-    enough = NO_BETTER * min(series.error for series in found)
-    return next(series for series in found if series.error <= enough)
+            candidates.append(min(fits, key=lambda series: series.error))
+            if candidates[-1].error <= tolerance:
+                return candidates[-1]
+    enough = NO_BETTER * min(series.error for series in candidates)
+    return next(series for series in candidates if series.error <= enough)
 
 
 def check_modulus(frequencies: Floats, moduli: Complex) -> None:
-    """Refuse complex moduli (f,) in Pa at frequencies (f,) in Hz, ascending and above 0, that no
-    passive, causal solid has. Causal: near some series of non-negative terms (`CAUSAL`).
+    """Refuse complex moduli (f,) in Pa at ascending frequencies (f,) in Hz that are not those of a
+    passive, causal solid. Causal moduli are near some series of non-negative terms (`CAUSAL`).
     """
     check_passive(frequencies, moduli)
     w = 2 * np.pi * frequencies
@@ -157,40 +163,41 @@ def check_modulus(frequencies: Floats, moduli: Complex) -> None:
     mean, worst = float(np.sqrt(np.mean(away**2))), int(away.argmax())
     if mean > CAUSAL:
         raise ValueError(
-            f"the complex modulus is not causal: every relaxing solid is {100 * mean:.0f} % away "
-            f"from it (root mean square, the limit is {100 * CAUSAL:g} %), at "
-            f"{frequencies[worst]:.3g} Hz {100 * away[worst]:.0f} %; a loss modulus comes with a "
-            "storage modulus that rises where it is large: check both, or give a loss_factor"
+            f"the complex modulus is not causal: it differs by {100 * mean:.0f} % from the nearest "
+            f"relaxing solid (root mean square, the limit is {100 * CAUSAL:g} %), at "
+            f"{frequencies[worst]:.3g} Hz by {100 * away[worst]:.0f} %; where the loss modulus is "
+            "large, the storage modulus must rise: check both, or give a loss_factor"
         )
 
 
 def check_passive(frequencies: Floats, moduli: Complex) -> None:
-    """Refuse complex moduli (f,) in Pa at frequencies (f,) in Hz that no passive solid has."""
+    """Refuse complex moduli (f,) in Pa at frequencies (f,) in Hz of a solid that is not passive."""
     limits = (
         (~np.isfinite(moduli), "modulus", np.real, "must be finite"),
         (moduli.real <= 0, "storage modulus", np.real, "must be above 0"),
-        (moduli.imag < LEAST_LOSS * np.abs(moduli), "loss modulus", np.imag, "must be 0 or above: "
-         "a passive solid takes energy up in every cycle"),
+        (moduli.imag < LEAST_LOSS * np.abs(moduli), "loss modulus", np.imag, "must be 0 or above, "
+         "because a passive solid absorbs energy"),
     )  # fmt: skip
-    for wrong, name, part, said in limits:
+    for wrong, name, part, condition in limits:
         if wrong.any():
             k = int(np.argmax(wrong))
             raise ValueError(
-                f"{name} is {part(moduli[k]):.4g} Pa at {frequencies[k]:.4g} Hz and {said}; check "
-                "its sign and unit"
+                f"{name} is {part(moduli[k]):.4g} Pa at {frequencies[k]:.4g} Hz and {condition}; "
+                "check its sign and unit"
             )
 
 
 def fitted_series(
     w: Floats, mu: Complex, times: Floats, rest: float | None, band: tuple[float, float]
 ) -> PronySeries:
-    """Prony series of times (n,) in s by non-negative least squares of the relative deviation from
-    moduli (f,) in Pa at w (f,) in rad/s; the modulus at rest in Pa is fitted if it is None.
+    """Fit a Prony series of times (n,) in s to moduli (f,) in Pa at w (f,) in rad/s, by
+    non-negative least squares of the relative deviation. The modulus at rest in Pa is fitted if it
+    is None.
     """
     from scipy.optimize import nnls  # which takes long to import
 
-    turned = 1j * w[:, None] * times
-    columns = np.hstack([np.ones((len(w), 1)), 1j * w[:, None], turned / (1 + turned)])
+    phase = 1j * w[:, None] * times
+    columns = np.hstack([np.ones((len(w), 1)), 1j * w[:, None], phase / (1 + phase)])
     lasting = rest or LEAST_MODULUS * abs(mu[0])
     A, b = columns / np.abs(mu)[:, None], (mu - lasting) / np.abs(mu)
     A[:, 0] *= rest is None
@@ -211,7 +218,8 @@ def fitted_series(
 
 @lru_cache(maxsize=1024)
 def constant_loss(loss_factor: float) -> PronySeries:
-    """Modulus of a nearly constant loss factor above 0, over the storage modulus at `REFERENCE`.
+    """Return the modulus of a nearly constant loss factor above 0, relative to the storage modulus
+    at `REFERENCE`.
 
     A modulus mu (1 + i eta) with one eta at all frequencies is not causal. The solid of constant
     loss factor eta has the modulus
@@ -219,11 +227,11 @@ def constant_loss(loss_factor: float) -> PronySeries:
         mu(w) = mu (i w / w_0)^a / cos(pi a / 2),   a = (2 / pi) atan(eta)
 
     (Kjartansson, J Geophys Res 84:4737 (1979), doi 10.1029/JB084iB09p04737), which is 0 at rest. A
-    few Maxwell branches with log-spaced times have the same modulus over a band, and a modulus at
-    rest (Emmerich and Korn, Geophysics 52:1252 (1987), doi 10.1190/1.1442386). They define a loss
-    factor here, in every model: it is eta within 2.5 % over `LOSS_BAND` up to eta = 2, within 10 %
-    beyond, half of it at 3 Hz, and 0 at rest, where the modulus is 0.92, 0.76 and 0.35 mu for eta =
-    0.03, 0.1 and 0.4.
+    few Maxwell branches with log-spaced times approximate it over a band and have a modulus at rest
+    (Emmerich and Korn, Geophysics 52:1252 (1987), doi 10.1190/1.1442386). They define the loss
+    factor in every model: eta within 2.5 % over `LOSS_BAND` up to eta = 2, within 10 % beyond, half
+    of it at 3 Hz, and 0 at rest, where the modulus is 0.92, 0.76 and 0.35 mu for eta = 0.03, 0.1
+    and 0.4.
     """
     w, w_0 = 2 * np.pi * np.geomspace(*LOSS_BAND, LOSS_FREQUENCIES), 2 * np.pi * REFERENCE
     power = 2 / np.pi * np.arctan(loss_factor)

@@ -1,4 +1,4 @@
-"""Stack of flat isotropic layers: what wavenumber integrals and dispersion curves are asked of."""
+"""Stack of flat isotropic layers, for wavenumber integrals and dispersion curves."""
 
 from dataclasses import dataclass
 from math import inf
@@ -17,11 +17,15 @@ class Stack:
     ----------
     materials : of each layer
     thicknesses : metre, of each layer, above 0; the last may be inf, a half-space
-    base : below the last layer unless it is a half-space: "clamped", "free" or "elastic", a Winkler
-        foundation
+    base : below the last layer if it is finite: "clamped", "free" or "elastic" (Winkler foundation)
     base_stiffness : N/m3, traction per displacement of an elastic base, in every direction
 
     Raises a ValueError if there is no layer, or a value is out of range.
+
+    >>> from simple_model.layers.material import PRESETS
+    >>> skin = Stack(materials=(PRESETS["dermis"], PRESETS["fat"]), thicknesses=(0.002, inf))
+    >>> skin.is_half_space
+    True
     """
 
     materials: tuple[Material, ...]
@@ -33,7 +37,7 @@ class Stack:
         if not self.materials or len(self.materials) != len(self.thicknesses):
             raise ValueError(
                 f"a stack has {len(self.materials)} materials and {len(self.thicknesses)} "
-                "thicknesses; give as many of each, one or more, from the surface downwards"
+                "thicknesses; give one of each for every layer, from the surface downwards"
             )
         if not all(0 < thickness < inf for thickness in self.thicknesses[:-1]):
             raise ValueError("layers above the last must have a finite thickness above 0")
@@ -42,8 +46,8 @@ class Stack:
         choose("base", self.base, BASES)
         if (self.base == "elastic") != (0 < self.base_stiffness < inf):
             raise ValueError(
-                f"base_stiffness = {self.base_stiffness} N/m3 of a base that is {self.base}; give "
-                "an elastic one a finite stiffness above 0, and no other"
+                f"base_stiffness = {self.base_stiffness} N/m3 does not fit a base that is "
+                f"{self.base}; give a finite stiffness above 0 for an elastic base, else 0"
             )
 
     @property
@@ -63,5 +67,5 @@ class Stack:
 
     @property
     def is_fixed(self) -> bool:
-        """Whether it is constrained, and does not drift."""
+        """Whether it is constrained and does not drift."""
         return self.is_rigid or self.base == "elastic"

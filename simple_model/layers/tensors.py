@@ -1,7 +1,7 @@
 """Symmetric tensors as six components xx, yy, zz, xy, xz, yz, in the last axis of an array.
 
-The components of shear are those of the tensor, half of the engineering strain. Stress is positive
-in tension.
+Shear components are those of the tensor, half of the engineering strain. Stress is positive in
+tension.
 """
 
 import numpy as np
@@ -28,7 +28,7 @@ def energy_root(material: Material) -> Floats:
 
 
 def largest_shear(strain: Floats) -> Floats:
-    """Largest shear strain (...) of strains (..., 6): the engineering strain, e_1 - e_3 of the
+    """Largest shear strain (...) of strains (..., 6): engineering strain, e_1 - e_3 of the
     principal strains.
     """
     principal = np.linalg.eigvalsh(_matrices(strain))

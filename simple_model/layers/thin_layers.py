@@ -1,15 +1,15 @@
 """Modes of a stack of layers at given frequencies, by the thin-layer method.
 
-A wave with displacements i U(z) along x and W(z) downwards, times e^{i (w t - k x)}, has strains
-k U, W' and i (U' - k W). Its weak form over the depth z is the symmetric quadratic pencil
+A wave with displacements i U(z) along x and W(z) downwards, times e^{i (w t - k x)}, has strains k
+U, W' and i (U' - k W). Its weak form over the depth z is the symmetric quadratic pencil
 
     (A k^2 + B k + G - w^2 M) (U, W) = 0
 
-with A, G, M block diagonal in (U, W) and B off it (E. Kausel, Int J Numer Meth Eng 37:927 (1994)),
-so that with V = k U it is linear in k^2, and half as large as its companion form. The elements in
-depth are of order `ORDER` with Gauss-Lobatto nodes, by which M and the terms of the shear modulus
-in A are diagonal. Those of the first Lame parameter have a Gauss point fewer than nodes: with as
-many, each element would have a spurious wave of pure pressure near nu = 0.5.
+with A, G, M block diagonal in (U, W) and B off-diagonal (E. Kausel, Int J Numer Meth Eng 37:927
+(1994)). With V = k U it is linear in k^2, and half as large as its companion form. The elements in
+depth are of order `ORDER` with Gauss-Lobatto nodes, which make M and the shear-modulus terms of A
+diagonal. The terms of the first Lame parameter have one Gauss point fewer than nodes: with as many,
+each element would have a spurious wave of pure pressure near nu = 0.5.
 
 A half-space below is a perfectly matched layer: elements of complex length, in which outgoing waves
 decay.
@@ -28,16 +28,16 @@ from simple_model.typing import Complex, Floats
 ORDER = 8
 SHIFT = 0.1 + 1.0j  # of the largest squared shear wavenumber
 PER_ELEMENT = 5.0  # shear wavenumber times length, of the longest element
-MOST = 20  # elements, whose matrices are dense: some seconds for fifty frequencies
-FEWEST = 2  # elements, of all layers in parts of their thickness
+MOST = 20  # elements with dense matrices: some seconds for fifty frequencies
+FEWEST = 2  # elements of all layers, in proportion to their thickness
 MATCHED = np.exp(-0.6j) * np.array([0.75, 1.5, 3.0, 6.0, 12.0])  # element lengths over 1/|k_s|
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Pencil:
-    """Matrices of the pencil at frequencies (f,): (f, n, n), or (f, n) if diagonal; M is the same
-    of U and of W. `traction` is the part of Buw by which U does work on the normal stress of a
-    section x = const. `depths` (d,) in metre are of the nodes outside a matched layer.
+    """Matrices of the pencil at frequencies (f,): (f, n, n), or (f, n) if diagonal; U and W share
+    M. `traction` is the part of Buw by which U does work on the normal stress of a section x =
+    const. `depths` (d,) in metre are those of the nodes outside a matched layer.
     """
 
     Auu: Complex
@@ -52,8 +52,8 @@ class Pencil:
 
 @cache
 def lobatto() -> tuple[Floats, Floats, Floats]:
-    """Nodes (9,) and weights (9,) of Gauss-Lobatto quadrature on 0..1, and the derivatives (q, a)
-    of shape functions there.
+    """Nodes (9,) and weights (9,) of Gauss-Lobatto quadrature on 0 to 1, and derivatives (q, a) of
+    shape functions.
     """
     top = legendre.Legendre.basis(ORDER)
     x = np.concatenate([[-1.0], np.sort(top.deriv().roots().real), [1.0]])
@@ -67,8 +67,8 @@ def lobatto() -> tuple[Floats, Floats, Floats]:
 
 @cache
 def gauss() -> tuple[Floats, Floats, Floats]:
-    """Weights (8,) of Gauss quadrature on 0..1, and shape functions (q, a) and their derivatives
-    there.
+    """Weights (8,) of Gauss quadrature on 0 to 1, and shape functions (q, a) and their
+    derivatives.
     """
     nodes, _, D = lobatto()
     x, weights = legendre.leggauss(ORDER)
@@ -96,7 +96,7 @@ def elements(stack: Stack, omega: Floats) -> tuple[list[int], Complex]:
     if len(layers) > MOST:
         raise ValueError(
             f"dispersion curves up to {omega.max() / 2 / np.pi:g} Hz of layers of {1e3 * finite:g} "
-            f"mm need {len(layers)} elements in depth, the limit is {MOST}; take a half-space, "
+            f"mm need {len(layers)} elements in depth, and the limit is {MOST}; use a half-space, "
             "thinner or fewer layers, or lower frequencies"
         )
     return layers, np.array(lengths, np.complex128).T
@@ -139,9 +139,8 @@ def pencil(stack: Stack, omega: Floats, moduli: Complex) -> Pencil:
 
 
 def eigenpairs(of: Pencil, omega: Floats) -> tuple[Complex, Complex, Complex]:
-    """Squared wavenumbers (f, m) in 1/m2, and V = k U and W (f, n, m) of all modes.
-
-    Of the pencil [[Auu, Buw], [0, Aww]] k^2 + [[Suu, 0], [Bwu, Sww]] on (V, W), S = G - w^2 M.
+    """Squared wavenumbers (f, m) in 1/m2, and V = k U and W (f, n, m), of all modes of the pencil
+    [[Auu, Buw], [0, Aww]] k^2 + [[Suu, 0], [Bwu, Sww]] on (V, W), S = G - w^2 M.
     """
     n = of.Auu.shape[1]
     inertia = (omega[:, None] ** 2 * of.M)[..., None] * np.eye(n)
@@ -150,14 +149,14 @@ def eigenpairs(of: Pencil, omega: Floats) -> tuple[Complex, Complex, Complex]:
     first[:, n:, n:] = of.Aww[..., None] * np.eye(n)
     second[:, :n, :n], second[:, n:, :n] = of.Guu - inertia, of.Buw.swapaxes(1, 2)
     second[:, n:, n:] = of.Gww - inertia
-    # About a shift: roots of slow modes are then accurate for any Poisson's ratio.
+    # The shift makes roots of slow modes accurate for any Poisson's ratio.
     shift = SHIFT * (omega**2 * np.abs(of.M / of.Aww).max(axis=1))[:, None, None]
     inverse, vectors = np.linalg.eig(np.linalg.solve(second + shift * first, first))
     return shift[..., 0] - 1 / inverse, vectors[:, :n], vectors[:, n:]
 
 
 def outgoing(squared: Complex, slope: Complex) -> Complex:
-    """Wavenumbers of squares, of the sign that decays or, without loss, carries energy outwards;
+    """Wavenumbers of squares, with the sign that decays or, without loss, carries energy outwards;
     `slope` is the derivative of the squares by omega.
     """
     k = np.sqrt(squared)

@@ -1,21 +1,21 @@
 """Wavenumber integrals: the field about a focal spot at rest, at each frequency.
 
 A pressure q exp(i w t) moves a body by u = G q at each wavenumber k. A focal spot S of unit
-pressure makes at a distance r
+pressure makes, at a distance r,
 
     g(r, w) = 1/(2 pi) int_0^inf S(k) G(k, w) J_n(kr)/r^n k dk
 
-with n = 0 for the vertical displacement and for pressures. A horizontal displacement goes as J_1
-and has the direction of (x, y), so that its components are x and y times an integral with n = 1;
-second derivatives likewise have n = 2. In this form all are as smooth as the focal spot.
+with n = 0 for vertical displacement and pressures. A horizontal displacement varies as J_1 in the
+direction of (x, y), so its components are x and y times an integral with n = 1. Second derivatives
+have n = 2. In this form all are as smooth as the focal spot.
 
-Frequencies of a transient are close to each other, below the real axis by its damping, and far from
-the poles, which lie above it by the body's own loss: what they make is smooth. Each batch of them
-is interpolated by a polynomial through Chebyshev points, whose error falls geometrically with their
-number (Berrut and Trefethen, SIAM Rev 46:501 (2004)), to below that of the integrals.
+The frequencies of a transient are close to each other and lie below the real axis, by its damping,
+far from the poles, which lie above it, by the loss of the body. The integrals are smooth there.
+Each batch of frequencies is interpolated by a polynomial through Chebyshev points, whose error
+falls geometrically with their number (Berrut and Trefethen, SIAM Rev 46:501 (2004)).
 
-The path of integration over k runs above the real axis, away from the poles of forward waves, which
-lie below it for any loss; and below those of backward waves, which lie above it.
+The path of integration over k runs above the real axis: above the poles of forward waves, which lie
+below the axis for any loss, and below those of backward waves, which lie above it.
 """
 
 from collections.abc import Callable, Iterator
@@ -32,27 +32,27 @@ from simple_model.typing import Complex, Floats
 
 INTEGRATION_ERROR = 1e-5  # relative change at which the wavenumber grid is fine enough
 FEWEST_NODES, MOST_NODES = 128, 2**16  # of the wavenumber grid
-AT_ONCE = 2**12  # pairs of frequency and wavenumber, in arrays that stay in cache
-UNRESOLVED = "the wavenumber integral does not converge; add some loss, or give a free slab a base"
-CHECKED_EACH = 8  # batches: how often the grid is checked by halving
+AT_ONCE = 2**12  # pairs of frequency and wavenumber, so that arrays stay in cache
+UNRESOLVED = "the wavenumber integral does not converge; add loss, or give a free slab a base"
+CHECK_INTERVAL = 8  # batches between two checks of the grid
 BATCH = 256  # frequencies at a time
-FIRST_BATCH = 64  # of a transient, whose later batches are as long as all before
-FEWEST_POINTS = 8  # intervals of the first Chebyshev points that a batch is interpolated between
-INTERPOLATION_ERROR = 1e-7  # relative, so that lines far weaker than the largest are right, too
-COMPARED = 16  # frequencies of a smooth batch at which two wavenumber grids are compared
+FIRST_BATCH = 64  # frequencies of a transient; later batches are as long as all before
+FEWEST_INTERVALS = 8  # between the first Chebyshev points of a batch
+INTERPOLATION_ERROR = 1e-7  # relative, so that weak lines are accurate too
+COMPARED = 16  # frequencies of a smooth batch at which two grids are compared
 
 
 @dataclass(frozen=True, kw_only=True)
 class Field:
-    """Field of a surface pressure, of m components that are made of c integrals.
+    """Field of a surface pressure: m components made of c integrals.
 
     Parameters
     ----------
     answer : (k (k,) in 1/m, w (f, 1) in rad/s) -> (c, f, k), per pressure
     orders : (c,) order n of each integral
     clearance : as of `Compliance`
-    weights : horizontal offsets (..., 2) in metre from the focus -> (m, c, ...), so that the
-        components are weights times integrals, in sum over c
+    weights : horizontal offsets (..., 2) in metre from the focus -> (m, c, ...); components are
+        sums over c of weights times integrals
     """
 
     answer: Callable[[Complex, Complex], Complex]
@@ -63,8 +63,8 @@ class Field:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Grid:
-    """Nodes `k` (n,) of the path of integration, and kernels (n, r) by which values there are
-    multiplied for the integrals of each order at all distances.
+    """Nodes `k` (n,) of the path of integration, and kernels (n, r) for each order: integrals at
+    all distances are values at the nodes times kernels.
     """
 
     k: Complex
@@ -84,7 +84,7 @@ def normal_field(compliance: Compliance) -> Field:
 def point_response(
     compliance: Compliance, distances: ArrayLike, frequencies: ArrayLike, width: float
 ) -> Complex:
-    """Response g(r, w) (f, r) in m/Pa to a Gaussian focal spot of 1 Pa, as `point_integrals`."""
+    """Response g(r, w) (f, r) in m/Pa to a Gaussian focal spot of 1 Pa, see `point_integrals`."""
     return point_integrals(normal_field(compliance), distances, frequencies, width)[0]
 
 
@@ -96,7 +96,7 @@ def point_integrals(
     *,
     negligible: float = 0.0,
 ) -> Complex:
-    """Integrals (c, f, r) of a field about a Gaussian focal spot of 1 Pa.
+    """Compute the integrals (c, f, r) of a field about a Gaussian focal spot of 1 Pa.
 
     Parameters
     ----------
@@ -104,14 +104,14 @@ def point_integrals(
     distances : (r,) float, metre
     frequencies : (f,) float or complex, rad/s, with imaginary part <= 0
     width : metre, standard deviation of the spot
-    negligible : for frequencies that rise: integration ends with the batch in which each integral
-        stays below this fraction of its largest value
+    negligible : for ascending frequencies: integration ends after the batch in which each integral
+        is below this fraction of its largest value
 
     Raises an ArithmeticError if the wavenumber grid cannot be made fine enough.
     """
     r = np.atleast_1d(np.asarray(distances, np.float64))
     w = np.atleast_1d(np.asarray(frequencies, np.complex128))
-    found = np.zeros((len(field.orders), len(w), len(r)), np.complex128)
+    integrals = np.zeros((len(field.orders), len(w), len(r)), np.complex128)
 
     @lru_cache(maxsize=2)
     def grid(lift: float, n: int) -> _Grid:
@@ -120,16 +120,16 @@ def point_integrals(
     n, before = FEWEST_NODES, 0.0
     for part in _batches(w):
         lift = _lift(field, r, w[part], width)
-        if lift != before or part.start % (CHECKED_EACH * BATCH) == 0:
+        if lift != before or part.start % (CHECK_INTERVAL * BATCH) == 0:
             least = n if lift == before else FEWEST_NODES
-            n, found[:, part] = _resolved(field, w[part], partial(grid, lift), least)
+            n, integrals[:, part] = _resolved(field, w[part], partial(grid, lift), least)
         else:
-            found[:, part] = _batch(field, w[part], grid(lift, n))
+            integrals[:, part] = _batch(field, w[part], grid(lift, n))
         before = lift
-        largest = np.abs(found[:, : part.stop]).max(axis=(1, 2))
-        if (np.abs(found[:, part]).max(axis=(1, 2)) < negligible * largest).all():
+        largest = np.abs(integrals[:, : part.stop]).max(axis=(1, 2))
+        if (np.abs(integrals[:, part]).max(axis=(1, 2)) < negligible * largest).all():
             break
-    return found
+    return integrals
 
 
 def _batches(w: Complex) -> Iterator[slice]:
@@ -141,7 +141,7 @@ def _batches(w: Complex) -> Iterator[slice]:
 
 
 def _lift(field: Field, r: Floats, w: Complex, width: float) -> float:
-    """Height above the real axis, 1/m, of the path of integration."""
+    """Height of the path of integration above the real axis, 1/m."""
     highest = 1.5 / max(float(r.max()), 5 * width)  # J_n grows by e^1.5 at most
     lift = min(highest, field.clearance(w))
     if not lift > 0:
@@ -152,7 +152,7 @@ def _lift(field: Field, r: Floats, w: Complex, width: float) -> float:
 def _resolved(
     field: Field, w: Complex, grid: Callable[[int], _Grid], n: int
 ) -> tuple[int, Complex]:
-    """The fewest wavenumbers, from n, that twice as many do not improve on, and the integrals."""
+    """Double the number of wavenumbers, from n, until the integrals do not change. Return both."""
     some = w[:: -(-len(w) // COMPARED)] if _is_damped(w) else w
     coarse = _integrated(field, some, grid(n))
     while n < MOST_NODES:
@@ -165,26 +165,26 @@ def _resolved(
 
 
 def _batch(field: Field, w: Complex, grid: _Grid) -> Complex:
-    """The integrals (c, f, r) at the frequencies of a batch: interpolated where they are smooth."""
-    found = _interpolated(field, w, grid) if _is_damped(w) else None
-    return _integrated(field, w, grid) if found is None else found
+    """Integrals (c, f, r) at the frequencies of a batch, interpolated if they are smooth."""
+    integrals = _interpolated(field, w, grid) if _is_damped(w) else None
+    return _integrated(field, w, grid) if integrals is None else integrals
 
 
 def _is_damped(w: Complex) -> bool:
-    """Whether frequencies are many on a line below the real axis, as those of a transient are."""
-    return bool(len(w) > 4 * FEWEST_POINTS and w.imag.max() < 0 and np.ptp(w.imag) == 0)
+    """Whether frequencies are many on a line below the real axis, as for a transient."""
+    return bool(len(w) > 4 * FEWEST_INTERVALS and w.imag.max() < 0 and np.ptp(w.imag) == 0)
 
 
 def _interpolated(field: Field, w: Complex, grid: _Grid) -> Complex | None:
-    """The integrals (c, f, r) at frequencies on a line, by a polynomial; None if that takes more
-    than half as many.
+    """Integrals (c, f, r) at frequencies on a line, by a polynomial; None if that takes more than
+    half as many evaluations.
     """
     middle, half = (w.real.max() + w.real.min()) / 2, np.ptp(w.real) / 2
 
     def at(x: Floats) -> Complex:
         return _integrated(field, middle + half * x + 1j * w.imag[0], grid)
 
-    n, error = FEWEST_POINTS, np.nan
+    n, error = FEWEST_INTERVALS, np.nan
     values = at(_chebyshev(n))
     while 4 * n <= len(w):
         between = _chebyshev(2 * n)[1::2]
@@ -193,10 +193,10 @@ def _interpolated(field: Field, w: Complex, grid: _Grid) -> Complex | None:
         before, errors = error, np.abs(_through(values, between) - finer[:, 1::2]).max(axis=(1, 2))
         error = (errors / np.abs(finer).max(axis=(1, 2))).max()
         values, n = finer, 2 * n
-        foreseen = error * (error / before) ** 2  # as it falls geometrically
-        if np.fmin(error, foreseen) <= INTERPOLATION_ERROR:
+        predicted = error * (error / before) ** 2  # as it falls geometrically
+        if np.fmin(error, predicted) <= INTERPOLATION_ERROR:
             return _through(values, (w.real - middle) / half)
-        if error ** (len(w) / n) > INTERPOLATION_ERROR**0.5:  # at as many as are allowed
+        if error ** (len(w) / n) > INTERPOLATION_ERROR**0.5:  # at the largest number allowed
             return None
     return None
 
@@ -212,13 +212,13 @@ def _through(values: Complex, x: Floats) -> Complex:
     away = x[:, None] - _chebyshev(n)
     weights = (-1.0) ** np.arange(n + 1)
     weights[[0, -1]] /= 2
-    shares = weights / np.where(away, away, 1e-300)  # all of it at a point itself
+    shares = weights / np.where(away, away, 1e-300)  # at a point itself
     shares /= shares.sum(axis=1, keepdims=True)
     return np.asarray(shares @ values)
 
 
 def _integrated(field: Field, w: Complex, grid: _Grid) -> Complex:
-    """The integrals (c, f, r), some frequencies at a time."""
+    """Integrals (c, f, r), some frequencies at a time."""
     parts = []
     for some in np.array_split(w[:, None], max(1, len(w) * len(grid.k) // AT_ONCE)):
         values = field.answer(grid.k, some)

@@ -14,9 +14,8 @@ from fem.plane_stiffness import Tension
 from meshes import TetMesh, middle_plane, sheet
 from meshes.shapes.structured import check_size, round_up
 from simple_model.layers.compliance import AIR_DENSITY, Compliance, thin_sheet
-from simple_model.layers.dispersion import DispersionCurves
+from simple_model.layers.dispersion import DispersionCurves, sheet_curves
 from simple_model.layers.material import Material
-from simple_model.plates.sheet_waves import sheet_curves
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.build import Build
 from skinwave.bodies.discretised import Discretised

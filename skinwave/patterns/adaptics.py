@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from simple_model import Tacton, Trajectory
-from simple_model.load.tacton import COMMENSURATE, LONGEST, RETURNED
-from simple_model.load.trajectory import LARGEST
+from simple_model.load.tacton import COMMENSURATE, LONGEST, RETURN_TOLERANCE
+from simple_model.load.trajectory import LARGEST_SIZE
 from skinwave.patterns.adaptics_file import Brush, Track, parse
 from skinwave.patterns.pattern import ENGINE_RATE, STRAIGHT, Options, Pattern, one_height, thinned
 from skinwave.typing import Floats
@@ -89,7 +89,9 @@ def _loops(brushes: list[Brush], period: float, notes: list[str]) -> int:
     )
     many = np.outer(np.arange(1, int(LONGEST / period) + 1), cycles)
     jump = np.abs(many - np.round(many)).max(axis=1)
-    count = int(np.argmax(jump <= RETURNED) if (jump <= RETURNED).any() else np.argmin(jump))
+    count = int(
+        np.argmax(jump <= RETURN_TOLERANCE) if (jump <= RETURN_TOLERANCE).any() else np.argmin(jump)
+    )
     if jump[count] > COMMENSURATE:
         notes.append(
             f"the path repeats after {count + 1} loops, where the brush jumps by "
@@ -133,7 +135,7 @@ def _within(level: Floats, notes: list[str]) -> Floats:
 def _is_simple(brush: Brush) -> bool:
     """Whether a brush at one place draws a point, a circle or a line of a Tacton."""
     size, f_d = 2e-3 * brush.numbers[0], brush.drawing_frequency
-    return brush.name != "lissajous" and 0 <= size <= LARGEST and f_d >= 0
+    return brush.name != "lissajous" and 0 <= size <= LARGEST_SIZE and f_d >= 0
 
 
 def _constant(brush: Brush, place: Floats, notes: list[str]) -> Tacton:

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from simple_model import MovingPressure, Trajectory
-from simple_model.layers.flat_body import steady_lines
-from simple_model.layers.flat_quantities import from_rest, surface_field
+from simple_model.layers.flat_body import field_history, steady_lines
+from simple_model.layers.flat_quantities import surface_field
 from simple_model.layers.wavenumber_integral import point_response
 from simple_model.load.focus import gaussian_width, spot_width
 from simple_model.load.spectrum import load_lines, merge_lines
@@ -101,7 +101,8 @@ def side_reflections(scene: Scene) -> float:
     seen = np.vstack([probes, *images])
     # Below the surface, and of components, about as of the displacement at the surface.
     asked = scene.reading.record if scene.reading.record.is_normal else DISPLACEMENT
-    u = from_rest(surface_field(asked, compliance(body)), asked, scene.pressure, seen, times)
+    field = surface_field(asked, compliance(body))
+    u = field_history(field, scene.pressure, seen, times)[..., 0]
     own, *returned = (u**2).mean(axis=0).reshape(-1, len(probes))
     share = float(np.sqrt((sum(returned) / np.maximum(own, 1e-300)).max()))
     critical = min(1.0, _loss_at_cut_off(body) / 2)

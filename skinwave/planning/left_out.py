@@ -21,7 +21,7 @@ import numpy as np
 
 from fem.reduced import exponential_sum, line_response
 from simple_model import MovingPressure, Response
-from simple_model.layers.flat_body import FINEST, steady_lines
+from simple_model.layers.flat_body import TRANSFORM_RATE, steady_lines
 from simple_model.layers.material import Material
 from simple_model.load.focus import spot_width
 from simple_model.load.spectrum import load_lines
@@ -95,7 +95,7 @@ def sudden_left_out(scene: Scene, model: Model, grid: tuple[Floats, int]) -> flo
     if model.is_steady or not scene.reading.record.rate:
         return 0.0
     times, first = grid
-    parts = max(2, ceil(2 * FINEST * times[1]))  # of a step, with twice the band
+    parts = max(2, ceil(2 * TRANSFORM_RATE * times[1]))  # of a step, with twice the band
     fine = np.asarray(times[1] / parts * np.arange(parts * (len(times) - 1) + 1), np.float64)
     usual, wide = (
         model.solve(scene, t, SolveOptions(tolerance=EXACT)).values for t in (times, fine)

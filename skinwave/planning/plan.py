@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 import fem
-from simple_model.layers.flat_body import FINEST
+from simple_model.layers.flat_body import TRANSFORM_RATE
 from simple_model.load.sampling import resolving_step
 from skinwave.bodies.sizes import check_mesh
 from skinwave.models import Limit, Model, named
@@ -272,7 +272,7 @@ def _without_mesh(
             f"{takers(scene)[0]} is" if takers(scene) else "absorbing sides are",
         ),
         *start_over_tolerance(asked, left, tolerance),
-        *sudden_over_tolerance(scene, FINEST / 4, sudden, tolerance),
+        *sudden_over_tolerance(scene, TRANSFORM_RATE / 4, sudden, tolerance),
     )
     rows = [
         row,

@@ -9,10 +9,9 @@ import read_results
 
 from simple_model import Material, Stack
 from simple_model.layers.compliance import half_space, layered, slab, thin_sheet
-from simple_model.layers.dispersion import dispersion_curves
+from simple_model.layers.dispersion import dispersion_curves, sheet_curves
 from simple_model.layers.material import PRESETS
 from simple_model.layers.wavenumber_integral import point_response
-from simple_model.plates.sheet_waves import sheet_curves
 from skinwave.studies.dispersion import driven_modes
 
 WIDTH = 4.35e-3  # m, of the focal spot

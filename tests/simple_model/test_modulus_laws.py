@@ -163,7 +163,7 @@ def test_a_table_continues_by_its_series():
 
 @pytest.mark.parametrize(
     ("law", "said"),
-    [(lambda w: 25e3 + 10e3j * np.sign(w), r"not causal.* \(root mean square.*at 1 Hz 3\d %"),
+    [(lambda w: 25e3 + 10e3j * np.sign(w), "not causal"),
      (lambda w: 25e3 * (1 - 1e-4j * w), "loss modulus")],
 )  # fmt: skip
 def test_a_law_of_no_solid_is_refused_by_every_model(law, said):

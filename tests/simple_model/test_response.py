@@ -143,5 +143,5 @@ def test_am_and_stm_have_pairs_and_nothing_at_multiples_of_f_d(am, size, speed):
 
 def test_probes_need_two_coordinates():
     load = MovingPressure(tacton=Tacton())
-    with pytest.raises(ValueError, match=r"give \(p, 2\)"):
+    with pytest.raises(ValueError, match="shape"):
         point_kernel(load, [1.0, 2.0], SECOND)

@@ -16,7 +16,7 @@ from simple_model import (
     Response,
     Tacton,
     Trajectory,
-    published,
+    published_load,
 )
 from skinwave.commands.cli import main
 from skinwave.planning.simulate import compute
@@ -103,7 +103,7 @@ def test_an_endless_body_of_elements_has_sides_that_absorb():
 def test_nothing_dropped_is_the_published_model_and_all_dropped_the_richest():
     scene, model = relaxed(SKIN, ())
     assert (scene.body.kind, model) == ("none", "point-kernel-published")
-    assert scene.pressure == published(SKIN.pressure)
+    assert scene.pressure == published_load(SKIN.pressure)
     scene, model = relaxed(SKIN, droppable(SKIN))
     assert model == "fem"
     assert scene.body.kind == "palm"
