@@ -157,7 +157,8 @@ def dispersion_curves(
 
     >>> from simple_model.layers.material import PRESETS
     >>> slab = Stack(materials=(PRESETS["palm"],), thicknesses=(0.015,))
-    >>> [round(float(mode.phase_speed[0]), 2) for mode in dispersion_curves(slab, [140.0]).modes[:2]]
+    >>> modes = dispersion_curves(slab, [140.0]).modes
+    >>> [round(float(mode.phase_speed[0]), 2) for mode in modes[:2]]  # m/s
     [11.43, 7.39]
     """
     f = checked_frequencies(frequencies)

@@ -1,6 +1,6 @@
 """Free vibration of a plate's modes with Maxwell branches in bending.
 
-A mode of squared frequency w^2, of which a share e is bending, has the dynamic stiffness
+A mode of squared frequency w^2, of which bending makes the share e, has the dynamic stiffness
 
     D(s) = s^2 + w^2 [1 - e + e h(s)],   h(s) = h_0 + lag s + sum_j h_j s tau_j / (1 + s tau_j),
 
@@ -18,41 +18,44 @@ from simple_model.layers.material import Material
 from simple_model.plates.modes import PlateModes
 from simple_model.typing import Complex, Floats
 
-POLISHED = 3  # steps of Newton's method on eigenvalues
-CRITICAL = 1e-6  # relative distance of two poles below which a mode is made a little stiffer
+NEWTON_STEPS = 3  # on eigenvalues
+CRITICAL = 1e-6  # relative distance of two poles, below which a mode is made stiffer
 STIFFER = 1.0001
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FreeModes:
-    """Poles (m, j) in 1/s of m modes and `residues` (m, j) in s of their compliances; of conjugate
-    poles one has all, the other none, and real ones have half.
+    """Poles (m, j) in 1/s of m modes, and `residues` (m, j) in s of their compliances. Of conjugate
+    poles only one has a residue, the whole one; real poles have half.
     """
 
     poles: Complex
     residues: Complex
 
     def start(self, frequencies: Floats, forces: Complex) -> Complex:
-        """Amplitudes (m, j) of exp(pole t) that end the rest of all modes before t = 0, under modal
-        forces Re sum F exp(2 pi i f t), with F (f, m) at frequencies (f,) in Hz: a line makes F
-        residue [exp(2 pi i f t) - exp(pole t)] / (2 pi i f - pole).
-        """
-        found = np.zeros(self.poles.shape, np.complex128)
-        for s, force in zip(2j * np.pi * frequencies, forces, strict=True):
-            found -= force[:, None] / (s - self.poles) + force.conj()[:, None] / (-s - self.poles)
-        return found * self.residues
+        """Amplitudes (m, j) of exp(pole t) that start all modes from rest at t = 0.
 
-    def impulse(self, place: Floats, speed: Floats) -> Complex:
-        """Amplitudes (m, j) of exp(pole t) after modes have been set to a place (m,) in metre
-        kg^1/2 and a speed (m,).
+        Modal forces are Re sum F exp(2 pi i f t), with F (f, m) at frequencies (f,) in Hz. A line
+        makes F residue [exp(2 pi i f t) - exp(pole t)] / (2 pi i f - pole).
         """
-        return 2 * self.residues * (self.poles * place[:, None] + speed[:, None])
+        amplitudes = np.zeros(self.poles.shape, np.complex128)
+        for s, force in zip(2j * np.pi * frequencies, forces, strict=True):
+            amplitudes -= force[:, None] / (s - self.poles) + force.conj()[:, None] / (
+                -s - self.poles
+            )
+        return amplitudes * self.residues
+
+    def impulse(self, coordinates: Floats, rates: Floats) -> Complex:
+        """Amplitudes (m, j) of exp(pole t) for initial coordinates (m,) in metre kg^1/2 and rates
+        (m,).
+        """
+        return 2 * self.residues * (self.poles * coordinates[:, None] + rates[:, None])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Loss:
-    """Modulus of a material over that of the modes: at `rest`, viscous `lag` in s, and `shares`
-    (j,) of Maxwell branches with relaxation `times` (j,) in s.
+    """Modulus of a material relative to that of the modes: at `rest`, viscous `lag` in s, and
+    `shares` (j,) of Maxwell branches with relaxation `times` (j,) in s.
     """
 
     rest: float
@@ -62,7 +65,7 @@ class Loss:
 
     @staticmethod
     def of(material: Material) -> "Loss":
-        """That of a material."""
+        """Relative modulus of a material."""
         solid, mu = material.relaxing(), material.shear_modulus
         terms = [term for term in solid.prony if term.modulus]
         return Loss(
@@ -81,7 +84,9 @@ WITHOUT_LOSS = Loss(rest=1.0, lag=0.0, shares=np.zeros(0), times=np.ones(0))
 
 
 def free_modes(modes: PlateModes, material: Material) -> FreeModes:
-    """Poles and residues of the modes of a plate of a material without a modulus law of its own."""
+    """Poles and residues of the modes of a plate, for a material without a modulus law of
+    its own.
+    """
     squared = np.maximum(modes.squared, np.finfo(float).tiny)
     bent = squared * modes.elastic
     return free_vibration(*relaxing_stiffness(squared - bent, bent, material))
@@ -89,8 +94,10 @@ def free_modes(modes: PlateModes, material: Material) -> FreeModes:
 
 def relaxing_stiffness(lossless: Floats, bent: Floats, material: Material) -> tuple[Floats, Floats]:
     """Stiffness (m, 2 + n) of modes and times (n,) in s, for `free_vibration`, of a material with
-    Maxwell branches; `lossless` (m,) and `bent` (m,) in 1/s2 are the parts of the squared
-    frequencies without loss, and in proportion to the material's modulus.
+    Maxwell branches.
+
+    `lossless` (m,) and `bent` (m,) in 1/s2 are the parts of the squared frequencies without loss
+    and in proportion to the modulus of the material.
     """
     loss = Loss.of(material)
     parts = lossless + bent * loss.rest, bent * loss.lag, bent[:, None] * loss.shares
@@ -112,7 +119,6 @@ def free_vibration(stiffness: Floats, times: Floats) -> FreeModes:
 
 
 def _poles(stiffness: Floats, times: Floats) -> Complex:
-    """Poles (m, 2 + n) of modes."""
     n = 2 + len(times)
     speed = np.sqrt(stiffness[:, 0])  # so that u' / speed is as large as u
     companion = np.zeros((len(stiffness), n, n))
@@ -123,16 +129,16 @@ def _poles(stiffness: Floats, times: Floats) -> Complex:
     companion[:, 2:, 1] = speed[:, None]
     companion[:, range(2, n), range(2, n)] = -1 / times
     poles = np.linalg.eigvals(companion).astype(np.complex128)
-    for _ in range(POLISHED):
+    for _ in range(NEWTON_STEPS):
         poles -= _stiffness(stiffness, times, poles) / _slope(stiffness, times, poles)
     return poles
 
 
 def _stiffness(stiffness: Floats, times: Floats, s: Complex) -> Complex:
     """Dynamic stiffness D (m, j) at s (m, j) in rad/s."""
-    turned = s[..., None] * times
+    phase = s[..., None] * times
     rest, viscous, relaxing = stiffness[:, :1], stiffness[:, 1:2], stiffness[:, None, 2:]
-    return s**2 + rest + viscous * s + (relaxing * turned / (1 + turned)).sum(axis=-1)
+    return s**2 + rest + viscous * s + (relaxing * phase / (1 + phase)).sum(axis=-1)
 
 
 def _slope(stiffness: Floats, times: Floats, s: Complex) -> Complex:

@@ -19,18 +19,18 @@ from simple_model.plates.modes import Plate, outside_clips
 from simple_model.plates.polynomials import LineBasis, continuous_basis, gauss_points
 from simple_model.typing import Bools, Floats, Ints
 
-# Whether a supported edge holds the in-plane displacement across it, and along it.
+# Whether a supported edge holds the in-plane displacement across and along the edge.
 IN_PLANE = {"held": (True, True), "sliding": (True, False), "movable": (False, False)}
-SHIFT = 1e-10  # of the mean stiffness, so that a plate which nothing holds can be solved
+SHIFT = 1e-10  # of the mean stiffness, so that a plate without support can be solved
 MOVES = "xi,yj,ijp->pxy"
 GATHERS = "xi,yj,pxy->ijp"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Grid:
-    """Gauss points of a plate and the polynomials on it. Along x and along y: `breaks` (e + 1,) in
-    metre, whether functions are `split` in even and odd ones, the `degrees` (e,) on each piece, and
-    the `points` and `weights` in metre.
+    """Gauss points of a plate and the polynomials on it, along x and along y: `breaks` (e + 1,) in
+    metre, whether functions are `split` into even and odd, `degrees` (e,) on each piece, and
+    `points` and `weights` in metre.
     """
 
     breaks: tuple[Floats, Floats]
@@ -79,8 +79,8 @@ class InPlane:
 
     @staticmethod
     def of(plate: Plate, A: Floats, grid: Grid, odd: tuple[int, int], in_plane: str) -> InPlane:
-        """The problem of a plate of stiffness A (3, 3) in N/m, with edges as of `IN_PLANE`, for
-        strains xx that are `odd` along x and along y, where functions are split.
+        """The problem of a plate of stiffness A (3, 3) in N/m, with edges as in `IN_PLANE`, for
+        strains xx that are `odd` along x and along y, if functions are split.
         """
         u, v = (
             tuple(
@@ -122,7 +122,7 @@ class InPlane:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Line:
-    """Functions along x or y with their values and slopes (points, i) on the grid, and its weights
+    """Functions along x or y, their values and slopes (points, i) on the grid, and its weights
     (points,).
     """
 
@@ -142,7 +142,6 @@ class _Line:
 def _functions(
     plate: Plate, grid: Grid, axis: int, component: int, odd: int, in_plane: str
 ) -> LineBasis:
-    """Functions of u or v along x or y."""
     names = (("left", "right"), ("front", "back"))[axis]
     holds = IN_PLANE[in_plane][axis != component]
     ends = ["simply" if holds and getattr(plate, name) != "free" else "free" for name in names]
@@ -173,7 +172,7 @@ def _coupling(u: Sequence[_Line], v: Sequence[_Line], A: Floats) -> Floats:
 
 
 def _integral(first: _Line, second: _Line, flipped: bool) -> Floats:
-    """Integrals (i, j) of the slopes of the first with the values of the second, or flipped."""
+    """Integrals (i, j) of the slopes of `first` with the values of `second`, or `flipped`."""
     a, b = (first.values, second.slopes) if flipped else (first.slopes, second.values)
     return np.asarray((a * first.weights[:, None]).T @ b)
 

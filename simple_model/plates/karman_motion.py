@@ -2,8 +2,8 @@
 
     z'' + K z + sum_k s_k H_k z = f,  y_k = z^T H_k z / 2
 
-s_k is the stress of the state y_k, without loss y_k itself. Bending and stretching both have the
-loss of the material: a viscosity and Maxwell branches.
+s_k is the stress of the state y_k; without loss it is y_k itself. Bending and stretching both have
+the loss of the material: a viscosity and Maxwell branches.
 
 Time steps of dt are linearly implicit, with y between steps:
 
@@ -16,14 +16,11 @@ change of y^2 / 2. Without load and loss the energy at half steps,
 
 is constant to round-off. It is never negative, so the motion is bounded for any dt. Each step
 solves one positive definite linear system (Bilbao, Numer Methods Partial Differ Equ 24:193 (2008);
-Bilbao, Thomas, Touze and Ducceschi, ibid. 31:1948 (2015), doi 10.1002/num.21974). The scheme is an
-energy quadratisation. Its auxiliary variables y are quadratic in z and therefore do not drift. A
-single scalar auxiliary variable (Bilbao, Ducceschi and Zama, J Comput Phys 472:111697 (2023)) needs
-no linear system, but drifts; the system is small here.
+Bilbao, Thomas, Touze and Ducceschi, ibid. 31:1948 (2015), doi 10.1002/num.21974).
 
-M is a little above 1, so that a mode without stretching has its exact frequency. `stretched_motion`
-goes further: its forces are those under which the steps of the linear plate are an exact linear
-motion, so that the error of the steps is in proportion to what stretching changes.
+M is a little above 1, so that a mode without stretching has its exact frequency. The forces of
+`stretched_motion` are those under which the steps of the linear plate are an exact linear motion,
+so the error of the steps is in proportion to the effect of stretching.
 """
 
 from __future__ import annotations
@@ -43,7 +40,7 @@ from simple_model.plates.path_forces import MIDDLE, modal_path_forces
 from simple_model.plates.von_karman import KarmanPlate
 from simple_model.typing import Floats, Ints
 
-HIGHEST_PHASE = 1.2  # rad per half step; faster modes are slowed to it
+HIGHEST_PHASE = 1.2  # rad per half step; faster modes are slowed down to it
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,14 +64,9 @@ def linear_motion(
     """Modal coordinates (t, r) in kg^1/2 m from rest of a plate that does not stretch, without time
     steps.
 
-    Parameters
-    ----------
-    modes, pressure : PlateModes and MovingPressure
-    material : Material, with the `shear_modulus` of the modes and no modulus law of its own
-    times : (t,) s, 0 or above
-    middle : (2,) metre, of the plate in the scene
-    chosen : (r,) int, indices of the modes to return; all if not given
-    highest : Hz, lines of the load from there on are left out
+    The material has the `shear_modulus` of the modes and no modulus law of its own; times (t,) in s
+    are 0 or above; `middle` (2,) in metre is that of the plate in the scene. Returns the modes of
+    indices `chosen` (r,), by default all. Lines of the load from `highest` Hz on are left out.
     """
 
     def modulus(omega: Floats) -> Floats:
@@ -84,23 +76,23 @@ def linear_motion(
     f, forces = lines_from_rest(pressure).gather(modal_path_forces(modes, pressure, middle))
     f, forces = f[f < highest], forces[f < highest]
     motion = modal_motion(modes, f, forces, modulus)[:, chosen]
-    beside = motion - modal_motion_apart(modes, f, forces, modulus)[:, chosen]
+    coupling = motion - modal_motion_apart(modes, f, forces, modulus)[:, chosen]
     every = free_modes(modes, material)
     free = FreeModes(poles=every.poles[chosen], residues=every.residues[chosen])
     start = free.start(f, forces[:, chosen])
-    start -= free.impulse(beside.real.sum(axis=0), (2j * np.pi * f @ beside).real)
-    found = synthesise(f, motion, times)
+    start -= free.impulse(coupling.real.sum(axis=0), (2j * np.pi * f @ coupling).real)
+    coordinates = synthesise(f, motion, times)
     for poles, amplitudes in zip(free.poles.T, start.T, strict=True):
         moving = amplitudes != 0
         decay = np.exp(np.multiply.outer(times, poles[moving]))
-        found[:, moving] += (decay * amplitudes[moving]).real
-    return found
+        coordinates[:, moving] += (decay * amplitudes[moving]).real
+    return coordinates
 
 
 def stretched_motion(
     plate: KarmanPlate, linear: Floats, dt: float, material: Material | None = None
 ) -> Motion:
-    """Motion from rest, at 0, dt, ..., (n - 1) dt in s, under the load that moves the plate by
+    """Motion from rest, at 0, dt, ..., (n - 1) dt in s. The load is the one that moves the plate by
     `linear` (n, r) in kg^1/2 m, as of `linear_motion` of the chosen modes, if it does not stretch.
     """
     forces = _Scheme.of(plate, dt, material).forces(linear)
@@ -116,8 +108,10 @@ def forced_motion(
     start: Floats | None = None,
 ) -> Motion:
     """Motion at the n + 1 times 0, dt, ..., n dt under forces (n, r) in N kg^-1/2 on the chosen
-    modes, without loss if no material is given; from `start` (2, r), coordinates in kg^1/2 m and
-    their rates, or from rest. Raises an ArithmeticError if a step is not finite.
+    modes.
+
+    It starts from `start` (2, r), coordinates in kg^1/2 m and their rates, or from rest, and has no
+    loss if no material is given. Raises an ArithmeticError if a step is not finite.
     """
     scheme = _Scheme.of(plate, dt, material)
     M, K, B, rest = scheme.mass, scheme.K, scheme.bending, scheme.rest

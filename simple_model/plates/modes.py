@@ -1,19 +1,19 @@
-"""Modes of a rectangular, orthotropic, stretched thin plate on any edges and clips, with its air.
+"""Modes of a rectangular, orthotropic, stretched thin plate with any edges and clips, and its air.
 
-Ritz's method: w(x, y) = sum c_ij X_i(x) Y_j(y) makes stationary the energies (Leissa, Vibration of
+Ritz's method: w(x, y) = sum c_ij X_i(x) Y_j(y) makes the energies stationary (Leissa, Vibration of
 Plates (1969), eqs. 9.4 and 10.1; orthotropic: Timoshenko and Woinowsky-Krieger, section 85)
 
     2 U = iint D11 w_xx^2 + 2 D12 w_xx w_yy + D22 w_yy^2 + 4 D66 w_xy^2 + Tx w_x^2 + Ty w_y^2 dA
     2 T = w^2 iint m w^2 dA + w^2 rho/pi iint iint w(x) w(y) / |x - y| dA dA
 
-X_i and Y_j are combinations of Legendre polynomials that meet the supports of the edges; what a
-free edge asks follows from the energies. A clip holds a square: between its sides the polynomials
-are their own, and products that would move it are left out. Where a plate is the same on both sides
-of its middle, even and odd modes are found apart. The second term of T is the air on both sides of
-a plate in a baffle, 2 rho / k at each wavenumber k: see `plate_air`.
+X_i and Y_j are combinations of Legendre polynomials that meet the supports of the edges; the
+conditions at a free edge follow from the energies. A clip holds a square: the polynomials between
+its sides are separate, and products that would move it are left out. If a plate is symmetric about
+its middle, even and odd modes separate. The second term of T is the air on both sides of a plate in
+a baffle, 2 rho / k at each wavenumber k: see `air`.
 
-Tension has no loss, so that the complex modulus of bending couples the modes of a stretched plate,
-close ones most.
+Tension has no loss, so the complex modulus of bending couples the modes of a stretched plate, close
+modes most.
 """
 
 from collections.abc import Sequence
@@ -35,15 +35,15 @@ from simple_model.plates.polynomials import LineBasis, line_basis, piecewise_bas
 from simple_model.typing import Bools, Complex, Floats
 
 SUPPORTS = ("clamped", "simply", "free")
-FINEST = 350.0  # rad/m: beyond it a focal spot of 4.35 mm has a third of its force
-MARGIN = 8  # polynomials beyond those that a wavenumber requires
-BESIDE = 3  # the same of pieces between the sides of clips
-NEARLY = 0.01  # of a clip's radius: a side of it so near another, or an edge of the plate, is there
-LAYER = 0.1  # of a clip's radius, beside its sides
+FINEST = 350.0  # rad/m: higher wavenumbers have a third of the force of a 4.35 mm focal spot
+MARGIN = 8  # polynomials more than a wavenumber requires
+CLIP_MARGIN = 3  # the same for pieces between the sides of clips
+SAME_SIDE = 0.01  # of the radius of a clip: sides and edges closer than that coincide
+LAYER = 0.1  # of the radius of a clip, width of a piece along its sides
 SHIFT = 1e-12  # of the mean squared frequency
-MOST_DOFS = 6000  # of one symmetry: some minutes
-COUPLED = 1.5  # of a line's frequency: modes above it are almost what they are by themselves
-RESIDUAL = 1e-6  # relative, of coupled modes
+MOST_DOFS = 6000  # of one symmetry, for some minutes
+COUPLED = 1.5  # of the frequency of a line: higher modes are almost uncoupled
+RESIDUAL = 1e-6  # relative, of the solution for coupled modes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,9 +56,10 @@ class Plate:
     d11, d22, d12, d66 : N m, bending stiffnesses; of an isotropic plate D, D, nu D, (1 - nu) D / 2
     mass_per_area : kg/m2
     tension_x, tension_y : N/m, uniform
-    left, right, front, back : "clamped", "simply" or "free", the edges of least and greatest x, y
+    left, right, front, back : "clamped", "simply" or "free", the edges at least and greatest x and
+        y
     clips : ((x, y), ...) metre, where the plate is fixed
-    clip_radius : metre, half a side of the square that is; 0 fixes the deflection of a point alone
+    clip_radius : metre, half a side of the fixed square; 0 fixes the deflection of a point only
     air_density : kg/m3, 0 in vacuum
 
     Raises a ValueError if a value is out of range, or a clip is off the plate.
@@ -88,7 +89,7 @@ class Plate:
         if not self.d12**2 < self.d11 * self.d22:
             raise ValueError(
                 f"d12 = {self.d12} of a plate is not below sqrt(d11 d22) = "
-                f"{(self.d11 * self.d22) ** 0.5:.4g}, so that it would bend by itself; lower it"
+                f"{(self.d11 * self.d22) ** 0.5:.4g}, so the plate would be unstable; lower d12"
             )
         for name in ("left", "right", "front", "back"):
             choose(name, getattr(self, name), SUPPORTS)
@@ -115,7 +116,7 @@ class Family:
 
     @property
     def elastic(self) -> Floats:
-        """Shares (m,) of the stiffness that are bending."""
+        """Shares (m,) of bending in the stiffness."""
         if self.bending is None:
             return np.ones(len(self.squared))
         largest = np.maximum(self.squared, np.finfo(float).tiny)
@@ -136,7 +137,7 @@ class PlateModes:
 
     @property
     def elastic(self) -> Floats:
-        """Shares (m,) of the stiffness that are bending, whose loss damps a mode."""
+        """Shares (m,) of bending in the stiffness; its loss damps a mode."""
         return np.concatenate([family.elastic for family in self.families])
 
     @property
@@ -153,7 +154,7 @@ class PlateModes:
         ])  # fmt: skip
 
     def on_grid(self, x: Floats, y: Floats) -> Floats:
-        """Shapes (x y, m) in kg^-1/2 at each x (x,) with each y (y,) in metre, y the faster."""
+        """Shapes (x y, m) in kg^-1/2 at each x (x,) with each y (y,) in metre, y faster."""
         each = [
             np.einsum("pi,ijm,qj->pqm", f.x(x), f.shapes, f.y(y), optimize=True)
             for f in self.families
@@ -162,16 +163,23 @@ class PlateModes:
 
 
 def plate_modes(plate: Plate, finest: float | Sequence[float] = FINEST) -> PlateModes:
-    """All modes of a plate that polynomials up to the wavenumber `finest` in rad/m, or one along
-    each side, make. The lowest are accurate, the highest only complete the static deflection. More
-    than `MOST_DOFS` degrees of freedom are a ValueError.
+    """Compute all modes of a plate that polynomials up to the wavenumber `finest` in rad/m
+    represent.
+
+    `finest` may differ along x and y. The lowest modes are accurate, the highest only complete the
+    static deflection. More than `MOST_DOFS` degrees of freedom raise a ValueError.
+
+    >>> stiffness = {"d11": 4e-4, "d22": 4e-4, "d12": 1.2e-4, "d66": 1.4e-4}
+    >>> plate = Plate(size_x=0.1, size_y=0.1, mass_per_area=0.08, **stiffness)
+    >>> plate_modes(plate, finest=150.0).frequencies[:3].round(1)  # Hz
+    array([28.2, 67.7, 67.7])
     """
     resolved, mirrored = np.broadcast_to(finest, 2), _symmetries(plate)
     bases = [_line_bases(plate, axis, resolved[axis], mirrored[axis]) for axis in (0, 1)]
     if (dofs := max(x.size * y.size for x, y in product(*bases))) > MOST_DOFS:
         raise ValueError(
-            f"a plate of {1e3 * plate.size_x:g} by {1e3 * plate.size_y:g} mm takes {dofs:,} "
-            f"degrees of freedom, the limit is {MOST_DOFS:,}; lower finest = {max(resolved):g}"
+            f"a plate of {1e3 * plate.size_x:g} by {1e3 * plate.size_y:g} mm needs {dofs:,} "
+            f"degrees of freedom, and the limit is {MOST_DOFS:,}; lower finest = {max(resolved):g}"
         )
     return PlateModes(plate=plate, families=tuple(_family(plate, x, y) for x, y in product(*bases)))
 
@@ -179,17 +187,13 @@ def plate_modes(plate: Plate, finest: float | Sequence[float] = FINEST) -> Plate
 def modal_motion(
     modes: PlateModes, frequencies: Floats, forces: Complex, modulus: ModulusLaw
 ) -> Complex:
-    """Steady modal coordinates q (f, m) in metre kg^1/2 of (diag(w_m^2) + (h - 1) B - w^2) q =
-    force, B the stiffness of bending between the modes and h its relative modulus.
+    """Steady modal coordinates q (f, m) in metre kg^1/2 under modal forces (f, m) in N kg^-1/2 at
+    frequencies (f,) in Hz.
 
-    Parameters
-    ----------
-    modes : PlateModes
-    frequencies : (f,) Hz
-    forces : (f, m) modal forces in N kg^-1/2
-    modulus : angular frequencies (...) in rad/s -> complex modulus (...) over that of the modes
-
-    Raises an ArithmeticError if coupled modes are not solved to `RESIDUAL`.
+    They solve (diag(w_m^2) + (h - 1) B - w^2) q = force, with the stiffness B of bending between
+    the modes and its relative modulus h: `modulus` maps angular frequencies (...) in rad/s to the
+    complex modulus (...) over that of the modes. Raises an ArithmeticError if coupled modes are not
+    solved to `RESIDUAL`.
     """
     w = 2 * np.pi * np.asarray(frequencies)
     added = np.broadcast_to(modulus(w) - 1, w.shape)
@@ -214,8 +218,8 @@ def modal_motion_apart(
 
 
 def _coupled(family: Family, w: Floats, added: Complex, forces: Complex) -> Complex:
-    """Modal coordinates (f, m) of a stretched plate, by GMRES, preconditioned by the low modes
-    together and the high ones apart.
+    """Modal coordinates (f, m) of a stretched plate, by GMRES. The preconditioner solves low modes
+    together and high modes separately.
     """
     assert family.bending is not None
     found, B = np.empty(forces.shape, np.complex128), family.bending
@@ -236,14 +240,13 @@ def _coupled(family: Family, w: Floats, added: Complex, forces: Complex) -> Comp
             found[line], failed = gmres(system, forces[line], M=before, rtol=RESIDUAL, maxiter=10)
             if failed:
                 raise ArithmeticError(
-                    f"the modes of a stretched plate are not solved to a residual of {RESIDUAL:g} "
-                    f"at {w[k] / 2 / np.pi:.4g} Hz; lower its loss"
+                    f"the coupled modes of a stretched plate do not converge to a residual of "
+                    f"{RESIDUAL:g} at {w[k] / 2 / np.pi:.4g} Hz; lower its loss"
                 )
     return found
 
 
 def _low_together(factor: Any, own: Complex, n: int, forces: Complex) -> Complex:
-    """Modal coordinates of the n low modes together, and of the others apart."""
     found = forces / own
     if n:
         found[:n] = linalg.lu_solve(factor, forces[:n], check_finite=False)
@@ -251,13 +254,12 @@ def _low_together(factor: Any, own: Complex, n: int, forces: Complex) -> Complex
 
 
 def _modal_forces(B: Floats, added: complex, diagonal: Floats, q: Complex) -> Complex:
-    """Modal forces of modal coordinates q (m,)."""
     bent = B @ np.column_stack([q.real, q.imag])  # real, which is faster
     return np.asarray(diagonal * q + added * (bent @ [1, 1j]))
 
 
 def _symmetries(plate: Plate) -> tuple[bool, bool]:
-    """Whether a plate is the same on both sides of its middle, along x and along y."""
+    """Whether a plate is symmetric about its middle, along x and along y."""
     clips = np.array(plate.clips).reshape(-1, 2)
 
     def same(mirror: tuple[int, int]) -> bool:
@@ -279,23 +281,23 @@ def _line_bases(plate: Plate, axis: int, finest: float, mirrored: bool) -> tuple
     if not (inner := _breaks(plate, axis, size)):
         return line_basis(size, ends, int(np.ceil(finest * size / 2)) + MARGIN, mirrored)
     breaks = np.array([-size / 2, *inner, size / 2])
-    degrees = [int(np.ceil(finest * piece / 2)) + BESIDE for piece in np.diff(breaks)]
+    degrees = [int(np.ceil(finest * piece / 2)) + CLIP_MARGIN for piece in np.diff(breaks)]
     return piecewise_basis(breaks, ends, degrees, mirrored)
 
 
 def _breaks(plate: Plate, axis: int, size: float) -> list[float]:
-    """Sides of the clips along an axis that are within the plate, in metre, and lines beside them:
-    at the corners of a clip the curvature has no bound.
+    """Sides of the clips along an axis within the plate, in metre, and lines next to them: at the
+    corners of a clip the curvature is unbounded.
     """
     reach = plate.clip_radius
     sides = [clip[axis] + turn * reach for clip in plate.clips for turn in (-1, 1) if reach]
-    kept = _apart([], sides, size / 2, NEARLY * reach)
+    kept = _apart([], sides, size / 2, SAME_SIDE * reach)
     beside = [at + turn * LAYER * reach for at in kept for turn in (-1, 1)]
     return sorted(_apart(kept, beside, size / 2, LAYER * reach / 2))
 
 
 def _apart(kept: Sequence[float], others: Sequence[float], end: float, gap: float) -> list[float]:
-    """Places and those of others that are farther than a gap from them and from both ends."""
+    """Places, and those of others that are farther than a gap from them and from both ends."""
     found = [-end, *kept, end]
     for place in sorted(others, key=abs):
         if abs(place) < end and all(abs(place - each) > gap for each in found):
@@ -323,9 +325,9 @@ def _family(plate: Plate, x: LineBasis, y: LineBasis) -> Family:
 
 
 def _modes(K: Floats, M: Floats) -> tuple[Floats, Floats]:
-    """Squared angular frequencies (m,) in rad2/s2 and shapes (n, m) of unit modal mass, ascending:
-    of M x = K x / w^2, as the error goes with the largest eigenvalue. A rigid plate's, 0, are
-    shifted.
+    """Squared angular frequencies (m,) in rad2/s2 and shapes (n, m) of unit modal mass, ascending.
+    Solves M x = K x / w^2, as the error goes with the largest eigenvalue; a shift allows rigid
+    motion.
     """
     shift = SHIFT * np.trace(K) / np.trace(M)
     inverse, shapes = linalg.eigh(M, K + shift * M, check_finite=False, overwrite_b=True)
@@ -349,7 +351,7 @@ def _stiffness(plate: Plate, x: LineBasis, y: LineBasis) -> tuple[Floats, Floats
 
 
 def _free_of_clips(plate: Plate, x: LineBasis, y: LineBasis) -> sparse.csr_array | Floats | None:
-    """Basis (n, r) of what leaves the clips at rest; None without clips."""
+    """Basis (n, r) of motion with the clips at rest; None without clips."""
     if not plate.clips:
         return None
     if plate.clip_radius:
@@ -363,11 +365,11 @@ def _free_of_clips(plate: Plate, x: LineBasis, y: LineBasis) -> sparse.csr_array
 
 
 def outside_clips(plate: Plate, x: LineBasis, y: LineBasis) -> Bools:
-    """Bools (x y,), y the faster, of products of functions that are zero on all clips."""
+    """Whether products (x y,) of functions, y faster, are zero on all clips."""
     found, reach = np.ones((x.size, y.size), bool), plate.clip_radius
     for along, across in plate.clips:
         moved = (
-            line.moved_within(at - reach, at + reach) for line, at in ((x, along), (y, across))
+            line.nonzero_within(at - reach, at + reach) for line, at in ((x, along), (y, across))
         )
         found &= ~np.outer(*moved)
     return found.ravel()

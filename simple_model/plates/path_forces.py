@@ -15,15 +15,15 @@ from simple_model.plates.polynomials import gauss_points
 from simple_model.typing import Complex, Floats
 
 MIDDLE = (0.0, 0.0)
-CLOSEST = 0.9  # standard deviations of the focal spot between Gauss points, about
-SPARE = 8  # more of them
+SPACING = 0.9  # of Gauss points, in standard deviations of the focal spot
+SPARE = 8  # more Gauss points
 
 
 def modal_path_forces(
     modes: PlateModes, pressure: MovingPressure, middle: Sequence[float] = MIDDLE
 ) -> Complex:
-    """Modal forces (n, m) in N kg^-1/2 of unit pressure on the path, by its harmonic; `middle` (2,)
-    in metre is the plate's.
+    """Modal forces (n, m) in N kg^-1/2 of unit pressure on the path, by harmonic of the path;
+    `middle` (2,) in metre is that of the plate.
     """
     knots, reach = path_samples(pressure), spot_reach(pressure.height, pressure.profile)
     detail = spot_detail(pressure.height, pressure.profile)
@@ -48,11 +48,11 @@ def plate_lines(
     middle: Sequence[float] = MIDDLE,
     path: Complex | None = None,
 ) -> tuple[Floats, Complex]:
-    """Frequencies (f,) in Hz and complex amplitudes (f, p) in metre of the lines of the steady
-    displacement at probes (p, 2) in metre of the scene, positive the way the pressure pushes.
+    """Lines of the steady displacement at probes (p, 2) in metre, positive the way the pressure
+    pushes: frequencies (f,) in Hz and complex amplitudes (f, p) in metre.
 
-    The modulus of bending is as of `modal_motion`, `middle` as of `modal_path_forces`, which are
-    `path` (n, m), if they are known.
+    The modulus of bending is as of `modal_motion`, `middle` as of `modal_path_forces`; `path` (n,
+    m) are the modal path forces if known.
     """
     path = modal_path_forces(modes, pressure, middle) if path is None else path
     frequencies, forces = load_lines(pressure).gather(path)
@@ -63,5 +63,5 @@ def plate_lines(
 def _gauss(low: float, high: float, detail: float) -> tuple[Floats, Floats]:
     """Gauss points and weights (k,) in metre between two places, for a detail in metre."""
     high = max(low, high)
-    count = int(np.ceil(np.pi / 2 * (high - low) / (CLOSEST * detail))) + SPARE
+    count = int(np.ceil(np.pi / 2 * (high - low) / (SPACING * detail))) + SPARE
     return gauss_points(np.array([low, high]), [count])

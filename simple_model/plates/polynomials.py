@@ -1,10 +1,10 @@
 """Polynomials on the pieces of a line that meet the supports of its ends, for Ritz's method.
 
-On one piece they are orthonormal combinations of Legendre polynomials P_n(2 x / a), of which
-n / (a / 2) resolves a wavenumber k. On several they are continuous with their slope, and each is
-zero on all pieces but one or two, so that what rests on a piece leaves some of them out: Hermite
-functions of the value and of the slope at each break, and bubbles within each piece (Babuska, Szabo
-and Katz, SIAM J Numer Anal 18:515 (1981)).
+On one piece they are orthonormal combinations of Legendre polynomials P_n(2 x / a), of which n / (a
+/ 2) resolves a wavenumber k. On several pieces they are continuous with their slope, and each is
+zero on all pieces but one or two, so that a piece at rest leaves some of them out: Hermite
+functions of value and slope at each break, and bubbles within each piece (Babuska, Szabo and Katz,
+SIAM J Numer Anal 18:515 (1981)).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,18 +12,20 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import legendre
+from scipy.linalg import null_space
 
 from simple_model.typing import Bools, Floats, Ints
 
 # Derivatives that are zero at an end.
 FIXED: Mapping[str, tuple[int, ...]] = {"clamped": (0, 1), "simply": (0,), "free": ()}
+NULL_RATIO = 1e-10  # of the largest singular value, below which a condition depends on others
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LineBasis:
-    """Functions u_i on the pieces of a line, of one symmetry or of none.
+    """Functions u_i on the pieces of a line, all of one symmetry or of none.
 
-    `breaks` (e + 1,) in metre from the middle: the ends of its pieces. `legendre` (e, n, i):
+    `breaks` (e + 1,) in metre from the middle: the ends of the pieces. `legendre` (e, n, i):
     coefficients in the orthonormal Legendre polynomials of each piece. Integrals (i, i): `mass` of
     u_i u_k, `slope` of u_i' u_k', `curvature` of u_i'' u_k'', `mixed` of u_i'' u_k.
     """
@@ -37,7 +39,7 @@ class LineBasis:
 
     @property
     def size(self) -> int:
-        """How many functions there are."""
+        """Number of functions."""
         return self.legendre.shape[2]
 
     @property
@@ -55,10 +57,6 @@ class LineBasis:
         d = _derivative(self.legendre.shape[1] - 1)
         return self._values(x, per_piece * (d @ self.legendre))
 
-    def integrals(self) -> Floats:
-        """Integrals (i,) of the functions along the line, in m^1/2."""
-        return np.asarray(np.sqrt(np.diff(self.breaks)) @ self.legendre[:, 0])
-
     def _values(self, x: Floats, legendre_coefficients: Floats) -> Floats:
         """Values (p, i) at x (p,) of functions with coefficients (e, n, i)."""
         x = np.asarray(x, np.float64)
@@ -72,15 +70,15 @@ class LineBasis:
             values[piece == e] = polynomials[piece == e] @ coefficients
         return values
 
-    def moved_within(self, low: float, high: float) -> Bools:
-        """Functions (i,) that are not zero everywhere between two breaks, in metre."""
+    def nonzero_within(self, low: float, high: float) -> Bools:
+        """Whether each function (i,) is nonzero between two breaks, in metre."""
         middles = (self.breaks[1:] + self.breaks[:-1]) / 2
         within = (low < middles) & (middles < high)
         return np.asarray((self.legendre[within] != 0).any(axis=(0, 1)))
 
 
 def gauss_points(breaks: Floats, counts: Sequence[int]) -> tuple[Floats, Floats]:
-    """So many Gauss points, and their weights, in metre on each piece of a line between breaks."""
+    """Gauss points and weights in metre, `counts` on each piece of a line between breaks."""
     points, weights = [], []
     for low, high, count in zip(breaks[:-1], breaks[1:], counts, strict=True):
         nodes, each = legendre.leggauss(count)
@@ -92,8 +90,8 @@ def gauss_points(breaks: Floats, counts: Sequence[int]) -> tuple[Floats, Floats]
 def line_basis(
     length: float, ends: Sequence[str], degree: int, split: bool
 ) -> tuple[LineBasis, ...]:
-    """Orthonormal functions, up to a degree, on one piece of a length in metre that meet the
-    supports of both ends: one basis or, `split`, that of even and that of odd functions.
+    """Orthonormal functions up to a degree, on one piece of a length in metre, that meet the
+    supports of both ends: one basis or, with `split`, one of even and one of odd functions.
     """
     n = np.arange(degree + 1)
     breaks = np.array([-length / 2, length / 2])
@@ -107,7 +105,7 @@ def piecewise_basis(
     breaks: Floats, ends: Sequence[str], degrees: Sequence[int], split: bool
 ) -> tuple[LineBasis, ...]:
     """Functions that are continuous with their slope at the breaks (e + 1,) of a line, in metre
-    from the middle, up to `degrees` (e,) of 3 or more on each piece; `split`, even and odd
+    from the middle, up to `degrees` (e,) of 3 or more on each piece; with `split`, even and odd
     functions in two bases.
     """
     return _pieces(breaks, ends, degrees, split, "clamped")
@@ -117,7 +115,7 @@ def continuous_basis(
     breaks: Floats, ends: Sequence[str], degrees: Sequence[int], split: bool
 ) -> tuple[LineBasis, ...]:
     """Functions that are continuous at the breaks of a line, with kinks there; otherwise as
-    `piecewise_basis`, with ends of "simply", which holds the value, or "free".
+    `piecewise_basis`, with ends that hold the value, "simply", or not, "free".
     """
     if len(breaks) == 2:
         return line_basis(float(np.ptp(breaks)), ends, degrees[0], split)
@@ -127,7 +125,7 @@ def continuous_basis(
 def _pieces(
     breaks: Floats, ends: Sequence[str], degrees: Sequence[int], split: bool, inner: str
 ) -> tuple[LineBasis, ...]:
-    """Bases of functions that are continuous in what a support of a bubble, `inner`, fixes."""
+    """Bases of functions that are continuous in what the support `inner` of a bubble fixes."""
     breaks = np.asarray(breaks, np.float64)
     nodal = _at_breaks(breaks, ends, degrees, FIXED[inner])
     functions = np.stack([*nodal, *_inner(degrees, (inner, inner))], axis=2)
@@ -156,8 +154,8 @@ def _basis(breaks: Floats, coefficients: Floats) -> LineBasis:
 def _at_breaks(
     breaks: Floats, ends: Sequence[str], degrees: Sequence[int], derivatives: Sequence[int]
 ) -> Iterator[Floats]:
-    """Coefficients (e, n) of a function of each value, and each slope, at a break that is not
-    fixed, orthogonal to the bubbles.
+    """Coefficients (e, n) of a function of each value, and each slope, that is free at a break,
+    orthogonal to the bubbles.
     """
     last, count = len(breaks) - 1, len(derivatives)
     of_piece = [
@@ -174,8 +172,8 @@ def _at_breaks(
 
 
 def _end_functions(degree: int, size: float, derivatives: Sequence[int]) -> Floats:
-    """Coefficients (2 d, n) of the smallest polynomials of one derivative of 1 at the low end of a
-    piece, then at the high end, the others of which are 0.
+    """Coefficients (2 d, n) of the smallest polynomials with one derivative of 1 at the low end of
+    a piece, then at the high end, and the other derivatives 0.
     """
     n = np.arange(degree + 1)
     rows = np.array(
@@ -187,7 +185,7 @@ def _end_functions(degree: int, size: float, derivatives: Sequence[int]) -> Floa
 
 
 def _inner(degrees: Sequence[int], ends: Sequence[str]) -> Iterator[Floats]:
-    """Coefficients (e, n) of the bubbles of each piece: orthonormal, each even or odd about its
+    """Coefficients (e, n) of the orthonormal bubbles of each piece, even or odd about its
     middle.
     """
     for piece, degree in enumerate(degrees):
@@ -200,8 +198,8 @@ def _inner(degrees: Sequence[int], ends: Sequence[str]) -> Iterator[Floats]:
 
 
 def _symmetric(functions: Floats) -> tuple[Floats, Floats]:
-    """Even and odd combinations (e, n, i) of functions (e, n, k), whose mirror images are among
-    them.
+    """Even and odd combinations (e, n, i) of functions (e, n, k), which include their mirror
+    images.
     """
     sign = np.where(np.arange(functions.shape[1]) % 2, -1.0, 1.0)
     mirrored = functions[::-1] * sign[:, None]
@@ -218,13 +216,16 @@ def _bubbles(degree: int, orders: Ints, ends: Sequence[str]) -> Floats:
     ends.
     """
     rows = [
-        _unit(_at_end(orders, derivative, side))
+        _at_end(orders, derivative, side)
         for end, side in zip(ends, (-1, 1), strict=True)
         for derivative in FIXED[end]
     ]
     coefficients = np.zeros((degree + 1, len(orders)))
     coefficients[orders, np.arange(len(orders))] = 1
-    return np.asarray(coefficients @ _null_space(np.array(rows).reshape(-1, len(orders))))
+    if rows:
+        unit = [row / np.linalg.norm(row) for row in rows]
+        coefficients = coefficients @ null_space(np.array(unit), rcond=NULL_RATIO)
+    return np.asarray(coefficients)
 
 
 def _at_end(orders: Ints, derivative: int, side: int) -> Floats:
@@ -234,22 +235,9 @@ def _at_end(orders: Ints, derivative: int, side: int) -> Floats:
     return np.asarray(value * (n * (n + 1) / 2) ** derivative)
 
 
-def _unit(row: Floats) -> Floats:
-    return np.asarray(row / np.linalg.norm(row))
-
-
-def _null_space(rows: Floats) -> Floats:
-    """Orthonormal columns (n, r) that are orthogonal to all rows (c, n)."""
-    if not len(rows):
-        return np.eye(rows.shape[1])
-    _, strength, known = np.linalg.svd(rows)
-    rank = int((strength > 1e-10 * strength[0]).sum())
-    return np.asarray(known[rank:].T)
-
-
 def _derivative(degree: int) -> Floats:
-    """Derivative (n, n) of orthonormal Legendre polynomials in themselves:
-    P_n' = sum (2 k + 1) P_k over k = n - 1, n - 3, ..., as (2 k + 1) P_k = P_(k+1)' - P_(k-1)'.
+    """Derivative (n, n) of orthonormal Legendre polynomials in themselves: P_n' = sum (2 k + 1) P_k
+    over k = n - 1, n - 3, ..., as (2 k + 1) P_k = P_(k+1)' - P_(k-1)'.
     """
     n = np.arange(degree + 1)
     below = (n[:, None] < n) & ((n[:, None] + n) % 2 == 1)

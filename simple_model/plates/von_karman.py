@@ -9,11 +9,11 @@ than bending waves, so the in-plane displacement (u, v) follows the deflection q
     iint A E : sym grad (du, dv) dA = 0
 
 (von Karman 1910; Chia, Nonlinear Analysis of Plates (1980), chapter 1). `in_plane` solves this for
-the stretching e of pairs of modes. The strain that remains is expanded in states of stress that are
-orthonormal in energy, the most energetic first. H_k is the stiffness that the k-th state adds to
-bending. The energy of stretching, of fourth order in z, is thereby a sum of squares (the same with
-Airy's function: Thomas and Bilbao, J Sound Vib 315:569 (2008); Ducceschi and Touze, J Sound Vib
-344:313 (2015)).
+the stretching e of pairs of modes. The remaining strain is expanded in states of stress that are
+orthonormal in energy, the most energetic first. H_k is the stiffness that state k adds to bending.
+The energy of stretching, of fourth order in z, is thereby a sum of squares (the same with Airy's
+function: Thomas and Bilbao, J Sound Vib 315:569 (2008); Ducceschi and Touze, J Sound Vib 344:313
+(2015)).
 
 Only the lowest modes stretch the plate. The others keep their stiffness at rest.
 """
@@ -34,12 +34,12 @@ from simple_model.plates.in_plane import IN_PLANE, Grid, InPlane
 from simple_model.plates.modes import Family, Plate, PlateModes
 from simple_model.typing import Floats, Ints
 
-MARGIN = 8  # polynomials beyond those that products of two modes require
-BESIDE = 4  # the same on a piece between the sides of clips
+MARGIN = 8  # polynomials more than products of two modes require
+CLIP_MARGIN = 4  # the same on a piece between the sides of clips
 MOST_PAIRS = 500  # of modes, of one symmetry, from which states of stress are made
-EQUAL_BELOW = 2 * np.pi * 200.0  # rad/s: modes below it are taken to have equal amplitudes
-SMALLEST_STATE = 0.03  # of the energy norm of the largest
-ROUND_OFF = 1e-10  # of the largest energy of states of stress
+EQUAL_BELOW = 2 * np.pi * 200.0  # rad/s: modes below it count as equally strong
+SMALLEST_STATE = 0.03  # of the largest energy norm of a state of stress
+ROUND_OFF = 1e-10  # of the largest energy of a state of stress
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -53,8 +53,8 @@ class KarmanPlate:
     squared : (r,) rad2/s2, their squared angular frequencies
     bending : (r, r) rad2/s2, stiffness of bending between them
     H : (k, r, r) J^-1/2 s^-2, stiffness that each state of stress adds, in coordinates in kg^1/2 m
-    symmetries : (r,) and (k,) int, ascending: bits 2 and 1 are set where a mode, or a state, is odd
-        along x and y. A state acts only between modes of which one has a bit that it has set.
+    symmetries : (r,) and (k,) int, ascending: bits 2 and 1 mark modes, or states, that are odd
+        along x and y. A state acts between modes of which exactly one has each of its bits.
     left_out : share of the energy norm of stretching in the states that are left out
     """
 
@@ -68,8 +68,8 @@ class KarmanPlate:
 
     @cached_property
     def _parts(self) -> list[tuple[slice, Floats, Ints]]:
-        """For the modes of each symmetry: which they are, the nonzero columns of H as a matrix (p,
-        columns), and where its product (p,) belongs in (k r,).
+        """For the modes of each symmetry: their slice, the nonzero columns of H as a matrix (p,
+        columns), and the places in (k r,) of its product (p,).
         """
         of_modes, of_states = self.symmetries
         found = []
@@ -94,9 +94,9 @@ class KarmanPlate:
 def karman_plate(
     modes: PlateModes, thickness: float, count: int = 60, *, in_plane: str = "held"
 ) -> KarmanPlate:
-    """Stiffness of a homogeneous plate at large deflection, for any load.
+    """Compute the stiffness of a homogeneous plate at large deflection, for any load.
 
-    Of a square plate under a uniform pressure, 60 modes give the deflection within 0.1 % up to 4
+    For a square plate under a uniform pressure, 60 modes give the deflection within 0.1 % up to 4
     times its thickness. Motion needs the modes up to about twice the highest frequency of the load.
 
     Parameters
@@ -104,7 +104,7 @@ def karman_plate(
     modes : PlateModes
     thickness : metre; the membrane stiffness is 12 / thickness^2 times the bending stiffness
     count : number of modes that stretch the plate, the lowest
-    in_plane : what supported edges do to the in-plane displacement: "held" fixes it, "sliding"
+    in_plane : effect of supported edges on the in-plane displacement: "held" fixes it, "sliding"
         fixes only its component across the edge, "movable" leaves it free. Clips with a radius
         always fix it.
 
@@ -114,7 +114,9 @@ def karman_plate(
     if not (np.isfinite(thickness) and thickness > 0):
         raise ValueError(f"thickness = {thickness} m must be finite and above 0")
     if not 1 <= count <= len(modes.squared):
-        raise ValueError(f"count = {count} must be from 1 to the {len(modes.squared)} modes")
+        raise ValueError(
+            f"count = {count} of stretching modes must be from 1 to {len(modes.squared)}"
+        )
     chosen = np.sort(np.argsort(modes.squared, kind="stable")[:count])
     squared, slopes = modes.squared[chosen], _Slopes.of(modes, chosen)
     reach = 1 / np.maximum(squared, EQUAL_BELOW**2)
@@ -137,14 +139,6 @@ def membrane_stiffness(plate: Plate, thickness: float) -> Floats:
     bending = np.diag([plate.d11, plate.d22, plate.d66])
     bending[0, 1] = bending[1, 0] = plate.d12
     return np.asarray(12 / thickness**2 * bending)
-
-
-def area_forces(modes: PlateModes) -> Floats:
-    """Modal forces (m,) in N kg^-1/2 of a uniform pressure of 1 Pa."""
-    return np.concatenate([
-        np.einsum("i,ijm,j->m", f.x.integrals(), f.shapes, f.y.integrals(), optimize=True)
-        for f in modes.families
-    ])  # fmt: skip
 
 
 def _bending(modes: PlateModes, chosen: Ints) -> Floats:
@@ -215,7 +209,7 @@ class _Slopes:
 def _degrees(
     families: Sequence[tuple[Family, Floats]], breaks: Sequence[Floats]
 ) -> list[list[int]]:
-    """Degrees of polynomials, on each piece along x and y, that resolve products of two modes."""
+    """Degrees of polynomials on each piece along x and y that resolve products of two modes."""
     largest = np.zeros(2)
     for f, shapes in families:
         forms = (f.x.mass, f.y.mass), (f.x.slope, f.y.mass), (f.x.mass, f.y.slope)
@@ -225,7 +219,7 @@ def _degrees(
         for axis, slope in enumerate(slopes):
             largest[axis] = max(largest[axis], np.sqrt((slope / moved).max(initial=0.0)))
     return [
-        [int(np.ceil(k * piece)) + (MARGIN if len(b) == 2 else BESIDE) for piece in np.diff(b)]
+        [int(np.ceil(k * piece)) + (MARGIN if len(b) == 2 else CLIP_MARGIN) for piece in np.diff(b)]
         for k, b in zip(largest, breaks, strict=True)
     ]
 
@@ -234,7 +228,7 @@ def _states_of_stress(
     problem: InPlane, slopes: _Slopes, reach: Floats, turn: int
 ) -> tuple[Floats, Floats]:
     """States of stress of one symmetry, orthonormal in energy, from the strongest pairs of modes:
-    the energy (k,) of stretching in each, relative, and the stiffness H (k, r, r).
+    relative energy (k,) of stretching in each, and stiffness H (k, r, r).
     """
     i, j = slopes.pairs(turn)
     order = np.argsort(-reach[i] * reach[j], kind="stable")[:MOST_PAIRS]

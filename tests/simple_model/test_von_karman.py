@@ -18,7 +18,8 @@ from simple_model.plates.karman_motion import (
 )
 from simple_model.plates.modes import Plate, plate_modes
 from simple_model.plates.path_forces import plate_lines
-from simple_model.plates.von_karman import area_forces, karman_plate
+from simple_model.plates.polynomials import gauss_points
+from simple_model.plates.von_karman import karman_plate
 
 YOUNG, THICKNESS, SIDE, MASS = 4e9, 1e-4, 0.1, 0.08  # Pa, m, m, kg/m2
 FRAME = ("left", "right", "front", "back")
@@ -64,7 +65,12 @@ def resting(karman, forces):
 
 def middle_deflection(karman, pressure):
     """Deflection of the middle under a uniform pressure, over the thickness."""
-    q = resting(karman, pressure * area_forces(karman.modes))
+    plate = karman.modes.plate
+    (x, of_x), (y, of_y) = (
+        gauss_points(np.array([-size / 2, size / 2]), [80]) for size in (plate.size_x, plate.size_y)
+    )
+    forces = np.outer(of_x, of_y).ravel() @ karman.modes.on_grid(x, y)
+    q = resting(karman, pressure * forces)
     return float(karman.modes.at([[0.0, 0.0]])[0] @ q) / THICKNESS
 
 
