@@ -56,11 +56,11 @@ def _read(model: str, history: Callable[..., Floats], scene: Scene, times: Float
     values = np.empty((len(times), len(depths)))
     for depth in np.unique(depths).tolist():
         here = depths == depth
-        components = sum(
+        components = [
             history(field, pressure, scene.probe_points[here], times)
             for field, pressure in zip(fields_read(scene, depth), scene.loads, strict=True)
-        )
-        values[:, here] = asked.waveforms(components, int(here.sum()))
+        ]
+        values[:, here] = asked.waveforms(np.sum(components, axis=0), int(here.sum()))
     effort = Effort(seconds={"evaluate": time.perf_counter() - started}, steps=len(times))
     return Response(
         model=model, times=times, probes=scene.probe_points, quantity=asked.name, values=values,
