@@ -258,7 +258,7 @@ def test_loads_that_make_no_sense_are_refused():
         ('kind = "shear"\ndirection = [1, 0, 0]', "must be 2 finite numbers, not all 0, or path"),
         ('kind = "shear"\ndirection = "path"', "rests or jumps from point to point"),
         ('kind = "point_force"', "must be a finite number above 0; give force_n"),
-        ('kind = "point_force"\nforce_n = 1\nwidth_mm = 0.01', "is outside 0.2..20 mm"),
+        ('kind = "point_force"\nforce_n = 1\nwidth_mm = 0.01', "is outside 0.2 to 20 mm"),
         ('kind = "point_force"\nforce_n = 1\nwidth_mm = 0', "width_mm = 0 is no contact"),
         ('kind = "point_force"\nforce_n = 1\ndirection = [0, 0, 0]', "must be 3 finite numbers"),
         ('kind = "point_force"\nforce_n = 1\n[focus]\nheight_mm = 300', "focus"),

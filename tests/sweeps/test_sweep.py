@@ -53,7 +53,7 @@ def test_a_failing_combination_is_a_row_with_its_error(scene):
     failed = [row["error"] for row in rows if row["status"] == "failed"]
     assert (len(rows), len(failed)) == (12, 8)
     assert sum("off the body" in error for error in failed) == 4
-    assert sum("outside 0..60 mm" in error for error in failed) == 4
+    assert sum("outside 0 to 60 mm" in error for error in failed) == 4
     words = ["body.thickness_mm=inf", "tacton.size_mm=11", "--model", "fem", "--element-size", 15]
     assert "inf has no mesh" in swept(*words, out="another")[0]["error"]
 
