@@ -12,8 +12,8 @@ from math import isfinite
 
 import numpy as np
 
-from simple_model import Tacton, Trajectory, evenly
-from simple_model.choices import meant
+from simple_model import Tacton, Trajectory, even_phases
+from simple_model.choices import suggestion
 from simple_model.load.tacton import LONGEST, MOST_FOCI
 from skinwave.patterns.pattern import Options, Pattern, aliased, loudness, one_height
 from skinwave.scene.scene import Scene
@@ -105,7 +105,7 @@ def recorded(times: Floats, places: Floats, levels: Floats, *, hold: bool = Fals
         levels=tuple(held[1].ravel().tolist()),
         hold=hold,
     )
-    return Tacton(duration=min(last, LONGEST), trajectory=path, foci=evenly(n))
+    return Tacton(duration=min(last, LONGEST), trajectory=path, foci=even_phases(n))
 
 
 def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
@@ -163,7 +163,7 @@ def _column(word: str) -> tuple[str, float]:
         units = UNITS.get(name, UNITS["lengths"] if name.endswith("_m") else {})
         if match := re.fullmatch(rf"({words})(?: ({'|'.join(units)}))?", plain):
             return name, units.get(match[2], 1.0)
-    hint = meant(word, COLUMNS) or f"; the columns are {','.join(COLUMNS)}"
+    hint = suggestion(word, COLUMNS) or f"; the columns are {','.join(COLUMNS)}"
     raise ValueError(f"column '{word[:40]}' is unknown{hint}")
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from simple_model import drawing
 from simple_model.choices import choose
-from simple_model.numbers import counted
+from simple_model.numbers import plural
 from simple_model.response import library
 from skinwave.models.options import SolveOptions
 from skinwave.scene.file import dumps
@@ -96,7 +96,7 @@ class SweepTable:
         return ax
 
     def __repr__(self) -> str:
-        text = f"{counted(len(self), 'run')} over {', '.join(self.varied)}"
+        text = f"{plural(len(self), 'run')} over {', '.join(self.varied)}"
         text += f"; {len(self.columns)} columns"
         return f"<SweepTable: {text}{f', {len(self.failed)} failed' * bool(self.failed)}>"
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from simple_model.numbers import counted, interval, percent, significant
+from simple_model.numbers import interval, percent, plural, significant
 from skinwave.report.figures import png
 from skinwave.scene.distributions import Spread
 from skinwave.scene.scene import Scene
@@ -97,7 +97,7 @@ def sentences(found: Ensemble) -> list[str]:
     x, y = (1e3 * z for z in found.scene.probes[p])
     low, _, median, _, high = quantity.per_unit * percentiles(found.rms)[:, p]
     text = [
-        f"{n} samples of {counted(d, 'uncertain number')}, {found.method.words}.",
+        f"{n} samples of {plural(d, 'uncertain number')}, {found.method.words}.",
         f"RMS at ({x:g}, {y:g}) mm: median {significant(median)} {quantity.shown}, in nine of ten "
         f"samples {interval(low, high, 3)} {quantity.shown}.",
     ]
@@ -120,7 +120,7 @@ def write_sampled(
     """
     done = finished(rows)
     failed = len(rows) - len(done)
-    text = f"{len(done)} runs of {counted(len(spreads), 'uncertain number')}."
+    text = f"{len(done)} runs of {plural(len(spreads), 'uncertain number')}."
     text += f" {failed} failed and are left out." if failed else ""
     numbers = [(s.key, f"{significant(s.value)}: {s.distribution.words}") for s in spreads]
     parts: list[Part] = [Table(["key", "distribution"], numbers)]
