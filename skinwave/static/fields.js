@@ -1,14 +1,14 @@
-// Fields of bounded bodies on a square grid, place after place: value m of place p at [p * count + m],
-// and their motion under a load.
+// Fields of bounded bodies on a square grid, and their motion under a load. Value m of place p is at
+// [p * count + m].
 
 import { loadLines, spotWidth } from "./load.js";
-import { divided, lagrange } from "./numeric.js";
+import { cached, divided, lagrange, zeros } from "./numeric.js";
 import { oscillation, underRhythm } from "./time.js";
 
 const POINTS = 8, STEPS = Array.from({ length: POINTS }, (_, k) => k); // of polynomials between places
-const LOOKED = 12, UNHEARD = 2e-3; // places of the path, and the share of the strongest line there
+const PATH_PLACES = 12, NEGLIGIBLE_ON_MAPS = 2e-3; // places of the path; of the strongest line there
 
-/** The square grid of a pack, its places and what is on the body. */
+/** The square grid of a pack: its places, and which of them are on the body. */
 export class Grid {
   constructor({ step, side, inside }) {
     Object.assign(this, { step, side, inside, half: step * (side - 1) / 2 });
@@ -21,7 +21,7 @@ export class Grid {
     return this.inside[row * this.side + column] === "1";
   }
 
-  /** Places of the grid about x, y in metre, and their shares in an interpolated value. */
+  /** Places of the grid around x, y in metre, and their weights in an interpolated value. */
   stencil(x, y) {
     const across = neighbours((x + this.half) / this.step, this.side);
     const along = neighbours((y + this.half) / this.step, this.side);
@@ -35,7 +35,7 @@ export class Grid {
     return { places, shares };
   }
 
-  /** Values (count,) at a place of fields with `count` values at each. */
+  /** Values (count,) at x, y in metre of fields with `count` values at each place. */
   at(fields, count, x, y) {
     const { places, shares } = this.stencil(x, y), found = new Float64Array(count);
     for (let k = 0; k < places.length; k++) {
@@ -45,27 +45,24 @@ export class Grid {
     return found;
   }
 
-  /** Lines {re, im} (l, p) of the grid's places at others (l, y, x); not a number off the body. */
-  resampled({ re, im }, count, xs, ys) {
+  /** Lines {re, im} (l, y, x) at other places, from those of the grid (l, p); NaN off the body. */
+  resampled(lines, count, xs, ys) {
     const n = xs.length * ys.length, own = this.side * this.side;
-    const found = { re: new Float32Array(count * n), im: new Float32Array(count * n) };
-    for (let k = 0; k < n; k++) {
-      const x = xs[k % xs.length], y = ys[Math.floor(k / xs.length)], on = this.isInside(x, y);
-      const { places, shares } = on ? this.stencil(x, y) : {};
-      for (let l = 0; l < count; l++) {
-        let a = on ? 0 : NaN, b = a;
-        for (let j = 0; on && j < places.length; j++) {
-          a += shares[j] * re[l * own + places[j]];
-          b += shares[j] * im[l * own + places[j]];
-        }
-        found.re[l * n + k] = a;
-        found.im[l * n + k] = b;
+    const stencils = Array.from({ length: n }, (_, k) => {
+      const x = xs[k % xs.length], y = ys[Math.floor(k / xs.length)];
+      return this.isInside(x, y) ? this.stencil(x, y) : null;
+    });
+    const [re, im] = [lines.re, lines.im].map((values) => {
+      const made = new Float32Array(count * n);
+      for (let l = 0, to = 0; l < count; l++) {
+        for (let k = 0; k < n; k++, to++) made[to] = interpolated(values, l * own, stencils[k]);
       }
-    }
-    return found;
+      return made;
+    });
+    return { re, im };
   }
 
-  /** Fields under a Gaussian of amplitude 1 and this width in metre: forces of a focal spot of 1 Pa. */
+  /** Fields smoothed by a Gaussian spot of 1 Pa and this width in metre: its forces on them. */
   smoothed(fields, count, width) {
     const { side, step } = this, reach = Math.ceil(5 * width / step);
     const taps = Float64Array.from({ length: 2 * reach + 1 },
@@ -87,13 +84,22 @@ export class Grid {
   }
 }
 
-/** Weights of POINTS neighbours of a place (in steps of the grid) and the first of them. */
+/** Value at a stencil of the values that begin at an index; NaN without a stencil. */
+function interpolated(values, from, stencil) {
+  if (!stencil) return NaN;
+  const { places, shares } = stencil;
+  let sum = 0;
+  for (let j = 0; j < places.length; j++) sum += shares[j] * values[from + places[j]];
+  return sum;
+}
+
+/** Index of the first of POINTS neighbours of a place in steps of the grid, and their weights. */
 function neighbours(place, side) {
   const first = Math.min(Math.max(Math.floor(place) - POINTS / 2 + 1, 0), side - POINTS);
   return { first, weights: lagrange(STEPS, Math.min(Math.max(place, 0), side - 1) - first) };
 }
 
-/** Rows (m, places on the body) as they are packed, place after place; zero off the body. */
+/** Fields (places, m), zero off the body, from rows (m, places on the body) of a pack. */
 export function byPlace(rows, count, inside) {
   const found = new Float32Array(inside.length * count);
   for (let p = 0, k = 0; p < inside.length; p++) {
@@ -106,7 +112,7 @@ export function byPlace(rows, count, inside) {
   return found;
 }
 
-/** Forces of a focal spot on the fields of a body that take up the load. */
+/** Forces of a focal spot on the fields through which the load acts on a body. */
 export class PathForces {
   constructor(grid, fields, width) {
     Object.assign(this, { grid, fields, width, smoothed: new Map(), paths: new Map() });
@@ -115,31 +121,23 @@ export class PathForces {
   /** Forces (q, width) of 1 Pa at the samples of a path. */
   along(load, samples) {
     const { grid, width } = this, count = samples.x.length;
-    return kept(this.paths, samplesKey(load, samples), () => {
-      const fields = kept(this.smoothed, load.height,
-        () => grid.smoothed(this.fields, width, spotWidth(load.height)));
+    return cached(this.paths, samplesKey(load, samples), () => {
+      const fields = cached(this.smoothed, load.height,
+        () => grid.smoothed(this.fields, width, spotWidth(load.height)), 4);
       const forces = new Float32Array(count * width);
       for (let q = 0; q < count; q++) {
         forces.set(grid.at(fields, width, samples.x[q], samples.y[q]), q * width);
       }
       return forces;
-    });
+    }, 4);
   }
-}
-
-/** Value of a key in a map that keeps a few; made if it is not there. */
-function kept(known, key, make) {
-  if (!known.has(key)) {
-    if (known.size > 3) known.clear();
-    known.set(key, make());
-  }
-  return known.get(key);
 }
 
 /**
- * Motion of a body under a load. The body has `values` of its fields (place, width), their `pushed`
- * PathForces and `solve(f, force)`, the complex amplitudes of the fields; for motion from rest, `poles`
- * (p,), the forces on them {ahead, back} of a line at positive and negative frequency, and `outputs`.
+ * Motion of a body under a load. The body has `values` of its fields (place, width), PathForces as `pushed`
+ * and `solve(f, force)`, which gives the complex amplitudes of the fields. For motion from rest it has
+ * `poles` (p,), `onPoles(force)`, the forces on them {ahead, back} at positive and negative frequency, and
+ * `outputs(values)`, the poles' fields at a place.
  */
 export class FieldMotion {
   constructor(body, load) {
@@ -157,7 +155,7 @@ export class FieldMotion {
       return { re, im };
     });
     this.amplitudes = this.forces.map((force, l) => body.solve(f[l], force));
-    this.first = f[0] === 0 ? 1 : 0; // after the mean
+    this.first = f[0] === 0 ? 1 : 0; // `f` leaves out the mean
     this.f = f.slice(this.first);
   }
 
@@ -174,7 +172,7 @@ export class FieldMotion {
   onGrid(xs, ys) {
     const { values, width, grid } = this.body, n = grid.side ** 2;
     const re = new Float32Array(this.f.length * n), im = new Float32Array(re.length);
-    for (const l of heard(this)) {
+    for (const l of mappedLines(this)) {
       const { re: qr, im: qi } = this.amplitudes[l + this.first];
       for (let p = 0, k = 0; p < n; p++) {
         let a = 0, b = 0;
@@ -196,7 +194,7 @@ export class FieldMotion {
     this.states ??= this.forces.map((force, l) => overPoles(body.poles, body.onPoles(force), f[l]));
     const steady = oscillation(f, this.amplitudes.map((each) => summed(own, each)), times);
     const lag = () => oscillation(f, this.states.map((state, l) => (
-      read(outputs, overPoles(body.poles, state, f[l])))), times);
+      stateAt(outputs, overPoles(body.poles, state, f[l])))), times);
     return underRhythm(this.load, times, steady, lag,
       (start, jump, bend) => ({ poles: body.poles, amplitudes: this.startOf(outputs, start, jump, bend) }));
   }
@@ -205,7 +203,7 @@ export class FieldMotion {
   startOf(outputs, start, jump, bend) {
     const { body } = this, found = zeros(outputs.re.length), { re, im } = found;
     this.lines.f.forEach((f, l) => {
-      const turn = 2 * Math.PI * f * start, c = Math.cos(turn), s = Math.sin(turn);
+      const angle = 2 * Math.PI * f * start, c = Math.cos(angle), s = Math.sin(angle);
       const add = ({ ahead, back }, share) => {
         for (let p = 0; p < re.length; p++) {
           re[p] += share * ((ahead.re[p] + back.re[p]) * c - (ahead.im[p] - back.im[p]) * s);
@@ -224,9 +222,7 @@ export class FieldMotion {
   }
 }
 
-export const zeros = (count) => ({ re: new Float64Array(count), im: new Float64Array(count) });
-
-/** States ahead / (i w - pole) and back / (-i w - pole) (p,) at a frequency in Hz. */
+/** States {ahead / (i w - pole), back / (-i w - pole)} (p,) at a frequency in Hz. */
 export function overPoles(poles, { ahead, back }, f) {
   const omega = 2 * Math.PI * f, over = ({ re, im }, w) => {
     const found = zeros(re.length);
@@ -238,8 +234,8 @@ export function overPoles(poles, { ahead, back }, f) {
   return { ahead: over(ahead, omega), back: over(back, -omega) };
 }
 
-/** Sum [re, im] over poles of outputs times a state ahead, and the conjugate of that back. */
-function read(outputs, { ahead, back }) {
+/** Sum [re, im] over poles of outputs times the state ahead plus the conjugate for the state back. */
+function stateAt(outputs, { ahead, back }) {
   let a = 0, b = 0;
   for (let p = 0; p < outputs.re.length; p++) {
     a += outputs.re[p] * (ahead.re[p] + back.re[p]) - outputs.im[p] * (ahead.im[p] + back.im[p]);
@@ -258,18 +254,18 @@ function summed(own, { re, im }) {
   return [a, b];
 }
 
-/** Indices of the lines of a motion that are not negligible along the path: those that maps show. */
-function heard(motion) {
-  const { x, y } = motion.lines.samples, step = Math.ceil(x.length / LOOKED);
+/** Indices of the lines of a motion that maps show: those that are not negligible along the path. */
+function mappedLines(motion) {
+  const { x, y } = motion.lines.samples, step = Math.ceil(x.length / PATH_PLACES);
   const largest = new Float64Array(motion.f.length);
   for (let q = 0; q < x.length; q += step) {
     const { re, im } = motion.at(x[q], y[q]);
     re.forEach((value, l) => { largest[l] = Math.max(largest[l], Math.hypot(value, im[l])); });
   }
   const strongest = Math.max(...largest);
-  return [...largest.keys()].filter((l) => largest[l] > UNHEARD * strongest);
+  return [...largest.keys()].filter((l) => largest[l] > NEGLIGIBLE_ON_MAPS * strongest);
 }
 
-/** Text that is the same for loads whose foci pass the same samples, however fast. */
+/** Key that is the same for loads with the same samples of the path, at any speed. */
 export const samplesKey = ({ path, foci, height }, { x }) => JSON.stringify([
   { ...path, speed: Boolean(path.speed), drawn: 0 }, foci.length > 1 ? foci : 1, height, x.length]);

@@ -1,14 +1,15 @@
-// The moving load of a Tacton: its path, its modulation, and its spectral lines.
-// The same formulas as simple_model: trajectory, tacton, drive, pressure, load_spectrum.
+// The moving load of a Tacton: its path, its modulation and its spectral lines, as in simple_model.load.
 
-import { fourier, indexIn } from "./numeric.js";
+import { fourier, indexIn, unitCircle, zeros } from "./numeric.js";
 
 const TAU = 2 * Math.PI;
-const FEWEST_KNOTS = 132; // positions along a closed path: all harmonics below 66 f_d
-const KNOTS_PER_WIDTH = 8; // of the focal spot
-const JUMP_RATE = 25000; // positions a second of a path that jumps; at most, of joined paths
+const FEWEST_SAMPLES = 132; // of a closed path: enough for all harmonics below 66 f_d
+const SAMPLES_PER_WIDTH = 8; // of the focal spot
+const JUMP_RATE = 25000; // samples per second of a path that jumps; the most of joined paths
 const ROUND = 132; // straight parts of a circle that is joined to other paths (simple_model.joined)
-const PHASES = 8; // of each sinusoid; more than twice the degree of a drive law
+const SIDES = { point: 1, line: 2, triangle: 3, square: 4, circle: ROUND }; // of a joined path
+const PHASES = 8; // of each sinusoid: more than twice the degree of a drive law
+const NEGLIGIBLE_PART = 1e-6; // of the strength of a line
 const ROOT3 = Math.sqrt(3);
 const CORNERS = {
   line: [[-0.5, 0], [0.5, 0]],
@@ -27,7 +28,7 @@ const DRIVES = {
   linear: (amplitude, m) => amplitude * m,
 };
 
-/** Value at x of straight lines between (xs, ys), constant beyond. */
+/** Value at x of straight lines between (xs, ys), constant outside. */
 function interpolate(x, xs, ys) {
   const k = indexIn(xs, x), step = xs[k + 1] - xs[k];
   return ys[k] + (ys[k + 1] - ys[k]) * (step ? Math.min(Math.max((x - xs[k]) / step, 0), 1) : 1);
@@ -38,7 +39,7 @@ const FORCE_SLOPES = [0.008225, 0.00830480734497, 0.00721852431146, 0.0051345147
   0.00298545060529, 0.00216984290623, 0.000979734391169, 0, -0.000302259559676, -0.00137362001564,
   -0.00211526538281, -0.00224260249554, -0.00197849343265, -0.00145039039039, -0.0009615];
 
-/** Intensity at a height in metre relative to 200 mm. */
+/** Intensity of the focus at a height in metre, relative to that at 200 mm. */
 export function relativeIntensity(height) {
   const x = Math.min(Math.max(1e3 * height, HEIGHTS[0]), HEIGHTS[HEIGHTS.length - 1]);
   const k = indexIn(HEIGHTS, x), h = HEIGHTS[k + 1] - HEIGHTS[k], t = (x - HEIGHTS[k]) / h;
@@ -55,7 +56,7 @@ function lobeWidth(height) {
 /** Standard deviation in metre of the Gaussian focal spot at a height in metre. */
 export const spotWidth = (height) => 4.35e-3 * lobeWidth(height) / lobeWidth(0.2);
 
-/** Relative pressure of a round focal spot at a squared distance in m2 from the focus. */
+/** Relative pressure of a focal spot at a squared distance in m2 from its middle. */
 export function spot(squared, height, profile) {
   if (profile === "gaussian") return Math.exp(-squared / (2 * spotWidth(height) ** 2));
   const angle = Math.PI * Math.sqrt(Math.max(squared, 1e-24)) / lobeWidth(height);
@@ -65,7 +66,7 @@ export function spot(squared, height, profile) {
 const isClosed = (points) => points.length > 2
   && points[0][0] === points[points.length - 1][0] && points[0][1] === points[points.length - 1][1];
 
-/** Corners of a path in metre, and whether a period is one run along them. */
+/** Corners of a path in metre, and whether a period passes them once, not there and back. */
 function outline(path) {
   if (path.shape === "polyline") {
     return { corners: path.points, runsOn: path.sweep === "one_way" || isClosed(path.points) };
@@ -84,16 +85,14 @@ function arc(corners) {
   return along;
 }
 
-const sidesOf = ({ shape }) => ({ point: 1, line: 2, triangle: 3, square: 4, circle: ROUND })[shape];
-
 /**
- * Corners {points: [[x, y]] in metre, times in s} of foci on paths of their own, joined: one period of
- * each path after the other, `drawn` times a second each. Foci at even phases of it are on one each.
+ * Corners {points: [[x, y]] in metre, times in s} of the paths of several foci, joined one after the other.
+ * Each path takes 1 / `drawn` s. Foci at even phases of the whole are on one path each.
  */
 export function joinedCorners({ paths, drawn }) {
   const points = [], times = [];
   paths.forEach((path, before) => {
-    const at = positionOf({ ...path, speed: 1 }), sides = sidesOf(path);
+    const at = positionOf(path), sides = SIDES[path.shape];
     for (let k = 0; k <= sides; k++) {
       points.push(at(k / sides));
       times.push((before + k / sides) / drawn);
@@ -102,17 +101,15 @@ export function joinedCorners({ paths, drawn }) {
   return { points, times };
 }
 
-/** Length in metre of one period of a path. */
+/** Length in metre of one period of a path that is not joined. */
 function pathLength(path) {
   if (path.shape === "point") return 0;
-  if (path.shape === "joined") return arc(joinedCorners(path).points).pop();
   if (path.shape === "circle") return Math.PI * path.size;
   const { corners, runsOn } = outline(path);
-  const along = arc(corners);
-  return along[along.length - 1] * (runsOn ? 1 : 2);
+  return arc(corners).pop() * (runsOn ? 1 : 2);
 }
 
-/** Periods of a path per second, Hz; 0 if the focus does not move. Of joined paths, of all together. */
+/** Frequency in Hz at which a path repeats, joined paths together; 0 if the focus rests. */
 export function drawingFrequency(path) {
   if (path.shape === "joined") return path.drawn / path.paths.length;
   const length = pathLength(path);
@@ -122,11 +119,10 @@ export function drawingFrequency(path) {
 /** Position [x, y] in metre as a function of the fraction 0..1 of the period. */
 export function positionOf(path) {
   if (path.shape === "joined") {
-    const each = path.paths.map(polygonOf);
-    return (p) => {
-      const turn = Math.floor(p * each.length + 1e-9);
-      return each[turn % each.length](Math.max(p * each.length - turn, 0));
-    };
+    const { points, times } = joinedCorners(path);
+    const [xs, ys] = [0, 1].map((axis) => points.map((at) => at[axis]));
+    const period = path.paths.length / path.drawn;
+    return (p) => [xs, ys].map((own) => interpolate(p * period + 1e-12, times, own)); // after a jump, not before
   }
   const [cx, cy] = path.centre || [0, 0];
   if (path.shape === "point" || pathLength(path) === 0) {
@@ -146,21 +142,10 @@ export function positionOf(path) {
   };
 }
 
-/** Position on a named shape as a function of the fraction of its period, a circle as a polygon. */
-function polygonOf(path) {
-  const at = positionOf({ ...path, speed: 1 });
-  if (path.shape !== "circle") return at;
-  return (p) => {
-    const k = Math.min(Math.floor(p * ROUND), ROUND - 1), part = p * ROUND - k;
-    const [[x0, y0], [x1, y1]] = [at(k / ROUND), at((k + 1) / ROUND)];
-    return [x0 + part * (x1 - x0), y0 + part * (y1 - y0)];
-  };
-}
-
 /** Fractions of the period at which a focus jumps. */
 function jumpPhases(path) {
   if (path.shape !== "joined") return jumps(path) ? [0] : [];
-  const starts = path.paths.map((own) => positionOf({ ...own, speed: 1 })(0)), n = starts.length;
+  const starts = path.paths.map((each) => positionOf(each)(0)), n = starts.length;
   const moved = ([x, y], [x0, y0]) => Math.max(Math.abs(x - x0), Math.abs(y - y0)) > 1e-7;
   return starts.map((at, k) => (moved(at, starts[(k + n - 1) % n]) ? k / n : -1)).filter((p) => p >= 0);
 }
@@ -171,40 +156,38 @@ export function jumps(path) {
   return path.sweep === "one_way" && !(path.shape === "polyline" && isClosed(path.points));
 }
 
-/** Positions {x, y} in metre in the middles of equal cells of one period. */
+/** Positions {x, y} in metre at the middles of equal cells of one period; of foci that rest, their own. */
 export function pathSamples(load) {
-  const { path } = load, fd = drawingFrequency(path);
-  let count = load.foci.length; // foci that rest have places of their own
-  if (fd > 0) {
-    const enough = KNOTS_PER_WIDTH * pathLength(path) / spotWidth(load.height);
-    count = 12 * Math.ceil(Math.max(enough, FEWEST_KNOTS) / 12);
-    if (jumps(path)) count = fastLength(Math.ceil(Math.max(enough, FEWEST_KNOTS, JUMP_RATE / fd)));
-    if (path.shape === "joined") count = joinedCount(load);
-  }
+  const { path, foci } = load, moves = drawingFrequency(path) > 0;
+  const count = moves ? sampleCount(load) : foci.length;
   const at = positionOf(path), x = new Float64Array(count), y = new Float64Array(count);
-  for (let q = 0; q < count; q++) [x[q], y[q]] = at(fd > 0 ? (q + 0.5) / count : load.foci[q] % 1);
+  for (let q = 0; q < count; q++) [x[q], y[q]] = at(moves ? (q + 0.5) / count : foci[q] % 1);
   return { x, y };
 }
 
-/** Smallest number from a count on with no prime factor above 11, as simple_model counts cells. */
+/** Number of samples of a path, such that corners and jumps fall between them. */
+function sampleCount({ path, height }) {
+  const perMetre = SAMPLES_PER_WIDTH / spotWidth(height), fd = drawingFrequency(path);
+  if (path.shape === "joined") {
+    const sides = path.paths.map(({ shape }) => SIDES[shape]), n = sides.length;
+    const whole = n * (sides.every((each) => each === sides[0]) ? sides[0] : 12);
+    const most = Math.min(perMetre * n * Math.max(...path.paths.map(pathLength)), JUMP_RATE / fd);
+    return whole * Math.ceil(Math.max(most, FEWEST_SAMPLES) / whole);
+  }
+  const enough = Math.max(perMetre * pathLength(path), FEWEST_SAMPLES);
+  return jumps(path) ? fastLength(Math.ceil(Math.max(enough, JUMP_RATE / fd))) : 12 * Math.ceil(enough / 12);
+}
+
+/** Smallest number from a count on without a prime factor above 11, as simple_model counts samples. */
 function fastLength(count) {
   let rest = count;
   for (const factor of [2, 3, 5, 7, 11]) while (rest % factor === 0) rest /= factor;
   return rest === 1 ? count : fastLength(count + 1);
 }
 
-/** Number of cells of joined paths: corners and jumps fall between them. */
-function joinedCount({ path, height }) {
-  const { paths } = path, n = paths.length, sides = paths.map(sidesOf);
-  const longest = Math.max(...paths.map((own) => pathLength({ shape: "joined", paths: [own], drawn: 1 })));
-  const whole = sides.every((each) => each === sides[0]) ? n * sides[0] : 12 * n;
-  const enough = Math.min(KNOTS_PER_WIDTH * n * longest / spotWidth(height), JUMP_RATE * n / path.drawn);
-  return whole * Math.ceil(Math.max(enough, FEWEST_KNOTS) / whole);
-}
-
 const tones = (load) => [load.am, load.am2, load.envelope];
 
-/** Modulation by the phases of the two AM sinusoids and the envelope. */
+/** Modulation at given phases of the two AM sinusoids and the envelope. */
 function modulationAt(load, phases) {
   const [m1, m2, e] = tones(load).map((f, k) => (f > 0 ? Math.sin(phases[k]) : 1));
   return (load.w1 * m1 + (1 - load.w1) * m2) * e;
@@ -213,9 +196,9 @@ function modulationAt(load, phases) {
 /** Period in s of the pulses of a rhythm. */
 export const rhythmPeriod = ({ pulses }) => pulses.reduce((sum, [on, gap]) => sum + on + gap, 0);
 
-/** Level 0..1 of the rhythm at a time in s; 1 without a rhythm. */
+/** Level of the rhythm from 0 to 1 at a time in s; 1 without a rhythm. */
 export function rhythmLevel(load, t) {
-  if (!load.pulses || !load.pulses.length) return 1;
+  if (!load.pulses) return 1;
   const period = rhythmPeriod(load);
   let into = ((t / period + 1e-12) % 1 + 1) % 1 * period;
   for (const [on, gap] of load.pulses) {
@@ -226,17 +209,17 @@ export function rhythmLevel(load, t) {
   return 0;
 }
 
-/** Pressure in Pa at each focus at a time in s, without rhythm. */
+/** Pressure in Pa of each focus at a time in s, without the rhythm. */
 export function gainAt(load, t) {
   const full = load.peak * relativeIntensity(load.height) / load.foci.length;
   return full * DRIVES[load.drive](load.amplitude, modulationAt(load, tones(load).map((f) => TAU * f * t)),
     load.depth);
 }
 
-/** Factor on the pressure of a level 0..1 of the amplitude. */
+/** Factor on the pressure of a level of the amplitude from 0 to 1. */
 export const levelFactor = (load, level) => DRIVES[load.drive](level, 1, load.depth);
 
-/** Lines [{f, re, im}] in Hz of either sign and Pa of the pressure at each focus. */
+/** Lines [{f, re, im, orders}] of the pressure of each focus in Pa, at positive and negative f in Hz. */
 export function gainLines(load) {
   const fs = tones(load), counts = fs.map((f) => (f > 0 ? PHASES : 1));
   const strides = [counts[1] * counts[2], counts[2], 1], total = counts[0] * strides[0];
@@ -258,9 +241,9 @@ export function gainLines(load) {
   return found.filter((c) => Math.hypot(c.re, c.im) > 1e-12 * largest);
 }
 
-/** Discrete Fourier transform along the axis of a table that has a count and a stride. */
+/** Discrete Fourier transform along the axis of a table with this count and stride. */
 function transformed(re, im, count, stride) {
-  const { cos, sin } = turnsOf(count), a = new Float64Array(re.length), b = new Float64Array(re.length);
+  const { cos, sin } = unitCircle(count), { re: a, im: b } = zeros(re.length);
   for (let k = 0; k < re.length; k++) {
     const n = Math.floor(k / stride) % count, first = k - n * stride;
     for (let j = 0; j < count; j++) {
@@ -283,12 +266,11 @@ function arrayFactor(load, n) {
 }
 
 /**
- * Weights {re, im} of the path's samples in harmonic n of the path, with all foci: the pressure at a
- * place is sum_n exp(2 pi i n f_d t) sum_q w_q S(x - X_q) times the pressure of one focus.
+ * Weights w {re, im} (q,) of the samples X of a path in its harmonic n, with all foci. The pressure at a
+ * place x is that of one focus times sum_n exp(2 pi i n f_d t) sum_q w_q S(x - X_q).
  */
 export function pathHarmonic(load, n, count) {
-  const [ar, ai] = arrayFactor(load, n), { cos, sin } = turnsOf(2 * count);
-  const re = new Float64Array(count), im = new Float64Array(count);
+  const [ar, ai] = arrayFactor(load, n), { cos, sin } = unitCircle(2 * count), { re, im } = zeros(count);
   const whole = 2 * count, first = ((n % whole) + whole) % whole, step = (2 * first) % whole;
   for (let q = 0, turn = first; q < count; q++) {
     const c = cos[turn] / count, s = -sin[turn] / count;
@@ -302,10 +284,10 @@ export function pathHarmonic(load, n, count) {
 }
 
 /**
- * Spectral lines of the load without its mean, its strongest ones: frequencies f (l,) in Hz,
- * ascending, and by line the complex pressure in Pa of a focus at each of the path's samples, so that
- * the pressure at a place is the real part of sum_q w_q S(x - X_q) exp(2 pi i f t). The parts of a line
- * are harmonics n of the path times lines {re, im} of the gain.
+ * The strongest spectral lines of the load, without its mean: frequencies f (l,) in Hz, ascending, and for
+ * each line the weights w {re, im} (q,) in Pa of the samples X of the path. The pressure at a place x is
+ * Re sum_q w_q S(x - X_q) exp(2 pi i f t). The `parts` of a line are harmonics n of the path times lines
+ * {re, im} of the gain.
  */
 export function loadLines(load, { threshold = 3e-4, lowest = 1e-6, highest = 1000, most = 60 } = {}) {
   const samples = pathSamples(load), count = samples.x.length, gain = gainLines(load);
@@ -330,9 +312,9 @@ export function loadLines(load, { threshold = 3e-4, lowest = 1e-6, highest = 100
     .sort((a, b) => a.f - b.f);
   const harmonics = new Map();
   const w = lines.map(({ f, strength, parts }) => {
-    const re = new Float64Array(count), im = new Float64Array(count), twice = f > 0 ? 2 : 1;
+    const { re, im } = zeros(count), twice = f > 0 ? 2 : 1;
     for (const part of parts) {
-      if (part.strength < 1e-6 * strength) continue;
+      if (part.strength < NEGLIGIBLE_PART * strength) continue;
       if (!harmonics.has(part.n)) harmonics.set(part.n, pathHarmonic(load, part.n, count));
       const h = harmonics.get(part.n), cr = twice * part.re, ci = twice * part.im;
       for (let q = 0; q < count; q++) {
@@ -346,7 +328,7 @@ export function loadLines(load, { threshold = 3e-4, lowest = 1e-6, highest = 100
   return { f, w, samples, parts: lines.map((line) => line.parts) };
 }
 
-/** Give the cells before and after each jump its moments (simple_model.load.path_cells). */
+/** Correct the cells before and after each jump for its moments (simple_model.load.path_cells). */
 function spreadJumps(path, cells) {
   const count = cells.length;
   for (const phase of jumpPhases(path)) {
@@ -357,18 +339,18 @@ function spreadJumps(path, cells) {
   }
 }
 
-/** Highest order of the path's harmonics that make lines up to a frequency in Hz with lines of the gain. */
+/** Highest harmonic of the path that makes a line up to a frequency in Hz. */
 function lastOrder(load, count, gain, highest) {
   const fd = drawingFrequency(load.path), top = highest + Math.max(...gain.map(({ f }) => f));
   return fd > 0 ? Math.min(Math.floor((count - 1) / 2), Math.ceil(top / fd)) : 0;
 }
 
-/** Largest amplitude at about nine points of the path of each harmonic of the focal spot up to `last`. */
+/** Largest amplitude of each harmonic up to `last` of the passing focal spot, at nine points of the path. */
 function harmonicStrengths(load, { x, y }, last) {
   const count = x.length, even = Math.max(1, Math.floor(count / 8));
   const step = load.path.shape === "joined" ? even + 1 : even; // not the same places of each path
   const strongest = new Float64Array(count);
-  for (let p = 0, seen = 0; p < count && seen < 9; p += step, seen++) {
+  for (let p = 0; p < Math.min(9 * step, count); p += step) {
     const values = new Float64Array(count);
     for (let q = 0; q < count; q++) {
       values[q] = spot((x[p] - x[q]) ** 2 + (y[p] - y[q]) ** 2, load.height, load.profile);
@@ -381,18 +363,4 @@ function harmonicStrengths(load, { x, y }, last) {
     }
   }
   return strongest;
-}
-
-const kept = new Map();
-function turnsOf(count) {
-  if (!kept.has(count)) {
-    if (kept.size > 8) kept.clear();
-    const cos = new Float64Array(count), sin = new Float64Array(count);
-    for (let q = 0; q < count; q++) {
-      cos[q] = Math.cos(TAU * q / count);
-      sin[q] = Math.sin(TAU * q / count);
-    }
-    kept.set(count, { cos, sin });
-  }
-  return kept.get(count);
 }

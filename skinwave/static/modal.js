@@ -2,8 +2,8 @@
 //   (diag(squared) + c(w) B - w^2) q = F
 // where c is the modulus of bending over that of the modes, less 1; as skinwave.live.sheets packs it.
 
-import { FieldMotion, Grid, PathForces, byPlace, zeros } from "./fields.js";
-import { divided } from "./numeric.js";
+import { FieldMotion, Grid, PathForces, byPlace } from "./fields.js";
+import { divided, zeros } from "./numeric.js";
 
 const RESIDUAL = 1e-5, MOST_STEPS = 300; // of coupled modes
 

@@ -1,26 +1,44 @@
-// Fourier transforms, interpolation and sums that several modules use.
+// Fourier transforms, interpolation and complex arrays that several modules use.
 
-const tables = new Map();
-
-function tableOf(n) {
-  if (!tables.has(n)) {
-    const cos = new Float64Array(n / 2), sin = new Float64Array(n / 2), order = new Uint32Array(n);
-    for (let k = 0; k < n / 2; k++) {
-      cos[k] = Math.cos(2 * Math.PI * k / n);
-      sin[k] = Math.sin(2 * Math.PI * k / n);
-    }
-    for (let k = 1, half = n >> 1; k < n; k++) order[k] = (order[k >> 1] >> 1) | (k & 1 ? half : 0);
-    tables.set(n, { cos, sin, order });
+/** Return the value of a key in a map of few entries; make it if it is missing. */
+export function cached(entries, key, make, most = 8) {
+  if (!entries.has(key)) {
+    if (entries.size >= most) entries.clear();
+    entries.set(key, make());
   }
-  return tables.get(n);
+  return entries.get(key);
 }
 
+/** Complex values (n,), all 0. */
+export const zeros = (count) => ({ re: new Float64Array(count), im: new Float64Array(count) });
+
+const unitCircles = new Map();
+
+/** Cosines and sines (n,) of the angles 2 pi k / n. */
+export const unitCircle = (n) => cached(unitCircles, n, () => {
+  const cos = new Float64Array(n), sin = new Float64Array(n);
+  for (let k = 0; k < n; k++) {
+    cos[k] = Math.cos(2 * Math.PI * k / n);
+    sin[k] = Math.sin(2 * Math.PI * k / n);
+  }
+  return { cos, sin };
+}, 16);
+
+const bitOrders = new Map();
+
+/** Indices (n,) with their bits reversed. */
+const bitReversed = (n) => cached(bitOrders, n, () => {
+  const order = new Uint32Array(n);
+  for (let k = 1, half = n >> 1; k < n; k++) order[k] = (order[k >> 1] >> 1) | (k & 1 ? half : 0);
+  return order;
+});
+
 /**
- * Transform re, im (n,) in place: sum_t x_t exp(-+ 2 pi i k t / n), with + if `inverse`; not divided
- * by n.
+ * Transform re, im (n,) in place, n a power of two: sum_t x_t exp(-2 pi i k t / n), or with + if
+ * `inverse`. The sum is not divided by n.
  */
 export function transform(re, im, inverse = false) {
-  const n = re.length, { cos, sin, order } = tableOf(n), sign = inverse ? 1 : -1;
+  const n = re.length, order = bitReversed(n), { cos, sin } = unitCircle(n), sign = inverse ? 1 : -1;
   for (let k = 0; k < n; k++) {
     const j = order[k];
     if (j > k) {
@@ -41,16 +59,15 @@ export function transform(re, im, inverse = false) {
   }
 }
 
-/** The least power of two that is not below a number. */
+/** Smallest power of two that is not below a number. */
 export const powerOfTwo = (least) => 2 ** Math.ceil(Math.log2(Math.max(least, 2)));
 
-/** Transform {re, im} of real values (n,) of any length, as `transform`: Bluestein's convolution. */
+/** Transform {re, im} of real values (n,) of any length by Bluestein's convolution. */
 export function fourier(values) {
-  const n = values.length, size = powerOfTwo(2 * n);
-  const chirp = (k) => Math.PI * ((k * k) % (2 * n)) / n;
+  const n = values.length, size = powerOfTwo(2 * n), { cos, sin } = unitCircle(2 * n);
   const [ar, ai, br, bi] = Array.from({ length: 4 }, () => new Float64Array(size));
   for (let k = 0; k < n; k++) {
-    const c = Math.cos(chirp(k)), s = Math.sin(chirp(k));
+    const c = cos[(k * k) % (2 * n)], s = sin[(k * k) % (2 * n)];
     ar[k] = values[k] * c;
     ai[k] = -values[k] * s;
     br[k] = br[(size - k) % size] = c;
@@ -62,16 +79,16 @@ export function fourier(values) {
     [ar[k], ai[k]] = [ar[k] * br[k] - ai[k] * bi[k], ar[k] * bi[k] + ai[k] * br[k]];
   }
   transform(ar, ai, true);
-  const re = new Float64Array(n), im = new Float64Array(n);
+  const { re, im } = zeros(n);
   for (let k = 0; k < n; k++) {
-    const c = Math.cos(chirp(k)) / size, s = Math.sin(chirp(k)) / size;
+    const c = cos[(k * k) % (2 * n)] / size, s = sin[(k * k) % (2 * n)] / size;
     re[k] = ar[k] * c + ai[k] * s;
     im[k] = ai[k] * c - ar[k] * s;
   }
   return { re, im };
 }
 
-/** Index of the last of ascending values that is not above x, but not of the last of all; 0 at least. */
+/** Index of the interval of ascending values in which x lies; the first or last one if x is outside. */
 export function indexIn(values, x) {
   let low = 0, high = values.length - 1;
   while (high - low > 1) {
@@ -81,7 +98,7 @@ export function indexIn(values, x) {
   return low;
 }
 
-/** Weights (n,) of the polynomial through n places `at`, read at x. */
+/** Weights (n,) of the values at n places `at` in the polynomial through them, at x. */
 export function lagrange(at, x) {
   const weights = new Float64Array(at.length).fill(1);
   for (let k = 0; k < at.length; k++) {
@@ -90,10 +107,10 @@ export function lagrange(at, x) {
   return weights;
 }
 
-/** Largest size of values, 0 of none; what is not a number does not count. */
+/** Largest absolute value, without NaN; 0 for an empty array. */
 export const largestOf = (values) => values.reduce((most, v) => (Math.abs(v) > most ? Math.abs(v) : most), 0);
 
-/** Quotient [re, im] of a + i b and c + i d. */
+/** Quotient [re, im] of a + i b over c + i d. */
 export function divided(a, b, c, d) {
   const size = c * c + d * d;
   return [(a * c + b * d) / size, (b * c - a * d) / size];

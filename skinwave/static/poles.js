@@ -2,7 +2,8 @@
 //   u(x, w) = sum_p O_p(x) F_p(w) / (i w - pole_p) + conj(O_p(x) F_p(-w) / (-i w - pole_p))
 // with complex fields O_p (p, place), which read the motion and take up the load.
 
-import { FieldMotion, Grid, PathForces, byPlace, overPoles, zeros } from "./fields.js";
+import { FieldMotion, Grid, PathForces, byPlace, overPoles } from "./fields.js";
+import { zeros } from "./numeric.js";
 
 /** A body of elements of a pack. Its real fields are the real, then the imaginary parts of O (2 p,). */
 export class PoleBody {
