@@ -106,7 +106,7 @@ def unmoved(page: Any, folder: Path) -> Iterator[str]:
     """Sentences on what does not follow a control of the live page, or differs from Python."""
     address = (folder / "waves.html").as_uri()
     page.goto(f"{address}#selftest")
-    said = page.locator("#selftest-said", has_text="largest error")
+    said = page.locator("#selftest-title", has_text="largest error")
     said.wait_for(timeout=120_000)
     if not float(said.get_attribute("data-error")) < 0.01:
         yield f"waves: {said.inner_text()}"

@@ -10,11 +10,11 @@ from skinwave.scene.file import loads
 from skinwave.scene.scene import BODIES
 
 USED = {
-    "bodies": "openBody", "contours": "contours", "maps": "drawMap mapControls",
+    "bodies": "openBody", "maps": "contours drawMap mapControls",
     "files": "linesCsv readMeasurement sceneToml waveformCsv waveformWav", "kernel": "respond",
-    "load": "loadLines spot", "numbers": "MAP_LINE amplitudesOf levelOf levelOver mapOf meanLevel "
+    "load": "loadLines spot", "evaluate": "MAP_LINE amplitudesOf levelOf levelOver mapOf meanLevel "
     "namesOf phaseDelay pressureThresholdAt reach shareOutside spectrum thresholdAt",
-    "values": "STARTS check fromAddress loadOf toAddress", "view3d": "openView",
+    "address": "fromAddress toAddress", "values": "STARTS check loadOf", "view3d": "openView",
 }  # fmt: skip
 MODULE = (
     "".join(

@@ -52,7 +52,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit code."""
-    from skinwave.live.data import comparison_page
+    from skinwave.live.page import comparison_page
     from skinwave.measure.comparison import at_measured
     from skinwave.report.palette import label
     from skinwave.results import record

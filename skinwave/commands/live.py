@@ -20,8 +20,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit code."""
-    from skinwave.live.data import data_of, read_scene
-    from skinwave.live.page import page
+    from skinwave.live.page import data_of, page, read_scene
     from skinwave.results.outputs import output_file
 
     scenes = [read_scene(path) for path in options.scenes]

@@ -1,1 +1,1 @@
-"""A page that computes in the browser what bodies that were made here answer."""
+"""The live page: bodies are reduced here, and their motion is computed in the browser."""

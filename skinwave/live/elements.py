@@ -1,11 +1,11 @@
-"""Packs of bodies of finite elements: a reduced model for every path of the focus, by its poles.
+"""Packs of bodies of finite elements: the poles of a reduced model for every path of the focus.
 
     u(x, w) = sum_p O_p(x) F_p / (i w - pole_p) + conj(O_p(x) F_p(-w) / (-i w - pole_p))
 
 The reduced basis is the proper orthogonal decomposition of the steady motion under focal spots all
-over the area, at frequencies of the band. Stiffness, damping and mass are symmetric: the same
-fields O_p read the motion and take up the load, which per area of the grid goes with the cosine of
-the slope: its square (`skinwave.scene.load`), over a larger area.
+over the area, at frequencies of the band. Stiffness, damping and mass are symmetric, so the load
+acts through the same fields O_p that give the motion. Per area of the grid, the force of the load
+is proportional to the cosine of the slope: its square (`skinwave.scene.load`), over a larger area.
 """
 
 from functools import partial
@@ -27,19 +27,19 @@ from skinwave.system.arrays import packed, quantised
 from skinwave.system.effort import Progress, silent
 from skinwave.typing import Floats
 
-LOWEST = 0.15  # m: least height of the focus, whose spot elements of some mm resolve
-REACH, SPACING = 0.031, 0.0058  # m from the middle to which foci are, and between training spots
+LOWEST = 0.15  # m: lowest height of the focus whose spot the elements resolve
+REACH, SPACING = 0.031, 0.0058  # m: radius of the area of training spots, and their spacing
 FREQUENCIES = (20.0, 70.0, 130.0, 190.0, 260.0, 350.0, 470.0, 640.0, 900.0)  # Hz
 MOST = 500  # dimensions of the basis
-FAINTNESS = 0.5  # power of the size of a frequency's motion by which it is divided
+WEIGHTING = 0.5  # power of the motion's size at a frequency by which it is divided
 ERROR = 0.2  # relative, of components up to `BAND` and within 20 dB of the strongest
 BAND = 300.0  # Hz
 WARNING = (
-    f"The stated {100 * ERROR:g} % holds up to {BAND:g} Hz, for components within 20 dB of the "
-    "strongest one. Faster and weaker ones err more."
+    f"The error is {100 * ERROR:g} % for components up to {BAND:g} Hz and within 20 dB of the "
+    "strongest one. It is larger at higher frequencies and for weaker components."
 )
 AT_ONCE = 32  # loads that are solved together
-LEFT_OUT = 1e-4  # of the mean-square motion: what the basis need not have
+NEGLIGIBLE = 1e-4  # relative RMS motion that the basis may miss
 
 
 def element_pack(body: Body, h: float, progress: Progress = silent) -> dict[str, Any]:
@@ -68,21 +68,21 @@ def element_pack(body: Body, h: float, progress: Progress = silent) -> dict[str,
 
 
 def training_knots(body: Body) -> Floats:
-    """Places (j, 2) in metre of focal spots all over the area, on a triangular grid."""
+    """Return places (j, 2) in metre of focal spots all over the area, on a triangular grid."""
     rows = int(2 * REACH / (SPACING * 0.75**0.5)) + 1
     half = np.array([body.width, body.height]) / 2 if body.of_kind.is_bounded else np.full(2, REACH)
-    found = [
+    grid = [
         (SPACING * (column + 0.5 * (row % 2)), SPACING * 0.75**0.5 * row)
         for row in range(-rows, rows + 1)
         for column in range(-rows, rows + 1)
     ]
-    knots = np.array(found)
-    kept = (np.hypot(*knots.T) <= REACH) & (np.abs(knots) <= half).all(axis=1)
-    return np.asarray(knots[kept])
+    knots = np.array(grid)
+    inside = (np.hypot(*knots.T) <= REACH) & (np.abs(knots) <= half).all(axis=1)
+    return np.asarray(knots[inside])
 
 
 def training_basis(ops: fem.Operators, forces: Floats, report: Any) -> np.ndarray:
-    """Basis (3 n, r) of the steady motion under loads (3 n, j), at all `FREQUENCIES`."""
+    """Return a basis (3 n, r) of the steady motion under loads (3 n, j) at all `FREQUENCIES`."""
     solve = LineSolver(ops)
     snapshots: list[np.ndarray] = []
     count = len(FREQUENCIES) * -(-forces.shape[1] // AT_ONCE)
@@ -91,24 +91,24 @@ def training_basis(ops: fem.Operators, forces: Floats, report: Any) -> np.ndarra
             report(len(snapshots) / count)
             part = solve(frequency, forces[:, first : first + AT_ONCE])[ops.free]
             snapshots.append(np.hstack([part.real, part.imag]).astype(np.float32))
-        # Faint motion of high frequencies counts, too, but less than that of low ones.
+        # Motion at high frequencies is weaker; it gets more weight, but less than at low ones.
         own = snapshots[len(snapshots) - -(-forces.shape[1] // AT_ONCE) :]
         size = np.sqrt(sum(float(np.linalg.norm(each)) ** 2 for each in own))
         for each in own:
-            each /= size**FAINTNESS
+            each /= size**WEIGHTING
     motions = np.hstack(snapshots)
     squares, turn = np.linalg.eigh((motions.T @ motions).astype(np.float64))
     squares, turn = squares[::-1], turn[:, ::-1]
-    left = np.sqrt(np.maximum(np.cumsum(squares[::-1])[::-1], 0.0) / squares.sum())
-    kept = min(MOST, int((left > LEFT_OUT).sum()))
+    missed = np.sqrt(np.maximum(np.cumsum(squares[::-1])[::-1], 0.0) / squares.sum())
+    kept = min(MOST, int((missed > NEGLIGIBLE).sum()))
     basis = np.zeros((len(forces), kept), np.float32)
     basis[ops.free] = motions @ (turn[:, :kept] / np.sqrt(squares[:kept])).astype(np.float32)
     return basis
 
 
 def reduced_poles(ops: fem.Operators, basis: np.ndarray) -> tuple[fem.Complex, fem.Complex]:
-    """Poles (p,) in 1/s with imaginary part >= 0 of the reduced body, and their combinations (r, p)
-    of the basis.
+    """Return the poles (p,) in 1/s, with imaginary part >= 0, of the reduced body, and their
+    combinations (r, p) of the basis.
     """
     V = basis[ops.free].astype(np.float64)
     projected = [V.T @ (A @ V) for A in (ops.M, ops.K, ops.C)]
@@ -121,26 +121,26 @@ def reduced_poles(ops: fem.Operators, basis: np.ndarray) -> tuple[fem.Complex, f
     small = fem.Operators(
         K=K, C=C, M=M, R=np.zeros_like(K), free=np.arange(len(K)), n_dofs=len(K), branches=branches
     )
-    found = fem.poles(small)
-    outputs, inputs = found.outputs, found.inputs.T
-    # Symmetric: inputs and outputs of a pole are the same up to a factor.
+    poles = fem.poles(small)
+    outputs, inputs = poles.outputs, poles.inputs.T
+    # The operators are symmetric: inputs and outputs of a pole differ by a factor.
     factor = (outputs.conj() * inputs).sum(axis=0) / (np.abs(outputs) ** 2).sum(axis=0)
-    return found.values, outputs * np.sqrt(factor)
+    return poles.values, outputs * np.sqrt(factor)
 
 
 def surface_grid(body: Body, made: Build) -> tuple[Floats, np.ndarray, Floats, Floats]:
-    """Places (SIDE^2, 2) in metre of the grid, whether they are on the body, and of the surface the
-    cosine of its slope (SIDE^2,) and its height (SIDE^2,) in metre.
+    """Return the places (SIDE^2, 2) in metre of the grid, whether they are on the body, and the
+    cosine of the slope and the height in metre of the surface there, (SIDE^2,) each.
     """
-    from scipy.interpolate import LinearNDInterpolator  # which takes long to import
+    from scipy.interpolate import LinearNDInterpolator  # slow to import
 
     x, y = np.meshgrid(grid_line(), grid_line())
     places = np.column_stack([x.ravel(), y.ravel()])
     inside = on_surface(made.mesh, places)
     points = made.mesh.points[np.unique(made.mesh.facets["top"])]
-    found = LinearNDInterpolator(points[:, :2], points[:, 2])(places[inside])
+    known = LinearNDInterpolator(points[:, :2], points[:, 2])(places[inside])
     heights = np.zeros(len(places))
-    heights[inside] = np.nan_to_num(found, nan=float(points[:, 2].max()))
-    shown = np.where(inside, heights, np.nan).reshape(SIDE, SIDE)
-    steep = np.nan_to_num(np.stack(np.gradient(shown, STEP)))
-    return places, inside, (1 + (steep**2).sum(axis=0)).ravel() ** -0.5, heights
+    heights[inside] = np.nan_to_num(known, nan=float(points[:, 2].max()))
+    surface = np.where(inside, heights, np.nan).reshape(SIDE, SIDE)
+    slope = np.nan_to_num(np.stack(np.gradient(surface, STEP)))
+    return places, inside, (1 + (slope**2).sum(axis=0)).ravel() ** -0.5, heights

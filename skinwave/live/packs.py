@@ -1,4 +1,4 @@
-"""The pack of a body, by its kind."""
+"""Packs of bodies: the data from which the page computes their motion."""
 
 import hashlib
 import json
@@ -21,32 +21,40 @@ from skinwave.system.effort import Progress, silent, versions
 FORMAT = "live pack 4"  # of cached entries
 
 
-def pack_of(body: Body, progress: Progress = silent) -> dict[str, Any]:
-    """Return the pack of a body: of wavenumber integrals, of a sheet's modes, or of elements; a
-    ValueError if it has none.
+def method_of(body: Body) -> str:
+    """Return the method by which the page computes a body: "radial" for wavenumber integrals,
+    "modal" for the modes of a sheet, or "poles" for a reduced finite-element model.
     """
     if not body.of_kind.discretise:
         raise ValueError(f"A body of kind '{body.kind}' does not move. Choose another body.")
     if is_laterally_infinite(body) and has_exact_waves(body):
-        return radial_pack(body, progress)
-    resting = Scene(pressure=MovingPressure(tacton=Tacton()), body=body, probes=((0.0, 0.0),))
-    if takes(MODES, resting):
-        return sheet_pack(body, progress)
+        return "radial"
+    if takes(MODES, resting_scene(body)):
+        return "modal"
     if body.of_kind.is_plate:
         raise ValueError(
-            "A sheet that is curled or tilted has no pack. Lay it flat, or use skinwave run."
+            "The live page has no model of a sheet that is curled or tilted. Lay it flat, or use "
+            "skinwave run."
         )
-    return _stored(body, progress)
+    return "poles"
 
 
-def _stored(body: Body, progress: Progress) -> dict[str, Any]:
-    """The pack of a body of elements, from the cache if it is there."""
+def resting_scene(body: Body) -> Scene:
+    """Return a scene of a body under a focus that rests at the origin."""
+    return Scene(pressure=MovingPressure(tacton=Tacton()), body=body, probes=((0.0, 0.0),))
+
+
+def pack_of(body: Body, progress: Progress = silent) -> dict[str, Any]:
+    """Return the pack of a body as a dict for JSON. Packs of finite elements are cached."""
+    method = method_of(body)
+    if method != "poles":
+        return {"radial": radial_pack, "modal": sheet_pack}[method](body, progress)
     content = hashlib.sha256(Path(body.file).read_bytes()).hexdigest() if body.file else ""
     size = body.of_kind.interactive_size
-    name = cache.key(FORMAT, body, content, size, versions())
-    if (entry := cache.load(name)) is not None and "pack" in entry:
-        found: dict[str, Any] = json.loads(entry["pack"].tobytes())
-        return found
+    key = cache.key(FORMAT, body, content, size, versions())
+    if (entry := cache.load(key)) is not None and "pack" in entry:
+        stored: dict[str, Any] = json.loads(entry["pack"].tobytes())
+        return stored
     pack = element_pack(body, size, progress)
-    cache.store(name, {}, pack=np.frombuffer(json.dumps(pack).encode(), np.uint8))
+    cache.store(key, {}, pack=np.frombuffer(json.dumps(pack).encode(), np.uint8))
     return pack

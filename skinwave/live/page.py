@@ -1,22 +1,32 @@
-"""One self-contained HTML file: template, styles, ES modules and data, without a request."""
+"""The live page: one self-contained HTML file of template, styles, ES modules and data."""
 
 import hashlib
 from base64 import b64encode
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from importlib import resources
+from pathlib import Path
 from typing import Any
 
+from skinwave.live import values
+from skinwave.live.packs import method_of, pack_of
+from skinwave.live.records import record_of, title_of
+from skinwave.live.selftest import selftest
+from skinwave.scene.paper15 import tactons
+from skinwave.scene.scene import BODIES, Body, Scene, body_name
+from skinwave.system.effort import Progress, silent
 from skinwave.system.scripts import bundle, encoded
 from skinwave.system.templates import render
 
-ENTRY = "page.js"
 TITLE = "skinwave: waves in skin and paper under mid-air ultrasound haptics"
+DEFAULT_BODIES = ("skin-slab", "paper-sheet", "palm")
+TESTS = 20  # Tactons of a self-test
 
 
 def page(data: Mapping[str, Any], title: str = TITLE) -> str:
-    """Return the live page as HTML, of the data that `skinwave.live.data` makes."""
+    """Return the live page as HTML, with data from `data_of`."""
     static = resources.files("skinwave") / "static"
-    script = "\n" + bundle(static, ENTRY)
+    script = "\n" + bundle(static, "page.js")
     return render(
         "live.html", title=title, script=script,
         css=(static / "page.css").read_text(encoding="utf-8"),
@@ -25,7 +35,7 @@ def page(data: Mapping[str, Any], title: str = TITLE) -> str:
 
 
 def policy(script: str, *, served: bool = False) -> str:
-    """Return the content security policy: one script, no request except to a page's own server."""
+    """Return the content security policy: one script, requests only to the page's own server."""
     digest = b64encode(hashlib.sha256(script.encode()).digest()).decode()
     own = "'self'" if served else "'none'"
     return (
@@ -33,3 +43,80 @@ def policy(script: str, *, served: bool = False) -> str:
         "img-src data: blob:; media-src data: blob:; worker-src blob:; "
         f"connect-src {own}; base-uri 'none'; form-action 'none'"
     )
+
+
+def data_of(
+    scenes: Sequence[Scene] = (),
+    progress: Progress = silent,
+    *,
+    bodies: Sequence[str] = DEFAULT_BODIES,
+    test: bool = True,
+) -> dict[str, Any]:
+    """Return the data of a page of scenes, or of preset bodies, as a dict for JSON. `test` adds the
+    data of the self-test. Raises ValueError if no control of the page can set a scene.
+    """
+    names = unique_names([scene.body for scene in scenes] or [BODIES[name] for name in bodies])
+    own = [values.values_of(scene, names[scene.body]) for scene in scenes]
+    records, tests = [], []
+    for body, name in names.items():
+        prefix = f"{title_of(body)}: " if len(names) > 1 else ""
+
+        def on_body(phase: str, fraction: float, prefix: str = prefix) -> None:
+            progress(f"{prefix}{phase}", fraction)
+
+        pack = pack_of(body, on_body)
+        records.append(record_of(body, pack, name))
+        if test:
+            lowest = pack["lowest_height_mm"] / 1e3
+            tests += selftest(body, name, -(-TESTS // len(names)), lowest, pack["error"])
+    return {
+        "bodies": records, "start": own[0] if own else {"body": records[0]["name"]},
+        "presets": _own_presets(scenes, own) + values.presets(),
+        "selftest": tests, "api": None,
+    }  # fmt: skip
+
+
+def comparison_page(scenes: Iterable[Scene]) -> str | None:
+    """Return the page of those scenes whose pack takes seconds; None if there are none, or if the
+    page cannot show them.
+    """
+    quick = [scene for scene in scenes if _is_quick(scene.body)]
+    try:
+        return page(data_of(quick, test=False)) if quick else None
+    except (ValueError, ArithmeticError):
+        return None
+
+
+def _is_quick(body: Body) -> bool:
+    try:
+        return method_of(body) != "poles"
+    except ValueError:
+        return False
+
+
+def unique_names(bodies: Sequence[Body]) -> dict[Body, str]:
+    """Return each of the different bodies with a name of its own."""
+    names: dict[Body, str] = {}
+    for body in dict.fromkeys(bodies):
+        name = body_name(body)
+        names[body] = f"{name}-{len(names) + 1}" if name in names.values() else name
+    return names
+
+
+def _own_presets(scenes: Sequence[Scene], own: Sequence[values.Values]) -> list[dict[str, Any]]:
+    """Presets of scenes, without the Tactons of the paper and without duplicates."""
+    presets: dict[str, dict[str, Any]] = {}
+    for scene, each in zip(scenes, own, strict=True):
+        tacton = {key: value for key, value in each.items() if key != "body"}
+        if scene.name not in dict(tactons()) and tacton not in presets.values():
+            title = f"{scene.name} ({len(presets) + 1})" if scene.name in presets else scene.name
+            presets[title] = tacton
+    return [{"title": title, "values": each} for title, each in presets.items()]
+
+
+def read_scene(path: Path) -> Scene:
+    """Read a scene for the page. A scene without a name is named after its file."""
+    from skinwave.scene.file import read
+
+    scene = read(path)
+    return scene if scene.name != Scene.name else replace(scene, name=path.stem)

@@ -1,10 +1,11 @@
-"""Packs of laterally infinite bodies: their compliance on a grid of wavenumbers for its integral
+"""Packs of laterally infinite bodies: the compliance G on a grid of wavenumbers k. The motion at a
+distance r from a focal spot is
 
     g(r, w) = 1/(2 pi) int_0^inf S(k) G(k, w) J0(k r) k dk
 
-in which only the transform S of the focal pressure profile depends on the height of the focus: the
-grid is fine and wide enough for the narrowest profile. The path of integration runs above the real
-axis, away from the poles of waves, as in `simple_model.layers.wavenumber_integral`.
+Only the transform S of the pressure profile depends on the height of the focus. The grid is fine
+and wide enough for the narrowest profile. The path of integration runs above the real axis, away
+from the poles of waves, as in `simple_model.layers.wavenumber_integral`.
 """
 
 from typing import Any, NamedTuple
@@ -27,41 +28,41 @@ from skinwave.system.arrays import packed, quantised
 from skinwave.system.effort import Progress, silent
 from skinwave.typing import Floats
 
-LOWEST = 0.1  # m: height of the focus from which a pack serves every height
-ERROR = 2e-3  # relative, of lines above -40 dB: twice the largest of 200 Tactons
-HIGHEST = 1200.0  # Hz: skin moves by less than a thousandth of its most above
-SPACING = 2.5  # Hz between frequencies of a table: motion that lasts up to 0.2 s
-MIDDLE, DAMPED = 300.0, 0.1  # Hz, and the loss factor above which motion there lasts 10 ms
-FURTHEST = 0.145  # m: from a path in one corner of the area to the other
+LOWEST = 0.1  # m: lowest height of the focus
+ERROR = 2e-3  # relative, of lines above -40 dB: twice the largest error of 200 Tactons
+HIGHEST = 1200.0  # Hz: at higher frequencies skin moves by less than 0.1 % of its largest motion
+SPACING = 2.5  # Hz between frequencies: resolves motion that lasts up to 0.2 s
+MIDDLE, DAMPED = 300.0, 0.1  # Hz, and the loss factor with which motion there lasts 10 ms
+FURTHEST = 0.145  # m: diagonal of the area
 DISTANCES = np.linspace(0, FURTHEST, int(np.ceil(6 * FURTHEST / spot_width(LOWEST))))  # m
 BROADEST = 6.5  # over the width of a spot: its transform is negligible at larger wavenumbers
 ORDER = 16  # of Gauss and Legendre's rule on each panel
 FEWEST_NODES = 256  # of the wavenumber grid
-LOOKED = 16  # every so many frequencies and distances the grid is checked at
+CHECKED = 16  # the grid is checked at every 16th frequency and distance
 
 
 def radial_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
     """Return the pack of a laterally infinite body: `frequencies` (f,) in Hz, complex `k` (k,) in
-    1/m and `weights` of the path of integration, and the compliance `G` (f, k) in m/Pa. An
+    1/m and `weights` of the path of integration, and the compliance `G` (f, k) in m/Pa. Raises
     ArithmeticError if no grid of wavenumbers is fine enough.
     """
     progress("wavenumber integral", 0.0)
-    answer, frequencies = compliance(body), _frequencies(body)
-    n, some = FEWEST_NODES, frequencies[::LOOKED]
-    coarse = _tabulated(_path(answer, some, n))
+    response, frequencies = compliance(body), _frequencies(body)
+    n, some = FEWEST_NODES, frequencies[::CHECKED]
+    coarse = _tabulated(_path(response, some, n))
     while True:
         if n >= MOST_NODES:
             raise ArithmeticError(UNRESOLVED)
-        fine = _tabulated(_path(answer, some, 2 * n))
+        fine = _tabulated(_path(response, some, 2 * n))
         if np.abs(fine - coarse).max() <= INTEGRATION_ERROR * np.abs(fine).max():
             break
         coarse, n = fine, 2 * n
-    known = _path(answer, frequencies, n)
+    path = _path(response, frequencies, n)
     return {
         "kind": "radial", "error": ERROR, "lowest_height_mm": 1e3 * LOWEST,
         "frequencies": frequencies.tolist(), "furthest": FURTHEST, "n_distances": len(DISTANCES),
-        "k": packed(known.k[None]), "weights": packed(known.weights[None]),
-        "G": quantised(known.G),
+        "k": packed(path.k[None]), "weights": packed(path.weights[None]),
+        "G": quantised(path.G),
     }  # fmt: skip
 
 
@@ -74,9 +75,7 @@ class _Path(NamedTuple):
 
 
 def _frequencies(body: Body) -> Floats:
-    """Frequencies in Hz of a table: with half as many above `MIDDLE` where loss lets motion last
-    a tenth of the time.
-    """
+    """Frequencies (f,) in Hz of a table, half as many above `MIDDLE` if loss damps motion there."""
     w = 2 * np.pi * MIDDLE
     moduli = [solid.complex_modulus(w) for _, solid in body.strata]
     damped = min(modulus.imag / modulus.real for modulus in moduli) > DAMPED
@@ -84,20 +83,20 @@ def _frequencies(body: Body) -> Floats:
     return fine[(fine <= MIDDLE) | (fine % (2 * SPACING) == 0)] if damped else fine
 
 
-def _tabulated(known: _Path) -> fem.Complex:
+def _tabulated(path: _Path) -> fem.Complex:
     """g (f, r) at some distances for the narrowest profile."""
-    k, width = known.k, spot_width(LOWEST)
-    shares = width**2 * np.exp(-((k * width) ** 2) / 2) * k * known.weights
-    return np.asarray(known.G @ (shares[:, None] * jv(0, k[:, None] * DISTANCES[::LOOKED])))
+    k, width = path.k, spot_width(LOWEST)
+    shares = width**2 * np.exp(-((k * width) ** 2) / 2) * k * path.weights
+    return np.asarray(path.G @ (shares[:, None] * jv(0, k[:, None] * DISTANCES[::CHECKED])))
 
 
-def _path(answer: Compliance, frequencies: Floats, n: int) -> _Path:
+def _path(response: Compliance, frequencies: Floats, n: int) -> _Path:
     w = 2 * np.pi * frequencies.astype(np.complex128)
-    lift = min(1.5 / FURTHEST, answer.clearance(w))  # J0 grows by e^1.5 at most
+    lift = min(1.5 / FURTHEST, response.clearance(w))  # J0 grows by e^1.5 at most
     if not lift > 0:
         raise ArithmeticError(UNRESOLVED)
     nodes, weights = np.polynomial.legendre.leggauss(ORDER)
-    # Panels grow away from k = 0, near which the waves of low frequencies have their poles.
+    # Panels grow with k, because waves of low frequencies have their poles near k = 0.
     edges = BROADEST / spot_width(LOWEST) * np.linspace(0, 1, n // ORDER + 1) ** 2
     half, middle = np.diff(edges) / 2, (edges[1:] + edges[:-1]) / 2
     along = (middle[:, None] + half[:, None] * nodes).ravel()
@@ -106,5 +105,5 @@ def _path(answer: Compliance, frequencies: Floats, n: int) -> _Path:
     parts = np.array_split(w[:, None], max(1, len(w) * n // AT_ONCE))
     return _Path(
         k, (half[:, None] * weights).ravel() * (1 + 1j * (1 - ramp**2)),
-        np.concatenate([answer(k, some) for some in parts]),
+        np.concatenate([response(k, some) for some in parts]),
     )  # fmt: skip

@@ -1,6 +1,4 @@
-"""Records of bodies for the page: what they are, which of their numbers a user may change, their
-waves, and the pack from which the page computes motion.
-"""
+"""Records of bodies for the page: title, values that a user may change, dispersion, and pack."""
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -11,24 +9,22 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from simple_model import MovingPressure, Tacton
 from simple_model.layers.material import Material
-from skinwave.bodies.analytic import dispersion, has_exact_waves, is_laterally_infinite
-from skinwave.live.radial import LOWEST
+from skinwave.bodies.analytic import dispersion
+from skinwave.live.packs import method_of, resting_scene
 from skinwave.scene.file import from_table, parse_toml, to_table
-from skinwave.scene.scene import BODIES, Body, Layer, Scene, body_name, solid_of
+from skinwave.scene.scene import BODIES, Body, Layer, body_name, solid_of
 
 SECTIONS = ("body", "placement")  # of a scene file
 LOSS_AT = 200.0  # Hz
-SPREADS = (1.01, 1.5, 4.0, 100.0)  # of a factor of losses about the ratio of loss factors
-SAME = 1e-5  # relative: a value as close to the body's own changes nothing
+SPREADS = (1.01, 1.5, 4.0, 100.0)  # factors around the ratio of loss factors
+SAME = 1e-5  # relative: a value this close to the present one changes nothing
 FREQUENCIES = np.linspace(10.0, 650.0, 33)  # Hz of dispersion curves
 MODES = 4
-DEEPEST = 0.04  # m that a page draws of a half-space
 SIDES = ("clamped", "absorbing", "free")
 SUPPORTS = ("clamped", "simply")
 MOUNTING = {"tension_x": "Tension along x", "tension_y": "Tension along y", "support": "Edges"}
-RANGES = {  # low, high, step
+RANGES = {  # lowest, highest, step
     "thickness": (0.05, 40.0, 0.05), "modulus": (0.5, 100.0, 0.5), "loss": (0.01, 2.0, 0.01),
     "sheet_thickness": (0.02, 1.0, 0.005), "young": (0.1, 12.0, 0.1),
     "density": (100.0, 2000.0, 10.0), "tension": (0.0, 400.0, 1.0),
@@ -43,9 +39,7 @@ TITLES = {
 
 @dataclass(frozen=True, kw_only=True)
 class Editable:
-    """A number or choice of a body: how a page shows it, and a function of another value to the
-    body with it.
-    """
+    """A number or choice of a body that a page can change; `change(value)` returns the new body."""
 
     key: str
     label: str
@@ -56,33 +50,28 @@ class Editable:
     choices: tuple[str, ...] = ()
 
     def record(self) -> dict[str, Any]:
-        """Return the record for the page; a range that excludes the value is widened."""
-        shown = {"key": self.key, "label": self.label, "unit": self.unit, "value": self.value}
+        """Return the record for the page. The range is widened if it excludes the value."""
+        record = {"key": self.key, "label": self.label, "unit": self.unit, "value": self.value}
         if self.choices:
-            return shown | {"choices": [*dict.fromkeys((*self.choices, self.value))]}
+            return record | {"choices": [*dict.fromkeys((*self.choices, self.value))]}
         low, high, step = self.range
         if self.value > high:
             high = float(f"{2 * self.value:.1g}")
-        return shown | {"low": min(low, self.value), "high": high, "step": step}
+        return record | {"low": min(low, self.value), "high": high, "step": step}
 
 
 def record_of(
     body: Body, pack: Mapping[str, Any], name: str = "", title: str = "", *, waves: bool = True
 ) -> dict[str, Any]:
-    """Return the record of a body for the page, a dict for JSON: its pack, from which the page
-    computes motion; name and title, by default its own; `waves`, its dispersion curves, if asked.
+    """Return the record of a body for the page, a dict for JSON, with its pack and, if `waves`, its
+    dispersion curves. Name and title are the body's own by default.
     """
-    kind = body.of_kind
-    infinite = is_laterally_infinite(body) and has_exact_waves(body)
+    kind, infinite = body.of_kind, method_of(body) == "radial"
     extent = [500 * body.width, 500 * body.height] if kind.is_bounded and not infinite else None
     return {
-        "name": name or body_name(body), "title": title or title_of(body), "kind": body.kind,
-        "depth_mm": 1e3 * body.depth if isfinite(body.depth) else 1e3 * DEEPEST,
-        "is_skin": body.is_skin, "is_infinite": infinite,
+        "name": name or body_name(body), "title": title or title_of(body), "is_skin": body.is_skin,
         "thickness_mm": 1e3 * body.depth if kind.is_plate else None, "extent_mm": extent,
-        "toml": toml_of(body), "lowest_height_mm": pack.get("lowest_height_mm", 1e3 * LOWEST),
-        "error": pack.get("error", 0.005), "warnings": list(pack.get("warnings", ())),
-        "keys": [each.record() for each in editables(body)],
+        "toml": toml_of(body), "keys": [each.record() for each in editables(body)],
         "dispersion": dispersion_of(body) if waves else None, "pack": dict(pack),
     }  # fmt: skip
 
@@ -96,30 +85,27 @@ def title_of(body: Body) -> str:
 
 def toml_of(body: Body) -> str:
     """Return the tables of a scene file that describe a body."""
-    scene = Scene(pressure=MovingPressure(tacton=Tacton()), body=body, probes=((0.0, 0.0),))
-    table = to_table(scene)
+    table = to_table(resting_scene(body))
     return tomli_w.dumps({section: table[section] for section in SECTIONS if section in table})
 
 
 def body_of(toml: str) -> Body:
-    """Return the body of a text that `toml_of` or a scene file holds; a ValueError if there is
-    none.
-    """
+    """Return the body of a scene file, or of a text from `toml_of`."""
     table = parse_toml(toml)
     if "body" not in table:
-        raise ValueError("The text has no [body]. Send the toml of a body's record.")
+        raise ValueError("The text has no table [body]. Add one.")
     own = {section: table[section] for section in SECTIONS if section in table}
     return from_table({**own, "probes": {"points_mm": [[0.0, 0.0]]}}).body
 
 
-def changed(body: Body, changes: Mapping[str, Any]) -> Body:
-    """Return a body with other values by key of its `editables`; a ValueError if a key is unknown
-    or a value out of range.
+def with_changes(body: Body, changes: Mapping[str, Any]) -> Body:
+    """Return a body with other values, by key of its `editables`. Raises ValueError if a key is
+    unknown or a value is out of range.
     """
     for key, value in changes.items():
         own = {each.key: each for each in editables(body)}
         if key not in own:
-            raise ValueError(f"{key} is no value of this body. It has {', '.join(own)}.")
+            raise ValueError(f"This body has no value '{key}'. Use {', '.join(own)}.")
         each = own[key]
         if each.choices:
             if value not in each.choices:
@@ -127,34 +113,34 @@ def changed(body: Body, changes: Mapping[str, Any]) -> Body:
             body = each.change(value)
             continue
         if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-            raise ValueError(f"{key} = {value!r} must be a number.")
+            raise ValueError(f"{key} = {value!r} is not a number. Give a finite number.")
         if not isclose(value, each.value, rel_tol=SAME):
             body = each.change(float(value))
     return body
 
 
 def editables(body: Body) -> list[Editable]:
-    """Return what a page may change of a body: its layers from the surface downwards, the density
-    of a single one, tension and support of a sheet, base and sides of a slab.
+    """Return the values of a body that a page can change: those of its layers from the surface
+    downwards, the density of a single layer, the mounting of a sheet, base and sides of a slab.
     """
     if not body.of_kind.discretise:
         return []
-    found = [each for number in range(len(body.layers) + 1) for each in _of_layer(body, number)]
+    values = [each for number in range(len(body.layers) + 1) for each in _of_layer(body, number)]
     if not body.layers:
-        found.append(Editable(
-            key="density", label="Density", unit="kg/m\u00b3", value=_shown(body.solid.density),
-            range=RANGES["density"],
+        values.append(Editable(
+            key="density", label="Density", unit="kg/m\u00b3", range=RANGES["density"],
+            value=_five_digits(body.solid.density),
             change=lambda value: replace(body, material=replace(body.solid, density=value)),
         ))  # fmt: skip
     if body.of_kind.is_plate and body.sides == "clamped":
-        found += [_of_mounting(body, *each) for each in MOUNTING.items()]
+        values += [_of_mounting(body, *each) for each in MOUNTING.items()]
     if body.of_kind.is_layer and isfinite(body.depth):
-        found += [_support(body, name) for name in ("base", "sides")]
-    return [each for each in found if isinstance(each.value, str | float)]
+        values += [_support(body, name) for name in ("base", "sides")]
+    return [each for each in values if isinstance(each.value, str | float)]
 
 
 def _of_layer(body: Body, number: int) -> list[Editable]:
-    """Thickness, modulus and loss factor of a layer; a body's own material is its last."""
+    """Thickness, modulus and loss factor of a layer; the last layer has the body's own material."""
     last, plate = number == len(body.layers), body.of_kind.is_plate
     given = body.material if last else body.layers[number].material
     above = sum(layer.thickness for layer in body.layers)
@@ -175,14 +161,14 @@ def _of_layer(body: Body, number: int) -> list[Editable]:
 
     def with_modulus(value: float) -> Body:
         if not value > 0:
-            raise ValueError(f"A modulus of {value:g} {unit} is out of range. Give one above 0.")
+            raise ValueError(f"The modulus {value:g} {unit} is out of range. Give a value above 0.")
         return with_layer(own, solid.scaled(modulus=value * per / modulus))
 
     def editable(key: str, label: str, value: float, **more: Any) -> Editable:
         if body.layers:
             name = given if isinstance(given, str) else f"layer {number + 1}"
             label = f"{name.capitalize()}: {label[:1].lower()}{label[1:]}"
-        return Editable(key=f"{prefix}{key}", label=label, value=_shown(value), **more)
+        return Editable(key=f"{prefix}{key}", label=label, value=_five_digits(value), **more)
 
     thickness = editable(
         "thickness", "Thickness", 1e3 * own, unit="mm",
@@ -220,38 +206,38 @@ def _loss_factor(solid: Material) -> float:
 
 
 def _loss_scale(solid: Material, loss: float) -> float:
-    """Factor of all losses of a material that gives a loss factor; a ValueError if none does."""
-    from scipy.optimize import brentq  # which takes long to import
+    """Return the factor on the losses of a material that gives it a loss factor."""
+    from scipy.optimize import brentq  # slow to import
 
-    def off(factor: float) -> float:
+    def excess(factor: float) -> float:
         return _loss_factor(solid.scaled(loss=factor)) - loss
 
     own = _loss_factor(solid)
     for spread in SPREADS if own > 0 else ():
-        with suppress(ValueError):  # beyond a material's limits, or no change of sign
-            return float(brentq(off, loss / own / spread, loss / own * spread, rtol=SAME / 10))
+        with suppress(ValueError):  # outside the material's law, or no change of sign
+            return float(brentq(excess, loss / own / spread, loss / own * spread, rtol=SAME / 10))
     raise ValueError(
-        f"A loss factor of {loss:g} at {LOSS_AT:g} Hz is out of reach of this material's law. "
-        f"Its own is {own:.3g}."
+        f"The material's law cannot have a loss factor of {loss:g} at {LOSS_AT:g} Hz. Give a value "
+        f"closer to the present one, {own:.3g}."
     )
 
 
 def dispersion_of(body: Body) -> dict[str, Any] | None:
-    """Return phase speeds in m/s of a body's propagating waves over frequency in Hz; None if it has
-    none that are known.
+    """Return phase speeds in m/s of a body's propagating waves over frequency in Hz, or None if
+    they are not available.
     """
     try:
         curves = dispersion(body, FREQUENCIES, MODES)
     except (ValueError, ArithmeticError):
         return None
     speeds = [np.where(mode.is_wave, mode.phase_speed, np.nan).tolist() for mode in curves.modes]
-    shown = [[_shown(c) if isfinite(c) else None for c in each] for each in speeds]
+    finite = [[_five_digits(c) if isfinite(c) else None for c in each] for each in speeds]
     branches = [
         {"name": f"mode {k}", "c": each}
-        for k, each in enumerate((x for x in shown if any(x)), start=1)
+        for k, each in enumerate((x for x in finite if any(x)), start=1)
     ]
     return {"f": curves.frequencies.tolist(), "branches": branches} if branches else None
 
 
-def _shown(value: float) -> float:
+def _five_digits(value: float) -> float:
     return float(f"{value:.5g}")

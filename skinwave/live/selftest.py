@@ -1,4 +1,4 @@
-"""Random Tactons with exact steady lines at a point, with which the page tests itself."""
+"""The self-test of the page: random Tactons with their exact steady lines at a point."""
 
 from collections.abc import Callable
 from typing import Any
@@ -7,10 +7,10 @@ import numpy as np
 
 from simple_model import SUPERPOSITIONS, MovingPressure, Tacton, Trajectory, even_phases
 from simple_model.layers.flat_body import steady_lines
-from skinwave.bodies.analytic import compliance, has_exact_waves, is_laterally_infinite
+from skinwave.bodies.analytic import compliance
+from skinwave.live.packs import method_of
 from skinwave.live.radial import LOWEST
 from skinwave.live.values import values_of
-from skinwave.models.limits import takes
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.plate_modes import steady_lines as plate_lines
 from skinwave.models.reduced import answer, components, prepare
@@ -19,13 +19,13 @@ from skinwave.scene.scene import Body, Scene
 from skinwave.typing import Complex, Floats
 
 SEED = 15
-# Lines that are compared: of the strongest of a point, and up to a frequency in Hz; then those of
-# bodies of elements, whose reduced model is known less exactly.
-SHOWN, HIGHEST = 0.01, 1000.0
-SHOWN_OF_ELEMENTS, HIGHEST_OF_ELEMENTS = 0.3, 200.0
+# Compared lines: smallest amplitude relative to the largest at the point, and highest frequency in
+# Hz. The pack of a body of elements is less accurate.
+SMALLEST, HIGHEST = 0.01, 1000.0
+SMALLEST_OF_ELEMENTS, HIGHEST_OF_ELEMENTS = 0.3, 200.0
 SHAPES = ("point", "line", "circle", "triangle", "square")
 DRIVES = ("pressure_squared", "force_corrected", "linear")
-# m: where bodies of elements are read, for which the exact model is reduced.
+# Places in metre at which the exact model of a body of elements is prepared.
 PLACES = ((0.0, 0.0), (0.006, -0.002), (-0.011, 0.007), (0.004, 0.016), (0.02, -0.012))
 
 Lines = Callable[[Scene], tuple[Floats, Complex]]
@@ -33,39 +33,44 @@ Waveform = Callable[[Scene], Floats]
 Places = tuple[tuple[float, float], ...]
 
 
-def selftest(body: Body, name: str, most: int, lowest: float, error: float) -> list[dict[str, Any]]:
+def selftest(
+    body: Body, name: str, count: int, lowest: float, error: float
+) -> list[dict[str, Any]]:
     """Return random Tactons on a body with their steady lines at a point: records of the body's
-    name, values, lines [{f in Hz, re, im in metre}] and the relative error that is allowed.
+    name, the values, the lines [{f in Hz, re, im in metre}] and the allowed relative error.
     """
     rng = np.random.default_rng(SEED)
-    found: list[dict[str, Any]] = []
+    records: list[dict[str, Any]] = []
     lines_of, _, places = exact(body)
-    least, highest = (SHOWN_OF_ELEMENTS, HIGHEST_OF_ELEMENTS) if places else (SHOWN, HIGHEST)
-    while len(found) < most:
+    smallest, highest = (
+        (SMALLEST_OF_ELEMENTS, HIGHEST_OF_ELEMENTS) if places else (SMALLEST, HIGHEST)
+    )
+    while len(records) < count:
         scene = random_scene(body, rng, lowest, places)
         f, amplitudes = lines_of(scene)
         size = np.abs(amplitudes)
-        kept = (f > 0) & (f <= highest)
-        kept &= size > least * size[(f > 0) & (f <= HIGHEST)].max(initial=0.0)
-        if not kept.any():  # such as that of a focus that neither moves nor is modulated
+        compared = (f > 0) & (f <= highest)
+        compared &= size > smallest * size[(f > 0) & (f <= HIGHEST)].max(initial=0.0)
+        if not compared.any():  # a focus that neither moves nor is modulated
             continue
-        lines = zip(f[kept].tolist(), amplitudes[kept].tolist(), strict=True)
-        found.append({
+        lines = zip(f[compared].tolist(), amplitudes[compared].tolist(), strict=True)
+        records.append({
             "body": name, "values": values_of(scene, name), "error": error,
             "lines": [{"f": at, "re": value.real, "im": value.imag} for at, value in lines],
         })  # fmt: skip
-    return found
+    return records
 
 
 def exact(body: Body, h: float | None = None) -> tuple[Lines, Waveform, Places]:
-    """Return an exact model of a body, which does not use its pack: functions of a scene of one
-    probe to its lines, frequencies (f,) in Hz and amplitudes (f,) in metre, and to its motion (t,)
-    from rest; and the only places (p, 2) in metre where it can be read, () if anywhere.
+    """Return a model of a body that does not use its pack: functions of a scene with one probe
+    that give its lines, frequencies (f,) in Hz and amplitudes (f,) in metre, and its motion (t,)
+    from rest; and the places (p, 2) in metre where it is known, () for any.
     """
-    if is_laterally_infinite(body) and has_exact_waves(body):
-        return (_lines_of_layers, lambda scene: compute(scene, "flat-body").values[:, 0], ())
-    if _is_plate(body):
-        return (_lines_of_sheet, lambda scene: compute(scene, FROM_REST.name).values[:, 0], ())
+    method = method_of(body)
+    if method != "poles":
+        model = "flat-body" if method == "radial" else FROM_REST.name
+        lines_of = _lines_of_layers if method == "radial" else _lines_of_sheet
+        return lines_of, lambda scene: compute(scene, model).values[:, 0], ()
     prepared = prepare(body, np.array(PLACES), h=h or body.of_kind.interactive_size)
 
     def index(scene: Scene) -> int:
@@ -78,20 +83,10 @@ def exact(body: Body, h: float | None = None) -> tuple[Lines, Waveform, Places]:
     return lines, lambda scene: answer(prepared, scene).values[:, index(scene)], PLACES
 
 
-def has_exact_lines(scene: Scene) -> bool:
-    """Whether a scene's body has an exact model that takes no elements."""
-    body = scene.body
-    return (is_laterally_infinite(body) and has_exact_waves(body)) or _is_plate(body)
-
-
-def _is_plate(body: Body) -> bool:
-    resting = Scene(pressure=MovingPressure(tacton=Tacton()), body=body, probes=((0.0, 0.0),))
-    return takes(FROM_REST, resting)
-
-
 def _lines_of_layers(scene: Scene) -> tuple[Floats, Complex]:
-    answer = compliance(scene.body)
-    f, lines = steady_lines(answer, scene.pressure, scene.probe_points, threshold=1e-4)
+    f, lines = steady_lines(
+        compliance(scene.body), scene.pressure, scene.probe_points, threshold=1e-4
+    )
     return f, lines[:, 0]
 
 
@@ -103,16 +98,15 @@ def _lines_of_sheet(scene: Scene) -> tuple[Floats, Complex]:
 def random_scene(
     body: Body, rng: np.random.Generator, lowest: float = LOWEST, places: Places = ()
 ) -> Scene:
-    """Return a scene of a random Tacton that the page's controls can set, at a height from `lowest`
-    in metre on, with its probe at one of the places, () for any.
+    """Return a scene of a random Tacton that the controls can set, with the focus at `lowest` in
+    metre or higher and the probe at one of the places, () for any.
     """
     bounded = body.of_kind.is_bounded
     half = min(0.025, *((body.width / 2, body.height / 2) if bounded else ()))
     shape = str(rng.choice(SHAPES))
-    size = round(float(rng.uniform(0.2, 1.0)) * half, 4)
-    moving = (
-        {"size": size, "speed": round(float(rng.uniform(2, 20)), 1)} if shape != "point" else {}
-    )
+    size, path = round(float(rng.uniform(0.2, 1.0)) * half, 4), Trajectory(shape=shape)
+    if shape != "point":
+        path = Trajectory(shape=shape, size=size, speed=round(float(rng.uniform(2, 20)), 1))
     am = float(rng.integers(20, 300)) if shape == "point" or rng.random() < 0.6 else 0.0
     second = am > 0 and rng.random() < 0.3
     ratio = SUPERPOSITIONS[int(rng.integers(1, 4)) if second else 0]
@@ -120,7 +114,7 @@ def random_scene(
         amplitude=float(rng.integers(30, 101)) / 100, am_frequency=am, superposition=ratio,
         second_am_frequency=float(rng.integers(20, 300)) if second else 0.0,
         envelope_frequency=float(rng.integers(1, 20)) if rng.random() < 0.2 else 0.0,
-        trajectory=Trajectory(shape=shape, **moving), foci=even_phases(int(rng.integers(1, 4))),
+        trajectory=path, foci=even_phases(int(rng.integers(1, 4))),
     )  # fmt: skip
     height = float(rng.integers(round(200 * lowest), 60)) / 200
     pressure = MovingPressure(tacton=tacton, drive=str(rng.choice(DRIVES)), height=height)

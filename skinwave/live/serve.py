@@ -1,7 +1,7 @@
-"""Serve the live page from this machine, and give it new bodies when it asks for them.
+"""Server of the live page on this machine. It computes bodies that the page requests.
 
-Only this machine reaches the server, and only a browser with the token gets an answer: the address
-of the page has it, and requests of the page send it in `X-Token`, which no other site can. The
+Only this machine can reach the server, and only requests with the token get an answer. The address
+of the page contains the token, and the page sends it in `X-Token`, which other sites cannot. The
 server keeps no state of a page.
 """
 
@@ -23,19 +23,19 @@ from skinwave.live.page import page
 from skinwave.system.effort import Progress
 from skinwave.system.plain_text import printable, say
 
-LARGEST = {  # bytes of a request
+LARGEST_REQUEST = {  # bytes
     "body": 2**20, "dispersion": 2**20, "scene": 2**22, "measurement": 20_000_000,
 }  # fmt: skip
-PATIENCE = 60.0  # s that a silent connection is kept
-LONGEST_LINE = 300  # characters of a fault in the terminal
+TIMEOUT = 60.0  # s without data, after which a connection is closed
+LONGEST_LINE = 300  # characters of an error in the terminal
 OWN_HOST = re.compile(r"(127\.0\.0\.1|localhost|\[::1\])(:\d{1,5})?")
 BASE = re.compile(r"/([\w.~%@:+-]+/)*")
 NO_TOKEN = (
     "The token is missing or belongs to another run. Open the address that skinwave web printed, "
     "with its ?token=..., in this browser."
 )
-NOT_HERE = "Open this page as http://127.0.0.1 or http://localhost, or start it with --base-url."
-FAULT = "The server failed at this request; its terminal says why."
+WRONG_HOST = "Open this page as http://127.0.0.1 or http://localhost, or start it with --base-url."
+FAULT = "The server failed. Its terminal shows the error."
 HEADERS = {
     "Cache-Control": "no-store", "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff", "X-Frame-Options": "DENY",
@@ -45,12 +45,12 @@ _T = TypeVar("_T")
 
 
 class Superseded(Exception):
-    """A newer request has come."""
+    """A newer request has replaced this one."""
 
 
 class Server(ThreadingHTTPServer):
-    """Server of a page, under a `base` path that a proxy shows, "/" by default, which begins and
-    ends with "/"; port 0 is any. A ValueError if the path or the port cannot be used.
+    """Server of a page on a port, 0 for any. `base` is the path under which a proxy shows the page;
+    it begins and ends with "/". Raises ValueError if the path or the port cannot be used.
     """
 
     daemon_threads = True
@@ -60,14 +60,16 @@ class Server(ThreadingHTTPServer):
         self, data: Mapping[str, Any], port: int = 0, base: str = "/", token: str = ""
     ) -> None:
         if not BASE.fullmatch(base):
-            raise ValueError(f"base-url = {base} must be a path such as /user/name/proxy/8123/")
+            raise ValueError(
+                f"base-url = {base} is not a path. Give a path such as /user/name/proxy/8123/."
+            )
         self.base, self.token = base, token or secrets.token_urlsafe(24)
         try:
             super().__init__(("127.0.0.1", port), _Handler)
         except (OSError, OverflowError) as error:
             raise ValueError(
-                f"port {port} cannot be used ({getattr(error, 'strerror', None) or error}); name "
-                "another with --port, or 0 for any"
+                f"Port {port} cannot be used: {getattr(error, 'strerror', None) or error}. Give "
+                "another with --port, or 0 for any free one."
             ) from None
         api = {"base": base, "token": self.token}
         self.page = page({**data, "api": api}).encode()
@@ -79,8 +81,8 @@ class Server(ThreadingHTTPServer):
         return f"http://127.0.0.1:{self.server_port}{self.base}?token={self.token}"
 
     def compute(self, work: Callable[[Progress], _T]) -> _T:
-        """Return what work gives, called with a progress that raises `Superseded` when newer work
-        has come. Only one computes at a time.
+        """Return the result of `work(progress)`. The progress raises `Superseded` once newer work
+        has come. Only one work runs at a time.
         """
         own = self._newest = next(self._numbers)
 
@@ -93,19 +95,19 @@ class Server(ThreadingHTTPServer):
             return work(check)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Say an error in one line; a connection that was closed is none."""
+        """Print an error in one line, unless the connection was closed."""
         error = sys.exc_info()[1]
         if not isinstance(error, ConnectionError | TimeoutError):
-            _say_fault(error)
+            _print_fault(error)
 
 
 class _Handler(BaseHTTPRequestHandler):
     server: Server
     server_version, sys_version = "skinwave", ""
-    timeout = PATIENCE
+    timeout = TIMEOUT
 
     def log_message(self, *_: Any) -> None:
-        """Keep the terminal free of requests."""
+        """Print nothing for a request."""
 
     def do_GET(self) -> None:
         """Send the page."""
@@ -119,24 +121,24 @@ class _Handler(BaseHTTPRequestHandler):
         """Answer a request of the page."""
         name = self._route(urlsplit(self.path).path)
         kind = name.removeprefix("api/")
-        known = kind != name and kind in LARGEST
+        known = kind != name and kind in LARGEST_REQUEST
         if refused := self._refusal(self.headers.get("X-Token", ""), known=known):
             return self._refuse(*refused)
         length = self.headers.get("Content-Length", "")
         if not re.fullmatch(r"\d{1,12}", length) or "Transfer-Encoding" in self.headers:
             return self._refuse(HTTPStatus.LENGTH_REQUIRED, "Send a Content-Length.")
-        if int(length) > LARGEST[kind]:
+        if int(length) > LARGEST_REQUEST[kind]:
             return self._refuse(
                 HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
-                f"{int(length) / 1e6:.3g} MB exceed {LARGEST[kind] / 1e6:.3g} MB, the most that "
-                "the page may send. Use the command line.",
+                f"The request has {int(length) / 1e6:.3g} MB; the limit is "
+                f"{LARGEST_REQUEST[kind] / 1e6:.3g} MB. Use the command line.",
             )
         return self._answer(kind, self.rfile.read(int(length)))
 
     def _refusal(self, token: str, *, known: bool) -> tuple[HTTPStatus, str] | None:
-        """Why a request for a known address or another gets no answer; None if it does."""
+        """Status and reason of a refusal, or None. `known` says whether the address exists."""
         if not self._is_local():
-            return HTTPStatus.FORBIDDEN, NOT_HERE
+            return HTTPStatus.FORBIDDEN, WRONG_HOST
         if not secrets.compare_digest(token.encode("utf-8", "replace"), self.server.token.encode()):
             return HTTPStatus.FORBIDDEN, NO_TOKEN
         return None if known else (HTTPStatus.NOT_FOUND, "There is nothing at this address.")
@@ -148,26 +150,26 @@ class _Handler(BaseHTTPRequestHandler):
         }  # fmt: skip
         try:
             if kind in works:
-                found = self.server.compute(works[kind])
+                result = self.server.compute(works[kind])
             elif kind == "dispersion":
-                found = dispersion_answer(content)
+                result = dispersion_answer(content)
             else:
-                found = measurement_answer(name, content)
-            return self._send(HTTPStatus.OK, _json(found), "application/json")
+                result = measurement_answer(name, content)
+            return self._send(HTTPStatus.OK, _json(result), "application/json")
         except ConnectionError:
             raise
         except Exception as error:
             return self._refuse(*_explained(error))
 
     def _route(self, path: str) -> str:
-        """Path below the base; a proxy may have removed the base from it."""
+        """Path below the base, which a proxy may have removed already."""
         base = self.server.base
         if path in (base, base.rstrip("/"), "/", ""):
             return ""
         return path[len(base) :] if path.startswith(base) else path.removeprefix("/")
 
     def _is_local(self) -> bool:
-        """Whether the host is this machine's own name, unless a proxy is expected."""
+        """Whether the request is for this machine's own name. Behind a proxy, any name is valid."""
         host, origin = self.headers.get("Host", ""), self.headers.get("Origin", "")
         if self.server.base != "/":
             return True
@@ -186,8 +188,8 @@ class _Handler(BaseHTTPRequestHandler):
         self.wfile.write(content)
 
 
-def _say_fault(error: BaseException | None) -> None:
-    """Say a fault of the server in one line of its terminal."""
+def _print_fault(error: BaseException | None) -> None:
+    """Print an error of the server in one line of its terminal."""
     text = printable(f"{type(error).__name__}: {error}"[:LONGEST_LINE], keep="")
     say(f"skinwave: a request failed: {text}", sys.stderr)
 
@@ -197,11 +199,11 @@ def _json(value: Any) -> bytes:
 
 
 def _explained(error: Exception) -> tuple[HTTPStatus, str]:
-    """Status and sentence of an error; a fault of the server is said in its terminal."""
+    """Status and sentence for an error. Errors of the server itself go to its terminal."""
     if isinstance(error, Superseded):
-        return HTTPStatus.CONFLICT, "A newer request has come."
+        return HTTPStatus.CONFLICT, "A newer request has replaced this one."
     if isinstance(error, EXPECTED):
         words = " ".join(str(error).split())
         return HTTPStatus.BAD_REQUEST, words or "There is not enough memory. Use larger elements."
-    _say_fault(error)
+    _print_fault(error)
     return HTTPStatus.INTERNAL_SERVER_ERROR, FAULT

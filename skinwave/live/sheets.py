@@ -1,10 +1,10 @@
-"""Packs of sheets: the modes of a thin plate by Ritz's method, as far as focal spots move them.
+"""Packs of sheets: modes of a thin plate by Ritz's method that focal spots move.
 
     (diag(squared) + c(w) B - w^2) q = F
 
 where B is the stiffness of bending between the modes and c its complex modulus over that of the
-modes, less 1. The fields of the modes are on a square grid; the force of a focal spot on a mode is
-its field smoothed by the spot.
+modes, minus 1. The fields of the modes are given on a square grid. The force of a focal spot on a
+mode is the field of the mode, smoothed by the spot.
 """
 
 from typing import Any
@@ -22,14 +22,14 @@ from skinwave.system.arrays import packed, quantised
 from skinwave.system.effort import Progress, silent
 from skinwave.typing import Floats
 
-STEP, SIDE = 3e-3, 37  # m between places of the square grid of fields, and places along a side
-LAW_STEP, HIGHEST = 2.5, 1000.0  # Hz between values of the modulus, and of the last
-LOWEST = 0.1  # m: least height of the focus
-ERROR = 0.01  # relative, of lines above -40 dB; several foci on a wide path err more
-BAND = 1300.0  # Hz: modes below are kept as they are
-COUPLED_BAND = 2600.0  # Hz: loss couples modes below
-LEFT_OUT = 0.005  # of the largest combination of modes above the band
-QUASI_STATIC = (0.0, 600.0, 1000.0)  # Hz at which these combinations are looked at
+STEP, SIDE = 3e-3, 37  # m between places of the grid of fields, and number of places along a side
+LAW_STEP, HIGHEST = 2.5, 1000.0  # Hz between values of the modulus, and of the last value
+LOWEST = 0.1  # m: lowest height of the focus
+ERROR = 0.01  # relative, of lines above -40 dB; it is larger for several foci on a wide path
+BAND = 1300.0  # Hz: modes below are kept, modes above are combined
+COUPLED_BAND = 2600.0  # Hz: coupling by loss is included for modes below
+NEGLIGIBLE = 0.005  # of the largest combination of modes above the band
+SAMPLED = (0.0, 600.0, 1000.0)  # Hz at which these combinations are sampled
 
 
 def grid_line() -> Floats:
@@ -38,7 +38,7 @@ def grid_line() -> Floats:
 
 
 def sheet_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
-    """Return the pack of a flat sheet that is held, as a dict for JSON."""
+    """Return the pack of a flat, held sheet as a dict for JSON."""
     progress("modes of the sheet", 0.0)
     modes = modes_of(plate_of(body))
     middle, line = np.asarray(body.placement.offset), grid_line()
@@ -70,16 +70,16 @@ def sheet_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
 
 
 def combined(modes: PlateModes, fields: Floats) -> tuple[Floats, Floats, Floats]:
-    """Modes below `BAND`, and the combinations of higher ones that focal spots move: squared
-    frequencies (r,) in rad2/s2, ascending, the stiffness of bending (r, r) in 1/s2 between them,
-    and these orthonormal combinations (m, r) of the modes.
+    """Return the modes below `BAND` and the combinations of higher modes that focal spots move:
+    squared frequencies (r,) in rad2/s2, ascending, the stiffness of bending (r, r) in 1/s2 between
+    them, and the orthonormal combinations (m, r) of the modes.
     """
     squared = modes.squared
     low = squared < (2 * np.pi * BAND) ** 2
     forces = smoothed(fields[~low], spot_width(LOWEST))
-    motions = [forces / (squared[~low] - (2 * np.pi * f) ** 2)[:, None] for f in QUASI_STATIC]
+    motions = [forces / (squared[~low] - (2 * np.pi * f) ** 2)[:, None] for f in SAMPLED]
     squares, directions = np.linalg.eigh(sum(each @ each.T for each in motions))
-    kept = directions[:, squares > LEFT_OUT**2 * squares.max(initial=0.0)]
+    kept = directions[:, squares > NEGLIGIBLE**2 * squares.max(initial=0.0)]
     own, turned = np.linalg.eigh(kept.T @ (squared[~low][:, None] * kept))
     turn = np.zeros((len(squared), low.sum() + len(own)))
     turn[low, : low.sum()] = np.eye(low.sum())
@@ -92,18 +92,18 @@ def combined(modes: PlateModes, fields: Floats) -> tuple[Floats, Floats, Floats]
 
 def _bending(modes: PlateModes, turn: Floats) -> Floats:
     """Stiffness of bending (r, r) in 1/s2 between combinations (m, r) of modes."""
-    found, first = np.zeros((turn.shape[1], turn.shape[1])), 0
+    stiffness, first = np.zeros((turn.shape[1], turn.shape[1])), 0
     for family in modes.families:
         part = turn[first : (first := first + len(family.squared))]
         own = np.diag(family.squared) if family.bending is None else family.bending
-        found += part.T @ own @ part
-    return found
+        stiffness += part.T @ own @ part
+    return stiffness
 
 
 def smoothed(fields: Floats, width: float) -> Floats:
-    """Forces (m, SIDE^2) of a focal spot of 1 Pa and this width in metre at each place of the grid:
-    sums over the places, which for smooth fields (m, SIDE^2) are the integrals.
+    """Return the forces (m, SIDE^2) of a focal spot of 1 Pa and this width in metre at each place
+    of the grid. Sums over the places approximate integrals of smooth fields (m, SIDE^2).
     """
-    away = np.subtract.outer(grid_line(), grid_line())
-    spot = STEP * np.exp(-(away**2) / (2 * width**2))
+    distance = np.subtract.outer(grid_line(), grid_line())
+    spot = STEP * np.exp(-(distance**2) / (2 * width**2))
     return np.asarray(spot @ fields.reshape(-1, SIDE, SIDE) @ spot).reshape(len(fields), -1)

@@ -1,6 +1,6 @@
-"""Values of the page's controls: of a scene, of the paper's Tactons, and of worked examples.
+"""Values of the page's controls for scenes, for the paper's Tactons and for worked examples.
 
-Keys and units are those of `static/values.js`; what a record leaves out keeps its value there.
+Keys and units are those of `static/values.js`. Controls without a value keep theirs.
 """
 
 from typing import Any
@@ -18,7 +18,7 @@ RATIOS = {f"{w1:g}:{w2:g}": (w1, w2) for w1, w2 in SUPERPOSITIONS}
 PROFILES = ("gaussian", "main_lobe")
 QUANTITIES = ("displacement", "velocity", "acceleration")
 CORNERS = {2: "point", 3: "line", 4: "triangle", 5: "square", CORNERS_OF_CIRCLE + 1: "circle"}
-CLOSE = 1e-8  # m, and share of a period: a recording as close is that of named shapes
+TOLERANCE = 1e-8  # m, and share of the period, by which a recording may differ from named shapes
 PLAIN = {"am2": 0, "ratio": "1:0", "envelope": 0, "foci": 1, "pulses": "", "phases": "",
          "paths": "", "polyline": "", "ramp": 0}  # fmt: skip
 
@@ -37,7 +37,7 @@ EXAMPLES = {
 
 
 def presets() -> list[dict[str, Any]]:
-    """Return the paper's 15 Tactons and some examples: title and the values that each sets."""
+    """Return the paper's 15 Tactons and the examples as records of title and values."""
     paper = {title_of(tacton): _tacton_values(tacton) for _, tacton in tactons()}
     examples = {title: PLAIN | values for title, values in EXAMPLES.items()}
     return [{"title": title, "values": own} for title, own in (paper | examples).items()]
@@ -54,23 +54,25 @@ def title_of(tacton: Tacton) -> str:
 
 
 def values_of(scene: Scene, body: str) -> Values:
-    """Return the values of the controls that give a scene, whose body has this name, at its first
-    probe; a ValueError if it has what no control sets.
+    """Return the values of the controls for a scene at its first probe; `body` is the name of its
+    body on the page. Raises ValueError if the scene has something that no control sets.
     """
     check_load(scene, "the live page")
     tacton, path, pressure = scene.tacton, scene.tacton.trajectory, scene.pressure
     beyond = {
         "a recorded path": path.shape == "recorded" and not _own_paths(tacton),
-        "several foci on a path that is moved": any(path.centre) and not _is_movable(tacton),
+        "several foci on a path that is not centred": any(path.centre) and not _is_movable(tacton),
         "a sampled signal": tacton.signal is not None,
-        "a superposition that is none of the five": tacton.superposition not in RATIOS.values(),
-        f"drive law '{pressure.law}'": pressure.drive not in DRIVES,
-        f"profile = {pressure.profile_name} of the focus": pressure.profile not in PROFILES,
+        "this superposition": tacton.superposition not in RATIOS.values(),
+        f"the drive law '{pressure.law}'": pressure.drive not in DRIVES,
+        f"the focus profile '{pressure.profile_name}'": pressure.profile not in PROFILES,
         "a probe below the surface": not scene.reading.is_on_surface,
-        scene.quantity: scene.quantity not in QUANTITIES,
+        f"the quantity {scene.quantity}": scene.quantity not in QUANTITIES,
     }
-    if said := [what for what, holds in beyond.items() if holds]:
-        raise ValueError(f"The live page has no control for {' or '.join(said)}. Use skinwave run.")
+    if missing := [feature for feature, is_used in beyond.items() if is_used]:
+        raise ValueError(
+            f"The live page has no control for {' or '.join(missing)}. Use skinwave run."
+        )
     x, y = (_rounded(1e3 * value) for value in scene.probes[0])
     return _tacton_values(tacton) | {
         "body": body, "height": _rounded(1e3 * pressure.height), "drive": str(pressure.drive),
@@ -112,7 +114,7 @@ def _path_values(tacton: Tacton, path: Trajectory) -> Values:
 
 
 def _is_movable(tacton: Tacton) -> bool:
-    """Whether a path that is not centred is one that a focus may have for its own."""
+    """Whether a path that is not centred can be the own path of a single focus."""
     path = tacton.trajectory
     swept = path.shape == "line" and path.sweep != "there_and_back"
     return len(tacton.foci) == 1 and path.shape in SHAPES and path.size > 0 and not swept
@@ -124,24 +126,24 @@ def _path_text(path: Trajectory) -> str:
 
 
 def _own_paths(tacton: Tacton) -> tuple[Trajectory, ...]:
-    """The named shapes that a Tacton's recording joins, one for each focus; () if it is another."""
+    """The named shapes that a recorded path joins, one for each focus; () if it joins no shapes."""
     path, n = tacton.trajectory, tacton.n_paths
     if path.shape != "recorded" or path.levels or path.hold or n != len(tacton.foci):
         return ()
     try:
         paths = tuple(map(_shape_of, split_recording(path, n)))
         same = joined(paths, tacton.drawing_frequency)
-    except (KeyError, ValueError):  # of another number of corners, or no shape
+    except (KeyError, ValueError):  # another number of corners, or no shape
         return ()
-    near = len(same.times) == len(path.times) and (
-        np.allclose(same.outline, path.outline, rtol=0, atol=CLOSE)
-        and np.allclose(same.times, path.times, rtol=0, atol=CLOSE * path.times[-1])
+    is_same = len(same.times) == len(path.times) and (
+        np.allclose(same.outline, path.outline, rtol=0, atol=TOLERANCE)
+        and np.allclose(same.times, path.times, rtol=0, atol=TOLERANCE * path.times[-1])
     )
-    return paths if near else ()
+    return paths if is_same else ()
 
 
 def _shape_of(corners: np.ndarray) -> Trajectory:
-    """The named shape of corners (k, 2) in metre, the first of them again at the end."""
+    """The named shape with corners (k, 2) in metre, the first of which is repeated at the end."""
     shape = CORNERS[len(corners)]
     x, y = corners[:-1].mean(axis=0)
     side = float(np.linalg.norm(corners[1] - corners[0]))

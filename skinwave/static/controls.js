@@ -1,4 +1,4 @@
-// The controls of the page: rows of a slider and a field, choices, texts and values of the body.
+// The controls of the page: sliders with fields, choices, texts, and values of the body.
 
 import { CHOICES, LABELS, NUMBERS, check } from "./values.js";
 import { escaped } from "./text.js";
@@ -6,42 +6,42 @@ import { escaped } from "./text.js";
 const WORDS = {
   there_and_back: "there and back", one_way: "one way, then jump", sinusoidal: "sinusoidal",
   linear: "linear, as published", pressure_squared: "pressure squared", force_corrected: "force corrected",
-  gaussian: "Gaussian, as the array's", main_lobe: "main lobe, as published",
+  gaussian: "Gaussian, as of the array", main_lobe: "main lobe, as published",
   simultaneous: "all at once", time_multiplexed: "in turn",
 };
-const RESTING = 120; // ms that a slider of the body rests before the body is asked for
+const PAUSE = 120; // ms without a move of a slider of the body, after which the body is requested
 
 const options = (values, words, chosen) => values.map((value) => `<option value="${escaped(value)}"${
   value === chosen ? " selected" : ""}>${escaped(words(value))}</option>`).join("");
 
-/** HTML of a body's keys: editable with a server, otherwise as they are. */
+/** HTML of the values of a body, which only a server can change. */
 function bodyKeys(body, editable) {
   const rows = (body.keys ?? []).map(({ key, label, unit, value, low, high, step, choices }) => {
-    const [name, of] = [label, unit].map(escaped);
-    if (!editable) return `<div class="fact"><span>${name}</span><b>${escaped(value)} ${of}</b></div>`;
+    const [name, per] = [label, unit].map(escaped);
+    if (!editable) return `<div class="fact"><span>${name}</span><b>${escaped(value)} ${per}</b></div>`;
     const head = `<span class="head"><label for="key-${key}" title="${name}">${name}</label></span>`;
     if (choices) {
       return `<div class="row wide">${head}<select id="key-${key}" data-body="${key}">${
         options(choices, (text) => text, value)}</select></div>`;
     }
     return `<div class="row">${head}<input type="range" data-body="${key}" min="${low}" max="${high}"
-      step="${step}" value="${value}" aria-label="${name}, ${of}"><input class="field" id="key-${key}"
+      step="${step}" value="${value}" aria-label="${name}, ${per}"><input class="field" id="key-${key}"
       data-body="${key}" value="${Number(value.toPrecision(4))}" inputmode="decimal" autocomplete="off">
-      <span class="unit">${of}</span></div>`;
+      <span class="unit">${per}</span></div>`;
   });
-  return rows.join("") || '<p class="note">This body has no values to change.</p>';
+  return rows.join("") || '<p class="note">This body has no values that can be changed.</p>';
 }
 
 /**
- * Make the controls inside an element work.
+ * Connect the controls inside an element.
  *
- * `change(key, value, settled)` receives each valid value, `refuse(key, sentence)` what was typed wrong
- * (an empty sentence once it is right), `moving(on)` whether a slider is held, `edit(key, text)` a value of
- * the body. Returns functions that show values, bodies and help.
+ * `change(key, value, settled)` receives each valid value; `refuse(key, sentence)` an error of typed text, or
+ * "" once it is valid; `moving(on)` whether a slider is held; `edit(key, text)` a value of the body. Returns
+ * functions that show values and bodies.
  */
 export function buildControls(host, { bodies, editable, change, refuse, moving, edit }) {
   const $ = (id) => host.querySelector(`#${id}`), all = (selector) => [...host.querySelectorAll(selector)];
-  let values = {}, resting = 0;
+  let values = {}, editDue = 0;
 
   for (const input of all("input[data-key][type=range]")) {
     const { low, high, step, unit } = NUMBERS[input.dataset.key], label = LABELS[input.dataset.key];
@@ -71,38 +71,38 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
     else if (field && !("whole" in target.dataset)) take(field, target.value, false);
     else if (body && target.type === "range") {
       target.nextElementSibling.value = target.value;
-      clearTimeout(resting);
-      resting = setTimeout(() => edit(body, target.value), RESTING);
+      clearTimeout(editDue);
+      editDue = setTimeout(() => edit(body, target.value), PAUSE);
     }
   });
   host.addEventListener("change", ({ target }) => {
     const { key, field, body } = target.dataset;
     if (key) { moving(false); take(key, target.value, true); }
     else if (field) take(field, target.value, true);
-    else if (body) { clearTimeout(resting); edit(body, target.value); }
+    else if (body) { clearTimeout(editDue); edit(body, target.value); }
   });
   host.addEventListener("pointerup", ({ target }) => target.type === "range" && moving(false));
   host.addEventListener("focusout", ({ target }) => {
     const key = target.dataset?.field;
     if (key && !target.hasAttribute("aria-invalid")) target.value = fieldText(key, values[key]);
   });
-  // Up and down in a field move it by a step, with the shift key by ten.
+  // Arrow keys in a field change it by one step, with shift by ten.
   host.addEventListener("keydown", (event) => {
     const key = event.target.dataset?.field, up = { ArrowUp: 1, ArrowDown: -1 }[event.key];
     if (!key || !up || !NUMBERS[key]) return;
     event.preventDefault();
-    const { low, high, least = low, step } = NUMBERS[key], by = up * step * (event.shiftKey ? 10 : 1);
-    const now = Number(event.target.value), from = Number.isFinite(now) ? now : values[key];
-    const next = Math.min(Math.max(Number((from + by).toFixed(6)), least), high);
+    const { low, high, least = low, step } = NUMBERS[key], change = up * step * (event.shiftKey ? 10 : 1);
+    const typed = Number(event.target.value), from = Number.isFinite(typed) ? typed : values[key];
+    const next = Math.min(Math.max(Number((from + change).toFixed(6)), least), high);
     event.target.value = fieldText(key, next);
     take(key, String(next), true);
   });
   const fieldText = (key, value) => (key in NUMBERS ? String(Number(Number(value).toPrecision(6))) : value);
 
   return {
-    /** Show values and a drawing frequency in Hz. */
-    show(given, drawn) {
-      values = given;
+    /** Show values and a drawing frequency in Hz, NaN if it is unknown. */
+    show(own, drawn) {
+      values = own;
       for (const input of all("[data-key]")) {
         const value = values[input.dataset.key];
         if (input.type === "radio") input.checked = input.value === value;
@@ -112,26 +112,26 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
         const key = input.dataset.field;
         if (input !== document.activeElement) input.value = fieldText(key, values[key]);
       }
-      const still = values.shape === "point" || Boolean(values.paths);
-      toggle("size", still || values.shape === "polyline");
-      toggle("speed", still);
+      const isStill = values.shape === "point" || Boolean(values.paths);
+      toggle("size", isStill || values.shape === "polyline");
+      toggle("speed", isStill);
       toggle("phases", values.foci < 2);
       toggle("sweep", !["line", "polyline"].includes(values.shape));
       toggle("polyline", values.shape !== "polyline");
       toggle("ramp", !values.pulses);
       toggle("ratio", !values.am2 || !values.am);
       toggle("drawn", !values.paths);
-      $("drawing").textContent = drawn ? `${drawn.toFixed(1)} Hz` : "does not move";
+      $("drawing").textContent = drawn === 0 ? "focus at rest" : drawn ? `${drawn.toFixed(1)} Hz` : "–";
       const at = ["x", "y"].map((axis) => fieldText(axis, values[axis]));
       const digest = {
-        rhythm: values.pulses || "always on", "foci-more": values.foci > 1 ? `${values.foci} foci`
-          : "one focus",
+        rhythm: values.pulses || "always on",
+        "foci-more": values.foci > 1 ? `${values.foci} foci` : "one focus",
         focus: `${values.height} mm, ${WORDS[values.drive]}`, "point-more": `${at.join(", ")} mm`,
       };
       for (const [id, text] of Object.entries(digest)) $(`${id}-digest`).textContent = text;
     },
     showBodies,
-    /** Show a body's values; what is being moved stays in place. */
+    /** Show a body's values, except the one that is being edited. */
     showBody(body) {
       const names = JSON.stringify([body.name, body.keys?.map(({ key }) => key)]);
       if ($("keys").dataset.names !== names) $("keys").innerHTML = bodyKeys(body, editable);
@@ -143,9 +143,10 @@ export function buildControls(host, { bodies, editable, change, refuse, moving, 
       }
       $("body-more-digest").textContent = body.title;
     },
-    mark(key, wrong) {
+    /** Mark a field as invalid or valid. */
+    mark(key, problem) {
       const input = host.querySelector(`[data-field="${key}"]`);
-      if (wrong) input?.setAttribute("aria-invalid", "true"); else input?.removeAttribute("aria-invalid");
+      if (problem) input?.setAttribute("aria-invalid", "true"); else input?.removeAttribute("aria-invalid");
     },
   };
 

@@ -1,7 +1,7 @@
-// Files: scenes, waveforms and lines as tables, sound, and measurements to read.
+// Files: scenes, tables of waveforms and lines, sound, and measurements.
 
 import { joinedCorners } from "./load.js";
-import { QUANTITIES, lineTable } from "./numbers.js";
+import { QUANTITIES, lineTable } from "./evaluate.js";
 import { largestOf } from "./numeric.js";
 import { loadOf, pulsesOf } from "./values.js";
 
@@ -15,7 +15,7 @@ const cell = (value) => (/[",\n]/.test(value) ? `"${String(value).replaceAll('"'
 const csv = (header, rows) => [header, ...rows].map((row) => row.map(cell).join(",")).join("\r\n") + "\r\n";
 const digits = (value) => `${Number(value.toPrecision(9))}`;
 
-/** Scene file of the controls' values and a body's record, which skinwave reads. */
+/** Scene file (TOML) of the controls' values and a body's record. */
 export function sceneToml(values, record) {
   const { path, foci } = loadOf(values), lines = {
     amplitude_percent: float(values.amplitude), am_frequency_hz: float(values.am),
@@ -54,7 +54,7 @@ export function sceneToml(values, record) {
 const timesOf = ({ duration }) => Float64Array.from({ length: Math.max(2, Math.round(duration * RATE)) },
   (_, k) => k / RATE);
 
-/** CSV of the waveforms at the point: time in s, displacement in metre, pressure of the kernel in Pa. */
+/** CSV of the waveforms at the point: time in s, displacement in metre, the kernel's pressure in Pa. */
 export function waveformCsv({ values, load, kernel, waves, x, y }) {
   const times = timesOf(load), columns = [waves, kernel].map((motion) => motion.waveform(x, y, times));
   const at = `(${values.x},${values.y})`, header = ["t [s]", `displacement${at} [m]`, `pressure${at} [Pa]`];
@@ -72,7 +72,7 @@ export function linesCsv(answer) {
   ]));
 }
 
-/** WAV (16 bit, mono) of samples about their mean, as loud as the format holds. */
+/** WAV (16 bit, mono) of samples without their mean, scaled to the full range. */
 function wav(samples, rate) {
   const bytes = new DataView(new ArrayBuffer(44 + 2 * samples.length));
   const text = (at, word) => [...word].forEach((letter, k) => bytes.setUint8(at + k, letter.charCodeAt(0)));
@@ -82,8 +82,8 @@ function wav(samples, rate) {
   words.forEach((word, k) => bytes.setUint32(16 + 4 * k, word, true));
   bytes.setUint32(40, 2 * samples.length, true);
   const mean = samples.reduce((sum, value) => sum + value, 0) / samples.length;
-  const about = samples.map((value) => value - mean), scale = FULL_SCALE / (largestOf(about) || 1);
-  about.forEach((value, k) => bytes.setInt16(44 + 2 * k, Math.round(scale * value), true));
+  const centred = samples.map((value) => value - mean), scale = FULL_SCALE / (largestOf(centred) || 1);
+  centred.forEach((value, k) => bytes.setInt16(44 + 2 * k, Math.round(scale * value), true));
   return new Uint8Array(bytes.buffer);
 }
 
@@ -102,52 +102,54 @@ const TIMES = { s: 1, ms: 1e-3, us: 1e-6 }, FREQUENCIES = { Hz: 1, kHz: 1e3 };
 const METRES = { m: 1, cm: 1e-2, mm: 1e-3, um: 1e-6, nm: 1e-9 };
 const MOTION = /^(c?m|mm|um|nm)(|\/s|\/s2)$/;
 const KINDS = { "": "displacement", "/s": "velocity", "/s2": "acceleration" };
-const OTHERS = "skinwave web and skinwave compare read other formats.";
-const UNEVEN = 0.25; // of a sampling interval, from where times are not equally spaced
+const OTHER_FORMATS = "skinwave web and skinwave compare read other formats.";
+const JITTER = 0.25; // of the sampling interval: times may deviate by as much
 
 /** Unit in brackets at the end of a column's title. */
 const unitIn = (title) => title.replace(/[µμ]/g, "u").replace("²", "2")
   .match(/[([]([^()[\]]*)[)\]]$/)?.[1] ?? "";
 
-/** Place [x, y] in metre in a column's title such as "displacement(0,10) [m]", in mm; null if none. */
+/** Place [x, y] in metre from a column's title such as "displacement(0,10) [m]" in mm; null if none. */
 function placeIn(title) {
-  const found = title.match(/\(\s*(-?[\d.]+)\s*[,;]\s*(-?[\d.]+)\s*\)/);
-  return found ? [Number(found[1]) / 1e3, Number(found[2]) / 1e3] : null;
+  const match = title.match(/\(\s*(-?[\d.]+)\s*[,;]\s*(-?[\d.]+)\s*\)/);
+  return match ? [Number(match[1]) / 1e3, Number(match[2]) / 1e3] : null;
 }
 
 /**
- * Measurement in a text of columns with units in the header, over time or frequency: {name, quantity,
- * places, remarks} with {times, values} or {frequencies, amplitudes} by place, in SI units. Throws an
- * Error for users if it is of another form.
+ * Read a measurement from a text of columns with units in the header, over time or frequency: {name,
+ * quantity, places, remarks} with {times, values} or {frequencies, amplitudes} by place, in SI units. Throws
+ * an Error with a sentence for users if the text has another form.
  */
 export function readMeasurement(text, name) {
   const lines = text.replace(/^\ufeff/, "").split(/\r?\n/).filter((line) => /^[^#%]/.test(line.trim()));
   const mark = ["\t", ";"].find((own) => lines[0]?.includes(own)) ?? ",";
-  const apart = new RegExp(`${mark}(?![^(]*\\))`); // not within the brackets of a place
-  const [titles = [], ...rows] = lines.map((line) => line.replaceAll('"', "").split(apart)
+  const separator = new RegExp(`${mark}(?![^(]*\\))`); // outside the brackets of a place
+  const [titles = [], ...rows] = lines.map((line) => line.replaceAll('"', "").split(separator)
     .map((word) => word.trim()));
-  const refuse = (what) => { throw new Error(`${name}: ${what} ${OTHERS}`); };
+  const refuse = (sentence) => { throw new Error(`${name}: ${sentence} ${OTHER_FORMATS}`); };
   const [unit, ...units] = titles.map(unitIn), kinds = units.map((own) => own.match(MOTION));
   const over = TIMES[unit] ?? FREQUENCIES[unit], isTime = unit in TIMES;
   if (!over || !kinds[0]) {
-    refuse("the first line does not name a time or frequency and a motion with their units. Write it as: "
-      + "time [s], displacement [µm].");
+    refuse("The first line must name a time or frequency and a motion, with their units: time [s], "
+      + "displacement [µm].");
   }
   if (!isTime && titles.some((title) => /\b(re|im|real|imag|imaginary|phase)\b/i.test(title))) {
-    refuse("its spectrum has real and imaginary parts or phases. Give amplitudes alone.");
+    refuse("The spectrum has real and imaginary parts or phases. Give amplitudes only.");
   }
   const columns = [...kinds.keys()].filter((k) => kinds[k]?.[2] === kinds[0][2]);
   const number = (word) => Number((mark === "," ? word : word?.replace(",", ".")) || NaN);
   const values = columns.map((k) => rows.map((row) => METRES[kinds[k][1]] * number(row[k + 1])));
   const at = rows.map((row) => over * number(row[0])), step = (at[at.length - 1] - at[0]) / (at.length - 1);
   if (at.length < 3 || ![at, ...values].flat().every(Number.isFinite)) {
-    refuse("it does not have three rows or more with a number in each cell.");
+    refuse("It needs at least three rows, with a number in each cell.");
   }
   const isUneven = (value, k) => value <= at[k - 1]
-    || (isTime && Math.abs(value - at[0] - k * step) > UNEVEN * step);
-  if (at.some(isUneven)) refuse(`its ${isTime ? "times are not equally spaced" : "frequencies do not rise"}.`);
-  const found = { name, quantity: KINDS[kinds[0][2]], remarks: [],
+    || (isTime && Math.abs(value - at[0] - k * step) > JITTER * step);
+  if (at.some(isUneven)) {
+    refuse(isTime ? "The times are not equally spaced." : "The frequencies are not in ascending order.");
+  }
+  const common = { name, quantity: KINDS[kinds[0][2]], remarks: [],
     places: columns.map((k) => placeIn(titles[k + 1])) };
-  if (!isTime) return { ...found, frequencies: at, amplitudes: values.map((own) => own.map(Math.abs)) };
-  return { ...found, times: at.map((t) => t - at[0]), values };
+  if (!isTime) return { ...common, frequencies: at, amplitudes: values.map((own) => own.map(Math.abs)) };
+  return { ...common, times: at.map((t) => t - at[0]), values };
 }

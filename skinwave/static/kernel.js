@@ -12,14 +12,20 @@ export function respond(load) {
   const reach = load.profile === "gaussian" ? NEGLIGIBLE * spotWidth(load.height) : Infinity;
   const onGrid = (xs, ys) => {
     const n = xs.length * ys.length, { re, im } = zeros(f.length * n);
-    for (let q = 0; q < samples.x.length; q++) {
-      for (let p = 0; p < n; p++) {
+    const near = new Uint16Array(samples.x.length), spots = new Float64Array(samples.x.length);
+    for (let p = 0; p < n; p++) {
+      let count = 0; // of samples near the place
+      for (let q = 0; q < samples.x.length; q++) {
         const x = xs[p % xs.length] - samples.x[q], y = ys[Math.floor(p / xs.length)] - samples.y[q];
         if (Math.abs(x) > reach || Math.abs(y) > reach) continue;
-        const s = spot(x * x + y * y, load.height, load.profile);
-        for (let l = 0, to = p; l < f.length; l++, to += n) {
-          re[to] += s * w[l].re[q];
-          im[to] += s * w[l].im[q];
+        near[count] = q;
+        spots[count++] = spot(x * x + y * y, load.height, load.profile);
+      }
+      for (let l = 0, to = p; l < f.length; l++, to += n) {
+        const { re: wr, im: wi } = w[l];
+        for (let k = 0; k < count; k++) {
+          re[to] += spots[k] * wr[near[k]];
+          im[to] += spots[k] * wi[near[k]];
         }
       }
     }

@@ -8,6 +8,7 @@ const SAMPLES_PER_WIDTH = 8; // of the focal spot
 const JUMP_RATE = 25000; // samples per second of a path that jumps; the most of joined paths
 const ROUND = 132; // straight parts of a circle that is joined to other paths (simple_model.joined)
 const SIDES = { point: 1, line: 2, triangle: 3, square: 4, circle: ROUND }; // of a joined path
+const AFTER_JUMP = 1e-12; // s, so that round-off does not place a focus before a jump
 const PHASES = 8; // of each sinusoid: more than twice the degree of a drive law
 const NEGLIGIBLE_PART = 1e-6; // of the strength of a line
 const ROOT3 = Math.sqrt(3);
@@ -122,7 +123,7 @@ export function positionOf(path) {
     const { points, times } = joinedCorners(path);
     const [xs, ys] = [0, 1].map((axis) => points.map((at) => at[axis]));
     const period = path.paths.length / path.drawn;
-    return (p) => [xs, ys].map((own) => interpolate(p * period + 1e-12, times, own)); // after a jump, not before
+    return (p) => [xs, ys].map((own) => interpolate(p * period + AFTER_JUMP, times, own));
   }
   const [cx, cy] = path.centre || [0, 0];
   if (path.shape === "point" || pathLength(path) === 0) {

@@ -1,19 +1,18 @@
-// Maps of a surface as SVG: 45 x 45 places, row y and column x ascending.
+// Maps of a surface as SVG. Values are by place, row y and column x ascending.
 
-import { contours } from "./contours.js";
 import { largestOf } from "./numeric.js";
 import { SEQUENTIAL, SIGNED, TABLE_LENGTH } from "./palette.js";
 import { escaped, withUnit } from "./text.js";
 
-const REACH = 0.044; // m, of a map either way
-const MARGIN = { left: 32, right: 10, top: 20, bottom: 50 }; // pixels about the map: text, ticks, bar
+const REACH = 0.044; // m: half the width of a map
+const MARGIN = { left: 32, right: 10, top: 20, bottom: 50 }; // px around the map for text, ticks and bar
 const TICKS = [-40, -20, 0, 20, 40]; // mm
-const INFLUENCED = -20; // dB of the kernel's largest: border of its area
-const CLICKED = 1e-3, LEAP = 5e-3; // m: a step by an arrow key, and with shift
+const INFLUENCED = -20; // dB re the largest of the kernel: edge of its region
+const KEY_STEP = 1e-3, LONG_KEY_STEP = 5e-3; // m: step of an arrow key, alone and with shift
 const COLOURS = { path: "#56b4e9", threshold: "#ff6fd0", point: "#d55e00" };
-const kept = new WeakMap(); // by element: options, box, image, hovered place
+const states = new WeakMap(); // by element: options, box, image, hovered place
 
-/** Place of each value on the scale of colours, 0 to 1, beyond these where it is clipped. */
+/** Function that gives the place of a value on the scale of colours, from 0 to 1. */
 function placeOnScale({ rms, largest, decibel, signed }) {
   if (decibel && !signed) return (v) => 1 + 20 * Math.log10(Math.max(v / largest, 1e-9)) / decibel;
   return signed ? (v) => 0.5 + v / (2 * largest) : (v) => v / largest;
@@ -26,7 +25,7 @@ function picture(width, height) {
   return canvas;
 }
 
-/** The values in colours, a pixel for each place; transparent where there is no body. */
+/** Image of the values, one pixel for each place; transparent off the body. */
 function image(options, n) {
   const { rms, signed } = options, onScale = placeOnScale(options), colours = signed ? SIGNED : SEQUENTIAL;
   const made = picture(n, n), context = made.getContext("2d"), data = context.createImageData(n, n);
@@ -39,14 +38,14 @@ function image(options, n) {
   return made.toDataURL();
 }
 
-/** The colours of a scale, left to right. */
+/** Image of the colours of a scale, left to right. */
 function bar(table) {
   const made = picture(TABLE_LENGTH, 1);
   made.getContext("2d").putImageData(new ImageData(new Uint8ClampedArray(table), TABLE_LENGTH, 1), 0, 0);
   return made.toDataURL();
 }
 
-/** The square of the map in an element of a size, in pixels. */
+/** Square of the map in an element of this size, in pixels. */
 function boxIn(width, height) {
   const room = width - MARGIN.left - MARGIN.right;
   const side = Math.max(40, Math.min(room, height - MARGIN.top - MARGIN.bottom));
@@ -57,7 +56,7 @@ const toPixels = (box) => ([x, y]) => [box.x + box.side * (0.5 + x / (2 * REACH)
   box.y + box.side * (0.5 - y / (2 * REACH))];
 const mm = (value) => `${Math.round(1e4 * value) / 10 || 0}`.replace("-", "−");
 
-/** A line through points, or lines through `apart` of them each. */
+/** A line through points, or lines through every `apart` of them. */
 const line = (points, { colour = "currentColor", width = 1, opacity = 1, apart = Infinity } = {}) => (
   `<path d="${points.map(([x, y], k) => `${k % apart ? "L" : "M"}${x.toFixed(1)},${y.toFixed(1)}`).join("")}"
   fill="none" stroke="${colour}" stroke-width="${width}" stroke-linecap="round" stroke-linejoin="round"
@@ -71,7 +70,29 @@ const drawn = (url, x, y, width, height) => `<image href="${url}" x="${x}" y="${
   height="${height}" preserveAspectRatio="none"/>`;
 const widthOf = (words, size) => 0.55 * size * words.length;
 
-/** What is on the square of a map: its image, contours, paths, foci and point. */
+/** Segments [[[x, y], [x, y]], ...] in steps of the grid of the contour at 0 of values (n * n). */
+export function contours(values, n) {
+  const segments = [];
+  for (let j = 0; j + 1 < n; j++) {
+    for (let i = 0; i + 1 < n; i++) {
+      const corners = [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]];
+      const own = corners.map(([x, y]) => values[y * n + x]);
+      if (own.some(Number.isNaN)) continue;
+      const ends = corners.flatMap(([x, y], k) => {
+        const next = (k + 1) % 4, part = own[k] / (own[k] - own[next]);
+        if ((own[k] > 0) === (own[next] > 0)) return [];
+        return [[x + part * (corners[next][0] - x), y + part * (corners[next][1] - y)]];
+      });
+      // If two segments cross a cell, its mean decides how they join.
+      const turned = own.reduce((sum, v) => sum + v) > 0 === own[0] > 0;
+      const order = ends.length === 4 && !turned ? [3, 0, 1, 2] : [0, 1, 2, 3];
+      for (let k = 0; k + 1 < ends.length; k += 2) segments.push([ends[order[k]], ends[order[k + 1]]]);
+    }
+  }
+  return segments;
+}
+
+/** Markup of the square of a map: image, contours, paths, foci and point. */
 function inside(options, { box, image: url }) {
   const { path = [], foci = [], point, hatched } = options, at = toPixels(box), parts = [];
   const n = Math.round(Math.sqrt(options.rms.length)), cell = box.side / (n - 1);
@@ -113,15 +134,15 @@ function inside(options, { box, image: url }) {
   return parts.join("");
 }
 
-/** A map as markup; `clip` is the name of its clipping path. */
+/** Markup of a map; `clip` is the name of its clipping path. */
 function markup(options, state, clip) {
   const { box } = state, { hatched, title = "" } = options, at = toPixels(box);
-  const said = state.hover ? readout(options, state.hover) : "", parts = [];
+  const reading = state.hover ? readout(options, state.hover) : "", parts = [];
   const left = box.x, top = box.y, right = left + box.side, bottom = top + box.side;
-  if (widthOf(title, 13) + widthOf(said, 11) < box.side || !state.hover) { // or the value alone
+  if (widthOf(title, 13) + widthOf(reading, 11) < box.side || !state.hover) { // or the value alone
     parts.push(text([left, top - 7], title, { size: 12, weight: 600 }));
   }
-  if (said) parts.push(text([right, top - 7], said, { anchor: "end" }));
+  if (reading) parts.push(text([right, top - 7], reading, { anchor: "end" }));
   parts.push(`<clipPath id="${clip}">${rectangle(left, top, box.side, box.side)}</clipPath>`,
     `<g clip-path="url(#${clip})">${inside(options, state)}</g>`);
   if (hatched) {
@@ -149,7 +170,7 @@ function barMarkup({ largest, unit, decibel, signed }, { box, bar: url }) {
     { size: 10.5, anchor: ["start", "middle", "end"][k] })).join("");
 }
 
-/** Value of a map at the place nearest to one in metre; NaN off the body. */
+/** Value of a map at the place nearest to [x, y] in metre; NaN off the body. */
 function valueAt({ rms }, at) {
   const n = Math.round(Math.sqrt(rms.length));
   const [i, j] = at.map((place) => Math.round((place / REACH + 1) * (n - 1) / 2));
@@ -158,7 +179,7 @@ function valueAt({ rms }, at) {
 
 const readout = (options, place) => {
   const value = valueAt(options, place);
-  const words = Number.isNaN(value) ? "no body" : withUnit(value, options.unit);
+  const words = Number.isNaN(value) ? "off the body" : withUnit(value, options.unit);
   return `${mm(place[0])}, ${mm(place[1])} mm: ${words}`;
 };
 
@@ -171,50 +192,49 @@ function imagesOf(options, before) {
 }
 
 /**
- * Draw a map in an SVG element, which has its size by styles.
+ * Draw a map in an SVG element whose size is set by styles.
  * @param {SVGSVGElement} svg
- * @param {object} options rms: values (n * n) in `unit`, NaN off the body; unit: "m", "Pa", "m/s", "dB";
- *   largest: end of the scale; decibel: span of a scale in dB below `largest`, linear if 0; signed: red and
- *   blue about 0; level: values (n * n), with a contour at 0; influenced: the kernel's values (n * n), with a
- *   dotted border at -20 dB; path: paths of points [x, y] in metre; foci: places [x, y] in metre;
- *   point: [x, y]; title; hatched: why the values are not valid
+ * @param {object} options rms: values (n * n) in `unit`, NaN off the body; unit: "m", "Pa" or "dB";
+ *   largest: end of the scale; decibel: range of the scale in dB below `largest`, or 0 if it is linear;
+ *   signed: whether the scale is red and blue about 0; level: values (n * n) with a contour at 0;
+ *   influenced: the kernel's values (n * n) with a contour at -20 dB; path: paths of points [x, y] in metre;
+ *   foci: places [x, y] in metre; point: [x, y] in metre; title; hatched: why the values are not valid
  */
 export function drawMap(svg, options) {
-  const before = kept.get(svg), { width, height } = svg.getBoundingClientRect();
+  const before = states.get(svg), { width, height } = svg.getBoundingClientRect();
   const state = { options, box: boxIn(width, height), hover: before?.hover, ...imagesOf(options, before) };
-  kept.set(svg, state);
+  states.set(svg, state);
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
   svg.innerHTML = markup(options, state, `clip-${svg.id}`);
   if (options.point) {
-    const said = `${options.title || "Map"}. Selected point ${readout(options, options.point)}. Arrow keys `
-      + "move it.";
-    svg.setAttribute("aria-label", said);
+    svg.setAttribute("aria-label", `${options.title || "Map"}. Selected point ${
+      readout(options, options.point)}. Arrow keys move it.`);
   }
 }
 
 /**
- * Select points of a map by pointer and arrow keys (1 mm, with shift 5 mm), and show the value under
- * the pointer. Calls onPoint(x, y) in metre.
+ * Let pointer and arrow keys select points of a map, and show the value under the pointer. Calls
+ * `onPoint(x, y)` in metre.
  */
 export function mapControls(svg, onPoint) {
   svg.tabIndex = 0;
   svg.setAttribute("role", "application");
-  svg.style.touchAction = "pan-y"; // a finger that moves up scrolls the page
+  svg.style.touchAction = "pan-y"; // moving a finger up scrolls the page
   const place = (event) => {
-    const { box } = kept.get(svg), bounds = svg.getBoundingClientRect();
+    const { box } = states.get(svg), bounds = svg.getBoundingClientRect();
     const parts = [event.clientX - bounds.left - box.x, bounds.top + box.y + box.side - event.clientY];
     return parts.map((part) => 2 * REACH * (part / box.side - 0.5));
   };
   const bounded = (at) => at.map((v) => Math.round(1e4 * Math.min(Math.max(v, -REACH), REACH)) / 1e4);
   const hover = (at) => {
-    const state = kept.get(svg);
+    const state = states.get(svg);
     if (!state) return;
     const within = at && Math.max(...at.map(Math.abs)) <= REACH;
     state.hover = within ? at.map((v) => Math.round(1e3 * v) / 1e3) : null;
     drawMap(svg, state.options);
   };
   const select = (event) => {
-    if (kept.has(svg)) onPoint(...bounded(place(event).map((v) => Math.round(1e3 * v) / 1e3)));
+    if (states.has(svg)) onPoint(...bounded(place(event).map((v) => Math.round(1e3 * v) / 1e3)));
   };
   svg.addEventListener("pointerdown", (event) => {
     svg.setPointerCapture(event.pointerId);
@@ -222,19 +242,19 @@ export function mapControls(svg, onPoint) {
   });
   svg.addEventListener("pointermove", (event) => {
     if (event.buttons) select(event);
-    if (kept.has(svg)) hover(place(event));
+    if (states.has(svg)) hover(place(event));
   });
   svg.addEventListener("pointerleave", () => hover(null));
   const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
   svg.addEventListener("keydown", (event) => {
-    const way = ways[event.key], from = kept.get(svg)?.options.point;
+    const way = ways[event.key], from = states.get(svg)?.options.point;
     if (!way || !from || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
-    onPoint(...bounded(from.map((v, k) => v + way[k] * (event.shiftKey ? LEAP : CLICKED))));
+    onPoint(...bounded(from.map((v, k) => v + way[k] * (event.shiftKey ? LONG_KEY_STEP : KEY_STEP))));
   });
 }
 
-/** The marks of a map and what they mean, as markup. */
+/** Legend of the marks of a map, as markup. */
 export const MAP_LEGEND = [
   ["path of the focus", `stroke="${COLOURS.path}" stroke-width="2"`],
   ["kernel above −20 dB", 'stroke="currentColor" stroke-width="1.2"'],

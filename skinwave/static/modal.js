@@ -1,27 +1,27 @@
 // Motion of a sheet in its modes q, of unit mass, under the forces F of a moving focus:
 //   (diag(squared) + c(w) B - w^2) q = F
-// where c is the modulus of bending over that of the modes, less 1; as skinwave.live.sheets packs it.
+// where c is the complex modulus of bending over that of the modes, minus 1 (see skinwave.live.sheets).
 
 import { FieldMotion, Grid, PathForces, byPlace } from "./fields.js";
 import { divided, zeros } from "./numeric.js";
 
-const RESIDUAL = 1e-5, MOST_STEPS = 300; // of coupled modes
+const RESIDUAL = 1e-5, MOST_STEPS = 300; // of the iteration for coupled modes
 
 /** A sheet of a pack. */
 export class ModalBody {
   constructor(pack) {
     Object.assign(this, pack);
     this.modes = this.squared.length;
-    this.together = Math.sqrt(this.between?.length ?? 0); // modes that loss couples
+    this.coupled = Math.sqrt(this.between?.length ?? 0); // number of modes that loss couples
     this.width = this.modes;
     this.grid = new Grid(pack);
     this.values = byPlace(this.V, this.modes, this.inside);
     this.pushed = new PathForces(this.grid, this.values, this.modes);
   }
 
-  respond(load) { return new FieldMotion(this, load); }
+  motion(load) { return new FieldMotion(this, load); }
 
-  /** Forces on the poles (m j,) {ahead, back} of those on the modes. */
+  /** Forces on the poles {ahead, back} (m j,), from those on the modes. */
   onPoles({ re, im }) {
     const count = this.poles.re.length, ahead = zeros(count), back = zeros(count);
     for (let k = 0; k < count; k++) {
@@ -33,13 +33,13 @@ export class ModalBody {
     return { ahead, back };
   }
 
-  /** Residues (m j,) times the modes at a place. */
+  /** Fields of the poles (m j,) at a place: residues times the modes there. */
   outputs(own) {
     const each = (values) => values.map((value, k) => value * own[Math.floor(k / this.kinds)]);
     return { re: each(this.residues.re), im: each(this.residues.im) };
   }
 
-  /** Add the free vibration after a jump of what coupling adds to the steady state, at rest before. */
+  /** Add the free vibration after a jump that belongs to the coupled part of the steady state. */
   addCoupled({ re, im }, { lines, forces, amplitudes }, start, jump) {
     if (!this.between) return;
     const { poles, kinds, modes } = this, place = new Float64Array(modes), speed = new Float64Array(modes);
@@ -60,7 +60,7 @@ export class ModalBody {
     }
   }
 
-  /** Diagonal (m,) {re, im} of the dynamic stiffness at a frequency in Hz, and the `factor` c there. */
+  /** Diagonal {re, im} (m,) of the dynamic stiffness at a frequency in Hz, and `factor`, which is c. */
   stiffness(frequency) {
     const omega2 = (2 * Math.PI * frequency) ** 2, { modes } = this;
     const factor = lawAt(this.law_step, this.law, frequency);
@@ -70,32 +70,33 @@ export class ModalBody {
   }
 
   /**
-   * Modal coordinates (m,) {re, im} of forces (m,) {re, im} at a frequency in Hz: conjugate gradients of a
-   * complex symmetric matrix, with its diagonal as preconditioner.
+   * Modal coordinates {re, im} (m,) under forces {re, im} (m,) at a frequency in Hz, by conjugate gradients
+   * for a complex symmetric matrix with its diagonal as preconditioner.
    */
   solve(frequency, force) {
-    const diagonal = this.stiffness(frequency), over = (own) => quotients(own, diagonal);
-    if (!this.between) return over(force);
-    const found = zeros(this.modes), left = { re: force.re.slice(), im: force.im.slice() };
-    let way = over(left), before = product(left, way);
-    for (let turn = 0; turn < MOST_STEPS && sizeOf(left) > RESIDUAL * sizeOf(force); turn++) {
-      const pushed = this.push(way, diagonal), step = divided(...before, ...product(way, pushed));
-      addTimes(found, step, way);
-      addTimes(left, step.map((value) => -value), pushed);
-      const next = over(left), now = product(left, next);
-      addTimes(next, divided(...now, ...before), way);
-      [way, before] = [next, now];
+    const diagonal = this.stiffness(frequency), precondition = (own) => quotients(own, diagonal);
+    if (!this.between) return precondition(force);
+    const q = zeros(this.modes), residual = { re: force.re.slice(), im: force.im.slice() };
+    let direction = precondition(residual), before = product(residual, direction);
+    for (let k = 0; k < MOST_STEPS && sizeOf(residual) > RESIDUAL * sizeOf(force); k++) {
+      const image = this.multiplied(direction, diagonal);
+      const step = divided(...before, ...product(direction, image));
+      addTimes(q, step, direction);
+      addTimes(residual, step.map((value) => -value), image);
+      const next = precondition(residual), now = product(residual, next);
+      addTimes(next, divided(...now, ...before), direction);
+      [direction, before] = [next, now];
     }
-    return found;
+    return q;
   }
 
   /** The dynamic stiffness times modal coordinates (m,). */
-  push(q, { re: dr, im: di, factor: [c, s] }) {
-    const { modes, between, together: n } = this, found = zeros(modes);
+  multiplied(q, { re: dr, im: di, factor: [c, s] }) {
+    const { modes, between, coupled: n } = this, found = zeros(modes);
     for (let m = 0, k = 0; m < modes; m++) {
       let a = 0, b = 0;
       for (let i = 0; m < n && i < n; i++, k++) {
-        if (i === m) continue; // its own part is in the diagonal
+        if (i === m) continue; // part of the diagonal
         a += between[k] * q.re[i];
         b += between[k] * q.im[i];
       }
@@ -106,7 +107,7 @@ export class ModalBody {
   }
 }
 
-/** Complex factor [re, im] at a frequency of a law (k, 2) tabulated every `step` Hz from 0 on. */
+/** Complex factor [re, im] at a frequency in Hz of a law that is tabulated every `step` Hz from 0 on. */
 function lawAt(step, law, frequency) {
   const count = law.re.length, x = Math.min(frequency / step, count - 1);
   const first = Math.min(Math.floor(x), count - 2), part = x - first;
@@ -124,7 +125,7 @@ function quotients({ re, im }, below) {
   return found;
 }
 
-/** Sum [re, im] of products of complex values, neither of them conjugated. */
+/** Sum [re, im] of products of complex values, without conjugation. */
 function product(a, b) {
   let re = 0, im = 0;
   for (let m = 0; m < a.re.length; m++) {
@@ -134,7 +135,7 @@ function product(a, b) {
   return [re, im];
 }
 
-/** Add a complex factor times values to others. */
+/** Add a complex factor times `from` to complex values, in place. */
 function addTimes({ re, im }, [c, s], from) {
   for (let m = 0; m < re.length; m++) {
     re[m] += c * from.re[m] - s * from.im[m];

@@ -1,13 +1,13 @@
-// Arrays of a pack: complex rows of 64-bit floats, or of whole numbers with a scale for each row.
+// Arrays of a pack: real or complex rows of 64-bit floats, or of integers with a scale for each row.
 
-/** Bytes of text in base 64. */
+/** Bytes of a text in base 64. */
 export const bytes = (text) => {
   const raw = atob(text), out = new Uint8Array(raw.length);
   for (let k = 0; k < raw.length; k++) out[k] = raw.charCodeAt(k);
   return out.buffer;
 };
 
-/** Array of what skinwave.system.arrays packs: {re, im, shape} of complex rows, or real values. */
+/** Array that skinwave.system.arrays packed: {re, im, shape} if it is complex, otherwise its values. */
 export function unpack(packed) {
   const [rows, columns] = packed.shape, count = rows * columns, real = packed.real;
   const values = packed.f8 ? new Float64Array(bytes(packed.f8)) : new Int16Array(bytes(packed.i2));
@@ -23,10 +23,10 @@ export function unpack(packed) {
   return real ? re : { re, im, shape: packed.shape };
 }
 
-/** A pack as it is in the page's JSON, with its arrays. */
-export function opened(pack) {
-  if (Array.isArray(pack)) return pack.map(opened);
+/** A pack with its arrays, from JSON. */
+export function unpacked(pack) {
+  if (Array.isArray(pack)) return pack.map(unpacked);
   if (!pack || typeof pack !== "object") return pack;
   if (pack.f8 || pack.i2) return unpack(pack);
-  return Object.fromEntries(Object.entries(pack).map(([name, value]) => [name, opened(value)]));
+  return Object.fromEntries(Object.entries(pack).map(([name, value]) => [name, unpacked(value)]));
 }

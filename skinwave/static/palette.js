@@ -1,5 +1,5 @@
-// Colours of pictures: cividis for amounts, red and blue for what has a sign. Both are perceptually
-// uniform and distinct for every kind of colour vision; reports use the same (skinwave.report.maps).
+// Colours of pictures: cividis for amounts, red and blue for signed values, as in skinwave.report.maps. Both
+// are perceptually uniform and distinct for every kind of colour vision.
 
 const CIVIDIS = `00224e 00285b 002e6a 053371 1a386f 273e6e 32436d 3b496c 434e6c 4b546c 535a6d 5a5f6e 61656f
   686a71 6f7073 767676 7d7c78 848279 8c8878 938e78 9b9476 a39a74 aba072 b4a76f bcae6c c4b468 cdbb63 d5c25e
@@ -20,6 +20,6 @@ function table(text) {
   return colours;
 }
 
-/** RGBA tables (256 colours each) from the lowest value to the highest. */
+/** Tables of 256 RGBA colours, from the lowest value to the highest. */
 export const SEQUENTIAL = table(CIVIDIS);
 export const SIGNED = table(RED_AND_BLUE);

@@ -1,14 +1,13 @@
-// Plots as SVG: curves, stems and names over two vertical axes that keep their scale, read by pointer
-// and arrow keys.
+// Plots as SVG: curves, stems and names with one or two vertical axes. Pointer and arrow keys read values.
 
 import { indexIn } from "./numeric.js";
 import { escaped, rounded } from "./text.js";
 
 const NS = "http://www.w3.org/2000/svg";
 const LEFT = 44, RIGHT = 46, TOP = 20, BOTTOM = 20;
-const NAME_HEIGHT = 12, READ_WITHIN = 14; // px
+const NAME_HEIGHT = 13, READING_DISTANCE = 14; // px
 
-/** The smallest of 1, 1.5, 2, 3, 4, 5, 6, 8 times a power of ten that is not below a value. */
+/** Smallest of 1, 1.5, 2, 3, 4, 5, 6 or 8 times a power of ten that is not below a value. */
 export function niceTop(value) {
   if (!(value > 0) || !Number.isFinite(value)) return 1;
   const unit = 10 ** Math.floor(Math.log10(value) + 1e-12);
@@ -16,14 +15,14 @@ export function niceTop(value) {
 }
 
 /**
- * Tops of axes by name that keep while a control moves: they grow if a curve does not fit, and shrink
- * only when nothing moves.
+ * Tops of axes by name that stay while a control moves. They grow if a curve does not fit, and shrink only
+ * when nothing moves.
  */
 export function keptScales() {
   const tops = new Map();
   return (name, largest, moving) => {
-    const fit = niceTop(1.08 * largest), top = tops.get(name);
-    if (top === undefined || fit > top || (!moving && fit < top)) tops.set(name, fit);
+    const fit = niceTop(1.08 * largest);
+    if (!(moving && fit < tops.get(name))) tops.set(name, fit);
     return tops.get(name);
   };
 }
@@ -37,7 +36,7 @@ function ticks(low, high, count) {
   return { values, step };
 }
 
-/** A number with as many decimals as its step needs. */
+/** Return a number with as many decimals as its step needs. */
 function atStep(value, step) {
   const decimals = Math.max(0, Math.ceil(-Math.log10(step) - 1e-9));
   return (Math.abs(value) < 1e-9 * step ? 0 : value).toFixed(Math.min(decimals, 6)).replace("-", "−");
@@ -64,7 +63,7 @@ export function createPlot(host, { announce }) {
   svg.append(picture, over);
   host.append(svg);
   const clip = `clip-${host.id}`;
-  let spec = null, size = [0, 0], cursor = null, read = -1;
+  let spec = null, size = [0, 0], cursor = null, selected = -1;
 
   const area = () => [LEFT, TOP, size[0] - (spec.y2 ? RIGHT : 12), size[1] - BOTTOM];
   const toX = (v) => {
@@ -89,7 +88,7 @@ export function createPlot(host, { announce }) {
       width="${Math.max(x1 - x0, 1)}" height="${Math.max(y1 - y0, 1)}"/>`);
     parts.push("</g>", legend(x0, x1), names(x0, x1));
     picture.innerHTML = parts.join("");
-    mark();
+    drawMarks();
   }
 
   function axes(x0, y0, x1, y1) {
@@ -185,30 +184,30 @@ export function createPlot(host, { announce }) {
     }).join("");
   }
 
-  /** Cursor of the playback, and what is read. */
-  function mark() {
+  /** Draw the cursor of the playback and the selected reading. */
+  function drawMarks() {
     const [x0, y0, x1, y1] = area(), parts = [];
     if (cursor !== null && cursor >= spec.x.range[0] && cursor <= spec.x.range[1]) {
       parts.push(`<path class="cursor" d="M${toX(cursor).toFixed(1)},${y0}V${y1}"/>`);
     }
-    if (read >= 0 && spec.curves.length) {
-      const { x, said } = readings()[read] ?? {};
-      if (said) {
+    if (selected >= 0) {
+      const { x, text } = readings()[selected] ?? {};
+      if (text) {
         const at = toX(x), end = at > (x0 + x1) / 2;
         parts.push(`<path class="reading" d="M${at.toFixed(1)},${y0}V${y1}"/>`, `<text class="read" x="${
           (at + (end ? -5 : 5)).toFixed(1)}" y="${y0 + 10}" text-anchor="${end ? "end" : "start"}">${
-          escaped(said)}</text>`);
+          escaped(text)}</text>`);
       }
     }
     over.innerHTML = parts.join("");
   }
 
-  /** Places that can be read: lines of a spectrum, or points of the first named curve. */
+  /** Readings {x, text}: at the lines of a spectrum, or at the points of the first named curve. */
   function readings() {
     const curves = spec.curves.filter((curve) => curve.name && !curve.fill);
     const lead = curves.find((curve) => curve.stems) ?? curves[0];
     if (!lead) return [];
-    const [low, high] = spec.x.range, found = [];
+    const [low, high] = spec.x.range, all = [];
     for (let k = 0; k < lead.x.length; k++) {
       const x = lead.x[k];
       if (x < low || x > high) continue;
@@ -217,9 +216,9 @@ export function createPlot(host, { announce }) {
         if (j < 0 || Math.abs(curve.x[j] - x) > (high - low) / 50) return "";
         return `${curve.name} ${rounded(curve.y[j])}`;
       }).filter(Boolean);
-      found.push({ x, said: `${rounded(x, 4)} ${spec.x.label.split(", ").pop()}: ${values.join(", ")}` });
+      all.push({ x, text: `${rounded(x, 4)} ${spec.x.label.split(", ").pop()}: ${values.join(", ")}` });
     }
-    return found;
+    return all;
   }
 
   const place = (event) => event.clientX - svg.getBoundingClientRect().left;
@@ -227,21 +226,22 @@ export function createPlot(host, { announce }) {
     if (!spec) return;
     const [x0, , x1] = area(), [low, high] = spec.x.range, all = readings();
     const x = low + (high - low) * (place(event) - x0) / (x1 - x0);
-    const found = nearest(all.map((each) => each.x), x);
-    read = found >= 0 && Math.abs(toX(all[found].x) - place(event)) < READ_WITHIN ? found : -1;
-    mark();
+    const index = nearest(all.map((each) => each.x), x);
+    selected = index >= 0 && Math.abs(toX(all[index].x) - place(event)) < READING_DISTANCE ? index : -1;
+    drawMarks();
   });
   for (const name of ["pointerleave", "blur"]) {
-    svg.addEventListener(name, () => { read = -1; if (spec) mark(); });
+    svg.addEventListener(name, () => { selected = -1; if (spec) drawMarks(); });
   }
   svg.addEventListener("keydown", (event) => {
     const way = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
     if (!spec || !way || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
     const all = readings();
-    read = Math.min(Math.max(read + way * Math.max(1, Math.round(all.length / 100)), 0), all.length - 1);
-    announce(all[read]?.said ?? "nothing to read");
-    mark();
+    const next = selected + way * Math.max(1, Math.round(all.length / 100));
+    selected = Math.min(Math.max(next, 0), all.length - 1);
+    announce(all[selected]?.text ?? "There are no values to read.");
+    drawMarks();
   });
   new ResizeObserver(() => {
     size = [host.clientWidth, host.clientHeight];
@@ -253,11 +253,11 @@ export function createPlot(host, { announce }) {
       spec = given;
       render();
     },
-    setCursor(x) { cursor = x; if (spec && size[0]) mark(); },
+    setCursor(x) { cursor = x; if (spec && size[0]) drawMarks(); },
   };
 }
 
-/** Index of the value nearest x among ascending ones; -1 if there are none. */
+/** Index of the ascending value nearest to x; -1 if there are none. */
 function nearest(values, x) {
   if (values.length < 2) return values.length - 1;
   const low = indexIn(values, x);

@@ -1,11 +1,11 @@
-// A body of elements by its poles, as skinwave.live.elements packs it:
+// Motion of a body of finite elements by its poles (see skinwave.live.elements):
 //   u(x, w) = sum_p O_p(x) F_p(w) / (i w - pole_p) + conj(O_p(x) F_p(-w) / (-i w - pole_p))
-// with complex fields O_p (p, place), which read the motion and take up the load.
+// with complex fields O_p (p, place), through which the load acts and the motion is read.
 
 import { FieldMotion, Grid, PathForces, byPlace, overPoles } from "./fields.js";
 import { zeros } from "./numeric.js";
 
-/** A body of elements of a pack. Its real fields are the real, then the imaginary parts of O (2 p,). */
+/** A body of a pack. Its real fields (2 p,) are the real, then the imaginary parts of O. */
 export class PoleBody {
   constructor(pack) {
     Object.assign(this, pack);
@@ -20,9 +20,9 @@ export class PoleBody {
     this.pushed = new PathForces(this.grid, loaded, width);
   }
 
-  respond(load) { return new FieldMotion(this, load); }
+  motion(load) { return new FieldMotion(this, load); }
 
-  /** Amplitudes (2 p,) {re, im} of the real fields under forces (2 p,) at a frequency in Hz. */
+  /** Amplitudes {re, im} (2 p,) of the real fields under forces {re, im} (2 p,) at a frequency in Hz. */
   solve(frequency, force) {
     const { ahead, back } = overPoles(this.poles, this.onPoles(force), frequency), found = zeros(this.width);
     for (let p = 0, j = this.width / 2; j < this.width; p++, j++) {
@@ -34,7 +34,7 @@ export class PoleBody {
     return found;
   }
 
-  /** Forces on the poles {ahead, back} of those on the real fields. */
+  /** Forces on the poles {ahead, back} (p,), from those on the real fields. */
   onPoles({ re: a, im: b }) {
     const count = this.width / 2, ahead = zeros(count), back = zeros(count);
     for (let p = 0, j = count; p < count; p++, j++) {
@@ -44,7 +44,7 @@ export class PoleBody {
     return { ahead, back };
   }
 
-  /** Fields O (p,) of their real and imaginary parts at a place. */
+  /** Fields O {re, im} (p,) at a place, from the real fields there. */
   outputs(own) {
     return { re: own.subarray(0, this.width / 2), im: own.subarray(this.width / 2) };
   }

@@ -91,7 +91,7 @@ export class RadialBody {
     }
   }
 
-  respond(load) { return new RadialMotion(this, load); }
+  motion(load) { return new RadialMotion(this, load); }
 
   /** Factors {re, im} of G in the integral, S(k) k times the weights, for a height of the focus in metre. */
   spotFactors(height) {

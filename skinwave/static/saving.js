@@ -6,7 +6,7 @@ const NS = "http://www.w3.org/2000/svg";
 const STYLED = ["fill", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin", "opacity",
   "fill-opacity", "font-size", "font-family", "font-weight", "paint-order"];
 
-/** An SVG element as text that stands alone: styles written into it. */
+/** Text of an SVG element at x, y that contains its styles. */
 function standalone(svg, x, y) {
   const copy = svg.cloneNode(true), from = [...svg.querySelectorAll("*")];
   [...copy.querySelectorAll("*")].forEach((element, k) => {
@@ -21,16 +21,16 @@ function standalone(svg, x, y) {
 }
 
 /**
- * SVG {text, width, height} of elements where they stand on the page: svg, canvas with `asSvg`, or ones
- * whose text is copied.
+ * SVG {text, width, height} of elements of the page in their places: SVG, a canvas with `asSvg`, or the text
+ * of others.
  */
 function figureOf(parts, paper) {
-  const seen = parts.filter((part) => part.getClientRects().length);
-  const boxes = seen.map((part) => part.getBoundingClientRect());
+  const visible = parts.filter((part) => part.getClientRects().length);
+  const boxes = visible.map((part) => part.getBoundingClientRect());
   const left = Math.min(...boxes.map((b) => b.left)) - 8, top = Math.min(...boxes.map((b) => b.top)) - 8;
   const width = Math.max(...boxes.map((b) => b.right)) - left + 8;
   const height = Math.max(...boxes.map((b) => b.bottom)) - top + 8;
-  const inside = seen.map((part, k) => {
+  const inside = visible.map((part, k) => {
     const x = boxes[k].left - left, y = boxes[k].top - top;
     if (part instanceof SVGSVGElement) return standalone(part, x, y);
     if (part.asSvg) {
@@ -47,7 +47,7 @@ function figureOf(parts, paper) {
   return { text, width, height };
 }
 
-/** PNG of an SVG text, twice as large; a promise of a blob. */
+/** PNG of an SVG text at twice its size, as a blob. */
 async function pngOf({ text, width, height }) {
   const picture = new Image();
   picture.src = URL.createObjectURL(new Blob([text], { type: "image/svg+xml" }));
@@ -67,16 +67,16 @@ function download(name, content, type) {
   setTimeout(() => URL.revokeObjectURL(link.href), 1e4);
 }
 
-/** The figure of the page: its tiles, maps and plots as they are shown. */
+/** Figure of the visible tiles, maps and plots of the page. */
 const figure = () => figureOf([...document.querySelectorAll(
   "#tiles .tile > span, .map, #solid canvas, .plot-card h2, .plot, #pane .plot")],
 getComputedStyle(document.documentElement).getPropertyValue("--card"));
 
 /**
- * Fill the menu of saves. `answer()` is what is shown, `writers` make files: [[title, name, type,
- * (answer) => text or bytes]].
+ * Fill the menu of files to save. `answer()` gives the present answer, `writers` write files: [[title, name,
+ * type, (answer) => text or bytes]].
  */
-export function offerSaves(menu, { answer, say, writers }) {
+export function offerSaves(menu, { answer, notify, writers }) {
   const items = [
     ["Maps and plots, SVG", "skinwave.svg", "image/svg+xml", () => figure().text],
     ["Maps and plots, PNG", "skinwave.png", "image/png", () => pngOf(figure())],
@@ -90,7 +90,7 @@ export function offerSaves(menu, { answer, say, writers }) {
     const [title, name, type, write] = item;
     try {
       download(name, await write(answer()), type);
-      say(`${name} is saved.`);
-    } catch (error) { say(`${title}: ${error.message}`); }
+      notify(`${name} is saved.`);
+    } catch (error) { notify(`${title}: ${error.message}`); }
   });
 }

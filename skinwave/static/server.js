@@ -1,10 +1,10 @@
-// Requests of a page that "skinwave web" serves: bodies with other values, scenes and measurements.
+// Requests to the server of the page, skinwave web: changed bodies, scenes and measurements.
 
-const LARGEST_FILE = 20e6; // the most that the server takes of a file
+const LARGEST_FILE = 20e6; // bytes that the server accepts
 
 /**
- * What the server makes of a request: {body} of a "body", {values, body} of a "scene", the record of a
- * "measurement". Throws an Error for users, or an AbortError.
+ * Send a request and return the answer: {body} for a "body", {dispersion} for a "dispersion", {values, body}
+ * for a "scene", the record of a "measurement". Throws an Error with a sentence for users, or an AbortError.
  */
 export async function request({ base, token }, name, body, { signal, fileName = "" } = {}) {
   const headers = { "X-Token": token, "X-Name": encodeURIComponent(fileName) };
@@ -17,8 +17,9 @@ export async function request({ base, token }, name, body, { signal, fileName = 
   throw new Error(await answer.text() || `The server answered ${answer.status}.`);
 }
 
-/** What the server makes of a file. */
+/** Send a file and return the answer. */
 export function sendFile(api, name, file) {
   if (file.size <= LARGEST_FILE) return request(api, name, file, { fileName: file.name });
-  throw new Error(`${file.name}: ${(file.size / 1e6).toFixed(0)} MB exceed 20 MB.`);
+  const size = `${(file.size / 1e6).toFixed(0)} MB`;
+  throw new Error(`${file.name} has ${size}; the limit is 20 MB. Use skinwave compare.`);
 }

@@ -1,50 +1,51 @@
 // The tiles and tables of an answer, as HTML.
 
 import { inQuantity, lineName, typeset } from "./answer.js";
-import { QUANTITIES, lineTable, meanLevel } from "./numbers.js";
+import { QUANTITIES, lineTable, meanLevel } from "./evaluate.js";
 import { escaped, rounded, signed } from "./text.js";
-import { LABELS, STARTS, shown } from "./values.js";
+import { LABELS, STARTS, textOf } from "./values.js";
 
-const NONE = "–", SAME_LINE = 0.5; // Hz between the same line of A and B at most
+const NONE = "–", SAME_LINE = 0.5; // Hz: lines of A and B this close are the same
 
 const fixed = (value, digits, unit) => (Number.isFinite(value) ? `${value.toFixed(digits)} ${unit}` : NONE);
 const percent = (share) => fixed(100 * share, share < 0.0995 ? 1 : 0, "%");
-const delayed = (seconds) => fixed(1e3 * seconds, 1, "ms");
-const far = (reach) => (reach ? `${reach.beyond ? "> " : ""}${fixed(1e3 * reach.metre, 0, "mm")}`
+const milliseconds = (seconds) => fixed(1e3 * seconds, 1, "ms");
+const distance = (reach) => (reach ? `${reach.beyond ? "> " : ""}${fixed(1e3 * reach.metre, 0, "mm")}`
   : "nowhere");
 const subscript = (name) => escaped(name).replace(/_(\w+)/g, "<sub>$1</sub>");
 
-/** The four numbers of an answer as text; those of the skin are none on another body. */
+/** The four numbers of an answer as text; level and reach exist on skin only. */
 function numbersOf({ body, level, reach, share, delay }) {
-  return { level: body.is_skin ? `${signed(level?.dB)} dB` : NONE, reach: body.is_skin ? far(reach) : NONE,
-    share: percent(share), delay: delayed(delay) };
+  const [above, far] = body.is_skin ? [`${signed(level?.dB)} dB`, distance(reach)] : [NONE, NONE];
+  return { level: above, reach: far, share: percent(share), delay: milliseconds(delay) };
 }
 
-/** HTML of the four tiles, with the numbers of what is pinned. */
+const TILES = {
+  level: ["Level at the point", "Level of the largest component above the detection threshold of skin"],
+  reach: ["Reach above threshold",
+    "Largest distance from the path at which a component is above the detection threshold"],
+  share: ["Outside the kernel's region",
+    "Share of the mean-square motion where the kernel is below −20 dB of its largest"],
+  delay: ["Delay", "Lag of the motion behind the pressure on the path, at the strongest component"],
+};
+
+/** HTML of the four tiles, with the numbers of the pinned answer. */
 export function tiles(answer, pinned) {
-  const own = numbersOf(answer), other = pinned && numbersOf(pinned), { level, reach, body } = answer;
-  const pauses = answer.load.pulses ? ", mean with pauses" : "";
-  const line = level
-    ? `${level.f.toFixed(0)} Hz (${subscript(lineName(answer, level.f) || "line")})${pauses}` : "";
-  const tile = (key, name, help, detail, kernel) => `<div class="tile" title="${help}">
-    <span class="name">${name}</span><span class="value">${own[key]}</span><span
-      class="detail">${detail}</span>
-    <span class="kernel">kernel ${kernel}</span><span class="of-a">${other ? `A: ${other[key]}`
-      : ""}</span></div>`;
-  const skin = (text) => (body.is_skin ? text : "no threshold: not skin");
-  return tile("level", "Level at the point", "Largest component over the detection threshold of skin",
-    skin(line), `${signed(answer.kernelLevel?.dB)} dB`)
-    + tile("reach", "Reach above threshold",
-      "Largest distance from the path at which a component is above threshold", skin(reach ? "from the path"
-        : ""), far(answer.kernelReach))
-    + tile("share", "Outside the kernel's region",
-      "Share of the mean-square motion where the kernel is below −20 dB of its largest", "of the motion",
-      percent(answer.kernelShare))
-    + tile("delay", "Delay", "Lag of the motion behind the pressure on the path, at the strongest component",
-      "behind the pressure", "0.0 ms");
+  const own = numbersOf(answer), other = pinned && numbersOf(pinned), { level, reach, load, body } = answer;
+  const line = level ? `${level.f.toFixed(0)} Hz (${subscript(lineName(answer, level.f) || "line")})${
+    load.pulses ? ", mean over the rhythm" : ""}` : "";
+  const onSkin = (text) => (body.is_skin ? text : "not skin, no threshold");
+  const details = { level: onSkin(line), reach: onSkin(reach ? "from the path" : ""), share: "of the motion",
+    delay: "behind the pressure" };
+  const kernel = { level: `${signed(answer.kernelLevel?.dB)} dB`, reach: distance(answer.kernelReach),
+    share: percent(answer.kernelShare), delay: milliseconds(0) };
+  return Object.entries(TILES).map(([key, [name, help]]) => `<div class="tile" title="${help}">
+    <span class="name">${name}</span><span class="value">${own[key]}</span>
+    <span class="detail">${details[key]}</span><span class="kernel">kernel ${kernel[key]}</span>
+    <span class="of-a">${other ? `A: ${other[key]}` : ""}</span></div>`).join("");
 }
 
-/** A table of columns [head, class] and rows of cells of HTML, the first of them heads; `marked` rows. */
+/** HTML of a table with columns [head, class] and rows of cells; each row begins with its head. */
 function table(columns, rows, marked = () => false) {
   const heads = columns.map(([head, look]) => `<th scope="col"${look ? ` class="${look}"`
     : ""}>${head}</th>`);
@@ -53,7 +54,7 @@ function table(columns, rows, marked = () => false) {
   return `<thead><tr>${heads.join("")}</tr></thead><tbody>${body.join("")}</tbody>`;
 }
 
-/** The table of lines, with the amplitudes of what is pinned. */
+/** HTML of the table of lines, with the amplitudes of the pinned answer. */
 export function linesTable(answer, pinned) {
   const name = answer.values.quantity, { unit, per } = QUANTITIES[name];
   const other = pinned && inQuantity(pinned.waves.f, pinned.wavesAt, name);
@@ -61,28 +62,24 @@ export function linesTable(answer, pinned) {
     const k = pinned.waves.f.findIndex((at) => Math.abs(at - f) < SAME_LINE);
     return k < 0 ? NONE : rounded(meanLevel(pinned.load) * other[k]);
   };
-  const columns = [["Line"], ["Hz"], ["kernel, Pa"], [`waves, ${unit}`, "waves-ink"], ...(pinned ? [["A",
-    "of-a"]] : []),
-    ['<abbr title="dB above the detection threshold">dB SL</abbr>']];
+  const columns = [["Line"], ["Hz"], ["Kernel, Pa"], [`Waves, ${unit}`, "waves-ink"],
+    ...(pinned ? [["A", "of-a"]] : []), ['<abbr title="dB above the detection threshold">dB SL</abbr>']];
   return table(columns, lineTable(answer).map(({ name: line, f, pressure, motion, level }) => [
     subscript(typeset(line)) || NONE, f.toFixed(1), rounded(pressure), rounded(per * motion),
     ...(pinned ? [ofA(f)] : []), level === null ? NONE : signed(level)]));
 }
 
-/** The table of what differs between A and B: values, then numbers. */
+/** HTML of the table that compares A and B: values that differ, then the four numbers. */
 export function comparison(a, b) {
-  const said = (own, key) => (key === "body" ? own.body.title : shown(key, own.values[key]));
+  const valueOf = (own, key) => (key === "body" ? own.body.title : textOf(key, own.values[key]));
   const rows = Object.keys(STARTS).filter((key) => a.values[key] !== b.values[key])
-    .map((key) => [LABELS[key], said(a, key), said(b, key)]);
+    .map((key) => [LABELS[key], valueOf(a, key), valueOf(b, key)]);
   for (const { key, label, value, unit } of (a.body.title === b.body.title && a.body.keys) || []) {
     const other = b.body.keys.find((own) => own.key === key)?.value ?? value;
     if (other !== value) rows.push([label, `${value} ${unit}`, `${other} ${unit}`]);
   }
   const count = rows.length, [ofA, ofB] = [a, b].map(numbersOf);
-  const names = { level: "Level at the point", reach: "Reach above threshold",
-    share: "Outside the kernel's region",
-    delay: "Delay" };
-  for (const [key, name] of Object.entries(names)) rows.push([name, ofA[key], ofB[key]]);
+  for (const [key, [name]] of Object.entries(TILES)) rows.push([name, ofA[key], ofB[key]]);
   return `<table>${table([["Scene"], ["A, pinned", "of-a"], ["B, shown", "waves-ink"]],
     rows.map((row) => row.map(escaped)), (k) => k < count)}</table>`;
 }

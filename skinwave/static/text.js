@@ -1,6 +1,6 @@
 // Numbers and names as text.
 
-/** A number to some digits, with a typeset minus. */
+/** Return a number with some significant digits and a typeset minus. */
 export function rounded(value, digits = 3) {
   if (!Number.isFinite(value)) return "–";
   const shown = Number(value.toPrecision(digits));
@@ -9,7 +9,7 @@ export function rounded(value, digits = 3) {
   return shown.toFixed(decimals).replace("-", "−");
 }
 
-/** A value in an SI unit with a prefix and three digits: 1.2e-6 m is "1.20 µm". */
+/** Return a value in an SI unit with a prefix and three digits: 1.2e-6 m becomes "1.20 µm". */
 export function withUnit(value, unit) {
   const size = Math.abs(value);
   if (!Number.isFinite(value)) return "none";
@@ -19,13 +19,13 @@ export function withUnit(value, unit) {
   return `${rounded(scale * value)} ${prefix}${unit}`;
 }
 
-/** A number of dB with its sign: whole, or with one digit if it is below 1. */
+/** Return a level with its sign: whole, or with one decimal if it is below 1. */
 export function signed(value) {
   if (!Number.isFinite(value)) return "–";
   const text = Math.abs(value).toFixed(Math.abs(value) < 0.95 ? 1 : 0);
   return Number(text) === 0 ? text : `${value > 0 ? "+" : "−"}${text}`;
 }
 
-/** Text with its special characters escaped for SVG and HTML. */
+/** Return text with its special characters escaped for SVG and HTML. */
 export const escaped = (text) => String(text).replace(/[&<>"]/g,
   (c) => ({ "&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;" })[c]);

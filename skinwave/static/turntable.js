@@ -1,4 +1,4 @@
-// The view of a report: a body that moves, of the data that skinwave.report.turntable wrote.
+// The view of a report: a moving body, from the data of skinwave.report.turntable.
 
 import { bytes, unpack } from "./pack.js";
 import { openView } from "./view3d.js";

@@ -1,10 +1,10 @@
-// The controls of the page: ranges, units, steps, checks, the address, and the load that they describe.
+// The controls of the page: ranges, units, steps, checks, and the load that they describe.
 
 import { drawingFrequency } from "./load.js";
 
 /**
- * Numbers with a slider from `low` to `high` in steps of `step`, in `unit`; `least` is the smallest
- * value that the field takes. Ranges: Lim, Seifi and Park, CHI EA '24, section 2.2.
+ * Numbers with a slider from `low` to `high` in steps of `step`, in `unit`; `least` is the smallest value
+ * of the field, if not `low`. Ranges: Lim, Seifi and Park, CHI EA '24, section 2.2.
  */
 export const NUMBERS = {
   amplitude: { label: "Amplitude", unit: "%", low: 0, high: 100, step: 1, start: 100 },
@@ -25,7 +25,7 @@ export const NUMBERS = {
 };
 
 const RATIOS = { "1:0": 1, "0.75:0.25": 0.75, "0.5:0.5": 0.5, "0.25:0.75": 0.25, "0:1": 0 };
-const SHAPES = ["point", "line", "circle", "triangle", "square"]; // a size describes them
+const SHAPES = ["point", "line", "circle", "triangle", "square"]; // shapes that have a size
 export const CHOICES = {
   ratio: Object.keys(RATIOS),
   shape: [...SHAPES, "polyline"],
@@ -51,14 +51,14 @@ export const LABELS = {
   pulses: "Rhythm, ms", phases: "Phases, %", paths: "Paths of the foci", polyline: "Points of the path, mm",
 };
 
-const AREA = 50; // mm: half the side of the area that paths stay within
-const LARGEST = 60; // mm, the size of a palm
-const FASTEST = 20000; // Hz, half the carrier
-// mm: where paths of further foci are placed
+const AREA = 50; // mm: half the side of the area of paths
+const LARGEST_SIZE = 60; // mm, the size of a palm
+const HIGHEST_FD = 20000; // Hz, half the carrier
+// mm: centres of the paths of further foci
 const CENTRES = [[-20, 0], [20, 0], [0, 20], [0, -20], [-20, 20], [20, -20], [20, 20], [-20, -20]];
 const ROOT3 = Math.sqrt(3);
 
-/** Names of the bodies that the page has. */
+/** Set the names of the bodies. */
 export function nameBodies(names) {
   CHOICES.body = [...names];
 }
@@ -69,23 +69,23 @@ const inUnit = (value, unit) => (unit ? `${value} ${unit}` : `${value}`);
 const short = (text) => (text.length > 40 ? `${text.slice(0, 37)}...` : text);
 
 /**
- * Texts of rows, each of `count` numbers between slashes, after one of some `words`; at `most` so many.
- * `like` says what one is.
+ * Controls with a text of at most `most` rows. A row has one of some `words`, if there are any, and `count`
+ * numbers, all between slashes. `like` describes a row.
  */
 const TEXTS = {
-  pulses: { count: 2, most: 64, like: "on/off times in ms, on longer than 0, such as 100/50",
+  pulses: { count: 2, most: 64, like: "on/off times in ms, with on above 0, such as 100/50",
     isValid: ([on, gap]) => on > 0 && gap >= 0 },
-  phases: { count: 1, most: NUMBERS.foci.high, like: "0 to below 100 %, such as 0, 25, 60",
+  phases: { count: 1, most: NUMBERS.foci.high, like: "phases from 0 to below 100 %, such as 0, 25, 60",
     isValid: ([phase]) => phase >= 0 && phase < 100 },
-  polyline: { count: 2, most: 400, like: `x/y in mm within ±${AREA} mm, such as 10/5`,
+  polyline: { count: 2, most: 400, like: `corners x/y within ±${AREA} mm, such as 10/5`,
     isValid: (at) => Math.max(...at.map(Math.abs)) <= AREA },
   paths: { count: 3, words: SHAPES, most: NUMBERS.foci.high, like: "shape/size/x/y in mm, such as "
-    + `circle/20/-15/0, with a shape of ${SHAPES.join(", ")}, up to ${LARGEST} mm and within ±${AREA} mm`,
-  isValid: ([shape, size, ...at]) => size >= 0 && size <= LARGEST && extentOf(shape, size)
+    + `circle/20/-15/0. Shapes: ${SHAPES.join(", ")}; size up to ${LARGEST_SIZE} mm; all within ±${AREA} mm`,
+  isValid: ([shape, size, ...at]) => size >= 0 && size <= LARGEST_SIZE && extentOf(shape, size)
     .every((extent, axis) => Math.abs(at[axis]) + extent <= AREA * (1 + 1e-9)) },
 };
 
-/** Rows [[...]] of the text of a control, in its units; [] if empty. Throws an Error for users. */
+/** Rows [[...]] of the text of a control, in its units. Throws an Error with a sentence for users. */
 function rowsOf(key, text) {
   const { count, words, most, like, isValid } = TEXTS[key];
   const rows = parts(text).map((part) => {
@@ -93,28 +93,28 @@ function rowsOf(key, text) {
     const row = [...word, ...cells.map(toNumber)];
     const isKnown = cells.length === count && row.slice(word.length).every(Number.isFinite);
     if (isKnown && (!words || words.includes(row[0])) && isValid(row)) return row;
-    throw new Error(`${LABELS[key]}: "${short(part)}" is not understood. Give ${like}.`);
+    throw new Error(`${LABELS[key]}: "${short(part)}" is not valid. Give ${like}.`);
   });
   if (rows.length <= most) return rows;
-  throw new Error(`${LABELS[key]}: ${rows.length} exceed the limit of ${most}. Give fewer.`);
+  throw new Error(`${LABELS[key]}: ${rows.length} entries are too many. Give at most ${most}.`);
 }
 
-/** Pulses and gaps [[on, gap]] in s of a text such as "100/50, 40/110" in ms; [] if empty. */
+/** Pulses and gaps [[on, gap]] in s, from a text such as "100/50, 40/110" in ms. */
 export const pulsesOf = (text) => rowsOf("pulses", text).map((pulse) => pulse.map((ms) => ms / 1e3));
 
-/** How far from its centre a named shape extends along each axis, as [x, y], in the unit of its size. */
+/** Half extent [x, y] of a shape around its centre, in the unit of its size. */
 function extentOf(shape, size) {
   return { point: [0, 0], line: [size / 2, 0], triangle: [size / 2, size / ROOT3] }[shape]
     || [size / 2, size / 2];
 }
 
-/** Paths {shape, size, centre} in metre, one for each focus, of a text; [] if empty. */
+/** Paths {shape, size, centre} in metre, one for each focus, from a text. */
 const pathsOf = (text) => rowsOf("paths", text).map(([shape, size, x, y]) => (
   { shape, size: shape === "point" ? 0 : size / 1e3, centre: [x / 1e3, y / 1e3] }));
 
 /**
- * Value of a control from what was typed or chosen. Throws an Error with one sentence for users if it
- * is unknown, not a number or out of range.
+ * Value of a control from typed text or a choice. Throws an Error with a sentence for users if it is unknown,
+ * not a number or out of range.
  */
 export function check(key, text) {
   if (!(key in STARTS)) throw new Error(`"${short(key)}" is not a control of this page.`);
@@ -134,7 +134,7 @@ export function check(key, text) {
     throw new Error(`${label}: "${short(given)}" is not a number. Give ${least} to ${inUnit(high, unit)}.`);
   }
   if (value < least || value > high) {
-    throw new Error(`${label}: ${inUnit(value, unit)} is outside ${least} to ${inUnit(high, unit)}.`);
+    throw new Error(`${label}: ${inUnit(value, unit)} is out of range. Give ${least} to ${inUnit(high, unit)}.`);
   }
   if (key === "foci" && !Number.isInteger(value)) {
     throw new Error(`${label}: ${value} is not a whole number. Give ${least} to ${high}.`);
@@ -142,36 +142,15 @@ export function check(key, text) {
   return value;
 }
 
-/** Value of a control in words, with its unit. */
-export function shown(key, value) {
+/** Text of a value of a control, with its unit. */
+export function textOf(key, value) {
   if (key in NUMBERS) return inUnit(Number(Number(value).toPrecision(6)), NUMBERS[key].unit);
   return String(value).replaceAll("_", " ") || "none";
 }
 
-/** Part of an address that fromAddress reads: the values that differ from the starts. */
-export function toAddress(values, starts = STARTS) {
-  return Object.keys(STARTS).filter((key) => values[key] !== starts[key]).map((key) => {
-    const text = key in NUMBERS ? Number(values[key].toPrecision(10)) : values[key];
-    return `${key}=${encodeURIComponent(text).replace(/%(2F|3A|2C)/g, decodeURIComponent)}`;
-  }).join("&");
-}
-
-/** Values of an address, and a sentence for each part of it that was refused: {values, refused}. */
-export function fromAddress(text, starts = STARTS) {
-  const values = { ...starts }, refused = [];
-  for (const [key, given] of new URLSearchParams(text.replace(/^[#?]/, ""))) {
-    try {
-      values[key] = check(key, given);
-    } catch (error) {
-      refused.push(`Left out of the address: ${error.message}`);
-    }
-  }
-  return { values, refused };
-}
-
 /**
- * Values with as many paths as foci, if foci have paths of their own. `moved` is the control that was
- * moved, "foci" or "paths", and stays.
+ * Values with as many paths as foci, if foci have paths of their own. `moved` is the control that keeps its
+ * value, "foci" or "paths".
  */
 export function fitPaths(values, moved) {
   if (!values.paths) return values;
@@ -184,54 +163,53 @@ export function fitPaths(values, moved) {
 
 const evenly = (n) => Array.from({ length: n }, (_, k) => k / n);
 
-/** The path of a load, and the phases of its foci. */
+/** Path and phases of the foci {path, foci} of a load. */
 function pathAndFoci(values) {
   const n = values.foci, own = pathsOf(values.paths);
   if (own.length) {
     if (own.length !== n) {
-      throw new Error(`Paths: ${own.length} for ${n} foci. Give one path for each focus, or none.`);
+      throw new Error(`Own paths: there are ${own.length} paths and ${n} foci. Give one for each focus.`);
     }
     return { path: { shape: "joined", paths: own, drawn: values.drawn }, foci: evenly(n) };
   }
   const phases = rowsOf("phases", values.phases).map(([phase]) => phase / 100), { shape, sweep } = values;
   if (phases.length && phases.length !== n) {
-    throw new Error(`Phases: ${phases.length} for ${n} foci. Give one phase for each focus, or none.`);
+    throw new Error(`Phases: there are ${phases.length} phases and ${n} foci. Give one for each focus.`);
   }
   const foci = phases.length ? phases : evenly(n);
   if (shape === "point") return { path: { shape, size: 0, speed: 0, sweep, centre: [0, 0] }, foci };
   if (shape === "polyline") {
     const points = rowsOf("polyline", values.polyline).map(([x, y]) => [x / 1e3, y / 1e3]);
-    if (points.length < 2) throw new Error("The path needs two points or more, such as 0/0, 10/0.");
+    if (points.length < 2) throw new Error("A polyline needs two corners or more, such as 0/0, 10/0.");
     return { path: { shape, size: 0, speed: values.speed, sweep, points, centre: [0, 0] }, foci };
   }
   return { path: { shape, size: values.size / 1e3, speed: values.speed, sweep, centre: [0, 0] }, foci };
 }
 
-/** How far in metre the path of a load extends from the origin along each axis, as [x, y]. */
+/** Largest distance [x, y] in metre of the path of a load from the origin along each axis. */
 function pathExtent(path) {
-  const each = (path.paths || [path]).map(({ shape, size, points, centre: [cx, cy] }) => {
-    if (shape === "polyline") return points.map(([x, y]) => [Math.abs(x + cx), Math.abs(y + cy)]);
-    const [ex, ey] = extentOf(shape, size);
-    return [[Math.abs(cx) + ex, Math.abs(cy) + ey]];
-  }).flat();
-  return [0, 1].map((axis) => Math.max(...each.map((point) => point[axis])));
+  const furthest = (path.paths || [path]).flatMap(({ shape, size, points, centre }) => {
+    if (shape === "polyline") return points;
+    return [extentOf(shape, size).map((extent, axis) => Math.abs(centre[axis]) + extent)];
+  });
+  return [0, 1].map((axis) => Math.max(...furthest.map((at) => Math.abs(at[axis]))));
 }
 
 /**
- * The load that the controls describe, in SI units. Throws an Error with one sentence for users if
- * values contradict each other or, with a body's record, the path leaves the body.
+ * Load of the values of the controls, in SI units. Throws an Error with a sentence for users if values
+ * contradict each other or, with a body's record, if the path leaves the body.
  */
 export function loadOf(values, body = null) {
   const { path, foci } = pathAndFoci(values), pulses = pulsesOf(values.pulses), ramp = values.ramp / 1e3;
-  const turns = drawingFrequency(path);
-  if (turns > FASTEST) {
-    throw new Error(`The path is drawn ${Math.round(turns)} times a second; the limit is ${FASTEST} Hz, `
-      + "half the carrier. Make it longer or slower.");
+  const fd = drawingFrequency(path);
+  if (fd > HIGHEST_FD) {
+    throw new Error(`The drawing frequency is ${Math.round(fd)} Hz; the limit is ${HIGHEST_FD} Hz, half the `
+      + "carrier. Use a longer path or a lower speed.");
   }
   const shortest = Math.min(...pulses.map(([on]) => on));
   if (pulses.length && ramp > shortest / 2) {
     throw new Error(`Ramp: ${values.ramp} ms is longer than half the shortest pulse of `
-      + `${Number((1e3 * shortest).toPrecision(6))} ms. Shorten it.`);
+      + `${Number((1e3 * shortest).toPrecision(6))} ms. Give a shorter ramp.`);
   }
   if (body) checkOnBody(path, values, body);
   return {
@@ -244,19 +222,19 @@ export function loadOf(values, body = null) {
 
 function checkOnBody(path, values, body) {
   if (values.height < (body.lowest_height_mm || 0)) {
-    throw new Error(`Height of the focus: ${values.height} mm is below ${body.lowest_height_mm} mm, the `
-      + `lowest for ${body.title}. Raise it.`);
+    throw new Error(`Height of the focus: ${values.height} mm is too low for ${body.title}. Give at least ${
+      body.lowest_height_mm} mm.`);
   }
   if (!body.extent_mm) return;
   const reach = pathExtent(path);
   for (const axis of [0, 1]) {
     const half = body.extent_mm[axis], name = "xy"[axis];
     if (1e3 * reach[axis] > half * (1 + 1e-9)) {
-      throw new Error(`The path reaches ${Number((1e3 * reach[axis]).toPrecision(3))} mm along ${name}, off `
-        + `the body, which ends at ${half} mm. Shrink it.`);
+      throw new Error(`The path reaches ${name} = ${Number((1e3 * reach[axis]).toPrecision(3))} mm, off the body, `
+        + `which ends at ±${half} mm. Make the path smaller.`);
     }
     if (Math.abs(values[name]) > half) {
-      throw new Error(`Point ${name} = ${values[name]} mm is off the body, which ends at ${half} mm.`);
+      throw new Error(`Point: ${name} = ${values[name]} mm is off the body, which ends at ±${half} mm.`);
     }
   }
 }

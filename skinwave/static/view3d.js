@@ -1,12 +1,11 @@
-// A body in three dimensions, moving: WebGL 2, in the live page and in reports.
+// A moving body in three dimensions, drawn by WebGL 2 in the live page and in reports.
 
-import { bounds, locate, shade } from "./mesh3d.js";
-import { dots, strongLines, synthesise } from "./motion3d.js";
 import { SIGNED, TABLE_LENGTH } from "./palette.js";
+import { bounds, dots, locate, shade, strongLines, synthesise } from "./surface3d.js";
 import { withUnit } from "./text.js";
 
 const SURFACE_VERTEX = `#version 300 es
-  in vec3 place; in vec2 state; in vec3 normal; // state: lift in mm, place on the scale of colours
+  in vec3 place; in vec2 state; in vec3 normal; // state: lift in mm, place on the colour scale
   uniform mat3 turn; uniform vec3 middle; uniform vec3 size;
   out float value; out vec3 facing, at;
   void main() {
@@ -27,7 +26,7 @@ const SURFACE_FRAGMENT = `#version 300 es
   }`;
 const MARK_VERTEX = `#version 300 es
   in vec3 place; uniform mat3 turn; uniform vec3 middle; uniform vec3 size;
-  uniform float width, lead; // lead: mm nearer than the surface, which would hide a half of each mark
+  uniform float width, lead; // lead: mm in front of the surface, so that it does not hide the mark
   void main() {
     vec3 at = turn * (place - middle);
     gl_Position = vec4(at.xy * size.xy, -(at.z + lead) * size.z, 1.0);
@@ -42,28 +41,28 @@ const MARK_FRAGMENT = `#version 300 es
     colour = vec4(r > edge ? vec3(1.0) : ink, 1.0);
   }`;
 const HOME = { turned: -0.5, tipped: 0.95, near: 1 };
-const DRAWN = 0.06; // of the width: how far the largest motion is drawn at most
-const LOOP = 0.1; // s that are repeated, or a period of the slowest line
-const SLOWER = [10, 30, 100, 300, 1000], SHOWN_RATE = 0.7; // Hz at which the strongest line is seen at first
+const LARGEST_LIFT = 0.06; // of the width: drawn size of the largest motion
+const LOOP = 0.1; // s that are repeated at least
+const SLOWER = [10, 30, 100, 300, 1000], FIRST_RATE = 0.7; // Hz at which the strongest line moves at first
 const BARS = [1, 2, 5, 10, 20, 50, 100]; // mm
-const NO_WEBGL = "This browser does not draw in three dimensions: WebGL 2 is off or missing. "
+const NO_WEBGL = "This browser has no WebGL 2, which pictures in three dimensions need. "
   + "The map shows the same motion from above.";
 const PANEL = `<div class="view3d">
-  <div class="stage"><canvas data-part="canvas" tabindex="0" role="application" aria-label="The body, moving.
-    Arrow keys turn it, plus and minus zoom, Home shows it as at first, space plays and pauses."></canvas>
+  <div class="stage"><canvas data-part="canvas" tabindex="0" role="application" aria-label="Moving body.
+    Arrow keys turn it, plus and minus zoom, Home resets the view, space plays and pauses."></canvas>
     <svg data-part="over" aria-hidden="true"></svg></div>
   <div class="colours" data-part="colours" aria-hidden="true"></div><div class="ends" data-part="ends"
-    title="≥: rare larger values have the last colour"></div>
+    title="≥: larger values have the last colour"></div>
   <div class="row"><button type="button" data-part="play"></button>
     <input type="range" class="time" max="1000" value="0" data-part="slider" aria-label="Time">
     <output data-part="now"></output>
-    <select data-part="slow" aria-label="How many times slower than real">${SLOWER.map((times) => (
+    <select data-part="slow" aria-label="Slow motion">${SLOWER.map((times) => (
     `<option value="${times}">${times} × slower</option>`)).join("")}</select>
     <button type="button" data-part="above" title="Look from above">Above</button>
-    <button type="button" data-part="home" title="Show the body as at first">Reset</button></div>
-  <div data-part="said"></div></div>`;
+    <button type="button" data-part="home" title="Reset the view">Reset</button></div>
+  <div data-part="caption"></div></div>`;
 
-/** A table of colours as a gradient of CSS. */
+/** CSS gradient of a table of colours. */
 const gradient = (table) => Array.from({ length: 17 }, (_, k) => {
   const at = 4 * Math.round(k / 16 * (TABLE_LENGTH - 1));
   return `rgb(${table[at]},${table[at + 1]},${table[at + 2]})`;
@@ -119,19 +118,19 @@ class View {
 
   /**
    * Show a body and its motion.
-   * @param {object} given shape: points in mm and triangles; motion: f (l,) in Hz, re and im (l * n) in
-   *   metre upwards; path: paths of points [x, y] in metre; foci: places [x, y] in metre as a
-   *   function of the time in s, or a list of them for equal parts of the period; points: places [x, y]
-   *   to mark; period: s, of the loop; unit: "Pa" of a pressure, less of which is upwards
+   * @param {object} scene shape: points in mm and triangles; motion: f (l,) in Hz, re and im (l * n) in
+   *   metre upwards; path: paths of points [x, y] in metre; foci: places [x, y] in metre, as a function of
+   *   the time in s or a list for equal parts of the period; points: places [x, y] in metre to mark;
+   *   period: s of the loop; unit: "Pa" for a pressure, with less pressure drawn upwards
    */
-  show(given) {
+  show(scene) {
     const { gl, buffers } = this;
     if (!gl) return;
-    const isNew = given.shape !== this.given?.shape;
-    this.given = given;
+    const isNew = scene.shape !== this.scene?.shape;
+    this.scene = scene;
     if (isNew) {
-      this.mesh = { ...given.shape, ...bounds(given.shape) };
-      this.moved = Float32Array.from(given.shape.points);
+      this.mesh = { ...scene.shape, ...bounds(scene.shape) };
+      this.moved = Float32Array.from(scene.shape.points);
       this.state = new Float32Array(5 * this.moved.length / 3);
       gl.bindBuffer(gl.ARRAY_BUFFER, buffers.places);
       gl.bufferData(gl.ARRAY_BUFFER, this.mesh.points, gl.STATIC_DRAW);
@@ -141,40 +140,42 @@ class View {
     }
     this.measure();
     const here = ([x, y]) => locate(this.mesh, x, y);
-    this.riders = { path: dots(given.path || []).map(here).filter(Boolean),
-      points: (given.points || []).map(([x, y]) => here([1e3 * x, 1e3 * y])).filter(Boolean) };
-    this.say();
+    this.riders = { path: dots(scene.path || []).map(here).filter(Boolean),
+      points: (scene.points || []).map(([x, y]) => here([1e3 * x, 1e3 * y])).filter(Boolean) };
+    this.describe();
     this.draw();
     this.run();
   }
 
-  /** What is the same at all times: lines, the end of the colours, exaggeration, and the loop. */
+  /** Compute what is the same at all times: lines, end of the colours, exaggeration and loop. */
   measure() {
-    const { motion, period } = this.given, strong = strongLines(motion);
+    const { motion, period } = this.scene, strong = strongLines(motion);
     const width = this.mesh.high[0] - this.mesh.low[0];
     const loudest = strong.lines.reduce((a, b) => (b.largest > a.largest ? b : a), { f: 100, largest: 0 });
     if (!this.slower) {
-      const off = (slower) => Math.abs(Math.log(slower * SHOWN_RATE / loudest.f));
+      const off = (slower) => Math.abs(Math.log(slower * FIRST_RATE / loudest.f));
       this.slower = SLOWER.reduce((a, b) => (off(b) < off(a) ? b : a));
       this.slow.value = this.slower;
     }
-    const { crest } = strong, factor = crest ? Number((1e-3 * DRAWN * width / crest).toPrecision(1)) : 0;
+    const { crest } = strong, exact = 1e-3 * LARGEST_LIFT * width / crest;
+    const factor = crest ? Number(exact.toPrecision(1)) : 0;
     Object.assign(this, { strong, factor, largest: crest || 1, u: new Float32Array(strong.n),
       loop: period || Math.max(LOOP, 1 / Math.min(...strong.lines.map(({ f }) => f))) });
     this.time %= this.loop;
   }
 
-  say() {
-    const { unit = "m" } = this.given, end = withUnit(this.largest, unit);
-    const drawn = `Exaggerated ${this.factor.toLocaleString("en")} times, mean removed.`;
-    this.said.textContent = unit === "Pa" ? "A relief of the pressure; nothing moves." : drawn;
-    if (!this.factor) this.said.textContent = "Nothing moves.";
+  /** Write the caption and the ends of the colour scale. */
+  describe() {
+    const { unit = "m" } = this.scene, end = withUnit(this.largest, unit);
+    const exaggerated = `Exaggerated ${this.factor.toLocaleString("en")} times, mean removed.`;
+    const caption = unit === "Pa" ? "Relief of the pressure. The kernel does not move." : exaggerated;
+    this.caption.textContent = this.factor ? caption : "Nothing moves.";
     const words = unit === "Pa" ? [`≥ ${end} less`, "mean pressure", `≥ ${end} more`]
       : [`≥ ${end} out of the body`, "0", `≥ ${end} into the body`];
     this.ends.innerHTML = words.map((text) => `<span>${text}</span>`).join("");
   }
 
-  /** Scale, in pixels per mm at the first view, so that the body fills the canvas. */
+  /** Compute middle and extent of the body in the first view, which fills the canvas. */
   fit() {
     const { low, high } = this.mesh, turn = this.turn(HOME), reach = [0, 0];
     this.middle = low.map((v, k) => (v + high[k]) / 2);
@@ -196,8 +197,8 @@ class View {
 
   /** Move the points to a time, and colour them. */
   place() {
-    const { mesh, state, moved, u, given, factor } = this;
-    synthesise(this.strong, given.motion, this.time, u);
+    const { mesh, state, moved, u, scene, factor } = this;
+    synthesise(this.strong, scene.motion, this.time, u);
     for (let p = 0; 3 * p < moved.length; p++) {
       const lift = u[p] || 0;
       state[5 * p] = 1e3 * factor * lift;
@@ -240,7 +241,7 @@ class View {
     common(this.marks);
     const foci = this.foci().map(([x, y]) => locate(mesh, 1e3 * x, 1e3 * y)).filter(Boolean);
     this.drawMarks(this.riders.path, 2.6 * ratio, [0.05, 0.05, 0.05], 2);
-    if (view.tipped < Math.PI / 2) gl.disable(gl.DEPTH_TEST); // seen in the hollows that they make
+    if (view.tipped < Math.PI / 2) gl.disable(gl.DEPTH_TEST); // visible in the hollows of the motion
     this.drawMarks(this.riders.points, 11 * ratio, [0.84, 0.37, 0], 0.72);
     this.drawMarks(foci, 13 * ratio, [0.05, 0.05, 0.05], 0.75);
     gl.enable(gl.DEPTH_TEST);
@@ -252,12 +253,12 @@ class View {
   }
 
   foci() {
-    const { foci = [] } = this.given;
+    const { foci = [] } = this.scene;
     if (typeof foci === "function") return foci(this.time);
     return foci.length ? foci[Math.floor(this.time / this.loop * foci.length) % foci.length] : [];
   }
 
-  /** Round marks of a width in pixels where riders are on the moved surface. */
+  /** Draw round marks of a width in pixels at places of the moved surface. */
   drawMarks(riders, width, ink, edge) {
     if (!riders.length) return;
     const { gl, moved, marks, buffers } = this, values = new Float32Array(3 * riders.length);
@@ -274,14 +275,14 @@ class View {
     gl.drawArrays(gl.POINTS, 0, riders.length);
   }
 
-  /** The scale bar and the axes, over the picture. */
+  /** Draw the scale bar and the axes over the picture. */
   drawOver(wide, tall, turn) {
     const bar = [...BARS].reverse().find((length) => length * this.scale < 0.3 * wide) || BARS[0];
     const y = tall - 8, length = bar * this.scale, [u, v] = [wide - 34, tall - 34];
     const lines = [`M10,${y - 4}v8m0,-4h${length}m0,-4v8`], texts = [[10 + length / 2, y - 6, `${bar} mm`]];
     ["x", "y", "z"].forEach((name, axis) => {
       const across = 22 * turn[3 * axis], up = 22 * turn[3 * axis + 1];
-      if (Math.hypot(across, up) < 5) return; // seen end on
+      if (Math.hypot(across, up) < 5) return; // end on
       lines.push(`M${u},${v}l${across},${-up}`);
       texts.push([u + 1.35 * across, v - 1.35 * up + 4, name]);
     });
@@ -290,7 +291,7 @@ class View {
         + ` fill="currentColor">${words}</text>`).join("");
   }
 
-  /** Play from frame to frame as long as anybody sees it. */
+  /** Play from frame to frame while the canvas is visible. */
   run() {
     this.play.textContent = this.playing ? "❚❚ Pause" : "▶ Play";
     if (!this.playing || this.frame || !this.mesh) return;
@@ -298,9 +299,9 @@ class View {
     const next = (now) => {
       this.frame = null;
       if (!this.playing || !this.canvas.isConnected || !this.canvas.clientWidth) return;
-      const passed = last === null ? 0 : Math.min(now - last, 100) / 1e3;
+      const elapsed = last === null ? 0 : Math.min(now - last, 100) / 1e3;
       last = now;
-      this.time = (this.time + passed / this.slower) % this.loop;
+      this.time = (this.time + elapsed / this.slower) % this.loop;
       this.draw();
       this.options.onTime?.(this.time);
       this.frame = requestAnimationFrame(next);
@@ -351,7 +352,7 @@ class View {
       this.run();
     };
     canvas.asSvg = () => {
-      this.draw(); // the picture can be read in the same turn only
+      this.draw(); // the picture can be read in the same task only
       return `<image href="${canvas.toDataURL()}" width="${canvas.clientWidth}" height="${
         canvas.clientHeight}"/>${this.over.innerHTML}`;
     };
@@ -368,7 +369,7 @@ class View {
 }
 
 /**
- * Open a view in an element, which gives it its size; `show` fills it.
+ * Open a view in an element that sets its size. `show` fills it.
  * @param {HTMLElement} container
  * @param {object} options onTime: called with the time in s as it changes
  */

@@ -11,7 +11,7 @@ from skinwave.live import elements
 from skinwave.live.elements import BAND, element_pack
 from skinwave.live.packs import pack_of
 from skinwave.live.records import record_of
-from skinwave.live.selftest import HIGHEST, SHOWN, exact, random_scene
+from skinwave.live.selftest import HIGHEST, SMALLEST, exact, random_scene
 from skinwave.live.values import values_of
 from skinwave.scene.scene import BODIES
 
@@ -30,84 +30,72 @@ PLACES = """({ name, values, k }) => {
   const at = motion.at(MAP_LINE[k % n], MAP_LINE[Math.floor(k / n)]).re;
   return [...motion.f].map((_, l) => [re[l * n * n + k], at[l]]);
 }"""
-H = 0.012  # m: elements of the palm, few for the test
+H = 0.012  # m: size of the palm's elements in this test
 
 
-@pytest.fixture(scope="module")
-def bodies(page):
-    """The page with layers and a sheet."""
-    for name in ("palm-layers", "paper-sheet"):
-        add(page, name, pack_of(BODIES[name]))
-    return page
-
-
-def add(page, name, pack):
-    """Open a body on the page."""
+def open_body(page, name, pack):
     page.evaluate(OPEN, record_of(BODIES[name], pack, name, waves=False))
 
 
 def scenes(name, count, places=(), **tacton):
     """Random scenes on a body, the same every time."""
     rng = np.random.default_rng(11)
-    found = [random_scene(BODIES[name], rng, 0.15, places) for _ in range(count)]
+    made = [random_scene(BODIES[name], rng, 0.15, places) for _ in range(count)]
     given = {"duration": 0.3} | tacton
     return [
-        replace(s, pressure=replace(s.pressure, tacton=replace(s.tacton, **given))) for s in found
+        replace(s, pressure=replace(s.pressure, tacton=replace(s.tacton, **given))) for s in made
     ]
 
 
 def answer(page, name, scene):
-    """What the page answers."""
     return page.evaluate(ANSWER, {"name": name, "values": values_of(scene, name)})
 
 
-def line_errors(page, name, made, lines_of, shown=SHOWN, highest=HIGHEST):
-    """Errors of the page's lines above a share of the strongest, relative to each."""
-    found = []
+def line_errors(page, name, made, lines_of, smallest=SMALLEST, highest=HIGHEST):
+    """Relative errors of the page's lines above a share of the strongest."""
+    errors = []
     for scene in made:
         own = answer(page, name, scene)
         lines = np.array(own["re"]) + 1j * np.array(own["im"])
         at = dict(zip(np.round(own["f"], 3), lines, strict=True))
         f, exactly = lines_of(scene)
-        heard = (f > 0) & (f <= highest)
-        heard &= np.abs(exactly) > shown * np.abs(exactly[f > 0]).max(initial=0.0)
-        pairs = zip(np.round(f[heard], 3), exactly[heard], strict=True)
-        found += [abs(at[x] - a) / abs(a) for x, a in pairs]
-    return np.array(found)
+        strong = (f > 0) & (f <= highest)
+        strong &= np.abs(exactly) > smallest * np.abs(exactly[f > 0]).max(initial=0.0)
+        pairs = zip(np.round(f[strong], 3), exactly[strong], strict=True)
+        errors += [abs(at[x] - a) / abs(a) for x, a in pairs]
+    return np.array(errors)
 
 
 def wave_errors(page, name, made, waveform_of):
     """Errors of the page's waveforms from rest in the L2 norm."""
-    found = []
-    for scene in made:
-        own, exactly = np.array(answer(page, name, scene)["u"]), waveform_of(scene)
-        found.append(np.linalg.norm(own - exactly) / np.linalg.norm(exactly))
-    return np.array(found)
+    pairs = [(np.array(answer(page, name, scene)["u"]), waveform_of(scene)) for scene in made]
+    return np.array([np.linalg.norm(own - u) / np.linalg.norm(u) for own, u in pairs])
 
 
 @pytest.mark.parametrize("name", ["palm-layers", "paper-sheet"])
-def test_lines_waveforms_and_maps_of_layers_and_sheets(bodies, name):
+def test_lines_waveforms_and_maps_of_layers_and_sheets(page, name):
+    open_body(page, name, pack_of(BODIES[name]))
     lines_of, waveform_of, _ = exact(BODIES[name])
     made = scenes(name, 4)
-    assert line_errors(bodies, name, made, lines_of).max() < 0.005
-    assert wave_errors(bodies, name, made[:2], waveform_of).max() < 0.01
+    assert line_errors(page, name, made, lines_of).max() < 0.005
+    assert wave_errors(page, name, made[:2], waveform_of).max() < 0.01
     rhythm = Rhythm(pulses=((0.03, 0.02), (0.02, 0.01)), ramp=0.01)
     pulsed = scenes(name, 1, rhythm=rhythm, duration=0.1)
-    assert wave_errors(bodies, name, pulsed, waveform_of).max() < 0.02
+    assert wave_errors(page, name, pulsed, waveform_of).max() < 0.02
     given = {"name": name, "values": values_of(made[0], name), "k": 45 * 19 + 28}
-    pairs = np.array(bodies.evaluate(PLACES, given))
+    pairs = np.array(page.evaluate(PLACES, given))
     assert np.abs(pairs[:, 0] - pairs[:, 1]).max() < 5e-3 * np.abs(pairs).max()
 
 
 def test_a_body_of_elements(page, monkeypatch):
     monkeypatch.setattr(elements, "MOST", 250)
     monkeypatch.setattr(elements, "SPACING", 0.0087)  # m: fewer focal spots, for the test
-    add(page, "palm", element_pack(BODIES["palm"], H))
+    open_body(page, "palm", element_pack(BODIES["palm"], H))
     lines_of, waveform_of, places = exact(BODIES["palm"], H)
     made = scenes("palm", 8, places)
-    errors = line_errors(page, "palm", made, lines_of, shown=0.1, highest=BAND)
+    errors = line_errors(page, "palm", made, lines_of, smallest=0.1, highest=BAND)
     assert np.median(errors) < 0.05
-    assert np.quantile(errors, 0.9) < 0.2  # of elements that are much larger than the focal spot
+    assert np.quantile(errors, 0.9) < 0.2  # elements are much larger than the focal spot
     assert np.median(wave_errors(page, "palm", made[:5], waveform_of)) < 0.12
     for scene in made[:2]:
         u = np.abs(answer(page, "palm", scene)["u"])

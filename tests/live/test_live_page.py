@@ -9,7 +9,7 @@ from in_browser import frames, needs_browser
 
 from skinwave.commands.cli import main
 from skinwave.live.page import bundle, encoded, page, policy
-from skinwave.live.records import body_of, changed, editables, record_of, toml_of
+from skinwave.live.records import body_of, editables, record_of, toml_of, with_changes
 from skinwave.live.values import presets, values_of
 from skinwave.scene.file import loads
 from skinwave.scene.scene import BODIES
@@ -108,13 +108,15 @@ def test_each_value_of_a_body_can_be_changed(name):
         if each.choices:
             continue
         other = each.value * 1.2 + 0.01
-        found = {new.key: new.value for new in editables(changed(body, {each.key: other}))}
+        found = {new.key: new.value for new in editables(with_changes(body, {each.key: other}))}
         assert found[each.key] == pytest.approx(other, rel=1e-3)
-        assert changed(body, {each.key: each.value}) == body
+        assert with_changes(body, {each.key: each.value}) == body
 
 
 def test_a_change_keeps_the_other_values_of_a_layer():
-    body = changed(BODIES["palm-layers"], {"layers.1.modulus": 140.0, "layers.1.thickness": 2.0})
+    body = with_changes(
+        BODIES["palm-layers"], {"layers.1.modulus": 140.0, "layers.1.thickness": 2.0}
+    )
     values = {each.key: each.value for each in editables(body)}
     before = {each.key: each.value for each in editables(BODIES["palm-layers"])}
     moved = {key for key in before if values[key] != pytest.approx(before[key])}
@@ -126,13 +128,13 @@ def test_changes_that_cannot_be_are_refused():
     for changes in ({"width": 3}, {"modulus": "3"}, {"modulus": float("nan")}, {"modulus": -3},
                     {"base": "glued"}, {"base": "free", "sides": "free"}):  # fmt: skip
         with pytest.raises(ValueError, match=r"width|modulus|base|free|unconst"):
-            changed(BODIES["skin-slab"], changes)
+            with_changes(BODIES["skin-slab"], changes)
 
 
 def test_the_record_of_a_body_says_what_the_page_needs():
     slab, sheet = (record_of(BODIES[name], {}) for name in ("skin-slab", "paper-sheet"))
-    assert (slab["is_infinite"], slab["extent_mm"], slab["thickness_mm"]) == (True, None, None)
-    assert (sheet["is_infinite"], sheet["extent_mm"]) == (False, [74.0, 52.5])
+    assert (slab["extent_mm"], slab["thickness_mm"]) == (None, None)
+    assert sheet["extent_mm"] == [74.0, 52.5]
     assert sheet["thickness_mm"] == pytest.approx(0.13375)
     branches = slab["dispersion"]["branches"]
     assert {len(branch["c"]) for branch in branches} == {len(slab["dispersion"]["f"])}
@@ -197,8 +199,8 @@ def tiles(tab):
 @needs_browser
 def test_it_opens_from_a_file_without_a_request_and_agrees_with_python(opened, file):
     tab = opened(part="#selftest")
-    tab.locator("#selftest-said", has_text="largest error").wait_for(timeout=60_000)
-    assert float(tab.get_attribute("#selftest-said", "data-error")) < 0.01
+    tab.locator("#selftest-title", has_text="largest error").wait_for(timeout=60_000)
+    assert float(tab.get_attribute("#selftest-title", "data-error")) < 0.01
     assert "191 Hz" in tiles(tab)
     assert tab.said == [file.as_uri()]
 

@@ -1,26 +1,27 @@
-// The plots and maps of an answer, as data for what draws them.
+// The plots of an answer as data for plots.js, and what maps show of a load.
 
 import { inQuantity, lineName } from "./answer.js";
-import { drawingFrequency, gainAt, positionOf, relativeIntensity, rhythmLevel, rhythmPeriod } from "./load.js";
-import { QUANTITIES, amplitudesOf, meanLevel, spectrum, thresholdAt } from "./numbers.js";
+import { drawingFrequency, gainAt, positionOf, relativeIntensity, rhythmLevel,
+  rhythmPeriod } from "./load.js";
+import { QUANTITIES, amplitudesOf, meanLevel, spectrum, thresholdAt } from "./evaluate.js";
 import { largestOf } from "./numeric.js";
 import { niceTop } from "./plots.js";
 import { rounded, signed } from "./text.js";
 import { NUMBERS } from "./values.js";
 
 export const OVER = { speed: [0.5, 40], size: [2, 60], am: [10, 400], height: [100, 400] };
-const SAMPLES = 700, FINEST = 2.5e-4; // points of a curve at least; s between them at most
-const DENSE = 12, MOST = 6000; // points in a period of the fastest tone, and in all, of the signal
-const DYNAMIC = 60; // dB that levels over a control show
-const APART = 3.5; // px between stems of the same line
-const NAMED = 7, NAMELESS = 0.02; // lines that have a name; of the tallest, below which they have none
-const FAR_APART = 10; // times that A and B differ, from where A is drawn by a factor
-const FLOOR = -40; // dB of the largest, which a difference of maps begins at
+const FEWEST_POINTS = 700, LONGEST_STEP = 2.5e-4; // of a waveform; s between its points
+const POINTS_PER_PERIOD = 12, MOST_POINTS = 6000; // of the commanded signal
+const LEVEL_RANGE = 60; // dB that the plot of levels over a control shows
+const STEM_SPACING = 3.5; // px between stems of the same line
+const MOST_NAMES = 7, LEAST_NAMED = 0.02; // lines with a name; share of the tallest line that they need
+const LARGE_RATIO = 10; // of A and B, above which A is drawn with a factor
+const FLOOR = -40; // dB re the largest: smaller values count as this in a difference of maps
 const PRESSURE = { per: 1, rate: 0 };
 
 const inMs = (span) => span.map((t) => 1e3 * t);
 
-/** Start and end in s of what a choice shows of a load. */
+/** Start and end in s of a choice of time span for a load. */
 export function spanOf(name, load) {
   const { duration, pulses } = load, period = pulses && rhythmPeriod(load);
   if (name === "last 60 ms") return [Math.max(0, duration - 0.06), duration];
@@ -29,7 +30,7 @@ export function spanOf(name, load) {
 
 /** Waveform {x in ms, y} within a span in s, in the unit of a quantity. */
 function waveform(motion, [x, y], [start, end], { per, rate }) {
-  const count = Math.max(SAMPLES, Math.ceil(end / FINEST)), dt = end / count;
+  const count = Math.max(FEWEST_POINTS, Math.ceil(end / LONGEST_STEP)), dt = end / count;
   const times = Float64Array.from({ length: count + 1 }, (_, k) => k * dt);
   let values = motion.waveform(x, y, times);
   for (let n = 0; n < rate; n++) {
@@ -39,15 +40,14 @@ function waveform(motion, [x, y], [start, end], { per, rate }) {
       return (own[after] - own[before]) / (dt * (after - before));
     });
   }
-  const first = Math.floor(start / dt), shown = (own, factor) => Array.from(own.subarray(first), (v) =>
-    factor * v);
-  return { x: shown(times, 1e3), y: shown(values, per) };
+  const scaled = (own, factor) => Array.from(own.subarray(Math.floor(start / dt)), (v) => factor * v);
+  return { x: scaled(times, 1e3), y: scaled(values, per) };
 }
 
-/** Plot of the commanded signal: amplitude of the sound at a focus in % of full drive. */
+/** Plot of the commanded signal: amplitude of the sound at a focus, in per cent of full drive. */
 export function commandedPlot({ load }, [start, end]) {
   const tones = load.am + load.am2 + load.envelope + 50;
-  const count = Math.min(Math.max(400, Math.ceil((end - start) * tones * DENSE)), MOST);
+  const count = Math.min(Math.max(400, Math.ceil((end - start) * tones * POINTS_PER_PERIOD)), MOST_POINTS);
   const full = load.peak * relativeIntensity(load.height) / load.foci.length;
   const x = new Array(count + 1), y = new Array(count + 1), own = { ...load };
   for (let k = 0; k <= count; k++) {
@@ -64,10 +64,10 @@ export function commandedPlot({ load }, [start, end]) {
   };
 }
 
-/** A power of ten by which A is drawn larger or smaller, if it differs from B by more than ten times. */
+/** Power of ten by which A is drawn larger or smaller, if it differs from B by more than a factor of 10. */
 export function factorOf(a, b) {
   const ratio = b / a;
-  const isFar = Number.isFinite(ratio) && ratio > 0 && Math.max(ratio, 1 / ratio) > FAR_APART;
+  const isFar = Number.isFinite(ratio) && ratio > 0 && Math.max(ratio, 1 / ratio) > LARGE_RATIO;
   return isFar ? 10 ** Math.round(Math.log10(ratio)) : 1;
 }
 
@@ -76,7 +76,7 @@ function nameOfA(factor) {
   return `A × ${factor > 1 ? factor : factor.toFixed(-Math.log10(factor))}`;
 }
 
-/** Plot of the waveforms; `scale(name, largest)` gives the top of an axis. */
+/** Plot of the waveforms. `scale(name, largest)` gives the top of an axis. */
 export function waveformPlot(answer, span, { pinned, measured, scale }) {
   const { kernel, waves, values, x, y } = answer, quantity = QUANTITIES[values.quantity];
   const curves = [{ role: "kernel", axis: "y", name: "kernel", ...waveform(kernel, [x, y], span, PRESSURE) }];
@@ -93,7 +93,7 @@ export function waveformPlot(answer, span, { pinned, measured, scale }) {
       y: nearestPlace(measured, answer, measured.values).map((v) => quantity.per * v) });
   }
   const axes = { y: { label: "Pa", role: "kernel" }, y2: { label: quantity.unit, role: "waves" } };
-  let below = 0.04; // of the top, so that both axes have their zero at the same height
+  let below = 0.04; // share of the top; the same on both axes, so that their zeros are level
   for (const [name, axis] of Object.entries(axes)) {
     const shown = curves.filter((curve) => curve.axis === name).flatMap((curve) => curve.y);
     axis.top = scale(`waveform ${name} ${values.quantity}`, largestOf(shown));
@@ -107,7 +107,7 @@ export function waveformPlot(answer, span, { pinned, measured, scale }) {
   };
 }
 
-/** Row of a measurement's curves at the place nearest the point. */
+/** Row of a measurement's curves at the place nearest to the point. */
 function nearestPlace({ places }, { x, y }, rows) {
   const away = places.map((at) => (at ? Math.hypot(at[0] - x, at[1] - y) : 0));
   return rows[away.indexOf(Math.min(...away))];
@@ -119,14 +119,14 @@ function measuredSpectrum(measured, answer, per, highest) {
   if (!f) {
     const values = nearestPlace(measured, answer, measured.values);
     const mean = values.reduce((sum, v) => sum + v, 0) / values.length;
-    const found = spectrum(values.map((v) => v - mean), measured.times[1] - measured.times[0]);
-    [f, a] = [Array.from(found.f), Array.from(found.amplitudes)];
+    const lines = spectrum(values.map((v) => v - mean), measured.times[1] - measured.times[0]);
+    [f, a] = [Array.from(lines.f), Array.from(lines.amplitudes)];
   }
   const count = f.filter((at) => at <= highest).length;
   return { x: f.slice(0, count), y: a.slice(0, count).map((v) => per * v) };
 }
 
-/** Plot of the spectra as stems side by side, with the pauses of a rhythm, and the threshold of skin. */
+/** Plot of the spectra as stems side by side, averaged over the rhythm, with the threshold of skin. */
 export function spectrumPlot(answer, { pinned, measured, highest, scale }) {
   const { kernel, waves, body, values: { quantity: name } } = answer, { unit, per, rate } = QUANTITIES[name];
   const mean = meanLevel(answer.load);
@@ -135,7 +135,7 @@ export function spectrumPlot(answer, { pinned, measured, highest, scale }) {
     return { role, axis, name: title, stems: true, offset, head: axis === "y" ? "square" : "circle",
       x: kept.map((k) => f[k]), y: kept.map((k) => factor * amplitudes[k]) };
   };
-  const wide = pinned ? 2 * APART : APART, moved = inQuantity(waves.f, answer.wavesAt, name);
+  const wide = pinned ? 2 * STEM_SPACING : STEM_SPACING, moved = inQuantity(waves.f, answer.wavesAt, name);
   const own = stems("waves", "y2", pinned ? "B" : "waves", waves.f, moved, wide / 2);
   const given = stems("kernel", "y", "kernel", kernel.f, amplitudesOf(kernel.f, answer.kernelAt), -wide / 2);
   const curves = [given, own];
@@ -158,11 +158,12 @@ export function spectrumPlot(answer, { pinned, measured, highest, scale }) {
     curves.push({ role: "threshold", axis: "y2", name: "threshold", dash: "5 3", x,
       y: x.map((f) => per * thresholdAt(f)) });
   }
-  const beside = (f) => given.y[given.x.findIndex((at) => Math.abs(at - f) < 1e-3)] ?? 0;
+  const kernelAt = (f) => given.y[given.x.findIndex((at) => Math.abs(at - f) < 1e-3)] ?? 0;
   const names = own.x.map((f, k) => ({ x: f, y: own.y[k], axis: "y2", text: lineName(answer, f),
-    above: { y: beside(f), axis: "y" } }));
-  const least = NAMELESS * largestOf(own.y);
-  const named = names.filter(({ text, y }) => text && y > least).sort((a, b) => b.y - a.y).slice(0, NAMED);
+    above: { y: kernelAt(f), axis: "y" } }));
+  const least = LEAST_NAMED * largestOf(own.y);
+  const named = names.filter(({ text, y }) => text && y > least).sort((a, b) => b.y - a.y)
+    .slice(0, MOST_NAMES);
   return {
     label: "Spectrum at the point: lines of the kernel in Pa and of the waves, side by side",
     x: { label: "frequency, Hz", range: [0, highest] }, ...axes, curves, names: named,
@@ -174,9 +175,9 @@ export function spectrumPlot(answer, { pinned, measured, highest, scale }) {
 export function dispersionPlot(answer, highest) {
   const { body: { dispersion }, load: { path }, waves } = answer;
   if (!dispersion) {
-    return { label: "No dispersion curves are known for this body",
-      x: { label: "frequency, Hz", range: [0, highest] }, y: { label: "m/s", range: [0, 10] }, curves: [],
-      names: [{ x: highest / 2, y: 5, axis: "y", text: "No dispersion curves are known for this body." }] };
+    const text = "Dispersion curves are not available for this body.";
+    return { label: text, x: { label: "frequency, Hz", range: [0, highest] },
+      y: { label: "m/s", range: [0, 10] }, curves: [], names: [{ x: highest / 2, y: 5, axis: "y", text }] };
   }
   const speed = drawingFrequency(path) ? path.speed : 0, across = [0, highest];
   const typical = dispersion.branches.map(({ c }) => c.filter((v) => v !== null).sort((a, b) => a - b))
@@ -188,7 +189,7 @@ export function dispersionPlot(answer, highest) {
     speed] });
   const sizes = amplitudesOf(waves.f, answer.wavesAt);
   const strong = Array.from(waves.f.keys()).filter((k) => waves.f[k] <= highest)
-    .sort((a, b) => sizes[b] - sizes[a]).slice(0, NAMED).map((k) => waves.f[k]);
+    .sort((a, b) => sizes[b] - sizes[a]).slice(0, MOST_NAMES).map((k) => waves.f[k]);
   for (const f of strong) curves.push({ role: "now", axis: "y", x: [f, f], y: [0, top], width: 1,
     dash: "2 3" });
   return {
@@ -203,19 +204,19 @@ export function levelPlot(answer, key, { x, kernel, waves, best }) {
   const { label, unit } = NUMBERS[key], now = answer.values[key];
   const known = [...waves, ...kernel].filter(Number.isFinite);
   const top = 5 * Math.ceil(Math.max(...known, 6) / 5 + 0.6);
-  const low = Math.max(5 * Math.floor(Math.min(...known, -5) / 5), top - DYNAMIC);
-  const said = best && `${rounded(best.at)} ${unit}: ${signed(best.level)} dB`;
+  const low = Math.max(5 * Math.floor(Math.min(...known, -5) / 5), top - LEVEL_RANGE);
+  const text = best && `${rounded(best.at)} ${unit}: ${signed(best.level)} dB`;
   return {
     label: `Sensation level over ${label}`, x: { label: `${label}, ${unit}`, range: OVER[key] },
     y: { label: "dB above threshold", range: [low, top] },
     curves: [
-      { role: "kernel", axis: "y", name: answer.body.is_skin ? "kernel" : "kernel alone: this body is not skin",
-        x, y: kernel },
+      { role: "kernel", axis: "y", x, y: kernel,
+        name: answer.body.is_skin ? "kernel" : "kernel only: this body is not skin" },
       ...(answer.body.is_skin ? [{ role: "waves", axis: "y", name: "waves", x, y: waves }] : []),
       { role: "threshold", axis: "y", x: OVER[key], y: [0, 0], dash: "5 3" },
       { role: "now", axis: "y", name: "now", x: [now, now], y: [low, top], dash: "2 3" },
     ],
-    names: best ? [{ x: best.at, y: best.level, axis: "y", text: said }] : [],
+    names: best ? [{ x: best.at, y: best.level, axis: "y", text }] : [],
   };
 }
 
@@ -234,7 +235,7 @@ export function fociAt(load, t) {
   return load.foci.map((ahead) => at((fd * t + ahead) % 1));
 }
 
-/** Where one map has more (positive) or less than another, in dB, each re its largest. */
+/** Difference of two maps in dB, each relative to its largest value. */
 export function difference(one, other) {
   const largest = [one, other].map(largestOf);
   const level = (v, k) => Math.max(20 * Math.log10(v / largest[k]), FLOOR);

@@ -1,48 +1,49 @@
-// Numbers of an answer: thresholds, levels, maps, reach, share, delay, and names of lines.
+// Evaluation of an answer: thresholds, levels, maps, reach, share, delay, and names of lines.
 
 import { fourier, largestOf } from "./numeric.js";
 import { drawingFrequency, jumps, levelFactor, loadLines, pathSamples, positionOf, rhythmLevel,
   rhythmPeriod } from "./load.js";
 
 const TAU = 2 * Math.PI;
-const PACINIAN = -13, NON_PACINIAN = 12; // dB re 1 um peak, at 250 Hz for a focal spot and at any
-const LOWEST = 10, HIGHEST = 1000; // Hz, between which the thresholds are known
-const PRESSURE = 2.2, TESTED = 200; // Pa of a component, and its frequency in Hz
-const SIDE = 45, HALF = 0.044; // places along a side of a map, and half of it in metre
-const LEVELS = 4096; // instants of a rhythm
+const PACINIAN = -13, NON_PACINIAN = 12; // dB re 1 um peak: at 250 Hz for a focal spot; at any frequency
+const LOWEST = 10, HIGHEST = 1000; // Hz: range of the thresholds
+const PRESSURE = 2.2, PRESSURE_AT = 200; // threshold of a component in Pa, and its frequency in Hz
+const SIDE = 45, HALF = 0.044; // places along a side of a map, and half its width in metre
+const LEVELS = 4096; // instants of a rhythm that are averaged
 const OUTSIDE = 0.1; // of the largest RMS: edge of the kernel's region
-const ON_PATH = 12; // places of the path at which the delay is looked for
-const HEARD = 0.1; // of its largest on the path: a weaker line has no phase
+const PATH_PLACES = 12; // on which the delay is looked for
+const WITH_PHASE = 0.1; // of its largest on the path: a weaker line has no reliable phase
 const SYMBOLS = ["f_d", "f_AM", "f_AM2", "f_e"];
-const REPEATED = 1.5; // periods in the Tacton at least, to make lines
+const REPETITIONS = 1.5; // periods in the Tacton that a path needs to make lines
 const NEGLIGIBLE_LINE = 1e-3; // of the strongest in a table
-const FAINT = 1e-5; // of the strongest product of sinusoids: weaker ones give no line a name
-const FINER = 16; // values between two others, among which the highest level is looked for
+const NEGLIGIBLE_PRODUCT = 1e-5; // of the strongest product of sinusoids: weaker ones give a line no name
+const FINER = 16; // steps between neighbours of the highest level, among which a higher one is looked for
 
-/** Quantities at the point: `rate` is the order of the derivative, 1 in SI is `per` in `unit`. */
+/** Quantities at the point: `rate` is the order of the derivative; 1 in SI units is `per` in `unit`. */
 export const QUANTITIES = {
   displacement: { unit: "µm", per: 1e6, rate: 0 },
   velocity: { unit: "mm/s", per: 1e3, rate: 1 },
   acceleration: { unit: "m/s²", per: 1, rate: 2 },
 };
 
-/** Detection threshold of displacement in metre, peak, at a frequency in Hz; NaN if not known. */
+/** Detection threshold in metre, peak displacement, at a frequency in Hz; NaN if unknown. */
 export function thresholdAt(frequency) {
   if (!(frequency >= LOWEST && frequency <= HIGHEST)) return NaN;
   const octaves = Math.log2(frequency / 250), slope = octaves < 0 ? -12 : 9;
   return 1e-6 * 10 ** (Math.min(PACINIAN + slope * octaves, NON_PACINIAN) / 20);
 }
 
-/** Detection threshold in Pa of a component of the pressure at a frequency in Hz; NaN if not known. */
-export const pressureThresholdAt = (frequency) => PRESSURE * thresholdAt(frequency) / thresholdAt(TESTED);
+/** Detection threshold in Pa of a component of the pressure at a frequency in Hz; NaN if unknown. */
+export const pressureThresholdAt = (frequency) => (
+  PRESSURE * thresholdAt(frequency) / thresholdAt(PRESSURE_AT));
 
-/** Level in dB of a peak amplitude in metre or Pa above its threshold; -Infinity if there is none. */
+/** Level in dB of a peak amplitude in metre or Pa above its threshold; -Infinity without a threshold. */
 function sensationLevel(amplitude, frequency, unit = "m") {
   const least = unit === "m" ? thresholdAt(frequency) : pressureThresholdAt(frequency);
   return amplitude > 0 && least > 0 ? 20 * Math.log10(amplitude / least) : -Infinity;
 }
 
-/** Amplitude of lines with the pauses of the rhythm over that while a pulse is on. */
+/** Amplitude of lines averaged over the rhythm, relative to that during a pulse. */
 export function meanLevel(load) {
   if (!load.pulses) return 1;
   const period = rhythmPeriod(load);
@@ -51,14 +52,14 @@ export function meanLevel(load) {
   return sum / LEVELS;
 }
 
-/** Amplitudes (l,) of complex lines at a place, as the `rate`-th derivative in time. */
+/** Amplitudes (l,) of complex lines at a place, of the `rate`-th time derivative. */
 export function amplitudesOf(f, { re, im }, rate = 0) {
   return Float64Array.from(f, (at, l) => (TAU * at) ** rate * Math.hypot(re[l], im[l]));
 }
 
 /**
- * Highest level over lines at a place, with the pauses of the rhythm: {dB, f}; null if nothing moves
- * there. `unit` is "m" or "Pa".
+ * Highest level of the lines at a place, averaged over the rhythm: {dB, f}; null if nothing moves there.
+ * `unit` is "m" or "Pa".
  */
 export function levelOf(load, f, at, unit = "m") {
   const mean = meanLevel(load);
@@ -70,12 +71,12 @@ export function levelOf(load, f, at, unit = "m") {
   return best;
 }
 
-/** Coordinates (n,) in metre of every map along either axis. */
+/** Coordinates (n,) in metre of the places of a map along either axis. */
 export const MAP_LINE = Float64Array.from({ length: SIDE }, (_, k) => HALF * (2 * k / (SIDE - 1) - 1));
 
 /**
- * Map of a motion: {rms, level}, row y, column x. RMS about the mean while a pulse is on; level
- * in dB of the highest line, with the pauses of a rhythm. NaN off the body.
+ * Map of a motion {rms, level} by row y and column x; NaN off the body. `rms` is about the mean during a
+ * pulse; `level` in dB is that of the highest line, averaged over the rhythm.
  */
 export function mapOf(motion, load) {
   const { re, im } = motion.onGrid(MAP_LINE, MAP_LINE), places = SIDE * SIDE, mean = meanLevel(load);
@@ -95,7 +96,7 @@ export function mapOf(motion, load) {
   return { rms, level };
 }
 
-/** Share 0..1 of squared motion where the kernel is 20 dB below its largest; NaN if nothing moves. */
+/** Share 0 to 1 of squared motion where the kernel is 20 dB below its largest; NaN if nothing moves. */
 export function shareOutside(kernelRms, rms) {
   const edge = OUTSIDE * largestOf(kernelRms);
   let outside = 0, all = 0;
@@ -107,7 +108,7 @@ export function shareOutside(kernelRms, rms) {
   return outside / all;
 }
 
-/** Distance in metre from the samples of the path of a load, as a function of x and y in metre. */
+/** Function of x, y in metre that gives the distance in metre from the samples of a path. */
 function distanceFromPath(load) {
   const { x: xs, y: ys } = pathSamples(load);
   return (x, y) => Math.sqrt(xs.reduce((least, own, q) => Math.min(least, (x - own) ** 2 + (y - ys[q]) ** 2),
@@ -115,8 +116,8 @@ function distanceFromPath(load) {
 }
 
 /**
- * Largest distance from the path at which a map is above the threshold of skin, interpolated between
- * places: {metre, beyond}, with `beyond` if it is at the edge of the map; null if it is nowhere.
+ * Largest distance from the path at which a map is above the detection threshold, interpolated between
+ * places: {metre, beyond}; null if it is nowhere above. `beyond` is true if it is above at the map's edge.
  */
 export function reach(load, { level }) {
   const distance = distanceFromPath(load), isIn = (p) => level[p] >= 0, at = (k) => MAP_LINE[k];
@@ -138,13 +139,13 @@ export function reach(load, { level }) {
   return metre < 0 ? null : { metre, beyond };
 }
 
-/** Delay in s of a complex b behind a at a frequency in Hz: a quarter period before to three after. */
+/** Delay in s of a complex b behind a at a frequency in Hz, from -1/4 to 3/4 of a period. */
 export function phaseDelay(a, b, f) {
   const turns = (Math.atan2(a.im, a.re) - Math.atan2(b.im, b.re)) / TAU;
   return (turns - Math.floor(turns + 0.25)) / f;
 }
 
-/** Complex lines {re, im} of a motion at each of some places; at all of them at once if it can. */
+/** Complex lines {re, im} of a motion at each of several places. */
 function linesAt(motion, places) {
   if (!motion.places) return places.map(([x, y]) => motion.at(x, y));
   const { re, im } = motion.places(...[0, 1].map((axis) => Float64Array.from(places, (at) => at[axis])));
@@ -153,13 +154,13 @@ function linesAt(motion, places) {
 }
 
 /**
- * Delay of the strongest line of a motion behind the kernel's pressure at the place of the path where
- * the pressure has most of it: {delay in s, f in Hz}; null if they share none.
+ * Delay of the strongest line of a motion behind the kernel's pressure, at the place of the path where that
+ * line of the pressure is largest: {delay in s, f in Hz}; null if kernel and motion share no such line.
  */
 export function delayOf(kernel, motion, load) {
   const position = positionOf(load.path), moves = drawingFrequency(load.path) > 0;
-  const phases = moves ? Array.from({ length: ON_PATH }, (_, k) => k / ON_PATH) : load.foci.map((a) => a % 1);
-  const places = phases.map((phase) => position(phase));
+  const evenly = Array.from({ length: PATH_PLACES }, (_, k) => k / PATH_PLACES);
+  const places = (moves ? evenly : load.foci.map((ahead) => ahead % 1)).map((phase) => position(phase));
   const [a, b] = [kernel, motion].map((each) => linesAt(each, places));
   const size = (each, l) => each.map(({ re, im }) => Math.hypot(re[l], im[l]));
   let line = -1, strongest = 0;
@@ -171,22 +172,22 @@ export function delayOf(kernel, motion, load) {
   const f = motion.f[line], own = kernel.f.findIndex((at) => Math.abs(at - f) < 1e-6);
   if (own < 0) return null;
   const pressure = size(a, own), moved = size(b, line);
-  const heard = (sizes, k) => sizes[k] > 0 && sizes[k] >= HEARD * largestOf(sizes);
-  const best = places.reduce((top, _, k) => (heard(pressure, k) && heard(moved, k)
+  const hasPhase = (sizes, k) => sizes[k] > 0 && sizes[k] >= WITH_PHASE * largestOf(sizes);
+  const best = places.reduce((top, _, k) => (hasPhase(pressure, k) && hasPhase(moved, k)
     && (top < 0 || pressure[k] > pressure[top]) ? k : top), -1);
   if (best < 0) return null;
   const at = ({ re, im }, l) => ({ re: re[l], im: im[l] });
   return { delay: phaseDelay(at(a[best], own), at(b[best], line), f), f };
 }
 
-/** Frequencies in Hz of SYMBOLS, 0 of those that the Tacton does not repeat. */
+/** Frequencies in Hz of SYMBOLS; 0 for those that the Tacton does not repeat. */
 function symbolsOf({ path, duration, am, am2, envelope, w1 }) {
-  const own = path.shape === "joined", turns = own ? path.drawn : drawingFrequency(path);
-  const least = own ? REPEATED : jumps(path) ? 1 - 1e-9 : 0;
-  return [turns * duration >= least ? turns : 0, w1 > 0 ? am : 0, w1 < 1 ? am2 : 0, envelope];
+  const isJoined = path.shape === "joined", fd = isJoined ? path.drawn : drawingFrequency(path);
+  const least = isJoined ? REPETITIONS : jumps(path) ? 1 - 1e-9 : 0;
+  return [fd * duration >= least ? fd : 0, w1 > 0 ? am : 0, w1 < 1 ? am2 : 0, envelope];
 }
 
-/** Name of the line of orders of SYMBOLS, such as "2f_d-f_AM". */
+/** Name of a line from its orders of SYMBOLS, such as "2f_d-f_AM". */
 function nameOf(orders, symbols) {
   const sum = orders.reduce((total, n, k) => total + n * symbols[k], 0);
   const sign = orders[0] > 0 || (orders[0] === 0 && sum > 0) ? 1 : -1;
@@ -196,11 +197,11 @@ function nameOf(orders, symbols) {
   return terms.map(([n, symbol]) => `${n < 0 ? "-" : "+"}${times(n)}${symbol}`).join("").replace(/^\+/, "");
 }
 
-/** Names of a load's lines while a pulse is on, as a function of the frequency in Hz; "" if unknown. */
+/** Function of the frequency in Hz that gives the name of a line of the load; "" if it is unknown. */
 export function namesOf(load) {
   const symbols = symbolsOf(load), paths = load.path.paths?.length ?? 1;
   const { f, parts } = loadLines(load, { threshold: 1e-4, most: 1000 });
-  const least = FAINT * Math.max(...parts.flat().map(({ strength }) => strength));
+  const least = NEGLIGIBLE_PRODUCT * Math.max(...parts.flat().map(({ strength }) => strength));
   const isNamed = ({ n, strength }) => strength > least && (symbols[0] ? n % paths === 0 : n === 0);
   const effortOf = (orders) => orders.reduce((sum, n) => sum + Math.abs(n) + (n ? 0.01 : 0),
     orders[0] ? 0.1 : 0);
@@ -215,9 +216,9 @@ export function namesOf(load) {
 }
 
 /**
- * Table of lines at a point, the strongest first: [{name, f, motion, pressure, level}] of an answer
- * {load, values, body, waves, wavesAt, kernel, kernelAt}: `motion` in SI units of the quantity, `pressure`
- * of the kernel in Pa, `level` in dB, null where the body is not skin.
+ * Table of the lines of an answer at the point, the strongest first: [{name, f, motion, pressure, level}],
+ * with `motion` in SI units of the quantity, the kernel's `pressure` in Pa, and `level` in dB or null if the
+ * body is not skin.
  */
 export function lineTable({ load, values, body, waves, wavesAt, kernel, kernelAt, names = namesOf(load) }) {
   const { rate } = QUANTITIES[values.quantity], mean = meanLevel(load);
@@ -231,8 +232,8 @@ export function lineTable({ load, values, body, waves, wavesAt, kernel, kernelAt
 }
 
 /**
- * Amplitude spectrum {f in Hz, amplitudes} of values at equal steps dt in s under a Hann window, as
- * simple_model.spectrum: a sinusoid of amplitude a on a bin shows as a.
+ * Amplitude spectrum {f in Hz, amplitudes} of values at steps of dt in s under a Hann window, as
+ * simple_model.spectrum computes it: a sinusoid on a bin has its own amplitude.
  */
 export function spectrum(values, dt) {
   const n = values.length, count = Math.floor(n / 2) + 1;
@@ -243,27 +244,27 @@ export function spectrum(values, dt) {
 }
 
 /**
- * Levels over a value of the controls: yields {x, kernel, waves, best} after each of `count` + 1 values
- * and, last, with the highest of the curve `of` as `best`, {at, level}, between them. `levelsAt(value)`
- * returns {kernel, waves} in dB or throws, which skips a value.
+ * Levels over a value of the controls. Yields {x, kernel, waves, best} after each of `count` + 1 values, and
+ * at the end with `best`, {at, level}: the highest level of the curve `lead`, refined between the values.
+ * `levelsAt(value)` returns {kernel, waves} in dB; if it throws, the value is skipped.
  */
-export function* levelOver(levelsAt, [low, high], { of = "waves", count = 48 } = {}) {
-  const found = { x: [], kernel: [], waves: [], best: null };
+export function* levelOver(levelsAt, [low, high], { lead = "waves", count = 48 } = {}) {
+  const curves = { x: [], kernel: [], waves: [], best: null };
   let best = { level: -Infinity }, [a, b] = [low, high];
   for (const parts of [count, FINER, FINER]) {
     for (let k = 0; k <= parts; k++) {
       const at = a + (b - a) * k / parts;
       let levels;
       try { levels = levelsAt(at); } catch { continue; } // such as a path that leaves the body
-      if (levels[of] > best.level) best = { at, level: levels[of] };
+      if (levels[lead] > best.level) best = { at, level: levels[lead] };
       if (b - a < high - low) continue;
-      found.x.push(at);
-      found.kernel.push(levels.kernel);
-      found.waves.push(levels.waves);
-      yield found;
+      curves.x.push(at);
+      curves.kernel.push(levels.kernel);
+      curves.waves.push(levels.waves);
+      yield curves;
     }
     if (best.level === -Infinity) return;
     [a, b] = [Math.max(best.at - (b - a) / parts, low), Math.min(best.at + (b - a) / parts, high)];
   }
-  yield { ...found, best };
+  yield { ...curves, best };
 }

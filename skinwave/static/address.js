@@ -1,0 +1,56 @@
+// The values of the controls in the page's address, and their history for undo and redo.
+
+import { NUMBERS, STARTS, check } from "./values.js";
+
+/** Text for an address with the values that differ from the starts. */
+export function toAddress(values, starts = STARTS) {
+  return Object.keys(STARTS).filter((key) => values[key] !== starts[key]).map((key) => {
+    const text = key in NUMBERS ? Number(values[key].toPrecision(10)) : values[key];
+    return `${key}=${encodeURIComponent(text).replace(/%(2F|3A|2C)/g, decodeURIComponent)}`;
+  }).join("&");
+}
+
+/** Values {values, refused} in the text of an address, with a sentence for each part that is refused. */
+export function fromAddress(text, starts = STARTS) {
+  const values = { ...starts }, refused = [];
+  for (const [key, given] of new URLSearchParams(text.replace(/^[#?]/, ""))) {
+    try {
+      values[key] = check(key, given);
+    } catch (error) {
+      refused.push(`This part of the address is ignored. ${error.message}`);
+    }
+  }
+  return { values, refused };
+}
+
+/** History of values: `add` a step, `go(-1)` or `go(1)` to its neighbour, and whether it `has` one. */
+export function createHistory(values) {
+  let steps = [values], at = 0;
+  const has = (way) => at + way in steps;
+  return {
+    add(next) {
+      if (toAddress(next) === toAddress(steps[at])) return;
+      steps = [...steps.slice(0, at + 1), next];
+      at++;
+    },
+    go: (way) => (has(way) ? steps[at += way] : null),
+    has,
+  };
+}
+
+/** Values and view in this page's address: {values, refused, view}. `starts` are those of the page. */
+export function readAddress(starts) {
+  const given = new URLSearchParams(location.hash.slice(1)), view = {};
+  for (const key of ["selftest", "view", "tab"]) {
+    if (given.has(key)) view[key] = given.get(key);
+    given.delete(key);
+  }
+  return { ...fromAddress(given.toString(), starts), view };
+}
+
+/** Address of this page with values and view. */
+export function addressOf(values, starts, view) {
+  const shown = Object.entries(view).filter(([, value]) => value).map(([key, value]) => `${key}=${value}`);
+  const text = [toAddress(values, starts), ...shown].filter(Boolean).join("&");
+  return `${location.href.split("#")[0]}${text ? `#${text}` : ""}`;
+}
