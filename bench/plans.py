@@ -24,8 +24,9 @@ from simple_model.layers.material import from_young
 from skinwave.bodies.sizes import default_size
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import answer, prepare
+from skinwave.models.relative_change import relative_changes
 from skinwave.planning.plan import plan
-from skinwave.planning.refinement import about_its_rest, relative_change
+from skinwave.planning.refinement import about_its_rest
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import from_table
 from skinwave.scene.scene import Body, Scene
@@ -52,8 +53,8 @@ def stated_and_true(scene: Scene, tolerance: float, h: float | None = None) -> t
         symmetry=chosen.symmetry, reading=scene.reading, load=scene.load,
     )  # fmt: skip
     better = answer(fine, replace(scene, body=chosen.body)).values
-    waveforms = (about_its_rest(scene, each) for each in (found.values, better))
-    return chosen.error, relative_change(*waveforms)
+    stated, true = (about_its_rest(scene, each) for each in (found.values, better))
+    return chosen.error, float(relative_changes(true - stated, true).max())
 
 
 def stated(number: int, seed: int) -> int:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:  # what readers of types and editors see of the names below
     from skinwave.models.options import SolveOptions
     from skinwave.models.parametric import ParametricBody, prepare
     from skinwave.planning.plan import plan
-    from skinwave.planning.rows import Plan
+    from skinwave.planning.record import Plan
     from skinwave.planning.simulate import simulate
     from skinwave.report.fields import Field, field
     from skinwave.report.styles import paper
@@ -38,7 +38,7 @@ _HOMES = {
     "simulate": "planning.simulate",
     "SkinwaveWarning": "system.effort",
     "SupportMotion": "scene.load",
-    "Plan": "planning.rows",
+    "Plan": "planning.record",
     "Field": "report.fields",
     "field": "report.fields",
     "Agreement": "results.comparison",

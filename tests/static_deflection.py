@@ -6,7 +6,7 @@ import numpy as np
 
 from simple_model import Response
 from skinwave.models import Limit, Model, register
-from skinwave.models.limits import of_body, plain_only
+from skinwave.models.limits import of_body, plain_limits
 from skinwave.models.options import SolveOptions
 from skinwave.scene.scene import Body, Scene
 from skinwave.typing import Floats
@@ -23,10 +23,10 @@ def limits(scene: Scene) -> Iterator[Limit]:
     body = scene.body
     if body.base != "clamped" or not np.isfinite(body.depth):
         yield Limit(
-            why=f"takes a body of finite depth with a clamped base, not a {body.base} one",
-            cure='take base = "clamped"', change=of_body(base="clamped"),
+            why=f"needs a body of finite depth with a clamped base, not a {body.base} one",
+            cure='set base = "clamped"', change=of_body(base="clamped"),
         )  # fmt: skip
-    yield from plain_only(scene)
+    yield from plain_limits(scene)
 
 
 def solve(scene: Scene, times: Floats, options: SolveOptions) -> Response:

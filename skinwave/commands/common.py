@@ -15,7 +15,7 @@ from skinwave.system.plain_text import say
 
 if TYPE_CHECKING:
     from simple_model import Response
-    from skinwave.planning.rows import Plan
+    from skinwave.planning.record import Plan
     from skinwave.scene.scene import Scene
     from skinwave.system.effort import Progress
 

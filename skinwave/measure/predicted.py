@@ -30,7 +30,7 @@ from skinwave.measure.parameters import (
     of_scene,
 )
 from skinwave.models import Model, named, parametric
-from skinwave.models.covering import covering, tried_together
+from skinwave.models.covering import covering, try_shared_body
 from skinwave.models.flat_body import fields_read
 from skinwave.models.limits import check_taken
 from skinwave.models.options import SolveOptions, sample_times
@@ -141,7 +141,7 @@ def with_reduction(aim: Target, parameters: Parameters, progress: Progress) -> T
     if not aim.record.is_reduced or parameters.ties or not ranges:
         return aim
     together = covering(aim.varied({}), ranges, RUNS)
-    found = tried_together(together, SolveOptions(progress=progress))
+    found = try_shared_body(together, SolveOptions(progress=progress))
     return replace(aim, reduced=found) if found else aim
 
 

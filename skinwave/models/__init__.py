@@ -1,6 +1,6 @@
-"""Models: a `Model` for each, which its file registers; loaded when it is first asked for.
+"""Models: each file registers its `Model`, and is imported when the model is first used.
 
-Importing this room loads no numerical library, because the command line lists the names.
+Importing this package loads no numerical library, because the command line lists the names.
 """
 
 from collections.abc import Callable, Iterable
@@ -36,14 +36,13 @@ BUILT_IN = {  # name -> the file that registers it
 
 @dataclass(frozen=True, kw_only=True)
 class Limit:
-    """Limit of a model that a scene is beyond.
+    """Limit of a model that a scene exceeds.
 
     Parameters
     ----------
-    why : str, what the model takes, and not what the scene has: "takes a flat sheet, not a curled
-        one"
-    cure : str, how to change the scene, in the imperative; "" if no change of it would help
-    change : the scene -> the scene so changed
+    why : str, what the model needs, after its name: "needs a flat sheet, not a curled one"
+    cure : str, how to change the scene, in the imperative; "" if no change helps
+    change : function of the scene to the changed scene
     """
 
     why: str
@@ -53,30 +52,30 @@ class Limit:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Model:
-    """Model: how it computes a scene's response, and what is known of that.
+    """Model: how it computes the response of a scene, and its properties.
 
     Parameters
     ----------
     name, label : str, in commands and tables; in legends
-    method : str, in a plan: what is computed, in a few words
-    words : str, on pages: what it computes and leaves out, one clause
-    solve : response of a scene at times (t,) in s, equally spaced from 0, with some options
-    limits : of a scene with a body, each `Limit` of the model that it is beyond; if not given, it
-        takes the displacement of the surface under a pressure alone
-    error : expected relative error with elements of a size in metre, nan if it is unknown; None for
-        linear waves, whose error a plan estimates by reflections and transient, or mesh refinement
-    default_size : element size in metre for a body; None without a mesh
-    seconds, memory : predicted for a first response where a plan does not measure, s and bytes
+    method : str, what is computed, in a few words for plans
+    words : str, what it computes and leaves out, one clause for pages
+    solve : function of a scene, times (t,) in s equally spaced from 0, and options to the response
+    limits : function of a scene with a body to each `Limit` that it exceeds; by default the model
+        computes only the displacement of the surface under a pressure
+    error : function of scene and element size in metre to the expected relative error, nan if
+        unknown; None for linear waves, whose error a plan estimates
+    default_size : function of a body to its element size in metre; None without a mesh
+    seconds, memory : predicted cost of a first response in s and bytes, unless a plan measures it
     colour : str, of figures
-    sources : of str, references to cite for its method
-    quantity : name of the one that it has whatever a scene asks for, as the point kernel has; or ""
+    sources : tuple of str, references of its method
+    quantity : str, name of a quantity that it always computes, such as pressure; or ""
     needs_body : bool
     is_reduced : bool, whether bodies are reduced once for all Tactons
     is_infinite : bool, whether it leaves out reflections from the sides
-    from_rest : name of the model that adds the start to it, of a model of the steady state; or ""
+    from_rest : str, name of the model from rest, for a model of the steady state; or ""
     is_stepped : bool, whether its error depends on a time step
-    is_nonlinear : bool, whether it has large deflections
-    takes_series : whether it takes Prony series for modulus laws of a body
+    is_nonlinear : bool, whether it includes large deflections
+    takes_series : function of a body, whether it replaces modulus laws by Prony series
     """
 
     name: str
@@ -102,7 +101,7 @@ class Model:
 
     @property
     def is_steady(self) -> bool:
-        """Whether it is of the steady state, and leaves out the start from rest."""
+        """Whether it computes the steady state and leaves out the start from rest."""
         return bool(self.from_rest)
 
 
@@ -110,32 +109,31 @@ _MODELS: dict[str, Model] = {}
 
 
 def register(model: Model) -> Model:
-    """Add a model to those that scenes can be computed by.
+    """Register a model, so that scenes can be computed by its name.
 
     Raises
     ------
     ValueError
-        If there is one of that name.
+        If the name is taken.
     """
-    home = BUILT_IN.get(model.name)
-    if home and not model.solve.__module__.startswith(f"{__name__}."):
+    if model.name in BUILT_IN and not model.solve.__module__.startswith(f"{__name__}."):
         raise ValueError(f"'{model.name}' is registered already; choose another name")
     extensions.add(_MODELS, model.name, model, model.solve)
     return model
 
 
 def names() -> tuple[str, ...]:
-    """All models by name, the built-in ones first."""
+    """Return the names of all models, the built-in ones first."""
     return (*BUILT_IN, *(name for name in _MODELS if name not in BUILT_IN))
 
 
 def named(name: str) -> Model:
-    """The model of a name.
+    """Return the model of a name.
 
     Raises
     ------
     ValueError
-        If there is none.
+        If the name is unknown.
     """
     from simple_model.choices import choose
 

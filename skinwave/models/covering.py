@@ -1,8 +1,8 @@
 """Bodies that share one reduction: one decision for sweeps, samples and fits.
 
-A parametric reduced-order model (`parametric`) serves all bodies of a scene that differ in
-materials and thicknesses within ranges. It costs some factorisations and many vectors, and pays for
-itself from a number of bodies on.
+A parametric reduced-order model (`parametric`) serves all bodies of a scene whose materials and
+thicknesses lie within ranges. It costs some factorisations and many vectors, so that it needs a
+minimum number of bodies to be worthwhile.
 """
 
 from collections.abc import Mapping
@@ -16,16 +16,16 @@ from skinwave.models.options import SolveOptions
 from skinwave.models.parametric import ParametricBody
 from skinwave.scene.scene import Body, Scene
 
-# Bodies for each key that is free, and for a thickness that moves the mesh: fewer cost less alone.
-LEAST, THICKNESS = 6, 15
-SHARE = 1 / 5  # of a tolerance: that of the reduced-order model
+# Fewest bodies for each free key, and for each thickness that moves the mesh.
+FEWEST, FEWEST_OF_THICKNESS = 6, 15
+SHARE = 1 / 5  # of a tolerance, for the reduced-order model
 
 
 @dataclass(frozen=True, kw_only=True)
 class Covering:
-    """Bodies that one reduced-order model serves: of a `scene` whose body's keys are free within
-    `ranges`, each a key, its least and its largest value; how many `members` there are, and the
-    `hardest` body, that with the shortest waves.
+    """Bodies that one reduced-order model serves: those of a `scene` with free keys within
+    `ranges`, each a key, its least and its largest value. `members` is their number, and `hardest`
+    the body with the shortest waves.
     """
 
     scene: Scene
@@ -34,7 +34,7 @@ class Covering:
     hardest: Body
 
     def has(self, values: Mapping[str, float]) -> bool:
-        """Whether the body of values by key is one of these."""
+        """Whether the ranges include the body with these values by key."""
         return all(low <= values[key] <= high for key, low, high in self.ranges)
 
 
@@ -45,12 +45,11 @@ def covering(
     tolerance: float = 0.05,
     hardest: Body | None = None,
 ) -> Covering | None:
-    """Bodies of a scene for one reduction; None if there are too few `members` for it to cost less
-    than one for each, or no affine sum gives them.
+    """Return the bodies of a scene for one reduction; None if one reduction for each of `members`
+    bodies costs less, or the keys cannot be free.
 
     `free` has the least and largest value of each key, in the file's unit; `tolerance` is the
-    relative error that responses may have; `hardest` the body with the shortest waves, by default
-    that of the scene.
+    relative error of responses; `hardest` the body with the shortest waves, by default the scene's.
     """
     plain = replace(scene, spreads=())
     try:
@@ -58,30 +57,32 @@ def covering(
         check_scene(plain, keys, tolerance)
     except ValueError:
         return None
-    if members < sum(THICKNESS if key.moves else LEAST for key in keys):
+    if members < sum(FEWEST_OF_THICKNESS if key.moves else FEWEST for key in keys):
         return None
     ranges = tuple((key, *ends) for key, ends in free.items())
     return Covering(scene=plain, ranges=ranges, members=members, hardest=hardest or plain.body)
 
 
-def reduce_together(found: Covering, options: SolveOptions) -> ParametricBody:
-    """Reduced-order model of all bodies; raises if the ranges are too wide for one."""
-    free = {key: (low, high) for key, low, high in found.ranges}
+def shared_body(bodies: Covering, options: SolveOptions) -> ParametricBody:
+    """Return the reduced-order model of all bodies; raises a ValueError or `fem.Diverged` if the
+    ranges are too wide for one.
+    """
+    free = {key: (low, high) for key, low, high in bodies.ranges}
     within = min(parametric.TOLERANCE, SHARE * options.tolerance)
     return parametric.prepare(
-        found.scene, free, within, options.progress, h=options.h, solver=options.solver
+        bodies.scene, free, within, options.progress, h=options.h, solver=options.solver
     )
 
 
 @lru_cache(maxsize=4)
-def kept_together(found: Covering, h: float, tolerance: float, solver: str) -> ParametricBody:
-    """The same, of which a process keeps the last few."""
-    return reduce_together(found, SolveOptions(h=h, tolerance=tolerance, solver=solver))
+def cached_shared_body(bodies: Covering, h: float, tolerance: float, solver: str) -> ParametricBody:
+    """Return the same; a process keeps the last few."""
+    return shared_body(bodies, SolveOptions(h=h, tolerance=tolerance, solver=solver))
 
 
-def tried_together(found: Covering | None, options: SolveOptions) -> ParametricBody | None:
-    """The same; None without a covering, or if its ranges are too wide for one model."""
+def try_shared_body(bodies: Covering | None, options: SolveOptions) -> ParametricBody | None:
+    """Return the same, or None without bodies or if their ranges are too wide for one model."""
     try:
-        return reduce_together(found, options) if found else None
+        return shared_body(bodies, options) if bodies else None
     except (ValueError, fem.Diverged):
         return None

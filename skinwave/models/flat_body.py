@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 import simple_model
-from simple_model import Effort, Response, steady_state
+from simple_model import Effort, Response
 from simple_model.layers.flat_body import field_history, steady_history
 from simple_model.layers.flat_quantities import quantity_field, surface_field, traction_field
 from simple_model.layers.wavenumber_integral import Field
@@ -17,14 +17,14 @@ from skinwave.bodies.parts import FLAT
 from skinwave.models import Limit, Model, register
 from skinwave.models.laws import has_table
 from skinwave.models.limits import (
+    displacement_at_surface,
+    isotropic_limits,
     load_limit,
-    of_alike_directions,
     of_body,
     of_part,
-    read_at_surface,
     reading_limit,
 )
-from skinwave.models.options import SolveOptions
+from skinwave.models.options import SolveOptions, response_of
 from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
 
@@ -33,66 +33,66 @@ LAYERS = (
     "Society of America 71 (1981) 1743-1761"
 )
 STEP = "wavenumber integral"
+Solve = Callable[[Scene, Floats, SolveOptions], Response]
 
 
-def _from_rest(scene: Scene, times: Floats, options: SolveOptions) -> Response:
-    options.progress(STEP, 0.0)
-    if not (scene.reading.is_plain and scene.load.is_plain):
-        return _read("flat-body", field_history, scene, times)
-    return simple_model.flat_body(compliance(scene.body), scene.pressure, scene.probe_points, times)
+def _solver(model: str, normal: Callable[..., Response], history: Callable[..., Floats]) -> Solve:
+    """Return the function that solves a scene: by `normal` for the normal displacement under a
+    pressure, and otherwise by the `history` of components at the probes of each depth.
+    """
 
+    def solve(scene: Scene, times: Floats, options: SolveOptions) -> Response:
+        options.progress(STEP, 0.0)
+        if scene.reading.is_plain and scene.load.is_plain:
+            return normal(compliance(scene.body), scene.pressure, scene.probe_points, times)
+        started, depths = time.perf_counter(), np.array(scene.depths)
+        values = np.empty((len(times), len(depths)))
+        for depth in np.unique(depths).tolist():
+            here = depths == depth
+            components = [
+                history(field, pressure, scene.probe_points[here], times)
+                for field, pressure in zip(fields_read(scene, depth), scene.loads, strict=True)
+            ]
+            total = np.sum(components, axis=0)
+            values[:, here] = scene.reading.record.waveforms(total, int(here.sum()))
+        effort = Effort(seconds={"evaluate": time.perf_counter() - started}, steps=len(times))
+        return response_of(scene, model, times, values, effort)
 
-def _steady(scene: Scene, times: Floats, options: SolveOptions) -> Response:
-    options.progress(STEP, 0.0)
-    if not (scene.reading.is_plain and scene.load.is_plain):
-        return _read("flat-body-harmonic", steady_history, scene, times)
-    return steady_state(compliance(scene.body), scene.pressure, scene.probe_points, times)
-
-
-def _read(model: str, history: Callable[..., Floats], scene: Scene, times: Floats) -> Response:
-    """Response of a quantity, the probes of one depth together."""
-    started = time.perf_counter()
-    asked, depths = scene.reading.record, np.array(scene.depths)
-    values = np.empty((len(times), len(depths)))
-    for depth in np.unique(depths).tolist():
-        here = depths == depth
-        components = [
-            history(field, pressure, scene.probe_points[here], times)
-            for field, pressure in zip(fields_read(scene, depth), scene.loads, strict=True)
-        ]
-        values[:, here] = asked.waveforms(np.sum(components, axis=0), int(here.sum()))
-    effort = Effort(seconds={"evaluate": time.perf_counter() - started}, steps=len(times))
-    return Response(
-        model=model, times=times, probes=scene.probe_points, quantity=asked.name, values=values,
-        effort=effort,
-    )  # fmt: skip
+    return solve
 
 
 def fields_read(scene: Scene, depth: float) -> tuple[Field, ...]:
-    """Fields of the quantity that a scene reads, one for each component of its load."""
+    """Return the fields of the quantity that a scene reads, one for each component of its load."""
     if scene.load.is_plain:
         return (field_read(scene, depth),)
     upright = scene.load.tractions(np.array([[0.0, 0.0, 1.0]]))[:, 0]
-    asked, layers = scene.reading.record, stack(scene.body)
-    return tuple(traction_field(asked, layers, direction) for direction in upright)
+    layers = stack(scene.body)
+    return tuple(traction_field(scene.reading.record, layers, direction) for direction in upright)
+
+
+def field_read(scene: Scene, depth: float) -> Field:
+    """Return the field under a pressure of the quantity that a scene reads, at a depth in metre."""
+    if scene.body.of_kind.is_layer:
+        return quantity_field(scene.reading.record, stack(scene.body), depth)
+    return surface_field(scene.reading.record, compliance(scene.body))
 
 
 def _limits(scene: Scene) -> Iterator[Limit]:
     body, reading, load, pressure = scene.body, scene.reading, scene.load, scene.pressure
     if body.of_kind.compliance is None:
-        yield Limit(why=f"takes a slab or a sheet, not a {body.kind}")
+        yield Limit(why=f"needs a slab or a sheet, not a {body.kind}")
         return
     if body.placement != FLAT:
         yield Limit(
-            why="takes a body that lies flat at the origin, not a tilted or moved one",
-            cure="leave out [placement]", change=of_body(placement=FLAT),
+            why="needs a body that lies flat at the origin, not a tilted or moved one",
+            cure="remove [placement]", change=of_body(placement=FLAT),
         )  # fmt: skip
     if body.of_kind.is_plate:
-        yield from of_alike_directions(body)
+        yield from isotropic_limits(body)
     if gaussian_width(pressure.height, pressure.profile) is None:
         yield Limit(
-            why=f"takes a Gaussian focus, not the profile {pressure.profile_name}",
-            cure='take profile = "gaussian"',
+            why=f"needs a Gaussian focus, not the profile {pressure.profile_name}",
+            cure='set profile = "gaussian"',
             change=lambda scene: replace(
                 scene, pressure=replace(scene.pressure, profile="gaussian")
             ),
@@ -104,8 +104,8 @@ def _limits(scene: Scene) -> Iterator[Limit]:
         yield load_limit(scene)
     elif not (load.is_plain or of_surface):
         yield Limit(
-            why=f"has no {reading.words} under {load.words}",
-            cure="ask for the displacement at the surface", change=read_at_surface,
+            why=f"does not compute {reading.words} under {load.words}",
+            cure="read the displacement at the surface", change=displacement_at_surface,
         )  # fmt: skip
 
 
@@ -113,23 +113,15 @@ def _steady_limits(scene: Scene) -> Iterator[Limit]:
     yield from _limits(scene)
     if not any(solid.has_loss for solid in scene.body.solids):
         yield Limit(
-            why="takes a material with loss, not one whose resonances are unbounded",
+            why="needs a material with loss, because resonances without loss are unbounded",
             cure="give the material a viscosity_pa_s", change=_with_loss,
         )  # fmt: skip
 
 
 def _with_loss(scene: Scene) -> Scene:
-    """The scene with a loss tangent of a tenth at 100 Hz."""
+    """Return the scene with a loss tangent of a tenth at 100 Hz."""
     viscosity = 0.1 * scene.body.solid.shear_modulus / (2 * np.pi * 100)
     return of_part("solid", viscosity=viscosity)(scene)
-
-
-def field_read(scene: Scene, depth: float) -> Field:
-    """Field of the quantity that a scene reads, at a depth in metre of its infinite body."""
-    body, asked = scene.body, scene.reading.record
-    if body.of_kind.is_layer:
-        return quantity_field(asked, stack(body), depth)
-    return surface_field(asked, compliance(body))
 
 
 FLAT_BODY = register(
@@ -137,7 +129,7 @@ FLAT_BODY = register(
         name="flat-body",
         method=STEP,
         words="linear waves of a laterally infinite flat body, by the wavenumber integral",
-        solve=_from_rest,
+        solve=_solver("flat-body", simple_model.flat_body, field_history),
         limits=_limits,
         error=None,
         seconds=2.0,
@@ -155,7 +147,7 @@ HARMONIC = register(
         method="wavenumber integral, line by line",
         words="the steady state of linear waves of a laterally infinite flat body, by the "
         "wavenumber integral",
-        solve=_steady,
+        solve=_solver("flat-body-harmonic", simple_model.steady_state, steady_history),
         limits=_steady_limits,
         colour="#E69F00",
         from_rest="flat-body",

@@ -1,13 +1,13 @@
-"""Bodies of a range: their materials, by the part of the body that each is of, and the geometries
-between which matrices of one moved mesh are interpolated.
+"""Bodies of a range: their materials by part of the body, and the geometries between which the
+matrices of one moved mesh are interpolated.
 
-Where nodes move in proportion to the thickness d_k of their layer, each matrix of a body is a sum
+If nodes move in proportion to the thickness d_k of their layer, each matrix of a body is a sum
 
     A(d) = A_0 + sum_k (d_k B_k + C_k / d_k)
 
-of as many terms as there are independent functions 1, d_k and 1/d_k. It is known for all d from as
-many geometries, to round-off: an error as small as 1e-4 would already act against lam, 5,000 times
-mu in soft tissue.
+of as many terms as there are independent functions 1, d_k and 1/d_k. As many geometries give it for
+all d to round-off. An error of 1e-4 would be too large, because lam is 5,000 times mu in soft
+tissue.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,19 +28,20 @@ from skinwave.bodies.sizes import default_size
 from skinwave.models.free_keys import FreeKey, Part, solid_at
 from skinwave.typing import Floats
 
-AGREES = 1e-9  # of a modulus: materials that differ by less are one
+SAME_MODULUS = 1e-9  # relative difference of moduli that are the same
 CANDIDATES = 5  # geometries along each thickness, for sums of d and 1/d
-INDEPENDENT = 1e-9  # of the largest pivot: functions whose rest is less are sums of others
+INDEPENDENT = 1e-9  # of the largest pivot: functions with smaller ones are sums of others
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Range:
-    """Bodies of a range: `body` at shares (k,) of it, 0 to 1, meshed at the shares `meshed` (k,)
-    with elements of `h` in metre, or its default, whose nodes are `moved` to a body's thicknesses.
+    """Bodies of a range: function `body` of shares (k,), 0 to 1. The body at the shares `meshed`
+    (k,) is meshed with elements of `h` in metre, or its default size, and its nodes are `moved` to
+    the thicknesses of others.
 
-    Matrices are combinations of `_terms` of a body's thicknesses. They are assembled at the
-    shares `geometries` (g, k), where the independent functions, of numbers `chosen` (g,), have the
-    values `known` (g, g).
+    Matrices are sums over `_terms` of the thicknesses. They are assembled at the shares
+    `geometries` (g, k), where the independent terms, of index `chosen` (g,), have the values
+    `known` (g, g).
     """
 
     body: Callable[[Sequence[float]], Body]
@@ -58,9 +59,9 @@ def range_of(
     thicknesses: Sequence[bool],
     h: float | None,
 ) -> Range:
-    """Range of bodies, with the geometries that its matrices are interpolated between: of a body at
-    shares (k,) of which some are of `thicknesses` (k,), on a mesh of that at the shares `meshed`.
-    Raises a ValueError if no mesh can be moved over the range.
+    """Return the range of a function `body` of shares (k,), some of which are of `thicknesses`
+    (k,), with the geometries between which matrices are interpolated. Raises a ValueError if no
+    mesh can be moved over the range.
     """
     reference, free = body(meshed), np.array(thicknesses)
     kind, moved = reference.of_kind, None
@@ -68,7 +69,7 @@ def range_of(
         thinnest = body(np.where(free, 0.0, meshed).tolist())
         moved = kind.morph(thinnest, reference, h or default_size(reference))
     along = ((1 - np.cos(np.pi * np.arange(CANDIDATES) / (CANDIDATES - 1))) / 2).tolist()
-    each = [along if is_one else [at] for is_one, at in zip(thicknesses, meshed, strict=True)]
+    each = [along if is_free else [at] for is_free, at in zip(thicknesses, meshed, strict=True)]
     candidates = list(product(*each))
     values = np.array([_terms(body(at)) for at in candidates])
     scaled = values / np.abs(values).max(axis=0)
@@ -84,7 +85,7 @@ def range_of(
 
 
 def geometry_shares(bodies: Range, body: Body) -> Floats:
-    """Shares (g,) of the known geometries in the matrices of a body of the range."""
+    """Return the weights (g,) of the geometries in the matrices of a body of the range."""
     if len(bodies.geometries) == 1:
         return np.ones(1)
     values = _terms(body)[list(bodies.chosen)]
@@ -92,7 +93,7 @@ def geometry_shares(bodies: Range, body: Body) -> Floats:
 
 
 def nearest_geometry(bodies: Range, at: Sequence[float]) -> tuple[float, ...]:
-    """Shares (k,) of a body of the same materials whose geometry is one of those known."""
+    """Return shares (k,) with the same materials at the nearest assembled geometry."""
     geometries = np.array(bodies.geometries)
     moved = np.ptp(geometries, axis=0) > 0
     k = int(np.argmin(np.linalg.norm((geometries - at)[:, moved], axis=1)))
@@ -100,7 +101,7 @@ def nearest_geometry(bodies: Range, at: Sequence[float]) -> tuple[float, ...]:
 
 
 def build_at(bodies: Range, at: Sequence[float], symmetry: str = "") -> Build:
-    """Mesh of the range, moved to the thicknesses of the body at shares (k,)."""
+    """Return the mesh of the range, moved to the thicknesses at shares (k,)."""
     reference = bodies.body(bodies.meshed)
     free = np.ptp(np.array(bodies.geometries), axis=0) > 0
     body = bodies.body(np.where(free, at, bodies.meshed).tolist())
@@ -108,16 +109,16 @@ def build_at(bodies: Range, at: Sequence[float], symmetry: str = "") -> Build:
 
 
 def _terms(body: Body) -> Floats:
-    """1, and d and 1/d of each stratum's thickness d in metre."""
+    """Return 1, and d and 1/d for the thickness d in metre of each stratum."""
     d = np.diff(body.interfaces)
     return np.concatenate([[1.0], d, 1 / d])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Reference:
-    """A body as it was meshed, the part (r,) of it that each of its materials is of, and the
-    factors (r, 2) of modulus and density of a mesh that stands for a thinner body; and whether it
-    rests on springs that go with its modulus.
+    """Body that was meshed: the `parts` (r,) of its materials, the factors (r, 2) on modulus and
+    density of a mesh that represents a thinner body, and whether it rests on springs that scale
+    with its modulus.
     """
 
     body: Body
@@ -127,8 +128,8 @@ class Reference:
 
 
 def reference_of(body: Body, build: Build, keys: Sequence[FreeKey]) -> Reference:
-    """Parts and factors of the materials of a body as it was meshed, with its free keys. Raises a
-    ValueError if a free layer is one with the next, or the body rests on springs of both kinds.
+    """Return the reference of a meshed body with free keys. Raises a ValueError if a free layer is
+    merged with the next, or the body rests on springs of both kinds.
     """
     tops = np.cumsum([0.0, *(layer.thickness for layer in body.layers)])
     starts = [start for start, _ in body.strata]
@@ -137,7 +138,8 @@ def reference_of(body: Body, build: Build, keys: Sequence[FreeKey]) -> Reference
     parts = (*layers, *dict(body.regions))
     if merged := [key.key for key in keys if key.part not in parts]:
         raise ValueError(
-            f"{merged[0]} is of a layer that is one with its neighbour; change its range slightly"
+            f"{merged[0]} belongs to a layer with the material of its neighbour; change its range "
+            "slightly"
         )
     factors = [_factors(m, s) for m, s in zip(meshed_materials(build), body.solids, strict=True)]
     return Reference(
@@ -146,28 +148,28 @@ def reference_of(body: Body, build: Build, keys: Sequence[FreeKey]) -> Reference
 
 
 def _is_sprung(body: Body, build: Build) -> bool:
-    """Whether a body rests on springs that stand for its own tissue. Raises a ValueError if its
-    base has a stiffness of its own beside them.
+    """Whether a body rests on springs that represent its own tissue. Raises a ValueError if its
+    base has another stiffness as well.
     """
     sprung = build.support is not None and bool(build.support.stiffness.any())
     if not body.base_stiffness:
         return sprung
     if "clamped" in body.conditions and "xyz" not in build.fixed.values():
         raise ValueError(
-            "a hand with free materials has one kind of springs, and this one has an elastic base "
-            "beside clamped ends, which go with its modulus; reduce it for each material"
+            "a hand with free materials cannot have both an elastic base and clamped ends, whose "
+            "springs scale with its modulus; reduce it for each material"
         )
     return False
 
 
 def meshed_materials(build: Build) -> tuple[Material, ...]:
-    """Materials of a mesh, those of its coat first."""
+    """Return the materials of a mesh, those of its coat first."""
     coat = build.coat.materials if build.coat else ()
     return (*coat, *(build.material[region] for region in sorted(build.material)))
 
 
 def affine_operators(body: Body, build: Build) -> AffineOperators:
-    """Matrices of each material of a meshed body, and of the air around it."""
+    """Return the matrices of each material of a meshed body, and of the air around it."""
     affine = assemble_affine(
         build.mesh, meshed_materials(build), fixed=build.constraints, absorbing=build.absorbing,
         drag=build.drag, support=build.support, coat=build.coat,
@@ -177,7 +179,7 @@ def affine_operators(body: Body, build: Build) -> AffineOperators:
 
 
 def solids_of(reference: Reference, body: Body) -> Solids:
-    """Materials of a body of the range, as the mesh of the reference has them."""
+    """Return the materials of a body of the range for the mesh of the reference."""
     own = [solid_at(body, part) for part in reference.parts]
     bodies = (reference.body, body)
     springs = [_spring_modulus(each) for each in bodies] if reference.is_sprung else [1.0, 1.0]
@@ -194,28 +196,28 @@ def solids_of(reference: Reference, body: Body) -> Solids:
 
 
 def _spring_modulus(body: Body) -> float:
-    """Modulus in Pa that the springs below a body go with: at rest those of a half-space."""
+    """Return the modulus in Pa of the springs below a body; for a half-space the one at rest."""
     if body.is_on_half_space:
         return body.solid.shear_modulus
-    # A modulus law has its own in a Prony series, which takes time to fit.
+    # Independent of the Prony series of a modulus law, which takes time to fit.
     return body.softest.shear_modulus + body.softest.fast_modulus
 
 
 def _factors(meshed: Material, solid: Material) -> tuple[float, float]:
-    """Modulus and density of a mesh's material over those of the body's."""
+    """Return modulus and density of a mesh's material over those of the body's."""
     modulus = meshed.shear_modulus / solid.shear_modulus
     density = meshed.density / solid.density
     expected, one = _times(solid, modulus, density), complex(meshed.complex_modulus(1e3))
-    if abs(one - complex(expected.complex_modulus(1e3))) > AGREES * abs(one):
+    if abs(one - complex(expected.complex_modulus(1e3))) > SAME_MODULUS * abs(one):
         raise ValueError(
-            "the mesh of this kind of body has other materials than its scene; reduce it for each "
-            "material"
+            "the mesh of this kind of body does not have the materials of its scene; reduce it for "
+            "each material"
         )
     return modulus, density
 
 
 def _times(solid: Material, modulus: float, density: float) -> Material:
-    """A material with all moduli, and the density, times a factor."""
+    """Return a material with factors on all moduli and on the density."""
     if modulus == density == 1:
         return solid
     return replace(solid.scaled(modulus=modulus), density=density * solid.density)

@@ -1,6 +1,4 @@
-"""Materials with a modulus law of their own: checked, and by Prony series where a model integrates
-internal variables.
-"""
+"""Materials with a modulus law: checks, and Prony series for models with internal variables."""
 
 from dataclasses import replace
 from functools import lru_cache
@@ -14,29 +12,29 @@ from simple_model.load.spectrum import load_lines
 from skinwave.bodies import Body
 from skinwave.bodies.parts import solid_of
 
-SERIES_SHARE = 0.1  # of a waveform's tolerance: relative error that a series may have
-STRONG = 1e-2  # of the strongest line of a load: lines that a table must reach
-OCTAVE = 2.0  # below its first frequency, as far as its Prony series continues it
+SERIES_SHARE = 0.1  # of a waveform's tolerance: relative error of a series
+STRONG = 1e-2  # of the strongest line of a load: lines that a table must cover
+OCTAVE = 2.0  # factor below the first frequency of a table to which its series extends it
 
 
 def own_laws(body: Body) -> tuple[Material, ...]:
-    """The materials of a body that have a modulus law of their own."""
+    """Return the materials of a body that have a modulus law."""
     return tuple(solid for solid in body.solids if solid.law is not None)
 
 
 def has_own_law(body: Body) -> bool:
-    """Whether a material of a body has a modulus law of its own."""
+    """Whether a material of a body has a modulus law."""
     return bool(own_laws(body))
 
 
 def has_table(body: Body) -> bool:
-    """Whether a material of a body has a table of moduli, which has none at complex frequencies."""
+    """Whether a material has a table of moduli, which is unknown at complex frequencies."""
     return any(isinstance(solid.law, ModulusTable) for solid in own_laws(body))
 
 
 def check_laws(body: Body, pressure: MovingPressure) -> None:
-    """Refuse a body with a modulus law that is not passive or not causal, or with a table that some
-    strong line of the load is outside of by more than an octave below; its mean may be.
+    """Raise a ValueError for a modulus law that is not passive or not causal, or a table that does
+    not cover the strong lines of the load, the mean excepted, to within an octave below.
     """
     for solid in own_laws(body):
         solid.series()
@@ -45,33 +43,33 @@ def check_laws(body: Body, pressure: MovingPressure) -> None:
             lowest, highest = slowest_and_fastest(pressure)
             if lowest < first / OCTAVE or highest > last * (1 + 1e-9):
                 raise ValueError(
-                    f"a table of complex moduli is from {first:g} to {last:g} Hz, and the load has "
-                    f"lines of {100 * STRONG:g} % of its strongest from {lowest:g} to {highest:g} "
-                    "Hz; extend the table, or take another load"
+                    f"the table of complex moduli covers {first:g} to {last:g} Hz, but strong "
+                    f"lines of the load (above {100 * STRONG:g} % of the strongest) lie at "
+                    f"{lowest:g} to {highest:g} Hz; extend the table, or use another load"
                 )
 
 
 @lru_cache(maxsize=8)
 def slowest_and_fastest(pressure: MovingPressure) -> tuple[float, float]:
-    """Strong lines of a load, but for its mean, in Hz."""
+    """Return the frequencies in Hz of the slowest and the fastest strong line, without the mean."""
     f = load_lines(pressure, STRONG).frequencies
     return float(f[f > 0].min(initial=np.inf)), float(f.max(initial=0.0))
 
 
 def series_tolerance(tolerance: float) -> float:
-    """Relative error of a Prony series: a share of that of a waveform."""
+    """Return the relative error of a Prony series for that of a waveform."""
     return min(FIT_TOLERANCE, SERIES_SHARE * tolerance)
 
 
 def relaxing(body: Body, tolerance: float) -> Body:
-    """The body with Prony series for its modulus laws, within a relative error."""
+    """Return the body with Prony series for its modulus laws, within a relative error."""
     if not has_own_law(body):
         return body
 
-    def made(material: str | Material) -> str | Material:
+    def series(material: str | Material) -> str | Material:
         solid = solid_of(material)
         return material if solid.law is None else solid.relaxing(tolerance)
 
-    layers = tuple(replace(layer, material=made(layer.material)) for layer in body.layers)
-    regions = tuple((name, made(material)) for name, material in body.regions)
-    return replace(body, material=made(body.material), layers=layers, regions=regions)
+    layers = tuple(replace(layer, material=series(layer.material)) for layer in body.layers)
+    regions = tuple((name, series(material)) for name, material in body.regions)
+    return replace(body, material=series(body.material), layers=layers, regions=regions)

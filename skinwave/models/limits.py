@@ -1,7 +1,7 @@
-"""Limits of models, the changes of a scene that bring it within them, and refusals.
+"""Limits of models, the changes of a scene that meet them, and refusals.
 
-A model lists its `Limit`s of a scene. It takes the scene if there are none. A refusal names only
-models that take the scene, and changes after which a model takes it.
+A model lists the `Limit`s that a scene exceeds, and takes the scene if there are none. A refusal
+names only models that take the scene, and changes after which a model takes it.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -17,7 +17,7 @@ from skinwave.models import Limit, Model, named, names
 from skinwave.scene.load import PRESSURE
 from skinwave.scene.scene import Scene
 
-# Models in the order in which advice names them: from rest first, then those of the steady state.
+# Models in the order of advice: from rest first, then those of the steady state.
 ADVISED = (
     "fem", "flat-body", "plate-modes-transient", "fem-transient", "fem-nonlinear",
     "plate-modes-nonlinear", "fem-nonlinear-transient", "fem-harmonic", "flat-body-harmonic",
@@ -28,9 +28,7 @@ MOST_CURES = 2  # in one sentence
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cure:
-    """Cure of a refusal: the `scene` that the `model` takes, and how to change it in words; "" for
-    the scene as it is.
-    """
+    """Cure of a refusal: a `scene` that the `model` takes, and the change in words, "" if none."""
 
     words: str
     scene: Scene
@@ -38,7 +36,7 @@ class Cure:
 
 
 class Refused(ValueError):
-    """A scene that a model does not take; `cures` are those that the message names."""
+    """Raised for a scene that a model does not take; `cures` are those of the message."""
 
     def __init__(self, message: str, cures: Sequence[Cure] = ()) -> None:
         super().__init__(message)
@@ -46,226 +44,228 @@ class Refused(ValueError):
 
 
 def beyond(model: Model, scene: Scene) -> list[Limit]:
-    """Limits of a model that a scene is beyond."""
+    """Return the limits of a model that a scene exceeds."""
     if model.needs_body and not scene.body.of_kind.discretise:
-        return [Limit(why="moves a body, and this scene has none")]
-    return [*(model.limits or plain_only)(scene)]
+        return [Limit(why="needs a body that moves, and the scene has none")]
+    return [*(model.limits or plain_limits)(scene)]
 
 
 def takes(model: Model, scene: Scene) -> bool:
-    """Whether a model takes a scene: its body, its load, and the quantity that its probes read."""
+    """Whether a model takes a scene: its body, its load, and the quantity of its probes."""
     return not beyond(model, scene)
 
 
 def takers(scene: Scene) -> list[str]:
-    """Names of the models that take a scene, the preferred first."""
-    return [model.name for model in _meant_for(scene) if takes(model, scene)]
+    """Return the names of the models that take a scene, the preferred ones first."""
+    return [model.name for model in _candidates(scene) if takes(model, scene)]
 
 
-def _meant_for(scene: Scene) -> list[Model]:
-    """Models of what a scene's probes read. None leaves out the sides of a body if they reflect."""
+def _candidates(scene: Scene) -> list[Model]:
+    """Return the models of the quantity of a scene, without those that leave out sides which
+    reflect.
+    """
     has_body = bool(scene.body.of_kind.discretise)
     bounded = has_body and not is_laterally_infinite(scene.body)
-    known = (named(name) for name in (*ADVISED, *(n for n in names() if n not in ADVISED)))
+    every = (named(name) for name in dict.fromkeys((*ADVISED, *names())))
     return [
-        model for model in known
+        model for model in every
         if not (model.quantity and has_body) and not (model.is_infinite and bounded)
     ]  # fmt: skip
 
 
 def default_model(scene: Scene) -> str:
-    """The first model that takes a scene; raises `Refused` if none does."""
-    if found := takers(scene):
-        return found[0]
+    """Return the name of the first model that takes a scene; raises `Refused` if none does."""
+    if models := takers(scene):
+        return models[0]
     raise no_model(scene)
 
 
 def check_taken(model: Model, scene: Scene) -> None:
-    """Raise `Refused` with limits and cures for a scene that a model does not take."""
-    if found := beyond(model, scene):
-        raise refusal(scene, model, found)
+    """Raise `Refused` with limits and cures if a model does not take a scene."""
+    if limits := beyond(model, scene):
+        raise refusal(scene, model, limits)
 
 
-def refusal(scene: Scene, model: Model, found: Sequence[Limit]) -> Refused:
-    """Refusal of a scene by a model, for the limits that it is beyond, with what helps."""
+def refusal(scene: Scene, model: Model, limits: Sequence[Limit]) -> Refused:
+    """Return the refusal of a scene for some limits of a model, with cures."""
     others = [name for name in takers(scene) if name != model.name][:MOST_CURES]
-    own = _changed(scene, model, found)
+    own = _changed(scene, model, limits)
     cures = [*own, *(Cure(words="", scene=scene, model=name) for name in others)]
-    return _with_cures(_why(model, found), cures or _of_any(scene), model.name)
+    return _with_cures(_reason(model, limits), cures or _any_cures(scene), model.name)
 
 
 def no_model(scene: Scene) -> Refused:
-    """Refusal of a scene that no model takes, with the changes after which one does."""
-    cures = _of_any(scene)
-    near = [named(cure.model) for cure in cures] or _meant_for(scene)[:1]
-    whys = ", and ".join(_why(model, beyond(model, scene)) for model in near)
-    return _with_cures(f"no model takes this scene: {whys}", cures, "auto")
+    """Return the refusal of a scene that no model takes, with changes after which one does."""
+    cures = _any_cures(scene)
+    nearest = [named(cure.model) for cure in cures] or _candidates(scene)[:1]
+    reasons = ", and ".join(_reason(model, beyond(model, scene)) for model in nearest)
+    return _with_cures(f"no model takes this scene: {reasons}", cures, "auto")
 
 
 def cures_for(scene: Scene, model: Model) -> list[Cure]:
-    """How to have a scene computed by a model: as it is, or after a change if there is one."""
+    """Return how a model can take a scene: unchanged, or by a change if one helps."""
     if takes(model, scene):
         return [Cure(words="", scene=scene, model=model.name)]
     return [*_changed(scene, model, beyond(model, scene))]
 
 
-def in_words(cures: Sequence[Cure], asked: str) -> str:
-    """Cures in words, for a model that was asked for, or "auto"."""
-    plain = [cure.model for cure in cures if not cure.words]
-    changes = [
-        cure.words + f" and use --model {cure.model}" * (asked not in (cure.model, "auto"))
+def in_words(cures: Sequence[Cure], requested: str) -> str:
+    """Return cures in words, for a requested model, or "auto"."""
+    unchanged = [cure.model for cure in cures if not cure.words]
+    clauses = [
+        cure.words + f" and use --model {cure.model}" * (requested not in (cure.model, "auto"))
         for cure in cures
         if cure.words
     ]
-    use = [f"use --model {' or '.join(plain)}"] if plain else []
-    *first, last = *changes, *use
+    clauses += [f"use --model {' or '.join(unchanged)}"] if unchanged else []
+    *first, last = clauses
     return f"{', '.join(first)}, or {last}" if first else last
 
 
-def _why(model: Model, found: Sequence[Limit]) -> str:
-    return f"{model.name} {', and '.join(limit.why for limit in found)}"
+def _reason(model: Model, limits: Sequence[Limit]) -> str:
+    return f"{model.name} {', and '.join(limit.why for limit in limits)}"
 
 
-def _of_any(scene: Scene) -> list[Cure]:
-    """Changes of a scene after which one of the models takes it."""
-    found: dict[str, Cure] = {}
-    for model in _meant_for(scene):
+def _any_cures(scene: Scene) -> list[Cure]:
+    """Return changes of a scene after which one of the models takes it."""
+    cures: dict[str, Cure] = {}
+    for model in _candidates(scene):
         for cure in _changed(scene, model, beyond(model, scene)):
-            found.setdefault(cure.words, cure)
-    return [*found.values()][:MOST_CURES]
+            cures.setdefault(cure.words, cure)
+    return [*cures.values()][:MOST_CURES]
 
 
-def _changed(scene: Scene, model: Model, found: Sequence[Limit]) -> Iterator[Cure]:
-    """The change of a scene that brings it within all limits of a model, if there is one."""
+def _changed(scene: Scene, model: Model, limits: Sequence[Limit]) -> Iterator[Cure]:
+    """Yield the change of a scene that meets all limits of a model, if there is one."""
     changed = scene
     try:
-        for limit in found:
+        for limit in limits:
             if limit.change is None:
                 return
             changed = limit.change(changed)
-        taken = takes(model, changed)
-    except ValueError:  # changes that contradict what else the scene has
+        is_taken = takes(model, changed)
+    except ValueError:  # the changes contradict the rest of the scene
         return
-    if taken:
-        words = " and ".join(dict.fromkeys(limit.cure for limit in found))
+    if is_taken:
+        words = " and ".join(dict.fromkeys(limit.cure for limit in limits))
         yield Cure(words=words, scene=changed, model=model.name)
 
 
-def _with_cures(why: str, cures: Sequence[Cure], asked: str) -> Refused:
-    return Refused(f"{why}; {in_words(cures, asked)}" if cures else why, cures)
+def _with_cures(reason: str, cures: Sequence[Cure], requested: str) -> Refused:
+    return Refused(f"{reason}; {in_words(cures, requested)}" if cures else reason, cures)
 
 
 def of_body(**values: Any) -> Callable[[Scene], Scene]:
-    """Change of attributes of a scene's body."""
+    """Return the change of a scene to other attributes of its body."""
     return lambda scene: replace(scene, body=replace(scene.body, **values))
 
 
 def of_part(part: str, **values: Any) -> Callable[[Scene], Scene]:
-    """Change of attributes of the `solid`, the mounting or the placement of a scene's body."""
+    """Return the change of a scene to other attributes of its `solid`, mounting or placement."""
     name = "material" if part == "solid" else part
     return lambda scene: of_body(**{name: replace(getattr(scene.body, part), **values)})(scene)
 
 
 def reading_limit(scene: Scene) -> Limit:
-    """Limit of a model that has not what a scene's probes read."""
+    """Return the limit of a model that does not compute the quantity of a scene's probes."""
     return Limit(
-        why=f"has no {scene.reading.words}",
-        cure="ask for the displacement at the surface",
-        change=read_at_surface,
+        why=f"does not compute {scene.reading.words}",
+        cure="read the displacement at the surface",
+        change=displacement_at_surface,
     )
 
 
-def read_at_surface(scene: Scene) -> Scene:
-    """The scene whose probes read the displacement at the surface."""
+def displacement_at_surface(scene: Scene) -> Scene:
+    """Return the scene whose probes read the displacement at the surface."""
     return replace(scene, quantity=DISPLACEMENT.name, depth=0.0)
 
 
 def load_limit(scene: Scene) -> Limit:
-    """Limit of a model that takes the pressure of a focus alone."""
+    """Return the limit of a model that takes only the pressure of a focus."""
     return Limit(
-        why=f"takes the pressure of a focus alone, not {scene.load.words}",
-        cure="leave out [load]",
-        change=_under_pressure,
+        why=f"needs the pressure of a focus alone, not {scene.load.words}",
+        cure="remove [load]",
+        change=_without_load,
     )
 
 
-def _under_pressure(scene: Scene) -> Scene:
-    """The scene without [load]: a load that no device makes leaves its Tacton."""
-    made = scene.load.of_kind.is_of_device
-    pressure = scene.pressure if made else MovingPressure(tacton=scene.tacton)
+def _without_load(scene: Scene) -> Scene:
+    """Return the scene without [load]; a load that no device makes leaves its Tacton."""
+    is_of_device = scene.load.of_kind.is_of_device
+    pressure = scene.pressure if is_of_device else MovingPressure(tacton=scene.tacton)
     return replace(scene, load=PRESSURE, pressure=pressure)
 
 
-def plain_only(scene: Scene) -> Iterator[Limit]:
-    """Limits of a model of the displacement of the surface under the pressure of a focus."""
+def plain_limits(scene: Scene) -> Iterator[Limit]:
+    """Yield the limits of a model of the displacement of the surface under a focus."""
     if not scene.reading.is_plain:
         yield reading_limit(scene)
     if not scene.load.is_plain:
         yield load_limit(scene)
 
 
-def surface_motion(scene: Scene) -> Iterator[Limit]:
-    """The same of a model that has the rates of that displacement, too."""
+def surface_limits(scene: Scene) -> Iterator[Limit]:
+    """Yield the same limits for a model that also computes the rates of that displacement."""
     if not (scene.reading.record.is_normal and scene.reading.is_on_surface):
         yield reading_limit(scene)
     if not scene.load.is_plain:
         yield load_limit(scene)
 
 
-def of_held_sheet(body: Body) -> Iterator[Limit]:
-    """Limits of a model of a flat sheet that is held at its edges and lies across the beam."""
+def held_sheet_limits(body: Body) -> Iterator[Limit]:
+    """Yield the limits of a model of a flat sheet with clamped sides across the beam."""
     if body.sides != "clamped":
         yield Limit(
-            why=f"takes a sheet that is held, not one with {body.sides} sides",
-            cure='take sides = "clamped"', change=of_body(sides="clamped"),
+            why=f"needs a sheet with clamped sides, not with {body.sides} sides",
+            cure='set sides = "clamped"', change=of_body(sides="clamped"),
         )  # fmt: skip
     if body.placement.is_tilted:
         yield Limit(
-            why="takes a sheet across the beam, not a tilted one",
-            cure="leave out its tilt", change=of_part("placement", tilt_x=0.0, tilt_y=0.0),
+            why="needs a sheet across the beam, not a tilted one",
+            cure="remove its tilt", change=of_part("placement", tilt_x=0.0, tilt_y=0.0),
         )  # fmt: skip
-    yield from of_flat_sheet(body)
+    yield from flat_sheet_limits(body)
 
 
-def of_flat_sheet(body: Body) -> Iterator[Limit]:
-    """Limit of a model of a sheet that is flat at rest."""
+def flat_sheet_limits(body: Body) -> Iterator[Limit]:
+    """Yield the limit of a model of a sheet that is flat at rest."""
     if body.mounting.is_curled:
         yield Limit(
-            why="takes a flat sheet, not a curled one",
-            cure="leave out its curl", change=of_part("mounting", curl_x=0.0, curl_y=0.0),
+            why="needs a flat sheet, not a curled one",
+            cure="remove its curl", change=of_part("mounting", curl_x=0.0, curl_y=0.0),
         )  # fmt: skip
 
 
-def of_alike_directions(body: Body) -> Iterator[Limit]:
-    """Limits of the wavenumber integral, whose waves are alike in all directions of a sheet."""
+def isotropic_limits(body: Body) -> Iterator[Limit]:
+    """Yield the limits of the wavenumber integral of a sheet, which must be isotropic."""
     held = body.mounting
     if body.solid.orthotropy is not None:
         yield Limit(
-            why="takes a sheet alike in all directions, not an orthotropic one",
-            cure="take an isotropic material", change=of_part("solid", orthotropy=None),
+            why="needs an isotropic sheet, not an orthotropic one",
+            cure="use an isotropic material", change=of_part("solid", orthotropy=None),
         )  # fmt: skip
     if held.tension_x != held.tension_y:
         mean = held.mean_tension
         yield Limit(
-            why="takes a sheet alike in all directions, not one stretched by "
-            f"{held.tension_x:g} and {held.tension_y:g} N/m along x and y",
-            cure="stretch it alike along both",
+            why=f"needs equal tension along x and y, not {held.tension_x:g} and "
+            f"{held.tension_y:g} N/m",
+            cure="use equal tension",
             change=of_part("mounting", tension_x=mean, tension_y=mean),
         )  # fmt: skip
-    yield from of_flat_sheet(body)
+    yield from flat_sheet_limits(body)
 
 
-def of_vacuum(body: Body) -> Iterator[Limit]:
-    """Limit of a model of sparse equations, which the added mass of air does not have."""
+def vacuum_limits(body: Body) -> Iterator[Limit]:
+    """Yield the limit of a model of sparse matrices, which exclude the added mass of air."""
     if body.air:
-        yield _without_air("has no air around a sheet")
+        yield _air_limit("does not include the air around a sheet")
 
 
-def of_air_in_a_frame(body: Body) -> Iterator[Limit]:
-    """Limit of elements: they have no air that flows around a free edge."""
+def frame_air_limits(body: Body) -> Iterator[Limit]:
+    """Yield the limit of elements, which include air only if it cannot flow around a free edge."""
     if how := open_air(body):
-        yield _without_air(f"has air around a sheet in a frame, not around one {how}")
+        yield _air_limit(f"includes the air only around a sheet in a frame, not around one {how}")
 
 
-def _without_air(why: str) -> Limit:
-    return Limit(why=why, cure="leave out its air", change=of_body(air=False))
+def _air_limit(why: str) -> Limit:
+    return Limit(why=why, cure="set air = false", change=of_body(air=False))

@@ -1,46 +1,53 @@
-"""Options of a solution, and the times at which it is sampled."""
+"""Options of a solution, the times of its samples, and the record of its response."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+from math import nan
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 import fem
-from simple_model import Response
+from simple_model import Effort, Response
 from simple_model.choices import choose
 from simple_model.response import UNEVEN
 from skinwave.scene.scene import MOST_VALUES, SAMPLE_RATE, Scene
 from skinwave.system.effort import Progress, silent
 from skinwave.typing import Floats
 
-MapFunction = Callable[..., Iterable[Any]]  # of the shape of the built-in `map`
 SIZES = {"h": ("element size", 1e3, "mm"), "dt": ("time step", 1.0, "s")}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SolveOptions:
-    """How a scene is solved, whatever the scene.
+    """Options of a solution, independent of the scene.
 
     Parameters
     ----------
-    model : str, a name of `models.names()`, or "auto": the cheapest within the tolerance
-    tolerance : float, 0..1, relative error that may be made; reduction takes at most a fiftieth
+    model : str, a name of `models.names()`; "auto" selects the cheapest within the tolerance
+    tolerance : float, 0..1, acceptable relative error; reduction takes at most a fiftieth of it
     h : float, metre, element size; planned if not given, and with it the extent of the body
     dt : float, s, time step of "fem-transient" and the nonlinear models; chosen if not given
     solver : str, a backend of `fem.linear_solver`, or "auto"
     times : (t,) float, s, equally spaced within the duration, the first a multiple of their step;
-        10 kHz over all of it if not given. Lines above half their rate are left out
+        10 kHz over the whole duration if not given. Lines above half their rate are left out
     progress : called with the name of the phase and the fraction done
-    mapped : called like the built-in `map`, for the lines of "fem-harmonic"
 
     Raises
     ------
     ValueError
         If the solver is not installed, or a number is out of range.
+
+    Examples
+    --------
+    >>> import skinwave
+    >>> skinwave.SolveOptions(model="fem", tolerance=0.02, h=3e-3).h
+    0.003
+    >>> skinwave.SolveOptions(h=-1e-3)
+    Traceback (most recent call last):
+        ...
+    ValueError: element size -1 mm must be a finite number above 0
     """
 
     model: str = "auto"
@@ -50,7 +57,6 @@ class SolveOptions:
     solver: str = "auto"
     times: ArrayLike | None = None
     progress: Progress = silent
-    mapped: MapFunction = map
 
     def __post_init__(self) -> None:
         if not 0 < self.tolerance < 1:
@@ -68,48 +74,61 @@ class SolveOptions:
 DEFAULT = SolveOptions()
 
 
+def solver_name(solver: str) -> str:
+    """Return the backend that a solver option selects."""
+    return fem.available()[0] if solver == "auto" else solver
+
+
+def response_of(
+    scene: Scene, model: str, times: Floats, values: Floats, effort: Effort, error: float = nan
+) -> Response:
+    """Return the response of a scene's quantity, with an error that the model measures."""
+    return Response(
+        model=model, times=times, probes=scene.probe_points, quantity=scene.quantity,
+        values=values, effort=effort, expected_error=error,
+    )  # fmt: skip
+
+
 def sample_times(scene: Scene, rate: float = SAMPLE_RATE) -> Floats:
-    """Sample times (t,) in s of a response: from 0 up to the duration, at least two."""
+    """Return sample times (t,) in s of a response: from 0 up to the duration, at least two."""
     return np.arange(max(2, round(scene.tacton.duration * rate))) / rate
 
 
 def sample_grid(scene: Scene, times: ArrayLike | None = None) -> tuple[Floats, int]:
-    """Times (t,) in s from 0, on which models compute, and the number of the first that is asked
-    for; those of the scene if none are given. Raises a ValueError if they are not evenly spaced,
-    not within the duration, or too many.
+    """Return times (t,) in s from 0, on which models compute, and the index of the first requested
+    one; by default those of the scene. Raises a ValueError if they are not evenly spaced, not
+    within the duration, or too many.
     """
     if times is None:
         return sample_times(scene), 0
-    asked = np.asarray(times, np.float64)
-    if asked.ndim != 1 or len(asked) < 2 or not np.isfinite(asked).all():
+    given = np.asarray(times, np.float64)
+    if given.ndim != 1 or len(given) < 2 or not np.isfinite(given).all():
+        raise ValueError(f"times have shape {given.shape}; give (t,) finite numbers in s, t >= 2")
+    start, end = float(given[0]), float(given[-1])
+    step, duration = (end - start) / (len(given) - 1), scene.tacton.duration
+    if not (step > 0 and np.abs(np.diff(given) - step).max() <= UNEVEN * step):
+        raise ValueError("times do not rise in equal steps; give evenly spaced times")
+    if not (start >= 0 and end <= duration + UNEVEN * step):
         raise ValueError(
-            f"times have shape {asked.shape}; give (t,) finite numbers in s, two or more"
+            f"times from {start:g} to {end:g} s are outside 0..{duration:g} s, the duration of the "
+            "Tacton; give times within it"
         )
-    step = float(asked[-1] - asked[0]) / (len(asked) - 1)
-    if not (step > 0 and np.abs(np.diff(asked) - step).max() <= UNEVEN * step):
-        raise ValueError("times do not rise in equal steps; give evenly spaced ones")
-    duration = scene.tacton.duration
-    if not (asked[0] >= 0 and asked[-1] <= duration + UNEVEN * step):
+    first = round(start / step)
+    if abs(start - first * step) > UNEVEN * step * max(1, first):
         raise ValueError(
-            f"times from {asked[0]:g} to {asked[-1]:g} s are outside 0..{duration:g} s, the "
-            "duration of the Tacton; give times within it"
-        )
-    first = round(float(asked[0]) / step)
-    if abs(asked[0] - first * step) > UNEVEN * step * max(1, first):
-        raise ValueError(
-            f"times begin at {asked[0]:g} s, which is no multiple of their step, {step:g} s; begin "
+            f"times begin at {start:g} s, which is not a multiple of their step, {step:g} s; begin "
             f"at {first * step:g} s"
         )
-    if (values := (first + len(asked)) * len(scene.probes)) > MOST_VALUES:
+    if (count := (first + len(given)) * len(scene.probes)) > MOST_VALUES:
         raise ValueError(
-            f"{values:,} values from 0 to {asked[-1]:g} s are more than {MOST_VALUES:,}; give a "
+            f"{count:,} values from 0 to {end:g} s exceed the limit of {MOST_VALUES:,}; give a "
             "larger step"
         )
-    return np.asarray(step * np.arange(first + len(asked)), np.float64), first
+    return np.asarray(step * np.arange(first + len(given)), np.float64), first
 
 
 def from_first(response: Response, first: int) -> Response:
-    """A response without its samples before a number."""
+    """Return a response without the samples before an index."""
     if not first:
         return response
     return replace(response, times=response.times[first:], values=response.values[first:])

@@ -1,10 +1,10 @@
 """Parametric reduced body: one offline stage for every material and thickness of a range.
 
-`prepare` is that stage, for a scene and ranges of some of its keys. `lines` takes milliseconds:
-Galerkin's equations of each line of the scene's load in a few states. `answer` is the waveform from
-rest, by the poles of the reduced-order model; `at` is that model, for any other Tacton. Poisson's
-ratios and the elements are fixed: with a thickness the nodes of one mesh move, or modulus and
-density of a sheet stand for it.
+`prepare` is that stage, for a scene and ranges of some of its keys. `lines` takes milliseconds: it
+solves Galerkin's equations of each line of the scene's load in a few states. `answer` returns the
+waveform from rest, by the poles of the reduced-order model. `at` returns that model, for any other
+Tacton. Poisson's ratios and the elements are fixed. With a thickness, the nodes of one mesh move,
+or the modulus and density of a sheet change.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from simple_model import Effort, Response
 from simple_model.layers.prony import FIT_TOLERANCE
 from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
+from skinwave.models import meshed
 from skinwave.models.free_bodies import (
     Range,
     Reference,
@@ -49,17 +50,7 @@ from skinwave.models.free_keys import (
     with_values,
 )
 from skinwave.models.laws import relaxing
-from skinwave.models.meshed import (
-    even_part,
-    images,
-    line_factor,
-    load_lines_at,
-    modelled_axes,
-    probe_rows,
-    spent,
-    spread,
-    surface_load,
-)
+from skinwave.models.options import solver_name
 from skinwave.models.reduced import (
     BAND,
     ReducedBody,
@@ -72,26 +63,34 @@ from skinwave.models.reduced import (
 from skinwave.models.reduced import answer as answer_of
 from skinwave.scene.scene import Body, Scene
 from skinwave.system.effort import Clock, Progress, one_thread, silent
-from skinwave.typing import Floats
+from skinwave.typing import Bools, Floats
 
-TOLERANCE = 0.01  # relative error of a line that is not faint
-SHARE = 0.4  # of the tolerance: of the reduced-order model, and of the lines' bases
-FAINTEST = 1e-3  # of the strongest line that moves the probes: weaker ones are left out
-FAINTEST_LOAD = 1e-6  # of the strongest line of the load
-FORMAT = "parametric 5"  # of what is cached
-BETWEEN = 0.3  # of each range: a body of no known geometry
-INSIDE = 128  # materials inside the ranges, for the lines' bases
+TOLERANCE = 0.01  # relative error of a strong line
+SHARE = 0.4  # of the tolerance, for the reduced-order model and for the bases of lines
+WEAK_LINE_RATIO = 1e-3  # to the strongest line that moves the probes: weaker ones are left out
+WEAKEST_LOAD_LINE = 1e-6  # of the strongest line of the load
+FORMAT = "parametric 6"  # of a cached body
+BETWEEN = 0.3  # share of each range of a body between geometries
+INSIDE = 128  # materials inside the ranges, for the bases of lines
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ParametricBody:
-    """Reduced body of a scene for every material and thickness of a range.
+    """Reduced body of a scene for every material and thickness of a range, as `skinwave.prepare`
+    returns it, with an example.
 
-    The `keys` that are free and the `bodies` of their values; the `reference` that was meshed; of
-    g geometries the reduced `model`, whose outputs (g, p c, r) the probes read, with the reduced
-    `forces` (g, c k, r) of unit pressure at the surface `points` (g, k, 3) in metre; models
-    `bases` (f,) in it of the lines at `frequencies` (f,) in Hz; and the `effort` of the offline
-    stage, with the number of its factorisations.
+    Attributes
+    ----------
+    scene : Scene
+    keys : tuple of FreeKey, the free keys
+    bodies : Range, the bodies of their values
+    reference : Reference, the body that was meshed
+    model : AffineModel, reduced model of g geometries, with outputs (g, p c, r) at the probes
+    forces : (g, c k, r) reduced forces of unit pressure
+    points : (g, k, 3) surface points in metre where the load is taken
+    frequencies : (f,) in Hz of the lines
+    bases : (f,) AffineModel, smaller models of the lines
+    effort : Effort of the offline stage, with the number of its factorisations
     """
 
     scene: Scene
@@ -121,7 +120,7 @@ def prepare(
     h: float | None = None,
     solver: str = "auto",
 ) -> ParametricBody:
-    """Offline stage: reduce a scene's body once for all materials and thicknesses within ranges.
+    """Reduce a scene's body once for all materials and thicknesses within ranges.
 
     Parameters
     ----------
@@ -140,8 +139,23 @@ def prepare(
     Raises
     ------
     ValueError
-        If a key cannot be free, the scene's probes read what depends on more than motion, or the
-        tolerance is out of reach.
+        If a key cannot be free, the quantity of the probes depends on it other than by the motion,
+        or the tolerance is out of reach.
+
+    Examples
+    --------
+    >>> import skinwave
+    >>> from skinwave.models import parametric
+    >>> scene = skinwave.loads(
+    ...     "[tacton]\\nam_frequency_hz = 100\\nduration_s = 0.02\\n[body]\\nsides = 'clamped'\\n"
+    ...     "size_x_mm = 40\\nsize_y_mm = 40\\nthickness_mm = 10"
+    ... )
+    >>> key = "body.material.shear_modulus_pa"
+    >>> body = skinwave.prepare(scene, {key: (2e4, 3e4)}, tolerance=0.1, h=0.01)
+    >>> body.keys[0].low, body.keys[0].high
+    (20000.0, 30000.0)
+    >>> parametric.answer(body, {key: 2.5e4}).values.shape
+    (200, 5)
     """
     keys = free_keys(scene.body, free)
     check_scene(scene, keys, tolerance)
@@ -150,8 +164,8 @@ def prepare(
         report("mesh", 0.0)
         bodies = _range(scene.body, keys, h)
         body = bodies.body(bodies.meshed)
-        # One side gives all that probes on a plane of symmetry read.
-        axes = modelled_axes(scene.body, scene.probe_points, "", scene.reading, scene.load)
+        # Probes on a plane of symmetry need only one half.
+        axes = meshed.modelled_axes(scene.body, scene.probe_points, "", scene.reading, scene.load)
         mesh = cached(partial(build_at, bodies, symmetry=axes))
         build = mesh(bodies.meshed)
     reference = reference_of(body, build, keys)
@@ -161,22 +175,22 @@ def prepare(
     )  # fmt: skip
     name = cache.key(FORMAT, of_body, scene.pressure, scene.reading, keys)
     with clock("read from cache"):
-        found = cached_record(name)
-    if found is None:
+        fields = cached_record(name)
+    if fields is None:
         stage = _Stage(
             scene=scene, bodies=bodies, mesh=mesh, reference=reference, tolerance=tolerance,
             solver=solver,
         )  # fmt: skip
-        found = _reduced(stage, clock, report, build)
-        store_record(name, found, found["model"].parts, found["forces"])
-    effort = spent(found["effort"], clock, build, h or default_size(body))
+        fields = _reduce(stage, clock, report, build)
+        store_record(name, fields, fields["model"].parts, fields["forces"])
+    effort = meshed.with_cost(fields["effort"], clock, build, h or default_size(body))
     return ParametricBody(
-        scene=scene, keys=keys, bodies=bodies, reference=reference, **found | {"effort": effort}
+        scene=scene, keys=keys, bodies=bodies, reference=reference, **fields | {"effort": effort}
     )
 
 
 def _range(body: Body, keys: tuple[FreeKey, ...], h: float | None) -> Range:
-    """Bodies of all values of the free keys."""
+    """Return the bodies of all values of the free keys."""
 
     def at(shares: Sequence[float]) -> Body:
         return relaxing(with_values(body, keys, values_at(keys, shares)), FIT_TOLERANCE)
@@ -186,7 +200,7 @@ def _range(body: Body, keys: tuple[FreeKey, ...], h: float | None) -> Range:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Stage:
-    """Offline stage of a scene and the bodies of a range; `mesh` is that of shares of the range."""
+    """Offline stage of a scene; `mesh` returns the mesh at shares of the range."""
 
     scene: Scene
     bodies: Range
@@ -196,99 +210,125 @@ class _Stage:
     solver: str
 
     def geometry(self, at: tuple[float, ...]) -> Geometry:
-        """Full body at shares of the range."""
+        """Return the full body at shares of the range."""
         body, build = self.bodies.body(at), self.mesh(at)
         affine = affine_operators(body, build)
         P, points = _surface(self.scene, build)
         return Geometry(
             affine=affine, probes=_probes(self.scene, body, build),
-            forces=_moving(self.scene, P, points)[1][:, affine.free],
-            loads=spread(P, typical_spots(body, points)),
+            forces=_line_forces(self.scene, P, points)[1][:, affine.free],
+            loads=meshed.spread(P, typical_spots(body, points)),
         )  # fmt: skip
 
+    def training(self) -> list[tuple[float, ...]]:
+        """Return shares (k,) of corners and middle at assembled geometries, and one between."""
+        count = len(self.bodies.meshed)
+        few = [nearest_geometry(self.bodies, each) for each in training_shares(count, 0).tolist()]
+        between = [(BETWEEN,) * count] if len(self.bodies.geometries) > 1 else []
+        return list(dict.fromkeys([*few, *between]))
 
-def _reduced(stage: _Stage, clock: Clock, report: Progress, build: Build) -> dict[str, Any]:
-    """What is cached: fields of a `ParametricBody`."""
+    def variant(self, at: tuple[float, ...], geometries: Mapping[Any, Any]) -> Variant:
+        """Return the body at shares of the range, at an assembled geometry or at its own."""
+        body = self.bodies.body(at)
+        shares = geometry_shares(self.bodies, body)
+        nearest = list(geometries.values())[int(np.argmax(shares))]
+        is_assembled = nearest_geometry(self.bodies, at) == at
+        solids = solids_of(self.reference, body)
+        return Variant(
+            solids=replace(solids, materials=tuple(m.relaxing() for m in solids.materials)),
+            shares=shares,
+            geometry=nearest if is_assembled else partial(self.geometry, at),
+        )
+
+
+def _reduce(stage: _Stage, clock: Clock, report: Progress, build: Build) -> dict[str, Any]:
+    """Reduce the body: fields of a `ParametricBody` that are cached."""
     bodies, tolerance, scene = stage.bodies, stage.tolerance, stage.scene
     geometries: dict[Any, Callable[[], Geometry]] = {
         at: cached(partial(stage.geometry, at)) for at in bodies.geometries
     }
     with clock("assemble"):
         report("assemble", 0.0)
-        frequencies, _ = _moving(scene, *_surface(scene, build))
+        frequencies, _ = _line_forces(scene, *_surface(scene, build))
         for geometry in geometries.values():
             geometry()
-    few = [_variant(stage, at, geometries) for at in _training(stage)]
+    variants = [stage.variant(at, geometries) for at in stage.training()]
     with clock("factorise and reduce"), one_thread():
         model, error, factorisations = reduce_affine(
-            list(geometries.values()), few, frequencies, band=BAND, tolerance=SHARE * tolerance,
-            solver=stage.solver, progress=partial(report, "reduce"),
+            list(geometries.values()), variants, frequencies, band=BAND,
+            tolerance=SHARE * tolerance, solver=stage.solver, progress=partial(report, "reduce"),
         )  # fmt: skip
     surface = []
     for mesh in map(stage.mesh, geometries):
         P, points = _surface(scene, mesh)
         surface.append((P[~fixed_dofs(mesh.mesh, mesh.constraints)].T @ model.basis, points))
     with clock("lines"), one_thread():
-        kept, bases, of_lines = _bases(stage, model, frequencies, few, report)
+        strong = _strong_lines(model, frequencies, variants)
+        bases, error_of_lines = _line_bases(stage, model, frequencies, strong, report)
     effort = Effort(
-        dofs=len(model.basis), reduced_dofs=model.basis.shape[1],
-        solver=fem.available()[0] if stage.solver == "auto" else stage.solver,
-        estimate=error + of_lines, factorisations=factorisations,
+        dofs=len(model.basis), reduced_dofs=model.basis.shape[1], solver=solver_name(stage.solver),
+        estimate=error + error_of_lines, factorisations=factorisations,
     )  # fmt: skip
-    forces, places = (np.stack(each) for each in zip(*surface, strict=True))
+    forces, points = (np.stack(each) for each in zip(*surface, strict=True))
     return {
-        "model": replace(model, basis=model.basis[:0]), "forces": forces, "points": places,
-        "frequencies": kept, "bases": bases, "effort": effort,
+        "model": replace(model, basis=model.basis[:0]), "forces": forces, "points": points,
+        "frequencies": frequencies[strong], "bases": bases, "effort": effort,
     }  # fmt: skip
 
 
-def _training(stage: _Stage) -> list[tuple[float, ...]]:
-    """Shares (k,) of corners and middle, of geometries that are known, and of one between them."""
+def _strong_lines(model: AffineModel, frequencies: Floats, variants: Sequence[Variant]) -> Bools:
+    """Return the mask (f,) of lines that are strong for one of the variants, and of the mean."""
+
+    def strength(each: Variant) -> Floats:
+        at = weights(model.terms, each.solids, frequencies)
+        motion = steady(model, at, each.shares, range(len(frequencies)))
+        return np.asarray(np.linalg.norm(motion, axis=1))
+
+    strengths = np.array([strength(each) for each in variants])
+    strongest = np.where(frequencies > 0, strengths, 0.0).max(axis=1, keepdims=True)
+    return (frequencies == 0) | (strengths > WEAK_LINE_RATIO * strongest).any(axis=0)
+
+
+def _line_bases(
+    stage: _Stage, model: AffineModel, frequencies: Floats, strong: Bools, report: Progress
+) -> tuple[tuple[AffineModel, ...], float]:
+    """Return the bases of the strong lines for many bodies inside the range, and their error."""
     count = len(stage.bodies.meshed)
-    few = [nearest_geometry(stage.bodies, each) for each in training_shares(count, 0).tolist()]
-    between = [(BETWEEN,) * count] if len(stage.bodies.geometries) > 1 else []
-    return list(dict.fromkeys([*few, *between]))
-
-
-def _variant(stage: _Stage, at: tuple[float, ...], geometries: Mapping[Any, Any]) -> Variant:
-    """Body at shares of the range, of a geometry that is meshed already, or of one of its own."""
-    body = stage.bodies.body(at)
-    shares = geometry_shares(stage.bodies, body)
-    nearest = list(geometries.values())[int(np.argmax(shares))]
-    is_known = nearest_geometry(stage.bodies, at) == at
-    solids = solids_of(stage.reference, body)
-    return Variant(
-        solids=replace(solids, materials=tuple(m.relaxing() for m in solids.materials)),
-        shares=shares,
-        geometry=nearest if is_known else partial(stage.geometry, at),
+    bodies = [stage.bodies.body(at) for at in training_shares(count, INSIDE).tolist()]
+    at_lines = [
+        weights(model.terms, solids_of(stage.reference, body), frequencies[strong])
+        for body in bodies
+    ]
+    return line_bases(
+        replace(model, forces=model.forces[:, strong]), np.stack(at_lines),
+        np.stack([geometry_shares(stage.bodies, body) for body in bodies]),
+        SHARE * stage.tolerance, partial(report, "lines"),
     )  # fmt: skip
 
 
 def lines(prepared: ParametricBody, values: Mapping[str, float]) -> tuple[Floats, fem.Complex]:
-    """Steady state of a body of the range at the strong lines of the scene's load: frequencies (f,)
-    in Hz, and amplitudes (f, p c) of the components that the probes read, in the quantity's unit.
+    """Return the steady state of a body of the range at the strong lines of the scene's load:
+    frequencies (f,) in Hz, and amplitudes (f, p c) of the components at the probes.
     """
     return lines_of(prepared, with_values(prepared.scene.body, prepared.keys, values))
 
 
 def lines_of(prepared: ParametricBody, body: Body) -> tuple[Floats, fem.Complex]:
-    """The same of a body that differs from the scene's by values of the free keys alone."""
+    """Return the same for a body that differs from the scene's only by values of the free keys."""
     solids = solids_of(prepared.reference, body)
-    of_parts = weights(prepared.model.terms, solids, prepared.frequencies)
-    found = steady_lines(prepared.bases, of_parts, geometry_shares(prepared.bodies, body))
-    s = 2j * np.pi * prepared.frequencies
-    return prepared.frequencies, found * line_factor(
-        prepared.scene.reading.record, s, (), found.shape[1]
-    )
+    at_lines = weights(prepared.model.terms, solids, prepared.frequencies)
+    motion = steady_lines(prepared.bases, at_lines, geometry_shares(prepared.bodies, body))
+    s, quantity = 2j * np.pi * prepared.frequencies, prepared.scene.reading.record
+    return prepared.frequencies, motion * meshed.line_factor(quantity, s, (), motion.shape[1])
 
 
 def answer(prepared: ParametricBody, values: Mapping[str, float]) -> Response:
-    """Response of a body of the range from rest to the scene's Tacton."""
+    """Return the response of a body of the range from rest to the scene's Tacton."""
     return answer_of(at(prepared, values), prepared.scene)
 
 
 def at(prepared: ParametricBody, values: Mapping[str, float]) -> ReducedBody:
-    """Reduced body of values of the free keys, for any Tacton."""
+    """Return the reduced body of values of the free keys, for any Tacton."""
     body = relaxing(with_values(prepared.scene.body, prepared.keys, values), FIT_TOLERANCE)
     shares, scene = geometry_shares(prepared.bodies, body), prepared.scene
     model = prepared.model
@@ -303,50 +343,20 @@ def at(prepared: ParametricBody, values: Mapping[str, float]) -> ReducedBody:
 
 
 def _probes(scene: Scene, body: Body, build: Build) -> sparse.csr_array:
-    """Probe operator (p c, 3 n) of a mesh."""
-    places = images(scene.probe_points, build.symmetry)
-    return probe_rows(body, build, places, scene.reading)[0]
+    """Return the probe operator (p c, 3 n) of a mesh."""
+    places = meshed.images(scene.probe_points, build.symmetry)
+    return meshed.probe_rows(body, build, places, scene.reading)[0]
 
 
 def _surface(scene: Scene, build: Build) -> tuple[sparse.csr_array, Floats]:
-    """Load operator (3 n, c k) of a mesh, and the points (k, 3) where it takes the load."""
-    return even_part(*surface_load(build, scene.load), build.symmetry)
+    """Return the load operator (3 n, c k) of a mesh, and the points (k, 3) of the load."""
+    return meshed.even_part(*meshed.surface_load(build, scene.load), build.symmetry)
 
 
-def _moving(scene: Scene, P: sparse.csr_array, points: Floats) -> tuple[Floats, fem.Complex]:
-    """Frequencies (f,) in Hz and nodal forces (f, 3 n) in N of the load's lines, without the mean
-    if the body is unconstrained, which drifts under it.
+def _line_forces(scene: Scene, P: sparse.csr_array, points: Floats) -> tuple[Floats, fem.Complex]:
+    """Return frequencies (f,) in Hz and nodal forces (f, 3 n) in N of the load's lines, without the
+    mean if the body is unconstrained, and would drift.
     """
-    frequencies, pressures = load_lines_at(scene.loads, points, FAINTEST_LOAD)
-    kept = (frequencies > 0) | scene.body.is_held
-    return frequencies[kept], (P @ pressures[kept].T).T
-
-
-def _bases(
-    stage: _Stage,
-    model: AffineModel,
-    frequencies: Floats,
-    few: Sequence[Variant],
-    report: Progress,
-) -> tuple[Floats, tuple[AffineModel, ...], float]:
-    """Frequencies, bases and error of the lines that are strong for some of a few variants."""
-    every = range(len(frequencies))
-
-    def strength(each: Variant) -> Floats:
-        at = weights(model.terms, each.solids, frequencies)
-        return np.asarray(np.linalg.norm(steady(model, at, each.shares, every), axis=1))
-
-    strengths = np.array([strength(each) for each in few])
-    moving = np.where(frequencies > 0, strengths, 0.0).max(axis=1, keepdims=True)
-    kept = (frequencies == 0) | (strengths > FAINTEST * moving).any(axis=0)
-    many = [
-        stage.bodies.body(at) for at in training_shares(len(stage.bodies.meshed), INSIDE).tolist()
-    ]
-    found, error = line_bases(
-        replace(model, forces=model.forces[:, kept]),
-        np.stack([weights(model.terms, solids_of(stage.reference, each), frequencies[kept])
-                  for each in many]),
-        np.stack([geometry_shares(stage.bodies, each) for each in many]),
-        SHARE * stage.tolerance, partial(report, "lines"),
-    )  # fmt: skip
-    return frequencies[kept], found, error
+    frequencies, pressures = meshed.load_lines_at(scene.loads, points, WEAKEST_LOAD_LINE)
+    chosen = (frequencies > 0) | scene.body.is_held
+    return frequencies[chosen], (P @ pressures[chosen].T).T

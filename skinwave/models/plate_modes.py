@@ -1,16 +1,16 @@
-"""Modes of a thin plate by Ritz's method: sheets of any support, stretched, with their air; in the
+"""Modes of a thin plate by Ritz's method, for sheets with any support, tension and air: in the
 steady state, from rest, and at large deflection by von Karman's equations.
 
-At large deflection the motion without stretching is that of `plate-modes-transient`, of all modes
-and without time steps. To it is added the difference that stretching makes, by time steps of the
-lowest modes. Their number and the steps are as the tolerance asks: over the first part of each
-answer two errors are measured, by steps half as long and by fewer modes.
+At large deflection, the motion without stretching is that of `plate-modes-transient`, with all
+modes and without time steps. Time steps of the lowest modes add the effect of stretching. Their
+number and the number of modes follow from the tolerance and from two errors over the first part of
+each response: with steps half as long, and with fewer modes.
 """
 
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import cache, lru_cache, partial
 from itertools import pairwise
 from math import ceil
 from typing import Any
@@ -38,29 +38,29 @@ from skinwave.bodies.body import Body
 from skinwave.bodies.supports import EDGES
 from skinwave.models import Limit, Model, register
 from skinwave.models.laws import has_own_law, slowest_and_fastest
-from skinwave.models.limits import of_body, of_held_sheet, surface_motion
-from skinwave.models.options import SolveOptions, sample_times
+from skinwave.models.limits import held_sheet_limits, of_body, surface_limits
+from skinwave.models.options import SolveOptions, response_of, sample_times
+from skinwave.models.relative_change import relative_changes
 from skinwave.scene.scene import Scene
 from skinwave.system.effort import peak_memory
 from skinwave.typing import Complex, Floats
 
 PLATES = "A. W. Leissa: Vibration of Plates. NASA SP-160, 1969"
-ERROR = 0.01  # relative, of a steady waveform beside finite elements of a frame, vacuum and air
+ERROR = 0.01  # relative, of a steady waveform, by finite elements of a frame, vacuum and air
 KARMAN = (
     "S. Bilbao, O. Thomas, C. Touze, M. Ducceschi: Conservative numerical methods for the full von "
     "Karman plate equations. Numerical Methods for Partial Differential Equations 31 (2015) "
     "1948-1970. doi 10.1002/num.21974"
 )
 LONGEST, SHORTEST = 1e-4, 2.5e-5  # s, of time steps
-COUNTS = 42, 60, 86, 120  # modes that stretch a sheet, each number judged beside the one before
-CHECKED = 0.2  # s of an answer at the least, of which errors are measured
+COUNTS = 42, 60, 86, 120  # modes that stretch a sheet, each number compared with the one before
+CHECKED_DURATION = 0.2  # s of a response, at least, over which errors are measured
 SHARE = 0.3  # of the tolerance, for steps and for modes
 DEGREE = 5  # of the splines that are differentiated
-STANDSTILL = 1e-9  # of the motion of the probe that moves most
 
 
 def plate_of(body: Body) -> Plate:
-    """Thin plate of a sheet in the record of `simple_model.plates.modes`."""
+    """Return the thin plate of a sheet as a record of `simple_model.plates.modes`."""
     held, Q = body.mounting, body.solid.plane_stress * body.depth**3 / 12
     support = {edge: held.support if edge in held.edges else "free" for edge in EDGES}
     return Plate(
@@ -77,7 +77,7 @@ _karman = lru_cache(maxsize=6)(karman_plate)
 
 
 def middle_compliance(body: Body) -> float:
-    """Static deflection of the middle of a held sheet per force there, m/N."""
+    """Return the static deflection of the middle of a held sheet per force there, in m/N."""
     modes = modes_of(plate_of(replace(body, air=False)))
     at_rest = relative_modulus(body, 0.0).real
     stiffness = modes.squared * (1 + (at_rest - 1) * modes.elastic)
@@ -85,45 +85,47 @@ def middle_compliance(body: Body) -> float:
 
 
 def relative_modulus(body: Body, omega: ArrayLike) -> Any:
-    """Complex modulus of bending at frequencies in rad/s, over that of the modes."""
+    """Return the complex bending modulus at frequencies in rad/s, over that of the modes."""
     return body.solid.complex_modulus(omega) / body.solid.shear_modulus
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Driven:
-    """Modes of a scene's plate, the `forces` (f, m) in N kg^-1/2 of its load's lines at
-    `frequencies` (f,) in Hz, and the shapes `outputs` (p, m) where it is read.
+    """Modes of a scene's plate under its load, and the shapes `outputs` (p, m) at its probes.
+
+    The load has lines at `frequencies` (f,) in Hz with modal `forces` (f, m) in N kg^-1/2, and
+    `motion` (f, m) in the steady state.
     """
 
     modes: PlateModes
     frequencies: Floats
     forces: Complex
+    motion: Complex
     outputs: Floats
 
 
 def steady_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
-    """Steady state of the modes under every line of the load below half the sampling rate."""
+    """Solve the steady state of the modes under every line of the load below half the rate."""
     started, driven = time.perf_counter(), _driven(scene, times, options)
-    values = _steady(scene, driven, _motion(scene, driven), times)
-    return _response(scene, times, MODES.name, driven, values, started)
+    return _response(scene, times, MODES.name, driven, _steady(scene, driven, times), started)
 
 
 def steady_lines(scene: Scene, places: Floats | None = None) -> tuple[Floats, Complex]:
-    """Frequencies (f,) in Hz and complex amplitudes (f, p) of a scene's quantity in the steady
-    state, at places (p, 2) in metre, or its probes; a ValueError of a load without lines.
+    """Return frequencies (f,) in Hz and complex amplitudes (f, p) of a scene's quantity in the
+    steady state, at places (p, 2) in metre or at its probes. Raises a ValueError for a load without
+    lines.
     """
     driven = _driven(scene, sample_times(scene), SolveOptions())
     if places is not None:
         outputs = driven.modes.at(places - scene.body.placement.offset)
         driven = replace(driven, outputs=outputs)
-    return driven.frequencies, _amplitudes(scene, driven, _motion(scene, driven))
+    return driven.frequencies, _amplitudes(scene, driven)
 
 
 def answer_from_rest(scene: Scene, times: Floats, options: SolveOptions) -> Response:
-    """The steady state and the free vibration that a start from rest leaves."""
+    """Solve the steady state and the free vibration that a start from rest leaves."""
     started, driven = time.perf_counter(), _driven(scene, times, options)
-    motion = _motion(scene, driven)
-    values = _steady(scene, driven, motion, times) + _transient(scene, driven, motion, times)
+    values = _steady(scene, driven, times) + _free_vibration(scene, driven, times)
     return _response(scene, times, FROM_REST.name, driven, values, started)
 
 
@@ -135,53 +137,45 @@ def _driven(scene: Scene, times: Floats, options: SolveOptions) -> Driven:
     middle = body.placement.offset
     f, forces = lines_from_rest(pressure).gather(modal_path_forces(modes, pressure, middle))
     driving = f < highest_driving(pressure, times)
+    f, forces = f[driving], forces[driving]
     return Driven(
-        modes=modes, frequencies=f[driving], forces=forces[driving],
-        outputs=modes.at(scene.probe_points - middle),
+        modes=modes, frequencies=f, forces=forces, outputs=modes.at(scene.probe_points - middle),
+        motion=modal_motion(modes, f, forces, partial(relative_modulus, body)),
     )  # fmt: skip
 
 
 def _response(
     scene: Scene, times: Floats, model: str, driven: Driven, values: Floats, started: float
 ) -> Response:
-    return Response(
-        model=model, times=times, probes=scene.probe_points,
-        quantity=scene.reading.record.name, values=values,
-        effort=Effort(
-            seconds={"evaluate": time.perf_counter() - started}, dofs=len(driven.modes.squared),
-            steps=len(driven.frequencies), peak_memory=peak_memory(),
-        ),
+    effort = Effort(
+        seconds={"evaluate": time.perf_counter() - started}, dofs=len(driven.modes.squared),
+        steps=len(driven.frequencies), peak_memory=peak_memory(),
     )  # fmt: skip
+    return response_of(scene, model, times, values, effort)
 
 
-def _motion(scene: Scene, driven: Driven) -> Complex:
-    """Steady modal coordinates (f, m) of all lines."""
-    modulus = partial(relative_modulus, scene.body)
-    return modal_motion(driven.modes, driven.frequencies, driven.forces, modulus)
-
-
-def _steady(scene: Scene, driven: Driven, motion: Complex, times: Floats) -> Floats:
-    """Steady state (t, p)."""
+def _steady(scene: Scene, driven: Driven, times: Floats) -> Floats:
+    """Return the steady state (t, p)."""
     below = below_half_the_rate(driven.frequencies, times)
-    amplitudes = _amplitudes(scene, driven, motion)
-    return synthesise(driven.frequencies[below], amplitudes[below], times)
+    return synthesise(driven.frequencies[below], _amplitudes(scene, driven)[below], times)
 
 
-def _amplitudes(scene: Scene, driven: Driven, motion: Complex) -> Complex:
-    """Lines (f, p) of the quantity that is asked for."""
+def _amplitudes(scene: Scene, driven: Driven) -> Complex:
+    """Return the lines (f, p) of the scene's quantity."""
     rates = scene.reading.record.factor(2j * np.pi * driven.frequencies)[:, None]
-    return np.asarray(motion @ driven.outputs.T * rates)
+    return np.asarray(driven.motion @ driven.outputs.T * rates)
 
 
-def _transient(scene: Scene, driven: Driven, motion: Complex, times: Floats) -> Floats:
-    """Free vibration (t, p) that ends the state of rest before t = 0: of each mode apart, and of
-    coupled ones such that all are at rest at t = 0.
+def _free_vibration(scene: Scene, driven: Driven, times: Floats) -> Floats:
+    """Return the free vibration (t, p) after the state of rest before t = 0: of uncoupled modes
+    each by itself, and of coupled ones such that all are at rest at t = 0.
     """
     modes, f, forces = driven.modes, driven.frequencies, driven.forces
     free = free_modes(modes, scene.body.solid)
-    beside = motion - modal_motion_apart(modes, f, forces, partial(relative_modulus, scene.body))
-    speed = (2j * np.pi * f @ beside).real
-    start = free.start(f, forces) - free.impulse(beside.real.sum(axis=0), speed)
+    uncoupled = modal_motion_apart(modes, f, forces, partial(relative_modulus, scene.body))
+    coupling = driven.motion - uncoupled
+    speed = (2j * np.pi * f @ coupling).real
+    start = free.start(f, forces) - free.impulse(coupling.real.sum(axis=0), speed)
     start *= scene.reading.record.factor(free.poles)
     vibrates = free.residues != 0
     outputs = np.broadcast_to(driven.outputs.T[:, None], (*vibrates.shape, len(driven.outputs)))
@@ -190,18 +184,18 @@ def _transient(scene: Scene, driven: Driven, motion: Complex, times: Floats) -> 
 
 
 def limits(scene: Scene) -> Iterator[Limit]:
-    """Limits of thin plates in their modes: flat sheets that are held, read at the surface."""
+    """Yield the limits of plate modes, which need a flat, held sheet, read at the surface."""
     body = scene.body
     if not body.of_kind.is_plate:
-        yield Limit(why=f"takes a sheet, not a {body.kind}")
+        yield Limit(why=f"needs a sheet, not a {body.kind}")
         return
-    yield from of_held_sheet(body)
+    yield from held_sheet_limits(body)
     if body.base != "free":
         yield Limit(
-            why=f"takes a sheet of free faces, not one with the base {body.base}",
-            cure='take base = "free"', change=of_body(base="free"),
+            why=f"needs a sheet with free faces, not with the base {body.base}",
+            cure='set base = "free"', change=of_body(base="free"),
         )  # fmt: skip
-    yield from surface_motion(scene)
+    yield from surface_limits(scene)
 
 
 MODES = register(
@@ -233,91 +227,75 @@ FROM_REST = register(
 )
 
 
-def relative(change: Floats, values: Floats) -> Floats:
-    """Relative changes (p,) of waveforms (t, p); 0 where nothing moves."""
-    sizes = np.linalg.norm(values, axis=0)
-    moves = sizes > STANDSTILL * sizes.max()
-    found = np.linalg.norm(change, axis=0) / np.where(moves, sizes, 1)
-    return np.asarray(np.where(moves, found, 0.0))
-
-
 def stretched_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
-    """Linear motion from rest, and what stretching adds to it."""
+    """Solve the linear motion from rest, and add the effect of stretching."""
     started = time.perf_counter()
     linear = FROM_REST.solve(scene, times, options)
     modes: PlateModes = modes_of(plate_of(scene.body))
     options.progress("large deflection", 0.0)
-    count, parts, error = _resolved(scene, times, options, modes, linear.values)
+    count, parts, error = _resolution(scene, times, options, modes, linear.values)
     options.progress("large deflection", 0.2)
+    values = linear.values + _stretching(scene, times, modes, count, parts)
     effort = Effort(
         seconds={"evaluate": time.perf_counter() - started}, dofs=len(modes.squared),
         reduced_dofs=count, steps=parts * (len(times) - 1), dt=step(times) / parts,
         peak_memory=peak_memory(),
     )  # fmt: skip
-    values = linear.values + _added(scene, times, modes, count, parts)
-    seconds = {"evaluate": time.perf_counter() - started}
-    return Response(
-        model=STRETCHED.name, times=times, probes=scene.probe_points, values=values,
-        quantity=scene.reading.record.name, expected_error=ERROR + error,
-        effort=replace(effort, seconds=seconds),
-    )  # fmt: skip
+    return response_of(scene, STRETCHED.name, times, values, effort, ERROR + error)
 
 
 def first_part(pressure: MovingPressure, times: Floats) -> Floats:
-    """Times (s,) in s in which errors are measured: a period of the slowest strong line."""
+    """Return the times (s,) in s over which errors are measured: a period of the slowest strong
+    line, or more.
+    """
     slowest, _ = slowest_and_fastest(pressure)
-    return times[: max(2, round(max(CHECKED, 1 / slowest) / step(times)) + 1)]
+    return times[: max(2, round(max(CHECKED_DURATION, 1 / slowest) / step(times)) + 1)]
 
 
 def linear_error(scene: Scene, times: Floats, linear: Floats) -> float:
-    """Largest relative error of the linear response (t, p) of a scene from rest."""
+    """Return the largest relative error of the linear response (t, p) of a scene from rest."""
     modes: PlateModes = modes_of(plate_of(scene.body))
     parts = ceil(step(times) / LONGEST - 1e-9)
-    added = _added(scene, times, modes, min(COUNTS[0], len(modes.squared)), parts)
-    return float(relative(added, linear + added).max())
+    stretching = _stretching(scene, times, modes, min(COUNTS[0], len(modes.squared)), parts)
+    return float(relative_changes(stretching, linear + stretching).max())
 
 
 def settled(scene: Scene, tolerance: float) -> tuple[Floats, Floats, PlateModes]:
-    """Motion of a whole sheet about its mean, in the later half of a scene: times (t,) in s,
-    coordinates (t, m) in kg^1/2 m of all modes, and the modes.
+    """Return the motion of a whole sheet about its mean in the later half of a scene: times (t,) in
+    s, coordinates (t, m) in kg^1/2 m of all modes, and the modes.
     """
     times = sample_times(scene)
     options = SolveOptions(tolerance=tolerance)
     modes: PlateModes = modes_of(plate_of(scene.body))
     linear = FROM_REST.solve(scene, times, options).values
-    count, parts, _ = _resolved(scene, times, options, modes, linear)
-    kept = slice(len(times) // 2, None)
+    count, parts, _ = _resolution(scene, times, options, modes, linear)
+    later = slice(len(times) // 2, None)
     middle = scene.body.placement.offset
-    z = linear_motion(modes, scene.pressure, scene.body.solid, times[kept], middle=middle)
-    plate, added = _moved(scene, times, modes, count, parts)
-    z[:, plate.chosen] += added[::parts][kept]
-    return times[kept], z - z.mean(axis=0), modes
+    z = linear_motion(modes, scene.pressure, scene.body.solid, times[later], middle=middle)
+    plate, stretching = _stretching_coordinates(scene, times, modes, count, parts)
+    z[:, plate.chosen] += stretching[::parts][later]
+    return times[later], z - z.mean(axis=0), modes
 
 
-def _resolved(
+def _resolution(
     scene: Scene, times: Floats, options: SolveOptions, modes: PlateModes, linear: Floats
 ) -> tuple[int, int, float]:
-    """Number of modes that stretch the sheet and of time steps a sample, and the error they make:
-    measured over the first part of an answer, and as small as the tolerance asks or as can be had.
+    """Return the number of modes that stretch the sheet, the number of time steps per sample, and
+    the error of both over the first part of a response, within the tolerance if possible.
     """
     sample = step(times)
     parts = ceil(sample / (options.dt or LONGEST) - 1e-9)
     counts = [min(count, len(modes.squared)) for count in COUNTS]
     start = first_part(scene.pressure, times)
-    known: dict[tuple[int, int], Floats] = {}
-
-    def added(count: int, parts: int) -> Floats:
-        if (count, parts) not in known:
-            known[count, parts] = _added(scene, start, modes, count, parts)
-        return known[count, parts]
-
+    stretching = cache(lambda count, parts: _stretching(scene, start, modes, count, parts))
     for fewer, count in pairwise(counts):
         while True:
-            part = added(count, parts)
+            part = stretching(count, parts)
             size = linear[: len(start)] + part
             # Steps are of second order: a quarter of the error with steps half as long.
-            by_steps = 4 / 3 * float(relative(added(count, 2 * parts) - part, size).max())
-            by_modes = float(relative(added(fewer, parts) - part, size).max())
+            change = relative_changes(stretching(count, 2 * parts) - part, size)
+            by_steps = 4 / 3 * float(change.max())
+            by_modes = float(relative_changes(stretching(fewer, parts) - part, size).max())
             may_be_shorter = options.dt is None and sample / parts > SHORTEST
             if by_steps <= SHARE * options.tolerance or not may_be_shorter:
                 break
@@ -327,22 +305,24 @@ def _resolved(
     return count, parts, by_steps + by_modes
 
 
-def _added(scene: Scene, times: Floats, modes: PlateModes, count: int, parts: int) -> Floats:
-    """Part (t, p) of the scene's quantity that stretching adds, by steps of a part of a sample."""
-    plate, moved = _moved(scene, times, modes, count, parts)
-    read = moved @ plate.shapes(scene.probe_points - scene.body.placement.offset).T
+def _stretching(scene: Scene, times: Floats, modes: PlateModes, count: int, parts: int) -> Floats:
+    """Return the part (t, p) of the scene's quantity that stretching adds, with some modes and
+    `parts` time steps per sample.
+    """
+    plate, coordinates = _stretching_coordinates(scene, times, modes, count, parts)
+    values = coordinates @ plate.shapes(scene.probe_points - scene.body.placement.offset).T
     if rate := scene.reading.record.rate:
-        from scipy.interpolate import make_interp_spline  # which takes long to import
+        from scipy.interpolate import make_interp_spline  # slow to import
 
-        steps = step(times) / parts * np.arange(len(moved))
-        read = make_interp_spline(steps, read, DEGREE)(steps, rate)
-    return np.asarray(read[::parts])
+        steps = step(times) / parts * np.arange(len(coordinates))
+        values = make_interp_spline(steps, values, DEGREE)(steps, rate)
+    return np.asarray(values[::parts])
 
 
-def _moved(
+def _stretching_coordinates(
     scene: Scene, times: Floats, modes: PlateModes, count: int, parts: int
 ) -> tuple[KarmanPlate, Floats]:
-    """The plate, and the coordinates (n, r) in kg^1/2 m at all steps that stretching adds."""
+    """Return the plate, and the coordinates (n, r) in kg^1/2 m that stretching adds at each step"""
     body, dt = scene.body, step(times) / parts
     plate = _karman(modes, body.depth, count)
     steps = np.asarray(dt * np.arange(parts * (len(times) - 1) + 1), np.float64)

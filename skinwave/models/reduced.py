@@ -7,8 +7,8 @@
 
     u(t) = Re sum_f lines exp(2 pi i f t) + Re sum_m start exp(pole t)
 
-A body is reduced to its probes, for a few waveforms of any load; or to the subspace of one path's
-load, for the motion of all of it.
+A body is reduced for its probes, to compute a few waveforms of any load, or for the load of one
+path, to compute the motion of the whole body.
 """
 
 import pickle
@@ -33,25 +33,9 @@ from skinwave.bodies.build import Build
 from skinwave.bodies.discretised import Discretise
 from skinwave.bodies.sheet import air
 from skinwave.bodies.sizes import default_size
+from skinwave.models import meshed
 from skinwave.models.laws import relaxing
-from skinwave.models.meshed import (
-    assembled,
-    energy_balance,
-    even_part,
-    images,
-    inertia,
-    line_factor,
-    meshed,
-    modelled_axes,
-    probe_rows,
-    sag,
-    spent,
-    spread,
-    surface_load,
-    translation,
-    with_sag,
-)
-from skinwave.models.options import sample_times
+from skinwave.models.options import sample_times, solver_name
 from skinwave.scene.load import PRESSURE, Load
 from skinwave.scene.scene import SURFACE, Body, Reading, Scene
 from skinwave.system.effort import Clock, Progress, one_thread, peak_memory, silent, versions
@@ -60,29 +44,29 @@ from skinwave.typing import Bools, Floats
 BAND = 1000.0  # Hz up to which a reduced model must meet its tolerance
 REDUCTION_TOLERANCE = 1e-3
 SERIES_ERROR = 5  # times that of the reduction: with `reduction_tolerance` the `series_tolerance`
-FORMAT = "reduced 8"  # of what is cached of a body
-NEGLIGIBLE_LINE = 1e-7  # of the strongest line at the probes
+FORMAT = "reduced 9"  # of a cached body
+NEGLIGIBLE_LINE_RATIO = 1e-7  # to the strongest line at the probes
 
 
 def reduction_tolerance(tolerance: float) -> float:
-    """Tolerance of a reduction: a small share of the relative error that a waveform may have."""
+    """Return the tolerance of a reduction, a small share of that of a waveform."""
     return min(REDUCTION_TOLERANCE, tolerance / 50)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReducedBody:
-    """Reduced body, the load on its surface, and what its probes read.
+    """Reduced body, the load on its surface, and the quantity of its probes.
 
-    `poles` of the reduced model, which give its coordinates (r,), its `damping` (r, r), the
-    `radiation` (r, r) in it and its Maxwell `branches` of (r, r); `forces` (c k, r): reduced forces
-    of unit pressure of the c components of the `load` at the surface points (k, 3) in metre. On a
-    support that moves, `inertia` (r,) is the reduced inertial force per acceleration against it;
-    the coordinates are then those seen from the support.
+    The `poles` of the reduced model define its coordinates (r,), in which the model has a `damping`
+    (r, r), `radiation` (r, r), and Maxwell `branches` (r, r). The `forces` (c k, r) are those of
+    unit pressure of the c components of the `load` at the surface `points` (k, 3) in metre. On a
+    support that moves, coordinates are relative to the support, and `inertia` (r,) is the inertial
+    force per acceleration.
 
-    `probes` (p, 2) in metre read the quantity of `reading`: its components at rest are `read`
-    (p c, r) of the coordinates, `sag` (p c,) under gravity, and `carried` (p c,) of a translation
-    by 1 m of the support; `solids`, if any, are the materials of the probes. `effort` is the cost
-    of the offline stage.
+    The `probes` (p, 2) in metre read the quantity of `reading`. Its components at rest are `read`
+    (p c, r) of the coordinates, `sag` (p c,) under gravity, and `translation` (p c,) for 1 m of
+    support motion. The materials of the probes are `solids`, if the quantity depends on them. The
+    `effort` is that of the offline stage.
     """
 
     poles: fem.Poles
@@ -97,18 +81,19 @@ class ReducedBody:
     probes: Floats
     read: Floats
     sag: Floats | float = 0.0
-    carried: Floats | float = 0.0
+    translation: Floats | float = 0.0
     reading: Reading = SURFACE
     solids: tuple[Material, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReducedResponse:
-    """Response from rest, in reduced coordinates or, in metre, at outputs of them.
+    """Response from rest, in reduced coordinates or in metre at outputs.
 
-    Steady state: complex `lines` (f, q) at `frequencies` (f,) in Hz; free vibration of the start:
-    complex `start` (m, q) at `poles` (m,) in 1/s. The relative error of the energy balance is
-    `imbalance`, and `radiated` the share of the losses that absorbing boundaries took.
+    The steady state has complex `lines` (f, q) at `frequencies` (f,) in Hz, and the free vibration
+    of the start complex amplitudes `start` (m, q) at `poles` (m,) in 1/s. `imbalance` is the
+    relative error of the energy balance, and `radiated` the share of absorbing boundaries in the
+    losses.
     """
 
     frequencies: Floats
@@ -132,37 +117,36 @@ def prepare(
     load: Load = PRESSURE,
     discretise: Discretise | None = None,
 ) -> ReducedBody:
-    """Offline stage: mesh, assemble, factorise and reduce a body, once for all Tactons and, by the
-    cache, once per machine.
+    """Mesh, assemble, factorise and reduce a body, once for all Tactons and, by the cache, once per
+    machine.
 
-    If all probes (p, 2) in metre lie on a symmetry plane of the body, one half of it is modelled.
-    `progress`, `h` and `solver` are as for `simulate`; `tolerance` is the relative error of the
-    reduction; `symmetry` and `discretise` are as in `bodies.build.build`, of the load of all
-    Tactons, and only for normal motion under a pressure.
+    If all probes (p, 2) in metre lie on a symmetry plane of the body, one half is modelled.
+    `progress`, `h` and `solver` are as in `SolveOptions`; `tolerance` is the relative error of the
+    reduction; `symmetry`, the axes across which all loads are symmetric, applies to normal motion
+    under a pressure, and `discretise` replaces the mesh of the body's kind.
     """
     clock, report = Clock(), progress or silent
     body = relaxing(body, SERIES_ERROR * tolerance)
-    symmetry = modelled_axes(body, probes, symmetry, reading, load)
+    symmetry = meshed.modelled_axes(body, probes, symmetry, reading, load)
     report("mesh", 0.0)
-    build = meshed(body, h, clock, silent, symmetry, discretise)
-    outputs, solids = probe_rows(body, build, images(probes, symmetry), reading)
+    build = meshed.mesh_body(body, h, clock, silent, symmetry, discretise)
+    outputs, solids = meshed.probe_rows(body, build, meshed.images(probes, symmetry), reading)
     own = None if reading.is_plain else outputs
     name = entry_name(body, build, probes, solver, tolerance, outputs=own, load=load)
     with clock("read from cache"):
-        found = cached_record(name)
-    if found is None:
-        with one_thread():  # a second one gains a tenth of the time, and rounds otherwise
-            found = _prepared_anew(
-                body, build, probes, outputs, clock, report, solver, tolerance, load
-            )
-        store_record(name, found, found.poles.values, found.read)
-    # Others may make the same mesh by another size.
-    effort = spent(found.effort, clock, build, h or default_size(body))
-    return replace(found, reading=reading, solids=solids, load=load, effort=effort)
+        reduced = cached_record(name)
+    if reduced is None:
+        with one_thread():  # a second thread saves a tenth of the time, and rounds differently
+            reduced = _prepare(body, build, outputs, clock, report, solver, tolerance, load)
+        reduced = replace(reduced, probes=probes)
+        store_record(name, reduced, reduced.poles.values, reduced.read)
+    # Another size may have made the same mesh.
+    effort = meshed.with_cost(reduced.effort, clock, build, h or default_size(body))
+    return replace(reduced, reading=reading, solids=solids, load=load, effort=effort)
 
 
 def cached_record(name: str) -> Any:
-    """A record that is cached under a name; None on a cache miss."""
+    """Return the record that is cached under a name, or None."""
     entry = cache.load(name)
     return pickle.loads(entry["record"].tobytes()) if entry else None
 
@@ -183,54 +167,46 @@ def entry_name(
     outputs: sparse.csr_array | None,
     load: Load = PRESSURE,
 ) -> str:
-    """Cache key of everything that a reduced body depends on, with the `outputs` (p c, 3 n) of its
-    probes, None if these are normal motion at the surface.
+    """Return the cache key of everything that a reduced body depends on; `outputs` (p c, 3 n) are
+    None for normal motion at the surface.
     """
     mesh = build.mesh
-    # A file may call other facets of the same mesh its top, or fix others.
-    named = [mesh.facets[facets] for facets in ("top", *build.fixed)]
-    rests = tuple(vars(build.support).values()) if build.support else ()
-    used = fem.available()[0] if solver == "auto" else solver
-    # Of its motion a reduced body depends on the direction alone.
-    way = load.support_motion.unit if load.support_motion else ()
+    # A file may name other facets of the same mesh as its top, or fix others.
+    facets = [mesh.facets[name] for name in ("top", *build.fixed)]
+    support = tuple(vars(build.support).values()) if build.support else ()
+    # Of the support motion a reduced body depends on the direction alone.
+    direction = load.support_motion.unit if load.support_motion else ()
     read = () if outputs is None else (outputs.data, outputs.indices, outputs.indptr)
     return cache.key(
-        FORMAT, *Effort.__dataclass_fields__, body, mesh.points, mesh.tets, mesh.region, *named,
-        build.material, build.symmetry,
-        build.fixed, build.absorbing, build.coat, build.drag, build.held, build.tension,
-        *rests, probes, BAND, tolerance, used,
-        versions(), *read, replace(load, support_motion=None), way,
+        FORMAT, *Effort.__dataclass_fields__, body, mesh.points, mesh.tets, mesh.region, *facets,
+        build.material, build.symmetry, build.fixed, build.absorbing, build.coat, build.drag,
+        build.held, build.tension, *support, probes, BAND, tolerance, solver_name(solver),
+        versions(), *read, replace(load, support_motion=None), direction,
     )  # fmt: skip
 
 
-def _prepared_anew(
-    body: Body,
-    build: Build,
-    probes: Floats,
-    outputs: sparse.csr_array,
-    clock: Clock,
-    report: Progress,
-    solver: str,
-    tolerance: float,
-    load: Load,
-) -> ReducedBody:
-    operators = assembled(build, clock, report)
+def _prepare(
+    body: Body, build: Build, outputs: sparse.csr_array, clock: Clock, report: Progress,
+    solver: str, tolerance: float, load: Load,
+) -> ReducedBody:  # fmt: skip
+    operators = meshed.assemble(build, clock, report)
     with clock("factorise and reduce"):
         report("factorise", 0.0)
-        P, points = even_part(*surface_load(build, load), build.symmetry)
-        still = sag(build, operators, outputs, load, solver)
+        P, points = meshed.even_part(*meshed.surface_load(build, load), build.symmetry)
+        still = meshed.sag(build, operators, outputs, load, solver)
         motion = load.support_motion
         reduced, _ = reduce_body(
             body, build, operators, outputs, tolerance, surface=(P, points),
-            loads=spread(P, typical_spots(body, points)),
-            inertia=inertia(build, motion.unit) if motion else None, solver=solver, report=report,
+            loads=meshed.spread(P, typical_spots(body, points)),
+            inertia=meshed.inertia(build, motion.unit) if motion else None, solver=solver,
+            report=report,
         )  # fmt: skip
-    carried = outputs @ translation(build, motion.unit if motion else (0.0, 0.0, 0.0))
-    return replace(reduced, probes=probes, sag=still, carried=carried)
+    moved = outputs @ meshed.translation(build, motion.unit if motion else (0.0, 0.0, 0.0))
+    return replace(reduced, sag=still, translation=moved)
 
 
 def typical_spots(body: Body, points: Floats) -> Floats:
-    """Unit Gaussian focal spots (n, 12) where palm-sized paths run, to estimate errors with."""
+    """Return unit Gaussian spots (n, 12) where palm-sized paths run, to estimate errors with."""
     reach = min(20e-3, body.width / 3, body.height / 3)
     centres = np.random.default_rng(0).uniform(-reach, reach, (12, 2))
     squared = ((points[:, None, :2] - centres) ** 2).sum(axis=2)
@@ -250,14 +226,14 @@ def reduce_body(
     solver: str = "auto",
     report: Progress = silent,
 ) -> tuple[ReducedBody, fem.ReducedModel]:
-    """Reduced body of a mesh and its operators, and its fem.ReducedModel with the basis.
+    """Return the reduced body of a mesh and its operators, and its fem.ReducedModel with the basis.
 
-    `outputs`, `loads`, `tolerance` and `solver` are as of `fem.reduce`; `surface` is the load
+    `outputs`, `loads`, `tolerance` and `solver` are as in `fem.reduce`; `surface` is the load
     operator (3 n, c k) with its points (k, 3), of `surface_load` or a part of them; `inertia`
     (3 n,) the nodal forces per acceleration of a support that moves.
     """
     P, points = surface
-    if inertia is not None and loads is not None:  # which counts as much as all others
+    if inertia is not None and loads is not None:  # with the same weight as all others
         size = np.linalg.norm(loads) / np.linalg.norm(inertia)
         loads = np.column_stack([loads, size * inertia])
     model = fem.reduce(
@@ -265,41 +241,41 @@ def reduce_body(
         solver=solver, progress=partial(report, "reduce"),
     )  # fmt: skip
     P = P.tocsr()
-    pushed = np.flatnonzero(np.diff(P.indptr))  # a few of all dofs
+    loaded = np.flatnonzero(np.diff(P.indptr))  # a few of all dofs
     effort = Effort(
         dofs=len(operators.free), reduced_dofs=model.basis.shape[1], solver=model.solver,
         factorisations=1, estimate=model.estimate,
     )  # fmt: skip
     reduced = reduced_of(
-        model.operators, P[pushed].T @ model.basis[pushed], points, effort, read=model.outputs
+        model.operators, P[loaded].T @ model.basis[loaded], points, effort, read=model.outputs
     )
     still = np.zeros(model.basis.shape[1])
     return replace(reduced, inertia=still if inertia is None else inertia @ model.basis), model
 
 
 def reduced_of(
-    operators: fem.Operators, forces: Floats, points: Floats, effort: Effort, **known: Any
+    operators: fem.Operators, forces: Floats, points: Floats, effort: Effort, **fields: Any
 ) -> ReducedBody:
-    """Reduced body of projected operators (r, r), in coordinates of any mass matrix, with reduced
-    `forces` (k, r) of unit pressure at points (k, 3) in metre, and what is `known` of its probes.
+    """Return the reduced body of projected operators (r, r), with reduced `forces` (k, r) of unit
+    pressure at points (k, 3) in metre, and other `fields`.
     """
     return ReducedBody(
         poles=fem.poles(operators), damping=operators.C, radiation=operators.R,
         branches=with_internal(operators.branches), forces=forces, points=points, effort=effort,
-        **{"probes": np.zeros((0, 2)), "read": np.zeros((0, forces.shape[1]))} | known,
+        **{"probes": np.zeros((0, 2)), "read": np.zeros((0, forces.shape[1]))} | fields,
     )  # fmt: skip
 
 
 def reduced_forces(reduced: ReducedBody, *pressures: MovingPressure) -> tuple[Floats, fem.Complex]:
-    """Distinct frequencies (f,) in Hz and reduced forces (f, r) of the components of a load."""
+    """Return distinct frequencies (f,) in Hz and reduced forces (f, r) of a load."""
     parts = np.split(reduced.forces, len(pressures))
     each = [
         reduced_lines(pressure, reduced.points, part)
         for pressure, part in zip(pressures, parts, strict=True)
     ]
     if motion := reduced.load.support_motion:
-        against = -motion.acceleration * np.asarray(reduced.inertia)
-        each.append((np.array([motion.frequency]), against[None]))
+        inertial = -motion.acceleration * np.asarray(reduced.inertia)
+        each.append((np.array([motion.frequency]), inertial[None]))
     if len(each) == 1:
         return each[0]
     frequencies, forces = zip(*each, strict=True)
@@ -309,17 +285,17 @@ def reduced_forces(reduced: ReducedBody, *pressures: MovingPressure) -> tuple[Fl
 def respond(
     reduced: ReducedBody, *pressures: MovingPressure, highest: float = np.inf
 ) -> ReducedResponse:
-    """Response of a reduced body to the components of a moving load, of lines below the `highest`
-    in Hz, in its coordinates. Raises `fem.Diverged` if its energy balance is violated.
+    """Return the response of a reduced body, in its coordinates, to the components of a moving load
+    with lines below the `highest` in Hz. Raises `fem.Diverged` if it violates the energy balance.
     """
     frequencies, forces = reduced_forces(reduced, *pressures)
     frequencies, forces = frequencies[frequencies < highest], forces[frequencies < highest]
     lines, start = line_response(reduced.poles, forces, frequencies)
-    if motion := reduced.load.support_motion:  # which the body at rest is struck by
+    if motion := reduced.load.support_motion:  # the support moves at once, with the body at rest
         start += impulse_response(reduced.poles, -motion.speed * np.asarray(reduced.inertia))
     damping = reduced.damping, reduced.radiation
     power = mean_power(*damping, forces, lines, frequencies, reduced.branches)
-    imbalance, radiated = energy_balance(power)
+    imbalance, radiated = meshed.energy_balance(power)
     return ReducedResponse(
         frequencies=frequencies, lines=lines, poles=reduced.poles.values, start=start,
         imbalance=imbalance, radiated=radiated,
@@ -333,97 +309,96 @@ def answer(
     *,
     times: Floats | None = None,
 ) -> Response:
-    """Response of a reduced body of a scene's probes to its Tacton from rest, as the steady state
-    of every line of the load and the free vibration of its start.
-
-    The times (t,) in s are equally spaced from 0; `sample_times` if not given. Raises
-    `fem.Diverged` if the energy balance is violated.
+    """Return the response of a reduced body to the scene's Tacton from rest, at times (t,) in s
+    equally spaced from 0, by default `sample_times`. Raises `fem.Diverged` if it violates the
+    energy balance.
     """
     if scene.load.moving != reduced.load.moving:
         raise ValueError(
-            f"the body is reduced for {reduced.load.words}, not {scene.load.words}; reduce it for"
-            " the load of the scene"
+            f"the body is reduced for {reduced.load.words}, not for {scene.load.words}; reduce it "
+            "for the load of the scene"
         )
-    clock, asked = Clock(), reduced.reading.record
+    clock, quantity = Clock(), reduced.reading.record
     times = sample_times(scene) if times is None else times
     if progress:
         progress("lines", 0.0)
     with clock("lines"):
         highest = highest_driving(scene.pressure, times)
         motion = components(reduced, *scene.loads, highest=highest)
-        # Lines are not weighed against the mean: that of an unconstrained body has no bound.
-        strength, mean = np.abs(motion.lines).max(axis=1), motion.frequencies == 0
-        heard = mean | (strength > NEGLIGIBLE_LINE * strength[~mean].max(initial=0.0))
-        heard &= below_half_the_rate(motion.frequencies, times)
-        moving = from_rest(select_lines(motion, heard), times)
-        waveforms = with_sag(moving, reduced.sag, asked)
+        # The mean of an unconstrained body has no bound, so that lines are not compared with it.
+        strength, is_mean = np.abs(motion.lines).max(axis=1), motion.frequencies == 0
+        strongest = strength[~is_mean].max(initial=0.0)
+        chosen = is_mean | (strength > NEGLIGIBLE_LINE_RATIO * strongest)
+        chosen &= below_half_the_rate(motion.frequencies, times)
+        moving = from_rest(select_lines(motion, chosen), times)
+        waveforms = meshed.with_sag(moving, reduced.sag, quantity)
     effort = replace(
         reduced.effort,
         seconds={**reduced.effort.seconds, **clock.seconds},
-        steps=int(heard.sum()),
+        steps=int(chosen.sum()),
         energy_imbalance=motion.imbalance,
         radiated=motion.radiated,
         peak_memory=peak_memory(),
     )
     return Response(
-        model="fem", times=times, probes=reduced.probes, quantity=asked.name,
-        values=asked.waveforms(waveforms, len(reduced.probes)), effort=effort,
+        model="fem", times=times, probes=reduced.probes, quantity=quantity.name,
+        values=quantity.waveforms(waveforms, len(reduced.probes)), effort=effort,
     )  # fmt: skip
 
 
 def steady_waveforms(reduced: ReducedBody, scene: Scene, times: Floats) -> Floats:
-    """Waveforms (t, p) in the steady state, as of fem-harmonic, at times (t,) in s."""
-    motion, asked = components(reduced, *scene.loads), reduced.reading.record
-    # Under its mean an unconstrained body has no steady state.
-    heard = below_half_the_rate(motion.frequencies, times)
-    heard &= scene.body.is_held | (motion.frequencies > 0)
-    moving = synthesise(motion.frequencies[heard], motion.lines[heard], times)
-    return asked.waveforms(with_sag(moving, reduced.sag, asked), len(reduced.probes))
+    """Return waveforms (t, p) in the steady state, as of fem-harmonic, at times (t,) in s."""
+    motion, quantity = components(reduced, *scene.loads), reduced.reading.record
+    # Under the mean an unconstrained body has no steady state.
+    chosen = below_half_the_rate(motion.frequencies, times)
+    chosen &= scene.body.is_held | (motion.frequencies > 0)
+    moving = synthesise(motion.frequencies[chosen], motion.lines[chosen], times)
+    return quantity.waveforms(meshed.with_sag(moving, reduced.sag, quantity), len(reduced.probes))
 
 
 def components(
     reduced: ReducedBody, *pressures: MovingPressure, highest: float = np.inf
 ) -> ReducedResponse:
-    """Response of the quantity's components that the probes read, up to a `highest` line."""
+    """Return the response of the quantity's components at the probes, up to a `highest` line."""
     motion = read_at(respond(reduced, *pressures, highest=highest), reduced.read)
-    if moved := reduced.load.support_motion:
-        frequencies = np.append(motion.frequencies, moved.frequency)
-        lines = np.vstack([motion.lines, moved.line * np.asarray(reduced.carried)])
+    if support := reduced.load.support_motion:
+        frequencies = np.append(motion.frequencies, support.frequency)
+        lines = np.vstack([motion.lines, support.line * np.asarray(reduced.translation)])
         frequencies, lines = merge_lines(frequencies, lines)
         motion = replace(motion, frequencies=frequencies, lines=lines)
     return in_motion(motion, reduced.reading.record, reduced.solids)
 
 
 def in_motion(
-    rest: ReducedResponse, asked: Quantity, solids: tuple[Material, ...]
+    rest: ReducedResponse, quantity: Quantity, solids: tuple[Material, ...]
 ) -> ReducedResponse:
-    """Components of a quantity with rates and relaxing stress, of those at rest."""
-    if not (asked.rate or asked.relaxes):
+    """Return the components of a quantity, with rates and relaxing stress, from those at rest."""
+    if not (quantity.rate or quantity.relaxes):
         return rest
     s, outputs = 2j * np.pi * rest.frequencies, rest.lines.shape[1]
     return replace(
         rest,
-        lines=rest.lines * line_factor(asked, s, solids, outputs),
-        start=rest.start * line_factor(asked, rest.poles, solids, outputs),
+        lines=rest.lines * meshed.line_factor(quantity, s, solids, outputs),
+        start=rest.start * meshed.line_factor(quantity, rest.poles, solids, outputs),
     )
 
 
 def read_at(motion: ReducedResponse, outputs: Floats) -> ReducedResponse:
-    """Response at outputs (p, r) of the reduced coordinates."""
+    """Return the response at outputs (p, r) of the reduced coordinates."""
     return replace(motion, lines=motion.lines @ outputs.T, start=motion.start @ outputs.T)
 
 
 def select_lines(motion: ReducedResponse, chosen: Bools) -> ReducedResponse:
-    """Response with some of the lines alone, those (f,) that are chosen."""
+    """Return the response with the chosen lines (f,) only."""
     return replace(motion, frequencies=motion.frequencies[chosen], lines=motion.lines[chosen])
 
 
 def oscillating(motion: ReducedResponse) -> ReducedResponse:
-    """Response without the mean."""
+    """Return the response without the mean."""
     return select_lines(motion, motion.frequencies > 0)
 
 
 def from_rest(motion: ReducedResponse, times: Floats) -> Floats:
-    """Displacement or coordinates (t, q) after a start from rest at times (t,) in s."""
+    """Return the displacement or coordinates (t, q) from rest at times (t,) in s."""
     rates = np.concatenate([2j * np.pi * motion.frequencies, motion.poles])
     return exponential_sum(rates, np.vstack([motion.lines, motion.start]), times)

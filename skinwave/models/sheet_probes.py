@@ -1,7 +1,7 @@
 """Quantities at the probes of a thin sheet, from the middle plane of its mesh.
 
-Stress is that of Piola and Kirchhoff, the second, of the strain of Green and Lagrange: along the
-axes of the sheet, which turn with it, and at strains as small as those of paper Cauchy's there.
+Strain is that of Green and Lagrange, and stress the second of Piola and Kirchhoff, along the axes
+of the sheet, which rotate with it. At the small strains of paper it equals Cauchy's stress there.
 """
 
 from collections.abc import Callable
@@ -35,31 +35,33 @@ Reader = Callable[[Floats], Floats]  # displacement or coordinates -> components
 def sheet_rows(
     body: Body, build: Build, probes: Floats, reading: Reading
 ) -> tuple[sparse.csr_array, tuple[Material, ...]]:
-    """Rows (p c, 3 n) of `probe_rows` for a sheet, but for its normal motion."""
-    seen, asked = _seen(body, build, probes), reading.record
+    """Return the rows (p c, 3 n) of `probe_rows` for quantities of a sheet other than its normal
+    motion.
+    """
+    points, quantity = _points(body, build, probes), reading.record
     below = np.broadcast_to(reading.depths or 0.0, len(probes))
     heights, solid = body.depth / 2 - below, body.solid.without_loss_factor()
-    linear = displacement_rows(seen, heights)
-    if asked.field == STRAIN:
-        linear = strain_rows(seen, heights, solid.poisson)
-    rows = sparse.kron(sparse.eye_array(len(probes)), asked.rows(solid), format="csr")
+    linear = displacement_rows(points, heights)
+    if quantity.field == STRAIN:
+        linear = strain_rows(points, heights, solid.poisson)
+    rows = sparse.kron(sparse.eye_array(len(probes)), quantity.rows(solid), format="csr")
     return (rows @ linear).tocsr(), (solid,) * len(probes)
 
 
 def full_reader(body: Body, build: Build, probes: Floats, reading: Reading) -> Reader:
-    """Function of the displacement (3 n,) of a sheet to components (p c,)."""
+    """Return the function of the displacement (3 n,) of a sheet to components (p c,)."""
     if reading.record.is_normal:
         normal = fem.probe_operator(build.mesh, probes)
         return lambda u: normal @ u
-    (rows, _), seen = sheet_rows(body, build, probes, reading), _seen(body, build, probes)
-    moved, strained = in_plane_rows(seen)
+    (rows, _), points = sheet_rows(body, build, probes, reading), _points(body, build, probes)
+    displacement, strain = in_plane_rows(points)
     own = reading.record.rows(body.solid)
     if reading.record.field != STRAIN:
-        return lambda u: rows @ u + ((moved @ u).reshape(-1, 2) @ own[:, :2].T).ravel()
+        return lambda u: rows @ u + ((displacement @ u).reshape(-1, 2) @ own[:, :2].T).ravel()
     plane = own @ from_plane(body.solid.poisson)
 
     def read(u: Floats) -> Floats:
-        stretched = (strained @ u).reshape(-1, 3) + quadratic_strain_at(seen, u)
+        stretched = (strain @ u).reshape(-1, 3) + quadratic_strain_at(points, u)
         return np.asarray(rows @ u + (stretched @ plane.T).ravel())
 
     return read
@@ -74,27 +76,27 @@ def modal_reader(
     reading: Reading,
     solver: str,
 ) -> Reader:
-    """Function of the coordinates (r,) of bending modes to components (p c,)."""
-    asked = reading.record
-    if asked.is_normal:
+    """Return the function of the coordinates (r,) of bending modes to components (p c,)."""
+    quantity = reading.record
+    if quantity.is_normal:
         normal = fem.probe_operator(build.mesh, probes) @ modes.basis
         return lambda z: normal @ z
-    (rows, _), seen = sheet_rows(body, build, probes, reading), _seen(body, build, probes)
-    moved, strained = in_plane_rows(seen)
-    by_strain = asked.field == STRAIN
+    (rows, _), points = sheet_rows(body, build, probes, reading), _points(body, build, probes)
+    displacement, strain = in_plane_rows(points)
+    by_strain = quantity.field == STRAIN
     Q = in_plane_matrices(
-        seen, modes.basis, strained if by_strain else moved, operators, solver=solver
+        points, modes.basis, strain if by_strain else displacement, operators, solver=solver
     ).reshape(len(probes), 3 if by_strain else 2, *(2 * modes.basis.shape[1:]))
-    own = asked.rows(body.solid)[:, :2]
+    own = quantity.rows(body.solid)[:, :2]
     if by_strain:
-        Q = Q + modal_quadratic_strain(seen, modes.basis)
-        own = asked.rows(body.solid) @ from_plane(body.solid.poisson)
+        Q = Q + modal_quadratic_strain(points, modes.basis)
+        own = quantity.rows(body.solid) @ from_plane(body.solid.poisson)
     linear = rows @ modes.basis
     Q = np.einsum("ca,pamn->pcmn", own, Q).reshape(-1, *Q.shape[2:])
     return lambda z: linear @ z + (Q @ z) @ z / 2
 
 
-def _seen(body: Body, build: Build, probes: Floats) -> SheetReading:
+def _points(body: Body, build: Build, probes: Floats) -> SheetReading:
     membrane = fem.Membrane(
         triangles=middle_plane(build.mesh), thickness=body.depth, material=body.solid
     )

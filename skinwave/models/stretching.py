@@ -1,15 +1,14 @@
 """Nonlinear models of a sheet at large deflection, from rest.
 
-A sheet is meshed as in the linear models, by an equivalent solid some ten times too thick with the
-bending stiffness and mass of the true one. The membrane stiffness of so thick a solid is too small
-by the factor d^2 / h^2, and a membrane in its middle plane adds what is missing: bending stiffness,
-mass and membrane stiffness are all those of the true sheet, and no element is flat.
+The sheet is meshed as in the linear models: an equivalent solid, some ten times as thick, has the
+bending stiffness and mass of the true sheet. Its membrane stiffness is too small by the factor
+d^2 / h^2, and a membrane in the middle plane adds the difference. Bending stiffness, mass and
+membrane stiffness are then those of the true sheet, and no element is flat.
 
 Time steps make an error that grows with frequency. In modes, the linear part of the motion is known
-exactly: the same steps of the linear part are replaced by it, so that steps affect only what
-stretching changes. What remains is measured with each answer, in the quantity of the scene:
-the linear part differs from that of a thin plate in its own modes by the error of elements and of
-the modes that are left out.
+exactly and replaces that of the time steps, so that steps affect only the effect of stretching. The
+remaining error is measured with each response, in the quantity of the scene. The error of elements
+and of neglected modes is the difference of the linear part from that of a thin plate in its modes.
 """
 
 from collections.abc import Callable, Iterator
@@ -31,33 +30,15 @@ from simple_model.load.spectrum import load_lines
 from simple_model.quantities import ACCELERATION, DISPLACEMENT, VELOCITY, Quantity
 from skinwave.bodies.build import Build, build
 from skinwave.bodies.sheet import air, bending_wavenumber, discretise
-from skinwave.models import Limit, Model, register
+from skinwave.models import Limit, Model, limits, linear_elements, reduced, register
 from skinwave.models.laws import has_own_law
-from skinwave.models.limits import beyond, load_limit, of_air_in_a_frame, of_held_sheet, of_vacuum
-from skinwave.models.linear_elements import (
-    NEWMARK,
-    TRANSIENT_RATE,
-    in_time,
-    marched,
-    of_mesh,
-    sampled_components,
-    step_count,
-)
-from skinwave.models.meshed import load_in_steps, spent, surface_load
-from skinwave.models.options import SolveOptions
+from skinwave.models.linear_elements import NEWMARK, TRANSIENT_RATE
+from skinwave.models.meshed import load_in_steps, surface_load, with_cost
+from skinwave.models.options import SolveOptions, response_of, solver_name
 from skinwave.models.plate_modes import ERROR as PLATE_ERROR
-from skinwave.models.plate_modes import FROM_REST, relative
-from skinwave.models.reduced import (
-    ReducedBody,
-    ReducedResponse,
-    from_rest,
-    in_motion,
-    read_at,
-    reduced_forces,
-    reduced_of,
-    respond,
-    select_lines,
-)
+from skinwave.models.plate_modes import FROM_REST
+from skinwave.models.reduced import ReducedBody, ReducedResponse
+from skinwave.models.relative_change import relative_changes
 from skinwave.models.sheet_probes import full_reader, modal_reader
 from skinwave.scene.scene import Body, Scene
 from skinwave.system.effort import Clock
@@ -68,7 +49,7 @@ NEWTON = (
     "Wiley, 2000"
 )
 # Thickness of the mesh over an element's side: the shear of so thick a sheet lowers frequencies by
-# as much as elements of this side raise them. At 7 elements a wavelength 0.3 % are left of 5 %.
+# as much as elements of this side raise them. With 7 elements a wavelength, 0.3 % of 5 % remain.
 STOCKY, STOUTEST = 0.48, 0.05
 FULL_CELLS, REDUCED_CELLS = 26, 32  # along the shorter side
 COARSE_ERROR, ERROR_ORDER = 0.05, 3.0  # of a waveform with FULL_CELLS; measured order 3.2
@@ -79,23 +60,23 @@ MOST_LINES = 500  # of a load that are summed in each step
 
 
 def stretching_size(body: Body, *, reduced: bool) -> float:
-    """Default element size of a sheet at large deflection, metre."""
+    """Return the default element size in metre of a sheet at large deflection."""
     return min(body.width, body.height) / (REDUCED_CELLS if reduced else FULL_CELLS)
 
 
 def expected_error(body: Body, h: float) -> float:
-    """Relative error of a waveform with elements of h in metre, as measured on a sheet of paper."""
+    """Return the error of a waveform with elements of h in metre, as measured on a paper sheet."""
     return min(1.0, COARSE_ERROR * (h * FULL_CELLS / min(body.width, body.height)) ** ERROR_ORDER)
 
 
 def meshed_sheet(body: Body, h: float) -> Build:
-    """Mesh of the equivalent sheet in cells of h in metre, with a thickness to match."""
+    """Return the mesh of the equivalent sheet in cells of h in metre, with a thickness to match."""
     thickness = min(STOCKY * h, STOUTEST * min(body.width, body.height))
     return build(body, h, discretise=partial(discretise, thickness=thickness))
 
 
 def membrane(body: Body, made: Build, share: float | None = None) -> fem.Membrane:
-    """Membrane with the stiffness that a meshed sheet lacks, or a share of its whole stiffness."""
+    """Return a membrane with a share of the sheet's stiffness, by default what the mesh lacks."""
     ratio = body.depth / float(np.ptp(made.mesh.points[:, 2]))
     share = 1 - ratio**2 if share is None else share
     triangles = middle_plane(made.mesh)
@@ -103,7 +84,7 @@ def membrane(body: Body, made: Build, share: float | None = None) -> fem.Membran
 
 
 def stretching_body(body: Body, made: Build) -> fem.Elastic:
-    """Full-order model of the meshed sheet at large displacement."""
+    """Return the full-order model of the meshed sheet at large displacement."""
     missing = membrane(body, made)
     return fem.finite_strain(
         made.mesh,
@@ -115,7 +96,7 @@ def stretching_body(body: Body, made: Build) -> fem.Elastic:
 
 
 def full_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
-    """Direct time integration of all dofs, from rest."""
+    """Integrate all degrees of freedom in time, from rest."""
     clock, size = Clock(), options.h or stretching_size(scene.body, reduced=False)
     with clock("assemble"):
         options.progress("assemble", 0.0)
@@ -124,19 +105,20 @@ def full_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     P, points = surface_load(made)
     dt = options.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
     load = load_in_steps((scene.pressure,), points, times, dt)
-    march = _march(
+    stepped, straight, effort = _march(
         body, lambda t: P @ load(t), dt, times, options, clock,
         read=full_reader(scene.body, made, scene.probe_points, scene.reading),
         rows=fem.probe_operator(made.mesh, scene.probe_points),
     )  # fmt: skip
-    values = in_time(march.steps, dt, times, scene, (scene.body.solid,) * len(scene.probes))
-    plain = _normal(scene)
-    linear = in_time(march.linear, dt, times, plain)
-    return _response(
-        "fem-nonlinear-transient", scene, times, clock, made, size,
-        values=values, error=_plate_error(plain, times, options, linear, size),
-        effort=replace(march.effort, dofs=len(body.operators.free)),
-    )  # fmt: skip
+    values = linear_elements.in_time(
+        stepped, dt, times, scene, (scene.body.solid,) * len(scene.probes)
+    )
+    normal = _normal_scene(scene)
+    error = _plate_error(
+        normal, times, options, linear_elements.in_time(straight, dt, times, normal), size
+    )
+    effort = with_cost(replace(effort, dofs=len(body.operators.free)), clock, made, size)
+    return response_of(scene, "fem-nonlinear-transient", times, values, effort, error)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -150,9 +132,9 @@ class _Reduced:
 
 
 def reduced_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
-    """Time integration of the sheet's bending modes, from rest, with an exact linear part."""
+    """Integrate the bending modes of the sheet in time, from rest, with an exact linear part."""
     clock, size = Clock(), options.h or stretching_size(scene.body, reduced=True)
-    asked, probes = scene.reading.record, scene.probe_points
+    quantity, probes = scene.reading.record, scene.probe_points
     with clock("reduce"):
         options.progress("reduce", 0.0)
         sheet = _reduced(scene.body, size, options.solver)
@@ -162,46 +144,49 @@ def reduced_answer(scene: Scene, times: Floats, options: SolveOptions) -> Respon
         )  # fmt: skip
 
     each = np.eye(len(sheet.modes.hz))
-    rows = np.stack([(read(z) - read(-z)) / 2 for z in each], axis=1)  # the rest is quadratic
+    rows = np.stack([(read(z) - read(-z)) / 2 for z in each], axis=1)  # without the quadratic part
     dt = options.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
     force = _modal_force(scene, sheet.linear, times, dt)
-    march = _march(sheet.modes.elastic, force, dt, times, options, clock, read=read, rows=rows)
+    stepped, straight, effort = _march(
+        sheet.modes.elastic, force, dt, times, options, clock, read=read, rows=rows
+    )
     with clock("linear part"):
-        solids, plain = (scene.body.solid,) * len(scene.probes), _normal(scene)
+        solids, normal = (scene.body.solid,) * len(scene.probes), _normal_scene(scene)
         highest = highest_driving(scene.pressure, times)
-        motion = respond(sheet.linear, scene.pressure, highest=highest)
-        linear = _from_rest(motion, rows, times, asked, solids)
-        bent, stepped = (
-            sampled_components(steps, dt, times, asked, solids)
-            for steps in (march.steps - march.linear, march.linear)
+        motion = reduced.respond(sheet.linear, scene.pressure, highest=highest)
+        linear = _from_rest(motion, rows, times, quantity, solids)
+        stretching, straight = (
+            linear_elements.sampled_components(steps, dt, times, quantity, solids)
+            for steps in (stepped - straight, straight)
         )
-        values, exact, stepped = (
-            asked.waveforms(each, len(probes)) for each in (linear + bent, linear, stepped)
+        values, linear, straight = (
+            quantity.waveforms(each, len(probes))
+            for each in (linear + stretching, linear, straight)
         )
         shapes = fem.probe_operator(sheet.made.mesh, probes) @ sheet.modes.basis
-        elements = _plate_error(
-            plain, times, options, _from_rest(motion, shapes, times, plain.reading.record, ()), size
-        )
-    # Steps of the linear part are corrected: what they do to the rest is as small as it is.
-    share = np.minimum(relative(values - exact, values), 1)
-    error = elements + float((share * relative(stepped - exact, values)).max())
-    return _response(
-        "fem-nonlinear", scene, times, clock, sheet.made, size, values=values, error=error,
-        effort=replace(
-            march.effort, dofs=len(sheet.operators.free), reduced_dofs=len(sheet.modes.hz),
-            estimate=sheet.modes.left_out,
-        ),
+        normal_motion = _from_rest(motion, shapes, times, normal.reading.record, ())
+        elements = _plate_error(normal, times, options, normal_motion, size)
+    # The steps of the linear part are corrected; those of the rest err in proportion to the rest.
+    share = np.minimum(relative_changes(values - linear, values), 1)
+    error = elements + float((share * relative_changes(straight - linear, values)).max())
+    effort = replace(
+        effort, dofs=len(sheet.operators.free), reduced_dofs=len(sheet.modes.hz),
+        estimate=sheet.modes.left_out,
     )  # fmt: skip
+    effort = with_cost(effort, clock, sheet.made, size)
+    return response_of(scene, "fem-nonlinear", times, values, effort, error)
 
 
 def _modal_force(
     scene: Scene, linear: ReducedBody, times: Floats, dt: float
 ) -> Callable[[float], Floats]:
-    """Modal forces (r,) at a time in s, by lines or, of many, by the load itself."""
+    """Return the function of a time in s to modal forces (r,), by lines or, if these are many, by
+    the load itself.
+    """
     if len(load_lines(scene.pressure).frequencies) > MOST_LINES:
         load = load_in_steps((scene.pressure,), linear.points, times, dt)
         return lambda t: load(t) @ linear.forces
-    hz, forces = reduced_forces(linear, scene.pressure)
+    hz, forces = reduced.reduced_forces(linear, scene.pressure)
     below = below_half_the_rate(hz, times)
     hz, forces = hz[below], forces[below]
     return lambda t: (np.exp(2j * pi * hz * t) @ forces).real
@@ -211,13 +196,13 @@ def _from_rest(
     motion: ReducedResponse,
     rows: Floats,
     times: Floats,
-    asked: Quantity,
+    quantity: Quantity,
     solids: tuple[Material, ...],
 ) -> Floats:
-    """Components (t, p c) of the linear part of the motion, exact for its modes."""
-    components = in_motion(read_at(motion, rows), asked, solids)
+    """Return the components (t, p c) of the linear part of the motion, exact for its modes."""
+    components = reduced.in_motion(reduced.read_at(motion, rows), quantity, solids)
     below = below_half_the_rate(components.frequencies, times)
-    return from_rest(select_lines(components, below), times)
+    return reduced.from_rest(reduced.select_lines(components, below), times)
 
 
 @lru_cache(maxsize=1)
@@ -235,105 +220,84 @@ def _reduced(body: Body, h: float, solver: str) -> _Reduced:
         modal, K=modal.K.toarray(), C=modal.C.toarray(), M=modal.M.toarray(), R=modal.R.toarray(),
         branches=tuple(replace(each, K=each.K.toarray()) for each in modal.branches),
     )  # fmt: skip
-    linear = reduced_of(dense, P.T @ modes.basis, points, Effort(dofs=len(operators.free)))
+    linear = reduced.reduced_of(dense, P.T @ modes.basis, points, Effort(dofs=len(operators.free)))
     return _Reduced(made=made, modes=modes, linear=linear, operators=operators)
 
 
 def mode_count(body: Body) -> int:
-    """Number of modes below `HIGHEST_MODE`: area times k^2 / 4 pi (Weyl; Courant and Hilbert)."""
-    squared = bending_wavenumber(body, HIGHEST_MODE) ** 2
-    found = round(body.width * body.height * squared / 4 / pi)
-    return min(max(found, FEWEST_MODES), MOST_MODES)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _March:
-    """Components (n, p c) that probes read at all steps, those of the linear part alone by the same
-    steps, and the cost.
+    """Return the number of modes below `HIGHEST_MODE`: area times k^2 / 4 pi (Weyl; Courant and
+    Hilbert).
     """
-
-    steps: Floats
-    linear: Floats
-    effort: Effort
+    squared = bending_wavenumber(body, HIGHEST_MODE) ** 2
+    count = round(body.width * body.height * squared / 4 / pi)
+    return min(max(count, FEWEST_MODES), MOST_MODES)
 
 
 def _march(
     body: fem.Elastic, force: Callable[[float], Floats], dt: float, times: Floats,
     options: SolveOptions, clock: Clock, *, read: Callable[[Floats], Floats], rows: Any,
-) -> _March:  # fmt: skip
-    """Time integration from rest, and of the linear part, of which `rows` (p c, r) are read."""
-    solver, steps = options.solver, step_count(float(times[-1]), dt)
-    kept, linear = lru_cache(maxsize=2)(force), []
+) -> tuple[Floats, Floats, Effort]:  # fmt: skip
+    """Integrate in time from rest: components (n, p c) that are read at all steps, those of the
+    linear part in the same steps by `rows` (p c, r), and the effort.
+    """
+    solver, steps = options.solver, linear_elements.step_count(float(times[-1]), dt)
+    cached, straight = lru_cache(maxsize=2)(force), []
 
     def states() -> Iterator[fem.State]:
-        bent = nonlinear.dynamic(body, kept, dt, solver=solver)
-        straight = fem.transient(body.operators, kept, dt, solver=solver)
-        for state, other in zip(islice(bent, steps + 1), straight, strict=False):
-            linear.append(rows @ other.displacement)
+        bent = nonlinear.dynamic(body, cached, dt, solver=solver)
+        linear = fem.transient(body.operators, cached, dt, solver=solver)
+        for state, other in zip(islice(bent, steps + 1), linear, strict=False):
+            straight.append(rows @ other.displacement)
             yield state
 
     with clock("march"):
-        stepped, (imbalance, _) = marched(
-            fem.with_energy_balance(body, states(), kept), steps, read,
+        stepped, (imbalance, _) = linear_elements.march(
+            fem.with_energy_balance(body, states(), cached), steps, read,
             lambda state: fem.stored(body, state), options.progress,
         )  # fmt: skip
-    effort = Effort(
-        steps=steps, solver=fem.available()[0] if solver == "auto" else solver,
-        energy_imbalance=imbalance, dt=dt,
-    )  # fmt: skip
-    return _March(steps=stepped, linear=np.array(linear), effort=effort)
+    effort = Effort(steps=steps, solver=solver_name(solver), energy_imbalance=imbalance, dt=dt)
+    return stepped, np.array(straight), effort
 
 
-def _normal(scene: Scene) -> Scene:
-    """The scene with a normal motion whose error is no smaller than its quantity's."""
-    asked = scene.reading.record
-    rate = min(asked.rate + (not asked.is_normal), len(RATES) - 1)
+def _normal_scene(scene: Scene) -> Scene:
+    """Return the scene with a normal motion whose error is no smaller than its quantity's."""
+    quantity = scene.reading.record
+    rate = min(quantity.rate + (not quantity.is_normal), len(RATES) - 1)
     return replace(scene, quantity=RATES[rate].name, depth=0.0)
 
 
 def _plate_error(
-    plain: Scene, times: Floats, options: SolveOptions, linear: Floats, h: float
+    normal: Scene, times: Floats, options: SolveOptions, linear: Floats, h: float
 ) -> float:
-    """Relative error of a linear part (t, p) of the normal motion, by that of a thin plate."""
-    if beyond(FROM_REST, plain):
-        return expected_error(plain.body, h)
-    plate = FROM_REST.solve(plain, times, options).values
-    error = float(relative(linear - plate, plate).max())
-    return error + PLATE_ERROR
-
-
-def _response(
-    model: str, scene: Scene, times: Floats, clock: Clock, made: Build, h: float, *,
-    values: Floats, error: float, effort: Effort,
-) -> Response:  # fmt: skip
-    return Response(
-        model=model, times=times, probes=scene.probe_points, quantity=scene.quantity,
-        values=values, expected_error=error, effort=spent(effort, clock, made, h),
-    )  # fmt: skip
+    """Return the error of a linear part (t, p) of the normal motion, by that of a thin plate."""
+    if limits.beyond(FROM_REST, normal):
+        return expected_error(normal.body, h)
+    plate = FROM_REST.solve(normal, times, options).values
+    return float(relative_changes(linear - plate, plate).max()) + PLATE_ERROR
 
 
 def _limits(
-    of_air: Callable[[Body], Iterator[Limit]], size: Callable[[Body], float], scene: Scene
+    air_limits: Callable[[Body], Iterator[Limit]], size: Callable[[Body], float], scene: Scene
 ) -> Iterator[Limit]:
     body = scene.body
     if not body.of_kind.is_plate:
-        yield Limit(why=f"takes a sheet, not a {body.kind}")
+        yield Limit(why=f"needs a sheet, not a {body.kind}")
         return
-    yield from of_held_sheet(body)
-    yield from of_air(body)
-    yield from of_mesh(body, size(body))
+    yield from limits.held_sheet_limits(body)
+    yield from air_limits(body)
+    yield from linear_elements.mesh_limits(body, size(body))
     if not scene.load.is_plain:
-        yield load_limit(scene)
+        yield limits.load_limit(scene)
 
 
-REDUCED_SIZE, FULL_SIZE = (partial(stretching_size, reduced=which) for which in (True, False))
+REDUCED_SIZE, FULL_SIZE = (partial(stretching_size, reduced=reduced) for reduced in (True, False))
 REDUCED = register(
     Model(
         name="fem-nonlinear",
         method="large deflection, step by step from rest",
         words="a sheet that stretches as it bends, in its modes, from rest",
         solve=reduced_answer,
-        limits=partial(_limits, of_air_in_a_frame, REDUCED_SIZE),
+        limits=partial(_limits, limits.frame_air_limits, REDUCED_SIZE),
         error=lambda scene, h: expected_error(scene.body, h or 0.0),
         default_size=REDUCED_SIZE,
         sources=(NEWMARK, NEWTON),
@@ -347,7 +311,7 @@ FULL = register(
         name="fem-nonlinear-transient",
         words="a sheet that stretches as it bends, on 10-node tetrahedra, step by step",
         solve=full_answer,
-        limits=partial(_limits, of_vacuum, FULL_SIZE),
+        limits=partial(_limits, limits.vacuum_limits, FULL_SIZE),
         default_size=FULL_SIZE,
     )
 )

@@ -1,12 +1,12 @@
-"""Error budget of a response: its numerical error beside what the spread of materials and of the
-device leaves, all relative to the waveform of the worst probe.
+"""Error budget of a response: its numerical error, and the uncertainty from the spread of materials
+and of the device, all relative to the waveform of the worst probe.
 
-First order: a number is moved one standard deviation either way, the others stay; half of the
-difference of the waveforms counts, and those of independent numbers add as squares. In the steady
-state and about the mean: layers by wavenumber integrals, where a palm is taken as flat layers as
-deep as its middle, and a body that is tilted as one that lies flat; a held sheet by the modes of a
-linear plate. Resonances of a body from a file depend on its sides, and curled sheets have no such
-modes: there only the effect of the pressure is known.
+The propagation is of first order: each number moves by one standard deviation either way, half of
+the difference of the waveforms counts, and independent numbers add as squares. Waveforms are in the
+steady state, about the mean. Layers are solved by wavenumber integrals, with a palm as flat layers
+as deep as its middle and a tilted body as a flat one; a held sheet by the modes of a linear plate.
+A body from a file, whose resonances depend on its sides, and a curled sheet have no such solution:
+only the uncertainty from the pressure is known.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,8 +22,9 @@ from skinwave.bodies.analytic import flattened
 from skinwave.models.limits import takes
 from skinwave.models.plate_modes import MODES
 from skinwave.models.plate_modes import steady_lines as steady_lines_of_plate
+from skinwave.models.relative_change import relative_changes
+from skinwave.planning.record import PlanRow
 from skinwave.planning.refinement import CONTROLLER, element_sizes
-from skinwave.planning.rows import PlanRow
 from skinwave.scene.distributions import Spread
 from skinwave.scene.scene import Scene
 from skinwave.scene.spreads import PRESSURE, spreads_of
@@ -31,15 +32,15 @@ from skinwave.scene.variation import with_values
 from skinwave.typing import Complex, Floats
 
 SIGMA = (0.15865525393145707, 0.8413447460685429)  # quantiles a standard deviation either way
-FAINT = 1e-3  # of the load's strongest line: lines that no budget needs
-LEFT_OUT = ("placement.", "probes.")  # sections of numbers that flat layers know nothing of
-ENOUGH = 0.1  # of another error: a numerical one below it gains nothing
+LINE_THRESHOLD = 1e-3  # of the load's strongest line
+NOT_IN_LAYERS = ("placement.", "probes.")  # sections whose numbers do not affect flat layers
+ENOUGH = 0.1  # of the uncertainty: a smaller numerical error gains nothing
 
 
 @dataclass(frozen=True, kw_only=True)
 class ErrorBudget:
-    """Relative errors of the worst probe's waveform: `numerical`; by one standard deviation of the
-    numbers of `material` and of `device`; nan where it is not computed, 0 where no spread is known.
+    """Relative errors of the worst probe's waveform: `numerical`, and by one standard deviation of
+    the numbers of the `material` and of the `device`; nan if not computed, 0 if no spread is known.
     """
 
     numerical: float
@@ -48,7 +49,7 @@ class ErrorBudget:
 
     @property
     def words(self) -> str:
-        """The three in one sentence."""
+        """All three errors in one sentence."""
         return (
             f"Error of the worst probe's waveform: numerical {stated_error(self.numerical)}; one "
             f"standard deviation of the {self.spreads}"
@@ -56,16 +57,15 @@ class ErrorBudget:
 
     @property
     def spreads(self) -> str:
-        """The material's and the device's in a few words."""
-        known = {"material": self.material, "device": self.device}
+        """The uncertainties from the material and the device in a few words."""
         return ", ".join(
             f"{name} {_percent(value) if value else '(spread unknown)'}"
-            for name, value in known.items()
+            for name, value in (("material", self.material), ("device", self.device))
         )
 
     @property
     def largest(self) -> tuple[str, float]:
-        """The larger of the material's and the device's, if any is known; else none and 0."""
+        """Name and value of the larger uncertainty; "" and 0 if none is known."""
         known = {"material": self.material, "device": self.device}
         name = max(known, key=lambda each: known[each] if isfinite(known[each]) else -1.0)
         return (name, known[name]) if isfinite(known[name]) else ("", 0.0)
@@ -76,83 +76,85 @@ def _percent(value: float) -> str:
 
 
 def error_budget(scene: Scene, numerical: float = nan) -> ErrorBudget:
-    """Error budget at a scene's probes, of a response with a `numerical` relative error."""
+    """Return the error budget of a response with a `numerical` relative error."""
     spreads = spreads_of(scene)
-    of_body = tuple(s for s in spreads if s.part == "material")
-    others = tuple(s for s in spreads if s.part != "material")
+    of_material = [s for s in spreads if s.part == "material"]
+    of_device = [s for s in spreads if s.part != "material"]
     return ErrorBudget(
-        numerical=numerical, material=_part(scene, of_body), device=_part(scene, others)
-    )
+        numerical=numerical, material=_uncertainty(scene, of_material),
+        device=_uncertainty(scene, of_device),
+    )  # fmt: skip
 
 
-def _part(scene: Scene, spreads: Sequence[Spread]) -> float:
-    """Relative change of the worst probe's waveform by some numbers; nan if it is not computed."""
+def _uncertainty(scene: Scene, spreads: Sequence[Spread]) -> float:
+    """Return the uncertainty of the worst probe's waveform; nan if it is not computed."""
     changes: list[Floats] = []
     for spread in spreads:
         low, high = spread.distribution.quantile(spread.value, SIGMA)
         if spread.key == PRESSURE:
             changes.append(np.full(len(scene.probes), (high - low) / (2 * spread.value)))
-        elif (found := _change(scene, spread.key, (float(low), float(high)))) is not None:
-            changes.append(found)
+        elif (change := _change(scene, spread.key, (float(low), float(high)))) is not None:
+            changes.append(change)
         else:
             return nan
     return float(np.sqrt(np.sum(np.square(changes), axis=0)).max()) if changes else 0.0
 
 
 def _change(scene: Scene, key: str, ends: tuple[float, float]) -> Floats | None:
-    """Half the relative difference (p,) of the motion at both ends of a number, or None."""
+    """Return half the relative difference (p,) of the motion between both ends of a number, or
+    None.
+    """
     lines_of = _closed_form(scene)
-    if lines_of is None or (lines_of is _lines and key.startswith(LEFT_OUT)):
+    if lines_of is None or (lines_of is _lines_of_layers and key.startswith(NOT_IN_LAYERS)):
         return None
     try:
         lines = [lines_of(scene), *(lines_of(with_values(scene, {key: end})) for end in ends)]
-    except (ValueError, ArithmeticError):  # a number out of range, or next to no loss
+    except (ValueError, ArithmeticError):  # a number out of range, or almost no loss
         return None
     (f, centre), (f_low, low), (f_high, high) = lines
     if not (np.array_equal(f, f_low) and np.array_equal(f, f_high)):
         return None
-    size = np.linalg.norm(centre, axis=0)
-    return np.linalg.norm(high - low, axis=0) / 2 / np.where(size > 0, size, np.inf)
+    return relative_changes((high - low) / 2, centre)
 
 
 def _closed_form(scene: Scene) -> Callable[[Scene], tuple[Floats, Complex]] | None:
-    """The function of a scene to its steady lines, by flat layers or modes; or None."""
+    """Return the function that computes a scene's steady lines, or None."""
     body = scene.body
     lossy = any(solid.has_loss for _, solid in body.strata)
     if not lossy or scene.tacton.trajectory.shape == "recorded":
         return None
     if body.of_kind.is_plate:
-        return _of_plate if takes(MODES, scene) else None
+        return _lines_of_plate if takes(MODES, scene) else None
     flat = body.of_kind.dispersion is not None
-    return _lines if flat and scene.reading.is_plain and scene.load.is_normal else None
+    return _lines_of_layers if flat and scene.reading.is_plain and scene.load.is_normal else None
 
 
-def _lines(scene: Scene) -> tuple[Floats, Complex]:
-    """Frequencies (f,) in Hz above 0 and amplitudes (f, p) at the probes, of flat layers."""
+def _lines_of_layers(scene: Scene) -> tuple[Floats, Complex]:
+    """Return frequencies (f,) in Hz above 0 and amplitudes (f, p) at the probes of flat layers."""
     pressure = replace(scene.pressure, profile="gaussian")
     compliance = layered(flattened(scene.body))
-    f, a = steady_lines(compliance, pressure, scene.probe_points, threshold=FAINT)
+    f, a = steady_lines(compliance, pressure, scene.probe_points, threshold=LINE_THRESHOLD)
     return f[f > 0], a[f > 0]
 
 
-def _of_plate(scene: Scene) -> tuple[Floats, Complex]:
-    """The same of a held sheet, in the quantity that its probes read."""
+def _lines_of_plate(scene: Scene) -> tuple[Floats, Complex]:
+    """Return the same for a held sheet, in the quantity of its probes."""
     f, a = steady_lines_of_plate(scene)
     return f[f > 0], a[f > 0]
 
 
 def mesh_row(scene: Scene, h: float | None, error: float) -> PlanRow:
-    """Row of the error budget of a response, and from which mesh on nothing is gained."""
-    found = error_budget(scene, error)
-    name, largest = found.largest
+    """Return the row of the error budget of a response, with the finest mesh that is worthwhile."""
+    budget = error_budget(scene, error)
+    name, largest = budget.largest
     if not largest:
-        return PlanRow(what="uncertainty", value=found.spreads, reason="nothing to compare with")
-    reason = f"a numerical error below a tenth of the {name}'s, {_percent(ENOUGH * largest)}, gains"
-    if h is None or not error > 0:
-        return PlanRow(what="uncertainty", value=found.spreads, reason=f"{reason} nothing")
-    coarsest = float(element_sizes(scene.body)[0])
-    size = min(CONTROLLER.size(h, error, ENOUGH * largest), max(coarsest, h))
-    return PlanRow(
-        what="uncertainty", value=found.spreads,
-        reason=f"{reason} nothing: nor does a mesh finer than {significant(1e3 * size, 2)} mm",
-    )  # fmt: skip
+        return PlanRow(what="uncertainty", value=budget.spreads, reason="no spread is known")
+    reason = (
+        f"numerical errors below a tenth of that of the {name}, {_percent(ENOUGH * largest)}, do "
+        "not matter"
+    )
+    if h is not None and error > 0:
+        coarsest = float(element_sizes(scene.body)[0])
+        size = min(CONTROLLER.size(h, error, ENOUGH * largest), max(coarsest, h))
+        reason += f": elements of {significant(1e3 * size, 2)} mm are fine enough"
+    return PlanRow(what="uncertainty", value=budget.spreads, reason=reason)

@@ -1,4 +1,4 @@
-"""A-priori estimates of lines and edge reflections of a response."""
+"""A-priori estimates: the relevant lines of a response, and reflections from the sides."""
 
 from dataclasses import replace
 
@@ -17,21 +17,20 @@ from skinwave.bodies.supports import EDGES
 from skinwave.scene.scene import Body, Scene
 from skinwave.typing import Complex, Floats
 
-REFLECTED = 0.03  # reflection coefficient of an absorbing side and the layer around it
+REFLECTION = 0.03  # reflection coefficient of an absorbing side and the layer around it
 # Reflections of the four sides may be in phase; slabs reflected 0.5 to 0.9 times as much. Where
 # viscosity dominates, a free side reflects more than its image source: overdamped slabs of 80 to
 # 120 mm reflected 0.9 to 1.1 times the estimate with both factors, of 70 mm up to 1.5 times.
-IN_STEP, OVERDAMPED = 2.0, 1.5
-UNHELD = 2.0  # times that of a body whose base is not clamped: small plates had up to 2.3
-NO_BOUND = 2.0  # relative to the larger of two waveforms, which no difference of them exceeds
+IN_PHASE, OVERDAMPED = 2.0, 1.5
+UNCLAMPED = 2.0  # factor for a base that is not clamped: small plates had up to 2.3
+NO_BOUND = 2.0  # difference of two waveforms over the larger one, which it never exceeds
 FAR = 0.25  # m, beyond which waves are neglected
-FOLLOWED, FOLLOWED_AT = 0.1, 2500.0  # s and Hz: duration and sampling rate of the estimate
+DURATION, RATE = 0.1, 2500.0  # s and Hz of the estimate of reflections
 
 
 def response_spectrum(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
-    """Response spectrum: frequencies (f,) in Hz of the lines that move the probes, and each one's
-    share (f, p) of the motion's power; by the wavenumber integral of the infinite body, or those of
-    the load.
+    """Return frequencies (f,) in Hz of the lines that move the probes, and the share (f, p) of each
+    in the power of the motion: by the wavenumber integral of the infinite body, or of the load.
     """
     body = scene.body
     if scene.tacton.trajectory.shape == "recorded":
@@ -41,13 +40,13 @@ def response_spectrum(scene: Scene, tolerance: float) -> tuple[Floats, Floats]:
         f, a = _lines_of_load(scene, tolerance)
     else:
         pressure = scene.pressure
-        if _width(pressure) is None:  # of the same width; only to find which lines matter
+        if _width(pressure) is None:  # a Gaussian of the same width shows which lines matter
             pressure = replace(pressure, profile="gaussian")
         try:
             f, a = steady_lines(
                 compliance(body), pressure, scene.probe_points, threshold=tolerance / 100
             )
-        except ArithmeticError:  # next to no loss
+        except ArithmeticError:  # almost no loss
             f, a = _lines_of_load(scene, tolerance)
     a = a * scene.reading.record.factor(2j * np.pi * f)[:, None]
     power = np.abs(a) ** 2 * np.where(f > 0, 0.5, 1.0)[:, None]
@@ -60,18 +59,20 @@ def _lines_of_load(scene: Scene, tolerance: float) -> tuple[Floats, Complex]:
 
 
 def cutoff_frequency(frequencies: Floats, shares: Floats, tolerance: float) -> float:
-    """Frequency in Hz above which every probe moves by less than a third of the tolerance."""
+    """Return the frequency in Hz above which lines move each probe by less than a third of the
+    tolerance.
+    """
     above = np.cumsum(shares[::-1], axis=0)[::-1].max(axis=1)
     return float(frequencies[np.flatnonzero(np.sqrt(above) > tolerance / 3).max(initial=0)])
 
 
 def has_wavenumber_solution(scene: Scene) -> bool:
-    """Whether the scene has a wavenumber integral, but for reflections from its sides."""
+    """Whether a wavenumber integral solves the scene, apart from reflections from the sides."""
     return is_flat_layer(scene.body) and _width(scene.pressure) is not None
 
 
 def spot_scale(pressure: MovingPressure) -> float:
-    """Standard deviation in metre of the Gaussian that is, or is as wide as, the focal spot."""
+    """Return the standard deviation in metre of a Gaussian as wide as the focal spot."""
     return _width(pressure) or spot_width(pressure.height)
 
 
@@ -80,41 +81,41 @@ def _width(pressure: MovingPressure) -> float | None:
 
 
 def side_reflections(scene: Scene) -> float:
-    """Edge reflections at the probes relative to their motion in an infinite body, for the first
-    `FOLLOWED`; at most `NO_BOUND`, which also stands for an unknown reflection.
+    """Return the reflections from the sides at the probes over their motion in an infinite body, at
+    most `NO_BOUND`, which also stands for unknown reflections.
 
-    The reflection of a side at a probe is the motion of an infinite body at the probe's mirror
-    image in it; `IN_STEP` times the root of the four energies, because they may add up, and up to
-    `OVERDAMPED` times that where shear waves cannot oscillate. Absorbing sides count as free of
-    reflections, and a half-space has no sides.
+    The reflection of a side at a probe is the motion of an infinite body at the mirror image of the
+    probe. The estimate is the root of the four energies times `IN_PHASE`, because reflections may
+    add up, and times up to `OVERDAMPED` where shear waves cannot oscillate. Absorbing sides do not
+    reflect, and a half-space has no sides.
     """
     body, probes = scene.body, scene.probe_points
     half = np.array([body.width, body.height]) / 2
     images = [] if is_laterally_infinite(body) else _reflecting(body, _mirrored(probes, half))
     if not images:
         return 0.0
-    known = scene.load.is_normal  # what returns of another load is not estimated
-    if not known or _to_edge(scene, half) < 2 * spot_scale(scene.pressure):
+    is_estimated = scene.load.is_normal
+    if not is_estimated or _to_edge(scene, half) < 2 * spot_scale(scene.pressure):
         return NO_BOUND
-    duration = min(scene.tacton.duration, FOLLOWED)
-    times = np.arange(max(2, round(duration * FOLLOWED_AT))) / FOLLOWED_AT
-    seen = np.vstack([probes, *images])
-    # Below the surface, and of components, about as of the displacement at the surface.
-    asked = scene.reading.record if scene.reading.record.is_normal else DISPLACEMENT
-    field = surface_field(asked, compliance(body))
-    u = field_history(field, scene.pressure, seen, times)[..., 0]
-    own, *returned = (u**2).mean(axis=0).reshape(-1, len(probes))
-    share = float(np.sqrt((sum(returned) / np.maximum(own, 1e-300)).max()))
+    duration = min(scene.tacton.duration, DURATION)
+    times = np.arange(max(2, round(duration * RATE))) / RATE
+    points = np.vstack([probes, *images])
+    # Other quantities reflect about as the displacement of the surface does.
+    quantity = scene.reading.record if scene.reading.record.is_normal else DISPLACEMENT
+    field = surface_field(quantity, compliance(body))
+    u = field_history(field, scene.pressure, points, times)[..., 0]
+    own, *reflected = (u**2).mean(axis=0).reshape(-1, len(probes))
+    ratio = float(np.sqrt((sum(reflected) / np.maximum(own, 1e-300)).max()))
     critical = min(1.0, _loss_at_cut_off(body) / 2)
-    back = IN_STEP * (1 + (OVERDAMPED - 1) * critical) * share
+    ratio *= IN_PHASE * (1 + (OVERDAMPED - 1) * critical)
     if body.base != "clamped":
-        # Waves of all frequencies go on, from side to side, and bend the body as a whole.
-        back = UNHELD * back / max(1 - UNHELD * back, UNHELD * back / NO_BOUND)
-    return min(NO_BOUND, back)
+        # Waves of all frequencies travel from side to side and bend the body as a whole.
+        ratio = UNCLAMPED * ratio / max(1 - UNCLAMPED * ratio, UNCLAMPED * ratio / NO_BOUND)
+    return min(NO_BOUND, ratio)
 
 
 def _loss_at_cut_off(body: Body) -> float:
-    """Largest loss tangent at the lowest cut-off of shear waves across the depth."""
+    """Return the largest loss tangent at the lowest cut-off of shear waves across the depth."""
     layers = stack(body)
     pairs = zip(layers.materials, layers.thicknesses, strict=True)
     w = np.pi / 2 / sum(thickness / material.shear_speed for material, thickness in pairs)
@@ -122,12 +123,12 @@ def _loss_at_cut_off(body: Body) -> float:
     return float(max(modulus.imag / modulus.real for modulus in moduli))
 
 
-def absorbed_returned(scene: Scene, half: Floats, highest: float) -> float:
-    """Reflection of absorbing sides `half` (2,) in metre from the middle, over the probes' own
-    steady motion; 1, for unknown, of a body with too little loss for that.
+def absorbing_reflection(scene: Scene, half: Floats, highest: float) -> float:
+    """Return the reflection of absorbing sides at distances `half` (2,) in metre from the middle,
+    over the steady motion of the probes; 1, for unknown, for a body with too little loss.
 
-    By mirror images of the focus in the four sides and the wavenumber integral of the infinite
-    body, for the lines of the load up to the `highest` in Hz.
+    The wavenumber integral of the infinite body gives the motion by mirror images of the focus in
+    the four sides, for lines of the load up to the `highest` in Hz.
     """
     body = scene.body
     width = spot_scale(scene.pressure)
@@ -137,21 +138,21 @@ def absorbed_returned(scene: Scene, half: Floats, highest: float) -> float:
     foci = np.array([path, *_mirrored(path, half)])
     distances = np.linalg.norm(scene.probe_points[:, None] - foci[:, None], axis=-1)  # (5, p, k)
     lines = load_lines(replace(scene.pressure, profile="gaussian"), 1e-2)
-    kept = lines.frequencies <= max(highest, 1.0)
-    frequencies, which = np.unique(lines.frequencies[kept], return_inverse=True)
-    strength = np.bincount(which, lines.strengths[kept] ** 2)
+    low = lines.frequencies <= max(highest, 1.0)
+    frequencies, index = np.unique(lines.frequencies[low], return_inverse=True)
+    strength = np.bincount(index, lines.strengths[low] ** 2)
     table = np.arange(0.0, FAR, width / 2)
     try:
         g = point_response(compliance(body), table, 2 * np.pi * frequencies, width)
     except ArithmeticError:
         return 1.0
     power = np.interp(distances, table, strength @ np.abs(g) ** 2).mean(axis=2)
-    share = power[1:].sum(axis=0) / np.maximum(power[0], 1e-300)
-    return min(1.0, REFLECTED * float(np.sqrt(share.max())))
+    ratio = power[1:].sum(axis=0) / np.maximum(power[0], 1e-300)
+    return min(1.0, REFLECTION * float(np.sqrt(ratio.max())))
 
 
 def _mirrored(points: Floats, half: Floats) -> list[Floats]:
-    """Mirror images (n, 2) of points (n, 2) in the four sides."""
+    """Return the mirror images (n, 2) of points (n, 2) in the four sides."""
     return [
         np.where(np.arange(2) == axis, 2 * sign * half - points, points)
         for axis in (0, 1)
@@ -160,27 +161,27 @@ def _mirrored(points: Floats, half: Floats) -> list[Floats]:
 
 
 def _reflecting(body: Body, images: list[Floats]) -> list[Floats]:
-    """The mirror images in those of a body's four sides that do not absorb."""
+    """Return the mirror images in the sides of a body that do not absorb."""
     each = zip(EDGES, images, strict=True)  # both are left, right, front and back
     return [image for name, image in each if body.side(name) != "absorbing"]
 
 
 def _to_edge(scene: Scene, half: Floats) -> float:
-    """Distance from the path or the probes to the nearest side, metre."""
-    used = np.vstack([path_places(scene.tacton.trajectory), scene.probe_points])
-    return float((half - np.abs(used).max(axis=0)).min())
+    """Return the distance in metre from the path or the probes to the nearest side."""
+    points = np.vstack([path_places(scene.tacton.trajectory), scene.probe_points])
+    return float((half - np.abs(points).max(axis=0)).min())
 
 
 def path_places(path: Trajectory) -> Floats:
-    """Some positions (k, 2) in metre of the focus."""
+    """Return some positions (k, 2) in metre of the focus."""
     if path.shape in BY_POINTS:
         return path.outline[:: max(1, len(path.points) // 24)]
     return path.at_phase(np.arange(24) / 24)
 
 
 def mean_gain(scene: Scene) -> float:
-    """Mean pressure in Pa of all foci together over a Tacton."""
-    # At random, because any even spacing would take some modulation for a constant.
+    """Return the mean pressure in Pa of all foci together over a Tacton."""
+    # Random times, because evenly spaced ones would see some modulations as constant.
     times = np.random.default_rng(0).uniform(0, scene.tacton.duration, 20_000)
     gain: Floats = scene.pressure.gain(np.sort(times))
     return float(abs(gain.mean())) * len(scene.tacton.foci)

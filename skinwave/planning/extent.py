@@ -1,8 +1,8 @@
-"""Extent of a body that a scene requires: its symmetry, and how far its absorbing ends are.
+"""Extent of the modelled body: its symmetry, and the distance of its absorbing ends.
 
-On a coarse mesh the absorbing layer is made twice as wide. The change of the waveforms is most of
-what the usual layer returns, because the wider one damps waves more, and near fields end further
-out.
+To estimate the error of an absorbing layer, a coarse mesh is solved again with a layer twice as
+wide. A wider layer damps waves more, and near fields end further out, so that the change of the
+waveforms is most of what the usual layer reflects.
 """
 
 from dataclasses import replace
@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 
 import fem
+from simple_model.numbers import percent
 from skinwave.bodies.absorbing_layer import has_layer, layer_of
 from skinwave.bodies.analytic import is_flat_layer
 from skinwave.bodies.sizes import check_mesh, default_size
@@ -19,43 +20,44 @@ from skinwave.bodies.supports import EDGES
 from skinwave.models.meshed import mirrored_axes
 from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.reduced import answer, prepare, reduction_tolerance
-from skinwave.planning.estimates import FAR, absorbed_returned, spot_scale
-from skinwave.planning.refinement import about_its_rest, element_sizes, relative_change
-from skinwave.planning.rows import PlanRow
+from skinwave.models.relative_change import relative_changes
+from skinwave.planning.estimates import FAR, absorbing_reflection, spot_scale
+from skinwave.planning.record import PlanRow
+from skinwave.planning.refinement import about_its_rest, element_sizes
 from skinwave.scene.scene import Body, Scene
 from skinwave.typing import Floats
 
 WIDER = 2.0  # times the width of the layer
-# Of the change: slabs on springs, free ones and half-spaces had 1.0 to 1.3 times it in error.
+# Error over change: slabs on springs, free ones and half-spaces had 1.0 to 1.3.
 MARGIN = 1.5
-COARSE = 0.01  # relative error of reduced bodies that cannot be reduced to less
-SHARE = 0.25  # of the tolerance: what absorbing ends may leave before the body is extended
+COARSE_REDUCTION = 0.01  # relative error of bodies that cannot be reduced to less
+SHARE = 0.25  # of the tolerance: error of absorbing ends above which the body is extended
 MOST_EXTENSIONS = 2
 
 
 def symmetry(scene: Scene) -> str:
-    """Symmetry axes: across their middle planes the load is its own mirror image at all times."""
-    if not isinstance(scene.pressure.profile, str):  # which may have no symmetry
+    """Return the axes across whose middle planes body and load are symmetric at all times."""
+    if not isinstance(scene.pressure.profile, str):  # a measured profile may have no symmetry
         return ""
     path = scene.tacton.trajectory
-    path_points = path.at_phase(np.zeros(1)) if path.is_static else path.outline
+    points = path.at_phase(np.zeros(1)) if path.is_static else path.outline
+    axes = mirrored_axes(scene.body, scene.reading, scene.load)
+    on_plane = np.abs(points).max(axis=0) < 1e-9
     return "".join(
-        axis
-        for axis, x in zip("xy", path_points.T, strict=True)
-        if np.abs(x).max() < 1e-9 and axis in mirrored_axes(scene.body, scene.reading, scene.load)
+        axis for axis, is_on in zip("xy", on_plane, strict=True) if is_on and axis in axes
     )
 
 
 def absorbing_error(scene: Scene, body: Body, options: SolveOptions = DEFAULT) -> float:
-    """Relative error of the worst probe's waveform that the absorbing base and sides of the meshed
-    body leave, the scene's or an extended one; 0 without an absorbing layer.
+    """Return the error that the absorbing base and sides of a meshed body leave, the scene's or an
+    extended one; 0 without an absorbing layer.
     """
     if not has_layer(body):
         return 0.0
     size = min(float(element_sizes(body)[0]), 2 * spot_scale(scene.pressure))
     axes = symmetry(scene)
 
-    def answered(wider: float, reduction: float) -> Floats:
+    def waveforms(wider: float, reduction: float) -> Floats:
         prepared = prepare(
             body, scene.probe_points, options.progress, h=size, symmetry=axes,
             solver=options.solver, tolerance=reduction, reading=scene.reading, load=scene.load,
@@ -64,48 +66,46 @@ def absorbing_error(scene: Scene, body: Body, options: SolveOptions = DEFAULT) -
         return about_its_rest(scene, answer(prepared, scene).values)
 
     def change(reduction: float) -> float:
-        return relative_change(answered(1.0, reduction), answered(WIDER, reduction))
+        usual, wide = waveforms(1.0, reduction), waveforms(WIDER, reduction)
+        return float(relative_changes(wide - usual, wide).max())
 
     try:
         return MARGIN * change(reduction_tolerance(options.tolerance))
     except fem.NotReduced:  # a free body has hundreds of modes in a wide layer
-        return MARGIN * change(COARSE)
+        return MARGIN * change(COARSE_REDUCTION)
 
 
 def extent(
     scene: Scene, options: SolveOptions, highest: float
 ) -> tuple[Body, list[PlanRow], float]:
-    """Body without what reflects too little to matter, or extended at its absorbing ends until
-    these leave a small share of the tolerance; a row if it is not all of the scene's, and the error
-    that its absorbing ends leave. Lines up to the `highest` in Hz count.
+    """Return the body to model, a row if it is not the scene's, and its error by absorbing ends.
+
+    The body is cut where reflections of lines up to the `highest` in Hz do not matter, or extended
+    at its absorbing ends until these leave a small share of the tolerance.
     """
     body, rows = _within_reflections(scene, options.tolerance, highest)
-    found, left = body, absorbing_error(scene, body, options)
+    larger, error = body, absorbing_error(scene, body, options)
     for _ in range(MOST_EXTENSIONS):
-        larger = _larger(found)
-        if left <= SHARE * options.tolerance or larger == found:
+        if error <= SHARE * options.tolerance or (next_larger := _larger(larger)) == larger:
             break
         try:
-            check_mesh(larger, default_size(larger))
+            check_mesh(next_larger, default_size(next_larger))
         except ValueError:  # too large
             break
-        found, left = larger, absorbing_error(scene, larger, options)
-    if found == body:
-        return body, rows, left
-    size = f"{1e3 * found.width:.0f} x {1e3 * found.height:.0f} x {1e3 * found.depth:.0f} mm"
-    row = PlanRow(
-        what="extent", value=size,
-        reason=f"absorbing ends further away; they leave an error of {100 * left:.2g} %",
-    )  # fmt: skip
-    return found, [row], left
+        larger, error = next_larger, absorbing_error(scene, next_larger, options)
+    if larger == body:
+        return body, rows, error
+    size = f"{1e3 * larger.width:.0f} x {1e3 * larger.height:.0f} x {1e3 * larger.depth:.0f} mm"
+    reason = f"absorbing ends further away, whose reflections are {percent(error)}"
+    return larger, [PlanRow(what="extent", value=size, reason=reason)], error
 
 
 def _within_reflections(
     scene: Scene, tolerance: float, highest: float
 ) -> tuple[Body, list[PlanRow]]:
-    """Extent of the body out to where reflections of lines up to the `highest` in Hz are
-    negligible, and the reason if it is not all of the scene's. Only absorbing sides are moved
-    inwards: reflections from others belong to the response.
+    """Return the body out to where reflections of lines up to the `highest` in Hz are negligible,
+    and a row if that is not the whole body. Only absorbing sides are moved inwards, because
+    reflections from others belong to the response.
     """
     body = scene.body
     if not is_flat_layer(body) or (body.base, body.sides) != ("clamped", "absorbing"):
@@ -116,7 +116,7 @@ def _within_reflections(
         alone = np.where(np.arange(2) == axis, half, FAR)
         for shorter in np.arange(0.03, min(0.8 * half[axis], FAR), 0.01):
             alone[axis] = shorter
-            if absorbed_returned(scene, alone, highest) <= tolerance / 10:
+            if absorbing_reflection(scene, alone, highest) <= tolerance / 10:
                 cut[axis] = shorter
                 break
     if (cut == half).all():
@@ -125,17 +125,17 @@ def _within_reflections(
     row = PlanRow(
         what="extent",
         value=f"{1e3 * width:.0f} x {1e3 * height:.0f} mm",
-        reason=f"reflections from further away are below {10 * tolerance:.2g} %; absorbing "
-        f"sides there leave out {100 * (1 - cut.prod() / half.prod()):.0f} % of the body",
+        reason=f"absorbing sides there reflect less than {percent(tolerance / 10)} and save "
+        f"{percent(1 - cut.prod() / half.prod())} of the body",
     )
     return replace(body, width=width, height=height), [row]
 
 
 def _larger(body: Body) -> Body:
-    """The body with its absorbing ends further out by the width of their layer."""
+    """Return the body with its absorbing ends further out by the width of their layer."""
     ends = [{body.side(name) for name, (k, _) in EDGES.items() if k == axis} for axis in (0, 1)]
-    by = np.array([*(each == {"absorbing"} for each in ends), body.base == "absorbing"])
-    width, height, depth = layer_of(body).width * by * (2, 2, 1)
+    absorbs = np.array([*(each == {"absorbing"} for each in ends), body.base == "absorbing"])
+    width, height, depth = layer_of(body).width * absorbs * (2, 2, 1)
     return replace(
         body, width=body.width + width, height=body.height + height, depth=body.depth + depth
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 import fem
 from simple_model.layers.flat_body import TRANSFORM_RATE
 from simple_model.load.sampling import resolving_step
+from simple_model.numbers import percent, significant
 from skinwave.bodies.sizes import check_mesh
 from skinwave.models import Limit, Model, named
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
@@ -20,43 +21,43 @@ from skinwave.models.options import DEFAULT, SolveOptions, sample_grid, sample_t
 from skinwave.models.plate_modes import ERROR, FROM_REST, STRETCHED
 from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.reduced import answer
-from skinwave.planning.estimates import (
-    NO_BOUND,
-    cutoff_frequency,
-    has_wavenumber_solution,
-    response_spectrum,
-    side_reflections,
-)
+from skinwave.models.relative_change import change_text
+from skinwave.planning import errors, estimates, left_out
+from skinwave.planning.errors import ErrorPart
 from skinwave.planning.extent import absorbing_error, extent, symmetry
-from skinwave.planning.left_out import (
-    beyond_linear,
-    deflection,
-    sensitivity,
-    series_error,
-    start_left_out,
-    stretching_left_out,
-    sudden_left_out,
-)
+from skinwave.planning.plan_warnings import NO_ERROR
+from skinwave.planning.record import Plan, PlanRow
 from skinwave.planning.refinement import above_band, refined
-from skinwave.planning.rows import (
-    Plan,
-    PlanRow,
-    element_rows,
-    error_not_estimated,
-    left_out,
-    of_elements,
-    of_ends_and_band,
-    over_tolerance,
-    series_over_tolerance,
-    start_over_tolerance,
-    sudden_over_tolerance,
-)
+from skinwave.planning.rows import element_rows, neglected_rows
 from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
 
-INTEGRAL_ERROR = 0.002  # of a wavenumber integral, beside finite elements
+INTEGRAL_ERROR = 0.002  # of a wavenumber integral, compared with finite elements
 Grid = tuple[Floats, int]  # as of `sample_grid`
 WAVES_SHARE = 0.8  # of the tolerance: largest reflections of sides that may be neglected
+REQUESTED = "as requested"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Request:
+    """A scene with the `model` that was requested or chosen for it, for a stated `reason`."""
+
+    scene: Scene
+    options: SolveOptions
+    grid: Grid
+    model: Model
+    reason: str = REQUESTED
+
+    @property
+    def tolerance(self) -> float:
+        return self.options.tolerance
+
+    def model_row(self, start: float = 0.0, method: str = "") -> PlanRow:
+        """Return the row of the model, with the relative error of a start that it leaves out."""
+        reason = f"{self.reason}: {method}" if method else self.reason
+        if start:
+            reason += f"; leaves out the initial transient, {change_text(start)}"
+        return PlanRow(what="model", value=self.model.name, reason=reason)
 
 
 def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
@@ -65,8 +66,8 @@ def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
     Parameters
     ----------
     scene : Scene
-    options : SolveOptions; with both a model and h all of the body is modelled, and h alone asks
-        for elements of a sheet
+    options : SolveOptions; with both a model and h the whole body is modelled, and h alone selects
+        elements for a sheet
 
     Returns
     -------
@@ -76,259 +77,264 @@ def plan(scene: Scene, options: SolveOptions = DEFAULT) -> Plan:
     ------
     ValueError
         If the model is unknown or does not take the scene, or the times, h or dt do not fit it.
+
+    Examples
+    --------
+    >>> import skinwave
+    >>> scene = skinwave.loads("[tacton]\\nam_frequency_hz = 100\\n[body]\\nthickness_mm = inf")
+    >>> plan = skinwave.plan(scene)
+    >>> plan.model, round(plan.error, 3)
+    ('flat-body-harmonic', 0.014)
+    >>> for row in plan.rows:
+    ...     print(f"{row.what}: {row.value}")
+    highest line: 200 Hz
+    model: flat-body-harmonic
     """
-    grid = sample_grid(scene, options.times)
-    found = _planned(scene, options, grid)
-    left = stretching_left_out(scene, named(found.model), options.tolerance)
-    return replace(found, error=found.error + left, options=options)
+    request = _choose_model(scene, options, sample_grid(scene, options.times))
+    if not scene.body.of_kind.discretise:
+        planned = Plan(model=request.model.name, body=scene.body, rows=(request.model_row(),))
+    elif request.model.error:
+        planned = _plan_known_error(request)
+    elif request.model.is_infinite:
+        planned = _plan_wavenumber_integral(request)
+    else:
+        planned = _plan_elements(request)
+    stretching = left_out.stretching_error(scene, request.model, options.tolerance)
+    return replace(planned, error=planned.error + stretching, options=options)
 
 
-def _planned(scene: Scene, options: SolveOptions, grid: Grid) -> Plan:
-    """The plan, but for what linear bending of a sheet leaves out."""
-    asked = None if options.model == "auto" else named(options.model)
+def _choose_model(scene: Scene, options: SolveOptions, grid: Grid) -> _Request:
+    """Check the request and return it with its model, or the one chosen for the scene."""
+    requested = None if options.model == "auto" else named(options.model)
     if options.dt is not None:
         step_count(float(sample_times(scene)[-1]), options.dt)
-    if asked:
-        check_taken(asked, scene)
-    if not scene.body.of_kind.discretise:
-        kernel = (asked or SAME_LOAD).name
-        row = PlanRow(what="model", value=kernel, reason="there is no body to move")
-        return Plan(model=kernel, body=scene.body, rows=(row,))
-    if not asked or asked.needs_body:
+    if requested:
+        check_taken(requested, scene)
+    moves = scene.body.of_kind.discretise
+    if moves and (not requested or requested.needs_body):
         check_laws(scene.body, scene.pressure)
-    if asked and asked.error:
-        return _unplanned(scene, options, asked, grid)
-    chosen = asked or _chosen(scene, options, grid)
-    if chosen is STRETCHED:
-        return _stretched(scene, options, grid)
-    highest, row = _highest_line(scene, options.tolerance)
-    if chosen.is_infinite:
-        found = _without_mesh(scene, options, chosen, highest, row, grid)
-        return _with_series(found, scene, options.tolerance)
-    if chosen is FROM_REST:
-        found = _unplanned(scene, replace(options, h=None), FROM_REST, grid)
-        found = _because(found, why_modes(scene, options.tolerance))
-        return replace(found, highest=highest, rows=(row, *found.rows, *left_out(scene, highest)))
-    if asked is None and chosen is not FEM:
-        found = _planned(scene, replace(options, model=chosen.name, h=None), grid)
-        return _because(found, f"{FEM.name} {beyond(FEM, scene)[0].why}")
-    return _by_elements(scene, options, chosen, highest, row, grid)
-
-
-def _because(found: Plan, reason: str) -> Plan:
-    """The plan with another reason for its model."""
-    rows = [replace(row, reason=reason) if row.what == "model" else row for row in found.rows]
-    return replace(found, rows=tuple(rows))
-
-
-def _chosen(scene: Scene, options: SolveOptions, grid: Grid) -> Model:
-    meshed = options.h is not None and scene.body.of_kind.is_plate and takes(FEM, scene)
-    return FEM if meshed else named(chosen_model(scene, options.tolerance, grid))
-
-
-def _highest_line(scene: Scene, tolerance: float) -> tuple[float, PlanRow]:
-    """Highest line in Hz that matters, and why."""
-    spectrum, motion = response_spectrum(scene, tolerance), scene.load.support_motion
-    highest = max(cutoff_frequency(*spectrum, tolerance), motion.frequency if motion else 0.0)
-    return highest, PlanRow(
-        what="highest line",
-        value=f"{highest:.0f} Hz",
-        reason=f"of {len(spectrum[0])} lines in the load; those above move the probes by less "
-        f"than {100 * tolerance / 3:.2g} % of the whole",
-    )
-
-
-def _by_elements(
-    scene: Scene, options: SolveOptions, chosen: Model, highest: float, row: PlanRow, grid: Grid
-) -> Plan:
-    """Plan of a model of linear elements, with its mesh."""
-    tolerance, whole = options.tolerance, scene
-    axes = symmetry(scene) if chosen.is_reduced else ""
-    try:
-        if options.model == "auto" or options.h is None:
-            body, cut, at_ends = extent(scene, options, highest)
-        else:  # all of it is meshed, as asked
-            body, cut, at_ends = scene.body, [], absorbing_error(scene, scene.body, options)
-        for_mesh = replace(options, tolerance=max(tolerance - at_ends, tolerance / 2))
-        mesh = refined(scene, body, for_mesh, symmetry=axes)
-    except fem.NotReduced as error:
-        limit = Limit(why=f"cannot reduce this body: {error}")
-        raise refusal(scene, chosen, [limit]) from None
-    scene = replace(scene, body=body)
-    step = options.dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
-    step_error = _march_error(scene, step) if chosen.is_stepped else 0.0
-    start = start_left_out(scene, chosen, grid, mesh.prepared)
-    times, _ = grid
-    sudden = above_band(answer(mesh.prepared, scene, times=times).values, times[1])
-    found = Plan(
-        model=chosen.name, body=body, symmetry=axes, h=mesh.h, highest=highest,
-        error=mesh.error + mesh.prepared.effort.estimate + at_ends + sudden + step_error + start,
-        seconds=sum(mesh.prepared.effort.seconds.values()),
-        memory=mesh.prepared.effort.peak_memory,
-        rows=(
-            row, PlanRow(what="model", value=chosen.name, reason=_why_elements(whole)), *cut,
-            *element_rows(scene, tolerance, axes, mesh, highest, options.h),
-        ),
-        warnings=(
-            *of_elements(scene, mesh.h, mesh.error, tolerance),
-            *of_ends_and_band(scene, at_ends, sudden, tolerance),
-            *over_tolerance(f"a time step of {1e3 * step:.3g} ms", step_error, tolerance,
-                      "a smaller one is"),
-            *start_over_tolerance(chosen, start, tolerance),
-        ),
-        prepared=mesh.prepared,
-    )  # fmt: skip
-    return _with_series(found, scene, tolerance)
+    if not moves:
+        reason = "the scene has no body that moves"
+        model = requested or SAME_LOAD
+    elif requested:
+        model, reason = requested, REQUESTED
+    elif options.h is not None and scene.body.of_kind.is_plate and takes(FEM, scene):
+        model, reason = FEM, _why_elements(scene)
+    else:
+        model, reason = _cheapest(scene, options.tolerance, grid)
+        options = options if model is FEM else replace(options, h=None)
+    return _Request(scene=scene, options=options, grid=grid, model=model, reason=reason)
 
 
 def chosen_model(scene: Scene, tolerance: float = 0.05, grid: Grid | None = None) -> str:
-    """Name of the model that a plan takes: the cheapest within the tolerance, for times as of
-    `sample_grid`, those of the scene if not given. Raises a ValueError if no model takes the scene.
+    """Return the name of the cheapest model within the tolerance, for times as of `sample_grid`,
+    by default those of the scene. Raises a ValueError if no model takes the scene.
     """
     if not scene.body.of_kind.discretise:
         return SAME_LOAD.name
-    if beyond_linear(scene, tolerance):
-        return STRETCHED.name
-    if _returned(scene) <= WAVES_SHARE * tolerance and takes(FLAT_BODY, scene):
-        try:  # reflections are of the load's lines, the start of the body's own: their powers add
-            start = start_left_out(scene, HARMONIC, grid or sample_grid(scene))
+    return _cheapest(scene, tolerance, grid or sample_grid(scene))[0].name
+
+
+def _cheapest(scene: Scene, tolerance: float, grid: Grid) -> tuple[Model, str]:
+    """Return the cheapest model of a body within the tolerance, and the reason for it."""
+    if left_out.beyond_linear(scene, tolerance):
+        stretching = left_out.stretching_error(scene, FROM_REST, tolerance)
+        return STRETCHED, (
+            f"a linear sheet would deflect by {significant(left_out.linear_deflection(scene), 2)} "
+            f"thicknesses, and stretching changes its motion by {change_text(stretching)}"
+        )
+    reflections = _reflections(scene)
+    if reflections <= WAVES_SHARE * tolerance and takes(FLAT_BODY, scene):
+        reason = f"reflections from the sides are only {percent(reflections)}"
+        if scene.body.sides == "absorbing":
+            reason = "flat layers with absorbing sides, which need no mesh"
+        try:  # lines are reflected, the start is the body's own vibration: their powers add
+            start = left_out.start_error(scene, HARMONIC, grid)
         except (ValueError, ArithmeticError):  # no steady state
-            return FLAT_BODY.name
-        steady = np.hypot(_returned(scene), start) <= tolerance
-        return HARMONIC.name if steady else FLAT_BODY.name
-    return FROM_REST.name if why_modes(scene, tolerance) else default_model(scene)
+            return FLAT_BODY, reason
+        return HARMONIC if np.hypot(reflections, start) <= tolerance else FLAT_BODY, reason
+    if reason := why_modes(scene, tolerance):
+        return FROM_REST, reason
+    model = named(default_model(scene))
+    why_not_elements = "" if model is FEM else f"{FEM.name} {beyond(FEM, scene)[0].why}"
+    return model, why_not_elements or _why_elements(scene)
 
 
 def why_modes(scene: Scene, tolerance: float) -> str:
-    """Reason for the modes of a scene's sheet instead of elements; none if elements do."""
+    """Return the reason for plate modes instead of elements; "" if elements are better."""
     body = scene.body
     if not takes(FROM_REST, scene) or tolerance < ERROR:
         return ""
     if body.air and not body.mounting.is_frame:
-        return f"elements have air around a sheet in a frame, not one {body.mounting.words}"
-    return "a flat sheet that is held: modes of a thin plate need no mesh"
-
-
-@lru_cache(maxsize=64)
-def _returned(scene: Scene) -> float:
-    """Relative reflections from the sides that a wavenumber integral leaves out."""
-    return side_reflections(scene) if has_wavenumber_solution(scene) else NO_BOUND
-
-
-def _unplanned(scene: Scene, options: SolveOptions, model: Model, grid: Grid) -> Plan:
-    """Plan of a model that states its own error. That of a sheet at large deflection does not come
-    from the linear response: stiffened by stretching it has longer waves and fewer resonances.
-    """
-    tolerance, h, start = options.tolerance, options.h, start_left_out(scene, model, grid)
-    reason = f"as asked: {model.method}{_without(start)}"
-    rows = [PlanRow(what="model", value=model.name, reason=reason)]
-    what, size = f"the {model.method}", None
-    cure = "a larger tolerance is" if model.needs_body else "a model with waves is"
-    if model.default_size:
-        size = h or model.default_size(scene.body)
-        check_mesh(scene.body, size)
-        reason = "as asked" if h else f"the default of {model.name}"
-        rows.append(PlanRow(what="element size", value=f"{1e3 * size:.2f} mm", reason=reason))
-        others = left_out(scene, 0.0)
-        rows += [r for r in others if not (model.is_nonlinear and r.what.endswith("stretching"))]
-        what, cure = f"elements of {1e3 * size:.3g} mm", "smaller ones are"
-    error = model.error(scene, size) if model.error else np.nan
-    return Plan(
-        model=model.name, body=scene.body, h=size, error=error + start, rows=tuple(rows),
-        seconds=model.seconds, memory=model.memory,
-        warnings=(
-            *error_not_estimated(model.name, error),
-            *over_tolerance(what, error, tolerance, cure),
-            *start_over_tolerance(model, start, tolerance),
-        ),
-    )  # fmt: skip
-
-
-def _stretched(scene: Scene, options: SolveOptions, grid: Grid) -> Plan:
-    """Plan of a sheet at large deflection."""
-    left = stretching_left_out(scene, FROM_REST, options.tolerance)
-    return _because(
-        _unplanned(scene, replace(options, h=None), STRETCHED, grid),
-        f"a linear sheet would deflect by {deflection(scene):.2g} thicknesses, and stretching "
-        f"changes its motion by {100 * left:.2g} %",
-    )
-
-
-def _without_mesh(
-    scene: Scene, options: SolveOptions, asked: Model, highest: float, row: PlanRow, grid: Grid
-) -> Plan:
-    returned, left = _returned(scene), start_left_out(scene, asked, grid)
-    model, tolerance = asked.name, options.tolerance
-    sudden = sudden_left_out(scene, asked, grid)
-    reason = "flat layers without reflecting sides: wavenumber integral, no mesh"
-    if scene.body.sides != "absorbing":
-        reason = f"reflections from the sides are {100 * returned:.2g} %: wavenumber integral"
-    reason += _without(left)
-    warnings = (
-        *over_tolerance(
-            f"{model}, which leaves out reflections from the sides,",
-            returned,
-            tolerance,
-            f"{takers(scene)[0]} is" if takers(scene) else "absorbing sides are",
-        ),
-        *start_over_tolerance(asked, left, tolerance),
-        *sudden_over_tolerance(scene, TRANSFORM_RATE / 4, sudden, tolerance),
-    )
-    rows = [
-        row,
-        PlanRow(what="model", value=model, reason="as asked" if warnings else reason),
-        *left_out(scene, highest),
-    ]
-    error = float(np.linalg.norm([returned, left, sudden, INTEGRAL_ERROR]))
-    return Plan(
-        model=model, body=scene.body, highest=highest, error=error,
-        seconds=asked.seconds, memory=asked.memory, rows=tuple(rows), warnings=warnings,
-    )  # fmt: skip
-
-
-def _without(start: float) -> str:
-    return f"; the initial transient, {100 * start:.2g} %, is left out" if start else ""
-
-
-def _with_series(found: Plan, scene: Scene, tolerance: float) -> Plan:
-    """Plan whose error counts the Prony series that its model takes for modulus laws."""
-    solids = own_laws(scene.body)
-    if not solids or not named(found.model).takes_series(scene.body):
-        return found
-    allowed = series_tolerance(tolerance)
-    error = series_error(scene, found.model, tolerance, found.prepared)
-    rows = tuple(
-        PlanRow(
-            what="modulus law",
-            value=solid.series(allowed).words,
-            reason=f"{found.model} takes it for the law; the motion of the probes is "
-            f"{100 * error:.2g} % off by it",
-        )
-        for solid in solids
-    )
-    warned = series_over_tolerance(rows[0].value, error, tolerance)
-    return replace(
-        found, error=found.error + error, rows=(*found.rows, *rows),
-        warnings=(*found.warnings, *warned),
-    )  # fmt: skip
-
-
-def _march_error(scene: Scene, dt: float) -> float:
-    """Expected relative error of a time step."""
-    known = sensitivity(scene)
-    # Average acceleration lowers frequencies by (w dt)^2/12 (Hughes 1987, chapter 9).
-    return min(1.0, known.value * (2 * np.pi * known.frequency * dt) ** 2 / 12)
+        return f"elements include air only around a sheet in a frame, not one {body.mounting.words}"
+    return "a flat sheet with clamped sides, whose modes need no mesh"
 
 
 def _why_elements(scene: Scene) -> str:
-    """Why no wavenumber integral stands for the body of a scene."""
+    """Return the reason why no wavenumber integral replaces elements."""
     if limits := beyond(FLAT_BODY, scene):
         return f"{FLAT_BODY.name} {limits[0].why}"
-    body, returned = scene.body, _returned(scene)
+    body, reflections = scene.body, _reflections(scene)
     if body.sides == "absorbing":
-        of_sheet = "absorbing sides of a sheet reflect in part"
-        return (
-            of_sheet if body.of_kind.is_plate else "as asked; this body has a wavenumber integral"
+        return "absorbing sides of a sheet reflect in part"
+    reflected = f" about {percent(reflections)}" if reflections < 1 else ""
+    return f"the {body.sides} sides reflect{reflected}, which the wavenumber integral leaves out"
+
+
+@lru_cache(maxsize=64)
+def _reflections(scene: Scene) -> float:
+    """Return the reflections from the sides that a wavenumber integral leaves out."""
+    return (
+        estimates.side_reflections(scene)
+        if estimates.has_wavenumber_solution(scene)
+        else estimates.NO_BOUND
+    )
+
+
+def _highest_line(scene: Scene, tolerance: float) -> tuple[float, PlanRow]:
+    """Return the highest relevant line in Hz, and its row."""
+    spectrum, motion = estimates.response_spectrum(scene, tolerance), scene.load.support_motion
+    highest = max(
+        estimates.cutoff_frequency(*spectrum, tolerance), motion.frequency if motion else 0.0
+    )
+    return highest, PlanRow(
+        what="highest line",
+        value=f"{highest:.0f} Hz",
+        reason=f"of {len(spectrum[0])} lines of the load; higher lines move the probes by less "
+        f"than {percent(tolerance / 3)}",
+    )
+
+
+def _plan_known_error(request: _Request) -> Plan:
+    """Plan a model that states its own error.
+
+    The error of a sheet at large deflection does not follow from the linear response, because
+    stretching stiffens the sheet and makes its waves longer.
+    """
+    scene, model, options = request.scene, request.model, request.options
+    is_auto_modes = model is FROM_REST and options.model == "auto"
+    highest, line_row = _highest_line(scene, request.tolerance) if is_auto_modes else (0.0, None)
+    start = left_out.start_error(scene, model, request.grid)
+    rows, size = [request.model_row(start, model.method)], None
+    source = f"the {model.method}"
+    cure = "use a larger tolerance" if model.needs_body else "use a model with waves"
+    if model.default_size:
+        size = options.h or model.default_size(scene.body)
+        check_mesh(scene.body, size)
+        reason = REQUESTED if options.h else f"the default of {model.name}"
+        rows.append(PlanRow(what="element size", value=f"{1e3 * size:.2f} mm", reason=reason))
+        source, cure = f"elements of {1e3 * size:.3g} mm", "use smaller elements"
+    if model.default_size or is_auto_modes:
+        neglected = neglected_rows(scene, highest)
+        rows += [r for r in neglected if not (model.is_nonlinear and "stretching" in r.what)]
+    own = model.error(scene, size) if model.error else np.nan
+    parts = [ErrorPart(source=source, error=own, cure=cure), errors.start_part(model, start)]
+    return Plan(
+        model=model.name, body=scene.body, h=size, highest=highest, error=errors.total_error(parts),
+        rows=(*([line_row] if line_row else []), *rows), seconds=model.seconds,
+        memory=model.memory, warnings=(
+            *(() if np.isfinite(own) else (NO_ERROR.format(model.name),)),
+            *errors.part_warnings(parts, request.tolerance),
+        ),
+    )  # fmt: skip
+
+
+def _plan_wavenumber_integral(request: _Request) -> Plan:
+    """Plan a wavenumber integral, which leaves out reflections from the sides."""
+    scene, model, tolerance = request.scene, request.model, request.tolerance
+    highest, line_row = _highest_line(scene, tolerance)
+    start, others = left_out.start_error(scene, model, request.grid), takers(scene)
+    parts = [
+        ErrorPart(
+            source=f"reflections from the sides, which {model.name} leaves out",
+            error=_reflections(scene),
+            cure=f"use --model {others[0]}" if others else "use absorbing sides",
+        ),
+        errors.start_part(model, start),
+        errors.band_part(
+            scene, TRANSFORM_RATE / 4, left_out.above_band_error(scene, model, request.grid)
+        ),
+        ErrorPart(source="the wavenumber integral", error=INTEGRAL_ERROR),
+    ]
+    planned = Plan(
+        model=model.name, body=scene.body, highest=highest, seconds=model.seconds,
+        memory=model.memory, error=errors.total_error(parts, independent=True),
+        rows=(line_row, request.model_row(start), *neglected_rows(scene, highest)),
+        warnings=errors.part_warnings(parts[:3], tolerance),
+    )  # fmt: skip
+    return _with_series(planned, request)
+
+
+def _plan_elements(request: _Request) -> Plan:
+    """Plan linear elements: extent, mesh, and the errors that remain."""
+    scene, model, tolerance = request.scene, request.model, request.tolerance
+    options, (times, _) = request.options, request.grid
+    highest, line_row = _highest_line(scene, tolerance)
+    axes = symmetry(scene) if model.is_reduced else ""
+    try:
+        if options.model != "auto" and options.h is not None:  # mesh the whole body
+            body, rows = scene.body, list[PlanRow]()
+            absorbing = absorbing_error(scene, body, options)
+        else:
+            body, rows, absorbing = extent(scene, options, highest)
+        for_mesh = replace(options, tolerance=max(tolerance - absorbing, tolerance / 2))
+        mesh = refined(scene, body, for_mesh, symmetry=axes)
+    except fem.NotReduced as error:
+        limit = Limit(why=f"cannot reduce this body: {error}")
+        raise refusal(scene, model, [limit]) from None
+    scene, effort = replace(scene, body=body), mesh.prepared.effort
+    above = above_band(answer(mesh.prepared, scene, times=times).values, times[1])
+    parts = errors.element_parts(
+        scene, tolerance, mesh.h, mesh=mesh.error, reduction=effort.estimate, absorbing=absorbing,
+        above_band=above,
+    )  # fmt: skip
+    start = left_out.start_error(scene, model, request.grid, mesh.prepared)
+    parts.append(errors.start_part(model, start))
+    if model.is_stepped:
+        parts.append(_step_part(scene, options.dt))
+    planned = Plan(
+        model=model.name, body=body, symmetry=axes, h=mesh.h, highest=highest,
+        error=errors.total_error(parts), seconds=sum(effort.seconds.values()),
+        memory=effort.peak_memory, prepared=mesh.prepared,
+        rows=(
+            line_row, request.model_row(start), *rows,
+            *element_rows(scene, tolerance, axes, mesh, highest, options.h),
+        ),
+        warnings=(
+            *errors.element_warnings(scene, mesh.h, mesh.error),
+            *errors.part_warnings(parts, tolerance),
+        ),
+    )  # fmt: skip
+    return _with_series(planned, replace(request, scene=scene))
+
+
+def _step_part(scene: Scene, dt: float | None) -> ErrorPart:
+    """Return the error of a time step: average acceleration lowers frequencies by (w dt)^2 / 12
+    (Hughes 1987, chapter 9).
+    """
+    step = dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
+    value, frequency = left_out.sensitivity(scene)
+    error = min(1.0, value * (2 * np.pi * frequency * step) ** 2 / 12)
+    source = f"a time step of {1e3 * step:.3g} ms"
+    return ErrorPart(source=source, error=error, cure="use a smaller time step")
+
+
+def _with_series(planned: Plan, request: _Request) -> Plan:
+    """Return the plan with the error of Prony series, if its model takes them for modulus laws."""
+    scene, tolerance = request.scene, request.tolerance
+    part = errors.series_part(scene, planned.model, tolerance, planned.prepared)
+    if part is None:
+        return planned
+    rows = tuple(
+        PlanRow(
+            what="modulus law",
+            value=solid.series(series_tolerance(tolerance)).words,
+            reason=f"replaces the law in {planned.model}, which changes the motion of the probes "
+            f"by {change_text(part.error)}",
         )
-    reflected = f" about {100 * returned:.3g} %" if returned < 1 else ""
-    return f"the {body.sides} sides reflect{reflected}; the wavenumber integral has no sides"
+        for solid in own_laws(scene.body)
+    )
+    return replace(
+        planned, error=planned.error + part.error, rows=(*planned.rows, *rows),
+        warnings=(*planned.warnings, *errors.part_warnings([part], tolerance)),
+    )  # fmt: skip

@@ -1,14 +1,13 @@
-"""Mesh refinement with Richardson error estimates: no a-priori error law holds for every scene.
+"""Mesh refinement with Richardson error estimates, because no a-priori law holds for every scene.
 
-Near a resonance a mesh that is a little too stiff changes the waveform by many times as much as
+Near a resonance, a mesh that is a little too stiff changes the waveform many times as much as
 elsewhere, and soft or thin bodies need more elements than stiff ones. The error of each mesh in a
-sequence is extrapolated from its change to the one before, and a controller chooses the next size.
-All axes are refined alike: a slab has few layers of cells, and one more changes as much as all that
-is between.
+sequence is extrapolated from the change to the mesh before, and a controller chooses the next size.
+All axes are refined alike, because a slab has few layers of cells and one more layer changes the
+result as much as the refinement along the surface.
 """
 
 from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 from scipy import fft
@@ -18,16 +17,10 @@ from skinwave.bodies.build import COMPARED
 from skinwave.bodies.sizes import check_mesh, coarsest_size, default_size
 from skinwave.bodies.slab import cell_layers
 from skinwave.bodies.tissue import FINE_PALM
+from skinwave.models import reduced
 from skinwave.models.options import DEFAULT, SolveOptions
-from skinwave.models.reduced import (
-    BAND,
-    ReducedBody,
-    answer,
-    components,
-    oscillating,
-    prepare,
-    reduction_tolerance,
-)
+from skinwave.models.reduced import BAND, ReducedBody
+from skinwave.models.relative_change import NO_MOTION, relative_changes
 from skinwave.scene.scene import Body, Scene
 from skinwave.typing import Array, Floats
 
@@ -41,13 +34,13 @@ class SizeController:
     """Controller of the element size h by Richardson extrapolation of an error ~ h^order.
 
     The error of a mesh is its relative change from one with elements r times as large, over
-    r^order - 1, and that times `margin`; the next size is h (safety tolerance / error)^(1/order).
+    r^order - 1, times `margin`. The next size is h (safety tolerance / error)^(1/order).
     Roache, Annu Rev Fluid Mech 29:123 (1997); ASME V&V 20 (2009), section 2.
 
-    `order` of convergence of a waveform, measured 1.9 to 3.5; `margin`, because clamped edges,
-    jumps of material and coarse meshes lower it: true errors were up to 1.4 times as large;
-    `safety` factor on the tolerance, so that one more mesh is enough; `largest_factor` between two
-    sizes, because coarse meshes overestimate their errors.
+    The `order` of convergence of a waveform was measured at 1.9 to 3.5. The `margin` covers clamped
+    edges, jumps of material and coarse meshes, where true errors were up to 1.4 times as large. The
+    `safety` factor on the tolerance makes one more mesh enough. `largest_factor` limits the ratio
+    of two sizes, because coarse meshes overestimate their errors.
     """
 
     order: float = 2.25
@@ -55,129 +48,101 @@ class SizeController:
     safety: float = 0.6
     largest_factor: float = 1.6
 
-    def error(self, other: Array, found: Array, ratio: float) -> float:
-        """Relative error of a quantity of interest (k, p) by that of another mesh with elements
-        `ratio` times as large.
+    def error(self, other: Array, values: Array, ratio: float) -> float:
+        """Return the error of a quantity of interest (k, p) from that of another mesh, `ratio`
+        times as coarse.
         """
-        return self.margin * relative_change(other, found) / abs(ratio**self.order - 1)
+        change = float(relative_changes(values - other, values).max())
+        return self.margin * change / abs(ratio**self.order - 1)
 
     def size(self, h: float, error: float, tolerance: float) -> float:
-        """Element size in metre that meets a tolerance, by the error with h."""
+        """Return the element size in metre that meets a tolerance, from the error with h."""
         return h * (self.safety * tolerance / error) ** (1 / self.order)
 
     def nearest(self, sizes: Floats, h: float, error: float, tolerance: float) -> float:
-        """Next of a sequence of sizes in metre after h."""
+        """Return the next of a sequence of sizes in metre after h."""
         wanted = max(self.size(h, error, tolerance), h / self.largest_factor)
         return float(sizes[np.abs(np.log(sizes / wanted)).argmin()])
 
 
 CONTROLLER = SizeController()
-NO_MOTION = 1e-9  # of the probe that moves most: what a weaker one reads is round-off
-
-
-def relative_change(other: Array, found: Array) -> float:
-    """Change of a quantity of interest (k, p) from another mesh's, relative, of the worst probe."""
-    size = np.linalg.norm(found, axis=0)
-    size = np.maximum(size, max(NO_MOTION * size.max(), 1e-300))
-    return float((np.linalg.norm(found - other, axis=0) / size).max())
-
-
-class Convergence(Enum):
-    """Outcome of the comparison of two element sizes."""
-
-    REACHED = "the error is within the tolerance"
-    NOT_REACHED = "the error is above the tolerance"
-    SAME_MESH = "both sizes are beyond the body's own, and make one mesh"
-    SINGLE_MESH = "a file has one mesh, which both sizes take"
-
-
-# Relative errors where there is none to extrapolate.
-UNESTIMATED = {Convergence.SAME_MESH: 1.0, Convergence.SINGLE_MESH: np.nan}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Refined:
-    """Refined mesh: element size `h` in metre, the `convergence` and the expected relative `error`
-    with it, the size in metre that it was `compared` with, and the reduced body, `prepared` with
-    it.
+    """Refined mesh: its element size `h` in metre, the expected relative `error` as of
+    `mesh_error`, the size in metre that it was `compared` with, and its reduced body.
     """
 
     h: float
-    convergence: Convergence
     error: float
     compared: float
     prepared: ReducedBody
 
 
 def refined(
-    scene: Scene,
-    body: Body,
-    options: SolveOptions = DEFAULT,
-    *,
-    symmetry: str = "",
+    scene: Scene, body: Body, options: SolveOptions = DEFAULT, *, symmetry: str = ""
 ) -> Refined:
-    """Coarsest mesh of a sequence for a scene's `body`, or a part of it, that is accurate to a
-    tolerance, or that of a given h, with its expected error; the finest of the sequence if that is
-    not accurate either. Raises a ValueError if the body has no mesh of that size.
+    """Return the coarsest mesh of a sequence that meets the tolerance, or else the finest; or the
+    mesh of a given h. The `body` is the scene's, or a part of it.
+
+    Raises a ValueError if the body has no mesh of that size.
     """
     h, tolerance = options.h, options.tolerance
 
-    def answered(size: float) -> tuple[ReducedBody, Array]:
-        prepared = prepare(
+    def solve(size: float) -> tuple[ReducedBody, Array]:
+        prepared = reduced.prepare(
             body, scene.probe_points, options.progress, h=size,
-            tolerance=reduction_tolerance(tolerance), symmetry=symmetry, solver=options.solver,
-            reading=scene.reading, load=scene.load,
+            tolerance=reduced.reduction_tolerance(tolerance), symmetry=symmetry,
+            solver=options.solver, reading=scene.reading, load=scene.load,
         )  # fmt: skip
-        return prepared, quantity_of_interest(prepared, scene, answer(prepared, scene))
+        return prepared, quantity_of_interest(prepared, scene, reduced.answer(prepared, scene))
 
     check_mesh(body, h or default_size(body))
     sizes = element_sizes(body)
     before = compared_with(body, h) if h else sizes[0]
     size = h or finer_sizes(sizes, before)[0]
-    coarse, other = answered(before)
+    coarse, other = solve(before)
     while True:
-        prepared, found = answered(size)
+        prepared, values = solve(size)
         same = coarse.effort.dofs == prepared.effort.dofs
-        outcome, error = convergence(body, (before, size), (other, found), tolerance, same=same)
-        refinable = outcome in (Convergence.NOT_REACHED, Convergence.SAME_MESH)
-        if h or not refinable or size == sizes[-1]:
-            return Refined(
-                h=size, convergence=outcome, error=error, compared=before, prepared=prepared
-            )
-        before, coarse, other = size, prepared, found
+        error = mesh_error(body, (before, size), (other, values), same=same)
+        if h or not error > tolerance or size == sizes[-1]:
+            return Refined(h=size, error=error, compared=before, prepared=prepared)
+        before, coarse, other = size, prepared, values
         size = CONTROLLER.nearest(finer_sizes(sizes, size), size, error, tolerance)
 
 
 def element_sizes(body: Body) -> Floats:
-    """Sequence of element sizes (k,) in metre that a body may be meshed with, descending."""
+    """Return the sequence of element sizes (k,) in metre for a body, descending."""
     coarsest, finest = FIRST * default_size(body), FINEST * default_size(body)
-    if not body.of_kind.conforming:  # whose coarser meshes cut the rim off, and layers
+    if not body.of_kind.conforming:  # coarser meshes would cut off the rim and layers
         coarsest = min(FIRST_HAND * default_size(body), COMPARED * coarsest_size(body))
         finest = max(finest, min(default_size(body), FINE_PALM))
     if not _has_cell_layers(body):
         sizes = np.geomspace(coarsest, finest, 64)
-        if actual := body.of_kind.actual_size:  # one of those with the same mesh
-            sizes = sizes[
+        if actual := body.of_kind.actual_size:  # one size for each mesh
+            return sizes[
                 np.unique([-actual(body, h) for h in sizes.tolist()], return_index=True)[1]
             ]
         return sizes
-    found, layers = [body.depth], 1
-    while found[-1] > finest:
+    layered, layers = [body.depth], 1
+    while layered[-1] > finest:
         layers = max(layers + 1, round(RATIO * layers))
-        size = _layered(body, layers, body.depth / layers)
-        found += [size] if size < found[-1] else []
-    sizes = np.array(found)
+        size = _layered_size(body, layers, body.depth / layers)
+        layered += [size] if size < layered[-1] else []
+    sizes = np.array(layered)
     return sizes[max(0, np.count_nonzero(sizes >= coarsest) - 1) :]
 
 
 def finer_sizes(sizes: Floats, size: float) -> Floats:
-    """Sizes of a sequence finer than one by `RATIO` or more; or the last."""
+    """Return the sizes of a sequence that are finer than one by `RATIO` or more; or the last."""
     coarser = np.count_nonzero(sizes > size / RATIO * (1 + 1e-9))
     return sizes[min(coarser, len(sizes) - 1) :]
 
 
 def compared_with(body: Body, h: float) -> float:
-    """Size that a given one can be compared with: coarser, or finer than a single layer."""
+    """Return a size to compare a given one with: coarser, or finer than a single layer."""
     if actual := body.of_kind.actual_size:
         sizes = (h * np.geomspace(1, 4, 80)).tolist() + (h / np.geomspace(1, 4, 80)).tolist()
         far = (s for s in sizes if abs(np.log(actual(body, s) / actual(body, h))) > np.log(RATIO))
@@ -186,7 +151,7 @@ def compared_with(body: Body, h: float) -> float:
         return min(RATIO * h, max(body.width, body.height))
     layers = cell_layers(body, h)
     other = min(layers - 1, round(layers / RATIO)) or 2
-    return _layered(body, other, min(h, body.depth) * layers / other)
+    return _layered_size(body, other, min(h, body.depth) * layers / other)
 
 
 def _has_cell_layers(body: Body) -> bool:
@@ -194,15 +159,15 @@ def _has_cell_layers(body: Body) -> bool:
     return body.of_kind.is_layer and len(body.strata) == 1
 
 
-def _layered(body: Body, layers: int, near: float) -> float:
-    """Size in metre near another with which a slab has so many layers of cells, or nearly."""
+def _layered_size(body: Body, layers: int, near: float) -> float:
+    """Return the size in metre near another for about so many layers of cells in a slab."""
     sizes = (near * 2 ** np.linspace(-1, 1, 101)).tolist()
     return min(sizes, key=lambda h: (abs(cell_layers(body, h) - layers), abs(np.log(h / near))))
 
 
-def coarser_by(body: Body, other: float, h: float) -> float:
-    """Refinement ratio of two meshes, coarser over finer: that of their sizes in metre, or of their
-    cells on average of all axes, where these differ less, because short sides have few cells.
+def refinement_ratio(body: Body, other: float, h: float) -> float:
+    """Return the refinement ratio of two meshes: that of their sizes in metre, or of their cells on
+    average of all axes where these differ less, because short sides have few cells.
     """
     if actual := body.of_kind.actual_size:
         return actual(body, other) / actual(body, h)
@@ -215,30 +180,26 @@ def coarser_by(body: Body, other: float, h: float) -> float:
 
 
 def about_its_rest(scene: Scene, waveforms: Array) -> Array:
-    """Waveforms (t, p) without the mean under gravity, which would hide errors."""
+    """Return waveforms (t, p) without the mean under gravity, which would hide errors."""
     return waveforms - waveforms.mean(axis=0) if scene.load.gravity else waveforms
 
 
-def quantity_of_interest(prepared: ReducedBody, scene: Scene, found: Response) -> Array:
-    """Quantity of interest of the response of a reduced body: its waveforms (t, p); of an
-    unconstrained body the lines (f, p c) of its components without the mean, because rigid-body
-    drift would hide the rest.
+def quantity_of_interest(prepared: ReducedBody, scene: Scene, response: Response) -> Array:
+    """Return the quantity of interest of a reduced body: its waveforms (t, p), or for an
+    unconstrained body the lines (f, p c) without the mean, whose drift would hide the rest.
     """
     if scene.body.is_held:
-        return about_its_rest(scene, found.values)
-    return oscillating(components(prepared, *scene.loads)).lines
+        return about_its_rest(scene, response.values)
+    return reduced.oscillating(reduced.components(prepared, *scene.loads)).lines
 
 
 def above_band(waveforms: Floats, step: float) -> float:
-    """Error of waveforms by what moves above `BAND`, up to which a reduced body is held to its
-    tolerance.
+    """Return the error of waveforms (t, p), sampled in steps in s, by motion above `BAND`.
 
-    Velocity and acceleration have such a part where a load begins, or jumps, at once. The reduced
-    body's own is as large as the true one and has no relation to it. A series of cosines continues
-    the record without a jump at its ends.
-
-    Of waveforms (t, p) with a step in s between samples, relative, of the worst probe: the root of
-    twice the share of the energy.
+    Velocity and acceleration have such a part where a load begins, or jumps, abruptly. The part of
+    a reduced body is as large as the true one but otherwise unrelated, so that the error is the
+    root of twice the share of the energy. A series of cosines continues the record without a jump
+    at its ends.
     """
     energy = fft.dct(waveforms, axis=0, norm="ortho") ** 2
     frequencies = np.arange(len(energy)) / (2 * step * len(energy))
@@ -247,26 +208,18 @@ def above_band(waveforms: Floats, step: float) -> float:
     return float(np.sqrt(2 * (above / whole).max()))
 
 
-def convergence(
-    body: Body,
-    sizes: tuple[float, float],
-    found: tuple[Array, Array],
-    tolerance: float,
-    *,
-    same: bool,
-) -> tuple[Convergence, float]:
-    """Outcome and relative error of the second of two element sizes in metre, by the quantities of
-    interest (k, p) that were found with them; whether both make the `same` mesh. The error is as of
-    `UNESTIMATED` where there is none to extrapolate.
+def mesh_error(
+    body: Body, sizes: tuple[float, float], quantities: tuple[Array, Array], *, same: bool
+) -> float:
+    """Return the error of the second of two element sizes in metre, from their quantities of
+    interest (k, p). If both give the `same` mesh, it is 1, or nan for the one mesh of a file.
     """
     if same:
-        outcome = Convergence.SINGLE_MESH if body.file else Convergence.SAME_MESH
-        return outcome, UNESTIMATED[outcome]
-    error = CONTROLLER.error(*found, coarser_by(body, *sizes))
-    return Convergence.NOT_REACHED if error > tolerance else Convergence.REACHED, error
+        return np.nan if body.file else 1.0
+    return CONTROLLER.error(*quantities, refinement_ratio(body, *sizes))
 
 
 def enough(body: Body, h: float, error: float, tolerance: float) -> float:
-    """Element size in metre that meets a tolerance, by the relative error with another, h."""
+    """Return the element size in metre that meets a tolerance, from the error with h."""
     size = min(h, body.depth if body.of_kind.is_layer else h)
     return CONTROLLER.size(size, max(CONTROLLER.safety * tolerance, error), tolerance)

@@ -1,8 +1,6 @@
 """Simulation of a scene by any model: plan, then solve, then check.
 
-    scene, options -> plan -> solve -> Response, with its error and warnings
-
-`simulate` is the whole way. `compute` is one model alone, without plan and checks.
+`simulate` does all three. `compute` runs one model without a plan and without checks.
 """
 
 from __future__ import annotations
@@ -20,7 +18,8 @@ from skinwave.models.limits import check_taken
 from skinwave.models.options import SolveOptions, from_first, sample_grid
 from skinwave.models.reduced import answer
 from skinwave.planning.plan import plan
-from skinwave.planning.rows import Plan, response_warnings
+from skinwave.planning.plan_warnings import response_warnings
+from skinwave.planning.record import Plan
 from skinwave.scene.scene import Scene
 from skinwave.system.effort import Progress, SkinwaveWarning, versions
 from skinwave.system.progress_bar import reported
@@ -33,85 +32,94 @@ def simulate(
     progress: Progress | bool | None = None,
     **options: Any,
 ) -> Response:
-    """Simulate a scene: the quantity that its probes read, with its expected error.
+    """Simulate a scene: compute the quantity that its probes read, with its expected error.
 
-    Where a request is not met, `effort.warnings` of the response say so, and each sentence is a
-    `SkinwaveWarning` once. The error of a given h or model is estimated as in a plan, which for
-    elements costs another, coarser mesh.
+    If part of the request is not met, a `SkinwaveWarning` says so, and `effort.warnings` of the
+    response keeps the sentence. The error of elements is estimated on a second, coarser mesh.
 
     Parameters
     ----------
     scene : Scene
-    model : "point-kernel", without propagation, under the scene's own load;
-        "point-kernel-published", the same under the paper's load (linear drive, main lobe);
-        "flat-body", the wavenumber integral of an infinite body; "fem", the reduced-order model;
-        "fem-transient", direct time integration; "flat-body-harmonic" and "fem-harmonic", the
-        steady state line by line; "plate-modes" and "plate-modes-transient", a thin plate in its
-        modes; "plate-modes-nonlinear", the same at large deflection; "fem-nonlinear", modes of
-        elements at large deflection; "fem-nonlinear-transient", the same with all dofs; or "auto":
-        the choice of `plan`
-    tolerance : float, relative error that may be made
-    progress : True for a bar; or called with the name of the phase and the fraction done
-    **options : h, dt, solver, times and mapped of `SolveOptions`
+    model : "auto", the choice of `plan`; or the name of a model:
+
+        - "point-kernel", the moving pressure without propagation; "point-kernel-published", the
+          same under the load of the paper
+        - "flat-body", the wavenumber integral of an infinite body; "flat-body-harmonic", its
+          steady state
+        - "fem", reduced-order finite elements; "fem-harmonic", their steady state line by line;
+          "fem-transient", direct time integration
+        - "plate-modes-transient", a thin plate in its modes; "plate-modes", its steady state;
+          "plate-modes-nonlinear", at large deflection
+        - "fem-nonlinear", modes of finite elements at large deflection; "fem-nonlinear-transient",
+          the same with all degrees of freedom
+    tolerance : float, acceptable relative error
+    progress : True for a bar, or a function of the name of the phase and the fraction done
+    **options : h, dt, solver and times of `SolveOptions`
 
     Returns
     -------
-    Response, (t, p) of the scene's quantity, or stimulation in Pa of the point kernel
+    Response, (t, p) of the scene's quantity, or stimulation in Pa for the point kernel
 
     Raises
     ------
     ValueError
-        If the model is unknown or does not fit the scene, or a number is out of range.
+        If the model is unknown or does not take the scene, or a number is out of range.
     Diverged
         If a nonlinear model does not converge, or a response violates the energy balance.
+
+    Examples
+    --------
+    >>> import skinwave
+    >>> scene = skinwave.loads("[tacton]\\nduration_s = 0.02\\n[body]\\nthickness_mm = inf")
+    >>> response = skinwave.simulate(scene)
+    >>> response.model, response.expected_error
+    ('flat-body', 0.002)
     """
     with reported(progress) as report:
-        asked = SolveOptions(model=model, tolerance=tolerance, progress=report, **options)
-        found = solve(scene, plan(scene, asked))
-    for sentence in found.effort.warnings:
+        request = SolveOptions(model=model, tolerance=tolerance, progress=report, **options)
+        response = solve(scene, plan(scene, request))
+    for sentence in response.effort.warnings:
         warnings.warn(sentence, SkinwaveWarning, stacklevel=2)
-    return found
+    return response
 
 
-def solve(scene: Scene, required: Plan) -> Response:
-    """Response of a plan of the scene, with its expected error and all warnings; raises what
-    `simulate` does. A model that measures its error with the answer states at least that error.
-    """
-    options = replace(required.options, model=required.model, h=required.h or required.options.h)
-    if required.prepared and named(required.model).is_reduced:
+def solve(scene: Scene, planned: Plan) -> Response:
+    """Solve a scene as planned, and check the response; raises what `simulate` does."""
+    options = replace(planned.options, model=planned.model, h=planned.h or planned.options.h)
+    if planned.prepared and named(planned.model).is_reduced:
         times, first = sample_grid(scene, options.times)
-        found = from_first(answer(required.prepared, scene, options.progress, times=times), first)
-    else:
-        found = _computed(replace(scene, body=required.body), options)
-    return _checked(scene, required, found)
-
-
-def _checked(scene: Scene, required: Plan, found: Response) -> Response:
-    """The response with all warnings, and the larger of planned and measured errors."""
-    tolerance = required.options.tolerance
-    more = response_warnings(scene, found, required.error, tolerance)
-    return replace(
-        found, load=scene.pressure,
-        effort=replace(found.effort, warnings=(*required.warnings, *more)),
-        expected_error=float(np.fmax(required.error, found.expected_error)),
-    )  # fmt: skip
+        whole = answer(planned.prepared, scene, options.progress, times=times)
+        return _checked(scene, planned, from_first(whole, first))
+    return _checked(scene, planned, _solved(replace(scene, body=planned.body), options))
 
 
 def compute(scene: Scene, model: str, **options: Any) -> Response:
-    """Response of one model, not planned, without warnings, with options of `SolveOptions`. Its
-    expected error is unknown, unless the model measures it. Raises what `simulate` does.
+    """Solve a scene by one model, without a plan or warnings; `options` are of `SolveOptions`.
+
+    The expected error is unknown unless the model measures it. Raises what `simulate` does.
     """
-    return _computed(scene, SolveOptions(model=model, **options))
+    return _solved(scene, SolveOptions(model=model, **options))
 
 
-def _computed(scene: Scene, options: SolveOptions) -> Response:
-    """Response of one model in its default mesh, or that of the options."""
-    known = named(options.model)
-    check_taken(known, scene)
-    if known.needs_body:
+def _solved(scene: Scene, options: SolveOptions) -> Response:
+    """Return the response of a model with its default mesh, or that of the options."""
+    model = named(options.model)
+    check_taken(model, scene)
+    if model.needs_body:
         check_laws(scene.body, scene.pressure)
     times, first = sample_grid(scene, options.times)
-    found = replace(from_first(known.solve(scene, times, options), first), load=scene.pressure)
-    if found.effort.versions:
-        return found
-    return replace(found, effort=replace(found.effort, versions=versions()))
+    response = from_first(model.solve(scene, times, options), first)
+    effort = response.effort
+    effort = effort if effort.versions else replace(effort, versions=versions())
+    return replace(response, load=scene.pressure, effort=effort)
+
+
+def _checked(scene: Scene, planned: Plan, response: Response) -> Response:
+    """Return the response with all warnings, and the larger of planned and measured errors."""
+    tolerance = planned.options.tolerance
+    others = response_warnings(scene, response, planned.error, tolerance)
+    return replace(
+        response, load=scene.pressure,
+        effort=replace(response.effort, warnings=(*planned.warnings, *others)),
+        expected_error=float(np.fmax(planned.error, response.expected_error)),
+    )  # fmt: skip

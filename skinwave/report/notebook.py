@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from skinwave.bodies import Body
-    from skinwave.planning.rows import Plan
+    from skinwave.planning.record import Plan
     from skinwave.results.comparison import Agreement
     from skinwave.scene.scene import Scene
 

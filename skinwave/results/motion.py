@@ -25,13 +25,13 @@ from skinwave.bodies.build import Build
 from skinwave.bodies.sizes import default_size
 from skinwave.models.laws import relaxing, series_tolerance
 from skinwave.models.meshed import (
-    assembled,
+    assemble,
     check_coat,
-    meshed,
+    mesh_body,
     probe_rows,
-    spent,
     spread,
     surface_load,
+    with_cost,
 )
 from skinwave.models.options import SolveOptions, sample_times
 from skinwave.models.reduced import (
@@ -136,8 +136,8 @@ def driven(
     SolveOptions(solver=solver, h=h, tolerance=tolerance)  # which refuses what is out of range
     clock, report = Clock(), progress or silent
     body = relaxing(scene.body, series_tolerance(tolerance))
-    build = meshed(body, h, clock, report)
-    operators = assembled(build, clock, report)
+    build = mesh_body(body, h, clock, report)
+    operators = assemble(build, clock, report)
     P, points = surface_load(build, scene.load)
     with clock("factorise and reduce"):
         report("factorise", 0.0)
@@ -149,7 +149,7 @@ def driven(
         )  # fmt: skip
     with clock("lines"):
         motion = respond(reduced, *scene.loads)
-    offline = spent(reduced.effort, clock, build, h or default_size(scene.body))
+    offline = with_cost(reduced.effort, clock, build, h or default_size(scene.body))
     effort = replace(
         offline, steps=len(motion.frequencies), energy_imbalance=motion.imbalance,
         radiated=motion.radiated,

@@ -26,7 +26,7 @@ from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.planning.plan import plan
-from skinwave.planning.rows import Plan
+from skinwave.planning.record import Plan
 from skinwave.planning.simulate import compute, solve
 from skinwave.report import description
 from skinwave.results import record, surface

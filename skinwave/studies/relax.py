@@ -26,7 +26,7 @@ from simple_model.load.drive import usual_drive
 from simple_model.numbers import decibel, significant
 from skinwave.bodies.sizes import default_size
 from skinwave.models import named
-from skinwave.planning.assessment import sentences
+from skinwave.planning.assessment import all_warnings
 from skinwave.planning.simulate import compute
 from skinwave.report.figures import png
 from skinwave.report.palette import BLUE
@@ -235,7 +235,7 @@ def _timed(
     response = compute(scene, model, h=h)
     seconds, memory = time.perf_counter() - started, peak_memory()
     # The discretisation error is common to all steps and no part of their differences.
-    effort = replace(response.effort, warnings=sentences(scene, response, h=h))
+    effort = replace(response.effort, warnings=all_warnings(scene, response, h=h))
     return replace(response, effort=effort), seconds, memory
 
 

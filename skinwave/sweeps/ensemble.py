@@ -22,7 +22,7 @@ from simple_model.response import SETTLE
 from skinwave.bodies.analytic import compliance
 from skinwave.bodies.sizes import default_size
 from skinwave.models import named
-from skinwave.models.covering import Covering, covering, kept_together, tried_together
+from skinwave.models.covering import Covering, cached_shared_body, covering, try_shared_body
 from skinwave.models.flat_body import HARMONIC
 from skinwave.models.linear_elements import FEM
 from skinwave.models.options import SolveOptions, sample_times
@@ -185,7 +185,7 @@ def shared_family(
     family = covering(scene, free, len(values), method.options.tolerance)
     size = method.options.h or default_size(scene.body)
     options = replace(method.options, h=size, progress=progress)
-    return family if tried_together(family, options) else None
+    return family if try_shared_body(family, options) else None
 
 
 def ensemble(
@@ -314,7 +314,7 @@ def solve_sample(scene: Scene, method: Method, *, together: bool = True) -> Solu
         shape, (f, a) = _mapped(scene, method)
     elif family and together:
         size = how.h or default_size(family.scene.body)
-        f, a = lines_of(kept_together(family, size, how.tolerance, how.solver), scene.body)
+        f, a = lines_of(cached_shared_body(family, size, how.tolerance, how.solver), scene.body)
         a = a * (scene.pressure.peak_pressure / family.scene.pressure.peak_pressure)
     elif family:
         own = prepare(

@@ -15,7 +15,7 @@ import numpy as np
 from simple_model import Response, named_lines
 from skinwave.bodies.analytic import is_flat_layer, is_laterally_infinite
 from skinwave.models import named, parametric
-from skinwave.models.covering import Covering, covering, kept_together
+from skinwave.models.covering import Covering, cached_shared_body, covering
 from skinwave.models.flat_body import FLAT_BODY
 from skinwave.models.free_keys import FreeKey, free_keys, with_values
 from skinwave.models.limits import default_model, takes
@@ -170,10 +170,10 @@ def mesh_of_family(options: SolveOptions, family: Covering) -> Mesh:
     ValueError if its bodies cannot be reduced together.
     """
     size = options.h or refined(family.scene, family.hardest, options).h
-    bodies = kept_together(family, size, options.tolerance, options.solver).bodies
+    bodies = cached_shared_body(family, size, options.tolerance, options.solver).bodies
     meshed = bodies.body(bodies.meshed)
     coarser = compared_with(meshed, size)
-    kept_together(family, coarser, options.tolerance, options.solver)
+    cached_shared_body(family, coarser, options.tolerance, options.solver)
     return Mesh(h=size, coarser=coarser, family=family, meshed=meshed)
 
 
@@ -209,7 +209,7 @@ def prepared(
 ) -> ReducedBody:
     """Return a reduced body with elements of h in metre; in a family, the one with these values."""
     if family:
-        return parametric.at(kept_together(family, h, tolerance, solver), dict(values))
+        return parametric.at(cached_shared_body(family, h, tolerance, solver), dict(values))
     body, probes, reading, load = solid
     return prepare(
         body, np.array(probes), h=h, solver=solver, tolerance=reduction_tolerance(tolerance),

@@ -30,7 +30,7 @@ H = 5e-3
 
 @pytest.mark.parametrize("model", ["fem-transient", "fem-nonlinear-transient"])
 def test_models_without_modes_refuse_it(model):
-    with pytest.raises(ValueError, match=f"{model} has no air"):
+    with pytest.raises(ValueError, match=f"{model} does not include the air"):
         compute(SCENE, model, h=H)
 
 

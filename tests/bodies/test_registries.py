@@ -83,7 +83,7 @@ def test_a_new_kind_runs(disc, capsys):
     rows = read_results.rows("out/lines.csv")
     assert {row["body"] for row in rows} == {"silicone-cylinder"}
     assert main(["plan", "disc.toml", "--tolerance", "0.5", "--element-size", "8"]) == 0
-    assert "flat-body takes a slab or a sheet, not a cylinder" in capsys.readouterr().out
+    assert "flat-body needs a slab or a sheet, not a cylinder" in capsys.readouterr().out
 
 
 @pytest.mark.slow
@@ -127,7 +127,7 @@ def test_a_new_model_runs(disc, capsys, static_deflection):
 
 def test_a_new_model_refuses_a_body(disc):
     floating = replace(disc, body=replace(disc.body, base="free", sides="clamped"))
-    with pytest.raises(ValueError, match="with a clamped base, not a free one; take base"):
+    with pytest.raises(ValueError, match="with a clamped base, not a free one; set base"):
         skinwave.simulate(floating, "static-deflection")
 
 

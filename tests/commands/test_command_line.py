@@ -222,8 +222,8 @@ def test_what_a_page_is_warned_of_is_on_it_whoever_planned(tmp_path, capsys, mon
         '[body]\nsize_x_mm = 30\nsize_y_mm = 30\nsides = "free"\n[probes]\npoints_mm = [[0, 0]]\n'
     )
     for model, cause in (
-        ("fem", "elements of 15 mm will have a relative error"),
-        ("flat-body", "flat-body, which leaves out reflections"),
+        ("fem", "elements of 15 mm: expected error"),
+        ("flat-body", "reflections from the sides, which flat-body leaves out"),
     ):
         asked = [
             "run",

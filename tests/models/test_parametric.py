@@ -239,47 +239,47 @@ def test_ranges_that_few_states_do_not_span_are_refused():
 
 
 @pytest.mark.parametrize(
-    ("free", "words"),
+    "free",
     [
-        ({}, "names no key"),
-        ({"body.size_x_mm": (30, 40)}, "serves materials and thicknesses alone"),
-        ({"body.layers.0.thickness_mm": (1.0, 2.0)}, "it has 0, counted from 0"),
-        ({MODULUS: (2e4, 1e4)}, "give a finite range, low to high"),
-        ({MODULUS: (-1e4, 1e4)}, "has shear_modulus_pa = -10000, outside 0.001"),
-        ({"body.material.prony.0.modulus_pa": (1e3, 2e3)}, "must be a list of tables"),
+        {},
+        {"body.size_x_mm": (30, 40)},
+        {"body.layers.0.thickness_mm": (1.0, 2.0)},
+        {MODULUS: (2e4, 1e4)},
+        {MODULUS: (-1e4, 1e4)},
+        {"body.material.prony.0.modulus_pa": (1e3, 2e3)},
     ],
 )
-def test_keys_that_cannot_be_free_are_refused(slab, free, words):
-    with pytest.raises(ValueError, match=words):
+def test_keys_that_cannot_be_free_are_refused(slab, free):
+    with pytest.raises(ValueError, match=next(iter(free), "free")):
         free_keys(slab.body, free)
 
 
 def test_thicknesses_that_no_mesh_follows_are_refused(slab):
-    with pytest.raises(ValueError, match="no mesh of a finger follows its thickness"):
+    with pytest.raises(ValueError, match="finger"):
         free_keys(BODIES["fingertip"], {"body.thickness_mm": (13.0, 15.0)})
     strain = replace(slab, quantity="largest_shear_strain", depth=1e-3)
-    with pytest.raises(ValueError, match="is not smooth in it"):
+    with pytest.raises(ValueError, match="largest shear strain"):
         skinwave.prepare(strain, {"body.thickness_mm": (8.0, 12.0)})
 
 
 def test_values_out_of_range_are_refused(prepared):
-    for values, words in (
-        ({MODULUS: 50e3, VISCOSITY: 5.0}, "outside its range, 15000 to 40000"),
-        ({MODULUS: 20e3}, "the values lack body.material.viscosity_pa_s"),
-        ({MODULUS: 20e3, VISCOSITY: 5.0, "body.size_x_mm": 3.0}, "is not free"),
+    for values, part in (
+        ({MODULUS: 50e3, VISCOSITY: 5.0}, "15000 to 40000"),
+        ({MODULUS: 20e3}, "body.material.viscosity_pa_s"),
+        ({MODULUS: 20e3, VISCOSITY: 5.0, "body.size_x_mm": 3.0}, "body.size_x_mm"),
     ):
-        with pytest.raises(ValueError, match=words):
+        with pytest.raises(ValueError, match=part):
             parametric.lines(prepared, values)
 
 
-def test_scenes_that_an_affine_sum_cannot_answer_are_refused(slab):
+def test_scenes_that_sums_of_matrices_cannot_solve_are_refused(slab):
     for quantity in ("von_mises_stress", "energy_density"):
-        with pytest.raises(ValueError, match="depends on the material beyond the motion"):
+        with pytest.raises(ValueError, match="free material"):
             skinwave.prepare(replace(slab, quantity=quantity), RANGES)
-
-
-def test_a_sheet_that_is_not_framed_is_refused():
+    constant = replace(slab.pressure, tacton=Tacton(duration=0.01))
+    with pytest.raises(ValueError, match="no oscillating line"):
+        skinwave.prepare(replace(slab, pressure=constant), RANGES)
     mounting = 'edges = ["left", "right"]'
-    scene = skinwave.loads(f"[body]\npreset = 'paper-sheet-loose'\n[body.mounting]\n{mounting}")
-    with pytest.raises(ValueError, match="an isotropic sheet in a frame"):
-        skinwave.prepare(scene, free={"body.material.density_kg_m3": (700, 900)})
+    open_sheet = f"[body]\npreset = 'paper-sheet-loose'\n[body.mounting]\n{mounting}"
+    with pytest.raises(ValueError, match="frame"):
+        skinwave.prepare(skinwave.loads(open_sheet), {"body.material.density_kg_m3": (700, 900)})

@@ -200,7 +200,7 @@ def pushed_and_read(material, rng):
 
 
 @given(materials, seeds, numbers(0, 800))
-def test_a_push_here_read_there_is_a_push_there_read_here(material, rng, hertz):
+def test_responses_are_reciprocal(material, rng, hertz):
     _, operators, S = pushed_and_read(material, rng)
     there = S @ fem.harmonic(operators, S[[0]].toarray()[0], hertz)[0]
     here = S @ fem.harmonic(operators, S[[1]].toarray()[0], hertz)[0]
@@ -246,7 +246,7 @@ def test_no_wave_of_a_mesh_arrives_before_it_can(distance, am):
 @pytest.mark.parametrize("model", ["flat-body", "fem", "fem-transient"])
 @settings(max_examples=4)
 @given(tactons)
-def test_what_the_load_does_later_changes_nothing_before(model, tacton):
+def test_a_later_load_does_not_change_an_earlier_motion(model, tacton):
     """The load lasts as long as its Tacton, so that the longer one goes on pushing."""
     tacton = replace(tacton, duration=max(tacton.duration, 0.005))
     longer = replace(tacton, duration=2 * tacton.duration)
@@ -267,21 +267,8 @@ def bodies(draw):
     return TetMesh(points=shaken, tets=mesh.tets, facets=mesh.facets)
 
 
-@given(bodies(), materials)
-def test_stiffness_and_damping_do_not_feel_a_rigid_motion(mesh, material):
-    free = np.zeros(mesh.points.shape, bool)
-    operators = fem.assemble(mesh, material, fixed=free)
-    x = mesh.points - mesh.points.mean(axis=0)
-    axes = np.eye(3)
-    motions = [np.ones((len(x), 1)) * axis for axis in axes]
-    motions += [np.cross(axis, x) / 0.01 for axis in axes]
-    for u in map(np.ravel, motions):
-        for operator in (operators.K, operators.C):
-            assert np.abs(operator @ u).max() < 1e-11 * abs(operator).max() * np.abs(u).max()
-
-
 @given(bodies(), materials, seeds)
-def test_an_answer_moves_and_turns_with_its_body(mesh, material, rng):
+def test_a_response_moves_and_rotates_with_its_body(mesh, material, rng):
     R = np.linalg.qr(rng.standard_normal((3, 3)))[0]
     R *= np.linalg.det(R)
     moved = TetMesh(
@@ -312,7 +299,7 @@ def test_a_scene_comes_back_from_its_file(scene, tacton):
 
 @settings(max_examples=6)
 @given(scenes())
-def test_what_is_planned_runs(scene):
+def test_planned_scenes_run(scene):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("skinwave.bodies.sheet.SHEET_CELLS", 16)
         patch.setattr("skinwave.bodies.slab.SLAB_CELL", 6e-3)

@@ -48,9 +48,9 @@ def scene(quantity="displacement", depth="0"):
     return loads(f'{SCENE}depth_mm = {depth}\nquantity = "{quantity}"\n')
 
 
-def strain(depth, model, **options):
-    """Strain (t, p, 6) by one response for each component."""
-    each = [compute(scene(f"strain_{c}", depth), model, **options).values
+def tensor(field, depth, model):
+    """Return strain or stress (t, p, 6) by one response for each component."""
+    each = [compute(scene(f"{field}_{c}", depth), model).values
             for c in ("xx", "yy", "zz", "xy", "xz", "yz")]  # fmt: skip
     return np.stack(each, axis=-1)
 
@@ -65,17 +65,17 @@ def test_keys_of_a_scene_are_read_and_written():
 
 
 @pytest.mark.parametrize(
-    ("quantity", "depth", "sentence"),
+    ("quantity", "depth", "part"),
     [
-        ("strain_zy", "0", r"quantity 'strain_zy' is unknown, use one of displacement.*strain_"),
-        ("velocity", "[1]", "depth_mm has 1 values for 2 probes"),
+        ("strain_zy", "0", "strain_zy"),
+        ("velocity", "[1]", "depth_mm"),
         ("velocity", "-1", "depth_mm = -1"),
-        ("strain_zz", "6", "depth_mm = 6 of a probe is not within the body, which is 6 mm"),
-        ("strain_zz", '"pacinian"', "depth_mm 'pacinian' is unknown.*pacini"),
+        ("strain_zz", "6", "depth_mm = 6"),
+        ("strain_zz", '"pacinian"', "pacini"),
     ],
 )
-def test_what_cannot_be_read_is_refused_in_a_sentence(quantity, depth, sentence):
-    with pytest.raises(ValueError, match=sentence):
+def test_unknown_quantities_and_depths_are_refused(quantity, depth, part):
+    with pytest.raises(ValueError, match=part):
         scene(quantity, depth)
 
 
@@ -138,21 +138,18 @@ def test_reduced_harmonic_and_transient_models_read_the_same():
 
 
 def test_quantities_that_are_not_linear_are_computed_in_time():
-    """From the six strains at each time, not from lines; energy at the moduli at rest."""
-    e, solid = strain("[0.7, 2]", "flat-body-harmonic"), scene().body.solid
-    shear = compute(scene("largest_shear_strain", "[0.7, 2]"), "flat-body-harmonic").values
-    np.testing.assert_allclose(shear, largest_shear(e), rtol=1e-6)
-    energy = compute(scene("energy_density", "[0.7, 2]"), "flat-body-harmonic").values
-    expected = ((e @ energy_root(solid).T) ** 2).sum(axis=-1)
-    np.testing.assert_allclose(energy, expected, rtol=1e-6)
-    assert (shear > 0).all()
-    assert (energy > 0).all()
-    stress = np.stack(
-        [compute(scene(f"stress_{c}", "[0.7, 2]"), "flat-body-harmonic").values
-         for c in ("xx", "yy", "zz", "xy", "xz", "yz")], axis=-1,
-    )  # fmt: skip
-    mises = compute(scene("von_mises_stress", "[0.7, 2]"), "flat-body-harmonic").values
-    np.testing.assert_allclose(mises, von_mises(stress), rtol=1e-6)
+    """From the components at each time, not from lines; energy with the moduli at rest."""
+    e, solid = tensor("strain", "[0.7, 2]", "flat-body-harmonic"), scene().body.solid
+    stress = tensor("stress", "[0.7, 2]", "flat-body-harmonic")
+    expected = {
+        "largest_shear_strain": largest_shear(e),
+        "energy_density": ((e @ energy_root(solid).T) ** 2).sum(axis=-1),
+        "von_mises_stress": von_mises(stress),
+    }
+    for quantity, values in expected.items():
+        computed = compute(scene(quantity, "[0.7, 2]"), "flat-body-harmonic").values
+        np.testing.assert_allclose(computed, values, rtol=1e-6)
+        assert (computed > 0).all()
 
 
 def test_a_layer_has_its_own_strain_and_the_traction_of_its_neighbour():
@@ -170,7 +167,7 @@ def test_a_layer_has_its_own_strain_and_the_traction_of_its_neighbour():
     assert 0.04 < np.abs(stiff).max() / np.abs(soft).max() < 0.08  # 25 to 35 kPa over 500 kPa
 
 
-def test_silicone_is_no_skin_but_layers_of_skin_and_own_materials_are():
+def test_layers_of_skin_and_own_materials_are_skin_and_silicone_is_not():
     slab = Body()
     assert slab.is_skin
     dermis = Layer(thickness=1e-3, material="dermis")
@@ -199,7 +196,7 @@ def test_a_run_is_written_and_read_again(tmp_path, monkeypatch):
     np.testing.assert_array_equal(run.response.values, arrays["strain_zz"])
     assert not run.is_skin
     assert not run.is_motion
-    with pytest.raises(ValueError, match="this response is of strain_zz; take its `values`"):
+    with pytest.raises(ValueError, match="strain_zz"):
         run.response.displacement  # noqa: B018
     assert main(["report", "out", "--quiet"]) == 0
     page = Path("out/report/index.html").read_text()
@@ -220,6 +217,6 @@ def test_strain_in_a_coat_is_refused():
     """Elements there are of the material below it."""
     coat = Coat(materials=(scene().body.solid,), thicknesses=(0.3e-3,))
     build = SimpleNamespace(coat=coat)
-    reading = replace(scene("strain_zz", "[0.1, 2]").reading)
-    with pytest.raises(ValueError, match="at a depth of 0.1 mm is in layers of 0.3 mm that are a"):
+    reading = scene("strain_zz", "[0.1, 2]").reading
+    with pytest.raises(ValueError, match="0.1 mm.*0.3 mm"):
         probe_rows(scene().body, build, np.zeros((2, 2)), reading)

@@ -158,24 +158,21 @@ def test_a_scene_of_a_sheet_has_its_quantities_by_every_model_of_elements():
     assert (modal[0] < 1e-12 * modal.max(axis=0)).all()  # from rest, but for round-off
     assert (modal[1:] > 0).all()
     for model in ("flat-body", "plate-modes"):
-        with pytest.raises(ValueError, match=f"{model} has no largest shear strain"):
+        with pytest.raises(ValueError, match=model):
             check_taken(named(model), bent)
-    with pytest.raises(ValueError, match="of a sheet is not drawn"):
+    with pytest.raises(ValueError, match="sheet"):
         shade(bent, None, np.zeros(1), np.zeros(1, int))
 
 
-def test_what_a_sheet_has_not_is_refused():
+def test_quantities_that_a_sheet_does_not_have_are_refused():
     strain = {"quantity": "strain_xx"}
-    with pytest.raises(ValueError, match="depth_mm = 0.2 of a probe"):
-        replace(SCENE, depth=2e-4)
     grained = replace(SCENE.body, material="paper-grain")
-    with pytest.raises(ValueError, match="of an orthotropic sheet needs its moduli across"):
-        replace(SCENE, body=grained, **strain)
     curled = replace(SCENE.body, mounting=replace(SCENE.body.mounting, curl_x=1e-3))
-    with pytest.raises(ValueError, match="is that of a flat sheet across the beam"):
-        replace(SCENE, body=curled, **strain)
+    for change in ({"depth": 2e-4}, {"body": grained, **strain}, {"body": curled, **strain}):
+        with pytest.raises(ValueError, match=r"depth_mm|orthotropic|flat"):
+            replace(SCENE, **change)
     mesh = sheet(0.05, 0.04, 0.002, 8e-3)
     whole = fem.Membrane(triangles=middle_plane(mesh), thickness=1e-4, material=PAPER)
-    with pytest.raises(ValueError, match=r"point \(60, 0\) mm is off the sheet"):
+    with pytest.raises(ValueError, match=r"\(60, 0\) mm"):
         sheet_reading(mesh, whole, [[0.06, 0.0]])
     assert QUANTITIES["strain_xx"].field == "strain"

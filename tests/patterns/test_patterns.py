@@ -491,5 +491,5 @@ def test_a_recorded_path_that_repeats_has_a_steady_state(tmp_path):
     assert np.abs(steady.values - later.values[-800:]).max() < 1e-3 * np.abs(later.values).max()
     off = [np.sqrt((x**2).sum(axis=0)) for x in (steady.values - rest.values, rest.values)]
     assert steady.expected_error == pytest.approx((off[0] / off[1]).max(), rel=0.01)
-    assert "flat-body is enough" in steady.effort.warnings[0]
+    assert "use --model flat-body" in steady.effort.warnings[0]
     assert rest.expected_error < 0.05

@@ -14,7 +14,7 @@ from skinwave.models.limits import cures_for
 from skinwave.models.options import SolveOptions
 from skinwave.models.plate_modes import FROM_REST
 from skinwave.planning.plan import chosen_model, why_modes
-from skinwave.planning.rows import NONLINEAR, of_stretching
+from skinwave.planning.plan_warnings import NONLINEAR, stretching
 from skinwave.planning.simulate import compute, solve
 from skinwave.results.comparison import compare
 from skinwave.scene.file import loads
@@ -28,7 +28,7 @@ STRETCHED = Body(
 )  # fmt: skip
 
 
-def test_modes_from_rest_are_elements_from_rest():
+def test_modes_from_rest_agree_with_elements():
     """A viscous loss is the same of a mode and of elements."""
     circle = Trajectory(shape="circle", size=0.012, speed=3.0)
     pressure = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.1, trajectory=circle))
@@ -106,14 +106,14 @@ def test_the_error_of_linear_bending_is_stated(pressure):
 
 
 @pytest.mark.parametrize("mounting", ['edges = ["left", "right"]', "tension_x_n_per_m = 5"])
-def test_what_a_warning_of_stretching_advises_is_computed(mounting):
+def test_the_cure_of_a_stretching_warning_can_be_computed(mounting):
     text = (
         "[tacton]\nam_frequency_hz = 140\nduration_s = 0.02\n[body]\nkind = 'sheet'\n"
         "size_x_mm = 40\nsize_y_mm = 40\nair = true\n[body.mounting]\n" + mounting
     )
     scene = loads(text + "\n[probes]\npoints_mm = [[0, 0]]")
     response = compute(scene, FROM_REST.name)
-    (said,) = of_stretching(scene, response, 0.05)
+    (said,) = stretching(scene, response, 0.05)
     (cure,) = cures_for(scene, named(NONLINEAR[0]))
     assert cure.words in said
     assert cure.model in said

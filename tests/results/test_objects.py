@@ -19,7 +19,7 @@ from simple_model import Effort, Response, phasors
 from simple_model.load.focus import spot_width
 from simple_model.numbers import stated_error
 from skinwave.planning.budget import error_budget
-from skinwave.planning.rows import PlanRow
+from skinwave.planning.record import PlanRow
 from skinwave.planning.simulate import compute
 from skinwave.report.fields import Field
 from skinwave.report.styles import style

@@ -128,7 +128,7 @@ def test_another_tone_takes_no_new_reduction(monkeypatch, tmp_path):
     np.testing.assert_array_equal(first.inertia, louder.inertia)
     along = prepare(COLUMN, probes, h=6e-3, load=Load())
     assert "factorise and reduce" in along.effort.seconds
-    assert not along.carried.any()
+    assert not along.translation.any()
 
 
 def test_scenes_with_it_come_back_from_their_files_and_are_planned():

@@ -87,7 +87,7 @@ def counted(monkeypatch, folder):
     """Factorisations from here on, with a cache of their own."""
     monkeypatch.setenv("SKINWAVE_CACHE", str(folder))
     reductions.prepared.cache_clear()
-    covering.kept_together.cache_clear()
+    covering.cached_shared_body.cache_clear()
     made = []
     for module, name in ((fem.krylov, "factorise"), (fem.affine, "SumFactoriser")):
         inner = getattr(module, name)

@@ -1,0 +1,104 @@
+"""Expected error of a response: its parts, their total, and the warnings that they cause."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+
+from skinwave.models import Model, named
+from skinwave.models.laws import own_laws, series_tolerance
+from skinwave.models.reduced import BAND, ReducedBody
+from skinwave.models.relative_change import change_text
+from skinwave.planning.estimates import spot_scale
+from skinwave.planning.left_out import series_error
+from skinwave.planning.plan_warnings import ERROR_UNKNOWN, rigid_body_drift, under_resolved
+from skinwave.planning.refinement import enough
+from skinwave.scene.scene import Scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class ErrorPart:
+    """One cause of error: its `source` as a noun phrase, the relative `error` of the worst probe's
+    waveform, and the `cure` of a warning in the imperative.
+    """
+
+    source: str
+    error: float
+    cure: str = ""
+
+
+def total_error(parts: Iterable[ErrorPart], *, independent: bool = False) -> float:
+    """Return the sum of the parts, or of independent ones the root of the sum of squares."""
+    errors = [part.error for part in parts]
+    return float(np.linalg.norm(errors) if independent else sum(errors))
+
+
+def part_warnings(parts: Iterable[ErrorPart], tolerance: float) -> tuple[str, ...]:
+    """Return a warning of each part that is above the tolerance."""
+    return tuple(
+        f"{part.source}: expected error {change_text(part.error)}, tolerance "
+        f"{100 * tolerance:g} %; {part.cure}"
+        for part in parts
+        if part.error > tolerance
+    )
+
+
+def element_parts(
+    scene: Scene, tolerance: float, h: float, *,
+    mesh: float, reduction: float, absorbing: float, above_band: float,
+) -> list[ErrorPart]:  # fmt: skip
+    """Return the parts of linear elements of h in metre: of the mesh, of the reduction, of the
+    absorbing layer, and of motion above the band of the reduced model.
+    """
+    size = 1e3 * enough(scene.body, h, mesh, tolerance)
+    return [
+        ErrorPart(source=f"elements of {1e3 * h:.3g} mm", error=mesh,
+                  cure=f"use elements of about {size:.2g} mm"),
+        ErrorPart(source="the reduced-order model", error=reduction, cure="lower the tolerance"),
+        ErrorPart(source="the absorbing layer", error=absorbing, cure="use a larger body"),
+        band_part(scene, BAND, above_band),
+    ]  # fmt: skip
+
+
+def element_warnings(scene: Scene, h: float, mesh: float) -> tuple[str, ...]:
+    """Return warnings of elements of h in metre other than those of `element_parts`; `mesh` is
+    their relative error, nan if unknown.
+    """
+    return (
+        *(() if isfinite(mesh) else (ERROR_UNKNOWN,)),
+        *rigid_body_drift(scene),
+        *under_resolved(h, spot_scale(scene.pressure)),
+    )
+
+
+def band_part(scene: Scene, band: float, error: float) -> ErrorPart:
+    """Return the part of motion above the band of a response in Hz."""
+    cure = "use a load that begins smoothly"
+    if scene.reading.record.rate:
+        cure = f"read the displacement, or {cure}"
+    return ErrorPart(source=f"the {scene.quantity} above {band:g} Hz", error=error, cure=cure)
+
+
+def start_part(model: Model, error: float) -> ErrorPart:
+    """Return the part of the start from rest, which a model of the steady state leaves out."""
+    return ErrorPart(
+        source=f"the initial transient, which {model.name} leaves out", error=error,
+        cure=f"use --model {model.from_rest}",
+    )  # fmt: skip
+
+
+def series_part(
+    scene: Scene, model: str, tolerance: float, prepared: ReducedBody | None = None
+) -> ErrorPart | None:
+    """Return the part of the Prony series that a model takes for the modulus laws of a body; None
+    if it takes none. A `prepared` body on any mesh saves the reduction of a coarse one.
+    """
+    laws = own_laws(scene.body)
+    if not laws or not named(model).takes_series(scene.body):
+        return None
+    return ErrorPart(
+        source=f"the {laws[0].series(series_tolerance(tolerance)).words}",
+        error=series_error(scene, model, tolerance, prepared),
+        cure="use --model flat-body-harmonic or fem-harmonic, which take the law itself",
+    )

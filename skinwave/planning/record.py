@@ -1,0 +1,73 @@
+"""Plan of a simulation, with a reason for each decision."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+from skinwave.models.options import DEFAULT, SolveOptions
+from skinwave.models.reduced import ReducedBody
+from skinwave.scene.scene import Body
+from skinwave.system.drawn import drawn
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlanRow:
+    """One decision of a plan, its value, and its reason."""
+
+    what: str
+    value: str
+    reason: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """Plan of a simulation, as `skinwave.plan` returns it.
+
+    Attributes
+    ----------
+    model : str, name of the model
+    body : Body, the part of the scene's body that is modelled
+    symmetry : str, axes of "xy" across which the body is halved
+    h : float or None, element size in metre; None without a mesh
+    highest : float, highest relevant line of the load in Hz
+    error : float, expected relative error
+    seconds, memory : float, predicted cost of the first response in s and bytes
+    rows : tuple of PlanRow, the decisions with their reasons
+    warnings : tuple of str, one sentence for each part of the request that is not met
+    prepared : ReducedBody or None, the body reduced on the planned mesh
+    options : SolveOptions, the request
+
+    Examples
+    --------
+    >>> import skinwave
+    >>> plan = skinwave.plan(skinwave.loads("[body]\\nkind = 'none'"))
+    >>> plan.model
+    'point-kernel'
+    >>> plan.rows[0].reason
+    'the scene has no body that moves'
+    """
+
+    model: str
+    body: Body
+    symmetry: str = ""
+    h: float | None = None
+    highest: float = 0.0
+    error: float = 0.0
+    seconds: float = 0.1
+    memory: float = 1e8
+    rows: tuple[PlanRow, ...] = ()
+    warnings: tuple[str, ...] = ()
+    prepared: ReducedBody | None = field(default=None, repr=False)
+    options: SolveOptions = field(default=DEFAULT, repr=False)
+
+    def table(self) -> dict[str, Any]:
+        """Return the plan as JSON values, without the reduced body and the options."""
+        values = asdict(replace(self, prepared=None, options=DEFAULT))
+        return {key: value for key, value in values.items() if key not in ("prepared", "options")}
+
+    def __repr__(self) -> str:
+        return drawn("notebook", "plan_line", self)
+
+    def _repr_html_(self) -> str:
+        return drawn("notebook", "plan_page", self)
