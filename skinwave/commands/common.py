@@ -15,6 +15,7 @@ from skinwave.system.plain_text import say
 
 if TYPE_CHECKING:
     from simple_model import Response
+    from skinwave.models.options import SolveOptions
     from skinwave.planning.record import Plan
     from skinwave.scene.scene import Scene
     from skinwave.system.effort import Progress
@@ -103,16 +104,22 @@ def add_model(parser: argparse.ArgumentParser, *, has_steps: bool = True) -> Non
         )
 
 
+def solving(options: argparse.Namespace, progress: "Progress", **more: Any) -> "SolveOptions":
+    """Return the element size and the solver of a command as options of a solution."""
+    from skinwave.models.options import SolveOptions
+
+    return SolveOptions(h=metre(options.h), solver=options.solver, progress=progress, **more)
+
+
 def planned(options: argparse.Namespace, scene: "Scene", **more: Any) -> "Plan":
     """Plan a scene by the options of a command, and print the warnings of the plan."""
     from skinwave.models.options import SolveOptions
     from skinwave.planning.plan import plan
 
-    solving = SolveOptions(
+    found = plan(scene, SolveOptions(
         model=options.model, tolerance=options.tolerance, h=metre(options.h), dt=options.dt,
         solver=options.solver, **more,
-    )  # fmt: skip
-    found = plan(scene, solving)
+    ))  # fmt: skip
     warn(found.warnings)
     return found
 
@@ -178,7 +185,7 @@ def result_folder(
         with progress_of(options) as progress:
             yield folder, progress
         if not (folder / record.FILE).exists():
-            record.write(folder, record.of_command(options), scene=scene)
+            record.write(folder, record.command_entry(options), scene=scene)
 
 
 def closing(options: argparse.Namespace, sentences: list[str], **summary: Any) -> None:

@@ -10,8 +10,8 @@ from skinwave.commands.common import (
     add_model_name,
     add_output,
     closing,
-    metre,
     result_folder,
+    solving,
     warn,
 )
 
@@ -83,8 +83,8 @@ def run(options: argparse.Namespace) -> int:
         if live:
             (folder / LIVE).write_text(live, encoding="utf-8")
         outcome = run_study(
-            scenes, folder, progress, title=title, command=record.of_command(options)["typed"],
-            model=options.model, h=metre(options.h), solver=options.solver, measured=measured,
+            scenes, folder, solving(options, progress, model=options.model), title=title,
+            command=record.command_entry(options)["typed"], measured=measured,
             more=[document.live_link(LIVE)] if live else [],
         )  # fmt: skip
     warn(outcome.warnings)

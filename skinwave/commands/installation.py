@@ -31,8 +31,8 @@ def examine() -> list[dict[str, str]]:
         ("solver", f"{solvers[0]} (of {', '.join(solvers)})"),
         (
             "renderer",
-            drawing.said if drawing.found else "none",
-            "" if drawing.found else drawing.said,
+            drawing.detail if drawing.is_available else "none",
+            "" if drawing.is_available else drawing.detail,
         ),
         ("threads", f"{usable_cores()} processors" + (f", limited by {limits}" if limits else "")),
         ("cache", str(home) if home else "off, by SKINWAVE_CACHE"),

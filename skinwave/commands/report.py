@@ -10,9 +10,9 @@ from skinwave.commands.common import (
     add_output,
     add_width,
     closing,
-    metre,
     progress_of,
     result_folder,
+    solving,
     summarise,
     warn,
 )
@@ -97,10 +97,10 @@ def run(options: argparse.Namespace) -> int:
 def _page(options: argparse.Namespace) -> int:
     from skinwave.report.styles import style
     from skinwave.results import record
-    from skinwave.studies.album import make
+    from skinwave.studies.album import write_album
     from skinwave.studies.report import write_report
 
-    chosen, command = style(options.style, options.width), record.of_command(options)
+    chosen, command = style(options.style, options.width), record.command_entry(options)
     source, has_results = options.source, options.source.is_dir()
     scene = None if has_results else _scene(options)
     if has_results and options.out is None:
@@ -111,11 +111,7 @@ def _page(options: argparse.Namespace) -> int:
     inputs = [source, scene.body.file if scene else ""]
     with result_folder(options, f"{source.stem}-report", inputs, scene) as (folder, progress):
         if scene is not None:
-            warnings = make(
-                folder, scene, progress, h=metre(options.h), solver=options.solver,
-                beside=options.beside,
-            )  # fmt: skip
-            warn(warnings)
+            warn(write_album(folder, scene, solving(options, progress), beside=options.beside))
         write_report(
             folder if scene else source, folder, chosen, progress, formats=options.format,
             columns=options.only, command=command["typed"] if scene else "",
@@ -139,17 +135,15 @@ def _map(options: argparse.Namespace) -> int:
     step = STEP if options.step is None else options.step
     name, inputs = f"{options.source.stem}-map", [options.source, scene.body.file]
     with result_folder(options, name, inputs, scene) as (folder, progress):
-        found = quantity_map(
-            scene, progress, reach=reach / 1e3, step=step / 1e3, h=metre(options.h),
-            solver=options.solver,
-        )  # fmt: skip
+        given = solving(options, progress)
+        found = quantity_map(scene, given, reach=reach / 1e3, step=step / 1e3)
         write_map(folder, scene, found)
     closing(options, map_sentences(scene, found))
     return 0
 
 
 def _film(options: argparse.Namespace) -> int:
-    from skinwave.report.films import check_format, film, seam
+    from skinwave.report.films import check_format, film, played_text
     from skinwave.report.renderer import renderer
     from skinwave.report.styles import style
     from skinwave.results.outputs import output_path
@@ -159,8 +153,8 @@ def _film(options: argparse.Namespace) -> int:
     check_format(out)
     if options.frames is not None and not 2 <= options.frames <= 1000:
         raise ValueError(f"--frames is {options.frames}; give a number from 2 to 1000")
-    if not renderer().found:
-        raise ValueError(f"this machine cannot draw a film: {renderer().said}")
+    if not renderer().is_available:
+        raise ValueError(f"this machine cannot draw a film: {renderer().detail}")
     with (
         output_path(out, overwrite=options.overwrite, inputs=[source]) as aside,
         progress_of(options) as progress,
@@ -170,7 +164,7 @@ def _film(options: argparse.Namespace) -> int:
         film(aside, views, style(options.style), progress, camera=camera)
     frames = len(views[0].times)
     summary = {"out": str(out), "frames": frames, "period_ms": 1e3 * views[0].period}
-    summarise(options, summary, f"{frames} frames of {seam(views[0])}; wrote {out}")
+    summarise(options, summary, f"{frames} frames of {played_text(views[0])}; wrote {out}")
     return 0
 
 
@@ -189,8 +183,7 @@ def _views(options: argparse.Namespace, progress: "Progress") -> "list[View]":
     if not options.source.is_dir():
         views, warnings = shown_views(
             replace(_scene(options), depth=0.0),  # a film shows the surface
-            progress, h=metre(options.h), solver=options.solver, frames=options.frames,
-            beside=options.beside,
+            solving(options, progress), frames=options.frames, beside=options.beside,
         )  # fmt: skip
         warn(warnings)
         return views

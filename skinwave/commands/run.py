@@ -59,8 +59,9 @@ def run(options: argparse.Namespace) -> int:
         more: list[Part] = []
         if options.samples:
             more = _uncertainty(options, run, plan.h, folder, progress)
-        write_run_page(folder, run, more)
-        record.write(folder, record.of_command(options), scene=scene, response=response)
+        command = record.command_entry(options)
+        write_run_page(folder, run, more, command["typed"])
+        record.write(folder, command, scene=scene, response=response)
     effort = response.effort
     summary = {
         "out": str(options.out), "model": response.model, "dofs": effort.dofs,

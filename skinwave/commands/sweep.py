@@ -139,7 +139,7 @@ def _sweep(options: argparse.Namespace, out: Path) -> tuple[dict[str, Any], list
         sweep = Sweep(
             folder=out, points=partial(cases, options.scene), options=solving, progress=progress,
             scheduler=options.scheduler, workers=options.workers,
-            command=record.of_command(options),
+            command=record.command_entry(options),
         )  # fmt: skip
         outcome = sweep.run(points)
         if grid and not outcome.missing:
@@ -170,7 +170,7 @@ def _sweep(options: argparse.Namespace, out: Path) -> tuple[dict[str, Any], list
 
 def _draw(options: argparse.Namespace, out: Path) -> list[str]:
     """Draw columns of a sweep's table; return the paths of the figures."""
-    from skinwave.report.figures import drawn
+    from skinwave.report.figures import figure_file
     from skinwave.report.styles import style
     from skinwave.results.files import distinct_names
     from skinwave.sweeps import dataset
@@ -194,7 +194,7 @@ def _draw(options: argparse.Namespace, out: Path) -> list[str]:
             figures[name] = line_figure(rows, column, x, by, chosen)
     stems = distinct_names(name.replace(" ", "-") for name in figures)
     files = {
-        f"figures/{stem}.{options.format}": drawn(figure, options.format, chosen.dpi)
+        f"figures/{stem}.{options.format}": figure_file(figure, options.format, chosen.dpi)
         for stem, figure in zip(stems, figures.values(), strict=True)
     }
     dataset.write_beside(out, files)

@@ -27,7 +27,7 @@ from skinwave.models.options import sample_times
 from skinwave.models.reduced import ReducedBody, answer
 from skinwave.planning.simulate import compute
 from skinwave.report.maps import MeasuredPlaces
-from skinwave.results.comparison import heard_phasors
+from skinwave.results.comparison import line_phasors
 from skinwave.results.run import ASSESSED, Run, own_names
 from skinwave.scene.scene import Scene, check_motion
 from skinwave.typing import Floats
@@ -232,7 +232,7 @@ def _spectrum_of(measurement: Measurement) -> tuple[Floats, Floats]:
 
 
 def _column(asked: Measured, run: Run, lines: MeasuredLines) -> ModelColumn:
-    z = heard_phasors(run.response, tuple(lines.frequencies.tolist()))
+    z = line_phasors(run.response, tuple(lines.frequencies.tolist()))
     gain = asked.gain if run.response.record.of_body else None
     window, centre = _delay_window(asked.measurement, run, lines)
     aligned = partial(align, window=window, centre=centre, delay=asked.delay, gain=gain)

@@ -20,8 +20,8 @@ from skinwave.measure.alignment import opposite_sign
 from skinwave.measure.claims import FAILS, HOLDS
 from skinwave.measure.comparison import LEVEL, UNKNOWN, MeasuredComparison, ModelColumn, overlap
 from skinwave.measure.inspection import flaws
-from skinwave.report.measured import MOST_LINES, lines_figure
 from skinwave.report.palette import label
+from skinwave.report.spectra import MOST_LINES, lines_figure
 from skinwave.results.claims import TEXTS
 from skinwave.system.document import Details, Picture, Section
 from skinwave.system.table import Column, Table

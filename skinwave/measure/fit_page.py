@@ -14,8 +14,8 @@ from simple_model.numbers import significant
 from skinwave.measure.findings import cautions, notes, probability, sentences, shown
 from skinwave.measure.fit import Fit
 from skinwave.report.figures import REPORT, png
-from skinwave.report.measured import lines_figure
 from skinwave.report.palette import BLUE, ORANGE
+from skinwave.report.spectra import lines_figure
 from skinwave.report.styles import Style
 from skinwave.scene.file import dumps
 from skinwave.system.document import Details, Part, Picture, Report, Section, preformatted

@@ -1,4 +1,4 @@
-"""Description of the models and of what they leave out, in sentences true of the runs at hand."""
+"""Sentences that describe a scene, the models that were run, and what these leave out."""
 
 from collections.abc import Iterable, Sequence
 
@@ -6,53 +6,52 @@ import numpy as np
 
 from simple_model import MovingPressure, Tacton
 from simple_model.layers.material import Material
+from simple_model.numbers import plural
 from skinwave.bodies.supports import FRAME
 from skinwave.models import named
-from skinwave.report.figures import answered
+from skinwave.report.figures import run_label
 from skinwave.results.run import Run
 from skinwave.scene.scene import Body, Scene
 
 NAMED = 4  # lines that a sentence names
 SPOTS = {
-    "gaussian": "a Gaussian focus",
-    "main_lobe": "a focus S = sinc²(D/D₀)",
-    "array": "the array's whole field",
+    "gaussian": "Gaussian focus",
+    "main_lobe": "focus S = sinc²(D/D₀)",
+    "array": "whole field of the array",
 }
 UNCERTAIN = (
-    "The pressure at the focus is uncertain by a factor of 2, and all displacements with it."
+    "The pressure at the focus, and therefore every displacement, is known only to a factor of 2."
 )
 
 
 def _spot(pressure: MovingPressure) -> str:
-    return SPOTS.get(pressure.profile_name, "a focal spot of its own")
+    return SPOTS.get(pressure.profile_name, "custom focal spot")
 
 
-def modelled(runs: Sequence[Run]) -> list[str]:
-    """A paragraph per body and model, and those true of all."""
+def model_paragraphs(runs: Sequence[Run]) -> list[str]:
+    """Return a paragraph for each body and model, and notes that are true of all."""
     groups: dict[tuple[str, str], list[Run]] = {}
     for run in runs:
         groups.setdefault((run.body, run.model), []).append(run)
     on_bodies = [run for run in runs if run.is_motion]
     notes = dict.fromkeys(run.scene.pressure.law.note for run in on_bodies if run.is_am)
     by_device = any(run.scene.load.of_kind.is_of_device for run in on_bodies)
-    said = [_modelled(group) for group in groups.values()]
-    return [*said, *filter(None, notes), *[UNCERTAIN] * by_device]
+    return [*map(_model_text, groups.values()), *filter(None, notes), *[UNCERTAIN] * by_device]
 
 
-def unresolved(runs: Iterable[Run]) -> list[str]:
-    """Unresolved lines of Tactons that are too short, a sentence for each duration."""
-    missing = {run.scene.tacton.duration: run.unresolved for run in runs if run.unresolved}
+def unresolved_lines(runs: Iterable[Run]) -> list[str]:
+    """Return a sentence about unresolved lines for each duration of a Tacton."""
+    unresolved = {run.scene.tacton.duration: run.unresolved for run in runs if run.unresolved}
     return [
-        f"{len(names)} line{'s' * (len(names) > 1)}, {', '.join(names[:NAMED])}"
-        f"{', ...' * (len(names) > NAMED)}, cannot be resolved in {seconds:g} s and "
-        f"{'are' if len(names) > 1 else 'is'} not reported; make the Tacton longer."
-        for seconds, names in missing.items()
+        f"A Tacton of {seconds:g} s is too short to resolve {plural(len(names), 'line')}: "
+        f"{', '.join(names[:NAMED])}{', ...' * (len(names) > NAMED)}. Make it longer to see them."
+        for seconds, names in unresolved.items()
     ]
 
 
-def _modelled(runs: list[Run]) -> str:
-    """One body by one model."""
-    scene, model, name = runs[0].scene, named(runs[0].model), answered(runs[0])
+def _model_text(runs: list[Run]) -> str:
+    """Describe the model of one body, its load, the body, and what is left out."""
+    scene, model, name = runs[0].scene, named(runs[0].model), run_label(runs[0])
     acting, body = scene.load, scene.body
     drive = scene.pressure.law.name.replace("_", " ")
     load = f"drive law {drive}, {_spot(scene.pressure)}"
@@ -61,28 +60,56 @@ def _modelled(runs: list[Run]) -> str:
     text = f"{name[0].upper()}{name[1:]}: {model.words}; {load}."
     if not runs[0].is_motion:
         return text
-    of, size = f"of {_material(body.solid)}{above(body)}", extent(body)
-    depth_only = " of which the wavenumber integral takes only the depth," * model.is_infinite
-    text += f" {size[0].upper()}{size[1:]},{depth_only} {of}."
+    material, size = f"{material_text(body.solid)}{layers_text(body)}", size_text(body)
+    infinite = " (taken as laterally infinite)" * model.is_infinite
+    text += f" Body: {size}{infinite}, of {material}."
     if body.of_kind.is_plate:
-        return f"{text} {_sheet(runs)}"
+        return f"{text} {_sheet_text(runs)}"
     left_out = ["layers"] * (len(body.strata) == 1) + ["curvature"] * body.of_kind.is_layer
     return f"{text} Left out: {' and '.join(left_out)}." if left_out else text
 
 
-def path_of(tacton: Tacton) -> str:
-    """Paths of the foci."""
+def _sheet_text(runs: list[Run]) -> str:
+    """Describe mesh, air and linearity of a sheet."""
+    body, model = runs[0].scene.body, named(runs[0].model)
+    sentences = []
+    if model.default_size:
+        sentences.append(
+            "The mesh is a thicker sheet of the same bending stiffness and mass per area."
+        )
+    if body.air:
+        sentences.append(
+            "Air moves with the sheet on both sides. Left out: flow around the edge, and sound "
+            "radiation."
+        )
+    else:
+        sentences.append(
+            "Left out: the air that moves with the sheet, which has a fifth to a third of the mass "
+            "of office paper."
+        )
+    if not model.is_nonlinear and all(run.is_motion for run in runs):
+        sag = max(float(run.response.displacement.mean(axis=0).max()) for run in runs) / body.depth
+        sentences.append(
+            f"Stretching is left out: under its mean load this sheet deflects by up to {sag:.1f} "
+            "times its thickness. Above half a thickness, a real sheet stiffens and its lowest "
+            "modes lie higher."
+        )
+    return " ".join([*sentences, "Size and support of the measured sheet are not published."])
+
+
+def path_text(tacton: Tacton) -> str:
+    """Describe the paths of the foci."""
     path = tacton.trajectory
     if path.shape == "recorded":
         f_d, n = tacton.drawing_frequency, tacton.n_paths
-        several = f"{n} paths, drawn {f_d:.3f} times a second"
+        several = f"{n} paths, drawn {f_d:.3f} times per second"
         text = several if n > 1 else f"a path recorded for {1 / f_d:.4g} s"
-        text += " with levels of its own" * bool(path.levels)
+        text += " with its own levels" * bool(path.levels)
     elif path.is_static:
         text = "at rest"
     else:
         size = 1e3 * (path.size or path.length)
-        text = f"{path.shape} of {size:g} mm{' a period' * (not path.size)} at {path.speed:g} m/s"
+        text = f"{path.shape} of {size:g} mm{' per period' * (not path.size)} at {path.speed:g} m/s"
         text += f", {path.sweep.replace('_', ' ')}" * (path.sweep != "there_and_back")
         text += f", f_d = {path.drawing_frequency:.3f} Hz"
     if any(path.centre):
@@ -92,8 +119,8 @@ def path_of(tacton: Tacton) -> str:
     return text
 
 
-def tones_of(tacton: Tacton) -> list[str]:
-    """The sinusoids that modulate."""
+def tone_texts(tacton: Tacton) -> list[str]:
+    """Describe the sinusoids that modulate the amplitude."""
     w1, w2 = tacton.superposition
     parts = [f"f_AM = {tacton.am_frequency:g} Hz"] if tacton.am_frequency * w1 else []
     parts += [f"f_AM2 = {tacton.second_am_frequency:g} Hz"] * bool(tacton.second_am_frequency * w2)
@@ -103,45 +130,46 @@ def tones_of(tacton: Tacton) -> list[str]:
     return parts
 
 
-def levels_of(tacton: Tacton) -> list[str]:
-    """Amplitude, rhythm and sampled signal, where there are any."""
+def level_texts(tacton: Tacton) -> list[str]:
+    """Describe amplitude, rhythm and sampled signal, where present."""
     parts = [f"{100 * tacton.amplitude:g} % of full drive"] * (tacton.amplitude != 1)
     if tacton.rhythm:
-        rhythm, count = tacton.rhythm, len(tacton.rhythm.pulses)
-        text = f"{count} pulse{'s' * (count > 1)} in {1e3 * rhythm.period:g} ms"
+        rhythm = tacton.rhythm
+        text = f"{plural(len(rhythm.pulses), 'pulse')} in {1e3 * rhythm.period:g} ms"
         parts.append(text + f" with ramps of {1e3 * rhythm.ramp:g} ms" * (rhythm.ramp > 0))
     if tacton.signal:
         parts.append(f"a sampled {tacton.signal.role}")
     return parts
 
 
-def extent(body: Body) -> str:
-    """Kind, size and boundary conditions of a body."""
+def size_text(body: Body) -> str:
+    """Describe kind, size and boundary conditions of a body."""
     size = body.of_kind.words(body)
     if body.mounting != FRAME:
         return f"{size}, {body.mounting.words}"
     return f"{size}, base {body.base}, sides {body.sides}" if body.of_kind.discretise else size
 
 
-def above(body: Body) -> str:
-    """The layers of a body, and how it lies under the device."""
+def layers_text(body: Body) -> str:
+    """Describe the layers of a body, and its placement under the device."""
     layers = [
-        f"{1e3 * layer.thickness:g} mm of {_material(layer.material)}" for layer in body.layers
+        f"{1e3 * layer.thickness:g} mm of {material_text(layer.material)}" for layer in body.layers
     ]
-    text = f"; on it, from the surface down: {', '.join(layers)}" if layers else ""
+    text = f"; layers from the surface down: {', '.join(layers)}" if layers else ""
     for name, material in body.regions:
-        text += f"; its region {name} of {_material(material)}"
+        text += f"; region {name} of {material_text(material)}"
     place = body.placement
     if place.is_tilted:
         x, y = np.degrees([place.tilt_x, place.tilt_y])
         text += f"; tilted by {x:g}° about x and {y:g}° about y"
     if any(place.offset) or place.lift:
-        moved = ", ".join(f"{1e3 * x:g}" for x in (*place.offset, place.lift))
-        text += f"; moved by ({moved}) mm"
+        offset = ", ".join(f"{1e3 * x:g}" for x in (*place.offset, place.lift))
+        text += f"; moved by ({offset}) mm"
     return text
 
 
-def _material(solid: Material | str) -> str:
+def material_text(solid: Material | str) -> str:
+    """Describe a material by its constants, or by its name."""
     if isinstance(solid, str):
         return solid
     text = f"density {solid.density:g} kg/m³, "
@@ -155,71 +183,48 @@ def _material(solid: Material | str) -> str:
             f"{along.poisson_xy:g}, "
         )
     if solid.law is not None:
-        return text + getattr(solid.law, "words", "a complex modulus of its own")
+        return text + getattr(solid.law, "words", "custom complex modulus")
     text += f"viscosity {solid.viscosity:g} Pa s"
     if solid.loss_factor:
         text += f", loss factor {solid.loss_factor:g}"
     for term in solid.prony:
-        text += (
-            f", a Maxwell branch of {term.modulus / 1e3:.4g} kPa with relaxation time "
-            f"{1e3 * term.time:g} ms"
-        )
+        text += f", Maxwell branch of {term.modulus / 1e3:.4g} kPa with relaxation time "
+        text += f"{1e3 * term.time:g} ms"
     return text
 
 
-def _sheet(runs: list[Run]) -> str:
-    text, model = "", named(runs[0].model)
-    if model.default_size:
-        text += "The mesh is a thicker sheet of the same bending stiffness and mass per area. "
-    text += (
-        "Air moves along on both sides. Left out: its flow around the edge, and sound radiation"
-        if runs[0].scene.body.air
-        else "Left out: the air that moves along, a fifth to a third of the mass of office paper"
-    )
-    if not model.is_nonlinear and all(run.is_motion for run in runs):
-        depth = runs[0].scene.body.depth
-        sag = max(float(run.response.displacement.mean(axis=0).max()) for run in runs) / depth
-        text += (
-            f"; and stretching: under its mean load this sheet sags by up to {sag:.1f} times its "
-            "thickness, and beyond about half a thickness a real one stiffens and its lowest "
-            "modes lie higher"
-        )
-    return f"{text}. Neither size nor support of the sheet that was measured is published."
-
-
-def asked_rows(scene: Scene) -> list[list[str]]:
-    """What a scene asks for, in rows of a table."""
+def scene_rows(scene: Scene) -> list[list[str]]:
+    """Return the contents of a scene as rows of a table."""
     tacton, pressure, body = scene.tacton, scene.pressure, scene.body
     depth = pressure.depth_of_modulation
-    of_depth = f", depth of modulation {depth:g}" if pressure.law.uses_depth else ""
-    drive = f"{pressure.drive}{of_depth}, {_spot(pressure)}, {pressure.peak_pressure:g} Pa at "
-    drive += f"full drive, {1e3 * pressure.height:g} mm above the array"
+    modulation = f", depth of modulation {depth:g}" if pressure.law.uses_depth else ""
+    drive = f"{pressure.law.name.replace('_', ' ')}{modulation}, {_spot(pressure)}, "
+    drive += f"{pressure.peak_pressure:g} Pa at full drive, {1e3 * pressure.height:g} mm above the "
+    drive += "array"
     return [
-        ["focus", path_of(tacton)],
-        ["amplitude modulation", ", ".join(tones_of(tacton)) or "none"],
-        ["amplitude", ", ".join(levels_of(tacton)) or "100 % of full drive"],
+        ["focus", path_text(tacton)],
+        ["amplitude modulation", ", ".join(tone_texts(tacton)) or "none"],
+        ["amplitude", ", ".join(level_texts(tacton)) or "100 % of full drive"],
         ["load", drive if scene.load.is_plain else scene.load.words],
-        ["body", extent(body) + above(body)],
+        ["body", size_text(body) + layers_text(body)],
         ["duration", f"{tacton.duration:g} s"],
         ["probes", ", ".join(f"({1e3 * x:g}, {1e3 * y:g})" for x, y in scene.probes) + " mm"],
-        ["they read", scene.reading.words],
+        ["quantity at the probes", scene.reading.words],
     ]
 
 
-def without_kernel(scene: Scene) -> str:
-    """That the point kernel has no such quantity."""
-    return f"the point kernel has no {scene.reading.words}, and predicts a pressure alone"
+def no_kernel_text(scene: Scene) -> str:
+    """Say that the point kernel does not compute the probes' quantity."""
+    return f"the point kernel computes only a pressure, not {scene.reading.words}"
 
 
-def other_quantity(scene: Scene) -> list[str]:
-    """Sentences for a page of a scene whose probes read something else than the displacement of
-    the surface.
-    """
+def quantity_notes(scene: Scene) -> list[str]:
+    """Return notes for a page of a scene whose probes do not read displacement of the surface."""
     if scene.reading.is_plain:
         return []
     return [
-        f"Probes read {scene.reading.words}, in {scene.reading.record.shown}; "
-        f"{without_kernel(scene)}: its columns are in Pa, and that of the quantity in lines.csv is "
-        "empty. Pictures of the surface but for maps of the quantity show its motion; claims and "
-        "sensation levels, which are of displacement, are left out of bodies."
+        f"Probes read {scene.reading.words}, in {scene.reading.record.shown}, but "
+        f"{no_kernel_text(scene)}. Its columns are in Pa, and it has no value of that quantity in "
+        "lines.csv. Pictures of the surface show its motion, except for maps of the quantity. "
+        "Claims and sensation levels, which need displacement, are left out for bodies."
     ]

@@ -9,19 +9,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import FuncFormatter
 
-from simple_model.drawing import small
 from simple_model.layers.dispersion import DispersionCurves
-from skinwave.report.figures import REPORT, legend, styled, written
+from skinwave.report.figures import LINE_STYLE, REPORT, legend, name_lines, with_style
 from skinwave.report.palette import SERIES
 from skinwave.report.styles import Style
 
 FINE = 600  # frequencies of a drawn curve
-PALE = 0.35  # opacity of a curve where its mode is evanescent
-ROWS = 3  # of the names of lines above the panels
-LETTER, GAP, LINE = 0.55, 0.7, 1.45  # width of their letters, between two, and of a row, over size
-SHARE = 0.68  # of a figure's width for the curves, where the shapes are beside them
+PALE = 0.35  # opacity of evanescent modes
+NAME_ROWS = 3  # of names of lines above the panels
+SHARE = 0.68  # of a figure's width for the curves, if the shapes are drawn too
 MOST_SHAPES = 4
-OF_LOAD: dict[str, Any] = {"color": "0.55", "lw": 0.9, "ls": ":"}
 LABELS = (
     "phase speed ω / |Re k|, m/s",
     "1/e length 1 / |Im k|, mm",
@@ -30,11 +27,11 @@ LABELS = (
 
 
 def colour(number: int) -> str:
-    """Colour of a mode by its number in the curves, from 0."""
+    """Return the colour of the mode with this index."""
     return SERIES[number % len(SERIES)]
 
 
-@styled
+@with_style
 def dispersion_figure(
     curves: DispersionCurves,
     lines: Mapping[str, float],
@@ -42,15 +39,10 @@ def dispersion_figure(
     at: float,
     style: Style = REPORT,
 ) -> Figure:
-    """Phase speed, 1/e length and group speed over frequency, and mode shapes at one frequency.
+    """Draw phase speed, 1/e length and group speed over frequency, and mode shapes at `at` Hz.
 
-    Parameters
-    ----------
-    curves : DispersionCurves
-    lines : names and frequencies in Hz of the lines of a load, the strongest first
-    focus_speed : m/s, 0 of a focus at rest
-    at : Hz, where the shapes are
-    style : Style
+    `lines` are frequencies in Hz by name, the strongest first. `focus_speed` is in m/s, 0 for a
+    focus at rest.
     """
     thick = len(curves.depths) > 2 and not style.is_narrow
     size = style.size(11.5 if thick else 8.5, 8.4)
@@ -65,15 +57,15 @@ def dispersion_figure(
         ax.set_xlim(0, curves.frequencies[-1])
         ax.set_ylabel(label)
         for frequency in lines.values():
-            ax.axvline(frequency, **OF_LOAD, zorder=0)
+            ax.axvline(frequency, **LINE_STYLE)
         ax.grid(alpha=0.25)
     width = 72 * size[0] * (SHARE if thick else 1) - 8 * style.font  # points
-    _name_lines(axes[0], lines, width)
+    name_lines(axes[0], lines, width, NAME_ROWS)
     axes[-1].set_xlabel("frequency, Hz")
     ink = mpl.rcParams["text.color"]
     entries: dict[str, dict[str, Any]] = {
         mode.name: {"color": colour(n), "lw": 2.2} for n, mode in enumerate(curves.modes)
-    } | {"evanescent": {"color": ink, "lw": 1, "alpha": PALE}, "lines of the load": OF_LOAD}
+    } | {"evanescent": {"color": ink, "lw": 1, "alpha": PALE}, "lines of the load": LINE_STYLE}
     if focus_speed:
         entries[f"focus, {focus_speed:g} m/s"] = {"color": ink, "lw": 1.2, "ls": "--"}
     legend(figure, entries, 2 if style.is_narrow else 5)
@@ -81,7 +73,7 @@ def dispersion_figure(
 
 
 def _draw_curves(axes: Sequence[Axes], curves: DispersionCurves, focus_speed: float) -> None:
-    """Speed, length and group speed of each mode, the first two pale where it is evanescent."""
+    """Draw speed, length and group speed of each mode; evanescent parts are pale."""
     speeds, groups, longest = [focus_speed], [1.0], 10.0
     drawn = []
     for n, mode in enumerate(curves.modes):
@@ -114,26 +106,8 @@ def _draw_curves(axes: Sequence[Axes], curves: DispersionCurves, focus_speed: fl
     axes[2].set_ylim(0, top)
 
 
-def _name_lines(ax: Axes, lines: Mapping[str, float], width: float) -> None:
-    """Names of lines above a panel of a width in points, the strongest that have room."""
-    size, taken = small(), [list[tuple[float, float]]() for _ in range(ROWS)]
-    for name, frequency in lines.items():
-        half = size * (LETTER * len(name.replace("_", "")) + GAP) / 2
-        middle = width * frequency / ax.get_xlim()[1]
-        low, high = middle - half, middle + half
-        free = [k for k, others in enumerate(taken) if all(high < a or b < low for a, b in others)]
-        if not free or high > width + 2 * size:
-            continue
-        taken[free[0]].append((low, high))
-        ax.annotate(
-            written(name), (frequency, 1.0), (0, 2 + LINE * size * free[0]),
-            xycoords=("data", "axes fraction"), textcoords="offset points", ha="center",
-            va="bottom", fontsize=size,
-        )  # fmt: skip
-
-
 def _shapes(figure: SubFigure, curves: DispersionCurves, at: float) -> None:
-    """Displacement over depth of the least evanescent modes, in phase with the surface."""
+    """Draw displacement over depth of the least evanescent modes, in phase with the surface."""
     axes = figure.subplots(2, 1, sharex=True, sharey=True)
     number = int(np.argmin(np.abs(curves.frequencies - at)))
     known = [n for n, mode in enumerate(curves.modes) if mode.kinds[number]]

@@ -1,4 +1,4 @@
-"""Motion of a whole body, with its expected error and all warnings."""
+"""Fields: the motion of a whole body, with its expected error and all warnings."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from skinwave.planning.assessment import assessed
 from skinwave.report.palette import SIGNED
 from skinwave.results.exports import collection
 from skinwave.results.files import folder_name
-from skinwave.results.motion import check_values, probe_lines, probe_response, waves
+from skinwave.results.motion import check_values, probe_lines, probe_response, whole_motion
 from skinwave.results.outputs import output_file
 from skinwave.results.views import split
 from skinwave.scene.scene import Scene
-from skinwave.system.effort import Progress, SkinwaveWarning
+from skinwave.system.effort import Progress, SkinwaveWarning, silent
 from skinwave.system.progress_bar import reported
 from skinwave.typing import Floats
 
@@ -33,13 +33,31 @@ if TYPE_CHECKING:
     import pyvista as pv
     from matplotlib.axes import Axes
 
-NEAR = 0.5  # of a sampling interval: how far outside a time may be
+SLACK = 0.5  # sampling intervals by which a time may lie outside those of a field
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Field:
-    """Displacement (t, n, 3) in metre of the nodes of `mesh` at `times` (t,) in s, and the relative
-    error that is expected of the probes' waveforms, nan if unknown.
+    """Motion of a whole body.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    times : (t,) float, s
+    displacement : (t, n, 3) float, metre, of the nodes of `mesh`
+    effort : Effort
+    expected_error : float, relative error of the waveforms at the probes, nan if unknown
+
+    Examples
+    --------
+    >>> import meshes, numpy as np
+    >>> from simple_model import Effort
+    >>> block = meshes.tag_boundary(meshes.block((4e-3, 4e-3, 2e-3), 2e-3))
+    >>> times = np.array([0.0, 1e-3])
+    >>> moved = 1e-6 * times[:, None, None] / 1e-3 * np.ones((2, len(block.points), 3))
+    >>> field = Field(mesh=block, times=times, displacement=moved, effort=Effort())
+    >>> field.frame(), field.frame(0.0)
+    (1, 0)
     """
 
     mesh: TetMesh
@@ -50,33 +68,36 @@ class Field:
 
     def __repr__(self) -> str:
         size = 1e6 * float(np.sqrt((self.displacement**2).sum(axis=2).max(initial=0.0)))
-        said = [
+        parts = [
             f"{plural(len(self.times), 'time')} from {1e3 * self.times[0]:g} to "
             f"{1e3 * self.times[-1]:.5g} ms, displacement at most {significant(size)} µm",
             f"{self.mesh!r}"[1:-1],
             f"expected error {stated_error(self.expected_error)}",
             plural(len(self.effort.warnings), "warning"),
         ]
-        return f"<Field: {'; '.join(said)}>"
+        return f"<Field: {'; '.join(parts)}>"
 
     def frame(self, time: float | None = None) -> int:
-        """Number of the time that is nearest to one in s or, without one, when a node is displaced
-        most; a ValueError of a time outside those of the field.
+        """Return the index of the nearest time, or of the largest displacement without a time in s.
+
+        Raises a ValueError if the time is outside those of the field.
         """
         times = self.times
         if time is None:
             return int(np.argmax((self.displacement**2).sum(axis=2).max(axis=1)))
-        slack = NEAR * float(times[1] - times[0]) if len(times) > 1 else 0.0
+        slack = SLACK * float(times[1] - times[0]) if len(times) > 1 else 0.0
         if not times[0] - slack <= time <= times[-1] + slack:
             raise ValueError(
-                f"time = {time:g} s is outside the field's, {times[0]:g} to {times[-1]:g} s; give "
-                "one of these"
+                f"time = {time:g} s is outside the times of the field, {times[0]:g} to "
+                f"{times[-1]:g} s"
             )
         return int(np.argmin(np.abs(times - time)))
 
     def to_pyvista(self, time: float | None = None) -> pv.UnstructuredGrid:
-        """The mesh at rest as a grid of pyvista, in metre, with its `displacement` (n, 3) in metre
-        at the time nearest to one in s, or when it is largest; `time_s` in its field data.
+        """Return the mesh at rest in metre with its `displacement` (n, 3) in metre.
+
+        It is that at the nearest time or, without a time in s, when it is largest. The field data
+        `time_s` is the time.
         """
         grid, k = self.mesh.to_pyvista(), self.frame(time)
         grid.point_data["displacement"] = self.displacement[k]
@@ -84,8 +105,10 @@ class Field:
         return grid
 
     def plot(self, time: float | None = None, *, ax: Axes | None = None) -> Axes:
-        """Draw the displacement into the body of the upper surface, seen from above, at the time
-        nearest to one in s, or when it is largest; colours are those of all times.
+        """Draw the displacement of the upper surface into the body, seen from above.
+
+        It is that at the nearest time or, without a time in s, when it is largest. The colour scale
+        covers all times.
         """
         from matplotlib.tri import Triangulation
 
@@ -107,25 +130,36 @@ class Field:
         return ax
 
     def save(self, path: str | Path, frames: int | None = None, *, overwrite: bool = False) -> Path:
-        """Write a ParaView collection, `path` ending in .pvd, and a .vtu file beside it of each of
-        so many times, evenly spaced, or of all; the path.
+        """Write a ParaView collection, `path` ending in .pvd, and a .vtu file for each time.
+
+        Parameters
+        ----------
+        path : str or Path
+        frames : int, number of evenly spaced times, all if not given
+        overwrite : bool
+
+        Returns
+        -------
+        Path
 
         Raises
         ------
         ValueError
-            If it ends otherwise, or there is such a file, which is not to be overwritten.
+            If the path has another ending, or a file exists and may not be overwritten.
         """
         path, count = Path(path), len(self.times)
         if path.suffix != ".pvd":
-            raise ValueError(f"'{path.name}' ends in {path.suffix or 'nothing'}; name it .pvd")
+            raise ValueError(f"'{path.name}' must end in .pvd")
         if frames is not None and frames < 1:
-            raise ValueError(f"frames = {frames} is below 1; give one at least")
+            raise ValueError(f"frames = {frames} must be 1 or more")
         chosen = np.unique(np.linspace(0, count - 1, min(frames or count, count)).round())
         times = self.times[chosen.astype(int)].tolist()
         names = [f"{folder_name(path.stem)}_{k:04d}.vtu" for k in range(len(times))]
-        taken = [name for name in (path.name, *names) if (path.parent / name).exists()]
-        if taken and not overwrite:
-            raise ValueError(f"{path.parent / taken[0]} exists; choose another, or overwrite=True")
+        existing = [name for name in (path.name, *names) if (path.parent / name).exists()]
+        if existing and not overwrite:
+            raise ValueError(
+                f"{path.parent / existing[0]} exists. Give another name or overwrite=True"
+            )
         for name, time in zip(names, times, strict=True):
             self.to_pyvista(time).save(path.parent / name)
         with output_file(path, overwrite=overwrite) as file:
@@ -142,12 +176,11 @@ def field(
     h: float | None = None,
     solver: str = "auto",
 ) -> Field:
-    """Motion of a scene's whole body from rest.
+    """Compute the motion of a scene's whole body from rest.
 
-    The body is reduced to the subspace of the load along the path: what it takes grows with the
-    length of the path, and another path needs another reduction. The error
-    against a coarser mesh and all else that falls short of the request is in `effort.warnings`,
-    each sentence issued once as a `SkinwaveWarning`.
+    The body is reduced to the subspace of the load along its path. The cost grows with the length
+    of the path, and another path needs another reduction. The error against a coarser mesh and all
+    warnings are in `effort.warnings`; each is also issued as a `SkinwaveWarning`.
 
     Parameters
     ----------
@@ -157,26 +190,37 @@ def field(
 
     Returns
     -------
-    Field, displacement (t, n, 3) in metre
+    Field
 
     Raises
     ------
     ValueError
-        If the scene has no body, a number is out of range or the tolerance is out of reach.
+        If the scene has no body, a number is out of range, or the tolerance cannot be reached.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import skinwave
+    >>> scene = skinwave.loads(
+    ...     "[tacton]\nam_frequency_hz = 140\nduration_s = 0.05\n[body]\nsize_x_mm = 30\n"
+    ...     "size_y_mm = 30\nthickness_mm = 6\nsides = 'clamped'\n"
+    ...     "[probes]\npoints_mm = [[0, 0]]"
+    ... )
+    >>> field = skinwave.field(scene, np.arange(100) / 5000, h=6e-3)  # doctest: +SKIP
     """
     with reported(progress) as report:
-        moved = waves(scene, tolerance, report, h=h, solver=solver)
+        options = SolveOptions(h=h, tolerance=tolerance, solver=solver, progress=report)
+        moved = whole_motion(scene, options)
     check_values(len(times), len(moved.mesh.points))
     displacement = (from_rest(moved.motion, times) @ moved.own_basis.T).reshape(len(times), -1, 3)
-    surface = replace(scene, depth=0.0, quantity=DISPLACEMENT.name)  # what is assessed is motion
+    surface = replace(scene, depth=0.0, quantity=DISPLACEMENT.name)  # the error is that of motion
     response = probe_response(surface, moved)
-    options = SolveOptions(h=h, tolerance=tolerance, solver=solver)
-    held = scene.body.is_held  # of a free body, whose mean has no bound, the lines are compared
+    held = scene.body.is_held  # the mean of an unconstrained body grows; its lines are compared
     compared = response.values if held else oscillating(probe_lines(surface, moved)).lines
-    stated = assessed(surface, response, compared, options)
-    for sentence in stated.effort.warnings:
+    response = assessed(surface, response, compared, replace(options, progress=silent))
+    for sentence in response.effort.warnings:
         warnings.warn(sentence, SkinwaveWarning, stacklevel=2)
     return Field(
-        mesh=moved.mesh, times=times, displacement=displacement, effort=stated.effort,
-        expected_error=stated.expected_error,
+        mesh=moved.mesh, times=times, displacement=displacement, effort=response.effort,
+        expected_error=response.expected_error,
     )  # fmt: skip

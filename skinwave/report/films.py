@@ -11,24 +11,25 @@ from simple_model.numbers import significant
 from skinwave.report.palette import COLOURS, SPARE
 from skinwave.report.render import Image, stage
 from skinwave.report.styles import Style
-from skinwave.results import speeds
+from skinwave.results import playback
 from skinwave.results.views import View
 from skinwave.system.effort import Progress, silent
 
-LASTS = 4.0  # s that a film lasts on the screen,
-EACH = 0.04  # s that a frame does at least
+SHORTEST = 4.0  # s, of a film
+SHORTEST_FRAME = 0.04  # s
 ROUND_OFF = 1e-4  # of a turn
 FORMATS = (".gif", ".mp4")
 ENCODER = ("imageio", "imageio_ffmpeg")
-SHADES = 240  # colours of a GIF that are found in its frames; the rest are those of the page
+SHADES = 240  # colours of a GIF that are chosen from its frames; the others are fixed
 
 
 def film(
     path: Path, views: Sequence[View], style: Style, progress: Progress | None = None, *,
     camera: str = "tilted", panel: tuple[int, int] | None = None,
 ) -> None:  # fmt: skip
-    """Write the views' frames, one period of the whole pattern in the steady state, which repeats
-    without a seam where the load is periodic; raises what `check_format` does.
+    """Write a film of one period of the steady state, with the views side by side.
+
+    It repeats without a jump if the load is periodic. Raises what `check_format` raises.
     """
     check_format(path)
     count, report = len(views[0].times), progress or silent
@@ -46,34 +47,34 @@ def film(
 
 
 def check_format(path: Path) -> None:
-    """Refuse a film that cannot be written, by a ValueError, before anything is computed."""
+    """Raise a ValueError if a film of this format cannot be written."""
     if path.suffix not in FORMATS:
-        raise ValueError(f"film '{path.name}' ends in none of {', '.join(FORMATS)}; name it .gif")
+        raise ValueError(f"the film '{path.name}' must end in {' or '.join(FORMATS)}")
     if path.suffix == ".mp4" and not all(map(find_spec, ENCODER)):
         raise ValueError(
-            "MP4 needs imageio and imageio-ffmpeg, which are not installed; install the extra "
-            "[film], or name it .gif"
+            "MP4 needs imageio and imageio-ffmpeg, which are not installed. Install the extra "
+            "[film], or write a .gif"
         )
 
 
-def seam(view: View) -> str:
-    """Part of a view's motion that is shown, and whether it repeats without a seam, in words."""
-    span, whole = f"{significant(1e3 * view.period)} ms", speeds.period(view.scene.pressure)
-    jump = speeds.seam(view.scene.tacton, view.period)
+def played_text(view: View) -> str:
+    """Describe the played part of a view's motion, and whether it repeats without a jump."""
+    span, whole = f"{significant(1e3 * view.period)} ms", playback.whole_period(view.scene.pressure)
+    jump = playback.phase_jump(view.scene.tacton, view.period)
     if jump < ROUND_OFF:
-        return f"one period of {span}, which repeats without a seam"
-    repeats = f"of {significant(1e3 * whole)} ms" if whole else "that never quite repeats"
-    turn = f"phases jump by up to {100 * jump:.2g} % of a turn"
-    return f"{span} of a pattern {repeats}; where it begins again, {turn}"
+        return f"one period of {span}, which repeats without a jump"
+    pattern = f"{significant(1e3 * whole)} ms long" if whole else "that never repeats exactly"
+    turn = f"phases jump by up to {100 * jump:.2g} % of a turn at each repetition"
+    return f"{span} of a pattern {pattern}; {turn}"
 
 
-def lasts(frames: int) -> float:
-    """How long in s a film of so many frames is shown."""
-    return max(LASTS, EACH * frames)
+def duration(frames: int) -> float:
+    """Return the duration in s of a film with so many frames."""
+    return max(SHORTEST, SHORTEST_FRAME * frames)
 
 
 def _write_gif(path: Path, frames: list[Image], style: Style) -> None:
-    """With one palette for all frames, so that still parts do not flicker."""
+    """Write a GIF with one palette for all frames, so that still parts do not flicker."""
     from PIL import Image as Pillow
 
     some = Pillow.fromarray(np.concatenate(frames[:: max(1, len(frames) // 4)]))
@@ -87,7 +88,7 @@ def _write_gif(path: Path, frames: list[Image], style: Style) -> None:
     ]
     shown[0].save(
         path, save_all=True, append_images=shown[1:], loop=0, optimize=False,
-        duration=round(100 * lasts(len(frames)) / len(frames)) * 10,  # ms, in steps of ten
+        duration=round(100 * duration(len(frames)) / len(frames)) * 10,  # ms, in steps of ten
     )  # fmt: skip
 
 
@@ -95,6 +96,6 @@ def _write_mp4(path: Path, frames: Iterator[Image], count: int) -> None:
     import imageio.v2 as imageio
 
     writer: Any
-    with imageio.get_writer(path, fps=count / lasts(count), macro_block_size=16) as writer:
+    with imageio.get_writer(path, fps=count / duration(count), macro_block_size=16) as writer:
         for frame in frames:
             writer.append_data(frame)

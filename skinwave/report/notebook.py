@@ -1,4 +1,4 @@
-"""Scenes, plans and comparisons in a line, and as small pages for notebooks."""
+"""Scenes, plans and comparisons as one line of text, and as small pages for notebooks."""
 
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
@@ -8,7 +8,7 @@ import numpy as np
 from simple_model import drawing
 from simple_model.load.focus import spot_width
 from simple_model.numbers import percent, plural, stated_error
-from skinwave.report.description import asked_rows
+from skinwave.report.description import scene_rows
 from skinwave.typing import Floats
 
 if TYPE_CHECKING:
@@ -21,52 +21,53 @@ if TYPE_CHECKING:
     from skinwave.scene.scene import Scene
 
 BODY, PATH, FOCUS, PROBE = "#e8d5c4", "#222222", "#D55E00", "#0072B2"
-REACH = 4.0  # widths of a focal spot that its contour is looked for in
-HALF = 0.5  # of the pressure at a focus: its contour
-NARROW = 0.5  # inch for each point of its letters, below which a legend has one column
-MOST_NUMBERED = 20  # probes
+SPOT_REACH = 4.0  # widths of a focal spot within which its contour is drawn
+HALF = 0.5  # of the pressure at a focus, on its contour
+NARROW = 0.5  # inch per point of font size: a narrower legend has one column
+MOST_NUMBERED = 20  # probes with a number
 MOST_ROWS = 12  # probes in a table
 
 
-def _line(kind: str, said: Iterable[str]) -> str:
-    return f"<{kind}: {'; '.join(said)}>"
+def _line(kind: str, parts: Iterable[str]) -> str:
+    return f"<{kind}: {'; '.join(parts)}>"
 
 
 def scene_line(scene: "Scene") -> str:
-    """Name, Tacton, body and probes in a line."""
+    """Describe name, Tacton, body and probes in one line."""
     tacton, body, path = scene.tacton, scene.body, scene.tacton.trajectory
     tones = [f"{f:g} Hz" for f in (tacton.am_frequency, tacton.second_am_frequency) if f]
-    moved = f"{path.shape} of {1e3 * path.size:.4g} mm at {path.speed:g} m/s"
-    driven = [f"AM {', '.join(tones)}"] if tones else []
-    driven += ["focus at rest" if path.is_static else moved, f"{tacton.duration:g} s"]
-    driven += [scene.load.words] * (not scene.load.is_plain)
-    of = body.of_kind.words(body)
+    moving = f"{path.shape} of {1e3 * path.size:.4g} mm at {path.speed:g} m/s"
+    load = [f"AM {', '.join(tones)}"] if tones else []
+    load += ["focus at rest" if path.is_static else moving, f"{tacton.duration:g} s"]
+    load += [scene.load.words] * (not scene.load.is_plain)
+    size = body.of_kind.words(body)
     if body.of_kind.discretise:
         layers = [f"{1e3 * each.thickness:g} mm of {_named(each.material)}" for each in body.layers]
-        of += f", {'; below it '.join([*layers, _named(body.material)])}"
+        size += f", {'; below it '.join([*layers, _named(body.material)])}"
     probes = f"{plural(len(scene.probes), 'probe')}, {scene.reading.words}"
-    return _line(f"Scene {scene.name!r}", [", ".join(driven), of, probes])
+    return _line(f"Scene {scene.name!r}", [", ".join(load), size, probes])
 
 
 def plan_line(plan: "Plan") -> str:
-    """Model, body, expected error, cost and number of warnings."""
+    """Describe model, body, expected error, cost and number of warnings in one line."""
     body = plan.body.of_kind.words(plan.body)
     body += f" halved across {' and '.join(plan.symmetry)}" if plan.symmetry else ""
     size = f"elements of {1e3 * plan.h:.3g} mm" if plan.h else "no mesh"
-    error, warned = stated_error(plan.error), plural(len(plan.warnings), "warning")
-    said = [f"{size}, {body}", f"expected error {error}", _cost(plan), warned]
-    return _line(f"Plan of {plan.model}", said)
+    error, warnings = stated_error(plan.error), plural(len(plan.warnings), "warning")
+    parts = [f"{size}, {body}", f"expected error {error}", _cost(plan), warnings]
+    return _line(f"Plan of {plan.model}", parts)
 
 
-def agreement_line(found: "Agreement") -> str:
-    """Misfits, delays and number of lines."""
-    said = [
-        f"relative L2 misfit {_range(found.relative_l2)}",
-        f"of the shape {_range(found.shape_misfit)}",
-        f"scale {found.scale:.4g}",
-        f"{plural(len(found.probes), 'probe')}, {plural(len(found.frequencies), 'line')}",
+def agreement_line(agreement: "Agreement") -> str:
+    """Describe misfits, scale and number of lines in one line."""
+    probes = plural(len(agreement.probes), "probe")
+    parts = [
+        f"relative L2 misfit {_range(agreement.relative_l2)}",
+        f"misfit of the shape {_range(agreement.shape_misfit)}",
+        f"scale {agreement.scale:.4g}",
+        f"{probes}, {plural(len(agreement.frequencies), 'line')}",
     ]
-    return _line("Agreement", said)
+    return _line("Agreement", parts)
 
 
 def _named(material: object) -> str:
@@ -86,14 +87,14 @@ def _range(misfit: Floats) -> str:
 
 
 def scene_page(scene: "Scene") -> str:
-    """A scene from above, and what it asks for."""
-    uncertain = [f"{key} is uncertain; its central value is taken" for key, _ in scene.spreads]
+    """Return a page with a scene from above and a table of its contents."""
+    uncertain = [f"{key} is uncertain; its central value is used" for key, _ in scene.spreads]
     image = drawing.picture(lambda figure: draw_scene(scene, figure.subplots()), 4.2, 3.8)
-    return drawing.page(f"Scene {scene.name}", image, [drawing.table(asked_rows(scene))], uncertain)
+    return drawing.page(f"Scene {scene.name}", image, [drawing.table(scene_rows(scene))], uncertain)
 
 
 def plan_page(plan: "Plan") -> str:
-    """A plan: the body that is modelled, and every choice with its reason."""
+    """Return a page with the modelled body and every choice of a plan with its reason."""
 
     def draw(figure: "Figure") -> None:
         ax = figure.subplots()
@@ -108,24 +109,25 @@ def plan_page(plan: "Plan") -> str:
     return drawing.page(f"Plan: {plan.model}", image, tables, plan.warnings)
 
 
-def agreement_page(found: "Agreement") -> str:
-    """A comparison: misfit and delay at every probe, and lines in dB."""
+def agreement_page(agreement: "Agreement") -> str:
+    """Return a page with misfit and delay at every probe, and lines in dB."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        levels = 20 * np.log10(found.line_ratios).T
+        levels = 20 * np.log10(agreement.line_ratios).T
     columns = zip(
-        found.probes, found.relative_l2, found.shape_misfit, found.delay, levels, strict=True
-    )
+        agreement.probes, agreement.relative_l2, agreement.shape_misfit, agreement.delay, levels,
+        strict=True,
+    )  # fmt: skip
     rows = [
         [drawing.place_name(place), f"{100 * l2:.3g}", f"{100 * shape:.3g}", f"{1e3 * delay:.3g}",
          *(f"{level:.2f}" for level in lines)]
         for place, l2, shape, delay, lines in columns
     ]  # fmt: skip
     header = ["probe, mm", "relative L2 misfit, %", "misfit of the shape, %", "delay, ms"]
-    header += [f"{frequency:g} Hz, dB re reference" for frequency in found.frequencies]
-    facts = [["scale", f"{found.scale:.4g}"]] + [
-        [f"spread to {drop} dB", f"{1e3 * reference:.3g} mm of the reference, "
-         f"{1e3 * found.spread_candidate[drop]:.3g} mm of the candidate"]
-        for drop, reference in found.spread_reference.items()
+    header += [f"{frequency:g} Hz, dB re reference" for frequency in agreement.frequencies]
+    facts = [["scale", f"{agreement.scale:.4g}"]] + [
+        [f"spread to {drop} dB", f"{1e3 * reference:.3g} mm (reference), "
+         f"{1e3 * agreement.spread_candidate[drop]:.3g} mm (candidate)"]
+        for drop, reference in agreement.spread_reference.items()
     ]  # fmt: skip
     tables = [drawing.table(facts), drawing.table(rows[:MOST_ROWS], header)]
     return drawing.page("Candidate against reference", b"", tables)
@@ -151,15 +153,16 @@ def draw_scene(scene: "Scene", ax: "Axes | None") -> "Axes":
 
 
 def _finish(ax: "Axes", legend: Mapping[str, Any]) -> None:
-    """Axes in mm, and a legend above them."""
+    """Label axes in mm and add a legend above them."""
     ax.set(aspect="equal", xlabel="x, mm", ylabel="y, mm")
     ax.legend(loc="lower left", bbox_to_anchor=(0, 1), frameon=False, fontsize=drawing.small(),
               **legend)  # fmt: skip
 
 
 def _draw_body(ax: "Axes", body: "Body", symmetry: str = "") -> None:
-    """Draw the outline of a body from above; of one that is halved, shade the part with positive x
-    or y that is modelled. The surface of a file or of none is not known here.
+    """Draw the outline of a body from above; shade the modelled part if it is halved.
+
+    Nothing is drawn for a body from a file, whose surface is not known here.
     """
     from matplotlib.patches import FancyBboxPatch, Rectangle
 
@@ -177,7 +180,7 @@ def _draw_body(ax: "Axes", body: "Body", symmetry: str = "") -> None:
         left, bottom = (0.0 if a in symmetry else -size / 2
                         for a, size in (("x", width), ("y", height)))  # fmt: skip
         part = Rectangle((left, bottom), width / 2 - left, height / 2 - bottom, facecolor=BODY)
-        part.set_label("part that is modelled")
+        part.set_label("modelled part")
         ax.add_patch(part)
         part.set_clip_path(outline)
     ax.update_datalim([(-width / 2 - 2, -height / 2 - 2), (width / 2 + 2, height / 2 + 2)])
@@ -185,10 +188,10 @@ def _draw_body(ax: "Axes", body: "Body", symmetry: str = "") -> None:
 
 
 def _draw_foci(ax: "Axes", scene: "Scene") -> None:
-    """Contour of half the pressure at every focus at the start."""
+    """Draw the contour of half the pressure at every focus at the start."""
     tacton, width = scene.tacton, spot_width(scene.pressure.height)
     phases = np.mod(tacton.trajectory.phase(0.0) + np.array(tacton.foci), 1.0)
-    across = REACH * width * np.linspace(-1, 1, 81)
+    across = SPOT_REACH * width * np.linspace(-1, 1, 81)
     grid = np.stack(np.meshgrid(across, across), axis=-1).reshape(-1, 2)
     shape = len(across), len(across)
     for centre in tacton.trajectory.at_phase(phases):

@@ -11,7 +11,7 @@ from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 
 BLUE, ORANGE = "#0072B2", "#D55E00"
 SPARE = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-SERIES = (BLUE, ORANGE, *SPARE)  # of curves that are no body or model
+SERIES = (BLUE, ORANGE, *SPARE)  # of other curves
 COLOURS = {
     **{model.name: model.colour for model in (SAME_LOAD, PUBLISHED)},
     "paper-sheet": ORANGE,
@@ -25,30 +25,30 @@ LABELS = {
     "paper-sheet-loose": "loose sheet",
     "skin-slab": "skin slab",
 }
-SIGNED, SEQUENTIAL = "RdBu_r", "cividis"  # colour maps, of quantities with and without a sign
+SIGNED, SEQUENTIAL = "RdBu_r", "cividis"  # colour maps of quantities with and without a sign
 
 
 def colour(column: str) -> str:
-    """The colour of a `Run.column`."""
+    """Return the colour of a `Run.column`."""
     return COLOURS.get(column) or SPARE[sum(map(ord, column)) % len(SPARE)]
 
 
-def inked(column: str) -> str:
-    """The same in a style whose paper may be dark, on which black is its ink."""
+def ink_colour(column: str) -> str:
+    """Return the colour of a `Run.column`; the ink of the style instead of black."""
     own = colour(column)
     return str(mpl.rcParams["text.color"]) if own == "#000000" else own
 
 
 def marker(column: str) -> str:
-    """The marker of a `Run.column`."""
+    """Return the marker of a `Run.column`."""
     return MARKERS.get(column, "^")
 
 
-def drawn_as(column: str) -> dict[str, Any]:
-    """Colour and marker of a `Run.column`, as properties of its lines."""
-    return {"color": inked(column), "marker": marker(column)}
+def line_style(column: str) -> dict[str, Any]:
+    """Return colour and marker of a `Run.column` as properties of a line."""
+    return {"color": ink_colour(column), "marker": marker(column)}
 
 
 def label(column: str) -> str:
-    """The name of a `Run.column`, as legends and tables have it."""
+    """Return the name of a `Run.column` in legends and tables."""
     return LABELS.get(column, column)

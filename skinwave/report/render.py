@@ -1,6 +1,6 @@
-"""Views in three dimensions (pyvista, off screen): bodies side by side, cut open or from above.
+"""Three-dimensional pictures of views (pyvista, off screen): side by side, cut open, from above.
 
-Lengths are in mm, and cameras without perspective, so that one scale bar is right everywhere.
+Lengths are in mm. Cameras have no perspective, so that one scale bar is valid everywhere.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -14,70 +14,72 @@ from numpy.typing import NDArray
 
 from meshes.tetmesh import boundary_facets
 from simple_model.quantities import PRESSURE, quantity
-from skinwave.report.maps import carrier
+from skinwave.report.maps import interpolation
 from skinwave.report.palette import SEQUENTIAL, SIGNED, colour, label
 from skinwave.report.styles import Style
 from skinwave.results.views import View, path_points, split
 from skinwave.typing import Floats, Ints
 
 Image = NDArray[np.uint8]
-Carrier = Callable[[Floats], Floats]  # values (s,) of a surface -> values at some places
-# Where the camera is seen from, what it looks at and half the height it sees, in widths of a body.
+Interpolation = Callable[[Floats], Floats]  # values (s,) of a surface -> values at some places
+# Direction of the camera, its focal point, and half of the visible height, in widths of a body.
 CAMERAS = {
     "tilted": ((-0.45, -1.0, 0.85), (0.0, -0.03, -0.05), 0.62),
     "front": ((0.0, -1.0, 0.45), (0.0, 0.2, 0.0), 0.5),
     "top": ((0.0, 0.0, 1.0), (0.0, 0.06, 0.0), 0.72),
 }
-SHOWN = 0.06  # of the body's width: how far the largest motion is drawn at most
-BAR = 10.0  # mm, the scale bar
-COLUMN = 112  # pixels for the colour bar
-ABOVE = 0.4  # mm, by which marks are lifted off the surface
+LARGEST_DRAWN = 0.06  # of the body's width, for the largest motion
+BAR = 10.0  # mm, length of the scale bar
+COLUMN = 112  # pixels, width of the colour bar
+WIDTH = 1600  # pixels, of a picture at least
+LIFT = 0.4  # mm, of path, probes and focus above the surface
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Panel:
-    """Geometry drawn of one view: a skin of triangles, the indices of its points (n,) in the view,
-    marks that ride on it, the focus and what is under it at every frame, and the factor by which
-    motion is multiplied.
+    """Geometry of one view: triangles of its surface with their nodes (n,), marks that move with
+    it, the focus, the interpolation to the focus at every frame, and the exaggeration.
     """
 
     view: View
     skin: Any
     nodes: Ints
-    marks: tuple[tuple[Any, Carrier], ...]
+    marks: tuple[tuple[Any, Interpolation], ...]
     focus: Any
-    under_focus: Carrier
+    under_focus: Interpolation
     factor: float
 
 
 def exaggeration(view: View) -> float:
-    """By what motion is multiplied so that it is seen: 1, 2 or 5 times a power of ten; 0 of the
-    point kernel, in which nothing moves.
-    """
+    """Return the exaggeration of motion: 1, 2 or 5 times a power of ten; 0 for the point kernel."""
     if view.quantity is PRESSURE:
         return 0.0
-    most = SHOWN * float(np.ptp(view.places[:, 0])) / view.peak
+    most = LARGEST_DRAWN * float(np.ptp(view.places[:, 0])) / view.peak
     power = 10.0 ** floor(log10(most))
     return power * max(step for step in (1, 2, 5) if step * power <= most)
 
 
-def shown_scale(view: View) -> str:
-    """How motion is drawn, in words, and what colours it if that is not the motion."""
+def scale_text(view: View) -> str:
+    """Return the exaggeration of the motion as text and, if it is not the motion, the colour."""
     factor = exaggeration(view)
     if not factor:
-        return "pressure; nothing moves"
-    named = f"{quantity(view.shade.quantity).words}; " if view.shade else ""
-    return f"{named}motion drawn {factor:,.0f} times"
+        return "pressure, no motion"
+    named = f"colour: {quantity(view.shade.quantity).words}; " if view.shade else ""
+    return f"{named}motion exaggerated {factor:,.0f} times, mean removed"
 
 
 def picture(
     views: Sequence[View], style: Style, frame: int = 0, *, camera: str = "tilted",
     cut: bool = False,
 ) -> Image:  # fmt: skip
-    """Views side by side at one frame, (height, width, 3), seen by one of `CAMERAS`; `cut` without
-    the half of each body that is nearer to it.
+    """Return a picture (height, width, 3) of views side by side, from one of `CAMERAS`.
+
+    With `cut`, the half of each body that is nearer to the camera is left out.
     """
-    with stage(views, style, camera=camera, cut=cut) as show:
+    width, height = style.panel
+    larger = max(1.0, (WIDTH - COLUMN) / (len(views) * width))
+    panel = round(larger * width), round(larger * height)
+    with stage(views, style, camera=camera, cut=cut, panel=panel) as show:
         return show(frame)
 
 
@@ -86,15 +88,15 @@ def stage(
     views: Sequence[View], style: Style, *, camera: str = "tilted", cut: bool = False,
     panel: tuple[int, int] | None = None,
 ) -> Iterator[Callable[[int], Image]]:  # fmt: skip
-    """A scene that is built once, and what shows it at a frame.
+    """Context manager that builds a plotter once and yields a function from a frame to a picture.
 
-    One colour scale serves all views: motion into the body over each model's largest or, of a
-    single view, motion in its own unit; another quantity in its unit, from 0 if it has no sign.
+    All views have one colour scale: motion into the body over each model's largest or, for a single
+    view, motion in its unit; another quantity in its unit, from 0 if it has no sign.
     """
     import pyvista as pv
     from vtkmodules.vtkCommonCore import vtkLogger
 
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # of displays that are not asked for
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # warnings about displays
     width, height = panel or style.panel
     share = [width / COLUMN] * len(views) + [1.0]
     plotter = pv.Plotter(
@@ -104,17 +106,17 @@ def stage(
     try:
         plotter.set_background(style.paper)
         small = height / 432 * 11
-        limits, title = scale(views)
+        limits, title = _colour_scale(views)
         panels = []
         for k, view in enumerate(views):
             plotter.subplot(0, k)
-            panels.append(prepared(view, cut))
-            actor = _add(plotter, panels[-1], style, limits, small, lit=camera != "top")
+            panels.append(make_panel(view, cut))
+            actor = _draw_panel(plotter, panels[-1], style, limits, small, lit=camera != "top")
             if not cut:  # the rim of the surface at rest
                 low, high = view.places.min(axis=0), view.places.max(axis=0)
                 rim = np.where([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]], high, low)
                 plotter.add_mesh(_line(rim, cut=False), color="#9a9a9a", line_width=1)
-            _look(plotter, camera, panels)
+            _set_camera(plotter, camera, panels)
         plotter.subplot(0, len(views))
         plotter.add_scalar_bar(
             title, mapper=actor.mapper, vertical=True, color=style.ink, n_labels=5,
@@ -124,12 +126,12 @@ def stage(
         plotter.subplot(0, 0)
 
         def show(frame: int) -> Image:
-            place(panels, frame, limits[1])
+            set_frame(panels, frame, limits[1])
             plotter.subplot(0, 0)
             stamp = f"t = {1e3 * views[0].times[frame]:.2f} ms"
             plotter.add_text(stamp, position=(0.66, 0.03), viewport=True, font_size=small,
                              color=style.ink, name="time", render=False)  # fmt: skip
-            plotter.render()  # or the picture before is taken again
+            plotter.render()  # otherwise the screenshot is the previous picture
             return np.asarray(plotter.screenshot(None, return_img=True, scale=style.oversampling))
 
         yield show
@@ -137,13 +139,13 @@ def stage(
         plotter.close()
 
 
-def scale(views: Sequence[View]) -> tuple[tuple[float, float], str]:
-    """The ends of the colour scale, and its title."""
+def _colour_scale(views: Sequence[View]) -> tuple[tuple[float, float], str]:
+    """Return the limits of the colour scale, and its title."""
     shades = [view.shade for view in views if view.shade]
     if shades:
-        asked = quantity(shades[0].quantity)
-        most = asked.per_unit * max(float(np.abs(shade.values).max()) for shade in shades) or 1.0
-        return (-most if asked.invariant is None else 0.0, most), f"{asked.shown}\n"
+        shown = quantity(shades[0].quantity)
+        most = shown.per_unit * max(float(np.abs(shade.values).max()) for shade in shades) or 1.0
+        return (-most if shown.invariant is None else 0.0, most), f"{shown.shown}\n"
     if len(views) > 1:
         return (-1.0, 1.0), "over the\nlargest\n"
     view = views[0]
@@ -151,8 +153,8 @@ def scale(views: Sequence[View]) -> tuple[tuple[float, float], str]:
     return (-most, most), f"{view.quantity.shown}\n"
 
 
-def prepared(view: View, cut: bool = False) -> Panel:
-    """A view, ready to be placed and drawn."""
+def make_panel(view: View, cut: bool = False) -> Panel:
+    """Return the geometry of a view."""
     import pyvista as pv
 
     nodes, triangles = outer_surface(view, cut)
@@ -160,14 +162,14 @@ def prepared(view: View, cut: bool = False) -> Panel:
     skin["motion"] = np.zeros(len(nodes), np.float32)
     path, probes = path_points(view.scene), view.scene.probe_points
     reach = np.abs(view.places).max(axis=0)
-    probes = probes[(np.abs(probes) <= reach).all(axis=1)]
-    riders = [(pv.PolyData(_lifted(probes)), probes)] if len(probes) else []
-    riders += [(_line(path, cut), path)] if len(path) > 1 else []
+    probes = probes[(np.abs(probes) <= reach).all(axis=1) & ~(cut & (probes[:, 1] < 0))]
+    riding = [(pv.PolyData(_lifted(probes)), probes)] if len(probes) else []
+    riding += [(_line(path, cut), path)] if len(path) > 1 else []
     if cut:  # the upper edge of the section
         edge = np.column_stack([np.linspace(-reach[0], reach[0], 121), np.zeros(121)])
-        riders.append((_line(edge, cut), edge))
-    marks = [(mesh, carrier(view, 0.9999 * places)) for mesh, places in riders]
-    under = carrier(view, 0.9999 * view.scene.tacton.trajectory.position(view.times))
+        riding.append((_line(edge, cut), edge))
+    marks = [(mesh, interpolation(view, 0.9999 * places)) for mesh, places in riding]
+    under = interpolation(view, 0.9999 * view.scene.tacton.trajectory.position(view.times))
     return Panel(
         view=view, skin=skin, nodes=nodes, marks=tuple(marks),
         focus=pv.PolyData(_lifted(path[:1])), under_focus=under, factor=exaggeration(view),
@@ -175,7 +177,7 @@ def prepared(view: View, cut: bool = False) -> Panel:
 
 
 def outer_surface(view: View, cut: bool = False) -> tuple[Ints, Ints]:
-    """Points (n,) of a view that are seen from outside, and triangles (k, 3) of them."""
+    """Return the points (n,) on the outer surface of a view, and its triangles (k, 3)."""
     if not len(view.tets):
         return view.surface, view.triangles
     tets = view.tets
@@ -186,7 +188,7 @@ def outer_surface(view: View, cut: bool = False) -> tuple[Ints, Ints]:
 
 
 def _line(path: Floats, cut: bool) -> Any:
-    """The path as a line, as far as there is body below it."""
+    """Return a line through places; with `cut`, only its part with y >= 0."""
     import pyvista as pv
 
     pairs = np.arange(len(path) - 1)[:, None] + np.arange(2)
@@ -197,44 +199,44 @@ def _line(path: Floats, cut: bool) -> Any:
 
 
 def _lifted(places: Floats) -> Floats:
-    return np.column_stack([1e3 * places, np.full(len(places), ABOVE)])
+    return np.column_stack([1e3 * places, np.full(len(places), LIFT)])
 
 
-def _add(
+def _draw_panel(
     plotter: Any, panel: Panel, style: Style, limits: tuple[float, float], small: float, *,
     lit: bool,
 ) -> Any:  # fmt: skip
-    """Everything of a panel; the actor of its skin."""
+    """Draw a panel; return the actor of its surface."""
     view = panel.view
     actor = plotter.add_mesh(
         panel.skin, scalars="motion", cmap=SIGNED if limits[0] else SEQUENTIAL, clim=limits,
         show_scalar_bar=False,
         ambient=0.3 if lit else 0.0, diffuse=0.8 if lit else 1.0, lighting=lit,
     )  # fmt: skip
-    balls = {"render_points_as_spheres": True}
+    balls, pixel = {"render_points_as_spheres": True}, small / 11  # of a panel of 432 pixels
     for mark, _ in panel.marks:
         if mark.n_lines:
-            plotter.add_mesh(mark, color="black", line_width=2)
+            plotter.add_mesh(mark, color="black", line_width=2 * pixel)
         else:
-            plotter.add_mesh(mark, color="#ffd000", point_size=9, **balls)
-    plotter.add_mesh(panel.focus, color="black", point_size=15, **balls)
+            plotter.add_mesh(mark, color="#ffd000", point_size=10 * pixel, **balls)
+    plotter.add_mesh(panel.focus, color="black", point_size=15 * pixel, **balls)
     own = colour(view.column)
     plotter.add_text(label(view.column), position=(0.04, 0.92), viewport=True,
                      font_size=1.25 * small,
                      color=style.ink if own == "#000000" else own)  # fmt: skip
-    plotter.add_text(shown_scale(view), position=(0.04, 0.86), viewport=True,
+    plotter.add_text(scale_text(view), position=(0.04, 0.86), viewport=True,
                      font_size=0.9 * small, color=style.ink)  # fmt: skip
     _add_scale_bar(plotter, view, style, small)
     return actor
 
 
 def _add_scale_bar(plotter: Any, view: View, style: Style, small: float) -> None:
-    """Ten millimetre along x, in front of the body."""
+    """Draw a scale bar along x, in front of the body."""
     import pyvista as pv
 
     left, front, bottom = 1e3 * view.points.min(axis=0)
     ends = np.array([[left, front - 5, bottom], [left + BAR, front - 5, bottom]])
-    plotter.add_mesh(pv.Line(*ends), color=style.ink, line_width=4)
+    plotter.add_mesh(pv.Line(*ends), color=style.ink, line_width=4 * small / 11)
     plotter.add_point_labels(
         ends.mean(axis=0)[None] - [0.0, 3.0, 0.0], [f"{BAR:g} mm"], font_size=int(1.35 * small),
         text_color=style.ink, shape=None, show_points=False, always_visible=True,
@@ -242,14 +244,14 @@ def _add_scale_bar(plotter: Any, view: View, style: Style, small: float) -> None
     )  # fmt: skip
 
 
-def _look(plotter: Any, camera: str, panels: Sequence[Panel]) -> None:
-    """The same camera and light for all panels, as far away as the widest body needs."""
+def _set_camera(plotter: Any, camera: str, panels: Sequence[Panel]) -> None:
+    """Set one camera and light for all panels, as far away as the widest body needs."""
     import pyvista as pv
 
-    way, aim, height = CAMERAS[camera]
+    direction, aim, height = CAMERAS[camera]
     widest = max(1e3 * float(np.ptp(panel.view.places, axis=0).max()) for panel in panels)
     plotter.camera.focal_point = tuple(widest * np.array(aim))
-    plotter.camera.position = tuple(widest * (np.array(aim) + 4 * np.array(way)))
+    plotter.camera.position = tuple(widest * (np.array(aim) + 4 * np.array(direction)))
     plotter.camera.up = (0.0, 1.0, 0.0) if camera == "top" else (0.0, 0.0, 1.0)
     for light in (
         pv.Light(light_type="headlight", color="white", intensity=0.6),
@@ -261,8 +263,8 @@ def _look(plotter: Any, camera: str, panels: Sequence[Panel]) -> None:
     plotter.renderer.reset_camera_clipping_range()
 
 
-def place(panels: Sequence[Panel], frame: int, limit: float) -> None:
-    """Every panel at a frame, in place, on a colour scale that ends at `limit`."""
+def set_frame(panels: Sequence[Panel], frame: int, limit: float) -> None:
+    """Move every panel to a frame, with a colour scale that ends at `limit`."""
     for panel in panels:
         view = panel.view
         motion = np.asarray(view.motion[frame], np.float64)
@@ -275,9 +277,9 @@ def place(panels: Sequence[Panel], frame: int, limit: float) -> None:
             values = np.float32(quantity(view.shade.quantity).per_unit) * values
         panel.skin["motion"] = values
         height = 1e3 * panel.factor * motion[view.surface, 2]
-        for mark, carried in panel.marks:
+        for mark, interpolate in panel.marks:
             raised = np.array(mark.points)
-            raised[:, 2] = carried(height) + ABOVE
+            raised[:, 2] = interpolate(height) + LIFT
             mark.points = raised
         focus = _lifted(view.scene.tacton.trajectory.position(view.times[frame : frame + 1]))
         panel.focus.points = focus + [0.0, 0.0, panel.under_focus(height)[frame]]

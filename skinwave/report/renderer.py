@@ -1,6 +1,6 @@
-"""Whether pictures in three dimensions can be drawn here, asked of a child process.
+"""Test whether three-dimensional pictures can be drawn, in a child process.
 
-Without GL libraries VTK ends the process that makes its first window, and no exception tells.
+Without GL libraries VTK ends the process that opens its first window, and raises no exception.
 """
 
 from dataclasses import dataclass
@@ -9,34 +9,34 @@ from functools import cache
 from meshes import subprocess_call
 
 PACKAGES = "libegl1 libgl1-mesa-dri"
-PATIENCE = 60.0  # s
+TIMEOUT = 60.0  # s
 
 
 @dataclass(frozen=True, kw_only=True)
 class Renderer:
-    """Whether there is one, and which; if there is none, why, in a sentence with its cure."""
+    """Whether there is a renderer; its name, or why there is none and what to do."""
 
-    found: bool
-    said: str
+    is_available: bool
+    detail: str
 
 
 @cache
 def renderer() -> Renderer:
-    """Renderer of this environment, probed once a process."""
+    """Return the renderer of this environment, tested once per process."""
     try:
-        return Renderer(found=True, said=subprocess_call.call(draw_a_ball, timeout=PATIENCE))
+        name = subprocess_call.call(draw_sphere, timeout=TIMEOUT)
+        return Renderer(is_available=True, detail=name)
     except TimeoutError:
-        return Renderer(found=False, said=f"a window is not made within {PATIENCE:g} s")
+        detail = f"opening a window takes more than {TIMEOUT:g} s"
     except ModuleNotFoundError as error:
-        cure = f"the Python package {error.name} is missing; install it"
-        return Renderer(found=False, said=cure)
+        detail = f"the Python package {error.name} is missing; install it"
     except Exception:
-        missing = "no picture in three dimensions can be drawn here: the GL libraries are missing"
-        return Renderer(found=False, said=f"{missing}; on Debian, apt install {PACKAGES}")
+        detail = f"the GL libraries are missing; on Debian, run apt install {PACKAGES}"
+    return Renderer(is_available=False, detail=detail)
 
 
-def draw_a_ball() -> str:
-    """Draw in a small window, and return the name of its class."""
+def draw_sphere() -> str:
+    """Draw in a small window and return the name of its class."""
     import pyvista as pv
 
     plotter = pv.Plotter(off_screen=True, window_size=(32, 32))

@@ -1,4 +1,4 @@
-"""How pictures are dressed for a report, a talk or a printed page."""
+"""Styles of pictures for a report, a talk or a printed page."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -7,19 +7,26 @@ from typing import Any
 
 from simple_model.choices import choose
 
-# Read when a file is written: text as text in SVG, and TrueType fonts in PDF, none of Type 3.
+# Settings for writing files: text as text in SVG, TrueType fonts in PDF.
 TEXT: Any = {"svg.fonttype": "none", "pdf.fonttype": 42, "ps.fonttype": 42}
 SHOWN = 0.030  # s of waveform shown, at the end of the Tacton
-NARROWEST, WIDEST = 2.0, 15.0  # inch of a figure
+NARROWEST, WIDEST = 2.0, 15.0  # inch, of a figure
 NARROW = 5.0  # inch: narrower figures have one column of panels
-ONE_COLUMN = 6.5  # inch of letters of 10 points: wider figures take two columns in print
+ONE_COLUMN = 6.5  # inch, with letters of 10 points: wider figures span two columns in print
 
 
 @dataclass(frozen=True, kw_only=True)
 class Style:
-    """Colours of `paper` and `ink`, `font` size in points, `dpi`; `columns`, the widths in inch of
-    one column of a printed page and of two, if figures are to have these; in three dimensions the
-    `panel` in pixels (width, height) of one model, and how much finer it is drawn, `oversampling`.
+    """Style of pictures.
+
+    Parameters
+    ----------
+    paper, ink : str, colours
+    font : float, points
+    dpi : int, dots per inch
+    columns : (float, float), inch, widths of one and of two columns of a printed page, or None
+    panel : (int, int), pixels, width and height of one model in three dimensions
+    oversampling : int, factor by which three-dimensional pictures are finer
     """
 
     paper: str = "#ffffff"
@@ -32,16 +39,16 @@ class Style:
 
     @property
     def zoom(self) -> float:
-        """How large letters are, over those of 10 points."""
+        """Font size over 10 points."""
         return self.font / 10
 
     @property
     def is_narrow(self) -> bool:
-        """Whether no column has room for two panels beside each other: they stand in one."""
+        """Whether figures have one column of panels."""
         return self.columns is not None and max(self.columns) < NARROW
 
     def size(self, width: float, height: float) -> tuple[float, float]:
-        """Width and height in inch of a figure that would be so large with letters of 10 points."""
+        """Return the size in inch of a figure that has this size with letters of 10 points."""
         if self.columns is None:
             return width * self.zoom, height * self.zoom
         column = self.columns[width > ONE_COLUMN]
@@ -69,25 +76,33 @@ STYLES = {
 
 
 def style(name: str, width: float | None = None) -> Style:
-    """A style by its name; with a width in inch that of print, all figures of that width, on the
-    paper and with the ink of its name. A ValueError if it is unknown, or no width of a page.
+    """Return a style by name.
+
+    With a width in inch all figures have that width and the letters of print, in the colours of
+    the named style. Raises a ValueError if the style is unknown or the width out of range.
     """
     chosen = STYLES[choose("style", name, STYLES)]
     if width is None:
         return chosen
     if not NARROWEST <= width <= WIDEST:
         raise ValueError(
-            f"width = {width:g} inch is outside {NARROWEST:g}..{WIDEST:g}; one column of a journal "
-            "is 3.5 inch, two are 7"
+            f"width = {width:g} inch must be {NARROWEST:g} to {WIDEST:g} inch. One column of a "
+            "journal is 3.5 inch wide, two columns are 7 inch wide"
         )
     return replace(STYLES["print"], columns=(width, width), ink=chosen.ink, paper=chosen.paper)
 
 
 @contextmanager
 def paper(width: float = 3.5, height: float | None = None) -> Iterator[None]:
-    """Settings of matplotlib for figures of a paper: this width and height in inch (0.7 of the
-    width if not given), letters of 8 points (subscripts of 5.6), 300 dots an inch, TrueType fonts
-    in PDF and text as text in SVG, drawn and saved within.
+    """Context manager with settings of matplotlib for figures of a paper.
+
+    Letters have 8 points, subscripts 5.6 points. Files have 300 dots per inch, TrueType fonts in
+    PDF, and text as text in SVG. Draw and save figures within the context.
+
+    Parameters
+    ----------
+    width : float, inch
+    height : float, inch, 0.7 of the width by default
     """
     import matplotlib as mpl
 

@@ -1,4 +1,4 @@
-"""A view to turn in a browser: one page without requests, with the code of the live page."""
+"""A page with a view that can be turned in a browser; it uses the code of the live page."""
 
 import base64
 from importlib import resources
@@ -15,13 +15,13 @@ from skinwave.system.scripts import bundle, encoded
 from skinwave.system.templates import render
 from skinwave.typing import Complex, Floats
 
-NEGLIGIBLE = 3e-3  # of the strongest line: weaker ones are left out
+NEGLIGIBLE_LINE_RATIO = 3e-3  # to the strongest line: weaker lines are left out
 MOST_LINES = 32
 DRAWN_POINTS = 121  # of each path
 
 
 def turntable(view: View, frame: int) -> str:
-    """Return a page that shows a view from any side, moving, from one of its frames on."""
+    """Return a page with a moving view that starts at a frame."""
     nodes, triangles = outer_surface(view)
     frequencies, upwards = motion_lines(view.motion[:, nodes, 2], view.period)
     paths, foci = focus_places(view.scene.pressure, view.times)
@@ -40,8 +40,9 @@ def turntable(view: View, frame: int) -> str:
 
 
 def motion_lines(frames: Any, period: float) -> tuple[Floats, Complex]:
-    """Return the strongest lines above 0 Hz of motion (t, n) at equally spaced times through its
-    period in s: (l,) Hz, ascending, and amplitudes (l, n), of which it is Re sum a exp(2 pi i f t).
+    """Return the strongest lines above 0 Hz of motion (t, n) sampled over its period in s.
+
+    Frequencies (l,) in Hz ascend; with amplitudes a (l, n) the motion is Re sum a exp(2 pi i f t).
     """
     count = len(frames)
     lines = 2 / count * np.fft.rfft(np.asarray(frames, np.float64), axis=0)
@@ -50,18 +51,18 @@ def motion_lines(frames: Any, period: float) -> tuple[Floats, Complex]:
     strength = np.abs(lines).max(axis=1)
     strength[0] = 0.0
     strongest = np.argsort(-strength)[:MOST_LINES]
-    kept = np.sort(strongest[strength[strongest] > NEGLIGIBLE * strength.max()])
-    return kept / period, lines[kept]
+    strong = np.sort(strongest[strength[strongest] > NEGLIGIBLE_LINE_RATIO * strength.max()])
+    return strong / period, lines[strong]
 
 
 def focus_places(pressure: MovingPressure, times: Floats) -> tuple[Floats, Floats]:
     """Return the paths (m, q, 2) and the foci (t, k, 2) at times (t,), in metre."""
     tacton, path = pressure.tacton, pressure.tacton.trajectory
     n = tacton.n_paths
-    # From one path's end to the next one's beginning there is no line.
+    # No line connects the end of a path to the beginning of the next.
     along = (np.arange(n)[:, None] + np.linspace(0, 1 - 1e-6, DRAWN_POINTS)) / n
     paths = path.at_phase(along) if tacton.drawing_frequency else np.zeros((0, 0, 2))
-    within = np.mod(tacton.drawing_frequency * times, 1.0) / n  # each stays on its own path
+    within = np.mod(tacton.drawing_frequency * times, 1.0) / n  # each focus stays on its own path
     foci = [path.at_phase((within + phase) % 1) for phase in tacton.foci]
     return paths, np.stack(foci, axis=1)
 

@@ -1,4 +1,4 @@
-"""References to cite for a response: the program, its model, and the solver that it used."""
+"""References to cite for a response: the program, the model and the solver."""
 
 from dataclasses import dataclass
 
@@ -24,7 +24,7 @@ SOLVERS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Citations:
-    """A sentence for a methods section, and the references to cite; printed, one a line."""
+    """A sentence for a methods section, and the references to cite; prints one per line."""
 
     sentence: str
     references: tuple[str, ...]
@@ -39,15 +39,30 @@ class Citations:
 
 
 def cite(*responses: Response) -> Citations:
-    """References for some responses: the program, what each model is computed by, and solvers.
+    """Return the references to cite for some responses.
+
+    Parameters
+    ----------
+    *responses : Response
+
+    Returns
+    -------
+    Citations, with the program, the sources of each model, and the solvers used
 
     Raises
     ------
     ValueError
-        If no response is given, or its model is unknown.
+        If no response is given, or a model is unknown.
+
+    Examples
+    --------
+    >>> import skinwave
+    >>> scene = skinwave.loads("[tacton]\nam_frequency_hz = 140\nduration_s = 0.05")
+    >>> cited = skinwave.cite(skinwave.simulate(scene, "point-kernel"))
+    >>> print(cited.references[1][:49])
     """
     if not responses:
-        raise ValueError("there is no response to cite for; give one or more")
+        raise ValueError("no response is given. Give one or more")
     models = list(dict.fromkeys(response.model for response in responses))
     methods = ", ".join(f"{name} ({named(name).method})" for name in models)
     release = {**versions(), **responses[0].effort.versions}.get("skinwave", "of unknown version")

@@ -1,7 +1,6 @@
-"""Claims of Lim, Seifi and Park about spectral lines, evaluated on any model's responses.
+"""Claims of Lim, Seifi and Park about spectral lines, evaluated on the responses of any model.
 
 S1 to S5 are claims about their simulation, M1 to M5 about their measurement on paper.
-Nothing here knows which model should fulfil which.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -17,20 +16,20 @@ from skinwave.scene.scene import Scene
 from skinwave.system.table import Table
 from skinwave.typing import Floats
 
-PRESENT = -60.0  # dB re f_AM: a line this weak is still seen above a vibrometer's noise
-ABSENT = -120.0  # dB
-MUCH_LOWER = -20.0  # dB: a tenth
-NOTHING = -300.0  # dB
+# Levels in dB re f_AM.
+PRESENT = -60.0  # a line this weak is visible above a vibrometer's noise
+ABSENT = -120.0
+MUCH_LOWER = -20.0  # a tenth of the amplitude
+NO_LINE = -300.0
 ON_BIN = 1.0  # Hz: one bin of a spectrum of 1 s
+PEAK_REACH = 6.0  # Hz from a line within which its spectral peak is searched
 NO_PEAK = "a line at 1, 2 or 3 f_d has no spectral peak next to it"
-REACH = 6.0  # Hz from a line within which its spectral peak is looked for
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LinesByName:
-    """Measured lines by name, with the attributes of a `Run` that claims are assessed by, and the
-    `radius` (p,) of the confidence circle of each amplitude; `spectrum` is empty where there are
-    only lines.
+    """Measured lines by name, with the attributes of a `Run` that claims need, and the `radius`
+    (p,) of the confidence circle of each amplitude. `spectrum` is empty if only lines are known.
     """
 
     tacton: str
@@ -54,7 +53,7 @@ class LinesByName:
 
     @property
     def is_motion(self) -> bool:
-        """Whether they are of displacement."""
+        """Whether the lines are of displacement."""
         return self.scene.reading.record is DISPLACEMENT
 
 
@@ -63,7 +62,9 @@ NamedLines = Run | LinesByName
 
 @dataclass(frozen=True, kw_only=True)
 class AssessedClaim:
-    """Whether a claim holds for a body and a model, by which number against which threshold."""
+    """Whether a claim holds for a body and a model, with the deciding `value` and its threshold
+    `bar`.
+    """
 
     claim: str
     body: str
@@ -75,14 +76,12 @@ class AssessedClaim:
 
     @property
     def column(self) -> str:
-        """As `Run.column`."""
+        """Name in tables and figures, as `Run.column`."""
         return self.model if self.body == "none" else self.body
 
 
 def evaluate(runs: Iterable[Run]) -> list[AssessedClaim]:
-    """Every claim on every body and model for which there are runs to assess it by, long enough to
-    resolve the lines that it is about.
-    """
+    """Assess every claim for every body and model whose runs resolve the lines that it is about."""
     groups: dict[tuple[str, str], list[Run]] = {}
     for run in filter(is_single, runs):
         groups.setdefault((run.body, run.model), []).append(run)
@@ -101,13 +100,13 @@ def evaluate(runs: Iterable[Run]) -> list[AssessedClaim]:
     return assessed_claims
 
 
-def claimed(runs: Iterable[Run]) -> list[Run]:
-    """Runs that claims are about: of the point kernel, and of the displacement of a surface."""
+def assessable_runs(runs: Iterable[Run]) -> list[Run]:
+    """Return the runs of the point kernel and of the displacement of a surface."""
     return [run for run in runs if run.is_motion or not run.response.record.of_body]
 
 
 def write_claims(path: Path, assessed_claims: Iterable[AssessedClaim]) -> None:
-    """Every assessed claim per body and model."""
+    """Write a CSV file with a row for each assessed claim."""
     table = Table([field.name for field in fields(AssessedClaim)], map(astuple, assessed_claims))
     path.write_bytes(table.to_csv())
 
@@ -116,19 +115,19 @@ Assessment = tuple[bool, float, float, str]
 
 
 def is_single(run: NamedLines) -> bool:
-    """Whether a run is of the kind that was measured: one focus, modulated evenly throughout by
-    one tone at most.
+    """Whether a run has the kind of Tacton that was measured: one focus, evenly modulated by at
+    most one tone.
     """
     tacton = run.scene.tacton
     plain = len(tacton.foci) == 1 and not tacton.is_sampled and not tacton.envelope_frequency
-    # Of two sinusoids the first is the one that claims are about, and must act alone.
+    # Claims are about the first of two sinusoids, which must act alone.
     w1, w2 = tacton.superposition
     one = (w1 > 0 or not tacton.am_frequency) and not (w2 > 0 and tacton.second_am_frequency)
     return bool(plain and one and tacton.trajectory.shape != "recorded")
 
 
 def is_resolved(run: NamedLines, claim: str) -> bool:
-    """Whether the lines that a claim is about are resolved; some are about all lines."""
+    """Whether the lines that a claim is about are resolved."""
     if claim in NEEDED:
         return any(run.frequencies.keys() >= set(names) for names in NEEDED[claim])
     return "f_AM" in run.frequencies and bool(rivals(run)) and not run.unresolved
@@ -144,9 +143,8 @@ def _am_harmonics(runs: Sequence[NamedLines]) -> Assessment:
     second = min(_strongest(run, ["2f_AM"]) for run in runs)
     third = min(_strongest(run, ["3f_AM"]) for run in runs)
     weakest = min(second, third)
-    sentence = (
-        f"at the least 2 f_AM is at {decibel(second)} dB and 3 f_AM at {decibel(third)} dB re f_AM"
-    )
+    levels = f"{decibel(second)} dB and of 3 f_AM {decibel(third)} dB re f_AM"
+    sentence = f"the lowest level of 2 f_AM is {levels}"
     return weakest > PRESENT, weakest, PRESENT, sentence
 
 
@@ -156,7 +154,7 @@ def _drawn_lines(runs: Sequence[NamedLines]) -> Assessment:
         for run in runs
         for n in (1, 2, 3)
     )
-    sentence = f"the peaks next to 1, 2 and 3 f_d are at most {offset:.2f} Hz away from them"
+    sentence = f"the peaks next to 1, 2 and 3 f_d deviate from them by at most {offset:.2f} Hz"
     return offset <= ON_BIN, offset, ON_BIN, sentence if np.isfinite(offset) else NO_PEAK
 
 
@@ -188,8 +186,8 @@ def _both_multiples(runs: Sequence[NamedLines]) -> Assessment:
     drawn = min(_strongest(run, ["f_d"], "f_AM") for run in runs)
     double = min(_strongest(run, ["2f_AM"], "f_AM") for run in runs)
     sentence = (
-        f"f_d is at {decibel(drawn)} dB re f_AM or above in every Tacton, 2 f_AM at "
-        f"{decibel(double)} dB or above"
+        f"in every Tacton f_d is at {decibel(drawn)} dB re f_AM or higher, and 2 f_AM at "
+        f"{decibel(double)} dB or higher"
     )
     return drawn > PRESENT, drawn, PRESENT, sentence
 
@@ -207,10 +205,10 @@ def _am_highest(runs: Sequence[NamedLines]) -> Assessment:
 
 def _am_highest_measured(runs: Sequence[NamedLines]) -> Assessment:
     holds, value, bar, sentence = _am_highest(runs)
-    beaten = [run.tacton for run in runs if rival_levels(run).max() >= 0]
-    if beaten:
-        sentence += f"; f_AM is exceeded in {', '.join(beaten)}"
-    if runs[0].is_motion:  # a vibrometer reads velocity; the point kernel has none
+    exceeded = [run.tacton for run in runs if rival_levels(run).max() >= 0]
+    if exceeded:
+        sentence += f"; f_AM is exceeded in {', '.join(exceeded)}"
+    if runs[0].is_motion:  # a vibrometer reads velocity; the point kernel has no velocity
         velocity = max(rival_levels(run, velocity=True).max() for run in runs)
         sentence += f"; as velocity the strongest rival is at {decibel(velocity, signed=True)} dB"
         value = max(value, velocity)
@@ -225,7 +223,7 @@ def _much_lower(runs: Sequence[NamedLines]) -> Assessment:
         f"{lower} of {len(runs)} Tactons all are below {MUCH_LOWER:g} dB at every probe"
     )
     if value < PRESENT:
-        sentence += f"; those that the claim is about are not there, above {PRESENT:g} dB"
+        sentence += f"; no line that the claim is about is above {PRESENT:g} dB"
     return bool(PRESENT <= value < MUCH_LOWER), value, MUCH_LOWER, sentence
 
 
@@ -236,11 +234,13 @@ def _exact_frequencies(runs: Sequence[NamedLines]) -> Assessment:
         for name in (["f_AM"] if run.is_am else ["f_d"])
     ]
     worst = max(offsets)
-    sentence = f"the spectral peaks are at most {worst:.2f} Hz from the commanded f_AM and f_d"
+    sentence = (
+        f"the spectral peaks deviate from the commanded f_AM and f_d by at most {worst:.2f} Hz"
+    )
     return worst <= ON_BIN, worst, ON_BIN, sentence
 
 
-# Whether the amplitude is modulated, and whether the focus moves, in runs that a claim is about.
+# Kinds of runs that claims are about: whether the amplitude is modulated, and the focus moves.
 AM, STM, BOTH = (True, False), (False, True), (True, True)
 CLAIMS: dict[
     str, tuple[tuple[tuple[bool, bool], ...], Callable[[Sequence[NamedLines]], Assessment]]
@@ -256,7 +256,7 @@ CLAIMS: dict[
     "M4": ((BOTH,), _am_highest_measured),
     "M5": ((BOTH,), _much_lower),
 }
-# Lines, one of these sets of which a claim is about; claims not listed are about all lines.
+# Sets of lines, one of which a claim needs; claims that are not listed need all lines.
 DRAWN = (("f_d", "2f_d", "3f_d"),)
 PAIRS = ("f_d-f_AM", "f_d+f_AM", "2f_d-f_AM", "2f_d+f_AM")
 NEEDED: dict[str, tuple[tuple[str, ...], ...]] = {
@@ -284,7 +284,7 @@ TEXTS = {
 def _probe_levels(
     run: NamedLines, names: Iterable[str], reference: str, velocity: bool = False
 ) -> Floats:
-    """(line, probe) levels in dB re a reference line at the same probe."""
+    """Return levels (line, probe) in dB re a reference line at the same probe."""
     names = list(names)
     weight = {name: run.frequencies[name] if velocity else 1.0 for name in [*names, reference]}
     base = np.maximum(run.lines[reference] * weight[reference], np.finfo(float).tiny)
@@ -293,26 +293,26 @@ def _probe_levels(
 
 
 def rivals(run: NamedLines) -> list[str]:
-    """Names of the lines that are resolved from f_AM itself."""
+    """Return the names of the lines that are resolved from f_AM."""
     f_am = run.frequencies["f_AM"]
     return [n for n, f in run.frequencies.items() if abs(f - f_am) > 2 * ON_BIN]
 
 
 def rival_levels(run: NamedLines, velocity: bool = False) -> Floats:
-    """Level of the strongest line other than f_AM at each probe, dB re f_AM there."""
+    """Return the level of the strongest line other than f_AM at each probe, in dB re f_AM there."""
     return _probe_levels(run, rivals(run), "f_AM", velocity).max(axis=0)
 
 
 def multiple_levels(run: NamedLines) -> Floats:
-    """Level of the strongest multiple of f_AM or of f_d other than f_AM at each probe, dB re f_AM
-    there: "these frequency harmonics", without the sums and differences of both.
+    """Return the level of the strongest multiple of f_AM or f_d other than f_AM at each probe, in
+    dB re f_AM there. Sums and differences of both are not "these frequency harmonics".
     """
     names = [n for n in rivals(run) if not ("f_AM" in n and "f_d" in n)]
-    return _probe_levels(run, names, "f_AM").max(axis=0, initial=NOTHING)
+    return _probe_levels(run, names, "f_AM").max(axis=0, initial=NO_LINE)
 
 
 def strongest_rival(run: NamedLines) -> tuple[str, float]:
-    """Strongest line other than f_AM, and the radius in mm of the probe where it is."""
+    """Return the strongest line other than f_AM, and the radius in mm of its probe."""
     names = rivals(run)
     levels = _probe_levels(run, names, "f_AM")
     line, probe = np.unravel_index(np.argmax(levels), levels.shape)
@@ -320,19 +320,19 @@ def strongest_rival(run: NamedLines) -> tuple[str, float]:
 
 
 def _strongest(run: NamedLines, names: list[str], reference: str = "f_AM") -> float:
-    """Level of the strongest of these lines at any probe, dB re the reference at that probe."""
+    """Return the highest level of these lines at any probe, in dB re the reference there."""
     return float(_probe_levels(run, names, reference).max())
 
 
 def _peak(run: NamedLines, line: str) -> float:
-    """Frequency in Hz of the spectral peak next to a line, at the probe where it is strongest.
+    """Return the frequency in Hz of the spectral peak next to a line, at its strongest probe.
 
-    Interpolated between bins on the logarithm; infinitely far if there is no peak in reach.
+    It is interpolated between bins on the logarithm, and infinite if there is no peak.
     """
     f, amplitude = run.spectrum
     x = amplitude[:, int(np.argmax(run.lines[line]))]
-    near = np.flatnonzero(np.abs(f - run.frequencies[line]) <= REACH)
-    if len(near) < 3:  # too short a Tacton for its spectrum to resolve
+    near = np.flatnonzero(np.abs(f - run.frequencies[line]) <= PEAK_REACH)
+    if len(near) < 3:  # the Tacton is too short
         return np.inf
     top = near[np.argmax(x[near])]
     if top in (near[0], near[-1]) or x[top] <= 0:

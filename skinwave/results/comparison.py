@@ -14,29 +14,40 @@ from skinwave.system.drawn import drawn
 from skinwave.typing import Floats
 
 ROUND_OFF = 1e-6  # of the largest RMS motion: weaker lines are round-off
-AUDIBLE = -20.0  # dB re a line's largest probe: below it a phase says nothing
+LOWEST_PHASE_LEVEL = -20.0  # dB re a line's largest amplitude: below it a phase means little
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Agreement:
-    """A candidate against a reference.
+    """Comparison of a candidate response with a reference.
 
     Parameters
     ----------
-    relative_l2 : (p,) float, misfit of the waveform at each probe, relative to the reference
-    scale : float, what the candidate was multiplied by first: 1 if both are of one quantity,
-        else the factor that fits best over all probes
-    shape_misfit : (p,) float, misfit of the steady waveform about its mean, relative to the
-        reference, after the gain and the delay that fit best at each probe
-    delay : (p,) float, s, by which the candidate comes later there, within half a period of the
-        reference's strongest frequency either way
-    line_ratios : (f, p) float, candidate over reference at the frequencies asked for, scaled
-    phase_delay : (f, p) float, s, by which each of these lines comes later in the candidate: a
-        quarter of a period before to three quarters after at the probe where it is strongest, and
-        unwrapped outwards from there; not a number where either is 20 dB below its largest
-    spread_reference, spread_candidate : {-6: metre, -20: metre}, distance of the outermost
-        probe whose RMS motion is within so many dB of the strongest probe's, from that probe
-    frequencies : (f,) float, Hz, of the lines; probes : (p, 2) float, metre
+    relative_l2 : (p,) float, relative L2 misfit of the waveform at each probe
+    scale : float, factor applied to the candidate first: 1 if both have the same quantity,
+        otherwise the best fit over all probes
+    shape_misfit : (p,) float, relative L2 misfit of the steady waveform about its mean, after the
+        best gain and delay at each probe
+    delay : (p,) float, s, that best delay; positive if the candidate is later. It is within half a
+        period of the reference's strongest frequency
+    line_ratios : (f, p) float, scaled candidate over reference at `frequencies`
+    phase_delay : (f, p) float, s, by which each line is later in the candidate. At the probe where
+        the line is strongest it lies between -1/4 and 3/4 of a period; it is unwrapped outwards
+        from there, and nan where either line is 20 dB below its largest
+    spread_reference, spread_candidate : {-6: metre, -20: metre}, distance from the strongest probe
+        to the outermost one whose RMS motion is within 6 or 20 dB
+    frequencies : (f,) float, Hz
+    probes : (p, 2) float, metre
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from simple_model import Response
+    >>> t = np.arange(1000) / 1e4
+    >>> wave, later = (np.sin(2 * np.pi * 100 * (t - d))[:, None] for d in (0, 1e-3))
+    >>> a, b = (Response(model="mine", times=t, probes=np.zeros((1, 2)), values=1e-6 * each)
+    ...         for each in (wave, later))
+    >>> compare(a, b, frequencies=(100.0,))
     """
 
     relative_l2: Floats
@@ -65,29 +76,37 @@ def compare(
     Parameters
     ----------
     reference, candidate : Response
-    frequencies : Hz, lines whose amplitudes and phases are compared
+    frequencies : tuple of float, Hz, lines whose amplitudes and phases are compared
 
     Returns
     -------
-    Agreement, of the candidate with the reference
+    Agreement
 
     Raises
     ------
     ValueError
         If probes or times differ.
+
+    Examples
+    --------
+    >>> import skinwave
+    >>> scene = skinwave.loads("[tacton]\\nam_frequency_hz = 140\\nduration_s = 0.1")
+    >>> published, kernel = (skinwave.simulate(scene, name) for name in
+    ...                      ("point-kernel-published", "point-kernel"))
+    >>> skinwave.compare(published, kernel).scale
     """
     if reference.probes.shape != candidate.probes.shape or not np.allclose(
         reference.probes, candidate.probes
     ):
-        raise ValueError("the responses have different probes; compare them at the same ones")
+        raise ValueError("the responses have different probes. Compute both at the same probes")
     if reference.times.shape != candidate.times.shape:
-        raise ValueError("the responses have different times; compare them at the same ones")
+        raise ValueError("the responses have different times. Compute both at the same times")
     x, y = reference.values, candidate.values
     fits = reference.quantity == candidate.quantity
     scale = 1.0 if fits else float((x * y).sum() / max((y * y).sum(), np.finfo(float).tiny))
     norm = np.linalg.norm(x, axis=0)
     delay, shape_misfit = _aligned(reference, candidate)
-    a, b = (heard_phasors(response, frequencies) for response in (reference, candidate))
+    a, b = (line_phasors(response, frequencies) for response in (reference, candidate))
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = abs(scale) * np.abs(b) / np.abs(a)
     return Agreement(
@@ -102,40 +121,41 @@ def compare(
 def phase_delays(
     reference: np.ndarray, candidate: np.ndarray, frequencies: Floats, probes: Floats
 ) -> Floats:
-    """Delays (f, p) in s of lines, as of `Agreement.phase_delay`, from their complex amplitudes
-    (f, p), each of its own unit, at frequencies (f,) in Hz and probes (p, 2) in metre.
+    """Return the delays (f, p) in s as `Agreement.phase_delay` defines them.
+
+    Complex amplitudes are (f, p), at frequencies (f,) in Hz and probes (p, 2) in metre.
     """
-    found = np.full(reference.shape, np.nan)
+    delays = np.full(reference.shape, np.nan)
     for k, (a, b, f) in enumerate(zip(reference, candidate, frequencies, strict=True)):
-        heard = _heard(a) & _heard(b)
-        if not (f > 0 and heard.any()):
+        strong = _is_strong(a) & _is_strong(b)
+        if not (f > 0 and strong.any()):
             continue
-        start = int(np.argmax(np.where(heard, np.abs(a), 0)))
+        start = int(np.argmax(np.where(strong, np.abs(a), 0)))
         outwards = np.argsort(np.linalg.norm(probes - probes[start], axis=1), kind="stable")
-        outwards = outwards[heard[outwards]]
+        outwards = outwards[strong[outwards]]
         turns = np.unwrap(-np.angle(b[outwards] / a[outwards]) / (2 * np.pi), period=1.0)
-        found[k, outwards] = (turns - np.floor(turns[0] + 0.25)) / f
-    return found
+        delays[k, outwards] = (turns - np.floor(turns[0] + 0.25)) / f
+    return delays
 
 
-def heard_phasors(response: Response, frequencies: tuple[float, ...]) -> np.ndarray:
-    """Complex amplitudes (f, p) of lines, 0 of what is round-off in the response."""
+def line_phasors(response: Response, frequencies: tuple[float, ...]) -> np.ndarray:
+    """Return the complex amplitudes (f, p) of lines; 0 for round-off."""
     if not frequencies:
         return np.zeros((0, len(response.probes)), np.complex128)
-    found = phasors(response, frequencies)
-    return np.where(np.abs(found) > ROUND_OFF * moving_rms(response).max(), found, 0)
+    amplitudes = phasors(response, frequencies)
+    return np.where(np.abs(amplitudes) > ROUND_OFF * moving_rms(response).max(), amplitudes, 0)
 
 
-def _heard(line: np.ndarray) -> np.ndarray:
+def _is_strong(line: np.ndarray) -> np.ndarray:
     size = np.abs(line)
-    return (size > 0) & (size >= 10 ** (AUDIBLE / 20) * size.max(initial=0.0))
+    return (size > 0) & (size >= 10 ** (LOWEST_PHASE_LEVEL / 20) * size.max(initial=0.0))
 
 
 def _aligned(reference: Response, candidate: Response) -> tuple[Floats, Floats]:
-    """Delay (p,) in s that fits a candidate best at each probe, and the misfit (p,) left then.
+    """Return the best delay (p,) in s at each probe, and the misfit (p,) after it.
 
-    A periodic signal correlates with itself at any number of periods; hence the delay is sought
-    within half a period of what is strongest.
+    A periodic signal correlates with itself after every period. The delay is therefore searched
+    within half a period of the strongest frequency.
     """
     x, y = (_moving(response) for response in (reference, candidate))
     n, dt = len(x), step(reference.times)
@@ -151,15 +171,15 @@ def _aligned(reference: Response, candidate: Response) -> tuple[Floats, Floats]:
 
 
 def _overlapping(x: Floats, lags: np.ndarray) -> Floats:
-    """Sum of squares (l, p) of the part of x (t, p) that meets a signal shifted by lags (l,)."""
+    """Return the sum of squares (l, p) of x (t, p) where it overlaps a signal shifted by lags."""
     summed = np.vstack([0 * x[:1], np.cumsum(x**2, axis=0)])
-    away = np.abs(lags)
-    early, late = summed[len(x) - away], summed[-1] - summed[away]
+    shift = np.abs(lags)
+    early, late = summed[len(x) - shift], summed[-1] - summed[shift]
     return np.where((lags >= 0)[:, None], early, late)
 
 
 def _vertex(y: Floats) -> tuple[float, float]:
-    """Vertex, in samples, and height of the parabola about the largest sample."""
+    """Return the vertex, in samples, and height of the parabola through the largest samples."""
     k = int(np.clip(np.argmax(y), 1, len(y) - 2))
     slope, bend = (y[k + 1] - y[k - 1]) / 2, y[k + 1] - 2 * y[k] + y[k - 1]
     ahead = float(np.clip(-slope / bend, -1, 1)) if bend < 0 else 0.0
@@ -167,13 +187,13 @@ def _vertex(y: Floats) -> tuple[float, float]:
 
 
 def _moving(response: Response) -> Floats:
-    """The response (t, p) about its mean, after the transient in its first part."""
-    kept = response.values[int(SETTLE * len(response.times)) :]
-    return np.asarray(kept - kept.mean(axis=0))
+    """Return the response (t, p) about its mean, without the transient at its start."""
+    steady = response.values[int(SETTLE * len(response.times)) :]
+    return np.asarray(steady - steady.mean(axis=0))
 
 
 def spread(response: Response) -> dict[int, float]:
-    """Distance in metre from the strongest probe to the outermost within 6 and within 20 dB."""
+    """Return the distance in metre from the strongest probe to the outermost within 6 and 20 dB."""
     level = moving_rms(response)
     strongest = int(np.argmax(level))
     distance = np.linalg.norm(response.probes - response.probes[strongest], axis=1)
@@ -182,5 +202,5 @@ def spread(response: Response) -> dict[int, float]:
 
 
 def moving_rms(response: Response) -> Floats:
-    """RMS (p,) about the mean after the first part of the response, in its unit."""
+    """Return the RMS (p,) about the mean, without the transient, in the unit of the response."""
     return np.asarray(_moving(response).std(axis=0))

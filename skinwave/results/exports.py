@@ -12,16 +12,15 @@ from skinwave.results.files import folder_name
 from skinwave.results.views import View, field_frames
 from skinwave.system.table import Table
 
-PARAVIEW = [0, 1, 2, 3, 5, 4]  # its order of the components of a tensor
+PARAVIEW_ORDER = [0, 1, 2, 3, 5, 4]  # of the components of a tensor
 UNITS = {"displacement_m": "m", "strain": "1", "stress_pa": "Pa"}
-FULL_SCALE = 32767
-IN_NAMES = str.maketrans({"µ": "u", "/": "_", "²": "2", "³": "3"})  # of files
+FULL_SCALE = 32767  # of 16-bit sound
+PLAIN_LETTERS = str.maketrans({"µ": "u", "/": "_", "²": "2", "³": "3"})  # for file names
 
 
 def write_probes(stem: Path, response: Response) -> None:
-    """`stem`.csv, a column a probe with its place in mm and its unit in the header, and `stem`.npz
-    with `t` s, `probes` m and, by the name of its quantity, the values (t, p) in its unit.
-    `skinwave.measure.reading.read` takes both.
+    """Write `stem`.csv, with a column for each probe, and `stem`.npz, with times `t` in s, `probes`
+    in m and values (t, p) under the name of their quantity, in its SI unit.
     """
     kind = response.quantity
     places = [f"({1e3 * x:g},{1e3 * y:g})" for x, y in response.probes]
@@ -33,16 +32,16 @@ def write_probes(stem: Path, response: Response) -> None:
 
 
 def write_sound(folder: Path, response: Response, probe: int) -> Path:
-    """A probe's waveform about its mean as a WAV file (16 bit, mono), at its own rate of sampling.
+    """Write a probe's waveform about its mean as a WAV file (16 bit, mono) and return its path.
 
-    The largest value that the format holds is that of the waveform; the name says how much it is.
+    Full scale is the largest value of the waveform, which the file name states.
     """
     from scipy.io import wavfile
 
     motion = response.values[:, probe] - response.values[:, probe].mean()
     largest = float(np.abs(motion).max())
     samples = np.round(motion / (largest or 1.0) * FULL_SCALE).astype(np.int16)
-    unit = response.record.shown.translate(IN_NAMES)
+    unit = response.record.shown.translate(PLAIN_LETTERS)
     x, y = 1e3 * response.probes[probe]
     scale = f"{response.record.per_unit * largest:.4g}_{unit}"
     path = folder / f"probe_{x:g}_{y:g}_mm_full_scale_{scale}.wav"
@@ -51,15 +50,15 @@ def write_sound(folder: Path, response: Response, probe: int) -> Path:
 
 
 def write_field(folder: Path, view: View) -> Path:
-    """`column`.pvd and a file of each of `FIELD_FRAMES` frames through a period; the .pvd.
+    """Write `column`.pvd with `FIELD_FRAMES` frames through a period, and return its path.
 
-    Bodies are 10-node tetrahedra with `displacement_m` (n, 3) and, but for sheets, whose mesh has
-    another thickness, `strain` and `stress_pa` (n, 6), tension positive, in ParaView's order of
-    components, XX, YY, ZZ, XY, YZ, XZ; nodes between two materials are there for each. The point
-    kernel is a surface with `pressure_pa`. All are about their mean; field data name their units.
+    Bodies are 10-node tetrahedra with `displacement_m` (n, 3). Solid bodies also have `strain` and
+    `stress_pa` (n, 6), tension positive, in the order XX, YY, ZZ, XY, YZ, XZ; a node between two
+    materials is written for each. The point kernel is a surface with `pressure_pa`. All are about
+    their mean, and the field data `units` names their units.
     """
     frames = field_frames(len(view.times)) if view.tensors is None else view.tensors.frames
-    names, stem = [], folder_name(view.column)  # which was read from a file
+    names, stem = [], folder_name(view.column)
     for k, frame in enumerate(frames.tolist()):
         names.append(f"{stem}_{k:03d}.{'vtu' if len(view.tets) else 'vtp'}")
         _grid(view, frame, k).save(folder / names[-1])
@@ -69,29 +68,29 @@ def write_field(folder: Path, view: View) -> Path:
 
 
 def _grid(view: View, frame: int, number: int) -> Any:
-    """A frame of a view, which is the `number`-th of those that are written."""
+    """Return one frame of a view, the `number`-th that is written, for pyvista."""
     import pyvista as pv
 
     if not len(view.tets):
         surface = pv.PolyData.from_regular_faces(view.points, view.triangles)
         surface["pressure_pa"] = view.pushed[frame]
         return surface
-    kept, nodes, tets = view.tensors, np.arange(len(view.points)), view.tets
-    if kept is not None:
-        nodes, tets = kept.nodes, kept.tets
+    tensors, nodes, tets = view.tensors, np.arange(len(view.points)), view.tets
+    if tensors is not None:
+        nodes, tets = tensors.nodes, tensors.tets
     cells = np.insert(tets, 0, 10, axis=1).ravel()
     kinds = np.full(len(tets), pv.CellType.QUADRATIC_TETRA)
     grid = pv.UnstructuredGrid(cells, kinds, view.points[nodes])
     grid["displacement_m"] = view.motion[frame][nodes]
-    if kept is not None:
-        grid["strain"] = kept.strain[number][:, PARAVIEW]
-        grid["stress_pa"] = kept.stress[number][:, PARAVIEW]
+    if tensors is not None:
+        grid["strain"] = tensors.strain[number][:, PARAVIEW_ORDER]
+        grid["stress_pa"] = tensors.stress[number][:, PARAVIEW_ORDER]
     grid.field_data["units"] = [f"{name}: {UNITS[name]}" for name in grid.point_data]
     return grid
 
 
 def collection(names: Sequence[str], times: Sequence[float]) -> str:
-    """ParaView collection: the file that belongs to each time in s."""
+    """Return a ParaView collection of files at times in s."""
     rows = "".join(
         f'<DataSet timestep="{t:.9g}" group="" part="0" file="{name}"/>\n'
         for t, name in zip(times, names, strict=True)

@@ -1,8 +1,8 @@
-"""Steady motion of a whole meshed body, line by line, for maps, films and files of other programs.
+"""Steady motion of a whole meshed body, line by line, for maps, films and exported fields.
 
-What is linear in the motion is about its mean, as the motion of pictures is. An invariant, such as
-the largest shear strain, is that of the whole tensor, its mean included, as probes read it; of an
-unconstrained body, whose mean has no bound, that of the rest.
+Linear quantities are given about their mean. Invariants, such as the largest shear strain, are
+computed from the whole tensor including its mean, as at probes. The mean of an unconstrained body
+grows without bound; it is left out there.
 """
 
 from collections.abc import Iterator
@@ -44,12 +44,12 @@ from skinwave.models.reduced import (
     respond,
 )
 from skinwave.scene.scene import Reading, Scene
-from skinwave.system.effort import Clock, Progress, silent
+from skinwave.system.effort import Clock
 from skinwave.typing import Floats, Ints
 
-TOLERANCE = 0.01  # of the reduction; with it stress at the surface meets the load within 3 %
+REDUCTION_TOLERANCE = 0.01  # stress at the surface then meets the load within 3 %
 MOST_VALUES = 500_000_000  # of the motion of a whole body, 4 GB
-INWARDS = np.array([[0.0, 0.0, -1.0]])  # what is drawn of normal motion
+INWARDS = np.array([[0.0, 0.0, -1.0]])  # the drawn component of normal motion
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,28 +70,29 @@ class BodyMotion:
 
     @property
     def mesh(self) -> TetMesh:
-        """The mesh of the body itself, without an absorbing layer around it."""
+        """Mesh of the body itself, without an absorbing layer around it."""
         return self._own[0]
 
     @property
     def nodes(self) -> Ints:
-        """Its nodes (m,) among all nodes."""
+        """Indices (m,) of the nodes of `mesh` among all nodes."""
         return self._own[1]
 
     @cached_property
     def own_basis(self) -> Floats:
-        """Rows (3 m, r) of the basis of these nodes."""
+        """Rows (3 m, r) of the basis at the nodes of `mesh`."""
         if self.build.drag is None:
             return self.basis
-        each = self.basis.reshape(-1, 3, self.basis.shape[1])
-        return each[self.nodes].reshape(3 * len(self.nodes), -1)
+        by_node = self.basis.reshape(-1, 3, self.basis.shape[1])
+        return by_node[self.nodes].reshape(3 * len(self.nodes), -1)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Tensors:
-    """Strain and stress (t, q, 6) in Pa of a body about their means at some `frames` (t,) of its
-    view: at `nodes` (q,) of its mesh, those between two materials once for each, by which `tets`
-    (m, 10) are numbered. Components are xx, yy, zz, xy, xz, yz.
+    """Strain and stress (t, q, 6) in Pa about their means at some `frames` (t,) of a view.
+
+    `nodes` (q,) are nodes of the mesh; a node between two materials is listed once for each.
+    `tets` (m, 10) index `nodes`. Components are xx, yy, zz, xy, xz, yz.
     """
 
     frames: Ints
@@ -103,40 +104,29 @@ class Tensors:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Shade:
-    """Colour of a view: values (t, q) of a quantity, by its name, at `nodes` (q,) of its mesh, at
-    each of its times.
-    """
+    """Colours of a view: values (t, q) of the named quantity at `nodes` (q,) of its mesh."""
 
     quantity: str
     nodes: Ints
     values: Floats
 
 
-def waves(
-    scene: Scene, tolerance: float = TOLERANCE, progress: Progress | None = None, *,
-    h: float | None = None, solver: str = "auto",
-) -> BodyMotion:  # fmt: skip
-    """Motion of a whole body at any times, as `skinwave.field` reads it; raises what that does."""
+def whole_motion(scene: Scene, options: SolveOptions) -> BodyMotion:
+    """Return the motion of a whole body at any time; raises what `skinwave.field` raises."""
     given = {"gravity": scene.load.gravity, "support_motion": scene.load.support_motion}
     if left_out := [key for key, value in given.items() if value]:
         raise ValueError(
-            "the motion of a whole body is about its rest without gravity, on a support at rest; "
-            f"leave {left_out[0]} out"
+            "the motion of a whole body is computed about its rest without gravity, on a support "
+            f"at rest; remove {left_out[0]} from the scene"
         )
-    return driven(scene, tolerance, progress, h=h, solver=solver)
+    return reduced_motion(scene, options)
 
 
-def driven(
-    scene: Scene, tolerance: float, progress: Progress | None = None, *, h: float | None = None,
-    solver: str = "auto",
-) -> BodyMotion:  # fmt: skip
-    """A meshed body under a load, reduced to the subspace of its path; options and errors as of
-    `simulate`.
-    """
-    SolveOptions(solver=solver, h=h, tolerance=tolerance)  # which refuses what is out of range
-    clock, report = Clock(), progress or silent
+def reduced_motion(scene: Scene, options: SolveOptions) -> BodyMotion:
+    """Mesh a body, reduce it to the subspace of the load along its path, and compute its lines."""
+    clock, report, tolerance = Clock(), options.progress, options.tolerance
     body = relaxing(scene.body, series_tolerance(tolerance))
-    build = mesh_body(body, h, clock, report)
+    build = mesh_body(body, options.h, clock, report)
     operators = assemble(build, clock, report)
     P, points = surface_load(build, scene.load)
     with clock("factorise and reduce"):
@@ -144,72 +134,69 @@ def driven(
         spots = scene.pressure.spot(points, path_samples(scene.loads[0]))
         subspace = sparse.csr_array(load_subspace(spread(P, spots.T), tolerance / 10).T)
         reduced, model = reduce_body(
-            body, build, operators, subspace, tolerance, surface=(P, points), solver=solver,
-            report=report,
+            body, build, operators, subspace, tolerance, surface=(P, points),
+            solver=options.solver, report=report,
         )  # fmt: skip
     with clock("lines"):
         motion = respond(reduced, *scene.loads)
-    offline = with_cost(reduced.effort, clock, build, h or default_size(scene.body))
+    offline = with_cost(reduced.effort, clock, build, options.h or default_size(scene.body))
     effort = replace(
         offline, steps=len(motion.frequencies), energy_imbalance=motion.imbalance,
         radiated=motion.radiated,
     )  # fmt: skip
-    basis = np.ascontiguousarray(model.basis)  # of which some rows are read at a time
+    basis = np.ascontiguousarray(model.basis)  # its rows are read a few at a time
     return BodyMotion(build=build, basis=basis, motion=motion, effort=effort)
 
 
 def probe_lines(scene: Scene, moved: BodyMotion) -> ReducedResponse:
-    """Components of the quantity that the probes of a scene read, from its body's motion."""
+    """Return the components of the probes' quantity."""
     rows, solids = probe_rows(scene.body, moved.build, scene.probe_points, scene.reading)
-    seen = read_at(moved.motion, rows @ moved.basis)
-    return in_motion(seen, scene.reading.record, solids)
+    return in_motion(read_at(moved.motion, rows @ moved.basis), scene.reading.record, solids)
 
 
 def probe_response(scene: Scene, moved: BodyMotion) -> Response:
-    """Quantity that the probes of a scene read, from its body's motion."""
-    times, points, asked = sample_times(scene), scene.probe_points, scene.reading.record
+    """Return the response at the probes, in their quantity."""
+    times, points, quantity = sample_times(scene), scene.probe_points, scene.reading.record
     components = from_rest(probe_lines(scene, moved), times)
     return Response(
-        model="fem", times=times, probes=points, quantity=asked.name,
-        values=asked.waveforms(components, len(points)), effort=moved.effort,
+        model="fem", times=times, probes=points, quantity=quantity.name,
+        values=quantity.waveforms(components, len(points)), effort=moved.effort,
     )  # fmt: skip
 
 
 def check_values(frames: int, nodes: int) -> None:
-    """Refuse motion at more times than memory has room for, by a ValueError."""
+    """Raise a ValueError if the motion does not fit into memory."""
     if (values := 3 * frames * nodes) > MOST_VALUES:
         raise ValueError(
-            f"{frames:,} times of {nodes:,} nodes are {values:,} values, the limit is "
-            f"{MOST_VALUES:,}; ask for fewer times or take larger elements"
+            f"the motion has {values:,} values ({frames:,} times of {nodes:,} nodes); the limit is "
+            f"{MOST_VALUES:,}. Give fewer times or larger elements"
         )
 
 
 def vibration(moved: BodyMotion, times: Floats) -> Floats:
-    """Displacement (t, m, 3) in metre of the body's own nodes about their mean, in the steady
-    state.
-    """
+    """Return the steady displacement (t, m, 3) in metre of the nodes of `mesh` about its mean."""
     check_values(len(times), len(moved.mesh.points))
     z = _coordinates(oscillating(moved.motion), times)
     return (z @ moved.own_basis.T).reshape(len(times), -1, 3)
 
 
 def tensors(moved: BodyMotion, times: Floats, frames: Ints) -> Tensors:
-    """Strain and stress of a solid body at some frames (t,) of all times (f,) in s."""
+    """Return strain and stress of a solid body at some `frames` (t,) of its `times` (f,) in s."""
     lines, offset = oscillating(moved.motion), 0
     nodes, tets, strains, stresses = [], [], [], []
     z = _coordinates(lines, times[frames])
-    for each, own in _parts(moved):
-        relaxed = _coordinates(lines, times[frames], each.material)
-        u = moved.basis @ np.vstack([z, relaxed]).T
-        found = nodal_strain(each, u, own).astype(np.float32)
-        still, moving = np.split(np.moveaxis(found, -1, 0), 2)
-        nodes.append(np.searchsorted(moved.nodes, each.nodes[own]))
-        number = np.full(len(each.nodes), -1)
+    for solid, own in _parts(moved):
+        relaxing_z = _coordinates(lines, times[frames], solid.material)
+        u = moved.basis @ np.vstack([z, relaxing_z]).T
+        both = nodal_strain(solid, u, own).astype(np.float32)
+        strain, relaxing_strain = np.split(np.moveaxis(both, -1, 0), 2)
+        nodes.append(np.searchsorted(moved.nodes, solid.nodes[own]))
+        number = np.full(len(solid.nodes), -1)
         number[own] = offset + np.arange(len(own))
-        inside = (number[each.tets] >= 0).all(axis=1)
-        tets.append(number[each.tets[inside]])
-        strains.append(still)
-        stresses.append(moving @ hooke(each.material).T.astype(np.float32))
+        inside = (number[solid.tets] >= 0).all(axis=1)
+        tets.append(number[solid.tets[inside]])
+        strains.append(strain)
+        stresses.append(relaxing_strain @ hooke(solid.material).T.astype(np.float32))
         offset += len(own)
     return Tensors(
         frames=frames, nodes=np.concatenate(nodes), tets=np.vstack(tets),
@@ -218,70 +205,71 @@ def tensors(moved: BodyMotion, times: Floats, frames: Ints) -> Tensors:
 
 
 def shade(scene: Scene, moved: BodyMotion, times: Floats, nodes: Ints) -> Shade:
-    """Quantity that a scene's probes read, at nodes (q,) of `moved.mesh` and times (t,) in s.
+    """Return the probes' quantity at nodes (q,) of `moved.mesh` and times (t,) in s.
 
     Raises
     ------
     ValueError
-        If it is of a sheet and not of its normal motion, is strain or stress in a coat, or has
+        If the quantity is not the normal motion of a sheet, is strain or stress in a coat, or has
         too many values.
     """
-    asked = scene.reading.record
-    if scene.body.of_kind.is_plate and not asked.is_normal:
+    quantity = scene.reading.record
+    if scene.body.of_kind.is_plate and not quantity.is_normal:
         raise ValueError(
-            f"{asked.words} of a sheet is not drawn, because its mesh is thicker than it; ask for "
-            "displacement, velocity or acceleration, or for its probes by skinwave run"
+            f"{quantity.words} of a sheet cannot be drawn, because its mesh is thicker than the "
+            "sheet. Choose displacement, velocity or acceleration, or read it at probes with "
+            "skinwave run"
         )
     check_values(len(times), len(nodes))
-    whole = asked.invariant is not None and scene.body.is_held
-    lines = moved.motion if whole else oscillating(moved.motion)
-    if asked.field == STRAIN:
-        check_coat(moved.build, Reading(quantity=asked.name))
-        values = _of_strain(asked, lines, moved, times, nodes)
+    with_mean = quantity.invariant is not None and scene.body.is_held
+    lines = moved.motion if with_mean else oscillating(moved.motion)
+    if quantity.field == STRAIN:
+        check_coat(moved.build, Reading(quantity=quantity.name))
+        values = _of_strain(quantity, lines, moved, times, nodes)
     else:
-        rows = {NORMAL: INWARDS, VECTOR: asked.rows(scene.body.solid)}[asked.field]
+        rows = {NORMAL: INWARDS, VECTOR: quantity.rows(scene.body.solid)}[quantity.field]
         basis = moved.own_basis.reshape(len(moved.mesh.points), 3, -1)[nodes]
-        z = _coordinates(lines, times, None, asked)
+        z = _coordinates(lines, times, None, quantity)
         values = z @ np.einsum("ci,nim->nm", rows, basis).T
-    return Shade(quantity=asked.name, nodes=nodes, values=values.astype(np.float32))
+    return Shade(quantity=quantity.name, nodes=nodes, values=values.astype(np.float32))
 
 
 def _of_strain(
-    asked: Quantity, lines: ReducedResponse, moved: BodyMotion, times: Floats, nodes: Ints
+    quantity: Quantity, lines: ReducedResponse, moved: BodyMotion, times: Floats, nodes: Ints
 ) -> Floats:
-    """Values (t, q) of a quantity of strain; between materials the mean of those on both sides."""
+    """Return values (t, q) of a quantity of strain; the mean of both sides between materials."""
     total, count = np.zeros((len(times), len(nodes))), np.zeros(len(nodes))
-    for each, own in _parts(moved):
-        here = np.searchsorted(moved.nodes, each.nodes[own])
-        seen = np.isin(here, nodes)
-        z = _coordinates(lines, times, each.material, asked)
-        strain = nodal_strain(each, moved.basis @ z.T, own[seen])
-        found = np.einsum("vc,qct->tqv", asked.rows(each.material), strain, optimize=True)
-        at = np.searchsorted(nodes, here[seen])
-        total[:, at] += asked.waveforms(found.reshape(len(times), -1), int(seen.sum()))
+    for solid, own in _parts(moved):
+        numbers = np.searchsorted(moved.nodes, solid.nodes[own])
+        wanted = np.isin(numbers, nodes)
+        z = _coordinates(lines, times, solid.material, quantity)
+        strain = nodal_strain(solid, moved.basis @ z.T, own[wanted])
+        components = np.einsum("vc,qct->tqv", quantity.rows(solid.material), strain, optimize=True)
+        at = np.searchsorted(nodes, numbers[wanted])
+        total[:, at] += quantity.waveforms(components.reshape(len(times), -1), int(wanted.sum()))
         count[at] += 1
     return total / count
 
 
 def _parts(moved: BodyMotion) -> Iterator[tuple[SolidPart, Ints]]:
-    """Parts of a driven mesh, of one material each, and which of their nodes are the body's."""
-    for each in solid_parts(moved.build.mesh, moved.build.material):
-        own = np.flatnonzero(np.isin(each.nodes, moved.nodes))
+    """Yield the parts of one material each, and which of their nodes belong to the body."""
+    for solid in solid_parts(moved.build.mesh, moved.build.material):
+        own = np.flatnonzero(np.isin(solid.nodes, moved.nodes))
         if len(own):
-            yield each, own
+            yield solid, own
 
 
 def _coordinates(
     lines: ReducedResponse, times: Floats, material: Material | None = None,
-    asked: Quantity | None = None,
+    quantity: Quantity | None = None,
 ) -> Floats:  # fmt: skip
-    """Reduced coordinates (t, r) of lines with the rates of a quantity and, of a material, with the
-    relaxation of its stress.
+    """Return reduced coordinates (t, r), with the rates of a quantity and the relaxation of a
+    material.
     """
     f = lines.frequencies
     if not len(f):
         return np.zeros((len(times), lines.lines.shape[1]))
     s = 2j * np.pi * f
     modulus = 1.0 if material is None else fem.relaxation(material, s)
-    factor = np.asarray(modulus if asked is None else asked.factor(s, modulus))
+    factor = np.asarray(modulus if quantity is None else quantity.factor(s, modulus))
     return synthesise(f, lines.lines * np.broadcast_to(factor, f.shape)[:, None], times)

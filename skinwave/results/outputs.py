@@ -1,7 +1,6 @@
-"""Output folders and files: written under another name beside the target, then renamed.
+"""Output folders and files, which are written under a temporary name and then renamed.
 
-A folder is replaced only if this program wrote it and everything in it: its record.json lists the
-files that were written beside it.
+A folder is replaced only if skinwave wrote every file in it, which its record.json lists.
 """
 
 import hashlib
@@ -18,82 +17,82 @@ from typing import IO
 from skinwave.results import record
 
 FILES = "files"  # key in record.json: path below its folder -> SHA-256
-REPORT = "report"  # the folder that the command of that name makes within a result
-OF_SYSTEM = (".DS_Store", "Thumbs.db", "desktop.ini")  # written by file browsers
-LONGEST = 50  # characters of a name that a temporary one begins with
+REPORT = "report"  # folder that the command `report` makes within a result
+SYSTEM_FILES = (".DS_Store", "Thumbs.db", "desktop.ini")  # written by file browsers
+LONGEST_PREFIX = 50  # characters of the target's name in a temporary name
 
 
 @contextmanager
 def output_folder(
     out: Path, *, overwrite: bool = False, inputs: Iterable[str | Path] = ()
 ) -> Iterator[Path]:
-    """Yield a folder to write in, which becomes `out` when all is written; a ValueError if that
-    exists and may not be replaced. `inputs`, which the command reads, are never replaced.
+    """Yield a temporary folder, which is renamed to `out` at the end.
 
-    Until then its name is `<out>.partial-` and eight digits. An error removes it and leaves `out`
-    untouched. An interrupt keeps it if it holds finished runs, and says so.
+    Raises a ValueError if `out` exists and may not be replaced, or contains one of the `inputs`. An
+    error removes the temporary folder and leaves `out` untouched. An interrupt keeps it if it
+    contains finished runs, and prints its name.
     """
-    out = Path(os.path.realpath(out))  # a link remains one, and points to what is written
-    _refuse_folder(out, overwrite, inputs)
+    out = Path(os.path.realpath(out))  # a link stays a link to the result
+    _check_replaceable(out, overwrite, inputs)
     out.parent.mkdir(parents=True, exist_ok=True)
-    aside, kept = beside(out, "partial"), False
-    aside.mkdir()
+    partial, is_kept = temporary_path(out, "partial"), False
+    partial.mkdir()
     try:
-        yield aside
-        seal(aside)
-        kept = True  # a whole result is not lost, whatever happened to the target meanwhile
-        _put_in_place(aside, out, overwrite)
+        yield partial
+        seal(partial)
+        is_kept = True  # a complete result is not lost, even if the target has changed meanwhile
+        _put_in_place(partial, out, overwrite)
     except KeyboardInterrupt:
-        kept = any(aside.rglob(record.FILE))
-        if not kept:
+        is_kept = any(partial.rglob(record.FILE))
+        if not is_kept:
             raise
-        command = shlex.join(["skinwave", "report", str(aside)])
+        command = shlex.join(["skinwave", "report", str(partial)])
         raise KeyboardInterrupt(
-            f"the runs that were finished are kept in {aside}; {command} makes a page of them"
+            f"finished runs are kept in {partial}; {command} makes a page of them"
         ) from None
     finally:
-        if not kept:
-            shutil.rmtree(aside, ignore_errors=True)
+        if not is_kept:
+            shutil.rmtree(partial, ignore_errors=True)
 
 
 @contextmanager
 def output_path(
     out: Path, *, overwrite: bool = False, inputs: Iterable[str | Path] = ()
 ) -> Iterator[Path]:
-    """Yield a path of the same suffix; what is written there becomes `out`, or leaves no trace. A
-    ValueError if `out` exists and may not be overwritten, or is one of the command's `inputs`.
+    """Yield a temporary path with the same suffix, which is renamed to `out` at the end; an error
+    leaves no file. Raises a ValueError if `out` may not be overwritten or is one of the `inputs`.
     """
     out = Path(os.path.realpath(out))
     if out.is_dir():
-        raise ValueError(f"{out} is a folder; name a file")
+        raise ValueError(f"{out} is a folder. Give the name of a file")
     if os.path.lexists(out) and not overwrite:
-        raise ValueError(f"{out} exists and is kept; pass --overwrite or choose another")
+        raise ValueError(f"{out} exists. Give --overwrite to replace it, or another name")
     if any(os.path.exists(path) and os.path.samefile(path, out) for path in inputs if out.exists()):
-        raise ValueError(f"{out} is read by this command; choose another")
-    aside = beside(out, "partial").with_suffix(out.suffix)
+        raise ValueError(f"{out} is an input of this command. Give another name")
+    partial = temporary_path(out, "partial").with_suffix(out.suffix)
     try:
-        yield aside
-        os.replace(aside, out)
+        yield partial
+        os.replace(partial, out)
     finally:
-        aside.unlink(missing_ok=True)
+        partial.unlink(missing_ok=True)
 
 
 @contextmanager
 def output_file(
     out: Path, *, overwrite: bool = False, inputs: Iterable[str | Path] = ()
 ) -> Iterator[IO[bytes]]:
-    """Yield a file to write to, which becomes `out` as that of `output_path` does."""
-    with output_path(out, overwrite=overwrite, inputs=inputs) as aside, open(aside, "xb") as file:
+    """Yield a file opened for writing; otherwise like `output_path`."""
+    with output_path(out, overwrite=overwrite, inputs=inputs) as path, open(path, "xb") as file:
         yield file
 
 
-def beside(out: Path, what: str) -> Path:
-    """Return a new path in the folder of `out`, which no other process has."""
-    return out.with_name(f"{out.name[:LONGEST]}.{what}-{secrets.token_hex(4)}")
+def temporary_path(out: Path, kind: str) -> Path:
+    """Return a unique path in the folder of `out`."""
+    return out.with_name(f"{out.name[:LONGEST_PREFIX]}.{kind}-{secrets.token_hex(4)}")
 
 
 def seal(folder: Path) -> None:
-    """Enter every file below a folder in its record.json, once all is written."""
+    """List every file below a folder in its record.json."""
     listed = {
         path.relative_to(folder).as_posix(): digest(path)
         for path in sorted(folder.rglob("*"))
@@ -104,80 +103,80 @@ def seal(folder: Path) -> None:
 
 
 def digest(path: Path) -> str:
-    """SHA-256 of a file's content."""
+    """Return the SHA-256 of a file."""
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def listed_files(folder: Path) -> dict[str, str] | None:
-    """SHA-256 by path of the files that a folder was written with; None if it is no result."""
+    """Return the SHA-256 of a result's files by path, or None if the folder is not a result."""
     try:
-        found = record.read(folder).get(FILES)
+        listed = record.read(folder).get(FILES)
     except ValueError:
         return None
-    return found if isinstance(found, dict) else None
+    return listed if isinstance(listed, dict) else None
 
 
 def foreign_file(folder: Path) -> Path | None:
-    """The first file below a folder that was added or changed since this program wrote it.
+    """Return the first file below a folder that was added or changed after skinwave wrote it.
 
-    A report within it has a list of its own.
+    A report within the folder has its own list.
     """
     records, listed = set[Path](), dict[Path, str]()
     for home in (folder, folder / REPORT):
-        if (known := listed_files(home)) is not None:
+        if (digests := listed_files(home)) is not None:
             records.add(home / record.FILE)
-            listed |= {home / name: found for name, found in known.items()}
+            listed |= {home / name: sha for name, sha in digests.items()}
     for path in sorted(folder.rglob("*")):
-        ours = path.name in OF_SYSTEM or path in records or is_as_listed(path, listed.get(path))
+        ours = path.name in SYSTEM_FILES or path in records or is_unchanged(path, listed.get(path))
         if not ours and (path.is_symlink() or not path.is_dir()):
             return path
     return None
 
 
-def is_as_listed(path: Path, entry: object) -> bool:
-    """Whether a path is a regular file, no link, with the content that its entry in a list has."""
-    return path.is_file() and not path.is_symlink() and digest(path) == entry
+def is_unchanged(path: Path, sha: object) -> bool:
+    """Whether a path is a regular file, not a link, with this SHA-256."""
+    return path.is_file() and not path.is_symlink() and digest(path) == sha
 
 
-def _refuse_folder(out: Path, overwrite: bool, inputs: Iterable[str | Path]) -> None:
-    """Refuse a target that exists, unless it may be replaced and holds nothing of the user's."""
+def _check_replaceable(out: Path, overwrite: bool, inputs: Iterable[str | Path]) -> None:
+    """Raise a ValueError if a target exists, unless it may be replaced and is all skinwave's."""
     try:
-        out.lstat()  # refuses a name that is too long now, not when all is computed
+        out.lstat()  # raises an OSError now if the name is too long
     except FileNotFoundError:
         return
     if not overwrite:
-        raise ValueError(f"{out} exists and is kept; pass --overwrite or another --out")
+        raise ValueError(f"{out} exists. Give --overwrite to replace it, or another --out")
     if not out.is_dir():
-        raise ValueError(f"{out} is a file; choose a folder with --out")
+        raise ValueError(f"{out} is a file. Give a folder with --out")
     for used in (Path.cwd(), *(path for path in inputs if path)):
         real = Path(os.path.realpath(used))
         if real.exists() and any(parent.samefile(out) for parent in (real, *real.parents)):
-            raise ValueError(f"{out} holds {used}, which is in use; choose another --out")
+            raise ValueError(f"{out} contains {used}, which is in use. Give another --out")
     if any(out.iterdir()) and listed_files(out) is None:
         raise ValueError(
-            f"{out} was not written by skinwave (it has no {record.FILE} that lists its files); "
-            "remove it yourself or choose another --out"
+            f"{out} was not written by skinwave (no {record.FILE} lists its files). Remove it, or "
+            "give another --out"
         )
     if (path := foreign_file(out)) is not None:
         raise ValueError(
-            f"{out} holds {path.relative_to(out)}, which was added or changed since skinwave "
-            "wrote it; move that elsewhere or choose another --out"
+            f"{out} contains {path.relative_to(out)}, which skinwave did not write or which was "
+            "changed. Move the file, or give another --out"
         )
 
 
-def _put_in_place(aside: Path, out: Path, overwrite: bool) -> None:
-    """Give a folder its name; what had the name is removed, if it is still wholly ours."""
-    old = beside(out, "replaced")
+def _put_in_place(partial: Path, out: Path, overwrite: bool) -> None:
+    """Rename a folder to `out`, and remove the old `out` if it may be replaced."""
+    old = temporary_path(out, "replaced")
     try:
-        _refuse_folder(out, overwrite, ())
+        _check_replaceable(out, overwrite, ())
         if out.exists():
             out.rename(old)
-        aside.rename(out)
+        partial.rename(out)
     except (OSError, ValueError) as error:
         if old.exists() and not os.path.lexists(out):
             old.rename(out)
         raise ValueError(
-            f"{out} cannot be replaced ({error}); this result is {aside}, rename it as you like"
+            f"{out} cannot be replaced ({error}). The result was kept in {partial}"
         ) from None
     shutil.rmtree(old, ignore_errors=True)

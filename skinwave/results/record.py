@@ -1,4 +1,4 @@
-"""Record of a result, record.json: the command that made it, its scene, its model and versions."""
+"""record.json of a result: the command that made it, its scene, its model and versions."""
 
 import json
 import shlex
@@ -16,13 +16,13 @@ from skinwave.system.effort import threads, versions
 
 FILE = "record.json"
 RESPONSES = "responses.npz"
-# Options that say where to compute and how to report, not what to compute.
+# Options that do not affect the result.
 REPORTING = ("command", "command_name", "out", "overwrite", "quiet", "json", "debug", "no_cache",
              "typed", "scheduler")  # fmt: skip
 
 
-def of_command(options: Namespace) -> dict[str, Any]:
-    """A command of the command line: as typed, its name, and all of its options."""
+def command_entry(options: Namespace) -> dict[str, Any]:
+    """Return a command as typed, with its name and options."""
     given = {name: value for name, value in vars(options).items() if name not in REPORTING}
     return {
         "typed": shlex.join(["skinwave", *options.typed]),
@@ -41,9 +41,7 @@ def write(
     scene: Scene | None = None,
     response: Response | None = None,
 ) -> None:
-    """Write record.json of a folder: a command as of `of_command`, and the scene and response of
-    one model, if there are any.
-    """
+    """Write record.json of a folder from a `command_entry` and, if given, scene and response."""
     content: dict[str, Any] = {
         "command": command, "scene": dumps(scene) if scene else None,
         "versions": versions(), "threads": threads(),
@@ -59,11 +57,11 @@ def write(
 
 
 def read(folder: Path) -> dict[str, Any]:
-    """Read the record of a result folder; a ValueError if there is none, or it is spoilt."""
+    """Read record.json of a result folder; raises a ValueError if it is missing or damaged."""
     path = folder / FILE
     if not path.exists():
-        raise ValueError(f"{folder} has no {FILE}; name a folder that skinwave wrote")
+        raise ValueError(f"{folder} has no {FILE}. Give a folder that skinwave wrote")
     content = reading.load_json(path)
     if not isinstance(content, dict) or not isinstance(content.get("command"), dict):
-        raise ValueError(f"{path} is no record of a result; make the result anew")
+        raise ValueError(f"{path} is damaged. Compute the result again")
     return content

@@ -1,4 +1,4 @@
-"""Response of one model to a scene, and its lines by name."""
+"""Runs: the response of one model to a scene, and its lines by name."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,18 +9,18 @@ from simple_model.load.line_names import SAME_LINE, line_frequency
 from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
 
-# Lines that claims are about, of one focus, whether or not the load has them.
+# Lines of one focus that claims are about, whether or not the load has them.
 ASSESSED = (
     "f_AM", "2f_AM", "3f_AM", "4f_AM", "5f_AM", "f_d", "2f_d", "3f_d",
     "f_d-f_AM", "f_d+f_AM", "2f_d-f_AM", "2f_d+f_AM",
 )  # fmt: skip
 
-SUPPORT = "f_support"  # the line of a support that moves
+SUPPORT = "f_support"  # line of a moving support
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Run:
-    """One Tacton on one body by one model; the lines of its response are those of its load."""
+    """Response of one model to one Tacton on one body; its lines are those of the load."""
 
     tacton: str
     body: str
@@ -29,21 +29,22 @@ class Run:
 
     @property
     def model(self) -> str:
-        """The model of the response."""
+        """Name of the model."""
         return self.response.model
 
     @property
     def column(self) -> str:
-        """Name in tables and figures: its body or, of a point kernel, the model."""
+        """Name in tables and figures: the body, or the model of a point kernel."""
         return self.model if self.body == "none" else self.body
 
     @cached_property
     def table(self) -> LineTable:
         """All lines of the response, each once."""
         candidates = ASSESSED if len(self.scene.tacton.foci) == 1 else ()
-        beside = lines_beside(self.scene, self.response)
+        motion = self.scene.load.support_motion
+        support = {SUPPORT: motion.frequency} if motion and self.response.record.of_body else {}
         return line_table(
-            self.scene.pressure, self.response, candidates=candidates, other_lines=beside
+            self.scene.pressure, self.response, candidates=candidates, other_lines=support
         )
 
     @property
@@ -58,7 +59,7 @@ class Run:
 
     @cached_property
     def frequencies(self) -> dict[str, float]:
-        """Frequencies in Hz by name; of lines that coincide, by each name that claims are about."""
+        """Frequencies in Hz by name; lines that coincide have each name that claims are about."""
         return {name: self.listed[own] for name, own in self._own.items()}
 
     @cached_property
@@ -73,12 +74,12 @@ class Run:
 
     @property
     def places(self) -> Floats:
-        """The probes (p, 2) in metre."""
+        """Places (p, 2) of the probes in metre."""
         return self.response.probes
 
     @property
     def unresolved(self) -> tuple[str, ...]:
-        """Names of lines too close to 0 Hz or to each other for the length of the response."""
+        """Names of lines too close to 0 Hz or to each other to be resolved in the response."""
         return tuple(self.table.unresolved)
 
     @cached_property
@@ -87,12 +88,12 @@ class Run:
 
     @property
     def is_motion(self) -> bool:
-        """Whether it is the displacement of a body's surface."""
+        """Whether the response is the displacement of a body's surface."""
         return self.scene.reading.is_plain and self.response.record.of_body
 
     @property
     def is_skin(self) -> bool:
-        """Whether it is the motion of skin, of which alone thresholds of detection are known."""
+        """Whether the response is the motion of skin, for which detection thresholds are known."""
         return self.is_motion and self.scene.body.is_skin
 
     @property
@@ -106,14 +107,10 @@ class Run:
         return self.scene.tacton.trajectory.drawing_frequency > 0
 
 
-def lines_beside(scene: Scene, response: Response) -> dict[str, float]:
-    """Names and frequencies in Hz of what moves a response's body beside the pressure."""
-    motion = scene.load.support_motion
-    return {SUPPORT: motion.frequency} if motion and response.record.of_body else {}
-
-
 def own_names(scene: Scene, listed: Mapping[str, float]) -> dict[str, str]:
-    """Listed names, with frequencies in Hz, by themselves and each name that claims are about."""
+    """Return the listed name (with its frequency in Hz) by itself and by each name of `ASSESSED`
+    that coincides with it.
+    """
     same = SAME_LINE / scene.tacton.duration
     own = {name: name for name in listed}
     for name in ASSESSED:

@@ -1,4 +1,4 @@
-"""A scene's responses by all models that pictures show side by side, in a folder.
+"""Albums: a scene's responses by all models that pictures show, in a folder.
 
 scene.toml  plan.json  lines.csv
 COLUMN/scene.toml  responses.npz  lines.csv  effort.json  record.json  view.npz  map.npz
@@ -17,6 +17,7 @@ import numpy as np
 from meshes import reading
 from simple_model import Response
 from simple_model.choices import choose
+from simple_model.load.tacton import repetition_frequencies
 from simple_model.quantities import DISPLACEMENT, QUANTITIES
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.models import named
@@ -31,9 +32,9 @@ from skinwave.planning.simulate import compute, solve
 from skinwave.report import description
 from skinwave.results import record, surface
 from skinwave.results.files import write_lines, write_run
-from skinwave.results.motion import BodyMotion, probe_response, waves
+from skinwave.results.motion import REDUCTION_TOLERANCE, BodyMotion, probe_response, whole_motion
+from skinwave.results.playback import played_part
 from skinwave.results.run import Run
-from skinwave.results.speeds import repetition_frequencies, shown_part
 from skinwave.results.surface import (
     SurfaceField,
     body_map,
@@ -49,25 +50,22 @@ from skinwave.results.views import (
     kernel_view,
     load,
     save,
-    shaded,
+    with_shade,
 )
 from skinwave.scene import paper15
 from skinwave.scene.file import dumps, read
 from skinwave.scene.scene import BODIES, Scene, body_name, check_load, with_body
 from skinwave.system.document import worst_warnings
-from skinwave.system.effort import Progress
 from skinwave.system.json_kinds import EFFORT, PLAN, effort_of, fitting
 
 KERNEL_REACH = np.array([BODIES["skin-slab"].width, BODIES["skin-slab"].height]) / 2
-LARGER = 1.5  # times the default size: elements of pictures, for a fifth of the time
-PLANNED = 0.05  # tolerance of the plan that stands on the page
+LARGER = 1.5  # element size of pictures over the default one, at a fifth of the time
+PLANNED = 0.05  # tolerance of the plan on the page
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Album:
-    """Contents of a folder: runs, views by body and the plan, where these were saved, and `maps` of
-    the quantity that the probes of each body read.
-    """
+    """Contents of a folder: runs, saved views and maps by column, and the saved plan."""
 
     title: str
     scene: Scene
@@ -85,13 +83,14 @@ class Album:
         return groups
 
 
-def shown_scenes(scene: Scene, beside: Sequence[str] = ()) -> dict[str, Scene]:
-    """The scene by `Run.column`: by both point kernels and on its own body or, without one, on
-    those of the paper sheet and the skin slab that its path and probes fit on; and on preset bodies
-    `beside` it, a ValueError if one is unknown or too small. All but the published kernel receive
-    the same load.
+def scene_columns(scene: Scene, beside: Sequence[str] = ()) -> dict[str, Scene]:
+    """Return a scene by `Run.column`: by both point kernels, on its own body and on other presets.
+
+    A scene without a body is shown on those of paper sheet and skin slab on which its path and
+    probes fit. All but the published kernel receive the same load. Raises a ValueError if the load
+    is not a pressure, or a body of `beside` is unknown or does not fit.
     """
-    check_load(scene, "a film or report")
+    check_load(scene, "a comparison with the point kernel")
     bodies: dict[str, Scene] = {}
     if scene.body.of_kind.discretise:
         bodies[body_name(scene.body)] = scene
@@ -99,33 +98,27 @@ def shown_scenes(scene: Scene, beside: Sequence[str] = ()) -> dict[str, Scene]:
         choose("body", name, [n for n in BODIES if n != "none"])
         other = with_body(scene, BODIES[name])
         if bodies.setdefault(name, other) != other:
-            raise ValueError(f"the scene's own body is shown as '{name}'; leave it out of --beside")
+            raise ValueError(
+                f"the scene's own body already has the name '{name}'. Remove it from --beside"
+            )
     for name in paper15.MEASURED_ON if not bodies else ():
-        with suppress(ValueError):  # a path or probes that do not fit on it
+        with suppress(ValueError):
             bodies[name] = with_body(scene, BODIES[name])
     return paper15.beside_kernels(scene) | bodies
 
 
-def make(
-    folder: Path,
-    scene: Scene,
-    progress: Progress,
-    *,
-    h: float | None = None,
-    solver: str = "auto",
-    frames: int | None = None,
+def write_album(
+    folder: Path, scene: Scene, options: SolveOptions, *, frames: int | None = None,
     beside: Sequence[str] = (),
-) -> list[str]:
-    """Compute a scene's response by every model and fill a folder with it; the warnings of all. A
-    ValueError if a model refuses the scene.
+) -> list[str]:  # fmt: skip
+    """Compute a scene by every model, fill a folder with the results, and return the warnings.
+
+    Raises a ValueError if a model cannot compute the scene.
     """
     (folder / "scene.toml").write_text(dumps(scene), encoding="utf-8")
     runs, own, misfit = [], None, {}
-    for view, run, planned in answers(
-        scene, progress, h=h, solver=solver, frames=frames, beside=beside
-    ):
-        also = None if view is None else partial(keep_view, view)
-        write_run(folder / run.column, run, also=also)
+    for view, run, planned in compute_views(scene, options, frames=frames, beside=beside):
+        write_run(folder / run.column, run, also=partial(write_view, view) if view else None)
         runs.append(run)
         if run.scene == scene and planned:
             own = planned
@@ -137,69 +130,69 @@ def make(
     return worst_warnings((run.body, run.response.effort) for run in runs)
 
 
-def keep_view(view: View, folder: Path) -> None:
-    """A view in a file and, of a body, the map of what its probes read."""
+def write_view(view: View, folder: Path) -> None:
+    """Write a view and, for a body, the map of the probes' quantity."""
     save(folder / "view.npz", view)
     scene, moved, (x, y) = view.scene, view.moved, grid(view.scene)
-    if scene.reading.is_plain and has_wavenumber_integral(scene):
-        moved = None
-    if moved is not None:
+    if moved and not (scene.reading.is_plain and has_wavenumber_integral(scene)):
         surface.save(folder / "map.npz", element_map(scene, moved, x, y))
     elif scene.reading.is_plain and view.body != "none":
         surface.save(folder / "map.npz", body_map(scene, x, y))
 
 
-def answers(
-    scene: Scene,
-    progress: Progress,
-    *,
-    h: float | None = None,
-    solver: str = "auto",
-    frames: int | None = None,
-    beside: Sequence[str] = (),
+def compute_views(
+    scene: Scene, options: SolveOptions, *, frames: int | None = None, beside: Sequence[str] = ()
 ) -> Iterator[tuple[View | None, Run, Plan | None]]:
-    """The runs of `shown_scenes`, one at a time, each with its view and its plan; there is no view
-    of the published kernel, whose load is another one. Raises what `make` does.
+    """Yield view, run and plan of each of `scene_columns`; the published kernel has no view.
 
-    Views of bodies are by finite elements that are larger than those of responses, or by the modes
-    of a plate.
+    Views use larger elements than responses, or the modes of a plate.
     """
-    shown = shown_scenes(scene, beside)
-    options = SolveOptions(tolerance=PLANNED, h=h, solver=solver, progress=progress)
+    columns, progress = scene_columns(scene, beside), options.progress
+    solving = replace(options, tolerance=PLANNED)
     plans = {
-        column: plan(its, options)
-        for column, its in shown.items() if its.body.of_kind.discretise
+        column: plan(each, solving)
+        for column, each in columns.items() if each.body.of_kind.discretise
     }  # fmt: skip
     moved = {
-        body: waves(its, progress=progress, h=h or LARGER * default_size(its.body), solver=solver)
-        for body, its in shown.items()
-        if _has_elements(its, h) and not _is_plate(its, h)
-    }
+        column: whole_motion(
+            each,
+            replace(
+                options, tolerance=REDUCTION_TOLERANCE,
+                h=options.h or LARGER * default_size(each.body),
+            ),
+        )
+        for column, each in columns.items()
+        if _has_elements(each, options.h)
+    }  # fmt: skip
     tones = max(repetition_frequencies(scene.tacton).values(), default=0.0)
     fastest = max(map(fastest_line, moved.values()), default=tones)
-    part = shown_part(scene.pressure, fastest, frames)  # the same for all, side by side
-    for column, its in shown.items():
+    part = played_part(scene.pressure, fastest, frames)  # all views play the same part
+    for column, each in columns.items():
         progress(f"response of {column}", 0.0)
         if column not in plans:
-            run = Run(tacton=scene.name, body="none", scene=its, response=compute(its, column))
+            run = Run(tacton=scene.name, body="none", scene=each, response=compute(each, column))
             is_shown = column == SAME_LOAD.name
-            yield kernel_view(its, KERNEL_REACH, part) if is_shown else None, run, None
+            yield kernel_view(each, KERNEL_REACH, part) if is_shown else None, run, None
             continue
-        response = solve(its, plans[column])
-        run = Run(tacton=scene.name, body=column, scene=its, response=response)
+        response = solve(each, plans[column])
+        run = Run(tacton=scene.name, body=column, scene=each, response=response)
         progress(f"pictures of {column}", 0.0)
         if column in moved:
-            view = body_view(its, column, moved[column], part)
+            view = body_view(each, column, moved[column], part)
         else:
             view = flat_view(run, KERNEL_REACH, part)
         yield view, run, plans[column]
 
 
 def _has_elements(scene: Scene, h: float | None) -> bool:
-    """Whether pictures are by elements: the body can be meshed, or has no model without a mesh. A
-    ValueError if it must be meshed and cannot be.
+    """Whether pictures are drawn by finite elements.
+
+    Without a given element size, plates are drawn by their modes, and layers that cannot be meshed
+    by their wavenumber integral. Raises a ValueError if a body must be meshed and cannot be.
     """
     if not scene.body.of_kind.discretise:
+        return False
+    if h is None and scene.reading.is_plain and takes(FROM_REST, scene):
         return False
     try:
         check_mesh(scene.body, h or default_size(scene.body))
@@ -210,71 +203,76 @@ def _has_elements(scene: Scene, h: float | None) -> bool:
     return True
 
 
-def _is_plate(scene: Scene, h: float | None) -> bool:
-    """Whether pictures are by the modes of a plate: of its displacement, unless the size of
-    elements is asked for.
-    """
-    return h is None and scene.reading.is_plain and takes(FROM_REST, scene)
+def shown_views(
+    scene: Scene, options: SolveOptions, *, frames: int | None = None, beside: Sequence[str] = ()
+) -> tuple[list[View], list[str]]:
+    """Return views of a scene coloured by the probes' quantity, and warnings.
 
-
-def shown_views(scene: Scene, progress: Progress, **options: Any) -> tuple[list[View], list[str]]:
-    """Views of a scene on all that it is shown on, by the quantity that its probes read, and
-    warnings. The point kernel is left out of other quantities than displacement, because it has
-    none. Options and errors are those of `make`.
+    Only displacement includes the point kernel. Raises what `write_album` raises.
     """
-    found = [(view, run) for view, run, _ in answers(scene, progress, **options) if view]
-    said = worst_warnings((run.body, run.response.effort) for _, run in found)
+    computed = [
+        (view, run)
+        for view, run, _ in compute_views(scene, options, frames=frames, beside=beside) if view
+    ]  # fmt: skip
+    warnings = worst_warnings((run.body, run.response.effort) for _, run in computed)
     if scene.reading.record is DISPLACEMENT:
-        return [view for view, _ in found], said
-    if not any(len(view.tets) for view, _ in found):
-        raise ValueError(f"{description.without_kernel(scene)}; give the scene a body")
-    said += [description.without_kernel(scene)]
-    return [shaded(view, run.scene) for view, run in found if len(view.tets)], said
+        return [view for view, _ in computed], warnings
+    missing = description.no_kernel_text(scene)
+    views = [with_shade(view, run.scene) for view, run in computed if len(view.tets)]
+    if not views:
+        raise ValueError(f"{missing}. Give the scene a body")
+    return views, [*warnings, missing]
 
 
 def _misfit(run: Run, moved: BodyMotion) -> float:
-    """How far the motion in pictures is from the response, over all probes, relative."""
+    """Return the relative difference between the motion in pictures and the response."""
     values = run.response.values
-    away = probe_response(run.scene, moved).values - values
-    return float(np.linalg.norm(away)) / (float(np.linalg.norm(values)) or 1.0)
+    difference = probe_response(run.scene, moved).values - values
+    return float(np.linalg.norm(difference)) / (float(np.linalg.norm(values)) or 1.0)
 
 
 def open_album(folder: Path) -> Album:
-    """Results in a folder that `run`, `compare` or `report` wrote; a ValueError if there are none.
-    No model is run.
+    """Read the results in a folder that `run`, `compare` or `report` wrote; no model is run.
+
+    Raises a ValueError if the folder has no results.
     """
     scenes = (path.parent for path in folder.rglob("scene.toml"))
-    found = [scene / record.RESPONSES for scene in scenes if (scene / record.RESPONSES).is_file()]
-    runs = [_run(path) for path in sorted(found, key=_order)]
+    responses = [path for home in scenes if (path := home / record.RESPONSES).is_file()]
+    runs = [_read_run(path) for path in sorted(responses, key=_order)]
     if not runs:
-        missing = f"{folder} holds no {record.RESPONSES}"
-        raise ValueError(f"{missing}; give a scene file or a result folder")
+        raise ValueError(
+            f"{folder} contains no {record.RESPONSES}. Give a scene file or a result folder"
+        )
     views = [load(path) for path in sorted(folder.glob("*/view.npz"), key=_order)]
-    own, scenes_of = folder / "scene.toml", {run.column: run.scene for run in runs}
-    kept = {path.parent.name: path for path in sorted(folder.glob("*/map.npz"), key=_order)}
+    own, scene_of = folder / "scene.toml", {run.column: run.scene for run in runs}
     scene = read(own) if own.exists() else runs[-1].scene
+    maps = {
+        name: surface.load(path, scene_of[name])
+        for path in sorted(folder.glob("*/map.npz"), key=_order)
+        if (name := path.parent.name) in scene_of
+    }
     return Album(
         title=scene.name if own.exists() else folder.resolve().name, scene=scene, runs=runs,
-        views={view.column: view for view in views}, planned=_json(folder / "plan.json", PLAN),
-        maps={n: surface.load(path, scenes_of[n]) for n, path in kept.items() if n in scenes_of},
+        views={view.column: view for view in views}, maps=maps,
+        planned=_read_json(folder / "plan.json", PLAN),
     )  # fmt: skip
 
 
 def _order(path: Path) -> tuple[str, int, str]:
-    """By Tacton, then the point kernels, then in the order in which bodies are named everywhere."""
+    """Return a sort key: Tacton, then point kernels, then bodies in the usual order."""
     column, known = path.parent.name, [PUBLISHED.name, SAME_LOAD.name, *BODIES]
     place = known.index(column) if column in known else len(known)
     return str(path.parent.parent), place, column
 
 
-def _run(path: Path) -> Run:
+def _read_run(path: Path) -> Run:
     scene = read(path.parent / "scene.toml")
     arrays = reading.load_arrays(path)
-    effort = _json(path.parent / "effort.json", EFFORT) or {}
-    expected = (_json(path.parent / record.FILE, {}) or {}).get("expected_error")
+    effort = _read_json(path.parent / "effort.json", EFFORT) or {}
+    expected = (_read_json(path.parent / record.FILE, {}) or {}).get("expected_error")
     try:
         if any(array.dtype.kind not in "fiu" for array in arrays.values()):
-            raise ValueError("it has arrays of other things than numbers")
+            raise ValueError("it has arrays that are not numbers")
         model = next(n for n in arrays if n not in ("t", "probes", *QUANTITIES))
         response = Response(
             model=model, times=arrays["t"], probes=arrays["probes"], values=arrays[model],
@@ -283,31 +281,34 @@ def _run(path: Path) -> Run:
             expected_error=np.nan if expected is None else fitting(expected, float, "the error"),
         )  # fmt: skip
         if len(response.times) < 2 or not len(response.probes) or response.probes.shape[1] != 2:
-            raise ValueError("it has no probe in a plane, or less than two samples")
+            raise ValueError("it has fewer than two samples, or no probe in a plane")
     except (ValueError, KeyError, TypeError, StopIteration) as error:
-        raise ValueError(f"{path} is no result ({error}); run its scene again") from None
+        raise ValueError(
+            f"{path} is not a result of skinwave ({error}). Run its scene again"
+        ) from None
     return Run(tacton=scene.name, body=body_name(scene.body), scene=scene, response=response)
 
 
-def _json(path: Path, pattern: dict[str, Any]) -> dict[str, Any] | None:
-    """Contents of a file, if there is one, as `fitting` takes it."""
+def _read_json(path: Path, pattern: dict[str, Any]) -> dict[str, Any] | None:
+    """Return the contents of a file that fit a pattern, or None if there is no file."""
     if not path.exists():
         return None
-    found: dict[str, Any] = fitting(reading.load_json(path), pattern, str(path))
-    return found
+    content: dict[str, Any] = fitting(reading.load_json(path), pattern, str(path))
+    return content
 
 
-def only(album: Album, columns: Sequence[str]) -> Album:
-    """An album with these columns alone, such as "point-kernel" and "skin-slab"; all of them if
-    none is named. A ValueError if it has no such column.
+def select_columns(album: Album, columns: Sequence[str]) -> Album:
+    """Return an album with these columns, such as "point-kernel", or with all if none is given.
+
+    Raises a ValueError if a column is unknown.
     """
     known = list(dict.fromkeys(run.column for run in album.runs))
     for name in columns:
         choose("column", name, known)
-    wanted = columns or known
+    selected = columns or known
     return replace(
         album,
-        runs=[run for run in album.runs if run.column in wanted],
-        views={name: view for name, view in album.views.items() if name in wanted},
-        maps={name: found for name, found in album.maps.items() if name in wanted},
+        runs=[run for run in album.runs if run.column in selected],
+        views={name: view for name, view in album.views.items() if name in selected},
+        maps={name: found for name, found in album.maps.items() if name in selected},
     )

@@ -1,8 +1,8 @@
 """Assumptions of the published model, and a scene with some of them dropped.
 
 The paper's model (Lim, Seifi and Park, CHI EA '24, section 2) is a round focal spot without side
-lobes, whose pressure follows the command and stimulates only where it acts, on a flat skin in which
-nothing propagates. Each name in `ASSUMPTIONS` turns one of these off.
+lobes. Its pressure follows the command and acts only where it is applied, on flat skin in which
+nothing propagates. Each name in `ASSUMPTIONS` drops one of these.
 """
 
 from collections.abc import Collection, Sequence
@@ -23,18 +23,18 @@ from skinwave.scene.scene import BODIES, FLAT, Body, Layer, Scene, solid_of
 ASSUMPTIONS = {
     "linear drive": "the force follows the square of the sound's amplitude",
     "sinc^2 profile": "the focal spot is a Gaussian of the same half width",
-    "no propagation": "waves run through an infinite flat body under the same load",
+    "no propagation": "waves propagate in an infinite flat body under the same load",
     "little loss": "the material has its full damping",
-    "viscous loss": "the damping is that of a standard linear solid, equal to the viscous one only "
-    "at the strongest line",
+    "viscous loss": "the damping is that of a standard linear solid, which equals the viscous one "
+    "at the strongest line only",
     "laterally-infinite": "the body has its own size and side conditions, and is meshed with "
     "finite elements",
-    "alike in all directions": "the sheet has the stiffness and tension of each direction",
+    "alike in all directions": "stiffness and tension of the sheet differ by direction",
     "vacuum": "the air moves with the sheet",
     "main lobe only": "the focus has the side lobes of the array",
     "continuous path": "the focus jumps at the device's rate",
-    "one material": "skin is layered",
-    "flat": "the palm is curved, and its layers are merged into one of their mean stiffness",
+    "one material": "skin has layers",
+    "flat": "the palm is curved, and one layer has the mean stiffness of all layers",
     "small deflection": "the sheet stretches as it bends",
 }
 ELEMENTS = {
@@ -42,9 +42,9 @@ ELEMENTS = {
     "small deflection",
 }  # fmt: skip
 DEVICE_RATES = (20_000.0, 40_000.0)  # Hz at which devices move their focus
-LOSS_LEFT = 0.1  # of the material's own: an undamped resonance is unbounded
+LITTLE_LOSS = 0.1  # of the material's own loss: an undamped resonance has no bound
 RELAXATION_TIME = PRESETS["palm-zener"].prony[0].time
-LEAST_LASTING = 0.5  # long-term share of a modulus, at the least, where part of it is made to relax
+LEAST_LONG_TERM = 0.5  # share of the static modulus that does not relax
 LAYERS = (
     Layer(thickness=0.3e-3, material="epidermis"),
     Layer(thickness=1.0e-3, material="dermis"),
@@ -53,33 +53,37 @@ LAYERS = (
 
 
 def droppable(scene: Scene) -> tuple[str, ...]:
-    """Assumptions that can be dropped for a scene, in the order of the model hierarchy; a
-    ValueError without a body.
+    """Return the assumptions that can be dropped, in the order of the model hierarchy.
+
+    Raises a ValueError if the scene has no body.
     """
     body, path = scene.body, scene.tacton.trajectory
     if not body.of_kind.discretise:
-        raise ValueError("a scene without a body keeps every assumption; give it one")
+        raise ValueError(
+            "no assumption can be dropped without a body. Give the scene one under [body]"
+        )
     sheet, slab, solid = body.of_kind.is_plate, body.of_kind.is_layer, body.solid
-    kept = {
+    conditions = {
         "little loss": slab and solid.has_loss,
         "viscous loss": slab and solid.fast_modulus > 0,
-        "alike in all directions": sheet and as_alike(body) != body,
+        "alike in all directions": sheet and isotropic_sheet(body) != body,
         "vacuum": sheet and body.mounting.is_frame,
         "continuous path": path.shape in ("line", "circle", "triangle", "square")
         and not path.is_static,
         "one material": slab
         and (bool(body.layers) or sum(x.thickness for x in LAYERS) < body.depth),
-        # The palm that stands for a hand has mounds, which a thin body has no room for.
+        # A thin body has no room for the mounds of the palm.
         "flat": slab and body.placement == FLAT and Palm.thenar_height < body.depth < np.inf,
         "small deflection": sheet and takes(STRETCHED, scene),
     }
-    return tuple(name for name in ASSUMPTIONS if kept.get(name, True))
+    return tuple(name for name in ASSUMPTIONS if conditions.get(name, True))
 
 
 def side_step(scene: Scene) -> tuple[str, ...]:
-    """Assumptions dropped in a side step of the hierarchy, with a second damping law; () without
-    viscosity. Finite elements take many times as long with it, because fast waves lose little:
-    where the scene does not have that law, it is tried on the wavenumber integral only.
+    """Return the assumptions dropped in a side step with a second damping law, or ().
+
+    With that law fast waves lose little, and finite elements take many times as long. Unless the
+    scene has the law, only the wavenumber integral is computed with it.
     """
     names = droppable(scene)
     if "viscous loss" in names or not scene.body.of_kind.is_layer or not scene.body.solid.viscosity:
@@ -88,9 +92,10 @@ def side_step(scene: Scene) -> tuple[str, ...]:
 
 
 def can_be_alone(name: str, names: Collection[str], scene: Scene) -> bool:
-    """Whether all assumptions but one can be dropped: the array's field has no profile of its own,
-    and an infinite body of elements is one with absorbing sides, if it has none anyway and is
-    constrained elsewhere.
+    """Whether all assumptions but one can be dropped.
+
+    The array's field has no other profile. An infinite body of elements has absorbing sides, which
+    must differ from those of the scene, and needs a constraint elsewhere.
     """
     if name == "sinc^2 profile":
         return "main lobe only" not in names
@@ -103,16 +108,17 @@ def can_be_alone(name: str, names: Collection[str], scene: Scene) -> bool:
     return infinite != body and infinite.is_held
 
 
-def relaxed(
+def without(
     scene: Scene,
     dropped: Collection[str],
     *,
     update_rate: float = DEVICE_RATES[0],
     points: int | None = None,
 ) -> tuple[Scene, str]:
-    """Scene without the dropped assumptions, and the model that computes it; update rate and points
-    are of the device, as `held` takes them. What is assumed of the load is the same with and
-    without propagation.
+    """Return a scene without the dropped assumptions, and the model that computes it.
+
+    `update_rate` and `points` are those of `device_path`. Assumptions on the load are the same with
+    and without propagation.
     """
     spot = "gaussian" if "sinc^2 profile" in dropped else "main_lobe"
     own = usual_drive(scene.pressure.drive, MovingPressure.drive)
@@ -120,13 +126,13 @@ def relaxed(
     drive = own if "linear drive" in dropped else PUBLISHED
     pressure = replace(scene.pressure, profile=profile, drive=drive)
     if "continuous path" in dropped:
-        path = held(scene.tacton.trajectory, update_rate, points)
+        path = device_path(scene.tacton.trajectory, update_rate, points)
         pressure = replace(pressure, tacton=replace(scene.tacton, trajectory=path))
     if "no propagation" not in dropped:
         kernel = "point-kernel" if dropped else "point-kernel-published"
         return replace(scene, pressure=pressure, body=BODIES["none"]), kernel
     body = _body(scene, dropped)
-    # Wavenumber integrals are those of a Gaussian in a homogeneous, flat and infinite body.
+    # Wavenumber integrals need a Gaussian on a homogeneous, flat and infinite body.
     elements = pressure.profile != "gaussian" or not ELEMENTS.isdisjoint(dropped)
     model = "fem" if elements else "flat-body"
     if elements and body.of_kind.is_layer and "laterally-infinite" not in dropped:
@@ -139,12 +145,13 @@ def relaxed(
     return changed, model
 
 
-def held(
+def device_path(
     path: Trajectory, update_rate: float = DEVICE_RATES[0], points: int | None = None
 ) -> Trajectory:
-    """Path as a device draws it that moves its focus at an update rate in Hz, one of
-    `DEVICE_RATES`: points equally spaced along it, the focus at rest on each, as many as the device
-    can set, rate / f_d, if not given. A ValueError if no device has the rate or so many points.
+    """Return the path of a device that moves its focus at an update rate in Hz.
+
+    The focus rests on equally spaced points, by default as many as the device can set, rate / f_d.
+    Raises a ValueError if no device has this rate or so many points.
     """
     check_rate(update_rate)
     period = 1 / path.drawing_frequency
@@ -152,50 +159,49 @@ def held(
     count = most if points is None else points
     if not 2 <= count <= most:
         raise ValueError(
-            f"points = {count} on the path must be 2 to {most}, which is what {update_rate:g} Hz "
-            f"can set {path.drawing_frequency:g} times a second; give as many"
+            f"points = {count} must be 2 to {most}: a device with {update_rate:g} Hz cannot set "
+            f"more on a path that is drawn {path.drawing_frequency:g} times per second"
         )
     phases = np.arange(count) / count
     places = path.at_phase(phases)
     closed = np.vstack([places, places[:1]])
-    points_held = tuple(map(tuple, closed.tolist()))
     times = tuple((period * np.append(phases, 1.0)).tolist())
-    return Trajectory(shape="recorded", points=points_held, times=times, hold=True)
+    stops = tuple(map(tuple, closed.tolist()))
+    return Trajectory(shape="recorded", points=stops, times=times, hold=True)
 
 
 def check_rate(update_rate: float) -> None:
-    """Refuse a rate in Hz that no device has."""
+    """Raise a ValueError if no device has an update rate in Hz."""
     if update_rate not in DEVICE_RATES:
         raise ValueError(
-            f"update_rate = {update_rate / 1e3:g} kHz is no device's; take "
-            f"{' or '.join(f'{rate / 1e3:g}' for rate in DEVICE_RATES)}"
+            f"update_rate = {update_rate / 1e3:g} kHz must be "
+            f"{' or '.join(f'{rate / 1e3:g}' for rate in DEVICE_RATES)} kHz"
         )
 
 
 def _body(scene: Scene, dropped: Collection[str]) -> Body:
     body = scene.body
     if body.of_kind.is_plate and "alike in all directions" not in dropped:
-        body = as_alike(body)
+        body = isotropic_sheet(body)
     solid, line = body.solid, strongest_line(scene)
     law = as_relaxing if "viscous loss" in dropped else as_viscous
 
-    def made(solid: Material) -> Material:
-        """A tissue as the assumptions have it."""
+    def assumed(solid: Material) -> Material:
         solid = law(solid, 2 * np.pi * line)
         return solid if "little loss" in dropped else with_little_loss(solid, 2 * np.pi * line)
 
     if body.of_kind.is_layer:
-        solid = made(solid)
+        solid = assumed(solid)
     changes: dict[str, object] = {
         "material": solid if solid != body.solid else body.material,
         "air": "vacuum" in dropped,
     }
     if "one material" in dropped:
         layers = tuple(
-            replace(layer, material=made(solid_of(layer.material)))
+            replace(layer, material=assumed(solid_of(layer.material)))
             for layer in body.layers or LAYERS
         )
-        changes["layers"] = (as_one(layers),) if "flat" in dropped else layers
+        changes["layers"] = (merged_layer(layers),) if "flat" in dropped else layers
     elif body.of_kind.is_layer:
         changes["layers"] = ()
     if "flat" in dropped:
@@ -204,18 +210,17 @@ def _body(scene: Scene, dropped: Collection[str]) -> Body:
     return replace(body, **changes)  # type: ignore[arg-type]
 
 
-def as_alike(body: Body) -> Body:
-    """A flat sheet of the mean stiffness and tension of its directions."""
-    held, tension = body.mounting, body.mounting.mean_tension
-    mean = replace(held, tension_x=tension, tension_y=tension, curl_x=0.0, curl_y=0.0)
-    found = replace(body, mounting=mean)
-    if body.solid.orthotropy is not None:
-        found = replace(found, material=replace(body.solid, orthotropy=None))
-    return found
+def isotropic_sheet(body: Body) -> Body:
+    """Return a flat sheet with the mean stiffness and tension of its directions."""
+    mounting, tension = body.mounting, body.mounting.mean_tension
+    mean = replace(mounting, tension_x=tension, tension_y=tension, curl_x=0.0, curl_y=0.0)
+    if body.solid.orthotropy is None:
+        return replace(body, mounting=mean)
+    return replace(body, mounting=mean, material=replace(body.solid, orthotropy=None))
 
 
-def as_one(layers: Sequence[Layer]) -> Layer:
-    """One layer as thick as all and of their mean stiffness, for a mesh without interfaces."""
+def merged_layer(layers: Sequence[Layer]) -> Layer:
+    """Return one layer with the total thickness and mean stiffness of several."""
     thickness = sum(layer.thickness for layer in layers)
     solids = [solid_of(layer.material).relaxing() for layer in layers]
 
@@ -227,7 +232,7 @@ def as_one(layers: Sequence[Layer]) -> Layer:
     moduli: dict[float, float] = {}
     for layer, solid in zip(layers, solids, strict=True):
         for term in solid.prony:
-            time = float(f"{term.time:.9g}")  # times that differ by round-off are one
+            time = float(f"{term.time:.9g}")  # merges times that differ by round-off
             moduli[time] = moduli.get(time, 0.0) + layer.thickness / thickness * term.modulus
     prony = tuple(PronyTerm(modulus=modulus, time=time) for time, modulus in moduli.items())
     means: dict[str, Any] = {name: mean(name) for name in names}
@@ -237,26 +242,27 @@ def as_one(layers: Sequence[Layer]) -> Layer:
 
 
 def with_little_loss(solid: Material, w: float) -> Material:
-    """A tenth of the damping, and the same storage modulus at w in rad/s."""
+    """Return a material with a tenth of the damping and the same storage modulus at w in rad/s."""
     if solid.law is not None or solid.loss_factor:
-        less = solid.scaled(loss=LOSS_LEFT)
+        less = solid.scaled(loss=LITTLE_LOSS)
         storage = [float(m.complex_modulus(w).real) for m in (solid, less)]
         return less.scaled(modulus=storage[0] / storage[1])
-    stiffer = (1 - LOSS_LEFT) * float(solid.relaxing_modulus(w).real)
-    less = solid.scaled(loss=LOSS_LEFT)
+    stiffer = (1 - LITTLE_LOSS) * float(solid.relaxing_modulus(w).real)
+    less = solid.scaled(loss=LITTLE_LOSS)
     return replace(less, shear_modulus=solid.shear_modulus + stiffer)
 
 
 def as_relaxing(solid: Material, w: float) -> Material:
-    """Standard linear solid with the complex modulus at w in rad/s of a Kelvin-Voigt solid. Its
-    relaxation time is that of the preset, or shorter where the long-term modulus would otherwise
-    fall below half of the static one.
+    """Return a standard linear solid with the modulus of a Kelvin-Voigt solid at w in rad/s.
+
+    Its relaxation time is that of the preset, or shorter so that the long-term modulus is at least
+    half of the static one.
     """
     loss = w * solid.viscosity
-    if not loss or solid.fast_modulus:  # nothing to fit, or fitted already
+    if not loss or solid.fast_modulus:  # nothing to fit, or already relaxing
         return solid
     solid = solid.without_loss_factor()
-    time = min(RELAXATION_TIME, (1 - LEAST_LASTING) * solid.shear_modulus / loss / w)
+    time = min(RELAXATION_TIME, (1 - LEAST_LONG_TERM) * solid.shear_modulus / loss / w)
     turned = w * time
     term = PronyTerm(modulus=loss * (1 + turned**2) / turned, time=time)
     others = max(solid.viscosity - loss / w, 0.0)  # of the loss factor
@@ -267,7 +273,9 @@ def as_relaxing(solid: Material, w: float) -> Material:
 
 
 def as_viscous(solid: Material, w: float) -> Material:
-    """Kelvin-Voigt solid with the complex modulus at w in rad/s of a generalised Maxwell solid."""
+    """Return a Kelvin-Voigt solid with the complex modulus of a generalised Maxwell solid at w in
+    rad/s.
+    """
     if not w or not solid.fast_modulus:
         return solid
     relaxing = complex(solid.relaxing_modulus(w))
@@ -279,7 +287,7 @@ def as_viscous(solid: Material, w: float) -> Material:
 
 
 def strongest_line(scene: Scene) -> float:
-    """Line in Hz that moves the probes most, at which damping laws are matched; 0 if none does."""
+    """Return the line in Hz that moves the probes most, or 0; damping laws are matched there."""
     frequencies, shares = response_spectrum(scene, 0.05)
     moving = frequencies > 0
     if not moving.any():

@@ -1,11 +1,11 @@
 """The page of responses that `run`, `compare` and `report` write.
 
-The first screen has the verdict, four numbers, one picture and the contents. Waveforms have a
-selector, and details are folded. `skinwave.results.propagation` defines the numbers.
+The first screen has the verdict, four numbers, which `skinwave.results.propagation` defines, the
+contents and one picture. A reader chooses one Tacton's waveforms at a time, and unfolds details.
 """
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,20 +17,28 @@ from PIL import features
 from simple_model import Effort
 from simple_model.numbers import interval, percent, significant
 from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity
+from skinwave.models import named
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
 from skinwave.report import description
-from skinwave.report.figures import REPORT, drawn, tacton_figure
-from skinwave.report.levels import levels_figure, strongest_probe
-from skinwave.report.maps import BESIDE, SURFACES, surfaces_figure
+from skinwave.report.figures import REPORT, figure_file
+from skinwave.report.maps import CAPTION, MEASURED_CAPTION, THRESHOLD_CAPTION, surfaces_figure
 from skinwave.report.palette import label
+from skinwave.report.spectra import levels_figure, strongest_probe, tacton_figure
 from skinwave.report.styles import Style
-from skinwave.results.claims import claimed, evaluate
+from skinwave.results.claims import assessable_runs, evaluate
 from skinwave.results.files import distinct_names, fill
 from skinwave.results.propagation import NEAR, OUTSIDE, Component, Propagation, Reach, added_lines
 from skinwave.results.run import Run
 from skinwave.scene.file import dumps
 from skinwave.studies import tables
-from skinwave.studies.changes import Shown, beside_kernels, changes, first_of, quick_maps, shown
+from skinwave.studies.first_screen import (
+    FirstScreen,
+    effects_of,
+    first_name,
+    first_screen,
+    quick_maps,
+    with_kernels,
+)
 from skinwave.system.document import (
     Choice,
     Details,
@@ -47,41 +55,41 @@ from skinwave.system.table import Table
 PICTURES = "pictures"  # folder of a page's figures
 QUALITY = 88  # of pictures inside a page
 NAMED = 3  # lines that a sentence names
-NOTHING = "Nothing vibrates: a constant pressure on a focus at rest leaves no wave."
+NO_MOTION = "Nothing vibrates, because a constant pressure on a focus at rest drives no wave."
 ABOUT_MAPS = (
-    "Maps give shares and spreads; they reach 44 mm either way. The map of a slab is that of a "
+    "Shares and spreads are computed from maps of 44 mm either way. The map of a slab is that of a "
     "laterally infinite layer. For other bodies only the first Tacton has a map. The strongest "
     "component has the largest amplitude at any probe. Its phase delay is known up to whole "
-    "periods and includes the phase of a body that is driven off resonance."
+    "periods. It includes the phase lag of a body that is driven away from a resonance."
 )
-WAVEFORMS = "Waveforms and spectra. Rows are probes."
+WAVEFORMS = "Waveforms and spectra; each row is a probe."
 LOADS = (
-    "The kernel as published has the paper's load, a linear drive in a sinc² main lobe; all others "
-    "have the scene's."
+    "The published kernel has the load of the paper: a linear drive and a sinc² main lobe. All "
+    "other models have the load of the scene."
 )
 SENSATION = (
-    "Lines of the motion at the probe that moves most, and the detection threshold (for a focal "
-    "spot on the hand; Verrillo 1963 and Bolanowski et al. 1988, uncertain by 5 dB and more)."
+    "Lines of the motion at the probe that moves most, and the detection threshold for a focal "
+    "spot on the hand (Verrillo 1963; Bolanowski et al. 1988), which is uncertain by 5 dB or more."
 )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Gallery:
-    """How pictures are drawn: `style`, and the `formats` of figures beside PNG."""
+    """Style of pictures, and formats of figure files beside PNG."""
 
     style: Style = REPORT
     formats: Sequence[str] = ()
 
     def figure(self, name: str, figure: Figure, caption: str) -> Picture:
-        """A figure, with its files."""
+        """Return a figure with its files."""
         kinds = ("png", *self.formats)
-        files = {kind: drawn(figure, kind, self.style.dpi) for kind in kinds}
+        files = {kind: figure_file(figure, kind, self.style.dpi) for kind in kinds}
         with Pillow.open(io.BytesIO(files["png"])) as image:
             small, kind = _compressed(image.convert("RGB"))
         return Picture(small, caption, name, kind, files)
 
     def image(self, name: str, pixels: Any, caption: str) -> Picture:
-        """An image (ny, nx, 3) of bytes, with its file."""
+        """Return an image (ny, nx, 3) of bytes with its file."""
         image, buffer = Pillow.fromarray(pixels), io.BytesIO()
         image.save(buffer, format="png", optimize=True)
         small, kind = _compressed(image)
@@ -89,7 +97,7 @@ class Gallery:
 
 
 def _compressed(image: Pillow.Image) -> tuple[bytes, str]:
-    """A picture in as few bytes as a browser needs, and their format."""
+    """Return a small file of a picture, and its format."""
     buffer, kind = io.BytesIO(), "webp" if features.check("webp") else "png"
     image.save(buffer, format=kind, quality=QUALITY, method=4)
     return buffer.getvalue(), kind
@@ -98,99 +106,106 @@ def _compressed(image: Pillow.Image) -> tuple[bytes, str]:
 def page_of(
     title: str,
     groups: Mapping[str, Sequence[Run]],
-    first: Shown | None,
+    first: FirstScreen | None,
     gallery: Gallery,
     *,
     figures: Mapping[str, Sequence[Run]] | None = None,
-    seen: Sequence[Part] = (),
-    more: Sequence[Part] = (),
+    before: Sequence[Part] = (),
+    after: Sequence[Part] = (),
     modelled: Sequence[Part] = (),
-    again: Sequence[Part] = (),
+    command: str = "",
+    notes: Sequence[Part] = (),
     seconds: float | None = None,
     progress: Progress = silent,
 ) -> Report:
-    """The page of runs by Tacton.
+    """Return the page of runs by Tacton.
 
     Parameters
     ----------
-    first : the Tacton of the first screen, if a body was run beside both kernels
-    figures : runs that figures show, if not the same
-    seen, more : parts before and after the waveforms
-    modelled, again : further parts of what was modelled, and of how to repeat it
-    seconds : of the whole, the sum of all runs if not given
+    first : results of the first screen, if a body and both kernels were run
+    figures : runs that figures show, `groups` if not given
+    before, after : parts before and after the waveforms
+    modelled : further parts of what was modelled
+    command, notes : command that makes the page again, and notes on it
+    seconds : duration of all runs, the sum of their efforts if not given
     """
     runs = [run for group in groups.values() for run in group]
-    of_one = len(groups) == 1
-    top: list[Part] = [*_first_screen(first, gallery)] if first else []
-    below: list[Part] = [*seen, *_waveforms(figures or groups, gallery, progress), *more]
-    below += tables.claims_parts(evaluate(claimed(runs)))
-    effects: Mapping[str, Mapping[str, Propagation]] = changes(groups)
-    if not effects and first:
-        effects = {first.kernel.tacton: first.changes}
+    is_single = len(groups) == 1
+    body: list[Part] = [*before, *_waveforms(figures or groups, gallery, progress), *after]
+    body += tables.claims_parts(evaluate(assessable_runs(runs)))
+    effects = {} if is_single and first else effects_of(groups)
+    if first:
+        effects |= {first.kernel.tacton: dict(first.effects)}
     if effects:
-        below.append(Details("What propagation changes", _per_tacton(effects)))
-    if of_one or not effects:
+        body.append(Details("What propagation changes", _effects_table(effects)))
+    if is_single or not effects:
         lines = [part for group in groups.values() for part in tables.lines_table(group)]
-        below.append(Details("Lines", lines))
-    below.append(Details("What was modelled, and what was left out",
-                         [*description.modelled(runs), *modelled]))  # fmt: skip
+        body.append(Details("Lines", lines))
+    models = [*description.model_paragraphs(runs), *modelled]
+    body.append(Details("What was modelled, and what was left out", models))
     if any(len(group) > 1 for group in groups.values()):
-        below.append(Details("How far the models agree", [tables.agreement_table(groups)]))
-    below.append(Details("Effort", tables.effort_table(_spent(runs), len(groups), seconds)))
-    scene = [preformatted(dumps(runs[-1].scene))] if of_one else []
-    below.append(Details("The scene, and how to do it again", [*again, *scene]))
-    notes = [*description.other_quantity(runs[-1].scene), *description.unresolved(runs)]
-    verdict = sentences(first) if first else []
-    if first and not of_one:
-        verdict[0] = f"{first.kernel.tacton}, one of the Tactons below: {verdict[0]}"
-    numbers = [four_numbers(first)] if first else []
-    parts = [*numbers, contents(below), *top, *notes, *below]
+        body.append(Details("How far the models agree", [tables.agreement_table(groups)]))
+    effort = tables.effort_table(_efforts_by_body(runs), len(groups), seconds)
+    body.append(Details("Effort", effort))
+    again: list[Part] = [f"Command: {command}"] if command else []
+    scene = [preformatted(dumps(runs[-1].scene))] if is_single else []
+    body.append(Details("The scene and the command", [*again, *notes, *scene]))
+    caveats = [*description.quantity_notes(runs[-1].scene), *description.unresolved_lines(runs)]
+    parts: list[Part] = [contents(body), *caveats, *body]
+    verdict: list[str] = []
+    if first:
+        verdict = sentences(first)
+        parts[1:1] = _first_parts(first, gallery)
+        parts.insert(0, four_numbers(first))
+        if not is_single:
+            verdict[0] = f"{first.kernel.tacton}, one of the Tactons below: {verdict[0]}"
     return Report(title, verdict, parts, efforts_of(runs), PICTURES)
 
 
 def efforts_of(runs: Sequence[Run]) -> list[tuple[str, Effort]]:
-    """Efforts of runs: by body and, if there are several, by Tacton."""
+    """Return the efforts of runs by body and, if there are several, by Tacton."""
     several = len({run.tacton for run in runs}) > 1
     names = (f"{run.tacton} on {run.body}" if several else run.body for run in runs)
     return [(name, run.response.effort) for name, run in zip(names, runs, strict=True)]
 
 
-def write_run_page(folder: Path, run: Run, more: Sequence[Part] = ()) -> None:
-    """The folder of one run, with its page, which may have more parts."""
+def write_run_page(folder: Path, run: Run, more: Sequence[Part] = (), command: str = "") -> None:
+    """Write the folder of one run with its page, which may have more parts."""
     fill(folder, run)
-    group = beside_kernels(run) if run.is_motion and run.scene.load.is_plain else []
-    first = shown({run.tacton: group}, quick_maps)
-    title = f"{run.tacton} on {run.body}: {run.model}"
-    page_of(title, {run.tacton: [run]}, first, Gallery(), more=more).write(folder)
+    group = with_kernels(run) if run.is_motion and run.scene.load.is_plain else []
+    first = first_screen({run.tacton: group}, quick_maps)
+    title = f"{run.tacton} on {label(run.body)}: {run.model}"
+    groups = {run.tacton: [run]}
+    page_of(title, groups, first, Gallery(), after=more, command=command).write(folder)
 
 
-def _spent(runs: Sequence[Run]) -> dict[str, Effort]:
-    """Effort by body: of its first response, with the largest errors of all."""
-    spent: dict[str, list[Effort]] = {}
+def _efforts_by_body(runs: Sequence[Run]) -> dict[str, Effort]:
+    """Return the effort of the first response of each body, with the largest errors of all."""
+    efforts: dict[str, list[Effort]] = {}
     for run in runs:
         if run.response.record.of_body:
-            spent.setdefault(run.body, []).append(run.response.effort)
+            efforts.setdefault(run.body, []).append(run.response.effort)
     return {
         body: replace(
-            efforts[0], energy_imbalance=max(e.energy_imbalance for e in efforts),
-            radiated=max(e.radiated for e in efforts),
+            of_body[0], energy_imbalance=max(e.energy_imbalance for e in of_body),
+            radiated=max(e.radiated for e in of_body),
         )
-        for body, efforts in spent.items()
+        for body, of_body in efforts.items()
     }  # fmt: skip
 
 
 def _waveforms(
     groups: Mapping[str, Sequence[Run]], gallery: Gallery, progress: Progress
 ) -> list[Part]:
-    """A figure of each Tacton, of which one is seen at a time."""
+    """Return a choice between the figures of Tactons."""
     options: dict[str, Part] = {}
     files = dict(zip(groups, distinct_names(groups), strict=True))
-    for k, name in enumerate(sorted(groups, key=lambda each: each != first_of(groups))):
+    for k, name in enumerate(sorted(groups, key=lambda each: each != first_name(groups))):
         progress(f"draw {name}", k / len(groups))
         runs = list(groups[name])
-        seen = name if len(groups) > 1 else "waveforms and spectra"
+        title = name if len(groups) > 1 else "waveforms and spectra"
         figure = tacton_figure(name, runs, gallery.style)
-        options[seen] = gallery.figure(files[name], figure, _caption(name, runs))
+        options[title] = gallery.figure(files[name], figure, _caption(name, runs))
         if len(groups) == 1 and any(run.response.record.of_body for run in runs):
             figure = levels_figure(runs, strongest_probe(runs), gallery.style)
             options["sensation levels"] = gallery.figure("sensation", figure, SENSATION)
@@ -199,134 +214,167 @@ def _waveforms(
 
 def _caption(name: str, runs: Sequence[Run]) -> str:
     tacton, columns = runs[0].scene.tacton, {run.column for run in runs}
-    moved = [] if tacton.trajectory.is_static else [description.path_of(tacton)]
-    commanded = [*description.tones_of(tacton), *moved, *description.levels_of(tacton)]
+    path = [] if tacton.trajectory.is_static else [description.path_text(tacton)]
+    commanded = [*description.tone_texts(tacton), *path, *description.level_texts(tacton)]
     text = f"{name}: {', '.join(commanded) or 'constant pressure'}. {WAVEFORMS}"
     return f"{text} {LOADS}" if {PUBLISHED.name, SAME_LOAD.name} <= columns else text
 
 
-def _first_screen(shown: Shown, gallery: Gallery) -> list[Part]:
-    """The maps, and how sure the numbers are."""
+def _first_parts(first: FirstScreen, gallery: Gallery) -> list[Part]:
+    """Return the maps and the uncertainty of the numbers."""
     parts: list[Part] = []
-    if shown.surfaces and shown.changes[shown.body.column].strongest:
+    if first.maps and first.effects[first.body.column].strongest:
         figure = surfaces_figure(
-            shown.kernel.scene, shown.surfaces, gallery.style, measured=shown.measured
+            first.kernel.scene, first.maps, gallery.style, measured=first.measured
         )
-        caption = f"{SURFACES} {BESIDE}" if shown.measured else SURFACES
-        parts.append(gallery.figure("propagation", figure, caption))
-    return [*parts, _sure(shown)]
+        has_level = any(surface.level is not None for surface in first.maps.values())
+        captions = [CAPTION, THRESHOLD_CAPTION * has_level, MEASURED_CAPTION * bool(first.measured)]
+        parts.append(gallery.figure("propagation", figure, " ".join(filter(None, captions))))
+    return [*parts, _uncertainty(first)]
 
 
-def sentences(shown: Shown) -> list[str]:
-    """The verdict: what propagation changes, and what the drive law and the focus do."""
-    found = shown.changes[shown.body.column]
-    return [_propagated(found), _driven(shown.kernel, shown.published)]
+def sentences(first: FirstScreen) -> list[str]:
+    """Return the verdict: what propagation changes, and what drive law and focus change."""
+    effect = first.effects[first.body.column]
+    return [_propagation_sentence(effect), _drive_sentence(first.kernel, first.published)]
 
 
-def four_numbers(shown: Shown) -> Table:
-    """Level, reach, share and delay: the kernel and bodies under the same load, a column each."""
-    found = list(shown.changes.values())
-    rows = [
-        ["highest sensation level at the probes", "-"]
-        + [_highest_sensation(c.highest_sensation) for c in found],
-        ["above threshold up to this distance from the path", "-"]
-        + [_above_threshold(c) for c in found],
-        [f"share of motion outside the kernel's {OUTSIDE:g} dB region"]
-        + ["-" if found[0].share is None else "0 %", *(_percent(c.share) for c in found)],
-        ["delay of the strongest component", "0 ms"]
-        + [f"{_delay(c)} ms" if c.delay is not None else "-" for c in found],
-    ]
-    name = f"{shown.kernel.tacton}: same load"
-    return Table([name, "point kernel", *(label(c.column) for c in found)], rows)
+def four_numbers(first: FirstScreen) -> Table:
+    """Return the four numbers of the kernel and of bodies under the same load.
+
+    They are level, reach, share outside and delay. Without skin, the deflection and the spread
+    replace level and reach.
+    """
+    effects = list(first.effects.values())
+    # Heading, value of the kernel, values of the bodies.
+    rows: list[tuple[str, str | None, Iterable[str | None]]]
+    if any(run.is_skin for run in first.bodies):
+        levels = (_sensation_text(each.highest_sensation) for each in effects)
+        rows = [
+            ("highest sensation level at the probes", None, levels),
+            ("above threshold up to this distance from the path", None,
+             map(_threshold_text, effects)),
+        ]  # fmt: skip
+    else:
+        rows = [
+            ("largest displacement at the probes", None, map(_deflection_text, first.bodies)),
+            (f"above {NEAR:g} dB of the largest RMS up to this distance from the path",
+             _distance(effects[0].kernel_spread), (_distance(each.spread) for each in effects)),
+        ]  # fmt: skip
+    rows += [
+        (f"share of motion outside the kernel's {OUTSIDE:g} dB region",
+         None if effects[0].share is None else "0 %", map(_share, effects)),
+        ("delay of the strongest component", "0 ms",
+         (ms and f"{ms} ms" for ms in map(_millisecond, effects))),
+    ]  # fmt: skip
+    name = f"{first.kernel.tacton}: same load"
+    columns = [name, "point kernel", *(label(each.column) for each in effects)]
+    return Table(columns, [[heading, kernel, *values] for heading, kernel, values in rows])
 
 
-def _propagated(found: Propagation) -> str:
-    if found.strongest is None:
-        return NOTHING
-    name, said = label(found.column), found.strongest
-    if found.share is None:
-        return f"The {name} moves most at {said.frequency:.0f} Hz ({said.name})."
+def _deflection_text(run: Run) -> str:
+    """Return the largest displacement; it is marked if a linear sheet is beyond its validity."""
+    largest = float(abs(run.response.displacement).max())
+    text, body = run.response.record.text(largest), run.scene.body
+    if not body.of_kind.is_plate or named(run.model).is_nonlinear or largest < body.depth / 2:
+        return text
+    return f"{text} (invalid: above half the thickness, where the sheet stiffens)"
+
+
+def _propagation_sentence(effect: Propagation) -> str:
+    if effect.strongest is None:
+        return NO_MOTION
+    name, line = label(effect.column), effect.strongest
+    if effect.share is None:
+        return f"The {name} moves most at {line.frequency:.0f} Hz ({line.name})."
     return (
-        f"{percent(found.share)} of the mean-square motion of the {name} lies outside the kernel's "
-        f"{OUTSIDE:g} dB region. It spreads up to {_reach(found.spread)} mm from the path "
-        f"({NEAR:g} dB); kernel: {_reach(found.kernel_spread)} mm."
+        f"{percent(effect.share)} of the mean-square motion of the {name} lies outside the "
+        f"kernel's {OUTSIDE:g} dB region. Motion within {-NEAR:g} dB of the largest extends to "
+        f"{_distance(effect.spread)} from the path; kernel: {_distance(effect.kernel_spread)}."
     )
 
 
-def _driven(kernel: Run, published: Run) -> str:
+def _drive_sentence(kernel: Run, published: Run) -> str:
     names, pressure = added_lines(kernel, published), kernel.scene.pressure
     if pressure == published.scene.pressure:
-        return "The load is the published one: only propagation differs from the paper's model."
-    names_of = f"{pressure.drive}, {pressure.profile_name}".replace("_", " ")
-    law = f"Drive law and focus ({names_of})"
+        return "The load is the published one; only propagation differs from the paper's model."
+    law = f"Drive law and focus ({pressure.drive}, {pressure.profile_name})".replace("_", " ")
     if not names:
-        return f"{law} change strengths of components and add none."
-    said = ", ".join(names[:NAMED]) + " and others" * (len(names) > NAMED)
-    return f"{law} add {said}; propagation adds no component."
+        return f"{law} change amplitudes of components and add none."
+    added = ", ".join(names[:NAMED]) + " and others" * (len(names) > NAMED)
+    return f"{law} add {added}; propagation adds no component."
 
 
-def _sure(shown: Shown) -> str:
-    """What the numbers are uncertain by."""
-    said = [f"{shown.budget.words}."] if shown.budget else []
-    if shown.shares:
-        low, high = (100 * share for share in shown.shares)
-        said.append(
-            f"For materials within what is known, the share outside is {interval(low, high)} %."
+def _uncertainty(first: FirstScreen) -> str:
+    """Return sentences on the uncertainty of the numbers."""
+    parts = [f"{first.budget.words}."] if first.budget else []
+    if first.shares:
+        low, high = (100 * share for share in first.shares)
+        parts.append(
+            f"Over the range of material data the share outside is {interval(low, high)} %."
         )
-    if shown.body.scene.body.of_kind.is_plate:
-        said.append(
+    if first.body.scene.body.of_kind.is_plate:
+        parts.append(
             "Grammage, stiffness and support of the measured sheet are not published. Detection "
-            "thresholds are those of skin, so a sheet has no level and no reach."
+            "thresholds are those of skin; a sheet has no sensation level."
         )
-    if any(c.above_threshold for c in shown.changes.values()):
-        said.append(
-            "The pressure is known to a factor of 2: distances in brackets are for half and twice "
+    if any(each.above_threshold for each in first.effects.values()):
+        parts.append(
+            "The pressure is known to a factor of 2; distances in brackets are for half and twice "
             "the pressure."
         )
-    return " ".join(said)
+    return " ".join(parts)
 
 
-def _above_threshold(found: Propagation) -> str:
-    """Reach above the threshold, and in brackets with half and twice the pressure."""
-    if not found.above_threshold:
-        return "-"
-    half, now, twice = (_reach(each) if each else "none" for each in found.above_threshold)
-    return f"{now} mm ({half} to {twice})" if half != twice else f"{now} mm"
+def _threshold_text(effect: Propagation) -> str | None:
+    """Return the reach above threshold, with that for half and twice the pressure in brackets."""
+    if not effect.above_threshold:
+        return None
+    half, once, twice = (_millimetre(each) or "none" for each in effect.above_threshold)
+    return f"{once} mm ({half} to {twice})" if half != twice else f"{once} mm"
 
 
-def _component(found: Component | None, quantity: Quantity = DISPLACEMENT) -> str:
-    if found is None:
+def _component(component: Component | None, quantity: Quantity = DISPLACEMENT) -> str:
+    if component is None:
         return "none"
-    return f"{found.name}, {found.frequency:.0f} Hz, {quantity.text(found.amplitude, 2)}"
+    size = quantity.text(component.amplitude, 2)
+    return f"{component.name}, {component.frequency:.0f} Hz, {size}"
 
 
-def _delay(found: Propagation) -> str:
-    return "-" if found.delay is None else significant(1e3 * found.delay, 2)
+def _sensation_text(component: Component | None) -> str | None:
+    if component is None or component.level is None:
+        return None
+    return f"{component.level:+.0f} dB ({component.name}, {component.frequency:.0f} Hz)"
 
 
-def _highest_sensation(found: Component | None) -> str:
-    if found is None or found.level is None:
-        return "-"
-    return f"{found.level:+.0f} dB ({found.name}, {found.frequency:.0f} Hz)"
+def _share(effect: Propagation) -> str | None:
+    return None if effect.share is None else percent(effect.share)
 
 
-def _percent(share: float | None) -> str:
-    return "-" if share is None else percent(share)
+def _millisecond(effect: Propagation) -> str | None:
+    return None if effect.delay is None else significant(1e3 * effect.delay, 2)
 
 
-def _reach(found: Reach | None) -> str:
-    return "-" if found is None else f"{'> ' * found.beyond}{1e3 * found.metre:.0f}"
+def _millimetre(reach: Reach | None) -> str | None:
+    return None if reach is None else f"{'> ' * reach.beyond}{1e3 * reach.metre:.0f}"
 
 
-def _per_tacton(found: Mapping[str, Mapping[str, Propagation]]) -> list[Part]:
-    """Tacton -> body -> what propagation changes, a row each."""
+def _distance(reach: Reach | None) -> str | None:
+    return None if reach is None else f"{_millimetre(reach)} mm"
+
+
+def _effects_table(effects: Mapping[str, Mapping[str, Propagation]]) -> list[Part]:
+    """Return a table of the effect of propagation, with a row for each Tacton and body."""
     rows = [
-        [name, label(c.column), _percent(c.share), _reach(c.kernel_spread), _reach(c.spread),
-         _delay(c), _component(c.kernel_strongest, PRESSURE), _component(c.strongest),
-         _highest_sensation(c.highest_sensation)]
-        for name, columns in found.items()
-        for c in columns.values()
+        [name, label(each.column), _share(each), _millimetre(each.kernel_spread),
+         _millimetre(each.spread), _millisecond(each), _component(each.kernel_strongest, PRESSURE),
+         _component(each.strongest), _sensation_text(each.highest_sensation)]
+        for name, columns in effects.items()
+        for each in columns.values()
     ]  # fmt: skip
-    columns = ["Tacton", "body", "share outside", "spread of kernel, mm", "of body, mm"]
-    columns += ["phase delay of strongest in body, ms", "strongest in kernel", "in body"]
-    return [ABOUT_MAPS, Table([*columns, "highest sensation level"], rows)]
+    columns = [
+        "Tacton", "body", "share outside", "spread, kernel, mm", "spread, body, mm",
+        "phase delay of the strongest component, ms", "strongest component, kernel",
+        "strongest component, body", "highest sensation level",
+    ]  # fmt: skip
+    return [ABOUT_MAPS, Table(columns, rows)]

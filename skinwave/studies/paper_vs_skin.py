@@ -1,10 +1,9 @@
-"""Paper versus skin: which mechanism makes which spectral line of the 15 Tactons.
+"""Paper versus skin: which mechanism causes which spectral line of the 15 Tactons.
 
 Lim, Seifi and Park (CHI EA '24) measured lines on paper that their model lacks. Here the same
-Tactons are driven by a linear load, by the square of the sound's amplitude, and on a sheet that
-stretches as it bends; and one Tacton at a quarter, a half and the whole of the amplitude, because a
-line of the load keeps its ratio to f_AM when the drive is turned down, and a line of the sheet does
-not.
+Tactons act as a linear load, as the squared amplitude of the sound, and on a sheet that stretches
+as it bends. One Tacton also acts at a quarter, a half and the whole of its amplitude: a line of the
+load keeps its ratio to f_AM when the drive is reduced, a line of the sheet does not.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -28,14 +27,14 @@ from skinwave.system.effort import Progress
 from skinwave.system.table import Column, Table
 from skinwave.typing import Floats
 
-DURATION = 0.5  # s of each Tacton, of which the later half is read
+DURATION = 0.5  # s, of each Tacton; its later half is evaluated
 AMPLITUDES = (0.25, 0.5, 1.0)
-AM = 140.0  # Hz of the Tacton whose amplitude is varied
+AM = 140.0  # Hz, of the Tacton whose amplitude is varied
 NEGLIGIBLE_CHANGE = 1e-3  # relative, of a ratio over the amplitudes
 NEGLIGIBLE_RATIO = 1e-5  # of 2 f_AM to f_AM
-WEAKEST = -100.0  # dB re the strongest line of a run: weaker ones are round-off
+WEAKEST = -100.0  # dB re the strongest line of a run: weaker lines are round-off
 HIGHEST = 700.0  # Hz
-# Loads over one period of the modulation m = sin, relative to the largest: each has its own ratios
+# Loads over one period of the modulation m = sin, relative to the largest. Each has its own ratios
 # 2f/f, 3f/f and 4f/f, before the response of the body changes them.
 LOADS: Mapping[str, Callable[[Floats], Floats]] = {
     "force follows the command, with a mean": lambda m: (1 + m) / 2,
@@ -48,9 +47,14 @@ LOADS: Mapping[str, Callable[[Floats], Floats]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Findings:
-    """`levels` of lines by Tacton, line and mechanism, dB re the strongest line of the run, at the
-    probe where each is strongest; `ratios` of 2 f_AM to f_AM at `AMPLITUDES` by mechanism; and
-    which runs `failed`, a sentence each.
+    """Results of the study.
+
+    Parameters
+    ----------
+    levels : dB re the strongest line of a run, at the probe where each line is strongest; by
+        (Tacton, line) and mechanism
+    ratios : 2 f_AM over f_AM at `AMPLITUDES` by mechanism
+    failed : a sentence for each failed run
     """
 
     levels: Mapping[tuple[str, str], Mapping[str, float]]
@@ -65,29 +69,29 @@ def paper_vs_skin(
     patterns: Iterable[tuple[str, Tacton]] | None = None,
     bodies: Mapping[str, Body] | None = None,
 ) -> Findings:
-    """Run Tactons, the paper's 15 if not given, through the mechanisms on several bodies, the paper
-    sheet and the skin slab if not given, with solid elements of h in metre.
+    """Run Tactons (default: the paper's 15) through the mechanisms on bodies (default: paper sheet
+    and skin slab), with solid elements of size h in metre.
     """
-    on = bodies or {name: BODIES[name] for name in MEASURED_ON}
+    bodies = bodies or {name: BODIES[name] for name in MEASURED_ON}
     chosen = [(n, replace(t, duration=DURATION)) for n, t in (patterns or tactons())]
     still = Tacton(am_frequency=AM, duration=DURATION, trajectory=Trajectory())
     levels: dict[tuple[str, str], dict[str, float]] = {}
     ratios: dict[str, tuple[float, ...]] = {}
     failed = []
-    for body_name, body in on.items():
+    for body_name, body in bodies.items():
         for cause, settled in _mechanisms(body, h, progress).items():
             mechanism = f"{label(body_name)}: {cause}"
             for k, (name, tacton) in enumerate(chosen):
                 progress(mechanism, k / (len(chosen) + 1))
                 try:
-                    found = _levels(*settled(tacton))
+                    lines_of = _levels(*settled(tacton))
                 except ArithmeticError as error:
                     failed.append(f"{name} on {mechanism}: {error}")
                     continue
-                for line, level in found.items():
+                for line, level in lines_of.items():
                     levels.setdefault((name, line), {})[mechanism] = level
-            quieter = (replace(still, amplitude=amplitude) for amplitude in AMPLITUDES)
-            ratios[mechanism] = tuple(_ratio(settled(tacton)[1]) for tacton in quieter)
+            scaled = (replace(still, amplitude=amplitude) for amplitude in AMPLITUDES)
+            ratios[mechanism] = tuple(_ratio(settled(tacton)[1]) for tacton in scaled)
     return Findings(levels=levels, ratios=ratios, failed=tuple(failed))
 
 
@@ -95,7 +99,7 @@ Settled = Callable[[Tacton], tuple[MovingPressure, Response]]
 
 
 def _mechanisms(body: Body, h: float | None, progress: Progress) -> Mapping[str, Settled]:
-    """By mechanism the function that computes a Tacton's settled response with it."""
+    """Return by mechanism a function that computes a Tacton's settled response."""
 
     def by(solve: Callable[[Scene], Response], drive: str) -> Settled:
         return partial(_settled, solve, body, drive)
@@ -117,7 +121,7 @@ def _mechanisms(body: Body, h: float | None, progress: Progress) -> Mapping[str,
 def _settled(
     solve: Callable[[Scene], Response], body: Body, drive: str, tacton: Tacton
 ) -> tuple[MovingPressure, Response]:
-    """The load of a Tacton, and the later half of the response, after the transient."""
+    """Return the load of a Tacton, and the later half of its response, after the transient."""
     pressure = MovingPressure(tacton=tacton, drive=drive)
     response = solve(Scene(pressure=pressure, body=body))
     half = len(response.times) // 2
@@ -126,9 +130,9 @@ def _settled(
 
 
 def _levels(pressure: MovingPressure, later: Response) -> dict[str, float]:
-    """Lines in dB re the strongest, at the probe where each is strongest.
+    """Return lines in dB re the strongest, at the probe where each is strongest.
 
-    A stretching sheet has lines that no load has: those that claims are about are looked for.
+    They include the lines that claims are about: a stretching sheet has lines that no load has.
     """
     names, _ = resolved_lines(pressure, later, candidates=ASSESSED, highest=HIGHEST)
     amplitudes = lines(later, list(names.values())).max(axis=1)
@@ -143,45 +147,45 @@ def _ratio(later: Response) -> float:
 
 
 def load_ratios() -> dict[str, tuple[float, ...]]:
-    """Amplitudes at 2f, 3f and 4f over that at f of each of `LOADS`."""
+    """Return the amplitudes at 2f, 3f and 4f over that at f of each of `LOADS`."""
     m = np.sin(2 * np.pi * (np.arange(4096) + 0.5) / 4096)
     spectra = {name: np.abs(np.fft.rfft(load(m))) for name, load in LOADS.items()}
     return {name: tuple((a[2:5] / a[1]).tolist()) for name, a in spectra.items()}
 
 
 def sentences(found: Findings) -> list[str]:
-    """Conclusions: lines explained, lines not explained, and the experiment that would decide."""
-    said, low = [], f"{100 * AMPLITUDES[0]:.0f}"
+    """Return conclusions: explained lines, unexplained lines, and the deciding experiment."""
+    parts, low = [], f"{100 * AMPLITUDES[0]:.0f}"
     for mechanism, ratios in found.ratios.items():
         if max(ratios) < NEGLIGIBLE_RATIO:
-            said.append(f"{mechanism}: no 2 f_AM at any amplitude.")
+            parts.append(f"{mechanism}: no 2 f_AM at any amplitude.")
         elif max(ratios) < (1 + NEGLIGIBLE_CHANGE) * min(ratios):
-            said.append(
+            parts.append(
                 f"{mechanism}: 2 f_AM is {ratios[-1]:.3f} of f_AM at {low} to 100 % of the "
                 "amplitude. It is a line of the load."
             )
         else:
-            said.append(
+            parts.append(
                 f"{mechanism}: 2 f_AM is {ratios[0]:.3g} of f_AM at {low} % of the amplitude and "
-                f"{ratios[-1]:.3g} at 100 %. It is a line of the sheet as well as of the load."
+                f"{ratios[-1]:.3g} at 100 %. It is a line of both sheet and load."
             )
     return [
-        *said,
-        "Linear waves add no line to those of the load. Multiples of f_AM and of f_d together need "
-        "a load with a mean. Contact and clipping were not simulated: the table has their pattern.",
+        *parts,
+        "Linear waves add no line to those of the load. Multiples of both f_AM and f_d need a load "
+        "with a mean. Contact and clipping were not simulated; the table shows their patterns.",
         "One experiment decides: the same Tacton at half and at full amplitude. If 2 f_AM / f_AM "
-        "stays the same, the line comes from the drive; if it grows, from the sheet.",
+        "stays the same, the drive causes the line; if it grows, the sheet does.",
     ]
 
 
 def report(found: Findings) -> Report:
-    """The page: conclusions, ratio over amplitude, lines by mechanism, and patterns of loads."""
+    """Return the page: conclusions, ratio over amplitude, lines by mechanism, patterns of loads."""
     caption = "Ratio of 2 f_AM to f_AM at the focus over the amplitude of the drive."
     by_mechanism = [Column(each, unit="dB", digits=2) for each in found.ratios]
     levels = Table(
         ["Tacton", "line", *by_mechanism],
         [
-            [*key, *(_shown(own, each) for each in found.ratios)]
+            [*key, *(_strong_level(own, each) for each in found.ratios)]
             for key, own in found.levels.items()
         ],
         name="lines",
@@ -193,13 +197,13 @@ def report(found: Findings) -> Report:
     patterns = Table(
         ["load", "2f / f", "3f / f", "4f / f"], [[n, *own] for n, own in load_ratios().items()]
     )
-    said = sentences(found)
+    conclusions = sentences(found)
     return Report(
-        title="Paper and skin: which mechanism makes which line",
-        verdict=said[-2:],
+        title="Paper and skin: which mechanism causes which line",
+        verdict=conclusions[-2:],
         parts=[
-            *said[:-2], *(f"Failed: {each}." for each in found.failed),
-            Picture(png(figure(found), dpi=130), caption, name="amplitude"),
+            *conclusions[:-2], *(f"Failed: {each}." for each in found.failed),
+            Picture(png(ratio_figure(found), dpi=130), caption, name="amplitude"),
             Details("2 f_AM over f_AM by amplitude", [ratios]),
             Details("Lines by mechanism", [levels]),
             Details("Patterns of loads", [patterns]),
@@ -207,15 +211,15 @@ def report(found: Findings) -> Report:
     )  # fmt: skip
 
 
-def _shown(levels: Mapping[str, float], mechanism: str) -> float | None:
+def _strong_level(levels: Mapping[str, float], mechanism: str) -> float | None:
     level = levels.get(mechanism, -np.inf)
     return level if level > WEAKEST else None
 
 
-def figure(found: Findings) -> Figure:
-    """2 f_AM / f_AM over amplitude, a curve for each mechanism that has the line."""
-    drawn = Figure(figsize=(7, 4), layout="constrained")
-    axes = drawn.add_subplot()
+def ratio_figure(found: Findings) -> Figure:
+    """Draw 2 f_AM / f_AM over amplitude for each mechanism that has the line."""
+    figure = Figure(figsize=(7, 4), layout="constrained")
+    axes = figure.add_subplot()
     names = {label(name): name for name in BODIES}
     curves = {m: own for m, own in found.ratios.items() if max(own) > NEGLIGIBLE_RATIO}
     for mechanism, own in curves.items():
@@ -228,5 +232,5 @@ def figure(found: Findings) -> Figure:
     axes.set(xlabel="amplitude of the drive, %", ylabel=r"$2 f_{AM}$ / $f_{AM}$", yscale="log")
     axes.grid(alpha=0.3)
     if curves:
-        drawn.legend(loc="outside lower center", ncols=2, frameon=False)
-    return drawn
+        figure.legend(loc="outside lower center", ncols=2, frameon=False)
+    return figure

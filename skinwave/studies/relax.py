@@ -1,9 +1,9 @@
 """Model hierarchy from the paper's model to the richest one: effect and cost of each assumption.
 
-Each step of the hierarchy drops one more assumption; leave-one-out models, which drop all but one,
-are run beside it. Each is computed in a process of its own, so that its memory is its own, and two
-at once, of which one at most reduces a body. A body that several steps share is meshed and reduced
-once, by the first of them; its seconds and memory count in all of them.
+Each step of the hierarchy drops one more assumption; leave-one-out models drop all but one. Each
+model runs in its own process, which gives its memory. Two run at once, of which at most one reduces
+a body. A body that several steps share is meshed and reduced once; its seconds and memory count in
+all of them.
 """
 
 import os
@@ -38,10 +38,10 @@ from skinwave.studies.assumptions import (
     DEVICE_RATES,
     can_be_alone,
     check_rate,
+    device_path,
     droppable,
-    held,
-    relaxed,
     side_step,
+    without,
 )
 from skinwave.system.document import Details, Part, Picture, Report
 from skinwave.system.effort import Progress, peak_memory
@@ -49,40 +49,41 @@ from skinwave.system.processes import pool
 from skinwave.system.table import Column, Table
 from skinwave.typing import Floats
 
-HIGHEST, FAINTEST = 600.0, 0.01  # Hz of the lines that are followed; of the strongest at a probe
+HIGHEST = 600.0  # Hz, of the lines that are compared
+WEAKEST_RATIO = 0.01  # to the strongest line at a probe
 TINY = np.finfo(float).tiny
-FIRST = "as published"  # by the model point-kernel-published
-LARGER = 1.25  # times the default element size, for a third of the time
-# With a tenth of the damping a body may take more moments than a reduced one has; in elements so
-# much larger it takes as many, and that is known at a tenth of the cost.
+FIRST = "as published"  # step of the model point-kernel-published
+LARGER = 1.25  # element size over the default one, at a third of the time
+# With a tenth of the damping a reduction may need more moments than allowed. Larger elements need
+# as many, and find out at a tenth of the cost.
 ALMOST_UNDAMPED, COARSER = "all but: little loss", 3.0
 LINE_COLUMNS = (
     "step", "model", "probe_x_mm", "probe_y_mm", "line", "frequency_hz", "from_step_before_db",
     "from_richest_db",
 )  # fmt: skip
 EFFECT_COLUMNS = (
-    Column("assumption", "assumption dropped"),
-    Column("waveform_percent", "waveform changes by", "% of the strongest probe's"),
-    Column("at_mm", "at", "mm"), Column("level_db", "sensation level changes by", "dB"),
-    Column("alone_percent", "waveform, if it is the only one made", "%"),
-    Column("costs_s", "costs", "s", digits=2), Column("lines_db", "lines change by", "dB"),
+    Column("assumption", "dropped assumption"),
+    Column("waveform_percent", "change of the waveform", "% of the strongest probe"),
+    Column("at_mm", "at", "mm"), Column("level_db", "change of the sensation level", "dB"),
+    Column("alone_percent", "change as the only assumption", "%"),
+    Column("costs_s", "cost", "s", digits=2), Column("lines_db", "change of lines", "dB"),
 )  # fmt: skip
 STEP_COLUMNS = (
-    "step", "model", "dofs", Column("seconds", "all from the start", "s", digits=2),
-    Column("memory_gib", "memory", "GiB"), Column("error", "why not"),
+    "step", "model", Column("dofs", "degrees of freedom"),
+    Column("seconds", "time from the start", "s", digits=2), Column("memory_gib", "memory", "GiB"),
+    Column("error", "reason of failure"),
 )  # fmt: skip
 INTRODUCTION = (
-    "From the published model to the richest one that this scene has, one assumption after "
-    "another. Waveforms are compared after the factor that fits best where one is a pressure and "
-    "the other a displacement."
+    "The steps lead from the published model to the richest one of this scene, one assumption "
+    "after another. A pressure and a displacement are compared after the best-fitting factor."
 )
-BARS = "What dropping each assumption changes: the waveform, and the sensation level (SL)."
+BARS = "Change of the waveform, and of the sensation level (SL), by dropping each assumption."
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HierarchyStep:
-    """Step of the model hierarchy: dropped assumptions, the `model` and `body` that are left, and
-    the response or the `error` instead.
+    """Step of the model hierarchy: its dropped assumptions, model and body, and its response or
+    `error`.
     """
 
     name: str
@@ -97,12 +98,17 @@ class HierarchyStep:
 
 @dataclass(frozen=True, kw_only=True)
 class Effect:
-    """Effect of dropping one assumption, of the step without it against the step with it.
+    """Effect of dropping one assumption.
 
-    `waveform` change in L2 at probe `where` (x, y) in metre, where it is largest, relative to the
-    probe that moves most (after the factor that fits best where units differ); `level` in dB, by
-    which the sensation level grows, None of what is not skin; `decibel` by line; `alone` the
-    waveform's change if it is the only assumption made; `seconds` that dropping costs.
+    Parameters
+    ----------
+    name : assumption
+    waveform, where : largest L2 change over the probes, relative to the probe that moves most, and
+        its probe (x, y) in metre
+    level : increase of the sensation level in dB, None unless the body is skin
+    decibel : increase of lines in dB by name
+    alone : change of the waveform if this is the only assumption, or None
+    seconds : additional time
     """
 
     name: str
@@ -116,8 +122,8 @@ class Effect:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Hierarchy:
-    """Model hierarchy: steps in order, the first as published and the last the richest; side
-    steps, which drop one more assumption than the step they branch off; and leave-one-out models.
+    """Model hierarchy: steps from the published to the richest model, side steps, which drop one
+    more assumption than the step they branch off, and leave-one-out models.
     """
 
     scene: Scene
@@ -127,37 +133,35 @@ class Hierarchy:
 
     @property
     def every(self) -> tuple[HierarchyStep, ...]:
-        """All steps, in the order of the tables."""
+        """All steps in the order of the tables."""
         return (*self.steps, *self.side_steps, *self.leave_one_out)
 
     @property
     def efforts(self) -> list[tuple[str, Effort]]:
-        """Effort of each response, by the name of its step."""
+        """Effort of each response by step."""
         return [(step.name, step.response.effort) for step in self.every if step.response]
 
     def pairs(self) -> list[tuple[HierarchyStep, HierarchyStep]]:
-        """Each computed step, side steps included, after the one that it is compared with; a step
-        after one that failed is left out, because it differs by two assumptions.
-        """
-        found = [(a, b) for a, b in pairwise(self.steps) if a.response and b.response]
+        """Return pairs of computed steps that differ by one assumption."""
+        pairs = [(a, b) for a, b in pairwise(self.steps) if a.response and b.response]
         for step in self.side_steps:
-            kept = set(step.dropped) - {step.name}
-            before = next((r for r in self.steps if r.response and set(r.dropped) == kept), None)
+            fewer = set(step.dropped) - {step.name}
+            before = next((r for r in self.steps if r.response and set(r.dropped) == fewer), None)
             if step.response and before:
-                found.append((before, step))
-        return found
+                pairs.append((before, step))
+        return pairs
 
     def effects(self) -> list[Effect]:
-        """Effect of each assumption, the largest first; failed steps are left out."""
-        all_of_them = set(self.steps[-1].dropped)
-        left = [(all_of_them.difference(r.dropped), r) for r in (*self.steps, *self.leave_one_out)]
-        kept = {names.pop(): step.response for names, step in left if len(names) == 1}
+        """Return the effect of each assumption, the largest first, without failed steps."""
+        every = set(self.steps[-1].dropped)
+        made = [(every.difference(r.dropped), r) for r in (*self.steps, *self.leave_one_out)]
+        alone = {names.pop(): step.response for names, step in made if len(names) == 1}
         richest = [step.response for step in self.steps if step.response][-1:]
-        found = [
-            _effect(self.scene, before, step, kept.get(step.name), *richest)
+        effects = [
+            _effect(self.scene, before, step, alone.get(step.name), *richest)
             for before, step in self.pairs()
         ]
-        return sorted(found, key=lambda e: -e.waveform)
+        return sorted(effects, key=lambda e: -e.waveform)
 
 
 def hierarchy_of(
@@ -168,50 +172,51 @@ def hierarchy_of(
     update_rate: float = DEVICE_RATES[0],
     points: int | None = None,
 ) -> Hierarchy:
-    """Compute a scene at every step of the model hierarchy, with elements of h in metre (`LARGER`
-    times the default of the body if not given) and the update rate and points of a device as `held`
-    takes them. A ValueError if the scene has no body, its probes read something else than the
-    displacement of the surface, or the device cannot be.
+    """Compute a scene at every step of the model hierarchy.
+
+    Elements have the size h in metre, by default `LARGER` times that of the body. `update_rate` and
+    `points` are those of `device_path`. Raises a ValueError if the scene has no body, its probes do
+    not read the displacement of the surface, or no such device exists.
     """
     check_motion(scene, "relax")
     names = droppable(scene)
     check_rate(update_rate)
     if "continuous path" in names:
-        held(scene.tacton.trajectory, update_rate, points)  # refuses before anything is computed
+        device_path(scene.tacton.trajectory, update_rate, points)  # raises before computing
     up = [(FIRST, ()), *((name, names[: k + 1]) for k, name in enumerate(names))]
-    aside = [(dropped[-1], dropped)] if (dropped := side_step(scene)) else []
+    side = [(dropped[-1], dropped)] if (dropped := side_step(scene)) else []
     others = [(name, tuple(n for n in names if n != name)) for name in names]
     leave_one_out = [
-        (f"all but: {name}", kept)
-        for name, kept in others
-        if kept not in [dropped for _, dropped in up] and can_be_alone(name, names, scene)
+        (f"all but: {name}", dropped)
+        for name, dropped in others
+        if dropped not in [each for _, each in up] and can_be_alone(name, names, scene)
     ]
     steps: list[HierarchyStep] = []
-    begun: list[Future[tuple[Response, float, int]] | None] = []
+    submitted: list[Future[tuple[Response, float, int]] | None] = []
     with (
         TemporaryDirectory(prefix="skinwave-") as cache,
         pool(1, renewed=True) as large, pool(1, renewed=True) as small,
     ):  # fmt: skip
-        for name, dropped in (*up, *aside, *leave_one_out):
+        for name, dropped in (*up, *side, *leave_one_out):
             step = HierarchyStep(name=name, dropped=dropped, model="none")
             try:
-                changed, model = relaxed(scene, dropped, update_rate=update_rate, points=points)
+                changed, model = without(scene, dropped, update_rate=update_rate, points=points)
                 step = replace(step, model=model, body=changed.body)
                 is_reduced = named(model).is_reduced
                 size = h or LARGER * default_size(scene.body) if is_reduced else h
             except (ValueError, ArithmeticError) as error:
                 steps.append(replace(step, error=str(error)))
-                begun.append(None)
+                submitted.append(None)
                 continue
-            tried = is_reduced and name == ALMOST_UNDAMPED
+            coarse_first = is_reduced and name == ALMOST_UNDAMPED
             steps.append(step)
             workers = large if is_reduced else small
-            begun.append(workers.submit(_timed, changed, model, size, cache, tried=tried))
-        for k, future in enumerate(begun):
+            submitted.append(workers.submit(_timed, changed, model, size, cache, coarse_first))
+        for k, future in enumerate(submitted):
             progress(steps[k].name, k / len(steps))
             if future:
                 steps[k] = _computed(steps[k], future, steps[:k])
-    first, second = len(up), len(up) + len(aside)
+    first, second = len(up), len(up) + len(side)
     return Hierarchy(
         scene=scene, steps=tuple(steps[:first]), side_steps=tuple(steps[first:second]),
         leave_one_out=tuple(steps[second:]),
@@ -219,13 +224,14 @@ def hierarchy_of(
 
 
 def _timed(
-    scene: Scene, model: str, h: float | None, cache: str, *, tried: bool
+    scene: Scene, model: str, h: float | None, cache: str, coarse_first: bool
 ) -> tuple[Response, float, int]:
-    """A response with its seconds and the peak memory of its process; `tried` first on coarse
-    elements, on which a body that cannot be reduced is refused.
+    """Return a response, its seconds and the peak memory of its process.
+
+    With `coarse_first`, a body that cannot be reduced is refused on coarse elements.
     """
     os.environ["SKINWAVE_CACHE"] = cache
-    if tried and h:
+    if coarse_first and h:
         with suppress(ValueError):
             try:
                 compute(scene, model, h=COARSER * h)
@@ -234,7 +240,7 @@ def _timed(
     started = time.perf_counter()
     response = compute(scene, model, h=h)
     seconds, memory = time.perf_counter() - started, peak_memory()
-    # The discretisation error is common to all steps and no part of their differences.
+    # All steps have the same discretisation error, which does not affect their differences.
     effort = replace(response.effort, warnings=all_warnings(scene, response, h=h))
     return replace(response, effort=effort), seconds, memory
 
@@ -244,8 +250,9 @@ def _computed(
     future: Future[tuple[Response, float, int]],
     before: Sequence[HierarchyStep],
 ) -> HierarchyStep:
-    """Step with its response, and with the seconds and memory of what an earlier one on the same
-    body did for it; or with what it was refused for.
+    """Return a step with its response or its error.
+
+    Seconds and memory include what an earlier step spent on the same body.
     """
     try:
         response, seconds, memory = future.result()
@@ -264,17 +271,17 @@ def _effect(
     scene: Scene, before: HierarchyStep, after: HierarchyStep, alone: Response | None,
     richest: Response,
 ) -> Effect:  # fmt: skip
-    """Effect of the assumption that a step is named by; `alone` is the only one in a response."""
+    """Return the effect of a step's assumption; only this one is made in `alone`."""
     assert before.response
     assert after.response
-    changed, scale = _changes(after.response, before.response)
-    most = int(np.argmax(changed))
+    changes, scale = _changes(after.response, before.response)
+    most = int(np.argmax(changes))
     level = None
     if scene.body.is_skin:
-        of_both = [_level(scene, each) for each in (before.response, after.response)]
-        level = of_both[1] - of_both[0] if np.isfinite(of_both).all() else None
+        levels = [_level(scene, each) for each in (before.response, after.response)]
+        level = levels[1] - levels[0] if np.isfinite(levels).all() else None
     return Effect(
-        name=after.name, waveform=float(changed[most]), where=scene.probes[most], level=level,
+        name=after.name, waveform=float(changes[most]), where=scene.probes[most], level=level,
         decibel=line_changes(scene, before.response, after.response, scale),
         alone=float(_changes(richest, alone)[0].max()) if alone else None,
         seconds=after.seconds - before.seconds,
@@ -282,26 +289,25 @@ def _effect(
 
 
 def _changes(reference: Response, candidate: Response) -> tuple[Floats, float]:
-    """Change (p,) of waveforms relative to that of the probe that moves most, and the factor of the
-    candidate.
-    """
-    change = compare(reference, candidate)
+    """Return changes (p,) relative to the strongest probe, and the factor of the candidate."""
+    agreement = compare(reference, candidate)
     sizes = np.linalg.norm(reference.values, axis=0)
-    return np.asarray(change.relative_l2 * sizes / max(sizes.max(), TINY)), change.scale
+    return np.asarray(agreement.relative_l2 * sizes / max(sizes.max(), TINY)), agreement.scale
 
 
 def _level(scene: Scene, response: Response) -> float:
-    """Highest sensation level in dB of a line at any probe; minus infinity without one."""
-    if not (names := followed_lines(scene, response)):
+    """Return the highest sensation level in dB of a line at any probe, or minus infinity."""
+    if not (names := compared_lines(scene, response)):
         return -np.inf
     f = np.array([*names.values()])
     unit = "m" if response.record.of_body else "Pa"
     return float(sensation_level(lines(response, f), f[:, None], unit=unit).max())
 
 
-def followed_lines(scene: Scene, response: Response) -> dict[str, float]:
-    """Names and frequencies in Hz of the lines that are followed, as far as a response resolves
-    them: those of a drive that is not linear, which has all that a linear one has.
+def compared_lines(scene: Scene, response: Response) -> dict[str, float]:
+    """Return the frequencies in Hz of resolved lines by name.
+
+    They are those of a nonlinear drive, which include all lines of a linear one.
     """
     drive = usual_drive(scene.pressure.drive, MovingPressure.drive)
     pressure = replace(scene.pressure, drive=drive)
@@ -311,12 +317,12 @@ def followed_lines(scene: Scene, response: Response) -> dict[str, float]:
 def line_changes(
     scene: Scene, before: Response, after: Response, scale: float = 1.0
 ) -> dict[str, float]:
-    """By how many dB each line that counts grows, at the probe where it is strongest."""
-    if not (names := followed_lines(scene, after)):
+    """Return the increase in dB of each strong line, at the probe where it is strongest."""
+    if not (names := compared_lines(scene, after)):
         return {}
     old, new = (lines(r, list(names.values())) for r in (before, after))
     old = abs(scale) * old
-    least = FAINTEST * max(old.max(), new.max())
+    least = WEAKEST_RATIO * max(old.max(), new.max())
     changes = {}
     for k, name in enumerate(names):
         probe = int(np.argmax(np.maximum(old[k], new[k])))
@@ -327,42 +333,50 @@ def line_changes(
 
 
 def sentence(e: Effect) -> str:
-    """Sentence on the effect and the cost of dropping an assumption."""
+    """Return a sentence on the effect and the cost of dropping an assumption."""
     x, y = (1e3 * v for v in e.where)
-    text = f"Dropping '{e.name}' ({ASSUMPTIONS[e.name]}) changes the waveform at "
-    text += f"({x:g}, {y:g}) mm by {significant(100 * e.waveform)} % of the strongest probe's"
+    changes = [f"the waveform at ({x:g}, {y:g}) mm changes by {_changed_by(e.waveform)}"]
     if e.level is not None:
-        text += f", the sensation level by {decibel(e.level, signed=True)} dB"
+        changes.append(f"the sensation level by {decibel(e.level, signed=True)} dB")
     if e.decibel:
         line = max(e.decibel, key=lambda name: abs(e.decibel[name]))
-        text += f" and the {line} line by {decibel(e.decibel[line], signed=True)} dB"
-    cost = f"costs {e.seconds:.1f} s more" if e.seconds > 0.05 else "costs nothing more"
-    return f"{text}, and {cost}."
+        changes.append(f"the line {line} by {decibel(e.decibel[line], signed=True)} dB")
+    cost = f"It takes {e.seconds:.1f} s more." if e.seconds > 0.05 else "It takes no extra time."
+    return f"Without the assumption '{e.name}', {ASSUMPTIONS[e.name]}; {', '.join(changes)}. {cost}"
+
+
+def _changed_by(ratio: float) -> str:
+    """Return a change relative to the strongest probe in percent, or as a factor above 100 %."""
+    if ratio > 1:
+        return f"{significant(ratio, 2)} times the motion of the strongest probe"
+    return f"{significant(100 * ratio)} % of the strongest probe"
 
 
 def write(folder: Path, found: Hierarchy) -> None:
-    """index.html, relax.png, relax.csv, effects.csv, steps.csv and responses.npz."""
+    """Write index.html, relax.png, relax.csv, effects.csv, steps.csv and responses.npz."""
     effects = found.effects()
     (folder / "relax.csv").write_bytes(Table(LINE_COLUMNS, _line_rows(found)).to_csv())
-    answered = {step.name: step.response for step in found.every if step.response}
-    arrays = {name: response.values for name, response in answered.items()}
-    first = next(iter(answered.values()))
+    responses = {step.name: step.response for step in found.every if step.response}
+    arrays = {name: response.values for name, response in responses.items()}
+    first = next(iter(responses.values()))
     arrays |= {"t": first.times, "probes": first.probes}
     np.savez(folder / "responses.npz", **arrays)  # type: ignore[arg-type]
-    verdict = [sentence(effects[0])] if effects else ["No two steps could be compared."]
+    verdict = "No two steps can be compared, because too many failed."
+    if effects:
+        verdict = sentence(effects[0])
     parts: list[Part] = [
         Picture(png(_figure(effects), dpi=130), BARS, "relax"),
         Table(EFFECT_COLUMNS, map(_effect_row, effects), "effects"),
         Details("Steps", [INTRODUCTION, Table(STEP_COLUMNS, map(_step_row, found.every), "steps")]),
     ]
     title = f"{found.scene.name}: assumptions, one by one"
-    Report(title, verdict, parts, found.efforts).write(folder)
+    Report(title, [verdict], parts, found.efforts).write(folder)
 
 
 def _figure(effects: list[Effect]) -> Figure:
-    """A bar for each assumption, the greatest effect at the top."""
-    drawn = Figure(figsize=(7, 1 + 0.32 * len(effects)), layout="constrained")
-    axes = drawn.add_subplot()
+    """Draw a bar for each assumption, the largest effect at the top."""
+    figure = Figure(figsize=(7, 1 + 0.32 * len(effects)), layout="constrained")
+    axes = figure.add_subplot()
     changes = [100 * e.waveform for e in effects]
     bars = axes.barh([e.name.replace("^2", "²") for e in effects], changes, color=BLUE, height=0.7)
     texts = [
@@ -373,9 +387,9 @@ def _figure(effects: list[Effect]) -> Figure:
     axes.bar_label(bars, texts, padding=4, fontsize=9)
     axes.invert_yaxis()
     axes.set_xlim(0, 1.3 * max(changes, default=1.0))
-    axes.set_xlabel("change of the waveform, % of the strongest probe's")
+    axes.set_xlabel("change of the waveform, % of the strongest probe")
     axes.spines[["top", "right"]].set_visible(False)
-    return drawn
+    return figure
 
 
 def _effect_row(e: Effect) -> list[object]:
@@ -392,12 +406,12 @@ def _step_row(step: HierarchyStep) -> list[object]:
 
 
 def _line_rows(found: Hierarchy) -> Iterator[list[object]]:
-    """Every line's change at each probe, from the step before and from the richest."""
+    """Yield the change of every line at each probe, from the step before and from the richest."""
     richest = [r.response for r in found.steps if r.response][-1]
     for before, step in found.pairs():
         assert before.response
         assert step.response
-        names = followed_lines(found.scene, step.response)
+        names = compared_lines(found.scene, step.response)
         ratios = [_ratios(step.response, other, names) for other in (before.response, richest)]
         for k, (name, f) in enumerate(names.items()):
             for p, (x, y) in enumerate(found.scene.probes):
@@ -406,7 +420,7 @@ def _line_rows(found: Hierarchy) -> Iterator[list[object]]:
 
 
 def _ratios(response: Response, other: Response, names: dict[str, float]) -> Floats:
-    """Lines (f, p) of a response over those of another, dB."""
-    found = compare(other, response, tuple(names.values()))
+    """Return lines (f, p) of a response in dB re those of another."""
+    agreement = compare(other, response, tuple(names.values()))
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(20 * np.log10(found.line_ratios))
+        return np.asarray(20 * np.log10(agreement.line_ratios))

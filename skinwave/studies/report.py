@@ -1,5 +1,5 @@
-"""The report of a scene: one page, its pictures and data for other programs, from the results in a
-folder; and the page of a map alone.
+"""The report of a scene: one page, its pictures and its data, from a result folder; and the page of
+a map.
 """
 
 import io
@@ -17,11 +17,10 @@ from PIL import features
 from simple_model.numbers import percent, significant, stated_error
 from skinwave.report import description, maps, render
 from skinwave.report.figures import png
-from skinwave.report.films import film, lasts, seam
-from skinwave.report.levels import strongest_probe
-from skinwave.report.maps import surfaces_figure
+from skinwave.report.films import duration, film, played_text
 from skinwave.report.palette import label
 from skinwave.report.renderer import renderer
+from skinwave.report.spectra import strongest_probe
 from skinwave.report.styles import Style
 from skinwave.report.turntable import turntable
 from skinwave.results import record, surface
@@ -34,8 +33,8 @@ from skinwave.results.views import View
 from skinwave.scene.file import dumps
 from skinwave.scene.scene import Scene
 from skinwave.studies import dispersion
-from skinwave.studies.album import Album, only, open_album
-from skinwave.studies.changes import Drawn, beside_kernels, shown
+from skinwave.studies.album import Album, open_album, select_columns
+from skinwave.studies.first_screen import Maps, first_screen, with_kernels
 from skinwave.studies.pages import Gallery, page_of
 from skinwave.system.document import Choice, Details, Part, Picture, Report, Section, inner_page
 from skinwave.system.effort import Progress
@@ -44,27 +43,27 @@ from skinwave.system.table import Table
 FILM_PANEL = (352, 304)  # pixels of a model in the film of a page
 FILM_QUALITY = 60
 NO_VIEWS = (
-    "No motion of whole bodies was saved here, and so there is no picture of a surface; "
+    "These results contain no motion of whole bodies, so that there is no picture of a surface. "
     "skinwave report SCENE computes it."
 )
 TURNED = (
-    "Turn it with the mouse, a finger or the arrow keys. Motion into the body is red, out of it "
-    "blue, about the mean; where the legend says ≥, rare larger values have the last colour. "
-    "Black: path and focus; orange: probes."
+    "Turn it with the mouse, a finger or the arrow keys. Colour: motion about its mean, red into "
+    "the body, blue out of it; with ≥ in the legend, larger values have the last colour. Black: "
+    "path and focus; orange: probes."
 )
 MARKS = "Black: path and focus; yellow: probes."
 COMPARED = (
-    "Colour: motion into the body about its mean, or the point kernel's pressure, over each "
-    "model's largest: a pressure and a motion have no common unit. All receive the same load."
+    "Colour: motion into the body about its mean, or pressure of the point kernel, over each "
+    "model's largest value. All models receive the same load."
 )
 SNAPSHOTS = (
-    "The surface when the body moves most, and a quarter, half and three quarters of a turn of the "
-    "focus later (of a period of the strongest line, if it rests). Behind a focus that is faster "
-    "than the surface wave, the Mach angle asin(c/v); no clean cone forms on a circle smaller than "
-    "a wavelength."
+    "The surface when the body moves most, and a quarter, a half and three quarters of a turn of "
+    "the focus later (of a period of the strongest line, if the focus rests). Behind a focus that "
+    "is faster than the surface wave, lines at the Mach angle asin(c/v) are drawn; no clean cone "
+    "forms on a circle smaller than a wavelength."
 )
 MAP = (
-    "RMS of the quantity about its mean in the steady state. Dotted: the path of the focus; white: "
+    "RMS of the quantity about its mean in the steady state. Dotted: path of the focus; white: "
     f"{NEAR:g} dB re the largest."
 )
 
@@ -79,37 +78,41 @@ def write_report(
     columns: Sequence[str] = (),
     command: str = "",
 ) -> None:
-    """index.html, pictures/ and, for other programs, data/ in `out` from the results in a folder,
-    or from some columns of them, which a command made. No model of a body is run. A ValueError if
-    the folder holds no result, or no such column.
+    """Write index.html, pictures/ and data/ into `out` from the results in a folder.
+
+    No model of a body is run. `columns` select models; `command` made the results. Raises a
+    ValueError if the folder has no result or no such column.
     """
-    album = only(open_album(results), columns)
+    album = select_columns(open_album(results), columns)
     gallery = Gallery(style=style, formats=formats)
-    seen = [*pictures(album, gallery, progress), *mapped(album, gallery)]
+    before = [*picture_parts(album, gallery, progress), *map_parts(album, gallery)]
     progress("write data", 0.0)
     _write_data(out / "data", album)
-    beside = {name: _with_kernels(runs) for name, runs in album.groups.items()}
-    asked = Details("What was asked", [Table(["", ""], description.asked_rows(album.scene))])
-    drawn_with = renderer().said if renderer().found else "nothing"
+    groups = {name: _with_kernels(runs) for name, runs in album.groups.items()}
+    scene = Details("The scene in words", [Table(["", ""], description.scene_rows(album.scene))])
+    drawn_with = renderer().detail if renderer().is_available else "none"
     page_of(
-        album.title, album.groups, shown(beside, partial(_maps, album)), gallery, seen=seen,
-        more=[asked, *_guided(album, gallery)], modelled=_planned(album), progress=progress,
-        again=[command or _command(results), f"Three-dimensional pictures: {drawn_with}."],
+        album.title, album.groups, first_screen(groups, partial(_maps, album)), gallery,
+        before=before, after=[scene, *_wave_parts(album, gallery)], modelled=_plan_parts(album),
+        progress=progress, command=command or _command(results),
+        notes=[f"Renderer of three-dimensional pictures: {drawn_with}."],
     ).write(out)  # fmt: skip
 
 
-def pictures(album: Album, gallery: Gallery, progress: Progress) -> list[Part]:
-    """Parts of a page that show an album's views, and why any of them is missing."""
+def picture_parts(album: Album, gallery: Gallery, progress: Progress) -> list[Part]:
+    """Return parts of a page that show the views, or say why there are none."""
     views = list(album.views.values())
     if not views:
         return [NO_VIEWS]
-    same = [v for v in views if v.scene.body == album.scene.body and v.quantity.of_body]
-    own = (same or views)[-1]
+    of_scene = [v for v in views if v.scene.body == album.scene.body and v.quantity.of_body]
+    own = (of_scene or views)[-1]
     frame = int(np.abs(own.pushed).max(axis=1).argmax())
     options: dict[str, Part] = {}
-    missing = [f"Pictures in three dimensions and the film are left out: {renderer().said}."]
-    if renderer().found:
-        options, missing = _spatial(own, frame, views, gallery, progress), []
+    missing: list[Part] = []
+    if renderer().is_available:
+        options = _spatial_parts(own, frame, views, gallery, progress)
+    else:
+        missing = [f"Three-dimensional pictures and the film are left out: {renderer().detail}."]
     progress("draw snapshots", 0.0)
     figure = maps.snapshots_figure(views, gallery.style)
     options["snapshots"] = gallery.figure("snapshots", figure, SNAPSHOTS)
@@ -117,17 +120,17 @@ def pictures(album: Album, gallery: Gallery, progress: Progress) -> list[Part]:
     return [Section("Pictures", [*missing, Choice("pictures", options), turned])]
 
 
-def _spatial(
+def _spatial_parts(
     own: View, frame: int, views: Sequence[View], gallery: Gallery, progress: Progress
 ) -> dict[str, Part]:
-    """Pictures in three dimensions at a frame, and the film."""
+    """Return three-dimensional pictures at a frame, and the film."""
     progress("draw side by side", 0.0)
-    scales = (f"{label(view.column)}: {render.shown_scale(view)}" for view in views)
+    scales = (f"{label(view.column)}: {render.scale_text(view)}" for view in views)
     peaks = (f"{label(view.column)} {view.quantity.text(view.peak)}" for view in views)
-    caption = f"{'; '.join(scales)}. The largest: {', '.join(peaks)}. {MARKS} {COMPARED}"
-    beside = render.picture(views, gallery.style, frame)
+    caption = f"{'; '.join(scales)}. Largest values: {', '.join(peaks)}. {MARKS} {COMPARED}"
+    pixels = render.picture(views, gallery.style, frame)
     parts: dict[str, Part] = {
-        "side by side": gallery.image("side-by-side", beside, caption),
+        "side by side": gallery.image("side-by-side", pixels, caption),
         "film": _film(own, views, gallery.style, progress),
     }
     if len(own.tets):
@@ -137,18 +140,18 @@ def _spatial(
         behind = int(np.where(in_view, largest, -1.0).argmax())
         cut = render.picture([own], gallery.style, behind, camera="front", cut=True)
         caption = (
-            f"{label(own.column)} cut open along y = 0, the section below the black line: "
-            f"{render.shown_scale(own)}. {MARKS}"
+            f"{label(own.column)} cut open along y = 0; the section is below the black line. "
+            f"{render.scale_text(own).capitalize()}. {MARKS}"
         )
         parts["cut open"] = gallery.image("cut-open", cut, caption)
     return parts
 
 
 def _film(own: View, views: Sequence[View], style: Style, progress: Progress) -> Picture:
-    """The film, on the page in a third of the bytes of its GIF where that can be done."""
+    """Return the film, as WebP on the page if possible, which has a third of the bytes of GIF."""
     count = len(own.times)
-    slower = significant(lasts(count) / own.period, 2)
-    caption = f"Film: {seam(own)}. {count} frames, {slower} times more slowly."
+    slower = significant(duration(count) / own.period, 2)
+    caption = f"Film: {played_text(own)}. {count} frames, slowed down {slower} times."
     with TemporaryDirectory() as folder:
         path = Path(folder, "film.gif")
         film(path, views, style, progress, panel=FILM_PANEL)
@@ -161,35 +164,35 @@ def _film(own: View, views: Sequence[View], style: Style, progress: Progress) ->
     return Picture(buffer.getvalue(), caption, "film", "webp", {"gif": gif})
 
 
-def mapped(album: Album, gallery: Gallery) -> list[Part]:
-    """Maps of the quantity that the probes read, where it is not the motion of the surface."""
+def map_parts(album: Album, gallery: Gallery) -> list[Part]:
+    """Return maps of the probes' quantity, unless it is the motion of the surface."""
     scenes = {run.column: run.scene for run in album.runs}
     parts = []
-    for name, found in album.maps.items():
+    for name, field in album.maps.items():
         if (scene := scenes[name]).reading.is_plain:
             continue
-        caption = f"{label(name)}: {' '.join(map_sentences(scene, found))} {MAP}"
-        figure = surfaces_figure(scene, {name: found}, gallery.style)
+        caption = f"{label(name)}: {' '.join(map_sentences(scene, field))} {MAP}"
+        figure = maps.surfaces_figure(scene, {name: field}, gallery.style)
         parts.append(gallery.figure(f"quantity-{folder_name(name)}", figure, caption))
     return [Section("Where the quantity is largest", parts)] if parts else []
 
 
 def _with_kernels(runs: Sequence[Run]) -> Sequence[Run]:
-    """Runs of one Tacton with both point kernels, computed anew, as they are formulas."""
+    """Return runs of one Tacton with both point kernels, which are computed again."""
     bodies = [run for run in runs if run.is_motion]
-    return [*beside_kernels(bodies[0])[:2], *bodies] if bodies else runs
+    return [*with_kernels(bodies[0])[:2], *bodies] if bodies else runs
 
 
-def _maps(album: Album, run: Run) -> Drawn:
-    """A body's map as it was saved with its view, and the kernel's."""
-    view, found = album.views.get(run.column), album.maps.get(run.column)
-    if view is None or found is None or view.scene.pressure != run.scene.pressure:
+def _maps(album: Album, run: Run) -> Maps:
+    """Return a body's saved map, and the kernel's."""
+    view, field = album.views.get(run.column), album.maps.get(run.column)
+    if view is None or field is None or view.scene.pressure != run.scene.pressure:
         return ()
-    return found, kernel_map(run.scene.pressure, found.x, found.y)
+    return field, kernel_map(run.scene.pressure, field.x, field.y)
 
 
 def _write_data(folder: Path, album: Album) -> None:
-    """Probes, their sound and, of every view, a few frames of its field."""
+    """Write probes, their sound, and a few frames of the field of every view."""
     folder.mkdir()
     names = distinct_names(album.groups) if len(album.groups) > 1 else [""]
     for name, runs in zip(names, album.groups.values(), strict=True):
@@ -201,70 +204,70 @@ def _write_data(folder: Path, album: Album) -> None:
         write_field(folder, view)
 
 
-def _planned(album: Album) -> list[Part]:
-    """The plan of the response, and how far pictures are from it."""
+def _plan_parts(album: Album) -> list[Part]:
+    """Return the plan of the response, and the difference between pictures and response."""
     if (planned := album.planned) is None:
-        return ["No plan was saved with these results; skinwave plan scene.toml makes one."]
+        return ["These results contain no plan. skinwave plan SCENE makes one."]
     heading = (
-        f"What the scene requires for a relative error of {100 * planned['tolerance']:g} % at its "
-        "probes, and why. Pictures show the whole body, by finite elements or the modes of a plate."
+        f"Plan for a relative error of {100 * planned['tolerance']:g} % at the probes. Pictures "
+        "show the whole body, by finite elements or the modes of a plate."
     )
     rows = [[row["what"], row["value"], row["reason"]] for row in planned["rows"]]
     parts: list[Part] = [heading, Table(["", "", "reason"], rows)]
     if "misfit" in planned:
         parts.append(
-            f"At the probes, the motion in pictures, which have larger elements, differs from the "
-            f"response by {planned['model']} by {percent(planned['misfit'])}."
+            "Pictures have larger elements. At the probes their motion differs from the response "
+            f"by {planned['model']} by {percent(planned['misfit'])}."
         )
     return [*parts, *(f"Warning: {text}." for text in planned["warnings"])]
 
 
-def _guided(album: Album, gallery: Gallery) -> list[Part]:
-    """Dispersion curves of the scene's body; nothing of a body that has none."""
+def _wave_parts(album: Album, gallery: Gallery) -> list[Part]:
+    """Return dispersion curves of the scene's body, if it has any."""
     if album.scene.body.of_kind.dispersion is None:
         return []
     try:
         parts = dispersion.page_parts(dispersion.driven_modes(album.scene), gallery)
-    except ValueError as error:  # such as a table of moduli that ends below the curves
+    except ValueError as error:  # such as a table of moduli that does not cover the frequencies
         parts = [f"No dispersion curves: {error}."]
     return [Details("Which waves the body guides, and which the load drives", parts)]
 
 
 def _command(results: Path) -> str:
-    """The command that made a folder, if its record says so."""
+    """Return the command that made a folder, from its record."""
     typed = ""
     with suppress(ValueError, KeyError):
         typed = str(record.read(results)["command"]["typed"])
     return typed or "skinwave report scene.toml"
 
 
-def map_sentences(scene: Scene, found: SurfaceField) -> list[str]:
-    """Sentences on the largest value of a map, where it is, how far it spreads, and its error."""
-    if not np.nanmax(found.rms):
-        return ["Nothing vibrates: the load is constant."]
-    row, column = np.unravel_index(np.nanargmax(found.rms), found.rms.shape)
-    largest, x, y = found.rms[row, column], 1e3 * found.x[column], 1e3 * found.y[row]
-    moving = np.nan_to_num(found.rms) >= largest * 10 ** (NEAR / 20)
-    reach = 1e3 * distance_from_path(scene, found.places)[moving].max()
-    border = np.abs(found.places[moving]).max(axis=0) >= [found.x[-1], found.y[-1]]
-    error = f"; expected error {stated_error(found.error)} of the largest"
+def map_sentences(scene: Scene, field: SurfaceField) -> list[str]:
+    """Return sentences on the largest value of a map, its place, its spread and its error."""
+    if not np.nanmax(field.rms):
+        return ["Nothing vibrates, because the load is constant."]
+    row, column = np.unravel_index(np.nanargmax(field.rms), field.rms.shape)
+    largest, x, y = field.rms[row, column], 1e3 * field.x[column], 1e3 * field.y[row]
+    inside = np.nan_to_num(field.rms) >= largest * 10 ** (NEAR / 20)
+    reach = 1e3 * distance_from_path(scene, field.places)[inside].max()
+    at_edge = np.abs(field.places[inside]).max(axis=0) >= [field.x[-1], field.y[-1]]
+    error = f"; expected error {stated_error(field.error)} of the largest"
     return [
         f"The RMS of the {scene.reading.words} is largest at ({x:g}, {y:g}) mm, "
-        f"{found.quantity.text(largest)}, and above {NEAR:g} dB of that up to "
+        f"{field.quantity.text(largest)}. It is above {NEAR:g} dB of that up to "
         f"{significant(reach, 2)} mm from the path"
-        + (", or further: the map ends there." if border.any() else "."),
-        f"Computed by {found.note}{error * isfinite(found.error)}.",
+        + (", or further, because the map ends there." if at_edge.any() else "."),
+        f"Computed by {field.note}{error * isfinite(field.error)}.",
     ]
 
 
-def write_map(folder: Path, scene: Scene, found: SurfaceField) -> None:
-    """index.html, map.png, map.csv, map.npz and scene.toml, into an empty folder."""
+def write_map(folder: Path, scene: Scene, field: SurfaceField) -> None:
+    """Write index.html, map.png, map.csv, map.npz and scene.toml into an empty folder."""
     (folder / "scene.toml").write_text(dumps(scene), encoding="utf-8")
-    X, Y = np.meshgrid(1e3 * found.x, 1e3 * found.y)
-    rows = zip(X.flat, Y.flat, found.shown.flat, strict=True)
-    columns = ("x_mm", "y_mm", f"rms_{found.quantity.column}")
+    X, Y = np.meshgrid(1e3 * field.x, 1e3 * field.y)
+    rows = zip(X.flat, Y.flat, field.shown.flat, strict=True)
+    columns = ("x_mm", "y_mm", f"rms_{field.quantity.column}")
     (folder / "map.csv").write_bytes(Table(columns, rows, stored=7).to_csv())
-    surface.save(folder / "map.npz", found)
-    figure = surfaces_figure(scene, {scene.reading.words: found})
+    surface.save(folder / "map.npz", field)
+    figure = maps.surfaces_figure(scene, {scene.reading.words: field})
     title = f"{scene.name}: {scene.reading.words}"
-    Report(title, map_sentences(scene, found), [Picture(png(figure), MAP, "map")]).write(folder)
+    Report(title, map_sentences(scene, field), [Picture(png(figure), MAP, "map")]).write(folder)

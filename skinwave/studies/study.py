@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from simple_model import Response
@@ -24,34 +25,35 @@ from skinwave.models.reduced import ReducedBody, answer, prepare
 from skinwave.planning.assessment import assessed, coarser_body
 from skinwave.planning.plan import chosen_model, plan
 from skinwave.planning.simulate import compute, solve
-from skinwave.results.claims import AssessedClaim, claimed, evaluate, write_claims
+from skinwave.results.claims import AssessedClaim, assessable_runs, evaluate, write_claims
 from skinwave.results.files import write_lines, write_responses, write_run
 from skinwave.results.run import Run
 from skinwave.results.surface import has_wavenumber_integral
 from skinwave.scene import paper15
-from skinwave.scene.scene import BODIES, Body, Scene, body_name, check_load, with_body
-from skinwave.studies.changes import Drawn, first_of, quick_maps, shown, slow_maps
+from skinwave.scene.scene import Body, Scene
+from skinwave.studies.album import scene_columns
+from skinwave.studies.first_screen import Maps, first_name, first_screen, quick_maps, slow_maps
 from skinwave.studies.pages import Gallery, efforts_of, page_of
 from skinwave.system import document
-from skinwave.system.effort import Progress, one_thread, peak_memory
+from skinwave.system.effort import Progress, one_thread, peak_memory, silent
 from skinwave.system.processes import pool
 
-# Of the models that plans choose, those that leave out more come first.
-COMPLETE = (
+# Models that plans choose, in the order of increasing completeness.
+COMPLETENESS = (
     "flat-body-harmonic", "flat-body", "plate-modes-transient", "fem", "plate-modes-nonlinear",
 )  # fmt: skip
-SLOW = 3.0  # s of a model: its responses come last
+SLOW = 3.0  # s: responses of slower models come last
 ABOUT = (
-    "The point-kernel model of Lim, Seifi and Park (CHI EA '24, doi 10.1145/3613905.3650981), as "
-    "published and under the load that the bodies receive, beside the motion of these bodies. "
-    "Amplitudes of all lines are in lines.csv, waveforms in responses.npz; each run's folder has "
-    "its scene."
+    "The point-kernel model of Lim, Seifi and Park (CHI EA '24, doi 10.1145/3613905.3650981) is "
+    "run as published and under the load of the bodies. Amplitudes of all lines are in lines.csv, "
+    "waveforms in responses.npz; the folder of each run has its scene."
 )
+Scenes = Mapping[str, Mapping[str, Scene]]  # Tacton -> column -> scene
 
 
 @dataclass(frozen=True, kw_only=True)
 class StudyOutcome:
-    """Outcome of a comparison: assessed claims, warnings, cost, and how much of it was done."""
+    """Outcome of a comparison; `runs` of the `planned` ones were done."""
 
     assessed_claims: list[AssessedClaim]
     warnings: list[str]
@@ -61,54 +63,54 @@ class StudyOutcome:
     peak_memory: int
 
 
-def paper_scenes(bodies: Mapping[str, Body] | None = None) -> dict[str, dict[str, Scene]]:
-    """Tacton -> column -> scene of the paper's 15 Tactons: both point kernels, and bodies by name,
-    or paper and skin.
+def paper_scenes(bodies: Mapping[str, Body] | None = None) -> Scenes:
+    """Return the scenes of the paper's 15 Tactons by both point kernels and on bodies by name,
+    paper and skin if none is given.
     """
     return {name: paper15.scenes(name, tacton, bodies) for name, tacton in paper15.tactons()}
 
 
-def own_scenes(scene: Scene, name: str) -> dict[str, dict[str, Scene]]:
-    """The same for one scene: on its own body or, if it has none, on paper and skin. A ValueError
-    if its load is another than the pressure of a focus, or it has gravity.
-    """
-    check_load(scene, "a comparison with the point kernel")
-    if scene.body.of_kind.discretise:
-        bodies = {body_name(scene.body): scene}
-    else:
-        bodies = {key: with_body(scene, BODIES[key]) for key in paper15.MEASURED_ON}
-    return {name: paper15.beside_kernels(scene) | bodies}
+def own_scenes(scene: Scene, name: str) -> Scenes:
+    """Return the scenes that a scene is compared in; raises a ValueError if no body fits."""
+    columns = scene_columns(scene)
+    if not any(each.body.of_kind.discretise for each in columns.values()):
+        raise ValueError(
+            "path or probes fit neither on the paper sheet nor on the skin slab. Give the scene a "
+            "body under [body]"
+        )
+    return {name: columns}
 
 
 def run_study(
-    scenes: Mapping[str, Mapping[str, Scene]],
+    scenes: Scenes,
     folder: Path,
-    progress: Progress,
+    options: SolveOptions,
     *,
     title: str,
     command: str,
-    model: str = "auto",
-    h: float | None = None,
-    solver: str = "auto",
     measured: Measured | None = None,
     more: Sequence[document.Part] = (),
 ) -> StudyOutcome:
-    """Run every scene, writing each run as it is finished, then the tables and the page; with a
-    measurement beside the models, if there is one of that Tacton. The page has `more` parts.
+    """Run every scene and write each run when it is finished, then the tables and the page.
 
-    Each body has one model: the given one, or of those that plans take for its scenes the one that
-    leaves out least; elements if their size h in metre is given. An interrupt ends the runs early;
-    those that are finished are still compared and written.
+    Each body has one model: the given one, or the most complete of those that plans choose for its
+    scenes, or finite elements if their size is given. A measurement is compared with the models of
+    its Tacton. `more` are further parts of the page. An interrupt ends the runs early; finished
+    runs are still compared and written.
     """
-    options = SolveOptions(solver=solver, h=h)
-    models = _models(scenes, FEM.name if h and model == "auto" else model, h)
-    started, planned = time.perf_counter(), sum(map(len, scenes.values()))
+    models = _models(scenes, options)
+    started, planned, progress = (
+        time.perf_counter(),
+        sum(map(len, scenes.values())),
+        options.progress,
+    )
     groups: dict[str, list[Run]] = {}
     prepared: dict[str, ReducedBody] = {}
+    options = replace(options, model="auto", progress=silent)
     with one_thread(), pool(2) as workers:
         maps = {
-            scene.body: workers.submit(slow_maps, scene, h, solver)
-            for scene in scenes[first_of(scenes)].values()
+            scene.body: workers.submit(slow_maps, scene, options)
+            for scene in scenes[first_name(scenes)].values()
             if scene.body.of_kind.discretise and scene.reading.is_plain
             and not has_wavenumber_integral(scene)
         }  # fmt: skip
@@ -120,7 +122,7 @@ def run_study(
             raise KeyboardInterrupt
         runs = [run for group in groups.values() for run in group]
         progress("write tables", 0.0)
-        assessed_claims = evaluate(claimed(runs))
+        assessed_claims = evaluate(assessable_runs(runs))
         write_claims(folder / "claims.csv", assessed_claims)
         write_lines(folder / "lines.csv", runs)
         by_name = {f"{r.tacton}/{r.body}/{r.model}": r for r in runs}
@@ -128,27 +130,27 @@ def run_study(
         first = None
         with suppress(KeyboardInterrupt):
             if len(runs) == planned:
-                first = shown(groups, lambda run: _maps(run, maps, progress))
-    parts: list[document.Part] = []
+                first = first_screen(groups, lambda run: _maps(run, maps, progress))
+    parts: list[document.Part] = [*more]
     figures: dict[str, Sequence[Run]] = dict(groups)
     for name, group in groups.items() if measured else ():
-        from skinwave.measure import comparison_page  # which takes a second
+        from skinwave.measure import comparison_page  # slow to import
 
         assert measured
-        asked = measured.measurement.quantity
+        quantity = measured.measurement.quantity
         comparison = compare_measured(
-            measured, [in_quantity(run, asked, prepared) for run in group]
+            measured, [in_quantity(run, quantity, prepared) for run in group]
         )
         comparison_page.write_tables(folder, comparison)
         parts.append(comparison_page.page_part(comparison, Gallery().figure))
         figures[name] = beside(comparison, [column.run for column in comparison.columns])
         first = replace(first, measured=measured_places(comparison)) if first else None
+    if len(runs) < planned:
+        parts.insert(0, f"Interrupted: this page shows the {len(runs)} finished of {planned} runs.")
     page_of(
-        title, groups, first, Gallery(), figures=figures, progress=progress,
-        seen=[*more, *parts] if len(runs) == planned else
-        [f"Interrupted: {len(runs)} of {planned} runs are finished and shown.", *more, *parts],
-        modelled=[ABOUT], seconds=time.perf_counter() - started,
-        again=[f"{command}; or, for one run, skinwave run TACTON/BODY/scene.toml in this folder."],
+        title, groups, first, Gallery(), figures=figures, progress=progress, before=parts,
+        modelled=[ABOUT], seconds=time.perf_counter() - started, command=command,
+        notes=["For one run: skinwave run TACTON/BODY/scene.toml in this folder."],
     ).write(folder)  # fmt: skip
     return StudyOutcome(
         assessed_claims=assessed_claims, warnings=document.worst_warnings(efforts_of(runs)),
@@ -157,45 +159,45 @@ def run_study(
     )  # fmt: skip
 
 
-def _models(
-    scenes: Mapping[str, Mapping[str, Scene]], model: str, h: float | None
-) -> dict[str, str]:
-    """Model of each column; a ValueError of a scene that it does not take, before any run."""
+def _models(scenes: Scenes, options: SolveOptions) -> dict[str, str]:
+    """Return the model of each column; raises a ValueError if it cannot compute a scene."""
+    model = FEM.name if options.h and options.model == "auto" else options.model
     if model != "auto" and not named(model).needs_body:
-        raise ValueError(f"{model} moves no body; give a model that does, or leave --model out")
-    found: dict[str, str] = {}
+        raise ValueError(f"{model} moves no body. Choose a model of a body, or leave --model out")
+    models: dict[str, str] = {}
     for column, scene in (each for group in scenes.values() for each in group.items()):
         if not scene.body.of_kind.discretise:
-            found[column] = column
+            models[column] = column
             continue
-        mine = model
+        own = model
         if model == "auto":
-            mine = chosen_model(scene) if found.get(column) != COMPLETE[-1] else COMPLETE[-1]
-        check_taken(named(mine), scene)
-        if named(mine).is_reduced:
-            check_mesh(scene.body, h or default_size(scene.body))
-        found[column] = max(found.get(column, mine), mine, key=_completeness)
-    return found
+            is_complete = models.get(column) == COMPLETENESS[-1]
+            own = COMPLETENESS[-1] if is_complete else chosen_model(scene)
+        check_taken(named(own), scene)
+        if named(own).is_reduced:
+            check_mesh(scene.body, options.h or default_size(scene.body))
+        models[column] = max(models.get(column, own), own, key=_completeness)
+    return models
 
 
 def _completeness(model: str) -> int:
-    """How little a model that plans choose leaves out."""
-    return COMPLETE.index(model) if model in COMPLETE else -1
+    return COMPLETENESS.index(model) if model in COMPLETENESS else -1
 
 
 def _runs(
-    scenes: Mapping[str, Mapping[str, Scene]], models: Mapping[str, str], options: SolveOptions,
+    scenes: Scenes, models: Mapping[str, str], options: SolveOptions,
     prepared: dict[str, ReducedBody], progress: Progress, workers: Executor,
 ) -> Iterator[Run]:  # fmt: skip
-    """Every run, those of fast models first. Bodies are reduced here, into `prepared`, once for all
-    Tactons; the coarser ones that give their errors, and all other responses, are computed by the
-    workers.
+    """Yield every run, those of fast models first.
+
+    Bodies are reduced here, once for all Tactons, into `prepared`. Workers compute the coarser
+    bodies, from which errors follow, and all other responses.
     """
     every = [(name, column, s) for name, group in scenes.items() for column, s in group.items()]
     reduced = {column for column, model in models.items() if named(model).is_reduced}
     every.sort(key=lambda each: (each[1] in reduced, named(models[each[1]]).seconds > SLOW))
     coarse = {s.body: s for _, column, s in every if column in reduced}
-    begun = {body: workers.submit(coarser_body, s, options) for body, s in coarse.items()}
+    coarser = {body: workers.submit(coarser_body, s, options) for body, s in coarse.items()}
     others = {
         (name, column): workers.submit(_response, scene, replace(options, model=models[column]))
         for name, column, scene in every
@@ -203,23 +205,23 @@ def _runs(
     }
     for k, (name, column, scene) in enumerate(every):
         if column in reduced:
-            body = prepared.get(column) or _prepared(scene, column, options, progress)
-            prepared[column] = body
-            found, coarser = answer(body, scene), begun[scene.body].result()
-            response = assessed(scene, found, body, options, compared=coarser)
+            if column not in prepared:
+                prepared[column] = prepare(
+                    scene.body, scene.probe_points, partial(_report, progress, column),
+                    h=options.h, solver=options.solver, reading=scene.reading,
+                )  # fmt: skip
+            response, body = answer(prepared[column], scene), prepared[column]
+            compared = coarser[scene.body].result()
+            response = assessed(scene, response, body, options, compared=compared)
         else:
             response = others[name, column].result()
         progress(f"response of {name} by {column}", (k + 1) / len(every))
-        body_of = column if scene.body.of_kind.discretise else "none"
-        yield Run(tacton=name, body=body_of, scene=scene, response=response)
+        body_name = column if scene.body.of_kind.discretise else "none"
+        yield Run(tacton=name, body=body_name, scene=scene, response=response)
 
 
-def _prepared(scene: Scene, column: str, options: SolveOptions, progress: Progress) -> ReducedBody:
-    return prepare(
-        scene.body, scene.probe_points,
-        lambda phase, fraction: progress(f"{column}: {phase}", fraction),
-        h=options.h, solver=options.solver, reading=scene.reading,
-    )  # fmt: skip
+def _report(progress: Progress, column: str, phase: str, fraction: float) -> None:
+    progress(f"{column}: {phase}", fraction)
 
 
 def _response(scene: Scene, options: SolveOptions) -> Response:
@@ -228,8 +230,8 @@ def _response(scene: Scene, options: SolveOptions) -> Response:
     return solve(scene, plan(scene, options))
 
 
-def _maps(run: Run, begun: Mapping[Body, Future[Drawn]], progress: Progress) -> Drawn:
-    if run.scene.body not in begun:
+def _maps(run: Run, submitted: Mapping[Body, Future[Maps]], progress: Progress) -> Maps:
+    if run.scene.body not in submitted:
         return quick_maps(run)
     progress(f"map of {run.column}", 0.0)
-    return begun[run.scene.body].result()
+    return submitted[run.scene.body].result()

@@ -1,4 +1,4 @@
-"""Tables of runs for pages: lines, claims, agreement, effort."""
+"""Tables of runs for pages: lines, claims, agreement and effort."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
@@ -7,9 +7,9 @@ import numpy as np
 from simple_model import Effort
 from simple_model.numbers import FAINTEST, decibel, interval, percent, plural, significant
 from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
-from skinwave.report.figures import answered
-from skinwave.report.levels import sensation_levels, strongest_probe
+from skinwave.report.figures import run_label
 from skinwave.report.palette import label
+from skinwave.report.spectra import sensation_levels, strongest_probe
 from skinwave.results.claims import TEXTS, AssessedClaim
 from skinwave.results.comparison import compare, moving_rms
 from skinwave.results.propagation import strongest_component
@@ -18,13 +18,13 @@ from skinwave.system.document import Details, Markup, Part, Section
 from skinwave.system.table import Column, Table
 from skinwave.typing import Floats
 
-SILENT = 0.01  # of the strongest probe: where the reference moves less, no misfit is given
-ROUND_OFF = 1e-3  # of a millisecond, or of a misfit
-TABLED = 12  # lines in the table
-NEGLIGIBLE_LINE = 1e-9  # of the strongest line
+STILL_RATIO = 0.01  # to the strongest probe: a misfit is given where the reference moves more
+ROUND_OFF = 1e-3  # ms, or of a misfit
+MOST_LINES = 12  # in a table
+NEGLIGIBLE_LINE_RATIO = 1e-9  # to the strongest line
 LEVELS = (
-    "Levels are relative to f_AM at the same probe, and those of the probe where that is largest, "
-    "which may be one where f_AM is weak."
+    "Levels are relative to f_AM at the same probe. The highest level over the probes is given; "
+    "f_AM may be weak there."
 )
 AGREEMENT = (
     "Tacton", "what changes", "from, to", "waveform misfit at the best scale",
@@ -32,22 +32,20 @@ AGREEMENT = (
     "phase delay of the strongest component, ms", "spread over the probes at -6 / -20 dB, mm",
 )  # fmt: skip
 EFFORT = (
-    "body", "dofs", "reduced to", Column("estimated reduction error", digits=2),
-    Column("relative energy imbalance", digits=1), "share of loss radiated", "solver",
-    "time by phase", "peak memory so far, GiB",
+    "body", "degrees of freedom", "reduced to", Column("estimated reduction error", digits=2),
+    Column("relative energy imbalance", digits=1), "radiated share of loss", "solver",
+    "time by phase", "peak memory, GiB",
 )  # fmt: skip
 
 
 def lines_table(runs: Sequence[Run]) -> list[Part]:
-    """Lines of each model at the probe that moves most, the strongest of any first, each model's in
-    the unit of its quantity.
-    """
+    """Return a table of the lines of each model at the probe that moves most, strongest first."""
     probe = strongest_probe(runs)
-    known = [name for name in runs[0].listed if all(name in run.listed for run in runs)]
-    if not known and not any(run.unnamed for run in runs):
-        return ["No line of the load is resolved: see above, or the pressure is constant."]
-    share = {name: max(_share(run, name, probe) for run in runs) for name in known}
-    names = sorted(share, key=lambda name: -share[name])[:TABLED]
+    common = [name for name in runs[0].listed if all(name in run.listed for run in runs)]
+    if not common and not any(run.unnamed for run in runs):
+        return ["The load has no resolved line: the Tacton is too short or the pressure constant."]
+    share = {name: max(_share(run, name, probe) for run in runs) for name in common}
+    names = sorted(share, key=lambda name: -share[name])[:MOST_LINES]
     sensation = [sensation_levels(run, probe) for run in runs]
     rows = [
         [name, f"{runs[0].listed[name]:.2f}"]
@@ -57,7 +55,7 @@ def lines_table(runs: Sequence[Run]) -> list[Part]:
     ]  # fmt: skip
     columns = ["line", "frequency, Hz"]
     for run in runs:
-        columns += [f"{answered(run)}, {run.response.record.shown} peak"]
+        columns += [f"{run_label(run)}, {run.response.record.shown} peak"]
         columns += ["dB re threshold"] if run.is_skin else []
     x, y = 1e3 * runs[0].response.probes[probe]
     title = f"{runs[0].tacton}: lines at ({x:g}, {y:g}) mm"
@@ -65,14 +63,14 @@ def lines_table(runs: Sequence[Run]) -> list[Part]:
 
 
 def _share(run: Run, name: str, probe: int) -> float:
-    """A line's amplitude over that of the strongest."""
+    """Return a line's amplitude over that of the strongest line."""
     strongest = max(float(x[probe]) for x in run.table.amplitudes.values())
     return float(run.table.amplitudes[name][probe]) / strongest if strongest else 0.0
 
 
 def _amplitude(run: Run, name: str, probe: int, levels: Mapping[str, float]) -> list[str]:
-    """A line's amplitude and, of skin, its level above threshold; 0 if it is round-off."""
-    if _share(run, name, probe) < NEGLIGIBLE_LINE:
+    """Return a line's amplitude (0 if it is round-off) and, for skin, its level over threshold."""
+    if _share(run, name, probe) < NEGLIGIBLE_LINE_RATIO:
         return ["0", ""] if run.is_skin else ["0"]
     size = significant(run.response.record.per_unit * float(run.table.amplitudes[name][probe]))
     if not run.is_skin:
@@ -82,30 +80,31 @@ def _amplitude(run: Run, name: str, probe: int, levels: Mapping[str, float]) -> 
 
 
 def _unnamed_rows(runs: Sequence[Run], probe: int) -> Iterator[list[object]]:
-    """A row for each peak that is no single line of the load, those of all runs together."""
-    found = {(peak.kind, round(peak.frequency, 1)) for run in runs for peak in run.unnamed[:TABLED]}
-    for kind, frequency in sorted(found):
+    """Yield a row for each peak that is not a line of the load."""
+    by_run = [
+        {(peak.kind, round(peak.frequency, 1)): peak.amplitudes[probe]
+         for peak in reversed(run.unnamed[:MOST_LINES])}
+        for run in runs
+    ]  # fmt: skip
+    for kind, frequency in sorted({key for peaks in by_run for key in peaks}):
         row: list[object] = [kind, f"{frequency:.1f}"]
-        for run in runs:
-            sizes: list[object] = [
-                run.response.record.per_unit * float(peak.amplitudes[probe])
-                for peak in run.unnamed[:TABLED]
-                if (peak.kind, round(peak.frequency, 1)) == (kind, frequency)
-            ]
-            row += [*(sizes[:1] or [""]), *([""] if run.is_skin else [])]
+        for run, peaks in zip(runs, by_run, strict=True):
+            size = peaks.get((kind, frequency))
+            row += ["" if size is None else run.response.record.per_unit * float(size)]
+            row += [""] * run.is_skin
         yield row
 
 
 def claims_parts(assessed_claims: Sequence[AssessedClaim]) -> list[Part]:
-    """Which of the paper's claims hold where: a grid of marks, and the numbers that decide."""
+    """Return a table of which claims hold where, and the deciding numbers."""
     if not assessed_claims:
         return []
     columns = list(dict.fromkeys(v.column for v in assessed_claims))
-    found = {(v.claim, v.column): v for v in assessed_claims}
+    by_cell = {(v.claim, v.column): v for v in assessed_claims}
     claims = [claim for claim in TEXTS if any(claim == v.claim for v in assessed_claims)]
     marks, numbers = [], []
     for claim in claims:
-        own = [found.get((claim, column)) for column in columns]
+        own = [by_cell.get((claim, column)) for column in columns]
         marks.append([f"{claim}: {TEXTS[claim]}", *map(_mark, own)])
         numbers.append([claim, *(v.sentence if v else None for v in own)])
     names = list(map(label, columns))
@@ -113,7 +112,7 @@ def claims_parts(assessed_claims: Sequence[AssessedClaim]) -> list[Part]:
     return [
         Section("Claims of the paper", [
             Table(["claim (Lim, Seifi and Park, CHI EA '24)", *names], marks),
-            Details("Numbers that decide", decide),
+            Details("Deciding numbers", decide),
         ])
     ]  # fmt: skip
 
@@ -126,7 +125,7 @@ def _mark(assessed: AssessedClaim | None) -> Markup | None:
 
 
 def _disagreements(assessed_claims: Sequence[AssessedClaim]) -> list[Part]:
-    """Claims measured on paper that a body contradicts, and whether propagation is the cause."""
+    """Return sentences on claims measured on paper that a body contradicts."""
     of_kernel = {v.claim: v for v in assessed_claims if v.model == SAME_LOAD.name}
     texts: list[Part] = []
     for assessed in assessed_claims:
@@ -137,20 +136,21 @@ def _disagreements(assessed_claims: Sequence[AssessedClaim]) -> list[Part]:
             f"paper: {assessed.sentence}."
         )
         kernel = of_kernel.get(assessed.claim)
-        if kernel is not None and assessed.claim != "M2":  # which is about places, in Hz
-            same = "holds" if kernel.holds else "fails, too"
+        if kernel is not None and assessed.claim != "M2":  # M2 is about frequencies
+            same = "holds" if kernel.holds else "also fails"
             text += (
-                f" In the point kernel under the same load it {same}: "
-                f"{decibel(kernel.value)} dB there, {decibel(assessed.value)} dB here. The "
-                "difference is due to propagation."
+                f" In the point kernel under the same load it {same}, at {decibel(kernel.value)} "
+                f"dB instead of {decibel(assessed.value)} dB. The motion of the body causes the "
+                "difference."
             )
         texts.append(text)
     return texts
 
 
 def agreement_table(runs: Mapping[str, Sequence[Run]]) -> Table:
-    """Each Tacton's responses, in pairs between which one thing changes: drive law and focus
-    from the published kernel to that under the same load, propagation from this to a body.
+    """Return a table that compares pairs of responses between which one thing changes.
+
+    Drive law and focus change between the two kernels, propagation between kernel and body.
     """
     rows = [
         [name, changed, f"{label(a.column)} to {label(b.column)}", *_agreement(a, b)]
@@ -161,45 +161,45 @@ def agreement_table(runs: Mapping[str, Sequence[Run]]) -> Table:
 
 
 def _pairs(group: Iterable[Run]) -> list[tuple[str, Run, Run]]:
-    """Name of the change, and the two runs between which it is made."""
-    found = {run.column: run for run in group}
-    kernel, published = found.get(SAME_LOAD.name), found.get(PUBLISHED.name)
+    """Return the names of changes, and the two runs between which each is made."""
+    runs = {run.column: run for run in group}
+    kernel, published = runs.get(SAME_LOAD.name), runs.get(PUBLISHED.name)
     if kernel is None:
         return []
     first = [("drive law and focus", published, kernel)] if published else []
-    return first + [("propagation", kernel, run) for run in found.values() if run.is_motion]
+    return first + [("propagation", kernel, run) for run in runs.values() if run.is_motion]
 
 
 def _agreement(a: Run, b: Run) -> list[str]:
     strongest = strongest_component(b)
-    found = compare(a.response, b.response, (strongest.frequency,) if strongest else ())
-    delays = found.phase_delay[0] if strongest else np.array([np.nan])
+    agreement = compare(a.response, b.response, (strongest.frequency,) if strongest else ())
+    delays = agreement.phase_delay[0] if strongest else np.array([np.nan])
     level = moving_rms(a.response)
-    moves = level > SILENT * level.max()  # a misfit relative to nothing is none
-    spreads = (found.spread_reference, found.spread_candidate)
+    moves = level > STILL_RATIO * level.max()
+    spreads = (agreement.spread_reference, agreement.spread_candidate)
     return [
-        _between(found.relative_l2[moves]),
-        _between(found.shape_misfit[moves]),
-        _between(1e3 * found.delay[moves]),
+        _between(agreement.relative_l2[moves]),
+        _between(agreement.shape_misfit[moves]),
+        _between(1e3 * agreement.delay[moves]),
         _between(1e3 * delays[np.isfinite(delays)]),
         " to ".join(f"{1e3 * each[-6]:g} / {1e3 * each[-20]:g}" for each in spreads),
     ]
 
 
 def _between(values: Floats) -> str:
-    """The least and the largest."""
+    """Return the range of values."""
     if not len(values):
         return "-"
     values = np.where(np.abs(values) < ROUND_OFF, 0.0, values) + 0.0
     low, high = float(values.min()), float(values.max())
-    alike = significant(low, 2) == significant(high, 2)
-    return significant(low, 2) if alike else interval(low, high)
+    is_one = significant(low, 2) == significant(high, 2)
+    return significant(low, 2) if is_one else interval(low, high)
 
 
 def effort_table(
     efforts: Mapping[str, Effort], tactons: int, total: float | None = None
 ) -> list[Part]:
-    """Seconds by phase, size and memory of each body, and of the whole."""
+    """Return a table of time, size and memory of each body, and the totals."""
     rows = [
         [label(name), effort.dofs, effort.reduced_dofs or None, effort.estimate or None,
          effort.energy_imbalance or None,
@@ -212,6 +212,6 @@ def effort_table(
     named = ", ".join(f"{name} {version}" for name, version in versions.items())
     peak = max((effort.peak_memory for effort in efforts.values()), default=0) / 2**30
     spent = sum(s for e in efforts.values() for s in e.seconds.values()) if total is None else total
-    took = f"{plural(tactons, 'Tacton')} took {significant(spent, 2)} s in all"
-    took += f", at most {peak:.2f} GiB in a process" * bool(peak)
-    return [Table(EFFORT, rows), f"{took}. {named}"]
+    text = f"{plural(tactons, 'Tacton')}: {significant(spent, 2)} s"
+    text += f", at most {peak:.2f} GiB in one process" * bool(peak)
+    return [Table(EFFORT, rows), f"{text}. {named}"]

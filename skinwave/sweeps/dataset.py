@@ -180,7 +180,7 @@ def refuse_changed(out: Path, names: Iterable[str]) -> None:
     known = outputs.listed_files(out) or {}
     for name in names:
         path = out / name
-        if os.path.lexists(path) and not outputs.is_as_listed(path, known.get(name)):
+        if os.path.lexists(path) and not outputs.is_unchanged(path, known.get(name)):
             raise ValueError(
                 f"{path} was added or changed since skinwave wrote it and is not replaced; move it "
                 "elsewhere"

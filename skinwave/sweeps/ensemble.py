@@ -30,7 +30,7 @@ from skinwave.models.parametric import lines_of
 from skinwave.models.reduced import components, prepare, reduction_tolerance
 from skinwave.planning.simulate import compute
 from skinwave.report.styles import SHOWN
-from skinwave.results.surface import REACH, SILENT, grid, has_wavenumber_integral
+from skinwave.results.surface import LOWEST_LEVEL, REACH, grid, has_wavenumber_integral
 from skinwave.scene.distributions import Spread
 from skinwave.scene.scene import Scene
 from skinwave.scene.spreads import PRESSURE, spreads_of
@@ -86,7 +86,7 @@ class Solution:
     waveform : (t, p) float, the last `SHOWN` of a Tacton
     lines : (f, p) float, amplitudes of the named lines
     rms : (p,) float
-    level : (p,) float, dB, highest sensation level of the lines as if on skin; at least `SILENT`
+    level : (p,) float, dB, highest sensation level as if on skin, `LOWEST_LEVEL` or more
     map_rms, map_level : (ny, nx) float, RMS and level on a map; empty without a map
     """
 
@@ -383,4 +383,4 @@ def _amplitudes_at(frequencies: Floats, f: Floats, amplitudes: Floats) -> Floats
 def _highest_level(frequencies: Floats, amplitudes: Floats) -> Floats:
     """Return the highest sensation level (p,) in dB of lines (f, p)."""
     levels = sensation_level(amplitudes, np.asarray(frequencies)[:, None])
-    return np.asarray(np.maximum(levels.max(axis=0, initial=-np.inf), SILENT))
+    return np.asarray(np.maximum(levels.max(axis=0, initial=-np.inf), LOWEST_LEVEL))

@@ -64,7 +64,7 @@ class Sweep:
     progress : called with the name of the phase and the fraction done
     scheduler : "processes", "threads", or the address of a Dask scheduler
     workers : number of runs at a time on this machine; all cores by default
-    command : entry in the record.json of a new folder, as of `record.of_command`
+    command : entry in the record.json of a new folder, as of `record.command_entry`
     """
 
     folder: Path

@@ -11,8 +11,9 @@ from matplotlib.figure import Figure
 
 from simple_model import threshold
 from simple_model.load.line_names import line_frequency
-from skinwave.report.figures import HIGHEST, written
+from skinwave.report.figures import line_symbol
 from skinwave.report.palette import SEQUENTIAL, SERIES
+from skinwave.report.spectra import HIGHEST_SHOWN
 from skinwave.report.styles import STYLES
 from skinwave.results.views import path_points
 from skinwave.sweeps.ensemble import STEP, Ensemble, map_axes, shown_times
@@ -71,17 +72,18 @@ def _lines(ax: Axes, found: Ensemble, bands: Floats, *, named: bool) -> None:
     ax.set_yscale("log")
     top = float(median.max(initial=1e-9))
     ax.set_ylim(1e-3 * top, 30 * top)
-    ax.set_xlim(0, HIGHEST)
+    ax.set_xlim(0, HIGHEST_SHOWN)
     if found.is_skin:
         grid = np.geomspace(max(10.0, np.nanmin(f) / 1.2), min(1000.0, np.nanmax(f) * 1.2), 200)
         ax.plot(grid, 1e6 * threshold(grid), color="0.45", lw=1.2, zorder=0,
                 label="detection threshold")  # fmt: skip
     ax.grid(alpha=0.25)
     if named:
-        order = [k for k in np.argsort(-median) if f[k] < HIGHEST]
+        order = [k for k in np.argsort(-median) if f[k] < HIGHEST_SHOWN]
         for k in order[:NAMED_LINES]:
-            ax.annotate(written(names[k]), (f[k], high[k]), xytext=(0, 3), ha="center", rotation=90,
-                        textcoords="offset points", va="bottom", fontsize="x-small")  # fmt: skip
+            ax.annotate(line_symbol(names[k]), (f[k], high[k]), xytext=(0, 3), ha="center",
+                        rotation=90, textcoords="offset points", va="bottom",
+                        fontsize="x-small")  # fmt: skip
 
 
 def maps_figure(found: Ensemble) -> Figure:

@@ -12,6 +12,7 @@ from PIL import Image
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.load.spectrum import synthesise
 from skinwave.report.turntable import focus_places, motion_lines, turntable
+from skinwave.results.playback import played_part
 from skinwave.results.views import kernel_view
 from skinwave.scene.scene import BODIES, Scene
 
@@ -128,7 +129,7 @@ def test_foci_are_where_the_path_is():
 @needs_browser
 def test_the_view_of_a_report_opens_from_a_file_without_requests(browser, tmp_path):
     scene = Scene(name="s", pressure=LOAD, body=BODIES["skin-slab"], probes=((0.0, 0.0),))
-    view = kernel_view(scene, np.array([0.03, 0.03]))
+    view = kernel_view(scene, np.array([0.03, 0.03]), played_part(LOAD, 420.0))
     (tmp_path / "view.html").write_text(turntable(view, 1), encoding="utf-8")
     page, asked, said = browser.new_page(), [], []
     page.on("request", lambda request: asked.append(request.url))

@@ -12,8 +12,9 @@ from simple_model import MovingPressure, Tacton, Trajectory, phasors
 from skinwave import Body, Scene
 from skinwave.bodies import BODIES
 from skinwave.bodies.build import build
+from skinwave.models.options import SolveOptions
 from skinwave.planning.simulate import compute
-from skinwave.results.motion import waves
+from skinwave.results.motion import whole_motion
 from skinwave.results.surface import element_map
 from skinwave.results.views import body_view
 
@@ -80,7 +81,7 @@ def test_maps_and_views_read_what_probes_read(roof):
     response = compute(roof, "fem", h=SIZE)
     expected = np.abs(phasors(response, (140.0,)))[0] / np.sqrt(2)
     x = y = 1e-3 * np.arange(-6, 7)
-    moved = waves(roof, 2e-3, h=SIZE)
+    moved = whole_motion(roof, SolveOptions(tolerance=2e-3, h=SIZE))
     found = element_map(roof, moved, x, y)
     at = np.rint(1e3 * roof.probe_points).astype(int) + 6
     np.testing.assert_allclose(found.rms[at[:, 1], at[:, 0]], expected, rtol=5e-3)

@@ -23,19 +23,21 @@ from PIL import Image
 
 from simple_model import MovingPressure, Tacton, Trajectory, pattern_period, published_load
 from skinwave.commands.cli import main
+from skinwave.models.options import SolveOptions
 from skinwave.report import films, maps, render
-from skinwave.report.figures import tacton_figure
-from skinwave.report.levels import levels_figure
 from skinwave.report.renderer import Renderer, renderer
+from skinwave.report.spectra import levels_figure, tacton_figure
 from skinwave.report.styles import style
-from skinwave.results import exports, motion, speeds, views
+from skinwave.results import exports, motion, playback, views
 from skinwave.scene.file import dumps
 from skinwave.scene.scene import Body, Scene
 from skinwave.studies import album, pages, report
 
 ONLY = "point-kernel-published,point-kernel,skin-slab"
 ARTEFACTS = Path(__file__).parents[2] / ".ci" / "artefacts"
-draws = pytest.mark.skipif("not renderer().found", reason="nothing draws in three dimensions here")
+draws = pytest.mark.skipif(
+    "not renderer().is_available", reason="nothing draws in three dimensions here"
+)
 
 
 def circling(frequency=200.0, **tacton):
@@ -52,15 +54,15 @@ def scene():
 
 @pytest.fixture(scope="module")
 def moved(scene):
-    return motion.waves(scene, h=0.012)
+    return motion.whole_motion(scene, SolveOptions(h=0.012, tolerance=0.01))
 
 
 @pytest.fixture(scope="module")
 def folder(scene, tmp_path_factory):
     """Folder that the report of a scene is built from, on coarse meshes."""
     out = tmp_path_factory.mktemp("album")
-    asked = {"h": 0.015, "frames": 12, "beside": ["paper-sheet-loose"]}
-    album.make(out, scene, lambda phase, done: None, **asked)
+    asked = {"frames": 12, "beside": ["paper-sheet-loose"]}
+    album.write_album(out, scene, SolveOptions(h=0.015), **asked)
     return out
 
 
@@ -92,23 +94,23 @@ def test_all_but_the_published_kernel_receive_the_same_load(scene, folder, seen)
 
 def test_a_body_of_ones_own_is_shown_alone_and_changes_no_load(scene):
     own = replace(scene.pressure, drive="linear", profile="array")
-    shown = album.shown_scenes(replace(scene, pressure=own, body=Body(depth=0.02)))
+    shown = album.scene_columns(replace(scene, pressure=own, body=Body(depth=0.02)))
     assert list(shown) == ["point-kernel-published", "point-kernel", "slab"]
     assert shown["point-kernel"].pressure == shown["slab"].pressure == own
-    bare = album.shown_scenes(replace(scene, pressure=own, body=Body(kind="none")))
+    bare = album.scene_columns(replace(scene, pressure=own, body=Body(kind="none")))
     assert list(bare)[2:] == ["paper-sheet", "skin-slab"]
     assert {its.pressure for its in list(bare.values())[1:]} == {own}
-    asked = album.shown_scenes(scene, ["paper-sheet-loose", "skin-slab"])
+    asked = album.scene_columns(scene, ["paper-sheet-loose", "skin-slab"])
     assert list(asked)[2:] == ["skin-slab", "paper-sheet-loose"]
     with pytest.raises(ValueError, match="body 'paper' is unknown"):
-        album.shown_scenes(scene, ["paper"])
+        album.scene_columns(scene, ["paper"])
 
 
 def test_a_point_moves_in_a_view_as_its_probe_does(scene, moved):
     """Late enough for the start to be forgotten, and about the mean."""
     view = views.body_view(scene, "skin-slab", moved, (0.01, 10))
     response = motion.probe_response(scene, moved)
-    at_probe = maps.carrier(view, scene.probe_points[2:3])
+    at_probe = maps.interpolation(view, scene.probe_points[2:3])
     drawn = np.array([at_probe(np.asarray(frame, float))[0] for frame in view.pushed])
     sampled = response.displacement[-100:, 2].reshape(10, 10)[:, 0]
     assert view.period == pytest.approx(0.01)
@@ -119,7 +121,7 @@ def test_a_point_moves_in_a_view_as_its_probe_does(scene, moved):
 def test_the_kernels_brightest_place_lies_on_the_path(seen):
     view = seen["point-kernel"]
     radius = view.scene.tacton.trajectory.size / 2
-    step = np.ptp(view.places[:, 0]) / (views.GRID - 1)
+    step = np.ptp(view.places[:, 0]) / (views.KERNEL_GRID - 1)
     brightest = view.places[view.pushed.std(axis=0).argmax()]
     assert abs(np.hypot(*brightest) - radius) < 1.5 * step
     for t, frame in zip(view.times, np.abs(view.pushed), strict=True):
@@ -133,21 +135,23 @@ def test_what_is_played_returns_after_the_slowest_beat():
     beating = circling(190.986, am_frequency=140)
     span = pattern_period(beating.tacton)
     assert span >= 1 / 50.986
-    assert speeds.seam(beating.tacton, 1 / 140) == pytest.approx(190.986 / 140 - 1)
+    assert playback.phase_jump(beating.tacton, 1 / 140) == pytest.approx(190.986 / 140 - 1)
     whole = circling(200.0, am_frequency=140)
-    assert speeds.shown_part(whole, 340.0) == pytest.approx((0.05, 8 * 0.05 * 340))
-    assert speeds.shown_part(circling(200.0), 200.0) == pytest.approx((0.005, speeds.FEWEST))
+    assert playback.played_part(whole, 340.0) == pytest.approx((0.05, 8 * 0.05 * 340))
+    assert playback.played_part(circling(200.0), 200.0) == pytest.approx(
+        (0.005, playback.FEWEST_FRAMES)
+    )
 
 
 def test_a_pattern_too_long_to_play_is_played_in_part_and_says_so():
     long = replace(circling(200.0, am_frequency=100.5).tacton, duration=2.0)
     load = MovingPressure(tacton=long)
-    assert speeds.period(load) == pytest.approx(2.0)
-    span, frames = speeds.shown_part(load, 300.0)
-    assert frames == speeds.MOST
-    assert frames / (span * 300.0) >= speeds.EACH
-    said = films.seam(SimpleNamespace(scene=Scene(pressure=load, body=Body()), period=span))
-    assert "of a pattern of 2,000 ms" in said
+    assert playback.whole_period(load) == pytest.approx(2.0)
+    span, frames = playback.played_part(load, 300.0)
+    assert frames == playback.MOST_FRAMES
+    assert frames / (span * 300.0) >= playback.FRAMES_PER_PERIOD
+    said = films.played_text(SimpleNamespace(scene=Scene(pressure=load, body=Body()), period=span))
+    assert "2,000 ms long" in said
     assert "phases jump by up to" in said
 
 
@@ -155,7 +159,9 @@ def test_frames_follow_the_fastest_line_that_moves_the_body(scene, moved):
     fastest = views.fastest_line(moved)
     view = views.body_view(scene, "skin-slab", moved)
     assert view.period == pytest.approx(0.01)
-    assert len(view.times) == max(speeds.FEWEST, round(speeds.EACH * fastest * view.period))
+    assert len(view.times) == max(
+        playback.FEWEST_FRAMES, round(playback.FRAMES_PER_PERIOD * fastest * view.period)
+    )
     amplitude = np.abs(np.fft.rfft(view.pushed, axis=0)).max(axis=1)
     strong = np.flatnonzero(amplitude > 0.1 * amplitude.max()) / view.period
     assert strong.max() <= 1.5 * fastest <= 1.5 * 800
@@ -164,16 +170,16 @@ def test_frames_follow_the_fastest_line_that_moves_the_body(scene, moved):
 @draws
 def test_motion_is_drawn_as_many_times_as_the_caption_says(seen):
     view = seen["paper-sheet-loose"]
-    panel = render.prepared(view)
-    render.place([panel], 5, 1.0)
+    panel = render.make_panel(view)
+    render.set_frame([panel], 5, 1.0)
     drawn = np.asarray(panel.skin.points) - 1e3 * view.points[panel.nodes]
     moved = 1e3 * view.motion[5, panel.nodes]
     factor = float((drawn * moved).sum() / (moved**2).sum())
-    said = re.search(r"drawn ([\d,]+) times", render.shown_scale(view))
+    said = re.search(r"exaggerated ([\d,]+) times", render.scale_text(view))
     assert said
     assert factor == pytest.approx(float(said[1].replace(",", "")), rel=1e-3)
-    assert 0.015 < factor * view.peak / 0.1 <= render.SHOWN
-    assert render.shown_scale(seen["point-kernel"]) == "pressure; nothing moves"
+    assert 0.015 < factor * view.peak / 0.1 <= render.LARGEST_DRAWN
+    assert render.scale_text(seen["point-kernel"]) == "pressure, no motion"
 
 
 @draws
@@ -203,7 +209,7 @@ def test_a_film_may_be_an_mp4(seen, tmp_path):
     films.film(path, [seen["skin-slab"]], style("report"), panel=(160, 144))
     with imageio.get_reader(path) as film:
         assert sum(1 for _ in film) == 12
-        assert film.get_meta_data()["fps"] == pytest.approx(12 / films.LASTS)
+        assert film.get_meta_data()["fps"] == pytest.approx(12 / films.SHORTEST)
     gc.collect()
 
 
@@ -297,19 +303,19 @@ def test_the_page_opens_in_a_browser_without_a_network(page, browser):
     assert all("favicon" in url for url in asked), asked
 
 
-NO_GL = Renderer(found=False, said="missing; apt install libegl1 libgl1-mesa-dri")
+NO_GL = Renderer(is_available=False, detail="missing; apt install libegl1 libgl1-mesa-dri")
 
 
 def test_a_report_is_rebuilt_without_a_model_and_without_gl(folder, tmp_path, monkeypatch):
     def run(*arguments, **options):
         raise AssertionError("a model was run")
 
-    for name in ("waves", "plan", "compute", "solve", "kernel_view"):
+    for name in ("whole_motion", "plan", "compute", "solve", "kernel_view"):
         monkeypatch.setattr(album, name, run)
     monkeypatch.setattr(report, "renderer", lambda: NO_GL)
     blank = BytesIO()  # what is on the figures is looked at in those of `page`
     Image.new("RGB", (8, 8)).save(blank, "PNG")
-    monkeypatch.setattr(pages, "drawn", lambda *figure: blank.getvalue())
+    monkeypatch.setattr(pages, "figure_file", lambda *figure: blank.getvalue())
     assert main(["report", str(folder), "--out", str(tmp_path / "flat"), "--quiet"]) == 0
     text = (tmp_path / "flat/index.html").read_text()
     assert "apt install libegl1 libgl1-mesa-dri" in text
@@ -318,10 +324,10 @@ def test_a_report_is_rebuilt_without_a_model_and_without_gl(folder, tmp_path, mo
 
 
 def test_a_window_that_ends_its_process_is_found_out(monkeypatch):
-    monkeypatch.setattr("skinwave.report.renderer.draw_a_ball", os.abort)
+    monkeypatch.setattr("skinwave.report.renderer.draw_sphere", os.abort)
     found = renderer.__wrapped__()
-    assert not found.found
-    assert "libegl1 libgl1-mesa-dri" in found.said
+    assert not found.is_available
+    assert "libegl1 libgl1-mesa-dri" in found.detail
 
 
 def test_a_run_of_one_model_has_a_report_too(tmp_path, monkeypatch, capsys):
@@ -343,4 +349,4 @@ def test_the_installation_names_what_there_is_and_what_is_missing(capsys):
     assert main(["verify", "--installation", "--json"]) == 0
     found = {row["what"]: row for row in json.loads(capsys.readouterr().out)["findings"]}
     assert {"python", "pyvista", "solver", "renderer", "threads"} <= set(found)
-    assert bool(found["renderer"]["cure"]) != renderer().found
+    assert bool(found["renderer"]["cure"]) != renderer().is_available

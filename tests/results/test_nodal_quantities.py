@@ -10,6 +10,7 @@ from fem.load_and_probe import node_operator
 from simple_model import MovingPressure, Response, Tacton, Trajectory
 from simple_model.layers.tensors import hooke
 from simple_model.load.spectrum import pressure_lines, synthesise
+from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import oscillating, read_at
 from skinwave.report import render
 from skinwave.report.renderer import renderer  # noqa: F401, in the condition below
@@ -21,19 +22,21 @@ from skinwave.scene.scene import Body, Layer, Scene
 from skinwave.studies import album, report
 from skinwave.studies.pages import Gallery
 
-draws = pytest.mark.skipif("not renderer().found", reason="nothing draws in three dimensions here")
+draws = pytest.mark.skipif(
+    "not renderer().is_available", reason="nothing draws in three dimensions here"
+)
 PATH = Trajectory(shape="circle", size=0.008, speed=5.0)
 SCENE = Scene(
     pressure=MovingPressure(tacton=Tacton(trajectory=PATH, duration=0.05, am_frequency=100)),
     body=Body(width=0.036, height=0.036, depth=0.009, sides="clamped"),
     probes=((0.0, 0.0), (0.006, 0.003), (-0.009, 0.0)),
 )
-COARSE = 3e-3
+COARSE = SolveOptions(h=3e-3, tolerance=0.01)
 
 
 @pytest.fixture(scope="module")
 def moved():
-    return motion.waves(SCENE, h=COARSE)
+    return motion.whole_motion(SCENE, COARSE)
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +79,7 @@ def test_a_view_comes_back_from_its_file(view, tmp_path):
 def test_between_two_materials_strain_jumps_and_traction_does_not():
     layers = (Layer(thickness=3e-3, material="palm-stiff"),)
     scene = replace(SCENE, body=replace(SCENE.body, layers=layers))
-    seen = views.body_view(scene, "slab", motion.waves(scene, h=COARSE), (0.01, 2))
+    seen = views.body_view(scene, "slab", motion.whole_motion(scene, COARSE), (0.01, 2))
     kept = views.with_tensors(seen).tensors
     assert len(kept.nodes) > len(seen.points)
     twice = np.flatnonzero(np.bincount(kept.nodes) == 2)
@@ -112,7 +115,7 @@ def test_the_colour_at_a_node_is_what_a_probe_reads_there(quantity, moved):
 def test_a_picture_is_of_the_quantity(view):
     """A signed one, and the same motion: another picture."""
     pictures = [
-        render.picture([views.shaded(view, replace(SCENE, quantity=name))], style("report"))
+        render.picture([views.with_shade(view, replace(SCENE, quantity=name))], style("report"))
         for name in ("strain_zz", "displacement_x")
     ]
     assert np.abs(pictures[0].astype(float) - pictures[1]).mean() > 1
@@ -122,7 +125,7 @@ def test_a_report_keeps_and_draws_a_map_of_the_quantity_at_its_depth(view, moved
     """Where a probe is, the map is the RMS of the lines that the probe reads."""
     quantity = "strain_zz"
     scene = replace(SCENE, quantity=quantity, depth=0.7e-3)
-    album.keep_view(replace(view, scene=scene), tmp_path)
+    album.write_view(replace(view, scene=scene), tmp_path)
     found = surface.load(tmp_path / "map.npz", scene)
     assert found.depth == 0.7e-3
     seen = motion.probe_lines(scene, moved)
@@ -137,14 +140,14 @@ def test_a_report_keeps_and_draws_a_map_of_the_quantity_at_its_depth(view, moved
         ),
     )  # fmt: skip
     kept = album.Album(title="", scene=scene, runs=[run], views={}, maps={"slab": found})
-    (section,) = report.mapped(kept, Gallery())
+    (section,) = report.map_parts(kept, Gallery())
     (picture,) = section.parts
     assert f"The RMS of the {scene.reading.words} is largest at" in picture.caption
     assert len(picture.files["png"]) > 10_000
 
 
 def test_a_report_of_motion_keeps_the_map_of_its_surface(view, moved, tmp_path):
-    album.keep_view(view, tmp_path)
+    album.write_view(view, tmp_path)
     found = surface.load(tmp_path / "map.npz", SCENE)
     at = np.unravel_index(np.nanargmax(found.rms), found.rms.shape)
     _, inwards = node_operator(moved.mesh, patch=SCENE.body.of_kind.normal_patch)
@@ -152,5 +155,5 @@ def test_a_report_of_motion_keeps_the_map_of_its_surface(view, moved, tmp_path):
     rms = np.sqrt((lines**2).sum(axis=0) / 2).max()
     assert found.rms[at] == pytest.approx(rms, rel=0.05)  # at places, and at nodes
     (tmp_path / "map.npz").write_bytes(b"none")
-    with pytest.raises(ValueError, match="is no map"):
+    with pytest.raises(ValueError, match="not a map"):
         surface.load(tmp_path / "map.npz", SCENE)

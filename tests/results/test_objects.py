@@ -24,7 +24,7 @@ from skinwave.planning.simulate import compute
 from skinwave.report.fields import Field
 from skinwave.report.styles import style
 from skinwave.results import citations
-from skinwave.studies.album import Album, only
+from skinwave.studies.album import Album, select_columns
 from skinwave.sweeps.in_python import SweepTable
 
 # What is tested here is not how accurate a model is.
@@ -311,12 +311,12 @@ def test_figures_of_a_paper_have_its_width_letters_and_fonts(tmp_path):
 def test_chosen_columns_of_a_folder_alone():
     runs = [SimpleNamespace(column=name) for name in ("point-kernel", "skin-slab", "paper-sheet")]
     found = Album(title="", scene=None, runs=runs, views={"skin-slab": 1, "paper-sheet": 2})
-    assert only(found, []).runs == runs
-    chosen = only(found, ["point-kernel", "skin-slab"])
+    assert select_columns(found, []).runs == runs
+    chosen = select_columns(found, ["point-kernel", "skin-slab"])
     assert [run.column for run in chosen.runs] == ["point-kernel", "skin-slab"]
     assert chosen.views == {"skin-slab": 1}
     with pytest.raises(ValueError, match="skin-slab"):
-        only(found, ["skin_slab"])
+        select_columns(found, ["skin_slab"])
 
 
 def test_types_and_names_of_the_package_are_those_that_it_has():

@@ -10,6 +10,7 @@ from simple_model import MovingPressure, Tacton, Trajectory, phasors
 from simple_model.load.spectrum import load_lines
 from skinwave import Body, Scene
 from skinwave.commands.cli import main
+from skinwave.models.options import SolveOptions
 from skinwave.planning.simulate import compute
 from skinwave.results.surface import body_map, grid, quantity_map
 from skinwave.scene.file import dumps
@@ -68,7 +69,7 @@ def test_elements_read_what_probes_read():
         body=replace(LAYER.body, width=0.04, height=0.04, sides="clamped"),
         pressure=replace(LAYER.pressure, tacton=still),
     )  # fmt: skip
-    found = quantity_map(scene, reach=0.006, step=0.002, h=8e-3)
+    found = quantity_map(scene, SolveOptions(h=8e-3), reach=0.006, step=0.002)
     probes = replace(scene, probes=((0.0, 0.0), (0.006, 0.002), (-0.004, 0.006)))
     response = compute(probes, "fem", h=8e-3)
     frequencies = np.unique(np.round(load_lines(scene.pressure, 1e-4).frequencies, 6))

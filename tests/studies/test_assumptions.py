@@ -27,11 +27,11 @@ from skinwave.studies.assumptions import (
     as_relaxing,
     as_viscous,
     can_be_alone,
+    device_path,
     droppable,
-    held,
-    relaxed,
     side_step,
     strongest_line,
+    without,
 )
 from skinwave.studies.relax import Hierarchy, HierarchyStep, hierarchy_of, line_changes
 
@@ -55,7 +55,7 @@ def test_a_slab_and_a_sheet_have_their_own_ladders():
         "main lobe only",
         "continuous path", "small deflection",
     )  # fmt: skip
-    with pytest.raises(ValueError, match="keeps every assumption"):
+    with pytest.raises(ValueError, match="assumption"):
         droppable(replace(SKIN, body=BODIES["none"]))
     # a body without room for a palm stays flat, and for layers that have no room of one material
     body = replace(SKIN.body, depth=0.004)
@@ -68,26 +68,26 @@ def test_a_slab_and_a_sheet_have_their_own_ladders():
 def test_each_step_of_load_and_propagation_changes_one_thing(own):
     names = droppable(own)
     k = names.index("no propagation")
-    before, kernel = relaxed(own, names[:k])
-    after, waves = relaxed(own, names[: k + 1])
+    before, kernel = without(own, names[:k])
+    after, waves = without(own, names[: k + 1])
     assert (kernel, waves) == ("point-kernel", "flat-body")
     assert before.pressure == after.pressure == own.pressure
     assert before == replace(after, body=BODIES["none"])
-    loads = [relaxed(own, names[:k])[0].pressure for k in range(3)]
+    loads = [without(own, names[:k])[0].pressure for k in range(3)]
     assert loads[1] == replace(loads[0], drive="pressure_squared")
     assert loads[2] == replace(loads[1], profile="gaussian")
     # With and without propagation the load is the same, whatever else is dropped.
     for name in names:
         kept = [n for n in names if n != name]
         still = [n for n in kept if n != "no propagation"]
-        assert relaxed(own, kept)[0].pressure == relaxed(own, still)[0].pressure
+        assert without(own, kept)[0].pressure == without(own, still)[0].pressure
 
 
 def test_an_endless_body_of_elements_has_sides_that_absorb():
     thin = replace(SKIN, body=replace(SKIN.body, depth=0.004, sides="clamped"))
     names = droppable(thin)
     body = {
-        name: relaxed(thin, [n for n in names if n != name])[0].body
+        name: without(thin, [n for n in names if n != name])[0].body
         for name in ("laterally-infinite", "flat")
     }
     assert body["laterally-infinite"].sides == "absorbing"
@@ -101,24 +101,24 @@ def test_an_endless_body_of_elements_has_sides_that_absorb():
 
 
 def test_nothing_dropped_is_the_published_model_and_all_dropped_the_richest():
-    scene, model = relaxed(SKIN, ())
+    scene, model = without(SKIN, ())
     assert (scene.body.kind, model) == ("none", "point-kernel-published")
     assert scene.pressure == published_load(SKIN.pressure)
-    scene, model = relaxed(SKIN, droppable(SKIN))
+    scene, model = without(SKIN, droppable(SKIN))
     assert model == "fem"
     assert scene.body.kind == "palm"
     assert (scene.pressure.drive, scene.pressure.profile) == ("pressure_squared", "array")
     assert scene.tacton.trajectory.hold
     assert len(scene.body.layers) == 1
-    sheet, model = relaxed(PAPER, droppable(PAPER))
+    sheet, model = without(PAPER, droppable(PAPER))
     assert model == "plate-modes-nonlinear"
     assert sheet.body == replace(PAPER.body, air=True)
 
 
 def test_a_device_holds_its_focus_at_points_equally_far_apart_for_equally_long():
-    most = held(PATH, DEVICE_RATES[1])
+    most = device_path(PATH, DEVICE_RATES[1])
     assert len(most.points) - 1 == round(DEVICE_RATES[1] / PATH.drawing_frequency)
-    path = held(PATH, points=5)
+    path = device_path(PATH, points=5)
     assert path.hold
     assert path.drawing_frequency == pytest.approx(PATH.drawing_frequency)
     corners = np.array(path.points)
@@ -127,17 +127,17 @@ def test_a_device_holds_its_focus_at_points_equally_far_apart_for_equally_long()
     np.testing.assert_allclose(np.diff(path.times), 1 / PATH.drawing_frequency / 5, rtol=1e-9)
     late = path.position(0.99 * path.times[1] * np.ones(1))
     np.testing.assert_allclose(late[0], corners[0], atol=1e-12)
-    scene, model = relaxed(SKIN, ("no propagation", "continuous path"), points=5)
+    scene, model = without(SKIN, ("no propagation", "continuous path"), points=5)
     assert (scene.tacton.trajectory, model) == (path, "fem")
 
 
 @pytest.mark.parametrize("device", [{"update_rate": 30e3}, {"update_rate": 20e3, "points": 106}])
 def test_a_device_that_cannot_be_is_refused_before_anything_is_computed(device):
     for call in (
-        lambda: held(PATH, **device),
+        lambda: device_path(PATH, **device),
         lambda: hierarchy_of(SKIN, lambda phase, done: pytest.fail("computed"), **device),
     ):
-        with pytest.raises(ValueError, match=r"take 20 or 40|must be 2 to 105"):
+        with pytest.raises(ValueError, match="must be"):
             call()
 
 
@@ -160,7 +160,7 @@ def test_little_loss_is_a_tenth_of_it_and_as_stiff(material):
     own = replace(SKIN, body=replace(SKIN.body, material=material))
     w = 2 * np.pi * strongest_line(own)
     little, all_of_it = (
-        relaxed(own, ("no propagation", *dropped))[0].body.solid.complex_modulus(w)
+        without(own, ("no propagation", *dropped))[0].body.solid.complex_modulus(w)
         for dropped in ((), ("little loss",))
     )
     assert little.real == pytest.approx(all_of_it.real, rel=1e-9)
@@ -180,8 +180,8 @@ def test_what_is_lost_by_hysteresis_stays_when_the_law_changes(law):
 
 
 def test_the_law_of_loss_is_one_rung():
-    before, _ = relaxed(SKIN, ("sinc^2 profile", "no propagation", "little loss"))
-    after, model = relaxed(
+    before, _ = without(SKIN, ("sinc^2 profile", "no propagation", "little loss"))
+    after, model = without(
         SKIN, ("sinc^2 profile", "no propagation", "little loss", "viscous loss")
     )
     assert model == "flat-body"
@@ -193,8 +193,8 @@ def test_the_law_of_loss_is_one_rung():
     own = replace(SKIN, body=replace(SKIN.body, material="palm-zener"))
     assert "viscous loss" in droppable(own)
     assert side_step(own) == ()
-    before, _ = relaxed(own, ("no propagation", "little loss"))
-    after, _ = relaxed(own, ("no propagation", "little loss", "viscous loss"))
+    before, _ = without(own, ("no propagation", "little loss"))
+    after, _ = without(own, ("no propagation", "little loss", "viscous loss"))
     assert before.body.solid.fast_modulus == 0 < before.body.solid.viscosity
     assert after.body.solid == own.body.solid
 
@@ -256,7 +256,7 @@ def test_a_rung_that_fails_leaves_the_others(monkeypatch):
         "skinwave.studies.relax.droppable", lambda scene: ("linear drive", "one material")
     )
     monkeypatch.setattr(
-        "skinwave.studies.relax.relaxed",
+        "skinwave.studies.relax.without",
         lambda scene, dropped, **device: (
             replace(scene, body=replace(scene.body, depth=0.001)), "flat-body",
         ) if not dropped else (scene, "no such model"),
@@ -274,7 +274,7 @@ def test_a_body_that_steps_share_is_reduced_once_and_counts_in_each(monkeypatch)
         "skinwave.studies.relax.droppable", lambda scene: ("linear drive", "sinc^2 profile")
     )
     monkeypatch.setattr(
-        "skinwave.studies.relax.relaxed",
+        "skinwave.studies.relax.without",
         lambda scene, dropped, **device: (replace(scene, body=small), "fem"),
     )
     monkeypatch.setattr("skinwave.studies.relax.sentences", lambda *scene, h: ())
@@ -304,7 +304,7 @@ def test_a_body_that_cannot_be_reduced_is_refused_on_a_coarse_mesh(monkeypatch):
         "skinwave.studies.relax.droppable", lambda scene: ("linear drive", "little loss", "flat")
     )
     monkeypatch.setattr(
-        "skinwave.studies.relax.relaxed",
+        "skinwave.studies.relax.without",
         lambda scene, dropped, **device: (
             scene, "fem" if set(dropped) == {"linear drive", "flat"} else "point-kernel",
         ),

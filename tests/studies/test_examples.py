@@ -1,6 +1,5 @@
 """Shipped examples through the commands that take a scene; they give the same numbers."""
 
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 from simple_model import Response
 from skinwave.commands.cli import main
 from skinwave.report.renderer import Renderer
-from skinwave.results.motion import waves
 
 EXAMPLES = {path.stem: path for path in (Path(__file__).parents[2] / "examples").glob("*.toml")}
 # Numbers of one mesh agree, coarse or not. A half-space has no mesh; a sheet has modes.
@@ -23,9 +21,9 @@ def result(tmp_path_factory, monkeypatch):
     """Folder of a command on an example; without three-dimensional pictures, and those of motion
     from a less accurate reduced-order model.
     """
-    none = Renderer(found=False, said="not asked")
+    none = Renderer(is_available=False, detail="not asked")
     monkeypatch.setattr("skinwave.studies.report.renderer", lambda: none)
-    monkeypatch.setattr("skinwave.studies.album.waves", partial(waves, tolerance=REDUCED))
+    monkeypatch.setattr("skinwave.studies.album.REDUCTION_TOLERANCE", REDUCED)
 
     def called(command, name, *options):
         out = tmp_path_factory.mktemp(command) / "out"

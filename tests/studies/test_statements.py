@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from simple_model import MovingPressure, Response, Rhythm, Tacton, Trajectory
-from skinwave.report.description import asked_rows, modelled, unresolved
-from skinwave.report.levels import sensation_levels
+from skinwave.report.description import model_paragraphs, scene_rows, unresolved_lines
+from skinwave.report.spectra import sensation_levels
 from skinwave.results.claims import evaluate
 from skinwave.results.files import line_rows
 from skinwave.results.run import Run
@@ -27,12 +27,12 @@ def run(body, drive="pressure_squared", **tacton):
     return Run(tacton="one", body=body.kind, scene=scene, response=response)
 
 
-ABOVE = "; on it, from the surface down: 1 mm of dermis"
+ABOVE = "; layers from the surface down: 1 mm of dermis"
 
 
 def test_a_drive_law_that_was_not_used_is_not_named():
     squared, corrected = (
-        " ".join(modelled([run(BODIES["palm"], drive, am_frequency=140)]))
+        " ".join(model_paragraphs([run(BODIES["palm"], drive, am_frequency=140)]))
         for drive in ("pressure_squared", "force_corrected")
     )
     assert "pressure squared" in squared
@@ -68,13 +68,10 @@ def test_lines_that_cannot_be_resolved_are_not_reported():
     assert short.frequencies == short.lines == sensation_levels(short, 0) == {}
     assert short.unresolved == ("f_AM", "2f_AM", "3f_AM", "4f_AM", "5f_AM")
     assert list(line_rows(short)) == []
-    assert (
-        "5 lines, f_AM, 2f_AM, 3f_AM, 4f_AM, ..., cannot be resolved in 0.5 s"
-        in unresolved([short])[0]
-    )
+    assert "5 lines: f_AM, 2f_AM, 3f_AM, 4f_AM, ..." in unresolved_lines([short])[0]
     assert evaluate([short]) == []
     assert long.unresolved == ()
-    assert unresolved([long]) == []
+    assert unresolved_lines([long]) == []
     assert long.lines["f_AM"][0] == pytest.approx(2e-6, rel=1e-3)
     assert long.lines["2f_AM"][0] == pytest.approx(1e-6, rel=1e-3)
     row = result_columns(short.scene, short.response)
@@ -108,14 +105,14 @@ SECOND = {"second_am_frequency": 200, "superposition": (0.25, 0.75)}
     [
         ({"am_frequency": 80, **SECOND}, "amplitude modulation",
          "f_AM = 80 Hz, f_AM2 = 200 Hz, weights 0.25 and 0.75"),
-        ({"trajectory": RECORDED}, "focus", "a path recorded for 0.25 s with levels of its own"),
+        ({"trajectory": RECORDED}, "focus", "a path recorded for 0.25 s with its own levels"),
         ({"amplitude": 0.5, "rhythm": Rhythm(pulses=((0.03, 0.02),), ramp=0.005)}, "amplitude",
          "50 % of full drive, 1 pulse in 50 ms with ramps of 5 ms"),
     ],
 )  # fmt: skip
 def test_a_page_says_all_that_was_commanded(tacton, row, said):
     one = run(BODIES["skin-slab"], **tacton)
-    assert dict(asked_rows(one.scene))[row] == said
+    assert dict(scene_rows(one.scene))[row] == said
 
 
 def test_a_page_says_how_a_body_lies_and_what_lies_above():
@@ -123,5 +120,5 @@ def test_a_page_says_how_a_body_lies_and_what_lies_above():
     body = Body(layers=LAYERS, placement=place)
     said = f"{ABOVE}; tilted by 10° about x and 0° about y; moved by (0, 5, 2) mm"
     one = run(body)
-    assert dict(asked_rows(one.scene))["body"].endswith(said)
-    assert said in modelled([one])[0]
+    assert dict(scene_rows(one.scene))["body"].endswith(said)
+    assert said in model_paragraphs([one])[0]

@@ -35,11 +35,11 @@ def test_a_study_ranks_candidates_by_measured_cost_and_error(tmp_path, monkeypat
     ]
     phases = []
     found = study(scene, lambda phase, fraction: phases.append(phase), chosen)
-    error = {m.candidate.name: m.error for m in found.measured}
+    error = {m.candidate.name: m.error for m in found.results}
     assert error["fem, h = 6.00 mm"] < error["fem, h = 12.00 mm"] < error["point-kernel"]
     assert error["fem-transient, h = 12.00 mm, dt = 2 ms"] > error["fem, h = 12.00 mm"]
     front = [(m.error, m.cold, m.warm) for m in found.front()]
-    for one in ((m.error, m.cold, m.warm) for m in found.measured):
+    for one in ((m.error, m.cold, m.warm) for m in found.results):
         beaten = any(all(np.array(other) <= one) for other in front if other != one)
         assert beaten != (one in front)
     assert found.cheapest(1e-12) is None

@@ -1,0 +1,316 @@
+"""Figures of waveforms and spectral lines: of models, of detection thresholds, of measurements."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from simple_model import sensation_level, spectrum, threshold
+from simple_model.drawing import small
+from simple_model.quantities import DISPLACEMENT, Quantity
+from simple_model.threshold import BAND, HIGHEST, LOWEST
+from skinwave.report.figures import (
+    REPORT,
+    ROW,
+    legend,
+    line_symbol,
+    name_lines,
+    run_label,
+    with_style,
+)
+from skinwave.report.palette import colour, ink_colour, label, line_style, marker
+from skinwave.report.styles import NARROW, SHOWN, Style
+from skinwave.results.run import Run
+from skinwave.typing import Floats
+
+# Titles of the columns of a Tacton's figure, in one line and in two.
+TITLES = (
+    "waveform about its mean, over the model's largest",
+    "spectrum, dB re the model's largest line",
+)
+SHORT_TITLES = ("waveform about its mean,\nover the largest", "spectrum, dB re\nlargest line")
+MARKED = ("f_AM", "2f_AM", "f_d", "2f_d", "3f_d")  # lines that a Tacton's figure names
+MOST_COLUMNS = 3  # of a legend
+LETTER, HANDLE = 0.07, 0.5  # inch: of a letter of a legend, and of a handle with its space
+FLOOR = -80.0  # dB
+HIGHEST_SHOWN = 650.0  # Hz
+LOWEST_SHOWN = 8.0  # Hz: the mean and its leakage lie below
+SETTLE = 0.25  # part of the response in which the transient decays
+LOWEST_LEVEL = -30.0  # dB re threshold: weaker lines are not drawn
+NAME_ROWS, MOST_NAMED = 3, 12  # of names above a panel of sensation levels
+CURVE: dict[str, Any] = {"color": "0.45", "lw": 1.5}
+THRESHOLD_BAND: dict[str, Any] = {"color": "0.5", "alpha": 0.25}
+MOST_LINES = 6  # of a measurement
+NORMAL_95 = 1.96
+SHIFT = 0.12  # of the distance between two places, by which models are drawn apart
+WEAKEST_PHASE = 0.02  # of a line's largest amplitude: weaker lines have no phase drawn
+
+
+@with_style
+def tacton_figure(title: str, runs: list[Run], style: Style = REPORT) -> Figure:
+    """Draw waveform and spectrum at each probe, with all models in one panel."""
+    probes, narrow = runs[0].response.probes, style.is_narrow
+    size = style.size(10.5, 1.25 * len(probes) + 1.3)
+    figure = Figure(figsize=(size[0], 0.75 * len(probes) + 1.6) if narrow else size)
+    axes = figure.subplots(len(probes), 2, sharex="col", sharey="col", squeeze=False)
+    rows = _legend(figure, runs)
+    # Fixed margins: a computed layout takes twice as long.
+    inch = style.zoom / figure.get_figheight()
+    left, right, between, top = (0.2, 0.97, 0.32, 0.75) if narrow else (0.08, 0.99, 0.14, 0.6)
+    figure.subplots_adjust(
+        left, 0.55 * inch, right, 1 - (top + 0.2 * rows) * inch, wspace=between, hspace=0.13
+    )
+    for p, (x, y) in enumerate(probes):
+        _draw_waveforms(axes[p, 0], runs, p)
+        _draw_spectra(axes[p, 1], runs, p)
+        axes[p, 0].set_ylabel(f"({1e3 * x:g}, {1e3 * y:g}) mm", fontweight="bold")
+    titles = SHORT_TITLES if narrow else TITLES
+    axes[0, 0].set_title(f"{title}\n{titles[0]}", fontsize="medium", parse_math=False)
+    pad = None
+    if narrow:
+        axes[0, 1].set_yticks(np.arange(FLOOR, 1, 40))
+    else:
+        pad, frequencies = 4 + ROW * small(), runs[0].frequencies
+        lines = {name: frequencies[name] for name in MARKED if name in frequencies}
+        name_lines(axes[0, 1], lines, 72 * axes[0, 1].get_position().width * size[0])
+    axes[0, 1].set_title(titles[1], fontsize="medium", pad=pad)
+    axes[-1, 0].set_xlabel("time, ms")
+    axes[-1, 1].set_xlabel("frequency, Hz")
+    return figure
+
+
+def _legend(figure: Figure, runs: list[Run]) -> int:
+    """Add an entry for each model above the figure, with the value of 1 on the waveform axis."""
+    entries: dict[str, dict[str, Any]] = {}
+    for run in runs:
+        scale = run.response.record.text(_largest(run, runs))
+        entries[f"{run_label(run)}, 1 = {scale}"] = {**line_style(run.column), "lw": 2}
+    if kinds := dict.fromkeys(peak.kind for run in runs for peak in run.unnamed):
+        entries[f"open: {', '.join(kinds)}"] = {
+            "color": "0.3", "marker": "^", "mfc": "none", "ls": ""
+        }  # fmt: skip
+    columns = len(entries) if len(entries) <= MOST_COLUMNS else -(-len(entries) // 2)
+    room = int(figure.get_figwidth() / (LETTER * max(map(len, entries)) + HANDLE))
+    columns = 1 if figure.get_figwidth() < NARROW else max(1, min(columns, room))
+    return legend(figure, entries, columns, loc="upper center", fontsize=None)
+
+
+def _shown_part(run: Run, runs: list[Run]) -> slice:
+    """Return the last part that all runs have; their records may begin at different times."""
+    times = run.response.times
+    end = min(float(other.response.times[-1]) for other in runs)
+    if end - SHOWN < times[0]:
+        end = max(float(times[0]) + SHOWN, end)
+    last = int(np.searchsorted(times, end + 0.5 * (times[1] - times[0])))
+    return slice(max(0, last - 1 - round(SHOWN / (times[1] - times[0]))), last)
+
+
+def _centred(run: Run, runs: list[Run]) -> Floats:
+    """Return the shown part (t, p) of the response about its mean in the steady state."""
+    motion = run.response.values
+    return motion[_shown_part(run, runs)] - motion[int(SETTLE * len(motion)) :].mean(axis=0)
+
+
+def _largest(run: Run, runs: list[Run]) -> float:
+    return float(np.abs(_centred(run, runs)).max()) or 1.0
+
+
+def _draw_waveforms(ax: Axes, runs: list[Run], p: int) -> None:
+    for run in runs:
+        centred = _centred(run, runs)[:, p] / _largest(run, runs)
+        times = 1e3 * run.response.times[_shown_part(run, runs)]
+        ax.plot(times, centred, color=ink_colour(run.column), lw=_width(run), zorder=_depth(run))
+    ax.margins(x=0)
+    ax.xaxis.set_major_locator(MaxNLocator(4, prune="both"))
+    ax.set_ylim(-1.1, 1.1)
+    ax.grid(alpha=0.25)
+
+
+def _draw_spectra(ax: Axes, runs: list[Run], p: int) -> None:
+    for run in runs:
+        f, amplitude = spectrum(run.response, "blackmanharris")
+        moving = f > LOWEST_SHOWN
+        top = max(float(amplitude[moving].max()), np.finfo(float).tiny)
+        level = 20 * np.log10(np.maximum(amplitude[moving, p] / top, 1e-12))
+        style = {**line_style(run.column), "zorder": _depth(run)}
+        ax.plot(f[moving], level, lw=_width(run) - 0.3, alpha=0.6, **(style | {"marker": ""}))
+        lines = [(f, run.table.amplitudes[name][p]) for name, f in run.listed.items()]
+        peaks = [(peak.frequency, peak.amplitudes[p]) for peak in run.unnamed]
+        for points, face in ((lines, colour(run.column)), (peaks, "none")):
+            at, size = np.array(points).reshape(-1, 2).T  # may be empty
+            height = 20 * np.log10(np.maximum(size / top, 1e-12))
+            above = height > FLOOR
+            ax.plot(at[above], height[above], ls="", ms=4, mfc=face, **style)
+    ax.set_xlim(0, HIGHEST_SHOWN)
+    ax.set_ylim(FLOOR, 5)
+    ax.set_yticks(np.arange(FLOOR, 1, 20))
+    ax.grid(alpha=0.25)
+
+
+def _width(run: Run) -> float:
+    return 1.0 if run.body == "none" else 1.4
+
+
+def _depth(run: Run) -> int:
+    return 4 if run.body == "none" else 3
+
+
+@with_style
+def levels_figure(runs: Sequence[Run], probe: int, style: Style) -> Figure:
+    """Draw the lines at one probe and, for skin, the detection threshold over frequency.
+
+    Each run of a body has its own panel.
+    """
+    runs = [run for run in runs if run.response.record.of_body]
+    count, narrow = max(len(runs), 1), style.is_narrow
+    size = style.size(5.2 * count, 4.6)
+    size = (size[0], 3.0 * count + 0.5) if narrow else size
+    figure = Figure(figsize=size, layout="constrained")
+    shape = (count, 1) if narrow else (1, count)
+    axes = figure.subplots(*shape, sharex=True, sharey=True, squeeze=False).ravel()
+    width = 72 * size[0] / shape[1] - 8 * style.font  # points
+    for ax, run in zip(axes, runs, strict=False):
+        _draw_levels(ax, run, probe, width)
+    entries: dict[str, dict[str, Any]] = {}
+    if any(run.is_skin for run in runs):
+        entries["threshold for a focal spot"] = CURVE
+        entries[f"±{BAND:g} dB between people"] = {**THRESHOLD_BAND, "lw": 6}
+    for kind in dict.fromkeys(peak.kind for run in runs for peak in run.unnamed):
+        entries[f"open: {kind}"] = {"color": "0.3", "marker": "o", "mfc": "none", "ls": ""}
+    if entries:
+        legend(figure, entries)
+    x, y = 1e3 * runs[0].response.probes[probe] if runs else (0.0, 0.0)
+    quantity = runs[0].response.record if runs else DISPLACEMENT
+    between = "\n" if style.columns else " "  # printed figures are small beside their letters
+    for ax in axes if narrow else axes[:1]:
+        ax.set_ylabel(f"{quantity.words}{between}at ({x:g}, {y:g}) mm, {quantity.shown} peak")
+    return figure
+
+
+def strongest_probe(runs: Sequence[Run]) -> int:
+    """Return the index of the probe that moves most, relative to the largest of each run."""
+    level = [np.ptp(run.response.values, axis=0) for run in runs]
+    return int(np.argmax(sum(x / max(float(x.max()), 1e-300) for x in level)))
+
+
+def sensation_levels(run: Run, probe: int) -> dict[str, float]:
+    """Return the levels of lines at a probe in dB above threshold, the highest first.
+
+    The dictionary is empty unless the body is skin.
+    """
+    if not run.is_skin:
+        return {}
+    levels = {
+        name: float(sensation_level(run.table.amplitudes[name][probe], frequency))
+        for name, frequency in run.listed.items()
+    }
+    return dict(sorted(levels.items(), key=lambda item: -item[1]))
+
+
+def _draw_levels(ax: Axes, run: Run, probe: int, width: float) -> None:
+    """Draw lines and their names: by sensation level or, if not skin, by amplitude."""
+    amplitudes = {name: float(values[probe]) for name, values in run.table.amplitudes.items()}
+    names = sorted(run.listed, key=lambda name: -amplitudes[name])
+    if run.is_skin:
+        levels = sensation_levels(run, probe)
+        names = [name for name, level in levels.items() if level > LOWEST_LEVEL]
+        f = np.geomspace(LOWEST, HIGHEST, 300)
+        curve, factor = 1e6 * threshold(f), 10 ** (BAND / 20)
+        ax.plot(f, curve, **CURVE)
+        ax.fill_between(f, curve / factor, curve * factor, lw=0, **THRESHOLD_BAND)
+    per_unit, style = run.response.record.per_unit, line_style(run.column)
+    frequencies = np.array([run.listed[name] for name in names])
+    heights = per_unit * np.array([amplitudes[name] for name in names])
+    ax.vlines(frequencies, 1e-4, heights, color=style["color"], lw=1.2)
+    ax.plot(frequencies, heights, ls="none", **style)
+    for peak in run.unnamed:
+        ax.plot(peak.frequency, per_unit * peak.amplitudes[probe], ls="none", mfc="none", **style)
+    ax.set(xscale="log", yscale="log", xlim=(LOWEST, HIGHEST), xlabel="frequency, Hz")
+    if run.response.record is DISPLACEMENT:
+        ax.set_ylim(2e-3, 3e3)
+    ax.set_xticks([10, 30, 100, 300, 1000], ["10", "30", "100", "300", "1000"])
+    ax.set_title(run_label(run), pad=4 + NAME_ROWS * ROW * small())
+    ax.grid(alpha=0.25)
+    name_lines(ax, {name: run.listed[name] for name in names[:MOST_NAMED]}, width, NAME_ROWS)
+
+
+@with_style
+def lines_figure(
+    lines: Mapping[str, float],
+    places: Floats,
+    measured: np.ndarray,
+    error: Floats,
+    models: Mapping[str, np.ndarray],
+    differs: Mapping[str, np.ndarray],
+    quantity: Quantity,
+    *,
+    style: Style = REPORT,
+) -> Figure:
+    """Draw amplitudes and phases of the strongest measured lines at each place, with models.
+
+    Parameters
+    ----------
+    lines : frequencies in Hz by name
+    places : (p, 2) float, metre
+    measured : (f, p) complex, SI units
+    error : (f, p) float, standard errors of amplitudes, SI units; nan if unknown
+    models : (f, p) complex by `Run.column`, with gain and delay, SI units
+    differs : (f, p) bool by `Run.column`, where the difference exceeds the noise
+    quantity : Quantity
+    style : Style
+    """
+    strongest = np.sort(np.argsort(-np.abs(measured).max(axis=1), kind="stable")[:MOST_LINES])
+    figure = Figure(figsize=style.size(10.5, 1.45 * len(strongest) + 1.7), layout="constrained")
+    axes = figure.subplots(len(strongest), 2, sharex=True, squeeze=False)
+    for (left, right), k in zip(axes, strongest, strict=True):
+        noise = NORMAL_95 * np.nan_to_num(error[k])
+        _draw_noise(left, right, quantity.per_unit * np.abs(measured[k]), quantity.per_unit * noise)
+        for n, (column, model) in enumerate(models.items()):
+            at = np.arange(len(places)) + SHIFT * (n - (len(models) - 1) / 2)
+            size = np.abs(model[k])
+            strong = size > WEAKEST_PHASE * size.max(initial=0.0)
+            phase = np.where(strong, np.degrees(np.angle(model[k] * measured[k].conj())), np.nan)
+            markers, filled = _markers(column), differs[column][k]
+            for mask, face in ((filled, markers["color"]), (~filled, "none")):
+                left.plot(at[mask], quantity.per_unit * size[mask], mfc=face, **markers)
+                right.plot(at[mask], phase[mask], mfc=face, **markers)
+        left.set_ylim(bottom=0)
+        name = list(lines)[k]
+        left.set_ylabel(f"{line_symbol(name)}\n{lines[name]:.1f} Hz", fontweight="bold")
+    axes[0, 0].set_title(f"amplitude, {quantity.shown}", fontsize="medium")
+    axes[0, 1].set_title("phase of the model minus measured phase, degrees", fontsize="medium")
+    for ax in axes[-1]:
+        ax.set_xticks(range(len(places)), [f"{1e3 * x:.3g}\n{1e3 * y:.3g}" for x, y in places])
+        ax.set(xlabel="place, x above y, mm", xlim=(-0.6, len(places) - 0.4))
+    entries: dict[str, dict[str, Any]] = {
+        "measured, bars of 95 %": {
+            "color": mpl.rcParams["text.color"], "marker": "_", "ms": 14, "mew": 2, "ls": ""
+        }
+    }  # fmt: skip
+    entries |= {label(column): _markers(column) for column in models}
+    entries["open: within the noise"] = {"ls": "", "marker": "o", "mfc": "none", "color": "0.4"}
+    legend(figure, entries, 5, loc="outside upper center", fontsize=None)
+    return figure
+
+
+def _draw_noise(left: Axes, right: Axes, size: Floats, noise: Floats) -> None:
+    """Draw amplitudes (p,) with error bars, and the band of noise of the phase about 0."""
+    at, ink = np.arange(len(size)), mpl.rcParams["text.color"]
+    left.errorbar(at, size, noise, fmt="_", ms=14, mew=2, capsize=4, color=ink, zorder=3)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        band = np.minimum(np.degrees(noise / size), 180)
+    right.bar(at, 2 * band, bottom=-band, width=0.7, color="0.8", zorder=0)
+    right.axhline(0, color=ink, lw=1)
+    right.set(ylim=(-190, 190), yticks=[-180, -90, 0, 90, 180])
+    for ax in (left, right):
+        ax.grid(alpha=0.25)
+
+
+def _markers(column: str) -> dict[str, Any]:
+    """Return the marker of a column; a cross is replaced by a filled one, which can be open."""
+    kind = marker(column).replace("x", "X")
+    return {"color": ink_colour(column), "ls": "", "ms": 6, "marker": kind}

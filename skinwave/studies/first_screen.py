@@ -1,0 +1,160 @@
+"""Effect of propagation on the Tactons of a page, with maps of the Tacton on its first screen."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from itertools import product
+from typing import TYPE_CHECKING
+
+from skinwave.models.limits import takes
+from skinwave.models.options import DEFAULT, SolveOptions
+from skinwave.models.plate_modes import FROM_REST
+from skinwave.models.point_kernel import PUBLISHED, SAME_LOAD
+from skinwave.planning.budget import ErrorBudget, error_budget
+from skinwave.planning.simulate import compute
+from skinwave.results.propagation import Propagation, propagation, share_outside
+from skinwave.results.run import Run
+from skinwave.results.surface import (
+    SurfaceField,
+    body_map,
+    grid,
+    has_wavenumber_integral,
+    kernel_map,
+)
+from skinwave.scene import paper15
+from skinwave.scene.keys import SCALES
+from skinwave.scene.scene import Scene
+from skinwave.scene.spreads import spreads_of
+from skinwave.scene.variation import with_values
+
+if TYPE_CHECKING:
+    from skinwave.report.maps import MeasuredPlaces
+
+MATERIAL, ENDS = "material", (0.05, 0.95)  # part of an uncertainty; ends of its 90 % interval
+PREFERRED = "am140-stm20"  # the paper's Tacton with both modulations in the middle
+Maps = tuple[SurfaceField, SurfaceField] | tuple[()]  # of a body and of the kernel
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FirstScreen:
+    """Results on the first screen of a page, of one Tacton.
+
+    Parameters
+    ----------
+    kernel, published : runs of the point kernel under the same load, and as published
+    bodies : runs of bodies
+    effects : effects of propagation by column
+    maps : maps by column
+    shares : least and largest share outside over the range of materials, or None
+    budget : error budget of `body`, or None
+    measured : measured places, or None
+    """
+
+    kernel: Run
+    published: Run
+    bodies: Sequence[Run]
+    effects: Mapping[str, Propagation]
+    maps: Mapping[str, SurfaceField] = field(default_factory=dict)
+    shares: tuple[float, float] | None = None
+    budget: ErrorBudget | None = None
+    measured: "MeasuredPlaces | None" = None
+
+    @property
+    def body(self) -> Run:
+        """The body that the verdict describes: skin if present."""
+        skin = [run for run in self.bodies if run.scene.body.is_skin]
+        return (skin or list(self.bodies))[-1]
+
+
+def effects_of(groups: Mapping[str, Sequence[Run]]) -> dict[str, dict[str, Propagation]]:
+    """Return the effect of propagation by Tacton and body, with maps if they cost little."""
+    effects: dict[str, dict[str, Propagation]] = {}
+    for name, group in groups.items():
+        if kernel := _run_of(group, SAME_LOAD.name):
+            for run in filter(lambda each: each.is_motion, group):
+                maps = quick_maps(run) if has_wavenumber_integral(run.scene) else ()
+                effects.setdefault(name, {})[run.column] = propagation(run, kernel, *maps)
+    return effects
+
+
+def first_screen(
+    groups: Mapping[str, Sequence[Run]], maps_of: Callable[[Run], Maps]
+) -> FirstScreen | None:
+    """Return the first screen, or None unless a body and both kernels were run."""
+    group = groups.get(first_name(groups), [])
+    kernel, published = _run_of(group, SAME_LOAD.name), _run_of(group, PUBLISHED.name)
+    bodies = [run for run in group if run.is_motion]
+    if kernel is None or published is None or not bodies:
+        return None
+    maps: dict[str, SurfaceField] = {}
+    effects: dict[str, Propagation] = {}
+    for run in bodies:
+        if own := maps_of(run):
+            maps |= {kernel.column: own[1], run.column: own[0]}
+        effects[run.column] = propagation(run, kernel, *own)
+    first = FirstScreen(
+        kernel=kernel, published=published, bodies=bodies, effects=effects, maps=maps
+    )
+    if effects[first.body.column].strongest is None:
+        return first
+    scene, error = first.body.scene, first.body.response.expected_error
+    return replace(first, shares=_shares(scene), budget=error_budget(scene, error))
+
+
+def with_kernels(run: Run) -> list[Run]:
+    """Return the runs of both point kernels for a body's scene, and the body's run."""
+    kernels = [
+        Run(tacton=run.tacton, body="none", scene=scene, response=compute(scene, model))
+        for model, scene in paper15.beside_kernels(run.scene).items()
+    ]
+    return [*kernels, run]
+
+
+def quick_maps(run: Run) -> Maps:
+    """Return the maps of a body and of the kernel if they need no mesh."""
+    scene = run.scene
+    if not (has_wavenumber_integral(scene) or (run.is_motion and takes(FROM_REST, scene))):
+        return ()
+    surface = _meshless_map(scene)
+    return surface, kernel_map(scene.pressure, surface.x, surface.y)
+
+
+def slow_maps(scene: Scene, options: SolveOptions = DEFAULT) -> Maps:
+    """Return the maps of a body, by the modes of a plate or by elements, and of the kernel."""
+    x, y = grid(scene)
+    return body_map(scene, x, y, options), kernel_map(scene.pressure, x, y)
+
+
+def first_name(names: Iterable[str]) -> str:
+    """Return the name of the Tacton on the first screen."""
+    names = list(names)
+    return PREFERRED if PREFERRED in names else (names or [""])[0]
+
+
+@lru_cache(maxsize=16)  # several parts of a page show the same scenes
+def _meshless_map(scene: Scene) -> SurfaceField:
+    return body_map(scene, *grid(scene))
+
+
+def _run_of(group: Sequence[Run], model: str) -> Run | None:
+    return next((run for run in group if run.model == model), None)
+
+
+def _shares(scene: Scene) -> tuple[float, float] | None:
+    """Return the least and largest share outside the kernel's region over the range of moduli and
+    of losses of all materials, or None if none is uncertain.
+    """
+    spreads = [each for each in spreads_of(scene) if each.part == MATERIAL]
+    if not spreads or not has_wavenumber_integral(scene):
+        return None
+    scenes = [scene]
+    for scale, end in product(SCALES, ENDS):
+        values = {
+            each.key: float(each.distribution.quantile(each.value, end))
+            for each in spreads
+            if each.key.endswith(scale)
+        }
+        scenes += [with_values(scene, values)] * bool(values)
+    kernel = kernel_map(scene.pressure, *grid(scene)).rms
+    shares = [share_outside(kernel, _meshless_map(each).rms) for each in scenes]
+    return min(shares), max(shares)
