@@ -277,7 +277,7 @@ def test_a_body_that_steps_share_is_reduced_once_and_counts_in_each(monkeypatch)
         "skinwave.studies.relax.without",
         lambda scene, dropped, **device: (replace(scene, body=small), "fem"),
     )
-    monkeypatch.setattr("skinwave.studies.relax.sentences", lambda *scene, h: ())
+    monkeypatch.setattr("skinwave.studies.relax.all_warnings", lambda *scene, h: ())
     found = hierarchy_of(SKIN, lambda phase, done: None, h=4e-3).steps
     first, *others = [step.response.effort.seconds for step in found]
     reduction = {"assemble", "factorise and reduce"}
@@ -299,7 +299,7 @@ def test_a_body_that_cannot_be_reduced_is_refused_on_a_coarse_mesh(monkeypatch):
         return compute(scene, model)
 
     monkeypatch.setattr("skinwave.studies.relax.compute", not_reduced)
-    monkeypatch.setattr("skinwave.studies.relax.sentences", lambda *scene, h: ())
+    monkeypatch.setattr("skinwave.studies.relax.all_warnings", lambda *scene, h: ())
     monkeypatch.setattr(
         "skinwave.studies.relax.droppable", lambda scene: ("linear drive", "little loss", "flat")
     )
