@@ -201,12 +201,9 @@ def field(
     --------
     >>> import numpy as np
     >>> import skinwave
-    >>> scene = skinwave.loads(
-    ...     "[tacton]\nam_frequency_hz = 140\nduration_s = 0.05\n[body]\nsize_x_mm = 30\n"
-    ...     "size_y_mm = 30\nthickness_mm = 6\nsides = 'clamped'\n"
-    ...     "[probes]\npoints_mm = [[0, 0]]"
-    ... )
-    >>> field = skinwave.field(scene, np.arange(100) / 5000, h=6e-3)  # doctest: +SKIP
+    >>> scene = skinwave.loads("[body]\\nkind = 'slab'\\nsides = 'clamped'")
+    >>> field = skinwave.field(scene, np.arange(100) / 5000)  # doctest: +SKIP
+    >>> field.plot(time=0.01)  # doctest: +SKIP
     """
     with reported(progress) as report:
         options = SolveOptions(h=h, tolerance=tolerance, solver=solver, progress=report)

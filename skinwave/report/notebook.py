@@ -7,7 +7,7 @@ import numpy as np
 
 from simple_model import drawing
 from simple_model.load.focus import spot_width
-from simple_model.numbers import percent, plural, stated_error
+from simple_model.numbers import interval, percent, plural, stated_error
 from skinwave.report.description import scene_rows
 from skinwave.typing import Floats
 
@@ -82,8 +82,9 @@ def _cost(plan: "Plan") -> str:
 
 
 def _range(misfit: Floats) -> str:
-    low, high = (percent(float(end)) for end in (misfit.min(), misfit.max()))
-    return low if low == high else f"{low.removesuffix(' %')} to {high}"
+    low, high = (100 * float(end) for end in (misfit.min(), misfit.max()))
+    is_one = percent(low / 100) == percent(high / 100)
+    return percent(low / 100) if is_one else f"{interval(low, high)} %"
 
 
 def scene_page(scene: "Scene") -> str:

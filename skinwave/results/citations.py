@@ -57,9 +57,9 @@ def cite(*responses: Response) -> Citations:
     Examples
     --------
     >>> import skinwave
-    >>> scene = skinwave.loads("[tacton]\nam_frequency_hz = 140\nduration_s = 0.05")
-    >>> cited = skinwave.cite(skinwave.simulate(scene, "point-kernel"))
-    >>> print(cited.references[1][:49])
+    >>> scene = skinwave.loads("[tacton]\\nduration_s = 0.05\\n[body]\\nkind = 'none'")
+    >>> print(skinwave.cite(skinwave.simulate(scene, "point-kernel")).references[1][:38])
+    C. Lim, H. Seifi, G. Park: An Interact
     """
     if not responses:
         raise ValueError("no response is given. Give one or more")
