@@ -53,7 +53,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit code."""
     from skinwave.live.page import comparison_page
-    from skinwave.measure.comparison import at_measured
+    from skinwave.measure.comparison import at_measured_places
     from skinwave.report.palette import label
     from skinwave.results import record
     from skinwave.results.files import folder_name
@@ -72,8 +72,9 @@ def run(options: argparse.Namespace) -> int:
         against = " and ".join(label(body) for body in bodies or paper15.MEASURED_ON)
         title = f"The paper's 15 Tactons: point kernel, {against}"
     else:
-        scene = at_measured(given, measured.measurement) if measured else given
-        for body in bodies.values():
+        if measured:
+            scene = at_measured_places(scene, measured.measurement)
+        for body in (bodies or {}).values():
             scene = with_body(scene, body)
         scenes, title = own_scenes(scene, folder_name(scene.name)), scene.name
         out = f"{Path(options.scene).stem}-compared"
@@ -114,10 +115,10 @@ def _measured(options: argparse.Namespace) -> "Measured | None":
             "measurement"
         )
     from skinwave.measure.comparison import Measured
-    from skinwave.measure.reading import read_alone
+    from skinwave.measure.reading import read_complete
 
     delay = None if options.delay is None else options.delay / 1e3
-    return Measured(measurement=read_alone(options.measured), delay=delay, gain=options.gain)
+    return Measured(measurement=read_complete(options.measured), delay=delay, gain=options.gain)
 
 
 def _chosen_body(options: argparse.Namespace) -> "dict[str, Body]":

@@ -117,12 +117,12 @@ def _inspect(options: argparse.Namespace) -> int:
 
 
 def _measured(file: Path, options: argparse.Namespace) -> "Measurement":
-    """Read a measurement; options give what the file does not state."""
-    from skinwave.measure.reading import places_of, read
+    """The measurement in a file, by the options of what it does not say."""
+    from skinwave.measure.reading import parse_places, read
 
     return read(
         file, quantity=options.quantity, unit=options.unit,
-        places=places_of(options.places) if options.places else None,
+        places=parse_places(options.places) if options.places else None,
         sign=SIGNS[options.positive] if options.positive else None,
         rate=options.rate, variable=options.variable, direction=options.direction or "",
         columns=tuple(name.strip() for name in options.columns.split(",") if name.strip()),

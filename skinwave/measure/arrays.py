@@ -1,12 +1,12 @@
-"""Recordings of named arrays: NumPy archives, skinwave's own and others, and MATLAB files.
+"""Recordings in named arrays: NumPy archives and MATLAB files.
 
-Times, places, the drive and words are found by their names; the motion by --variable, by its name,
+Times, places, drive and texts are identified by their names; the motion by --variable, by its name,
 or as the only other array that fits.
 
-One published set has a form of its own: Reardon et al., Sci. Adv. 9, eadf2037 (2023), doi
+One published set has its own form: Reardon et al., Sci. Adv. 9, eadf2037 (2023), doi
 10.1126/sciadv.adf2037, record 10.5281/zenodo.7686560, skin velocity under a focus that draws a
 zigzag along the hand. Its y (N, M, 2) is the velocity along the laser in m/s at N places, M times,
-2 repetitions; places are measured one after the other, and the reference r tells when each began.
+2 repetitions. Places were measured one after the other, each with a reference r.
 """
 
 from collections.abc import Iterable, Mapping
@@ -19,10 +19,10 @@ from meshes import reading, subprocess_call
 from meshes.tetmesh import MeshError
 from simple_model.quantities import QUANTITIES
 from skinwave.measure import units
-from skinwave.measure.delays import aligned
-from skinwave.measure.headers import NAMES, TIME, column
+from skinwave.measure.delays import align_by_references
+from skinwave.measure.headers import NAMES, TIME, parse_heading
 from skinwave.measure.matlab import DAMAGED, read_arrays
-from skinwave.measure.recording import Given, Recording, nowhere
+from skinwave.measure.recording import Given, Recording, unknown_places
 from skinwave.measure.table import rises
 from skinwave.models import named, names
 from skinwave.typing import Floats
@@ -38,80 +38,73 @@ STARTS = ("t0", "t_start", "tstart", "start_time", "x0")
 INTERVALS = ("dt", "sampling_interval")
 PLACES = ("places", "points", "probes", "xy", "xyz", "positions", "coordinates", "locations")
 MILLIMETRES = tuple(f"{name}_mm" for name in PLACES)
-FARTHEST = 5.0  # m, of a place: beyond it the unit is another one
+FARTHEST = 5.0  # m, of a place; beyond it the unit is not the metre
 DRIVES = ("drive", "ref", "reference", "r", "trigger")
-MOTION = {name: kind for kind in units.MOTION for name in NAMES[kind]} | dict.fromkeys(
+MOTION = {name: quantity for quantity in units.MOTION for name in NAMES[quantity]} | dict.fromkeys(
     ("values", "y", "data", "signal", "signals"), ""
 )
-KNOWN = (*TIMES, *FREQUENCIES, *RATES, *INTERVALS, *STARTS, *PLACES, *MILLIMETRES, *DRIVES,
-         "quantity", "unit", "name")  # fmt: skip
+NOT_MOTION = (*TIMES, *FREQUENCIES, *RATES, *INTERVALS, *STARTS, *PLACES, *MILLIMETRES, *DRIVES,
+              "quantity", "unit", "name")  # fmt: skip
 Arrays = Mapping[str, np.ndarray]
 
 
 def read_npz(path: Path, given: Given) -> Recording:
-    """The recording in an .npz file; of skinwave's own everything is in SI. Raises a ValueError if
-    it is none, or its arrays do not make a measurement.
-    """
-    with reading.open_regular(path):
+    """Return the recording in an .npz file, skinwave's own or another program's."""
+    with reading.opened(path):
         pass
     try:
-        found = reading.load_arrays(path)
+        arrays = reading.arrays(path)
     except ValueError:
-        raise ValueError(
-            "the file cannot be read as .npz; save arrays of numbers by numpy.savez"
-        ) from None
-    if str(found.get("format", "")) == FORMAT:
-        return _own(found)
-    if quantity := _of_response(found):
-        alone = {name: found[name] for name in ("t", "probes", quantity)}
-        read = recording(alone, replace(given, variable=""))
-        return replace(read, unit=QUANTITIES[quantity].unit, sign=1)
-    return recording(found, given)
+        raise ValueError("the file cannot be read as .npz; save arrays by numpy.savez") from None
+    if str(arrays.get("format", "")) == FORMAT:
+        return _own(arrays)
+    if quantity := _response_quantity(arrays):
+        kept = {name: arrays[name] for name in ("t", "probes", quantity)}
+        recording = recording_of(kept, replace(given, variable=""))
+        return replace(recording, unit=QUANTITIES[quantity].unit, sign=1)
+    return recording_of(arrays, given)
 
 
 def read_mat(path: Path, given: Given) -> Recording:
-    """The recording in a MATLAB file; raises what `read_npz` does."""
-    with reading.open_regular(path, LARGEST) as file:
+    """Return the recording in a MATLAB file."""
+    with reading.opened(path, LARGEST) as file:
         if not file.read(1):
-            raise ValueError("the file is empty; download or export it anew")
+            raise ValueError("the file is empty; download or export it again")
     try:
-        found = subprocess_call.call_reader(read_arrays, path)
+        arrays = subprocess_call.call_reader(read_arrays, path)
     except MeshError as error:
         raise ValueError(DAMAGED) from error
-    if not found:
-        raise ValueError("the file has no arrays of numbers; save the signals as such")
-    return recording(found, given)
+    if not arrays:
+        raise ValueError("the file has no arrays of numbers; save the signals as arrays")
+    return recording_of(arrays, given)
 
 
-def _own(found: Arrays) -> Recording:
-    if missing := {"quantity", "unit", "values", "places", "times", "frequencies"} - found.keys():
-        raise ValueError(f"the array '{min(missing)}' is missing; write the measurement anew")
-    if found["values"].ndim != 3 or found["values"].dtype.kind not in "fc":
-        raise ValueError(f"values have the shape {found['values'].shape}; write them anew")
+def _own(arrays: Arrays) -> Recording:
+    if missing := {"quantity", "unit", "values", "places", "times", "frequencies"} - arrays.keys():
+        raise ValueError(f"the array '{min(missing)}' is missing; write the measurement again")
+    if arrays["values"].ndim != 3 or arrays["values"].dtype.kind not in "fc":
+        raise ValueError(f"values have shape {arrays['values'].shape}; write them again")
     return Recording(
-        quantity=str(found["quantity"]), unit=str(found["unit"]), places=found["places"],
-        times=found["times"], frequencies=found["frequencies"], values=found["values"],
-        drive=found.get("drive", np.empty(0)), sign=1, name=str(found.get("name", "")),
-        remarks=tuple(map(str, found.get("remarks", ()))),
+        quantity=str(arrays["quantity"]), unit=str(arrays["unit"]), places=arrays["places"],
+        times=arrays["times"], frequencies=arrays["frequencies"], values=arrays["values"],
+        drive=arrays.get("drive", np.empty(0)), sign=1, name=str(arrays.get("name", "")),
+        remarks=tuple(map(str, arrays.get("remarks", ()))),
     )  # fmt: skip
 
 
-def _of_response(found: Arrays) -> str:
-    """Quantity of the responses that a file of skinwave's holds; "" if it is none."""
-    own = [name for name in found if name in QUANTITIES]
-    models = found.keys() - {"t", "probes", *own}
-    if not {"t", "probes"} <= found.keys() or len(own) != 1 or not models <= set(names()):
+def _response_quantity(arrays: Arrays) -> str:
+    """Return the quantity of the responses in a file of results; "" for other files."""
+    quantities = [name for name in arrays if name in QUANTITIES]
+    models = arrays.keys() - {"t", "probes", *quantities}
+    if not {"t", "probes"} <= arrays.keys() or len(quantities) != 1 or not models <= set(names()):
         return ""
-    if not QUANTITIES[own[0]].of_body or not all(named(name).needs_body for name in models):
-        raise ValueError(
-            "the file holds a pressure, which is no motion; give the response of a body"
-        )
-    return own[0]
+    if not QUANTITIES[quantities[0]].of_body or not all(named(name).needs_body for name in models):
+        raise ValueError("the file holds a pressure, not motion; give the response of a body")
+    return quantities[0]
 
 
-def recording(arrays: Arrays, given: Given) -> Recording:
-    """The recording that arrays of numbers and texts hold by name, of a structure by
-    "structure.name"; the motion is the variable that is given.
+def recording_of(arrays: Arrays, given: Given) -> Recording:
+    """Return the recording in arrays by name, "structure.name" for fields of structures.
 
     Raises a ValueError if no array, or more than one, can be the motion, or shapes do not fit.
     """
@@ -122,93 +115,93 @@ def recording(arrays: Arrays, given: Given) -> Recording:
         raise ValueError(f"no array is named '{name[:40]}'; give --variable as {_list(arrays)}")
     values = np.asarray(arrays[name])
     if values.dtype.kind not in "fiuc" or not values.size:
-        raise ValueError(f"the array '{name[:40]}' holds no numbers; give another --variable")
+        raise ValueError(f"the array '{name[:40]}' has no numbers; give another --variable")
     if len(times) and len(frequencies):
-        times, frequencies = (
-            (np.empty(0), frequencies) if values.dtype.kind == "c" else (times, np.empty(0))
-        )
-    axis = times if len(times) else frequencies
+        if values.dtype.kind == "c":
+            times = np.empty(0)
+        else:
+            frequencies = np.empty(0)
+    count = len(times) or len(frequencies)
     places = given.places if given.places is not None else _places(short)
-    each = next((short[key] for key in DRIVES if key in short), np.empty(0))
+    references = next((short[key] for key in DRIVES if key in short), np.empty(0))
     is_zigzag = values.ndim == 3 and values.shape[2] == 2 and _last(name) == "y" and "r" in short
-    if is_zigzag and each.shape == values.shape[:2]:
-        each = np.repeat(each[..., None], 2, axis=2)
-    said: list[str] = []
+    if is_zigzag and references.shape == values.shape[:2]:
+        references = np.repeat(references[..., None], 2, axis=2)
+    remarks: list[str] = []
 
     def ordered(array: np.ndarray) -> np.ndarray:
         if is_zigzag:
             return np.transpose(array, (2, 1, 0))
-        return _in_order(array, len(axis), len(places), name, said)
+        return _in_order(array, count, len(places), name, remarks)
 
     moved, rate, start = ordered(values), _rate(short), _scalar(short, STARTS)
-    if not (len(axis) or np.isnan(start + rate)):
+    if not (count or np.isnan(start + rate)):
         times = start + np.arange(moved.shape[1]) / rate
-    elif not (len(axis) or is_zigzag):
-        times, moved = _times_within(moved, name, given, said)
+    elif not (count or is_zigzag):
+        times, moved = _times_within(moved, name, given, remarks)
     drive = _vector(short, DRIVES)
     if not len(frequencies):
         moved = _real(moved, name)
-        if each.shape == values.shape:
-            moved, drive, more = aligned(moved, _real(ordered(each), name))
-            times, said = times[: moved.shape[1]], [*said, more]
+        if references.shape == values.shape:
+            moved, drive, remark = align_by_references(moved, _real(ordered(references), name))
+            times, remarks = times[: moved.shape[1]], [*remarks, remark]
     if is_zigzag:
-        said.append("velocity along the laser, taken as normal to the skin")
+        remarks.append("velocity along the laser, taken as normal to the skin")
     word = {key: _word(short, key) for key in ("quantity", "unit", "name")}
+    has_places = len(places) == moved.shape[2]
     return Recording(
         values=moved, times=times, frequencies=frequencies, rate=rate,
         quantity=word["quantity"] or ("velocity" if is_zigzag else MOTION.get(_last(name), "")),
         unit=word["unit"] or "m/s" * is_zigzag, name=word["name"],
-        places=places if len(places) == moved.shape[2] else nowhere(moved.shape[2]),
-        drive=drive if len(drive) == moved.shape[1] else np.empty(0), remarks=tuple(said),
+        places=places if has_places else unknown_places(moved.shape[2]),
+        drive=drive if len(drive) == moved.shape[1] else np.empty(0), remarks=tuple(remarks),
     )  # fmt: skip
 
 
 def _last(name: str) -> str:
-    """Name of an array in lower case, without that of its structure."""
+    """Return the name of an array in lower case, without that of its structure."""
     return name.rpartition(".")[2].lower()
 
 
 def _in_order(
-    values: np.ndarray, samples: int, places: int, name: str, said: list[str]
+    values: np.ndarray, samples: int, places: int, name: str, remarks: list[str]
 ) -> np.ndarray:
-    """Values (r, n, p), whatever the order of the one to three axes of an array, by the numbers of
-    times or frequencies and of places, 0 where not known; what is assumed is said.
+    """Return values (r, n, p) for any order of one to three axes, from the numbers of samples and
+    of places; 0 if unknown.
     """
-    kept = values if values.ndim <= 3 else values.squeeze()
-    if kept.ndim > 3 or kept.ndim == 0:
-        raise ValueError(f"'{name[:40]}' has the shape {values.shape}; give samples and places")
-    sizes = list(kept.shape)
+    values = values if values.ndim <= 3 else values.squeeze()
+    sizes = values.shape
+    if not 1 <= values.ndim <= 3:
+        raise ValueError(f"'{name[:40]}' has shape {sizes}; give samples and places")
     along = [k for k, size in enumerate(sizes) if size == samples]
     if samples and not along:
-        raise ValueError(
-            f"'{name[:40]}' has the shape {kept.shape}; give an array of {samples} times or values"
-        )
+        raise ValueError(f"'{name[:40]}' has shape {sizes}; give an array of {samples} times")
     if not samples:
         free = [k for k, size in enumerate(sizes) if size != places or sizes.count(places) > 1]
-        along = [max(free or range(kept.ndim), key=lambda k: sizes[k])]
-        if kept.ndim > 1:
-            said.append(f"the axis of {sizes[along[0]]} of '{name[:40]}' is taken as time")
-    time = 1 if kept.ndim == 3 and 1 in along else along[0]
-    rest = [k for k in range(kept.ndim) if k != time]
-    spot = max(rest, key=lambda k: (sizes[k] == places, sizes[k], -k), default=None)
-    if spot is None:
-        return kept[None, :, None]
-    moved = np.transpose(kept, [*(k for k in rest if k != spot), time, spot])
+        along = [max(free or range(values.ndim), key=lambda k: sizes[k])]
+        if values.ndim > 1:
+            remarks.append(f"the axis of {sizes[along[0]]} of '{name[:40]}' is taken as time")
+    time = 1 if values.ndim == 3 and 1 in along else along[0]
+    rest = [k for k in range(values.ndim) if k != time]
+    if not rest:
+        return values[None, :, None]
+    spot = max(rest, key=lambda k: (sizes[k] == places, sizes[k], -k))
+    moved = np.transpose(values, [*(k for k in rest if k != spot), time, spot])
     return moved if moved.ndim == 3 else moved[None]
 
 
 def _motion(arrays: Arrays) -> str:
-    """Name of the array that is the motion."""
-    other = [
+    """Return the name of the array of motion."""
+    candidates = [
         name for name, array in arrays.items()
-        if array.dtype.kind in "fiuc" and array.size > 1 and _last(name) not in KNOWN
+        if array.dtype.kind in "fiuc" and array.size > 1 and _last(name) not in NOT_MOTION
     ]  # fmt: skip
-    other = [name for name in other if _last(name) in MOTION] or other
-    if len(other) == 1:
-        return other[0]
-    if not other:
-        raise ValueError(f"no array is of motion, only {_list(arrays)}; give --variable")
-    raise ValueError(f"several arrays may be of motion; give --variable as {_list(other)}")
+    candidates = [name for name in candidates if _last(name) in MOTION] or candidates
+    if not candidates:
+        raise ValueError(f"no array is motion, only {_list(arrays)}; give --variable")
+    if len(candidates) > 1:
+        raise ValueError(f"several arrays may be motion; give --variable as {_list(candidates)}")
+    return candidates[0]
 
 
 def _list(names: Iterable[str]) -> str:
@@ -217,83 +210,80 @@ def _list(names: Iterable[str]) -> str:
 
 
 def _vector(arrays: Arrays, names: tuple[str, ...]) -> np.ndarray:
-    """The first array of one axis by these names, or of copies of one; empty if there is none."""
+    """Return the first vector with one of these names; empty if there is none."""
     for name in names:
         array = arrays.get(name, np.empty(0))
         if array.dtype.kind not in "fiuc" or array.size < 2:
             continue
         if array.size == max(array.shape):
             return array.ravel()
-        if names is TIMES and array.ndim == 2:
+        if names is TIMES and array.ndim == 2:  # times of each place
             rows = array if np.diff(array, axis=1).min(initial=1.0) > 0 else array.T
             first = rows[np.argmax(np.isfinite(rows).sum(axis=1))]
             if not (np.isnan(rows) | np.isclose(rows, first, rtol=1e-9, atol=0)).all():
-                raise ValueError(
-                    f"times '{name}' differ from place to place; save signals of the same times"
-                )
+                raise ValueError(f"times '{name}' differ from place to place; save common times")
             return first
     return np.empty(0)
 
 
 def _times(arrays: Arrays) -> np.ndarray:
-    """Times in s, of an array "t" or "time", or one whose name ends in its unit: "t_ms"."""
-    found = _vector(arrays, TIMES).real
-    for name in () if len(found) else arrays:
-        one = column(name)
-        if one.role == TIME and one.unit and len(array := _vector(arrays, (name,))):
-            found = units.in_si(array, units.scale(one.unit, units.TIMES, "time"))
-    return found
+    """Return times in s from "t" or "time", or from a name with its unit: "t_ms"."""
+    times = _vector(arrays, TIMES).real
+    for name in () if len(times) else arrays:
+        column = parse_heading(name)
+        if column.role == TIME and column.unit and len(array := _vector(arrays, (name,))):
+            times = units.in_si(array, units.divisor(column.unit, units.TIMES, "time"))
+    return times
 
 
 def _times_within(
-    values: np.ndarray, name: str, given: Given, said: list[str]
+    values: np.ndarray, name: str, given: Given, remarks: list[str]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Times of a column of a matrix that rises evenly, and the other columns."""
+    """Return the times of a column that rises evenly, and the other columns."""
     count = values.shape[2]
     rising = [p for p in range(count) if np.isrealobj(values) and rises(values[0, :, p])]
     if not rising or count < 2:
         return np.empty(0), values
+    column = f"column {rising[0] + 1} of '{name[:40]}' rises evenly"
     if given.rate is None:
-        raise ValueError(
-            f"column {rising[0] + 1} of '{name[:40]}' rises evenly as times do; give --rate in Hz, "
-            "or save the times as an array 't' in s"
-        )
-    said.append(f"column {rising[0] + 1} of '{name[:40]}' rises evenly and is taken as time")
+        raise ValueError(f"{column} as times do; give --rate, or save times as an array 't' in s")
+    remarks.append(f"{column} and is taken as time")
     return values[0, :, rising[0]].astype(float), np.delete(values, rising[0], axis=2)
 
 
 def _scalar(arrays: Arrays, names: tuple[str, ...]) -> float:
-    """The first single number by these names; nan if there is none."""
-    found = (arrays[name] for name in names if name in arrays)
-    numbers = (one.ravel()[0] for one in found if one.dtype.kind in "fiu" and one.size == 1)
-    return float(next(numbers, np.nan))
+    """Return the first single number with one of these names, or nan."""
+    for name in names:
+        array = arrays.get(name, np.empty(0))
+        if array.dtype.kind in "fiu" and array.size == 1:
+            return float(array.ravel()[0])
+    return float("nan")
 
 
 def _rate(arrays: Arrays) -> float:
-    """Sampling rate in Hz by its usual names; nan if there is none."""
     rate, interval = _scalar(arrays, RATES), _scalar(arrays, INTERVALS)
     return rate if rate > 0 else 1 / interval if interval > 0 else np.nan
 
 
 def _places(arrays: Arrays) -> Floats:
-    """Places (p, 2) in metre, of the first two coordinates; (0, 2) if there are none."""
+    """Return places (p, 2) in metres from the first two coordinates; (0, 2) if there are none."""
     for name in (*PLACES, *MILLIMETRES):
-        found = arrays.get(name, np.empty(0))
-        if found.dtype.kind not in "fiu" or found.ndim != 2 or not {2, 3} & set(found.shape):
+        array = arrays.get(name, np.empty(0))
+        if array.dtype.kind not in "fiu" or array.ndim != 2 or not {2, 3} & set(array.shape):
             continue
-        points = (found if found.shape[1] in (2, 3) else found.T)[:, :2].astype(np.float64)
+        points = (array if array.shape[1] in (2, 3) else array.T)[:, :2].astype(np.float64)
         points = points / 1e3 if name in MILLIMETRES else points
         if (largest := np.nanmax(np.abs(points), initial=0.0)) > FARTHEST:
             raise ValueError(
-                f"'{name}' reaches {largest:g} m; call an array in mm 'places_mm', or give --places"
+                f"'{name}' reaches {largest:g} m; name it 'places_mm', or give --places"
             )
         return points
     return np.empty((0, 2))
 
 
 def _word(arrays: Arrays, name: str) -> str:
-    found = arrays.get(name, np.empty(0))
-    return str(found.ravel()[0]).strip()[:80] if found.dtype.kind == "U" and found.size else ""
+    array = arrays.get(name, np.empty(0))
+    return str(array.ravel()[0]).strip()[:80] if array.dtype.kind == "U" and array.size else ""
 
 
 def _real(values: np.ndarray, name: str) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Models beside a measurement: lines, delay, gain, and differences that exceed the noise."""
+"""Comparison of models with a measurement: lines, delay, gain, and differences beyond the noise."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,13 +16,12 @@ from skinwave.measure.lines import (
     MeasuredLines,
     as_response,
     bin_width,
-    departures,
     evenly,
     holm,
     lines_of,
     measurable,
 )
-from skinwave.measure.measurement import Measurement
+from skinwave.measure.measurement import Measurement, strongest
 from skinwave.models.options import sample_times
 from skinwave.models.reduced import ReducedBody, answer
 from skinwave.planning.simulate import compute
@@ -32,20 +31,20 @@ from skinwave.results.run import ASSESSED, Run, own_names
 from skinwave.scene.scene import Scene, check_motion
 from skinwave.typing import Floats
 
-WITHIN = 0.75  # of a record, or of the Tacton, that is to lie within the other
-LEVEL = 0.05  # chance that any difference at all is declared where there is none
-AGREES, DIFFERS, NUMERICAL, SILENT, UNKNOWN = (
+LEAST_OVERLAP = 0.75  # of the shorter one of record and Tacton
+LEVEL = 0.05  # probability that any difference is declared where there is none
+AGREES, DIFFERS, NUMERICAL, NO_LINE, UNKNOWN = (
     "within the noise", "beyond the noise", "beyond the noise, within the numerical error",
     "no line above the noise", "noise unknown",
 )  # fmt: skip
-MEASURED = "measured"  # body and model of what is drawn beside the models
+MEASURED = "measured"  # body and model of the measurement in figures
 MOST_DRAWN = 8  # places
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Measured:
-    """A measurement to compare with, and its delay in s and its gain if they are known; the gain is
-    that of bodies, since kernels are of another unit.
+    """A measurement to compare with, its delay in s and its gain if known. The gain is that of
+    bodies, because kernels have another unit.
     """
 
     measurement: Measurement
@@ -55,125 +54,91 @@ class Measured:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ModelColumn:
-    """A model beside a measurement.
+    """A model compared with a measurement."""
 
-    Parameters
-    ----------
-    run : Run, in the measurement's quantity or, of a kernel, in Pa
-    alignment : Alignment
-    model : (f, p) complex, its lines with gain and delay, in the unit of the measurement
-    significance : (f, p) float, of differences, adjusted for their number (Holm); nan if unknown
-    misfit : float, RMS difference of the lines over all places over that of the measured lines
-    may_be_turned : bool, whether the measurement with its sign turned fits as well
-    """
-
-    run: Run
+    run: Run  # in the measured quantity or, for a kernel, in Pa
     alignment: Alignment
-    model: np.ndarray
-    significance: Floats
-    misfit: float
-    may_be_turned: bool = False
+    model: np.ndarray  # (f, p) complex, its lines with gain and delay
+    p_values: Floats  # (f, p), of differences, adjusted for their number (Holm); nan if unknown
+    misfit: float  # RMS difference of the lines over that of the measured lines
+    may_be_flipped: bool = False  # whether the opposite sign fits as well
 
     @property
     def differs(self) -> np.ndarray:
         """Mask (f, p) of differences beyond the noise."""
         with np.errstate(invalid="ignore"):
-            return np.asarray(self.significance < LEVEL)
+            return np.asarray(self.p_values < LEVEL)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeasuredComparison:
-    """A measurement beside models.
-
-    Parameters
-    ----------
-    measurement : Measurement
-    scene : Scene, at the places and in the quantity of the measurement
-    names : names of each line by the first of them, in the order of the lines
-    lines : MeasuredLines, of these
-    present : (f, p) float, significance of each line, adjusted for their number; nan if unknown
-    unresolved : names of lines of the load that the record cannot resolve
-    halves : (2, f, p) float, amplitudes in both halves of what is fitted of the record, which
-        are the same if the motion is steady
-    columns : of the models
-    claims : what the measurement alone says of the paper's claims
-    """
+    """Models compared with a measurement."""
 
     measurement: Measurement
-    scene: Scene
-    names: Mapping[str, tuple[str, ...]]
+    scene: Scene  # at the places and in the quantity of the measurement
+    names: Mapping[str, tuple[str, ...]]  # all names of each line by the first
     lines: MeasuredLines
-    present: Floats
-    unresolved: tuple[str, ...]
-    halves: Floats
+    present: Floats  # (f, p), adjusted p-value of each line in noise; nan if unknown
+    unresolved: tuple[str, ...]  # lines of the load that the record cannot resolve
     columns: tuple[ModelColumn, ...]
-    claims: tuple[MeasuredClaim, ...]
+    claims: tuple[MeasuredClaim, ...]  # of the paper, assessed on the measurement alone
 
     @property
     def noise(self) -> float:
-        """Misfit that noise alone would leave; nan if it is unknown. Lines of unknown noise count
-        as the others do.
-        """
+        """Misfit that noise alone would leave; nan if unknown."""
         known = self.lines.variance[np.isfinite(self.lines.variance)]
-        whole = float((np.abs(self.lines.mean) ** 2).sum())
-        return float(np.sqrt(known.mean() * self.lines.variance.size / whole)) if len(known) else (
-            np.nan)  # fmt: skip
+        if not len(known):
+            return float("nan")
+        power = float((np.abs(self.lines.mean) ** 2).sum())
+        return float(np.sqrt(known.mean() * self.lines.variance.size / power))
 
     @property
     def bodies(self) -> list[ModelColumn]:
-        """The columns of waves: of the bodies, or of the last kernel if there is none."""
+        """Columns of bodies, or the last kernel if there are none."""
         bodies = [c for c in self.columns if c.run.response.record.of_body]
         return bodies or list(self.columns[-1:])
 
     @property
     def main(self) -> ModelColumn:
-        """The last column of waves."""
+        """The last of the bodies."""
         return self.bodies[-1]
 
     def is_numerical(self, column: ModelColumn) -> np.ndarray:
-        """Mask (f, p) of differences no larger than the numerical error that a model's waveform is
-        expected to have at that place.
-        """
+        """Return a mask (f, p) of differences within the expected numerical error of a model."""
         away = np.abs(self.lines.mean - column.model)
         error = np.nan_to_num(column.run.response.expected_error)
         return np.asarray(away <= error * np.linalg.norm(column.model, axis=0))
 
     def findings(self, column: ModelColumn) -> np.ndarray:
-        """Finding (f, p) of each difference: one of `AGREES` to `UNKNOWN`."""
+        """Return one of `AGREES` to `UNKNOWN` (f, p) for each difference."""
         with np.errstate(invalid="ignore"):
-            silent = self.present >= LEVEL
-        found = np.where(silent, SILENT, AGREES).astype(object)
-        found[column.differs] = DIFFERS
-        found[column.differs & self.is_numerical(column)] = NUMERICAL
-        found[np.isnan(column.significance)] = UNKNOWN
-        return found
+            is_noise = self.present >= LEVEL
+        findings = np.where(is_noise, NO_LINE, AGREES).astype(object)
+        findings[column.differs] = DIFFERS
+        findings[column.differs & self.is_numerical(column)] = NUMERICAL
+        findings[np.isnan(column.p_values)] = UNKNOWN
+        return findings
 
     @property
     def drawn_places(self) -> np.ndarray:
-        """Indices of the places that figures show: all, or some, the strongest and the weakest."""
-        size = np.linalg.norm(self.lines.mean, axis=0)
-        if len(size) <= MOST_DRAWN:
-            return np.arange(len(size))
-        order = np.argsort(-size, kind="stable")
-        return np.sort(order[np.linspace(0, len(size) - 1, MOST_DRAWN).round().astype(int)])
+        """Indices of the places in figures, those with the strongest lines."""
+        return strongest(np.linalg.norm(self.lines.mean, axis=0), MOST_DRAWN)
 
 
-def compare_measured(asked: Measured, runs: Sequence[Run]) -> MeasuredComparison:
-    """Models beside a measurement, by runs of one Tacton at its places and, of bodies, in its
-    quantity; raises a ValueError if the record resolves no line of the load.
+def compare_measured(measured: Measured, runs: Sequence[Run]) -> MeasuredComparison:
+    """Return the comparison of runs of one Tacton, at the places and, for bodies, in the quantity
+    of the measurement. Raises a ValueError if the record resolves no line of the load.
     """
-    measurement = asked.measurement
+    measurement = measured.measurement
     bodies = [run for run in runs if run.response.record.of_body]
-    scene = (bodies or list(runs))[-1].scene  # of a body, whose load is the scene's own
+    scene = (bodies or list(runs))[-1].scene  # a body has the load of the scene file
     names, frequencies, unresolved = lines_to_compare(measurement, scene)
     lines = lines_of(measurement, frequencies)
     named = by_name(scene, names, lines, unresolved, _spectrum_of(measurement))
-    left = [half.mean for half in departures(measurement, frequencies)] or [0 * lines.mean] * 2
     return MeasuredComparison(
         measurement=measurement, scene=scene, names=names, lines=lines,
-        present=holm(lines.significances(lines.mean)), unresolved=unresolved,
-        halves=np.abs(lines.mean + np.array(left)),
-        columns=tuple(_column(asked, run, lines) for run in runs),
+        present=holm(lines.p_values(lines.mean)), unresolved=unresolved,
+        columns=tuple(_column(measured, run, lines) for run in runs),
         claims=tuple(assess_measured(named)),
     )  # fmt: skip
 
@@ -181,34 +146,32 @@ def compare_measured(asked: Measured, runs: Sequence[Run]) -> MeasuredComparison
 def lines_to_compare(
     measurement: Measurement, scene: Scene
 ) -> tuple[dict[str, tuple[str, ...]], Floats, tuple[str, ...]]:
-    """Lines of the load that both the record and a response of the scene resolve: names by the
-    first of each, frequencies (f,) in Hz, and the names of those left out. Raises a ValueError if
-    there are none.
+    """Return the lines of the load that record and response both resolve: all names by the first,
+    frequencies (f,) in Hz, and the names of the unresolved ones.
     """
     candidates = ASSESSED if len(scene.tacton.foci) == 1 else ()
     clocks = [*_clock(measurement), _silence(sample_times(scene))]
     highest = min(0.5 / step(clock.times) for clock in clocks)
-    found: dict[str, float] = {}
+    lines: dict[str, float] = {}
     lost: dict[str, float] = {}
     for clock in clocks:
         good, bad = resolved_lines(scene.pressure, clock, candidates=candidates, highest=highest)
-        found, lost = (found | good), (lost | bad)
-    reached = dict(zip(found, measurable(measurement, np.array([*found.values()])), strict=True))
-    lost |= {name: f for name, f in sorted(found.items(), key=lambda x: x[1]) if not reached[name]}
-    kept = {n: f for n, f in sorted(found.items(), key=lambda x: x[1]) if n not in lost}
+        lines, lost = (lines | good), (lost | bad)
+    lines = dict(sorted(lines.items(), key=lambda line: line[1]))
+    sampled = measurable(measurement, np.array([*lines.values()]))
+    lost |= {name: lines[name] for name, is_sampled in zip(lines, sampled, strict=True)
+             if not is_sampled}  # fmt: skip
+    kept = {name: f for name, f in lines.items() if name not in lost}
     if not kept:
-        raise ValueError(
-            "the measurement resolves no line of the scene's load; give a longer record, a higher "
-            "sampling rate, or the scene that was measured"
-        )
+        raise ValueError("the record resolves no line of the scene's load; check rate and Tacton")
     own = own_names(scene, kept)
     names = {name: (name, *(n for n, o in own.items() if o == name != n)) for name in kept}
     return names, np.array([*kept.values()]), tuple(lost)
 
 
 def _clock(measurement: Measurement) -> list[Response]:
-    """Silence at the times of a measurement, by which lines are resolved; of a spectrum with equal
-    bins at times whose transform has them.
+    """Return a zero response at the times of a measurement, whose length decides which lines are
+    resolved; for spectra with equal bins, at times whose transform has these bins.
     """
     if not measurement.is_spectrum:
         return [_silence(evenly(measurement))]
@@ -223,7 +186,7 @@ def _silence(times: Floats) -> Response:
 
 
 def _spectrum_of(measurement: Measurement) -> tuple[Floats, Floats]:
-    """Amplitude spectrum of the mean, for peaks; empty of spectra of single lines."""
+    """Return the amplitude spectrum of the mean, empty for single lines."""
     if not measurement.is_spectrum:
         return spectrum(as_response(measurement))
     if not bin_width(measurement):
@@ -231,109 +194,110 @@ def _spectrum_of(measurement: Measurement) -> tuple[Floats, Floats]:
     return measurement.frequencies, np.abs(measurement.mean)
 
 
-def _column(asked: Measured, run: Run, lines: MeasuredLines) -> ModelColumn:
+def _column(measured: Measured, run: Run, lines: MeasuredLines) -> ModelColumn:
     z = line_phasors(run.response, tuple(lines.frequencies.tolist()))
-    gain = asked.gain if run.response.record.of_body else None
-    window, centre = _delay_window(asked.measurement, run, lines)
-    aligned = partial(align, window=window, centre=centre, delay=asked.delay, gain=gain)
-    found = aligned(lines, z)
-    model = found.applied(lines.frequencies, z)
+    gain = measured.gain if run.response.record.of_body else None
+    window, centre = _delay_window(measured.measurement, run, lines)
+    aligned = partial(align, window=window, centre=centre, delay=measured.delay, gain=gain)
+    best = aligned(lines, z)
+    model = best.applied(lines.frequencies, z)
     away = lines.mean - model
-    turned = aligned(replace(lines, each=-lines.each), z)
-    fits = 2 * lines.variance.size * (turned.chi_square - found.chi_square) < AS_GOOD
-    nearer = abs(turned.delay) < abs(found.delay) or turned.chi_square < found.chi_square
+    flipped = aligned(replace(lines, each=-lines.each), z)
+    fits = 2 * lines.variance.size * (flipped.chi_square - best.chi_square) < AS_GOOD
+    is_nearer = abs(flipped.delay) < abs(best.delay) or flipped.chi_square < best.chi_square
     return ModelColumn(
-        run=run, alignment=found, model=model, significance=holm(lines.significances(away)),
+        run=run, alignment=best, model=model, p_values=holm(lines.p_values(away)),
         misfit=float(np.linalg.norm(away) / np.linalg.norm(lines.mean)),
-        may_be_turned=bool(fits and nearer),
+        may_be_flipped=bool(fits and is_nearer),
     )  # fmt: skip
 
 
 def _delay_window(measurement: Measurement, run: Run, lines: MeasuredLines) -> tuple[float, float]:
-    """Width and centre in s of the delays at which most of a record lies within the Tacton, or most
-    of the Tacton within the record; at least a period of the lowest line wide.
+    """Return width and centre in s of the delays at which record and Tacton overlap by at least
+    `LEAST_OVERLAP`; at least a period of the lowest line wide.
     """
     begin, end = (float(t) for t in run.response.times[[0, -1]])
     period = 1 / float(lines.frequencies.min())
     if measurement.is_spectrum:
         return 2 * max(end - begin, period), 0.0
     first, last = (float(t) for t in measurement.times[[0, -1]])
-    within = WITHIN * min(last - first, end - begin)
+    within = LEAST_OVERLAP * min(last - first, end - begin)
     low, high = first + within - end, last - within - begin
     return max(high - low, period), (low + high) / 2
 
 
 def overlap(measurement: Measurement, run: Run, delay: float) -> float:
-    """Time in s of a record that lies within the Tacton, at a delay of the record."""
+    """Return the time in s of a record within the Tacton, at a delay of the record."""
     begin, end = (float(t) + delay for t in run.response.times[[0, -1]])
     return min(float(measurement.times[-1]), end) - max(float(measurement.times[0]), begin)
 
 
-def at_measured(scene: Scene, measurement: Measurement) -> Scene:
-    """The scene with probes where was measured or, where that is unknown, with as many; they read
-    displacement, as every comparison, and are read in the measured quantity beside it.
+def at_measured_places(scene: Scene, measurement: Measurement) -> Scene:
+    """Return the scene with probes at the measured places, which read displacement.
 
-    Raises a ValueError if the quantity is not of normal motion, places are unknown and not as many
-    as probes, or the record resolves no line of the load.
+    Raises a ValueError if the quantity is not normal motion, places are unknown and not as many as
+    probes, or the record resolves no line of the load.
     """
     if not measurement.record.is_normal:
         known = ", ".join(name for name, q in QUANTITIES.items() if q.is_normal and q.of_body)
-        raise ValueError(
-            f"a measured {measurement.record.words} cannot be compared; give one of {known}"
-        )
-    if scene.reading.is_on_surface and scene.reading.record.is_normal:
+        raise ValueError(f"{measurement.record.words} cannot be compared; give one of {known}")
+    if scene.reading.is_on_surface and scene.reading.asked.is_normal:
         scene = replace(scene, quantity=DISPLACEMENT.name)
     check_motion(scene, "a comparison with a measurement")
     if np.isfinite(measurement.places).all():
         scene = replace(scene, probes=tuple(map(tuple, measurement.places.tolist())))
     elif len(scene.probes) != len(measurement.places):
-        raise ValueError(
-            f"the places of the measurement's {len(measurement.places)} signals are unknown, and "
-            f"the scene has {len(scene.probes)} probes; give as many, in the same order"
-        )
+        count = f"{len(measurement.places)} signals at unknown places"
+        raise ValueError(f"give as many probes: {len(scene.probes)} probes, but {count}")
     lines_to_compare(measurement, scene)
     return scene
 
 
 def in_quantity(run: Run, quantity: str, prepared: Mapping[str, ReducedBody]) -> Run:
-    """A body's run read in another quantity of normal motion; a kernel's as it is."""
+    """Return a body's run in another quantity of normal motion; kernels are unchanged."""
     if not run.response.record.of_body or run.response.quantity == quantity:
         return run
     scene = replace(run.scene, quantity=quantity)
     if run.column in prepared:
-        found = answer(replace(prepared[run.column], reading=scene.reading), scene)
+        response = answer(replace(prepared[run.column], reading=scene.reading), scene)
     else:
-        found = compute(scene, run.model)
-    found = replace(found, expected_error=run.response.expected_error)
-    return replace(run, scene=scene, response=found)
+        response = compute(scene, run.model)
+    response = replace(response, expected_error=run.response.expected_error)
+    return replace(run, scene=scene, response=response)
 
 
 def measured_places(comparison: MeasuredComparison) -> MeasuredPlaces:
-    """Places of a measurement with the RMS of its lines, read as displacement, to mark on a map."""
+    """Return the places of a measurement with the RMS of its lines as displacement, for maps."""
     lines, record = comparison.lines, comparison.measurement.record
     factor = record.factor(2j * np.pi * lines.frequencies)[:, None]
     rms = np.sqrt((np.abs(lines.mean / factor) ** 2).sum(axis=0) / 2)
     return MeasuredPlaces(places=comparison.scene.probe_points, rms=rms)
 
 
-def beside(comparison: MeasuredComparison, group: Sequence[Run]) -> list[Run]:
-    """Runs to draw: models in the measured quantity, and the measurement on their clock."""
-    chosen = comparison.drawn_places
-    return [_at_places(run, chosen) for run in (*group, _measured_run(comparison))]
+def runs_to_draw(comparison: MeasuredComparison) -> list[Run]:
+    """Return the models and the measurement on their clock, at the places in figures."""
+    drawn = comparison.drawn_places
+    runs = []
+    for run in (*(column.run for column in comparison.columns), _measured_run(comparison)):
+        scene = replace(run.scene, probes=tuple(run.scene.probes[k] for k in drawn), depth=0.0)
+        response = replace(run.response, probes=run.response.probes[drawn],
+                           values=run.response.values[:, drawn])  # fmt: skip
+        runs.append(replace(run, scene=scene, response=response))
+    return runs
 
 
 def _measured_run(comparison: MeasuredComparison) -> Run:
-    """The mean over the repetitions, each shifted as its lines were, as a run to draw on the clock
-    of a model's response; of spectra the sum of the lines, since their waveform is not there.
+    """Return the mean of the aligned repetitions on the clock of the main model; for spectra, the
+    sum of the lines.
     """
-    measurement, like = comparison.measurement, comparison.main.run
-    delay, shifts = comparison.main.alignment.delay, comparison.lines.shifts
+    measurement, main = comparison.measurement, comparison.main
+    delay, shifts = main.alignment.delay, comparison.lines.shifts
     if measurement.is_spectrum:
-        times = like.response.times
+        times = main.run.response.times
         turned = np.exp(2j * np.pi * np.multiply.outer(times + delay, comparison.lines.frequencies))
         values = (turned @ comparison.lines.mean).real
     else:
-        from scipy.interpolate import CubicSpline  # which takes long to import
+        from scipy.interpolate import CubicSpline  # slow to import
 
         at = evenly(measurement)
         each = (CubicSpline(at, x)(np.clip(at + shift, at[0], at[-1]))
@@ -343,13 +307,4 @@ def _measured_run(comparison: MeasuredComparison) -> Run:
         model=MEASURED, times=times, probes=comparison.scene.probe_points, values=values,
         quantity=measurement.quantity,
     )  # fmt: skip
-    return Run(tacton=like.tacton, body=MEASURED, scene=comparison.scene, response=response)
-
-
-def _at_places(run: Run, chosen: np.ndarray) -> Run:
-    """A run at some of its probes."""
-    response = run.response
-    scene = replace(run.scene, probes=tuple(run.scene.probes[k] for k in chosen), depth=0.0)
-    return replace(run, scene=scene, response=replace(
-        response, probes=response.probes[chosen], values=response.values[:, chosen]
-    ))  # fmt: skip
+    return Run(tacton=main.run.tacton, body=MEASURED, scene=comparison.scene, response=response)

@@ -13,7 +13,7 @@ from skinwave.bodies.parts import solid_of
 from skinwave.measure.intervals import LEVEL, Estimate, Intervals, intervals
 from skinwave.measure.measurement import Measurement
 from skinwave.measure.observed import KINDS, data_of
-from skinwave.measure.parameters import Parameter, check, of_scene, parse
+from skinwave.measure.parameters import Parameter, check_limits, of_scene, parse
 from skinwave.measure.predicted import Target, target, with_reduction
 from skinwave.measure.search import Problem, Solution, solve
 from skinwave.models.flat_body import FLAT_BODY
@@ -32,9 +32,7 @@ STARTS = 8
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fit:
-    """Fit of a scene to a measurement: the target has the scene whose parameters were varied, and
-    the model.
-    """
+    """Fit of a scene to a measurement; the target has the original scene and the model."""
 
     measured: Measurement
     target: Target
@@ -43,31 +41,31 @@ class Fit:
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
-        """Estimates with their intervals, one a parameter."""
+        """Estimates with their intervals, one per parameter."""
         return self.intervals.estimates
 
     @property
     def values(self) -> dict[str, float]:
-        """Values by key at the solution, those that are tied too."""
+        """Values by key at the solution, with ties."""
         return self.solution.problem.parameters.values(self.solution.u)
 
     @property
     def scene(self) -> Scene:
-        """The scene with the estimates. A number has the standard error of its interval, normal or,
-        if it was varied by its logarithm, lognormal; one without an interval, or at a limit, is
-        uniform between its limits. Numbers of a preset that were not fitted keep what is known of
-        the preset.
+        """The scene with the estimates and their spreads.
+
+        The spread of a number is the standard error of its interval, normal or, for a logarithm,
+        lognormal; without an interval, or at a limit, it is uniform between the limits. Numbers of
+        a preset that were not fitted keep the spread of the preset.
         """
         scene, parameters = self.target.scene, self.solution.problem.parameters
         changed = with_values(scene, of_scene(self.values))
-        given = dict(changed.spreads) | _of_presets(scene, changed)
-        given = {key: x for key, x in given.items() if key not in parameters.ties}
+        spreads = dict(changed.spreads) | _of_presets(scene, changed)
+        spreads = {key: spread for key, spread in spreads.items() if key not in parameters.ties}
         each = zip(parameters.free, self.estimates, self.intervals.half.tolist(), strict=True)
-        spreads = {limits.key: _distribution(limits, one, half) for limits, one, half in each}
-        for key in of_scene(dict.fromkeys(spreads, 0.0)):
-            if _has_place(changed, key):
-                given[key] = spreads[key]
-        return with_distributions(changed, given)
+        for limits, estimate, half in each:
+            if of_scene({limits.key: 0.0}) and _may_have_spread(changed, limits.key):
+                spreads[limits.key] = _distribution(limits, estimate, half)
+        return with_distributions(changed, spreads)
 
     @property
     def predicted(self) -> Floats:
@@ -76,7 +74,7 @@ class Fit:
 
     @property
     def misfit(self) -> float:
-        """Relative L2 norm of what the fit leaves of the data."""
+        """Relative L2 norm of the unweighted residual."""
         values = self.solution.problem.data.values
         return float(np.linalg.norm(self.predicted - values) / np.linalg.norm(values))
 
@@ -93,19 +91,18 @@ def fit(
     seed: int = 0,
     progress: Progress = silent,
 ) -> Fit:
-    """Weighted least-squares fit of keys of a scene to a measurement.
+    """Return the weighted least-squares fit of keys of a scene to a measurement.
 
     Parameters
     ----------
-    scene : Scene, whose Tacton is the one that was measured
+    scene : Scene with the Tacton that was measured
     measured : Measurement of displacement, velocity or acceleration
-    vary : "KEY=low:high" each, keys of the scene's file, or "gain", "delay_ms", "offset_x_mm",
-        "offset_y_mm", by which the measurement may differ from it
-    tie : "KEY=expression" each, of keys that are varied
-    kind : "waveforms", "lines" or "amplitudes", what of the measurement; if not given, waveforms
-        or, of spectra, lines
-    model : name of a model, or "auto": the wavenumber integral where the body has one, else "fem"
-    starts : how many, between the limits
+    vary : texts "KEY=low:high" of keys of the scene file, or of "gain", "delay_ms", "offset_x_mm"
+        and "offset_y_mm" of the measurement
+    tie : texts "KEY=expression" of keys that vary
+    kind : "waveforms", "lines" or "amplitudes"; by default waveforms or, for spectra, lines
+    model : name of a model, or "auto": the wavenumber integral for flat bodies, else "fem"
+    starts : number of starts between the limits
     seed : of the starts
     progress : called with the name of the phase and the fraction done
 
@@ -119,29 +116,26 @@ def fit(
     if model == "auto":
         model = FLAT_BODY.name if takes(FLAT_BODY, scene) else "fem"
     aim = target(scene, model, measured.record, measured.places)
-    check(scene, parameters)
+    check_limits(scene, parameters)
     aim = with_reduction(aim, parameters, progress)
-    problem = Problem(
-        parameters=parameters, data=data_of(kind, measured, aim), linear=aim.linear
-    )  # fmt: skip
+    data = data_of(kind, measured, aim)
+    problem = Problem(parameters=parameters, data=data, linear=aim.linear)
     solution = solve(problem, starts, seed, progress)
     return Fit(measured=measured, target=aim, solution=solution, intervals=intervals(solution))
 
 
-def _distribution(limits: Parameter, found: Estimate, half: float) -> Distribution:
-    """Distribution of an estimate by half of its interval, in parts of the range."""
-    if not found.is_resolved or found.at_limit:
+def _distribution(limits: Parameter, estimate: Estimate, half: float) -> Distribution:
+    """Return the distribution of an estimate with half an interval in the unit interval."""
+    if not estimate.is_resolved or estimate.at_limit:
         return Distribution(shape="uniform", measure="bounds", width=(limits.low, limits.high))
     deviation = half * limits.span / float(ndtri((1 + LEVEL) / 2))
     shape = "lognormal" if limits.is_log else "normal"
-    error = found.value * sqrt(expm1(deviation**2)) if limits.is_log else deviation
+    error = estimate.value * sqrt(expm1(deviation**2)) if limits.is_log else deviation
     return Distribution(shape=shape, measure="standard_error", width=(error,))
 
 
-def _has_place(scene: Scene, key: str) -> bool:
-    """Whether a scene file can hold a spread at a key: not of one that is not written, nor of a
-    coordinate.
-    """
+def _may_have_spread(scene: Scene, key: str) -> bool:
+    """Whether a scene file can hold a spread of a key: derived keys and coordinates cannot."""
     if key.partition(".")[2] in DERIVED:
         return False
     path, _, name = key.rpartition(".")
@@ -150,27 +144,28 @@ def _has_place(scene: Scene, key: str) -> bool:
 
 
 def _of_presets(scene: Scene, changed: Scene) -> dict[str, Distribution]:
-    """Distributions of the numbers of presets that became tables: of all moduli, and all losses."""
+    """Return the distributions of all moduli, or all losses, of presets that became tables."""
     left = {spread.key for spread in spreads_of(changed)}
-    found: dict[str, Distribution] = {}
+    spreads: dict[str, Distribution] = {}
     for spread in spreads_of(scene):
         place, _, scale = spread.key.rpartition(".")
         if spread.key not in left and scale in SCALES:
             keys = _scaled_keys(to_table(scene), place, scale)
-            found |= {key: spread.distribution for key in keys if _has_place(changed, key)}
-    return found
+            spreads |= {k: spread.distribution for k in keys if _may_have_spread(changed, k)}
+    return spreads
 
 
 def _scaled_keys(table: Mapping[str, Any], place: str, scale: str) -> Iterator[str]:
-    """Dotted keys of the numbers of a preset that are moduli, or that are losses."""
-    plain = solid_of(value_at(table, place))
-    with_loss = set(_changed(write_material(plain), write_material(plain.scaled(loss=2.0)), place))
-    stiff = _changed(write_material(plain), write_material(plain.scaled(modulus=2.0)), place)
-    yield from with_loss if scale == LOSSES else (key for key in stiff if key not in with_loss)
+    """Yield the dotted keys of the moduli, or of the losses, of a preset."""
+    solid = solid_of(value_at(table, place))
+    plain = write_material(solid)
+    losses = set(_changed(plain, write_material(solid.scaled(loss=2.0)), place))
+    moduli = _changed(plain, write_material(solid.scaled(modulus=2.0)), place)
+    yield from losses if scale == LOSSES else (key for key in moduli if key not in losses)
 
 
 def _changed(one: Any, other: Any, path: str) -> Iterator[str]:
-    """Dotted keys of the numbers in which two tables differ."""
+    """Yield the dotted keys of the numbers in which two tables differ."""
     if isinstance(one, dict | list):
         for key, inner in one.items() if isinstance(one, dict) else enumerate(one):
             yield from _changed(inner, other[key], f"{path}.{key}")

@@ -1,8 +1,8 @@
-"""Headings of columns: what a column holds, where, of which repetition, in which unit.
+"""Headings of columns: quantity, place, repetition and unit of the values below.
 
-`t [s]`, `v(0,0) [mm/s]`, `v(5,0)#2 [mm/s]`, `re u(0,0) [um]`, `phase u(0,0) [deg]`, `drive`, or
-with the unit as in skinwave's own tables: `t_s`, `x_mm`, `velocity_mm_s`. Headings of other
-programs and languages follow from their units, or from a few words.
+skinwave's own headings are `t [s]`, `v(0,0) [mm/s]`, `v(5,0)#2 [mm/s]`, `re u(0,0) [um]`,
+`phase u(0,0) [deg]`, `drive`, or end in the unit: `t_s`, `x_mm`, `velocity_mm_s`. Headings of other
+programs and languages are identified by their units and a few words.
 """
 
 import re
@@ -16,15 +16,15 @@ from skinwave.measure.units import (
     LENGTHS,
     MOTION,
     TIMES,
-    length,
-    plain,
+    canonical,
+    metres,
     quantity_of,
 )
 
 TIME, FREQUENCY, X, Y, Z = "time", "frequency", "x", "y", "z"
 REPETITION, DRIVE, INDEX = "repetition", "drive", "index"
-AROUND = (TIME, FREQUENCY, X, Y, Z, REPETITION, DRIVE, INDEX)  # what is no motion
-SEQUENCE = "Sequence"  # the unit of a count
+NOT_MOTION = (TIME, FREQUENCY, X, Y, Z, REPETITION, DRIVE, INDEX)
+COUNT_UNIT = "Sequence"  # Rigol's unit of a row number
 NAMES = {
     TIME: (
         "t", "time", "times", "zeit", "temps", "tempo", "tiempo", "x_value", "timestamp",
@@ -41,10 +41,10 @@ NAMES = {
     "velocity": ("v", "vel", "velocity"),
     "acceleration": ("a", "acc", "accel", "acceleration"),
 }  # fmt: skip
-ROLE = {name: role for role, names in NAMES.items() for name in names} | {
+ROLES = {name: role for role, names in NAMES.items() for name in names} | {
     name: name for name, record in QUANTITIES.items() if record.of_body
 }
-PARTS = {
+COMPLEX_PARTS = {
     word: part
     for part, words in {
         "re": "re real realteil réel", "im": "im imag imaginary imaginärteil imaginaire",
@@ -52,10 +52,10 @@ PARTS = {
     }.items()
     for word in words.split()
 }  # fmt: skip
-_PART = "|".join(PARTS)
-_COLUMN = re.compile(
+_PART = "|".join(COMPLEX_PARTS)
+_HEADING = re.compile(
     r"(?P<name>[^()\[\]#]*?)\s*"
-    r"(?:\((?P<place>[^()]*,[^()]*)\))?\s*(?:\#(?P<rep>\d{1,9}))?\s*"
+    r"(?:\((?P<place>[^()]*,[^()]*)\))?\s*(?:\#(?P<repetition>\d{1,9}))?\s*"
     r"(?:\[(?P<unit>[^\]]*)\]|\((?P<round>(?:[^(),]|\([^()]*\))*)\))?"
 )
 _SUFFIXES = {
@@ -63,16 +63,15 @@ _SUFFIXES = {
     for units in (TIMES, FREQUENCIES, *MOTION.values(), ANGLES)
     for unit in units
 }
-UNITS = {plain(unit) for unit in _SUFFIXES.values()} | {
-    "V", "mV", "uV", "N", "mN", "Pa", "kPa", "A", "mA", "%", "EU", "a.u.", SEQUENCE, "dB", "",
+UNITS = {canonical(unit) for unit in _SUFFIXES.values()} | {
+    "V", "mV", "uV", "N", "mN", "Pa", "kPa", "A", "mA", "%", "EU", "a.u.", COUNT_UNIT, "dB", "",
 }  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
 class Column:
-    """A column: its `text` as written, `role` ("" if its name says none), `part` of a complex
-    amplitude ("" of real values), `place` in metre (nan where it has none), `repetition` from 1,
-    and `unit`.
+    """Column of a table: its heading `text`, `role` ("" if unknown), `part` of a complex amplitude
+    ("" for real values), `place` in metres (nan if unknown), `repetition` from 1, and `unit`.
     """
 
     text: str
@@ -83,78 +82,85 @@ class Column:
     unit: str = ""
 
     @property
-    def is_motion(self) -> bool:
-        """Whether it has measured values, not what they are at, or the drive."""
-        return self.role not in AROUND
+    def may_be_motion(self) -> bool:
+        """Whether the column may hold measured motion."""
+        return self.role not in NOT_MOTION
 
     @property
-    def is_of_motion(self) -> bool:
-        """Whether its name or unit says that it is motion."""
-        return self.is_motion and bool(self.role or self.part or quantity_of(self.unit))
+    def is_motion(self) -> bool:
+        """Whether the name or the unit identifies the column as motion."""
+        return self.may_be_motion and bool(self.role or self.part or quantity_of(self.unit))
 
 
-def column(text: str, unit: str = "") -> Column:
-    """The column that a heading describes, with the unit below it; raises a ValueError if its place
-    is no pair of numbers.
+def parse_heading(text: str, unit: str = "") -> Column:
+    """Return the column with this heading and with the unit below it, if any.
+
+    Raises a ValueError if the place in the heading is not a pair of numbers.
     """
-    said = " ".join(unicodedata.normalize("NFKC", text).split())
-    apart = re.fullmatch(r"(.+?)(?:\s+/\s*|\s*/\s+|,\s+|\s+in\s+)(\S+)", said)
-    if apart and plain(apart[2]) in UNITS:
-        said = f"{apart[1]} [{apart[2]}]"
-    found = _COLUMN.fullmatch(said)
-    if not found:
-        last = re.fullmatch(r".*[\[(]([^\[\]()]*)[\])]", said)
+    text = " ".join(unicodedata.normalize("NFKC", text).split())
+    heading = text
+    split = re.fullmatch(r"(.+?)(?:\s+/\s*|\s*/\s+|,\s+|\s+in\s+)(\S+)", text)
+    if split and canonical(split[2]) in UNITS:
+        heading = f"{split[1]} [{split[2]}]"
+    match = _HEADING.fullmatch(heading)
+    if not match:
+        last = re.fullmatch(r".*[\[(]([^\[\]()]*)[\])]", heading)
         unit = (unit or (last[1] if last else "")).strip("[]() ")
-        return Column(text=said, role=_role("", unit), unit=unit)
-    words = found["name"].strip().lower()
-    unit = (unit or found["unit"] or found["round"] or "").strip("[]() ")
-    if words not in ROLE and not unit:
-        words, unit = _suffixed(words)
-    parted = re.fullmatch(rf"(?:({_PART})(?:[ _.]+|$))?(.*?)(?:[ _.]+({_PART}))?", words)
-    name, part = (parted[2], PARTS.get(parted[1] or parted[3] or "", "")) if parted else (words, "")
+        return Column(text=heading, role=_role("", unit), unit=unit)
+    words = match["name"].strip().lower()
+    unit = (unit or match["unit"] or match["round"] or "").strip("[]() ")
+    if words not in ROLES and not unit:
+        words, unit = _split_suffix(words)
+    parts = re.fullmatch(rf"(?:({_PART})(?:[ _.]+|$))?(.*?)(?:[ _.]+({_PART}))?", words)
+    name, part = words, ""
+    if parts:
+        name, part = parts[2], COMPLEX_PARTS.get(parts[1] or parts[3] or "", "")
     return Column(
-        text=said,
-        role=ROLE.get(name, "") if found["place"] else _role(name, unit),
-        part=part or ("phase" if plain(unit) in ANGLES else ""),
-        place=_place(found["place"]) if found["place"] else Column.place,
-        repetition=int(found["rep"] or 1),
+        text=heading,
+        role=ROLES.get(name, "") if match["place"] else _role(name, unit),
+        part=part or ("phase" if canonical(unit) in ANGLES else ""),
+        place=_place(match["place"]) if match["place"] else Column.place,
+        repetition=int(match["repetition"] or 1),
         unit=unit,
     )
 
 
 def _role(name: str, unit: str) -> str:
-    """Role of a name without a place. The unit decides where it says another one."""
-    role, of = ROLE.get(name, ""), plain(unit)
-    if ROLE.get(re.sub(r"[ _]?\d+$", "", name)) == TIME:
+    """Return the role of a heading without a place. Where name and unit differ, the unit counts."""
+    role, known_unit = ROLES.get(name, ""), canonical(unit)
+    if ROLES.get(re.sub(r"[ _]?\d+$", "", name)) == TIME:
         role = TIME
-    if of in TIMES or of in FREQUENCIES:
-        return TIME if of in TIMES else FREQUENCY
-    if of == SEQUENCE:
+    if known_unit in TIMES:
+        return TIME
+    if known_unit in FREQUENCIES:
+        return FREQUENCY
+    if known_unit == COUNT_UNIT:
         return INDEX
-    if role in (FREQUENCY, INDEX) and of in UNITS - {""}:
-        return ""
-    if role in (X, Y, Z) and quantity_of(unit) and of not in LENGTHS:
-        return ""
-    return "" if len(name) == 1 and role in MOTION and quantity_of(unit) not in ("", role) else role
+    quantity = quantity_of(unit)
+    differs = (
+        (role in (FREQUENCY, INDEX) and known_unit in UNITS - {""})
+        or (role in (X, Y, Z) and quantity and known_unit not in LENGTHS)
+        or (len(name) == 1 and role in MOTION and quantity not in ("", role))
+    )
+    return "" if differs else role
 
 
-def _suffixed(name: str) -> tuple[str, str]:
-    """Name and unit of one such as "velocity_mm_s"; the longest unit that its end is."""
+def _split_suffix(name: str) -> tuple[str, str]:
+    """Split a name such as "velocity_mm_s" into name and unit, the longest possible."""
     parts = name.split("_")
     for k in range(1, len(parts)):
-        end = "_".join(parts[k:])
-        if unit := next((u for s, u in _SUFFIXES.items() if s.lower() == end), ""):
+        suffix = "_".join(parts[k:])
+        if unit := next((u for s, u in _SUFFIXES.items() if s.lower() == suffix), ""):
             return "_".join(parts[:k]), unit
     return name, ""
 
 
 def _place(text: str) -> tuple[float, float]:
-    """Place in metre of "5,0", in mm unless a unit of length ends it: "0.005,0 m"."""
-    body, _, unit = text.strip().rpartition(" ")
-    if plain(unit) not in LENGTHS:
-        body, unit = text, "mm"
-    parts = body.split(",")
-    if len(parts) != 2:
-        raise ValueError(f"the place ({text[:40]}) of a column is no pair x,y; write (5,0)")
-    x, y = (length(part, unit) for part in parts)
-    return x, y
+    """Return the place in metres of "5,0", in mm unless a unit follows: "0.005,0 m"."""
+    coordinates, _, unit = text.strip().rpartition(" ")
+    if canonical(unit) not in LENGTHS:
+        coordinates, unit = text, "mm"
+    pair = coordinates.split(",")
+    if len(pair) != 2:
+        raise ValueError(f"the place ({text[:40]}) of a column is not a pair x,y; write (5,0)")
+    return metres(pair[0], unit), metres(pair[1], unit)

@@ -1,4 +1,4 @@
-"""Inspection of a measurement: lines, noise floor, mains hum, clipping, and what is missing."""
+"""Inspection of a measurement: lines, noise floor, mains hum, clipping, and missing information."""
 
 from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
@@ -7,72 +7,61 @@ import numpy as np
 
 from simple_model import MovingPressure
 from simple_model.load.line_names import line_names
-from simple_model.numbers import significant
-from simple_model.response import SETTLE
-from skinwave.measure.lines import bin_width, departures, holm
-from skinwave.measure.measurement import Measurement
-from skinwave.measure.noise_floor import floor_of
-from skinwave.measure.spectral_lines import (
+from simple_model.numbers import percent
+from simple_model.response import SETTLE, fit_lines
+from skinwave.measure.line_search import (
     ALARM,
     FEWEST,
     LOWEST,
     LineSpectrum,
     SpectralLine,
+    find_lines,
     peaks,
-    spectral_lines,
 )
+from skinwave.measure.lines import as_response, bin_width, holm, lines_of
+from skinwave.measure.measurement import Measurement
+from skinwave.measure.noise_floor import noise_floor
 from skinwave.typing import Floats
 
-MOST_VALUES = 2_000_000  # that lines are looked for in
+MOST_VALUES = 2_000_000  # that are searched for lines
 MOST_SAMPLES = 100_000  # of a waveform
-FEWEST_BINS = 64  # equally spaced frequencies of a spectrum that has a noise floor
-CHANCE = 0.01  # of a note that a steady motion is not steady
-TURNS = 2.0  # standard errors of a frequency, whose turn of phase is ignored
-SAME = 4.0  # standard errors between two lines that may be one
+FEWEST_BINS = 64  # equally spaced frequencies of a spectrum with a noise floor
+UNSTEADY_CHANCE = 0.01  # that a steady motion is called unsteady
+TURN_ERRORS = 2.0  # standard errors of a frequency, whose turn of phase is ignored
+SAME_LINE = 4.0  # standard errors between two estimates of one line
 
 MAINS = (50.0, 60.0)  # Hz
-WANDER = 0.004  # of its frequency: how far the mains of any grid are from it
-HIGHEST, FALSIFYING = 20, 7  # multiple of the mains frequency: of hum, and of a line of the load
-STRONG = 1e-2  # of the strongest line of the load: what hum may be mistaken for
+MAINS_WANDER = 0.004  # of its frequency
+MOST_HUM, MOST_HUM_ON_LOAD = 20, 7  # multiples of the mains frequency
+STRONG = 1e-2  # of the strongest line of the load, for which hum may be mistaken
 
-RUN, RUNS = 3, 2  # clipped are so many samples in a row at an extreme, so many times,
-LONG = 20  # or one run as long
-BELOW = 0.005  # of the half range: the band next to the extreme that is compared with it
-EXCESS = 6.0  # times the samples in the band; a sinusoid that is rounded has 2.4 at most
+RUN, FEWEST_RUNS = 3, 2  # clipped samples in a row at an extreme, and how many such runs,
+LONG_RUN = 20  # or one run
+BAND = 0.005  # of the half range, next to the extreme
+EXCESS = 6.0  # times the samples in the band; a rounded sinusoid has at most 2.4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Inspection:
-    """Content of a measurement, and what it lacks.
-
-    Parameters
-    ----------
-    measured : Measurement
-    spectrum : LineSpectrum of the `kept` places and samples; None where there are too few
-    origins : of its lines: "mains 50 Hz", "drive" or ""
-    kept : numbers of the places whose lines were looked for
-    clipped : (r, p) int, samples that are cut off
-    constant : numbers of the places where nothing varies
-    missing : sentences
-    """
+    """Content of a measurement, and what is missing."""
 
     measured: Measurement
-    spectrum: LineSpectrum | None
-    origins: tuple[str, ...]
-    kept: np.ndarray
-    clipped: np.ndarray
-    constant: np.ndarray
-    missing: tuple[str, ...]
+    spectrum: LineSpectrum | None  # of the `kept` places; None for too few samples
+    origins: tuple[str, ...]  # of its lines: "mains 50 Hz", "drive" or ""
+    kept: np.ndarray  # indices of the places that were searched for lines
+    clipped: np.ndarray  # (r, p) int, samples that are cut off
+    constant: np.ndarray  # indices of the places where nothing varies
+    missing: tuple[str, ...]  # sentences
 
     @property
     def lines(self) -> tuple[SpectralLine, ...]:
-        """The lines found, by frequency."""
+        """Lines by frequency."""
         return self.spectrum.lines if self.spectrum else ()
 
     @property
     def noise(self) -> Floats:
-        """Noise floor (p,) of the kept places, the median over frequency, unit/sqrt(Hz); of
-        spectra, the unit; nan if it is unknown.
+        """Noise floor (p,) of the kept places, median over frequency, in unit/sqrt(Hz) or, for
+        spectra, the unit; nan if unknown.
         """
         if self.spectrum is None:
             return np.full(len(self.kept), np.nan)
@@ -80,47 +69,42 @@ class Inspection:
 
 
 def inspect(measured: Measurement, *, alarm: float = ALARM) -> Inspection:
-    """Inspection of a measurement, with lines of which noise alone has any with the probability
-    `alarm`; raises a ValueError if that is not between 0 and 1.
+    """Return the inspection of a measurement.
+
+    Noise alone has any line with the probability `alarm`, between 0 and 1.
     """
     if not 0 < alarm < 1:
-        raise ValueError(f"the probability {alarm:g} of a false alarm must be between 0 and 1")
+        raise ValueError(f"the false-alarm probability {alarm:g} must be between 0 and 1")
     missing = list(measured.remarks)
-    if np.isnan(measured.places).any() and not any("place" in said for said in missing):
+    if np.isnan(measured.places).any() and not any("place" in remark for remark in missing):
         missing.append("places are not known; give --places")
     if not len(measured.drive):
         missing.append("no drive is recorded: delays against it are unknown")
     if len(measured.values) == 1:
-        missing.append("one repetition: how far it repeats is unknown")
+        missing.append("one repetition: repeatability is unknown")
     constant = np.flatnonzero(np.ptp(measured.values, axis=1).max(axis=0) == 0)
-    varying = np.setdiff1d(np.arange(len(measured.places)), constant)
-    part = _looked_at(measured)
-    most = max(1, MOST_VALUES // ((part.stop - part.start) * len(measured.values)))
-    kept = varying
+    kept = varying = np.setdiff1d(np.arange(len(measured.places)), constant)
+    # As in a comparison, the first quarter is not used: a motion may begin there.
+    stop = min(len(measured.axis), MOST_SAMPLES)
+    part = slice(0 if measured.is_spectrum else int(SETTLE * stop), stop)
+    most = max(1, MOST_VALUES // ((stop - part.start) * len(measured.values)))
     if len(varying) > most:
         kept = varying[np.linspace(0, len(varying) - 1, most).astype(int)]
-        missing.append(f"lines were looked for at {len(kept)} of {len(varying)} places")
-    if not measured.is_spectrum and part.stop < len(measured.times):
-        missing.append(f"lines were looked for in the first {part.stop / measured.rate:g} s")
+        missing.append(f"lines were searched at {len(kept)} of {len(varying)} places")
+    if not measured.is_spectrum and stop < len(measured.times):
+        missing.append(f"lines were searched in the first {stop / measured.rate:g} s")
     spectrum = _spectrum(measured, kept, part, alarm)
     if not measured.is_spectrum and spectrum and spectrum.lines:
-        looked_at = replace(
-            measured, times=measured.times[: part.stop], drive=np.empty(0),
-            values=measured.values[:, : part.stop, kept], places=measured.places[kept],
+        searched = replace(
+            measured, times=measured.times[:stop], values=measured.values[:, :stop, kept],
+            places=measured.places[kept], drive=np.empty(0),
         )  # fmt: skip
-        missing += _unsteady(looked_at, spectrum.lines)
+        f, error = np.array([(line.frequency, line.error) for line in spectrum.lines]).T
+        missing += unsteady(searched, [f"{x:.4g} Hz" for x in f], f, error)
     return Inspection(
         measured=measured, spectrum=spectrum, origins=_origins(measured, spectrum, part), kept=kept,
         clipped=_clipped_samples(measured), constant=constant, missing=tuple(missing),
     )  # fmt: skip
-
-
-def _looked_at(measured: Measurement) -> slice:
-    """Samples that lines are looked for in: as in a comparison without the first quarter, where a
-    motion may begin; all of spectra.
-    """
-    count = min(len(measured.axis), MOST_SAMPLES)
-    return slice(0 if measured.is_spectrum else int(SETTLE * count), count)
 
 
 def _spectrum(
@@ -132,44 +116,62 @@ def _spectrum(
         return _of_amplitudes(measured, kept, alarm)
     if part.stop - part.start < FEWEST:
         return None
-    return spectral_lines(measured.values[:, part, kept], measured.rate, alarm=alarm)
+    return find_lines(measured.values[:, part, kept], measured.rate, alarm=alarm)
 
 
-def _unsteady(measured: Measurement, lines: Sequence[SpectralLine]) -> list[str]:
-    """A sentence if a line differs between the halves of a record by more than its errors: beyond
-    the noise, and by more than its phase turns if its frequency is `TURNS` errors away.
+def unsteady(
+    measured: Measurement,
+    names: Sequence[str],
+    frequencies: Floats,
+    errors: Floats,
+    least: float = 0.0,
+) -> list[str]:
+    """Return a sentence, without a full stop, if a line of waveforms changes between both halves.
+
+    It changes by more than the noise, by more than the `least` share, and by more than its phase
+    turns within `TURN_ERRORS` of the errors (f,) of its frequency in Hz.
     """
-    first, second = departures(measured, np.array([line.frequency for line in lines]))
+    count = len(measured.times)
+    half = int((1 - SETTLE) * count) // 2
+    if half < 2:
+        return []
+    amplitudes, rest = fit_lines(as_response(measured), frequencies)
+    first, second = (
+        lines_of(
+            replace(measured, times=measured.times[part], values=rest[None, part],
+                    drive=np.empty(0)), frequencies, settle=0.0,
+        )
+        for part in (slice(count - 2 * half, count - half), slice(count - half, count))
+    )  # fmt: skip
     change = second.mean - first.mean
     both = replace(first, variance=first.variance + second.variance)
-    size = np.array([np.sqrt((line.amplitudes**2).sum()) for line in lines])
-    share = np.sqrt((np.abs(change) ** 2).sum(axis=1)) / size
-    half = (1 - SETTLE) / 2 * len(measured.times) / measured.rate
-    turn = 2 * np.pi * half * np.array([line.error for line in lines])
-    sure = (holm(both.significances(change)) < CHANCE).any(axis=1)
-    beyond = np.flatnonzero(sure & (share > TURNS * turn))
+    size = np.linalg.norm(amplitudes, axis=1)
+    share = np.linalg.norm(change, axis=1) / size
+    turn = np.pi * (1 - SETTLE) * count / measured.rate * errors
+    is_sure = (holm(both.p_values(change)) < UNSTEADY_CHANCE).any(axis=1)
+    beyond = np.flatnonzero(is_sure & (share > np.maximum(TURN_ERRORS * turn, least)))
     if not len(beyond):
         return []
     k = beyond[(share * size)[beyond].argmax()]
     return [
-        f"the line at {lines[k].frequency:.4g} Hz changes by {significant(100 * share[k])} % "
-        "between the halves of the record, so the errors of frequencies do not hold: the motion "
-        "is not steady, or lines are too close; cut off what is not steady, or record longer"
+        f"the line at {names[k]} changes by {percent(share[k])} between the halves of the record: "
+        "the motion is not steady, or lines are too close, and errors of lines and frequencies are "
+        "not valid; cut off the unsteady part, or record longer"
     ]
 
 
 def _of_amplitudes(measured: Measurement, kept: np.ndarray, alarm: float) -> LineSpectrum | None:
-    """Lines of complex amplitudes at equally spaced frequencies: local maxima above their median.
+    """Return the lines of spectra with equally spaced frequencies: local maxima above the floor.
 
-    The frequency of one is within half a step, whose uniform distribution has the standard error.
+    The error of a frequency is the standard deviation of a uniform distribution over a bin.
     """
     width, runs = bin_width(measured), len(measured.values)
     if not width or len(measured.frequencies) < FEWEST_BINS:
         return None
     density = np.mean(np.abs(measured.values[:, :, kept]) ** 2, axis=0)
-    floor = floor_of(density, runs)
-    found, chance = peaks(density, floor, runs, alarm, np.empty(0))
-    bins = np.round(found).astype(int)
+    floor = noise_floor(density, runs)
+    position, chance = peaks(density, floor, runs, alarm, np.empty(0))
+    bins = np.round(position).astype(int)
     lines = tuple(
         SpectralLine(frequency=float(measured.frequencies[bins[k]]), error=width / np.sqrt(12),
                      amplitudes=np.sqrt(density[bins[k]]), false_alarm=float(chance[k]))
@@ -179,69 +181,69 @@ def _of_amplitudes(measured: Measurement, kept: np.ndarray, alarm: float) -> Lin
 
 
 def _origins(measured: Measurement, spectrum: LineSpectrum | None, part: slice) -> tuple[str, ...]:
-    """Origins of the lines: the drive, or else mains hum."""
+    """Return the origin of each line: drive, mains hum or ""."""
     if spectrum is None:
         return ()
     duration, driven = np.inf, set()
     if not measured.is_spectrum:
         duration = (part.stop - part.start) / measured.rate
         if len(measured.drive) and np.ptp(measured.drive) > 0:
-            of_drive = spectral_lines(measured.drive[None, part, None], measured.rate).lines
+            of_drive = find_lines(measured.drive[None, part, None], measured.rate).lines
             driven = {
                 k for k, line in enumerate(spectrum.lines)
-                if any(_may_be_one(line, other, 1, duration) for other in of_drive)
+                if any(_is_multiple(line, other, 1, duration) for other in of_drive)
             }  # fmt: skip
     hum = hum_of(spectrum.lines, duration, driven)
     return tuple("drive" if k in driven else hum.get(k, "") for k in range(len(spectrum.lines)))
 
 
-def _may_be_one(line: SpectralLine, other: SpectralLine, n: int, duration: float) -> bool:
-    """Whether a line is the n-th multiple of another within their errors."""
-    within = SAME * float(np.hypot(line.error, n * other.error)) + 0.05 / duration
-    return abs(line.frequency - n * other.frequency) <= within
+def _is_multiple(line: SpectralLine, base: SpectralLine, n: int, duration: float) -> bool:
+    """Whether a line may be the n-th multiple of another within their errors."""
+    within = SAME_LINE * float(np.hypot(line.error, n * base.error)) + 0.05 / duration
+    return abs(line.frequency - n * base.frequency) <= within
 
 
 def hum_of(
     lines: Sequence[SpectralLine], duration: float, driven: Container[int] = ()
 ) -> dict[int, str]:
-    """Names of lines that may be mains hum by their number in `lines`, such as "mains 3 x 50 Hz".
+    """Return names, such as "mains 3 x 50 Hz", by index of the lines that may be mains hum.
 
-    It takes a line at the mains frequency: 200, 400 and 600 Hz may be a load's own. A multiple is
-    one of the mains frequency as found, not of 50 Hz. Lines whose numbers are `driven` are in the
-    drive of the record, and their multiples are no hum; the duration is in s.
+    Hum needs a line at the mains frequency, because 200, 400 and 600 Hz may be lines of a load; its
+    multiples are those of the measured mains frequency. Lines with the indices `driven` are in the
+    recorded drive and do not count. The duration is in s.
     """
-    found: dict[int, str] = {}
+    hum: dict[int, str] = {}
     for mains, base in _mains(lines, driven):
         for k, line in enumerate(lines):
             n = round(line.frequency / base.frequency)
-            if 1 <= n <= HIGHEST and _may_be_one(line, base, n, duration):
-                found.setdefault(k, f"mains {f'{n} x ' * (n > 1)}{mains:g} Hz")
-    return found
+            if 1 <= n <= MOST_HUM and _is_multiple(line, base, n, duration):
+                hum.setdefault(k, f"mains {f'{n} x ' * (n > 1)}{mains:g} Hz")
+    return hum
 
 
 def _mains(
     lines: Sequence[SpectralLine], driven: Container[int]
 ) -> list[tuple[float, SpectralLine]]:
-    """Mains frequencies that lines have, and the line nearest to each."""
-    found = []
+    """Return the mains frequencies that are present, with the nearest line."""
+    present = []
     for mains in MAINS:
         near = [line for k, line in enumerate(lines)
-                if k not in driven and abs(line.frequency - mains) <= WANDER * mains]  # fmt: skip
-        found += [(mains, min(near, key=lambda line: abs(line.frequency - mains)))] if near else []
-    return found
+                if k not in driven and abs(line.frequency / mains - 1) <= MAINS_WANDER]  # fmt: skip
+        if near:
+            present.append((mains, min(near, key=lambda line: abs(line.frequency - mains))))
+    return present
 
 
 def clipped(waveform: Floats) -> int:
-    """How many samples of a waveform (t,) are cut off at its largest or its smallest value.
+    """Return how many samples of a waveform (t,) are cut off at its largest or smallest value.
 
-    A peak that rounding makes flat has as many samples in the next step below it; one that is cut
-    off has not.
+    A peak that rounding flattens has as many samples in the step below; a clipped one has not.
     """
     return _cut_off(waveform) + _cut_off(-waveform) if np.ptp(waveform) > 0 else 0
 
 
 def _clipped_samples(measured: Measurement) -> np.ndarray:
-    """Samples (r, p) that are cut off, by repetition and place; none of spectra."""
+    """Return numbers (r, p) of clipped samples."""
     if measured.is_spectrum:
         return np.zeros((len(measured.values), len(measured.places)), int)
     return np.array([[clipped(waveform) for waveform in run.T] for run in measured.values])
@@ -252,52 +254,47 @@ def _cut_off(x: Floats) -> int:
     at_top = x == top
     edges = np.diff(np.r_[False, at_top, False].astype(int))
     lengths = np.flatnonzero(edges < 0) - np.flatnonzero(edges > 0)
-    if (lengths >= RUN).sum() < RUNS and lengths.max() < LONG:
+    if (lengths >= RUN).sum() < FEWEST_RUNS and lengths.max() < LONG_RUN:
         return 0
-    band = min(top - BELOW * np.ptp(x) / 2, x[x < top].max())
+    band = min(top - BAND * np.ptp(x) / 2, x[x < top].max())
     count, below = int(at_top.sum()), int(((x < top) & (x >= band)).sum())
     return count if count > EXCESS * below else 0
 
 
 def flaws(measured: Measurement, pressure: MovingPressure) -> list[str]:
-    """Sentences, without a full stop, on what falsifies the lines of a load in waveforms: clipping,
-    and mains hum on one of them. There are none of spectra, in which neither can be seen.
+    """Return sentences, without a full stop, on what falsifies the lines of a load in waveforms:
+    clipping, and mains hum on one of them.
     """
     if measured.is_spectrum:
         return []
-    said, cut = [], _clipped_samples(measured)
+    sentences, cut = [], _clipped_samples(measured)
     if cut.any():
         where = measured.place_names(np.flatnonzero(cut.sum(axis=0)))
-        said.append(
+        sentences.append(
             f"the record is clipped: {int(cut.sum()):,} samples in runs at the same extreme, at "
-            f"{where}, which makes lines weaker and adds others; measure with a larger range"
+            f"{where}; this weakens lines and adds others; measure with a larger range"
         )
-    return said + _hum(measured, pressure)
+    return sentences + _hum(measured, pressure)
 
 
 def _hum(measured: Measurement, pressure: MovingPressure) -> list[str]:
-    """Sentences on lines of the load that the record does not resolve from a multiple of a mains
-    frequency, of which there is hum.
-    """
+    """Return sentences on lines of the load that coincide with a multiple of mains hum."""
     load = line_names(pressure)
     strong = load.strengths >= STRONG * load.strengths.max(initial=0.0)
     f, names = load.frequencies[strong], np.array(load.names)[strong]
     apart = 1 / float(np.ptp(measured.times))
 
     def on(mains: float, within: float) -> np.ndarray:
-        n = np.clip(np.round(f / mains), 1, FALSIFYING)
+        n = np.clip(np.round(f / mains), 1, MOST_HUM_ON_LOAD)
         return np.asarray(np.abs(f - n * mains) <= apart + within * n * mains)
 
-    if not any(on(mains, WANDER).any() for mains in MAINS):
-        return []  # and no search for lines, which takes long
+    if not any(on(mains, MAINS_WANDER).any() for mains in MAINS):
+        return []  # without the slow search for lines
     lines = inspect(measured).lines
     driven = [k for k, x in enumerate(lines) if (np.abs(f - x.frequency) <= apart).any()]
-    said = []
-    for _, line in _mains(lines, driven):
-        if (near := on(line.frequency, 0.0)).any():
-            said.append(
-                f"there is mains hum of {line.frequency:.4g} Hz, and {', '.join(names[near])} of "
-                "the load cannot be resolved from a multiple of it: what is measured there may be "
-                "hum"
-            )
-    return said
+    return [
+        f"mains hum of {line.frequency:.4g} Hz is present, and {', '.join(names[near])} of the "
+        "load cannot be resolved from a multiple of it: the measured line may be hum"
+        for _, line in _mains(lines, driven)
+        if (near := on(line.frequency, 0.0)).any()
+    ]

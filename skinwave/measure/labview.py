@@ -1,4 +1,4 @@
-"""LabVIEW's files: measurement files (.lvm) by lvm-read, and TDMS by npTDMS."""
+"""LabVIEW measurement files (.lvm) by lvm-read, and TDMS files by npTDMS."""
 
 import warnings
 from pathlib import Path
@@ -7,105 +7,103 @@ from typing import Any
 import numpy as np
 
 from meshes import reading
-from meshes.reading import read_exported_text
-from skinwave.measure.headers import column
+from meshes.reading import exported_text
+from skinwave.measure.headers import parse_heading
 from skinwave.measure.recording import Given, Recording
-from skinwave.measure.table import Table, recording
-from skinwave.measure.units import plain
+from skinwave.measure.table import Table, recording_of
+from skinwave.measure.units import canonical
 
 LARGEST = 1_000_000_000  # bytes
-MISSING = 'TDMS files need npTDMS; pip install "skinwave[measure]", or export .lvm or .csv'
+AXIS_UNITS = {"Time": "s", "Frequency": "Hz"}
 
 
 def read_lvm(path: Path, given: Given) -> Recording:
-    """The recording in a LabVIEW measurement file of one segment."""
-    return recording(lvm_table(read_exported_text(path, LARGEST)), given)
+    """Return the recording in a LabVIEW measurement file with one segment."""
+    return recording_of(lvm_table(exported_text(path, LARGEST)), given)
 
 
 def lvm_table(text: str) -> Table:
-    """The table in the text of a LabVIEW measurement file; raises what `read_lvm` does."""
+    """Return the table in the text of a LabVIEW measurement file."""
     import lvm_read
 
     try:
-        found = lvm_read.read_str(text.replace("\r\n", "\n"))
-    except Exception:  # whatever is made of spoilt text
-        raise ValueError(
-            "the file is damaged or no LabVIEW measurement file; export it anew"
-        ) from None
-    if found["Segments"] > 1:
-        raise ValueError(f"the file has {found['Segments']} segments; export one of them")
-    return _of_segment(found[0], found.get("X_Columns", "One"))
-
-
-def _of_segment(one: dict[str, Any], x_columns: str) -> Table:
-    """Times, of the file or of its start and step, and the channels of a segment."""
-    names, numbers = list(one["Channel names"]), np.asarray(one["data"], float)
+        content = lvm_read.read_str(text.replace("\r\n", "\n"))
+    except Exception:  # whatever the library raises for damaged text
+        raise ValueError("the LabVIEW measurement file is damaged; export it again") from None
+    if content["Segments"] > 1:
+        raise ValueError(f"the file has {content['Segments']} segments; export one of them")
+    segment, x_columns = content[0], content.get("X_Columns", "One")
+    names, numbers = list(segment["Channel names"]), np.asarray(segment["data"], float)
     if names and names[-1] == "Comment":
         names, numbers = names[:-1], numbers[:, : len(names) - 1]
+    units = [unit.strip() for unit in segment.get("Y_Unit_Label", [])]
     if x_columns == "Multi":
         pairs = range(0, len(names) - 1, 2)
         if any(not np.array_equal(numbers[:, k], numbers[:, 0]) for k in pairs):
-            raise ValueError("channels have times of their own; export them with one X column")
+            raise ValueError("channels differ in their times; export them with one X column")
         kept = [0, *(k + 1 for k in pairs)]
-        names, numbers = [names[k] for k in kept], numbers[:, kept]
-    axis = (one.get("X_Dimension") or ["Time"])[0].strip() or "Time"
-    x_unit = {"Time": "s", "Frequency": "Hz"}.get(axis, axis)
-    units = [unit.strip() for unit in one.get("Y_Unit_Label", [])]
-    units = units[::2] if x_columns == "Multi" else units
+        names, numbers, units = [names[k] for k in kept], numbers[:, kept], units[::2]
     notes: tuple[tuple[str, str], ...] = ()
+    headings = []
     if x_columns == "No":
-        step, start = (np.asarray(one[key], float) for key in ("Delta_X", "X0"))
-        for said, values in (("steps", step), ("starts", start)):
-            if not np.allclose(values[np.isfinite(values)], values[0], rtol=1e-9, atol=0):
-                raise ValueError(f"channels have {said} in time of their own; export one of them")
-        notes = (("delta_x", repr(float(step[0]))), ("x0", repr(float(start[0]))))
-        heads: list[str] = []
+        step, start = (_common(segment, key) for key in ("Delta_X", "X0"))
+        notes = (("delta_x", repr(step)), ("x0", repr(start)))
     else:
-        heads, names = [f"{axis} [{x_unit}]"], names[1:]
-    heads += [f"{name} [{unit}]" if unit else name
-              for name, unit in zip(names, [*units, *[""] * len(names)], strict=False)]  # fmt: skip
-    return Table(columns=tuple(map(column, heads)), numbers=numbers, notes=notes)
+        axis = (segment.get("X_Dimension") or ["Time"])[0].strip() or "Time"
+        headings, names = [f"{axis} [{AXIS_UNITS.get(axis, axis)}]"], names[1:]
+    for name, unit in zip(names, [*units, *[""] * len(names)], strict=False):
+        headings.append(f"{name} [{unit}]" if unit else name)
+    return Table(columns=tuple(map(parse_heading, headings)), numbers=numbers, notes=notes)
+
+
+def _common(segment: dict[str, Any], key: str) -> float:
+    """Return the number that all channels of a segment share."""
+    values = np.asarray(segment[key], float)
+    if not np.allclose(values[np.isfinite(values)], values[0], rtol=1e-9, atol=0):
+        raise ValueError(f"channels differ in {key}; export one of them")
+    return float(values[0])
 
 
 def read_tdms(path: Path, given: Given) -> Recording:
-    """The recording in a TDMS file, whose waveforms tell their start and step; raises a ValueError
-    if channels have other ones, or other lengths.
-    """
+    """Return the recording in a TDMS file whose channels share start, step and length."""
     try:
         from nptdms import TdmsFile
     except ImportError:
-        raise ValueError(MISSING) from None
-    with reading.open_regular(path, LARGEST):
+        raise ValueError(
+            'TDMS files need npTDMS; pip install "skinwave[measure]", or export .lvm or .csv'
+        ) from None
+    with reading.opened(path, LARGEST):
         pass
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             channels = [one for group in TdmsFile.read(path).groups() for one in group.channels()]
-            data = [np.asarray(one[:]) for one in channels]
-    except Exception:  # whatever is made of spoilt bytes
-        raise ValueError("the file is damaged or no TDMS file; export it anew") from None
-    of = [k for k, one in enumerate(data) if one.dtype.kind in "fiuM" and one.size > 1]
-    if not of:
-        raise ValueError("no channel of the TDMS file has numbers; save the signals as such")
-    if len({len(data[k]) for k in of}) > 1:
-        counts = ", ".join(f"{channels[k].name[:20]} {len(data[k]):,}" for k in of)
-        raise ValueError(f"channels have other numbers of samples, {counts[:120]}; export one rate")
-    heads, notes = [], set()
-    for k in of:
-        said = channels[k].properties
-        if data[k].dtype.kind == "M":
-            data[k] = (data[k] - data[k][0]) / np.timedelta64(1, "s")
-            said = said | {"unit_string": "s"}
-        unit = plain(str(said.get("unit_string", "")))
-        heads.append(column(f"{channels[k].name} [{unit}]" if unit else channels[k].name))
-        if step := float(said.get("wf_increment", 0)):
-            notes.add((step, float(said.get("wf_start_offset", 0)), said.get("wf_start_time")))
-    if len(notes) > 1:
-        raise ValueError(
-            "channels differ in step or start and are not simultaneous; export those of one task"
-        )
-    axis = [(("dt", repr(step)), ("x0", repr(start))) for step, start, _ in notes]
-    return recording(
-        Table(columns=tuple(heads), numbers=np.column_stack([data[k] for k in of]).astype(float),
-              notes=axis[0] if axis else ()), given,
-    )  # fmt: skip
+            data = [np.asarray(channel[:]) for channel in channels]
+    except Exception:  # whatever the library raises for damaged bytes
+        raise ValueError("the file is damaged or not a TDMS file; export it again") from None
+    signals = [
+        (channel.name, channel.properties, values)
+        for channel, values in zip(channels, data, strict=True)
+        if values.dtype.kind in "fiuM" and values.size > 1
+    ]
+    if not signals:
+        raise ValueError("no channel of the TDMS file has numbers; save the signals as numbers")
+    if len({len(values) for _, _, values in signals}) > 1:
+        counts = ", ".join(f"{name[:20]} {len(values):,}" for name, _, values in signals)
+        raise ValueError(f"channels differ in length ({counts[:120]}); export those of one rate")
+    columns, series, clocks = [], [], set()
+    for name, properties, values in signals:
+        unit = canonical(str(properties.get("unit_string", "")))
+        if values.dtype.kind == "M":
+            values, unit = (values - values[0]) / np.timedelta64(1, "s"), "s"
+        columns.append(parse_heading(f"{name} [{unit}]" if unit else name))
+        series.append(values)
+        if step := float(properties.get("wf_increment", 0)):
+            start = float(properties.get("wf_start_offset", 0))
+            clocks.add((step, start, properties.get("wf_start_time")))
+    if len(clocks) > 1:
+        raise ValueError("channels differ in step or start; export simultaneous ones")
+    notes = [(("dt", repr(step)), ("x0", repr(start))) for step, start, _ in clocks]
+    numbers = np.column_stack(series).astype(float)
+    table = Table(columns=tuple(columns), numbers=numbers, notes=notes[0] if notes else ())
+    return recording_of(table, given)

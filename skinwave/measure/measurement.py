@@ -7,8 +7,8 @@ import numpy as np
 from simple_model.quantities import Quantity, quantity
 from skinwave.typing import Floats
 
-UNEVEN = 1e-3  # of a sampling interval: what rounding in text files may leave
-MOST_NAMED = 5  # places
+UNEVEN = 1e-3  # of a sampling interval, left by rounding in text files
+MOST_NAMED = 5  # places in a message
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -17,25 +17,30 @@ class Measurement:
 
     Parameters
     ----------
-    quantity : str, name of one of `simple_model.quantities.QUANTITIES`; of the normal motion,
-        positive into the body, the way a pressure pushes
-    places : (p, 2) float, metre, in the plane of the body, as probes are; nan where unknown
-    times : (t,) float, s, rising in equal steps; empty of spectra
-    frequencies : (f,) float, Hz, rising; empty of waveforms
-    values : (r, t, p) float or, of spectra, (r, f, p) complex, SI: repetitions first; a spectrum
+    quantity : str, name of one of `simple_model.quantities.QUANTITIES`, normal to the body and
+        positive into it
+    places : (p, 2) float, metre, in the plane of the body; nan if unknown
+    times : (t,) float, s, rising in equal steps; empty for spectra
+    frequencies : (f,) float, Hz, rising; empty for waveforms
+    values : (r, t, p) float or, for spectra, (r, f, p) complex, in SI: r repetitions; a spectrum
         has the complex amplitudes a of Re a exp(2 pi i f t)
-    drive : (t,) float or (f,) complex, the reference signal that was recorded beside it, in an
-        unknown unit; empty where there is none
-    name, source : str, what it is called, and the file or publication that it is from
-    remarks : sentences on what was missing or assumed when it was read
+    drive : (t,) float or (f,) complex, the recorded reference signal in any unit; may be empty
+    name, source : str, a title, and the file or publication
+    remarks : sentences on what was missing in the file, or assumed
 
-    The arrays are copied, and the copies cannot be written to.
+    Arrays are copied and read-only.
 
     Raises
     ------
     ValueError
         If shapes do not fit, a value is not finite, times are not equally spaced, or the quantity
         is unknown or not one of a body.
+
+    >>> t = np.arange(100) / 1000
+    >>> values = np.sin(2 * np.pi * 140 * t)[None, :, None]
+    >>> record = Measurement(quantity="velocity", places=[[0, 0]], times=t, values=values)
+    >>> record.values.shape, record.rate
+    ((1, 100, 1), 1000.0)
     """
 
     quantity: str
@@ -50,12 +55,10 @@ class Measurement:
 
     def __post_init__(self) -> None:
         if not quantity(self.quantity).of_body:
-            raise ValueError(f"{self.quantity} is not measured on a body; give a quantity of one")
+            raise ValueError(f"a measurement on a body cannot be of {self.quantity}")
         kind = np.complex128 if len(self.frequencies) else np.float64
-        for name, dtype in (
-            ("places", np.float64), ("times", np.float64), ("frequencies", np.float64),
-            ("values", kind), ("drive", kind),
-        ):  # fmt: skip
+        for name in ("places", "times", "frequencies", "values", "drive"):
+            dtype = kind if name in ("values", "drive") else np.float64
             array = np.array(getattr(self, name), dtype)
             if name != "places" and not np.isfinite(array).all():
                 raise ValueError(f"{name} of a measurement must be finite; leave out nan and inf")
@@ -67,47 +70,40 @@ class Measurement:
     def _check(self) -> None:
         if bool(len(self.times)) == bool(len(self.frequencies)):
             raise ValueError("a measurement has either times or frequencies; give one of them")
-        if self.places.ndim != 2 or self.places.shape[1] != 2:
-            raise ValueError(
-                f"places of a measurement have shape {self.places.shape}; give (p, 2) in metre"
-            )
-        expected = len(self.axis), len(self.places)
-        if self.values.ndim != 3 or not len(self.values) or self.values.shape[1:] != expected:
-            raise ValueError(
-                f"values of a measurement have shape {self.values.shape}; give (repetitions, "
-                f"{expected[0]}, {expected[1]}), by its times or frequencies and places"
-            )
-        if len(self.drive) not in (0, len(self.axis)):
-            raise ValueError(
-                f"the drive of a measurement has {len(self.drive)} values; give {len(self.axis)}"
-            )
+        shape, count = self.places.shape, len(self.axis)
+        if len(shape) != 2 or shape[1] != 2:
+            raise ValueError(f"places of a measurement have shape {shape}; give (p, 2) in metre")
+        expected = (max(len(self.values), 1), count, len(self.places))
+        if self.values.shape != expected:
+            shape = self.values.shape
+            raise ValueError(f"values of a measurement have shape {shape}; give {expected}")
+        if len(self.drive) not in (0, count):
+            raise ValueError(f"drive of a measurement has {len(self.drive)} values; give {count}")
         steps = np.diff(self.axis)
-        if len(steps) and not steps.min() > 0:
+        if not steps.min(initial=1.0) > 0:
             raise ValueError("times or frequencies of a measurement must rise; sort them")
         if len(self.times) > 1 and np.abs(steps - steps.mean()).max() > UNEVEN * steps.mean():
-            raise ValueError(
-                f"times of a measurement must rise in equal steps, and theirs are {steps.min():g} "
-                f"to {steps.max():g} s; sample it evenly"
-            )
+            steps_s = f"{steps.min():g} to {steps.max():g} s"
+            raise ValueError(f"times of a measurement must rise in equal steps, not {steps_s}")
 
     @property
     def axis(self) -> Floats:
-        """Times in s or, of spectra, frequencies in Hz."""
+        """Times in s or, for spectra, frequencies in Hz."""
         return self.times if len(self.times) else self.frequencies
 
     @property
     def is_spectrum(self) -> bool:
-        """Whether it is of complex amplitudes by frequency, not of waveforms."""
+        """Whether values are complex amplitudes by frequency, not waveforms."""
         return len(self.frequencies) > 0
 
     @property
     def record(self) -> Quantity:
-        """The record of its quantity."""
+        """Record of the quantity."""
         return quantity(self.quantity)
 
     @property
     def rate(self) -> float:
-        """Sampling rate of waveforms, Hz; nan of spectra."""
+        """Sampling rate of waveforms, Hz; nan for spectra."""
         times = self.times
         return (len(times) - 1) / float(np.ptp(times)) if len(times) > 1 else float("nan")
 
@@ -117,11 +113,16 @@ class Measurement:
         return np.asarray(self.values.mean(axis=0))
 
     def place_name(self, place: int) -> str:
-        """A place: (5, 0) mm, or its number, from 1, where it is not known."""
+        """Return the position of a place, such as "(5, 0) mm", or its number from 1."""
         x, y = 1e3 * self.places[place]
         return f"({x:.4g}, {y:.4g}) mm" if np.isfinite([x, y]).all() else f"place {place + 1}"
 
     def place_names(self, places: np.ndarray) -> str:
-        """The first of some places."""
+        """Return the names of the first of some places."""
         names = ", ".join(self.place_name(int(p)) for p in places[:MOST_NAMED])
         return names + f" and {len(places) - MOST_NAMED} more" * (len(places) > MOST_NAMED)
+
+
+def strongest(size: Floats, most: int) -> np.ndarray:
+    """Return the indices of the places with the largest of sizes (p,), in their order."""
+    return np.sort(np.argsort(-size, kind="stable")[:most])

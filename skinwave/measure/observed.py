@@ -1,8 +1,7 @@
 """Data of a fit: waveforms, complex amplitudes of lines, or their moduli, with standard errors.
 
-Errors are those of the mean over repetitions. Where there is one repetition, those of lines are as
-`lines` has them, and those of waveforms the remainder itself, whose common scale the residuals of
-the fit then set.
+Errors are those of the mean over repetitions. With one repetition, errors of lines are those of
+`lines`, and errors of waveforms are proportional to the residual, with a scale from the fit.
 """
 
 from collections.abc import Callable, Mapping
@@ -17,107 +16,95 @@ from simple_model.numbers import plural
 from simple_model.response import SETTLE, fit_lines
 from skinwave.measure.lines import MeasuredLines, as_response, holm, lines_of, measurable
 from skinwave.measure.measurement import Measurement
-from skinwave.measure.predicted import SAME, Target, predicted_lines, predicted_waveforms
+from skinwave.measure.predicted import (
+    SAME_LINE,
+    Predict,
+    Target,
+    predicted_lines,
+    predicted_waveforms,
+)
 from skinwave.typing import Complex, Floats
 
 KINDS = ("waveforms", "lines", "amplitudes")
-STEADY = 1.5  # times the remainder of the rest: that of the start of a steady record, at most
-FAINT = 1e-3  # of the largest motion: weaker transients are ignored
-SINGULAR = 1e-3  # of the largest variance: the least that a combination of lines is given
-MOST = 20_000_000  # values of waveforms
-FOURTH = 70.0  # sum of squares of the coefficients of a fourth difference
-WEAK = 0.05  # of the load's strongest line: unresolved ones below it are left out
-NAMED = 3  # of lines in a sentence
-SURE = 0.01  # probability of as strong a line in noise alone, below which it is more than noise
+STEADY = 1.5  # largest residual of the start of a steady record, relative to the rest
+NEGLIGIBLE_TRANSIENT = 1e-3  # of the largest motion
+LEAST_VARIANCE = 1e-3  # of a combination of lines, relative to the largest
+MOST_VALUES = 20_000_000  # of waveforms
+FOURTH_DIFFERENCE = 70.0  # sum of its squared coefficients
+WEAK = 0.05  # of the load's strongest line; weaker unresolved lines are left out
+MOST_NAMED = 3  # lines in a sentence
+NOISE_CHANCE = 0.01  # p-value of a line, below which it is more than noise
 
 
 @dataclass(frozen=True, kw_only=True)
-class LeftOut:
-    """Line of the load that is not fitted, since a reduced body leaves it out, or since it is weak
-    and not resolved: its name, its frequency in Hz, and its `share` of the measured power of all
-    lines less that of noise; nan if it is not resolved, and 0 if it is no stronger than noise.
+class LeftOutLine:
+    """Line of the load that is not fitted, because a reduced body leaves it out, or because it is
+    weak and unresolved.
     """
 
     name: str
-    frequency: float
-    share: float
+    frequency: float  # Hz
+    share: float  # of the measured power of all lines without noise; nan if unresolved
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LoadLines:
-    """Lines of a load in a measurement that a model predicts: their `names` (f,) and what was
-    `found` of them; `lost` are strong lines of the load that the record is too short to resolve,
-    which leak into others; other lines of the load are `left_out`.
-    """
+    """Lines of a load in a measurement that a model predicts."""
 
-    names: tuple[str, ...]
-    found: MeasuredLines
-    lost: tuple[str, ...] = ()
-    left_out: tuple[LeftOut, ...] = ()
+    names: tuple[str, ...]  # (f,)
+    measured: MeasuredLines
+    unresolved: tuple[str, ...] = ()  # strong lines, which leak into others
+    left_out: tuple[LeftOutLine, ...] = ()
 
     @property
     def is_known(self) -> bool:
         """Whether errors are known."""
-        return bool(np.isfinite(self.found.variance).all())
+        return bool(np.isfinite(self.measured.variance).all())
 
     @property
     def error(self) -> Floats:
         """Standard error (f, p) of each real or imaginary part; the same for all if unknown."""
-        a = self.found.mean
+        a = self.measured.mean
         if self.is_known:
-            return _above_none(self.found.amplitude_error, a)
+            return _positive(self.measured.amplitude_error, a)
         return np.full(a.shape, np.sqrt((np.abs(a) ** 2).mean()) if a.size else 1.0)
 
     @property
     def words(self) -> str:
-        """How many there are at how many places."""
-        n, p = self.found.mean.shape
-        return f"{plural(n, 'line')} at {plural(p, 'place')}"
+        """Numbers of lines and places."""
+        n, p = self.measured.mean.shape
+        return f"{counted(n, 'line')} at {counted(p, 'place')}"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Data:
-    """Data of a fit.
+    """Data of a fit, and the prediction of a model."""
 
-    Parameters
-    ----------
-    kind, words : str, one of `KINDS`; what is fitted, with how the errors are known
-    axis : (n,) float, time in s or frequency in Hz
-    values : (n, s) float, SI, what was measured; complex ones as real and imaginary parts
-    error : (n, s) float, their standard errors
-    is_known : bool, whether the errors are known; else up to a common factor
-    predict : values of the parameters -> (n, s)
-    whitening : (1 or p, m, m) float, by which the values of a place over their errors, of m = n s/p
-        and the s/p series of it one after the other, become independent; None if they are
-    lines : names (f,) of the lines that are fitted, if it is to lines
-    left_out : lines of the load that are not, if it is to lines
-    rough : data of the same record that cost less, for the search; None if there are none
-    """
-
-    kind: str
-    words: str
-    axis: Floats
-    values: Floats
-    error: Floats
-    is_known: bool
-    predict: Callable[[Mapping[str, float]], Floats]
+    kind: str  # one of KINDS
+    words: str  # what is fitted, and where the errors are from
+    axis: Floats  # (n,), time in s or frequency in Hz
+    values: Floats  # (n, s) SI, complex ones as real and imaginary parts
+    error: Floats  # (n, s), standard errors
+    is_known: bool  # whether errors are known, or only up to a common factor
+    predict: Predict  # values of the parameters -> (n, s)
+    # Matrices (1 or p, m, m) that make the m values of a place over their errors independent.
     whitening: Floats | None = None
-    lines: tuple[str, ...] = ()
-    left_out: tuple[LeftOut, ...] = ()
-    rough: "Data | None" = None
+    lines: tuple[str, ...] = ()  # fitted lines
+    left_out: tuple[LeftOutLine, ...] = ()  # lines of the load that are not fitted
+    rough: "Data | None" = None  # cheaper data of the same record, for the search
 
     @property
     def is_in_time(self) -> bool:
-        """Whether it is of waveforms."""
+        """Whether the data are waveforms."""
         return self.kind == "waveforms"
 
     @property
     def has_sign(self) -> bool:
-        """Whether a measurement with its sign turned has other values."""
+        """Whether a measurement with the opposite sign has other values."""
         return self.kind != "amplitudes"
 
     def weighted(self, values: Floats) -> Floats:
-        """Values (n, s) in units of their errors, made independent."""
+        """Return values (n, s) in units of their errors, made independent."""
         over = values / self.error
         if self.whitening is None:
             return np.asarray(over)
@@ -128,78 +115,75 @@ class Data:
 
 
 def data_of(kind: str, measured: Measurement, aim: Target) -> Data:
-    """Data of a kind of `KINDS` from a measurement, which the model of a target predicts; raises a
-    ValueError if there are none.
-    """
+    """Return data of a kind of `KINDS`. Raises a ValueError if the measurement has none."""
     return _waveforms(measured, aim) if kind == "waveforms" else _of_lines(kind, measured, aim)
 
 
 def load_lines(measured: Measurement, aim: Target) -> LoadLines:
-    """Lines of a load in a measurement, as far as they are predicted; none if there are none."""
-    load = line_names(aim.scene.pressure)
+    """Return the lines of a load in a measurement, as far as they are predicted."""
+    load, lost = line_names(aim.scene.pressure), dict[str, float]()
     if measured.is_spectrum:
         away = np.abs(measured.frequencies[:, None] - load.frequencies).min(axis=0)
-        near = (away <= SAME * load.frequencies) & measurable(measured, load.frequencies)
+        near = (away <= SAME_LINE * load.frequencies) & measurable(measured, load.frequencies)
         kept = {load.names[k]: float(load.frequencies[k]) for k in np.flatnonzero(near)}
-        lost: Mapping[str, float] = {}
     else:
         kept, lost = resolved_lines(aim.scene.pressure, as_response(measured))
-    found, names = lines_of(measured, np.array(list(kept.values()))), np.array(list(kept))
-    predicted = aim.predicts(found.frequencies)
+    lines, names = lines_of(measured, np.array(list(kept.values()))), np.array(list(kept))
+    predicted = aim.predicts(lines.frequencies)
     strengths = dict(zip(load.names, load.strengths.tolist(), strict=True))
     least = WEAK * float(load.strengths.max(initial=0.0))
     strong = tuple(name for name in lost if strengths.get(name, 0.0) > least)
-    close = (LeftOut(name=name, frequency=f, share=np.nan)
-             for name, f in lost.items() if name not in strong)  # fmt: skip
+    weak = (LeftOutLine(name=name, frequency=f, share=np.nan)
+            for name, f in lost.items() if name not in strong)  # fmt: skip
     return LoadLines(
-        names=tuple(names[predicted].tolist()), found=found.taken(predicted), lost=strong,
-        left_out=(*_not_predicted(names, found, ~predicted), *close),
+        names=tuple(names[predicted].tolist()), measured=lines.only(predicted), unresolved=strong,
+        left_out=(*_not_predicted(names, lines, ~predicted), *weak),
     )  # fmt: skip
 
 
-def _not_predicted(names: np.ndarray, found: MeasuredLines, faint: np.ndarray) -> list[LeftOut]:
-    """Those of measured lines that a reduced body does not predict, the strongest first."""
-    more = np.abs(found.mean) ** 2 - np.nan_to_num(found.variance)
-    whole = max(float(np.maximum(more, 0.0).sum()), 1e-300)
-    chance = found.significances(found.mean)
+def _not_predicted(
+    names: np.ndarray, lines: MeasuredLines, left_out: np.ndarray
+) -> list[LeftOutLine]:  # fmt: skip
+    """Return the measured lines that a reduced body does not predict, the strongest first."""
+    power = np.abs(lines.mean) ** 2 - np.nan_to_num(lines.variance)
+    whole = max(float(np.maximum(power, 0.0).sum()), 1e-300)
+    chance = lines.p_values(lines.mean)
     each = []
-    for k in np.flatnonzero(faint).tolist():
-        is_noise = holm(chance[k]).min(initial=1.0) >= SURE  # of unknown noise nan
-        share = 0.0 if is_noise else max(float(more[k].sum()), 0.0) / whole
-        each.append(LeftOut(name=str(names[k]), frequency=float(found.frequencies[k]), share=share))
+    for k in np.flatnonzero(left_out).tolist():
+        is_noise = holm(chance[k]).min(initial=1.0) >= NOISE_CHANCE  # nan if unknown
+        share = 0.0 if is_noise else max(float(power[k].sum()), 0.0) / whole
+        f = float(lines.frequencies[k])
+        each.append(LeftOutLine(name=str(names[k]), frequency=f, share=share))
     return sorted(each, key=lambda line: -line.share)
 
 
-def some(names: tuple[str, ...]) -> str:
-    """The first of some names."""
-    return ", ".join(names[:NAMED]) + f" and {len(names) - NAMED} more" * (len(names) > NAMED)
+def first_names(names: tuple[str, ...]) -> str:
+    """Return the first of some names, and the number of others."""
+    more = len(names) - MOST_NAMED
+    return ", ".join(names[:MOST_NAMED]) + f" and {more} more" * (more > 0)
 
 
 def _of_lines(kind: str, measured: Measurement, aim: Target) -> Data:
-    """Complex amplitudes as real and imaginary parts, or moduli with that of noise: the mean of
+    """Return complex amplitudes as real and imaginary parts, or moduli including noise: the mean of
     Rice's distribution for weak noise.
     """
     lines = load_lines(measured, aim)
-    if lines.lost:
-        raise ValueError(
-            f"the record of {1e3 * float(np.ptp(measured.times)):.4g} ms is too short to resolve "
-            f"{some(lines.lost)} from other lines of the load; fit waveforms from rest, or a "
-            "longer record"
-        )
+    if lines.unresolved:
+        names = first_names(lines.unresolved)
+        raise ValueError(f"the record is too short to resolve {names}; fit waveforms from rest")
     if not lines.names:
-        raise ValueError(
-            "the measurement resolves no line of the scene's load; give the measured Tacton"
-        )
-    a, f, both = lines.found.mean, lines.found.frequencies, lines.found.correlation
-    predict, runs = predicted_lines(aim, f), len(lines.found.each)
+        raise ValueError("the measurement resolves no line of the scene's load; check the Tacton")
+    amplitudes = lines.measured
+    a, f, correlation = amplitudes.mean, amplitudes.frequencies, amplitudes.correlation
+    predict, runs = predicted_lines(aim, f), len(amplitudes.each)
     noise = f"errors from {runs} repetitions" if runs > 1 else "errors from the noise floor"
     if not lines.is_known:
-        noise = "errors the same for all, as there is one repetition"
+        noise = "equal errors, as there is one repetition"
     data = Data(
         kind=kind, words=f"complex amplitudes of {lines.words}, {noise}", axis=f,
         values=_parts(a), error=np.tile(lines.error, 2), is_known=lines.is_known,
         predict=lambda values: _parts(predict(values)), lines=lines.names, left_out=lines.left_out,
-        whitening=None if both is None else _whitening(both[None]),
+        whitening=None if correlation is None else _whitening(correlation[None]),
     )  # fmt: skip
     if kind == "lines":
         return data
@@ -207,12 +191,12 @@ def _of_lines(kind: str, measured: Measurement, aim: Target) -> Data:
     return replace(
         data, words=f"amplitudes of {lines.words}, {noise}", values=np.abs(a), error=lines.error,
         predict=lambda values: np.sqrt(np.abs(predict(values)) ** 2 + floor),
-        whitening=None if both is None else _whitening(_along(both, a)),
+        whitening=None if correlation is None else _whitening(_of_moduli(correlation, a)),
     )  # fmt: skip
 
 
-def _along(correlation: Floats, a: Complex) -> Floats:
-    """Correlations (p, f, f) of moduli, whose errors are the parts along the amplitudes (f, p)."""
+def _of_moduli(correlation: Floats, a: Complex) -> Floats:
+    """Return the correlations (p, f, f) of the moduli of amplitudes (f, p)."""
     turn = np.exp(1j * np.angle(a.T))
     along = np.concatenate([turn.real, turn.imag], axis=1)
     shared = along[:, :, None] * correlation * along[:, None, :]
@@ -220,58 +204,56 @@ def _along(correlation: Floats, a: Complex) -> Floats:
 
 
 def _whitening(correlation: Floats) -> Floats:
-    """Matrices (p, m, m) that make errors of such correlations (p, m, m) independent."""
+    """Return matrices (p, m, m) that make errors with correlations (p, m, m) independent."""
     values, vectors = np.linalg.eigh(correlation)
-    least = SINGULAR * values.max(axis=-1, keepdims=True, initial=0.0)
+    least = LEAST_VARIANCE * values.max(axis=-1, keepdims=True, initial=0.0)
     return np.asarray(vectors.swapaxes(-1, -2) / np.sqrt(np.maximum(values, least))[..., None])
 
 
 def _waveforms(measured: Measurement, aim: Target) -> Data:
-    """Steady waveforms about their mean as the sum of lines, or waveforms from rest."""
+    """Return steady waveforms about their mean, predicted as a sum of lines, or waveforms from
+    rest.
+    """
     if measured.is_spectrum:
-        raise ValueError("the measurement is of spectra; fit lines or amplitudes")
+        raise ValueError("the measurement has spectra; fit lines or amplitudes")
     count = measured.times.size * len(measured.places)
-    if count > MOST:
-        raise ValueError(
-            f"the waveforms are {count:,} values, the limit is {MOST:,}; fit lines, or less of them"
-        )
+    if count > MOST_VALUES:
+        raise ValueError(f"{count:,} values of waveforms exceed {MOST_VALUES:,}; fit lines")
     lines, mean = load_lines(measured, aim), measured.mean
-    rough = _of_lines("lines", measured, aim) if lines.names and not lines.lost else None
-    if rough and is_steady(measured, lines.found.frequencies):
-        rest = fit_lines(as_response(measured), lines.found.frequencies)[1]
-        data = _of_time(
-            measured, mean - mean.mean(axis=0), _synthesised(measured, aim, lines),
+    frequencies = lines.measured.frequencies
+    rough = _of_lines("lines", measured, aim) if lines.names and not lines.unresolved else None
+    if rough and is_steady(measured, frequencies):
+        rest = fit_lines(as_response(measured), frequencies)[1]
+        data = _in_time(
+            measured, mean - mean.mean(axis=0), _sum_of_lines(measured, aim, frequencies),
             rest.std(axis=0), f"steady waveforms about their mean, as {lines.words}", rough,
         )  # fmt: skip
         return replace(data, lines=lines.names, left_out=lines.left_out)
     if aim.record.is_steady:
-        why = f"are too short to resolve {some(lines.lost)}" if lines.lost else "have a transient"
-        cure = " or a longer record" if lines.lost else ", or fit lines"
-        raise ValueError(
-            f"the waveforms {why}, and {aim.model} has the steady state alone; take another model"
-            + cure
-        )
-    differences = np.diff(mean, 4, axis=0)  # which leave little of smooth motion
-    return _of_time(
-        measured, mean, predicted_waveforms(aim, measured.times),
-        np.sqrt((differences**2).mean(axis=0) / FOURTH), "waveforms from rest at t = 0", rough,
-    )  # fmt: skip
+        names = first_names(lines.unresolved)
+        problem = f"are too short to resolve {names}" if names else "have a transient"
+        cure = "a longer record" if names else "fit lines"
+        raise ValueError(f"the waveforms {problem}, but {aim.model} computes only the steady "
+                         f"state; take another model, or {cure}")  # fmt: skip
+    differences = np.diff(mean, 4, axis=0)  # nearly free of smooth motion
+    noise = np.sqrt((differences**2).mean(axis=0) / FOURTH_DIFFERENCE)
+    predict = predicted_waveforms(aim, measured.times)
+    return _in_time(measured, mean, predict, noise, "waveforms from rest at t = 0", rough)
 
 
 def is_steady(measured: Measurement, frequencies: Floats) -> bool:
-    """Whether lines, fitted to the later part of waveforms, are all of their start, too."""
+    """Whether lines fitted to the later part of waveforms also explain their start."""
     rest = fit_lines(as_response(measured), frequencies)[1]
     n = int(SETTLE * len(rest))
     start, later = (np.sqrt((part**2).mean()) for part in (rest[:n], rest[n:]))
-    return bool(start <= max(STEADY * later, FAINT * np.abs(measured.mean).max()))
+    largest = np.abs(measured.mean).max()
+    return bool(start <= max(STEADY * later, NEGLIGIBLE_TRANSIENT * largest))
 
 
-def _synthesised(
-    measured: Measurement, aim: Target, lines: LoadLines
-) -> Callable[[Mapping[str, float]], Floats]:
-    """Prediction of steady waveforms (t, p) about their mean."""
-    predict = predicted_lines(aim, lines.found.frequencies)
-    waves = np.exp(2j * pi * measured.times[:, None] * lines.found.frequencies)
+def _sum_of_lines(measured: Measurement, aim: Target, frequencies: Floats) -> Predict:
+    """Return the prediction of steady waveforms (t, p) about their mean."""
+    predict = predicted_lines(aim, frequencies)
+    waves = np.exp(2j * pi * measured.times[:, None] * frequencies)
 
     def synthesised(values: Mapping[str, float]) -> Floats:
         x = (waves @ predict(values)).real
@@ -280,31 +262,31 @@ def _synthesised(
     return synthesised
 
 
-def _of_time(
+def _in_time(
     measured: Measurement,
     values: Floats,
     predict: Callable[[Mapping[str, float]], Floats],
-    alone: Floats,
+    noise: Floats,
     words: str,
     rough: Data | None,
 ) -> Data:
-    """Data of waveforms (t, p), with the standard error of the mean over repetitions or, of one
-    repetition, a common multiple of that (p,) of each place `alone`.
+    """Return data of waveforms (t, p). With one repetition, errors are proportional to the noise
+    (p,) of each place.
     """
     r = len(measured.values)
-    error, noise = alone, "errors in proportion to the noise at each place"
+    error, source = noise, "errors in proportion to the noise at each place"
     if r > 1:
         error = np.sqrt(measured.values.var(axis=0, ddof=1).mean(axis=0) / r)
-        noise = f"errors from {r} repetitions"
-    each = np.broadcast_to(_above_none(error, measured.values), values.shape)
+        source = f"errors from {r} repetitions"
+    each = np.broadcast_to(_positive(error, measured.values), values.shape)
     return Data(
-        kind="waveforms", words=f"{words}, {noise}", axis=measured.times, values=values,
+        kind="waveforms", words=f"{words}, {source}", axis=measured.times, values=values,
         error=each, is_known=r > 1, predict=predict, rough=rough,
     )  # fmt: skip
 
 
-def _above_none(error: Floats, values: np.ndarray) -> Floats:
-    """Errors that are not 0, as those of repetitions without noise would be."""
+def _positive(error: Floats, values: np.ndarray) -> Floats:
+    """Return errors above 0, which repetitions without noise would have."""
     least = 1e-9 * float(np.abs(values).max(initial=0.0)) or 1e-300
     return np.asarray(np.maximum(error, least))
 

@@ -1,6 +1,4 @@
-"""A file's recording as it stands, what a user adds to it, and the measurement that both make: in
-SI, positive into the body, at even times without gaps.
-"""
+"""Completion of a file's recording: SI units, positive into the body, even times, no gaps."""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,22 +11,32 @@ from skinwave.measure import units
 from skinwave.measure.measurement import UNEVEN, Measurement
 from skinwave.typing import Floats
 
-LARGEST = 1e100  # of any value in SI: squares of larger ones may overflow
-SLOWEST = 40.0  # Hz of samples: half of it is below all vibrations that are felt
+LARGEST_VALUE = 1e100  # in SI; squares of larger values may overflow
+LOWEST_RATE = 40.0  # Hz; half of it is below all vibrations that are felt
 EXAMPLE = "--quantity velocity --unit mm/s"
-CLOCK = 1e8  # s: later times are counted from an epoch, and become those from the first
-DIGITS = 7  # of times as programs round them
-COARSEST = 0.25  # of a sampling interval: what rounding may leave
+LARGEST_TIME = 1e8  # s; later times count from an epoch
+TIME_DIGITS = 7  # to which programs round times
+LARGEST_ROUNDING = 0.25  # of a sampling interval
 LARGEST_GAPS = 0.1  # of the samples
-LARGEST_ERROR = 0.1  # of the RMS: what interpolation may be wrong by
-TRIALS = 16  # places in a record at which it is tried
-BESIDE = 8  # samples on both sides of each
+LARGEST_GAP_ERROR = 0.1  # of the RMS
+GAP_TRIALS = 16  # positions at which interpolation is tested
+GAP_MARGIN = 8  # samples on both sides of each
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Given:
-    """Options of a user, as `reading.read` has them: each replaces what the file says, None or ""
-    leaves it.
+    """What a user says of a file. Each value replaces what the file says; None or "" keeps it.
+
+    Parameters
+    ----------
+    quantity : "displacement", "velocity", "acceleration" or another of `QUANTITIES`
+    unit : "mm/s", "um", "g", ...; "20 mm/s" if 1 in the file stands for 20 mm/s
+    places : (p, 2) float, metre
+    sign : 1 if positive values are into the body, -1 if out of it
+    rate : Hz, replaces the steps of the file's times; the first sample stays as many steps from 0
+    variable : name of the array of motion in a file with several
+    columns : headings, or numbers from 1, of the columns or channels of motion
+    direction : "x", "y" or "z", the direction of motion in a Universal File
     """
 
     quantity: str = ""
@@ -40,190 +48,176 @@ class Given:
     columns: tuple[str, ...] = ()
     direction: str = ""
 
+    def __post_init__(self) -> None:
+        if self.sign not in (None, 1, -1):
+            raise ValueError(f"sign = {self.sign} must be 1, into the body, or -1, out of it")
+        if self.places is not None:
+            object.__setattr__(self, "places", np.atleast_2d(self.places).astype(float))
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Recording:
-    """Content of a file.
+    """Content of a file, in its own unit."""
 
-    Parameters
-    ----------
-    values : (r, t, p) float or (r, f, p) complex, in the unit of the file
-    times, frequencies : s and Hz; both empty of samples whose rate is to be given
-    rate : Hz, of samples without times; nan if the file has none
-    quantity, unit : str, "" where the file does not say
-    places : (p, 2) float, metre, nan where unknown
-    drive : (t,) or (f,), the reference signal; empty without
-    sign : 1 or -1, of a direction that the file tells, into the body or out of it; 0 if it does not
-    name, remarks : as of `Measurement`
-    """
-
-    values: np.ndarray
-    times: Floats = field(default_factory=lambda: np.empty(0))
-    frequencies: Floats = field(default_factory=lambda: np.empty(0))
-    rate: float = float("nan")
+    values: np.ndarray  # (r, t, p) float or (r, f, p) complex
+    times: Floats = field(default_factory=lambda: np.empty(0))  # s
+    frequencies: Floats = field(default_factory=lambda: np.empty(0))  # Hz
+    rate: float = float("nan")  # Hz, of samples without times
     quantity: str = ""
     unit: str = ""
-    places: Floats
-    drive: np.ndarray = field(default_factory=lambda: np.empty(0))
-    sign: int = 0
+    places: Floats  # (p, 2) metre, nan if unknown
+    drive: np.ndarray = field(default_factory=lambda: np.empty(0))  # (t,) or (f,)
+    sign: int = 0  # 1 into the body, -1 out of it, 0 unknown
     name: str = ""
     remarks: tuple[str, ...] = ()
 
 
-def nowhere(count: int) -> Floats:
-    """Places (p, 2) that are not known."""
+def unknown_places(count: int) -> Floats:
+    """Return places (p, 2) of nan."""
     return np.full((count, 2), np.nan)
 
 
-def completed(found: Recording, given: Given, path: Path) -> Measurement:
-    """The measurement in SI, positive into the body; raises a ValueError with the option that says
-    what neither the file nor the user do.
+def completed(recording: Recording, given: Given, path: Path) -> Measurement:
+    """Return the measurement in SI, positive into the body.
+
+    Raises a ValueError that names the option for what neither the file nor the user says.
     """
-    said = list(found.remarks)
-    quantity, unit = _quantity(found, given)
-    if given.sign not in (None, 1, -1):
-        raise ValueError(f"sign = {given.sign} must be 1, into the body, or -1, out of it")
-    found = _measured(replace(found, places=_places(found, given)), said)
-    times, found = _sampled(found, given, said)
-    values = (given.sign or found.sign or 1) * units.in_si(
-        found.values, units.per_unit(unit, quantity)
-    )
-    if values.size and not np.abs(values).max() < LARGEST:
-        raise ValueError(
-            f"values reach {np.abs(values).max():g} in SI; leave out nan and inf, and check --unit"
-        )
-    if lost := int(np.isnan(found.places).any(axis=1).sum()):
-        said.append(f"of {lost} of {len(found.places)} places the position is not in the file; "
-                    "give --places")  # fmt: skip
-    still = np.flatnonzero((values == values[:, :1]).all(axis=(0, 1)))
+    remarks = list(recording.remarks)
+    quantity, unit = _quantity(recording, given)
+    recording = replace(recording, places=_places(recording, given))
+    recording = _without_empty(recording, remarks)
+    times, recording = _sampled(recording, given, remarks)
+    sign = given.sign or recording.sign
+    values = units.in_si(recording.values, units.motion_divisor(unit, quantity)) * (sign or 1)
+    if values.size and not np.abs(values).max() < LARGEST_VALUE:
+        raise ValueError(f"values reach {np.abs(values).max():g} in SI; check them and --unit")
+    if missing := int(np.isnan(recording.places).any(axis=1).sum()):
+        count = len(recording.places)
+        remarks.append(f"{missing} of {count} places have no position; give --places")
+    still = np.flatnonzero((values == values[:, :1]).all(axis=(0, 1))) + 1
     if len(still) and values.shape[1] > 1:
-        said.append(f"place {', '.join(str(k + 1) for k in still[:8])} has the same value "
-                    "throughout, as without a signal; choose others by --columns")  # fmt: skip
-    if not (given.sign or found.sign):
-        said.append("the file gives no sign: positive is taken as into the body; use "
-                    "--positive out to flip it")  # fmt: skip
+        remarks.append(f"place {', '.join(map(str, still[:8]))} has the same value throughout; "
+                       "choose others by --columns")  # fmt: skip
+    if not sign:
+        remarks.append("the file gives no sign: positive is taken as into the body; use "
+                       "--positive out to flip it")  # fmt: skip
     return Measurement(
-        quantity=quantity, places=found.places, times=times, frequencies=found.frequencies,
-        values=values, drive=found.drive, name=found.name or path.stem, source=path.name,
-        remarks=tuple(dict.fromkeys(said)),
+        quantity=quantity, places=recording.places, times=times,
+        frequencies=recording.frequencies, values=values, drive=recording.drive,
+        name=recording.name or path.stem, source=path.name, remarks=tuple(dict.fromkeys(remarks)),
     )  # fmt: skip
 
 
-def _quantity(found: Recording, given: Given) -> tuple[str, str]:
-    """Quantity and unit."""
-    unit = given.unit or found.unit
-    of_unit = units.quantity_of(unit)
-    quantity = given.quantity or (of_unit if given.unit else "") or found.quantity or of_unit
+def _quantity(recording: Recording, given: Given) -> tuple[str, str]:
+    """Return quantity and unit."""
+    unit = given.unit or recording.unit
+    by_unit = units.quantity_of(unit)
+    quantity = given.quantity or (given.unit and by_unit) or recording.quantity or by_unit
     if not unit:
         if not quantity:
-            raise ValueError(f"what was measured, and its unit, is not in the file; give {EXAMPLE}")
+            raise ValueError(f"the file gives neither quantity nor unit; give {EXAMPLE}")
         known = QUANTITIES.get(quantity)
-        usual = units.plain(known.shown) if known and quantity in units.MOTION else "UNIT"
-        raise ValueError(f"the unit is not in the file; give --unit {usual}")
+        usual = units.canonical(known.shown) if known and quantity in units.MOTION else "UNIT"
+        raise ValueError(f"the file gives no unit; give --unit {usual}")
     if not given.unit and not quantity and "dB" not in unit:
-        raise ValueError(
-            f"the values are in {unit[:40]}, and how much motion that is is not in the file; give "
-            f'--unit "20 mm/s" if 1 {unit[:40]} stands for 20 mm/s'
-        )
+        raise ValueError(f'give the motion that 1 {unit[:40]} stands for: --unit "20 mm/s"')
     if not quantity:
-        units.per_unit(unit, "displacement")  # whose sentence names what is wrong with it
+        units.motion_divisor(unit, "displacement")  # whose error names what is wrong
     return choose("quantity", quantity, [name for name, q in QUANTITIES.items() if q.of_body]), unit
 
 
-def _places(found: Recording, given: Given) -> Floats:
-    count = found.values.shape[2]
-    places = found.places if given.places is None else np.atleast_2d(given.places).astype(float)
+def _places(recording: Recording, given: Given) -> Floats:
+    places = recording.places if given.places is None else given.places
+    count = recording.values.shape[2]
     if places.shape != (count, 2):
-        raise ValueError(
-            f"--places has {len(places)} places, and the file has {count}; give one for each"
-        )
+        raise ValueError(f"--places has {len(places)} places, and the file has {count} signals")
     return places
 
 
-def _measured(found: Recording, said: list[str]) -> Recording:
-    """The recording without places and frequencies of which nothing was measured."""
-    gone = np.isnan(found.values)
-    place = ~gone.all(axis=(0, 1))
+def _without_empty(recording: Recording, remarks: list[str]) -> Recording:
+    """Return the recording without places and frequencies that have no value."""
+    missing = np.isnan(recording.values)
+    place = ~missing.all(axis=(0, 1))
     if not place.any():
         raise ValueError("no place has a value; export the measured values")
     if not place.all():
-        said.append(f"{(~place).sum()} of {len(place)} places have no value and are left out")
-        found = replace(found, values=found.values[:, :, place], places=found.places[place])
-    at = ~gone[:, :, place].any(axis=(0, 2))
-    if not len(found.frequencies) or at.all():
-        return found
-    if 2 * at.sum() < len(at):
-        raise ValueError(f"only {at.sum()} of {len(at)} frequencies have values of all places")
-    said.append(f"{(~at).sum()} frequencies without values are left out")
-    drive = found.drive[at] if len(found.drive) else found.drive
-    return replace(
-        found, values=found.values[:, at], frequencies=found.frequencies[at], drive=drive
+        remarks.append(f"{(~place).sum()} of {len(place)} places have no value and are left out")
+    recording = replace(
+        recording, values=recording.values[:, :, place], places=recording.places[place]
     )
+    at = ~missing[:, :, place].any(axis=(0, 2))
+    if not len(recording.frequencies) or at.all():
+        return recording
+    if 2 * at.sum() < len(at):
+        raise ValueError(f"only {at.sum()} of {len(at)} frequencies have values at all places")
+    remarks.append(f"{(~at).sum()} frequencies without values are left out")
+    drive = recording.drive[at] if len(recording.drive) else recording.drive
+    frequencies, values = recording.frequencies[at], recording.values[:, at]
+    return replace(recording, values=values, frequencies=frequencies, drive=drive)
 
 
-def _sampled(found: Recording, given: Given, said: list[str]) -> tuple[Floats, Recording]:
-    """Even times, and the recording at each of them; samples at the start and the end at which a
-    place has no value are cut off, and others that are missing interpolated.
-    """
-    if len(found.frequencies):
-        if found.frequencies.min() < 0:
+def _sampled(
+    recording: Recording, given: Given, remarks: list[str]
+) -> tuple[Floats, Recording]:  # fmt: skip
+    """Return even times, and the recording at each of them without missing samples."""
+    if len(recording.frequencies):
+        if recording.frequencies.min() < 0:
             raise ValueError("frequencies fall below 0 Hz; export the one-sided spectrum")
-        return np.empty(0), found
-    times, index = _times(found, given, said)
-    runs, samples, count = found.values.shape
-    has_drive = len(found.drive) == samples
+        return np.empty(0), recording
+    times, index = _times(recording, given, remarks)
+    runs, samples, count = recording.values.shape
+    has_drive = len(recording.drive) == samples
     full = np.full((runs, len(times), count + has_drive), np.nan)
-    full[:, index, :count] = found.values
+    full[:, index, :count] = recording.values
     if has_drive:
-        full[:, index, count] = found.drive
+        full[:, index, count] = recording.drive
     if np.isnan(full).any():
-        part = _known_part(full)
+        part = _complete_part(full)
         if cut := len(times) - (part.stop - part.start):
-            said.append(f"{cut} samples at the start or the end without a value are left out")
+            remarks.append(f"{cut} samples at the start or the end have no value and are left out")
         times, full = times[part], full[:, part]
-        _interpolate(full, said)
-    if len(times) > 1 and (rate := 1 / (times[1] - times[0])) < SLOWEST:
-        said.append(f"samples at {rate:.3g} Hz show no vibration that is felt; check the times, or "
-                    "give --rate")  # fmt: skip
-    drive = full[0, :, count] if has_drive else found.drive
-    return times, replace(found, values=full[..., :count], drive=drive)
+        _interpolate(full, remarks)
+    if len(times) > 1 and (rate := 1 / (times[1] - times[0])) < LOWEST_RATE:
+        remarks.append(f"samples at {rate:.3g} Hz show no vibration that is felt; check the times, "
+                       "or give --rate")  # fmt: skip
+    drive = full[0, :, count] if has_drive else recording.drive
+    return times, replace(recording, values=full[..., :count], drive=drive)
 
 
-def _times(found: Recording, given: Given, said: list[str]) -> tuple[Floats, np.ndarray]:
-    """Times of samples, and the number of each sample of the file. A rate that is given replaces
-    steps; the first sample stays as many steps from zero.
-    """
-    count = found.values.shape[1]
-    rate = found.rate if given.rate is None else given.rate
-    if given.rate is None and len(found.times):
-        return _even(found.times)
+def _times(recording: Recording, given: Given, remarks: list[str]) -> tuple[Floats, np.ndarray]:
+    """Return even times, and the index in them of each sample of the file."""
+    count = recording.values.shape[1]
+    rate = recording.rate if given.rate is None else given.rate
+    if given.rate is None and len(recording.times):
+        return _even(recording.times)
     if np.isnan(rate):
-        raise ValueError("the sampling rate is not in the file; give --rate in Hz")
+        raise ValueError("the file gives no sampling rate; give --rate in Hz")
     if not 0 < rate < np.inf:
         raise ValueError(f"the rate of {rate:g} Hz must be above 0 and finite; give --rate in Hz")
-    if len(found.times) < 2:
+    if len(recording.times) < 2:
         return np.arange(count) / rate, np.arange(count)
     try:
-        times, index = _even(found.times)
+        times, index = _even(recording.times)
     except ValueError:
-        span, steps = float(found.times[-1] - found.times[0]), np.diff(found.times)
+        span, steps = float(recording.times[-1] - recording.times[0]), np.diff(recording.times)
         if not span > 0 or steps.max() > max(3 * steps.mean(), 1.5 * np.median(steps[steps > 0])):
             raise
-        times, index = found.times[0] + span * np.linspace(0, 1, count), np.arange(count)
+        times = recording.times[0] + span * np.linspace(0, 1, count)
+        index = np.arange(count)
     step, start = float(times[-1] - times[0]) / (len(times) - 1), float(times[0])
     if not np.isclose(step * rate, 1, rtol=UNEVEN):
         start /= step * rate
-        said.append(f"the file's steps of {step:g} are replaced by 1/{rate:g} s")
+        remarks.append(f"the file's steps of {step:g} s are replaced by 1/{rate:g} s")
     return start + np.arange(len(times)) / rate, index
 
 
 def _even(times: Floats) -> tuple[Floats, np.ndarray]:
-    """Even times (n,) in s of rounded ones with missing rows, and the number (t,) of each.
+    """Return even times (n,) for rounded ones with missing rows, and the index (t,) of each.
 
-    Times that are even within `UNEVEN` come back as they are.
+    Times that are even within `UNEVEN` are returned unchanged.
     """
     largest = float(np.abs(times).max(initial=0.0))
-    if largest > CLOCK:
+    if largest > LARGEST_TIME:
         times = times - times[0]
     steps, index = np.diff(times), np.arange(len(times))
     if not np.isfinite(times).all():
@@ -238,70 +232,61 @@ def _even(times: Floats) -> tuple[Floats, np.ndarray]:
     index = np.concatenate([[0], np.cumsum(np.rint(steps / step).astype(int))])
     step, start = np.polyfit(index, times, 1)
     away = float(np.abs(times - start - step * index).max())
-    rounding = 0.51 * 10.0 ** (np.floor(np.log10(largest)) + 1 - DIGITS)
-    if np.diff(index).min() < 1 or away > max(UNEVEN * step, min(rounding, COARSEST * step)):
-        raise ValueError(
-            f"times of a measurement must rise in equal steps, and theirs are {steps.min():g} to "
-            f"{steps.max():g} s; sample it evenly, or give --rate"
-        )
+    rounding = 0.51 * 10.0 ** (np.floor(np.log10(largest)) + 1 - TIME_DIGITS)
+    allowed = max(UNEVEN * step, min(rounding, LARGEST_ROUNDING * step))
+    if np.diff(index).min() < 1 or away > allowed:
+        steps_s = f"{steps.min():g} to {steps.max():g} s"
+        raise ValueError(f"times must rise in equal steps, not {steps_s}; give --rate if rounded")
     if (missing := index[-1] + 1 - len(index)) > LARGEST_GAPS * len(index):
-        raise ValueError(
-            f"{missing} rows are missing between {len(index)} in equal steps; give a complete part"
-        )
+        raise ValueError(f"{missing} rows are missing between {len(index)}; give a complete part")
     full = start + step * np.arange(index[-1] + 1)
     if away <= UNEVEN * step:
         full[index] = times
     return full, index
 
 
-def _known_part(values: Floats) -> slice:
-    """Samples between the first and the last value of every place of values (r, n, p)."""
+def _complete_part(values: Floats) -> slice:
+    """Return the samples between the first and the last value of every place of (r, n, p)."""
     known, count = ~np.isnan(values), values.shape[1]
     if not known.any(axis=1).all():
         raise ValueError("a repetition of a place has no value; choose others by --columns")
     part = slice(int(known.argmax(axis=1).max()), count - int(known[:, ::-1].argmax(axis=1).max()))
     if part.stop - part.start < (1 - LARGEST_GAPS) * count:
-        raise ValueError(
-            f"of {count} samples only {max(part.stop - part.start, 0)} lie between the first and "
-            "the last value of every place; give the part, or the --columns, with values"
-        )
+        common = max(part.stop - part.start, 0)
+        raise ValueError(f"only {common} of {count} samples are common to all places; give a part")
     return part
 
 
-def _interpolate(values: Floats, said: list[str]) -> None:
-    """Fill the gaps of values (r, n, p) by cubic splines, and say how wrong these are."""
+def _interpolate(values: Floats, remarks: list[str]) -> None:
+    """Fill the gaps of values (r, n, p) by cubic splines."""
     gaps = np.isnan(values)
     if not gaps.any():
         return
-    worst = max(
-        _fill(values[r, :, p], gaps[r, :, p]) for r, p in np.argwhere(gaps.any(axis=1)).tolist()
-    )
-    said.append(
+    error = max(_fill(values[r, :, p], gaps[r, :, p]) for r, p in np.argwhere(gaps.any(axis=1)))
+    remarks.append(
         f"{int(gaps.any(axis=(0, 2)).sum())} samples are missing and interpolated, with an error "
-        f"of about {100 * worst:.2g} % of the RMS"
+        f"of about {100 * error:.2g} % of the RMS"
     )
 
 
 def _fill(row: Floats, gap: np.ndarray) -> float:
-    """Fill the gaps of a row; the error of gaps as long elsewhere, as a fraction of the RMS."""
-    from scipy.interpolate import CubicSpline  # only where it is needed: it takes a while
+    """Fill the gaps of a row; return the error of as long gaps elsewhere, relative to the RMS."""
+    from scipy.interpolate import CubicSpline  # slow to import
 
     known = np.flatnonzero(~gap)
     longest = int(np.diff(known).max()) - 1
-    width = longest + 2 * BESIDE
+    width = longest + 2 * GAP_MARGIN
     free = np.flatnonzero(np.convolve(gap, np.ones(width), "valid") == 0)
     size, error = float(row[known].std()), np.inf
-    if len(free) >= TRIALS and gap.sum() <= LARGEST_GAPS * len(row):
-        hidden, wrong = slice(BESIDE, BESIDE + longest), []
-        for first in free[np.linspace(0, len(free) - 1, TRIALS).astype(int)]:
+    if len(free) >= GAP_TRIALS and gap.sum() <= LARGEST_GAPS * len(row):
+        hidden, away = slice(GAP_MARGIN, GAP_MARGIN + longest), []
+        for first in free[np.linspace(0, len(free) - 1, GAP_TRIALS).astype(int)]:
             at = np.arange(first, first + width)
-            beside = np.delete(at, hidden)
-            wrong.append(CubicSpline(beside, row[beside])(at[hidden]) - row[at[hidden]])
-        error = float(np.sqrt(np.mean(np.square(wrong)))) / size if size > 0 else 0.0
-    if not error <= LARGEST_ERROR:
-        raise ValueError(
-            f"{int(gap.sum())} samples are missing, up to {longest} in a row, which is too long to "
-            "interpolate; give the part without them, or leave out that place by --columns"
-        )
+            others = np.delete(at, hidden)
+            away.append(CubicSpline(others, row[others])(at[hidden]) - row[at[hidden]])
+        error = float(np.sqrt(np.mean(np.square(away)))) / size if size > 0 else 0.0
+    if not error <= LARGEST_GAP_ERROR:
+        missing = f"{int(gap.sum())} samples are missing, up to {longest} in a row"
+        raise ValueError(f"{missing}, too many to interpolate; choose other --columns or a part")
     row[gap] = CubicSpline(known, row[known])(np.flatnonzero(gap))
     return error

@@ -1,5 +1,7 @@
-"""Recordings of tables: which columns hold times or frequencies, motion, and the drive; wide tables
-with a column a place, and long ones with a row a time and place.
+"""Recordings from tables: wide ones with a column per place, long ones with a row per place.
+
+Headings say which columns are times, frequencies, motion and drive. What they leave open follows
+from the numbers, and a remark says so.
 """
 
 import re
@@ -7,37 +9,27 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from skinwave.measure.headers import (
-    DRIVE,
-    FREQUENCY,
-    INDEX,
-    REPETITION,
-    TIME,
-    Column,
-    X,
-    Y,
-    Z,
-)
+from skinwave.measure.headers import DRIVE, FREQUENCY, INDEX, REPETITION, TIME, Column, X, Y, Z
 from skinwave.measure.recording import Given, Recording
 from skinwave.measure.units import (
     FREQUENCIES,
     LENGTHS,
     TIMES,
+    canonical,
+    divisor,
     in_si,
     per_reference,
-    plain,
     quantity_of,
-    scale,
 )
 from skinwave.typing import Floats
 
 EXAMPLE = "t [s], v(0,0) [mm/s], v(5,0) [mm/s]"
-LONG = "t [s], x [mm], y [mm], v [mm/s]"
-OF_DRIVES = ("V", "mV", "N", "mN", "Pa", "kPa", "A", "mA")
-DIRECTIONS = {"into the body": 1, "out of the body": -1}
-STRAIGHT = 1e-2  # of its range: how far a column of rounded times may be from rising evenly
-FEWEST = 4  # rows that show whether a column rises
-# Notes above a table, in lower case.
+LONG_EXAMPLE = "t [s], x [mm], y [mm], v [mm/s]"
+DRIVE_UNITS = ("V", "mV", "N", "mN", "Pa", "kPa", "A", "mA")
+SIGNS = {"into the body": 1, "out of the body": -1}
+UNEVENNESS = 1e-2  # of the range: largest distance of rounded times from a straight line
+FEWEST_ROWS = 4  # that show whether a column rises
+# Keys of notes, in lower case.
 _RATE = re.compile(r"sampl\w*[ _-]*(rate|freq\w*)|abtast(rate|frequenz)|fs|rate")
 _INTERVAL = re.compile(
     r"(sampl\w*|time)[ _-]*(interval|increment|period)|increment|delta_x|dt|tinc"
@@ -46,7 +38,8 @@ _START = re.compile(r"start|x0|t0|trigger offset|first time")
 _BAND = re.compile(r"(band[ _-]*|cent(er|re)[ _-]*)?(frequency|frequenz|fréquence)")
 _AXIS_UNIT = re.compile(r"(horizontal|x|time)[ _-]*units?")
 _UNIT = re.compile(r"(vertical|y)?[ _-]*(units?|einheit)")
-_AXIS = re.compile(r"(?:^|[ _])([xyz])\s*(?:[\[(]|$)")
+_DIRECTION = re.compile(r"(?:^|[ _])([xyz])\s*(?:[\[(]|$)")
+Notes = list[tuple[str, str]]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,346 +50,319 @@ class Table:
     numbers: Floats
     notes: tuple[tuple[str, str], ...] = ()
 
-    def of(self, role: str) -> int:
-        """Number of the only column of a role; -1 if there is none."""
-        found = [k for k, one in enumerate(self.columns) if one.role == role]
-        if len(found) > 1:
-            raise ValueError(f"{len(found)} columns are of {role}; leave one")
-        return found[0] if found else -1
+    def index(self, role: str) -> int:
+        """Return the index of the only column with a role, or -1."""
+        at = [k for k, column in enumerate(self.columns) if column.role == role]
+        if len(at) > 1:
+            raise ValueError(f"{len(at)} columns hold the {role}; export one of them")
+        return at[0] if at else -1
 
     def note(self, key: re.Pattern[str]) -> str:
-        """The first value of the notes whose key is this; "" if there is none."""
+        """Return the first value of a note, or ""."""
         return next((value for name, value in self.notes if key.fullmatch(name) and value), "")
 
     def number(self, key: re.Pattern[str], units: dict[str, float]) -> float:
-        """A number of the notes in SI; nan if it is missing or in another unit."""
-        found = re.fullmatch(r"\D*?([-+.\deE,]+)\s*([^\d\s].*)?", self.note(key))
-        if not found:
+        """Return the number of a note in SI, or nan."""
+        match = re.fullmatch(r"\D*?([-+.\deE,]+)\s*([^\d\s].*)?", self.note(key))
+        if not match:
             return float("nan")
-        unit = re.sub(r"^(k?)Sa?/s$", r"\1Hz", plain(found[2] or ""))
-        unit = unit or (plain(self.note(_AXIS_UNIT)) if units is TIMES else "") or next(iter(units))
+        unit = re.sub(r"^(k?)Sa?/s$", r"\1Hz", canonical(match[2] or ""))
+        if not unit and units is TIMES:
+            unit = canonical(self.note(_AXIS_UNIT))
         try:
-            return float(found[1].replace(",", ".")) / units[unit]
+            return float(match[1].replace(",", ".")) / units[unit or next(iter(units))]
         except (KeyError, ValueError):
             return float("nan")
 
 
-def recording(table: Table, given: Given) -> Recording:
-    """The recording in a table: a column for each place and repetition or, if it has the columns x
-    and y, a row for each time or frequency, place and perhaps repetition.
-
-    Raises a ValueError if its columns do not make a measurement.
-    """
-    table, said = _with_roles(table, given)
+def recording_of(table: Table, given: Given) -> Recording:
+    """Return the recording in a table. Raises a ValueError if its columns are not a measurement."""
+    table, remarks = _with_roles(table, given)
     columns, numbers = table.columns, table.numbers
-    where, of = (table.of(X), table.of(Y)), (table.of(TIME), table.of(FREQUENCY))
-    motion, is_long = [k for k, one in enumerate(columns) if one.is_motion], max(where) >= 0
-    if min(of) >= 0 and not is_long:
-        raise ValueError("columns are of time and of frequency; export one of them")
-    if is_long and (min(where) < 0 or not motion):
-        raise ValueError(f"a table of a row a place needs the columns {LONG}; mend the header")
-    times, frequencies = _axis(table, max(of), given, is_long)
+    motion = [k for k, column in enumerate(columns) if column.may_be_motion]
+    at_time, at_frequency = table.index(TIME), table.index(FREQUENCY)
+    is_long = max(table.index(X), table.index(Y)) >= 0
+    if min(at_time, at_frequency) >= 0 and not is_long:
+        raise ValueError("the table has times and frequencies; export one of them")
+    if is_long and (min(table.index(X), table.index(Y)) < 0 or not motion):
+        raise ValueError(f"a table with a row per place needs the columns {LONG_EXAMPLE}")
+    times, frequencies = _axis(table, max(at_time, at_frequency), given, is_long)
     if not motion:
-        raise ValueError(f"no column is of motion; write a header such as {EXAMPLE}")
-    series = _series(columns, numbers, motion, len(frequencies) > 0)
-    quantity, unit = _agreed([one for one, _ in series], given)
-    drive = _drive(columns, numbers)
+        raise ValueError(f"no column is motion; write a header such as {EXAMPLE}")
+    series = _series(table, motion, len(frequencies) > 0)
+    quantity, unit = _common(series, "role", given.quantity), _common(series, "unit", given.unit)
+    drive = _drive(table)
     if is_long:
         if len(series) > 1:
-            raise ValueError(
-                f"a table of a row a place has {len(series)} columns of motion; leave one"
-            )
+            raise ValueError(f"the table has {len(series)} columns of motion; export one")
         axis, row = np.unique(times if len(times) else frequencies, return_inverse=True)
         times, frequencies = (axis, frequencies) if len(times) else (times, axis)
-        places, spot = _distinct(in_metre(columns, numbers, where))
-        again = table.of(REPETITION)
-        run = np.unique(numbers[:, again], return_inverse=True)[1] if again >= 0 else 0 * row
-        values = _filled(series[0][1], (run, row, spot))
-        drive = _filled(drive, (run, row, spot))[0, :, 0] if len(drive) else drive
+        places, spot = _distinct(coordinates(table))
+        at = table.index(REPETITION)
+        run = np.unique(numbers[:, at], return_inverse=True)[1] if at >= 0 else 0 * row
+        values = _arranged(series[0][1], (run, row, spot))
+        drive = _arranged(drive, (run, row, spot))[0, :, 0] if len(drive) else drive
     else:
         values, places = _by_repetition(series)
     notes = {key: value for key, value in reversed(table.notes) if value}
+    remarks = [value for key, value in table.notes if key == "remark" and value] + remarks
     return Recording(
         values=values, times=times, frequencies=frequencies, quantity=quantity, unit=unit,
-        places=places, drive=drive, sign=DIRECTIONS.get(notes.get("positive", ""), 0),
-        name=notes.get("name", ""),
-        remarks=(*(value for key, value in table.notes if key == "remark" and value), *said),
+        places=places, drive=drive, sign=SIGNS.get(notes.get("positive", ""), 0),
+        name=notes.get("name", ""), remarks=tuple(remarks),
     )  # fmt: skip
 
 
 def _with_roles(table: Table, given: Given) -> tuple[Table, list[str]]:
-    """The table of the columns to keep, with the roles that their headings do not say, and remarks:
-    those of motion are the chosen ones or, if none are, those in a unit of motion.
-    """
-    numbers, said = _rows(table), []
-    columns = [replace(one, unit=per_reference(one.unit)[0]) for one in table.columns]
-    if any(per_reference(one.unit)[1] for one in table.columns):
-        said.append("values are per unit of the reference")
-    roles = {one.role for one in columns}
-    has_places = {X, Y} <= roles and any(
-        one.role in (TIME, FREQUENCY) or plain(one.unit) in LENGTHS for one in columns
-    )
-    for k, one in enumerate(columns):
-        is_lost = one.role in (X, Y, Z) and plain(one.unit) not in LENGTHS
-        is_lost |= one.role == INDEX and not _counts(numbers[:, k])
-        if is_lost and not has_places:
-            columns[k] = replace(one, role="")
-    chosen = _chosen(columns, given.columns)
-    _check_directions(columns, chosen, has_places)
+    """Return the table of the columns to keep, with roles from their numbers, and remarks."""
+    numbers, remarks = _rows(table), []
+    columns = [replace(column, unit=per_reference(column.unit)[0]) for column in table.columns]
+    if any(per_reference(column.unit)[1] for column in table.columns):
+        remarks.append("values are per unit of the reference")
+    roles = {column.role for column in columns}
     has_axis = bool(roles & {TIME, FREQUENCY})
-    for k, one in enumerate(columns) if len(columns) > 1 else ():
-        if not one.is_motion or one.is_of_motion or k in chosen or not rises(numbers[:, k]):
+    has_lengths = any(canonical(column.unit) in LENGTHS for column in columns)
+    has_places = {X, Y} <= roles and (has_axis or has_lengths)
+    for k, column in enumerate(columns) if not has_places else ():
+        is_length = canonical(column.unit) in LENGTHS
+        is_other = column.role in (X, Y, Z) and not is_length
+        if is_other or (column.role == INDEX and not _counts(numbers[:, k])):
+            columns[k] = replace(column, role="")
+    chosen = _chosen(columns, given.columns)
+    directions = [_DIRECTION.search(c.text.lower()) for c in columns if quantity_of(c.unit)]
+    axes = sorted({match[1] for match in directions if match})
+    if len(axes) > 1 and not (chosen or has_places):
+        raise ValueError(f"columns are along {', '.join(axes)}; choose one by --columns")
+    for k, column in enumerate(columns) if len(columns) > 1 else ():
+        if not column.may_be_motion or column.is_motion or k in chosen or not rises(numbers[:, k]):
             continue
         counts = _counts(numbers[:, k]) and numbers[0, k] in (0, 1)
         if counts or not has_axis:
-            columns[k] = replace(one, role=INDEX if counts else TIME)
+            columns[k] = replace(column, role=INDEX if counts else TIME)
         kind = "a count of samples" if counts else "motion" if has_axis else "time"
-        said.append(f"column {k + 1} rises evenly and is taken as {kind}")
+        remarks.append(f"column {k + 1} rises evenly and is taken as {kind}")
     columns = _one_time(columns, numbers)
-    kept = [k for k, one in enumerate(columns) if k in chosen or not one.is_motion]
+    kept = [k for k, column in enumerate(columns) if k in chosen or not column.may_be_motion]
     if not chosen:
-        kept, more = _motion(columns, given)
-        said += more
-    of_axis, unit = table.note(_AXIS_UNIT), table.note(_UNIT)
-    for k, one in enumerate(columns):
-        if not one.unit and (one.role == TIME or (one.is_motion and quantity_of(unit))):
-            columns[k] = replace(one, unit=of_axis if one.role == TIME else unit)
-    found = replace(table, columns=tuple(columns[k] for k in kept), numbers=numbers[:, kept])
-    return found, said
+        kept = _motion(columns, given, remarks)
+    axis_unit, unit = table.note(_AXIS_UNIT), table.note(_UNIT)
+    for k, column in enumerate(columns):
+        if not column.unit and column.role == TIME:
+            columns[k] = replace(column, unit=axis_unit)
+        elif not column.unit and column.may_be_motion and quantity_of(unit):
+            columns[k] = replace(column, unit=unit)
+    kept_columns = tuple(columns[k] for k in kept)
+    return replace(table, columns=kept_columns, numbers=numbers[:, kept]), remarks
 
 
 def _rows(table: Table) -> Floats:
-    """Numbers without empty rows, if times tell which rows are missing."""
-    numbers = table.numbers
-    full = ~np.isnan(numbers).all(axis=1)
-    has_times = any(one.role in (TIME, FREQUENCY) for one in table.columns) or any(
-        rises(column) for column in numbers[full].T
-    )
-    return numbers[full] if has_times else numbers
+    """Return the numbers without empty rows, if times show which rows are missing."""
+    full = ~np.isnan(table.numbers).all(axis=1)
+    has_axis = any(column.role in (TIME, FREQUENCY) for column in table.columns)
+    has_axis = has_axis or any(map(rises, table.numbers[full].T))
+    return table.numbers[full] if has_axis else table.numbers
 
 
 def _counts(numbers: Floats) -> bool:
-    """Whether numbers count rows, by ones."""
     return bool(len(numbers) > 1 and (np.diff(numbers) == 1).all())
 
 
 def rises(numbers: Floats) -> bool:
-    """Whether numbers rise as times do: in steps that are even up to rounding, or always."""
-    if len(numbers) < FEWEST or not np.isfinite(numbers).all() or (np.diff(numbers) < 0).any():
+    """Whether numbers rise as times do: evenly up to rounding, or in every step."""
+    if len(numbers) < FEWEST_ROWS or not np.isfinite(numbers).all() or np.diff(numbers).min() < 0:
         return False
     span = float(np.ptp(numbers))
     even = np.linspace(numbers[0], numbers[-1], len(numbers))
-    straight = np.abs(numbers - even).max() <= STRAIGHT * span
-    return span > 0 and bool(straight or (len(numbers) > 2 * FEWEST and np.diff(numbers).min() > 0))
+    is_even = np.abs(numbers - even).max() <= UNEVENNESS * span
+    rises_always = len(numbers) > 2 * FEWEST_ROWS and np.diff(numbers).min() > 0
+    return span > 0 and bool(is_even or rises_always)
 
 
 def _one_time(columns: list[Column], numbers: Floats) -> list[Column]:
-    """Columns with one of time: constants, such as dates, and copies are none."""
-    found = [k for k, one in enumerate(columns) if one.role == TIME]
-    if len(found) < 2:
+    """Return columns with one of times; constants, such as dates, and copies do not count."""
+    times = [k for k, column in enumerate(columns) if column.role == TIME]
+    if len(times) < 2:
         return columns
-    kept = [k for k in found if len(numbers) == 1 or np.ptp(numbers[:, k])] or found[:1]
-    kept = [k for k in kept if columns[k].unit] or kept
-    for k in kept[1:]:
-        if not np.array_equal(numbers[:, k], numbers[:, kept[0]]):
-            raise ValueError(
-                f"times '{columns[kept[0]].text}' and '{columns[k].text}' differ; export one"
-            )
-    return [replace(one, role=INDEX) if k in found and k != kept[0] else one
-            for k, one in enumerate(columns)]  # fmt: skip
+    varying = [k for k in times if len(numbers) == 1 or np.ptp(numbers[:, k])] or times[:1]
+    first, *others = [k for k in varying if columns[k].unit] or varying
+    for k in others:
+        if not np.array_equal(numbers[:, k], numbers[:, first]):
+            names = f"'{columns[first].text}' and '{columns[k].text}'"
+            raise ValueError(f"the times {names} differ; export one of them")
+    return [
+        replace(column, role=INDEX) if k in times and k != first else column
+        for k, column in enumerate(columns)
+    ]
 
 
 def _chosen(columns: list[Column], wanted: tuple[str, ...]) -> list[int]:
-    """Numbers of the columns that a user names, by heading or by number from 1."""
-    found = []
+    """Return indices of columns that a user names by heading or by number from 1."""
+    chosen = []
     for name in wanted:
-        names = [one.text.lower() for one in columns]
+        names = [column.text.lower() for column in columns]
         bare = [re.sub(r"\s*[\[(].*", "", text) for text in names]
         at = [k for k, text in enumerate(names) if name.lower() in (text, bare[k])]
         if not at and name.isdigit() and 1 <= int(name) <= len(columns):
             at = [int(name) - 1]
         if not at:
-            known = ", ".join(one.text or str(k + 1) for k, one in enumerate(columns))
-            raise ValueError(f"--columns has '{name[:40]}', and the columns are {known[:200]}")
-        found += at
-    return found
+            known = ", ".join(column.text or str(k + 1) for k, column in enumerate(columns))
+            raise ValueError(f"--columns has '{name[:40]}'; the columns are {known[:200]}")
+        chosen += at
+    return chosen
 
 
-def _check_directions(columns: list[Column], chosen: list[int], has_places: bool) -> None:
-    """Refuse columns along several axes, of which none is chosen."""
-    found = [_AXIS.search(one.text.lower()) for one in columns if quantity_of(one.unit)]
-    axes = {one[1] for one in found if one}
-    if len(axes) > 1 and not (chosen or has_places):
-        raise ValueError(
-            f"columns are along {', '.join(sorted(axes))}; choose the normal one by --columns"
-        )
-
-
-def _motion(columns: list[Column], given: Given) -> tuple[list[int], list[str]]:
-    """Numbers of the columns to keep: beside columns in units of motion, one in another unit is the
-    drive and others are left out. Of several quantities the one that is wanted stays.
+def _motion(columns: list[Column], given: Given, remarks: list[str]) -> list[int]:
+    """Return indices of the columns to keep. If columns have units of motion, one in another unit
+    is the drive, and further ones are left out.
     """
-    motion = [k for k, one in enumerate(columns) if one.is_motion]
-    sure = [k for k in motion if quantity_of(columns[k].unit)]
-    apart = [k for k in motion if k not in sure and np.isnan(columns[k].place[0])]
-    names = ", ".join(columns[k].text or str(k + 1) for k in apart)
-    said, other = [], []
-    if len(apart) == len(motion) > 1 and given.places is None:
-        if all(plain(columns[k].unit) in OF_DRIVES for k in apart):
+    motion = [k for k, column in enumerate(columns) if column.may_be_motion]
+    known = [k for k in motion if quantity_of(columns[k].unit)]
+    bare = [k for k in motion if k not in known and np.isnan(columns[k].place[0])]
+    names = ", ".join(columns[k].text or str(k + 1) for k in bare)
+    if len(bare) == len(motion) > 1 and given.places is None:
+        if all(canonical(columns[k].unit) in DRIVE_UNITS for k in bare):
+            unit = columns[bare[0]].unit
             raise ValueError(
-                f"columns {names} are channels in {columns[apart[0]].unit}, and one may be the "
-                "drive; choose those of motion by --columns, or give the --places of all"
+                f"columns {names} are in {unit}; choose by --columns, or give --places"
             )
-        said.append(f"columns {names} are taken as places; if one is the drive, give --columns")
-    if sure:
-        other = [k for k in motion if k not in sure and columns[k].unit
-                 and columns[k].part != "phase"]  # fmt: skip
-        drives = [k for k in other if plain(columns[k].unit) in OF_DRIVES]
-        if len(drives) == 1 and not any(one.role == DRIVE for one in columns):
-            k = drives[0]
-            columns[k] = replace(columns[k], role=DRIVE)
-            other.remove(k)
-            said.append(f"column '{columns[k].text}' in {columns[k].unit} is taken as the drive")
-        if other:
-            said.append(f"{len(other)} columns that are not in a unit of motion are left out")
-        kinds = {k: quantity_of(columns[k].unit) for k in sure}
-        if given.quantity in kinds.values():
-            other += [k for k in sure if kinds[k] != given.quantity]
-    return [k for k in range(len(columns)) if k not in other], said
+        remarks.append(f"columns {names} are taken as places; if one is the drive, give --columns")
+    if not known:
+        return list(range(len(columns)))
+    left_out = [k for k in motion if k not in known and columns[k].unit
+                and columns[k].part != "phase"]  # fmt: skip
+    drives = [k for k in left_out if canonical(columns[k].unit) in DRIVE_UNITS]
+    if len(drives) == 1 and not any(column.role == DRIVE for column in columns):
+        k = drives[0]
+        columns[k] = replace(columns[k], role=DRIVE)
+        left_out.remove(k)
+        remarks.append(f"column '{columns[k].text}' in {columns[k].unit} is taken as the drive")
+    if left_out:
+        remarks.append(f"{len(left_out)} columns without a unit of motion are left out")
+    quantities = {k: quantity_of(columns[k].unit) for k in known}
+    if given.quantity in quantities.values():
+        left_out += [k for k in known if quantities[k] != given.quantity]
+    return [k for k in range(len(columns)) if k not in left_out]
 
 
 def _axis(table: Table, at: int, given: Given, is_long: bool) -> tuple[Floats, Floats]:
-    """Times in s and frequencies in Hz of the rows, one of them empty, by a column or the notes;
-    both empty where the rate is given. With a rate that is given, times need no unit.
+    """Return times in s and frequencies in Hz of the rows from a column or the notes. One of them
+    is empty; both are if the user gives the rate.
     """
-    none, count = np.empty(0), len(table.numbers)
+    empty, count = np.empty(0), len(table.numbers)
     if at < 0 and is_long:
-        band = table.number(_BAND, FREQUENCIES)  # of an exported band
+        band = table.number(_BAND, FREQUENCIES)
         if np.isnan(band):
-            raise ValueError(f"a table of a row a place needs the columns {LONG}; mend the header")
-        return none, np.full(count, band)
+            raise ValueError(f"a table with a row per place needs the columns {LONG_EXAMPLE}")
+        return empty, np.full(count, band)
     if at < 0:
-        start = table.number(_START, TIMES)
         rate, interval = table.number(_RATE, FREQUENCIES), table.number(_INTERVAL, TIMES)
         rate = rate if rate > 0 else 1 / interval if interval > 0 else np.nan
-        if given.rate is None and np.isnan(rate):
-            raise ValueError(
-                f"no column is of time or frequency; write a header such as {EXAMPLE}, or give "
-                "--rate, --quantity and --unit"
-            )
-        return (none if np.isnan(rate) else np.nan_to_num(start) + np.arange(count) / rate), none
-    one, values = table.columns[at], table.numbers[:, at]
-    is_time = one.role == TIME
-    if is_time and given.rate is not None and not is_long and plain(one.unit) not in TIMES:
-        return values, none
-    if not one.unit:
-        raise ValueError(
-            f"the column '{one.text or at + 1}' has no unit; write "
-            f"'{'t [s]' if is_time else 'f [Hz]'}'" + ", or give --rate" * is_time
-        )
-    known, what = (TIMES, "time") if is_time else (FREQUENCIES, "frequency")
-    values = in_si(values, scale(one.unit, known, what))
-    return (values, none) if is_time else (none, values)
+        if np.isnan(rate):
+            if given.rate is None:
+                raise ValueError(f"no column has times; write {EXAMPLE} above, or give --rate")
+            return empty, empty
+        return np.nan_to_num(table.number(_START, TIMES)) + np.arange(count) / rate, empty
+    column, values = table.columns[at], table.numbers[:, at]
+    is_time = column.role == TIME
+    if is_time and given.rate is not None and not is_long and canonical(column.unit) not in TIMES:
+        return values, empty  # the rate replaces the unit
+    if not column.unit:
+        cure = "write 't [s]', or give --rate" if is_time else "write 'f [Hz]'"
+        raise ValueError(f"the column '{column.text or at + 1}' has no unit; {cure}")
+    if is_time:
+        return in_si(values, divisor(column.unit, TIMES, "time")), empty
+    return empty, in_si(values, divisor(column.unit, FREQUENCIES, "frequency"))
 
 
-def _series(
-    columns: tuple[Column, ...], numbers: Floats, motion: list[int], is_complex: bool
-) -> list[tuple[Column, np.ndarray]]:
-    """Columns of motion with their values, real and imaginary parts together."""
+Series = list[tuple[Column, np.ndarray]]
+
+
+def _series(table: Table, motion: list[int], is_complex: bool) -> Series:
+    """Return columns of motion with their values, two columns for each complex amplitude."""
+    columns = table.columns
     if not is_complex:
         if parts := [columns[k].text for k in motion if columns[k].part]:
-            raise ValueError(f"the column '{parts[0]}' is of a spectrum; give the column 'f [Hz]'")
-        return [(columns[k], numbers[:, k]) for k in motion]
+            raise ValueError(f"the column '{parts[0]}' is of a spectrum; add the column 'f [Hz]'")
+        return [(columns[k], table.numbers[:, k]) for k in motion]
     if len(motion) % 2:
-        raise ValueError(
-            "a spectrum needs two columns a place, re and im or magnitude and phase; choose these"
-        )
+        raise ValueError("a spectrum needs two columns per place, re and im, or abs and phase")
     pairs = zip(motion[::2], motion[1::2], strict=True)
-    return [(columns[k], _complex_of(columns, numbers, k, other)) for k, other in pairs]
+    return [(columns[k], _complex(table, k, other)) for k, other in pairs]
 
 
-def _complex_of(
-    columns: tuple[Column, ...], numbers: Floats, first: int, second: int
-) -> np.ndarray:
-    """Complex amplitudes of two columns, the two parts of one."""
-    one, other = columns[first], columns[second]
-    a, b = numbers[:, first], numbers[:, second]
-    same = one.repetition == other.repetition and str(one.place) == str(other.place)
-    if same and (one.part, other.part) == ("re", "im"):
+def _complex(table: Table, first: int, second: int) -> np.ndarray:
+    """Return the complex amplitudes of two columns."""
+    one, other = table.columns[first], table.columns[second]
+    a, b = table.numbers[:, first], table.numbers[:, second]
+    is_pair = one.repetition == other.repetition and str(one.place) == str(other.place)
+    if is_pair and (one.part, other.part) == ("re", "im"):
         return a + 1j * b
-    if same and one.part in ("", "abs") and other.part == "phase":
-        if (unit := plain(other.unit)) not in ("deg", "rad"):
-            raise ValueError(f"the phase '{other.text}' needs a unit; give [deg] or [rad]")
+    if is_pair and one.part in ("", "abs") and other.part == "phase":
+        if (unit := canonical(other.unit)) not in ("deg", "rad"):
+            raise ValueError(f"the phase '{other.text}' needs the unit [deg] or [rad]")
         return np.asarray(a * np.exp(1j * (np.deg2rad(b) if unit == "deg" else b)))
-    raise ValueError(
-        f"'{one.text}' and '{other.text}' are no complex amplitude; name them 're v', 'im v', or "
-        "'abs v', 'phase v'"
-    )
+    names = f"'{one.text}' and '{other.text}'"
+    raise ValueError(f"{names} are not a complex amplitude; name them 're v' and 'im v'")
 
 
-def _agreed(columns: list[Column], given: Given) -> tuple[str, str]:
-    """The one quantity and unit of columns of motion; "" where none says, or an option replaces."""
-    found = []
-    for what, replaced in (("role", given.quantity), ("unit", given.unit)):
-        said = {getattr(one, what) for one in columns} - {""}
-        mixed = what == "unit" and not all(map(quantity_of, said))
-        if len(said) > 1 and (mixed or not replaced):
-            raise ValueError(
-                f"columns differ in {'quantity' if what == 'role' else what}: "
-                f"{', '.join(sorted(said))[:80]}; choose some by --columns or --quantity"
-            )
-        found.append(said.pop() if len(said) == 1 else "")
-    return found[0], found[1]
+def _common(series: Series, attribute: str, given: str) -> str:
+    """Return the role or unit that columns of motion share; "" if unknown."""
+    values = {getattr(column, attribute) for column, _ in series} - {""}
+    is_mixed = attribute == "unit" and not all(map(quantity_of, values))
+    if len(values) > 1 and (is_mixed or not given):
+        what = "quantity" if attribute == "role" else "unit"
+        names = ", ".join(sorted(values))[:80]
+        raise ValueError(f"columns differ in {what}: {names}; choose by --columns or --quantity")
+    return str(values.pop()) if len(values) == 1 else ""
 
 
-def _by_repetition(series: list[tuple[Column, np.ndarray]]) -> tuple[np.ndarray, Floats]:
-    """Values (r, n, p) and places (p, 2); every repetition has the same places."""
-    groups: dict[int, list[tuple[Column, np.ndarray]]] = {}
-    for one, values in series:
-        groups.setdefault(one.repetition, []).append((one, values))
-    places = [[one.place for one, _ in group] for group in groups.values()]
+def _by_repetition(series: Series) -> tuple[np.ndarray, Floats]:
+    """Return values (r, n, p) and places (p, 2)."""
+    groups: dict[int, Series] = {}
+    for column, values in series:
+        groups.setdefault(column.repetition, []).append((column, values))
+    places = [[column.place for column, _ in group] for group in groups.values()]
     if len(set(map(str, places))) > 1:
-        raise ValueError("repetitions have not the same places in the same order; mend the header")
-    each = [np.column_stack([v for _, v in group]) for group in groups.values()]
+        raise ValueError("repetitions differ in their places; correct the header")
+    each = [np.column_stack([values for _, values in group]) for group in groups.values()]
     return np.array(each), np.array(places[0])
 
 
-def _drive(columns: tuple[Column, ...], numbers: Floats) -> np.ndarray:
-    found = [k for k, one in enumerate(columns) if one.role == DRIVE]
-    if len(found) > 2:
-        raise ValueError(f"{len(found)} columns are of the drive; leave one")
-    if len(found) == 2:
-        return _complex_of(columns, numbers, *found)
-    return numbers[:, found[0]] if found else np.empty(0)
+def _drive(table: Table) -> np.ndarray:
+    at = [k for k, column in enumerate(table.columns) if column.role == DRIVE]
+    if len(at) > 2:
+        raise ValueError(f"{len(at)} columns hold the drive; export one of them")
+    if len(at) == 2:
+        return _complex(table, *at)
+    return table.numbers[:, at[0]] if at else np.empty(0)
 
 
-def in_metre(columns: tuple[Column, ...], numbers: Floats, where: tuple[int, int]) -> Floats:
-    """Places (p, 2) in metre of two columns; each has a unit."""
-    for k in where:
-        if not columns[k].unit:
-            raise ValueError(f"the column '{columns[k].text}' has no unit; write 'x [mm]'")
+def coordinates(table: Table) -> Floats:
+    """Return the places (n, 2) in metres of the columns x and y."""
+    at = table.index(X), table.index(Y)
+    for k in at:
+        if not table.columns[k].unit:
+            raise ValueError(f"the column '{table.columns[k].text}' has no unit; write 'x [mm]'")
     return np.column_stack([
-        in_si(numbers[:, k], scale(columns[k].unit, LENGTHS, "length")) for k in where
+        in_si(table.numbers[:, k], divisor(table.columns[k].unit, LENGTHS, "length")) for k in at
     ])  # fmt: skip
 
 
 def _distinct(points: Floats) -> tuple[Floats, np.ndarray]:
-    """Distinct places (p, 2) in the order that they appear, and which one each row has."""
+    """Return distinct places (p, 2) in their order, and the index of each row's place."""
     _, first, inverse = np.unique(points, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
     return points[first[order]], np.argsort(order)[inverse.ravel()]
 
 
-def _filled(values: np.ndarray, at: tuple[np.ndarray, ...]) -> np.ndarray:
-    """Values (r, n, p) of rows, each of which has one of these numbers."""
+def _arranged(values: np.ndarray, at: tuple[np.ndarray, ...]) -> np.ndarray:
+    """Return values (r, n, p) from rows with these indices."""
     shape = tuple(int(k.max()) + 1 for k in at)
     total = int(np.prod(shape, dtype=object))
     flat, row = np.unique(np.ravel_multi_index(at, shape), return_index=True)
     if len(flat) < len(values):
         twice = int(np.setdiff1d(np.arange(len(values)), row)[0])
-        raise ValueError(f"row {twice + 1} has a time and place that another row has; leave one")
+        raise ValueError(f"row {twice + 1} repeats the time and place of another row; remove one")
     if total != len(values):
-        raise ValueError(
-            f"{len(values)} rows are not {total}, one a repetition, time and place; complete them"
-        )
+        raise ValueError(f"times, places and repetitions need {total} rows, not {len(values)}")
     return np.asarray(values[row].reshape(shape))

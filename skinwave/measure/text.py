@@ -1,10 +1,11 @@
-"""Text in columns as programs export it: encoding, delimiter, decimal sign, header, and numbers.
+"""Text tables as instruments and programs export them.
 
-The rows at the end of a file show what separates its cells and which columns hold numbers. Its
-table begins at the first line with numbers in these columns. The line above has the names, or the
-units below a line of names. Everything above, and cells beside the numbers, are notes.
+The last rows of a file show the delimiter, the decimal sign and the columns of numbers. The table
+begins at the first row with numbers in these columns. The line above has the names, or the units
+below a line of names. All other lines, and cells outside these columns, are notes.
 """
 
+import csv
 import io
 import re
 from collections.abc import Iterator
@@ -15,83 +16,76 @@ from pathlib import Path
 
 import numpy as np
 
-from meshes.reading import read_exported_text
-from skinwave.measure.headers import TIME, UNITS, Column, X, Y, column
+from meshes.reading import exported_text
+from skinwave.measure.headers import TIME, UNITS, Column, X, Y, parse_heading
 from skinwave.measure.labview import lvm_table
 from skinwave.measure.recording import Given, Recording
-from skinwave.measure.table import EXAMPLE, Table, in_metre, recording
-from skinwave.measure.units import plain, quantity_of
+from skinwave.measure.table import EXAMPLE, Notes, Table, coordinates, recording_of
+from skinwave.measure.units import canonical, quantity_of
 from skinwave.system.plain_text import number_in
 from skinwave.typing import Floats
 
 LARGEST = 256_000_000  # bytes
-FIRST_LINE = "LabVIEW Measurement"  # of .lvm files, whatever they are called
-SHOWN = 100  # rows at the end that show what separates cells
-NO_VALUE = (
+LVM_FIRST_LINE = "LabVIEW Measurement"  # whatever the suffix of the file
+SAMPLE_ROWS = 100  # at the end of a file, which show the layout
+MISSING = (
     "", "-", "--", "---", "na", "n/a", "#n/a", "null", "none", "nan", "1.#qnan", "-1.#ind",
     "1.#ind", "missing", "invalid",
 )  # fmt: skip
-BEYOND = ("∞", "+∞", "1.#inf", "overload", "over")  # the range of an instrument
-MARK = "#%;/!"  # before lines about the measurement
+OVERLOAD = ("∞", "+∞", "1.#inf", "overload", "over")
+COMMENT = "#%;/!"  # first letters of lines with notes
+DELIMITER_NAMES = {"\t": "tabs", " ": "white space", ",": "commas", ";": "semicolons"}
 _LEADING_ZERO = re.compile(r",0\d+(?=,|$)")
-Notes = list[tuple[str, str]]
 
 
 def read(path: Path, given: Given) -> Recording:
-    """The recording in a text file; raises a ValueError if it is no table of numbers, or its
-    columns do not make a measurement.
-    """
-    text = read_exported_text(path, LARGEST)
-    return recording(lvm_table(text) if text.startswith(FIRST_LINE) else table(text), given)
+    """Return the recording in a text file. Raises a ValueError if it has no table of motion."""
+    text = exported_text(path, LARGEST)
+    table = lvm_table(text) if text.startswith(LVM_FIRST_LINE) else parse_table(text)
+    return recording_of(table, given)
 
 
-def places(path: Path) -> Floats:
-    """Places (p, 2) in metre of a text file with the columns x and y, or of two columns in mm;
-    raises a ValueError if it has none.
-    """
-    found = table(read_exported_text(path, LARGEST))
-    columns = found.columns
-    if len(columns) == 2 and not any(one.text for one in columns):
-        columns = (column("x [mm]"), column("y [mm]"))
-    where = [[k for k, one in enumerate(columns) if one.role == role] for role in (X, Y)]
-    if not all(len(of) == 1 for of in where):
-        raise ValueError(f"{path}: a file of places needs the columns x [mm], y [mm]; add these")
-    return in_metre(columns, found.numbers, (where[0][0], where[1][0]))
+def read_places(path: Path) -> Floats:
+    """Return places (p, 2) in metres from the columns x and y, or from two columns in mm."""
+    table = parse_table(exported_text(path, LARGEST))
+    if len(table.columns) == 2 and not any(column.text for column in table.columns):
+        table = replace(table, columns=(parse_heading("x [mm]"), parse_heading("y [mm]")))
+    roles = [column.role for column in table.columns]
+    if roles.count(X) != 1 or roles.count(Y) != 1:
+        raise ValueError(f"{path}: a file of places needs the columns x [mm] and y [mm]; add them")
+    return coordinates(table)
 
 
 @dataclass(frozen=True)
 class _Layout:
-    """How rows of a table are written: what separates cells, whether decimal signs are commas, the
-    columns of numbers, and how many cells a row has.
+    """Delimiter, whether decimal signs are commas, indices of the columns of numbers, and the
+    number of cells in a row.
     """
 
     delimiter: str
-    comma: bool
-    kept: tuple[int, ...]
+    has_commas: bool
+    numeric: tuple[int, ...]
     width: int
 
     def cells(self, line: str) -> list[str]:
-        """Cells of a line, with decimal points."""
-        return _cells(line, self.delimiter, self.comma)
+        return _cells(line, self.delimiter, self.has_commas)
 
     def is_row(self, line: str) -> bool:
-        """Whether a line is a row: values in the columns of numbers, and one number at least."""
+        """Whether a line has values in all columns of numbers, and at least one number."""
         cells = self.cells(line)
-        if not self.kept[-1] < len(cells) <= self.width:
+        if not self.numeric[-1] < len(cells) <= self.width:
             return False
-        found = [_value(cells[k]) for k in self.kept]
-        return None not in found and any(_is_number(cells[k]) for k in self.kept)
+        values = [_value(cells[k]) for k in self.numeric]
+        return None not in values and any(_is_number(cells[k]) for k in self.numeric)
 
 
-def table(text: str) -> Table:
-    """The table in a text: columns, numbers, and notes above it; raises a ValueError if there is
-    none, or with the number of a line in it that is no row of numbers.
-    """
+def parse_table(text: str) -> Table:
+    """Return the table in a text. Raises a ValueError with the number of the first wrong line."""
     lines = text.rstrip().splitlines()
-    last = [line for line in lines[-4 * SHOWN :] if line.strip()][-SHOWN:]
+    last = [line for line in lines[-4 * SAMPLE_ROWS :] if line.strip()][-SAMPLE_ROWS:]
     if not any(line.strip() and line.lstrip()[0] not in "#%" for line in lines):
         raise ValueError(f"the file has no table; give a header such as {EXAMPLE}, and numbers")
-    misfits = []
+    problems = []
     for layout in _layouts(last):
         first = next((k for k, line in enumerate(lines) if layout.is_row(line)), -1)
         if first < 0:
@@ -99,71 +93,64 @@ def table(text: str) -> Table:
         try:
             names, units, notes = _header(lines[:first], layout)
         except ValueError as error:
-            misfits.append(str(error))
+            problems.append(str(error))
             continue
         row = layout.cells(lines[first])
         columns = _columns(names, units, layout, row, notes)
         numbers = _numbers(lines, first, layout, names, notes)
-        for k, cell in enumerate(row[c] for c in layout.kept):
-            if _clock(cell) is not None:
+        for k, cell in enumerate(row[c] for c in layout.numeric):
+            if _clock_seconds(cell) is not None:
                 numbers[:, k] -= numbers[0, k]
                 columns[k] = replace(columns[k], role=TIME, unit="s")
         return Table(columns=tuple(columns), numbers=numbers, notes=tuple(notes))
-    wrong = "the file has a header and no numbers; export it anew"
+    problem = "the file has a header but no numbers; export it again"
     if len(last) > 1:
         cells = re.split(r"[\t;, ]+", last[-1].strip())
         word = next((cell for cell in cells if number_in(cell) is None), cells[0])
-        wrong = f"line {len(lines)} has '{word[:40]}', which is no number; mend it"
-    raise ValueError([*misfits, wrong][0])
+        problem = f"line {len(lines)} has '{word[:40]}', which is not a number; correct it"
+    raise ValueError([*problems, problem][0])
 
 
 def _layouts(rows: list[str]) -> Iterator[_Layout]:
-    """Layouts by which most rows at the end of a file are alike."""
+    """Yield the layouts that fit most of the last rows of a file."""
     for delimiter in "\t;, ":
         if delimiter != " " and not any(delimiter in line for line in rows):
             continue
-        comma = any(
+        has_commas = any(
             _with_point(cell) != cell
             for line in rows if "," in line and line.lstrip()[0] not in "#%"
             for cell in _cells(line, delimiter)
         )  # fmt: skip
-        split = [_cells(line, delimiter, comma) for line in rows]
+        split = [_cells(line, delimiter, has_commas) for line in rows]
         widths = [len(cells) for cells in split[-3:]]
         width = max(widths, key=widths.count)
         alike = [cells for cells in split if len(cells) == width]
         alike = alike[len(alike) // 2 :]  # without the header of a short table
         full = [k for k in range(width) if any(cells[k] for cells in alike)]
-        values = [sum(_value(cells[k]) is not None for cells in alike) for k in full]
-        kept = [k for k, count in zip(full, values, strict=True) if 2 * count >= len(alike)]
-        is_table = any(_is_number(cells[k]) for cells in alike for k in kept)
-        if is_table and (delimiter != " " or kept == full):
-            yield _Layout(delimiter, comma, tuple(kept), width)
+        counts = {k: sum(_value(cells[k]) is not None for cells in alike) for k in full}
+        numeric = [k for k in full if 2 * counts[k] >= len(alike)]
+        is_table = any(_is_number(cells[k]) for cells in alike for k in numeric)
+        if is_table and (delimiter != " " or numeric == full):
+            yield _Layout(delimiter, has_commas, tuple(numeric), width)
 
 
-def _cells(line: str, delimiter: str, comma: bool = False) -> list[str]:
-    """Cells of a line; a delimiter within quotes or brackets is none, as in v(0,0)."""
+def _cells(line: str, delimiter: str, has_commas: bool = False) -> list[str]:
+    """Split a line; delimiters within quotes or brackets, as in v(0,0), do not count."""
     if delimiter == " ":
         joined = re.sub(r"\s+(?=[^\[\]]*\])|\s+(?=[\[(#])", "", line.strip()).replace('"', "")
-        found = joined.split()
-    elif not re.search(r'["(\[]', line):
-        found = line.split(delimiter)
+        cells = joined.split()
+    elif '"' in line:
+        cells = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
+    elif re.search(r"[(\[]", line):
+        cells = re.split(rf"{delimiter}(?![^(\[]*[)\]])", line)
     else:
-        found, cell, depth, quoted = [], "", 0, False
-        for letter in line + delimiter:
-            if letter == '"':
-                quoted = not quoted
-            elif letter == delimiter and not quoted and depth <= 0:
-                found.append(cell)
-                cell = ""
-            else:
-                depth += 0 if quoted else (letter in "([") - (letter in ")]")
-                cell += letter
-    found = [cell.strip().replace("\u2212", "-") for cell in found]
-    return [_with_point(cell) for cell in found] if comma else found
+        cells = line.split(delimiter)
+    cells = [cell.strip().replace("\u2212", "-") for cell in cells]
+    return [_with_point(cell) for cell in cells] if has_commas else cells
 
 
 def _with_point(cell: str) -> str:
-    """A number with a decimal comma as one with a point; other cells as they are."""
+    """Return a number with a decimal comma with a point, other cells unchanged."""
     pointed = cell.replace(",", ".")
     return pointed if "." not in cell and number_in(pointed) is not None else cell
 
@@ -174,106 +161,108 @@ def _is_number(cell: str) -> bool:
 
 
 def _value(cell: str) -> float | None:
-    """Number of a cell: nan of one that was not measured, inf beyond the range, s of a clock."""
+    """Return the number in a cell: nan if missing, inf if overloaded, None if it is text."""
     number = number_in(cell)
     if number is not None:
         return number
-    if cell.lower() in NO_VALUE:
+    if cell.lower() in MISSING:
         return np.nan
-    return np.inf if cell.lower().lstrip("-") in BEYOND else _clock(cell)
+    return np.inf if cell.lower().lstrip("-") in OVERLOAD else _clock_seconds(cell)
 
 
-def _clock(cell: str) -> float | None:
-    """Seconds of an ISO date, a time of day, or both."""
+def _clock_seconds(cell: str) -> float | None:
+    """Return the seconds of an ISO date, a time of day, or both."""
     if not ("-" in cell or ":" in cell) or not cell[:1].isdigit():
         return None
     for parse in (datetime.fromisoformat, time.fromisoformat):
         with suppress(ValueError):
             at = parse(cell)
-            day = at.toordinal() % 100 if isinstance(at, datetime) else 0  # leaves digits
-            return (
-                86400.0 * day + 3600 * at.hour + 60 * at.minute + at.second + at.microsecond / 1e6
-            )
+            days = at.toordinal() % 100 if isinstance(at, datetime) else 0  # keeps digits
+            seconds = 86400.0 * days + 3600 * at.hour + 60 * at.minute + at.second
+            return seconds + at.microsecond / 1e6
     return None
 
 
 def _header(above: list[str], layout: _Layout) -> tuple[list[str], list[str], Notes]:
-    """Names and units of columns, and notes, of the lines above a table; raises a ValueError if the
-    line of names does not fit the columns.
+    """Return names and units of columns, and notes, from the lines above a table.
+
+    Raises a ValueError if the line of names does not fit the columns.
     """
-    delimiter, kept, width = layout.delimiter, layout.kept, layout.width
+    numeric, width = layout.numeric, layout.width
     at = [k for k, line in enumerate(above) if line.strip()]
     notes = [_note(above[k]) for k in at]
-    rows = [_heading(above[k], delimiter) for k in at]
+    rows = [_heading_cells(above[k], layout.delimiter) for k in at]
     if rows:  # Rigol's "t0 = -0.01, tInc = 1e-4" behind names
         notes += [_note(cell) for cell in rows[-1] if "=" in cell]
         rows[-1] = [cell for cell in rows[-1] if "=" not in cell]
-    found = [rows.pop()] if rows and not _is_title(rows[-1], len(kept)) else []
-    if found and _are_units([found[0][k] for k in kept if k < len(found[0])]):
-        found = [rows.pop() if rows and len(rows[-1]) > kept[-1] else [], *found]
-    elif found and any(number_in(cell) is not None for cell in found[0]):
-        if rows and len(rows[-1]) == len(found[0]) and not any(map(number_in, rows[-1])):
-            cell = next((cell for cell in found[0] if number_in(cell) is None), "")
-            raise ValueError(f"line {at[-1] + 1} has '{cell[:40]}', which is no number; mend it")
-        found = found if column(found[0][0]).role else []
-    count = len(found[0]) if found else width
-    if count and (count <= kept[-1] or (count > width and len(found) == 1)):
-        word = {"\t": "tabs", " ": "white space"}.get(delimiter, f"'{delimiter}'")
-        raise ValueError(
-            f"line {at[-1] + 2} has {width} cells between {word} and the header {count}; give a "
-            "name for each column, and columns with decimal commas between semicolons"
-        )
-    names, units = ([*cells, *[""] * width] for cells in [*found, [], []][:2])
-    notes += [(name.lower(), unit) for k, (name, unit) in enumerate(zip(names, units, strict=False))
-              if k not in kept and name and unit]  # fmt: skip
+    names: list[str] = []
+    units: list[str] = []
+    if rows and not _is_title(rows[-1], len(numeric)):
+        names = rows.pop()
+    if names and _are_units([names[k] for k in numeric if k < len(names)]):
+        units, names = names, (rows.pop() if rows and len(rows[-1]) > numeric[-1] else [])
+    elif any(number_in(cell) is not None for cell in names):
+        if rows and len(rows[-1]) == len(names) and not any(map(number_in, rows[-1])):
+            cell = next((cell for cell in names if number_in(cell) is None), "")
+            raise ValueError(f"line {at[-1] + 1} has '{cell[:40]}', not a number; correct it")
+        names = names if parse_heading(names[0]).role else []
+    count = len(names) or (0 if units else width)
+    if count and (count <= numeric[-1] or (count > width and not units)):
+        cells = f"{width} cells between {DELIMITER_NAMES[layout.delimiter]}"
+        raise ValueError(f"line {at[-1] + 2} has {cells}, the header {count}; name each column")
+    names, units = names + [""] * width, units + [""] * width
+    notes += [
+        (names[k].lower(), units[k])
+        for k in range(min(len(names), len(units)))
+        if k not in numeric and names[k] and units[k]
+    ]
     return names[: max(width, count)], units, notes
 
 
 def _columns(
-    names: list[str], units: list[str], layout: _Layout, cells: list[str], notes: Notes
+    names: list[str], units: list[str], layout: _Layout, first: list[str], notes: Notes
 ) -> list[Column]:
-    """Columns of numbers. Of text a note says that it is left out; it is refused if its heading is
+    """Return the columns of numbers. Text is left out with a remark, or refused if its heading is
     that of numbers.
     """
-    for k, cell in enumerate(cells[: len(names)]):
-        if k in layout.kept or not (names[k] and cell) or _is_number(cell):
+    for k, cell in enumerate(first[: len(names)]):
+        if k in layout.numeric or not (names[k] and cell) or _is_number(cell):
             continue
-        if (one := column(names[k], units[k])).role or quantity_of(one.unit):
-            raise ValueError(
-                f"the column '{names[k][:40]}' holds text such as '{cell[:40]}'; export numbers"
-            )
+        column = parse_heading(names[k], units[k])
+        if column.role or quantity_of(column.unit):
+            raise ValueError(f"the column '{names[k][:40]}' has text, '{cell[:40]}'; use numbers")
         notes.append(("remark", f"the column '{names[k][:40]}' holds text and is left out"))
-    return [column(names[k], units[k]) for k in layout.kept]
+    return [parse_heading(names[k], units[k]) for k in layout.numeric]
 
 
 def _is_title(cells: list[str], count: int) -> bool:
-    """Whether the cells above a table are no names of its columns."""
+    """Whether the cells above a table of `count` columns are not their names."""
     if len(cells) == 1 and count > 1:
-        one = column(cells[0])
-        return not (one.role or one.unit)
+        column = parse_heading(cells[0])
+        return not (column.role or column.unit)
     return not cells
 
 
-def _heading(line: str, delimiter: str) -> list[str]:
-    """Cells of a line that may be names or units; none of a note such as "key: value"."""
-    marked = line.lstrip()[0] in MARK
-    if marked and ":" in line:
+def _heading_cells(line: str, delimiter: str) -> list[str]:
+    """Return cells that may be names or units; none for a note such as "# key: value"."""
+    is_comment = line.lstrip()[0] in COMMENT
+    if is_comment and ":" in line:
         return []
-    cells = _cells(line.lstrip(MARK + " ") if marked else line, delimiter)
+    cells = _cells(line.lstrip(COMMENT + " ") if is_comment else line, delimiter)
     while cells and not cells[-1]:
         cells.pop()
     return cells
 
 
 def _are_units(cells: list[str]) -> bool:
-    """Whether cells are units and nothing else, be they in brackets."""
     return any(cells) and all(
-        plain(cell) in UNITS or re.fullmatch(r"[\[(].*[\])]", cell) is not None for cell in cells
+        canonical(cell) in UNITS or re.fullmatch(r"[\[(].*[\])]", cell) is not None
+        for cell in cells
     )
 
 
 def _note(line: str) -> tuple[str, str]:
-    """Key and value of a line such as "Sample rate (kHz): 20" or "Unit;mm/s"."""
+    """Return key and value of a line such as "Sample rate (kHz): 20" or "Unit;mm/s"."""
     bare = re.sub(r"^[\s#%;/!]+", "", line).replace('"', "")
     key, value = [*re.split(r"[:,;\t=]+", bare, maxsplit=1), ""][:2]
     name, _, unit = key.strip(" )]").replace("[", "(").partition("(")
@@ -283,21 +272,19 @@ def _note(line: str) -> tuple[str, str]:
 def _numbers(
     lines: list[str], first: int, layout: _Layout, names: list[str], notes: Notes
 ) -> Floats:
-    """Numbers (n, c) of the lines from the first on; notes from cells beside them are added."""
+    """Return the numbers (n, c) from line `first` on; other cells are added to the notes."""
     rows, width, delimiter = lines[first:], len(names), layout.delimiter
-    if delimiter == "," and any(_LEADING_ZERO.search(line) for line in rows[:SHOWN]):
-        raise ValueError(
-            f"line {first + 1} has decimal commas between commas; export semicolons or tabs"
-        )
+    if delimiter == "," and any(_LEADING_ZERO.search(line) for line in rows[:SAMPLE_ROWS]):
+        raise ValueError(f"line {first + 1} has decimal commas between commas; use semicolons")
     text = "\n".join(rows)
-    if len(layout.kept) == width > 1 and not (layout.comma and "." in text):  # 10 times faster
-        with suppress(ValueError):
-            found = np.loadtxt(
-                io.StringIO(text.replace(",", ".") if layout.comma else text), ndmin=2,
-                comments=None, delimiter=None if delimiter == " " else delimiter,
+    if len(layout.numeric) == width > 1 and not (layout.has_commas and "." in text):
+        with suppress(ValueError):  # ten times faster, if all cells are plain numbers
+            table = np.loadtxt(
+                io.StringIO(text.replace(",", ".") if layout.has_commas else text),
+                ndmin=2, comments=None, delimiter=None if delimiter == " " else delimiter,
             )  # fmt: skip
-            if found.shape[1] == width and not np.isinf(found).any():
-                return found
+            if table.shape[1] == width and not np.isinf(table).any():
+                return table
     return np.array([
         _row(line, k, layout, names, notes)
         for k, line in enumerate(rows, first + 1) if line.strip() or width == 1
@@ -305,29 +292,29 @@ def _numbers(
 
 
 def _row(line: str, number: int, layout: _Layout, names: list[str], notes: Notes) -> list[float]:
-    """Numbers of a line; its other cells are notes."""
-    cells, kept = layout.cells(line) or [""], layout.kept
-    wrong, cure = "", "has a dot, and the file has decimal commas; leave out other separators"
-    if layout.comma and "." in line and ":" not in line:
-        wrong = next((c for c in _cells(line, layout.delimiter) if "." in c), "")
-    elif not kept[-1] < len(cells) <= len(names):
-        raise ValueError(
-            f"line {number} has {len(cells)} cells and rows above {len(names)}; complete it"
-        )
-    values = [] if wrong else [_value(cells[k]) for k in kept]
-    for k, value in zip(kept, values, strict=False):
+    """Return the numbers of a line, and add its other cells to the notes."""
+
+    def refuse(cell: str, problem: str) -> ValueError:
+        return ValueError(f"line {number} has '{cell[:40]}', which {problem}")
+
+    pointed = [c for c in _cells(line, layout.delimiter) if "." in c] if layout.has_commas else []
+    if pointed and ":" not in line:
+        raise refuse(pointed[0], "has a point in a file with decimal commas; leave it out")
+    cells = layout.cells(line) or [""]
+    if not layout.numeric[-1] < len(cells) <= len(names):
+        raise ValueError(f"line {number} has {len(cells)} cells instead of {len(names)}")
+    values = []
+    for cell in (cells[k] for k in layout.numeric):
+        value = _value(cell)
         if value is None:
-            wrong, cure = cells[k], "is no number; mend it"
-        elif np.isinf(value):
-            wrong = cells[k]
-            cure = "is beyond the range of the instrument; measure with a larger range"
-    aside = {k: cell for k, cell in enumerate(cells) if cell and k not in kept}
-    for k, cell in aside.items() if not wrong else ():
-        if names[k] and _is_number(cell):
-            wrong = cell
-            cure = f"is in the column '{names[k][:40]}', which ends early; leave it out"
-    if wrong:
-        raise ValueError(f"line {number} has '{wrong[:40]}', which {cure}")
-    if aside and not any(names[k] for k in aside):
-        notes.append((next(iter(aside.values())).lower(), " ".join([*aside.values()][1:])))
-    return [float("nan") if value is None else value for value in values]
+            raise refuse(cell, "is not a number; correct it")
+        if np.isinf(value):
+            raise refuse(cell, "is an overload; measure with a larger range")
+        values.append(value)
+    others = [k for k, cell in enumerate(cells) if cell and k not in layout.numeric]
+    for k in others:
+        if names[k] and _is_number(cells[k]):
+            raise refuse(cells[k], f"is in the column '{names[k][:40]}', which is not complete")
+    if others and not any(names[k] for k in others):
+        notes.append((cells[others[0]].lower(), " ".join(cells[k] for k in others[1:])))
+    return values

@@ -1,6 +1,6 @@
-"""Units of what is measured, of times, frequencies and lengths, and what they are in SI.
+"""Units of motion, time, frequency and length.
 
-A unit is a divisor: a value in mm/s over 1000 is in m/s, correctly rounded.
+A unit is stored as a divisor: a value in mm/s over 1000 is in m/s, correctly rounded.
 """
 
 import re
@@ -15,19 +15,18 @@ STANDARD_GRAVITY = 9.80665  # m/s2
 LENGTHS = {"m": 1.0, "cm": 1e2, "mm": 1e3, "um": 1e6, "nm": 1e9, "pm": 1e12}
 TIMES = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 FREQUENCIES = {"Hz": 1.0, "kHz": 1e-3}
-# Per quantity, its units by what 1 in SI is in each.
 MOTION = {
     DISPLACEMENT.name: LENGTHS,
-    VELOCITY.name: {f"{length}/s": per for length, per in LENGTHS.items()},
+    VELOCITY.name: {f"{length}/s": divisor for length, divisor in LENGTHS.items()},
     ACCELERATION.name: {
-        **{f"{length}/s2": per for length, per in LENGTHS.items()},
+        **{f"{length}/s2": divisor for length, divisor in LENGTHS.items()},
         "g": 1 / STANDARD_GRAVITY, "mg": 1e3 / STANDARD_GRAVITY,
     },
 }  # fmt: skip
 ANGLES = {"deg": 1.0, "rad": 1.0}
-_SAME = str.maketrans({"µ": "u", "μ": "u", "²": "2", "¹": "1", "⁻": "-", "°": "deg", "º": "deg"})
-# Words of programs and languages, in lower case.
-_WORDS = {
+_LETTERS = str.maketrans({"µ": "u", "μ": "u", "²": "2", "¹": "1", "⁻": "-", "°": "deg", "º": "deg"})
+# Spelled-out units of programs and languages, in lower case.
+_SPELLINGS = {
     word: unit
     for unit, words in {
         "s": "s sec secs second seconds sekunde sekunden seconde secondes 秒",
@@ -40,80 +39,77 @@ _WORDS = {
     for word in words.split()
 }  # fmt: skip
 _FACTOR = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)\s*(.*)", re.IGNORECASE)
-_LEVELS = re.compile(r"dB\w*(/.*)?", re.IGNORECASE)
+_LEVEL = re.compile(r"dB\w*(/.*)?", re.IGNORECASE)
 
 
-def plain(unit: str) -> str:
-    """A unit as it is looked up: "µm·s^-1" is "um/s", "m/s^2" and "m/s/s" are "m/s2"."""
-    text = unit.strip().strip("[]()").translate(_SAME).replace("**", "^").replace("^", "")
+def canonical(unit: str) -> str:
+    """Return the canonical spelling of a unit: "um/s" for "µm·s^-1", "m/s2" for "m/s/s"."""
+    text = unit.strip().strip("[]()").translate(_LETTERS).replace("**", "^").replace("^", "")
     text = re.sub(r"[\s·*.]*s-1$", "/s", text)
     text = re.sub(r"[\s·*.]*s-2$|/s/s$|/s\^?2$|/\(s2\)$", "/s2", text).replace(" ", "")
     above, slash, below = text.partition("/")
-    words = _WORDS.get(above.lower(), above), re.sub(r"^sec(ond)?s?(?=2?$)", "s", below)
-    return slash.join(words) if slash else words[0]
+    below = re.sub(r"^sec(ond)?s?(?=2?$)", "s", below)
+    return _SPELLINGS.get(above.lower(), above) + slash + below
 
 
 def per_reference(unit: str) -> tuple[str, bool]:
-    """Unit of motion without that of a reference below it, as "m/s" of "(m/s)/N", and whether it
-    has one.
-    """
+    """Return the unit of motion in a unit such as "(m/s)/N", and whether it is per a reference."""
     unit = re.sub(r"\(1/(\w+)\)\*(\(.*\))", r"\2/\1", unit)
     above, _, below = unit.strip("[] ").rpartition("/")
-    has = plain(below) in ("N", "V", "Pa") and bool(quantity_of(above))
-    return (above.strip("() "), True) if has else (unit, False)
+    if canonical(below) in ("N", "V", "Pa") and quantity_of(above):
+        return above.strip("() "), True
+    return unit, False
 
 
 def quantity_of(unit: str) -> str:
-    """The quantity that a unit of motion is of; "" if it is of none."""
-    _, name = _split(unit)
-    return next((kind for kind, units in MOTION.items() if name in units), "")
+    """Return the quantity of motion that a unit measures; "" if it is no unit of motion."""
+    _, name = _factor_and_name(unit)
+    return next((quantity for quantity, units in MOTION.items() if name in units), "")
 
 
-def per_unit(unit: str, kind: str) -> float:
-    """Divisor of a unit of a quantity: values over it are in SI; of "20 mm/s" it is 50. Raises a
-    ValueError if the unit is unknown, a level in dB, or one of another quantity.
+def motion_divisor(unit: str, quantity: str) -> float:
+    """Return the divisor that converts a unit of a quantity to SI: 50 for "20 mm/s".
+
+    Raises a ValueError if the unit is unknown, a level in dB, or a unit of another quantity.
     """
-    factor, name = _split(unit)
-    if _LEVELS.fullmatch(name):
+    factor, name = _factor_and_name(unit)
+    if _LEVEL.fullmatch(name):
         raise ValueError(f"'{unit}' is a level, not a unit; export linear values")
-    units = MOTION.get(kind, {plain(QUANTITIES[kind].unit): 1.0})
+    units = MOTION.get(quantity, {canonical(QUANTITIES[quantity].unit): 1.0})
     if name not in units:
         other = quantity_of(unit)
-        why = f"is one of {other}, not of {kind}" if other else f"is no unit of {kind}"
+        problem = f"is a unit of {other}, not of {quantity}" if other else (
+            f"is not a unit of {quantity}")  # fmt: skip
         raise ValueError(
-            f"'{unit[:40]}' {why}; give --unit as one of {', '.join(units)}"
-            f"{suggestion(name, units)}"
+            f"'{unit[:40]}' {problem}; give --unit as one of {', '.join(units)}{meant(name, units)}"
         )
     if factor <= 0:
-        raise ValueError(f"'{unit[:40]}' must be above 0; use --positive to turn the sign")
+        raise ValueError(f"'{unit[:40]}' must be above 0; use --positive to flip the sign")
     return units[name] / factor
 
 
-def in_si(values: np.ndarray, per: float) -> np.ndarray:
-    """Values in SI of some in a unit that 1 in SI is `per` of, rounded once."""
-    return values / per if per >= 1 else values * (1 / per)
+def in_si(values: np.ndarray, divisor: float) -> np.ndarray:
+    """Return values over a divisor, with one rounding."""
+    return values / divisor if divisor >= 1 else values * (1 / divisor)
 
 
-def scale(unit: str, units: dict[str, float], what: str) -> float:
-    """Divisor of a unit of times, frequencies or lengths; raises a ValueError if it is none."""
-    if (name := plain(unit)) not in units:
-        raise ValueError(
-            f"'{unit[:40]}' is no unit of {what}; use one of {', '.join(units)} in the header"
-        )
+def divisor(unit: str, units: dict[str, float], dimension: str) -> float:
+    """Return the divisor of a unit of time, frequency or length."""
+    if (name := canonical(unit)) not in units:
+        raise ValueError(f"'{unit[:40]}' is not a unit of {dimension}; use {', '.join(units)}")
     return units[name]
 
 
-def length(text: str, unit: str) -> float:
-    """Metre of a number in a unit of length, exact as decimal numbers are; raises a ValueError if
-    it is none.
-    """
+def metres(text: str, unit: str) -> float:
+    """Return a decimal number in a unit of length in metres, exactly rounded."""
     try:
-        return float(Decimal(text.strip()) / Decimal(scale(unit, LENGTHS, "length")))
+        return float(Decimal(text.strip()) / Decimal(divisor(unit, LENGTHS, "length")))
     except InvalidOperation:
-        raise ValueError(f"'{text.strip()[:40]}' is no number of {unit}; mend it") from None
+        raise ValueError(f"'{text.strip()[:40]}' is not a number of {unit}") from None
 
 
-def _split(unit: str) -> tuple[float, str]:
-    """Factor and name of a unit such as "20 mm/s"; the factor is 1 if there is none."""
-    found = _FACTOR.fullmatch(unit.strip().strip("[]()"))
-    return (float(found[1]), plain(found[2])) if found and found[2] else (1.0, plain(unit))
+def _factor_and_name(unit: str) -> tuple[float, str]:
+    match = _FACTOR.fullmatch(unit.strip().strip("[]()"))
+    if match and match[2]:
+        return float(match[1]), canonical(match[2])
+    return 1.0, canonical(unit)

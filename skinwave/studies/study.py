@@ -12,10 +12,10 @@ from simple_model import Response
 from skinwave.bodies.sizes import check_mesh, default_size
 from skinwave.measure.comparison import (
     Measured,
-    beside,
     compare_measured,
     in_quantity,
     measured_places,
+    runs_to_draw,
 )
 from skinwave.models import named
 from skinwave.models.limits import check_taken
@@ -142,8 +142,8 @@ def run_study(
             measured, [in_quantity(run, quantity, prepared) for run in group]
         )
         comparison_page.write_tables(folder, comparison)
-        parts.append(comparison_page.page_part(comparison, Gallery().figure))
-        figures[name] = beside(comparison, [column.run for column in comparison.columns])
+        parts.append(comparison_page.page_section(comparison, Gallery().figure))
+        figures[name] = runs_to_draw(comparison)
         first = replace(first, measured=measured_places(comparison)) if first else None
     if len(runs) < planned:
         parts.insert(0, f"Interrupted: this page shows the {len(runs)} finished of {planned} runs.")

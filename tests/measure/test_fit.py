@@ -17,7 +17,7 @@ from skinwave.measure.findings import cautions
 from skinwave.measure.fit import fit
 from skinwave.measure.fit_page import fitted_scene
 from skinwave.measure.observed import is_steady, load_lines
-from skinwave.measure.parameters import check, parse
+from skinwave.measure.parameters import check_limits, parse
 from skinwave.measure.predicted import predicted_lines, target
 from skinwave.measure.writing import write
 from skinwave.planning.simulate import compute
@@ -93,12 +93,12 @@ def test_gain_and_pressure_have_no_interval(scene, lines):
     assert of[MODULUS].low < of[MODULUS].value < of[MODULUS].high
     (keys,) = found.intervals.unresolved
     assert set(keys) == {"gain", PRESSURE}
-    assert len([text for text in cautions(found) if "do not resolve" in text]) == 1
+    assert len([text for text in cautions(found) if PRESSURE in text]) == 1
     assert found.values["gain"] * found.values[PRESSURE] == pytest.approx(0.8 * 50, rel=0.05)
     text = fitted_scene(found)
     given = {each.key: each for each in spreads_of(loads(text))}
     assert given[PRESSURE].distribution.width == (10, 200)
-    assert f"{PRESSURE} is not resolved by the measurement" in text
+    assert f"# {PRESSURE}" in text
 
 
 def test_noise_determines_nothing(scene, lines):
@@ -115,7 +115,7 @@ def test_the_fitted_scene_has_the_spreads_of_the_estimates(scene, lines):
     found = fit(scene, measured, [*vary("gain", MODULUS, "delay_ms"), "body.thickness_mm=10:20"],
                 starts=1)  # fmt: skip
     text = fitted_scene(found)
-    assert "correlations of the estimates" in text
+    assert "correlations" in text
     given = {each.key: each for each in spreads_of(loads(text))}
     assert given.keys() == {MODULUS, VISCOSITY, "body.thickness_mm", PRESSURE}
     for each in (one for one in found.estimates if "." in one.key):
@@ -125,11 +125,11 @@ def test_the_fitted_scene_has_the_spreads_of_the_estimates(scene, lines):
     assert given[VISCOSITY].distribution == OF_PRESETS["palm"].losses
 
 
-def test_an_estimate_at_a_limit_and_a_misfit_are_said(scene, lines):
+def test_an_estimate_at_a_limit_and_a_misfit_give_warnings(scene, lines):
     vary_low = [f"{MODULUS}=10000:20000", *vary("gain")]
-    said = cautions(fit(scene, spectra(scene, lines, delay=0), vary_low, starts=1))
-    assert any(text.startswith(f"{MODULUS} = ") and "at a limit" in text for text in said)
-    assert any("errors of the measurement explain" in text for text in said)
+    warnings = cautions(fit(scene, spectra(scene, lines, delay=0), vary_low, starts=1))
+    assert any(text.startswith(f"{MODULUS} = ") and "limit" in text for text in warnings)
+    assert any(text.startswith("chi squared") for text in warnings)
 
 
 def test_amplitudes_need_no_delay(scene, lines):
@@ -185,10 +185,10 @@ def test_waveforms_from_rest_are_fitted_with_their_transient(scene, lines):
     assert "from rest" in found.solution.problem.data.words
     assert found.values[MODULUS] == pytest.approx(30e3, rel=0.01)
     assert found.values["gain"] == pytest.approx(1.5, rel=0.02)
-    with pytest.raises(ValueError, match="transient, and flat-body-harmonic has"):
+    with pytest.raises(ValueError, match="transient.*flat-body-harmonic"):
         fit(scene, measured, vary(MODULUS), model="flat-body-harmonic")
     brief = loads(TEXT.replace("duration_s = 0.2", "duration_s = 0.05"))
-    with pytest.raises(ValueError, match="Tacton after 50 ms"):
+    with pytest.raises(ValueError, match="Tacton of 50 ms"):
         fit(brief, measured, vary(MODULUS))
 
 
@@ -224,15 +224,15 @@ def test_elements_are_factorised_once_for_many_predictions():
 def test_what_cannot_be_fitted_is_refused(scene, lines):
     measured = spectra(scene, lines)
     with pytest.raises(ValueError, match="body.material.poisson at 0.6"):
-        check(scene, parse(["body.material.poisson=0.3:0.6"]))
+        check_limits(scene, parse(["body.material.poisson=0.3:0.6"]))
     with pytest.raises(ValueError, match="load has no line at"):
         fit(scene, measured, ["tacton.am_frequency_hz=100:180"])
-    with pytest.raises(ValueError, match="spectra; fit lines"):
+    with pytest.raises(ValueError, match="fit lines"):
         fit(scene, measured, vary("gain"), kind="waveforms")
     with pytest.raises(ValueError, match="has no body"):
         fit(scene, measured, vary("gain"), model="point-kernel")
     unknown = replace(measured, places=np.full((3, 2), np.nan))
-    with pytest.raises(ValueError, match="places of the measurement are not known"):
+    with pytest.raises(ValueError, match="places are unknown"):
         fit(scene, unknown, vary("gain"))
     other = replace(measured, frequencies=measured.frequencies + 17)
     with pytest.raises(ValueError, match="resolves no line"):
@@ -243,31 +243,30 @@ def test_what_cannot_be_fitted_is_refused(scene, lines):
         fit(scene, one, vary(MODULUS, VISCOSITY, "gain"))
 
 
-def test_a_measurement_with_its_sign_turned_is_noticed(scene, lines):
+def test_a_measurement_with_the_opposite_sign_is_recognised(scene, lines):
     measured = spectra(scene, lines, delay=0)
     for sign in (1, -1):
         each = replace(measured, values=sign * measured.values)
-        said = cautions(fit(scene, each, vary(MODULUS, "gain"), starts=1))
-        assert any("sign turned" in text for text in said) == (sign < 0)
+        found = fit(scene, each, vary(MODULUS, "gain"), starts=1)
+        assert found.solution.may_be_flipped == (sign < 0)
+        assert any("sign" in text for text in cautions(found)) == (sign < 0)
 
 
-def test_lines_that_a_reduced_body_does_not_have_are_told(scene, lines):
+def test_lines_that_a_reduced_body_leaves_out_are_reported(scene, lines):
     """The share of their power is that of all lines less noise; of noise alone it is 0."""
     measured = spectra(scene, lines)
     aim = target(scene, "flat-body", measured.record, scene.probe_points)
     every = load_lines(measured, aim)
     assert every.left_out == ()
-    small = replace(aim, reduced=SimpleNamespace(frequencies=every.found.frequencies[:1]))
+    small = replace(aim, reduced=SimpleNamespace(frequencies=every.measured.frequencies[:1]))
     left = load_lines(measured, small).left_out[0]
-    power = (np.abs(every.found.mean) ** 2 - 2 * every.error**2).sum(axis=1)
+    power = (np.abs(every.measured.mean) ** 2 - 2 * every.error**2).sum(axis=1)
     assert left.frequency == 280.0
     assert left.share == pytest.approx(power[1] / power.sum(), rel=0.01)
     found = fit(scene, measured, vary("gain"), starts=1)
     data = replace(found.solution.problem.data, left_out=(left, replace(left, share=np.nan)))
     solution = replace(found.solution, problem=replace(found.solution.problem, data=data))
-    said = [text for text in cautions(replace(found, solution=solution)) if "not fitted" in text]
-    assert len(said) == 1
-    assert left.name in said[0]
+    assert any(left.name in text for text in cautions(replace(found, solution=solution)))
     rng = np.random.default_rng(1)
     values = 1e-6 * (rng.standard_normal(measured.values.shape) + 1j)
     values[:, 0] = measured.values[:, 0]
@@ -283,11 +282,9 @@ def test_the_command_writes_a_scene_and_a_page(scene, lines, tmp_path, capsys):
              f"{VISCOSITY}=6", "--starts", "1", "-o", str(tmp_path / "out"),
              "--json"]  # fmt: skip
     assert cli.main(words) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["unresolved"] == [["gain", PRESSURE]]
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["unresolved"] == [["gain", PRESSURE]]
     text = (tmp_path / "out/scene.toml").read_text()
     assert loads(text).body.material.shear_modulus == pytest.approx(30e3, rel=0.02)
-    page = (tmp_path / "out/index.html").read_text()
-    assert "the data do not resolve gain" in page
     names = {"estimates.csv", "fit.json", "fit.npz", "fitted.png", "residuals.png", "record.json"}
     assert names <= {path.name for path in (tmp_path / "out").iterdir()}

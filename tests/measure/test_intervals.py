@@ -10,7 +10,7 @@ from skinwave.measure import Measurement, observed
 from skinwave.measure.intervals import intervals, whiteness, widening
 from skinwave.measure.observed import Data
 from skinwave.measure.parameters import Parameter, parse
-from skinwave.measure.search import Problem, best_placed, descended, refine, search, solve
+from skinwave.measure.search import Problem, best_candidate, descend, refine, search, solve
 from skinwave.scene.file import loads
 from skinwave.system.effort import silent
 
@@ -192,12 +192,12 @@ def of_waves(true=TRUE, sign=1.0, vary=VARY):
 def test_a_search_leaves_the_minimum_of_a_delay_a_period_off(modulus):
     """Of a start with the wrong delay; the local search from it ends elsewhere."""
     asked = of_waves()
-    u = np.array([each.place(x) for each, x in zip(
+    u = np.array([each.position(x) for each, x in zip(
         asked.parameters.free, (modulus, 1.0, 3.6), strict=True)])  # fmt: skip
     wrong = refine(asked, u)
     assert wrong.converged
     assert wrong.cost > 100 * asked.data.values.size
-    found = asked.parameters.values(descended(asked, wrong).ended)
+    found = asked.parameters.values(descend(asked, wrong).ended)
     assert found[MODULUS] == pytest.approx(TRUE[MODULUS], rel=0.02)
     assert found["delay_ms"] == pytest.approx(TRUE["delay_ms"], abs=0.05)
 
@@ -205,7 +205,7 @@ def test_a_search_leaves_the_minimum_of_a_delay_a_period_off(modulus):
 def test_every_start_reaches_the_least_minimum():
     asked, rng = of_waves(), np.random.default_rng(1)
     starts = [rng.random((1, 3)) for _ in range(25)]
-    local = [refine(asked, best_placed(asked, each)) for each in starts]
+    local = [refine(asked, best_candidate(asked, each)) for each in starts]
     least = min(start.cost for start in local)
     assert sum(start.cost > 2 * least for start in local) >= 1
     found = search(asked, starts, silent)
@@ -214,10 +214,10 @@ def test_every_start_reaches_the_least_minimum():
 
 def test_a_turned_sign_is_noticed():
     for sign in (1, -1):
-        assert solve(of_waves(TRUE, sign), 2, 0, silent).may_be_turned == (sign < 0)
+        assert solve(of_waves(TRUE, sign), 2, 0, silent).may_be_flipped == (sign < 0)
         vary = (VARY[0], "gain=-5:5", VARY[2])
         found = solve(of_waves(TRUE | {"delay_ms": 0.1}, sign, vary), 2, 0, silent)
-        assert found.may_be_turned == (sign < 0)
+        assert found.may_be_flipped == (sign < 0)
 
 
 def test_parameters_are_placed_by_their_logarithm_where_both_limits_are_positive():
@@ -226,8 +226,8 @@ def test_parameters_are_placed_by_their_logarithm_where_both_limits_are_positive
     linear = Parameter(key="b", low=-1, high=3)
     assert linear.value(0.5) == pytest.approx(1)
     for each in (by_log, linear):
-        assert each.place(each.value(0.3)) == pytest.approx(0.3)
-        assert each.place(1e9) == 1
+        assert each.position(each.value(0.3)) == pytest.approx(0.3)
+        assert each.position(1e9) == 1
     for given in (
         ["gain"], ["gain=1:2:3"], ["gain=2:1"], ["gain=1:inf"], ["gain=1:2", "gain=1:3"], [],
         ["body.materal=1:2"],

@@ -127,7 +127,7 @@ def test_significances_are_uniform_where_there_is_noise_alone():
     rng = np.random.default_rng(6)
     for repetitions in (2, 5):
         lines = only(complex_noise(rng, repetitions, 6, 2000))
-        p = lines.significances(lines.mean)
+        p = lines.p_values(lines.mean)
         assert stats.kstest(p.ravel(), "uniform").pvalue > 1e-3
         f = np.abs(lines.mean) ** 2 / lines.variance
         assert np.allclose(p, stats.f.sf(f, 2, 2 * (repetitions - 1)))
@@ -139,7 +139,7 @@ def test_the_chance_of_any_false_difference_is_as_stated():
     for _ in range(40):
         lines = lines_of(measured(rng, 5, 0.2), LINES)
         away = lines.mean - align(lines, MODEL, window=0.05).applied(LINES, MODEL)
-        p = lines.significances(away)
+        p = lines.p_values(away)
         single.append(np.mean(p < 0.05))
         any_at_all.append(holm(p).min() < 0.05)
     assert 0.03 < np.mean(single) < 0.06
@@ -226,6 +226,6 @@ def test_spectra_have_lines_in_their_bins_and_noise_beside_them():
 def test_single_lines_once_have_no_known_noise():
     found = lines_of(spectra(1, 0.0, LINES, MODEL), LINES)
     assert np.isnan(found.variance).all()
-    assert np.isnan(found.significances(found.mean)).all()
+    assert np.isnan(found.p_values(found.mean)).all()
     a = align(found, MODEL)
     assert (a.delay, a.gain) == (pytest.approx(0, abs=1e-12), pytest.approx(1))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from skinwave.measure.reading import places_of, read
+from skinwave.measure.reading import parse_places, read
 
 RATE, COUNT, START = 10_000.0, 1200, -0.02
 T = START + np.arange(COUNT) / RATE
@@ -265,9 +265,9 @@ def test_places_are_pairs_in_millimetre(tmp_path):
         "x_m,y_m,z_m\n0,0,1\n0.005,-0.0025,1",
     ):
         (tmp_path / "a.csv").write_text(text)
-        assert np.array_equal(places_of(str(tmp_path / "a.csv")), [[0, 0], [0.005, -0.0025]])
+        assert np.array_equal(parse_places(str(tmp_path / "a.csv")), [[0, 0], [0.005, -0.0025]])
     (tmp_path / "a.csv").write_text("x [mm],z [mm]\n0,0\n")
-    assert np.array_equal(places_of("0,0 (5,-2.5)"), [[0, 0], [0.005, -0.0025]])
+    assert np.array_equal(parse_places("0,0 (5,-2.5)"), [[0, 0], [0.005, -0.0025]])
     for wrong in (str(tmp_path / "a.csv"), "", "5", "a,b", "1,2,3", "nan,0"):
         with pytest.raises(ValueError, match="mm"):
-            places_of(wrong)
+            parse_places(wrong)

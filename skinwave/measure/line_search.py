@@ -1,0 +1,227 @@
+"""Search for spectral lines in waveforms: which frequencies rise above the noise, and how surely.
+
+A line is a peak of the periodogram (Hann window, mean of R repetitions) above the noise floor, a
+running median. In Gaussian noise their ratio has an F distribution with 2 R and nu degrees of
+freedom, nu from the variance of the median (Welch 1967). The false-alarm probability is that of one
+bin times bins and places (Bonferroni).
+
+Lines are searched strongest first and fitted together with a linear trend, so that side lobes are
+not taken for lines. Frequencies follow from Gauss-Newton steps with the amplitudes projected out
+(Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973). Standard errors are the Cramer-Rao bound, for
+one sinusoid of amplitude A over a time T in noise of one-sided density S 3 S / (pi^2 A^2 T^3)
+(Rife and Boorstyn, IEEE Trans. Inf. Theory 20, 1974, eq. 17).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from simple_model.windows import cosines
+from skinwave.measure.noise_floor import false_alarm, noise_floor
+from skinwave.typing import Floats
+
+ALARM = 0.01  # probability that a file of noise has any line
+RESOLVED = 1.5  # bins; closer lines are one
+LOWEST = 4  # bins; slower motion is drift, and lines as close to half the rate are undetermined
+FEWEST = 32  # samples
+MOST_LINES = 40
+MOST_PASSES = 12
+DYNAMIC_RANGE = 1e-2  # in power; weaker lines are searched once stronger ones are fitted
+CLOSE = 4.0  # bins from a known line, where its fit may leave unknown lines
+LEAKAGE = 4.0  # times the bound of the Hann window's side lobes
+ROUND_OFF = 1e-9  # of the largest value; weaker lines are round-off
+MOST_STEPS = 12  # of Gauss-Newton
+LAST_STEP = 0.01  # of a standard error or of `LARGEST_STEP`
+LARGEST_STEP = 0.5  # bins
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SpectralLine:
+    """Line with its `frequency` and standard `error` in Hz, `amplitudes` (p,) in SI, root mean
+    square over repetitions, and the probability `false_alarm` of any such line in noise alone.
+    """
+
+    frequency: float
+    error: float
+    amplitudes: Floats
+    false_alarm: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LineSpectrum:
+    """Lines by frequency, and one-sided densities (f, p), unit^2/Hz, at `frequencies` (f,) of the
+    waveforms and of the noise `floor`.
+    """
+
+    lines: tuple[SpectralLine, ...]
+    frequencies: Floats
+    density: Floats
+    floor: Floats
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Fit:
+    """Lines fitted to waveforms."""
+
+    frequencies: Floats  # (l,) Hz
+    errors: Floats  # (l,) Hz
+    amplitudes: np.ndarray  # (l, r, p) of Re a exp(2 pi i f t)
+    rest: Floats  # (t, r p) without lines and trend
+
+    @property
+    def power(self) -> Floats:
+        """Squared amplitudes (l, p), means over repetitions."""
+        return np.asarray((np.abs(self.amplitudes) ** 2).mean(axis=1))
+
+
+def find_lines(values: Floats, rate: float, *, alarm: float = ALARM) -> LineSpectrum:
+    """Return lines and noise floor of repetitions of waveforms (r, t, p) at a rate in Hz.
+
+    Noise alone has any line with the probability `alarm`. Raises a ValueError for fewer than 32
+    samples.
+    """
+    runs, count, places = values.shape
+    if count < FEWEST:
+        raise ValueError(f"{count} samples are too few for a spectrum; measure {FEWEST} or more")
+    x = np.moveaxis(values, 0, 1).reshape(count, runs * places)
+    least = 2 / rate * (ROUND_OFF * np.abs(values).max()) ** 2
+    width, chance = rate / count, np.empty(0)
+    fit = _fitted(x, np.empty(0), rate, np.ones((2, places)), runs)
+    density = rest = _densities(fit.rest, runs, rate)
+    floor = np.maximum(noise_floor(density, runs), least)
+    for _ in range(MOST_PASSES):
+        peak, peak_chance = peaks(rest, floor, runs, alarm, fit.frequencies / width)
+        if not len(peak):
+            break
+        away = np.abs(peak[:, None] - fit.frequencies / width).min(axis=1, initial=np.inf)
+        chosen = away >= min(CLOSE, away.max())
+        start = np.append(fit.frequencies, peak[chosen] * width)
+        chance = np.append(chance, peak_chance[chosen])
+        fit = _fitted(x, start, rate, floor, runs)
+        # Before the neighbour of a line is known, the residual of the line may look like a line.
+        kept = _are_significant(fit, floor, rate, alarm)
+        if not kept.all():
+            fit, chance = _fitted(x, fit.frequencies[kept], rate, floor, runs), chance[kept]
+        rest = _densities(fit.rest, runs, rate)
+        floor = np.maximum(noise_floor(rest, runs), least)
+        if len(chance) >= MOST_LINES:
+            break
+    errors, size = _errors(fit, rate, floor, runs), np.sqrt(fit.power)
+    lines = tuple(
+        SpectralLine(frequency=float(fit.frequencies[k]), error=float(errors[k]),
+                     amplitudes=size[k], false_alarm=float(chance[k]))
+        for k in np.argsort(fit.frequencies)
+    )  # fmt: skip
+    frequencies = np.arange(len(density)) * width
+    return LineSpectrum(lines=lines, frequencies=frequencies, density=density, floor=floor)
+
+
+def _densities(x: Floats, runs: int, rate: float, window: str = "hann") -> Floats:
+    """Return the one-sided densities (f, p) of waveforms (t, r p), means over repetitions."""
+    weights = cosines(window, len(x))
+    spectra = np.abs(np.fft.rfft(x * weights[:, None], axis=0)) ** 2
+    density = 2 * spectra / (rate * np.sum(weights**2))
+    return density.reshape(len(density), runs, -1).mean(axis=1)
+
+
+def peaks(
+    density: Floats, floor: Floats, runs: int, alarm: float, known: Floats
+) -> tuple[Floats, Floats]:
+    """Return positions (n,) in bins of new lines, strongest first, and their false-alarm
+    probabilities (n,), from densities and floors (f, p) and the positions (l,) of known lines.
+    """
+    tests = density[LOWEST:-1].size
+    chance = np.minimum(1.0, tests * false_alarm(density / floor, runs, len(density)))
+    least, height = chance.min(axis=1), (density / floor).max(axis=1)
+    inner = height[1:-1]
+    top = np.r_[False, (inner >= height[:-2]) & (inner > height[2:]), False]
+    top[:LOWEST] = top[-LOWEST:] = False
+    bins = np.flatnonzero(top & (least < alarm))
+    size = density.max(axis=1)
+    bins = bins[size[bins] >= DYNAMIC_RANGE * size[bins].max(initial=0.0)]
+    lines: list[int] = []
+    for k in sorted(bins.tolist(), key=lambda k: -height[k]):
+        if np.abs(np.append(known, lines) - k).min(initial=np.inf) < RESOLVED:
+            continue
+        leaks = [density[j] * _side_lobe(abs(k - j)) for j in lines]
+        if not lines or (density[k] > np.sum(leaks, axis=0))[chance[k] < alarm].any():
+            lines.append(k)
+    at = np.array(lines[: MOST_LINES - len(known)], int)
+    left, middle, right = (np.log(height[at + shift]) for shift in (-1, 0, 1))
+    return at + (left - right) / (left - 2 * middle + right) / 2, least[at]
+
+
+def _side_lobe(bins: int) -> float:
+    """Return a bound of the Hann window's power some bins from a line, relative to the line."""
+    return 1.0 if bins < 2 else LEAKAGE / (np.pi * bins * (bins**2 - 1)) ** 2
+
+
+def _are_significant(fit: _Fit, floor: Floats, rate: float, alarm: float) -> np.ndarray:
+    """Return a mask (l,) of lines that rise above the noise with all others fitted."""
+    ratio = np.ones(floor.shape)
+    bins, runs = _bins(fit.frequencies, fit.rest, floor, rate), fit.amplitudes.shape[1]
+    ratio[bins] = fit.power * len(fit.rest) / (2 * rate) / floor[bins]
+    tests = floor[LOWEST:-1].size
+    return np.asarray(tests * false_alarm(ratio, runs, len(floor))[bins].min(axis=1) < alarm)
+
+
+def _bins(frequencies: Floats, x: Floats, floor: Floats, rate: float) -> np.ndarray:
+    return np.clip(np.round(frequencies * len(x) / rate), 1, len(floor) - 1).astype(int)
+
+
+def _errors(fit: _Fit, rate: float, floor: Floats, runs: int) -> Floats:
+    """Return standard errors in Hz in the residual without a window, in which transients and
+    drifting lines leave more than with one.
+    """
+    bins = _bins(fit.frequencies, fit.rest, floor, rate)
+    bare = noise_floor(_densities(fit.rest, runs, rate, "boxcar"), runs)[bins]
+    weight = fit.power / floor[bins]
+    excess = np.sum(weight * bare / floor[bins], axis=1) / np.sum(weight, axis=1)
+    return fit.errors * np.sqrt(np.maximum(excess, 1.0))
+
+
+def _fitted(x: Floats, start: Floats, rate: float, floor: Floats, runs: int) -> _Fit:
+    """Return lines fitted together to waveforms (t, r p), weighted by the noise floor (f, p), from
+    frequencies (l,) in Hz that are known to a fraction of a bin.
+    """
+    frequencies, limit = start.copy(), LARGEST_STEP * rate / len(x)
+    noise = np.tile(floor[_bins(start, x, floor, rate)], (1, runs))
+    for _ in range(MOST_STEPS):
+        step, errors, linear, rest = _step(x, frequencies, rate, noise)
+        if (np.abs(step) < LAST_STEP * np.minimum(errors, limit)).all():
+            break
+        moved = frequencies + np.clip(step, -limit, limit)
+        frequencies = np.clip(moved, limit, rate / 2 - limit)
+    cosine, sine = np.split(linear[:-2], 2)
+    amplitudes = (cosine - 1j * sine).reshape(len(frequencies), runs, x.shape[1] // runs)
+    return _Fit(frequencies=frequencies, errors=errors, amplitudes=amplitudes, rest=rest)
+
+
+def _step(
+    x: Floats, frequencies: Floats, rate: float, noise: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return a Gauss-Newton step of the frequencies, their standard errors, the coefficients
+    (2 l + 2, q) of cosines, sines, constant and trend, and the residual (t, q) of these.
+    """
+    count, half = len(frequencies), 2 * len(frequencies) + 2
+    time = (np.arange(len(x)) - len(x) / 2)[:, None] / rate
+    angle = 2 * np.pi * time * frequencies
+    trend = 2 * rate / len(x) * time
+    basis = np.hstack([np.cos(angle), np.sin(angle), np.ones_like(trend), trend])
+    both = np.hstack([basis, time * basis[:, :-2]])
+    gram, right = both.T @ both, both.T @ x
+    inner = gram[:half, :half]
+    lower = np.linalg.lstsq(inner, gram[:half, half:], rcond=1e-13)[0]
+    linear = np.asarray(np.linalg.lstsq(inner, right[:half], rcond=1e-13)[0], np.float64)
+    schur = gram[half:, half:] - gram[half:, :half] @ lower
+    slope = right[half:] - gram[half:, :half] @ linear
+    cosine, sine = np.split(linear[:-2], 2)
+    # d/df of c cos + s sin is 2 pi t (s cos - c sin), weighted by the noise of a sample, S rate/2.
+    deviation = np.sqrt(noise * rate / 2)
+    change = 2 * np.pi / deviation * np.stack([sine, -cosine])  # (2, l, q)
+    blocks = schur.reshape(2, count, 2, count)
+    fisher = np.einsum("alq,albm,bmq->lm", change, blocks, change, optimize=True)
+    gradient = np.einsum("alq,alq->l", change, slope.reshape(2, *deviation.shape) / deviation)
+    inverse = np.linalg.pinv(fisher, hermitian=True)
+    errors = np.sqrt(np.maximum(np.diag(inverse), 0.0))
+    return inverse @ gradient, errors, linear, x - basis @ linear
