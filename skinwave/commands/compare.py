@@ -72,9 +72,8 @@ def run(options: argparse.Namespace) -> int:
         against = " and ".join(label(body) for body in bodies or paper15.MEASURED_ON)
         title = f"The paper's 15 Tactons: point kernel, {against}"
     else:
-        if measured:
-            scene = at_measured_places(scene, measured.measurement)
-        for body in (bodies or {}).values():
+        scene = at_measured_places(given, measured.measurement) if measured else given
+        for body in bodies.values():
             scene = with_body(scene, body)
         scenes, title = own_scenes(scene, folder_name(scene.name)), scene.name
         out = f"{Path(options.scene).stem}-compared"

@@ -117,7 +117,7 @@ def _inspect(options: argparse.Namespace) -> int:
 
 
 def _measured(file: Path, options: argparse.Namespace) -> "Measurement":
-    """The measurement in a file, by the options of what it does not say."""
+    """Read a measurement; options give what the file does not state."""
     from skinwave.measure.reading import parse_places, read
 
     return read(

@@ -50,10 +50,10 @@ Arrays = Mapping[str, np.ndarray]
 
 def read_npz(path: Path, given: Given) -> Recording:
     """Return the recording in an .npz file, skinwave's own or another program's."""
-    with reading.opened(path):
+    with reading.open_regular(path):
         pass
     try:
-        arrays = reading.arrays(path)
+        arrays = reading.load_arrays(path)
     except ValueError:
         raise ValueError("the file cannot be read as .npz; save arrays by numpy.savez") from None
     if str(arrays.get("format", "")) == FORMAT:
@@ -67,7 +67,7 @@ def read_npz(path: Path, given: Given) -> Recording:
 
 def read_mat(path: Path, given: Given) -> Recording:
     """Return the recording in a MATLAB file."""
-    with reading.opened(path, LARGEST) as file:
+    with reading.open_regular(path, LARGEST) as file:
         if not file.read(1):
             raise ValueError("the file is empty; download or export it again")
     try:

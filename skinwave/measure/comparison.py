@@ -241,7 +241,7 @@ def at_measured_places(scene: Scene, measurement: Measurement) -> Scene:
     if not measurement.record.is_normal:
         known = ", ".join(name for name, q in QUANTITIES.items() if q.is_normal and q.of_body)
         raise ValueError(f"{measurement.record.words} cannot be compared; give one of {known}")
-    if scene.reading.is_on_surface and scene.reading.asked.is_normal:
+    if scene.reading.is_on_surface and scene.reading.record.is_normal:
         scene = replace(scene, quantity=DISPLACEMENT.name)
     check_motion(scene, "a comparison with a measurement")
     if np.isfinite(measurement.places).all():

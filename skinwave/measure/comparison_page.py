@@ -210,7 +210,7 @@ def _where(comparison: MeasuredComparison, column: ModelColumn) -> str:
     names, places = list(comparison.names), beyond.shape[1]
     shown = [f"{names[k]} at {beyond[k].sum()} of {places} places" for k in lines[:MOST_NAMED]]
     more = len(lines) - len(shown)
-    return ", ".join(shown) + (f" and {counted(more, 'more line')}" if more else "")
+    return ", ".join(shown) + (f" and {plural(more, 'more line')}" if more else "")
 
 
 def remarks(comparison: MeasuredComparison) -> list[str]:
@@ -218,7 +218,7 @@ def remarks(comparison: MeasuredComparison) -> list[str]:
     measurement, main, lines = comparison.measurement, comparison.main, comparison.lines
     sentences = [
         f"{measurement.name or 'The measurement'}: {measurement.record.words} at "
-        f"{counted(len(measurement.places), 'place')}, {_repetitions(comparison)}"
+        f"{plural(len(measurement.places), 'place')}, {_repetitions(comparison)}"
     ]
     if main.may_be_flipped:
         name = label(main.run.column)
@@ -247,7 +247,7 @@ def _repetitions(comparison: MeasuredComparison) -> str:
     unknown = int(np.isnan(lines.variance).any(axis=1).sum())
     if unknown == len(lines.frequencies):
         return "one repetition, with unknown noise."
-    others = f", and unknown for {counted(unknown, 'line')}" * (unknown > 0)
+    others = f", and unknown for {plural(unknown, 'line')}" * (unknown > 0)
     return f"one repetition; the noise is the noise floor at each line{others}."
 
 

@@ -25,7 +25,7 @@ def sentences(found: Fit) -> list[str]:
     known = f"; chi squared over its degrees of freedom is {ratio}, with known errors"
     return [
         f"{found.target.model} was fitted to {data.words}.",
-        f"{solution.agreeing_starts} of {counted(len(solution.starts), 'start')} reached the "
+        f"{solution.agreeing_starts} of {plural(len(solution.starts), 'start')} reached the "
         f"solution. Its residual is {percent(found.misfit)} of the measured motion"
         f"{known * data.is_known}.",
         *(

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from simple_model.numbers import as_sentence, counted, interval, significant
+from simple_model.numbers import as_sentence, interval, plural, significant
 from simple_model.response import SETTLE
 from skinwave.measure import writing
 from skinwave.measure.inspection import Inspection
@@ -95,18 +95,18 @@ def sentences(found: Inspection) -> list[str]:
         lines.append(f"Clipped: {int(found.clipped.sum()):,} samples in runs at the same extreme, "
                      f"at {measured.place_names(where)}.")  # fmt: skip
     if len(found.constant) and len(measured.axis) > 1:
-        lines.append(f"Nothing varies at {counted(len(found.constant), 'place')}: "
+        lines.append(f"Nothing varies at {plural(len(found.constant), 'place')}: "
                      f"{measured.place_names(found.constant)}.")  # fmt: skip
     return lines
 
 
 def _content(found: Inspection) -> str:
     measured, axis = found.measured, found.measured.axis
-    content = f"{measured.record.name.capitalize()} at {counted(len(measured.places), 'place')}, "
-    content += counted(len(measured.values), "repetition")
+    content = f"{measured.record.name.capitalize()} at {plural(len(measured.places), 'place')}, "
+    content += plural(len(measured.values), "repetition")
     if measured.is_spectrum:
         return f"{content}: {len(axis)} complex amplitudes, {axis[0]:g} to {axis[-1]:g} Hz."
-    content += f": {counted(len(axis), 'sample')}"
+    content += f": {plural(len(axis), 'sample')}"
     if len(axis) < 2:
         return f"{content}."
     duration = len(axis) / measured.rate

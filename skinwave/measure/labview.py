@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from meshes import reading
-from meshes.reading import exported_text
+from meshes.reading import read_exported_text
 from skinwave.measure.headers import parse_heading
 from skinwave.measure.recording import Given, Recording
 from skinwave.measure.table import Table, recording_of
@@ -19,7 +19,7 @@ AXIS_UNITS = {"Time": "s", "Frequency": "Hz"}
 
 def read_lvm(path: Path, given: Given) -> Recording:
     """Return the recording in a LabVIEW measurement file with one segment."""
-    return recording_of(lvm_table(exported_text(path, LARGEST)), given)
+    return recording_of(lvm_table(read_exported_text(path, LARGEST)), given)
 
 
 def lvm_table(text: str) -> Table:
@@ -72,7 +72,7 @@ def read_tdms(path: Path, given: Given) -> Recording:
         raise ValueError(
             'TDMS files need npTDMS; pip install "skinwave[measure]", or export .lvm or .csv'
         ) from None
-    with reading.opened(path, LARGEST):
+    with reading.open_regular(path, LARGEST):
         pass
     try:
         with warnings.catch_warnings():

@@ -73,7 +73,7 @@ class LoadLines:
     def words(self) -> str:
         """Numbers of lines and places."""
         n, p = self.measured.mean.shape
-        return f"{counted(n, 'line')} at {counted(p, 'place')}"
+        return f"{plural(n, 'line')} at {plural(p, 'place')}"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

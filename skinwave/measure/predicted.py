@@ -200,7 +200,7 @@ def _flat_lines_of(scene: Scene) -> tuple[Floats, Complex]:
     if scene.load.is_plain:
         body = compliance(scene.body)
         f, a = steady_lines(body, scene.pressure, points, threshold=WEAKEST)
-        return f, a * scene.reading.asked.factor(2j * np.pi * f)[:, None]
+        return f, a * scene.reading.record.factor(2j * np.pi * f)[:, None]
     parts = zip(fields_read(scene, 0.0), scene.loads, strict=True)
     each = [field_lines(*part, points, threshold=WEAKEST) for part in parts]
     frequencies, amplitudes = zip(*each, strict=True)

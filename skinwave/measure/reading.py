@@ -63,7 +63,7 @@ def read_skinsource(path: Path, given: Given) -> Recording:
     match = _SKINSOURCE_NAME.fullmatch(path.name)
     if not match:
         raise ValueError(f"the name is not model-1-location-01.f32 to ...; {DOWNLOAD}")
-    content = reading.content(path, SKINSOURCE_BYTES + 1)
+    content = reading.read_bytes(path, SKINSOURCE_BYTES + 1)
     values = np.frombuffer(content[: len(content) // 4 * 4], "<f4")
     if len(content) != SKINSOURCE_BYTES or not np.isfinite(values).all():
         expected = f"{SKINSOURCE_BYTES:,} bytes of finite numbers"

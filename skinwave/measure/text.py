@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from meshes.reading import exported_text
+from meshes.reading import read_exported_text
 from skinwave.measure.headers import TIME, UNITS, Column, X, Y, parse_heading
 from skinwave.measure.labview import lvm_table
 from skinwave.measure.recording import Given, Recording
@@ -40,14 +40,14 @@ _LEADING_ZERO = re.compile(r",0\d+(?=,|$)")
 
 def read(path: Path, given: Given) -> Recording:
     """Return the recording in a text file. Raises a ValueError if it has no table of motion."""
-    text = exported_text(path, LARGEST)
+    text = read_exported_text(path, LARGEST)
     table = lvm_table(text) if text.startswith(LVM_FIRST_LINE) else parse_table(text)
     return recording_of(table, given)
 
 
 def read_places(path: Path) -> Floats:
     """Return places (p, 2) in metres from the columns x and y, or from two columns in mm."""
-    table = parse_table(exported_text(path, LARGEST))
+    table = parse_table(read_exported_text(path, LARGEST))
     if len(table.columns) == 2 and not any(column.text for column in table.columns):
         table = replace(table, columns=(parse_heading("x [mm]"), parse_heading("y [mm]")))
     roles = [column.role for column in table.columns]

@@ -80,9 +80,8 @@ def motion_divisor(unit: str, quantity: str) -> float:
         other = quantity_of(unit)
         problem = f"is a unit of {other}, not of {quantity}" if other else (
             f"is not a unit of {quantity}")  # fmt: skip
-        raise ValueError(
-            f"'{unit[:40]}' {problem}; give --unit as one of {', '.join(units)}{meant(name, units)}"
-        )
+        known = ", ".join(units) + suggestion(name, units)
+        raise ValueError(f"'{unit[:40]}' {problem}; give --unit as one of {known}")
     if factor <= 0:
         raise ValueError(f"'{unit[:40]}' must be above 0; use --positive to flip the sign")
     return units[name] / factor

@@ -92,7 +92,7 @@ def _sets(path: Path) -> tuple[list[Function], dict[int, tuple[float, float]], f
         import pyuff
     except ImportError:
         raise ValueError('Universal Files need pyuff; pip install "skinwave[measure]"') from None
-    with reading.opened(path, LARGEST) as content:
+    with reading.open_regular(path, LARGEST) as content:
         if len(SET_TAG.findall(content.read())) % 2:
             raise ValueError("the file ends within a set; export it again")
     try:

@@ -18,7 +18,7 @@ def rows(*columns, sep=",", comma=False, tail="", digits="%.7g"):
     return text.replace(".", ",") if comma else text
 
 
-def plural(text):
+def numbered(text):
     """A table with a count of its rows before each."""
     return "".join(f"{k},{row}\n" for k, row in enumerate(text.splitlines()))
 
@@ -66,11 +66,11 @@ TABLES = {
                 for k, row in enumerate(rows(T, TONE).splitlines())), MM_S, 1,
     ),
     "siglent": (SIGLENT + rows(T, TONE), MM_S, 1),
-    "rigol": (RIGOL + plural(rows(TONE, OTHER, tail=",,")), BOTH, 2),
+    "rigol": (RIGOL + numbered(rows(TONE, OTHER, tail=",,")), BOTH, 2),
     "rigol, start and step behind names": (
         "CH1V,CH2V,t0 =-2.0e-02, tInc = 1.0e-04,\n" + rows(TONE, OTHER, tail=",,"), BOTH, 2
     ),
-    "scopy": (SCOPY + plural(TWO), BOTH, 2),
+    "scopy": (SCOPY + numbered(TWO), BOTH, 2),
     "picoscope": (
         "Time,Channel A,Channel B\n(ms),(mV),(mV)\n\n" + rows(1e3 * T, TONE, OTHER), BOTH, 2
     ),
@@ -83,7 +83,7 @@ TABLES = {
     "numpy's header": ("# t [s], v [mm/s]\n" + rows(T, TONE), {}, 1),
     "times twice": ("t1 [s],v1 [mm/s],t2 [s],v2 [mm/s]\n" + rows(T, TONE, T, OTHER), {}, 2),
     "count and temperature": (
-        "No.,Time [ms],Velocity [mm/s],Temp [degC]\n" + plural(rows(1e3 * T, TONE, 0 * T)), {}, 1
+        "No.,Time [ms],Velocity [mm/s],Temp [degC]\n" + numbered(rows(1e3 * T, TONE, 0 * T)), {}, 1
     ),
     "no header": (TWO, MM_S | {"rate": RATE}, 2),
     "time last, chosen by name": (
@@ -92,7 +92,7 @@ TABLES = {
     "title in cells": ("My measurement,,\n\nt [s],v [mm/s],w [mm/s]\n" + TWO, {}, 2),
     "decimal commas in quotes": ('sep=,\n"t [s]","v [mm/s]"\n' + "".join(
         '"{}","{}"\n'.format(*row.split(";")) for row in GERMAN.splitlines()), {}, 1),
-    "index of a data frame": (",t [s],v [mm/s]\n" + plural(rows(T, TONE)), {}, 1),
+    "index of a data frame": (",t [s],v [mm/s]\n" + numbered(rows(T, TONE)), {}, 1),
     "uneven times, rate given": (
         rows(T + 3e-5 * np.sin(np.arange(COUNT) ** 2.0), TONE, digits="%.9g"),
         MM_S | {"rate": RATE}, 1,
