@@ -33,7 +33,7 @@ TEXTS = {
     "f [Hz], v(0,0) [m/s]\n1, 1\n": "two columns",
     "f [Hz], re v [m/s], re v [m/s]\n1, 1, 1\n": "complex amplitude",
     "t [s], re v [m/s], im v [m/s]\n0, 1, 1\n1, 1, 1\n": "of a spectrum",
-    "t [s], x [mm], y [mm], v [mm/s]\n0,0,0,1\n1,0,0,1\n0,5,0,1\n": "3 rows",
+    "t [s], x [mm], y [mm], v [mm/s]\n0,0,0,1\n1,0,0,1\n0,5,0,1\n": "4 rows",
     "t [s], x [mm], y [mm], v [mm/s]\n0,0,0,1\n0,0,0,2\n1,0,0,1\n1,5,0,1\n": "row",
 }
 
