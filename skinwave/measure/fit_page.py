@@ -5,6 +5,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -13,9 +14,9 @@ from simple_model.numbers import significant
 from skinwave.measure.findings import cautions, notes, probability, rounded, sentences
 from skinwave.measure.fit import Fit
 from skinwave.measure.measurement import strongest
-from skinwave.report.figures import REPORT, png, styled
-from skinwave.report.spectra import lines_figure
+from skinwave.report.figures import REPORT, png
 from skinwave.report.palette import BLUE, ORANGE
+from skinwave.report.spectra import lines_figure
 from skinwave.scene.file import dumps
 from skinwave.system.document import Details, Part, Picture, Report, Section, preformatted
 from skinwave.system.table import Column, Table
@@ -154,7 +155,7 @@ def _finite(value: float) -> float | None:
     return value if isfinite(value) else None
 
 
-@styled
+@mpl.rc_context(REPORT.rc)
 def fitted_figure(found: Fit) -> Figure:
     """Return fitted and measured data at the places with the largest motion."""
     data, count = found.solution.problem.data, len(found.measured.places)
@@ -204,7 +205,7 @@ def _largest(values: np.ndarray) -> np.ndarray:
     return strongest((np.abs(values) ** 2).sum(axis=0), MOST_DRAWN)
 
 
-@styled
+@mpl.rc_context(REPORT.rc)
 def residual_figure(found: Fit) -> Figure:
     """Return weighted residuals along their axis, and their autocorrelation if it is known."""
     data, solution = found.solution.problem.data, found.solution

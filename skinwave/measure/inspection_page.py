@@ -14,7 +14,7 @@ from skinwave.measure import writing
 from skinwave.measure.inspection import Inspection
 from skinwave.measure.line_search import LOWEST
 from skinwave.measure.measurement import strongest
-from skinwave.report.figures import REPORT, png, styled
+from skinwave.report.figures import REPORT, png
 from skinwave.report.palette import SERIES
 from skinwave.system.document import Picture, Report, Section
 from skinwave.system.table import Column, Table, shown
@@ -158,7 +158,7 @@ def _known(values: Any) -> list[float | None]:
     return [None if np.isnan(x) else float(x) for x in values]
 
 
-@styled
+@mpl.rc_context(REPORT.rc)
 def figure(found: Inspection) -> Figure:
     """Return waveforms, a map of their RMS, and spectra with lines and noise floor."""
     measured = found.measured
