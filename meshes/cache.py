@@ -13,7 +13,6 @@ import os
 import re
 import tempfile
 import time
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -76,7 +75,7 @@ def load(name: str) -> dict[str, Any] | None:
     return arrays | {"meta": meta}
 
 
-def store(name: str, meta: Mapping[str, Any], **arrays: np.ndarray) -> None:
+def store(name: str, meta: Any, **arrays: np.ndarray) -> None:
     """Store an entry; a folder that cannot be written is no error, only a miss next time."""
     home = folder()
     if home is None or not all(np.isfinite(array).all() for array in arrays.values()):

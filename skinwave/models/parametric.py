@@ -69,7 +69,7 @@ TOLERANCE = 0.01  # relative error of a strong line
 SHARE = 0.4  # of the tolerance, for the reduced-order model and for the bases of lines
 WEAK_LINE_RATIO = 1e-3  # to the strongest line that moves the probes: weaker ones are left out
 WEAKEST_LOAD_LINE = 1e-6  # of the strongest line of the load
-FORMAT = "parametric 6"  # of a cached body
+FORMAT = "parametric 7"  # of a cached body
 BETWEEN = 0.3  # share of each range of a body between geometries
 INSIDE = 128  # materials inside the ranges, for the bases of lines
 
@@ -182,7 +182,7 @@ def prepare(
             solver=solver,
         )  # fmt: skip
         fields = _reduce(stage, clock, report, build)
-        store_record(name, fields, fields["model"].parts, fields["forces"])
+        store_record(name, fields)
     effort = meshed.with_cost(fields["effort"], clock, build, h or default_size(body))
     return ParametricBody(
         scene=scene, keys=keys, bodies=bodies, reference=reference, **fields | {"effort": effort}

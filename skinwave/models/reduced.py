@@ -11,7 +11,6 @@ A body is reduced for its probes, to compute a few waveforms of any load, or for
 path, to compute the motion of the whole body.
 """
 
-import pickle
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -24,6 +23,7 @@ from fem.energy import mean_power
 from fem.maxwell import with_internal
 from fem.reduced import exponential_sum, impulse_response, line_response
 from meshes import cache
+from meshes.records import decoded, encoded
 from simple_model import Effort, Material, MovingPressure, Response
 from simple_model.load.focus import spot_width
 from simple_model.load.sampling import below_half_the_rate, highest_driving
@@ -44,7 +44,7 @@ from skinwave.typing import Bools, Floats
 BAND = 1000.0  # Hz up to which a reduced model must meet its tolerance
 REDUCTION_TOLERANCE = 1e-3
 SERIES_ERROR = 5  # times that of the reduction: with `reduction_tolerance` the `series_tolerance`
-FORMAT = "reduced 9"  # of a cached body
+FORMAT = "reduced 10"  # of a cached body
 NEGLIGIBLE_LINE_RATIO = 1e-7  # to the strongest line at the probes
 
 
@@ -139,7 +139,7 @@ def prepare(
         with one_thread():  # a second thread saves a tenth of the time, and rounds differently
             reduced = _prepare(body, build, outputs, clock, report, solver, tolerance, load)
         reduced = replace(reduced, probes=probes)
-        store_record(name, reduced, reduced.poles.values, reduced.read)
+        store_record(name, reduced)
     # Another size may have made the same mesh.
     effort = meshed.with_cost(reduced.effort, clock, build, h or default_size(body))
     return replace(reduced, reading=reading, solids=solids, load=load, effort=effort)
@@ -148,13 +148,16 @@ def prepare(
 def cached_record(name: str) -> Any:
     """Return the record that is cached under a name, or None."""
     entry = cache.load(name)
-    return pickle.loads(entry["record"].tobytes()) if entry else None
+    try:
+        return decoded(entry["meta"], entry) if entry else None
+    except (ImportError, KeyError, TypeError, ValueError):  # of another version of skinwave
+        return None
 
 
-def store_record(name: str, record: object, *numbers: np.ndarray) -> None:
-    """Cache a record under a name, if some of its numbers are finite."""
-    checked = {f"numbers_{k}": each for k, each in enumerate(numbers)}
-    cache.store(name, {}, record=np.frombuffer(pickle.dumps(record), np.uint8), **checked)
+def store_record(name: str, record: object) -> None:
+    """Cache a record under a name, if all numbers of its arrays are finite."""
+    arrays: dict[str, np.ndarray] = {}
+    cache.store(name, encoded(record, arrays), **arrays)
 
 
 def entry_name(

@@ -1,1 +1,1 @@
-"""What every command and record needs: files, processes, text, numbers and progress."""
+"""Basics of commands and records: pages, processes, text, and progress."""

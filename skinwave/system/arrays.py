@@ -1,4 +1,4 @@
-"""Arrays of a pack as text: 64-bit floats, or 16-bit whole numbers with a scale for each row."""
+"""Arrays as text in JSON: 64-bit floats, or 16-bit integers with a scale for each row."""
 
 import base64
 from typing import Any
@@ -10,14 +10,14 @@ LARGEST = 32767
 
 
 def packed(values: np.ndarray) -> Packed:
-    """Real or complex rows (n, m) as 64-bit floats in base 64."""
+    """Encode real or complex rows (n, m) as 64-bit floats in base 64."""
     rows = np.atleast_2d(values)
     found = {"shape": list(rows.shape), "f8": _text(_parts(rows).astype("<f8"))}
     return found if np.iscomplexobj(rows) else found | {"real": True}
 
 
 def quantised(values: np.ndarray) -> Packed:
-    """Real or complex rows (n, m) as 16-bit whole numbers, each row relative to its largest."""
+    """Encode real or complex rows (n, m) as 16-bit integers relative to the largest of each row."""
     parts = _parts(values)
     largest = np.maximum(np.abs(parts).reshape(len(values), -1).max(axis=1), 1e-300)
     scale = (largest / LARGEST).reshape(-1, *(1,) * (parts.ndim - 1))
@@ -29,7 +29,7 @@ def quantised(values: np.ndarray) -> Packed:
 
 
 def _parts(values: np.ndarray) -> np.ndarray:
-    """Real and imaginary parts of complex values along a last axis."""
+    """Return real and imaginary parts of complex values along a new last axis."""
     return np.stack([values.real, values.imag], -1) if np.iscomplexobj(values) else values
 
 

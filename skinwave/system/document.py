@@ -1,8 +1,7 @@
 """Pages: a `Report` is a title, a verdict and parts, written as one HTML file.
 
 Parts are text (a paragraph each), `Table`, `Picture`, `Section`, `Details`, `Choice` or `Markup`.
-Templates are those of Jinja in `templates/`, which escape text wherever it enters a page; only
-`Markup` is taken as it is. It is made of templates and literals alone: see its `format` and `join`.
+The templates escape all text except `Markup`, which is made only from templates and literals.
 """
 
 import hashlib
@@ -19,8 +18,8 @@ from simple_model import Effort
 from skinwave.system.table import Table
 from skinwave.system.templates import part, render, typeset
 
-# What a page may load: pictures inside it and its own styles. No network, form or script but those
-# of a page within it, by their digests: it inherits this policy.
+# A page may load its own pictures and styles; no network, forms or scripts, except the scripts of
+# an inner page, by their digests.
 POLICY = (
     "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; "
     "form-action 'none'"
@@ -32,8 +31,8 @@ _NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 @dataclass(frozen=True)
 class Picture:
-    """An image of a `kind`, with a caption; with a `name`, `files` by ending (the image itself if
-    none are given) are written beside the page.
+    """An image of a `kind`, with a caption. With a `name`, `files` by suffix (by default the image)
+    are written beside the page.
     """
 
     image: bytes
@@ -43,39 +42,39 @@ class Picture:
     files: Mapping[str, bytes] = field(default_factory=dict)
 
     def html(self) -> Markup:
-        """The image inside the page."""
+        """Return the image for a page."""
         return part("picture", b64encode(self.image).decode(), self.caption, self.name, self.kind)
 
 
 @dataclass(frozen=True)
 class Section:
-    """A headed part of a page; level 3 is for one within another."""
+    """A part with a heading; level 3 is for a section inside another."""
 
     heading: str
     parts: "Sequence[Part]"
     level: int = 2
 
     def html(self) -> Markup:
-        """Heading and parts."""
+        """Return heading and parts for a page."""
         parts = list(map(_html, self.parts))
         return part("section", self.heading, self.level, parts, _anchor(self.heading))
 
 
 @dataclass(frozen=True)
 class Details:
-    """Parts that a reader unfolds."""
+    """Parts that a reader can unfold."""
 
     summary: str
     parts: "Sequence[Part]"
 
     def html(self) -> Markup:
-        """Summary and parts."""
+        """Return summary and parts for a page."""
         return part("details", self.summary, list(map(_html, self.parts)), _anchor(self.summary))
 
 
 @dataclass(frozen=True)
 class Choice:
-    """Parts by name, of which a reader sees one at a time; `name` is that of the choice."""
+    """Parts by name, of which a page shows one at a time; `name` is that of the choice."""
 
     name: str
     options: "Mapping[str, Part]"
@@ -86,7 +85,7 @@ class Choice:
         return list(self.options.values())
 
     def html(self) -> Markup:
-        """A button for each part, and the part that is chosen."""
+        """Return a button for each part, and the chosen part."""
         shown = [(name, _html(each)) for name, each in self.options.items()]
         return part("choice", self.name, shown) if len(shown) > 1 else shown[0][1]
 
@@ -96,8 +95,9 @@ Part = str | Table | Picture | Section | Details | Choice
 
 @dataclass(frozen=True)
 class Report:
-    """A page: title, paragraphs of its verdict, and parts. The warnings of named `efforts` stand
-    above all else; files of pictures are written into the folder `pictures` beside the page.
+    """A page: title, paragraphs of the verdict, and parts.
+
+    Warnings of named `efforts` come first. Files of pictures go into the folder `pictures`.
     """
 
     title: str
@@ -107,7 +107,7 @@ class Report:
     pictures: str = ""
 
     def html(self) -> str:
-        """The page, complete with its policy."""
+        """Return the page with its policy."""
         verdict = (
             Markup('<p class="verdict">{}</p>').format(typeset(said)) for said in self.verdict
         )
@@ -116,7 +116,7 @@ class Report:
         return render("page.html", title=self.title, body=body, policy=_policy(body))
 
     def write(self, folder: Path) -> None:
-        """Write index.html into a folder, and a file of every picture and table with a name."""
+        """Write index.html into a folder, and files of every picture and table with a name."""
         beside = folder / self.pictures
         beside.mkdir(exist_ok=True)
         for one in _flat(self.parts):
@@ -142,7 +142,7 @@ def _html(one: Part) -> Markup:
 
 
 def contents(parts: Iterable[Part]) -> Markup:
-    """Links to the sections and folded parts of a page."""
+    """Return links to the sections and folded parts of a page."""
     headings = [
         each.heading if isinstance(each, Section) else each.summary
         for each in parts
@@ -152,12 +152,12 @@ def contents(parts: Iterable[Part]) -> Markup:
 
 
 def _anchor(heading: str) -> str:
-    """The name of a heading in links."""
+    """Return the name of a heading in links."""
     return re.sub(r"\W+", "-", heading.lower()).strip("-")
 
 
 def live_link(file: str) -> Markup:
-    """A paragraph that leads to a live page beside this one."""
+    """Return a paragraph with a link to a live page."""
     return Markup(
         '<p><a href="{}">Change the Tacton and see the waves move</a>: a page that computes in the '
         "browser.</p>"
@@ -165,23 +165,24 @@ def live_link(file: str) -> Markup:
 
 
 def preformatted(text: str) -> Markup:
-    """Text with its own lines and spaces."""
+    """Return text with its own lines and spaces."""
     return Markup("<pre>{}</pre>").format(text)
 
 
 def warnings_banner(efforts: Iterable[tuple[str, Effort]]) -> Markup:
-    """All warnings of some responses by name, for the top of a page; nothing if there are none."""
+    """Return all warnings of some responses by name for a page; empty without warnings."""
     return part("warnings", worst_warnings(efforts))
 
 
 def inner_page(page: str, caption: str) -> Markup:
-    """A page within the page, on screens only; its scripts reach nothing outside of it."""
+    """Return a page inside the page, on screens only; its scripts are isolated."""
     return part("inner_page", str(page), caption)
 
 
 def worst_warnings(efforts: Iterable[tuple[str, Effort]]) -> list[str]:
-    """Warnings of some responses, with their names unless all have the same; of those that differ
-    by numbers only, the one with the largest, and how many more there are.
+    """Return the warnings of some responses, with their names unless all have the same warnings.
+
+    Of warnings that differ only in numbers, return the one with the largest, and how many others.
     """
     efforts = list(efforts)
     differ = len({tuple(effort.warnings) for _, effort in efforts}) > 1
@@ -198,7 +199,8 @@ def worst_warnings(efforts: Iterable[tuple[str, Effort]]) -> list[str]:
 
 
 def _policy(body: Markup) -> str:
-    """The policy of a page; escaped text has no quotes, so that what is found is an inner page."""
+    """Return the policy of a page."""
+    # Escaped text has no quotes, so that each match is an inner page.
     inner = (unescape(found) for found in _INNER.findall(body))
     scripts = [script for page in inner for script in _SCRIPT.findall(page)]
     if not scripts:

@@ -1,7 +1,4 @@
-"""Drawing of records, by functions of `skinwave.report` that are imported when first called.
-
-Records are below the room of drawing and import none of it.
-"""
+"""Drawing of records by functions of `skinwave.report`, which are imported when first called."""
 
 from importlib import import_module
 from typing import Any

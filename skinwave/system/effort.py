@@ -1,4 +1,4 @@
-"""Cost of a response: seconds by phase, memory, versions."""
+"""Cost of a response: seconds by phase, memory, versions, threads."""
 
 import os
 import platform
@@ -10,13 +10,13 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from threading import Lock
 
-SOLVERS = ("mkl", "scikit-sparse", "pymetis")  # used where they are installed
+SOLVERS = ("mkl", "scikit-sparse", "pymetis")  # optional
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
-Progress = Callable[[str, float], None]  # phase and fraction of it done
+Progress = Callable[[str, float], None]  # of a phase and the fraction done
 
 
 class SkinwaveWarning(UserWarning):
-    """Warning that a result falls short of the request, in one sentence."""
+    """Warning that a result does not meet the request."""
 
 
 class Clock:
@@ -34,7 +34,7 @@ class Clock:
 
 
 def peak_memory() -> int:
-    """Largest resident size of this process so far, bytes; 0 where the system does not tell."""
+    """Return the largest resident size of this process so far in bytes; 0 if it is unknown."""
     try:
         import resource
     except ImportError:
@@ -48,10 +48,9 @@ _LOCK, _LIMIT, _WITHIN = Lock(), ExitStack(), [0]
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Linear algebra on one thread: in small products several wait for each other.
+    """Limit linear algebra to one thread, because in small products threads wait for each other.
 
-    The limit is that of the process. The first that enters sets it and the last lifts it, as each
-    would otherwise restore what it found limited by another.
+    The limit applies to the process. The first entry sets it and the last exit removes it.
     """
     from threadpoolctl import threadpool_limits
 
@@ -70,7 +69,7 @@ def one_thread() -> Iterator[None]:
 
 @cache
 def versions() -> dict[str, str]:
-    """Versions of Python, skinwave, what it computes with, and the operating system."""
+    """Return the versions of Python, skinwave, its numerical libraries and the operating system."""
     found = {"python": sys.version.split()[0]}
     for name in ("skinwave", "numpy", "scipy", *SOLVERS):
         with suppress(PackageNotFoundError):
@@ -79,19 +78,19 @@ def versions() -> dict[str, str]:
 
 
 def usable_cores() -> int:
-    """How many cores this process may use."""
+    """Return the number of cores that this process may use."""
     counted = getattr(os, "sched_getaffinity", None)
     return len(counted(0)) if counted else os.cpu_count() or 1
 
 
 def threads() -> dict[str, str]:
-    """How many threads linear algebra takes, by the environment variables that say so.
+    """Return the number of threads of linear algebra by environment variable.
 
-    Sums in another order round otherwise; as many threads give the same digits again.
+    The number of threads affects rounding.
     """
     usable = os.environ.get(THREADS[0]) or str(usable_cores())
     return {name: os.environ.get(name) or usable for name in THREADS}
 
 
 def silent(phase: str, fraction: float) -> None:
-    """Progress that is not shown."""
+    """Ignore progress."""

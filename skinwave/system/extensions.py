@@ -1,8 +1,7 @@
-"""Modules that add body kinds and models from outside: here, and in the processes that this starts.
+"""Extension modules, which add body kinds and models in this process and in its workers.
 
-A module registers when it is imported. Its name is kept in the environment, where processes that
-are started later find it. The command line takes what the modules add that `SKINWAVE_EXTENSIONS`
-names, with commas between them.
+A module registers them when it is imported. The environment variable `SKINWAVE_EXTENSIONS` lists
+the modules, separated by commas, for the command line and for worker processes.
 """
 
 import os
@@ -15,30 +14,20 @@ T = TypeVar("T")
 
 
 def load() -> None:
-    """Import the modules that the environment names.
-
-    Raises
-    ------
-    ValueError
-        If one cannot be found.
-    """
+    """Import the extension modules; raise a ValueError if one cannot be imported."""
     for name in _named():
         try:
             import_module(name)
         except ImportError as error:
             raise ValueError(
-                f"{VARIABLE} names the module '{name}', which cannot be imported ({error}); put "
-                "it where Python finds modules"
+                f"the module '{name}' in {VARIABLE} cannot be imported ({error}); add its "
+                "folder to PYTHONPATH"
             ) from None
 
 
 def add(registry: dict[str, T], name: str, record: T, made_by: Callable[..., Any] | None) -> None:
-    """Add a record to a registry, and the module of a function of it to the environment.
-
-    Raises
-    ------
-    ValueError
-        If there is a record of that name.
+    """Add a record to a registry, and the module of its function `made_by` to the environment;
+    raise a ValueError if the name is taken.
     """
     if name in registry:
         raise ValueError(f"'{name}' is registered already; choose another name")

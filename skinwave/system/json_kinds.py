@@ -1,4 +1,4 @@
-"""Whether a JSON file of a result holds the kinds of values that are read from it."""
+"""Check that a JSON file of a result contains values of the expected kinds."""
 
 from dataclasses import fields
 from math import isfinite
@@ -18,38 +18,31 @@ EFFORT = {
 
 
 def fitting(value: Any, pattern: Any, where: str) -> Any:
-    """The value, if it fits a pattern: a type, float for any finite number; [pattern] for a list;
-    {str: pattern} for a table, or a table of patterns by key, of which "key?" may be missing.
+    """Return a value that fits a pattern; raise a ValueError if it does not.
 
-    Raises
-    ------
-    ValueError
-        If it does not fit.
+    A pattern is a type (float for any finite number), [pattern] for a list, {str: pattern} for a
+    table, or a table of patterns by key; "key?" may be missing.
     """
     if not _fits(value, pattern):
-        raise ValueError(f"{where} has other contents than skinwave writes; make the result anew")
+        raise ValueError(f"{where} has unexpected contents; compute the result again")
     return value
 
 
 def is_finite_number(value: Any) -> bool:
-    """Whether a value is a number that a float can hold, and no truth value."""
+    """Whether a value is a finite number, and not a truth value."""
     try:
         return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
-    except OverflowError:  # of a whole number
+    except OverflowError:  # of a large integer
         return False
 
 
 def effort_of(table: Any, where: str) -> Effort:
-    """The effort in a table of a JSON file.
-
-    Raises
-    ------
-    ValueError
-        If it is none.
-    """
+    """Return the effort in a table of a JSON file; raise a ValueError for other contents."""
     fitting(table, EFFORT, where)
-    if strange := table.keys() - {one.name for one in fields(Effort)}:
-        raise ValueError(f"{where} has the unknown key {min(strange)[:40]!r}; make it anew")
+    if unknown := table.keys() - {one.name for one in fields(Effort)}:
+        raise ValueError(
+            f"{where} has the unknown key {min(unknown)[:40]!r}; compute the result again"
+        )
     return Effort(**table)
 
 

@@ -1,4 +1,4 @@
-"""Text of a user's file or name where a terminal or spreadsheet could obey it, not show it."""
+"""Text from users' files, made safe for terminals and spreadsheets; tables in CSV."""
 
 import csv
 import io
@@ -6,17 +6,17 @@ import sys
 from collections.abc import Iterable
 from typing import TextIO
 
-FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what a spreadsheet takes for the start of one
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # first characters of formulas in spreadsheets
 
 
 def printable(text: str, keep: str = "\n") -> str:
-    """The text with control, bidirectional and other invisible characters as escapes of JSON."""
+    """Escape control, bidirectional and other invisible characters of a text, as JSON does."""
     codes = {ord(c) for c in text if not (c.isprintable() or c in keep)}
     return text.translate({n: f"\\u{n:04x}" if n < 0x10000 else f"\\U{n:08x}" for n in codes})
 
 
 def say(text: str, file: TextIO | None = None) -> None:
-    """Print a text so that a terminal shows it, and never obeys it or fails at a letter."""
+    """Print a text without control characters, and with escapes for characters that fail."""
     file = file or sys.stdout
     code = getattr(file, "encoding", None) or "utf-8"
     shown = printable(text).encode(code, "backslashreplace").decode(code)
@@ -24,7 +24,7 @@ def say(text: str, file: TextIO | None = None) -> None:
 
 
 def cell(value: object) -> object:
-    """A value of a CSV row; text that a spreadsheet would compute gets an apostrophe before it."""
+    """Return a value of a CSV row; text that looks like a formula gets an apostrophe."""
     is_formula = isinstance(value, str) and value.startswith(FORMULA) and number_in(value) is None
     return f"'{value}" if is_formula else value
 
@@ -32,7 +32,7 @@ def cell(value: object) -> object:
 def csv_table(
     header: Iterable[str], rows: Iterable[Iterable[object]], newline: str = "\r\n"
 ) -> bytes:
-    """A table in CSV, UTF-8, each value as its `cell`; None is an empty one."""
+    """Return a table as CSV in UTF-8, with an empty cell for None."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator=newline)
     writer.writerow(map(cell, header))
@@ -41,24 +41,20 @@ def csv_table(
 
 
 def as_utf_8(content: bytes) -> str:
-    """The text of a file's content, without a byte order mark.
-
-    Raises
-    ------
-    ValueError
-        If it is no text in UTF-8.
+    """Decode the content of a file, without a byte order mark; raise a ValueError if it is not
+    UTF-8.
     """
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise ValueError("no text in UTF-8; save it as UTF-8") from None
+        raise ValueError("the file is not text in UTF-8; save it as UTF-8") from None
     if "\0" in text:
-        raise ValueError("no text, or one in UTF-16; save it as UTF-8")
+        raise ValueError("the file is not text in UTF-8, but binary or UTF-16; save it as UTF-8")
     return text
 
 
 def number_in(text: str) -> float | None:
-    """The number that a text is, as Python reads it, if it is one."""
+    """Return the number in a text, or None."""
     try:
         return float(text)
     except ValueError:

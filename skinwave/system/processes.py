@@ -1,6 +1,6 @@
-"""Python functions in processes of their own, which end with the process that started them.
+"""Pools of processes, which end with the process that started them.
 
-Only light modules are imported here, because the command line begins with it.
+This module imports only light modules, because the command line starts with it.
 """
 
 import os
@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-SAFE_PATH = {"PYTHONSAFEPATH": "1"}  # so that a random.py of the working folder is not imported
+SAFE_PATH = {"PYTHONSAFEPATH": "1"}  # do not import a random.py of the working folder
 
 
 @contextmanager
 def environment(values: Mapping[str, str]) -> Iterator[None]:
-    """Set environment variables meanwhile."""
+    """Set environment variables for the duration of a block."""
     before = {name: os.environ.get(name) for name in values}
     os.environ.update(values)
     try:
@@ -34,9 +34,9 @@ def environment(values: Mapping[str, str]) -> Iterator[None]:
 
 @contextmanager
 def pool(count: int, threads: int | None = 1, *, renewed: bool = False) -> "Iterator[Executor]":
-    """Start so many processes, each with `threads` of linear algebra unless the environment says
-    otherwise; None for as many as here; `renewed` for a new process for each call. What they have
-    not done when this ends is given up.
+    """Start `count` processes, each with `threads` of linear algebra unless the environment sets
+    them; None does not limit them. With `renewed`, each call has a new process. Unfinished work is
+    cancelled at the end.
     """
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
@@ -59,7 +59,7 @@ def pool(count: int, threads: int | None = 1, *, renewed: bool = False) -> "Iter
 
 
 def begin_worker(threads: int | None) -> None:
-    """Begin a process of a pool: interrupts are its parent's, and it ends with that."""
+    """Start a process of a pool, which ignores interrupts and ends with its parent."""
     from multiprocessing import parent_process
 
     from skinwave.system.effort import THREADS

@@ -1,8 +1,7 @@
-"""Progress: steps of a body's preparation, the time left, and a bar that shows them."""
+"""Progress on standard error: the steps of preparing a body, and a bar."""
 
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 from skinwave.system.effort import Progress, silent
@@ -10,76 +9,65 @@ from skinwave.system.plain_text import printable, say
 
 # Steps in their order, each with its share of the time: between those of a sheet and of a palm.
 STEPS = {"mesh": 0.05, "assemble": 0.05, "factorise": 0.20, "reduce": 0.70}
-LEAST = 0.2  # of all, after which the time that is left is shown: a sheet is meshed at once
 
 
-def follower(
-    clock: Callable[[], float] = time.monotonic,
-) -> Callable[[str, float], tuple[str, float, str]]:
-    """Function of a phase and the fraction of it done: the phase with the number of its step, the
-    share done of all steps or of the phase, and the time left in words, if it is known.
+def step_of(phase: str, fraction: float) -> tuple[str, float]:
+    """Return the phase with the number of its step, and the share done of all steps; of a phase
+    that is not a step, its own share.
     """
-    names, last = list(STEPS), 0.0
-    group, since, before = "", 0.0, 0.0  # what is followed, since when, and what was done then
-
-    def follow(phase: str, fraction: float) -> tuple[str, float, str]:
-        nonlocal last, group, since, before
-        of, _, own = phase.rpartition(": ")
-        own = "reduce" if own == "march" else own
-        name, followed, done = phase, phase, min(max(fraction, 0.0), 1.0)
-        if own in STEPS:
-            number = names.index(own)
-            done = sum(STEPS[step] for step in names[:number]) + done * STEPS[own]
-            name, followed = f"{phase} (step {number + 1} of {len(names)})", f"{of}: steps"
-        now = clock()
-        if followed != group or done < last:
-            group, since, before = followed, now, done
-        last, gained = done, done - before
-        if gained <= LEAST:
-            return name, done, ""
-        left = (now - since) * (1 - done) / gained
-        to = 1 if left < 10 else 5
-        return name, done, f"about {max(to, to * round(left / to))} s left"
-
-    return follow
+    names, done = list(STEPS), min(max(fraction, 0.0), 1.0)
+    step = phase.rpartition(": ")[2]
+    step = "reduce" if step == "march" else step
+    if step not in STEPS:
+        return phase, done
+    number = names.index(step)
+    done = sum(STEPS[name] for name in names[:number]) + done * STEPS[step]
+    return f"{phase} (step {number + 1} of {len(names)})", done
 
 
 @contextmanager
 def reported(progress: Progress | bool | None) -> Iterator[Progress]:
-    """Where progress goes: a bar of True, nowhere of False or None, or the function itself."""
+    """Yield a progress callback: a bar for True, none for False or None, or the given function."""
     if progress is True:
-        with bar() as shown:
-            yield shown
+        with bar() as report:
+            yield report
     else:
         yield progress or silent
 
 
 @contextmanager
 def bar() -> Iterator[Progress]:
-    """A bar where standard error is a terminal, and lines elsewhere, as in a notebook."""
-    follow, last = follower(), ""
+    """Yield a callback that shows a bar on a terminal, and otherwise a line for each step."""
+    last = ("", 0.0)
     if not sys.stderr.isatty():
 
         def log(phase: str, fraction: float) -> None:
             nonlocal last
-            name = follow(phase, fraction)[0]
-            if name != last:
-                last = name
-                say(name, sys.stderr)
+            step = step_of(phase, fraction)
+            if step[0] != last[0]:
+                say(step[0], sys.stderr)
+            last = step
 
         yield log
         return
     from rich import progress as rich
     from rich.console import Console
 
-    name, left = (rich.TextColumn(f"{{task.{of}}}", markup=False)
-                  for of in ("description:<36", "fields[left]"))  # fmt: skip
-    columns = name, rich.BarColumn(), rich.TimeElapsedColumn(), left
+    columns = (
+        rich.TextColumn("{task.description:<36}", markup=False),
+        rich.BarColumn(),
+        rich.TimeElapsedColumn(),
+        rich.TimeRemainingColumn(),
+    )
     with rich.Progress(*columns, console=Console(stderr=True)) as shown:
-        task = shown.add_task("", total=1.0, left="")
+        task = shown.add_task("", total=1.0)
 
         def show(phase: str, fraction: float) -> None:
-            step, done, in_words = follow(phase, fraction)
-            shown.update(task, description=printable(step, ""), completed=done, left=in_words)
+            nonlocal last
+            step = step_of(phase, fraction)
+            if step[1] < last[1]:  # the next body, or a phase after the steps
+                shown.reset(task)
+            shown.update(task, description=printable(step[0], ""), completed=step[1])
+            last = step
 
         yield show

@@ -1,7 +1,6 @@
-"""Scripts of pages: ES modules joined into one, and data that a script element holds.
+"""Scripts of pages: ES modules joined into one script, and data in a script element.
 
-The modules of a folder become one module script: each is a function that returns what it exports,
-in the order in which they need each other.
+Each module becomes a function that returns its exports, in the order of their dependencies.
 """
 
 import json
@@ -16,7 +15,7 @@ _EXPORT = re.compile(
     r"^export\s+((?:async\s+)?function\s*\*?\s*|class\s+|const\s+)([\w$]+)", re.MULTILINE
 )
 _NAME = re.compile(r"([\w$]+)(?:\s+as\s+([\w$]+))?")
-# Imports and exports of other forms, and what would end the script of the page.
+# Imports and exports of other forms, and text that ends the script of the page.
 _REFUSED = re.compile(
     r'^(?:import\s*(?:[{*"\']|[\w$]+\s*(?:,|from\b))|export\b).*|\bimport\s*\(\s*["\'`].*'
     r"|\bimport\.meta\b.*|(?i:</script)|<!--",
@@ -25,25 +24,17 @@ _REFUSED = re.compile(
 
 
 def encoded(data: Mapping[str, Any]) -> str:
-    """Return data as JSON that cannot end the script element around it.
-
-    Raises
-    ------
-    ValueError
-        If a number is not finite.
+    """Return data as JSON that cannot end the script element around it; raise a ValueError if a
+    number is not finite.
     """
     text = json.dumps(data, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
     return text.replace("<", "\\u003c")
 
 
 def bundle(folder: Traversable, entry: str) -> str:
-    """Join the module that begins a page, and all in its folder that it imports, into one script.
+    """Join the entry module and all modules of its folder that it imports into one script.
 
-    Raises
-    ------
-    ValueError
-        If a module is missing, imports what another does not export, takes part in a circle, or
-        has an import or export of a form that is not known here.
+    Raises a ValueError for a missing module or name, a circle, or an unsupported form of import.
     """
     texts: dict[str, str] = {}
     needed: dict[str, dict[str, set[str]]] = {entry: {}}  # names by module that each imports
@@ -51,7 +42,7 @@ def bundle(folder: Traversable, entry: str) -> str:
     while missing := needed.keys() - texts.keys():
         name = min(missing)
         if not (folder / name).is_file():
-            raise ValueError(f"there is no module {name}; correct the import")
+            raise ValueError(f"module {name} does not exist; correct the import")
         source = (folder / name).read_text(encoding="utf-8")
         for names, module in _IMPORT.findall(source):
             found = {part[0] for part in _NAME.findall(names)}
@@ -70,7 +61,7 @@ def bundle(folder: Traversable, entry: str) -> str:
 
 
 def _as_function(name: str, source: str, exports: set[str]) -> str:
-    """A module as a constant: the result of a function that returns its exports."""
+    """Return a module as a constant: the result of a function that returns its exports."""
 
     def unpacked(found: re.Match[str]) -> str:
         pairs = (f"{own}: {other}" if other else own for own, other in _NAME.findall(found[1]))
@@ -79,13 +70,13 @@ def _as_function(name: str, source: str, exports: set[str]) -> str:
     body = _EXPORT.sub(r"\1\2", _IMPORT.sub(unpacked, source))
     if found := _REFUSED.search(body):
         raise ValueError(
-            f"{name}: '{found[0].strip()}' is refused; import and export by name at the beginning "
-            "of a line, and split texts that end a script"
+            f"{name}: '{found[0].strip()}' is not supported; import and export by name "
+            "at the start of a line, and split text that ends a script"
         )
     shown = ", ".join(sorted(exports))
     return f"const {_variable(name)} = (() => {{\n{body}\nreturn {{ {shown} }};\n}})();"
 
 
 def _variable(name: str) -> str:
-    """Name of the constant that holds a module's exports."""
+    """Return the name of the constant with a module's exports."""
     return "$" + re.sub(r"\W", "_", name.removesuffix(".js"))

@@ -17,8 +17,8 @@ STORED = 6  # significant digits of numbers in CSV files
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its `name`, such as "frequency_hz", in CSV and JSON; on pages its `heading` (or the
-    name), unit and significant digits.
+    """A column: its `name` in CSV and JSON, such as "frequency_hz"; and on pages its `heading` (by
+    default the name), unit and significant digits.
     """
 
     name: str
@@ -34,9 +34,10 @@ class Column:
 
 @dataclass(frozen=True, init=False)
 class Table:
-    """Columns (text where name and heading are the same) and rows of text, `Markup`, numbers, or
-    None where there is no value. A table with a `name` is also a CSV file beside the page, whose
-    numbers have `stored` significant digits.
+    """Columns, given as `Column` or name, and rows of text, `Markup`, numbers or None (no value).
+
+    With a `name`, the table is also written as a CSV file beside the page. Numbers in CSV have
+    `stored` significant digits.
 
     >>> table = Table([Column("f_hz", "frequency", "Hz"), "line"], [(127.38, "f_d"), (None, "2 f")])
     >>> table.to_csv()
@@ -59,7 +60,7 @@ class Table:
         object.__setattr__(self, "stored", stored)
 
     def only(self, *names: str, most: int | None = None) -> "Table":
-        """Return the columns of these names, and at most so many rows, for a page."""
+        """Return a table of some columns, and at most `most` rows."""
         at = [[column.name for column in self.columns].index(name) for name in names]
         at = at or list(range(len(self.columns)))
         rows = ([row[k] for k in at] for row in self.rows[:most])
@@ -84,7 +85,7 @@ class Table:
 
 
 def shown(value: Any, digits: int = 3) -> str:
-    """A cell as a page shows it: numbers to so many significant digits, "-" for no value."""
+    """Return a cell as text: numbers with significant digits, "-" for no value."""
     if isinstance(value, str):
         return value
     if not _is_known(value):

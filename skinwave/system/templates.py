@@ -1,4 +1,4 @@
-"""Templates of pages: those of Jinja in `skinwave/templates`, which escape all but `Markup`."""
+"""Jinja templates of pages in `skinwave/templates`, which escape all text except `Markup`."""
 
 import re
 from functools import cache
@@ -6,7 +6,7 @@ from typing import Any
 
 from markupsafe import Markup, escape
 
-# Text of symbols, and how pages write it.
+# Symbols in text, and their markup.
 _SYMBOLS = (
     (r"\b(\d*[fc])_(AM2?|[deRps])\b", r"\1<sub>\2</sub>"),
     (r"(?<=\d) x (?=\d)", " \u00d7 "),
@@ -15,19 +15,19 @@ _SYMBOLS = (
 
 
 def render(template: str, **values: object) -> str:
-    """Render a template; values that are text are escaped."""
+    """Render a template; text is escaped."""
     shown: str = _templates().get_template(template).render(**values)
     return shown
 
 
 def part(name: str, *values: object) -> Markup:
-    """Apply a macro of `parts.html` to values; those that are text are escaped."""
+    """Apply a macro of `parts.html` to values; text is escaped."""
     made: Markup = getattr(_templates().get_template("parts.html").module, name)(*values)
     return made
 
 
 def typeset(text: str) -> Markup:
-    """Escape text and write its symbols with subscripts and signs; Markup is taken as it is."""
+    """Escape text and typeset its symbols; Markup does not change."""
     if isinstance(text, Markup):
         return text
     made = str(escape(text))

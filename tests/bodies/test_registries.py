@@ -155,4 +155,4 @@ def test_a_module_of_the_environment_is_loaded_by_the_command_line(tmp_path):
     env["SKINWAVE_EXTENSIONS"] = "no_such_module"
     found = subprocess.run(command, env=env, check=False, capture_output=True, text=True)
     assert found.returncode == 2
-    assert "SKINWAVE_EXTENSIONS names the module 'no_such_module'" in found.stderr
+    assert "'no_such_module' in SKINWAVE_EXTENSIONS" in found.stderr

@@ -5,8 +5,6 @@ import os
 import re
 import sys
 from argparse import Namespace
-from functools import partial
-from itertools import count
 
 import numpy as np
 import pytest
@@ -15,7 +13,6 @@ from corpus import GOOD, SMALL
 
 from skinwave.commands.cli import main
 from skinwave.commands.common import progress_of
-from skinwave.system.progress_bar import follower
 
 CLAMPED = SMALL.replace("[body]", '[body]\nthickness_mm = 8\nsides = "clamped"')
 
@@ -178,11 +175,9 @@ def test_wrong_options_exit_with_two(capsys):
 
 
 @pytest.mark.parametrize("terminal", [False, True])
-def test_progress_says_the_step_and_the_time_left(capsys, monkeypatch, terminal):
+def test_progress_shows_the_step_and_the_time(capsys, monkeypatch, terminal):
     monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal)
     monkeypatch.setenv("COLUMNS", "100")
-    clock = count(0.0, 0.1).__next__
-    monkeypatch.setattr("skinwave.system.progress_bar.follower", partial(follower, clock=clock))
     with progress_of(Namespace(quiet=False, json=False)) as progress:
         for phase in ("mesh", "assemble", "factorise"):
             progress(phase, 0.0)
@@ -190,7 +185,7 @@ def test_progress_says_the_step_and_the_time_left(capsys, monkeypatch, terminal)
         progress("reduce", 0.9)
     said = capsys.readouterr().err
     if terminal:
-        assert re.search(r"reduce \(step 4 of 4\) +.* about 1 s left", said)
+        assert re.search(r"reduce \(step 4 of 4\) +.*0:00:0", said)
     else:
         assert said.splitlines() == [
             "mesh (step 1 of 4)", "assemble (step 2 of 4)", "factorise (step 3 of 4)",
