@@ -8,8 +8,7 @@ import errno
 import os
 import sys
 from collections.abc import Sequence
-from functools import partial
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import skinwave
 from skinwave.commands import COMMANDS
@@ -84,45 +83,10 @@ def _joined(arguments: Sequence[str]) -> list[str]:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Argument parser whose errors are one sentence and suggest the nearest known word."""
-
-    def __init__(self, **options: Any) -> None:
-        super().__init__(**options)
-        self.register("type", float, _number)
-        self.register("type", int, partial(_number, kind=int))
+    """Argument parser whose errors are one sentence."""
 
     def error(self, message: str) -> NoReturn:
-        shown = printable(message, keep="")
-        self.exit(2, f"skinwave: {shown}; see {self.prog} --help\n")
-
-    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        found, unknown = super().parse_known_args(args, namespace)
-        if unknown:
-            from simple_model.choices import suggestion
-
-            known = [word for action in self._actions for word in action.option_strings]
-            what = "option" if unknown[0].startswith("-") else "argument"
-            name = unknown[0].partition("=")[0]
-            self.error(f"unknown {what} {name}{suggestion(name, known).rstrip('?')}")
-        return found, unknown
-
-    def _check_value(self, action: argparse.Action, value: Any) -> None:
-        if action.choices is not None and value not in action.choices:
-            from simple_model.choices import choose
-
-            try:
-                choose("value", value, action.choices)
-            except ValueError as error:
-                raise argparse.ArgumentError(action, str(error).rstrip("?")) from None
-
-
-def _number(text: str, kind: type = float) -> Any:
-    """Parse the number of an option."""
-    try:
-        return kind(text)
-    except ValueError:
-        words = "a whole number" if kind is int else "a number, such as 0.5"
-        raise argparse.ArgumentTypeError(f"'{text}' is not {words}") from None
+        self.exit(2, f"skinwave: {printable(message, keep='')}; see {self.prog} --help\n")
 
 
 def parser() -> argparse.ArgumentParser:

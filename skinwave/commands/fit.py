@@ -21,7 +21,7 @@ KINDS = ("waveforms", "lines", "amplitudes")
 SIGNS = {"in": 1, "out": -1}
 TEXTS = (  # options about a file, each a text
     ("quantity", "NAME", "quantity in the file: displacement, velocity or acceleration"),
-    ("unit", "UNIT", 'unit in the file: mm/s, um, g; "20 mm/s" is a scale per unit in the file'),
+    ("unit", "UNIT", 'unit in the file: mm/s, um, g; or "20 mm/s" if 1 in the file is 20 mm/s'),
     ("places", "XY", 'places of the channels in mm, such as "0,0 5,0", or a file of places'),
     ("variable", "NAME", "name of the array in a file of several arrays"),
     ("columns", "NAMES", 'columns of motion: names such as "CH1,CH3", or numbers from 1'),

@@ -45,7 +45,9 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--map", action="store_true",
         help="write only a map: RMS of the quantity of the probes over the body, at their depth",
     )  # fmt: skip
-    parser.add_argument("--style", choices=STYLES, default="report")
+    parser.add_argument(
+        "--style", choices=STYLES, default="report", help="style of figures (default: report)"
+    )
     parser.add_argument(
         "--format", choices=FORMATS, action="append", default=[],
         help="format of figures besides PNG; may be repeated",

@@ -52,22 +52,22 @@ def test_a_best_value_is_refined_and_has_the_interval_of_its_samples(parabola):
     assert found.uncertain == tuple(each.key for each in spreads)
     speeds = np.clip(found.value * samples(spreads, 39)[:, 0] ** 0.5, 5, 15)
     assert found.interval == pytest.approx((5, speeds.max() + 0.1 * 5))
-    assert "reaches an end of the range" in found.words
+    assert found.interval[0] == found.limits[0]
 
 
-def test_a_best_value_at_the_end_of_the_range_is_called_so(scene, capsys):
+def test_a_best_value_at_an_end_of_the_range_is_marked(scene, capsys):
     text = scene.read_text().replace("[body]", "[body]\nmaterial = 'ecoflex'")
     scene.write_text(text + "[focus]\npeak_pressure_pa = { value = 50, spread = 0 }\n")
     vary = ["--vary", "tacton.speed_m_per_s=4:8:3", "--model", "point-kernel"]
     column = "drawing_frequency_hz"  # which goes with the speed
     assert main(["sweep", str(scene), *vary, "--best", column, "--scheduler", "threads"]) == 0
-    said = capsys.readouterr().out
-    assert "8.00, an end of the range," in said
-    assert "no interval" in said
+    printed = capsys.readouterr().out
+    assert "8.00, an end of the range," in printed
+    assert "no interval" in printed
     assert len(dataset.read(Path("short-sweep"))) == 3
 
 
-def test_values_without_a_number_are_no_best_value():
+def test_values_without_a_number_are_skipped():
     def column(runs):
         return np.array([-((r["x"] - r["c"]) ** 2) if r["x"] > 1 else np.nan for r in runs])
 
@@ -77,20 +77,15 @@ def test_values_without_a_number_are_no_best_value():
     assert np.isneginf(none)
 
 
-def test_what_has_no_best_value_is_refused_before_any_run(scene, capsys):
-    for cure, *words in (
-        ("vary one", "tacton.speed_m_per_s=4:8:3", "tacton.size_mm=5:9:3"),
-        ("give body.material=start:stop:n", "body.material=palm,forearm,bone"),
-        ("at least three values", "tacton.size_mm=5,9"),
-        ("39", "tacton.size_mm=5:9:3", "--samples", "9"),
-        ("--design lhs", "tacton.size_mm=5:9", "--design", "lhs", "--samples", "99"),
-    ):
-        assert main(["sweep", str(scene), "--best", "level_db[0]", "--vary", *words]) == 2
-        assert cure in capsys.readouterr().err
+def test_designs_without_a_best_value_are_refused_before_any_run(scene):
+    for words in (
+        "tacton.speed_m_per_s=4:8:3 tacton.size_mm=5:9:3", "body.material=palm,forearm,bone",
+        "tacton.size_mm=5,9", "tacton.size_mm=5:9:3 --samples 9",
+        "tacton.size_mm=5:9 --design lhs --samples 99",
+    ):  # fmt: skip
+        assert main(["sweep", str(scene), "--best", "level_db[0]", "--vary", *words.split()]) == 2
     assert not Path("short-sweep").exists()
     asked = ["sweep", str(scene), "--model", "point-kernel", "--vary", "tacton.size_mm=5:9:3"]
-    for cure, column in (("did you mean", "kernel_peak"), ("no finite number", "model"),
-                         ("no finite number", "kernel_peak_pa[9]")):  # fmt: skip
+    for column in ("kernel_peak", "model", "kernel_peak_pa[9]"):
         assert main([*asked, "--best", column, "--scheduler", "threads", "--quiet"]) == 2
-        assert cure in capsys.readouterr().err
-    assert len(dataset.read(Path("short-sweep"))) == 3  # which are kept
+    assert len(dataset.read(Path("short-sweep"))) == 3

@@ -84,7 +84,7 @@ points_mm = [[0, 0], [10, 0]]
 """
 
 
-def test_a_scene_with_spreads_is_complete_and_takes_the_central_values():
+def test_a_scene_with_spreads_has_the_central_values():
     layer = "layers = [{ thickness_mm = { value = 2, low = 1, high = 3 }, material = 'fat' }]"
     scene = loads(SLAB.replace('kind = "slab"', f'kind = "slab"\n{layer}'))
     assert scene.pressure.peak_pressure == 50
@@ -95,26 +95,19 @@ def test_a_scene_with_spreads_is_complete_and_takes_the_central_values():
     assert loads(SLAB.replace(NORMAL, "50")).pressure == scene.pressure
 
 
-@pytest.mark.parametrize(
-    ("table", "said"),
-    [
-        ("{ value = 50, spred = 0.2 }", "did you mean 'spread'"),
-        ("{ value = 50 }", "needs one of"),
-        ("{ value = 50, low = 1, high = 3 }", "outside"),
-        ("{ value = 50, factor = 0.5 }", "below 1"),
-        ("{ value = 50, factor = 2, distribution = 'normal' }", "no factor"),
-        ("{ value = 0, spread = 0.2 }", "standard_error"),
-        ("{ value = 50, spread = nan }", "finite"),
-    ],
-)
-def test_a_wrong_spread_is_refused_with_its_cure(table, said):
-    with pytest.raises(ValueError, match=said):
-        loads(f"[focus]\npeak_pressure_pa = {table}")
-    with pytest.raises(ValueError, match="no such number"):
+def test_wrong_spreads_are_refused():
+    for table in (
+        "{ value = 50, spred = 0.2 }", "{ value = 50 }", "{ value = 50, low = 1, high = 3 }",
+        "{ value = 50, factor = 0.5 }", "{ value = 50, factor = 2, distribution = 'normal' }",
+        "{ value = 0, spread = 0.2 }", "{ value = 50, spread = nan }",
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match="peak_pressure_pa"):
+            loads(f"[focus]\npeak_pressure_pa = {table}")
+    with pytest.raises(ValueError, match="thickness_mm"):
         loads('[body]\nkind = "none"\nthickness_mm = { value = 15, spread = 0.2 }')
 
 
-def test_presets_and_the_device_carry_the_spread_of_their_sources():
+def test_presets_and_the_device_have_spreads():
     found = {s.key: s for s in spreads_of(loads('[body]\nmaterial = "palm"'))}
     assert {s.part for s in found.values()} == {"material", "device"}
     assert found[PRESSURE].distribution == within_factor(2.0)
@@ -126,7 +119,7 @@ def test_presets_and_the_device_carry_the_spread_of_their_sources():
         propagate(measured, 8)
 
 
-def test_numbers_of_a_scene_are_changed_by_key():
+def test_with_values_changes_numbers_by_key():
     scene = loads('[body]\nmaterial = "palm"\n[[body.layers]]\nthickness_mm = 1\nmaterial = "fat"')
     changed = {
         "body.thickness_mm": 12.0, PRESSURE: 70.0, "body.layers.0.material.loss_scale": 3.0,
@@ -204,7 +197,7 @@ def test_a_model_without_an_exact_map_gives_probes_alone():
     assert found.lines[0, :, 0].max() == pytest.approx(25, rel=1e-3)  # half of 50 Pa, at f_AM
 
 
-def test_samples_of_a_body_that_is_reduced_once_are_those_of_bodies_of_their_own():
+def test_samples_of_bodies_reduced_together_agree_with_separate_bodies():
     scene = loads(SMALL)
     found = propagate(scene, 72, model="fem", h=0.01)
     keys = [s.key for s in found.spreads]
@@ -228,9 +221,9 @@ def test_samples_of_a_body_that_is_reduced_once_are_those_of_bodies_of_their_own
     assert shared_family(few, spreads, samples(spreads, 4), method) is None
 
 
-def test_a_sample_that_makes_no_scene_is_named():
+def test_an_impossible_sample_is_named():
     scene = loads(SLAB.replace("0.4999", "{ value = 0.4999, spread = 0.2 }"))
-    with pytest.raises(ValueError, match=r"poisson = 0\..*narrow its distribution"):
+    with pytest.raises(ValueError, match=r"poisson = 0\."):
         propagate(scene, 8)
 
 
@@ -243,8 +236,7 @@ def test_the_budget_of_the_pressure_is_its_closed_form():
     assert "numerical 2.0 %" in found.words
 
 
-def test_the_budget_of_the_material_is_what_samples_of_it_show():
-    """First order: the share of one standard deviation, here of 3 %, in the waveform's change."""
+def test_the_budget_of_the_material_agrees_with_samples():
     text = SLAB.replace("25e3", "{ value = 25e3, spread = 0.03 }").replace(NORMAL, KNOWN)
     found = propagate(loads(text), 64)
     centre = solve_sample(found.scene, found.method).waveform
@@ -253,7 +245,7 @@ def test_the_budget_of_the_material_is_what_samples_of_it_show():
     assert error_budget(found.scene).material == pytest.approx(expected, rel=0.1)
 
 
-def test_the_budget_of_a_sheet_is_what_samples_of_its_modes_show():
+def test_the_budget_of_a_sheet_agrees_with_samples():
     scene = loads(SHEET)
     (spread,) = (each for each in spreads_of(scene) if each.part == "material")
 
@@ -323,7 +315,7 @@ def test_a_run_with_samples_writes_bands(tmp_path, monkeypatch, capsys):
     assert not Path("other").exists()
 
 
-def test_what_ignores_a_spread_says_so_once(tmp_path, capsys):
+def test_commands_without_samples_note_the_central_values_once(tmp_path, capsys):
     path = tmp_path / "slab.toml"
     path.write_text(SLAB)
     asked = Namespace(scene=path, command_name="compare", samples=None)
