@@ -54,7 +54,7 @@ class _Request:
 
     def model_row(self, start: float = 0.0, method: str = "") -> PlanRow:
         """Return the row of the model, with the relative error of a start that it leaves out."""
-        reason = f"{self.reason}: {method}" if method else self.reason
+        reason = f"{self.reason} ({method})" if method else self.reason
         if start:
             reason += f"; leaves out the initial transient, {change_text(start)}"
         return PlanRow(what="model", value=self.model.name, reason=reason)
