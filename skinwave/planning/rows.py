@@ -128,7 +128,7 @@ def neglected_rows(scene: Scene, highest: float) -> list[PlanRow]:
     return [
         PlanRow(
             what="air" if body.air else "left out: air",
-            value=f"{percent(air)} of added mass",
+            value=f"added mass {significant(air, 2)} times the mass of the sheet",
             reason=f"{lower}; the model uses the added mass of each wavenumber"
             if body.air
             else f"{lower} in air; set air = true in [body] to include it",
