@@ -64,9 +64,7 @@ def covering(
 
 
 def shared_body(bodies: Covering, options: SolveOptions) -> ParametricBody:
-    """Return the reduced-order model of all bodies; raises a ValueError or `fem.Diverged` if the
-    ranges are too wide for one.
-    """
+    """Return the reduced-order model of all bodies; raises if their ranges are too wide for one."""
     free = {key: (low, high) for key, low, high in bodies.ranges}
     within = min(parametric.TOLERANCE, SHARE * options.tolerance)
     return parametric.prepare(

@@ -148,9 +148,7 @@ def reference_of(body: Body, build: Build, keys: Sequence[FreeKey]) -> Reference
 
 
 def _is_sprung(body: Body, build: Build) -> bool:
-    """Whether a body rests on springs that represent its own tissue. Raises a ValueError if its
-    base has another stiffness as well.
-    """
+    """Whether a body rests on springs that represent its own tissue."""
     sprung = build.support is not None and bool(build.support.stiffness.any())
     if not body.base_stiffness:
         return sprung

@@ -78,9 +78,7 @@ class FreeKey:
 
 
 def free_keys(body: Body, free: Mapping[str, tuple[float, float]]) -> tuple[FreeKey, ...]:
-    """Return the free keys of a body; raises a ValueError if a key cannot be free, or its range is
-    not valid.
-    """
+    """Return the free keys of a body; raises a ValueError if a key or its range is not valid."""
     if not free:
         raise ValueError("free = {} names no key; give one, such as body.material.shear_modulus_pa")
     keys = tuple(_free_key(body, key, bounds) for key, bounds in free.items())
@@ -270,9 +268,7 @@ def has_affine_operators(body: Body) -> bool:
 
 
 def check_scene(scene: Scene, keys: Sequence[FreeKey], tolerance: float) -> None:
-    """Raise a ValueError if sums over free materials cannot solve a scene to a relative error of
-    each line.
-    """
+    """Raise a ValueError if sums over free materials cannot solve a scene."""
     if not 0 < tolerance < 1:
         raise ValueError(f"tolerance = {tolerance} is outside 0 < tolerance < 1")
     load, own = scene.load, "or reduce a body for each material"

@@ -61,9 +61,7 @@ def takers(scene: Scene) -> list[str]:
 
 
 def _candidates(scene: Scene) -> list[Model]:
-    """Return the models of the quantity of a scene, without those that leave out sides which
-    reflect.
-    """
+    """Return the models of a scene's quantity that do not leave out reflecting sides."""
     has_body = bool(scene.body.of_kind.discretise)
     bounded = has_body and not is_laterally_infinite(scene.body)
     every = (named(name) for name in dict.fromkeys((*ADVISED, *names())))

@@ -234,9 +234,7 @@ def line_factor(
 
 
 def mirrored_axes(body: Body, reading: Reading, load: Load) -> str:
-    """Return the axes across which a body is symmetric and the quantity of its probes keeps its
-    sign.
-    """
+    """Return the axes across which a body is symmetric and its probes' quantity keeps its sign."""
     if not body.of_kind.is_symmetric or body.placement != FLAT:
         return ""
     # Other quantities change sign, and other loads may have a direction.

@@ -354,9 +354,8 @@ def _surface(scene: Scene, build: Build) -> tuple[sparse.csr_array, Floats]:
 
 
 def _line_forces(scene: Scene, P: sparse.csr_array, points: Floats) -> tuple[Floats, fem.Complex]:
-    """Return frequencies (f,) in Hz and nodal forces (f, 3 n) in N of the load's lines, without the
-    mean if the body is unconstrained, and would drift.
-    """
+    """Return frequencies (f,) in Hz and nodal forces (f, 3 n) in N of the load's lines."""
     frequencies, pressures = meshed.load_lines_at(scene.loads, points, WEAKEST_LOAD_LINE)
+    # Under the mean an unconstrained body would drift.
     chosen = (frequencies > 0) | scene.body.is_held
     return frequencies[chosen], (P @ pressures[chosen].T).T

@@ -245,9 +245,7 @@ def stretched_answer(scene: Scene, times: Floats, options: SolveOptions) -> Resp
 
 
 def first_part(pressure: MovingPressure, times: Floats) -> Floats:
-    """Return the times (s,) in s over which errors are measured: a period of the slowest strong
-    line, or more.
-    """
+    """Return the times (s,) in s over which errors are measured."""
     slowest, _ = slowest_and_fastest(pressure)
     return times[: max(2, round(max(CHECKED_DURATION, 1 / slowest) / step(times)) + 1)]
 
@@ -306,9 +304,7 @@ def _resolution(
 
 
 def _stretching(scene: Scene, times: Floats, modes: PlateModes, count: int, parts: int) -> Floats:
-    """Return the part (t, p) of the scene's quantity that stretching adds, with some modes and
-    `parts` time steps per sample.
-    """
+    """Return the part (t, p) of the quantity that stretching adds, in `parts` steps per sample."""
     plate, coordinates = _stretching_coordinates(scene, times, modes, count, parts)
     values = coordinates @ plate.shapes(scene.probe_points - scene.body.placement.offset).T
     if rate := scene.reading.record.rate:

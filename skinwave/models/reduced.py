@@ -259,9 +259,7 @@ def reduce_body(
 def reduced_of(
     operators: fem.Operators, forces: Floats, points: Floats, effort: Effort, **fields: Any
 ) -> ReducedBody:
-    """Return the reduced body of projected operators (r, r), with reduced `forces` (k, r) of unit
-    pressure at points (k, 3) in metre, and other `fields`.
-    """
+    """Return the reduced body of projected operators and `forces` (k, r) at points (k, 3)."""
     return ReducedBody(
         poles=fem.poles(operators), damping=operators.C, radiation=operators.R,
         branches=with_internal(operators.branches), forces=forces, points=points, effort=effort,

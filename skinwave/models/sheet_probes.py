@@ -35,9 +35,7 @@ Reader = Callable[[Floats], Floats]  # displacement or coordinates -> components
 def sheet_rows(
     body: Body, build: Build, probes: Floats, reading: Reading
 ) -> tuple[sparse.csr_array, tuple[Material, ...]]:
-    """Return the rows (p c, 3 n) of `probe_rows` for quantities of a sheet other than its normal
-    motion.
-    """
+    """Return the rows (p c, 3 n) of quantities of a sheet other than its normal motion."""
     points, quantity = _points(body, build, probes), reading.record
     below = np.broadcast_to(reading.depths or 0.0, len(probes))
     heights, solid = body.depth / 2 - below, body.solid.without_loss_factor()

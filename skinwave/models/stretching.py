@@ -180,9 +180,7 @@ def reduced_answer(scene: Scene, times: Floats, options: SolveOptions) -> Respon
 def _modal_force(
     scene: Scene, linear: ReducedBody, times: Floats, dt: float
 ) -> Callable[[float], Floats]:
-    """Return the function of a time in s to modal forces (r,), by lines or, if these are many, by
-    the load itself.
-    """
+    """Return the function of a time in s to the modal forces (r,)."""
     if len(load_lines(scene.pressure).frequencies) > MOST_LINES:
         load = load_in_steps((scene.pressure,), linear.points, times, dt)
         return lambda t: load(t) @ linear.forces
@@ -225,9 +223,7 @@ def _reduced(body: Body, h: float, solver: str) -> _Reduced:
 
 
 def mode_count(body: Body) -> int:
-    """Return the number of modes below `HIGHEST_MODE`: area times k^2 / 4 pi (Weyl; Courant and
-    Hilbert).
-    """
+    """Return the number of modes below `HIGHEST_MODE`: area times k^2 / 4 pi (Weyl)."""
     squared = bending_wavenumber(body, HIGHEST_MODE) ** 2
     count = round(body.width * body.height * squared / 4 / pi)
     return min(max(count, FEWEST_MODES), MOST_MODES)

@@ -101,9 +101,7 @@ def _uncertainty(scene: Scene, spreads: Sequence[Spread]) -> float:
 
 
 def _change(scene: Scene, key: str, ends: tuple[float, float]) -> Floats | None:
-    """Return half the relative difference (p,) of the motion between both ends of a number, or
-    None.
-    """
+    """Return half the relative change (p,) of the motion between both ends of a number, or None."""
     lines_of = _closed_form(scene)
     if lines_of is None or (lines_of is _lines_of_layers and key.startswith(NOT_IN_LAYERS)):
         return None

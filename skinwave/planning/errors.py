@@ -48,9 +48,7 @@ def element_parts(
     scene: Scene, tolerance: float, h: float, *,
     mesh: float, reduction: float, absorbing: float, above_band: float,
 ) -> list[ErrorPart]:  # fmt: skip
-    """Return the parts of linear elements of h in metre: of the mesh, of the reduction, of the
-    absorbing layer, and of motion above the band of the reduced model.
-    """
+    """Return the parts of linear elements of h in metre, from the relative error of each cause."""
     size = 1e3 * enough(scene.body, h, mesh, tolerance)
     return [
         ErrorPart(source=f"elements of {1e3 * h:.3g} mm", error=mesh,
@@ -62,9 +60,7 @@ def element_parts(
 
 
 def element_warnings(scene: Scene, h: float, mesh: float) -> tuple[str, ...]:
-    """Return warnings of elements of h in metre other than those of `element_parts`; `mesh` is
-    their relative error, nan if unknown.
-    """
+    """Return other warnings of elements of h in metre, whose relative error is `mesh` or nan."""
     return (
         *(() if isfinite(mesh) else (ERROR_UNKNOWN,)),
         *rigid_body_drift(scene),

@@ -59,9 +59,7 @@ def _lines_of_load(scene: Scene, tolerance: float) -> tuple[Floats, Complex]:
 
 
 def cutoff_frequency(frequencies: Floats, shares: Floats, tolerance: float) -> float:
-    """Return the frequency in Hz above which lines move each probe by less than a third of the
-    tolerance.
-    """
+    """Return the frequency in Hz above which lines move no probe by a third of the tolerance."""
     above = np.cumsum(shares[::-1], axis=0)[::-1].max(axis=1)
     return float(frequencies[np.flatnonzero(np.sqrt(above) > tolerance / 3).max(initial=0)])
 

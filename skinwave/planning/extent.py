@@ -49,9 +49,7 @@ def symmetry(scene: Scene) -> str:
 
 
 def absorbing_error(scene: Scene, body: Body, options: SolveOptions = DEFAULT) -> float:
-    """Return the error that the absorbing base and sides of a meshed body leave, the scene's or an
-    extended one; 0 without an absorbing layer.
-    """
+    """Return the error of the absorbing base and sides of a meshed body, 0 without any."""
     if not has_layer(body):
         return 0.0
     size = min(float(element_sizes(body)[0]), 2 * spot_scale(scene.pressure))

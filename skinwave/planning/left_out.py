@@ -136,9 +136,7 @@ def linear_deflection(scene: Scene) -> float:
 
 @lru_cache(maxsize=64)
 def _first_deflection(scene: Scene) -> float:
-    """Return the largest deflection over thickness in the first part of a response; 0 if plate
-    modes do not take the scene.
-    """
+    """Return the largest deflection over thickness in the first part of a response, or 0."""
     middle = tuple(float(x) for x in scene.body.placement.offset)
     with_middle = replace(
         scene, probes=tuple(dict.fromkeys((*scene.probes, (middle[0], middle[1]))))
@@ -268,9 +266,7 @@ def series_error(
 
 
 def _series_deviation(solid: Material, pressure: MovingPressure, allowed: float) -> float:
-    """Return the largest relative deviation of a series from its law, in its band and at the lines
-    of the load.
-    """
+    """Return the largest relative deviation of a series from its law in its band or at a line."""
     series, f = solid.series(allowed), load_lines(pressure, STRONG).frequencies
     w = 2 * np.pi * f[f >= series.band[0]]
     law = solid.complex_modulus(w)

@@ -309,11 +309,10 @@ def _plan_elements(request: _Request) -> Plan:
 
 
 def _step_part(scene: Scene, dt: float | None) -> ErrorPart:
-    """Return the error of a time step: average acceleration lowers frequencies by (w dt)^2 / 12
-    (Hughes 1987, chapter 9).
-    """
+    """Return the error of a time step of average acceleration."""
     step = dt or resolving_step(scene.pressure, 1 / TRANSIENT_RATE)
     value, frequency = left_out.sensitivity(scene)
+    # Frequencies are lower by (w dt)^2 / 12 (Hughes 1987, chapter 9).
     error = min(1.0, value * (2 * np.pi * frequency * step) ** 2 / 12)
     source = f"a time step of {1e3 * step:.3g} ms"
     return ErrorPart(source=source, error=error, cure="use a smaller time step")

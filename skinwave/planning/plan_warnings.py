@@ -26,9 +26,7 @@ WEAK_LINE_RATIO = 0.05  # of the strongest line of a load: no warning if weaker 
 def response_warnings(
     scene: Scene, response: Response, predicted: float, tolerance: float
 ) -> tuple[str, ...]:
-    """Return warnings of any response in addition to those of its plan; `predicted` is the relative
-    error that the plan or the mesh gave.
-    """
+    """Return the warnings of a response other than those of its plan with the error `predicted`."""
     return (
         *larger_error(scene, response, predicted, tolerance),
         *stretching(scene, response, tolerance),

@@ -49,9 +49,7 @@ class SizeController:
     largest_factor: float = 1.6
 
     def error(self, other: Array, values: Array, ratio: float) -> float:
-        """Return the error of a quantity of interest (k, p) from that of another mesh, `ratio`
-        times as coarse.
-        """
+        """Return the error of a quantity (k, p) from that of a mesh `ratio` times as coarse."""
         change = float(relative_changes(values - other, values).max())
         return self.margin * change / abs(ratio**self.order - 1)
 

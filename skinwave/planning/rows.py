@@ -20,9 +20,7 @@ LOWEST_AIR_FREQUENCY = 20.0  # Hz at which air is estimated if no line is higher
 def element_rows(
     scene: Scene, tolerance: float, axes: str, mesh: Refined, highest: float, h: float | None
 ) -> list[PlanRow]:
-    """Return the rows of a model of elements. The load is symmetric across `axes`, `highest` is the
-    highest relevant line in Hz, and h the requested element size in metre, if any.
-    """
+    """Return the rows of elements: `axes` of symmetry, `highest` line in Hz, requested size h."""
     effort = mesh.prepared.effort
     cached = "" if "factorise and reduce" in effort.seconds else " (read from the cache)"
     return [
