@@ -33,7 +33,7 @@ SAME_LOAD = register(
         label="kernel, same load",
         method="point kernel",
         words="the moving pressure, weighted by the distance to the focus; nothing propagates, and "
-        "what it predicts is a stimulation in Pa",
+        "the result is a stimulation in Pa",
         solve=_same_load,
         error=lambda scene, h: ERROR,
         colour="#000000",

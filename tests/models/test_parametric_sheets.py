@@ -57,7 +57,7 @@ def own_lines(scene, body, frequencies):
 
 
 def test_lines_in_air_are_those_of_each_sheets_own_reduction(prepared):
-    for values in random_values(prepared.keys, 4):
+    for values in random_values(prepared.keys, 2):
         frequencies, found = parametric.lines(prepared, values)
         body = with_values(SHEET, prepared.keys, values)
         assert line_errors(found, own_lines(SCENE, body, frequencies)).max() < 0.003
