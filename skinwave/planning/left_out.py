@@ -3,13 +3,9 @@ a sheet, the law of a material behind a Prony series, and errors of natural freq
 
 Each function returns a relative error of the worst probe's waveform.
 
-A sheet that deflects by w stiffens in proportion to (w / h)^2, with its thickness h. The linear
-motion of office paper in a frame without tension has an error of 1 to 3 % at w = 0.1 h and of 25 to
-60 % at w = 0.5 h.
-
-Discretisation in space and time gives every natural frequency a small error. Near a resonance the
-waveform changes many times as much as elsewhere. The sensitivity follows from the poles of a coarse
-reduced model, shifted by a thousandth.
+A sheet of thickness h that deflects by w stiffens in proportion to (w / h)^2. Near a resonance, the
+small errors of natural frequencies by discretisation change the waveform many times as much. The
+sensitivity follows from the poles of a coarse reduced model, shifted by a thousandth.
 """
 
 from collections.abc import Callable
@@ -53,7 +49,7 @@ LATER_SHARE = 0.02  # of the energy of a start: what may follow the compared sam
 NO_START = 1e-6  # of the largest probe's motion: weaker motion is round-off
 EXACT = SolveOptions(tolerance=1e-3)  # of the models that are compared
 LINEAR = 0.5  # deflection over thickness up to which bending of a sheet may be taken as linear
-# Relative error of linear bending over (w / h)^2: 0.4 to 3.3 of paper sheets of 30 to 210 mm, on
+# Relative error of linear bending over (w / h)^2: 0.4 to 3.3 for paper sheets of 30 to 210 mm, on
 # four edges, two or in clips, with tension and without; 7 with a tenth of their loss.
 STEEPEST = 7.0
 NEGLIGIBLE = 0.1  # of the tolerance, of an error that is bounded rather than measured

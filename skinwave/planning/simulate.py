@@ -40,18 +40,8 @@ def simulate(
     Parameters
     ----------
     scene : Scene
-    model : "auto", the choice of `plan`; or the name of a model:
-
-        - "point-kernel", the moving pressure without propagation; "point-kernel-published", the
-          same under the load of the paper
-        - "flat-body", the wavenumber integral of an infinite body; "flat-body-harmonic", its
-          steady state
-        - "fem", reduced-order finite elements; "fem-harmonic", their steady state line by line;
-          "fem-transient", direct time integration
-        - "plate-modes-transient", a thin plate in its modes; "plate-modes", its steady state;
-          "plate-modes-nonlinear", at large deflection
-        - "fem-nonlinear", modes of finite elements at large deflection; "fem-nonlinear-transient",
-          the same with all degrees of freedom
+    model : str, "auto" for the choice of `plan`, or a name of `skinwave.models.names()`, such as
+        "point-kernel", "flat-body", "fem" or "plate-modes-nonlinear"
     tolerance : float, acceptable relative error
     progress : True for a bar, or a function of the name of the phase and the fraction done
     **options : h, dt, solver and times of `SolveOptions`
