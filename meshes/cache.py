@@ -1,9 +1,8 @@
 """Disk cache of meshes and reduced bodies, so that each is computed once per machine.
 
-One file an entry, named by a hash of everything that it depends on, and written aside and renamed.
-An entry that cannot be read is a cache miss. Above `LIMIT` the least recently used entries are
-removed, and never a file whose name is not of the cache. It is in the platform's folder of caches;
-`SKINWAVE_CACHE` names another, and empty turns the cache off.
+The name of each file is a hash of everything that its content depends on. Unreadable entries are
+misses. When all entries exceed `LIMIT` bytes, the least recently used are removed. The folder is
+that of the platform; `SKINWAVE_CACHE` names another, and an empty value disables the cache.
 """
 
 import contextlib
@@ -21,45 +20,45 @@ import numpy as np
 from meshes import reading
 
 LIMIT = 5 * 2**30  # bytes of all entries
-OURS = re.compile(r"[0-9a-f]{32}(\.npz|\.\w+\.part)")  # entries, and what is being written
-ABANDONED = 86_400.0  # s after which what was being written no longer is
+ENTRY = re.compile(r"[0-9a-f]{32}(\.npz|\.\w+\.part)")  # names of entries and unfinished ones
+ABANDONED_AFTER = 86_400.0  # s, of unfinished entries
 
 
 def folder() -> Path | None:
-    """Folder of the cache; None if the cache is off."""
+    """Return the folder of the cache, or None if the cache is off."""
     if (named := os.environ.get("SKINWAVE_CACHE")) is not None:
         return Path(named) if named else None
     from platformdirs import user_cache_path
 
     try:
-        found = user_cache_path("skinwave", appauthor=False)
-    except RuntimeError:  # nobody has a home here
+        path = user_cache_path("skinwave", appauthor=False)
+    except RuntimeError:  # no home directory
         return None
-    return found if found.is_absolute() else None  # the same, of older platformdirs
+    return path if path.is_absolute() else None  # older platformdirs without a home directory
 
 
 def key(*parts: object) -> str:
-    """Cache key of everything that an entry depends on; arrays count by type, shape and bytes."""
+    """Return the cache key of everything that an entry depends on."""
     return digest(*parts)[:32]
 
 
 def digest(*parts: object) -> str:
-    """SHA-256 in hexadecimal of arrays, by type, shape and bytes, and of the repr of all else."""
-    found = hashlib.sha256()
+    """Return the SHA-256 of arrays by type, shape and bytes, and of other objects by their repr."""
+    sha = hashlib.sha256()
     for part in parts:
         if isinstance(part, np.ndarray):
-            found.update(f"{part.dtype.str}{part.shape}".encode())
-            found.update(np.ascontiguousarray(part).data)
+            sha.update(f"{part.dtype.str}{part.shape}".encode())
+            sha.update(np.ascontiguousarray(part).data)
         else:
             text = repr(part)
-            # A function has no name that lasts: what depends on one is never found again.
-            found.update(text.encode() + (os.urandom(16) if " at 0x" in text else b""))
-        found.update(b"\0")
-    return found.hexdigest()
+            # The repr of a function has an address: a random key makes it a miss every time.
+            sha.update(text.encode() + (os.urandom(16) if " at 0x" in text else b""))
+        sha.update(b"\0")
+    return sha.hexdigest()
 
 
 def load(name: str) -> dict[str, Any] | None:
-    """Arrays of an entry, and `meta` as it was stored; None on a cache miss."""
+    """Return the arrays and `meta` of an entry, or None on a cache miss."""
     home = folder()
     if home is None:
         return None
@@ -68,15 +67,15 @@ def load(name: str) -> dict[str, Any] | None:
         with reading.open_regular(path) as file, np.load(file) as entry:
             arrays: dict[str, Any] = {field: entry[field] for field in entry.files}
         meta = json.loads(str(arrays.pop("meta")))["meta"]
-    except Exception:  # whatever zip files, array headers or JSON make of spoilt bytes
+    except Exception:  # damaged files raise many types
         return None
-    with contextlib.suppress(OSError):  # not ours to change
-        os.utime(path)  # used now
+    with contextlib.suppress(OSError):  # a read-only cache
+        os.utime(path)
     return arrays | {"meta": meta}
 
 
 def store(name: str, meta: Any, **arrays: np.ndarray) -> None:
-    """Store an entry; a folder that cannot be written is no error, only a miss next time."""
+    """Store an entry, unless the folder cannot be written or a number is not finite."""
     home = folder()
     if home is None or not all(np.isfinite(array).all() for array in arrays.values()):
         return
@@ -95,15 +94,15 @@ def store(name: str, meta: Any, **arrays: np.ndarray) -> None:
 
 
 def _keep_within(limit: int, home: Path, newest: str) -> None:
-    """Evict the least recently used entries until the rest is within a limit; the newest stays."""
-    found = {}
+    """Remove the least recently used entries, except the newest, until the rest fit a limit."""
+    entries = {}
     for path in home.iterdir():
-        if OURS.fullmatch(path.name) and path.is_file() and not path.is_symlink():
-            with contextlib.suppress(FileNotFoundError):  # removed by another process meanwhile
-                found[path] = path.lstat()
-    size = sum(status.st_size for status in found.values())
-    for path, status in sorted(found.items(), key=lambda each: each[1].st_mtime_ns):
-        abandoned = path.suffix == ".part" and time.time() - status.st_mtime > ABANDONED
+        if ENTRY.fullmatch(path.name) and path.is_file() and not path.is_symlink():
+            with contextlib.suppress(FileNotFoundError):  # removed by another process
+                entries[path] = path.lstat()
+    size = sum(status.st_size for status in entries.values())
+    for path, status in sorted(entries.items(), key=lambda each: each[1].st_mtime_ns):
+        abandoned = path.suffix == ".part" and time.time() - status.st_mtime > ABANDONED_AFTER
         if abandoned or (size > limit and path.suffix == ".npz" and path.name != newest):
             path.unlink(missing_ok=True)
             size -= status.st_size

@@ -1,4 +1,4 @@
-"""Facet sets of a boundary, by the place and direction of their facets."""
+"""Facet sets of a boundary, chosen by the position and direction of their facets."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Predicate = Callable[[Floats, Floats], np.ndarray]
 
 
 def geometry(mesh: TetMesh, facets: Ints) -> tuple[Floats, Floats]:
-    """Centroids (k, 3) in metre and outward unit normals (k, 3) of straight facets."""
+    """Return centroids (k, 3) in metre and outward unit normals (k, 3) of straight facets."""
     a, b, c = (mesh.points[facets[:, i]] for i in range(3))
     normals = np.cross(b - a, c - a)
     return (a + b + c) / 3, normals / np.linalg.norm(normals, axis=1, keepdims=True)
@@ -28,50 +28,57 @@ def tag_boundary(
     Parameters
     ----------
     mesh : TetMesh
-    rest : name of the facets that are in no part, if wanted
-    parts : name -> a function of centroids (k, 3) and outward normals (k, 3) to a mask (k,) of
-        boundary facets, or the mask. Parts may overlap.
+    rest : name of the facets that belong to no part, optional
+    parts : name -> mask (k,) of the boundary facets, or a function that computes it from their
+        centroids (k, 3) and outward normals (k, 3). Parts may overlap.
 
     Returns
     -------
     TetMesh
+
+    >>> from meshes import block
+    >>> mesh = block((0.02, 0.02, 0.01), 0.01)
+    >>> mesh = tag_boundary(mesh, low=lambda at, normals: at[:, 2] < -0.005)
+    >>> {name: len(mesh.facets[name]) for name in ("surface", "low")}
+    {'surface': 32, 'low': 16}
     """
     facets = boundary_facets(mesh.tets)
     centroids, normals = geometry(mesh, facets)
-    which = {
+    masks = {
         name: np.asarray(part(centroids, normals) if callable(part) else part, bool)
         for name, part in parts.items()
     }
     if rest is not None:
-        which[rest] = ~np.logical_or.reduce(list(which.values()))
-    sets = {name: facets[chosen] for name, chosen in which.items()}
+        masks[rest] = ~np.logical_or.reduce(list(masks.values()))
+    sets = {name: facets[chosen] for name, chosen in masks.items()}
     return replace(mesh, facets={**mesh.facets, "surface": facets, **sets})
 
 
 def visible_from_above(mesh: TetMesh) -> np.ndarray:
-    """Mask (k,) of the boundary facets, in the order of `boundary_facets`, that face upwards and
-    have nothing of the body above their centroid.
+    """Return the mask (k,) of the `boundary_facets` that face upwards with nothing of the body
+    above.
     """
     from scipy.spatial import cKDTree
 
     facets = boundary_facets(mesh.tets)
     centroids, normals = geometry(mesh, facets)
-    seen, above = normals[:, 2] > 0, np.flatnonzero(normals[:, 2] < 0)
-    corners = mesh.points[facets[above, :3]]
-    # What lies over a point of the body has an underside there.
-    reach = np.linalg.norm(corners[..., :2] - centroids[above, None, :2], axis=2).max()
-    asked = np.flatnonzero(seen)
-    near = cKDTree(centroids[above, :2]).query_ball_point(centroids[asked, :2], reach)
-    count = [len(found) for found in near]
-    who = np.repeat(asked, count)
-    over = np.concatenate([np.asarray(found, np.int64) for found in near])
-    hides = heights_over(corners[over], centroids[who, :2]) > centroids[who, 2]
-    seen[who[hides]] = False
-    return seen
+    visible, undersides = normals[:, 2] > 0, np.flatnonzero(normals[:, 2] < 0)
+    corners = mesh.points[facets[undersides, :3]]
+    # Any part of the body above a point has an underside over it.
+    reach = np.linalg.norm(corners[..., :2] - centroids[undersides, None, :2], axis=2).max()
+    upper = np.flatnonzero(visible)
+    near = cKDTree(centroids[undersides, :2]).query_ball_point(centroids[upper, :2], reach)
+    facet = np.repeat(upper, [len(candidates) for candidates in near])
+    over = np.concatenate([np.asarray(candidates, np.int64) for candidates in near])
+    hidden = heights_over(corners[over], centroids[facet, :2]) > centroids[facet, 2]
+    visible[facet[hidden]] = False
+    return visible
 
 
 def heights_over(triangles: Floats, places: Floats) -> Floats:
-    """Height (m,) in metre of triangles (m, 3, 3) over places (m, 2) or (2,); -inf beside them."""
+    """Return the heights (m,) in metre of triangles (m, 3, 3) above places (m, 2) or (2,), else
+    -inf.
+    """
     flat = triangles[..., :2] - places[..., None, :]
     x, y = flat[..., 0], flat[..., 1]
     share = np.stack(

@@ -1,8 +1,7 @@
-"""Tetrahedral mesh with regions and facet sets, and the queries on it.
+"""Tetrahedral meshes with regions and facet sets.
 
-Local numbering is VTK's: corners 0 1 2 3, then the mid-side nodes of the edges
-01 12 02 03 13 23. Facets are numbered corners first, mid-side nodes after, and
-are seen anticlockwise from outside the body.
+Nodes are numbered as in VTK: corners 0 1 2 3, then the mid-side nodes of the edges 01 12 02 03 13
+23. Facets list their corners first, then their mid-side nodes, anticlockwise as seen from outside.
 """
 
 from __future__ import annotations
@@ -26,37 +25,37 @@ log = logging.getLogger(__name__)
 
 EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
 FACES = np.array([[1, 2, 3, 5, 9, 8], [0, 3, 2, 7, 9, 6], [0, 1, 3, 4, 8, 7], [0, 2, 1, 6, 5, 4]])
-# Exchanging corners 2 and 3 turns a tetrahedron inside out; the mid-side nodes follow.
+# Swapping corners 2 and 3 inverts a tetrahedron; the mid-side nodes follow.
 MIRRORED = np.array([0, 1, 3, 2, 4, 8, 7, 6, 5, 9])
-VTK_KINDS, VTK_SETS = {4: 10, 10: 24}, "facets:"  # types by nodes; before names of facet sets
-# A tetrahedron flatter than this (volume over longest edge cubed) has no usable shape.
-FLATTEST = 1e-9
+VTK_KINDS, VTK_SETS = {4: 10, 10: 24}, "facets:"  # cell type by node count; prefix of facet sets
+FLATTEST = 1e-9  # volume over longest edge cubed: flatter tetrahedra have no usable shape
 FURTHEST = 1e50  # m: beyond it, products of lengths overflow
 
 
 class MeshError(ValueError):
-    """A mesh that no element can be built on."""
+    """Raised for a mesh, surface or file that no elements can be built on."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TetMesh:
-    """Tetrahedra with named sets of boundary facets.
+    """Tetrahedra with regions and named sets of boundary facets.
 
     Parameters
     ----------
     points : (n, 3) float, metre
-    tets : (m, 4) or (m, 10) int, node numbers in VTK order; negative volumes are turned round
-    region : (m,) int, number of the material of each tetrahedron; all 0 if not given
-    region_names : region number -> name, of those that have one
-    facets : name -> (k, 3) or (k, 6) int, boundary facets seen from outside
-    unmoved : (n, 3) float, metre, of a mesh whose nodes were moved: the points before, by whose
-        edges elements are grouped
+    tets : (m, 4) or (m, 10) int, node numbers in VTK order; inverted tetrahedra are reordered
+    region : (m,) int, number of the material of each tetrahedron; 0 by default
+    region_names : name of each region number that has one
+    facets : name -> (k, 3) or (k, 6) int, boundary facets as seen from outside
+    unmoved : (n, 3) float, metre, points before nodes were moved; their edges group the elements
 
-    Raises
-    ------
-    MeshError
-        If shapes or node numbers do not fit, a point is not finite or further than `FURTHEST` away,
-        or a tetrahedron is flat.
+    Raises a MeshError if shapes or node numbers do not fit, a point is not finite or further away
+    than `FURTHEST`, or a tetrahedron is flat.
+
+    >>> from meshes import block
+    >>> mesh = block((0.04, 0.03, 0.01), 0.01)
+    >>> mesh.n_dofs, mesh.order, mesh.facets["top"].shape
+    (729, 2, (32, 6))
     """
 
     points: Floats
@@ -75,8 +74,8 @@ class TetMesh:
         region = region if region.size else np.zeros(len(tets), np.int64)
         if region.shape != (len(tets),) or region.min() < 0:
             raise MeshError(
-                f"region has shape {region.shape} for {len(tets)} tetrahedra; give one per "
-                "element, 0 or above"
+                f"region has shape {region.shape} for {len(tets)} tetrahedra; give one number "
+                "per tetrahedron, 0 or above"
             )
         facets = {name: _facets(name, nodes, points, tets) for name, nodes in self.facets.items()}
         for array in (points, tets, region, *facets.values()):
@@ -101,12 +100,13 @@ class TetMesh:
 
     @property
     def n_dofs(self) -> int:
-        """Three displacement components per node."""
+        """Number of degrees of freedom, three displacement components per node."""
         return 3 * len(self.points)
 
     def to_pyvista(self) -> pv.UnstructuredGrid:
-        """The mesh as a grid of pyvista, in metre: `region` as cell data, and each facet set that
-        is not empty as field data, such as "facets:top".
+        """Return the mesh as a pyvista grid, in metre.
+
+        Regions are cell data. Each facet set that is not empty is field data, such as "facets:top".
         """
         import pyvista as pv
 
@@ -116,25 +116,25 @@ class TetMesh:
         grid = pv.UnstructuredGrid(cells, kinds, self.points.copy())
         grid.cell_data["region"] = self.region.copy()
         for name, facets in self.facets.items():
-            if len(facets):  # no array of VTK is empty
+            if len(facets):  # VTK has no empty arrays
                 grid.field_data[VTK_SETS + name] = facets.copy()
         return grid
 
 
 def corner_volumes(points: Floats, tets: Ints) -> Floats:
-    """Signed volume (m,) in cubic metre of the straight tetrahedra through the corners."""
+    """Return the signed volume (m,) in cubic metre of the straight-edged tetrahedra."""
     a, b, c, d = (points[tets[:, i]] for i in range(4))
     return np.einsum("ei,ei->e", np.cross(b - a, c - a), d - a) / 6
 
 
 def boundary_facets(tets: Ints) -> Ints:
-    """Facets (k, 3 or 6) that belong to one tetrahedron only, seen from outside."""
+    """Return the facets (k, 3 or 6) that belong to one tetrahedron only, as seen from outside."""
     width = 3 if tets.shape[1] == 4 else 6
     return tets[:, FACES[:, :width]][neighbours(tets) < 0]
 
 
 def neighbours(tets: Ints) -> Ints:
-    """The tetrahedron (m, 4) beyond each of the `FACES`, -1 where there is none."""
+    """Return the tetrahedron (m, 4) beyond each of the `FACES`, -1 at the boundary."""
     low, middle, high = np.sort(tets[:, FACES[:, :3]].reshape(-1, 3), axis=1).T
     edge = low * (tets.max() + 1) + middle
     order = np.lexsort((high, edge))
@@ -146,7 +146,7 @@ def neighbours(tets: Ints) -> Ints:
 
 
 def interface_facets(mesh: TetMesh) -> Ints:
-    """Facets (k, 3 or 6) between two regions, each once, seen from that of the higher number."""
+    """Return the facets (k, 3 or 6) between regions, each once, seen from the higher region."""
     width = 3 if mesh.order == 1 else 6
     beyond = neighbours(mesh.tets)
     lower = (beyond >= 0) & (mesh.region[beyond] < mesh.region[:, None])
@@ -154,9 +154,7 @@ def interface_facets(mesh: TetMesh) -> Ints:
 
 
 def facet_set(mesh: TetMesh, facets: str | Ints) -> Ints:
-    """Facets (k, 3 or 6) of a named set, or the given ones; a MeshError if there is no such set, or
-    the given ones do not fit.
-    """
+    """Return the facets (k, 3 or 6) of a named set, or the given ones if they fit the mesh."""
     if not isinstance(facets, str):
         return _facets("given", facets, mesh.points, mesh.tets)
     if facets not in mesh.facets:
@@ -166,7 +164,12 @@ def facet_set(mesh: TetMesh, facets: str | Ints) -> Ints:
 
 
 def quadratic(mesh: TetMesh) -> TetMesh:
-    """The same straight-sided body with 10-node tetrahedra."""
+    """Return the same straight-sided mesh with ten-node tetrahedra.
+
+    >>> from meshes import block
+    >>> quadratic(block((0.02, 0.02, 0.01), 0.01, order=1)).tets.shape
+    (24, 10)
+    """
     if mesh.order == 2:
         return mesh
     n = len(mesh.points)
@@ -190,19 +193,19 @@ def quadratic(mesh: TetMesh) -> TetMesh:
 
 
 def half(mesh: TetMesh, axis: str) -> TetMesh:
-    """The part of a mesh where x (or y, z) is positive; its cut is the facet set `mirror_x`. A
-    MeshError if tetrahedra cross the plane, or none lies beyond it.
-    """
+    """Return the part of a mesh at positive x, y or z, with its cut in the facet set `mirror_x`."""
     if axis not in ("x", "y", "z"):
         raise MeshError(f"axis '{axis}' is unknown; use x, y or z")
     coordinate = mesh.points[:, "xyz".index(axis)]
     away = np.where(np.abs(coordinate) < 1e-9 * np.abs(coordinate).max(), 0.0, coordinate)
     side = np.sign(away[mesh.tets[:, :4]])
     if ((side.min(axis=1) < 0) & (side.max(axis=1) > 0)).any():
-        raise MeshError(f"tetrahedra cross the plane {axis} = 0; mesh an even number of cells")
+        raise MeshError(
+            f"tetrahedra cross the plane {axis} = 0; use an even number of cells along {axis}"
+        )
     inside = side.max(axis=1) > 0
     if not inside.any():
-        raise MeshError(f"no tetrahedron has a positive {axis}; there is nothing to keep")
+        raise MeshError(f"no tetrahedron lies at positive {axis}; move the mesh")
     kept, nodes = part(mesh, inside)
     outer = boundary_facets(kept.tets)
     cut = outer[(away[nodes][outer] == 0).all(axis=1)]
@@ -210,8 +213,8 @@ def half(mesh: TetMesh, axis: str) -> TetMesh:
 
 
 def part(mesh: TetMesh, inside: Bools) -> tuple[TetMesh, Ints]:
-    """The tetrahedra (m,) that are inside, with their share of the facet sets, and the numbers (k,)
-    that their nodes had.
+    """Return the selected tetrahedra (m,) with their facets, and the original numbers (k,) of
+    nodes.
     """
     nodes, tets = np.unique(mesh.tets[inside], return_inverse=True)
     tets = tets.reshape(-1, mesh.tets.shape[1])
@@ -219,30 +222,30 @@ def part(mesh: TetMesh, inside: Bools) -> tuple[TetMesh, Ints]:
     number[nodes] = np.arange(len(nodes))
     outer = facet_keys(boundary_facets(tets), len(nodes))
 
-    def of_it(facets: Ints) -> Ints:
+    def remaining(facets: Ints) -> Ints:
         kept = number[facets]
         kept = kept[(kept >= 0).all(axis=1)]
         return kept[np.isin(facet_keys(kept, len(nodes)), outer)]
 
-    facets = {name: of_it(each) for name, each in mesh.facets.items()}
-    found = replace(
+    facets = {name: remaining(each) for name, each in mesh.facets.items()}
+    piece = replace(
         mesh, points=mesh.points[nodes], tets=tets, region=mesh.region[inside], facets=facets,
         unmoved=None if mesh.unmoved is None else mesh.unmoved[nodes],
     )  # fmt: skip
-    return found, nodes
+    return piece, nodes
 
 
 def facet_keys(facets: Ints, n: int) -> Ints:
-    """A number for each facet (k,) by its corners, whatever their order."""
+    """Return one number (k,) per facet that depends on its corners, not on their order."""
     low, middle, high = np.sort(facets[:, :3], axis=1).T
     return (low * n + middle) * n + high
 
 
 def _whole(name: str, values: ArrayLike) -> Ints:
-    """Whole numbers as an array of its own."""
+    """Return whole numbers as a new array."""
     given = np.array(values)
     if given.size and given.dtype.kind not in "biu":
-        raise MeshError(f"{name} must be whole numbers, not {given.dtype}; number nodes from 0")
+        raise MeshError(f"{name} has type {given.dtype}; give whole numbers, counted from 0")
     return given.astype(np.int64)
 
 
@@ -253,9 +256,9 @@ def _facets(name: str, nodes: ArrayLike, points: Floats, tets: Ints) -> Ints:
     if facets.ndim != 2 or facets.shape[1] != width:
         raise MeshError(
             f"facets '{name}' have shape {facets.shape}; give (k, {width}) node numbers for "
-            f"tetrahedra of {tets.shape[1]} nodes"
+            f"{tets.shape[1]}-node tetrahedra"
         )
-    _check_numbers(f"node numbers of facets '{name}'", facets, points)
+    check_node_numbers(f"node numbers of facets '{name}'", facets, points)
     return facets
 
 
@@ -264,17 +267,26 @@ def _check(points: Floats, tets: Ints) -> None:
         raise MeshError(f"points have shape {points.shape}; give (n, 3) coordinates in metre")
     if tets.ndim != 2 or tets.shape[1] not in (4, 10) or not len(tets):
         raise MeshError(f"tets have shape {tets.shape}; give (m, 4) or (m, 10) node numbers, m > 0")
+    check_finite(points)
+    check_node_numbers("node numbers", tets, points)
+
+
+def check_finite(points: Floats) -> None:
+    """Refuse points (n, 3) that are not finite, or whose products would overflow."""
     bad = np.flatnonzero(~(np.abs(points) <= FURTHEST).all(axis=1))
     if len(bad):
-        raise MeshError(f"{len(bad)} points are not finite, first {bad[0]}; repair the mesh")
-    _check_numbers("node numbers", tets, points)
+        raise MeshError(
+            f"{len(bad):,} of {len(points):,} points are not finite, first point {bad[0]}; "
+            "repair the file that they come from"
+        )
 
 
-def _check_numbers(what: str, nodes: Ints, points: Floats) -> None:
+def check_node_numbers(what: str, nodes: Ints, points: Floats) -> None:
+    """Refuse numbers that do not belong to any of the points (n, 3)."""
     if nodes.min() < 0 or nodes.max() >= len(points):
         raise MeshError(
-            f"{what} run from {nodes.min()} to {nodes.max()}, but there are {len(points)} points; "
-            "number them from 0"
+            f"{what} run from {nodes.min()} to {nodes.max()}, but there are {len(points)} "
+            "points; count them from 0"
         )
 
 
@@ -286,11 +298,11 @@ def _oriented(points: Floats, tets: Ints) -> Ints:
     if len(flat):
         worst = flat[np.argmin(np.abs(volume[flat]) / np.maximum(longest[flat] ** 3, 1e-300))]
         raise MeshError(
-            f"{len(flat)} tetrahedra are flat, the worst is {worst} with volume "
-            f"{volume[worst]:.3g} m3; remesh or remove them"
+            f"{len(flat):,} tetrahedra are flat, the worst is number {worst} with a volume of "
+            f"{volume[worst]:.3g} m3; remesh the body or remove them"
         )
     inside_out = volume < 0
     if inside_out.any():
-        log.info("turned round %d tetrahedra of %d", inside_out.sum(), len(tets))
+        log.info("reordered %d inverted tetrahedra of %d", inside_out.sum(), len(tets))
         tets[inside_out] = tets[inside_out][:, MIRRORED[: tets.shape[1]]]
     return tets

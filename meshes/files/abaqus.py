@@ -1,7 +1,7 @@
-"""Abaqus input files: the nodes, elements and sections of parts, where their instances place them.
+"""Abaqus input files: nodes, elements and sections of parts, placed by their instances.
 
-Keywords as in the Abaqus Keywords Reference Guide. meshio's reader knows neither parts nor
-instances, and keeps only the last of several blocks of nodes.
+Keywords follow the Abaqus Keywords Reference Guide. The reader of meshio ignores parts and
+instances, and keeps only the last of several node blocks.
 """
 
 import re
@@ -22,18 +22,20 @@ SOLIDS = {
     20: "hexahedron20", 27: "hexahedron27",
 }  # fmt: skip
 FACES = {3: "triangle", 4: "quad"}
-# Keywords that make, copy or move nodes and elements.
+# Keywords that generate, copy or move nodes and elements.
 GENERATING = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM")
-MOST_INCLUDED = 20  # levels of files that include others
+MOST_INCLUDED = 20  # levels of nested *INCLUDE
 LARGEST = 500_000_000  # bytes
-AGAIN = "save it again from the program that it comes from"
+AGAIN = "save it again from the program that made it"
 
 Rows = list[list[str]]
 
 
 @dataclass
 class _Part:
-    """Nodes and elements by number, sets of elements, and those that *ELEMENT and sections name."""
+    """Nodes and elements by number, sets of elements, and the sets that *ELEMENT and
+    sections name.
+    """
 
     name: str
     nodes: dict[int, list[float]] = field(default_factory=dict)
@@ -44,26 +46,23 @@ class _Part:
 
 
 def read_abaqus(path: Path) -> Any:
-    """All instances of the parts in a file, or what it holds outside of parts: a meshio.Mesh whose
-    `info` has `notes`, and `names` of regions, which are element sets or parts.
-    """
+    """Return all instances of the parts in a file, or its loose elements, as a meshio.Mesh."""
     loose = current = _Part("")
     parts: dict[str, _Part] = {}
     instances: list[tuple[_Part, Rows]] = []
     for keyword, options, rows in _blocks(path):
         if keyword in GENERATING or (keyword == "NODE" and options.get("SYSTEM", "R") != "R"):
             raise MeshError(
-                f"{path} has *{keyword}, which makes nodes or elements by a rule; save it with all "
-                "of them written out, from Abaqus/CAE or as .vtu"
+                f"{path} has *{keyword}, which generates nodes or elements; save it from "
+                "Abaqus/CAE or as .vtu with all of them written out"
             )
         if keyword == "PART":
             current = parts[options.get("NAME", "").upper()] = _Part(options.get("NAME", ""))
         elif keyword == "INSTANCE":
-            own = parts.get(options.get("PART", "").upper())
-            if own is None:
-                missing = options.get("PART", "")
-                raise MeshError(f"{path} has no part '{missing}' of an instance; save it with all")
-            current = deepcopy(own)  # which may have nodes and elements of its own
+            name = options.get("PART", "")
+            if name.upper() not in parts:
+                raise MeshError(f"{path} has an instance of a missing part '{name}'; {AGAIN}")
+            current = deepcopy(parts[name.upper()])  # an instance may add nodes and elements
             instances.append((current, rows))
         elif keyword in ("END PART", "END INSTANCE"):
             current = loose
@@ -72,15 +71,15 @@ def read_abaqus(path: Path) -> Any:
                 _add(current, keyword, options, rows)
             except (ValueError, IndexError):
                 raise MeshError(
-                    f"{path}: a line below *{keyword} is not of whole numbers and coordinates; "
-                    f"{AGAIN}"
+                    f"{path}: a line below *{keyword} does not have whole numbers and "
+                    f"coordinates; {AGAIN}"
                 ) from None
     placed = [(loose, []), *instances] if instances else [(p, []) for p in (loose, *parts.values())]
     return _joined(path, [(part, rows) for part, rows in placed if part.elements])
 
 
 def _lines(path: Path, level: int = 0) -> Iterator[str]:
-    """Lines that are neither empty nor comments, with those of included files in their places."""
+    """Lines that are neither empty nor comments, with included files in their places."""
     try:
         content = read_exported_text(path, LARGEST).splitlines()
     except ValueError as error:
@@ -93,7 +92,7 @@ def _lines(path: Path, level: int = 0) -> Iterator[str]:
         if not (line.startswith("*") or head):
             yield line
             continue
-        head += line  # keywords go on in the next line after a comma
+        head += line  # a keyword line continues after a comma
         if head.endswith(","):
             continue
         keyword, options = _keyword(head)
@@ -103,7 +102,10 @@ def _lines(path: Path, level: int = 0) -> Iterator[str]:
         if keyword in ("INCLUDE", "NODE", "ELEMENT", "ELSET") and "INPUT" in options:
             other = path.parent / options["INPUT"]
             if level == MOST_INCLUDED or not other.is_file():
-                raise MeshError(f"{path} includes '{options['INPUT']}'; put that file beside it")
+                raise MeshError(
+                    f"{path} includes '{options['INPUT']}', which does not exist; copy it to the "
+                    "same folder"
+                )
             yield from _lines(other, level + 1)
 
 
@@ -116,7 +118,7 @@ def _keyword(line: str) -> tuple[str, dict[str, str]]:
 
 
 def _blocks(path: Path) -> Iterator[tuple[str, dict[str, str], Rows]]:
-    """Each keyword with its options and the lines of data below it."""
+    """Each keyword with its options and the data lines below it."""
     keyword, options = _keyword("*")
     rows: Rows = []
     for line in _lines(path):
@@ -159,7 +161,7 @@ def _add(part: _Part, keyword: str, options: dict[str, str], rows: Rows) -> None
 
 
 def _joined(path: Path, placed: list[tuple[_Part, Rows]]) -> Any:
-    """All parts where they are placed, as one mesh."""
+    """All parts, in their places, as one mesh."""
     import meshio
 
     points: list[Floats] = [np.zeros((0, 3))]
@@ -182,10 +184,11 @@ def _joined(path: Path, placed: list[tuple[_Part, Rows]]) -> Any:
             try:
                 cells.setdefault(name, []).append([number[node] for node in nodes])
             except KeyError as error:
-                missing = f"{path} has no node {error} of its element {element}"
-                raise MeshError(f"{missing}; {AGAIN}") from None
+                raise MeshError(
+                    f"{path} has an element {element} with a missing node {error}; {AGAIN}"
+                ) from None
             regions.setdefault(name, []).append(region.get(element, 0))
-    notes = list(dict.fromkeys(notes))  # of several instances of a part
+    notes = list(dict.fromkeys(notes))  # instances of one part have the same notes
     notes += [f"left out {count:,} elements of type {kind}" for kind, count in left_out.items()]
     if len(placed) > 1:
         notes.append(f"read {len(placed)} parts or instances of parts")
@@ -198,31 +201,32 @@ def _joined(path: Path, placed: list[tuple[_Part, Rows]]) -> Any:
 
 
 def _kind(kind: str, nodes: int) -> str | None:
-    """The name of an element's shape by its type and the number of its nodes; None if unknown."""
+    """meshio's name of an element type with so many nodes; None if unknown."""
     if expected := _solid_nodes(kind):
         return SOLIDS.get(nodes, kind) if nodes == expected else kind
     return FACES.get(nodes) if re.match(r"(?:S|STRI|M3D|R3D|SFM3D)[34]", kind) else None
 
 
 def _solid_nodes(kind: str) -> int:
-    """How many nodes a solid element of a type has; 0 of other types."""
-    found = re.match(r"(?:C|DC|AC|DCC|Q)3D(\d+)", kind)
-    return int(found[1]) if found else 0
+    """Number of nodes of a solid element type; 0 for other types."""
+    match = re.match(r"(?:C|DC|AC|DCC|Q)3D(\d+)", kind)
+    return int(match[1]) if match else 0
 
 
 def _regions(part: _Part, names: dict[str, int], notes: list[str]) -> dict[int, int]:
-    """The number of the region of each element, from 1; `names` has those of all parts. Regions are
-    the sets of sections; else sets of *ELSET, or of lines of *ELEMENT, that have each element once;
-    else those of lines of *ELEMENT, or the part.
+    """Region number, from 1, of each element; `names` collects those of all parts.
+
+    Regions are the sets of sections; otherwise *ELSET sets or *ELEMENT sets that contain each
+    element once; otherwise *ELEMENT sets, or the part.
     """
-    known = {title: of for title, of in part.sets.items() if title and of}
-    apart = [title for title in known if title not in part.blocks]
-    families = [[t for t in titles if t in known] for titles in (part.sections, apart, part.blocks)]
-    chosen = families[0] or next((f for f in families[1:] if _is_partition(part, known, f)), [])
-    chosen = list(dict.fromkeys(chosen or families[2]))
-    if others := [title for title in known if title not in chosen]:
-        notes.append(f"element sets that are not taken as regions: {', '.join(others)}")
-    regions = {title: known[title] for title in chosen} or {part.name: set(part.elements)}
+    sets = {title: members for title, members in part.sets.items() if title and members}
+    sections, blocks = ([t for t in titles if t in sets] for titles in (part.sections, part.blocks))
+    others = [title for title in sets if title not in blocks]
+    families = [titles for titles in (others, blocks) if _is_partition(part, sets, titles)]
+    chosen = list(dict.fromkeys(sections or (families or [blocks])[0]))
+    if unused := [title for title in sets if title not in chosen]:
+        notes.append(f"element sets that are not regions: {', '.join(unused)}")
+    regions = {title: sets[title] for title in chosen} or {part.name: set(part.elements)}
     return {
         element: names.setdefault(title, len(names) + 1)
         for title, members in regions.items()
@@ -231,15 +235,13 @@ def _regions(part: _Part, names: dict[str, int], notes: list[str]) -> dict[int, 
 
 
 def _is_partition(part: _Part, sets: dict[str, set[int]], titles: list[str]) -> bool:
-    """Whether sets of elements have each element of a part once."""
+    """Whether sets contain each element of a part once."""
     members = [element for title in titles for element in sets[title]]
     return len(members) == len(part.elements) and set(members) == set(part.elements)
 
 
 def _moved(path: Path, points: Floats, rows: Rows) -> Floats:
-    """Points after the translation and the rotation of an instance: a vector, then two points of an
-    axis and an angle in degrees.
-    """
+    """Points after the translation and the rotation (axis and degrees) of an instance."""
     from scipy.spatial.transform import Rotation
 
     try:
@@ -251,6 +253,7 @@ def _moved(path: Path, points: Floats, rows: Rows) -> Floats:
             axis = (b - a) / np.linalg.norm(b - a)
             points = a + Rotation.from_rotvec(np.radians(angle) * axis).apply(points - a)
     except (ValueError, IndexError):
-        wrong = f"{path} has an instance whose lines are no translation and rotation"
-        raise MeshError(f"{wrong}; {AGAIN}") from None
+        raise MeshError(
+            f"{path} has an instance whose translation or rotation is not valid; {AGAIN}"
+        ) from None
     return np.asarray(points)

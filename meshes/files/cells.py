@@ -1,6 +1,6 @@
-"""Cell arrays of mesh files: tetrahedra, regions, facet sets, the order of an element's nodes.
+"""Cells of mesh files: tetrahedra, regions, facet sets and the node order of elements.
 
-`raw` is a mesh as meshio reads it, `kind` one of its cell types.
+`raw` is a mesh as meshio represents it, `kind` one of its cell types.
 """
 
 import re
@@ -10,16 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from meshes.surface.repair import first_of_same
+from meshes.surface.repair import first_coincident
 from meshes.tetmesh import EDGES, FACES, MeshError, corner_volumes, facet_keys
 from meshes.typing import Floats, Ints
 
 FACETS, REGION, NAMED = "facets:", "region ", "region:"
-# Cell arrays that number regions: of this package, of others, and of meshio's readers.
+# Cell arrays with region numbers, of this package, of others, and of meshio's readers.
 NUMBERED = ("region", "material", "medit:ref", "tetgen:ref", "nastran:ref", "cell_tags")
-OFF_MIDDLE = 0.25  # of an edge: how far a mid-side node may lie from its middle
+OFF_MIDDLE = 0.25  # of the length of an edge: how far its mid-side node may lie from the middle
 
-# Faces of the solid elements that are split into tetrahedra, by their corners.
+# Corners of the faces of the solid elements that are split into tetrahedra.
 SPLIT = {
     "hexahedron": [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6],
                    [3, 0, 4, 7]],
@@ -29,7 +29,7 @@ SPLIT = {
 SOLID = ("tetra", "tetra10", *SPLIT)
 PLANE = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}  # corners
 SMALLER = ("vertex", "line", "line3")
-FLAT = 1e-9  # of the volume of its cell: a tetrahedron of a collapsed one
+FLAT = 1e-9  # of the volume of its cell: smaller tetrahedra come from a collapsed cell
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,8 +40,8 @@ class Contents:
     ----------
     points : (n, 3) float, in the unit of the file
     tets : (m, 4) or (m, 10) int, m = 0 for a surface
-    triangles : (k, 3) int of a surface; none of a mesh, whose facets are in its sets
-    region : (m,) int, and `names` of those that have one
+    triangles : (k, 3) int of a surface; empty for a mesh, whose facets are in its sets
+    region : (m,) int; `names` has the names of those that have one
     facets : name -> (j, 3) or (j, 6) int
     notes : a sentence on each thing that was left out, merged or split
     """
@@ -56,52 +56,53 @@ class Contents:
 
 
 def contents(path: Path, raw: Any) -> Contents:
-    """The contents of a mesh as meshio has it, whose `info` has `notes` and `names` of regions; a
-    MeshError if it holds neither solid elements nor triangles, some of a kind that is not read, or
-    nodes that it does not have.
+    """Return the contents of a mesh that meshio read, with its `notes` and region `names` in
+    `info`.
     """
-    held: dict[str, int] = {}
+    counts: dict[str, int] = {}
     for block in raw.cells:
         if not len(block.data):
             continue
-        held[block.type] = held.get(block.type, 0) + len(block.data)
+        counts[block.type] = counts.get(block.type, 0) + len(block.data)
         if np.min(block.data) < 0 or np.max(block.data) >= len(raw.points):
-            raise MeshError(f"{path} has cells of points that it does not have; save it again")
-    solid = [kind for kind in SOLID if kind in held]
-    unknown = [kind for kind in held if kind not in (*SOLID, *PLANE, *SMALLER)]
+            raise MeshError(f"{path} has cells that refer to missing points; save it again")
+    solid = [kind for kind in SOLID if kind in counts]
+    unknown = [kind for kind in counts if kind not in (*SOLID, *PLANE, *SMALLER)]
     if unknown or ("tetra10" in solid and len(solid) > 1):
-        listed = ", ".join(f"{held[kind]:,} of type {kind}" for kind in unknown or solid)
+        listed = ", ".join(f"{counts[kind]:,} of type {kind}" for kind in unknown or solid)
         raise MeshError(
-            f"{path} has cells that are not read here ({listed}); save it with tetrahedra of 4 "
-            "nodes, or all of them with 10"
+            f"{path} has unsupported cells ({listed}); save it with 4-node tetrahedra, or only "
+            "10-node ones"
         )
-    if not solid and not any(kind in PLANE for kind in held):
-        raise MeshError(f"{path} holds no triangles and no solid elements; give that of a body")
-    notes = [f"left out {held[kind]:,} cells of type {kind}" for kind in SMALLER if kind in held]
+    if not solid and not any(kind in PLANE for kind in counts):
+        raise MeshError(f"{path} has no triangles and no solid elements; give a file with a body")
+    notes = [
+        f"left out {counts[kind]:,} cells of type {kind}" for kind in SMALLER if kind in counts
+    ]
     notes = [*raw.info["notes"], *notes]
     points = np.zeros((len(raw.points), 3))
     points[:, : raw.points.shape[1]] = raw.points
     if solid:
         return _tetrahedra(path, raw, points, solid, notes)
-    fans = [_fan(_joined(raw.cells, kind), PLANE[kind])[0] for kind in PLANE if kind in held]
+    fans = [_fan(_joined(raw.cells, kind), PLANE[kind])[0] for kind in PLANE if kind in counts]
     return Contents(points=points, triangles=np.vstack(fans), notes=notes)
 
 
 def _tetrahedra(
     path: Path, raw: Any, points: Floats, solid: list[str], notes: list[str]
 ) -> Contents:
-    """Tetrahedra, each once, with nodes that are used, each once; their regions and facet sets."""
+    """Tetrahedra and used nodes, each once, with their regions and facet sets."""
     used = np.unique(np.concatenate([_joined(raw.cells, kind).ravel() for kind in solid]))
     if bad := int((~np.isfinite(points[used])).any(axis=1).sum()):
-        raise MeshError(f"{path} has {bad:,} nodes whose coordinates are no numbers; mend them")
-    same = np.arange(len(points))
-    same[used] = used[first_of_same(points[used])]
-    if merged := len(used) - len(np.unique(same[used])):
-        notes.append(f"merged {merged:,} nodes that coincide with others, as where bodies touch")
+        raise MeshError(f"{path} has {bad:,} nodes whose coordinates are not finite; correct them")
+    merged = np.arange(len(points))
+    merged[used] = used[first_coincident(points[used])]
+    if count := len(used) - len(np.unique(merged[used])):
+        notes.append(f"merged {count:,} nodes that coincide with others, as where bodies touch")
     names = {abs(number): name for number, name in raw.info["names"].items()}
     parts: list[tuple[Ints, Ints]] = []
     for kind in solid:
-        nodes, (own, titles) = same[_joined(raw.cells, kind)], _regions(raw, kind)
+        nodes, (own, titles) = merged[_joined(raw.cells, kind)], _regions(raw, kind)
         names |= titles
         if kind == "tetra10":
             nodes = nodes[:, _node_order(path, points, nodes)]
@@ -112,25 +113,25 @@ def _tetrahedra(
             own = own[cell]
         parts.append((nodes, own))
     tets, region = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    whole = (np.diff(np.sort(tets[:, :4], axis=1), axis=1) > 0).all(axis=1)
-    if not whole.all():
-        notes.append(f"left out {(~whole).sum():,} tetrahedra with a node that they have twice")
-    tets, region = tets[whole], region[whole]
+    proper = (np.diff(np.sort(tets[:, :4], axis=1), axis=1) > 0).all(axis=1)
+    if not proper.all():
+        notes.append(f"left out {(~proper).sum():,} tetrahedra with a repeated node")
+    tets, region = tets[proper], region[proper]
     once = _once(tets, region)
     if len(once) < len(tets):
         several = len(np.unique(region)) > 1
         notes.append(
-            f"left out {len(tets) - len(once):,} tetrahedra that are listed twice"
-            + ("; the smaller of their groups is taken as their region" if several else "")
+            f"left out {len(tets) - len(once):,} duplicate tetrahedra"
+            + ("; their region is the smaller of their groups" if several else "")
         )
         tets, region = tets[once], region[once]
     used, numbers = np.unique(tets, return_inverse=True)
     new = np.full(len(points), -1)
     new[used] = np.arange(len(used))
     tets = numbers.reshape(tets.shape)
-    if inside_out := int((corner_volumes(points[used], tets) < 0).sum()):
-        notes.append(f"turned round {inside_out:,} of {len(tets):,} tetrahedra")
-    sets = _facet_sets(raw, new[same], tets, notes)
+    if inverted := int((corner_volumes(points[used], tets) < 0).sum()):
+        notes.append(f"reordered {inverted:,} inverted tetrahedra of {len(tets):,}")
+    sets = _facet_sets(raw, new[merged], tets, notes)
     names = {number: name for number, name in names.items() if number in region}
     return Contents(
         points=points[used], tets=tets, region=region, names=names, facets=sets, notes=notes
@@ -138,7 +139,7 @@ def _tetrahedra(
 
 
 def _once(tets: Ints, region: Ints) -> Ints:
-    """Numbers, ascending, of tetrahedra without their copies in larger regions."""
+    """Numbers, ascending, of tetrahedra, without duplicates that belong to larger regions."""
     _, which, count = np.unique(region, return_inverse=True, return_counts=True)
     order = np.argsort(count[which], kind="stable")
     _, first = np.unique(np.sort(tets[order, :4], axis=1), axis=0, return_index=True)
@@ -146,8 +147,8 @@ def _once(tets: Ints, region: Ints) -> Ints:
 
 
 def _fan(nodes: Ints, corners: int) -> tuple[Ints, Ints]:
-    """Triangles (k, 3) of plane cells with 3 or 4 corners, from the lowest of a cell's node
-    numbers, and the cell (k,) of each.
+    """Triangles (k, 3) of plane cells, split at their lowest node number, and the cell (k,) of
+    each.
     """
     if corners == 3:
         return nodes[:, :3], np.arange(len(nodes))
@@ -160,9 +161,9 @@ def _fan(nodes: Ints, corners: int) -> tuple[Ints, Ints]:
 def _split(path: Path, points: Floats, nodes: Ints, kind: str) -> tuple[Ints, Ints]:
     """Tetrahedra (m, 4) of solid cells, and the cell (m,) of each.
 
-    They join the lowest of a cell's node numbers with the triangles of the faces that do not have
-    it, each split from its own lowest, so that neighbours split a common face alike (Dompierre et
-    al, 8th International Meshing Roundtable (1999)). Warped cells are refused.
+    The lowest node of a cell is joined to the triangles of its opposite faces. Each face is split
+    at its own lowest node, so that neighbours split a common face alike (Dompierre et al, 8th
+    International Meshing Roundtable (1999)).
     """
     least, tets, cells = nodes.min(axis=1), [], []
     for face in SPLIT[kind]:
@@ -170,17 +171,17 @@ def _split(path: Path, points: Floats, nodes: Ints, kind: str) -> tuple[Ints, In
         away = (nodes[cell][:, face] != least[cell, None]).all(axis=1)
         tets.append(np.column_stack([least[cell], triangles])[away])
         cells.append(cell[away])
-    found, cell = np.vstack(tets), np.concatenate(cells)
-    volumes = corner_volumes(points, found)
+    parts, cell = np.vstack(tets), np.concatenate(cells)
+    volumes = corner_volumes(points, parts)
     size = np.bincount(cell, np.abs(volumes), len(nodes))
     warped = np.abs(np.bincount(cell, volumes, len(nodes))) < (1 - FLAT) * size
     if warped.any():
         raise MeshError(
-            f"{path} has {warped.sum():,} cells of type {kind} that are too warped to be split "
-            "into tetrahedra; save it as tetrahedra"
+            f"{path} has {warped.sum():,} cells of type {kind} that are too warped to split into "
+            "tetrahedra; save it as tetrahedra"
         )
     solid = np.abs(volumes) > FLAT * size[cell]
-    return found[solid], cell[solid]
+    return parts[solid], cell[solid]
 
 
 def _joined(cells: Any, kind: str) -> Ints:
@@ -192,35 +193,32 @@ def _joined(cells: Any, kind: str) -> Ints:
 
 def _values(raw: Any, name: str, kind: str) -> np.ndarray:
     """Cell array (e,) by name over all blocks of a kind, in native byte order."""
-    found = [
-        np.asarray(values) for block, values in zip(raw.cells, raw.cell_data[name], strict=True)
-        if block.type == kind
-    ]  # fmt: skip
-    return np.concatenate(found).astype(np.int64)
+    blocks = zip(raw.cells, raw.cell_data[name], strict=True)
+    return np.concatenate([np.asarray(x) for cells, x in blocks if cells.type == kind]).astype(
+        np.int64
+    )
 
 
 def _regions(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
-    """Region (e,) of each element: an array called so, physical groups, or element sets; and their
+    """Region (e,) of each element from arrays, physical groups or element sets, and region
     names.
     """
     for name in NUMBERED:
         if name in raw.cell_data:
             region = _values(raw, name, kind)
             region = -region if name == "cell_tags" else region  # MED's are negative
-            flags = [title for title in raw.cell_data if title.startswith(NAMED)]
-            marked = {title: region[_values(raw, title, kind) == 1] for title in flags}
-            return region, {
-                int(of[0]): t.removeprefix(NAMED) for t, of in marked.items() if len(of)
-            }
+            names = {}
+            for title in raw.cell_data:
+                if title.startswith(NAMED) and (own := _values(raw, title, kind) == 1).any():
+                    names[int(region[own][0])] = title.removeprefix(NAMED)
+            return region, names
     if "gmsh:physical" in raw.cell_data:
         return _physical_groups(raw, kind)
     return _element_sets(raw, kind)
 
 
 def _physical_groups(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
-    """Physical group (e,) of each element, by the number in its title if it was written here, and
-    the names of groups.
-    """
+    """Physical group (e,) of each element, or the region number in its title, and group names."""
     tags, place = np.unique(_values(raw, "gmsh:physical", kind), return_inverse=True)
     numbers, names = {}, {}
     for title, (tag, dimension) in raw.field_data.items():
@@ -233,25 +231,23 @@ def _physical_groups(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
 
 
 def _element_sets(raw: Any, kind: str) -> tuple[Ints, dict[int, str]]:
-    """The number, from 1, of the last set that each element is in, or 0; and names of sets."""
+    """Number (e,), from 1, of the last set that contains each element, or 0, and set names."""
     blocks = [i for i, block in enumerate(raw.cells) if block.type == kind]
     regions = [np.zeros(len(raw.cells[i].data), np.int64) for i in blocks]
-    members = {
-        str(name): [np.asarray(of[i], np.int64) for i in blocks]
-        for name, of in raw.cell_sets.items()
-    }
-    filled = {name: of for name, of in members.items()
-              if sum(map(len, of)) and not name.startswith("gmsh:")}  # fmt: skip
-    for number, of in enumerate(filled.values(), start=1):
-        for region, which in zip(regions, of, strict=True):
-            region[which] = number
-    return np.concatenate(regions), dict(enumerate(filled, start=1))
+    names: dict[int, str] = {}
+    for name, members in raw.cell_sets.items():
+        own = [np.asarray(members[i], np.int64) for i in blocks]
+        if sum(map(len, own)) and not name.startswith("gmsh:"):
+            names[len(names) + 1] = str(name)
+            for region, elements in zip(regions, own, strict=True):
+                region[elements] = len(names)
+    return np.concatenate(regions), names
 
 
 def _facet_sets(raw: Any, new: Ints, tets: Ints, notes: list[str]) -> dict[str, Ints]:
-    """Facets (k, 3) or (k, 6) of sets by name, of arrays `facets:<name>` or physical groups, seen
-    from outside; `new` (n,) are the numbers of nodes among those of the tetrahedra (m, 4 or 10), or
-    -1. Plane cells that are no faces of tetrahedra are left out, and noted.
+    """Facets (k, 3) or (k, 6) by name, from arrays `facets:<name>` or physical groups.
+
+    `new` (n,) maps nodes to those of the tetrahedra (m, 4 or 10), or to -1.
     """
     titles = {name.removeprefix(FACETS): name for name in raw.cell_data if name.startswith(FACETS)}
     groups = {title: tag for title, (tag, d) in raw.field_data.items() if d == 2}
@@ -270,14 +266,14 @@ def _facet_sets(raw: Any, new: Ints, tets: Ints, notes: list[str]) -> dict[str, 
         for title, own in marked.items():
             sets.setdefault(title, []).append(facets[own[cell] & is_face])
     if lost:
-        notes.append(f"left out {lost:,} triangles that are no faces of its tetrahedra")
-    none = np.zeros((0, width), np.int64)
-    return {title: np.vstack([none, *found]) for title, found in sets.items()}
+        notes.append(f"left out {lost:,} triangles that are not faces of tetrahedra")
+    empty = np.zeros((0, width), np.int64)
+    return {title: np.vstack([empty, *parts]) for title, parts in sets.items()}
 
 
 def _faces_of(nodes: Ints, corners: int, tets: Ints, width: int) -> tuple[Ints, np.ndarray, Ints]:
-    """Plane cells as faces (k, width) of tetrahedra, seen from outside, whether they are some, and
-    the cell of each.
+    """Faces (k, width) of tetrahedra that match plane cells, whether they do, and the cell
+    of each.
     """
     triangles, cell = _fan(nodes, corners)
     n = int(tets.max()) + 1
@@ -293,8 +289,8 @@ def _faces_of(nodes: Ints, corners: int, tets: Ints, width: int) -> tuple[Ints, 
 
 
 def _node_order(path: Path, points: Floats, tets: Ints) -> list[int]:
-    """The column of ten-node tetrahedra (e, 10) for each of the ten nodes, in VTK's order, by the
-    positions of mid-side nodes.
+    """Column for each node of 10-node tetrahedra (e, 10) in VTK's order, from the node
+    positions.
     """
     nodes = points[tets]
     middles = nodes[:, EDGES].mean(axis=2)
@@ -304,13 +300,13 @@ def _node_order(path: Path, points: Floats, tets: Ints) -> list[int]:
     own = np.einsum("ejj->ej", away).max(axis=1)
     if (own <= OFF_MIDDLE).all():
         return list(range(10))
-    column = np.median(away, axis=0).argmin(axis=0)  # which node lies on each edge
+    column = np.median(away, axis=0).argmin(axis=0)  # the node on each edge
     off = away[:, column, range(6)].max(axis=1) > OFF_MIDDLE
     if sorted(column) == list(range(6)) and not off.any():
         return [*range(4), *(4 + column).tolist()]
     count = int(min(off.sum(), (own > OFF_MIDDLE).sum()))
     raise MeshError(
-        f"{path} has {count:,} of {len(tets):,} tetrahedra with a node further than "
-        f"{OFF_MIDDLE:.0%} of an edge from its middle; save it with straight edges, or in VTK's "
-        "order of nodes"
+        f"{path} has {count:,} of {len(tets):,} tetrahedra with a mid-side node more than "
+        f"{OFF_MIDDLE:.0%} of its edge away from the middle; save it with straight edges, or in "
+        "VTK's node order"
     )

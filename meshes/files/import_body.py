@@ -12,17 +12,25 @@ from meshes.facets import geometry, tag_boundary, visible_from_above
 from meshes.files.mesh_files import UNITS, Contents, mesh_of, read_contents, scale_of
 from meshes.reading import PathLike
 from meshes.shapes.structured import Grading
-from meshes.surface.alignment import aligned, clipped, cut_to, off_origin, on_planes, turned, turns
+from meshes.surface.alignment import (
+    aligned,
+    clipped,
+    cut_to_box,
+    on_planes,
+    rotation_to_z,
+    shift_to_origin,
+)
 from meshes.surface.repair import check, in_mm, repaired
 from meshes.surface.triangulation import Surface, compact, volume
 from meshes.surface.winding import check_inside
 from meshes.tetmesh import MeshError, TetMesh, boundary_facets, corner_volumes
-from meshes.volume.quality import dihedral_angles, edge_lengths, one_body
+from meshes.volume.quality import check_one_body, dihedral_angles, edge_lengths
 from meshes.volume.tetrahedralise import EPSILON, REST, check_size, graded, tetrahedralise
 
-FINE_RADIUS, GROWTH, COARSEST = 30e-3, 1.25, 2.0  # m about the palm's middle; elements; of h
-SMALLEST, LARGEST = 5e-3, 1.0  # m: diagonal of what can be a hand, or part of one
-TYPICAL = 0.1  # m
+FINE_RADIUS = 30e-3  # m about the middle of the palm, within which elements have the size h
+GROWTH, COARSEST = 1.25, 2.0  # of elements beyond it: size ratio of neighbours, limit over h
+SMALLEST, LARGEST = 5e-3, 1.0  # m: diagonal of a hand or part of one
+TYPICAL = 0.1  # m, likewise
 
 Say = Callable[[str], None]
 Progress = Callable[[str, float], None]
@@ -42,68 +50,69 @@ def body_from_file(
     say: Say = lambda sentence: None,
     progress: Progress = lambda phase, share: None,
 ) -> TetMesh:
-    """Tetrahedra of the body in a file, placed under the device, with its boundary named.
+    """Return the tetrahedra of a body in a file, placed under the device, with named boundaries.
 
-    A surface is repaired where that takes no guess, turned so that `up` is +z, moved so that the
-    middle of its palm is the origin and its top there is z = 0, cut to `clip` and filled with
-    tetrahedra of h that grow beyond 30 mm from the middle. A mesh is checked like a surface and
-    turned; it is moved only if the origin is not on top of it.
+    A surface is repaired, rotated so that `up` becomes +z, and moved so that the middle of its palm
+    is the origin. It is then cut to `clip` and filled with tetrahedra of size h, which grow beyond
+    30 mm from the middle. A mesh is checked and rotated, and moved only if the origin does not lie
+    on its top.
 
     Parameters
     ----------
-    path : file of a surface or mesh, of one of `FORMATS`
-    h : float, metre, edge length aimed at in the middle of the palm
-    unit : of the coordinates in the file: m, cm, mm, um or in
+    path : surface or mesh file in one of `FORMATS`
+    h : float, metre, edge length in the middle of the palm
+    unit : unit of the coordinates in the file: m, cm, mm, um or in
     up : axis of the file that points to the device: +x, -x, ... -z
-    inner : files of closed surfaces inside it, such as bones, each of which becomes a region by the
-        name of its file
-    clip : least and greatest x, least and greatest y, metre from the middle of the palm
+    inner : files of closed surfaces inside it, such as bones. Each becomes a region with the name
+        of its file.
+    clip : least and greatest x, then least and greatest y, metre from the middle of the palm
     keep_largest : keep only the largest of several separate pieces
     cap : close holes of a surface whose edges lie in a plane, such as an open wrist
-    timeout : float, second, of the mesher
-    say, progress : get a sentence on each thing that was found or done; the phase, and 0
+    timeout : float, second, limit for the mesher
+    say : receives a sentence on each finding and change
+    progress : receives the name of each phase, and 0
 
     Returns
     -------
-    TetMesh with the facet sets `surface`, `top` (seen from above), `cut` (the planes of the clip)
-        and `bottom`, or those of the file; and its regions, or `tissue` and one for each inner
-        surface
+    TetMesh with its regions, or `tissue` and one region per inner surface. Its facet sets are those
+        of the file, `surface`, `top` (visible from above), `cut` (the sides of the clip) and
+        `bottom`.
 
-    Raises a MeshError if the file cannot be read or repaired, is of a size that no hand has, or the
-    mesher fails.
+    Raises a MeshError if the file cannot be read or repaired, its size is not that of a hand, or
+    the mesher fails.
     """
     progress(f"reading {Path(path).name}", 0.0)
-    scale, found = scale_of(unit), read_contents(path)
-    for note in found.notes:
+    scale, contents = scale_of(unit), read_contents(path)
+    for note in contents.notes:
         say(note)
-    _check_plausible(path, found, unit)
-    if len(found.tets):
+    _check_plausible(path, contents, unit)
+    if len(contents.tets):
         if clip is not None or inner:
             raise MeshError(
-                f"{path} is a mesh already, which is neither clipped nor filled; save its surface"
+                f"{path} is a mesh, which cannot be clipped or get inner surfaces; give its surface"
             )
-        say(f"read {len(found.tets):,} tetrahedra of {found.tets.shape[1]} nodes")
-        mesh = mesh_of(replace(found, points=found.points @ turns(up).T), scale)
-        mesh = one_body(mesh, keep_largest=keep_largest, say=say)
-        return _described(_with_sides(_on_top(mesh, say)), say)
-    surface = _sound(found, scale, up=up, keep_largest=keep_largest, cap=cap, say=say)
+        say(f"read {len(contents.tets):,} tetrahedra with {contents.tets.shape[1]} nodes each")
+        mesh = mesh_of(replace(contents, points=contents.points @ rotation_to_z(up).T), scale)
+        mesh = check_one_body(mesh, keep_largest=keep_largest, say=say)
+        return _with_summary(_with_sides(_on_top(mesh, say)), say)
+    surface = _sound_surface(contents, scale, up, say, keep_largest=keep_largest, cap=cap)
     bones = _inner_surfaces(inner, surface, unit=unit, up=up, say=say)
     surface, shift = aligned(surface)
     bones = {name: replace(bone, points=bone.points + shift) for name, bone in bones.items()}
-    say(f"moved by {in_mm(shift)}, the palm's middle to the origin")
+    say(f"moved by {in_mm(shift)}, so that the middle of the palm is the origin")
     planes = []
     if clip is not None:
-        surface, said = clipped(surface, clip)
-        for sentence in said:
-            say(sentence)
+        surface, notes = clipped(surface, clip)
+        for note in notes:
+            say(note)
         check(surface)
         planes = list(clip)
-        bones = {name: part for name, bone in bones.items() if (part := cut_to(bone, clip)[0])}
+        bones = {name: cut for name, bone in bones.items() if (cut := cut_to_box(bone, clip)[0])}
     progress("filling it with tetrahedra", 0.0)
     check_size(surface, "h", h)
     grading = Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=COARSEST * h)
     mesh = tetrahedralise(surface, h, inner=bones, sizing=graded(h, grading), timeout=timeout)
-    return _described(_with_sides(mesh, planes, 2 * EPSILON * h), say)
+    return _with_summary(_with_sides(mesh, planes, 2 * EPSILON * h), say)
 
 
 def _inner_surfaces(
@@ -115,45 +124,49 @@ def _inner_surfaces(
         raise MeshError(
             f"{twice[-1]} would be a second region '{Path(twice[-1]).stem}'; rename the file"
         )
-    found: dict[str, Surface] = {}
+    surfaces: dict[str, Surface] = {}
     for path in paths:
         try:
-            inside, scale = read_contents(path), scale_of(unit)
-            if len(inside.tets):
+            contents = read_contents(path)
+            if len(contents.tets):
                 raise MeshError(f"{path} is a mesh; give a closed surface")
-            found[Path(path).stem] = _sound(
-                inside, scale, up=up, keep_largest=False, cap=False, say=say
-            )
+            surfaces[Path(path).stem] = _sound_surface(contents, scale_of(unit), up, say)
         except MeshError as error:
             raise MeshError(f"{path}: {str(error).removeprefix(f'{path} ')}") from None
-    if found:
-        check_inside(outer, found)
-    return found
+    if surfaces:
+        check_inside(outer, surfaces)
+    return surfaces
 
 
-def _check_plausible(path: PathLike, found: Contents, unit: str) -> None:
-    """Check that a body is as large as a hand, or part of one, in the unit of its file."""
-    used = found.points[np.unique(found.tets if len(found.tets) else found.triangles)]
+def _check_plausible(path: PathLike, contents: Contents, unit: str) -> None:
+    """Check that a body has the size of a hand, or of part of one, in the unit of its file."""
+    used = contents.points[np.unique(contents.tets if len(contents.tets) else contents.triangles)]
     size = float(np.linalg.norm(np.ptp(used, axis=0)))
     if SMALLEST < size * scale_of(unit) < LARGEST:
         return
     likely = min(UNITS, key=lambda name: abs(np.log(max(size, 1e-300) * UNITS[name] / TYPICAL)))
     raise MeshError(
-        f"{path} is {1e3 * size * scale_of(unit):.3g} mm from corner to corner with its unit taken "
-        f"as {unit}, and must be from {1e3 * SMALLEST:g} to {1e3 * LARGEST:g} mm; give its unit, "
-        f'which may be {likely} (--unit {likely}; in a scene, unit = "{likely}" of [body])'
+        f"{path} is {1e3 * size * scale_of(unit):.3g} mm from corner to corner if its unit is "
+        f"{unit}, but a hand or part of one has {1e3 * SMALLEST:g} to {1e3 * LARGEST:g} mm; give "
+        f'its unit, probably {likely} (--unit {likely}, or unit = "{likely}" in [body])'
     )
 
 
-def _sound(
-    found: Contents, scale: float, *, up: str, keep_largest: bool, cap: bool, say: Say
+def _sound_surface(
+    contents: Contents,
+    scale: float,
+    up: str,
+    say: Say,
+    *,
+    keep_largest: bool = False,
+    cap: bool = False,
 ) -> Surface:
-    """Surface in a file, metre, repaired and checked."""
-    say(f"read {len(found.triangles):,} triangles and {len(found.points):,} points")
-    points = turned(Surface(points=found.points * scale, triangles=found.triangles), up).points
-    surface, said = repaired(points, found.triangles, keep_largest=keep_largest, cap=cap)
-    for sentence in said:
-        say(sentence)
+    """Surface in a file, in metre, rotated, repaired and checked."""
+    say(f"read {len(contents.triangles):,} triangles and {len(contents.points):,} points")
+    points = contents.points * scale @ rotation_to_z(up).T
+    surface, notes = repaired(points, contents.triangles, keep_largest=keep_largest, cap=cap)
+    for note in notes:
+        say(note)
     check(surface)
     size = " x ".join(f"{1e3 * side:.0f}" for side in np.ptp(surface.points, axis=0))
     say(f"closed surface of {size} mm, {1e6 * volume(surface):.1f} cm3")
@@ -161,36 +174,35 @@ def _sound(
 
 
 def _on_top(mesh: TetMesh, say: Say) -> TetMesh:
-    """The mesh, moved like a surface if the origin is not on top of it."""
-    boundary = compact(mesh.points, boundary_facets(mesh.tets)[:, :3])
-    shift = off_origin(boundary)
+    """The mesh, moved like a surface if the origin is not on its top."""
+    shift = shift_to_origin(compact(mesh.points, boundary_facets(mesh.tets)[:, :3]))
     if not shift.any():
         return mesh
-    say(f"moved by {in_mm(shift)}, its top to the origin")
+    say(f"moved by {in_mm(shift)}, so that its top is at the origin")
     unmoved = None if mesh.unmoved is None else mesh.unmoved + shift
     return replace(mesh, points=mesh.points + shift, unmoved=unmoved)
 
 
 def _with_sides(mesh: TetMesh, planes: Sequence[float] = (), tolerance: float = 0.0) -> TetMesh:
-    """The mesh with `surface`, `top`, `cut` and `bottom`, of which it keeps what it has."""
-    seen = visible_from_above(mesh)
-    sides = {"top": seen}
+    """The mesh with the facet sets `surface`, `top`, `cut` and `bottom` that it does not have."""
+    visible = visible_from_above(mesh)
+    sides = {"top": visible}
     if planes:
         is_cut = on_planes(planes, tolerance)(*geometry(mesh, boundary_facets(mesh.tets)))
-        sides = {"cut": is_cut, "top": seen & ~is_cut}
-    made = tag_boundary(mesh, rest="bottom", **sides)
-    return replace(mesh, facets={**made.facets, **mesh.facets})
+        sides = {"cut": is_cut, "top": visible & ~is_cut}
+    tagged = tag_boundary(mesh, rest="bottom", **sides)
+    return replace(mesh, facets={**tagged.facets, **mesh.facets})
 
 
-def _described(mesh: TetMesh, say: Say) -> TetMesh:
+def _with_summary(mesh: TetMesh, say: Say) -> TetMesh:
     volumes = corner_volumes(mesh.points, mesh.tets)
     numbers = np.unique(mesh.region).tolist()
     for number in numbers if len(numbers) > 1 or mesh.region_names else []:
         name, own = mesh.region_names.get(number, number), mesh.region == number
         say(f"region {name}: {own.sum():,} tetrahedra, {1e6 * volumes[own].sum():.3g} cm3")
     say(
-        f"{len(mesh.tets):,} tetrahedra, {1e6 * volumes.sum():.1f} cm3, edges of "
-        f"{1e3 * np.median(edge_lengths(mesh)):.1f} mm, dihedral angles from "
+        f"{len(mesh.tets):,} tetrahedra, {1e6 * volumes.sum():.1f} cm3, median edge "
+        f"{1e3 * np.median(edge_lengths(mesh)):.1f} mm, least dihedral angle "
         f"{dihedral_angles(mesh).min():.1f} degrees"
     )
     return mesh

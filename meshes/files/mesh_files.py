@@ -1,10 +1,10 @@
-"""Mesh and surface files: what they hold, and meshes written with meshio.
+"""Mesh and surface files: their contents, and meshes written with meshio.
 
-Files are read in a process of their own, because readers crash on damaged files, print, and take
-whatever time and memory a file asks for. A mesh is written with its regions and facet sets, and
-`read` gives it as it was. In `.vtu`, the cell array `region` numbers the tetrahedra,
-`region:<name>` is 1 for those of a region with a name, and each facet set is a block of triangles
-for which the cell array `facets:<name>` is 1. In `.msh` 2.2 they are physical groups.
+Files are read in a separate process, because readers crash on damaged files, print, and may use any
+amount of time and memory. `read` restores a written mesh with its regions and facet sets. In
+`.vtu`, the cell array `region` numbers the tetrahedra, `region:<name>` is 1 in a named region, and
+each facet set is a block of triangles with 1 in the cell array `facets:<name>`. In `.msh` 2.2 they
+are physical groups.
 """
 
 import contextlib
@@ -27,20 +27,20 @@ BY_VTK = (
 )  # fmt: skip
 FORMATS = (*BY_VTK, *BY_MESHIO, ".inp")
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 25.4e-3}
-WRITTEN = {".vtu": "vtu", ".msh": "gmsh22"}  # version 4.1 of meshio is refused by gmsh itself
+WRITTEN = {".vtu": "vtu", ".msh": "gmsh22"}  # gmsh cannot read the version 4.1 of meshio
 
 
 def read_contents(path: str | os.PathLike[str]) -> Contents:
-    """Everything in a file that a body can be made of, by its suffix.
+    """Return everything in a file that a body can be made of.
 
-    Raises a MeshError if the file does not exist, is of an unknown kind or damaged, or holds
-    neither triangles nor solid elements that can be split into tetrahedra.
+    Raises a MeshError if the file is missing, damaged, of an unknown kind, or has no suitable
+    cells.
     """
     path = Path(path)
     if path.suffix.lower() not in FORMATS:
-        raise MeshError(f"{path} is of no kind that is read here; give one of {', '.join(FORMATS)}")
+        raise MeshError(f"{path} has an unknown file format; give one of {', '.join(FORMATS)}")
     if not path.is_file():
-        raise MeshError(f"{path} is no file that is there; check its name")
+        raise MeshError(f"{path} does not exist; check its name")
     try:
         return subprocess_call.call_reader(read_file, path)
     except subprocess_call.Crashed:
@@ -50,51 +50,57 @@ def read_contents(path: str | os.PathLike[str]) -> Contents:
 
 
 def scale_of(unit: str) -> float:
-    """Size in metre of a unit, by its name; a MeshError if it is unknown."""
+    """Return the size of a unit in metre."""
     if unit not in UNITS:
         raise MeshError(f"unit '{unit}' is unknown; use one of {', '.join(UNITS)}")
     return UNITS[unit]
 
 
 def read(path: str | os.PathLike[str], *, unit: str = "m") -> TetMesh:
-    """The tetrahedra of a mesh file, with regions and facet sets.
+    """Read the tetrahedra of a mesh file, with regions and facet sets.
 
-    Regions are the cell array `region` or `material`, medit's references, physical groups, the
-    element sets of Abaqus's sections, or blocks. Hexahedra, prisms and pyramids are split into
-    tetrahedra, coinciding nodes are merged, and elements that are listed twice are taken once.
+    Regions are the cell array `region` or `material`, Medit references, physical groups, Abaqus
+    element sets, or blocks. Hexahedra, prisms and pyramids are split into tetrahedra. Coinciding
+    nodes are merged and duplicate elements dropped.
 
     Parameters
     ----------
-    path : file of one of `FORMATS`
-    unit : of the coordinates in the file: m, cm, mm, um or in
+    path : file in one of `FORMATS`
+    unit : unit of the coordinates in the file: m, cm, mm, um or in
 
     Returns
     -------
     TetMesh
 
-    Raises a MeshError if the file cannot be read, holds no solid elements, or numbers nodes in an
-    unknown order.
+    Raises a MeshError if the file cannot be read, has no solid elements, or has an unknown node
+    order.
+
+    >>> from meshes import block
+    >>> write("block.vtu", block((0.02, 0.02, 0.01), 0.01))
+    >>> sorted(read("block.vtu").facets)[:3]
+    ['absorbing', 'back', 'bottom']
     """
-    scale, found = scale_of(unit), read_contents(path)
-    if not len(found.tets):
+    scale, contents = scale_of(unit), read_contents(path)
+    if not len(contents.tets):
         raise MeshError(
-            f"{path} is a surface without solid elements; fill it: skinwave mesh, or "
+            f"{path} is a surface without solid elements; fill it with skinwave mesh or "
             "`meshes.body_from_file`"
         )
-    return mesh_of(found, scale)
+    return mesh_of(contents, scale)
 
 
-def mesh_of(found: Contents, scale: float) -> TetMesh:
-    """The mesh in a file, metre, with `scale` the size of its unit."""
+def mesh_of(contents: Contents, scale: float) -> TetMesh:
+    """Return the mesh in a file in metre; `scale` is the size of its unit."""
     return TetMesh(
-        points=found.points * scale if scale != 1 else found.points, tets=found.tets,
-        region=found.region, region_names=found.names, facets=found.facets,
+        points=contents.points * scale, tets=contents.tets, region=contents.region,
+        region_names=contents.names, facets=contents.facets,
     )  # fmt: skip
 
 
 def write(path: str | os.PathLike[str], mesh: TetMesh) -> None:
-    """Write a mesh with its regions and facet sets to `.vtu`, or `.msh` 2.2 for gmsh, aside and
-    renamed; a MeshError if the kind of file is unknown.
+    """Write a mesh with its regions and facet sets as `.vtu`, or as `.msh` 2.2 for gmsh.
+
+    The file is replaced only when complete. Raises a MeshError for another suffix.
     """
     import meshio
 
@@ -102,13 +108,13 @@ def write(path: str | os.PathLike[str], mesh: TetMesh) -> None:
     kind = WRITTEN.get(path.suffix.lower())
     if kind is None:
         raise MeshError(
-            f"{path} cannot be written; name a file that ends in {' or '.join(WRITTEN)}"
+            f"{path} has an unknown format; name a file that ends in {' or '.join(WRITTEN)}"
         )
     names = sorted(mesh.facets)
     facets = [(("triangle", "triangle6")[mesh.order - 1], mesh.facets[name]) for name in names]
     cells = [(("tetra", "tetra10")[mesh.order - 1], mesh.tets), *facets]
     tags, groups = (_vtu_tags if kind == "vtu" else _gmsh_tags)(mesh, names)
-    # Blocks without cells are left out; what names them is not.
+    # Empty blocks are left out, but the names of their sets stay.
     keep = [i for i, (_, nodes) in enumerate(cells) if len(nodes)]
     raw = meshio.Mesh(
         mesh.points,
@@ -127,9 +133,7 @@ def write(path: str | os.PathLike[str], mesh: TetMesh) -> None:
 
 
 def _vtu_tags(mesh: TetMesh, names: list[str]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Cell arrays by block: regions, 1 for the elements of each region with a name, and 1 for the
-    facets of each set; no groups.
-    """
+    """Cell arrays by block: regions, 1 in each named region, and 1 for the facets of each set."""
     sizes = [len(mesh.facets[name]) for name in names]
     tags = {"region": [mesh.region, *(np.full(n, -1) for n in sizes)]}
     for number, title in mesh.region_names.items():
@@ -142,9 +146,7 @@ def _vtu_tags(mesh: TetMesh, names: list[str]) -> tuple[dict[str, Any], dict[str
 
 
 def _gmsh_tags(mesh: TetMesh, names: list[str]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Physical groups of each block, from 1 as 0 is no group in gmsh, and the number and dimension
-    of each group by its name.
-    """
+    """Physical groups of each block, from 1 because gmsh has no group 0, and their dimensions."""
     tags = [mesh.region + 1, *(np.full(len(mesh.facets[n]), i + 1) for i, n in enumerate(names))]
     tags = [tag.astype(np.int32) for tag in tags]
     regions = np.unique(mesh.region).tolist()

@@ -1,5 +1,6 @@
-"""Readers of mesh files: VTK for its own formats and those of surfaces, meshio for those of mesh
-generators. They crash on damaged files and print: `read_contents` calls them in a process.
+"""Readers of mesh files: VTK for its own and surface formats, meshio for those of mesh generators.
+
+They crash on damaged files and print, so `read_contents` calls them in a separate process.
 """
 
 import contextlib
@@ -25,35 +26,38 @@ VTK_CELLS = {
     24: "tetra10", 25: "hexahedron20", 26: "wedge15", 27: "pyramid13",
 }  # fmt: skip
 SOLID = 3  # dimension
-VOXEL, BRICK = 11, [0, 1, 3, 2, 4, 5, 7, 6]  # its corners in the order of a hexahedron's
+VOXEL, BRICK = 11, [0, 1, 3, 2, 4, 5, 7, 6]  # corners of a voxel in the order of a hexahedron
 
 
 def read_file(path: Path) -> Contents:
-    """The contents of a file; raises a MeshError that says what is wrong with it."""
+    """Return the contents of a file, or raise a MeshError that says what is wrong with it."""
     try:
-        with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings(record=True) as met:
+        with (
+            contextlib.redirect_stdout(io.StringIO()),
+            warnings.catch_warnings(record=True) as caught,
+        ):
             warnings.simplefilter("always")
             raw = _read(path)
-            if any("error while reading" in str(one.message) for one in met):
+            if any("error while reading" in str(one.message) for one in caught):
                 raise MeshError(f"{path} is damaged or cut short; {AGAIN}")
             return contents(path, raw)
     except MeshError:
         raise
-    except ImportError as error:  # MED files are read by h5py
+    except ImportError as error:  # MED files need h5py
         raise MeshError(
-            f"{path} is read with {error.name}, which is not installed; pip install "
+            f"{path} needs {error.name}, which is not installed; pip install "
             '"skinwave[measure]", or save it as .vtu'
         ) from None
     except (Exception, SystemExit) as error:
-        why = "is damaged, or holds what its reader does not know"
+        why = "is damaged or has unsupported contents"
         if isinstance(error, MemoryError):
-            why = "asks for more memory than a mesh of its size needs"
+            why = "needs more memory than a mesh of its size should"
         cure = "save it as version 2.2 (gmsh -format msh22)" if path.suffix == ".msh" else AGAIN
         raise MeshError(f"{path} cannot be read: it {why}; {cure}") from None
 
 
 def _read(path: Path) -> Any:
-    """A file's cells as meshio has them; `info` has `notes`, and `names` of regions."""
+    """Read a file as a meshio.Mesh, whose `info` has `notes` and the `names` of regions."""
     suffix = path.suffix.lower()
     if suffix == ".inp":
         return read_abaqus(path)
@@ -70,7 +74,7 @@ def _read(path: Path) -> Any:
 
 
 def _read_vtk(path: Path) -> Any:
-    """The cells of all parts of what VTK reads; several parts with solid cells are regions."""
+    """The cells of all data sets of a VTK file. Several data sets with solid cells are regions."""
     import meshio
     import pyvista
 
@@ -86,8 +90,8 @@ def _read_vtk(path: Path) -> Any:
                 name = pyvista.CellType(kind).name.lower().replace("_", " ")
                 if pyvista.CellType(kind).dimension == SOLID:
                     raise MeshError(
-                        f"{path} has {own.sum():,} cells of type {name}, which are not split into "
-                        "tetrahedra here; save it as tetrahedra"
+                        f"{path} has {own.sum():,} cells of type {name}, which cannot be split "
+                        "into tetrahedra; save it as tetrahedra"
                     )
                 notes.append(f"left out {own.sum():,} cells of type {name}")
                 continue
@@ -112,21 +116,21 @@ def _read_vtk(path: Path) -> Any:
 
 
 def _data(path: Path) -> Any:
-    """What VTK reads from a file."""
+    """The content of a file as VTK reads it."""
     import pyvista
 
     if path.suffix.lower() not in (".xdmf", ".xmf"):
         return pyvista.read(path)
     from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
 
-    reader = vtkXdmfReader()  # pyvista's wants steps of time
+    reader = vtkXdmfReader()  # pyvista's reader requires time steps
     reader.SetFileName(str(path))
     reader.Update()
     return pyvista.wrap(reader.GetOutputDataObject(0))
 
 
 def _leaves(data: Any, name: str) -> Iterator[tuple[str, Any]]:
-    """The data sets of what VTK read, which may be nested, with their names."""
+    """The data sets in nested blocks, with their names."""
     import pyvista
 
     if isinstance(data, pyvista.PartitionedDataSet):  # parts of one grid
@@ -149,7 +153,7 @@ def _grid(part: Any) -> Any:
 
 
 def _kinds(grid: Any, dimension: int | None = None) -> list[int]:
-    """VTK's numbers of the types of cells of a grid, all or those of a dimension."""
+    """VTK's numbers of the cell types of a grid, all or those of one dimension."""
     import pyvista
 
     kinds = [int(kind) for kind in np.unique(grid.celltypes)]
@@ -157,10 +161,12 @@ def _kinds(grid: Any, dimension: int | None = None) -> list[int]:
 
 
 def _check_unread(path: Path, kind: str) -> None:
-    """Refuse what meshio's readers pass over: coordinate systems of Nastran, partitions of gmsh."""
+    """Refuse what meshio's readers ignore: coordinate systems of Nastran, partitions of gmsh."""
     content = path.read_bytes()
     if kind == "gmsh" and b"$EndElements" not in content:
-        raise MeshError(f"{path} is cut short or no mesh of gmsh: it has no $EndElements; {AGAIN}")
+        raise MeshError(
+            f"{path} is cut short or not a gmsh mesh, because it has no $EndElements; {AGAIN}"
+        )
     if kind == "gmsh" and b"$PartitionedEntities" in content:
         raise MeshError(f"{path} is partitioned; save it without partitions, or as version 2.2")
     if kind != "nastran":
@@ -173,5 +179,5 @@ def _check_unread(path: Path, kind: str) -> None:
             if system.strip() not in ("", "0"):
                 raise MeshError(
                     f"{path} gives nodes in coordinate system {system.strip()}; save it with all "
-                    "nodes in the basic one"
+                    "nodes in the basic system"
                 )

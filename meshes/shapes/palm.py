@@ -1,15 +1,15 @@
-"""A palm: a rounded slab with mounds, joined smoothly, bent to a cup.
+"""Palm: a rounded slab with mounds, joined smoothly and bent to a cup.
 
-A right hand with its palm facing +z, the fingers towards +y, the thumb towards +x. The middle of
-the palm is the origin, and lies on the surface. The body is where the level set is negative:
+It is a right hand with the palm facing +z, the fingers towards +y and the thumb towards +x. The
+origin is the middle of the palm, on its surface. The body is where the level set is negative:
 
     F(x, y, z) = join(box, mounds)(x, y, z - rise),  rise = cup_depth ((2x/b)^2 + (2y/l)^2)
 
 `box` is the exact distance from a slab with rounded corners and edges, a mound the first-order
-distance of an ellipsoid, and `join` a smooth minimum with continuous second derivatives, which
-differs from the lesser of the two only where they differ by less than a mound's height. Near the
-surface F is the distance from it, within a few percent. Without cup and mounds the body is a slab
-whose top is the plane z = 0 up to `edge_radius` from its sides.
+distance from an ellipsoid, and `join` a smooth minimum with continuous second derivatives. It
+differs from the minimum only where the two differ by less than the height of the mound. Near the
+surface, F is the distance from it within a few per cent. Without cup and mounds, the top is the
+plane z = 0 up to `edge_radius` from the sides.
 """
 
 from collections.abc import Iterator
@@ -22,23 +22,26 @@ from meshes.tetmesh import MeshError
 from meshes.typing import Floats
 
 LevelSet = tuple[Floats, Floats]  # values (n,) and gradients (n, 3)
-PADS = (-0.33, -0.11, 0.11, 0.33)  # of the breadth: where the fingers begin
+PADS = (-0.33, -0.11, 0.11, 0.33)  # of the breadth: x of the finger roots
 
 
 @dataclass(frozen=True, kw_only=True)
 class Palm:
-    """Size and relief of a palm, in metre; the defaults are an adult's.
+    """Size and relief of a palm, in metre. The defaults are those of an adult.
 
     Parameters
     ----------
     breadth, length : across the four fingers (x) and from wrist to finger roots (y)
-    thickness : at its middle, from the palm to the back of the hand
-    cup_depth : how far the middles of the sides, bent up, lie above the middle of the palm
+    thickness : in the middle, from the palm to the back of the hand
+    cup_depth : height of the middles of the sides above the middle of the palm
     thenar_height, hypothenar_height : of the mounds at the thumb and opposite, above the palm
     pad_height : of the four pads below the fingers
     corner_radius, edge_radius : of the outline seen from above, and of its cross-section
 
     Raises a MeshError if a value is out of range, or a radius does not fit.
+
+    >>> Palm(thickness=0.030).edge_radius
+    0.01
     """
 
     breadth: float = 0.085
@@ -54,41 +57,42 @@ class Palm:
     def __post_init__(self) -> None:
         relief = ("cup_depth", "thenar_height", "hypothenar_height", "pad_height")
         for name, value in vars(self).items():
-            flat = name in relief
-            if not (0 <= value < 1 if flat else 0 < value < 1):
-                least = "0 or above" if flat else "above 0"
+            if not (0 < value < 1 or (value == 0 and name in relief)):
+                least = "0 or above" if name in relief else "above 0"
                 raise MeshError(
                     f"{name} = {1e3 * value:g} mm of the palm must be {least} and below 1 m"
                 )
-            if flat and value > self.thickness:
+            if name in relief and value > self.thickness:
                 raise MeshError(
                     f"{name} = {1e3 * value:g} mm exceeds the thickness of the palm, "
-                    f"{1e3 * self.thickness:g} mm; give a lower one"
+                    f"{1e3 * self.thickness:g} mm; reduce it"
                 )
-        for name, limit, what in (
+        for name, limit, meaning in (
             ("corner_radius", min(self.breadth, self.length) / 2, "half the shorter side"),
             ("edge_radius", self.thickness / 2, "half the thickness"),
             ("edge_radius", self.corner_radius, "corner_radius"),
         ):
             if not (value := getattr(self, name)) <= limit * (1 + 1e-9):
                 raise MeshError(
-                    f"{name} = {1e3 * value:g} mm of the palm is more than {what}, "
-                    f"{1e3 * limit:g} mm; give that or less"
+                    f"{name} = {1e3 * value:g} mm of the palm exceeds {meaning}, "
+                    f"{1e3 * limit:g} mm; reduce it"
                 )
 
 
 def level_set(palm: Palm, points: ArrayLike) -> Floats:
-    """F (n,) in metre at points (n, 3) in metre: below 0 inside, near the surface the distance."""
+    """Return F (n,) in metre at points (n, 3), negative inside; near the surface, the distance."""
     return _field(palm, np.asarray(points, np.float64))[0]
 
 
 def gradient(palm: Palm, points: ArrayLike) -> Floats:
-    """Derivatives (n, 3) of `level_set`; about a unit vector outwards near the surface."""
+    """Return the derivatives (n, 3) of `level_set`, about a unit outward normal near the
+    surface.
+    """
     return _field(palm, np.asarray(points, np.float64))[1]
 
 
 def rise(palm: Palm, places: Floats) -> Floats:
-    """Height (...,) in metre by which the cup raises the palm at places (..., 2) in metre."""
+    """Return the height (...,) in metre by which the cup raises places (..., 2)."""
     return np.asarray(places**2 @ _bend(palm))
 
 
@@ -108,7 +112,7 @@ def _field(palm: Palm, points: Floats) -> LevelSet:
 
 
 def _mounds(palm: Palm) -> Iterator[tuple[float, Floats, Floats]]:
-    """Height, centre and half axes of each mound that there is."""
+    """Height, centre and semi-axes of each mound."""
     b, length, half = palm.breadth, palm.length, palm.thickness / 2
     places = [
         (palm.thenar_height, 0.25 * b, -0.21 * length, 0.22 * b, 0.29 * length),
@@ -117,12 +121,12 @@ def _mounds(palm: Palm) -> Iterator[tuple[float, Floats, Floats]]:
     ]
     for height, x, y, across, along in places:
         if height > 0:
-            # As deep as the slab and raised, so that the back of the hand stays as it is.
+            # As deep as the slab and raised, so that the back of the hand does not change.
             yield height, np.array([x, y, height - half]), np.array([across, along, half])
 
 
 def _box_distance(palm: Palm, points: Floats) -> LevelSet:
-    """Distance from a box with rounded corners in its plan and rounded edges."""
+    """Distance from a box with rounded corners in plan and rounded edges."""
     half = np.array([palm.breadth, palm.length]) / 2
     middle = points + [0, 0, palm.thickness / 2]
     sign = np.where(middle < 0, -1.0, 1.0)
@@ -133,7 +137,7 @@ def _box_distance(palm: Palm, points: Floats) -> LevelSet:
 
 
 def _rounded(beyond: Floats, radius: float) -> LevelSet:
-    """Distance (n,) from a corner of that radius, of points so far beyond its two sides (n, 2)."""
+    """Distance (n,) from a corner of a radius, for points beyond its two sides by (n, 2)."""
     inner = beyond + radius
     outside = np.maximum(inner, 0)
     length = np.linalg.norm(outside, axis=1)
@@ -155,11 +159,11 @@ def _ellipsoid(points: Floats, half_axes: Floats) -> LevelSet:
 
 
 def _join(one: LevelSet, other: LevelSet, width: float) -> LevelSet:
-    """Smooth minimum: cubic, so that second derivatives are continuous."""
+    """Smooth minimum, cubic, with continuous second derivatives."""
     (a, slope_a), (b, slope_b) = one, other
     gap = np.maximum(width - np.abs(a - b), 0) / width
     lesser = a <= b
-    share = gap**2 / 2  # of the greater one
+    share = gap**2 / 2  # weight of the larger one
     slope_low = np.where(lesser[:, None], slope_a, slope_b)
     slope_high = np.where(lesser[:, None], slope_b, slope_a)
     slope = slope_low + share[:, None] * (slope_high - slope_low)

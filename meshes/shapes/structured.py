@@ -1,9 +1,9 @@
-"""Structured meshes: triangulated rectangles extruded downwards, three tetrahedra a prism.
+"""Structured meshes: triangulated rectangles, discs and planes extruded to prisms of three
+tetrahedra.
 
-The driven surface is the plane z = 0 with the body below it, centred on the origin.
-Ordering the nodes of each triangle by the parity of their grid position before it is extruded
-makes neighbouring prisms cut their common side along the same diagonal, so that the mesh
-conforms without a search, and has the mirror symmetries of its grid.
+The loaded surface is the plane z = 0, with the body below it and the origin in its middle. The
+nodes of each triangle are ordered by the parity of their grid position. Neighbouring prisms then
+split their common side along the same diagonal, and the mesh has the mirror symmetries of its grid.
 """
 
 from __future__ import annotations
@@ -18,8 +18,6 @@ from numpy.typing import ArrayLike
 
 from meshes.facets import tag_boundary
 from meshes.tetmesh import (
-    Floats,
-    Ints,
     MeshError,
     TetMesh,
     boundary_facets,
@@ -27,25 +25,24 @@ from meshes.tetmesh import (
     facet_set,
     quadratic,
 )
+from meshes.typing import Floats, Ints
 
-SECTORS = 8  # of a disc, so that no element crosses x = 0 or y = 0
-CLOSEST = 0.4  # of a cell: a grid line nearer to a plane is replaced by it
-MOST_UNKNOWNS = 3_000_000  # of a mesh: beyond it no factorisation fits in a workstation
+SECTORS = 8  # of a disc: no element crosses x = 0 or y = 0
+CLOSEST = 0.4  # of a cell: a plane replaces grid lines nearer than this
+MOST_UNKNOWNS = 3_000_000  # degrees of freedom whose factorisation fits in a workstation
 
 Lines = tuple[Floats, Floats, Floats]  # metre, increasing, along x, y and z
 
 
 @dataclass(frozen=True, kw_only=True)
 class Grading:
-    """Grading of cell sizes: fine where the focus travels, coarser away from it.
+    """Growth of cell sizes away from the focus.
 
     Parameters
     ----------
     radius : float, metre, half width of the square of fine cells
-    growth : float, ratio of one cell to its neighbour outside the square and downwards
+    growth : float, size ratio of neighbouring cells outside the square and downwards
     coarsest : float, metre, largest cell
-
-    Raises a MeshError if a value is out of range.
     """
 
     radius: float
@@ -54,7 +51,7 @@ class Grading:
 
     def __post_init__(self) -> None:
         if not (self.radius >= 0 and 1 <= self.growth < np.inf and self.coarsest > 0):
-            raise MeshError(f"{self} needs a radius >= 0, a growth >= 1 and a coarsest cell > 0")
+            raise MeshError(f"{self} needs radius >= 0, growth >= 1 and coarsest > 0")
 
 
 def sheet(
@@ -67,19 +64,22 @@ def sheet(
     order: int = 2,
     planes: Sequence[Sequence[float]] = ((), ()),
 ) -> TetMesh:
-    """Flat sheet with its edges in the facet set `clamped`.
+    """Return a flat sheet whose edges are the facet set `clamped`.
 
     Parameters
     ----------
-    width, height, thickness : float, metre, along x, y and z.
-    h : float, metre, largest side of a cell in the plane.
-    layers : int, elements through the thickness.
-    order : 1 or 2, four- or ten-node tetrahedra.
-    planes : two sequences of places in metre along x and along y, which grid lines meet.
+    width, height, thickness : float, metre, along x, y and z
+    h : float, metre, largest side of a cell in the plane
+    layers : int, elements through the thickness
+    order : 1 or 2, four- or ten-node tetrahedra
+    planes : places in metre along x and along y where grid lines must lie
 
     Returns
     -------
     TetMesh
+
+    >>> sheet(0.1, 0.08, 1e-3, 0.01)
+    <TetMesh: 1,071 nodes, 480 tetrahedra of 10 nodes, 1 regions; facets back, ...>
     """
     x, y = (
         with_planes(_even(size, h), wanted)
@@ -96,18 +96,22 @@ def block(
     grading: Grading | None = None,
     order: int = 2,
 ) -> TetMesh:
-    """Rectangular block: its base in the facet set `clamped`, its sides in `absorbing`.
+    """Return a rectangular block with its base as `clamped` and its sides as `absorbing` facets.
 
     Parameters
     ----------
-    lengths : three floats, metre, along x, y and z.
-    h : float, metre, largest side of a cell, under the focus if graded.
-    grading : how cells grow away from the focus; None for equal cells.
-    order : 1 or 2, four- or ten-node tetrahedra.
+    lengths : three floats, metre, along x, y and z
+    h : float, metre, largest side of a cell, under the focus if graded
+    grading : growth of cells away from the focus; None for equal cells
+    order : 1 or 2, four- or ten-node tetrahedra
 
     Returns
     -------
     TetMesh
+
+    >>> mesh = block((0.04, 0.04, 0.01), 0.005)
+    >>> len(mesh.tets), sorted(mesh.facets)[:3]
+    (768, ['absorbing', 'back', 'bottom'])
     """
     x_length, y_length, depth = lengths
     if grading is None:
@@ -122,8 +126,8 @@ def block(
 
 
 def middle_plane(mesh: TetMesh) -> Ints:
-    """Triangles (k, 6) half way through an extruded sheet of ten-node tetrahedra, one below each
-    facet of its top; a MeshError if there are no such nodes.
+    """Return the triangles (k, 6) in the middle plane of an extruded sheet, one below each facet of
+    its top.
     """
     top = facet_set(mesh, "top")
     low, high = mesh.points[:, 2].min(), mesh.points[:, 2].max()
@@ -131,24 +135,22 @@ def middle_plane(mesh: TetMesh) -> Ints:
     above = np.unique(top)
     by_place = [nodes[np.lexsort(mesh.points[nodes, :2].T)] for nodes in (layer, above)]
     if len(layer) != len(above) or (np.diff(mesh.points[by_place, :2], axis=0) != 0).any():
-        raise MeshError("the mesh has no nodes half way below its top; extrude it with order 2")
+        raise MeshError("the mesh has no nodes in its middle plane; extrude it with order 2")
     below = np.zeros(len(mesh.points), np.int64)
     below[by_place[1]] = by_place[0]
     return below[top]
 
 
 def disc(diameter: float, thickness: float, h: float, planes: Iterable[float] = ()) -> TetMesh:
-    """Ten-node tetrahedra of a cylinder below the plane z = 0, about the z axis: a prism on a
-    polygon of 8 sides for each ring of elements. It has the facet sets `top`, `bottom`, `sides` and
-    `surface`.
+    """Return ten-node tetrahedra of a vertical cylinder below the plane z = 0.
+
+    Prisms stand on concentric rings of triangles. Facet sets: `top`, `bottom`, `sides`, `surface`.
 
     Parameters
     ----------
     diameter, thickness : float, metre
     h : float, metre, largest edge along a radius and downwards
-    planes : depths in metre that elements do not cross
-
-    Raises a MeshError if a length is not above 0, or there would be too many elements.
+    planes : depths in metre where element layers must end
     """
     for name, length in (("diameter", diameter), ("thickness", thickness), ("h", h)):
         if not 0 < length < np.inf:
@@ -166,7 +168,7 @@ def disc(diameter: float, thickness: float, h: float, planes: Iterable[float] = 
 
 
 def _rings(rings: int) -> tuple[Floats, Ints]:
-    """Points (n, 2) on rings of a unit disc, 8 k on ring k, and triangles (8 r^2, 3) of them."""
+    """Points (n, 2) of a unit disc, 8 k on ring k, and triangles (8 r^2, 3)."""
     start = np.cumsum([0, 1, *(SECTORS * np.arange(1, rings))])
     points, triangles = [np.zeros((1, 2))], []
     for k in range(1, rings + 1):
@@ -185,17 +187,10 @@ def _rings(rings: int) -> tuple[Floats, Ints]:
 
 
 def graded_axis(length: float, h: float, grading: Grading) -> Floats:
-    """Graded grid lines from 0: cells of equal size up to the radius, then growing.
+    """Return grid lines (n,) in metre from 0 to a length: equal cells of size h, then growing ones.
 
-    Parameters
-    ----------
-    length, h, grading : in metre the end, and the size of the first cells
-
-    Returns
-    -------
-    (n,) float, metre
-
-    Raises a MeshError if a length is not above 0, or there would be too many cells.
+    >>> graded_axis(0.05, 0.01, Grading(radius=0.02, growth=2.0)).tolist()
+    [0.0, 0.01, 0.02, 0.05]
     """
     _check_lengths(length, h)
     fine = min(grading.radius, length)
@@ -209,25 +204,29 @@ def graded_axis(length: float, h: float, grading: Grading) -> Floats:
         reached += size
         check_size((len(cells) + len(tail), 1, 1))
     if tail:
-        # Land on the end exactly, by leaving out the last cell or stretching fewer of them.
+        # Drop the last cell if it is mostly beyond the end, and scale the growing ones.
         tail = tail[:-1] if len(tail) > 1 and reached - rest > tail[-1] / 2 else tail
         cells += list(np.array(tail) * (rest / sum(tail)))
     return np.concatenate([[0.0], np.cumsum(cells)])
 
 
 def with_planes(line: Floats, planes: Iterable[float]) -> Floats:
-    """Grid lines with further ones at given places, instead of those that are too close to them."""
-    wanted = np.array(sorted(planes))
+    """Return grid lines with additional ones at given places, which replace lines that are too
+    close.
+    """
+    places = np.array(sorted(planes))
     inner = line[1:-1]
-    if len(wanted) and len(inner):
+    if len(places) and len(inner):
         cell = np.minimum(np.diff(line)[:-1], np.diff(line)[1:])
-        inner = inner[np.abs(inner[:, None] - wanted).min(axis=1) > CLOSEST * cell]
-    return np.unique(np.concatenate([line[:1], inner, wanted, line[-1:]]))
+        inner = inner[np.abs(inner[:, None] - places).min(axis=1) > CLOSEST * cell]
+    return np.unique(np.concatenate([line[:1], inner, places, line[-1:]]))
 
 
 def extrude(x: ArrayLike, y: ArrayLike, z: ArrayLike, *, order: int = 2) -> TetMesh:
-    """Tetrahedra on grid lines, with diagonals that alternate between cells, so that a grid with an
-    even number of cells and mirrored lines has the mirror symmetries of the rectangle.
+    """Return tetrahedra on grid lines along x, y and z, in metre.
+
+    Diagonals alternate between cells. A grid of mirrored lines and an even number of cells has the
+    mirror symmetries of the rectangle.
 
     Parameters
     ----------
@@ -236,18 +235,20 @@ def extrude(x: ArrayLike, y: ArrayLike, z: ArrayLike, *, order: int = 2) -> TetM
 
     Returns
     -------
-    TetMesh with the facet sets `top`, `bottom`, `sides` and the four sides `left` (least x),
-        `right`, `front` (least y) and `back`
+    TetMesh with the facet sets `top`, `bottom`, `sides` and, at least and greatest x and y, `left`,
+        `right`, `front` and `back`
 
-    Raises a MeshError if grid lines do not increase, the order is unknown, or there are too many
-    cells.
+    Raises a MeshError if grid lines do not increase or there are too many cells.
+
+    >>> extrude([0, 1, 2], [0, 1], [-1, 0], order=1)
+    <TetMesh: 12 nodes, 12 tetrahedra of 4 nodes, 1 regions; facets back, ...>
     """
     lines = [np.asarray(line, np.float64) for line in (x, y, z)]
     for name, line in zip("xyz", lines, strict=True):
         if line.ndim != 1 or len(line) < 2 or not (np.diff(line) > 0).all():
             raise MeshError(f"grid lines along {name} must be two or more increasing numbers")
     if order not in (1, 2):
-        raise MeshError(f"order = {order} is not available; use 1 or 2")
+        raise MeshError(f"order = {order} is not supported; use 1 or 2")
     check_size((len(line) - 1 for line in lines), order)
     triangles = _rectangle_triangles(*lines[:2])
     yy, xx = np.meshgrid(lines[1], lines[0], indexing="ij")
@@ -257,7 +258,7 @@ def extrude(x: ArrayLike, y: ArrayLike, z: ArrayLike, *, order: int = 2) -> TetM
 
 
 def extruded(plane: ArrayLike, triangles: ArrayLike, z: ArrayLike, *, order: int = 2) -> TetMesh:
-    """Tetrahedra on any triangulation of a plane, three a prism.
+    """Return tetrahedra on any triangulated plane, with the facet set `top`.
 
     Parameters
     ----------
@@ -265,12 +266,8 @@ def extruded(plane: ArrayLike, triangles: ArrayLike, z: ArrayLike, *, order: int
     triangles : (k, 3) int, nodes of the plane
     z : increasing heights of the layers, metre
     order : 1 or 2, four- or ten-node tetrahedra
-
-    Returns
-    -------
-    TetMesh with the facet set `top`
     """
-    ranked = np.sort(np.asarray(triangles), axis=1)  # one order for all: neighbours conform
+    ranked = np.sort(np.asarray(triangles), axis=1)  # the same order everywhere: neighbours conform
     points, tets = _layers(np.asarray(plane), ranked, np.asarray(z))
     facets = boundary_facets(tets)
     top = facets[(points[facets, 2] == points[:, 2].max()).all(axis=1)]
@@ -283,17 +280,17 @@ def _layers(plane: Floats, triangles: Ints, z: Floats) -> tuple[Floats, Ints]:
     n = len(plane)
     tets = np.vstack([_prism_tets(triangles + low * n, n) for low, _ in pairwise(range(len(z)))])
     points = np.column_stack([np.tile(plane, (len(z), 1)), np.repeat(z, n)])
-    wrong = corner_volumes(points, tets) < 0
-    tets[wrong, 2:] = tets[wrong, :1:-1]
+    inverted = corner_volumes(points, tets) < 0
+    tets[inverted, 2:] = tets[inverted, :1:-1]
     return points, tets
 
 
 def _rectangle_triangles(x: Floats, y: Floats) -> Ints:
-    """Two triangles a cell with alternating diagonals, nodes ordered by parity."""
+    """Two triangles per cell with alternating diagonals and nodes ordered by parity."""
     nx, ny = len(x) - 1, len(y) - 1
-    # By parity about the origin, under the focus, whose elements then look the same in every mesh,
-    # whole or part. The corners of a cell all differ in rank, and its diagonal joins the first to
-    # the last, so that the six tetrahedra above a cell have their longest edge in common.
+    # Parity counts from the origin, so that whole and half meshes have the same elements there. All
+    # corners of a cell differ in rank. Its diagonal joins the first to the last, so that the six
+    # tetrahedra of a cell share their longest edge.
     at_x, at_y = np.argmin(np.abs(x)), np.argmin(np.abs(y))
     j, i = np.divmod(np.arange(nx * ny), nx)
     a, b = j * (nx + 1) + i, j * (nx + 1) + i + 1
@@ -328,25 +325,25 @@ def _sides(points: Floats, facets: Ints) -> dict[str, Ints]:
 
 
 def _with_roles(mesh: TetMesh, **roles: str) -> TetMesh:
-    """The mesh with some of its facet sets under further names."""
+    """The mesh with additional names of facet sets."""
     named = {role: mesh.facets[name] for role, name in roles.items()}
     return replace(mesh, facets={**mesh.facets, **named})
 
 
 def _even(length: float, h: float, *, least: int = 2) -> Floats:
-    """Equal cells no larger than h about the origin, an even number where symmetry is wanted."""
+    """Equal cells no larger than h about the origin, in multiples of `least`."""
     _check_lengths(length, h)
     check_size((length / h, 1, 1))
     return np.linspace(-length / 2, length / 2, least * max(1, round_up(length / (least * h))) + 1)
 
 
 def check_size(cells: Iterable[float], order: int = 2) -> None:
-    """Refuse so many cells along three axes if they have more than `MOST_UNKNOWNS`."""
+    """Refuse numbers of cells along three axes that give more than `MOST_UNKNOWNS`."""
     unknowns = 3.0 * prod(order * n + 1 for n in cells)
     if not unknowns <= MOST_UNKNOWNS:
         raise MeshError(
-            f"the mesh would have {unknowns:.2g} degrees of freedom or more, the limit is "
-            f"{MOST_UNKNOWNS:,}; take larger elements or a smaller body"
+            f"the mesh would have at least {unknowns:.2g} degrees of freedom, more than the "
+            f"limit of {MOST_UNKNOWNS:,}; use larger elements or a smaller body"
         )
 
 
@@ -356,10 +353,10 @@ def _check_lengths(length: float, h: float) -> None:
 
 
 def round_up(ratio: float) -> int:
-    """Ceiling that forgives round-off just above a whole number."""
+    """Return the ceiling, ignoring round-off just above a whole number."""
     return int(np.ceil(ratio - 1e-9))
 
 
 def mirrored(half: Floats) -> Floats:
-    """A line (2 n - 1,) from its half (n,) that begins at 0."""
+    """Return a symmetric line (2 n - 1,) from its half (n,) that begins at 0."""
     return np.concatenate([-half[:0:-1], half])

@@ -1,6 +1,6 @@
 """Checks and repair of a closed surface before it is meshed.
 
-Every refusal counts what is wrong and says where the first of it is, in millimetre.
+Errors state how many edges, points or triangles are wrong, and where the first of them is.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from meshes.surface.triangulation import (
     areas_of,
     centred_corners,
     compact,
+    connected_components,
     n_pieces,
     pieces,
     volume,
@@ -21,60 +22,58 @@ from meshes.surface.triangulation import (
 from meshes.tetmesh import MeshError
 from meshes.typing import Floats, Ints
 
-MOST_OFF_PLANE = 0.1  # of its width: how far the edge of a hole that is capped may leave a plane
-SAME_POINT = 1e-6  # of the diagonal: points nearer than this are one
+MOST_OFF_PLANE = 0.1  # of the width of a hole: how far its edge may leave a plane to be capped
+SAME_POINT = 1e-6  # of the diagonal: points nearer to each other than this are merged
 
 
 def check(surface: Surface) -> None:
-    """Check that a surface is one closed manifold, seen from outside, without self-intersection; a
-    MeshError says how many edges, points or triangles are wrong, and where.
-    """
+    """Refuse a surface that is not one closed outward-facing manifold without intersections."""
     check_manifold(surface)
     if (n := n_pieces(surface)) > 1:
         raise MeshError(
-            f"the surface is {n} separate pieces; keep the largest of them with --keep largest, "
-            "or save one that lies inside another, as a bone does, as a file for --inner"
+            f"the surface consists of {n} separate pieces; keep only the largest with --keep "
+            "largest, or save a piece inside another, such as a bone, as its own file and give "
+            "it with --inner"
         )
     if not (enclosed := volume(surface)) > 1e-9 * surface.diagonal**3:
         raise MeshError(
-            f"the surface encloses {enclosed:.3g} m3; give a closed one whose triangles are seen "
-            "anticlockwise from outside"
+            f"the surface encloses {enclosed:.3g} m3; give a closed surface whose triangles are "
+            "listed anticlockwise as seen from outside"
         )
     check_crossings(surface)
 
 
 def check_manifold(surface: Surface) -> None:
-    """Check that two triangles meet at each edge and look the same way, and that those around each
-    point are one fan.
-    """
+    """Refuse open, crowded or inconsistently oriented edges, and pinched points."""
     pairs = _paired_edges(surface)
     against = pairs[_starts(surface)[pairs[:, 0]] == _starts(surface)[pairs[:, 1]]]
     if len(against):
         raise MeshError(
-            f"the triangles at {len(against)} edges of the surface look opposite ways, first near "
-            f"{_at(surface, against[0, 0])}; orient them, as `repaired` does"
+            f"the triangles at {len(against)} edges of the surface are oriented in opposite "
+            f"directions, first near {_at(surface, against[0, 0])}; orient them consistently, "
+            "for example with `meshes.repaired`"
         )
     _check_fans(surface, pairs)
 
 
 def check_crossings(surface: Surface) -> None:
-    """Check that no triangles cross or overlap."""
+    """Refuse a surface whose triangles cross or overlap."""
     crossing = self_intersections(surface)
     if len(crossing):
         raise MeshError(
-            f"the surface crosses itself at {len(crossing)} pairs of triangles, first near "
-            f"{in_mm(surface.points[surface.triangles[crossing[0, 0]]].mean(axis=0))}; "
-            "separate or join the parts in the program that it comes from"
+            f"the surface intersects itself at {len(crossing)} pairs of triangles, first near "
+            f"{in_mm(surface.points[surface.triangles[crossing[0, 0]]].mean(axis=0))}; separate "
+            "or join these parts in the program that made it"
         )
 
 
 def repaired(
     points: ArrayLike, triangles: ArrayLike, *, keep_largest: bool = False, cap: bool = False
 ) -> tuple[Surface, list[str]]:
-    """Repair seams, doubles and wrong orientation of a surface.
+    """Repair seams, duplicates and orientation of a surface.
 
-    Points that coincide become one, triangles without three corners and second copies of triangles
-    go, neighbours are made to look the same way and outwards.
+    Coinciding points are merged. Triangles without three different corners and duplicates are
+    dropped. The rest is oriented outwards.
 
     Parameters
     ----------
@@ -84,64 +83,61 @@ def repaired(
 
     Returns
     -------
-    Surface, and sentences on what was done
+    Surface, and a sentence on each change
 
-    Raises a MeshError if it is open, has edges of more than two triangles, or has only one side; or
-    a hole to be capped is not in a plane.
+    Raises a MeshError if the surface is open, has edges with more than two triangles, or has only
+    one side; or if a hole to be capped is not plane.
+
+    >>> from meshes import block, boundary_facets
+    >>> box = block((0.02, 0.02, 0.02), 0.02, order=1)
+    >>> surface, notes = repaired(box.points, boundary_facets(box.tets)[:, ::-1])
+    >>> notes
+    ['reversed 32 of 32 triangles to face outwards']
     """
-    raw, said = Surface(points=points, triangles=triangles), []  # type: ignore[arg-type]
-    number = first_of_same(raw.points)
-    kept = number[raw.triangles]
+    raw = Surface(points=points, triangles=triangles)  # type: ignore[arg-type]
+    notes: list[str] = []
+    number = first_coincident(raw.points)
+    triangles = number[raw.triangles]
     if (merged := len(number) - len(np.unique(number))) > 0:
-        said.append(f"merged {merged:,} points that coincide with others, as along seams")
-    a, b, c = kept.T
-    real = (a != b) & (b != c) & (c != a)
-    if not real.all():
-        said.append(f"dropped {(~real).sum():,} triangles that are only a line or a point")
-    kept = kept[real]
-    _, first = np.unique(np.sort(kept, axis=1), axis=0, return_index=True)
-    if len(first) < len(kept):
-        said.append(f"dropped {len(kept) - len(first):,} second copies of triangles")
-    surface = compact(raw.points, kept[np.sort(first)])
+        notes.append(f"merged {merged:,} points that coincide with others, as along seams")
+    a, b, c = triangles.T
+    proper = (a != b) & (b != c) & (c != a)
+    if not proper.all():
+        notes.append(f"dropped {(~proper).sum():,} triangles without three different corners")
+    triangles = triangles[proper]
+    _, first = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
+    if len(first) < len(triangles):
+        notes.append(f"dropped {len(triangles) - len(first):,} duplicate triangles")
+    surface = compact(raw.points, triangles[np.sort(first)])
     if (unused := len(number) - merged - len(surface.points)) > 0:
-        said.append(f"dropped {unused:,} points that no triangle uses")
+        notes.append(f"dropped {unused:,} unused points")
     if keep_largest and (n := n_pieces(surface)) > 1:
-        surface, share = _largest(surface)
-        said.append(f"kept the largest of {n} pieces, {100 * share:.1f} % of the area")
+        piece = pieces(surface)
+        areas = np.bincount(piece, areas_of(surface))
+        surface = compact(surface.points, surface.triangles[piece == areas.argmax()])
+        share = 100 * areas.max() / areas.sum()
+        notes.append(f"kept the largest of {n} pieces, {share:.1f} % of the area")
     if cap:
-        surface = _capped(surface, said)
-    turned = _turned(surface)
-    if turned.any():
-        said.append(f"turned round {turned.sum():,} of {len(turned):,} triangles to look outwards")
-        order = np.where(turned[:, None], [[0, 2, 1]], [[0, 1, 2]])
-        along = np.take_along_axis(surface.triangles, order, axis=1)
-        surface = Surface(points=surface.points, triangles=along)
-    return surface, said
+        surface = _with_caps(surface, notes)
+    inverted = _inverted(surface)
+    if inverted.any():
+        notes.append(f"reversed {inverted.sum():,} of {len(inverted):,} triangles to face outwards")
+        order = np.where(inverted[:, None], [[0, 2, 1]], [[0, 1, 2]])
+        outwards = np.take_along_axis(surface.triangles, order, axis=1)
+        surface = Surface(points=surface.points, triangles=outwards)
+    return surface, notes
 
 
-def _largest(surface: Surface) -> tuple[Surface, float]:
-    """The piece with the largest area, and its share of all."""
-    piece = pieces(surface)
-    areas = np.bincount(piece, areas_of(surface))
-    largest = int(areas.argmax())
-    kept = compact(surface.points, surface.triangles[piece == largest])
-    return kept, float(areas[largest] / areas.sum())
-
-
-def _capped(surface: Surface, said: list[str]) -> Surface:
-    """The surface with its holes closed, each by triangles between the points of its edge."""
+def _with_caps(surface: Surface, notes: list[str]) -> Surface:
+    """Close holes by triangles between the points of their edges."""
     import pyvista
-    from scipy import sparse
 
-    sides = np.sort(surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    edges, count = np.unique(sides, axis=0, return_counts=True)
+    edges, count = np.unique(np.sort(_edges(surface), axis=1), axis=0, return_counts=True)
     ends = edges[count == 1]
     if not len(ends):
-        said.append("found no hole to close")
+        notes.append("no hole to close")
         return surface
-    n = len(surface.points)
-    graph = sparse.coo_array((np.ones(len(ends), bool), tuple(ends.T)), shape=(n, n))
-    label = sparse.csgraph.connected_components(graph, directed=False)[1]
+    label = connected_components(len(surface.points), ends)
     for hole in np.unique(label[ends]):
         rim = surface.points[np.flatnonzero(label == hole)]
         rim = rim - rim.mean(axis=0)
@@ -149,12 +145,13 @@ def _capped(surface: Surface, said: list[str]) -> Surface:
         if widths[2] > MOST_OFF_PLANE * widths[0]:
             place = in_mm(surface.points[label == hole][0])
             raise MeshError(
-                f"a hole of {1e3 * widths[0]:.0f} mm near {place} is {1e3 * widths[2]:.1f} mm out "
-                "of a plane and cannot be capped; close it in the program that it comes from"
+                f"a hole {1e3 * widths[0]:.0f} mm wide near {place} cannot be capped, because its "
+                f"edge leaves a plane by {1e3 * widths[2]:.1f} mm; close it in the program that "
+                "made the surface"
             )
-        said.append(
-            f"closed a hole of {len(rim)} edges, {1e3 * widths[0]:.0f} mm wide and "
-            f"{1e3 * widths[2]:.1f} mm out of a plane"
+        notes.append(
+            f"closed a hole of {len(rim)} edges, {1e3 * widths[0]:.0f} mm wide, whose edge leaves "
+            f"a plane by {1e3 * widths[2]:.1f} mm"
         )
     faces = np.insert(surface.triangles, 0, 3, axis=1).ravel()
     closed = pyvista.PolyData(np.array(surface.points), faces=faces).fill_holes(np.inf)
@@ -162,78 +159,74 @@ def _capped(surface: Surface, said: list[str]) -> Surface:
     return Surface(points=np.asarray(closed.points, np.float64), triangles=new)
 
 
-def first_of_same(points: Floats) -> Ints:
-    """The number (n,) of the first point that each of points (n, 3) coincides with."""
-    from scipy import sparse
+def first_coincident(points: Floats) -> Ints:
+    """Return the number (n,) of the first point that each of points (n, 3) coincides with."""
     from scipy.spatial import cKDTree
 
-    n, diagonal = len(points), float(np.linalg.norm(np.ptp(points, axis=0)))
+    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     near = cKDTree(points).query_pairs(SAME_POINT * diagonal, output_type="ndarray")
-    graph = sparse.coo_array((np.ones(len(near), bool), tuple(near.T)), shape=(n, n))
-    label = sparse.csgraph.connected_components(graph, directed=False)[1]
+    label = connected_components(len(points), near)
     _, first = np.unique(label, return_index=True)
     return np.asarray(first[label])
 
 
 def _starts(surface: Surface) -> Ints:
-    """The point (3 k,) at which each side of each triangle starts; side 3 t + j of triangle t."""
+    """Point (3 k,) at which each side starts. Side 3 t + j is side j of triangle t."""
     return surface.triangles.ravel()
 
 
+def _edges(surface: Surface) -> Ints:
+    """Points (3 k, 2) at the ends of each side."""
+    return surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+
+
 def _paired_edges(surface: Surface) -> Ints:
-    """The two sides (m, 2) that meet at each edge; an error if anywhere there are not two."""
-    sides = np.sort(surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    """The two sides (m, 2) at each edge. Refuses edges with one or with more than two triangles."""
+    sides = np.sort(_edges(surface), axis=1)
     keys = sides[:, 0] * len(surface.points) + sides[:, 1]
     _, first, count = np.unique(keys, return_index=True, return_counts=True)
     if (open_edges := first[count == 1]).size:
         raise MeshError(
             f"the surface is open along {len(open_edges):,} of its {len(first):,} edges, first "
-            f"near {_at(surface, open_edges[0])}; close those in a plane, such as a wrist, with "
-            "--cap, and others in the program that it comes from"
+            f"near {_at(surface, open_edges[0])}; close plane holes, such as a wrist, with "
+            "--cap, and other holes in the program that made it"
         )
     if (crowded := first[count > 2]).size:
         raise MeshError(
             f"{len(crowded):,} edges of the surface have more than two triangles, first near "
-            f"{_at(surface, crowded[0])}; keep its outer skin only"
+            f"{_at(surface, crowded[0])}; keep only its outer skin"
         )
     return np.argsort(keys, kind="stable").reshape(-1, 2)
 
 
-def _turned(surface: Surface) -> np.ndarray:
-    """Mask (k,) of the triangles to turn round so that all of each piece face outwards."""
-    from scipy import sparse
-
+def _inverted(surface: Surface) -> np.ndarray:
+    """Mask (k,) of the triangles to reverse so that every piece faces outwards."""
     pairs, n = _paired_edges(surface), len(surface.triangles)
     t, other = pairs.T // 3
     starts = _starts(surface)
     against = starts[pairs[:, 0]] == starts[pairs[:, 1]]
-    # Each triangle twice, as it is and turned; those of neighbours that agree are connected.
-    rows = np.concatenate([t, t + n])
-    columns = np.concatenate([other + n * against, other + n * ~against])
-    graph = sparse.coo_array((np.ones(len(rows), bool), (rows, columns)), shape=(2 * n, 2 * n))
-    label = sparse.csgraph.connected_components(graph, directed=False)[1]
+    # Each triangle is listed twice, as given and reversed. Neighbours that agree are linked.
+    links = [np.column_stack([t, other + n * against]),
+             np.column_stack([t + n, other + n * ~against])]  # fmt: skip
+    label = connected_components(2 * n, np.vstack(links))
     if (one_sided := np.flatnonzero(label[:n] == label[n:])).size:
         raise MeshError(
-            f"{len(one_sided):,} triangles belong to a surface with only one side, like a Moebius "
-            "strip; give one that encloses a body"
+            f"{len(one_sided):,} triangles belong to a surface with only one side, like a "
+            "Moebius strip; give a surface that encloses a body"
         )
-    turned = label[:n] > label[n:]
+    inverted = label[:n] > label[n:]
     a, b, c = centred_corners(surface)
-    enclosed = np.einsum("ei,ei->e", np.cross(a, b), c) * np.where(turned, -1, 1)
+    enclosed = np.einsum("ei,ei->e", np.cross(a, b), c) * np.where(inverted, -1, 1)
     piece = pieces(surface)
-    return turned ^ (np.bincount(piece, enclosed) < 0)[piece]
+    return inverted ^ (np.bincount(piece, enclosed) < 0)[piece]
 
 
 def _check_fans(surface: Surface, pairs: Ints) -> None:
-    """Check that the triangles around each point are one fan."""
-    from scipy import sparse
-
-    n = surface.triangles.size
+    """Refuse points at which several fans of triangles touch."""
     ends = pairs - pairs % 3 + (pairs + 1) % 3
-    rows, columns = pairs.ravel(), ends[:, ::-1].ravel()
-    graph = sparse.coo_array((np.ones(len(rows), bool), (rows, columns)), shape=(n, n))
-    fans, label = sparse.csgraph.connected_components(graph, directed=False)
-    owner = np.empty(fans, np.int64)
+    links = np.column_stack([pairs.ravel(), ends[:, ::-1].ravel()])
+    label = connected_components(surface.triangles.size, links)
+    owner = np.empty(label.max() + 1, np.int64)
     owner[label] = _starts(surface)
     used, count = np.unique(owner, return_counts=True)
     if (pinched := used[count > 1]).size:
@@ -244,12 +237,12 @@ def _check_fans(surface: Surface, pairs: Ints) -> None:
 
 
 def _at(surface: Surface, side: int) -> str:
-    """Position of a side of a triangle, as text."""
+    """Position of the middle of a side, as text."""
     triangle, corner = divmod(int(side), 3)
     ends = surface.triangles[triangle, [corner, (corner + 1) % 3]]
     return in_mm(surface.points[ends].mean(axis=0))
 
 
 def in_mm(place: Floats) -> str:
-    """A place (3,) in metre, as messages have it."""
+    """Return a position (3,) in metre as text in mm."""
     return "({:.4g}, {:.4g}, {:.4g}) mm".format(*(1e3 * place))

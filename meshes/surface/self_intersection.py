@@ -1,6 +1,6 @@
 """Self-intersection of a triangulated surface.
 
-Two triangles cross if a side of one pierces the other, or if they overlap in one plane.
+Two triangles intersect if a side of one pierces the other, or if they overlap in one plane.
 Candidates are triangles whose bounding boxes share a cell of a grid.
 """
 
@@ -9,20 +9,22 @@ import numpy as np
 from meshes.surface.triangulation import Surface
 from meshes.typing import Floats, Ints
 
-ROUND_OFF = 1e-9  # of the size of both triangles: nearer to a plane is on it
-MOST_CELLS = 400_000  # of the grid that one triangle may be listed in before cells grow
+ROUND_OFF = 1e-9  # of the size of both triangles: points nearer to a plane lie on it
+MOST_CELLS = 400_000  # entries of large triangles in the grid, before its cells grow
 CHUNK = 200_000  # pairs tested at once
 
 
 def self_intersections(surface: Surface) -> Ints:
-    """Pairs (m, 2) of triangles that intersect or overlap; contact at shared corners is neither."""
+    """Return the pairs (m, 2) of triangles that intersect or overlap. Contact at shared corners is
+    allowed.
+    """
     corners = surface.points[surface.triangles] - surface.points.mean(axis=0)
     pairs = _candidates(corners)
-    found = [
+    crossing = [
         chunk[_cross(corners, surface.triangles, chunk)]
         for chunk in np.array_split(pairs, max(1, len(pairs) // CHUNK))
     ]
-    return np.vstack(found)
+    return np.vstack(crossing)
 
 
 def _candidates(corners: Floats) -> Ints:
@@ -36,15 +38,12 @@ def _candidates(corners: Floats) -> Ints:
         if span.prod(axis=1).sum() <= 20 * len(corners) + MOST_CELLS:
             break
         cell *= 2
-    owner = np.repeat(np.arange(len(corners)), span.prod(axis=1))
-    place = np.arange(len(owner)) - np.repeat(
-        np.cumsum(span.prod(axis=1)) - span.prod(axis=1), span.prod(axis=1)
-    )
+    count = span.prod(axis=1)
+    owner = np.repeat(np.arange(len(corners)), count)
+    place = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
     _, sy, sz = span[owner].T
-    within = np.column_stack([place // (sy * sz), place // sz % sy, place % sz])
-    where = first[owner] + within
-    _, ny, nz = where.max(axis=0) + 1
-    pairs = _same_cell((where[:, 0] * ny + where[:, 1]) * nz + where[:, 2], owner)
+    i, j, k = (first[owner] + np.column_stack([place // (sy * sz), place // sz % sy, place % sz])).T
+    pairs = _same_cell((i * (j.max() + 1) + j) * (k.max() + 1) + k, owner)
     a, b = pairs.T
     near = (low[a] <= high[b]).all(axis=1) & (low[b] <= high[a]).all(axis=1)
     keys = np.unique(pairs[near] @ np.array([len(corners), 1]))
@@ -52,7 +51,7 @@ def _candidates(corners: Floats) -> Ints:
 
 
 def _same_cell(cells: Ints, owner: Ints) -> Ints:
-    """Pairs (m, 2), lower number first, of owners that are listed in one cell."""
+    """Pairs (m, 2), lower number first, of owners listed in the same cell."""
     order = np.lexsort((owner, cells))
     cells, owner = cells[order], owner[order]
     end = np.searchsorted(cells, cells, side="right")
@@ -63,7 +62,7 @@ def _same_cell(cells: Ints, owner: Ints) -> Ints:
 
 
 def _cross(corners: Floats, triangles: Ints, pairs: Ints) -> np.ndarray:
-    """Mask (m,) of the pairs that cross."""
+    """Mask (m,) of the pairs that intersect."""
     p, q = corners[pairs[:, 0]], corners[pairs[:, 1]]
     shared = triangles[pairs[:, 0]][:, :, None] == triangles[pairs[:, 1]][:, None, :]
     common = shared.sum(axis=(1, 2))
@@ -73,7 +72,7 @@ def _cross(corners: Floats, triangles: Ints, pairs: Ints) -> np.ndarray:
     crossing = np.zeros(len(pairs), bool)
     for j in range(3):
         k = (j + 1) % 3
-        # A side that starts or ends at a shared corner touches there, and is not tested.
+        # A side that starts or ends at a shared corner touches the other triangle there.
         free_p = ~shared[:, [j, k]].any(axis=(1, 2))
         free_q = ~shared[:, :, [j, k]].any(axis=(1, 2))
         crossing |= free_p & _pierces(p[:, j], p[:, k], p_to_q[:, j], p_to_q[:, k], q, scale)
@@ -85,7 +84,7 @@ def _cross(corners: Floats, triangles: Ints, pairs: Ints) -> np.ndarray:
 
 
 def _heights(p: Floats, q: Floats, scale: Floats) -> Floats:
-    """Signed distance (m, 3) of the corners of p from the plane of q; 0 within round-off."""
+    """Signed distance (m, 3) of the corners of p from the plane of q, with round-off set to 0."""
     normal = np.cross(q[:, 1] - q[:, 0], q[:, 2] - q[:, 0])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     unit = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
@@ -97,7 +96,9 @@ def _heights(p: Floats, q: Floats, scale: Floats) -> Floats:
 def _pierces(
     start: Floats, end: Floats, from_: Floats, to: Floats, triangle: Floats, scale: Floats
 ) -> np.ndarray:
-    """Whether each side, of known heights above the plane, passes through the triangle."""
+    """Whether each side, with the given heights of its ends above the plane, passes through the
+    triangle.
+    """
     passes = from_ * to < 0
     share = np.divide(from_, from_ - to, out=np.zeros_like(from_), where=passes)
     at = start + share[:, None] * (end - start)
@@ -112,9 +113,11 @@ def _pierces(
 
 
 def _overlap(p: Floats, q: Floats, scale: Floats) -> np.ndarray:
-    """Whether triangles of one plane overlap: no side of either separates them."""
+    """Whether triangles in one plane overlap, that is, no side of either separates them."""
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    apart = np.linalg.norm(normal, axis=1) <= (ROUND_OFF * scale**2)  # without area: no overlap
+    apart = np.linalg.norm(normal, axis=1) <= (
+        ROUND_OFF * scale**2
+    )  # degenerate triangles do not overlap
     for one, other in ((p, q), (q, p)):
         for j in range(3):
             side = one[:, (j + 1) % 3] - one[:, j]

@@ -1,4 +1,4 @@
-"""Triangulated surfaces. Triangles are seen anticlockwise from outside."""
+"""Triangulated surfaces. Triangles are listed anticlockwise as seen from outside."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from meshes.tetmesh import FURTHEST, MeshError
+from meshes.tetmesh import MeshError, check_finite, check_node_numbers
 from meshes.typing import Floats, Ints
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Surface:
-    """Triangles in space.
+    """Triangulated surface.
 
     Parameters
     ----------
@@ -32,19 +32,10 @@ class Surface:
         triangles = _array("triangles", self.triangles, "point numbers")
         if triangles.dtype.kind not in "iu":
             raise MeshError(
-                f"triangles must be whole numbers, not {triangles.dtype}; number points from 0"
+                f"triangles have type {triangles.dtype}; give whole numbers, counted from 0"
             )
-        bad = np.flatnonzero(~(np.abs(points) < FURTHEST).all(axis=1))
-        if len(bad):
-            raise MeshError(
-                f"{len(bad)} of {len(points)} points are not finite, first point {bad[0]}; "
-                "repair the file it comes from"
-            )
-        if triangles.min() < 0 or triangles.max() >= len(points):
-            raise MeshError(
-                f"point numbers of triangles run from {triangles.min()} to {triangles.max()}, "
-                f"but there are {len(points)} points; number them from 0"
-            )
+        check_finite(points)
+        check_node_numbers("point numbers of triangles", triangles, points)
         for name, array in (("points", points), ("triangles", triangles.astype(np.int64))):
             array.setflags(write=False)
             object.__setattr__(self, name, array)
@@ -56,46 +47,51 @@ class Surface:
 
 
 def volume(surface: Surface) -> float:
-    """Enclosed volume in cubic metre; negative if the triangles are seen from inside."""
+    """Return the enclosed volume in cubic metre, negative if the triangles are inverted."""
     a, b, c = centred_corners(surface)
     return float(np.einsum("ei,ei->", np.cross(a, b), c)) / 6
 
 
 def areas_of(surface: Surface) -> Floats:
-    """Area (k,) in square metre of each triangle."""
+    """Return the area (k,) in square metre of each triangle."""
     a, b, c = centred_corners(surface)
     return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
 
 
 def area(surface: Surface) -> float:
-    """Area in square metre."""
+    """Return the total area in square metre."""
     return float(areas_of(surface).sum())
 
 
 def thinnest(surface: Surface) -> float:
-    """Twice volume over area, metre: the thickness of a plate, a third of a cube's side."""
+    """Return twice the volume over the area, metre: the thickness of a plate."""
     return 2 * abs(volume(surface)) / area(surface)
 
 
 def compact(points: Floats, triangles: Ints) -> Surface:
-    """The surface of these triangles with the points that they use."""
+    """Return the surface of these triangles, without the points that they do not use."""
     used, numbers = np.unique(triangles, return_inverse=True)
     return Surface(points=points[used], triangles=numbers.reshape(-1, 3))
 
 
-def pieces(surface: Surface) -> Ints:
-    """Index (k,) of the connected piece that each triangle belongs to."""
+def connected_components(n: int, pairs: Ints) -> Ints:
+    """Label (n,) of the connected component of each of n items, linked in pairs (m, 2)."""
     from scipy import sparse
 
-    ends = surface.triangles[:, [0, 1, 1, 2]].reshape(-1, 2).T
-    n = len(surface.points)
-    graph = sparse.coo_array((np.ones(ends.shape[1], bool), tuple(ends)), shape=(n, n))
-    label = sparse.csgraph.connected_components(graph, directed=False)[1]
+    graph = sparse.coo_array((np.ones(len(pairs), bool), tuple(pairs.T)), shape=(n, n))
+    label: Ints = sparse.csgraph.connected_components(graph, directed=False)[1]
+    return label
+
+
+def pieces(surface: Surface) -> Ints:
+    """Return the index (k,) of the connected piece that each triangle belongs to."""
+    edges = surface.triangles[:, [0, 1, 1, 2]].reshape(-1, 2)
+    label = connected_components(len(surface.points), edges)
     return np.unique(label[surface.triangles[:, 0]], return_inverse=True)[1]
 
 
 def n_pieces(surface: Surface) -> int:
-    """Number of connected pieces of the surface."""
+    """Return the number of connected pieces."""
     return int(pieces(surface).max()) + 1
 
 
@@ -103,7 +99,7 @@ def _array(name: str, values: ArrayLike, meaning: str) -> np.ndarray:
     try:
         array = np.array(values)
     except (TypeError, ValueError) as error:
-        raise MeshError(f"{name} are no array ({error}); give (n, 3) {meaning}") from None
+        raise MeshError(f"{name} are not an array ({error}); give (n, 3) {meaning}") from None
     if array.ndim != 2 or array.shape[1] != 3 or not len(array) or array.dtype.kind not in "biuf":
         raise MeshError(
             f"{name} of the surface have shape {array.shape} and type {array.dtype}; give (n, 3) "
@@ -113,7 +109,7 @@ def _array(name: str, values: ArrayLike, meaning: str) -> np.ndarray:
 
 
 def centred_corners(surface: Surface) -> tuple[Floats, Floats, Floats]:
-    """Corners about the middle of the surface, so that products of lengths lose no digits."""
+    """Return the corners about the centre, so that products of lengths keep their digits."""
     points = surface.points - surface.points.mean(axis=0)
     a, b, c = surface.triangles.T
     return points[a], points[b], points[c]

@@ -10,21 +10,21 @@ from meshes.surface.triangulation import Surface
 from meshes.tetmesh import MeshError
 from meshes.typing import Floats
 
-CHUNK = 2_000_000  # pairs of points and triangles at once
+CHUNK = 2_000_000  # pairs of points and triangles computed at once
 
 
 def winding_number(surface: Surface, points: Floats) -> Floats:
-    """Winding number (n,) of a closed surface about points (n, 3), 1 inside, 0 outside: solid
-    angles of its triangles (van Oosterom and Strackee, IEEE Trans Biomed Eng 30:125 (1983)) over 4
-    pi.
+    """Return the winding number (n,) of a closed surface about points (n, 3): 1 inside, 0 outside.
+
+    Sum of solid angles (van Oosterom and Strackee, IEEE Trans Biomed Eng 30:125 (1983)) over 4 pi.
     """
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     near = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
-    found = np.zeros(len(points))
+    winding = np.zeros(len(points))
     corners = surface.points[surface.triangles]
     for some in np.array_split(near, max(1, len(near) * len(corners) // CHUNK)):
-        found[some] = _solid_angles(corners, points[some]) / (4 * np.pi)
-    return found
+        winding[some] = _solid_angles(corners, points[some]) / (4 * np.pi)
+    return winding
 
 
 def _solid_angles(corners: Floats, points: Floats) -> Floats:
@@ -39,7 +39,7 @@ def _solid_angles(corners: Floats, points: Floats) -> Floats:
 
 
 def joined(surfaces: list[Surface]) -> Surface:
-    """All triangles of some surfaces as one."""
+    """Return one surface with the triangles of several."""
     first = np.cumsum([0, *(len(each.points) for each in surfaces)])
     triangles = [each.triangles + n for each, n in zip(surfaces, first, strict=False)]
     return Surface(
@@ -48,19 +48,19 @@ def joined(surfaces: list[Surface]) -> Surface:
 
 
 def check_inside(outer: Surface, inner: Mapping[str, Surface]) -> None:
-    """Refuse surfaces that are not closed, not inside another, or cross it or each other."""
+    """Refuse surfaces that are not closed, lie outside another one, or cross it or each other."""
     for name, surface in inner.items():
         try:
             check(surface)
         except MeshError as error:
             raise MeshError(f"{name}: {error}") from None
-    every = {"the body": outer, **inner}
-    both = joined(list(every.values()))
-    owner = np.repeat(np.arange(len(every)), [len(each.triangles) for each in every.values()])
-    pairs = self_intersections(both)
+    surfaces = {"the body": outer, **inner}
+    whole = joined(list(surfaces.values()))
+    owner = np.repeat(np.arange(len(surfaces)), [len(s.triangles) for s in surfaces.values()])
+    pairs = self_intersections(whole)
     if len(pairs):
-        one, other = (list(every)[owner[k]] for k in pairs[0])
-        place = in_mm(both.points[both.triangles[pairs[0, 0]]].mean(axis=0))
+        one, other = (list(surfaces)[owner[k]] for k in pairs[0])
+        place = in_mm(whole.points[whole.triangles[pairs[0, 0]]].mean(axis=0))
         raise MeshError(
             f"the surfaces of {one} and {other} cross at {len(pairs)} pairs of triangles, first "
             f"near {place}; make the inner one smaller, or move it inside"
@@ -68,6 +68,7 @@ def check_inside(outer: Surface, inner: Mapping[str, Surface]) -> None:
     for name, surface in inner.items():
         if not winding_number(outer, surface.points[:1])[0] > 0.5:
             raise MeshError(
-                f"{name} is not inside the body: its middle is at "
-                f"{in_mm(surface.points.mean(axis=0))}; give both files in one frame and one unit"
+                f"{name} lies outside the body, with its middle at "
+                f"{in_mm(surface.points.mean(axis=0))}; give both files in the same coordinates "
+                "and unit"
             )

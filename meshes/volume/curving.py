@@ -1,4 +1,4 @@
-"""Ten-node elements whose boundary follows a level set instead of its facets."""
+"""Ten-node elements whose boundary follows a level set instead of straight facets."""
 
 from __future__ import annotations
 
@@ -8,28 +8,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from meshes.tetmesh import (
-    EDGES,
-    Floats,
-    Ints,
-    MeshError,
-    TetMesh,
-    boundary_facets,
-    corner_volumes,
-)
-from meshes.volume.quality import edge_lengths, jacobian_ratios, moved_back
+from meshes.tetmesh import EDGES, MeshError, TetMesh, boundary_facets, corner_volumes
+from meshes.typing import Floats, Ints
+from meshes.volume.quality import edge_lengths, jacobian_ratios, restore_bad
 
 log = logging.getLogger(__name__)
 
-LEAST_RATIO = 0.3  # of det J to that of the straight element, below which edges stay straight
-FURTHEST = 0.5  # of the edges around: what lies further from the level set is no part of it
+LEAST_RATIO = 0.3  # of det J to that of the straight element; below, edges stay straight
+FURTHEST = 0.5  # of the mean edge at a node: nodes further from the level set stay
 
 Function = Callable[[Floats], Floats]
 
 
 def curve_boundary(mesh: TetMesh, level_set: Function, gradient: Function) -> TetMesh:
-    """Mesh with the nodes of its boundary moved onto a level set: corners first, then mid-side
-    nodes. Where an element would lose more than 70 % of its Jacobian, or of its volume, nodes stay.
+    """Move the boundary nodes of a mesh onto a level set: corners first, then mid-side nodes.
+
+    Nodes stay where an element would lose more than 70 % of its Jacobian or volume.
 
     Parameters
     ----------
@@ -39,41 +33,41 @@ def curve_boundary(mesh: TetMesh, level_set: Function, gradient: Function) -> Te
     Returns
     -------
     TetMesh
-
-    Raises a MeshError if the elements have four nodes.
     """
     if mesh.order != 2:
-        raise MeshError("elements of 4 nodes have no curved edges; make them `meshes.quadratic`")
-    chosen = boundary_facets(mesh.tets)
-    corners, middles = np.unique(chosen[:, :3]), np.unique(chosen[:, 3:])
+        raise MeshError(
+            "4-node elements have no curved edges; convert them with `meshes.quadratic`"
+        )
+    facets = boundary_facets(mesh.tets)
+    corners, middles = np.unique(facets[:, :3]), np.unique(facets[:, 3:])
     reach = FURTHEST * _mean_edge(mesh)
 
     def target(points: Floats, nodes: Ints) -> Floats:
-        """Where nodes are on the level set; where they are if it is too far or not found."""
+        """Positions of nodes on the level set, unchanged if it is too far away."""
         moved = project_to_level_set(points[nodes], level_set, gradient)
-        way = np.linalg.norm(moved - points[nodes], axis=1)
-        found = (way < reach[nodes]) & (np.abs(level_set(moved)) < 1e-3 * reach[nodes])
-        return np.where(found[:, None], moved, points[nodes])
+        distance = np.linalg.norm(moved - points[nodes], axis=1)
+        is_near = (distance < reach[nodes]) & (np.abs(level_set(moved)) < 1e-3 * reach[nodes])
+        return np.where(is_near[:, None], moved, points[nodes])
 
     points = np.array(mesh.points)
     points[corners] = target(points, corners)
     least = LEAST_RATIO * corner_volumes(mesh.points, mesh.tets)
-    points, _ = moved_back(
+    points, _ = restore_bad(
         mesh.points, points, mesh.tets[:, :4], lambda at: corner_volumes(at, mesh.tets) < least
     )
     ends = points[mesh.tets[:, EDGES]]
     points[mesh.tets[:, 4:]] = ends.mean(axis=2)
     straight = points.copy()
     points[middles] = target(points, middles)
-    points, kept = keep_jacobians(mesh.tets, straight, points)
-    log.info("curved %d edges, %d stay straight", len(middles) - kept, kept)
+    points, count = keep_jacobians(mesh.tets, straight, points)
+    log.info("curved %d edges, %d stay straight", len(middles) - count, count)
     return replace(mesh, points=points)
 
 
 def project_to_level_set(
     points: Floats, level_set: Function, gradient: Function, steps: int = 4
 ) -> Floats:
-    """Points (n, 3) moved onto a level set that is near by Newton steps along its gradient."""
+    """Return points (n, 3) moved onto a nearby level set by Newton steps along its gradient."""
     for _ in range(steps):
         slope = gradient(points)
         steepness = np.maximum(np.einsum("ni,ni->n", slope, slope), 1e-12)
@@ -82,7 +76,7 @@ def project_to_level_set(
 
 
 def _mean_edge(mesh: TetMesh) -> Floats:
-    """Mean length (n,) of the edges of the elements at each node, metre."""
+    """Mean edge length (n,) in metre of the elements at each node."""
     nodes, own = mesh.tets.ravel(), edge_lengths(mesh).mean(axis=1)
     count = np.bincount(nodes, minlength=len(mesh.points))
     total = np.bincount(nodes, np.repeat(own, mesh.tets.shape[1]), len(mesh.points))
@@ -90,7 +84,9 @@ def _mean_edge(mesh: TetMesh) -> Floats:
 
 
 def keep_jacobians(tets: Ints, straight: Floats, points: Floats) -> tuple[Floats, int]:
-    """Curved points (n, 3), straight ones where elements would be distorted, and their number."""
-    return moved_back(
+    """Return curved points (n, 3), straight where elements would be distorted, and how many are
+    straight.
+    """
+    return restore_bad(
         straight, points, tets[:, 4:], lambda at: jacobian_ratios(at, tets) < LEAST_RATIO
     )

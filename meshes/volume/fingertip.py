@@ -1,10 +1,10 @@
-"""Fingertip: an elliptic cylinder of soft tissue that ends in half an ellipsoid, with a bone of the
-same kind inside, meshed in shells.
+"""Fingertip: an elliptic cylinder of soft tissue with an ellipsoidal end, and a similar bone
+inside.
 
-The half ball |x| + |y| + |z| <= n, y >= 0, of a lattice of tetrahedra and the prisms that continue
-its section y = 0 are mapped shell by shell: so many shells within the bone, the others around it,
-each a surface between that of the bone and the skin. Each eighth of the ball is a simplex in Kuhn's
-subdivision (edgewise: Edelsbrunner and Grayson, Discrete Comput Geom 24:707 (2000)).
+The mesh maps a lattice of tetrahedra in the half ball |x| + |y| + |z| <= n, y >= 0, and the prisms
+that extend its section y = 0. Shells of the lattice become surfaces within the bone, or between
+bone and skin. Each eighth of the ball is a simplex in Kuhn's subdivision (Edelsbrunner and Grayson,
+Discrete Comput Geom 24:707 (2000)).
 """
 
 from dataclasses import dataclass, replace
@@ -20,13 +20,14 @@ from meshes.volume.curving import LEAST_RATIO, keep_jacobians
 from meshes.volume.quality import jacobian_ratios
 
 TISSUE, BONE = 0, 1  # regions
-EASINGS, EASED = 6, 0.7
-FEWEST, BONY = 3, 2  # shells, and those of them in the bone
+EASING_STEPS, EASING = 6, 0.7  # reductions of the curvature of distorted elements
+FEWEST_SHELLS, FEWEST_BONE_SHELLS = 3, 2
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fingertip:
-    """Shape of a fingertip below the plane z = 0, its tip towards +y, its middle at the origin.
+    """Shape of a fingertip below the plane z = 0, with its tip towards +y and its middle at the
+    origin.
 
     Parameters
     ----------
@@ -51,20 +52,21 @@ class Fingertip:
                 raise MeshError(f"{name} = {value} m of a fingertip must be finite and above 0")
         if self.length <= self.breadth / 2:
             raise MeshError(
-                f"a fingertip of {1e3 * self.length:g} mm is no longer than its round end, half of "
-                f"{1e3 * self.breadth:g} mm; make it longer"
+                f"a fingertip of {1e3 * self.length:g} mm is not longer than its round end, half "
+                f"of {1e3 * self.breadth:g} mm; make it longer"
             )
         below = self.thickness - self.cover - self.bone_thickness
         if not (self.bone_breadth < self.breadth and below > 0 and self.tip < self.breadth / 2):
             raise MeshError(
                 f"a bone of {1e3 * self.bone_breadth:g} x {1e3 * self.bone_thickness:g} mm under "
                 f"{1e3 * self.cover:g} mm of tissue, {1e3 * self.tip:g} mm from the tip, is not "
-                f"inside a fingertip of {1e3 * self.breadth:g} x {1e3 * self.thickness:g} mm"
+                f"inside a fingertip of {1e3 * self.breadth:g} x {1e3 * self.thickness:g} mm; "
+                "make the bone smaller"
             )
 
     @property
     def section(self) -> float:
-        """Where the cylinder ends and the round end begins, metre along y."""
+        """Position along y, metre, where the cylinder ends and the round end begins."""
         return (self.length - self.breadth) / 2
 
     @property
@@ -74,64 +76,64 @@ class Fingertip:
         return np.array(bone) / 2, np.array([self.breadth, self.breadth, self.thickness]) / 2
 
 
-def shells_of(shape: Fingertip, h: float) -> int:
-    """Number of shells of cells of a size h in metre at the skin."""
-    return max(FEWEST, round_up(quarter_of(shape) / h))
+def shell_count(shape: Fingertip, h: float) -> int:
+    """Return the number of shells of a mesh with cells of size h in metre at the skin."""
+    return max(FEWEST_SHELLS, round_up(quarter_circumference(shape) / h))
 
 
-def quarter_of(shape: Fingertip) -> float:
-    """A quarter of the way around a fingertip in metre."""
+def quarter_circumference(shape: Fingertip) -> float:
+    """Return a quarter of the circumference of a fingertip in metre."""
     return float(np.pi / 4 * (shape.breadth + shape.thickness) / 2)
 
 
 def fingertip_mesh(shape: Fingertip, h: float) -> TetMesh:
-    """Ten-node tetrahedra of a fingertip, curved at its skin and its bone.
+    """Return ten-node tetrahedra of a fingertip, curved at its skin and its bone.
 
     Parameters
     ----------
     shape : Fingertip
-    h : float, metre, edge length aimed at at the skin
+    h : float, metre, target edge length at the skin
 
     Returns
     -------
-    TetMesh with the regions `tissue` (0) and `bone` (1) and the facet sets `top`, which looks
-        upwards, `sides`, where it is cut, and `bottom`, the rest
-
-    Raises a MeshError if h is not above 0, or there would be too many elements.
+    TetMesh with the regions `tissue` (0) and `bone` (1) and the facet sets `top` (faces upwards),
+        `sides` (the cut) and `bottom`
     """
     if not 0 < h < np.inf:
         raise MeshError(f"h = {h} m must be finite and above 0")
-    shells = shells_of(shape, h)
-    bone = max(BONY, shells - max(1, round(shape.cover / h)))
+    shells = shell_count(shape, h)
+    bone = max(FEWEST_BONE_SHELLS, shells - max(1, round(shape.cover / h)))
     layers = max(1, round_up((shape.length - shape.breadth / 2) / h))
     check_size((2 * shells, 2 * shells, layers + shells), order=2)
-    lattice, tets = _lattice_of(shells, layers)
-    points = _placed(shape, lattice, (bone, shells), layers)
+    lattice, tets = _lattice(shells, layers)
+    points = _map_lattice(shape, lattice, (bone, shells), layers)
     region = np.where(_shell_of(lattice)[tets].max(axis=1) <= bone, BONE, TISSUE)
     names = {TISSUE: "tissue", BONE: "bone"}
     mesh = quadratic(TetMesh(points=points, tets=tets, region=region, region_names=names))
     edges = np.moveaxis(mesh.tets[:, EDGES], 2, 0)
     curved = np.array(mesh.points)
     for shell in (bone, shells):
-        # Seen from above, the outline stays the polygon of facets in which probes are looked for.
+        # The outline seen from above stays straight, because probes are located in its facets.
         outline = (lattice[edges, 2] == 0).all(axis=0) & (shell == shells)
         own = (_shell_of(lattice)[edges] == shell).all(axis=0) & ~outline
         middles = lattice[edges[:, own]].mean(axis=0)
-        curved[mesh.tets[:, 4:][own]] = _placed(shape, middles, (bone, shells), layers)
-    return _tagged(shape, replace(mesh, points=_eased(mesh, curved)))
+        curved[mesh.tets[:, 4:][own]] = _map_lattice(shape, middles, (bone, shells), layers)
+    return _tagged(shape, replace(mesh, points=_reduce_curvature(mesh, curved)))
 
 
-def _eased(mesh: TetMesh, curved: Floats) -> Floats:
-    """Curved nodes (n, 3), less so where elements would be distorted: the bone has few elements."""
-    share, way = np.ones((len(curved), 1)), curved - mesh.points
-    for _ in range(EASINGS):
-        bad = jacobian_ratios(mesh.points + share * way, mesh.tets) < LEAST_RATIO
-        share[np.unique(mesh.tets[bad, 4:])] *= EASED
-    return keep_jacobians(mesh.tets, mesh.points, mesh.points + share * way)[0]
+def _reduce_curvature(mesh: TetMesh, curved: Floats) -> Floats:
+    """Curved nodes (n, 3), less curved where elements, as in the coarse bone, would be
+    distorted.
+    """
+    share, change = np.ones((len(curved), 1)), curved - mesh.points
+    for _ in range(EASING_STEPS):
+        bad = jacobian_ratios(mesh.points + share * change, mesh.tets) < LEAST_RATIO
+        share[np.unique(mesh.tets[bad, 4:])] *= EASING
+    return keep_jacobians(mesh.tets, mesh.points, mesh.points + share * change)[0]
 
 
 def _tagged(shape: Fingertip, mesh: TetMesh) -> TetMesh:
-    """The mesh with its facet sets, by where and how its facets lie."""
+    """The mesh with its facet sets, chosen by the position and direction of facets."""
     facets = boundary_facets(mesh.tets)
     centroids, normals = geometry(mesh, facets)
     cut = centroids[:, 1] < -shape.length / 2 * (1 - 1e-9)
@@ -140,10 +142,8 @@ def _tagged(shape: Fingertip, mesh: TetMesh) -> TetMesh:
     return replace(mesh, facets=sets)
 
 
-def _lattice_of(shells: int, layers: int) -> tuple[Floats, Ints]:
-    """Points (n, 3) and tetrahedra (e, 4) of half a ball of so many shells, y >= 0, and of a
-    cylinder of so many layers, y < 0.
-    """
+def _lattice(shells: int, layers: int) -> tuple[Floats, Ints]:
+    """Points (n, 3) and tetrahedra (e, 4) of half a ball of shells, y >= 0, and layers, y < 0."""
     eighth = _simplex(shells)
     signs = np.array(list(product((-1, 1), (1,), (-1, 1))))
     ball = (eighth * signs[:, None, None]).reshape(-1, 4, 3)
@@ -157,7 +157,7 @@ def _lattice_of(shells: int, layers: int) -> tuple[Floats, Ints]:
 
 def _simplex(n: int) -> Ints:
     """Corners (n^3, 4, 3) of the tetrahedra of x, y, z >= 0, x + y + z <= n: where a <= b <= c,
-    cubes along their diagonals, of a = x, b = x + y and c = x + y + z.
+    cubes split along their diagonals, with a = x, b = x + y and c = x + y + z.
     """
     cubes = np.array(list(product(range(n), repeat=3)))
     steps = np.cumsum(
@@ -170,24 +170,24 @@ def _simplex(n: int) -> Ints:
 
 
 def _section(ball: Ints) -> Ints:
-    """Triangles (k, 3, 2) along x and z of the half ball's section y = 0."""
+    """Triangles (k, 3, 2) along x and z of the section y = 0 of the half ball."""
     on_it = ball[..., 1] == 0
     flat = on_it.sum(axis=1) == 3
     return ball[flat][on_it[flat]].reshape(-1, 3, 3)[..., [0, 2]]
 
 
 def _shell_of(lattice: Floats) -> Floats:
-    """Shell (n,) of points of the lattice."""
+    """Shell (n,) of lattice points."""
     return np.abs(lattice[:, 0]) + np.maximum(lattice[:, 1], 0) + np.abs(lattice[:, 2])
 
 
-def _placed(shape: Fingertip, lattice: Floats, ends: tuple[int, int], layers: int) -> Floats:
-    """Points (n, 3) in metre of a fingertip where those of the lattice are; `ends` are the shells
-    of the surfaces of bone and tissue.
+def _map_lattice(shape: Fingertip, lattice: Floats, ends: tuple[int, int], layers: int) -> Floats:
+    """Points (n, 3) in metre of lattice points; `ends` are the outermost shells of bone and
+    skin.
     """
     shell = _shell_of(lattice)[:, None]
     shares = (lattice * [1, 0, 1] + np.maximum(lattice, 0) * [0, 1, 0]) / np.maximum(shell, 1e-300)
-    outward = np.sin(np.pi / 2 * shares)  # evener on a sphere than the shares themselves
+    outward = np.sin(np.pi / 2 * shares)  # more even on a sphere than the shares themselves
     outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-300)
     bone_axes, skin_axes = shape.semi_axes
     bone_height, height = -shape.cover - shape.bone_thickness / 2, -shape.thickness / 2

@@ -1,10 +1,9 @@
 """Palm as a mapped structured mesh: a grid of boxes wrapped into its rounded outline and rim.
 
-Needs no mesher, is the same in every run, and its elements follow the top and the base. In the
-plan, concentric rectangles become rectangles whose corners get rounder outwards; in the section of
-the rim likewise; then the nodes of the boundary move onto the level set, which adds the relief, and
-take those inside along by transfinite interpolation (Gordon and Hall, Int J Numer Methods Eng
-7:461, 1973).
+It needs no mesher and is the same in every run. Concentric rectangles in plan, and in the section
+of the rim, become rectangles whose corners get rounder outwards. Boundary nodes then move onto the
+level set, which adds the relief, and inner nodes follow by transfinite interpolation (Gordon and
+Hall, Int J Numer Methods Eng 7:461, 1973).
 """
 
 from __future__ import annotations
@@ -23,15 +22,15 @@ from meshes.volume.curving import curve_boundary
 from meshes.volume.quality import angles_between_faces
 from meshes.volume.tetrahedralise import SHARPEST
 
-INWARDS = 2.0  # power of the distance from the middle with which corners get sharper inwards
-RIM = 2.0  # thicknesses of half a palm from its outline inwards, in which boxes follow the rim
-LEAST = 0.3  # cosine between the normals of a palm with and without mounds
-STEPS = 8  # of Newton's method, onto mounds that lie as high as the palm is thick
-OFF = 1e-3  # of the thickness: how far a node of the boundary may miss the level set
+INWARDS = 2.0  # power of the distance from the middle with which corner radii grow outwards
+RIM = 2.0  # width of the zone whose boxes follow the rim, over half the thickness
+LEAST_COSINE = 0.3  # between the normals of a palm with and without mounds
+STEPS = 8  # of Newton's method, enough for mounds as high as the palm is thick
+OFF = 1e-3  # of the thickness: largest distance of a boundary node from the level set
 
 
 def mapped_palm(palm: Palm, x: Floats, y: Floats, z: Floats) -> TetMesh:
-    """Ten-node tetrahedra of a palm whose boundary nodes lie on its true surface.
+    """Return ten-node tetrahedra of a palm whose boundary nodes lie on its level set.
 
     Parameters
     ----------
@@ -41,10 +40,9 @@ def mapped_palm(palm: Palm, x: Floats, y: Floats, z: Floats) -> TetMesh:
 
     Returns
     -------
-    TetMesh with the facet sets `surface`, `top` (what the device sees), `wrist` and `fingers` (the
-        ends) and `back`, the rest
+    TetMesh with the facet sets `surface`, `top` (visible from above), `wrist`, `fingers` and `back`
 
-    Raises a MeshError if there are too many cells, or a relief is too steep for them.
+    Raises a MeshError if there are too many cells, or the relief is too steep for them.
     """
     cells = (len(x) - 1, len(y) - 1, len(z) - 1)
     tets = kuhn_tets(cells)
@@ -55,9 +53,9 @@ def mapped_palm(palm: Palm, x: Floats, y: Floats, z: Floats) -> TetMesh:
     off = np.abs(level_set(palm, points[_on_boundary(cells).ravel()])).max()
     if sharpest < SHARPEST or off > OFF * palm.thickness:
         raise MeshError(
-            f"a mapped mesh of this palm has a dihedral angle of {sharpest:.2g} degrees, the least "
-            f"that is accepted is {SHARPEST:g}, and misses its surface by {1e3 * off:.2g} mm; take "
-            "a lower relief"
+            f"a mapped mesh of this palm has a least dihedral angle of {sharpest:.2g} degrees "
+            f"(limit {SHARPEST:g} degrees) and misses its surface by {1e3 * off:.2g} mm; use a "
+            "lower relief"
         )
     mesh = quadratic(TetMesh(points=points, tets=tets))
     mesh = curve_boundary(mesh, lambda p: level_set(palm, p), lambda p: gradient(palm, p))
@@ -71,10 +69,11 @@ def mapped_palm(palm: Palm, x: Floats, y: Floats, z: Floats) -> TetMesh:
 
 
 def kuhn_tets(cells: tuple[int, int, int]) -> Ints:
-    """Tetrahedra (6 n, 4), with positive volume, of a grid of so many cells, whose nodes are
-    numbered with the last axis fastest. The diagonals of the boxes run outwards from the middle of
-    the grid (Kuhn triangulation of each octant), so that no tetrahedron has two facets on its
-    boundary.
+    """Return tetrahedra (6 n, 4) of a grid of cells whose nodes are numbered with the last axis
+    fastest.
+
+    Diagonals run outwards from the middle of the grid (Kuhn triangulation of each octant), so that
+    no tetrahedron has two boundary facets.
     """
     check_size(cells)
     places = np.stack(np.meshgrid(*map(np.arange, cells), indexing="ij"), axis=-1).reshape(-1, 3)
@@ -85,16 +84,16 @@ def kuhn_tets(cells: tuple[int, int, int]) -> Ints:
     tets = []
     for order in permutations(range(3)):
         b, c, d = inner + np.cumsum(steps[:, order], axis=1).T
-        turned = outwards.prod(axis=1) * np.linalg.det(np.eye(3)[list(order)]) < 0
-        tets.append(np.column_stack([inner, b, np.where(turned, d, c), np.where(turned, c, d)]))
+        is_odd = outwards.prod(axis=1) * np.linalg.det(np.eye(3)[list(order)]) < 0
+        tets.append(np.column_stack([inner, b, np.where(is_odd, d, c), np.where(is_odd, c, d)]))
     return np.vstack(tets)
 
 
 def _wrapped(palm: Palm, box: Floats) -> Floats:
-    """Points (..., 3) of the box where they lie in a palm without mounds, bent to its cup."""
+    """Points (..., 3) of the box mapped to a palm without mounds, bent to its cup."""
     half = np.array([palm.breadth, palm.length]) / 2
     across, middle = palm.thickness / 2, box[..., 2] + palm.thickness / 2
-    # Where a point lies between the middle (0) and the outline (1), of concentric rectangles.
+    # Concentric rectangle through each point: 0 in the middle, 1 at the outline.
     level = np.abs(box[..., :2] / half).max(axis=-1)
     width = min(half.min(), RIM * across)
     beyond = width - (1 - level) * half.min()  # the inner edge of the rim
@@ -110,12 +109,12 @@ def _wrapped(palm: Palm, box: Floats) -> Floats:
 def _rounded(
     x: Floats, y: Floats, half: tuple[float, float] | Floats, radius: float
 ) -> tuple[Floats, Floats]:
-    """Points of a rectangle within one with round corners: of each concentric rectangle t times as
-    large, the sides and the quarter circles of t^2 times the radius are divided alike.
+    """Points of a rectangle mapped to one with round corners. In each concentric rectangle of
+    relative size t, the sides and the quarter circles, of t^2 times the radius, are divided evenly.
     """
     a, b = half
     level = np.maximum(np.maximum(np.abs(x) / a, np.abs(y) / b), 1e-300)
-    on_x = np.abs(x) / a >= np.abs(y) / b  # points of the sides at constant x
+    on_x = np.abs(x) / a >= np.abs(y) / b  # on a side of constant x
     r = radius * level**INWARDS
     side = level * np.where(on_x, b, a)
     straight = side - r
@@ -123,33 +122,25 @@ def _rounded(
     angle = np.maximum(way - straight, 0) / np.maximum(r, 1e-300)
     out = level * np.where(on_x, a, b) - r * (1 - np.cos(angle))
     along = np.where(way <= straight, way, straight + r * np.sin(angle))
-    found = np.where(on_x, out, along), np.where(on_x, along, out)
-    return np.copysign(found[0], x), np.copysign(found[1], y)
+    return (
+        np.copysign(np.where(on_x, out, along), x),
+        np.copysign(np.where(on_x, along, out), y),
+    )
 
 
 def _onto_level_set(palm: Palm, grid: Floats) -> Floats:
-    """Grid (i, j, k, 3) with the nodes of its boundary on the level set; the others follow."""
+    """Grid (i, j, k, 3) with its boundary nodes on the level set; inner nodes follow."""
     outer = _on_boundary(tuple(n - 1 for n in grid.shape[:3]))
     moved = np.zeros_like(grid)
-    # Along the normals of the mounds nodes would gather in the dips between them.
-    normals = gradient(without_mounds(palm), grid[outer])
-    moved[outer] = along_normals(palm, grid[outer], normals) - grid[outer]
-    return grid + _transfinite(moved)
-
-
-def without_mounds(palm: Palm) -> Palm:
-    """The same palm with cup and rim alone."""
-    return replace(palm, thenar_height=0.0, hypothenar_height=0.0, pad_height=0.0)
-
-
-def along_normals(palm: Palm, points: Floats, normals: Floats) -> Floats:
-    """Points (n, 3) near the surface of a palm moved onto it along unit vectors (n, 3)."""
+    # Along the normals of the mounds, nodes would gather in the dips between them.
+    smooth = replace(palm, thenar_height=0.0, hypothenar_height=0.0, pad_height=0.0)
+    points, normals = grid[outer], gradient(smooth, grid[outer])
     for _ in range(STEPS):
         steepness = np.einsum("ni,ni->n", gradient(palm, points), normals)
-        points = (
-            points - (level_set(palm, points) / np.maximum(steepness, LEAST))[:, None] * normals
-        )
-    return points
+        step = level_set(palm, points) / np.maximum(steepness, LEAST_COSINE)
+        points = points - step[:, None] * normals
+    moved[outer] = points - grid[outer]
+    return grid + _transfinite(moved)
 
 
 def _on_boundary(cells: tuple[int, ...]) -> Bools:

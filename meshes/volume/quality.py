@@ -1,4 +1,4 @@
-"""Quality of tetrahedra: angles, sizes, distortion, and whether they are one body."""
+"""Quality of tetrahedra: angles, sizes and distortion, and whether they are one body."""
 
 from __future__ import annotations
 
@@ -8,12 +8,10 @@ from itertools import combinations
 import numpy as np
 
 from meshes.surface.repair import check_crossings, check_manifold, in_mm
-from meshes.surface.triangulation import compact
+from meshes.surface.triangulation import compact, connected_components
 from meshes.tetmesh import (
     EDGES,
     FACES,
-    Floats,
-    Ints,
     MeshError,
     TetMesh,
     boundary_facets,
@@ -21,15 +19,18 @@ from meshes.tetmesh import (
     neighbours,
     part,
 )
+from meshes.typing import Floats, Ints
 
 
 def dihedral_angles(mesh: TetMesh) -> Floats:
-    """Angles (m, 6) in degrees between the faces of each straight tetrahedron."""
+    """Return the angles (m, 6) in degrees between the faces of each straight tetrahedron."""
     return angles_between_faces(mesh.points, mesh.tets)
 
 
 def angles_between_faces(points: Floats, tets: Ints) -> Floats:
-    """Dihedral angles (m, 6) in degrees of tetrahedra (m, 4 or 10) with positive volume."""
+    """Return the dihedral angles (m, 6) in degrees of tetrahedra (m, 4 or 10) with positive
+    volume.
+    """
     corners = points[tets[:, :4]]
     faces = corners[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]]
     normals = np.cross(faces[:, :, 1] - faces[:, :, 0], faces[:, :, 2] - faces[:, :, 0])
@@ -40,7 +41,7 @@ def angles_between_faces(points: Floats, tets: Ints) -> Floats:
 
 
 def edge_lengths(mesh: TetMesh) -> Floats:
-    """Lengths (m, 6) in metre of the straight edges of each tetrahedron."""
+    """Return the lengths (m, 6) in metre of the straight edges of each tetrahedron."""
     ends = mesh.points[mesh.tets[:, EDGES]]
     return np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
 
@@ -56,10 +57,10 @@ def _determinants(nodes: Floats, at: Floats) -> Floats:
 
 
 def jacobian_ratios(points: Floats, tets: Ints) -> Floats:
-    """Least ratio (m,) of det J of each 10-node element to that of the straight one.
+    """Return the least ratio (m,) of det J of each 10-node element to that of its straight element.
 
-    Taken at the corners, the middles of the edges and the four Gauss points; 1 without curved
-    edges, 0 or below where the element is folded.
+    It is evaluated at the corners, the edge middles and the four Gauss points: 1 without curved
+    edges, 0 or negative for a folded element.
     """
     nodes, ratio = points[tets], np.full(len(tets), np.inf)
     straight = 6 * corner_volumes(points, tets)
@@ -71,11 +72,11 @@ def jacobian_ratios(points: Floats, tets: Ints) -> Floats:
     return ratio
 
 
-def moved_back(
+def restore_bad(
     points: Floats, moved: Floats, tets: Ints, are_bad: Callable[[Floats], np.ndarray]
 ) -> tuple[Floats, int]:
-    """Moved points (n, 3), of which those of bad elements (m, a) go back until none is bad, and how
-    many went back.
+    """Return points (n, 3) with those of bad elements (m, a) restored until none is bad, and how
+    many.
     """
     count = 0
     while True:
@@ -87,19 +88,21 @@ def moved_back(
         count += len(nodes)
 
 
-def one_body(
+def check_one_body(
     mesh: TetMesh, *, keep_largest: bool = False, say: Callable[[str], None] = print
 ) -> TetMesh:
-    """The mesh, or the largest of its bodies on request; a MeshError if tetrahedra overlap, they
-    are several bodies, or their boundary is not closed, touches or crosses itself.
+    """Return a mesh, or its largest body on request.
+
+    Raises a MeshError if tetrahedra overlap, they form several bodies, or their boundary is open,
+    pinched or intersects itself.
     """
     _check_overlaps(mesh)
     body, volumes = _bodies(mesh)
     if len(volumes) > 1 and not keep_largest:
         listed = ", ".join(f"{1e6 * volume:.3g}" for volume in np.sort(volumes)[::-1][:5])
         raise MeshError(
-            f"the mesh is {len(volumes)} separate bodies ({listed} cm3); join them, or keep the "
-            "largest: skinwave mesh FILE --keep largest"
+            f"the mesh consists of {len(volumes)} separate bodies ({listed} cm3); join them, or "
+            "keep the largest with skinwave mesh FILE --keep largest"
         )
     if len(volumes) > 1:
         share = volumes.max() / volumes.sum()
@@ -112,26 +115,23 @@ def one_body(
 
 
 def _check_overlaps(mesh: TetMesh) -> None:
-    """Check that at most two tetrahedra have a facet, which lie on either side of it."""
+    """Refuse tetrahedra that lie on the same side of a common facet."""
     faces = mesh.tets[:, FACES[:, :3]].reshape(-1, 3)
     low = faces.argmin(axis=1)[:, None]
-    turned = np.take_along_axis(faces, (low + np.arange(3)) % 3, axis=1)  # seen from outside
-    _, place, count = np.unique(turned, axis=0, return_index=True, return_counts=True)
+    cyclic = np.take_along_axis(faces, (low + np.arange(3)) % 3, axis=1)  # from the lowest node
+    _, place, count = np.unique(cyclic, axis=0, return_index=True, return_counts=True)
     twice = place[count > 1]
     if len(twice):
         middle = in_mm(mesh.points[faces[twice[0]]].mean(axis=0))
         raise MeshError(
             f"tetrahedra of the mesh overlap at {len(twice):,} of their faces, first near "
-            f"{middle}; mesh the body anew"
+            f"{middle}; mesh the body again"
         )
 
 
 def _bodies(mesh: TetMesh) -> tuple[Ints, np.ndarray]:
     """The body (m,) of each tetrahedron, and the volume of each body in cubic metre."""
-    from scipy import sparse
-
-    beyond, m = neighbours(mesh.tets), len(mesh.tets)
-    one, face = np.nonzero(beyond >= 0)
-    graph = sparse.coo_array((np.ones(len(one), bool), (one, beyond[one, face])), shape=(m, m))
-    body = sparse.csgraph.connected_components(graph, directed=False)[1]
+    beyond = neighbours(mesh.tets)
+    tet, face = np.nonzero(beyond >= 0)
+    body = connected_components(len(mesh.tets), np.column_stack([tet, beyond[tet, face]]))
     return body, np.bincount(body, corner_volumes(mesh.points, mesh.tets))

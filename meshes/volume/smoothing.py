@@ -1,8 +1,8 @@
-"""Smoothing of tetrahedral meshes without change of their connectivity.
+"""Smoothing of tetrahedral meshes with fixed connectivity.
 
-Each inner node goes to the mean of the centroids of its elements, weighted by how large they are
-compared to what is asked for: the centroidal patches of Chen and Holst, Comput Methods Appl Mech
-Eng 200:967 (2011), doi 10.1016/j.cma.2010.11.007.
+Each inner node moves to the mean of the centroids of its elements, weighted by their volume over
+the target volume: the centroidal patches of Chen and Holst, Comput Methods Appl Mech Eng 200:967
+(2011), doi 10.1016/j.cma.2010.11.007.
 """
 
 from collections.abc import Callable
@@ -12,21 +12,23 @@ import numpy as np
 
 from meshes.tetmesh import TetMesh, boundary_facets, corner_volumes, interface_facets
 from meshes.typing import Floats, Ints
-from meshes.volume.quality import angles_between_faces, moved_back
+from meshes.volume.quality import angles_between_faces, restore_bad
 
 Sizing = Callable[[Floats], Floats]
 
-STEPS, SHARE = 12, 0.7  # of the way that a node goes in each
-# Where else a node of a sharp element is tried: how far, of the edges around, and which way.
-TRIED = np.array([0.2, 0.1, 0.05, 0.025] * 2)
+STEPS, SHARE = 12, 0.7  # steps, and the share of the way to the mean in each
+# Trial moves of a node of a sharp element: distances over the edges around it, and directions.
+TRIAL_STEPS = np.array([0.2, 0.1, 0.05, 0.025] * 2)
 DIRECTIONS = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)]) - 1.0
-GOOD = 25.0  # degrees: smaller angles may not shrink, larger ones not below it
+GOOD = 25.0  # degrees: least angles below it may not shrink, and others not fall below it
 
 
 def smoothed(mesh: TetMesh, sizing: Sizing | None = None) -> TetMesh:
-    """Smoothed four-node mesh: its inner nodes are moved so that no least angle below 25 degrees
-    gets less; nodes of its boundary and between its regions stay. `sizing` is a function of points
-    (n, 3) in metre to edge lengths (n,) asked for; None if equal.
+    """Return a four-node mesh with its inner nodes moved, so that no least angle below 25 degrees
+    shrinks.
+
+    Nodes on the boundary and between regions stay. `sizing` maps points (n, 3) to target edge
+    lengths (n,) in metre; None for equal sizes.
     """
     points, tets = np.array(mesh.points), mesh.tets
     outer = np.zeros(len(points), bool)
@@ -34,7 +36,7 @@ def smoothed(mesh: TetMesh, sizing: Sizing | None = None) -> TetMesh:
     for _ in range(STEPS):
         moved = _means(points, tets, sizing)
         moved[outer] = points[outer]
-        points = _no_worse(tets, points, points + SHARE * (moved - points))
+        points = _without_losses(tets, points, points + SHARE * (moved - points))
     for node in np.unique(tets[_least_angles(points, tets) < GOOD]):
         if not outer[node]:
             _widen(points, tets[(tets == node).any(axis=1)], node)
@@ -42,10 +44,10 @@ def smoothed(mesh: TetMesh, sizing: Sizing | None = None) -> TetMesh:
 
 
 def _widen(points: Floats, patch: Ints, node: int) -> None:
-    """Move a node to where the least angle of the elements at it is largest, by trial."""
+    """Move a node by trial to where the least angle of its elements is largest."""
     best = _least_angles(points, patch).min()
     length = np.linalg.norm(np.ptp(points[patch], axis=1), axis=1).mean()
-    for reach in length * TRIED:
+    for reach in length * TRIAL_STEPS:
         for place in points[node] + reach * DIRECTIONS:
             before = points[node].copy()
             points[node] = place
@@ -61,9 +63,7 @@ def _least_angles(points: Floats, tets: Ints) -> Floats:
 
 
 def _means(points: Floats, tets: Ints, sizing: Sizing | None) -> Floats:
-    """Weighted mean (n, 3) of the centroids of the tetrahedra at each node, by their volumes over
-    those that are asked for.
-    """
+    """Weighted mean (n, 3) of the centroids of the tetrahedra at each node."""
     centroids, weight = points[tets].mean(axis=1), corner_volumes(points, tets)
     if sizing:
         weight = weight / sizing(centroids) ** 3
@@ -73,11 +73,11 @@ def _means(points: Floats, tets: Ints, sizing: Sizing | None) -> Floats:
     return np.column_stack(sums) / total[:, None]
 
 
-def _no_worse(tets: Ints, points: Floats, moved: Floats) -> Floats:
-    """Moved nodes go back at elements that lose by it."""
+def _without_losses(tets: Ints, points: Floats, moved: Floats) -> Floats:
+    """Moved nodes, restored at elements whose angles get worse."""
     floor = np.minimum(_least_angles(points, tets), GOOD)
 
-    def lose(at: Floats) -> np.ndarray:
+    def gets_worse(at: Floats) -> np.ndarray:
         return np.asarray((_least_angles(at, tets) < floor) | (corner_volumes(at, tets) <= 0))
 
-    return moved_back(points, moved, tets, lose)[0]
+    return restore_bad(points, moved, tets, gets_worse)[0]

@@ -1,10 +1,8 @@
-"""Tetrahedral meshing of any closed surface, by fTetWild (Hu et al. 2020, doi
-10.1145/3386569.3392385).
+"""Tetrahedral meshes of closed surfaces by fTetWild (Hu et al. 2020, doi 10.1145/3386569.3392385).
 
-The mesher differs from run to run, crashes on what it cannot read, never ends on some sizes, and
-returns nothing for bodies thinner than its envelope. So its input is checked, it runs in a process
-and a folder of its own with a time limit, its result is checked, and cached on disk: the same body
-is meshed once per machine.
+The mesher varies between runs, crashes on invalid input, hangs on some sizes, and returns nothing
+for bodies thinner than its envelope. Its input and result are therefore checked, it runs in a
+separate process with a time limit, and results are cached on disk.
 """
 
 from __future__ import annotations
@@ -30,15 +28,15 @@ from meshes.volume.smoothing import Sizing, smoothed
 
 log = logging.getLogger(__name__)
 
-EPSILON = 0.05  # of h: how far the mesh may lie from the surface
-SMALLEST_EPSILON = 1e-4  # of the diagonal: below, the mesher takes minutes to hours
-MOST_OF_INNER = 0.025  # likewise of what is inside it, whose volume may differ by 2 %
-MOST_OF_THICKNESS = 0.1  # what the envelope may be of the body's thickness, or it swallows it
+EPSILON = 0.05  # of h: largest distance of the mesh from the surface, its envelope
+SMALLEST_EPSILON = 1e-4  # of the diagonal: below it, the mesher takes minutes to hours
+MOST_OF_INNER = 0.025  # of the thickness of an inner surface, whose volume may change by 2 %
+MOST_OF_THICKNESS = 0.1  # of the thickness of the body, which a larger envelope would swallow
 MOST_TETRAHEDRA = 1_000_000
-SHARPEST = 5.0  # degrees: least dihedral angle of a mesh that is accepted
-VOLUME_ERROR, INNER_VOLUME_ERROR = 0.005, 0.02  # of the volumes within surfaces
-LOST_SHELL = 0.3  # of the shell between surface and envelope: what chords of curves may cut off
-REST = "tissue"  # name of the region that is in no inner surface
+SHARPEST = 5.0  # degrees: least acceptable dihedral angle
+VOLUME_ERROR, INNER_VOLUME_ERROR = 0.005, 0.02  # relative to the volumes within surfaces
+LOST_SHELL = 0.3  # of the volume between surface and envelope that straight facets may cut off
+REST = "tissue"  # name of the region outside inner surfaces
 GRID_CELLS = 32  # along the longest side of the background grid of sizes
 
 
@@ -50,25 +48,24 @@ def tetrahedralise(
     sizing: Sizing | None = None,
     timeout: float = 600.0,
 ) -> TetMesh:
-    """Four-node tetrahedra that fill a closed surface, with facets in the surfaces inside it.
+    """Fill a closed surface with four-node tetrahedra, with facets on the surfaces inside it.
 
     Parameters
     ----------
     surface : Surface
-    h : float, metre, edge length that is aimed at
+    h : float, metre, target edge length
     inner : name of a region and the closed surface around it, inside the other one or cut off with
         it at one plane
-    sizing : function of points (n, 3) in metre to edge lengths (n,) in metre that are aimed at;
-        None for h everywhere
-    timeout : float, second, after which the mesher is stopped
+    sizing : function of points (n, 3) to target edge lengths (n,), metre; None for h everywhere
+    timeout : float, second, limit for the mesher
 
     Returns
     -------
-    TetMesh with its facets in the set `surface`, and with inner surfaces its regions: 0 outside of
-        them, the others from 1, with their names
+    TetMesh with its facets in the set `surface`. With inner surfaces it has the region 0 outside of
+        them and a named region from 1 for each.
 
-    Raises a MeshError if the surface is not sound; h or a size is out of range; or the
-    mesher fails, takes too long, or returns a bad mesh.
+    Raises a MeshError if the surface is not sound, h or a size is out of range, or the mesher
+    fails, takes too long, or returns a bad mesh.
     """
     check(surface)
     check_size(surface, "h", h)
@@ -92,15 +89,19 @@ def tetrahedralise(
     name = cache.key("tetrahedralise 3", *(inputs[part] for part in sorted(inputs)))
     entry = cache.load(name) or {}
     if {"points", "tets"} <= entry.keys():
-        return _with_regions(_accepted(surface, epsilon, entry["points"], entry["tets"]), inner)
-    found = _with_regions(_accepted(surface, epsilon, *_run(inputs, timeout)), inner)
-    mesh = smoothed(found, sizing)
+        return _with_regions(
+            _checked_result(surface, epsilon, entry["points"], entry["tets"]), inner
+        )
+    result = _checked_result(surface, epsilon, *_run(inputs, timeout))
+    mesh = smoothed(_with_regions(result, inner), sizing)
     cache.store(name, {}, points=mesh.points, tets=mesh.tets)
     return mesh
 
 
 def graded(h: float, grading: Grading) -> Sizing:
-    """Edge lengths: h within the grading's radius of the origin, growing up to `coarsest`."""
+    """Return a sizing function: h within the grading's radius of the origin, growing to
+    `coarsest`.
+    """
     slope = float(np.log(grading.growth))
 
     def sizes(points: Floats) -> Floats:
@@ -111,20 +112,22 @@ def graded(h: float, grading: Grading) -> Sizing:
 
 
 def _envelope(surface: Surface, h: float) -> float:
-    """How far in metre a mesh may lie from a surface: less is slower where it curves."""
+    """Largest distance in metre of a mesh from a surface. Smaller ones are slower on curved
+    surfaces.
+    """
     thickness, diagonal = thinnest(surface), surface.diagonal
     most, least = MOST_OF_THICKNESS * thickness, SMALLEST_EPSILON * diagonal
     if most < least:
         raise MeshError(
-            f"the body is {1e3 * thickness:.3g} mm thick and {1e3 * diagonal:.3g} mm long, which "
-            f"is too thin for the mesher, whose limit is 1:{MOST_OF_THICKNESS / SMALLEST_EPSILON:g}"
-            "; use `meshes.sheet` or `meshes.block`"
+            f"the body is {1e3 * thickness:.3g} mm thick and {1e3 * diagonal:.3g} mm long, too "
+            f"thin for the mesher, whose limit is 1:{MOST_OF_THICKNESS / SMALLEST_EPSILON:g}; "
+            "use `meshes.sheet` or `meshes.block`"
         )
     return min(max(EPSILON * h, least), most)
 
 
 def check_size(surface: Surface, name: str, length: float) -> None:
-    """Refuse a length in metre that is longer than the body, or shorter than a thousandth of it."""
+    """Refuse a length in metre that exceeds the body, or is less than a thousandth of it."""
     longest = float(np.ptp(surface.points, axis=0).max())
     if not 1e-3 * longest <= length <= longest:
         raise MeshError(
@@ -134,7 +137,7 @@ def check_size(surface: Surface, name: str, length: float) -> None:
 
 
 def _size_grid(surface: Surface, h: float, sizing: Sizing | None) -> dict[str, np.ndarray]:
-    """Background mesh around the body, with the edge length (n,) aimed at by each of its points."""
+    """Background mesh around the body, with the target edge length (n,) at each point."""
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     pad = 0.05 * (high - low).max()
     cells = np.maximum(2, np.ceil(GRID_CELLS * (high - low) / (high - low).max())).astype(int)
@@ -145,38 +148,40 @@ def _size_grid(surface: Surface, h: float, sizing: Sizing | None) -> dict[str, n
     if sizing:
         sizes = np.asarray(sizing(grid.points), np.float64)
         if sizes.shape != (len(grid.points),) or not np.isfinite(sizes).all():
-            raise MeshError(f"sizing gave shape {sizes.shape}; return one finite length a point")
+            raise MeshError(
+                f"sizing returned shape {sizes.shape}; return one finite length per point"
+            )
         check_size(surface, "least size", float(sizes.min()))
         sizes = np.minimum(sizes, (high - low).max())
     expected = (corner_volumes(grid.points, grid.tets) / sizes[grid.tets].mean(axis=1) ** 3).sum()
     expected *= 8.5 * volume(surface) / np.prod(high - low + 2 * pad)
     if expected > MOST_TETRAHEDRA:
         raise MeshError(
-            f"the mesh would have {expected:.2g} tetrahedra or more, the limit is "
-            f"{MOST_TETRAHEDRA:,}; take larger elements"
+            f"the mesh would have at least {expected:.2g} tetrahedra, more than the limit of "
+            f"{MOST_TETRAHEDRA:,}; use larger elements"
         )
     return {"grid_points": grid.points, "grid_tets": grid.tets, "grid_sizes": sizes}
 
 
 def _run(inputs: dict[str, np.ndarray], timeout: float) -> tuple[Floats, np.ndarray]:
-    """Run the mesher in a process of its own."""
+    """Run the mesher in a separate process."""
     if find_spec("pytetwild") is None:
         raise MeshError(
-            "tetrahedra need the package pytetwild, which has no wheel for Intel Macs; install it, "
-            "or give a file that has a mesh"
+            "filling a surface needs the package pytetwild, which has no wheel for Intel Macs; "
+            "install it, or give a file with a volume mesh"
         )
     try:
         return subprocess_call.call(mesh_by_tetwild, inputs, timeout=timeout)
     except TimeoutError:
         raise MeshError(
-            f"the mesher was stopped after {timeout:g} s; take larger elements or more time"
+            f"the mesher was stopped after {timeout:g} s; use larger elements or a longer timeout"
         ) from None
     except Exception as error:
         raise MeshError(f"the mesher failed: {error}; simplify or smooth the surface") from None
 
 
 def mesh_by_tetwild(inputs: Mapping[str, np.ndarray]) -> tuple[Floats, np.ndarray]:
-    """Points and tetrahedra of the mesher, which may crash or never end, and writes files."""
+    """Return the points and tetrahedra of the mesher, which may crash or hang, and writes files."""
     from pytetwild import tetrahedralize
 
     points, tets = tetrahedralize(
@@ -193,8 +198,8 @@ def mesh_by_tetwild(inputs: Mapping[str, np.ndarray]) -> tuple[Floats, np.ndarra
 
 
 def _with_regions(mesh: TetMesh, inner: Mapping[str, Surface]) -> TetMesh:
-    """Mesh with a region for each inner surface, from 1, and 0 for the rest: a tetrahedron is in
-    the smallest surface whose winding number about its middle is above 1/2.
+    """The mesh with a region for each inner surface, from 1: that of the smallest surface whose
+    winding number about the middle of a tetrahedron is above 1/2.
     """
     if not inner:
         return mesh
@@ -208,35 +213,38 @@ def _with_regions(mesh: TetMesh, inner: Mapping[str, Surface]) -> TetMesh:
         ratio = volumes[inside].sum() / enclosed[k]
         if not abs(ratio - 1) <= INNER_VOLUME_ERROR:
             raise MeshError(
-                f"the region {name} has {100 * ratio:.3g} % of the volume within its surface, and "
-                f"may differ by {100 * INNER_VOLUME_ERROR:g} %; take smaller elements"
+                f"the region {name} has {100 * ratio:.3g} % of the volume within its surface, a "
+                f"difference above {100 * INNER_VOLUME_ERROR:g} %; use smaller elements"
             )
     return replace(mesh, region=region, region_names=dict(enumerate([REST, *inner])))
 
 
-def _accepted(surface: Surface, epsilon: float, points: Floats, tets: np.ndarray) -> TetMesh:
+def _checked_result(surface: Surface, epsilon: float, points: Floats, tets: np.ndarray) -> TetMesh:
     """The mesh, if it fills the surface and has no bad element."""
     if not len(tets):
         raise MeshError("the mesher returned no tetrahedra; give a thicker body")
     used, numbers = np.unique(tets, return_inverse=True)
     mesh = tag_boundary(TetMesh(points=points[used], tets=numbers.reshape(-1, 4)))
     boundary = boundary_facets(mesh.tets)
-    outside, _ = repaired(mesh.points, boundary)  # which refuses open and crowded edges
+    outside, _ = repaired(mesh.points, boundary)  # refuses open and crowded edges
     if (n := n_pieces(outside)) != 1 or len(outside.triangles) != len(boundary):
-        raise MeshError(f"the boundary of the mesh is {n} pieces, not one; smooth the surface")
+        raise MeshError(
+            f"the boundary of the mesh has {n} pieces instead of one; smooth the surface"
+        )
     enclosed = volume(surface)
     ratio = corner_volumes(mesh.points, mesh.tets).sum() / enclosed
     limit = VOLUME_ERROR + LOST_SHELL * epsilon * area(surface) / enclosed
     if not abs(ratio - 1) <= limit:
         raise MeshError(
-            f"the mesh has {100 * ratio:.2f} % of the volume within the surface, and may differ "
-            f"by {100 * limit:.2g} %; take a smaller epsilon"
+            f"the mesh has {100 * ratio:.2f} % of the volume within the surface, a difference "
+            f"above {100 * limit:.2g} %; use smaller elements"
         )
     angles = dihedral_angles(mesh).min(axis=1)
     if not angles.min() >= SHARPEST:
         raise MeshError(
-            f"{(angles < SHARPEST).sum()} tetrahedra have dihedral angles below {SHARPEST:g} "
-            f"degrees, the least is {angles.min():.2g}; smooth the surface or take smaller elements"
+            f"{(angles < SHARPEST).sum():,} tetrahedra have dihedral angles below {SHARPEST:g} "
+            f"degrees, the least is {angles.min():.2g} degrees; smooth the surface or use "
+            "smaller elements"
         )
     log.info("%d tetrahedra, least dihedral angle %.1f degrees", len(mesh.tets), angles.min())
     return mesh

@@ -12,14 +12,15 @@ from meshes import Grading, TetMesh, graded_axis
 from skinwave.bodies.body import Body
 from skinwave.typing import Floats
 
-LOWEST_CUT_ON = 80.0  # Hz: what deeper slabs carry below it is still near field at their sides
+LOWEST_CUT_ON = 80.0  # Hz: motion of deeper slabs below it is near field at their sides
 
 
 @dataclass(frozen=True, kw_only=True)
 class AbsorbingLayer:
-    """Absorbing layer of a `width` in metre. Its mass-proportional damping rises with the square of
-    the distance, up to `drag` in 1/s; its cells grow by `growth` from one to the next, up to
-    `coarsest` in metre.
+    """Absorbing layer of a `width` in metre.
+
+    Its mass-proportional damping rises with the square of the distance, up to `drag` in 1/s. Its
+    cells grow by `growth` from one to the next, up to `coarsest` in metre.
     """
 
     width: float
@@ -34,20 +35,21 @@ def has_layer(body: Body) -> bool:
 
 
 def layer_of(body: Body, wider: float = 1.0) -> AbsorbingLayer:
-    """Absorbing layer of a slab, so many times `wider` than usual for estimates of what it
-    reflects.
+    """Return the absorbing layer of a slab; `wider` multiplies its width to estimate its
+    reflections.
 
     Dashpots alone reflect a quarter of a shear wave at 30 degrees. Lengths are multiples of the
-    depth, at most that whose first mode cuts on at `LOWEST_CUT_ON`. On a rigid base waves are long
-    near the cut-on, and decay below it: the reflection of a plane slab of 50 mm is at most 1.4 % of
-    the motion at the focus at any line, that of dashpots alone 17 % (`skinwave.verify.waves`). A
-    free or elastic base has bending waves at any frequency, which a layer has to damp alone. Above
-    an absorbing base waves are spherical, and as long as those of the lowest material.
+    depth, at most of the depth whose first mode cuts on at `LOWEST_CUT_ON`. On a rigid base, waves
+    are long near the cut-on and decay below it. A plane slab of 50 mm then reflects at most 1.4 %
+    of the motion at the focus at any line, compared with 17 % for dashpots alone
+    (`skinwave.verify.waves`). A free or elastic base carries bending waves at all frequencies,
+    which the layer must damp alone. Above an absorbing base, waves are spherical and as long as
+    those of the lowest material.
     """
     speed = body.solid.shear_speed
     longest = speed / (4 * LOWEST_CUT_ON)
     scale = longest if body.base == "absorbing" else min(body.depth, longest)
-    # Width, and coarsest cell, over that scale; damping over the angular frequency of cut-on.
+    # Width and coarsest cell over that scale; damping over the angular frequency of cut-on.
     width, coarsest, drag, growth = {
         "clamped": (7.0, 2.0, 0.35, 1.4),
         "absorbing": (13.0, 3.0, 0.25, 1.5),
@@ -59,14 +61,16 @@ def layer_of(body: Body, wider: float = 1.0) -> AbsorbingLayer:
 
 
 def layer_line(layer: AbsorbingLayer, half: Floats) -> Floats:
-    """Grid lines of the absorbing layer, from where the body ends."""
+    """Return grid lines of the absorbing layer, from the end of the body."""
     grading = Grading(radius=0.0, growth=layer.growth, coarsest=layer.coarsest)
     first = min(layer.growth * (half[-1] - half[-2]), layer.coarsest)
     return graded_axis(layer.width, first, grading)[1:]
 
 
 def layer_drag(body: Body, layer: AbsorbingLayer, mesh: TetMesh) -> Floats:
-    """Damping (m,) in 1/s of the elements of a mesh: 0 in the body, quadratic beyond it."""
+    """Return the damping (m,) in 1/s of the elements of a mesh: 0 in the body, quadratic
+    beyond it.
+    """
     ends = np.array([body.width / 2, body.height / 2, body.depth])
     middles = np.abs(mesh.points[mesh.tets[:, :4]].mean(axis=1))
     beyond = np.clip(middles - ends, 0.0, None).max(axis=1) / layer.width
@@ -74,13 +78,13 @@ def layer_drag(body: Body, layer: AbsorbingLayer, mesh: TetMesh) -> Floats:
 
 
 def far_springs(body: Body, mesh: TetMesh) -> Support:
-    """Springs at the end of the absorbing layer of a slab on a half-space.
+    """Return springs at the end of the absorbing layer of a slab on a half-space.
 
-    The half-space beyond resists as it does where a force acts at the origin: of incompressible
-    tissue the traction is radial, 3 P c / (2 pi r^2) with the cosine c of the angle to the force,
-    and the displacement P / (4 pi mu r) times 2 c radially and sin normal to it (Johnson, Contact
-    Mechanics (1985), section 3.2). Springs in all directions have the work of both, which for a
-    normal n is
+    The half-space resists as it does to a force P at the origin. In incompressible tissue the
+    traction is radial, 3 P c / (2 pi r^2), with c the cosine of the angle to the force. The
+    displacement is P / (4 pi mu r) times 2 c radially and the sine of the angle normal to it
+    (Johnson, Contact Mechanics (1985), section 3.2). Equal springs in all directions that do the
+    same work have, for a normal n,
 
         k = 12 mu c^2 |n r| / (r (1 + 3 c^2))    with the unit vector r from the origin
     """

@@ -1,4 +1,4 @@
-"""Analytic solutions of a body: its stack of layers, their wavenumber integral and modes."""
+"""Analytic solutions of a body: its stack of layers, wavenumber integral and modes."""
 
 from math import inf, isfinite
 
@@ -12,10 +12,10 @@ from skinwave.typing import Floats
 
 
 def has_exact_waves(body: Body) -> bool:
-    """Whether the wavenumber integral of infinite layers is the solution for a body, but for
-    reflections from its sides.
+    """Whether the wavenumber integral of infinite layers solves a body, except for side
+    reflections.
 
-    Without any loss resonances of layers are unbounded.
+    Without loss, the resonances of layers are unbounded.
     """
     return is_flat_layer(body) and any(solid.has_loss for _, solid in body.strata)
 
@@ -26,29 +26,33 @@ def is_flat_layer(body: Body) -> bool:
 
 
 def is_laterally_infinite(body: Body) -> bool:
-    """Whether a body has no sides that reflect: they absorb, or it is a half-space."""
+    """Whether a body has no reflecting sides: they absorb, or it is a half-space."""
     return body.sides == "absorbing" or not isfinite(body.depth)
 
 
 def compliance(body: Body) -> Compliance:
-    """Compliance of an infinite body of the same section, with the means of its directions."""
+    """Return the compliance of an infinite body of the same section, with direction-averaged
+    moduli.
+    """
     if body.of_kind.compliance is None:
         raise ValueError(
-            f"a wavenumber integral is of a sheet or a slab, not of a body of kind '{body.kind}'; "
-            "take one of these"
+            "the wavenumber integral supports a sheet or a slab, not a body of kind "
+            f"'{body.kind}'; use one of these"
         )
     return body.of_kind.compliance(body)
 
 
 def stack(body: Body) -> Stack:
-    """Layers of a slab; a half-space of the lowest material stands for an absorbing base."""
+    """Return the layers of a slab; an absorbing base becomes a half-space of the lowest
+    material.
+    """
     if not body.of_kind.is_layer:
-        raise ValueError(f"a body of kind '{body.kind}' is no stack of flat layers; take a slab")
+        raise ValueError(f"a body of kind '{body.kind}' is not a stack of flat layers; use a slab")
     return flattened(body)
 
 
 def flattened(body: Body) -> Stack:
-    """Layers of a body as a `stack`, as if all of it were flat and as deep as in its middle."""
+    """Return the layers of a body as if all of it were flat and as deep as in its middle."""
     starts, materials = zip(*body.strata, strict=True)
     end = inf if body.base == "absorbing" else body.depth
     thicknesses = [below - top for top, below in zip(starts, (*starts[1:], end), strict=True)]
@@ -61,15 +65,15 @@ def flattened(body: Body) -> Stack:
 
 
 def dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
-    """Dispersion curves, `most` modes at frequencies (f,) in Hz, of an infinite body."""
+    """Return dispersion curves of an infinite body, `most` modes at frequencies (f,) in Hz."""
     if body.of_kind.dispersion is None:
         raise ValueError(
-            f"dispersion curves are of a sheet, a slab or a palm, not of a body of kind "
-            f"'{body.kind}'; take a slab of its depth and layers"
+            "dispersion curves support a sheet, a slab or a palm, not a body of kind "
+            f"'{body.kind}'; use a slab of its depth and layers"
         )
     return body.of_kind.dispersion(body, frequencies, most)
 
 
 def stack_dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
-    """Dispersion curves of a body's layers, as of `dispersion`."""
+    """Return the dispersion curves of the flattened layers of a body."""
     return dispersion_curves(flattened(body), frequencies, most=most)

@@ -1,4 +1,4 @@
-"""A body and its kind, and the registry of kinds."""
+"""A body, its kind, and the registry of kinds."""
 
 from __future__ import annotations
 
@@ -29,51 +29,52 @@ from skinwave.bodies.parts import (
     solid_of,
 )
 from skinwave.bodies.supports import (
+    DEFAULT_SIDE,
     FRAME,
-    USUAL,
     Mounting,
     Sides,
     check_base,
     check_extent,
-    complete,
+    complete_sides,
 )
 from skinwave.system import extensions
 from skinwave.typing import Floats
 
 KEYS = {"width": "size_x_mm", "height": "size_y_mm", "depth": "thickness_mm"}  # in a scene file
-LARGEST = 2.0  # m: a body of more was meant in mm
+LARGEST = 2.0  # m: larger numbers are probably in mm
 
 
 @dataclass(frozen=True, kw_only=True)
 class Body:
-    """A body below the plane that the focus moves in, the middle of its surface at the origin.
+    """A body below the plane in which the focus moves, with the middle of its surface at the
+    origin.
 
     Parameters
     ----------
-    kind : the name of a registered `BodyKind`: "none" (the point kernel needs no body), "sheet"
-        (thin, bends), "slab" (thick), "palm" (soft tissue on bone, `depth` below the middle of the
-        palm), "finger" (soft tissue around bone), "disc" or "mesh" (from a file)
-    material : the name of a preset, or a Material
-    width, height, depth : float, metre, along x, y and downwards, at most 2; a slab's depth may
-        be inf, a half-space, which only flat-body can compute
-    base, sides : "clamped", "absorbing" or "free", and of a base "elastic", a Winkler foundation;
-        of a hand the part that looks downwards, and the ends at the wrist and the fingers or the
-        cuts of a file; or a condition for each of the `Sides`, where they are not alike
+    kind : name of a registered `BodyKind`: "none" (the point kernel needs no body), "sheet" (thin,
+        bends), "slab" (thick), "palm" (soft tissue on bone, `depth` below the middle of the palm),
+        "finger" (soft tissue around bone), "disc" or "mesh" (from a file)
+    material : name of a preset, or a Material
+    width, height, depth : float, metre, along x, y and downwards, at most 2; the depth of a slab
+        may be inf, a half-space, which only flat-body can compute
+    base, sides : "clamped", "absorbing" or "free"; a base may also be "elastic", a Winkler
+        foundation. The base of a hand is its part that faces downwards, its sides are the ends at
+        wrist and fingers, or the cuts of a file. `Sides` gives each side its own condition.
     base_stiffness : N/m3, traction per displacement of an elastic base, in every direction
-    layers : from the surface downwards; what is below them is of `material`
+    layers : from the surface downwards; `material` fills the rest
     relief : of a palm
     bone : of a finger
-    regions : name or number of a region of the mesh, and its material, where that is another than
-        `material`, as bone in soft tissue
-    file, unit, up : of a mesh, as `meshes.body_from_file` takes them
-    placement : how the body lies under the device
-    air : bool, whether air moves along on both sides of a sheet, as if in a baffle; or vacuum
-    mounting : which of the sides of a sheet are held, and how it is stretched
+    regions : name or number of a region of the mesh, and its material if it is not `material`, such
+        as bone in soft tissue
+    file, unit, up : of a mesh, as for `meshes.body_from_file`
+    placement : position and rotation under the device
+    air : bool, whether air moves with both sides of a sheet, as in a baffle; False for vacuum
+    mounting : which sides of a sheet are held, and how it is stretched
 
-    Raises
-    ------
-    ValueError
-        If a value is unknown, not finite or out of range.
+    Raises a ValueError if a value is unknown, not finite or out of range.
+
+    >>> Body(kind="slab", material="palm", depth=0.015).solid.shear_modulus
+    25000.0
     """
 
     kind: str = "slab"
@@ -82,7 +83,7 @@ class Body:
     height: float = 0.100
     depth: float = 0.015
     base: str = "clamped"
-    sides: str | Sides = USUAL
+    sides: str | Sides = DEFAULT_SIDE
     base_stiffness: float = 0.0
     layers: tuple[Layer, ...] = ()
     relief: Relief = PLAIN
@@ -99,7 +100,7 @@ class Body:
         kind = self.of_kind
         check_material(self.material)
         check_base(self.base, self.base_stiffness, depth=self.depth, is_plate=kind.is_plate)
-        object.__setattr__(self, "sides", complete(self.sides, kind.named_sides, self.kind))
+        object.__setattr__(self, "sides", complete_sides(self.sides, kind.named_sides, self.kind))
         for name in ("width", "height", "depth"):
             length, may_be_infinite = getattr(self, name), name == "depth" and kind.is_layer
             if not (length > 0 and (isfinite(length) or (may_be_infinite and length == inf))):
@@ -108,45 +109,48 @@ class Body:
                 )
             if isfinite(length) and length > LARGEST:
                 raise ValueError(
-                    f"body {name} = {length:g} m is more than {LARGEST:g} m; lengths are in metre "
-                    f"here: {length:g} mm are {name} = {length / 1e3:g}, or in a scene file "
-                    f"{KEYS[name]} = {length:g}"
+                    f"body {name} = {length:g} m exceeds {LARGEST:g} m; lengths are in metre: "
+                    f"{length:g} mm are {name} = {length / 1e3:g}, or {KEYS[name]} = {length:g} "
+                    "in a scene file"
                 )
         if kind.discretise and {self.base, *self.conditions} == {"free"}:
             raise ValueError(
-                "a body with free base and free sides is unconstrained and drifts; clamp one"
+                "a body with free base and free sides is unconstrained and drifts; clamp its "
+                "base or a side"
             )
         self._check_layers()
         check_regions(self.regions)
         if self.regions and "regions" not in kind.keys:
-            raise ValueError(f"a body of kind '{self.kind}' has no regions; leave them out")
+            raise ValueError(f"a body of kind '{self.kind}' cannot have regions; remove them")
         if ("file" in kind.keys) != bool(self.file):
             raise ValueError(
-                "a body of kind 'mesh' needs a file, no other has one; give it or leave it out"
+                "a body of kind 'mesh' needs a file, and no other kind takes one; add or remove it"
             )
         if self.air and "air" not in kind.keys:
-            raise ValueError(f"air = true is for a sheet, not a {self.kind}; leave it out")
+            raise ValueError(f"air = true is for a sheet, not a {self.kind}; remove it")
         self._check_sheet()
         kind.check(self)
 
     def _check_sheet(self) -> None:
-        """Refuse what only a sheet has, and supports that contradict each other."""
+        """Refuse properties that only a sheet has, and supports that contradict each other."""
         if self.solid.orthotropy is not None and not self.of_kind.is_plate:
             raise ValueError(
-                f"an orthotropic material is for a sheet, not a {self.kind}; take an isotropic one"
+                f"an orthotropic material is for a sheet, not a {self.kind}; use an isotropic "
+                "material"
             )
         if self.mounting == FRAME:
             return
         if "mounting" not in self.of_kind.keys:
-            raise ValueError(f"a mounting is for a sheet, not a {self.kind}; leave it out")
+            raise ValueError(f"a mounting is for a sheet, not a {self.kind}; remove it")
         if self.sides != "clamped":
             raise ValueError(
-                f'a mounting needs sides = "clamped", and they are {self.sides}; leave it out'
+                f'a mounting needs sides = "clamped", not {self.sides}; remove it or clamp the '
+                "sides"
             )
-        shaped = self.mounting.support == "simply" or self.mounting.is_curled
-        if shaped and self.placement.is_tilted:
+        needs_flat = self.mounting.support == "simply" or self.mounting.is_curled
+        if needs_flat and self.placement.is_tilted:
             raise ValueError(
-                "a sheet that is tilted has no simple support and no curl; leave out its tilt"
+                "a tilted sheet cannot have simple supports or a curl; remove its tilt"
             )
         check_extent(self.mounting, self.width, self.height)
 
@@ -154,13 +158,16 @@ class Body:
         if not self.layers:
             return
         if not self.of_kind.may_be_layered:
-            raise ValueError(f"a body of kind '{self.kind}' has no layers; leave them out")
+            raise ValueError(f"a body of kind '{self.kind}' cannot have layers; remove them")
         if any(solid_of(layer.material).orthotropy is not None for layer in self.layers):
-            raise ValueError("layers are isotropic; an orthotropic material is for a sheet")
+            raise ValueError(
+                "layers must be isotropic; use another material than an orthotropic one"
+            )
         if (below := sum(layer.thickness for layer in self.layers)) >= self.depth:
             raise ValueError(
-                f"the layers are {1e3 * below:g} mm thick in all, but the body is "
-                f"{1e3 * self.depth:g} mm deep; leave some of it for what is below them"
+                f"the layers are {1e3 * below:g} mm thick in total, but the body is only "
+                f"{1e3 * self.depth:g} mm deep; make them thinner, so that `material` fills the "
+                "rest"
             )
 
     @property
@@ -170,7 +177,7 @@ class Body:
 
     @property
     def solid(self) -> Material:
-        """The material itself, below all layers."""
+        """The material below all layers."""
         return solid_of(self.material)
 
     @property
@@ -190,17 +197,19 @@ class Body:
 
     @property
     def strata(self) -> tuple[tuple[float, Material], ...]:
-        """Depth in metre where each material begins; neighbours of one material are one."""
-        found: list[tuple[float, Material]] = []
+        """Depth in metre at which each material begins; neighbours of the same material are
+        merged.
+        """
+        strata: list[tuple[float, Material]] = []
         top = 0.0
         for thickness, material in [
             *((layer.thickness, solid_of(layer.material)) for layer in self.layers),
             (inf, self.solid),
         ]:
-            if not found or found[-1][1] != material:
-                found.append((top, material))
+            if not strata or strata[-1][1] != material:
+                strata.append((top, material))
             top += thickness
-        return tuple(found)
+        return tuple(strata)
 
     @property
     def interfaces(self) -> list[float]:
@@ -267,43 +276,44 @@ class Body:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BodyKind:
-    """Kind of body: the keys that it takes, how it is meshed, and what is known of its waves.
+    """Kind of body: the keys it takes, how it is meshed, and its waves.
+
+    Callables take a body first. Optional ones are None where a kind does not support them.
 
     Parameters
     ----------
-    name : str, `kind` in a scene
-    keys : attributes of `Body` that only kinds take which list them
-    presets : name of a preset body -> attributes that differ from those of `Body()`; missing keys
-        of a scene are those of the first
-    check : raises a ValueError for a body that cannot be
-    words : kind and size of a body in a few words
-    discretise : mesh of a body, with elements of a size in metre; None without anything to mesh
-    morph : called with the thinnest and the thickest body of a range and an element size in metre,
-        a function as `discretise` whose meshes have the same nodes, moved in proportion to the
-        thicknesses of the body's layers, so that its matrices are sums over few; None without any
-    equivalent : thickness in metre of the mesh of all bodies that are thinner, whose modulus and
-        density stand for it (`sheet.bending_equivalent`); None where each has its own mesh
-    grid_lines : lines (n,) in metre along x, y and z of the grid of its mesh, with elements of a
-        size in metre; None without a grid
-    check_size : raises a ValueError for an element size in metre that has too many elements
-    default_size : default element size of a body, metre
-    interactive_size : element size in metre for a response within seconds, with some per cent error
-    compliance : wavenumber integral of a laterally infinite body; None without any
-    dispersion : dispersion curves of a laterally infinite body of the same section, at
-        frequencies (f,) in Hz and of at most so many modes; None without any
+    name : `kind` in a scene
+    keys : attributes of `Body` that only the kinds that list them take
+    presets : name of a preset body -> attributes that differ from `Body()`; the first preset
+        supplies missing keys of a scene
+    check : raises a ValueError for a body that is not possible
+    words : kind and size in a few words
+    discretise : mesh for an element size in metre
+    morph : for the thinnest and the thickest body of a range and an element size in metre, a
+        function like `discretise` whose meshes have the same nodes, moved in proportion to the
+        layers, so that matrices are sums of few terms
+    equivalent : thickness in metre of the mesh that stands for all thinner bodies, with equivalent
+        modulus and density (`sheet.bending_equivalent`)
+    grid_lines : grid lines (n,) in metre along x, y and z for an element size in metre
+    check_size : raises a ValueError for an element size in metre that gives too many elements
+    default_size : default element size, metre
+    interactive_size : element size in metre for a response within seconds and errors of some per
+        cent
+    compliance : wavenumber integral of a laterally infinite body
+    dispersion : dispersion curves of a laterally infinite body of the same section, at frequencies
+        (f,) in Hz with at most so many modes
     wave_speed : phase speed in m/s of its surface waves at a frequency in Hz
-    named_sides : names of the sides that may have conditions of their own
-    is_plate : bool, whether it is thin, so that it bends, in-plane tension stiffens it, and air
-        adds mass
-    is_layer : bool, whether it is a layer of uniform depth, which may be inf
-    is_symmetric : bool, whether its mesh may be halved at x = 0 and y = 0
-    is_bounded : bool, whether width and height are those of its surface
-    may_be_layered : bool
-    actual_size : size in metre that a mesh of one asked for has, where cells come in whole numbers
-    conforming : bool, whether elements follow its layers
-    may_be_coated : bool, whether layers that elements do not resolve may be a coat
-    normal_patch : float, metre, standard deviation of the area about a probe whose mean normal is
-        the direction of its motion; 0 for the normal at the probe
+    named_sides : names of the sides that may have separate conditions
+    is_plate : whether it is thin: it bends, tension stiffens it, and air adds mass
+    is_layer : whether it is a layer of uniform depth, which may be inf
+    is_symmetric : whether its mesh may be halved at x = 0 and y = 0
+    is_bounded : whether width and height are those of its surface
+    may_be_layered : whether it may have layers
+    actual_size : size in metre of a mesh whose cells come in whole numbers
+    conforming : whether elements follow its layers
+    may_be_coated : whether layers thinner than elements may become a coat
+    normal_patch : metre, standard deviation of the area about a probe whose mean normal is the
+        direction of its motion; 0 for the normal at the probe
     """
 
     name: str
@@ -340,9 +350,10 @@ def _size(body: Body) -> str:
 
 
 def _rayleigh(body: Body, frequency: float) -> float:
-    """Phase speed in m/s of the Rayleigh wave of a body's softest material, as if it were deep: in
-    a layer that is thin beside the wavelength waves run faster. w / Re k with k = w / (c_R/c_s
-    sqrt(mu*/rho)) and mu* = `Material.complex_modulus`.
+    """Phase speed in m/s of the Rayleigh wave of the softest material, as if the body were deep.
+
+    It is w / Re k with k = w / (c_R/c_s sqrt(mu*/rho)) and mu* = `Material.complex_modulus`. Waves
+    in layers that are thin compared with the wavelength are faster.
     """
     solid = body.softest
     slowness = 1 / np.sqrt(solid.complex_modulus(2 * np.pi * frequency) / solid.density)
@@ -354,8 +365,10 @@ BODIES: dict[str, Body] = {}  # presets by name
 
 
 def register(kind: BodyKind) -> BodyKind:
-    """Add a kind of body and its presets to those that scenes may have; raises a ValueError for a
-    known name. Presets of a known kind need no kind of their own: `BODIES[name] = Body(...)`.
+    """Add a kind of body and its presets; raises a ValueError for a name that is already
+    registered.
+
+    A preset of a known kind needs no registration: `BODIES[name] = Body(...)`.
     """
     extensions.add(KINDS, kind.name, kind, kind.discretise)
     for name, own in kind.presets.items():
@@ -364,19 +377,19 @@ def register(kind: BodyKind) -> BodyKind:
 
 
 def kind_of(name: str) -> BodyKind:
-    """The kind of a name; raises a ValueError if there is none."""
+    """Return the kind of a name; raises a ValueError if it is unknown."""
     if name not in KINDS:
         extensions.load()
     return KINDS[choose("body kind", name, KINDS)]
 
 
 def body_name(body: Body) -> str:
-    """The name of a preset body, or else the kind of a body."""
+    """Return the name of a preset body, or the kind of any other body."""
     return next((name for name, known in BODIES.items() if known == body), body.kind)
 
 
 def _no_wave(body: Body, frequency: float) -> float:
-    raise ValueError("body kind 'none' carries no wave; choose a sheet or a slab")
+    raise ValueError("body kind 'none' has no waves; choose a sheet or a slab")
 
 
 NONE = register(  # what the point kernel acts on

@@ -1,4 +1,4 @@
-"""A body that is meshed, with its materials and boundary conditions, under the device."""
+"""A meshed body with its materials and boundary conditions, placed under the device."""
 
 from dataclasses import dataclass, field, replace
 
@@ -13,19 +13,20 @@ from meshes import TetMesh, half
 from simple_model.layers.material import Material
 from skinwave.bodies.body import Body
 from skinwave.bodies.discretised import Discretise
-from skinwave.bodies.sizes import checked, default_size
-from skinwave.bodies.supports import bed, together
+from skinwave.bodies.sizes import check_element_size, default_size
+from skinwave.bodies.supports import combined, winkler_foundation
 from skinwave.typing import Bools, Floats, Ints
 
-# Of a size that is asked for: a mesh that it is compared with may be so much coarser.
-COMPARED = 4 / 3
+COMPARED = 4 / 3  # of the coarsest element size: limit of meshes that estimate errors
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Build:
-    """Meshed body: arguments of `fem.assemble`; `coat` and `support` of a hand, or None; `drag`
-    (m,) in 1/s of the absorbing layer, or None; `held` (n, 3) components beside those `fixed`, or
-    None; `stiffener` and `tension` of a sheet, or None, and `axes` (2, 3) along its sides.
+    """Meshed body, as arguments of `fem.assemble`.
+
+    `fixed` are facet sets with their fixed components; `held` (n, 3) are additional fixed
+    components. `drag` (m,) in 1/s is that of the absorbing layer. `coat` and `support` are those of
+    a hand, `stiffener`, `tension` and `axes` (2, 3) along the sides those of a sheet.
     """
 
     mesh: TetMesh
@@ -43,7 +44,7 @@ class Build:
 
     @property
     def constraints(self) -> dict[str, str] | Bools:
-        """All components that are fixed."""
+        """All fixed components."""
         if self.held is None:
             return self.fixed
         return self.held | fixed_dofs(self.mesh, self.fixed).reshape(-1, 3)
@@ -55,16 +56,15 @@ def build(
     symmetry: str = "",
     discretise: Discretise | None = None,
 ) -> Build:
-    """Mesh of a body with its materials and boundary conditions.
+    """Mesh a body with its materials and boundary conditions.
 
-    `h` is the element size in metre, by default that of the body. Across the axes of `symmetry`, of
-    "xy", the load is its own mirror image: only the part with positive coordinates is meshed, with
-    symmetry conditions. `discretise` replaces that of the kind. Raises a ValueError if the body has
-    no such mesh.
+    `h` is the element size in metre, by default that of the body. Across the axes of `symmetry`,
+    "x", "y" or "xy", only the part at positive coordinates is meshed, with symmetry conditions.
+    `discretise` replaces that of the kind. Raises a ValueError if the body has no such mesh.
     """
-    size = checked(body, h or default_size(body), COMPARED)
+    size = check_element_size(body, h or default_size(body), COMPARED)
     discretise = discretise or body.of_kind.discretise
-    assert discretise  # else refused
+    assert discretise  # checked with the size
     made = discretise(body, size)
     mesh = made.mesh
     sides = {"sides": body.sides} if isinstance(body.sides, str) else body.sides.by_name
@@ -79,14 +79,16 @@ def build(
     drag = made.drag(mesh) if made.drag else None
     support = made.support(mesh) if made.support else None
     if ends.get("bottom") == "elastic":
-        support = together(support, bed(mesh, mesh.facets["bottom"], body.base_stiffness))
+        support = combined(
+            support, winkler_foundation(mesh, mesh.facets["bottom"], body.base_stiffness)
+        )
     held = made.held(mesh) if made.held else None
     stiffener = made.stiffener(mesh) if made.stiffener else None
     is_fixed = "xyz" in fixed.values() or held is not None
     if body.is_held and not is_fixed and not (support and support.stiffness.any()):
         raise ValueError(
-            f"the sides are clamped, but {body.file} has no facets 'sides' or 'cut' to fix; clamp "
-            "its base, or name them in the file"
+            f"the sides are clamped, but {body.file} has no facet set 'sides' or 'cut'; clamp "
+            "the base, or name the facets in the file"
         )
     mesh = replace(mesh, points=body.placement(mesh.points))
     leaky = [mesh.facets[name] for name, end in ends.items() if end == "absorbing"]
@@ -107,7 +109,7 @@ def build(
 
 
 def operators(build: Build) -> Operators:
-    """Stiffness, damping and mass of a meshed body."""
+    """Return the stiffness, damping and mass of a meshed body."""
     return assemble(
         build.mesh,
         build.material,

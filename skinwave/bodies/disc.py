@@ -1,4 +1,4 @@
-"""Disc: a cylinder on its base, such as a silicone that stands for skin."""
+"""Disc: a cylinder on its base, such as silicone that stands for skin."""
 
 from dataclasses import replace
 
@@ -11,21 +11,23 @@ from skinwave.bodies.discretised import Discretise, Discretised, in_layers
 
 
 def check(body: Body) -> None:
-    """Refuse what is not round; raises a ValueError."""
+    """Refuse a disc that is not round."""
     if body.width != body.height:
         raise ValueError(
-            f"a disc is {1e3 * body.width:g} mm wide along x and {1e3 * body.height:g} mm along y; "
-            "give it one diameter as size_x_mm and size_y_mm"
+            f"a disc is {1e3 * body.width:g} mm wide along x but {1e3 * body.height:g} mm along "
+            "y; give the same diameter as size_x_mm and size_y_mm"
         )
 
 
 def discretise(body: Body, h: float) -> Discretised:
-    """Ten-node tetrahedra of at most h in metre, in even rings and the body's layers."""
+    """Return ten-node tetrahedra of at most h in metre, in equal rings and the layers of
+    the body.
+    """
     return _in_strata(body, disc(body.width, body.depth, h, body.interfaces[1:-1]))
 
 
 def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
-    """Mesh of the thickest disc, whose layers are stretched to those of another."""
+    """Return a mesher that stretches the layers of the thickest disc to those of another."""
     mesh = discretise(thickest, h).mesh
 
     def moved(body: Body, h: float) -> Discretised:

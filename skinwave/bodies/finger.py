@@ -3,17 +3,17 @@
 from dataclasses import replace
 
 from meshes import Fingertip, fingertip_mesh
-from meshes.volume.fingertip import quarter_of, shells_of
+from meshes.volume.fingertip import quarter_circumference, shell_count
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised
 from skinwave.bodies.sizes import coarsest_size
-from skinwave.bodies.tissue import in_its_layers
+from skinwave.bodies.tissue import in_tissue_layers
 
-SIZE = 1.5e-3  # m: within 0.2 % of elements of 1.2 mm, those of 3 mm within 2.3 %
+SIZE = 1.5e-3  # m: within 0.2 % of elements of 1.2 mm; those of 3 mm are within 2.3 %
 
 
 def shape(body: Body) -> Fingertip:
-    """The fingertip that outline and bone describe."""
+    """Return the fingertip that outline and bone describe."""
     return Fingertip(
         breadth=body.width, length=body.height, thickness=body.depth,
         bone_breadth=body.bone.breadth, bone_thickness=body.bone.thickness, cover=body.bone.cover,
@@ -22,15 +22,15 @@ def shape(body: Body) -> Fingertip:
 
 
 def actual_size(body: Body, h: float) -> float:
-    """Size in metre of the cells at the skin of a mesh of h, whose shells are a whole number."""
-    return quarter_of(shape(body)) / shells_of(shape(body), h)
+    """Return the cell size in metre at the skin of a mesh with a whole number of shells."""
+    return quarter_circumference(shape(body)) / shell_count(shape(body), h)
 
 
 def discretise(body: Body, h: float) -> Discretised:
-    """Ten-node tetrahedra of h in metre at the skin, with the region `bone`."""
+    """Return ten-node tetrahedra of h in metre at the skin, with the region `bone`."""
     mesh = fingertip_mesh(shape(body), h)
     facets = {name: mesh.facets[name] for name in ("top", "sides")}
-    return in_its_layers(body, h, replace(mesh, facets=facets))
+    return in_tissue_layers(body, h, replace(mesh, facets=facets))
 
 
 FINGER = register(

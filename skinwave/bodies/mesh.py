@@ -9,36 +9,36 @@ from meshes import TetMesh, body_from_file, boundary_facets, quadratic
 from meshes.facets import visible_from_above
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised
-from skinwave.bodies.tissue import hand_size, in_its_layers
+from skinwave.bodies.tissue import hand_size, in_tissue_layers
 from skinwave.typing import Ints
 
-NORMAL_PATCH = 3e-3  # m, standard deviation: two thirds of the focal spot's
+NORMAL_PATCH = 3e-3  # m, standard deviation: two thirds of that of the focal spot
 
 
 def discretise(body: Body, h: float) -> Discretised:
-    """Ten-node tetrahedra about the middle of a hand, growing away from it.
+    """Return ten-node tetrahedra about the middle of a hand, growing away from it.
 
-    The facet sets are `top`, seen from above, the file's own `bottom`, and `sides` where it was cut
-    or has a set of that name. All else that it rests on is its support.
+    Facet sets are `top`, a `bottom` that the file names, and `sides` where it was cut or names
+    them. The support acts on the other facets that face downwards.
     """
     mesh = quadratic(body_from_file(body.file, h, unit=body.unit, up=body.up))
     cut = [mesh.facets[name] for name in ("cut", "sides") if name in mesh.facets]
     facets = {"top": mesh.facets["top"], "sides": np.vstack([mesh.facets["top"][:0], *cut])}
-    if not _is_rest(mesh):
+    if not _is_remainder(mesh):
         facets["bottom"] = mesh.facets["bottom"]
     mesh = replace(mesh, facets=facets)
-    return in_its_layers(body, h, mesh)
+    return in_tissue_layers(body, h, mesh)
 
 
-def _is_rest(mesh: TetMesh) -> bool:
-    """Whether `bottom` is all of the boundary that is not seen from above, but for the cut."""
-    unseen = boundary_facets(mesh.tets)[~visible_from_above(mesh)]
+def _is_remainder(mesh: TetMesh) -> bool:
+    """Whether `bottom` is all of the boundary that is not visible from above, except the cut."""
+    hidden = boundary_facets(mesh.tets)[~visible_from_above(mesh)]
     cut = _corners(mesh.facets["cut"]) if "cut" in mesh.facets else set()
-    return _corners(mesh.facets["bottom"]) | cut == _corners(unseen) | cut
+    return _corners(mesh.facets["bottom"]) | cut == _corners(hidden) | cut
 
 
 def _corners(facets: Ints) -> set[tuple[int, ...]]:
-    """The corners of each facet, in rising order."""
+    """The corners of each facet in ascending order."""
     return set(map(tuple, np.sort(facets[:, :3], axis=1).tolist()))
 
 

@@ -21,10 +21,10 @@ from meshes.shapes.structured import Lines, mirrored
 from skinwave.bodies.analytic import stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised
-from skinwave.bodies.tissue import HAND_CELL, hand_size, in_its_layers, support
+from skinwave.bodies.tissue import HAND_CELL, hand_size, in_tissue_layers, support
 
-COARSEST = 2.0  # elements far from the middle, over those of h
-RIM = 0.7  # elements at the rim of a palm, over the radius of its edge
+COARSEST = 2.0  # largest elements far from the middle, over h
+RIM = 0.7  # largest elements at the rim, over the radius of the edge
 # Elements at the surface, over those of h, because the motion there has the scale of the focal
 # spot; up to which radius they have that size; and how much slower than sideways they grow
 # downwards.
@@ -36,33 +36,35 @@ CELL = 0.85
 
 
 def discretise(body: Body, h: float) -> Discretised:
-    """Ten-node tetrahedra of h in metre about the middle of the palm, growing away from it; all
-    that it rests on is its support, bone below, and at its ends the tissue that it is cut from.
+    """Return ten-node tetrahedra of h in metre about the middle of the palm, growing away from it.
+
+    The support below stands for bone, that at both ends for the tissue that was cut.
     """
     try:
         mesh = mapped_palm(body.palm, *body_lines(body, h))
     except MeshError as error:
         raise MeshError(
-            "this palm has no mesh: its relief is too steep; lower thenar_height_mm, "
-            "hypothenar_height_mm, pad_height_mm or cup_depth_mm, or take a mesh from a file"
+            "this palm cannot be meshed, because its relief is too steep; reduce "
+            "thenar_height_mm, hypothenar_height_mm, pad_height_mm or cup_depth_mm, or use a "
+            "mesh from a file"
         ) from error
     mesh = replace(mesh, facets={"top": mesh.facets["top"]})
-    return in_its_layers(body, h, mesh, partial(_support, body))
+    return in_tissue_layers(body, h, mesh, partial(_support, body))
 
 
 def _coarsest(body: Body, h: float) -> float:
-    """Largest element: larger ones do not follow the rim, where waves reflect."""
+    """Largest element; larger ones do not follow the rim, where waves reflect."""
     return max(SURFACE * h, min(COARSEST * h, RIM * body.palm.edge_radius))
 
 
 def body_lines(body: Body, h: float) -> Lines:
-    """Grid lines in metre of the box around a palm; cells grow away from its middle."""
+    """Return grid lines in metre of the box around a palm, with cells that grow from its middle."""
     side = CELL * max(1.0, HAND_CELL / h) ** (1 / 3)
     finest, coarsest = side * SURFACE * h, side * _coarsest(body, h)
     along = Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=coarsest)
     x, y = (mirrored(graded_axis(side / 2, finest, along)) for side in (body.width, body.height))
-    # No cell is higher than asked for: two element sizes that are compared then have different
-    # numbers of layers more often, and one more changes as much as all that is beside it.
+    # No cell is higher than its target size. Two meshes that are compared then differ more often in
+    # their number of layers, which affects the error most.
     heights = [finest]
     while (below := sum(heights)) < body.depth:
         heights.append(min(heights[-1] * GROWTH**DOWNWARDS, coarsest))
@@ -70,7 +72,7 @@ def body_lines(body: Body, h: float) -> Lines:
 
 
 def _support(body: Body, mesh: TetMesh) -> fem.Support:
-    """Support below and at both ends, by the normals of the palm's level set."""
+    """Support below and at both ends, by the normals of the level set."""
     slope = gradient(body.palm, facet_points(mesh, boundary_facets(mesh.tets)))
     outward = np.asarray(slope / np.linalg.norm(slope, axis=1, keepdims=True))
     ends = [(body.side("front"), -outward[:, 1]), (body.side("back"), outward[:, 1])]

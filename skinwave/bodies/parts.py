@@ -1,4 +1,4 @@
-"""Parts of a body: its layers, the relief of a palm, and its placement under the device."""
+"""Parts of a body: layers, relief of a palm, bone of a finger, and placement under the device."""
 
 from __future__ import annotations
 
@@ -21,12 +21,7 @@ class Layer:
     Parameters
     ----------
     thickness : float, metre
-    material : the name of a preset, or a Material
-
-    Raises
-    ------
-    ValueError
-        If the material is unknown, or the thickness not finite and above 0.
+    material : name of a preset, or a Material
     """
 
     thickness: float
@@ -42,8 +37,10 @@ class Layer:
 
 @dataclass(frozen=True, kw_only=True)
 class Relief:
-    """Relief of a palm, in metre, as in `meshes.Palm`; with all heights 0 a slab with rounded
-    edges. What is not given, None, is an adult's where that fits the palm, or else lower.
+    """Relief of a palm, in metre, as for `meshes.Palm`; with all heights 0, a slab with rounded
+    edges.
+
+    Values of None are those of an adult, reduced where the palm is too small for them.
     """
 
     cup_depth: float | None = None
@@ -54,7 +51,7 @@ class Relief:
     edge_radius: float | None = None
 
     def of(self, breadth: float, length: float, thickness: float) -> Palm:
-        """The palm of a size in metre with this relief."""
+        """Return the palm of a size in metre with this relief."""
         thin = min(1.0, thickness / (2 * EDGE_RADIUS))
         corner = min(Palm.corner_radius, ROUNDEST * min(breadth, length) / 2)
         usual = {
@@ -71,16 +68,18 @@ class Relief:
 
 EDGE_RADIUS = 7e-3  # m: soft tissue on bone is thinner than a whole hand
 ROUNDEST = 0.95  # of half the shorter side: rounder outlines have no straight side to mesh
-
-
 PLAIN = Relief()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Phalanx:
-    """Bone in a finger, in metre: its breadth and thickness, and the soft tissue between it and the
-    pad, `cover`, and the tip, as in `meshes.Fingertip`. Rounded, of an adult's index finger; no
-    finger was measured.
+    """Bone in a finger. The defaults are rounded values of an adult's index finger, not
+    measurements.
+
+    Parameters
+    ----------
+    breadth, thickness : float, metre
+    cover, tip : float, metre, of soft tissue between the pad, or the tip, and the bone
     """
 
     breadth: float = 0.007
@@ -94,19 +93,14 @@ PHALANX = Phalanx()
 
 @dataclass(frozen=True, kw_only=True)
 class Placement:
-    """Where a body lies under the device: turned about the x axis, then about the y axis of the
-    plane that the focus moves in, then moved.
+    """Position of a body under the device: rotated about the x axis, then about the y axis, then
+    moved.
 
     Parameters
     ----------
     tilt_x, tilt_y : float, rad, at most 60 degrees
     offset : (x, y) in metre
-    lift : float, metre, upwards, towards the device
-
-    Raises
-    ------
-    ValueError
-        If a value is not finite or out of range.
+    lift : float, metre, towards the device
     """
 
     tilt_x: float = 0.0
@@ -118,30 +112,32 @@ class Placement:
         for name in ("tilt_x", "tilt_y"):
             if not abs(getattr(self, name)) <= STEEPEST:
                 raise ValueError(
-                    f"{name} = {np.degrees(getattr(self, name)):g} degrees is beyond "
-                    f"{np.degrees(STEEPEST):.0f}, where next to no pressure is left; turn it less"
+                    f"{name} = {np.degrees(getattr(self, name)):g} degrees exceeds "
+                    f"{np.degrees(STEEPEST):.0f} degrees, where almost no pressure acts; tilt it "
+                    "less"
                 )
         if not (np.isfinite(self.offset).all() and abs(self.lift) <= FURTHEST_LIFT):
             raise ValueError(
                 f"offset {self.offset} m and lift {self.lift} m: the body must lie within "
-                f"{1e3 * FURTHEST_LIFT:g} mm of the focus; move the height of the focus with it"
+                f"{1e3 * FURTHEST_LIFT:g} mm of the focus; change the height of the focus "
+                "instead"
             )
 
     @property
     def is_tilted(self) -> bool:
-        """Whether it is turned, and not only moved."""
+        """Whether the body is rotated."""
         return bool(self.tilt_x or self.tilt_y)
 
     @property
     def rotation(self) -> Floats:
-        """The matrix (3, 3) that turns the body."""
+        """The rotation matrix (3, 3) of the body."""
         (cx, cy), (sx, sy) = np.cos([self.tilt_x, self.tilt_y]), np.sin([self.tilt_x, self.tilt_y])
         about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
         about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
         return about_y @ about_x
 
     def __call__(self, points: Floats) -> Floats:
-        """Points (n, 3) of the body where they lie under the device."""
+        """Return points (n, 3) of the body at their position under the device."""
         if self == FLAT:
             return points
         return points @ self.rotation.T + [*self.offset, self.lift]
@@ -152,25 +148,25 @@ FLAT = Placement()
 
 
 def solid_of(material: str | Material) -> Material:
-    """The material that a name stands for."""
+    """Return the material of a name, or the given one."""
     return PRESETS[material] if isinstance(material, str) else material
 
 
 def check_regions(regions: Sequence[tuple[str, str | Material]]) -> None:
-    """Refuse regions of one name, and materials of them that are unknown or orthotropic."""
+    """Refuse duplicate regions, and regions of unknown or orthotropic materials."""
     names = [name for name, _ in regions]
     if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise ValueError(f"region '{twice[0]}' has two materials; give it one")
+        raise ValueError(f"region '{twice[0]}' has two materials; give one")
     for name, material in regions:
         check_material(material)
         if solid_of(material).orthotropy is not None:
             raise ValueError(
-                f"the material of region '{name}' is orthotropic, which is for a sheet; give it a "
-                "shear_modulus and a Poisson's ratio"
+                f"the material of region '{name}' is orthotropic, which only a sheet can be; use "
+                "an isotropic material"
             )
 
 
 def check_material(material: str | Material) -> None:
-    """Refuse the name of a material that is no preset."""
+    """Refuse the name of an unknown material."""
     if isinstance(material, str):
         choose("material", material, PRESETS)

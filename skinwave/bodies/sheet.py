@@ -1,4 +1,4 @@
-"""Thin sheet, which bends: paper in a frame. Its waves, its air, and its mesh."""
+"""Thin sheet, which bends: paper in a frame. Its waves, its air and its mesh."""
 
 from dataclasses import replace
 from functools import partial
@@ -19,23 +19,21 @@ from simple_model.layers.material import Material
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.build import Build
 from skinwave.bodies.discretised import Discretised
-from skinwave.bodies.supports import Mounting, clip_lines, held
+from skinwave.bodies.supports import Mounting, clip_lines, held_components
 from skinwave.typing import Bools, Floats, Ints
 
 SHEET_CELLS = 60  # along the shorter side: f1 within 0.1 %, deflection within 0.6 %
-# A sheet bends like one of this relative thickness with the same bending stiffness and mass per
-# area, and thicker elements are far more accurate: thin ones lock.
+# Thickness of the elements over the shorter side. A sheet of equal bending stiffness and mass per
+# area bends alike, and thick elements are far more accurate because thin ones lock.
 SHEET_THICKNESS = 0.01
-CLIP_THICKNESS = 0.1  # of the radius of a clip: frequencies within 0.15 % of a thin plate's
+CLIP_THICKNESS = 0.1  # over the radius of a clip: frequencies within 0.15 % of a thin plate
 PAPER = {"depth": 1e-4, "base": "free", "sides": "clamped"}
-OF_A_SIZE = {"material": "paper-grain", "air": True, **PAPER}
-AIR_TURNS = 30  # each leaves a quarter of the error, or less
+PAPER_SIZE = {"material": "paper-grain", "air": True, **PAPER}
+AIR_ITERATIONS = 30  # each leaves at most a quarter of the error
 
 
 def discretise(body: Body, h: float, thickness: float | None = None) -> Discretised:
-    """Mesh of a thicker sheet of the same bending stiffness and mass per area, with elements of h
-    in metre; its `thickness` is no less than the sheet's own, and by default that of `equivalent`.
-    """
+    """Return the mesh of a thicker sheet of the same bending stiffness and mass per area."""
     thickness = max(body.depth, thickness or equivalent(body))
     planes = [clip_lines(body.mounting, *each) for each in enumerate((body.width, body.height))]
     return Discretised(
@@ -48,13 +46,15 @@ def discretise(body: Body, h: float, thickness: float | None = None) -> Discreti
 
 
 def _held(body: Body, mesh: TetMesh) -> Bools:
-    """Components (n, 3) that are held: all of a node, if the sheet is tilted."""
-    found = held(body.mounting, mesh)
-    return found | (found.any(axis=1, keepdims=True) & body.placement.is_tilted)
+    """Held components (n, 3) of nodes; those of a tilted sheet are held completely."""
+    components = held_components(body.mounting, mesh)
+    return components | (components.any(axis=1, keepdims=True) & body.placement.is_tilted)
 
 
 def equivalent(body: Body) -> float:
-    """Thickness in metre of elements, small beside the sheet and its clips."""
+    """Return the thickness in metre of the elements, small compared with the sheet and its
+    clips.
+    """
     least = SHEET_THICKNESS * min(body.width, body.height)
     reach = body.mounting.clip_radius if body.mounting.clips else 0.0
     return min(least, CLIP_THICKNESS * reach) if reach else least
@@ -65,23 +65,22 @@ def _curl(body: Body, mesh: TetMesh) -> sparse.csr_array:
     middle = Membrane(triangles=middle_plane(mesh), thickness=body.depth, material=body.solid)
     rise = np.array([body.mounting.curl_x, body.mounting.curl_y])
     curvature = -8 * rise / np.array([body.width, body.height]) ** 2
-    meshed = (body.depth / float(np.ptp(mesh.points[:, 2]))) ** 2  # as of `bending_equivalent`
+    meshed = (body.depth / float(np.ptp(mesh.points[:, 2]))) ** 2  # as for `bending_equivalent`
     return shell_stiffness(mesh, middle, lambda at: curvature * at, meshed=meshed)
 
 
 def tension(body: Body) -> Tension | None:
-    """Tension of a sheet; None without any."""
+    """Return the tension of a sheet, or None."""
     if not body.mounting.is_stretched:
         return None
-    x, y = body.mounting.tension_x, body.mounting.tension_y
-    return Tension(x=x, y=y)
+    return Tension(x=body.mounting.tension_x, y=body.mounting.tension_y)
 
 
 def bending_equivalent(material: Material, ratio: float) -> Material:
-    """Material of a thicker sheet of the same bending stiffness and mass per area; `ratio` is that
-    of the thicknesses, original over equivalent.
+    """Return the material of a thicker sheet of the same bending stiffness and mass per area.
 
-    Bending stiffness goes with E d^3, mass per area with rho d. Valid for linear bending only.
+    `ratio` is the original thickness over the equivalent one. Bending stiffness scales with E d^3,
+    mass per area with rho d. Valid for linear bending only.
     """
     return replace(material.scaled(modulus=ratio**3), density=material.density * ratio)
 
@@ -90,20 +89,20 @@ def _check_size(body: Body, h: float) -> None:
     check_size(2 * max(1, round_up(side / (2 * h))) for side in (body.width, body.height))
 
 
-def check_alike(body: Body) -> None:
-    """Refuse a sheet whose waves depend on their direction, as an infinite one, by a ValueError."""
+def check_isotropic(body: Body) -> None:
+    """Refuse a sheet whose waves depend on their direction."""
     x, y = body.mounting.tension_x, body.mounting.tension_y
     if body.solid.orthotropy is not None or x != y or body.mounting.is_curled:
-        what = "orthotropic" if x == y else f"stretched by {x:g} and {y:g} N/m along x and y"
-        what = "curled" if body.mounting.is_curled else what
+        reason = "orthotropic" if x == y else f"stretched by {x:g} and {y:g} N/m along x and y"
+        reason = "curled" if body.mounting.is_curled else reason
         raise ValueError(
-            f"the wavenumber integral is of waves alike in all directions, and this sheet is {what}"
-            "; take a flat one of an isotropic material and equal tensions"
+            "the wavenumber integral needs equal waves in all directions, but this sheet is "
+            f"{reason}; use a flat sheet of an isotropic material with equal tensions"
         )
 
 
 def compliance(body: Body) -> Compliance:
-    """Compliance of an infinite sheet; of one whose directions differ, that of their means."""
+    """Return the compliance of an infinite sheet, with the mean properties of its directions."""
     return thin_sheet(
         body.solid, body.depth, air_density=AIR_DENSITY if body.air else 0.0,
         tension=body.mounting.mean_tension,
@@ -111,8 +110,8 @@ def compliance(body: Body) -> Compliance:
 
 
 def dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
-    """Dispersion curves of an infinite sheet: its bending wave and near field."""
-    check_alike(body)
+    """Return the dispersion curves of an infinite sheet: its bending wave and near field."""
+    check_isotropic(body)
     return sheet_curves(
         body.solid, body.depth, frequencies, air_density=AIR_DENSITY if body.air else 0.0,
         tension=body.mounting.mean_tension,
@@ -120,8 +119,10 @@ def dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
 
 
 def bending_wavenumber(body: Body, frequency: float) -> float:
-    """Bending wavenumber k of an infinite sheet, rad/m, at a frequency in Hz:
-    D k^4 + T k^2 = (m + 2 rho / k) w^2, with the means D and T of an orthotropic one's directions.
+    """Return the bending wavenumber k in rad/m of an infinite sheet at a frequency in Hz.
+
+    It solves D k^4 + T k^2 = (m + 2 rho / k) w^2, with the mean D and T of the directions of an
+    orthotropic sheet.
     """
     w, D = 2 * pi * frequency, body.bending_stiffness
     half = body.mounting.mean_tension / 2 / D
@@ -130,13 +131,13 @@ def bending_wavenumber(body: Body, frequency: float) -> float:
         return sqrt(sqrt(half**2 + mass * w**2 / D) - half)
 
     k = without_air(body.mass_per_area)
-    for _ in range(AIR_TURNS if body.air and w else 0):
+    for _ in range(AIR_ITERATIONS if body.air and w else 0):
         k = without_air(body.mass_per_area + 2 * AIR_DENSITY / k)
     return k
 
 
 def air_mass(body: Body, frequency: float) -> float:
-    """Added mass 2 rho / k, kg/m2, of the air on both sides of a sheet at a frequency in Hz.
+    """Return the added mass 2 rho / k, kg/m2, of the air on both sides at a frequency in Hz.
 
     Junger and Feit, Sound, Structures, and Their Interaction (1986), section 5.11.
     """
@@ -144,22 +145,23 @@ def air_mass(body: Body, frequency: float) -> float:
 
 
 def open_air(body: Body) -> str:
-    """How a sheet is held around whose free edges air flows; "" if there is none."""
+    """Return how a sheet with air around free edges is held, or an empty text."""
     if not body.air or (body.sides == "clamped" and body.mounting.is_frame):
         return ""
     return body.mounting.words if body.sides == "clamped" else f"with {body.sides} sides"
 
 
 def refuse_open_air(body: Body) -> None:
-    """Refuse, by a ValueError, air that flows around a free edge, which elements do not have."""
+    """Refuse air that flows around a free edge, which elements do not model."""
     if how := open_air(body):
         raise ValueError(
-            f"elements have air around a sheet in a frame, not around one {how}; leave out its air"
+            f"finite elements model air around a sheet in a frame, not around one {how}; remove "
+            "its air"
         )
 
 
 def air(body: Body, build: Build, free: Ints) -> LinearOperator | None:
-    """Added mass in kg of the air around a meshed sheet; None in vacuum."""
+    """Return the added mass in kg of the air around a meshed sheet, or None in vacuum."""
     if not body.air:
         return None
     refuse_open_air(body)
@@ -171,20 +173,20 @@ SHEET = register(
     BodyKind(
         name="sheet",
         keys=("air", "mounting"),
-        # A sheet described by hand starts from the first. A sizes lie across, with air and their
-        # grain along x. docs/sheets.md says why "paper-sheet" is the one it is.
+        # The first supplies missing keys of scenes. A sizes have air and their grain along x.
+        # docs/sheets.md explains the numbers of "paper-sheet".
         presets={
             "paper-sheet-loose": {"material": "paper", **PAPER},
             "paper-sheet": {
                 "width": 0.148,
                 "height": 0.105,
-                **OF_A_SIZE,
+                **PAPER_SIZE,
                 "depth": 107e-3 / 800.0,
                 "mounting": Mounting(tension_x=49.0, tension_y=15.0),
             },
-            "a4-sheet": {"width": 0.297, "height": 0.210, **OF_A_SIZE},
-            "a5-sheet": {"width": 0.210, "height": 0.148, **OF_A_SIZE},
-            "a6-sheet": {"width": 0.148, "height": 0.105, **OF_A_SIZE},
+            "a4-sheet": {"width": 0.297, "height": 0.210, **PAPER_SIZE},
+            "a5-sheet": {"width": 0.210, "height": 0.148, **PAPER_SIZE},
+            "a6-sheet": {"width": 0.148, "height": 0.105, **PAPER_SIZE},
         },
         discretise=discretise,
         equivalent=equivalent,

@@ -23,24 +23,26 @@ from skinwave.bodies.supports import EDGES
 from skinwave.typing import Floats
 
 SLAB_CELL = 3e-3  # m: two thirds of the focal spot's standard deviation
-# From cell to cell along the surface and downwards, and the coarsest cell over the finest.
+# Size ratio of neighbouring cells along the surface and downwards; coarsest cell over finest.
 GROWTH, COARSEST = (1.4, 1.25), (3.0, 2.0)
 
 
 def discretise(body: Body, h: float, wider: float = 1.0) -> Discretised:
-    """Structured mesh in layers, with an absorbing layer so many times `wider`."""
+    """Return a structured mesh in layers, with an absorbing layer `wider` times as wide as
+    usual.
+    """
     return on_lines(body, body_lines(body, h), wider)
 
 
 def morph(thinnest: Body, thickest: Body, h: float) -> Discretise:
-    """Mesh of the thickest slab, whose layers are stretched to those of another."""
+    """Return a mesher that stretches the layers of the thickest slab to those of another."""
     x, y, z = body_lines(thickest, h)
-    before = thickest.interfaces
-    return lambda body, h: on_lines(body, (x, y, -np.interp(-z, before, body.interfaces)))
+    depths = thickest.interfaces
+    return lambda body, h: on_lines(body, (x, y, -np.interp(-z, depths, body.interfaces)))
 
 
 def on_lines(body: Body, lines: Lines, wider: float = 1.0) -> Discretised:
-    """Structured mesh on grid lines, which planes between layers replace where close."""
+    """Return a structured mesh on grid lines, moved onto the planes between layers."""
     x, y, z = lines
     planes = [-start for start, _ in body.strata[1:]]
     mesh = extrude(*_extended(body, (x, y, with_planes(z, planes)), wider))
@@ -54,19 +56,19 @@ def on_lines(body: Body, lines: Lines, wider: float = 1.0) -> Discretised:
 
 
 def body_lines(body: Body, h: float) -> Lines:
-    """Grid lines along x, y and z through a body: fine where the focus travels."""
+    """Return grid lines along x, y and z through a body, fine where the focus travels."""
     along = Grading(radius=FINE_RADIUS, growth=GROWTH[0], coarsest=COARSEST[0] * h)
     x, y = (mirrored(graded_axis(side / 2, h, along)) for side in (body.width, body.height))
     return x, y, -_depth_line(body, h)[::-1]
 
 
 def slab_lines(body: Body, h: float) -> Lines:
-    """The same with those of any absorbing layer."""
+    """Return the grid lines of a body with those of any absorbing layer."""
     return _extended(body, body_lines(body, h))
 
 
 def _extended(body: Body, lines: Lines, wider: float = 1.0) -> Lines:
-    """Grid lines through a body, with an absorbing layer where an end has one."""
+    """Grid lines through a body, with an absorbing layer at its absorbing ends."""
     if not has_layer(body):
         return lines
     layer, (x, y, z) = layer_of(body, wider), lines
@@ -74,12 +76,16 @@ def _extended(body: Body, lines: Lines, wider: float = 1.0) -> Lines:
     def beyond(line: Floats, end: str) -> Floats:
         return line[-1] + layer_line(layer, line) if end == "absorbing" else line[:0]
 
-    def both(line: Floats, low: str, high: str) -> Floats:
+    def extended(line: Floats, low: str, high: str) -> Floats:
         before, after = beyond(-line[::-1], body.side(low)), beyond(line, body.side(high))
         return np.concatenate([-before[::-1], line, after])
 
     below = beyond(-z[::-1], body.base)
-    return both(x, "left", "right"), both(y, "front", "back"), np.concatenate([-below[::-1], z])
+    return (
+        extended(x, "left", "right"),
+        extended(y, "front", "back"),
+        np.concatenate([-below[::-1], z]),
+    )
 
 
 def _depth_line(body: Body, h: float) -> Floats:
@@ -89,21 +95,21 @@ def _depth_line(body: Body, h: float) -> Floats:
 
 
 def cell_layers(body: Body, h: float) -> int:
-    """Number of cells of h in metre through the depth of a slab."""
+    """Return the number of cells of h in metre through the depth of a slab."""
     return len(_depth_line(body, h)) - 1
 
 
-# Skin in layers on bone, fitted to published waves (bench/layered_skin.py has the ranges of each
-# number). Epidermis of a palm 265 +- 51 um (optical coherence tomography, PMC11137746), all skin
-# 0.8 to 1.4 mm, hypodermis 2 to 6 mm; the depth of the bone is assumed within 10 to 25 mm.
+# Layered skin on bone, fitted to published waves; bench/layered_skin.py has the range of each
+# number. Epidermis of a palm 265 +- 51 um (optical coherence tomography, PMC11137746), all skin
+# 0.8 to 1.4 mm, hypodermis 2 to 6 mm. The depth of the bone is an assumption within 10 to 25 mm.
 PALM_LAYERS = (
     Layer(thickness=0.27e-3, material="epidermis"),
     Layer(thickness=1.0e-3, material="dermis"),
     Layer(thickness=2.0e-3, material="fat"),
 )
 # Epidermis with stratum corneum of a forearm 75 +- 13 um (Sandby-Moller et al., Acta Derm Venereol
-# 83:410 (2003)). Dermis of 1 to 1.5 mm, hypodermis of 2 to 10 mm and muscle of 10 to 20 mm differ
-# between people, and are assumed.
+# 83:410 (2003)). Dermis (1 to 1.5 mm), hypodermis (2 to 10 mm) and muscle (10 to 20 mm) vary
+# between people and are assumptions.
 FOREARM_LAYERS = (
     Layer(thickness=0.075e-3, material="forearm-epidermis"),
     Layer(thickness=1.2e-3, material="forearm-dermis"),

@@ -1,10 +1,8 @@
-"""How a body is supported: its sides one by one, the elastic bed below it, and a sheet by its
-edges, its clips, the tension in its plane, and its curl.
-"""
+"""Supports of a body: its sides, the elastic bed below it, and the mounting of a sheet."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
-from math import isfinite
+from dataclasses import dataclass, fields
+from math import inf
 
 import numpy as np
 
@@ -14,26 +12,22 @@ from meshes import TetMesh
 from simple_model.choices import choose
 from skinwave.typing import Bools, Ints
 
-EDGES = {"left": (0, -1), "right": (0, 1), "front": (1, -1), "back": (1, 1)}  # axis, and its end
+EDGES = {"left": (0, -1), "right": (0, 1), "front": (1, -1), "back": (1, 1)}  # axis, end
 SUPPORTS = ("clamped", "simply")
 STEEPEST = 0.05  # rise over side of a curled sheet: slopes of 0.2 at its edges
-FEWEST = 3  # columns of nodes in a clip: fewer let the sheet turn about it
-BESIDE = (0.1, 0.25, 0.5)  # of a clip's radius from its sides: lines of a mesh
-NEARLY = 0.01  # of a clip's radius: a side of it so near an edge of the sheet is there
+FEWEST_COLUMNS = 3  # of nodes in a clip: fewer let the sheet turn about it
+CLIP_LINES = (0.1, 0.25, 0.5)  # of the radius of a clip: grid lines on both sides of its edges
+NEARLY = 0.01  # of the radius of a clip: lines nearer than this to another are left out
 CONDITIONS = ("clamped", "absorbing", "free")  # of a side
 BASES = (*CONDITIONS, "elastic")
-USUAL = "absorbing"  # of a side that is not named
+DEFAULT_SIDE = "absorbing"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sides:
-    """Condition of each side: left (least x), right, front (least y) and back; "" where it is not
-    given, or a body has none.
+    """Condition of each side: left (least x), right, front (least y) and back.
 
-    Raises
-    ------
-    ValueError
-        If a condition is unknown.
+    An empty text stands for the default, or a side that the body does not have.
     """
 
     left: str = ""
@@ -56,43 +50,36 @@ class Sides:
 
     @property
     def symmetry(self) -> str:
-        """The axes, of "xy", across whose middle planes the sides are their own mirror image."""
-        ends = {axis: [n for n, (k, _) in EDGES.items() if k == axis] for axis in (0, 1)}
-        return "".join(
-            "xy"[axis]
-            for axis, (low, high) in ends.items()
-            if getattr(self, low) == getattr(self, high)
-        )
+        """Axes, of "xy", across whose middle planes the sides are mirror images of each other."""
+        return "x" * (self.left == self.right) + "y" * (self.front == self.back)
 
 
-def complete(sides: str | Sides, known: Sequence[str], kind: str) -> str | Sides:
-    """Sides of a body, those that are not given as usual; one word if all are alike. `known` are
-    the names of the sides that its kind has. Raises a ValueError for others.
+def complete_sides(sides: str | Sides, known: Sequence[str], kind: str) -> str | Sides:
+    """Return the sides of a body, one word if all are alike, with defaults for missing ones.
+
+    `known` are the names of the sides of its kind; others raise a ValueError.
     """
     if isinstance(sides, str):
-        choose("sides", sides, CONDITIONS)
+        choose("side", sides, CONDITIONS)
         return sides
-    given = sides.by_name
-    if beyond := [name for name in given if name not in known]:
-        has = (
-            f"its sides are {' and '.join(known)}"
-            if known
-            else ("whose sides are all alike; a sheet has edges in its mounting")
-        )
-        raise ValueError(f"a {kind} has no side '{beyond[0]}' of its own, {has}; leave it out")
-    found = dict.fromkeys(known, USUAL) | given
-    alike = set(found.values())
-    return alike.pop() if len(alike) == 1 else Sides(**found)
+    if unknown := [name for name in sides.by_name if name not in known]:
+        cure = f"its sides are {' and '.join(known)}"
+        if not known:
+            cure = "its sides have one common condition, and a sheet has edges in its mounting"
+        raise ValueError(f"a {kind} has no separate side '{unknown[0]}'; {cure}")
+    complete = dict.fromkeys(known, DEFAULT_SIDE) | sides.by_name
+    alike = set(complete.values())
+    return alike.pop() if len(alike) == 1 else Sides(**complete)
 
 
 def check_base(base: str, stiffness: float, *, depth: float, is_plate: bool) -> None:
-    """Refuse a base that is unknown, and an elastic one without its stiffness in N/m3."""
+    """Refuse an unknown base, and an elastic one without its stiffness in N/m3."""
     choose("base", base, BASES)
     if base != "elastic":
         if stiffness:
             raise ValueError(
-                f"base_stiffness = {stiffness:g} N/m3 is that of an elastic base, and this one is "
-                f'{base}; take base = "elastic", or leave it out'
+                f"base_stiffness = {stiffness:g} N/m3 is for an elastic base, but the base is "
+                f'{base}; give base = "elastic", or remove it'
             )
         return
     if not (np.isfinite(stiffness) and stiffness > 0):
@@ -101,24 +88,23 @@ def check_base(base: str, stiffness: float, *, depth: float, is_plate: bool) -> 
             "above 0; give base_stiffness_n_per_m3, force per area and displacement"
         )
     if is_plate or not np.isfinite(depth):
-        what = "a sheet, whose elements are thicker than it is" if is_plate else "a half-space"
+        refused = "a sheet" if is_plate else "a half-space"
         raise ValueError(
-            f'an elastic base is below a solid of finite depth, not {what}; take base = "free"'
+            f'an elastic base needs a solid of finite depth, not {refused}; use base = "free"'
         )
 
 
-def bed(mesh: TetMesh, facets: Ints, stiffness: float) -> Support:
-    """Winkler foundation: springs in all directions, of a stiffness in N/m3."""
+def winkler_foundation(mesh: TetMesh, facets: Ints, stiffness: float) -> Support:
+    """Return springs in all directions, of a stiffness in N/m3."""
     k = np.full(len(facet_points(mesh, facets)), stiffness)
     return Support(facets=facets, stiffness=k, absorbed=np.zeros_like(k))
 
 
-def together(first: Support | None, second: Support) -> Support:
-    """Both supports of a mesh."""
+def combined(first: Support | None, second: Support) -> Support:
+    """Return both supports of a mesh as one."""
     if first is None:
         return second
-    return replace(
-        first,
+    return Support(
         facets=np.vstack([first.facets, second.facets]),
         stiffness=np.concatenate([first.stiffness, second.stiffness]),
         absorbed=np.concatenate([first.absorbed, second.absorbed]),
@@ -127,22 +113,19 @@ def together(first: Support | None, second: Support) -> Support:
 
 @dataclass(frozen=True, kw_only=True)
 class Mounting:
-    """Support and pretension of a sheet whose sides are clamped.
+    """Supports and pretension of a sheet whose sides are clamped.
 
     Parameters
     ----------
-    edges : names of the `EDGES` that are held; in any order
-    support : "clamped", or "simply": held edges may turn
+    edges : names of the held edges: left, right, front, back
+    support : "clamped", or "simply" for held edges that may turn
     clips : (x, y) in metre, middles of clips, squares along the sides in which nothing moves
     clip_radius : float, metre, half a side of these squares
     tension_x, tension_y : float, N/m, uniform, 0 or above
-    curl_x, curl_y : float, metre, how much higher than its edges the sheet is in the middle between
-        left and right, and between front and back, as a parabola; it is unstressed
+    curl_x, curl_y : float, metre, height of the middle above the edges, between left and right and
+        between front and back; the sheet is an unstressed parabola
 
-    Raises
-    ------
-    ValueError
-        If a value is unknown, not finite or out of range, or the sheet is unconstrained.
+    Raises a ValueError if a value is unknown or out of range, or the sheet is unconstrained.
     """
 
     edges: tuple[str, ...] = tuple(EDGES)
@@ -160,16 +143,15 @@ class Mounting:
         object.__setattr__(self, "edges", tuple(edge for edge in EDGES if edge in self.edges))
         choose("support", self.support, SUPPORTS)
         for name, unit in (("tension_x", "N/m"), ("tension_y", "N/m"), ("clip_radius", "m")):
-            value = getattr(self, name)
-            if not (isfinite(value) and value >= 0):
+            if not 0 <= (value := getattr(self, name)) < inf:
                 raise ValueError(f"{name} = {value} {unit} must be a finite number, 0 or above")
         if not (self.edges or self.clips):
             raise ValueError(
-                "edges = [] without clips_mm leaves the sheet unconstrained; name an edge or a clip"
+                "edges = [] without clips_mm leaves the sheet unconstrained; give an edge or a clip"
             )
         if self.support == "simply" and len(self.edges) == 1 and not self.clips:
             raise ValueError(
-                f"a sheet that is simply supported at its {self.edges[0]} edge alone turns about "
+                f"a sheet that is simply supported only at its {self.edges[0]} edge turns about "
                 "it; clamp that edge, or hold another"
             )
 
@@ -195,20 +177,23 @@ class Mounting:
 
     @property
     def symmetry(self) -> str:
-        """The axes, of "xy", across whose middle planes the supports are their own mirror image."""
+        """Axes, of "xy", across whose middle planes the supports are mirror images of each
+        other.
+        """
         return "".join(name for name, axis in (("x", 0), ("y", 1)) if self._is_mirrored(axis))
 
     def _is_mirrored(self, axis: int) -> bool:
         ends = [edge for edge in self.edges if EDGES[edge][0] == axis]
         there = {tuple(round(c, 9) for c in clip) for clip in self.clips}
-        back = {tuple(-c if a == axis else c for a, c in enumerate(clip)) for clip in there}
-        return len(ends) != 1 and there == back
+        mirror = {tuple(-c if a == axis else c for a, c in enumerate(clip)) for clip in there}
+        return len(ends) != 1 and there == mirror
 
     @property
     def words(self) -> str:
         """Supports and tension in a few words."""
         how = "clamped" if self.support == "clamped" else "simply supported"
-        held = [] if not self.edges else [f"{how} at its {_listed(self.edges)}"]
+        plural = "s" if len(self.edges) > 1 else ""
+        held = [f"{how} at its {' and '.join(self.edges)} edge{plural}"] if self.edges else []
         if self.is_frame:
             held = [f"{how} all around"]
         if self.clips:
@@ -220,82 +205,82 @@ class Mounting:
         return " and ".join(held)
 
 
-def _listed(edges: Sequence[str]) -> str:
-    return f"{' and '.join(edges)} edge{'s' * (len(edges) > 1)}"
-
-
 FRAME = Mounting()
 
 
 def check_extent(mounting: Mounting, width: float, height: float) -> None:
-    """Refuse clips off a sheet of a width and height in metre, and a curl that is not shallow."""
+    """Refuse clips outside a sheet of a width and height in metre, and a curl that is not
+    shallow.
+    """
     for name, side in (("curl_x", width), ("curl_y", height)):
         if not abs(curl := getattr(mounting, name)) <= STEEPEST * side:
             raise ValueError(
-                f"{name} = {1e3 * curl:g} mm on a side of {1e3 * side:g} mm is beyond "
-                f"{1e3 * STEEPEST * side:g} mm, the limit of a shallow shell; flatten it"
+                f"{name} = {1e3 * curl:g} mm on a side of {1e3 * side:g} mm exceeds "
+                f"{1e3 * STEEPEST * side:g} mm, the limit of a shallow shell; reduce it"
             )
     for x, y in mounting.clips:
         if not (abs(x) <= width / 2 and abs(y) <= height / 2):
             raise ValueError(
-                f"the clip at ({1e3 * x:g}, {1e3 * y:g}) mm is off the sheet, which ends at "
-                f"{500 * width:g} and {500 * height:g} mm; move it inside"
+                f"the clip at ({1e3 * x:g}, {1e3 * y:g}) mm lies outside the sheet. Move it "
+                f"inside x = ±{500 * width:g} mm, y = ±{500 * height:g} mm"
             )
 
 
 def clip_lines(mounting: Mounting, axis: int, size: float) -> list[float]:
-    """Places in metre, ascending, along an axis of a sheet of a size: of the sides of its clips,
-    and of lines beside them, as the curvature has no bound at their corners.
+    """Return grid lines in metre along an axis of a sheet: the sides of its clips, and lines near
+    them.
+
+    The curvature is unbounded at the corners of clips.
     """
     reach = mounting.clip_radius
     sides = [clip[axis] + turn * reach for clip in mounting.clips for turn in (-1, 1) if reach]
-    found: list[float] = []
-    for part in (0.0, *BESIDE):
+    placed: list[float] = []
+    for part in (0.0, *CLIP_LINES):
         gap = (part / 2 or NEARLY) * reach
         lines = {side + turn * part * reach for side in sides for turn in (-1, 1)}
-        found += [
+        placed += [
             at for at in sorted(lines, key=abs)
-            if abs(at) < size / 2 - gap and all(abs(at - other) > gap for other in found)
+            if abs(at) < size / 2 - gap and all(abs(at - other) > gap for other in placed)
         ]  # fmt: skip
-    return sorted(found)
+    return sorted(placed)
 
 
-def held(mounting: Mounting, mesh: TetMesh) -> Bools:
-    """Components (n, 3) of the nodes that supports hold, of a flat sheet or the part of it that
-    symmetry leaves.
+def held_components(mounting: Mounting, mesh: TetMesh) -> Bools:
+    """Return the components (n, 3) of nodes that supports hold, of a flat sheet or its symmetric
+    part.
 
-    Clamped sections neither move along the sheet nor turn. Their deflection is held in the middle
-    plane alone: bending changes the thickness, by Poisson's effect, and held faces would make the
-    sheet stiffer in proportion to its thickness, which is larger in elements. A simple support
-    holds an edge's deflection, and its motion along the edge; that across the edge in the middle
-    plane alone, so that the section may turn.
+    Clamped sections neither move along the sheet nor turn. Their deflection is held only in the
+    middle plane: bending changes the thickness by Poisson's effect, and held faces would stiffen
+    the sheet in proportion to its thickness, which is larger in elements. A simple support holds
+    the deflection of an edge and the motion along it, and the motion across it only in the middle
+    plane, so that the section may turn.
     """
     points = mesh.points
     low, high = points.min(axis=0), points.max(axis=0)
     high[:2] = np.maximum(high[:2], -low[:2])
     near = 1e-9 * float(np.ptp(points, axis=0).max())
     middle = np.abs(2 * points[:, 2] - low[2] - high[2]) < near
-    found = np.zeros(points.shape, bool)
+    held = np.zeros(points.shape, bool)
     for edge in mounting.edges:
         axis, end = EDGES[edge]
         at = np.abs(points[:, axis] - end * high[axis]) < near
         if mounting.support == "simply":
-            found[at, 2] = found[at, 1 - axis] = True
-            found[at & middle] = True
+            held[at, 2] = held[at, 1 - axis] = True
+            held[at & middle] = True
         else:
-            found[at, :2] = True
-            found[at & middle, 2] = True
+            held[at, :2] = True
+            held[at & middle, 2] = True
     for clip in mounting.clips:
         there = [abs(c) if low[axis] > -near else c for axis, c in enumerate(clip)]
         at = _clipped(mesh, there, mounting.clip_radius)
-        found[at, :2] = True
-        found[at & middle, 2] = True
-    return found
+        held[at, :2] = True
+        held[at & middle, 2] = True
+    return held
 
 
 def _clipped(mesh: TetMesh, clip: Sequence[float], radius: float) -> Bools:
-    """Nodes (n,) in a clip: in its square, and in the `FEWEST` nearest columns."""
+    """Nodes (n,) in a clip: those in its square, and in the `FEWEST_COLUMNS` nearest columns."""
     away = np.abs(mesh.points[:, :2] - clip).max(axis=1)
     top = np.unique(mesh.facets["top"])
-    reach = np.partition(away[top], FEWEST - 1)[FEWEST - 1]
+    reach = np.partition(away[top], FEWEST_COLUMNS - 1)[FEWEST_COLUMNS - 1]
     return away <= max(radius, reach) * (1 + NEARLY)

@@ -1,1 +1,1 @@
-"""Scenes: what is commanded, on which body, and where it is probed; their files."""
+"""Scenes: the load, the body and the probes of an experiment, and their files."""

@@ -1,9 +1,9 @@
-"""Distribution of a number of a scene about its central value, and how a scene file says it.
+"""Distribution of a number of a scene about its central value, as in a scene file:
 
     shear_modulus_pa = { value = 25e3, spread = 0.3 }
     peak_pressure_pa = { value = 50, factor = 2 }
 
-What does not ask for the spread takes `value`. Numbers above 0 are lognormal by default, with
+Commands that do not use the spread take `value`. Numbers above 0 are lognormal by default, with
 `value` as the median, so that no sample changes sign.
 """
 
@@ -21,17 +21,17 @@ from simple_model.choices import choose, suggestion
 from skinwave.system.plain_text import number_in
 from skinwave.typing import Floats
 
-VALUE, SHAPE = "value", "distribution"  # keys of a table beside its width
+VALUE, SHAPE = "value", "distribution"  # keys of the table, in addition to its width
 TAIL = 1.6448536269514722  # standard deviations from the median of a normal to its 95th percentile
-EDGE = 1e-9  # of the unit interval, which keeps quantiles finite
-# By measure of the width: its keys in a scene file, and the shapes that it fits, the default first.
+EDGE = 1e-9  # distance of shares from 0 and 1, which keeps quantiles finite
+# Keys in a scene file and possible shapes, the default first, of each measure of the width.
 MEASURES = {
     "spread": (("spread",), ("lognormal", "normal")),
     "factor": (("factor",), ("lognormal",)),
     "standard_error": (("standard_error",), ("normal", "lognormal")),
     "bounds": (("low", "high"), ("uniform", "triangular")),
 }
-PARTS = {"body": "material", "focus": "device", "tacton": "device"}  # of keys by section
+PARTS = {"body": "material", "focus": "device", "tacton": "device"}  # by section of a key
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,16 +40,14 @@ class Distribution:
 
     Parameters
     ----------
-    shape : "lognormal" (`value` is the median), "normal", "uniform" or "triangular" (mode)
+    shape : "lognormal" (the value is the median), "normal", "uniform" or "triangular" (the mode)
     measure : "spread", the standard deviation over the central value; "factor", so that 90 % of a
-        lognormal are between value / factor and value * factor; "standard_error", the standard
+        lognormal lie between value / factor and value * factor; "standard_error", the standard
         deviation in the unit of the value; or "bounds"
-    width : of that measure, one number, or low and high
+    width : one number of that measure, or low and high
 
-    Raises
-    ------
-    ValueError
-        If a name is unknown, the two do not fit, or a number is out of range.
+    >>> Distribution(measure="factor", width=(2.0,)).quantile(50.0, [0.05, 0.5, 0.95]).round(6)
+    array([ 25.,  50., 100.])
     """
 
     shape: str = "lognormal"
@@ -60,30 +58,30 @@ class Distribution:
         choose("measure", self.measure, MEASURES)
         if self.shape not in (fits := MEASURES[self.measure][1]):
             raise ValueError(
-                f"{SHAPE} '{self.shape}' has no {self.measure}; take {' or '.join(fits)}, or "
-                "another measure of the width"
+                f"a {self.shape} {SHAPE} cannot be given by {self.measure}; use "
+                f"{' or '.join(fits)}, or another measure of its width"
             )
         if not all(map(isfinite, self.width)):
-            raise ValueError(f"{self.measure} = {self.width} must be finite; give other numbers")
+            raise ValueError(f"{self.measure} = {self.width} must be finite")
         if self.measure == "bounds":
             if not self.width[0] < self.width[1]:
                 low, high = self.width
-                raise ValueError(f"low = {low:g} is not below high = {high:g}; swap them")
+                raise ValueError(f"low = {low:g} must be below high = {high:g}; swap them")
         elif self.width[0] < (least := float(self.measure == "factor")):
-            raise ValueError(f"{self.measure} = {self.width[0]:g} is below {least:g}, its least")
+            raise ValueError(f"{self.measure} = {self.width[0]:g} must be at least {least:g}")
 
     @property
     def is_relative(self) -> bool:
-        """Whether its width is over the value, and the same in any unit."""
+        """Whether its width is relative to the value, and thus the same in any unit."""
         return self.measure in ("spread", "factor")
 
     @property
     def is_exact(self) -> bool:
-        """Whether it is of no width: the number is known."""
+        """Whether the number is known exactly."""
         return self.measure != "bounds" and self.width[0] == float(self.measure == "factor")
 
     def quantile(self, value: float, shares: ArrayLike) -> Floats:
-        """Quantiles (...) about a central value, at shares (...) of 0 to 1."""
+        """Return the quantiles (...) about a central value, at shares (...) from 0 to 1."""
         self.check(value)
         shares = np.clip(np.asarray(shares, np.float64), EDGE, 1 - EDGE)
         if self.measure == "bounds":
@@ -102,10 +100,12 @@ class Distribution:
         return np.asarray(value * np.exp(s * ndtri(shares)))
 
     def check(self, value: float) -> None:
-        """Refuse a central value that it cannot be about; raises a ValueError."""
+        """Refuse a central value that does not fit the distribution."""
         if self.measure == "bounds" and not self.width[0] <= value <= self.width[1]:
             low, high = self.width
-            raise ValueError(f"value = {value:g} is outside low = {low:g} .. high = {high:g}")
+            raise ValueError(
+                f"value = {value:g} is outside low = {low:g} to high = {high:g}; change one of them"
+            )
         if self.shape == "lognormal" and not value > 0:
             raise ValueError(
                 f"value = {value:g} of a lognormal distribution must be above 0; give "
@@ -128,8 +128,8 @@ class Distribution:
 
 @dataclass(frozen=True, kw_only=True)
 class Spread:
-    """An uncertain number of a scene: its dotted `key`, the `value` about which it is distributed,
-    in the unit of the key, and whether a preset `implied` it.
+    """An uncertain number of a scene: its dotted `key`, its central `value` in the unit of the key,
+    its distribution, and whether a preset `implied` it.
     """
 
     key: str
@@ -139,37 +139,36 @@ class Spread:
 
     @property
     def part(self) -> str:
-        """The part of an uncertainty that it belongs to: material, device, or placement."""
+        """The part of an uncertainty that it belongs to: material, device or placement."""
         return PARTS.get(self.key.partition(".")[0], "placement")
 
     def at(self, shares: ArrayLike) -> list[float]:
-        """Quantiles at shares (n,) of 0 to 1."""
-        found: list[float] = self.distribution.quantile(self.value, shares).tolist()
-        return found
+        """Return the quantiles at shares (n,) from 0 to 1."""
+        return list(self.distribution.quantile(self.value, shares).tolist())
 
 
 def within_factor(factor: float) -> Distribution:
-    """Lognormal distribution with 90 % between the value over and times a factor."""
+    """Return the lognormal distribution with 90 % between the value over and times a factor."""
     return Distribution(measure="factor", width=(factor,))
 
 
 def uniform(key: str, low: float, high: float) -> Spread:
-    """A number that is uniform between limits."""
-    given = Distribution(shape="uniform", measure="bounds", width=(low, high))
-    return Spread(key=key, value=(low + high) / 2, distribution=given)
+    """Return a number that is uniform between limits."""
+    bounds = Distribution(shape="uniform", measure="bounds", width=(low, high))
+    return Spread(key=key, value=(low + high) / 2, distribution=bounds)
 
 
 def read_distribution(key: str, table: Mapping[str, Any]) -> Distribution:
-    """Distribution in a scene's table of a `value` and its spread."""
+    """Return the distribution in the table of a `value` and its spread."""
     known = (VALUE, SHAPE, *(k for keys, _ in MEASURES.values() for k in keys))
     for own in table:
         if own not in known:
-            hint = suggestion(own, known) or f"; it may have {', '.join(known)}"
+            hint = suggestion(own, known) or f"; use one of {', '.join(known)}"
             raise ValueError(f"{key} has the unknown key '{own}'{hint}")
     given = [name for name, (keys, _) in MEASURES.items() if {*keys} & table.keys()]
     if len(given) != 1 or not {*MEASURES[given[0]][0]} <= table.keys():
         raise ValueError(
-            f"{key} needs one of spread, factor, standard_error, or low and high, beside value"
+            f"{key} needs value and one of spread, factor, standard_error, or low and high"
         )
     keys, shapes = MEASURES[given[0]]
     for own in (VALUE, *keys):
@@ -179,24 +178,24 @@ def read_distribution(key: str, table: Mapping[str, Any]) -> Distribution:
     if given == ["spread"] and value <= 0:
         default = "normal"
     try:
-        found = Distribution(
+        distribution = Distribution(
             shape=table.get(SHAPE, default),
             measure=given[0],
             width=tuple(float(table[k]) for k in keys),
         )
-        found.check(value)
+        distribution.check(value)
     except ValueError as error:
         raise ValueError(f"{key}: {error}") from None
-    return found
+    return distribution
 
 
 def written_distribution(value: Any, given: Distribution) -> dict[str, Any]:
-    """The table of a value and its distribution, as a scene file has it."""
+    """Return the table of a value and its distribution for a scene file."""
     keys, _ = MEASURES[given.measure]
     return {VALUE: value, SHAPE: given.shape, **dict(zip(keys, given.width, strict=True))}
 
 
-# Texts of distributions: shape, measure, and an example with all of its numbers.
+# Distributions on the command line: shape, measure, and an example with all numbers.
 CALLS = {
     "normal": ("normal", "spread", "normal(25e3, 0.3)"),
     "lognormal": ("lognormal", "spread", "lognormal(25e3, 0.3)"),
@@ -204,14 +203,15 @@ CALLS = {
     "uniform": ("uniform", "bounds", "uniform(10, 20)"),
     "triangular": ("triangular", "bounds", "triangular(10, 15, 20)"),
 }
-CALLED = re.compile(rf"\s*({'|'.join(CALLS)})\s*\(([^()]*)\)\s*")
+CALL = re.compile(rf"\s*({'|'.join(CALLS)})\s*\(([^()]*)\)\s*")
 
 
 def parse_distribution(key: str, text: str) -> Spread | None:
-    """Spread of a key by a text as in `CALLS`, with the central value first, or between limits;
-    None of any other text.
+    """Return the spread of a key by a text such as those in `CALLS`; None for any other text.
+
+    The central value comes first, or in the middle between limits.
     """
-    match = CALLED.fullmatch(text)
+    match = CALL.fullmatch(text)
     if match is None:
         return None
     shape, measure, example = CALLS[match[1]]
@@ -224,6 +224,6 @@ def parse_distribution(key: str, text: str) -> Spread | None:
         value, width = (mode[0] if mode else (low + high) / 2), [low, high]
     else:
         value, *width = numbers
-    found = Distribution(shape=shape, measure=measure, width=tuple(width))
-    found.check(value)
-    return Spread(key=key, value=value, distribution=found)
+    distribution = Distribution(shape=shape, measure=measure, width=tuple(width))
+    distribution.check(value)
+    return Spread(key=key, value=value, distribution=distribution)

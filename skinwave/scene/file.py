@@ -1,4 +1,4 @@
-"""Scenes as TOML files, read and written."""
+"""Reading and writing of scenes as TOML files."""
 
 import re
 import tomllib
@@ -28,33 +28,33 @@ from skinwave.scene.keys import (
     SECTIONS,
     as_table,
     as_text,
-    checked,
+    read_keys,
     value_at,
     with_value,
 )
 from skinwave.scene.load import Load
 from skinwave.scene.material_file import with_tables
 from skinwave.scene.scene import BODIES, KINDS, Body, Placement, Scene, kind_of, solid_of
-from skinwave.system.plain_text import as_utf_8
 
-LARGEST = 16_000_000  # bytes of a file: some seconds of a path recorded at 40 kHz
-PAIRS = re.compile(r"\[\s+(-?\d[\d.e+-]*),\s+(-?\d[\d.e+-]*),\s+\]")  # on lines of their own
-CURE = "write key = value, each key once, with texts in closed quotes and numbers as 0.5"
+PAIRS = re.compile(r"\[\s+(-?\d[\d.e+-]*),\s+(-?\d[\d.e+-]*),\s+\]")  # each number on its own line
+CURE = "write key = value, with each key once, texts in quotes, and numbers such as 0.5"
 PATHS = "write a Windows path in single quotes, 'C:\\hand.stl', or with /, \"C:/hand.stl\""
 
 
 def read(path: str | Path) -> Scene:
-    """The scene in a TOML file.
+    """Read the scene in a TOML file.
 
-    Raises
-    ------
-    ValueError
-        If the file cannot be read, or is not a scene: what, got, limit, cure in one sentence.
+    Raises a ValueError, in one sentence, if the file cannot be read or is not a scene.
+
+    >>> from pathlib import Path
+    >>> _ = Path("scene.toml").write_text("[tacton]\\nam_frequency_hz = 140\\n")
+    >>> read("scene.toml").tacton.am_frequency
+    140.0
     """
-    text = content(path)
+    text = reading.read_text(path)
     try:
         scene = from_table(parse_toml(text, Path(path).parent))
-        if scene.body.file:  # is named from where the scene is
+        if scene.body.file:  # relative to the scene file
             place = str((Path(path).parent / scene.body.file).resolve())
             scene = replace(scene, body=replace(scene.body, file=place))
         return scene
@@ -62,40 +62,36 @@ def read(path: str | Path) -> Scene:
         raise ValueError(f"{path}: {error}") from None
 
 
-def content(path: str | Path) -> str:
-    """The text of a scene file; raises a ValueError if it cannot be read or is no UTF-8."""
-    found = reading.read_bytes(path, LARGEST)
-    try:
-        return as_utf_8(found)
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
-
-
 def loads(text: str) -> Scene:
-    """The scene in a TOML text; missing keys take the preset's value."""
+    """Return the scene in a TOML text; missing keys take the values of the preset body.
+
+    >>> scene = loads('[tacton]\\nshape = "circle"\\nsize_mm = 20\\nspeed_m_per_s = 12')
+    >>> scene.tacton.trajectory.size, scene.body.kind
+    (0.02, 'slab')
+    """
     return from_table(parse_toml(text))
 
 
 def parse_toml(text: str, folder: Path | None = None) -> dict[str, Any]:
-    """The table of a scene's TOML text; with a folder, with the numbers of tables of moduli that
-    are named from there.
+    """Return the table of a scene's TOML text, with modulus files in a folder replaced by their
+    numbers.
     """
     try:
         table = tomllib.loads(text)
     except ValueError as error:
         raise ValueError(_not_toml(text, str(error))) from None
     except RecursionError:
-        raise ValueError("not valid TOML: brackets within brackets beyond all depth") from None
+        raise ValueError("not valid TOML: brackets are nested too deeply") from None
     _check_texts({key: value for key, value in table.items() if key != "name"})
     return with_tables(table, folder) if folder else table
 
 
 def _not_toml(text: str, error: str) -> str:
-    """What is wrong with a text that the parser refuses, with the line and the cure."""
+    """Error of the parser in plain words, with the line and the cure."""
     lines = text.splitlines() or [""]
     place = re.search(r"at line (\d+)", error)
     k = min(int(place[1]), len(lines)) if place else len(lines)
-    if "Illegal character '\\n'" in error and k > 1:  # found where the next line begins
+    if "Illegal character '\\n'" in error and k > 1:  # reported at the start of the next line
         k -= not lines[k - 1].count('"') % 2
     line = lines[k - 1].strip()
     cure = PATHS if "\\" in line else CURE
@@ -103,7 +99,7 @@ def _not_toml(text: str, error: str) -> str:
 
 
 def _check_texts(table: Mapping[str, Any]) -> None:
-    """Refuse texts with control characters, which a path in double quotes gets from a backslash."""
+    """Refuse control characters, which backslashes of a path in double quotes become."""
     for key, value in table.items():
         for each in value if isinstance(value, list) else [value]:
             if isinstance(each, dict):
@@ -113,19 +109,19 @@ def _check_texts(table: Mapping[str, Any]) -> None:
 
 
 def from_table(table: dict[str, Any]) -> Scene:
-    """The scene of a table by a scene file's keys; raises a ValueError as `loads` does."""
+    """Return the scene of a table by the keys of a scene file."""
     table, spreads = without_spreads(table)
     sections = {"name": as_text, **dict.fromkeys(SECTIONS, as_table)}
     preset, table = _preset(table)
-    top = checked("scene", table, sections)
+    top = read_keys("scene", table, sections)
     parts = {
-        section: checked(f"[{section}]", top.get(section, {}), keys)
+        section: read_keys(f"[{section}]", top.get(section, {}), keys)
         for section, keys in SECTIONS.items()
     }
     body = _body(parts["body"] | parts["placement"], preset)
     load = Load(**parts["load"])
     if parts["focus"] and not load.of_kind.is_of_device:
-        raise ValueError(f"[focus] is not for a load of kind '{load.kind}'; leave it out")
+        raise ValueError(f"[focus] does not apply to a load of kind '{load.kind}'; remove it")
     tacton, path = _split(parts["tacton"], PATH)
     pressure = MovingPressure(
         tacton=Tacton(**tacton, trajectory=Trajectory(**path)), **parts["focus"]
@@ -137,13 +133,13 @@ def from_table(table: dict[str, Any]) -> Scene:
 
 
 def with_distributions(scene: Scene, spreads: Mapping[str, Distribution]) -> Scene:
-    """The scene with these distributions of its numbers, by dotted key, and no others."""
+    """Return the scene with these distributions of its numbers by dotted key, and no others."""
     complete = to_table(scene)
-    found = dict(_of_shear(complete, *each) for each in spreads.items())
-    for key in found:
+    by_key = dict(_of_shear(complete, *each) for each in spreads.items())
+    for key in by_key:
         if value_at(complete, key) is None:
-            raise ValueError(f"{key} has a spread, but this scene has no such number; leave it out")
-    return replace(scene, spreads=tuple(sorted(found.items())))
+            raise ValueError(f"{key} has a spread, but the scene has no such number; remove it")
+    return replace(scene, spreads=tuple(sorted(by_key.items())))
 
 
 def _of_shear(complete: dict[str, Any], key: str, given: Distribution) -> tuple[str, Distribution]:
@@ -159,29 +155,31 @@ def _of_shear(complete: dict[str, Any], key: str, given: Distribution) -> tuple[
 
 
 def without_spreads(node: Any, path: str = "") -> tuple[Any, dict[str, Distribution]]:
-    """A scene's table with the central value for each that has a spread, and the distributions by
-    dotted key, as `body.layers.0.thickness_mm`.
-    """
+    """Return a table with the central value of each number, and distributions by dotted key."""
     if isinstance(node, dict) and VALUE in node and path:
         return node[VALUE], {path: read_distribution(path, node)}
     is_list = isinstance(node, list) and any(isinstance(inner, dict) for inner in node)
     if not (isinstance(node, dict) or is_list):
         return node, {}
-    found: dict[str, Distribution] = {}
+    spreads: dict[str, Distribution] = {}
     plain = {}
     for key, inner in node.items() if isinstance(node, dict) else enumerate(node):
         plain[key], own = without_spreads(inner, f"{path}.{key}" if path else str(key))
-        found |= own
-    return list(plain.values()) if is_list else plain, found
+        spreads |= own
+    return list(plain.values()) if is_list else plain, spreads
 
 
 def dumps(scene: Scene) -> str:
-    """The complete scene as TOML; `loads` gives it back."""
+    """Return the complete scene as TOML, which `loads` reads back.
+
+    >>> loads(dumps(loads(""))) == loads("")
+    True
+    """
     return PAIRS.sub(r"[\1, \2]", tomli_w.dumps(to_table(scene)))
 
 
 def to_table(scene: Scene) -> dict[str, Any]:
-    """The complete scene by a scene file's keys; `from_table` gives it back."""
+    """Return the complete scene as a table, which `from_table` reads back."""
     tacton, body = scene.tacton, scene.body
     sources: dict[str, tuple[Any, ...]] = {
         "tacton": (tacton, tacton.trajectory),
@@ -192,7 +190,7 @@ def to_table(scene: Scene) -> dict[str, Any]:
         "probes": (scene,),
     }
     table: dict[str, Any] = {"name": scene.name}
-    left = _without_meaning(scene)
+    left = _unused_keys(scene)
     for section, keys in SECTIONS.items():
         if section in left:
             continue
@@ -201,7 +199,7 @@ def to_table(scene: Scene) -> dict[str, Any]:
             if key in DERIVED or f"{section}.{key}" in left:
                 continue
             source = next(s for s in sources[section] if hasattr(s, field.name))
-            if section != "tacton" or key not in unused(tacton):
+            if section != "tacton" or key not in unused_tacton_keys(tacton):
                 table[section][key] = field.write(getattr(source, field.name))
     if not body.of_kind.discretise:
         table["body"] = {"kind": "none"}
@@ -214,8 +212,8 @@ def to_table(scene: Scene) -> dict[str, Any]:
     return table
 
 
-def _without_meaning(scene: Scene) -> set[str]:
-    """Sections and dotted keys that mean nothing with the scene's kind of load and its base."""
+def _unused_keys(scene: Scene) -> set[str]:
+    """Sections and dotted keys that do not apply to the scene's kind of load and base."""
     load = scene.load.of_kind
     own = SECTIONS["load"].items()
     has = {"kind", "gravity", *load.defaults}
@@ -225,8 +223,8 @@ def _without_meaning(scene: Scene) -> set[str]:
     return left | (set() if scene.body.base_stiffness else {"body.base_stiffness_n_per_m3"})
 
 
-def unused(tacton: Tacton) -> set[str]:
-    """Keys of a Tacton that mean nothing with the others it has."""
+def unused_tacton_keys(tacton: Tacton) -> set[str]:
+    """Return the keys of a Tacton that do not apply to its other values."""
     keys = {key for key in ("rhythm", "signal") if getattr(tacton, key) is None}
     if tacton.trajectory.shape != "recorded":
         keys |= {"times_s", "levels", "hold"}
@@ -234,7 +232,7 @@ def unused(tacton: Tacton) -> set[str]:
 
 
 def _preset(scene: dict[str, Any]) -> tuple[Body | None, dict[str, Any]]:
-    """The body that `preset` of [body] names, and the table without it."""
+    """The body that `preset` of [body] names, and the table without that key."""
     body = scene.get("body")
     if not isinstance(body, dict):
         return None, scene
@@ -242,8 +240,8 @@ def _preset(scene: dict[str, Any]) -> tuple[Body | None, dict[str, Any]]:
     if named is None:
         if (kind := str(body.get("kind"))) in BODIES and kind not in KINDS:
             raise ValueError(
-                f"body kind '{kind}' is unknown, but there is a preset of that name; write "
-                f'preset = "{kind}" instead'
+                f"body kind '{kind}' is unknown, but a preset has this name; write preset = "
+                f'"{kind}" instead'
             )
         return None, scene
     name = choose("body preset", as_text("preset", named), BODIES)
@@ -254,7 +252,7 @@ def _body(values: dict[str, Any], preset: Body | None) -> Body:
     kind = kind_of(values.get("kind", preset.kind if preset else Body.kind))
     if preset and kind is not preset.of_kind:
         raise ValueError(
-            f'[body] has kind = "{kind.name}" and a preset of kind = "{preset.kind}"; leave out one'
+            f'[body] has kind = "{kind.name}" and a preset of kind = "{preset.kind}"; remove one'
         )
     for key in (_keys_of_kinds() - set(kind.keys)) & values.keys():
         takers = " or ".join(f'"{each.name}"' for each in KINDS.values() if key in each.keys)
@@ -272,9 +270,11 @@ def _body(values: dict[str, Any], preset: Body | None) -> Body:
 def _of_grammage(
     grammage: float, kind: BodyKind, values: dict[str, Any], thickness_is_given: bool
 ) -> dict[str, Any]:
-    """The material of a sheet of so many kg/m2 and of a given thickness, or else its thickness."""
+    """The density of a sheet of a mass per area in kg/m2 and a given thickness, or its
+    thickness.
+    """
     if not kind.is_plate:
-        raise ValueError(f'[body] grammage_g_m2 is for a sheet, not "{kind.name}"')
+        raise ValueError(f'[body] grammage_g_m2 is for a sheet, not "{kind.name}"; remove it')
     if not 0 < grammage < inf:
         raise ValueError(f"grammage_g_m2 = {1e3 * grammage:g} must be a finite number above 0")
     check_material(values["material"])
@@ -282,7 +282,7 @@ def _of_grammage(
     if not thickness_is_given:
         return {"depth": grammage / solid.density}
     if not values["depth"] > 0:
-        return {}  # which the body refuses
+        return {}  # the body refuses it
     return {"material": replace(solid, density=grammage / values["depth"])}
 
 

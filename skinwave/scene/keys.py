@@ -1,5 +1,6 @@
-"""The keys of a scene file: each with its unit, what it may hold, and the attribute behind it; and
-how a dotted key of a scene's table is read and with_value.
+"""Keys of a scene file, each with its unit, its values and the attribute behind it.
+
+Also reads and changes dotted keys in the table of a scene.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -19,15 +20,15 @@ from skinwave.scene.material_file import material_of, values_of, written_table
 from skinwave.scene.scene import Layer, Mounting, Phalanx, Relief, Sides, solid_of
 from skinwave.system.plain_text import number_in
 
-# Typical depths of receptors in the glabrous skin of a hand in metre, rounded: Merkel's cells at
-# the base of the epidermis, Meissner's corpuscles in the papillae beside them, Pacini's in the deep
-# dermis and below. A place and a person may differ by half: give a number where it is known.
+# Typical depths in metre of receptors in the glabrous skin of a hand: Merkel cells at the base of
+# the epidermis, Meissner corpuscles in the papillae next to them, Pacinian corpuscles in the deep
+# dermis and below. They differ by half between places and people.
 RECEPTORS = {"surface": 0.0, "meissner": 0.7e-3, "merkel": 0.75e-3, "pacini": 2e-3}
 
 
 @dataclass(frozen=True)
 class SceneKey:
-    """A key of the file: the attribute behind it and how it is read and written."""
+    """A key of a scene file: its attribute, and how its value is read and written."""
 
     name: str
     read: Callable[[str, Any], Any]
@@ -37,40 +38,35 @@ class SceneKey:
 Keys = Mapping[str, SceneKey]
 
 
-def written(keys: Keys, record: Any) -> dict[str, Any]:
-    """The table of a record, by the keys of a file, without what is None."""
+def write_record(keys: Keys, record: Any) -> dict[str, Any]:
+    """Return the table of a record by the keys of a file, without values of None."""
     values = ((key, field, getattr(record, field.name)) for key, field in keys.items())
     return {key: field.write(value) for key, field, value in values if value is not None}
 
 
-def _wrong(key: str, value: Any, must: str) -> ValueError:
-    text = repr(value)
-    return ValueError(f"{key} = {text if len(text) <= 60 else f'{text[:57]}...'} must be {must}")
-
-
-def _of_type(key: str, value: Any, kind: type, must: str) -> Any:
-    if not isinstance(value, kind):
-        raise _wrong(key, value, must)
+def _of_type(key: str, value: Any, kind: Any, must: str) -> Any:
+    if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
+        text = repr(value)
+        text = text if len(text) <= 60 else f"{text[:57]}..."
+        raise ValueError(f"{key} = {text} must be {must}")
     return value
 
 
 def _number(key: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise _wrong(key, value, "a number")
     try:
-        return float(value)
+        return float(_of_type(key, value, int | float, "a number"))
     except OverflowError:
-        raise ValueError(f"{key} is too large a number; give one below 1e308") from None
+        raise ValueError(f"{key} is too large; give a number below 1e308") from None
 
 
 def as_text(key: str, value: Any) -> str:
-    """The text itself; an error for anything else."""
+    """Return a text, or raise a ValueError for another type."""
     text: str = _of_type(key, value, str, "a text in quotes")
     return text
 
 
 def as_table(key: str, value: Any) -> dict[str, Any]:
-    """The table itself; an error for anything else."""
+    """Return a table, or raise a ValueError for another type."""
     table: dict[str, Any] = _of_type(key, value, dict, f"a table, [{key}]")
     return table
 
@@ -89,15 +85,18 @@ def _words(key: str, value: Any) -> tuple[str, ...]:
 
 
 def _pair(key: str, value: Any) -> tuple[float, float]:
-    if not isinstance(value, list) or len(value) != 2:
-        raise _wrong(key, value, "a pair of numbers, such as [1.0, 0.0]")
+    must = "a pair of numbers, such as [1.0, 0.0]"
+    if len(_of_type(key, value, list, must)) != 2:
+        raise ValueError(f"{key} = {value!r} must be {must}")
     return _number(key, value[0]), _number(key, value[1])
 
 
 def _pair_in_mm(key: str, value: Any) -> tuple[float, float]:
     x, y = _pair(key, value)
     if not (isfinite(x) and isfinite(y)):
-        raise ValueError(f"{key} has the point [{x}, {y}]; coordinates must be finite")
+        raise ValueError(
+            f"{key} has the point [{x}, {y}]; coordinates must be finite numbers in mm"
+        )
     return x / 1e3, y / 1e3
 
 
@@ -117,31 +116,33 @@ def _write_points(points: Points) -> list[list[float]]:
 def _record(
     section: str, name: str, make: Callable[..., Any], keys: Keys, required: int = 0
 ) -> SceneKey:
-    """A table of a record in a section, of whose first keys so many are required."""
+    """Key of a table for a record; the first `required` keys of the table must be given."""
 
     def read(key: str, value: Any) -> Any:
         where = f"{section}.{key}"
-        return make(**_checked_all(f"[{where}]", as_table(where, value), keys, required))
+        return make(**_read_required(f"[{where}]", as_table(where, value), keys, required))
 
-    return SceneKey(name, read, partial(written, keys))
+    return SceneKey(name, read, partial(write_record, keys))
 
 
 def _records(where: str, make: Callable[..., Any], keys: Keys) -> SceneKey:
-    """Tables under [[where]], of records, all of whose keys are required."""
+    """Key of a list of tables [[where]] for records; all keys of each table must be given."""
 
     def read(key: str, value: Any) -> Any:
         tables = _of_type(key, value, list, f"a list of tables, each under [[{where}]]")
-        found = (_checked_all(f"[[{where}]]", as_table(where, t), keys, len(keys)) for t in tables)
-        return tuple(make(**each) for each in found)
+        values = (
+            _read_required(f"[[{where}]]", as_table(where, t), keys, len(keys)) for t in tables
+        )
+        return tuple(make(**each) for each in values)
 
     name = where.rpartition(".")[2]
-    return SceneKey(name, read, lambda records: [written(keys, record) for record in records])
+    return SceneKey(name, read, lambda records: [write_record(keys, record) for record in records])
 
 
-def _checked_all(where: str, table: dict[str, Any], keys: Keys, required: int) -> dict[str, Any]:
-    values = checked(where, table, keys)
+def _read_required(where: str, table: dict[str, Any], keys: Keys, required: int) -> dict[str, Any]:
+    values = read_keys(where, table, keys)
     if missing := [k for k in list(keys)[:required] if keys[k].name not in values]:
-        raise ValueError(f"{where} lacks {' and '.join(missing)}; give it")
+        raise ValueError(f"{where} needs {' and '.join(missing)}; add it")
     return values
 
 
@@ -149,12 +150,12 @@ def _material(key: str, value: Any) -> str | Material:
     if isinstance(value, str):
         return value
     where = f"[body.{key}]"
-    values = checked(where, as_table(key, value), MATERIAL)
+    values = read_keys(where, as_table(key, value), MATERIAL)
     return material_of(values, where, {field.name: own for own, field in MATERIAL.items()})
 
 
 def write_material(material: str | Material) -> Any:
-    """The name of a material, or its table."""
+    """Return the name of a material, or its table."""
     if isinstance(material, str):
         return material
     values = values_of(material)
@@ -164,16 +165,16 @@ def write_material(material: str | Material) -> Any:
 def _table(key: str, value: Any) -> ModulusTable:
     if isinstance(value, str):
         raise ValueError(
-            f"{key} = {value!r} names a file, which is looked for beside a scene file, and this "
-            f"scene is none; give its numbers, {key}.{', '.join(COLUMNS)}"
+            f"{key} = {value!r} names a file, which only a scene in a file can do; give its "
+            f"numbers as {key}.{', '.join(COLUMNS)}"
         )
     where, columns = f"[body.material.{key}]", {n: SceneKey(n, _numbers, list) for n in COLUMNS}
-    found = _checked_all(where, as_table(key, value), columns, len(columns))
-    frequencies, storage, loss = (found[name] for name in COLUMNS)
+    values = _read_required(where, as_table(key, value), columns, len(columns))
+    frequencies, storage, loss = (values[name] for name in COLUMNS)
     if not len(frequencies) == len(storage) == len(loss):
         raise ValueError(
-            f"{where} has {len(frequencies)} frequencies, {len(storage)} storage and {len(loss)} "
-            "loss moduli; give as many of each"
+            f"{where} has {len(frequencies)} frequencies, {len(storage)} storage moduli and "
+            f"{len(loss)} loss moduli; give equally many"
         )
     moduli = tuple(complex(*each) for each in zip(storage, loss, strict=True))
     return ModulusTable(frequencies=frequencies, moduli=moduli)
@@ -182,7 +183,7 @@ def _table(key: str, value: Any) -> ModulusTable:
 def _write_drive(drive: str | DriveLaw) -> str:
     if isinstance(drive, DriveLaw) and DRIVES.get(drive.name) is not drive:
         raise ValueError(
-            f"drive law '{drive}' is a Python function, which a scene file cannot hold; take one "
+            f"drive law '{drive}' is a Python function, which a scene file cannot store; use one "
             f"of {', '.join(DRIVES)}, register it in DRIVES, or simulate it from Python"
         )
     return str(drive)
@@ -191,8 +192,8 @@ def _write_drive(drive: str | DriveLaw) -> str:
 def _write_profile(profile: str | FocalSpot) -> str:
     if not isinstance(profile, str):
         raise ValueError(
-            "the focus profile is a map or a Python function, which a scene file cannot hold; take "
-            f"one of {', '.join(FOCI)}, or simulate it from Python"
+            "the focus profile is a map or a Python function, which a scene file cannot store; "
+            f"use one of {', '.join(FOCI)}, or simulate it from Python"
         )
     return profile
 
@@ -203,7 +204,7 @@ def _regions(key: str, value: Any) -> tuple[tuple[str, str | Material], ...]:
 
 
 def _mounting(**values: Any) -> Mounting:
-    """Clips hold the sheet alone, unless edges are named, too."""
+    """With clips, edges are held only if they are named."""
     return Mounting(**({"edges": ()} if values.get("clips") else {}) | values)
 
 
@@ -218,18 +219,20 @@ def _direction(key: str, value: Any) -> str | tuple[float, ...]:
 
 
 def _or_word(value: Any) -> Any:
-    """A word as it is, numbers as a list."""
+    """A word, or numbers as a list."""
     return value if isinstance(value, str) else list(value)
 
 
 def _contact_in_mm(key: str, value: Any) -> float:
     if not (width := _number(key, value)):
-        raise ValueError(f"{key} = 0 is no contact; give its width, or leave it out for 2 mm")
+        raise ValueError(
+            f"{key} = 0 must be above 0; give the width of the contact, or remove it for 2 mm"
+        )
     return width / 1e3
 
 
 def _scaled(name: str, per_unit: float = 1.0) -> SceneKey:
-    """A number whose unit in the file is `per_unit` times smaller than inside."""
+    """A number that is stored in SI units, and in the file times `per_unit`."""
     return SceneKey(
         name,
         lambda key, value: _number(key, value) / per_unit,
@@ -238,11 +241,11 @@ def _scaled(name: str, per_unit: float = 1.0) -> SceneKey:
 
 
 def _in_units(value: float, per_unit: float) -> float:
-    """The number for a file, the shortest that is read as the value itself if there is one."""
+    """The shortest number for a file that is read back as the same value."""
     near = value * per_unit
-    beside = [nextafter(near, way) for way in (-inf, inf)]
-    further = [nextafter(x, way) for x, way in zip(beside, (-inf, inf), strict=True)]
-    nearest = [*(round(near, digits) for digits in (9, 12)), near, *beside, *further]
+    low, high = nextafter(near, -inf), nextafter(near, inf)
+    nearest = [round(near, 9), round(near, 12), near, low, high]
+    nearest += [nextafter(low, -inf), nextafter(high, inf)]
     return next((x for x in nearest if x / per_unit == value), near)
 
 
@@ -259,7 +262,7 @@ def _one_depth(key: str, value: Any) -> float:
 
 
 def depth_of(word: str) -> float:
-    """Depth in metre of a word on the command line: a number in mm, or a receptor."""
+    """Return the depth in metre of a word on the command line: a number in mm, or a receptor."""
     number = number_in(word)
     return _one_depth("--depth", word if number is None else number)
 
@@ -271,13 +274,13 @@ def _write_depth(depth: float | tuple[float, ...]) -> float | list[float]:
 
 
 def _numbers_of(**keys: str) -> dict[str, SceneKey]:
-    """Numbers by their keys, whose ends are their units, each with the name of its attribute."""
+    """Number keys by the names of their attributes; the end of a key is its unit."""
     units = {key: next((x for end, x in PER_SI.items() if key.endswith(end)), 1.0) for key in keys}
     return {key: _scaled(name, units[key]) for key, name in keys.items()}
 
 
 def _words_of(*names: str) -> dict[str, SceneKey]:
-    """Words whose keys are the names of their attributes."""
+    """Word keys with the names of their attributes."""
     return {name: SceneKey(name, as_text, str) for name in names}
 
 
@@ -285,7 +288,7 @@ PER_SI = {
     "_mm": 1e3, "_ms": 1e3, "_um": 1e6, "_percent": 100.0, "_deg": 180 / pi, "_g_m2": 1e3,
 }  # fmt: skip
 PRONY = _numbers_of(modulus_pa="modulus", time_s="time")
-MODULI, LOSSES = "modulus_scale", "loss_scale"  # of a material, beside its keys; 1 is as it is
+MODULI, LOSSES = "modulus_scale", "loss_scale"  # factors on a material in dotted keys
 SCALES = {MODULI: "modulus", LOSSES: "loss"}  # arguments of `Material.scaled`
 MATERIAL = {
     **_numbers_of(
@@ -298,7 +301,7 @@ MATERIAL = {
     "table": SceneKey("table", _table, written_table),
     "prony": _records("body.material.prony", PronyTerm, PRONY),
 }  # fmt: skip
-INSTEAD = {  # keys of a material of which one is computed from the other
+ALTERNATIVES = {  # keys of a material that replace each other
     "young_modulus_pa": "shear_modulus_pa",
     "shear_modulus_pa": "young_modulus_pa",
 }
@@ -390,18 +393,17 @@ SECTIONS = {
 }  # fmt: skip
 
 
-# Keys that others are computed from, and that no file is written with.
-DERIVED = {"grammage_g_m2"}
+DERIVED = {"grammage_g_m2"}  # keys that set others, and that are not written
 
 
-def checked(where: str, table: dict[str, Any], keys: Mapping[str, Any]) -> dict[str, Any]:
-    """Values by attribute name, each read by its field; an error names keys for a wrong one."""
+def read_keys(where: str, table: dict[str, Any], keys: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of a table by attribute name; an error suggests keys for an unknown one."""
     values = {}
     for key, value in table.items():
         if key not in keys:
             others = [f"[{name}]" for name, known in SECTIONS.items() if key in known]
-            hint = f"; it belongs to {' or '.join(others)}" if others else suggestion(key, keys)
-            hint = hint or f"; it may have {', '.join(keys)}"
+            hint = f"; move it to {' or '.join(others)}" if others else suggestion(key, keys)
+            hint = hint or f"; use one of {', '.join(keys)}"
             raise ValueError(f"{where} has the unknown key {key[:60]!r}{hint}")
         field = keys[key]
         if isinstance(field, SceneKey):
@@ -412,9 +414,7 @@ def checked(where: str, table: dict[str, Any], keys: Mapping[str, Any]) -> dict[
 
 
 def value_at(node: Any, key: str) -> Any:
-    """Value of a dotted key in a scene's table, such as "body.layers.0.thickness_mm"; None if there
-    is none.
-    """
+    """Return the value of a dotted key, such as "body.layers.0.thickness_mm", or None."""
     for name in key.split("."):
         if isinstance(node, list):
             node = node[int(name)] if name.isdecimal() and int(name) < len(node) else None
@@ -424,23 +424,23 @@ def value_at(node: Any, key: str) -> Any:
 
 
 def with_value(node: Any, path: Sequence[str], value: Any, complete: Any = None) -> Any:
-    """A copy of a table with another value where a path leads to.
+    """Return a copy of a table with another value at the end of a path.
 
-    What the table leaves out on the way has the values of the `complete` table. A preset's name
-    stands for its table. A key that the new one is instead of is left out.
+    Missing tables on the path come from the `complete` table, and the name of a preset is replaced
+    by its table. Keys that the new one replaces are dropped.
     """
     if not path:
         return value
     head, rest = path[0], path[1:]
     if isinstance(node, list):
         if not (head.isdecimal() and int(head) < len(node)):
-            raise ValueError(f"there is no '{head}' in a list of {len(node)}; count from 0")
+            raise ValueError(f"there is no item '{head}' in a list of {len(node)}; count from 0")
         k = int(head)
         return [*node[:k], with_value(node[k], rest, value), *node[k + 1 :]]
     if isinstance(node, str):
         node = write_material(solid_of(choose("material", node, PRESETS)))
     if not isinstance(node, dict):
-        raise ValueError(f"there is no '{head}' in {node!r}; vary the whole value")
+        raise ValueError(f"there is no key '{head}' in {node!r}; change the whole value")
     before = complete.get(head) if isinstance(complete, dict) else None
     inner = with_value(node.get(head, before or {}), rest, value, before)
-    return {name: x for name, x in node.items() if name != INSTEAD.get(head)} | {head: inner}
+    return {name: x for name, x in node.items() if name != ALTERNATIVES.get(head)} | {head: inner}

@@ -1,13 +1,13 @@
-"""How a scene's load acts: as a pressure, as a shear traction, or as the force of a contact.
+"""Load of a scene: a pressure, a shear traction, or the force of a contact.
 
-A Tacton says where and when, by q(x, t) at the surface; a kind of load says what q is, and in which
-direction it acts on a surface of normal n. Beside it there may be gravity, which is static, and a
-support that moves: all that a body is clamped to, or rests on springs on, has one translation
+A Tacton defines q(x, t) at the surface. The kind of load defines the meaning of q and its direction
+on a surface of normal n. Static gravity may be added. The support, which is everything that clamps
+the body or carries its springs, may have one translation
 
     u_c(t) = direction amplitude sin(2 pi f t),   t >= 0
 
-With u = w + u_c everywhere, w is the motion seen from the support. A rigid translation strains
-nothing, so that A(s) w = -s^2 M u_c, the load of an inertial force.
+With u = w + u_c everywhere, w is the motion relative to the support. A rigid translation causes no
+strain, so that A(s) w = -s^2 M u_c, the load of an inertial force.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from simple_model.load.focus import NOMINAL_HEIGHT, ContactSpot
 from skinwave.typing import Floats
 
 ALONG_PATH = "path"
-STRONGEST = 30.0  # m/s2 of gravity: three times that of the earth
-LARGEST = 0.01  # m, amplitude of a support: strains are small
-HIGHEST = 1000.0  # Hz of a support, up to which reduced bodies meet their tolerance
+STRONGEST_GRAVITY = 30.0  # m/s2, three times that of the earth
+LARGEST_AMPLITUDE = 0.01  # m, of a support, for small strains
+HIGHEST_FREQUENCY = 1000.0  # Hz, of a support: reduced bodies meet their tolerance up to it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,11 +39,6 @@ class SupportMotion:
     amplitude : float, metre, at most 0.01
     frequency : float, Hz, at most 1000
     direction : (x, y, z) of any length, z upwards
-
-    Raises
-    ------
-    ValueError
-        If a value is not finite or out of range.
     """
 
     amplitude: float
@@ -51,15 +46,15 @@ class SupportMotion:
     direction: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
     def __post_init__(self) -> None:
-        if not 0 < self.amplitude <= LARGEST:
+        if not 0 < self.amplitude <= LARGEST_AMPLITUDE:
             raise ValueError(
-                f"amplitude = {1e6 * self.amplitude:g} um of a support must be above 0 and at most "
-                f"{1e6 * LARGEST:g} um; give amplitude_um"
+                f"amplitude = {1e6 * self.amplitude:g} um of a support must be above 0 and at "
+                f"most {1e6 * LARGEST_AMPLITUDE:g} um; give amplitude_um"
             )
-        if not 0 < self.frequency <= HIGHEST:
+        if not 0 < self.frequency <= HIGHEST_FREQUENCY:
             raise ValueError(
                 f"frequency = {self.frequency:g} Hz of a support must be above 0 and at most "
-                f"{HIGHEST:g} Hz; give frequency_hz"
+                f"{HIGHEST_FREQUENCY:g} Hz; give frequency_hz"
             )
         _check_direction(self.direction, 3, "a support")
 
@@ -75,7 +70,7 @@ class SupportMotion:
 
     @property
     def speed(self) -> float:
-        """Speed in m/s that it starts with."""
+        """Initial speed in m/s."""
         return 2 * pi * self.frequency * self.amplitude
 
     @property
@@ -88,28 +83,28 @@ class SupportMotion:
         """The motion in a few words."""
         return (
             f"a support that moves by {1e6 * self.amplitude:g} um at {self.frequency:g} Hz along "
-            f"{_shown(self.direction)}"
+            f"{_direction_text(self.direction)}"
         )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Load:
-    """How the Tacton's load acts.
+    """Kind and direction of the load of a Tacton.
 
     Parameters
     ----------
-    kind : the name of one of `LOADS`
+    kind : one of `LOADS`
     direction : of a shear traction (x, y) of any length, or "path", along the path of the focus; of
-        a force (x, y, z), z upwards; () for that of its kind
+        a force (x, y, z), z upwards; () for the default of the kind
     force : float, N, of a contact at full drive
-    width : float, metre, standard deviation of a contact's Gaussian traction; 0 for 2 mm
+    width : float, metre, standard deviation of the Gaussian traction of a contact; 0 for 2 mm
     gravity : float, m/s2, downwards; it deflects the body before the load begins
-    support_motion : SupportMotion, of all that the body is clamped to or rests on; or None
+    support_motion : SupportMotion of everything that holds the body, or None
 
-    Raises
-    ------
-    ValueError
-        If a value is unknown, not finite or out of range, or its kind has none of that name.
+    Raises a ValueError if a value is unknown, out of range, or does not apply to the kind.
+
+    >>> Load(kind="shear").words
+    'a shear traction along (1, 0)'
     """
 
     kind: str = "pressure"
@@ -125,10 +120,11 @@ class Load:
             if not getattr(self, name) and name in kind.defaults:
                 object.__setattr__(self, name, kind.defaults[name])
             elif getattr(self, name) and name not in kind.defaults:
-                raise ValueError(f"a load of kind '{self.kind}' has no {name}; leave it out")
-        if not abs(self.gravity) <= STRONGEST:
+                raise ValueError(f"a load of kind '{self.kind}' does not take {name}; remove it")
+        if not abs(self.gravity) <= STRONGEST_GRAVITY:
             raise ValueError(
-                f"gravity = {self.gravity} m/s2 must be a number within {STRONGEST:g} of 0"
+                f"gravity = {self.gravity} m/s2 must be from {-STRONGEST_GRAVITY:g} to "
+                f"{STRONGEST_GRAVITY:g} m/s2"
             )
         kind.check(self)
 
@@ -139,42 +135,44 @@ class Load:
 
     @property
     def is_plain(self) -> bool:
-        """Whether it is the pressure of the focus and nothing else."""
+        """Whether it is only the pressure of the focus."""
         return self == PRESSURE
 
     @property
     def is_normal(self) -> bool:
-        """Whether what moves is normal to a flat surface, as a pressure is."""
+        """Whether the moving load is normal to a flat surface, like a pressure."""
         return not self.moving.tractions(np.array([[0.0, 0.0, 1.0]]))[..., :2].any()
 
     @property
     def moving(self) -> Load:
-        """The same without gravity."""
+        """The same load without gravity."""
         return replace(self, gravity=0.0)
 
     @property
     def words(self) -> str:
-        """Its kind, its direction, gravity and the motion of the support, in a few words."""
+        """Kind, direction, gravity and support motion in a few words."""
         gravity = f" and gravity of {self.gravity:g} m/s2" if self.gravity else ""
         moved = f" and {self.support_motion.words}" if self.support_motion else ""
         return f"{self.of_kind.words(self)}{gravity}{moved}"
 
     def pressures(self, pressure: MovingPressure) -> tuple[MovingPressure, ...]:
-        """Its components (c,), each a moving scalar load."""
+        """Return its components (c,), each a moving scalar load."""
         return self.of_kind.pressures(self, pressure)
 
     def tractions(self, normals: Floats) -> Floats:
-        """Traction vectors (c, n, 3) of its components, per unit of each, at points of a surface
-        that faces the device, of unit normals (n, 3).
+        """Return traction vectors (c, n, 3) of its components, per unit of each.
+
+        They act at points of a surface that faces the device, of unit normals (n, 3).
         """
         return self.of_kind.tractions(self, normals)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LoadKind:
-    """Kind of load: a load in `words`; the attributes of `Load` that it has beside gravity, with
-    their `defaults`; what it may not be, `check`; and the Tacton's pressure as the scalar load that
-    is `acting`, with the `pressures` and `tractions` of `Load`.
+    """Kind of load: its `words`, the `defaults` of the attributes that it takes, and its `check`.
+
+    `acting` returns the Tacton's pressure as the scalar load of this kind; `pressures` and
+    `tractions` are those of `Load`.
     """
 
     words: Callable[[Load], str]
@@ -188,7 +186,7 @@ class LoadKind:
 
     @property
     def is_of_device(self) -> bool:
-        """Whether the device makes it, so that a scene has the focus of one."""
+        """Whether the device produces it, so that a scene has [focus]."""
         return "force" not in self.defaults
 
 
@@ -197,32 +195,32 @@ def _facing(normals: Floats) -> Floats:
     return np.maximum(normals[:, 2:], 0.0)
 
 
-def _pushing(load: Load, normals: Floats) -> Floats:
-    """Radiation pressure, which goes with the square of the cosine of incidence: once for the beam
-    that is spread over a sloping surface, once for the momentum that is reflected along its normal.
+def _pressure_tractions(load: Load, normals: Floats) -> Floats:
+    """Radiation pressure, which scales with the squared cosine of incidence: once because a sloping
+    surface spreads the beam, once because momentum is reflected along the normal.
     """
     return (-normals * _facing(normals) ** 2)[None]
 
 
-def _dragging(load: Load, normals: Floats) -> Floats:
-    """Tangential part of the direction; of the path, of both axes."""
+def _shear_tractions(load: Load, normals: Floats) -> Floats:
+    """Tangential part of the direction, or of both axes for the path."""
     along = np.eye(3)[:2] if load.direction == ALONG_PATH else _unit((*load.direction, 0.0))[None]
     normal = np.einsum("ci,ni->cn", along, normals)[..., None] * normals
     return (along[:, None] - normal) * _facing(normals)
 
 
 def _unit(direction: Any) -> Floats:
-    way = np.array(direction, np.float64)
-    return np.asarray(way / np.linalg.norm(way), np.float64)
+    vector = np.array(direction, np.float64)
+    return np.asarray(vector / np.linalg.norm(vector), np.float64)
 
 
-def _along(load: Load, pressure: MovingPressure) -> tuple[MovingPressure, ...]:
+def _shear_pressures(load: Load, pressure: MovingPressure) -> tuple[MovingPressure, ...]:
     if load.direction != ALONG_PATH:
         return (pressure,)
     return tuple(replace(pressure, heading=axis) for axis in "xy")
 
 
-def _contact(load: Load, pressure: MovingPressure) -> MovingPressure:
+def _contact_pressure(load: Load, pressure: MovingPressure) -> MovingPressure:
     """Traction of a contact, whose force is the commanded signal itself."""
     return replace(
         pressure, profile=ContactSpot(width=load.width), drive="linear", height=NOMINAL_HEIGHT,
@@ -230,53 +228,54 @@ def _contact(load: Load, pressure: MovingPressure) -> MovingPressure:
     )  # fmt: skip
 
 
-def _check_direction(way: Any, axes: int, what: str, instead: str = "") -> None:
-    if isinstance(way, str) or len(way) != axes or not (isfinite(sum(way)) and hypot(*way) > 0):
+def _check_direction(direction: Any, axes: int, what: str, instead: str = "") -> None:
+    is_wrong = isinstance(direction, str) or len(direction) != axes
+    if is_wrong or not (isfinite(sum(direction)) and hypot(*direction) > 0):
         raise ValueError(
-            f"direction = {way!r} of {what} must be {axes} finite numbers, not all 0{instead}"
+            f"direction = {direction!r} of {what} must be {axes} finite numbers, not all 0{instead}"
         )
 
 
 def _check_shear(load: Load) -> None:
     if load.direction != ALONG_PATH:
-        _check_direction(load.direction, 2, "a load of kind 'shear'", ", or path")
+        _check_direction(load.direction, 2, "a load of kind 'shear'", ', or "path"')
 
 
 def _check_contact(load: Load) -> None:
     if not (isfinite(load.force) and load.force > 0):
         raise ValueError(
-            f"force = {load.force} N of a load of kind '{load.kind}' must be a finite number above "
-            "0; give force_n"
+            f"force = {load.force} N of a load of kind '{load.kind}' must be a finite number "
+            "above 0; give force_n"
         )
     ContactSpot(width=load.width)
     _check_direction(load.direction, 3, "a load of kind 'point_force'")
 
 
-def _contact_in_words(load: Load) -> str:
+def _contact_words(load: Load) -> str:
     return (
-        f"a force of {load.force:g} N along {_shown(load.direction)} over a contact of "
+        f"a force of {load.force:g} N along {_direction_text(load.direction)} over a contact of "
         f"{1e3 * load.width:g} mm"
     )
 
 
-def _shown(direction: Any) -> str:
+def _direction_text(direction: Any) -> str:
     if direction == ALONG_PATH:
         return "the path"
     return f"({', '.join(f'{x:g}' for x in direction)})"
 
 
 LOADS = {
-    "pressure": LoadKind(words=lambda load: "pressure", defaults={}, tractions=_pushing),
+    "pressure": LoadKind(words=lambda load: "pressure", defaults={}, tractions=_pressure_tractions),
     "shear": LoadKind(
-        words=lambda load: f"a shear traction along {_shown(load.direction)}",
-        defaults={"direction": (1.0, 0.0)}, tractions=_dragging, check=_check_shear,
-        pressures=_along,
+        words=lambda load: f"a shear traction along {_direction_text(load.direction)}",
+        defaults={"direction": (1.0, 0.0)}, tractions=_shear_tractions, check=_check_shear,
+        pressures=_shear_pressures,
     ),
     "point_force": LoadKind(
-        words=_contact_in_words,
+        words=_contact_words,
         defaults={"direction": (0.0, 0.0, -1.0), "force": 0.0, "width": 2e-3},
         tractions=lambda load, normals: (_unit(load.direction) * _facing(normals))[None],
-        check=_check_contact, acting=_contact,
+        check=_check_contact, acting=_contact_pressure,
     ),
 }  # fmt: skip
 PRESSURE = Load()

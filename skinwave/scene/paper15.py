@@ -7,12 +7,12 @@ from simple_model import MovingPressure, Tacton, Trajectory, published_load
 from skinwave.scene.scene import BODIES, Body, Scene, with_body
 
 AM_FREQUENCIES = (0.0, 80.0, 140.0, 210.0)  # Hz
-MEASURED_ON = ("paper-sheet", "skin-slab")  # the sheet they had, and what they wished to
+MEASURED_ON = ("paper-sheet", "skin-slab")  # the sheet that they measured, and skin
 PATHS = ((0.0, 0.0), (0.010, 6.0), (0.020, 12.0), (0.030, 18.0))  # circle diameter m, speed m/s
 
 
 def tactons() -> Iterator[tuple[str, Tacton]]:
-    """Name and Tacton of the 3 PureAM, 3 PureSTM and 9 AM+STM patterns, each 1 s."""
+    """Yield the name and Tacton of the 3 PureAM, 3 PureSTM and 9 AM+STM patterns of 1 s."""
     for am_frequency in AM_FREQUENCIES:
         for size, speed in PATHS:
             parts = [f"am{am_frequency:g}"] if am_frequency else []
@@ -23,8 +23,10 @@ def tactons() -> Iterator[tuple[str, Tacton]]:
 
 
 def scenes(name: str, tacton: Tacton, bodies: Mapping[str, Body] | None = None) -> dict[str, Scene]:
-    """One Tacton by both point kernels and on bodies by name, the paper sheet and skin if none are
-    given, which all receive the same load.
+    """Return scenes of one Tacton by both point kernels and on bodies by name, all with the same
+    load.
+
+    The default bodies are the paper sheet and skin.
     """
     bodies = bodies or {key: BODIES[key] for key in MEASURED_ON}
     scene = Scene(name=name, pressure=MovingPressure(tacton=tacton), body=BODIES["none"])
@@ -32,7 +34,7 @@ def scenes(name: str, tacton: Tacton, bodies: Mapping[str, Body] | None = None) 
 
 
 def beside_kernels(scene: Scene) -> dict[str, Scene]:
-    """The scene without its body by model: under the published load, and under its own."""
+    """Return the scene without its body, under the published load and under its own load."""
     bare = with_body(scene, BODIES["none"])
     paper = replace(bare, pressure=published_load(scene.pressure))
     return {"point-kernel-published": paper, "point-kernel": bare}

@@ -1,4 +1,4 @@
-"""A scene: what is commanded, what it acts on, where it is probed. Physics only, one TOML file."""
+"""A scene: the load, the body and the probes of an experiment. It is stored as one TOML file."""
 
 from __future__ import annotations
 
@@ -39,16 +39,14 @@ __all__ = [
     "body_name", "check_motion", "kind_of", "solid_of", "with_body",
 ]  # fmt: skip
 
-SAMPLE_RATE = 10_000.0  # Hz of every response: five times the highest line that matters
+SAMPLE_RATE = 10_000.0  # Hz of every response: five times the highest relevant line
 MOST_VALUES = 50_000_000  # of all waveforms of one response, 400 MB
 PROBES = ((0.0, 0.0), (0.005, 0.0), (0.010, 0.0), (0.015, 0.0), (0.020, 0.0))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """Name of the quantity that probes read, and the depth in metre of each; () for all at the
-    surface.
-    """
+    """Name of the quantity that probes read, and the depth in metre of each; () at the surface."""
 
     quantity: str = DISPLACEMENT.name
     depths: tuple[float, ...] = ()
@@ -87,20 +85,22 @@ class Scene:
     Parameters
     ----------
     name : str
-    pressure : MovingPressure, with its Tacton; of a load that no device makes, that of the load
+    pressure : MovingPressure with its Tacton; for a load without a device, that of the load
     body : Body
-    probes : (p, 2) positions in metre, where the surface is watched
-    depth : of the probes in metre below the surface, along its normal; one, or one a probe
-    load : how the pressure acts, and gravity
-    quantity : name of one of `simple_model.quantities.QUANTITIES`, what the probes read
-    spreads : dotted key of a scene file and the distribution of its number about the central value,
-        which is that of the scene; `scene.spreads` has those of presets and of the device, too
+    probes : (p, 2) positions in metre on the surface
+    depth : of the probes in metre below the surface, along its normal; one for all, or one each
+    load : kind of load, and gravity
+    quantity : what the probes read, one of `simple_model.quantities.QUANTITIES`
+    spreads : dotted key of a scene file and distribution of its number about the value of the
+        scene. `scene.spreads` also has those of presets and of the device.
 
-    Raises
-    ------
-    ValueError
-        If a probe or the path of the focus is off the body, there is no probe, or the body has no
-        such quantity or depth.
+    Raises a ValueError if a probe or the path of the focus lies outside the body, there is no
+    probe, or the body does not have the quantity or depth.
+
+    >>> from simple_model import MovingPressure, Tacton
+    >>> scene = Scene(pressure=MovingPressure(tacton=Tacton(am_frequency=140)), body=BODIES["palm"])
+    >>> scene.probe_points.shape, scene.reading.words
+    ((5, 2), 'displacement into the body')
     """
 
     name: str = "scene"
@@ -126,39 +126,40 @@ class Scene:
             raise ValueError("points_mm is empty; give at least one probe")
         if (values := len(self.probes) * self.tacton.duration * SAMPLE_RATE) > MOST_VALUES:
             raise ValueError(
-                f"{len(self.probes):,} probes for {self.tacton.duration:g} s are {values:,.0f} "
-                f"values, the limit is {MOST_VALUES:,}; give fewer probes or a shorter Tacton"
+                f"{len(self.probes):,} probes for {self.tacton.duration:g} s give {values:,.0f} "
+                f"values, more than the limit of {MOST_VALUES:,}; use fewer probes or a shorter "
+                "Tacton"
             )
         if isinstance(self.depth, tuple) and len(self.depth) != len(self.probes):
             raise ValueError(
-                f"depth_mm has {len(self.depth)} values for {len(self.probes)} probes; give one a "
-                "probe, or one"
+                f"depth_mm has {len(self.depth)} values for {len(self.probes)} probes; give one "
+                "value, or one for each probe"
             )
         if not (np.isfinite(self.depths).all() and min(self.depths) >= 0):
             raise ValueError(f"depth_mm = {1e3 * np.array(self.depth)} must be finite, 0 or above")
 
     def _check_load(self) -> None:
-        _ = self.loads  # a path may have no direction
+        _ = self.loads  # raises an error if a path has no direction
         body, load = self.body, self.load
         if body.of_kind.is_plate and not load.is_normal:
             raise ValueError(
-                f"a {body.kind} takes what is normal to it, not {load.words}; take a slab"
+                f"a {body.kind} needs a load normal to it, not {load.words}; use a slab"
             )
-        held = body.is_held and not body.is_on_half_space  # which sags without bound
-        if load.gravity and body.of_kind.discretise and not held:
+        carries = body.is_held and not body.is_on_half_space  # a half-space sags without bound
+        if load.gravity and body.of_kind.discretise and not carries:
             raise ValueError("an unconstrained body falls under gravity; clamp its base")
         if (motion := load.support_motion) is None:
             return
         if not body.of_kind.discretise or body.of_kind.is_plate:
             raise ValueError(
-                f"{motion.words} is for a solid, not a body of kind '{body.kind}'; take a slab"
+                f"{motion.words} needs a solid, not a body of kind '{body.kind}'; use a slab"
             )
         if not body.is_held:
-            raise ValueError(f"{motion.words} moves no body that is unconstrained; clamp its base")
+            raise ValueError(f"{motion.words} does not move an unconstrained body; clamp its base")
         if "absorbing" in (body.base, *body.conditions):
             raise ValueError(
-                f"{motion.words} has no absorbing sides, beyond which tissue is at rest; take "
-                'sides = "free" or "clamped"'
+                f"{motion.words} needs sides that do not absorb, because the tissue beyond them "
+                'is at rest; use sides = "free" or "clamped"'
             )
 
     def _check_extent(self) -> None:
@@ -166,16 +167,16 @@ class Scene:
         for x, y in self.probes:
             if abs(x) > half[0] or abs(y) > half[1]:
                 raise ValueError(
-                    f"probe ({1e3 * x:g}, {1e3 * y:g}) mm is off the body, which ends at "
-                    f"{1e3 * half[0]:g} and {1e3 * half[1]:g} mm; move it inside"
+                    f"probe ({1e3 * x:g}, {1e3 * y:g}) mm lies outside the body. Move it inside "
+                    f"x = ±{1e3 * half[0]:g} mm, y = ±{1e3 * half[1]:g} mm"
                 )
         path = self.tacton.trajectory.outline
         if (reach := np.abs(path).max(axis=0) - half).max() > 1e-12:
             axis = int(np.argmax(reach))
             raise ValueError(
-                f"the focus path reaches {1e3 * (reach + half)[axis]:g} mm along {'xy'[axis]}, off "
-                f"the body, which ends at {1e3 * half[axis]:g} mm; shrink it (of a file: skinwave "
-                "convert --resize) or widen the body"
+                f"the focus path reaches {1e3 * (reach + half)[axis]:g} mm along {'xy'[axis]}, "
+                f"outside the body, which ends at ±{1e3 * half[axis]:g} mm; shrink the path (of "
+                "a file: skinwave convert --resize) or widen the body"
             )
 
     @property
@@ -201,11 +202,11 @@ class Scene:
 
     @property
     def reading(self) -> Reading:
-        """Quantity of the probes, and their depths."""
+        """Quantity and depths of the probes."""
         return Reading(quantity=self.quantity, depths=self.depths if any(self.depths) else ())
 
     def plot(self, *, ax: Axes | None = None) -> Axes:
-        """Draw body, path, foci at the start and probes from above, and return the axes."""
+        """Draw the body, path, initial foci and probes from above, and return the axes."""
         return drawn("notebook", "draw_scene", self, ax)
 
     def __repr__(self) -> str:
@@ -216,51 +217,50 @@ class Scene:
 
 
 def _check_reading(body: Body, reading: Reading) -> None:
-    """Refuse a quantity or a depth that a body has not."""
-    asked, is_plate = reading.record, body.of_kind.is_plate
+    """Refuse a quantity or depth that a body does not have."""
+    quantity, is_plate = reading.record, body.of_kind.is_plate
     deepest = max(reading.depths, default=0.0)
-    if not asked.of_body:
-        raise ValueError(f"quantity '{asked.name}' is of no body; leave it out")
+    if not quantity.of_body:
+        raise ValueError(f"quantity '{quantity.name}' does not apply to a body; remove it")
     is_outside = deepest > body.depth if is_plate else deepest >= body.depth
     if is_outside and (is_plate or body.of_kind.is_layer):
         raise ValueError(
-            f"depth_mm = {1e3 * deepest:g} of a probe is not within the body, which is "
-            f"{1e3 * body.depth:g} mm thick; give less than that"
+            f"depth_mm = {1e3 * deepest:g} of a probe lies outside the body, which is "
+            f"{1e3 * body.depth:g} mm thick; use a smaller depth"
         )
-    if asked.is_normal or not is_plate:
+    if quantity.is_normal or not is_plate:
         return
     if body.mounting.is_curled or body.placement.is_tilted:
         raise ValueError(
-            f"{asked.words} is that of a flat {body.kind} across the beam; lay it flat"
+            f"{quantity.words} is computed only for a flat {body.kind} across the beam; remove "
+            "its curl or tilt"
         )
-    if asked.field == STRAIN and body.solid.orthotropy is not None:
+    if quantity.field == STRAIN and body.solid.orthotropy is not None:
         raise ValueError(
-            f"{asked.words} of an orthotropic {body.kind} needs its moduli across its thickness; "
-            "take an isotropic material"
+            f"{quantity.words} of an orthotropic {body.kind} depends on moduli across its "
+            "thickness, which are unknown; use an isotropic material"
         )
 
 
 def check_motion(scene: Scene, command: str) -> None:
-    """Refuse, by a ValueError, a scene for a command that is about the displacement of the surface
-    under a pressure.
-    """
+    """Refuse a scene for a command that needs the surface displacement under a pressure."""
     check_load(scene, command)
     if not scene.reading.is_plain:
         raise ValueError(
-            f"{command} is about the displacement of the surface, not {scene.reading.words}; leave "
-            "out depth_mm and quantity, or use skinwave run, compare, report, film or sweep"
+            f"{command} computes the displacement of the surface, not {scene.reading.words}; "
+            "remove depth_mm and quantity, or use skinwave run, compare, report, film or sweep"
         )
 
 
 def check_load(scene: Scene, command: str) -> None:
-    """Refuse, by a ValueError, a scene for a command that is about the pressure of a focus."""
+    """Refuse a scene for a command that needs the pressure of a focus."""
     if not scene.load.is_plain:
         raise ValueError(
-            f"{command} is about the pressure of a focus, not {scene.load.words}; leave out [load],"
-            " or use skinwave run or sweep"
+            f"{command} needs the pressure of a focus, not {scene.load.words}; remove [load], or "
+            "use skinwave run or sweep"
         )
 
 
 def with_body(scene: Scene, body: Body, **pressure: Any) -> Scene:
-    """The same Tacton and probes on another body, with changes to the pressure if any."""
+    """Return the scene on another body, with optional changes to the pressure."""
     return replace(scene, body=body, pressure=replace(scene.pressure, **pressure))

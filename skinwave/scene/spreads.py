@@ -1,9 +1,8 @@
-"""Uncertain numbers of a scene, and where the spread of each comes from.
+"""Uncertain numbers of a scene, with the sources of their spreads.
 
-A scene file may give any number a spread of its own. Beside these, a preset of a material carries
-the spread that its sources leave, as a factor on all its moduli and one on all its losses, and the
-pressure of a device is known to a factor of 2 unless the file says otherwise (`spread = 0` for a
-measured one).
+A scene file may give a spread to any number. The presets of materials have the spread of their
+sources, as factors on all moduli and on all losses. The pressure of a device is known to a factor
+of 2, unless the file gives its spread (`spread = 0` for a measured pressure).
 
     preset                   moduli               losses
     palm, palm-stiff,        factor 2 [1]         factor 3 [2]
@@ -12,23 +11,23 @@ measured one).
     layers of skin           factor 3.2 [4]       factor 3 [2]
     paper                    factor 2 [5]         factor 1.6 [5]
     paper-grain              factor 1.6 [5]       factor 1.6 [5]
-    ecoflex                  none known: its constants are second-hand
-    bone                     none: ten times its modulus moves a fingertip by 2 %
+    ecoflex                  unknown, because its constants are second-hand
+    bone                     none, because ten times its modulus moves a fingertip by 2 %
 
-[1] No shear modulus of a palm in vivo is published: surface waves at which a moving focus is
-    perceived as strongest run at 5 to 8 m/s (Frier et al., EuroHaptics 2018), those of fingers
-    reach 7 m/s (Manfredi et al., PLoS ONE 7:e31203 (2012)), those of forearms 3.25 m/s at 200 Hz
-    (Zhang et al. 2011): c^2 spreads over a factor of 4, 2 either way of the preset.
+[1] No shear modulus of a palm in vivo is published. A moving focus feels strongest at 5 to 8 m/s
+    (Frier et al., EuroHaptics 2018). Waves reach 7 m/s on fingers (Manfredi et al., PLoS ONE
+    7:e31203 (2012)) and 3.25 m/s at 200 Hz on forearms (Zhang et al. 2011). c^2 thus spreads over
+    a factor of 4, which is 2 on both sides of the preset.
 [2] Decay lengths and loss factors of skin at 200 Hz differ by a factor of 5 to 9 between sources
-    (Potts et al. 1983; Manfredi et al. 2012; Zhang et al. 2011): 3 either way at most.
+    (Potts et al. 1983; Manfredi et al. 2012; Zhang et al. 2011), at most 3 on both sides.
 [3] Zhang et al., Med Eng Phys 33:31 (2011): 7.86 +- 1.86 kPa and 5.03 +- 0.60 Pa s, whose ratio,
     the loss, has 27 % if the two errors are independent.
-[4] Published moduli of a layer differ by a factor of 6 to 18 between methods and people, and
-    waves on hands by 1.8 in speed, 3.2 in its square, from fitted layers (bench/layered_skin.py).
-[5] Office paper: 5 to 8 GPa along and 2 to 4 GPa across the machine direction, about the 4 GPa of
-    "paper" and, each, the 5.5 and 2.5 GPa of "paper-grain"; loss factor 0.02 to 0.05.
+[4] Published moduli of a layer differ by a factor of 6 to 18 between methods and people. Speeds of
+    waves on hands differ from fitted layers by 1.8, their squares by 3.2 (bench/layered_skin.py).
+[5] Office paper has 5 to 8 GPa along and 2 to 4 GPa across the machine direction; "paper" has 4
+    GPa, "paper-grain" 5.5 and 2.5 GPa. Its loss factor is 0.02 to 0.05.
 
-Pressure: 160 dB at 200 mm are 59 Pa or, if that level is of the peak, 28 Pa; models of the array
+Pressure: 160 dB at 200 mm are 59 Pa, or 28 Pa if that level is a peak value. Models of the array
 give 59 to 87 Pa (Liebler et al., J Acoust Soc Am 148:1713 (2020); HandyBeam; AcousTools).
 """
 
@@ -40,12 +39,12 @@ from skinwave.scene.file import to_table
 from skinwave.scene.keys import LOSSES, MODULI, value_at
 from skinwave.scene.scene import Scene
 
-PRESSURE, FACTOR = "focus.peak_pressure_pa", 2.0
+PRESSURE, PRESSURE_FACTOR = "focus.peak_pressure_pa", 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class MaterialSpread:
-    """Distributions about 1 of the factors on all moduli and on all losses of a material."""
+    """Distributions, about 1, of the factors on all moduli and on all losses of a material."""
 
     moduli: Distribution
     losses: Distribution
@@ -67,24 +66,22 @@ OF_PRESETS: Mapping[str, MaterialSpread] = {
 
 
 def spreads_of(scene: Scene) -> tuple[Spread, ...]:
-    """Uncertain numbers of a scene: those of its file, of its presets, and the device's pressure;
-    none that is known exactly.
-    """
+    """Return the uncertain numbers of a scene: those of its file, of presets, and the pressure."""
     table = to_table(replace(scene, spreads=())) if scene.spreads else {}
-    found = [
+    spreads = [
         Spread(key=key, value=float(value), distribution=given)
         for key, given in scene.spreads
         if (value := value_at(table, key)) is not None
     ]
     device = scene.load.of_kind.is_of_device
     if device and PRESSURE not in dict(scene.spreads) and scene.pressure.peak_pressure > 0:
-        found.append(
+        spreads.append(
             Spread(key=PRESSURE, value=scene.pressure.peak_pressure,
-                   distribution=within_factor(FACTOR), implied=True)
+                   distribution=within_factor(PRESSURE_FACTOR), implied=True)
         )  # fmt: skip
     if scene.body.of_kind.discretise:
-        found += _of_materials(scene)
-    return tuple(each for each in found if not each.distribution.is_exact)
+        spreads += _of_materials(scene)
+    return tuple(each for each in spreads if not each.distribution.is_exact)
 
 
 def _of_materials(scene: Scene) -> Iterator[Spread]:

@@ -1,4 +1,4 @@
-"""Design of a sweep: keys of a scene file, their values, and how these are combined."""
+"""Design of a sweep: keys of a scene file, their values, and how they are combined."""
 
 import hashlib
 import itertools
@@ -17,7 +17,6 @@ from meshes import reading
 from simple_model.choices import choose, suggestion
 from skinwave.scene.distributions import Spread, parse_distribution, uniform
 from skinwave.scene.file import (
-    content,
     dumps,
     from_table,
     loads,
@@ -33,9 +32,9 @@ from skinwave.system.plain_text import number_in
 from skinwave.typing import Floats
 
 DESIGNS = ("factorial", "zip", "lhs", "sobol")
-SAMPLED = ("lhs", "sobol")  # of which --samples says how many
+SAMPLED = ("lhs", "sobol")  # designs with --samples
 MOST_RUNS = 100_000
-BODY = "body"  # the key of a whole body: the name of a preset, or a file
+BODY = "body"  # key of a whole body, the name of a preset or a file
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +45,7 @@ class Choice:
     values: tuple[Any, ...]
 
     def at(self, shares: Floats) -> list[Any]:
-        """Values at shares (n,) of 0 to 1 of all."""
+        """Return the values at shares (n,) from 0 to 1 of the list."""
         last = len(self.values) - 1
         return [self.values[min(int(share * len(self.values)), last)] for share in shares]
 
@@ -56,9 +55,10 @@ Variation = Choice | Spread
 
 @dataclass(frozen=True, kw_only=True)
 class DesignPoint:
-    """One run that is wanted: its `varied` keys, the scene that they make or the `error` why they
-    make none, the `keys` of that scene's file, and its `text`; and the scene that it is `before`
-    factors on all moduli or losses of a material.
+    """One run of a sweep: its `varied` keys and the scene, or the `error` why there is none.
+
+    `keys` and `text` are those of the scene's file. `before` is the scene before factors on all
+    moduli or losses of a material.
     """
 
     varied: Mapping[str, Any]
@@ -69,7 +69,7 @@ class DesignPoint:
     error: str = ""
 
     def name(self, *model_options: object) -> str:
-        """A hash of the complete scene, of the file of its body, and of the solver options."""
+        """Return a hash of the complete scene, the file of its body and the solver options."""
         digest = hashlib.sha256(repr((self.text, *model_options)).encode())
         if self.scene and self.scene.body.file:
             with reading.open_regular(self.scene.body.file) as file:
@@ -78,26 +78,27 @@ class DesignPoint:
 
 
 def parse(text: str) -> Variation:
-    """Variation of `key=v1,v2`, `key=start:stop:n` or, uniform between, `key=start:stop`; or by a
-    distribution, as `key=normal(25e3,0.3)`.
+    """Return the variation of `key=v1,v2`, `key=start:stop:n`, or a distribution.
+
+    A distribution is `key=start:stop`, uniform between limits, or `key=normal(25e3,0.3)` and so on.
     """
     key, equals, right = text.partition("=")
-    key = _known(key.strip())
+    key = _checked_key(key.strip())
     if not equals or not right.strip():
-        raise ValueError(f"--vary {text} lacks values; write {key}=v1,v2 or {key}=start:stop:n")
-    if found := parse_distribution(key, right):
-        return found
+        raise ValueError(f"--vary {text} needs values; write {key}=v1,v2 or {key}=start:stop:n")
+    if spread := parse_distribution(key, right):
+        return spread
     numbers = [number_in(part) for part in right.split(":")]
     if len(numbers) == 1 or None in numbers:
         return Choice(key=key, values=tuple(_values(right)))
     if len(numbers) > 3 or not all(math.isfinite(x) for x in numbers if x is not None):
-        raise ValueError(f"--vary {text} is no finite start:stop:n; write three finite numbers")
+        raise ValueError(f"--vary {text} is not valid; write three finite numbers, start:stop:n")
     start, stop, *count = (x for x in numbers if x is not None)
     if not count:
         return uniform(key, start, stop)
     if not (count[0] == int(count[0]) and 1 <= count[0] <= MOST_RUNS):
         raise ValueError(
-            f"--vary {text} asks for {count[0]:g} values; give a whole number, 1..{MOST_RUNS:,}"
+            f"--vary {text} gives {count[0]:g} values; use a whole number from 1 to {MOST_RUNS:,}"
         )
     return Choice(key=key, values=tuple(np.linspace(start, stop, int(count[0])).tolist()))
 
@@ -108,11 +109,11 @@ def combinations(
     samples: int | None = None,
     seed: int = 0,
 ) -> list[dict[str, Any]]:
-    """The values that meet in each run, by key.
+    """Return the values of each run, by key.
 
     The design is "factorial", every value with every other; "zip", first with first; "lhs", a Latin
-    hypercube of so many samples of lists and distributions, the same for the same seed (McKay et
-    al., Technometrics 21:239 (1979)); or "sobol", for Sobol' indices, with so many samples of each
+    hypercube of samples of lists and distributions, the same for the same seed (McKay et al.,
+    Technometrics 21:239 (1979)); or "sobol", for Sobol' indices, with so many samples of each
     matrix.
     """
     choose("design", design, DESIGNS)
@@ -120,9 +121,11 @@ def combinations(
     if not keys:
         raise ValueError("nothing is varied; give --vary key=v1,v2 at least once")
     if twice := [key for key in dict.fromkeys(keys) if keys.count(key) > 1]:
-        raise ValueError(f"{twice[0]} is varied twice; give all its values at once")
+        raise ValueError(f"{twice[0]} is varied twice; give all its values in one --vary")
     if (samples is None) == (design in SAMPLED):
-        raise ValueError("--samples and --design lhs or sobol need each other; give both or none")
+        raise ValueError(
+            "--samples needs --design lhs or sobol, and these need --samples; give both or neither"
+        )
     if design in SAMPLED:
         shares = _shares(len(keys), design, samples or 0, seed)
         drawn = [each.at(column) for each, column in zip(variations, shares.T, strict=True)]
@@ -130,21 +133,19 @@ def combinations(
     values = [each.values for each in variations if isinstance(each, Choice)]
     if spread := [each.key for each in variations if isinstance(each, Spread)]:
         raise ValueError(
-            f"{spread[0]} has a distribution; give --design lhs or sobol, and --samples, or "
-            "values: of start:stop add :n"
+            f"{spread[0]} has a distribution; use --design lhs or sobol with --samples, or give "
+            "values (start:stop:n)"
         )
     lengths = [len(each) for each in values]
     if design == "zip" and len(set(lengths)) > 1:
-        raise ValueError(
-            f"--design zip pairs lists of one length, not of {lengths}; take factorial"
-        )
+        raise ValueError(f"--design zip needs lists of equal length, not {lengths}; use factorial")
     _check_count(lengths[0] if design == "zip" else math.prod(lengths))
     every = zip(*values, strict=True) if design == "zip" else itertools.product(*values)
     return [dict(zip(keys, each, strict=True)) for each in every]
 
 
 def _shares(d: int, design: str, samples: int, seed: int) -> Floats:
-    """Shares (n, d) of all values of d keys in the runs of samples."""
+    """Shares (n, d) from 0 to 1 of d keys in the runs of a sampled design."""
     from scipy.stats import qmc
 
     if design == "lhs":
@@ -155,17 +156,17 @@ def _shares(d: int, design: str, samples: int, seed: int) -> Floats:
 
 
 def saltelli_shares(d: int, n: int, seed: int = 0) -> Floats:
-    """Shares (n (d + 2), d) of 0 to 1 of d numbers, for Sobol' indices: matrices A and B of n rows,
-    a power of two, then A with column k of B for each k, of a scrambled Sobol' sequence (Owen,
-    J Complex 14:466 (1998)) in 2 d dimensions.
+    """Return shares (n (d + 2), d) from 0 to 1 of d numbers, for Sobol' indices.
 
-    Saltelli et al., Comput Phys Commun 181:259 (2010), section 3.
+    These are matrices A and B of n rows, a power of two, then A with column k of B for each k. They
+    come from a scrambled Sobol' sequence in 2 d dimensions (Owen, J Complex 14:466 (1998); Saltelli
+    et al., Comput Phys Commun 181:259 (2010), section 3).
     """
     from scipy.stats import qmc
 
     if n < 2 or n & (n - 1):
         near = 2 ** max(1, round(np.log2(max(n, 2))))
-        raise ValueError(f"{n} samples of each matrix are no power of two; take {near}")
+        raise ValueError(f"{n} samples of each matrix are not a power of two; use {near}")
     a, b = np.split(qmc.Sobol(2 * d, rng=seed).random(n), 2, axis=1)
     mixed = np.tile(a, (d, 1, 1))
     for k in range(d):
@@ -174,30 +175,28 @@ def saltelli_shares(d: int, n: int, seed: int = 0) -> Floats:
 
 
 def cases(path: Path, combined: Sequence[Mapping[str, Any]]) -> list[DesignPoint]:
-    """The scenes that a scene file and each combination of values make.
-
-    A combination that makes no scene is a case with its error.
-    """
+    """Return the runs of a scene file with each combination of values, or their errors."""
     base = read(path)
-    table = parse_toml(content(path), path.parent)
+    table = parse_toml(reading.read_text(path), path.parent)
     if base.body.file:
         table["body"]["file"] = base.body.file
     return cases_of(table, tomllib.loads(dumps(base)), combined)
 
 
 def cases_of(table: Any, complete: Any, combined: Sequence[Mapping[str, Any]]) -> list[DesignPoint]:
-    """The same for the table of a scene file, and that with all keys that it leaves out."""
-    found = [_case(table, complete, each) for each in combined]
-    _refuse_words(found)
-    return found
+    """Return the runs for the table of a scene file, and its complete table."""
+    points = [_case(table, complete, each) for each in combined]
+    _check_words(points)
+    return points
 
 
 def with_values(scene: Scene, values: Mapping[str, Any]) -> Scene:
-    """A scene with other values of keys of its file, or factors on all moduli or losses of a
-    material, such as "body.material.modulus_scale"; these keys have no spread.
+    """Return a scene with other values of keys of its file; these keys have no spread.
+
+    Keys such as "body.material.modulus_scale" are factors on all moduli or losses of a material.
     """
-    plain, scales = _parted(values)
-    if plain.keys() == {PRESSURE}:  # of any scene, also one that no file holds
+    plain, scales = _split_scales(values)
+    if plain.keys() == {PRESSURE}:  # works for scenes that no file can store
         pressure = replace(scene.pressure, peak_pressure=plain[PRESSURE])
         left = tuple(each for each in scene.spreads if each[0] != PRESSURE)
         scene = replace(scene, pressure=pressure, spreads=left)
@@ -207,14 +206,14 @@ def with_values(scene: Scene, values: Mapping[str, Any]) -> Scene:
     return _scaled(scene, scales)
 
 
-def _parted(values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+def _split_scales(values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     """Values of keys of a file, and factors on moduli and losses."""
     scales = {key: x for key, x in values.items() if key.rpartition(".")[2] in SCALES}
     return {key: x for key, x in values.items() if key not in scales}, scales
 
 
 def _scaled(scene: Scene, scales: Mapping[str, Any]) -> Scene:
-    """The scene with factors on all moduli, or losses; those of a material at once."""
+    """The scene with factors on all moduli or losses, those of one material at once."""
     places: dict[str, dict[str, float]] = {}
     for key, factor in scales.items():
         if isinstance(factor, bool) or not isinstance(factor, int | float) or not factor > 0:
@@ -241,27 +240,27 @@ def _with_factors(body: Body, place: str, factors: dict[str, float]) -> Body:
             layers[int(k)] = replace(layer, material=solid_of(layer.material).scaled(**factors))
             return replace(body, layers=tuple(layers))
     scale = f"{place}.{'modulus' if 'modulus' in factors else 'loss'}_scale"
-    raise ValueError(f"there is no material for {scale} in this scene; leave it out")
+    raise ValueError(f"the scene has no material for {scale}; remove it")
 
 
 def _check_count(count: int) -> None:
     if not 1 <= count <= MOST_RUNS:
-        raise ValueError(f"{count:,} runs are outside 1..{MOST_RUNS:,}; vary fewer values")
+        raise ValueError(f"{count:,} runs are outside 1 to {MOST_RUNS:,}; vary fewer values")
 
 
-def _known(key: str) -> str:
-    """The key, if a scene has it; parts of a value, as in body.material.poisson, are checked when
-    the scene is read.
+def _checked_key(key: str) -> str:
+    """The key, if scenes have it; parts of a value, as in body.material.poisson, are
+    checked later.
     """
     known = [f"{section}.{name}" for section, keys in SECTIONS.items() for name in keys]
     if key != BODY and ".".join(key.split(".")[:2]) not in known:
-        hint = suggestion(key, known) or "; a key is of the form tacton.size_mm"
-        raise ValueError(f"'{key}' is no key of a scene{hint}")
+        hint = suggestion(key, known) or "; write a key such as tacton.size_mm"
+        raise ValueError(f"'{key}' is not a key of a scene{hint}")
     return key
 
 
 def _values(text: str) -> list[Any]:
-    """Values between commas as a scene file would have them, or words, which need no quotes."""
+    """Values between commas, as in a scene file, or words without quotes."""
     try:
         return list(tomllib.loads(f"values = [{text}]")["values"])
     except (tomllib.TOMLDecodeError, RecursionError):
@@ -272,7 +271,7 @@ def _values(text: str) -> list[Any]:
 
 def _case(table: Any, complete: Any, varied: Mapping[str, Any]) -> DesignPoint:
     scene, before, error = None, None, ""
-    plain, scales = _parted(varied)
+    plain, scales = _split_scales(varied)
     made = _changed(table, complete, plain)
     try:
         text = tomli_w.dumps(made)
@@ -282,7 +281,7 @@ def _case(table: Any, complete: Any, varied: Mapping[str, Any]) -> DesignPoint:
     except ValueError as refused:
         error = str(refused)
     keys = _flat(without_spreads(tomllib.loads(text))[0])
-    for key, value in varied.items():  # a name for a number, as of a depth, is that number
+    for key, value in varied.items():  # words for numbers, such as depths, become numbers
         keys[key] = keys[key] if isinstance(keys.get(key), float) else _plain(value)
     return DesignPoint(
         varied=varied, keys=keys, text=text, scene=scene, before=before, error=error
@@ -290,7 +289,7 @@ def _case(table: Any, complete: Any, varied: Mapping[str, Any]) -> DesignPoint:
 
 
 def _changed(table: Any, complete: Any, varied: Mapping[str, Any]) -> Any:
-    """A copy of a table with other values of its keys; the body first, then what is in it."""
+    """A copy of a table with other values, first that of the body, then those in it."""
     for key in sorted(varied, key=lambda key: key != BODY):
         if key == BODY:
             table = table | {BODY: _body(varied[key])}
@@ -300,23 +299,25 @@ def _changed(table: Any, complete: Any, varied: Mapping[str, Any]) -> Any:
 
 
 def _body(name: Any) -> Any:
-    """The table of a preset, or of a file."""
+    """The table of a preset or of a file."""
     if name in BODIES:
         return to_table(with_body(loads(""), BODIES[name]))[BODY]
     if not Path(str(name)).is_file():
         raise ValueError(
-            f"body '{name}' is no file and none of {', '.join(BODIES)}; name one of these or a file"
+            f"body '{name}' is neither a file nor one of {', '.join(BODIES)}; use one of these "
+            "or a file"
         )
     return {"kind": "mesh", "file": str(Path(name).resolve())}
 
 
 def _flat(table: Mapping[str, Any]) -> dict[str, float | str]:
-    """Keys with their section, and values that fit one entry of a table."""
-    found: dict[str, float | str] = {}
-    for section, values in table.items():
-        if isinstance(values, dict):
-            found |= {f"{section}.{key}": _plain(value) for key, value in values.items()}
-    return found
+    """Keys with their section, and values that fit in a table cell."""
+    return {
+        f"{section}.{key}": _plain(value)
+        for section, values in table.items()
+        if isinstance(values, dict)
+        for key, value in values.items()
+    }
 
 
 def _plain(value: Any) -> float | str:
@@ -325,12 +326,12 @@ def _plain(value: Any) -> float | str:
     return value if isinstance(value, str) else json.dumps(value)
 
 
-def _refuse_words(found: Sequence[DesignPoint]) -> None:
-    """Numbers may be out of range in some runs; a word that no run can use is a slip."""
-    if all(case.error for case in found):
-        raise ValueError(f"no combination makes a scene: {found[0].error}")
-    accepted = {(k, str(v)) for case in found if not case.error for k, v in case.varied.items()}
-    for case in found:
+def _check_words(points: Sequence[DesignPoint]) -> None:
+    """Refuse words that no run can use. Numbers may be out of range in some runs."""
+    if all(case.error for case in points):
+        raise ValueError(f"no combination gives a valid scene: {points[0].error}")
+    accepted = {(k, str(v)) for case in points if not case.error for k, v in case.varied.items()}
+    for case in points:
         for key, value in case.varied.items():
             if not isinstance(value, int | float) and (key, str(value)) not in accepted:
                 raise ValueError(f"{key} = {value}: {case.error}")

@@ -225,7 +225,7 @@ def test_what_no_sheet_has_is_refused():
         ('[body]\nkind = "slab"\ngrammage_g_m2 = 80', "grammage_g_m2 is for a sheet"),
         ('[body]\nkind = "sheet"\nmounting = {edges = []}', "unconstrained"),
         ('[body]\nkind = "sheet"\nmounting = {tension_x_n_per_m = -1}', "0 or above"),
-        ('[body]\nkind = "sheet"\nmounting = {clips_mm = [[80, 0]]}', "off the sheet"),
+        ('[body]\nkind = "sheet"\nmounting = {clips_mm = [[80, 0]]}', "outside the sheet"),
         (
             '[body]\nkind = "sheet"\nmounting = {edges = ["left"], support = "simply"}',
             "turns about",

@@ -165,7 +165,7 @@ def test_nodes_of_gmsh_are_taken_to_our_order(tmp_path):
 
 def test_nodes_beside_their_edges_are_refused(tmp_path):
     gmsh_file(tmp_path / "a.msh", CORNERS, TWO, edges=[(0, 1)] * 3 + GMSH_EDGES[3:])
-    with pytest.raises(MeshError, match=r"2 of 2 tetrahedra with a node further than 25% of an"):
+    with pytest.raises(MeshError, match=r"2 of 2 tetrahedra with a mid-side node more than 25% of"):
         meshes.read(tmp_path / "a.msh")
 
 
@@ -352,7 +352,7 @@ def test_generated_sets_that_have_each_element_once_are_regions(tmp_path):
     mesh, said = made(tmp_path / "a.inp")
     names = {mesh.region_names[r]: (mesh.region == r).sum() for r in np.unique(mesh.region)}
     assert names == {"SKIN": upper.sum(), "MUSCLE": (~upper).sum()}
-    assert said_of(said, "element sets that are not taken as regions: ALL")
+    assert said_of(said, "element sets that are not regions: ALL")
 
 
 def test_sets_continued_lines_and_included_nodes(tmp_path):
@@ -383,8 +383,8 @@ def test_what_abaqus_makes_by_a_rule_or_lacks_is_refused(tmp_path):
     for text, said in [
         ("*NODE\n1, 0, 0, 0\n*NGEN\n1, 9, 1\n", "NGEN"),
         ("*INCLUDE, INPUT=gone.inc\n", "gone.inc"),
-        ("*NODE\n1, 0, 0, 0\n*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n", "no node 2"),
-        ("*INSTANCE, NAME=a, PART=b\n*END INSTANCE\n", "part 'b'"),
+        ("*NODE\n1, 0, 0, 0\n*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n", "missing node 2"),
+        ("*INSTANCE, NAME=a, PART=b\n*END INSTANCE\n", "missing part 'b'"),
         ("*NODE\n1, a, 0, 0\n", r"below \*NODE"),
     ]:
         (tmp_path / "a.inp").write_text(text)
@@ -404,19 +404,19 @@ def test_the_smaller_of_two_groups_is_the_region(tmp_path):
     meshio.write(tmp_path / "a.msh", raw, file_format="gmsh22")
     mesh, said = made(tmp_path / "a.msh")
     assert set(mesh.region_names.values()) == {"skin", "fat"}
-    assert said_of(said, "the smaller of their groups is taken as their region")
+    assert said_of(said, "their region is the smaller of their groups")
 
 
 def test_damaged_files_are_refused_by_what_is_wrong(tmp_path):
     points = np.array(SLAB.points)
     points[3] = np.nan
     grid_of(points, {TETRAHEDRON: SLAB.tets}).save(tmp_path / "a.vtk")
-    with pytest.raises(MeshError, match="1 nodes whose coordinates are no numbers"):
+    with pytest.raises(MeshError, match="1 nodes whose coordinates"):
         meshes.read(tmp_path / "a.vtk")
     meshes.write(tmp_path / "b.msh", SLAB)
     content = (tmp_path / "b.msh").read_bytes()
     (tmp_path / "b.msh").write_bytes(content[: len(content) * 3 // 4])
-    with pytest.raises(MeshError, match="cut short or no mesh of gmsh"):
+    with pytest.raises(MeshError, match="cut short"):
         meshes.read(tmp_path / "b.msh")
     (tmp_path / "c.stl").write_text("solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0")
     with pytest.raises(MeshError, match="is damaged or cut short"):
@@ -428,7 +428,7 @@ def test_inverted_tetrahedra_are_turned_and_overlapping_ones_refused(tmp_path):
     tets[:20] = tets[:20][:, [0, 2, 1, 3]]
     grid_of(SLAB.points, {TETRAHEDRON: tets}).save(tmp_path / "a.vtu")
     mesh, said = made(tmp_path / "a.vtu")
-    assert said_of(said, "turned round 20 of 192")
+    assert said_of(said, "reordered 20 inverted")
     assert volume_of(mesh) == pytest.approx(19.2, rel=1e-9)
     points = np.array(SLAB.points)
     inner = np.flatnonzero(np.abs(points - [0, 0, -0.006]).max(axis=1) < 1e-9)
@@ -459,7 +459,7 @@ def test_a_mesh_is_turned_and_brought_below_the_device(tmp_path):
     np.testing.assert_allclose(low, [-0.02, -0.02, -0.012], atol=1e-3)
     np.testing.assert_allclose(high, [0.02, 0.02, 0.0], atol=1e-3)
     assert high[2] == pytest.approx(0.0, abs=1e-12)
-    assert said_of(said, "its top to the origin")
+    assert said_of(said, "its top is at the origin")
     meshes.write(tmp_path / "b.vtu", mesh)
     again, said = made(tmp_path / "b.vtu")
     np.testing.assert_array_equal(again.points, mesh.points)  # where it is on its top already
@@ -530,10 +530,10 @@ def test_an_open_wrist_is_capped_on_request(tmp_path):
     mesh, said = made(tmp_path / "a.stl", cap=True)
     area = 24 / 2 * np.sin(2 * np.pi / 24) * 0.02 * 0.008
     assert volume_of(mesh) == pytest.approx(1e6 * 0.04 * area, rel=0.02)
-    assert said_of(said, "closed a hole of 24 edges, 40 mm wide and 0.0 mm out of a plane")
+    assert said_of(said, "closed a hole of 24 edges, 40 mm wide")
     open_wrist(tmp_path / "b.stl", rim=0.005)
     said = refused(tmp_path / "b.stl", cap=True)
-    assert "10.0 mm out of a plane and cannot be capped" in said
+    assert "leaves a plane by 10.0 mm" in said
 
 
 def test_a_bone_in_the_file_of_its_skin_is_named_with_both_cures(tmp_path):
@@ -649,7 +649,7 @@ def test_options_of_the_command_reach_the_reader(tmp_path, capsys):
     mesh = meshes.read(tmp_path / "b.vtu")
     np.testing.assert_allclose(np.ptp(mesh.points, axis=0), [0.02, 0.03, 0.01], rtol=1e-9)
     assert main([*command[:-1], "--overwrite", "--quiet"]) == 2
-    assert "which may be mm (--unit mm" in capsys.readouterr().err
+    assert "probably mm (--unit mm" in capsys.readouterr().err
 
 
 def test_what_is_prepared_is_kept_for_the_facets_that_a_file_names(tmp_path):
@@ -669,7 +669,7 @@ def test_what_is_prepared_is_kept_for_the_facets_that_a_file_names(tmp_path):
 def test_what_cannot_be_meshed_ends_in_one_line(tmp_path, monkeypatch, capsys):
     for arguments, said in [
         (["open.stl"], "open along"),
-        (["hand.obj", "--unit", "mm"], "may be m"),
+        (["hand.obj", "--unit", "mm"], "probably m"),
         (["hand.obj", "--up", "up"], "up"),
         (["hand.obj", "--element-size", "nan"], "h = nan m"),
         (["hand.obj", "--clip", "10", "20", "10", "20"], "middle of the palm"),

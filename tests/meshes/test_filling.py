@@ -64,13 +64,13 @@ def test_a_mesher_that_does_not_end_is_stopped(tmp_path, monkeypatch):
 
 def test_what_the_mesher_returns_is_not_trusted():
     def accepted(mesh, surface):
-        return tetra._accepted(surface, 1e-6, mesh.points, mesh.tets)
+        return tetra._checked_result(surface, 1e-6, mesh.points, mesh.tets)
 
     box, whole = meshes.block((0.02, 0.02, 0.02), 5e-3, order=1), cube()
     accepted(box, whole)
     none = np.zeros((0, 4), int)
     with pytest.raises(MeshError, match="returned no tetrahedra"):
-        tetra._accepted(whole, 1e-6, box.points, none)
+        tetra._checked_result(whole, 1e-6, box.points, none)
     with pytest.raises(MeshError, match="12.50 %"):
         accepted(box, cube(0.04))
     flat = TetMesh(points=box.points * [1, 1, 0.01], tets=box.tets)
@@ -146,4 +146,4 @@ def test_a_body_is_meshed_with_its_bone_as_a_region_that_scenes_read(tmp_path, m
     assert main([*command, "--inner", bone, "--overwrite"]) == 2
     assert "a second region 'bone'" in capsys.readouterr().err
     assert main(["mesh", out, "--inner", bone, "-o", str(tmp_path / "b.vtu")]) == 2
-    assert "is a mesh already" in capsys.readouterr().err
+    assert "is a mesh, which cannot" in capsys.readouterr().err

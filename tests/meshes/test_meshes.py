@@ -70,12 +70,12 @@ CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]]
 
 def test_broken_meshes_are_refused_with_what_and_where():
     for fields, said in [
-        ({"points": [*CORNERS[:3], [1, 1, 0.0]]}, "1 tetrahedra are flat, the worst is 0"),
-        ({"points": [*CORNERS[:3], [0, 0, np.nan]]}, "1 points are not finite, first 3"),
+        ({"points": [*CORNERS[:3], [1, 1, 0.0]]}, "1 tetrahedra are flat, the worst is number 0"),
+        ({"points": [*CORNERS[:3], [0, 0, np.nan]]}, "1 of 4 points are not finite, first point 3"),
         ({"tets": [[0, 1, 2, 4]]}, "node numbers run from 0 to 4"),
         ({"tets": [[0, 1, 2]]}, r"tets have shape \(1, 3\)"),
         ({"tets": np.zeros((0, 4), int)}, "m > 0"),
-        ({"region": [0, 1]}, "give one per element"),
+        ({"region": [0, 1]}, "region has shape"),
     ]:
         with pytest.raises(MeshError, match=said):
             TetMesh(**{"points": CORNERS, "tets": [[0, 1, 2, 3]]} | fields)

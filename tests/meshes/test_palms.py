@@ -98,7 +98,7 @@ def test_a_relief_that_a_grid_cannot_follow_is_refused():
     body = Body(kind="palm", width=0.085, depth=0.022, relief=relief)
     with pytest.raises(MeshError, match="dihedral angle"):
         mapped_palm(body.palm, *grid(body.palm, 5e-3))
-    with pytest.raises(MeshError, match="lower thenar_height_mm"):
+    with pytest.raises(MeshError, match="reduce thenar_height_mm"):
         body_palm.discretise(body, 5e-3)
 
 

@@ -45,7 +45,7 @@ def test_arrays_come_back_and_do_not_unpack_to_more_than_a_limit(tmp_path, monke
     found = reading.load_arrays(tmp_path / "a.npz")
     assert found["x"].shape == (100_000,)
     assert str(found["y"]) == "text"
-    monkeypatch.setattr(reading, "UNPACKED", 100_000)
+    monkeypatch.setattr(reading, "MOST_UNPACKED", 100_000)
     with pytest.raises(ValueError, match="unpacks to 1 MB"):
         reading.load_arrays(tmp_path / "a.npz")
     np.savez(tmp_path / "b.npz", x=np.random.default_rng(0).random(100_000))

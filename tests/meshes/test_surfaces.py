@@ -86,7 +86,7 @@ REFUSED = {
     "one triangle": (lambda: Surface(points=FEW, triangles=[[0, 1, 2]]), "open along 3 of its 3"),
     "crossing itself": (lambda: together(cube(), cube(at=(0.011, 0.007, 0.003))), "2 separate"),
     "triangles twice": (doubled, "more than two triangles"),
-    "mixed orientation": (mixed, "opposite ways"),
+    "mixed orientation": (mixed, "opposite directions"),
     "seen from inside": (
         lambda: Surface(points=SPHERE.points, triangles=SPHERE.triangles[:, ::-1]), "encloses -"),
     "touching at a point": (pinched, "touch at 1 single"),
@@ -94,7 +94,7 @@ REFUSED = {
     "no triangles": (lambda: Surface(points=FEW, triangles=np.zeros((0, 3), int)), "n > 0"),
     "number too large": (changed("triangles", (3, 0), 10**6), "from 0 to 1000000"),
     "numbers with fractions": (lambda: Surface(points=FEW, triangles=[[0, 1, 1.5]]), "whole"),
-    "ragged": (lambda: Surface(points=FEW, triangles=[[0, 1], [2]]), "no array"),
+    "ragged": (lambda: Surface(points=FEW, triangles=[[0, 1], [2]]), "not an array"),
 }  # fmt: skip
 
 
@@ -182,7 +182,7 @@ def test_one_point_drawn_through_the_body_is_found_where_it_is():
     points = np.array(SPHERE.points)
     top = int(points[:, 2].argmax())
     points[top] *= [1, 1, -1.5]
-    with pytest.raises(MeshError, match=r"crosses itself at \d+ pairs of triangles, first near"):
+    with pytest.raises(MeshError, match=r"intersects itself at \d+ pairs of triangles, first near"):
         check(Surface(points=points, triangles=SPHERE.triangles))
 
 
@@ -190,18 +190,17 @@ def test_bodies_are_centred_whatever_the_rounding_at_their_sides():
     for sides in [(0.048, 0.032, 0.01), (0.04, 0.04, 0.012), (0.03, 0.02, 0.01)]:
         block = meshes.block(sides, 0.008, order=1)
         surface, _ = repaired(block.points, meshes.boundary_facets(block.tets))
-        x, y, radius = alignment.widest_place(surface)
+        x, y, radius = alignment.widest_circle(surface)
         assert [x, y] == pytest.approx([0, 0], abs=0.01 * sides[0])
         assert radius == pytest.approx(min(sides[:2]) / 2, rel=0.02)
 
 
 def test_up_is_a_turn_that_takes_the_axis_to_z():
-    for up in alignment.TURNS:
+    for up in alignment.ROTATIONS:
         axis = np.zeros((3, 3))
         axis[0, "xyz".index(up[1])] = 1 if up[0] == "+" else -1
-        turned = alignment.turned(Surface(points=axis, triangles=[[0, 1, 2]]), up)
-        assert turned.points[0].tolist() == [0, 0, 1]
-        assert np.linalg.det(alignment.TURNS[up]) == 1
+        assert (alignment.rotation_to_z(up) @ axis[0]).tolist() == [0, 0, 1]
+        assert np.linalg.det(alignment.ROTATIONS[up]) == 1
 
 
 def box(sides, at=(0.0, 0.0, 0.0), h=np.inf):
@@ -227,7 +226,7 @@ def test_a_winding_number_is_1_inside_and_0_outside():
 def test_surfaces_that_are_not_inside_are_refused():
     for inner, said in [
         ({"a": box((0.008,) * 3, (0.009, 0, -2e-3))}, "the body and a cross"),
-        ({"a": box((0.008,) * 3, (0.05, 0, -2e-3))}, "a is not inside"),
+        ({"a": box((0.008,) * 3, (0.05, 0, -2e-3))}, "a lies outside"),
         ({"a": BONE, "b": box((0.009, 0.003, 0.003), (0, 0, -5e-3))}, "a and b cross"),
         ({"a": Surface(points=BONE.points, triangles=BONE.triangles[1:])}, "a: .* open along 3"),
     ]:
@@ -237,10 +236,10 @@ def test_surfaces_that_are_not_inside_are_refused():
 
 
 def test_a_bone_is_cut_with_the_body_that_it_is_in():
-    whole, cuts = alignment.cut_to(BONE, (-1, 1, -1, 1))
+    whole, cuts = alignment.cut_to_box(BONE, (-1, 1, -1, 1))
     assert whole is BONE
     assert not cuts
-    part, cuts = alignment.cut_to(BONE, (-0.002, 1, -1, 1))
+    part, cuts = alignment.cut_to_box(BONE, (-0.002, 1, -1, 1))
     assert cuts == 1
     assert volume(part) == pytest.approx(0.006 * 0.006 * 0.005, rel=1e-6)
-    assert alignment.cut_to(BONE, (0.005, 1, -1, 1))[0] is None
+    assert alignment.cut_to_box(BONE, (0.005, 1, -1, 1))[0] is None

@@ -70,8 +70,8 @@ def test_keys_of_a_scene_are_read_and_written():
         ("strain_zy", "0", "strain_zy"),
         ("velocity", "[1]", "depth_mm"),
         ("velocity", "-1", "depth_mm = -1"),
-        ("strain_zz", "6", "depth_mm = 6"),
-        ("strain_zz", '"pacinian"', "pacini"),
+        ("strain_zz", "6", "depth_mm = 6 of a probe"),
+        ("strain_zz", '"pacinian"', "depth_mm 'pacinian' is unknown.*pacini"),
     ],
 )
 def test_unknown_quantities_and_depths_are_refused(quantity, depth, part):

@@ -212,7 +212,7 @@ def test_meshes_of_a_palm_resolve_its_layers():
     assert default_size(thick) == default_size(Body(kind="palm"))
     fine = Body(kind="palm", layers=(fat, Layer(thickness=0.6e-3, material="epidermis")))
     for body, h, cure in ((thin, 2.1e-3, "elements of 2 mm"), (fine, 2e-3, "elements of 1.2 mm")):
-        with pytest.raises(ValueError, match=f"thinner than half an element.*take {cure}, thicker"):
+        with pytest.raises(ValueError, match=f"thinner than half an element.*use {cure}, thicker"):
             check_mesh(body, h)
 
 

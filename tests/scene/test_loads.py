@@ -294,7 +294,7 @@ def test_what_is_computed_for_a_pressure_alone_refuses_other_loads():
     assert target(heavy, "fem", DISPLACEMENT, scene.probe_points).linear == ("gain",)
     with pytest.raises(ValueError, match="a pattern of a device is about"):
         write_pattern(scene, ".csv", Options())
-    with pytest.raises(ValueError, match="takes what is normal to it"):
+    with pytest.raises(ValueError, match="needs a load normal to it"):
         loads(SHEAR + "[body]\npreset = 'paper-sheet-loose'")
     reduced = prepare(scene.body, scene.probe_points, h=6e-3)
     assert np.isfinite(answer(reduced, replace(scene, load=Load())).values).all()

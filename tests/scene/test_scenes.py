@@ -88,7 +88,7 @@ WRONG = {
     "[focus]\nheight_mm = 700": "height = 700 mm is outside 20 to 600 mm",
     "[focus]\ndrive = 'squared'": "did you mean 'pressure_squared'",
     "[focus]\nprofile = 'gauss'": "did you mean 'gaussian'",
-    "[probes]\npoints_mm = [[51, 0]]": "probe (51, 0) mm is off the body",
+    "[probes]\npoints_mm = [[51, 0]]": "probe (51, 0) mm lies outside the body",
     "[probes]\npoints_mm = []": "give at least one probe",
     "[probes]\npoints_mm = [[0, nan]]": "coordinates must be finite",
     "[tacton]\nshape = 'circle'\nsize_mm = 60\n[body]\nsize_x_mm = 50": "path reaches 30 mm",

@@ -149,8 +149,8 @@ def test_supports_that_cannot_move_are_refused():
         ("[load]\nsupport_motion = { amplitude_um = 5 }", "lacks frequency_hz; give it"),
         (SHAKEN.replace("140", "4000"), "above 0 and at most 1000 Hz; give frequency_hz"),
         (SHAKEN.replace("140", "140, direction = [0, 0]"), "must be 3 finite numbers, not all 0"),
-        (SHAKEN, "absorbing sides"),
-        (SHAKEN + '[body]\nbase = "absorbing"\nsides = "clamped"', "absorbing sides"),
+        (SHAKEN, "sides that do not absorb"),
+        (SHAKEN + '[body]\nbase = "absorbing"\nsides = "clamped"', "do not absorb"),
         (SHAKEN + '[body]\npreset = "paper-sheet"', "is for a solid, not a body of kind 'sheet'"),
         (SHAKEN + '[body]\nkind = "none"', "is for a solid, not a body of kind 'none'"),
         (

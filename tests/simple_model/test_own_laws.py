@@ -90,7 +90,7 @@ def test_laws_that_cannot_be_used_are_refused():
         (lambda: DriveLaw(name="wrong", degree=2, pressure=saturating), "polynomial"),
         (lambda: MovingPressure(tacton=BEATEN, drive=SATURATING), "product"),
         (lambda: dumps(scene(drive=CUBIC)), "Python function"),
-        (lambda: dumps(scene(replace(TWO, prony=(), law=closed_form))), "law of its own"),
+        (lambda: dumps(scene(replace(TWO, prony=(), law=closed_form))), "Python function"),
         (lambda: compute(scene(profile=lambda x: np.ones(x.shape[:-1])), "flat-body"), "flat-body"),
     ):
         with pytest.raises(ValueError, match=said):
