@@ -61,7 +61,7 @@ def test_a_slab_is_the_stack_of_its_layers(body, base, last):
     assert found.base == base or last == inf
 
 
-def test_layers_that_lose_nothing_need_one_that_does():
+def test_exact_waves_need_a_layer_with_loss():
     still = replace(solid_of("fat"), viscosity=0.0)
     assert has_exact_waves(changed(layers=(Layer(thickness=1e-3, material=still),)).body)
     assert not has_exact_waves(changed(layers=(), material=still).body)
@@ -84,7 +84,7 @@ def test_a_plan_takes_the_wavenumber_integral_of_layers(body):
     ("preset", "speeds", "lengths"),
     [("palm-layers", (8.5, 5.1), (40, 30)), ("forearm-layers", (3.5, 3.2), (21, 7.8))],
 )
-def test_waves_of_layers_are_as_fast_as_the_manual_says(preset, speeds, lengths):
+def test_wave_speeds_of_layers_agree_with_the_manual(preset, speeds, lengths):
     wave = leading_wave(BODIES[preset], [100.0, 200.0])
     assert wave.speed == pytest.approx(speeds, rel=0.03)
     assert 1e3 * wave.length == pytest.approx(lengths, rel=0.03)

@@ -102,7 +102,7 @@ def test_elements_have_the_material_of_their_region_and_the_rest_that_of_the_bod
     assert {solid for solid in used if solid is not BONE} == {SOFT, fem.PRESETS["fat"]}
 
 
-def test_regions_that_a_file_has_not_are_named_with_those_that_it_has(body, finger):
+def test_errors_of_missing_regions_list_those_of_the_file(body, finger):
     volume = 1e6 * meshes.corner_volumes(finger.points, finger.tets)
     shown = f"{volume[finger.region == 0].sum():.3g} cm3"
     with pytest.raises(ValueError, match=f"'bones'.*{shown}"):
@@ -119,7 +119,7 @@ TISSUE, IN_BONE = "body.material.shear_modulus_pa", "body.regions.bone.shear_mod
 DENSITY = "body.regions.bone.density_kg_m3"
 
 
-def test_materials_of_tissue_and_bone_are_free(body):
+def test_materials_of_tissue_and_bone_can_be_varied(body):
     assert has_affine_operators(body)
     tacton = Tacton(trajectory=Trajectory(shape="circle", size=0.006, speed=3.0))
     probes = ((0.0, 0.0), (3e-3, 2e-3))
@@ -165,7 +165,7 @@ def test_a_bone_outside_a_finger_is_refused():
             replace(FINGER, **changes)
 
 
-def test_every_linear_model_takes_a_bone_and_they_agree():
+def test_linear_models_of_a_finger_agree():
     text = '[tacton]\nam_frequency_hz = 100\nduration_s = 0.05\n[body]\nkind = "finger"\n'
     scene = loads(text + "[probes]\npoints_mm = [[0, 0], [0, 6]]\n")
     found = {

@@ -131,7 +131,7 @@ def test_a_new_model_refuses_a_body(disc):
         skinwave.simulate(floating, "static-deflection")
 
 
-def test_names_are_given_once(static_deflection):
+def test_duplicate_names_are_refused(static_deflection):
     with pytest.raises(ValueError, match="'slab' is registered already"):
         register(BodyKind(name="slab"))
     with pytest.raises(ValueError, match="'fem' is registered already"):

@@ -219,7 +219,7 @@ def test_scenes_of_sheets_are_read_and_written():
     assert loads(dumps(replace(scene, body=BODIES["a4-sheet"]))).body == BODIES["a4-sheet"]
 
 
-def test_what_no_sheet_has_is_refused():
+def test_invalid_sheets_are_refused():
     for text, said in [
         ('[body]\nkind = "slab"\nmaterial = "paper-grain"', "orthotropic material is for a sheet"),
         ('[body]\nkind = "slab"\ngrammage_g_m2 = 80', "grammage_g_m2 is for a sheet"),
@@ -240,7 +240,7 @@ def test_what_no_sheet_has_is_refused():
             loads(text)
 
 
-def test_models_say_which_sheets_they_are_not_for():
+def test_models_refuse_sheets_that_they_do_not_cover():
     def refused(model, body):
         load = MovingPressure(tacton=Tacton(am_frequency=140))
         return beyond(named(model), Scene(pressure=load, body=body, probes=((0.0, 0.0),)))

@@ -32,7 +32,7 @@ WIDTH = 7e-3  # m, standard deviation: a spot that coarse elements resolve
 BED = 3e6  # N/m3: a slab of 10 mm of SOLID is about twice as stiff in shear
 
 
-def test_youngs_modulus_is_another_name_of_the_shear_modulus():
+def test_youngs_modulus_gives_the_shear_modulus():
     scene = loads(YOUNG)
     assert scene.body.solid == from_young(density=1000, young=75e3, poisson=0.25)
     assert scene.body.solid.shear_modulus == 30e3
@@ -52,7 +52,7 @@ def test_contradictory_moduli_are_refused():
             loads(text)
 
 
-def test_sides_are_named_one_by_one_and_alike_they_are_one_word():
+def test_sides_have_one_condition_or_one_each():
     scene = loads('[body]\nsides = { left = "clamped", right = "free" }')
     assert scene.body.sides == Sides(
         left="clamped", right="free", front="absorbing", back="absorbing"
@@ -64,7 +64,7 @@ def test_sides_are_named_one_by_one_and_alike_they_are_one_word():
     assert loads(f"[body]\nsides = {{ {every} }}").body == loads('[body]\nsides = "free"').body
 
 
-def test_supports_that_a_body_has_not_are_refused():
+def test_invalid_supports_are_refused():
     for text, said in [
         ('sides = { lft = "free" }', "did you mean 'left'"),
         ('sides = { left = "elastic" }', "side 'elastic' is unknown, use one of clamped"),
@@ -86,7 +86,7 @@ def only(side):
 
 
 @pytest.mark.parametrize(("side", "axis", "end"), [("left", 0, 1), ("back", 1, -1)])
-def test_a_block_that_one_side_holds_is_a_cantilever(side, axis, end):
+def test_a_block_clamped_at_one_side_is_a_cantilever(side, axis, end):
     """Tip deflection q L^4 / 8 E I + q L^2 / 2 kappa G A (Timoshenko, kappa = 5/6)."""
     length, across, depth, solid = 0.02, 0.004, 0.004, replace(SOLID, poisson=0.0)
     size = {"width": across, "height": across} | {("width", "height")[axis]: length}
@@ -108,7 +108,7 @@ def errors_beside_the_wavenumber_integral(scene, found):
     return np.linalg.norm(found - exact, axis=0) / np.linalg.norm(exact, axis=0)
 
 
-def test_an_absorbing_base_stands_for_a_half_space():
+def test_an_absorbing_base_replaces_a_half_space():
     """From rest and with the mean, at 20 Hz, where a wave is 250 mm long."""
     scene = loads(
         "[tacton]\nam_frequency_hz = 20\nduration_s = 0.06\n[body]\nbase = 'absorbing'\n"
@@ -128,7 +128,7 @@ def elastic(*thicknesses, stiffness=BED, solids=(SOFT, SOLID)):
     )  # fmt: skip
 
 
-def test_a_column_on_springs_yields_by_both():
+def test_a_column_on_springs_adds_both_compliances():
     """u = q (1 / k + sum H / M) of a uniform static pressure, and a resonance of the rigid slab."""
     stack = elastic(4e-3, 6e-3)
     moduli = [m.first_lame + 2 * m.shear_modulus for m in stack.materials]
@@ -155,7 +155,7 @@ def test_elements_on_springs_meet_the_wavenumber_integral():
     assert np.abs(u - exact).max() < 0.02 * np.abs(exact).max()
 
 
-def test_a_hand_rests_on_springs_where_it_looks_down():
+def test_a_hand_rests_on_springs_where_it_faces_down():
     """All of the base of a block of 20 x 30 mm, which has no facets of that name; and no end."""
     body = Body(kind="palm", base="elastic", base_stiffness=BED, sides="free")
     mesh = block((0.02, 0.03, 0.01), 5e-3)

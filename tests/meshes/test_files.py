@@ -151,7 +151,7 @@ def in_the_middle(mesh):
     np.testing.assert_allclose(mesh.points[mesh.tets[:, 4:]], ends.mean(axis=2), atol=1e-15)
 
 
-def test_nodes_of_gmsh_are_taken_to_our_order(tmp_path):
+def test_nodes_in_gmsh_order_are_reordered(tmp_path):
     gmsh_file(tmp_path / "a.msh", CORNERS, TWO, triangles=[(0, 1, 2)], names=NAMES)
     mesh = meshes.read(tmp_path / "a.msh")
     in_the_middle(mesh)
@@ -163,13 +163,13 @@ def test_nodes_of_gmsh_are_taken_to_our_order(tmp_path):
     assert np.cross(b - a, c - a)[2] < 0  # seen from below, which is outside
 
 
-def test_nodes_beside_their_edges_are_refused(tmp_path):
+def test_mid_side_nodes_off_their_edges_are_refused(tmp_path):
     gmsh_file(tmp_path / "a.msh", CORNERS, TWO, edges=[(0, 1)] * 3 + GMSH_EDGES[3:])
     with pytest.raises(MeshError, match=r"2 of 2 tetrahedra with a mid-side node more than 25% of"):
         meshes.read(tmp_path / "a.msh")
 
 
-def test_version_4_of_another_program_is_read_or_refused_but_never_wrong(tmp_path):
+def test_gmsh_version_4_is_read_correctly_or_refused(tmp_path):
     mesh = layered(2)
     raw = meshio.Mesh(mesh.points, [("tetra10", mesh.tets)])
     meshio.write(tmp_path / "a.msh", raw, file_format="gmsh")
@@ -220,7 +220,7 @@ def pieces_vtu(path):
     )
 
 
-def test_pieces_of_a_file_are_one_body_where_they_touch(tmp_path):
+def test_touching_pieces_of_a_file_are_merged(tmp_path):
     pieces_vtu(tmp_path / "a.vtu")
     mesh, said = made(tmp_path / "a.vtu")
     assert volume_of(mesh) == pytest.approx(19.2, rel=1e-6)
@@ -331,7 +331,7 @@ def test_instances_are_placed_by_translation_and_rotation(tmp_path):
     np.testing.assert_allclose(read.points[:, 0].mean(), 0.1, atol=1e-12)
 
 
-def test_parts_that_are_numbered_alike_are_two_bodies_or_one_where_they_touch(tmp_path):
+def test_touching_parts_with_equal_numbers_are_merged(tmp_path):
     parts = [(name, nodes_and_elements(*half(side))) for name, side in (("SKIN", -1), ("BONE", 1))]
     instances = "".join(
         f"*Instance, name={name}-1, part={name}\n*End Instance\n" for name, _ in parts
@@ -342,7 +342,7 @@ def test_parts_that_are_numbered_alike_are_two_bodies_or_one_where_they_touch(tm
     assert sorted(mesh.region_names.values()) == ["BONE", "SKIN"]
 
 
-def test_generated_sets_that_have_each_element_once_are_regions(tmp_path):
+def test_generated_sets_that_partition_the_elements_are_regions(tmp_path):
     upper = SLAB.points[SLAB.tets].mean(axis=1)[:, 2] > -0.006
     order = np.concatenate([np.flatnonzero(upper), np.flatnonzero(~upper)])
     text = nodes_and_elements(SLAB.points, SLAB.tets[order], ", elset=ALL")
@@ -379,7 +379,7 @@ def test_sets_continued_lines_and_included_nodes(tmp_path):
     )
 
 
-def test_what_abaqus_makes_by_a_rule_or_lacks_is_refused(tmp_path):
+def test_generated_or_missing_abaqus_data_are_refused(tmp_path):
     for text, said in [
         ("*NODE\n1, 0, 0, 0\n*NGEN\n1, 9, 1\n", "NGEN"),
         ("*INCLUDE, INPUT=gone.inc\n", "gone.inc"),
@@ -392,7 +392,7 @@ def test_what_abaqus_makes_by_a_rule_or_lacks_is_refused(tmp_path):
             meshes.read(tmp_path / "a.inp")
 
 
-def test_the_smaller_of_two_groups_is_the_region(tmp_path):
+def test_overlapping_groups_give_the_smaller_as_region(tmp_path):
     upper = SLAB.points[SLAB.tets].mean(axis=1)[:, 2] > -0.006
     tets = np.vstack([SLAB.tets, SLAB.tets])
     groups = np.concatenate([np.full(len(SLAB.tets), 1), np.where(upper, 2, 3)])
@@ -407,7 +407,7 @@ def test_the_smaller_of_two_groups_is_the_region(tmp_path):
     assert said_of(said, "their region is the smaller of their groups")
 
 
-def test_damaged_files_are_refused_by_what_is_wrong(tmp_path):
+def test_errors_of_damaged_files_name_the_damage(tmp_path):
     points = np.array(SLAB.points)
     points[3] = np.nan
     grid_of(points, {TETRAHEDRON: SLAB.tets}).save(tmp_path / "a.vtk")
@@ -423,7 +423,7 @@ def test_damaged_files_are_refused_by_what_is_wrong(tmp_path):
         read_contents(tmp_path / "c.stl")
 
 
-def test_inverted_tetrahedra_are_turned_and_overlapping_ones_refused(tmp_path):
+def test_inverted_tetrahedra_are_reordered_and_overlapping_ones_refused(tmp_path):
     tets = np.array(SLAB.tets)
     tets[:20] = tets[:20][:, [0, 2, 1, 3]]
     grid_of(SLAB.points, {TETRAHEDRON: tets}).save(tmp_path / "a.vtu")
@@ -450,7 +450,7 @@ def test_the_largest_of_several_bodies_is_kept_on_request(tmp_path):
     assert said_of(said, "kept the largest of 2 bodies, 100.0 % of the volume")
 
 
-def test_a_mesh_is_turned_and_brought_below_the_device(tmp_path):
+def test_a_mesh_is_rotated_and_moved_below_the_device(tmp_path):
     x, y, z = SLAB.points.T
     corner = np.column_stack([x + 0.02, z + 0.012, 0.02 - y])  # y up, a corner at the origin
     meshes.write(tmp_path / "a.msh", replace(SLAB, points=corner, facets={}))
@@ -466,7 +466,7 @@ def test_a_mesh_is_turned_and_brought_below_the_device(tmp_path):
     assert not said_of(said, "moved by")
 
 
-def test_negative_regions_are_refused_and_not_taken_as_positive(tmp_path):
+def test_negative_regions_are_refused(tmp_path):
     grid = grid_of(SLAB.points, {TETRAHEDRON: SLAB.tets})
     grid.cell_data["material"] = np.where(np.arange(len(SLAB.tets)) < 96, 1, -1)
     grid.save(tmp_path / "a.vtu")
@@ -474,7 +474,7 @@ def test_negative_regions_are_refused_and_not_taken_as_positive(tmp_path):
         meshes.read(tmp_path / "a.vtu")
 
 
-def test_what_is_no_mesh_is_refused_in_one_sentence(tmp_path):
+def test_files_without_a_mesh_are_refused_in_one_sentence(tmp_path):
     for name, content in [
         ("a.vtu", b"<VTKFile>"),
         ("a.msh", b"nothing"),
@@ -490,7 +490,7 @@ def test_what_is_no_mesh_is_refused_in_one_sentence(tmp_path):
         assert "\n" not in str(error.value)
 
 
-def test_a_failed_write_leaves_what_was_there(tmp_path, monkeypatch):
+def test_a_failed_write_keeps_the_old_file(tmp_path, monkeypatch):
     (tmp_path / "a.vtu").write_text("mine")
 
     def half_written(path, *arguments, **options):
@@ -536,7 +536,7 @@ def test_an_open_wrist_is_capped_on_request(tmp_path):
     assert "leaves a plane by 10.0 mm" in said
 
 
-def test_a_bone_in_the_file_of_its_skin_is_named_with_both_cures(tmp_path):
+def test_a_surface_inside_another_is_refused(tmp_path):
     skin, bone = pyvista.Sphere(radius=0.02), pyvista.Sphere(radius=0.005)
     (skin + bone).save(tmp_path / "a.stl")
     said = refused(tmp_path / "a.stl")
@@ -570,7 +570,7 @@ WRITERS = {".obj": write_obj, ".stl": write_by_vtk}
 
 
 @pytest.mark.parametrize("suffix", WRITERS)
-def test_a_hand_with_seams_is_the_same_from_every_kind_of_file(tmp_path, suffix):
+def test_a_hand_with_seams_is_repaired_from_every_format(tmp_path, suffix):
     points, triangles = hand()
     WRITERS[suffix](tmp_path / f"hand{suffix}", points, triangles)
     raw = read_contents(tmp_path / f"hand{suffix}")
@@ -583,7 +583,7 @@ def test_a_hand_with_seams_is_the_same_from_every_kind_of_file(tmp_path, suffix)
 
 
 @pytest.mark.parametrize("suffix", [".stl", ".glb", ".vtu", ".msh"])
-def test_a_file_that_is_cut_short_or_garbled_is_refused(tmp_path, monkeypatch, suffix):
+def test_truncated_and_garbled_files_are_refused(tmp_path, monkeypatch, suffix):
     monkeypatch.chdir(tmp_path)
     path = tmp_path / f"body{suffix}"
     if suffix == ".glb":
@@ -604,7 +604,7 @@ def test_a_file_that_is_cut_short_or_garbled_is_refused(tmp_path, monkeypatch, s
         assert [each.name for each in tmp_path.iterdir()] == [path.name]
 
 
-def test_a_patch_is_cut_with_its_cuts_named(tmp_path, monkeypatch, capsys):
+def test_a_clipped_patch_has_its_cuts_as_facets(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     points, triangles = hand()
     write_by_vtk("hand.ply", 1e3 * points, triangles)
@@ -622,7 +622,7 @@ def test_a_patch_is_cut_with_its_cuts_named(tmp_path, monkeypatch, capsys):
     assert len(mesh.facets["surface"]) == sum(parts)
 
 
-def test_a_mesh_is_taken_as_it_is(tmp_path, monkeypatch, capsys):
+def test_the_mesh_command_keeps_a_volume_mesh(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     meshes.write("slab.msh", layered(2))
     assert main(["mesh", "slab.msh", "--quiet"]) == 0
@@ -635,7 +635,7 @@ def test_a_mesh_is_taken_as_it_is(tmp_path, monkeypatch, capsys):
     assert main(["mesh", "slab.msh", "--quiet", "--overwrite"]) == 0
 
 
-def test_options_of_the_command_reach_the_reader(tmp_path, capsys):
+def test_options_of_the_mesh_command(tmp_path, capsys):
     x, y, z = layered(1).points.T
     points = 1e3 * np.column_stack([x + 0.02, z, -y])  # in mm, y up
     loose = np.vstack([np.zeros(3), np.eye(3)]) + [60, 0, 0]
@@ -652,7 +652,7 @@ def test_options_of_the_command_reach_the_reader(tmp_path, capsys):
     assert "probably mm (--unit mm" in capsys.readouterr().err
 
 
-def test_what_is_prepared_is_kept_for_the_facets_that_a_file_names(tmp_path):
+def test_the_cache_distinguishes_facet_sets_of_a_file(tmp_path):
     block = meshes.block((0.02, 0.02, 0.01), 0.005)
     body = Body(kind="mesh", file=str(tmp_path / "body.vtu"), sides="clamped")
     read = []
@@ -666,7 +666,7 @@ def test_what_is_prepared_is_kept_for_the_facets_that_a_file_names(tmp_path):
     assert len(read[1].points) == 2 * len(read[2].points)
 
 
-def test_what_cannot_be_meshed_ends_in_one_line(tmp_path, monkeypatch, capsys):
+def test_errors_of_the_mesh_command_are_one_line(tmp_path, monkeypatch, capsys):
     for arguments, said in [
         (["open.stl"], "open along"),
         (["hand.obj", "--unit", "mm"], "probably m"),

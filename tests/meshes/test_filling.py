@@ -44,7 +44,7 @@ def inputs(surface, **changed):
     return plain | grid | changed
 
 
-def test_a_mesher_that_crashes_takes_nobody_with_it(tmp_path, monkeypatch):
+def test_a_crash_of_the_mesher_is_an_error(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     points = np.array(SPHERE.points)
     points[7, 1] = np.inf
@@ -53,7 +53,7 @@ def test_a_mesher_that_crashes_takes_nobody_with_it(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_mesher_that_does_not_end_is_stopped(tmp_path, monkeypatch):
+def test_the_mesher_is_stopped_after_its_timeout(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     plain = inputs(SPHERE)
     infinite = {"h": np.array(1e-4), "grid_sizes": np.full_like(plain["grid_sizes"], 1e-4)}
@@ -62,7 +62,7 @@ def test_a_mesher_that_does_not_end_is_stopped(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-def test_what_the_mesher_returns_is_not_trusted():
+def test_results_of_the_mesher_are_checked():
     def accepted(mesh, surface):
         return tetra._checked_result(surface, 1e-6, mesh.points, mesh.tets)
 
@@ -82,13 +82,13 @@ def test_what_the_mesher_returns_is_not_trusted():
         accepted(TetMesh(points=box.points, tets=box.tets[x > 0.005]), whole)
 
 
-def test_the_mesher_missing_is_said_with_its_cure(monkeypatch):
+def test_a_missing_mesher_is_an_error(monkeypatch):
     monkeypatch.setattr(tetra, "find_spec", lambda name: None)
     with pytest.raises(MeshError, match="pytetwild"):
         tetra._run(inputs(SPHERE), 10.0)
 
 
-def test_elements_follow_the_sizes_asked_for():
+def test_elements_follow_the_target_sizes():
     slab = Surface(points=cube().points * [3, 3, 0.5], triangles=cube().triangles)
     slab = Surface(points=slab.points - [0, 0, 0.005], triangles=slab.triangles)
     sizing = meshes.graded(2e-3, meshes.Grading(radius=0.01, growth=1.3, coarsest=6e-3))
@@ -119,7 +119,7 @@ def save(path, surface):
     meshio.write(path, meshio.Mesh(1e3 * surface.points, [("triangle", surface.triangles)]))
 
 
-def test_a_body_is_meshed_with_its_bone_as_a_region_that_scenes_read(tmp_path, monkeypatch, capsys):
+def test_a_bone_inside_a_body_is_a_region_of_scenes(tmp_path, monkeypatch, capsys):
     """With a grid in place of the mesher, whose planes are the sides of the bone."""
     grid = meshes.block((0.020, 0.016, 0.012), 1e-3, order=1)
     monkeypatch.setattr(tetra, "_run", lambda inputs, timeout: (grid.points, grid.tets))

@@ -18,7 +18,7 @@ def test_a_sheet_is_exact_and_conforming():
     np.testing.assert_array_equal(mesh.facets["clamped"], mesh.facets["sides"])
 
 
-def test_facets_look_outwards():
+def test_facets_face_outwards():
     mesh = meshes.block((0.02, 0.03, 0.01), 0.005)
     for name, normal in {"top": (0, 0, 1), "left": (-1, 0, 0), "back": (0, 1, 0)}.items():
         a, b, c = (mesh.points[mesh.facets[name][:, i]] for i in range(3))
@@ -58,7 +58,7 @@ def test_grading_is_fine_inside_and_ends_on_the_side():
     assert cells.max() < 0.0125
 
 
-def test_inside_out_tetrahedra_are_turned_round():
+def test_inverted_tetrahedra_are_reordered():
     mesh = meshes.block((0.02, 0.02, 0.01), 0.01)
     swapped = mesh.tets[:, [0, 1, 3, 2, 4, 8, 7, 6, 5, 9]]
     again = TetMesh(points=mesh.points, tets=swapped)
@@ -68,7 +68,7 @@ def test_inside_out_tetrahedra_are_turned_round():
 CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]]
 
 
-def test_broken_meshes_are_refused_with_what_and_where():
+def test_invalid_meshes_are_refused():
     for fields, said in [
         ({"points": [*CORNERS[:3], [1, 1, 0.0]]}, "1 tetrahedra are flat, the worst is number 0"),
         ({"points": [*CORNERS[:3], [0, 0, np.nan]]}, "1 of 4 points are not finite, first point 3"),
@@ -81,13 +81,13 @@ def test_broken_meshes_are_refused_with_what_and_where():
             TetMesh(**{"points": CORNERS, "tets": [[0, 1, 2, 3]]} | fields)
 
 
-def test_unknown_facet_sets_are_named_with_the_known_ones():
+def test_errors_of_unknown_facet_sets_list_the_known_ones():
     with pytest.raises(MeshError, match=r"no facet set 'lid'.*top"):
         meshes.facet_set(meshes.sheet(0.1, 0.1, 0.001, 0.05), "lid")
 
 
 @pytest.mark.parametrize("kind", ["sheet", "block"])
-def test_a_quarter_answers_like_the_whole_under_a_symmetric_load(kind):
+def test_a_quarter_moves_like_the_whole_under_a_symmetric_load(kind):
     if kind == "sheet":
         mesh, ends = meshes.sheet(0.1, 0.08, 1e-3, 0.01), {"sides": "xyz"}
     else:

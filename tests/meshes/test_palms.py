@@ -38,7 +38,7 @@ def test_without_relief_the_top_is_a_plane():
     assert np.abs(shape.level_set(low, top)).max() < 4e-9
 
 
-def test_no_palm_is_refused():
+def test_invalid_palms_are_refused():
     for fields, said in [
         ({"thickness": 0.0}, "thickness = 0 mm"),
         ({"length": float("nan")}, "length = nan"),
@@ -102,7 +102,7 @@ def test_a_relief_that_a_grid_cannot_follow_is_refused():
         body_palm.discretise(body, 5e-3)
 
 
-def test_the_usual_relief_fits_every_palm():
+def test_the_default_relief_fits_small_palms():
     """Its volume is below that of the box and its mounds, and above half of the box."""
     width, height, depth = 0.03, 0.12, 0.008
     body = Body(kind="palm", width=width, height=height, depth=depth)
@@ -131,7 +131,7 @@ def test_edges_that_would_fold_an_element_stay_straight():
     assert 0.05 < on_it.mean() < 0.97
 
 
-def test_what_is_hidden_from_above_is_not_the_top():
+def test_facets_hidden_from_above_are_not_the_top():
     lines = np.linspace(0, 0.02, 3), np.linspace(0, 0.01, 2), np.linspace(0, 0.03, 4)
     block = meshes.extrude(*lines, order=1)
     x, _, z = block.points[block.tets].mean(axis=1).T

@@ -23,14 +23,14 @@ def test_only_regular_files_are_opened(tmp_path):
                 read(tmp_path / name)
 
 
-def test_a_file_is_as_large_as_the_limit_at_most(tmp_path):
+def test_files_above_the_size_limit_are_refused(tmp_path):
     (tmp_path / "x").write_bytes(b"12345")
     assert reading.read_bytes(tmp_path / "x", 5) == b"12345"
     with pytest.raises(ValueError, match="limit"):
         reading.read_bytes(tmp_path / "x", 4)
 
 
-def test_text_is_read_in_the_encodings_of_programs_and_junk_refused(tmp_path):
+def test_text_is_read_in_common_encodings(tmp_path):
     for encoding in ("utf-8", "utf-8-sig", "utf-16", "utf-16-le", "cp1252"):
         (tmp_path / "x").write_bytes("t [s]; ° 1,5\n".encode(encoding))
         assert reading.read_exported_text(tmp_path / "x") == "t [s]; ° 1,5\n", encoding
@@ -40,7 +40,7 @@ def test_text_is_read_in_the_encodings_of_programs_and_junk_refused(tmp_path):
             read(tmp_path / "x")
 
 
-def test_arrays_come_back_and_do_not_unpack_to_more_than_a_limit(tmp_path, monkeypatch):
+def test_arrays_that_unpack_beyond_the_limit_are_refused(tmp_path, monkeypatch):
     np.savez_compressed(tmp_path / "a.npz", x=np.zeros(100_000), y=np.array("text"))
     found = reading.load_arrays(tmp_path / "a.npz")
     assert found["x"].shape == (100_000,)
@@ -52,7 +52,7 @@ def test_arrays_come_back_and_do_not_unpack_to_more_than_a_limit(tmp_path, monke
     reading.load_arrays(tmp_path / "b.npz")  # takes as much on the disk
 
 
-def test_a_reader_gets_time_and_memory_by_the_size_of_its_file(tmp_path, monkeypatch):
+def test_time_and_memory_of_a_reader_are_limited(tmp_path, monkeypatch):
     """A few bytes that ask for a terabyte, and ones that are read for ever."""
     node = "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT,TYPE=C3D4\n1,1,2,3,4\n"
     path = tmp_path / "a.inp"
@@ -70,7 +70,7 @@ def test_a_reader_gets_time_and_memory_by_the_size_of_its_file(tmp_path, monkeyp
         meshes.read(path)
 
 
-def test_a_function_runs_in_a_process_of_its_own_and_its_end_is_told():
+def test_a_separate_process_returns_results_and_errors():
     assert subprocess_call.call(os.getpid, timeout=600) != os.getpid()
     with pytest.raises(ZeroDivisionError):
         subprocess_call.call(divmod, 1, 0, timeout=600)
@@ -97,7 +97,7 @@ def stored(name, size=1000):
     cache.store(name, {"version": 3}, x=np.arange(size // 8, dtype=np.float64))
 
 
-def test_a_spoilt_entry_is_a_miss_and_replaced(home):
+def test_a_damaged_entry_is_a_miss(home):
     stored(NAMES[0])
     path = home / f"{NAMES[0]}.npz"
     whole = path.read_bytes()
@@ -116,7 +116,7 @@ def left(home):
     return [name for name in NAMES if (home / f"{name}.npz").exists()]
 
 
-def test_what_was_used_longest_ago_leaves_first(home, monkeypatch):
+def test_the_least_recently_used_entries_are_removed_first(home, monkeypatch):
     monkeypatch.setattr(cache, "LIMIT", 35_000)
     for k, name in enumerate(NAMES[:3]):
         stored(name, 10_000)
@@ -128,7 +128,7 @@ def test_what_was_used_longest_ago_leaves_first(home, monkeypatch):
     assert left(home) == [NAMES[4]]
 
 
-def test_only_what_is_ours_is_removed(home, monkeypatch, tmp_path):
+def test_other_files_in_the_cache_folder_are_kept(home, monkeypatch, tmp_path):
     monkeypatch.setattr(cache, "LIMIT", 0)
     home.mkdir()
     (tmp_path / "thesis.npz").write_text("mine")
@@ -146,7 +146,7 @@ def test_only_what_is_ours_is_removed(home, monkeypatch, tmp_path):
     assert sorted(home.iterdir()) == sorted([*before, new, home / f"{NAMES[0]}.npz"])
 
 
-def test_an_interrupt_leaves_nothing_half_written(home, monkeypatch):
+def test_an_interrupt_leaves_no_unfinished_entry(home, monkeypatch):
     def interrupted(file, **arrays):
         file.write(b"half")
         raise SystemExit(143)
@@ -158,7 +158,7 @@ def test_an_interrupt_leaves_nothing_half_written(home, monkeypatch):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the folder of another platform")
-def test_it_is_in_the_platforms_folder_of_caches_or_nowhere(tmp_path, monkeypatch):
+def test_the_cache_is_in_the_folder_of_the_platform(tmp_path, monkeypatch):
     monkeypatch.delenv("SKINWAVE_CACHE", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert cache.folder() == tmp_path / "skinwave"

@@ -40,7 +40,7 @@ def test_a_surface_is_read_at_its_own_nodes(mesh):
     np.testing.assert_allclose(read @ (mesh.points @ gradient.T).ravel(), expected, atol=1e-15)
 
 
-def test_places_up_to_the_silhouette_are_read_where_they_are_or_refused(mesh):
+def test_places_up_to_the_silhouette_are_read_exactly(mesh):
     corners = mesh.points[mesh.facets["top"][:, :3], :2]
     low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
     places = np.random.default_rng(0).uniform(1.05 * low, 1.05 * high, (2000, 2))

@@ -111,14 +111,14 @@ def no_mesher(monkeypatch, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_no_unsound_surface_reaches_the_mesher(no_mesher):
+def test_invalid_surfaces_do_not_reach_the_mesher(no_mesher):
     for make, said in REFUSED.values():
         with pytest.raises(MeshError, match=said) as error:
             meshes.tetrahedralise(make(), 3e-3)
         assert "\n" not in str(error.value)
 
 
-def test_no_absurd_option_reaches_the_mesher(no_mesher):
+def test_invalid_options_do_not_reach_the_mesher(no_mesher):
     for options, said in [
         ({"h": 1.0}, "h = 1.0 m"),
         ({"h": float("nan")}, "h = nan m"),
@@ -138,7 +138,7 @@ def test_a_sheet_is_too_thin_for_the_mesher(no_mesher):
         meshes.tetrahedralise(surface, 5e-3)
 
 
-def test_what_takes_no_guess_is_repaired():
+def test_common_defects_are_repaired():
     for make in (soup, doubled, degenerate, mixed):
         surface, said = repaired(make().points, make().triangles)
         check(surface)
@@ -154,7 +154,7 @@ def test_sound_surfaces_do_not_cross_themselves():
         assert not len(self_intersections(far))
 
 
-def test_crossings_are_those_that_trying_every_pair_finds():
+def test_crossings_agree_with_testing_every_pair():
     rng = np.random.default_rng(3)
     points = rng.uniform(size=(60, 1, 3)) + rng.uniform(-0.2, 0.2, size=(60, 3, 3))
     soup = Surface(points=points.reshape(-1, 3), triangles=np.arange(180).reshape(-1, 3))
@@ -178,7 +178,7 @@ def test_crossings_are_those_that_trying_every_pair_finds():
     assert [tuple(pair) for pair in self_intersections(soup).tolist()] == expected
 
 
-def test_one_point_drawn_through_the_body_is_found_where_it_is():
+def test_a_point_pulled_through_the_body_is_found():
     points = np.array(SPHERE.points)
     top = int(points[:, 2].argmax())
     points[top] *= [1, 1, -1.5]
@@ -186,7 +186,7 @@ def test_one_point_drawn_through_the_body_is_found_where_it_is():
         check(Surface(points=points, triangles=SPHERE.triangles))
 
 
-def test_bodies_are_centred_whatever_the_rounding_at_their_sides():
+def test_blocks_are_centred_despite_round_off():
     for sides in [(0.048, 0.032, 0.01), (0.04, 0.04, 0.012), (0.03, 0.02, 0.01)]:
         block = meshes.block(sides, 0.008, order=1)
         surface, _ = repaired(block.points, meshes.boundary_facets(block.tets))
@@ -195,7 +195,7 @@ def test_bodies_are_centred_whatever_the_rounding_at_their_sides():
         assert radius == pytest.approx(min(sides[:2]) / 2, rel=0.02)
 
 
-def test_up_is_a_turn_that_takes_the_axis_to_z():
+def test_rotations_take_each_axis_to_z():
     for up in alignment.ROTATIONS:
         axis = np.zeros((3, 3))
         axis[0, "xyz".index(up[1])] = 1 if up[0] == "+" else -1
@@ -235,7 +235,7 @@ def test_surfaces_that_are_not_inside_are_refused():
         check_inside(OUTER, {"a": BONE, "marrow": box((2e-3,) * 3, (0, 0, -5e-3))})
 
 
-def test_a_bone_is_cut_with_the_body_that_it_is_in():
+def test_a_bone_is_cut_with_its_body():
     whole, cuts = alignment.cut_to_box(BONE, (-1, 1, -1, 1))
     assert whole is BONE
     assert not cuts

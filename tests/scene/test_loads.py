@@ -84,7 +84,7 @@ def test_a_shear_traction_on_a_half_space_is_that_of_cerruti():
     np.testing.assert_allclose(at((0.6, 0.0, -0.8)), both, rtol=1e-9)
 
 
-def test_the_unit_tangent_goes_the_way_of_the_focus():
+def test_the_unit_tangent_follows_the_focus():
     phase = np.array([0.1, 0.3, 0.85])
     angle = 2 * pi * phase
     around = np.column_stack([-np.sin(angle), np.cos(angle)])
@@ -97,7 +97,7 @@ def test_the_unit_tangent_goes_the_way_of_the_focus():
 
 
 @pytest.mark.parametrize("path", [CIRCLE, SQUARE], ids=["circle", "square"])
-def test_the_lines_along_a_path_are_those_of_the_load_in_time(path):
+def test_spectral_lines_along_a_path_give_the_load_in_time(path):
     """A direction that jumps at corners has lines 1/n: those beyond the 250th harmonic, of which
     there are none, hold some 5 % of the waveform of a point there.
     """
@@ -168,7 +168,7 @@ def test_elements_under_tractions_meet_the_wavenumber_integral():
     ],
     ids=["along a circle", "impulse"],
 )
-def test_models_agree_on_loads_beside_pressure(text):
+def test_models_agree_on_shear_and_contact_loads(text):
     """The reduced model, time steps, and the wavenumber integral, each from rest."""
     scene = loads(text + SMALL)
     flat = compute(scene, "flat-body").values
@@ -230,7 +230,7 @@ def test_probes_read_the_stress_of_weight():
 
 @pytest.mark.parametrize("load", ['kind = "shear"\ndirection = [1, 2]', 'direction = "path"\n'
                                   'kind = "shear"', "gravity_m_per_s2 = 9.81"])  # fmt: skip
-def test_scenes_of_loads_come_back_from_their_files(load):
+def test_scenes_of_loads_round_trip(load):
     scene = loads(f'[tacton]\nshape = "circle"\nsize_mm = 10\nspeed_m_per_s = 4\n[load]\n{load}')
     assert loads(dumps(scene)) == scene
     assert not scene.load.is_plain
@@ -251,7 +251,7 @@ def test_a_force_has_no_device():
     assert found.model.startswith("flat-body")
 
 
-def test_loads_that_make_no_sense_are_refused():
+def test_invalid_loads_are_refused():
     for text, said in [
         ('kind = "sheer"', "did you mean 'shear'"),
         ("force_n = 1", "a load of kind 'pressure' has no force; leave it out"),
@@ -278,7 +278,7 @@ def test_loads_that_make_no_sense_are_refused():
          "does not compute strain zz under a shear traction along .*use --model fem"),
     ],
 )  # fmt: skip
-def test_models_say_which_loads_they_do_not_take(model, scene, said):
+def test_models_refuse_unsupported_loads(model, scene, said):
     with pytest.raises(ValueError, match=said):
         compute(loads(scene), model)
 
@@ -286,7 +286,7 @@ def test_models_say_which_loads_they_do_not_take(model, scene, said):
 SHEAR = '[load]\nkind = "shear"\ndirection = [1, 0]\n'
 
 
-def test_what_is_computed_for_a_pressure_alone_refuses_other_loads():
+def test_pressure_only_functions_refuse_other_loads():
     scene = loads(SHEAR + SMALL)
     heavy = replace(scene, load=Load(gravity=9.81))
     with pytest.raises(ValueError, match="focus alone, not pressure and gravity"):
@@ -315,7 +315,7 @@ MODULUS = "body.material.shear_modulus_pa"
 
 
 @pytest.mark.parametrize("load", [FORCE, '[load]\nkind = "shear"\ndirection = "path"\n'])
-def test_materials_are_free_under_any_moving_load(load):
+def test_materials_can_be_varied_under_any_moving_load(load):
     start = IMPULSE if load == FORCE else AROUND
     scene = loads((start.partition("[focus]")[0] if load == FORCE else start) + SMALL + load)
     free = skinwave.prepare(scene, {MODULUS: (1.5e4, 3e4)}, h=6e-3)
@@ -326,7 +326,7 @@ def test_materials_are_free_under_any_moving_load(load):
     assert far(found, expected).max() < 0.01
 
 
-def test_what_depends_on_the_material_beside_the_moving_load_is_refused():
+def test_varied_materials_refuse_gravity():
     gravity = loads(SMALL + "[load]\ngravity_m_per_s2 = 9.81\n")
     with pytest.raises(ValueError, match="free materials exclude gravity"):
         skinwave.prepare(gravity, {MODULUS: (1.5e4, 3e4)})

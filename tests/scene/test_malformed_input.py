@@ -45,7 +45,7 @@ def said(capsys, folder, arguments, codes=(2,)):
 
 
 @pytest.mark.parametrize("kind", SCENES)
-def test_no_scene_is_refused_in_one_line(folder, capsys, kind):
+def test_invalid_scenes_are_refused_in_one_line(folder, capsys, kind):
     for content in SCENES[kind].values():
         (folder / "wrong.toml").write_bytes(content)
         assert "wrong.toml: " in said(capsys, folder, ["plan", "wrong.toml"]), content[:200]
@@ -58,7 +58,7 @@ def test_a_damaged_scene_is_planned_or_refused(folder, capsys):
 
 
 @pytest.mark.parametrize("command", ["run", "compare", "plan"])
-def test_no_command_is_refused_in_one_line(folder, capsys, command):
+def test_invalid_commands_are_refused_in_one_line(folder, capsys, command):
     for arguments in corpus.command_lines():
         if arguments[0] == command:
             said(capsys, folder, arguments)
@@ -77,7 +77,7 @@ def test_wrong_usage_ends_with_two(folder, capsys):
 
 
 @pytest.mark.parametrize("name", corpus.ABSURD)
-def test_what_no_machine_can_solve_is_refused_with_its_number(folder, capsys, name):
+def test_problems_too_large_for_any_machine_are_refused(folder, capsys, name):
     body, size, *options = corpus.ABSURD[name]
     scene = corpus.GOOD.replace("[body]", f"[body]\n{body}")
     for line in size.splitlines():
@@ -89,7 +89,7 @@ def test_what_no_machine_can_solve_is_refused_with_its_number(folder, capsys, na
         assert "3,000,000" in said(capsys, folder, arguments)
 
 
-def test_no_mesh_is_refused_in_one_line():
+def test_invalid_meshes_are_refused_in_one_line():
     for name, make in corpus.broken_meshes().items():
         with pytest.raises(ValueError) as error:  # noqa: PT011 - any sentence will do, but one
             make()
@@ -97,7 +97,7 @@ def test_no_mesh_is_refused_in_one_line():
         assert "\n" not in str(error.value), name
 
 
-def test_a_process_of_its_own_says_the_same(folder):
+def test_a_separate_process_reports_the_same_error(folder):
     (folder / "wrong.toml").write_bytes(SCENES["whole files"]["brackets without end"])
     before = corpus.contents(folder)
     command = [sys.executable, "-m", "skinwave", "run", "wrong.toml"]
@@ -110,7 +110,7 @@ def test_a_process_of_its_own_says_the_same(folder):
 
 
 @pytest.mark.parametrize("name", ["..", "zero \\u0000 byte", "n" * 300])
-def test_a_scene_of_any_name_is_answered_within_its_folder(folder, name):
+def test_scenes_of_any_name_write_only_in_their_folder(folder, name):
     text = corpus.GOOD.replace('"small"', f'"{name}"').replace("0.02", "0.005")
     (folder / "named.toml").write_text(text, encoding="utf-8")
     before = corpus.contents(folder)
@@ -120,7 +120,7 @@ def test_a_scene_of_any_name_is_answered_within_its_folder(folder, name):
     assert (folder / "out/responses.npz").exists()
 
 
-def test_a_probe_on_a_clamped_edge_stays_and_spoils_no_other():
+def test_a_probe_on_a_clamped_edge_does_not_move():
     rim = corpus.GOOD.replace("[5, 0]", "[15, 0]")
     scene, alone = loads(rim), loads(rim.replace("[0, 0], ", ""))
     motion = compute(scene, "fem", tolerance=0.3, h=0.006).displacement
@@ -130,7 +130,7 @@ def test_a_probe_on_a_clamped_edge_stays_and_spoils_no_other():
         compute(alone, "fem", tolerance=0.3, h=0.006)
 
 
-def test_a_silent_tacton_moves_nothing_and_is_planned():
+def test_a_silent_tacton_causes_no_motion():
     silent = loads(corpus.GOOD.replace("[tacton]", "[tacton]\namplitude_percent = 0"))
     for model in ("point-kernel", "flat-body", "fem"):
         assert not compute(silent, model, tolerance=0.3, h=0.006).displacement.any()

@@ -24,19 +24,19 @@ def test_the_paper_has_fifteen_tactons():
     assert sum(t.am_frequency > 0 for t in moving) == 9
 
 
-def test_every_preset_comes_back_from_its_file():
+def test_presets_round_trip():
     for name, tacton in tactons():
         for scene in scenes(name, tacton).values():
             assert loads(dumps(scene)) == scene
 
 
-def test_every_example_is_a_scene_that_comes_back():
+def test_examples_round_trip():
     assert len(EXAMPLES) > 5
     for path in EXAMPLES:
         assert loads(dumps(read(path))) == read(path), path
 
 
-def test_a_material_of_ones_own_comes_back():
+def test_a_material_round_trips():
     scene = loads(
         "[body]\nkind = 'slab'\n[body.material]\ndensity_kg_m3 = 1070\n"
         "shear_modulus_pa = 25e3\npoisson = 0.49\nviscosity_pa_s = 3\n"
@@ -47,7 +47,7 @@ def test_a_material_of_ones_own_comes_back():
     assert loads(dumps(scene)) == scene
 
 
-def test_missing_keys_take_the_presets_value():
+def test_missing_keys_take_the_value_of_the_preset():
     assert loads("").body == BODIES["skin-slab"]
     assert loads("[body]\nkind = 'sheet'").body == BODIES["paper-sheet-loose"]
     # A body, or none, never changes the load.
@@ -55,7 +55,7 @@ def test_missing_keys_take_the_presets_value():
     assert loads("").pressure.drive == "pressure_squared"
 
 
-def test_units_of_the_file_are_those_of_its_keys():
+def test_keys_have_their_units():
     scene = loads(
         "[tacton]\namplitude_percent = 50\nshape = 'circle'\nsize_mm = 20\nspeed_m_per_s = 12\n"
         "[focus]\nheight_mm = 150\n[probes]\npoints_mm = [[5, -10]]"
@@ -66,73 +66,63 @@ def test_units_of_the_file_are_those_of_its_keys():
     np.testing.assert_array_equal(scene.probe_points, [[0.005, -0.010]])
 
 
-WRONG = {
-    "[tacton]\nshape = 'circel'": "did you mean 'circle'",
-    "[tacton]\nsize = 20": "unknown key 'size'; did you mean 'size_mm'",
-    '[body]\nkind = "palm-layers"': 'a preset of that name; write preset = "palm-layers" instead',
-    '[body]\npreset = "palm-layer"': "'palm-layer' is unknown, use one of none,",
-    '[body]\npreset = ["palm"]': "must be a text in quotes",
-    '[body]\npreset = "palm"\nkind = "slab"': 'kind = "slab" and a preset of kind = "palm"',
-    "[tactons]\nsize_mm = 20": "unknown key 'tactons'; did you mean 'tacton'",
-    "[tacton]\nshape = 'circle'\nsize_mm = 61": "size = 61 mm is outside 0 to 60 mm",
+INVALID = {  # and what the error names
+    "[tacton]\nshape = 'circel'": "'circle'",
+    "[tacton]\nsize = 20": "'size_mm'",
+    '[body]\nkind = "palm-layers"': 'preset = "palm-layers"',
+    '[body]\npreset = "palm-layer"': "'palm-layer'",
+    '[body]\npreset = ["palm"]': "text",
+    '[body]\npreset = "palm"\nkind = "slab"': 'kind = "slab"',
+    "[tactons]\nsize_mm = 20": "'tacton'",
+    "[tacton]\nshape = 'circle'\nsize_mm = 61": "61 mm",
     "[tacton]\nam_frequency_hz = -80": "am_frequency = -80",
-    "[tacton]\nspeed_m_per_s = nan": "speed = nan of a path must be a finite number",
-    "[focus]\npeak_pressure_pa = inf": "peak_pressure = inf of a load must be a finite number",
-    "[tacton]\nsuperposition = [0.5, 0.6]": "with sum 1",
-    "[tacton]\nsuperposition = [1]": "must be a pair of numbers",
-    "[tacton]\nduration_s = 0": "of a Tacton must be a finite number, above 0",
-    "[tacton]\nduration_s = 32": "longest Tacton; shorten it",
-    "[tacton]\nsize_mm = 'big'": "size_mm = 'big' must be a number",
-    "[tacton]\nsize_mm = true": "size_mm = True must be a number",
-    "tacton = 3": "must be a table",
-    "[focus]\nheight_mm = 700": "height = 700 mm is outside 20 to 600 mm",
-    "[focus]\ndrive = 'squared'": "did you mean 'pressure_squared'",
-    "[focus]\nprofile = 'gauss'": "did you mean 'gaussian'",
-    "[probes]\npoints_mm = [[51, 0]]": "probe (51, 0) mm lies outside the body",
-    "[probes]\npoints_mm = []": "give at least one probe",
-    "[probes]\npoints_mm = [[0, nan]]": "coordinates must be finite",
-    "[tacton]\nshape = 'circle'\nsize_mm = 60\n[body]\nsize_x_mm = 50": "path reaches 30 mm",
-    "[body]\nkind = 'slap'": "did you mean 'slab'",
-    "[body]\nmaterial = 'palms'": "did you mean 'palm'",
-    "[body]\nbase = 'free'\nsides = 'free'": "unconstrained and drifts",
-    "[body]\nthickness_mm = -1": "must be finite and above 0",
-    "[body]\nthickness_mm = 15000": "body depth = 15 m is more than 2 m",
-    "[body]\nsize_x_mm = 1e5": "body width = 100 m is more than 2 m",
-    "[body.material]\ndensity_kg_m3 = 1000": "lacks shear_modulus_pa and poisson",
-    "[tacton\n": "not valid TOML",
+    "[tacton]\nspeed_m_per_s = nan": "speed = nan",
+    "[focus]\npeak_pressure_pa = inf": "peak_pressure = inf",
+    "[tacton]\nsuperposition = [0.5, 0.6]": "sum",
+    "[tacton]\nsuperposition = [1]": "pair",
+    "[tacton]\nduration_s = 0": "above 0",
+    "[tacton]\nduration_s = 32": "32",
+    "[tacton]\nsize_mm = 'big'": "size_mm = 'big'",
+    "[tacton]\nsize_mm = true": "size_mm = True",
+    "tacton = 3": "table",
+    "[focus]\nheight_mm = 700": "700 mm",
+    "[focus]\ndrive = 'squared'": "'pressure_squared'",
+    "[focus]\nprofile = 'gauss'": "'gaussian'",
+    "[probes]\npoints_mm = [[51, 0]]": "probe (51, 0) mm",
+    "[probes]\npoints_mm = []": "points_mm",
+    "[probes]\npoints_mm = [[0, nan]]": "finite",
+    "[tacton]\nshape = 'circle'\nsize_mm = 60\n[body]\nsize_x_mm = 50": "30 mm",
+    "[body]\nkind = 'slap'": "'slab'",
+    "[body]\nmaterial = 'palms'": "'palm'",
+    "[body]\nbase = 'free'\nsides = 'free'": "unconstrained",
+    "[body]\nthickness_mm = -1": "thickness_mm",
+    "[body]\nthickness_mm = 15000": "15 m exceeds 2 m",
+    "[body.material]\ndensity_kg_m3 = 1000": "shear_modulus_pa and poisson",
+    "[tacton\n": "TOML",
 }
+NONSENSE = (
+    "[tacton]\nshape = 'xyzzy'", "[body]\nmaterial = 'q'", "[tacton]\nwwwwww = 1",
+    "[zzz]\nsize_mm = 1",
+)  # fmt: skip
 
 
-def test_wrong_scenes_are_refused_in_one_sentence():
-    for text in WRONG:
-        with pytest.raises(ValueError) as error:  # noqa: PT011 - the text is checked below
+def test_invalid_scenes_are_refused_in_one_sentence():
+    for text, named in INVALID.items():
+        with pytest.raises(ValueError, match=re.escape(named)) as error:
             loads(text)
-        assert WRONG[text] in str(error.value)
         assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize("name", ["width", "height", "depth"])
-def test_a_length_in_millimetre_where_metres_are_meant_is_refused(name):
-    said = rf"body {name} = 15 m .*lengths are in metre here.*15 mm are {name} = 0.015"
-    with pytest.raises(ValueError, match=said):
-        Body(**{name: 15})
-    assert getattr(Body(**{name: 2.0}), name) == 2
-    assert Body(depth=inf).depth == inf
-
-
-NONSENSE = {
-    "[tacton]\nshape = 'xyzzy'": "shape 'xyzzy' is unknown, use one of point, line,",
-    "[body]\nmaterial = 'q'": "material 'q' is unknown, use one of",
-    "[tacton]\nwwwwww = 1": "[tacton] has the unknown key 'wwwwww'; it may have amplitude_percent,",
-    "[zzz]\nsize_mm = 1": "has the unknown key 'zzz'; it may have",
-}
-
-
-def test_nothing_is_suggested_for_nonsense():
     for text in NONSENSE:
-        with pytest.raises(ValueError, match=re.escape(NONSENSE[text])) as error:
+        with pytest.raises(ValueError, match="use one of") as error:
             loads(text)
         assert "did you mean" not in str(error.value)
+
+
+def test_lengths_in_millimetre_instead_of_metre_are_refused():
+    for name in ("width", "height", "depth"):
+        with pytest.raises(ValueError, match=f"{name} = 15 m .*{name} = 0.015"):
+            Body(**{name: 15})
+        assert getattr(Body(**{name: 2.0}), name) == 2
+    assert Body(depth=inf).depth == inf
 
 
 def test_a_preset_is_changed_by_other_keys():

@@ -84,7 +84,7 @@ def test_layers_on_shaken_springs_and_sideways_motion_of_slow_bodies():
     )
 
 
-def test_the_start_is_from_rest():
+def test_a_shaken_layer_starts_from_rest():
     """u = u_c + w, of the modes sin (n + 1/2) pi (z / H) of w, which start with its -u_c' (0)."""
     found = compute(shaken(), "fem", h=4e-3)
     n = np.arange(40)[:, None]
@@ -104,7 +104,7 @@ def test_the_start_is_from_rest():
     assert error < 2e-3
 
 
-def test_motion_adds_to_the_load_and_has_rates():
+def test_support_motion_adds_to_the_load_and_has_rates():
     both = shaken()
     pressed = replace(both, pressure=replace(both.pressure, peak_pressure=50.0))
     alone = replace(pressed, load=Load())
@@ -116,7 +116,7 @@ def test_motion_adds_to_the_load_and_has_rates():
     )
 
 
-def test_another_tone_takes_no_new_reduction(monkeypatch, tmp_path):
+def test_another_tone_reuses_the_reduction(monkeypatch, tmp_path):
     monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
     probes = np.zeros((1, 2))
     first, louder = (
@@ -131,7 +131,7 @@ def test_another_tone_takes_no_new_reduction(monkeypatch, tmp_path):
     assert not along.translation.any()
 
 
-def test_scenes_with_it_come_back_from_their_files_and_are_planned():
+def test_scenes_with_support_motion_round_trip_and_are_planned():
     scene = loads(REST + SHAKEN + STILL)
     assert loads(dumps(scene)) == scene
     assert scene.load.support_motion == UP
@@ -144,7 +144,7 @@ def test_scenes_with_it_come_back_from_their_files_and_are_planned():
     assert found.symmetry == ""
 
 
-def test_supports_that_cannot_move_are_refused():
+def test_invalid_support_motions_are_refused():
     for text, said in [
         ("[load]\nsupport_motion = { amplitude_um = 5 }", "lacks frequency_hz; give it"),
         (SHAKEN.replace("140", "4000"), "above 0 and at most 1000 Hz; give frequency_hz"),
@@ -165,7 +165,7 @@ def test_supports_that_cannot_move_are_refused():
 
 
 @pytest.mark.parametrize("model", ["flat-body", "fem-transient", "point-kernel"])
-def test_models_that_have_no_moving_support_say_so(model):
+def test_models_without_support_motion_refuse_it(model):
     scene = loads(REST + SHAKEN + STILL)
     said = f"^{model} (takes|does not take) .*a support that moves by 5 um .*use --model fem"
     with pytest.raises(ValueError, match=said):
