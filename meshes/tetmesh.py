@@ -67,10 +67,10 @@ class TetMesh:
 
     def __post_init__(self) -> None:
         points = np.array(self.points, np.float64)
-        tets = _whole("tets", self.tets)
+        tets = whole_numbers("tets", self.tets)
         _check(points, tets)
         tets = _oriented(points, tets)
-        region = _whole("region", self.region)
+        region = whole_numbers("region", self.region)
         region = region if region.size else np.zeros(len(tets), np.int64)
         if region.shape != (len(tets),) or region.min() < 0:
             raise MeshError(
@@ -241,7 +241,7 @@ def facet_keys(facets: Ints, n: int) -> Ints:
     return (low * n + middle) * n + high
 
 
-def _whole(name: str, values: ArrayLike) -> Ints:
+def whole_numbers(name: str, values: ArrayLike) -> Ints:
     """Return whole numbers as a new array."""
     given = np.array(values)
     if given.size and given.dtype.kind not in "biu":
@@ -250,7 +250,7 @@ def _whole(name: str, values: ArrayLike) -> Ints:
 
 
 def _facets(name: str, nodes: ArrayLike, points: Floats, tets: Ints) -> Ints:
-    facets, width = _whole(f"facets '{name}'", nodes), 3 if tets.shape[1] == 4 else 6
+    facets, width = whole_numbers(f"facets '{name}'", nodes), 3 if tets.shape[1] == 4 else 6
     if not facets.size:
         return facets.reshape(0, width)
     if facets.ndim != 2 or facets.shape[1] != width:

@@ -140,8 +140,8 @@ def _tetrahedra(
 
 def _once(tets: Ints, region: Ints) -> Ints:
     """Numbers, ascending, of tetrahedra, without duplicates that belong to larger regions."""
-    _, which, count = np.unique(region, return_inverse=True, return_counts=True)
-    order = np.argsort(count[which], kind="stable")
+    _, place, count = np.unique(region, return_inverse=True, return_counts=True)
+    order = np.argsort(count[place], kind="stable")
     _, first = np.unique(np.sort(tets[order, :4], axis=1), axis=0, return_index=True)
     return np.sort(order[first])
 

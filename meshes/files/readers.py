@@ -68,7 +68,10 @@ def _read(path: Path) -> Any:
         with contextlib.redirect_stderr(io.StringIO()):
             raw = meshio.read(path, file_format=BY_MESHIO[suffix])
         families = getattr(raw, "cell_tags", {})  # of MED
-        raw.info = {"notes": [], "names": {int(n): ", ".join(of) for n, of in families.items()}}
+        raw.info = {
+            "notes": [],
+            "names": {int(n): ", ".join(names) for n, names in families.items()},
+        }
         return raw
     return _read_vtk(path)
 
@@ -102,7 +105,7 @@ def _read_vtk(path: Path) -> Any:
             blocks.append((VTK_CELLS[kind], nodes[:, BRICK] if kind == VOXEL else nodes, arrays))
         points.append(np.asarray(grid.points, np.float64))
         first += grid.n_points
-    tags = {name for _, _, arrays in blocks for name, of in arrays.items() if of.ndim == 1}
+    tags = {name for _, _, arrays in blocks for name, array in arrays.items() if array.ndim == 1}
     names = dict(enumerate(solid, start=1)) if len(solid) > 1 else {}
     return meshio.Mesh(
         np.vstack(points),

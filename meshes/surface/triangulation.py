@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from meshes.tetmesh import MeshError, check_finite, check_node_numbers
+from meshes.tetmesh import MeshError, check_finite, check_node_numbers, whole_numbers
 from meshes.typing import Floats, Ints
 
 
@@ -28,15 +27,14 @@ class Surface:
     triangles: Ints
 
     def __post_init__(self) -> None:
-        points = _array("points", self.points, "coordinates in metre").astype(np.float64)
-        triangles = _array("triangles", self.triangles, "point numbers")
-        if triangles.dtype.kind not in "iu":
-            raise MeshError(
-                f"triangles have type {triangles.dtype}; give whole numbers, counted from 0"
-            )
+        points = np.array(self.points, np.float64)
+        triangles = whole_numbers("triangles", self.triangles)
+        for name, array in (("points", points), ("triangles", triangles)):
+            if array.ndim != 2 or array.shape[1] != 3 or not len(array):
+                raise MeshError(f"{name} have shape {array.shape}; give (n, 3) numbers, n > 0")
         check_finite(points)
         check_node_numbers("point numbers of triangles", triangles, points)
-        for name, array in (("points", points), ("triangles", triangles.astype(np.int64))):
+        for name, array in (("points", points), ("triangles", triangles)):
             array.setflags(write=False)
             object.__setattr__(self, name, array)
 
@@ -93,19 +91,6 @@ def pieces(surface: Surface) -> Ints:
 def n_pieces(surface: Surface) -> int:
     """Return the number of connected pieces."""
     return int(pieces(surface).max()) + 1
-
-
-def _array(name: str, values: ArrayLike, meaning: str) -> np.ndarray:
-    try:
-        array = np.array(values)
-    except (TypeError, ValueError) as error:
-        raise MeshError(f"{name} are not an array ({error}); give (n, 3) {meaning}") from None
-    if array.ndim != 2 or array.shape[1] != 3 or not len(array) or array.dtype.kind not in "biuf":
-        raise MeshError(
-            f"{name} of the surface have shape {array.shape} and type {array.dtype}; give (n, 3) "
-            f"{meaning}, n > 0"
-        )
-    return array
 
 
 def centred_corners(surface: Surface) -> tuple[Floats, Floats, Floats]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Set
+from dataclasses import dataclass, field, fields
 from math import inf, isfinite
 from typing import Any
 
@@ -120,14 +120,11 @@ class Body:
             )
         self._check_layers()
         check_regions(self.regions)
-        if self.regions and "regions" not in kind.keys:
-            raise ValueError(f"a body of kind '{self.kind}' cannot have regions; remove them")
-        if ("file" in kind.keys) != bool(self.file):
-            raise ValueError(
-                "a body of kind 'mesh' needs a file, and no other kind takes one; add or remove it"
-            )
-        if self.air and "air" not in kind.keys:
-            raise ValueError(f"air = true is for a sheet, not a {self.kind}; remove it")
+        check_keys(
+            kind, {each.name for each in fields(self) if getattr(self, each.name) != each.default}
+        )
+        if "file" in kind.keys and not self.file:
+            raise ValueError(f"a body of kind '{self.kind}' needs a file; give its name")
         self._check_sheet()
         kind.check(self)
 
@@ -140,8 +137,6 @@ class Body:
             )
         if self.mounting == FRAME:
             return
-        if "mounting" not in self.of_kind.keys:
-            raise ValueError(f"a mounting is for a sheet, not a {self.kind}; remove it")
         if self.sides != "clamped":
             raise ValueError(
                 f'a mounting needs sides = "clamped", not {self.sides}; remove it or clamp the '
@@ -381,6 +376,15 @@ def kind_of(name: str) -> BodyKind:
     if name not in KINDS:
         extensions.load()
     return KINDS[choose("body kind", name, KINDS)]
+
+
+def check_keys(kind: BodyKind, names: Set[str]) -> None:
+    """Refuse attributes, by name, that only other kinds of body take."""
+    for name in sorted(names - set(kind.keys)):
+        if takers := [f'"{each.name}"' for each in KINDS.values() if name in each.keys]:
+            raise ValueError(
+                f'{name} is for kind = {" or ".join(takers)}, not "{kind.name}"; remove it'
+            )
 
 
 def body_name(body: Body) -> str:

@@ -25,13 +25,12 @@ from skinwave.bodies.tissue import HAND_CELL, hand_size, in_tissue_layers, suppo
 
 COARSEST = 2.0  # largest elements far from the middle, over h
 RIM = 0.7  # largest elements at the rim, over the radius of the edge
-# Elements at the surface, over those of h, because the motion there has the scale of the focal
-# spot; up to which radius they have that size; and how much slower than sideways they grow
-# downwards.
+# Elements at the surface over h, because motion there has the scale of the focal spot; the radius
+# in which they have that size; growth downwards over that sideways, as powers.
 SURFACE, FINE_RADIUS, DOWNWARDS = 0.8, 25e-3, 0.6
-# Sides of the boxes that are split into elements, over the edges asked for of these; below the
-# default size they grow by its third root, because a row of boxes is as fine from side to side, and
-# 2 mm would take 560,000 dofs, where 230,000 are within 0.3 %.
+# Sides of boxes over the edges of their elements. Below the default size they grow by its third
+# root: rows of boxes are fine from side to side, and 2 mm would need 560,000 dofs where 230,000
+# are within 0.3 %.
 CELL = 0.85
 
 

@@ -14,7 +14,7 @@ from meshes import reading
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.choices import choose
 from simple_model.load.trajectory import BY_POINTS
-from skinwave.bodies import BodyKind
+from skinwave.bodies.body import BodyKind, check_keys
 from skinwave.bodies.parts import check_material
 from skinwave.scene.distributions import (
     VALUE,
@@ -204,7 +204,7 @@ def to_table(scene: Scene) -> dict[str, Any]:
     if not body.of_kind.discretise:
         table["body"] = {"kind": "none"}
         del table["placement"]
-    for key in _keys_of_kinds() - set(body.of_kind.keys):
+    for key in {key for kind in KINDS.values() for key in kind.keys} - set(body.of_kind.keys):
         table["body"].pop(key, None)
     for key, given in scene.spreads:
         if (value := value_at(table, key)) is not None:
@@ -254,9 +254,7 @@ def _body(values: dict[str, Any], preset: Body | None) -> Body:
         raise ValueError(
             f'[body] has kind = "{kind.name}" and a preset of kind = "{preset.kind}"; remove one'
         )
-    for key in (_keys_of_kinds() - set(kind.keys)) & values.keys():
-        takers = " or ".join(f'"{each.name}"' for each in KINDS.values() if key in each.keys)
-        raise ValueError(f'[body] {key} is for kind = {takers}, not "{kind.name}"')
+    check_keys(kind, values.keys())
     shape, placement = _split(values, tuple(field.name for field in SECTIONS["placement"].values()))
     missing = vars(preset) if preset else next(iter(kind.presets.values()), {})
     if (grammage := shape.pop("grammage", None)) is not None:
@@ -284,11 +282,6 @@ def _of_grammage(
     if not values["depth"] > 0:
         return {}  # the body refuses it
     return {"material": replace(solid, density=grammage / values["depth"])}
-
-
-def _keys_of_kinds() -> set[str]:
-    """Keys that only some kinds of body take."""
-    return {key for kind in KINDS.values() for key in kind.keys}
 
 
 def _split(values: dict[str, Any], names: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, Any]]:

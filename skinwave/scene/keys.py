@@ -200,7 +200,7 @@ def _write_profile(profile: str | FocalSpot) -> str:
 
 def _regions(key: str, value: Any) -> tuple[tuple[str, str | Material], ...]:
     table = as_table(f"body.{key}", value)
-    return tuple((name, _material(f"{key}.{name}", of)) for name, of in table.items())
+    return tuple((name, _material(f"{key}.{name}", each)) for name, each in table.items())
 
 
 def _mounting(**values: Any) -> Mounting:
@@ -367,7 +367,7 @@ SECTIONS = {
         "bone": _record("body", "bone", Phalanx, BONE),
         **_words_of("file", "unit", "up"),
         "regions": SceneKey(
-            "regions", _regions, lambda named: {name: write_material(of) for name, of in named}
+            "regions", _regions, lambda named: {name: write_material(each) for name, each in named}
         ),
         "air": SceneKey("air", _switch, bool),
         "mounting": _record("body", "mounting", _mounting, MOUNTING),

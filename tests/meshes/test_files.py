@@ -24,7 +24,6 @@ from skinwave.scene.scene import Body
 @pytest.fixture(autouse=True)
 def read_here(monkeypatch):
     """Files are read in this process, which has imported what reads them."""
-
     monkeypatch.setattr(subprocess_call, "call_reader", lambda read, path: read(path))
 
 
@@ -33,8 +32,6 @@ GMSH_EDGES = [(0, 1), (1, 2), (0, 2), (0, 3), (2, 3), (1, 3)]  # of gmsh's manua
 
 
 SLAB = meshes.block((0.040, 0.040, 0.012), 0.010, order=1)
-
-
 TETRAHEDRON, HEXAHEDRON, WEDGE, PYRAMID = 10, 12, 13, 14  # in VTK
 
 
@@ -138,11 +135,7 @@ def gmsh_file(path, points, tets, *, edges=GMSH_EDGES, triangles=(), names=""):
 
 
 CORNERS = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)]
-
-
 TWO = [(7, (0, 1, 2, 3)), (9, (1, 2, 3, 4))]
-
-
 NAMES = '$PhysicalNames\n2\n2 5 "the lid"\n3 7 "skin"\n$EndPhysicalNames'
 
 
@@ -169,17 +162,12 @@ def test_mid_side_nodes_off_their_edges_are_refused(tmp_path):
         meshes.read(tmp_path / "a.msh")
 
 
-def test_gmsh_version_4_is_read_correctly_or_refused(tmp_path):
+def test_gmsh_version_4_is_read(tmp_path):
     mesh = layered(2)
     raw = meshio.Mesh(mesh.points, [("tetra10", mesh.tets)])
     meshio.write(tmp_path / "a.msh", raw, file_format="gmsh")
     read = meshes.read(tmp_path / "a.msh")
     np.testing.assert_array_equal(read.tets, mesh.tets)
-    meshio.write(tmp_path / "b.msh", raw, file_format="gmsh", binary=False)
-    try:
-        in_the_middle(meshes.read(tmp_path / "b.msh"))
-    except MeshError as error:
-        assert "msh22" in str(error)  # noqa: PT017 - either outcome is right
 
 
 @pytest.mark.parametrize(("mode", "compressor"), [("Ascii", "none"), ("Appended", "lz4")])
@@ -374,9 +362,7 @@ def test_sets_continued_lines_and_included_nodes(tmp_path):
     assert mesh.order == 2
     assert volume_of(mesh) == pytest.approx(19.2, rel=1e-9)
     names = {name: (mesh.region == number).sum() for number, name in mesh.region_names.items()}
-    assert names == {"SKIN": upper.sum(), "MUSCLE": (~upper).sum()} or sum(names.values()) == len(
-        mesh.tets
-    )
+    assert names == {"SKIN": upper.sum(), "MUSCLE": (~upper).sum()}
 
 
 def test_generated_or_missing_abaqus_data_are_refused(tmp_path):
