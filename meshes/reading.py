@@ -37,8 +37,7 @@ def open_regular(path: PathLike, limit: float = np.inf) -> Iterator[BinaryIO]:
     with os.fdopen(handle, "rb") as file:
         if status.st_size > limit:
             raise ValueError(
-                f"{path}: the file has {status.st_size / 1e6:,.0f} MB, more than the limit of "
-                f"{limit / 1e6:g} MB; check the path"
+                f"{path}: the file exceeds the limit of {limit / 1e6:g} MB; check the path"
             )
         yield file
 

@@ -74,8 +74,7 @@ class TetMesh:
         region = region if region.size else np.zeros(len(tets), np.int64)
         if region.shape != (len(tets),) or region.min() < 0:
             raise MeshError(
-                f"region has shape {region.shape} for {len(tets)} tetrahedra; give one number "
-                "per tetrahedron, 0 or above"
+                f"region has shape {region.shape}; give one number, 0 or above, per tetrahedron"
             )
         facets = {name: _facets(name, nodes, points, tets) for name, nodes in self.facets.items()}
         for array in (points, tets, region, *facets.values()):
@@ -276,18 +275,14 @@ def check_finite(points: Floats) -> None:
     bad = np.flatnonzero(~(np.abs(points) <= FURTHEST).all(axis=1))
     if len(bad):
         raise MeshError(
-            f"{len(bad):,} of {len(points):,} points are not finite, first point {bad[0]}; "
-            "repair the file that they come from"
+            f"{len(bad):,} points are not finite, first point {bad[0]}; repair the file"
         )
 
 
 def check_node_numbers(what: str, nodes: Ints, points: Floats) -> None:
     """Refuse numbers that do not belong to any of the points (n, 3)."""
     if nodes.min() < 0 or nodes.max() >= len(points):
-        raise MeshError(
-            f"{what} run from {nodes.min()} to {nodes.max()}, but there are {len(points)} "
-            "points; count them from 0"
-        )
+        raise MeshError(f"{what} run from {nodes.min()} to {nodes.max()} for {len(points)} points")
 
 
 def _oriented(points: Floats, tets: Ints) -> Ints:

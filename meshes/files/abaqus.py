@@ -70,10 +70,7 @@ def read_abaqus(path: Path) -> Any:
             try:
                 _add(current, keyword, options, rows)
             except (ValueError, IndexError):
-                raise MeshError(
-                    f"{path}: a line below *{keyword} does not have whole numbers and "
-                    f"coordinates; {AGAIN}"
-                ) from None
+                raise MeshError(f"{path}: wrong numbers below *{keyword}; {AGAIN}") from None
     placed = [(loose, []), *instances] if instances else [(p, []) for p in (loose, *parts.values())]
     return _joined(path, [(part, rows) for part, rows in placed if part.elements])
 
@@ -103,8 +100,7 @@ def _lines(path: Path, level: int = 0) -> Iterator[str]:
             other = path.parent / options["INPUT"]
             if level == MOST_INCLUDED or not other.is_file():
                 raise MeshError(
-                    f"{path} includes '{options['INPUT']}', which does not exist; copy it to the "
-                    "same folder"
+                    f"{path} includes '{options['INPUT']}', which is missing; copy it there"
                 )
             yield from _lines(other, level + 1)
 

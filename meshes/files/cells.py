@@ -71,8 +71,7 @@ def contents(path: Path, raw: Any) -> Contents:
     if unknown or ("tetra10" in solid and len(solid) > 1):
         listed = ", ".join(f"{counts[kind]:,} of type {kind}" for kind in unknown or solid)
         raise MeshError(
-            f"{path} has unsupported cells ({listed}); save it with 4-node tetrahedra, or only "
-            "10-node ones"
+            f"{path} has unsupported cells ({listed}); save only 4- or 10-node tetrahedra"
         )
     if not solid and not any(kind in PLANE for kind in counts):
         raise MeshError(f"{path} has no triangles and no solid elements; give a file with a body")

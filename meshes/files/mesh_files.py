@@ -83,8 +83,7 @@ def read(path: str | os.PathLike[str], *, unit: str = "m") -> TetMesh:
     scale, contents = scale_of(unit), read_contents(path)
     if not len(contents.tets):
         raise MeshError(
-            f"{path} is a surface without solid elements; fill it with skinwave mesh or "
-            "`meshes.body_from_file`"
+            f"{path} is a surface; fill it with skinwave mesh or `meshes.body_from_file`"
         )
     return mesh_of(contents, scale)
 

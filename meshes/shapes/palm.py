@@ -62,12 +62,8 @@ class Palm:
                 raise MeshError(
                     f"{name} = {1e3 * value:g} mm of the palm must be {least} and below 1 m"
                 )
-            if name in relief and value > self.thickness:
-                raise MeshError(
-                    f"{name} = {1e3 * value:g} mm exceeds the thickness of the palm, "
-                    f"{1e3 * self.thickness:g} mm; reduce it"
-                )
         for name, limit, meaning in (
+            *((name, self.thickness, "its thickness") for name in relief),
             ("corner_radius", min(self.breadth, self.length) / 2, "half the shorter side"),
             ("edge_radius", self.thickness / 2, "half the thickness"),
             ("edge_radius", self.corner_radius, "corner_radius"),

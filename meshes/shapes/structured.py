@@ -86,7 +86,8 @@ def sheet(
         for size, wanted in zip((width, height), planes, strict=True)
     )
     lines = x, y, np.linspace(-thickness, 0.0, layers + 1)
-    return _with_roles(extrude(*lines, order=order), clamped="sides")
+    mesh = extrude(*lines, order=order)
+    return replace(mesh, facets={**mesh.facets, "clamped": mesh.facets["sides"]})
 
 
 def block(
@@ -122,7 +123,9 @@ def block(
             mirrored(graded_axis(y_length / 2, h, grading)),
             -graded_axis(depth, h, replace(grading, radius=0))[::-1],
         )
-    return _with_roles(extrude(*lines, order=order), clamped="bottom", absorbing="sides")
+    mesh = extrude(*lines, order=order)
+    roles = {"clamped": mesh.facets["bottom"], "absorbing": mesh.facets["sides"]}
+    return replace(mesh, facets={**mesh.facets, **roles})
 
 
 def middle_plane(mesh: TetMesh) -> Ints:
@@ -142,15 +145,8 @@ def middle_plane(mesh: TetMesh) -> Ints:
 
 
 def disc(diameter: float, thickness: float, h: float, planes: Iterable[float] = ()) -> TetMesh:
-    """Return ten-node tetrahedra of a vertical cylinder below the plane z = 0.
-
-    Prisms stand on concentric rings of triangles. Facet sets: `top`, `bottom`, `sides`, `surface`.
-
-    Parameters
-    ----------
-    diameter, thickness : float, metre
-    h : float, metre, largest edge along a radius and downwards
-    planes : depths in metre where element layers must end
+    """Return ten-node tetrahedra of a cylinder below z = 0 on rings of triangles; h is the largest
+    edge along a radius and downwards, and `planes` are depths, in metre, where element layers end.
     """
     for name, length in (("diameter", diameter), ("thickness", thickness), ("h", h)):
         if not 0 < length < np.inf:
@@ -324,12 +320,6 @@ def _sides(points: Floats, facets: Ints) -> dict[str, Ints]:
     return sets
 
 
-def _with_roles(mesh: TetMesh, **roles: str) -> TetMesh:
-    """The mesh with additional names of facet sets."""
-    named = {role: mesh.facets[name] for role, name in roles.items()}
-    return replace(mesh, facets={**mesh.facets, **named})
-
-
 def _even(length: float, h: float, *, least: int = 2) -> Floats:
     """Equal cells no larger than h about the origin, in multiples of `least`."""
     _check_lengths(length, h)
@@ -342,8 +332,8 @@ def check_size(cells: Iterable[float], order: int = 2) -> None:
     unknowns = 3.0 * prod(order * n + 1 for n in cells)
     if not unknowns <= MOST_UNKNOWNS:
         raise MeshError(
-            f"the mesh would have at least {unknowns:.2g} degrees of freedom, more than the "
-            f"limit of {MOST_UNKNOWNS:,}; use larger elements or a smaller body"
+            f"{unknowns:.2g} or more degrees of freedom exceed the limit of {MOST_UNKNOWNS:,}; "
+            "use larger elements or a smaller body"
         )
 
 

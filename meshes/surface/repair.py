@@ -97,18 +97,18 @@ def repaired(
     raw = Surface(points=points, triangles=triangles)  # type: ignore[arg-type]
     notes: list[str] = []
     number = first_coincident(raw.points)
-    triangles = number[raw.triangles]
+    corners = number[raw.triangles]
     if (merged := len(number) - len(np.unique(number))) > 0:
         notes.append(f"merged {merged:,} points that coincide with others, as along seams")
-    a, b, c = triangles.T
+    a, b, c = corners.T
     proper = (a != b) & (b != c) & (c != a)
     if not proper.all():
         notes.append(f"dropped {(~proper).sum():,} triangles without three different corners")
-    triangles = triangles[proper]
-    _, first = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
-    if len(first) < len(triangles):
-        notes.append(f"dropped {len(triangles) - len(first):,} duplicate triangles")
-    surface = compact(raw.points, triangles[np.sort(first)])
+    corners = corners[proper]
+    _, first = np.unique(np.sort(corners, axis=1), axis=0, return_index=True)
+    if len(first) < len(corners):
+        notes.append(f"dropped {len(corners) - len(first):,} duplicate triangles")
+    surface = compact(raw.points, corners[np.sort(first)])
     if (unused := len(number) - merged - len(surface.points)) > 0:
         notes.append(f"dropped {unused:,} unused points")
     if keep_largest and (n := n_pieces(surface)) > 1:
@@ -193,8 +193,8 @@ def _paired_edges(surface: Surface) -> Ints:
         )
     if (crowded := first[count > 2]).size:
         raise MeshError(
-            f"{len(crowded):,} edges of the surface have more than two triangles, first near "
-            f"{_at(surface, crowded[0])}; keep only its outer skin"
+            f"{len(crowded):,} edges have more than two triangles, first near "
+            f"{_at(surface, crowded[0])}; keep the outer skin"
         )
     return np.argsort(keys, kind="stable").reshape(-1, 2)
 

@@ -130,10 +130,7 @@ def check_size(surface: Surface, name: str, length: float) -> None:
     """Refuse a length in metre that exceeds the body, or is less than a thousandth of it."""
     longest = float(np.ptp(surface.points, axis=0).max())
     if not 1e-3 * longest <= length <= longest:
-        raise MeshError(
-            f"{name} = {length} m must be from {1e-3 * longest:.2g} m to {longest:.2g} m, the "
-            "longest side of the body"
-        )
+        raise MeshError(f"{name} = {length} m must be from {1e-3 * longest:.2g} to {longest:.2g} m")
 
 
 def _size_grid(surface: Surface, h: float, sizing: Sizing | None) -> dict[str, np.ndarray]:

@@ -102,21 +102,19 @@ class Body:
         check_base(self.base, self.base_stiffness, depth=self.depth, is_plate=kind.is_plate)
         object.__setattr__(self, "sides", complete_sides(self.sides, kind.named_sides, self.kind))
         for name in ("width", "height", "depth"):
-            length, may_be_infinite = getattr(self, name), name == "depth" and kind.is_layer
-            if not (length > 0 and (isfinite(length) or (may_be_infinite and length == inf))):
+            length = getattr(self, name)
+            if name == "depth" and kind.is_layer and length == inf:
+                continue
+            if not 0 < length < inf:
+                raise ValueError(f"{KEYS[name]} = {1e3 * length:g} must be finite and above 0")
+            if length > LARGEST:
                 raise ValueError(
-                    f"body {name} ({KEYS[name]}) = {1e3 * length:g} must be finite and above 0"
-                )
-            if isfinite(length) and length > LARGEST:
-                raise ValueError(
-                    f"body {name} = {length:g} m exceeds {LARGEST:g} m; lengths are in metre: "
-                    f"{length:g} mm are {name} = {length / 1e3:g}, or {KEYS[name]} = {length:g} "
-                    "in a scene file"
+                    f"body {name} = {length:g} m exceeds {LARGEST:g} m; {length:g} mm are "
+                    f"{name} = {length / 1e3:g} in metre, or {KEYS[name]} = {length:g} in a scene"
                 )
         if kind.discretise and {self.base, *self.conditions} == {"free"}:
             raise ValueError(
-                "a body with free base and free sides is unconstrained and drifts; clamp its "
-                "base or a side"
+                "a body with free base and sides is unconstrained and drifts; clamp one"
             )
         self._check_layers()
         check_regions(self.regions)
@@ -131,22 +129,16 @@ class Body:
     def _check_sheet(self) -> None:
         """Refuse properties that only a sheet has, and supports that contradict each other."""
         if self.solid.orthotropy is not None and not self.of_kind.is_plate:
-            raise ValueError(
-                f"an orthotropic material is for a sheet, not a {self.kind}; use an isotropic "
-                "material"
-            )
+            raise ValueError("an orthotropic material is for a sheet; use an isotropic material")
         if self.mounting == FRAME:
             return
         if self.sides != "clamped":
             raise ValueError(
-                f'a mounting needs sides = "clamped", not {self.sides}; remove it or clamp the '
-                "sides"
+                f'a mounting needs sides = "clamped", not {self.sides}; clamp the sides'
             )
         needs_flat = self.mounting.support == "simply" or self.mounting.is_curled
         if needs_flat and self.placement.is_tilted:
-            raise ValueError(
-                "a tilted sheet cannot have simple supports or a curl; remove its tilt"
-            )
+            raise ValueError("a tilted sheet cannot be simply supported or curled; remove its tilt")
         check_extent(self.mounting, self.width, self.height)
 
     def _check_layers(self) -> None:
@@ -160,9 +152,8 @@ class Body:
             )
         if (below := sum(layer.thickness for layer in self.layers)) >= self.depth:
             raise ValueError(
-                f"the layers are {1e3 * below:g} mm thick in total, but the body is only "
-                f"{1e3 * self.depth:g} mm deep; make them thinner, so that `material` fills the "
-                "rest"
+                f"the layers of {1e3 * below:g} mm fill the body of {1e3 * self.depth:g} mm; "
+                "make them thinner"
             )
 
     @property

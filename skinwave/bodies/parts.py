@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isfinite
 
 import numpy as np
 
 from meshes import Palm
-from simple_model.choices import choose
+from simple_model.choices import check_numbers, check_range, choose
 from simple_model.layers.material import PRESETS, Material
 from skinwave.typing import Floats
 
@@ -29,10 +28,7 @@ class Layer:
 
     def __post_init__(self) -> None:
         check_material(self.material)
-        if not (isfinite(self.thickness) and self.thickness > 0):
-            raise ValueError(
-                f"layer thickness = {1e3 * self.thickness} mm must be finite and above 0"
-            )
+        check_numbers("a layer", self, "thickness")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,12 +106,8 @@ class Placement:
 
     def __post_init__(self) -> None:
         for name in ("tilt_x", "tilt_y"):
-            if not abs(getattr(self, name)) <= STEEPEST:
-                raise ValueError(
-                    f"{name} = {np.degrees(getattr(self, name)):g} degrees exceeds "
-                    f"{np.degrees(STEEPEST):.0f} degrees, where almost no pressure acts; tilt it "
-                    "less"
-                )
+            degrees = np.degrees(getattr(self, name))
+            check_range(name, degrees, -STEEPEST, STEEPEST, " degrees", "; tilt the body less")
         if not (np.isfinite(self.offset).all() and abs(self.lift) <= FURTHEST_LIFT):
             raise ValueError(
                 f"offset {self.offset} m and lift {self.lift} m: the body must lie within "
@@ -143,7 +135,8 @@ class Placement:
         return points @ self.rotation.T + [*self.offset, self.lift]
 
 
-STEEPEST, FURTHEST_LIFT = np.pi / 3, 0.05
+STEEPEST = 60.0 + 1e-9  # degrees: almost no pressure acts on steeper bodies
+FURTHEST_LIFT = 0.05  # m
 FLAT = Placement()
 
 

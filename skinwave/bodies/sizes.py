@@ -41,8 +41,8 @@ def check_element_size(body: Body, h: float, slack: float = 1.0) -> float:
     longest = max(body.width, body.height, body.depth)
     if h > longest:
         raise ValueError(
-            f"elements of {1e3 * h:g} mm are larger than the body, whose longest side is "
-            f"{1e3 * longest:g} mm; use smaller ones"
+            f"elements of {1e3 * h:g} mm are larger than the body of {1e3 * longest:g} mm; use "
+            "smaller ones"
         )
     return h
 

@@ -2,14 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from math import inf
 
 import numpy as np
 
 from fem.boundary import Support
 from fem.load_and_probe import facet_points
 from meshes import TetMesh
-from simple_model.choices import choose
+from simple_model.choices import check_numbers, check_range, choose
 from skinwave.typing import Bools, Ints
 
 EDGES = {"left": (0, -1), "right": (0, 1), "front": (1, -1), "back": (1, 1)}  # axis, end
@@ -78,14 +77,14 @@ def check_base(base: str, stiffness: float, *, depth: float, is_plate: bool) -> 
     if base != "elastic":
         if stiffness:
             raise ValueError(
-                f"base_stiffness = {stiffness:g} N/m3 is for an elastic base, but the base is "
-                f'{base}; give base = "elastic", or remove it'
+                f'base_stiffness = {stiffness:g} N/m3 needs base = "elastic", not {base}; remove '
+                "one"
             )
         return
     if not (np.isfinite(stiffness) and stiffness > 0):
         raise ValueError(
-            f"base_stiffness = {stiffness:g} N/m3 of an elastic base must be a finite number "
-            "above 0; give base_stiffness_n_per_m3, force per area and displacement"
+            f"base_stiffness = {stiffness:g} N/m3 of an elastic base must be finite and above 0; "
+            "give base_stiffness_n_per_m3"
         )
     if is_plate or not np.isfinite(depth):
         refused = "a sheet" if is_plate else "a half-space"
@@ -142,12 +141,10 @@ class Mounting:
             choose("edge", edge, EDGES)
         object.__setattr__(self, "edges", tuple(edge for edge in EDGES if edge in self.edges))
         choose("support", self.support, SUPPORTS)
-        for name, unit in (("tension_x", "N/m"), ("tension_y", "N/m"), ("clip_radius", "m")):
-            if not 0 <= (value := getattr(self, name)) < inf:
-                raise ValueError(f"{name} = {value} {unit} must be a finite number, 0 or above")
+        check_numbers("a sheet", self, "tension_x", "tension_y", "clip_radius", least="0 or above")
         if not (self.edges or self.clips):
             raise ValueError(
-                "edges = [] without clips_mm leaves the sheet unconstrained; give an edge or a clip"
+                "the sheet is unconstrained without edges and clips_mm; give one of them"
             )
         if self.support == "simply" and len(self.edges) == 1 and not self.clips:
             raise ValueError(
@@ -213,11 +210,9 @@ def check_extent(mounting: Mounting, width: float, height: float) -> None:
     shallow.
     """
     for name, side in (("curl_x", width), ("curl_y", height)):
-        if not abs(curl := getattr(mounting, name)) <= STEEPEST * side:
-            raise ValueError(
-                f"{name} = {1e3 * curl:g} mm on a side of {1e3 * side:g} mm exceeds "
-                f"{1e3 * STEEPEST * side:g} mm, the limit of a shallow shell; reduce it"
-            )
+        most = 1e3 * STEEPEST * side
+        cure = ", the limits of a shallow shell; reduce it"
+        check_range(name, 1e3 * getattr(mounting, name), -most, most, " mm", cure)
     for x, y in mounting.clips:
         if not (abs(x) <= width / 2 and abs(y) <= height / 2):
             raise ValueError(

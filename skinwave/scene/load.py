@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from simple_model import MovingPressure
-from simple_model.choices import choose
+from simple_model.choices import check_numbers, check_range, choose
 from simple_model.load.focus import NOMINAL_HEIGHT, ContactSpot
 from skinwave.typing import Floats
 
@@ -46,16 +46,9 @@ class SupportMotion:
     direction: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
     def __post_init__(self) -> None:
-        if not 0 < self.amplitude <= LARGEST_AMPLITUDE:
-            raise ValueError(
-                f"amplitude = {1e6 * self.amplitude:g} um of a support must be above 0 and at "
-                f"most {1e6 * LARGEST_AMPLITUDE:g} um; give amplitude_um"
-            )
-        if not 0 < self.frequency <= HIGHEST_FREQUENCY:
-            raise ValueError(
-                f"frequency = {self.frequency:g} Hz of a support must be above 0 and at most "
-                f"{HIGHEST_FREQUENCY:g} Hz; give frequency_hz"
-            )
+        check_numbers("a support", self, "amplitude", "frequency")
+        check_range("amplitude_um", 1e6 * self.amplitude, 0, 1e6 * LARGEST_AMPLITUDE)
+        check_range("frequency_hz", self.frequency, 0, HIGHEST_FREQUENCY)
         _check_direction(self.direction, 3, "a support")
 
     @property
@@ -121,11 +114,7 @@ class Load:
                 object.__setattr__(self, name, kind.defaults[name])
             elif getattr(self, name) and name not in kind.defaults:
                 raise ValueError(f"a load of kind '{self.kind}' does not take {name}; remove it")
-        if not abs(self.gravity) <= STRONGEST_GRAVITY:
-            raise ValueError(
-                f"gravity = {self.gravity} m/s2 must be from {-STRONGEST_GRAVITY:g} to "
-                f"{STRONGEST_GRAVITY:g} m/s2"
-            )
+        check_range("gravity", self.gravity, -STRONGEST_GRAVITY, STRONGEST_GRAVITY, " m/s2")
         kind.check(self)
 
     @property
@@ -242,11 +231,7 @@ def _check_shear(load: Load) -> None:
 
 
 def _check_contact(load: Load) -> None:
-    if not (isfinite(load.force) and load.force > 0):
-        raise ValueError(
-            f"force = {load.force} N of a load of kind '{load.kind}' must be a finite number "
-            "above 0; give force_n"
-        )
+    check_numbers(f"a load of kind '{load.kind}'", load, "force")
     ContactSpot(width=load.width)
     _check_direction(load.direction, 3, "a load of kind 'point_force'")
 

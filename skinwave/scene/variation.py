@@ -97,9 +97,7 @@ def parse(text: str) -> Variation:
     if not count:
         return uniform(key, start, stop)
     if not (count[0] == int(count[0]) and 1 <= count[0] <= MOST_RUNS):
-        raise ValueError(
-            f"--vary {text} gives {count[0]:g} values; use a whole number from 1 to {MOST_RUNS:,}"
-        )
+        raise ValueError(f"--vary {text} needs a whole number of values from 1 to {MOST_RUNS:,}")
     return Choice(key=key, values=tuple(np.linspace(start, stop, int(count[0])).tolist()))
 
 

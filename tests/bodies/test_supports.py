@@ -44,9 +44,9 @@ def test_youngs_modulus_gives_the_shear_modulus():
 
 def test_contradictory_moduli_are_refused():
     for text, said in [
-        (YOUNG + "shear_modulus_pa = 29e3", r"a shear modulus of 30000 Pa .* = 29000; leave out"),
+        (YOUNG + "shear_modulus_pa = 29e3", r"a shear modulus of 30000 Pa .* = 29000"),
         (YOUNG.replace("poisson = 0.25", ""), "has young_modulus_pa without poisson"),
-        (YOUNG.replace("75e3", "-1"), "has young_modulus_pa = -1; give one above 0"),
+        (YOUNG.replace("75e3", "-1"), "has young_modulus_pa = -1"),
     ]:
         with pytest.raises(ValueError, match=said):
             loads(text)
@@ -71,7 +71,7 @@ def test_invalid_supports_are_refused():
         ('kind = "palm"\nsides = { left = "free" }', "its sides are front and back"),
         ('kind = "sheet"\nsides = { left = "free" }', "edges in its mounting"),
         ('base = "elastic"', "base_stiffness = 0 N/m3 of an elastic base must be"),
-        ("base_stiffness_n_per_m3 = 1e6", "is that of an elastic base, and this one is clamped"),
+        ("base_stiffness_n_per_m3 = 1e6", "needs base = .elastic."),
         ('base = "elastic"\nbase_stiffness_n_per_m3 = 1e6\nthickness_mm = inf', "not a half-space"),
         ('kind = "sheet"\nbase = "elastic"\nbase_stiffness_n_per_m3 = 1e6', "not a sheet"),
     ]:

@@ -254,15 +254,15 @@ def test_a_force_has_no_device():
 def test_invalid_loads_are_refused():
     for text, said in [
         ('kind = "sheer"', "did you mean 'shear'"),
-        ("force_n = 1", "a load of kind 'pressure' has no force; leave it out"),
-        ('kind = "shear"\ndirection = [1, 0, 0]', "must be 2 finite numbers, not all 0, or path"),
+        ("force_n = 1", "a load of kind 'pressure' does not take force"),
+        ('kind = "shear"\ndirection = [1, 0, 0]', "must be 2 finite numbers"),
         ('kind = "shear"\ndirection = "path"', "rests or jumps from point to point"),
-        ('kind = "point_force"', "must be a finite number above 0; give force_n"),
+        ('kind = "point_force"', "force = 0.0 of a load"),
         ('kind = "point_force"\nforce_n = 1\nwidth_mm = 0.01', "is outside 0.2 to 20 mm"),
-        ('kind = "point_force"\nforce_n = 1\nwidth_mm = 0', "width_mm = 0 is no contact"),
+        ('kind = "point_force"\nforce_n = 1\nwidth_mm = 0', "width_mm = 0 must"),
         ('kind = "point_force"\nforce_n = 1\ndirection = [0, 0, 0]', "must be 3 finite numbers"),
         ('kind = "point_force"\nforce_n = 1\n[focus]\nheight_mm = 300', "focus"),
-        ("gravity_m_per_s2 = 99", "must be a number within 30 of 0"),
+        ("gravity_m_per_s2 = 99", "gravity = 99"),
         ('gravity_m_per_s2 = 9.8\n[body]\nbase = "free"', "falls under gravity; clamp"),
     ]:
         with pytest.raises(ValueError, match=said):
@@ -292,7 +292,7 @@ def test_pressure_only_functions_refuse_other_loads():
     with pytest.raises(ValueError, match="focus alone, not pressure and gravity"):
         target(heavy, "flat-body", DISPLACEMENT, scene.probe_points)
     assert target(heavy, "fem", DISPLACEMENT, scene.probe_points).linear == ("gain",)
-    with pytest.raises(ValueError, match="a pattern of a device is about"):
+    with pytest.raises(ValueError, match="a pattern of a device needs"):
         write_pattern(scene, ".csv", Options())
     with pytest.raises(ValueError, match="needs a load normal to it"):
         loads(SHEAR + "[body]\npreset = 'paper-sheet-loose'")
