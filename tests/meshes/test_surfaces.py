@@ -94,7 +94,6 @@ REFUSED = {
     "no triangles": (lambda: Surface(points=FEW, triangles=np.zeros((0, 3), int)), "n > 0"),
     "number too large": (changed("triangles", (3, 0), 10**6), "from 0 to 1000000"),
     "numbers with fractions": (lambda: Surface(points=FEW, triangles=[[0, 1, 1.5]]), "whole"),
-    "ragged": (lambda: Surface(points=FEW, triangles=[[0, 1], [2]]), "not an array"),
 }  # fmt: skip
 
 
