@@ -276,7 +276,7 @@ def test_places_are_those_of_the_measurement_or_as_many():
         at_measured_places(AM, unknown)
     two = replace(AM, probes=((0.0, 0.0), (0.002, 0.0)))
     assert at_measured_places(two, unknown) == replace(two, quantity="displacement")
-    with pytest.raises(ValueError, match="off the body"):
+    with pytest.raises(ValueError, match="outside the body"):
         at_measured_places(AM, Measurement(places=places + 1, **given))
     with pytest.raises(ValueError, match="strain"):
         at_measured_places(AM, Measurement(places=places, **(given | {"quantity": "strain_xx"})))
