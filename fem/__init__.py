@@ -2,10 +2,9 @@
 
     M u'' + C u' + K u = P q(t),  probes = S u
 
-(`maxwell` has what Prony terms and other modulus laws add to K.)
+(`maxwell` describes what Prony terms and other modulus laws add to K.)
 
-Operators are built once, factorised once, and then only solved with. Index letters of every
-einsum in this package:
+Operators are assembled and factorised once. Index letters of all einsum in this package:
 
     e    element or facet
     q    quadrature point
@@ -29,7 +28,7 @@ from fem.added_mass import added_mass
 from fem.assembly import Operators, assemble
 from fem.boundary import Support
 from fem.coat import Coat
-from fem.energy import Elastic, EnergyBalance, imbalance, stored, with_energy_balance
+from fem.energy import Elastic, EnergyBalance, imbalance, mechanical_energy, with_energy_balance
 from fem.finite_strain import Membrane, finite_strain
 from fem.harmonic import LineSolver, harmonic
 from fem.krylov import NotReduced, reduce
@@ -58,7 +57,8 @@ __all__ = [
     "Material", "MaxwellBranch", "Membrane", "NotReduced", "Operators", "Poles", "PronyTerm",
     "ReducedModel", "State", "Support", "Tension", "added_mass", "assemble", "at_rest", "available",
     "displacement_operator", "facet_normals", "facet_points", "factorise", "finite_strain",
-    "from_young", "harmonic", "imbalance", "is_inside", "load_operator", "locate", "modes",
-    "nonlinear", "of_law", "poles", "probe_operator", "reduce", "relaxation", "static",
-    "stored", "strain_operator", "tabulated", "transfer", "transient", "with_energy_balance",
+    "from_young", "harmonic", "imbalance", "is_inside", "load_operator", "locate",
+    "mechanical_energy", "modes", "nonlinear", "of_law", "poles", "probe_operator", "reduce",
+    "relaxation", "static", "strain_operator", "tabulated", "transfer", "transient",
+    "with_energy_balance",
 ]  # fmt: skip

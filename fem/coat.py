@@ -1,6 +1,6 @@
 """Coat: thin elastic layers at a surface, as a laminated Kirchhoff shell on its facets.
 
-A layer thinner than elements resolve keeps its normals straight, normal and of one length,
+A layer thinner than the elements keeps its normals straight, perpendicular and of constant length,
 
     u(z) = u + z d,   d = -t^k (n . u,k),   -thickness <= z <= 0 along the outward normal n,
 
@@ -10,17 +10,17 @@ per thickness at z and the change d = T u of the normal at each node of a facet,
     A + B T + (B T)^T + T^T D T,    A, B, D = int (1, z, z^2) K(z) dz
 
 (Reddy, Mechanics of Laminated Composite Plates and Shells (2004), chapter 3). The volume is meshed
-up to the surface with its own material, which is subtracted in K(z) and carries the normal stress:
-an effective boundary condition of first order in the thickness (Bovik, J Appl Mech 61:162 (1994)).
+up to the surface with its own material. K(z) subtracts that material, which carries the normal
+stress: an effective boundary condition of first order in the thickness (Bovik, J Appl Mech 61:162
+(1994)).
 
-The slope is not continuous between facets. The turn [d] of one facet against the next is bound by
-the interior penalty method (Engel et al., Comput Methods Appl Mech Eng 191:3669 (2002); Brenner and
-Sung, J Sci Comput 22:83 (2005)),
+The slope is discontinuous between facets. The interior penalty method (Engel et al., Comput Methods
+Appl Mech Eng 191:3669 (2002); Brenner and Sung, J Sci Comput 22:83 (2005)) penalises the jump [d],
 
     - int {m} [d] ds - (int {m} [d] ds)^T + int a [d] [d] ds,    m = n . int z s dz . n,
 
-of the bending moment m across the edge, with its normal n in the surface, the mean {} of both
-sides, and a penalty a. Rotary inertia is left out.
+with the bending moment m across the edge, the edge's normal n in the surface, the mean {} of both
+sides, and the penalty a. Rotary inertia is neglected.
 """
 
 from __future__ import annotations
@@ -31,28 +31,38 @@ import numpy as np
 from scipy import sparse
 
 from fem.boundary import owners
+from fem.combination import viscoelastic
 from fem.elements import TRIANGLE_EDGES, shape_derivatives, shape_functions, triangle_rule
 from fem.load_and_probe import facet_areas
-from fem.maxwell import Matrices, property_of, viscoelastic
+from fem.maxwell import Matrices, property_of
+from fem.sparsity import dofs_of, from_entries
 from fem.typing import Bools, Floats, Ints
 from meshes import TetMesh, facet_set
 from simple_model.layers.material import Material
 
 QUADRATIC = 6  # nodes of a facet
 STATIONS, STATION_WEIGHTS = np.polynomial.legendre.leggauss(2)  # through each layer, along edges
-# Penalty over D L / A, D the bending stiffness of a facet of area A and L its edge's length. From
-# this on the stiffness of a facet bounds its moments at three edges: int m^2 ds <= L/A int m^2 dA
-# of the constant moments of quadratic facets. More of it makes bending stiffer than it is, to
-# three times the error of a coat of 1 mm on elements of 3 mm; with 0.85 some modes are negative.
+# Penalty over D L / A, with bending stiffness D and area A of a facet and length L of its edge. It
+# is the least for which the stiffness of a facet bounds its moments at three edges: int m^2 ds <=
+# L/A int m^2 dA for the constant moments of quadratic facets. A larger penalty makes bending too
+# stiff; with 0.85 of this one some modes have negative stiffness.
 PENALTY = 3 / 4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Coat:
-    """Coat of thin layers just below the surface of a mesh, in place of the material there:
-    materials and thicknesses in metre from the surface downwards, on facets, a set's name or nodes
-    (e, a). Layers that do not match or thicknesses that are not finite and above 0 raise a
-    ValueError.
+    """Thin layers just below the surface of a mesh, in place of the material there.
+
+    Parameters
+    ----------
+    materials : materials of the layers, from the surface downwards
+    thicknesses : thicknesses of the layers in metres, finite and above 0
+    facets : name of a facet set, or nodes (e, a)
+
+    Raises
+    ------
+    ValueError
+        If there are no layers, or numbers of materials and thicknesses differ.
     """
 
     materials: tuple[Material, ...]
@@ -63,17 +73,17 @@ class Coat:
         if not self.materials or len(self.materials) != len(self.thicknesses):
             raise ValueError(
                 f"a coat has {len(self.materials)} materials and {len(self.thicknesses)} "
-                "thicknesses; give as many of each, one or more, from the surface downwards"
+                "thicknesses; give one thickness for each material, at least one"
             )
         if not all(0 < thickness < np.inf for thickness in self.thicknesses):
             raise ValueError(
-                f"thicknesses of a coat are {self.thicknesses} m; each must be finite and above 0"
+                f"a coat has thicknesses {self.thicknesses} m; give finite numbers above 0"
             )
 
     @property
     def stations(self) -> tuple[Floats, Floats, Ints]:
-        """Gauss points through the layers: heights z (s,) and weights (s,) in metre, and the layer
-        (s,) of each.
+        """Gauss points through the layers: heights z (s,) and weights (s,) in metres, and the
+        layer (s,) of each.
         """
         t = np.array(self.thicknesses)
         middles = t / 2 - np.cumsum(t)
@@ -83,9 +93,8 @@ class Coat:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Surface:
-    """Surface of a coat: `nodes` (n,) of the mesh and `facets` (e, a) among them, with the `points`
-    (e, a, i) and unit `normals` (e, a, i) of each facet at its nodes, its operator `turn`
-    (e, 3 a, 3 a), T, and its `edges`.
+    """Surface of a coat: `nodes` (n,) of the mesh; `facets` (e, a), which number these nodes; their
+    `points` and unit `normals` (e, a, i); the operator T, `turn` (e, 3 a, 3 a); and the `edges`.
     """
 
     nodes: Ints
@@ -98,11 +107,10 @@ class Surface:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Edges:
-    """Edges across which a coat bends, from each side h: the `facet` (h,) and the number of the
-    `edge` (h,); at points q of it, the same from both sides, the `slopes` (h, q, a, d) of the shape
-    functions, unit `conormals` (h, q, i) out of the facet, `lengths` (h, q) in metre and the turn
-    `outwards` (h, q, 3 a) of the facet's normal; `sides` (h,) is 2 where a mirror image is the
-    other side, else 1.
+    """Edges across which a coat bends, one entry per side h: the `facet` (h,) and number of the
+    `edge` (h,). At points q, the same for both sides: the `slopes` (h, q, a, d) of the shape
+    functions, unit `conormals` (h, q, i) out of the facet, `lengths` (h, q) in metres, and the
+    rotation `outwards` (h, q, 3 a) of the normal. `sides` (h,) is 2 at a plane of symmetry, else 1.
     """
 
     facet: Ints
@@ -115,14 +123,14 @@ class Edges:
 
 
 def surface_of(mesh: TetMesh, coat: Coat, fixed: Bools) -> Surface:
-    """Surface of a coat on ten-node tetrahedra, whose normals do not turn at a border that is fixed
-    in the direction across it, by the fixed dofs (3 n,). Linear facets raise a ValueError.
+    """Return the surface of a coat on ten-node tetrahedra. Its normals do not turn at a border
+    where `fixed` (3 n,) holds the direction across it.
     """
     of_mesh = facet_set(mesh, coat.facets)
     if of_mesh.shape[1] != QUADRATIC:
         raise ValueError(
-            f"facets of a coat have {of_mesh.shape[1]} nodes, and bend with {QUADRATIC}; make the "
-            "mesh with order=2"
+            f"facets of a coat have {of_mesh.shape[1]} nodes and need {QUADRATIC}; make the mesh "
+            "with order=2"
         )
     nodes, facets = np.unique(of_mesh, return_inverse=True)
     facets, points = facets.reshape(of_mesh.shape), mesh.points[of_mesh]
@@ -139,17 +147,17 @@ def surface_of(mesh: TetMesh, coat: Coat, fixed: Bools) -> Surface:
 
 
 def _frames(points: Floats, slopes: Floats) -> tuple[Floats, Floats]:
-    """Tangents (e, q, d, i) and unit normals (e, q, i) where shape functions have the slopes
-    (e, q, a, d), of facets with nodes at points (e, a, i).
+    """Return tangents (e, q, d, i) and unit normals (e, q, i) of facets with nodes at points
+    (e, a, i), where their shape functions have slopes (e, q, a, d).
     """
     tangents = np.einsum("eqad,eai->eqdi", slopes, points)
     normals = np.cross(tangents[:, :, 0], tangents[:, :, 1])
     return tangents, normals / np.linalg.norm(normals, axis=2, keepdims=True)
 
 
-def _edges(facets: Ints, points: Floats, held: Bools) -> Edges:
-    """Edges of facets (e, a) with nodes at points (e, a, i), of which components (e, a, i) are
-    held: all but the free border.
+def _edges(facets: Ints, points: Floats, fixed: Bools) -> Edges:
+    """Return all edges but the free border of facets (e, a) with nodes at points (e, a, i) and
+    fixed components (e, a, i).
     """
     ends = facets[:, TRIANGLE_EDGES].reshape(-1, 2)
     _, edge, sides = np.unique(
@@ -157,7 +165,7 @@ def _edges(facets: Ints, points: Floats, held: Bools) -> Edges:
     )
     edge = edge.ravel()
     facet, k = np.divmod(np.arange(len(ends)), 3)
-    # From the end with the lower number to the other, so that both sides have the same points.
+    # From the end with the lower number to the other, so that both sides use the same points.
     s = np.where((ends[:, 0] < ends[:, 1])[:, None], STATIONS, -STATIONS)[..., None]
     start, end = np.eye(3)[TRIANGLE_EDGES[k]].swapaxes(0, 1)[:, :, None]
     at = ((1 - s) * start + (1 + s) * end) / 2
@@ -171,7 +179,7 @@ def _edges(facets: Ints, points: Floats, held: Bools) -> Edges:
     border = sides[edge] == 1
     across = np.abs(conormals).sum(axis=1).argmax(axis=1)
     of_edge = np.c_[TRIANGLE_EDGES, 3 + np.arange(3)][k]
-    mirrored = border & held[facet[:, None], of_edge, across[:, None]].all(axis=1)
+    mirrored = border & fixed[facet[:, None], of_edge, across[:, None]].all(axis=1)
     kept = mirrored | ~border
     return Edges(
         facet=facet[kept], edge=np.unique(edge[kept], return_inverse=True)[1],
@@ -183,8 +191,8 @@ def _edges(facets: Ints, points: Floats, held: Bools) -> Edges:
 
 
 def coat_stiffness(surface: Surface, coat: Coat, mu: Floats, lam: Floats) -> sparse.csr_array:
-    """Stiffness (3 n, 3 n) in N/m of a coat on a surface of n nodes, by Lame's parameters (layers,
-    e) in Pa, of plane stress, less those of the material that it replaces.
+    """Return the stiffness (3 n, 3 n) in N/m of a coat for Lame's parameters of plane stress
+    (layers, e) in Pa, minus those of the replaced material.
     """
     T, local = surface.turn, np.zeros_like(surface.turn)
     for z, weight, layer in zip(*coat.stations, strict=True):
@@ -197,9 +205,7 @@ def coat_stiffness(surface: Surface, coat: Coat, mu: Floats, lam: Floats) -> spa
 
 
 def _edge_stiffness(surface: Surface, coat: Coat, mu: Floats, lam: Floats) -> sparse.csr_array:
-    """Stiffness (3 n, 3 n) of the edges of a coat, by the jump [d] and the mean moment {m} at
-    points of each, in rows.
-    """
+    """Return the stiffness (3 n, 3 n) of the edges: the jump [d] and mean moment {m} at points."""
     edges, points = surface.edges, len(STATIONS)
     moment, bending = _moments(surface, coat, mu, lam)
     corners = surface.points[edges.facet, :3]
@@ -209,15 +215,13 @@ def _edge_stiffness(surface: Surface, coat: Coat, mu: Floats, lam: Floats) -> sp
     lengths[edges.edge] = edges.lengths / edges.sides[:, None]
     weights = lengths * np.bincount(edges.edge, penalty, len(lengths))[:, None]
 
-    dofs = _dofs(surface.facets[edges.facet]).reshape(len(edges.facet), 1, -1)
+    dofs = dofs_of(surface.facets[edges.facet]).reshape(len(edges.facet), 1, -1)
     rows = points * edges.edge[:, None, None] + np.arange(points)[:, None]
-    size = np.broadcast_shapes(dofs.shape, rows.shape)
-    at = [np.broadcast_to(x, size).astype(np.int32).ravel() for x in (rows, dofs)]
 
     def of_both(values: Floats) -> sparse.csr_array:
-        """Sum (edges q, 3 n) of values (h, q, 3 a) of both sides."""
-        whole = (edges.sides[:, None, None] * values).ravel()
-        return sparse.csr_array((whole, at), shape=(lengths.size, 3 * len(surface.nodes)))
+        """Return the sum (edges q, 3 n) of values (h, q, 3 a) over both sides."""
+        whole = edges.sides[:, None, None] * values
+        return from_entries(whole, rows, dofs, (lengths.size, 3 * len(surface.nodes)))
 
     jump, mean = of_both(edges.outwards), of_both(moment / 2)
     work = jump.T @ mean.multiply(lengths.reshape(-1, 1))
@@ -225,7 +229,7 @@ def _edge_stiffness(surface: Surface, coat: Coat, mu: Floats, lam: Floats) -> sp
 
 
 def _moments(surface: Surface, coat: Coat, mu: Floats, lam: Floats) -> tuple[Floats, Floats]:
-    """Bending moments across edges (h, q, 3 a), newton per displacement, and bending stiffnesses
+    """Return bending moments across edges (h, q, 3 a) per displacement, and bending stiffnesses
     (h,) in N m, from each side.
     """
     edges, facet = surface.edges, surface.edges.facet
@@ -235,7 +239,7 @@ def _moments(surface: Surface, coat: Coat, mu: Floats, lam: Floats) -> tuple[Flo
         tangents, _ = _frames(points, edges.slopes)
         dual = np.linalg.pinv(tangents)
         gradient = np.einsum("hqid,hqad->hqai", dual, edges.slopes)
-        # In the tangent plane there, so that a rotation strains nothing.
+        # In the tangent plane there, so that a rotation makes no strain.
         across = np.einsum("hqi,hqid,hqdj->hqj", edges.conormals, dual, tangents)
         gradient_across = np.einsum("hqai,hqi->hqa", gradient, across)[..., None]
         two_mu, lam_there = 2 * mu[layer, facet], lam[layer, facet]
@@ -248,8 +252,8 @@ def _moments(surface: Surface, coat: Coat, mu: Floats, lam: Floats) -> tuple[Flo
 
 
 def membrane_stiffness(points: Floats, mu: Floats, lam: Floats) -> Floats:
-    """Stiffness (e, 3 a, 3 a) in Pa, N/m per thickness, of curved membranes with nodes at points
-    (e, a, 3), by Lame's parameters (e,) of plane stress.
+    """Return the stiffness (e, 3 a, 3 a) per thickness, in Pa, of curved membranes with nodes at
+    points (e, a, 3) and Lame's parameters (e,) of plane stress.
 
         K_ai,bj = int lam A_ai A_bj + mu (A_aj A_bi + G_ka G_kb F_ki F_kj) dA,  A_ai = G_ka F_ki
 
@@ -272,8 +276,8 @@ def membrane_stiffness(points: Floats, mu: Floats, lam: Floats) -> Floats:
 
 
 def coat_mass(surface: Surface, coat: Coat, density: Floats) -> sparse.csr_array:
-    """Mass (3 n, 3 n) in kg of a coat, int rho N_a N_b dA dz, by the density (layers, e), less that
-    of the material that it replaces.
+    """Return the mass (3 n, 3 n) in kg of a coat, int rho N_a N_b dA dz, for densities (layers, e)
+    minus those of the replaced material.
     """
     facets = surface.facets
     N = shape_functions(triangle_rule()[0], facets.shape[1])
@@ -292,17 +296,18 @@ def coat_operators(
     region: Ints,
     fixed: Bools,
 ) -> Matrices:
-    """Contribution of a coat to K, C, M and the branches of a body of materials, by the index (m,)
-    of each element's, on all dofs of its mesh, of which some (3 n,) are fixed.
+    """Return what a coat adds to K, C, M and the branches of a body, on all dofs of its mesh.
+
+    `region` (m,) has the index of each element's material, `fixed` (3 n,) the fixed dofs.
     """
     surface, layers = surface_of(mesh, coat, fixed), len(coat.materials)
     behind = region[owners(mesh, facet_set(mesh, coat.facets))]
-    all_of_them = [*(m.without_loss_factor() for m in coat.materials), *materials]
-    mu, lam = (property_of(all_of_them, name) for name in ("shear_modulus", "first_lame"))
+    both = [*(m.without_loss_factor() for m in coat.materials), *materials]
+    mu, lam = (property_of(both, name) for name in ("shear_modulus", "first_lame"))
     lam = 2 * lam * mu / (lam + 2 * mu)
 
     def excess(values: Floats) -> Floats:
-        """Values (layers, e) of the coat, less those of the material that it replaces."""
+        """Return values (layers, e) of the coat minus those of the replaced material."""
         return values[:layers, None] - values[layers:][behind]
 
     def stiffness(share: Floats) -> sparse.csr_array:
@@ -312,25 +317,19 @@ def coat_operators(
     def mass(density: Floats) -> sparse.csr_array:
         return _on_mesh(surface, coat_mass(surface, coat, excess(density)), mesh.n_dofs)
 
-    return viscoelastic(all_of_them, stiffness, mass)
+    K, C, M, branches, _ = viscoelastic(both, stiffness, mass)
+    return K, C, M, branches
 
 
 def _on_mesh(surface: Surface, operator: sparse.csr_array, n_dofs: int) -> sparse.csr_array:
-    """An operator (3 n, 3 n) of a surface on the dofs of the whole mesh."""
-    dofs = _dofs(surface.nodes).ravel()
+    """Return an operator (3 n, 3 n) of a surface on the dofs of the whole mesh."""
+    dofs = dofs_of(surface.nodes).ravel()
     part = operator.tocoo()
-    return sparse.csr_array((part.data, (dofs[part.row], dofs[part.col])), shape=(n_dofs, n_dofs))
+    return from_entries(part.data, dofs[part.row], dofs[part.col], (n_dofs, n_dofs))
 
 
 def _summed(local: Floats, facets: Ints, n: int) -> sparse.csr_array:
-    """Sum (3 n, 3 n) of matrices (e, a, i, b, j) of facets (e, a) among n nodes."""
-    dofs = _dofs(facets).reshape(len(facets), -1)
-    size = (*dofs.shape, dofs.shape[1])
-    rows, columns = np.broadcast_to(dofs[:, :, None], size), np.broadcast_to(dofs[:, None], size)
-    return sparse.csr_array((local.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * n, 3 * n))
-
-
-def _dofs(nodes: Ints) -> Ints:
-    """Dofs (..., 3) of nodes (...), of a type that keeps the indices of matrices small."""
-    first = 3 * nodes[..., None].astype(np.int32)
-    return np.asarray(first + np.arange(3, dtype=np.int32), np.int32)
+    """Return the sum (3 n, 3 n) of matrices (e, a, i, b, j) of facets (e, a) among n nodes."""
+    dofs = dofs_of(facets).reshape(len(facets), -1)
+    local = local.reshape(*dofs.shape, dofs.shape[1])
+    return from_entries(local, dofs[:, :, None], dofs[:, None], (3 * n, 3 * n))

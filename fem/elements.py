@@ -1,7 +1,7 @@
 """Lagrange shape functions and quadrature on triangles and tetrahedra.
 
-Both are written in barycentric coordinates, so that one formula serves both shapes: the
-quadratic functions are L_a (2 L_a - 1) at the corners and 4 L_a L_b at the mid-sides.
+Both use barycentric coordinates, so one formula serves both shapes: the quadratic functions are
+L_a (2 L_a - 1) at the corners and 4 L_a L_b at the mid-sides.
 """
 
 from functools import cache
@@ -16,7 +16,9 @@ TRIANGLE_EDGES = np.array([[0, 1], [1, 2], [2, 0]])
 
 
 def shape_functions(barycentric: Floats, n_nodes: int) -> Floats:
-    """Values (q, n_nodes) at barycentric points (q, 3) of triangles or (q, 4) of tetrahedra."""
+    """Return values (q, n_nodes) at barycentric points (q, 3) of triangles or (q, 4) of
+    tetrahedra.
+    """
     corners = barycentric.shape[1]
     if n_nodes == corners:
         return barycentric
@@ -26,7 +28,7 @@ def shape_functions(barycentric: Floats, n_nodes: int) -> Floats:
 
 
 def shape_derivatives(barycentric: Floats, n_nodes: int) -> Floats:
-    """Derivatives (q, n_nodes, d) along the edges from corner 0 to each other corner."""
+    """Return derivatives (q, n_nodes, d) along the edges from corner 0 to the other corners."""
     points, corners = barycentric.shape
     by_coordinate = np.zeros((points, n_nodes, corners))
     if n_nodes == corners:
@@ -42,7 +44,7 @@ def shape_derivatives(barycentric: Floats, n_nodes: int) -> Floats:
 
 @cache
 def tetrahedron_rule(degree: int) -> tuple[Floats, Floats]:
-    """Barycentric points (q, 4) and weights (q,) summing to 1, exact to `degree` (2 or 5).
+    """Return barycentric points (q, 4) and weights (q,) summing to 1, exact to `degree` (2 or 5).
 
     Degree 5 is the 14-point rule of Walkington, Quadrature on Simplices of Arbitrary Dimension
     (Carnegie Mellon University, 2000), all of whose weights are positive.
@@ -58,7 +60,7 @@ def tetrahedron_rule(degree: int) -> tuple[Floats, Floats]:
 
 @cache
 def triangle_rule(degree: int = 4) -> tuple[Floats, Floats]:
-    """Barycentric points (q, 3) and weights (q,) summing to 1, exact to `degree` (2 or 4).
+    """Return barycentric points (q, 3) and weights (q,) summing to 1, exact to `degree` (2 or 4).
 
     Three points and six: Dunavant, Int J Numer Methods Eng 21:1129 (1985).
     """
@@ -75,7 +77,7 @@ def _edges(corners: int) -> Ints:
 
 
 def _orbits(*orbits: tuple[float, list[float]]) -> tuple[Floats, Floats]:
-    """Every distinct permutation of each point; its last coordinate makes the sum 1."""
+    """Return all distinct permutations of each point, completed to the sum 1, and weights."""
     points: list[tuple[float, ...]] = []
     weights: list[float] = []
     for weight, leading in orbits:
@@ -85,6 +87,6 @@ def _orbits(*orbits: tuple[float, list[float]]) -> tuple[Floats, Floats]:
         points += distinct.values()
         weights += [weight] * len(distinct)
     rule = np.array(points), np.array(weights) / sum(weights)
-    for shared in rule:
-        shared.setflags(write=False)
+    for array in rule:
+        array.setflags(write=False)
     return rule

@@ -1,13 +1,13 @@
-"""Total Lagrangian finite strain: tetrahedra, and a membrane stretched among their nodes.
+"""Total Lagrangian finite strain: tetrahedra, and a membrane between their nodes.
 
     F_ki = T_ki + G_ka u_ai,  E = (F F^T - 1) / 2,  S = lam tr(E) 1 + 2 mu E
     f_ai = int G_ka S_kl F_li dV,  W = int (lam tr(E)^2 / 2 + mu E : E) dV
 
 The material is St. Venant-Kirchhoff: Bonet and Wood, Nonlinear Continuum Mechanics for Finite
-Element Analysis (1997), chapters 5 and 7. Rows k, l of F are directions at rest, of which a solid
-has three and a horizontal membrane two; T are the first rows of the unit matrix. Gradients are at
-four points of a tetrahedron and three of a triangle. Orthotropic sheets add (Q - Q_iso) to the in-
-plane stress, and tension its forces on the normal displacement, as in `plane_stiffness`.
+Element Analysis (1997), chapters 5 and 7. Rows k, l of F are directions at rest: three for a solid,
+two for a horizontal membrane. T are the first rows of the unit matrix. Gradients are at four points
+of a tetrahedron and three of a triangle. Orthotropic sheets add (Q - Q_iso) to the in-plane stress,
+and tension adds forces on the normal displacement, as in `plane_stiffness`.
 """
 
 from __future__ import annotations
@@ -23,20 +23,25 @@ from fem.assembly import assemble, by_region
 from fem.elements import shape_derivatives, triangle_rule
 from fem.energy import Elastic, Relaxing
 from fem.geometry import gradients, shape_nodes
-from fem.maxwell import MaxwellBranch
+from fem.maxwell import MaxwellBranch, relaxation_of
 from fem.plane_stiffness import SIDES, Tension, directional_parts, tension_stiffness
-from fem.sparsity import UPPER, SparsityPattern, restricted, slabs
+from fem.sparsity import UPPER, SparsityPattern, from_entries, restricted, slabs
 from fem.typing import Floats, Ints
 from meshes import MeshError, TetMesh
 from simple_model.layers.material import Material
 
-LARGEST_POISSON = 0.45  # beyond it the linear code projects the dilatation, which this one does not
+LARGEST_POISSON = 0.45  # beyond it elements lock, as their dilatation is not projected here
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Membrane:
-    """A horizontal membrane without bending stiffness and without mass: triangles (k, 3 or 6) of
-    nodes of the tetrahedral mesh, corners first, of a thickness in metre.
+    """Horizontal membrane without bending stiffness or mass.
+
+    Parameters
+    ----------
+    triangles : (k, 3) or (k, 6) int, nodes of the tetrahedral mesh, corners first
+    thickness : m
+    material : Material
     """
 
     triangles: Ints
@@ -48,7 +53,7 @@ class Membrane:
 class Part:
     """Elements of one kind: nodes (e, a), gradients G (e, q, k, a) and volumes (e, q) at the
     quadrature points, Lame's parameters lam and mu (e,), and D (e q k, n) with D u = G_ka u_a.
-    `along` (e, 3, 3) in Pa is what orthotropy adds for the strains xx, yy and 2 xy, or None.
+    `orthotropic` (e, 3, 3) in Pa adds stiffness for the strains xx, yy and 2 xy, or is None.
     """
 
     nodes: Ints
@@ -59,14 +64,13 @@ class Part:
     D: sparse.csr_array
     D_transposed: sparse.csr_array
     pattern: SparsityPattern
-    along: Floats | None = None
+    orthotropic: Floats | None = None
 
     @staticmethod
     def of(nodes: Ints, G: Floats, volume: Floats, lam: Floats, mu: Floats, n: int) -> Part:
-        """The part of a mesh of n nodes."""
-        rows = np.arange(G[..., 0].size).repeat(nodes.shape[1])
-        columns = np.broadcast_to(nodes[:, None, None, :], G.shape).ravel()
-        D = sparse.csr_array((G.ravel(), (rows, columns)), shape=(G[..., 0].size, n))
+        """Return the part of a mesh of n nodes."""
+        rows = np.arange(G[..., 0].size).reshape(*G.shape[:-1], 1)
+        D = from_entries(G, rows, nodes[:, None, None], (G[..., 0].size, n))
         return Part(
             nodes=nodes, G=G, volume=volume, lam=lam, mu=mu, D=D,
             D_transposed=D.T.tocsr(), pattern=SparsityPattern.of(nodes, n),
@@ -81,95 +85,100 @@ def finite_strain(
     membrane: Membrane | None = None,
     tension: Tension | None = None,
 ) -> Elastic:
-    """Hyperelastic body at large displacement, of tetrahedra and a membrane if there is one.
+    """Return a hyperelastic body of tetrahedra, with or without a membrane, at large displacement.
 
     Mass, damping and Maxwell branches of the tetrahedra are those of `assemble`, linear and
     constant, which holds for small rotations. In a membrane the viscous stress follows the rate of
-    E, and branches are stretched by E.
+    E, and the branches are stretched by E.
 
     Parameters
     ----------
-    mesh, material, fixed : as for `assemble`
-    membrane : Membrane among the nodes of the mesh, or None
+    mesh, material, fixed : see `assemble`
+    membrane : Membrane between the nodes of the mesh, or None
     tension : in-plane tension at rest of a horizontal sheet along x and y, or None
 
     Returns
     -------
     Elastic
-        Forces in N and their tangent in N/m on the 3 n degrees of freedom.
+        Forces in N and their tangent in N/m on the free degrees of freedom.
 
     Raises
     ------
     ValueError
-        If a Poisson's ratio is above `LARGEST_POISSON`, where these elements would lock, or a
-        material has a modulus law of its own; else as `assemble`.
+        If a Poisson's ratio exceeds `LARGEST_POISSON`, or a material has its own modulus law; and
+        the errors of `assemble`.
     """
     n = len(mesh.points)
-    solid = solid_part(mesh, material)
-    operators = assemble(mesh, material, fixed=fixed, tension=tension)
-    free = operators.free
+    parts = [solid_part(mesh, material)]
+    linear = assemble(mesh, material, fixed=fixed, tension=tension)
+    free, operators, relaxing = linear.free, linear, Elastic.linear(linear).relaxing
+    T = sparse.csr_array((len(free), len(free)))
+    if tension is not None:
+        T = restricted(tension_stiffness(mesh, parts[0].pattern, tension, SIDES), free)
 
     def spread(u: Floats) -> Floats:
         return operators.expand(u).reshape(n, 3)
 
-    T = sparse.csr_array((len(free), len(free)))
-    if tension is not None:
-        T = restricted(tension_stiffness(mesh, solid.pattern, tension, SIDES), free)
-    body = replace(
-        Elastic.linear(operators),
-        internal=lambda u: internal_force(solid, spread(u)).ravel()[free] + T @ u,
-        tangent=lambda u: restricted(tangent(solid, spread(u)), free) + T,
-        energy=lambda u: stored_energy(solid, spread(u)) + float(u @ (T @ u)) / 2,
-    )
-    if membrane is None:
-        return body
-    part, (lag, shares, times) = membrane_part(mesh, membrane), losses(membrane.material)
-    K = restricted(tangent(part, np.zeros((n, 3))), free)
-    at_rest = replace(
-        operators, K=operators.K + K, C=operators.C + lag * K, laws=None,
-        branches=(*operators.branches, *(
-            MaxwellBranch(K=x * K, time=time)
-            for x, time in zip(shares.tolist(), times.tolist(), strict=True)
-        )),
-    )  # fmt: skip
-    stretched = Relaxing(
-        times=times,
-        strain=lambda u: deformation(part, spread(u))[1],
-        force=lambda u, d: stress_force(part, spread(u), np.tensordot(shares, d, 1)).ravel()[free],
-        tangent=lambda u, x: shares @ x * restricted(tangent(part, spread(u)), free),
-        energy=lambda d: shares * np.array([strain_energy(part, e) for e in d]),
-    )
+    def viscous(u: Floats, v: Floats) -> Floats:
+        return linear.C @ v
+
+    if membrane is not None:
+        part, (lag, times, shares) = membrane_part(mesh, membrane), losses(membrane.material)
+        parts.append(part)
+        K = restricted(tangent(part, np.zeros((n, 3))), free)
+        branches = (
+            MaxwellBranch(K=share * K, time=time)
+            for share, time in zip(shares.tolist(), times.tolist(), strict=True)
+        )
+        operators = replace(
+            linear, K=linear.K + K, C=linear.C + lag * K, laws=None,
+            branches=(*linear.branches, *branches),
+        )  # fmt: skip
+        stretched = Relaxing(
+            times=times,
+            strain=lambda u: deformation(part, spread(u))[1],
+            force=lambda u, d: stress_force(part, spread(u), np.tensordot(shares, d, 1)).ravel()[
+                free
+            ],
+            tangent=lambda u, x: shares @ x * restricted(tangent(part, spread(u)), free),
+            energy=lambda d: shares * np.array([strain_energy(part, e) for e in d]),
+        )
+        relaxing = (*relaxing, stretched) if len(times) else relaxing
+
+        def viscous(u: Floats, v: Floats) -> Floats:
+            return linear.C @ v + lag * rate_force(part, spread(u), spread(v)).ravel()[free]
+
     return Elastic(
-        operators=at_rest,
-        internal=lambda u: body.internal(u) + internal_force(part, spread(u)).ravel()[free],
-        tangent=lambda u: body.tangent(u) + restricted(tangent(part, spread(u)), free),
-        viscous=lambda u, v: (
-            body.viscous(u, v) + lag * rate_force(part, spread(u), spread(v)).ravel()[free]
+        operators=operators,
+        internal=lambda u: sum(
+            (internal_force(part, spread(u)).ravel()[free] for part in parts), start=T @ u
         ),
-        energy=lambda u: body.energy(u) + stored_energy(part, spread(u)),
-        relaxing=(*body.relaxing, stretched) if len(times) else body.relaxing,
+        tangent=lambda u: sum((restricted(tangent(part, spread(u)), free) for part in parts), T),
+        viscous=viscous,
+        energy=lambda u: sum(
+            (stored_energy(part, spread(u)) for part in parts), start=float(u @ (T @ u)) / 2
+        ),
+        relaxing=relaxing,
     )
 
 
 def losses(material: Material) -> tuple[float, Floats, Floats]:
-    """Viscosity in s and moduli (j,) of Maxwell branches over the modulus at rest; times (j,) in s
-    of the branches.
+    """Return the viscosity in s of a material over its modulus at rest, and the times (j,) in s and
+    relative moduli (j,) of its Maxwell branches.
     """
-    solid = material.without_loss_factor()
-    mu = solid.shear_modulus
-    shares = np.array([term.modulus / mu for term in solid.prony])
-    return solid.viscosity / mu, shares, np.array([term.time for term in solid.prony])
+    lag, times, shares = relaxation_of([material.without_loss_factor()])
+    return float(lag[0]), times, shares[:, 0]
 
 
 def solid_part(mesh: TetMesh, material: Material | Mapping[int, Material]) -> Part:
-    """The tetrahedra of a mesh."""
+    """Return the tetrahedra of a mesh."""
     given, region = by_region(mesh, material)
     materials = [m.without_loss_factor() for m in given]
     for m in materials:
         if m.poisson > LARGEST_POISSON:
             raise ValueError(
-                f"poisson = {m.poisson} exceeds {LARGEST_POISSON}, the limit of large "
-                "displacement, where these elements would lock; use the linear fem for it"
+                f"poisson is {m.poisson}, but elements at large displacement lock above "
+                f"{LARGEST_POISSON}; use the linear model fem"
             )
     lam, mu = np.array([(m.first_lame, m.shear_modulus) for m in materials])[region].T
     G, volume = gradients(shape_nodes(mesh), mesh.tets.shape[1], 2, 0)
@@ -178,17 +187,17 @@ def solid_part(mesh: TetMesh, material: Material | Mapping[int, Material]) -> Pa
 
 
 def _with_orthotropy(part: Part, materials: list[Material], region: Ints) -> Part:
-    """The part with what the orthotropy of its materials, by their index (e,), adds."""
+    """Add the orthotropy of materials with index (e,) to a part."""
     added = directional_parts(materials)
     if not added:
         return part
     each = np.array([added.get(m, np.zeros((3, 3))) for m in range(len(materials))])
-    return replace(part, along=each[region])
+    return replace(part, orthotropic=each[region])
 
 
 def membrane_part(mesh: TetMesh, membrane: Membrane) -> Part:
-    """Triangles of a membrane in plane stress, lam = 2 lam mu / (lam + 2 mu), which must lie in one
-    horizontal plane, seen anticlockwise from above, or raise a MeshError.
+    """Return the triangles of a membrane in plane stress, lam = 2 lam mu / (lam + 2 mu). Raises a
+    MeshError unless they lie in one horizontal plane, anticlockwise from above.
     """
     nodes, m = membrane.triangles, membrane.material.without_loss_factor()
     corners = mesh.points[nodes[:, :3]]
@@ -196,8 +205,8 @@ def membrane_part(mesh: TetMesh, membrane: Membrane) -> Part:
     area = np.linalg.det(edges) / 2
     if np.ptp(corners[..., 2]) > 1e-9 * np.abs(edges).max() or (area <= 0).any():
         raise MeshError(
-            "a membrane's triangles must lie in one horizontal plane, seen anticlockwise from "
-            "above; take those of meshes.middle_plane"
+            "the triangles of a membrane must lie in one horizontal plane, anticlockwise seen from "
+            "above; use those of meshes.middle_plane"
         )
     barycentric, weights = triangle_rule(2)
     derivatives = shape_derivatives(barycentric, nodes.shape[1])
@@ -210,18 +219,20 @@ def membrane_part(mesh: TetMesh, membrane: Membrane) -> Part:
 
 
 def internal_force(part: Part, u: Floats) -> Floats:
-    """Internal nodal forces (n, 3) in N of a part at the displacement u (n, 3) in metre."""
+    """Return internal nodal forces (n, 3) in N at the displacement u (n, 3) in metres."""
     F, E = deformation(part, u)
     return spread_stress(part, stress(part, E) @ F)
 
 
 def stress_force(part: Part, u: Floats, strain: Floats) -> Floats:
-    """Nodal forces (n, 3) in N of the stress of a strain (e, q, k, l), at displacements (n, 3)."""
+    """Return nodal forces (n, 3) in N of the stress of a strain (e, q, k, l), at displacements
+    (n, 3).
+    """
     return spread_stress(part, stress(part, strain) @ deformation(part, u)[0])
 
 
 def rate_force(part: Part, u: Floats, v: Floats) -> Floats:
-    """Rate (n, 3) in N/s of nodal forces, of the stress of the rate of E, at a displacement and a
+    """Return nodal forces (n, 3) in N/s of the stress of the rate of E, at a displacement and a
     velocity (n, 3).
     """
     F = deformation(part, u)[0]
@@ -230,41 +241,35 @@ def rate_force(part: Part, u: Floats, v: Floats) -> Floats:
 
 
 def stored_energy(part: Part, u: Floats) -> float:
-    """Strain energy in J of a part at the displacement u (n, 3) in metre."""
+    """Return the strain energy in J at the displacement u (n, 3) in metres."""
     return strain_energy(part, deformation(part, u)[1])
 
 
 def strain_energy(part: Part, E: Floats) -> float:
-    """Energy in J of a part at the strain E (e, q, k, l)."""
+    """Return the energy in J of the strain E (e, q, k, l)."""
     return float((part.volume[..., None, None] * stress(part, E) * E).sum() / 2)
 
 
 def deformation(part: Part, u: Floats) -> tuple[Floats, Floats]:
-    """Deformation gradient F (e, q, k, i) and Green-Lagrange strain E (e, q, k, l), exact at small
-    u.
+    """Return the deformation gradient F (e, q, k, i) and the Green-Lagrange strain E (e, q, k, l),
+    without cancellation at small u.
     """
     H = (part.D @ u).reshape(*part.G.shape[:3], 3)
     k = H.shape[2]
-    E = quadratic_strain(H, H)
+    E = H @ H.swapaxes(2, 3) / 2
     E += (H[..., :k] + H[..., :k].swapaxes(2, 3)) / 2
     return H + np.eye(3)[:k], E
 
 
-def quadratic_strain(H: Floats, other: Floats) -> Floats:
-    """Quadratic part sym(H other^T) / 2 (e, q, k, l) of the Green-Lagrange strain."""
-    product = H @ other.swapaxes(2, 3)
-    return (product + product.swapaxes(2, 3)) / 4
-
-
 def stress(part: Part, E: Floats) -> Floats:
-    """Second Piola-Kirchhoff stress (e, q, k, l) in Pa."""
+    """Return the second Piola-Kirchhoff stress (e, q, k, l) in Pa of the strain E."""
     S = 2 * part.mu[:, None, None, None] * E
     pressure = part.lam[:, None] * np.trace(E, axis1=2, axis2=3)
     for k in range(E.shape[2]):
         S[..., k, k] += pressure
-    if part.along is not None:
+    if part.orthotropic is not None:
         strains = np.stack([E[..., 0, 0], E[..., 1, 1], 2 * E[..., 0, 1]], axis=-1)
-        xx, yy, xy = np.moveaxis(np.einsum("evw,eqw->eqv", part.along, strains), -1, 0)
+        xx, yy, xy = np.moveaxis(np.einsum("evw,eqw->eqv", part.orthotropic, strains), -1, 0)
         S[..., 0, 0] += xx
         S[..., 1, 1] += yy
         S[..., 0, 1] += xy
@@ -273,12 +278,12 @@ def stress(part: Part, E: Floats) -> Floats:
 
 
 def spread_stress(part: Part, P: Floats) -> Floats:
-    """Nodal forces (n, 3) of a stress P (e, q, k, i): int G_ka P_ki dV."""
+    """Return nodal forces (n, 3) of a stress P (e, q, k, i): int G_ka P_ki dV."""
     return part.D_transposed @ (part.volume[..., None, None] * P).reshape(-1, P.shape[3])
 
 
 def tangent(part: Part, u: Floats) -> sparse.bsr_array:
-    """Consistent tangent d internal_force / d u (3 n, 3 n) in N/m, symmetric.
+    """Return the consistent tangent d internal_force / d u (3 n, 3 n) in N/m, symmetric.
 
     K_ab,ij = int lam A_ai A_bj + mu (A_aj A_bi + G_ka G_kb F_li F_lj) + delta_ij G_ka S_kl G_lb,
     A_ai = G_ka F_ki
@@ -292,7 +297,7 @@ def tangent(part: Part, u: Floats) -> sparse.bsr_array:
 
 
 def tangent_blocks(part: Part, slab: slice, F: Floats, S: Floats) -> Floats:
-    """Element blocks (6, e, a, b) in N/m of the tangent of a slab of elements, by their deformation
+    """Return blocks (6, e, a, b) in N/m of the tangent of a slab of elements with deformation
     gradient F (e, q, k, i) and stress S (e, q, k, l).
     """
     V, G = part.volume[slab, :, None, None], part.G[slab]
@@ -302,7 +307,7 @@ def tangent_blocks(part: Part, slab: slice, F: Floats, S: Floats) -> Floats:
     stretch = part.mu[slab, None, None, None] * (F.swapaxes(2, 3) @ F)
     geometric = (V * (G_transposed @ (S @ G))).sum(axis=1)
     lam, mu = part.lam[slab, None, None], part.mu[slab, None, None]
-    along = None if part.along is None else part.along[slab]
+    added = None if part.orthotropic is None else part.orthotropic[slab]
     blocks = np.empty((6, *geometric.shape))
     for block, (i, j) in zip(blocks, UPPER, strict=True):
         across = np.einsum("eqa,eqb->eab", V[..., 0] * A[..., i], A[..., j], optimize=True)
@@ -310,15 +315,15 @@ def tangent_blocks(part: Part, slab: slice, F: Floats, S: Floats) -> Floats:
         block += np.einsum("eqab,eq->eab", slopes, stretch[..., i, j])
         if i == j:
             block += geometric
-        if along is not None:
+        if added is not None:
             one, other = (_plane_strains(G, F[..., c]) for c in (i, j))
-            block += np.einsum("eqva,evw,eqwb->eab", V * one, along, other, optimize=True)
+            block += np.einsum("eqva,evw,eqwb->eab", V * one, added, other, optimize=True)
     return blocks
 
 
 def _plane_strains(G: Floats, F: Floats) -> Floats:
-    """Rates (e, q, 3, a) of the strains xx, yy and 2 xy with one component of displacement, of
-    gradients (e, q, k, a) and that column (e, q, k) of the deformation gradient.
+    """Return derivatives (e, q, 3, a) of the strains xx, yy and 2 xy by one displacement component,
+    for gradients (e, q, k, a) and that column (e, q, k) of the deformation gradient.
     """
     (x, y), (along, across) = (np.moveaxis(G, 2, 0)[:2], np.moveaxis(F, 2, 0)[:2, ..., None])
     return np.stack([x * along, y * across, x * across + y * along], axis=2)
@@ -331,17 +336,16 @@ def shell_stiffness(
     *,
     meshed: float = 0.0,
 ) -> sparse.bsr_array:
-    """Membrane stiffness (3 n, 3 n) in N/m of a sheet that is a little curved at rest, a shallow
-    shell.
+    """Return the membrane stiffness (3 n, 3 n) in N/m of a shallow shell, a slightly curved sheet.
 
-    Of a middle surface that rises by z0(x, y) above its plane, the membrane strains are (Marguerre,
-    Proc 5th Int Congr Appl Mech (1938))
+    For a middle surface with height z0(x, y), the membrane strains are (Marguerre, Proc 5th Int
+    Congr Appl Mech (1938))
 
         e_kl = (u_k,l + u_l,k + z0_,k w_,l + z0_,l w_,k) / 2
 
-    those of a membrane whose deformation gradient at rest has the slopes of z0: `slopes` of points
-    (..., 2) along x and y, well below 1. The mesh stays flat; of its membrane, of the whole
-    stiffness, `meshed` is the part that the elements have, which is taken away.
+    those of a membrane whose deformation gradient at rest has the slopes of z0. `slopes` maps
+    points (..., 2) to slopes along x and y, well below 1. The mesh stays flat; `meshed` is the
+    fraction of the membrane stiffness that its elements have, which is subtracted.
     """
     part = membrane_part(mesh, membrane)
     corners = mesh.points[membrane.triangles[:, :3], :2]
@@ -351,7 +355,9 @@ def shell_stiffness(
     curved[..., 2] = slopes(at)
 
     def blocks(slab: slice) -> Floats:
-        found = (tangent_blocks(part, slab, F[slab], unstressed[slab]) for F in (curved, flat))
-        return next(found) - meshed * next(found)
+        bent, plane = (
+            tangent_blocks(part, slab, F[slab], unstressed[slab]) for F in (curved, flat)
+        )
+        return bent - meshed * plane
 
     return part.pattern.blocks((slab, blocks(slab)) for slab in slabs(len(part.nodes)))

@@ -1,4 +1,4 @@
-"""The map from the reference element to the elements of a mesh."""
+"""Map from the reference element to the elements of a mesh."""
 
 from collections.abc import Callable, Iterator
 
@@ -12,10 +12,10 @@ from meshes.tetmesh import EDGES
 
 
 def is_straight(mesh: TetMesh) -> bool:
-    """Whether every mid-side node lies in the middle of its edge."""
+    """Return whether every mid-side node lies in the middle of its edge."""
     if mesh.order == 1:
         return True
-    ends = np.repeat(np.arange(len(mesh.points))[:, None], 2, axis=1)  # of a corner: itself
+    ends = np.repeat(np.arange(len(mesh.points))[:, None], 2, axis=1)  # a corner's ends: itself
     ends[mesh.tets[:, 4:]] = mesh.tets[:, EDGES]
     first, last = mesh.points[ends.T]
     bow = np.abs(2 * mesh.points - first - last).max()
@@ -23,13 +23,13 @@ def is_straight(mesh: TetMesh) -> bool:
 
 
 def shape_nodes(mesh: TetMesh) -> Floats:
-    """The nodes (e, a, 3) that give each element its shape: the corners of straight ones."""
+    """Return the nodes (e, a, 3) that define the shape of each element: corners if straight."""
     return mesh.points[mesh.tets[:, :4] if is_straight(mesh) else mesh.tets]
 
 
 def gradients(nodes: Floats, n_nodes: int, degree: int, first: int) -> tuple[Floats, Floats]:
-    """Shape gradients (e, q, i, a) in 1/m and quadrature volumes (e, q) in m3 of tetrahedra with
-    nodes (e, a, i), by the number of shape functions and the degree of the quadrature.
+    """Return shape gradients (e, q, i, a) in 1/m and quadrature volumes (e, q) in m3 of tetrahedra
+    with nodes (e, a, i), for `n_nodes` shape functions and a quadrature degree.
     """
     derivatives = shape_derivatives(tetrahedron_rule(degree)[0], n_nodes)
     cofactors, determinants, volumes = jacobians(nodes, degree, first)
@@ -40,11 +40,10 @@ def gradients(nodes: Floats, n_nodes: int, degree: int, first: int) -> tuple[Flo
 def gradient_integrals(
     mesh: TetMesh, coefficients: Callable[[slice, Floats], Floats]
 ) -> Iterator[tuple[slice, Floats]]:
-    """Element matrices (m, e, a, b) of int c_kl N_a,k N_b,l dV, some elements at a time, with their
-    slice, by integrals of products of derivatives along the edges of the reference element.
-    `coefficients` are a function of the slice and of G (k, l, e, x) to c_kl G_kl (m, e, x); x
-    numbers what is the same in all elements: two edges, at each quadrature point of curved
-    elements.
+    """Yield slabs of elements and their matrices (m, e, a, b) of int c_kl N_a,k N_b,l dV.
+
+    `coefficients` maps a slab and G (k, l, e, x) to c_kl G_kl (m, e, x). x numbers pairs of edges
+    of the reference element, at each quadrature point if elements are curved.
     """
     n_nodes, shapes = mesh.tets.shape[1], shape_nodes(mesh)
     barycentric, weights = tetrahedron_rule(2)
@@ -59,15 +58,16 @@ def gradient_integrals(
         if shapes.shape[1] == 4:
             volumes = volumes.sum(axis=1, keepdims=True)
         G = (volumes[..., None] * inverse)[:, None, ..., None] * inverse[None, ..., None, :]
-        found = coefficients(slab, G.reshape(3, 3, len(volumes), -1)) @ edges
-        yield slab, found.reshape(*found.shape[:2], n_nodes, n_nodes)
+        matrices = coefficients(slab, G.reshape(3, 3, len(volumes), -1)) @ edges
+        yield slab, matrices.reshape(*matrices.shape[:2], n_nodes, n_nodes)
 
 
 def jacobians(nodes: Floats, degree: int, first: int) -> tuple[Floats, Floats, Floats]:
-    """Cofactors (e, q, d, i) in m2 and determinants (e, q) in m3 of the map from the reference
-    element to those with nodes (e, a, i), q being 1 if they are straight, with four nodes; and
-    volumes (e, q) of the quadrature points. `first` numbers the first element in the MeshError of
-    an inverted one.
+    """Return cofactors (e, q, d, i) in m2 and determinants (e, q) in m3 of the map from the
+    reference element to those with nodes (e, a, i), and volumes (e, q) of the quadrature points.
+
+    Elements with four nodes have one q. Raises a MeshError if an element is inverted; `first` is
+    the number of the first element.
     """
     barycentric, weights = tetrahedron_rule(degree)
     at = barycentric[:1] if nodes.shape[1] == 4 else barycentric
@@ -83,7 +83,7 @@ def jacobians(nodes: Floats, degree: int, first: int) -> tuple[Floats, Floats, F
     inverted = np.flatnonzero((determinants <= 0).any(axis=1))
     if len(inverted):
         raise MeshError(
-            f"element {first + inverted[0]} is inverted (and {len(inverted) - 1} more near it); "
+            f"element {first + inverted[0]} is inverted, and {len(inverted) - 1} more near it; "
             "straighten its mid-side nodes or remesh"
         )
     return cofactors, determinants, determinants * weights / 6

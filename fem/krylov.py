@@ -1,22 +1,22 @@
 """Krylov moment matching: the basis of a reduced-order model of probes under any surface load.
 
-With A(s) = K + s C + s^2 M (and s tau_j / (1 + s tau_j) K_j for each generalised Maxwell branch),
+With A(s) = K + s C + s^2 M (plus s tau_j / (1 + s tau_j) K_j for each generalised Maxwell branch),
 symmetric, the transfer function from a load f to a probe s_p is, by reciprocity,
 
     H(s) = s_p^T A(s)^-1 f = f^T y(s),   A(s) y(s) = s_p
 
-V holds the first n moments of y, its Taylor coefficients about one real expansion point s_0. Then
-Galerkin projection onto V has the same moments of H (Bai and Su, SIAM J Sci Comput 26:1692, 2005),
-at the cost of one real factorisation. V is built by the two-level orthogonal Arnoldi procedure
-(TOAR: Lu, Su and Bai, SIAM J Matrix Anal Appl 37:195, 2016): with proportional damping the plain
-recurrence loses all accuracy after a few dozen moments. The dashpot stretches of Maxwell branches,
-y / (1 + s tau_j), are further parts of the linearised vectors; their moments lie in the same space.
-The basis is mass-orthonormal. Added mass of a fluid is dense and can only be applied: with it the
-expansion point is 0, where no mass is factorised.
+V spans the first n moments of y, its Taylor coefficients about one real expansion point s_0.
+Galerkin projection onto V preserves these moments of H (Bai and Su, SIAM J Sci Comput 26:1692,
+2005) at the cost of one real factorisation. V is built by the two-level orthogonal Arnoldi
+procedure (TOAR: Lu, Su and Bai, SIAM J Matrix Anal Appl 37:195, 2016), because the plain recurrence
+loses all accuracy after a few dozen moments with proportional damping. The dashpot stretches of
+Maxwell branches, y / (1 + s tau_j), are further parts of the linearised vectors; their moments lie
+in the same space. The basis is mass-orthonormal. The added mass of a fluid is dense and can only be
+applied; the expansion point is then 0, where no mass is factorised.
 
-The error estimate is the difference from the response of the model with some more moments, which by
-Galerkin orthogonality solves the residual equation in the larger space. Those moments are then
-dropped: convergence may become steep or stall at any moment.
+The error estimate is the difference from a model with a few more moments, which by Galerkin
+orthogonality solves the residual equation in the larger space. These moments are then dropped:
+convergence may become steep or stall at any moment.
 """
 
 from __future__ import annotations
@@ -30,36 +30,36 @@ from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, aslinearoperator
 
 from fem.assembly import Operators
-from fem.combination import Laws, factors_at, laws_of
+from fem.combination import Laws, factors_at
 from fem.harmonic import dynamic_stiffness
 from fem.linear_solver import Factor, factorise
-from fem.maxwell import Branch, MaxwellBranch, with_internal
+from fem.maxwell import MaxwellBranch, maxwell_only
 from fem.reduced import ReducedModel
 from fem.typing import Complex, Floats
 
 EXPANSION_POINT = 2 * np.pi * 200.0  # rad/s: best at 200 to 400 Hz for a band of 1 to 2 kHz
-# Expansion point over the band with Maxwell branches: waves of high frequency lose little then, and
-# many of them count. Best between 0.8 and 1.6; the one above takes nearly twice as many moments.
+# Expansion point over the band with Maxwell branches, where waves of high frequency lose little and
+# many of them matter. Best between 0.8 and 1.6; the point above needs nearly twice as many moments.
 RELAXING_POINT = 1.0
-# Moments between two error estimates: at least so many, which give it to a factor of 4, and this
-# share of all, because estimating the error of a large model costs more than its moments.
+# Moments between two error estimates: at least this many, which give the error to a factor of 4,
+# and this share of all, because estimating the error of a large model costs more than its moments.
 FEWEST_BETWEEN = 3
 SHARE_BETWEEN = 1 / 16
 MOST_MOMENTS = 200
-LOOKED_AT, AT_FIRST = 41, 5  # frequencies that the error is looked at, and every which at first
+FREQUENCIES, COARSE_STEP = 41, 5  # where the error is computed, and every which of them at first
 SMALLEST = np.finfo(np.float64).tiny
-DISTINCT = 1e-6  # of the largest singular value: probes that differ by less count as dependent
+DISTINCT = 1e-6  # of the largest singular value: probes that differ by less are dependent
 ROUND_OFF = 1e-12  # of a direction: what orthogonalisation leaves of it is round-off
-DEPENDENT = 1e-10  # squared sine below which a direction counts as not new
+DEPENDENT = 1e-10  # squared sine below which a direction is not new
 ALIKE = 1e-6  # squared sine below which directions are orthonormalised once more
-AT_ONCE = 32  # vectors that are multiplied together
-# Rows of tall matrices whose inner products are taken at a time, which stay in the processor's
-# cache: 100 by 5 inner products of 128,000 rows take 5.5 ms so, and 18 by one multiplication.
+AT_ONCE = 32  # vectors multiplied together
+# Rows of tall matrices per inner product, so that they stay in the processor's cache: 100 by 5
+# inner products of 128,000 rows take 5.5 ms, and 18 ms by one multiplication.
 ROWS = 512
 
 
 class NotReduced(ValueError):
-    """A body whose response takes more moments than a reduced-order model is made of."""
+    """The response of a body needs more moments than a reduced-order model may have."""
 
 
 def reduce(
@@ -73,59 +73,69 @@ def reduce(
     solver: str = "auto",
     progress: Callable[[float], None] | None = None,
 ) -> ReducedModel:
-    """Reduced-order model of the motion of a body's probes.
+    """Return a reduced-order model of the motion of a body's probes.
 
     Parameters
     ----------
-    operators : Operators, of the full body
-    probes : (p, 3 n) sparse, from `probe_operator`; for whole fields the rows of a
-        `load_subspace` as well, without `loads`
-    band : float, Hz, highest frequency at which the tolerance must be met
-    tolerance : float, relative error of the probes' displacement at any frequency of the band
-    loads : (3 n, k), typical nodal forces that the error is estimated for; without any it is
-        that of the probes' adjoint fields in the whole body, which takes far more moments
-    added : added mass of a fluid, as `added_mass` gives it; the body must be constrained then
-    solver : of `linear_solver.factorise`
-    progress : called with the fraction done, as the error estimate approaches the tolerance
+    operators : Operators of the full body
+    probes : (p, 3 n) sparse, from `probe_operator`; for whole fields also the rows of a
+        `load_subspace`, without `loads`
+    band : highest frequency at which the tolerance must be met, Hz
+    tolerance : relative error of the probes' displacement at any frequency of the band
+    loads : (3 n, k) float, typical nodal forces for the error estimate. Without them, the error is
+        that of the probes' adjoint fields in the whole body, which needs far more moments.
+    added : added mass of a fluid, from `added_mass`; the body must then be constrained
+    solver : backend of `factorise`
+    progress : called with the fraction done as the error estimate approaches the tolerance
 
     Returns
     -------
     ReducedModel
-        With an `estimate` of at most the tolerance.
+        Its `estimate` is at most the tolerance.
 
     Raises
     ------
     NotReduced
-        If the tolerance is out of reach.
+        If the tolerance is not reached.
     ValueError
         If no probe can move.
+
+    Examples
+    --------
+    >>> import fem, meshes
+    >>> mesh = meshes.block((0.02, 0.02, 0.01), 0.005)
+    >>> ops = fem.assemble(mesh, fem.PRESETS["palm"], fixed="bottom")
+    >>> S, force = fem.probe_operator(mesh, [[0.0, 0.0]]), fem.load_operator(mesh).sum(axis=1)
+    >>> model = fem.reduce(ops, S, 500.0, 1e-3, loads=force[:, None])
+    >>> len(ops.free), len(model.operators.K)
+    (972, 12)
     """
     free, report = operators.free, progress or (lambda fraction: None)
     start_vectors = probes[:, free].toarray().T
     if not start_vectors.any():
-        raise ValueError("no probe can move, all lie where the body is fixed; move one inwards")
+        raise ValueError("all probes lie where the body is fixed; move one to a free point")
     point, operators = _expansion(operators, added, band)
-    laws = laws_of(operators.K, operators.C, operators.branches, operators.laws)
+    laws = operators.combinations()
     factors = factors_at(operators.branches, point)
     factor = factorise(laws.dynamic_stiffness(factors, operators.K, operators.M), backend=solver)
     report(0.0)
 
     independent = _independent(start_vectors)
     space = KrylovBasis(operators, laws, independent.shape[1] * (MOST_MOMENTS + 1))
-    seen = start_vectors if loads is None else np.hstack([start_vectors, loads[free]])
+    rows = start_vectors if loads is None else np.hstack([start_vectors, loads[free]])
     growing = _moments(space, operators, laws, point, factor, independent)
     moments, size, estimate = _converged(
-        space, seen, start_vectors.shape[1], band, tolerance, growing, report
+        space, rows, start_vectors.shape[1], band, tolerance, growing, report
     )
 
     backend = factor.backend
-    del factor  # whose memory the basis takes
+    del factor  # the basis needs its memory
     K, C, M, branches = space.model(size)
     small = Operators(
         K=K.copy(), C=C.copy(), M=M, R=space.radiation(operators.R, size), branches=branches,
         free=np.arange(size), n_dofs=size,
     )  # fmt: skip
-    outputs = space.seen(size)[:, : start_vectors.shape[1]].T.copy()
+    outputs = space.rows(size)[:, : start_vectors.shape[1]].T.copy()
     return ReducedModel(
         operators=small, basis=space.expanded(size), outputs=outputs, moments=moments,
         estimate=estimate, solver=backend,
@@ -133,21 +143,20 @@ def reduce(
 
 
 def load_subspace(loads: Floats, tolerance: float = 1e-3) -> Floats:
-    """Proper orthogonal basis (3 n, s) of loads (3 n, k), to a relative error in the 2-norm. A
-    circling focus needs about twenty at 1e-3.
+    """Return a proper orthogonal basis (3 n, s) of loads (3 n, k) to a relative error in the
+    2-norm. A circling focus needs about twenty vectors at 1e-3.
     """
     squares, vectors = np.linalg.eigh(loads.T @ loads)
-    left_out = np.sqrt(np.cumsum(np.maximum(squares, 0)) / squares.sum())
-    kept = left_out > tolerance
-    return loads @ (vectors[:, kept] / np.sqrt(squares[kept]))
+    truncated = np.sqrt(np.cumsum(np.maximum(squares, 0)) / squares.sum())
+    needed = truncated > tolerance
+    return loads @ (vectors[:, needed] / np.sqrt(squares[needed]))
 
 
 class KrylovBasis:
-    """Mass-orthonormal basis that grows, and what is projected onto it.
+    """Growing mass-orthonormal basis, with the matrices and vectors projected onto it.
 
-    Products with sparse matrices are formed where they are needed, in less time than it takes to
-    read them from memory. Memory is touched only as far as used, and new vectors are
-    orthonormalised in place.
+    Products with sparse matrices are recomputed where needed, which takes less time than reading
+    them from memory. New vectors are orthonormalised in place.
     """
 
     def __init__(self, operators: Operators, laws: Laws, most: int) -> None:
@@ -157,10 +166,10 @@ class KrylovBasis:
         self._free, n_dofs = operators.free, operators.n_dofs
         self._all_dofs = np.empty((n_dofs, most), order="F")  # for `expanded`
         self._columns = self._all_dofs[: len(operators.free)]
-        # Projected K and rests (size, size), and what is seen of a response (size, k).
+        # Projected K and rests (size, size), and projected probes and loads (size, k).
         self._small_K = np.empty((0, 0))
         self._small_rests: list[Any] = [None if r is None else self._small_K for r in self._rests]
-        self._seen = np.empty((0, 0))
+        self._rows = np.empty((0, 0))
         self.size = 0
 
     @property
@@ -169,8 +178,8 @@ class KrylovBasis:
         return self._columns[:, : self.size]
 
     def expanded(self, size: int) -> Floats:
-        """The first vectors on all dofs (n_dofs, size), 0 where the body is fixed. Reuses the basis
-        buffer; the basis is invalid afterwards.
+        """Return the first vectors on all dofs (n_dofs, size), 0 where the body is fixed. Reuses
+        the basis buffer; the basis is invalid afterwards.
         """
         for column in self._all_dofs[:, :size].T:
             values = column[: len(self._free)].copy()
@@ -179,26 +188,27 @@ class KrylovBasis:
         return self._all_dofs[:, :size]
 
     def model(self, size: int) -> tuple[Floats, Floats, Floats, tuple[MaxwellBranch, ...]]:
-        """Projected K, C, M and Maxwell branches, in the first vectors, as far as projected."""
+        """Return K, C, M and Maxwell branches projected onto the first vectors."""
         K, M = self._small_K[:size, :size], np.eye(size)
         rests = (None if rest is None else rest[:size, :size] for rest in self._small_rests)
         each = (replace(part, rest=r) for part, r in zip(self._laws.parts, rests, strict=True))
         C, *relaxing = (part.of(K) for part in each)
-        return K, C, M, _branches(relaxing, self._branches)
+        branches = zip(relaxing, maxwell_only(self._branches), strict=True)
+        return K, C, M, tuple(MaxwellBranch(K=A, time=b.time) for A, b in branches)
 
-    def seen(self, size: int) -> Floats:
-        """Components (size, k) of the vectors that `project` was given."""
-        return self._seen[:size]
+    def rows(self, size: int) -> Floats:
+        """Return the components (size, k) of the vectors last given to `project`."""
+        return self._rows[:size]
 
     def radiation(self, R: sparse.csr_array, size: int) -> Floats:
-        """Projected damping (size, size) of absorbing boundaries, which may be the rest of C."""
+        """Return the projected damping (size, size) of absorbing boundaries."""
         if R is self._laws.damping.rest:
             return np.array(self._small_rests[0])[:size, :size]
         basis = self.basis[:, :size]
         return _products(R, basis, basis)
 
     def forces(self, of_mass: Floats, of_rests: Sequence[Floats]) -> Floats:
-        """Nodal forces M z + sum_j rest_j r_j (n, k) of coordinates z and r_j (size, k)."""
+        """Return nodal forces M z + sum_j rest_j r_j (n, k) for coordinates z, r_j (size, k)."""
         acting = [(self._M, of_mass)]
         acting += [(A, r) for A, r in zip(self._rests, of_rests, strict=True) if A is not None]
         fields = _combined(self.basis, np.hstack([r for _, r in acting]))  # reads the basis once
@@ -206,47 +216,47 @@ class KrylovBasis:
         return sum(A @ field for (A, _), field in zip(acting, each, strict=True))
 
     def extend(self, block: Floats) -> Floats:
-        """Add the linearly independent directions of a block (n, k), by block Gram-Schmidt and a
-        decomposition of its Gram matrix; its coordinates (size, k).
+        """Add the independent directions of a block (n, k), by block Gram-Schmidt and a
+        decomposition of its Gram matrix. Return the coordinates (size, k) of the block.
         """
         M, Q = self._M, self.basis
-        moved = M @ block
-        scale = _norms(block, moved)
-        first = _inner(Q, moved)
+        product = M @ block
+        scale = _norms(block, product)
+        first = _inner(Q, product)
         block = block - _combined(Q, first)
-        # Twice is enough, and once is not: after 90 moments vectors were orthogonal to 1e-3.
-        moved = M @ block
-        second = _inner(Q, moved)
-        gram = block.T @ moved - second.T @ second
+        # Once is not enough: after 90 moments vectors would be orthogonal to 1e-3 only.
+        product = M @ block
+        second = _inner(Q, product)
+        gram = block.T @ product - second.T @ second
         block -= _combined(Q, second)
         size = np.sqrt(np.maximum(np.diag(gram), 0.0))
-        # A space of all of a body's dofs has no new direction.
+        # A space that spans all dofs of a body has no new direction.
         inverse = np.divide(1, size, out=np.zeros_like(size), where=size > ROUND_OFF * scale)
         squares, directions = np.linalg.eigh(gram * np.outer(inverse, inverse))
         distinct = squares > max(DEPENDENT * squares.max(), SMALLEST)
         squares, directions = squares[distinct], directions[:, distinct]
         upright = inverse[:, None] * directions / np.sqrt(squares)
         if len(squares) and squares.min() < ALIKE * squares.max():
-            upright = self._again(block, upright)
+            upright = self._reorthonormalised(block, upright)
         start, self.size = self.size, self.size + upright.shape[1]
         np.matmul(block, upright, out=self._columns[:, start : self.size])
         return np.vstack([first + second, upright.T @ gram])
 
-    def _again(self, block: Floats, upright: Floats) -> Floats:
-        """Orthonormalise directions of a block that are much alike once more: scaled, their
-        round-off is no longer small, also that of what is in the basis.
+    def _reorthonormalised(self, block: Floats, upright: Floats) -> Floats:
+        """Orthonormalise similar directions of a block once more, because scaling amplifies their
+        round-off, including that along the basis.
         """
         new = block @ upright
         block -= _combined(self.basis, self.basis.T @ (self._M @ new)) @ np.linalg.pinv(upright)
         new = block @ upright
         return upright @ np.linalg.inv(np.linalg.cholesky(new.T @ (self._M @ new))).T
 
-    def project(self, seen: Floats, size: int) -> None:
-        """Project the matrices, and what is seen (n, k), onto those of the first vectors that are
-        new since.
+    def project(self, rows: Floats, size: int) -> None:
+        """Project the matrices, and probes and loads (n, k), onto the vectors added since the last
+        call.
         """
         Q, new = self._columns[:, :size], self._columns[:, len(self._small_K) : size]
-        self._seen = np.vstack([self._seen.reshape(-1, seen.shape[1]), new.T @ seen])
+        self._rows = np.vstack([self._rows.reshape(-1, rows.shape[1]), new.T @ rows])
         self._small_K = _bordered(self._small_K, _products(self._K, Q, new))
         self._small_rests = [
             None if rest is None else _bordered(small, _products(rest, Q, new))
@@ -256,25 +266,25 @@ class KrylovBasis:
 
 def _converged(
     space: KrylovBasis,
-    seen: Floats,
+    rows: Floats,
     probes: int,
     band: float,
     tolerance: float,
     growing: Iterable[tuple[int, int]],
     report: Callable[[float], None],
 ) -> tuple[int, int, float]:
-    """Moments and vectors of the first model within the tolerance, and its error, as both grow, by
-    what is seen (n, probes + loads) of a response.
+    """Return the moments, vectors and error of the first model within the tolerance, for the
+    vectors `rows` (n, probes + loads).
     """
-    # Nearly from 0 Hz: at 0 Hz itself an unconstrained body has no finite response.
-    fine = np.asarray(2j * np.pi * np.linspace(1e-3 * band, band, LOOKED_AT), np.complex128)
-    coarse = fine[::AT_FIRST]  # until the error is below the tolerance there
+    # Not 0 Hz itself, where an unconstrained body has no finite response.
+    fine = np.asarray(2j * np.pi * np.linspace(1e-3 * band, band, FREQUENCIES), np.complex128)
+    coarse = fine[::COARSE_STEP]  # until the error is below the tolerance there
     at, before, response, first, error = 0, (0, 0), None, np.inf, np.inf
     for moments, size in growing:
         if moments < at + max(FEWEST_BETWEEN, SHARE_BETWEEN * moments):
             continue
         at = moments
-        space.project(seen, size)
+        space.project(rows, size)
         now = _band_response(space, probes, coarse, size)
         if response is not None:
             error = _largest_change(response, now)
@@ -287,17 +297,15 @@ def _converged(
                 return *before, error
         before, response = (moments, size), now
     raise NotReduced(
-        f"{MOST_MOMENTS} moments leave an error of {error:.2g}, above the tolerance {tolerance:g}; "
-        "raise the tolerance, narrow the band or add damping"
+        f"the reduced-order model of {MOST_MOMENTS} moments has a relative error of {error:.2g}, "
+        f"above the tolerance {tolerance:g}; raise the tolerance, narrow the band or add damping"
     )
 
 
 def _expansion(
     operators: Operators, added: LinearOperator | None, band: float
 ) -> tuple[float, Operators]:
-    """Expansion point in rad/s, and the operators with an added mass, of which M can only be
-    applied.
-    """
+    """Return the expansion point in rad/s, and the operators with the added mass."""
     if added is None:
         relaxing = 2 * np.pi * RELAXING_POINT * band
         return relaxing if operators.branches else EXPANSION_POINT, operators
@@ -305,12 +313,12 @@ def _expansion(
 
 
 def _independent(start_vectors: Floats) -> Floats:
-    """Independent directions of vectors (n, p), of length 1: probes on a clamped edge do not move,
-    and those in one element may be linearly dependent. Opposite vectors have opposite directions.
+    """Return independent unit directions of vectors (n, p): probes on a clamped edge do not move,
+    and probes in one element may be linearly dependent.
     """
     squares, directions = np.linalg.eigh(start_vectors.T @ start_vectors)
-    kept = squares > DISTINCT**2 * squares[-1]
-    return start_vectors @ (directions[:, kept] / np.sqrt(squares[kept]))[:, ::-1]
+    distinct = squares > DISTINCT**2 * squares[-1]
+    return start_vectors @ (directions[:, distinct] / np.sqrt(squares[distinct]))[:, ::-1]
 
 
 def _moments(
@@ -321,15 +329,15 @@ def _moments(
     factor: Factor,
     start_vectors: Floats,
 ) -> Iterator[tuple[int, int]]:
-    """Numbers of the moments of start vectors (n, p), from 1, by each of which the space has been
-    extended, and of its vectors.
+    """Extend the space by one moment of start vectors (n, p) at a time; yield the numbers of
+    moments and of vectors.
     """
-    branches = with_internal(operators.branches)
+    branches = maxwell_only(operators.branches)
     lags = [branch.time / (1 + point * branch.time) for branch in branches]
     factors = factors_at(branches, point)
     scale = point or EXPANSION_POINT
-    # Coordinates in the basis of the linearised Krylov vectors (y, y' / scale, dashpot stretches):
-    # those of all moments are orthonormalised, so that nothing grows however many there are.
+    # Coordinates of the linearised Krylov vectors (y, y' / scale, dashpot stretches) in the basis.
+    # They are orthonormalised over all moments, so that none grows.
     earlier = np.zeros((2 + len(lags), 0, 0))
     upper = space.extend(factor.solve(start_vectors))
     relaxed = [(1 - point * lag) * upper for lag in lags]
@@ -339,11 +347,11 @@ def _moments(
         earlier, latest = _orthonormalised(earlier, latest)
         y, y_before, *y_relaxed = latest
         stretches = [lag * part for lag, part in zip(lags, y_relaxed, strict=True)]
-        known, of_mass, of_rests = laws.without_stiffness(
+        direct, of_mass, of_rests = laws.without_stiffness(
             factors, [y, *stretches], 2 * point * y + scale * y_before
         )
         upper = -space.extend(factor.solve(space.forces(of_mass, of_rests)))
-        upper -= _padded(known, len(upper))
+        upper -= _padded(direct, len(upper))
         lower, _, *before = (_padded(part, len(upper)) for part in latest)
         relaxed = [
             (1 - point * lag) * upper - lag * part for lag, part in zip(lags, before, strict=True)
@@ -352,23 +360,22 @@ def _moments(
 
 
 def _combined(basis: Floats, coordinates: Floats) -> Floats:
-    """Vectors (n, k) of coordinates (size, k), column by column as the basis, which is faster."""
-    found = np.empty((len(basis), coordinates.shape[1]), order="F")
-    return np.matmul(basis, coordinates, out=found)
+    """Return vectors (n, k) of coordinates (size, k), column by column like the basis for speed."""
+    return np.matmul(
+        basis, coordinates, out=np.empty((len(basis), coordinates.shape[1]), order="F")
+    )
 
 
 def _inner(basis: Floats, block: Floats) -> Floats:
-    """Inner products basis^T block (size, k) of tall matrices."""
-    found = np.zeros((block.shape[1], basis.shape[1]))
+    """Return the inner products basis^T block (size, k) of tall matrices."""
+    products = np.zeros((block.shape[1], basis.shape[1]))
     for start in range(0, len(basis), ROWS):
-        found += block[start : start + ROWS].T @ basis[start : start + ROWS]
-    return found.T
+        products += block[start : start + ROWS].T @ basis[start : start + ROWS]
+    return products.T
 
 
 def _norms(block: Floats, product: Floats) -> Floats:
-    """Mass norms (m,) of columns with their product with M: 0 at rest for every second moment of a
-    body without loss.
-    """
+    """Return the mass norms (m,) of columns from their product with M, at least `SMALLEST`."""
     return np.maximum(np.sqrt(np.einsum("nm,nm->m", block, product)), SMALLEST)
 
 
@@ -377,7 +384,7 @@ def _padded(coordinates: Floats, size: int) -> Floats:
 
 
 def _orthonormalised(earlier: Floats, latest: Floats) -> tuple[Floats, Floats]:
-    """Earlier vectors (parts, size, k) with the latest, orthonormalised to them; and the latest."""
+    """Orthonormalise the latest vectors to earlier ones (parts, size, k). Return all, and them."""
     parts, size, width = latest.shape
     padded = np.zeros((parts, size, earlier.shape[2]))
     padded[:, : earlier.shape[1]] = earlier
@@ -390,14 +397,14 @@ def _orthonormalised(earlier: Floats, latest: Floats) -> tuple[Floats, Floats]:
 
 
 def _products(A: Any, basis: Floats, vectors: Floats) -> Floats:
-    """Matrix basis^T A vectors (size, k) of a symmetric A, some vectors at a time."""
+    """Return basis^T A vectors (size, k), some vectors at a time."""
     starts = range(0, vectors.shape[1], AT_ONCE)
     columns = [_inner(basis, A @ vectors[:, k : k + AT_ONCE]) for k in starts]
     return np.hstack(columns) if columns else np.empty((basis.shape[1], 0))
 
 
 def _bordered(small: Floats, columns: Floats) -> Floats:
-    """Symmetric matrix bordered by its last columns (r, k) and rows."""
+    """Border a symmetric matrix by its last columns (r, k) and rows."""
     r, k = columns.shape
     whole = np.empty((r, r))
     whole[: r - k, : r - k] = small
@@ -406,20 +413,13 @@ def _bordered(small: Floats, columns: Floats) -> Floats:
     return whole
 
 
-def _branches(small: list[Floats], large: tuple[Branch, ...]) -> tuple[MaxwellBranch, ...]:
-    """The full model's Maxwell branches with the reduced stiffness."""
-    return tuple(
-        MaxwellBranch(K=K, time=b.time) for K, b in zip(small, with_internal(large), strict=True)
-    )
-
-
 def _band_response(space: KrylovBasis, probes: int, s: Complex, size: int) -> Complex:
-    """Responses (f, k, p) of the probes to the loads that the space has seen beside them, or their
-    fields (f, size, p), at complex frequencies s (f,) in rad/s, by the first vectors of the basis.
+    """Return responses (f, k, p) of the probes to the loads, or without loads their fields
+    (f, size, p), at complex frequencies s (f,) in rad/s, in the first vectors of the basis.
     """
     K, C, M, branches = space.model(size)
-    start_vectors, loads = np.split(space.seen(size), [probes], axis=1)
-    # One by one: all at once would be as large as the body's own factors.
+    start_vectors, loads = np.split(space.rows(size), [probes], axis=1)
+    # One by one: all at once would need as much memory as the body's own factors.
     fields: Iterator[Any] = (
         np.linalg.solve(dynamic_stiffness(K, C, M, branches, at), start_vectors) for at in s
     )
@@ -427,7 +427,7 @@ def _band_response(space: KrylovBasis, probes: int, s: Complex, size: int) -> Co
 
 
 def _largest_change(before: Complex, now: Complex) -> float:
-    """Largest relative change at any frequency."""
+    """Return the largest relative change at any frequency."""
     change = now.copy()
     change[:, : before.shape[1]] -= before
     return float((np.linalg.norm(change, axis=(1, 2)) / np.linalg.norm(now, axis=(1, 2))).max())

@@ -1,7 +1,7 @@
 """Sparse direct solvers behind one interface: `factorise(A).solve(b)`.
 
-Both factorise symmetric matrices, real or complex. MKL PARDISO is used if it is installed; SciPy's
-SuperLU needs nothing.
+Both backends factorise symmetric matrices, real or complex: MKL PARDISO, if it is installed, and
+SciPy's SuperLU.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from fem.pardiso import Pardiso, PardisoError, mkl
 from fem.sparsity import on_one_pattern, upper_triangle
 from fem.typing import Array, Ints
 
-REFINED, SLOWEST = 1e-10, 0.2  # residual over the right-hand side, and over that of a step before
+REFINED, SLOWEST = 1e-10, 0.2  # residual over the right-hand side, and over the last residual
 BACKENDS = ("pardiso", "superlu")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Factor:
-    """A factorised matrix: `solve(b)` for right-hand sides (n,) or (n, k)."""
+    """Factorised matrix: `solve(b)` for right-hand sides (n,) or (n, k), and its `backend`."""
 
     solve: Callable[[Array], Array]
     backend: str
 
 
 def available() -> tuple[str, ...]:
-    """Installed backends, the fastest first."""
+    """Return the installed backends, the fastest first."""
     return BACKENDS if mkl() is not None else BACKENDS[1:]
 
 
@@ -43,7 +43,7 @@ def factorise(A: sparse.csr_array, *, backend: str = "auto") -> Factor:
     Parameters
     ----------
     A : sparse (n, n), float or complex
-    backend : "auto" for the fastest that is installed, or one of `BACKENDS`
+    backend : "auto" for the fastest installed one, or one of `BACKENDS`
 
     Returns
     -------
@@ -54,19 +54,19 @@ def factorise(A: sparse.csr_array, *, backend: str = "auto") -> Factor:
     ValueError
         If the backend is unknown or not installed, or A is singular.
     MemoryError
-        If there is no room for the factor, on the disk neither.
+        If the factor fits neither in memory nor on the disk.
     """
     names = available()
     backend = names[0] if backend == "auto" else backend
     if backend not in names:
-        raise ValueError(f"solver '{backend}' is not installed; choose one of {', '.join(names)}")
+        raise ValueError(f"solver '{backend}' is not installed; use {' or '.join(names)}")
     A = sparse.csr_array(A)
     A.sort_indices()
     _check_finite(A.data)
     complex_valued, only = np.iscomplexobj(A.data), [A]
-    del A  # for PARDISO to free the whole of it, of which it needs half
+    del A  # PARDISO frees the matrix, of which it needs half
     solve = (_pardiso if backend == "pardiso" else _superlu)(only.pop())
-    return Factor(solve=solve if complex_valued else _by_parts(solve), backend=backend)
+    return Factor(solve=solve if complex_valued else _real_and_imaginary(solve), backend=backend)
 
 
 def _check_finite(values: Array) -> None:
@@ -74,19 +74,15 @@ def _check_finite(values: Array) -> None:
         raise ValueError("the matrix has entries that are not finite; check the material")
 
 
-def _by_parts(solve: Callable[[Array], Array]) -> Callable[[Array], Array]:
-    """A real factor's solution that takes complex right-hand sides, too."""
-
-    def either(b: Array) -> Array:
-        return solve(b.real) + 1j * solve(b.imag) if np.iscomplexobj(b) else solve(b)
-
-    return either
+def _real_and_imaginary(solve: Callable[[Array], Array]) -> Callable[[Array], Array]:
+    """Extend the solution of a real matrix to complex right-hand sides."""
+    return lambda b: solve(b.real) + 1j * solve(b.imag) if np.iscomplexobj(b) else solve(b)
 
 
 def _singular(detail: object) -> ValueError:
     return ValueError(
-        f"the matrix is singular or not positive definite ({detail}); "
-        "is the body constrained anywhere, and are all its stiffnesses above 0?"
+        f"the matrix is singular or not positive definite ({detail}); check that the body is "
+        "constrained and that its stiffnesses are above 0"
     )
 
 
@@ -97,14 +93,14 @@ def _pardiso(A: sparse.csr_array) -> Callable[[Array], Array]:
     indices += 1
     indptr += 1
     matrix = Pardiso(indices, indptr, kind)
-    _factorised(matrix, values)
+    _factorise_with(matrix, values)
     if kind == 2:
         del values, indices, indptr
-        matrix.forget()
+        matrix.free_matrix()
     return matrix.solve
 
 
-def _factorised(matrix: Pardiso, values: Array) -> None:
+def _factorise_with(matrix: Pardiso, values: Array) -> None:
     try:
         matrix.factorise(values)
     except PardisoError as error:
@@ -112,12 +108,12 @@ def _factorised(matrix: Pardiso, values: Array) -> None:
 
 
 class SumFactoriser:
-    """Factorises weighted sums of real symmetric matrices (n, n), sparse, with complex weights, in
-    the union of their patterns, which PARDISO analyses once.
+    """Factorise complex weighted sums of real symmetric sparse matrices (n, n).
 
-    Its factors are in single precision, refined in double, which takes half of the memory and two
-    thirds of the time. Where that does not converge, as it does not for thin sheets, the matrix and
-    all later ones are factorised in double precision.
+    PARDISO analyses the union of their patterns once. Factors are in single precision, with
+    refinement in double precision, which needs half the memory and two thirds of the time. If
+    refinement does not converge, as for thin sheets, this matrix and all later ones are factorised
+    in double precision.
     """
 
     def __init__(self, matrices: Sequence[sparse.csr_array], *, backend: str = "auto") -> None:
@@ -126,11 +122,11 @@ class SumFactoriser:
         self._matrix: Pardiso | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """State for other processes, without what PARDISO has analysed."""
+        """Return the state for other processes, without PARDISO's analysis."""
         return {**vars(self), "_matrix": None}
 
     def __call__(self, weights: Array) -> Factor:
-        """Factor of a sum, valid until the next one is made. Raises as `factorise` does."""
+        """Return the factor of a sum, valid until the next call. Raises as `factorise`."""
         values = np.empty(self._values.shape[1], np.complex128)
         values.real, values.imag = weights.real @ self._values, weights.imag @ self._values
         if self._backend not in ("auto", "pardiso") or mkl() is None:
@@ -138,32 +134,32 @@ class SumFactoriser:
             whole = upper + sparse.triu(upper, 1, format="csr").T
             return factorise(whole, backend=self._backend)
         _check_finite(values)
-        self._matrix = self._matrix or self._analysed()
-        _factorised(self._matrix, values.astype(np.complex64) if self._is_single else values)
+        self._matrix = self._matrix or self._new_matrix()
+        _factorise_with(self._matrix, values.astype(np.complex64) if self._is_single else values)
         return Factor(solve=partial(self._solve, self._matrix, values), backend="pardiso")
 
     def _solve(self, matrix: Pardiso, values: Array, b: Array) -> Array:
         if self._is_single:
-            x = _refined(self._upper(values), lambda r: matrix.solve(r.astype(np.complex64)), b)
+            x = _refine(self._upper(values), lambda r: matrix.solve(r.astype(np.complex64)), b)
             if x is not None:
                 return x
             self._is_single = False
-            self._matrix = self._analysed()
-            _factorised(self._matrix, values)
+            self._matrix = self._new_matrix()
+            _factorise_with(self._matrix, values)
         return (self._matrix or matrix).solve(b)
 
     def _upper(self, values: Array) -> sparse.csr_array:
         n = len(self._indptr) - 1
         return sparse.csr_array((values, self._indices, self._indptr), shape=(n, n))
 
-    def _analysed(self) -> Pardiso:
+    def _new_matrix(self) -> Pardiso:
         one = np.int32(1)
         return Pardiso(self._indices + one, self._indptr + one, 6, single=self._is_single)
 
 
-def _refined(upper: sparse.csr_array, solve: Callable[[Array], Array], b: Array) -> Array | None:
-    """Solution of a symmetric matrix, by its upper triangle, by iterative refinement of one that is
-    nearly so; None if that does not converge.
+def _refine(upper: sparse.csr_array, solve: Callable[[Array], Array], b: Array) -> Array | None:
+    """Refine an approximate `solve` of a symmetric matrix, given by its upper triangle. Return None
+    if that does not converge.
     """
     x, r, size = np.zeros_like(b), b, np.linalg.norm(b, axis=0)
     lower, diagonal, before = upper.T, upper.diagonal().reshape(-1, *[1] * (b.ndim - 1)), size
@@ -179,7 +175,7 @@ def _refined(upper: sparse.csr_array, solve: Callable[[Array], Array], b: Array)
 
 
 def _superlu(A: sparse.csr_array) -> Callable[[Array], Array]:
-    """SuperLU without pivoting, ordered by METIS, or by minimum degree where pymetis is missing."""
+    """Use SuperLU without pivoting, ordered by METIS, or by minimum degree without pymetis."""
     metis = find_spec("pymetis") is not None
     order = dissect(A) if metis else np.arange(A.shape[0])
     permuted = sparse.csc_array(A[order][:, order])
@@ -199,9 +195,9 @@ def _superlu(A: sparse.csr_array) -> Callable[[Array], Array]:
 
 
 def dissect(A: sparse.csr_array) -> Ints:
-    """Fill-reducing ordering (n,) of a symmetric matrix: METIS's nested dissection of its graph.
+    """Return a fill-reducing ordering (n,) of a symmetric matrix, by METIS's nested dissection.
 
-    Degrees of freedom with the same neighbours, as the components of one node, are ordered as one.
+    Degrees of freedom with the same neighbours, such as those of one node, are ordered as one.
     """
     import pymetis
 

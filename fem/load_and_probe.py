@@ -10,25 +10,34 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from fem.elements import shape_derivatives, shape_functions, triangle_rule
+from fem.sparsity import dofs_of, from_entries
 from fem.typing import Bools, Floats, Ints
 from meshes import TetMesh, facet_set
 
-BESIDE = 1e-6  # barycentric: how far outside a facet a point still counts as on it
-CLOSE = 1e-9  # of a facet's size: Newton's method has found a point
-MOST_STEPS, FURTHEST = 12, 3.0  # of Newton's method, and how far outside a facet it is followed
-EDGE_ON = 1e-9  # of a facet's squared size: the area of one that is seen edge-on
-SAME_HEIGHT = 1e-6  # of the surface's extent: neighbours meet at one height
+FACET_MARGIN = 1e-6  # barycentric: a point so little outside a facet counts as on it
+NEWTON_TOLERANCE = 1e-9  # of a facet's size
+NEWTON_STEPS, NEWTON_REACH = 12, 3.0  # most steps; barycentric coordinate beyond which it stops
+EDGE_ON_AREA = 1e-9  # of a facet's squared size: the projected area of a facet seen edge-on
+SAME_HEIGHT = 1e-6  # of the surface's extent: neighbouring facets with this difference are level
 AT_ONCE = 2_000_000  # pairs of points and facets
-OUTSIDE = 1e-6  # barycentric: how far outside all elements a point still counts as in the body
-BOWED = 0.3  # of an element's size: the same where the straight element stands for a curved one
-REACH = 0.05  # of an element's size, by which a curved element may reach beyond its corners
+ELEMENT_MARGIN = 1e-6  # barycentric: a point so little outside all elements counts as inside
+BOWED_MARGIN = 0.3  # of an element's size: likewise for the straight element of a curved one
+BULGE = 0.05  # of an element's size: how far a curved element may extend beyond its corners
 NODES = np.vstack([np.eye(3), [[0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]]])  # of a facet
 
 
 def load_operator(mesh: TetMesh, facets: str | Ints = "top") -> sparse.csr_array:
-    """Load operator P (3 n, k q): nodal forces in N of pressures in Pa at `facet_points`.
+    """Return the load operator P (3 n, k q): nodal forces in N for pressures in Pa.
 
-    Pressure pushes into the body, against the outward normal.
+    Pressures are values at `facet_points` and act into the body, against the outward normal.
+
+    Examples
+    --------
+    >>> import fem, meshes
+    >>> mesh = meshes.block((0.02, 0.02, 0.01), 0.005)
+    >>> force = fem.load_operator(mesh).sum(axis=1)  # 1 Pa on the whole top, 4 cm2
+    >>> float(force[2::3].sum().round(9))  # N
+    -0.0004
     """
     N, normals = facet_geometry(mesh, facet_set(mesh, facets))
     return _forces(mesh, facets, -np.einsum("qa,eqi->eaiq", N, normals))
@@ -37,8 +46,8 @@ def load_operator(mesh: TetMesh, facets: str | Ints = "top") -> sparse.csr_array
 def traction_operator(
     mesh: TetMesh, tractions: Floats, facets: str | Ints = "top"
 ) -> sparse.csr_array:
-    """Load operator (3 n, k q) of tractions: nodal forces int N_a t dA in N of the traction vectors
-    (k q, 3) of unit values at the `facet_points`.
+    """Return the load operator (3 n, k q) of tractions: nodal forces int N_a t dA in N for values
+    at `facet_points` times the traction vectors (k q, 3).
     """
     N, normals = facet_geometry(mesh, facet_set(mesh, facets))
     area = np.linalg.norm(normals, axis=2)
@@ -47,23 +56,22 @@ def traction_operator(
 
 
 def _forces(mesh: TetMesh, facets: str | Ints, values: Floats) -> sparse.csr_array:
-    """Load operator (3 n, e q) of nodal forces (e, a, i, q) of unit values."""
-    nodes, (k, _, _, q) = facet_set(mesh, facets), values.shape
-    rows = (3 * nodes[:, :, None, None] + np.arange(3)[:, None]).repeat(q, axis=3)
-    columns = np.broadcast_to(np.arange(k * q).reshape(k, 1, 1, q), rows.shape)
-    shape = (mesh.n_dofs, k * q)
-    return sparse.csr_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
+    """Return the load operator (3 n, e q) with nodal forces (e, a, i, q) of unit values."""
+    k, _, _, q = values.shape
+    rows = dofs_of(facet_set(mesh, facets))[..., None]
+    columns = np.arange(k * q).reshape(k, 1, 1, q)
+    return from_entries(values, rows, columns, (mesh.n_dofs, k * q))
 
 
 def facet_points(mesh: TetMesh, facets: str | Ints = "top") -> Floats:
-    """Quadrature points (k q, 3) in metre at which `load_operator` takes the pressure."""
+    """Return the quadrature points (k q, 3) of `load_operator`, in metres."""
     nodes = facet_set(mesh, facets)
     N = shape_functions(triangle_rule()[0], nodes.shape[1])
     return np.einsum("qa,eai->eqi", N, mesh.points[nodes]).reshape(-1, 3)
 
 
 def facet_normals(mesh: TetMesh, facets: str | Ints = "top") -> Floats:
-    """Unit normals (k q, 3) out of the body at the points of `facet_points`."""
+    """Return unit normals (k q, 3) out of the body at `facet_points`."""
     normals = facet_geometry(mesh, facet_set(mesh, facets))[1].reshape(-1, 3)
     return normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
@@ -71,27 +79,27 @@ def facet_normals(mesh: TetMesh, facets: str | Ints = "top") -> Floats:
 def probe_operator(
     mesh: TetMesh, points: ArrayLike, facets: str | Ints = "top", *, patch: float = 0.0
 ) -> sparse.csr_array:
-    """Probe operator S: displacement into the body at surface points.
+    """Return the probe operator S: displacement into the body at surface points.
 
-    A point is projected along z onto the highest of the facets. Positive is the direction of a
-    pressure, against the normal of the facet or, next to a crease, where that depends on the mesh,
-    against the mean normal of a patch.
+    A point is projected along z onto the highest facet. Displacement is positive in the direction
+    of a pressure: against the normal of the facet, or against the mean normal of a patch. Next to a
+    crease, the normal of a single facet depends on the mesh.
 
     Parameters
     ----------
     mesh : TetMesh
-    points : (p, 2 or 3) float, metre
-    facets : a facet set's name or nodes (e, a)
-    patch : metre, standard deviation of the Gaussian that weights the normals about a point, or 0
+    points : (p, 2) or (p, 3) float, m
+    facets : name of a facet set, or nodes (e, a)
+    patch : standard deviation in metres of the Gaussian weights of normals around a point, or 0
 
     Returns
     -------
-    (p, 3 n) sparse, without unit
+    (p, 3 n) sparse, dimensionless
 
     Raises
     ------
     ValueError
-        If a point lies outside the facets, or has no finite coordinates.
+        If a point lies off the facets or is not finite.
     """
     return _inwards(mesh, *_surface_frame(mesh, points, facets, patch))
 
@@ -99,9 +107,8 @@ def probe_operator(
 def node_operator(
     mesh: TetMesh, facets: str | Ints = "top", *, patch: float = 0.0
 ) -> tuple[Ints, sparse.csr_array]:
-    """Nodes (s,) of a surface in ascending order, and the operator (s, 3 n) of their displacement
-    into the body, against the mean normal of the facets at each, or of a patch as for
-    `probe_operator`.
+    """Return the nodes (s,) of a surface in ascending order, and the operator (s, 3 n) of their
+    displacement into the body, against the mean normal of their facets or of a `patch`.
     """
     nodes = facet_set(mesh, facets)
     surface, local = np.unique(nodes, return_inverse=True)
@@ -117,19 +124,18 @@ def node_operator(
 
 
 def _inwards(mesh: TetMesh, nodes: Ints, N: Floats, normals: Floats) -> sparse.csr_array:
-    """Displacement against normals (p, 3), of nodes (p, a) with weights (p, a)."""
+    """Return the displacement against normals (p, 3) of nodes (p, a) with weights (p, a)."""
     values = -np.einsum("pa,pi->pai", N, normals)
-    columns = 3 * nodes[:, :, None] + np.arange(3)
-    rows = np.broadcast_to(np.arange(len(nodes))[:, None, None], columns.shape)
-    shape = (len(nodes), mesh.n_dofs)
-    return sparse.csr_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
+    rows = np.arange(len(nodes))[:, None, None]
+    return from_entries(values, rows, dofs_of(nodes), (len(nodes), mesh.n_dofs))
 
 
 def surface_frame(
     mesh: TetMesh, points: ArrayLike, facets: str | Ints = "top", *, patch: float = 0.0
 ) -> tuple[Floats, Floats]:
-    """Places (p, 3) in metre on a surface, and unit normals (p, 3) out of the body there; arguments
-    and errors are those of `probe_operator`.
+    """Return places (p, 3) in metres on a surface, and unit normals (p, 3) out of the body there.
+
+    Arguments and errors are those of `probe_operator`.
     """
     nodes, N, normals = _surface_frame(mesh, points, facets, patch)
     return np.einsum("pa,pai->pi", N, mesh.points[nodes]), normals
@@ -138,16 +144,20 @@ def surface_frame(
 def _surface_frame(
     mesh: TetMesh, points: ArrayLike, facets: str | Ints, patch: float
 ) -> tuple[Ints, Floats, Floats]:
-    """Nodes (p, a) of the facet below each point, shape functions (p, a) and normals (p, 3)."""
+    """Return the nodes (p, a) of the facet below each point, shape functions (p, a) and normals
+    (p, 3).
+    """
     nodes = facet_set(mesh, facets)
     points = np.atleast_2d(np.asarray(points, np.float64))
     if points.ndim != 2 or points.shape[1] not in (2, 3) or not np.isfinite(points).all():
-        raise ValueError(f"points of shape {points.shape}: give (p, 2 or 3) finite coordinates")
+        raise ValueError(
+            f"points have shape {points.shape}; give finite coordinates of shape (p, 2) or (p, 3)"
+        )
     if not len(nodes):
-        raise ValueError("there are no facets to read; name a facet set that is not empty")
-    owner, barycentric = _seen(mesh.points[nodes], points[:, :2])
-    if (beside := owner < 0).any():
-        x_mm, y_mm = 1e3 * points[beside][0, :2]
+        raise ValueError("the facet set is empty; name another one")
+    owner, barycentric = _facets_below(mesh.points[nodes], points[:, :2])
+    if (outside := owner < 0).any():
+        x_mm, y_mm = 1e3 * points[outside][0, :2]
         raise ValueError(
             f"point ({x_mm:g}, {y_mm:g}) mm is not on the surface of the body; move it inside"
         )
@@ -161,31 +171,33 @@ def _surface_frame(
 
 
 def _mean_normals(mesh: TetMesh, nodes: Ints, places: Floats, patch: float) -> Floats:
-    """Mean normals (p, 3) of facets (k, a) about places (p, 3), weighted by area and distance."""
+    """Return mean normals (p, 3) of facets (k, a) weighted by area and distance to places (p,
+    3).
+    """
     at, areas = facet_points(mesh, nodes), facet_geometry(mesh, nodes)[1].reshape(-1, 3)
-    found, count = np.empty((len(places), 3)), max(1, AT_ONCE // len(at))
+    normals, count = np.empty((len(places), 3)), max(1, AT_ONCE // len(at))
     for start in range(0, len(places), count):
         part = slice(start, start + count)
         squared = ((places[part, None] - at) ** 2).sum(axis=2)
-        nearest = squared.min(axis=1, keepdims=True)  # of facets larger than the patch one is left
-        found[part] = np.exp((nearest - squared) / (2 * patch**2)) @ areas
-    return found
+        nearest = squared.min(axis=1, keepdims=True)  # counts even if it is beyond the patch
+        normals[part] = np.exp((nearest - squared) / (2 * patch**2)) @ areas
+    return normals
 
 
 def _facet_tangents(mesh: TetMesh, nodes: Ints, barycentric: Floats) -> tuple[Floats, Floats]:
-    """The two edge tangents at one barycentric point (p, 3) per facet (p, a)."""
+    """Return the two edge tangents at one barycentric point (p, 3) of each facet (p, a)."""
     derivatives = shape_derivatives(barycentric, nodes.shape[1])
     tangents = np.einsum("pad,pai->pdi", derivatives, mesh.points[nodes])
     return tangents[:, 0], tangents[:, 1]
 
 
 def facet_geometry(mesh: TetMesh, nodes: Ints) -> tuple[Floats, Floats]:
-    """Shape values (q, a) and outward normals (e, q, i) times area and quadrature weight."""
+    """Return shape functions (q, a), and outward normals (e, q, i) times area and weight."""
     return facet_areas(mesh.points[nodes])
 
 
 def facet_areas(places: Floats) -> tuple[Floats, Floats]:
-    """`facet_geometry` of facets whose nodes are at places (e, a, i)."""
+    """Return the `facet_geometry` of facets with nodes at places (e, a, i)."""
     barycentric, weights = triangle_rule()
     derivatives = shape_derivatives(barycentric, places.shape[1])
     tangents = np.einsum("qad,eai->eqdi", derivatives, places, optimize=True)
@@ -194,105 +206,118 @@ def facet_areas(places: Floats) -> tuple[Floats, Floats]:
 
 
 def on_curved(elements: Floats, barycentric: Floats, points: Floats) -> Floats:
-    """Barycentric coordinates (p, 4) of points (p, 3) in curved tetrahedra with nodes (p, a, 3), by
-    Newton's method from others.
+    """Return barycentric coordinates (p, 4) of points (p, 3) in curved tetrahedra with nodes
+    (p, a, 3), by Newton's method from initial ones.
     """
     for _ in range(4):
-        miss, tangents = _missed(elements, barycentric, points)
+        miss, tangents = _offsets(elements, barycentric, points)
         step = np.linalg.solve(tangents, miss[:, :, None])[:, :, 0]
         barycentric = barycentric + np.column_stack([-step.sum(axis=1), step])
     return barycentric
 
 
 def on_surface(mesh: TetMesh, points: Floats, facets: str | Ints = "top") -> Bools:
-    """Mask (p,) of the points (p, 2) in metre at which `probe_operator` can read."""
-    return _seen(mesh.points[facet_set(mesh, facets)], points)[0] >= 0
+    """Return a mask (p,) of the points (p, 2) in metres that `probe_operator` accepts."""
+    return _facets_below(mesh.points[facet_set(mesh, facets)], points)[0] >= 0
 
 
-def _seen(facets: Floats, points: Floats) -> tuple[Ints, Floats]:
-    """Highest of the facets (k, a, 3) at each of the points (p, 2), seen along z, -1 where there is
-    none, and the barycentric coordinates (p, 3) there: a point is on a facet only if Newton's
-    method ends inside of it, as shape functions extrapolate without bound on a facet that is seen
-    edge-on.
+def _facets_below(facets: Floats, points: Floats) -> tuple[Ints, Floats]:
+    """Return the highest of the facets (k, a, 3) below each point (p, 2), or -1, and the
+    barycentric coordinates (p, 3) there.
+
+    Newton's method must end inside a facet, because shape functions extrapolate without bound on a
+    facet seen edge-on.
     """
-    who, which = _near(facets[:, :, :2], points)
-    barycentric, found = _within(facets[which, :, :2], points[who])
-    who, which, barycentric = who[found], which[found], barycentric[found]
+    point, facet = _candidates(facets[:, :, :2], points)
+    barycentric, is_on = _facet_coordinates(facets[facet, :, :2], points[point])
+    point, facet, barycentric = point[is_on], facet[is_on], barycentric[is_on]
     height = np.einsum(
-        "ma,ma->m", shape_functions(barycentric, facets.shape[1]), facets[which, :, 2]
+        "ma,ma->m", shape_functions(barycentric, facets.shape[1]), facets[facet, :, 2]
     )
     size = np.ptp(facets[:, :, :2], axis=(0, 1)).max(initial=0.0)
     level = np.rint(height / (SAME_HEIGHT * size or 1.0))
-    # Last is the highest; of neighbours that share an edge, the one that it is deepest inside.
-    order = np.lexsort((barycentric.min(axis=1), level, who))
-    last = order[np.append(np.diff(who[order]) > 0, True)[: len(order)]]
+    # The last is the highest; of neighbours that share an edge, the one the point is deepest in.
+    order = np.lexsort((barycentric.min(axis=1), level, point))
+    last = order[np.append(np.diff(point[order]) > 0, True)[: len(order)]]
     owner, coordinates = np.full(len(points), -1), np.zeros((len(points), 3))
-    # On an edge exactly: nodes off a clamped one would add round-off to what stays at rest.
-    barycentric = np.where(np.abs(barycentric) < CLOSE, 0.0, barycentric)[last]
-    owner[who[last]] = which[last]
-    coordinates[who[last]] = barycentric / barycentric.sum(axis=1, keepdims=True)
+    # Exactly on an edge: nodes off a clamped edge would add round-off to what stays at rest.
+    barycentric = np.where(np.abs(barycentric) < NEWTON_TOLERANCE, 0.0, barycentric)[last]
+    owner[point[last]] = facet[last]
+    coordinates[point[last]] = barycentric / barycentric.sum(axis=1, keepdims=True)
     return owner, coordinates
 
 
-def _near(facets: Floats, points: Floats) -> tuple[Ints, Ints]:
-    """Pairs (m,) of points (p, 2) and facets (k, a, 2) whose bounding boxes they lie in."""
+def _candidates(facets: Floats, points: Floats) -> tuple[Ints, Ints]:
+    """Return pairs (m,) of points (p, 2) and facets (k, a, 2) whose bounding boxes hold them."""
     hull = facets.copy()
-    if facets.shape[1] == 6:  # the control points of their edges, between which curves stay
+    if facets.shape[1] == 6:  # the control points of the edges, which bound curved ones
         corners = facets[:, :3]
         hull[:, 3:] = 2 * facets[:, 3:] - (corners + np.roll(corners, -1, axis=1)) / 2
     low, high = hull.min(axis=1), hull.max(axis=1)
-    slack = BESIDE * (high - low).max(axis=1, initial=0.0, keepdims=True)
+    slack = FACET_MARGIN * (high - low).max(axis=1, initial=0.0, keepdims=True)
     (left, below), (right, above) = (low - slack).T, (high + slack).T
-    who, which = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)]
+    pairs = [np.zeros((2, 0), np.intp)]
     count = max(1, AT_ONCE // max(len(facets), 1))
     for start in range(0, len(points), count):
         x, y = points[start : start + count].T[:, :, None]
-        pairs = np.nonzero((left <= x) & (x <= right) & (below <= y) & (y <= above))
-        who.append(pairs[0] + start)
-        which.append(pairs[1])
-    return np.concatenate(who), np.concatenate(which)
+        point, facet = np.nonzero((left <= x) & (x <= right) & (below <= y) & (y <= above))
+        pairs.append(np.stack([point + start, facet]))
+    point, facet = np.concatenate(pairs, axis=1)
+    return point, facet
 
 
-def _within(facets: Floats, points: Floats) -> tuple[Floats, Bools]:
-    """Barycentric coordinates (m, 3) of points (m, 2) on facets (m, a, 2), and whether each is on
-    its facet.
+def _facet_coordinates(facets: Floats, points: Floats) -> tuple[Floats, Bools]:
+    """Return barycentric coordinates (m, 3) of points (m, 2) on facets (m, a, 2), and whether each
+    point is on its facet.
     """
-    found = np.full((len(points), 3), 1 / 3)
+    coordinates = np.full((len(points), 3), 1 / 3)
     size = np.ptp(facets, axis=1).max(axis=1, initial=0.0)
-    missed, active = np.full(len(points), np.inf), np.arange(len(points))
-    for _ in range(MOST_STEPS):
-        miss, tangents = _missed(facets[active], found[active], points[active])
-        missed[active] = np.linalg.norm(miss, axis=1) / size[active]
+    distance, active = np.full(len(points), np.inf), np.arange(len(points))
+    for _ in range(NEWTON_STEPS):
+        miss, tangents = _offsets(facets[active], coordinates[active], points[active])
+        distance[active] = np.linalg.norm(miss, axis=1) / size[active]
         (a, b), (c, d) = np.moveaxis(tangents, 0, 2)
         area = a * d - b * c
-        standing = np.abs(area) < EDGE_ON * size[active] ** 2
-        missed[active[standing]] = np.inf  # seen edge-on there
-        going = ~standing & (missed[active] > CLOSE)
+        edge_on = np.abs(area) < EDGE_ON_AREA * size[active] ** 2
+        distance[active[edge_on]] = np.inf
+        going = ~edge_on & (distance[active] > NEWTON_TOLERANCE)
         miss, area = miss[going], area[going]
         second = (d[going] * miss[:, 0] - b[going] * miss[:, 1]) / area
         third = (a[going] * miss[:, 1] - c[going] * miss[:, 0]) / area
         active = active[going]
-        found[active] += np.column_stack([-second - third, second, third])
-        active = active[np.abs(found[active]).max(axis=1, initial=0.0) < FURTHEST]
+        coordinates[active] += np.column_stack([-second - third, second, third])
+        largest = np.abs(coordinates[active]).max(axis=1, initial=0.0)
+        active = active[largest < NEWTON_REACH]
         if not len(active):
             break
-    return found, (missed <= CLOSE) & (found.min(axis=1) >= -BESIDE)
+    is_inside = coordinates.min(axis=1) >= -FACET_MARGIN
+    return coordinates, (distance <= NEWTON_TOLERANCE) & is_inside
 
 
-def _missed(elements: Floats, barycentric: Floats, points: Floats) -> tuple[Floats, Floats]:
-    """Vectors (p, i) from places in elements (p, a, i) to points (p, i), and tangents (p, i, d)."""
+def _offsets(elements: Floats, barycentric: Floats, points: Floats) -> tuple[Floats, Floats]:
+    """Return vectors (p, i) from places in elements (p, a, i) to points (p, i), and the tangents
+    (p, i, d) there.
+    """
     N = shape_functions(barycentric, elements.shape[1])
     derivatives = shape_derivatives(barycentric, elements.shape[1])
     miss = points - np.einsum("pa,pai->pi", N, elements)
     return miss, np.einsum("pad,pai->pid", derivatives, elements)
 
 
+def straight_coordinates(corners: Floats, point: Floats) -> Floats:
+    """Return the barycentric coordinates (e, a) of a point (i,) in straight elements (e, a, i)."""
+    first = corners[:, 0]
+    edges = (corners[:, 1:] - first[:, None]).swapaxes(1, 2)
+    inner = np.linalg.solve(edges, (point - first)[:, :, None])[:, :, 0]
+    return np.column_stack([1 - inner.sum(axis=1), inner])
+
+
 def locate(mesh: TetMesh, points: ArrayLike) -> tuple[Ints, Floats]:
-    """Element (p,) that each point (p, 3) in metre lies in, and its barycentric coordinates (p, 4).
-    A point outside the body raises a ValueError.
+    """Return the element (p,) that each point (p, 3) in metres lies in, and its barycentric
+    coordinates (p, 4). Raises a ValueError if a point lies outside the body.
     """
     points = np.atleast_2d(np.asarray(points, np.float64))
-    owner, barycentric, inside = _located(mesh, points)
+    owner, barycentric, inside = _elements_at(mesh, points)
     if not inside.all():
         x, y, z = 1e3 * points[~inside][0]
         raise ValueError(f"point ({x:.4g}, {y:.4g}, {z:.4g}) mm is not in the body; move it inside")
@@ -300,51 +325,47 @@ def locate(mesh: TetMesh, points: ArrayLike) -> tuple[Ints, Floats]:
 
 
 def is_inside(mesh: TetMesh, points: ArrayLike) -> Bools:
-    """Mask (p,) of the points (p, 3) in metre that are in the body."""
-    return _located(mesh, np.atleast_2d(np.asarray(points, np.float64)))[2]
+    """Return a mask (p,) of the points (p, 3) in metres that lie in the body."""
+    return _elements_at(mesh, np.atleast_2d(np.asarray(points, np.float64)))[2]
 
 
-def _located(mesh: TetMesh, points: Floats) -> tuple[Ints, Floats, Bools]:
-    """Element (p,) of each point (p, 3), its coordinates (p, 4), and whether it is inside of it."""
+def _elements_at(mesh: TetMesh, points: Floats) -> tuple[Ints, Floats, Bools]:
+    """Return the element (p,) of each point (p, 3), coordinates (p, 4), and whether it is
+    inside.
+    """
     corners = mesh.points[mesh.tets[:, :4]]
     low, high = corners.min(axis=1), corners.max(axis=1)
-    slack = REACH * (high - low).max(axis=1, keepdims=True)
+    slack = BULGE * (high - low).max(axis=1, keepdims=True)
     low, high = low - slack, high + slack
-    found = [_containing(corners, low, high, point) for point in points]
-    owner = np.array([element for element, _ in found])
-    barycentric = np.array([coordinates for _, coordinates in found])
+    elements = [_containing(corners, low, high, point) for point in points]
+    owner = np.array([element for element, _ in elements])
+    barycentric = np.array([coordinates for _, coordinates in elements])
     inside = np.isfinite(barycentric).all(axis=1)
     if mesh.order == 2:
         nodes = mesh.points[mesh.tets[owner[inside]]]
         barycentric[inside] = on_curved(nodes, barycentric[inside], points[inside])
-    inside[inside] = barycentric[inside].min(axis=1) >= -BOWED * REACH - OUTSIDE
+    inside[inside] = barycentric[inside].min(axis=1) >= -BOWED_MARGIN * BULGE - ELEMENT_MARGIN
     return owner, barycentric, inside
 
 
 def _containing(corners: Floats, low: Floats, high: Floats, point: Floats) -> tuple[int, Floats]:
-    """The straight element that a point (3,) is in, or the least outside of those near it, and its
-    coordinates, which are nan if none is near.
+    """Return the straight element that a point (3,) is in or nearest to, and its coordinates; nan
+    if no element is near.
     """
     near = np.flatnonzero(((low <= point) & (point <= high)).all(axis=1))
     if not len(near):
         return 0, np.full(4, np.nan)
-    first = corners[near, 0]
-    edges = (corners[near, 1:] - first[:, None]).swapaxes(1, 2)
-    inner = np.linalg.solve(edges, (point - first)[:, :, None])[:, :, 0]
-    coordinates = np.column_stack([1 - inner.sum(axis=1), inner])
+    coordinates = straight_coordinates(corners[near], point)
     best = int(coordinates.min(axis=1).argmax())
     return int(near[best]), coordinates[best]
 
 
 def displacement_operator(mesh: TetMesh, points: ArrayLike) -> sparse.csr_array:
-    """Displacement operator (3 p, 3 n), component fastest, at points (p, 3) in metre inside a body.
-    A point outside raises a ValueError.
+    """Return the displacement operator (3 p, 3 n), component fastest, at points (p, 3) in metres
+    inside a body. Raises a ValueError if a point lies outside.
     """
     owner, barycentric = locate(mesh, points)
     nodes = mesh.tets[owner]
     N = shape_functions(barycentric, nodes.shape[1])
-    rows, component = np.arange(len(owner))[:, None, None], np.arange(3)
-    columns = 3 * nodes[:, :, None] + component
-    values = np.broadcast_to(N[:, :, None], columns.shape).ravel()
-    places = np.broadcast_to(3 * rows + component, columns.shape).ravel(), columns.ravel()
-    return sparse.csr_array((values, places), shape=(3 * len(owner), mesh.n_dofs))
+    rows = dofs_of(np.arange(len(owner)))[:, None]
+    return from_entries(N[..., None], rows, dofs_of(nodes), (3 * len(owner), mesh.n_dofs))

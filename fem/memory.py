@@ -1,47 +1,45 @@
-"""Memory that this process may still take, and what a body takes of it."""
+"""Free memory, and the memory that a body needs."""
 
 import math
 from pathlib import Path
 
-# Of matrices, temporaries of the assembly and Krylov vectors, without the factor: measured 7.9 to
-# 8.3 kB for slabs of 76,000 to 260,000 dofs at five probes.
+# Matrices, temporaries of the assembly and Krylov vectors, without the factor: measured as 7.9 to
+# 8.3 kB for slabs of 76,000 to 260,000 dofs with five probes.
 BYTES_PER_DOF = 8.3e3
 CGROUP = Path("/sys/fs/cgroup")
 
 
 def check_memory(dofs: int) -> None:
-    """Refuse, by a MemoryError and before anything is assembled, a body whose matrices take more
-    memory than is free, even with their factor in files.
+    """Raise a MemoryError if the matrices of a body need more memory than is free, even with their
+    factor in files.
     """
     needed, free = BYTES_PER_DOF * dofs, free_memory()
     if needed > free:
         raise MemoryError(
-            f"{dofs:,} degrees of freedom take about {needed / 2**30:.2g} GiB beside their factor, "
-            f"and {free / 2**30:.2g} GiB of memory are free, enough for {free / BYTES_PER_DOF:,.0f}"
-            "; take larger elements or a smaller body"
+            f"{dofs:,} degrees of freedom need about {needed / 2**30:.2g} GiB of memory plus the "
+            f"factor, but only {free / 2**30:.2g} GiB are free, enough for "
+            f"{free / BYTES_PER_DOF:,.0f} degrees of freedom; use larger elements or a smaller body"
         )
 
 
 def free_memory() -> float:
-    """Bytes that may still be taken, of the machine's or of the container's; infinite where the
-    system does not tell.
-    """
-    return min(_of_machine(), _of_container())
+    """Return the free bytes of the machine or container; infinity where the system reports none."""
+    return min(_free_of_machine(), _free_of_container())
 
 
-def _of_machine() -> float:
+def _free_of_machine() -> float:
     try:
         lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
     except OSError:
         return math.inf
-    known = dict(line.split(":", 1) for line in lines)
-    return 1024.0 * int(known["MemAvailable"].split()[0])
+    sizes = dict(line.split(":", 1) for line in lines)
+    return 1024.0 * int(sizes["MemAvailable"].split()[0])
 
 
-def _of_container() -> float:
+def _free_of_container() -> float:
     try:
-        most = (CGROUP / "memory.max").read_text(encoding="ascii").strip()
-        taken = (CGROUP / "memory.current").read_text(encoding="ascii")
+        limit = (CGROUP / "memory.max").read_text(encoding="ascii").strip()
+        used = (CGROUP / "memory.current").read_text(encoding="ascii")
     except OSError:
         return math.inf
-    return math.inf if most == "max" else float(most) - float(taken)
+    return math.inf if limit == "max" else float(limit) - float(used)

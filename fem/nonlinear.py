@@ -1,14 +1,14 @@
 """Nonlinear statics and dynamics at large displacement: M u'' + f_int(u, u', d) = f(t, u).
 
-Statics by Newton's method with a line search, in load steps if need be. Dynamics by the average
+Statics uses Newton's method with a line search, in load steps if needed. Dynamics uses the average
 acceleration of `transient`, with forces balanced in the mean of the ends of a step,
 
     M (a' + a) + f_int(u', v') - f' + f_int(u, v) - f = 0
 
-and the stretches d of Maxwell branches at these ends, by the trapezoidal rule (Belytschko, Liu and
-Moran, Nonlinear Finite Elements for Continua and Structures (2000), chapter 6). One factorisation
-serves as many steps as Newton's method converges with it (modified Newton). Energy is conserved to
-second order in the step.
+and the trapezoidal rule for the stretches d of Maxwell branches (Belytschko, Liu and Moran,
+Nonlinear Finite Elements for Continua and Structures (2000), chapter 6). A factorisation is reused
+as long as Newton's method converges with it (modified Newton). Energy is conserved to second order
+in the step.
 """
 
 from collections.abc import Callable, Iterator
@@ -24,13 +24,13 @@ from fem.typing import Floats
 
 MOST_ITERATIONS = 25
 MOST_HALVINGS = 6  # of a load or time step
-SLOW = 0.3  # of a correction, beyond which the next one calls for another tangent
-ROUND_OFF = 1e-5  # of the load: a residual below it is assessed by the correction it calls for
-STANDSTILL = 1e-6  # of the displacement: a step below it counts as none
+SLOW = 0.3  # ratio of successive corrections above which the tangent is factorised again
+ROUND_OFF = 1e-5  # of the load: a smaller residual is judged by the correction it causes
+STANDSTILL = 1e-6  # of the displacement: the least scale of a step's correction
 
 
 class _Stuck(ArithmeticError):
-    """Newton's method did not converge; its argument is the relative residual."""
+    """Newton's method did not converge; the argument is the relative residual."""
 
 
 def static(
@@ -41,12 +41,26 @@ def static(
     tolerance: float = 1e-8,
     solver: str = "auto",
 ) -> Floats:
-    """Static displacement (3 n,) in metre under a force (3 n,) in N, applied in as few load steps
-    as converge, from an initial guess or undeformed.
+    """Return the static displacement under a force, applied in as few load steps as converge.
 
-    The `tolerance` is of the residual relative to the force or, below `ROUND_OFF`, of the
-    correction that it calls for, relative to the displacement. If Newton's method does not converge
-    even in steps of 1/64 of the load, it raises Diverged.
+    Parameters
+    ----------
+    body : Elastic
+    force : (3 n,) float, N
+    start : (3 n,) float, m, initial guess; undeformed by default
+    tolerance : largest residual relative to the force; or, for residuals below `ROUND_OFF`, largest
+        correction relative to the displacement
+    solver : backend of `factorise`
+
+    Returns
+    -------
+    (3 n,) float
+        Displacement, m.
+
+    Raises
+    ------
+    Diverged
+        If Newton's method does not converge in steps of 1/64 of the load.
     """
     operators = body.operators
     free = operators.free
@@ -65,9 +79,9 @@ def static(
             part /= 2
             if part < 0.5**MOST_HALVINGS:
                 raise Diverged(
-                    f"no equilibrium was found at {100 * target:.3g} % of the load: a residual of "
-                    f"{stuck.args[0]:.2g} of it is left, above {tolerance:g}, after load steps of "
-                    f"1/{2**MOST_HALVINGS}; lower the load, or refine the mesh where it bends most"
+                    f"no equilibrium was found at {100 * target:.3g} % of the load in load steps "
+                    f"of 1/{2**MOST_HALVINGS}: the relative residual is {stuck.args[0]:.2g}, above "
+                    f"{tolerance:g}; lower the load, or refine the mesh where it bends most"
                 ) from None
         else:
             reached, part = target, 2 * part
@@ -81,33 +95,33 @@ def _newton(
     tolerance: float,
     solver: str,
 ) -> Floats:
-    left = np.inf
+    residual = np.inf
     for _ in range(MOST_ITERATIONS):
         r, size = unbalanced(u)
-        left = float(np.linalg.norm(r)) / (size or 1.0)
-        if not np.isfinite(left):
+        residual = float(np.linalg.norm(r)) / (size or 1.0)
+        if not np.isfinite(residual):
             break
-        if left <= tolerance:
+        if residual <= tolerance:
             return u
         try:
             step = factorise(body.tangent(u), backend=solver).solve(r)
         except ValueError:  # no longer positive definite: too far from the solution
             break
-        # The residual of thin bodies ends as round-off of forces that cancel: it moves nothing.
+        # The residual of thin bodies may be round-off of cancelling forces, which moves nothing.
         size = float(np.linalg.norm(u))
-        if left <= ROUND_OFF and float(np.linalg.norm(step)) <= tolerance * size:
+        if residual <= ROUND_OFF and float(np.linalg.norm(step)) <= tolerance * size:
             return u + step
-        if float(step @ r) <= 0.0:  # nor is it for solvers that do not tell
+        if float(step @ r) <= 0.0:  # likewise, for solvers that raise no error
             break
         u = u + _line_search(unbalanced, u, step) * step
-    raise _Stuck(left)
+    raise _Stuck(residual)
 
 
 def _line_search(
     unbalanced: Callable[[Floats], tuple[Floats, float]], u: Floats, step: Floats
 ) -> float:
-    """Line search: the fraction of a step at which the residual does no more work along it."""
-    from scipy.optimize import brentq  # which takes long to import
+    """Return the fraction of a step at which the residual does no work along it."""
+    from scipy.optimize import brentq  # slow to import
 
     def work(part: float) -> float:
         return float(step @ unbalanced(u + part * step)[0])
@@ -119,9 +133,9 @@ def _line_search(
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Now:
-    """Free components of a state, with the load and the internal force; the strain and stretch of
-    each kind of Maxwell branches.
+class _Moment:
+    """Free components of a state, with load and internal force, and the strain and stretch of each
+    kind of Maxwell branches.
     """
 
     t: float
@@ -143,135 +157,149 @@ def dynamic(
     tolerance: float = 1e-3,
     solver: str = "auto",
 ) -> Iterator[State]:
-    """Time integration by average acceleration and Newton's method, without end: states at 0, dt, 2
-    dt, ..., from rest or an initial displacement and velocity, under nodal forces (3 n,) in N of a
-    time in s.
+    """Integrate in time by average acceleration and Newton's method, without end.
 
-    Arguments are those of `transient`; the `tolerance` is of the last correction of a step's
-    displacement, relative to it. A step for which Newton's method does not converge is made of two
-    halves, and so on; if even 64 parts do not, it raises Diverged.
+    Parameters
+    ----------
+    body : Elastic
+    force : function of the time in s that returns nodal forces (3 n,) in N
+    dt : time step, s
+    initial : state with initial displacement and velocity; at rest by default
+    tolerance : largest last correction of a step's displacement, relative to it
+    solver : backend of `factorise`
+
+    Yields
+    ------
+    State
+        At 0, dt, 2 dt, ...
+
+    Raises
+    ------
+    ValueError
+        If dt is not a finite number above 0.
+    Diverged
+        If a step does not converge even when divided into 64 parts.
     """
     check_step(dt)
-    free, start = body.operators.free, initial or at_rest(body.operators.n_dofs)
-    u, v = start.displacement[free], start.velocity[free]
-    f, internal = force(start.time)[free], body.internal(u)
-    strain = tuple(part.strain(u) for part in body.relaxing)
-    stretch = start.stretch or tuple(
-        np.zeros((len(part.times), *e.shape)) for part, e in zip(body.relaxing, strain, strict=True)
-    )
-    internal = internal + body.viscous(u, v) + _relaxing_force(body, u, stretch)
-    a = acceleration(body.operators, f - internal)
-    now = _Now(t=start.time, u=u, v=v, a=a, force=f, internal=internal,
-               strain=strain, stretch=stretch)  # fmt: skip
-    march = _March(body=body, force=force, tolerance=tolerance, solver=solver)
-    factors: dict[float, Factor] = {}
+    march = _March(body, force, tolerance, solver)
+    start = initial or at_rest(body.operators.n_dofs)
+    now = march.start(start)
     for step in count(1):
-        yield _state(body, now)
+        yield march.state(now)
         try:
-            now = _advance(march, now, start.time + step * dt, factors, 0)
+            now = march.advance(now, start.time + step * dt)
         except _Stuck as stuck:
             raise Diverged(
                 f"step {step} of dt = {dt:g} s, to t = {start.time + step * dt:g} s, did not "
-                f"converge even in {2**MOST_HALVINGS} parts: a residual of {stuck.args[0]:.2g} of "
-                f"the load is left, with corrections above {tolerance:g} of a part; shorten dt or "
-                "lower the load"
+                f"converge in {2**MOST_HALVINGS} parts: the residual is {stuck.args[0]:.2g} of the "
+                f"load, with corrections above {tolerance:g} of a part; shorten dt or lower the "
+                "load"
             ) from None
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
 class _March:
-    """Body, load, tolerance and solver of a time integration, the same in every step."""
+    """Time integration of one body under one load, with its cached factorisations."""
 
-    body: Elastic
-    force: Callable[[float], Floats]
-    tolerance: float
-    solver: str
+    def __init__(
+        self, body: Elastic, force: Callable[[float], Floats], tolerance: float, solver: str
+    ) -> None:
+        self.body, self.force, self.tolerance, self.solver = body, force, tolerance, solver
+        self.factors: dict[int, Factor] = {}  # by the number of halvings of the step
 
+    def start(self, initial: State) -> _Moment:
+        """Return the first moment, with the acceleration that balances the forces."""
+        body, free = self.body, self.body.operators.free
+        u, v = initial.displacement[free], initial.velocity[free]
+        strain = tuple(part.strain(u) for part in body.relaxing)
+        stretch = initial.stretch or tuple(
+            np.zeros((len(part.times), *e.shape))
+            for part, e in zip(body.relaxing, strain, strict=True)
+        )
+        f, internal = self.force(initial.time)[free], self._internal(u, v, stretch)
+        a = acceleration(body.operators, f - internal)
+        return _Moment(t=initial.time, u=u, v=v, a=a, force=f, internal=internal,
+                       strain=strain, stretch=stretch)  # fmt: skip
 
-def _advance(
-    march: _March, now: _Now, until: float, factors: dict[float, Factor], halvings: int
-) -> _Now:
-    try:
-        return _step(march, now, until, factors, halvings)
-    except _Stuck:
-        factors.pop(halvings, None)
-        if halvings == MOST_HALVINGS:
-            raise
-    middle = _advance(march, now, (now.t + until) / 2, factors, halvings + 1)
-    return _advance(march, middle, until, factors, halvings + 1)
+    def state(self, now: _Moment) -> State:
+        """Return the state on all degrees of freedom."""
+        expand = self.body.operators.expand
+        return State(
+            time=now.t, displacement=expand(now.u), velocity=expand(now.v),
+            acceleration=expand(now.a), stretch=now.stretch,
+        )  # fmt: skip
 
+    def advance(self, now: _Moment, until: float, halvings: int = 0) -> _Moment:
+        """Return the state at a time, in one step or, if it does not converge, two halves."""
+        try:
+            return self._step(now, until, halvings)
+        except _Stuck:
+            self.factors.pop(halvings, None)
+            if halvings == MOST_HALVINGS:
+                raise
+        middle = self.advance(now, (now.t + until) / 2, halvings + 1)
+        return self.advance(middle, until, halvings + 1)
 
-def _step(
-    march: _March, now: _Now, until: float, factors: dict[float, Factor], halvings: int
-) -> _Now:
-    """One step by Newton's method, with the factorisation cached by `halvings` while it
-    converges.
-    """
-    body = march.body
-    C, M, free = body.operators.C, body.operators.M, body.operators.free
-    dt, a, before, residual = until - now.t, now.a, np.inf, np.inf
-    shares = [2 * part.times / (dt + 2 * part.times) for part in body.relaxing]
-    predicted = now.u + dt * now.v + dt**2 / 4 * now.a
-    f = march.force(until)[free]
-    load = f + now.force
-    for _ in range(MOST_ITERATIONS):
-        u = predicted + dt**2 / 4 * a
-        v = now.v + dt / 2 * (now.a + a)
-        _, stretch = _relaxed(body, now, u, shares)
-        internal = body.internal(u) + body.viscous(u, v) + _relaxing_force(body, u, stretch)
-        r = load - M @ (a + now.a) - internal - now.internal
-        residual = float(np.linalg.norm(r) / (np.linalg.norm(load) or 1.0))
-        if not np.isfinite(residual):
-            break
-        if halvings not in factors:
-            K = body.tangent(u)
+    def _step(self, now: _Moment, until: float, halvings: int) -> _Moment:
+        body, tolerance = self.body, self.tolerance
+        M, free = body.operators.M, body.operators.free
+        dt, a, before, residual = until - now.t, now.a, np.inf, np.inf
+        shares = [2 * part.times / (dt + 2 * part.times) for part in body.relaxing]
+        predicted = now.u + dt * now.v + dt**2 / 4 * now.a
+        f = self.force(until)[free]
+        load = f + now.force
+        for _ in range(MOST_ITERATIONS):
+            u = predicted + dt**2 / 4 * a
+            v = now.v + dt / 2 * (now.a + a)
+            _, stretch = self._relaxed(now, u, shares)
+            r = load - M @ (a + now.a) - self._internal(u, v, stretch) - now.internal
+            residual = float(np.linalg.norm(r) / (np.linalg.norm(load) or 1.0))
+            if not np.isfinite(residual):
+                break
+            try:
+                change = self._factor(u, dt, shares, halvings).solve(r)
+            except ValueError:  # the tangent is not positive definite
+                break
+            a = a + change
+            sizes = (u - now.u, dt**2 / 4 * a, STANDSTILL * u)
+            step = max(float(np.linalg.norm(size)) for size in sizes)
+            left = dt**2 / 4 * float(np.linalg.norm(change)) / (step or 1.0)
+            shrinks = left <= max(SLOW * before, tolerance / 100)
+            if left <= tolerance and (shrinks or before <= tolerance):
+                # One more residual would only confirm what this correction leaves: its square or,
+                # with an old tangent, a small part of it. The balance of forces replaces it.
+                u, v = u + dt**2 / 4 * change, v + dt / 2 * change
+                internal = load - M @ (a + now.a) - now.internal
+                strain, stretch = self._relaxed(now, u, shares)
+                return _Moment(t=until, u=u, v=v, a=a, force=f, internal=internal,
+                               strain=strain, stretch=stretch)  # fmt: skip
+            if left > SLOW * before:
+                self.factors.pop(halvings)
+            before = left
+        raise _Stuck(residual)
+
+    def _factor(self, u: Floats, dt: float, shares: list[Floats], halvings: int) -> Factor:
+        """Return the cached factorisation, or that of the tangent at u."""
+        if halvings not in self.factors:
+            body, K = self.body, self.body.tangent(u)
             for part, share in zip(body.relaxing, shares, strict=True):
                 K = K + part.tangent(u, share)
-            system = M + dt * (C / 2 + dt / 4 * K)
-            try:
-                factors[halvings] = factorise(system, backend=march.solver)
-            except ValueError:
-                break
-        change = factors[halvings].solve(r)
-        a = a + change
-        sizes = (u - now.u, dt**2 / 4 * a, STANDSTILL * u)
-        step = max(float(np.linalg.norm(size)) for size in sizes)
-        left = dt**2 / 4 * float(np.linalg.norm(change)) / (step or 1.0)
-        shrinks = left <= max(SLOW * before, march.tolerance / 100)
-        if left <= march.tolerance and (shrinks or before <= march.tolerance):
-            # One more residual would only confirm what this correction leaves: its square or, with
-            # an old tangent, a small part of it. The balance of forces stands for it.
-            u, v = u + dt**2 / 4 * change, v + dt / 2 * change
-            internal = load - M @ (a + now.a) - now.internal
-            strain, stretch = _relaxed(body, now, u, shares)
-            return _Now(t=until, u=u, v=v, a=a, force=f, internal=internal,
-                        strain=strain, stretch=stretch)  # fmt: skip
-        if left > SLOW * before:
-            factors.pop(halvings)
-        before = left
-    raise _Stuck(residual)
+            system = body.operators.M + dt * (body.operators.C / 2 + dt / 4 * K)
+            self.factors[halvings] = factorise(system, backend=self.solver)
+        return self.factors[halvings]
 
+    def _internal(self, u: Floats, v: Floats, stretch: tuple[Floats, ...]) -> Floats:
+        """Return the internal force, including viscosity and Maxwell branches."""
+        each = zip(self.body.relaxing, stretch, strict=True)
+        relaxing = sum((part.force(u, d) for part, d in each), np.zeros_like(u))
+        return self.body.internal(u) + self.body.viscous(u, v) + relaxing
 
-def _relaxed(
-    body: Elastic, now: _Now, u: Floats, shares: list[Floats]
-) -> tuple[tuple[Floats, ...], tuple[Floats, ...]]:
-    """Strains and stretches of the branches at the end of a step, at a displacement u."""
-    strain = tuple(part.strain(u) for part in body.relaxing)
-    each = zip(shares, now.stretch, now.strain, strain, strict=True)
-    return strain, tuple(
-        np.multiply.outer(2 * x - 1, np.ones_like(new)) * d + np.multiply.outer(x, new - old)
-        for x, d, old, new in each
-    )
-
-
-def _relaxing_force(body: Elastic, u: Floats, stretch: tuple[Floats, ...]) -> Floats:
-    each = zip(body.relaxing, stretch, strict=True)
-    return sum((part.force(u, d) for part, d in each), np.zeros_like(u))
-
-
-def _state(body: Elastic, now: _Now) -> State:
-    expand = body.operators.expand
-    return State(
-        time=now.t, displacement=expand(now.u), velocity=expand(now.v), acceleration=expand(now.a),
-        stretch=now.stretch,
-    )  # fmt: skip
+    def _relaxed(
+        self, now: _Moment, u: Floats, shares: list[Floats]
+    ) -> tuple[tuple[Floats, ...], tuple[Floats, ...]]:
+        """Return strains and stretches of the branches at the end of a step, at displacement u."""
+        strain = tuple(part.strain(u) for part in self.body.relaxing)
+        each = zip(shares, now.stretch, now.strain, strain, strict=True)
+        return strain, tuple(
+            np.multiply.outer(2 * x - 1, np.ones_like(new)) * d + np.multiply.outer(x, new - old)
+            for x, d, old, new in each
+        )

@@ -1,10 +1,10 @@
-"""MKL's PARDISO, where it is installed, on the upper triangle of symmetric matrices: Cholesky if
-real, LDL^T if complex.
+"""Interface to MKL PARDISO for the upper triangle of symmetric matrices: Cholesky if real, LDL^T
+if complex.
 
-PARDISO orders blocks of rows with similar patterns, as those of a node's components: 0.7 s instead
-of 2.8 for a slab of 128,000 dofs, and a third of the memory. A factor that is larger than the
-memory that is free is kept in files (out of core), which PARDISO writes and reads: its size is
-known after the analysis, before anything is factorised.
+Rows with similar patterns, such as those of one node, are ordered as blocks: 0.7 s instead of 2.8 s
+for a slab of 128,000 dofs, and a third of the memory. A factor larger than the free memory is kept
+in files (out of core), which PARDISO writes and reads. Its size is known after the analysis, before
+anything is factorised.
 """
 
 import ctypes
@@ -28,20 +28,20 @@ from fem.typing import Array, Index
 log = logging.getLogger(__name__)
 
 SPARSE = 0.1  # share of n^2 in the upper triangle; blocks of denser matrices may crash PARDISO
-BLOCKS = 80  # %: how much alike the patterns of rows are that PARDISO takes as a block
-TWO_LEVELS, SINGLE, BY_BLOCKS, OUT_OF_CORE = 23, 27, 36, 59  # of its settings; 2 for files
-IN_CORE = 0.8  # of the memory that is free, at most, for a factor; vectors need the rest
-LEAST_CORE = 500  # MB that it may use beside the files: with less it fails
+BLOCKS = 80  # %: similarity of the patterns of rows that PARDISO orders as a block
+TWO_LEVELS, SINGLE, BY_BLOCKS, OUT_OF_CORE = 23, 27, 36, 59  # indices of its settings
+IN_CORE = 0.8  # of the free memory, at most, for a factor; vectors need the rest
+LEAST_CORE = 500  # MB of memory beside the files, without which it fails
 PHASES = {"analyse": 11, "factorise": 22, "solve": 33, "release": -1}
 
 
 class PardisoError(ArithmeticError):
-    """Failure of PARDISO, by the number of its error."""
+    """PARDISO failed; the message has the number of its error."""
 
 
 @cache
 def mkl() -> ctypes.CDLL | None:
-    """The MKL runtime of the `mkl` wheel, if it is installed."""
+    """Return the MKL runtime of the `mkl` wheel, or None if it is not installed."""
     for folder in ("lib", "Library/bin"):
         for path in sorted(Path(sys.prefix, folder).glob("*mkl_rt*")):
             try:
@@ -52,11 +52,11 @@ def mkl() -> ctypes.CDLL | None:
 
 
 class Pardiso:
-    """PARDISO on upper triangles of one pattern, which it analyses once."""
+    """PARDISO on upper triangles of one pattern, which is analysed once."""
 
     def __init__(self, indices: Index, indptr: Index, kind: int, *, single: bool = False) -> None:
-        """Columns and starts of rows, numbered from 1, which it keeps; kind 2 for real matrices, 6
-        for complex.
+        """Keep columns and row starts, numbered from 1. The kind is 2 for real matrices, 6 for
+        complex ones.
         """
         self._indices, self._indptr, self._kind, self._n = indices, indptr, kind, len(indptr) - 1
         self._handle, self._settings = np.zeros(64, np.int64), np.zeros(64, np.int32)
@@ -68,12 +68,12 @@ class Pardiso:
         self._values: Array = np.zeros(0)
         self._scale, self._folders = 1.0, list[str]()
         self._analysed, self._environment = False, partial(_environment, None, 0.0)
-        known = self._handle, self._settings, kind, self._n
-        weakref.finalize(self, _release, *known, self._folders)
+        state = self._handle, self._settings, kind, self._n
+        weakref.finalize(self, _release, *state, self._folders)
 
     def factorise(self, values: Array) -> None:
-        """Factorise a matrix, whose values (nnz,) are scaled in place."""
-        # PARDISO perturbs pivots below an absolute bound: entries of about 1 make it relative.
+        """Factorise a matrix; its values (nnz,) are scaled in place."""
+        # PARDISO perturbs pivots below an absolute bound; entries near 1 make it relative.
         self._scale = 2.0 ** np.round(np.log2(np.abs(values).max(initial=1e-300)))
         values /= self._scale
         self._values = values
@@ -90,21 +90,21 @@ class Pardiso:
         if size <= IN_CORE * limit:
             return
         self._folders.append(_folder(self._n, size, limit))
-        # With blocks and two levels some solutions take 30 times as long as others then.
+        # Out of core, blocks and two levels make some solutions 30 times slower.
         self._run("release")
         self._settings[[TWO_LEVELS, BY_BLOCKS]], self._settings[OUT_OF_CORE] = 0, 2
         self._environment = partial(_environment, self._folders[0], limit)
         with self._environment():
             self._run("analyse")
 
-    def forget(self) -> None:
-        """Free the matrix, without which a Cholesky factor, which perturbs no pivots, solves."""
+    def free_matrix(self) -> None:
+        """Free the matrix, which a Cholesky factor in memory does not need to solve."""
         if not self._folders:
             self._values = self._values[:1].copy()
             self._indices, self._indptr = self._indices[:1].copy(), self._indptr[:1].copy()
 
     def solve(self, b: Array) -> Array:
-        """Solution (n,) or (n, k) of right-hand sides."""
+        """Return the solution (n,) or (n, k) of right-hand sides."""
         x = self._run("solve", b)
         x /= self._scale
         return x
@@ -123,7 +123,7 @@ def _call(
     matrix: tuple[Array, Array, Array] | None = None,
     b: Array | None = None,
 ) -> Array:
-    """A phase of PARDISO; the solution (n, k) of right-hand sides b (n, k)."""
+    """Run a phase of PARDISO; return the solution (n, k) of right-hand sides b (n, k)."""
     values, indptr, indices = matrix or (np.zeros(1),) * 3
     right = 1 if b is None or b.ndim == 1 else b.shape[1]
     b = np.zeros(1, values.dtype) if b is None else np.asfortranarray(b, values.dtype)
@@ -138,34 +138,34 @@ def _call(
         b.ctypes.data_as(pointer), x.ctypes.data_as(pointer), ctypes.byref(error),
     )  # fmt: skip
     if error.value == -2:
-        raise MemoryError(f"not enough memory to factorise {n:,} dofs; coarsen the mesh")
+        raise MemoryError(f"not enough memory to factorise {n:,} dofs; use larger elements")
     if error.value:
-        raise PardisoError(f"PARDISO error {error.value}, {phase}")
+        raise PardisoError(f"PARDISO error {error.value} in phase {phase}")
     return x
 
 
 def _folder(n: int, size: float, limit: float) -> str:
-    """New folder for the files of a factor of so many bytes, if the disk has room for it."""
+    """Make a folder for the files of a factor of `size` bytes, if the disk has room for it."""
     folder = tempfile.mkdtemp(prefix="skinwave-factor-")
     needed, room = f"{size / 2**30:.2g} GiB", shutil.disk_usage(folder).free
     memory = f"{limit / 2**30:.2g} GiB of memory"
     if size > room:
         os.rmdir(folder)
         raise MemoryError(
-            f"the factor of {n:,} dofs takes {needed}, more than the {memory} that are free and "
-            f"the {room / 2**30:.2g} GiB of disk under {tempfile.gettempdir()}; coarsen the mesh, "
-            "or set TMPDIR to a folder of a larger disk"
+            f"the factor of {n:,} dofs needs {needed}, but only {memory} and "
+            f"{room / 2**30:.2g} GiB of disk under {tempfile.gettempdir()} are free; use larger "
+            "elements, or set TMPDIR to a folder on a larger disk"
         )
     log.warning(
-        "the factor of %s dofs takes %s, more than the %s that are free: it is kept in files under "
-        "%s, and each solution reads them", f"{n:,}", needed, memory, folder,
+        "the factor of %s dofs needs %s, but only %s are free: it is kept in files under %s, which "
+        "each solution reads", f"{n:,}", needed, memory, folder,
     )  # fmt: skip
     return folder
 
 
 @contextmanager
 def _environment(folder: str | None, limit: float) -> Iterator[None]:
-    """Where PARDISO keeps its files, if any, and how much memory it may use beside them."""
+    """Set the folder of PARDISO's files, if any, and the memory in bytes that it may use."""
     core = max(LEAST_CORE, round(IN_CORE * limit / 2**20))
     wanted = {"MKL_PARDISO_OOC_PATH": folder, "MKL_PARDISO_OOC_MAX_CORE_SIZE": str(core)}
     before = {name: os.environ[name] for name in wanted if name in os.environ}

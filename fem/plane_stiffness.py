@@ -1,11 +1,11 @@
-"""Stiffness of a sheet beyond that of an isotropic solid: orthotropy, and in-plane tension.
+"""Stiffness of a sheet beyond that of an isotropic solid: orthotropy and in-plane tension.
 
     K_ab,ij += int (Q - Q_iso)_kl,mn N_a,l N_b,n dV       on the in-plane strains alone
     K_ab,ij += n_i n_j int (T_k / h) N_a,k N_b,k dV       k along the sides x and y of the sheet
 
 Plane stress relaxes the stress across the sheet with D_zz and D_z,kl alone, which are those of the
-isotropic mean, so that Q is the plane stress stiffness of the sum. The tension acts on the slopes
-of the normal displacement alone: the meshed, thicker sheet is too soft in its plane. (Reddy,
+isotropic mean, so Q is the plane stress stiffness of the sum. Tension acts on the slopes of the
+normal displacement alone, because the thicker sheet of the mesh is too soft in its plane. (Reddy,
 Mechanics of Laminated Composite Plates and Shells (2004), chapters 1 and 3.)
 """
 
@@ -28,15 +28,15 @@ SIDES = np.eye(3)[:2]  # unit vectors (2, 3) along the sides x and y of a sheet 
 
 @dataclass(frozen=True, kw_only=True)
 class Tension:
-    """Uniform in-plane tension of a sheet, `x` and `y` in N/m along its sides. It has no loss."""
+    """Uniform in-plane tension of a sheet, `x` and `y` in N/m along its sides, without loss."""
 
     x: float
     y: float
 
 
 def directional_parts(materials: Sequence[Material]) -> dict[int, Floats]:
-    """Plane stress stiffness (3, 3) in Pa of each orthotropic material, by its index, less that of
-    its isotropic mean.
+    """Return the plane stress stiffness (3, 3) in Pa of each orthotropic material minus that of its
+    isotropic mean, by index.
     """
     return {
         m: solid.plane_stress - replace(solid, orthotropy=None).plane_stress
@@ -48,8 +48,8 @@ def directional_parts(materials: Sequence[Material]) -> dict[int, Floats]:
 def orthotropic_stiffness(
     mesh: TetMesh, pattern: SparsityPattern, added: Floats, axes: Floats
 ) -> sparse.bsr_array:
-    """Stiffness (3 n, 3 n) in N/m of elements of a pattern against in-plane strain, by the
-    stiffness (3, 3) in Pa for the strains xx, yy and 2 xy along the axes (2, 3) of the sheet.
+    """Return the stiffness (3 n, 3 n) in N/m that `added` (3, 3) in Pa gives the strains xx, yy and
+    2 xy along the axes (2, 3) of the sheet.
     """
     x, y = axes
     # 2 u_(x,y) = y . grad u . x + x . grad u . y
@@ -66,8 +66,8 @@ def orthotropic_stiffness(
 def tension_stiffness(
     mesh: TetMesh, pattern: SparsityPattern, tension: Tension, axes: Floats
 ) -> sparse.bsr_array:
-    """Geometric stiffness (3 n, 3 n) in N/m of a uniform in-plane tension on the normal
-    displacement of a sheet of one thickness, with unit vectors (2, 3) along its sides.
+    """Return the geometric stiffness (3 n, 3 n) in N/m of a tension on the normal displacement of a
+    sheet of uniform thickness, with axes (2, 3) along its sides.
     """
     normal = np.cross(*axes)
     stress = axes.T @ np.diag([tension.x, tension.y]) @ axes / np.ptp(mesh.points @ normal)

@@ -1,12 +1,12 @@
 """Macroelement pressure projection (B-bar family) against volumetric locking.
 
-Where a solid is nearly incompressible its stiffness against dilatation acts on the L2 projection of
-div u onto linear functions over macroelements, each of which has an edge inside it. The mid-side
-node of that edge can follow the slope of the pressure, which makes this a stable mixed u-p pair
-with errors of the displacement's own orders, 3 in L2 and 2 in the H1 seminorm, at any Poisson's
-ratio (macroelements: Stenberg, Math Comp 42:9, 1984, and Comput Methods Appl Mech Eng 63:261,
-1987). The pressure is statically condensed in its macroelement: no degrees of freedom are added,
-and K stays positive definite.
+In a nearly incompressible solid, the stiffness against dilatation acts on the L2 projection of
+div u onto linear functions over macroelements, each with an edge inside it. The mid-side node of
+that edge can follow the slope of the pressure, which makes this a stable mixed u-p pair with the
+orders of the displacement element, 3 in L2 and 2 in the H1 seminorm, at any Poisson's ratio
+(macroelements: Stenberg, Math Comp 42:9, 1984, and Comput Methods Appl Mech Eng 63:261, 1987). The
+pressure is condensed in its macroelement: there are no further degrees of freedom, and K stays
+positive definite.
 """
 
 import numpy as np
@@ -14,38 +14,36 @@ from scipy import sparse
 
 from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradients, jacobians, shape_nodes
+from fem.sparsity import from_entries
 from fem.typing import Bools, Floats, Ints
 from meshes import TetMesh
 from meshes.tetmesh import EDGES, FACES, neighbours
 
 
 def projected_divergence(mesh: TetMesh) -> sparse.bsr_array:
-    """Projected-divergence matrix D (4 c, 3 n) of ten-node tetrahedra in c macroelements: |D u|^2
-    is the integral of the squared projection of div u, and D u its coefficients in the
-    `linear_functions`.
+    """Return the matrix D (4 c, 3 n) of ten-node tetrahedra in c macroelements: D u are the
+    coefficients of the projected div u in the `linear_functions`, and |D u|^2 is the integral of
+    its square.
     """
     cluster, sloping = macroelements(mesh)
     return _coefficients(mesh, cluster, linear_functions(mesh, cluster, sloping))
 
 
 def dilatation_operator(mesh: TetMesh, elements: Ints) -> sparse.csr_array:
-    """Projected dilatation at the quadrature points for degree 2 of some elements (k,) of those of
-    `projected_divergence`: sum_v q_v (D u)_v, a matrix (4 k, 3 n) in 1/m.
+    """Return the projected dilatation, a matrix (4 k, 3 n) in 1/m, at the quadrature points for
+    degree 2 of some elements (k,): sum_v q_v (D u)_v.
     """
     cluster, sloping = macroelements(mesh)
     q = linear_functions(mesh, cluster, sloping)
-    owners = 4 * cluster[elements, None, None] + np.arange(4)
-    columns = np.broadcast_to(owners, q[elements].shape).ravel()
-    starts = 4 * np.arange(4 * len(elements) + 1)
     D = _coefficients(mesh, cluster, q)
-    Q = sparse.csr_array(
-        (q[elements].ravel(), columns, starts), shape=(len(starts) - 1, D.shape[0])
-    )
+    rows = np.arange(4 * len(elements)).reshape(-1, 4, 1)
+    columns = 4 * cluster[elements, None, None] + np.arange(4)
+    Q = from_entries(q[elements], rows, columns, (4 * len(elements), D.shape[0]))
     return (Q @ D).tocsr()
 
 
 def _coefficients(mesh: TetMesh, cluster: Ints, q: Floats) -> sparse.bsr_array:
-    """Matrix D of `projected_divergence`, by macroelements (e,) and functions (e, q, v)."""
+    """Return D of `projected_divergence` for macroelements (e,) and functions (e, q, v)."""
     slopes, volumes = gradients(shape_nodes(mesh), 10, 2, 0)
     values = np.einsum("eq,eqv,eqia->eavi", volumes, q, slopes, optimize=True).reshape(-1, 4, 3)
     starts = 10 * np.arange(len(cluster) + 1, dtype=np.int32)
@@ -59,9 +57,9 @@ def _coefficients(mesh: TetMesh, cluster: Ints, q: Floats) -> sparse.bsr_array:
 
 
 def linear_functions(mesh: TetMesh, cluster: Ints, sloping: Bools) -> Floats:
-    """Orthonormal linear pressure functions (e, q, 4) in m^-3/2 over the macroelement (e,) of each
-    element, at the quadrature points for degree 2; the constant alone where a macroelement (c,) may
-    not slope.
+    """Return orthonormal linear pressure functions (e, q, 4) in m^-3/2 over the macroelement (e,)
+    of each element, at the quadrature points for degree 2. Only the constant is nonzero in
+    macroelements (c,) that are not `sloping`.
     """
     nodes = shape_nodes(mesh)
     volumes = jacobians(nodes, 2, 0)[2]
@@ -80,27 +78,29 @@ def linear_functions(mesh: TetMesh, cluster: Ints, sloping: Bools) -> Floats:
 
 
 def macroelements(mesh: TetMesh) -> tuple[Ints, Bools]:
-    """Macroelements: the one (e,) that each element is in, and whether each (c,) has an inner edge.
-    It is all elements around an inner edge, the longest edges first: in a box that is split along a
-    diagonal, the box. An element left between joins a neighbour's or stays alone.
+    """Return the macroelement (e,) of each element, and whether each macroelement (c,) has an inner
+    edge.
+
+    A macroelement consists of all elements around an inner edge, with the longest edges first: in a
+    box split along a diagonal, the box. Remaining elements join a neighbour or stay alone.
     """
     points = mesh.points if mesh.unmoved is None else mesh.unmoved
     middles, ends = mesh.tets[:, 4:], points[mesh.tets[:, EDGES]]
     lengths = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2)
     around = np.bincount(middles.ravel(), minlength=len(mesh.points))
     beyond = neighbours(mesh.tets)
-    around[mesh.tets[:, FACES[:, 3:]][beyond < 0]] = -1  # of edges that are not inside
-    edge = np.full(len(middles), -1)  # what each element is around, by the edge's middle node
+    around[mesh.tets[:, FACES[:, 3:]][beyond < 0]] = -1  # of edges on the surface
+    edge = np.full(len(middles), -1)  # of each element's macroelement, by its middle node
     while True:
-        untaken = np.bincount(middles[edge < 0].ravel(), minlength=len(around)) == around
-        reach = np.where(untaken[middles], lengths, 0.0)
+        is_open = np.bincount(middles[edge < 0].ravel(), minlength=len(around)) == around
+        reach = np.where(is_open[middles], lengths, 0.0)
         longest = middles[np.arange(len(reach)), reach.argmax(axis=1)]
-        wishing = reach.any(axis=1)
-        agreed = np.bincount(longest[wishing], minlength=len(around)) == around
-        taken = wishing & agreed[longest]
-        if not taken.any():
+        can_join = reach.any(axis=1)
+        agreed = np.bincount(longest[can_join], minlength=len(around)) == around
+        joining = can_join & agreed[longest]
+        if not joining.any():
             break
-        edge[taken] = longest[taken]
+        edge[joining] = longest[joining]
     while True:
         theirs = np.where(beyond >= 0, edge[beyond], -1)
         size = np.bincount(edge[edge >= 0], minlength=len(around))

@@ -1,4 +1,4 @@
-"""Reduced-order model of a body: its transfer function, its poles, and its motion under loads.
+"""Reduced-order model of a body: transfer function, poles, and motion under loads.
 
     M u'' + C u' + K u = basis^T f,  probes = outputs u
 
@@ -6,8 +6,7 @@ In modal (pole-residue) form
 
     z' = pole z + inputs f(t),  probes = 2 Re(outputs z)
 
-and, exact in time for a load of lines F exp(i w t), the lines themselves and the free vibration
-that the start leaves:
+For a load of lines F exp(i w t) from rest, the exact solution is the lines plus a free vibration:
 
     z(t) = inputs F [exp(i w t) - exp(pole t)] / (i w - pole)
 """
@@ -22,18 +21,25 @@ from scipy import linalg
 
 from fem.assembly import Operators
 from fem.harmonic import dynamic_stiffness
-from fem.maxwell import with_internal
+from fem.maxwell import maxwell_only
 from fem.typing import Complex, Floats
 
 CHUNK = 256  # times that share their exponentials
-MOST_RATES = 8192  # summed at a time, to bound memory
+MOST_RATES = 8192  # rates summed at a time, to bound memory
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReducedModel:
-    """Projected `operators` of r basis vectors, with a `basis` (3 n, r) in kg^-1/2 and the probes'
-    `outputs` (p, r); `estimate` is the relative change of the probes' response by some more
-    moments, `moments` how many there are.
+    """Reduced-order model in r basis vectors, from `reduce`.
+
+    Parameters
+    ----------
+    operators : Operators (r, r), projected
+    basis : (3 n, r) float, kg^-1/2
+    outputs : (p, r) float, of the probes
+    moments : number of Krylov moments
+    estimate : relative change of the probes' response by a few more moments
+    solver : backend that factorised the body
     """
 
     operators: Operators
@@ -45,7 +51,7 @@ class ReducedModel:
 
 
 def transfer(model: ReducedModel, forces: Floats, frequencies: ArrayLike) -> Complex:
-    """Transfer function of a reduced-order model.
+    """Return the transfer function of a reduced-order model.
 
     Parameters
     ----------
@@ -55,12 +61,13 @@ def transfer(model: ReducedModel, forces: Floats, frequencies: ArrayLike) -> Com
 
     Returns
     -------
-    (f, p, k) complex, metre, displacement of the probes under each of the forces
+    (f, p, k) complex
+        Displacement of the probes under each of the forces, m.
 
     Raises
     ------
     LinAlgError
-        If the model has no loss and a natural frequency among the frequencies.
+        If the model has no loss and a frequency is a natural frequency.
     """
     s = 2j * np.pi * np.atleast_1d(np.asarray(frequencies, np.float64))[:, None, None]
     ops = model.operators
@@ -73,7 +80,11 @@ def transfer(model: ReducedModel, forces: Floats, frequencies: ArrayLike) -> Com
 class Poles:
     """Pole-residue form of a model: z' = pole z + inputs f, probes = 2 Re(outputs z).
 
-    `values` (m,) in 1/s with imaginary part >= 0, `inputs` (m, r), `outputs` (p, m).
+    Parameters
+    ----------
+    values : (m,) complex, poles with imaginary part >= 0, 1/s
+    inputs : (m, r) complex
+    outputs : (p, m) complex
     """
 
     values: Complex
@@ -82,17 +93,28 @@ class Poles:
 
 
 def poles(operators: Operators, outputs: Floats | None = None) -> Poles:
-    """Diagonalise projected `Operators`, dense, in any coordinates (r,), in first-order form, and
-    read outputs (p, r) of these, or all; one of each conjugate pair is returned. Internal variables
-    of Maxwell branches are part of that form: z_j' = (L_j^T u - z_j) / tau_j, K_j = L_j L_j^T.
+    """Diagonalise projected operators in first-order form.
+
+    Internal variables of Maxwell branches are part of that form:
+    z_j' = (L_j^T u - z_j) / tau_j with K_j = L_j L_j^T.
+
+    Parameters
+    ----------
+    operators : Operators with dense matrices (r, r)
+    outputs : (p, r) float; all coordinates by default
+
+    Returns
+    -------
+    Poles
+        One of each conjugate pair.
     """
-    r, branches = len(operators.K), with_internal(operators.branches)
+    r, branches = len(operators.K), maxwell_only(operators.branches)
     upright = np.linalg.inv(np.linalg.cholesky(operators.M)).T  # coordinates of unit mass
     K, C, *relaxing = (
         upright.T @ A @ upright for A in (operators.K, operators.C, *(b.K for b in branches))
     )
     companion = np.block([[np.zeros((r, r)), np.eye(r)], [-(K + sum(relaxing)), -C]])
-    for L, time in zip(map(factor, relaxing), (b.time for b in branches), strict=True):
+    for L, time in zip(map(low_rank_factor, relaxing), (b.time for b in branches), strict=True):
         size, k = len(companion), L.shape[1]
         pulled, followed = np.zeros((size, k)), np.zeros((k, size))
         pulled[r : 2 * r], followed[:, :r] = L, L.T / time
@@ -100,7 +122,7 @@ def poles(operators: Operators, outputs: Floats | None = None) -> Poles:
     values, vectors = linalg.eig(companion)
     kept = values.imag >= 0
     inverse = np.linalg.solve(vectors, np.eye(len(values))[:, r : 2 * r])[kept]
-    # A real pole stands alone, so that twice the real part counts it double.
+    # A real pole has no conjugate, and twice the real part would count it double.
     weight = np.where(values[kept].imag > 0, 1.0, 0.5)
     read = upright if outputs is None else outputs @ upright
     return Poles(
@@ -109,20 +131,21 @@ def poles(operators: Operators, outputs: Floats | None = None) -> Poles:
     )  # fmt: skip
 
 
-def factor(K: Floats) -> Floats:
-    """Low-rank factor L (n, k) of a positive semidefinite K = L L^T, as many columns as its rank:
-    with z = L^T (u - d) a branch z' = (L^T u - z) / tau has an internal variable only where it has
-    a spring.
+def low_rank_factor(K: Floats) -> Floats:
+    """Return L (n, k) of full rank with L L^T = K, positive semidefinite, so that a branch has
+    internal variables only where it has springs.
     """
     squares, vectors = np.linalg.eigh(K)
-    kept = squares > 1e-12 * squares.max()
-    return np.asarray(vectors[:, kept] * np.sqrt(squares[kept]))
+    nonzero = squares > 1e-12 * squares.max()
+    return np.asarray(vectors[:, nonzero] * np.sqrt(squares[nonzero]))
 
 
 def line_response(poles: Poles, forces: Complex, frequencies: Floats) -> tuple[Complex, Complex]:
-    """Steady state (f, p) and free vibration (m, p) from rest at t = 0, complex amplitudes in metre
-    of exp(2 pi i f t) and exp(pole t), under a load Re sum_f forces exp(2 pi i f t) of reduced
-    forces (f, r) in N kg^-1/2 at frequencies (f,) in Hz.
+    """Return the steady state (f, p) and the free vibration (m, p) from rest at t = 0: complex
+    amplitudes in m of exp(2 pi i f t) and exp(pole t).
+
+    The load is Re sum_f forces exp(2 pi i f t) with reduced forces (f, r) in N kg^-1/2 and
+    frequencies (f,) in Hz.
     """
     iw, values = 2j * np.pi * frequencies[:, None], poles.values
     forwards = (forces @ poles.inputs.T) / (iw - values)  # (f, m)
@@ -132,27 +155,22 @@ def line_response(poles: Poles, forces: Complex, frequencies: Floats) -> tuple[C
 
 
 def impulse_response(poles: Poles, impulse: Floats) -> Complex:
-    """Free vibration (m, p), complex amplitudes of exp(pole t), after an impulse (r,) in
+    """Return the free vibration (m, p), complex amplitudes of exp(pole t), after an impulse (r,) in
     N s kg^-1/2 at t = 0.
     """
     return 2 * (poles.inputs @ impulse)[:, None] * poles.outputs.T
 
 
 def exponential_sum(rates: Complex, amplitudes: Complex, times: Floats) -> Floats:
-    """Exponential sum Re sum_j amplitudes exp(rates t) (t, p) of complex rates (j,) in 1/s and
-    amplitudes (j, p), at equally spaced times from 0. Exponentials are computed within one chunk of
-    times and at the start of each, and multiplied.
+    """Return Re sum_j amplitudes exp(rates t) (t, p) for complex rates (j,) in 1/s and amplitudes
+    (j, p), at equally spaced times from 0.
+
+    Exponentials are products of those within the first chunk of times and at the start of each.
     """
     j, p = amplitudes.shape
     if j > MOST_RATES:
-        parts = range(0, j, MOST_RATES)
-        return np.sum(
-            [
-                exponential_sum(rates[k : k + MOST_RATES], amplitudes[k : k + MOST_RATES], times)
-                for k in parts
-            ],
-            axis=0,
-        )
+        parts = [slice(k, k + MOST_RATES) for k in range(0, j, MOST_RATES)]
+        return np.sum([exponential_sum(rates[k], amplitudes[k], times) for k in parts], axis=0)
     within = np.exp(rates * times[:CHUNK, None])
     starts = np.exp(rates * times[::CHUNK, None])
     driven = (starts[:, :, None] * amplitudes).transpose(1, 0, 2).reshape(j, -1)

@@ -3,11 +3,11 @@
     w = shapes z,  M = 1,  energy = z^T K z / 2 + sum_k y_k^2 / 2,  y_k = z^T H_k z / 2
 
 The in-plane motion follows the stretching of bending, e(w, w) = grad w grad w^T / 2, quasi-
-statically. The strain that is left is expanded in self-equilibrated states of stress s_k that are
-orthonormal in energy, and H_k is the geometric stiffness that s_k adds to bending. For pairs of
-modes the in-plane problem is solved, and the incompatible strains are decomposed, the most
-energetic states first (implicit condensation: Hollkamp and Gordon, J Sound Vib 318:1139 (2008); the
-equations are von Karman's with Airy's function, Thomas and Bilbao, J Sound Vib 315:569 (2008)).
+statically. The remaining strain is expanded in self-equilibrated states of stress s_k that are
+orthonormal in energy; H_k is the geometric stiffness that s_k adds to bending. The in-plane problem
+is solved for pairs of modes, and the incompatible strains are decomposed, with the most energetic
+states first (implicit condensation: Hollkamp and Gordon, J Sound Vib 318:1139 (2008); von Karman's
+equations with Airy's function, Thomas and Bilbao, J Sound Vib 315:569 (2008)).
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from fem.finite_strain import (
     tangent,
 )
 from fem.linear_solver import factorise
-from fem.maxwell import with_internal
+from fem.maxwell import maxwell_only
 from fem.sheet_reading import SheetReading, modal_slopes
 from fem.sparsity import restricted
 from fem.static import modes
@@ -41,18 +41,16 @@ from fem.typing import Bools, Floats, Ints
 from meshes import TetMesh
 from simple_model.layers.material import Material
 
-PAIRS = 200  # of modes that are enforced
-RESONANT = 2 * np.pi * 200.0  # rad/s below which modes are taken to have equal amplitudes
+PAIRS = 200  # of modes, for which the in-plane problem is solved
+RESONANT = 2 * np.pi * 200.0  # rad/s: modes below are weighted equally
 SMALLEST_STATE = 1e-2  # of the energy norm of the largest
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StretchingModes:
-    """Modal model of a sheet in coordinates z (r,) in kg^1/2 m.
-
-    `basis` (3 n, r) in kg^-1/2, `hz` (r,) natural frequencies, `H` (k, r, r), the truncated share
-    `left_out` of the states of stress, and `elastic` for `nonlinear.static` and
-    `nonlinear.dynamic`.
+    """Modal model of a sheet in coordinates z (r,) in kg^1/2 m: `basis` (3 n, r) in kg^-1/2,
+    natural frequencies `hz` (r,), `H` (k, r, r), the truncated share `left_out` of the states of
+    stress, and `elastic` for `nonlinear.static` and `nonlinear.dynamic`.
     """
 
     basis: Floats
@@ -72,9 +70,9 @@ def stretching_modes(
     solver: str = "auto",
     progress: Callable[[float], None] | None = None,
 ) -> StretchingModes:
-    """Reduce a sheet, its linear operators and its whole membrane stiffness, to its n lowest
-    bending modes; with the added mass of a fluid to combinations of these. Modes that do not
-    converge raise Diverged.
+    """Reduce a sheet, given by linear operators and its whole membrane, to its n lowest bending
+    modes, or with the added mass of a fluid to combinations of them. Raises Diverged if the modes
+    do not converge.
     """
     hz, shapes = modes(operators, n, solver=solver)
     if added is not None:
@@ -109,7 +107,7 @@ def stretching_modes(
 def _with_added(
     operators: Operators, added: LinearOperator, hz: Floats, shapes: Floats
 ) -> tuple[Floats, Floats]:
-    """Modes with an added mass, by the Rayleigh-Ritz method from those without."""
+    """Return the modes with an added mass, by the Rayleigh-Ritz method."""
     mass = np.eye(len(hz)) + _projected(added, shapes[operators.free])
     squares, turn = linalg.eigh(np.diag((2 * np.pi * hz) ** 2), mass)
     return np.sqrt(squares) / (2 * np.pi), shapes @ turn
@@ -120,13 +118,14 @@ def _projected(A: Any, shapes: Floats) -> Floats:
 
 
 def modal_elastic(modal: Operators, H: Floats, material: Material) -> Elastic:
-    """Strain energy of a sheet in its modal coordinates z (r,), and its derivatives, by `Operators`
-    of diagonal K in 1/s2, the geometric stiffness H (k, r, r) of each state of stress, and the
-    material of the sheet as it stretches.
+    """Return the forces and energy of a sheet in modal coordinates z (r,).
+
+    `modal` has a diagonal K in 1/s2, H (k, r, r) is the geometric stiffness of each state of
+    stress, and `material` defines the losses in stretching.
     """
     squares, n = modal.K.diagonal(), len(modal.free)
-    stacked, (lag, shares, times) = H.reshape(-1, n), losses(material)
-    branches = with_internal(modal.branches)
+    stacked, (lag, times, shares) = H.reshape(-1, n), losses(material)
+    branches = maxwell_only(modal.branches)
 
     @lru_cache(maxsize=2)
     def product(z: bytes) -> Floats:
@@ -170,12 +169,11 @@ def in_plane_matrices(
     *,
     solver: str = "auto",
 ) -> Floats:
-    """In-plane motion that follows bending modes z of a basis (3 n, m) quasi-statically: symmetric
-    Q (c, m, m) of outputs z^T Q z / 2, of `rows` (c, 3 n) of the in-plane displacement of the
-    middle plane.
+    """Return symmetric Q (c, m, m): outputs z^T Q z / 2 of the in-plane motion that follows bending
+    modes z of a basis (3 n, m), for `rows` (c, 3 n) that read the middle plane.
 
     A linear output s v of the in-plane displacement v is -g f(z), with g = K^-1 s and the forces
-    f(z) of the stretching e(w, w): -z^T H z / 2, with H of the states of stress that g has.
+    f(z) of the stretching e(w, w). It equals -z^T H z / 2, with H for the states of stress of g.
     """
     part = reading.part
     fixed = np.ones(operators.n_dofs, bool)
@@ -183,35 +181,37 @@ def in_plane_matrices(
     plane = _Plane.of(part, fixed, solver)
     slopes = modal_slopes(reading, basis).reshape(*part.G.shape[:3], -1)
     weighted = (slopes * part.volume[..., None, None]).reshape(-1, slopes.shape[3])
-    found = np.empty((rows.shape[0], *(2 * basis.shape[1:])))
+    matrices = np.empty((rows.shape[0], *(2 * basis.shape[1:])))
     for k, row in enumerate(rows.toarray()):
         g = np.zeros(operators.n_dofs)
         g[plane.moving] = plane.solve(row[plane.moving])
         slope = (part.D @ g.reshape(-1, 3)[:, :2]).reshape(*part.G.shape[:3], 2)
         strain = (slope + slope.swapaxes(2, 3)) / 2
-        found[k] = -weighted.T @ (stress(part, strain) @ slopes).reshape(weighted.shape)
-    return found
+        matrices[k] = -weighted.T @ (stress(part, strain) @ slopes).reshape(weighted.shape)
+    return matrices
 
 
 def _states_of_stress(
     part: Part, fixed: Bools, slopes: Floats, hz: Floats, solver: str
 ) -> tuple[Floats, float]:
-    """Strains (k, e, q, k, l) of states of stress, orthonormal in energy; the truncated share."""
+    """Return strains (k, e, q, k, l) of states of stress, orthonormal in energy, and the truncated
+    share.
+    """
     reach = 1 / np.maximum(2 * np.pi * hz, RESONANT) ** 2
     i, j = _strongest_pairs(reach)
     weight = reach[i] * reach[j] * np.where(i == j, 1, 2)
-    left = []
+    incompatible = []
     plane = _Plane.of(part, fixed, solver)
     for first, second, scale in zip(i, j, weight, strict=True):
         e = slopes[..., :, None, first] * slopes[..., None, :, second] * scale / 2
-        left.append(plane.incompatible((e + e.swapaxes(2, 3)) / 2))
-    strains = np.array(left)
-    stresses = np.array([stress(part, s) * part.volume[..., None, None] for s in left])
+        incompatible.append(plane.incompatible((e + e.swapaxes(2, 3)) / 2))
+    strains = np.array(incompatible)
+    stresses = np.array([stress(part, s) * part.volume[..., None, None] for s in strains])
     gram = strains.reshape(len(i), -1) @ stresses.reshape(len(i), -1).T
     squares, vectors = np.linalg.eigh((gram + gram.T) / 2)
-    kept = squares > SMALLEST_STATE**2 * squares.max()
-    states = np.tensordot((vectors[:, kept] / np.sqrt(squares[kept])).T[::-1], strains, axes=1)
-    return states, float(np.sqrt(squares[~kept].clip(0).sum() / squares.sum()))
+    large = squares > SMALLEST_STATE**2 * squares.max()
+    states = np.tensordot((vectors[:, large] / np.sqrt(squares[large])).T[::-1], strains, axes=1)
+    return states, float(np.sqrt(squares[~large].clip(0).sum() / squares.sum()))
 
 
 def _strongest_pairs(reach: Floats) -> tuple[Ints, Ints]:
@@ -238,9 +238,7 @@ class _Plane:
         return _Plane(part=part, moving=moving, solve=factorise(K, backend=solver).solve)
 
     def incompatible(self, e: Floats) -> Floats:
-        """Incompatible part of a strain (e, q, k, l): less that of the in-plane displacement which
-        relieves it.
-        """
+        """Return a strain (e, q, k, l) minus that of the in-plane displacement that relieves it."""
         f = np.zeros((self.part.D.shape[1], 3))
         f[:, :2] = spread_stress(self.part, stress(self.part, e))
         v = np.zeros(f.size)

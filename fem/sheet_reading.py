@@ -1,13 +1,13 @@
 """Displacement and strain at points of a thin sheet, from the middle plane of its mesh.
 
-Only the middle plane of the thicker mesh of the same bending stiffness has the sheet's motion. By
-Kirchhoff's kinematics, at a height z above that plane,
+The mesh is thicker than the sheet and has the same bending stiffness; only its middle plane moves
+like the sheet. By Kirchhoff's kinematics, at a height z above that plane,
 
     u_a(z) = u_a - z w,a,   E_ab(z) = (u_a,b + u_b,a + u_i,a u_i,b) / 2 - z w,ab,
 
 and E_zz = -nu / (1 - nu) (E_xx + E_yy) in plane stress, without transverse shear. E is the strain
-of Green and Lagrange. Slopes and curvatures are those of polynomials that fit the derivatives at
-the quadrature points about a point, as in `stress`.
+of Green and Lagrange. Slopes and curvatures are those of polynomials fitted to the derivatives at
+the quadrature points around a point, as in `stress`.
 """
 
 from dataclasses import dataclass
@@ -18,19 +18,21 @@ from scipy import sparse
 
 from fem.elements import shape_functions, triangle_rule
 from fem.finite_strain import Membrane, Part, membrane_part
+from fem.load_and_probe import straight_coordinates
+from fem.sparsity import from_entries
 from fem.stress import fitted_polynomial
 from fem.typing import Floats, Ints
 from meshes import TetMesh
 
 PAIRS = ((0, 0), (1, 1), (0, 1))  # xx, yy, xy
-ON_EDGE = 1e-9  # barycentric: how far outside all triangles a point still counts as on the sheet
+EDGE_MARGIN = 1e-9  # barycentric: a point so little outside all triangles is on the sheet
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SheetReading:
-    """Operators of p points of a sheet on the n nodes of its mesh: `value` (p, n) of a nodal field,
-    its `slopes` (2, p, n) and `curvatures` (p, n) xx, yy and xy; and `fit` (p, e q), the values at
-    the points by those at the quadrature points of the `part`.
+    """Operators that read p points of a sheet from the n nodes of its mesh: the `value` (p, n) of a
+    nodal field, its `slopes` (p, n) along x and y, and its `curvatures` (p, n) xx, yy and xy. `fit`
+    (p, e q) maps values at the quadrature points of the `part` to the points.
     """
 
     part: Part
@@ -41,16 +43,15 @@ class SheetReading:
 
 
 def sheet_reading(mesh: TetMesh, membrane: Membrane, points: ArrayLike) -> SheetReading:
-    """Operators that read the middle plane, a `Membrane`, of a meshed sheet at points (p, 2) in
-    metre. A point off the sheet raises a ValueError.
+    """Return operators that read the middle plane of a meshed sheet, a `Membrane`, at points (p, 2)
+    in metres. Raises a ValueError if a point lies off the sheet.
     """
     points = np.atleast_2d(np.asarray(points, np.float64))
     part = membrane_part(mesh, membrane)
     owner, inner = _located(mesh.points[:, :2], part.nodes, points)
     N = shape_functions(inner, part.nodes.shape[1])
-    rows = np.repeat(np.arange(len(points)), N.shape[1])
-    shape = (len(points), len(mesh.points))
-    value = sparse.csr_array((N.ravel(), (rows, part.nodes[owner].ravel())), shape=shape)
+    rows, shape = np.arange(len(points))[:, None], (len(points), len(mesh.points))
+    value = from_entries(N, rows, part.nodes[owner], shape)
     fit, along_x, along_y = _fits(mesh.points[:, :2], part, owner, points)
     D = part.D[0::2], part.D[1::2]
     mixed = (along_y @ D[0] + along_x @ D[1]) / 2
@@ -61,8 +62,8 @@ def sheet_reading(mesh: TetMesh, membrane: Membrane, points: ArrayLike) -> Sheet
 
 
 def displacement_rows(reading: SheetReading, heights: Floats) -> sparse.csr_array:
-    """Displacement operator (3 p, 3 n) of bending, at heights (p,) in metre above the middle
-    plane, which has no in-plane motion in it.
+    """Return the displacement operator (3 p, 3 n) of bending at heights (p,) in metres above the
+    middle plane, without in-plane motion of that plane.
     """
     z, nothing = sparse.diags_array(heights), sparse.csr_array(reading.value.shape)
     x, y = (-(z @ slope) for slope in reading.slopes)
@@ -71,8 +72,8 @@ def displacement_rows(reading: SheetReading, heights: Floats) -> sparse.csr_arra
 
 
 def strain_rows(reading: SheetReading, heights: Floats, poisson: float) -> sparse.csr_array:
-    """Strain operator (6 p, 3 n) in 1/m of bending, at heights (p,) in metre above the middle plane
-    of a sheet of some Poisson's ratio; components xx, yy, zz, xy, xz, yz fastest.
+    """Return the strain operator (6 p, 3 n) in 1/m of bending at heights (p,) in metres above the
+    middle plane; components xx, yy, zz, xy, xz, yz fastest.
     """
     z, nothing = sparse.diags_array(heights), sparse.csr_array(reading.value.shape)
     bent = _by_point([[nothing, nothing, -(z @ part)] for part in reading.curvatures])
@@ -81,17 +82,18 @@ def strain_rows(reading: SheetReading, heights: Floats, poisson: float) -> spars
 
 
 def from_plane(poisson: float) -> Floats:
-    """Matrix (6, 3): strain xx, yy, zz, xy, xz, yz by xx, yy and xy in plane stress."""
-    across = -poisson / (1 - poisson)
-    found = np.zeros((6, 3))
-    found[[0, 1, 3], [0, 1, 2]] = 1.0
-    found[2, :2] = across
-    return found
+    """Return the matrix (6, 3) of strain xx, yy, zz, xy, xz, yz per xx, yy and xy in plane
+    stress.
+    """
+    matrix = np.zeros((6, 3))
+    matrix[[0, 1, 3], [0, 1, 2]] = 1.0
+    matrix[2, :2] = -poisson / (1 - poisson)
+    return matrix
 
 
 def quadratic_strain_at(reading: SheetReading, u: Floats) -> Floats:
-    """Quadratic part u_i,a u_i,b / 2 (p, 3) of the strains xx, yy and xy of the middle plane, at a
-    displacement u (3 n,) in metre.
+    """Return the quadratic part u_i,a u_i,b / 2 (p, 3) of the strains xx, yy and xy of the middle
+    plane at a displacement u (3 n,) in metres.
     """
     D = reading.part.D
     slopes = (D @ u.reshape(-1, 3)).reshape(-1, 2, 3)
@@ -101,30 +103,32 @@ def quadratic_strain_at(reading: SheetReading, u: Floats) -> Floats:
 
 
 def modal_slopes(reading: SheetReading, basis: Floats) -> Floats:
-    """Slopes (e q, 2, m) at the quadrature points of the normal displacement of basis vectors
-    (3 n, m).
+    """Return slopes (e q, 2, m) of the normal displacement of basis vectors (3 n, m) at the
+    quadrature points.
     """
     w = basis.reshape(-1, 3, basis.shape[1])[:, 2]
     return np.asarray((reading.part.D @ w).reshape(-1, 2, basis.shape[1]))
 
 
 def modal_quadratic_strain(reading: SheetReading, basis: Floats) -> Floats:
-    """Matrices Q (p, 3, m, m) of w,a w,b / 2 = z^T Q z / 2 at the points, for xx, yy and xy, of a
+    """Return Q (p, 3, m, m) with w,a w,b / 2 = z^T Q z / 2 at the points, for xx, yy and xy and a
     normal displacement w in coordinates z of a basis (3 n, m).
     """
     slopes = modal_slopes(reading, basis)
-    found = np.empty((reading.fit.shape[0], 3, *(slopes.shape[2:] * 2)))
-    for p in range(len(found)):
+    matrices = np.empty((reading.fit.shape[0], 3, *(slopes.shape[2:] * 2)))
+    for p in range(len(matrices)):
         row = reading.fit[[p]].tocoo()
         near, weights = slopes[row.col], row.data[:, None, None]
         for c, (a, b) in enumerate(PAIRS):
             product = np.einsum("qm,qn->mn", (weights * near)[:, a], near[:, b])
-            found[p, c] = (product + product.T) / 2
-    return found
+            matrices[p, c] = (product + product.T) / 2
+    return matrices
 
 
 def in_plane_rows(reading: SheetReading) -> tuple[sparse.csr_array, sparse.csr_array]:
-    """Displacement (2 p, 3 n), and strain xx, yy and xy (3 p, 3 n) of the middle plane alone."""
+    """Return in-plane displacement (2 p, 3 n) and strain xx, yy, xy (3 p, 3 n) of the middle
+    plane.
+    """
     nothing, N = sparse.csr_array(reading.value.shape), reading.value
     x, y = reading.slopes
     moved = _by_point([[N, nothing, nothing], [nothing, N, nothing]])
@@ -133,8 +137,8 @@ def in_plane_rows(reading: SheetReading) -> tuple[sparse.csr_array, sparse.csr_a
 
 
 def _by_point(blocks: list[list[sparse.csr_array]]) -> sparse.csr_array:
-    """Operator (c p, 3 n), components of a point next to each other, from blocks (p, n) by its
-    components and by those of the displacement.
+    """Return an operator (c p, 3 n), component fastest, from blocks (p, n) by output component and
+    by displacement component.
     """
     rows, (p, n) = len(blocks), blocks[0][0].shape
     whole = sparse.block_array(blocks, format="csr")
@@ -144,17 +148,14 @@ def _by_point(blocks: list[list[sparse.csr_array]]) -> sparse.csr_array:
 
 
 def _located(places: Floats, triangles: Ints, points: Floats) -> tuple[Ints, Floats]:
-    """Triangle (p,) of each point, and its barycentric coordinates (p, 3)."""
+    """Return the triangle (p,) of each point, and its barycentric coordinates (p, 3)."""
     corners = places[triangles[:, :3]]
-    edges = (corners[:, 1:] - corners[:, :1]).swapaxes(1, 2)
-    inverse = np.linalg.inv(edges)
     owner, inner = np.empty(len(points), np.int64), np.empty((len(points), 3))
     for p, point in enumerate(points):
-        local = np.einsum("eij,ej->ei", inverse, point - corners[:, 0])
-        coordinates = np.column_stack([1 - local.sum(axis=1), local])
+        coordinates = straight_coordinates(corners, point)
         owner[p] = coordinates.min(axis=1).argmax()
         inner[p] = coordinates[owner[p]]
-        if inner[p].min() < -ON_EDGE:
+        if inner[p].min() < -EDGE_MARGIN:
             x, y = 1e3 * point
             raise ValueError(f"point ({x:g}, {y:g}) mm is off the sheet; move it inside")
     return owner, inner
@@ -163,24 +164,24 @@ def _located(places: Floats, triangles: Ints, points: Floats) -> tuple[Ints, Flo
 def _fits(
     places: Floats, part: Part, owner: Ints, points: Floats
 ) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array]:
-    """Value (p, e q) at each point, and its derivatives along x and y, of the polynomial that fits
-    values at the quadrature points of the triangles about it.
+    """Return the value (p, e q) at each point and its derivatives along x and y of the polynomial
+    fitted to values at the quadrature points of the triangles around it.
     """
     barycentric, _ = triangle_rule(2)
     N = shape_functions(barycentric, part.nodes.shape[1])
     samples = np.einsum("qa,eai->eqi", N, places[part.nodes])
     many, corners = samples.shape[1], part.nodes[:, :3]
-    rows, columns, found = [], [], []
+    rows, columns, fits = [], [], []
     for p, point in enumerate(points):
         core = np.isin(corners, corners[owner[p]]).any(axis=1)
         patch = np.flatnonzero(np.isin(corners, corners[core]).any(axis=1))
         size = np.ptp(places[corners[patch]], axis=1).mean()
         away = ((samples[patch] - point) / size).reshape(-1, 2)
         fit, _ = fitted_polynomial(away)
-        found.append(fit[:3] / np.array([[1.0], [size], [size]]))
+        fits.append(fit[:3] / np.array([[1.0], [size], [size]]))
         columns.append((many * patch[:, None] + np.arange(many)).ravel())
         rows.append(np.full(len(columns[-1]), p))
-    shape, at = (len(points), many * len(corners)), (np.concatenate(rows), np.concatenate(columns))
-    values = np.concatenate(found, axis=1)
-    fit, along_x, along_y = (sparse.csr_array((each, at), shape=shape) for each in values)
+    at, shape = (np.concatenate(rows), np.concatenate(columns)), (len(points), samples[..., 0].size)
+    values = np.concatenate(fits, axis=1)
+    fit, along_x, along_y = (from_entries(each, *at, shape) for each in values)
     return fit, along_x, along_y

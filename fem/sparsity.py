@@ -1,4 +1,4 @@
-"""Sparsity pattern of a mesh, and the assembly of element matrices into sparse ones."""
+"""Sparse matrices: sparsity pattern of a mesh, assembly of element matrices, selection."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -11,14 +11,14 @@ from scipy import sparse
 from fem.typing import Array, Bools, Floats, Index, Ints
 from meshes import MeshError
 
-SLAB = 256  # elements at a time: their temporaries stay near the processor
+SLAB = 256  # elements at a time, so that temporaries stay in the processor's cache
 UPPER = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]  # components on and above the diagonal
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SparsityPattern:
-    """CSR sparsity pattern on n nodes, with the slot that each pair of element nodes is summed in:
-    one beyond the last for pairs that take no part.
+    """CSR sparsity pattern on n nodes. Each pair of nodes of an element is summed in its `slot`;
+    the slot beyond the last collects pairs that are left out.
     """
 
     indptr: Index
@@ -27,14 +27,15 @@ class SparsityPattern:
 
     @staticmethod
     def of(nodes: Ints, n: int) -> "SparsityPattern":
-        """The pattern of elements of some nodes (e, a) below n, or n for nodes that take no part.
+        """Return the pattern of elements with nodes (e, a); node number n marks nodes left out.
 
-        Pairs of nodes are sorted by their first node and then their second one without comparing
-        any: twice, SciPy's transposition of a matrix counts how many there are of each.
+        Pairs of nodes are sorted by first and second node without comparisons, by transposing
+        sparse matrices twice.
         """
         a = nodes.shape[1]
         if nodes.size * a > np.iinfo(np.int32).max:
-            raise MeshError(f"{len(nodes)} elements are too many for one assembly; coarsen")
+            raise MeshError(f"the mesh has {len(nodes)} elements, too many for one assembly; "
+                            "use larger elements")  # fmt: skip
         each, local = nodes.astype(np.int32), np.arange(a, dtype=np.int32)
         places = np.arange(nodes.size + 1, dtype=np.int32)
         indptr, places, _ = _by_column(places[:-1], each, places[::a], n)
@@ -51,8 +52,8 @@ class SparsityPattern:
         )
 
     def blocks(self, slabs: Iterable[tuple[slice, Floats]]) -> sparse.bsr_array:
-        """Symmetric matrix (3 n, 3 n) of element matrices (6, e, a, b) for the components UPPER,
-        some elements at a time.
+        """Sum element matrices (6, e, a, b) of the components `UPPER`, given slab by slab, to a
+        symmetric matrix (3 n, 3 n).
         """
         n, summed = 3 * (len(self.indptr) - 1), np.zeros((len(self.indices) + 1, 3, 3))
         flat = summed.ravel()
@@ -67,7 +68,7 @@ class SparsityPattern:
         return sparse.bsr_array((summed[:-1], self.indices, self.indptr), shape=(n, n))
 
     def nodal(self, slabs: Iterable[tuple[slice, Floats]]) -> sparse.csr_array:
-        """Matrix (n, n) of element matrices (e, a, b), some elements at a time."""
+        """Sum element matrices (e, a, b), given slab by slab, to a matrix (n, n)."""
         n, summed = len(self.indptr) - 1, np.zeros(len(self.indices) + 1)
         for slab, values in slabs:
             np.add.at(summed, self.slot[slab].ravel(), values.ravel())
@@ -75,8 +76,8 @@ class SparsityPattern:
 
 
 def _by_column(entries: Index, columns: Index, indptr: Index, n: int) -> tuple[Index, Index, Index]:
-    """Entries of rows that start at `indptr`, by column below n, and by row within one: where each
-    column starts, the entries, and their rows.
+    """Sort entries, given by rows that start at `indptr`, by column and then by row. Return the
+    starts of columns 0 to n - 1, the entries, and their rows.
     """
     rows = sparse.csr_array(
         (entries.ravel(), columns.ravel(), indptr), shape=(len(indptr) - 1, n + 1)
@@ -86,7 +87,7 @@ def _by_column(entries: Index, columns: Index, indptr: Index, n: int) -> tuple[I
 
 
 def in_each_direction(A: sparse.csr_array) -> sparse.csr_array:
-    """The matrix (3 n, 3 n) of one on nodes (n, n), the same for each of three components."""
+    """Return the matrix (3 n, 3 n) that applies a matrix (n, n) to each of three components."""
     lengths, component = np.diff(A.indptr), np.arange(3, dtype=np.int32)
     rows = np.repeat(lengths, 3)
     indptr = np.append(np.int32(0), np.cumsum(rows, dtype=np.int32))
@@ -97,24 +98,35 @@ def in_each_direction(A: sparse.csr_array) -> sparse.csr_array:
     return sparse.csr_array((A.data[entry], columns, indptr), shape=shape)
 
 
+def from_entries(values: Any, rows: Any, columns: Any, shape: tuple[int, int]) -> sparse.csr_array:
+    """Return a matrix with entries at rows and columns, which broadcast; repeated entries add."""
+    values, rows, columns = (each.ravel() for each in np.broadcast_arrays(values, rows, columns))
+    return sparse.csr_array((values, (rows, columns)), shape=shape)
+
+
+def dofs_of(nodes: NDArray[np.integer[Any]]) -> Index:
+    """Return the degrees of freedom (..., 3) of nodes (...)."""
+    return np.asarray(3 * nodes[..., None] + np.arange(3), np.int32)
+
+
 def restricted(A: Any, free: Ints) -> sparse.csr_array:
-    """Rows and columns of a matrix that are free, in rising order."""
+    """Return the free rows and columns of a matrix, in ascending order."""
     return selected(A.tocsr(), free, free)
 
 
 def selected(A: Any, rows: Ints, columns: Ints) -> Any:
-    """Some rows (r,) and columns (c,), in rising order, of a CSR matrix, or of a BSR matrix of
-    which blocks are counted.
+    """Return ascending rows (r,) and columns (c,) of a CSR matrix, or block rows and block columns
+    of a BSR matrix.
     """
     shape = np.array(A.shape) // getattr(A, "blocksize", 1)
     if (len(rows), len(columns)) == tuple(shape):
         return A
     number = np.full(shape[1], -1, A.indices.dtype)
     number[columns] = np.arange(len(columns))
-    taken = np.zeros(shape[0], bool)
-    taken[rows] = True
+    is_selected = np.zeros(shape[0], bool)
+    is_selected[rows] = True
     places = number[A.indices]
-    kept = (places >= 0) & np.repeat(taken, np.diff(A.indptr))
+    kept = (places >= 0) & np.repeat(is_selected, np.diff(A.indptr))
     starts = starts_of_kept(kept, A.indptr)
     indptr = np.append(starts[rows], starts[-1])
     size = np.array([len(rows), len(columns)]) * A.shape // shape
@@ -122,8 +134,8 @@ def selected(A: Any, rows: Ints, columns: Ints) -> Any:
 
 
 def upper_triangle(A: sparse.csr_array) -> tuple[Array, Index, Index]:
-    """Values, float64 or complex128, columns and starts of rows of the upper triangle of a matrix
-    with sorted indices.
+    """Return the upper triangle of a matrix with sorted indices: values in double precision,
+    columns and row starts.
     """
     n, kind = A.shape[0], np.complex128 if np.iscomplexobj(A.data) else np.float64
     kept = A.indices >= np.repeat(np.arange(n, dtype=A.indices.dtype), np.diff(A.indptr))
@@ -132,8 +144,8 @@ def upper_triangle(A: sparse.csr_array) -> tuple[Array, Index, Index]:
 
 
 def on_one_pattern(matrices: Sequence[sparse.csr_array]) -> tuple[Floats, Index, Index]:
-    """Upper triangles of real matrices in the union of their sparsity patterns: values (j, nnz) of
-    each, columns and starts of rows.
+    """Return upper triangles of real matrices on the union of their patterns: values (j, nnz),
+    columns and row starts.
     """
     shape, values, patterns = matrices[0].shape, [], []
     for A in matrices:
@@ -146,19 +158,19 @@ def on_one_pattern(matrices: Sequence[sparse.csr_array]) -> tuple[Floats, Index,
     numbered = sparse.csr_array(
         (np.arange(1, union.nnz + 1, dtype=np.int32), union.indices, union.indptr), shape=shape
     )
-    found = np.zeros((len(values), union.nnz))
-    for row, each, pattern in zip(found, values, patterns, strict=True):
+    on_union = np.zeros((len(values), union.nnz))
+    for row, each, pattern in zip(on_union, values, patterns, strict=True):
         row[numbered.multiply(pattern).data - 1] = each
-    return found, union.indices, union.indptr
+    return on_union, union.indices, union.indptr
 
 
 def starts_of_kept(kept: Bools, indptr: NDArray[np.integer[Any]]) -> Index:
-    """Starts (n + 1,) of the rows of a matrix of which some entries (nnz,) are kept."""
+    """Return row starts (n + 1,) of a matrix that keeps only some of its entries (nnz,)."""
     before = np.zeros(len(kept) + 1, np.int32)
     np.cumsum(kept, out=before[1:])
     return before[indptr]
 
 
 def slabs(count: int) -> list[slice]:
-    """Slices of elements, `SLAB` at a time."""
+    """Return slices of `SLAB` elements each."""
     return [slice(start, start + SLAB) for start in range(0, count, SLAB)]

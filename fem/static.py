@@ -12,31 +12,41 @@ from fem.linear_solver import Factor, factorise
 from fem.transient import Diverged
 from fem.typing import Floats
 
-FLOATING = (1e-6, 1e-9, 1e-12)  # of the square of the highest frequency: shifts of free bodies
-RIGID = 1e-14  # of it: a mode below is a rigid-body mode
-MOST_RESTARTS = 40  # of Lanczos' method
+FREE_SHIFTS = (1e-6, 1e-9, 1e-12)  # of the square of the highest frequency, for free bodies
+RIGID = 1e-14  # of that square: below it a mode is a rigid-body mode
+MOST_RESTARTS = 40  # of the Lanczos method
 
 
 def static(operators: Operators, force: Floats, *, solver: str = "auto") -> Floats:
-    """Static displacement under nodal forces.
+    """Return the static displacement under nodal forces.
 
-    One step of iterative refinement: thin sheets are so ill-conditioned that a direct solution
-    alone leaves residuals near 1e-5.
+    One step of iterative refinement follows the direct solution, whose residual may be 1e-5 for
+    thin sheets.
 
     Parameters
     ----------
     operators : Operators
     force : (3 n,) or (3 n, k) float, N
-    solver : of `linear_solver.factorise`
+    solver : backend of `factorise`
 
     Returns
     -------
-    (3 n,) or (3 n, k) float, metre
+    (3 n,) or (3 n, k) float
+        Displacement, m.
 
     Raises
     ------
     ValueError
         If the body is unconstrained.
+
+    Examples
+    --------
+    >>> import fem, meshes
+    >>> mesh = meshes.block((0.02, 0.02, 0.01), 0.005)
+    >>> ops = fem.assemble(mesh, fem.PRESETS["palm"], fixed="bottom")
+    >>> u = fem.static(ops, fem.load_operator(mesh).sum(axis=1))  # 1 Pa on the whole top
+    >>> (1e9 * (fem.probe_operator(mesh, [[0.0, 0.0]]) @ u)).round(1)  # nm
+    array([93.])
     """
     factor = factorise(operators.K, backend=solver)
     f = force[operators.free]
@@ -45,15 +55,15 @@ def static(operators: Operators, force: Floats, *, solver: str = "auto") -> Floa
 
 
 def modes(operators: Operators, n: int, *, solver: str = "auto") -> tuple[Floats, Floats]:
-    """Natural modes of lowest frequency, without damping.
+    """Return the undamped natural modes of lowest frequency.
 
-    Rigid-body modes of a free body are found near 0 Hz.
+    Rigid-body modes of a free body have frequencies near 0 Hz.
 
     Parameters
     ----------
     operators : Operators
     n : number of modes
-    solver : of `linear_solver.factorise`
+    solver : backend of `factorise`
 
     Returns
     -------
@@ -63,7 +73,16 @@ def modes(operators: Operators, n: int, *, solver: str = "auto") -> tuple[Floats
     Raises
     ------
     Diverged
-        If they do not converge.
+        If the modes do not converge.
+
+    Examples
+    --------
+    >>> import fem, meshes
+    >>> mesh = meshes.block((0.02, 0.02, 0.01), 0.005)
+    >>> ops = fem.assemble(mesh, fem.PRESETS["palm"], fixed="bottom")
+    >>> frequencies, shapes = fem.modes(ops, 2)
+    >>> frequencies.round(1)  # Hz
+    array([112.7, 112.7])
     """
     K, M = operators.K, operators.M
     for shift, factor in _inverses(operators, solver):
@@ -79,28 +98,27 @@ def modes(operators: Operators, n: int, *, solver: str = "auto") -> tuple[Floats
         frequencies = np.sqrt(np.maximum(squares[order], 0)) / (2 * np.pi)
         return frequencies, operators.expand(shapes[:, order])
     raise Diverged(
-        f"the {n} lowest modes did not converge in {MOST_RESTARTS} restarts: the body is so thin "
-        "that round-off hides them; constrain it, ask for more modes, or mesh a thicker equivalent"
+        f"the {n} lowest modes did not converge in {MOST_RESTARTS} restarts because of round-off "
+        "in a thin body; constrain it, compute more modes, or mesh a thicker equivalent"
     )
 
 
 def _inverses(operators: Operators, solver: str) -> Iterator[tuple[float, Factor]]:
-    """Shifts s and factorised K + s M: 0 for a constrained body; for a free one, smaller and
-    smaller fractions of the square of the mesh's highest frequency, above which only a solid
-    body's first modes lie.
+    """Yield shifts s and factorised K + s M: s = 0 for a constrained body; for a free one, smaller
+    and smaller fractions of the square of the highest frequency of the mesh.
     """
     K, M = operators.K, operators.M
     scale = K.trace() / M.trace()
     try:
         factor = factorise(K, backend=solver)
     except ValueError:
-        held = False
+        is_constrained = False
     else:
-        # An inverse iteration ends near a rigid-body mode if there is one, whose K is round-off.
+        # Inverse iteration approaches a rigid-body mode if there is one; its energy is round-off.
         u = factor.solve(M @ np.random.default_rng(0).standard_normal(len(operators.free)))
-        held = bool(u @ (K @ u) > RIGID * scale * (u @ (M @ u)))
-    if held:
+        is_constrained = bool(u @ (K @ u) > RIGID * scale * (u @ (M @ u)))
+    if is_constrained:
         yield 0.0, factor
         return
-    for part in FLOATING:
+    for part in FREE_SHIFTS:
         yield part * scale, factorise(K + part * scale * M, backend=solver)

@@ -11,7 +11,7 @@ from scipy import sparse
 
 import fem
 from fem.energy import mean_power
-from fem.stress import relaxed
+from fem.stress import relaxed_stress
 from meshes import MeshError
 from simple_model import Effort, Material, Response
 from simple_model.load.sampling import below_half_the_rate, resolving_step
@@ -139,8 +139,9 @@ def transient_answer(scene: Scene, times: Floats, options: SolveOptions) -> Resp
         states = fem.transient(ops, force, dt, solver=solver)
         balanced = fem.with_energy_balance(ops, islice(states, steps + 1), force)
         stepped, (imbalance, radiated) = march(
-            balanced, steps, lambda u: S @ u, lambda state: fem.stored(ops, state), report
-        )
+            balanced, steps, lambda u: S @ u, lambda state: fem.mechanical_energy(ops, state),
+            report,
+        )  # fmt: skip
     still = meshed.sag(build, ops, S, scene.load, solver)
     effort = Effort(
         dofs=len(ops.free), steps=steps, energy_imbalance=imbalance, radiated=radiated, dt=dt,
@@ -177,7 +178,7 @@ def sampled_components(
 
     if quantity.relaxes:
         each = np.split(stepped, len(solids), axis=1)
-        stepped = np.hstack([relaxed(x, dt, m) for x, m in zip(each, solids, strict=True)])
+        stepped = np.hstack([relaxed_stress(x, dt, m) for x, m in zip(each, solids, strict=True)])
     return np.asarray(CubicSpline(np.arange(len(stepped)) * dt, stepped)(times, quantity.rate))
 
 

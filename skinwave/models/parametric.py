@@ -20,7 +20,7 @@ from scipy import sparse
 
 import fem
 from fem.affine import weights
-from fem.affine_model import AffineModel, operators_at, steady, steady_lines
+from fem.affine_model import AffineModel, operators_at, steady_lines, steady_outputs
 from fem.boundary import fixed_dofs
 from fem.greedy import Geometry, Variant, line_bases, reduce_affine
 from meshes import cache
@@ -281,7 +281,7 @@ def _strong_lines(model: AffineModel, frequencies: Floats, variants: Sequence[Va
 
     def strength(each: Variant) -> Floats:
         at = weights(model.terms, each.solids, frequencies)
-        motion = steady(model, at, each.shares, range(len(frequencies)))
+        motion = steady_outputs(model, at, each.shares, range(len(frequencies)))
         return np.asarray(np.linalg.norm(motion, axis=1))
 
     strengths = np.array([strength(each) for each in variants])

@@ -20,7 +20,7 @@ from scipy import sparse
 
 import fem
 from fem.energy import mean_power
-from fem.maxwell import with_internal
+from fem.maxwell import maxwell_only
 from fem.reduced import exponential_sum, impulse_response, line_response
 from meshes import cache
 from meshes.records import decoded, encoded
@@ -262,7 +262,7 @@ def reduced_of(
     """Return the reduced body of projected operators and `forces` (k, r) at points (k, 3)."""
     return ReducedBody(
         poles=fem.poles(operators), damping=operators.C, radiation=operators.R,
-        branches=with_internal(operators.branches), forces=forces, points=points, effort=effort,
+        branches=maxwell_only(operators.branches), forces=forces, points=points, effort=effort,
         **{"probes": np.zeros((0, 2)), "read": np.zeros((0, forces.shape[1]))} | fields,
     )  # fmt: skip
 

@@ -249,7 +249,7 @@ def _march(
     with clock("march"):
         stepped, (imbalance, _) = linear_elements.march(
             fem.with_energy_balance(body, states(), cached), steps, read,
-            lambda state: fem.stored(body, state), options.progress,
+            lambda state: fem.mechanical_energy(body, state), options.progress,
         )  # fmt: skip
     effort = Effort(steps=steps, solver=solver_name(solver), energy_imbalance=imbalance, dt=dt)
     return stepped, np.array(straight), effort

@@ -122,7 +122,7 @@ def free_energy() -> Checks:
     u = nonlinear.static(body, P @ np.full(P.shape[1], 6.2))
     start, steps = replace(fem.at_rest(mesh.n_dofs), displacement=u), 800
     moved = nonlinear.dynamic(body, lambda t: 0 * u, 1e-4, initial=start, tolerance=1e-3)
-    energies = [fem.stored(body, s) for s in islice(moved, steps + 1)]
+    energies = [fem.mechanical_energy(body, s) for s in islice(moved, steps + 1)]
     drift = np.array(energies) / energies[0] - 1
     late = np.abs(drift[-steps // 4 :].mean() - drift[: steps // 4].mean())
     yield relative("released from, w / h", (S @ u)[0] / PAPER.depth, 3.0, 0.05)

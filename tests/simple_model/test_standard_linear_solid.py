@@ -136,7 +136,7 @@ def test_small_motion_at_large_displacement_relaxes_as_linear_motion_does():
                       for each, (state, _) in zip(linear, found, strict=True)])  # fmt: skip
     assert np.linalg.norm(moved[:, 0] - moved[:, 1]) < 1e-6 * np.linalg.norm(moved[:, 1])
     state, spent = found[-1]
-    stored = fem.stored(body, state)
+    stored = fem.mechanical_energy(body, state)
     assert spent.dissipated > 0.05 * spent.work
     assert abs(spent.work - stored - spent.lost) < 1e-6 * spent.work
 
@@ -170,5 +170,5 @@ def test_modes_of_a_sheet_relax_as_the_sheet_does():
     moved = np.array([state.displacement for state, _ in found])
     assert np.linalg.norm(moved - exact) < 2e-3 * np.linalg.norm(exact)
     state, spent = found[-1]
-    stored = fem.stored(body, state)
+    stored = fem.mechanical_energy(body, state)
     assert abs(spent.work - stored - spent.lost) < 2e-3 * spent.work
