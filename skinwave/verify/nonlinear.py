@@ -1,7 +1,6 @@
-"""Large deflection: elastica, disc, rotation, tangent, energy, the linear limit, and its limits."""
+"""Large deflection: elastica, disc, rotation, tangent, energy, and reduction."""
 
 from dataclasses import replace
-from functools import cache
 from itertools import islice
 
 import numpy as np
@@ -14,7 +13,7 @@ from meshes import TetMesh
 from simple_model import MovingPressure, Tacton
 from skinwave.models.stretching import meshed_sheet, stretching_body
 from skinwave.planning.simulate import compute
-from skinwave.scene.scene import BODIES, Body, Scene
+from skinwave.scene.scene import BODIES, Scene
 from skinwave.verify.case import Checks, below, case, misfit, relative
 from skinwave.verify.references import elastica as elastica_tip
 from skinwave.verify.references import karman_disc
@@ -23,7 +22,6 @@ PAPER = BODIES["paper-sheet-loose"]
 SMALL = replace(PAPER, width=0.06, height=0.06)
 BONET = "Bonet and Wood, Nonlinear Continuum Mechanics for Finite Element Analysis (1997)"
 TIMOSHENKO = "Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells (1959), chapter 13"
-AM = 140.0  # Hz
 
 
 @case(
@@ -32,7 +30,7 @@ AM = 140.0  # Hz
     mesh="20 by 1 by 1 cells, thickness / length = 0.02, nu = 0",
 )
 def elastica() -> Checks:
-    """Elastica: a clamped strip under a force at its tip."""
+    """Elastica: clamped strip under a force at its tip."""
     width, thickness = 0.05, 0.02
     material = fem.from_young(density=1, young=1e9, poisson=0.0)
     mesh = meshes.extrude(np.linspace(0, 1, 21), [0, width], [-thickness, 0])
@@ -54,16 +52,16 @@ def elastica() -> Checks:
 @case(
     f"von Karman's equations: {TIMOSHENKO}; Way, Trans ASME 56:627 (1934)",
     mesh="a quarter, 16 rings, one cell thick, thickness / radius = 0.04",
-    note="The formula w + 0.488 w^3 / h^2 = q a^4 / 64 D (Timoshenko, chapter 13) has 0.774 and "
-    "1.86, 2.1 and 5.2 % above the solution of the equations that it approximates.",
+    note="The approximate formula w + 0.488 w^3 / h^2 = q a^4 / 64 D (Timoshenko, chapter 13) "
+    "gives 0.774 and 1.86, which is 2.1 % and 5.2 % above the solution of the equations.",
 )
 def clamped_disc() -> Checks:
-    """Clamped disc, its edge immovable, deflected by up to 1.8 thicknesses."""
+    """Clamped disc with an immovable edge, deflected by up to 1.8 thicknesses."""
     radius, paper, meshed = 0.05, replace(PAPER.solid, loss_factor=0.0), 2e-3
     mesh = quarter_disc(radius, meshed, 16)
     P, S = fem.load_operator(mesh), fem.probe_operator(mesh, [[0, 0]])
     for name, thickness in (("solid", meshed), ("equivalent of 0.1 mm", 1e-4)):
-        # A thin disc as a thick one of the same bending stiffness, with a membrane in it.
+        # A thin disc is meshed as a thick one of the same bending stiffness, with a membrane.
         ratio = thickness / meshed
         solid = replace(paper, shear_modulus=paper.shear_modulus * ratio**3)
         missing = thickness * (1 - ratio**2)
@@ -75,18 +73,18 @@ def clamped_disc() -> Checks:
         stiffness = paper.young * thickness**3 / 12 / (1 - paper.poisson**2)
         for load in (1.0, 5.0):
             pressure = np.full(P.shape[1], 64 * load * stiffness * thickness / radius**4)
-            found = float((S @ nonlinear.static(body, P @ pressure))[0]) / thickness
+            deflection = (S @ nonlinear.static(body, P @ pressure))[0] / thickness
             what = f"{name}: w / h at q a^4 / 64 D h = {load:g}"
-            yield relative(what, found, karman_disc(load, paper.poisson), 0.05)
+            yield relative(what, deflection, karman_disc(load, paper.poisson), 0.05)
 
 
 @case(
     f"{BONET}, chapters 3 and 7: E = (F^T F - 1) / 2 = 0 under rotation, consistent linearisation; "
     "central differences",
-    mesh="block of 2 by 2 by 1 cells, displaced at random; with 10 nodes also a membrane within",
+    mesh="block of 2 by 2 by 1 cells, displaced at random; with 10 nodes also a membrane inside",
 )
 def tangent() -> Checks:
-    """A rigid rotation makes no stress; tangent and force are derivatives of force and energy."""
+    """Rigid rotation without stress; tangent and force as derivatives of force and energy."""
     turn, _ = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))
     turn *= np.linalg.det(turn)
     random, step = np.random.default_rng(4), 1e-5
@@ -99,7 +97,7 @@ def tangent() -> Checks:
         x = mesh.points
         body = fem.finite_strain(mesh, material, fixed=0 * x, membrane=layer)
         forces = [np.abs(body.internal(u.ravel())).max() for u in (x @ turn.T - x, 0.3 * x)]
-        what = f"{nodes} nodes: largest force of a rotation, over that of 30 % stretch"
+        what = f"{nodes} nodes: largest force in a rotation, over that in 30 % stretch"
         yield below(what, forces[0] / forces[1], 1e-10)
         u, du = (1e-3 * random.standard_normal(x.size) for _ in range(2))
         ahead, behind = (u + sign * step * du for sign in (1, -1))
@@ -111,18 +109,20 @@ def tangent() -> Checks:
 
 @case(
     "Hughes, The Finite Element Method (1987), chapter 9: average acceleration conserves the "
-    "energy of a linear body; of a nonlinear one to second order in the step",
+    "energy of a linear body, and of a nonlinear one to second order in the step",
     mesh="4 by 4 by 1 cells, no loss; steps of 0.1 ms",
 )
 def free_energy() -> Checks:
-    """Free oscillation of a sheet from three thicknesses, 800 steps."""
-    mesh, body = _sheet(replace(PAPER, material=replace(PAPER.solid, loss_factor=0.0)), 4)
+    """Free oscillation of a sheet released from three thicknesses, 800 steps."""
+    lossless = replace(PAPER, material=replace(PAPER.solid, loss_factor=0.0))
+    made = meshed_sheet(lossless, min(PAPER.width, PAPER.height) / 4)
+    mesh, body = made.mesh, stretching_body(lossless, made)
     P, S = fem.load_operator(mesh), fem.probe_operator(mesh, [[0, 0]])
     # 6 Pa deflect the coarse sheet by three thicknesses.
     u = nonlinear.static(body, P @ np.full(P.shape[1], 6.2))
     start, steps = replace(fem.at_rest(mesh.n_dofs), displacement=u), 800
-    moved = nonlinear.dynamic(body, lambda t: 0 * u, 1e-4, initial=start, tolerance=1e-3)
-    energies = [fem.mechanical_energy(body, s) for s in islice(moved, steps + 1)]
+    states = nonlinear.dynamic(body, lambda t: 0 * u, 1e-4, initial=start, tolerance=1e-3)
+    energies = [fem.mechanical_energy(body, s) for s in islice(states, steps + 1)]
     drift = np.array(energies) / energies[0] - 1
     late = np.abs(drift[-steps // 4 :].mean() - drift[: steps // 4].mean())
     yield relative("released from, w / h", (S @ u)[0] / PAPER.depth, 3.0, 0.05)
@@ -136,9 +136,12 @@ def free_energy() -> Checks:
     mesh="a sheet of 60 mm in 8 by 8 by 1 cells, 0.02 s of a Tacton", slow=True,
 )  # fmt: skip
 def modes_or_all() -> Checks:
-    """A sheet in its bending modes against all of its dofs."""
+    """Sheet in its bending modes against all of its degrees of freedom."""
+    tacton = Tacton(am_frequency=140.0, duration=0.02)
+    pressure = MovingPressure(tacton=tacton, drive="pressure_squared")
+    scene = Scene(pressure=pressure, body=SMALL, probes=((0.0, 0.0), (0.01, 0.005)))
     modes, full = (
-        compute(_scene(1.0, 0.02), model, h=SMALL.width / 8)
+        compute(scene, model, h=SMALL.width / 8)
         for model in ("fem-nonlinear", "fem-nonlinear-transient")
     )
     swing = full.displacement - full.displacement.mean(axis=0)
@@ -148,7 +151,7 @@ def modes_or_all() -> Checks:
 
 
 def quarter_disc(radius: float, thickness: float, rings: int) -> TetMesh:
-    """A quarter of a disc, its facet sets `top`, `rim`, `left` (x = 0) and `front` (y = 0)."""
+    """Return a quarter of a disc with facet sets `top`, `rim`, `left` (x = 0), `front` (y = 0)."""
     ring = np.repeat(np.arange(rings + 1), np.arange(1, rings + 2))
     first = np.arange(rings + 1) * np.arange(1, rings + 2) // 2
     place = np.arange(len(ring)) - first[ring]
@@ -167,15 +170,3 @@ def quarter_disc(radius: float, thickness: float, rings: int) -> TetMesh:
         "rim": np.hypot(x, y) > radius - near,
     }  # fmt: skip
     return replace(mesh, facets={name: facets[where.all(axis=1)] for name, where in on.items()})
-
-
-@cache
-def _sheet(body: Body, cells: int) -> tuple[TetMesh, fem.Elastic]:
-    made = meshed_sheet(body, min(body.width, body.height) / cells)
-    return made.mesh, stretching_body(body, made)
-
-
-def _scene(amplitude: float, duration: float) -> Scene:
-    tacton = Tacton(amplitude=amplitude, am_frequency=AM, duration=duration)
-    pressure = MovingPressure(tacton=tacton, drive="pressure_squared")
-    return Scene(pressure=pressure, body=SMALL, probes=((0.0, 0.0), (0.01, 0.005)))

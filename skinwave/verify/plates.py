@@ -1,6 +1,6 @@
 """Sheets, plates and beams: free vibration, thin limits, moving forces, and air."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import islice
 
@@ -10,15 +10,26 @@ from scipy import sparse
 import fem
 import meshes
 from fem.added_mass import near_field
+from meshes import TetMesh
 from simple_model.layers.compliance import AIR_DENSITY, thin_sheet
 from simple_model.layers.wavenumber_integral import point_response
 from skinwave.typing import Floats
 from skinwave.verify import references
 from skinwave.verify.case import Checks, below, case, misfit, order, relative
-from skinwave.verify.statics import WIDTH
+from skinwave.verify.setups import (
+    PAPER,
+    THICKNESS,
+    WIDTH,
+    frequencies,
+    gaussian,
+    nearest,
+    push,
+    read,
+    unit,
+)
 
-SLIDING = {"left": "yz", "right": "yz", "front": "xz", "back": "xz"}
-# Lengths in metre and material of two plates whose natural frequencies are known in 3-D.
+SUPPORTED = {"left": "yz", "right": "yz", "front": "xz", "back": "xz"}  # Navier's supports
+# Lengths in metres and material of two plates with known natural frequencies in 3-D.
 STEEL = ((10.0, 10.0, 1.0), fem.from_young(density=8000, young=200e9, poisson=0.3))
 SOFT = ((0.06, 0.06, 0.01), fem.Material(density=1000, shear_modulus=25e3, poisson=0.45))
 # Thickness over width, half waves along the width, and length over thickness of an element.
@@ -26,13 +37,11 @@ SHEETS = (
     (0.2, 1, 1), (0.05, 1, 1), (0.05, 1, 5), (0.01, 1, 1), (0.01, 1, 5), (0.01, 1, 20),
     (1e-3, 1, 5), (1e-3, 1, 20), (1e-3, 1, 50), (1e-4, 5, 10), (1e-4, 5, 20), (1e-4, 5, 50),
 )  # fmt: skip
-THICKNESS = 1e-4  # m, of paper
-PAPER = {"bending_stiffness": 4e9 * 1e-12 / 12 / 0.91, "mass_per_area": 0.08}
 ACHENBACH = "Achenbach, Wave Propagation in Elastic Solids (1973), chapter 6"
 NAVIER = f"Rayleigh-Lamb roots at k = pi hypot(m / a, n / b): {ACHENBACH}"
 LAMB = "Lamb, Proc R Soc A 98:205 (1920)"
 LAMBS_FACTOR = 0.669  # of rho_f a / (rho_p h): the lowest mode, fluid on one side
-LAG = 1.2e-3  # s: a wave of 80 Hz that has crossed the sheet and back is down to three thousandths
+LAG = 1.2e-3  # s: a wave of 80 Hz falls to 0.003 on its way across the sheet and back
 
 
 @case(
@@ -46,48 +55,46 @@ def clamped_sheet() -> Checks:
     material = fem.from_young(density=80, young=4e6, poisson=0.3)
     half = np.linspace(0, a / 2, 23)
     mesh = meshes.extrude(half, half, [-thickness, 0])
-    held = {"right": "xyz", "back": "xyz", "front": "y"}
-    even, odd = (fem.assemble(mesh, material, fixed={**held, "left": x}) for x in ("x", "yz"))
+    fixed = {"right": "xyz", "back": "xyz", "front": "y"}
+    even, odd = (fem.assemble(mesh, material, fixed={**fixed, "left": x}) for x in ("x", "yz"))
     D = material.young * thickness**3 / 12 / (1 - 0.3**2)
     parameters, centre = references.clamped_plate()
     hz = parameters / a**2 * np.sqrt(D / (material.density * thickness)) / (2 * np.pi)
-    P = fem.load_operator(mesh)
-    u = fem.probe_operator(mesh, [[0, 0]]) @ fem.static(even, P @ np.ones(P.shape[1]))
-    yield relative("first natural frequency", fem.modes(even, 1)[0][0], hz[0], 0.01, "Hz")
-    yield relative("second natural frequency", fem.modes(odd, 1)[0][0], hz[1], 0.01, "Hz")
-    yield relative("central deflection, 1 Pa", u[0], centre * a**4 / D, 0.01, "mm")
+    deflection = read(mesh, fem.static(even, push(mesh)), 0.0)
+    yield relative("first natural frequency", fem.modes(even, 1)[0], hz[0], 0.01, "Hz")
+    yield relative("second natural frequency", fem.modes(odd, 1)[0], hz[1], 0.01, "Hz")
+    yield relative("central deflection, 1 Pa", deflection, centre * a**4 / D, 0.01, "mm")
 
 
 @case(
     "Filon (1903): strip under a sine of pressure, exact; Kirchhoff's plate for scale",
     mesh="strips of one element across and through, 4 to 100 along the half wave",
-    note="Values are deflections over Kirchhoff's; the reference exceeds 1 by shear. Round-off of "
-    "the stiffness costs about 1e-17 (half wave / thickness)^4: a single half wave along a sheet "
-    "of thickness / width 0.0001 is wrong, five half waves are right.",
+    note="Values are deflections over Kirchhoff's; the reference exceeds 1 because of shear. "
+    "Round-off of the stiffness causes an error of about 1e-17 (half wave / thickness)^4. For a "
+    "sheet of thickness / width 0.0001, one half wave is wrong and five half waves are right.",
 )
 def thin_sheets() -> Checks:
     """Sheets of thickness / width 0.0001 to 0.2, elements of aspect 1 to 50."""
     for thin, waves, aspect in SHEETS:
-        found, exact, kirchhoff = _strip_bending(thin * waves, aspect)
+        deflection, exact, kirchhoff = _strip_bending(thin * waves, aspect)
         what = f"thickness / width {thin:g}, half waves {waves}, aspect {aspect}"
         bar = 0.01 if thin * waves * aspect < 0.1 else 0.02
-        yield relative(what, found / kirchhoff, exact / kirchhoff, bar)
+        yield relative(what, deflection / kirchhoff, exact / kirchhoff, bar)
 
 
 @case(f"Shear wave SH0, w = c_s k: {ACHENBACH}", mesh="4 by 4 by 1 cells")
 def in_plane_shear() -> Checks:
-    """In-plane shear of a plate at four cells a half wave."""
+    """In-plane shear of a plate with four cells per half wave."""
     lengths, material = STEEL
     exact = material.shear_speed * np.hypot(1 / lengths[0], 1 / lengths[1]) / 2
-    found = _modes(lengths, (4, 4, 1), material, SLIDING, 40)
-    nearest = found[np.argmin(np.abs(found / exact - 1))]
-    yield relative("half waves 1, 1", nearest, exact, 3e-3, "Hz")
+    hz = frequencies(_plate(lengths, (4, 4, 1)), material, SUPPORTED, 40)
+    yield relative("half waves 1, 1", nearest(hz, exact), exact, 3e-3, "Hz")
 
 
 @case(
     f"{NAVIER}; Strang and Fix, An Analysis of the Finite Element Method (1973), chapter 6: order "
     "2 p = 4, from above",
-    mesh="the upper half of a quarter plate; 8, 12 and 16 cells, or 14 a half wave",
+    mesh="the upper half of a quarter plate; 8, 12 and 16 cells, or 14 per half wave",
 )
 def navier() -> Checks:
     """Plates on Navier's supports, thickness / side 0.1 and 0.17, nu 0.3 and 0.45."""
@@ -99,23 +106,22 @@ def navier() -> Checks:
             m: int, n: int, size: tuple[int, int, int], many: int,
             upper: tuple[float, float, float] = upper, material: fem.Material = material,
         ) -> Floats:  # fmt: skip
-            """Natural frequencies; an odd number of half waves is symmetric about the middle."""
+            """Return natural frequencies; odd half waves are symmetric about the middle."""
             middle = {"right": "x" if m % 2 else "yz", "back": "y" if n % 2 else "xz"}
             fixed = {"left": "yz", "front": "xz", "bottom": "xy", **middle}
-            return _modes(upper, size, material, fixed, many)
+            return frequencies(_plate(upper, size), material, fixed, many)
 
         what, first = f"nu = {material.poisson:g}", _navier_exact(lengths, material, 1, 1)
-        found = np.array([plate(1, 1, (n, n, n // 4), 1)[0] for n in cells])
-        errors = found / first - 1
+        hz = np.array([plate(1, 1, (n, n, n // 4), 1)[0] for n in cells])
+        errors = hz / first - 1
         yield order(f"{what}: order", 1 / np.array(cells), errors, 4, 0.2)
-        yield relative(f"{what}: first frequency, finest mesh", found[-1], first, 5e-5, "Hz")
+        yield relative(f"{what}: first frequency, finest mesh", hz[-1], first, 5e-5, "Hz")
         shortfall = max(0.0, -errors.min())
         yield below(f"{what}: largest shortfall below the exact frequency", shortfall, 0.0)
         for m, n in ((1, 1), (1, 2), (2, 2), (1, 3)):
             exact = _navier_exact(lengths, material, m, n)
-            found = plate(m, n, (7 * m, 7 * n, 2), 6)
-            nearest = found[np.argmin(np.abs(found / exact - 1))]
-            yield relative(f"{what}: half waves {m}, {n}", nearest, exact, 1e-3, "Hz")
+            mode = nearest(plate(m, n, (7 * m, 7 * n, 2), 6), exact)
+            yield relative(f"{what}: half waves {m}, {n}", mode, exact, 1e-3, "Hz")
 
 
 @case(
@@ -123,7 +129,7 @@ def navier() -> Checks:
     mesh="50 by 1 by 1 cells, thickness / length = 0.02",
 )
 def moving_force() -> Checks:
-    """Force crossing a simply supported beam at a quarter and half of the critical speed."""
+    """Force crossing a simply supported beam at a quarter and a half of the critical speed."""
     length, thickness, n, spot = 1.0, 0.02, 50, 0.02
     material = fem.from_young(density=1000, young=1e6, poisson=0.0)
     mesh = meshes.extrude(np.linspace(0, length, n + 1), [0, 0.02], np.linspace(-thickness, 0, 2))
@@ -142,89 +148,79 @@ def moving_force() -> Checks:
 
         dt = length / speed / 400
         states = islice(fem.transient(ops, force, dt), 401)
-        found = stiffness * np.array([(S @ s.displacement)[0] for s in states])
+        course = stiffness * np.array([(S @ s.displacement)[0] for s in states])
         exact = references.moving_force_on_beam(
             np.arange(401) * dt, speed=speed, critical=critical, period=1 / first
         )
         what = f"{ratio:g} of the critical speed"
-        yield relative(
-            f"{what}: largest deflection / (F L^3 / 48 E I)", found.max(), exact.max(), 0.01
-        )
-        yield misfit(f"{what}: its course while the force crosses, L2", found, exact, 0.02)
+        largest = f"{what}: largest deflection / (F L^3 / 48 E I)"
+        yield relative(largest, course.max(), exact.max(), 0.01)
+        yield misfit(f"{what}: deflection over time, L2", course, exact, 0.02)
 
 
 @case(
     f"{LAMB}: 0.669 of (1 - r^2/a^2)^2; a Gaussian by Parseval's theorem and the transform "
     "2 pi / k of 1/r: iint w w / r = 2 pi^(5/2) s^3",
-    mesh="grids of 49 to 385 nodes a side across 12 standard deviations; 161 across the disc",
+    mesh="grids of 49 to 385 nodes per side over 12 standard deviations; 161 over the disc",
 )
 def air_operator() -> Checks:
-    """Air around a sheet: the operator on shapes of known energy."""
+    """Air around a sheet: added mass of shapes with known energy."""
     sizes = np.array([0.25, 0.125, 0.0625, 0.03125])  # of the Gaussian's standard deviation
     energies = [_energy(6.0, s, lambda r: np.exp(-(r**2) / 2)) for s in sizes]
     errors = np.abs(np.array(energies) / (2 * np.pi**2.5) - 1)
     lamb = _energy(1.0, 1 / 80, lambda r: np.where(r < 1, (1 - r**2) ** 2, 0.0))
     factor = lamb / (2 * np.pi) / (np.pi / 5)  # int (1 - r^2)^4 dA = pi/5
     yield order("order in the spacing, Gaussian", sizes, errors, 2, 0.1)
-    yield relative("Gaussian, 32 nodes a standard deviation", 1 - errors[-1], 1.0, 5e-5)
+    yield relative("Gaussian, 32 nodes per standard deviation", 1 - errors[-1], 1.0, 5e-5)
     yield relative("Lamb's factor of the added mass, one side", factor, LAMBS_FACTOR, 1e-3)
 
 
 @case(
     "2 rho / k of each wavenumber: Junger and Feit, Sound, Structures, and Their Interaction "
-    "(1986), section 5.11; by the wavenumber integral that the cases on flat-body verify",
+    "(1986), section 5.11; wavenumber integral, verified by the cases on flat-body",
     mesh="a quarter in cells of 4 mm; edges clamped at 168 mm; loss factor 0.6 at 80 Hz, so that "
     "they reflect little", slow=True,
 )  # fmt: skip
 def focus_in_air() -> Checks:
-    """Focus on a large and lossy sheet in air: finite elements against the infinite sheet."""
+    """Focus on a large, lossy sheet in air: finite elements against the infinite sheet."""
     thickness = 1e-3
     young = 12 * PAPER["bending_stiffness"] * (1 - 0.3**2) / thickness**3
     solid = fem.Material(
         density=PAPER["mass_per_area"] / thickness, shear_modulus=young / 2.6, poisson=0.3,
         viscosity=LAG * young / 2.6,
     )  # fmt: skip
-    mesh = _quarter(0.168, thickness, 4e-3)
+    mesh = meshes.sheet(2 * 0.168, 2 * 0.168, thickness, 4e-3)
+    mesh = meshes.half(meshes.half(mesh, "x"), "y")
     ops = fem.assemble(mesh, solid, fixed={"clamped": "xyz", "mirror_x": "x", "mirror_y": "y"})
     radii, hz = np.array([0.0, 5, 10, 15, 20, 30]) * 1e-3, np.array([80.0, 140, 210, 300])
-    read = fem.probe_operator(mesh, np.column_stack([radii, np.zeros(6)]))
-    squared = (fem.facet_points(mesh)[:, :2] ** 2).sum(axis=1)
-    force = fem.load_operator(mesh) @ np.exp(-squared / (2 * WIDTH**2))[:, None]
+    S = fem.probe_operator(mesh, np.column_stack([radii, np.zeros(6)]))
+    force = push(mesh, gaussian())[:, None]
     model = fem.reduce(
         ops, sparse.csr_array(force.T), hz.max(), 2e-3,
         added=fem.added_mass(mesh, ops.free, AIR_DENSITY, mirrored="xy"),
     )  # fmt: skip
-    model = replace(model, outputs=read @ model.basis)
-    found = fem.transfer(model, model.basis.T @ force, hz)[..., 0]
+    model = replace(model, outputs=S @ model.basis)
+    amplitudes = fem.transfer(model, model.basis.T @ force, hz)[..., 0]
     paper = replace(fem.PRESETS["paper"], loss_factor=0.0)
     paper = replace(paper, viscosity=LAG * paper.shear_modulus)
     sheet = thin_sheet(paper, THICKNESS, air_density=AIR_DENSITY)
     exact = point_response(sheet, radii, 2 * np.pi * hz, WIDTH)
-    for f, ours, theirs in zip(hz, found, exact, strict=True):
+    for f, ours, theirs in zip(hz, amplitudes, exact, strict=True):
         yield misfit(f"{f:g} Hz, 0 to 30 mm, complex, relative L2", ours, theirs, 0.03, "um")
 
 
-def _quarter(half: float, thickness: float, h: float) -> meshes.TetMesh:
-    """The part of a square sheet with positive x and y."""
-    whole = meshes.sheet(2 * half, 2 * half, thickness, h)
-    return meshes.half(meshes.half(whole, "x"), "y")
-
-
 def _energy(half: float, spacing: float, shape: Callable[[Floats], Floats]) -> float:
-    """iint w(x) w(y) / |x - y| dA dA of a shape of the distance from the middle of a square."""
+    """Return iint w(x) w(y) / |x - y| dA dA of w, a function of the distance from the centre."""
     x = spacing * np.arange(-round(half / spacing), round(half / spacing) + 1)
     w = shape(np.hypot(x, x[:, None]))
     field = near_field((len(w), len(w)), (spacing, spacing))
     return float((w * field(w[None])[0]).sum() * spacing**2)
 
 
-def _modes(
-    lengths: tuple[float, float, float], cells: tuple[int, int, int], material: fem.Material,
-    fixed: dict[str, str], n: int,
-) -> Floats:  # fmt: skip
+def _plate(lengths: Sequence[float], cells: Sequence[int]) -> TetMesh:
+    """Return a plate with its top at z = 0."""
     x, y, depth = (np.linspace(0, a, k + 1) for a, k in zip(lengths, cells, strict=True))
-    mesh = meshes.extrude(x, y, depth - lengths[2])
-    return fem.modes(fem.assemble(mesh, material, fixed=fixed), n)[0]
+    return meshes.extrude(x, y, depth - lengths[2])
 
 
 def _navier_exact(
@@ -236,14 +232,12 @@ def _navier_exact(
 
 
 def _strip_bending(thin: float, aspect: float) -> tuple[float, float, float]:
-    """Mid-span deflection under a sine of 1 Pa: ours, Filon's and Kirchhoff's, metre."""
+    """Return the mid-span deflection under a sine of 1 Pa: ours, Filon's and Kirchhoff's, m."""
     n = max(4, round(1 / thin / aspect / 2))
     cell = 0.5 / n
     mesh = meshes.extrude(np.linspace(0, 0.5, n + 1), [0, cell], [-thin, 0])
-    material = fem.Material(density=1, shear_modulus=1, poisson=0.3)
     fixed = {"left": "z", "right": "x", "front": "y", "back": "y"}
-    P, x = fem.load_operator(mesh), fem.facet_points(mesh)[:, 0]
-    u = fem.static(fem.assemble(mesh, material, fixed=fixed), P @ np.sin(np.pi * x))
-    found = float((fem.probe_operator(mesh, [[0.5, cell / 2]]) @ u)[0])
+    force = push(mesh, lambda x: np.sin(np.pi * x[:, 0]))
+    u = fem.static(fem.assemble(mesh, unit(0.3), fixed=fixed), force)
     exact = references.strip_under_sine(np.pi, thickness=thin, shear_modulus=1, poisson=0.3)
-    return found, exact, 6 * (1 - 0.3) / np.pi**4 / thin**3
+    return float(read(mesh, u, 0.5, cell / 2)[0]), exact, 6 * (1 - 0.3) / np.pi**4 / thin**3

@@ -1,8 +1,8 @@
 """Published values that models are compared with, from `published.toml`.
 
-`how` says whether a number was read in the source or where it is quoted, in the abstract only, or
-computed from what the source gives. `built` names the presets that were fitted to a source or
-chosen by it: there agreement is no evidence. All others predict it.
+`how` is the quality of a set: read in the source, quoted elsewhere, from the abstract only, or
+computed from the source's numbers. `built` names the presets that were fitted to a source or chosen
+by it; their agreement with it is no evidence.
 """
 
 import tomllib
@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 SKIN_DENSITY = 1000.0  # kg/m3
-RAYLEIGH = 0.955313  # speed of the Rayleigh wave over that of shear waves, nu = 0.5
-ALL = "All sources"  # begins the name of a set of them
+RAYLEIGH = 0.955313  # speed of Rayleigh waves over that of shear waves, nu = 0.5
+ALL = "All sources"  # start of the names of `all_sources`
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """Quantity that sources publish: its name, unit on pages, and that unit in SI."""
+    """A published quantity: its name, its unit on pages, and the size of that unit in SI."""
 
     name: str
     unit: str
@@ -36,9 +36,11 @@ QUANTITIES = {each.name: each for each in (SPEED, LENGTH, EXPONENT, FOCUS_SPEED)
 
 @dataclass(frozen=True, kw_only=True)
 class Published:
-    """Published `values` (n,) of one quantity, SI, at `frequencies` (n,) in Hz, nan of a value at
-    none, or where only a range is published. `lows` and `highs` (n,) are of people, or a standard
-    deviation about the value; () without a spread. `bodies` of `predictions` are compared with it.
+    """Published `values` (n,) of one quantity, in SI, at `frequencies` (n,) in Hz.
+
+    A frequency is nan for a value without one, a value is nan where only a range is published.
+    `lows` and `highs` (n,) span people or a standard deviation; they are empty without a spread.
+    `bodies` of `predictions` are compared with the set.
     """
 
     name: str
@@ -56,18 +58,18 @@ class Published:
     remark: str = ""
 
     def between(self, k: int) -> tuple[float, float]:
-        """Lowest and highest value, SI, at one of its frequencies."""
+        """Return the lowest and highest value, in SI, at frequency number k."""
         return (self.lows[k], self.highs[k]) if self.lows else (self.values[k], self.values[k])
 
     def at(self, frequency: float) -> tuple[float, float] | None:
-        """The same at a frequency in Hz, None if the source does not have it."""
-        known = np.flatnonzero(np.isclose(self.frequencies, frequency))
-        return self.between(int(known[0])) if len(known) else None
+        """Return the same at a frequency in Hz, or None if the source does not have it."""
+        equal = np.flatnonzero(np.isclose(self.frequencies, frequency))
+        return self.between(int(equal[0])) if len(equal) else None
 
 
 def rayleigh_wave(modulus: float, viscosity: float, frequency: float) -> tuple[float, float]:
-    """Phase speed in m/s and 1/e length in m of Rayleigh's wave in an incompressible solid of
-    Kelvin-Voigt's law: k = w sqrt(rho/(mu1 + i w mu2)) / 0.9553.
+    """Return the phase speed in m/s and 1/e length in m of Rayleigh waves in an incompressible
+    Kelvin-Voigt solid: k = w sqrt(rho/(mu1 + i w mu2)) / 0.9553.
     """
     w = 2 * np.pi * frequency
     k = w * np.sqrt(SKIN_DENSITY / (modulus + 1j * w * viscosity)) / RAYLEIGH
@@ -75,7 +77,7 @@ def rayleigh_wave(modulus: float, viscosity: float, frequency: float) -> tuple[f
 
 
 def _published(table: dict[str, Any]) -> Published:
-    """A set of the file."""
+    """Return a set of values from its table in the file."""
     quantity = QUANTITIES[table.pop("quantity")]
     frequencies = tuple(map(float, table.pop("frequencies")))
     numbers = {"values": (np.nan,) * len(frequencies)} | {
@@ -95,7 +97,7 @@ def _published(table: dict[str, Any]) -> Published:
 def _by_voigt(
     frequencies: tuple[float, ...], *constants: tuple[float, float]
 ) -> dict[str, tuple[float, ...]]:
-    """1/e lengths by constants of Voigt's law, each a mean and its standard deviation."""
+    """Return 1/e lengths from constants of Voigt's law, each a mean and a standard deviation."""
     ends = list(product(*((mean - spread, mean + spread) for mean, spread in constants)))
     spread = [[rayleigh_wave(mu, eta, f)[1] for mu, eta in ends] for f in frequencies]
     (mu, _), (eta, _) = constants
@@ -113,20 +115,20 @@ NOT_COMPARED = tuple(tuple(each.values()) for each in _FILE["not_compared"])
 
 
 def all_sources(quantity: Quantity) -> Published:
-    """Lowest and highest value, whatever the site, of all sources of a quantity as one set, at the
-    frequencies that two of them have or more.
+    """Return the range of a quantity over all sources and sites, as one set, at the frequencies
+    that at least two sources have.
     """
     sets = [each for each in WAVES if each.quantity is quantity]
-    found = {f: [pair for each in sets if (pair := each.at(f))] for f in np.arange(100.0, 701, 100)}
-    shared = {float(f): pairs for f, pairs in found.items() if len(pairs) > 1}
+    ranges = {f: [x for each in sets if (x := each.at(f))] for f in np.arange(100.0, 701, 100)}
+    shared = {float(f): pairs for f, pairs in ranges.items() if len(pairs) > 1}
     return Published(
         name=f"{ALL}: {quantity.name}", site="back of the hand, finger, forearm",
         quantity=quantity, frequencies=tuple(shared), values=(np.nan,) * len(shared),
         lows=tuple(min(low for low, _ in pairs) for pairs in shared.values()),
         highs=tuple(max(high for _, high in pairs) for pairs in shared.values()),
-        conditions="lowest to highest of the sources here, where two or more have the frequency",
+        conditions="lowest to highest of the sources here, where at least two have the frequency",
         source="the sets of this page", how="computed from the source's numbers",
         bodies=("forearm", "palm", "palm-stiff", "skin-slab", "palm-layers", "forearm-layers"),
-        remark="Sites and methods differ, so that this is wider than people are at one site; sets "
-        "that presets were fitted to are among them",
+        remark="Sites and methods differ, so the range is wider than between people at one site; "
+        "it includes sets that presets were fitted to",
     )  # fmt: skip

@@ -12,7 +12,9 @@ from skinwave.typing import Array
 
 
 def gaussian_at_rest(r: Array, *, width: float, shear_modulus: float, poisson: float) -> Array:
-    """Deflection of a half-space under exp(-r^2 / 2 s^2) Pa: kernel (1 - nu) / (mu k)."""
+    """Return the deflection of a half-space under exp(-r^2 / 2 s^2) Pa: kernel (1 - nu) / (mu
+    k).
+    """
     x = (r / width) ** 2 / 4
     return (1 - poisson) * width * np.sqrt(np.pi / 2) / shear_modulus * ive(0, x)
 
@@ -20,7 +22,7 @@ def gaussian_at_rest(r: Array, *, width: float, shear_modulus: float, poisson: f
 def gaussian_on_bonded_layer(
     r: Array, *, width: float, shear_modulus: float, poisson: float, depth: float
 ) -> Array:
-    """The same on a layer bonded to a rigid base: that kernel times
+    """Return the same for a layer bonded to a rigid base: that kernel times
     (2 c sinh 2u - 4u) / (2 c cosh 2u + 4 u^2 + 1 + c^2), u = k depth, c = 3 - 4 nu.
     """
     k = np.linspace(1e-9, 8, 4001) / width
@@ -32,8 +34,8 @@ def gaussian_on_bonded_layer(
 
 
 def half_space_kernel(k: Array, w: float, *, density: float, mu: complex, poisson: float) -> Array:
-    """Deflection per pressure of wavenumber k, with a complex modulus: -b_p k_s^2 / (mu R),
-    R = (2 k^2 - k_s^2)^2 - 4 k^2 b_p b_s.
+    """Return the deflection per pressure of wavenumber k, with a complex modulus: -b_p k_s^2 / (mu
+    R), R = (2 k^2 - k_s^2)^2 - 4 k^2 b_p b_s.
     """
     ks2 = density * w**2 / mu
     bp, bs = np.sqrt(k**2 - ks2 * (1 - 2 * poisson) / (2 - 2 * poisson)), np.sqrt(k**2 - ks2 + 0j)
@@ -41,7 +43,7 @@ def half_space_kernel(k: Array, w: float, *, density: float, mu: complex, poisso
 
 
 def plate_kernel(k: Array, w: float, *, stiffness: complex, mass: float, air: float) -> Array:
-    """1 / [D k^4 - (m + 2 air / k) w^2]."""
+    """Return 1 / [D k^4 - (m + 2 air / k) w^2]."""
     return 1 / (stiffness * k**4 - (mass + 2 * air / k) * w**2)
 
 
@@ -53,17 +55,17 @@ def gaussian_response(
     circle: float = 0.0,
     harmonic: int = 0,
 ) -> Array:
-    """Hankel's integral of a kernel for a Gaussian push of 1 Pa. On a circle of radius R, harmonic
-    n of the turning push moves radius r by int s^2 exp(-k^2 s^2 / 2) G(k) J_n(k R) J_n(k r) k dk.
+    """Return Hankel's integral of a kernel for a Gaussian pressure of 1 Pa. For a push on a circle
+    of radius R, harmonic n at radius r is int s^2 exp(-k^2 s^2 / 2) G(k) J_n(k R) J_n(k r) k dk.
     """
-    k = np.geomspace(1e-6, 8, 25_001) / width  # as 200_001 of them to 1e-14
+    k = np.geomspace(1e-6, 8, 25_001) / width  # equal to 200_001 points to 1e-14
     common = width**2 * np.exp(-((k * width) ** 2) / 2) * kernel(k) * jv(harmonic, k * circle) * k
     return np.array([simpson(common * jv(harmonic, k * x) * k, x=np.log(k)) for x in r])
 
 
 def strip_under_sine(k: float, *, thickness: float, shear_modulus: float, poisson: float) -> float:
-    """Deflection of the loaded face of a free strip, plane strain, under 1 Pa times sin(k x):
-    Timoshenko and Goodier, Theory of Elasticity (1970), chapter 3.
+    """Return the deflection of the loaded face of a free strip, plane strain, under 1 Pa times
+    sin(k x): Timoshenko and Goodier, Theory of Elasticity (1970), chapter 3.
     """
     x = k * thickness
     bending = (np.cosh(x) + 1) / (np.sinh(x) - x) if x > 1e-2 else 12 / x**3 * (1 + x**2 / 5)
@@ -72,7 +74,7 @@ def strip_under_sine(k: float, *, thickness: float, shear_modulus: float, poisso
 
 
 def rayleigh_ratio(poisson: float) -> float:
-    """c_R / c_s: x^6 - 8 x^4 + (24 - 16 g) x^2 - 16 (1 - g) = 0, g = (c_s / c_p)^2."""
+    """Return c_R / c_s: x^6 - 8 x^4 + (24 - 16 g) x^2 - 16 (1 - g) = 0, g = (c_s / c_p)^2."""
     g = (1 - 2 * poisson) / (2 - 2 * poisson)
     roots = np.roots([1, -8, 24 - 16 * g, -16 * (1 - g)])
     squares = roots[np.abs(roots.imag) < 1e-9].real
@@ -80,7 +82,7 @@ def rayleigh_ratio(poisson: float) -> float:
 
 
 def rayleigh_lamb(k: float, *, thickness: float, poisson: float, symmetric: bool = False) -> float:
-    """w / c_s in 1/m of the lowest wave of a free plate, bending (A0) or stretching (S0)."""
+    """Return w / c_s in 1/m of the lowest wave of a free plate, A0 or S0 (symmetric)."""
     half, g = thickness / 2, (1 - 2 * poisson) / (2 - 2 * poisson)
 
     def balance(w: float) -> float:
@@ -98,8 +100,9 @@ def rayleigh_lamb(k: float, *, thickness: float, poisson: float, symmetric: bool
 
 
 def clamped_plate() -> tuple[Array, float]:
-    """w a^2 sqrt(m / D) (ascending) and central deflection D w / q a^4 of a clamped square plate,
-    by the polynomials (1 - x^2)^2 x^n. Young has 35.99 and 73.41, Timoshenko 0.00126.
+    """Return w a^2 sqrt(m / D), ascending, and the central deflection D w / q a^4 of a clamped
+    square plate, by the polynomials (1 - x^2)^2 x^n. Young gives 35.99 and 73.41, Timoshenko
+    0.00126.
     """
     x, weight = np.polynomial.legendre.leggauss(40)
     shapes = [np.polynomial.Legendre.basis(n) for n in range(14)]
@@ -116,8 +119,8 @@ def clamped_plate() -> tuple[Array, float]:
 
 
 def moving_force_on_beam(t: Array, *, speed: float, critical: float, period: float) -> Array:
-    """Mid-span deflection over F L^3 / 48 E I while a force crosses a simply supported beam, by a
-    sum over modes n; `period` is that of the first.
+    """Return the mid-span deflection over F L^3 / 48 E I while a force crosses a simply supported
+    beam, by a sum over modes n; `period` is that of the first mode.
     """
     w1, alpha, total = 2 * np.pi / period, speed / critical, np.zeros_like(t)
     for n in range(1, 60, 2):
@@ -130,8 +133,8 @@ def moving_force_on_beam(t: Array, *, speed: float, critical: float, period: flo
 def layered_column(
     w: Array, lengths: list[float], densities: list[float], moduli: list[Array]
 ) -> Array:
-    """Top displacement per top stress of a column of layers, from the fixed base: tan(k L) / (k M)
-    of one layer, joined by the addition theorem of the tangent; M complex with loss.
+    """Return the displacement per stress at the top of a column of layers on a fixed base:
+    tan(k L) / (k M) for one layer, joined by the addition theorem of the tangent; M may be complex.
     """
     below = np.zeros_like(w, np.complex128)
     for length, density, modulus in zip(lengths, densities, moduli, strict=True):
@@ -144,8 +147,8 @@ def layered_column(
 def lamb_pulse(
     t: Array, r: float, *, mu: float, shear_speed: float, delay: float, width: float
 ) -> Array:
-    """Vertical surface motion at r under a point force exp(-(t - delay)^2 / 2 width^2) N, nu 1/4:
-    the step response as Mooney writes it, convolved with the derivative of the force.
+    """Return the vertical surface motion at r under a point force exp(-(t - delay)^2 / 2 width^2) N
+    for nu = 1/4: Mooney's step response, convolved with the derivative of the force.
     """
     s, g = np.sqrt(3), np.sqrt(3 + np.sqrt(3)) / 2
     x, weight = np.polynomial.legendre.leggauss(400)
@@ -158,7 +161,7 @@ def lamb_pulse(
         return (6 - np.sqrt(3 * s + 5) / np.sqrt(g**2 - tau**2)) / 16
 
     def convolved(step: Callable[[Array], Array], low: float, high: float) -> Array:
-        """tau = g sin(angle) takes the root at the Rayleigh arrival away."""
+        """Convolve; tau = g sin(angle) removes the root at the Rayleigh arrival."""
         low, high = np.arcsin(low / g), np.arcsin(high / g)
         angle = (low + high) / 2 + (high - low) / 2 * x
         tau, d_tau = g * np.sin(angle), g * np.cos(angle) * weight * (high - low) / 2
@@ -171,9 +174,10 @@ def lamb_pulse(
 
 
 def in_plane_reflection(k: float, ks: float, *, poisson: float) -> tuple[Array, Array]:
-    """Reflected (P, SV) displacement amplitudes of a viscous boundary, a row for each of P, SV in,
-    for plane waves of wavenumber k along it; ks is that of shear waves. Also the waves: rows P in,
-    SV in, P out, SV out; motion along and towards the boundary, wavenumber towards it.
+    """Return the reflected (P, SV) displacement amplitudes of a viscous boundary, in rows for P and
+    SV in, for plane waves with wavenumber k along it and shear wavenumber ks. Also return the
+    waves, in rows P in, SV in, P out, SV out: motion along and towards the boundary, and wavenumber
+    towards it.
     """
     ratio = np.sqrt((1 - 2 * poisson) / (2 - 2 * poisson))
     kp = ks * ratio
@@ -192,8 +196,8 @@ def in_plane_reflection(k: float, ks: float, *, poisson: float) -> tuple[Array, 
 def driven_oscillator(
     t: float, *, drive: float, damping: float = 0.0, modulus: float = 0.0, time: float = 1.0
 ) -> float:
-    """u'' + damping u' + u + modulus d = sin(drive t) from rest, d' = u' - d / time: by partial
-    fractions of the transform.
+    """Return the solution of u'' + damping u' + u + modulus d = sin(drive t) from rest,
+    d' = u' - d / time, by partial fractions of the transform.
     """
     lagging = [time, 1.0]
     cubic = np.polyadd(np.polymul([1.0, damping, 1.0], lagging), [modulus * time, 0.0])
@@ -204,9 +208,8 @@ def driven_oscillator(
 
 
 def elastica(load: float) -> tuple[float, float]:
-    """Deflection and shortening of a cantilever's tip over its length, at load = P L^2 / E I, by
-    theta'' = -load cos(theta) from the end, with the slope that makes it clamped. Mattiasson has
-    0.30172 and 0.05643 at 1.
+    """Return the tip deflection and shortening of a cantilever over its length at load = P L^2 / E
+    I, by shooting with theta'' = -load cos(theta). Mattiasson gives 0.30172 and 0.05643 at 1.
     """
 
     def bent(tip: float) -> Array:
@@ -220,9 +223,11 @@ def elastica(load: float) -> tuple[float, float]:
 
 
 def karman_disc(load: float, poisson: float) -> float:
-    """Central w / h of a clamped disc with an immovable edge, at q a^4 / 64 D h = load. Slope r g
-    and force N a^2 / D of the radius r / a, deflection in thicknesses: g'' + 3 g' / r = N g + 32
-    load, N'' + 3 N' / r = -6 (1 - nu^2) g^2.
+    """Return w / h at the centre of a clamped disc with an immovable edge, at q a^4 / 64 D h =
+    load.
+
+    With slope r g, force N a^2 / D and radius r / a: g'' + 3 g' / r = N g + 32 load,
+    N'' + 3 N' / r = -6 (1 - nu^2) g^2.
     """
 
     def slopes(r: Array, y: Array) -> Array:
@@ -236,7 +241,7 @@ def karman_disc(load: float, poisson: float) -> float:
     start = np.zeros((5, len(r)))
     start[0], start[4] = -4 * (1 - r**2), (1 - r**2) ** 2
     singular = np.diag([0.0, -3, 0, -3, 0])
-    found = solve_bvp(slopes, ends, r, start, S=singular, tol=1e-6, max_nodes=20_000)
-    if found.status:
-        raise ArithmeticError(f"von Karman's equations were not solved: {found.message}")
-    return float(found.y[4, 0])
+    solution = solve_bvp(slopes, ends, r, start, S=singular, tol=1e-6, max_nodes=20_000)
+    if solution.status:
+        raise ArithmeticError(f"von Karman's equations were not solved: {solution.message}")
+    return float(solution.y[4, 0])

@@ -1,39 +1,25 @@
 """Bodies at rest: half-space, layers, columns, and a fingertip by another code."""
 
-from itertools import pairwise
-
 import numpy as np
-from scipy import sparse
 
 import fem
 import meshes
 from meshes import TetMesh
 from skinwave.typing import Array
 from skinwave.verify import references
-from skinwave.verify.case import Checks, case, largest, relative
+from skinwave.verify.case import Checks, case, relative
+from skinwave.verify.setups import (
+    QUARTER,
+    RADII,
+    WIDTH,
+    column,
+    gaussian,
+    push,
+    quarter_space,
+    read,
+)
 
-WIDTH = 4.35e-3  # m, standard deviation of the Gaussian focus
-RADII = np.array([0, 5, 10, 15, 20]) * 1e-3
-QUARTER = {"bottom": "xyz", "right": "xyz", "back": "xyz", "left": "x", "front": "y"}
 RATIOS = (0.0, 0.45, 0.49, 0.499, 0.4999, 0.49999)
-
-
-def quarter_space(length: float, growth: float, radius: float, h: float = 0.0025) -> TetMesh:
-    """A quarter of a block, its inner sides sliding, fine where the focus is."""
-    across = meshes.graded_axis(length, h, meshes.Grading(radius=radius, growth=growth))
-    down = meshes.graded_axis(length, h, meshes.Grading(radius=0.0, growth=growth))
-    return meshes.extrude(across, across, -down[::-1])
-
-
-def focus_force(mesh: TetMesh) -> Array:
-    """Nodal forces (3 n,) in N of a Gaussian focus of 1 Pa at the origin."""
-    points = fem.facet_points(mesh)
-    return fem.load_operator(mesh) @ np.exp(-(points[:, :2] ** 2).sum(axis=1) / 2 / WIDTH**2)
-
-
-def on_axis(mesh: TetMesh, radii: Array) -> sparse.csr_array:
-    """Probes (p, 3 n) along the x axis."""
-    return fem.probe_operator(mesh, np.column_stack([radii, 0 * radii]))
 
 
 @case(
@@ -44,32 +30,32 @@ def focus_at_rest() -> Checks:
     """Gaussian focus at rest on a half-space, nu = 0.4999."""
     material = fem.Material(density=1000, shear_modulus=7.86e3, poisson=0.4999)
     mesh = quarter_space(4.0, 1.7, 0.01)
-    u = fem.static(fem.assemble(mesh, material, fixed=QUARTER), focus_force(mesh))
-    found = on_axis(mesh, RADII) @ u
+    u = fem.static(fem.assemble(mesh, material, fixed=QUARTER), push(mesh, gaussian()))
     exact = references.gaussian_at_rest(RADII, width=WIDTH, shear_modulus=7.86e3, poisson=0.4999)
-    yield relative("deflection at the focus, 1 Pa", found[0], exact[0], 0.01, "um")
-    yield largest("deflection at 0 to 20 mm, worst", found, exact, 0.03, "um")
+    deflection = read(mesh, u, RADII)
+    yield relative("deflection at the focus, 1 Pa", deflection[0], exact[0], 0.01, "um")
+    yield relative("deflection at 0 to 20 mm, worst", deflection, exact, 0.03, "um")
 
 
 @case(
     "Vorovich, Aleksandrov and Babeshko (1974): kernel of a bonded layer",
-    mesh="a quarter; 3 mm, sides fixed at 60 mm",
+    mesh="a quarter; cells of 3 mm, sides fixed at 60 mm",
 )
 def poisson_ratios() -> Checks:
     """Gaussian focus on a bonded layer of 15 mm, Poisson's ratio 0 to 0.49999."""
     depth, radii = 0.015, np.array([0.0, 0.01])
     axis = meshes.graded_axis(0.06, 0.003, meshes.Grading(radius=0.015, growth=1.5))
     mesh = meshes.extrude(axis, axis, np.linspace(-depth, 0, 6))
-    found, exact = [], []
+    deflections, exact = [], []
     for nu in RATIOS:
         material = fem.Material(density=1000, shear_modulus=25e3, poisson=nu)
-        u = fem.static(fem.assemble(mesh, material, fixed=QUARTER), focus_force(mesh))
-        found.append(on_axis(mesh, radii) @ u)
+        u = fem.static(fem.assemble(mesh, material, fixed=QUARTER), push(mesh, gaussian()))
+        deflections.append(read(mesh, u, radii))
         exact.append(references.gaussian_on_bonded_layer(
             radii, width=WIDTH, shear_modulus=25e3, poisson=nu, depth=depth))  # fmt: skip
     for k, (place, bar) in enumerate((("the focus", 0.02), ("10 mm", 0.03))):
-        for nu, f, e in zip(RATIOS, found, exact, strict=True):
-            yield relative(f"deflection at {place}, nu = {nu:g}", f[k], e[k], bar, "um")
+        for nu, ours, theirs in zip(RATIOS, deflections, exact, strict=True):
+            yield relative(f"deflection at {place}, nu = {nu:g}", ours[k], theirs[k], bar, "um")
 
 
 @case(
@@ -83,40 +69,18 @@ def stiffness_contrast() -> Checks:
         r: fem.Material(density=rho, shear_modulus=mu, poisson=0.45, viscosity=lag * mu)
         for r, mu in enumerate(mus)
     }
-    ops, force, read = column(lengths, 20, solids)
+    ops, force, top = column(lengths, 20, solids)
     moduli = [m.first_lame + 2 * m.shear_modulus for m in solids.values()]
     rest = sum(length / m for length, m in zip(lengths, moduli, strict=True))
     hz = np.array([5.0, 20.0, 50.0, 100.0])
     dynamic = [m * (1 + 2j * np.pi * hz * lag) for m in moduli]
     exact = references.layered_column(2 * np.pi * hz, lengths, [rho, rho], dynamic)
-    found = fem.harmonic(ops, force, hz) @ read
-    yield relative("deflection at rest, 1 Pa", read @ fem.static(ops, force), rest, 1e-6, "um")
-    yield largest("amplitude, 5 to 100 Hz, worst", found, exact, 0.005, "um")
+    yield relative("deflection at rest, 1 Pa", top @ fem.static(ops, force), rest, 1e-6, "um")
+    amplitudes = fem.harmonic(ops, force, hz) @ top
+    yield relative("amplitude, 5 to 100 Hz, worst", amplitudes, exact, 0.005, "um")
 
 
-def column(
-    lengths: list[float], cells: int, solids: dict[int, fem.Material]
-) -> tuple[fem.Operators, Array, Array]:
-    """Operators of a column of layers, from the base upwards, one cell across with sliding sides;
-    the force of 1 Pa and the mean of its top as (3 n,).
-    """
-    ends = np.concatenate([[0], np.cumsum(lengths)]) - sum(lengths)
-    z = np.concatenate([[ends[0]], *(np.linspace(a, b, cells + 1)[1:] for a, b in pairwise(ends))])
-    side = [0.0, min(lengths) / cells * 2]
-    mesh = meshes.extrude(side, side, z)
-    middle = mesh.points[mesh.tets[:, :4]].mean(axis=1)[:, 2]
-    region = np.searchsorted(ends[1:-1], middle)
-    mesh = TetMesh(points=mesh.points, tets=mesh.tets, region=region, facets=mesh.facets)
-    ops = fem.assemble(
-        mesh, solids,
-        fixed={"bottom": "xyz", "left": "x", "right": "x", "front": "y", "back": "y"},
-    )  # fmt: skip
-    P = fem.load_operator(mesh)
-    force = P @ np.ones(P.shape[1])
-    return ops, force, force / np.abs(force).sum()
-
-
-# The fingertip: at most nu = 0.45, up to which no stiffness is projected, as in the other code.
+# Fingertip with nu = 0.45 at most, up to which no stiffness is projected, as in the other code.
 SHAPE = meshes.Fingertip(
     breadth=0.016, length=0.025, thickness=0.013, bone_breadth=0.007, bone_thickness=0.004,
     cover=0.006, tip=0.004,
@@ -124,7 +88,7 @@ SHAPE = meshes.Fingertip(
 TISSUE = fem.Material(density=1000, shear_modulus=25e3, poisson=0.45, viscosity=5.0)
 FINGERTIPS = {"with bone": {0: TISSUE, 1: fem.PRESETS["bone"]}, "without": {0: TISSUE, 1: TISSUE}}
 FREQUENCY = 140.0  # Hz
-THEIRS = {  # `fingertip_summary` of scikit-fem's motion, at rest and at the frequency
+SCIKIT_FEM = {  # `fingertip_summary` of scikit-fem's motion, at rest and at the frequency
     "with bone": (
         (0.6418072421356115, 0.2466061863954612, -0.007529687876997654, -0.0002901458322150343),
         (0.8508287974499185 - 0.2190162904349815j, 0.3712460537507848,
@@ -143,52 +107,50 @@ THEIRS = {  # `fingertip_summary` of scikit-fem's motion, at rest and at the fre
 @case(
     "scikit-fem 12.0.2 on the same nodes, elements and forces (Gustafsson and McBain, J Open "
     "Source Softw 5:2369 (2020)): python -m bench.beside fingertip, where all nodes are compared",
-    mesh="ten-node tetrahedra with straight sides, 4 mm, held at its cut",
+    mesh="ten-node tetrahedra with straight sides, 4 mm, fixed at the cut",
 )
 def fingertip_with_bone() -> Checks:
-    """A fingertip with a bone inside, two materials of one mesh, beside another code."""
+    """Fingertip with a bone, two materials in one mesh, compared with another code."""
     mesh = fingertip()
     for name, materials in FINGERTIPS.items():
-        motions = zip(("at rest", f"{FREQUENCY:g} Hz"), fingertip_motion(mesh, materials),
-                      THEIRS[name], strict=True)  # fmt: skip
+        times = "at rest", f"{FREQUENCY:g} Hz"
+        motions = zip(times, fingertip_motion(mesh, materials), SCIKIT_FEM[name], strict=True)
         for when, u, theirs in motions:
             names = ("work", "motion", "tip", "end of the bone")
             for what, one, other in zip(names, fingertip_summary(mesh, u), theirs, strict=True):
-                yield largest(f"{what}, {name}, {when}", one, other, 1e-9)
+                yield relative(f"{what}, {name}, {when}", one, other, 1e-9)
 
 
 def fingertip() -> TetMesh:
-    """Ten-node tetrahedra of the fingertip with straight sides."""
-    return _straight_sided(meshes.fingertip_mesh(SHAPE, 4e-3))
-
-
-def fingertip_push(mesh: TetMesh) -> Array:
-    """Nodal forces (3 n,) in N, downwards on the nodes of the top about the origin."""
-    top = np.unique(mesh.facets["top"])
-    force = np.zeros(mesh.points.shape)
-    force[top, 2] = -np.exp(-(mesh.points[top, :2] ** 2).sum(axis=1) / 2 / WIDTH**2)
-    return force.ravel()
-
-
-def fingertip_motion(mesh: TetMesh, materials: dict[int, fem.Material]) -> tuple[Array, Array]:
-    """Motion (3 n,) in metre at rest and at `FREQUENCY`, of a fingertip held at its cut."""
-    ops, force = fem.assemble(mesh, materials, fixed="sides"), fingertip_push(mesh)
-    return fem.static(ops, force), fem.harmonic(ops, force, FREQUENCY)[0]
-
-
-def fingertip_summary(mesh: TetMesh, u: Array) -> Array:
-    """Work of the push in J, the root of the summed squares of u (3 n,), and the height of the tip
-    and of the end of the bone, in metre.
-    """
-    inside = np.unique(mesh.tets[mesh.region == 1])
-    ends = [nodes[np.argmax(mesh.points[nodes, 1])] for nodes in (np.unique(mesh.tets), inside)]
-    return np.array([fingertip_push(mesh) @ u, np.linalg.norm(u), *u.reshape(-1, 3)[ends, 2]])
-
-
-def _straight_sided(mesh: TetMesh) -> TetMesh:
-    """Ten-node tetrahedra with straight sides between the corners of a mesh."""
+    """Return a fingertip of ten-node tetrahedra with straight sides."""
+    mesh = meshes.fingertip_mesh(SHAPE, 4e-3)
     used, tets = np.unique(mesh.tets[:, :4], return_inverse=True)
     facets = {name: np.searchsorted(used, f[:, :3]) for name, f in mesh.facets.items()}
     return meshes.quadratic(TetMesh(
         points=mesh.points[used], tets=tets.reshape(-1, 4), region=mesh.region, facets=facets
     ))  # fmt: skip
+
+
+def fingertip_push(mesh: TetMesh) -> Array:
+    """Return nodal forces (3 n,) in N, downwards on the nodes of the top around the origin."""
+    top = np.unique(mesh.facets["top"])
+    force = np.zeros(mesh.points.shape)
+    force[top, 2] = -gaussian()(mesh.points[top])
+    return force.ravel()
+
+
+def fingertip_motion(mesh: TetMesh, materials: dict[int, fem.Material]) -> tuple[Array, Array]:
+    """Return the motion (3 n,) in metres of a fingertip fixed at its cut, at rest and at
+    `FREQUENCY`.
+    """
+    ops, force = fem.assemble(mesh, materials, fixed="sides"), fingertip_push(mesh)
+    return fem.static(ops, force), fem.harmonic(ops, force, FREQUENCY)[0]
+
+
+def fingertip_summary(mesh: TetMesh, u: Array) -> Array:
+    """Return the work of the push in J, the norm of u (3 n,), and the heights in metres of the tip
+    and of the end of the bone.
+    """
+    inside = np.unique(mesh.tets[mesh.region == 1])
+    ends = [nodes[np.argmax(mesh.points[nodes, 1])] for nodes in (np.unique(mesh.tets), inside)]
+    return np.array([fingertip_push(mesh) @ u, np.linalg.norm(u), *u.reshape(-1, 3)[ends, 2]])

@@ -1,4 +1,4 @@
-"""The suite of verification cases, running it, and its page."""
+"""Suite of verification cases, and its page."""
 
 import json
 import math
@@ -18,20 +18,20 @@ from skinwave.verify.case import Case, Check, Result
 MODULES = {
     "Elements": elements, "At rest": statics, "Plates and beams": plates, "Waves": waves,
     "Wavenumber integrals": exact, "Time, damping, units": stepping,
-    "The load at its extremes": extremes, "Large deflection": nonlinear,
+    "Extreme loads": extremes, "Large deflection": nonlinear,
 }  # fmt: skip
 TOPICS = {
-    topic: [found for found in vars(module).values() if isinstance(found, Case)]
+    topic: [each for each in vars(module).values() if isinstance(each, Case)]
     for topic, module in MODULES.items()
 }
-CASES = {found.name: found for cases in TOPICS.values() for found in cases}
+CASES = {each.name: each for cases in TOPICS.values() for each in cases}
 SCOPE = (
-    "Verification asks whether the equations are solved right. Most references are closed forms, "
-    "series or integrals from the literature, computed without this program's solvers. Other cases "
-    "compare two of its models, or one model with its own limits or in other units. Whether these "
-    "are the right equations for a hand is another question: see skinwave verify --published. "
-    "Errors are relative unless they are called absolute. A case passes if each of its errors is "
-    "within its tolerance; the table shows the check nearest to its tolerance."
+    "Verification checks that the equations are solved correctly. Most references are closed "
+    "forms, series or integrals from the literature, computed without this program's solvers. "
+    "Other cases compare two of its models, or one model with its own limits or in other units. "
+    "skinwave verify --published checks whether they are the right equations for a hand. Errors "
+    "are relative unless marked as absolute. A case passes if each error is within its tolerance. "
+    "The table shows the check nearest to its tolerance."
 )
 VALUES = ("value", "reference", "error", "tolerance", "")
 
@@ -39,9 +39,9 @@ VALUES = ("value", "reference", "error", "tolerance", "")
 def run_suite(
     cases: Iterable[Case], folder: Path, progress: Progress, *, debug: bool = False
 ) -> list[Result]:
-    """Run cases, write verify.json after each and index.html at the end.
+    """Run cases, and write verify.json after each and index.html at the end.
 
-    An interrupt ends the run early; what is finished is written.
+    An interrupt ends the run early and keeps the finished cases.
     """
     cases, results = list(cases), list[Result]()
     try:
@@ -57,13 +57,13 @@ def run_suite(
 
 
 def page(results: list[Result], planned: int) -> Report:
-    """A summary of all cases, then each with its source, mesh and checks."""
-    left_out = len(CASES) - planned
-    verdict = [f"{plural(results)}."]
+    """Return a page with a summary, then each case with its source, mesh and checks."""
+    omitted = len(CASES) - planned
+    verdict = [f"{count_text(results)}."]
     if len(results) < planned:
-        verdict.insert(0, f"Interrupted: {len(results)} of {planned} cases are finished.")
-    if left_out > 0:
-        verdict.append(f"{left_out} slower cases are left out (skinwave verify without --quick).")
+        verdict.insert(0, f"Interrupted after {len(results)} of {planned} cases.")
+    if omitted > 0:
+        verdict.append(f"{omitted} slow cases are omitted (run skinwave verify without --quick).")
     used = ", ".join(f"{name} {version}" for name, version in versions().items())
     spent = f"{sum(r.seconds for r in results):.0f} s with {used}."
     summary = Table(
@@ -71,7 +71,7 @@ def page(results: list[Result], planned: int) -> Report:
         [[r.case.title, *_row(r.worst), r.seconds] for r in results],
     )
     topics = [
-        Details(topic, [_shown(r) for r in results if r.case in cases])
+        Details(topic, [_details(r) for r in results if r.case in cases])
         for topic, cases in TOPICS.items()
         if any(r.case in cases for r in results)
     ]
@@ -79,7 +79,7 @@ def page(results: list[Result], planned: int) -> Report:
 
 
 def summary(results: list[Result]) -> str:
-    """A line per case, and how many passed."""
+    """Return a line per case, and the counts of passed and failed cases."""
     width = max((len(r.case.name) for r in results), default=0)
     rows = [f"{'case':<{width}}  {'error':>8}  {'tolerance':>9}"]
     rows += [
@@ -87,29 +87,28 @@ def summary(results: list[Result]) -> str:
         f"{'passed' if r.passed else 'FAILED'}" + f"  {r.error}" * bool(r.error)
         for r in results
     ]
-    return "\n".join([*rows, plural(results)])
+    return "\n".join([*rows, count_text(results)])
 
 
-def plural(results: list[Result]) -> str:
-    """How many cases passed and failed."""
+def count_text(results: list[Result]) -> str:
+    """Return the counts of passed and failed cases."""
     failed = sum(not r.passed for r in results)
     return f"{len(results) - failed} passed, {failed} failed"
 
 
-def _shown(result: Result) -> Details:
-    """One case on the page, which unfolds."""
-    found = result.case
-    words = [found.note, f"It ended early: {result.error}" if result.error else ""]
+def _details(result: Result) -> Details:
+    each = result.case
+    notes = [each.note, f"The case ended with an error: {result.error}" if result.error else ""]
     table = Table(["quantity", *VALUES], map(_row, result.checks))
-    source = f"Source: {found.source}. Mesh: {found.mesh}."
-    return Details(found.title, [source, table, *filter(None, words)])
+    source = f"Source: {each.source}. Mesh: {each.mesh}."
+    return Details(each.title, [source, table, *filter(None, notes)])
 
 
 def _row(check: Check) -> list[Any]:
-    """Cells of a check."""
+    """Return the cells of a check."""
     what = f"{check.what}, {check.unit}" if check.unit else check.what
-    word = "passed" if check.passed else "FAILED"
-    verdict = Markup('<span class="{}">{}</span>').format("yes" if check.passed else "no", word)
+    outcome = ("yes", "passed") if check.passed else ("no", "FAILED")
+    verdict = Markup('<span class="{}">{}</span>').format(*outcome)
     return [what, f"{check.value:.5g}", f"{check.reference:.5g}", f"{check.error:.2g}",
             f"{check.bar:.2g}", verdict]  # fmt: skip
 
@@ -125,7 +124,7 @@ def _write_json(path: Path, results: list[Result], planned: int) -> None:
 
 
 def _record(result: Result) -> dict[str, Any]:
-    """A finished case as JSON; null where a number is not finite."""
+    """Return a finished case for JSON, with null for numbers that are not finite."""
     checks = [
         {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in row.items()}
         for row in ({**asdict(c), "passed": c.passed} for c in result.checks)

@@ -1,8 +1,8 @@
-"""Models beside published measurements: rows, verdict, figures and page."""
+"""Comparison of models with published measurements: rows, verdict, figures and page."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import inf, isfinite, nan
+from math import inf, isnan, nan
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from simple_model.numbers import significant
+from simple_model.numbers import EN_DASH, significant
 from skinwave.report.figures import REPORT, png
 from skinwave.system.document import Details, Picture, Report, Section
 from skinwave.system.effort import Progress
@@ -34,45 +34,43 @@ from skinwave.verify.published import (
 )
 
 NONE, WITHIN, ABOVE, BELOW = "no wave", "within", "above", "below"
-DIGITISED = 0.05  # of a value without a spread: no nearer can one be read off a curve
+READING_ERROR = 0.05  # relative, of a value that is read off a published curve
 HAND = "hand, finite elements"
 COLOURS = {
     "forearm": "#D55E00", "palm": "#0072B2", "palm-stiff": "#56B4E9", "skin-slab": "#009E73",
     "palm-layers": "#CC79A7", "forearm-layers": "#E69F00", HAND: "#000000",
 }  # fmt: skip
 BAND, MARKERS = "#dddddd", "osv^DPX"
-FURTHEST = 10.0  # factors beyond it are drawn at it
+DRAWN_FACTOR = 10.0  # larger factors are drawn at this one
 SCOPE = (
-    "Verification asks whether the equations are solved right. This page asks whether they are the "
-    "right ones, as far as published numbers tell. A preset agrees by construction with a source "
-    "that it was fitted to or chosen by; tables mark these pairs as fitted. All other values are "
-    "predictions. A factor is ours over the published value, or over the nearer end of its spread."
+    "Verification checks that the equations are solved correctly. This page checks whether they "
+    "are the right equations, as far as published numbers show. A preset agrees by construction "
+    "with a source that it was fitted to or chosen by; tables mark these pairs as fitted. All "
+    "other values are predictions. A factor is the model's value over the published value, or over "
+    "the nearer end of its spread."
 )
 FACTORS = (
-    "Each point is a preset at a frequency; grey: within 5 %, what can be read off a curve. "
-    "Hollow: the preset was fitted to that source; filled: it predicts it. "
-    f"Factors beyond {FURTHEST:g} are drawn there."
+    "Each point is a preset at a frequency. Grey: within 5 %, the accuracy of reading a curve. "
+    "Hollow: the preset was fitted to that source. Filled: it predicts the source. "
+    f"Factors beyond {DRAWN_FACTOR:g} are drawn at {DRAWN_FACTOR:g}."
 )
 SPEEDS = (
-    "Points: sources, with the spread between people, or a standard deviation, where one is "
-    "published. Grey: from the lowest to the highest source at each frequency. Lines: the wave of "
-    "each preset that moves the surface most at the edge of the focal spot (half-spaces solid, "
-    "layers on bone dashed); a line breaks where another mode takes the lead, and is missing where "
-    "none propagates. Lengths are those of plane waves, without geometric spreading."
+    "Points: sources, with the spread between people or a standard deviation where published. "
+    "Grey: range over all sources at each frequency. Lines: for each preset, the wave that moves "
+    "the surface most at the edge of the focal spot (half-spaces solid, layers on bone dashed). A "
+    "line breaks where another mode leads, and ends where no wave propagates. Lengths are those of "
+    "plane waves, without geometric spreading."
 )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Compared:
-    """A published value and ours: of `body`, at `frequency` in Hz, SI, ours nan without a wave."""
+    """The value `ours` of a body, in SI or nan without a wave, and number k of a published set."""
 
     published: Published
+    k: int
     body: str
-    frequency: float
     ours: float
-    value: float
-    low: float
-    high: float
 
     @property
     def is_built(self) -> bool:
@@ -80,45 +78,45 @@ class Compared:
         return self.body in self.published.built
 
     @property
+    def frequency(self) -> float:
+        """Frequency in Hz."""
+        return self.published.frequencies[self.k]
+
+    @property
     def factor(self) -> float:
         """Ours over the nearest published value: 1 within the spread, nan without ours."""
-        if not isfinite(self.ours):
-            return self.ours
-        near = 0.0 if self.published.lows else DIGITISED
-        if (1 - near) * self.low <= self.ours <= (1 + near) * self.high:
+        low, high = self.published.between(self.k)
+        margin = 0.0 if self.published.lows else READING_ERROR
+        if (1 - margin) * low <= self.ours <= (1 + margin) * high:
             return 1.0
-        return self.ours / (self.high if self.ours > self.high else self.low)
+        return self.ours / (high if self.ours > high else low)
 
     @property
     def miss(self) -> float:
-        """The factor, or one over it, whichever is above 1."""
+        """The factor or its reciprocal, whichever is above 1."""
         return max(self.factor, 1 / self.factor) if self.factor else inf
 
     @property
     def outcome(self) -> str:
-        """One of the words above."""
-        if self.factor != self.factor:
+        """One of `NONE`, `WITHIN`, `ABOVE` and `BELOW`."""
+        if isnan(self.factor):
             return NONE
         return WITHIN if self.factor == 1.0 else ABOVE if self.factor > 1 else BELOW
 
 
 def compared(published: Published, body: str, ours: Iterable[float]) -> list[Compared]:
-    """Rows of a set beside a body, whose values (n,) are SI at the frequencies of the set."""
+    """Return rows of a set and a body with values (n,), in SI, at the frequencies of the set."""
     return [
-        Compared(
-            published=published, body=body, frequency=published.frequencies[k], ours=float(value),
-            value=published.values[k], low=low, high=high,
-        )
+        Compared(published=published, k=k, body=body, ours=float(value))
         for k, value in enumerate(ours)
-        for low, high in [published.between(k)]
-    ]  # fmt: skip
+    ]
 
 
 def validate(
     report: Progress, *, hand: Path | None = None
 ) -> tuple[Mapping[str, Curves], list[Compared]]:
-    """Waves by body, and rows of all published sets: with the file of a `hand` also of the decay
-    along its finger, by finite elements.
+    """Return the leading wave of each body, and rows of all published sets. With the file of a
+    `hand`, rows include the decay along its finger, by finite elements.
     """
     of_hand = compare_finger(predictions.along_finger(hand, report)) if hand else []
     report("waves", 0.02)
@@ -130,7 +128,7 @@ def validate(
 
 
 def compare_waves(curves: Mapping[str, Curves]) -> list[Compared]:
-    """Rows of all published sets of waves, by the curves of `BODIES`."""
+    """Return rows of all published sets of waves for the curves of `BODIES`."""
 
     def ours(published: Published, name: str) -> Any:
         if published.quantity is EXPONENT:
@@ -143,19 +141,19 @@ def compare_waves(curves: Mapping[str, Curves]) -> list[Compared]:
 
 
 def compare_optima(body: str) -> list[Compared]:
-    """Rows of the speed of the focus at which a body deflects most, on circles of two sizes."""
+    """Return rows of the focus speed of the largest deflection of a body, on two circles."""
     rows = []
     for perimeter in predictions.PERIMETERS:
         deflections = predictions.focus_speeds(BODIES[body], perimeter)
         for what, deflection in zip(("largest", "peak to peak"), deflections, strict=True):
             name = f"{OPTIMUM.name}, {what}, {1e3 * perimeter:g} mm around"
-            speed = predictions.top(predictions.SPEEDS, deflection)
+            speed = predictions.peak(predictions.SPEEDS, deflection)
             rows += compared(replace(OPTIMUM, name=name), body, [speed])
     return rows
 
 
 def compare_finger(finger: Finger) -> list[Compared]:
-    """Rows of a finger beside the people of SkinSource, at its own frequencies."""
+    """Return rows of a finger and the people of SkinSource, at the finger's frequencies."""
     at = [SKINSOURCE.frequencies.index(f) for f in finger.frequencies]
     own = replace(
         SKINSOURCE, frequencies=tuple(finger.frequencies), values=(nan,) * len(at),
@@ -165,45 +163,46 @@ def compare_finger(finger: Finger) -> list[Compared]:
 
 
 def verdict(rows: Sequence[Compared]) -> list[str]:
-    """What the comparisons come to, in sentences."""
+    """Return sentences that sum up the comparisons."""
     single = [row for row in rows if not row.published.name.startswith(ALL)]
     own = [row for row in single if not row.is_built]
     within, missed = _count(own, WITHIN), [row for row in own if row.outcome in (ABOVE, BELOW)]
     sentences = [
-        f"{within} of {len(own)} independent comparisons agree, within the published spread or "
-        f"{100 * DIGITISED:g} %; {len(missed)} miss, by a factor of {_median(missed)} in the "
-        f"median; in {_count(own, NONE)} the model has no wave. {len(single) - len(own)} more are "
-        "of presets that were fitted to the source, and are no evidence."
+        f"{within} of {len(own)} independent comparisons agree within the published spread or "
+        f"{100 * READING_ERROR:g} %; {len(missed)} miss, by a factor of {_median(missed)} in the "
+        f"median; in {_count(own, NONE)} the model has no wave. {len(single) - len(own)} more "
+        "comparisons are of presets that were fitted to the source; they are no evidence."
     ]
     for quantity, words in ((SPEED, "Phase speeds"), (LENGTH, "1/e lengths"),
                             (EXPONENT, "Decay exponents")):  # fmt: skip
-        of = [row for row in own if row.published.quantity is quantity]
+        alike = [row for row in own if row.published.quantity is quantity]
         parts = [
-            f"{outcome} the published in {len(group)} of {len(of)}, by a factor of {_median(group)}"
+            f"{outcome} the published values in {len(group)} of {len(alike)} comparisons, by a "
+            f"factor of {_median(group)}"
             for outcome in (BELOW, ABOVE)
-            if (group := [row for row in of if row.outcome == outcome])
+            if (group := [row for row in alike if row.outcome == outcome])
         ]
-        sentences.append(f"{words} are {', and '.join(parts) or 'all within'}.")
+        sentences.append(f"{words} are {' and '.join(parts) or 'all within the spread'}.")
     for quantity in (SPEED, LENGTH):
         band = all_sources(quantity)
         apart = max(high / low for low, high in zip(band.lows, band.highs, strict=True))
-        sentences.append(f"The sources themselves differ in {quantity.name} by a factor of up to "
+        sentences.append(f"The sources differ in {quantity.name} by factors of up to "
                          f"{significant(apart, 2)} at one frequency.")  # fmt: skip
     optima = [f"{row.body} {significant(row.ours, 2)}" for row in own
               if row.published.name.startswith(f"{OPTIMUM.name}, largest")]  # fmt: skip
     sentences.append(
-        f"Predicted speeds of the focus at the largest deflection are {', '.join(optima)} m/s; "
-        f"{OPTIMUM.lows[0]:g} to {OPTIMUM.highs[0]:g} m/s is published."
+        f"Predicted focus speeds of the largest deflection are {', '.join(optima)} m/s; published "
+        f"are {OPTIMUM.lows[0]:g}{EN_DASH}{OPTIMUM.highs[0]:g} m/s."
     )
     if lengths := [significant(1e3 * row.ours, 2) for row in rows if row.body == HAND]:
-        sentences.append(f"Along a finger motion falls to 1/e in {', '.join(lengths)} mm.")
+        sentences.append(f"Along a finger, motion falls to 1/e in {', '.join(lengths)} mm.")
     return sentences
 
 
 def report(curves: Mapping[str, Curves], rows: Sequence[Compared]) -> Report:
-    """The page, with its figures and validation.csv."""
+    """Return the page, with its figures and validation.csv."""
     sources = {row.published.name: row.published for row in rows}
-    return Report("Models beside published measurements", [" ".join(verdict(rows))], [
+    return Report("Models and published measurements", [" ".join(verdict(rows))], [
         _picture("factors", _factors, (10.5, 0.3 * len(sources) + 1.6), FACTORS, rows),
         SCOPE,
         _summary(rows),
@@ -211,11 +210,10 @@ def report(curves: Mapping[str, Curves], rows: Sequence[Compared]) -> Report:
         Section("Speed and decay of waves",
                 [_picture("waves", _waves, (11.5, 5.6), SPEEDS, curves)]),
         Details("Sources", [Table(
-            ["set", "site", "conditions", "source", "how sure", "contradictions and assumptions"],
+            ["set", "site", "conditions", "source", "quality", "contradictions and assumptions"],
             [(s.name, s.site, s.conditions, s.source, s.how, s.remark) for s in sources.values()],
         )]),
-        Details("Published, and not compared",
-                [Table(["source", "what", "why not"], NOT_COMPARED)]),
+        Details("Published but not compared", [Table(["source", "what", "reason"], NOT_COMPARED)]),
     ])  # fmt: skip
 
 
@@ -224,19 +222,19 @@ def _count(rows: Iterable[Compared], outcome: str) -> int:
 
 
 def _median(rows: Iterable[Compared]) -> str:
-    """Median factor of rows that miss."""
+    """Return the median factor of rows that miss."""
     return significant(float(np.median([row.miss for row in rows] or [1.0])), 2)
 
 
 def _summary(rows: Sequence[Compared]) -> Table:
-    """A row for each set and preset: how many values agree, and the median factor of the others."""
+    """Return a row for each set and preset: counts of outcomes, and the median factor of a miss."""
     groups: dict[tuple[str, str], list[Compared]] = {}
     for row in rows:
         groups.setdefault((row.published.name, row.body), []).append(row)
     return Table(
-        ["set", "preset", "fitted to it or predicts it", "values", WITHIN, BELOW, ABOVE, NONE,
+        ["set", "preset", "fitted or predicted", "values", WITHIN, BELOW, ABOVE, NONE,
          "median factor of a miss"],
-        [(name, body, "fitted" if group[0].is_built else "predicts", len(group),
+        [(name, body, "fitted" if group[0].is_built else "predicted", len(group),
           *(_count(group, outcome) for outcome in (WITHIN, BELOW, ABOVE, NONE)),
           _median(row for row in group if row.outcome in (ABOVE, BELOW)))
          for (name, body), group in groups.items()],
@@ -244,14 +242,15 @@ def _summary(rows: Sequence[Compared]) -> Table:
 
 
 def _table(rows: Sequence[Compared]) -> Table:
-    """Every published value and preset."""
+    """Return a row for every published value and preset."""
 
     def cells(row: Compared) -> list[Any]:
-        of = row.published
-        low, high = (row.low, row.high) if of.lows else (nan, nan)
-        numbers = (x / of.quantity.size for x in (row.value, low, high, row.ours))
-        return [of.name, of.site, of.quantity.name, of.quantity.unit, row.frequency, row.body,
-                *numbers, row.factor, row.outcome, row.is_built, of.how, of.source]  # fmt: skip
+        each = row.published
+        low, high = each.between(row.k) if each.lows else (nan, nan)
+        numbers = (x / each.quantity.size for x in (each.values[row.k], low, high, row.ours))
+        return [each.name, each.site, each.quantity.name, each.quantity.unit, row.frequency,
+                row.body, *numbers, row.factor, row.outcome, row.is_built, each.how,
+                each.source]  # fmt: skip
 
     return Table(
         ["set", "site", "quantity", "unit", Column("frequency_hz", "frequency", "Hz"), "body",
@@ -264,31 +263,34 @@ def _table(rows: Sequence[Compared]) -> Table:
 
 def _picture(
     name: str, draw: Callable[[Figure, Any], None], size: tuple[float, float], caption: str,
-    of: Any,
+    data: Any,
 ) -> Picture:  # fmt: skip
     with mpl.rc_context(REPORT.rc):
         figure = Figure(figsize=REPORT.size(*size), layout="constrained")
-        draw(figure, of)
+        draw(figure, data)
     return Picture(png(figure), caption, name)
 
 
 def _style(name: str) -> dict[str, Any]:
-    """Colour and line of a preset: half-spaces solid, layers dashed."""
+    """Return the colour and line of a preset: half-spaces solid, layers dashed."""
     return {"color": COLOURS[name], "ls": "-" if BODIES[name].depth == inf else "--"}
 
 
 def _factors(figure: Figure, rows: Sequence[Compared]) -> None:
-    """Ours over the nearest published value, a line of points for each set."""
+    """Draw the factors, a row of points for each set."""
     ax, names = figure.subplots(), list(dict.fromkeys(row.published.name for row in rows))
-    ax.axvspan(1 - DIGITISED, 1 + DIGITISED, color=BAND, lw=0)
-    for row in (row for row in rows if row.factor == row.factor):
+    ax.axvspan(1 - READING_ERROR, 1 + READING_ERROR, color=BAND, lw=0)
+    for row in (row for row in rows if row.outcome != NONE):
         offset, colour = (list(COLOURS).index(row.body) - 3) / 9, COLOURS[row.body]
+        factor = np.clip(row.factor, 1 / DRAWN_FACTOR, DRAWN_FACTOR)
         ax.plot(
-            np.clip(row.factor, 1 / FURTHEST, FURTHEST), names.index(row.published.name) + offset,
-            "o", ms=4, mew=1, color=colour, mfc="none" if row.is_built else None,
+            factor, names.index(row.published.name) + offset, "o", ms=4, mew=1, color=colour,
+            mfc="none" if row.is_built else None,
         )  # fmt: skip
-    ax.set(xscale="log", xlim=(0.9 / FURTHEST, FURTHEST / 0.9), ylim=(len(names) - 0.5, -0.5),
-           xlabel="ours over the nearest published value")  # fmt: skip
+    ax.set(
+        xscale="log", xlim=(0.9 / DRAWN_FACTOR, DRAWN_FACTOR / 0.9), ylim=(len(names) - 0.5, -0.5),
+        xlabel="model over nearest published value",
+    )  # fmt: skip
     ticks = [0.1, 0.2, 0.5, 1, 2, 5, 10]
     ax.set_xticks(ticks, [f"{x:g}" for x in ticks])
     ax.minorticks_off()
@@ -299,7 +301,7 @@ def _factors(figure: Figure, rows: Sequence[Compared]) -> None:
 
 
 def _waves(figure: Figure, curves: Mapping[str, Curves]) -> None:
-    """Phase speed and 1/e length by frequency: sources as points, presets as lines."""
+    """Draw phase speed and 1/e length over frequency: sources as points, presets as lines."""
     for ax, quantity in zip(figure.subplots(1, 2), (SPEED, LENGTH), strict=True):
         _sources(ax, quantity)
         for name, c in curves.items():
@@ -318,7 +320,7 @@ def _waves(figure: Figure, curves: Mapping[str, Curves]) -> None:
 
 
 def _sources(ax: Axes, quantity: Quantity) -> None:
-    """Published values with their spread, or their range alone, and the range of all of them."""
+    """Draw published values with their spread, or their range, and the range of all sources."""
     size, whole = quantity.size, all_sources(quantity)
     low, high = (np.array(x) / size for x in (whole.lows, whole.highs))
     ax.fill_between(whole.frequencies, low, high, color=BAND, lw=0, zorder=0)

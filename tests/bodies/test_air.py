@@ -19,7 +19,7 @@ from skinwave.models.stretching import reduced_answer
 from skinwave.planning.simulate import compute
 from skinwave.scene.scene import BODIES, Placement, Scene
 from skinwave.verify import references
-from skinwave.verify.plates import PAPER
+from skinwave.verify.setups import PAPER
 
 SHEET = replace(BODIES["paper-sheet-loose"], width=0.06, height=0.05, air=True)
 PATH = Trajectory(shape="circle", size=0.01, speed=4.0)

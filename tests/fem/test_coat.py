@@ -64,13 +64,13 @@ def inside(mesh, margin=4.5e-3):
     return np.clip(1 - (across / (across.max() - margin)) ** 2, 0, None)
 
 
-def test_a_coat_of_the_material_that_it_replaces_changes_nothing():
+def test_coat_of_the_replaced_material_changes_nothing():
     same = fem.Coat(materials=(SOFT, SOFT), thicknesses=(0.1e-3, 0.3e-3))
     K, C, M, branches = added(block(), same)
     assert K.nnz == C.nnz == M.nnz == len(branches) == 0 or abs(K).max() == abs(M).max() == 0
 
 
-def test_a_uniform_strain_in_the_plane_is_exact():
+def test_uniform_in_plane_strain_is_exact():
     mesh, strain = block(), np.array([[2e-3, 7e-4], [7e-4, -1e-3]])
     u = np.zeros_like(mesh.points)
     u[:, :2] = mesh.points[:, :2] @ strain
@@ -93,7 +93,7 @@ def test_a_uniform_strain_in_the_plane_is_exact():
     assert energy == pytest.approx(expected, rel=1e-9)
 
 
-def test_a_uniform_curvature_is_exact():
+def test_uniform_curvature_is_exact():
     """Normals stay normal: the strain at a height z is z times the curvature."""
     mesh, curvature = block(), 0.3
     u = np.zeros_like(mesh.points)
@@ -104,7 +104,7 @@ def test_a_uniform_curvature_is_exact():
     assert energy == pytest.approx(stiffness * curvature**2 * 24e-3**2, rel=1e-9)
 
 
-def test_layers_of_a_coat_are_stacked_from_the_surface_downwards():
+def test_layers_are_stacked_from_the_surface_downwards():
     """Bending about the surface: the lower of two layers has seven times the stiffness."""
     mesh = block()
     u = np.zeros_like(mesh.points)
@@ -120,7 +120,7 @@ def test_layers_of_a_coat_are_stacked_from_the_surface_downwards():
 
 
 @pytest.mark.parametrize("bent", [(0.0, 0.0), (40.0, 40.0)])
-def test_a_rigid_rotation_has_no_energy(bent):
+def test_rigid_rotation_has_no_energy(bent):
     mesh = block(bent)
     turned = np.cross([0.3, -0.5, 0.8], mesh.points).ravel()
     K = added(mesh)[0]
@@ -128,7 +128,7 @@ def test_a_rigid_rotation_has_no_energy(bent):
 
 
 @pytest.mark.parametrize("bent", [(0.0, 0.0), (40.0, 40.0)])
-def test_a_coat_alone_has_no_negative_stiffness(bent):
+def test_coat_alone_has_no_negative_stiffness(bent):
     """At the least penalty that is enough: with 0.85 of it some modes are negative."""
     mesh, free = block(bent), np.zeros(block().n_dofs, bool)
     surface = surface_of(mesh, THIN, free)
@@ -137,14 +137,14 @@ def test_a_coat_alone_has_no_negative_stiffness(bent):
     assert stiffness[0] > -1e-12 * stiffness[-1]
 
 
-def test_a_coat_on_linear_facets_is_refused():
+def test_coat_on_linear_facets_is_refused():
     mesh = meshes.extrude(*(np.linspace(0, 1e-2, 3) for _ in "xyz"), order=1)
     with pytest.raises(ValueError, match="order=2"):
         added(mesh)
 
 
 @pytest.mark.parametrize("bent", [(40.0, 0.0), (40.0, 40.0)], ids=["cylinder", "sphere"])
-def test_a_curved_membrane_under_pressure_has_the_tension_of_laplace(bent):
+def test_curved_membrane_under_pressure_has_laplace_tension(bent):
     """p = t (sigma_1 / R_1 + sigma_2 / R_2), by the virtual work of a bump."""
     mesh, radius, growth = block(bent), 25e-3, 1e-6
     thin = fem.Coat(materials=(STIFF,), thicknesses=(1e-5,))
@@ -162,7 +162,7 @@ def test_a_curved_membrane_under_pressure_has_the_tension_of_laplace(bent):
     assert found == pytest.approx(expected, rel=0.01)
 
 
-def test_the_mass_of_a_coat_is_that_of_what_it_replaces_and_the_difference():
+def test_mass_of_a_coat_is_the_difference_of_densities():
     mesh = block((40.0, 40.0))
     up = np.tile([0.0, 0.0, 1.0], len(mesh.points))
     M = added(mesh)[2]
@@ -171,7 +171,7 @@ def test_the_mass_of_a_coat_is_that_of_what_it_replaces_and_the_difference():
     assert up @ (M @ up) == pytest.approx(100 * 0.4e-3 * inner, rel=2e-3)
 
 
-def test_moduli_of_a_coat_depend_on_frequency_as_those_of_a_body_do():
+def test_stiffness_of_a_coat_has_the_complex_moduli():
     """Viscosity, Prony terms, and the material replaced, each by its own complex modulus."""
     zener = PronyTerm(modulus=3e4, time=1e-3)
     skin = replace(STIFF, viscosity=20.0, prony=(zener, PronyTerm(modulus=1e4, time=1e-4)))
@@ -195,7 +195,7 @@ def test_moduli_of_a_coat_depend_on_frequency_as_those_of_a_body_do():
     assert abs(difference).max() < 1e-12 * abs(expected).max()
 
 
-def test_a_body_and_its_coat_share_branches_of_one_time():
+def test_body_and_coat_share_branches_of_equal_time():
     term = (PronyTerm(modulus=1e3, time=1e-3),)
     mesh, below = block(), fem.Material(density=1000, shear_modulus=2e4, poisson=0.3, prony=term)
     stronger = (PronyTerm(modulus=9e3, time=1e-3),)
@@ -208,7 +208,7 @@ def test_a_body_and_its_coat_share_branches_of_one_time():
     assert abs(difference).max() < 1e-12 * abs(extra).max()
 
 
-def test_half_of_a_symmetric_body_moves_as_all_of_it():
+def test_half_of_a_symmetric_body_moves_like_the_whole():
     """Normals do not turn across a plane of symmetry."""
     x = np.linspace(-9e-3, 9e-3, 7)
     mesh = meshes.extrude(x, x, np.array([-6e-3, -3e-3, 0.0]))
@@ -228,7 +228,7 @@ def test_half_of_a_symmetric_body_moves_as_all_of_it():
     np.testing.assert_allclose(found["xy"], found[""], rtol=1e-7)
 
 
-def test_a_coat_of_half_an_element_leaves_the_stiffness_positive():
+def test_coat_of_half_an_element_keeps_the_stiffness_positive():
     soft = fem.Material(density=1000, shear_modulus=2e4, poisson=0.4999)
     thick = fem.Coat(materials=(soft.scaled(modulus=1e3),), thicknesses=(1.5e-3,))
     operators = fem.assemble(block(), soft, fixed="bottom", coat=thick)
@@ -275,7 +275,7 @@ def response(hertz, coat=None):
     ("thickness", "hertz", "most"),
     [(0.3e-3, 400.0, 0.03), (1e-3, 140.0, 0.05)],
 )
-def test_a_coated_slab_moves_as_its_wavenumber_integral_says(thickness, hertz, most):
+def test_coated_slab_matches_its_wavenumber_integral(thickness, hertz, most):
     coated = Stack(materials=(SKIN, FOREARM), thicknesses=(thickness, DEPTH - thickness))
     plain = Stack(materials=(FOREARM,), thicknesses=(DEPTH,))
     true, bare = (
@@ -290,7 +290,7 @@ def test_a_coated_slab_moves_as_its_wavenumber_integral_says(thickness, hertz, m
     assert change < 0.25 * np.abs(true - bare).max()
 
 
-def test_a_coat_without_layers_or_thickness_is_refused():
+def test_coat_without_layers_or_thickness_is_refused():
     with pytest.raises(ValueError, match="0 materials"):
         fem.Coat(materials=(), thicknesses=(1e-3,))
     with pytest.raises(ValueError, match="above 0"):
@@ -301,7 +301,7 @@ def palm(*layers):
     return Body(kind="palm", layers=layers)
 
 
-def test_thin_layers_on_a_palm_are_a_coat_and_leave_its_elements_as_they_are():
+def test_thin_layers_on_a_palm_become_a_coat():
     body = palm(EPIDERMIS)
     assert default_size(body) == default_size(BODIES["palm"])
     check_mesh(body, 5e-3)
@@ -316,7 +316,7 @@ def test_thin_layers_on_a_palm_are_a_coat_and_leave_its_elements_as_they_are():
     assert [row.what for row in coat_rows(palm(EPIDERMIS, fat), 5e-3)][1] == "layers"
 
 
-def test_as_few_layers_as_need_be_are_a_coat():
+def test_only_layers_thinner_than_elements_become_a_coat():
     dermis = Layer(thickness=0.8e-3, material="dermis")
     both = palm(EPIDERMIS, dermis)
     assert coarsest_size(both) == np.inf
@@ -325,7 +325,7 @@ def test_as_few_layers_as_need_be_are_a_coat():
     assert [start for start, _ in meshed_strata(both, 2e-3)] == [0.0, pytest.approx(1.1e-3)]
 
 
-def test_thin_layers_that_are_no_coat_are_refused():
+def test_thin_layers_that_cannot_be_a_coat_are_refused():
     thick = Layer(thickness=3e-3, material="fat"), EPIDERMIS
     for layers in (thick, (Layer(thickness=0.8e-3, material="forearm-hypodermis"),)):
         with pytest.raises(ValueError, match="coat|at most"):
@@ -349,7 +349,7 @@ def lump(tmp_path_factory):
     return {mm: loads(text + (layer.format(mm) if mm else "")) for mm in (0, 0.3)}
 
 
-def test_all_linear_models_have_the_coat(lump):
+def test_all_linear_models_include_the_coat(lump):
     reduced = {mm: compute(scene, "fem").displacement for mm, scene in lump.items()}
     assert np.linalg.norm(reduced[0.3]) < 0.95 * np.linalg.norm(reduced[0])
     stepped = compute(lump[0.3], "fem-transient", dt=1e-4).displacement

@@ -33,7 +33,7 @@ def same(one, other):
 
 
 @pytest.mark.parametrize("material", [LOSSY, fem.PRESETS["palm-zener"]])
-def test_they_are_the_matrices_that_are_assembled_part_by_part(material):
+def test_combinations_equal_matrices_assembled_part_by_part(material):
     """K of two materials alike has macroelements of its own where it is projected."""
     material = replace(material, poisson=0.45)
     _, one, parts = block(material)
@@ -45,7 +45,7 @@ def test_they_are_the_matrices_that_are_assembled_part_by_part(material):
     assert all(same(a.K, b.K) for a, b in zip(one.branches, parts.branches, strict=True))
 
 
-def test_a_branch_of_one_material_shares_the_pattern_of_its_stiffness():
+def test_branch_of_one_material_shares_the_pattern_of_k():
     """A third of its memory."""
     found = fem.assemble(meshes.block((0.02, 0.02, 0.01), 0.01), fem.PRESETS["palm-zener"])
     (branch,) = found.branches
@@ -54,7 +54,7 @@ def test_a_branch_of_one_material_shares_the_pattern_of_its_stiffness():
 
 
 @pytest.mark.parametrize("material", [PALM, LOSSY])
-def test_moments_without_products_are_those_with_them(material):
+def test_moments_by_combinations_equal_those_by_products(material):
     mesh, ops, _ = block(material)
     S = fem.probe_operator(mesh, [[0.0, 0.0], [0.004, 0.001]])
     F = fem.load_operator(mesh) @ np.random.default_rng(0).random((len(facet_points(mesh)), 3))

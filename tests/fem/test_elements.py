@@ -32,7 +32,7 @@ def test_quadrature_is_exact_to_its_degree(rule, degree, corners):
 
 
 @pytest.mark.parametrize(("corners", "nodes"), [(3, 3), (3, 6), (4, 4), (4, 10)])
-def test_shape_functions_sum_to_one_and_derivatives_are_theirs(corners, nodes):
+def test_shape_functions_sum_to_one_and_match_their_derivatives(corners, nodes):
     point = np.random.default_rng(1).dirichlet(np.ones(corners), 5)
     np.testing.assert_allclose(shape_functions(point, nodes).sum(axis=1), 1, atol=1e-14)
     derivatives, eps = shape_derivatives(point, nodes), 1e-6
@@ -51,7 +51,7 @@ def test_rigid_motion_has_no_energy(distorted_cube):
         assert abs(u @ K @ u) < 1e-12 * abs(K).sum() / len(u)
 
 
-def test_projection_keeps_linear_dilatation_and_no_more(distorted_cube):
+def test_projection_is_exact_for_linear_dilatation(distorted_cube):
     mesh = distorted_cube
     cluster, sloping = macroelements(mesh)
     assert set(cluster) == set(range(len(sloping)))
@@ -71,7 +71,7 @@ def test_projection_keeps_linear_dilatation_and_no_more(distorted_cube):
     assert found @ found < 0.6 * (rough @ direct @ rough)
 
 
-def test_clusters_are_the_boxes_of_a_mesh_of_boxes():
+def test_macroelements_of_a_box_mesh_are_the_boxes():
     mesh = meshes.block((3.0, 2.0, 1.0), 0.5)
     cluster, sloping = macroelements(mesh)
     assert sloping.all()
@@ -84,7 +84,7 @@ def test_clusters_are_the_boxes_of_a_mesh_of_boxes():
     assert (highest - lowest).max() < 0.5
 
 
-def test_an_element_without_inner_edges_is_a_cluster_of_its_own():
+def test_element_without_inner_edges_is_its_own_macroelement():
     points = np.vstack([np.zeros(3), np.eye(3)])
     mesh = meshes.quadratic(TetMesh(points=points, tets=[[0, 1, 2, 3]]))
     cluster, sloping = macroelements(mesh)
@@ -94,7 +94,7 @@ def test_an_element_without_inner_edges_is_a_cluster_of_its_own():
     assert (swelling**2).sum() == pytest.approx(3**2 / 6)  # div u squared, times the volume
 
 
-def test_mass_and_weight_are_those_of_the_body(distorted_cube):
+def test_mass_matrix_has_the_mass_of_the_body(distorted_cube):
     material = fem.Material(density=700, shear_modulus=1, poisson=0.3)
     M = fem.assemble(distorted_cube, material, fixed=np.zeros_like(distorted_cube.points, bool)).M
     up = np.tile([0, 0, 1.0], len(distorted_cube.points))
@@ -115,7 +115,7 @@ def test_operators_are_symmetric_and_positive(distorted_cube):
 @pytest.mark.parametrize(
     ("bend", "fixed"), [(0.0, {"bottom": "xyz", "sides": "x"}), (0.05, {"bottom": "z"})]
 )
-def test_operators_are_the_integrals_of_their_definition(distorted_cube, bend, fixed):
+def test_operators_equal_their_defining_integrals(distorted_cube, bend, fixed):
     x = distorted_cube.points
     mesh = replace(distorted_cube, points=x + bend * np.sin(5 * x[:, [1, 2, 0]]))
     mu, lam, rho = 2.0, 3.0, 700.0
@@ -167,7 +167,7 @@ def test_probes_off_the_body_are_refused():
         fem.probe_operator(meshes.sheet(0.1, 0.1, 0.001, 0.02), [[0.06, 0.0]])
 
 
-def test_probes_read_the_displacement_along_the_push(distorted_cube):
+def test_probes_read_the_displacement_into_the_body(distorted_cube):
     u = np.zeros_like(distorted_cube.points)
     u[:, 2] = -(1 + distorted_cube.points[:, 0] ** 2)
     S = fem.probe_operator(distorted_cube, [[0.3, 0.4], [0.71, 0.2]])

@@ -33,7 +33,7 @@ def sheet():
     return made, stretching_body(PAPER, made)
 
 
-def test_the_membrane_makes_up_for_what_a_thick_equivalent_lacks_of_stretching(sheet):
+def test_membrane_adds_the_missing_stretching_stiffness(sheet):
     made, _ = sheet
     x = made.mesh.points
     stretched = np.zeros_like(x)
@@ -49,7 +49,7 @@ def test_the_membrane_makes_up_for_what_a_thick_equivalent_lacks_of_stretching(s
     assert free.energy(stretched.ravel()) == pytest.approx(exact, rel=1e-3)
 
 
-def test_the_motion_starts_from_rest():
+def test_motion_starts_from_rest():
     response = compute(SCENE, "fem-nonlinear", h=0.01)
     assert np.abs(response.displacement[0]).max() < 1e-12 * np.abs(response.displacement).max()
     assert response.model == "fem-nonlinear"
@@ -58,7 +58,7 @@ def test_the_motion_starts_from_rest():
     assert 0 < response.effort.energy_imbalance < 0.01
 
 
-def test_a_sheet_that_hardly_bends_moves_from_rest_as_a_linear_plate():
+def test_small_deflection_matches_a_linear_plate():
     """Under next to no pressure, by Ritz's modes of a thin plate, with the mean deflection."""
     lossy = from_young(density=800, young=8e8, poisson=0.3, viscosity=1.2e4)
     held = Mounting(edges=("front",))
@@ -75,7 +75,7 @@ def test_a_sheet_that_hardly_bends_moves_from_rest_as_a_linear_plate():
         assert error < 1.1 * found.expected_error
 
 
-def test_a_step_that_fails_is_halved(sheet, monkeypatch):
+def test_step_that_does_not_converge_is_halved(sheet, monkeypatch):
     monkeypatch.setattr(nonlinear, "MOST_ITERATIONS", 4)
     made, body = sheet
     P = fem.load_operator(made.mesh)
@@ -91,7 +91,7 @@ def test_a_step_that_fails_is_halved(sheet, monkeypatch):
     assert np.isfinite(states[1].displacement).all()
 
 
-def test_states_before_a_failure_are_kept(sheet):
+def test_states_before_a_failure_are_yielded(sheet):
     made, body = sheet
     P = fem.load_operator(made.mesh)
     push = P @ np.ones(P.shape[1])
@@ -112,28 +112,28 @@ def thin_strip(cells):
     return fem.finite_strain(mesh, material, fixed={"left": "xyz"}), share, 1e9 * 0.05 * 1e-6 / 12
 
 
-def test_a_thin_strip_bends_as_the_elastica():
+def test_thin_strip_bends_like_the_elastica():
     (body, share, stiffness), load = thin_strip(40), 10.0
     u = nonlinear.static(body, load * stiffness * share.ravel()).reshape(-1, 3)
     tip = u[share[:, 2] != 0].mean(axis=0)
     np.testing.assert_allclose((-tip[2], -tip[0]), elastica(load), rtol=1e-3)
 
 
-def test_round_off_of_a_thin_strip_is_no_lack_of_convergence():
+def test_static_solution_of_a_thin_strip_converges_despite_round_off():
     body, share, stiffness = thin_strip(40)
     u = nonlinear.static(body, 0.02 * stiffness * share.ravel()).reshape(-1, 3)
     tip = u[share[:, 2] != 0].mean(axis=0)
     assert -tip[2] == pytest.approx(elastica(0.02)[0], rel=1e-3)
 
 
-def test_a_body_that_has_not_come_to_rest_is_refused(monkeypatch):
+def test_static_solution_that_does_not_converge_is_refused(monkeypatch):
     monkeypatch.setattr(nonlinear, "MOST_ITERATIONS", 3)
     body, share, stiffness = thin_strip(4)
     with pytest.raises(fem.Diverged, match="no equilibrium"):
         nonlinear.static(body, 100 * stiffness * share.ravel())
 
 
-def test_what_it_does_not_answer_is_refused():
+def test_invalid_bodies_are_refused():
     mesh = meshes.block((0.02, 0.02, 0.01), 0.01)
     with pytest.raises(ValueError, match="poisson"):
         fem.finite_strain(mesh, fem.Material(density=1, shear_modulus=1, poisson=0.49))
@@ -146,14 +146,14 @@ def test_what_it_does_not_answer_is_refused():
         fem.finite_strain(mesh, fem.PRESETS["paper"], membrane=layer)
 
 
-def test_nonlinear_models_are_for_sheets_that_are_held():
+def test_nonlinear_models_need_a_clamped_level_sheet():
     tilted = replace(PAPER, placement=Placement(tilt_x=0.1))
     for body in (Body(), replace(PAPER, sides="absorbing"), tilted):
         with pytest.raises(ValueError, match=r"sheet"):
             compute(replace(SCENE, body=body), "fem-nonlinear", h=0.0125)
 
 
-def test_a_lifted_sheet_feels_what_the_focus_has_left_there():
+def test_lifted_sheet_gets_the_axial_pressure_of_the_focus():
     """Under next to no pressure, where the response is linear."""
     still = Tacton(am_frequency=140, duration=0.02)
     scene = replace(SCENE, pressure=MovingPressure(tacton=still, peak_pressure=1e-3))

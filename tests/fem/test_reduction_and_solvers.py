@@ -1,4 +1,4 @@
-"""Every solver has the same solution, and the reduced-order model that of the full one."""
+"""Solvers agree with each other, and the reduced-order model with the full one."""
 
 import gc
 import os
@@ -27,37 +27,39 @@ from skinwave.models.meshed import energy_balance
 from skinwave.planning.simulate import compute
 
 PROBES = np.column_stack([[0, 5, 10, 15, 20], np.zeros(5)]) * 1e-3
+needs_pardiso = pytest.mark.skipif("pardiso" not in fem.available(), reason="MKL is not installed")
+BACKENDS = [pytest.param("pardiso", marks=needs_pardiso), "superlu"]
+
+
+def solves(x, A, b):
+    return np.abs(A @ x - b).max() < 1e-9 * np.abs(b).max()
 
 
 @pytest.fixture(scope="module")
 def stiff():
-    """A small dynamic stiffness and a right-hand side."""
+    """A small dynamic stiffness and right-hand sides."""
     mesh = meshes.block((0.025, 0.025, 0.01), 0.005)
     ops = fem.assemble(mesh, fem.PRESETS["palm"], absorbing="sides")
     A = ops.K + 1e3 * ops.C + 1e6 * ops.M
     return ops, A, np.random.default_rng(0).standard_normal((A.shape[0], 3))
 
 
-@pytest.mark.parametrize("backend", linear_solver.BACKENDS)
+@pytest.mark.parametrize("backend", BACKENDS)
 def test_every_solver_solves_real_and_complex_matrices(stiff, backend):
-    if backend not in fem.available():
-        pytest.skip(f"{backend} is not installed")
     ops, A, b = stiff
     factor = fem.factorise(A, backend=backend)
     assert factor.backend == backend
     x = factor.solve(b)
-    assert np.abs(A @ x - b).max() < 1e-9 * np.abs(b).max()
+    assert solves(x, A, b)
     np.testing.assert_allclose(factor.solve(b[:, 0]), x[:, 0], rtol=1e-9)
     complex_b = b[:, 0] * (1 + 2j)
     np.testing.assert_allclose(factor.solve(complex_b), (1 + 2j) * x[:, 0], rtol=1e-9)
     A = ops.K + 1j * 900 * ops.C - 900**2 * ops.M
-    x = fem.factorise(A, backend=backend).solve(b.astype(complex))
-    assert np.abs(A @ x - b).max() < 1e-9 * np.abs(b).max()
+    assert solves(fem.factorise(A, backend=backend).solve(b.astype(complex)), A, b)
 
 
-def test_a_factor_larger_than_the_memory_is_kept_in_files(stiff, monkeypatch, tmp_path, caplog):
-    if "pardiso" not in fem.available():
-        pytest.skip("pardiso is not installed")
+@needs_pardiso
+def test_factor_larger_than_memory_is_kept_in_files(stiff, monkeypatch, tmp_path, caplog):
     _, A, b = stiff
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     monkeypatch.setenv("MKL_PARDISO_OOC_PATH", "the user's own")
@@ -65,9 +67,9 @@ def test_a_factor_larger_than_the_memory_is_kept_in_files(stiff, monkeypatch, tm
         scarce.setattr(pardiso, "free_memory", lambda: 1e5)
         factor = fem.factorise(A)
     assert f"{A.shape[0]:,} dofs" in caplog.text
-    assert list(tmp_path.glob("skinwave-factor-*/*")), "no file"
+    assert list(tmp_path.glob("skinwave-factor-*/*"))
     x = factor.solve(b)
-    assert np.abs(A @ x - b).max() < 1e-9 * np.abs(b).max()
+    assert solves(x, A, b)
     np.testing.assert_allclose(x, fem.factorise(A).solve(b), rtol=0, atol=1e-9 * np.abs(x).max())
     del factor
     gc.collect()
@@ -75,9 +77,8 @@ def test_a_factor_larger_than_the_memory_is_kept_in_files(stiff, monkeypatch, tm
     assert os.environ["MKL_PARDISO_OOC_PATH"] == "the user's own"
 
 
-def test_a_factor_larger_than_memory_and_disk_is_refused(stiff, monkeypatch):
-    if "pardiso" not in fem.available():
-        pytest.skip("pardiso is not installed")
+@needs_pardiso
+def test_factor_larger_than_memory_and_disk_is_refused(stiff, monkeypatch):
     usage = shutil._ntuple_diskusage(1, 1, 1000)
     monkeypatch.setattr(shutil, "disk_usage", lambda folder: usage)
     monkeypatch.setattr(pardiso, "free_memory", lambda: 1e5)
@@ -85,34 +86,30 @@ def test_a_factor_larger_than_memory_and_disk_is_refused(stiff, monkeypatch):
         fem.factorise(stiff[1])
 
 
-def test_a_body_larger_than_the_memory_is_refused_before_it_is_assembled(monkeypatch):
+def test_body_larger_than_memory_is_refused(monkeypatch):
     monkeypatch.setattr(memory, "free_memory", lambda: 1e7)
     mesh = meshes.block((0.025, 0.025, 0.01), 0.005)
     with pytest.raises(MemoryError, match="larger elements"):
         fem.assemble(mesh, fem.PRESETS["palm"])
 
 
-@pytest.mark.parametrize(("backend", "known"), [("pardiso", True), ("superlu", False)])
-def test_lines_are_solved_one_after_the_other(stiff, backend, known):
-    """Also by a solver that another process is sent between two of them."""
-    if backend not in fem.available():
-        pytest.skip(f"{backend} is not installed")
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_line_solver_solves_successive_frequencies(stiff, backend):
+    """With and without known combinations, also after pickling between frequencies."""
     b = stiff[2]
     terms = (fem.PronyTerm(modulus=5e3, time=1e-3), fem.PronyTerm(modulus=9e3, time=1e-4))
     mesh = meshes.block((0.025, 0.025, 0.01), 0.005)
     ops = fem.assemble(mesh, replace(fem.PRESETS["palm"], prony=terms), absorbing="sides")
-    solve = fem.LineSolver(ops if known else replace(ops, laws=None), backend)
+    solve = fem.LineSolver(ops if backend == "pardiso" else replace(ops, laws=None), backend)
     for hertz in (0.0, 50.0, 700.0):
         A = dynamic_stiffness(ops.K, ops.C, ops.M, ops.branches, 2j * np.pi * hertz)
-        x = solve(hertz, ops.expand(b))[ops.free]
-        assert np.abs(A @ x - b).max() < 1e-9 * np.abs(b).max()
+        assert solves(solve(hertz, ops.expand(b))[ops.free], A, b)
         solve = pickle.loads(pickle.dumps(solve))
 
 
+@needs_pardiso
 @pytest.mark.parametrize("slowest", [0.2, 0.0])
-def test_a_factor_in_single_precision_is_refined_or_made_in_double(stiff, monkeypatch, slowest):
-    if "pardiso" not in fem.available():
-        pytest.skip("mkl is not installed")
+def test_single_precision_factor_is_refined_or_replaced(stiff, monkeypatch, slowest):
     monkeypatch.setattr(linear_solver, "SLOWEST", slowest)
     ops, _, b = stiff
     columns = b[:, 0], b.astype(complex)
@@ -121,13 +118,12 @@ def test_a_factor_in_single_precision_is_refined_or_made_in_double(stiff, monkey
     for w, each in zip((300.0, 2000.0), A, strict=True):
         factor = factorise(np.array([1, 1j * w, -(w**2)]))
         for right in columns:
-            x = factor.solve(right.astype(complex))
-            assert np.abs(each @ x - right).max() < 1e-9 * np.abs(right).max()
+            assert solves(factor.solve(right.astype(complex)), each, right)
     assert factorise._is_single == (slowest > 0)
 
 
-def test_lines_of_a_thin_sheet_are_solved_as_well_as_its_matrix_allows():
-    """In single precision nothing is left of its stiffness against bending."""
+def test_lines_of_a_thin_sheet_match_double_precision():
+    """Round-off of single precision exceeds its bending stiffness."""
     mesh = meshes.sheet(0.1, 0.1, 1e-4, 0.005)
     ops = fem.assemble(mesh, fem.PRESETS["paper"], fixed="sides")
     force = fem.load_operator(mesh) @ np.ones(len(fem.facet_points(mesh)))
@@ -139,7 +135,7 @@ def test_lines_of_a_thin_sheet_are_solved_as_well_as_its_matrix_allows():
         np.testing.assert_allclose(S @ fem.harmonic(ops, force, hertz)[0], exact, rtol=1e-3)
 
 
-def test_patterns_that_differ_are_united():
+def test_different_patterns_are_united():
     rng = np.random.default_rng(3)
     full = [sparse.random_array((9, 9), density=0.2, rng=rng, format="csr") for _ in range(3)]
     matrices = [(A + A.T).tocsr() for A in full]
@@ -149,16 +145,16 @@ def test_patterns_that_differ_are_united():
         np.testing.assert_array_equal(found.toarray(), np.triu(A.toarray()))
 
 
-def test_without_mkl_and_metis_superlu_carries_it(stiff, monkeypatch):
+def test_superlu_works_without_mkl_and_metis(stiff, monkeypatch):
     _, A, b = stiff
     monkeypatch.setitem(sys.modules, "pymetis", None)
     monkeypatch.setattr(linear_solver, "mkl", lambda: None)
     factor = fem.factorise(A)
     assert factor.backend == "superlu"
-    assert np.abs(A @ factor.solve(b) - b).max() < 1e-9 * np.abs(b).max()
+    assert solves(factor.solve(b), A, b)
 
 
-def test_a_floating_body_and_an_unknown_solver_are_refused():
+def test_free_body_and_unknown_solver_are_refused():
     singular = sparse.csr_array(np.array([[1.0, -1.0], [-1.0, 1.0]]))
     for backend in fem.available():
         with pytest.raises(ValueError, match="constrained"):
@@ -182,8 +178,8 @@ def misfit(candidate, reference):
 
 
 @pytest.mark.parametrize(("kind", "h"), [("skin", 0.01), ("sheet", 0.0125)])
-def test_the_estimate_is_near_the_true_error(kind, h):
-    """Also where moments converge ever faster, as those of sheets with little loss do."""
+def test_error_estimate_is_near_the_true_error(kind, h):
+    """Also for a sheet with little loss, where moments converge faster and faster."""
     mesh, ops = body(kind, h)
     P, points = fem.load_operator(mesh), fem.facet_points(mesh)[:, :2]
     S = fem.probe_operator(mesh, PROBES)
@@ -199,8 +195,8 @@ def test_the_estimate_is_near_the_true_error(kind, h):
         assert model.estimate / 4 < error.max() < model.estimate * 4
 
 
-def test_a_space_that_holds_all_of_a_body_is_the_body():
-    """More moments bring nothing but round-off, which is no direction."""
+def test_basis_of_all_dofs_gives_the_full_model():
+    """Further moments are round-off and must not be added."""
     mesh = meshes.block((0.06, 0.06, 0.015), 0.06)
     ops = fem.assemble(mesh, replace(fem.PRESETS["palm"], viscosity=0.0))
     S = fem.probe_operator(mesh, np.column_stack([np.linspace(0, 0.02, 40)] * 2))
@@ -217,8 +213,8 @@ def test_a_space_that_holds_all_of_a_body_is_the_body():
         assert np.linalg.norm(found - exact) < max(1e-9, 4 * model.estimate) * np.linalg.norm(exact)
 
 
-def test_probes_in_one_element_are_no_more_than_what_moves_it():
-    """Their seeds depend on each other: forty-one probes, two of them in one place."""
+def test_dependent_probes_in_one_element():
+    """Forty-one probes, two of them at one point."""
     mesh = meshes.block((0.03, 0.03, 0.01), 0.008)
     ops = fem.assemble(mesh, fem.PRESETS["palm"], absorbing="sides")
     places = np.column_stack([np.linspace(0, 0.01, 41), np.zeros(41)])
@@ -232,7 +228,7 @@ def test_probes_in_one_element_are_no_more_than_what_moves_it():
     np.testing.assert_array_equal(found[0], found[1])
 
 
-def test_poles_answer_like_the_model(stiff):
+def test_poles_give_the_transfer_function(stiff):
     ops, _, _ = stiff
     mesh = meshes.block((0.025, 0.025, 0.01), 0.005)
     S = fem.probe_operator(mesh, [[0.0, 0.0], [0.004, 0.001]])
@@ -261,7 +257,7 @@ def integrated(poles, load, dt):
     return found.T
 
 
-def test_lines_from_rest_are_the_recurrence_at_a_fine_step():
+def test_lines_from_rest_match_an_exponential_integrator():
     poles = fem.Poles(
         values=np.array([-30.0 + 400j, -900.0 + 0j]),
         inputs=np.array([[1.0 + 0.5j], [2.0 + 0j]]),
@@ -275,12 +271,12 @@ def test_lines_from_rest_are_the_recurrence_at_a_fine_step():
     rates = np.concatenate([2j * np.pi * frequencies, poles.values])
     summed = exponential_sum(rates, np.vstack([lines, start]), t)
     assert misfit(summed, recurrence) < 1e-5
-    # Chunks of times end nowhere in particular.
+    # The number of times need not be a multiple of the chunks.
     short = exponential_sum(rates, np.vstack([lines, start]), t[:300])
     np.testing.assert_allclose(short, summed[:300], atol=1e-15)
 
 
-def test_a_load_subspace_spans_the_load():
+def test_load_subspace_spans_the_loads():
     centres = np.linspace(-0.01, 0.01, 40)
     x = np.linspace(-0.03, 0.03, 500)
     loads = np.exp(-((x[:, None] - centres) ** 2) / 2 / 0.004**2)
@@ -291,7 +287,7 @@ def test_a_load_subspace_spans_the_load():
     assert np.linalg.norm(left) < 1e-3 * np.linalg.norm(loads)
 
 
-def test_an_unreachable_tolerance_is_said(monkeypatch):
+def test_unreachable_tolerance_is_refused(monkeypatch):
     monkeypatch.setattr("fem.krylov.MOST_MOMENTS", 20)
     mesh, ops = body("sheet", 0.0125)
     S = fem.probe_operator(mesh, PROBES[:1])
@@ -300,7 +296,7 @@ def test_an_unreachable_tolerance_is_said(monkeypatch):
 
 
 @pytest.mark.parametrize("model", ["fem", "fem-transient"])
-def test_every_element_answer_accounts_for_its_energy(model):
+def test_element_models_balance_energy(model):
     path = Trajectory(shape="circle", size=0.01, speed=6.0)
     scene = skinwave.Scene(
         pressure=MovingPressure(tacton=Tacton(am_frequency=140, duration=0.01, trajectory=path)),
@@ -314,7 +310,7 @@ def test_every_element_answer_accounts_for_its_energy(model):
     assert compute(closed, model, h=0.008).effort.radiated == 0
 
 
-def test_an_answer_that_makes_energy_is_refused():
+def test_energy_imbalance_is_refused():
     mesh = meshes.block((0.03, 0.03, 0.01), 0.006)
     ops = fem.assemble(mesh, fem.PRESETS["palm"])
     push = fem.load_operator(mesh) @ np.ones(fem.load_operator(mesh).shape[1])

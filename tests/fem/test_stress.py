@@ -30,7 +30,7 @@ def tensor(matrix):
 
 
 @pytest.mark.parametrize("poisson", POISSON)
-def test_linear_displacement_has_its_strain_and_stress_everywhere(poisson):
+def test_linear_displacement_has_exact_strain_and_stress(poisson):
     """Patch test, on distorted elements, inside, on the surface and in a corner."""
     mesh = meshes.block((0.02, 0.02, 0.012), 3e-3)
     rng = np.random.default_rng(0)
@@ -81,13 +81,13 @@ def four_foci(poisson, point):
 
 @pytest.fixture(scope="module")
 def half_space():
-    """A quarter of a block that is large beside the foci."""
+    """A quarter of a block that is much larger than the foci."""
     along = meshes.Grading(radius=12e-3, growth=1.5, coarsest=0.02)
     mesh = meshes.block((0.16, 0.16, 0.08), 2e-3, grading=along)
     return meshes.half(meshes.half(mesh, "x"), "y")
 
 
-def test_stress_below_a_focus_is_that_of_boussinesq(half_space):
+def test_stress_below_a_focus_matches_boussinesq(half_space):
     """At the surface too: sigma_zz = -p without shear; all within 3 % of the largest pressure."""
     poisson = 0.4999
     mesh, material = half_space, solid(poisson)
@@ -107,7 +107,7 @@ def test_stress_below_a_focus_is_that_of_boussinesq(half_space):
 
 
 @pytest.mark.parametrize("poisson", POISSON)
-def test_a_thick_cylinder_under_pressure_is_lames(poisson):
+def test_thick_cylinder_under_pressure_matches_lame(poisson):
     """Plane strain, inner radius 1, outer 2: sigma_rr, sigma_tt = (A -+ B / r^2) p, A = 1/3,
     B = 4/3 (Timoshenko and Goodier, Theory of Elasticity (1970), section 28).
     """
@@ -132,7 +132,7 @@ def test_a_thick_cylinder_under_pressure_is_lames(poisson):
     np.testing.assert_allclose(found[:, 2], 2 / 3 * poisson, rtol=0, atol=0.02)
 
 
-def test_strain_jumps_between_materials_and_is_not_smoothed():
+def test_strain_jumps_between_materials():
     """Two layers in series under one pressure, without lateral strain: stress over modulus each."""
     mesh = meshes.extrude(np.linspace(0, 1, 4), np.linspace(0, 1, 4), np.linspace(-1, 0, 5))
     middle = mesh.points[mesh.tets[:, :4], 2].mean(axis=1)
@@ -151,7 +151,7 @@ def test_strain_jumps_between_materials_and_is_not_smoothed():
     np.testing.assert_allclose(stress, -1.0, rtol=1e-8)
 
 
-def test_strain_at_nodes_is_that_of_points_and_jumps_between_materials():
+def test_nodal_strain_equals_strain_at_points():
     """All of them or some, by the same polynomials at corners, on a curved displacement."""
     mesh = meshes.block((0.012, 0.012, 0.012), 3e-3)
     middle = mesh.points[mesh.tets[:, :4], 2].mean(axis=1)
@@ -173,7 +173,7 @@ def test_strain_at_nodes_is_that_of_points_and_jumps_between_materials():
     np.testing.assert_allclose(part_of_it, found[some, :, 0], rtol=0, atol=1e-9)
 
 
-def test_four_nodes_are_refused():
+def test_four_node_elements_are_refused():
     mesh = meshes.block((1.0, 1.0, 1.0), 0.5, order=1)
     with pytest.raises(ValueError, match="ten-node"):
         strain_operator(mesh, solid(0.3), [[0, 0, -0.2]])

@@ -1,4 +1,4 @@
-"""Published measurements beside the models: factors, closed forms, the command."""
+"""Published measurements and the models: factors, closed forms, the command."""
 
 from dataclasses import replace
 from math import inf, nan
@@ -35,11 +35,11 @@ SPREAD = replace(
     OPTIMUM, frequencies=(1.0, 2.0, 3.0, 4.0, 5.0), values=(nan,) * 5, lows=(2.0,) * 5,
     highs=(4.0,) * 5,
 )  # fmt: skip
-COARSE = np.arange(50.0, 701.0, 50.0)  # Hz, so as to be quick
+COARSE = np.arange(50.0, 701.0, 50.0)  # Hz, to save time
 HAND = Path(__file__).parents[2] / "examples/hand/generic-hand-right.glb"
 
 
-def test_a_factor_is_to_the_nearer_end_of_the_spread():
+def test_factor_is_relative_to_the_nearer_end_of_the_spread():
     rows = compared(SPREAD, "palm-layers", [1.0, 3.0, 8.0, nan, inf])
     assert [row.outcome for row in rows] == [BELOW, WITHIN, ABOVE, NONE, ABOVE]
     assert [row.factor for row in rows[:3]] == [0.5, 1.0, 2.0]
@@ -47,21 +47,21 @@ def test_a_factor_is_to_the_nearer_end_of_the_spread():
     assert compared(SPREAD, "palm", [1.0])[0].is_built
 
 
-def test_without_a_spread_agreement_is_as_near_as_a_curve_is_read():
+def test_values_without_spread_agree_within_the_reading_error():
     alone = replace(SPREAD, values=(3.0,) * 5, lows=(), highs=())
     rows = compared(alone, "palm", [3.1, 2.9, 3.2, 2.0, 6.0])
     assert [row.outcome for row in rows] == [WITHIN, WITHIN, ABOVE, BELOW, ABOVE]
 
 
-def test_voigt_lengths_are_those_of_the_closed_form_and_within_their_spread():
+def test_voigt_lengths_match_the_closed_form():
     """With mu = 7.86 kPa and 5.03 Pa s the 1/e length is 7.3 mm at 200 Hz, the speed 3.22 m/s."""
     speed, length = rayleigh_wave(7.86e3, 5.03, 200.0)
     assert speed == pytest.approx(3.22, abs=0.005)
     assert length == pytest.approx(7.3e-3, abs=5e-5)
-    found = next(each for each in WAVES if "Voigt" in each.name)
-    assert found.values[1] == pytest.approx(length)
-    assert (np.array(found.lows) < found.values).all()
-    assert (np.array(found.highs) > found.values).all()
+    voigt = next(each for each in WAVES if "Voigt" in each.name)
+    assert voigt.values[1] == pytest.approx(length)
+    assert (np.array(voigt.lows) < voigt.values).all()
+    assert (np.array(voigt.highs) > voigt.values).all()
 
 
 @pytest.fixture(scope="module")
@@ -69,21 +69,21 @@ def curves():
     return {name: leading_wave(body, COARSE) for name, body in BODIES.items()}
 
 
-def test_the_wave_of_a_half_space_is_that_of_the_closed_form(curves):
+def test_wave_of_a_half_space_matches_the_closed_form(curves):
     f = np.array([100.0, 200.0, 700.0])
     expected = np.array([rayleigh_wave(25e3, 5.0, x) for x in f]).T
     assert curves["palm"].at(SPEED, f) == pytest.approx(expected[0], rel=2e-4)
     assert curves["palm"].at(LENGTH, f) == pytest.approx(expected[1], rel=2e-4)
 
 
-def test_a_layer_on_bone_has_no_wave_at_rest():
+def test_layer_on_bone_has_no_wave_at_rest():
     slab = leading_wave(BODIES["skin-slab"])
     assert np.isnan(slab.at(SPEED, np.array([0.0, 50.0]))).all()
     # 15 mm and c_s = 5 m/s: nothing propagates below a quarter of a shear wave, 83 Hz.
     assert slab.frequencies[np.isfinite(slab.speed)][0] == pytest.approx(83, abs=10)
 
 
-def test_an_exponent_at_rest_is_that_of_the_closed_form_and_grows_with_loss():
+def test_decay_exponents_match_closed_forms():
     """Statically a Gaussian spot deflects a half-space as exp(-x) I_0(x), x = r^2 / 4 s^2."""
     r = np.geomspace(0.010, 0.040, 12)
     at_rest, moving = decay_exponents(BODIES["palm"], np.array([0.01, 300.0]))
@@ -94,7 +94,7 @@ def test_an_exponent_at_rest_is_that_of_the_closed_form_and_grows_with_loss():
     assert moving == pytest.approx(-np.polyfit(np.log(r), wave, 1)[0], abs=0.05)
 
 
-def test_all_sources_span_each_of_them():
+def test_all_sources_span_the_single_sources():
     both = all_sources(SPEED), all_sources(LENGTH)
     assert np.array(both[0].lows)[[0, 1, 3]].tolist() == [8.0, 3.06, 5.0]
     assert np.array(both[0].highs)[[0, 1, 3]].tolist() == [18.0, 10.0, 10.0]
@@ -102,29 +102,29 @@ def test_all_sources_span_each_of_them():
     assert both[1].frequencies == (100.0, 200.0, 300.0, 400.0)  # beyond, Potts alone
 
 
-def test_each_published_set_has_a_source_and_a_row_for_each_of_its_bodies(curves):
+def test_each_published_set_has_a_row_for_each_body(curves):
     rows = compare_waves(curves)
     for each in WAVES:
         assert each.source
         assert set(each.built) <= set(BODIES)
-        assert {len(each.values), len(each.frequencies)} == {len(each.frequencies)}
+        assert len(each.values) == len(each.frequencies)
         own = [row for row in rows if row.published.name == each.name]
         assert len(own) == len(each.bodies) * len(each.frequencies)
     built = {(row.published.name, row.body) for row in rows if row.is_built}
     assert ("Zhang: speed", "forearm") in built
 
 
-def test_the_optimum_of_a_half_space_is_near_its_surface_wave():
+def test_best_focus_speed_of_a_half_space_is_near_its_surface_wave():
     """Deflection of the half-space forearm at 2, 3 and 5 m/s: 0.402, 0.409, 0.309 um/Pa."""
     largest, _ = focus_speeds(BODIES["forearm"], 0.100)
     at = {v: 1e6 * u for v, u in zip(predictions.SPEEDS, largest, strict=True)}
     assert [at[2.0], at[3.0], at[5.0]] == pytest.approx([0.402, 0.409, 0.309], abs=6e-4)
-    assert 2.4 < predictions.top(predictions.SPEEDS, largest) < 3.3
-    assert np.isnan(predictions.top(np.arange(3.0), np.array([3.0, 2.0, 1.0])))
-    assert predictions.top(np.arange(5.0), -((np.arange(5.0) - 2.3) ** 2)) == pytest.approx(2.3)
+    assert 2.4 < predictions.peak(predictions.SPEEDS, largest) < 3.3
+    assert np.isnan(predictions.peak(np.arange(3.0), np.array([3.0, 2.0, 1.0])))
+    assert predictions.peak(np.arange(5.0), -((np.arange(5.0) - 2.3) ** 2)) == pytest.approx(2.3)
 
 
-def test_a_finger_is_compared_at_its_own_frequencies():
+def test_finger_is_compared_at_its_own_frequencies():
     finger = Finger(frequencies=np.array([200.0, 300.0]), lengths=np.array([0.020, 0.045]), dofs=1)
     rows = compare_finger(finger)
     assert [row.frequency for row in rows] == [200.0, 300.0]
@@ -132,25 +132,25 @@ def test_a_finger_is_compared_at_its_own_frequencies():
     assert rows[1].outcome == WITHIN
 
 
-def test_a_hand_loses_more_along_its_finger_at_a_higher_frequency(monkeypatch):
+def test_motion_decays_faster_along_a_finger_at_higher_frequency(monkeypatch):
     """Coarse: by 6.5 mm the lengths are 23, 14 and 9.8 mm at 200, 300 and 400 Hz."""
     monkeypatch.setattr(predictions, "HAND_SIZE", 0.009)
-    found = predictions.along_finger(HAND, silent, (200.0, 300.0))
-    assert found.dofs > 10_000
-    assert found.lengths == pytest.approx([0.023, 0.014], rel=0.2)
-    assert compare_finger(found)[1].outcome == BELOW
+    finger = predictions.along_finger(HAND, silent, (200.0, 300.0))
+    assert finger.dofs > 10_000
+    assert finger.lengths == pytest.approx([0.023, 0.014], rel=0.2)
+    assert compare_finger(finger)[1].outcome == BELOW
 
 
-@pytest.mark.parametrize("asked", [["--published", "--hand", "no-hand.glb"], ["--hand", "x.glb"]])
-def test_command_refuses_in_one_sentence(tmp_path, monkeypatch, capsys, asked):
+@pytest.mark.parametrize("words", [["--published", "--hand", "no-hand.glb"], ["--hand", "x.glb"]])
+def test_command_refuses_a_missing_hand(tmp_path, monkeypatch, capsys, words):
     monkeypatch.chdir(tmp_path)
-    assert main(["verify", "--quiet", *asked]) == 2
+    assert main(["verify", "--quiet", *words]) == 2
     assert capsys.readouterr().err.count("\n") == 1
     assert not (tmp_path / "validation").exists()
 
 
 def test_command_writes_a_page_and_a_table(tmp_path, monkeypatch):
-    """With few speeds and frequencies, so as to be quick."""
+    """With few speeds and frequencies, to save time."""
     monkeypatch.setattr(predictions, "SPEEDS", np.array([2.0, 5.0, 12.0]))
     monkeypatch.setattr(predictions, "GRID", COARSE)
     out = tmp_path / "out"
