@@ -1,1 +1,1 @@
-"""Measurements against what a user would pick instead; nothing here is asserted in tests."""
+"""Benchmarks and comparisons with other codes; tests assert none of these numbers."""

@@ -1,11 +1,11 @@
-"""Agreement of models: random scenes, and every model that takes them.
+"""Agreement of models on random scenes.
 
 `python -m bench.agreement N SEED` draws N scenes over the keys of a scene file, computes each by
-every model that accepts it, and compares each pair of answers. A pair agrees if, at the worst
+every model that accepts it, and compares each pair of responses. A pair agrees if, at the worst
 probe, the relative L2 difference over the whole record is at most 1.2 times the sum of both
-expected errors. What disagrees is printed as a scene file.
+expected errors. Scenes with disagreements are printed as scene files.
 
-A scene depends on the seed and its number alone: `--first K` draws from number K on.
+A scene depends only on the seed and its number; `--first K` starts at number K.
 """
 
 import argparse
@@ -34,38 +34,38 @@ from skinwave.scene.file import from_table
 from skinwave.scene.scene import Scene
 
 SLACK = 1.2  # times the sum of the stated errors
-FLOOR = 2e-3  # relative: differences below it are round-off and interpolation
+FLOOR = 2e-3  # relative: smaller differences are round-off and interpolation
 WEAKEST = 0.01  # of the largest motion: weaker probes are not compared
-SLOWEST = 30.0  # s of CPU time of one response, beyond which it is ended and counted as slow
+SLOWEST = 30.0  # s of CPU time, after which a response is stopped and counted as slow
 TOLERANCE = 0.05
-KERNELS = ("point-kernel", "point-kernel-published")  # their answer is a pressure
+KERNELS = ("point-kernel", "point-kernel-published")  # their response is a pressure
 Table = dict[str, Any]
 
 
 def table(number: int, seed: int) -> Table:
-    """Scene of a number and a seed, as a table by the keys of a scene file."""
+    """Return the scene with a number and a seed, as a table with the keys of a scene file."""
     draw = random.Random(f"{seed}-{number}")
     body = _body(draw)
     reach = 0.35 * min(body["size_x_mm"], body["size_y_mm"], 40)
-    found = {
+    scene = {
         "tacton": _tacton(draw, reach),
         "focus": _focus(draw),
         "body": body,
         "probes": _probes(draw, body, reach),
     }
     if body["kind"] not in ("sheet", "palm") and draw.random() < 0.1:
-        found["load"] = {"kind": "shear", "direction": draw.choice(["path", [1.0, 0.0]])}
-        if found["load"]["direction"] == "path" and found["tacton"]["shape"] == "point":
-            found["load"]["direction"] = [0.0, 1.0]
-        found["probes"]["quantity"] = draw.choice(["displacement_x", "displacement_y", "velocity"])
+        scene["load"] = {"kind": "shear", "direction": draw.choice(["path", [1.0, 0.0]])}
+        if scene["load"]["direction"] == "path" and scene["tacton"]["shape"] == "point":
+            scene["load"]["direction"] = [0.0, 1.0]
+        scene["probes"]["quantity"] = draw.choice(["displacement_x", "displacement_y", "velocity"])
     elif body["kind"] not in ("sheet",) and draw.random() < 0.05:
-        found["load"] = {"kind": "point_force", "force_n": 1e-3}
-        del found["focus"]
-    return found
+        scene["load"] = {"kind": "point_force", "force_n": 1e-3}
+        del scene["focus"]
+    return scene
 
 
 def _number(draw: random.Random, low: float, high: float) -> float:
-    """Number of four digits, uniform in its logarithm."""
+    """Return a random number with four digits, uniform in its logarithm."""
     return float(f"{math.exp(draw.uniform(math.log(low), math.log(high))):.4g}")
 
 
@@ -74,58 +74,56 @@ def _point(draw: random.Random, reach: float) -> list[float]:
 
 
 def _tacton(draw: random.Random, reach: float) -> Table:
-    found: Table = {"duration_s": _number(draw, 0.005, draw.choice([0.1, 0.5, 2.0]))}
+    keys: Table = {"duration_s": _number(draw, 0.005, draw.choice([0.1, 0.5, 2.0]))}
     shape = draw.choice(
         ["point", "point", "line", "circle", "circle", "triangle", "square", "polyline", "recorded"]
     )
-    found["shape"] = shape
+    keys["shape"] = shape
     if shape in ("line", "polyline"):
-        found["sweep"] = draw.choice(["there_and_back", "one_way", "sinusoidal"])
+        keys["sweep"] = draw.choice(["there_and_back", "one_way", "sinusoidal"])
     if shape == "recorded":
         gaps = [round(draw.choice([0.0, _number(draw, 0.002, 0.05)]), 5) for _ in range(4)]
-        found["times_s"] = [round(sum(gaps[:k]), 5) for k in range(4)] + [
-            round(sum(gaps) + 0.01, 5)
-        ]
-        found["points_mm"] = [_point(draw, reach) for _ in range(5)]
+        keys["times_s"] = [round(sum(gaps[:k]), 5) for k in range(4)] + [round(sum(gaps) + 0.01, 5)]
+        keys["points_mm"] = [_point(draw, reach) for _ in range(5)]
         if draw.random() < 0.3:
-            found["hold"] = True
+            keys["hold"] = True
         if draw.random() < 0.3:
-            found["levels"] = [round(draw.random(), 2) for _ in range(5)]
+            keys["levels"] = [round(draw.random(), 2) for _ in range(5)]
     elif shape == "polyline":
-        found["points_mm"] = [_point(draw, reach) for _ in range(draw.randint(2, 5))]
-        found["speed_m_per_s"] = _number(draw, 0.02, 30)
+        keys["points_mm"] = [_point(draw, reach) for _ in range(draw.randint(2, 5))]
+        keys["speed_m_per_s"] = _number(draw, 0.02, 30)
     elif shape != "point":
-        found["size_mm"] = _number(draw, 2, reach)
-        # At most 2 kHz drawing frequency, which no body follows.
-        found["speed_m_per_s"] = _number(draw, 0.02, min(100, 2 * found["size_mm"]))
+        keys["size_mm"] = _number(draw, 2, reach)
+        # At most 2 kHz drawing frequency, far above what bodies follow.
+        keys["speed_m_per_s"] = _number(draw, 0.02, min(100, 2 * keys["size_mm"]))
     if draw.random() < 0.7:
-        found["am_frequency_hz"] = _number(draw, 10, 350)
+        keys["am_frequency_hz"] = _number(draw, 10, 350)
     if draw.random() < 0.15:
-        found["second_am_frequency_hz"] = _number(draw, 10, 350)
-        found["superposition"] = draw.choice([[1.0, 0.0], [0.75, 0.25], [0.5, 0.5]])
+        keys["second_am_frequency_hz"] = _number(draw, 10, 350)
+        keys["superposition"] = draw.choice([[1.0, 0.0], [0.75, 0.25], [0.5, 0.5]])
     if draw.random() < 0.15:
-        found["envelope_frequency_hz"] = _number(draw, 0.5, 60)
-    sampled = shape == "recorded" and "levels" in found
+        keys["envelope_frequency_hz"] = _number(draw, 0.5, 60)
+    sampled = shape == "recorded" and "levels" in keys
     if not sampled and draw.random() < 0.15:
         pulses = [[_number(draw, 5, 60), _number(draw, 1, 60)] for _ in range(draw.randint(1, 2))]
         ramp = draw.choice([0.0, 0.3]) * min(on for on, _ in pulses)
-        found["rhythm"] = {"pulses_ms": pulses, "ramp_ms": round(ramp, 3)}
+        keys["rhythm"] = {"pulses_ms": pulses, "ramp_ms": round(ramp, 3)}
     if shape != "point" and draw.random() < 0.15:
-        found["foci"] = draw.choice([[0.0, 0.5], [0.0, 0.25, 0.6]])
-    return found
+        keys["foci"] = draw.choice([[0.0, 0.5], [0.0, 0.25, 0.6]])
+    return keys
 
 
 def _focus(draw: random.Random) -> Table:
-    found: Table = {"peak_pressure_pa": _number(draw, 0.001, 50)}
+    keys: Table = {"peak_pressure_pa": _number(draw, 0.001, 50)}
     if draw.random() < 0.4:
-        found["drive"] = draw.choice(["linear", "pressure_squared", "force_corrected"])
+        keys["drive"] = draw.choice(["linear", "pressure_squared", "force_corrected"])
     if draw.random() < 0.2:
-        found["depth_of_modulation"] = round(draw.uniform(0.1, 1), 2)
+        keys["depth_of_modulation"] = round(draw.uniform(0.1, 1), 2)
     if draw.random() < 0.2:
-        found["height_mm"] = draw.choice([150, 200, 250])
+        keys["height_mm"] = draw.choice([150, 200, 250])
     if draw.random() < 0.1:
-        found["profile"] = "main_lobe"
-    return found
+        keys["profile"] = "main_lobe"
+    return keys
 
 
 def _body(draw: random.Random) -> Table:
@@ -137,39 +135,39 @@ def _body(draw: random.Random) -> Table:
 
 
 def _skin(draw: random.Random, softest: float = 8e3, stiffest: float = 80e3) -> Any:
-    """Material of a solid: a preset, or a table with any law."""
+    """Return the material of a solid: a preset, or a table with any law."""
     if draw.random() < 0.25:
         return draw.choice(["palm", "palm-stiff", "palm-zener"])
-    found: Table = {
+    keys: Table = {
         "density_kg_m3": round(draw.uniform(950, 1150)),
         "shear_modulus_pa": _number(draw, softest, stiffest),
         "poisson": draw.choice([0.3, 0.45, 0.49]),
     }
-    _add_loss(draw, found, found["shear_modulus_pa"])
-    return found
+    _add_loss(draw, keys, keys["shear_modulus_pa"])
+    return keys
 
 
-def _add_loss(draw: random.Random, found: Table, modulus: float) -> None:
+def _add_loss(draw: random.Random, keys: Table, modulus: float) -> None:
     law = draw.choice(["voigt", "voigt", "loss_factor", "loss_factor", "prony", "fractional"])
     if law == "voigt":
-        found["viscosity_pa_s"] = float(f"{modulus * draw.uniform(5e-5, 5e-4):.3g}")
+        keys["viscosity_pa_s"] = float(f"{modulus * draw.uniform(5e-5, 5e-4):.3g}")
     elif law == "loss_factor":
-        found["loss_factor"] = _number(draw, 0.02, 0.5)
+        keys["loss_factor"] = _number(draw, 0.02, 0.5)
     elif law == "prony":
         share, when = draw.uniform(0.1, 0.8), _number(draw, 2e-4, 1e-2)
-        found["prony"] = [{"modulus_pa": float(f"{share * modulus:.3g}"), "time_s": when}]
+        keys["prony"] = [{"modulus_pa": float(f"{share * modulus:.3g}"), "time_s": when}]
     else:
-        found["law"] = draw.choice(["fractional-kelvin-voigt", "fractional-zener"])
-        found |= {
+        keys["law"] = draw.choice(["fractional-kelvin-voigt", "fractional-zener"])
+        keys |= {
             "exponent": round(draw.uniform(0.15, 0.9), 2),
             "time_s": _number(draw, 1e-4, 2e-3),
         }
-        if found["law"] == "fractional-zener":
-            found["fast_modulus_pa"] = float(f"{modulus * draw.uniform(1.5, 5):.3g}")
+        if keys["law"] == "fractional-zener":
+            keys["fast_modulus_pa"] = float(f"{modulus * draw.uniform(1.5, 5):.3g}")
 
 
 def _slab(draw: random.Random) -> Table:
-    found: Table = {
+    keys: Table = {
         "size_x_mm": round(draw.uniform(16, 32), 1),
         "size_y_mm": round(draw.uniform(16, 32), 1),
         "thickness_mm": round(draw.uniform(2, 8), 1),
@@ -178,17 +176,17 @@ def _slab(draw: random.Random) -> Table:
         "base": draw.choice(["clamped"] * 4 + ["elastic", "absorbing", "free"]),
     }
     if draw.random() < 0.1:
-        found |= {"thickness_mm": math.inf, "base": "clamped"}
-    elif found["base"] == "elastic":
-        found["base_stiffness_n_per_m3"] = _number(draw, 5e5, 5e7)
-    if found["base"] == "free" and found["sides"] == "free":
-        found["sides"] = "clamped"
+        keys |= {"thickness_mm": math.inf, "base": "clamped"}
+    elif keys["base"] == "elastic":
+        keys["base_stiffness_n_per_m3"] = _number(draw, 5e5, 5e7)
+    if keys["base"] == "free" and keys["sides"] == "free":
+        keys["sides"] = "clamped"
     if draw.random() < 0.25:
-        found["layers"] = [
-            {"thickness_mm": round(draw.uniform(0.15, 0.4) * min(found["thickness_mm"], 8), 2),
+        keys["layers"] = [
+            {"thickness_mm": round(draw.uniform(0.15, 0.4) * min(keys["thickness_mm"], 8), 2),
              "material": _skin(draw)} for _ in range(draw.randint(1, 2))
         ]  # fmt: skip
-    return found
+    return keys
 
 
 def _sheet(draw: random.Random) -> Table:
@@ -200,7 +198,7 @@ def _sheet(draw: random.Random) -> Table:
         material["loss_factor"] = _number(draw, 0.01, 0.2)
     else:
         _add_loss(draw, material, young / 2.6)
-    found: Table = {
+    keys: Table = {
         "size_x_mm": round(draw.uniform(15, 40), 1),
         "size_y_mm": round(draw.uniform(15, 40), 1),
         "thickness_mm": round(draw.uniform(0.08, 0.3), 3),
@@ -217,8 +215,8 @@ def _sheet(draw: random.Random) -> Table:
         for axis in "xy":
             mounting[f"tension_{axis}_n_per_m"] = round(draw.uniform(0, 50), 1)
     if mounting:
-        found["mounting"] = mounting
-    return found
+        keys["mounting"] = mounting
+    return keys
 
 
 def _palm(draw: random.Random) -> Table:
@@ -245,22 +243,24 @@ def _finger(draw: random.Random) -> Table:
 
 def _probes(draw: random.Random, body: Table, reach: float) -> Table:
     near = 0.3 if body["kind"] == "finger" else 1.0
-    found: Table = {"points_mm": [_point(draw, near * reach) for _ in range(draw.randint(1, 3))]}
+    keys: Table = {"points_mm": [_point(draw, near * reach) for _ in range(draw.randint(1, 3))]}
     if draw.random() < 0.4:
-        found["quantity"] = draw.choice(["velocity", "acceleration"])
+        keys["quantity"] = draw.choice(["velocity", "acceleration"])
     if body["kind"] == "slab" and draw.random() < 0.15:
-        found["depth_mm"] = round(draw.uniform(0.2, 0.5) * min(body["thickness_mm"], 4), 2)
-        found["quantity"] = draw.choice(["displacement_z", "strain_zz", "displacement"])
-    return found
+        keys["depth_mm"] = round(draw.uniform(0.2, 0.5) * min(body["thickness_mm"], 4), 2)
+        keys["quantity"] = draw.choice(["displacement_z", "strain_zz", "displacement"])
+    return keys
 
 
 class TooSlow(Exception):
-    """A response that takes longer than it may."""
+    """A response took longer than the limit."""
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Difference of two models' answers at the worst probe, and the sum of what they state."""
+    """Difference of two models' responses at the worst probe, and the sum of their stated
+    errors.
+    """
 
     models: tuple[str, str]
     difference: float
@@ -268,13 +268,13 @@ class Pair:
 
     @property
     def agrees(self) -> bool:
-        """Whether the difference is within what both state."""
+        """Whether the difference is within the stated errors."""
         return self.difference <= SLACK * self.stated + FLOOR
 
 
 @dataclass
 class Outcome:
-    """Outcome of one scene: its pairs, what is wrong, refusals and stated errors by model."""
+    """Outcome of one scene: pairs, faults, slow models, and refusals and stated errors by model."""
 
     number: int
     scene: Table
@@ -286,37 +286,37 @@ class Outcome:
 
     @property
     def disagreements(self) -> list[Pair]:
-        """Pairs that do not agree."""
+        """Pairs that disagree."""
         return [pair for pair in self.pairs if not pair.agrees]
 
 
 def outcome(
     number: int, scene: Table, only: tuple[str, ...] = (), slowest: float = SLOWEST
 ) -> Outcome:
-    """Answers of every model to a scene, or of some, compared."""
-    found = Outcome(number, scene)
+    """Compute a scene by all or some models, and compare the responses."""
+    result = Outcome(number, scene)
     try:
         parsed = from_table(copy.deepcopy(scene))
     except ValueError as error:
-        found.refusals["scene"] = str(error)
-        return found
-    answers: dict[str, Response] = {}
+        result.refusals["scene"] = str(error)
+        return result
+    responses: dict[str, Response] = {}
     for name in only or [each for each in models.names() if each not in KERNELS]:
         started = time.process_time()
         try:
-            answers[name] = _answer(parsed, name, started + slowest)
+            responses[name] = _response(parsed, name, started + slowest)
         except TooSlow:
-            found.slow.append(name)
+            result.slow.append(name)
         except (ValueError, Diverged) as error:
-            found.refusals[name] = str(error)
+            result.refusals[name] = str(error)
         except Exception:
-            found.faults.append(f"{name}: {traceback.format_exc(limit=-2)}")
-    found.stated = {name: each.expected_error for name, each in answers.items()}
-    found.pairs = list(_pairs(answers))
-    return found
+            result.faults.append(f"{name}: {traceback.format_exc(limit=-2)}")
+    result.stated = {name: each.expected_error for name, each in responses.items()}
+    result.pairs = list(_pairs(responses))
+    return result
 
 
-def _answer(scene: Scene, model: str, until: float) -> Response:
+def _response(scene: Scene, model: str, until: float) -> Response:
     def watch(phase: str, fraction: float) -> None:
         if time.process_time() > until:
             raise TooSlow
@@ -326,32 +326,34 @@ def _answer(scene: Scene, model: str, until: float) -> Response:
         return skinwave.simulate(scene, model, TOLERANCE, watch)
 
 
-def _pairs(answers: dict[str, Response]) -> Iterator[Pair]:
-    for one, other in combinations(answers, 2):
-        a, b = answers[one], answers[other]
+def _pairs(responses: dict[str, Response]) -> Iterator[Pair]:
+    for one, other in combinations(responses, 2):
+        a, b = responses[one], responses[other]
         linear = {models.named(name).is_nonlinear for name in (one, other)} == {False, True}
-        if linear and _is_bent(*answers.values()):
-            continue  # each is right about its own physics, and the linear one says so
+        if linear and _is_bent(*responses.values()):
+            continue  # the linear model warns of its limit
         stated = a.expected_error + b.expected_error
         if math.isnan(stated):
             continue
         yield Pair((one, other), _difference(np.asarray(a.values), np.asarray(b.values)), stated)
 
 
-def _is_bent(*answers: Response) -> bool:
+def _is_bent(*responses: Response) -> bool:
     return any(
-        "linear bending holds" in each for answer in answers for each in answer.effort.warnings
+        "linear bending holds" in warning
+        for response in responses
+        for warning in response.effort.warnings
     )
 
 
 def _difference(a: np.ndarray, b: np.ndarray) -> float:
-    """Relative L2 difference at the worst probe."""
+    """Return the relative L2 difference at the worst probe."""
     if a.shape != b.shape:
         return math.inf
     sizes = np.maximum(np.linalg.norm(a, axis=0), np.linalg.norm(b, axis=0))
-    seen = sizes > WEAKEST * sizes.max()
-    apart = np.linalg.norm(a - b, axis=0)[seen] / sizes[seen]
-    return float(apart.max(initial=0.0))
+    moves = sizes > WEAKEST * sizes.max()
+    differences = np.linalg.norm(a - b, axis=0)[moves] / sizes[moves]
+    return float(differences.max(initial=0.0))
 
 
 def _from_number(given: tuple[int, int, tuple[str, ...], float]) -> Outcome:
@@ -360,52 +362,52 @@ def _from_number(given: tuple[int, int, tuple[str, ...], float]) -> Outcome:
 
 
 def main() -> int:
-    """Compare models over random scenes, and print what disagrees and a table of pairs."""
+    """Compare models on random scenes; print disagreements and a table of pairs."""
     parser = argparse.ArgumentParser(prog="python -m bench.agreement", description=__doc__)
     parser.add_argument("count", type=int, help="number of scenes")
     parser.add_argument("seed", type=int)
     parser.add_argument("--first", type=int, default=0, help="number of the first scene")
     parser.add_argument("--workers", type=int, default=1)
-    parser.add_argument("--models", nargs="+", default=(), help="only these, in place of all")
+    parser.add_argument("--models", nargs="+", default=(), help="only these models")
     parser.add_argument(
-        "--slowest", type=float, default=SLOWEST, help="s of CPU time of a response"
+        "--slowest", type=float, default=SLOWEST, help="limit of the CPU time of a response, s"
     )
     given = parser.parse_args()
     numbers = range(given.first, given.first + given.count)
     work = [(k, given.seed, tuple(given.models), given.slowest) for k in numbers]
-    found = []
+    outcomes = []
     with get_context("spawn").Pool(given.workers, maxtasksperchild=20) as pool:
         for each in pool.imap(_from_number, work):
-            found.append(each)
-            _show(each)
-    _summary(found)
-    return int(any(each.disagreements or each.faults for each in found))
+            outcomes.append(each)
+            _print_outcome(each)
+    _print_summary(outcomes)
+    return int(any(each.disagreements or each.faults for each in outcomes))
 
 
-def _show(found: Outcome) -> None:
-    bad, kind = found.disagreements, found.scene["body"]["kind"]
-    slow = f", slow: {', '.join(found.slow)}" if found.slow else ""
-    print(f"scene {found.number}: {kind}, {len(found.pairs)} pairs, {len(bad)} disagree{slow}")
+def _print_outcome(result: Outcome) -> None:
+    bad, kind = result.disagreements, result.scene["body"]["kind"]
+    slow = f", slow: {', '.join(result.slow)}" if result.slow else ""
+    print(f"scene {result.number}: {kind}, {len(result.pairs)} pairs, {len(bad)} disagree{slow}")
     for pair in bad:
-        names = " and ".join(f"{name} ({found.stated[name]:.2%})" for name in pair.models)
+        names = " and ".join(f"{name} ({result.stated[name]:.2%})" for name in pair.models)
         print(f"  {names}: {pair.difference:.2%}")
-    for fault in found.faults:
+    for fault in result.faults:
         print(f"  fault: {fault}")
-    if bad or found.faults:
-        print("    " + tomli_w.dumps(found.scene).replace("\n", "\n    "))
+    if bad or result.faults:
+        print("    " + tomli_w.dumps(result.scene).replace("\n", "\n    "))
     sys.stdout.flush()
 
 
-def _summary(found: list[Outcome]) -> None:
-    pairs = [pair for each in found for pair in each.pairs]
+def _print_summary(outcomes: list[Outcome]) -> None:
+    pairs = [pair for each in outcomes for pair in each.pairs]
     shared = Counter(pair.models for pair in pairs)
     bad = Counter(pair.models for pair in pairs if not pair.agrees)
     print(f"\n{'pair':<50} {'scenes':>7} {'disagree':>9}")
     for one, other in sorted(shared):
         print(f"{one + ', ' + other:<50} {shared[one, other]:>7} {bad[one, other]:>9}")
-    refused = sum("scene" in each.refusals for each in found)
-    faults = sum(len(each.faults) for each in found)
-    print(f"{len(found)} scenes, {refused} refused: {len(pairs)} pairs, {sum(bad.values())} "
+    refused = sum("scene" in each.refusals for each in outcomes)
+    faults = sum(len(each.faults) for each in outcomes)
+    print(f"{len(outcomes)} scenes, {refused} refused: {len(pairs)} pairs, {sum(bad.values())} "
           f"disagree; {faults} faults")  # fmt: skip
 
 

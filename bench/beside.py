@@ -1,12 +1,12 @@
-"""Other codes beside ours: `python -m bench.beside [assembly | waves | fingertip]`.
+"""Comparison with other codes: `python -m bench.beside [assembly | waves | fingertip]`.
 
-The tables of cost use one mesh, material and load, and a process for each code. The skin slab has
+The tables of cost use one mesh, material and load, and one process for each code. The skin slab has
 free sides, because not every code has absorbing ones, and Poisson's ratio 0.45, up to which plain
-quadratic tetrahedra do not lock. Nodal forces are computed by skinwave beforehand. A code that is
-not installed is a row that says so.
+quadratic tetrahedra do not lock. skinwave computes the nodal forces beforehand. A code that is not
+installed is reported as not measured.
 
-`fingertip` solves the fingertip of the verification by scikit-fem on the same mesh: the largest
-difference of any node's motion, and the values that `skinwave/verify/statics.py` compares with.
+`fingertip` solves the fingertip of the verification by scikit-fem on the same mesh. It prints the
+largest difference of the motion of any node, and the values in `skinwave/verify/statics.py`.
 """
 
 import contextlib
@@ -37,24 +37,24 @@ BODY = Body(material=SKIN, sides="free")
 TACTON = "am140-stm20"
 ACROSS = (8, 40)  # cells of the blocks of the assembly, the first a warm-up
 SIZE = 4.7e-3  # m, elements of the waves
-RATE, STEPS = 10_000, 1000  # steps a second, which is what 1 % takes, and those that are timed
+RATE, STEPS = 10_000, 1000  # steps per second, for an error of 1 %; steps that are timed
 
 
 def assembly() -> None:
-    """Time to assemble K and M of a block, by every code."""
+    """Print the time of each code to assemble K and M of a block."""
     small, large = (problem(block(n)) for n in ACROSS)
     print(f"K and M of {len(large.cells):,} ten-node tetrahedra")
     print(f"{'code':<12}{'version':<12}{'s':>8}{'ratio':>7}{'energy J':>15}{'mass kg':>10}")
     first = None
-    for name, found in each_code(assembled, small, large):
-        seconds, (energy, mass) = found["seconds"], found["check"]
+    for name, row in each_code(assembled, small, large):
+        seconds, (energy, mass) = row["seconds"], row["check"]
         first = first or seconds
-        print(f"{name:<12}{found['version']:<12}{seconds:8.2f}{seconds / first:7.1f}"
+        print(f"{name:<12}{row['version']:<12}{seconds:8.2f}{seconds / first:7.1f}"
               f"{energy:15.6e}{mass:10.6f}", flush=True)  # fmt: skip
 
 
 def waves() -> None:
-    """Time of one Tacton of a second and of fifteen on the skin slab, extrapolated from steps."""
+    """Print the time of one and of fifteen Tactons of 1 s on the skin slab, extrapolated."""
     scene = replace(paper15.scenes("bench", dict(paper15.tactons())[TACTON])["skin-slab"],
                     body=BODY)  # fmt: skip
     mesh, times = build(BODY, SIZE).mesh, np.arange(STEPS + 1) / RATE
@@ -75,18 +75,18 @@ def waves() -> None:
           f"{'15':>9}{'ratio':>7}{'to ours':>9}")  # fmt: skip
     print(f"{'skinwave, reduced':<39}{one:9.1f}s{1:7.1f}{fifteen:8.1f}s{1:7.1f}")
     ours = None
-    for name, found in each_code(stepped, problem(mesh), load):
-        once, second = found["seconds"] + found["factorise"], found["step"] * RATE
-        ours = found["seen"] if ours is None else ours
-        apart = np.linalg.norm(found["seen"] - ours) / np.linalg.norm(ours)
-        print(f"{name:<12}{found['seconds']:8.2f}s{found['factorise']:9.2f}s"
-              f"{1e3 * found['step']:8.2f}{once + second:9.1f}s{(once + second) / one:7.1f}"
+    for name, row in each_code(stepped, problem(mesh), load):
+        once, second = row["seconds"] + row["factorise"], row["step"] * RATE
+        ours = row["motion"] if ours is None else ours
+        apart = np.linalg.norm(row["motion"] - ours) / np.linalg.norm(ours)
+        print(f"{name:<12}{row['seconds']:8.2f}s{row['factorise']:9.2f}s"
+              f"{1e3 * row['step']:8.2f}{once + second:9.1f}s{(once + second) / one:7.1f}"
               f"{once + 15 * second:8.0f}s{(once + 15 * second) / fifteen:7.0f}{apart:9.1e}",
               flush=True)  # fmt: skip
 
 
 def fingertip() -> None:
-    """Motion of the fingertip with and without bone, by scikit-fem."""
+    """Print the motion of the fingertip with and without bone, by scikit-fem."""
     mesh = statics.fingertip()
     for name, materials in statics.FINGERTIPS.items():
         solids = [materials[r] for r in mesh.region.tolist()]
@@ -94,8 +94,8 @@ def fingertip() -> None:
             np.array([getattr(m, key) for m in solids])[:, None]
             for key in ("shear_modulus", "poisson", "density", "viscosity")
         )
-        of = replace(problem(mesh), mu=mu, nu=nu, rho=rho)
-        body, C = CODES["scikit-fem"][0](of), CODES["scikit-fem"][0](replace(of, mu=viscosity)).K
+        tip = replace(problem(mesh), mu=mu, nu=nu, rho=rho)
+        body, C = CODES["scikit-fem"][0](tip), CODES["scikit-fem"][0](replace(tip, mu=viscosity)).K
         held = np.repeat(np.isin(np.arange(len(mesh.points)), mesh.facets["sides"]), 3)
         free = np.flatnonzero(abs(body.to_nodes[np.flatnonzero(held)]).sum(axis=0) == 0)
         force, w = body.to_nodes.T @ statics.fingertip_push(mesh), 2 * np.pi * statics.FREQUENCY
@@ -113,19 +113,19 @@ def fingertip() -> None:
 
 
 def assembled(name: str, small: Problem, large: Problem) -> dict[str, Any]:
-    """Seconds of a code after a warm-up, with strain energy and mass."""
+    """Return the seconds of a code after a warm-up, with strain energy and mass."""
     with threads(name):
         CODES[name][0](small)
         body = CODES[name][0](large)
         return {"seconds": body.seconds, "check": body.check(large.nodes)}
 
 
-def stepped(name: str, of: Problem, load: dict[str, Any]) -> dict[str, Any]:
-    """Seconds of assembly, factorisation and a step of average acceleration from rest, and the
-    displacement (t, p) of the probes.
+def stepped(name: str, given: Problem, load: dict[str, Any]) -> dict[str, Any]:
+    """Return the seconds of assembly, factorisation and a step of average acceleration from rest,
+    and the displacement (t, p) of the probes.
     """
     with threads(name):
-        body, dt, lag = CODES[name][0](of), 1 / RATE, SKIN.viscosity / SKIN.shear_modulus
+        body, dt, lag = CODES[name][0](given), 1 / RATE, SKIN.viscosity / SKIN.shear_modulus
         held = np.repeat(load["held"], 3)
         free = abs(body.to_nodes[np.flatnonzero(held)]).sum(axis=0) == 0
         forces, read = body.to_nodes.T @ load["forces"], load["probes"] @ body.to_nodes
@@ -134,17 +134,17 @@ def stepped(name: str, of: Problem, load: dict[str, Any]) -> dict[str, Any]:
         factorised = time.perf_counter() - started
         u = v = np.zeros(len(free))
         a = first_acceleration(body, forces[:, [0]].toarray().ravel(), free)
-        seen, seconds = [read @ u], []
+        motion, seconds = [read @ u], []
         for k in range(1, STEPS + 1):
             force, started = forces[:, [k]].toarray().ravel(), time.perf_counter()
             u, v = u + dt * v + dt**2 / 4 * a, v + dt / 2 * a
             a = solve(force - body.K @ (u + lag * v))
             u, v = u + dt**2 / 4 * a, v + dt / 2 * a
-            seen.append(read @ u)
+            motion.append(read @ u)
             seconds.append(time.perf_counter() - started)
-    # The median leaves out steps that other processes held up.
+    # The median ignores steps delayed by other processes.
     return {"seconds": body.seconds, "factorise": factorised, "step": np.median(seconds),
-            "seen": np.array(seen)}  # fmt: skip
+            "motion": np.array(motion)}  # fmt: skip
 
 
 def first_acceleration(body: Assembled, force: np.ndarray, free: np.ndarray) -> np.ndarray:
@@ -177,12 +177,12 @@ def problem(mesh: meshes.TetMesh) -> Problem:
 
 
 def each_code(run: Callable[..., dict], *given: Any) -> Iterator[tuple[str, dict]]:
-    """Measurements of every code that is installed, each in a process of its own."""
+    """Yield the measurements of each installed code, from a process of its own."""
     for name, (_, package) in CODES.items():
         with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as alone:
             try:
-                found = alone.submit(run, name, *given).result()
-                yield name, found | {"version": version(package)[:11]}
+                row = alone.submit(run, name, *given).result()
+                yield name, row | {"version": version(package)[:11]}
             except ImportError as error:
                 print(f"{name:<12}not measured: {error}", flush=True)
 

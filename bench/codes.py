@@ -1,7 +1,7 @@
-"""Assembly of K and M and factorisation of M + c K by each code, as its user would do it.
+"""Assembly of K and M and factorisation of M + c K by each code, as in its documentation.
 
-All codes share one time loop, loads and probes: those of the mesh's nodes, which `to_nodes` maps to
-a code's own dofs. Only assembly and factorisation differ.
+All codes share the time loop, loads and probes, which refer to the nodes of the mesh; `to_nodes`
+maps them to a code's own dofs. Only assembly and factorisation differ.
 """
 
 import time
@@ -21,8 +21,8 @@ Solve = Callable[[np.ndarray], np.ndarray]
 class Problem:
     """A body of straight 10-node tetrahedra.
 
-    `nodes` (n, 3) in metre, corners first; `cells` (m, 10) in VTK's order; `surface` (k, 3) the
-    boundary's corners; `mu` in Pa, `nu`, `rho` in kg/m3, for scikit-fem also (m, 1) of each cell.
+    `nodes` (n, 3) in metres, corners first; `cells` (m, 10) in VTK's order; `surface` (k, 3), the
+    corners of boundary facets; `mu` in Pa, `nu`, `rho` in kg/m3, for scikit-fem also (m, 1).
     """
 
     nodes: np.ndarray
@@ -38,7 +38,7 @@ class Problem:
 
     @property
     def points(self) -> np.ndarray:
-        """The corners, all that most codes take."""
+        """The corners, which most codes take."""
         return self.nodes[: self.tets.max() + 1]
 
     @property
@@ -48,10 +48,10 @@ class Problem:
 
 @dataclass
 class Assembled:
-    """`K` and `M` multiply vectors of the code's own dofs by `@`.
+    """Operators of a code: `K` and `M` multiply vectors of its own dofs by `@`.
 
-    `to_nodes` (3 n, dofs) gives the displacement of the nodes, component fastest;
-    `factorise(c, free)` solves with M + c K on the free dofs and leaves 0 on the others.
+    `to_nodes` (3 n, dofs) gives the displacement of the nodes, component fastest. `factorise(c,
+    free)` returns a function that solves with M + c K on the free dofs and returns 0 on the others.
     """
 
     seconds: float
@@ -61,11 +61,11 @@ class Assembled:
     factorise: Callable[[float, np.ndarray], Solve]
 
     def check(self, nodes: np.ndarray) -> tuple[float, float]:
-        """Strain energy in J of u = (x^2, x y, 0), and mass in kg: the same for all codes."""
+        """Return the strain energy in J of u = (x^2, x y, 0) and the mass in kg."""
         x, y, _ = nodes.T
         bent, moved = np.zeros((2, *nodes.shape))
         bent[:, 0], bent[:, 1], moved[:, 0] = x * x, x * y, 1
-        transfer = sparse.csc_matrix(self.to_nodes)  # spsolve wants its old kind of matrix
+        transfer = sparse.csc_matrix(self.to_nodes)  # spsolve needs a matrix, not an array
         u, one = (spsolve(transfer, values.ravel()) for values in (bent, moved))
         return float(u @ (self.K @ u) / 2), float(one @ (self.M @ one))
 
@@ -105,7 +105,7 @@ def scikit_fem(p: Problem) -> Assembled:
     component = np.empty(K.shape[0], int)
     for i in range(3):
         component[basis.nodal_dofs[i]] = component[basis.edge_dofs[i]] = i
-    # Its example 19 steps in time with SciPy's splu as it is.
+    # Its example 19 steps in time with SciPy's splu.
     return _scipy(seconds, K, M, 3 * _matched(basis.doflocs.T, p.nodes) + component, _superlu)
 
 
@@ -152,7 +152,7 @@ def ngsolve(p: Problem) -> Assembled:
 
 
 def _of_arrays(operator: Any) -> Solve:
-    """An operator of NGSolve on numpy arrays; the copies are a few thousandths of its work."""
+    """Wrap an operator of NGSolve for numpy arrays; copies take a few thousandths of its time."""
     x, y = operator.CreateColVector(), operator.CreateRowVector()
 
     def apply(values: np.ndarray) -> np.ndarray:
@@ -164,7 +164,7 @@ def _of_arrays(operator: Any) -> Solve:
 
 
 def _from_hierarchical(p: Problem, mesh: Any) -> sparse.csr_array:
-    """Nodal values from NGSolve's dofs: values at corners, then one bubble for each edge."""
+    """Map NGSolve's dofs, values at corners and one bubble for each edge, to nodal values."""
     import ngsolve as ng
 
     ends = np.array([[vertex.nr for vertex in edge.vertices] for edge in mesh.edges])
@@ -177,7 +177,7 @@ def _from_hierarchical(p: Problem, mesh: Any) -> sparse.csr_array:
     columns = np.concatenate([np.arange(corners), *ends.T, corners + np.arange(edges)])
     values = np.concatenate([np.ones(corners), np.full(2 * edges, 0.5), np.full(edges, height)])
     scalar = sparse.csr_array((values, (rows, columns)), shape=(len(p.nodes), corners + edges))
-    # Its dofs are ordered component by component, ours node by node.
+    # NGSolve orders dofs component by component, skinwave node by node.
     by_component = sparse.csr_array(sparse.kron(np.eye(3), scalar))
     return by_component[np.arange(3 * len(p.nodes)).reshape(3, -1).T.ravel()]
 
@@ -195,22 +195,22 @@ def felupe(p: Problem) -> Assembled:
     heavy = fe.FieldContainer([fe.Field(fine, dim=3)])
     M = fe.SolidBody(umat, heavy, density=p.rho).assemble.mass()
     seconds = time.perf_counter() - started
-    # Its Newton solver calls SciPy's spsolve, which is splu for a single right-hand side.
+    # Its Newton solver calls SciPy's spsolve, which uses splu for a single right-hand side.
     return _scipy(seconds, K, M, np.arange(K.shape[0]), _superlu)
 
 
 def _scipy(
     seconds: float, K: Any, M: Any, numbers: np.ndarray, factorised: Callable[[Any], Solve]
 ) -> Assembled:
-    """Matrices of SciPy; dof i is the mesh's component `numbers[i]`."""
+    """Return matrices of SciPy; dof i is component `numbers[i]` of the mesh."""
 
     def factorise(c: float, free: np.ndarray) -> Solve:
-        kept = np.flatnonzero(free)
-        solve = factorised(sparse.csr_array(M + c * K)[kept][:, kept])
+        dofs = np.flatnonzero(free)
+        solve = factorised(sparse.csr_array(M + c * K)[dofs][:, dofs])
 
         def on_all(b: np.ndarray) -> np.ndarray:
             x = np.zeros(len(b))
-            x[kept] = solve(b[kept])
+            x[dofs] = solve(b[dofs])
             return x
 
         return on_all
@@ -228,14 +228,14 @@ def _renumbered(numbers: np.ndarray) -> sparse.csr_array:
 
 
 def _matched(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """Number of the node at each point."""
+    """Return the number of the node at each point."""
     distance, number = cKDTree(nodes).query(points)
     if distance.max() > 1e-9:
         raise ValueError(f"a point lies {distance.max():g} m from every node")
     return number
 
 
-# Code -> its assembly and the name of its package.
+# Assembly of each code, and its package.
 CODES = {
     "skinwave": (skinwave, "skinwave"),
     "scikit-fem": (scikit_fem, "scikit-fem"),

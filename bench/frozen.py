@@ -1,9 +1,9 @@
-"""Regression check of all numbers: `python -m bench.frozen write DIR`, then, after a change of the
-code, `python -m bench.frozen compare DIR`.
+"""Regression check of all numbers: `python -m bench.frozen write DIR` before a change of the code,
+`python -m bench.frozen compare DIR` after it.
 
-`compare` runs the same commands on the scenes in DIR again. Texts may differ (they are counted) and
-so may times. Numbers must agree to 1e-9 of the largest of their column. Each check of a
-verification must agree with one of the old checks, to 1e-9 of its reference or its tolerance.
+`compare` repeats the commands on the scenes in DIR. Texts and times may differ; different texts are
+counted. Numbers must agree to 1e-9 of the largest in their column. Each check of a verification
+must agree with one of the old checks, to 1e-9 of its reference or its tolerance.
 """
 
 import argparse
@@ -26,19 +26,19 @@ CHECK = "check of a verification"
 
 
 def parts() -> dict[str, tuple[tuple[str, ...], tuple[str, ...]]]:
-    """Command and compared files of each part, by its name; OUT and SCENES are folders."""
-    found = {"paper-15": (("compare",), ("lines.csv", "claims.csv", "responses.npz"))}
+    """Return the command and the compared files of each part; SCENES is a folder."""
+    table = {"paper-15": (("compare",), ("lines.csv", "claims.csv", "responses.npz"))}
     for name in sorted(p.stem for p in (ROOT / "examples").glob("*.toml")):
-        found[f"run {name}"] = (("run", f"SCENES/{name}.toml"), ("lines.csv", "responses.npz"))
+        table[f"run {name}"] = (("run", f"SCENES/{name}.toml"), ("lines.csv", "responses.npz"))
     for name in SCENES:
-        found[f"relax {name}"] = (("relax", f"SCENES/{name}.toml"), ("relax.csv", "responses.npz"))
+        table[f"relax {name}"] = (("relax", f"SCENES/{name}.toml"), ("relax.csv", "responses.npz"))
     for k in range(PLANNED):
-        found[f"plan {k:02}"] = (("plan", f"SCENES/planned-{k:02}.toml", "--json"), ("said.json",))
-    return found | {"verify": (("verify",), ("verify.json",))}
+        table[f"plan {k:02}"] = (("plan", f"SCENES/planned-{k:02}.toml", "--json"), ("said.json",))
+    return table | {"verify": (("verify",), ("verify.json",))}
 
 
 def write_scenes(folder: Path) -> None:
-    """The examples, and the random scenes of `bench.plans`, as files."""
+    """Write the examples and the random scenes of `bench.plans`."""
     from bench.plans import scene
     from skinwave.scene.file import dumps
 
@@ -51,7 +51,7 @@ def write_scenes(folder: Path) -> None:
 
 
 def run(name: str, command: tuple[str, ...], scenes: Path, folder: Path, cache: str) -> Path:
-    """Run a part's command; the folder with its files."""
+    """Run the command of a part, and return the folder with its files."""
     out = folder / name.replace(" ", "-")
     words = [word.replace("SCENES", str(scenes)) for word in command]
     if command[0] != "plan":
@@ -60,7 +60,7 @@ def run(name: str, command: tuple[str, ...], scenes: Path, folder: Path, cache: 
     done = subprocess.run([sys.executable, "-m", "skinwave", *words], capture_output=True,
                           text=True, cwd=ROOT, env=env, check=False)  # fmt: skip
     if done.returncode:
-        raise SystemExit(f"{name}: ended with {done.returncode}: {done.stderr.strip()}")
+        raise SystemExit(f"{name}: exit code {done.returncode}: {done.stderr.strip()}")
     out.mkdir(exist_ok=True)
     if command[0] == "plan":
         (out / "said.json").write_text(done.stdout, encoding="utf-8")
@@ -68,7 +68,7 @@ def run(name: str, command: tuple[str, ...], scenes: Path, folder: Path, cache: 
 
 
 def numbers(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
-    """The numbers of a file, by column, and its text, both in their order."""
+    """Return the numbers of a file by column, and its texts, in order."""
     if path.suffix == ".npz":
         with np.load(path) as arrays:
             return {name: arrays[name] for name in arrays.files}, []
@@ -89,7 +89,7 @@ def _cells(path: Path) -> Iterator[tuple[str, object]]:
 
 
 def _leaves(value: object, name: str) -> Iterator[tuple[str, object]]:
-    """Everything in a JSON value; the checks of a verification over their tolerances."""
+    """Yield all values in JSON; checks of a verification are divided by their tolerance."""
     if isinstance(value, dict) and "bar" in value:
         unit = max(abs(value["reference"] or 0.0), 1e6 * value["bar"])
         yield CHECK, float(value["value"] or 0.0) / (unit or 1.0)
@@ -104,21 +104,21 @@ def _leaves(value: object, name: str) -> Iterator[tuple[str, object]]:
         yield name, float(value) if is_number else value  # type: ignore[arg-type]
 
 
-def _split(found: Iterator[tuple[str, object]]) -> tuple[dict[str, np.ndarray], list[str]]:
+def _split(values: Iterator[tuple[str, object]]) -> tuple[dict[str, np.ndarray], list[str]]:
     numeric: dict[str, list[float]] = {}
     text = []
-    for name, value in found:
+    for name, value in values:
         if any(word in name for word in NOT_COMPARED):
             continue
         if isinstance(value, float):
             numeric.setdefault(name, []).append(value)
         else:
             text.append(str(value))
-    return {name: np.array(values) for name, values in numeric.items()}, text
+    return {name: np.array(column) for name, column in numeric.items()}, text
 
 
 def differences(before: Path, after: Path) -> Iterator[str]:
-    """Differences between two files beyond the tolerance; names may have changed, order not."""
+    """Yield differences between two files; names may have changed, but not the order."""
     (old, old_text), (new, new_text) = numbers(before), numbers(after)
     if CHECK in old:
         yield from _changed_checks(old[CHECK], new[CHECK])
@@ -140,7 +140,7 @@ def differences(before: Path, after: Path) -> Iterator[str]:
 
 
 def _changed_checks(old: np.ndarray, new: np.ndarray) -> Iterator[str]:
-    """Checks whose value no old check has; cases may have been regrouped or removed."""
+    """Yield checks whose value is not among the old checks, which may be in another order."""
     print(f"  {len(old)} checks, now {len(new)}")
     apart = np.abs(new[:, None] - old).min(axis=1)
     yield from (
@@ -157,27 +157,29 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m bench.frozen", description=__doc__)
     parser.add_argument("what", choices=("write", "compare"))
     parser.add_argument("folder", type=Path, metavar="DIR")
-    parser.add_argument("--only", default="", metavar="TEXT", help="parts whose name begins so")
-    asked = parser.parse_args()
-    folder = asked.folder.resolve()
+    parser.add_argument(
+        "--only", default="", metavar="TEXT", help="only parts whose names start with this text"
+    )
+    given = parser.parse_args()
+    folder = given.folder.resolve()
     scenes = folder / "scenes"
-    if asked.what == "write" and not scenes.exists():
+    if given.what == "write" and not scenes.exists():
         write_scenes(scenes)
     failed = 0
     with tempfile.TemporaryDirectory() as place:
         for name, (command, files) in parts().items():
-            if not name.startswith(asked.only):
+            if not name.startswith(given.only):
                 continue
             print(name, flush=True)
             cache = str(Path(place, "cache"))
-            kept = folder if asked.what == "write" else Path(place)
-            out = run(name, command, scenes, kept, cache)
-            if asked.what == "compare":
+            results = folder if given.what == "write" else Path(place)
+            out = run(name, command, scenes, results, cache)
+            if given.what == "compare":
                 for file in files:
-                    for said in differences(folder / out.name / file, out / file):
+                    for difference in differences(folder / out.name / file, out / file):
                         failed += 1
-                        print(f"  {file}: {said}", flush=True)
-    if asked.what == "compare":
+                        print(f"  {file}: {difference}", flush=True)
+    if given.what == "compare":
         print(f"{failed} differences" if failed else "all numbers agree")
         sys.exit(bool(failed))
 

@@ -1,8 +1,8 @@
 """Layered skin fitted to published waves: `python -m bench.layered_skin [--presets]`.
 
-Shear moduli, thicknesses and one loss of all layers are fitted, within published ranges, to phase
-speeds, 1/e lengths and decay exponents by frequency. Squared logarithms of the factors of a set are
-averaged, and the sets summed. `--presets` leaves out the fits.
+Shear moduli, thicknesses and one loss for all layers are fitted, within published ranges, to phase
+speeds, 1/e lengths and decay exponents over frequency. The squared logarithms of the factors are
+averaged within a set and summed over the sets. `--presets` skips the fits.
 """
 
 import sys
@@ -20,10 +20,10 @@ from skinwave.verify.predictions import Curves, decay_exponents, leading_wave
 from skinwave.verify.published import EXPONENT, WAVES, Published
 
 GRID = np.arange(100.0, 701.0, 100.0)  # Hz
-NO_WAVE, FURTHEST = np.log(3.0), 2.0  # of a factor: without a wave, and the largest that counts
-DRAWS, STARTS = 24, 2  # random numbers within the ranges, the best of which start a fit
-MOST, STEP = 12, 0.02  # iterations of a fit, and its step of logarithms
-LAYERS = ("epidermis", "dermis", "hypodermis")  # from the surface down; what is below is "muscle"
+NO_WAVE, LARGEST = np.log(3.0), 2.0  # logarithms of factors: without a wave, and the largest
+DRAWS, STARTS = 24, 2  # random draws within the ranges; the best of them start a fit
+MOST_ITERATIONS, STEP = 12, 0.02  # of a fit; step of the logarithms
+LAYERS = ("epidermis", "dermis", "hypodermis")  # from the surface down, above "muscle"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +36,7 @@ class Range:
 
 
 def _young(low: float, high: float, source: str) -> Range:
-    """Range of shear moduli in Pa by Young's moduli in kPa of incompressible tissue."""
+    """Return a range of shear moduli from Young's moduli in kPa of incompressible tissue."""
     return Range(low=1e3 * low / 3, high=1e3 * high / 3, source=source)
 
 
@@ -66,7 +66,7 @@ RANGES = {"palm-layers": PALM, "forearm-layers": FOREARM}
 
 
 def values_of(body: Body, names: Iterable[str]) -> dict[str, float]:
-    """Numbers of a body by their names in its ranges, SI."""
+    """Return named numbers of a body, in SI."""
     solids = [*(solid_of(each.material) for each in body.layers), body.solid]
     known = {name: solid.shear_modulus
              for name, solid in zip((*LAYERS, "muscle"), solids, strict=True)}  # fmt: skip
@@ -77,7 +77,7 @@ def values_of(body: Body, names: Iterable[str]) -> dict[str, float]:
 
 
 def with_values(body: Body, values: Mapping[str, float]) -> Body:
-    """The body with other numbers; the loss is that of all its layers."""
+    """Return the body with other numbers; all layers have the same loss."""
 
     def solid(name: str, material: str | Material) -> Material:
         known = solid_of(material)
@@ -94,8 +94,8 @@ def with_values(body: Body, values: Mapping[str, float]) -> Body:
 
 
 def misses(body: Body, curves: Curves, published: Published) -> Floats:
-    """Logarithms (n,) of the factors of a set from 100 Hz: ours over the published value or, where
-    only a range is published, its nearer end; nan without a wave.
+    """Return logarithms (n,) of the factors of a set from 100 Hz: ours over the published value, or
+    over the nearer end of a published range; nan without a wave.
     """
     f, values = np.array(published.frequencies), np.array(published.values)
     lows, highs = np.array([published.between(k) for k in range(len(f))]).T
@@ -106,19 +106,19 @@ def misses(body: Body, curves: Curves, published: Published) -> Floats:
 
 
 def residuals(body: Body, sets: Sequence[Published]) -> Floats:
-    """Logarithms of all factors, each set with a weight of 1 in the sum of their squares."""
+    """Return the logarithms of all factors, weighted so that each set counts once."""
     curves = leading_wave(body, GRID)
     parts = []
     for each in sets:
         logs = misses(body, curves, each)
-        bounded = np.where(np.isnan(logs), NO_WAVE, np.clip(logs, -FURTHEST, FURTHEST))
+        bounded = np.where(np.isnan(logs), NO_WAVE, np.clip(logs, -LARGEST, LARGEST))
         parts.append(bounded / np.sqrt(len(logs)))
     return np.concatenate(parts)
 
 
 def fit(preset: str, sets: Sequence[Published]) -> dict[str, float]:
-    """Numbers of a preset, SI, within their ranges: the best of fits that begin at the best of
-    random draws and the preset's own numbers.
+    """Fit the numbers of a preset, in SI, within their ranges, from the best of random draws and of
+    the preset's own numbers.
     """
     ranges, body = RANGES[preset], BODIES[preset]
     low, high = np.log([(each.low, each.high) for each in ranges.values()]).T
@@ -126,15 +126,15 @@ def fit(preset: str, sets: Sequence[Published]) -> dict[str, float]:
     def named(x: Floats) -> dict[str, float]:
         return dict(zip(ranges, np.exp(x).tolist(), strict=True))
 
-    def left(x: Floats) -> Floats:
+    def remainder(x: Floats) -> Floats:
         return residuals(with_values(body, named(x)), sets)
 
     draws = np.random.default_rng(0).uniform(low, high, (DRAWS, len(low)))
     own = np.log(list(values_of(body, ranges).values()))
     draws = np.clip([own, *draws], low + 1e-3, high - 1e-3)
-    first = np.argsort([np.square(left(x)).sum() for x in draws])[:STARTS]
+    first = np.argsort([np.square(remainder(x)).sum() for x in draws])[:STARTS]
     found = [
-        least_squares(left, x, bounds=(low, high), diff_step=STEP, max_nfev=MOST,
+        least_squares(remainder, x, bounds=(low, high), diff_step=STEP, max_nfev=MOST_ITERATIONS,
                       x_scale=high - low)
         for x in draws[first]
     ]  # fmt: skip
@@ -142,7 +142,7 @@ def fit(preset: str, sets: Sequence[Published]) -> dict[str, float]:
 
 
 def main(*arguments: str) -> None:
-    """Print the numbers of both presets and their fits, and the median factor of each set."""
+    """Print the numbers of both presets and fits, and the median factor of each set."""
     for preset, ranges in RANGES.items():
         sets = [each for each in WAVES if preset in each.bodies]
         numbers = {"preset": values_of(BODIES[preset], ranges)}

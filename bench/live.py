@@ -1,8 +1,8 @@
-"""Time of the live page in chromium: from a key to the pixels, and to a changed body.
+"""Response times of the live page in chromium: from a key to pixels, and to a changed body.
 
     python -m bench.live [COUNT] [BODY ...]     # by default 20 and skin-slab, paper-sheet
 
-A key moves a slider by a step. The time ends with the frame after the one with a new spectrum.
+A key moves a slider by one step. The time ends one frame after the spectrum has changed.
 """
 
 import re
@@ -38,13 +38,13 @@ KEY = """async ({ label, down }) => {
 
 
 def line(name: str, times: list[float]) -> str:
-    """A row: median and 95 % of times in ms."""
+    """Return a row: median and 95th percentile of times in ms."""
     high = quantiles(times, n=20)[-1] if len(times) > 1 else times[0]
     return f"{name:<48}{median(times):8.0f} ms{high:8.0f} ms{len(times):6d}"
 
 
 def keys(tab: Any, count: int) -> dict[str, tuple[list[float], float]]:
-    """Times of keys on each slider, and the CPU time in ms of the page's thread for each key."""
+    """Return the times of keys on each slider, and the CPU time in ms of the page per key."""
     session = tab.context.new_cdp_session(tab)
     session.send("Performance.enable", {"timeDomain": "threadTicks"})
 
@@ -61,7 +61,7 @@ def keys(tab: Any, count: int) -> dict[str, tuple[list[float], float]]:
 
 
 def body_changes(tab: Any, count: int) -> list[float]:
-    """Times in ms from a change of the first modulus until the page is current again."""
+    """Return times in ms from a change of the first modulus until the page is up to date."""
     tab.locator("summary", has_text="Layers").click()
     slider = tab.get_by_role("slider", name=re.compile("modulus", re.IGNORECASE)).first
     found = []
@@ -76,7 +76,7 @@ def body_changes(tab: Any, count: int) -> list[float]:
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure and print the times."""
     count = int(sys.argv[1]) if sys.argv[1:] else 20
     bodies = sys.argv[2:] or ["skin-slab", "paper-sheet"]
     print(f"{'':<48}{'median':>11}{'95 %':>11}{'of':>6}")

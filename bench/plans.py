@@ -1,12 +1,12 @@
-"""What plans promise and cost, on random scenes: `python -m bench.plans stated|cost [N] [SEED]`.
+"""Errors and costs of plans on random scenes: `python -m bench.plans stated|cost [N] [SEED]`.
 
-`stated`: the error that the plan of `fem` states on scenes of `bench.agreement` with small solid
-bodies without absorbing sides, beside the true one, by elements half as large on the body that the
-plan models. A scene fails if its true error is more than 1.1 times the stated one.
+`stated`: the error that the plan of `fem` states, on scenes of `bench.agreement` with small solid
+bodies without absorbing sides, and the true error, by elements of half the size on the planned
+body. A scene fails if its true error is more than 1.1 times the stated one.
 
 `cost`: the error of the planned response against fine elements (0.7 of the default size, absorbing
 sides twice as far away), and its time over that of the cheapest candidate within the tolerance,
-which nobody knows beforehand; without and with the time of planning.
+which is not known beforehand, without and with the time of planning.
 """
 
 import os
@@ -32,7 +32,7 @@ from skinwave.scene.file import from_table
 from skinwave.scene.scene import Body, Scene
 
 MOST = 1.1  # times the stated error
-LARGEST = 8000  # degrees of freedom: of more the reference takes minutes
+LARGEST = 8000  # degrees of freedom: above, the reference takes minutes
 REFERENCE = 1e-4  # relative error of the reduction of a reference
 FINEST = 0.7  # of the default element size
 COARSER = (2.6, 2.0, 1.6, 1.3, 1.0, 0.8)
@@ -41,26 +41,26 @@ SCENES = 20
 
 
 def stated_and_true(scene: Scene, tolerance: float, h: float | None = None) -> tuple[float, float]:
-    """Stated error of `fem` with its planned elements, or those of h in metre, and the true one."""
+    """Return the stated and the true error of `fem`, with planned elements or size h in metres."""
     chosen = plan(scene, SolveOptions(tolerance=tolerance, model="fem", h=h))
     assert chosen.prepared
     assert chosen.h
     if chosen.prepared.effort.dofs > LARGEST:
         raise ValueError(f"{chosen.prepared.effort.dofs} degrees of freedom")
-    found = answer(chosen.prepared, replace(scene, body=chosen.body))
+    planned = answer(chosen.prepared, replace(scene, body=chosen.body))
     fine = prepare(
         chosen.body, scene.probe_points, h=chosen.h / 2, tolerance=REFERENCE,
         symmetry=chosen.symmetry, reading=scene.reading, load=scene.load,
     )  # fmt: skip
     better = answer(fine, replace(scene, body=chosen.body)).values
-    stated, true = (about_its_rest(scene, each) for each in (found.values, better))
+    stated, true = (about_its_rest(scene, each) for each in (planned.values, better))
     return chosen.error, float(relative_changes(true - stated, true).max())
 
 
 def stated(number: int, seed: int) -> int:
-    """Table of scenes with solid bodies; the number of those that fail."""
+    """Print a table of scenes with solid bodies, and return how many fail."""
     done = failed = 0
-    print("scene, kind, layers, base and sides | asked | stated | true | true over stated")
+    print("scene, kind, layers, base and sides | tolerance | stated | true | true over stated")
     for k in count():
         if done == number:
             break
@@ -71,7 +71,7 @@ def stated(number: int, seed: int) -> int:
             if body.kind == "sheet" or np.isinf(body.depth) or body.sides == "absorbing":
                 raise ValueError("no elements, or too many")
             error, true = stated_and_true(scene, tolerance)
-        except ValueError:  # too large, or refused
+        except ValueError:  # too large or refused
             continue
         done += 1
         failed += true > MOST * error
@@ -83,7 +83,7 @@ def stated(number: int, seed: int) -> int:
 
 
 def scene(seed: int) -> tuple[Scene, float]:
-    """A random scene, and the tolerance that is asked of it."""
+    """Return a random scene and a tolerance."""
     pick = np.random.default_rng(seed)
     shape = pick.choice(["point", "line", "circle", "square"])
     size = float(pick.uniform(6e-3, 20e-3))
@@ -111,80 +111,81 @@ def scene(seed: int) -> tuple[Scene, float]:
         )  # fmt: skip
     probes = tuple((float(x), 0.0) for x in (0.0, 0.005, 0.010))
     pressure = MovingPressure(tacton=tacton)
-    found = Scene(name=f"random {seed}", pressure=pressure, body=body, probes=probes)
-    return found, float(pick.choice(TOLERANCES))
+    drawn = Scene(name=f"random {seed}", pressure=pressure, body=body, probes=probes)
+    return drawn, float(pick.choice(TOLERANCES))
 
 
 def error(candidate: Response, reference: Response) -> float:
-    """Worst probe's relative waveform error; a point kernel is scaled to fit."""
+    """Return the relative waveform error at the worst probe; a point kernel is scaled to fit."""
     u, v = candidate.displacement, reference.displacement
     if not candidate.record.of_body:
         u = u * (u * v).sum() / (u * u).sum()
     return float((np.linalg.norm(u - v, axis=0) / np.linalg.norm(v, axis=0)).max())
 
 
-def followed(scene: Scene, tolerance: float) -> tuple[str, Response, float, float]:
-    """Planned model, its response, and the seconds of it and of the planning before.
+def planned_response(scene: Scene, tolerance: float) -> tuple[str, Response, float, float]:
+    """Return the planned model, its response, and the seconds of the response and of planning.
 
-    A plan that has reduced the body on the mesh it chose has that time taken from its own.
+    The time of a reduction during planning counts for the response.
     """
     started = time.perf_counter()
     chosen = plan(scene, SolveOptions(tolerance=tolerance))
     planning, started = time.perf_counter() - started, time.perf_counter()
     if chosen.prepared:
-        found, prepared = answer(chosen.prepared, scene), chosen.seconds
+        response, prepared = answer(chosen.prepared, scene), chosen.seconds
     else:
-        found, prepared = compute(replace(scene, body=chosen.body), chosen.model, h=chosen.h), 0.0
+        planned = replace(scene, body=chosen.body)
+        response, prepared = compute(planned, chosen.model, h=chosen.h), 0.0
     seconds = time.perf_counter() - started + prepared
-    return chosen.model, found, seconds, planning - prepared
+    return chosen.model, response, seconds, planning - prepared
 
 
 def assess(seed: int) -> tuple[bool, bool, bool]:
-    """Print one row; whether the planned response is within the tolerance, and whether its price is
-    fair without and with planning.
+    """Print a row; return whether the planned response is within the tolerance, and whether its
+    time is at most five times that of the cheapest, without and with planning.
     """
-    asked, tolerance = scene(seed)
-    body, h = asked.body, default_size(asked.body)
-    far = asked
+    drawn, tolerance = scene(seed)
+    body, h = drawn.body, default_size(drawn.body)
+    far = drawn
     if body.sides == "absorbing":
-        far = replace(asked, body=replace(body, width=2 * body.width, height=2 * body.height))
+        far = replace(drawn, body=replace(body, width=2 * body.width, height=2 * body.height))
     reference = compute(far, "fem", h=FINEST * h)
-    model, planned, seconds, planning = followed(asked, tolerance)
-    wrong = error(planned, reference)
+    model, planned, seconds, planning = planned_response(drawn, tolerance)
+    planned_error = error(planned, reference)
     good = []
     candidates = [("point-kernel", {}), *(("fem", {"h": h * ratio}) for ratio in COARSER)]
     if body.of_kind.is_layer:
         candidates[1:1] = [("flat-body-harmonic", {}), ("flat-body", {})]
     for other, model_options in candidates:
         started = time.perf_counter()
-        found, cost = compute(asked, other, **model_options), time.perf_counter() - started
-        if error(found, reference) <= tolerance:
+        response, cost = compute(drawn, other, **model_options), time.perf_counter() - started
+        if error(response, reference) <= tolerance:
             good.append((cost, other, model_options))
             break  # by rising cost: the first within the tolerance is the cheapest
     cost, best, model_options = min(good, default=(np.inf, "none", {}))
     name = best + "".join(f" {1e3 * v:.1f} mm" for v in model_options.values())
-    shape, am = asked.tacton.trajectory.shape, asked.tacton.am_frequency
+    shape, am = drawn.tacton.trajectory.shape, drawn.tacton.am_frequency
     print(
         f"{seed:>3} {body.kind:<6}{body.sides:<10} {shape:<7}{am:5.0f} Hz"
-        f" {100 * tolerance:5.0f} % {100 * wrong:7.2f} %  {model:<18}{seconds:6.1f} s"
+        f" {100 * tolerance:5.0f} % {100 * planned_error:7.2f} %  {model:<18}{seconds:6.1f} s"
         f"{planning:6.1f} s  {name:<18}{cost:6.1f} s {seconds / cost:6.1f}"
         f" {(seconds + planning) / cost:6.1f}",
         flush=True,
     )
-    return wrong <= tolerance, seconds <= 5 * cost, seconds + planning <= 5 * cost
+    return planned_error <= tolerance, seconds <= 5 * cost, seconds + planning <= 5 * cost
 
 
 def cost(number: int, first: int) -> None:
-    """Table of random scenes from the first on."""
-    print("    body             path       f_AM  asked   error   chosen                   planning"
+    """Print a table of random scenes."""
+    print("    body             path       f_AM  limit   error   chosen                   planning"
           "  cheapest in tolerance    ratio   with")  # fmt: skip
-    held = np.array([assess(first + k) for k in range(number)]).sum(axis=0)
-    print(f"{held[0]} of {number} within the tolerance; {held[1]} at no more than five times "
-          f"the cheapest, {held[2]} with planning")  # fmt: skip
+    counts = np.array([assess(first + k) for k in range(number)]).sum(axis=0)
+    print(f"{counts[0]} of {number} within the tolerance; {counts[1]} at no more than five times "
+          f"the cheapest, {counts[2]} with planning")  # fmt: skip
 
 
 if __name__ == "__main__":
     os.environ["SKINWAVE_CACHE"] = ""
-    what, *numbers = sys.argv[1:]
+    table_name, *numbers = sys.argv[1:]
     number, seed = (*map(int, numbers), *(SCENES, 0)[len(numbers) :])
-    {"stated": stated, "cost": cost}[what](number, seed)
+    {"stated": stated, "cost": cost}[table_name](number, seed)
