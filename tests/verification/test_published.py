@@ -132,6 +132,7 @@ def test_finger_is_compared_at_its_own_frequencies():
     assert rows[1].outcome == WITHIN
 
 
+@pytest.mark.slow
 def test_motion_decays_faster_along_a_finger_at_higher_frequency(monkeypatch):
     """Coarse: by 6.5 mm the lengths are 23, 14 and 9.8 mm at 200, 300 and 400 Hz."""
     monkeypatch.setattr(predictions, "HAND_SIZE", 0.009)
