@@ -159,9 +159,7 @@ def operators_of(affine: AffineOperators, solids: Solids) -> Operators:
 
 
 def weights(terms: Terms, solids: Solids, frequencies: ArrayLike) -> Complex:
-    """Return the weights (f, q) of terms (q,) in the dynamic stiffness at frequencies (f,) in Hz,
-    for materials with any modulus laws.
-    """
+    """Return the weights (f, q) of terms in the dynamic stiffness at frequencies (f,) in Hz."""
     s = 2j * np.pi * np.asarray(frequencies, np.float64)
 
     def of_kind(kind: str, m: Material) -> Any:
@@ -182,9 +180,7 @@ def weights(terms: Terms, solids: Solids, frequencies: ArrayLike) -> Complex:
 
 
 def project(affine: AffineOperators, basis: Floats, before: Floats) -> Floats:
-    """Return the matrices (q, m, m) projected onto a basis (n_free, m); `before` (q, k, k) are
-    those of the first k vectors.
-    """
+    """Project the matrices onto a basis (n_free, m); `before` (q, k, k) has those of k vectors."""
     k, m = before.shape[1], basis.shape[1]
     projected = np.empty((len(affine.parts), m, m))
     projected[:, :k, :k] = before

@@ -105,9 +105,7 @@ class Operators:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MovingNodes:
-    """Nodes (n,) with a free component, their sparsity pattern, and the free ones (f,) among their
-    3 n components.
-    """
+    """Nodes (n,) with a free component, their pattern, and their free components (f,)."""
 
     nodes: Ints
     pattern: SparsityPattern

@@ -82,9 +82,7 @@ class Coat:
 
     @property
     def stations(self) -> tuple[Floats, Floats, Ints]:
-        """Gauss points through the layers: heights z (s,) and weights (s,) in metres, and the
-        layer (s,) of each.
-        """
+        """Gauss points through the layers: heights z and weights (s,) in m, and layers (s,)."""
         t = np.array(self.thicknesses)
         middles = t / 2 - np.cumsum(t)
         z, weight = middles[:, None] + t[:, None] / 2 * STATIONS, t[:, None] / 2 * STATION_WEIGHTS
@@ -156,9 +154,7 @@ def _frames(points: Floats, slopes: Floats) -> tuple[Floats, Floats]:
 
 
 def _edges(facets: Ints, points: Floats, fixed: Bools) -> Edges:
-    """Return all edges but the free border of facets (e, a) with nodes at points (e, a, i) and
-    fixed components (e, a, i).
-    """
+    """Return the edges, except the free border, of facets (e, a) with nodes at points (e, a, i)."""
     ends = facets[:, TRIANGLE_EDGES].reshape(-1, 2)
     _, edge, sides = np.unique(
         np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True
@@ -229,9 +225,7 @@ def _edge_stiffness(surface: Surface, coat: Coat, mu: Floats, lam: Floats) -> sp
 
 
 def _moments(surface: Surface, coat: Coat, mu: Floats, lam: Floats) -> tuple[Floats, Floats]:
-    """Return bending moments across edges (h, q, 3 a) per displacement, and bending stiffnesses
-    (h,) in N m, from each side.
-    """
+    """Return bending moments (h, q, 3 a) per displacement and stiffnesses (h,) in N m per side."""
     edges, facet = surface.edges, surface.edges.facet
     moment, bending = np.zeros_like(edges.outwards), np.zeros(len(facet))
     for z, weight, layer in zip(*coat.stations, strict=True):

@@ -33,9 +33,7 @@ class Combination:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Laws:
-    """C (`damping`) and the stiffness of each branch as combinations of K. `matrices` are the K, C
-    and K_j for which they hold.
-    """
+    """C (`damping`) and branches as combinations of K, valid for the `matrices` K, C and K_j."""
 
     damping: Combination
     branches: tuple[Combination, ...]

@@ -16,9 +16,7 @@ TRIANGLE_EDGES = np.array([[0, 1], [1, 2], [2, 0]])
 
 
 def shape_functions(barycentric: Floats, n_nodes: int) -> Floats:
-    """Return values (q, n_nodes) at barycentric points (q, 3) of triangles or (q, 4) of
-    tetrahedra.
-    """
+    """Return values (q, n_nodes) at barycentric points (q, 3) or (q, 4)."""
     corners = barycentric.shape[1]
     if n_nodes == corners:
         return barycentric

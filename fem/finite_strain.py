@@ -225,16 +225,12 @@ def internal_force(part: Part, u: Floats) -> Floats:
 
 
 def stress_force(part: Part, u: Floats, strain: Floats) -> Floats:
-    """Return nodal forces (n, 3) in N of the stress of a strain (e, q, k, l), at displacements
-    (n, 3).
-    """
+    """Return nodal forces (n, 3) in N of the stress of a strain, at displacements (n, 3)."""
     return spread_stress(part, stress(part, strain) @ deformation(part, u)[0])
 
 
 def rate_force(part: Part, u: Floats, v: Floats) -> Floats:
-    """Return nodal forces (n, 3) in N/s of the stress of the rate of E, at a displacement and a
-    velocity (n, 3).
-    """
+    """Return nodal forces (n, 3) in N/s of the stress of the rate of E, at u and v (n, 3)."""
     F = deformation(part, u)[0]
     rate = F @ (part.D @ v).reshape(F.shape).swapaxes(2, 3)
     return stress_force(part, u, (rate + rate.swapaxes(2, 3)) / 2)
@@ -251,9 +247,7 @@ def strain_energy(part: Part, E: Floats) -> float:
 
 
 def deformation(part: Part, u: Floats) -> tuple[Floats, Floats]:
-    """Return the deformation gradient F (e, q, k, i) and the Green-Lagrange strain E (e, q, k, l),
-    without cancellation at small u.
-    """
+    """Return F (e, q, k, i) and E (e, q, k, l), without cancellation at small u."""
     H = (part.D @ u).reshape(*part.G.shape[:3], 3)
     k = H.shape[2]
     E = H @ H.swapaxes(2, 3) / 2

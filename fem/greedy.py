@@ -138,9 +138,7 @@ def reduce_affine(
 def _projected(
     geometries: Sequence[Callable[[], Geometry]], basis: Floats, before: Floats
 ) -> AffineModel:
-    """Return the model of a basis (n_free, m); `before` (g, q, k, k) are the matrices of its first
-    vectors.
-    """
+    """Return the model of a basis (n_free, m), given the matrices of its first vectors."""
     parts, outputs, forces = [], [], []
     for geometry, projected in zip(geometries, before, strict=True):
         full = geometry()
@@ -217,9 +215,7 @@ def _mass(affine: AffineOperators, solids: Solids) -> LinearOperator:
 
 
 def _joined(basis: Floats, more: Floats, M: LinearOperator) -> Floats:
-    """Extend a mass-orthonormal basis (n, m) by the new directions of vectors (n, k); the first
-    ones must be orthonormal.
-    """
+    """Extend a mass-orthonormal basis (n, m) by the new directions of vectors (n, k)."""
     if not basis.shape[1]:
         return more
     new = more

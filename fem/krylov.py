@@ -243,18 +243,14 @@ class KrylovBasis:
         return np.vstack([first + second, upright.T @ gram])
 
     def _reorthonormalised(self, block: Floats, upright: Floats) -> Floats:
-        """Orthonormalise similar directions of a block once more, because scaling amplifies their
-        round-off, including that along the basis.
-        """
+        """Orthonormalise similar directions again, because scaling amplifies round-off."""
         new = block @ upright
         block -= _combined(self.basis, self.basis.T @ (self._M @ new)) @ np.linalg.pinv(upright)
         new = block @ upright
         return upright @ np.linalg.inv(np.linalg.cholesky(new.T @ (self._M @ new))).T
 
     def project(self, rows: Floats, size: int) -> None:
-        """Project the matrices, and probes and loads (n, k), onto the vectors added since the last
-        call.
-        """
+        """Project the matrices, probes and loads (n, k) onto the vectors added since."""
         Q, new = self._columns[:, :size], self._columns[:, len(self._small_K) : size]
         self._rows = np.vstack([self._rows.reshape(-1, rows.shape[1]), new.T @ rows])
         self._small_K = _bordered(self._small_K, _products(self._K, Q, new))
@@ -273,9 +269,7 @@ def _converged(
     growing: Iterable[tuple[int, int]],
     report: Callable[[float], None],
 ) -> tuple[int, int, float]:
-    """Return the moments, vectors and error of the first model within the tolerance, for the
-    vectors `rows` (n, probes + loads).
-    """
+    """Return moments, vectors and error of the first model within the tolerance."""
     # Not 0 Hz itself, where an unconstrained body has no finite response.
     fine = np.asarray(2j * np.pi * np.linspace(1e-3 * band, band, FREQUENCIES), np.complex128)
     coarse = fine[::COARSE_STEP]  # until the error is below the tolerance there
@@ -329,9 +323,7 @@ def _moments(
     factor: Factor,
     start_vectors: Floats,
 ) -> Iterator[tuple[int, int]]:
-    """Extend the space by one moment of start vectors (n, p) at a time; yield the numbers of
-    moments and of vectors.
-    """
+    """Extend the space moment by moment; yield the numbers of moments and of vectors."""
     branches = maxwell_only(operators.branches)
     lags = [branch.time / (1 + point * branch.time) for branch in branches]
     factors = factors_at(branches, point)

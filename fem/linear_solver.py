@@ -158,9 +158,7 @@ class SumFactoriser:
 
 
 def _refine(upper: sparse.csr_array, solve: Callable[[Array], Array], b: Array) -> Array | None:
-    """Refine an approximate `solve` of a symmetric matrix, given by its upper triangle. Return None
-    if that does not converge.
-    """
+    """Refine an approximate `solve` of a symmetric matrix; None if that does not converge."""
     x, r, size = np.zeros_like(b), b, np.linalg.norm(b, axis=0)
     lower, diagonal, before = upper.T, upper.diagonal().reshape(-1, *[1] * (b.ndim - 1)), size
     while True:

@@ -144,9 +144,7 @@ def surface_frame(
 def _surface_frame(
     mesh: TetMesh, points: ArrayLike, facets: str | Ints, patch: float
 ) -> tuple[Ints, Floats, Floats]:
-    """Return the nodes (p, a) of the facet below each point, shape functions (p, a) and normals
-    (p, 3).
-    """
+    """Return nodes (p, a), shape functions (p, a) and normals (p, 3) of the facets below."""
     nodes = facet_set(mesh, facets)
     points = np.atleast_2d(np.asarray(points, np.float64))
     if points.ndim != 2 or points.shape[1] not in (2, 3) or not np.isfinite(points).all():
@@ -171,9 +169,7 @@ def _surface_frame(
 
 
 def _mean_normals(mesh: TetMesh, nodes: Ints, places: Floats, patch: float) -> Floats:
-    """Return mean normals (p, 3) of facets (k, a) weighted by area and distance to places (p,
-    3).
-    """
+    """Return normals (p, 3) of facets (k, a), averaged by area and distance to places."""
     at, areas = facet_points(mesh, nodes), facet_geometry(mesh, nodes)[1].reshape(-1, 3)
     normals, count = np.empty((len(places), 3)), max(1, AT_ONCE // len(at))
     for start in range(0, len(places), count):
@@ -267,9 +263,7 @@ def _candidates(facets: Floats, points: Floats) -> tuple[Ints, Ints]:
 
 
 def _facet_coordinates(facets: Floats, points: Floats) -> tuple[Floats, Bools]:
-    """Return barycentric coordinates (m, 3) of points (m, 2) on facets (m, a, 2), and whether each
-    point is on its facet.
-    """
+    """Return coordinates (m, 3) of points on facets (m, a, 2), and whether each is on it."""
     coordinates = np.full((len(points), 3), 1 / 3)
     size = np.ptp(facets, axis=1).max(axis=1, initial=0.0)
     distance, active = np.full(len(points), np.inf), np.arange(len(points))
@@ -295,9 +289,7 @@ def _facet_coordinates(facets: Floats, points: Floats) -> tuple[Floats, Bools]:
 
 
 def _offsets(elements: Floats, barycentric: Floats, points: Floats) -> tuple[Floats, Floats]:
-    """Return vectors (p, i) from places in elements (p, a, i) to points (p, i), and the tangents
-    (p, i, d) there.
-    """
+    """Return vectors (p, i) from places in elements to points, and tangents (p, i, d)."""
     N = shape_functions(barycentric, elements.shape[1])
     derivatives = shape_derivatives(barycentric, elements.shape[1])
     miss = points - np.einsum("pa,pai->pi", N, elements)
@@ -330,9 +322,7 @@ def is_inside(mesh: TetMesh, points: ArrayLike) -> Bools:
 
 
 def _elements_at(mesh: TetMesh, points: Floats) -> tuple[Ints, Floats, Bools]:
-    """Return the element (p,) of each point (p, 3), coordinates (p, 4), and whether it is
-    inside.
-    """
+    """Return the element (p,) and coordinates (p, 4) of each point, and if it is inside."""
     corners = mesh.points[mesh.tets[:, :4]]
     low, high = corners.min(axis=1), corners.max(axis=1)
     slack = BULGE * (high - low).max(axis=1, keepdims=True)
@@ -349,9 +339,7 @@ def _elements_at(mesh: TetMesh, points: Floats) -> tuple[Ints, Floats, Bools]:
 
 
 def _containing(corners: Floats, low: Floats, high: Floats, point: Floats) -> tuple[int, Floats]:
-    """Return the straight element that a point (3,) is in or nearest to, and its coordinates; nan
-    if no element is near.
-    """
+    """Return the straight element nearest to a point (3,), and coordinates; nan if none."""
     near = np.flatnonzero(((low <= point) & (point <= high)).all(axis=1))
     if not len(near):
         return 0, np.full(4, np.nan)

@@ -40,9 +40,7 @@ class MaxwellBranch:
     time: float
 
     def share(self, s: Any) -> Any:
-        """Return the factor s tau / (1 + s tau) of K at complex frequencies s in rad/s: 0 in slow
-        motion, 1 in fast motion.
-        """
+        """Return the factor s tau / (1 + s tau) of K at complex frequencies s in rad/s."""
         return s * self.time / (1 + s * self.time)
 
     def lag(self, w: Any) -> Any:

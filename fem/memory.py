@@ -10,9 +10,7 @@ CGROUP = Path("/sys/fs/cgroup")
 
 
 def check_memory(dofs: int) -> None:
-    """Raise a MemoryError if the matrices of a body need more memory than is free, even with their
-    factor in files.
-    """
+    """Raise a MemoryError if the matrices of a body need more memory than is free."""
     needed, free = BYTES_PER_DOF * dofs, free_memory()
     if needed > free:
         raise MemoryError(

@@ -134,9 +134,7 @@ def _line_search(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Moment:
-    """Free components of a state, with load and internal force, and the strain and stretch of each
-    kind of Maxwell branches.
-    """
+    """Free components of a state, forces, and strain and stretch of Maxwell branches."""
 
     t: float
     u: Floats

@@ -55,9 +55,7 @@ class Pardiso:
     """PARDISO on upper triangles of one pattern, which is analysed once."""
 
     def __init__(self, indices: Index, indptr: Index, kind: int, *, single: bool = False) -> None:
-        """Keep columns and row starts, numbered from 1. The kind is 2 for real matrices, 6 for
-        complex ones.
-        """
+        """Keep columns and row starts, numbered from 1; kind 2 is real, 6 is complex."""
         self._indices, self._indptr, self._kind, self._n = indices, indptr, kind, len(indptr) - 1
         self._handle, self._settings = np.zeros(64, np.int64), np.zeros(64, np.int32)
         self._settings[[0, 1, 7]] = 1, 2, 0  # own settings, METIS, no refinement

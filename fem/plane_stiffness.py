@@ -35,9 +35,7 @@ class Tension:
 
 
 def directional_parts(materials: Sequence[Material]) -> dict[int, Floats]:
-    """Return the plane stress stiffness (3, 3) in Pa of each orthotropic material minus that of its
-    isotropic mean, by index.
-    """
+    """Return the orthotropic part (3, 3) in Pa of plane stress stiffness, by material index."""
     return {
         m: solid.plane_stress - replace(solid, orthotropy=None).plane_stress
         for m, solid in enumerate(materials)

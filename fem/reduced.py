@@ -155,9 +155,7 @@ def line_response(poles: Poles, forces: Complex, frequencies: Floats) -> tuple[C
 
 
 def impulse_response(poles: Poles, impulse: Floats) -> Complex:
-    """Return the free vibration (m, p), complex amplitudes of exp(pole t), after an impulse (r,) in
-    N s kg^-1/2 at t = 0.
-    """
+    """Return amplitudes (m, p) of exp(pole t) after an impulse (r,) in N s kg^-1/2 at t = 0."""
     return 2 * (poles.inputs @ impulse)[:, None] * poles.outputs.T
 
 

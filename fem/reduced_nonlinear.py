@@ -194,9 +194,7 @@ def in_plane_matrices(
 def _states_of_stress(
     part: Part, fixed: Bools, slopes: Floats, hz: Floats, solver: str
 ) -> tuple[Floats, float]:
-    """Return strains (k, e, q, k, l) of states of stress, orthonormal in energy, and the truncated
-    share.
-    """
+    """Return strains of energy-orthonormal states of stress, and the truncated share."""
     reach = 1 / np.maximum(2 * np.pi * hz, RESONANT) ** 2
     i, j = _strongest_pairs(reach)
     weight = reach[i] * reach[j] * np.where(i == j, 1, 2)

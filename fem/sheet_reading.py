@@ -82,9 +82,7 @@ def strain_rows(reading: SheetReading, heights: Floats, poisson: float) -> spars
 
 
 def from_plane(poisson: float) -> Floats:
-    """Return the matrix (6, 3) of strain xx, yy, zz, xy, xz, yz per xx, yy and xy in plane
-    stress.
-    """
+    """Return the matrix (6, 3) of all strain components per xx, yy and xy in plane stress."""
     matrix = np.zeros((6, 3))
     matrix[[0, 1, 3], [0, 1, 2]] = 1.0
     matrix[2, :2] = -poisson / (1 - poisson)
@@ -103,9 +101,7 @@ def quadratic_strain_at(reading: SheetReading, u: Floats) -> Floats:
 
 
 def modal_slopes(reading: SheetReading, basis: Floats) -> Floats:
-    """Return slopes (e q, 2, m) of the normal displacement of basis vectors (3 n, m) at the
-    quadrature points.
-    """
+    """Return slopes (e q, 2, m) of the normal displacement at the quadrature points."""
     w = basis.reshape(-1, 3, basis.shape[1])[:, 2]
     return np.asarray((reading.part.D @ w).reshape(-1, 2, basis.shape[1]))
 
@@ -126,9 +122,7 @@ def modal_quadratic_strain(reading: SheetReading, basis: Floats) -> Floats:
 
 
 def in_plane_rows(reading: SheetReading) -> tuple[sparse.csr_array, sparse.csr_array]:
-    """Return in-plane displacement (2 p, 3 n) and strain xx, yy, xy (3 p, 3 n) of the middle
-    plane.
-    """
+    """Return displacement (2 p, 3 n) and strain xx, yy, xy (3 p, 3 n) in the middle plane."""
     nothing, N = sparse.csr_array(reading.value.shape), reading.value
     x, y = reading.slopes
     moved = _by_point([[N, nothing, nothing], [nothing, N, nothing]])
@@ -137,9 +131,7 @@ def in_plane_rows(reading: SheetReading) -> tuple[sparse.csr_array, sparse.csr_a
 
 
 def _by_point(blocks: list[list[sparse.csr_array]]) -> sparse.csr_array:
-    """Return an operator (c p, 3 n), component fastest, from blocks (p, n) by output component and
-    by displacement component.
-    """
+    """Stack blocks (p, n) by output and displacement component to (c p, 3 n)."""
     rows, (p, n) = len(blocks), blocks[0][0].shape
     whole = sparse.block_array(blocks, format="csr")
     by_point = np.arange(rows * p).reshape(rows, p).T.ravel()

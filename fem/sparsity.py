@@ -52,9 +52,7 @@ class SparsityPattern:
         )
 
     def blocks(self, slabs: Iterable[tuple[slice, Floats]]) -> sparse.bsr_array:
-        """Sum element matrices (6, e, a, b) of the components `UPPER`, given slab by slab, to a
-        symmetric matrix (3 n, 3 n).
-        """
+        """Sum element matrices (6, e, a, b) of the components `UPPER` to a matrix (3 n, 3 n)."""
         n, summed = 3 * (len(self.indptr) - 1), np.zeros((len(self.indices) + 1, 3, 3))
         flat = summed.ravel()
         for slab, values in slabs:
@@ -115,9 +113,7 @@ def restricted(A: Any, free: Ints) -> sparse.csr_array:
 
 
 def selected(A: Any, rows: Ints, columns: Ints) -> Any:
-    """Return ascending rows (r,) and columns (c,) of a CSR matrix, or block rows and block columns
-    of a BSR matrix.
-    """
+    """Return ascending rows (r,) and columns (c,), for BSR matrices in blocks."""
     shape = np.array(A.shape) // getattr(A, "blocksize", 1)
     if (len(rows), len(columns)) == tuple(shape):
         return A
@@ -134,9 +130,7 @@ def selected(A: Any, rows: Ints, columns: Ints) -> Any:
 
 
 def upper_triangle(A: sparse.csr_array) -> tuple[Array, Index, Index]:
-    """Return the upper triangle of a matrix with sorted indices: values in double precision,
-    columns and row starts.
-    """
+    """Return values, columns and row starts of the upper triangle, in double precision."""
     n, kind = A.shape[0], np.complex128 if np.iscomplexobj(A.data) else np.float64
     kept = A.indices >= np.repeat(np.arange(n, dtype=A.indices.dtype), np.diff(A.indptr))
     columns = A.indices[kept].astype(np.int32, copy=False)
@@ -144,9 +138,7 @@ def upper_triangle(A: sparse.csr_array) -> tuple[Array, Index, Index]:
 
 
 def on_one_pattern(matrices: Sequence[sparse.csr_array]) -> tuple[Floats, Index, Index]:
-    """Return upper triangles of real matrices on the union of their patterns: values (j, nnz),
-    columns and row starts.
-    """
+    """Return values (j, nnz), columns and row starts of upper triangles on one pattern."""
     shape, values, patterns = matrices[0].shape, [], []
     for A in matrices:
         A.sort_indices()

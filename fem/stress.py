@@ -139,9 +139,7 @@ def relaxed_stress(stress: Floats, dt: float, material: Material) -> Floats:
 def materials_at(
     mesh: TetMesh, material: Material | Mapping[int, Material], points: ArrayLike
 ) -> tuple[Material, ...]:
-    """Return the material at each of points (p, 3) in a body, with Prony terms instead of loss
-    factors.
-    """
+    """Return the material at each point (p, 3), with Prony terms instead of loss factors."""
     given, region = by_region(mesh, material)
     materials = [m.without_loss_factor() for m in given]
     return tuple(materials[r] for r in region[locate(mesh, points)[0]])
@@ -240,9 +238,7 @@ def _sampled_strain(mesh: TetMesh, used: Ints, material: Material) -> sparse.csr
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SolidPart:
-    """Elements of one material: a `mesh` of these elements and all nodes, their `nodes` (q,), and
-    `tets` (m, 10) numbered by these nodes.
-    """
+    """Elements of one material: a `mesh`, their `nodes` (q,), and `tets` by these nodes."""
 
     mesh: TetMesh
     material: Material
@@ -251,9 +247,7 @@ class SolidPart:
 
 
 def solid_parts(mesh: TetMesh, material: Material | Mapping[int, Material]) -> list[SolidPart]:
-    """Return the parts of a mesh, one for each material. Raises a ValueError for four-node
-    elements, whose strain is constant.
-    """
+    """Return the parts of a mesh of ten-node tetrahedra, one for each material."""
     materials, region = _materials(mesh, material)
     parts = []
     for r in np.unique(region):

@@ -132,9 +132,7 @@ def at_rest(n_dofs: int) -> State:
 
 
 def acceleration(operators: Operators, unbalanced: Floats) -> Floats:
-    """Return M^-1 r by conjugate gradients: a consistent mass matrix is well-conditioned when
-    scaled by its diagonal.
-    """
+    """Return M^-1 r by conjugate gradients with a diagonal preconditioner."""
     if not unbalanced.any():
         return np.zeros_like(unbalanced)
     scale = 1 / np.sqrt(operators.M.diagonal())

@@ -36,9 +36,7 @@ FIT_RANGE = (0.010, 0.040)  # m from the focus, over which an exponent is fitted
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Curves:
-    """Leading wave of a body at frequencies (f,) in Hz: mode number, phase speed in m/s and 1/e
-    length in m, nan where no wave propagates.
-    """
+    """Mode, phase speed in m/s and 1/e length in m over frequency in Hz; nan without a wave."""
 
     frequencies: Floats
     mode: Ints
@@ -109,9 +107,7 @@ def focus_speeds(body: Body, perimeter: float) -> tuple[Floats, Floats]:
 
 
 def peak(x: Floats, y: Floats) -> float:
-    """Return the peak of the parabola through the highest point and its neighbours; nan at an
-    end.
-    """
+    """Return the peak of the parabola through the highest point; nan at an end."""
     k = int(np.argmax(y))
     if not 0 < k < len(x) - 1:
         return float("nan")

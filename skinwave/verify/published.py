@@ -115,9 +115,7 @@ NOT_COMPARED = tuple(tuple(each.values()) for each in _FILE["not_compared"])
 
 
 def all_sources(quantity: Quantity) -> Published:
-    """Return the range of a quantity over all sources and sites, as one set, at the frequencies
-    that at least two sources have.
-    """
+    """Return the range over all sources, at frequencies that at least two sources have."""
     sets = [each for each in WAVES if each.quantity is quantity]
     ranges = {f: [x for each in sets if (x := each.at(f))] for f in np.arange(100.0, 701, 100)}
     shared = {float(f): pairs for f, pairs in ranges.items() if len(pairs) > 1}

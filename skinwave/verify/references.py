@@ -12,9 +12,7 @@ from skinwave.typing import Array
 
 
 def gaussian_at_rest(r: Array, *, width: float, shear_modulus: float, poisson: float) -> Array:
-    """Return the deflection of a half-space under exp(-r^2 / 2 s^2) Pa: kernel (1 - nu) / (mu
-    k).
-    """
+    """Return the deflection under exp(-r^2 / 2 s^2) Pa, with kernel (1 - nu) / (mu k)."""
     x = (r / width) ** 2 / 4
     return (1 - poisson) * width * np.sqrt(np.pi / 2) / shear_modulus * ive(0, x)
 

@@ -35,9 +35,7 @@ def gaussian(width: float = WIDTH) -> Callable[[Array], Array]:
 
 
 def push(mesh: TetMesh, pressure: Callable[[Array], Array] | None = None) -> Array:
-    """Return nodal forces (3 n,) in N of a pressure on the top, a function of points; 1 Pa by
-    default.
-    """
+    """Return nodal forces (3 n,) in N of a pressure on the top; 1 Pa by default."""
     points = fem.facet_points(mesh)
     return fem.load_operator(mesh) @ (pressure(points) if pressure else np.ones(len(points)))
 

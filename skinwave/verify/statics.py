@@ -140,17 +140,13 @@ def fingertip_push(mesh: TetMesh) -> Array:
 
 
 def fingertip_motion(mesh: TetMesh, materials: dict[int, fem.Material]) -> tuple[Array, Array]:
-    """Return the motion (3 n,) in metres of a fingertip fixed at its cut, at rest and at
-    `FREQUENCY`.
-    """
+    """Return the motion (3 n,) in m of a fingertip fixed at its cut, at rest and at 140 Hz."""
     ops, force = fem.assemble(mesh, materials, fixed="sides"), fingertip_push(mesh)
     return fem.static(ops, force), fem.harmonic(ops, force, FREQUENCY)[0]
 
 
 def fingertip_summary(mesh: TetMesh, u: Array) -> Array:
-    """Return the work of the push in J, the norm of u (3 n,), and the heights in metres of the tip
-    and of the end of the bone.
-    """
+    """Return work in J, the norm of u, and heights in m of the tip and the end of the bone."""
     inside = np.unique(mesh.tets[mesh.region == 1])
     ends = [nodes[np.argmax(mesh.points[nodes, 1])] for nodes in (np.unique(mesh.tets), inside)]
     return np.array([fingertip_push(mesh) @ u, np.linalg.norm(u), *u.reshape(-1, 3)[ends, 2]])
