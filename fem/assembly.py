@@ -32,7 +32,7 @@ from fem.coat import Coat, coat_operators
 from fem.combination import Combination, Laws, viscoelastic
 from fem.elements import shape_functions, tetrahedron_rule
 from fem.geometry import gradient_integrals, jacobians, shape_nodes
-from fem.maxwell import Branch, add_matrices, on_free, property_of
+from fem.maxwell import Branch, add_matrices, property_of
 from fem.memory import check_memory
 from fem.plane_stiffness import (
     SIDES,
@@ -213,8 +213,9 @@ def assemble(
     )  # fmt: skip
     if coat is not None:
         of_coat = coat_operators(mesh, coat, materials, region, fixed_dofs(mesh, fixed))
-        thin = *(restricted(A, free) for A in of_coat[:3]), on_free(of_coat[3], free)
-        K, C, M, branches = add_matrices((K, C, M, branches), thin)
+        thin = [restricted(A, free) for A in of_coat[:3]]
+        relaxing = tuple(replace(b, K=restricted(b.K, free)) for b in of_coat[3])
+        K, C, M, branches = add_matrices((K, C, M, branches), (*thin, relaxing))
     return Operators(
         K=K,
         C=C,

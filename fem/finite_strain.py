@@ -156,7 +156,8 @@ def finite_strain(
         tangent=lambda u: sum((restricted(tangent(part, spread(u)), free) for part in parts), T),
         viscous=viscous,
         energy=lambda u: sum(
-            (stored_energy(part, spread(u)) for part in parts), start=float(u @ (T @ u)) / 2
+            (strain_energy(part, deformation(part, spread(u))[1]) for part in parts),
+            start=float(u @ (T @ u)) / 2,
         ),
         relaxing=relaxing,
     )
@@ -234,11 +235,6 @@ def rate_force(part: Part, u: Floats, v: Floats) -> Floats:
     F = deformation(part, u)[0]
     rate = F @ (part.D @ v).reshape(F.shape).swapaxes(2, 3)
     return stress_force(part, u, (rate + rate.swapaxes(2, 3)) / 2)
-
-
-def stored_energy(part: Part, u: Floats) -> float:
-    """Return the strain energy in J at the displacement u (n, 3) in metres."""
-    return strain_energy(part, deformation(part, u)[1])
 
 
 def strain_energy(part: Part, E: Floats) -> float:

@@ -11,20 +11,14 @@ from meshes import MeshError, TetMesh
 from meshes.tetmesh import EDGES
 
 
-def is_straight(mesh: TetMesh) -> bool:
-    """Return whether every mid-side node lies in the middle of its edge."""
-    if mesh.order == 1:
-        return True
-    ends = np.repeat(np.arange(len(mesh.points))[:, None], 2, axis=1)  # a corner's ends: itself
-    ends[mesh.tets[:, 4:]] = mesh.tets[:, EDGES]
-    first, last = mesh.points[ends.T]
-    bow = np.abs(2 * mesh.points - first - last).max()
-    return bool(bow < 1e-10 * np.abs(first - last).max())
-
-
 def shape_nodes(mesh: TetMesh) -> Floats:
-    """Return the nodes (e, a, 3) that define the shape of each element: corners if straight."""
-    return mesh.points[mesh.tets[:, :4] if is_straight(mesh) else mesh.tets]
+    """Return the nodes (e, a, 3) that define each element: corners if all edges are straight."""
+    corners = mesh.points[mesh.tets[:, :4]]
+    if mesh.order == 1:
+        return corners
+    first, last = mesh.points[mesh.tets[:, EDGES]].swapaxes(0, 2).swapaxes(1, 2)
+    bow = np.abs(2 * mesh.points[mesh.tets[:, 4:]] - first - last).max()
+    return corners if bow < 1e-10 * np.abs(first - last).max() else mesh.points[mesh.tets]
 
 
 def gradients(nodes: Floats, n_nodes: int, degree: int, first: int) -> tuple[Floats, Floats]:

@@ -11,7 +11,7 @@ a stiffness that depends on frequency and has no internal variable.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -86,13 +86,6 @@ def relaxing_stiffness(branches: Sequence[Branch], s: Any) -> Any:
 def branch_force(branches: Sequence[Branch], stretch: Floats) -> Any:
     """Return the forces (n,) of branches in N for internal variables (j, n) in metres."""
     return sum(branch.K @ d for branch, d in zip(branches, stretch, strict=True))
-
-
-def on_free(branches: Sequence[Branch], free: Any) -> tuple[Branch, ...]:
-    """Return the branches on the free degrees of freedom."""
-    return tuple(
-        replace(branch, K=sparse.csr_array(branch.K)[free][:, free]) for branch in branches
-    )
 
 
 def property_of(materials: Sequence[Material], name: str) -> Floats:

@@ -196,7 +196,9 @@ def _states_of_stress(
 ) -> tuple[Floats, float]:
     """Return strains of energy-orthonormal states of stress, and the truncated share."""
     reach = 1 / np.maximum(2 * np.pi * hz, RESONANT) ** 2
-    i, j = _strongest_pairs(reach)
+    i, j = np.triu_indices(len(reach))
+    strongest = np.argsort(-reach[i] * reach[j], kind="stable")[:PAIRS]
+    i, j = i[strongest], j[strongest]
     weight = reach[i] * reach[j] * np.where(i == j, 1, 2)
     incompatible = []
     plane = _Plane.of(part, fixed, solver)
@@ -210,12 +212,6 @@ def _states_of_stress(
     large = squares > SMALLEST_STATE**2 * squares.max()
     states = np.tensordot((vectors[:, large] / np.sqrt(squares[large])).T[::-1], strains, axes=1)
     return states, float(np.sqrt(squares[~large].clip(0).sum() / squares.sum()))
-
-
-def _strongest_pairs(reach: Floats) -> tuple[Ints, Ints]:
-    i, j = np.triu_indices(len(reach))
-    order = np.argsort(-reach[i] * reach[j], kind="stable")[:PAIRS]
-    return i[order], j[order]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
