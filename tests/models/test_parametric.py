@@ -234,7 +234,7 @@ def test_ranges_that_few_states_do_not_span_are_refused():
     # Each material resonates elsewhere, without loss: no few states span that.
     at = np.random.default_rng(0).uniform(0, 1, (30, 1, 30)).astype(complex)
     model = of_one_line(np.stack([np.diag(row) for row in np.eye(30)]), np.ones((1, 30)))
-    with pytest.raises(ValueError, match=r"^30 materials of the ranges leave an error of .*"):
+    with pytest.raises(ValueError, match="30 materials"):
         line_bases(model, at, np.ones((30, 1)), 1e-6, lambda x: None)
 
 
