@@ -21,8 +21,8 @@ from simple_model.response import (
     resolution,
     windowed_amplitude,
 )
+from simple_model.spectra import cosines
 from simple_model.typing import Bools, Floats
-from simple_model.windows import cosines
 
 FITTED = 1e-4  # of the strongest line of the load: weaker lines are not fitted
 FAINTEST = 1e-6  # of the strongest line of the load: weaker lines name no peak

@@ -16,9 +16,8 @@ from simple_model.load.pressure import MovingPressure
 from simple_model.load.sampling import step
 from simple_model.numbers import plural, significant, stated_error
 from simple_model.quantities import DISPLACEMENT, PRESSURE, NotApplicable, Quantity, quantity
-from simple_model.spectra import Lines, Spectrum
+from simple_model.spectra import Lines, Spectrum, cosines
 from simple_model.typing import Bools, Complex, Floats, Ints
-from simple_model.windows import cosines
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -241,7 +240,7 @@ def spectrum(response: Response, window: str = "hann") -> tuple[Floats, Floats]:
     """Compute the amplitude spectrum: frequencies (f,) in Hz and amplitudes (f, p) in the unit of
     the response.
 
-    A sinusoid of amplitude a on a bin shows as a under every window, a name in `windows.COSINES`.
+    A sinusoid of amplitude a on a bin shows as a under every window, a name in `spectra.COSINES`.
     """
     amplitude = windowed_amplitude(response.values, window)
     amplitude[0] /= 2
@@ -255,15 +254,8 @@ def windowed_amplitude(x: Floats, window: str) -> Floats:
 
 
 def lines(response: Response, frequencies: ArrayLike, *, settle: float = SETTLE) -> Floats:
-    """Compute line amplitudes: the moduli of `phasors`.
-
-    Parameters
-    ----------
-    response, frequencies, settle : as for `phasors`
-
-    Returns
-    -------
-    (f, p) float, in the unit of the response
+    """Compute line amplitudes (f, p) in the unit of the response: the moduli of `phasors`, with its
+    arguments.
     """
     return np.abs(phasors(response, frequencies, settle=settle))
 

@@ -19,6 +19,13 @@ MOST_PRINTED = 5  # names of lines
 NAMES_ABREAST = 28  # that fit along the frequency axis
 NONE_RESOLVED = "no line of the load is resolved;\na longer Tacton resolves more"
 
+# Weights of cosines (Harris 1978, doi:10.1109/PROC.1978.10837).
+COSINES = {
+    "boxcar": (1.0,),
+    "hann": (0.5, 0.5),
+    "blackmanharris": (0.35875, 0.48829, 0.14128, 0.01168),
+}
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Spectrum:
@@ -126,3 +133,17 @@ def _scale(ax: "Axes", frequencies: Floats, amplitudes: Floats, record: Quantity
     ax.set_xlabel("frequency, Hz")
     ax.set_ylabel(f"amplitude, {record.shown}")
     return end
+
+
+def cosines(name: str, n: int) -> Floats:
+    """Return the periodic window (n,) of a name in `COSINES`, without the slow import of
+    scipy.signal.
+    """
+    choose("window", name, COSINES)
+    if n < 2:
+        return np.ones(n)
+    turn = np.linspace(-np.pi, np.pi, n + 1)[:n]
+    window = np.zeros(n)
+    for k, weight in enumerate(COSINES[name]):
+        window += weight * np.cos(k * turn)
+    return window

@@ -164,22 +164,22 @@ def dispersion_curves(
     f = checked_frequencies(frequencies)
     omega = 2 * np.pi * f
     if stack.is_half_space and len(stack.materials) == 1:
-        found, depths = rayleigh_mode(stack.materials[0], omega)
-        return curves(f, depths, found, ("Rayleigh wave",))
+        roots, depths = rayleigh_mode(stack.materials[0], omega)
+        return curves(f, depths, roots, ("Rayleigh wave",))
     most_roots = CANDIDATES * most
-    fine, (found, depths) = omega, _roots(stack, omega, most_roots)
+    fine, (roots, depths) = omega, _roots(stack, omega, most_roots)
     for _ in range(ROUNDS):
-        is_bound = np.abs(found.wavenumbers.real) > _leaking(stack, fine)[:, None]
-        is_wave = is_bound & ~_is_evanescent(found.wavenumbers)
-        further = frequencies_between(found, fine, is_wave, most)
+        is_bound = np.abs(roots.wavenumbers.real) > _leaking(stack, fine)[:, None]
+        is_wave = is_bound & ~_is_evanescent(roots.wavenumbers)
+        further = frequencies_between(roots, fine, is_wave, most)
         if not len(further):
             break
         # The ends of the band determine elements and depths.
         other, _ = _roots(stack, np.concatenate([omega[:1], further, omega[-1:]]), most_roots)
-        inner = Roots(**{name: values[1:-1] for name, values in vars(other).items()})
-        found, fine = merge_roots(found, fine, inner, further)
-    found = track_modes(found, fine, most, np.searchsorted(fine, omega))
-    return curves(f, depths, found, (), _leaking(stack, omega) if stack.is_half_space else None)
+        inner = other.apply(lambda values: values[1:-1])
+        roots, fine = merge_roots(roots, fine, inner, further)
+    roots = track_modes(roots, fine, most, np.searchsorted(fine, omega))
+    return curves(f, depths, roots, (), _leaking(stack, omega) if stack.is_half_space else None)
 
 
 def _leaking(stack: Stack, omega: Floats) -> Floats:
@@ -261,17 +261,17 @@ def _finite(
     shapes = np.zeros((*k.shape, len(of.depths), 2), np.complex128)
     for axis, x in enumerate((U, W)):
         shapes[:, :, : x.shape[1], axis] = x.swapaxes(1, 2)
-    found = Roots(
+    roots = Roots(
         squared=squared, slope=slope, wavenumbers=k, residues=squared * W[:, 0] ** 2 / norm,
         energy_speed=np.abs(carried.real / stored.real), shapes=shapes,
     )  # fmt: skip
-    return found, of.depths
+    return roots, of.depths
 
 
 def curves(
     frequencies: Floats,
     depths: Floats,
-    found: Roots,
+    roots: Roots,
     names: tuple[str, ...] = (),
     bound: Floats | None = None,
 ) -> DispersionCurves:
@@ -280,24 +280,24 @@ def curves(
     Modes without names are numbered by cut-on. `bound` (f,) in 1/m is the wavenumber of the shear
     wave of a half-space below: waves of smaller wavenumbers leak into it.
     """
-    k = found.wavenumbers
+    k = roots.wavenumbers
     known = np.isfinite(k)
     with np.errstate(invalid="ignore", divide="ignore"):
         omega = 2 * np.pi * frequencies[:, None]
         decays = _is_evanescent(k)
-        stays = found.energy_speed < SLOWEST_FLUX * omega / np.abs(k.real)
+        stays = roots.energy_speed < SLOWEST_FLUX * omega / np.abs(k.real)
         leaks = np.zeros(k.shape, bool) if bound is None else np.abs(k.real) < bound[:, None]
         kinds = np.select(
             [~known, decays | stays, leaks, k.real < 0],
             ["", "evanescent", "leaky", "backward"], "propagating",
         )  # fmt: skip
-        largest = np.abs(found.shapes).max(axis=(2, 3), keepdims=True)
-        shapes = found.shapes / np.where(largest > 0, largest, 1.0)
-        slowness = found.slope / (2 * k)
+        largest = np.abs(roots.shapes).max(axis=(2, 3), keepdims=True)
+        shapes = roots.shapes / np.where(largest > 0, largest, 1.0)
+        slowness = roots.slope / (2 * k)
     modes = [
         Mode(
             name=names[m] if names else "", frequencies=frequencies, wavenumbers=k[:, m],
-            slowness=slowness[:, m], residues=found.residues[:, m], kinds=kinds[:, m],
+            slowness=slowness[:, m], residues=roots.residues[:, m], kinds=kinds[:, m],
             shapes=shapes[:, m],
         )
         for m in range(k.shape[1])

@@ -182,13 +182,7 @@ def steady_state(
 ) -> Response:
     """Compute the steady state of the normal displacement: the lines below half the sampling rate.
 
-    Parameters
-    ----------
-    compliance, pressure, probes, times : as for `flat_body`
-
-    Returns
-    -------
-    Response, displacement (t, p) in metre
+    Takes the arguments of `flat_body`; returns a Response, displacement (t, p) in metre.
     """
     started = time.perf_counter()
     probes = np.atleast_2d(np.array(probes, np.float64))

@@ -11,6 +11,7 @@ depth, leaky waves grow.
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -48,11 +49,11 @@ def rayleigh_mode(material: Material, omega: Floats) -> tuple[Roots, Floats]:
     depths = np.linspace(0, 2 * np.pi / np.median(np.abs(k)), DEPTHS)
     ratio = 2 * k * p / (s**2 + k**2)  # of the SV wave, for no shear stress at the surface
     waves = np.stack([np.ones_like(ratio), ratio], axis=-1)
-    found = Roots(
+    roots = Roots(
         squared=k**2, slope=slope, wavenumbers=k, residues=-p * ks2 / (mu * by_square),
         energy_speed=np.full(k.shape, np.inf), shapes=_shape(k, p, s, waves, depths),
     )  # fmt: skip
-    return found, depths
+    return roots, depths
 
 
 def modes_above_half_space(
@@ -95,17 +96,18 @@ def modes_above_half_space(
     ks2 = np.asarray(ks**2, np.complex128)
     longest = 4 * np.pi / float(ks.real[0, 0] + ks.real[-1, 0])  # in the middle of the band
     reach = np.linspace(0, max(layers.thickness, longest), DEPTHS)
-    found = Roots(
+    roots = Roots(
         squared=k**2, slope=slope, wavenumbers=k,
         residues=2 * k * x[..., len(of.depths)] ** 2 / norm,
         energy_speed=np.full(k.shape, np.inf),
         shapes=_continued(x, ends, k, *_decay(k, ks2, below.poisson, MATCHED[0]), reach),
     )  # fmt: skip
-    kept = {
-        name: np.where(genuine.reshape(genuine.shape + (1,) * (v.ndim - 2)), v, np.nan)
-        for name, v in vars(found).items()
-    }
-    return Roots(**kept), np.concatenate([of.depths, layers.thickness + reach[1:]])
+
+    def without_false(values: Any) -> Any:
+        mask = genuine.reshape(genuine.shape + (1,) * (values.ndim - 2))
+        return np.where(mask, values, np.nan)
+
+    return roots.apply(without_false), np.concatenate([of.depths, layers.thickness + reach[1:]])
 
 
 def _candidates(

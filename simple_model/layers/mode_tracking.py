@@ -1,6 +1,8 @@
 """Modes followed along frequency: matching of roots at neighbouring frequencies."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -35,27 +37,29 @@ class Roots:
     energy_speed: Floats
     shapes: Complex
 
+    def apply(self, change: Callable[[Any], Any]) -> "Roots":
+        """Change every field."""
+        return Roots(**{field.name: change(getattr(self, field.name)) for field in fields(self)})
 
-def track_modes(found: Roots, omega: Floats, most: int, kept: Ints) -> Roots:
+
+def track_modes(roots: Roots, omega: Floats, most: int, kept: Ints) -> Roots:
     """Sort roots at (f,) rad/s into modes, one in each column, NaN where a mode has no root.
 
     A root continues another if the trapezoidal rule of k^2, whose derivative is known, leads from
     one to the other, and if their shapes are alike. Of all modes it returns at most `most`, the
     least evanescent anywhere, of these the slowest, at the frequencies of indices `kept` (g,).
     """
-    from scipy.optimize import linear_sum_assignment  # which takes long to import
-
     count = len(omega)
     index = np.full((count, 0), -1)
     for f in range(count):
-        known = np.flatnonzero(np.isfinite(found.squared[f]))
+        known = np.flatnonzero(np.isfinite(roots.squared[f]))
         seen = np.where(index >= 0, np.arange(count)[:, None], -1).max(axis=0, initial=-1)
         alive = np.flatnonzero(f - seen <= 1 + LONGEST_GAP)
-        roots = index[seen[alive], alive]
-        # Equal costs of unlike pairs keep them from breaking up good ones.
-        costs = np.minimum(_misfit(found, omega, (seen[alive], roots), (f, known)), UNLIKE)
-        pairs = [(alive[i], known[j]) for i, j in zip(*linear_sum_assignment(costs), strict=True)
-                 if costs[i, j] < UNLIKE]  # fmt: skip
+        last = index[seen[alive], alive]
+        costs, matches = _matches(roots, omega, (seen[alive], last), (f, known))
+        pairs = [
+            (alive[i], known[j]) for i, j in zip(*matches, strict=True) if costs[i, j] < UNLIKE
+        ]
         for column, root in pairs:
             index[f, column] = root
         new = np.setdiff1d(known, [root for _, root in pairs])
@@ -64,41 +68,38 @@ def track_modes(found: Roots, omega: Floats, most: int, kept: Ints) -> Roots:
         index = np.hstack([index, begun])
     index = index[kept]
     index = index[:, (index >= 0).any(axis=0)]
-    found = Roots(**{each.name: getattr(found, each.name)[kept] for each in fields(found)})
-    decay = np.abs(found.wavenumbers.imag)
-    decay = np.where(decay > ROUND_OFF * np.abs(found.wavenumbers), decay, 0.0)
+    roots = roots.apply(lambda values: values[kept])
+    decay = np.abs(roots.wavenumbers.imag)
+    decay = np.where(decay > ROUND_OFF * np.abs(roots.wavenumbers), decay, 0.0)
     least = np.where(index >= 0, _at(decay, index), np.inf).min(axis=0)
-    slowness = np.where(decay == 0, np.abs(found.wavenumbers.real) / omega[kept, None], 0.0)
+    slowness = np.where(decay == 0, np.abs(roots.wavenumbers.real) / omega[kept, None], 0.0)
     slowest = np.where(index >= 0, _at(slowness, index), 0.0).max(axis=0)
     least = np.lexsort([-slowest, least])[:most]
     index = index[:, least]
-    picked = {}
-    for field in fields(found):
-        values = _at(getattr(found, field.name), index)
+
+    def pick(values: Any) -> Any:
+        values = _at(values, index)
         missing = (index < 0).reshape(index.shape + (1,) * (values.ndim - 2))
         none = complex(np.nan, np.nan) if np.iscomplexobj(values) else np.nan
-        picked[field.name] = np.where(missing, none, values)
-    return Roots(**picked)
+        return np.where(missing, none, values)
+
+    return roots.apply(pick)
 
 
-def frequencies_between(found: Roots, omega: Floats, waves: Bools, most: int) -> Floats:
+def frequencies_between(roots: Roots, omega: Floats, waves: Bools, most: int) -> Floats:
     """Frequencies (g,) in rad/s at the middle of gaps across which modes cannot be followed safely;
     `waves` (f, m) marks roots that are waves.
     """
-    from scipy.optimize import linear_sum_assignment  # which takes long to import
-
     further = []
     for f in np.flatnonzero(omega[1:] > NARROW * omega[:-1]).tolist():
-        here, there = (np.flatnonzero(np.isfinite(found.squared[g])) for g in (f, f + 1))
-        costs = _misfit(found, omega, (np.full(len(here), f), here), (f + 1, there))
-        costs = np.minimum(costs, UNLIKE)
-        pairs = linear_sum_assignment(costs)
+        here, there = (np.flatnonzero(np.isfinite(roots.squared[g])) for g in (f, f + 1))
+        costs, pairs = _matches(roots, omega, (np.full(len(here), f), here), (f + 1, there))
         is_sure = np.zeros(costs.shape, bool)
         is_sure[pairs] = costs[pairs] <= SURE
         rivals = costs < RIVAL
         is_sure &= (rivals.sum(axis=1, keepdims=True) == 1) & (rivals.sum(axis=0) == 1)
-        for g, roots, axis in ((f, here, 1), (f + 1, there, 0)):
-            slowness = np.where(waves[g, roots], np.abs(found.wavenumbers[g, roots].real), 0.0)
+        for g, chosen, axis in ((f, here, 1), (f + 1, there, 0)):
+            slowness = np.where(waves[g, chosen], np.abs(roots.wavenumbers[g, chosen].real), 0.0)
             slowest = np.argsort(-slowness)[:most]
             slowest = slowest[slowness[slowest] > 0]
             if not np.any(is_sure, axis=axis, keepdims=True).ravel()[slowest].all():
@@ -107,15 +108,17 @@ def frequencies_between(found: Roots, omega: Floats, waves: Bools, most: int) ->
     return np.array(further)
 
 
-def merge_roots(found: Roots, omega: Floats, other: Roots, further: Floats) -> tuple[Roots, Floats]:
+def merge_roots(roots: Roots, omega: Floats, other: Roots, further: Floats) -> tuple[Roots, Floats]:
     """Merge roots at two sets (f,) and (g,) of frequencies in rad/s; return them and the
     frequencies.
     """
     both = np.concatenate([omega, further])
     order = np.argsort(both)
-    pairs = ((each.name, getattr(found, each.name), getattr(other, each.name))
-             for each in fields(found))  # fmt: skip
-    return Roots(**{name: np.concatenate(pair)[order] for name, *pair in pairs}), both[order]
+    values = {
+        name: np.concatenate([value, getattr(other, name)])[order]
+        for name, value in vars(roots).items()
+    }
+    return Roots(**values), both[order]
 
 
 def _at(values: Complex | Floats, index: np.ndarray) -> np.ndarray:
@@ -123,13 +126,23 @@ def _at(values: Complex | Floats, index: np.ndarray) -> np.ndarray:
     return np.asarray(values[np.arange(len(index))[:, None], index])
 
 
+def _matches(
+    roots: Roots, omega: Floats, before: tuple[Ints, Ints], after: tuple[int, Ints]
+) -> tuple[Floats, tuple[Ints, Ints]]:
+    """Misfits (n, m), at most `UNLIKE`, and the best pairs; equal costs spare good pairs."""
+    from scipy.optimize import linear_sum_assignment  # slow to import
+
+    costs = np.minimum(_misfit(roots, omega, before, after), UNLIKE)
+    return costs, linear_sum_assignment(costs)
+
+
 def _misfit(
-    found: Roots, omega: Floats, before: tuple[Ints, Ints], after: tuple[int, Ints]
+    roots: Roots, omega: Floats, before: tuple[Ints, Ints], after: tuple[int, Ints]
 ) -> Floats:
     """Misfit (n, m) of the roots at n places (f, m) with m roots at a later frequency."""
-    (f, m), (g, roots) = before, after
-    start, end = found.squared[f, m][:, None], found.squared[g, roots]
-    rise, later = found.slope[f, m][:, None], found.slope[g, roots]
+    (f, m), (g, n) = before, after
+    start, end = roots.squared[f, m][:, None], roots.squared[g, n]
+    rise, later = roots.slope[f, m][:, None], roots.slope[g, n]
     led = start + (omega[g] - omega[f])[:, None] * (rise + later) / 2
     size = np.abs(start) + np.abs(end) + 0.01 * np.abs(end).max(initial=0.0)
     missed = np.abs(led - end) / size
@@ -137,7 +150,7 @@ def _misfit(
     w, v = omega[f][:, None], omega[g]
     power = (w * rise / start + v * later / end) / 2
     missed = np.minimum(missed, np.abs(np.log(end / start) - power * np.log(v / w)) / 2)
-    a, b = (x.reshape(len(x), found.shapes[0, 0].size)
-            for x in (found.shapes[f, m], found.shapes[g, roots]))  # fmt: skip
+    a, b = (x.reshape(len(x), roots.shapes[0, 0].size)
+            for x in (roots.shapes[f, m], roots.shapes[g, n]))  # fmt: skip
     a, b = (x / np.maximum(np.linalg.norm(x, axis=1), 1e-300)[:, None] for x in (a, b))
     return np.asarray(missed + SHAPE_WEIGHT * (1 - np.abs(a.conj() @ b.T)))

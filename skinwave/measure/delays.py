@@ -5,7 +5,7 @@ lines by the maxima of the correlation of two sums of sinusoids.
 import numpy as np
 from scipy.special import fdtrc
 
-from simple_model.windows import cosines
+from simple_model.spectra import cosines
 from skinwave.typing import Floats
 
 TRIALS_PER_PERIOD = 8  # of the highest line

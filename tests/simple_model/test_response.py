@@ -16,8 +16,8 @@ from simple_model import (
     lines,
     phasors,
     point_kernel,
+    spectra,
     spectrum,
-    windows,
 )
 from skinwave.results.run import ASSESSED
 
@@ -55,8 +55,8 @@ def test_a_response_that_cannot_be_is_refused_in_a_sentence():
 
 def test_windows_are_scipys():
     n = 1001
-    for name in windows.COSINES:
-        np.testing.assert_array_equal(windows.cosines(name, n), signal.get_window(name, n))
+    for name in spectra.COSINES:
+        np.testing.assert_array_equal(spectra.cosines(name, n), signal.get_window(name, n))
 
 
 def test_what_few_commands_need_is_not_imported_by_all():
