@@ -273,21 +273,6 @@ def test_command_writes_a_page_a_table_and_arrays(tmp_path, capsys):
     assert arrays["frequency_hz"].max() == 300
 
 
-def test_command_refuses_in_one_sentence(tmp_path, capsys):
-    from skinwave.commands.cli import main
-
-    scene, out = tmp_path / "scene.toml", tmp_path / "out"
-    for body, asked in (
-        ("none", []),
-        ("slab", ["--highest", "nan"]),
-        ("slab", ["--highest", "1e9"]),
-    ):
-        scene.write_text(f'{CIRCLE}kind = "{body}"')
-        assert main(["dispersion", str(scene), "--quiet", "--out", str(out), *asked]) == 2
-        assert capsys.readouterr().err.count("\n") == 1
-        assert not out.exists()
-
-
 def bound_speeds(stack, hertz, slowest, fastest):
     """Speeds of the waves between two, ascending, where the compliance of the surface is infinite:
     without loss 1/G is real, and each sign of it that changes through 0 is one.

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from circling import circling
 from scipy.interpolate import CubicSpline
 
 from simple_model import (
@@ -41,13 +42,6 @@ def solved(scene, **options):
     return solve(scene, plan(scene, SolveOptions(**options)))
 
 
-def circling(size, speed, am=0.0, **load):
-    path = Trajectory(shape="circle", size=size, speed=speed)
-    return MovingPressure(
-        tacton=Tacton(am_frequency=am, trajectory=path), **{"peak_pressure": 1.0} | load
-    )
-
-
 def misfit(found, expected, alternating, late=LATE):
     """Root mean square (p,) of what differs late, relative to that of the alternating part."""
     return np.sqrt(((found - expected)[late] ** 2).mean(axis=0)) / alternating
@@ -72,7 +66,7 @@ def test_flat_body_settles_into_the_steady_state_on_fast_circles():
     ("model", "size", "speed", "folded"),
     [(flat_body, 0.02, 100.0, 450.7), (steady_state, 0.005, 60.0, 2360.6)],
 )
-def test_no_line_of_a_fast_circle_shows_at_another_frequency(model, size, speed, folded):
+def test_lines_of_a_fast_circle_do_not_alias(model, size, speed, folded):
     load = circling(size, speed)
     false = lines(model(PALM, load, PROBES, TIMES), [folded], settle=0.5)
     assert (false < 1e-3 * alternating(load)).all()
@@ -95,13 +89,7 @@ def lines_of(x):
     return 2 * np.abs(np.fft.rfft(window * x, n=10_000, axis=0)) / window.sum()
 
 
-def test_the_kernel_of_ordinary_paths_is_the_load_itself():
-    load = circling(0.03, 18.0, 200.0)
-    found = point_kernel(load, PROBES, TIMES).displacement
-    np.testing.assert_array_equal(found, load(PROBES, TIMES))
-
-
-def test_time_steps_resolve_a_fast_focus_and_leave_others_alone():
+def test_time_steps_resolve_a_fast_focus():
     assert resolving_step(circling(0.03, 18.0, 200.0), 5e-5) == 5e-5
     load = circling(0.005, 100.0)
     assert 1 / resolving_step(load, 5e-5) > 6 * load.tacton.drawing_frequency
@@ -134,7 +122,7 @@ def test_a_slow_line_jumps_back_at_once(model):
     assert np.abs(found - expected)[late].max() < 5e-3 * np.abs(expected).max()
 
 
-def test_jumps_of_a_recording_are_where_they_are():
+def test_jumps_of_a_recording_are_exact_in_time():
     """Between samples and at the end of its period, against eight times as many samples."""
     path = Trajectory(
         shape="recorded", points=((0.006, 0.006), (0.006, -0.006), (-0.006, -0.006)) * 2,
@@ -166,7 +154,7 @@ def test_rates_are_right_to_the_last_sample(order):
     assert np.abs(differs).max() < 1e-3 * np.ptp(expected, axis=0).min()
 
 
-def test_lines_that_are_left_out_are_named():
+def test_a_warning_names_lines_that_are_left_out():
     load = MovingPressure(tacton=Tacton(am_frequency=310.0, duration=0.4))
     scene = Scene(pressure=load, body=replace(SKIN, sides="absorbing"))
     found = solved(scene, model="flat-body-harmonic", times=np.arange(200) / 500)
@@ -178,7 +166,7 @@ def test_lines_that_are_left_out_are_named():
     assert not any("sampling rate" in each for each in cured.effort.warnings)
 
 
-def test_every_model_answers_at_the_times_asked_for():
+def test_every_model_returns_the_given_times():
     load = circling(0.005, 6.0)
     load = replace(load, tacton=replace(load.tacton, duration=0.02))
     times = 0.005 + np.arange(30) / 2e3

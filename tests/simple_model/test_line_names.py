@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from circling import circle
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -23,10 +24,6 @@ from simple_model.response import SETTLE, fit_lines
 
 TIMES = np.arange(6000) / 6000
 PLACES = [[0.0, 0.0], [0.006, 0.0], [0.012, 0.002]]
-
-
-def circle(f_d, size=0.02):
-    return Trajectory(shape="circle", size=size, speed=size * np.pi * f_d)
 
 
 def answered(drive="linear", places=PLACES, times=TIMES, **tacton):
@@ -61,7 +58,7 @@ def test_the_squared_law_has_pairs_about_multiples_of_f_d_at_twice_f_am():
 # Names
 
 
-def test_names_say_their_frequencies():
+def test_names_give_the_frequencies_of_lines():
     tacton = Tacton(
         am_frequency=140, second_am_frequency=217, superposition=(0.5, 0.5), envelope_frequency=7,
         trajectory=circle(190.986), rhythm=Rhythm(pulses=((0.05, 0.03),)),
@@ -128,7 +125,7 @@ loads = st.builds(
 
 @settings(max_examples=15)
 @given(loads)
-def test_the_table_is_the_spectrum(load):
+def test_the_line_table_matches_the_spectrum(load):
     """The strongest line of the table is the strongest of the spectrum, and what is listed leaves a
     thousandth of the power at most; not of a rhythm, whose lines have no end, nor of what one
     second does not resolve.
@@ -181,7 +178,7 @@ def struck(frequency=87.0, decay=6.0, strength=0.3, quantity="displacement"):
     return load, response
 
 
-def test_a_free_vibration_is_told_from_a_line_of_the_load():
+def test_a_free_vibration_differs_from_a_line_of_the_load():
     table = line_table(*struck())
     assert [peak.kind for peak in table.unnamed] == [FREE]
     assert table.unnamed[0].frequency == pytest.approx(87, abs=0.2)
@@ -190,7 +187,7 @@ def test_a_free_vibration_is_told_from_a_line_of_the_load():
     assert line_table(*struck(strength=3e-3)).unnamed == ()  # below -40 dB
 
 
-def test_what_neither_decays_nor_is_in_the_load_is_unnamed():
+def test_a_steady_peak_that_is_not_in_the_load_is_unnamed():
     table = line_table(*struck(decay=0.0))
     assert [peak.kind for peak in table.unnamed] == [UNNAMED]
     assert table.unnamed[0].amplitudes[0] == pytest.approx(0.3e-6, rel=0.02)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from circling import circle
 
 import skinwave
 from simple_model import (
@@ -23,7 +24,7 @@ from simple_model import (
 from skinwave.planning.simulate import compute
 
 
-def test_the_papers_circles_are_drawn_at_191_hz():
+def test_the_circles_of_the_paper_are_drawn_at_191_hz():
     for size, speed in ((0.010, 6), (0.030, 18)):
         path = Trajectory(shape="circle", size=size, speed=speed)
         assert path.drawing_frequency == pytest.approx(190.986, abs=5e-4)
@@ -63,13 +64,9 @@ def test_values_out_of_range_are_refused():
             build()
 
 
-def test_a_misspelt_word_is_answered_by_the_nearest():
+def test_an_error_suggests_the_nearest_word():
     with pytest.raises(ValueError, match="did you mean 'circle'"):
         Trajectory(shape="circel")
-
-
-def circle(f_d):
-    return Trajectory(shape="circle", size=0.02, speed=0.02 * np.pi * f_d)
 
 
 BOTH = {"second_am_frequency": 101.0, "superposition": (0.5, 0.5)}
@@ -122,7 +119,7 @@ def array_intensity(points, height):
     return np.abs(p) ** 2
 
 
-def test_the_main_lobe_is_the_arrays():
+def test_the_main_lobe_matches_the_array():
     from_array = array_intensity(on_axis(D_MM), 0.2)
     np.testing.assert_allclose(focal_spot(on_axis(D_MM)), from_array / from_array[0], atol=0.006)
 
@@ -136,7 +133,7 @@ def test_the_array_makes_the_published_table():
 
 
 @pytest.mark.parametrize(("height", "half_width"), [(0.1, 3.2), (0.3, 7.3)])
-def test_every_spot_has_the_arrays_half_width(height, half_width):
+def test_every_spot_has_the_half_width_of_the_array(height, half_width):
     for focus in ("main_lobe", "gaussian", "array"):
         at_half = focal_spot(on_axis(np.array([half_width])), height, focus)
         assert at_half == pytest.approx(0.5, abs=0.03), focus
@@ -185,14 +182,14 @@ SHORT = Tacton(am_frequency=140, duration=0.01)
 SKIN = skinwave.Body(width=0.04, height=0.04, depth=0.01)
 
 
-def test_models_of_lines_refuse_a_load_with_formulas_of_its_own():
+def test_models_of_lines_refuse_subclasses_of_the_load():
     scene = skinwave.Scene(pressure=Louder(tacton=SHORT), body=SKIN)
     for model in ("auto", "flat-body"):
         with pytest.raises(ValueError, match="Louder"):
             skinwave.simulate(scene, model)
 
 
-def test_models_that_evaluate_the_load_honour_its_own_formulas():
+def test_models_that_evaluate_the_load_accept_subclasses():
     plain, louder = (
         compute(skinwave.Scene(pressure=load(tacton=SHORT), body=SKIN), "fem-transient", h=0.01)
         for load in (MovingPressure, Louder)

@@ -69,7 +69,7 @@ def scene(material, drive="linear", **tacton):
 # The laws
 
 
-def test_with_the_exponent_1_they_are_kelvin_voigt_and_standard_linear_solid():
+def test_fractional_laws_with_exponent_1_are_kelvin_voigt_and_zener():
     viscous = Material(density=1.0, shear_modulus=25e3, poisson=0.4, viscosity=25e3 * 0.3e-3)
     linear = Material(
         density=1.0, shear_modulus=20e3, poisson=0.4, prony=(PronyTerm(modulus=40e3, time=5e-4),)
@@ -92,7 +92,7 @@ def test_constants_out_of_range_are_refused():
 # Prony series
 
 
-def test_a_series_is_as_near_as_it_says_and_no_longer_than_it_must_be():
+def test_a_series_has_its_stated_error_and_few_terms():
     solid, modulus, tolerance = ZENER, zener, 1e-3
     series = solid.series(tolerance)
     f = np.geomspace(*series.band, 997)
@@ -107,7 +107,7 @@ def test_a_series_is_as_near_as_it_says_and_no_longer_than_it_must_be():
     np.testing.assert_allclose(relaxed, series(2 * np.pi * f), rtol=1e-13)
 
 
-def test_flat_body_takes_the_series_of_a_table_at_complex_frequencies():
+def test_flat_body_uses_the_series_of_a_table():
     circle = Trajectory(shape="circle", size=0.01, speed=4.0)
     # From 0 Hz on, where a table does not leave open what it creeps to.
     table = table_of(ECOFLEX, [0.0, *np.geomspace(1.0, 3000.0, 60)])
@@ -119,7 +119,7 @@ def test_flat_body_takes_the_series_of_a_table_at_complex_frequencies():
 # What a plan says of it
 
 
-def test_a_plan_counts_the_series_in_its_error():
+def test_the_expected_error_of_a_plan_includes_the_series():
     noise = np.random.default_rng(0).standard_normal((2, len(HERTZ)))
     moduli = ECOFLEX.complex_modulus(2 * np.pi * HERTZ) * (1 + 0.03 * (noise[0] + 1j * noise[1]))
     rough = tabulated(density=1070, poisson=0.4999, frequencies=HERTZ, moduli=moduli)
@@ -166,7 +166,7 @@ def test_a_table_continues_by_its_series():
     [(lambda w: 25e3 + 10e3j * np.sign(w), "not causal"),
      (lambda w: 25e3 * (1 - 1e-4j * w), "loss modulus")],
 )  # fmt: skip
-def test_a_law_of_no_solid_is_refused_by_every_model(law, said):
+def test_every_model_refuses_an_impossible_law(law, said):
     own = scene(replace(ECOFLEX, law=law))
     with pytest.raises(ValueError, match=said):
         skinwave.plan(own)
@@ -182,7 +182,7 @@ BODY = "[body.material]\ndensity_kg_m3 = 1070\npoisson = 0.4999\n"
 HEADER = "frequency_hz,storage_pa,loss_pa\n"
 
 
-def test_a_table_is_read_from_beside_the_scene(tmp_path):
+def test_a_table_is_read_from_the_folder_of_the_scene(tmp_path):
     """The complete scene has its numbers, and needs the file no more."""
     rows = "200,27e3,5e3\n20,25e3,1e3\n# a comment\n60, 26e3 ,3e3\n"
     (tmp_path / "moduli.csv").write_text(HEADER + rows)
@@ -201,7 +201,7 @@ def test_a_table_is_read_from_beside_the_scene(tmp_path):
         loads(BODY + 'table = "moduli.csv"\n')
 
 
-def test_a_file_of_moduli_of_bad_content_is_refused():
+def test_invalid_files_of_moduli_are_refused():
     for text, said in (
         ("", "frequency_hz"), ("1,2\n", "three numbers"), ("10,0,3\n", "storage modulus"),
         ("10,1e4,3\n10,1e4,4\n", "does not rise"), ("0,1e4,3\n10,1e4,4\n", "at 0 Hz"),

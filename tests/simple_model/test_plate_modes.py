@@ -212,7 +212,7 @@ def test_the_moving_load_is_that_of_a_fine_grid():
     np.testing.assert_allclose(u, (modal_motion(modes, f, found, modulus) @ shapes.T), rtol=1e-12)
 
 
-def test_plates_that_are_none_are_refused():
+def test_invalid_plates_are_refused():
     given = {"size_x": SIDE, "size_y": SIDE, "d11": D, "d22": D, "d12": 0.0, "d66": D / 2,
              "mass_per_area": MASS}  # fmt: skip
     for change in ({"size_x": 0.0}, {"left": "glued"}, {"clips": ((0.06, 0.0),)}, {"d12": 4e-4}):
@@ -224,7 +224,7 @@ def test_plates_that_are_none_are_refused():
     "losses",
     [{"viscosity": 20.0}, {"viscosity": 2.0, "prony": (PronyTerm(modulus=5e3, time=1e-3),)}],
 )
-def test_modes_from_rest_are_those_of_ordinary_differential_equations(losses):
+def test_modes_from_rest_match_ordinary_differential_equations(losses):
     """Underdamped, overdamped and relaxing; acceleration at the start is force per mass."""
     solid = Material(density=1000, shear_modulus=25e3, poisson=0.3, **losses)
     plate = isotropic(nu=0.3, tension_x=20.0)

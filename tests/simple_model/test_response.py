@@ -29,7 +29,7 @@ def made(**changed):
     return Response(model="made", **(parts | changed))
 
 
-def test_the_callers_arrays_stay_the_callers():
+def test_a_response_copies_its_arrays():
     mine = {"times": TIMES.copy(), "probes": np.zeros((2, 2)), "values": np.ones((5, 2))}
     response = made(**mine)
     for array in mine.values():
@@ -40,7 +40,7 @@ def test_the_callers_arrays_stay_the_callers():
         response.displacement[0] = 2.0
 
 
-def test_a_response_that_cannot_be_is_refused_in_a_sentence():
+def test_invalid_responses_are_refused():
     for changed in (
         {"times": TIMES[:, None]},
         {"probes": np.zeros((2, 4))},
@@ -53,13 +53,13 @@ def test_a_response_that_cannot_be_is_refused_in_a_sentence():
             made(**changed)
 
 
-def test_windows_are_scipys():
+def test_windows_match_scipy():
     n = 1001
     for name in spectra.COSINES:
         np.testing.assert_array_equal(spectra.cosines(name, n), signal.get_window(name, n))
 
 
-def test_what_few_commands_need_is_not_imported_by_all():
+def test_slow_imports_are_deferred():
     """Each of a study's processes and each page would wait for it."""
     code = "import fem, simple_model, sys; print(*sys.modules)"
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -122,7 +122,7 @@ def test_the_spectrum_shows_amplitudes():
         (0.030, 18, 0.015, [0.125, 0.213, 0.189, 0.153]),
     ],
 )
-def test_stm_alone_has_the_kernels_own_lines(size, speed, probe, expected):
+def test_lines_of_stm_are_those_of_the_kernel(size, speed, probe, expected):
     _, response = kernel(size=size, speed=speed, probes=[[probe, 0.0]])
     f_d = 190.98593171027443
     found = lines(response, np.arange(4) * f_d)[:, 0]

@@ -12,6 +12,8 @@ from simple_model import (
     Tacton,
     Trajectory,
     commanded_signal,
+    even_phases,
+    joined,
     line_table,
     lines,
     named_lines,
@@ -45,7 +47,7 @@ def wandering(seconds=0.03, count=601, **more):
 
 
 @pytest.mark.parametrize("drive", ["linear", "pressure_squared"])
-def test_there_is_silence_in_the_gaps(drive):
+def test_gaps_have_no_pressure(drive):
     tacton = Tacton(am_frequency=140, trajectory=CIRCLE, rhythm=PULSES)
     x = point_kernel(MovingPressure(tacton=tacton, drive=drive), PLACES, TIMES).displacement
     into = np.mod(TIMES + 1e-9, PULSES.period)
@@ -70,28 +72,90 @@ def test_pulses_make_lines_of_their_period():
     assert found["2f_r"] < 1e-3
 
 
-@pytest.mark.parametrize(
-    ("foci", "extra"),
-    [
-        ((0.0, 0.3), {"rhythm": PULSES}),
-        ((0.0,), {"signal": Signal(rate=800, samples=(0.0, 0.4, 1.0, 0.3, -0.8, 0.1))}),
-        ((0.0, 0.3), {"signal": Signal(rate=60, samples=(0.0, 0.4, 1.0, 0.3), role="envelope")}),
-    ],
+FREQUENCY = 185.0
+STRAIGHT = (
+    Trajectory(shape="square", size=0.015, centre=(-0.015, 0.010)),
+    Trajectory(shape="line", size=0.020, centre=(0.020, 0.0)),
+    Trajectory(shape="triangle", size=0.010, centre=(0.0, -0.020)),
+    Trajectory(shape="point", centre=(0.0, 0.020)),
 )
-def test_lines_are_those_of_the_load_sampled(extra, foci):
-    """Against a transform of the point kernel at 320 kHz, up to 1 kHz."""
-    tacton = Tacton(
+WITH_ROUND = (Trajectory(shape="circle", size=0.020, centre=(-0.010, 0.0)), STRAIGHT[1])
+RAMPED = Rhythm(pulses=((0.010, 0.006), (0.004, 0.013)), ramp=0.001)
+AROUND = np.array([[0.0, 0.0], [-0.015, 0.010], [0.020, 0.001], [0.004, -0.018]])
+
+
+def together(paths, **more):
+    """Foci on paths of their own, by one recording."""
+    return Tacton(trajectory=joined(paths, FREQUENCY), foci=even_phases(len(paths)), **more)
+
+
+def on_circle(**more):
+    return Tacton(
         am_frequency=90.0, second_am_frequency=131.0, superposition=(0.75, 0.25), duration=0.25,
-        trajectory=CIRCLE, foci=foci, **extra,
+        trajectory=CIRCLE, **more,
     )  # fmt: skip
-    load = MovingPressure(tacton=tacton)
-    fine = (np.arange(80_000) + 0.5) / 320_000
-    sampled = np.fft.rfft(load(PLACES, fine), axis=0)[:251] / 80_000
-    sampled *= np.exp(-1j * np.pi * np.arange(251) / 80_000)[:, None]
+
+
+@pytest.mark.parametrize(
+    ("tacton", "places", "most"),
+    [
+        (on_circle(foci=(0.0, 0.3), rhythm=PULSES), PLACES, 2e-4),
+        (on_circle(signal=Signal(rate=800, samples=(0.0, 0.4, 1.0, 0.3, -0.8, 0.1))), PLACES, 2e-4),
+        (
+            on_circle(
+                foci=(0.0, 0.3),
+                signal=Signal(rate=60, samples=(0.0, 0.4, 1.0, 0.3), role="envelope"),
+            ),
+            PLACES,
+            2e-4,
+        ),
+        (together(STRAIGHT, rhythm=RAMPED, duration=0.297), AROUND, 5e-4),
+        (together(WITH_ROUND, am_frequency=140.0, duration=0.2), AROUND, 5e-4),
+    ],
+    ids=["rhythm", "signal", "envelope", "joined", "joined with a circle"],
+)
+def test_lines_match_a_transform_of_the_sampled_load(tacton, places, most):
+    """At 320 kHz, up to about 1 kHz."""
+    load, count = MovingPressure(tacton=tacton), round(tacton.duration * 320_000)
+    kept = 251 if tacton.duration == 0.25 else 200
+    sampled = np.fft.rfft(load(places, (np.arange(count) + 0.5) / 320_000), axis=0)[:kept] / count
+    sampled *= np.exp(-1j * np.pi * np.arange(kept) / count)[:, None]
     sampled[1:] *= 2
-    f, a = load_lines(load).gather(path_fourier(load, load.spot(PLACES, path_samples(load)).T).T)
-    np.testing.assert_allclose(f[:251], np.arange(251) / 0.25, atol=1e-8)
-    assert np.abs(a[:251] - sampled).max() < 2e-4 * np.abs(sampled).max()
+    f, a = load_lines(load).gather(path_fourier(load, load.spot(places, path_samples(load)).T).T)
+    rank = np.round(f * tacton.duration).astype(int)
+    np.testing.assert_allclose(f, rank / tacton.duration, atol=1e-6)
+    computed = np.zeros_like(sampled)
+    computed[rank[rank < kept]] = a[rank < kept]
+    assert np.abs(computed - sampled).max() < most * np.abs(sampled).max()
+
+
+@pytest.mark.parametrize("more", [{"am_frequency": 140.0}, {"rhythm": RAMPED}])
+def test_the_pressure_of_joined_paths_is_the_mean_of_each(more):
+    rng = np.random.default_rng(1)
+    points, times = rng.uniform(-0.04, 0.04, (200, 2)), rng.random(300)
+    for paths, error in ((STRAIGHT, 1e-6), (STRAIGHT[1:2], 1e-6), (WITH_ROUND, 2e-3)):
+        each = [replace(path, speed=FREQUENCY * path.length) for path in paths]
+        alone = [MovingPressure(tacton=Tacton(trajectory=path, **more)) for path in each]
+        mean = sum(load(points, times) for load in alone) / len(paths)
+        pressure = MovingPressure(tacton=together(paths, **more))(points, times)
+        assert np.abs(pressure - mean).max() < error * np.abs(mean).max()
+
+
+def test_lines_of_joined_paths_have_the_names_of_the_common_frequency():
+    load = MovingPressure(tacton=together(STRAIGHT, am_frequency=83.0, duration=0.2))
+    names = named_lines(load)
+    assert load.tacton.drawing_frequency == pytest.approx(FREQUENCY)
+    assert [name for name in names if name.endswith("f_d")][:3] == ["f_d", "2f_d", "3f_d"]
+    assert names["f_d"] == pytest.approx(FREQUENCY)
+    assert names["2f_d-f_AM"] == pytest.approx(2 * FREQUENCY - 83)
+    # Lines at a quarter of it cancel between the paths.
+    f = load_lines(MovingPressure(tacton=together(STRAIGHT))).frequencies
+    assert len(f) > 8
+    np.testing.assert_allclose(f / FREQUENCY, np.round(f / FREQUENCY), atol=1e-9)
+    response = point_kernel(load, AROUND, np.arange(8000) / 4e4)
+    assert (lines(response, [names["f_d"], names["f_d-f_AM"]]).max(axis=1) > 0.1).all()
+    once = together(STRAIGHT, duration=1 / FREQUENCY)
+    assert not named_lines(MovingPressure(tacton=once))
 
 
 def test_even_foci_leave_only_multiples_of_their_number():
@@ -139,7 +203,7 @@ def test_polylines_run_at_constant_speed_round_or_there_and_back():
         assert np.median(steps) == pytest.approx(path.length / 28000, rel=1e-6)
 
 
-def test_a_recording_is_where_and_when_it_was():
+def test_a_recording_keeps_its_positions_and_times():
     path = wandering()
     now = np.array(path.times)[:-1]
     np.testing.assert_allclose(path.position(now), np.array(path.points)[:-1], atol=1e-12)
@@ -183,7 +247,7 @@ def small_scene(duration=0.03, **tacton):
 
 
 @pytest.mark.parametrize("name", LOADS)
-def test_lines_and_time_steps_answer_the_same_load(name):
+def test_lines_and_time_steps_give_the_same_motion(name):
     scene = small_scene(0.03 if "pulses" in name else 0.015, **LOADS[name])
     scene = replace(scene, body=replace(scene.body, sides="clamped"))  # no layer around it
     x = compute(scene, "fem", h=0.006).displacement
@@ -192,7 +256,7 @@ def test_lines_and_time_steps_answer_the_same_load(name):
     assert error.max() < 2e-3 if "pulses" in name else error.max() < 1e-3
 
 
-def test_what_cannot_be_is_refused_in_one_sentence():
+def test_invalid_rhythms_signals_and_paths_are_refused():
     for build in (
         lambda: Rhythm(pulses=((0.0, 0.1),)),
         lambda: Rhythm(pulses=((0.01, 0.0),), ramp=0.006),
@@ -204,6 +268,9 @@ def test_what_cannot_be_is_refused_in_one_sentence():
         lambda: Trajectory(shape="circle", points=((0, 0), (0, 1))),
         lambda: replace(wandering(), levels=(1.0,)),
         lambda: Trajectory(shape="recorded", points=((0, 0),) * 2, times=(1, 2)),
+        lambda: joined((), 100.0),
+        lambda: joined(STRAIGHT, float("nan")),
+        lambda: joined((joined(STRAIGHT, 1.0),), 1.0),
     ):
         with pytest.raises(ValueError, match="[a-z]") as error:
             build()

@@ -42,15 +42,6 @@ def block():
     return mesh, force, fem.probe_operator(mesh, [[0.0, 0.0], [0.005, 0.0]])
 
 
-def test_the_modulus_goes_from_what_lasts_to_the_whole():
-    solid = fem.Material(
-        density=1000, shear_modulus=25e3, poisson=0.45, prony=(PronyTerm(modulus=10e3, time=5e-4),)
-    )
-    assert solid.complex_modulus(0.0) == 25e3
-    assert solid.complex_modulus(1e12) == pytest.approx(35e3)
-    assert solid.complex_modulus(1 / 5e-4) == pytest.approx(30e3 + 5e3j)  # the peak of the loss
-
-
 def layered(mesh):
     """Two materials that relax in different times on one that does not."""
     depth = -mesh.points[mesh.tets[:, :4], 2].mean(axis=1)
@@ -110,7 +101,7 @@ def test_reduced_motion_from_rest_is_that_of_the_transient():
     assert misfit.max() <= 1e-3
 
 
-def test_what_is_lost_in_dashpots_of_the_law_is_accounted_for():
+def test_the_energy_balance_includes_losses_of_the_law():
     found = compute(SCENE, "fem-transient", h=0.012)
     assert found.effort.energy_imbalance < 1e-6
     assert 0 < found.effort.radiated < 0.9  # all that is not radiated is lost in the law
