@@ -38,11 +38,11 @@ FREE, UNRESOLVED, UNNAMED = "free vibration", "unresolved", "unnamed"
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Unnamed:
     """A peak that is not a single line of the load: `frequency` in Hz, `amplitudes` (p,), and
-    `kind`:
+    `kind`.
 
-    "free vibration"  of a body after its start: it decays "unresolved"      lines of the load too
-    close to each other for a short response "unnamed"         anything else, such as a harmonic of
-    a nonlinear body
+    Kinds are "free vibration" of a body after its start, which decays; "unresolved" lines of the
+    load, too close to each other for a short response; and "unnamed" for any other peak, such as a
+    harmonic of a nonlinear body.
     """
 
     frequency: float
@@ -145,8 +145,8 @@ def resolved_lines(
     return _named(named, known), _named(named, lost)
 
 
-def _named(named: LineNames, kept: Bools) -> dict[str, float]:
-    return {named.names[k]: float(named.frequencies[k]) for k in np.flatnonzero(kept)}
+def _named(named: LineNames, chosen: Bools) -> dict[str, float]:
+    return {named.names[k]: float(named.frequencies[k]) for k in np.flatnonzero(chosen)}
 
 
 def _floored(named: LineNames) -> Floats:

@@ -399,9 +399,9 @@ def _weighted_waves(
         raise ValueError(f"{len(times)} samples are too few to fit lines; record more")
     distinct, which = _distinct(frequencies, 1 / span)
     basis = _waves(distinct, times)
-    kept = basis[:, first:]
-    weighted = kept * np.kaiser(kept.shape[1], _beta(_closest(distinct, span)))
-    inverse = np.linalg.pinv(weighted @ kept.T, rcond=1e-13, hermitian=True)
+    fitted = basis[:, first:]
+    weighted = fitted * np.kaiser(fitted.shape[1], _beta(_closest(distinct, span)))
+    inverse = np.linalg.pinv(weighted @ fitted.T, rcond=1e-13, hermitian=True)
     return basis, weighted, np.asarray(inverse, np.float64), which
 
 

@@ -25,7 +25,7 @@ SHEET_MODES = ("bending wave", "bending near field")
 KINDS = ("propagating", "backward", "leaky", "evanescent")
 MOST = 6  # modes
 ROUNDS = 4  # of further frequencies between the given ones
-CANDIDATES = 3  # roots that are track_modes over the modes that are kept
+CANDIDATES = 3  # roots that are tracked per returned mode
 FASTEST_DECAY = 2 / np.pi  # |Im k| / |Re k| of a wave that falls to 1/e in a quarter of its length
 SLOWEST_FLUX = 0.05  # of the phase speed: energy that moves slower does not leave
 DIFFERENCE = 1e-4  # of a frequency, step of the derivative of a modulus
@@ -231,8 +231,8 @@ def _finite(
 ) -> tuple[Roots, Floats]:
     """Least evanescent roots of a finite stack, and the depths of their shapes."""
     springless = replace(stack, base="free", base_stiffness=0.0) if stack.base_stiffness else stack
-    of, change = pencil(stack, omega, moduli), pencil(springless, omega, slopes)
-    squared, V, W = eigenpairs(of, omega)
+    own, change = pencil(stack, omega, moduli), pencil(springless, omega, slopes)
+    squared, V, W = eigenpairs(own, omega)
     order = np.argsort(np.abs(np.sqrt(squared).imag), axis=1)[:, :most]
     squared = np.take_along_axis(squared, order, axis=1)
     V, W = (np.take_along_axis(x, order[:, None], axis=2) for x in (V, W))
@@ -243,29 +243,29 @@ def _finite(
     def diagonal(left: Complex, matrix: Complex, right: Complex) -> Complex:
         return np.asarray(np.einsum("fam,fa,fam->fm", left, matrix, right))
 
-    # Left eigenvectors are (V, k^2 W); the derivative of the linear pencil in k^2, then in w.
-    norm = form(V, of.Auu, V) + form(V, of.Buw, W) + squared * diagonal(W, of.Aww, W)
+    # Left eigenvectors are (V, k^2 W); derivative of the linear pencil in k^2, then in w.
+    norm = form(V, own.Auu, V) + form(V, own.Buw, W) + squared * diagonal(W, own.Aww, W)
     by_frequency = squared * (
         form(V, change.Auu, V) + 2 * form(V, change.Buw, W) + form(W, change.Gww, W)
         + squared * diagonal(W, change.Aww, W)
     ) + form(V, change.Guu, V) - 2 * omega[:, None] * (
-        diagonal(V, of.M, V) + squared * diagonal(W, of.M, W)
+        diagonal(V, own.M, V) + squared * diagonal(W, own.M, W)
     )  # fmt: skip
     slope = -by_frequency / norm
     k = outgoing(squared, slope)
     U = V / k[:, None]
-    carried = form(U.conj(), of.traction, W) + form(
-        W.conj(), (of.Buw - of.traction).swapaxes(1, 2), U)  # fmt: skip
-    carried += k * (form(U.conj(), of.Auu, U) + diagonal(W.conj(), of.Aww, W))
-    stored = omega[:, None] * sum(diagonal(x.conj(), of.M, x) for x in (U, W))
-    shapes = np.zeros((*k.shape, len(of.depths), 2), np.complex128)
+    flux = form(U.conj(), own.traction, W) + form(
+        W.conj(), (own.Buw - own.traction).swapaxes(1, 2), U)  # fmt: skip
+    flux += k * (form(U.conj(), own.Auu, U) + diagonal(W.conj(), own.Aww, W))
+    stored = omega[:, None] * sum(diagonal(x.conj(), own.M, x) for x in (U, W))
+    shapes = np.zeros((*k.shape, len(own.depths), 2), np.complex128)
     for axis, x in enumerate((U, W)):
         shapes[:, :, : x.shape[1], axis] = x.swapaxes(1, 2)
     roots = Roots(
         squared=squared, slope=slope, wavenumbers=k, residues=squared * W[:, 0] ** 2 / norm,
-        energy_speed=np.abs(carried.real / stored.real), shapes=shapes,
+        energy_speed=np.abs(flux.real / stored.real), shapes=shapes,
     )  # fmt: skip
-    return roots, of.depths
+    return roots, own.depths
 
 
 def curves(

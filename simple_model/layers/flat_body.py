@@ -127,13 +127,13 @@ class _Path:
         """Amplitudes (f, p, m): c sum_cj g_cj(f) h_nmcj(x_p) of integrals g (c, f, j) and harmonics
         h (n, m, c, j, p).
         """
-        found = np.zeros((g.shape[1], harmonics.shape[-1], harmonics.shape[1]), np.complex128)
+        amplitudes = np.zeros((g.shape[1], harmonics.shape[-1], harmonics.shape[1]), np.complex128)
         for order, harmonic in enumerate(harmonics):
             own = self.orders == order
             moved = np.tensordot(g[:, self.lines[own]], harmonic, axes=([0, 2], [1, 2]))
             moved = self.coefficients[own, None, None] * moved.swapaxes(1, 2)
-            np.add.at(found, self.lines[own], moved)
-        return found
+            np.add.at(amplitudes, self.lines[own], moved)
+        return amplitudes
 
 
 def _path(
@@ -270,11 +270,11 @@ def field_history(
     g = point_integrals(field, table, w, width, negligible=NEGLIGIBLE)
     u = np.zeros((len(w), len(probes), len(field.weights(SAMPLE_OFFSETS))), np.complex128)
     for i, probe in enumerate(probes):
-        carried = weighted_splines(field, splines, probe - knots)
+        weighted = weighted_splines(field, splines, probe - knots)
         for m, c in np.argwhere(field.weights(SAMPLE_OFFSETS).any(axis=-1)):
             blocks = min(len(table), len(table) * padded * parts // AT_ONCE + 1)
             for some in np.array_split(np.arange(len(table)), blocks):
-                x = of_load(carried[m, c, some].T)
+                x = of_load(weighted[m, c, some].T)
                 transformed = rfft(x, axis=0)[: len(w)] / parts
                 u[:, i, m] += np.einsum("wj,wj->w", g[c][:, some], transformed)
     t = dt * np.arange(n)[::within]
@@ -343,7 +343,7 @@ def _interpolation(probes: Floats, knots: Floats, width: float) -> tuple[Floats,
     if len(knots) * len(probes) <= FEW_DISTANCES:
         unique = np.unique(np.linalg.norm(probes[:, None] - knots, axis=-1))
         return unique, lambda r: (r[..., None] == unique).astype(float)
-    from scipy.interpolate import CubicSpline  # which takes long to import
+    from scipy.interpolate import CubicSpline  # slow to import
 
     furthest = max(np.linalg.norm(probe - knots, axis=1).max() for probe in probes)
     steps = max(FEWEST_STEPS, int(np.ceil(furthest / width * STEPS_PER_WIDTH)))

@@ -34,8 +34,8 @@ def motion_field(stack: Stack, depth: float = 0.0) -> Field:
 
     def weights(away: Floats) -> Floats:
         x, y = np.moveaxis(away, -1, 0)
-        none, one = np.zeros_like(x), np.ones_like(x)
-        return np.array([[x, none], [y, none], [none, one]])
+        zero, one = np.zeros_like(x), np.ones_like(x)
+        return np.array([[x, zero], [y, zero], [zero, one]])
 
     return Field(
         answer=answer, orders=(1, 0), clearance=lambda w: clearance(stack, w), weights=weights
@@ -55,14 +55,14 @@ def strain_field(stack: Stack, depth: float = 0.0) -> Field:
 
     def weights(away: Floats) -> Floats:
         x, y = np.moveaxis(away, -1, 0)
-        none, one, turned = np.zeros_like(x), np.ones_like(x), x**2 - y**2
+        zero, one, turned = np.zeros_like(x), np.ones_like(x), x**2 - y**2
         return np.array([
-            [one, none, turned, none],
-            [one, none, -turned, none],
-            [none, one, none, none],
-            [none, none, 2 * x * y, none],
-            [none, none, none, -x],
-            [none, none, none, -y],
+            [one, zero, turned, zero],
+            [one, zero, -turned, zero],
+            [zero, one, zero, zero],
+            [zero, zero, 2 * x * y, zero],
+            [zero, zero, zero, -x],
+            [zero, zero, zero, -y],
         ])  # fmt: skip
 
     return Field(

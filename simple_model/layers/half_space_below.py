@@ -66,7 +66,7 @@ def modes_above_half_space(
     it returns the `most` roots with most motion in the layers, NaN if there are fewer.
     """
     layers = Stack(materials=stack.materials[:-1], thicknesses=stack.thicknesses[:-1], base="free")
-    of, change = (pencil(layers, omega, x[:, :-1]) for x in (moduli, slopes))
+    terms, change = (pencil(layers, omega, x[:, :-1]) for x in (moduli, slopes))
     w, mu, dmu = omega[:, None], moduli[:, -1:], slopes[:, -1:]
     below = stack.materials[-1]
 
@@ -75,30 +75,30 @@ def modes_above_half_space(
         return _stiffness(k, below.density * at**2 / modulus, modulus, below.poisson)
 
     ks = np.asarray(w * np.sqrt(below.density / mu), np.complex128)
-    start, x = _candidates(pencil(stack, omega, moduli), of, omega, ks, most)
+    start, x = _candidates(pencil(stack, omega, moduli), terms, omega, ks, most)
     # Thin layers hardly move in a long wave, which is that of the half-space alone.
     rayleigh = ks * below.shear_speed / below.rayleigh_speed
     start = np.concatenate([rayleigh, start], axis=1)
     x = np.concatenate([np.ones_like(x[:, :1]), x], axis=1)
-    k, x, last = _refined(of, omega, start, x, impedance)
+    k, x, last = _refined(terms, omega, start, x, impedance)
     genuine = (np.abs(k - start) < FARTHEST_MOVE * np.abs(ks)) & (last < CONVERGED)
     genuine &= ~_repeated(k**2, genuine, SAME_ROOT * np.abs(ks) ** 2)
-    ends, up, down = _ends(of), 1 + EPS, 1 - EPS
+    ends, up, down = _ends(terms), 1 + EPS, 1 - EPS
     by_k = (impedance(up * k) - impedance(down * k)) / (2 * EPS * k)[..., None, None]
     by_w = (impedance(k, EPS) - impedance(k, -EPS)) / (2 * EPS * w)[..., None, None]
-    norm = _form(x, _by_wavenumber(of, k)) + _form(x[..., ends], by_k)
-    inertia = (np.concatenate([of.M, of.M], axis=1)[:, None] * x**2).sum(axis=-1)
+    norm = _form(x, _by_wavenumber(terms, k)) + _form(x[..., ends], by_k)
+    inertia = (np.concatenate([terms.M, terms.M], axis=1)[:, None] * x**2).sum(axis=-1)
     by_frequency = _form(x, _matrix(change, k)) - 2 * w * inertia + _form(x[..., ends], by_w)
     slope = -2 * k * by_frequency / norm
     turned = outgoing(k**2, slope) / k  # 1, or -1: then U changes its sign, too
-    x = x * np.repeat(np.stack([turned, np.ones_like(k)], axis=-1), len(of.depths), axis=-1)
+    x = x * np.repeat(np.stack([turned, np.ones_like(k)], axis=-1), len(terms.depths), axis=-1)
     k, norm = turned * k, turned * norm
     ks2 = np.asarray(ks**2, np.complex128)
     longest = 4 * np.pi / float(ks.real[0, 0] + ks.real[-1, 0])  # in the middle of the band
     reach = np.linspace(0, max(layers.thickness, longest), DEPTHS)
     roots = Roots(
         squared=k**2, slope=slope, wavenumbers=k,
-        residues=2 * k * x[..., len(of.depths)] ** 2 / norm,
+        residues=2 * k * x[..., len(terms.depths)] ** 2 / norm,
         energy_speed=np.full(k.shape, np.inf),
         shapes=_continued(x, ends, k, *_decay(k, ks2, below.poisson, MATCHED[0]), reach),
     )  # fmt: skip
@@ -107,11 +107,11 @@ def modes_above_half_space(
         mask = genuine.reshape(genuine.shape + (1,) * (values.ndim - 2))
         return np.where(mask, values, np.nan)
 
-    return roots.apply(without_false), np.concatenate([of.depths, layers.thickness + reach[1:]])
+    return roots.apply(without_false), np.concatenate([terms.depths, layers.thickness + reach[1:]])
 
 
 def _candidates(
-    whole: Pencil, of: Pencil, omega: Floats, ks: Complex, most: int
+    whole: Pencil, terms: Pencil, omega: Floats, ks: Complex, most: int
 ) -> tuple[Complex, Complex]:
     """Roots (f, m) of layers on a matched layer, and their motion (f, m, 2 n) in the layers: those
     slower than the shear wave (f, 1) below, and those with most motion in the layers.
@@ -119,15 +119,15 @@ def _candidates(
     squared, V, W = eigenpairs(whole, omega)
     k = np.sqrt(squared)
     k = np.where(k.imag > 1e-9 * np.abs(k), -k, k)
-    n = of.M.shape[1]
+    n = terms.M.shape[1]
     x = np.concatenate([V / k[:, None], W], axis=1)
     weights = np.concatenate([whole.M, whole.M], axis=1)
     moving = np.abs(weights)[..., None] * np.abs(x) ** 2
     inside = np.concatenate([moving[:, :n], moving[:, len(V[0]) : len(V[0]) + n]], axis=1)
     share = inside.sum(axis=1) / moving.sum(axis=1)
-    shortest = 2 * np.pi / of.depths[-1] + np.abs(k).min(axis=1, keepdims=True)
+    shortest = 2 * np.pi / terms.depths[-1] + np.abs(k).min(axis=1, keepdims=True)
     share = np.where(np.abs(k.imag) < shortest, share, 0.0)
-    slowest = omega * np.sqrt(np.abs(of.M / of.Aww).max(axis=1))
+    slowest = omega * np.sqrt(np.abs(terms.M / terms.Aww).max(axis=1))
     is_bound = (np.abs(k.imag) < k.real / 2) & (k.real > LEAST_BOUND * ks.real)
     is_bound &= k.real < LARGEST_BOUND * np.maximum(slowest[:, None], np.abs(ks))
     share = share + is_bound
@@ -138,7 +138,7 @@ def _candidates(
 
 
 def _refined(
-    of: Pencil,
+    terms: Pencil,
     omega: Floats,
     start: Complex,
     x: Complex,
@@ -147,11 +147,11 @@ def _refined(
     """Refine roots (f, m) with the exact half-space by inverse iteration. Return them, their motion
     (f, m, 2 n) and the relative change in the last step.
     """
-    ends = np.ix_(_ends(of), _ends(of))
+    ends = np.ix_(_ends(terms), _ends(terms))
     k, last = start, np.ones(start.shape)
     for _ in range(STEPS):
         at = BESIDE * k  # where the matrix is not singular
-        matrix, slope = _matrix(of, at, omega), _by_wavenumber(of, at)
+        matrix, slope = _matrix(terms, at, omega), _by_wavenumber(terms, at)
         matrix[..., ends[0], ends[1]] += impedance(at)
         change = (impedance((1 + EPS) * at) - impedance((1 - EPS) * at)) / (2 * EPS)
         slope[..., ends[0], ends[1]] += change / at[..., None, None]
@@ -210,34 +210,34 @@ def _continued(
     return np.concatenate([inside, _shape(k, p, s, waves, depths[1:])], axis=2)
 
 
-def _matrix(of: Pencil, k: Complex, omega: Floats | None = None) -> Complex:
+def _matrix(terms: Pencil, k: Complex, omega: Floats | None = None) -> Complex:
     """A k^2 + B k + G (f, m, 2 n, 2 n), less w^2 M at frequencies (f,) if given."""
-    n = of.M.shape[1]
-    found = k[..., None, None] * _by_wavenumber(of, k)
-    found[..., :n, :n] -= k[..., None, None] ** 2 * of.Auu[:, None]
-    found[..., n:, n:] -= k[..., None, None] ** 2 * (of.Aww[..., None] * np.eye(n))[:, None]
-    found[..., :n, :n] += of.Guu[:, None]
-    found[..., n:, n:] += of.Gww[:, None]
+    n = terms.M.shape[1]
+    matrix = k[..., None, None] * _by_wavenumber(terms, k)
+    matrix[..., :n, :n] -= k[..., None, None] ** 2 * terms.Auu[:, None]
+    matrix[..., n:, n:] -= k[..., None, None] ** 2 * (terms.Aww[..., None] * np.eye(n))[:, None]
+    matrix[..., :n, :n] += terms.Guu[:, None]
+    matrix[..., n:, n:] += terms.Gww[:, None]
     if omega is not None:
-        inertia = omega[:, None] ** 2 * np.concatenate([of.M, of.M], axis=1)
-        found -= (inertia[..., None] * np.eye(2 * n))[:, None]
-    return found
+        inertia = omega[:, None] ** 2 * np.concatenate([terms.M, terms.M], axis=1)
+        matrix -= (inertia[..., None] * np.eye(2 * n))[:, None]
+    return matrix
 
 
-def _by_wavenumber(of: Pencil, k: Complex) -> Complex:
+def _by_wavenumber(terms: Pencil, k: Complex) -> Complex:
     """2 A k + B (f, m, 2 n, 2 n)."""
-    n = of.M.shape[1]
-    found = np.zeros((*k.shape, 2 * n, 2 * n), np.complex128)
-    found[..., :n, :n] = 2 * k[..., None, None] * of.Auu[:, None]
-    found[..., n:, n:] = 2 * k[..., None, None] * (of.Aww[..., None] * np.eye(n))[:, None]
-    found[..., :n, n:] = of.Buw[:, None]
-    found[..., n:, :n] = of.Buw.swapaxes(1, 2)[:, None]
-    return found
+    n = terms.M.shape[1]
+    derivative = np.zeros((*k.shape, 2 * n, 2 * n), np.complex128)
+    derivative[..., :n, :n] = 2 * k[..., None, None] * terms.Auu[:, None]
+    derivative[..., n:, n:] = 2 * k[..., None, None] * (terms.Aww[..., None] * np.eye(n))[:, None]
+    derivative[..., :n, n:] = terms.Buw[:, None]
+    derivative[..., n:, :n] = terms.Buw.swapaxes(1, 2)[:, None]
+    return derivative
 
 
-def _ends(of: Pencil) -> list[int]:
+def _ends(terms: Pencil) -> list[int]:
     """Indices of U and W of the lowest node."""
-    n = of.M.shape[1]
+    n = terms.M.shape[1]
     return [n - 1, 2 * n - 1]
 
 

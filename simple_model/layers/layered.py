@@ -88,8 +88,8 @@ def transfer(stack: Stack, depths: Sequence[float]) -> Transfer:
         u, f = ([each[plane][part] for plane in planes] for part in (0, 1))
         parts = [*zip(*u, strict=True), [-v for _, v in f], [-h for h, _ in f]]
         shape = np.broadcast_shapes(k.shape, w.shape)
-        found = np.array([[np.broadcast_to(x, shape) for x in part] for part in parts])
-        return _about_mean(stack, w, found)
+        values = np.array([[np.broadcast_to(x, shape) for x in part] for part in parts])
+        return _about_mean(stack, w, values)
 
     return answer
 
@@ -154,12 +154,12 @@ def _resonance(
     layers: list[tuple[Material, float]], w: Complex, modulus: Callable[..., Complex]
 ) -> Floats:
     """w^2 sum_n 1 / w_n^2 over the resonances w_n across layers on a rigid base."""
-    above, found = 0.0, np.zeros(len(w))
+    above, total = 0.0, np.zeros(len(w))
     for material, thickness in layers:
         mass = material.density * thickness
-        found += np.abs(w**2 / modulus(material, w)) * thickness * (above + mass / 2)
+        total += np.abs(w**2 / modulus(material, w)) * thickness * (above + mass / 2)
         above += mass
-    return found
+    return total
 
 
 def _decay(stack: Stack, w: Complex) -> Floats:
@@ -190,8 +190,8 @@ def _impedances(stack: Stack, k: Complex, w: Complex) -> Impedances:
         layer_stiffness(material, thickness, k, w)
         for material, thickness in zip(stack.materials, stack.thicknesses, strict=True)
     ]
-    spring, none = np.full(1, stack.base_stiffness, np.complex128), np.zeros(1, np.complex128)
-    below: list[Symmetric | None] = [None if stack.is_rigid else (spring, none, spring)]
+    spring, zero = np.full(1, stack.base_stiffness, np.complex128), np.zeros(1, np.complex128)
+    below: list[Symmetric | None] = [None if stack.is_rigid else (spring, zero, spring)]
     for layer in layers[:0:-1]:
         below.append(_condensed(layer, below[-1]))
     return Impedances(_condensed(layers[0], below[-1]), layers, below[::-1])
@@ -220,7 +220,7 @@ def _downwards(known: Impedances) -> list[tuple[Pair, Pair]]:
     a, b, c = known.surface
     over = 1 / (a * c - b * b)
     u, f = (-b * over, a * over), (0 * over, 1 + 0 * over)
-    found = [(u, f)]
+    interfaces = [(u, f)]
     for layer, below in zip(known.layers, known.below, strict=True):
         d, e, g = layer.across
         f = (e * u[1] - d * u[0], -e * u[0] - g * u[1])
@@ -229,8 +229,8 @@ def _downwards(known: Impedances) -> list[tuple[Pair, Pair]]:
         else:
             u, (a, b, c) = _solve_below(layer, below, f), below
             f = (a * u[0] + b * u[1], b * u[0] + c * u[1])
-        found.append((u, f))
-    return found
+        interfaces.append((u, f))
+    return interfaces
 
 
 def layer_stiffness(material: Material, thickness: float, k: Complex, w: Complex) -> Layer:
@@ -292,6 +292,6 @@ def _difference_quotient(
     if not nearly.any():
         return np.asarray((es - ep) / apart)
     series = 1 - x2 * (1 / 3 - x2 * (2 / 15 - x2 * (17 / 315 - x2 * (62 / 2835))))
-    found = thickness * mean * series
-    np.divide(es - ep, apart, out=found, where=~nearly)
-    return np.asarray(found)
+    quotient = thickness * mean * series
+    np.divide(es - ep, apart, out=quotient, where=~nearly)
+    return np.asarray(quotient)

@@ -42,21 +42,21 @@ class Roots:
         return Roots(**{field.name: change(getattr(self, field.name)) for field in fields(self)})
 
 
-def track_modes(roots: Roots, omega: Floats, most: int, kept: Ints) -> Roots:
+def track_modes(roots: Roots, omega: Floats, most: int, returned: Ints) -> Roots:
     """Sort roots at (f,) rad/s into modes, one in each column, NaN where a mode has no root.
 
     A root continues another if the trapezoidal rule of k^2, whose derivative is known, leads from
     one to the other, and if their shapes are alike. Of all modes it returns at most `most`, the
-    least evanescent anywhere, of these the slowest, at the frequencies of indices `kept` (g,).
+    least evanescent anywhere, of these the slowest, at the frequencies of indices `returned` (g,).
     """
     count = len(omega)
     index = np.full((count, 0), -1)
     for f in range(count):
         known = np.flatnonzero(np.isfinite(roots.squared[f]))
-        seen = np.where(index >= 0, np.arange(count)[:, None], -1).max(axis=0, initial=-1)
-        alive = np.flatnonzero(f - seen <= 1 + LONGEST_GAP)
-        last = index[seen[alive], alive]
-        costs, matches = _matches(roots, omega, (seen[alive], last), (f, known))
+        latest = np.where(index >= 0, np.arange(count)[:, None], -1).max(axis=0, initial=-1)
+        alive = np.flatnonzero(f - latest <= 1 + LONGEST_GAP)
+        last = index[latest[alive], alive]
+        costs, matches = _matches(roots, omega, (latest[alive], last), (f, known))
         pairs = [
             (alive[i], known[j]) for i, j in zip(*matches, strict=True) if costs[i, j] < UNLIKE
         ]
@@ -66,13 +66,13 @@ def track_modes(roots: Roots, omega: Floats, most: int, kept: Ints) -> Roots:
         begun = np.full((count, len(new)), -1)
         begun[f] = new
         index = np.hstack([index, begun])
-    index = index[kept]
+    index = index[returned]
     index = index[:, (index >= 0).any(axis=0)]
-    roots = roots.apply(lambda values: values[kept])
+    roots = roots.apply(lambda values: values[returned])
     decay = np.abs(roots.wavenumbers.imag)
     decay = np.where(decay > ROUND_OFF * np.abs(roots.wavenumbers), decay, 0.0)
     least = np.where(index >= 0, _at(decay, index), np.inf).min(axis=0)
-    slowness = np.where(decay == 0, np.abs(roots.wavenumbers.real) / omega[kept, None], 0.0)
+    slowness = np.where(decay == 0, np.abs(roots.wavenumbers.real) / omega[returned, None], 0.0)
     slowest = np.where(index >= 0, _at(slowness, index), 0.0).max(axis=0)
     least = np.lexsort([-slowest, least])[:most]
     index = index[:, least]

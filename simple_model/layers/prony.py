@@ -194,7 +194,7 @@ def fitted_series(
     non-negative least squares of the relative deviation. The modulus at rest in Pa is fitted if it
     is None.
     """
-    from scipy.optimize import nnls  # which takes long to import
+    from scipy.optimize import nnls  # slow to import
 
     phase = 1j * w[:, None] * times
     columns = np.hstack([np.ones((len(w), 1)), 1j * w[:, None], phase / (1 + phase)])

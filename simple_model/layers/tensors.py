@@ -48,7 +48,7 @@ def squared(values: Floats) -> Floats:
 
 def _matrices(tensor: Floats) -> Floats:
     """Symmetric matrices (..., 3, 3)."""
-    found = np.empty((*tensor.shape[:-1], 3, 3))
+    matrices = np.empty((*tensor.shape[:-1], 3, 3))
     for c, (i, j) in enumerate(TENSOR):
-        found[..., i, j] = found[..., j, i] = tensor[..., c]
-    return found
+        matrices[..., i, j] = matrices[..., j, i] = tensor[..., c]
+    return matrices

@@ -130,27 +130,27 @@ def pencil(stack: Stack, omega: Floats, moduli: Complex) -> Pencil:
     if not stack.is_rigid:  # springs on the last node, none below a free stack
         Guu[:, -1, -1] += stack.base_stiffness
         Gww[:, -1, -1] += stack.base_stiffness
-    kept = slice(0, count - stack.is_rigid)
-    square = (slice(None), kept, kept)
+    free = slice(0, count - stack.is_rigid)
+    square = (slice(None), free, free)
     return Pencil(
-        Auu=Auu[square], Aww=Aww[:, kept], Guu=Guu[square], Gww=Gww[square], Buw=Buw[square],
-        M=M[:, kept], traction=traction[square], depths=np.concatenate(depths),
+        Auu=Auu[square], Aww=Aww[:, free], Guu=Guu[square], Gww=Gww[square], Buw=Buw[square],
+        M=M[:, free], traction=traction[square], depths=np.concatenate(depths),
     )  # fmt: skip
 
 
-def eigenpairs(of: Pencil, omega: Floats) -> tuple[Complex, Complex, Complex]:
+def eigenpairs(terms: Pencil, omega: Floats) -> tuple[Complex, Complex, Complex]:
     """Squared wavenumbers (f, m) in 1/m2, and V = k U and W (f, n, m), of all modes of the pencil
     [[Auu, Buw], [0, Aww]] k^2 + [[Suu, 0], [Bwu, Sww]] on (V, W), S = G - w^2 M.
     """
-    n = of.Auu.shape[1]
-    inertia = (omega[:, None] ** 2 * of.M)[..., None] * np.eye(n)
+    n = terms.Auu.shape[1]
+    inertia = (omega[:, None] ** 2 * terms.M)[..., None] * np.eye(n)
     first, second = np.zeros((2, len(omega), 2 * n, 2 * n), np.complex128)
-    first[:, :n, :n], first[:, :n, n:] = of.Auu, of.Buw
-    first[:, n:, n:] = of.Aww[..., None] * np.eye(n)
-    second[:, :n, :n], second[:, n:, :n] = of.Guu - inertia, of.Buw.swapaxes(1, 2)
-    second[:, n:, n:] = of.Gww - inertia
+    first[:, :n, :n], first[:, :n, n:] = terms.Auu, terms.Buw
+    first[:, n:, n:] = terms.Aww[..., None] * np.eye(n)
+    second[:, :n, :n], second[:, n:, :n] = terms.Guu - inertia, terms.Buw.swapaxes(1, 2)
+    second[:, n:, n:] = terms.Gww - inertia
     # The shift makes roots of slow modes accurate for any Poisson's ratio.
-    shift = SHIFT * (omega**2 * np.abs(of.M / of.Aww).max(axis=1))[:, None, None]
+    shift = SHIFT * (omega**2 * np.abs(terms.M / terms.Aww).max(axis=1))[:, None, None]
     inverse, vectors = np.linalg.eig(np.linalg.solve(second + shift * first, first))
     return shift[..., 0] - 1 / inverse, vectors[:, :n], vectors[:, n:]
 

@@ -97,7 +97,7 @@ def relative_intensity(height: float) -> float:
     check_range("height", 1e3 * height, low, high, " mm", ", where the array focuses")
     if height == NOMINAL_HEIGHT:
         return 1.0
-    from scipy.interpolate import PchipInterpolator  # which takes long to import
+    from scipy.interpolate import PchipInterpolator  # slow to import
 
     return float(PchipInterpolator(_HEIGHTS, _FORCES)(1e3 * height))
 

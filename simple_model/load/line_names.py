@@ -205,9 +205,9 @@ def _load_orders(pressure: MovingPressure, threshold: float) -> tuple[Ints, Floa
     orders = np.column_stack([np.repeat(n, len(gain)), np.tile(gain, (len(n), 1))])
     strengths = 2 * (share[:, None] * c).ravel()
     f = orders @ of_tacton
-    kept = (f > SAME_LINE / tacton.duration) & (strengths > 0)
-    kept &= strengths > 1e-2 * threshold * strengths[kept].max(initial=0.0)
-    return orders[kept], strengths[kept]
+    strong = (f > SAME_LINE / tacton.duration) & (strengths > 0)
+    strong &= strengths > 1e-2 * threshold * strengths[strong].max(initial=0.0)
+    return orders[strong], strengths[strong]
 
 
 def _gain_products(pressure: MovingPressure, threshold: float) -> tuple[Ints, Floats]:
@@ -284,8 +284,8 @@ def _distinct(
         orders, axis=1)  # fmt: skip
     simplest = np.lexsort((-strengths, effort, group))[first]
     power = np.bincount(group, strengths**2).astype(np.float64)
-    kept = np.bincount(group, strengths == 0) > 0  # candidates
+    listed = np.bincount(group, strengths == 0) > 0  # candidates
     strongest = np.argsort(-power, kind="stable")[:most]
-    kept[strongest] |= power[strongest] > threshold**2 * power.max(initial=0.0)
-    names = tuple(line_name(orders[k].tolist(), of_tacton) for k in simplest[kept])
-    return LineNames(names=names, frequencies=f[simplest[kept]], strengths=np.sqrt(power[kept]))
+    listed[strongest] |= power[strongest] > threshold**2 * power.max(initial=0.0)
+    names = tuple(line_name(orders[k].tolist(), of_tacton) for k in simplest[listed])
+    return LineNames(names=names, frequencies=f[simplest[listed]], strengths=np.sqrt(power[listed]))

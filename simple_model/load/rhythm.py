@@ -10,10 +10,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from simple_model.choices import check_numbers, check_range, choose
-from simple_model.typing import Floats
+from simple_model.typing import Floats, Ints
 
 ROLES = ("modulation", "envelope")
 MOST_SAMPLES = 2_000_000
+
+
+def between(knots: Floats, t: Floats, after: Floats) -> tuple[Ints, Floats]:
+    """Index (...) of the last rising knot (k,) at times `after` (...), and the fraction (...) of
+    the way from it to the next at times t (...).
+    """
+    before = np.minimum(np.searchsorted(knots, after, side="right") - 1, len(knots) - 2)
+    step = np.maximum(knots[before + 1] - knots[before], 1e-300)
+    return before, np.clip((t - knots[before]) / step, 0.0, 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,9 +77,7 @@ class Rhythm:
         t = np.asarray(t, np.float64)
         # The first sample of a pulse belongs to it, whatever the rounding of its time.
         into = np.mod(t / self.period + 1e-12, 1.0) * self.period
-        before = np.minimum(np.searchsorted(knots, into, side="right") - 1, len(knots) - 2)
-        step = np.maximum(knots[before + 1] - knots[before], 1e-300)
-        part = np.clip((into - knots[before]) / step, 0.0, 1.0)
+        before, part = between(knots, into, into)
         return np.asarray(levels[before] + part * (levels[before + 1] - levels[before]))
 
     @cached_property

@@ -28,19 +28,6 @@ def step(times: Floats) -> float:
     return float((times[-1] - times[0]) / (len(times) - 1))
 
 
-def highest(pressure: MovingPressure, passing: float) -> float:
-    """Highest line in Hz of a load whose moving focus makes lines up to `passing` Hz.
-
-    Rhythms are averaged over a sample and do not count; a signal counts with half its rate.
-    """
-    tacton = pressure.tacton
-    first, second, envelope = tones(tacton)
-    weights = np.array(tacton.superposition) > 0
-    tone = max(first * weights[0], second * weights[1]) + envelope
-    made = passing + _highest_order(pressure) * tone
-    return max(made, tacton.signal.rate / 2 if tacton.signal else 0.0)
-
-
 @lru_cache(maxsize=32)
 def _highest_order(pressure: MovingPressure) -> int:
     """Highest order of a sinusoid in the gain: the degree of the law, or where harmonics vanish."""
@@ -51,11 +38,18 @@ def _highest_order(pressure: MovingPressure) -> int:
 
 
 def highest_line(pressure: MovingPressure) -> float:
-    """Highest line in Hz of a load at any place; 0, for unknown, if it is not a
-    `MovingPressure`.
+    """Highest line in Hz of a load at any place; 0, for unknown, if it is not a `MovingPressure`.
+
+    Rhythms are averaged over a sample and do not count; a signal counts with half its rate.
     """
-    is_known = isinstance(pressure, MovingPressure)
-    return highest(pressure, highest_passing(pressure)) if is_known else 0.0
+    if not isinstance(pressure, MovingPressure):
+        return 0.0
+    tacton = pressure.tacton
+    first, second, envelope = tones(tacton)
+    weights = np.array(tacton.superposition) > 0
+    tone = max(first * weights[0], second * weights[1]) + envelope
+    highest = highest_passing(pressure) + _highest_order(pressure) * tone
+    return max(highest, tacton.signal.rate / 2 if tacton.signal else 0.0)
 
 
 def oversampling(highest: float, dt: float) -> int:

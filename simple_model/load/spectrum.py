@@ -86,14 +86,14 @@ def load_lines(pressure: MovingPressure, threshold: float = 1e-6) -> LoadSpectru
     f, order = np.round(f, 9), np.repeat(n, len(tone))  # f_AM - 2 f_d may be 0 but for round-off
     c = (foci_harmonics(pressure, n)[:, None] * gain).ravel() * np.where(f > 0, 2, 1)
     strength = np.abs(c) * np.repeat(of_spot, len(tone))
-    kept = (f >= 0) & (strength > threshold * strength.max())
+    strong = (f >= 0) & (strength > threshold * strength.max())
     if whole or tacton.trajectory.shape == "recorded" or is_abrupt(pressure):
-        kept &= f <= HIGHEST
-    if not kept.any():
-        kept = (order == 0) & (f == 0)
+        strong &= f <= HIGHEST
+    if not strong.any():
+        strong = (order == 0) & (f == 0)
     return LoadSpectrum(
-        frequencies=np.abs(f[kept]), harmonics=order[kept], coefficients=c[kept],
-        strengths=strength[kept],
+        frequencies=np.abs(f[strong]), harmonics=order[strong], coefficients=c[strong],
+        strengths=strength[strong],
     )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from simple_model.choices import check_numbers, check_range, choose
+from simple_model.load.rhythm import between
 from simple_model.typing import Bools, Floats, Ints, Points
 
 SHAPES = ("point", "line", "circle", "triangle", "square")  # defined by a size alone
@@ -244,12 +245,8 @@ class Trajectory:
         """Index of the last point of a recording, and the fraction of the way to the next."""
         clock = self._clock
         t = phase * clock[-1]
-        late = t + JUST_AFTER * clock[-1] / (len(clock) - 1)
-        before = np.minimum(np.searchsorted(clock, late, side="right") - 1, len(clock) - 2)
-        if self.hold:
-            return before, np.zeros_like(t)
-        step = np.maximum(clock[before + 1] - clock[before], 1e-300)
-        return before, np.clip((t - clock[before]) / step, 0.0, 1.0)
+        before, part = between(clock, t, t + JUST_AFTER * clock[-1] / (len(clock) - 1))
+        return before, np.zeros_like(t) if self.hold else part
 
 
 def differ(before: Floats, after: Floats) -> Bools:

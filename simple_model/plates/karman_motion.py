@@ -190,7 +190,7 @@ class _Scheme:
 
     def forces(self, motion: Floats) -> Floats:
         """Forces (n - 1, r) under which the steps without stretching are a motion (n, r)."""
-        from scipy.signal import lfilter  # which takes long to import
+        from scipy.signal import lfilter  # slow to import
 
         z, dt = motion, self.dt
         change = np.vstack([z[1:2] - z[:1], z[2:] - z[:-2]]) / 2

@@ -197,14 +197,14 @@ def modal_motion(
     """
     w = 2 * np.pi * np.asarray(frequencies)
     added = np.broadcast_to(modulus(w) - 1, w.shape)
-    found = modal_motion_apart(modes, frequencies, forces, modulus)
+    coordinates = modal_motion_apart(modes, frequencies, forces, modulus)
     first = 0
     for family in modes.families:
         part = slice(first, first := first + len(family.squared))
         if family.bending is not None:
             lossy = np.flatnonzero(added)
-            found[lossy, part] = _coupled(family, w[lossy], added[lossy], forces[lossy, part])
-    return found
+            coordinates[lossy, part] = _coupled(family, w[lossy], added[lossy], forces[lossy, part])
+    return coordinates
 
 
 def modal_motion_apart(
@@ -213,8 +213,8 @@ def modal_motion_apart(
     """Modal coordinates (f, m) as of `modal_motion`, without the coupling of the modes."""
     w = 2 * np.pi * np.asarray(frequencies)[:, None]
     bending = modulus(w) * modes.elastic
-    found = forces / (modes.squared * (1 - modes.elastic + bending) - w**2)
-    return np.asarray(found, np.complex128)
+    coordinates = forces / (modes.squared * (1 - modes.elastic + bending) - w**2)
+    return np.asarray(coordinates, np.complex128)
 
 
 def _coupled(family: Family, w: Floats, added: Complex, forces: Complex) -> Complex:
@@ -222,7 +222,7 @@ def _coupled(family: Family, w: Floats, added: Complex, forces: Complex) -> Comp
     together and high modes separately.
     """
     assert family.bending is not None
-    found, B = np.empty(forces.shape, np.complex128), family.bending
+    coordinates, B = np.empty(forces.shape, np.complex128), family.bending
     _, first, which = np.unique(np.round(w, 6), return_index=True, return_inverse=True)
     for each, k in enumerate(first.tolist()):
         n = int(np.searchsorted(family.squared, (COUPLED * w[k]) ** 2))
@@ -237,20 +237,22 @@ def _coupled(family: Family, w: Floats, added: Complex, forces: Complex) -> Comp
             LinearOperator((size, size), matvec=f, dtype=np.complex128) for f in (full, of_mode)
         )
         for line in np.flatnonzero(which == each).tolist():  # of several loads
-            found[line], failed = gmres(system, forces[line], M=before, rtol=RESIDUAL, maxiter=10)
+            coordinates[line], failed = gmres(
+                system, forces[line], M=before, rtol=RESIDUAL, maxiter=10
+            )
             if failed:
                 raise ArithmeticError(
                     f"the coupled modes of a stretched plate do not converge to a residual of "
                     f"{RESIDUAL:g} at {w[k] / 2 / np.pi:.4g} Hz; lower its loss"
                 )
-    return found
+    return coordinates
 
 
 def _low_together(factor: Any, own: Complex, n: int, forces: Complex) -> Complex:
-    found = forces / own
+    coordinates = forces / own
     if n:
-        found[:n] = linalg.lu_solve(factor, forces[:n], check_finite=False)
-    return found
+        coordinates[:n] = linalg.lu_solve(factor, forces[:n], check_finite=False)
+    return coordinates
 
 
 def _modal_forces(B: Floats, added: complex, diagonal: Floats, q: Complex) -> Complex:
@@ -291,18 +293,18 @@ def _breaks(plate: Plate, axis: int, size: float) -> list[float]:
     """
     reach = plate.clip_radius
     sides = [clip[axis] + turn * reach for clip in plate.clips for turn in (-1, 1) if reach]
-    kept = _apart([], sides, size / 2, SAME_SIDE * reach)
-    beside = [at + turn * LAYER * reach for at in kept for turn in (-1, 1)]
-    return sorted(_apart(kept, beside, size / 2, LAYER * reach / 2))
+    inside = _apart([], sides, size / 2, SAME_SIDE * reach)
+    lines = [at + turn * LAYER * reach for at in inside for turn in (-1, 1)]
+    return sorted(_apart(inside, lines, size / 2, LAYER * reach / 2))
 
 
-def _apart(kept: Sequence[float], others: Sequence[float], end: float, gap: float) -> list[float]:
+def _apart(first: Sequence[float], others: Sequence[float], end: float, gap: float) -> list[float]:
     """Places, and those of others that are farther than a gap from them and from both ends."""
-    found = [-end, *kept, end]
+    places = [-end, *first, end]
     for place in sorted(others, key=abs):
-        if abs(place) < end and all(abs(place - each) > gap for each in found):
-            found.append(place)
-    return [place for place in found if abs(place) < end]
+        if abs(place) < end and all(abs(place - each) > gap for each in places):
+            places.append(place)
+    return [place for place in places if abs(place) < end]
 
 
 def _family(plate: Plate, x: LineBasis, y: LineBasis) -> Family:
@@ -315,8 +317,8 @@ def _family(plate: Plate, x: LineBasis, y: LineBasis) -> Family:
     if free is None:
         squared, shapes = _modes(K, mass)
     else:
-        held = (np.asarray(free.T @ each @ free, np.float64) for each in (K, mass))
-        squared, shapes = _modes(*held)
+        reduced = (np.asarray(free.T @ each @ free, np.float64) for each in (K, mass))
+        squared, shapes = _modes(*reduced)
         shapes = free @ shapes
     between = None if stretching is None else np.asarray(shapes.T @ (bending @ shapes))
     return Family(
@@ -366,10 +368,10 @@ def _free_of_clips(plate: Plate, x: LineBasis, y: LineBasis) -> sparse.csr_array
 
 def outside_clips(plate: Plate, x: LineBasis, y: LineBasis) -> Bools:
     """Whether products (x y,) of functions, y faster, are zero on all clips."""
-    found, reach = np.ones((x.size, y.size), bool), plate.clip_radius
+    outside, reach = np.ones((x.size, y.size), bool), plate.clip_radius
     for along, across in plate.clips:
         moved = (
             line.nonzero_within(at - reach, at + reach) for line, at in ((x, along), (y, across))
         )
-        found &= ~np.outer(*moved)
-    return found.ravel()
+        outside &= ~np.outer(*moved)
+    return outside.ravel()

@@ -164,11 +164,13 @@ def _at_breaks(
     for k in range(last + 1):
         end = ends[0] if k == 0 else ends[1] if k == last else "free"
         for derivative in sorted({*derivatives} - {*FIXED[end]}):
-            found = np.zeros((last, max(degrees) + 1))
+            function = np.zeros((last, max(degrees) + 1))
             for piece, side in ((k - 1, 1), (k, 0)):
                 if 0 <= piece < last:
-                    found[piece, : degrees[piece] + 1] = of_piece[piece][count * side + derivative]
-            yield found / np.linalg.norm(found)
+                    function[piece, : degrees[piece] + 1] = of_piece[piece][
+                        count * side + derivative
+                    ]
+            yield function / np.linalg.norm(function)
 
 
 def _end_functions(degree: int, size: float, derivatives: Sequence[int]) -> Floats:
@@ -192,9 +194,9 @@ def _inner(degrees: Sequence[int], ends: Sequence[str]) -> Iterator[Floats]:
         n = np.arange(degree + 1)
         for orders in (n[::2], n[1::2]):
             for bubble in _bubbles(max(degrees), orders, ends).T:
-                found = np.zeros((len(degrees), max(degrees) + 1))
-                found[piece] = bubble
-                yield found
+                function = np.zeros((len(degrees), max(degrees) + 1))
+                function[piece] = bubble
+                yield function
 
 
 def _symmetric(functions: Floats) -> tuple[Floats, Floats]:

@@ -72,12 +72,12 @@ class KarmanPlate:
         columns), and the places in (k r,) of its product (p,).
         """
         of_modes, of_states = self.symmetries
-        found = []
+        parts = []
         for bits in np.unique(of_modes):
             columns = slice(*np.searchsorted(of_modes, (bits, bits + 1)))
             states, rows = np.nonzero((of_states ^ bits)[:, None] == of_modes)
-            found.append((columns, self.H[states, rows, columns], states * len(of_modes) + rows))
-        return found
+            parts.append((columns, self.H[states, rows, columns], states * len(of_modes) + rows))
+        return parts
 
     def shapes(self, points: ArrayLike) -> Floats:
         """Shapes (p, r) in kg^-1/2 of the chosen modes at points (p, 2) in metre."""
@@ -85,10 +85,10 @@ class KarmanPlate:
 
     def gradients(self, z: Floats) -> Floats:
         """Derivatives H z (k, r) of the states of stress y at coordinates z (r,)."""
-        found = np.empty(self.H.shape[0] * self.H.shape[1])
+        derivatives = np.empty(self.H.shape[0] * self.H.shape[1])
         for columns, part, places in self._parts:
-            found[places] = part @ z[columns]
-        return found.reshape(self.H.shape[:2])
+            derivatives[places] = part @ z[columns]
+        return derivatives.reshape(self.H.shape[:2])
 
 
 def karman_plate(
@@ -126,11 +126,11 @@ def karman_plate(
         parts.append(_states_of_stress(problem, slopes, reach, turn := 2 * odd[0] + odd[1]))
         turns.append(np.full(len(parts[-1][0]), turn))
     energy, H = (np.concatenate(each) for each in zip(*parts, strict=True))
-    kept = energy > SMALLEST_STATE**2 * energy.max()
+    strong = energy > SMALLEST_STATE**2 * energy.max()
     return KarmanPlate(
-        modes=modes, chosen=chosen, squared=squared, bending=_bending(modes, chosen), H=H[kept],
-        symmetries=(slopes.symmetries, np.concatenate(turns)[kept]),
-        left_out=float(np.sqrt(energy[~kept].sum() / energy.sum())),
+        modes=modes, chosen=chosen, squared=squared, bending=_bending(modes, chosen), H=H[strong],
+        symmetries=(slopes.symmetries, np.concatenate(turns)[strong]),
+        left_out=float(np.sqrt(energy[~strong].sum() / energy.sum())),
     )  # fmt: skip
 
 
@@ -198,12 +198,12 @@ class _Slopes:
         resultants times areas (3, x, y, k).
         """
         i, j = self.pairs(turn)
-        found = np.zeros((states.shape[3], *(2 * self.symmetries.shape)))
+        added = np.zeros((states.shape[3], *(2 * self.symmetries.shape)))
         for part in np.array_split(np.arange(len(i)), len(i) // MOST_PAIRS + 1):
             a, b = i[part], j[part]
             work = np.tensordot(states, self.stretching(a, b), axes=([0, 1, 2], [0, 2, 3]))
-            found[:, a, b] = found[:, b, a] = 2 * work
-        return found
+            added[:, a, b] = added[:, b, a] = 2 * work
+        return added
 
 
 def _degrees(
@@ -240,7 +240,7 @@ def _states_of_stress(
     weighted = np.tensordot(problem.A, strains, axes=1) * slopes.grid.areas
     gram = np.tensordot(strains, weighted, axes=([0, 2, 3], [0, 2, 3]))
     energy, vectors = np.linalg.eigh((gram + gram.T) / 2)
-    kept = energy > ROUND_OFF * energy[-1]
-    scaled = vectors[:, kept] / np.sqrt(energy[kept])
+    strong = energy > ROUND_OFF * energy[-1]
+    scaled = vectors[:, strong] / np.sqrt(energy[strong])
     states = np.tensordot(weighted, scaled, axes=([1], [0]))
-    return energy[kept], slopes.stiffness(turn, states)
+    return energy[strong], slopes.stiffness(turn, states)

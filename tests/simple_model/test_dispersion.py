@@ -8,7 +8,7 @@ import pytest
 import read_results
 
 from simple_model import Material, Stack
-from simple_model.layers.compliance import half_space, layered, slab, thin_sheet
+from simple_model.layers.compliance import layered, slab, thin_sheet
 from simple_model.layers.dispersion import dispersion_curves, sheet_curves
 from simple_model.layers.material import PRESETS
 from simple_model.layers.wavenumber_integral import point_response
@@ -170,17 +170,6 @@ def test_modes_of_a_slab_add_up_to_its_wavenumber_integral():
     ((expected,),) = point_response(slab(palm, 0.015), [0.03], [2 * pi * f], WIDTH)
     found = sum(m.amplitude(WIDTH, 0.03)[0] for m in dispersion_curves(stack, [f], most=12).modes)
     assert abs(found - expected) < 1e-6 * abs(expected)
-
-
-def test_residues_are_those_of_the_compliance():
-    """G (k^2 - k_m^2) next to the pole, of a half-space and of a sheet with air."""
-    material, f = PRESETS["paper"], 140.0
-    (mode,) = dispersion_curves(Stack(materials=(material,), thicknesses=(inf,)), [f]).modes
-    bending = sheet_curves(material, 1e-3, [f]).modes[0]
-    for wave, compliance in ((mode, half_space(material)), (bending, thin_sheet(material, 1e-3))):
-        k, beside = wave.wavenumbers[0], wave.wavenumbers[0] * (1 + 1e-5 * np.array([1, -1]))
-        near = compliance(beside, np.array(2 * pi * f + 0j)) * (beside**2 - k**2)
-        assert abs(near.mean() / wave.residues[0] - 1) < 1e-6
 
 
 def test_bending_waves_of_a_sheet_in_vacuum_and_in_air():

@@ -25,8 +25,8 @@ from simple_model.layers.wavenumber_integral import point_integrals, point_respo
 
 WIDTH = 4.35e-3
 RADII = np.arange(5) * 5e-3
-K = np.geomspace(0.3, 1400, 16)
-HERTZ = np.array([1.0, 20, 80, 140, 210, 500, 1000, 2000])
+K = np.geomspace(0.3, 1400, 11)
+HERTZ = np.array([1.0, 20, 140, 500, 2000])
 PALM = PRESETS["palm"]
 SOFT = Material(density=1000, shear_modulus=8e3, viscosity=3.0, poisson=0.49)
 STIFF = Material(density=1000, shear_modulus=60e3, viscosity=6.0, poisson=0.49)
@@ -274,7 +274,6 @@ def test_a_free_stack_has_no_static_deflection():
 
 
 FOREARM = {"density": 1000, "shear_modulus": 7.86e3, "viscosity": 5.03}
-PAPER = thin_sheet(PRESETS["paper"], 1e-4)
 # The published lines are those of one complex modulus at all frequencies, which is not causal.
 HYSTERETIC = thin_sheet(
     replace(

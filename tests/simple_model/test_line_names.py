@@ -123,7 +123,7 @@ loads = st.builds(
 )  # fmt: skip
 
 
-@settings(max_examples=15)
+@settings(max_examples=10)
 @given(loads)
 def test_the_line_table_matches_the_spectrum(load):
     """The strongest line of the table is the strongest of the spectrum, and what is listed leaves a

@@ -178,7 +178,7 @@ class Louder(MovingPressure):
         return 2 * super().__call__(points, t)
 
 
-SHORT = Tacton(am_frequency=140, duration=0.01)
+SHORT = Tacton(am_frequency=140, duration=0.003)
 SKIN = skinwave.Body(width=0.04, height=0.04, depth=0.01)
 
 

@@ -23,7 +23,7 @@ from simple_model import (
     tabulated,
 )
 from simple_model.layers.compliance import slab
-from simple_model.load.sampling import highest
+from simple_model.load.sampling import highest_line
 from simple_model.load.spectrum import load_lines
 from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads
@@ -76,7 +76,7 @@ def test_lines_of_any_drive_law_match_its_waveform(law):
     assert np.abs(found - spectrum).max() < 1e-4 * np.abs(spectrum).max()
     above = np.flatnonzero(np.abs(spectrum) > 1e-3 * np.abs(spectrum).max()).max()
     assert above > 2 * 120  # beyond the second order
-    assert highest(load, 0.0) >= above
+    assert highest_line(load) >= above
     assert "3f_AM" in named_lines(replace(load, tacton=replace(tacton, envelope_frequency=0.0)))
 
 

@@ -112,23 +112,6 @@ def test_frequencies_of_square_plates_are_those_published(supports, published, l
     assert (error < most).all()
 
 
-def test_static_and_steady_deflection_are_those_of_naviers_series():
-    modes = plate_modes(SIMPLY, 900.0)
-    points, loaded = np.array([[0.011, -0.007], [0.0, 0.0]]), np.array([[-0.013, 0.009]])
-    forces = np.repeat(modes.at(loaded), 2, axis=0)  # of 1 N
-    found = modal_motion(modes, np.array([0.0, 90.0]), forces, np.ones_like) @ modes.at(points).T
-    a, b, stiffness = navier(SIMPLY, 400)
-
-    def shapes(p):
-        along = np.sin(a * (p[0] + SIMPLY.size_x / 2))
-        return along * np.sin(b * (p[1] + SIMPLY.size_y / 2))
-
-    for line, f in zip(found, (0.0, 90.0), strict=True):
-        series = 4 / (SIMPLY.size_x * SIMPLY.size_y) / (stiffness - MASS * (2 * np.pi * f) ** 2)
-        exact = [(series * shapes(p) * shapes(loaded[0])).sum() for p in points]
-        np.testing.assert_allclose(line, exact, rtol=2e-3)
-
-
 def clamped_beam(tension, loss, frequency):
     """Deflection of the middle of a clamped, stretched beam under 1 Pa: its characteristic roots
     D (1 + i eta) k^4 - T k^2 - m w^2 = 0 and the two conditions of an end.

@@ -248,7 +248,7 @@ def small_scene(duration=0.03, **tacton):
 
 @pytest.mark.parametrize("name", LOADS)
 def test_lines_and_time_steps_give_the_same_motion(name):
-    scene = small_scene(0.03 if "pulses" in name else 0.015, **LOADS[name])
+    scene = small_scene(0.02 if "pulses" in name else 0.015, **LOADS[name])
     scene = replace(scene, body=replace(scene.body, sides="clamped"))  # no layer around it
     x = compute(scene, "fem", h=0.006).displacement
     y = compute(scene, "fem-transient", h=0.006, dt=2.5e-5).displacement
