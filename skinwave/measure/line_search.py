@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simple_model.windows import cosines
+from simple_model.spectra import cosines
 from skinwave.measure.noise_floor import false_alarm, noise_floor
 from skinwave.typing import Floats
 

@@ -18,7 +18,7 @@ from scipy.special import fdtrc
 
 from simple_model import Response
 from simple_model.response import SETTLE, line_rows
-from simple_model.windows import cosines
+from simple_model.spectra import cosines
 from skinwave.measure.delays import in_step
 from skinwave.measure.measurement import Measurement
 from skinwave.measure.noise_floor import freedom, noise_floor
