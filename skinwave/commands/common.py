@@ -210,7 +210,7 @@ def metre(millimetre: float | None) -> float | None:
 @contextmanager
 def progress_of(options: argparse.Namespace) -> "Iterator[Progress]":
     """Yield a progress callback: a bar on a terminal, lines on a pipe, nothing if quiet."""
-    from skinwave.system.progress_bar import reported
+    from skinwave.system.progress_bar import progress_callback
 
-    with reported(not (options.quiet or options.json)) as progress:
+    with progress_callback(not (options.quiet or options.json)) as progress:
         yield progress

@@ -25,23 +25,22 @@ PAPER = "paper-15"
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
-    parser.add_argument(
+    add = parser.add_argument
+    add(
         "scene", nargs="?", default=PAPER, metavar="SCENE",
         help=f"scene file (TOML), or {PAPER} (default): the 15 Tactons of Lim, Seifi and Park",
     )  # fmt: skip
-    parser.add_argument(
+    add(
         "--body", metavar="BODY", help="replace the body: paper-sheet, skin-slab, palm, or a file "
         "with the surface of a hand (stl, ply, obj, glb, vtp) or a mesh (vtu, msh, inp, vtk)",
     )  # fmt: skip
     add_file_frame(parser)
-    parser.add_argument(
-        "--measured", type=Path, metavar="FILE", help="compare with this measurement of the scene"
-    )
-    parser.add_argument(
+    add("--measured", type=Path, metavar="FILE", help="compare with this measurement of the scene")
+    add(
         "--delay", type=float, metavar="MS",
         help="delay of the record relative to the models in ms (default: fitted)",
     )  # fmt: skip
-    parser.add_argument(
+    add(
         "--gain", type=float, metavar="G",
         help="gain of the record relative to the body (default: fitted)",
     )  # fmt: skip

@@ -10,38 +10,25 @@ from skinwave.system.plain_text import number_in
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
-    parser.add_argument(
-        "source", type=Path, metavar="IN", help="file to read: .toml, .adaptics, .csv or .wav"
-    )
-    parser.add_argument(
-        "target", type=Path, metavar="OUT", help="file to write: .toml, .adaptics, .csv or .py"
-    )
-    parser.add_argument(
-        "--scene", type=Path, metavar="SCENE", help="scene file that receives the pattern"
-    )
-    parser.add_argument(
+    add = parser.add_argument
+    add("source", type=Path, metavar="IN", help="file to read: .toml, .adaptics, .csv or .wav")
+    add("target", type=Path, metavar="OUT", help="file to write: .toml, .adaptics, .csv or .py")
+    add("--scene", type=Path, metavar="SCENE", help="scene file that receives the pattern")
+    add(
         "--rate", type=float, metavar="HZ", help="samples per second of a CSV file, read or written"
     )
-    parser.add_argument(
-        "--height", type=float, metavar="MM", help="height of the focus above the array in mm"
-    )
-    parser.add_argument(
-        "--hold", action="store_true", help="a focal point stays until the next sample"
-    )
-    parser.add_argument(
-        "--role", default="modulation", help="meaning of a WAV: modulation (default) or envelope"
-    )
-    parser.add_argument(
+    add("--height", type=float, metavar="MM", help="height of the focus above the array in mm")
+    add("--hold", action="store_true", help="a focal point stays until the next sample")
+    add("--role", default="modulation", help="meaning of a WAV: modulation (default) or envelope")
+    add(
         "--scale", default="full", help="scale of the samples of a WAV: full (default), peak or rms"
     )
-    parser.add_argument(
+    add(
         "--parameter", action="append", default=[], metavar="NAME=VALUE",
         help="value of a parameter of an AdapTics file; may be repeated",
     )  # fmt: skip
-    parser.add_argument(
-        "--resize", type=float, default=1.0, metavar="FACTOR", help="multiply the path by a factor"
-    )
-    parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
+    add("--resize", type=float, default=1.0, metavar="FACTOR", help="multiply the path by a factor")
+    add("--overwrite", action="store_true", help="replace an existing file")
     add_reporting(parser)
 
 

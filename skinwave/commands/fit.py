@@ -30,44 +30,37 @@ TEXTS = (  # options about a file, each a text
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
-    parser.add_argument(
-        "scene", type=Path, nargs="?", metavar="SCENE", help="scene file (TOML) of the measurement"
-    )
-    parser.add_argument("--measured", type=Path, metavar="FILE", help="file of the measurement")
-    parser.add_argument(
+    add = parser.add_argument
+    add("scene", type=Path, nargs="?", metavar="SCENE", help="scene file (TOML) of the measurement")
+    add("--measured", type=Path, metavar="FILE", help="file of the measurement")
+    add(
         "--vary", action="extend", nargs="+", metavar="KEY=LOW:HIGH", default=[],
         help="numbers to fit, such as body.material.shear_modulus_pa=5000:50000; also gain, "
         "delay_ms, offset_x_mm and offset_y_mm of the measurement",
     )  # fmt: skip
-    parser.add_argument(
+    add(
         "--tie", action="extend", nargs="+", default=[], metavar="KEY=EXPRESSION",
         help="compute a key from the varied keys",
     )  # fmt: skip
-    parser.add_argument(
+    add(
         "--to", choices=KINDS, help="data to fit: waveforms (default), complex lines, or amplitudes"
     )
     add_model_name(parser)
-    parser.add_argument(
-        "--starts", type=int, default=8, metavar="N", help="starts of the search (default: 8)"
-    )
-    parser.add_argument("--seed", type=int, default=0, help="seed of the starts (default: 0)")
-    parser.add_argument(
+    add("--starts", type=int, default=8, metavar="N", help="starts of the search (default: 8)")
+    add("--seed", type=int, default=0, help="seed of the starts (default: 0)")
+    add(
         "--inspect", type=Path, metavar="FILE", help="report what a file contains, without a fit: "
         ".csv .txt .lvm .tdms .npz .wav .mat .uff .f32",
     )  # fmt: skip
-    parser.add_argument(
+    add(
         "--false-alarm", type=float, default=0.01, metavar="P",
         help="with --inspect: probability that noise alone shows any line (default: 0.01)",
     )  # fmt: skip
     for name, metavar, words in TEXTS:
-        parser.add_argument(f"--{name}", default="", metavar=metavar, help=words)
-    parser.add_argument(
-        "--positive", choices=tuple(SIGNS), help="positive motion is into the body or out of it"
-    )
-    parser.add_argument("--rate", type=float, metavar="HZ", help="samples per second")
-    parser.add_argument(
-        "--direction", choices=("x", "y", "z"), help="direction of motion in a Universal File"
-    )
+        add(f"--{name}", default="", metavar=metavar, help=words)
+    add("--positive", choices=tuple(SIGNS), help="positive motion is into the body or out of it")
+    add("--rate", type=float, metavar="HZ", help="samples per second")
+    add("--direction", choices=("x", "y", "z"), help="direction of motion in a Universal File")
     add_output(parser)
 
 

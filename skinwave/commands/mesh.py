@@ -8,29 +8,28 @@ from skinwave.commands.common import add_file_frame, add_output, add_size, progr
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
-    parser.add_argument(
+    add = parser.add_argument
+    add(
         "file", type=Path, metavar="FILE", help="surface (stl, ply, obj, off, glb, vtp) or mesh "
         "(vtu, msh, inp, vtk, vtkhdf, xdmf, med, bdf, mesh)",
     )  # fmt: skip
     add_file_frame(parser)
-    parser.add_argument(
+    add(
         "--inner", type=Path, action="append", default=[], metavar="FILE",
         help="closed surface inside the body, such as a bone, which becomes a region with the name "
         "of its file; may be repeated",
     )  # fmt: skip
-    parser.add_argument(
+    add(
         "--clip", type=float, nargs=4, metavar=("XMIN", "XMAX", "YMIN", "YMAX"),
         help="keep only this patch, in mm from the middle of the palm",
     )  # fmt: skip
-    parser.add_argument(
+    add(
         "--keep", choices=["all", "largest"], default="all",
         help="pieces to keep if the file has several: all (default) or the largest",
     )  # fmt: skip
-    parser.add_argument(
-        "--cap", action="store_true", help="close plane holes, such as an open wrist"
-    )
+    add("--cap", action="store_true", help="close plane holes, such as an open wrist")
     add_size(parser, default=4.0, help="element size in mm (default: 4)")
-    parser.add_argument(
+    add(
         "--timeout", type=float, default=600.0, metavar="S",
         help="time limit of the mesher in s (default: 600)",
     )  # fmt: skip

@@ -10,16 +10,17 @@ BOTH = "paper-vs-skin"
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
-    parser.add_argument(
+    add = parser.add_argument
+    add(
         "scene", metavar="SCENE", help=f"scene file (TOML), or {BOTH}: which mechanism produces "
         "which line of the 15 Tactons",
     )  # fmt: skip
     add_size(parser, help="element size of all steps in mm")
-    parser.add_argument(
+    add(
         "--update-rate", type=float, default=20.0, metavar="KHZ",
         help="update rate of the device's focus: 20 (default) or 40 kHz",
     )  # fmt: skip
-    parser.add_argument(
+    add(
         "--points", type=int, metavar="N",
         help="number of points on the path at which the focus rests (default: as many as the "
         "update rate allows)",

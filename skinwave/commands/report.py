@@ -32,7 +32,8 @@ REACH, STEP = 30.0, 1.0  # mm, of a map
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
-    parser.add_argument(
+    add = parser.add_argument
+    add(
         "source", type=Path, metavar="SCENE|DIR",
         help="scene file, or a folder that run, compare or report wrote; no model is run for a "
         "folder",
@@ -45,39 +46,29 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--map", action="store_true",
         help="write only a map: RMS of the quantity of the probes over the body, at their depth",
     )  # fmt: skip
-    parser.add_argument(
-        "--style", choices=STYLES, default="report", help="style of figures (default: report)"
-    )
-    parser.add_argument(
+    add("--style", choices=STYLES, default="report", help="style of figures (default: report)")
+    add(
         "--format", choices=FORMATS, action="append", default=[],
         help="format of figures besides PNG; may be repeated",
     )  # fmt: skip
-    parser.add_argument(
+    add(
         "--beside", type=lambda text: text.split(","), default=[], metavar="BODIES",
         help="add these bodies: paper-sheet, skin-slab or palm, separated by commas",
     )  # fmt: skip
     add_width(parser)
-    parser.add_argument(
+    add(
         "--only", type=lambda text: text.split(","), default=[], metavar="COLUMNS",
         help="show only these models, such as point-kernel,skin-slab",
     )  # fmt: skip
-    parser.add_argument(
-        "--quantity", metavar="NAME", help="quantity of a film or map (default: that of the scene)"
-    )
-    parser.add_argument(
-        "--camera", choices=("tilted", "front", "top"), help="camera of a film (default: tilted)"
-    )
-    parser.add_argument(
+    add("--quantity", metavar="NAME", help="quantity of a film or map (default: that of the scene)")
+    add("--camera", choices=("tilted", "front", "top"), help="camera of a film (default: tilted)")
+    add(
         "--frames", type=int, metavar="N",
         help="frames of a film (default: as many as its fastest strong line needs)",
     )  # fmt: skip
-    parser.add_argument(
-        "--reach", type=float, metavar="MM", help=f"half width of a map (default: {REACH:g} mm)"
-    )
-    parser.add_argument(
-        "--step", type=float, metavar="MM", help=f"grid step of a map (default: {STEP:g} mm)"
-    )
-    parser.add_argument(
+    add("--reach", type=float, metavar="MM", help=f"half width of a map (default: {REACH:g} mm)")
+    add("--step", type=float, metavar="MM", help=f"grid step of a map (default: {STEP:g} mm)")
+    add(
         "--depth", metavar="MM",
         help="depth of a map in mm, or a receptor (default: that of the scene)",
     )  # fmt: skip

@@ -24,58 +24,51 @@ FORMATS = ("png", "svg", "pdf")
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
-    parser.add_argument(
+    add = parser.add_argument
+    add(
         "scene", type=Path, metavar="SCENE|DIR",
         help="scene file (TOML), or the folder of a sweep for --plot and --csv",
     )  # fmt: skip
-    parser.add_argument(
+    add(
         "--vary", action="extend", nargs="+", metavar="KEY=VALUES", default=[],
         help="keys to vary: tacton.speed_m_per_s=1:12:12, body.thickness_mm=10,15, "
         "body=skin-slab,palm; for lhs and sobol start:stop, normal(25e3,0.3), lognormal, factor, "
         "uniform or triangular",
     )  # fmt: skip
-    parser.add_argument(
-        "--design", default="factorial", help="factorial (default), zip, lhs or sobol"
-    )
-    parser.add_argument(
+    add("--design", default="factorial", help="factorial (default), zip, lhs or sobol")
+    add(
         "--samples", type=int, metavar="N",
         help="runs of lhs, rows of each matrix of sobol, or samples for the interval of --best "
         "(default: 199)",
     )  # fmt: skip
-    parser.add_argument("--seed", type=int, default=0, help="seed of the samples (default: 0)")
-    parser.add_argument(
+    add("--seed", type=int, default=0, help="seed of the samples (default: 0)")
+    add(
         "--best", metavar="COLUMN",
         help="find the value of the varied key at which a column such as level_db[0] is largest, "
         "and its 95 %% interval under the distributions of the scene",
     )  # fmt: skip
-    parser.add_argument("-o", "--out", type=Path, metavar="DIR", help="folder of the table")
-    parser.add_argument(
+    add("-o", "--out", type=Path, metavar="DIR", help="folder of the table")
+    add(
         "--scheduler", default="processes", metavar="WHERE",
         help="processes (default), threads, or the address of a Dask scheduler",
     )  # fmt: skip
-    parser.add_argument(
+    add(
         "--workers", type=int, metavar="N",
         help="number of runs at a time on this machine (default: all cores)",
     )  # fmt: skip
     add_model(parser, has_steps=False)
     add_mesh(parser)
-    parser.add_argument("--csv", action="store_true", help="also write rows.csv")
-    parser.add_argument(
+    add("--csv", action="store_true", help="also write rows.csv")
+    add(
         "--plot", nargs="*", metavar="COLUMN",
         help="draw columns of the table into the folder figures: peak_um (default), level_db, "
         "f_AM_um[2] for one probe",
     )  # fmt: skip
-    parser.add_argument(
-        "--x", metavar="KEY", help="key of the horizontal axis (default: the one with most values)"
-    )
-    parser.add_argument(
-        "--by", metavar="KEY", help="key with a curve for each value (default: the next one)"
-    )
-    parser.add_argument("--heat", action="store_true", help="draw a map over --x and --by")
-    parser.add_argument(
-        "--format", choices=FORMATS, default="png", help="format of figures (default: png)"
-    )
-    parser.add_argument("--style", default="report", help="report (default), talk or print")
+    add("--x", metavar="KEY", help="key of the horizontal axis (default: the one with most values)")
+    add("--by", metavar="KEY", help="key with a curve for each value (default: the next one)")
+    add("--heat", action="store_true", help="draw a map over --x and --by")
+    add("--format", choices=FORMATS, default="png", help="format of figures (default: png)")
+    add("--style", default="report", help="report (default), talk or print")
     add_width(parser)
     add_reporting(parser)
 

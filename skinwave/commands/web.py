@@ -16,15 +16,14 @@ QUICK = ("skin-slab", "paper-sheet")  # bodies that are ready in seconds
 
 def options(parser: argparse.ArgumentParser) -> None:
     """Declare the command-line options."""
+    add = parser.add_argument
     add_scenes(parser, " and ".join(QUICK))
-    parser.add_argument(
-        "--port", type=int, default=8080, help="port (default: 8080; 0 for any free port)"
-    )
-    parser.add_argument(
+    add("--port", type=int, default=8080, help="port (default: 8080; 0 for any free port)")
+    add(
         "--base-url", default="/", metavar="PATH",
         help="path of the page behind a proxy, such as /user/name/proxy/8080/",
     )  # fmt: skip
-    parser.add_argument("--no-browser", action="store_true", help="only print the address")
+    add("--no-browser", action="store_true", help="only print the address")
     add_reporting(parser)
 
 

@@ -15,7 +15,7 @@ from skinwave.live.selftest import selftest
 from skinwave.scene.paper15 import tactons
 from skinwave.scene.scene import BODIES, Body, Scene, body_name
 from skinwave.system.effort import Progress, silent
-from skinwave.system.scripts import bundle, encoded
+from skinwave.system.scripts import bundle, json_for_script
 from skinwave.system.templates import render
 
 TITLE = "skinwave: waves in skin and paper under mid-air ultrasound haptics"
@@ -30,7 +30,7 @@ def page(data: Mapping[str, Any], title: str = TITLE) -> str:
     return render(
         "live.html", title=title, script=script,
         css=(static / "page.css").read_text(encoding="utf-8"),
-        data=encoded(data), policy=policy(script, served=bool(data.get("api"))),
+        data=json_for_script(data), policy=policy(script, served=bool(data.get("api"))),
     )  # fmt: skip
 
 

@@ -17,7 +17,7 @@ from skinwave.measure.measurement import strongest
 from skinwave.report.figures import REPORT, png
 from skinwave.report.palette import SERIES
 from skinwave.system.document import Picture, Report, Section
-from skinwave.system.table import Column, Table, shown
+from skinwave.system.table import Column, Table, cell_text
 
 MOST_DRAWN = 4  # places
 DRAWN_TIME = 0.1  # s
@@ -124,7 +124,7 @@ def text(found: Inspection) -> str:
         cells = [[column.title for column in table.columns]]
         for row in table.rows:
             pairs = zip(row, table.columns, strict=True)
-            cells.append([shown(value, column.digits) for value, column in pairs])
+            cells.append([cell_text(value, column.digits) for value, column in pairs])
         widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
         padded = ("  ".join(map(str.ljust, row, widths)).rstrip() for row in cells)
         lines += ["", *padded, ""]

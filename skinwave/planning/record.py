@@ -8,7 +8,7 @@ from typing import Any
 from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.reduced import ReducedBody
 from skinwave.scene.scene import Body
-from skinwave.system.drawn import drawn
+from skinwave.system.drawing import call_report
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +67,7 @@ class Plan:
         return {key: value for key, value in values.items() if key not in ("prepared", "options")}
 
     def __repr__(self) -> str:
-        return drawn("notebook", "plan_line", self)
+        return call_report("notebook", "plan_line", self)
 
     def _repr_html_(self) -> str:
-        return drawn("notebook", "plan_page", self)
+        return call_report("notebook", "plan_page", self)

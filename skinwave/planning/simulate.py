@@ -22,7 +22,7 @@ from skinwave.planning.plan_warnings import response_warnings
 from skinwave.planning.record import Plan
 from skinwave.scene.scene import Scene
 from skinwave.system.effort import Progress, SkinwaveWarning, versions
-from skinwave.system.progress_bar import reported
+from skinwave.system.progress_bar import progress_callback
 
 
 def simulate(
@@ -65,7 +65,7 @@ def simulate(
     >>> response.model, response.expected_error
     ('flat-body', 0.002)
     """
-    with reported(progress) as report:
+    with progress_callback(progress) as report:
         request = SolveOptions(model=model, tolerance=tolerance, progress=report, **options)
         response = solve(scene, plan(scene, request))
     for sentence in response.effort.warnings:

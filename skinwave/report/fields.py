@@ -26,7 +26,7 @@ from skinwave.results.outputs import output_file
 from skinwave.results.views import split
 from skinwave.scene.scene import Scene
 from skinwave.system.effort import Progress, SkinwaveWarning, silent
-from skinwave.system.progress_bar import reported
+from skinwave.system.progress_bar import progress_callback
 from skinwave.typing import Floats
 
 if TYPE_CHECKING:
@@ -205,7 +205,7 @@ def field(
     >>> field = skinwave.field(scene, np.arange(100) / 5000)  # doctest: +SKIP
     >>> field.plot(time=0.01)  # doctest: +SKIP
     """
-    with reported(progress) as report:
+    with progress_callback(progress) as report:
         options = SolveOptions(h=h, tolerance=tolerance, solver=solver, progress=report)
         moved = whole_motion(scene, options)
     check_values(len(times), len(moved.mesh.points))

@@ -11,7 +11,7 @@ from skinwave.report.palette import label
 from skinwave.report.render import outer_surface
 from skinwave.results.views import View
 from skinwave.system.arrays import quantised
-from skinwave.system.scripts import bundle, encoded
+from skinwave.system.scripts import bundle, json_for_script
 from skinwave.system.templates import render
 from skinwave.typing import Complex, Floats
 
@@ -34,7 +34,7 @@ def turntable(view: View, frame: int) -> str:
     }  # fmt: skip
     static = resources.files("skinwave") / "static"
     return render(
-        "turntable.html", title=data["title"], data=encoded(data),
+        "turntable.html", title=data["title"], data=json_for_script(data),
         script="\n" + bundle(static, "turntable.js"),
     )  # fmt: skip
 

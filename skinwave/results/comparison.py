@@ -10,7 +10,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 from simple_model import Response, phasors
 from simple_model.load.sampling import step
 from simple_model.response import SETTLE
-from skinwave.system.drawn import drawn
+from skinwave.system.drawing import call_report
 from skinwave.typing import Floats
 
 ROUND_OFF = 1e-6  # of the largest RMS motion: weaker lines are round-off
@@ -63,10 +63,10 @@ class Agreement:
     probes: Floats
 
     def __repr__(self) -> str:
-        return drawn("notebook", "agreement_line", self)
+        return call_report("notebook", "agreement_line", self)
 
     def _repr_html_(self) -> str:
-        return drawn("notebook", "agreement_page", self)
+        return call_report("notebook", "agreement_page", self)
 
 
 def compare(

@@ -26,7 +26,7 @@ from skinwave.bodies import (
 )
 from skinwave.scene.distributions import Distribution
 from skinwave.scene.load import PRESSURE, Load
-from skinwave.system.drawn import drawn
+from skinwave.system.drawing import call_report
 from skinwave.typing import Floats
 
 if TYPE_CHECKING:
@@ -207,13 +207,13 @@ class Scene:
 
     def plot(self, *, ax: Axes | None = None) -> Axes:
         """Draw the body, path, initial foci and probes from above, and return the axes."""
-        return drawn("notebook", "draw_scene", self, ax)
+        return call_report("notebook", "draw_scene", self, ax)
 
     def __repr__(self) -> str:
-        return drawn("notebook", "scene_line", self)
+        return call_report("notebook", "scene_line", self)
 
     def _repr_html_(self) -> str:
-        return drawn("notebook", "scene_page", self)
+        return call_report("notebook", "scene_page", self)
 
 
 def _check_reading(body: Body, reading: Reading) -> None:

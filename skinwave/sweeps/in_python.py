@@ -23,8 +23,8 @@ from skinwave.sweeps import best
 from skinwave.sweeps.sweep import Sweep
 from skinwave.sweeps.table_figures import axis_label, curves, finished, value
 from skinwave.system.effort import Progress
-from skinwave.system.progress_bar import reported
-from skinwave.system.table import shown
+from skinwave.system.progress_bar import progress_callback
+from skinwave.system.table import cell_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -103,7 +103,10 @@ class SweepTable:
     def _repr_html_(self) -> str:
         names = [*self.varied, *(name for name in RESULTS if name in self.columns)]
         rows = [
-            [shown(row.get(name) if name in self.varied else value(row, name)) for name in names]
+            [
+                cell_text(row.get(name) if name in self.varied else value(row, name))
+                for name in names
+            ]
             for row in self.rows[:MOST_ROWS]
         ]
         image = b""
@@ -231,7 +234,7 @@ def _sweep_of(
     """Yield the sweep of some options; without a folder, a temporary one."""
     table = tomllib.loads(dumps(scene))
     options = SolveOptions(model=model, tolerance=tolerance, h=h, solver=solver)
-    with reported(progress) as report, tempfile.TemporaryDirectory() as temporary:
+    with progress_callback(progress) as report, tempfile.TemporaryDirectory() as temporary:
         yield Sweep(
             folder=Path(temporary) / "sweep" if folder is None else Path(folder),
             points=partial(cases_of, table, table), options=options, progress=report,

@@ -26,7 +26,7 @@ def step_of(phase: str, fraction: float) -> tuple[str, float]:
 
 
 @contextmanager
-def reported(progress: Progress | bool | None) -> Iterator[Progress]:
+def progress_callback(progress: Progress | bool | None) -> Iterator[Progress]:
     """Yield a progress callback: a bar for True, none for False or None, or the given function."""
     if progress is True:
         with bar() as report:

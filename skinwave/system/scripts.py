@@ -23,7 +23,7 @@ _REFUSED = re.compile(
 )
 
 
-def encoded(data: Mapping[str, Any]) -> str:
+def json_for_script(data: Mapping[str, Any]) -> str:
     """Return data as JSON that cannot end the script element around it; raise a ValueError if a
     number is not finite.
     """

@@ -80,11 +80,11 @@ class Table:
     def html(self) -> Markup:
         """Return the table for a page; "-" where there is no value."""
         digits = [column.digits for column in self.columns]
-        rows = ([shown(v, n) for v, n in zip(row, digits, strict=True)] for row in self.rows)
+        rows = ([cell_text(v, n) for v, n in zip(row, digits, strict=True)] for row in self.rows)
         return part("table", [column.title for column in self.columns], rows)
 
 
-def shown(value: Any, digits: int = 3) -> str:
+def cell_text(value: Any, digits: int = 3) -> str:
     """Return a cell as text: numbers with significant digits, "-" for no value."""
     if isinstance(value, str):
         return value

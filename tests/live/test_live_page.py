@@ -8,7 +8,7 @@ import pytest
 from in_browser import frames, needs_browser
 
 from skinwave.commands.cli import main
-from skinwave.live.page import bundle, encoded, page, policy
+from skinwave.live.page import bundle, json_for_script, page, policy
 from skinwave.live.records import body_of, editables, record_of, toml_of, with_changes
 from skinwave.live.values import presets, values_of
 from skinwave.scene.file import loads
@@ -64,7 +64,7 @@ def test_what_is_not_understood_is_refused(tmp_path):
 
 
 def test_data_cannot_end_its_script():
-    text = encoded({"name": "</script><!--é"})
+    text = json_for_script({"name": "</script><!--é"})
     assert "<" not in text
     assert json.loads(text) == {"name": "</script><!--é"}
     with pytest.raises(ValueError, match="not JSON compliant"):

@@ -4,6 +4,6 @@ from importlib import import_module
 from typing import Any
 
 
-def drawn(module: str, function: str, *values: Any) -> Any:
+def call_report(module: str, function: str, *values: Any) -> Any:
     """Call a function of a module of `skinwave.report`."""
     return getattr(import_module(f"skinwave.report.{module}"), function)(*values)
