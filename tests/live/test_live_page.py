@@ -68,7 +68,7 @@ def test_data_cannot_end_its_script():
     assert "<" not in text
     assert json.loads(text) == {"name": "</script><!--é"}
     with pytest.raises(ValueError, match="not JSON compliant"):
-        encoded({"x": np.nan})
+        json_for_script({"x": np.nan})
 
 
 def test_only_a_served_page_may_ask_its_server():
