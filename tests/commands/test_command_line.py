@@ -123,8 +123,8 @@ def test_a_run_without_the_cache_leaves_nothing_in_it(scene, monkeypatch, tmp_pa
 def test_what_exists_is_kept(scene, capsys):
     (scene.parent / "kept").mkdir()
     (scene.parent / "kept/note.txt").write_text("mine")
-    assert "pass --overwrite" in refused(capsys, "run", scene, "--out", "kept")
-    assert "pass --overwrite" in refused(capsys, "compare", scene, "--out", "kept")
+    assert "--overwrite" in refused(capsys, "run", scene, "--out", "kept")
+    assert "--overwrite" in refused(capsys, "compare", scene, "--out", "kept")
     assert (scene.parent / "kept/note.txt").read_text() == "mine"
 
 
