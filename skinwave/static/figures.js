@@ -137,8 +137,8 @@ export function spectrumPlot(answer, { pinned, measured, highest, scale }) {
   };
   const wide = pinned ? 2 * STEM_SPACING : STEM_SPACING, moved = inQuantity(waves.f, answer.wavesAt, name);
   const own = stems("waves", "y2", pinned ? "B" : "waves", waves.f, moved, wide / 2);
-  const given = stems("kernel", "y", "kernel", kernel.f, amplitudesOf(kernel.f, answer.kernelAt), -wide / 2);
-  const curves = [given, own];
+  const pressure = amplitudesOf(kernel.f, answer.kernelAt);
+  const curves = [stems("kernel", "y", "kernel", kernel.f, pressure, -wide / 2), own];
   if (pinned) {
     const moves = meanLevel(pinned.load), amplitudes = inQuantity(pinned.waves.f, pinned.wavesAt, name);
     const factor = factorOf(moves * largestOf(amplitudes), largestOf(own.y));
@@ -158,9 +158,7 @@ export function spectrumPlot(answer, { pinned, measured, highest, scale }) {
     curves.push({ role: "threshold", axis: "y2", name: "threshold", dash: "5 3", x,
       y: x.map((f) => per * thresholdAt(f)) });
   }
-  const kernelAt = (f) => given.y[given.x.findIndex((at) => Math.abs(at - f) < 1e-3)] ?? 0;
-  const names = own.x.map((f, k) => ({ x: f, y: own.y[k], axis: "y2", text: lineName(answer, f),
-    above: { y: kernelAt(f), axis: "y" } }));
+  const names = own.x.map((f, k) => ({ x: f, y: own.y[k], axis: "y2", text: lineName(answer, f) }));
   const least = LEAST_NAMED * largestOf(own.y);
   const named = names.filter(({ text, y }) => text && y > least).sort((a, b) => b.y - a.y)
     .slice(0, MOST_NAMES);

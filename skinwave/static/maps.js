@@ -257,7 +257,7 @@ export function mapControls(svg, onPoint) {
 /** Legend of the marks of a map, as markup. */
 export const MAP_LEGEND = [
   ["path of the focus", `stroke="${COLOURS.path}" stroke-width="2"`],
-  ["kernel above −20 dB", 'stroke="currentColor" stroke-width="1.2"'],
+  ["kernel at −20 dB", 'stroke="currentColor" stroke-width="1.2"'],
   ["detection threshold", `stroke="${COLOURS.threshold}" stroke-width="2"`],
 ].map(([words, look]) => '<span class="mark"><svg width="20" height="8" aria-hidden="true">'
   + `<path d="M1,4H19" fill="none" ${look}/></svg> ${words}</span>`).join(" ");

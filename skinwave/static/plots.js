@@ -51,7 +51,7 @@ const subscripted = (name) => escaped(name).replace(/_(\w+)/g,
  *
  * `draw(spec)` takes { x: {label, range}, y: {label, range, role}, y2, curves, names, hatched, label }. A
  * curve has {role, axis: "y"|"y2", x, y, name, width, dash, fill, stems, offset}; names are [{x, y, axis,
- * text, above}], the most important first.
+ * text}], the most important first.
  */
 export function createPlot(host, { announce }) {
   const svg = document.createElementNS(NS, "svg");
@@ -65,7 +65,7 @@ export function createPlot(host, { announce }) {
   const clip = `clip-${host.id}`;
   let spec = null, size = [0, 0], cursor = null, selected = -1;
 
-  const area = () => [LEFT, TOP, size[0] - (spec.y2 ? RIGHT : 12), size[1] - BOTTOM];
+  const area = () => [LEFT, TOP, size[0] - RIGHT, size[1] - BOTTOM];
   const toX = (v) => {
     const [x0, , x1] = area(), [low, high] = spec.x.range;
     return x0 + (x1 - x0) * (v - low) / (high - low || 1);
@@ -167,16 +167,21 @@ export function createPlot(host, { announce }) {
     }).join("");
   }
 
+  /** Names above their lines. A name that would cross another line or name is left out. */
   function names(x0, x1) {
-    const boxes = [];
-    return (spec.names ?? []).map(({ x, y, axis, text, above }) => {
+    const boxes = [], stems = spec.curves.filter((curve) => curve.stems).flatMap((curve) => (
+      curve.x.map((x, k) => ({ x, at: toX(x) + (curve.offset ?? 0), top: toY(curve.y[k], curve.axis) }))));
+    return (spec.names ?? []).map(({ x, y, axis, text }) => {
       const width = 6.2 * text.replace(/_/g, "").length, [low, high] = spec.x.range;
       if (x < low || x > high) return "";
       const at = Math.min(Math.max(toX(x), x0 + width / 2), x1 - width / 2);
-      let up = Math.max(Math.min(toY(y, axis), above ? toY(above.y, above.axis) : Infinity) - 6, TOP + 2);
-      const hits = () => boxes.some((b) => Math.abs(b.at - at) < (b.width + width) / 2
-        && Math.abs(b.up - up) < NAME_HEIGHT);
-      for (let tries = 0; tries < 3 && hits(); tries++) up -= NAME_HEIGHT;
+      const own = stems.filter((stem) => Math.abs(stem.x - x) < 1e-3);
+      const others = stems.filter((stem) => !own.includes(stem));
+      let up = Math.max(Math.min(toY(y, axis), ...own.map(({ top }) => top)) - 6, TOP + 2);
+      const hits = () => boxes.some((box) => Math.abs(box.at - at) < (box.width + width) / 2
+        && Math.abs(box.up - up) < NAME_HEIGHT)
+        || others.some((stem) => Math.abs(stem.at - at) < width / 2 && stem.top < up + 4);
+      if (hits()) up -= NAME_HEIGHT;
       if (hits() || up < TOP - 4) return "";
       boxes.push({ at, up, width });
       return `<text class="name" x="${at.toFixed(1)}" y="${up.toFixed(1)}" text-anchor="middle">${

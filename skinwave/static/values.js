@@ -130,14 +130,15 @@ export function check(key, text) {
     return given;
   }
   const { unit, low, high, least = low } = NUMBERS[key], value = toNumber(given.replace(",", "."));
+  const range = `a value from ${least} to ${inUnit(high, unit)}`;
   if (!Number.isFinite(value)) {
-    throw new Error(`${label}: "${short(given)}" is not a number. Give ${least} to ${inUnit(high, unit)}.`);
+    throw new Error(`${label}: "${short(given)}" is not a number. Give ${range}.`);
   }
   if (value < least || value > high) {
-    throw new Error(`${label}: ${inUnit(value, unit)} is out of range. Give ${least} to ${inUnit(high, unit)}.`);
+    throw new Error(`${label}: ${inUnit(value, unit)} is out of range. Give ${range}.`);
   }
   if (key === "foci" && !Number.isInteger(value)) {
-    throw new Error(`${label}: ${value} is not a whole number. Give ${least} to ${high}.`);
+    throw new Error(`${label}: ${value} is not a whole number. Give ${range}.`);
   }
   return value;
 }
@@ -230,8 +231,9 @@ function checkOnBody(path, values, body) {
   for (const axis of [0, 1]) {
     const half = body.extent_mm[axis], name = "xy"[axis];
     if (1e3 * reach[axis] > half * (1 + 1e-9)) {
-      throw new Error(`The path reaches ${name} = ${Number((1e3 * reach[axis]).toPrecision(3))} mm, off the body, `
-        + `which ends at ±${half} mm. Make the path smaller.`);
+      const furthest = Number((1e3 * reach[axis]).toPrecision(3));
+      throw new Error(`The path reaches ${name} = ${furthest} mm, off the body, which ends at ±${half} mm. `
+        + "Make the path smaller.");
     }
     if (Math.abs(values[name]) > half) {
       throw new Error(`Point: ${name} = ${values[name]} mm is off the body, which ends at ±${half} mm.`);
