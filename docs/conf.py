@@ -1,4 +1,4 @@
-"""Sphinx's settings of the documentation site; `.ci/docs` builds it."""
+"""Settings of the documentation site for Sphinx. `.ci/docs` builds it."""
 
 import os
 import sys
@@ -32,8 +32,8 @@ extensions = [
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
     "mathml",  # formulas without a script
-    "generated",  # pages from the code, and links to files beside docs/
-    "docstrings",  # as numpydoc has them
+    "generated",  # pages from the code, and links to files outside docs/
+    "docstrings",  # numpydoc style
     "live_page",  # the page that computes
 ]
 exclude_patterns = ["_build", "extension", "gallery/*.py", "sg_execution_times.rst",
@@ -42,10 +42,10 @@ myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 4
 suppress_warnings = ["config.cache"]  # functions in the settings of the gallery
 
-nitpicky = True  # of pages and labels; annotations name numpy's types, whose pages are elsewhere
+nitpicky = True  # for pages and labels; annotations have types of numpy, which has its own site
 nitpick_ignore_regex = [(r"py:.*", r".*")]
 default_role = "code"
-highlight_language = "none"  # of formulas in docstrings; code says its own
+highlight_language = "none"  # for formulas in docstrings; code blocks name their language
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # docstrings have shapes and units

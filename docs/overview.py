@@ -1,4 +1,4 @@
-"""The picture of the README: one load on three models. `python docs/overview.py` takes a minute."""
+"""Draw the picture of the README: one load on three models. It takes a minute."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Debian's browser without a display, and the live page that skinwave web serves."""
+"""Chromium without a display, and the server skinwave web."""
 
 import os
 import re
@@ -24,10 +24,10 @@ needs_browser = pytest.mark.skipif(
 
 @contextmanager
 def chromium() -> Iterator[Any]:
-    """A browser, as Playwright has it."""
+    """A browser of Playwright."""
     playwright = pytest.importorskip("playwright.sync_api")
     wait = playwright.Page.wait_for_function
-    # By itself it looks with every frame, for which the browser draws sixty of them a second.
+    # By default it checks in every frame, which makes the browser draw 60 frames a second.
     playwright.Page.wait_for_function = partialmethod(wait, polling=50)
     with playwright.sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
@@ -37,7 +37,7 @@ def chromium() -> Iterator[Any]:
 
 
 def frames(page: Any, count: int) -> None:
-    """Wait until a page has drawn so many frames."""
+    """Wait until a page has drawn `count` frames."""
     page.evaluate(
         "count => new Promise(done => { const next = () => count-- ? requestAnimationFrame(next)"
         " : done(); next() })",
@@ -46,7 +46,7 @@ def frames(page: Any, count: int) -> None:
 
 
 def settled(page: Any) -> None:
-    """Wait until a page has drawn what was changed, has its pictures and changes no style."""
+    """Wait until a page has drawn its changes and pictures, and no animation runs."""
     frames(page, 2)
     page.wait_for_function(
         "() => document.readyState === 'complete' && [...document.images].every(i => i.complete)"
@@ -55,21 +55,21 @@ def settled(page: Any) -> None:
     )
 
 
-def served(*arguments: str) -> tuple[Any, str]:
-    """A server in a process of its own, and its address."""
+def start_server(*arguments: str) -> tuple[Any, str]:
+    """Start a server in its own process; return the process and the address."""
     command = [sys.executable, "-m", "skinwave", "web", "--no-browser", *arguments]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=dict(os.environ))
     assert process.stderr is not None
-    said = []
+    lines = []
     for line in process.stderr:
-        said.append(line)
+        lines.append(line)
         if found := re.search(r"http://\S+", line):
             return process, found.group()
-    raise AssertionError("".join(said))
+    raise AssertionError("".join(lines))
 
 
-def ended(process: Any) -> None:
-    """End a server, which must say nothing of a fault."""
+def end_server(process: Any) -> None:
+    """End a server, which must not have printed a traceback."""
     process.terminate()
-    said = process.communicate(timeout=600)[1]
-    assert "Traceback" not in said, said
+    printed = process.communicate(timeout=600)[1]
+    assert "Traceback" not in printed, printed

@@ -36,8 +36,8 @@ SHAPES = ("point", "line", "circle", "triangle", "square")
 
 
 def modules(browser, folder):
-    """A page with a map and a view, whose window has the functions of modules, and `attempt` for
-    what they refuse.
+    """A page with a map and a view. Its window has the functions of modules, and `attempt`, which
+    returns errors as `refused`.
     """
     shutil.copytree(str(resources.files("skinwave") / "static"), folder)
     (folder / "entry.js").write_text(MODULE, encoding="utf-8")
@@ -56,7 +56,7 @@ def some_values(starts, count, *, rhythm):
 
 
 def scenes_of(page, many):
-    """Scenes of values of the controls, by the files that the page saves."""
+    """Scenes of values of the controls, from the files that the page saves."""
     made = "([many, toml]) => many.map((own) => sceneToml(own, { toml }))"
     return [loads(text) for text in page.evaluate(made, [many, BARE])]
 

@@ -1,4 +1,4 @@
-// What scrolls is reached by the keyboard; links that are pictures have names.
+// Make scrolling parts reachable by keyboard, and name links that are pictures.
 function reachable() {
   for (const each of document.querySelectorAll("pre, .table-wrapper, .math"))
     if (each.scrollWidth > each.clientWidth || each.scrollHeight > each.clientHeight) each.tabIndex = 0;

@@ -1,6 +1,6 @@
-"""Pages of the reference from the code: `<!-- generated: name -->` in a page becomes its Markdown.
+"""Reference pages from the code: Markdown replaces `<!-- generated: name -->` in a page.
 
-What is listed is what the program itself reads: parsers, keys, registries and docstrings.
+The pages list parsers, keys, registries and docstrings of the program itself.
 """
 
 import argparse
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parents[2]
 MARK = re.compile(r"<!-- generated: ([\w-]+) -->")
-HERTZ = 200.0  # at which a table of materials states losses and speeds
+HERTZ = 200.0  # of losses and speeds in the table of materials
 PARAMETER = re.compile(r"^(\w+(?:, \w+)*) : (.*(?:\n    .*)*)", re.MULTILINE)
 
 
 def table(head: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
-    """A Markdown table."""
+    """Return a Markdown table."""
     head = list(head)
     lines = [head, ["---"] * len(head), *([_cell(each) for each in row] for row in rows)]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
@@ -32,28 +32,25 @@ def _cell(value: Any) -> str:
     return " ".join(str(value).split()).replace("|", "\\|")
 
 
-def described(record: type) -> dict[str, str]:
-    """What the docstring of a record says of each of its fields."""
-    found = {}
-    said = {f"`{name}`": _listed(values) for name, values in _choices().items()}
-    for names, text in PARAMETER.findall(inspect.getdoc(record) or ""):
-        for name in names.split(", "):
-            found[name] = " ".join(text.split())
-            for constant, values in said.items():
-                found[name] = found[name].replace(constant, values)
-    return found
-
-
-def _choices() -> dict[str, Iterable[str]]:
-    """Constants that docstrings name, whose values a reader of the page wants."""
+def descriptions_of(record: type) -> dict[str, str]:
+    """Return the description of each field in the docstring of a record, with the values of the
+    constants that it names.
+    """
     from simple_model import SHAPES
     from simple_model.load.trajectory import BY_POINTS
     from skinwave.scene.load import LOADS
 
-    return {"SHAPES": SHAPES, "BY_POINTS": BY_POINTS, "LOADS": LOADS}
+    descriptions = {}
+    constants = {"SHAPES": SHAPES, "BY_POINTS": BY_POINTS, "LOADS": LOADS}
+    for names, text in PARAMETER.findall(inspect.getdoc(record) or ""):
+        description = " ".join(text.split())
+        for name, values in constants.items():
+            description = description.replace(f"`{name}`", _code_list(values))
+        descriptions |= dict.fromkeys(names.split(", "), description)
+    return descriptions
 
 
-def _listed(values: Iterable[str]) -> str:
+def _code_list(values: Iterable[str]) -> str:
     return ", ".join(f"`{value}`" for value in values)
 
 
@@ -61,7 +58,7 @@ def _listed(values: Iterable[str]) -> str:
 
 
 def commands() -> str:
-    """Every command with its options, as its parser has them."""
+    """Return all commands with their options, from their parsers."""
     from skinwave.commands import cli
 
     actions = cli.parser()._actions
@@ -74,29 +71,29 @@ def commands() -> str:
     return "\n".join([overview, *parts])
 
 
-def _command(name: str, said: str, parser: argparse.ArgumentParser) -> str:
+def _command(name: str, text: str, parser: argparse.ArgumentParser) -> str:
     usage = parser.format_usage().removeprefix("usage: ").strip()
     rows = [_option(parser, each) for each in parser._actions if each.dest != "help"]
-    options = table(["", "", "if not given"], rows) if rows else ""
+    options = table(["", "", "default"], rows) if rows else ""
     return (
-        f"(skinwave-{name})=\n\n## skinwave {name}\n\n{said}.\n\n```text\n{usage}\n```\n\n{options}"
+        f"(skinwave-{name})=\n\n## skinwave {name}\n\n{text}.\n\n```text\n{usage}\n```\n\n{options}"
     )
 
 
 def _option(parser: argparse.ArgumentParser, action: argparse.Action) -> list[str]:
     formatter = parser._get_formatter()
-    shown = formatter._format_action_invocation(action)
-    said = formatter._expand_help(action) if action.help else ""
+    invocation = formatter._format_action_invocation(action)
+    text = formatter._expand_help(action) if action.help else ""
     default = action.default
-    plain = default is None or default is False or default is argparse.SUPPRESS or default == []
-    return [f"`{shown}`", said, "" if plain else f"`{default}`"]
+    is_obvious = default in (None, False, argparse.SUPPRESS) or default == []
+    return [f"`{invocation}`", text, "" if is_obvious else f"`{default}`"]
 
 
 # Scene files
 
 
 def scene_keys() -> str:
-    """Every key of a scene file with its meaning and the value that it takes if not given."""
+    """Return all keys of scene files with their meanings and defaults."""
     from simple_model import Material, MovingPressure, PronyTerm, Rhythm, Signal, Tacton, Trajectory
     from skinwave import Body, Load, Scene
     from skinwave.bodies import Layer, Mounting, Phalanx, Placement, Relief
@@ -122,22 +119,22 @@ def scene_keys() -> str:
     parts = [_section(name, sections[name], classes) for name, classes in records.items()]
     parts += [_section(name, keys, [record]) for name, (keys, record) in inner.items()]
     if missing := sections.keys() - records.keys():
-        raise ValueError(f"no record describes the section {', '.join(missing)}; name it here")
+        raise ValueError(f"The section {', '.join(missing)} has no record. Add it to `records`.")
     return "\n".join(parts)
 
 
 def _section(name: str, keys: Mapping[str, Any], records: list[type]) -> str:
-    said: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for record in records:
-        said |= described(record)
-    rows = [[f"`{k}`", said.get(key.name, ""), _default(key, records)] for k, key in keys.items()]
+        texts |= descriptions_of(record)
+    rows = [[f"`{k}`", texts.get(key.name, ""), _default(key, records)] for k, key in keys.items()]
     lists = name in ("body.layers", "body.material.prony")
     heading = f"[[{name}]]" if lists else f"[{name}]"
-    return f"## `{heading}`\n\n{table(['key', '', 'if not given'], rows)}"
+    return f"## `{heading}`\n\n{table(['key', '', 'default'], rows)}"
 
 
 def _default(key: Any, records: list[type]) -> str:
-    """A default as a scene file has it; nothing where there is none."""
+    """Return the default of a key as in a scene file, "" if it has none."""
     from dataclasses import MISSING, fields
 
     for field in (each for record in records for each in fields(record)):
@@ -145,13 +142,13 @@ def _default(key: Any, records: list[type]) -> str:
             continue
         try:
             return f"`{json.dumps(key.write(field.default))}`"
-        except (TypeError, ValueError, AttributeError):  # a record of its own, see its section
+        except (TypeError, ValueError, AttributeError):  # a record with its own section
             return ""
     return ""
 
 
 def shipped() -> str:
-    """Scene files of examples/, whole."""
+    """Return the scene files of examples/."""
     files = sorted((ROOT / "examples").glob("*.toml"))
     return "\n".join(f"## {f.name}\n\n```toml\n{f.read_text('utf-8')}```\n" for f in files)
 
@@ -160,7 +157,7 @@ def shipped() -> str:
 
 
 def models() -> str:
-    """Registered models: what each computes and leaves out, and for which bodies."""
+    """Return the registered models, what each computes, and for which bodies."""
     from skinwave import models
     from skinwave.bodies import BODIES
 
@@ -169,25 +166,23 @@ def models() -> str:
     for model in map(models.named, models.names()):
         marks = [_takes(model, body) for body in bodies.values()]
         rows.append([f"`{model.name}`", model.words, *marks])
-    said = [
-        f"**{model.name}** rests on: {'; '.join(model.sources)}.\n"
+    sources = [
+        f"**{model.name}** uses: {'; '.join(model.sources)}.\n"
         for model in map(models.named, models.names())
         if model.sources
     ]
-    return table(["model", "computes", *bodies], rows) + "\n" + "\n".join(said)
+    return table(["model", "computes", *bodies], rows) + "\n" + "\n".join(sources)
 
 
 def _takes(model: Any, body: Any) -> str:
-    from simple_model import MovingPressure, Tacton
+    from skinwave.live.packs import resting_scene
     from skinwave.models.limits import takes
-    from skinwave.scene.scene import Scene
 
-    scene = Scene(pressure=MovingPressure(tacton=Tacton()), body=body, probes=((0.0, 0.0),))
-    return "yes" if takes(model, scene) else ""
+    return "yes" if takes(model, resting_scene(body)) else ""
 
 
 def bodies() -> str:
-    """Kinds of body with the keys that only they take, and bodies by name."""
+    """Return the kinds of body with their own keys, and the bodies by name."""
     from skinwave.bodies import BODIES, KINDS
 
     kinds = [
@@ -196,23 +191,26 @@ def bodies() -> str:
             "yes" if kind.may_be_layered and kind.discretise else "",
             "yes" if kind.compliance else "",
             "yes" if kind.dispersion else "",
-            ", ".join(f"`{key}`" for key in kind.keys),
+            _code_list(kind.keys),
         ]
         for kind in KINDS.values()
     ]
-    named = [[f"`{name}`", body.of_kind.words(body), _of(body)] for name, body in BODIES.items()]
-    head = ["kind", "layers", "wavenumber integral", "dispersion", "keys of its own"]
+    named = [
+        [f"`{name}`", body.of_kind.words(body), _materials_of(body)]
+        for name, body in BODIES.items()
+    ]
+    head = ["kind", "layers", "wavenumber integral", "dispersion", "own keys"]
     return f"{table(head, kinds)}\n## By name\n\n{table(['name', 'is', 'material'], named)}"
 
 
-def _of(body: Any) -> str:
+def _materials_of(body: Any) -> str:
     name = body.material if isinstance(body.material, str) else "a table"
     layers = [layer.material for layer in body.layers if isinstance(layer.material, str)]
     return ", ".join([*layers, name])
 
 
 def materials() -> str:
-    """Material presets: moduli at rest, loss and wave speed at `HERTZ`."""
+    """Return the material presets: moduli at rest, loss and wave speed at `HERTZ`."""
     import numpy as np
 
     from simple_model.layers.material import PRESETS
@@ -223,9 +221,9 @@ def materials() -> str:
         speed = 1 / (1 / np.sqrt(modulus / solid.density)).real
         rows.append(
             [
-                f"`{name}`", f"{solid.density:g}", _shown(solid.shear_modulus / 1e3),
-                f"{solid.poisson:.4g}", _shown(modulus.real / 1e3),
-                f"{modulus.imag / modulus.real:.2g}", _shown(speed),
+                f"`{name}`", f"{solid.density:g}", _number(solid.shear_modulus / 1e3),
+                f"{solid.poisson:.4g}", _number(modulus.real / 1e3),
+                f"{modulus.imag / modulus.real:.2g}", _number(speed),
             ]
         )  # fmt: skip
     at = f"at {HERTZ:g} Hz"
@@ -235,12 +233,12 @@ def materials() -> str:
     )
 
 
-def _shown(value: float) -> str:
+def _number(value: float) -> str:
     return f"{value:,.0f}" if value >= 1000 else f"{value:.3g}"
 
 
 def quantities() -> str:
-    """Quantities that probes may read."""
+    """Return the quantities of probes."""
     from simple_model.quantities import QUANTITIES
 
     rows = [[f"`{q.name}`", q.words, q.unit, q.shown] for q in QUANTITIES.values() if q.of_body]
@@ -248,7 +246,7 @@ def quantities() -> str:
 
 
 def drives() -> str:
-    """Drive laws, with the sentence that pages have of each."""
+    """Return the drive laws with their notes."""
     from simple_model import DRIVES
 
     rows = [[f"`{law.name}`", law.words, law.note] for law in DRIVES.values()]
@@ -259,7 +257,7 @@ def drives() -> str:
 
 
 def verification() -> str:
-    """Cases of the verification suite, with their references and meshes."""
+    """Return the cases of the verification suite with their references and meshes."""
     from skinwave.verify.suite import CASES, TOPICS
 
     parts = [f"`skinwave verify` has {len(CASES)} cases."]
@@ -273,10 +271,10 @@ def _plain(text: str) -> str:
     return re.sub(r"([*_<^])", r"\\\1", text)
 
 
-# Pages that stand beside docs/
+# Pages from outside docs/
 
 
-SITE = {  # of the repository -> of the site
+SITE = {  # path in the repository -> page of the site
     "bench": "reference/benchmarks",
     "bench/README.md": "reference/benchmarks",
     "examples": "reference/scenes-shipped",
@@ -289,29 +287,29 @@ GALLERY = Path("examples/gallery")  # whose scripts are pages
 LINK = re.compile(r"\[([^\]\[]*)\]\(([^)#\s]+)((?:#[^)]*)?)\)")
 
 
-def mended(text: str, source: Path, page: Path) -> str:
-    """Text of a folder `source` on a page of the folder `page`, with links that the site has."""
+def with_site_links(text: str, source: Path, page: Path) -> str:
+    """Return a text of the folder `source` for a page of the folder `page`, with links to pages."""
 
     def one(match: re.Match[str]) -> str:
-        """A link, to a page of the site, or its text alone of a folder."""
+        """Return a link to a page of the site, or its text if the target is a folder."""
         label, target, anchor = match.groups()
         place = (source / target).resolve()
         if "://" in target or not place.is_relative_to(ROOT):
             return match.group()
         own = place.relative_to(ROOT)
-        found = SITE.get(str(own), f"gallery/{own.stem}" if own.parent == GALLERY else "")
-        if not found and place.is_dir():
+        name = SITE.get(str(own), f"gallery/{own.stem}" if own.parent == GALLERY else "")
+        if not name and place.is_dir():
             return label
-        to = ROOT / "docs" / found if found else place
+        to = ROOT / "docs" / name if name else place
         return f"[{label}]({os.path.relpath(to, page)}{anchor})"
 
     return LINK.sub(one, text)
 
 
 def _page(name: str, folder: str) -> str:
-    """A Markdown page of the repository without its title, with links as from a folder."""
+    """Return a Markdown page of the repository without its title, with links from a folder."""
     path = ROOT / name
-    return mended(path.read_text("utf-8").split("\n", 1)[1], path.parent, ROOT / folder)
+    return with_site_links(path.read_text("utf-8").split("\n", 1)[1], path.parent, ROOT / folder)
 
 
 PAGES: Mapping[str, Callable[[], str]] = {
@@ -331,15 +329,15 @@ PAGES: Mapping[str, Callable[[], str]] = {
 
 
 def read(app: "Sphinx", page: str, source: list[str]) -> None:
-    """Put what is generated into the source of a page, and mend the links of a Markdown page."""
+    """Insert generated text into the source of a page, and correct links of Markdown pages."""
     source[0] = MARK.sub(lambda match: PAGES[match.group(1)](), source[0])
     if app.env.doc2path(page).suffix == ".md":
         folder = (ROOT / "docs" / page).parent
-        source[0] = mended(source[0], folder, folder)
+        source[0] = with_site_links(source[0], folder, folder)
 
 
 def outdated(app: "Sphinx", env: Any, *changes: set[str]) -> list[str]:
-    """Pages that are read anew in every build, since the code may have changed."""
+    """Return the pages with generated text, which every build reads again."""
     pages = [page for page in env.found_docs if env.doc2path(page).suffix == ".md"]
     return [page for page in pages if MARK.search(env.doc2path(page).read_text("utf-8"))]
 

@@ -1,4 +1,4 @@
-"""The live page of the home page: skin slab and paper sheet, beside the other pages of the site."""
+"""The live page in the home page, with the skin slab and the paper sheet."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""Formulas as MathML, which browsers draw by themselves: no script, no font from a network."""
+"""Formulas as MathML, which browsers draw without scripts and fonts from a network."""
 
 from typing import Any
 
@@ -18,6 +18,6 @@ def _block(writer: Any, node: nodes.math_block) -> None:
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Register the renderer, which Sphinx takes if it is the only one."""
+    """Register the renderer. Sphinx uses it if it is the only one."""
     app.add_html_math_renderer("mathml", (_inline, None), (_block, None))
     return {"parallel_read_safe": True}

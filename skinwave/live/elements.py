@@ -85,17 +85,16 @@ def training_basis(ops: fem.Operators, forces: Floats, report: Any) -> np.ndarra
     """Return a basis (3 n, r) of the steady motion under loads (3 n, j) at all `FREQUENCIES`."""
     solve = LineSolver(ops)
     snapshots: list[np.ndarray] = []
-    count = len(FREQUENCIES) * -(-forces.shape[1] // AT_ONCE)
-    for frequency in FREQUENCIES:
-        for first in range(0, forces.shape[1], AT_ONCE):
-            report(len(snapshots) / count)
-            part = solve(frequency, forces[:, first : first + AT_ONCE])[ops.free]
-            snapshots.append(np.hstack([part.real, part.imag]).astype(np.float32))
+    batches = np.array_split(forces, -(-forces.shape[1] // AT_ONCE), axis=1)
+    for k, frequency in enumerate(FREQUENCIES):
+        parts = []
+        for j, batch in enumerate(batches):
+            report((k + j / len(batches)) / len(FREQUENCIES))
+            part = solve(frequency, batch)[ops.free]
+            parts += [part.real.astype(np.float32), part.imag.astype(np.float32)]
+        motion = np.hstack(parts)
         # Motion at high frequencies is weaker; it gets more weight, but less than at low ones.
-        own = snapshots[len(snapshots) - -(-forces.shape[1] // AT_ONCE) :]
-        size = np.sqrt(sum(float(np.linalg.norm(each)) ** 2 for each in own))
-        for each in own:
-            each /= size**WEIGHTING
+        snapshots.append(motion / float(np.linalg.norm(motion)) ** WEIGHTING)
     motions = np.hstack(snapshots)
     squares, turn = np.linalg.eigh((motions.T @ motions).astype(np.float64))
     squares, turn = squares[::-1], turn[:, ::-1]

@@ -37,12 +37,12 @@ export class Grid {
 
   /** Values (count,) at x, y in metre of fields with `count` values at each place. */
   at(fields, count, x, y) {
-    const { places, shares } = this.stencil(x, y), found = new Float64Array(count);
+    const { places, shares } = this.stencil(x, y), out = new Float64Array(count);
     for (let k = 0; k < places.length; k++) {
       const share = shares[k];
-      for (let m = 0, from = places[k] * count; m < count; m++, from++) found[m] += share * fields[from];
+      for (let m = 0, from = places[k] * count; m < count; m++, from++) out[m] += share * fields[from];
     }
-    return found;
+    return out;
   }
 
   /** Lines {re, im} (l, y, x) at other places, from those of the grid (l, p); NaN off the body. */
@@ -68,17 +68,17 @@ export class Grid {
     const taps = Float64Array.from({ length: 2 * reach + 1 },
       (_, k) => step * Math.exp(-(((k - reach) * step / width) ** 2) / 2));
     const pass = (from, stride, other) => {
-      const found = new Float32Array(from.length);
+      const out = new Float32Array(from.length);
       for (let a = 0; a < side; a++) {
         for (let b = 0; b < side; b++) {
           const to = (a * other + b * stride) * count;
           for (let j = Math.max(b - reach, 0); j <= Math.min(b + reach, side - 1); j++) {
             const tap = taps[j - b + reach], own = (a * other + j * stride) * count;
-            for (let m = 0; m < count; m++) found[to + m] += tap * from[own + m];
+            for (let m = 0; m < count; m++) out[to + m] += tap * from[own + m];
           }
         }
       }
-      return found;
+      return out;
     };
     return pass(pass(fields, 1, side), side, 1);
   }
@@ -101,15 +101,15 @@ function neighbours(place, side) {
 
 /** Fields (places, m), zero off the body, from rows (m, places on the body) of a pack. */
 export function byPlace(rows, count, inside) {
-  const found = new Float32Array(inside.length * count);
+  const out = new Float32Array(inside.length * count);
   for (let p = 0, k = 0; p < inside.length; p++) {
     if (inside[p] !== "1") continue;
     for (let m = 0, from = k, step = rows.length / count; m < count; m++, from += step) {
-      found[p * count + m] = rows[from];
+      out[p * count + m] = rows[from];
     }
     k++;
   }
-  return found;
+  return out;
 }
 
 /** Forces of a focal spot on the fields through which the load acts on a body. */
@@ -161,11 +161,11 @@ export class FieldMotion {
 
   /** Complex amplitudes (l,) in metre at a place in metre. */
   at(x, y) {
-    const own = this.body.grid.at(this.body.values, this.body.width, x, y), found = zeros(this.f.length);
+    const own = this.body.grid.at(this.body.values, this.body.width, x, y), out = zeros(this.f.length);
     for (let l = 0; l < this.f.length; l++) {
-      [found.re[l], found.im[l]] = summed(own, this.amplitudes[l + this.first]);
+      [out.re[l], out.im[l]] = summed(own, this.amplitudes[l + this.first]);
     }
-    return found;
+    return out;
   }
 
   /** Complex amplitudes (l, y, x) in metre on a grid. */
@@ -201,7 +201,7 @@ export class FieldMotion {
 
   /** Complex amplitudes (p,) of exp(pole t) at a place after a jump and a bend of the level. */
   startOf(outputs, start, jump, bend) {
-    const { body } = this, found = zeros(outputs.re.length), { re, im } = found;
+    const { body } = this, out = zeros(outputs.re.length), { re, im } = out;
     this.lines.f.forEach((f, l) => {
       const angle = 2 * Math.PI * f * start, c = Math.cos(angle), s = Math.sin(angle);
       const add = ({ ahead, back }, share) => {
@@ -213,23 +213,23 @@ export class FieldMotion {
       add(this.states[l], -jump);
       if (bend) add(overPoles(body.poles, this.states[l], f), bend);
     });
-    body.addCoupled?.(found, this, start, jump);
+    body.addCoupled?.(out, this, start, jump);
     for (let p = 0; p < re.length; p++) {
       [re[p], im[p]] = [re[p] * outputs.re[p] - im[p] * outputs.im[p],
         re[p] * outputs.im[p] + im[p] * outputs.re[p]];
     }
-    return found;
+    return out;
   }
 }
 
 /** States {ahead / (i w - pole), back / (-i w - pole)} (p,) at a frequency in Hz. */
 export function overPoles(poles, { ahead, back }, f) {
   const omega = 2 * Math.PI * f, over = ({ re, im }, w) => {
-    const found = zeros(re.length);
+    const out = zeros(re.length);
     for (let p = 0; p < re.length; p++) {
-      [found.re[p], found.im[p]] = divided(re[p], im[p], -poles.re[p], w - poles.im[p]);
+      [out.re[p], out.im[p]] = divided(re[p], im[p], -poles.re[p], w - poles.im[p]);
     }
-    return found;
+    return out;
   };
   return { ahead: over(ahead, omega), back: over(back, -omega) };
 }

@@ -234,12 +234,12 @@ export function gainLines(load) {
   counts.forEach((count, axis) => {
     if (count > 1) [re, im] = transformed(re, im, count, strides[axis]);
   });
-  const found = Array.from(re, (value, k) => {
+  const lines = Array.from(re, (value, k) => {
     const orders = places(k).map((n, axis) => (n >= counts[axis] / 2 && n > 0 ? n - counts[axis] : n));
     return { f: orders.reduce((sum, n, axis) => sum + n * fs[axis], 0), re: value, im: im[k], orders };
   });
-  const largest = Math.max(...found.map((c) => Math.hypot(c.re, c.im)));
-  return found.filter((c) => Math.hypot(c.re, c.im) > 1e-12 * largest);
+  const largest = Math.max(...lines.map((c) => Math.hypot(c.re, c.im)));
+  return lines.filter((c) => Math.hypot(c.re, c.im) > 1e-12 * largest);
 }
 
 /** Discrete Fourier transform along the axis of a table with this count and stride. */

@@ -66,7 +66,7 @@ const text = ([x, y], words, { colour = "currentColor", size = 11, anchor = "sta
   font-weight="${weight}">${escaped(words)}</text>`);
 const rectangle = (x, y, width, height, look = "") => (
   `<rect x="${x}" y="${y}" width="${width}" height="${height}" ${look}/>`);
-const drawn = (url, x, y, width, height) => `<image href="${url}" x="${x}" y="${y}" width="${width}"
+const imageMarkup = (url, x, y, width, height) => `<image href="${url}" x="${x}" y="${y}" width="${width}"
   height="${height}" preserveAspectRatio="none"/>`;
 const widthOf = (words, size) => 0.55 * size * words.length;
 
@@ -101,7 +101,7 @@ function inside(options, { box, image: url }) {
       [box.x + i * cell, box.y + box.side - j * cell])));
     parts.push(...looks.map((look) => line(lines.flat(), { ...look, apart: 2 })));
   };
-  parts.push(drawn(url, box.x - cell / 2, box.y - cell / 2, box.side + cell, box.side + cell));
+  parts.push(imageMarkup(url, box.x - cell / 2, box.y - cell / 2, box.side + cell, box.side + cell));
   if (hatched) {
     for (let k = -box.side, odd = false; k < box.side; k += 9, odd = !odd) {
       const ends = [[box.x + k, box.y + box.side], [box.x + k + box.side, box.y]];
@@ -165,7 +165,7 @@ function barMarkup({ largest, unit, decibel, signed }, { box, bar: url }) {
   if (decibel && !signed) words = [`≤ −${decibel} dB`, `−${decibel / 2}`, `0 dB = ${end}`];
   if (signed) words = [withUnit(-largest, unit), "0", `+${end}`];
   if (words.reduce((sum, each) => sum + widthOf(each, 13), 0) > box.side) words[1] = "";
-  return drawn(url, box.x, top, box.side, 9) + words.map((each, k) => text(
+  return imageMarkup(url, box.x, top, box.side, 9) + words.map((each, k) => text(
     [box.x + box.side * k / 2, top + 21], each,
     { size: 10.5, anchor: ["start", "middle", "end"][k] })).join("");
 }

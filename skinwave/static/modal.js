@@ -92,7 +92,7 @@ export class ModalBody {
 
   /** The dynamic stiffness times modal coordinates (m,). */
   multiplied(q, { re: dr, im: di, factor: [c, s] }) {
-    const { modes, between, coupled: n } = this, found = zeros(modes);
+    const { modes, between, coupled: n } = this, out = zeros(modes);
     for (let m = 0, k = 0; m < modes; m++) {
       let a = 0, b = 0;
       for (let i = 0; m < n && i < n; i++, k++) {
@@ -100,10 +100,10 @@ export class ModalBody {
         a += between[k] * q.re[i];
         b += between[k] * q.im[i];
       }
-      found.re[m] = dr[m] * q.re[m] - di[m] * q.im[m] + c * a - s * b;
-      found.im[m] = dr[m] * q.im[m] + di[m] * q.re[m] + c * b + s * a;
+      out.re[m] = dr[m] * q.re[m] - di[m] * q.im[m] + c * a - s * b;
+      out.im[m] = dr[m] * q.im[m] + di[m] * q.re[m] + c * b + s * a;
     }
-    return found;
+    return out;
   }
 }
 
@@ -118,11 +118,11 @@ const sizeOf = ({ re, im }) => Math.sqrt(re.reduce((sum, v, k) => sum + v * v + 
 
 /** Quotients (m,) of complex values. */
 function quotients({ re, im }, below) {
-  const found = zeros(re.length);
+  const out = zeros(re.length);
   for (let m = 0; m < re.length; m++) {
-    [found.re[m], found.im[m]] = divided(re[m], im[m], below.re[m], below.im[m]);
+    [out.re[m], out.im[m]] = divided(re[m], im[m], below.re[m], below.im[m]);
   }
-  return found;
+  return out;
 }
 
 /** Sum [re, im] of products of complex values, without conjugation. */

@@ -24,14 +24,14 @@ export class PoleBody {
 
   /** Amplitudes {re, im} (2 p,) of the real fields under forces {re, im} (2 p,) at a frequency in Hz. */
   solve(frequency, force) {
-    const { ahead, back } = overPoles(this.poles, this.onPoles(force), frequency), found = zeros(this.width);
+    const { ahead, back } = overPoles(this.poles, this.onPoles(force), frequency), out = zeros(this.width);
     for (let p = 0, j = this.width / 2; j < this.width; p++, j++) {
-      found.re[p] = ahead.re[p] + back.re[p];
-      found.re[j] = -ahead.im[p] - back.im[p];
-      found.im[p] = ahead.im[p] - back.im[p];
-      found.im[j] = ahead.re[p] - back.re[p];
+      out.re[p] = ahead.re[p] + back.re[p];
+      out.re[j] = -ahead.im[p] - back.im[p];
+      out.im[p] = ahead.im[p] - back.im[p];
+      out.im[j] = ahead.re[p] - back.re[p];
     }
-    return found;
+    return out;
   }
 
   /** Forces on the poles {ahead, back} (p,), from those on the real fields. */

@@ -247,10 +247,10 @@ class RadialMotion {
     const most = fd > 0 ? Math.min(Math.floor((HIGHEST + tones) / fd), Math.floor((count - 1) / 2)) : 0;
     const key = JSON.stringify([x, y, samplesKey(load, samples), load.foci]);
     if (body.latest?.key !== key || body.latest.most < most) {
-      const passing = this.passing(x, y), found = [];
-      for (let order = -most; order <= most; order++) found.push(harmonic(passing, order, load));
-      const largest = Math.max(...found.map(({ size }) => size));
-      const harmonics = found.filter(({ size }) => size > NEGLIGIBLE_HARMONIC * largest);
+      const passing = this.passing(x, y), all = [];
+      for (let order = -most; order <= most; order++) all.push(harmonic(passing, order, load));
+      const largest = Math.max(...all.map(({ size }) => size));
+      const harmonics = all.filter(({ size }) => size > NEGLIGIBLE_HARMONIC * largest);
       body.latest = { key, most, harmonics: harmonics.map(({ order, re, im }) => [order, { re, im }]) };
     }
     return body.latest.harmonics.filter(([order]) => Math.abs(order) <= most);

@@ -81,15 +81,11 @@ export function synthesise({ n, lines }, { re, im }, time, out) {
   }
 }
 
-/** Points [x, y] in mm, STEP apart, along paths of points in metre. */
-export function dots(paths) {
-  const places = [];
-  for (const line of paths) {
-    for (let k = 1; k < line.length; k++) {
-      const [x, y] = line[k - 1].map((v) => 1e3 * v), [u, v] = line[k].map((w) => 1e3 * w);
-      const parts = Math.ceil(Math.hypot(u - x, v - y) / STEP) || 1;
-      for (let j = 0; j < parts; j++) places.push([x + (u - x) * j / parts, y + (v - y) * j / parts]);
-    }
-  }
-  return places;
+/** Points [x, y] in mm, at most STEP apart, along a path of points in metre. */
+export function dots(path) {
+  return path.flatMap(([x, y], k) => {
+    const [u, v] = path[k + 1] ?? [x, y], parts = Math.ceil(1e3 * Math.hypot(u - x, v - y) / STEP) || 1;
+    return Array.from({ length: parts }, (_, j) => [x + (u - x) * j / parts, y + (v - y) * j / parts])
+      .map((at) => at.map((metre) => 1e3 * metre));
+  });
 }

@@ -9,10 +9,10 @@ const AT_ONCE = 64; // instants whose exponentials follow from each other by mul
 
 /** Re sum_l amplitudes [re, im] exp(2 pi i f t) at equally spaced times (t,) in s from 0. */
 export function oscillation(f, amplitudes, times) {
-  const found = new Float64Array(times.length), part = (k) => amplitudes.map((own) => own[k]);
-  addDecay(found, times, 0, { re: zeros(f.length).re, im: f.map((at) => 2 * Math.PI * at) },
+  const motion = new Float64Array(times.length), part = (k) => amplitudes.map((own) => own[k]);
+  addDecay(motion, times, 0, { re: zeros(f.length).re, im: f.map((at) => 2 * Math.PI * at) },
     { re: part(0), im: part(1) });
-  return found;
+  return motion;
 }
 
 /**
@@ -43,10 +43,10 @@ function rhythmPieces(load, until) {
 }
 
 /**
- * Add Re sum_k amplitudes exp(pole (t - start)) to `found` (t,) from `start` in s on, without negligible
+ * Add Re sum_k amplitudes exp(pole (t - start)) to `motion` (t,) from `start` in s on, without negligible
  * terms. Poles in 1/s and amplitudes are {re, im} (k,).
  */
-function addDecay(found, times, start, poles, amplitudes) {
+function addDecay(motion, times, start, poles, amplitudes) {
   const dt = times[1] - times[0], n = times.length, first = Math.ceil(start / dt - 1e-9);
   let largest = 0;
   for (let k = 0; k < poles.re.length; k++) {
@@ -65,7 +65,7 @@ function addDecay(found, times, start, poles, amplitudes) {
       let zr = amplitudes.re[k] * gr - amplitudes.im[k] * gi;
       let zi = amplitudes.re[k] * gi + amplitudes.im[k] * gr;
       for (let i = t, end = Math.min(t + AT_ONCE, last); i < end; i++) {
-        found[i] += zr;
+        motion[i] += zr;
         const next = zr * c - zi * s;
         zi = zr * s + zi * c;
         zr = next;
@@ -83,22 +83,22 @@ function addDecay(found, times, start, poles, amplitudes) {
  */
 export function underRhythm(load, times, steady, lag, free) {
   const pieces = rhythmPieces(load, times[times.length - 1]), dt = times[1] - times[0];
-  const found = new Float64Array(times.length);
+  const motion = new Float64Array(times.length);
   const lagging = pieces.some(({ slope }) => slope) ? lag() : null;
   let before = { level: 0, slope: 0, start: 0, end: 0 };
   for (const piece of pieces) {
     const { start, end, level, slope } = piece;
     const from = Math.ceil(start / dt - 1e-9), to = Math.min(Math.ceil(end / dt - 1e-9), times.length);
     for (let k = from; k < to; k++) {
-      found[k] += (level + slope * (times[k] - start)) * steady[k] - (lagging ? slope * lagging[k] : 0);
+      motion[k] += (level + slope * (times[k] - start)) * steady[k] - (lagging ? slope * lagging[k] : 0);
     }
     const jump = level - (before.level + before.slope * (before.end - before.start));
     const bend = slope - before.slope;
     if (Math.abs(jump) > 1e-9 || Math.abs(bend) > 1e-9) {
       const { poles, amplitudes } = free(start, jump, bend);
-      addDecay(found, times, start, poles, amplitudes);
+      addDecay(motion, times, start, poles, amplitudes);
     }
     before = piece;
   }
-  return found;
+  return motion;
 }

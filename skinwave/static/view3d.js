@@ -4,7 +4,7 @@ import { SIGNED, TABLE_LENGTH } from "./palette.js";
 import { bounds, dots, locate, shade, strongLines, synthesise } from "./surface3d.js";
 import { withUnit } from "./text.js";
 
-const SURFACE_VERTEX = `#version 300 es
+const VERTEX = `#version 300 es
   in vec3 place; in vec2 state; in vec3 normal; // state: lift in mm, place on the colour scale
   uniform mat3 turn; uniform vec3 middle; uniform vec3 size;
   out float value; out vec3 facing, at;
@@ -13,7 +13,7 @@ const SURFACE_VERTEX = `#version 300 es
     value = state.y; facing = turn * normal;
     gl_Position = vec4(at.xy * size.xy, -at.z * size.z, 1.0);
   }`;
-const SURFACE_FRAGMENT = `#version 300 es
+const FRAGMENT = `#version 300 es
   precision highp float;
   in float value; in vec3 facing, at;
   uniform sampler2D colours; out vec4 colour;
@@ -23,22 +23,6 @@ const SURFACE_FRAGMENT = `#version 300 es
     if (!(dot(way, flat_way) > 0.55)) way = flat_way; // beyond a sharp edge
     float light = 0.36 + 0.72 * max(0.0, dot(way, normalize(vec3(-0.55, 0.5, 0.67))));
     colour = vec4(texture(colours, vec2(clamp(value, 0.002, 0.998), 0.5)).rgb * light, 1.0);
-  }`;
-const MARK_VERTEX = `#version 300 es
-  in vec3 place; uniform mat3 turn; uniform vec3 middle; uniform vec3 size;
-  uniform float width, lead; // lead: mm in front of the surface, so that it does not hide the mark
-  void main() {
-    vec3 at = turn * (place - middle);
-    gl_Position = vec4(at.xy * size.xy, -(at.z + lead) * size.z, 1.0);
-    gl_PointSize = width;
-  }`;
-const MARK_FRAGMENT = `#version 300 es
-  precision highp float;
-  uniform vec3 ink; uniform float edge; out vec4 colour;
-  void main() {
-    float r = 2.0 * length(gl_PointCoord - 0.5);
-    if (r > 1.0) discard;
-    colour = vec4(r > edge ? vec3(1.0) : ink, 1.0);
   }`;
 const HOME = { turned: -0.5, tipped: 0.95, near: 1 };
 const LARGEST_LIFT = 0.06; // of the width: drawn size of the largest motion
@@ -84,27 +68,22 @@ class View {
   }
 
   begin() {
-    const { gl } = this, made = (vertex, fragment) => {
-      const program = gl.createProgram();
-      for (const [kind, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
-        const shader = gl.createShader(kind);
-        gl.shaderSource(shader, source);
-        gl.compileShader(shader);
-        gl.attachShader(program, shader);
-      }
-      ["place", "state", "normal"].forEach((name, k) => gl.bindAttribLocation(program, k, name));
-      gl.linkProgram(program);
-      const count = gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS), at = {};
-      for (let k = 0; k < count; k++) {
-        const { name } = gl.getActiveUniform(program, k);
-        at[name] = gl.getUniformLocation(program, name);
-      }
-      return { program, at };
-    };
-    this.surface = made(SURFACE_VERTEX, SURFACE_FRAGMENT);
-    this.marks = made(MARK_VERTEX, MARK_FRAGMENT);
-    this.buffers = {};
-    for (const name of ["places", "state", "triangles", "marks"]) this.buffers[name] = gl.createBuffer();
+    const { gl } = this, program = gl.createProgram();
+    for (const [kind, source] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]]) {
+      const shader = gl.createShader(kind);
+      gl.shaderSource(shader, source);
+      gl.compileShader(shader);
+      gl.attachShader(program, shader);
+    }
+    ["place", "state", "normal"].forEach((name, k) => {
+      gl.bindAttribLocation(program, k, name);
+      gl.enableVertexAttribArray(k);
+    });
+    gl.linkProgram(program);
+    gl.useProgram(program);
+    const names = ["turn", "middle", "size"];
+    this.uniforms = Object.fromEntries(names.map((name) => [name, gl.getUniformLocation(program, name)]));
+    this.buffers = { places: gl.createBuffer(), state: gl.createBuffer(), triangles: gl.createBuffer() };
     gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
     const looks = { MIN_FILTER: gl.LINEAR, WRAP_S: gl.CLAMP_TO_EDGE, WRAP_T: gl.CLAMP_TO_EDGE };
     for (const [key, value] of Object.entries(looks)) {
@@ -140,7 +119,7 @@ class View {
     }
     this.measure();
     const here = ([x, y]) => locate(this.mesh, x, y);
-    this.riders = { path: dots(scene.path || []).map(here).filter(Boolean),
+    this.marks = { paths: (scene.path || []).map((each) => dots(each).map(here).filter(Boolean)),
       points: (scene.points || []).map(([x, y]) => here([1e3 * x, 1e3 * y])).filter(Boolean) };
     this.describe();
     this.draw();
@@ -220,32 +199,19 @@ class View {
     const { view, buffers } = this, turn = this.turn(view), room = 0.88;
     this.scale = room * view.near * Math.min(wide / 2 / this.reach[0], (tall - 24) / 2 / this.reach[1]);
     const size = [2 * this.scale / wide, 2 * this.scale / tall, 0.9 / this.deep];
-    const common = ({ program, at }) => {
-      gl.useProgram(program);
-      gl.uniformMatrix3fv(at.turn, false, turn);
-      gl.uniform3fv(at.middle, this.middle);
-      gl.uniform3fv(at.size, size);
-    };
-    common(this.surface);
+    gl.uniformMatrix3fv(this.uniforms.turn, false, turn);
+    gl.uniform3fv(this.uniforms.middle, this.middle);
+    gl.uniform3fv(this.uniforms.size, size);
     gl.bindBuffer(gl.ARRAY_BUFFER, buffers.places);
     gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 0, 0);
     gl.bindBuffer(gl.ARRAY_BUFFER, buffers.state);
     gl.bufferData(gl.ARRAY_BUFFER, this.state, gl.DYNAMIC_DRAW);
     gl.vertexAttribPointer(1, 2, gl.FLOAT, false, 20, 0);
     gl.vertexAttribPointer(2, 3, gl.FLOAT, false, 20, 8);
-    for (const k of [0, 1, 2]) gl.enableVertexAttribArray(k);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.triangles);
     gl.drawElements(gl.TRIANGLES, mesh.triangles.length, gl.UNSIGNED_INT, 0);
-    gl.disableVertexAttribArray(1);
-    gl.disableVertexAttribArray(2);
-    common(this.marks);
-    const foci = this.foci().map(([x, y]) => locate(mesh, 1e3 * x, 1e3 * y)).filter(Boolean);
-    this.drawMarks(this.riders.path, 2.6 * ratio, [0.05, 0.05, 0.05], 2);
-    if (view.tipped < Math.PI / 2) gl.disable(gl.DEPTH_TEST); // visible in the hollows of the motion
-    this.drawMarks(this.riders.points, 11 * ratio, [0.84, 0.37, 0], 0.72);
-    this.drawMarks(foci, 13 * ratio, [0.05, 0.05, 0.05], 0.75);
-    gl.enable(gl.DEPTH_TEST);
-    this.drawOver(wide, tall, turn);
+    const marks = view.tipped < Math.PI / 2 ? this.drawMarks(wide, tall, turn) : ""; // on the upper side
+    this.over.innerHTML = marks + this.drawScale(wide, tall, turn);
     this.slider.value = 1000 * (this.time / this.loop);
     this.now.textContent = `${(1e3 * this.time).toFixed(2)} ms`;
     this.slider.setAttribute("aria-valuetext", this.now.textContent);
@@ -258,25 +224,27 @@ class View {
     return foci.length ? foci[Math.floor(this.time / this.loop * foci.length) % foci.length] : [];
   }
 
-  /** Draw round marks of a width in pixels at places of the moved surface. */
-  drawMarks(riders, width, ink, edge) {
-    if (!riders.length) return;
-    const { gl, moved, marks, buffers } = this, values = new Float32Array(3 * riders.length);
-    riders.forEach(({ corners, weights, x, y }, k) => {
-      values.set([x, y, corners.reduce((sum, c, j) => sum + weights[j] * moved[3 * c + 2], 0.1)], 3 * k);
-    });
-    gl.bindBuffer(gl.ARRAY_BUFFER, buffers.marks);
-    gl.bufferData(gl.ARRAY_BUFFER, values, gl.DYNAMIC_DRAW);
-    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 0, 0);
-    gl.uniform1f(marks.at.width, width);
-    gl.uniform1f(marks.at.lead, 0.3 + width / this.scale);
-    gl.uniform3fv(marks.at.ink, ink);
-    gl.uniform1f(marks.at.edge, edge);
-    gl.drawArrays(gl.POINTS, 0, riders.length);
+  /** Markup of paths, points and foci on the moved surface. */
+  drawMarks(wide, tall, turn) {
+    const project = ({ corners, weights, x, y }) => {
+      const z = corners.reduce((sum, c, j) => sum + weights[j] * this.moved[3 * c + 2], 0);
+      const at = [x, y, z].map((v, axis) => v - this.middle[axis]);
+      const along = (row) => this.scale * at.reduce((sum, v, axis) => sum + v * turn[3 * axis + row], 0);
+      return [wide / 2 + along(0), tall / 2 - along(1)].map((v) => v.toFixed(1));
+    };
+    const circle = (colour, radius) => (mark) => {
+      const [x, y] = project(mark);
+      return `<circle cx="${x}" cy="${y}" r="${radius}" fill="${colour}" stroke="#fff" stroke-width="1.5"/>`;
+    };
+    const foci = this.foci().map(([x, y]) => locate(this.mesh, 1e3 * x, 1e3 * y)).filter(Boolean);
+    const paths = this.marks.paths.filter((each) => each.length).map((each) => (
+      `<path d="M${each.map(project).join("L")}" fill="none" stroke="#111" stroke-width="2"/>`));
+    const points = this.marks.points.map(circle("#d55e00", 5));
+    return [...paths, ...points, ...foci.map(circle("#111", 6))].join("");
   }
 
-  /** Draw the scale bar and the axes over the picture. */
-  drawOver(wide, tall, turn) {
+  /** Markup of the scale bar and the axes. */
+  drawScale(wide, tall, turn) {
     const bar = [...BARS].reverse().find((length) => length * this.scale < 0.3 * wide) || BARS[0];
     const y = tall - 8, length = bar * this.scale, [u, v] = [wide - 34, tall - 34];
     const lines = [`M10,${y - 4}v8m0,-4h${length}m0,-4v8`], texts = [[10 + length / 2, y - 6, `${bar} mm`]];
@@ -286,7 +254,7 @@ class View {
       lines.push(`M${u},${v}l${across},${-up}`);
       texts.push([u + 1.35 * across, v - 1.35 * up + 4, name]);
     });
-    this.over.innerHTML = `<path d="${lines.join("")}" fill="none" stroke="currentColor" stroke-width="1.5"/>`
+    return `<path d="${lines.join("")}" fill="none" stroke="currentColor" stroke-width="1.5"/>`
       + texts.map(([x, at, words]) => `<text x="${x}" y="${at}" text-anchor="middle" font-size="11"`
         + ` fill="currentColor">${words}</text>`).join("");
   }

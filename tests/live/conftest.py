@@ -6,15 +6,15 @@ from in_live_page import modules
 
 @pytest.fixture(scope="session")
 def page(browser, tmp_path_factory):
-    """A page with the functions of the modules, shared by all tests; nothing may fail in it."""
-    found, said = modules(browser, tmp_path_factory.mktemp("live") / "static"), []
-    found.on("pageerror", lambda error: said.append(str(error)))
-    yield found
-    found.close()
-    assert said == []
+    """A page with the functions of the modules, without errors in its scripts."""
+    page, errors = modules(browser, tmp_path_factory.mktemp("live") / "static"), []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    yield page
+    page.close()
+    assert errors == []
 
 
 @pytest.fixture(scope="session")
 def starts(page):
-    """Values of the controls at the start."""
+    """Initial values of the controls."""
     return page.evaluate("() => STARTS")

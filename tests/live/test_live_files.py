@@ -17,7 +17,7 @@ ANSWER = """(own) => { const load = loadOf(own), x = own.x / 1e3, y = own.y / 1e
     waves: motion, wavesAt: at }; }"""
 
 
-def test_tables_and_sound_are_of_the_waveform_and_the_lines(page, starts, tmp_path):
+def test_tables_and_sound(page, starts, tmp_path):
     table, lines, sound = page.evaluate(
         f"""(own) => {{ const answer = ({ANSWER})(own);
           return [waveformCsv(answer), linesCsv(answer), [...waveformWav(answer)]]; }}""",
@@ -44,7 +44,7 @@ def test_tables_and_sound_are_of_the_waveform_and_the_lines(page, starts, tmp_pa
         ("# from a vibrometer\ntime [s]\ta [m/s²]\tb [m/s²]", "\t", "acceleration"),
     ],
 )
-def test_measurements_are_read_as_python_reads_them(page, tmp_path, header, mark, quantity):
+def test_reading_of_measurements(page, tmp_path, header, mark, quantity):
     t = np.arange(40) * 1e-3
     rows = (mark.join(f"{x:.9f}" for x in (a, np.sin(a), np.cos(a))) for a in t)
     text = "\n".join([header, *((row.replace(".", ",") if mark == ";" else row) for row in rows)])
@@ -65,7 +65,7 @@ REFUSED = (
 )  # fmt: skip
 
 
-def test_other_files_are_refused_with_where_to_go(page):
+def test_other_files_are_refused(page):
     read_all = "(texts) => texts.map((text) => attempt(() => readMeasurement(text, 'a.csv')))"
     for found in page.evaluate(read_all, REFUSED):
         assert "skinwave web" in found["refused"]

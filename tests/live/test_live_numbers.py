@@ -1,4 +1,4 @@
-"""Controls, loads, kernel and numbers of the live page in a browser, against Python."""
+"""Controls, loads, kernel and numbers of the live page in a browser, compared with Python."""
 
 import re
 from dataclasses import replace
@@ -22,15 +22,15 @@ pytestmark = needs_browser
 
 PLACES = [[0.0, 0.0], [0.01, -0.003], [-0.02, 0.015]]
 TIMES = np.arange(301) * 1e-4
-JOINED = 5e-5  # of lines of joined paths and of paths that jump, whose weak parts are left out
+JUMPS = 5e-5  # relative error of lines of joined paths and of paths that jump
 
 
 def steady(pressure):
-    """A load while a pulse is on."""
+    """The load during a pulse."""
     return replace(pressure, tacton=replace(pressure.tacton, rhythm=None))
 
 
-def test_scene_files_and_addresses_give_the_values_back(page, starts):
+def test_scene_files_and_addresses_preserve_values(page, starts):
     many = some_values(starts, 50, rhythm=True)
     addressed = "(many) => many.map((own) => fromAddress(`#${toAddress(own)}`))"
     assert page.evaluate(addressed, many) == [{"values": own, "refused": []} for own in many]
@@ -46,13 +46,13 @@ def test_scene_files_and_addresses_give_the_values_back(page, starts):
 WRONG = {"am": "high", "height": "90", "foci": "2.5", "pulses": "100", "paths": "circle/20/45/0"}
 
 
-def test_what_is_typed_wrong_is_refused(page):
+def test_invalid_input_is_refused(page):
     checked = "(wrong) => wrong.map(([key, text]) => attempt(() => check(key, text)))"
     assert all(found["refused"] for found in page.evaluate(checked, list(WRONG.items())))
     assert page.evaluate('() => check("am", "12,5")') == 12.5
 
 
-def test_a_ramp_longer_than_half_a_pulse_and_a_path_off_the_body_are_refused(page, starts):
+def test_long_ramps_and_paths_off_the_body_are_refused(page, starts):
     own = starts | {"pulses": "10/10", "ramp": 8}
     loaded = "([own, body]) => attempt(() => loadOf(own, body))"
     assert page.evaluate(loaded, [own, None])["refused"]
@@ -60,7 +60,7 @@ def test_a_ramp_longer_than_half_a_pulse_and_a_path_off_the_body_are_refused(pag
     assert page.evaluate(loaded, [starts, body])["refused"]
 
 
-def test_lines_of_the_load_are_those_of_python(page, starts, monkeypatch):
+def test_lines_of_the_load(page, starts, monkeypatch):
     # Interpolation along the path is exact to 1e-5 of a circle only.
     monkeypatch.setattr(simple_model.load.path_cells, "NODES_PER_WIDTH", 1e7)
     simple_model.load.path_cells.path_cells.cache_clear()
@@ -93,11 +93,11 @@ def test_lines_of_the_load_are_those_of_python(page, starts, monkeypatch):
         known = np.abs(np.array(own["f"])[at] - f) < 1e-6
         missed = np.where(known[:, None], given[at], 0) - lines[:, : len(PLACES)]
         rough = pressure.tacton.n_paths > 1 or pressure.tacton.trajectory.shape == "recorded"
-        bound = JOINED if rough or is_abrupt(pressure) else 1e-6
+        bound = JUMPS if rough or is_abrupt(pressure) else 1e-6
         assert np.abs(missed).max() < bound * largest
 
 
-def test_the_kernel_is_that_of_python_in_time_and_on_a_map(page, starts):
+def test_the_kernel_in_time_and_on_a_map(page, starts):
     many = some_values(starts, 20, rhythm=True)
     found = page.evaluate(
         """([many, times]) => many.map((own) => {
@@ -127,7 +127,7 @@ def test_the_kernel_is_that_of_python_in_time_and_on_a_map(page, starts):
 
 
 def _check_map(scene, own, amplitudes):
-    """Levels and distances of a map are those of their definitions in Python."""
+    """Check level, share and reach of a map."""
     levels = sensation_level(own["mean"] * np.array(amplitudes), own["f"], unit="Pa")
     if own["level"] is not None:
         assert own["level"]["dB"] == pytest.approx(levels.max(), abs=1e-6)
@@ -137,7 +137,7 @@ def _check_map(scene, own, amplitudes):
     places = np.stack(np.meshgrid(*2 * [np.linspace(-0.044, 0.044, 45)]), axis=-1)
     away, step = distance_from_path(scene, places), 0.002
     if scene.tacton.trajectory.is_static:
-        return  # foci that rest apart have distances of their own
+        return  # each focus at rest has its own distance
     found, inside = own["reach"], level >= 0
     if found is None or not inside.any():
         assert found is None or not rms.any()
@@ -147,7 +147,7 @@ def _check_map(scene, own, amplitudes):
     assert found["beyond"] == wanted.beyond
 
 
-def test_thresholds_spectra_and_delays_are_those_of_python(page):
+def test_thresholds_spectra_and_delays(page):
     f = np.array([5.0, 10, 20, 100, 137, 250, 400, 1000, 1001])
     given = page.evaluate("(f) => [f.map(thresholdAt), f.map(pressureThresholdAt)]", f.tolist())
     for found, wanted in zip(given, (threshold(f), pressure_threshold(f)), strict=True):
@@ -167,7 +167,7 @@ def test_thresholds_spectra_and_delays_are_those_of_python(page):
     np.testing.assert_allclose(page.evaluate(delay, [z.tolist(), f.tolist()]), wanted, atol=1e-12)
 
 
-def test_the_highest_level_over_a_control_is_found_between_values(page, starts):
+def test_the_highest_level_over_a_control_is_refined(page, starts):
     own = starts | {"am": 0, "shape": "circle", "size": 20, "x": 10, "y": 0, "body": "none"}
     found = page.evaluate(
         """(own) => {
@@ -194,7 +194,7 @@ def test_the_highest_level_over_a_control_is_found_between_values(page, starts):
     assert found["best"]["level"] == pytest.approx(levels.max(), abs=0.01)
 
 
-def test_lines_have_the_names_of_python(page, starts):
+def test_names_of_lines(page, starts):
     paper = [starts | preset["values"] for preset in presets()]
     many = [*paper, *some_values(starts, 40, rhythm=False)]
     named = """(many) => many.map((own) => {

@@ -1,4 +1,4 @@
-"""The live page: its assembly, its records, and how it behaves in a browser from a file."""
+"""The live page: its assembly, its records, and its behaviour in a browser."""
 
 import json
 import re
@@ -35,7 +35,7 @@ def modules(folder, **texts):
     return folder
 
 
-def test_modules_are_joined_in_the_order_in_which_they_need_each_other(tmp_path):
+def test_modules_are_joined_in_the_order_of_imports(tmp_path):
     text = bundle(
         modules(
             tmp_path,
@@ -51,7 +51,7 @@ def test_modules_are_joined_in_the_order_in_which_they_need_each_other(tmp_path)
     assert not re.search(r"^(export|import \{)", text, re.MULTILINE)
 
 
-def test_what_is_not_understood_is_refused(tmp_path):
+def test_unsupported_modules_are_refused(tmp_path):
     other = {
         "a": "export const a = 1;",
         "b": 'import { page } from "./page.js";\nexport const b = 1;',
@@ -71,7 +71,7 @@ def test_data_cannot_end_its_script():
         json_for_script({"x": np.nan})
 
 
-def test_only_a_served_page_may_ask_its_server():
+def test_only_a_served_page_may_send_requests():
     assert "connect-src 'none'" in policy("")
     assert "connect-src 'self'" in policy("", served=True)
     data = {"bodies": [], "start": {}, "presets": [], "selftest": [], "api": None}
@@ -88,7 +88,7 @@ SET = {
 }
 
 
-def test_values_are_those_of_a_scene_that_controls_can_set():
+def test_values_of_scenes():
     titles = [each["title"] for each in presets()]
     assert len(titles) == 15 + 4
     assert {"AM 140 Hz", "Circle 10 mm at 6 m/s", "AM 140 Hz + circle 20 mm at 12 m/s"} <= {*titles}
@@ -113,7 +113,7 @@ def test_each_value_of_a_body_can_be_changed(name):
         assert with_changes(body, {each.key: each.value}) == body
 
 
-def test_a_change_keeps_the_other_values_of_a_layer():
+def test_a_change_preserves_other_values_of_a_layer():
     body = with_changes(
         BODIES["palm-layers"], {"layers.1.modulus": 140.0, "layers.1.thickness": 2.0}
     )
@@ -124,14 +124,14 @@ def test_a_change_keeps_the_other_values_of_a_layer():
     assert body.depth == pytest.approx(26e-3)
 
 
-def test_changes_that_cannot_be_are_refused():
+def test_invalid_changes_are_refused():
     for changes in ({"width": 3}, {"modulus": "3"}, {"modulus": float("nan")}, {"modulus": -3},
                     {"base": "glued"}, {"base": "free", "sides": "free"}):  # fmt: skip
         with pytest.raises(ValueError, match=r"width|modulus|base|free|unconst"):
             with_changes(BODIES["skin-slab"], changes)
 
 
-def test_the_record_of_a_body_says_what_the_page_needs():
+def test_the_record_of_a_body():
     slab, sheet = (record_of(BODIES[name], {}) for name in ("skin-slab", "paper-sheet"))
     assert (slab["extent_mm"], slab["thickness_mm"]) == (None, None)
     assert sheet["extent_mm"] == [74.0, 52.5]
@@ -145,8 +145,8 @@ def test_the_record_of_a_body_says_what_the_page_needs():
 def file(tmp_path_factory):
     folder = tmp_path_factory.mktemp("live")
     (folder / "circle.toml").write_text(SCENE)
-    asked = ["live", str(folder / "circle.toml"), "-o", str(folder / "live.html"), "--quiet"]
-    assert main(asked) == 0
+    command = ["live", str(folder / "circle.toml"), "-o", str(folder / "live.html"), "--quiet"]
+    assert main(command) == 0
     return folder / "live.html"
 
 
@@ -162,7 +162,7 @@ def test_the_command_writes_one_file(file, capsys):
     assert sorted(path.name for path in file.parent.iterdir()) == ["circle.toml", "live.html"]
 
 
-def test_a_scene_that_is_malformed_is_refused_in_a_sentence(tmp_path, capsys):
+def test_a_malformed_scene_is_refused(tmp_path, capsys):
     (tmp_path / "bad.toml").write_text("[tacton]\nshape = 3\n")
     assert main(["live", str(tmp_path / "bad.toml"), "-o", str(tmp_path / "a.html")]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
@@ -171,18 +171,16 @@ def test_a_scene_that_is_malformed_is_refused_in_a_sentence(tmp_path, capsys):
 
 @pytest.fixture
 def opened(browser, file):
-    """A function that opens the page with a width and a part of its address; what the browser says
-    and asks for is collected.
-    """
+    """A function that opens the page, with its messages and requests as `messages`."""
     made = []
 
     def opening(width=1280, height=800, part=""):
         tab = browser.new_page(viewport={"width": width, "height": height}, reduced_motion="reduce")
         made.append(tab)
-        tab.said = []
-        tab.on("console", lambda message: tab.said.append(message.text))
-        tab.on("pageerror", lambda error: tab.said.append(str(error)))
-        tab.on("request", lambda request: tab.said.append(request.url))
+        tab.messages = []
+        tab.on("console", lambda message: tab.messages.append(message.text))
+        tab.on("pageerror", lambda error: tab.messages.append(str(error)))
+        tab.on("request", lambda request: tab.messages.append(request.url))
         tab.goto(f"{file.as_uri()}{part}")
         tab.locator(".tile").first.wait_for(state="attached")
         return tab
@@ -197,17 +195,17 @@ def tiles(tab):
 
 
 @needs_browser
-def test_it_opens_from_a_file_without_a_request_and_agrees_with_python(opened, file):
+def test_it_works_from_a_file_and_passes_its_self_test(opened, file):
     tab = opened(part="#selftest")
     tab.locator("#selftest-title", has_text="largest error").wait_for(timeout=60_000)
     assert float(tab.get_attribute("#selftest-title", "data-error")) < 0.01
     assert "191 Hz" in tiles(tab)
-    assert tab.said == [file.as_uri()]
+    assert tab.messages == [file.as_uri()]
 
 
 @needs_browser
 @pytest.mark.parametrize("width", [1280, 390])
-def test_it_is_accessible_and_fits(opened, width):
+def test_accessibility_and_size(opened, width):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
     tab = opened(width=width)
     found = axe.run(tab, options={"resultTypes": ["violations"], "preload": False}).response
@@ -220,7 +218,7 @@ def test_it_is_accessible_and_fits(opened, width):
 
 
 @needs_browser
-def test_controls_change_the_page_and_are_undone(opened):
+def test_controls_and_undo(opened):
     tab = opened()
     before = tiles(tab)
     tab.get_by_role("slider", name="Drawing speed").first.focus()
@@ -245,7 +243,7 @@ def test_controls_change_the_page_and_are_undone(opened):
 
 
 @needs_browser
-def test_a_preset_is_taken_and_compared_with_what_was_pinned(opened):
+def test_a_preset_is_compared_with_a_pinned_result(opened):
     tab = opened()
     tab.click("#pin")
     tab.click("[popovertarget=presets]")
@@ -264,7 +262,7 @@ def level(tab):
 
 
 @needs_browser
-def test_files_are_saved_and_a_measurement_is_drawn_over_the_waves(opened, tmp_path):
+def test_saved_files_and_a_measurement(opened, tmp_path):
     tab = opened()
     for title, held in (("Maps and plots, SVG", "<svg"), ("Scene, TOML", "speed_m_per_s = 12")):
         tab.click("[popovertarget=save]")

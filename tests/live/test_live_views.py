@@ -1,4 +1,4 @@
-"""Maps and views in three dimensions of the live page, drawn in a browser; the page of a report."""
+"""Maps and views in three dimensions of the live page, and the view of a report."""
 
 import json
 from io import BytesIO
@@ -38,7 +38,7 @@ LOAD = MovingPressure(
 
 
 def grid(of):
-    """Values of a function of x and y in metre at the places of a map, as a page takes them."""
+    """JavaScript array of a function of x, y in metre at the places of a map."""
     x, y = np.meshgrid(*2 * [np.linspace(-REACH, REACH, N)])
     return f"Float32Array.from({json.dumps(of(x, y).ravel().tolist())})"
 
@@ -55,7 +55,7 @@ def draw(page, rms, **options):
 
 @needs_browser
 @pytest.mark.parametrize("kind", ["decibel", "signed"])
-def test_a_map_has_the_colours_of_its_values_and_is_empty_off_the_body(page, kind):
+def test_colours_of_a_map(page, kind):
     scale, options = {
         "decibel": (lambda v: 1 + 20 * np.log10(v / 0.1) / 40, {"decibel": 40}),
         "signed": (lambda v: 0.5 + v / 0.2, {"signed": True}),
@@ -72,7 +72,7 @@ def test_a_map_has_the_colours_of_its_values_and_is_empty_off_the_body(page, kin
 
 
 @needs_browser
-def test_a_contour_is_where_values_are_zero(page):
+def test_contours(page):
     ends = page.evaluate(f"contours({grid(lambda x, y: np.hypot(x, y) - 0.015)}, {N})")
     places = REACH * (2 * np.reshape(ends, (-1, 2)) / (N - 1) - 1)
     np.testing.assert_allclose(np.hypot(*places.T), 0.015, atol=1e-4)
@@ -81,7 +81,7 @@ def test_a_contour_is_where_values_are_zero(page):
 
 
 @needs_browser
-def test_keys_and_a_pointer_select_points_of_a_map(page):
+def test_keys_and_pointer_select_points_of_a_map(page):
     draw(page, grid(lambda x, y: x), point=[0.01, 0.0], title="A < B", unit="Pa", largest=0.1)
     assert {"A < B", "0.100 Pa", "0 mm"} <= {*page.locator("#map text").all_text_contents()}
     page.evaluate("mapControls(document.getElementById('map'), (...at) => { window.at = at; })")
@@ -95,23 +95,23 @@ def test_keys_and_a_pointer_select_points_of_a_map(page):
 
 
 @needs_browser
-def test_a_body_moves_turns_and_says_how_it_is_drawn(page):
+def test_a_moving_body(page):
     page.evaluate(BODY)
     settled(page)
     assert "Exaggerated 3,000 times" in page.inner_text("#view")
     assert page.evaluate("view.loop") == pytest.approx(0.1)
-    seen = [picture(page, "#view canvas")]
-    assert seen[0].std() > 10  # not blank
+    pictures = [picture(page, "#view canvas")]
+    assert pictures[0].std() > 10  # not blank
     for change in CHANGES:
         page.evaluate(change)
-        seen.append(picture(page, "#view canvas"))
-        assert np.abs(seen[-1].astype(int) - seen[-2]).max() > 30
+        pictures.append(picture(page, "#view canvas"))
+        assert np.abs(pictures[-1].astype(int) - pictures[-2]).max() > 30
     page.focus("#view canvas")
     page.keyboard.press("Space")
     page.wait_for_function("view.time > 0.006")
 
 
-def test_lines_of_motion_that_repeats_add_up_to_it():
+def test_lines_of_periodic_motion():
     t, k = np.arange(40) / 40 * 0.02, np.arange(7)
     frames = np.cos(2 * np.pi * 150 * t[:, None] + k) + 0.2 * np.sin(2 * np.pi * 400 * t)[:, None]
     f, lines = motion_lines(frames, 0.02)
@@ -119,7 +119,7 @@ def test_lines_of_motion_that_repeats_add_up_to_it():
     np.testing.assert_allclose(synthesise(f, lines, t), frames, atol=1e-9)
 
 
-def test_foci_are_where_the_path_is():
+def test_foci_on_the_path():
     times = np.linspace(0, 0.05, 5)
     paths, foci = focus_places(LOAD, times)
     np.testing.assert_allclose(np.hypot(*paths[0].T), 0.01)
@@ -127,18 +127,18 @@ def test_foci_are_where_the_path_is():
 
 
 @needs_browser
-def test_the_view_of_a_report_opens_from_a_file_without_requests(browser, tmp_path):
+def test_the_view_of_a_report(browser, tmp_path):
     scene = Scene(name="s", pressure=LOAD, body=BODIES["skin-slab"], probes=((0.0, 0.0),))
     view = kernel_view(scene, np.array([0.03, 0.03]), played_part(LOAD, 420.0))
     (tmp_path / "view.html").write_text(turntable(view, 1), encoding="utf-8")
-    page, asked, said = browser.new_page(), [], []
-    page.on("request", lambda request: asked.append(request.url))
-    page.on("pageerror", lambda error: said.append(str(error)))
+    page, requests, errors = browser.new_page(), [], []
+    page.on("request", lambda request: requests.append(request.url))
+    page.on("pageerror", lambda error: errors.append(str(error)))
     page.goto((tmp_path / "view.html").as_uri())
     page.wait_for_selector("canvas[data-time]")
     time = page.evaluate("Number(document.querySelector('canvas').dataset.time)")
     assert time >= view.times[1] - 1e-9
     assert picture(page, "canvas").std() > 3
     page.close()
-    assert len(asked) == 1
-    assert said == []
+    assert len(requests) == 1
+    assert errors == []

@@ -88,4 +88,4 @@ def test_links_beyond_the_pages_lead_to_pages_of_the_site():
         ("[a](../fem)", "a"),
         ("[a](https://doi.org/x)", "[a](https://doi.org/x)"),
     ):
-        assert generated.mended(text, ROOT / "docs", ROOT / "docs") == expected
+        assert generated.with_site_links(text, ROOT / "docs", ROOT / "docs") == expected
