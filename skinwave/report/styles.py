@@ -17,16 +17,9 @@ ONE_COLUMN = 6.5  # inch, with letters of 10 points: wider figures span two colu
 
 @dataclass(frozen=True, kw_only=True)
 class Style:
-    """Style of pictures.
-
-    Parameters
-    ----------
-    paper, ink : str, colours
-    font : float, points
-    dpi : int, dots per inch
-    columns : (float, float), inch, widths of one and of two columns of a printed page, or None
-    panel : (int, int), pixels, width and height of one model in three dimensions
-    oversampling : int, factor by which three-dimensional pictures are finer
+    """Style of pictures: colours of paper and ink, font size in points, dots per inch, widths in
+    inch of one and of two columns of a printed page, size in pixels of a model in three dimensions,
+    and the factor by which three-dimensional pictures are finer.
     """
 
     paper: str = "#ffffff"

@@ -11,7 +11,7 @@ import numpy as np
 
 from simple_model.numbers import decibel
 from simple_model.quantities import DISPLACEMENT
-from skinwave.results.run import Run
+from skinwave.results.run import OfTacton, Run
 from skinwave.scene.scene import Scene
 from skinwave.system.table import Table
 from skinwave.typing import Floats
@@ -27,7 +27,7 @@ NO_PEAK = "a line at 1, 2 or 3 f_d has no spectral peak next to it"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LinesByName:
+class LinesByName(OfTacton):
     """Measured lines by name, with the attributes of a `Run` that claims need, and the `radius`
     (p,) of the confidence circle of each amplitude. `spectrum` is empty if only lines are known.
     """
@@ -40,16 +40,6 @@ class LinesByName:
     radius: dict[str, Floats]
     unresolved: tuple[str, ...]
     spectrum: tuple[Floats, Floats]
-
-    @property
-    def is_am(self) -> bool:
-        """Whether the amplitude is modulated."""
-        return self.scene.tacton.am_frequency > 0
-
-    @property
-    def is_stm(self) -> bool:
-        """Whether the focus moves."""
-        return self.scene.tacton.trajectory.drawing_frequency > 0
 
     @property
     def is_motion(self) -> bool:

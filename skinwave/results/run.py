@@ -18,8 +18,24 @@ ASSESSED = (
 SUPPORT = "f_support"  # line of a moving support
 
 
+class OfTacton:
+    """Properties of the Tacton in a scene."""
+
+    scene: Scene
+
+    @property
+    def is_am(self) -> bool:
+        """Whether the amplitude is modulated."""
+        return self.scene.tacton.am_frequency > 0
+
+    @property
+    def is_stm(self) -> bool:
+        """Whether the focus moves."""
+        return self.scene.tacton.trajectory.drawing_frequency > 0
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Run:
+class Run(OfTacton):
     """Response of one model to one Tacton on one body; its lines are those of the load."""
 
     tacton: str
@@ -95,16 +111,6 @@ class Run:
     def is_skin(self) -> bool:
         """Whether the response is the motion of skin, for which detection thresholds are known."""
         return self.is_motion and self.scene.body.is_skin
-
-    @property
-    def is_am(self) -> bool:
-        """Whether the amplitude is modulated."""
-        return self.scene.tacton.am_frequency > 0
-
-    @property
-    def is_stm(self) -> bool:
-        """Whether the focus moves."""
-        return self.scene.tacton.trajectory.drawing_frequency > 0
 
 
 def own_names(scene: Scene, listed: Mapping[str, float]) -> dict[str, str]:

@@ -63,15 +63,8 @@ EXPLAINED = (
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DrivenLine:
-    """A line of a load and the mode that it drives.
-
-    Parameters
-    ----------
-    name, frequency : name and frequency in Hz
-    strength : Pa, largest amplitude on the path
-    mode, at : driven mode, and the index of the frequency in it
-    share : share of the mode in the motion by all modes
-    focus_speed : m/s
+    """A line of a load, its frequency in Hz and largest amplitude in Pa on the path, the mode that
+    it drives with the index of the frequency, and the share of the mode in the motion.
     """
 
     name: str

@@ -37,17 +37,9 @@ Maps = tuple[SurfaceField, SurfaceField] | tuple[()]  # of a body and of the ker
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FirstScreen:
-    """Results on the first screen of a page, of one Tacton.
-
-    Parameters
-    ----------
-    kernel, published : runs of the point kernel under the same load, and as published
-    bodies : runs of bodies
-    effects : effects of propagation by column
-    maps : maps by column
-    shares : least and largest share outside over the range of materials, or None
-    budget : error budget of `body`, or None
-    measured : measured places, or None
+    """Results of one Tacton on the first screen of a page: runs of the kernel under the same load
+    and as published, and of bodies; effects and maps by column. If known, least and largest share
+    outside over the range of materials, error budget of `body`, and measured places.
     """
 
     kernel: Run

@@ -47,14 +47,8 @@ LOADS: Mapping[str, Callable[[Floats], Floats]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Findings:
-    """Results of the study.
-
-    Parameters
-    ----------
-    levels : dB re the strongest line of a run, at the probe where each line is strongest; by
-        (Tacton, line) and mechanism
-    ratios : 2 f_AM over f_AM at `AMPLITUDES` by mechanism
-    failed : a sentence for each failed run
+    """Levels in dB re the strongest line of a run by (Tacton, line) and mechanism, ratios of 2 f_AM
+    to f_AM at `AMPLITUDES` by mechanism, and a sentence for each failed run.
     """
 
     levels: Mapping[tuple[str, str], Mapping[str, float]]

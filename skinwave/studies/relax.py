@@ -98,17 +98,9 @@ class HierarchyStep:
 
 @dataclass(frozen=True, kw_only=True)
 class Effect:
-    """Effect of dropping one assumption.
-
-    Parameters
-    ----------
-    name : assumption
-    waveform, where : largest L2 change over the probes, relative to the probe that moves most, and
-        its probe (x, y) in metre
-    level : increase of the sensation level in dB, None unless the body is skin
-    decibel : increase of lines in dB by name
-    alone : change of the waveform if this is the only assumption, or None
-    seconds : additional time
+    """Effect of dropping one assumption: largest change of a waveform relative to the strongest
+    probe, its probe (x, y) in metre, increase of the sensation level and of lines in dB, change of
+    the waveform if this is the only assumption, and additional seconds.
     """
 
     name: str

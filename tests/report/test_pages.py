@@ -147,7 +147,7 @@ class Tags(HTMLParser):
         self.text += data
 
 
-def test_a_text_that_looks_like_markup_is_text(tmp_path):
+def test_pages_escape_markup_in_text(tmp_path):
     for write in (relaxed, traded, verified, reported, compared):
         folder = tmp_path / write.__name__
         folder.mkdir()
@@ -186,7 +186,7 @@ def test_the_policy_lets_a_page_within_a_page_run_its_own_scripts_only(browser, 
         assert len(said) == 1
 
 
-def test_only_html_made_here_is_taken_as_it_is():
+def test_only_markup_of_templates_is_not_escaped():
     cells = ["<b>1</b>", Markup("<b>2</b>"), Markup("<i>{}</i>").format("<b>"), "-1e+3"]
     made = Table(["a", "b", "c", "d"], [cells]).html()
     assert "<td>&lt;b&gt;1&lt;/b&gt;</td><td><b>2</b></td><td><i>&lt;b&gt;</i></td>" in made

@@ -92,7 +92,7 @@ def test_all_but_the_published_kernel_receive_the_same_load(scene, folder, seen)
     assert set(loads.values()) == {scene.pressure}
 
 
-def test_a_body_of_ones_own_is_shown_alone_and_changes_no_load(scene):
+def test_a_scene_is_shown_on_its_own_body_under_its_load(scene):
     own = replace(scene.pressure, drive="linear", profile="array")
     shown = album.scene_columns(replace(scene, pressure=own, body=Body(depth=0.02)))
     assert list(shown) == ["point-kernel-published", "point-kernel", "slab"]
@@ -106,7 +106,7 @@ def test_a_body_of_ones_own_is_shown_alone_and_changes_no_load(scene):
         album.scene_columns(scene, ["paper"])
 
 
-def test_a_point_moves_in_a_view_as_its_probe_does(scene, moved):
+def test_views_agree_with_probes(scene, moved):
     """Late enough for the start to be forgotten, and about the mean."""
     view = views.body_view(scene, "skin-slab", moved, (0.01, 10))
     response = motion.probe_response(scene, moved)
@@ -118,7 +118,7 @@ def test_a_point_moves_in_a_view_as_its_probe_does(scene, moved):
     np.testing.assert_allclose(drawn, sampled - response.displacement[-100:, 2].mean(), atol=3e-8)
 
 
-def test_the_kernels_brightest_place_lies_on_the_path(seen):
+def test_the_kernel_is_strongest_on_the_path(seen):
     view = seen["point-kernel"]
     radius = view.scene.tacton.trajectory.size / 2
     step = np.ptp(view.places[:, 0]) / (views.KERNEL_GRID - 1)
@@ -130,7 +130,7 @@ def test_the_kernels_brightest_place_lies_on_the_path(seen):
             assert np.linalg.norm(view.places[frame.argmax()] - focus) < 1.5 * step
 
 
-def test_what_is_played_returns_after_the_slowest_beat():
+def test_the_played_part_is_a_period_of_the_pattern():
     """f_d - f_AM = 51 Hz is the slowest line: the load is another one after one period of AM."""
     beating = circling(190.986, am_frequency=140)
     span = pattern_period(beating.tacton)
@@ -143,7 +143,7 @@ def test_what_is_played_returns_after_the_slowest_beat():
     )
 
 
-def test_a_pattern_too_long_to_play_is_played_in_part_and_says_so():
+def test_a_long_pattern_is_played_in_part():
     long = replace(circling(200.0, am_frequency=100.5).tacton, duration=2.0)
     load = MovingPressure(tacton=long)
     assert playback.whole_period(load) == pytest.approx(2.0)
@@ -155,7 +155,7 @@ def test_a_pattern_too_long_to_play_is_played_in_part_and_says_so():
     assert "phases jump by up to" in said
 
 
-def test_frames_follow_the_fastest_line_that_moves_the_body(scene, moved):
+def test_the_number_of_frames_follows_from_the_fastest_line(scene, moved):
     fastest = views.fastest_line(moved)
     view = views.body_view(scene, "skin-slab", moved)
     assert view.period == pytest.approx(0.01)
@@ -168,7 +168,7 @@ def test_frames_follow_the_fastest_line_that_moves_the_body(scene, moved):
 
 
 @draws
-def test_motion_is_drawn_as_many_times_as_the_caption_says(seen):
+def test_motion_is_exaggerated_as_stated(seen):
     view = seen["paper-sheet-loose"]
     panel = render.make_panel(view)
     render.set_frame([panel], 5, 1.0)
@@ -183,7 +183,7 @@ def test_motion_is_drawn_as_many_times_as_the_caption_says(seen):
 
 
 @draws
-def test_every_frame_of_a_film_differs_and_the_last_leads_to_the_first(seen, tmp_path):
+def test_a_film_has_distinct_frames_and_repeats_without_a_jump(seen, tmp_path):
     films.film(tmp_path / "film.gif", [seen["skin-slab"]], style("report"), panel=(160, 144))
     with Image.open(tmp_path / "film.gif") as film:
         assert film.n_frames == 12
@@ -241,7 +241,7 @@ def test_fields_are_opened_again_with_their_times(seen, page):
     assert list(grid.field_data["units"]) == ["displacement_m: m", "strain: 1", "stress_pa: Pa"]
 
 
-def test_text_of_vector_figures_is_text(page):
+def test_vector_figures_keep_text_as_text(page):
     for name in ("propagation", "snapshots"):
         assert (page / f"pictures/{name}.png").stat().st_size > 10_000
         svg = (page / f"pictures/{name}.svg").read_text()
@@ -306,7 +306,7 @@ def test_the_page_opens_in_a_browser_without_a_network(page, browser):
 NO_GL = Renderer(is_available=False, detail="missing; apt install libegl1 libgl1-mesa-dri")
 
 
-def test_a_report_is_rebuilt_without_a_model_and_without_gl(folder, tmp_path, monkeypatch):
+def test_a_report_is_drawn_again_without_a_model_or_gl(folder, tmp_path, monkeypatch):
     def run(*arguments, **options):
         raise AssertionError("a model was run")
 
@@ -323,14 +323,14 @@ def test_a_report_is_rebuilt_without_a_model_and_without_gl(folder, tmp_path, mo
     assert not (tmp_path / "flat/pictures/film.gif").exists()
 
 
-def test_a_window_that_ends_its_process_is_found_out(monkeypatch):
+def test_a_crash_of_the_renderer_is_detected(monkeypatch):
     monkeypatch.setattr("skinwave.report.renderer.draw_sphere", os.abort)
     found = renderer.__wrapped__()
     assert not found.is_available
     assert "libegl1 libgl1-mesa-dri" in found.detail
 
 
-def test_a_run_of_one_model_has_a_report_too(tmp_path, monkeypatch, capsys):
+def test_a_run_of_one_model_has_a_report(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     kernel = Scene(name="kernel", pressure=circling(am_frequency=100), body=Body(kind="none"))
     Path("kernel.toml").write_text(dumps(kernel))
@@ -345,7 +345,7 @@ def test_a_run_of_one_model_has_a_report_too(tmp_path, monkeypatch, capsys):
         assert capsys.readouterr().err.count("\n") == 1
 
 
-def test_the_installation_names_what_there_is_and_what_is_missing(capsys):
+def test_the_installation_lists_packages_and_cures(capsys):
     assert main(["verify", "--installation", "--json"]) == 0
     found = {row["what"]: row for row in json.loads(capsys.readouterr().out)["findings"]}
     assert {"python", "pyvista", "solver", "renderer", "threads"} <= set(found)

@@ -88,6 +88,6 @@ def test_hostile_files_are_refused(kind, tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.slow
-def test_results(tmp_path_factory, tmp_path, monkeypatch, capsys):
+def test_damaged_result_folders_are_refused(tmp_path_factory, tmp_path, monkeypatch, capsys):
     made = hostile._answered(tmp_path_factory.mktemp("made"))
     check_all(hostile.results(made), tmp_path, monkeypatch, capsys)

@@ -60,7 +60,7 @@ def test_stress_at_the_surface_meets_the_load(view, moved):
     assert np.abs(elastic + p / np.abs(p).max()).max() > 0.12  # without the viscous part
 
 
-def test_a_view_comes_back_from_its_file(view, tmp_path):
+def test_a_saved_view_is_read_again_and_damaged_files_are_refused(view, tmp_path):
     views.save(tmp_path / "view.npz", view)
     again, own = views.load(tmp_path / "view.npz"), views.with_tensors(view).tensors
     assert again.scene == view.scene
@@ -112,7 +112,7 @@ def test_the_colour_at_a_node_is_what_a_probe_reads_there(quantity, moved):
 
 
 @draws
-def test_a_picture_is_of_the_quantity(view):
+def test_pictures_are_coloured_by_the_quantity(view):
     """A signed one, and the same motion: another picture."""
     pictures = [
         render.picture([views.with_shade(view, replace(SCENE, quantity=name))], style("report"))
@@ -121,7 +121,7 @@ def test_a_picture_is_of_the_quantity(view):
     assert np.abs(pictures[0].astype(float) - pictures[1]).mean() > 1
 
 
-def test_a_report_keeps_and_draws_a_map_of_the_quantity_at_its_depth(view, moved, tmp_path):
+def test_a_report_maps_the_quantity_at_the_depth_of_the_probes(view, moved, tmp_path):
     """Where a probe is, the map is the RMS of the lines that the probe reads."""
     quantity = "strain_zz"
     scene = replace(SCENE, quantity=quantity, depth=0.7e-3)
@@ -146,7 +146,7 @@ def test_a_report_keeps_and_draws_a_map_of_the_quantity_at_its_depth(view, moved
     assert len(picture.files["png"]) > 10_000
 
 
-def test_a_report_of_motion_keeps_the_map_of_its_surface(view, moved, tmp_path):
+def test_a_report_of_motion_maps_the_surface(view, moved, tmp_path):
     album.write_view(view, tmp_path)
     found = surface.load(tmp_path / "map.npz", SCENE)
     at = np.unravel_index(np.nanargmax(found.rms), found.rms.shape)

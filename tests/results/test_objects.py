@@ -71,7 +71,7 @@ def wave(frequency=130.0, quantity="displacement", n=1000, warnings=("too <coars
     )  # fmt: skip
 
 
-def test_a_table_of_pandas_has_all_of_a_response(monkeypatch):
+def test_to_pandas_has_values_probes_and_units(monkeypatch):
     table = wave(quantity="strain_xz").to_pandas()
     assert table.index.name == "time_s"
     assert table.columns.names == ["x_m", "y_m"]
@@ -83,14 +83,14 @@ def test_a_table_of_pandas_has_all_of_a_response(monkeypatch):
         wave().to_pandas()
 
 
-def test_what_a_response_has_not_is_refused():
+def test_missing_attributes_of_a_response_raise():
     for response, name in ((wave(quantity="acceleration"), "displacement"), (wave(), "lines")):
         with pytest.raises(ValueError, match="values|unknown"):
             getattr(response, name)
         assert not hasattr(response, name)
 
 
-def test_lines_are_complex_and_have_the_names_of_the_load(scene):
+def test_lines_of_a_response_are_complex_amplitudes_by_name(scene):
     still = replace(scene.tacton, trajectory=type(scene.tacton.trajectory)())
     rest = replace(scene, pressure=replace(scene.pressure, tacton=still))
     found = skinwave.simulate(rest, "point-kernel", 0.999)
@@ -105,7 +105,7 @@ def test_lines_are_complex_and_have_the_names_of_the_load(scene):
         lines["f_D"]
 
 
-def test_curves_have_the_values_and_axes_their_units():
+def test_plots_of_responses_have_values_and_units():
     found = wave()
     ax = found.plot()
     assert len(ax.lines) == 2
@@ -120,7 +120,7 @@ def test_curves_have_the_values_and_axes_their_units():
     assert wave(quantity="strain_xx").plot().get_ylabel() == "strain xx, µm/m"
 
 
-def test_a_mesh_of_pyvista_is_the_same():
+def test_to_pyvista_keeps_the_mesh():
     mesh = meshes.block((2e-3, 2e-3, 1e-3), 1e-3, order=1)
     mesh = meshes.quadratic(replace(mesh, region=np.arange(len(mesh.tets))))
     grid = mesh.to_pyvista()
@@ -142,7 +142,7 @@ def field():
     return Field(mesh=block, times=times, displacement=moved, effort=Effort())
 
 
-def test_a_grid_has_the_displacement_of_a_time(field):
+def test_a_field_at_a_time_has_its_displacement(field):
     grid = field.to_pyvista(0.0032)
     assert np.array_equal(grid["displacement"], field.displacement[3])
     assert grid.field_data["time_s"][0] == 0.003
@@ -166,7 +166,7 @@ def test_paraview_reads_what_a_field_saves(field, tmp_path):
     assert len(pv.get_reader(field.save(path, frames=2, overwrite=True)).time_values) == 2
 
 
-def test_a_map_is_of_the_upper_surface_into_the_body(field):
+def test_plot_of_a_field_shows_the_upper_surface(field):
     ax = field.plot(0.002)
     image = ax.collections[0]
     top = np.unique(field.mesh.facets["top"])
@@ -189,7 +189,7 @@ def test_a_scene_is_drawn_before_anything_is_solved(scene):
     assert not skinwave.loads("[body]\nkind = 'none'").plot().patches
 
 
-def test_pages_have_a_figure_and_every_warning_and_no_markup_of_others(scene):
+def test_notebook_pages_have_figures_and_warnings_and_escape_text(scene):
     response = skinwave.simulate(scene, "point-kernel", 0.999)
     kernel = replace(response, model="<i>")
     agreement = skinwave.compare(kernel, response, (100.0,))
@@ -204,7 +204,7 @@ def test_pages_have_a_figure_and_every_warning_and_no_markup_of_others(scene):
         assert text in record._repr_html_()
 
 
-def test_records_print_as_a_short_line(scene, field):
+def test_records_have_a_short_repr(scene, field):
     response = skinwave.simulate(scene, "flat-body")
     table = SweepTable(rows=({"status": "done", "focus.height_mm": 200},), varied=("height",))
     agreement = skinwave.compare(response, response, (100.0,))
@@ -215,7 +215,7 @@ def test_records_print_as_a_short_line(scene, field):
         assert "array" not in repr(record)
 
 
-def test_an_expected_error_is_said_alike_everywhere(scene):
+def test_the_expected_error_has_the_same_text_everywhere(scene):
     said = "below 0.50 %"
     found = skinwave.simulate(scene, "flat-body")
     assert stated_error(found.expected_error) == said
@@ -249,7 +249,7 @@ def test_a_sweep_in_python_has_the_runs_of_each_scene(scene, tmp_path):
         skinwave.sweep(base, {"tacton.sped": [1]})
 
 
-def test_references_are_those_of_the_models():
+def test_citations_depend_on_models_and_solvers():
     found = skinwave.cite(replace(wave(), model="flat-body"), replace(wave(), model="point-kernel"))
     assert "flat-body (wavenumber integral), point-kernel" in found.sentence
     assert "Kausel" in found.references[2]
@@ -279,7 +279,7 @@ def test_times_are_a_part_of_the_whole_response(scene):
             skinwave.simulate(scene, "point-kernel", times=times)
 
 
-def test_progress_is_shown_where_it_is_asked_for(scene, capsys):
+def test_progress_is_shown_on_request_only(scene, capsys):
     small = replace(scene, body=replace(scene.body, width=0.06, height=0.06, sides="clamped"))
     skinwave.simulate(small, "fem", 0.9, h=10e-3, progress=True)
     assert "lines" in capsys.readouterr().err.split("\n")
@@ -289,7 +289,7 @@ def test_progress_is_shown_where_it_is_asked_for(scene, capsys):
     assert not capsys.readouterr().err
 
 
-def test_figures_of_a_paper_have_its_width_letters_and_fonts(tmp_path):
+def test_paper_style_sets_width_letters_and_fonts(tmp_path):
     with skinwave.paper(3.5, 2.5):
         assert mpl.rcParams["font.size"] == 8
         figure = wave().plot().figure
@@ -308,7 +308,7 @@ def test_figures_of_a_paper_have_its_width_letters_and_fonts(tmp_path):
         style("print", 90.0)
 
 
-def test_chosen_columns_of_a_folder_alone():
+def test_columns_of_an_album_can_be_selected():
     runs = [SimpleNamespace(column=name) for name in ("point-kernel", "skin-slab", "paper-sheet")]
     found = Album(title="", scene=None, runs=runs, views={"skin-slab": 1, "paper-sheet": 2})
     assert select_columns(found, []).runs == runs
@@ -319,7 +319,7 @@ def test_chosen_columns_of_a_folder_alone():
         select_columns(found, ["skin_slab"])
 
 
-def test_types_and_names_of_the_package_are_those_that_it_has():
+def test_lazy_names_of_the_package_exist():
     tree = ast.parse((ROOT / "skinwave/__init__.py").read_text())
     typed = {
         alias.name: node.module

@@ -69,7 +69,7 @@ def refused(capsys, *arguments):
     return said
 
 
-def test_a_result_is_kept_unless_it_may_be_overwritten(folder, capsys):
+def test_a_result_is_replaced_with_overwrite_only(folder, capsys):
     assert main([*RUN, "--out", "out"]) == 0
     assert "--overwrite" in refused(capsys, *RUN, "--out", "out")
     assert main([*RUN, "--out", "out", "--overwrite"]) == 0
@@ -106,7 +106,7 @@ def test_a_file_that_the_user_added_or_changed_is_kept(folder):
     assert foreign_file(out) == out / "index.html"
 
 
-def test_what_a_command_reads_is_never_replaced(folder, capsys, monkeypatch):
+def test_inputs_are_never_replaced(folder, capsys, monkeypatch):
     out = made(folder / "out")
     (out / "none.toml").write_text(corpus.SILENT_GROUND)
     seal(out)
@@ -118,7 +118,7 @@ def test_what_a_command_reads_is_never_replaced(folder, capsys, monkeypatch):
     assert "in use" in refused(capsys, *RUN, "--out", "..", "--overwrite")
 
 
-def test_what_another_writes_during_a_run_is_kept(folder):
+def test_results_of_concurrent_commands_are_kept(folder):
     with pytest.raises(ValueError, match="partial-") as error:
         made(folder / "out", "later", meanwhile=lambda: made(folder / "out", "first"))
     (later,) = folder.glob("out.partial-*")
@@ -132,7 +132,7 @@ def test_what_another_writes_during_a_run_is_kept(folder):
     assert (folder / "out/index.html").read_text() == "first"
 
 
-def test_an_error_leaves_nothing_and_the_earlier_result(folder):
+def test_an_error_keeps_the_earlier_result(folder):
     def interrupted():
         raise KeyboardInterrupt
 
@@ -148,7 +148,7 @@ def test_an_error_leaves_nothing_and_the_earlier_result(folder):
 
 
 @posix
-def test_a_killed_process_leaves_nothing_that_has_the_name_of_a_result(folder):
+def test_a_killed_process_leaves_the_earlier_result(folder):
     made(folder / "out", "old")
     code = (
         "import os, sys, skinwave.results.record as record\n"
@@ -161,9 +161,7 @@ def test_a_killed_process_leaves_nothing_that_has_the_name_of_a_result(folder):
     assert (folder / "out/index.html").read_text() == "old"
 
 
-def test_an_interrupted_report_keeps_finished_runs_and_says_how_to_go_on(
-    folder, capsys, monkeypatch
-):
+def test_an_interrupted_report_keeps_finished_runs(folder, capsys, monkeypatch):
     def interrupted(results, out, *given, **options):
         files.write_run(out / "point-kernel", a_run())
         raise KeyboardInterrupt
@@ -183,7 +181,7 @@ def test_an_interrupted_report_keeps_finished_runs_and_says_how_to_go_on(
     assert (left / "report/index.html").read_text().rstrip().endswith("</html>")
 
 
-def test_half_a_run_is_none(folder, monkeypatch):
+def test_an_incomplete_run_is_removed(folder, monkeypatch):
     def fails(path, effort):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
@@ -194,7 +192,7 @@ def test_half_a_run_is_none(folder, monkeypatch):
     assert [run.tacton for run in open_album(folder / "out").runs] == ["small"]
 
 
-def test_a_full_disk_is_said_with_place_and_cure(folder, capsys, monkeypatch):
+def test_a_full_disk_is_reported_in_one_sentence(folder, capsys, monkeypatch):
     def full(path, *given, **options):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
 
@@ -205,7 +203,7 @@ def test_a_full_disk_is_said_with_place_and_cure(folder, capsys, monkeypatch):
     refused(capsys, *RUN, "--out", "n" * 300)
 
 
-def test_a_file_appears_whole_and_not_over_another(folder):
+def test_a_file_is_written_completely_or_not_at_all(folder):
     with output_path(folder / "o.csv") as aside:
         aside.write_text("later")
         assert not (folder / "o.csv").exists()
@@ -218,7 +216,7 @@ def test_a_file_appears_whole_and_not_over_another(folder):
 
 
 @posix
-def test_a_reader_that_is_gone_ends_a_command_quietly(folder):
+def test_a_closed_pipe_ends_a_command_quietly(folder):
     read_end, write_end = os.pipe()
     os.close(read_end)
     words = [sys.executable, "-m", "skinwave", "plan", "none.toml"]
@@ -249,7 +247,7 @@ NAMES = (
 )  # fmt: skip
 
 
-def test_any_name_is_a_safe_one_on_any_system():
+def test_folder_names_are_valid_on_any_system():
     for name in NAMES:
         plain = files.folder_name(name)
         assert plain == plain.strip()

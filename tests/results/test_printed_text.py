@@ -30,7 +30,7 @@ def test_control_characters_are_escapes():
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such file names")
-def test_names_words_warnings_and_steps_are_shown(tmp_path, monkeypatch, capsys):
+def test_printed_text_has_no_control_characters(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     name = "a\x1b[2Jb\u202e\x9b.csv"
     (tmp_path / "s.toml").write_text("[tacton]\nam_frequency_hz = 100\nduration_s = 0.01\n")
@@ -49,7 +49,7 @@ def test_names_words_warnings_and_steps_are_shown(tmp_path, monkeypatch, capsys)
     assert printed.err.count("\n") == 5
 
 
-def test_a_bar_shows_brackets(monkeypatch):
+def test_the_progress_bar_escapes_markup(monkeypatch):
     """Rich would make colours and links of them."""
     drawn, name = io.StringIO(), "[red]x[/red][link=file:///etc]y"
 

@@ -52,7 +52,7 @@ def test_each_call_of_a_renewed_pool_has_a_process_of_its_own():
         assert len({call.result() for call in calls} | {os.getpid()}) == 4
 
 
-def test_a_pool_gives_up_what_is_not_done_and_restores_the_environment(monkeypatch):
+def test_a_pool_cancels_unfinished_calls_and_restores_the_environment(monkeypatch):
     monkeypatch.delenv("PYTHONSAFEPATH", raising=False)
     with pool(1) as other:
         unfinished = other.submit(signal.pause if hasattr(signal, "pause") else input)

@@ -25,20 +25,20 @@ LAYER = Scene(
 PLACES = {"reach": 0.012, "step": 0.003}
 
 
-def test_motion_is_that_of_the_maps_of_reports():
+def test_maps_of_displacement_agree_with_those_of_reports():
     found = quantity_map(LAYER, **PLACES)
     known = body_map(LAYER, *grid(LAYER, **PLACES))
     np.testing.assert_allclose(found.rms, known.rms, rtol=1e-4)  # which has a spline
     assert np.isnan(found.error)
 
 
-def test_an_invariant_is_alike_all_around_a_circle():
+def test_the_rms_of_an_invariant_has_the_symmetry_of_the_load():
     """Neither of two frequencies that have no common period is ahead of the other anywhere."""
     rms = quantity_map(replace(LAYER, quantity="energy_density", depth=0.7e-3), **PLACES).rms
     np.testing.assert_allclose(np.rot90(rms), rms, rtol=5e-3)
 
 
-def test_the_invariant_of_one_frequency_has_the_mean_square_of_its_period():
+def test_the_rms_of_an_invariant_of_one_frequency():
     """u(t) = |a cos| has the RMS about its mean of a rectified sine: a sqrt(1/2 - 4/pi^2)."""
     still = replace(AM, trajectory=Trajectory(shape="point"))
     linear = replace(LAYER.pressure, tacton=still, drive="linear")
@@ -53,7 +53,7 @@ def test_the_invariant_of_one_frequency_has_the_mean_square_of_its_period():
     assert rms[middle] == pytest.approx(expected, rel=2e-3)
 
 
-def test_an_invariant_is_of_the_whole_tensor_its_mean_included():
+def test_an_invariant_includes_the_mean_of_the_tensor():
     scene = replace(LAYER, quantity="largest_shear_strain", depth=0.001)
     rms = quantity_map(scene, **PLACES).rms
     long = replace(scene.pressure, tacton=replace(AM, duration=1.0))
@@ -62,7 +62,7 @@ def test_an_invariant_is_of_the_whole_tensor_its_mean_included():
     np.testing.assert_allclose(rms[[4, 5], [4, 6]], seen, rtol=0.01)
 
 
-def test_elements_read_what_probes_read():
+def test_maps_of_elements_agree_with_probes():
     still = replace(AM, trajectory=Trajectory(shape="point"), duration=0.5)
     scene = replace(
         LAYER, quantity="strain_zz", depth=0.002,

@@ -41,7 +41,7 @@ SKIN = skinwave.Scene(pressure=LOAD, body=Body(width=0.04, height=0.04), probes=
 PAPER = replace(SKIN, body=replace(BODIES["paper-sheet-loose"], width=0.05, height=0.05))
 
 
-def test_a_slab_and_a_sheet_have_their_own_ladders():
+def test_assumptions_of_slab_and_sheet():
     assert droppable(SKIN) == (
         "linear drive", "sinc^2 profile", "no propagation", "little loss", "laterally-infinite",
         "main lobe only", "continuous path", "one material", "flat",
@@ -83,7 +83,7 @@ def test_each_step_of_load_and_propagation_changes_one_thing(own):
         assert without(own, kept)[0].pressure == without(own, still)[0].pressure
 
 
-def test_an_endless_body_of_elements_has_sides_that_absorb():
+def test_an_infinite_body_of_elements_has_absorbing_sides():
     thin = replace(SKIN, body=replace(SKIN.body, depth=0.004, sides="clamped"))
     names = droppable(thin)
     body = {
@@ -100,7 +100,7 @@ def test_an_endless_body_of_elements_has_sides_that_absorb():
     assert not can_be_alone("laterally-infinite", droppable(PAPER), PAPER)
 
 
-def test_nothing_dropped_is_the_published_model_and_all_dropped_the_richest():
+def test_first_and_last_models_of_the_hierarchy():
     scene, model = without(SKIN, ())
     assert (scene.body.kind, model) == ("none", "point-kernel-published")
     assert scene.pressure == published_load(SKIN.pressure)
@@ -115,7 +115,7 @@ def test_nothing_dropped_is_the_published_model_and_all_dropped_the_richest():
     assert sheet.body == replace(PAPER.body, air=True)
 
 
-def test_a_device_holds_its_focus_at_points_equally_far_apart_for_equally_long():
+def test_a_device_rests_on_equally_spaced_points():
     most = device_path(PATH, DEVICE_RATES[1])
     assert len(most.points) - 1 == round(DEVICE_RATES[1] / PATH.drawing_frequency)
     path = device_path(PATH, points=5)
@@ -132,7 +132,7 @@ def test_a_device_holds_its_focus_at_points_equally_far_apart_for_equally_long()
 
 
 @pytest.mark.parametrize("device", [{"update_rate": 30e3}, {"update_rate": 20e3, "points": 106}])
-def test_a_device_that_cannot_be_is_refused_before_anything_is_computed(device):
+def test_impossible_devices_are_refused(device):
     for call in (
         lambda: device_path(PATH, **device),
         lambda: hierarchy_of(SKIN, lambda phase, done: pytest.fail("computed"), **device),
@@ -141,7 +141,7 @@ def test_a_device_that_cannot_be_is_refused_before_anything_is_computed(device):
             call()
 
 
-def test_both_laws_of_loss_are_the_same_at_the_frequency_of_the_fit():
+def test_damping_laws_agree_at_the_fitted_frequency():
     for name, hz in (("palm", 140.0), ("forearm", 140.0), ("forearm", 600.0)):
         w = 2 * np.pi * hz
         viscous = fem.PRESETS[name]
@@ -156,7 +156,7 @@ def test_both_laws_of_loss_are_the_same_at_the_frequency_of_the_fit():
 
 
 @pytest.mark.parametrize("material", ["palm", "palm-zener"])
-def test_little_loss_is_a_tenth_of_it_and_as_stiff(material):
+def test_little_loss_is_a_tenth_at_the_same_stiffness(material):
     own = replace(SKIN, body=replace(SKIN.body, material=material))
     w = 2 * np.pi * strongest_line(own)
     little, all_of_it = (
@@ -169,7 +169,7 @@ def test_little_loss_is_a_tenth_of_it_and_as_stiff(material):
 
 
 @pytest.mark.parametrize("law", [as_relaxing, as_viscous])
-def test_what_is_lost_by_hysteresis_stays_when_the_law_changes(law):
+def test_a_change_of_damping_law_keeps_hysteresis(law):
     both = Material(
         density=1000, shear_modulus=25e3, poisson=0.49, loss_factor=0.2,
         **({"viscosity": 5.0} if law is as_relaxing else
@@ -179,7 +179,7 @@ def test_what_is_lost_by_hysteresis_stays_when_the_law_changes(law):
     assert law(both, w).complex_modulus(w) == pytest.approx(both.complex_modulus(w), rel=1e-9)
 
 
-def test_the_law_of_loss_is_one_rung():
+def test_the_damping_law_is_one_step():
     before, _ = without(SKIN, ("sinc^2 profile", "no propagation", "little loss"))
     after, model = without(
         SKIN, ("sinc^2 profile", "no propagation", "little loss", "viscous loss")
@@ -201,7 +201,7 @@ def test_the_law_of_loss_is_one_rung():
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("in_one_process")
-def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, capsys):
+def test_relax_writes_effects_and_costs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     scene = replace(SKIN, body=Body(width=0.032, height=0.032, depth=0.004))  # too thin for layers
     monkeypatch.setattr(
@@ -237,7 +237,7 @@ def test_each_assumption_has_its_effect_and_its_cost(tmp_path, monkeypatch, caps
     assert coarse in (out / "index.html").read_text()
 
 
-def test_what_follows_a_failed_rung_is_not_told_as_one_assumption():
+def test_a_step_after_a_failed_one_has_no_effect():
     times = np.arange(4.0)
     told = Response(model="fem", times=times, probes=np.zeros((1, 2)), values=times[:, None])
     steps = [
@@ -251,7 +251,7 @@ def test_what_follows_a_failed_rung_is_not_told_as_one_assumption():
     assert [(a.name, b.name) for a, b in found.pairs()] == [("b", "c")]
 
 
-def test_a_rung_that_fails_leaves_the_others(monkeypatch):
+def test_a_failed_step_leaves_the_others(monkeypatch):
     monkeypatch.setattr(
         "skinwave.studies.relax.droppable", lambda scene: ("linear drive", "one material")
     )
@@ -268,7 +268,7 @@ def test_a_rung_that_fails_leaves_the_others(monkeypatch):
 
 
 @pytest.mark.usefixtures("in_one_process")
-def test_a_body_that_steps_share_is_reduced_once_and_counts_in_each(monkeypatch):
+def test_a_shared_body_is_reduced_once(monkeypatch):
     small = Body(width=0.03, height=0.03, depth=0.004)
     monkeypatch.setattr(
         "skinwave.studies.relax.droppable", lambda scene: ("linear drive", "sinc^2 profile")
@@ -317,7 +317,7 @@ def test_a_body_that_cannot_be_reduced_is_refused_on_a_coarse_mesh(monkeypatch):
     assert len([h for h in asked if h == 5e-3]) == len(found.every) - 1
 
 
-def test_line_changes_are_of_lines_that_count():
+def test_changes_of_lines_in_decibel():
     times = np.arange(1000) / 10_000
     loud = np.sin(2 * np.pi * 140 * times)[:, None]
     first = skinwave.simulate(replace(SKIN, body=BODIES["none"]), "point-kernel")

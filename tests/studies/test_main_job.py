@@ -59,7 +59,7 @@ def test_every_response_is_within_the_tolerance_and_the_memory_is_bounded(job):
     assert summary["peak_memory_gib"] <= 6
 
 
-def test_the_papers_statements_about_its_simulation_hold_in_its_model(claims):
+def test_claims_about_the_simulation_hold_in_the_published_kernel(claims):
     published = {claim: row for (column, claim), row in claims.items() if column == PUBLISHED}
     assert set(TEXTS) == set(published)
     for claim in ("S1", "S2", "S3", "S4", "S5"):
@@ -70,7 +70,7 @@ def test_the_papers_statements_about_its_simulation_hold_in_its_model(claims):
         assert published[claim]["holds"] == "False"
 
 
-def test_what_lines_there_are_follows_from_the_load_and_not_from_waves(claims):
+def test_the_load_determines_which_lines_are_present(claims):
     """The same components exist in the kernel under the same load and in a linear body."""
     for claim in ("S1", "S2", "S3", "S5", "M1", "M2", "M3"):
         of_both = [claims[column, claim]["holds"] for column in ("point-kernel", "skin-slab")]
@@ -79,12 +79,12 @@ def test_what_lines_there_are_follows_from_the_load_and_not_from_waves(claims):
     assert claims["point-kernel", "M1"]["holds"] == "False"  # a square has no third harmonic
 
 
-def test_a_sheet_that_stretches_has_harmonics_that_the_load_lacks(claims):
+def test_a_stretching_sheet_adds_harmonics(claims):
     """M1 was measured on paper: 2 f_AM and 3 f_AM under AM alone."""
     assert claims["paper-sheet", "M1"]["holds"] == "True"
 
 
-def test_second_harmonic_is_the_loads_times_the_bodys(job):
+def test_the_second_harmonic_on_skin(job):
     """AM 140 on skin: 2 f / f is a quarter in the load, and no body adds 3 f."""
     rows = csv.DictReader((job[0] / "am140/skin-slab/lines.csv").read_text().splitlines())
     centre = {r["line"]: float(r["displacement_um"]) for r in rows if r["probe_x_mm"] == "0"}
@@ -103,7 +103,7 @@ def test_waves_spread_further_than_the_point_kernel(job):
     assert (level("skin-slab", "flat-body") > kernel + 10).all()
 
 
-def test_the_centre_of_a_circle_does_not_feel_the_drawing_frequency(job):
+def test_the_drawing_frequency_vanishes_at_the_centre_of_a_circle(job):
     rows = csv.DictReader((job[0] / "stm20/skin-slab/lines.csv").read_text().splitlines())
     drawn = {r["probe_x_mm"]: float(r["displacement_um"]) for r in rows if r["line"] == "f_d"}
     assert drawn["0"] < 1e-3 * drawn["10"]
@@ -121,7 +121,7 @@ def test_the_page_stands_alone(job):
 
 
 @needs_browser
-def test_the_page_folds_what_is_beyond_four_screens(job, browser):
+def test_the_page_has_at_most_four_screens(job, browser):
     tab = browser.new_page(viewport={"width": 1200, "height": 900})
     tab.goto(f"file://{job[0] / 'index.html'}")
     assert tab.evaluate("document.documentElement.scrollHeight") <= 4 * 900

@@ -9,7 +9,7 @@ from skinwave.scene.scene import BODIES, Body
 from skinwave.studies import paper_vs_skin as study
 
 
-def test_patterns_of_loads_are_those_of_their_fourier_series():
+def test_load_ratios_are_those_of_the_fourier_series():
     found = study.load_ratios()
     expected = {
         "square of the sound's amplitude": (0.25, 0, 0),
@@ -22,9 +22,7 @@ def test_patterns_of_loads_are_those_of_their_fourier_series():
 
 
 @pytest.mark.slow
-def test_a_line_of_the_sheet_grows_with_the_amplitude_and_one_of_the_load_does_not(
-    tmp_path, monkeypatch
-):
+def test_ratios_over_amplitude_separate_lines_of_sheet_and_load(tmp_path, monkeypatch):
     monkeypatch.setattr(study, "DURATION", 0.2)  # s; after half of it these bodies are steady
     monkeypatch.setattr(study, "AMPLITUDES", (0.25, 1.0))
     bodies = {

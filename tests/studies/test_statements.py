@@ -30,7 +30,7 @@ def run(body, drive="pressure_squared", **tacton):
 ABOVE = "; layers from the surface down: 1 mm of dermis"
 
 
-def test_a_drive_law_that_was_not_used_is_not_named():
+def test_pages_name_the_drive_law():
     squared, corrected = (
         " ".join(model_paragraphs([run(BODIES["palm"], drive, am_frequency=140)]))
         for drive in ("pressure_squared", "force_corrected")
@@ -47,7 +47,7 @@ def test_a_drive_law_that_was_not_used_is_not_named():
         {"am_frequency": 140, "envelope_frequency": 10},
     ],
 )
-def test_statements_on_one_tone_are_not_judged_by_others(tones):
+def test_claims_need_a_single_tone(tones):
     assert evaluate([run(BODIES["skin-slab"], **tones)]) == []
     assert evaluate([run(BODIES["skin-slab"], am_frequency=140)])
 
@@ -63,7 +63,7 @@ def at_the_focus(seconds, **tacton):
     return replace(one, scene=replace(one.scene, pressure=pressure), response=response)
 
 
-def test_lines_that_cannot_be_resolved_are_not_reported():
+def test_unresolved_lines_are_not_reported():
     short, long = at_the_focus(0.5, am_frequency=2), at_the_focus(2.0, am_frequency=2)
     assert short.frequencies == short.lines == sensation_levels(short, 0) == {}
     assert short.unresolved == ("f_AM", "2f_AM", "3f_AM", "4f_AM", "5f_AM")
@@ -78,7 +78,7 @@ def test_lines_that_cannot_be_resolved_are_not_reported():
     assert not [name for name in row if name.startswith(("f_AM", "2f_AM"))]
 
 
-def test_lines_beside_those_that_cannot_be_told_are_not_judged_either():
+def test_lines_next_to_unresolved_ones_are_not_assessed():
     """The path of 141 Hz is too near to 140 Hz, and 282 Hz to 280; pairs lie near 0 Hz. At 700 Hz
     no line is, but at 703 and 704 Hz two are that are unresolved, and so not subtracted.
     """
@@ -110,12 +110,12 @@ SECOND = {"second_am_frequency": 200, "superposition": (0.25, 0.75)}
          "50 % of full drive, 1 pulse in 50 ms with ramps of 5 ms"),
     ],
 )  # fmt: skip
-def test_a_page_says_all_that_was_commanded(tacton, row, said):
+def test_scene_rows_describe_the_tacton(tacton, row, said):
     one = run(BODIES["skin-slab"], **tacton)
     assert dict(scene_rows(one.scene))[row] == said
 
 
-def test_a_page_says_how_a_body_lies_and_what_lies_above():
+def test_scene_rows_describe_placement_and_layers():
     place = Placement(tilt_x=np.radians(10), offset=(0.0, 0.005), lift=0.002)
     body = Body(layers=LAYERS, placement=place)
     said = f"{ABOVE}; tilted by 10° about x and 0° about y; moved by (0, 5, 2) mm"

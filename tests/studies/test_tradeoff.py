@@ -23,7 +23,7 @@ points_mm = [[0, 0], [5, 0]]
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("in_one_process")
-def test_a_study_ranks_candidates_by_measured_cost_and_error(tmp_path, monkeypatch):
+def test_tradeoff_ranks_candidates_by_cost_and_error(tmp_path, monkeypatch):
     monkeypatch.setattr("skinwave.studies.tradeoff.FINEST", (1.5, 1.25))
     scene = loads(SHORT)
     scene = replace(scene, body=replace(scene.body, width=0.03, height=0.03, sides="free"))
@@ -48,6 +48,6 @@ def test_a_study_ranks_candidates_by_measured_cost_and_error(tmp_path, monkeypat
     assert (tmp_path / "tradeoff.csv").read_text().count("\n") == 5
 
 
-def test_a_scene_without_a_body_has_nothing_to_trade():
+def test_tradeoff_needs_a_body():
     with pytest.raises(ValueError, match="give it a sheet or a slab"):
         study(loads("[body]\nkind = 'none'"), lambda phase, fraction: None)
