@@ -310,5 +310,5 @@ def select_columns(album: Album, columns: Sequence[str]) -> Album:
         album,
         runs=[run for run in album.runs if run.column in selected],
         views={name: view for name, view in album.views.items() if name in selected},
-        maps={name: found for name, found in album.maps.items() if name in selected},
+        maps={name: each for name, each in album.maps.items() if name in selected},
     )

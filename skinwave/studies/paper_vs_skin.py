@@ -147,10 +147,10 @@ def load_ratios() -> dict[str, tuple[float, ...]]:
     return {name: tuple((a[2:5] / a[1]).tolist()) for name, a in spectra.items()}
 
 
-def sentences(found: Findings) -> list[str]:
+def sentences(findings: Findings) -> list[str]:
     """Return conclusions: explained lines, unexplained lines, and the deciding experiment."""
     parts, low = [], f"{100 * AMPLITUDES[0]:.0f}"
-    for mechanism, ratios in found.ratios.items():
+    for mechanism, ratios in findings.ratios.items():
         if max(ratios) < NEGLIGIBLE_RATIO:
             parts.append(f"{mechanism}: no 2 f_AM at any amplitude.")
         elif max(ratios) < (1 + NEGLIGIBLE_CHANGE) * min(ratios):
@@ -172,32 +172,32 @@ def sentences(found: Findings) -> list[str]:
     ]
 
 
-def report(found: Findings) -> Report:
+def report(findings: Findings) -> Report:
     """Return the page: conclusions, ratio over amplitude, lines by mechanism, patterns of loads."""
     caption = "Ratio of 2 f_AM to f_AM at the focus over the amplitude of the drive."
-    by_mechanism = [Column(each, unit="dB", digits=2) for each in found.ratios]
+    by_mechanism = [Column(each, unit="dB", digits=2) for each in findings.ratios]
     levels = Table(
         ["Tacton", "line", *by_mechanism],
         [
-            [*key, *(_strong_level(own, each) for each in found.ratios)]
-            for key, own in found.levels.items()
+            [*key, *(_strong_level(own, each) for each in findings.ratios)]
+            for key, own in findings.levels.items()
         ],
         name="lines",
     )
     ratios = Table(
         ["mechanism", *(f"{100 * each:.0f} %" for each in AMPLITUDES)],
-        [[mechanism, *own] for mechanism, own in found.ratios.items()], name="ratios",
+        [[mechanism, *own] for mechanism, own in findings.ratios.items()], name="ratios",
     )  # fmt: skip
     patterns = Table(
         ["load", "2f / f", "3f / f", "4f / f"], [[n, *own] for n, own in load_ratios().items()]
     )
-    conclusions = sentences(found)
+    conclusions = sentences(findings)
     return Report(
         title="Paper and skin: which mechanism causes which line",
         verdict=conclusions[-2:],
         parts=[
-            *conclusions[:-2], *(f"Failed: {each}." for each in found.failed),
-            Picture(png(ratio_figure(found), dpi=130), caption, name="amplitude"),
+            *conclusions[:-2], *(f"Failed: {each}." for each in findings.failed),
+            Picture(png(ratio_figure(findings), dpi=130), caption, name="amplitude"),
             Details("2 f_AM over f_AM by amplitude", [ratios]),
             Details("Lines by mechanism", [levels]),
             Details("Patterns of loads", [patterns]),
@@ -210,12 +210,12 @@ def _strong_level(levels: Mapping[str, float], mechanism: str) -> float | None:
     return level if level > WEAKEST else None
 
 
-def ratio_figure(found: Findings) -> Figure:
+def ratio_figure(findings: Findings) -> Figure:
     """Draw 2 f_AM / f_AM over amplitude for each mechanism that has the line."""
     figure = Figure(figsize=(7, 4), layout="constrained")
     axes = figure.add_subplot()
     names = {label(name): name for name in BODIES}
-    curves = {m: own for m, own in found.ratios.items() if max(own) > NEGLIGIBLE_RATIO}
+    curves = {m: own for m, own in findings.ratios.items() if max(own) > NEGLIGIBLE_RATIO}
     for mechanism, own in curves.items():
         body, _, cause = mechanism.partition(": ")
         name = names.get(body, body)

@@ -344,11 +344,11 @@ def _changed_by(ratio: float) -> str:
     return f"{significant(100 * ratio)} % of the strongest probe"
 
 
-def write(folder: Path, found: Hierarchy) -> None:
+def write(folder: Path, hierarchy: Hierarchy) -> None:
     """Write index.html, relax.png, relax.csv, effects.csv, steps.csv and responses.npz."""
-    effects = found.effects()
-    (folder / "relax.csv").write_bytes(Table(LINE_COLUMNS, _line_rows(found)).to_csv())
-    responses = {step.name: step.response for step in found.every if step.response}
+    effects = hierarchy.effects()
+    (folder / "relax.csv").write_bytes(Table(LINE_COLUMNS, _line_rows(hierarchy)).to_csv())
+    responses = {step.name: step.response for step in hierarchy.every if step.response}
     arrays = {name: response.values for name, response in responses.items()}
     first = next(iter(responses.values()))
     arrays |= {"t": first.times, "probes": first.probes}
@@ -356,13 +356,16 @@ def write(folder: Path, found: Hierarchy) -> None:
     verdict = "No two steps can be compared, because too many failed."
     if effects:
         verdict = sentence(effects[0])
+    steps = Table(STEP_COLUMNS, map(_step_row, hierarchy.every), "steps")
     parts: list[Part] = [
         Picture(png(_figure(effects), dpi=130), BARS, "relax"),
         Table(EFFECT_COLUMNS, map(_effect_row, effects), "effects"),
-        Details("Steps", [INTRODUCTION, Table(STEP_COLUMNS, map(_step_row, found.every), "steps")]),
+        Details(
+            "Steps", [INTRODUCTION, Table(STEP_COLUMNS, map(_step_row, hierarchy.every), "steps")]
+        ),
     ]
-    title = f"{found.scene.name}: assumptions, one by one"
-    Report(title, [verdict], parts, found.efforts).write(folder)
+    title = f"{hierarchy.scene.name}: assumptions, one by one"
+    Report(title, [verdict], parts, hierarchy.efforts).write(folder)
 
 
 def _figure(effects: list[Effect]) -> Figure:
@@ -397,16 +400,16 @@ def _step_row(step: HierarchyStep) -> list[object]:
     return [step.name, step.model, dofs, step.seconds, step.memory / 2**30 or None, step.error]
 
 
-def _line_rows(found: Hierarchy) -> Iterator[list[object]]:
+def _line_rows(hierarchy: Hierarchy) -> Iterator[list[object]]:
     """Yield the change of every line at each probe, from the step before and from the richest."""
-    richest = [r.response for r in found.steps if r.response][-1]
-    for before, step in found.pairs():
+    richest = [r.response for r in hierarchy.steps if r.response][-1]
+    for before, step in hierarchy.pairs():
         assert before.response
         assert step.response
-        names = compared_lines(found.scene, step.response)
+        names = compared_lines(hierarchy.scene, step.response)
         ratios = [_ratios(step.response, other, names) for other in (before.response, richest)]
         for k, (name, f) in enumerate(names.items()):
-            for p, (x, y) in enumerate(found.scene.probes):
+            for p, (x, y) in enumerate(hierarchy.scene.probes):
                 changes = [f"{r[k, p]:.4g}" if np.isfinite(r[k, p]) else None for r in ratios]
                 yield [step.name, step.model, 1e3 * x, 1e3 * y, name, f, *changes]
 

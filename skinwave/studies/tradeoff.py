@@ -175,52 +175,52 @@ def _run(scene: Scene, candidate: Candidate) -> tuple[Response, float, float, in
     return response, cold, cold, peak_memory()
 
 
-def write(folder: Path, scene: Scene, found: Study) -> None:
+def write(folder: Path, scene: Scene, outcome: Study) -> None:
     """Write index.html, tradeoff.png and tradeoff.csv of a study."""
-    front = found.front()
+    front = outcome.front()
     table = Table(
         ["candidate", Column("front", "on the front"), Column("error_percent", "error", "%"),
          Column("cold_s", "cold", "s", digits=2), Column("warm_s", "warm", "s", digits=2),
          Column("memory_mib", "peak memory", "MiB"), Column("dofs", "degrees of freedom")],
         [(m.candidate.name, m in front, 100 * m.error, m.cold, m.warm, m.memory / 2**20, m.dofs)
-         for m in found.results], name="tradeoff",
+         for m in outcome.results], name="tradeoff",
     )  # fmt: skip
-    picture = Picture(png(_figure(found), dpi=130), CAPTION, "tradeoff")
+    picture = Picture(png(_figure(outcome), dpi=130), CAPTION, "tradeoff")
     title = f"Speed against accuracy: {scene.name}"
-    parts = sentences(found)
+    parts = sentences(outcome)
     verdict = [" ".join(parts[-len(BARS) :]), " ".join(parts[: -len(BARS)])]
     Report(title, verdict, [picture, table]).write(folder)
 
 
-def sentences(found: Study) -> list[str]:
+def sentences(outcome: Study) -> list[str]:
     """Return sentences on the reference, and the cheapest candidate for each of `BARS`."""
-    convergence = f"{100 * found.self_convergence:.2g} %"
-    reference = f"The reference, {found.reference.name}, differs from the next coarser run by "
+    convergence = f"{100 * outcome.self_convergence:.2g} %"
+    reference = f"The reference, {outcome.reference.name}, differs from the next coarser run by "
     parts = [f"{reference}{convergence}."]
-    if not found.accepted:
-        limit = f"{1000 * found.self_convergence:.2g} %"
+    if not outcome.accepted:
+        limit = f"{1000 * outcome.self_convergence:.2g} %"
         parts[0] += f" Errors below {limit} are therefore upper estimates."
-    if any(m.candidate.model == FLAT_BODY.name for m in found.results):
+    if any(m.candidate.model == FLAT_BODY.name for m in outcome.results):
         parts.append(
             "flat-body is the analytic solution of a laterally infinite body. It differs from the "
             "meshed body by the reflections from its sides."
         )
     for bar in BARS:
         best = "no candidate"
-        if m := found.cheapest(bar):
+        if m := outcome.cheapest(bar):
             best = f"{m.candidate.name}, {m.cold:.2g} s (error {100 * m.error:.2g} %)"
         parts.append(f"Cheapest within {100 * bar:g} %: {best}.")
     return parts
 
 
-def _figure(found: Study) -> Figure:
+def _figure(outcome: Study) -> Figure:
     """Draw error over cold and warm seconds, with one colour for each model."""
     figure = Figure(figsize=(10, 5.2), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
-    front = found.front()
+    front = outcome.front()
     entries: dict[str, dict[str, Any]] = {}
     for model in names():
-        if own := [m for m in found.results if m.candidate.model == model]:
+        if own := [m for m in outcome.results if m.candidate.model == model]:
             colour, edges = named(model).colour, [1.5 * (m in front) for m in own]
             entries[model] = {"color": colour, "marker": "o", "ms": 7, "ls": "", "alpha": 0.75}
             for ax, when in zip(panels, ("cold", "warm"), strict=True):
@@ -231,7 +231,7 @@ def _figure(found: Study) -> Figure:
                 )  # fmt: skip
     entries["difference of the two finest runs"] = {"color": "0.5", "ls": ":", "lw": 1}
     for ax in panels:
-        ax.axhline(100 * found.self_convergence, **entries["difference of the two finest runs"])
+        ax.axhline(100 * outcome.self_convergence, **entries["difference of the two finest runs"])
         ax.set(xscale="log", yscale="log")
         ax.grid(alpha=0.3, which="both")
     panels[0].set(xlabel="first response (cold), s", ylabel="error of the worst probe, %")
