@@ -360,9 +360,7 @@ def write(folder: Path, hierarchy: Hierarchy) -> None:
     parts: list[Part] = [
         Picture(png(_figure(effects), dpi=130), BARS, "relax"),
         Table(EFFECT_COLUMNS, map(_effect_row, effects), "effects"),
-        Details(
-            "Steps", [INTRODUCTION, Table(STEP_COLUMNS, map(_step_row, hierarchy.every), "steps")]
-        ),
+        Details("Steps", [INTRODUCTION, steps]),
     ]
     title = f"{hierarchy.scene.name}: assumptions, one by one"
     Report(title, [verdict], parts, hierarchy.efforts).write(folder)
