@@ -109,9 +109,7 @@ def align(
 
 
 def opposite_sign(model: str, has_delay: bool) -> str:
-    """Return a sentence, without a full stop, for a measurement that fits as well with its sign
-    flipped.
-    """
+    """Return a warning that a measurement fits a model as well with the opposite sign."""
     delay = ", at another delay" * has_delay
     return (
         f"with the opposite sign the measurement fits {model} as well or better{delay}: check "
@@ -164,9 +162,7 @@ def _best_delay(
 
 
 def _error(factors: np.ndarray, lines: MeasuredLines) -> float:
-    """Return the standard error of Re sum(lines * factors (f, p)), widened so that 1.96 of it are
-    Student's 95 % (Satterthwaite 1946).
-    """
+    """Return the standard error of Re sum(lines * factors (f, p)) (Satterthwaite 1946)."""
     terms = np.nan_to_num(np.abs(factors) ** 2 * lines.variance / 2)
     squares = float((terms**2 / lines.freedom).sum())
     if not squares > 0:

@@ -104,10 +104,7 @@ def _response_quantity(arrays: Arrays) -> str:
 
 
 def recording_of(arrays: Arrays, given: Given) -> Recording:
-    """Return the recording in arrays by name, "structure.name" for fields of structures.
-
-    Raises a ValueError if no array, or more than one, can be the motion, or shapes do not fit.
-    """
+    """Return the recording in arrays by name, "structure.name" for fields of structures."""
     short = {_last(name): array for name, array in arrays.items()}
     times, frequencies = _times(short), _vector(short, FREQUENCIES)
     name = given.variable or _motion(arrays)
@@ -166,9 +163,7 @@ def _last(name: str) -> str:
 def _in_order(
     values: np.ndarray, samples: int, places: int, name: str, remarks: list[str]
 ) -> np.ndarray:
-    """Return values (r, n, p) for any order of one to three axes, from the numbers of samples and
-    of places; 0 if unknown.
-    """
+    """Return values (r, n, p) for any order of axes, from known numbers of samples and places."""
     values = values if values.ndim <= 3 else values.squeeze()
     sizes = values.shape
     if not 1 <= values.ndim <= 3:

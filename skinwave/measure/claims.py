@@ -57,11 +57,7 @@ def by_name(
 
 
 def assess_measured(measured: LinesByName) -> list[MeasuredClaim]:
-    """Return every claim that concerns such a Tacton.
-
-    A claim is decided if all amplitudes within the noise agree, at the places where f_AM is above
-    the noise.
-    """
+    """Return every claim about such a Tacton, decided if all amplitudes in the noise agree."""
     if not is_single(measured):
         return []
     kind = measured.is_am, measured.is_stm
@@ -121,9 +117,7 @@ def _undecidable(measured: LinesByName, claim: str) -> str:
 
 
 def _varied(measured: LinesByName, claim: str, way: int, am: int) -> LinesByName:
-    """Return amplitudes varied within the noise in favour of a claim (way 1) or against it (-1),
-    with those of f_AM up (am 1) or down (-1).
-    """
+    """Return amplitudes varied within the noise for a claim (way 1) or against it (-1)."""
     of_am = measured.frequencies["f_AM"]
 
     def sign(name: str) -> int:

@@ -43,9 +43,7 @@ MOST_DRAWN = 8  # places
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Measured:
-    """A measurement to compare with, its delay in s and its gain if known. The gain is that of
-    bodies, because kernels have another unit.
-    """
+    """A measurement to compare with, its delay in s and its gain over bodies, if known."""
 
     measurement: Measurement
     delay: float | None = None
@@ -126,9 +124,7 @@ class MeasuredComparison:
 
 
 def compare_measured(measured: Measured, runs: Sequence[Run]) -> MeasuredComparison:
-    """Return the comparison of runs of one Tacton, at the places and, for bodies, in the quantity
-    of the measurement. Raises a ValueError if the record resolves no line of the load.
-    """
+    """Return the comparison of runs of one Tacton, at the places of the measurement."""
     measurement = measured.measurement
     bodies = [run for run in runs if run.response.record.of_body]
     scene = (bodies or list(runs))[-1].scene  # a body has the load of the scene file
@@ -146,9 +142,7 @@ def compare_measured(measured: Measured, runs: Sequence[Run]) -> MeasuredCompari
 def lines_to_compare(
     measurement: Measurement, scene: Scene
 ) -> tuple[dict[str, tuple[str, ...]], Floats, tuple[str, ...]]:
-    """Return the lines of the load that record and response both resolve: all names by the first,
-    frequencies (f,) in Hz, and the names of the unresolved ones.
-    """
+    """Return names and frequencies (f,) of lines that are resolved, and unresolved names."""
     candidates = ASSESSED if len(scene.tacton.foci) == 1 else ()
     clocks = [*_clock(measurement), _silence(sample_times(scene))]
     highest = min(0.5 / step(clock.times) for clock in clocks)
@@ -170,9 +164,7 @@ def lines_to_compare(
 
 
 def _clock(measurement: Measurement) -> list[Response]:
-    """Return a zero response at the times of a measurement, whose length decides which lines are
-    resolved; for spectra with equal bins, at times whose transform has these bins.
-    """
+    """Return a zero response with the times, or the bins, of a measurement."""
     if not measurement.is_spectrum:
         return [_silence(evenly(measurement))]
     width, rate = bin_width(measurement), 2.1 * measurement.frequencies[-1]
@@ -213,9 +205,7 @@ def _column(measured: Measured, run: Run, lines: MeasuredLines) -> ModelColumn:
 
 
 def _delay_window(measurement: Measurement, run: Run, lines: MeasuredLines) -> tuple[float, float]:
-    """Return width and centre in s of the delays at which record and Tacton overlap by at least
-    `LEAST_OVERLAP`; at least a period of the lowest line wide.
-    """
+    """Return width and centre in s of the delays at which record and Tacton overlap enough."""
     begin, end = (float(t) for t in run.response.times[[0, -1]])
     period = 1 / float(lines.frequencies.min())
     if measurement.is_spectrum:
@@ -287,9 +277,7 @@ def runs_to_draw(comparison: MeasuredComparison) -> list[Run]:
 
 
 def _measured_run(comparison: MeasuredComparison) -> Run:
-    """Return the mean of the aligned repetitions on the clock of the main model; for spectra, the
-    sum of the lines.
-    """
+    """Return the mean of the aligned repetitions, or the sum of lines, on the model's clock."""
     measurement, main = comparison.measurement, comparison.main
     delay, shifts = main.alignment.delay, comparison.lines.shifts
     if measurement.is_spectrum:

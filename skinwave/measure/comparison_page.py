@@ -55,9 +55,7 @@ ABOUT_CLAIMS = (
 def page_section(
     comparison: MeasuredComparison, picture: Callable[[str, Figure, str], Picture]
 ) -> Section:
-    """Return the section: conclusion, figure and tables. `picture(name, figure, caption)` makes a
-    part of a page.
-    """
+    """Return the section; `picture(name, figure, caption)` makes a part of a page."""
     lines, main, at = comparison.lines, comparison.main, comparison.drawn_places
     columns = {c.run.column: c for c in comparison.columns}
     figure = lines_figure(

@@ -116,9 +116,7 @@ def _squares(each: np.ndarray) -> Floats:
 
 
 def align_by_references(values: Floats, references: Floats) -> tuple[Floats, Floats, str]:
-    """Return values (r, t, p) aligned by their references (r, t, p), the common reference, and a
-    remark. If references differ, values are unchanged and the reference is empty.
-    """
+    """Return values (r, t, p) aligned by references (r, t, p), the common one, and a remark."""
     lags, count = _lags(references), values.shape[1]
     begin = lags - lags.min()
     left = count - int(np.ceil(begin.max()))

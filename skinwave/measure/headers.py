@@ -93,10 +93,7 @@ class Column:
 
 
 def parse_heading(text: str, unit: str = "") -> Column:
-    """Return the column with this heading and with the unit below it, if any.
-
-    Raises a ValueError if the place in the heading is not a pair of numbers.
-    """
+    """Return the column with this heading, and with the unit below it, if any."""
     text = " ".join(unicodedata.normalize("NFKC", text).split())
     heading = text
     split = re.fullmatch(r"(.+?)(?:\s+/\s*|\s*/\s+|,\s+|\s+in\s+)(\S+)", text)

@@ -69,10 +69,7 @@ class Inspection:
 
 
 def inspect(measured: Measurement, *, alarm: float = ALARM) -> Inspection:
-    """Return the inspection of a measurement.
-
-    Noise alone has any line with the probability `alarm`, between 0 and 1.
-    """
+    """Return the inspection; noise alone has any line with the probability `alarm`."""
     if not 0 < alarm < 1:
         raise ValueError(f"the false-alarm probability {alarm:g} must be between 0 and 1")
     missing = list(measured.remarks)
@@ -161,10 +158,7 @@ def unsteady(
 
 
 def _of_amplitudes(measured: Measurement, kept: np.ndarray, alarm: float) -> LineSpectrum | None:
-    """Return the lines of spectra with equally spaced frequencies: local maxima above the floor.
-
-    The error of a frequency is the standard deviation of a uniform distribution over a bin.
-    """
+    """Return the lines of spectra with equally spaced frequencies: maxima above the floor."""
     width, runs = bin_width(measured), len(measured.values)
     if not width or len(measured.frequencies) < FEWEST_BINS:
         return None
@@ -262,9 +256,7 @@ def _cut_off(x: Floats) -> int:
 
 
 def flaws(measured: Measurement, pressure: MovingPressure) -> list[str]:
-    """Return sentences, without a full stop, on what falsifies the lines of a load in waveforms:
-    clipping, and mains hum on one of them.
-    """
+    """Return warnings of clipping, and of mains hum on a line of the load."""
     if measured.is_spectrum:
         return []
     sentences, cut = [], _clipped_samples(measured)

@@ -33,9 +33,7 @@ CURVED = 0.3  # relative difference of the root of chi squared from that of a li
 
 @dataclass(frozen=True, kw_only=True)
 class Estimate:
-    """Estimate of a parameter with its 95 % interval, nan if the data do not resolve it. The
-    interval of a curved model is approximate.
-    """
+    """Estimate of a parameter with its 95 % interval, nan if the data do not resolve it."""
 
     key: str
     value: float
@@ -113,9 +111,7 @@ def intervals(solution: Solution) -> Intervals:
 
 
 def _estimate(solution: Solution, k: int, to_end: Floats, away: float) -> Estimate:
-    """Return the estimate of parameter k. Its interval ends `to_end` (k,) from the solution, `away`
-    standard errors.
-    """
+    """Return the estimate of parameter k, with interval ends `to_end` (k,) from the solution."""
     parameter, u, half = solution.problem.parameters.free[k], float(solution.u[k]), float(to_end[k])
     low, high, is_curved = np.nan, np.nan, False
     if half < UNRESOLVED:
@@ -139,9 +135,7 @@ def _standard_errors(solution: Solution, u: Floats) -> float:
 
 
 def widening(residual: Floats, rows: Floats) -> Floats:
-    """Return factors (k,) >= 1 by which intervals of linear combinations P (k, n, s) of the errors
-    are wider than for independent errors, from the residual (n, s).
-    """
+    """Return factors (k,) >= 1 for intervals of combinations (k, n, s) of the errors."""
     power = np.abs(np.fft.fft(residual, axis=0)) ** 2 / len(residual)
     power[0] = power[1:3].mean(axis=0)  # a fit may have removed the mean
     density = uniform_filter1d(power, int(np.sqrt(len(residual))) | 1, axis=0, mode="wrap")
@@ -151,9 +145,7 @@ def widening(residual: Floats, rows: Floats) -> Floats:
 
 
 def whiteness(residual: Floats) -> Whiteness:
-    """Return the test of residuals (n, s), all series together (Ljung and Box, Biometrika 65:297
-    (1978)); p is nan for fewer than ten.
-    """
+    """Return the test of residuals (n, s) (Ljung and Box, Biometrika 65:297 (1978))."""
     n, series = residual.shape
     lags = min(MOST_LAGS, n // 5)
     if lags < 2:

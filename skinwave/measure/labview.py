@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from meshes import reading
-from meshes.reading import read_exported_text
 from skinwave.measure.headers import parse_heading
 from skinwave.measure.recording import Given, Recording
 from skinwave.measure.table import Table, recording_of
@@ -17,13 +16,8 @@ LARGEST = 1_000_000_000  # bytes
 AXIS_UNITS = {"Time": "s", "Frequency": "Hz"}
 
 
-def read_lvm(path: Path, given: Given) -> Recording:
-    """Return the recording in a LabVIEW measurement file with one segment."""
-    return recording_of(lvm_table(read_exported_text(path, LARGEST)), given)
-
-
 def lvm_table(text: str) -> Table:
-    """Return the table in the text of a LabVIEW measurement file."""
+    """Return the table in the text of a LabVIEW measurement file with one segment."""
     import lvm_read
 
     try:

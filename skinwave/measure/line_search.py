@@ -49,9 +49,7 @@ class SpectralLine:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LineSpectrum:
-    """Lines by frequency, and one-sided densities (f, p), unit^2/Hz, at `frequencies` (f,) of the
-    waveforms and of the noise `floor`.
-    """
+    """Lines, and one-sided densities (f, p), unit^2/Hz, of waveforms and noise `floor`."""
 
     lines: tuple[SpectralLine, ...]
     frequencies: Floats
@@ -170,9 +168,7 @@ def _bins(frequencies: Floats, x: Floats, floor: Floats, rate: float) -> np.ndar
 
 
 def _errors(fit: _Fit, rate: float, floor: Floats, runs: int) -> Floats:
-    """Return standard errors in Hz in the residual without a window, in which transients and
-    drifting lines leave more than with one.
-    """
+    """Return standard errors in Hz in the residual without a window, which has transients."""
     bins = _bins(fit.frequencies, fit.rest, floor, rate)
     bare = noise_floor(_densities(fit.rest, runs, rate, "boxcar"), runs)[bins]
     weight = fit.power / floor[bins]

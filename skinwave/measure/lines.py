@@ -112,9 +112,7 @@ class MeasuredLines:
 
 
 def holm(p: Floats) -> Floats:
-    """Return p-values adjusted for their number: with a threshold a, the probability of any false
-    one is at most a (Holm 1979). nan stays.
-    """
+    """Return p-values adjusted for their number (Holm 1979); nan stays."""
     known = np.flatnonzero(np.isfinite(p.ravel()))
     order = known[np.argsort(p.ravel()[known], kind="stable")]
     adjusted = np.full(p.size, np.nan)
@@ -169,9 +167,7 @@ def lines_of(
 
 
 def _pooled(each: np.ndarray, floor: Floats, degrees: Floats) -> tuple[Floats, Floats]:
-    """Return variances (f, p) of the mean of amplitudes (r, f, p) and their degrees of freedom (f,)
-    from a floor (f, p) with degrees (f,) and from the repetitions.
-    """
+    """Return variances (f, p) of the mean, and degrees (f,), from floor and repetitions."""
     runs, lines, places = each.shape
     variance, own = each.var(axis=0, ddof=1) / runs, np.full((lines, 1), 2.0 * (runs - 1))
     if np.isnan(floor).all():
@@ -204,9 +200,7 @@ Estimate = tuple[np.ndarray, Floats, Floats, Floats | None]
 
 
 def _of_waveforms(measurement: Measurement, frequencies: Floats, settle: float) -> Estimate:
-    """Return amplitudes (r, f, p), the variance (f, p) of their mean, its degrees of freedom (f,),
-    and the correlation (2 f, 2 f).
-    """
+    """Return amplitudes (r, f, p), variance (f, p) of their mean, degrees (f,), correlation."""
     runs = len(measurement.values)
     waves, rows, index = line_rows(evenly(measurement), frequencies, settle=settle)
     n = rows.shape[1]
@@ -234,9 +228,7 @@ def _of_waveforms(measurement: Measurement, frequencies: Floats, settle: float) 
 
 
 def _kept(window: Floats, waves: Floats, rows: Floats) -> Floats:
-    """Return the share (k,) of windowed white noise that a fit leaves at each bin; its waves (m, n)
-    have the coefficients rows (m, n) @ x.
-    """
+    """Return the share (k,) of windowed white noise that a fit leaves at each bin."""
     moved, made = np.fft.rfft(window * rows), np.fft.rfft(window * waves)
     removed = 2 * (made.conj() * moved).real.sum(axis=0)
     added = (made.conj() * ((rows @ rows.T) @ made)).real.sum(axis=0)

@@ -38,9 +38,7 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
 
 
 def _mat(path: Path) -> dict[str, Any]:
-    """Return the variables of a file of version 4 to 7: arrays, lists for cells, and lists of
-    dictionaries for structures.
-    """
+    """Return the variables of a file of version 4 to 7; structures as dictionaries."""
     from scipy.io import loadmat
 
     def convert(value: Any) -> Any:
@@ -100,10 +98,7 @@ def _add(arrays: dict[str, np.ndarray], name: str, value: Any, depth: int) -> No
 
 
 def _stacked(parts: list[Any]) -> np.ndarray | None:
-    """Return arrays along a new first axis, with nan at the end of shorter vectors.
-
-    Equal texts or numbers become one; parts that do not fit together become None.
-    """
+    """Return arrays along a new first axis, nan at the end of shorter vectors, or None."""
     parts = [_stacked(one) if isinstance(one, list) else one for one in parts]
     kinds = {one.dtype.kind if isinstance(one, np.ndarray) else "" for one in parts}
     if not kinds or (not kinds <= set("fiuc") and kinds != {"U"}):

@@ -81,9 +81,7 @@ def _knots(bins: int) -> np.ndarray:
 
 
 def _trend(bins: np.ndarray, density: Floats, count: int) -> Floats:
-    """Return a parabola (count, p) in log frequency through the logarithms of medians of half
-    octaves of densities (b, p) at bins (b,).
-    """
+    """Return a parabola (count, p) in log frequency through log medians of half octaves."""
     edges = np.unique(np.geomspace(2, count, max(int(2 * np.log2(count)), 4)).astype(int))
     bands = [band for band in pairwise(np.searchsorted(bins, edges).tolist()) if band[1] > band[0]]
     x = np.array([np.log(bins[low:high].mean()) for low, high in bands])

@@ -38,9 +38,7 @@ NOISE_CHANCE = 0.01  # p-value of a line, below which it is more than noise
 
 @dataclass(frozen=True, kw_only=True)
 class LeftOutLine:
-    """Line of the load that is not fitted, because a reduced body leaves it out, or because it is
-    weak and unresolved.
-    """
+    """Line of the load that is weak and unresolved, or that a reduced body leaves out."""
 
     name: str
     frequency: float  # Hz
@@ -164,9 +162,7 @@ def first_names(names: tuple[str, ...]) -> str:
 
 
 def _of_lines(kind: str, measured: Measurement, aim: Target) -> Data:
-    """Return complex amplitudes as real and imaginary parts, or moduli including noise: the mean of
-    Rice's distribution for weak noise.
-    """
+    """Return complex amplitudes in two parts, or moduli with noise (Rice's distribution)."""
     lines = load_lines(measured, aim)
     if lines.unresolved:
         names = first_names(lines.unresolved)
@@ -211,9 +207,7 @@ def _whitening(correlation: Floats) -> Floats:
 
 
 def _waveforms(measured: Measurement, aim: Target) -> Data:
-    """Return steady waveforms about their mean, predicted as a sum of lines, or waveforms from
-    rest.
-    """
+    """Return steady waveforms, predicted as a sum of lines, or waveforms from rest."""
     if measured.is_spectrum:
         raise ValueError("the measurement has spectra; fit lines or amplitudes")
     count = measured.times.size * len(measured.places)
@@ -270,9 +264,7 @@ def _in_time(
     words: str,
     rough: Data | None,
 ) -> Data:
-    """Return data of waveforms (t, p). With one repetition, errors are proportional to the noise
-    (p,) of each place.
-    """
+    """Return data of waveforms (t, p), with the noise (p,) of each place for one repetition."""
     r = len(measured.values)
     error, source = noise, "errors in proportion to the noise at each place"
     if r > 1:

@@ -50,9 +50,7 @@ WEAKEST = 1e-5  # of the strongest line of the load; weaker ones are not predict
 
 @dataclass(frozen=True, kw_only=True)
 class Target:
-    """A scene whose parameters vary, a model, and what it predicts: a quantity of the normal motion
-    at places (p, 2) in metres. `reduced` is one reduction for all values of the materials.
-    """
+    """A scene that varies, a model, and the quantity at places (p, 2) that it predicts."""
 
     scene: Scene
     model: str
@@ -108,11 +106,7 @@ class Target:
 
 
 def target(scene: Scene, model: str, quantity: Quantity, places: Floats) -> Target:
-    """Return the target of a model by its name.
-
-    Raises a ValueError if the quantity is not normal motion, the model has no body or refuses the
-    scene, or a place is unknown or off the body.
-    """
+    """Return the target of a model; a ValueError if the model refuses scene or quantity."""
     if not quantity.is_normal:
         raise ValueError(f"a fit needs motion normal to the body, not {quantity.words}")
     if not np.isfinite(places).all():
@@ -126,9 +120,7 @@ def target(scene: Scene, model: str, quantity: Quantity, places: Floats) -> Targ
 
 
 def with_reduction(aim: Target, parameters: Parameters, progress: Progress) -> Target:
-    """Return the target with one reduction of its body, if one reduced-order model covers the
-    ranges of all materials, thicknesses and the pressure that vary.
-    """
+    """Return the target with one reduction of its body, if one covers all ranges."""
     ranges = {each.key: (each.low, each.high) for each in parameters.free}
     ranges = {key: ranges[key] for key in aim.rest(dict.fromkeys(ranges, 1.0))}
     if not aim.record.is_reduced or parameters.ties or not ranges:

@@ -90,8 +90,7 @@ class Reader:
 
 
 READERS = (
-    Reader(name="text table", suffixes=(".csv", ".tsv", ".txt", ".asc", ".dat"), read=text.read),
-    Reader(name="LabVIEW measurement", suffixes=(".lvm",), read=labview.read_lvm),
+    Reader(name="text", suffixes=(".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm"), read=text.read),
     Reader(name="TDMS", suffixes=(".tdms",), read=labview.read_tdms),
     Reader(name="NumPy", suffixes=(".npz",), read=arrays.read_npz, choices=("variable",)),
     Reader(name="sound", suffixes=(".wav",), read=read_wav),
@@ -133,10 +132,7 @@ def read(path: str | Path, **options: Any) -> Measurement:
 
 
 def read_complete(path: str | Path) -> Measurement:
-    """Return the measurement in a file that needs no options.
-
-    Raises a ValueError as `read`, with the command that makes such a file.
-    """
+    """Return the measurement in a file that needs no options."""
     try:
         return read(path)
     except ValueError as error:

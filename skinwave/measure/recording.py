@@ -78,10 +78,7 @@ def unknown_places(count: int) -> Floats:
 
 
 def completed(recording: Recording, given: Given, path: Path) -> Measurement:
-    """Return the measurement in SI, positive into the body.
-
-    Raises a ValueError that names the option for what neither the file nor the user says.
-    """
+    """Return the measurement in SI, positive into the body."""
     remarks = list(recording.remarks)
     quantity, unit = _quantity(recording, given)
     recording = replace(recording, places=_places(recording, given))
@@ -212,10 +209,7 @@ def _times(recording: Recording, given: Given, remarks: list[str]) -> tuple[Floa
 
 
 def _even(times: Floats) -> tuple[Floats, np.ndarray]:
-    """Return even times (n,) for rounded ones with missing rows, and the index (t,) of each.
-
-    Times that are even within `UNEVEN` are returned unchanged.
-    """
+    """Return even times (n,) for rounded ones with missing rows, and the index (t,) of each."""
     largest = float(np.abs(times).max(initial=0.0))
     if largest > LARGEST_TIME:
         times = times - times[0]

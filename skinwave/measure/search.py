@@ -39,9 +39,7 @@ SAME_COST = 1.0  # of twice the log-likelihood, of starts that reached the best 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Problem:
-    """Weighted residuals over the unit cube of the parameters. The model is proportional to the
-    `linear` keys.
-    """
+    """Weighted residuals over the unit cube; the model is proportional to `linear` keys."""
 
     parameters: Parameters
     data: Data
@@ -147,9 +145,7 @@ def solve(problem: Problem, starts: int, seed: int, progress: Progress) -> Solut
 
 
 def _may_be_flipped(problem: Problem, best: Start, candidates: Floats) -> bool:
-    """Whether a linear factor is negative or, if none may be, the flipped measurement fits better,
-    or as well with a smaller delay.
-    """
+    """Whether the measurement with the opposite sign fits better, or with a smaller delay."""
     data, parameters = problem.data, problem.parameters
     linear = [each for each in parameters.free if each.key in problem.linear]
     values = parameters.values(best.ended)
@@ -203,9 +199,7 @@ def _lower(problem: Problem, local: Start) -> Start | None:
 
 
 def _scan_minima(problem: Problem, local: Start, k: int) -> list[Floats]:
-    """Return the minima (k,) of chi squared along a parameter through the end of a local search,
-    with the best delay and linear factor at each position; the lowest first.
-    """
+    """Return the minima (k,) along a parameter through the end of a local search."""
     free, u = problem.parameters.free[k], local.ended
     count = int(np.ceil(free.span / np.log(SCAN_RATIO))) if free.is_log else FEWEST_SCANNED
     positions = np.linspace(0, 1, int(np.clip(count, FEWEST_SCANNED, MOST_SCANNED)))
@@ -220,9 +214,7 @@ def _scan_minima(problem: Problem, local: Start, k: int) -> list[Floats]:
 def refine(
     problem: Problem, u: Floats, most: int = MOST_EVALUATIONS, tolerance: float = ROUGH_TOLERANCE
 ) -> Start:
-    """Return the local search from a point (k,), until chi squared changes by less than a relative
-    tolerance.
-    """
+    """Return the local search from a point (k,) to a relative tolerance of chi squared."""
     result = least_squares(
         problem.residual, np.clip(u, 1e-6, 1 - 1e-6), problem.forward_slopes, bounds=(0, 1),
         x_scale="jac", xtol=1e-8, ftol=tolerance, gtol=1e-8, max_nfev=most,

@@ -212,9 +212,7 @@ def _chosen(columns: list[Column], wanted: tuple[str, ...]) -> list[int]:
 
 
 def _motion(columns: list[Column], given: Given, remarks: list[str]) -> list[int]:
-    """Return indices of the columns to keep. If columns have units of motion, one in another unit
-    is the drive, and further ones are left out.
-    """
+    """Return the columns to keep; next to units of motion, one in another unit is the drive."""
     motion = [k for k, column in enumerate(columns) if column.may_be_motion]
     known = [k for k in motion if quantity_of(columns[k].unit)]
     bare = [k for k in motion if k not in known and np.isnan(columns[k].place[0])]
@@ -245,9 +243,7 @@ def _motion(columns: list[Column], given: Given, remarks: list[str]) -> list[int
 
 
 def _axis(table: Table, at: int, given: Given, is_long: bool) -> tuple[Floats, Floats]:
-    """Return times in s and frequencies in Hz of the rows from a column or the notes. One of them
-    is empty; both are if the user gives the rate.
-    """
+    """Return times in s and frequencies in Hz of the rows; one of them, or both, is empty."""
     empty, count = np.empty(0), len(table.numbers)
     if at < 0 and is_long:
         band = table.number(_BAND, FREQUENCIES)

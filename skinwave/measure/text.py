@@ -58,9 +58,7 @@ def read_places(path: Path) -> Floats:
 
 @dataclass(frozen=True)
 class _Layout:
-    """Delimiter, whether decimal signs are commas, indices of the columns of numbers, and the
-    number of cells in a row.
-    """
+    """Delimiter, decimal commas or not, indices of columns of numbers, cells in a row."""
 
     delimiter: str
     has_commas: bool
@@ -184,10 +182,7 @@ def _clock_seconds(cell: str) -> float | None:
 
 
 def _header(above: list[str], layout: _Layout) -> tuple[list[str], list[str], Notes]:
-    """Return names and units of columns, and notes, from the lines above a table.
-
-    Raises a ValueError if the line of names does not fit the columns.
-    """
+    """Return names and units of columns, and notes, from the lines above a table."""
     numeric, width = layout.numeric, layout.width
     at = [k for k, line in enumerate(above) if line.strip()]
     notes = [_note(above[k]) for k in at]
@@ -222,9 +217,7 @@ def _header(above: list[str], layout: _Layout) -> tuple[list[str], list[str], No
 def _columns(
     names: list[str], units: list[str], layout: _Layout, first: list[str], notes: Notes
 ) -> list[Column]:
-    """Return the columns of numbers. Text is left out with a remark, or refused if its heading is
-    that of numbers.
-    """
+    """Return the columns of numbers; leave out text, or refuse it under a heading of numbers."""
     for k, cell in enumerate(first[: len(names)]):
         if k in layout.numeric or not (names[k] and cell) or _is_number(cell):
             continue

@@ -187,10 +187,7 @@ def _check_alike(motion: list[Function]) -> None:
 
 
 def _by_node(motion: list[Function]) -> list[tuple[int, list[Function]]]:
-    """Return nodes with their functions, equally many.
-
-    Functions with distinct names that have no common node, or unequal numbers, are places.
-    """
+    """Return nodes with equally many functions; functions of distinct names are places."""
     groups: dict[int, list[Function]] = {}
     for one in motion:
         groups.setdefault(one.node, []).append(one)

@@ -27,9 +27,7 @@ def to_npz(measured: Measurement) -> bytes:
 
 
 def to_csv(measured: Measurement) -> bytes:
-    """Return a CSV file with a column (two for complex values) per place and repetition, below
-    comments with name and remarks.
-    """
+    """Return a CSV file with a column (two for complex values) per place and repetition."""
     unit, is_spectrum = measured.record.unit, measured.is_spectrum
     series = [
         (f"{measured.quantity}{_place(x, y)}{f'#{r + 1}' * (r > 0)} [{unit}]", run[:, p])
