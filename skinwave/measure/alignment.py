@@ -1,9 +1,7 @@
-"""Delay and gain between a measurement and a model, from their spectral lines.
+"""Delay and gain between a measurement and a model: measured(t) = gain * model(t - delay).
 
-A record begins at an unknown time of the response, and in an unknown unit of pressure:
-measured(t) = gain * model(t - delay). Both follow from the complex amplitudes of the lines by
-weighted least squares: the gain in closed form for each delay, and the delay as the maximum of the
-correlation of the lines.
+Both follow from the complex amplitudes of the lines by weighted least squares: the gain in closed
+form for each delay, and the delay as the maximum of the correlation of the lines.
 """
 
 from dataclasses import dataclass, replace

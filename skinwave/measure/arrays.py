@@ -1,12 +1,9 @@
 """Recordings in named arrays: NumPy archives and MATLAB files.
 
 Times, places, drive and texts are identified by their names; the motion by --variable, by its name,
-or as the only other array that fits.
-
-One published set has its own form: Reardon et al., Sci. Adv. 9, eadf2037 (2023), doi
-10.1126/sciadv.adf2037, record 10.5281/zenodo.7686560, skin velocity under a focus that draws a
-zigzag along the hand. Its y (N, M, 2) is the velocity along the laser in m/s at N places, M times,
-2 repetitions. Places were measured one after the other, each with a reference r.
+or as the only other array that fits. One published set has its own form: Reardon et al., Sci. Adv.
+9, eadf2037 (2023), doi 10.1126/sciadv.adf2037, record 10.5281/zenodo.7686560. Its y (N, M, 2) is
+the velocity along the laser in m/s at N places, M times, 2 repetitions, each with a reference r.
 """
 
 from collections.abc import Iterable, Mapping

@@ -27,7 +27,6 @@ from skinwave.system.document import Details, Part, Picture, Section
 from skinwave.system.table import Column, Table
 
 SAFE_OVERLAP = 0.85  # of the shorter one of record and Tacton
-FEW_REPETITIONS = 4
 LEAST_CHANGE = 0.2  # of a line between the halves of the record, that is reported
 MOST_NAMED = 3  # lines in a sentence
 MOST_ROWS = 30  # differences on the page; measured.csv has all
@@ -193,10 +192,7 @@ def conclusion(comparison: MeasuredComparison, column: ModelColumn) -> str:
     numerical = f", {few} of them within the model's numerical error of {error}" if few else ""
     beyond = f"{many} of {known} differences are beyond the noise{numerical}"
     if few == many:
-        return (
-            f"The {name} agrees with the data within the noise and its numerical error: {beyond}. "
-            f"{misfit}"
-        )
+        return f"The {name} agrees with the data within its numerical error: {beyond}. {misfit}"
     return f"The {name} disagrees with the data: {beyond} ({_where(comparison, column)}). {misfit}"
 
 
@@ -224,9 +220,7 @@ def remarks(comparison: MeasuredComparison) -> list[str]:
     sentences += _outside(comparison, main)
     if comparison.unresolved:
         unresolved = ", ".join(comparison.unresolved)
-        sentences.append(
-            f"Not compared, because record or model cannot resolve them: {unresolved}."
-        )
+        sentences.append(f"Not compared, because record or model is too short: {unresolved}.")
     errors = np.zeros(len(lines.frequencies))
     changes = unsteady(measurement, list(comparison.names), lines.frequencies, errors, LEAST_CHANGE)
     more = (*changes, *flaws(measurement, comparison.scene.pressure), *measurement.remarks)
@@ -235,18 +229,13 @@ def remarks(comparison: MeasuredComparison) -> list[str]:
 
 def _repetitions(comparison: MeasuredComparison) -> str:
     """Return how often the motion was measured, and what the noise is estimated from."""
-    shifts, lines = comparison.lines.shifts, comparison.lines
-    if (r := len(shifts)) > 1:
-        step = ""
-        if shifts.any():
-            step = f"; they were out of step by up to {1e3 * np.ptp(shifts):.3g} ms and are aligned"
-        more = " More repetitions would show smaller differences." * (r < FEW_REPETITIONS)
-        return f"{r} repetitions, whose spread is part of the noise{step}.{more}"
-    unknown = int(np.isnan(lines.variance).any(axis=1).sum())
-    if unknown == len(lines.frequencies):
-        return "one repetition, with unknown noise."
-    others = f", and unknown for {plural(unknown, 'line')}" * (unknown > 0)
-    return f"one repetition; the noise is the noise floor at each line{others}."
+    shifts = comparison.lines.shifts
+    if len(shifts) > 1:
+        aligned = f", aligned by up to {1e3 * np.ptp(shifts):.3g} ms" * bool(shifts.any())
+        return f"{len(shifts)} repetitions{aligned}. Their spread is part of the noise."
+    if np.isnan(comparison.lines.variance).all():
+        return "one repetition. The noise is unknown."
+    return "one repetition. The noise is the noise floor at each line."
 
 
 def _outside(comparison: MeasuredComparison, column: ModelColumn) -> list[str]:

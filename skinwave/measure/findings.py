@@ -1,6 +1,6 @@
 """Sentences on a fit: results, warnings, and what the fitted scene cannot hold."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -73,9 +73,10 @@ def _of_solution(found: Fit) -> Iterator[str]:
             f"{significant(np.sqrt(solution.scale), 2)}, are not valid 95 % intervals"
         )
     if not test.is_white:
+        factor = max(found.intervals.widenings.tolist(), default=1.0)
         yield (
             f"the residuals are not white (Ljung-Box, p {probability(test.p)}); intervals are "
-            f"widened by {_factors(found)}; check what the scene leaves out"
+            f"widened by up to a factor of {significant(factor)}; check what the scene leaves out"
         )
     if (share := sum(line.share for line in strong)) > LEAST_SHARE:
         yield (
@@ -89,7 +90,8 @@ def _of_estimates(found: Fit) -> Iterator[str]:
     directions = dict.fromkeys(found.intervals.unresolved)
     for keys in directions:
         if len(keys) > 1:
-            yield f"the data do not separate {_list(keys)}; fix one of them, or measure more"
+            names = f"{', '.join(keys[:-1])} and {keys[-1]}"
+            yield f"the data do not separate {names}; fix one of them, or measure more"
         else:
             yield _undetermined(keys[0])
     named = {key for keys in directions for key in keys}
@@ -113,18 +115,6 @@ def _undetermined(key: str) -> str:
     return f"the data do not determine {key} between its limits; fix it, or measure more"
 
 
-def _list(keys: Sequence[str]) -> str:
-    return f"{', '.join(keys[:-1])} and {keys[-1]}"
-
-
-def _factors(found: Fit) -> str:
-    """Return the factors by which intervals are widened."""
-    pairs = zip(found.intervals.widenings, found.estimates, strict=True)
-    each = [factor for factor, estimate in pairs if estimate.is_resolved]
-    low, high = (significant(x, 3) for x in (min(each, default=1.0), max(each, default=1.0)))
-    return f"a factor of {low}" if low == high else f"factors of {low} to {high}"
-
-
 def probability(p: float) -> str:
     """Return a probability with = or <."""
     return f"= {significant(p, 2)}" if p >= LEAST_PROBABILITY else f"< {LEAST_PROBABILITY:g}"
@@ -138,10 +128,9 @@ def notes(found: Fit) -> list[str]:
         for key, value in found.values.items() if "." not in key
     ]  # fmt: skip
     for each in found.estimates:
-        if not each.is_resolved and "." in each.key:
-            sentences.append(f"{each.key} is not resolved: its spread is its whole range")
-        elif each.is_resolved and each.at_limit:
-            sentences.append(f"{each.key} is at a limit: its spread is its whole range")
+        if "." in each.key and (each.at_limit or not each.is_resolved):
+            reason = "at a limit" if each.is_resolved else "not resolved"
+            sentences.append(f"{each.key} is {reason}: its spread is its whole range")
     sentences += [f"{key} is tied and has no spread" for key in parameters.ties if "." in key]
     is_part = np.array(["." in key for key in parameters.keys])
     correlations = np.nan_to_num(found.intervals.correlations)
@@ -149,7 +138,6 @@ def notes(found: Fit) -> list[str]:
     np.fill_diagonal(table, 0.0)
     if (largest := float(np.abs(table).max())) >= CORRELATED:
         sentences.append(
-            f"correlations of the estimates, up to {significant(largest, 2)}, are dropped: spreads "
-            "are independent"
+            f"correlations of the estimates, up to {significant(largest, 2)}, are dropped"
         )
     return sentences

@@ -88,12 +88,10 @@ def _whiteness(found: Fit) -> str:
     test = found.intervals.whiteness
     if not isfinite(test.p):
         return "The data are too few for a test of whiteness."
-    result = "the residuals may be white"
-    if not test.is_white:
-        result = (
-            "the residuals are not white; a sandwich covariance widens the intervals (White 1980)"
-        )
-    return f"By the test of Ljung and Box (p {probability(test.p)}), {result}."
+    result = f"Test of Ljung and Box: p {probability(test.p)}"
+    if test.is_white:
+        return f"{result}; the residuals may be white."
+    return f"{result}; the residuals are not white, and the intervals are widened (White 1980)."
 
 
 def estimate_table(found: Fit) -> Table:

@@ -1,15 +1,13 @@
 """Intervals of a fit from the covariance at its solution, and what the data do not resolve.
 
-At the solution the residual r changes by its slopes J over the unit cube. With s^2 the scale of the
+At the solution the residual changes by its slopes J over the unit cube. With s^2 the scale of the
 variances and J / s = U diag(S) V^T, a move by d along a column of V changes the residual by S d
-standard errors. If the 95 % interval of such a direction is wider than the limits, the data do not
-resolve it. A parameter whose own interval is as wide gets none (Transtrum, Machta and Sethna, Phys
-Rev E 83:036701 (2011)).
+standard errors. If the 95 % interval of a direction, or of a parameter, is wider than the limits,
+the data do not resolve it (Transtrum, Machta and Sethna, Phys Rev E 83:036701 (2011)).
 
-If residuals are not white, intervals are widened. Least squares moves an estimate by d = P e with
-the errors e of variance s^2, P the pseudo-inverse of the slopes. For e stationary along the axis,
-the variance of d is a sandwich covariance, as in `lines`, instead of s^2 |P|^2, with the residuals'
-periodogram, smoothed over the square root of their number (Daniell).
+If residuals are not white, intervals are widened. An estimate moves by d = P e with the errors e, P
+the pseudo-inverse of the slopes; for stationary e, the variance of d is a sandwich covariance, as
+in `lines`, with the residuals' periodogram, smoothed over the root of their number (Daniell).
 """
 
 from dataclasses import dataclass

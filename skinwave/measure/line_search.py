@@ -1,15 +1,13 @@
 """Search for spectral lines in waveforms: which frequencies rise above the noise, and how surely.
 
-A line is a peak of the periodogram (Hann window, mean of R repetitions) above the noise floor, a
-running median. In Gaussian noise their ratio has an F distribution with 2 R and nu degrees of
-freedom, nu from the variance of the median (Welch 1967). The false-alarm probability is that of one
-bin times bins and places (Bonferroni).
-
-Lines are searched strongest first and fitted together with a linear trend, so that side lobes are
-not taken for lines. Frequencies follow from Gauss-Newton steps with the amplitudes projected out
-(Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973). Standard errors are the Cramer-Rao bound, for
-one sinusoid of amplitude A over a time T in noise of one-sided density S 3 S / (pi^2 A^2 T^3)
-(Rife and Boorstyn, IEEE Trans. Inf. Theory 20, 1974, eq. 17).
+A line is a peak of the periodogram (Hann window, mean of R repetitions) above the noise floor. In
+Gaussian noise their ratio has an F distribution with 2 R and nu degrees of freedom, nu from the
+variance of a running median (Welch 1967). The false-alarm probability is that of one bin times bins
+and places (Bonferroni). Lines are searched strongest first and fitted together with a linear trend.
+Frequencies follow from Gauss-Newton steps with the amplitudes projected out (Golub and Pereyra,
+SIAM J. Numer. Anal. 10, 1973). Standard errors are the Cramer-Rao bound, for one sinusoid of
+amplitude A over a time T in noise of one-sided density S 3 S / (pi^2 A^2 T^3) (Rife and Boorstyn,
+IEEE Trans. Inf. Theory 20, 1974, eq. 17).
 """
 
 from dataclasses import dataclass

@@ -2,13 +2,11 @@
 
 Lines are linear combinations a = P x of the samples x, the weighted least squares of
 `simple_model.response.fit_lines`. In stationary noise of one-sided density S at a sampling rate r
-their covariance is a sandwich,
+their covariance is a sandwich (White, Econometrica 48:817 (1980)),
 
-    cov a = r/2 1/n sum over k of S(k) F P(k) F P(k)^*,     F the transform of n samples,
+    cov a = r/2 1/n sum over k of S(k) F P(k) F P(k)^*,     F the transform of n samples.
 
-which includes the effects of a window, close lines and steep noise (White, Econometrica 48:817
-(1980)). S is the floor of the residual of the same fit, divided by the share of white noise that
-the fit leaves at each bin.
+S is the floor of the residual of the same fit, over the share of white noise that the fit leaves.
 """
 
 from dataclasses import dataclass, replace

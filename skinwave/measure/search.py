@@ -1,13 +1,11 @@
 """Weighted least squares within limits, from several starts.
 
-At each start, the parameters that need no run of the model are set first: the delay by a scan of
-its range, the gain or the peak pressure by linear least squares at each delay (variable projection;
-Golub and Pereyra, SIAM J Numer Anal 10:413 (1973)). A trust-region method continues from there. It
-may end in another minimum, such as a softer body whose waves are one period later at the places.
-Therefore each other parameter is scanned through its range, with the best delay and gain at each
-position, and the search continues from the minima of the scan until none leads lower. Starts that
-end in the same minimum share its scans. Searches use rough data if there are any; the best start
-continues with all data.
+The delay, by a scan of its range, and the gain or the pressure, by linear least squares at each
+delay (Golub and Pereyra, SIAM J Numer Anal 10:413 (1973)), need no run of the model and are set
+first. A trust-region method continues from there. It may end in another minimum, such as a softer
+body whose waves are one period later. Therefore each other parameter is scanned through its range,
+and the search continues from the minima of the scan until none leads lower. Searches use rough data
+if there are any; the best start continues with all data.
 """
 
 from collections.abc import Sequence
