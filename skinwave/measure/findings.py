@@ -18,19 +18,19 @@ LEAST_PROBABILITY = 1e-9  # that is shown
 CORRELATED = 0.1  # smallest correlation that is mentioned
 
 
-def sentences(found: Fit) -> list[str]:
+def sentences(result: Fit) -> list[str]:
     """Return sentences on what was fitted, and how well."""
-    solution, data = found.solution, found.solution.problem.data
+    solution, data = result.solution, result.solution.problem.data
     ratio = significant(solution.cost / solution.dof)
     known = f"; chi squared over its degrees of freedom is {ratio}, with known errors"
     return [
-        f"{found.target.model} was fitted to {data.words}.",
+        f"{result.target.model} was fitted to {data.words}.",
         f"{solution.agreeing_starts} of {plural(len(solution.starts), 'start')} reached the "
-        f"solution. Its residual is {percent(found.misfit)} of the measured motion"
+        f"solution. Its residual is {percent(result.misfit)} of the measured motion"
         f"{known * data.is_known}.",
         *(
             "{} = {}, 95 % interval {} to {}.".format(each.key, *rounded(each))
-            for each in found.estimates
+            for each in result.estimates
             if each.is_resolved and not each.at_limit
         ),
     ]
@@ -46,19 +46,19 @@ def rounded(each: Estimate) -> tuple[str, str, str]:
     return value, low, high
 
 
-def cautions(found: Fit) -> list[str]:
+def cautions(result: Fit) -> list[str]:
     """Return warnings, without a full stop."""
-    return [*_of_solution(found), *_of_estimates(found),
-            *flaws(found.measured, found.target.scene.pressure)]  # fmt: skip
+    return [*_of_solution(result), *_of_estimates(result),
+            *flaws(result.measured, result.target.scene.pressure)]  # fmt: skip
 
 
-def _of_solution(found: Fit) -> Iterator[str]:
-    solution, test = found.solution, found.intervals.whiteness
+def _of_solution(result: Fit) -> Iterator[str]:
+    solution, test = result.solution, result.intervals.whiteness
     count = len(solution.starts)
     missed = count - solution.agreeing_starts
     strong = [line for line in solution.problem.data.left_out if line.share > 0]
     if solution.may_be_flipped:
-        yield opposite_sign(found.target.model, DELAY in solution.problem.parameters.keys)
+        yield opposite_sign(result.target.model, DELAY in solution.problem.parameters.keys)
     if not solution.converged:
         yield "the search did not converge: chi squared may be smaller; give more --starts"
     if missed > count / 2:
@@ -73,7 +73,7 @@ def _of_solution(found: Fit) -> Iterator[str]:
             f"{significant(np.sqrt(solution.scale), 2)}, are not valid 95 % intervals"
         )
     if not test.is_white:
-        factor = max(found.intervals.widenings.tolist(), default=1.0)
+        factor = max(result.intervals.widenings.tolist(), default=1.0)
         yield (
             f"the residuals are not white (Ljung-Box, p {probability(test.p)}); intervals are "
             f"widened by up to a factor of {significant(factor)}; check what the scene leaves out"
@@ -86,8 +86,8 @@ def _of_solution(found: Fit) -> Iterator[str]:
         )
 
 
-def _of_estimates(found: Fit) -> Iterator[str]:
-    directions = dict.fromkeys(found.intervals.unresolved)
+def _of_estimates(result: Fit) -> Iterator[str]:
+    directions = dict.fromkeys(result.intervals.unresolved)
     for keys in directions:
         if len(keys) > 1:
             names = f"{', '.join(keys[:-1])} and {keys[-1]}"
@@ -95,7 +95,7 @@ def _of_estimates(found: Fit) -> Iterator[str]:
         else:
             yield _undetermined(keys[0])
     named = {key for keys in directions for key in keys}
-    for each, limits in zip(found.estimates, found.solution.problem.parameters.free, strict=True):
+    for each, limits in zip(result.estimates, result.solution.problem.parameters.free, strict=True):
         if each.at_limit:
             yield (
                 f"{each.key} = {significant(each.value, 4)} is at a limit of its range, "
@@ -120,20 +120,20 @@ def probability(p: float) -> str:
     return f"= {significant(p, 2)}" if p >= LEAST_PROBABILITY else f"< {LEAST_PROBABILITY:g}"
 
 
-def notes(found: Fit) -> list[str]:
+def notes(result: Fit) -> list[str]:
     """Return sentences, without a full stop, on what the fitted scene cannot hold."""
-    parameters = found.solution.problem.parameters
+    parameters = result.solution.problem.parameters
     sentences = [
         f"{key} = {value:.6g} belongs to the measurement and is not part of the scene"
-        for key, value in found.values.items() if "." not in key
+        for key, value in result.values.items() if "." not in key
     ]  # fmt: skip
-    for each in found.estimates:
+    for each in result.estimates:
         if "." in each.key and (each.at_limit or not each.is_resolved):
             reason = "at a limit" if each.is_resolved else "not resolved"
             sentences.append(f"{each.key} is {reason}: its spread is its whole range")
     sentences += [f"{key} is tied and has no spread" for key in parameters.ties if "." in key]
     is_part = np.array(["." in key for key in parameters.keys])
-    correlations = np.nan_to_num(found.intervals.correlations)
+    correlations = np.nan_to_num(result.intervals.correlations)
     table = np.where(np.outer(is_part, is_part), correlations, 0.0)
     np.fill_diagonal(table, 0.0)
     if (largest := float(np.abs(table).max())) >= CORRELATED:

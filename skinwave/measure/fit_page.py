@@ -44,27 +44,27 @@ ABOUT_CORRELATIONS = (
 )
 
 
-def write(folder: Path, found: Fit) -> None:
+def write(folder: Path, result: Fit) -> None:
     """Write index.html, the fitted scene.toml, estimates.csv, fit.json, fit.npz and figures."""
-    text, data = fitted_scene(found), found.solution.problem.data
-    keys, correlations = found.solution.problem.parameters.keys, found.intervals.correlations
+    text, data = fitted_scene(result), result.solution.problem.data
+    keys, correlations = result.solution.problem.parameters.keys, result.intervals.correlations
     (folder / "scene.toml").write_text(text, encoding="utf-8")
-    (folder / "estimates.csv").write_bytes(estimate_table(found).to_csv())
-    content = json.dumps(summary(found), indent=1, allow_nan=False)
+    (folder / "estimates.csv").write_bytes(estimate_table(result).to_csv())
+    content = json.dumps(summary(result), indent=1, allow_nan=False)
     (folder / "fit.json").write_text(content, encoding="utf-8")
     np.savez(
         folder / "fit.npz", axis=data.axis, measured=data.values, error=data.error,
-        fitted=found.predicted, residual=found.solution.residual, places_m=found.measured.places,
+        fitted=result.predicted, residual=result.solution.residual, places_m=result.measured.places,
         correlations=correlations, keys=np.array(keys),
     )  # fmt: skip
-    about = ABOUT_RESIDUALS + ABOUT_LAGS * bool(len(found.intervals.whiteness.correlations))
+    about = ABOUT_RESIDUALS + ABOUT_LAGS * bool(len(result.intervals.whiteness.correlations))
     caption = ABOUT_WAVEFORMS if data.is_in_time else ABOUT_LINES
-    method, estimates = sentences(found)[:2], sentences(found)[2:]
+    method, estimates = sentences(result)[:2], sentences(result)[2:]
     parts: list[Part] = [
-        _interval_table(found), ABOUT_INTERVALS,
-        Picture(png(fitted_figure(found)), caption, "fitted"),
+        _interval_table(result), ABOUT_INTERVALS,
+        Picture(png(fitted_figure(result)), caption, "fitted"),
         Section("Residuals", [
-            _whiteness(found), Picture(png(residual_figure(found)), about, "residuals"),
+            _whiteness(result), Picture(png(residual_figure(result)), about, "residuals"),
         ]),
     ]  # fmt: skip
     if len(keys) > 1:
@@ -73,44 +73,44 @@ def write(folder: Path, found: Fit) -> None:
         parts.append(Section("Correlations", [ABOUT_CORRELATIONS, table]))
     parts.append(Details("The scene with the estimates", [preformatted(text)]))
     Report(
-        f"{found.target.scene.name} fitted to {found.measured.name or 'a measurement'}",
+        f"{result.target.scene.name} fitted to {result.measured.name or 'a measurement'}",
         verdict=[" ".join(text) for text in (estimates, method) if text], parts=parts,
-        efforts=[("", Effort(warnings=tuple(cautions(found))))],
+        efforts=[("", Effort(warnings=tuple(cautions(result))))],
     ).write(folder)  # fmt: skip
 
 
-def fitted_scene(found: Fit) -> str:
+def fitted_scene(result: Fit) -> str:
     """Return the scene file with estimates and spreads, and comments on what it cannot hold."""
-    return "".join(["# fitted\n", *(f"# {note}\n" for note in notes(found)), dumps(found.scene)])
+    return "".join(["# fitted\n", *(f"# {note}\n" for note in notes(result)), dumps(result.scene)])
 
 
-def _whiteness(found: Fit) -> str:
-    test = found.intervals.whiteness
+def _whiteness(result: Fit) -> str:
+    test = result.intervals.whiteness
     if not isfinite(test.p):
         return "The data are too few for a test of whiteness."
-    result = f"Test of Ljung and Box: p {probability(test.p)}"
+    text = f"Test of Ljung and Box: p {probability(test.p)}"
     if test.is_white:
-        return f"{result}; the residuals may be white."
-    return f"{result}; the residuals are not white, and the intervals are widened (White 1980)."
+        return f"{text}; the residuals may be white."
+    return f"{text}; the residuals are not white, and the intervals are widened (White 1980)."
 
 
-def estimate_table(found: Fit) -> Table:
+def estimate_table(result: Fit) -> Table:
     """Return the estimates with their intervals, nan for unresolved ones."""
-    free = found.solution.problem.parameters.free
+    free = result.solution.problem.parameters.free
     return Table((
         "parameter", "estimate", "low", "high", "resolved", "at_limit", "limit_low", "limit_high",
     ), (
         (each.key, each.value, each.low, each.high, each.is_resolved, each.at_limit, limits.low,
          limits.high)
-        for each, limits in zip(found.estimates, free, strict=True)
+        for each, limits in zip(result.estimates, free, strict=True)
     ), stored=8)  # fmt: skip
 
 
-def _interval_table(found: Fit) -> Table:
+def _interval_table(result: Fit) -> Table:
     """Return the same for the page, with intervals to two digits of their width."""
     rows = []
-    free = found.solution.problem.parameters.free
-    for each, limits in zip(found.estimates, free, strict=True):
+    free = result.solution.problem.parameters.free
+    for each, limits in zip(result.estimates, free, strict=True):
         value, interval = significant(each.value), "not resolved by the data"
         if each.is_resolved:
             value, low, high = rounded(each)
@@ -120,22 +120,22 @@ def _interval_table(found: Fit) -> Table:
     return Table(("parameter", "estimate", "95 % interval", "limits"), rows)
 
 
-def summary(found: Fit) -> dict[str, Any]:
+def summary(result: Fit) -> dict[str, Any]:
     """Return the fit for JSON."""
-    solution, data = found.solution, found.solution.problem.data
+    solution, data = result.solution, result.solution.problem.data
     keys = solution.problem.parameters.keys
     return {
-        "model": found.target.model,
+        "model": result.target.model,
         "kind": data.kind,
         "converged": solution.converged,
-        "values": found.values,
-        "estimates": json.loads(estimate_table(found).to_json()),
-        "unresolved": [list(keys) for keys in found.intervals.unresolved],
+        "values": result.values,
+        "estimates": json.loads(estimate_table(result).to_json()),
+        "unresolved": [list(keys) for keys in result.intervals.unresolved],
         "chi_squared": solution.cost,
         "degrees_of_freedom": solution.dof,
-        "misfit": found.misfit,
-        "whiteness_p": _finite(found.intervals.whiteness.p),
-        "widened": dict(zip(keys, found.intervals.widenings.tolist(), strict=True)),
+        "misfit": result.misfit,
+        "whiteness_p": _finite(result.intervals.whiteness.p),
+        "widened": dict(zip(keys, result.intervals.widenings.tolist(), strict=True)),
         "left_out": [
             {"line": line.name, "frequency_hz": line.frequency, "share": _finite(line.share)}
             for line in data.left_out
@@ -143,9 +143,9 @@ def summary(found: Fit) -> dict[str, Any]:
         "may_be_turned": solution.may_be_flipped,
         "starts": len(solution.starts),
         "starts_that_reached_it": solution.agreeing_starts,
-        "factorisations": found.target.reduced and found.target.reduced.effort.factorisations,
-        "sentences": sentences(found),
-        "warnings": cautions(found),
+        "factorisations": result.target.reduced and result.target.reduced.effort.factorisations,
+        "sentences": sentences(result),
+        "warnings": cautions(result),
     }  # fmt: skip
 
 
@@ -154,25 +154,25 @@ def _finite(value: float) -> float | None:
 
 
 @mpl.rc_context(REPORT.rc)
-def fitted_figure(found: Fit) -> Figure:
+def fitted_figure(result: Fit) -> Figure:
     """Return fitted and measured data at the places with the largest motion."""
-    data, count = found.solution.problem.data, len(found.measured.places)
+    data, count = result.solution.problem.data, len(result.measured.places)
     if data.is_in_time:
-        return _waveforms(found)
-    measured, fitted = (_amplitudes(x, count) for x in (data.values, found.predicted))
+        return _waveforms(result)
+    measured, fitted = (_amplitudes(x, count) for x in (data.values, result.predicted))
     at, error = _largest(measured), data.error[:, :count]
     differs = np.abs(measured - fitted) > NORMAL_95 * error
     return lines_figure(
-        dict(zip(data.lines, data.axis.tolist(), strict=True)), found.measured.places[at],
+        dict(zip(data.lines, data.axis.tolist(), strict=True)), result.measured.places[at],
         measured[:, at], error[:, at], {"fitted": fitted[:, at]}, {"fitted": differs[:, at]},
-        found.measured.record,
+        result.measured.record,
     )  # fmt: skip
 
 
-def _waveforms(found: Fit) -> Figure:
+def _waveforms(result: Fit) -> Figure:
     """Return the end of steady waveforms, or the start of waveforms from rest."""
-    data, record = found.solution.problem.data, found.measured.record
-    places, fitted = _largest(data.values), found.predicted
+    data, record = result.solution.problem.data, result.measured.record
+    places, fitted = _largest(data.values), result.predicted
     n = int(np.searchsorted(data.axis, data.axis[0] + DRAWN_TIME)) + 1
     part = slice(max(len(data.axis) - n, 0), None) if data.lines else slice(n)
     t = 1e3 * data.axis[part]
@@ -184,7 +184,7 @@ def _waveforms(found: Fit) -> Figure:
             (data.values - fitted, "measured minus fitted", RESIDUAL, 0.8),
         ):  # fmt: skip
             ax.plot(t, record.per_unit * values[part, p], color=colour, lw=width, label=name)
-        ax.set_title(found.measured.place_name(p), loc="left", fontsize="medium")
+        ax.set_title(result.measured.place_name(p), loc="left", fontsize="medium")
         ax.set_ylabel(record.shown)
         ax.grid(alpha=0.25)
     axes[-1].set_xlabel("time, ms")
@@ -204,12 +204,12 @@ def _largest(values: np.ndarray) -> np.ndarray:
 
 
 @mpl.rc_context(REPORT.rc)
-def residual_figure(found: Fit) -> Figure:
+def residual_figure(result: Fit) -> Figure:
     """Return weighted residuals along their axis, and their autocorrelation if it is known."""
-    data, solution = found.solution.problem.data, found.solution
+    data, solution = result.solution.problem.data, result.solution
     residual = solution.residual / np.sqrt(solution.scale)
     scale, label = (1e3, "time, ms") if data.is_in_time else (1.0, "frequency, Hz")
-    each, band = found.intervals.whiteness.correlations, 2 / np.sqrt(residual.size)
+    each, band = result.intervals.whiteness.correlations, 2 / np.sqrt(residual.size)
     figure = Figure(figsize=REPORT.size(10.5, 3.2), layout="constrained")
     widths = (2, 1)[: 1 + bool(len(each))]
     left, *others = figure.subplots(1, len(widths), width_ratios=widths, squeeze=False)[0]

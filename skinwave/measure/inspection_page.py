@@ -44,64 +44,67 @@ METHOD = (
 )
 
 
-def write(folder: Path, found: Inspection) -> None:
+def write(folder: Path, inspection: Inspection) -> None:
     """Write index.html, measured.png, found-lines.csv, measurement.npz and, unless large, .csv."""
-    measured = found.measured
+    measured = inspection.measured
     (folder / "measurement.npz").write_bytes(writing.to_npz(measured))
     if measured.values.size <= MOST_CELLS:
         (folder / "measurement.csv").write_bytes(writing.to_csv(measured))
-    (folder / "found-lines.csv").write_bytes(line_table(found).to_csv())
-    missing = [as_sentence(sentence) for sentence in found.missing] or ["Nothing."]
+    (folder / "found-lines.csv").write_bytes(line_table(inspection).to_csv())
+    missing = [as_sentence(sentence) for sentence in inspection.missing] or ["Nothing."]
     Report(
-        f"Inspection of {measured.name}", verdict=[" ".join(sentences(found))],
+        f"Inspection of {measured.name}", verdict=[" ".join(sentences(inspection))],
         parts=[
-            Picture(png(figure(found)), CAPTION, "measured"),
-            Section("Lines", [largest(found), METHOD] if found.lines else [NO_LINES]),
+            Picture(png(figure(inspection)), CAPTION, "measured"),
+            Section("Lines", [largest(inspection), METHOD] if inspection.lines else [NO_LINES]),
             Section("Missing or assumed", missing),
         ],
     ).write(folder)  # fmt: skip
 
 
-def line_table(found: Inspection) -> Table:
+def line_table(inspection: Inspection) -> Table:
     """Return the lines, a row for each line and place."""
-    record, places = found.measured.record, found.measured.places
+    record, places = inspection.measured.record, inspection.measured.places
     rows = (
         (line.frequency, line.error, int(p) + 1, *(1e3 * places[p]).tolist(),
          float(record.per_unit * line.amplitudes[k]), record.shown, line.false_alarm, origin)
-        for line, origin in zip(found.lines, found.origins, strict=True)
-        for k, p in enumerate(found.kept)
+        for line, origin in zip(inspection.lines, inspection.origins, strict=True)
+        for k, p in enumerate(inspection.kept)
     )  # fmt: skip
     return Table(COLUMNS, rows, stored=9)
 
 
-def largest(found: Inspection) -> Table:
+def largest(inspection: Inspection) -> Table:
     """Return the row of each line at the place where it is largest."""
-    rows, count = line_table(found).rows, len(found.kept)
-    best = [n * count + int(line.amplitudes.argmax()) for n, line in enumerate(found.lines)]
+    rows, count = line_table(inspection).rows, len(inspection.kept)
+    best = [n * count + int(line.amplitudes.argmax()) for n, line in enumerate(inspection.lines)]
     return Table(COLUMNS, [rows[k] for k in best])
 
 
-def sentences(found: Inspection) -> list[str]:
+def sentences(inspection: Inspection) -> list[str]:
     """Return sentences on content, noise, clipping and places where nothing varies."""
-    measured, where = found.measured, np.flatnonzero(found.clipped.sum(axis=0))
-    record, noise = measured.record, found.noise[np.isfinite(found.noise)]
-    lines = [_content(found), "The record is too short or too sparse for a noise floor and lines."]
+    measured, where = inspection.measured, np.flatnonzero(inspection.clipped.sum(axis=0))
+    record, noise = measured.record, inspection.noise[np.isfinite(inspection.noise)]
+    lines = [
+        _content(inspection),
+        "The record is too short or too sparse for a noise floor and lines.",
+    ]
     if len(noise):
         low, high = (record.per_unit * float(x) for x in (noise.min(), noise.max()))
         level = interval(low, high) if high > low else significant(low)
         unit = record.shown + "/√Hz" * (not measured.is_spectrum)
         lines[1] = f"Noise floor {level} {unit}, median over frequency without the lines."
     if len(where):
-        lines.append(f"Clipped: {int(found.clipped.sum()):,} samples in runs at the same extreme, "
-                     f"at {measured.place_names(where)}.")  # fmt: skip
-    if len(found.constant) and len(measured.axis) > 1:
-        lines.append(f"Nothing varies at {plural(len(found.constant), 'place')}: "
-                     f"{measured.place_names(found.constant)}.")  # fmt: skip
+        count = int(inspection.clipped.sum())
+        lines.append(f"Clipped: {count:,} samples at an extreme, at {measured.place_names(where)}.")
+    if len(inspection.constant) and len(measured.axis) > 1:
+        names = measured.place_names(inspection.constant)
+        lines.append(f"Nothing varies at {plural(len(inspection.constant), 'place')}: {names}.")
     return lines
 
 
-def _content(found: Inspection) -> str:
-    measured, axis = found.measured, found.measured.axis
+def _content(inspection: Inspection) -> str:
+    measured, axis = inspection.measured, inspection.measured.axis
     content = f"{measured.record.name.capitalize()} at {plural(len(measured.places), 'place')}, "
     content += plural(len(measured.values), "repetition")
     if measured.is_spectrum:
@@ -116,11 +119,11 @@ def _content(found: Inspection) -> str:
     )
 
 
-def text(found: Inspection) -> str:
+def text(inspection: Inspection) -> str:
     """Return the inspection for a terminal."""
-    lines = [f"{found.measured.source}: {_content(found)}", *sentences(found)[1:]]
-    if found.lines:
-        table = largest(found)
+    lines = [f"{inspection.measured.source}: {_content(inspection)}", *sentences(inspection)[1:]]
+    if inspection.lines:
+        table = largest(inspection)
         cells = [[column.title for column in table.columns]]
         for row in table.rows:
             pairs = zip(row, table.columns, strict=True)
@@ -128,14 +131,14 @@ def text(found: Inspection) -> str:
         widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
         padded = ("  ".join(map(str.ljust, row, widths)).rstrip() for row in cells)
         lines += ["", *padded, ""]
-    elif found.spectrum is not None:
+    elif inspection.spectrum is not None:
         lines.append(NO_LINES)
-    return "\n".join([*lines, *(f"note: {sentence}" for sentence in found.missing)])
+    return "\n".join([*lines, *(f"note: {sentence}" for sentence in inspection.missing)])
 
 
-def summary(found: Inspection) -> dict[str, Any]:
+def summary(inspection: Inspection) -> dict[str, Any]:
     """Return the inspection in SI, for JSON."""
-    measured = found.measured
+    measured = inspection.measured
     return {
         "name": measured.name, "source": measured.source, "quantity": measured.quantity,
         "unit": measured.record.unit, "repetitions": len(measured.values),
@@ -146,11 +149,11 @@ def summary(found: Inspection) -> dict[str, Any]:
             {"frequency_hz": line.frequency, "frequency_error_hz": line.error,
              "false_alarm": line.false_alarm, "what": origin,
              "amplitudes": line.amplitudes.tolist()}
-            for line, origin in zip(found.lines, found.origins, strict=True)
+            for line, origin in zip(inspection.lines, inspection.origins, strict=True)
         ],
-        "looked_at": (found.kept + 1).tolist(), "noise_floor": _known(found.noise),
-        "clipped_samples": found.clipped.tolist(),
-        "constant_places": (found.constant + 1).tolist(), "missing": list(found.missing),
+        "looked_at": (inspection.kept + 1).tolist(), "noise_floor": _known(inspection.noise),
+        "clipped_samples": inspection.clipped.tolist(),
+        "constant_places": (inspection.constant + 1).tolist(), "missing": list(inspection.missing),
     }  # fmt: skip
 
 
@@ -159,9 +162,9 @@ def _known(values: Any) -> list[float | None]:
 
 
 @mpl.rc_context(REPORT.rc)
-def figure(found: Inspection) -> Figure:
+def figure(inspection: Inspection) -> Figure:
     """Return waveforms, a map of their RMS, and spectra with lines and noise floor."""
-    measured = found.measured
+    measured = inspection.measured
     moving = measured.values
     if not measured.is_spectrum:
         moving = moving - moving.mean(axis=1, keepdims=True)
@@ -170,9 +173,9 @@ def figure(found: Inspection) -> Figure:
     panels = (not measured.is_spectrum) + has_map
     drawn = Figure(figsize=REPORT.size(11.0, 7.4 if panels else 4.2), layout="constrained")
     grid = drawn.add_gridspec(2 if panels else 1, 2 if panels == 2 else 1)
-    at = strongest(rms[found.kept], MOST_DRAWN)
+    at = strongest(rms[inspection.kept], MOST_DRAWN)
     if not measured.is_spectrum:
-        _waveforms(drawn.add_subplot(grid[0, 0]), found, at)
+        _waveforms(drawn.add_subplot(grid[0, 0]), inspection, at)
     if has_map:
         ax = drawn.add_subplot(grid[0, -1])
         x, y = 1e3 * measured.places.T
@@ -182,13 +185,13 @@ def figure(found: Inspection) -> Figure:
         drawn.colorbar(dots, ax=ax, label=name)
         ax.set_aspect("equal", adjustable="datalim")
         ax.set(xlabel="x, mm", ylabel="y, mm")
-    _spectra(drawn.add_subplot(grid[-1, :]), found, at)
+    _spectra(drawn.add_subplot(grid[-1, :]), inspection, at)
     return drawn
 
 
-def _waveforms(ax: Axes, found: Inspection, at: np.ndarray) -> None:
+def _waveforms(ax: Axes, inspection: Inspection, at: np.ndarray) -> None:
     """Draw the mean waveforms where they are largest, one above the other."""
-    measured, places = found.measured, found.kept[at]
+    measured, places = inspection.measured, inspection.kept[at]
     record, mean = measured.record, measured.mean - measured.mean.mean(axis=0)
     size = np.abs(mean[:, places]).max(axis=1, initial=0.0)
     count = int(np.searchsorted(measured.times - measured.times[0], DRAWN_TIME))
@@ -204,27 +207,27 @@ def _waveforms(ax: Axes, found: Inspection, at: np.ndarray) -> None:
     ax.grid(alpha=0.25)
 
 
-def _spectra(ax: Axes, found: Inspection, at: np.ndarray) -> None:
-    measured, spectrum = found.measured, found.spectrum
+def _spectra(ax: Axes, inspection: Inspection, at: np.ndarray) -> None:
+    measured, spectrum = inspection.measured, inspection.spectrum
     unit = measured.record.per_unit
-    if spectrum is None and not (measured.is_spectrum and len(found.kept)):
+    if spectrum is None and not (measured.is_spectrum and len(inspection.kept)):
         ax.text(0.5, 0.5, "too short for a spectrum", ha="center", transform=ax.transAxes)
         return
     if spectrum is None:
         f, marker = measured.frequencies, "o-"
-        size = unit * np.abs(measured.values[:, :, found.kept[at]]).mean(axis=0)
+        size = unit * np.abs(measured.values[:, :, inspection.kept[at]]).mean(axis=0)
     else:
         inner = slice(0 if measured.is_spectrum else LOWEST // 2, -1)
         f, marker = spectrum.frequencies[inner], "-"
         size = unit * np.sqrt(spectrum.density[inner][:, at])
         floor = unit * np.sqrt(np.median(spectrum.floor[inner][:, at], axis=1))
         ax.plot(f, floor, color=mpl.rcParams["text.color"], lw=1.4, ls="--", label="noise floor")
-        highest = max([line.frequency for line in found.lines], default=float(f[-1]))
+        highest = max([line.frequency for line in inspection.lines], default=float(f[-1]))
         ax.set_xlim(float(f[0]), min(2.0 * highest, float(f[-1])))
-    for k, p in enumerate(found.kept[at]):
+    for k, p in enumerate(inspection.kept[at]):
         ax.plot(f, size[:, k], marker, color=SERIES[k], lw=0.8, label=measured.place_name(int(p)))
     ax.set_yscale("log")
-    _mark_lines(ax, found, f, size.max(axis=1))
+    _mark_lines(ax, inspection, f, size.max(axis=1))
     per_root = "/√Hz" * (not measured.is_spectrum)
     name = f"{measured.record.name}, {measured.record.shown}{per_root}"
     ax.set(xlabel="frequency, Hz", ylabel=name)
@@ -232,12 +235,12 @@ def _spectra(ax: Axes, found: Inspection, at: np.ndarray) -> None:
     ax.grid(alpha=0.25)
 
 
-def _mark_lines(ax: Axes, found: Inspection, f: np.ndarray, level: np.ndarray) -> None:
+def _mark_lines(ax: Axes, inspection: Inspection, f: np.ndarray, level: np.ndarray) -> None:
     """Draw triangles above the lines, with the frequencies of the strongest."""
-    at = [int(np.searchsorted(f, line.frequency)) for line in found.lines]
+    at = [int(np.searchsorted(f, line.frequency)) for line in inspection.lines]
     tops = np.array([level[max(k - 2, 0) : k + 3].max(initial=0.0) for k in at])
     named = strongest(tops, MOST_NAMED)
-    for k, (line, origin) in enumerate(zip(found.lines, found.origins, strict=True)):
+    for k, (line, origin) in enumerate(zip(inspection.lines, inspection.origins, strict=True)):
         colour = "#888888" if origin.startswith("mains") else mpl.rcParams["text.color"]
         ax.plot(line.frequency, 1.5 * tops[k], "v", ms=5, color=colour)
         if k in named:
