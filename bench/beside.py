@@ -60,7 +60,7 @@ def waves() -> None:
     mesh, times = build(BODY, SIZE).mesh, np.arange(STEPS + 1) / RATE
     P, points = fem.load_operator(mesh), fem.facet_points(mesh)
     load = {
-        "held": np.isin(np.arange(len(mesh.points)), mesh.facets["bottom"]),
+        "fixed": np.isin(np.arange(len(mesh.points)), mesh.facets["bottom"]),
         "forces": csr_array(P @ scene.pressure(points, times).T),
         "probes": fem.probe_operator(mesh, PROBES),
     }
@@ -96,8 +96,8 @@ def fingertip() -> None:
         )
         tip = replace(problem(mesh), mu=mu, nu=nu, rho=rho)
         body, C = CODES["scikit-fem"][0](tip), CODES["scikit-fem"][0](replace(tip, mu=viscosity)).K
-        held = np.repeat(np.isin(np.arange(len(mesh.points)), mesh.facets["sides"]), 3)
-        free = np.flatnonzero(abs(body.to_nodes[np.flatnonzero(held)]).sum(axis=0) == 0)
+        is_fixed = np.repeat(np.isin(np.arange(len(mesh.points)), mesh.facets["sides"]), 3)
+        free = np.flatnonzero(abs(body.to_nodes[np.flatnonzero(is_fixed)]).sum(axis=0) == 0)
         force, w = body.to_nodes.T @ statics.fingertip_push(mesh), 2 * np.pi * statics.FREQUENCY
         motions = zip(statics.fingertip_motion(mesh, materials),
                       (body.K, body.K + 1j * w * C - w**2 * body.M), strict=True)  # fmt: skip
@@ -126,8 +126,8 @@ def stepped(name: str, given: Problem, load: dict[str, Any]) -> dict[str, Any]:
     """
     with threads(name):
         body, dt, lag = CODES[name][0](given), 1 / RATE, SKIN.viscosity / SKIN.shear_modulus
-        held = np.repeat(load["held"], 3)
-        free = abs(body.to_nodes[np.flatnonzero(held)]).sum(axis=0) == 0
+        is_fixed = np.repeat(load["fixed"], 3)
+        free = abs(body.to_nodes[np.flatnonzero(is_fixed)]).sum(axis=0) == 0
         forces, read = body.to_nodes.T @ load["forces"], load["probes"] @ body.to_nodes
         started = time.perf_counter()
         solve = body.factorise(dt / 2 * lag + dt**2 / 4, free)

@@ -13,7 +13,7 @@ Operators are assembled and factorised once. Index letters of all einsum in this
     d    derivative along an element edge, from corner 0 to another corner
     i j  components of displacement
     c    components of a symmetric tensor: xx, yy, zz, xy, xz, yz
-    k l  directions at rest, of which a membrane has two
+    k l  directions at rest: three in a solid, two in a membrane
     v w  linear pressure functions of a macroelement; in-plane strains xx, yy and 2 xy
     n    node, or degree of freedom
     p    probe, or point

@@ -46,8 +46,8 @@ def added_mass(
     free : (n_free,) int, free degrees of freedom
     density : density of the fluid, kg/m3
     axes : (2, 3) unit vectors along the sides of the rectangle
-    mirrored : axes ("x", "y", "xy") of which only the positive half is meshed. The motion of the
-        other half is its mirror image; the result is the added mass of the meshed part.
+    mirrored : "x", "y" or "xy" if only the positive half along these axes is meshed. The other
+        half moves as the mirror image; the result is the added mass of the meshed part.
     facets : name of a facet set, or nodes (e, a), of the sheet
 
     Returns

@@ -64,7 +64,7 @@ def factorise(A: sparse.csr_array, *, backend: str = "auto") -> Factor:
     A.sort_indices()
     _check_finite(A.data)
     complex_valued, only = np.iscomplexobj(A.data), [A]
-    del A  # PARDISO frees the matrix, of which it needs half
+    del A  # PARDISO frees the matrix after taking its upper half
     solve = (_pardiso if backend == "pardiso" else _superlu)(only.pop())
     return Factor(solve=solve if complex_valued else _real_and_imaginary(solve), backend=backend)
 

@@ -31,7 +31,7 @@ SPARSE = 0.1  # share of n^2 in the upper triangle; blocks of denser matrices ma
 BLOCKS = 80  # %: similarity of the patterns of rows that PARDISO orders as a block
 TWO_LEVELS, SINGLE, BY_BLOCKS, OUT_OF_CORE = 23, 27, 36, 59  # indices of its settings
 IN_CORE = 0.8  # of the free memory, at most, for a factor; vectors need the rest
-LEAST_CORE = 500  # MB of memory beside the files, without which it fails
+LEAST_CORE = 500  # MB of memory that it needs besides the files
 PHASES = {"analyse": 11, "factorise": 22, "solve": 33, "release": -1}
 
 

@@ -54,8 +54,8 @@ def block(bent=(0.0, 0.0)):
 
 
 def added(mesh, coat=THIN, soft=SOFT, fixed=None):
-    held = np.zeros(mesh.points.shape, bool) if fixed is None else fixed
-    return coat_operators(mesh, coat, *by_region(mesh, soft), fixed_dofs(mesh, held))
+    mask = np.zeros(mesh.points.shape, bool) if fixed is None else fixed
+    return coat_operators(mesh, coat, *by_region(mesh, soft), fixed_dofs(mesh, mask))
 
 
 def inside(mesh, margin=4.5e-3):
@@ -241,24 +241,24 @@ def quarter():
     """Quarter of a slab of 60 x 60 x 15 mm with elements of 3 mm, its operators, load, probes."""
     x = np.arange(0, 30.1, 3) * 1e-3
     mesh = meshes.extrude(x, x, np.arange(-15, 0.1, 3) * 1e-3)
-    held = np.zeros(mesh.points.shape, bool)
+    mask = np.zeros(mesh.points.shape, bool)
     for axis in (0, 1):
-        held[mesh.points[:, axis] < 1e-9, axis] = True
-        held[mesh.points[:, axis] > x[-1] - 1e-9] = True
-    held[mesh.points[:, 2] < -DEPTH + 1e-9] = True
+        mask[mesh.points[:, axis] < 1e-9, axis] = True
+        mask[mesh.points[:, axis] > x[-1] - 1e-9] = True
+    mask[mesh.points[:, 2] < -DEPTH + 1e-9] = True
     at = fem.facet_points(mesh)
     load = fem.load_operator(mesh) @ np.exp(-(at[:, :2] ** 2).sum(axis=1) / 2 / WIDTH**2)
     probes = fem.probe_operator(mesh, np.c_[RADII, 0 * RADII])
-    return mesh, held, fem.assemble(mesh, FOREARM, fixed=held), load, probes
+    return mesh, mask, fem.assemble(mesh, FOREARM, fixed=mask), load, probes
 
 
 @cache
 def response(hertz, coat=None):
     """Motion (p,) of the quarter slab under a focal spot of 1 Pa."""
-    mesh, held, plain, load, S = quarter()
+    mesh, mask, plain, load, S = quarter()
     if coat is None:
         return S @ fem.harmonic(plain, load, hertz)[0]
-    K, C, M, _ = added(mesh, coat, FOREARM, held)
+    K, C, M, _ = added(mesh, coat, FOREARM, mask)
     free = plain.free
     parts = {name: part[free][:, free] for name, part in zip("KCM", (K, C, M), strict=True)}
     coated = replace(plain, **{name: getattr(plain, name) + part for name, part in parts.items()})

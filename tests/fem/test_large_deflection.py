@@ -61,8 +61,8 @@ def test_motion_starts_from_rest():
 def test_small_deflection_matches_a_linear_plate():
     """Under very little pressure, by Ritz's modes of a thin plate, with the mean deflection."""
     lossy = from_young(density=800, young=8e8, poisson=0.3, viscosity=1.2e4)
-    held = Mounting(edges=("front",))
-    body = replace(PAPER, width=0.03, height=0.03, depth=2.5e-4, material=lossy, mounting=held)
+    mounting = Mounting(edges=("front",))
+    body = replace(PAPER, width=0.03, height=0.03, depth=2.5e-4, material=lossy, mounting=mounting)
     weak = MovingPressure(tacton=Tacton(am_frequency=60, duration=0.02), peak_pressure=1e-3)
     scene = Scene(pressure=weak, body=body, probes=((0.0, 0.0), (5e-3, 5e-3)))
     for quantity, bound in (("displacement", 0.03), ("acceleration", 0.04)):
