@@ -133,7 +133,7 @@ def interpolation(view: View, places: Floats) -> Callable[[Floats], Floats]:
     """Return the linear interpolation of values (s,) of a view's surface to places (..., 2)."""
     owner = view.finder(places[..., 0], places[..., 1])
     on = owner >= 0
-    nodes = view.triangles[owner[on]]
+    nodes = view.upward[owner[on]]
     corners = view.places[nodes]  # (q, 3, 2)
     edges = corners[:, 1:] - corners[:, :1]
     inside = (places[on] - corners[:, 0])[..., None]

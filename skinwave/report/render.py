@@ -30,7 +30,7 @@ CAMERAS = {
 }
 LARGEST_DRAWN = 0.06  # of the body's width, for the largest motion
 BAR = 10.0  # mm, length of the scale bar
-COLUMN = 112  # pixels, width of the colour bar
+COLUMN = 0.26  # width of the colour bar over the height of the picture
 WIDTH = 1600  # pixels, of a picture at least
 LIFT = 0.4  # mm, of path, probes and focus above the surface
 
@@ -65,7 +65,7 @@ def scale_text(view: View) -> str:
     if not factor:
         return "pressure, no motion"
     named = f"colour: {quantity(view.shade.quantity).words}; " if view.shade else ""
-    return f"{named}motion exaggerated {factor:,.0f} times, mean removed"
+    return f"{named}exaggerated {factor:,.0f} times, mean removed"
 
 
 def picture(
@@ -77,7 +77,7 @@ def picture(
     With `cut`, the half of each body that is nearer to the camera is left out.
     """
     width, height = style.panel
-    larger = max(1.0, (WIDTH - COLUMN) / (len(views) * width))
+    larger = max(1.0, WIDTH / (len(views) * width + COLUMN * height))
     panel = round(larger * width), round(larger * height)
     with stage(views, style, camera=camera, cut=cut, panel=panel) as show:
         return show(frame)
@@ -98,10 +98,11 @@ def stage(
 
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # warnings about displays
     width, height = panel or style.panel
-    share = [width / COLUMN] * len(views) + [1.0]
+    column = round(COLUMN * height)
+    share = [width / column] * len(views) + [1.0]
     plotter = pv.Plotter(
         off_screen=True, lighting="none", shape=(1, len(views) + 1), border=False,
-        col_weights=share, window_size=(width * len(views) + COLUMN, height),
+        col_weights=share, window_size=(width * len(views) + column, height),
     )  # fmt: skip
     try:
         plotter.set_background(style.paper)
@@ -276,7 +277,7 @@ def set_frame(panels: Sequence[Panel], frame: int, limit: float) -> None:
             values = view.shade.values[frame, np.searchsorted(view.shade.nodes, panel.nodes)]
             values = np.float32(quantity(view.shade.quantity).per_unit) * values
         panel.skin["motion"] = values
-        height = 1e3 * panel.factor * motion[view.surface, 2]
+        height = drawn[view.surface, 2]
         for mark, interpolate in panel.marks:
             raised = np.array(mark.points)
             raised[:, 2] = interpolate(height) + LIFT

@@ -105,16 +105,19 @@ class View:
         return -self.motion[:, self.surface, 2]
 
     @cached_property
-    def finder(self) -> Any:
-        """Function of x and y (...) in metre that returns the triangle there, or -1."""
-        from matplotlib.tri import Triangulation
-
-        x, y = self.places.T
-        corners = np.stack([x, y], axis=1)[self.triangles]
+    def upward(self) -> Ints:
+        """Triangles (k, 3) of the surface seen from above; some of a steep rim are not."""
+        corners = self.places[self.triangles]
         along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
         area = along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]
-        upward = area > 1e-6 * area.max()  # triangles of a steep rim may be seen from below
-        return Triangulation(x, y, self.triangles[upward]).get_trifinder()
+        return np.asarray(self.triangles[area > 1e-6 * area.max()])
+
+    @cached_property
+    def finder(self) -> Any:
+        """Function of x and y (...) in metre that returns the index in `upward`, or -1."""
+        from matplotlib.tri import Triangulation
+
+        return Triangulation(*self.places.T, self.upward).get_trifinder()
 
     @property
     def peak(self) -> float:
