@@ -22,6 +22,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
 from simple_model import MovingPressure, Tacton, Trajectory, pattern_period, published_load
+from simple_model.quantities import DISPLACEMENT
 from skinwave.commands.cli import main
 from skinwave.models.options import SolveOptions
 from skinwave.report import films, maps, render
@@ -116,6 +117,18 @@ def test_views_agree_with_probes(scene, moved):
     assert view.period == pytest.approx(0.01)
     assert np.ptp(drawn) > 1e-7
     np.testing.assert_allclose(drawn, sampled - response.displacement[-100:, 2].mean(), atol=3e-8)
+
+
+def test_interpolation_leaves_out_triangles_seen_edge_on():
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.5, 0, -1]], float)
+    view = views.View(
+        body="b", model="m", scene=None, quantity=DISPLACEMENT, points=points,
+        tets=np.zeros((0, 10), int), surface=np.arange(4), period=1.0,
+        triangles=np.array([[0, 3, 1], [0, 1, 2]]),
+        times=np.zeros(1), motion=np.zeros((1, 4, 3)), tone=0.0, speed=None,
+    )  # fmt: skip
+    found = maps.interpolation(view, np.array([[0.25, 0.25]]))(np.array([0.0, 1.0, 2.0, 9.0]))
+    assert found == pytest.approx([0.75])
 
 
 def test_the_kernel_is_strongest_on_the_path(seen):
