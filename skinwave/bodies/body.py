@@ -183,9 +183,7 @@ class Body:
 
     @property
     def strata(self) -> tuple[tuple[float, Material], ...]:
-        """Depth in metre at which each material begins; neighbours of the same material are
-        merged.
-        """
+        """Depth in metre at which each material begins; equal neighbours are merged."""
         strata: list[tuple[float, Material]] = []
         top = 0.0
         for thickness, material in [
@@ -199,64 +197,62 @@ class Body:
 
     @property
     def interfaces(self) -> list[float]:
-        """Depths in metre where its strata begin, and where the last one ends."""
+        """Depths in metre at which the strata begin, and at which the last one ends."""
         return [*(start for start, _ in self.strata), self.depth]
 
     @property
     def thicknesses(self) -> list[float]:
-        """Thickness in metre of each of its layers as they are given, and then of all of it."""
+        """Thickness in metre of each given layer, then of the whole body."""
         return [*(layer.thickness for layer in self.layers), self.depth]
 
     @property
     def solids(self) -> tuple[Material, ...]:
-        """All of its materials: of its strata, and of its regions."""
+        """Materials of the strata, then of the regions."""
         strata = (solid for _, solid in self.strata)
         return (*strata, *(solid_of(material) for _, material in self.regions))
 
     @property
     def softest(self) -> Material:
-        """The softest of its material and those of its regions, in which its waves are slowest."""
+        """Material with the slowest shear waves, of the lowest stratum and the regions."""
         inside = (solid_of(material) for _, material in self.regions)
         return min((self.solid, *inside), key=lambda solid: solid.shear_speed)
 
     @property
     def conditions(self) -> tuple[str, ...]:
-        """Conditions of its sides, one if they are alike."""
+        """Conditions of the sides, one if they are alike."""
         return (self.sides,) if isinstance(self.sides, str) else (*self.sides.by_name.values(),)
 
     def side(self, name: str) -> str:
-        """Condition of one side."""
+        """Return the condition of one side."""
         return self.sides if isinstance(self.sides, str) else getattr(self.sides, name)
 
     @property
     def symmetry(self) -> str:
-        """The axes, of "xy", across whose middle planes its supports are their own mirror image."""
+        """Axes, of "xy", across whose middle planes the supports are mirror images."""
         sides = "xy" if isinstance(self.sides, str) else self.sides.symmetry
         return "".join(axis for axis in sides if axis in self.mounting.symmetry)
 
     @property
     def is_held(self) -> bool:
-        """Whether it is constrained: at its base, or clamped at one of its sides."""
+        """Whether the body is constrained: at its base, or clamped at a side."""
         at_base = self.base in ("clamped", "elastic") or self.is_on_half_space
         return at_base or "clamped" in self.conditions
 
     @property
     def is_on_half_space(self) -> bool:
-        """Whether it is a slab whose base and sides all absorb, as part of a half-space."""
+        """Whether it is a slab whose base and sides all absorb, like part of a half-space."""
         return self.of_kind.is_layer and {self.base, *self.conditions} == {"absorbing"}
 
     @property
     def is_skin(self) -> bool:
-        """Whether its surface is skin: a plate is paper, and presets such as silicone are none. A
-        material of one's own counts as skin.
-        """
+        """Whether its surface is skin, that is, not a plate and not a preset such as silicone."""
         top = self.layers[0].material if self.layers else self.material
         others = [PRESETS[name] for name in NOT_SKIN]
         return self.is_solid and solid_of(top) not in others
 
     @property
     def is_solid(self) -> bool:
-        """Whether it is a solid with waves on its surface, which neither a plate nor "none" is."""
+        """Whether it is a solid with surface waves, so neither a plate nor "none"."""
         return self.of_kind.discretise is not None and not self.of_kind.is_plate
 
 

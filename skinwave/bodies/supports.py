@@ -49,7 +49,7 @@ class Sides:
 
     @property
     def symmetry(self) -> str:
-        """Axes, of "xy", across whose middle planes the sides are mirror images of each other."""
+        """Axes, of "xy", across whose middle planes the sides are mirror images."""
         return "x" * (self.left == self.right) + "y" * (self.front == self.back)
 
 
@@ -174,9 +174,7 @@ class Mounting:
 
     @property
     def symmetry(self) -> str:
-        """Axes, of "xy", across whose middle planes the supports are mirror images of each
-        other.
-        """
+        """Axes, of "xy", across whose middle planes the supports are mirror images."""
         return "".join(name for name, axis in (("x", 0), ("y", 1)) if self._is_mirrored(axis))
 
     def _is_mirrored(self, axis: int) -> bool:
