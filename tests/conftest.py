@@ -14,6 +14,7 @@ from in_browser import chromium
 from shares import dealt
 
 import meshes
+from meshes import subprocess_call
 from skinwave.verify import elements
 
 # The same examples every time, whatever the speed of the machine.
@@ -46,6 +47,12 @@ def fresh_cache(tmp_path_factory):
 def distorted_cube() -> meshes.TetMesh:
     """A unit cube of ten-node tetrahedra whose inner corners are shaken."""
     return elements.distorted_cube()
+
+
+@pytest.fixture
+def read_here(monkeypatch):
+    """Read mesh files in this process, which has imported the readers already."""
+    monkeypatch.setattr(subprocess_call, "call_reader", lambda read, path: read(path))
 
 
 @pytest.fixture

@@ -24,6 +24,7 @@ from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads
 from skinwave.scene.scene import Body, Layer, Placement, Relief
 
+pytestmark = pytest.mark.usefixtures("read_here")
 HAND = Path(__file__).parents[2] / "examples/hand/generic-hand-right.glb"
 PATH = Trajectory(shape="circle", size=0.02, speed=12.0)
 LOAD = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.25, trajectory=PATH))

@@ -21,6 +21,7 @@ from skinwave.planning.simulate import compute
 from skinwave.scene.file import dumps, loads
 from skinwave.scene.scene import Scene
 
+pytestmark = pytest.mark.usefixtures("read_here")
 FINGER = BODIES["fingertip"]
 SHAPE = meshes.Fingertip(
     breadth=0.016, length=0.025, thickness=0.013, bone_breadth=0.007, bone_thickness=0.004,

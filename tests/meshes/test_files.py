@@ -12,7 +12,7 @@ import pytest
 import pyvista
 
 import meshes
-from meshes import MeshError, TetMesh, subprocess_call
+from meshes import MeshError, TetMesh
 from meshes.files.mesh_files import read_contents
 from meshes.surface.repair import check
 from meshes.surface.triangulation import volume
@@ -20,13 +20,7 @@ from skinwave.commands.cli import main
 from skinwave.models.reduced import prepare
 from skinwave.scene.scene import Body
 
-
-@pytest.fixture(autouse=True)
-def read_here(monkeypatch):
-    """Files are read in this process, which has imported what reads them."""
-    monkeypatch.setattr(subprocess_call, "call_reader", lambda read, path: read(path))
-
-
+pytestmark = pytest.mark.usefixtures("read_here")
 HAND = Path(__file__).parents[2] / "examples/hand/generic-hand-right.glb"
 GMSH_EDGES = [(0, 1), (1, 2), (0, 2), (0, 3), (2, 3), (1, 3)]  # of gmsh's manual, 10-node tets
 

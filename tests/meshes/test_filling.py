@@ -9,7 +9,7 @@ from test_surfaces import BONE, OUTER, SPHERE, cube
 
 import fem
 import meshes
-from meshes import MeshError, Surface, TetMesh, subprocess_call
+from meshes import MeshError, Surface, TetMesh
 from meshes.surface.triangulation import volume
 from meshes.tetmesh import interface_facets
 from meshes.volume import tetrahedralise as tetra
@@ -119,11 +119,11 @@ def save(path, surface):
     meshio.write(path, meshio.Mesh(1e3 * surface.points, [("triangle", surface.triangles)]))
 
 
+@pytest.mark.usefixtures("read_here")
 def test_a_bone_inside_a_body_is_a_region_of_scenes(tmp_path, monkeypatch, capsys):
     """With a grid in place of the mesher, whose planes are the sides of the bone."""
     grid = meshes.block((0.020, 0.016, 0.012), 1e-3, order=1)
     monkeypatch.setattr(tetra, "_run", lambda inputs, timeout: (grid.points, grid.tets))
-    monkeypatch.setattr(subprocess_call, "call_reader", lambda read, path: read(path))
     monkeypatch.setenv("SKINWAVE_CACHE", "")
     save(tmp_path / "hand.stl", OUTER)
     save(tmp_path / "bone.stl", BONE)

@@ -18,6 +18,7 @@ from skinwave.results.motion import whole_motion
 from skinwave.results.surface import element_map
 from skinwave.results.views import body_view
 
+pytestmark = pytest.mark.usefixtures("read_here")
 BENT = {"palm": 10e-3, "fingertip": 3e-3, "silicone-disc": 8e-3}  # and element sizes in metre
 SIZE = 4e-3  # m, of the elements of a roof
 STILL = Tacton(am_frequency=140.0, duration=0.2, trajectory=Trajectory(shape="point"))
