@@ -99,9 +99,9 @@ def training_basis(ops: fem.Operators, forces: Floats, report: Any) -> np.ndarra
     squares, turn = np.linalg.eigh((motions.T @ motions).astype(np.float64))
     squares, turn = squares[::-1], turn[:, ::-1]
     missed = np.sqrt(np.maximum(np.cumsum(squares[::-1])[::-1], 0.0) / squares.sum())
-    kept = min(MOST, int((missed > NEGLIGIBLE).sum()))
-    basis = np.zeros((len(forces), kept), np.float32)
-    basis[ops.free] = motions @ (turn[:, :kept] / np.sqrt(squares[:kept])).astype(np.float32)
+    size = min(MOST, int((missed > NEGLIGIBLE).sum()))
+    basis = np.zeros((len(forces), size), np.float32)
+    basis[ops.free] = motions @ (turn[:, :size] / np.sqrt(squares[:size])).astype(np.float32)
     return basis
 
 

@@ -50,7 +50,7 @@ export function readAddress(starts) {
 
 /** Address of this page with values and view. */
 export function addressOf(values, starts, view) {
-  const shown = Object.entries(view).filter(([, value]) => value).map(([key, value]) => `${key}=${value}`);
-  const text = [toAddress(values, starts), ...shown].filter(Boolean).join("&");
+  const changes = Object.entries(view).filter(([, value]) => value).map(([key, value]) => `${key}=${value}`);
+  const text = [toAddress(values, starts), ...changes].filter(Boolean).join("&");
   return `${location.href.split("#")[0]}${text ? `#${text}` : ""}`;
 }

@@ -95,9 +95,9 @@ export function waveformPlot(answer, span, { pinned, measured, scale }) {
   const axes = { y: { label: "Pa", role: "kernel" }, y2: { label: quantity.unit, role: "waves" } };
   let below = 0.04; // share of the top; the same on both axes, so that their zeros are level
   for (const [name, axis] of Object.entries(axes)) {
-    const shown = curves.filter((curve) => curve.axis === name).flatMap((curve) => curve.y);
-    axis.top = scale(`waveform ${name} ${values.quantity}`, largestOf(shown));
-    below = Math.max(below, -shown.reduce((least, v) => Math.min(least, v), 0) / axis.top);
+    const drawn = curves.filter((curve) => curve.axis === name).flatMap((curve) => curve.y);
+    axis.top = scale(`waveform ${name} ${values.quantity}`, largestOf(drawn));
+    below = Math.max(below, -drawn.reduce((least, v) => Math.min(least, v), 0) / axis.top);
   }
   const low = scale("waveform below", below);
   for (const axis of Object.values(axes)) axis.range = [-axis.top * low, axis.top];
@@ -131,9 +131,9 @@ export function spectrumPlot(answer, { pinned, measured, highest, scale }) {
   const { kernel, waves, body, values: { quantity: name } } = answer, { unit, per, rate } = QUANTITIES[name];
   const mean = meanLevel(answer.load);
   const stems = (role, axis, title, f, amplitudes, offset, factor = mean) => {
-    const kept = Array.from(f.keys()).filter((k) => f[k] <= highest);
+    const visible = Array.from(f.keys()).filter((k) => f[k] <= highest);
     return { role, axis, name: title, stems: true, offset, head: axis === "y" ? "square" : "circle",
-      x: kept.map((k) => f[k]), y: kept.map((k) => factor * amplitudes[k]) };
+      x: visible.map((k) => f[k]), y: visible.map((k) => factor * amplitudes[k]) };
   };
   const wide = pinned ? 2 * STEM_SPACING : STEM_SPACING, moved = inQuantity(waves.f, answer.wavesAt, name);
   const own = stems("waves", "y2", pinned ? "B" : "waves", waves.f, moved, wide / 2);

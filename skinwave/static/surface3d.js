@@ -68,8 +68,8 @@ export function strongLines({ f, re, im }) {
     lines.push({ f: f[line], from: line * n, largest: Math.sqrt(largest) });
   }
   const most = Math.max(0, ...lines.map((line) => line.largest));
-  const kept = lines.filter((line) => line.largest > NEGLIGIBLE * most);
-  return { n, lines: kept, crest: CREST * Math.sqrt(Math.max(0, ...squares)) };
+  const strong = lines.filter((line) => line.largest > NEGLIGIBLE * most);
+  return { n, lines: strong, crest: CREST * Math.sqrt(Math.max(0, ...squares)) };
 }
 
 /** Write the sum of lines at a time in s into `out` (n,). */

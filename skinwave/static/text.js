@@ -3,10 +3,10 @@
 /** Return a number with some significant digits and a typeset minus. */
 export function rounded(value, digits = 3) {
   if (!Number.isFinite(value)) return "–";
-  const shown = Number(value.toPrecision(digits));
-  if (shown === 0) return "0";
-  const decimals = Math.max(0, Math.min(digits - 1 - Math.floor(Math.log10(Math.abs(shown))), 9));
-  return shown.toFixed(decimals).replace("-", "−");
+  const number = Number(value.toPrecision(digits));
+  if (number === 0) return "0";
+  const decimals = Math.max(0, Math.min(digits - 1 - Math.floor(Math.log10(Math.abs(number))), 9));
+  return number.toFixed(decimals).replace("-", "−");
 }
 
 /** Return a value in an SI unit with a prefix and three digits: 1.2e-6 m becomes "1.20 µm". */

@@ -157,9 +157,9 @@ export function fitPaths(values, moved) {
   if (!values.paths) return values;
   const own = parts(values.paths);
   if (moved === "paths") return { ...values, foci: own.length };
-  const kept = own.slice(0, values.foci), like = kept[kept.length - 1].split("/").slice(0, 2).join("/");
-  const more = CENTRES.slice(kept.length, values.foci).map(([x, y]) => `${like}/${x}/${y}`);
-  return { ...values, paths: [...kept, ...more].join(", ") };
+  const first = own.slice(0, values.foci), like = first[first.length - 1].split("/").slice(0, 2).join("/");
+  const more = CENTRES.slice(first.length, values.foci).map(([x, y]) => `${like}/${x}/${y}`);
+  return { ...values, paths: [...first, ...more].join(", ") };
 }
 
 const evenly = (n) => Array.from({ length: n }, (_, k) => k / n);
