@@ -117,7 +117,8 @@ class View:
         """Function of x and y (...) in metre that returns the index in `upward`, or -1."""
         from matplotlib.tri import Triangulation
 
-        return Triangulation(*self.places.T, self.upward).get_trifinder()
+        x, y = self.places.T
+        return Triangulation(x, y, self.upward).get_trifinder()
 
     @property
     def peak(self) -> float:
