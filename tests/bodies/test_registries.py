@@ -99,7 +99,7 @@ def test_a_new_kind_is_compared_and_swept_in_other_processes(disc):
 
 
 def test_a_new_model_runs(disc, capsys, static_deflection):
-    said = "the error of static-deflection is not estimated"
+    said = "static-deflection does not estimate its error"
     with pytest.warns(skinwave.SkinwaveWarning, match=said):
         found = skinwave.simulate(disc, "static-deflection")
     assert found.model == "static-deflection"
