@@ -46,7 +46,7 @@ def assembly() -> None:
     print(f"K and M of {len(large.cells):,} ten-node tetrahedra")
     print(f"{'code':<12}{'version':<12}{'s':>8}{'ratio':>7}{'energy J':>15}{'mass kg':>10}")
     first = None
-    for name, row in each_code(assembled, small, large):
+    for name, row in each_code(time_assembly, small, large):
         seconds, (energy, mass) = row["seconds"], row["check"]
         first = first or seconds
         print(f"{name:<12}{row['version']:<12}{seconds:8.2f}{seconds / first:7.1f}"
@@ -75,7 +75,7 @@ def waves() -> None:
           f"{'15':>9}{'ratio':>7}{'to ours':>9}")  # fmt: skip
     print(f"{'skinwave, reduced':<39}{one:9.1f}s{1:7.1f}{fifteen:8.1f}s{1:7.1f}")
     ours = None
-    for name, row in each_code(stepped, problem(mesh), load):
+    for name, row in each_code(time_steps, problem(mesh), load):
         once, second = row["seconds"] + row["factorise"], row["step"] * RATE
         ours = row["motion"] if ours is None else ours
         apart = np.linalg.norm(row["motion"] - ours) / np.linalg.norm(ours)
@@ -112,7 +112,7 @@ def fingertip() -> None:
             print(statics.fingertip_summary(mesh, other).tolist())
 
 
-def assembled(name: str, small: Problem, large: Problem) -> dict[str, Any]:
+def time_assembly(name: str, small: Problem, large: Problem) -> dict[str, Any]:
     """Return the seconds of a code after a warm-up, with strain energy and mass."""
     with threads(name):
         CODES[name][0](small)
@@ -120,7 +120,7 @@ def assembled(name: str, small: Problem, large: Problem) -> dict[str, Any]:
         return {"seconds": body.seconds, "check": body.check(large.nodes)}
 
 
-def stepped(name: str, given: Problem, load: dict[str, Any]) -> dict[str, Any]:
+def time_steps(name: str, given: Problem, load: dict[str, Any]) -> dict[str, Any]:
     """Return the seconds of assembly, factorisation and a step of average acceleration from rest,
     and the displacement (t, p) of the probes.
     """

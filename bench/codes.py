@@ -106,7 +106,7 @@ def scikit_fem(p: Problem) -> Assembled:
     for i in range(3):
         component[basis.nodal_dofs[i]] = component[basis.edge_dofs[i]] = i
     # Its example 19 steps in time with SciPy's splu.
-    return _scipy(seconds, K, M, 3 * _matched(basis.doflocs.T, p.nodes) + component, _superlu)
+    return _scipy(seconds, K, M, 3 * _match_nodes(basis.doflocs.T, p.nodes) + component, _superlu)
 
 
 def ngsolve(p: Problem) -> Assembled:
@@ -169,7 +169,7 @@ def _from_hierarchical(p: Problem, mesh: Any) -> sparse.csr_array:
 
     ends = np.array([[vertex.nr for vertex in edge.vertices] for edge in mesh.edges])
     middles = (p.points[ends[:, 0]] + p.points[ends[:, 1]]) / 2
-    node, corners, edges = _matched(middles, p.nodes), len(p.points), len(ends)
+    node, corners, edges = _match_nodes(middles, p.nodes), len(p.points), len(ends)
     bubble = ng.GridFunction(ng.H1(mesh, order=2))
     bubble.vec[corners] = 1
     height = bubble(mesh(*middles[0]))
@@ -215,19 +215,19 @@ def _scipy(
 
         return on_all
 
-    return Assembled(seconds, K, M, _renumbered(numbers), factorise)
+    return Assembled(seconds, K, M, _renumber(numbers), factorise)
 
 
 def _superlu(A: Any) -> Solve:
     return splu(A.tocsc()).solve
 
 
-def _renumbered(numbers: np.ndarray) -> sparse.csr_array:
+def _renumber(numbers: np.ndarray) -> sparse.csr_array:
     n = len(numbers)
     return sparse.csr_array((np.ones(n), (numbers, np.arange(n))), shape=(n, n))
 
 
-def _matched(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+def _match_nodes(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     """Return the number of the node at each point."""
     distance, number = cKDTree(nodes).query(points)
     if distance.max() > 1e-9:

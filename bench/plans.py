@@ -57,7 +57,7 @@ def stated_and_true(scene: Scene, tolerance: float, h: float | None = None) -> t
     return chosen.error, float(relative_changes(true - stated, true).max())
 
 
-def stated(number: int, seed: int) -> int:
+def check_stated_errors(number: int, seed: int) -> int:
     """Print a table of scenes with solid bodies, and return how many fail."""
     done = failed = 0
     print("scene, kind, layers, base and sides | tolerance | stated | true | true over stated")
@@ -188,4 +188,4 @@ if __name__ == "__main__":
     os.environ["SKINWAVE_CACHE"] = ""
     table_name, *numbers = sys.argv[1:]
     number, seed = (*map(int, numbers), *(SCENES, 0)[len(numbers) :])
-    {"stated": stated, "cost": cost}[table_name](number, seed)
+    {"stated": check_stated_errors, "cost": cost}[table_name](number, seed)

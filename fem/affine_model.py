@@ -66,10 +66,10 @@ def steady_lines(bases: Sequence[AffineModel], weights: Complex, shares: Floats)
 
 def operators_at(model: AffineModel, solids: Solids, shares: Floats) -> Operators:
     """Return the operators in the coordinates of a model, of materials without own modulus laws."""
-    return operators_of(interpolated(model, shares), solids)
+    return operators_of(interpolate(model, shares), solids)
 
 
-def interpolated(model: AffineModel, shares: Floats) -> AffineOperators:
+def interpolate(model: AffineModel, shares: Floats) -> AffineOperators:
     """Return affine operators in the coordinates of a model, for shares (g,) of the geometries."""
     r = model.parts.shape[-1]
     parts = np.tensordot(shares, model.parts, 1)

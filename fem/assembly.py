@@ -46,8 +46,8 @@ from fem.sparsity import (
     UPPER,
     SparsityPattern,
     in_each_direction,
-    restricted,
-    selected,
+    restrict,
+    select,
     slabs,
 )
 from fem.typing import Bools, Floats, Ints
@@ -125,7 +125,7 @@ class MovingNodes:
 
     def on_free(self, A: Any) -> sparse.csr_array:
         """Restrict a matrix on these nodes to the free degrees of freedom."""
-        return restricted(A, self.free)
+        return restrict(A, self.free)
 
     def of_elements(self, own: Bools | Ints) -> SparsityPattern:
         """Return the pattern with the slots of some elements only."""
@@ -197,14 +197,14 @@ def assemble(
     stiffness, mass = _volume(mesh, nodes, materials, region, axes, stiffener)
     extra = R = sparse.csr_array((len(free), len(free)))  # added to K, and to C
     if support is not None and support.stiffness.any():
-        extra = extra + restricted(springs(mesh, support), free)
+        extra = extra + restrict(springs(mesh, support), free)
     if tension is not None:
         extra = extra + nodes.on_free(tension_stiffness(mesh, nodes.pattern, tension, axes))
     if absorbing is not None:
-        R = R + restricted(dashpots(mesh, facet_set(mesh, absorbing), given, region), free)
+        R = R + restrict(dashpots(mesh, facet_set(mesh, absorbing), given, region), free)
     if support is not None and support.absorbed.any():
         of_support = dashpots(mesh, support.facets, given, region, support.absorbed)
-        R = R + restricted(of_support, free)
+        R = R + restrict(of_support, free)
     if drag is not None:
         R = R + _drag(mesh, nodes, property_of(materials, "density")[region] * drag)
     K, C, M, branches, combined = viscoelastic(
@@ -213,8 +213,8 @@ def assemble(
     )  # fmt: skip
     if coat is not None:
         of_coat = coat_operators(mesh, coat, materials, region, fixed_dofs(mesh, fixed))
-        thin = [restricted(A, free) for A in of_coat[:3]]
-        relaxing = tuple(replace(b, K=restricted(b.K, free)) for b in of_coat[3])
+        thin = [restrict(A, free) for A in of_coat[:3]]
+        relaxing = tuple(replace(b, K=restrict(b.K, free)) for b in of_coat[3])
         K, C, M, branches = add_matrices((K, C, M, branches), (*thin, relaxing))
     return Operators(
         K=K,
@@ -242,7 +242,7 @@ def _volume(
     extra: dict[int, Any] = {}
     for m in np.flatnonzero(lam > direct).tolist():
         D = (lam - direct)[m] ** 0.5 * projected_divergence(elements_of(mesh, region == m))
-        D = selected(D, np.arange(D.shape[0] // 4), nodes.nodes)
+        D = select(D, np.arange(D.shape[0] // 4), nodes.nodes)
         extra[m] = (D.T @ D).T  # symmetric; the transpose is sorted, as sums need
     for m, added in directional_parts(materials).items():
         own = region == m
@@ -250,7 +250,7 @@ def _volume(
         extra[m] = extra.get(m, 0) + part
     if stiffener is not None:
         blocks = sparse.bsr_array(stiffener, blocksize=(3, 3))
-        extra[0] = extra.get(0, 0) + selected(blocks, nodes.nodes, nodes.nodes)
+        extra[0] = extra.get(0, 0) + select(blocks, nodes.nodes, nodes.nodes)
 
     def stiffness(share: Floats) -> sparse.csr_array:
         blocks = element_stiffness(mesh, (share * mu)[region], (share * direct)[region])

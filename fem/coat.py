@@ -196,7 +196,7 @@ def coat_stiffness(surface: Surface, coat: Coat, mu: Floats, lam: Floats) -> spa
         K = weight * membrane_stiffness(points, mu[layer], lam[layer])
         KT = z * K @ T
         local += K + KT + KT.swapaxes(1, 2) + z * T.swapaxes(1, 2) @ KT
-    within = _summed(local, surface.facets, len(surface.nodes))
+    within = _sum_elements(local, surface.facets, len(surface.nodes))
     return (within + _edge_stiffness(surface, coat, mu, lam)).tocsr()
 
 
@@ -280,7 +280,7 @@ def coat_mass(surface: Surface, coat: Coat, density: Floats) -> sparse.csr_array
         normals = facet_areas(surface.points + z * surface.normals)[1]
         area = weight * density[layer][:, None] * np.linalg.norm(normals, axis=2)
         local += np.einsum("eq,qa,qb->eab", area, N, N, optimize=True)
-    return _summed(np.einsum("eab,ij->eaibj", local, np.eye(3)), facets, len(surface.nodes))
+    return _sum_elements(np.einsum("eab,ij->eaibj", local, np.eye(3)), facets, len(surface.nodes))
 
 
 def coat_operators(
@@ -322,7 +322,7 @@ def _on_mesh(surface: Surface, operator: sparse.csr_array, n_dofs: int) -> spars
     return from_entries(part.data, dofs[part.row], dofs[part.col], (n_dofs, n_dofs))
 
 
-def _summed(local: Floats, facets: Ints, n: int) -> sparse.csr_array:
+def _sum_elements(local: Floats, facets: Ints, n: int) -> sparse.csr_array:
     """Return the sum (3 n, 3 n) of matrices (e, a, i, b, j) of facets (e, a) among n nodes."""
     dofs = dofs_of(facets).reshape(len(facets), -1)
     local = local.reshape(*dofs.shape, dofs.shape[1])

@@ -25,7 +25,7 @@ from fem.energy import Elastic, Relaxing
 from fem.geometry import gradients, shape_nodes
 from fem.maxwell import MaxwellBranch, relaxation_of
 from fem.plane_stiffness import SIDES, Tension, directional_parts, tension_stiffness
-from fem.sparsity import UPPER, SparsityPattern, from_entries, restricted, slabs
+from fem.sparsity import UPPER, SparsityPattern, from_entries, restrict, slabs
 from fem.typing import Floats, Ints
 from meshes import MeshError, TetMesh
 from simple_model.layers.material import Material
@@ -114,7 +114,7 @@ def finite_strain(
     free, operators, relaxing = linear.free, linear, Elastic.linear(linear).relaxing
     T = sparse.csr_array((len(free), len(free)))
     if tension is not None:
-        T = restricted(tension_stiffness(mesh, parts[0].pattern, tension, SIDES), free)
+        T = restrict(tension_stiffness(mesh, parts[0].pattern, tension, SIDES), free)
 
     def spread(u: Floats) -> Floats:
         return operators.expand(u).reshape(n, 3)
@@ -125,7 +125,7 @@ def finite_strain(
     if membrane is not None:
         part, (lag, times, shares) = membrane_part(mesh, membrane), losses(membrane.material)
         parts.append(part)
-        K = restricted(tangent(part, np.zeros((n, 3))), free)
+        K = restrict(tangent(part, np.zeros((n, 3))), free)
         branches = (
             MaxwellBranch(K=share * K, time=time)
             for share, time in zip(shares.tolist(), times.tolist(), strict=True)
@@ -140,7 +140,7 @@ def finite_strain(
             force=lambda u, d: stress_force(part, spread(u), np.tensordot(shares, d, 1)).ravel()[
                 free
             ],
-            tangent=lambda u, x: shares @ x * restricted(tangent(part, spread(u)), free),
+            tangent=lambda u, x: shares @ x * restrict(tangent(part, spread(u)), free),
             energy=lambda d: shares * np.array([strain_energy(part, e) for e in d]),
         )
         relaxing = (*relaxing, stretched) if len(times) else relaxing
@@ -153,7 +153,7 @@ def finite_strain(
         internal=lambda u: sum(
             (internal_force(part, spread(u)).ravel()[free] for part in parts), start=T @ u
         ),
-        tangent=lambda u: sum((restricted(tangent(part, spread(u)), free) for part in parts), T),
+        tangent=lambda u: sum((restrict(tangent(part, spread(u)), free) for part in parts), T),
         viscous=viscous,
         energy=lambda u: sum(
             (strain_energy(part, deformation(part, spread(u))[1]) for part in parts),

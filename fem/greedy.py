@@ -25,7 +25,7 @@ from fem.affine import AffineOperators, Solids, line_solution, operators_of, pro
 from fem.affine_model import (
     WEAK_LINE_RATIO,
     AffineModel,
-    interpolated,
+    interpolate,
     line_errors,
     steady_outputs,
     steady_states,
@@ -111,8 +111,8 @@ def reduce_affine(
             progress=lambda x: progress((step + x) / (step + 2)),  # noqa: B023
         )  # fmt: skip
         smaller = basis.shape[1] or int(NESTED * reduced.basis.shape[1])
-        basis = _joined(basis, reduced.basis[full.affine.free], M)
-        model = _projected(geometries, basis, parts)
+        basis = _join(basis, reduced.basis[full.affine.free], M)
+        model = _project(geometries, basis, parts)
         parts = model.parts
         others = [t for t, each in enumerate(training) if t not in visited or each.is_between]
         errors = {}
@@ -135,7 +135,7 @@ def reduce_affine(
     )
 
 
-def _projected(
+def _project(
     geometries: Sequence[Callable[[], Geometry]], basis: Floats, before: Floats
 ) -> AffineModel:
     """Return the model of a basis (n_free, m), given the matrices of its first vectors."""
@@ -203,7 +203,7 @@ def _outputs(
 
 def _fluid_share(model: AffineModel, variant: Variant, x: Complex) -> float:
     """Return the added mass of a fluid over the body's own mass in a state (m,) of the model."""
-    small = interpolated(model, variant.shares)
+    small = interpolate(model, variant.shares)
     own = operators_of(small.in_vacuum(), variant.solids).M
     return float(np.vdot(x, small.fluid @ x).real / np.vdot(x, own @ x).real)
 
@@ -214,7 +214,7 @@ def _mass(affine: AffineOperators, solids: Solids) -> LinearOperator:
     return own if affine.fluid is None else own + affine.fluid
 
 
-def _joined(basis: Floats, more: Floats, M: LinearOperator) -> Floats:
+def _join(basis: Floats, more: Floats, M: LinearOperator) -> Floats:
     """Extend a mass-orthonormal basis (n, m) by the new directions of vectors (n, k)."""
     if not basis.shape[1]:
         return more
@@ -265,7 +265,7 @@ def line_bases(
             return tuple(bases), max(errors[-IN_A_ROW:])
         progress(min(0.9, len(errors) / EXPECTED_STATES))
         for k in np.flatnonzero(by_line > SETTLED * tolerance).tolist():
-            bases[k] = _extended(bases[k], exact[k], model, k)
+            bases[k] = _extend(bases[k], exact[k], model, k)
         now = np.stack(
             [_outputs_of_all(b, weights[:, k], shares) for k, b in enumerate(bases)], axis=1
         )
@@ -288,7 +288,7 @@ def _outputs_of_all(line: AffineModel, weights: Complex, shares: Floats) -> Comp
     return np.asarray(np.einsum("tg,tgp->tp", shares, each))
 
 
-def _extended(basis: AffineModel, state: Complex, model: AffineModel, line: int) -> AffineModel:
+def _extend(basis: AffineModel, state: Complex, model: AffineModel, line: int) -> AffineModel:
     """Return the basis of a line with a further state (r,) of the model, if it is independent."""
     W, new = basis.basis, state / np.linalg.norm(state)
     for _ in range(2):

@@ -124,7 +124,7 @@ def reduce(
     space = KrylovBasis(operators, laws, independent.shape[1] * (MOST_MOMENTS + 1))
     rows = start_vectors if loads is None else np.hstack([start_vectors, loads[free]])
     growing = _moments(space, operators, laws, point, factor, independent)
-    moments, size, estimate = _converged(
+    moments, size, estimate = _iterate(
         space, rows, start_vectors.shape[1], band, tolerance, growing, report
     )
 
@@ -211,7 +211,7 @@ class KrylovBasis:
         """Return nodal forces M z + sum_j rest_j r_j (n, k) for coordinates z, r_j (size, k)."""
         acting = [(self._M, of_mass)]
         acting += [(A, r) for A, r in zip(self._rests, of_rests, strict=True) if A is not None]
-        fields = _combined(self.basis, np.hstack([r for _, r in acting]))  # reads the basis once
+        fields = _combine(self.basis, np.hstack([r for _, r in acting]))  # reads the basis once
         each = np.split(fields, len(acting), axis=1)
         return sum(A @ field for (A, _), field in zip(acting, each, strict=True))
 
@@ -223,12 +223,12 @@ class KrylovBasis:
         product = M @ block
         scale = _norms(block, product)
         first = _inner(Q, product)
-        block = block - _combined(Q, first)
+        block = block - _combine(Q, first)
         # Once is not enough: after 90 moments vectors would be orthogonal to 1e-3 only.
         product = M @ block
         second = _inner(Q, product)
         gram = block.T @ product - second.T @ second
-        block -= _combined(Q, second)
+        block -= _combine(Q, second)
         size = np.sqrt(np.maximum(np.diag(gram), 0.0))
         # A space that spans all dofs of a body has no new direction.
         inverse = np.divide(1, size, out=np.zeros_like(size), where=size > ROUND_OFF * scale)
@@ -245,7 +245,7 @@ class KrylovBasis:
     def _reorthonormalised(self, block: Floats, upright: Floats) -> Floats:
         """Orthonormalise similar directions again, because scaling amplifies round-off."""
         new = block @ upright
-        block -= _combined(self.basis, self.basis.T @ (self._M @ new)) @ np.linalg.pinv(upright)
+        block -= _combine(self.basis, self.basis.T @ (self._M @ new)) @ np.linalg.pinv(upright)
         new = block @ upright
         return upright @ np.linalg.inv(np.linalg.cholesky(new.T @ (self._M @ new))).T
 
@@ -253,14 +253,14 @@ class KrylovBasis:
         """Project the matrices, probes and loads (n, k) onto the vectors added since."""
         Q, new = self._columns[:, :size], self._columns[:, len(self._small_K) : size]
         self._rows = np.vstack([self._rows.reshape(-1, rows.shape[1]), new.T @ rows])
-        self._small_K = _bordered(self._small_K, _products(self._K, Q, new))
+        self._small_K = _border(self._small_K, _products(self._K, Q, new))
         self._small_rests = [
-            None if rest is None else _bordered(small, _products(rest, Q, new))
+            None if rest is None else _border(small, _products(rest, Q, new))
             for rest, small in zip(self._rests, self._small_rests, strict=True)
         ]
 
 
-def _converged(
+def _iterate(
     space: KrylovBasis,
     rows: Floats,
     probes: int,
@@ -336,22 +336,22 @@ def _moments(
     latest = np.stack([upper, np.zeros_like(upper), *relaxed])
     for moment in range(1, MOST_MOMENTS + 1):
         yield moment, space.size
-        earlier, latest = _orthonormalised(earlier, latest)
+        earlier, latest = _orthonormalise(earlier, latest)
         y, y_before, *y_relaxed = latest
         stretches = [lag * part for lag, part in zip(lags, y_relaxed, strict=True)]
         direct, of_mass, of_rests = laws.without_stiffness(
             factors, [y, *stretches], 2 * point * y + scale * y_before
         )
         upper = -space.extend(factor.solve(space.forces(of_mass, of_rests)))
-        upper -= _padded(direct, len(upper))
-        lower, _, *before = (_padded(part, len(upper)) for part in latest)
+        upper -= _pad(direct, len(upper))
+        lower, _, *before = (_pad(part, len(upper)) for part in latest)
         relaxed = [
             (1 - point * lag) * upper - lag * part for lag, part in zip(lags, before, strict=True)
         ]
         latest = np.stack([upper, lower / scale, *relaxed])
 
 
-def _combined(basis: Floats, coordinates: Floats) -> Floats:
+def _combine(basis: Floats, coordinates: Floats) -> Floats:
     """Return vectors (n, k) of coordinates (size, k), column by column like the basis for speed."""
     return np.matmul(
         basis, coordinates, out=np.empty((len(basis), coordinates.shape[1]), order="F")
@@ -371,11 +371,11 @@ def _norms(block: Floats, product: Floats) -> Floats:
     return np.maximum(np.sqrt(np.einsum("nm,nm->m", block, product)), SMALLEST)
 
 
-def _padded(coordinates: Floats, size: int) -> Floats:
+def _pad(coordinates: Floats, size: int) -> Floats:
     return np.vstack([coordinates, np.zeros((size - len(coordinates), coordinates.shape[1]))])
 
 
-def _orthonormalised(earlier: Floats, latest: Floats) -> tuple[Floats, Floats]:
+def _orthonormalise(earlier: Floats, latest: Floats) -> tuple[Floats, Floats]:
     """Orthonormalise the latest vectors to earlier ones (parts, size, k). Return all, and them."""
     parts, size, width = latest.shape
     padded = np.zeros((parts, size, earlier.shape[2]))
@@ -395,7 +395,7 @@ def _products(A: Any, basis: Floats, vectors: Floats) -> Floats:
     return np.hstack(columns) if columns else np.empty((basis.shape[1], 0))
 
 
-def _bordered(small: Floats, columns: Floats) -> Floats:
+def _border(small: Floats, columns: Floats) -> Floats:
     """Border a symmetric matrix by its last columns (r, k) and rows."""
     r, k = columns.shape
     whole = np.empty((r, r))

@@ -35,7 +35,7 @@ from fem.finite_strain import (
 from fem.linear_solver import factorise
 from fem.maxwell import maxwell_only
 from fem.sheet_reading import SheetReading, modal_slopes
-from fem.sparsity import restricted
+from fem.sparsity import restrict
 from fem.static import modes
 from fem.typing import Bools, Floats, Ints
 from meshes import TetMesh
@@ -91,10 +91,10 @@ def stretching_modes(
             progress(k / len(states))
     modal = Operators(
         K=sparse.diags_array((2 * np.pi * hz) ** 2).tocsr(),
-        C=sparse.csr_array(_projected(operators.C, shapes[operators.free])),
+        C=sparse.csr_array(_project(operators.C, shapes[operators.free])),
         M=sparse.eye_array(n).tocsr(), R=sparse.csr_array((n, n)), free=np.arange(n), n_dofs=n,
         branches=tuple(
-            replace(branch, K=sparse.csr_array(_projected(branch.K, shapes[operators.free])))
+            replace(branch, K=sparse.csr_array(_project(branch.K, shapes[operators.free])))
             for branch in operators.branches
         ),
     )  # fmt: skip
@@ -108,12 +108,12 @@ def _with_added(
     operators: Operators, added: LinearOperator, hz: Floats, shapes: Floats
 ) -> tuple[Floats, Floats]:
     """Return the modes with an added mass, by the Rayleigh-Ritz method."""
-    mass = np.eye(len(hz)) + _projected(added, shapes[operators.free])
+    mass = np.eye(len(hz)) + _project(added, shapes[operators.free])
     squares, turn = linalg.eigh(np.diag((2 * np.pi * hz) ** 2), mass)
     return np.sqrt(squares) / (2 * np.pi), shapes @ turn
 
 
-def _projected(A: Any, shapes: Floats) -> Floats:
+def _project(A: Any, shapes: Floats) -> Floats:
     return np.asarray(shapes.T @ (A @ shapes))
 
 
@@ -228,7 +228,7 @@ class _Plane:
         horizontal = np.zeros((n, 3), bool)
         horizontal[np.unique(part.nodes), :2] = True
         moving = np.flatnonzero(horizontal.ravel() & ~fixed)
-        K = restricted(tangent(part, np.zeros((n, 3))), moving)
+        K = restrict(tangent(part, np.zeros((n, 3))), moving)
         return _Plane(part=part, moving=moving, solve=factorise(K, backend=solver).solve)
 
     def incompatible(self, e: Floats) -> Floats:

@@ -48,7 +48,7 @@ def sheet_reading(mesh: TetMesh, membrane: Membrane, points: ArrayLike) -> Sheet
     """
     points = np.atleast_2d(np.asarray(points, np.float64))
     part = membrane_part(mesh, membrane)
-    owner, inner = _located(mesh.points[:, :2], part.nodes, points)
+    owner, inner = _locate(mesh.points[:, :2], part.nodes, points)
     N = shape_functions(inner, part.nodes.shape[1])
     rows, shape = np.arange(len(points))[:, None], (len(points), len(mesh.points))
     value = from_entries(N, rows, part.nodes[owner], shape)
@@ -139,7 +139,7 @@ def _by_point(blocks: list[list[sparse.csr_array]]) -> sparse.csr_array:
     return whole[by_point][:, by_node].tocsr()
 
 
-def _located(places: Floats, triangles: Ints, points: Floats) -> tuple[Ints, Floats]:
+def _locate(places: Floats, triangles: Ints, points: Floats) -> tuple[Ints, Floats]:
     """Return the triangle (p,) of each point, and its barycentric coordinates (p, 3)."""
     corners = places[triangles[:, :3]]
     owner, inner = np.empty(len(points), np.int64), np.empty((len(points), 3))

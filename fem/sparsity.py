@@ -107,12 +107,12 @@ def dofs_of(nodes: NDArray[np.integer[Any]]) -> Index:
     return np.asarray(3 * nodes[..., None] + np.arange(3), np.int32)
 
 
-def restricted(A: Any, free: Ints) -> sparse.csr_array:
+def restrict(A: Any, free: Ints) -> sparse.csr_array:
     """Return the free rows and columns of a matrix, in ascending order."""
-    return selected(A.tocsr(), free, free)
+    return select(A.tocsr(), free, free)
 
 
-def selected(A: Any, rows: Ints, columns: Ints) -> Any:
+def select(A: Any, rows: Ints, columns: Ints) -> Any:
     """Return ascending rows (r,) and columns (c,), for BSR matrices in blocks."""
     shape = np.array(A.shape) // getattr(A, "blocksize", 1)
     if (len(rows), len(columns)) == tuple(shape):

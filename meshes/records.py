@@ -10,7 +10,7 @@ import numpy as np
 PACKAGES = ("fem", "meshes", "simple_model", "skinwave")  # whose dataclasses are read
 
 
-def encoded(value: Any, arrays: dict[str, np.ndarray]) -> Any:
+def encode(value: Any, arrays: dict[str, np.ndarray]) -> Any:
     """Return a structure for JSON, and add the arrays in a value to `arrays`; raise a TypeError for
     other values, such as functions.
     """
@@ -21,11 +21,11 @@ def encoded(value: Any, arrays: dict[str, np.ndarray]) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
         kind = type(value)
         content = {each.name: getattr(value, each.name) for each in fields(value) if each.init}
-        return {"record": f"{kind.__module__}:{kind.__qualname__}", **encoded(content, arrays)}
+        return {"record": f"{kind.__module__}:{kind.__qualname__}", **encode(content, arrays)}
     if isinstance(value, dict):
-        return {"items": [[encoded(each, arrays) for each in item] for item in value.items()]}
+        return {"items": [[encode(each, arrays) for each in item] for item in value.items()]}
     if isinstance(value, tuple | list):
-        return {type(value).__name__: [encoded(each, arrays) for each in value]}
+        return {type(value).__name__: [encode(each, arrays) for each in value]}
     if isinstance(value, complex):
         return {"complex": [value.real, value.imag]}
     if value is None or isinstance(value, bool | int | float | str):
@@ -33,20 +33,20 @@ def encoded(value: Any, arrays: dict[str, np.ndarray]) -> Any:
     raise TypeError(f"a {type(value).__name__} cannot be stored in a record")
 
 
-def decoded(value: Any, arrays: Mapping[str, np.ndarray]) -> Any:
-    """Return the value of a structure of `encoded`; raise a ValueError for unknown dataclasses."""
+def decode(value: Any, arrays: Mapping[str, np.ndarray]) -> Any:
+    """Return the value of a structure of `encode`; raise a ValueError for unknown dataclasses."""
     if not isinstance(value, dict):
         return value
     if "array" in value:
         array = arrays[value["array"]]
         return array if array.ndim else array[()]
     if "items" in value:
-        content = {decoded(k, arrays): decoded(v, arrays) for k, v in value["items"]}
+        content = {decode(k, arrays): decode(v, arrays) for k, v in value["items"]}
         return _kind(value["record"])(**content) if "record" in value else content
     if "complex" in value:
         return complex(*value["complex"])
     ((kind, items),) = value.items()
-    return {"tuple": tuple, "list": list}[kind](decoded(each, arrays) for each in items)
+    return {"tuple": tuple, "list": list}[kind](decode(each, arrays) for each in items)
 
 
 def _kind(name: str) -> type:

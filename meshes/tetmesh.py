@@ -69,7 +69,7 @@ class TetMesh:
         points = np.array(self.points, np.float64)
         tets = whole_numbers("tets", self.tets)
         _check(points, tets)
-        tets = _oriented(points, tets)
+        tets = _orient(points, tets)
         region = whole_numbers("region", self.region)
         region = region if region.size else np.zeros(len(tets), np.int64)
         if region.shape != (len(tets),) or region.min() < 0:
@@ -285,7 +285,7 @@ def check_node_numbers(what: str, nodes: Ints, points: Floats) -> None:
         raise MeshError(f"{what} run from {nodes.min()} to {nodes.max()} for {len(points)} points")
 
 
-def _oriented(points: Floats, tets: Ints) -> Ints:
+def _orient(points: Floats, tets: Ints) -> Ints:
     volume = corner_volumes(points, tets)
     corners = points[tets[:, EDGES]]
     longest = np.linalg.norm(corners[:, :, 1] - corners[:, :, 0], axis=2).max(axis=1)

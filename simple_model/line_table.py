@@ -140,16 +140,16 @@ def resolved_lines(
     named = line_names(pressure, candidates=candidates)
     named = named.some(named.frequencies < highest)
     f = named.frequencies
-    known = are_resolved(response, f, strengths=_floored(named))
+    known = are_resolved(response, f, strengths=_strengths_above_zero(named))
     lost = ~known & ~_near(f, f[known], resolution(response))
-    return _named(named, known), _named(named, lost)
+    return _name_lines(named, known), _name_lines(named, lost)
 
 
-def _named(named: LineNames, chosen: Bools) -> dict[str, float]:
+def _name_lines(named: LineNames, chosen: Bools) -> dict[str, float]:
     return {named.names[k]: float(named.frequencies[k]) for k in np.flatnonzero(chosen)}
 
 
-def _floored(named: LineNames) -> Floats:
+def _strengths_above_zero(named: LineNames) -> Floats:
     """Strengths (f,) in Pa, above 0 for candidates too."""
     return np.maximum(named.strengths, FITTED * named.strengths.max(initial=1e-300))
 
@@ -168,7 +168,7 @@ class _Fit:
 
 def _fit(named: LineNames, response: Response) -> _Fit:
     f, least = named.frequencies, resolution(response)
-    strengths = _floored(named)
+    strengths = _strengths_above_zero(named)
     fitted = np.zeros(len(f), bool)
     for k in np.argsort(-strengths, kind="stable"):
         fitted[k] = f[k] >= least and not _near(f[k : k + 1], f[fitted], least)[0]
@@ -262,17 +262,17 @@ def _table(named: LineNames, fit: _Fit, peaks: list[Unnamed], response: Response
     mixed &= f >= LOBE * bin_width
     alone = [x for x in peaks
              if not _near(np.array([x.frequency]), f[lost], LOBE * bin_width)[0]]  # fmt: skip
-    unnamed = [*_mixed(response, f[mixed]), *alone]
+    unnamed = [*_unresolved(response, f[mixed]), *alone]
     unnamed.sort(key=lambda peak: -float((peak.amplitudes / loudest).max()))
     return LineTable(
-        frequencies=_named(named, listed),
+        frequencies=_name_lines(named, listed),
         amplitudes={named.names[k]: fit.amplitudes[k] for k in np.flatnonzero(listed)},
-        unresolved=_named(named, lost),
+        unresolved=_name_lines(named, lost),
         unnamed=tuple(unnamed[:MOST_PEAKS]),
     )
 
 
-def _mixed(response: Response, frequencies: Floats) -> list[Unnamed]:
+def _unresolved(response: Response, frequencies: Floats) -> list[Unnamed]:
     """Unresolved lines, as they appear together in the spectrum of the response."""
     if not len(frequencies):
         return []

@@ -23,7 +23,7 @@ from simple_model.layers.tensors import (
     energy_root,
     hooke,
     largest_shear,
-    squared,
+    sum_of_squares,
     von_mises,
 )
 from simple_model.numbers import significant
@@ -113,7 +113,7 @@ def quantity(name: str) -> Quantity:
     return QUANTITIES[choose("quantity", name, QUANTITIES)]
 
 
-def _chosen(rows: Rows, component: int) -> Rows:
+def _choose(rows: Rows, component: int) -> Rows:
     return lambda material: rows(material)[[component]]
 
 
@@ -150,7 +150,7 @@ for _k, _axis in enumerate("xyz"):
         Quantity(
             name=f"displacement_{_axis}", symbol=f"u_{_axis}", words=f"displacement along {_axis}",
             unit="m", shown="µm", per_unit=1e6, column=f"displacement_{_axis}_um", field=VECTOR,
-            rows=_chosen(_identity(3), _k),
+            rows=_choose(_identity(3), _k),
         )
     )  # fmt: skip
 for _k, _pair in enumerate(COMPONENTS):
@@ -158,14 +158,14 @@ for _k, _pair in enumerate(COMPONENTS):
         Quantity(
             name=f"strain_{_pair}", symbol=rf"\varepsilon_{{{_pair}}}",
             words=f"strain {_pair}", unit="1", shown="µm/m", per_unit=1e6,
-            column=f"strain_{_pair}_um_m", field=STRAIN, rows=_chosen(_identity(6), _k),
+            column=f"strain_{_pair}_um_m", field=STRAIN, rows=_choose(_identity(6), _k),
         )
     )  # fmt: skip
     register(
         Quantity(
             name=f"stress_{_pair}", symbol=rf"\sigma_{{{_pair}}}",
             words=f"stress {_pair}", unit="Pa", shown="Pa", column=f"stress_{_pair}_pa",
-            field=STRAIN, rows=_chosen(hooke, _k), relaxes=True,
+            field=STRAIN, rows=_choose(hooke, _k), relaxes=True,
         )
     )  # fmt: skip
 register(
@@ -186,6 +186,6 @@ register(
     Quantity(
         name="energy_density", symbol="W", words="elastic strain energy density at the moduli at "
         "rest", unit="J/m3", shown="mJ/m³", per_unit=1e3, column="energy_density_mj_m3",
-        field=STRAIN, rows=energy_root, invariant=squared,
+        field=STRAIN, rows=energy_root, invariant=sum_of_squares,
     )
 )  # fmt: skip

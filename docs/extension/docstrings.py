@@ -20,7 +20,7 @@ def _plain(line: str) -> str:
     return MARKUP.sub(lambda m: m.group(1) or "\\" + m.group(0), line)
 
 
-def rewritten(lines: list[str]) -> list[str]:
+def rewrite(lines: list[str]) -> list[str]:
     """Return the lines of a docstring for napoleon."""
     out: list[str] = []
     in_sections = literal = False
@@ -42,7 +42,7 @@ def rewritten(lines: list[str]) -> list[str]:
 
 def process(app: "Sphinx", what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
     """Rewrite a docstring in place."""
-    lines[:] = rewritten(lines)
+    lines[:] = rewrite(lines)
     if what == "property":  # napoleon reads its first line as "type: meaning"
         lines.insert(0, "")
 

@@ -147,7 +147,7 @@ def _default(key: Any, records: list[type]) -> str:
     return ""
 
 
-def shipped() -> str:
+def shipped_scenes() -> str:
     """Return the scene files of examples/."""
     files = sorted((ROOT / "examples").glob("*.toml"))
     return "\n".join(f"## {f.name}\n\n```toml\n{f.read_text('utf-8')}```\n" for f in files)
@@ -315,7 +315,7 @@ def _page(name: str, folder: str) -> str:
 PAGES: Mapping[str, Callable[[], str]] = {
     "commands": commands,
     "scene-keys": scene_keys,
-    "scenes-shipped": shipped,
+    "scenes-shipped": shipped_scenes,
     "models": models,
     "bodies": bodies,
     "materials": materials,
@@ -336,7 +336,7 @@ def read(app: "Sphinx", page: str, source: list[str]) -> None:
         source[0] = with_site_links(source[0], folder, folder)
 
 
-def outdated(app: "Sphinx", env: Any, *changes: set[str]) -> list[str]:
+def pages_to_read(app: "Sphinx", env: Any, *changes: set[str]) -> list[str]:
     """Return the pages with generated text, which every build reads again."""
     pages = [page for page in env.found_docs if env.doc2path(page).suffix == ".md"]
     return [page for page in pages if MARK.search(env.doc2path(page).read_text("utf-8"))]
@@ -345,5 +345,5 @@ def outdated(app: "Sphinx", env: Any, *changes: set[str]) -> list[str]:
 def setup(app: "Sphinx") -> dict[str, bool]:
     """Register the reader."""
     app.connect("source-read", read)
-    app.connect("env-get-outdated", outdated)
+    app.connect("env-get-outdated", pages_to_read)
     return {"parallel_read_safe": True}

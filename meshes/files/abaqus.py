@@ -72,7 +72,7 @@ def read_abaqus(path: Path) -> Any:
             except (ValueError, IndexError):
                 raise MeshError(f"{path}: wrong numbers below *{keyword}; {AGAIN}") from None
     placed = [(loose, []), *instances] if instances else [(p, []) for p in (loose, *parts.values())]
-    return _joined(path, [(part, rows) for part, rows in placed if part.elements])
+    return _join_parts(path, [(part, rows) for part, rows in placed if part.elements])
 
 
 def _lines(path: Path, level: int = 0) -> Iterator[str]:
@@ -156,7 +156,7 @@ def _add(part: _Part, keyword: str, options: dict[str, str], rows: Rows) -> None
         part.sections.append(options.get("ELSET", "").upper())
 
 
-def _joined(path: Path, placed: list[tuple[_Part, Rows]]) -> Any:
+def _join_parts(path: Path, placed: list[tuple[_Part, Rows]]) -> Any:
     """All parts, in their places, as one mesh."""
     import meshio
 
@@ -170,7 +170,7 @@ def _joined(path: Path, placed: list[tuple[_Part, Rows]]) -> Any:
     for part, rows in placed:
         number = {node: first + i for i, node in enumerate(part.nodes)}
         first += len(number)
-        points.append(_moved(path, np.array(list(part.nodes.values())).reshape(-1, 3), rows))
+        points.append(_move(path, np.array(list(part.nodes.values())).reshape(-1, 3), rows))
         region = _regions(part, names, notes)
         for element, (kind, nodes) in part.elements.items():
             name = _kind(kind, len(nodes))
@@ -236,7 +236,7 @@ def _is_partition(part: _Part, sets: dict[str, set[int]], titles: list[str]) -> 
     return len(members) == len(part.elements) and set(members) == set(part.elements)
 
 
-def _moved(path: Path, points: Floats, rows: Rows) -> Floats:
+def _move(path: Path, points: Floats, rows: Rows) -> Floats:
     """Points after the translation and the rotation (axis and degrees) of an instance."""
     from scipy.spatial.transform import Rotation
 

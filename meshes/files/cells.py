@@ -83,7 +83,7 @@ def contents(path: Path, raw: Any) -> Contents:
     points[:, : raw.points.shape[1]] = raw.points
     if solid:
         return _tetrahedra(path, raw, points, solid, notes)
-    fans = [_fan(_joined(raw.cells, kind), PLANE[kind])[0] for kind in PLANE if kind in counts]
+    fans = [_fan(_join(raw.cells, kind), PLANE[kind])[0] for kind in PLANE if kind in counts]
     return Contents(points=points, triangles=np.vstack(fans), notes=notes)
 
 
@@ -91,7 +91,7 @@ def _tetrahedra(
     path: Path, raw: Any, points: Floats, solid: list[str], notes: list[str]
 ) -> Contents:
     """Tetrahedra and used nodes, each once, with their regions and facet sets."""
-    used = np.unique(np.concatenate([_joined(raw.cells, kind).ravel() for kind in solid]))
+    used = np.unique(np.concatenate([_join(raw.cells, kind).ravel() for kind in solid]))
     if bad := int((~np.isfinite(points[used])).any(axis=1).sum()):
         raise MeshError(f"{path} has {bad:,} nodes whose coordinates are not finite; correct them")
     merged = np.arange(len(points))
@@ -101,7 +101,7 @@ def _tetrahedra(
     names = {abs(number): name for number, name in raw.info["names"].items()}
     parts: list[tuple[Ints, Ints]] = []
     for kind in solid:
-        nodes, (own, titles) = merged[_joined(raw.cells, kind)], _regions(raw, kind)
+        nodes, (own, titles) = merged[_join(raw.cells, kind)], _regions(raw, kind)
         names |= titles
         if kind == "tetra10":
             nodes = nodes[:, _node_order(path, points, nodes)]
@@ -183,7 +183,7 @@ def _split(path: Path, points: Floats, nodes: Ints, kind: str) -> tuple[Ints, In
     return parts[solid], cell[solid]
 
 
-def _joined(cells: Any, kind: str) -> Ints:
+def _join(cells: Any, kind: str) -> Ints:
     """Nodes (e, a) of all blocks of a kind."""
     return np.vstack(
         [np.asarray(block.data).astype(np.int64) for block in cells if block.type == kind]
@@ -254,7 +254,7 @@ def _facet_sets(raw: Any, new: Ints, tets: Ints, notes: list[str]) -> dict[str, 
     sets: dict[str, list[Ints]] = {title: [] for title in (*titles, *groups)}
     lost = 0
     for kind in [kind for kind in PLANE if any(block.type == kind for block in raw.cells)]:
-        facets, is_face, cell = _faces_of(new[_joined(raw.cells, kind)], PLANE[kind], tets, width)
+        facets, is_face, cell = _faces_of(new[_join(raw.cells, kind)], PLANE[kind], tets, width)
         lost += int((~is_face).sum())
         marked = {title: _values(raw, name, kind) == 1 for title, name in titles.items()}
         if "gmsh:physical" in raw.cell_data:

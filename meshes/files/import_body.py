@@ -13,7 +13,7 @@ from meshes.files.mesh_files import UNITS, Contents, mesh_of, read_contents, sca
 from meshes.reading import PathLike
 from meshes.shapes.structured import Grading
 from meshes.surface.alignment import (
-    aligned,
+    align,
     clipped,
     cut_to_box,
     on_planes,
@@ -97,7 +97,7 @@ def body_from_file(
         return _with_summary(_with_sides(_on_top(mesh, say)), say)
     surface = _sound_surface(contents, scale, up, say, keep_largest=keep_largest, cap=cap)
     bones = _inner_surfaces(inner, surface, unit=unit, up=up, say=say)
-    surface, shift = aligned(surface)
+    surface, shift = align(surface)
     bones = {name: replace(bone, points=bone.points + shift) for name, bone in bones.items()}
     say(f"moved by {in_mm(shift)}, so that the middle of the palm is the origin")
     planes = []

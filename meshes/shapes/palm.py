@@ -126,13 +126,13 @@ def _box_distance(palm: Palm, points: Floats) -> LevelSet:
     half = np.array([palm.breadth, palm.length]) / 2
     middle = points + [0, 0, palm.thickness / 2]
     sign = np.where(middle < 0, -1.0, 1.0)
-    outline, across = _rounded(np.abs(middle[:, :2]) - half, palm.corner_radius)
+    outline, across = _corner_distance(np.abs(middle[:, :2]) - half, palm.corner_radius)
     upward = np.abs(middle[:, 2]) - palm.thickness / 2
-    value, share = _rounded(np.column_stack([outline, upward]), palm.edge_radius)
+    value, share = _corner_distance(np.column_stack([outline, upward]), palm.edge_radius)
     return value, sign * np.column_stack([share[:, :1] * across, share[:, 1]])
 
 
-def _rounded(beyond: Floats, radius: float) -> LevelSet:
+def _corner_distance(beyond: Floats, radius: float) -> LevelSet:
     """Distance (n,) from a corner of a radius, for points beyond its two sides by (n, 2)."""
     inner = beyond + radius
     outside = np.maximum(inner, 0)

@@ -82,7 +82,7 @@ def sheet(
     <TetMesh: 1,071 nodes, 480 tetrahedra of 10 nodes, 1 regions; facets back, ...>
     """
     x, y = (
-        with_planes(_even(size, h), wanted)
+        with_planes(_cells(size, h), wanted)
         for size, wanted in zip((width, height), planes, strict=True)
     )
     lines = x, y, np.linspace(-thickness, 0.0, layers + 1)
@@ -116,7 +116,7 @@ def block(
     """
     x_length, y_length, depth = lengths
     if grading is None:
-        lines = _even(x_length, h), _even(y_length, h), _even(depth, h, least=1) - depth / 2
+        lines = _cells(x_length, h), _cells(y_length, h), _cells(depth, h, least=1) - depth / 2
     else:
         lines = (
             mirrored(graded_axis(x_length / 2, h, grading)),
@@ -320,7 +320,7 @@ def _sides(points: Floats, facets: Ints) -> dict[str, Ints]:
     return sets
 
 
-def _even(length: float, h: float, *, least: int = 2) -> Floats:
+def _cells(length: float, h: float, *, least: int = 2) -> Floats:
     """Equal cells no larger than h about the origin, in multiples of `least`."""
     _check_lengths(length, h)
     check_size((length / h, 1, 1))

@@ -29,7 +29,7 @@ def rotation_to_z(up: str) -> Floats:
     return np.array(ROTATIONS[up], np.float64)
 
 
-def aligned(surface: Surface) -> tuple[Surface, Floats]:
+def align(surface: Surface) -> tuple[Surface, Floats]:
     """Return the surface with its top above the widest circle at the origin, and its shift (3,),
     metre.
     """
@@ -42,7 +42,7 @@ def shift_to_origin(surface: Surface) -> Floats:
     """Return the shift (3,) in metre that brings the top of a surface to the origin.
 
     It is 0 if the origin already lies on the top, at least 3 mm or half the radius of the widest
-    circle inside the outline; otherwise it is that of `aligned`.
+    circle inside the outline; otherwise it is that of `align`.
     """
     x, y, radius = widest_circle(surface)
     low, cell, depth = _outline(surface)

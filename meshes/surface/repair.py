@@ -119,7 +119,7 @@ def repaired(
         notes.append(f"kept the largest of {n} pieces, {share:.1f} % of the area")
     if cap:
         surface = _with_caps(surface, notes)
-    inverted = _inverted(surface)
+    inverted = _inward_triangles(surface)
     if inverted.any():
         notes.append(f"reversed {inverted.sum():,} of {len(inverted):,} triangles to face outwards")
         order = np.where(inverted[:, None], [[0, 2, 1]], [[0, 1, 2]])
@@ -199,7 +199,7 @@ def _paired_edges(surface: Surface) -> Ints:
     return np.argsort(keys, kind="stable").reshape(-1, 2)
 
 
-def _inverted(surface: Surface) -> np.ndarray:
+def _inward_triangles(surface: Surface) -> np.ndarray:
     """Mask (k,) of the triangles to reverse so that every piece faces outwards."""
     pairs, n = _paired_edges(surface), len(surface.triangles)
     t, other = pairs.T // 3

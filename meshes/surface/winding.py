@@ -38,7 +38,7 @@ def _solid_angles(corners: Floats, points: Floats) -> Floats:
     )
 
 
-def joined(surfaces: list[Surface]) -> Surface:
+def join(surfaces: list[Surface]) -> Surface:
     """Return one surface with the triangles of several."""
     first = np.cumsum([0, *(len(each.points) for each in surfaces)])
     triangles = [each.triangles + n for each, n in zip(surfaces, first, strict=False)]
@@ -55,7 +55,7 @@ def check_inside(outer: Surface, inner: Mapping[str, Surface]) -> None:
         except MeshError as error:
             raise MeshError(f"{name}: {error}") from None
     surfaces = {"the body": outer, **inner}
-    whole = joined(list(surfaces.values()))
+    whole = join(list(surfaces.values()))
     owner = np.repeat(np.arange(len(surfaces)), [len(s.triangles) for s in surfaces.values()])
     pairs = self_intersections(whole)
     if len(pairs):

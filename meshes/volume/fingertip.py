@@ -118,7 +118,7 @@ def fingertip_mesh(shape: Fingertip, h: float) -> TetMesh:
         own = (_shell_of(lattice)[edges] == shell).all(axis=0) & ~outline
         middles = lattice[edges[:, own]].mean(axis=0)
         curved[mesh.tets[:, 4:][own]] = _map_lattice(shape, middles, (bone, shells), layers)
-    return _tagged(shape, replace(mesh, points=_reduce_curvature(mesh, curved)))
+    return _tag_facets(shape, replace(mesh, points=_reduce_curvature(mesh, curved)))
 
 
 def _reduce_curvature(mesh: TetMesh, curved: Floats) -> Floats:
@@ -132,7 +132,7 @@ def _reduce_curvature(mesh: TetMesh, curved: Floats) -> Floats:
     return keep_jacobians(mesh.tets, mesh.points, mesh.points + share * change)[0]
 
 
-def _tagged(shape: Fingertip, mesh: TetMesh) -> TetMesh:
+def _tag_facets(shape: Fingertip, mesh: TetMesh) -> TetMesh:
     """The mesh with its facet sets, chosen by the position and direction of facets."""
     facets = boundary_facets(mesh.tets)
     centroids, normals = geometry(mesh, facets)

@@ -47,7 +47,7 @@ def mapped_palm(palm: Palm, x: Floats, y: Floats, z: Floats) -> TetMesh:
     cells = (len(x) - 1, len(y) - 1, len(z) - 1)
     tets = kuhn_tets(cells)
     box = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1)
-    points = _onto_level_set(palm, _wrapped(palm, box)).reshape(-1, 3)
+    points = _onto_level_set(palm, _wrap(palm, box)).reshape(-1, 3)
     inverted = corner_volumes(points, tets).min() <= 0
     sharpest = 0.0 if inverted else float(angles_between_faces(points, tets).min())
     off = np.abs(level_set(palm, points[_on_boundary(cells).ravel()])).max()
@@ -89,7 +89,7 @@ def kuhn_tets(cells: tuple[int, int, int]) -> Ints:
     return np.vstack(tets)
 
 
-def _wrapped(palm: Palm, box: Floats) -> Floats:
+def _wrap(palm: Palm, box: Floats) -> Floats:
     """Points (..., 3) of the box mapped to a palm without mounds, bent to its cup."""
     half = np.array([palm.breadth, palm.length]) / 2
     across, middle = palm.thickness / 2, box[..., 2] + palm.thickness / 2
@@ -97,16 +97,16 @@ def _wrapped(palm: Palm, box: Floats) -> Floats:
     level = np.abs(box[..., :2] / half).max(axis=-1)
     width = min(half.min(), RIM * across)
     beyond = width - (1 - level) * half.min()  # the inner edge of the rim
-    inner, height = _rounded(np.maximum(beyond, 0), middle, (width, across), palm.edge_radius)
+    inner, height = _round_corners(np.maximum(beyond, 0), middle, (width, across), palm.edge_radius)
     in_rim = beyond > 0
     moved = np.where(in_rim, 1 - (width - inner) / half.min(), level)
     height = np.where(in_rim, height, middle)
     plan = box[..., :2] * (moved / np.maximum(level, 1e-300))[..., None]
-    plan = np.stack(_rounded(plan[..., 0], plan[..., 1], half, palm.corner_radius), axis=-1)
+    plan = np.stack(_round_corners(plan[..., 0], plan[..., 1], half, palm.corner_radius), axis=-1)
     return np.concatenate([plan, (height - across + rise(palm, plan))[..., None]], axis=-1)
 
 
-def _rounded(
+def _round_corners(
     x: Floats, y: Floats, half: tuple[float, float] | Floats, radius: float
 ) -> tuple[Floats, Floats]:
     """Points of a rectangle mapped to one with round corners. In each concentric rectangle of

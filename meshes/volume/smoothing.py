@@ -23,7 +23,7 @@ DIRECTIONS = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)]) - 1.0
 GOOD = 25.0  # degrees: least angles below it may not shrink, and others not fall below it
 
 
-def smoothed(mesh: TetMesh, sizing: Sizing | None = None) -> TetMesh:
+def smooth(mesh: TetMesh, sizing: Sizing | None = None) -> TetMesh:
     """Return a four-node mesh with its inner nodes moved, so that no least angle below 25 degrees
     shrinks.
 

@@ -20,11 +20,11 @@ from meshes.facets import tag_boundary
 from meshes.shapes.structured import Grading, extrude
 from meshes.surface.repair import check, repaired
 from meshes.surface.triangulation import Surface, area, n_pieces, thinnest, volume
-from meshes.surface.winding import joined, winding_number
+from meshes.surface.winding import join, winding_number
 from meshes.tetmesh import MeshError, TetMesh, boundary_facets, corner_volumes
 from meshes.typing import Floats
 from meshes.volume.quality import dihedral_angles
-from meshes.volume.smoothing import Sizing, smoothed
+from meshes.volume.smoothing import Sizing, smooth
 
 log = logging.getLogger(__name__)
 
@@ -78,7 +78,7 @@ def tetrahedralise(
     if not 0 < timeout < np.inf:
         raise MeshError(f"timeout = {timeout} s must be finite and above 0")
     grid = _size_grid(surface, h, sizing)
-    whole = joined([surface, *inner.values()])
+    whole = join([surface, *inner.values()])
     inputs = {
         "points": whole.points,
         "triangles": whole.triangles,
@@ -93,7 +93,7 @@ def tetrahedralise(
             _checked_result(surface, epsilon, entry["points"], entry["tets"]), inner
         )
     result = _checked_result(surface, epsilon, *_run(inputs, timeout))
-    mesh = smoothed(_with_regions(result, inner), sizing)
+    mesh = smooth(_with_regions(result, inner), sizing)
     cache.store(name, {}, points=mesh.points, tets=mesh.tets)
     return mesh
 

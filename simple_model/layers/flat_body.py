@@ -191,7 +191,7 @@ def steady_state(
     below = below_half_the_rate(f, times)
     values = synthesise(f[below], a[below], times)
     count = int(below.sum())
-    return _timed("flat-body-harmonic", started, times, probes, values, count, count)
+    return _make_response("flat-body-harmonic", started, times, probes, values, count, count)
 
 
 def flat_body(
@@ -231,7 +231,7 @@ def flat_body(
     started = time.perf_counter()
     probes, times = np.atleast_2d(np.array(probes, np.float64)), np.array(times)
     values = field_history(normal_field(compliance), pressure, probes, times)[..., 0]
-    return _timed("flat-body", started, times, probes, values, len(times), len(times) + 1)
+    return _make_response("flat-body", started, times, probes, values, len(times), len(times) + 1)
 
 
 def field_history(
@@ -315,7 +315,7 @@ def _low_passed_load(
     return path_samples(pressure), of_load
 
 
-def _timed(
+def _make_response(
     model: str, started: float, times: Floats, probes: Floats, values: Floats, steps: int, dofs: int
 ) -> Response:
     """Make the response, with the seconds since its computation started."""

@@ -80,9 +80,9 @@ def modes_above_half_space(
     rayleigh = ks * below.shear_speed / below.rayleigh_speed
     start = np.concatenate([rayleigh, start], axis=1)
     x = np.concatenate([np.ones_like(x[:, :1]), x], axis=1)
-    k, x, last = _refined(terms, omega, start, x, impedance)
+    k, x, last = _refine(terms, omega, start, x, impedance)
     genuine = (np.abs(k - start) < FARTHEST_MOVE * np.abs(ks)) & (last < CONVERGED)
-    genuine &= ~_repeated(k**2, genuine, SAME_ROOT * np.abs(ks) ** 2)
+    genuine &= ~_is_repeated(k**2, genuine, SAME_ROOT * np.abs(ks) ** 2)
     ends, up, down = _ends(terms), 1 + EPS, 1 - EPS
     by_k = (impedance(up * k) - impedance(down * k)) / (2 * EPS * k)[..., None, None]
     by_w = (impedance(k, EPS) - impedance(k, -EPS)) / (2 * EPS * w)[..., None, None]
@@ -100,7 +100,7 @@ def modes_above_half_space(
         squared=k**2, slope=slope, wavenumbers=k,
         residues=2 * k * x[..., len(terms.depths)] ** 2 / norm,
         energy_speed=np.full(k.shape, np.inf),
-        shapes=_continued(x, ends, k, *_decay(k, ks2, below.poisson, MATCHED[0]), reach),
+        shapes=_continue_below(x, ends, k, *_decay(k, ks2, below.poisson, MATCHED[0]), reach),
     )  # fmt: skip
 
     def without_false(values: Any) -> Any:
@@ -137,7 +137,7 @@ def _candidates(
     return np.take_along_axis(k, order, axis=1), picked
 
 
-def _refined(
+def _refine(
     terms: Pencil,
     omega: Floats,
     start: Complex,
@@ -199,7 +199,7 @@ def _shape(k: Complex, p: Complex, s: Complex, waves: Complex, depths: Floats) -
     return np.concatenate([-k * pressure + s * shear, -p * pressure + k * shear], axis=-1)
 
 
-def _continued(
+def _continue_below(
     x: Complex, ends: list[int], k: Complex, p: Complex, s: Complex, depths: Floats
 ) -> Complex:
     """Shapes (f, m, d, 2) of the motion x (f, m, 2 n) of layers, continued in the half-space."""
@@ -246,7 +246,7 @@ def _form(x: Complex, matrix: Complex) -> Complex:
     return np.asarray((x * (matrix @ x[..., None])[..., 0]).sum(axis=-1))
 
 
-def _repeated(k: Complex, genuine: np.ndarray, least: Floats) -> np.ndarray:
+def _is_repeated(k: Complex, genuine: np.ndarray, least: Floats) -> np.ndarray:
     """Whether a root (f, m) is within `least` (f, 1) of an earlier genuine one."""
     near = np.abs(k[:, :, None] - k[:, None]) < least[..., None]
     earlier = np.tri(k.shape[1], k=-1, dtype=bool)

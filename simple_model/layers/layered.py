@@ -193,11 +193,11 @@ def _impedances(stack: Stack, k: Complex, w: Complex) -> Impedances:
     spring, zero = np.full(1, stack.base_stiffness, np.complex128), np.zeros(1, np.complex128)
     below: list[Symmetric | None] = [None if stack.is_rigid else (spring, zero, spring)]
     for layer in layers[:0:-1]:
-        below.append(_condensed(layer, below[-1]))
-    return Impedances(_condensed(layers[0], below[-1]), layers, below[::-1])
+        below.append(_condense(layer, below[-1]))
+    return Impedances(_condense(layers[0], below[-1]), layers, below[::-1])
 
 
-def _condensed(layer: Layer, below: Symmetric | None) -> Symmetric:
+def _condense(layer: Layer, below: Symmetric | None) -> Symmetric:
     """Z = K11 - K12 (K22 + Z)^-1 K21."""
     a, b, c = layer.top
     if below is None:

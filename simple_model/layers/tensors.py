@@ -41,7 +41,7 @@ def von_mises(stress: Floats) -> Floats:
     return np.sqrt(1.5 * np.maximum((TWICE * deviator**2).sum(axis=-1), 0.0))
 
 
-def squared(values: Floats) -> Floats:
+def sum_of_squares(values: Floats) -> Floats:
     """Sum of the squares (...) of values (..., c)."""
     return np.asarray((values**2).sum(axis=-1))
 

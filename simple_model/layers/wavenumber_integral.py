@@ -122,7 +122,7 @@ def point_integrals(
         lift = _lift(field, r, w[part], width)
         if lift != before or part.start % (CHECK_INTERVAL * BATCH) == 0:
             least = n if lift == before else FEWEST_NODES
-            n, integrals[:, part] = _resolved(field, w[part], partial(grid, lift), least)
+            n, integrals[:, part] = _resolve(field, w[part], partial(grid, lift), least)
         else:
             integrals[:, part] = _batch(field, w[part], grid(lift, n))
         before = lift
@@ -149,14 +149,12 @@ def _lift(field: Field, r: Floats, w: Complex, width: float) -> float:
     return lift
 
 
-def _resolved(
-    field: Field, w: Complex, grid: Callable[[int], _Grid], n: int
-) -> tuple[int, Complex]:
+def _resolve(field: Field, w: Complex, grid: Callable[[int], _Grid], n: int) -> tuple[int, Complex]:
     """Double the number of wavenumbers, from n, until the integrals do not change. Return both."""
     some = w[:: -(-len(w) // COMPARED)] if _is_damped(w) else w
-    coarse = _integrated(field, some, grid(n))
+    coarse = _integrate(field, some, grid(n))
     while n < MOST_NODES:
-        fine = _integrated(field, some, grid(2 * n))
+        fine = _integrate(field, some, grid(2 * n))
         largest = np.abs(fine).max(axis=(1, 2))
         if (np.abs(fine - coarse).max(axis=(1, 2)) <= INTEGRATION_ERROR * largest).all():
             return n, fine if some is w else _batch(field, w, grid(2 * n))
@@ -166,8 +164,8 @@ def _resolved(
 
 def _batch(field: Field, w: Complex, grid: _Grid) -> Complex:
     """Integrals (c, f, r) at the frequencies of a batch, interpolated if they are smooth."""
-    integrals = _interpolated(field, w, grid) if _is_damped(w) else None
-    return _integrated(field, w, grid) if integrals is None else integrals
+    integrals = _interpolate(field, w, grid) if _is_damped(w) else None
+    return _integrate(field, w, grid) if integrals is None else integrals
 
 
 def _is_damped(w: Complex) -> bool:
@@ -175,14 +173,14 @@ def _is_damped(w: Complex) -> bool:
     return bool(len(w) > 4 * FEWEST_INTERVALS and w.imag.max() < 0 and np.ptp(w.imag) == 0)
 
 
-def _interpolated(field: Field, w: Complex, grid: _Grid) -> Complex | None:
+def _interpolate(field: Field, w: Complex, grid: _Grid) -> Complex | None:
     """Integrals (c, f, r) at frequencies on a line, by a polynomial; None if that takes more than
     half as many evaluations.
     """
     middle, half = (w.real.max() + w.real.min()) / 2, np.ptp(w.real) / 2
 
     def at(x: Floats) -> Complex:
-        return _integrated(field, middle + half * x + 1j * w.imag[0], grid)
+        return _integrate(field, middle + half * x + 1j * w.imag[0], grid)
 
     n, error = FEWEST_INTERVALS, np.nan
     values = at(_chebyshev(n))
@@ -217,7 +215,7 @@ def _through(values: Complex, x: Floats) -> Complex:
     return np.asarray(shares @ values)
 
 
-def _integrated(field: Field, w: Complex, grid: _Grid) -> Complex:
+def _integrate(field: Field, w: Complex, grid: _Grid) -> Complex:
     """Integrals (c, f, r), some frequencies at a time."""
     parts = []
     for some in np.array_split(w[:, None], max(1, len(w) * len(grid.k) // AT_ONCE)):

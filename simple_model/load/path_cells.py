@@ -270,7 +270,7 @@ def highest_passing(pressure: MovingPressure) -> float:
     `HIGHEST` for a recording.
     """
     highest = (
-        PASSING_LIMIT * _speed(pressure.tacton) / spot_detail(pressure.height, pressure.profile)
+        PASSING_LIMIT * _top_speed(pressure.tacton) / spot_detail(pressure.height, pressure.profile)
     )
     return min(highest, HIGHEST) if pressure.tacton.trajectory.shape == "recorded" else highest
 
@@ -304,7 +304,7 @@ def _rate(pressure: MovingPressure) -> float:
     return max(LEAST_RATE, HIGHEST + made)
 
 
-def _speed(tacton: Tacton) -> float:
+def _top_speed(tacton: Tacton) -> float:
     """Largest speed of a focus in m/s; moves shorter than `BRIEF` of a recording do not count."""
     path = tacton.trajectory
     if path.shape != "recorded":

@@ -203,7 +203,7 @@ def modal_motion(
         part = slice(first, first := first + len(family.squared))
         if family.bending is not None:
             lossy = np.flatnonzero(added)
-            coordinates[lossy, part] = _coupled(family, w[lossy], added[lossy], forces[lossy, part])
+            coordinates[lossy, part] = _solve(family, w[lossy], added[lossy], forces[lossy, part])
     return coordinates
 
 
@@ -217,7 +217,7 @@ def modal_motion_apart(
     return np.asarray(coordinates, np.complex128)
 
 
-def _coupled(family: Family, w: Floats, added: Complex, forces: Complex) -> Complex:
+def _solve(family: Family, w: Floats, added: Complex, forces: Complex) -> Complex:
     """Modal coordinates (f, m) of a stretched plate, by GMRES. The preconditioner solves low modes
     together and high modes separately.
     """

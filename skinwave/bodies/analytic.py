@@ -48,10 +48,10 @@ def stack(body: Body) -> Stack:
     """
     if not body.of_kind.is_layer:
         raise ValueError(f"a body of kind '{body.kind}' is not a stack of flat layers; use a slab")
-    return flattened(body)
+    return flat_layers(body)
 
 
-def flattened(body: Body) -> Stack:
+def flat_layers(body: Body) -> Stack:
     """Return the layers of a body as if all of it were flat and as deep as in its middle."""
     starts, materials = zip(*body.strata, strict=True)
     end = inf if body.base == "absorbing" else body.depth
@@ -76,4 +76,4 @@ def dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
 
 def stack_dispersion(body: Body, frequencies: Floats, most: int) -> DispersionCurves:
     """Return the dispersion curves of the flattened layers of a body."""
-    return dispersion_curves(flattened(body), frequencies, most=most)
+    return dispersion_curves(flat_layers(body), frequencies, most=most)

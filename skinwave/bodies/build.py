@@ -14,7 +14,7 @@ from simple_model.layers.material import Material
 from skinwave.bodies.body import Body
 from skinwave.bodies.discretised import Discretise
 from skinwave.bodies.sizes import check_element_size, default_size
-from skinwave.bodies.supports import combined, winkler_foundation
+from skinwave.bodies.supports import combine, winkler_foundation
 from skinwave.typing import Bools, Floats, Ints
 
 COMPARED = 4 / 3  # of the coarsest element size: limit of meshes that estimate errors
@@ -79,7 +79,7 @@ def build(
     drag = made.drag(mesh) if made.drag else None
     support = made.support(mesh) if made.support else None
     if ends.get("bottom") == "elastic":
-        support = combined(
+        support = combine(
             support, winkler_foundation(mesh, mesh.facets["bottom"], body.base_stiffness)
         )
     held = made.held(mesh) if made.held else None

@@ -39,13 +39,13 @@ def discretise(body: Body, h: float, thickness: float | None = None) -> Discreti
     return Discretised(
         mesh=sheet(body.width, body.height, thickness, h, planes=planes),
         materials=[bending_equivalent(body.solid, body.depth / thickness)],
-        held=partial(_held, body) if body.sides == "clamped" else None,
+        held=partial(_fixed_nodes, body) if body.sides == "clamped" else None,
         tension=tension(body),
         stiffener=partial(_curl, body) if body.mounting.is_curled else None,
     )
 
 
-def _held(body: Body, mesh: TetMesh) -> Bools:
+def _fixed_nodes(body: Body, mesh: TetMesh) -> Bools:
     """Held components (n, 3) of nodes; those of a tilted sheet are held completely."""
     components = held_components(body.mounting, mesh)
     return components | (components.any(axis=1, keepdims=True) & body.placement.is_tilted)

@@ -45,7 +45,7 @@ def on_lines(body: Body, lines: Lines, wider: float = 1.0) -> Discretised:
     """Return a structured mesh on grid lines, moved onto the planes between layers."""
     x, y, z = lines
     planes = [-start for start, _ in body.strata[1:]]
-    mesh = extrude(*_extended(body, (x, y, with_planes(z, planes)), wider))
+    mesh = extrude(*_extend(body, (x, y, with_planes(z, planes)), wider))
     depths = -mesh.points[mesh.tets[:, :4], 2].mean(axis=1)
     mesh, materials = in_layers(mesh, body.strata, depths)
     return Discretised(
@@ -64,10 +64,10 @@ def body_lines(body: Body, h: float) -> Lines:
 
 def slab_lines(body: Body, h: float) -> Lines:
     """Return the grid lines of a body with those of any absorbing layer."""
-    return _extended(body, body_lines(body, h))
+    return _extend(body, body_lines(body, h))
 
 
-def _extended(body: Body, lines: Lines, wider: float = 1.0) -> Lines:
+def _extend(body: Body, lines: Lines, wider: float = 1.0) -> Lines:
     """Grid lines through a body, with an absorbing layer at its absorbing ends."""
     if not has_layer(body):
         return lines

@@ -99,7 +99,7 @@ def winkler_foundation(mesh: TetMesh, facets: Ints, stiffness: float) -> Support
     return Support(facets=facets, stiffness=k, absorbed=np.zeros_like(k))
 
 
-def combined(first: Support | None, second: Support) -> Support:
+def combine(first: Support | None, second: Support) -> Support:
     """Return both supports of a mesh as one."""
     if first is None:
         return second
@@ -265,13 +265,13 @@ def held_components(mounting: Mounting, mesh: TetMesh) -> Bools:
             held[at & middle, 2] = True
     for clip in mounting.clips:
         there = [abs(c) if low[axis] > -near else c for axis, c in enumerate(clip)]
-        at = _clipped(mesh, there, mounting.clip_radius)
+        at = _clip_nodes(mesh, there, mounting.clip_radius)
         held[at, :2] = True
         held[at & middle, 2] = True
     return held
 
 
-def _clipped(mesh: TetMesh, clip: Sequence[float], radius: float) -> Bools:
+def _clip_nodes(mesh: TetMesh, clip: Sequence[float], radius: float) -> Bools:
     """Nodes (n,) in a clip: those in its square, and in the `FEWEST_COLUMNS` nearest columns."""
     away = np.abs(mesh.points[:, :2] - clip).max(axis=1)
     top = np.unique(mesh.facets["top"])

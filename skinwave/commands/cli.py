@@ -50,7 +50,7 @@ def _command(typed: list[str]) -> int:
         print(f"skinwave {skinwave.__version__}")
         return 0
     extensions.load()
-    options = parser().parse_args(_joined(typed))
+    options = parser().parse_args(_join_up_option(typed))
     if options.command_name is None:
         parser().error(f"no command given; use one of {', '.join(COMMANDS)}")
     options.typed = typed
@@ -71,7 +71,7 @@ def _message(error: Exception) -> str:
     return f"{place} cannot be read or written ({error.strerror}); {cure}"
 
 
-def _joined(arguments: Sequence[str]) -> list[str]:
+def _join_up_option(arguments: Sequence[str]) -> list[str]:
     """Join `--up -z`, which argparse would read as two options, to `--up=-z`."""
     joined: list[str] = []
     for argument in arguments:

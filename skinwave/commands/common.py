@@ -111,7 +111,7 @@ def solving(options: argparse.Namespace, progress: "Progress", **more: Any) -> "
     return SolveOptions(h=metre(options.h), solver=options.solver, progress=progress, **more)
 
 
-def planned(options: argparse.Namespace, scene: "Scene", **more: Any) -> "Plan":
+def plan_of_command(options: argparse.Namespace, scene: "Scene", **more: Any) -> "Plan":
     """Plan a scene by the options of a command, and print the warnings of the plan."""
     from skinwave.models.options import SolveOptions
     from skinwave.planning.plan import plan

@@ -64,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
 
     given = None if options.scene == PAPER else read(options.scene)
     bodies = _chosen_body(options)
-    measured = _measured(options)
+    measured = _read_measurement(options)
     inputs = [body.file for body in bodies.values()]
     if given is None:
         scenes, out = paper_scenes(bodies or None), PAPER
@@ -101,7 +101,7 @@ def run(options: argparse.Namespace) -> int:
     return 0 if outcome.runs == outcome.planned else 1
 
 
-def _measured(options: argparse.Namespace) -> "Measured | None":
+def _read_measurement(options: argparse.Namespace) -> "Measured | None":
     """Read the measurement to compare with, if one is given."""
     if options.measured is None:
         if options.delay is not None or options.gain is not None:

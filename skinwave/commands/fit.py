@@ -77,7 +77,7 @@ def run(options: argparse.Namespace) -> int:
 
     check_seed(options.seed)
     scene = read(options.scene)
-    measured = _measured(options.measured, options)
+    measured = _read_measurement(options.measured, options)
     name, inputs = f"{options.scene.stem}-fit", [options.scene, options.measured, scene.body.file]
     with result_folder(options, name, inputs, scene) as (folder, progress):
         found = fit(
@@ -98,7 +98,7 @@ def _inspect(options: argparse.Namespace) -> int:
 
     if options.scene or options.measured or options.vary:
         raise ValueError("--inspect does not fit; remove SCENE, --measured and --vary")
-    found = inspect(_measured(options.inspect, options), alarm=options.false_alarm)
+    found = inspect(_read_measurement(options.inspect, options), alarm=options.false_alarm)
     contents, lines = summary(found), text(found)
     if options.out:
         with result_folder(options, "", [options.inspect]) as (folder, _):
@@ -109,7 +109,7 @@ def _inspect(options: argparse.Namespace) -> int:
     return 0
 
 
-def _measured(file: Path, options: argparse.Namespace) -> "Measurement":
+def _read_measurement(file: Path, options: argparse.Namespace) -> "Measurement":
     """Read a measurement; options give what the file does not state."""
     from skinwave.measure.reading import parse_places, read
 

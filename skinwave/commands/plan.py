@@ -7,7 +7,7 @@ from skinwave.commands.common import (
     add_model,
     add_reporting,
     add_scene,
-    planned,
+    plan_of_command,
     summarise,
 )
 
@@ -28,7 +28,7 @@ def run(options: argparse.Namespace) -> int:
     from skinwave.scene.file import read
 
     scene = read(options.scene)
-    found = planned(options, scene)
+    found = plan_of_command(options, scene)
     row = mesh_row(replace(scene, body=found.body), found.h, found.error)
     found = replace(found, rows=(*found.rows, row))
     width = [max(len(getattr(row, name)) for row in found.rows) for name in ("what", "value")]

@@ -11,7 +11,7 @@ from skinwave.commands.common import (
     add_output,
     add_scene,
     metre,
-    planned,
+    plan_of_command,
     result_folder,
     summarise,
     warn,
@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
         check(spreads_of(scene), options.samples, options.seed)
     inputs = [options.scene, scene.body.file]
     with result_folder(options, f"{options.scene.stem}-out", inputs) as (folder, progress):
-        plan = planned(options, scene, progress=progress)
+        plan = plan_of_command(options, scene, progress=progress)
         response = solve(scene, plan)
         warn(w for w in response.effort.warnings if w not in plan.warnings)
         run = Run(tacton=scene.name, body=body_name(scene.body), scene=scene, response=response)

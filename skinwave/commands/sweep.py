@@ -167,11 +167,11 @@ def _draw(options: argparse.Namespace, out: Path) -> list[str]:
     from skinwave.report.styles import style
     from skinwave.results.files import distinct_names
     from skinwave.sweeps import dataset
-    from skinwave.sweeps.table_figures import finished, heat_figure, line_figure, varied
+    from skinwave.sweeps.table_figures import finished_rows, heat_figure, line_figure, varied_keys
 
     chosen = style(options.style, options.width)
-    rows = finished(dataset.read(out))
-    keys = varied(rows)
+    rows = finished_rows(dataset.read(out))
+    keys = varied_keys(rows)
     x = options.x or next(iter(keys), None)
     if x is None:
         raise ValueError(f"no key varies in {out}; name a column for the axis with --x")

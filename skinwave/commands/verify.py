@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
     if options.installation:
         return _installation(options)
     if options.published:
-        return _published(options)
+        return _run_published(options)
     return _tradeoff(options) if options.scene else _cases(options)
 
 
@@ -63,7 +63,7 @@ def _cases(options: argparse.Namespace) -> int:
     return 1 if failed or is_incomplete else 0
 
 
-def _published(options: argparse.Namespace) -> int:
+def _run_published(options: argparse.Namespace) -> int:
     from skinwave.verify.validation import report, validate, verdict
 
     inputs = [options.hand] if options.hand else []

@@ -23,7 +23,7 @@ from skinwave.live.sheets import SIDE, STEP, grid_line
 from skinwave.models.laws import relaxing
 from skinwave.models.meshed import surface_load, surface_motion
 from skinwave.scene.scene import Body
-from skinwave.system.arrays import packed, quantised
+from skinwave.system.arrays import pack, quantise
 from skinwave.system.effort import Progress, silent
 from skinwave.typing import Floats
 
@@ -60,9 +60,9 @@ def element_pack(body: Body, h: float, progress: Progress = silent) -> dict[str,
     fields = (turn.T @ read.T).astype(np.complex64)
     return {
         "kind": "poles", "step": STEP, "side": SIDE, "lowest_height_mm": 1e3 * LOWEST,
-        "poles": packed(poles), "fields": quantised(fields), "cosines": quantised(cosines[None]),
+        "poles": pack(poles), "fields": quantise(fields), "cosines": quantise(cosines[None]),
         "inside": "".join("01"[int(each)] for each in inside),
-        "heights": quantised(1e3 * heights[None]), "reach_mm": 1e3 * REACH,
+        "heights": quantise(1e3 * heights[None]), "reach_mm": 1e3 * REACH,
         "error": ERROR, "warnings": [WARNING],
     }  # fmt: skip
 

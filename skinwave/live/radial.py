@@ -24,7 +24,7 @@ from simple_model.layers.wavenumber_integral import (
 from simple_model.load.focus import spot_width
 from skinwave.bodies.analytic import compliance
 from skinwave.scene.scene import Body
-from skinwave.system.arrays import packed, quantised
+from skinwave.system.arrays import pack, quantise
 from skinwave.system.effort import Progress, silent
 from skinwave.typing import Floats
 
@@ -49,11 +49,11 @@ def radial_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
     progress("wavenumber integral", 0.0)
     response, frequencies = compliance(body), _frequencies(body)
     n, some = FEWEST_NODES, frequencies[::CHECKED]
-    coarse = _tabulated(_path(response, some, n))
+    coarse = _tabulate(_path(response, some, n))
     while True:
         if n >= MOST_NODES:
             raise ArithmeticError(UNRESOLVED)
-        fine = _tabulated(_path(response, some, 2 * n))
+        fine = _tabulate(_path(response, some, 2 * n))
         if np.abs(fine - coarse).max() <= INTEGRATION_ERROR * np.abs(fine).max():
             break
         coarse, n = fine, 2 * n
@@ -61,8 +61,8 @@ def radial_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
     return {
         "kind": "radial", "error": ERROR, "lowest_height_mm": 1e3 * LOWEST,
         "frequencies": frequencies.tolist(), "furthest": FURTHEST, "n_distances": len(DISTANCES),
-        "k": packed(path.k[None]), "weights": packed(path.weights[None]),
-        "G": quantised(path.G),
+        "k": pack(path.k[None]), "weights": pack(path.weights[None]),
+        "G": quantise(path.G),
     }  # fmt: skip
 
 
@@ -83,7 +83,7 @@ def _frequencies(body: Body) -> Floats:
     return fine[(fine <= MIDDLE) | (fine % (2 * SPACING) == 0)] if damped else fine
 
 
-def _tabulated(path: _Path) -> fem.Complex:
+def _tabulate(path: _Path) -> fem.Complex:
     """g (f, r) at some distances for the narrowest profile."""
     k, width = path.k, spot_width(LOWEST)
     shares = width**2 * np.exp(-((k * width) ** 2) / 2) * k * path.weights

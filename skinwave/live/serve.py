@@ -159,7 +159,7 @@ class _Handler(BaseHTTPRequestHandler):
         except ConnectionError:
             raise
         except Exception as error:
-            return self._refuse(*_explained(error))
+            return self._refuse(*_error_answer(error))
 
     def _route(self, path: str) -> str:
         """Path below the base, which a proxy may have removed already."""
@@ -198,7 +198,7 @@ def _json(value: Any) -> bytes:
     return json.dumps(value, allow_nan=False, separators=(",", ":")).encode()
 
 
-def _explained(error: Exception) -> tuple[HTTPStatus, str]:
+def _error_answer(error: Exception) -> tuple[HTTPStatus, str]:
     """Status and sentence for an error. Errors of the server itself go to its terminal."""
     if isinstance(error, Superseded):
         return HTTPStatus.CONFLICT, "A newer request has replaced this one."

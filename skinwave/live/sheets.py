@@ -18,7 +18,7 @@ from simple_model.plates.modes import PlateModes
 from skinwave.models.laws import relaxing
 from skinwave.models.plate_modes import modes_of, plate_of, relative_modulus
 from skinwave.scene.scene import Body
-from skinwave.system.arrays import packed, quantised
+from skinwave.system.arrays import pack, quantise
 from skinwave.system.effort import Progress, silent
 from skinwave.typing import Floats
 
@@ -49,7 +49,7 @@ def sheet_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
     fields = modes.on_grid(x, y).reshape(SIDE, SIDE, -1).transpose(2, 1, 0).reshape(-1, SIDE**2)
     fields = fields * inside
     progress("combinations of high modes", 0.5)
-    squared, bending, turn = combined(modes, fields)
+    squared, bending, turn = combine_modes(modes, fields)
     frequencies = np.arange(0.0, HIGHEST + LAW_STEP / 2, LAW_STEP)
     relative = relative_modulus(body, 2 * np.pi * frequencies) - 1
     bent, stretched = np.diagonal(bending), modes.plate.tension_x or modes.plate.tension_y
@@ -59,24 +59,24 @@ def sheet_pack(body: Body, progress: Progress = silent) -> dict[str, Any]:
     return {
         "kind": "modal", "error": ERROR, "lowest_height_mm": 1e3 * LOWEST,
         "step": STEP, "side": SIDE,
-        "squared": packed(squared), "diagonal": packed(bent.copy()),
-        "between": quantised(bending[:coupled, :coupled]) if stretched else None,
-        "law": packed(relative.astype(np.complex128)), "law_step": LAW_STEP,
-        "V": quantised((turn.T @ fields)[:, inside]),
+        "squared": pack(squared), "diagonal": pack(bent.copy()),
+        "between": quantise(bending[:coupled, :coupled]) if stretched else None,
+        "law": pack(relative.astype(np.complex128)), "law_step": LAW_STEP,
+        "V": quantise((turn.T @ fields)[:, inside]),
         "inside": "".join("01"[int(each)] for each in inside),
         "kinds": free.poles.shape[1],
-        "poles": packed(free.poles), "residues": packed(free.residues),
+        "poles": pack(free.poles), "residues": pack(free.residues),
     }  # fmt: skip
 
 
-def combined(modes: PlateModes, fields: Floats) -> tuple[Floats, Floats, Floats]:
+def combine_modes(modes: PlateModes, fields: Floats) -> tuple[Floats, Floats, Floats]:
     """Return the modes below `BAND` and the combinations of higher modes that focal spots move:
     squared frequencies (r,) in rad2/s2, ascending, the stiffness of bending (r, r) in 1/s2 between
     them, and the orthonormal combinations (m, r) of the modes.
     """
     squared = modes.squared
     low = squared < (2 * np.pi * BAND) ** 2
-    forces = smoothed(fields[~low], spot_width(LOWEST))
+    forces = spot_forces(fields[~low], spot_width(LOWEST))
     motions = [forces / (squared[~low] - (2 * np.pi * f) ** 2)[:, None] for f in SAMPLED]
     squares, directions = np.linalg.eigh(sum(each @ each.T for each in motions))
     kept = directions[:, squares > NEGLIGIBLE**2 * squares.max(initial=0.0)]
@@ -100,7 +100,7 @@ def _bending(modes: PlateModes, turn: Floats) -> Floats:
     return stiffness
 
 
-def smoothed(fields: Floats, width: float) -> Floats:
+def spot_forces(fields: Floats, width: float) -> Floats:
     """Return the forces (m, SIDE^2) of a focal spot of 1 Pa and this width in metre at each place
     of the grid. Sums over the places approximate integrals of smooth fields (m, SIDE^2).
     """

@@ -73,11 +73,11 @@ def values_of(scene: Scene, body: str) -> Values:
         raise ValueError(
             f"The live page has no control for {' or '.join(missing)}. Use skinwave run."
         )
-    x, y = (_rounded(1e3 * value) for value in scene.probes[0])
+    x, y = (_round(1e3 * value) for value in scene.probes[0])
     return _tacton_values(tacton) | {
-        "body": body, "height": _rounded(1e3 * pressure.height), "drive": str(pressure.drive),
-        "profile": pressure.profile, "peak": _rounded(pressure.peak_pressure),
-        "modulation": _rounded(100 * pressure.depth_of_modulation),
+        "body": body, "height": _round(1e3 * pressure.height), "drive": str(pressure.drive),
+        "profile": pressure.profile, "peak": _round(pressure.peak_pressure),
+        "modulation": _round(100 * pressure.depth_of_modulation),
         "x": x, "y": y, "quantity": scene.quantity,
     }  # fmt: skip
 
@@ -88,13 +88,13 @@ def _tacton_values(tacton: Tacton) -> Values:
     phases = "" if even else ", ".join(f"{100 * phase:g}" for phase in tacton.foci)
     pulses = rhythm.pulses if rhythm else ()
     return PLAIN | {
-        "amplitude": _rounded(100 * tacton.amplitude), "am": tacton.am_frequency,
+        "amplitude": _round(100 * tacton.amplitude), "am": tacton.am_frequency,
         "am2": tacton.second_am_frequency,
         "ratio": next(k for k, weights in RATIOS.items() if weights == tacton.superposition),
         "envelope": tacton.envelope_frequency, "duration": tacton.duration,
         "foci": len(tacton.foci), "sharing": tacton.sharing, "phases": phases,
         "pulses": ", ".join(f"{1e3 * on:g}/{1e3 * gap:g}" for on, gap in pulses),
-        "ramp": _rounded(1e3 * rhythm.ramp) if rhythm else 0,
+        "ramp": _round(1e3 * rhythm.ramp) if rhythm else 0,
     } | _path_values(tacton, path)  # fmt: skip
 
 
@@ -103,13 +103,13 @@ def _path_values(tacton: Tacton, path: Trajectory) -> Values:
         own = _own_paths(tacton) if path.shape == "recorded" else (path,)
         return {
             "paths": ", ".join(map(_path_text, own)),
-            "drawn": _rounded(tacton.drawing_frequency),
+            "drawn": _round(tacton.drawing_frequency),
         }
     if path.shape == "polyline":
         points = (f"{1e3 * x:.10g}/{1e3 * y:.10g}" for x, y in path.points)
         return {"shape": "polyline", "polyline": ", ".join(points), "speed": path.speed,
                 "sweep": path.sweep}  # fmt: skip
-    return {"shape": path.shape if path.size else "point", "size": _rounded(1e3 * path.size),
+    return {"shape": path.shape if path.size else "point", "size": _round(1e3 * path.size),
             "speed": path.speed, "sweep": path.sweep}  # fmt: skip
 
 
@@ -152,5 +152,5 @@ def _shape_of(corners: np.ndarray) -> Trajectory:
     return Trajectory(shape=shape, size=round(sizes.get(shape, side), 9), centre=centre)
 
 
-def _rounded(value: float) -> float:
+def _round(value: float) -> float:
     return round(float(value), 6)

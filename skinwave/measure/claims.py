@@ -65,11 +65,11 @@ def assess_measured(measured: LinesByName) -> list[MeasuredClaim]:
     return [
         MeasuredClaim(claim=claim, finding=finding, sentence=sentence)
         for claim, assess in concerned
-        for finding, sentence in [_assessed(measured, claim, assess)]
+        for finding, sentence in [_assess(measured, claim, assess)]
     ]
 
 
-def _assessed(
+def _assess(
     measured: LinesByName, claim: str, assess: Callable[[Sequence[NamedLines]], tuple]
 ) -> tuple[str, str]:
     if reason := _undecidable(measured, claim):
@@ -83,7 +83,7 @@ def _assessed(
         lines={name: a[at] for name, a in measured.lines.items()},
         radius={name: r[at] for name, r in measured.radius.items()},
     )  # fmt: skip
-    best, worst = ([assess([_varied(clear, claim, way, am)]) for am in (-1, 1)] for way in (1, -1))
+    best, worst = ([assess([_vary(clear, claim, way, am)]) for am in (-1, 1)] for way in (1, -1))
     sentence = assess([clear])[3]
     if not at.all():
         sentence += f"; assessed at {at.sum()} of {len(at)} places, where f_AM is above the noise"
@@ -116,7 +116,7 @@ def _undecidable(measured: LinesByName, claim: str) -> str:
     return f"{', '.join(weak)} not above the noise at any place" if weak else ""
 
 
-def _varied(measured: LinesByName, claim: str, way: int, am: int) -> LinesByName:
+def _vary(measured: LinesByName, claim: str, way: int, am: int) -> LinesByName:
     """Return amplitudes varied within the noise for a claim (way 1) or against it (-1)."""
     of_am = measured.frequencies["f_AM"]
 

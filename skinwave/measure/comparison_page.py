@@ -105,8 +105,8 @@ def columns_table(comparison: MeasuredComparison) -> Table:
         rows.append((
             label(column.run.column), 100 * column.misfit, 100 * comparison.noise,
             f"{column.differs.sum()} of {known}" if known else UNKNOWN,
-            _fitted(per * a.gain, per * a.gain_error) + unit,
-            _fitted(1e3 * a.delay, 1e3 * a.delay_error), 1e3 * a.repeats,
+            _fit_parts(per * a.gain, per * a.gain_error) + unit,
+            _fit_parts(1e3 * a.delay, 1e3 * a.delay_error), 1e3 * a.repeats,
         ))  # fmt: skip
     return Table((
         "model", Column("misfit", unit="%"), Column("misfit of noise alone", unit="%", digits=2),
@@ -115,7 +115,7 @@ def columns_table(comparison: MeasuredComparison) -> Table:
     ), rows)  # fmt: skip
 
 
-def _fitted(value: float, error: float) -> str:
+def _fit_parts(value: float, error: float) -> str:
     return with_error(value, error) if error else f"{significant(value, 4)} (given)"
 
 

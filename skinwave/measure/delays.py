@@ -46,11 +46,11 @@ def maxima(frequencies: Floats, products: np.ndarray, window: float) -> tuple[Fl
     top = 1 + np.flatnonzero((height[1:-1] >= height[:-2]) & (height[1:-1] > height[2:]))
     top = top[height[top] > 0] if (height[top] > 0).any() else np.array([int(np.argmax(height))])
     chosen = top[np.argsort(-height[top], kind="stable")[:1000]]
-    delays = _refined(frequencies, products, np.asarray(trials[chosen], np.float64), step)
+    delays = _refine(frequencies, products, np.asarray(trials[chosen], np.float64), step)
     return delays, correlation(frequencies, products, delays)
 
 
-def _refined(frequencies: Floats, products: np.ndarray, delays: Floats, step: float) -> Floats:
+def _refine(frequencies: Floats, products: np.ndarray, delays: Floats, step: float) -> Floats:
     """Return the maxima of the correlation next to delays (k,), by Newton's method."""
     for _ in range(NEWTON_STEPS):
         slope, bend = (correlation(frequencies, products, delays, n) for n in (1, 2))
@@ -124,7 +124,7 @@ def align_by_references(values: Floats, references: Floats) -> tuple[Floats, Flo
         return values, np.empty(0), (
             f"places are not aligned in time: their references are {begin.max():.0f} samples apart"
         )  # fmt: skip
-    moved, drives = _shifted(values, begin, left), _shifted(references, begin, left)
+    moved, drives = _shift(values, begin, left), _shift(references, begin, left)
     centred = drives - drives.mean(axis=1, keepdims=True)
     centred /= np.linalg.norm(centred, axis=1, keepdims=True) + np.finfo(float).tiny
     alike = np.einsum("t,rtp->rp", centred[0, :, 0], centred).min()
@@ -151,12 +151,12 @@ def _lags(references: Floats) -> Floats:
         window = cosines("hann", len(a))
         cross = np.fft.rfft(window * b) * np.fft.rfft(window * a).conj()
         cycles = np.asarray(np.fft.rfftfreq(len(a)), np.float64)
-        fraction = float(_refined(cycles, cross, np.zeros(1), 1.0)[0])
+        fraction = float(_refine(cycles, cross, np.zeros(1), 1.0)[0])
         lags[r, p] = lag + (fraction if LEAST_FRACTION < abs(fraction) < 1 else 0.0)
     return lags
 
 
-def _shifted(values: Floats, begin: Floats, left: int) -> Floats:
+def _shift(values: Floats, begin: Floats, left: int) -> Floats:
     """Return values (r, m, p) from `begin` (r, p) on, between samples by cubic splines."""
     from scipy.interpolate import CubicSpline  # slow to import
 

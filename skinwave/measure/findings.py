@@ -29,14 +29,14 @@ def sentences(result: Fit) -> list[str]:
         f"solution. Its residual is {percent(result.misfit)} of the measured motion"
         f"{known * data.is_known}.",
         *(
-            "{} = {}, 95 % interval {} to {}.".format(each.key, *rounded(each))
+            "{} = {}, 95 % interval {} to {}.".format(each.key, *round_to_interval(each))
             for each in result.estimates
             if each.is_resolved and not each.at_limit
         ),
     ]
 
 
-def rounded(each: Estimate) -> tuple[str, str, str]:
+def round_to_interval(each: Estimate) -> tuple[str, str, str]:
     """Return an estimate and its interval, to two digits of the interval's width."""
     numbers = each.value, each.low, each.high
     width = max(each.high - each.low, 1e-12 * abs(each.value), 1e-300)
@@ -93,7 +93,7 @@ def _of_estimates(result: Fit) -> Iterator[str]:
             names = f"{', '.join(keys[:-1])} and {keys[-1]}"
             yield f"the data do not separate {names}; fix one of them, or measure more"
         else:
-            yield _undetermined(keys[0])
+            yield _undetermined_keys(keys[0])
     named = {key for keys in directions for key in keys}
     for each, limits in zip(result.estimates, result.solution.problem.parameters.free, strict=True):
         if each.at_limit:
@@ -103,7 +103,7 @@ def _of_estimates(result: Fit) -> Iterator[str]:
                 "or check the scene"
             )
         elif not each.is_resolved and each.key not in named:
-            yield _undetermined(each.key)
+            yield _undetermined_keys(each.key)
         if each.is_curved and not each.at_limit:
             yield (
                 f"the interval of {each.key} is approximate, because the model is not linear over "
@@ -111,7 +111,7 @@ def _of_estimates(result: Fit) -> Iterator[str]:
             )
 
 
-def _undetermined(key: str) -> str:
+def _undetermined_keys(key: str) -> str:
     return f"the data do not determine {key} between its limits; fix it, or measure more"
 
 

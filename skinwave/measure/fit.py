@@ -159,15 +159,15 @@ def _scaled_keys(table: Mapping[str, Any], place: str, scale: str) -> Iterator[s
     """Yield the dotted keys of the moduli, or of the losses, of a preset."""
     solid = solid_of(value_at(table, place))
     plain = write_material(solid)
-    losses = set(_changed(plain, write_material(solid.scaled(loss=2.0)), place))
-    moduli = _changed(plain, write_material(solid.scaled(modulus=2.0)), place)
+    losses = set(_changed_keys(plain, write_material(solid.scaled(loss=2.0)), place))
+    moduli = _changed_keys(plain, write_material(solid.scaled(modulus=2.0)), place)
     yield from losses if scale == LOSSES else (key for key in moduli if key not in losses)
 
 
-def _changed(one: Any, other: Any, path: str) -> Iterator[str]:
+def _changed_keys(one: Any, other: Any, path: str) -> Iterator[str]:
     """Yield the dotted keys of the numbers in which two tables differ."""
     if isinstance(one, dict | list):
         for key, inner in one.items() if isinstance(one, dict) else enumerate(one):
-            yield from _changed(inner, other[key], f"{path}.{key}")
+            yield from _changed_keys(inner, other[key], f"{path}.{key}")
     elif one != other:
         yield path

@@ -11,14 +11,14 @@ from matplotlib.figure import Figure
 
 from simple_model import Effort
 from simple_model.numbers import significant
-from skinwave.measure.findings import cautions, notes, probability, rounded, sentences
+from skinwave.measure.findings import cautions, notes, probability, round_to_interval, sentences
 from skinwave.measure.fit import Fit
 from skinwave.measure.measurement import strongest
 from skinwave.report.figures import REPORT, png
 from skinwave.report.palette import BLUE, ORANGE
 from skinwave.report.spectra import lines_figure
 from skinwave.scene.file import dumps
-from skinwave.system.document import Details, Part, Picture, Report, Section, preformatted
+from skinwave.system.document import Details, Part, Picture, Report, Section, preformat
 from skinwave.system.table import Column, Table
 from skinwave.typing import Floats
 
@@ -71,7 +71,7 @@ def write(folder: Path, result: Fit) -> None:
         rows = ((key, *row) for key, row in zip(keys, correlations.tolist(), strict=True))
         table = Table(("", *(Column(key, digits=2) for key in keys)), rows)
         parts.append(Section("Correlations", [ABOUT_CORRELATIONS, table]))
-    parts.append(Details("The scene with the estimates", [preformatted(text)]))
+    parts.append(Details("The scene with the estimates", [preformat(text)]))
     Report(
         f"{result.target.scene.name} fitted to {result.measured.name or 'a measurement'}",
         verdict=[" ".join(text) for text in (estimates, method) if text], parts=parts,
@@ -113,7 +113,7 @@ def _interval_table(result: Fit) -> Table:
     for each, limits in zip(result.estimates, free, strict=True):
         value, interval = significant(each.value), "not resolved by the data"
         if each.is_resolved:
-            value, low, high = rounded(each)
+            value, low, high = round_to_interval(each)
             interval = f"{low} to {high}"
         rows.append((each.key + ", at a limit" * each.at_limit, value, interval,
                      f"{significant(limits.low)} to {significant(limits.high)}"))  # fmt: skip

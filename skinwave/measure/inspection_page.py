@@ -142,22 +142,22 @@ def summary(inspection: Inspection) -> dict[str, Any]:
     return {
         "name": measured.name, "source": measured.source, "quantity": measured.quantity,
         "unit": measured.record.unit, "repetitions": len(measured.values),
-        "places_m": [_known(place) for place in measured.places],
+        "places_m": [_known_rows(place) for place in measured.places],
         "samples": len(measured.axis), "is_spectrum": measured.is_spectrum,
-        "rate_hz": _known([measured.rate])[0], "has_drive": len(measured.drive) > 0,
+        "rate_hz": _known_rows([measured.rate])[0], "has_drive": len(measured.drive) > 0,
         "lines": [
             {"frequency_hz": line.frequency, "frequency_error_hz": line.error,
              "false_alarm": line.false_alarm, "what": origin,
              "amplitudes": line.amplitudes.tolist()}
             for line, origin in zip(inspection.lines, inspection.origins, strict=True)
         ],
-        "looked_at": (inspection.kept + 1).tolist(), "noise_floor": _known(inspection.noise),
+        "looked_at": (inspection.kept + 1).tolist(), "noise_floor": _known_rows(inspection.noise),
         "clipped_samples": inspection.clipped.tolist(),
         "constant_places": (inspection.constant + 1).tolist(), "missing": list(inspection.missing),
     }  # fmt: skip
 
 
-def _known(values: Any) -> list[float | None]:
+def _known_rows(values: Any) -> list[float | None]:
     return [None if np.isnan(x) else float(x) for x in values]
 
 

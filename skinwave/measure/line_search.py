@@ -82,7 +82,7 @@ def find_lines(values: Floats, rate: float, *, alarm: float = ALARM) -> LineSpec
     x = np.moveaxis(values, 0, 1).reshape(count, runs * places)
     least = 2 / rate * (ROUND_OFF * np.abs(values).max()) ** 2
     width, chance = rate / count, np.empty(0)
-    fit = _fitted(x, np.empty(0), rate, np.ones((2, places)), runs)
+    fit = _fit_lines(x, np.empty(0), rate, np.ones((2, places)), runs)
     density = rest = _densities(fit.rest, runs, rate)
     floor = np.maximum(noise_floor(density, runs), least)
     for _ in range(MOST_PASSES):
@@ -93,11 +93,11 @@ def find_lines(values: Floats, rate: float, *, alarm: float = ALARM) -> LineSpec
         chosen = away >= min(CLOSE, away.max())
         start = np.append(fit.frequencies, peak[chosen] * width)
         chance = np.append(chance, peak_chance[chosen])
-        fit = _fitted(x, start, rate, floor, runs)
+        fit = _fit_lines(x, start, rate, floor, runs)
         # Before the neighbour of a line is known, the residual of the line may look like a line.
         kept = _are_significant(fit, floor, rate, alarm)
         if not kept.all():
-            fit, chance = _fitted(x, fit.frequencies[kept], rate, floor, runs), chance[kept]
+            fit, chance = _fit_lines(x, fit.frequencies[kept], rate, floor, runs), chance[kept]
         rest = _densities(fit.rest, runs, rate)
         floor = np.maximum(noise_floor(rest, runs), least)
         if len(chance) >= MOST_LINES:
@@ -174,7 +174,7 @@ def _errors(fit: _Fit, rate: float, floor: Floats, runs: int) -> Floats:
     return fit.errors * np.sqrt(np.maximum(excess, 1.0))
 
 
-def _fitted(x: Floats, start: Floats, rate: float, floor: Floats, runs: int) -> _Fit:
+def _fit_lines(x: Floats, start: Floats, rate: float, floor: Floats, runs: int) -> _Fit:
     """Return lines fitted together to waveforms (t, r p), weighted by the noise floor (f, p), from
     frequencies (l,) in Hz that are known to a fraction of a bin.
     """

@@ -157,14 +157,14 @@ def lines_of(
     shifts = np.zeros(len(each))
     if len(each) > 1:
         each, shifts = in_step(each, frequencies)
-        variance, degrees = _pooled(each, variance, degrees)
+        variance, degrees = _pool_variances(each, variance, degrees)
     return MeasuredLines(
         frequencies=frequencies, each=each, variance=variance, freedom=degrees[:, None],
         shifts=shifts, correlation=correlation,
     )  # fmt: skip
 
 
-def _pooled(each: np.ndarray, floor: Floats, degrees: Floats) -> tuple[Floats, Floats]:
+def _pool_variances(each: np.ndarray, floor: Floats, degrees: Floats) -> tuple[Floats, Floats]:
     """Return variances (f, p) of the mean, and degrees (f,), from floor and repetitions."""
     runs, lines, places = each.shape
     variance, own = each.var(axis=0, ddof=1) / runs, np.full((lines, 1), 2.0 * (runs - 1))
@@ -208,7 +208,7 @@ def _of_waveforms(measurement: Measurement, frequencies: Floats, settle: float) 
     window = cosines("hann", n)
     rest = window[:, None] * (x - waves.T @ fitted)
     density = (np.abs(np.fft.rfft(rest, axis=1)) ** 2).mean(axis=0) / (window**2).sum()
-    kept = _kept(window, waves, rows)
+    kept = _select(window, waves, rows)
     floor = noise_floor(density, runs, kept)  # S r / 2, for white noise its variance
     spectra = np.fft.rfft(rows[np.append(cosine, sine)])
     sides = np.full(len(floor), 2.0)
@@ -225,7 +225,7 @@ def _of_waveforms(measurement: Measurement, frequencies: Floats, settle: float) 
     )  # fmt: skip
 
 
-def _kept(window: Floats, waves: Floats, rows: Floats) -> Floats:
+def _select(window: Floats, waves: Floats, rows: Floats) -> Floats:
     """Return the share (k,) of windowed white noise that a fit leaves at each bin."""
     moved, made = np.fft.rfft(window * rows), np.fft.rfft(window * waves)
     removed = 2 * (made.conj() * moved).real.sum(axis=0)

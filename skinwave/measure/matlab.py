@@ -92,14 +92,14 @@ def _add(arrays: dict[str, np.ndarray], name: str, value: Any, depth: int) -> No
         for field, one in value.items():
             _add(arrays, f"{name}.{field}", one, depth + 1)
     elif isinstance(value, list):
-        value = _stacked(value)
+        value = _stack(value)
     if isinstance(value, np.ndarray) and value.dtype.kind in "fiucU":
         arrays[name] = value
 
 
-def _stacked(parts: list[Any]) -> np.ndarray | None:
+def _stack(parts: list[Any]) -> np.ndarray | None:
     """Return arrays along a new first axis, nan at the end of shorter vectors, or None."""
-    parts = [_stacked(one) if isinstance(one, list) else one for one in parts]
+    parts = [_stack(one) if isinstance(one, list) else one for one in parts]
     kinds = {one.dtype.kind if isinstance(one, np.ndarray) else "" for one in parts}
     if not kinds or (not kinds <= set("fiuc") and kinds != {"U"}):
         return None

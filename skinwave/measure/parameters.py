@@ -85,7 +85,7 @@ class Parameters:
         """Return the values of all keys at a point u (k,) of the unit cube."""
         values = {each.key: each.value(float(x)) for each, x in zip(self.free, u, strict=True)}
         for key, text in self.ties.items():
-            values[key] = _tied(key, text, values)
+            values[key] = _tied_value(key, text, values)
         return values
 
 
@@ -116,12 +116,12 @@ def _key(text: str) -> str:
     return key if key in OF_MEASUREMENT else variation.parse(f"{key}=0").key
 
 
-def _tied(key: str, expression: str, values: Values) -> float:
+def _tied_value(key: str, expression: str, values: Values) -> float:
     """Return the value of an expression of other keys."""
     keys = r"(?<![\w.])[A-Za-z_][\w.]*"
     try:
         numbers = re.sub(keys, lambda match: f"({float(values[match[0]])!r})", expression)
-        value = float(_evaluated(ast.parse(numbers, mode="eval").body))
+        value = float(_evaluate(ast.parse(numbers, mode="eval").body))
     except (ArithmeticError, LookupError, SyntaxError, TypeError, ValueError):
         raise ValueError(
             f"--tie {key}={expression} cannot be evaluated; use numbers and keys that vary"
@@ -131,15 +131,15 @@ def _tied(key: str, expression: str, values: Values) -> float:
     return value
 
 
-def _evaluated(node: ast.AST) -> float:
+def _evaluate(node: ast.AST) -> float:
     """Return the value of an expression of numbers with + - * / and **."""
     match node:
         case ast.Constant(value=int() | float() as value):
             return value
         case ast.BinOp(left=left, op=op, right=right):
-            return OPERATORS[type(op)](_evaluated(left), _evaluated(right))
+            return OPERATORS[type(op)](_evaluate(left), _evaluate(right))
         case ast.UnaryOp(op=ast.USub(), operand=operand):
-            return -_evaluated(operand)
+            return -_evaluate(operand)
     raise ValueError
 
 

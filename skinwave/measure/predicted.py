@@ -136,7 +136,7 @@ def predicted_lines(aim: Target, frequencies: Floats) -> Predict:
     """
     unscaled = _flat_lines if aim.record.is_infinite else _sampled_lines
     unscaled = _reduced_lines if aim.reduced else unscaled
-    base = _cached(lambda values: unscaled(aim, values, frequencies))
+    base = _from_cache(lambda values: unscaled(aim, values, frequencies))
 
     def predict(values: Values) -> Complex:
         late = np.exp(-2j * pi * frequencies * values.get(DELAY, 0.0) / 1e3)
@@ -153,7 +153,7 @@ def predicted_waveforms(aim: Target, times: Floats) -> Predict:
             f"the record ends at {1e3 * last:.4g} ms, after the scene's Tacton of "
             f"{1e3 * duration:.4g} ms; lengthen the Tacton, or cut off the record"
         )
-    base = _cached(lambda values: _history(aim, values, last))
+    base = _from_cache(lambda values: _history(aim, values, last))
 
     def predict(values: Values) -> Floats:
         t = times - values.get(DELAY, 0.0) / 1e3
@@ -164,7 +164,7 @@ def predicted_waveforms(aim: Target, times: Floats) -> Predict:
     return predict
 
 
-def _cached(function: Callable[[Values], Any]) -> Callable[[Values], Any]:
+def _from_cache(function: Callable[[Values], Any]) -> Callable[[Values], Any]:
     @lru_cache(maxsize=CACHED)
     def of_items(items: tuple[tuple[str, float], ...]) -> Any:
         return function(dict(items))

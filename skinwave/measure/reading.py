@@ -16,7 +16,7 @@ from meshes import reading
 from skinwave.measure import arrays, labview, text, universal
 from skinwave.measure.headers import Column
 from skinwave.measure.measurement import Measurement
-from skinwave.measure.recording import Given, Recording, completed, unknown_places
+from skinwave.measure.recording import Given, Recording, complete, unknown_places
 from skinwave.measure.table import Table, recording_of
 from skinwave.measure.units import metres
 from skinwave.typing import Floats
@@ -122,7 +122,7 @@ def read(path: str | Path, **options: Any) -> Measurement:
         if getattr(given, option) and option not in reader.choices:
             raise ValueError(f"{path}: --{option} has no effect on {reader.name} files")
     try:
-        return completed(reader.read(path, given), given, path)
+        return complete(reader.read(path, given), given, path)
     except ValueError as error:
         message = " ".join(str(error).split())
         prefix = "" if message.startswith(str(path)) else f"{path}: "

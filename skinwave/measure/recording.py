@@ -77,13 +77,13 @@ def unknown_places(count: int) -> Floats:
     return np.full((count, 2), np.nan)
 
 
-def completed(recording: Recording, given: Given, path: Path) -> Measurement:
+def complete(recording: Recording, given: Given, path: Path) -> Measurement:
     """Return the measurement in SI, positive into the body."""
     remarks = list(recording.remarks)
     quantity, unit = _quantity(recording, given)
     recording = replace(recording, places=_places(recording, given))
     recording = _without_empty(recording, remarks)
-    times, recording = _sampled(recording, given, remarks)
+    times, recording = _sample_evenly(recording, given, remarks)
     sign = given.sign or recording.sign
     values = units.in_si(recording.values, units.motion_divisor(unit, quantity)) * (sign or 1)
     if values.size and not np.abs(values).max() < LARGEST_VALUE:
@@ -153,7 +153,7 @@ def _without_empty(recording: Recording, remarks: list[str]) -> Recording:
     return replace(recording, values=values, frequencies=frequencies, drive=drive)
 
 
-def _sampled(
+def _sample_evenly(
     recording: Recording, given: Given, remarks: list[str]
 ) -> tuple[Floats, Recording]:  # fmt: skip
     """Return even times, and the recording at each of them without missing samples."""
@@ -186,7 +186,7 @@ def _times(recording: Recording, given: Given, remarks: list[str]) -> tuple[Floa
     count = recording.values.shape[1]
     rate = recording.rate if given.rate is None else given.rate
     if given.rate is None and len(recording.times):
-        return _even(recording.times)
+        return _even_times(recording.times)
     if np.isnan(rate):
         raise ValueError("the file gives no sampling rate; give --rate in Hz")
     if not 0 < rate < np.inf:
@@ -194,7 +194,7 @@ def _times(recording: Recording, given: Given, remarks: list[str]) -> tuple[Floa
     if len(recording.times) < 2:
         return np.arange(count) / rate, np.arange(count)
     try:
-        times, index = _even(recording.times)
+        times, index = _even_times(recording.times)
     except ValueError:
         span, steps = float(recording.times[-1] - recording.times[0]), np.diff(recording.times)
         if not span > 0 or steps.max() > max(3 * steps.mean(), 1.5 * np.median(steps[steps > 0])):
@@ -208,7 +208,7 @@ def _times(recording: Recording, given: Given, remarks: list[str]) -> tuple[Floa
     return start + np.arange(len(times)) / rate, index
 
 
-def _even(times: Floats) -> tuple[Floats, np.ndarray]:
+def _even_times(times: Floats) -> tuple[Floats, np.ndarray]:
     """Return even times (n,) for rounded ones with missing rows, and the index (t,) of each."""
     largest = float(np.abs(times).max(initial=0.0))
     if largest > LARGEST_TIME:

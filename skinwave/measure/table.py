@@ -100,8 +100,8 @@ def recording_of(table: Table, given: Given) -> Recording:
         places, spot = _distinct(coordinates(table))
         at = table.index(REPETITION)
         run = np.unique(numbers[:, at], return_inverse=True)[1] if at >= 0 else 0 * row
-        values = _arranged(series[0][1], (run, row, spot))
-        drive = _arranged(drive, (run, row, spot))[0, :, 0] if len(drive) else drive
+        values = _arrange(series[0][1], (run, row, spot))
+        drive = _arrange(drive, (run, row, spot))[0, :, 0] if len(drive) else drive
     else:
         values, places = _by_repetition(series)
     notes = {key: value for key, value in reversed(table.notes) if value}
@@ -128,7 +128,7 @@ def _with_roles(table: Table, given: Given) -> tuple[Table, list[str]]:
         is_other = column.role in (X, Y, Z) and not is_length
         if is_other or (column.role == INDEX and not _counts(numbers[:, k])):
             columns[k] = replace(column, role="")
-    chosen = _chosen(columns, given.columns)
+    chosen = _choose_columns(columns, given.columns)
     directions = [_DIRECTION.search(c.text.lower()) for c in columns if quantity_of(c.unit)]
     axes = sorted({match[1] for match in directions if match})
     if len(axes) > 1 and not (chosen or has_places):
@@ -195,7 +195,7 @@ def _one_time(columns: list[Column], numbers: Floats) -> list[Column]:
     ]
 
 
-def _chosen(columns: list[Column], wanted: tuple[str, ...]) -> list[int]:
+def _choose_columns(columns: list[Column], wanted: tuple[str, ...]) -> list[int]:
     """Return indices of columns that a user names by heading or by number from 1."""
     chosen = []
     for name in wanted:
@@ -351,7 +351,7 @@ def _distinct(points: Floats) -> tuple[Floats, np.ndarray]:
     return points[first[order]], np.argsort(order)[inverse.ravel()]
 
 
-def _arranged(values: np.ndarray, at: tuple[np.ndarray, ...]) -> np.ndarray:
+def _arrange(values: np.ndarray, at: tuple[np.ndarray, ...]) -> np.ndarray:
     """Return values (r, n, p) from rows with these indices."""
     shape = tuple(int(k.max()) + 1 for k in at)
     total = int(np.prod(shape, dtype=object))

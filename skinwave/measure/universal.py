@@ -62,7 +62,7 @@ def read(path: Path, given: Given) -> Recording:
     if not first.is_in_time and not np.iscomplexobj(values):
         raise ValueError("the spectra have no phase; export complex spectra or time responses")
     nodes = [node for node, _ in groups]
-    values, drive, remarks = _aligned(values, others, first, nodes)
+    values, drive, remarks = _align(values, others, first, nodes)
     directions = [abs(one.direction) for one in functions if one.quantity]
     if left_out := sum(d not in (0, abs(first.direction)) for d in directions):
         remarks.append(f"{left_out} functions of other directions are left out")
@@ -212,7 +212,7 @@ def _along_axis(motion: list[Function]) -> tuple[list[Function], int]:
     return turned, -(abs(directions[0]) == AXES["z"])
 
 
-def _aligned(
+def _align(
     values: np.ndarray, others: list[Function], first: Function, nodes: list[int]
 ) -> tuple[np.ndarray, np.ndarray, list[str]]:
     """Return values (r, n, p) aligned by the reference of each, the drive, and remarks."""

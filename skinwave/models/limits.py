@@ -87,7 +87,7 @@ def check_taken(model: Model, scene: Scene) -> None:
 def refusal(scene: Scene, model: Model, limits: Sequence[Limit]) -> Refused:
     """Return the refusal of a scene for some limits of a model, with cures."""
     others = [name for name in takers(scene) if name != model.name][:MOST_CURES]
-    own = _changed(scene, model, limits)
+    own = _changes(scene, model, limits)
     cures = [*own, *(Cure(words="", scene=scene, model=name) for name in others)]
     return _with_cures(_reason(model, limits), cures or _any_cures(scene), model.name)
 
@@ -104,7 +104,7 @@ def cures_for(scene: Scene, model: Model) -> list[Cure]:
     """Return how a model can take a scene: unchanged, or by a change if one helps."""
     if takes(model, scene):
         return [Cure(words="", scene=scene, model=model.name)]
-    return [*_changed(scene, model, beyond(model, scene))]
+    return [*_changes(scene, model, beyond(model, scene))]
 
 
 def in_words(cures: Sequence[Cure], requested: str) -> str:
@@ -128,12 +128,12 @@ def _any_cures(scene: Scene) -> list[Cure]:
     """Return changes of a scene after which one of the models takes it."""
     cures: dict[str, Cure] = {}
     for model in _candidates(scene):
-        for cure in _changed(scene, model, beyond(model, scene)):
+        for cure in _changes(scene, model, beyond(model, scene)):
             cures.setdefault(cure.words, cure)
     return [*cures.values()][:MOST_CURES]
 
 
-def _changed(scene: Scene, model: Model, limits: Sequence[Limit]) -> Iterator[Cure]:
+def _changes(scene: Scene, model: Model, limits: Sequence[Limit]) -> Iterator[Cure]:
     """Yield the change of a scene that meets all limits of a model, if there is one."""
     changed = scene
     try:

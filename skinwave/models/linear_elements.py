@@ -114,7 +114,7 @@ def _limits(
         )
 
 
-def _reduced(scene: Scene, times: Floats, options: SolveOptions) -> Response:
+def _solve_reduced(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     prepared = prepare(
         scene.body, scene.probe_points, options.progress, h=options.h, solver=options.solver,
         tolerance=reduction_tolerance(options.tolerance), reading=scene.reading, load=scene.load,
@@ -308,7 +308,7 @@ FEM = register(
         name="fem",
         method="10-node tetrahedra, reduced-order model",
         words="linear waves on 10-node tetrahedra by a reduced-order model",
-        solve=_reduced,
+        solve=_solve_reduced,
         error=None,
         default_size=default_size,
         limits=partial(_limits, frame_air_limits, True),

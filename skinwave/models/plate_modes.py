@@ -106,7 +106,7 @@ class Driven:
 
 def steady_answer(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     """Solve the steady state of the modes under every line of the load below half the rate."""
-    started, driven = time.perf_counter(), _driven(scene, times, options)
+    started, driven = time.perf_counter(), _drive(scene, times, options)
     return _response(scene, times, MODES.name, driven, _steady(scene, driven, times), started)
 
 
@@ -115,7 +115,7 @@ def steady_lines(scene: Scene, places: Floats | None = None) -> tuple[Floats, Co
     steady state, at places (p, 2) in metre or at its probes. Raises a ValueError for a load without
     lines.
     """
-    driven = _driven(scene, sample_times(scene), SolveOptions())
+    driven = _drive(scene, sample_times(scene), SolveOptions())
     if places is not None:
         outputs = driven.modes.at(places - scene.body.placement.offset)
         driven = replace(driven, outputs=outputs)
@@ -124,12 +124,12 @@ def steady_lines(scene: Scene, places: Floats | None = None) -> tuple[Floats, Co
 
 def answer_from_rest(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     """Solve the steady state and the free vibration that a start from rest leaves."""
-    started, driven = time.perf_counter(), _driven(scene, times, options)
+    started, driven = time.perf_counter(), _drive(scene, times, options)
     values = _steady(scene, driven, times) + _free_vibration(scene, driven, times)
     return _response(scene, times, FROM_REST.name, driven, values, started)
 
 
-def _driven(scene: Scene, times: Floats, options: SolveOptions) -> Driven:
+def _drive(scene: Scene, times: Floats, options: SolveOptions) -> Driven:
     body, pressure = scene.body, scene.pressure
     options.progress("modes", 0.0)
     modes: PlateModes = modes_of(plate_of(body))
@@ -258,7 +258,7 @@ def linear_error(scene: Scene, times: Floats, linear: Floats) -> float:
     return float(relative_changes(stretching, linear + stretching).max())
 
 
-def settled(scene: Scene, tolerance: float) -> tuple[Floats, Floats, PlateModes]:
+def steady_motion(scene: Scene, tolerance: float) -> tuple[Floats, Floats, PlateModes]:
     """Return the motion of a whole sheet about its mean in the later half of a scene: times (t,) in
     s, coordinates (t, m) in kg^1/2 m of all modes, and the modes.
     """

@@ -18,7 +18,7 @@ def _same_load(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     return point_kernel(scene.pressure, scene.probe_points, times)
 
 
-def _published(scene: Scene, times: Floats, options: SolveOptions) -> Response:
+def _solve_published(scene: Scene, times: Floats, options: SolveOptions) -> Response:
     return point_kernel_published(scene.pressure, scene.probe_points, times)
 
 
@@ -49,7 +49,7 @@ PUBLISHED = register(
         label="kernel, as published",
         words="the same under the load of Lim, Seifi and Park: the commanded signal itself, "
         "without a mean",
-        solve=_published,
+        solve=_solve_published,
         colour="#999999",
     )
 )

@@ -23,7 +23,7 @@ from fem.energy import mean_power
 from fem.maxwell import maxwell_only
 from fem.reduced import exponential_sum, impulse_response, line_response
 from meshes import cache
-from meshes.records import decoded, encoded
+from meshes.records import decode, encode
 from simple_model import Effort, Material, MovingPressure, Response
 from simple_model.load.focus import spot_width
 from simple_model.load.sampling import below_half_the_rate, highest_driving
@@ -149,7 +149,7 @@ def cached_record(name: str) -> Any:
     """Return the record that is cached under a name, or None."""
     entry = cache.load(name)
     try:
-        return decoded(entry["meta"], entry) if entry else None
+        return decode(entry["meta"], entry) if entry else None
     except (ImportError, KeyError, TypeError, ValueError):  # of another version of skinwave
         return None
 
@@ -157,7 +157,7 @@ def cached_record(name: str) -> Any:
 def store_record(name: str, record: object) -> None:
     """Cache a record under a name, if all numbers of its arrays are finite."""
     arrays: dict[str, np.ndarray] = {}
-    cache.store(name, encoded(record, arrays), **arrays)
+    cache.store(name, encode(record, arrays), **arrays)
 
 
 def entry_name(

@@ -137,7 +137,7 @@ def reduced_answer(scene: Scene, times: Floats, options: SolveOptions) -> Respon
     quantity, probes = scene.reading.record, scene.probe_points
     with clock("reduce"):
         options.progress("reduce", 0.0)
-        sheet = _reduced(scene.body, size, options.solver)
+        sheet = _reduce(scene.body, size, options.solver)
         read = modal_reader(
             scene.body, sheet.made, sheet.modes, sheet.operators, probes, scene.reading,
             options.solver,
@@ -204,7 +204,7 @@ def _from_rest(
 
 
 @lru_cache(maxsize=1)
-def _reduced(body: Body, h: float, solver: str) -> _Reduced:
+def _reduce(body: Body, h: float, solver: str) -> _Reduced:
     """Reduce the sheet to its modes, cached for many Tactons in a row."""
     made = meshed_sheet(body, h)
     operators = stretching_body(body, made).operators

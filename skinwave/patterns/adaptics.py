@@ -21,7 +21,7 @@ from simple_model import Tacton, Trajectory
 from simple_model.load.tacton import COMMENSURATE, LONGEST, RETURN_TOLERANCE
 from simple_model.load.trajectory import LARGEST_SIZE
 from skinwave.patterns.adaptics_file import Brush, Track, parse
-from skinwave.patterns.pattern import ENGINE_RATE, STRAIGHT, Options, Pattern, one_height, thinned
+from skinwave.patterns.pattern import ENGINE_RATE, STRAIGHT, Options, Pattern, one_height, thin
 from skinwave.typing import Floats
 
 ENDLESS = 1.0  # s, duration of a pattern without an end
@@ -49,7 +49,7 @@ def read(content: bytes, options: Options) -> Pattern:
             + (f"; the first {1e3 * before:g} ms are left out" if before else "")
         )
     t, p = _playhead(runs, 1)
-    before_p, part = _between(animation.brushes, p)
+    before_p, part = _keyframe_before(animation.brushes, p)
     visited = np.union1d(before_p, before_p[part > 0] + 1)
     brushes = list(dict.fromkeys(animation.brushes.values[k] for k in visited))
     if animation.loop is not None and (count := _loops(brushes, duration, notes)) > 1:
@@ -78,7 +78,7 @@ def read(content: bytes, options: Options) -> Pattern:
             f"sampled at {ENGINE_RATE:g} Hz like the engine, and reduced to straight lines within "
             f"{1e3 * STRAIGHT[0]:g} mm"
         )
-        tacton = _recorded(t, (place[:, :2] + offset) / 1e3, level)
+        tacton = _record(t, (place[:, :2] + offset) / 1e3, level)
     return Pattern(tacton=tacton, pressure=pressure, name=animation.name, notes=tuple(notes))
 
 
@@ -112,9 +112,9 @@ def _playhead(runs: Floats, count: int) -> tuple[Floats, Floats]:
     return t, np.asarray(runs[run, 1] - (ends[run] - again))
 
 
-def _recorded(t: Floats, places: Floats, levels: Floats) -> Tacton:
+def _record(t: Floats, places: Floats, levels: Floats) -> Tacton:
     """Return a Tacton of a focus at places (t, 2) in metre with levels (t,)."""
-    kept = thinned(t, places, levels)
+    kept = thin(t, places, levels)
     path = Trajectory(
         shape="recorded", times=tuple(np.round(t[kept], 9).tolist()),
         points=tuple(map(tuple, np.round(places[kept], 9).tolist())),
@@ -156,12 +156,12 @@ def _constant(brush: Brush, place: Floats, notes: list[str]) -> Tacton:
 def _at(track: Track, t: Floats) -> Floats:
     """Return values (t, k) of a track of numbers, or of k numbers each."""
     values = np.array(track.values).reshape(len(track.values), -1)
-    before, part = _between(track, t)
+    before, part = _keyframe_before(track, t)
     after = np.minimum(before + 1, len(values) - 1)
     return np.asarray(values[before] + part[:, None] * (values[after] - values[before]))
 
 
-def _between(track: Track, t: Floats) -> tuple[np.ndarray, Floats]:
+def _keyframe_before(track: Track, t: Floats) -> tuple[np.ndarray, Floats]:
     """Return the index of the last keyframe, and the fraction of the way to the next."""
     times = np.array(track.times)
     before = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 1)
@@ -178,7 +178,7 @@ def _brush_at(track: Track, p: Floats, t: Floats) -> tuple[Floats, Floats]:
     Numbers of brushes of one kind are interpolated, of a lissajous only its rotation. A brush stays
     constant until one of another kind.
     """
-    before, part = _between(track, p)
+    before, part = _keyframe_before(track, p)
     offset, cycles = np.zeros((len(t), 2)), np.zeros(len(t))
     for k in np.unique(before):
         mine, brush = before == k, track.values[k]

@@ -132,7 +132,7 @@ class _Numbers:
         if not definition and not is_given:
             raise ValueError(f"parameter {str(name)[:40]!r} has no definition; define its default")
         title = f"parameter '{name[:40]}'"
-        default = _checked(definition, title).get("default")
+        default = _check(definition, title).get("default")
         given = value = _finite(self._given.get(name, default), f"default of {title}")
         for key, bound in (("min", max), ("max", min)):
             if definition.get(key) is not None:
@@ -191,7 +191,7 @@ def _animation(table: Table, number: _Numbers) -> Animation:
         notes.append(f"playback at {speed:g} times the speed; drawing frequencies do not change")
     return Animation(
         name=str(table.get("name", ""))[:80], brushes=_track(tracks["brush"], POINT),
-        places=replace(places, values=_transformed(places.values, geometry, number)),
+        places=replace(places, values=_transform(places.values, geometry, number)),
         intensities=_track(tracks["intensity"], 0.0), factor=factor, runs=runs, loop=loop,
         notes=tuple(notes),
     )  # fmt: skip
@@ -204,7 +204,7 @@ def _keyframes(table: Table, speed: float) -> list[tuple[float, Table]]:
         raise ValueError("the file has no keyframes; add at least one")
     found = [
         (
-            _finite(_checked(each, "a keyframe").get("time"), "time of a keyframe") / 1e3 / speed,
+            _finite(_check(each, "a keyframe").get("time"), "time of a keyframe") / 1e3 / speed,
             each,
         )
         for each in keyframes
@@ -226,7 +226,7 @@ def _track(entries: list[Entry], first: Any) -> Track:
 def _jump(frame: Table, number: _Numbers) -> float | None:
     """Return the target in s, at speed 1, of the first jump whose condition is met."""
     for each in _child(frame, "cjumps", list, []) or []:
-        jump = _checked(each, "a conditional jump")
+        jump = _check(each, "a conditional jump")
         if number.is_met(_child(jump, "condition", dict, {})):
             return _finite(jump.get("jump_to"), "jump_to of a jump") / 1e3
     return None
@@ -291,7 +291,7 @@ SETTINGS: dict[str, Callable[[Table, _Numbers], Any]] = {
 }  # fmt: skip
 
 
-def _transformed(
+def _transform(
     places: Iterable[tuple[float, ...]], transform: Table, number: _Numbers
 ) -> tuple[tuple[float, ...], ...]:
     """Scale, rotate and move places, in this order; brushes stay the same."""
@@ -307,10 +307,10 @@ def _transformed(
 
 
 def _child(table: Table, key: str, kind: type, default: Any = None) -> Any:
-    return _checked(table.get(key, default), key, kind)
+    return _check(table.get(key, default), key, kind)
 
 
-def _checked(value: Any, name: str, kind: type = dict) -> Any:
+def _check(value: Any, name: str, kind: type = dict) -> Any:
     if not isinstance(value, kind):
         word = "an object" if kind is dict else "a list"
         raise ValueError(f"{name} is {json.dumps(value)[:40]}; it must be {word}")

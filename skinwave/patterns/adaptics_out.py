@@ -8,7 +8,7 @@ import numpy as np
 
 from simple_model import Tacton
 from skinwave.patterns.adaptics_file import DRAWING_FREQUENCY, FORMAT, REVISIONS
-from skinwave.patterns.pattern import ENGINE_RATE, STRAIGHT, Options, loudness, thinned
+from skinwave.patterns.pattern import ENGINE_RATE, STRAIGHT, Options, loudness, thin
 from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
 
@@ -89,7 +89,7 @@ def _path(scene: Scene) -> tuple[Floats, Floats, Floats]:
     times = times[(times >= 0) & (times <= end)]
     phases = np.mod(f_d * times + ahead, 1.0)
     places, levels = path.at_phase(phases), np.sqrt(scene.pressure.weight(phases))
-    kept = thinned(times, places, levels)
+    kept = thin(times, places, levels)
     if len(kept) > MOST_KEYFRAMES:
         raise ValueError(
             f"the path of {end:g} s needs {len(kept):,} keyframes, more than {MOST_KEYFRAMES:,}; "

@@ -9,7 +9,7 @@ from math import ceil
 import numpy as np
 
 from simple_model import MovingPressure
-from skinwave.patterns.pattern import Options, aliased, loudness
+from skinwave.patterns.pattern import Options, aliasing_notes, loudness
 from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
 
@@ -41,7 +41,7 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
         notes.append(f"{foci} foci {'in turn' if in_turn else 'at the same time'}")
     if len(samples) > 1:
         notes.append(f"modulation: {len(samples)} samples at {TICK / ticks:g} Hz with 8 bits")
-    notes += aliased(scene.tacton, TICK / ticks)
+    notes += aliasing_notes(scene.tacton, TICK / ticks)
     return _script(scene, places, division, samples, ticks, notes).encode(), tuple(notes)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from simple_model import Tacton, Trajectory, even_phases
 from simple_model.choices import suggestion
 from simple_model.load.tacton import LONGEST, MOST_FOCI
-from skinwave.patterns.pattern import Options, Pattern, aliased, loudness, one_height
+from skinwave.patterns.pattern import Options, Pattern, aliasing_notes, loudness, one_height
 from skinwave.scene.scene import Scene
 from skinwave.system.plain_text import as_utf_8, csv_table, number_in
 from skinwave.typing import Floats
@@ -127,7 +127,7 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
     notes = (
         f"{len(t):,} samples of {len(tacton.foci)} focal points at {rate:g} Hz",
         "intensity is the sound pressure relative to full drive, the root of the load",
-        *aliased(tacton, rate),
+        *aliasing_notes(tacton, rate),
     )
     return csv_table(COLUMNS, rows, "\n"), notes
 

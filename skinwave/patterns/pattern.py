@@ -88,7 +88,7 @@ def wide_enough(base: Scene, tacton: Tacton, notes: list[str]) -> Scene:
     return replace(base, body=replace(base.body, width=width, height=height))
 
 
-def aliased(tacton: Tacton, rate: float) -> list[str]:
+def aliasing_notes(tacton: Tacton, rate: float) -> list[str]:
     """Return a note on each tone of the modulation above half a rate in Hz."""
     return [
         f"AM of {f:g} Hz is above half the sample rate, {rate / 2:g} Hz, and becomes "
@@ -115,7 +115,7 @@ def one_height(z: Floats, options: Options, notes: list[str]) -> dict[str, float
     return {"height": float(z[0])}
 
 
-def thinned(t: Floats, places: Floats, levels: Floats) -> np.ndarray:
+def thin(t: Floats, places: Floats, levels: Floats) -> np.ndarray:
     """Return indices (k,) of samples such that straight lines between them are within `STRAIGHT`
     of all places (t, 2) in metre and levels (t,) at times (t,).
     """

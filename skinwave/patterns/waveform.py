@@ -26,8 +26,8 @@ def read(content: bytes, options: Options, base: Scene) -> Pattern:
     """
     choose("role of a WAV", options.role, ROLES)
     choose("scale", options.scale, SCALES)
-    rate, samples = _decoded(content)
-    samples, note = _scaled(samples, options.scale)
+    rate, samples = _decode(content)
+    samples, note = _scale(samples, options.scale)
     if options.role == "envelope":
         if samples.min() < -RESOLUTION:
             raise ValueError(
@@ -51,7 +51,7 @@ def read(content: bytes, options: Options, base: Scene) -> Pattern:
     )
 
 
-def _decoded(content: bytes) -> tuple[int, Floats]:
+def _decode(content: bytes) -> tuple[int, Floats]:
     """Return the rate in Hz, and samples (k,) with full scale 1."""
     try:
         with warnings.catch_warnings():
@@ -72,7 +72,7 @@ def _decoded(content: bytes) -> tuple[int, Floats]:
     return rate, data.astype(np.float64)
 
 
-def _scaled(samples: Floats, scale: str) -> tuple[Floats, str]:
+def _scale(samples: Floats, scale: str) -> tuple[Floats, str]:
     """Return scaled samples (k,), and the scale in words."""
     peak, rms = float(np.abs(samples).max()), float(np.sqrt(np.mean(samples**2)))
     if peak == 0:

@@ -28,7 +28,7 @@ Coarser = tuple[float, ReducedBody]  # element size in metre, and the body with 
 COARSE_RATIO = 2.0  # of the element size of the mesh to compare with, over a default one
 
 
-def assessed(
+def assess(
     scene: Scene,
     response: Response,
     moved: ReducedBody | Array,
@@ -72,12 +72,12 @@ def assessed(
 
 
 def coarser_body(scene: Scene, options: SolveOptions = DEFAULT) -> Coarser:
-    """Return the element size in metre that `assessed` compares with, and the body on that mesh."""
+    """Return the element size in metre that `assess` compares with, and the body on that mesh."""
     body, h = scene.body, options.h
     other = refinement.compared_with(body, h) if h else _coarser_size(body, default_size(body))
     reduction = reduction_tolerance(options.tolerance)
     parts = body, scene.probes, scene.reading, scene.load
-    return other, _prepared(*parts, other, options.solver, reduction)
+    return other, _prepare(*parts, other, options.solver, reduction)
 
 
 def all_warnings(
@@ -105,7 +105,7 @@ def _coarser_size(body: Body, h: float) -> float:
 
 
 @lru_cache(maxsize=4)  # of Tactons on the same bodies
-def _prepared(
+def _prepare(
     body: Body, probes: tuple[tuple[float, float], ...], reading: Reading, load: Load,
     h: float, solver: str, tolerance: float,
 ) -> ReducedBody:  # fmt: skip

@@ -18,7 +18,7 @@ import numpy as np
 from simple_model.layers.compliance import layered
 from simple_model.layers.flat_body import steady_lines
 from simple_model.numbers import percent, significant, stated_error
-from skinwave.bodies.analytic import flattened
+from skinwave.bodies.analytic import flat_layers
 from skinwave.models.limits import takes
 from skinwave.models.plate_modes import MODES
 from skinwave.models.plate_modes import steady_lines as steady_lines_of_plate
@@ -130,7 +130,7 @@ def _closed_form(scene: Scene) -> Callable[[Scene], tuple[Floats, Complex]] | No
 def _lines_of_layers(scene: Scene) -> tuple[Floats, Complex]:
     """Return frequencies (f,) in Hz above 0 and amplitudes (f, p) at the probes of flat layers."""
     pressure = replace(scene.pressure, profile="gaussian")
-    compliance = layered(flattened(scene.body))
+    compliance = layered(flat_layers(scene.body))
     f, a = steady_lines(compliance, pressure, scene.probe_points, threshold=LINE_THRESHOLD)
     return f[f > 0], a[f > 0]
 

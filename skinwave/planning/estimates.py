@@ -89,7 +89,7 @@ def side_reflections(scene: Scene) -> float:
     """
     body, probes = scene.body, scene.probe_points
     half = np.array([body.width, body.height]) / 2
-    images = [] if is_laterally_infinite(body) else _reflecting(body, _mirrored(probes, half))
+    images = [] if is_laterally_infinite(body) else _reflecting(body, _mirror_images(probes, half))
     if not images:
         return 0.0
     is_estimated = scene.load.is_normal
@@ -133,7 +133,7 @@ def absorbing_reflection(scene: Scene, half: Floats, highest: float) -> float:
     path = path_places(scene.tacton.trajectory)
     if _to_edge(scene, half) < 2 * width:
         return 1.0
-    foci = np.array([path, *_mirrored(path, half)])
+    foci = np.array([path, *_mirror_images(path, half)])
     distances = np.linalg.norm(scene.probe_points[:, None] - foci[:, None], axis=-1)  # (5, p, k)
     lines = load_lines(replace(scene.pressure, profile="gaussian"), 1e-2)
     low = lines.frequencies <= max(highest, 1.0)
@@ -149,7 +149,7 @@ def absorbing_reflection(scene: Scene, half: Floats, highest: float) -> float:
     return min(1.0, REFLECTION * float(np.sqrt(ratio.max())))
 
 
-def _mirrored(points: Floats, half: Floats) -> list[Floats]:
+def _mirror_images(points: Floats, half: Floats) -> list[Floats]:
     """Return the mirror images (n, 2) of points (n, 2) in the four sides."""
     return [
         np.where(np.arange(2) == axis, 2 * sign * half - points, points)

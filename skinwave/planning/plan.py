@@ -27,7 +27,7 @@ from skinwave.planning.errors import ErrorPart
 from skinwave.planning.extent import absorbing_error, extent, symmetry
 from skinwave.planning.plan_warnings import NO_ERROR
 from skinwave.planning.record import Plan, PlanRow
-from skinwave.planning.refinement import above_band, refined
+from skinwave.planning.refinement import above_band, refine
 from skinwave.planning.rows import element_rows, neglected_rows
 from skinwave.scene.scene import Scene
 from skinwave.typing import Floats
@@ -278,7 +278,7 @@ def _plan_elements(request: _Request) -> Plan:
         else:
             body, rows, absorbing = extent(scene, options, highest)
         for_mesh = replace(options, tolerance=max(tolerance - absorbing, tolerance / 2))
-        mesh = refined(scene, body, for_mesh, symmetry=axes)
+        mesh = refine(scene, body, for_mesh, symmetry=axes)
     except fem.NotReduced as error:
         limit = Limit(why=f"cannot reduce this body: {error}")
         raise refusal(scene, model, [limit]) from None

@@ -78,7 +78,7 @@ class Refined:
     prepared: ReducedBody
 
 
-def refined(
+def refine(
     scene: Scene, body: Body, options: SolveOptions = DEFAULT, *, symmetry: str = ""
 ) -> Refined:
     """Return the coarsest mesh of a sequence that meets the tolerance, or else the finest; or the

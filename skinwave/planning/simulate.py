@@ -79,8 +79,8 @@ def solve(scene: Scene, planned: Plan) -> Response:
     if planned.prepared and named(planned.model).is_reduced:
         times, first = sample_grid(scene, options.times)
         whole = answer(planned.prepared, scene, options.progress, times=times)
-        return _checked(scene, planned, from_first(whole, first))
-    return _checked(scene, planned, _solved(replace(scene, body=planned.body), options))
+        return _check(scene, planned, from_first(whole, first))
+    return _check(scene, planned, _solve_by_model(replace(scene, body=planned.body), options))
 
 
 def compute(scene: Scene, model: str, **options: Any) -> Response:
@@ -88,10 +88,10 @@ def compute(scene: Scene, model: str, **options: Any) -> Response:
 
     The expected error is unknown unless the model measures it. Raises what `simulate` does.
     """
-    return _solved(scene, SolveOptions(model=model, **options))
+    return _solve_by_model(scene, SolveOptions(model=model, **options))
 
 
-def _solved(scene: Scene, options: SolveOptions) -> Response:
+def _solve_by_model(scene: Scene, options: SolveOptions) -> Response:
     """Return the response of a model with its default mesh, or that of the options."""
     model = named(options.model)
     check_taken(model, scene)
@@ -104,7 +104,7 @@ def _solved(scene: Scene, options: SolveOptions) -> Response:
     return replace(response, load=scene.pressure, effort=effort)
 
 
-def _checked(scene: Scene, planned: Plan, response: Response) -> Response:
+def _check(scene: Scene, planned: Plan, response: Response) -> Response:
     """Return the response with all warnings, and the larger of planned and measured errors."""
     tolerance = planned.options.tolerance
     others = response_warnings(scene, response, planned.error, tolerance)

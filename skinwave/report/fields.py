@@ -17,7 +17,7 @@ from simple_model.numbers import plural, significant, stated_error
 from simple_model.quantities import DISPLACEMENT
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import from_rest, oscillating
-from skinwave.planning.assessment import assessed
+from skinwave.planning.assessment import assess
 from skinwave.report.palette import SIGNED
 from skinwave.results.exports import collection
 from skinwave.results.files import folder_name
@@ -214,7 +214,7 @@ def field(
     response = probe_response(surface, moved)
     held = scene.body.is_held  # the mean of an unconstrained body grows; its lines are compared
     compared = response.values if held else oscillating(probe_lines(surface, moved)).lines
-    response = assessed(surface, response, compared, replace(options, progress=silent))
+    response = assess(surface, response, compared, replace(options, progress=silent))
     for sentence in response.effort.warnings:
         warnings.warn(sentence, SkinwaveWarning, stacklevel=2)
     return Field(

@@ -164,7 +164,7 @@ def make_panel(view: View, cut: bool = False) -> Panel:
     path, probes = path_points(view.scene), view.scene.probe_points
     reach = np.abs(view.places).max(axis=0)
     probes = probes[(np.abs(probes) <= reach).all(axis=1) & ~(cut & (probes[:, 1] < 0))]
-    riding = [(pv.PolyData(_lifted(probes)), probes)] if len(probes) else []
+    riding = [(pv.PolyData(_lift(probes)), probes)] if len(probes) else []
     riding += [(_line(path, cut), path)] if len(path) > 1 else []
     if cut:  # the upper edge of the section
         edge = np.column_stack([np.linspace(-reach[0], reach[0], 121), np.zeros(121)])
@@ -173,7 +173,7 @@ def make_panel(view: View, cut: bool = False) -> Panel:
     under = interpolation(view, 0.9999 * view.scene.tacton.trajectory.position(view.times))
     return Panel(
         view=view, skin=skin, nodes=nodes, marks=tuple(marks),
-        focus=pv.PolyData(_lifted(path[:1])), under_focus=under, factor=exaggeration(view),
+        focus=pv.PolyData(_lift(path[:1])), under_focus=under, factor=exaggeration(view),
     )  # fmt: skip
 
 
@@ -196,10 +196,10 @@ def _line(path: Floats, cut: bool) -> Any:
     if cut:
         pairs = pairs[(path[pairs, 1] >= 0).all(axis=1)]
     cells = np.hstack([np.full((len(pairs), 1), 2), pairs]).ravel()
-    return pv.PolyData(_lifted(path), lines=cells)
+    return pv.PolyData(_lift(path), lines=cells)
 
 
-def _lifted(places: Floats) -> Floats:
+def _lift(places: Floats) -> Floats:
     return np.column_stack([1e3 * places, np.full(len(places), LIFT)])
 
 
@@ -282,5 +282,5 @@ def set_frame(panels: Sequence[Panel], frame: int, limit: float) -> None:
             raised = np.array(mark.points)
             raised[:, 2] = interpolate(height) + LIFT
             mark.points = raised
-        focus = _lifted(view.scene.tacton.trajectory.position(view.times[frame : frame + 1]))
+        focus = _lift(view.scene.tacton.trajectory.position(view.times[frame : frame + 1]))
         panel.focus.points = focus + [0.0, 0.0, panel.under_focus(height)[frame]]

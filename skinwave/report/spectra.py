@@ -109,19 +109,19 @@ def _shown_part(run: Run, runs: list[Run]) -> slice:
     return slice(max(0, last - 1 - round(SHOWN / (times[1] - times[0]))), last)
 
 
-def _centred(run: Run, runs: list[Run]) -> Floats:
+def _remove_mean(run: Run, runs: list[Run]) -> Floats:
     """Return the shown part (t, p) of the response about its mean in the steady state."""
     motion = run.response.values
     return motion[_shown_part(run, runs)] - motion[int(SETTLE * len(motion)) :].mean(axis=0)
 
 
 def _largest(run: Run, runs: list[Run]) -> float:
-    return float(np.abs(_centred(run, runs)).max()) or 1.0
+    return float(np.abs(_remove_mean(run, runs)).max()) or 1.0
 
 
 def _draw_waveforms(ax: Axes, runs: list[Run], p: int) -> None:
     for run in runs:
-        centred = _centred(run, runs)[:, p] / _largest(run, runs)
+        centred = _remove_mean(run, runs)[:, p] / _largest(run, runs)
         times = 1e3 * run.response.times[_shown_part(run, runs)]
         ax.plot(times, centred, color=ink_colour(run.column), lw=_width(run), zorder=_depth(run))
     ax.margins(x=0)

@@ -10,7 +10,7 @@ from simple_model import MovingPressure
 from skinwave.report.palette import label
 from skinwave.report.render import outer_surface
 from skinwave.results.views import View
-from skinwave.system.arrays import quantised
+from skinwave.system.arrays import quantise
 from skinwave.system.scripts import bundle, json_for_script
 from skinwave.system.templates import render
 from skinwave.typing import Complex, Floats
@@ -28,7 +28,7 @@ def turntable(view: View, frame: int) -> str:
     data = {
         "title": label(view.column), "unit": view.quantity.unit, "period": view.period,
         "time": float(view.times[frame]), "frequencies": frequencies.tolist(),
-        "motion": quantised(upwards), "points": _binary(1e3 * view.points[nodes], "<f4"),
+        "motion": quantise(upwards), "points": _binary(1e3 * view.points[nodes], "<f4"),
         "triangles": _binary(triangles, "<u4"), "path": paths.tolist(), "foci": foci.tolist(),
         "probes": view.scene.probe_points[:, :2].tolist(),
     }  # fmt: skip

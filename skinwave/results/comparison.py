@@ -110,7 +110,7 @@ def compare(
     fits = reference.quantity == candidate.quantity
     scale = 1.0 if fits else float((x * y).sum() / max((y * y).sum(), np.finfo(float).tiny))
     norm = np.linalg.norm(x, axis=0)
-    delay, shape_misfit = _aligned(reference, candidate)
+    delay, shape_misfit = _align(reference, candidate)
     a, b = (line_phasors(response, frequencies) for response in (reference, candidate))
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = abs(scale) * np.abs(b) / np.abs(a)
@@ -156,7 +156,7 @@ def _is_strong(line: np.ndarray) -> np.ndarray:
     return (size > 0) & (size >= 10 ** (LOWEST_PHASE_LEVEL / 20) * size.max(initial=0.0))
 
 
-def _aligned(reference: Response, candidate: Response) -> tuple[Floats, Floats]:
+def _align(reference: Response, candidate: Response) -> tuple[Floats, Floats]:
     """Return the best delay (p,) in s at each probe, and the misfit (p,) after it.
 
     A periodic signal correlates with itself after every period. The delay is therefore searched

@@ -26,7 +26,7 @@ from skinwave.models.limits import takes
 from skinwave.models.meshed import line_factor, probe_rows
 from skinwave.models.options import DEFAULT, SolveOptions
 from skinwave.models.plate_modes import ERROR as PLATE_ERROR
-from skinwave.models.plate_modes import FROM_REST, settled
+from skinwave.models.plate_modes import FROM_REST, steady_motion
 from skinwave.models.plate_modes import steady_lines as plate_lines
 from skinwave.models.reduced import read_at
 from skinwave.planning.left_out import beyond_linear
@@ -119,7 +119,7 @@ def surface_lines(scene: Scene) -> LinesAt:
 def kernel_map(pressure: MovingPressure, x: Floats, y: Floats) -> SurfaceField:
     """Return the map of the point kernel's pressure at x (nx,) and y (ny,) in metre."""
     lines_at = partial(pressure_lines, pressure, threshold=NEGLIGIBLE_LINE_RATIO)
-    rms = _rms(PRESSURE, _interpolated(pressure, lines_at, x, y), len(x) * len(y))
+    rms = _rms(PRESSURE, _interpolate(pressure, lines_at, x, y), len(x) * len(y))
     return SurfaceField(x=x, y=y, rms=rms.reshape(len(y), len(x)), quantity=PRESSURE)
 
 
@@ -133,7 +133,7 @@ def body_map(scene: Scene, x: Floats, y: Floats, options: SolveOptions = DEFAULT
     if options.h is None and takes(FROM_REST, scene):
         return _plate_map(scene, x, y)
     if has_wavenumber_integral(scene):
-        lines = _interpolated(scene.pressure, surface_lines(scene), x, y)
+        lines = _interpolate(scene.pressure, surface_lines(scene), x, y)
         return _field(scene, x, y, lines, "laterally infinite layer")
     size = max(options.h or 0.0, COARSER[scene.body.of_kind.is_plate] * default_size(scene.body))
     moved = reduced_motion(scene, replace(options, tolerance=MAP_TOLERANCE, h=size))
@@ -145,7 +145,7 @@ def _plate_map(scene: Scene, x: Floats, y: Floats) -> SurfaceField:
     places = _places(x, y)
     if not beyond_linear(scene, MAP_TOLERANCE):
         return _field(scene, x, y, plate_lines(scene, places), "thin plate")
-    _, z, modes = settled(scene, MAP_TOLERANCE)
+    _, z, modes = steady_motion(scene, MAP_TOLERANCE)
     shapes, covariance = modes.at(places - scene.body.placement.offset), np.cov(z, rowvar=False)
     rms = np.sqrt(np.einsum("pi,ij,pj->p", shapes, covariance, shapes, optimize=True))
     return SurfaceField(x=x, y=y, rms=rms.reshape(len(y), len(x)), note="stretching plate")
@@ -276,7 +276,7 @@ def _field(
     )  # fmt: skip
 
 
-def _interpolated(pressure: MovingPressure, lines_at: LinesAt, x: Floats, y: Floats) -> Lines:
+def _interpolate(pressure: MovingPressure, lines_at: LinesAt, x: Floats, y: Floats) -> Lines:
     """Return the lines on a grid. Those of an axisymmetric load are interpolated from a radius;
     then only their amplitudes are valid.
     """

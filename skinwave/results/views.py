@@ -19,7 +19,7 @@ from meshes.tetmesh import boundary_facets
 from simple_model.load.spectrum import pressure_lines, synthesise
 from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity, quantity
 from skinwave.models.limits import takes
-from skinwave.models.plate_modes import FROM_REST, STRETCHED, settled
+from skinwave.models.plate_modes import FROM_REST, STRETCHED, steady_motion
 from skinwave.models.point_kernel import SAME_LOAD
 from skinwave.models.reduced import oscillating, read_at
 from skinwave.results.motion import BodyMotion, Shade, Tensors, shade, tensors, vibration
@@ -199,7 +199,7 @@ def flat_view(run: Run, reach: Floats, part: tuple[float, int]) -> View:
         points, triangles = _grid(np.array([body.width, body.height]) / 2, LAYER_GRID)
         points[:, :2] += body.placement.offset
         if run.model == STRETCHED.name:
-            lines_at, motion_at = _stretched(scene, lines_at, np.array(body.placement.offset))
+            lines_at, motion_at = _large_motion(scene, lines_at, np.array(body.placement.offset))
     else:
         points, triangles = _grid(reach, LAYER_GRID)
     return _flat_view(scene, run.body, run.model, part, (points, triangles), lines_at, motion_at)
@@ -219,11 +219,11 @@ def _strongest_tone(frequencies: Floats, amplitudes: Floats) -> float:
     return float(frequencies[np.argmax((amplitudes**2).sum(axis=1))])
 
 
-def _stretched(scene: Scene, linear: LinesAt, middle: Floats) -> tuple[LinesAt, MotionAt]:
+def _large_motion(scene: Scene, linear: LinesAt, middle: Floats) -> tuple[LinesAt, MotionAt]:
     """Return lines and motion of a sheet at large deflection, in the later half of the scene."""
     from scipy.interpolate import CubicSpline  # slow to import
 
-    at, z, modes = settled(scene, PLATE_TOLERANCE)
+    at, z, modes = steady_motion(scene, PLATE_TOLERANCE)
     steady = CubicSpline(at - at[0], z)
     f = linear(middle[None])[0]
     window = np.hanning(len(at))

@@ -231,7 +231,7 @@ def _contact_in_mm(key: str, value: Any) -> float:
     return width / 1e3
 
 
-def _scaled(name: str, per_unit: float = 1.0) -> SceneKey:
+def _scaled_number(name: str, per_unit: float = 1.0) -> SceneKey:
     """A number that is stored in SI units, and in the file times `per_unit`."""
     return SceneKey(
         name,
@@ -276,7 +276,7 @@ def _write_depth(depth: float | tuple[float, ...]) -> float | list[float]:
 def _numbers_of(**keys: str) -> dict[str, SceneKey]:
     """Number keys by the names of their attributes; the end of a key is its unit."""
     units = {key: next((x for end, x in PER_SI.items() if key.endswith(end)), 1.0) for key in keys}
-    return {key: _scaled(name, units[key]) for key, name in keys.items()}
+    return {key: _scaled_number(name, units[key]) for key, name in keys.items()}
 
 
 def _words_of(*names: str) -> dict[str, SceneKey]:
@@ -376,7 +376,7 @@ SECTIONS = {
     "load": {
         **_words_of("kind"), **DIRECTION,
         **_numbers_of(force_n="force"),
-        "width_mm": replace(_scaled("width", 1e3), read=_contact_in_mm),
+        "width_mm": replace(_scaled_number("width", 1e3), read=_contact_in_mm),
         **_numbers_of(gravity_m_per_s2="gravity"),
         "support_motion": _record("load", "support_motion", SupportMotion, SUPPORT_MOTION, 2),
     },

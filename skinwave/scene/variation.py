@@ -200,8 +200,8 @@ def with_values(scene: Scene, values: Mapping[str, Any]) -> Scene:
         scene = replace(scene, pressure=pressure, spreads=left)
     elif plain:
         complete = to_table(scene)
-        scene = from_table(_changed(complete, complete, plain))
-    return _scaled(scene, scales)
+        scene = from_table(_change(complete, complete, plain))
+    return _scale(scene, scales)
 
 
 def _split_scales(values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -210,7 +210,7 @@ def _split_scales(values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, 
     return {key: x for key, x in values.items() if key not in scales}, scales
 
 
-def _scaled(scene: Scene, scales: Mapping[str, Any]) -> Scene:
+def _scale(scene: Scene, scales: Mapping[str, Any]) -> Scene:
     """The scene with factors on all moduli or losses, those of one material at once."""
     places: dict[str, dict[str, float]] = {}
     for key, factor in scales.items():
@@ -270,11 +270,11 @@ def _values(text: str) -> list[Any]:
 def _case(table: Any, complete: Any, varied: Mapping[str, Any]) -> DesignPoint:
     scene, before, error = None, None, ""
     plain, scales = _split_scales(varied)
-    made = _changed(table, complete, plain)
+    made = _change(table, complete, plain)
     try:
         text = tomli_w.dumps(made)
         before = loads(text)
-        scene = _scaled(before, scales)
+        scene = _scale(before, scales)
         text = dumps(scene)
     except ValueError as refused:
         error = str(refused)
@@ -286,7 +286,7 @@ def _case(table: Any, complete: Any, varied: Mapping[str, Any]) -> DesignPoint:
     )  # fmt: skip
 
 
-def _changed(table: Any, complete: Any, varied: Mapping[str, Any]) -> Any:
+def _change(table: Any, complete: Any, varied: Mapping[str, Any]) -> Any:
     """A copy of a table with other values, first that of the body, then those in it."""
     for key in sorted(varied, key=lambda key: key != BODY):
         if key == BODY:

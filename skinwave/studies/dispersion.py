@@ -25,7 +25,7 @@ from skinwave.results.propagation import mach_angle
 from skinwave.scene.file import dumps
 from skinwave.scene.scene import Scene
 from skinwave.studies.pages import Gallery
-from skinwave.system.document import Details, Part, Report, preformatted
+from skinwave.system.document import Details, Part, Report, preformat
 from skinwave.system.table import Column, Table
 
 LOWEST, HIGHEST = 10.0, 650.0  # Hz
@@ -244,7 +244,7 @@ def write(folder: Path, driven: DrivenModes) -> None:
         shape=np.array([mode.shapes for mode in modes]),
     )  # fmt: skip
     verdict, *parts = page_parts(driven, Gallery())
-    parts.append(Details("The scene", [preformatted(dumps(driven.scene))]))
+    parts.append(Details("The scene", [preformat(dumps(driven.scene))]))
     Report(f"{driven.scene.name}: waves that its body guides", [str(verdict)], parts).write(folder)
 
 

@@ -47,7 +47,7 @@ from skinwave.system.document import (
     Report,
     Section,
     contents,
-    preformatted,
+    preformat,
 )
 from skinwave.system.effort import Progress, silent
 from skinwave.system.table import Table
@@ -85,18 +85,18 @@ class Gallery:
         kinds = ("png", *self.formats)
         files = {kind: figure_file(figure, kind, self.style.dpi) for kind in kinds}
         with Pillow.open(io.BytesIO(files["png"])) as image:
-            small, kind = _compressed(image.convert("RGB"))
+            small, kind = _compress(image.convert("RGB"))
         return Picture(small, caption, name, kind, files)
 
     def image(self, name: str, pixels: Any, caption: str) -> Picture:
         """Return an image (ny, nx, 3) of bytes with its file."""
         image, buffer = Pillow.fromarray(pixels), io.BytesIO()
         image.save(buffer, format="png", optimize=True)
-        small, kind = _compressed(image)
+        small, kind = _compress(image)
         return Picture(small, caption, name, kind, {"png": buffer.getvalue()})
 
 
-def _compressed(image: Pillow.Image) -> tuple[bytes, str]:
+def _compress(image: Pillow.Image) -> tuple[bytes, str]:
     """Return a small file of a picture, and its format."""
     buffer, kind = io.BytesIO(), "webp" if features.check("webp") else "png"
     image.save(buffer, format=kind, quality=QUALITY, method=4)
@@ -148,7 +148,7 @@ def page_of(
     effort = tables.effort_table(_efforts_by_body(runs), len(groups), seconds)
     body.append(Details("Effort", effort))
     again: list[Part] = [f"Command: {command}"] if command else []
-    scene = [preformatted(dumps(runs[-1].scene))] if is_single else []
+    scene = [preformat(dumps(runs[-1].scene))] if is_single else []
     body.append(Details("The scene and the command", [*again, *notes, *scene]))
     caveats = [*description.quantity_notes(runs[-1].scene), *description.unresolved_lines(runs)]
     parts: list[Part] = [contents(body), *caveats, *body]

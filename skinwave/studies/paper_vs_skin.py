@@ -96,7 +96,7 @@ def _mechanisms(body: Body, h: float | None, progress: Progress) -> Mapping[str,
     """Return by mechanism a function that computes a Tacton's settled response."""
 
     def by(solve: Callable[[Scene], Response], drive: str) -> Settled:
-        return partial(_settled, solve, body, drive)
+        return partial(_steady_half, solve, body, drive)
 
     if not body.of_kind.is_plate:
         linear = partial(answer, prepare(body, np.array(PROBES), progress, h=h))
@@ -112,7 +112,7 @@ def _mechanisms(body: Body, h: float | None, progress: Progress) -> Mapping[str,
     }
 
 
-def _settled(
+def _steady_half(
     solve: Callable[[Scene], Response], body: Body, drive: str, tacton: Tacton
 ) -> tuple[MovingPressure, Response]:
     """Return the load of a Tacton, and the later half of its response, after the transient."""

@@ -203,11 +203,11 @@ def hierarchy_of(
             coarse_first = is_reduced and name == ALMOST_UNDAMPED
             steps.append(step)
             workers = large if is_reduced else small
-            submitted.append(workers.submit(_timed, changed, model, size, cache, coarse_first))
+            submitted.append(workers.submit(_time, changed, model, size, cache, coarse_first))
         for k, future in enumerate(submitted):
             progress(steps[k].name, k / len(steps))
             if future:
-                steps[k] = _computed(steps[k], future, steps[:k])
+                steps[k] = _compute(steps[k], future, steps[:k])
     first, second = len(up), len(up) + len(side)
     return Hierarchy(
         scene=scene, steps=tuple(steps[:first]), side_steps=tuple(steps[first:second]),
@@ -215,7 +215,7 @@ def hierarchy_of(
     )  # fmt: skip
 
 
-def _timed(
+def _time(
     scene: Scene, model: str, h: float | None, cache: str, coarse_first: bool
 ) -> tuple[Response, float, int]:
     """Return a response, its seconds and the peak memory of its process.
@@ -237,7 +237,7 @@ def _timed(
     return replace(response, effort=effort), seconds, memory
 
 
-def _computed(
+def _compute(
     step: HierarchyStep,
     future: Future[tuple[Response, float, int]],
     before: Sequence[HierarchyStep],

@@ -22,7 +22,7 @@ from skinwave.models.limits import check_taken
 from skinwave.models.linear_elements import FEM
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import ReducedBody, answer, prepare
-from skinwave.planning.assessment import assessed, coarser_body
+from skinwave.planning.assessment import assess, coarser_body
 from skinwave.planning.plan import chosen_model, plan
 from skinwave.planning.simulate import compute, solve
 from skinwave.results.claims import AssessedClaim, assessable_runs, evaluate, write_claims
@@ -212,7 +212,7 @@ def _runs(
                 )  # fmt: skip
             response, body = answer(prepared[column], scene), prepared[column]
             compared = coarser[scene.body].result()
-            response = assessed(scene, response, body, options, compared=compared)
+            response = assess(scene, response, body, options, compared=compared)
         else:
             response = others[name, column].result()
         progress(f"response of {name} by {column}", (k + 1) / len(every))

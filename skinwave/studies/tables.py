@@ -178,15 +178,15 @@ def _agreement(a: Run, b: Run) -> list[str]:
     moves = level > STILL_RATIO * level.max()
     spreads = (agreement.spread_reference, agreement.spread_candidate)
     return [
-        _between(agreement.relative_l2[moves]),
-        _between(agreement.shape_misfit[moves]),
-        _between(1e3 * agreement.delay[moves]),
-        _between(1e3 * delays[np.isfinite(delays)]),
+        _range(agreement.relative_l2[moves]),
+        _range(agreement.shape_misfit[moves]),
+        _range(1e3 * agreement.delay[moves]),
+        _range(1e3 * delays[np.isfinite(delays)]),
         " to ".join(f"{1e3 * each[-6]:g} / {1e3 * each[-20]:g}" for each in spreads),
     ]
 
 
-def _between(values: Floats) -> str:
+def _range(values: Floats) -> str:
     """Return the range of values."""
     if not len(values):
         return "-"

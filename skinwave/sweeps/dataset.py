@@ -52,7 +52,7 @@ def check_folder(out: Path) -> None:
 
 
 @contextmanager
-def locked(out: Path) -> Iterator[None]:
+def lock_rows(out: Path) -> Iterator[None]:
     """Lock the rows of a folder; raise a ValueError if another sweep has locked them.
 
     The operating system releases the lock however the process ends.
@@ -106,7 +106,7 @@ def names(out: Path) -> dict[str, int]:
     return dict(zip(table[KEY].to_pylist(), table[INDEX].to_pylist(), strict=True))
 
 
-def numbered(wanted: Iterable[str], earlier: Mapping[str, int]) -> dict[str, int]:
+def number_rows(wanted: Iterable[str], earlier: Mapping[str, int]) -> dict[str, int]:
     """Return the index of each wanted row: its place in the design, after the rows of another
     design.
     """

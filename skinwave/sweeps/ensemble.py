@@ -223,7 +223,7 @@ def ensemble(
         raise ValueError("workers were killed; provide more memory, or use fewer workers")
     solutions = [solution for k in range(len(batches)) for solution in solved[k]]
     arrays = {
-        name: _scaled(
+        name: _scale(
             name, np.stack([vars(each)[name] for each in solutions])[place.ravel()], factors
         )
         for name in (field.name for field in fields(Solution))
@@ -245,7 +245,7 @@ def is_linear(scene: Scene, name: str) -> bool:
     return scene.reading.is_plain and linear and alone
 
 
-def _scaled(name: str, values: Floats, factors: Floats) -> Floats:
+def _scale(name: str, values: Floats, factors: Floats) -> Floats:
     """Multiply values (n, ...) of a solution by factors (n,) of the pressure; levels are in dB."""
     columns = values.T + 20 * np.log10(factors) if "level" in name else values.T * factors
     return np.asarray(columns.T)
@@ -311,7 +311,7 @@ def solve_sample(scene: Scene, method: Method, *, together: bool = True) -> Solu
     shape: tuple[int, ...] = (0, 0)
     how, family = method.options, method.family
     if method.mapped:
-        shape, (f, a) = _mapped(scene, method)
+        shape, (f, a) = _map_lines(scene, method)
     elif family and together:
         size = how.h or default_size(family.scene.body)
         f, a = lines_of(cached_shared_body(family, size, how.tolerance, how.solver), scene.body)
@@ -324,7 +324,7 @@ def solve_sample(scene: Scene, method: Method, *, together: bool = True) -> Solu
         motion = components(own, *scene.loads)
         f, a = motion.frequencies, motion.lines
     else:
-        return _computed(scene, method)
+        return _compute(scene, method)
     f, a = f[f > 0], a[f > 0]
     p = len(scene.probes)
     rms, levels = np.sqrt((np.abs(a) ** 2).sum(axis=0) / 2), _highest_level(f, np.abs(a))
@@ -336,7 +336,7 @@ def solve_sample(scene: Scene, method: Method, *, together: bool = True) -> Solu
     )  # fmt: skip
 
 
-def _mapped(scene: Scene, method: Method) -> tuple[tuple[int, int], tuple[Floats, Complex]]:
+def _map_lines(scene: Scene, method: Method) -> tuple[tuple[int, int], tuple[Floats, Complex]]:
     """Return the shape of the map, and lines by the wavenumber integral at probes and map."""
     x, y = map_axes(scene)
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
@@ -354,7 +354,7 @@ def _operator(
     return path_operator(pressure, points, threshold=NEGLIGIBLE_LINE)
 
 
-def _computed(scene: Scene, method: Method) -> Solution:
+def _compute(scene: Scene, method: Method) -> Solution:
     """Solve one sample by a model, at the probes."""
     how = method.options
     response = compute(scene, how.model, tolerance=how.tolerance, h=how.h, solver=how.solver)

@@ -21,7 +21,7 @@ from skinwave.scene.scene import Scene
 from skinwave.scene.variation import Choice, Variation, cases_of, combinations, parse
 from skinwave.sweeps import best
 from skinwave.sweeps.sweep import Sweep
-from skinwave.sweeps.table_figures import axis_label, curves, finished, value
+from skinwave.sweeps.table_figures import axis_label, curves, finished_rows, value
 from skinwave.system.effort import Progress
 from skinwave.system.progress_bar import progress_callback
 from skinwave.system.table import cell_text
@@ -91,7 +91,7 @@ class SweepTable:
         x = x or self.varied[0]
         others = [key for key in self.varied if key != x]
         ax = drawing.new_axes(ax)
-        curves(ax, finished(self.rows), column, x, by or (others[0] if others else None))
+        curves(ax, finished_rows(self.rows), column, x, by or (others[0] if others else None))
         ax.set(xlabel=axis_label(x), ylabel=axis_label(column))
         return ax
 

@@ -21,8 +21,8 @@ from skinwave.models.free_keys import FreeKey, free_keys, with_values
 from skinwave.models.limits import default_model, takes
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import ReducedBody, answer, prepare, reduction_tolerance
-from skinwave.planning.assessment import assessed
-from skinwave.planning.refinement import compared_with, refined
+from skinwave.planning.assessment import assess
+from skinwave.planning.refinement import compared_with, refine
 from skinwave.scene.scene import Body, Load, Reading, Scene
 from skinwave.scene.variation import DesignPoint
 from skinwave.system.effort import Progress
@@ -156,7 +156,7 @@ def error_text(error: Exception) -> str:
 def mesh_of_body(options: SolveOptions, scene: Scene) -> Mesh:
     """Reduce a body on the mesh that its hardest scene needs, cached on disk for all workers."""
     if not options.h:
-        pair = refined(scene, scene.body, options)
+        pair = refine(scene, scene.body, options)
         return Mesh(h=pair.h, coarser=pair.compared)
     # Raises the error of the given size before that of the coarser mesh.
     _reduced_twice(solid_of(scene), options, Mesh(h=options.h, coarser=options.h))
@@ -169,7 +169,7 @@ def mesh_of_family(options: SolveOptions, family: Covering) -> Mesh:
     """Reduce a family on the mesh that its hardest scene needs, unless its size is given; raise a
     ValueError if its bodies cannot be reduced together.
     """
-    size = options.h or refined(family.scene, family.hardest, options).h
+    size = options.h or refine(family.scene, family.hardest, options).h
     bodies = cached_shared_body(family, size, options.tolerance, options.solver).bodies
     meshed = bodies.body(bodies.meshed)
     coarser = compared_with(meshed, size)
@@ -186,7 +186,7 @@ def on_mesh(scene: Scene, options: SolveOptions, mesh: Mesh) -> tuple[Response, 
         raise ValueError(mesh.error)
     fine, coarse = _reduced_twice(solid_of(scene), options, mesh)
     how = SolveOptions(tolerance=options.tolerance, h=mesh.h, solver=options.solver)
-    response = assessed(
+    response = assess(
         scene, answer(fine, scene), fine, how, compared=(mesh.coarser, coarse), meshed=mesh.meshed
     )
     is_shared = mesh.family and not options.h
@@ -198,13 +198,13 @@ def on_mesh(scene: Scene, options: SolveOptions, mesh: Mesh) -> tuple[Response, 
 def _reduced_twice(solid: Solid, options: SolveOptions, mesh: Mesh) -> list[ReducedBody]:
     """Return the reduced body on both meshes."""
     return [
-        prepared(solid, h, options.tolerance, options.solver, mesh.family, mesh.values)
+        prepare_body(solid, h, options.tolerance, options.solver, mesh.family, mesh.values)
         for h in (mesh.h, mesh.coarser)
     ]
 
 
 @lru_cache(maxsize=2 * CACHED)
-def prepared(
+def prepare_body(
     solid: Solid, h: float, tolerance: float, solver: str, family: Covering | None, values: Values
 ) -> ReducedBody:
     """Return a reduced body with elements of h in metre; in a family, the one with these values."""

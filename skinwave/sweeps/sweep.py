@@ -85,7 +85,7 @@ class Sweep:
         engine.check(self.scheduler)
         count = engine.worker_count(self.scheduler, self.workers)
         wanted = {self._name(point): point for point in points}
-        with dataset.locked(dataset.open_folder(self.folder, self.command)):
+        with dataset.lock_rows(dataset.open_folder(self.folder, self.command)):
             return self._run_missing(wanted, count)
 
     def rows(self, points: Sequence[DesignPoint]) -> list[dataset.Row]:
@@ -104,7 +104,7 @@ class Sweep:
     def _run_missing(self, wanted: Mapping[str, DesignPoint], count: int) -> SweepOutcome:
         started, earlier = time.perf_counter(), dataset.names(self.folder)
         missing = {name: point for name, point in wanted.items() if name not in earlier}
-        index = dataset.numbered(wanted, earlier)
+        index = dataset.number_rows(wanted, earlier)
         tally = {"done": 0, "failed": 0}
         constant = {
             "version": version("skinwave"), "asked_model": self.options.model,

@@ -38,7 +38,7 @@ NAMES = {
 }  # fmt: skip
 
 
-def varied(rows: Sequence[Row]) -> list[str]:
+def varied_keys(rows: Sequence[Row]) -> list[str]:
     """Return the keys that differ between rows, those with most values first; of a table and a key
     in it, only the key.
     """
@@ -49,7 +49,7 @@ def varied(rows: Sequence[Row]) -> list[str]:
     return sorted(own, key=lambda key: -counts[key])
 
 
-def finished(rows: Sequence[Row]) -> list[Row]:
+def finished_rows(rows: Sequence[Row]) -> list[Row]:
     """Return the rows with a response; raise a ValueError if all runs failed."""
     done = [row for row in rows if row.get("status") == "done"]
     if not done:
@@ -135,7 +135,7 @@ def curves(ax: Axes, rows: Sequence[Row], column: str, x: str, by: str | None) -
     )
     # Neighbours along a curve are joined if they differ by nothing else, or by its mean.
     pairs = {(_plain(row.get(x)), _plain(row.get(by)) if by else None) for row in rows}
-    joined = len(pairs) < len(rows) or not set(varied(rows)) - {x, by}
+    joined = len(pairs) < len(rows) or not set(varied_keys(rows)) - {x, by}
     for k, group in enumerate(groups):
         mine = [row for row in rows if by is None or _plain(row.get(by)) == group]
         at = _levels(mine, x)

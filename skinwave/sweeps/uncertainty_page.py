@@ -17,7 +17,7 @@ from skinwave.sweeps import dataset
 from skinwave.sweeps.dataset import Row
 from skinwave.sweeps.ensemble import Ensemble, ensemble, propagate, rows_of
 from skinwave.sweeps.sampling import PERCENTILES, one_at_a_time, percentiles, sobol_indices
-from skinwave.sweeps.table_figures import axis_label, finished, value
+from skinwave.sweeps.table_figures import axis_label, finished_rows, value
 from skinwave.sweeps.uncertainty_figures import bands_figure, maps_figure, tornado_figure
 from skinwave.system.document import Details, Part, Picture, Report, Section
 from skinwave.system.table import Column, Table
@@ -118,7 +118,7 @@ def write_sampled(
     """Write percentiles.csv, indices.csv and uncertainty.html of a sweep by distributions, given
     its rows in the order of the design; return their names. Sobol' indices need every run.
     """
-    done = finished(rows)
+    done = finished_rows(rows)
     failed = len(rows) - len(done)
     text = f"{len(done)} runs of {plural(len(spreads), 'uncertain number')}."
     text += f" {failed} failed and are left out." if failed else ""

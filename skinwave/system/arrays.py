@@ -9,14 +9,14 @@ Packed = dict[str, Any]
 LARGEST = 32767
 
 
-def packed(values: np.ndarray) -> Packed:
+def pack(values: np.ndarray) -> Packed:
     """Encode real or complex rows (n, m) as 64-bit floats in base 64."""
     rows = np.atleast_2d(values)
     found = {"shape": list(rows.shape), "f8": _text(_parts(rows).astype("<f8"))}
     return found if np.iscomplexobj(rows) else found | {"real": True}
 
 
-def quantised(values: np.ndarray) -> Packed:
+def quantise(values: np.ndarray) -> Packed:
     """Encode real or complex rows (n, m) as 16-bit integers relative to the largest of each row."""
     parts = _parts(values)
     largest = np.maximum(np.abs(parts).reshape(len(values), -1).max(axis=1), 1e-300)

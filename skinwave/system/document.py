@@ -164,7 +164,7 @@ def live_link(file: str) -> Markup:
     ).format(file)
 
 
-def preformatted(text: str) -> Markup:
+def preformat(text: str) -> Markup:
     """Return text with its own lines and spaces."""
     return Markup("<pre>{}</pre>").format(text)
 

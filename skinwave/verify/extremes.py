@@ -49,7 +49,7 @@ def modulation_frequencies() -> Checks:
     for k, (x, _) in enumerate(PROBES):
         yield relative(f"1 Hz: amplitude at {1e3 * x:g} mm", slow[k], rest[k], 0.005, "m")
     fast = lines(_response(0.5, am=1000.0), [1000.0])[0, 0]
-    made, ops = _meshed()
+    made, ops = _mesh()
     force = push(made.mesh, lambda x: POINT(x[:, :2], 0.0))
     u = read(made.mesh, fem.harmonic(ops, force, 1000.0)[0], 0.0)
     yield relative("1 kHz: amplitude at the focus", fast, abs(u[0]), 0.005, "m")
@@ -105,19 +105,19 @@ def durations() -> Checks:
 
 
 @cache
-def _prepared() -> ReducedBody:
+def _prepare() -> ReducedBody:
     return prepare(BODY, np.array(PROBES), h=H, tolerance=1e-4)
 
 
 @cache
-def _meshed() -> tuple[Build, fem.Operators]:
+def _mesh() -> tuple[Build, fem.Operators]:
     made = build(BODY, H)
     return made, operators(made)
 
 
 def _static(pressure: MovingPressure, count: int) -> Floats:
     """Return the static displacement of the probes under the mean of focal spots on the path."""
-    made, ops = _meshed()
+    made, ops = _mesh()
     centres = pressure.tacton.trajectory.at_phase(np.arange(count) / count)
     gain = float(pressure.gain(np.zeros(1))[0])
     force = push(made.mesh, lambda x: pressure.spot(x[:, :2], centres).mean(axis=0) * gain)
@@ -131,7 +131,7 @@ def _response(
     path = Trajectory(shape="circle", size=size, speed=speed) if speed else Trajectory()
     tacton = Tacton(am_frequency=am, duration=duration, trajectory=path)
     pressure = MovingPressure(tacton=tacton, drive="linear")
-    return answer(_prepared(), Scene(pressure=pressure, body=BODY, probes=PROBES))
+    return answer(_prepare(), Scene(pressure=pressure, body=BODY, probes=PROBES))
 
 
 def _forces(load: MovingPressure, h: float, places: Sequence[tuple[float, float]]) -> Floats:

@@ -76,7 +76,7 @@ def rayleigh_wave(modulus: float, viscosity: float, frequency: float) -> tuple[f
     return float(w / k.real), float(1 / abs(k.imag))
 
 
-def _published(table: dict[str, Any]) -> Published:
+def _read_published(table: dict[str, Any]) -> Published:
     """Return a set of values from its table in the file."""
     quantity = QUANTITIES[table.pop("quantity")]
     frequencies = tuple(map(float, table.pop("frequencies")))
@@ -108,9 +108,9 @@ def _by_voigt(
 
 
 _FILE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
-WAVES = tuple(map(_published, _FILE["wave"]))  # speeds, 1/e lengths, exponents by frequency
+WAVES = tuple(map(_read_published, _FILE["wave"]))  # speeds, 1/e lengths, exponents by frequency
 SKINSOURCE = next(each for each in WAVES if each.name.startswith("SkinSource"))
-OPTIMUM = _published(_FILE["optimum"])
+OPTIMUM = _read_published(_FILE["optimum"])
 NOT_COMPARED = tuple(tuple(each.values()) for each in _FILE["not_compared"])
 
 

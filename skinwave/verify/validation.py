@@ -104,7 +104,7 @@ class Compared:
         return WITHIN if self.factor == 1.0 else ABOVE if self.factor > 1 else BELOW
 
 
-def compared(published: Published, body: str, ours: Iterable[float]) -> list[Compared]:
+def compare_set(published: Published, body: str, ours: Iterable[float]) -> list[Compared]:
     """Return rows of a set and a body with values (n,), in SI, at the frequencies of the set."""
     return [
         Compared(published=published, k=k, body=body, ours=float(value))
@@ -137,7 +137,7 @@ def compare_waves(curves: Mapping[str, Curves]) -> list[Compared]:
 
     sets = (*WAVES, all_sources(SPEED), all_sources(LENGTH))
     return [row for each in sets for name in each.bodies
-            for row in compared(each, name, ours(each, name))]  # fmt: skip
+            for row in compare_set(each, name, ours(each, name))]  # fmt: skip
 
 
 def compare_optima(body: str) -> list[Compared]:
@@ -148,7 +148,7 @@ def compare_optima(body: str) -> list[Compared]:
         for what, deflection in zip(("largest", "peak to peak"), deflections, strict=True):
             name = f"{OPTIMUM.name}, {what}, {1e3 * perimeter:g} mm around"
             speed = predictions.peak(predictions.SPEEDS, deflection)
-            rows += compared(replace(OPTIMUM, name=name), body, [speed])
+            rows += compare_set(replace(OPTIMUM, name=name), body, [speed])
     return rows
 
 
@@ -159,7 +159,7 @@ def compare_finger(finger: Finger) -> list[Compared]:
         SKINSOURCE, frequencies=tuple(finger.frequencies), values=(nan,) * len(at),
         lows=tuple(SKINSOURCE.lows[k] for k in at), highs=tuple(SKINSOURCE.highs[k] for k in at),
     )  # fmt: skip
-    return compared(own, HAND, finger.lengths)
+    return compare_set(own, HAND, finger.lengths)
 
 
 def verdict(rows: Sequence[Compared]) -> list[str]:

@@ -7,7 +7,7 @@ import pytest
 
 import fem
 from meshes import cache
-from meshes.records import decoded, encoded
+from meshes.records import decode, encode
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import answer, prepare
 from skinwave.planning.plan import plan
@@ -70,15 +70,15 @@ def test_a_spoilt_cache_entry_is_rebuilt(tmp_path, monkeypatch):
 def test_records_are_read_back_exactly_and_only_from_our_own_types():
     branch, arrays = fem.MaxwellBranch(K=np.eye(2) / 3, time=0.1), {}
     record = {"branches": (branch, None), ("a", 1): [2.5 - 1j, True, np.float64(0.1)]}
-    structure = json.loads(json.dumps(encoded(record, arrays)))
-    again = decoded(structure, arrays)
+    structure = json.loads(json.dumps(encode(record, arrays)))
+    again = decode(structure, arrays)
     np.testing.assert_array_equal(again["branches"][0].K, branch.K)
     assert again["branches"][0].time == 0.1
     assert again["a", 1] == [2.5 - 1j, True, 0.1]
     with pytest.raises(ValueError, match="subprocess"):
-        decoded({"record": "subprocess:Popen", "items": []}, {})
+        decode({"record": "subprocess:Popen", "items": []}, {})
     with pytest.raises(TypeError):
-        encoded(print, {})
+        encode(print, {})
 
 
 def test_the_key_of_a_body_holds_solver_options_and_shapes(tmp_path, monkeypatch):

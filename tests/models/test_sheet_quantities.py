@@ -130,7 +130,7 @@ def test_modes_and_all_dofs_read_the_same_of_a_stretched_sheet(quantity, preload
 
 @pytest.fixture(scope="module")
 def preloaded():
-    from skinwave.models.stretching import _reduced
+    from skinwave.models.stretching import _reduce
 
     body, h = SCENE.body, 2.5e-3
     made = meshed_sheet(body, h)
@@ -138,7 +138,7 @@ def preloaded():
     P, points = surface_load(made)
     force = P @ SCENE.pressure.spot(points, np.array([[0.005, 0.0]]))[0]
     u = nonlinear.static(elastic, PEAK * force)
-    kept = _reduced(body, h, "auto")
+    kept = _reduce(body, h, "auto")
     z = nonlinear.static(kept.modes.elastic, kept.modes.basis.T @ (PEAK * force))
     assert 0.3 < np.abs(u).max() / body.depth < 3
     return body, made, u, kept.modes, kept.operators, z

@@ -18,7 +18,7 @@ from skinwave.planning.refinement import (
     SizeController,
     compared_with,
     mesh_error,
-    refined,
+    refine,
 )
 from skinwave.planning.simulate import compute
 from skinwave.results.comparison import compare
@@ -148,7 +148,7 @@ def test_refinement_ends_at_the_finest_mesh_with_its_error(monkeypatch):
         "[tacton]\nduration_s = 0.05\n[body]\nkind = 'sheet'\nsize_x_mm = 60\nsize_y_mm = 60\n"
         "[probes]\npoints_mm = [[0, 0]]"
     )
-    found = refined(scene, scene.body, SolveOptions(tolerance=0.01))
+    found = refine(scene, scene.body, SolveOptions(tolerance=0.01))
     assert found.h == pytest.approx(2.1 * default_size(scene.body))
     assert found.error > 0.01
 
@@ -183,7 +183,7 @@ def test_the_error_of_a_mesh_without_another_is_1_or_unknown():
 def test_the_expected_error_of_a_mesh_is_near_the_true_one(h):
     """Also where it has as many layers as the next coarser one, or twice as many."""
     scene = loads(SHORT.replace("size_x_mm = 60\nsize_y_mm = 60", "size_x_mm = 40\nsize_y_mm = 40"))
-    found = refined(scene, scene.body, SolveOptions(tolerance=0.05, h=h))
+    found = refine(scene, scene.body, SolveOptions(tolerance=0.05, h=h))
     true = compare(answer(found.prepared, scene), compute(scene, "flat-body")).relative_l2.max()
     assert 0.4 < found.error / true < 2.5
 

@@ -73,7 +73,7 @@ def test_commands_are_understood():
             lines = [line for line in text.splitlines() if line.startswith("skinwave ")]
             for line in lines:
                 words = shlex.split(line, comments=True)[1:]
-                assert cli.parser().parse_args(cli._joined(words)).command, page
+                assert cli.parser().parse_args(cli._join_up_option(words)).command, page
             assert lines or "python3 -m venv" in text, page
 
 

@@ -195,7 +195,7 @@ def test_only_markup_of_templates_is_not_escaped():
         Report("<t>", ["<p>"]).html(), Section("<t>", ["<p>"]).html(),
         Details("<t>", ["<p>"]).html(), Table(["<t>"], [["<p>"]]).html(),
         Picture(b"", "<p>\"'", '<t>"').html(), document.inner_page("<p>", "<t>"),
-        document.preformatted("<p><t>"),
+        document.preformat("<p><t>"),
         document.warnings_banner([("<t>", Effort(warnings=("<p>",))), ("", Effort())]),
     ):  # fmt: skip
         assert not re.search(r"<[pt]>[^<]*(?!</p>)<[pt]>|<t>|<p>\"", made)

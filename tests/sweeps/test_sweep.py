@@ -75,7 +75,7 @@ def test_bodies_are_prepared_once(scene, monkeypatch):
     prepared, inner = [], reductions.prepare
     counting = lambda *a, **k: prepared.append((a, k)) or inner(*a, **k)  # noqa: E731
     monkeypatch.setattr(reductions, "prepare", counting)
-    reductions.prepared.cache_clear()
+    reductions.prepare_body.cache_clear()
     rows = swept("tacton.speed_m_per_s=2:8:3", "body.thickness_mm=12,13", *ON_SMALL)
     assert {row["status"] for row in rows} == {"done"}
     assert len(prepared) == len({(a[0], k["h"]) for a, k in prepared}) == 4  # two meshes each
@@ -85,7 +85,7 @@ def test_bodies_are_prepared_once(scene, monkeypatch):
 def counted(monkeypatch, folder):
     """Factorisations from here on, with a cache of their own."""
     monkeypatch.setenv("SKINWAVE_CACHE", str(folder))
-    reductions.prepared.cache_clear()
+    reductions.prepare_body.cache_clear()
     covering.cached_shared_body.cache_clear()
     made = []
     for module, name in ((fem.krylov, "factorise"), (fem.affine, "SumFactoriser")):

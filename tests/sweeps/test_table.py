@@ -105,12 +105,12 @@ def test_only_one_sweep_writes_into_a_folder(scene, capsys):
     """A process that ends releases its lock."""
     folder = dataset.open_folder(OUT)
     arguments = ["sweep", "short.toml", "--vary", "body.thickness_mm=10,15", *THREADS]
-    with dataset.locked(folder):
+    with dataset.lock_rows(folder):
         assert "short-sweep" in refused(capsys, *arguments)
     there = "import os, sys; from pathlib import Path; from skinwave.sweeps import dataset; "
     held = "held = dataset.locked(Path(sys.argv[1])); held.__enter__(); os._exit(0)"
     subprocess.run([sys.executable, "-c", there + held, str(folder)], check=True)
-    with dataset.locked(folder):
+    with dataset.lock_rows(folder):
         assert not dataset.names(folder)
 
 
@@ -205,7 +205,7 @@ def test_figures_have_units_and_names_in_every_format(scene, capsys):
 
 def test_a_material_with_varied_factors_is_not_a_varied_key():
     rows = [{"body.material": f"{k}", "body.material.modulus_scale": k, SIZE: 8} for k in (1, 2)]
-    assert table_figures.varied(rows) == ["body.material.modulus_scale"]
+    assert table_figures.varied_keys(rows) == ["body.material.modulus_scale"]
 
 
 def test_a_latin_hypercube_is_drawn_as_coloured_points():

@@ -27,8 +27,8 @@ from skinwave.verify.validation import (
     NONE,
     WITHIN,
     compare_finger,
+    compare_set,
     compare_waves,
-    compared,
 )
 
 SPREAD = replace(
@@ -40,16 +40,16 @@ HAND = Path(__file__).parents[2] / "examples/hand/generic-hand-right.glb"
 
 
 def test_factor_is_relative_to_the_nearer_end_of_the_spread():
-    rows = compared(SPREAD, "palm-layers", [1.0, 3.0, 8.0, nan, inf])
+    rows = compare_set(SPREAD, "palm-layers", [1.0, 3.0, 8.0, nan, inf])
     assert [row.outcome for row in rows] == [BELOW, WITHIN, ABOVE, NONE, ABOVE]
     assert [row.factor for row in rows[:3]] == [0.5, 1.0, 2.0]
     assert not rows[0].is_built
-    assert compared(SPREAD, "palm", [1.0])[0].is_built
+    assert compare_set(SPREAD, "palm", [1.0])[0].is_built
 
 
 def test_values_without_spread_agree_within_the_reading_error():
     alone = replace(SPREAD, values=(3.0,) * 5, lows=(), highs=())
-    rows = compared(alone, "palm", [3.1, 2.9, 3.2, 2.0, 6.0])
+    rows = compare_set(alone, "palm", [3.1, 2.9, 3.2, 2.0, 6.0])
     assert [row.outcome for row in rows] == [WITHIN, WITHIN, ABOVE, BELOW, ABOVE]
 
 
