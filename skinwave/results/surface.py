@@ -21,6 +21,7 @@ from simple_model.load.spectrum import load_lines, pressure_lines, synthesise
 from simple_model.quantities import DISPLACEMENT, PRESSURE, Quantity
 from skinwave.bodies.analytic import compliance, has_exact_waves, is_laterally_infinite
 from skinwave.bodies.sizes import default_size
+from skinwave.models import named
 from skinwave.models.flat_body import field_read
 from skinwave.models.limits import takes
 from skinwave.models.meshed import line_factor, probe_rows
@@ -128,10 +129,11 @@ def body_map(scene: Scene, x: Floats, y: Floats, options: SolveOptions = DEFAULT
     levels.
 
     Elements are larger than those of `simulate`, or as large as the options say if that is larger.
+    A sheet is linear if the model of the options is.
     Raises a ValueError if the body is missing or cannot be meshed.
     """
     if options.h is None and takes(FROM_REST, scene):
-        return _plate_map(scene, x, y)
+        return _plate_map(scene, x, y, options.model)
     if has_wavenumber_integral(scene):
         lines = _interpolate(scene.pressure, surface_lines(scene), x, y)
         return _field(scene, x, y, lines, "laterally infinite layer")
@@ -140,10 +142,11 @@ def body_map(scene: Scene, x: Floats, y: Floats, options: SolveOptions = DEFAULT
     return replace(element_map(scene, moved, x, y), note=f"elements of {1e3 * size:.2g} mm")
 
 
-def _plate_map(scene: Scene, x: Floats, y: Floats) -> SurfaceField:
-    """Return the map of a thin plate in its modes."""
+def _plate_map(scene: Scene, x: Floats, y: Floats, model: str = "auto") -> SurfaceField:
+    """Return the map of a thin plate in its modes: linear if the model is, or if that is enough."""
     places = _places(x, y)
-    if not beyond_linear(scene, MAP_TOLERANCE):
+    is_linear = model != "auto" and not named(model).is_nonlinear
+    if is_linear or not beyond_linear(scene, MAP_TOLERANCE):
         return _field(scene, x, y, plate_lines(scene, places), "thin plate")
     _, z, modes = steady_motion(scene, MAP_TOLERANCE)
     shapes, covariance = modes.at(places - scene.body.placement.offset), np.cov(z, rowvar=False)

@@ -107,7 +107,7 @@ def quick_maps(run: Run) -> Maps:
     scene = run.scene
     if not (has_wavenumber_integral(scene) or (run.is_motion and takes(FROM_REST, scene))):
         return ()
-    surface = _meshless_map(scene)
+    surface = _meshless_map(scene, run.model)
     return surface, kernel_map(scene.pressure, surface.x, surface.y)
 
 
@@ -124,8 +124,8 @@ def first_name(names: Iterable[str]) -> str:
 
 
 @lru_cache(maxsize=16)  # several parts of a page show the same scenes
-def _meshless_map(scene: Scene) -> SurfaceField:
-    return body_map(scene, *grid(scene))
+def _meshless_map(scene: Scene, model: str = "auto") -> SurfaceField:
+    return body_map(scene, *grid(scene), SolveOptions(model=model))
 
 
 def _run_of(group: Sequence[Run], model: str) -> Run | None:

@@ -260,7 +260,7 @@ def test_a_public_hand_goes_from_its_file_to_a_comparison_in_one_command(
     ask = ["compare", "scene.toml", "--body", str(HAND), "--up", "-x", "--element-size", "16"]
     assert main([*ask, "--out", "both", "--quiet"]) == 0
     page = (tmp_path / "both/index.html").read_text()
-    assert "Body from generic-hand-right.glb, -x towards the device" in page
+    assert "body from generic-hand-right.glb, -x towards the device" in page
     assert "thicker sheet" not in page
     assert "elements of 16 mm" in page  # of the map, too
     assert "--up -x --element-size 16" in page

@@ -93,7 +93,7 @@ def test_a_new_kind_is_compared_and_swept_in_other_processes(disc):
         "none",
         "silicone-cylinder",
     }
-    assert "Cylinder of 80 \u00d7 20 mm" in Path("compared/index.html").read_text()
+    assert "cylinder of 80 \u00d7 20 mm" in Path("compared/index.html").read_text()
     vary = ["--vary", "tacton.am_frequency_hz=80,120", "--model", "fem", "--out", "swept"]
     assert main(["sweep", "disc.toml", *vary, "--workers", "2", *MESH, "--json"]) == 0
 

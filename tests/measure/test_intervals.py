@@ -232,5 +232,5 @@ def test_parameters_are_placed_by_their_logarithm_where_both_limits_are_positive
         ["gain"], ["gain=1:2:3"], ["gain=2:1"], ["gain=1:inf"], ["gain=1:2", "gain=1:3"], [],
         ["body.materal=1:2"],
     ):  # fmt: skip
-        with pytest.raises(ValueError, match="vary|gain|no key"):
+        with pytest.raises(ValueError, match="vary|gain|not a key"):
             parse(given)

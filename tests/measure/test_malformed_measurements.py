@@ -71,7 +71,7 @@ OWN = {"format": "skinwave measurement 1", "quantity": "velocity", "unit": "m/s"
 MM_S = ["--unit", "mm/s"]
 # Name of the file, its content, options, and what is named.
 BINARIES = [
-    ("a.csv", lambda *_: b"\xff\x00t", [], "no text"),
+    ("a.csv", lambda *_: b"\xff\x00t", [], "not text"),
     ("a.npz", lambda *_: b"text", [], "cannot be read"),
     ("a.npz", half(written(files.numpy_npz)), [], "cannot be read"),
     ("a.npz", npz(t=np.array([{}], dtype=object)), [], "cannot be read"),

@@ -124,8 +124,8 @@ def test_a_reduction_out_of_reach_names_the_model_that_works(monkeypatch):
     monkeypatch.setattr(fem.krylov, "MOST_MOMENTS", 6)
     pressure = MovingPressure(tacton=Tacton(am_frequency=140, duration=0.05))
     scene = Scene(pressure=pressure, body=STRETCHED, probes=((0.01, 0.005),))
-    with pytest.raises(ValueError, match="6 moments leave.*use --model"):
+    with pytest.raises(ValueError, match="6 moments.*use --model"):
         plan(scene, SolveOptions(model="fem", h=0.005))
     slab = Scene(pressure=pressure, body=Body(width=0.04, height=0.04, sides="clamped"))
-    with pytest.raises(ValueError, match="6 moments leave.*use --model"):
+    with pytest.raises(ValueError, match="6 moments.*use --model"):
         plan(slab, SolveOptions(model="fem", h=0.01))

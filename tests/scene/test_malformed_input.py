@@ -126,7 +126,7 @@ def test_a_probe_on_a_clamped_edge_does_not_move():
     motion = compute(scene, "fem", tolerance=0.3, h=0.006).displacement
     assert np.abs(motion[:, 0]).max() > 0
     assert np.abs(motion[:, 1]).max() < 1e-12 * np.abs(motion[:, 0]).max()
-    with pytest.raises(ValueError, match="no probe can move"):
+    with pytest.raises(ValueError, match="all probes"):
         compute(alone, "fem", tolerance=0.3, h=0.006)
 
 

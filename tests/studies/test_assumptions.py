@@ -210,7 +210,7 @@ def test_relax_writes_effects_and_costs(tmp_path, monkeypatch, capsys):
     )
     (tmp_path / "scene.toml").write_text(dumps(scene))
     assert main(["relax", "scene.toml", "--element-size", "9", "--quiet"]) == 0
-    coarse = "elements of 9 mm are wider than twice the standard deviation of the focal spot"
+    coarse = "elements of 9 mm are too coarse for the focal spot"
     assert coarse in capsys.readouterr().err
     out = tmp_path / "scene-relaxed"
     effects = {row["assumption"]: row for row in read_results.rows(out / "effects.csv")}

@@ -49,5 +49,5 @@ def test_tradeoff_ranks_candidates_by_cost_and_error(tmp_path, monkeypatch):
 
 
 def test_tradeoff_needs_a_body():
-    with pytest.raises(ValueError, match="give it a sheet or a slab"):
+    with pytest.raises(ValueError, match="sheet or a slab"):
         study(loads("[body]\nkind = 'none'"), lambda phase, fraction: None)

@@ -108,7 +108,7 @@ def test_only_one_sweep_writes_into_a_folder(scene, capsys):
     with dataset.lock_rows(folder):
         assert "short-sweep" in refused(capsys, *arguments)
     there = "import os, sys; from pathlib import Path; from skinwave.sweeps import dataset; "
-    held = "held = dataset.locked(Path(sys.argv[1])); held.__enter__(); os._exit(0)"
+    held = "held = dataset.lock_rows(Path(sys.argv[1])); held.__enter__(); os._exit(0)"
     subprocess.run([sys.executable, "-c", there + held, str(folder)], check=True)
     with dataset.lock_rows(folder):
         assert not dataset.names(folder)
