@@ -16,7 +16,7 @@ from typing import Any
 
 from playwright.sync_api import sync_playwright
 
-from skinwave.live.page import data_of, page
+from skinwave.live.html_file import data_of, page
 from skinwave.live.serve import Server
 
 CHROMIUM = "/usr/bin/chromium"

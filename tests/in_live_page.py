@@ -4,7 +4,7 @@ import random
 import shutil
 from importlib import resources
 
-from skinwave.live.page import bundle
+from skinwave.live.html_file import bundle
 from skinwave.live.records import toml_of
 from skinwave.scene.file import loads
 from skinwave.scene.scene import BODIES

@@ -13,7 +13,7 @@ BODIES = ("skin-slab", "paper-sheet")
 def write(app: "Sphinx", exception: Exception | None) -> None:
     """Write the page."""
     if exception is None and app.builder.format == "html":
-        from skinwave.live.page import data_of, page
+        from skinwave.live.html_file import data_of, page
 
         (Path(app.outdir) / PAGE).write_text(page(data_of(bodies=BODIES)), "utf-8")
 

@@ -51,7 +51,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit code."""
-    from skinwave.live.page import comparison_page
+    from skinwave.live.html_file import comparison_page
     from skinwave.measure.comparison import at_measured_places
     from skinwave.report.palette import label
     from skinwave.results import record

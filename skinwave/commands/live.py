@@ -20,7 +20,7 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit code."""
-    from skinwave.live.page import data_of, page, read_scene
+    from skinwave.live.html_file import data_of, page, read_scene
     from skinwave.results.outputs import output_file
 
     scenes = [read_scene(path) for path in options.scenes]

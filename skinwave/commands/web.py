@@ -31,7 +31,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit code."""
     if not 0 <= options.port <= 65535:
         raise ValueError(f"--port is {options.port}; give a number from 0 to 65535")
-    from skinwave.live.page import data_of, read_scene
+    from skinwave.live.html_file import data_of, read_scene
     from skinwave.live.serve import Server
 
     base = f"/{options.base_url.strip('/')}/" if options.base_url.strip("/") else "/"

@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 from urllib.parse import parse_qs, unquote, urlsplit
 
 from skinwave.live.answers import body_answer, dispersion_answer, measurement_answer, scene_answer
-from skinwave.live.page import page
+from skinwave.live.html_file import page
 from skinwave.system.effort import Progress
 from skinwave.system.plain_text import printable, say
 

@@ -8,7 +8,7 @@ import pytest
 from in_browser import frames, needs_browser
 
 from skinwave.commands.cli import main
-from skinwave.live.page import bundle, json_for_script, page, policy
+from skinwave.live.html_file import bundle, json_for_script, page, policy
 from skinwave.live.records import body_of, editables, record_of, toml_of, with_changes
 from skinwave.live.values import presets, values_of
 from skinwave.scene.file import loads
