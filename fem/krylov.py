@@ -137,7 +137,7 @@ def reduce(
     )  # fmt: skip
     outputs = space.rows(size)[:, : start_vectors.shape[1]].T.copy()
     return ReducedModel(
-        operators=small, basis=space.expanded(size), outputs=outputs, moments=moments,
+        operators=small, basis=space.on_all_dofs(size), outputs=outputs, moments=moments,
         estimate=estimate, solver=backend,
     )  # fmt: skip
 
@@ -177,7 +177,7 @@ class KrylovBasis:
         """Vectors (n, size)."""
         return self._columns[:, : self.size]
 
-    def expanded(self, size: int) -> Floats:
+    def on_all_dofs(self, size: int) -> Floats:
         """Return the first vectors on all dofs (n_dofs, size), 0 where the body is fixed. Reuses
         the basis buffer; the basis is invalid afterwards.
         """
@@ -237,12 +237,12 @@ class KrylovBasis:
         squares, directions = squares[distinct], directions[:, distinct]
         upright = inverse[:, None] * directions / np.sqrt(squares)
         if len(squares) and squares.min() < ALIKE * squares.max():
-            upright = self._reorthonormalised(block, upright)
+            upright = self._reorthonormalise(block, upright)
         start, self.size = self.size, self.size + upright.shape[1]
         np.matmul(block, upright, out=self._columns[:, start : self.size])
         return np.vstack([first + second, upright.T @ gram])
 
-    def _reorthonormalised(self, block: Floats, upright: Floats) -> Floats:
+    def _reorthonormalise(self, block: Floats, upright: Floats) -> Floats:
         """Orthonormalise similar directions again, because scaling amplifies round-off."""
         new = block @ upright
         block -= _combine(self.basis, self.basis.T @ (self._M @ new)) @ np.linalg.pinv(upright)

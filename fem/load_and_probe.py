@@ -201,7 +201,7 @@ def facet_areas(places: Floats) -> tuple[Floats, Floats]:
     return shape_functions(barycentric, places.shape[1]), normals * weights[:, None]
 
 
-def on_curved(elements: Floats, barycentric: Floats, points: Floats) -> Floats:
+def curved_coordinates(elements: Floats, barycentric: Floats, points: Floats) -> Floats:
     """Return barycentric coordinates (p, 4) of points (p, 3) in curved tetrahedra with nodes
     (p, a, 3), by Newton's method from initial ones.
     """
@@ -333,7 +333,7 @@ def _elements_at(mesh: TetMesh, points: Floats) -> tuple[Ints, Floats, Bools]:
     inside = np.isfinite(barycentric).all(axis=1)
     if mesh.order == 2:
         nodes = mesh.points[mesh.tets[owner[inside]]]
-        barycentric[inside] = on_curved(nodes, barycentric[inside], points[inside])
+        barycentric[inside] = curved_coordinates(nodes, barycentric[inside], points[inside])
     inside[inside] = barycentric[inside].min(axis=1) >= -BOWED_MARGIN * BULGE - ELEMENT_MARGIN
     return owner, barycentric, inside
 

@@ -248,7 +248,7 @@ class _March:
         for _ in range(MOST_ITERATIONS):
             u = predicted + dt**2 / 4 * a
             v = now.v + dt / 2 * (now.a + a)
-            _, stretch = self._relaxed(now, u, shares)
+            _, stretch = self._branch_stretches(now, u, shares)
             r = load - M @ (a + now.a) - self._internal(u, v, stretch) - now.internal
             residual = float(np.linalg.norm(r) / (np.linalg.norm(load) or 1.0))
             if not np.isfinite(residual):
@@ -267,7 +267,7 @@ class _March:
                 # with an old tangent, a small part of it. The balance of forces replaces it.
                 u, v = u + dt**2 / 4 * change, v + dt / 2 * change
                 internal = load - M @ (a + now.a) - now.internal
-                strain, stretch = self._relaxed(now, u, shares)
+                strain, stretch = self._branch_stretches(now, u, shares)
                 return _Moment(t=until, u=u, v=v, a=a, force=f, internal=internal,
                                strain=strain, stretch=stretch)  # fmt: skip
             if left > SLOW * before:
@@ -291,7 +291,7 @@ class _March:
         relaxing = sum((part.force(u, d) for part, d in each), np.zeros_like(u))
         return self.body.internal(u) + self.body.viscous(u, v) + relaxing
 
-    def _relaxed(
+    def _branch_stretches(
         self, now: _Moment, u: Floats, shares: list[Floats]
     ) -> tuple[tuple[Floats, ...], tuple[Floats, ...]]:
         """Return strains and stretches of the branches at the end of a step, at displacement u."""

@@ -48,7 +48,7 @@ class SparsityPattern:
         slot = np.full(nodes.size * a, len(indices), np.int32)
         slot[pairs] = np.cumsum(first, dtype=np.int32) - np.int32(1)
         return SparsityPattern(
-            indptr=starts_of_kept(first, indptr), indices=indices, slot=slot.reshape(-1, a, a)
+            indptr=row_starts_of(first, indptr), indices=indices, slot=slot.reshape(-1, a, a)
         )
 
     def blocks(self, slabs: Iterable[tuple[slice, Floats]]) -> sparse.bsr_array:
@@ -123,7 +123,7 @@ def select(A: Any, rows: Ints, columns: Ints) -> Any:
     is_selected[rows] = True
     places = number[A.indices]
     kept = (places >= 0) & np.repeat(is_selected, np.diff(A.indptr))
-    starts = starts_of_kept(kept, A.indptr)
+    starts = row_starts_of(kept, A.indptr)
     indptr = np.append(starts[rows], starts[-1])
     size = np.array([len(rows), len(columns)]) * A.shape // shape
     return type(A)((A.data[kept], places[kept], indptr), shape=tuple(size))
@@ -134,7 +134,7 @@ def upper_triangle(A: sparse.csr_array) -> tuple[Array, Index, Index]:
     n, kind = A.shape[0], np.complex128 if np.iscomplexobj(A.data) else np.float64
     kept = A.indices >= np.repeat(np.arange(n, dtype=A.indices.dtype), np.diff(A.indptr))
     columns = A.indices[kept].astype(np.int32, copy=False)
-    return A.data[kept].astype(kind, copy=False), columns, starts_of_kept(kept, A.indptr)
+    return A.data[kept].astype(kind, copy=False), columns, row_starts_of(kept, A.indptr)
 
 
 def on_one_pattern(matrices: Sequence[sparse.csr_array]) -> tuple[Floats, Index, Index]:
@@ -156,7 +156,7 @@ def on_one_pattern(matrices: Sequence[sparse.csr_array]) -> tuple[Floats, Index,
     return on_union, union.indices, union.indptr
 
 
-def starts_of_kept(kept: Bools, indptr: NDArray[np.integer[Any]]) -> Index:
+def row_starts_of(kept: Bools, indptr: NDArray[np.integer[Any]]) -> Index:
     """Return row starts (n + 1,) of a matrix that keeps only some of its entries (nnz,)."""
     before = np.zeros(len(kept) + 1, np.int32)
     np.cumsum(kept, out=before[1:])

@@ -14,7 +14,7 @@ from meshes.reading import PathLike
 from meshes.shapes.structured import Grading
 from meshes.surface.alignment import (
     align,
-    clipped,
+    clip_to_box,
     cut_to_box,
     on_planes,
     rotation_to_z,
@@ -102,7 +102,7 @@ def body_from_file(
     say(f"moved by {in_mm(shift)}, so that the middle of the palm is the origin")
     planes = []
     if clip is not None:
-        surface, notes = clipped(surface, clip)
+        surface, notes = clip_to_box(surface, clip)
         for note in notes:
             say(note)
         check(surface)

@@ -119,8 +119,8 @@ def block(
         lines = _cells(x_length, h), _cells(y_length, h), _cells(depth, h, least=1) - depth / 2
     else:
         lines = (
-            mirrored(graded_axis(x_length / 2, h, grading)),
-            mirrored(graded_axis(y_length / 2, h, grading)),
+            mirror_line(graded_axis(x_length / 2, h, grading)),
+            mirror_line(graded_axis(y_length / 2, h, grading)),
             -graded_axis(depth, h, replace(grading, radius=0))[::-1],
         )
     mesh = extrude(*lines, order=order)
@@ -347,6 +347,6 @@ def round_up(ratio: float) -> int:
     return int(np.ceil(ratio - 1e-9))
 
 
-def mirrored(half: Floats) -> Floats:
+def mirror_line(half: Floats) -> Floats:
     """Return a symmetric line (2 n - 1,) from its half (n,) that begins at 0."""
     return np.concatenate([-half[:0:-1], half])

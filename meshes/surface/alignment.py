@@ -95,7 +95,7 @@ def height_at(surface: Surface, x: float, y: float) -> float:
     return float(highest)
 
 
-def clipped(surface: Surface, box: Sequence[float]) -> tuple[Surface, list[str]]:
+def clip_to_box(surface: Surface, box: Sequence[float]) -> tuple[Surface, list[str]]:
     """Return the closed part of a closed surface within a box, and sentences on the cuts.
 
     `box` is the least and greatest x, then y, in metre. Of several pieces, the one below the origin

@@ -88,7 +88,7 @@ def field_lines(
     """
     path, blocks = _path(field, pressure, probes, threshold)
     g = point_integrals(field, path.distances, 2 * np.pi * path.frequencies, path.width)
-    return path.frequencies, np.concatenate([path.combined(g, h) for h in blocks], axis=1)
+    return path.frequencies, np.concatenate([path.combine(g, h) for h in blocks], axis=1)
 
 
 def weighted_splines(field: Field, splines: Splines, away: Floats) -> Floats:
@@ -123,7 +123,7 @@ class _Path:
     orders: Ints
     coefficients: Complex
 
-    def combined(self, g: Complex, harmonics: Complex) -> Complex:
+    def combine(self, g: Complex, harmonics: Complex) -> Complex:
         """Amplitudes (f, p, m): c sum_cj g_cj(f) h_nmcj(x_p) of integrals g (c, f, j) and harmonics
         h (n, m, c, j, p).
         """
@@ -172,7 +172,7 @@ def path_operator(
     def lines_of(compliance: Compliance) -> tuple[Floats, Complex]:
         field, omega = normal_field(compliance), 2 * np.pi * path.frequencies
         g = point_integrals(field, path.distances, omega, path.width)
-        return path.frequencies, path.combined(g, harmonics)[..., 0]
+        return path.frequencies, path.combine(g, harmonics)[..., 0]
 
     return lines_of
 

@@ -24,8 +24,8 @@ from simple_model.load.spectrum import (
     ALIASED,
     foci_harmonics,
     gain_orders,
-    harmonics_unbounded,
     path_strengths,
+    unbounded_harmonics_error,
 )
 from simple_model.load.tacton import Tacton, tones
 from simple_model.typing import Complex, Floats, Ints
@@ -253,7 +253,7 @@ def _in_powers(pressure: MovingPressure) -> tuple[Ints, NDArray]:
         coefficients = np.linalg.solve(powers[::2], at[::2])
         if np.abs(powers @ coefficients - at).max() <= ALIASED * np.abs(at).max():
             return orders, coefficients
-    raise harmonics_unbounded(law)
+    raise unbounded_harmonics_error(law)
 
 
 def _fourier(values: Floats) -> Complex:

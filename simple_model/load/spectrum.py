@@ -217,10 +217,10 @@ def gain_orders(
         if law.degree is not None or np.abs(c[:, beyond]).max(initial=0.0) <= ALIASED * strongest:
             return orders, c
         count *= 2
-    raise harmonics_unbounded(law)
+    raise unbounded_harmonics_error(law)
 
 
-def harmonics_unbounded(law: DriveLaw) -> ValueError:
+def unbounded_harmonics_error(law: DriveLaw) -> ValueError:
     """Error for a drive law whose harmonics do not decay."""
     return ValueError(
         f"the harmonics of drive law '{law}' do not fall to {ALIASED:g} of the strongest; use a "

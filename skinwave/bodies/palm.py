@@ -17,7 +17,7 @@ from meshes import (
 )
 from meshes.files.import_body import GROWTH
 from meshes.shapes.palm import gradient
-from meshes.shapes.structured import Lines, mirrored
+from meshes.shapes.structured import Lines, mirror_line
 from skinwave.bodies.analytic import stack_dispersion
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.discretised import Discretised
@@ -61,7 +61,7 @@ def body_lines(body: Body, h: float) -> Lines:
     side = CELL * max(1.0, HAND_CELL / h) ** (1 / 3)
     finest, coarsest = side * SURFACE * h, side * _coarsest(body, h)
     along = Grading(radius=FINE_RADIUS, growth=GROWTH, coarsest=coarsest)
-    x, y = (mirrored(graded_axis(side / 2, finest, along)) for side in (body.width, body.height))
+    x, y = (mirror_line(graded_axis(side / 2, finest, along)) for side in (body.width, body.height))
     # No cell is higher than its target size. Two meshes that are compared then differ more often in
     # their number of layers, which affects the error most.
     heights = [finest]

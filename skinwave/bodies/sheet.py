@@ -19,7 +19,7 @@ from simple_model.layers.material import Material
 from skinwave.bodies.body import Body, BodyKind, register
 from skinwave.bodies.build import Build
 from skinwave.bodies.discretised import Discretised
-from skinwave.bodies.supports import Mounting, clip_lines, held_components
+from skinwave.bodies.supports import Mounting, clip_lines, supported_components
 from skinwave.typing import Bools, Floats, Ints
 
 SHEET_CELLS = 60  # along the shorter side: f1 within 0.1 %, deflection within 0.6 %
@@ -47,7 +47,7 @@ def discretise(body: Body, h: float, thickness: float | None = None) -> Discreti
 
 def _fixed_nodes(body: Body, mesh: TetMesh) -> Bools:
     """Held components (n, 3) of nodes; those of a tilted sheet are held completely."""
-    components = held_components(body.mounting, mesh)
+    components = supported_components(body.mounting, mesh)
     return components | (components.any(axis=1, keepdims=True) & body.placement.is_tilted)
 
 

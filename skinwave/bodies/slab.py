@@ -6,7 +6,7 @@ import numpy as np
 
 from meshes import Grading, extrude, graded_axis
 from meshes.files.import_body import FINE_RADIUS
-from meshes.shapes.structured import Lines, check_size, mirrored, with_planes
+from meshes.shapes.structured import Lines, check_size, mirror_line, with_planes
 from simple_model.layers.compliance import layered
 from skinwave.bodies.absorbing_layer import (
     far_springs,
@@ -58,7 +58,7 @@ def on_lines(body: Body, lines: Lines, wider: float = 1.0) -> Discretised:
 def body_lines(body: Body, h: float) -> Lines:
     """Return grid lines along x, y and z through a body, fine where the focus travels."""
     along = Grading(radius=FINE_RADIUS, growth=GROWTH[0], coarsest=COARSEST[0] * h)
-    x, y = (mirrored(graded_axis(side / 2, h, along)) for side in (body.width, body.height))
+    x, y = (mirror_line(graded_axis(side / 2, h, along)) for side in (body.width, body.height))
     return x, y, -_depth_line(body, h)[::-1]
 
 

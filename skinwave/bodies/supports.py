@@ -238,7 +238,7 @@ def clip_lines(mounting: Mounting, axis: int, size: float) -> list[float]:
     return sorted(placed)
 
 
-def held_components(mounting: Mounting, mesh: TetMesh) -> Bools:
+def supported_components(mounting: Mounting, mesh: TetMesh) -> Bools:
     """Return the components (n, 3) of nodes that supports hold, of a flat sheet or its symmetric
     part.
 

@@ -171,10 +171,10 @@ def _scene(options: argparse.Namespace) -> "Scene":
 
 def _views(options: argparse.Namespace, progress: "Progress") -> "list[View]":
     """Return the saved motion of a result folder, or compute that of every model of a scene."""
-    from skinwave.studies.album import open_album, shown_views
+    from skinwave.studies.album import open_album, quantity_views
 
     if not options.source.is_dir():
-        views, warnings = shown_views(
+        views, warnings = quantity_views(
             replace(_scene(options), depth=0.0),  # a film shows the surface
             solving(options, progress), frames=options.frames, beside=options.beside,
         )  # fmt: skip

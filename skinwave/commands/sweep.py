@@ -122,7 +122,7 @@ def _sweep(options: argparse.Namespace, out: Path) -> tuple[dict[str, Any], list
     spreads = [each for each in variations if is_sampled and isinstance(each, Spread)]
     has_page = len(spreads) == len(variations)
     tables = uncertainty_page.SAMPLED_FILES if has_page else ()
-    dataset.refuse_changed(out, [*tables, *[dataset.CSV] * options.csv])  # before any run
+    dataset.check_own_files(out, [*tables, *[dataset.CSV] * options.csv])  # before any run
     solving = SolveOptions(
         model=options.model, tolerance=options.tolerance, h=metre(options.h), solver=options.solver
     )
@@ -138,7 +138,7 @@ def _sweep(options: argparse.Namespace, out: Path) -> tuple[dict[str, Any], list
         if grid and not outcome.missing:
             optimum = best.find_best(sweep, grid, options.best, options.samples, options.seed)
     if has_page and not outcome.missing:
-        files = uncertainty_page.write_sampled(
+        files = uncertainty_page.write_uncertainty(
             out, sweep.rows(points), spreads, has_indices=options.design == "sobol"
         )
     if outcome.missing:

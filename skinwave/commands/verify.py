@@ -83,7 +83,7 @@ def _tradeoff(options: argparse.Namespace) -> int:
     with result_folder(options, name, inputs, scene) as (folder, progress):
         found = study(scene, progress)
         write(folder, scene, found)
-    closing(options, sentences(found), accepted=found.accepted)
+    closing(options, sentences(found), accepted=found.is_converged)
     return 0
 
 

@@ -39,7 +39,7 @@ class Alignment:
     repeats: float = np.inf
     chi_square: float = np.nan
 
-    def applied(self, frequencies: Floats, model: np.ndarray) -> np.ndarray:
+    def apply(self, frequencies: Floats, model: np.ndarray) -> np.ndarray:
         """Return the amplitudes (f, p) of a model with the gain and the delay."""
         turned = np.exp(-2j * np.pi * frequencies * self.delay)
         return np.asarray(self.gain * turned[:, None] * model)
@@ -98,7 +98,7 @@ def align(
         delay_error=0.0 if delay is not None else float(np.hypot(from_noise, lines.shift_error)),
         gain_error=_error(turned, lines) / size if gain is None else 0.0,
     )  # fmt: skip
-    away = lines.mean - result.applied(f, model)
+    away = lines.mean - result.apply(f, model)
     freedom = 2 * away.size - (delay is None) - (gain is None)
     if freedom <= 0 or not (lines.variance > 0).any():
         return result

@@ -118,7 +118,7 @@ class MeasuredComparison:
         return findings
 
     @property
-    def drawn_places(self) -> np.ndarray:
+    def figure_places(self) -> np.ndarray:
         """Indices of the places in figures, those with the strongest lines."""
         return strongest(np.linalg.norm(self.lines.mean, axis=0), MOST_DRAWN)
 
@@ -192,7 +192,7 @@ def _column(measured: Measured, run: Run, lines: MeasuredLines) -> ModelColumn:
     window, centre = _delay_window(measured.measurement, run, lines)
     aligned = partial(align, window=window, centre=centre, delay=measured.delay, gain=gain)
     best = aligned(lines, z)
-    model = best.applied(lines.frequencies, z)
+    model = best.apply(lines.frequencies, z)
     away = lines.mean - model
     flipped = aligned(replace(lines, each=-lines.each), z)
     fits = 2 * lines.variance.size * (flipped.chi_square - best.chi_square) < AS_GOOD
@@ -266,7 +266,7 @@ def measured_places(comparison: MeasuredComparison) -> MeasuredPlaces:
 
 def runs_to_draw(comparison: MeasuredComparison) -> list[Run]:
     """Return the models and the measurement on their clock, at the places in figures."""
-    drawn = comparison.drawn_places
+    drawn = comparison.figure_places
     runs = []
     for run in (*(column.run for column in comparison.columns), _measured_run(comparison)):
         scene = replace(run.scene, probes=tuple(run.scene.probes[k] for k in drawn), depth=0.0)

@@ -55,7 +55,7 @@ def page_section(
     comparison: MeasuredComparison, picture: Callable[[str, Figure, str], Picture]
 ) -> Section:
     """Return the section; `picture(name, figure, caption)` makes a part of a page."""
-    lines, main, at = comparison.lines, comparison.main, comparison.drawn_places
+    lines, main, at = comparison.lines, comparison.main, comparison.figure_places
     columns = {c.run.column: c for c in comparison.columns}
     figure = lines_figure(
         dict(zip(comparison.names, lines.frequencies.tolist(), strict=True)),

@@ -68,15 +68,15 @@ class Fit:
         return with_distributions(changed, spreads)
 
     @property
-    def predicted(self) -> Floats:
+    def prediction(self) -> Floats:
         """Prediction (n, s) at the solution."""
-        return self.solution.problem.predicted(self.solution.u)
+        return self.solution.problem.predict(self.solution.u)
 
     @property
     def misfit(self) -> float:
         """Relative L2 norm of the unweighted residual."""
         values = self.solution.problem.data.values
-        return float(np.linalg.norm(self.predicted - values) / np.linalg.norm(values))
+        return float(np.linalg.norm(self.prediction - values) / np.linalg.norm(values))
 
 
 def fit(

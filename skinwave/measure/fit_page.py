@@ -54,8 +54,8 @@ def write(folder: Path, result: Fit) -> None:
     (folder / "fit.json").write_text(content, encoding="utf-8")
     np.savez(
         folder / "fit.npz", axis=data.axis, measured=data.values, error=data.error,
-        fitted=result.predicted, residual=result.solution.residual, places_m=result.measured.places,
-        correlations=correlations, keys=np.array(keys),
+        fitted=result.prediction, residual=result.solution.residual, correlations=correlations,
+        places_m=result.measured.places, keys=np.array(keys),
     )  # fmt: skip
     about = ABOUT_RESIDUALS + ABOUT_LAGS * bool(len(result.intervals.whiteness.correlations))
     caption = ABOUT_WAVEFORMS if data.is_in_time else ABOUT_LINES
@@ -159,7 +159,7 @@ def fitted_figure(result: Fit) -> Figure:
     data, count = result.solution.problem.data, len(result.measured.places)
     if data.is_in_time:
         return _waveforms(result)
-    measured, fitted = (_amplitudes(x, count) for x in (data.values, result.predicted))
+    measured, fitted = (_amplitudes(x, count) for x in (data.values, result.prediction))
     at, error = _largest(measured), data.error[:, :count]
     differs = np.abs(measured - fitted) > NORMAL_95 * error
     return lines_figure(
@@ -172,7 +172,7 @@ def fitted_figure(result: Fit) -> Figure:
 def _waveforms(result: Fit) -> Figure:
     """Return the end of steady waveforms, or the start of waveforms from rest."""
     data, record = result.solution.problem.data, result.measured.record
-    places, fitted = _largest(data.values), result.predicted
+    places, fitted = _largest(data.values), result.prediction
     n = int(np.searchsorted(data.axis, data.axis[0] + DRAWN_TIME)) + 1
     part = slice(max(len(data.axis) - n, 0), None) if data.lines else slice(n)
     t = 1e3 * data.axis[part]

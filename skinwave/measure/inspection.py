@@ -228,7 +228,7 @@ def _mains(
     return present
 
 
-def clipped(waveform: Floats) -> int:
+def clip_count(waveform: Floats) -> int:
     """Return how many samples of a waveform (t,) are cut off at its largest or smallest value.
 
     A peak that rounding flattens has as many samples in the step below; a clipped one has not.
@@ -240,7 +240,7 @@ def _clipped_samples(measured: Measurement) -> np.ndarray:
     """Return numbers (r, p) of clipped samples."""
     if measured.is_spectrum:
         return np.zeros((len(measured.values), len(measured.places)), int)
-    return np.array([[clipped(waveform) for waveform in run.T] for run in measured.values])
+    return np.array([[clip_count(waveform) for waveform in run.T] for run in measured.values])
 
 
 def _cut_off(x: Floats) -> int:

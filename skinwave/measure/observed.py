@@ -101,7 +101,7 @@ class Data:
         """Whether a measurement with the opposite sign has other values."""
         return self.kind != "amplitudes"
 
-    def weighted(self, values: Floats) -> Floats:
+    def whiten(self, values: Floats) -> Floats:
         """Return values (n, s) in units of their errors, made independent."""
         over = values / self.error
         if self.whitening is None:

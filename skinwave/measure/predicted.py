@@ -32,7 +32,7 @@ from skinwave.measure.parameters import (
 from skinwave.models import Model, named, parametric
 from skinwave.models.covering import covering, try_shared_body
 from skinwave.models.flat_body import fields_read
-from skinwave.models.limits import check_taken
+from skinwave.models.limits import check_takes
 from skinwave.models.options import SolveOptions, sample_times
 from skinwave.models.parametric import ParametricBody
 from skinwave.planning.simulate import compute
@@ -77,7 +77,7 @@ class Target:
             return PRESSURE, self.scene.pressure.peak_pressure
         return FORCE, self.scene.load.force
 
-    def varied(self, values: Values) -> Scene:
+    def scene_with(self, values: Values) -> Scene:
         """Return the scene with these values, and probes at the places with their offset."""
         changed = with_values(self.scene, of_scene(values)) if of_scene(values) else self.scene
         offset = np.array([values.get(OFFSET_X, 0.0), values.get(OFFSET_Y, 0.0)]) / 1e3
@@ -115,7 +115,7 @@ def target(scene: Scene, model: str, quantity: Quantity, places: Floats) -> Targ
     if not record.needs_body:
         raise ValueError(f"{model} has no body to fit; choose another model")
     aim = Target(scene=scene, model=model, quantity=quantity, places=places)
-    check_taken(record, aim.varied({}))
+    check_takes(record, aim.scene_with({}))
     return aim
 
 
@@ -125,7 +125,7 @@ def with_reduction(aim: Target, parameters: Parameters, progress: Progress) -> T
     ranges = {key: ranges[key] for key in aim.rest(dict.fromkeys(ranges, 1.0))}
     if not aim.record.is_reduced or parameters.ties or not ranges:
         return aim
-    together = covering(aim.varied({}), ranges, EXPECTED_RUNS)
+    together = covering(aim.scene_with({}), ranges, EXPECTED_RUNS)
     reduced = try_shared_body(together, SolveOptions(progress=progress))
     return replace(aim, reduced=reduced) if reduced else aim
 
@@ -174,7 +174,7 @@ def _from_cache(function: Callable[[Values], Any]) -> Callable[[Values], Any]:
 
 def _flat_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
     """Return lines by wavenumber integrals."""
-    f, a = _flat_lines_of(aim.varied(values))
+    f, a = _flat_lines_of(aim.scene_with(values))
     at = np.abs(f[:, None] - frequencies).argmin(axis=0)
     apart = np.abs(f[at] - frequencies) > SAME_LINE * frequencies
     if apart.any():
@@ -208,7 +208,7 @@ def _reduced_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
 
 def _sampled_lines(aim: Target, values: Values, frequencies: Floats) -> Complex:
     """Return lines of the waveforms of any model."""
-    return np.asarray(fit_lines(compute(aim.varied(values), aim.model), frequencies)[0])
+    return np.asarray(fit_lines(compute(aim.scene_with(values), aim.model), frequencies)[0])
 
 
 def _history(aim: Target, values: Values, last: float) -> CubicSpline:
@@ -216,7 +216,7 @@ def _history(aim: Target, values: Values, last: float) -> CubicSpline:
     if aim.reduced:
         response = parametric.answer(aim.reduced, values)
     else:
-        scene = aim.varied(values)
+        scene = aim.scene_with(values)
         count = int(np.ceil(2 * last * SAMPLE_RATE)) + 2
         response = compute(scene, aim.model, times=sample_times(scene)[:count])
     return CubicSpline(response.times, response.values)

@@ -45,9 +45,9 @@ class Problem:
 
     def residual(self, u: Floats) -> Floats:
         """Return the weighted residual (n s,) at a point u (k,) of the unit cube."""
-        return self.data.weighted(self.predicted(u) - self.data.values).ravel()
+        return self.data.whiten(self.predict(u) - self.data.values).ravel()
 
-    def predicted(self, u: Floats) -> Floats:
+    def predict(self, u: Floats) -> Floats:
         """Return the prediction (n, s)."""
         return self.data.predict(self.parameters.values(u))
 
@@ -249,7 +249,7 @@ def _delays(problem: Problem, at: int) -> list[float]:
 def _with_factor(problem: Problem, u: Floats, at: int | None) -> tuple[float, Floats]:
     """Return chi squared and the point with the linear parameter `at`, if any, of least squares."""
     data = problem.data
-    predicted, values = data.weighted(problem.predicted(u)), data.weighted(data.values)
+    predicted, values = data.whiten(problem.predict(u)), data.whiten(data.values)
     factor = 1.0
     if at is not None:
         linear = problem.parameters.free[at]

@@ -78,7 +78,7 @@ def default_model(scene: Scene) -> str:
     raise no_model(scene)
 
 
-def check_taken(model: Model, scene: Scene) -> None:
+def check_takes(model: Model, scene: Scene) -> None:
     """Raise `Refused` with limits and cures if a model does not take a scene."""
     if limits := beyond(model, scene):
         raise refusal(scene, model, limits)
@@ -210,7 +210,7 @@ def surface_limits(scene: Scene) -> Iterator[Limit]:
         yield load_limit(scene)
 
 
-def held_sheet_limits(body: Body) -> Iterator[Limit]:
+def clamped_sheet_limits(body: Body) -> Iterator[Limit]:
     """Yield the limits of a model of a flat sheet with clamped sides across the beam."""
     if body.sides != "clamped":
         yield Limit(

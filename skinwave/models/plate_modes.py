@@ -38,7 +38,7 @@ from skinwave.bodies.body import Body
 from skinwave.bodies.supports import EDGES
 from skinwave.models import Limit, Model, register
 from skinwave.models.laws import has_own_law, slowest_and_fastest
-from skinwave.models.limits import held_sheet_limits, of_body, surface_limits
+from skinwave.models.limits import clamped_sheet_limits, of_body, surface_limits
 from skinwave.models.options import SolveOptions, response_of, sample_times
 from skinwave.models.relative_change import relative_changes
 from skinwave.scene.scene import Scene
@@ -189,7 +189,7 @@ def limits(scene: Scene) -> Iterator[Limit]:
     if not body.of_kind.is_plate:
         yield Limit(why=f"needs a sheet, not a {body.kind}")
         return
-    yield from held_sheet_limits(body)
+    yield from clamped_sheet_limits(body)
     if body.base != "free":
         yield Limit(
             why=f"needs a sheet with free faces, not with the base {body.base}",

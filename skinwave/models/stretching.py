@@ -279,7 +279,7 @@ def _limits(
     if not body.of_kind.is_plate:
         yield Limit(why=f"needs a sheet, not a {body.kind}")
         return
-    yield from limits.held_sheet_limits(body)
+    yield from limits.clamped_sheet_limits(body)
     yield from air_limits(body)
     yield from linear_elements.mesh_limits(body, size(body))
     if not scene.load.is_plain:

@@ -118,7 +118,7 @@ class _Numbers:
             return False
         return bool(compare(self._parameter(parameter), limit))
 
-    def check_given(self) -> None:
+    def check_parameters(self) -> None:
         """Raise a ValueError if a value is given for a parameter that the file does not have."""
         known = list({**self._definitions, **self.notes})
         if self._given and not known:
@@ -185,7 +185,7 @@ def _animation(table: Table, number: _Numbers) -> Animation:
     places = _track(tracks["coords"], (0.0, 0.0, 0.0))
     geometry = _child(transform, "geometric_transforms", dict, {})
     factor = number(transform.get("intensity_factor", 1.0), "intensity_factor")
-    number.check_given()
+    number.check_parameters()
     notes = list(number.notes.values())
     if speed != 1:
         notes.append(f"playback at {speed:g} times the speed; drawing frequencies do not change")

@@ -28,7 +28,7 @@ def write(scene: Scene, options: Options) -> tuple[bytes, tuple[str, ...]]:
         amplitude = float(loudness(scene.pressure, np.zeros(1))[0])
     brush, place = _brush(tacton)
     if brush is None:
-        brush = _named("circle", {"radius": 0.0}, tacton, 0.0)
+        brush = _figure("circle", {"radius": 0.0}, tacton, 0.0)
         times, places, levels = _path(scene)
         notes.append(f"{len(times)} keyframes, within {1e3 * STRAIGHT[0]:g} mm of the path")
     else:
@@ -103,17 +103,17 @@ def _brush(tacton: Tacton) -> tuple[dict[str, Any] | None, tuple[float, float]]:
     path = tacton.trajectory
     if path.shape == "circle" and tacton.foci[0] == 0:
         radius = {"radius": 1e3 * path.size / 2}
-        return _named("circle", radius, tacton, path.drawing_frequency), path.centre
+        return _figure("circle", radius, tacton, path.drawing_frequency), path.centre
     if path.shape == "point" or (path.is_static and path.shape != "recorded"):
         x, y = path.position(0.0).tolist()
-        return _named("circle", {"radius": 0.0}, tacton, DRAWING_FREQUENCY), (x, y)
+        return _figure("circle", {"radius": 0.0}, tacton, DRAWING_FREQUENCY), (x, y)
     straight = path.shape == "line" or (path.shape == "polyline" and len(path.outline) == 2)
     if not straight or path.sweep != "sinusoidal" or tacton.foci[0] != 0:
         return None, path.centre
     first, last = path.at_phase([0.0, 0.5])
     (x, y), (dx, dy) = (first + last) / 2, (first - last) / 2
     numbers = {"length": 1e3 * hypot(dx, dy), "thickness": 1.0, "rotation": degrees(atan2(dy, dx))}
-    return _named("line", numbers, tacton, path.drawing_frequency), (float(x), float(y))
+    return _figure("line", numbers, tacton, path.drawing_frequency), (float(x), float(y))
 
 
 def _keyframe(t: float, place: Any, level: float, brush: dict[str, Any]) -> dict[str, Any]:
@@ -127,7 +127,7 @@ def _keyframe(t: float, place: Any, level: float, brush: dict[str, Any]) -> dict
     }  # fmt: skip
 
 
-def _named(name: str, numbers: dict[str, float], tacton: Tacton, f_d: float) -> dict[str, Any]:
+def _figure(name: str, numbers: dict[str, float], tacton: Tacton, f_d: float) -> dict[str, Any]:
     numbers = {**numbers, "am_freq": tacton.am_frequency, "stm_freq": f_d}
     return {"name": name, "params": {key: _f64(value) for key, value in numbers.items()}}
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from meshes import reading
 from skinwave.patterns import adaptics, adaptics_out, autd3, focal_points, waveform
-from skinwave.patterns.pattern import Options, onto, resized, wide_enough
+from skinwave.patterns.pattern import Options, onto, resize, wide_enough
 from skinwave.scene import file as scene_file
 from skinwave.scene.scene import Body, Scene, check_load
 
@@ -54,7 +54,7 @@ def read_pattern(
         raise ValueError(f"{path}: cannot read '{suffix}'; use {', '.join(READERS)}")
     if suffix == ".toml":
         scene = scene_file.read(path)
-        tacton = resized(scene.tacton, options.resize)
+        tacton = resize(scene.tacton, options.resize)
         return replace(scene, pressure=replace(scene.pressure, tacton=tacton)), ()
     receiver = base or scene_file.loads("")
     content = reading.read_bytes(path, LARGEST[suffix])
@@ -63,7 +63,7 @@ def read_pattern(
             pattern = waveform.read(content, options, receiver)
         else:
             pattern = {".adaptics": adaptics, ".csv": focal_points}[suffix].read(content, options)
-        tacton = resized(pattern.tacton, options.resize)
+        tacton = resize(pattern.tacton, options.resize)
         notes = list(pattern.notes)
         receiver = base or wide_enough(receiver, tacton, notes)
         return onto(receiver, replace(pattern, tacton=tacton), path.stem), tuple(notes)

@@ -69,14 +69,14 @@ def read(content: bytes, options: Options) -> Pattern:
         notes.append("the file has times, so that --rate applies only to a file that is written")
     notes.append(f"the focus {'stays until the next sample' if options.hold else 'moves straight'}")
     height = one_height(table["z_m"].ravel(), options, notes)
-    tacton = recorded(times[0], np.stack([table["x_m"], table["y_m"]], -1), table["intensity"],
+    tacton = tacton_of(times[0], np.stack([table["x_m"], table["y_m"]], -1), table["intensity"],
                       hold=options.hold)  # fmt: skip
     return Pattern(
         tacton=tacton, pressure={"drive": "pressure_squared", **height}, notes=tuple(notes)
     )
 
 
-def recorded(times: Floats, places: Floats, levels: Floats, *, hold: bool = False) -> Tacton:
+def tacton_of(times: Floats, places: Floats, levels: Floats, *, hold: bool = False) -> Tacton:
     """Return a Tacton of foci at places (n, t, 2) in metre with levels (n, t) at times (t,) in s.
 
     The last sample lasts as long as the one before it.

@@ -62,7 +62,7 @@ def onto(base: Scene, pattern: Pattern, name: str) -> Scene:
     return replace(base, name=clean, pressure=pressure)
 
 
-def resized(tacton: Tacton, factor: float) -> Tacton:
+def resize(tacton: Tacton, factor: float) -> Tacton:
     """Multiply all positions of a Tacton by a factor; its drawing frequency stays the same."""
     if not (isfinite(factor) and factor > 0):
         raise ValueError(f"--resize is {factor:g}; give a finite number above 0")

@@ -74,7 +74,7 @@ def assess(
 def coarser_body(scene: Scene, options: SolveOptions = DEFAULT) -> Coarser:
     """Return the element size in metre that `assess` compares with, and the body on that mesh."""
     body, h = scene.body, options.h
-    other = refinement.compared_with(body, h) if h else _coarser_size(body, default_size(body))
+    other = refinement.comparison_size(body, h) if h else _coarser_size(body, default_size(body))
     reduction = reduction_tolerance(options.tolerance)
     parts = body, scene.probes, scene.reading, scene.load
     return other, _prepare(*parts, other, options.solver, reduction)
@@ -100,7 +100,7 @@ def _coarser_size(body: Body, h: float) -> float:
     try:
         check_mesh(body, COARSE_RATIO * h)
     except ValueError:
-        return refinement.compared_with(body, h)
+        return refinement.comparison_size(body, h)
     return COARSE_RATIO * h
 
 

@@ -15,7 +15,7 @@ from skinwave.bodies.sizes import check_mesh
 from skinwave.models import Limit, Model, named
 from skinwave.models.flat_body import FLAT_BODY, HARMONIC
 from skinwave.models.laws import check_laws, own_laws, series_tolerance
-from skinwave.models.limits import beyond, check_taken, default_model, refusal, takers, takes
+from skinwave.models.limits import beyond, check_takes, default_model, refusal, takers, takes
 from skinwave.models.linear_elements import FEM, TRANSIENT_RATE, step_count
 from skinwave.models.options import DEFAULT, SolveOptions, sample_grid, sample_times
 from skinwave.models.plate_modes import ERROR, FROM_REST, STRETCHED
@@ -109,7 +109,7 @@ def _choose_model(scene: Scene, options: SolveOptions, grid: Grid) -> _Request:
     if options.dt is not None:
         step_count(float(sample_times(scene)[-1]), options.dt)
     if requested:
-        check_taken(requested, scene)
+        check_takes(requested, scene)
     moves = scene.body.of_kind.discretise
     if moves and (not requested or requested.needs_body):
         check_laws(scene.body, scene.pressure)

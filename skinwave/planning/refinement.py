@@ -98,7 +98,7 @@ def refine(
 
     check_mesh(body, h or default_size(body))
     sizes = element_sizes(body)
-    before = compared_with(body, h) if h else sizes[0]
+    before = comparison_size(body, h) if h else sizes[0]
     size = h or finer_sizes(sizes, before)[0]
     coarse, other = solve(before)
     while True:
@@ -139,7 +139,7 @@ def finer_sizes(sizes: Floats, size: float) -> Floats:
     return sizes[min(coarser, len(sizes) - 1) :]
 
 
-def compared_with(body: Body, h: float) -> float:
+def comparison_size(body: Body, h: float) -> float:
     """Return a size to compare a given one with: coarser, or finer than a single layer."""
     if actual := body.of_kind.actual_size:
         sizes = (h * np.geomspace(1, 4, 80)).tolist() + (h / np.geomspace(1, 4, 80)).tolist()

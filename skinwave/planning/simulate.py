@@ -14,7 +14,7 @@ import numpy as np
 from simple_model import Response
 from skinwave.models import named
 from skinwave.models.laws import check_laws
-from skinwave.models.limits import check_taken
+from skinwave.models.limits import check_takes
 from skinwave.models.options import SolveOptions, from_first, sample_grid
 from skinwave.models.reduced import answer
 from skinwave.planning.plan import plan
@@ -94,7 +94,7 @@ def compute(scene: Scene, model: str, **options: Any) -> Response:
 def _solve_by_model(scene: Scene, options: SolveOptions) -> Response:
     """Return the response of a model with its default mesh, or that of the options."""
     model = named(options.model)
-    check_taken(model, scene)
+    check_takes(model, scene)
     if model.needs_body:
         check_laws(scene.body, scene.pressure)
     times, first = sample_grid(scene, options.times)

@@ -65,7 +65,7 @@ def surfaces_figure(
     entries: dict[str, Any] = {"path of the focus": {"color": "0.6", "ls": "dotted"}}
     for ax, (column, surface) in zip(axes, surfaces.items(), strict=True):
         extent = tuple(1e3 * np.array([*surface.x[[0, -1]], *surface.y[[0, -1]]]))
-        image = ax.imshow(surface.shown, cmap=SEQUENTIAL, vmin=0, origin="lower", extent=extent)
+        image = ax.imshow(surface.unit_rms, cmap=SEQUENTIAL, vmin=0, origin="lower", extent=extent)
         borders = [(surface.rms, NEAR, "white", "solid", f"{NEAR:g} dB")]
         if kernel is not None:
             borders.insert(0, (kernel.rms, OUTSIDE, KERNEL, "dashed", f"kernel's {OUTSIDE:g} dB"))
@@ -169,7 +169,7 @@ def snapshots_figure(views: Sequence[View], style: Style, count: int = 4) -> Fig
         sampled = interpolation(view, raster)
         for frame, ax in zip(frames, row, strict=True):
             image = ax.imshow(
-                sampled(view.pushed[frame] / view.peak), cmap=SIGNED, vmin=-1, vmax=1,
+                sampled(view.inward[frame] / view.peak), cmap=SIGNED, vmin=-1, vmax=1,
                 extent=extent, origin="lower",
             )  # fmt: skip
             draw_path(ax, view.scene, "black")
@@ -190,7 +190,7 @@ def _snapshot_frames(view: View, count: int) -> list[int]:
     frequency = view.scene.tacton.trajectory.drawing_frequency or view.tone
     turn = min(1 / frequency, view.period) if frequency else view.period
     frames = len(view.times)
-    first, step = int(np.abs(view.pushed).max(axis=1).argmax()), frames * turn / view.period / count
+    first, step = int(np.abs(view.inward).max(axis=1).argmax()), frames * turn / view.period / count
     return [(first + round(k * step)) % frames for k in range(count)]
 
 

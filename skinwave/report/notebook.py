@@ -42,8 +42,8 @@ def scene_line(scene: "Scene") -> str:
     load += [scene.load.words] * (not scene.load.is_plain)
     size = body.of_kind.words(body)
     if body.of_kind.discretise:
-        layers = [f"{1e3 * each.thickness:g} mm of {_named(each.material)}" for each in body.layers]
-        size += f", {'; below it '.join([*layers, _named(body.material)])}"
+        layers = [f"{1e3 * each.thickness:g} mm of {_label(each.material)}" for each in body.layers]
+        size += f", {'; below it '.join([*layers, _label(body.material)])}"
     probes = f"{plural(len(scene.probes), 'probe')}, {scene.reading.words}"
     return _line(f"Scene {scene.name!r}", [", ".join(load), size, probes])
 
@@ -70,7 +70,7 @@ def agreement_line(agreement: "Agreement") -> str:
     return _line("Agreement", parts)
 
 
-def _named(material: object) -> str:
+def _label(material: object) -> str:
     if isinstance(material, str):
         return material
     young, density = getattr(material, "young", np.nan), getattr(material, "density", np.nan)

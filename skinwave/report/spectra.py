@@ -99,7 +99,7 @@ def _legend(figure: Figure, runs: list[Run]) -> int:
     return legend(figure, entries, columns, loc="upper center", fontsize=None)
 
 
-def _shown_part(run: Run, runs: list[Run]) -> slice:
+def _common_end(run: Run, runs: list[Run]) -> slice:
     """Return the last part that all runs have; their records may begin at different times."""
     times = run.response.times
     end = min(float(other.response.times[-1]) for other in runs)
@@ -112,7 +112,7 @@ def _shown_part(run: Run, runs: list[Run]) -> slice:
 def _remove_mean(run: Run, runs: list[Run]) -> Floats:
     """Return the shown part (t, p) of the response about its mean in the steady state."""
     motion = run.response.values
-    return motion[_shown_part(run, runs)] - motion[int(SETTLE * len(motion)) :].mean(axis=0)
+    return motion[_common_end(run, runs)] - motion[int(SETTLE * len(motion)) :].mean(axis=0)
 
 
 def _largest(run: Run, runs: list[Run]) -> float:
@@ -122,7 +122,7 @@ def _largest(run: Run, runs: list[Run]) -> float:
 def _draw_waveforms(ax: Axes, runs: list[Run], p: int) -> None:
     for run in runs:
         centred = _remove_mean(run, runs)[:, p] / _largest(run, runs)
-        times = 1e3 * run.response.times[_shown_part(run, runs)]
+        times = 1e3 * run.response.times[_common_end(run, runs)]
         ax.plot(times, centred, color=ink_colour(run.column), lw=_width(run), zorder=_depth(run))
     ax.margins(x=0)
     ax.xaxis.set_major_locator(MaxNLocator(4, prune="both"))
@@ -138,7 +138,7 @@ def _draw_spectra(ax: Axes, runs: list[Run], p: int) -> None:
         level = 20 * np.log10(np.maximum(amplitude[moving, p] / top, 1e-12))
         style = {**line_style(run.column), "zorder": _depth(run)}
         ax.plot(f[moving], level, lw=_width(run) - 0.3, alpha=0.6, **(style | {"marker": ""}))
-        lines = [(f, run.table.amplitudes[name][p]) for name, f in run.listed.items()]
+        lines = [(f, run.table.amplitudes[name][p]) for name, f in run.line_hz.items()]
         peaks = [(peak.frequency, peak.amplitudes[p]) for peak in run.unnamed]
         for points, face in ((lines, colour(run.column)), (peaks, "none")):
             at, size = np.array(points).reshape(-1, 2).T  # may be empty
@@ -206,7 +206,7 @@ def sensation_levels(run: Run, probe: int) -> dict[str, float]:
         return {}
     levels = {
         name: float(sensation_level(run.table.amplitudes[name][probe], frequency))
-        for name, frequency in run.listed.items()
+        for name, frequency in run.line_hz.items()
     }
     return dict(sorted(levels.items(), key=lambda item: -item[1]))
 
@@ -214,7 +214,7 @@ def sensation_levels(run: Run, probe: int) -> dict[str, float]:
 def _draw_levels(ax: Axes, run: Run, probe: int, width: float) -> None:
     """Draw lines and their names: by sensation level or, if not skin, by amplitude."""
     amplitudes = {name: float(values[probe]) for name, values in run.table.amplitudes.items()}
-    names = sorted(run.listed, key=lambda name: -amplitudes[name])
+    names = sorted(run.line_hz, key=lambda name: -amplitudes[name])
     if run.is_skin:
         levels = sensation_levels(run, probe)
         names = [name for name, level in levels.items() if level > LOWEST_LEVEL]
@@ -223,7 +223,7 @@ def _draw_levels(ax: Axes, run: Run, probe: int, width: float) -> None:
         ax.plot(f, curve, **CURVE)
         ax.fill_between(f, curve / factor, curve * factor, lw=0, **THRESHOLD_BAND)
     per_unit, style = run.response.record.per_unit, line_style(run.column)
-    frequencies = np.array([run.listed[name] for name in names])
+    frequencies = np.array([run.line_hz[name] for name in names])
     heights = per_unit * np.array([amplitudes[name] for name in names])
     ax.vlines(frequencies, 1e-4, heights, color=style["color"], lw=1.2)
     ax.plot(frequencies, heights, ls="none", **style)
@@ -235,7 +235,7 @@ def _draw_levels(ax: Axes, run: Run, probe: int, width: float) -> None:
     ax.set_xticks([10, 30, 100, 300, 1000], ["10", "30", "100", "300", "1000"])
     ax.set_title(run_label(run), pad=4 + NAME_ROWS * ROW * small())
     ax.grid(alpha=0.25)
-    name_lines(ax, {name: run.listed[name] for name in names[:MOST_NAMED]}, width, NAME_ROWS)
+    name_lines(ax, {name: run.line_hz[name] for name in names[:MOST_NAMED]}, width, NAME_ROWS)
 
 
 @with_style

@@ -138,7 +138,7 @@ def _am_harmonics(runs: Sequence[NamedLines]) -> Assessment:
     return weakest > PRESENT, weakest, PRESENT, sentence
 
 
-def _drawn_lines(runs: Sequence[NamedLines]) -> Assessment:
+def _drawing_lines(runs: Sequence[NamedLines]) -> Assessment:
     offset = max(
         abs(_peak(run, f"{n}f_d".lstrip("1")) - n * run.scene.tacton.trajectory.drawing_frequency)
         for run in runs
@@ -236,7 +236,7 @@ CLAIMS: dict[
     str, tuple[tuple[tuple[bool, bool], ...], Callable[[Sequence[NamedLines]], Assessment]]
 ] = {
     "S1": ((AM,), _single_line),
-    "S2": ((STM,), _drawn_lines),
+    "S2": ((STM,), _drawing_lines),
     "S3": ((BOTH,), _pairs_only),
     "S4": ((BOTH,), _am_highest),
     "S5": ((AM, STM), _exact_frequencies),

@@ -73,7 +73,7 @@ def _grid(view: View, frame: int, number: int) -> Any:
 
     if not len(view.tets):
         surface = pv.PolyData.from_regular_faces(view.points, view.triangles)
-        surface["pressure_pa"] = view.pushed[frame]
+        surface["pressure_pa"] = view.inward[frame]
         return surface
     tensors, nodes, tets = view.tensors, np.arange(len(view.points)), view.tets
     if tensors is not None:

@@ -99,7 +99,7 @@ def line_rows(run: Run) -> Iterator[dict[str, Any]]:
     Peaks that are not a line of the load are named by their kind, such as "free vibration".
     """
     quantity = run.response.record
-    lines = [(name, f, run.table.amplitudes[name]) for name, f in run.listed.items()]
+    lines = [(name, f, run.table.amplitudes[name]) for name, f in run.line_hz.items()]
     lines += [(peak.kind, peak.frequency, peak.amplitudes) for peak in run.unnamed]
     # The point kernel's pressure is always on the surface.
     depths = run.scene.depths if quantity.of_body else [0.0] * len(run.scene.depths)

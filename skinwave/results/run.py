@@ -64,7 +64,7 @@ class Run(OfTacton):
         )
 
     @property
-    def listed(self) -> dict[str, float]:
+    def line_hz(self) -> dict[str, float]:
         """Names and frequencies in Hz of the resolved lines of the load, each once."""
         return self.table.frequencies
 
@@ -76,7 +76,7 @@ class Run(OfTacton):
     @cached_property
     def frequencies(self) -> dict[str, float]:
         """Frequencies in Hz by name; lines that coincide have each name that claims are about."""
-        return {name: self.listed[own] for name, own in self._own.items()}
+        return {name: self.line_hz[own] for name, own in self._own.items()}
 
     @cached_property
     def lines(self) -> dict[str, Floats]:
@@ -100,7 +100,7 @@ class Run(OfTacton):
 
     @cached_property
     def _own(self) -> dict[str, str]:
-        return own_names(self.scene, self.listed)
+        return own_names(self.scene, self.line_hz)
 
     @property
     def is_motion(self) -> bool:

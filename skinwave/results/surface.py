@@ -88,7 +88,7 @@ class SurfaceField:
         return np.stack(np.meshgrid(self.x, self.y), axis=-1)
 
     @property
-    def shown(self) -> Floats:
+    def unit_rms(self) -> Floats:
         """RMS (ny, nx) in the unit of figures."""
         return self.quantity.per_unit * self.rms
 

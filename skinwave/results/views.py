@@ -100,7 +100,7 @@ class View:
         return self.points[self.surface, :2]
 
     @property
-    def pushed(self) -> Singles:
+    def inward(self) -> Singles:
         """Motion (f, s) of the upper surface into the body, in SI units."""
         return -self.motion[:, self.surface, 2]
 
@@ -123,7 +123,7 @@ class View:
     @property
     def peak(self) -> float:
         """Largest motion into or out of the body, in SI units."""
-        return float(np.abs(self.pushed).max()) or 1.0
+        return float(np.abs(self.inward).max()) or 1.0
 
 
 def fastest_line(moved: BodyMotion) -> float:

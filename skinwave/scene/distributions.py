@@ -189,7 +189,7 @@ def read_distribution(key: str, table: Mapping[str, Any]) -> Distribution:
     return distribution
 
 
-def written_distribution(value: Any, given: Distribution) -> dict[str, Any]:
+def distribution_table(value: Any, given: Distribution) -> dict[str, Any]:
     """Return the table of a value and its distribution for a scene file."""
     keys, _ = MEASURES[given.measure]
     return {VALUE: value, SHAPE: given.shape, **dict(zip(keys, given.width, strict=True))}

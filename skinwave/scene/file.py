@@ -19,8 +19,8 @@ from skinwave.bodies.parts import check_material
 from skinwave.scene.distributions import (
     VALUE,
     Distribution,
+    distribution_table,
     read_distribution,
-    written_distribution,
 )
 from skinwave.scene.keys import (
     DERIVED,
@@ -208,7 +208,7 @@ def to_table(scene: Scene) -> dict[str, Any]:
         table["body"].pop(key, None)
     for key, given in scene.spreads:
         if (value := value_at(table, key)) is not None:
-            table = with_value(table, key.split("."), written_distribution(value, given))
+            table = with_value(table, key.split("."), distribution_table(value, given))
     return table
 
 

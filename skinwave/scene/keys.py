@@ -16,7 +16,7 @@ from simple_model.layers.modulus_laws import COLUMNS
 from simple_model.load.focus import FOCI, FocalSpot
 from simple_model.load.trajectory import Points
 from skinwave.scene.load import SupportMotion
-from skinwave.scene.material_file import material_of, values_of, written_table
+from skinwave.scene.material_file import material_of, modulus_columns, values_of
 from skinwave.scene.scene import Layer, Mounting, Phalanx, Relief, Sides, solid_of
 from skinwave.system.plain_text import number_in
 
@@ -298,7 +298,7 @@ MATERIAL = {
     ),
     **_words_of("law"),
     **_numbers_of(fast_modulus_pa="fast_modulus", exponent="exponent", time_s="time"),
-    "table": SceneKey("table", _table, written_table),
+    "table": SceneKey("table", _table, modulus_columns),
     "prony": _records("body.material.prony", PronyTerm, PRONY),
 }  # fmt: skip
 ALTERNATIVES = {  # keys of a material that replace each other

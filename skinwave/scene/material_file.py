@@ -115,7 +115,7 @@ def with_tables(scene: dict[str, Any], folder: Path) -> dict[str, Any]:
         if isinstance(name := material.get("table"), str):
             text = reading.read_text(folder / name)
             try:
-                material["table"] = written_table(modulus_table(text))
+                material["table"] = modulus_columns(modulus_table(text))
             except ValueError as error:
                 raise ValueError(f"{folder / name}: {error}") from None
     return scene
@@ -133,7 +133,7 @@ def _materials(scene: dict[str, Any]) -> list[dict[str, Any]]:
     return [material for material in materials if isinstance(material, dict)]
 
 
-def written_table(table: ModulusTable) -> dict[str, list[float]]:
+def modulus_columns(table: ModulusTable) -> dict[str, list[float]]:
     """Return the columns of a table of complex moduli, by their keys."""
     moduli = table.moduli
     columns = (table.frequencies, [mu.real for mu in moduli], [mu.imag for mu in moduli])

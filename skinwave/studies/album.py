@@ -203,7 +203,7 @@ def _has_elements(scene: Scene, h: float | None) -> bool:
     return True
 
 
-def shown_views(
+def quantity_views(
     scene: Scene, options: SolveOptions, *, frames: int | None = None, beside: Sequence[str] = ()
 ) -> tuple[list[View], list[str]]:
     """Return views of a scene coloured by the probes' quantity, and warnings.

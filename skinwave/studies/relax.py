@@ -327,7 +327,7 @@ def line_changes(
 def sentence(e: Effect) -> str:
     """Return a sentence on the effect and the cost of dropping an assumption."""
     x, y = (1e3 * v for v in e.where)
-    changes = [f"the waveform at ({x:g}, {y:g}) mm changes by {_changed_by(e.waveform)}"]
+    changes = [f"the waveform at ({x:g}, {y:g}) mm changes by {_change_words(e.waveform)}"]
     if e.level is not None:
         changes.append(f"the sensation level by {decibel(e.level, signed=True)} dB")
     if e.decibel:
@@ -337,7 +337,7 @@ def sentence(e: Effect) -> str:
     return f"Without the assumption '{e.name}', {ASSUMPTIONS[e.name]}; {', '.join(changes)}. {cost}"
 
 
-def _changed_by(ratio: float) -> str:
+def _change_words(ratio: float) -> str:
     """Return a change relative to the strongest probe in percent, or as a factor above 100 %."""
     if ratio > 1:
         return f"{significant(ratio, 2)} times the motion of the strongest probe"

@@ -106,7 +106,7 @@ def picture_parts(album: Album, gallery: Gallery, progress: Progress) -> list[Pa
         return [NO_VIEWS]
     of_scene = [v for v in views if v.scene.body == album.scene.body and v.quantity.of_body]
     own = (of_scene or views)[-1]
-    frame = int(np.abs(own.pushed).max(axis=1).argmax())
+    frame = int(np.abs(own.inward).max(axis=1).argmax())
     options: dict[str, Part] = {}
     missing: list[Part] = []
     if renderer().is_available:
@@ -135,7 +135,7 @@ def _spatial_parts(
     }
     if len(own.tets):
         progress("draw cut open", 0.0)
-        largest = np.abs(own.pushed).max(axis=1)
+        largest = np.abs(own.inward).max(axis=1)
         in_view = own.scene.tacton.trajectory.position(own.times)[:, 1] >= 0
         behind = int(np.where(in_view, largest, -1.0).argmax())
         cut = render.picture([own], gallery.style, behind, camera="front", cut=True)
@@ -264,7 +264,7 @@ def write_map(folder: Path, scene: Scene, field: SurfaceField) -> None:
     """Write index.html, map.png, map.csv, map.npz and scene.toml into an empty folder."""
     (folder / "scene.toml").write_text(dumps(scene), encoding="utf-8")
     X, Y = np.meshgrid(1e3 * field.x, 1e3 * field.y)
-    rows = zip(X.flat, Y.flat, field.shown.flat, strict=True)
+    rows = zip(X.flat, Y.flat, field.unit_rms.flat, strict=True)
     columns = ("x_mm", "y_mm", f"rms_{field.quantity.column}")
     (folder / "map.csv").write_bytes(Table(columns, rows, stored=7).to_csv())
     surface.save(folder / "map.npz", field)

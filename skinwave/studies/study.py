@@ -18,7 +18,7 @@ from skinwave.measure.comparison import (
     runs_to_draw,
 )
 from skinwave.models import named
-from skinwave.models.limits import check_taken
+from skinwave.models.limits import check_takes
 from skinwave.models.linear_elements import FEM
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import ReducedBody, answer, prepare
@@ -173,7 +173,7 @@ def _models(scenes: Scenes, options: SolveOptions) -> dict[str, str]:
         if model == "auto":
             is_complete = models.get(column) == COMPLETENESS[-1]
             own = COMPLETENESS[-1] if is_complete else chosen_model(scene)
-        check_taken(named(own), scene)
+        check_takes(named(own), scene)
         if named(own).is_reduced:
             check_mesh(scene.body, options.h or default_size(scene.body))
         models[column] = max(models.get(column, own), own, key=_completeness)

@@ -41,14 +41,14 @@ EFFORT = (
 def lines_table(runs: Sequence[Run]) -> list[Part]:
     """Return a table of the lines of each model at the probe that moves most, strongest first."""
     probe = strongest_probe(runs)
-    common = [name for name in runs[0].listed if all(name in run.listed for run in runs)]
+    common = [name for name in runs[0].line_hz if all(name in run.line_hz for run in runs)]
     if not common and not any(run.unnamed for run in runs):
         return ["The load has no resolved line: the Tacton is too short or the pressure constant."]
     share = {name: max(_share(run, name, probe) for run in runs) for name in common}
     names = sorted(share, key=lambda name: -share[name])[:MOST_LINES]
     sensation = [sensation_levels(run, probe) for run in runs]
     rows = [
-        [name, f"{runs[0].listed[name]:.2f}"]
+        [name, f"{runs[0].line_hz[name]:.2f}"]
         + [cell for run, levels in zip(runs, sensation, strict=True)
            for cell in _amplitude(run, name, probe, levels)]
         for name in names

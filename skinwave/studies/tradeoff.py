@@ -93,7 +93,7 @@ class Study:
     self_convergence: float
 
     @property
-    def accepted(self) -> bool:
+    def is_converged(self) -> bool:
         """Whether the two finest runs differ by less than a tenth of the smallest error."""
         return self.self_convergence < 0.1 * min(m.error for m in self.results)
 
@@ -197,7 +197,7 @@ def sentences(outcome: Study) -> list[str]:
     convergence = f"{100 * outcome.self_convergence:.2g} %"
     reference = f"The reference, {outcome.reference.name}, differs from the next coarser run by "
     parts = [f"{reference}{convergence}."]
-    if not outcome.accepted:
+    if not outcome.is_converged:
         limit = f"{1000 * outcome.self_convergence:.2g} %"
         parts[0] += f" Errors below {limit} are therefore upper estimates."
     if any(m.candidate.model == FLAT_BODY.name for m in outcome.results):

@@ -162,9 +162,9 @@ def _cells(name: str, value: Any) -> Iterable[tuple[str, Any]]:
 
 def write_beside(out: Path, files: Mapping[str, bytes]) -> None:
     """Write files into the folder of a sweep, and list them in its record; raise a ValueError as
-    `refuse_changed` does.
+    `check_own_files` does.
     """
-    refuse_changed(out, files)
+    check_own_files(out, files)
     for name, content in files.items():
         (out / name).parent.mkdir(exist_ok=True)
         with output_file(out / name, overwrite=True) as file:
@@ -175,7 +175,7 @@ def write_beside(out: Path, files: Mapping[str, bytes]) -> None:
         file.write(json.dumps(record.read(out) | {outputs.FILES: listed}, indent=1).encode())
 
 
-def refuse_changed(out: Path, names: Iterable[str]) -> None:
+def check_own_files(out: Path, names: Iterable[str]) -> None:
     """Raise a ValueError if a file to replace was not written by this program."""
     known = outputs.listed_files(out) or {}
     for name in names:

@@ -293,7 +293,7 @@ def rows_of(found: Ensemble) -> list[dict[str, Any]]:
     ]
 
 
-def shown_times(scene: Scene) -> Floats:
+def waveform_times(scene: Scene) -> Floats:
     """Return the times (t,) in s of the waveforms."""
     times = sample_times(scene)
     return times[times >= times[-1] - SHOWN]
@@ -329,7 +329,7 @@ def solve_sample(scene: Scene, method: Method, *, together: bool = True) -> Solu
     p = len(scene.probes)
     rms, levels = np.sqrt((np.abs(a) ** 2).sum(axis=0) / 2), _highest_level(f, np.abs(a))
     return Solution(
-        waveform=synthesise(f, a[:, :p], shown_times(scene)),
+        waveform=synthesise(f, a[:, :p], waveform_times(scene)),
         lines=_amplitudes_at(_frequencies(scene, method), f, np.abs(a[:, :p])),
         rms=rms[:p], level=levels[:p],
         map_rms=rms[p:].reshape(shape), map_level=levels[p:].reshape(shape),
@@ -359,7 +359,7 @@ def _compute(scene: Scene, method: Method) -> Solution:
     how = method.options
     response = compute(scene, how.model, tolerance=how.tolerance, h=how.h, solver=how.solver)
     settled = response.values[int(SETTLE * len(response.times)) :]
-    motion = response.values[-len(shown_times(scene)) :] - settled.mean(axis=0)
+    motion = response.values[-len(waveform_times(scene)) :] - settled.mean(axis=0)
     frequencies, no_map = _frequencies(scene, method), np.zeros((0, 0))
     lines = np.abs(phasors(response, frequencies)) * (frequencies > 0)[:, None]
     return Solution(

@@ -22,7 +22,7 @@ from skinwave.models.limits import default_model, takes
 from skinwave.models.options import SolveOptions
 from skinwave.models.reduced import ReducedBody, answer, prepare, reduction_tolerance
 from skinwave.planning.assessment import assess
-from skinwave.planning.refinement import compared_with, refine
+from skinwave.planning.refinement import comparison_size, refine
 from skinwave.scene.scene import Body, Load, Reading, Scene
 from skinwave.scene.variation import DesignPoint
 from skinwave.system.effort import Progress
@@ -159,9 +159,9 @@ def mesh_of_body(options: SolveOptions, scene: Scene) -> Mesh:
         pair = refine(scene, scene.body, options)
         return Mesh(h=pair.h, coarser=pair.compared)
     # Raises the error of the given size before that of the coarser mesh.
-    _reduced_twice(solid_of(scene), options, Mesh(h=options.h, coarser=options.h))
-    mesh = Mesh(h=options.h, coarser=compared_with(scene.body, options.h))
-    _reduced_twice(solid_of(scene), options, mesh)
+    _reduce_twice(solid_of(scene), options, Mesh(h=options.h, coarser=options.h))
+    mesh = Mesh(h=options.h, coarser=comparison_size(scene.body, options.h))
+    _reduce_twice(solid_of(scene), options, mesh)
     return mesh
 
 
@@ -172,7 +172,7 @@ def mesh_of_family(options: SolveOptions, family: Covering) -> Mesh:
     size = options.h or refine(family.scene, family.hardest, options).h
     bodies = cached_shared_body(family, size, options.tolerance, options.solver).bodies
     meshed = bodies.body(bodies.meshed)
-    coarser = compared_with(meshed, size)
+    coarser = comparison_size(meshed, size)
     cached_shared_body(family, coarser, options.tolerance, options.solver)
     return Mesh(h=size, coarser=coarser, family=family, meshed=meshed)
 
@@ -184,7 +184,7 @@ def on_mesh(scene: Scene, options: SolveOptions, mesh: Mesh) -> tuple[Response, 
     """
     if mesh.error:
         raise ValueError(mesh.error)
-    fine, coarse = _reduced_twice(solid_of(scene), options, mesh)
+    fine, coarse = _reduce_twice(solid_of(scene), options, mesh)
     how = SolveOptions(tolerance=options.tolerance, h=mesh.h, solver=options.solver)
     response = assess(
         scene, answer(fine, scene), fine, how, compared=(mesh.coarser, coarse), meshed=mesh.meshed
@@ -195,7 +195,7 @@ def on_mesh(scene: Scene, options: SolveOptions, mesh: Mesh) -> tuple[Response, 
     return response, mesh
 
 
-def _reduced_twice(solid: Solid, options: SolveOptions, mesh: Mesh) -> list[ReducedBody]:
+def _reduce_twice(solid: Solid, options: SolveOptions, mesh: Mesh) -> list[ReducedBody]:
     """Return the reduced body on both meshes."""
     return [
         prepare_body(solid, h, options.tolerance, options.solver, mesh.family, mesh.values)

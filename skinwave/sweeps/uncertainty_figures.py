@@ -16,7 +16,7 @@ from skinwave.report.palette import SEQUENTIAL, SERIES
 from skinwave.report.spectra import HIGHEST_SHOWN
 from skinwave.report.styles import STYLES
 from skinwave.results.views import path_points
-from skinwave.sweeps.ensemble import STEP, Ensemble, map_axes, shown_times
+from skinwave.sweeps.ensemble import STEP, Ensemble, map_axes, waveform_times
 from skinwave.sweeps.sampling import ENDS, PERCENTILES, percentiles
 from skinwave.typing import Floats
 
@@ -33,7 +33,7 @@ def bands_figure(found: Ensemble, centre: Floats) -> Figure:
     waveform `centre` (t, p) of the central values.
     """
     quantity, probes = found.scene.reading.record, found.scene.probes
-    times = 1e3 * shown_times(found.scene)
+    times = 1e3 * waveform_times(found.scene)
     waveforms, lines = (quantity.per_unit * percentiles(x) for x in (found.waveform, found.lines))
     with mpl.rc_context(REPORT.rc):
         figure = Figure(figsize=REPORT.size(10.5, 1.7 * len(probes) + 1.3), layout="constrained")

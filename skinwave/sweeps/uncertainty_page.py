@@ -112,7 +112,7 @@ def sentences(found: Ensemble) -> list[str]:
     return text
 
 
-def write_sampled(
+def write_uncertainty(
     out: Path, rows: Sequence[Row], spreads: Sequence[Spread], *, has_indices: bool
 ) -> list[str]:
     """Write percentiles.csv, indices.csv and uncertainty.html of a sweep by distributions, given

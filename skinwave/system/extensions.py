@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 def load() -> None:
     """Import the extension modules; raise a ValueError if one cannot be imported."""
-    for name in _named():
+    for name in _module_names():
         try:
             import_module(name)
         except ImportError as error:
@@ -33,9 +33,9 @@ def add(registry: dict[str, T], name: str, record: T, made_by: Callable[..., Any
         raise ValueError(f"'{name}' is registered already; choose another name")
     registry[name] = record
     module = getattr(made_by, "__module__", None) or "skinwave"
-    if module.split(".")[0] != "skinwave" and module not in {*_named(), "__main__"}:
-        os.environ[VARIABLE] = ",".join([*_named(), module])
+    if module.split(".")[0] != "skinwave" and module not in {*_module_names(), "__main__"}:
+        os.environ[VARIABLE] = ",".join([*_module_names(), module])
 
 
-def _named() -> list[str]:
+def _module_names() -> list[str]:
     return [name for name in os.environ.get(VARIABLE, "").split(",") if name]

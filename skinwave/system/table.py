@@ -68,7 +68,7 @@ class Table:
 
     def to_csv(self) -> bytes:
         """Return a CSV file in UTF-8; a cell without a value is empty."""
-        rows = ([_stored(value, self.stored) for value in row] for row in self.rows)
+        rows = ([_csv_value(value, self.stored) for value in row] for row in self.rows)
         return csv_table((column.name for column in self.columns), rows)
 
     def to_json(self) -> str:
@@ -99,7 +99,7 @@ def _is_known(value: Any) -> bool:
     return value is not None and (not isinstance(value, float) or isfinite(value))
 
 
-def _stored(value: Any, digits: int) -> Any:
+def _csv_value(value: Any, digits: int) -> Any:
     if not _is_known(value):
         return None
     return f"{value:.{digits}g}" if isinstance(value, float) else value

@@ -108,7 +108,7 @@ def test_gains_of_close_lines_hold_the_truth(monkeypatch, colour, repetitions, k
                               predicts=lambda f: np.full(len(f), True))  # fmt: skip
         data = observed.data_of(kind, measured, aim)
         assert data.is_known
-        slope, y = (data.weighted(x).reshape(len(f), -1, draws)
+        slope, y = (data.whiten(x).reshape(len(f), -1, draws)
                     for x in (data.predict({}), data.values))  # fmt: skip
         power = (slope**2).sum(axis=(0, 1))
         gain = (slope * y).sum(axis=(0, 1)) / power

@@ -38,7 +38,7 @@ TEXTS = {
 }
 
 
-def written(write, *arguments, **options):
+def bytes_of(write, *arguments, **options):
     """Content that a function writes into a file."""
 
     def content(folder, name):
@@ -59,11 +59,11 @@ def npz(**arrays):
 
 
 def mat(**arrays):
-    return written(savemat, arrays)
+    return bytes_of(savemat, arrays)
 
 
 def wav(array):
-    return written(wavfile.write, 1000, array)
+    return bytes_of(wavfile.write, 1000, array)
 
 
 V = np.zeros((10, 2))
@@ -73,7 +73,7 @@ MM_S = ["--unit", "mm/s"]
 BINARIES = [
     ("a.csv", lambda *_: b"\xff\x00t", [], "not text"),
     ("a.npz", lambda *_: b"text", [], "cannot be read"),
-    ("a.npz", half(written(files.numpy_npz)), [], "cannot be read"),
+    ("a.npz", half(bytes_of(files.numpy_npz)), [], "cannot be read"),
     ("a.npz", npz(t=np.array([{}], dtype=object)), [], "cannot be read"),
     ("a.npz", npz(t=np.arange(9.0)), [], "motion"),
     ("a.npz", npz(left=V, right=V), [], "--variable as left, right"),
@@ -87,12 +87,12 @@ BINARIES = [
     ("a.wav", wav(np.zeros(9, np.int16)), [], "--unit mm/s"),
     ("a.wav", wav(np.full(9, np.nan, np.float32)), MM_S, "no place has a value"),
     ("a.mat", lambda *_: b"", [], "empty"),
-    ("a.mat", half(written(files.matlab_73)), [], "damaged"),
+    ("a.mat", half(bytes_of(files.matlab_73)), [], "damaged"),
     ("a.mat", mat(note="text"), [], "motion"),
     ("a.uff", lambda *_: b"text", [], "no set 58"),
-    ("a.uff", lambda *where: written(files.universal)(*where)[:-300], [], "within a set"),
-    ("a.uff", written(files.universal, func_type=9), [], "type 9"),
-    ("a.uff", written(files.universal, rsp_dir=1), [], "--direction"),
+    ("a.uff", lambda *where: bytes_of(files.universal)(*where)[:-300], [], "within a set"),
+    ("a.uff", bytes_of(files.universal, func_type=9), [], "type 9"),
+    ("a.uff", bytes_of(files.universal, rsp_dir=1), [], "--direction"),
     ("model-5-location-01.f32", lambda *_: b"", [], "SkinSource"),
     ("model-1-location-01.f32", lambda *_: b"x" * 9, [], "9 bytes"),
     ("a.docx", lambda *_: b"", [], "'.docx'"),

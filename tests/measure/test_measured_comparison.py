@@ -87,7 +87,7 @@ def test_a_true_model_agrees_but_for_the_stated_rate(models):
     assert np.mean(delays) > 0.85
 
 
-def test_a_model_three_tenths_too_stiff_is_found_out(models):
+def test_a_model_three_tenths_too_stiff_is_rejected(models):
     rng = np.random.default_rng(2)
     measured = Measured(measurement=record(models[True][-1], rng, sigma=2e-5))
     found = compare_measured(measured, models[False])

@@ -138,7 +138,7 @@ def test_the_chance_of_any_false_difference_is_as_stated():
     single, any_at_all = [], []
     for _ in range(40):
         lines = lines_of(measured(rng, 5, 0.2), LINES)
-        away = lines.mean - align(lines, MODEL, window=0.05).applied(LINES, MODEL)
+        away = lines.mean - align(lines, MODEL, window=0.05).apply(LINES, MODEL)
         p = lines.p_values(away)
         single.append(np.mean(p < 0.05))
         any_at_all.append(holm(p).min() < 0.05)

@@ -8,7 +8,7 @@ import pytest
 
 from skinwave.commands.cli import main
 from skinwave.measure import Measurement
-from skinwave.measure.inspection import clipped, hum_of, inspect
+from skinwave.measure.inspection import clip_count, hum_of, inspect
 from skinwave.measure.inspection_page import text
 from skinwave.measure.line_search import SpectralLine, find_lines
 from skinwave.measure.writing import write
@@ -35,7 +35,7 @@ def test_noise_alone_rarely_has_lines():
     assert 1 <= alarms <= 19
 
 
-def test_lines_are_found_within_their_errors():
+def test_lines_lie_within_their_errors():
     """Three lines, two of them 3/T apart and 30 dB different, in noise of known density."""
     rng = np.random.default_rng(4)
     deviations, floors = [], []
@@ -107,12 +107,12 @@ def test_lines_of_a_motion_from_rest_are_within_their_errors(seconds, decay, noi
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.03])
-def test_a_transient_that_outlasts_the_first_quarter_is_noted(noise):
+def test_a_transient_that_outlasts_the_first_quarter_is_reported(noise):
     for seconds in (0.1, 0.15, 0.2, 0.3, 0.4):
         assert says_unsteady(inspect(from_rest(seconds, 0.1, noise)))
 
 
-def test_steady_records_are_rarely_noted_as_not_steady():
+def test_steady_records_are_rarely_called_unsteady():
     """At most 1 % of them; lines four resolutions apart or more."""
     rng, noted = np.random.default_rng(3), 0
     for _ in range(60):
@@ -157,14 +157,14 @@ def test_mains_hum_is_resolved_from_lines_of_the_load():
 def test_clipping_is_not_rounding():
     sine = np.sin(2 * np.pi * 7.3 * T)
     for cut in (0.5, 0.9, 0.97):
-        assert clipped(np.clip(sine, -cut, cut)) == (np.abs(sine) >= cut).sum()
+        assert clip_count(np.clip(sine, -cut, cut)) == (np.abs(sine) >= cut).sum()
         coarse = np.round(np.clip(sine, -cut, cut) * 500)
-        assert clipped(coarse) == (np.abs(coarse) == coarse.max()).sum()
-    assert clipped(np.minimum(sine, 0.8)) == (sine >= 0.8).sum()
+        assert clip_count(coarse) == (np.abs(coarse) == coarse.max()).sum()
+    assert clip_count(np.minimum(sine, 0.8)) == (sine >= 0.8).sum()
     for steps in (2, 3, 20, 1000):
-        assert clipped(np.round(sine * steps)) == 0
+        assert clip_count(np.round(sine * steps)) == 0
     noise = np.random.default_rng(7).normal(size=5000)
-    assert clipped(noise) == clipped(np.round(100 * noise)) == clipped(np.ones(50)) == 0
+    assert clip_count(noise) == clip_count(np.round(100 * noise)) == clip_count(np.ones(50)) == 0
 
 
 def scan(**changes):

@@ -73,7 +73,7 @@ def boxes(nx, ny, nz, size):
     return points, np.stack(a, axis=-1).reshape(-1, 8)
 
 
-def made(file, h=0.008, **options):
+def import_body(file, h=0.008, **options):
     """The body of a file, and what is said of it."""
     said = []
     return meshes.body_from_file(file, h, say=said.append, **options), said
@@ -204,7 +204,7 @@ def pieces_vtu(path):
 
 def test_touching_pieces_of_a_file_are_merged(tmp_path):
     pieces_vtu(tmp_path / "a.vtu")
-    mesh, said = made(tmp_path / "a.vtu")
+    mesh, said = import_body(tmp_path / "a.vtu")
     assert volume_of(mesh) == pytest.approx(19.2, rel=1e-6)
     assert len(mesh.points) == len(SLAB.points)
     assert said_of(said, "merged 15 nodes that coincide")
@@ -214,7 +214,7 @@ def test_blocks_are_regions_by_their_names(tmp_path):
     grids = {name: grid_of(points, {TETRAHEDRON: tets})
              for name, (points, tets) in (("skin", half(-1)), ("fat", half(1)))}  # fmt: skip
     pyvista.MultiBlock(grids).save(tmp_path / "a.vtm")
-    mesh, _ = made(tmp_path / "a.vtm")
+    mesh, _ = import_body(tmp_path / "a.vtm")
     volumes = meshes.corner_volumes(mesh.points, mesh.tets)
     for number, name in mesh.region_names.items():
         assert 1e6 * volumes[mesh.region == number].sum() == pytest.approx(9.6), name
@@ -242,7 +242,7 @@ def test_hexahedra_wedges_and_pyramids_are_split_conformingly(tmp_path):
     points, cells = mixed()
     grid = grid_of(points, cells)
     grid.save(tmp_path / "a.vtu")
-    mesh, said = made(tmp_path / "a.vtu")
+    mesh, said = import_body(tmp_path / "a.vtu")
     by_vtk = 1e6 * grid.compute_cell_sizes()["Volume"].sum()
     assert volume_of(mesh) == pytest.approx(by_vtk, rel=1e-9)
     for kind in ("hexahedron", "wedge", "pyramid"):
@@ -295,7 +295,7 @@ def test_instances_are_placed_by_translation_and_rotation(tmp_path):
         "0., 0., 0.\n0., 0., 0., 0., 0., 1., 180.\n*End Instance\n"
     )
     (tmp_path / "a.inp").write_text(abaqus(part, instances))
-    mesh, said = made(tmp_path / "a.inp")
+    mesh, said = import_body(tmp_path / "a.inp")
     assert volume_of(mesh) == pytest.approx(19.2, rel=1e-9)
     assert said_of(said, "read 2 parts or instances")
     away = instances.replace("0., 0., 0.\n", "0., 0.05, 0.\n")
@@ -319,7 +319,7 @@ def test_touching_parts_with_equal_numbers_are_merged(tmp_path):
         f"*Instance, name={name}-1, part={name}\n*End Instance\n" for name, _ in parts
     )
     (tmp_path / "a.inp").write_text(abaqus(parts, instances))
-    mesh, _ = made(tmp_path / "a.inp")
+    mesh, _ = import_body(tmp_path / "a.inp")
     assert volume_of(mesh) == pytest.approx(19.2, rel=1e-9)
     assert sorted(mesh.region_names.values()) == ["BONE", "SKIN"]
 
@@ -331,7 +331,7 @@ def test_generated_sets_that_partition_the_elements_are_regions(tmp_path):
     text += f"*Elset, elset=skin, generate\n1, {upper.sum()}, 1\n"
     text += f"*Elset, elset=muscle, generate\n{upper.sum() + 1}, {len(order)}\n"
     (tmp_path / "a.inp").write_text(text)
-    mesh, said = made(tmp_path / "a.inp")
+    mesh, said = import_body(tmp_path / "a.inp")
     names = {mesh.region_names[r]: (mesh.region == r).sum() for r in np.unique(mesh.region)}
     assert names == {"SKIN": upper.sum(), "MUSCLE": (~upper).sum()}
     assert said_of(said, "element sets that are not regions: ALL")
@@ -382,7 +382,7 @@ def test_overlapping_groups_give_the_smaller_as_region(tmp_path):
         field_data={"all": np.array([1, 3]), "skin": np.array([2, 3]), "fat": np.array([3, 3])},
     )  # fmt: skip
     meshio.write(tmp_path / "a.msh", raw, file_format="gmsh22")
-    mesh, said = made(tmp_path / "a.msh")
+    mesh, said = import_body(tmp_path / "a.msh")
     assert set(mesh.region_names.values()) == {"skin", "fat"}
     assert said_of(said, "their region is the smaller of their groups")
 
@@ -407,7 +407,7 @@ def test_inverted_tetrahedra_are_reordered_and_overlapping_ones_refused(tmp_path
     tets = np.array(SLAB.tets)
     tets[:20] = tets[:20][:, [0, 2, 1, 3]]
     grid_of(SLAB.points, {TETRAHEDRON: tets}).save(tmp_path / "a.vtu")
-    mesh, said = made(tmp_path / "a.vtu")
+    mesh, said = import_body(tmp_path / "a.vtu")
     assert said_of(said, "reordered 20 inverted")
     assert volume_of(mesh) == pytest.approx(19.2, rel=1e-9)
     points = np.array(SLAB.points)
@@ -425,7 +425,7 @@ def test_the_largest_of_several_bodies_is_kept_on_request(tmp_path):
     said = refused(tmp_path / "a.vtu")
     assert "2 separate bodies (19.2, 0.000167 cm3)" in said
     assert "--keep largest" in said
-    mesh, said = made(tmp_path / "a.vtu", keep_largest=True)
+    mesh, said = import_body(tmp_path / "a.vtu", keep_largest=True)
     assert len(mesh.tets) == len(SLAB.tets)
     assert said_of(said, "kept the largest of 2 bodies, 100.0 % of the volume")
 
@@ -434,14 +434,14 @@ def test_a_mesh_is_rotated_and_moved_below_the_device(tmp_path):
     x, y, z = SLAB.points.T
     corner = np.column_stack([x + 0.02, z + 0.012, 0.02 - y])  # y up, a corner at the origin
     meshes.write(tmp_path / "a.msh", replace(SLAB, points=corner, facets={}))
-    mesh, said = made(tmp_path / "a.msh", up="+y")
+    mesh, said = import_body(tmp_path / "a.msh", up="+y")
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     np.testing.assert_allclose(low, [-0.02, -0.02, -0.012], atol=1e-3)
     np.testing.assert_allclose(high, [0.02, 0.02, 0.0], atol=1e-3)
     assert high[2] == pytest.approx(0.0, abs=1e-12)
     assert said_of(said, "its top is at the origin")
     meshes.write(tmp_path / "b.vtu", mesh)
-    again, said = made(tmp_path / "b.vtu")
+    again, said = import_body(tmp_path / "b.vtu")
     np.testing.assert_array_equal(again.points, mesh.points)  # where it is on its top already
     assert not said_of(said, "moved by")
 
@@ -507,7 +507,7 @@ def test_an_open_wrist_is_capped_on_request(tmp_path):
     said = refused(tmp_path / "a.stl")
     assert "open along 24 of its" in said
     assert "--cap" in said
-    mesh, said = made(tmp_path / "a.stl", cap=True)
+    mesh, said = import_body(tmp_path / "a.stl", cap=True)
     area = 24 / 2 * np.sin(2 * np.pi / 24) * 0.02 * 0.008
     assert volume_of(mesh) == pytest.approx(1e6 * 0.04 * area, rel=0.02)
     assert said_of(said, "closed a hole of 24 edges, 40 mm wide")

@@ -88,4 +88,4 @@ def test_maps_and_views_read_what_probes_read(roof):
     np.testing.assert_allclose(found.rms[at[:, 1], at[:, 0]], expected, rtol=5e-3)
     view = body_view(roof, "roof", moved, (1 / 140, 8))
     (node,) = np.flatnonzero(np.linalg.norm(view.places - roof.probes[3], axis=1) < 1e-6)
-    assert view.pushed[:, node].std() == pytest.approx(expected[3], rel=5e-3)
+    assert view.inward[:, node].std() == pytest.approx(expected[3], rel=5e-3)

@@ -177,7 +177,7 @@ def test_crossings_agree_with_testing_every_pair():
     assert [tuple(pair) for pair in self_intersections(soup).tolist()] == expected
 
 
-def test_a_point_pulled_through_the_body_is_found():
+def test_a_point_pulled_through_the_body_is_detected():
     points = np.array(SPHERE.points)
     top = int(points[:, 2].argmax())
     points[top] *= [1, 1, -1.5]

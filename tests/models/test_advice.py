@@ -5,7 +5,7 @@ import itertools
 import pytest
 
 from skinwave.models import named, names
-from skinwave.models.limits import Refused, check_taken, takers, takes
+from skinwave.models.limits import Refused, check_takes, takers, takes
 from skinwave.planning.plan import plan
 from skinwave.scene.file import dumps, loads
 
@@ -83,7 +83,7 @@ def refused(scene, model):
             if not takers(scene):
                 plan(scene)
         else:
-            check_taken(named(model), scene)
+            check_takes(named(model), scene)
     except Refused as error:
         return error
     return None

@@ -85,17 +85,17 @@ def test_the_key_of_a_body_holds_solver_options_and_shapes(tmp_path, monkeypatch
     monkeypatch.setenv("SKINWAVE_CACHE", str(tmp_path))
     scene = loads(SHORT)
 
-    def made(**options):
+    def is_stored(**options):
         before = len(list(tmp_path.glob("*.npz")))
         prepare(scene.body, scene.probe_points, h=0.01, **options)
         return len(list(tmp_path.glob("*.npz"))) > before
 
-    assert made()
-    assert not made(solver=fem.available()[0])  # what auto is
-    assert made(solver="superlu") == (fem.available()[0] != "superlu")
-    assert made(tolerance=5e-3)
-    assert made(symmetry="x")
-    assert not made()
+    assert is_stored()
+    assert not is_stored(solver=fem.available()[0])  # what auto is
+    assert is_stored(solver="superlu") == (fem.available()[0] != "superlu")
+    assert is_stored(tolerance=5e-3)
+    assert is_stored(symmetry="x")
+    assert not is_stored()
     x = np.arange(6.0)
     assert len({cache.key(a) for a in (x, x.reshape(2, 3), x.view(np.int64))}) == 3
 

@@ -169,7 +169,7 @@ def small_scene(tacton, body=SMALL, **pressure):
     return Scene(pressure=load, body=body, probes=WATCHED)
 
 
-def taken(model):
+def body_for(model):
     """A small body that a model takes."""
     slab = small_scene(Tacton())
     return SMALL if takes(named(model), slab) else SHEET
@@ -182,7 +182,7 @@ def taken(model):
 @given(tactons, numbers(0.01, 100))
 def test_every_linear_model_is_linear_in_the_pressure(model, tacton, factor):
     model_options = {"h": 0.01, "dt": 1e-3 if tacton.duration > 2e-3 else None}
-    body = taken(model)
+    body = body_for(model)
     once = compute(
         small_scene(tacton, body, peak_pressure=10.0), model, tolerance=0.3, **model_options
     ).displacement

@@ -21,7 +21,7 @@ from meshes import middle_plane, sheet
 from simple_model import MovingPressure, Tacton, Trajectory
 from simple_model.quantities import QUANTITIES
 from skinwave.models import named
-from skinwave.models.limits import check_taken
+from skinwave.models.limits import check_takes
 from skinwave.models.meshed import probe_rows, surface_load
 from skinwave.models.sheet_probes import full_reader, modal_reader
 from skinwave.models.stretching import meshed_sheet, stretching_body
@@ -159,7 +159,7 @@ def test_a_scene_of_a_sheet_has_its_quantities_by_every_model_of_elements():
     assert (modal[1:] > 0).all()
     for model in ("flat-body", "plate-modes"):
         with pytest.raises(ValueError, match=model):
-            check_taken(named(model), bent)
+            check_takes(named(model), bent)
     with pytest.raises(ValueError, match="sheet"):
         shade(bent, None, np.zeros(1), np.zeros(1, int))
 

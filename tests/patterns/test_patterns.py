@@ -465,7 +465,7 @@ def test_conversions_that_cannot_be_are_refused_in_one_line(tmp_path, monkeypatc
         assert sorted(tmp_path.iterdir()) == before
 
 
-def test_a_rate_that_does_not_reach_the_modulation_is_noted():
+def test_a_rate_too_low_for_the_modulation_makes_a_note():
     scene = loads("[tacton]\nam_frequency_hz = 200\nduration_s = 0.5\n")
     (said,) = (n for n in write_pattern(scene, ".csv", Options(rate=250))[1] if "AM of" in n)
     assert "50 Hz" in said

@@ -16,7 +16,7 @@ from skinwave.planning.estimates import side_reflections
 from skinwave.planning.plan import plan
 from skinwave.planning.refinement import (
     SizeController,
-    compared_with,
+    comparison_size,
     mesh_error,
     refine,
 )
@@ -157,12 +157,12 @@ def test_a_quantity_that_converges_at_the_order_of_the_controller_is_extrapolate
     controller = SizeController(order=2.0, margin=1.0, safety=0.5, largest_factor=1.6)
     limit = np.array([[3.0, -2.0], [4.0, 1.0]])
 
-    def found(h):  # of which the change is the error itself
+    def value(h):  # of which the change is the error itself
         return limit * (1 + h**2)
 
-    fine, true = found(0.1), 0.1**2 / (1 + 0.1**2)
-    assert controller.error(found(0.15), fine, 1.5) == pytest.approx(true, rel=1e-12)
-    assert controller.error(found(0.05), fine, 0.5) == pytest.approx(true, rel=1e-12)
+    fine, true = value(0.1), 0.1**2 / (1 + 0.1**2)
+    assert controller.error(value(0.15), fine, 1.5) == pytest.approx(true, rel=1e-12)
+    assert controller.error(value(0.05), fine, 0.5) == pytest.approx(true, rel=1e-12)
     size = controller.size(0.1, 0.1**2, 0.08)
     assert size**2 == pytest.approx(0.04)  # half of what is asked for is left
     sizes = np.array([0.1, 0.08, 0.0625, 0.05])
@@ -172,7 +172,7 @@ def test_a_quantity_that_converges_at_the_order_of_the_controller_is_extrapolate
 
 def test_the_error_of_a_mesh_without_another_is_1_or_unknown():
     body = loads("[body]\nkind = 'slab'").body
-    quantities, sizes = (np.ones((3, 1)), np.full((3, 1), 1.1)), (compared_with(body, 5e-3), 5e-3)
+    quantities, sizes = (np.ones((3, 1)), np.full((3, 1), 1.1)), (comparison_size(body, 5e-3), 5e-3)
     assert 0.01 < mesh_error(body, sizes, quantities, same=False) < 0.5
     assert mesh_error(body, sizes, quantities, same=True) == 1.0
     of_file = replace(body, kind="mesh", file="hand.msh")

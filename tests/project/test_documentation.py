@@ -17,7 +17,7 @@ PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
 OTHERS = [page for page in PAGES if page.stem not in WRITTEN]
 
 
-def shown(language, pages=PAGES):
+def code_blocks(language, pages=PAGES):
     """Code blocks of a language, by page."""
     pattern = re.compile(rf"```{language}\n(.*?)```", re.DOTALL)
     found = {page: pattern.findall(page.read_text("utf-8")) for page in pages}
@@ -61,14 +61,14 @@ def test_pictures_of_the_gallery_are_of_scripts_that_there_are():
 
 
 def test_every_scene_that_the_documentation_shows_is_one():
-    for page, texts in shown("toml").items():
+    for page, texts in code_blocks("toml").items():
         for text in texts:
             scene = loads(text)
             assert loads(dumps(scene)) == scene, page
 
 
 def test_commands_are_understood():
-    for page, texts in shown("sh").items():
+    for page, texts in code_blocks("sh").items():
         for text in texts:
             lines = [line for line in text.splitlines() if line.startswith("skinwave ")]
             for line in lines:
@@ -78,10 +78,10 @@ def test_commands_are_understood():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", shown("python", OTHERS), ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", code_blocks("python", OTHERS), ids=lambda page: page.stem)
 def test_python_runs(page, monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
-    for text in shown("python", OTHERS)[page]:
+    for text in code_blocks("python", OTHERS)[page]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SkinwaveWarning)  # the point kernel has no propagation
             exec(compile(text, str(page), "exec"), {})

@@ -101,7 +101,7 @@ def test_modules_of_skinwave_are_in_rooms():
     assert folders == set(INNER)
 
 
-def test_processes_are_started_where_it_is_told():
+def test_two_modules_start_processes():
     """Programs by one function, Python functions by another; for the rest see the latter."""
     starts = r"subprocess\.(run|Popen|check_)|create_subprocess|get_context|os\.(fork|exec|sys)"
     places = (path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
@@ -131,7 +131,7 @@ def test_packages_and_commands_load_only_what_they_need():
     assert not loaded_by("import skinwave.studies.study") & (few | {"scipy.stats"})
 
 
-def test_public_names_are_found_even_after_their_modules():
+def test_public_names_are_importable_after_their_modules():
     code = (
         "import skinwave\n"
         "assert {*skinwave.__all__, '__version__'} <= {*dir(skinwave)}\n"

@@ -112,7 +112,7 @@ def test_views_agree_with_probes(scene, moved):
     view = views.body_view(scene, "skin-slab", moved, (0.01, 10))
     response = motion.probe_response(scene, moved)
     at_probe = maps.interpolation(view, scene.probe_points[2:3])
-    drawn = np.array([at_probe(np.asarray(frame, float))[0] for frame in view.pushed])
+    drawn = np.array([at_probe(np.asarray(frame, float))[0] for frame in view.inward])
     sampled = response.displacement[-100:, 2].reshape(10, 10)[:, 0]
     assert view.period == pytest.approx(0.01)
     assert np.ptp(drawn) > 1e-7
@@ -135,9 +135,9 @@ def test_the_kernel_is_strongest_on_the_path(seen):
     view = seen["point-kernel"]
     radius = view.scene.tacton.trajectory.size / 2
     step = np.ptp(view.places[:, 0]) / (views.KERNEL_GRID - 1)
-    brightest = view.places[view.pushed.std(axis=0).argmax()]
+    brightest = view.places[view.inward.std(axis=0).argmax()]
     assert abs(np.hypot(*brightest) - radius) < 1.5 * step
-    for t, frame in zip(view.times, np.abs(view.pushed), strict=True):
+    for t, frame in zip(view.times, np.abs(view.inward), strict=True):
         if frame.max() > 0.2 * view.peak:  # where the modulation is not at its zero
             focus = view.scene.tacton.trajectory.position(float(t))
             assert np.linalg.norm(view.places[frame.argmax()] - focus) < 1.5 * step
@@ -175,7 +175,7 @@ def test_the_number_of_frames_follows_from_the_fastest_line(scene, moved):
     assert len(view.times) == max(
         playback.FEWEST_FRAMES, round(playback.FRAMES_PER_PERIOD * fastest * view.period)
     )
-    amplitude = np.abs(np.fft.rfft(view.pushed, axis=0)).max(axis=1)
+    amplitude = np.abs(np.fft.rfft(view.inward, axis=0)).max(axis=1)
     strong = np.flatnonzero(amplitude > 0.1 * amplitude.max()) / view.period
     assert strong.max() <= 1.5 * fastest <= 1.5 * 800
 

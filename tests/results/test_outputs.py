@@ -40,7 +40,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def made(out, text="one", meanwhile=lambda: None, **options):
+def make(out, text="one", meanwhile=lambda: None, **options):
     """A folder as a command writes it, and what happens until it is finished."""
     with output_folder(out, **options) as place:
         meanwhile()
@@ -88,8 +88,8 @@ def test_what_skinwave_did_not_write_is_never_replaced(folder, capsys):
 
 @posix
 def test_a_file_that_the_user_added_or_changed_is_kept(folder):
-    out = made(folder / "out")
-    made(out / "report")
+    out = make(folder / "out")
+    make(out / "report")
     (out / ".DS_Store").write_text("of the system")
     assert foreign_file(out) is None
     for name in ("deeper/notes.txt", "index.html", "mine/record.json", "report/index.html"):
@@ -99,7 +99,7 @@ def test_a_file_that_the_user_added_or_changed_is_kept(folder):
         path.write_text("mine")
         assert foreign_file(out) == path
         with pytest.raises(ValueError, match=name):
-            made(out, overwrite=True)
+            make(out, overwrite=True)
         path.unlink() if kept is None else path.write_text(kept)
     (out / "index.html").rename("elsewhere")
     (out / "index.html").symlink_to("../elsewhere")
@@ -107,7 +107,7 @@ def test_a_file_that_the_user_added_or_changed_is_kept(folder):
 
 
 def test_inputs_are_never_replaced(folder, capsys, monkeypatch):
-    out = made(folder / "out")
+    out = make(folder / "out")
     (out / "none.toml").write_text(corpus.SILENT_GROUND)
     seal(out)
     asked = ["run", "out/none.toml", "--out", "out", "--overwrite", "--quiet"]
@@ -120,14 +120,14 @@ def test_inputs_are_never_replaced(folder, capsys, monkeypatch):
 
 def test_results_of_concurrent_commands_are_kept(folder):
     with pytest.raises(ValueError, match="partial-") as error:
-        made(folder / "out", "later", meanwhile=lambda: made(folder / "out", "first"))
+        make(folder / "out", "later", meanwhile=lambda: make(folder / "out", "first"))
     (later,) = folder.glob("out.partial-*")
     assert str(later) in str(error.value)
     assert (later / "index.html").read_text() == "later"
     assert (folder / "out/index.html").read_text() == "first"
     notes = folder / "out/notes.txt"
     with pytest.raises(ValueError, match=r"notes\.txt"):
-        made(folder / "out", "new", overwrite=True, meanwhile=lambda: notes.write_text("mine"))
+        make(folder / "out", "new", overwrite=True, meanwhile=lambda: notes.write_text("mine"))
     assert notes.read_text() == "mine"
     assert (folder / "out/index.html").read_text() == "first"
 
@@ -136,12 +136,12 @@ def test_an_error_keeps_the_earlier_result(folder):
     def interrupted():
         raise KeyboardInterrupt
 
-    made(folder / "out", "old")
+    make(folder / "out", "old")
     before = corpus.contents(folder)
     with pytest.raises(KeyboardInterrupt):  # without a finished run
-        made(folder / "out", overwrite=True, meanwhile=interrupted)
+        make(folder / "out", overwrite=True, meanwhile=interrupted)
     with pytest.raises(ZeroDivisionError):
-        made(folder / "out", overwrite=True, meanwhile=lambda: 1 / 0)
+        make(folder / "out", overwrite=True, meanwhile=lambda: 1 / 0)
     with pytest.raises(ZeroDivisionError), output_file(folder / "file.csv") as file:
         file.write(b"%d" % (1 / 0))
     assert corpus.contents(folder) == before
@@ -149,7 +149,7 @@ def test_an_error_keeps_the_earlier_result(folder):
 
 @posix
 def test_a_killed_process_leaves_the_earlier_result(folder):
-    made(folder / "out", "old")
+    make(folder / "out", "old")
     code = (
         "import os, sys, skinwave.results.record as record\n"
         "record.write = lambda *given, **options: os._exit(9)\n"

@@ -24,14 +24,14 @@ from skinwave.results.run import ASSESSED
 TIMES = np.arange(5) / 10_000
 
 
-def made(**changed):
+def make(**changed):
     parts = {"times": TIMES, "probes": np.zeros((2, 2)), "values": np.ones((5, 2))}
     return Response(model="made", **(parts | changed))
 
 
 def test_a_response_copies_its_arrays():
     mine = {"times": TIMES.copy(), "probes": np.zeros((2, 2)), "values": np.ones((5, 2))}
-    response = made(**mine)
+    response = make(**mine)
     for array in mine.values():
         array += 1.0  # neither frozen nor shared
     np.testing.assert_array_equal(response.times, TIMES)
@@ -50,7 +50,7 @@ def test_invalid_responses_are_refused():
         {"quantity": "mm"},
     ):
         with pytest.raises(ValueError, match="of a response|is unknown"):
-            made(**changed)
+            make(**changed)
 
 
 def test_windows_match_scipy():
@@ -69,7 +69,7 @@ def test_slow_imports_are_deferred():
 
 
 def test_lines_of_two_samples_are_refused():
-    two = made(times=TIMES[:2], values=np.ones((2, 2)))
+    two = make(times=TIMES[:2], values=np.ones((2, 2)))
     with pytest.raises(ValueError, match="2 samples"):
         phasors(two, (100.0,))
 

@@ -217,7 +217,7 @@ def test_stretching_of_the_first_mode_has_the_closed_form_of_chu_and_herrmann():
     assert cubic / plate.squared[0] * (THICKNESS / shape) ** 2 == pytest.approx(exact, rel=1e-6)
 
 
-def test_the_first_mode_vibrates_faster_with_amplitude_as_chu_and_herrmann_found():
+def test_the_first_mode_vibrates_faster_with_amplitude_as_in_chu_and_herrmann():
     """To leading order w^2 = w_1^2 (1 + 3/4 e (A / h)^2), whatever other modes do."""
     nu, plate = 0.3, reduced(framed("simply"), 8, "sliding")
     amplitude, first = 0.15, np.sqrt(plate.squared[0])

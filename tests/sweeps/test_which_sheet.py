@@ -11,7 +11,7 @@ import which_sheet
 from which_sheet import fill, hypercube, information, nearest, share
 
 
-def made(candidate):
+def row_of(candidate):
     """A row in which the drive law decides M1 and the loss the level of the strongest rival."""
     level = 1000 * candidate["loss_factor"] - 30
     values = {"M1": -40.0, "M2": 0.0, "M3": -30.0, "M4": level, "M5": level - 1}
@@ -34,7 +34,7 @@ def test_only_devices_that_clip_or_compress_have_a_third_harmonic():
 
 def test_a_table_goes_on_and_refuses_other_candidates(tmp_path, monkeypatch):
     computed = []
-    monkeypatch.setattr(which_sheet, "assess", lambda each: computed.append(each) or made(each))
+    monkeypatch.setattr(which_sheet, "assess", lambda each: computed.append(each) or row_of(each))
     candidates = hypercube(6)
     first = fill(tmp_path / "table.csv", candidates[:4])
     rows = fill(tmp_path / "table.csv", candidates)
@@ -45,8 +45,8 @@ def test_a_table_goes_on_and_refuses_other_candidates(tmp_path, monkeypatch):
         fill(tmp_path / "table.csv", hypercube(6, seed=1))
 
 
-def test_the_parameter_that_decides_and_the_nearest_plausible_sheets_are_found():
-    rows = [made(each) for each in hypercube(400)]
+def test_the_deciding_parameter_and_the_nearest_plausible_sheets():
+    rows = [row_of(each) for each in hypercube(400)]
     m1, m4 = (which_sheet.holds(rows, claim) for claim in ("M1", "M4"))
     assert next(iter(information(rows, m1).items())) == ("drive", pytest.approx(1.0, abs=0.03))
     assert next(iter(information(rows, m4))) == "loss_factor"
